@@ -1,0 +1,58 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "core/specification.h"
+
+namespace stellate::core {
+
+enum class QueryKind {
+  kClosestPoint,   // a point of M nearest to x
+  kIntersectFlat,  // the point of M nearest to c in the flat c + T^perp, within a radius
+};
+
+// Queries of one kind. Column j is query j. Memory order is the wire's: points are n x d and bases
+// n x d x k in C order, so conversion is a copy.
+struct QueryBlock {
+  QueryKind kind = QueryKind::kClosestPoint;
+  Eigen::MatrixXd points;  // d x n: x, or the flat's point c
+  Eigen::MatrixXd bases;   // (d k) x n, kIntersectFlat only: entry i*k + a of a column is
+                           // coordinate i of tangent vector a; orthonormal
+  Eigen::VectorXd radii;   // n, kIntersectFlat only: look no farther than this from c
+  bool want_tangents = false;  // the answers must carry tangent bases
+
+  Eigen::Index size() const { return points.cols(); }
+};
+
+// The queries of one round: all independent, all to be answered together.
+struct QueryBatch {
+  std::uint64_t round = 0;  // 1, 2, ...: one round trip each
+  std::vector<QueryBlock> blocks;
+
+  Eigen::Index size() const {
+    Eigen::Index n = 0;
+    for (const QueryBlock& b : blocks) n += b.size();
+    return n;
+  }
+};
+
+struct AnswerBlock {
+  Eigen::MatrixXd points;           // d x n; ignored where not found
+  std::vector<std::uint8_t> found;  // n, 1 or 0; empty: all found
+  Eigen::MatrixXd tangents;         // (d k) x n laid out as QueryBlock::bases, or empty
+};
+
+struct Answers {
+  std::vector<AnswerBlock> blocks;  // one for each block of the batch, in its order
+};
+
+// Checks the answers to queries [first, first + answer.points.cols()) of `block` against what can
+// be checked without asking again: counts, finiteness, on the flat, within the radius, orthonormal
+// tangents. The message holds the query's index in the block, the value and the rule broken.
+// Pure; any thread. Cost O(n d k^2).
+Status CheckAnswers(const Specification& spec, const QueryBlock& block, Eigen::Index first,
+                    const AnswerBlock& answer);
+
+}  // namespace stellate::core

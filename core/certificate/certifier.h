@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/batch.h"
+#include "core/report.h"
+#include "core/specification.h"
+
+namespace stellate::core {
+
+// A finished mesh as the certifier sees it: the complex and the sample, nothing of how they came
+// about. Borrowed; must outlive the Certifier.
+struct MeshView {
+  int k = 0, d = 0;
+  std::uint64_t vertices = 0;
+  const double* points = nullptr;    // vertices x d, C order
+  const double* tangents = nullptr;  // vertices x d x k, C order, orthonormal columns
+  const std::vector<std::uint32_t>* simplices = nullptr;  // k+1 ascending vertex ids each
+};
+
+// What only the stars know.
+struct StarFacts {
+  std::uint64_t inconsistent_simplices = 0;
+  double max_circumradius = 0;  // max R_p(sigma)
+  bool converged = false;       // no rule applies any more
+};
+
+// Proves or refutes that a finished mesh is what was asked for. A state machine like Mesher: it
+// asks for closest points in a few batches, then holds the certificate.
+class Certifier {
+ public:
+  Certifier(const Specification& spec, const MeshView& mesh, const StarFacts& facts);
+  ~Certifier();
+
+  // The next closest-point queries, or nullptr when the certificate is complete.
+  const std::vector<QueryBlock>* NextBlocks();
+  // Answers have passed CheckAnswers.
+  void Absorb(const std::vector<AnswerBlock>& answers);
+  const Certificate& certificate() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace stellate::core

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/batch.h"
+#include "core/report.h"
+#include "core/specification.h"
+
+namespace stellate::core {
+
+// The epsilon-refinement of Chapter 5 as a state machine that asks.
+//
+// It never calls an oracle. It hands out the queries of one round and takes their answers:
+//
+//   auto mesher = Mesher::Create(spec);
+//   while (const QueryBatch* batch = (*mesher)->NextBatch()) {
+//     auto delta = (*mesher)->Absorb(answers_of(*batch));
+//   }
+//   const Report& report = (*mesher)->report();
+//
+// Deterministic: the specification and the answers determine the mesh bit for bit, whatever
+// Specification::threads. One thread at a time may use a Mesher; nothing here blocks, logs or
+// reads a clock.
+class Mesher {
+ public:
+  // Errors: those of Validate(spec).
+  static Expected<std::unique_ptr<Mesher>> Create(Specification spec);
+  virtual ~Mesher() = default;
+
+  // The queries of the next round, or nullptr when the run is over. The batch stays the same, and
+  // the pointer valid, until Absorb, Cancel or Fail.
+  virtual const QueryBatch* NextBatch() = 0;
+
+  // Takes the answers to the current batch and refines. On error (CheckAnswers, idempotence,
+  // kFailedPrecondition without a current batch) nothing has changed: the same batch may be
+  // answered again, or Fail called.
+  virtual Expected<MeshDelta> Absorb(const Answers& answers) = 0;
+
+  // End the run now, with the mesh as it stands. No effect once it is over.
+  virtual void Cancel() = 0;
+  virtual void Fail(Status reason) = 0;
+
+  virtual const Specification& specification() const = 0;
+  virtual const Progress& progress() const = 0;
+  virtual const Report& report() const = 0;  // complete once NextBatch returned nullptr
+
+  // The mesh as it stands: points d x n, tangent bases (d k) x n laid out as QueryBlock::bases,
+  // simplices of k+1 ascending vertex ids each, in the order of their lowest vertex.
+  virtual Eigen::MatrixXd Points() const = 0;
+  virtual Eigen::MatrixXd Tangents() const = 0;
+  virtual std::vector<std::uint32_t> Simplices() const = 0;
+};
+
+}  // namespace stellate::core

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+
+#include "core/status.h"
+
+namespace stellate::core {
+
+inline constexpr int kMaxDimension = 5;            // largest k this build carries a template for
+inline constexpr int kMaxAmbientDimension = 4096;  // largest d; servers may set less
+
+// What the client's oracle can do beyond closest_point, which it must have (Sec. 5.3.1).
+struct OracleCapabilities {
+  bool intersect_flat = false;  // answers "the point of M nearest c in c + T^perp"
+  bool tangent_basis = false;   // sends an orthonormal tangent basis with every point of M
+};
+
+// Axis-aligned box, ambient coordinates, lower < upper in each.
+struct BoundingBox {
+  Eigen::VectorXd lower, upper;  // d each
+};
+
+// The constants of Chapter 5. The proofs' values are far too small to use; the defaults here are
+// the measured ones. nullopt means "the default for this k".
+struct Criteria {
+  double radius_edge_bound = 2.0;            // rho0 of rule R2, no unit, > 1
+  std::optional<double> sliver_bound;        // Theta0 of rule R3, no unit, in [0, 0.3]; 0 turns R3
+                                             // off. Default 0 for k <= 2, 0.2 for k >= 3
+  double picking_radius = 0.4;               // delta: the picking region is B(c_p, delta R_p); in
+                                             // (0, 1)
+  double small_sliver_radius = 2.0;          // beta: only simplices of circumradius <= beta R_p
+                                             // count against a candidate; >= 1
+  std::optional<int> candidates;             // points tried in a picking region, 1..100. Default 1
+                                             // for k <= 2, 10 for k >= 3
+  std::optional<double> advance_step;        // h, length: how far the front steps over unknown
+                                             // ground. Default 3 epsilon
+  int flat_alternations = 1;                 // without intersect_flat: closest points taken when
+                                             // alternating towards a flat, 1..20
+};
+
+struct Limits {
+  std::uint64_t max_vertices = 10'000'000;
+  std::uint64_t max_rounds = 100'000;  // batches of queries
+};
+
+// All that determines a mesh, together with the answers.
+struct Specification {
+  int dimension = 0;          // k
+  int ambient_dimension = 0;  // d, k < d
+  double epsilon = 0;         // rule R1: every R_p(sigma) <= epsilon; a length, > 0
+  OracleCapabilities oracle;
+  std::optional<BoundingBox> bounding_box;  // seeds are drawn from it when none are given
+  Eigen::MatrixXd seeds;                    // d x m, near M, may be empty
+  int box_seeds = 0;                        // points drawn from the box, 1..100000; 0: 100
+  std::uint64_t random_seed = 1;            // of everything random
+  Criteria criteria;
+  Limits limits;
+  int threads = 0;  // 0: all cores. Never changes the mesh.
+};
+
+// kInvalidArgument or kLimitExceeded with the offending field and value, else Ok.
+Status Validate(const Specification& spec);
+
+}  // namespace stellate::core

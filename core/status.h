@@ -1,0 +1,45 @@
+#pragma once
+
+#include <string>
+#include <tl/expected.hpp>
+#include <utility>
+
+namespace stellate::core {
+
+// Why the core refuses something. One table in server/ maps these to gRPC codes.
+enum class StatusCode {
+  kOk = 0,
+  kInvalidArgument,      // a specification that makes no sense: fix it, then try again
+  kLimitExceeded,        // a specification beyond what this build can do (k too large)
+  kNoSeeds,              // no seed has a closest point on the manifold
+  kOracleShape,          // answers of the wrong count or size
+  kOracleNotFinite,      // NaN or infinity in an answer
+  kOracleOffFlat,        // an intersection that is not in the flat asked for
+  kOracleOutsideRadius,  // an intersection farther than the radius asked for
+  kOracleBadTangent,     // a tangent basis that is not orthonormal
+  kOracleNotIdempotent,  // closest_point moves a point that it returned itself
+  kOracleFailed,         // the oracle reported a failure of its own, or vanished
+  kFailedPrecondition,   // a call out of order
+};
+
+// A refusal: the code for programs, the message for people. The message names the offending
+// value, where it was found, the rule that it broke and what to do.
+struct Status {
+  StatusCode code = StatusCode::kOk;
+  std::string message;
+
+  bool ok() const { return code == StatusCode::kOk; }
+  static Status Ok() { return {}; }
+};
+
+// Stable upper-case name of a code, e.g. "ORACLE_NOT_FINITE". Programs may compare it.
+const char* StatusCodeName(StatusCode code);
+
+template <typename T>
+using Expected = tl::expected<T, Status>;
+
+inline tl::unexpected<Status> Refuse(StatusCode code, std::string message) {
+  return tl::unexpected<Status>(Status{code, std::move(message)});
+}
+
+}  // namespace stellate::core
