@@ -48,6 +48,22 @@ struct Answers {
   std::vector<AnswerBlock> blocks;  // one for each block of the batch, in its order
 };
 
+// What CheckAnswers forgives. A client solves equations, so its answers are right to some solver
+// tolerance and no better; each bound is far above a careful solver's error and far below what
+// could change a mesh. All scale with the query, so that units do not matter.
+
+// How far an intersection y may lie off its flat, |T^t (y - c)|, as a share of the radius asked.
+inline constexpr double kFlatTolerance = 1e-6;
+// How far beyond the radius it may lie, as a share of the radius: a client may stop its search at
+// the radius and polish the point afterwards.
+inline constexpr double kRadiusTolerance = 1e-6;
+// Largest |T^t T - I| entry. Admits bases computed in single precision. The mesher itself
+// tolerates directions wrong by 0.03, so this asks for orthonormality, not for accuracy.
+inline constexpr double kOrthonormalTolerance = 1e-6;
+// Added to the first two, as a share of the largest coordinate involved: what rounding alone does
+// to a point far from the origin.
+inline constexpr double kRoundingTolerance = 1e-13;
+
 // Checks the answers to queries [first, first + answer.points.cols()) of `block` against what can
 // be checked without asking again: counts, finiteness, on the flat, within the radius, orthonormal
 // tangents. The message holds the query's index in the block, the value and the rule broken.

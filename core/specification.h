@@ -11,6 +11,16 @@ namespace stellate::core {
 inline constexpr int kMaxDimension = 5;            // largest k this build carries a template for
 inline constexpr int kMaxAmbientDimension = 4096;  // largest d; servers may set less
 
+// Lengths and coordinates beyond these would overflow or vanish when raised to the powers that
+// volumes need; every real unit is far inside.
+inline constexpr double kMinLength = 1e-45;
+inline constexpr double kMaxLength = 1e45;
+
+inline constexpr double kMaxSliverBound = 0.3;   // refinement does not terminate above
+inline constexpr int kMaxCandidates = 100;
+inline constexpr int kMaxFlatAlternations = 20;
+inline constexpr int kMaxBoxSeeds = 100'000;
+
 // What the client's oracle can do beyond closest_point, which it must have (Sec. 5.3.1).
 struct OracleCapabilities {
   bool intersect_flat = false;  // answers "the point of M nearest c in c + T^perp"

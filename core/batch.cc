@@ -1,0 +1,160 @@
+#include "core/batch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "core/message.h"
+
+namespace stellate::core {
+namespace {
+
+using Eigen::Index;
+
+const char* KindName(QueryKind kind) {
+  return kind == QueryKind::kClosestPoint ? "closest_point" : "intersect_flat";
+}
+
+// "closest_point query 17", the start of each message.
+std::string Where(const QueryBlock& block, Index query) {
+  return Message(KindName(block.kind), " query ", query);
+}
+
+Status CheckShape(const Specification& spec, const QueryBlock& block, Index first,
+                  const AnswerBlock& answer) {
+  const Index d = spec.ambient_dimension;
+  const Index n = answer.points.cols();
+  const auto refuse = [&](const auto&... parts) {
+    return Status{StatusCode::kOracleShape, Message(KindName(block.kind), " answers: ", parts...)};
+  };
+  if (answer.points.rows() != d && n > 0) {
+    return refuse("points have ", answer.points.rows(), " coordinates but the ambient dimension ",
+                  "is ", d, ": send n x d numbers");
+  }
+  if (first < 0 || n > block.size() - first) {
+    return refuse(n, " points from query ", first, " on but the block holds ", block.size(),
+                  " queries: send one point for each query");
+  }
+  if (!answer.found.empty() && static_cast<Index>(answer.found.size()) != n) {
+    return refuse("found has ", answer.found.size(), " flags for ", n,
+                  " points: send one for each, or none when all were found");
+  }
+  const Index basis_size = d * spec.dimension;
+  if (answer.tangents.size() == 0) {
+    const bool any_found =
+        n > 0 && (answer.found.empty() ||
+                  std::any_of(answer.found.begin(), answer.found.end(), [](auto f) { return f; }));
+    if (block.want_tangents && any_found) {
+      return refuse("no tangent bases came but the query wants them: send n x d x k numbers, or "
+                    "declare that the oracle has no tangent_basis");
+    }
+    return Status::Ok();
+  }
+  if (answer.tangents.rows() != basis_size || answer.tangents.cols() != n) {
+    return refuse("tangents hold ", answer.tangents.size(), " numbers but ", n,
+                  " bases of d x k = ", d, " x ", spec.dimension, " need ", n * basis_size,
+                  ": send n x d x k numbers");
+  }
+  return Status::Ok();
+}
+
+// A value whose square still is finite.
+bool IsUsable(double value) { return std::abs(value) <= kMaxLength; }
+
+Status CheckFinite(const QueryBlock& block, Index query, const char* what, const double* values,
+                   Index count) {
+  for (Index i = 0; i < count; ++i) {
+    if (!IsUsable(values[i])) {
+      return {StatusCode::kOracleNotFinite,
+              Message(Where(block, query), ": the answer's ", what, " is ", values[i],
+                      " in coordinate ", i, " but must be finite and at most ", kMaxLength,
+                      " in size: answer \"not found\" when there is no point")};
+    }
+  }
+  return Status::Ok();
+}
+
+Status CheckIntersection(const Specification& spec, const QueryBlock& block, Index query,
+                         const Eigen::VectorXd& y) {
+  const Index k = spec.dimension;
+  const Index d = spec.ambient_dimension;
+  const auto c = block.points.col(query);
+  const Eigen::VectorXd offset = y - c;
+  const double distance = offset.norm();
+  const double rounding =
+      kRoundingTolerance * std::max(y.lpNorm<Eigen::Infinity>(), c.lpNorm<Eigen::Infinity>());
+  // An unbounded search has no scale but its own result.
+  const double radius = block.radii[query];
+  const double scale = std::isfinite(radius) ? radius : distance;
+
+  const double* basis = block.bases.col(query).data();
+  double off_flat_squared = 0;
+  for (Index a = 0; a < k; ++a) {
+    double component = 0;
+    for (Index i = 0; i < d; ++i) component += basis[i * k + a] * offset[i];
+    off_flat_squared += component * component;
+  }
+  const double off_flat = std::sqrt(off_flat_squared);
+  const double off_flat_bound = kFlatTolerance * scale + rounding;
+  if (off_flat > off_flat_bound) {
+    return {StatusCode::kOracleOffFlat,
+            Message(Where(block, query), ": the answer lies ", off_flat,
+                    " off the flat c + T^perp, more than the ", off_flat_bound,
+                    " allowed for a search radius of ", radius,
+                    ": solve to a tighter tolerance, or answer \"not found\"")};
+  }
+  const double radius_bound = radius * (1 + kRadiusTolerance) + rounding;
+  if (distance > radius_bound) {
+    return {StatusCode::kOracleOutsideRadius,
+            Message(Where(block, query), ": the answer lies ", distance, " from c, beyond the ",
+                    "search radius ", radius, ": answer \"not found\" when the nearest ",
+                    "intersection is farther")};
+  }
+  return Status::Ok();
+}
+
+Status CheckTangent(const Specification& spec, const QueryBlock& block, Index query,
+                    const double* basis) {
+  const Index k = spec.dimension;
+  const Index d = spec.ambient_dimension;
+  for (Index a = 0; a < k; ++a) {
+    for (Index b = a; b < k; ++b) {
+      double dot = 0;
+      for (Index i = 0; i < d; ++i) dot += basis[i * k + a] * basis[i * k + b];
+      const double error = std::abs(dot - (a == b ? 1 : 0));
+      if (!(error <= kOrthonormalTolerance)) {
+        return {StatusCode::kOracleBadTangent,
+                Message(Where(block, query), ": the tangent basis is not orthonormal: vectors ", a,
+                        " and ", b, " have the inner product ", dot, ", off by ", error,
+                        " where ", kOrthonormalTolerance,
+                        " is allowed: orthonormalise it, columns being tangent vectors")};
+      }
+    }
+  }
+  return Status::Ok();
+}
+
+}  // namespace
+
+Status CheckAnswers(const Specification& spec, const QueryBlock& block, Eigen::Index first,
+                    const AnswerBlock& answer) {
+  Status status = CheckShape(spec, block, first, answer);
+  if (!status.ok()) return status;
+  for (Index j = 0; j < answer.points.cols(); ++j) {
+    if (!answer.found.empty() && answer.found[j] == 0) continue;
+    const Index query = first + j;
+    status = CheckFinite(block, query, "point", answer.points.col(j).data(), answer.points.rows());
+    if (status.ok() && block.kind == QueryKind::kIntersectFlat) {
+      status = CheckIntersection(spec, block, query, answer.points.col(j));
+    }
+    if (status.ok() && answer.tangents.size() > 0) {
+      const double* basis = answer.tangents.col(j).data();
+      status = CheckFinite(block, query, "tangent basis", basis, answer.tangents.rows());
+      if (status.ok()) status = CheckTangent(spec, block, query, basis);
+    }
+    if (!status.ok()) return status;
+  }
+  return Status::Ok();
+}
+
+}  // namespace stellate::core

@@ -1,0 +1,177 @@
+#include "core/specification.h"
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "core/message.h"
+
+namespace stellate::core {
+namespace {
+
+Status Invalid(std::string message) {
+  return {StatusCode::kInvalidArgument, std::move(message)};
+}
+
+Status TooLarge(std::string message) { return {StatusCode::kLimitExceeded, std::move(message)}; }
+
+// False for NaN too.
+bool IsLength(double value) { return value >= kMinLength && value <= kMaxLength; }
+bool IsCoordinate(double value) { return std::abs(value) <= kMaxLength; }
+
+std::string LengthRule() { return Message("a length between ", kMinLength, " and ", kMaxLength); }
+
+Status CheckDimensions(const Specification& spec) {
+  const int k = spec.dimension;
+  const int d = spec.ambient_dimension;
+  if (k < 1) {
+    return Invalid(Message("dimension (k) is ", k,
+                           " but must be at least 1: set it to the dimension of the manifold"));
+  }
+  if (k > kMaxDimension) {
+    return TooLarge(Message("dimension (k) is ", k, " but this build meshes manifolds of ",
+                            "dimension up to ", kMaxDimension, ": mesh a manifold of lower dimension"));
+  }
+  if (d > kMaxAmbientDimension) {
+    return TooLarge(Message("ambient_dimension (d) is ", d, " but may be at most ",
+                            kMaxAmbientDimension,
+                            ": map the manifold into a space of lower dimension first"));
+  }
+  if (k >= d) {
+    return Invalid(Message("dimension (k) is ", k, " and ambient_dimension (d) is ", d,
+                           " but k must be less than d: a closed manifold of dimension k needs "
+                           "at least k + 1 coordinates"));
+  }
+  return Status::Ok();
+}
+
+Status CheckEpsilon(double epsilon) {
+  if (IsLength(epsilon)) return Status::Ok();
+  return Invalid(Message("epsilon is ", epsilon, " but must be ", LengthRule(),
+                         ": give the largest circumradius that a simplex may have, in the unit of "
+                         "the coordinates"));
+}
+
+Status CheckBox(const BoundingBox& box, int d) {
+  for (const auto* side : {&box.lower, &box.upper}) {
+    const char* name = side == &box.lower ? "bounding_box.lower" : "bounding_box.upper";
+    if (side->size() != d) {
+      return Invalid(Message(name, " has ", side->size(), " coordinates but ambient_dimension is ",
+                             d, ": give one coordinate for each ambient axis"));
+    }
+    for (int i = 0; i < d; ++i) {
+      if (!IsCoordinate((*side)[i])) {
+        return Invalid(Message(name, " is ", (*side)[i], " in coordinate ", i,
+                               " but must be finite and at most ", kMaxLength,
+                               " in size: give a box that encloses the manifold"));
+      }
+    }
+  }
+  for (int i = 0; i < d; ++i) {
+    if (!(box.lower[i] < box.upper[i])) {
+      return Invalid(Message("bounding_box is empty in coordinate ", i, ": lower is ", box.lower[i],
+                             " and upper is ", box.upper[i],
+                             " but lower must be less than upper; swap or widen them"));
+    }
+  }
+  return Status::Ok();
+}
+
+Status CheckSeeds(const Specification& spec) {
+  const Eigen::MatrixXd& seeds = spec.seeds;
+  if (seeds.cols() == 0 && !spec.bounding_box) {
+    return Invalid(
+        "neither seeds nor bounding_box is given: give points near the manifold, or a box that "
+        "encloses it");
+  }
+  if (seeds.cols() > 0 && seeds.rows() != spec.ambient_dimension) {
+    return Invalid(Message("seeds have ", seeds.rows(), " coordinates each but ambient_dimension ",
+                           "is ", spec.ambient_dimension, ": give points of the ambient space"));
+  }
+  for (Eigen::Index j = 0; j < seeds.cols(); ++j) {
+    for (Eigen::Index i = 0; i < seeds.rows(); ++i) {
+      if (!IsCoordinate(seeds(i, j))) {
+        return Invalid(Message("seeds is ", seeds(i, j), " in coordinate ", i, " of seed ", j,
+                               " but must be finite and at most ", kMaxLength,
+                               " in size: remove or correct that seed"));
+      }
+    }
+  }
+  if (spec.box_seeds < 0 || spec.box_seeds > kMaxBoxSeeds) {
+    return Invalid(Message("box_seeds is ", spec.box_seeds, " but must be between 0 and ",
+                           kMaxBoxSeeds, "; 0 asks for the default"));
+  }
+  return Status::Ok();
+}
+
+Status CheckCriteria(const Criteria& c) {
+  if (!(c.radius_edge_bound > 1 && c.radius_edge_bound <= kMaxLength)) {
+    return Invalid(Message("criteria.radius_edge_bound (rho0) is ", c.radius_edge_bound,
+                           " but must be finite and greater than 1: 2 is the default"));
+  }
+  if (c.sliver_bound && !(*c.sliver_bound >= 0 && *c.sliver_bound <= kMaxSliverBound)) {
+    return Invalid(Message("criteria.sliver_bound (Theta0) is ", *c.sliver_bound,
+                           " but must be between 0 and ", kMaxSliverBound,
+                           ": refinement never ends above; 0 turns the rule off"));
+  }
+  if (!(c.picking_radius > 0 && c.picking_radius < 1)) {
+    return Invalid(Message("criteria.picking_radius (delta) is ", c.picking_radius,
+                           " but must lie strictly between 0 and 1: 0.4 is the default"));
+  }
+  if (!(c.small_sliver_radius >= 1 && c.small_sliver_radius <= kMaxLength)) {
+    return Invalid(Message("criteria.small_sliver_radius (beta) is ", c.small_sliver_radius,
+                           " but must be finite and at least 1: 2 is the default"));
+  }
+  if (c.candidates && (*c.candidates < 1 || *c.candidates > kMaxCandidates)) {
+    return Invalid(Message("criteria.candidates is ", *c.candidates, " but must be between 1 and ",
+                           kMaxCandidates, ": leave it unset for the default of this dimension"));
+  }
+  if (c.advance_step && !IsLength(*c.advance_step)) {
+    return Invalid(Message("criteria.advance_step (h) is ", *c.advance_step, " but must be ",
+                           LengthRule(), ": leave it unset for 3 epsilon"));
+  }
+  if (c.flat_alternations < 1 || c.flat_alternations > kMaxFlatAlternations) {
+    return Invalid(Message("criteria.flat_alternations is ", c.flat_alternations,
+                           " but must be between 1 and ", kMaxFlatAlternations,
+                           ": 1 is the default"));
+  }
+  return Status::Ok();
+}
+
+Status CheckLimits(const Specification& spec) {
+  const Limits& limits = spec.limits;
+  if (limits.max_vertices < 1) {
+    return Invalid(
+        "limits.max_vertices is 0 but must be at least 1: give the largest mesh that you want");
+  }
+  if (limits.max_vertices > std::numeric_limits<std::uint32_t>::max()) {
+    return TooLarge(Message("limits.max_vertices is ", limits.max_vertices, " but may be at most ",
+                            std::numeric_limits<std::uint32_t>::max(),
+                            ": vertex ids have 32 bits"));
+  }
+  if (limits.max_rounds < 1) {
+    return Invalid(
+        "limits.max_rounds is 0 but must be at least 1: a round is one batch of queries");
+  }
+  if (spec.threads < 0) {
+    return Invalid(Message("threads is ", spec.threads,
+                           " but must not be negative: 0 takes all cores"));
+  }
+  return Status::Ok();
+}
+
+}  // namespace
+
+Status Validate(const Specification& spec) {
+  Status status = CheckDimensions(spec);
+  if (status.ok()) status = CheckEpsilon(spec.epsilon);
+  if (status.ok() && spec.bounding_box) {
+    status = CheckBox(*spec.bounding_box, spec.ambient_dimension);
+  }
+  if (status.ok()) status = CheckSeeds(spec);
+  if (status.ok()) status = CheckCriteria(spec.criteria);
+  if (status.ok()) status = CheckLimits(spec);
+  return status;
+}
+
+}  // namespace stellate::core
