@@ -1,0 +1,81 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "shapes/shapes.h"
+
+namespace stellate::shapes {
+namespace {
+
+constexpr int kMaxIterations = 100;
+
+// The closest point to x is y_i = a_i^2 x_i / (a_i^2 + t), with t the largest root of
+// g(t) = sum (a_i x_i / (a_i^2 + t))^2 - 1. Right of the pole at -min a_i^2, g is convex and falls,
+// so Newton's method from a point with g >= 0 climbs to the root without overshooting.
+class EllipsoidShape final : public PointwiseOracle {
+ public:
+  explicit EllipsoidShape(const std::vector<double>& axes)
+      : PointwiseOracle(static_cast<int>(axes.size()) - 1, static_cast<int>(axes.size())),
+        axes_(Eigen::Map<const Eigen::ArrayXd>(axes.data(),
+                                               static_cast<Eigen::Index>(axes.size()))) {
+    axes_.minCoeff(&shortest_);
+  }
+  std::optional<BoundingBox> bounding_box() const override {
+    return BoundingBox{-1.1 * axes_.matrix(), 1.1 * axes_.matrix()};
+  }
+
+  bool Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const override {
+    if (!x.allFinite()) return false;
+    const Eigen::ArrayXd squares = axes_.square();
+    const Eigen::ArrayXd ax = axes_ * x.array().abs();
+    const double pole = -squares[shortest_];
+    // Where one term alone is 1 the sum is at least 1.
+    double t = std::max((ax - squares).maxCoeff(), pole);
+    if (t <= pole) {
+      // x has no component along the shortest axes. Near the centre the closest point leaves that
+      // subspace: two choices by symmetry, and t sits on the pole.
+      y = (squares > -pole).select(squares * x.array() / (squares + pole).max(kTiny), 0.0);
+      const double rest = 1 - (y.array() / axes_).square().sum();
+      if (rest >= 0) {
+        y[shortest_] = axes_[shortest_] * std::sqrt(rest);
+        return true;
+      }
+      t = pole + kTiny;
+    }
+    for (int i = 0; i < kMaxIterations; ++i) {
+      const Eigen::ArrayXd terms = (ax / (squares + t)).square();
+      const double step = (terms.sum() - 1) / (2 * (terms / (squares + t)).sum());
+      const double next = t + step;
+      if (!(next > t)) {
+        // Rounding: a last step to the left is as good as any, but never across the pole.
+        if (next > pole) t = next;
+        break;
+      }
+      t = next;
+    }
+    y = squares * x.array() / (squares + t);
+    // One Newton step along the normal takes off what rounding in t left of F(y) = 0.
+    const Eigen::ArrayXd gradient = y.array() / squares;
+    const double value = (y.array() / axes_).square().sum() - 1;
+    y.array() -= value / (2 * gradient.square().sum()) * gradient;
+    return y.allFinite();
+  }
+
+  void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const override {
+    ComplementOf((y.array() / axes_.square()).matrix().normalized(), tangent);
+  }
+
+ private:
+  static constexpr double kTiny = std::numeric_limits<double>::min();
+  Eigen::ArrayXd axes_;
+  Eigen::Index shortest_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<PointwiseOracle> Ellipsoid(std::vector<double> axes) {
+  return std::make_unique<EllipsoidShape>(axes);
+}
+
+}  // namespace stellate::shapes

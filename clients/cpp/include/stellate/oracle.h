@@ -1,0 +1,65 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+namespace stellate {
+
+// Axis-aligned box of R^d, lower < upper in each coordinate.
+struct BoundingBox {
+  Eigen::VectorXd lower, upper;  // d each
+};
+
+// The answers to a batch of n queries, column j to query j.
+struct Answer {
+  Eigen::MatrixXd points;           // d x n; ignored where not found
+  std::vector<std::uint8_t> found;  // n, 1 or 0; empty: all found
+  Eigen::MatrixXd tangents;         // (d k) x n laid out as a basis (see Oracle), or empty
+
+  bool IsFound(Eigen::Index j) const { return found.empty() || found[static_cast<size_t>(j)] != 0; }
+};
+
+// A compact smooth k-submanifold M of R^d without boundary, known by what it answers. Derive from
+// this to mesh a manifold of your own: dimension, ambient_dimension, ClosestPoint, and one of
+// bounding_box and seeds are all it takes. PointwiseOracle and ImplicitOracle do more of the work.
+//
+// A basis of k vectors of R^d travels as a column of d k numbers: entry i*k + a is coordinate i of
+// vector a. Whole batches come in, one query a column.
+//
+// With several workers the methods are called from several threads at once. What they throw ends
+// the run and reaches the caller of MeshManifold as it is.
+class Oracle {
+ public:
+  virtual ~Oracle() = default;
+
+  virtual int dimension() const = 0;          // k
+  virtual int ambient_dimension() const = 0;  // d > k
+
+  // A point of M nearest to each column of x (d x n).
+  virtual Answer ClosestPoint(const Eigen::MatrixXd& x) = 0;
+
+  // The point of M nearest to each centre c in the (d-k)-flat c + T^perp, no farther than its
+  // radius from c. Called only when has_intersect_flat.
+  //   centers d x n    bases (d k) x n, the orthonormal T of each flat    radii n
+  virtual bool has_intersect_flat() const { return false; }
+  virtual Answer IntersectFlat(const Eigen::MatrixXd& /*centers*/, const Eigen::MatrixXd& /*bases*/,
+                               const Eigen::VectorXd& /*radii*/) {
+    throw std::logic_error("this oracle does not intersect flats");
+  }
+
+  // Orthonormal tangent bases, (d k) x n, at points of M (d x n). Called only when
+  // has_tangent_basis and the answer did not bring its own; without, the server finds them.
+  virtual bool has_tangent_basis() const { return false; }
+  virtual Eigen::MatrixXd TangentBasis(const Eigen::MatrixXd& /*points*/) {
+    throw std::logic_error("this oracle has no tangent bases");
+  }
+
+  // Where to look for M: a box, or points near M, one at least on each component that is wanted.
+  virtual std::optional<BoundingBox> bounding_box() const { return std::nullopt; }
+  virtual Eigen::MatrixXd seeds() const { return {}; }  // d x m
+};
+
+}  // namespace stellate

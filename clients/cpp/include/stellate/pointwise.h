@@ -1,0 +1,51 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "stellate/oracle.h"
+
+namespace stellate {
+
+// An oracle written one point at a time: say where the closest point is and what the tangent
+// space there is, and batches and flat intersections follow.
+//
+// Project and Tangent must be safe to call from several threads.
+class PointwiseOracle : public Oracle {
+ public:
+  int dimension() const final { return dimension_; }
+  int ambient_dimension() const final { return ambient_dimension_; }
+  bool has_intersect_flat() const override { return true; }
+  bool has_tangent_basis() const override { return true; }
+
+  Answer ClosestPoint(const Eigen::MatrixXd& x) override;
+  Answer IntersectFlat(const Eigen::MatrixXd& centers, const Eigen::MatrixXd& bases,
+                       const Eigen::VectorXd& radii) override;
+  Eigen::MatrixXd TangentBasis(const Eigen::MatrixXd& points) override;
+
+  // y := a point of M nearest to x. False when none was found.
+  virtual bool Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const = 0;
+  // tangent (d x k) := an orthonormal basis of the tangent space at y, a point of M.
+  virtual void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const = 0;
+
+  // m := the point of M with basis^T m = level that Newton's method along M reaches from the
+  // closest point of `start`. That is the nearest one when M is nearly flat on the way; false when
+  // none is reached. `basis` (d x k) need not be orthonormal.
+  //
+  // Accuracy: |basis^T m - level| is at most kFlatTolerance (1 + |level| + |m|), mostly near
+  // rounding; m is as near M as Project puts it.
+  bool Meet(const Eigen::VectorXd& start, const Eigen::MatrixXd& basis,
+            const Eigen::VectorXd& level, Eigen::VectorXd& m) const;
+
+  // A thousand times what double precision attains on a well placed flat, and a thousand times
+  // finer than what servers check.
+  static constexpr double kFlatTolerance = 1e-12;
+
+ protected:
+  PointwiseOracle(int dimension, int ambient_dimension)
+      : dimension_(dimension), ambient_dimension_(ambient_dimension) {}
+
+ private:
+  int dimension_, ambient_dimension_;
+};
+
+}  // namespace stellate
