@@ -102,7 +102,7 @@ bool ImplicitOracle::Descend(const Eigen::VectorXd& x, Eigen::VectorXd& y, doubl
   const double h = kHessianStep * length_;
   for (int a = 0; a < k; ++a) {
     const Eigen::MatrixXd difference = J(y + h * tangent.col(a)) - J(y - h * tangent.col(a));
-    hessian.col(a) -= tangent.transpose() * (difference.transpose() * lambda) / (2 * h);
+    hessian.col(a) += tangent.transpose() * (difference.transpose() * lambda) / (2 * h);
   }
   const Eigen::LLT<Eigen::MatrixXd> factor((hessian + hessian.transpose()) / 2);
   // Where the distance is not convex the gradient still points downhill.

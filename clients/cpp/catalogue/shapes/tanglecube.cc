@@ -59,7 +59,7 @@ bool Descend(const Eigen::Vector3d& x, Eigen::Vector3d& y) {
     const Eigen::Vector3d g = Gradient(y);
     const double lambda = (x - y).dot(g) / g.squaredNorm();
     const Eigen::Matrix2d hessian =
-        Eigen::Matrix2d::Identity() -
+        Eigen::Matrix2d::Identity() +
         lambda * tangent.transpose() * HessianDiagonal(y).asDiagonal() * tangent;
     // Rather along the gradient where the distance is not convex.
     const bool convex = hessian.trace() > 0 && hessian.determinant() > 1e-6;
