@@ -1,0 +1,72 @@
+"""Meshes of smooth manifolds of any dimension, known through oracles alone.
+
+    mesh = stellate.mesh(oracle, epsilon=0.1)
+    print(mesh.report)
+    mesh.save("manifold.vtu")
+
+`stellate.Oracle` says what an oracle is; `stellate.ImplicitManifold` makes one from equations, and
+`stellate.manifolds` has a few ready.
+"""
+
+from . import _stubs
+
+_stubs.ensure()  # before anything imports them
+
+from . import manifolds  # noqa: E402
+from ._face import mesh, serve, watch  # noqa: E402
+from ._mesh import Mesh, load_txt  # noqa: E402
+from ._server import Server, find_stellated  # noqa: E402
+from .client import Client, MeshInfo, ServerInfo  # noqa: E402
+from .errors import (  # noqa: E402
+    Cancelled,
+    FailedPrecondition,
+    InvalidArgument,
+    LimitExceeded,
+    MeshNotFound,
+    NotConverged,
+    OracleError,
+    SaveError,
+    ServerNotFound,
+    StellateError,
+    Unavailable,
+)
+from .implicit import ImplicitManifold  # noqa: E402
+from .oracle import Oracle  # noqa: E402
+from .progress import ProgressBar, progress_bar  # noqa: E402
+from .report import Certificate, Counts, Failure, Progress, Report  # noqa: E402
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Cancelled",
+    "Certificate",
+    "Client",
+    "Counts",
+    "FailedPrecondition",
+    "Failure",
+    "ImplicitManifold",
+    "InvalidArgument",
+    "LimitExceeded",
+    "Mesh",
+    "MeshInfo",
+    "MeshNotFound",
+    "NotConverged",
+    "Oracle",
+    "OracleError",
+    "Progress",
+    "ProgressBar",
+    "Report",
+    "SaveError",
+    "Server",
+    "ServerInfo",
+    "ServerNotFound",
+    "StellateError",
+    "Unavailable",
+    "find_stellated",
+    "load_txt",
+    "manifolds",
+    "mesh",
+    "progress_bar",
+    "serve",
+    "watch",
+]

@@ -1,0 +1,98 @@
+"""stellate.mesh, stellate.watch and stellate.serve."""
+
+from __future__ import annotations
+
+from typing import Any, Iterator
+
+from ._mesh import Mesh
+from ._server import Server
+from ._session import OnProgress, Session, follow
+from .client import Client
+
+
+def mesh(
+    oracle: Any,
+    epsilon: float = 0.1,
+    server: str | Server | Client | None = None,
+    on_progress: OnProgress | None = None,
+    **criteria: Any,
+) -> Mesh:
+    """Meshes the manifold that an oracle knows.
+
+    Args:
+      oracle: see stellate.Oracle.
+      epsilon: the largest circumradius of a simplex, a length. The mesh lies within about
+        epsilon^2 / (2 reach) of the manifold; 0.4 reach and below is safe.
+      server: "host:port", "unix:/path", a stellate.Server or Client; None starts a stellated on a
+        private unix socket and stops it afterwards.
+      on_progress: called in this thread with a stellate.Progress now and then. If it raises, the
+        mesh is cancelled.
+      **criteria: radius_edge_bound, sliver_bound, picking_radius, small_sliver_radius, candidates,
+        advance_step, flat_alternations; max_vertices, max_rounds, worker_wait_seconds,
+        answer_seconds; random_seed, box_seeds, seeds, label: the protocol's MeshSpec says what each
+        is. workers: how many threads call the oracle, which takes effect when the oracle says
+        `thread_safe = True`; the mesh is the same for any number.
+
+    Returns:
+      The mesh. It may be uncertified, when a budget was spent or epsilon is too coarse: its report
+      says so, and why.
+
+    Raises:
+      What the oracle raises, as itself; OracleError for answers that break a rule; InvalidArgument,
+      LimitExceeded, Unavailable, Cancelled, ServerNotFound. KeyboardInterrupt cancels the mesh.
+    """
+    last = None
+    for last in watch(oracle, epsilon, server, on_progress, **criteria):
+        pass
+    assert last is not None  # a watch ends with a finished mesh or an exception
+    return last
+
+
+def watch(
+    oracle: Any,
+    epsilon: float = 0.1,
+    server: str | Server | Client | None = None,
+    on_progress: OnProgress | None = None,
+    **criteria: Any,
+) -> Iterator[Mesh]:
+    """The mesh as it grows: an iterator over Mesh, the last of which has its report.
+
+    With an oracle, everything is as in stellate.mesh; closing the iterator cancels the mesh. With
+    the name of a mesh in place of the oracle, a mesh that others made and serve is watched, from
+    its beginning, and closing the iterator leaves it alone.
+    """
+    if isinstance(oracle, str):
+        if criteria:
+            raise TypeError(f"a mesh that exists already takes no {', '.join(criteria)}")
+        yield from _watch_by_name(oracle, server, on_progress)
+        return
+    workers = criteria.pop("workers", 1)
+    with Session(oracle, epsilon, server, on_progress, workers, criteria) as session:
+        yield from session
+
+
+def _watch_by_name(
+    name: str, server: str | Server | Client | None, on_progress: OnProgress | None
+) -> Iterator[Mesh]:
+    if server is None:
+        raise TypeError("to watch a mesh by its name, say on which server it is")
+    if isinstance(server, Client):
+        yield from follow(server, server.get(name), on_progress)
+        return
+    with Client(server) as client:
+        yield from follow(client, client.get(name), on_progress)
+
+
+def serve(oracle: Any, mesh_name: str, *, server: str | Server | Client, worker: str = "") -> str:
+    """One more worker for a mesh: answers the server's questions until the mesh is over.
+
+    All workers of a mesh have to answer for the same manifold. Ctrl-C takes this worker away; its
+    work goes to the others.
+
+    Returns: the state that the mesh ended in, e.g. "SUCCEEDED".
+    Raises: what the oracle raises, after the server was told, or a StellateError.
+    """
+    if isinstance(server, Client):
+        return server.serve(oracle, mesh_name, worker=worker)
+    with Client(server) as client:
+        return client.serve(oracle, mesh_name, worker=worker)

@@ -1,0 +1,99 @@
+"""A mesh, finished or growing."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+
+import numpy as np
+
+from . import _formats
+from ._orientation import components, orient, signed_volume
+from .report import Progress, Report
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Mesh:
+    """A simplicial k-complex in R^d.
+
+    Attributes:
+      points: (n, d) float64, the sample points.
+      simplices: (m, k+1) int64, zero-based ids of points, ascending in each row, rows in
+        lexicographic order.
+      report: how it ended and what is proved; None while the mesh grows.
+      progress: how it stood at this revision; None if that is not known.
+      revision: one for each round that changed the mesh.
+    """
+
+    points: np.ndarray
+    simplices: np.ndarray
+    report: Report | None = None
+    progress: Progress | None = None
+    revision: int = 0
+
+    @property
+    def dimension(self) -> int:
+        """k"""
+        return self.simplices.shape[1] - 1
+
+    @property
+    def ambient_dimension(self) -> int:
+        """d"""
+        return self.points.shape[1]
+
+    @property
+    def certified(self) -> bool:
+        """Whether the mesh is finished and proved good."""
+        return self.report is not None and self.report.certified
+
+    def oriented_simplices(self) -> np.ndarray | None:
+        """The simplices with vertices exchanged so that neighbours agree; None if not orientable.
+
+        A hypersurface (k = d - 1) gets its normals outwards, component by component.
+        """
+        oriented = orient(self.simplices)
+        if oriented is None or self.dimension != self.ambient_dimension - 1:
+            return oriented
+        label = components(oriented, len(self.points))
+        for component in np.unique(label):
+            rows = np.flatnonzero(label == component)
+            if signed_volume(self.points, oriented[rows]) < 0:
+                oriented[rows, :2] = oriented[rows][:, [1, 0]]
+        return oriented
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the mesh in the format that the file name's ending says.
+
+        .txt  any k and d, exact: "k d nv ns", then nv lines of coordinates, then ns lines of ids.
+        .off  any d (nOFF when d is not 3), k <= 2.
+        .obj  .ply  curves and surfaces, d <= 3.
+        .vtu  and what else meshio knows: k <= 3. When d > 3 the points are the first three
+              coordinates, and all of them are the point data "coordinates".
+
+        Surfaces are written with their triangles turned to agree where they are orientable.
+
+        Raises: SaveError when the format cannot hold this mesh, OSError.
+        """
+        _formats.save(self, os.fspath(path))
+
+    def __repr__(self) -> str:
+        state = "growing" if self.report is None else self.report.termination
+        return (
+            f"<stellate.Mesh k={self.dimension} d={self.ambient_dimension} "
+            f"{len(self.points)} points, {len(self.simplices)} simplices, {state}>"
+        )
+
+
+def load_txt(path: str | os.PathLike[str]) -> Mesh:
+    """Reads the .txt format back, to the last bit. Raises ValueError if it is something else."""
+    with open(path) as file:
+        header = file.readline().split()
+        if len(header) != 4:
+            raise ValueError(f"{os.fspath(path)}: the first line has to be 'k d nv ns'")
+        k, d, vertex_count, simplex_count = map(int, header)
+        body = file.read().split()
+    if len(body) != vertex_count * d + simplex_count * (k + 1):
+        raise ValueError(f"{os.fspath(path)}: {len(body)} numbers do not fit its first line")
+    points = np.array(body[: vertex_count * d], dtype=float).reshape(vertex_count, d)
+    simplices = np.array(body[vertex_count * d :], dtype=np.int64).reshape(simplex_count, k + 1)
+    return Mesh(points, simplices)

@@ -1,0 +1,152 @@
+"""A stellated of one's own: found, started on a private unix socket, and stopped."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import tempfile
+import threading
+import time
+from types import TracebackType
+
+from .errors import ServerNotFound, Unavailable
+
+_READY_SECONDS = 30.0
+_STOP_SECONDS = 10.0
+_LONGEST_SOCKET_PATH = 100  # the kernel takes 107 bytes
+
+
+def find_stellated() -> str:
+    """The server binary: $STELLATED, else build/*/bin of the source tree, else PATH.
+
+    Raises: ServerNotFound with where it was looked for.
+    """
+    named = os.environ.get("STELLATED")
+    if named:
+        path = shutil.which(named)
+        if path is None:
+            raise ServerNotFound(f"$STELLATED is {named!r}, which is not a program that can be run")
+        return path
+    build = pathlib.Path(__file__).resolve().parents[3] / "build"
+    built = [p for p in build.glob("*/bin/stellated") if os.access(p, os.X_OK)]
+    if built:
+        # The release build before others, then the newest.
+        return str(max(built, key=lambda p: (p.parts[-3] == "release", p.stat().st_mtime)))
+    path = shutil.which("stellated")
+    if path is None:
+        raise ServerNotFound(
+            "no server was given and no stellated found to start: pass server='host:port', or set "
+            f"$STELLATED to the binary, or build it under {build}, or put it on PATH"
+        )
+    return path
+
+
+class Server:
+    """A private stellated, for as many meshes as one likes. A context manager.
+
+        with stellate.Server() as server:
+            mesh = stellate.mesh(oracle, server=server)
+
+    It listens on a unix socket in a directory that only this user may enter, and ends with this
+    process whatever happens to it.
+    """
+
+    def __init__(self, *arguments: str, binary: str | None = None) -> None:
+        """Starts it; `arguments` are more flags for stellated."""
+        self._binary = binary or find_stellated()
+        self._directory = tempfile.mkdtemp(prefix="stellate-")
+        if len(self._directory) + len("/socket") > _LONGEST_SOCKET_PATH:
+            os.rmdir(self._directory)
+            self._directory = tempfile.mkdtemp(prefix="stellate-", dir="/tmp")
+        self._log = os.path.join(self._directory, "log")
+        socket = os.path.join(self._directory, "socket")
+        self.address = f"unix:{socket}"
+        self._process: subprocess.Popen[bytes] | None = None
+        self._start_error: OSError | None = None
+        started = threading.Event()
+        command = [self._binary, "--listen", self.address, *arguments]
+        # On Linux the kernel ends the server when the thread that started it ends: a thread of its
+        # own stays for as long as the server runs.
+        tie = shutil.which("setpriv")
+        if tie is not None:
+            command = [tie, "--pdeathsig", "TERM", *command]
+        self._keeper = threading.Thread(
+            target=self._keep, args=(command, started), name="stellated", daemon=True
+        )
+        self._keeper.start()
+        started.wait()
+        try:
+            if self._start_error is not None:
+                raise ServerNotFound(f"cannot start {self._binary}: {self._start_error}")
+            self._wait_for(socket)
+        except BaseException:
+            self.close()
+            raise
+
+    def _keep(self, command: list[str], started: threading.Event) -> None:
+        try:
+            with open(self._log, "wb") as log:
+                # A session of its own: Ctrl-C is for the client, which cancels its meshes first.
+                self._process = subprocess.Popen(
+                    command,
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                    start_new_session=True,
+                )
+        except OSError as error:
+            self._start_error = error
+            return
+        finally:
+            started.set()
+        self._process.wait()
+
+    def _wait_for(self, socket: str) -> None:
+        deadline = time.monotonic() + _READY_SECONDS
+        while not os.path.exists(socket):
+            if not self.alive:
+                raise self.why_gone()
+            if time.monotonic() > deadline:
+                raise Unavailable(f"{self._binary} did not listen within {_READY_SECONDS:.0f} s")
+            time.sleep(0.005)
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process runs."""
+        return self._process is not None and self._keeper.is_alive()
+
+    def why_gone(self) -> Unavailable:
+        """An error with the last words of a server that is no more."""
+        try:
+            words = pathlib.Path(self._log).read_text(errors="replace")[-2000:].strip()
+        except OSError:
+            words = ""
+        status = self._process.returncode if self._process is not None else None
+        return Unavailable(
+            f"{self._binary} ended with status {status}" + (f":\n{words}" if words else ""),
+            "SERVER_GONE",
+        )
+
+    def close(self) -> None:
+        """Stops the server and removes its directory. May be called again."""
+        if self._process is not None and self._keeper.is_alive():
+            self._process.send_signal(signal.SIGTERM)
+            self._keeper.join(_STOP_SECONDS)
+            if self._keeper.is_alive():
+                self._process.kill()
+        self._keeper.join()
+        shutil.rmtree(self._directory, ignore_errors=True)
+
+    def __enter__(self) -> Server:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()

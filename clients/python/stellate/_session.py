@@ -1,0 +1,176 @@
+"""One mesh from its declaration to its end: the server asks, the oracle answers, we watch."""
+
+from __future__ import annotations
+
+import threading
+import time
+from types import TracebackType
+from typing import Any, Callable, Iterator
+
+from ._growth import GrowingComplex
+from ._mesh import Mesh
+from ._server import Server
+from .client import Client, MeshInfo
+from .errors import Cancelled, StellateError, Unavailable, error_class
+from .oracle import CheckedOracle
+from .report import Progress, Report
+
+OnProgress = Callable[[Progress], None]
+
+_FAREWELL_SECONDS = 5.0  # that an oracle may take to come to an end when nobody waits for it
+_RECONNECT_PAUSES = (0.1, 0.5, 1.0, 2.0, 4.0)
+
+
+class _Workers:
+    """Threads that serve one mesh with one oracle. The first exception of any is kept."""
+
+    def __init__(self, client: Client, oracle: CheckedOracle, mesh: str, count: int) -> None:
+        self.failure: BaseException | None = None
+        self._stopping = threading.Event()
+        self._workers = [client.worker(oracle, mesh, f"python-{i + 1}") for i in range(count)]
+        self._threads = [
+            threading.Thread(target=self._run, args=(worker,), name=f"oracle-{i + 1}", daemon=True)
+            for i, worker in enumerate(self._workers)
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def _run(self, worker: Any) -> None:
+        for pause in (*_RECONNECT_PAUSES, None):
+            try:
+                worker.run()
+                return
+            except Unavailable:
+                # The watch notices a server that is gone for good, and says so.
+                if pause is None or self._stopping.wait(pause):
+                    return
+            except StellateError as error:
+                # The server's refusals end the mesh, which the watch reports; ours come first.
+                if self.failure is None and "grpc_code" not in error.details:
+                    self.failure = error
+                return
+            except BaseException as error:  # the oracle's own, whatever it is
+                if self.failure is None:
+                    self.failure = error
+                return
+
+    def stop(self) -> None:
+        self._stopping.set()
+        for worker in self._workers:
+            worker.stop()
+
+    def join(self, seconds: float | None) -> None:
+        deadline = None if seconds is None else time.monotonic() + seconds
+        for thread in self._threads:
+            thread.join(None if deadline is None else max(0.0, deadline - time.monotonic()))
+
+
+class Session:
+    """A mesh that is created, served and watched, as a context manager.
+
+    Leaving it early cancels the mesh; leaving it at all deletes the mesh from the server.
+    """
+
+    def __init__(
+        self,
+        oracle: Any,
+        epsilon: float,
+        server: str | Server | Client | None,
+        on_progress: OnProgress | None,
+        workers: int,
+        criteria: dict[str, Any],
+    ) -> None:
+        if int(workers) != workers or workers < 1:
+            raise ValueError(f"workers has to be a whole number from 1 on, and is {workers!r}")
+        checked = CheckedOracle(oracle)
+        self._on_progress = on_progress
+        self._owns_client = not isinstance(server, Client)
+        self._client = server if isinstance(server, Client) else Client(server)
+        try:
+            self.info = self._client.create(checked, epsilon, **criteria)
+        except BaseException:
+            self._close_client()
+            raise
+        self._ended = False
+        self._workers = _Workers(self._client, checked, self.info.name, int(workers))
+
+    def __iter__(self) -> Iterator[Mesh]:
+        """The mesh at every revision, the last with its report. Raises how it failed."""
+        try:
+            yield from follow(self._client, self.info, self._on_progress)
+        except StellateError as error:
+            if self._workers.failure is None:
+                raise
+            # Our own exception says more than the server's account of it.
+            if isinstance(self._workers.failure, StellateError):
+                self._workers.failure.mesh = error.mesh
+            raise self._workers.failure from None
+        self._ended = True
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            if not self._ended:
+                self._workers.stop()
+            self._workers.join(_FAREWELL_SECONDS)
+            try:
+                self._client.delete(self.info.name)
+            except StellateError:
+                pass  # it ends with its server, or somebody else was first
+        finally:
+            self._close_client()
+            close = getattr(self._on_progress, "close", None)
+            if callable(close):
+                close()
+
+    def _close_client(self) -> None:
+        if self._owns_client:
+            self._client.close()
+
+
+def follow(client: Client, info: MeshInfo, on_progress: OnProgress | None) -> Iterator[Mesh]:
+    """A mesh at every revision until its end. Closing the iterator leaves the mesh alone."""
+    growth = GrowingComplex(info.dimension, info.ambient_dimension)
+    watch = client.watch(info.name)
+    watch.on_resume = growth.forget_pending
+    progress: Progress | None = None
+    try:
+        for event in watch:
+            kind = event.WhichOneof("event")
+            if kind == "delta":
+                try:
+                    complete = growth.absorb(event.delta)
+                except ValueError as error:
+                    raise StellateError(f"the server broke the protocol: {error}", "PROTOCOL") from error
+                if complete:
+                    yield Mesh(growth.points(), growth.simplices(), None, progress, growth.revision)
+            elif kind == "progress":
+                progress = Progress.from_wire(event.progress)
+                if on_progress is not None:
+                    on_progress(progress)
+            elif kind == "final":
+                final = MeshInfo.from_wire(event.final)
+                if on_progress is not None and progress != final.progress:
+                    on_progress(final.progress)
+                yield _finished(growth, final)
+    finally:
+        watch.close()
+
+
+def _finished(growth: GrowingComplex, final: MeshInfo) -> Mesh:
+    mesh = Mesh(growth.points(), growth.simplices(), final.report, final.progress, growth.revision)
+    if final.state == "CANCELLED":
+        raise Cancelled("the mesh was cancelled", mesh=mesh)
+    if final.state == "FAILED":
+        failure = final.report.failure if isinstance(final.report, Report) else None
+        reason = failure.reason if failure else "ORACLE_FAILED"
+        message = failure.message if failure else "the mesh failed, and the server does not say why"
+        raise error_class(reason)(message, reason, mesh=mesh)
+    return mesh

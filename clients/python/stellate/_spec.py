@@ -1,0 +1,74 @@
+"""From an oracle and keyword arguments to the protocol's MeshSpec."""
+
+from __future__ import annotations
+
+import difflib
+from typing import Any
+
+import numpy as np
+
+from ._arrays import to_wire
+from ._generated import mesh_pb2 as pb
+from .errors import InvalidArgument
+from .oracle import CheckedOracle
+
+_CRITERIA = {field.name for field in pb.Criteria.DESCRIPTOR.fields}
+_LIMITS = {field.name for field in pb.MeshLimits.DESCRIPTOR.fields}
+
+
+def mesh_spec(oracle: CheckedOracle, epsilon: float, criteria: dict[str, Any]) -> pb.MeshSpec:
+    """The specification of a mesh. Ranges are the server's to check; here only types are.
+
+    Raises: TypeError for an unknown keyword, InvalidArgument for a value of the wrong type.
+    """
+    spec = pb.MeshSpec()
+    _set(spec, "dimension", oracle.dimension)
+    _set(spec, "ambient_dimension", oracle.ambient_dimension)
+    _set(spec, "epsilon", epsilon)
+    spec.oracle.intersect_flat = oracle.has_intersect_flat
+    spec.oracle.tangent_basis = oracle.has_tangent_basis
+    if oracle.bounding_box is not None:
+        lower, upper = oracle.bounding_box
+        spec.bounding_box.lower.CopyFrom(to_wire(lower))
+        spec.bounding_box.upper.CopyFrom(to_wire(upper))
+    if oracle.seeds is not None:
+        spec.seeds.CopyFrom(to_wire(oracle.seeds))
+    for name, value in criteria.items():
+        if value is None:
+            continue
+        if name in _CRITERIA:
+            _set(spec.criteria, name, value)
+        elif name in _LIMITS:
+            _set(spec.limits, name, value)
+        elif name in ("random_seed", "label", "box_seeds"):
+            _set(spec, name, value)
+        elif name == "seeds":
+            spec.seeds.CopyFrom(to_wire(_points(value)))
+        else:
+            raise TypeError(_unknown(name))
+    return spec
+
+
+def _set(message: Any, name: str, value: Any) -> None:
+    if isinstance(value, np.generic):
+        value = value.item()
+    try:
+        setattr(message, name, value)
+    except (TypeError, ValueError) as error:
+        raise InvalidArgument(
+            f"{name} cannot be {value!r}: {error}", details={"fields": {name: str(error)}}
+        ) from None
+
+
+def _points(seeds: Any) -> np.ndarray:
+    try:
+        return np.asarray(seeds, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidArgument("seeds have to be an array of points (m, d)") from None
+
+
+def _unknown(name: str) -> str:
+    known = sorted(_CRITERIA | _LIMITS | {"random_seed", "label", "box_seeds", "seeds", "workers"})
+    near = difflib.get_close_matches(name, known, 1)
+    hint = f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(known)}"
+    return f"unknown keyword {name!r}{hint}"

@@ -1,0 +1,171 @@
+"""What can go wrong, as exceptions.
+
+Every error of ours is a StellateError with a stable upper-case `reason` (the protocol's ErrorReason)
+for programs and a message for people. An exception that an oracle raises is not among them: it
+reaches the caller as itself.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Mapping
+
+import grpc
+import numpy as np
+
+from ._generated import status_details_pb2 as details_pb
+
+if TYPE_CHECKING:
+    from ._mesh import Mesh
+
+
+class StellateError(Exception):
+    """Base of all errors of this package.
+
+    Attributes:
+      reason: stable name of what happened, e.g. "ORACLE_NOT_FINITE".
+      details: what else is known, e.g. {"fields": {"epsilon": "must be positive"}}.
+      mesh: the unfinished mesh as far as it came, where there is one.
+    """
+
+    default_reason = "UNSPECIFIED"
+
+    def __init__(
+        self,
+        message: str,
+        reason: str | None = None,
+        details: Mapping[str, Any] | None = None,
+        mesh: Mesh | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.reason = reason or self.default_reason
+        self.details = dict(details or {})
+        self.mesh = mesh
+
+
+class InvalidArgument(StellateError, ValueError):
+    """A specification that makes no sense. Mend the field that the message names."""
+
+    default_reason = "INVALID_ARGUMENT"
+
+
+class LimitExceeded(StellateError):
+    """More than the server is willing to do. Ask for less, or raise its limit."""
+
+    default_reason = "LIMIT_EXCEEDED"
+
+
+class MeshNotFound(StellateError, LookupError):
+    """No mesh has this name: it is misspelt, or the mesh was deleted."""
+
+    default_reason = "MESH_NOT_FOUND"
+
+
+class FailedPrecondition(StellateError):
+    """A call out of order, such as serving a mesh that is over."""
+
+    default_reason = "FAILED_PRECONDITION"
+
+
+class OracleError(StellateError):
+    """The oracle's answers break a rule, or the mesh got none. Mend the oracle."""
+
+    default_reason = "ORACLE_FAILED"
+
+
+class Cancelled(StellateError):
+    """The mesh was cancelled by somebody else."""
+
+    default_reason = "CANCELLED"
+
+
+class Unavailable(StellateError, ConnectionError):
+    """The server cannot be reached, or is stopping."""
+
+    default_reason = "UNAVAILABLE"
+
+
+class ServerNotFound(StellateError, FileNotFoundError):
+    """No server address was given, and there is no stellated on this machine to start."""
+
+    default_reason = "SERVER_NOT_FOUND"
+
+
+class SaveError(StellateError, ValueError):
+    """A mesh that the chosen file format cannot hold."""
+
+    default_reason = "FORMAT"
+
+
+class NotConverged(StellateError, ArithmeticError):
+    """Closest points that were not found for some of a batch.
+
+    An oracle may raise it: the points that did converge are used, and the server is told that there
+    is none for the others.
+
+    Attributes:
+      points: (n, d), meaningful where `converged`.
+      converged: (n,) bool.
+    """
+
+    default_reason = "NOT_CONVERGED"
+
+    def __init__(self, points: np.ndarray, converged: np.ndarray, message: str = "") -> None:
+        converged = np.asarray(converged, dtype=bool)
+        super().__init__(
+            message or f"no convergence for {np.count_nonzero(~converged)} of {converged.size} points"
+        )
+        self.points = np.asarray(points, dtype=float)
+        self.converged = converged
+
+
+_BY_REASON: dict[str, type[StellateError]] = {
+    "INVALID_ARGUMENT": InvalidArgument,
+    "OUT_OF_ORDER": FailedPrecondition,
+    "LIMIT_EXCEEDED": LimitExceeded,
+    "MESH_NOT_FOUND": MeshNotFound,
+    "FAILED_PRECONDITION": FailedPrecondition,
+    "SHUTTING_DOWN": Unavailable,
+    "REVISION_TOO_NEW": InvalidArgument,
+    "NO_SEEDS": OracleError,
+    "NO_WORKER": OracleError,
+    "ANSWER_TIMEOUT": OracleError,
+}
+
+_BY_CODE: dict[grpc.StatusCode, type[StellateError]] = {
+    grpc.StatusCode.INVALID_ARGUMENT: InvalidArgument,
+    grpc.StatusCode.OUT_OF_RANGE: InvalidArgument,
+    grpc.StatusCode.RESOURCE_EXHAUSTED: LimitExceeded,
+    grpc.StatusCode.NOT_FOUND: MeshNotFound,
+    grpc.StatusCode.FAILED_PRECONDITION: FailedPrecondition,
+    grpc.StatusCode.ABORTED: OracleError,
+    grpc.StatusCode.CANCELLED: Cancelled,
+    grpc.StatusCode.UNAVAILABLE: Unavailable,
+    grpc.StatusCode.DEADLINE_EXCEEDED: Unavailable,
+}
+
+
+def error_class(reason: str) -> type[StellateError]:
+    """The exception for one of the protocol's reasons."""
+    return OracleError if reason.startswith("ORACLE_") else _BY_REASON.get(reason, StellateError)
+
+
+def from_rpc(error: grpc.RpcError) -> StellateError:
+    """Our exception for a failed rpc, with the reason and the fields that the server named."""
+    code, message = error.code(), error.details() or ""
+    reason, details = "", {"grpc_code": code.name}
+    for key, value in error.trailing_metadata() or ():
+        if key != "grpc-status-details-bin":
+            continue
+        for part in details_pb.Status.FromString(value).details:
+            kind = part.type_url.rpartition("/")[2]
+            if kind == "google.rpc.ErrorInfo":
+                info = details_pb.ErrorInfo.FromString(part.value)
+                reason = info.reason
+                details.update(info.metadata)
+            elif kind == "google.rpc.BadRequest":
+                violations = details_pb.BadRequest.FromString(part.value).field_violations
+                details["fields"] = {v.field: v.description for v in violations}
+    kind_of_error = error_class(reason) if reason else _BY_CODE.get(code, StellateError)
+    if kind_of_error is StellateError:
+        kind_of_error = _BY_CODE.get(code, StellateError)
+    return kind_of_error(message or code.name, reason or None, details)

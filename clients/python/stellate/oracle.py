@@ -1,0 +1,188 @@
+"""What a manifold has to answer, and the checks its answers pass before they are sent."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from .errors import InvalidArgument, NotConverged, OracleError
+
+
+@runtime_checkable
+class Oracle(Protocol):
+    """A compact smooth k-submanifold M of R^d without boundary, 1 <= k < d.
+
+    Every method takes and returns whole batches as numpy arrays of float64; those it is given are
+    read-only. The answer to a query must not depend on the rest of its batch: batches are cut
+    differently from run to run.
+
+    Besides what is declared here an oracle may have:
+      intersect_flat(centers (n, d), bases (n, d, k), radii (n,)) -> (points (n, d), found (n,)):
+        the point of M nearest to each center in the flat {c + v : basis^T v = 0} within the radius,
+        or found = False where there is none. Without it the server asks for closest points only.
+      tangent_basis(points (n, d)) -> (n, d, k): orthonormal columns that span the tangent space at
+        points of M. Without it the server finds tangent spaces from closest points.
+      bounding_box: (lower (d,), upper (d,)), where to look for M, or
+      seeds: (m, d), points near M, one at least on each component. One of the two is needed.
+      thread_safe: True lets several workers call it at once.
+    """
+
+    dimension: int  # k
+    ambient_dimension: int  # d
+
+    def closest_point(self, points: np.ndarray) -> np.ndarray:
+        """(n, d) -> (n, d): a point of M nearest to each. May raise NotConverged."""
+        ...
+
+
+class CheckedOracle:
+    """An oracle as the server sees it: shapes, types and finiteness are checked with clear words.
+
+    Calls come one at a time unless the oracle says `thread_safe = True`.
+    """
+
+    def __init__(self, oracle: Any) -> None:
+        self._oracle = oracle
+        self.dimension = _whole_number(oracle, "dimension")
+        self.ambient_dimension = _whole_number(oracle, "ambient_dimension")
+        if not callable(getattr(oracle, "closest_point", None)):
+            raise InvalidArgument(f"{type(oracle).__name__} has no method closest_point(points)")
+        self.has_intersect_flat = callable(getattr(oracle, "intersect_flat", None))
+        self.has_tangent_basis = callable(getattr(oracle, "tangent_basis", None))
+        self.bounding_box = _box(getattr(oracle, "bounding_box", None))
+        self.seeds = _seeds(getattr(oracle, "seeds", None))
+        shared = bool(getattr(oracle, "thread_safe", False))
+        self._one_at_a_time = contextlib.nullcontext() if shared else threading.Lock()
+
+    def closest_points(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(n, d) -> the closest points (n, d), and where they were found (n,)."""
+        with self._one_at_a_time:
+            try:
+                answer = self._oracle.closest_point(points)
+                found = np.ones(len(points), dtype=bool)
+            except NotConverged as error:
+                answer, found = error.points, error.converged
+        found = _flags("closest_point", found, len(points))
+        return _numbers("closest_point", answer, points.shape, found), found
+
+    def intersections(
+        self, centers: np.ndarray, bases: np.ndarray, radii: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The points (n, d) where M meets the flats, and where it does (n,)."""
+        with self._one_at_a_time:
+            try:
+                answer = self._oracle.intersect_flat(centers, bases, radii)
+            except NotConverged as error:
+                answer = error.points, error.converged
+        if not isinstance(answer, (tuple, list)) or len(answer) != 2:
+            raise OracleError(
+                f"intersect_flat returned {_describe(answer)}; it has to return the pair "
+                "(points (n, d), found (n,))",
+                "ORACLE_SHAPE",
+            )
+        found = _flags("intersect_flat", answer[1], len(centers))
+        return _numbers("intersect_flat", answer[0], centers.shape, found), found
+
+    def tangents(self, points: np.ndarray, found: np.ndarray) -> np.ndarray:
+        """(n, d) -> (n, d, k) orthonormal bases; the rows that were not found hold any basis."""
+        k, d = self.dimension, self.ambient_dimension
+        bases = np.broadcast_to(np.eye(d, k), (len(points), d, k)).copy()
+        on_manifold = np.ascontiguousarray(points[found])
+        if len(on_manifold):
+            with self._one_at_a_time:
+                answer = self._oracle.tangent_basis(on_manifold)
+            everywhere = np.ones(len(on_manifold), dtype=bool)
+            bases[found] = _numbers("tangent_basis", answer, (len(on_manifold), d, k), everywhere)
+        return bases
+
+
+def _describe(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return f"an array of shape {value.shape} and type {value.dtype}"
+    return f"a {type(value).__name__}"
+
+
+def _numbers(method: str, answer: Any, shape: tuple[int, ...], found: np.ndarray) -> np.ndarray:
+    """The answer as float64, or an OracleError that says what is wrong with it."""
+    array = answer if isinstance(answer, np.ndarray) else None
+    if array is None:
+        try:
+            array = np.asarray(answer)
+        except ValueError:  # ragged lists
+            array = np.asarray(None)
+    if array.dtype.kind not in "fiu":
+        raise OracleError(
+            f"{method} returned {_describe(answer)}; it has to return real numbers of shape {shape}",
+            "ORACLE_SHAPE",
+        )
+    if array.shape != shape:
+        raise OracleError(
+            f"{method} returned an array of shape {array.shape} for a batch of {shape[0]}; "
+            f"the shape has to be {shape}",
+            "ORACLE_SHAPE",
+        )
+    array = np.ascontiguousarray(array, dtype=np.float64)
+    bad = found & ~np.isfinite(array.reshape(len(array), -1)).all(axis=1)
+    if bad.any():
+        row = int(np.flatnonzero(bad)[0])
+        raise OracleError(
+            f"{method} returned {array[row].tolist()} for query {row} of a batch of {shape[0]} "
+            f"({np.count_nonzero(bad)} answers are not finite); where there is no answer, say so: "
+            "found = False from intersect_flat, or raise stellate.NotConverged from closest_point",
+            "ORACLE_NOT_FINITE",
+        )
+    if not found.all():
+        array = np.where(found.reshape((-1,) + (1,) * (array.ndim - 1)), array, 0.0)
+    return array
+
+
+def _flags(method: str, found: Any, count: int) -> np.ndarray:
+    flags = np.asarray(found)
+    if flags.shape != (count,) or flags.dtype.kind not in "biu":
+        raise OracleError(
+            f"{method} returned {_describe(flags)} for found; it has to be {count} booleans",
+            "ORACLE_SHAPE",
+        )
+    return flags.astype(bool)
+
+
+def _whole_number(oracle: Any, name: str) -> int:
+    try:
+        value = getattr(oracle, name)
+    except AttributeError:
+        raise InvalidArgument(
+            f"{type(oracle).__name__} has no attribute {name}: an oracle needs dimension (k), "
+            "ambient_dimension (d) and closest_point"
+        ) from None
+    try:
+        as_float = float(value)
+    except (TypeError, ValueError):
+        as_float = float("nan")
+    if not as_float.is_integer():
+        raise InvalidArgument(f"{name} has to be a whole number, and is {value!r}")
+    return int(value)
+
+
+def _box(box: Any) -> tuple[np.ndarray, np.ndarray] | None:
+    if box is None:
+        return None
+    try:
+        lower, upper = (np.asarray(corner, dtype=np.float64) for corner in box)
+    except (TypeError, ValueError):
+        raise InvalidArgument(
+            f"bounding_box has to be a pair of points (lower (d,), upper (d,)), and is {box!r}"
+        ) from None
+    return lower, upper
+
+
+def _seeds(seeds: Any) -> np.ndarray | None:
+    if seeds is None:
+        return None
+    try:
+        array = np.asarray(seeds, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidArgument("seeds have to be an array of points (m, d)") from None
+    return array

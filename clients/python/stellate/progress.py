@@ -1,0 +1,82 @@
+"""Showing a mesh at work."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import time
+from typing import TextIO
+
+from .report import Progress
+
+_REDRAW_SECONDS = 0.05
+_PLAIN_SECONDS = 5.0
+_PHASES = {
+    "SEEDING": "seeding",
+    "REFINING": "refining",
+    "CERTIFYING": "certifying",
+    "DONE": "done",
+}
+
+
+class ProgressBar:
+    """An `on_progress` that keeps one live line on a terminal, and else prints few plain lines."""
+
+    def __init__(self, title: str = "", file: TextIO | None = None) -> None:
+        self._title = title + " " if title else ""
+        self._file = sys.stderr if file is None else file
+        self._live = self._file.isatty()
+        self._last_time = -1e9
+        self._last_phase = ""
+        self._open = False
+
+    def __call__(self, progress: Progress) -> None:
+        now = time.monotonic()
+        new_phase = progress.phase != self._last_phase
+        pause = _REDRAW_SECONDS if self._live else _PLAIN_SECONDS
+        if not new_phase and now - self._last_time < pause:
+            return
+        self._last_time, self._last_phase = now, progress.phase
+        if self._live:
+            width = shutil.get_terminal_size().columns
+            self._file.write("\r" + self._line(progress, width)[: width - 1] + "\x1b[K")
+            self._open = True
+        else:
+            self._file.write(f"{self._title}{self._numbers(progress)}\n")
+        self._file.flush()
+
+    def close(self) -> None:
+        """Ends the live line. Called by stellate.mesh when the mesh is over."""
+        if self._open:
+            self._file.write("\n")
+            self._file.flush()
+            self._open = False
+        self._last_phase = ""
+
+    def _line(self, progress: Progress, width: int) -> str:
+        numbers = self._numbers(progress)
+        cells = max(10, min(30, width - len(self._title) - len(numbers) - 12))
+        filled = progress.fraction * cells
+        whole = int(filled)
+        part = " ▏▎▍▌▋▊▉"[int((filled - whole) * 8)] if whole < cells else ""
+        bar = ("█" * whole + part).ljust(cells)
+        return f"{self._title}{100 * progress.fraction:3.0f} % │{bar}│ {numbers}"
+
+    @staticmethod
+    def _numbers(progress: Progress) -> str:
+        text = f"{_PHASES.get(progress.phase, progress.phase.lower())}, round {progress.round}, "
+        text += f"{progress.vertices:,} vertices, {progress.elapsed_seconds:.1f} s"
+        if progress.remaining_seconds > 0 and progress.phase != "DONE":
+            text += f", {progress.remaining_seconds:.0f} s left"
+        return text
+
+
+def progress_bar(title: str = "", file: TextIO | None = None) -> ProgressBar:
+    """A progress bar for `stellate.mesh(..., on_progress=stellate.progress_bar())`.
+
+    Args:
+      title: put before the bar.
+      file: where to; standard error by default. If it is no terminal, a line at each phase and
+        every few seconds.
+    """
+    return ProgressBar(title, file)

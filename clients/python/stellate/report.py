@@ -1,0 +1,195 @@
+"""How a mesh stands, how it ended, and what was proved of it."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+from ._generated import mesh_pb2 as pb
+
+
+def _copy_fields(cls: type, message: Any) -> Any:
+    """A dataclass from the message with the same plain fields."""
+    values = {}
+    for field in dataclasses.fields(cls):
+        value = getattr(message, field.name)
+        values[field.name] = tuple(value) if field.type == "tuple[str, ...]" else value
+    return cls(**values)
+
+
+def _enum_name(enum: Any, value: int, prefix: str) -> str:
+    return enum.Name(value).removeprefix(prefix)
+
+
+@dataclasses.dataclass(frozen=True)
+class Progress:
+    """A picture of a mesh at work."""
+
+    phase: str  # "SEEDING", "REFINING", "CERTIFYING" or "DONE"
+    round: int  # batches of queries answered
+    queries: int  # queries answered
+    vertices: int
+    simplices: int
+    unbounded_stars: int  # stars on the advancing front
+    bad_size: int  # stars with a simplex that breaks rule R1, then R2, R3, R4
+    bad_radius_edge: int
+    bad_sliver: int
+    bad_inconsistent: int
+    fraction: float  # estimated share of the work done, 0..1
+    elapsed_seconds: float
+    remaining_seconds: float  # an estimate; 0 when unknown
+
+    @classmethod
+    def from_wire(cls, message: pb.Progress) -> Progress:
+        plain = [f.name for f in dataclasses.fields(cls) if f.name != "phase"]
+        phase = _enum_name(pb.Phase, message.phase, "PHASE_")
+        return cls(phase=phase, **{name: getattr(message, name) for name in plain})
+
+
+@dataclasses.dataclass(frozen=True)
+class Counts:
+    """What a mesh took."""
+
+    vertices: int
+    simplices: int
+    rounds: int  # round trips
+    queries: int
+    tangent_queries: int  # closest points spent on finding tangent bases
+    inserted_size: int  # sample points inserted by rule R1, then R2, R3, R4
+    inserted_radius_edge: int
+    inserted_sliver: int
+    inserted_inconsistent: int
+    duplicates: int  # answers that fell on an existing sample point
+
+
+@dataclasses.dataclass(frozen=True)
+class Certificate:
+    """What was computed from the finished complex. Lengths are in the units of the coordinates."""
+
+    certified: bool  # every claim holds and the run converged
+    verdict: str  # plain words; the first thing wrong if not certified
+    warnings: tuple[str, ...]
+    closed: bool  # every (k-1)-face is in exactly two simplices
+    bad_faces: int
+    links_are_spheres: bool
+    links_decided_exactly: bool  # k <= 3; above, by homology
+    bad_links: int
+    inconsistent_simplices: int
+    unembedded_stars: int  # stars whose projection on the tangent space overlaps itself
+    fibre_failures: int  # sampled normal flats that do not meet the mesh exactly once nearby
+    fibre_samples: int
+    max_circumradius: float
+    max_radius_edge: float
+    min_fatness: float  # volume / diameter^k
+    min_angle_degrees: float  # k = 2 only
+    max_tangent_angle_degrees: float
+    max_barycentre_distance: float  # of a simplex to the manifold
+    estimated_reach: float  # an estimate from above
+    epsilon_over_reach: float
+    components: int
+    euler_characteristic: int
+    orientable: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class Failure:
+    """Why a mesh failed."""
+
+    reason: str  # stable, e.g. "ORACLE_NOT_FINITE"
+    message: str
+
+
+_TERMINATIONS = {
+    "CONVERGED": "converged: no refinement rule applies any more",
+    "VERTEX_BUDGET": "stopped: max_vertices is spent",
+    "ROUND_BUDGET": "stopped: max_rounds is spent",
+    "CANCELLED": "cancelled",
+    "ORACLE_FAILED": "the oracle failed",
+    "NO_PROGRESS": "stopped: rules still apply, but refinement no longer helps",
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Report:
+    """The end of a mesh. `str(report)` is for people."""
+
+    termination: str  # "CONVERGED", "VERTEX_BUDGET", "ROUND_BUDGET", "CANCELLED", ...
+    failure: Failure | None
+    counts: Counts
+    certificate: Certificate
+    elapsed_seconds: float
+
+    @property
+    def certified(self) -> bool:
+        """Whether the mesh is proved good."""
+        return self.certificate.certified
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to know about the mesh, certified or not."""
+        return self.certificate.warnings
+
+    @classmethod
+    def from_wire(cls, message: pb.Report) -> Report:
+        failure = None
+        if message.HasField("failure"):
+            failure = Failure(message.failure.reason, message.failure.message)
+        return cls(
+            termination=_enum_name(pb.Termination, message.termination, "TERMINATION_"),
+            failure=failure,
+            counts=_copy_fields(Counts, message.counts),
+            certificate=_copy_fields(Certificate, message.certificate),
+            elapsed_seconds=message.elapsed_seconds,
+        )
+
+    def __str__(self) -> str:
+        n, c = self.counts, self.certificate
+        inserted = (
+            f"size {n.inserted_size:,}, radius-edge {n.inserted_radius_edge:,}, "
+            f"slivers {n.inserted_sliver:,}, inconsistencies {n.inserted_inconsistent:,}"
+        )
+        lines = [
+            ("mesh", f"{n.vertices:,} vertices, {n.simplices:,} simplices"),
+            ("run", _TERMINATIONS.get(self.termination, self.termination.lower())),
+            ("took", f"{self.elapsed_seconds:.2f} s, {n.rounds:,} round trips, {n.queries:,} queries"),
+            ("inserted for", inserted),
+        ]
+        if self.failure is not None:
+            lines.append(("failure", f"{self.failure.reason}: {self.failure.message}"))
+        lines.append(("certificate", ("CERTIFIED. " if c.certified else "NOT CERTIFIED. ") + c.verdict))
+        if c.components:
+            lines += _certificate_lines(c)
+        lines += [("warning", text) for text in c.warnings]
+        return "\n".join(f"{title:>13}  {text}" for title, text in lines)
+
+
+def _certificate_lines(c: Certificate) -> list[tuple[str, str]]:
+    closed = "closed" if c.closed else f"not closed ({c.bad_faces:,} bad faces)"
+    how = "exactly" if c.links_decided_exactly else "by homology"
+    links = (
+        f"every link a sphere (decided {how})"
+        if c.links_are_spheres
+        else f"{c.bad_links:,} links are not spheres"
+    )
+    orientable = "orientable" if c.orientable else "not orientable"
+    components = "1 component" if c.components == 1 else f"{c.components:,} components"
+    shape = f"largest circumradius {c.max_circumradius:.4g}, radius-edge ratio {c.max_radius_edge:.3g}"
+    shape += f"; smallest fatness {c.min_fatness:.3g}"
+    if c.min_angle_degrees > 0:
+        shape += f", angle {c.min_angle_degrees:.1f} degrees"
+    return [
+        ("topology", f"{components}, Euler characteristic {c.euler_characteristic}, {orientable}"),
+        ("manifold", f"{closed}; {links}"),
+        (
+            "stars",
+            f"{c.inconsistent_simplices:,} inconsistent simplices, {c.unembedded_stars:,} stars overlap, "
+            f"{c.fibre_failures:,} of {c.fibre_samples:,} normal flats met wrongly",
+        ),
+        ("shape", shape),
+        (
+            "closeness",
+            f"barycentres within {c.max_barycentre_distance:.3g} of the manifold, simplices within "
+            f"{c.max_tangent_angle_degrees:.1f} degrees of its tangent spaces",
+        ),
+        ("reach", f"about {c.estimated_reach:.4g}, epsilon is {c.epsilon_over_reach:.3g} of it"),
+    ]
