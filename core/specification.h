@@ -10,6 +10,7 @@ namespace stellate::core {
 
 inline constexpr int kMaxDimension = 5;            // largest k this build carries a template for
 inline constexpr int kMaxAmbientDimension = 4096;  // largest d; servers may set less
+inline constexpr int kDefaultBoxSeeds = 100;       // points drawn from the box when none are given
 
 // Lengths and coordinates beyond these would overflow or vanish when raised to the powers that
 // volumes need; every real unit is far inside.
@@ -63,7 +64,7 @@ struct Specification {
   OracleCapabilities oracle;
   std::optional<BoundingBox> bounding_box;  // seeds are drawn from it when none are given
   Eigen::MatrixXd seeds;                    // d x m, near M, may be empty
-  int box_seeds = 0;                        // points drawn from the box, 1..100000; 0: 100
+  int box_seeds = 0;                        // points drawn from the box; 0: the default
   std::uint64_t random_seed = 1;            // of everything random
   Criteria criteria;
   Limits limits;

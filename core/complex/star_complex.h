@@ -1,0 +1,106 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/geometry/restricted_voronoi_cell.h"
+#include "core/sample/ball_tree.h"
+
+namespace stellate::core {
+
+// The sample and the star of each of its points (Sec. 5.2.1): star(p) is kept as its dual, the
+// Voronoi cell of p restricted to T_pM. The mesh is the union of the stars.
+//
+// Ids count up from 0; points are never removed. Const calls may run in parallel.
+template <int K>
+class StarComplex {
+ public:
+  using Cell = RestrictedVoronoiCell<K>;
+  using Vertex = typename Cell::Vertex;
+  using Simplex = std::array<std::uint32_t, K + 1>;  // ascending ids
+
+  // d         ambient dimension
+  // epsilon   the size bound, length: sets the scale of the perturbing weights
+  // inradius  of the fake simplex that each cell begins as, length
+  StarComplex(int d, double epsilon, double inradius);
+  StarComplex(const StarComplex&) = delete;
+  StarComplex& operator=(const StarComplex&) = delete;
+
+  // What an insertion did.
+  struct Change {
+    std::vector<std::uint32_t> stars;  // old stars that changed, ascending; new ones not among them
+    std::vector<std::uint32_t> added, removed;  // simplices held by their lowest vertex, K+1 ids each
+  };
+
+  // A point waiting to be inserted by Commit. Later calls of NearestWithin see it.
+  std::uint32_t Append(const double* point, const double* tangent);
+  // Builds the stars of the appended points and clips all others by them, in parallel; the result
+  // does not depend on the number of threads. `around`, if given, gets the neighbours that changed
+  // stars have or had (with repetitions): their simplices may have become inconsistent.
+  Change Commit(std::vector<std::uint32_t>* around = nullptr);
+
+  std::uint32_t size() const { return static_cast<std::uint32_t>(points_.size() / stride()); }
+  int d() const { return d_; }
+  const double* Point(std::uint32_t id) const { return points_.data() + id * stride(); }
+  // K rows of d: row a is tangent vector a.
+  const double* Tangent(std::uint32_t id) const { return tangents_.data() + id * stride() * K; }
+  const Cell& cell(std::uint32_t id) const { return cells_[id]; }
+
+  // The simplex dual to a vertex of star(p), or false if a facet of it is fake.
+  bool SimplexOf(std::uint32_t p, const Cell& cell, const Vertex& v, Simplex* simplex) const;
+
+  // Whether some sample point lies within `radius` of q.
+  bool AnyWithin(const double* q, double radius) const;
+
+  // q in p's tangent coordinates: normal = T_p^t (q - p), the return value |q - p|^2.
+  double Project(std::uint32_t p, const double* q, double* normal) const;
+  // p + T_p x.
+  void Lift(std::uint32_t p, const double* x, double* point) const;
+
+  // The cells as they would be with one more point: its own, and those that it would cut,
+  // ascending by id. Const: the complex does not change.
+  struct Tentative {
+    Cell own;
+    std::vector<std::pair<std::uint32_t, Cell>> cut;
+  };
+  void TryPoint(const double* point, const double* tangent, typename Cell::Scratch& scratch,
+                Tentative* result) const;
+
+  // Simplices held by the star of their lowest vertex.
+  std::vector<std::uint32_t> Simplices() const;
+  std::uint64_t simplex_count() const { return simplex_count_; }
+
+  const std::vector<double>& points() const { return points_; }  // d each
+  // (d K) x n, entry i*K + a of a column is coordinate i of tangent vector a.
+  Eigen::MatrixXd TangentMatrix() const;
+
+ private:
+  std::size_t stride() const { return static_cast<std::size_t>(d_); }
+  // Cospherical points would have every star decide alone how to split them; weights this much
+  // larger than rounding, and this much smaller than anything geometric, make all decide alike.
+  double Weight(std::uint32_t id) const {
+    return weight_scale_ * (static_cast<double>(Mix64(id) >> 11) * 0x1p-53);
+  }
+  bool ClipBy(Cell& cell, std::uint32_t p, std::uint32_t q, typename Cell::Scratch& s) const;
+  void BuildStar(std::uint32_t p, typename Cell::Scratch& scratch);
+  void Owned(std::uint32_t p, std::vector<Simplex>* simplices) const;
+  double Influence(const Cell& cell) const { return 2 * std::sqrt(cell.max_norm2()) * (1 + 1e-9); }
+
+  int d_;
+  double inradius_;
+  double weight_scale_;
+  std::vector<double> points_, tangents_;
+  std::vector<Cell> cells_;
+  BallTree tree_;
+  std::uint64_t simplex_count_ = 0;
+};
+
+extern template class StarComplex<1>;
+extern template class StarComplex<2>;
+extern template class StarComplex<3>;
+extern template class StarComplex<4>;
+extern template class StarComplex<5>;
+
+}  // namespace stellate::core

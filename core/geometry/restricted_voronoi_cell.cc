@@ -1,0 +1,258 @@
+#include "core/geometry/restricted_voronoi_cell.h"
+
+#include <utility>
+
+namespace stellate::core {
+namespace {
+
+// Solves the K x K system rows . x = rhs by elimination with partial pivoting. False if singular.
+template <int K>
+bool Solve(double (&m)[K][K + 1], double* x) {
+  for (int c = 0; c < K; ++c) {
+    int pivot = c;
+    for (int r = c + 1; r < K; ++r)
+      if (std::abs(m[r][c]) > std::abs(m[pivot][c])) pivot = r;
+    if (m[pivot][c] == 0) return false;
+    if (pivot != c) std::swap(m[pivot], m[c]);
+    const double inverse = 1.0 / m[c][c];
+    for (int r = c + 1; r < K; ++r) {
+      const double factor = m[r][c] * inverse;
+      for (int j = c + 1; j <= K; ++j) m[r][j] -= factor * m[c][j];
+    }
+  }
+  for (int r = K - 1; r >= 0; --r) {
+    double s = m[r][K];
+    for (int j = r + 1; j < K; ++j) s -= m[r][j] * x[j];
+    x[r] = s / m[r][r];
+  }
+  return true;
+}
+
+template <>
+bool Solve<2>(double (&m)[2][3], double* x) {
+  const double det = m[0][0] * m[1][1] - m[0][1] * m[1][0];
+  if (det == 0) return false;
+  const double inverse = 1.0 / det;
+  x[0] = (m[0][2] * m[1][1] - m[0][1] * m[1][2]) * inverse;
+  x[1] = (m[0][0] * m[1][2] - m[0][2] * m[1][0]) * inverse;
+  return true;
+}
+
+}  // namespace
+
+template <int K>
+void RestrictedVoronoiCell<K>::Reset(double inradius) {
+  // Vertices of a regular simplex, one coordinate at a time: all unit vectors, all pairwise dot
+  // products -1/K.
+  double n[K + 1][K] = {};
+  for (int a = 0; a < K; ++a) {
+    double rest = 1;
+    for (int b = 0; b < a; ++b) rest -= n[a][b] * n[a][b];
+    n[a][a] = std::sqrt(rest);
+    for (int i = a + 1; i <= K; ++i) {
+      double s = -1.0 / K;
+      for (int b = 0; b < a; ++b) s -= n[a][b] * n[i][b];
+      n[i][a] = s / n[a][a];
+    }
+  }
+  facets_.resize(K + 1);
+  vertices_.resize(K + 1);
+  for (int i = 0; i <= K; ++i) facets_[i].id = kFirstFakeId + static_cast<std::uint32_t>(i);
+  for (int i = 0; i <= K; ++i) {
+    for (int a = 0; a < K; ++a) {
+      facets_[i].normal[a] = n[i][a] * inradius;
+      vertices_[i].x[a] = -n[i][a] * inradius * K;
+    }
+    facets_[i].offset = inradius * inradius;
+    vertices_[i].norm2 = inradius * inradius * K * K;
+    vertices_[i].key = 0;
+    for (int j = 0, slot = 0; j <= K; ++j) {
+      if (j == i) continue;
+      vertices_[i].key += Mix64(facets_[static_cast<std::size_t>(j)].id);
+      vertices_[i].facet[slot] = static_cast<Index>(j);  // vertex i is on all facets but facet i
+      vertices_[i].adjacent[slot] = static_cast<Index>(j);
+      ++slot;
+    }
+  }
+  max_norm2_ = inradius * inradius * K * K;
+  has_fake_ = true;
+}
+
+// The coordinates come from the facets alone, in the order of their ids, so that they do not
+// depend on the order of the cuts. Where the facets are too nearly parallel for that, the point is
+// interpolated on the edge that the cut crosses.
+template <int K>
+void RestrictedVoronoiCell<K>::Locate(Vertex& v, const Vertex& kept, const Vertex& removed,
+                                      double s, double t) const {
+  Index order[K];
+  std::copy(v.facet, v.facet + K, order);
+  std::sort(order, order + K, [&](Index a, Index b) { return facets_[a].id < facets_[b].id; });
+  double m[K][K + 1];
+  v.key = 0;
+  for (int r = 0; r < K; ++r) {
+    const Facet& f = facets_[order[r]];
+    v.key += Mix64(f.id);
+    for (int a = 0; a < K; ++a) m[r][a] = f.normal[a];
+    m[r][K] = f.offset;
+  }
+  const bool solved = Solve<K>(m, v.x);
+  v.norm2 = 0;
+  for (int a = 0; a < K; ++a) v.norm2 += v.x[a] * v.x[a];
+  // A point of the edge is no farther from p than its farther end; 1e-9 is far above rounding in a
+  // well-conditioned solve and far below any distance that matters.
+  const double farther = std::max(kept.norm2, removed.norm2);
+  if (!solved || !(v.norm2 <= farther * (1 + 1e-9))) {
+    const double u = t > s ? -s / (t - s) : 0.0;  // s <= 0 < t: excess at kept, at removed
+    v.norm2 = 0;
+    for (int a = 0; a < K; ++a) {
+      v.x[a] = kept.x[a] + u * (removed.x[a] - kept.x[a]);
+      v.norm2 += v.x[a] * v.x[a];
+    }
+  }
+}
+
+template <int K>
+bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, double offset,
+                                    Scratch& scratch) {
+  const std::size_t old_count = vertices_.size();
+  scratch.excess.resize(old_count);
+  std::size_t worst = 0;
+  for (std::size_t i = 0; i < old_count; ++i) {
+    scratch.excess[i] = Excess(vertices_[i], normal, offset);
+    if (scratch.excess[i] > scratch.excess[worst]) worst = i;
+  }
+  if (!(scratch.excess[worst] > 0)) return false;
+
+  // What a plane cuts off a polytope is connected: take the part around the worst vertex, and
+  // leave what only rounding put beyond the plane.
+  scratch.cut.assign(old_count, 0);
+  scratch.stack.assign(1, static_cast<Index>(worst));
+  scratch.cut[worst] = 1;
+  std::size_t removed_count = 0;
+  scratch.crossings.clear();
+  while (!scratch.stack.empty()) {
+    const Index v = scratch.stack.back();
+    scratch.stack.pop_back();
+    ++removed_count;
+    for (int s = 0; s < K; ++s) {
+      const Index w = vertices_[v].adjacent[s];
+      if (scratch.excess[w] > 0) {
+        if (!scratch.cut[w]) {
+          scratch.cut[w] = 1;
+          scratch.stack.push_back(w);
+        }
+      } else {
+        scratch.crossings.push_back({w, v, static_cast<Index>(s)});
+      }
+    }
+  }
+  if (removed_count == old_count) return false;
+
+  const Index new_facet = static_cast<Index>(facets_.size());
+  Facet facet;
+  std::copy(normal, normal + K, facet.normal);
+  facet.offset = offset;
+  facet.id = id;
+  facets_.push_back(facet);
+
+  // One new vertex on each edge that crosses the plane. Its slot 0 holds the new facet, so that
+  // adjacent[0] is the kept end of the edge; the edge's facets follow.
+  vertices_.resize(old_count + scratch.crossings.size());
+  for (std::size_t c = 0; c < scratch.crossings.size(); ++c) {
+    const auto [kept, removed, slot] = scratch.crossings[c];
+    const Index created = static_cast<Index>(old_count + c);
+    Vertex& v = vertices_[created];
+    v.facet[0] = new_facet;
+    v.adjacent[0] = kept;
+    for (int s = 0, i = 1; s < K; ++s)
+      if (s != slot) v.facet[i++] = vertices_[removed].facet[s];
+    Vertex& k = vertices_[kept];
+    for (int s = 0; s < K; ++s) {
+      // The slot of kept's edge to `removed`: its facet is not on the edge.
+      if (k.adjacent[s] == removed &&
+          std::find(v.facet + 1, v.facet + K, k.facet[s]) == v.facet + K) {
+        k.adjacent[s] = created;
+        break;
+      }
+    }
+    vertices_[removed].adjacent[slot] = created;
+    Locate(v, k, vertices_[removed], scratch.excess[kept], scratch.excess[removed]);
+  }
+
+  // Neighbours on the new facet: around each two-dimensional face, walk from the removed end of
+  // one crossing edge through removed vertices to the next crossing edge.
+  for (std::size_t c = 0; c < scratch.crossings.size(); ++c) {
+    Vertex& v = vertices_[old_count + c];
+    for (int i = 1; i < K; ++i) {
+      Index at = scratch.crossings[c].removed;
+      Index entered = vertices_[at].facet[scratch.crossings[c].slot];  // not on the edge behind
+      Index drop = v.facet[i];
+      while (true) {
+        const Vertex& here = vertices_[at];
+        int s = 0;
+        while (here.facet[s] != drop) ++s;
+        const Index next = here.adjacent[s];
+        if (next >= old_count) {
+          v.adjacent[i] = next;
+          break;
+        }
+        // On `next` one facet is new to the walk; the one to drop there is the one entered by here.
+        drop = entered;
+        const Vertex& there = vertices_[next];
+        for (int r = 0; r < K; ++r)
+          if (std::find(here.facet, here.facet + K, there.facet[r]) == here.facet + K)
+            entered = there.facet[r];
+        at = next;
+      }
+    }
+  }
+  Compact(scratch);
+  return true;
+}
+
+// Drops the cut vertices and the facets that no vertex is left on; recomputes what is cached.
+template <int K>
+void RestrictedVoronoiCell<K>::Compact(Scratch& scratch) {
+  const std::size_t total = vertices_.size();
+  const std::size_t old_count = scratch.cut.size();
+  scratch.remap.resize(total);
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < total; ++i) {
+    if (i < old_count && scratch.cut[i]) continue;
+    scratch.remap[i] = static_cast<Index>(count);
+    if (count != i) vertices_[count] = vertices_[i];
+    ++count;
+  }
+  vertices_.resize(count);
+  max_norm2_ = 0;
+  scratch.cut.assign(facets_.size(), 0);
+  for (Vertex& v : vertices_) {
+    max_norm2_ = std::max(max_norm2_, v.norm2);
+    for (int s = 0; s < K; ++s) {
+      v.adjacent[s] = scratch.remap[v.adjacent[s]];
+      scratch.cut[v.facet[s]] = 1;
+    }
+  }
+  std::size_t kept = 0;
+  has_fake_ = false;
+  scratch.remap.resize(facets_.size());
+  for (std::size_t f = 0; f < facets_.size(); ++f) {
+    if (!scratch.cut[f]) continue;
+    scratch.remap[f] = static_cast<Index>(kept);
+    if (kept != f) facets_[kept] = facets_[f];
+    has_fake_ |= IsFake(facets_[kept].id);
+    ++kept;
+  }
+  if (kept == facets_.size()) return;
+  facets_.resize(kept);
+  for (Vertex& v : vertices_)
+    for (int s = 0; s < K; ++s) v.facet[s] = scratch.remap[v.facet[s]];
+}
+
+template class RestrictedVoronoiCell<1>;
+template class RestrictedVoronoiCell<2>;
+template class RestrictedVoronoiCell<3>;
+template class RestrictedVoronoiCell<4>;
+template class RestrictedVoronoiCell<5>;
+
+}  // namespace stellate::core

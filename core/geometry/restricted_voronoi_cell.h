@@ -1,0 +1,103 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "core/sample/random.h"
+
+namespace stellate::core {
+
+// Ids of the facets that bound a cell before its neighbours are known.
+inline constexpr std::uint32_t kFirstFakeId = 0xfffffff0u;
+inline constexpr bool IsFake(std::uint32_t id) { return id >= kFirstFakeId; }
+
+// The Voronoi cell of a sample point p restricted to T_pM (Lemma 2.4.2), in tangent coordinates
+// with p at the origin:
+//
+//   V(p) = { x in R^K : normal_q . x <= offset_q  for all q },
+//   normal_q = T_p^t (q - p),  offset_q = |q - p|^2 / 2  (plus the perturbing weights).
+//
+// A simple polytope: each vertex lies on exactly K facets and has K neighbours; it is dual to the
+// k-simplex of star(p) on p and the K facets' points, and is that simplex's circumcentre c_p in
+// T_pM. Kept by clipping, one half-space at a time; what is cut off is found by walking, so that
+// the combinatorics stay those of a polytope whatever rounding does to the coordinates.
+template <int K>
+class RestrictedVoronoiCell {
+ public:
+  using Index = std::uint16_t;
+
+  struct Facet {
+    double normal[K];  // length
+    double offset;     // length squared
+    std::uint32_t id;  // sample point, or fake
+  };
+
+  struct Vertex {
+    double x[K];              // c_p(sigma), tangent coordinates
+    double norm2;             // R_p(sigma)^2
+    std::uint64_t key;        // sum of Mix64 over the facets' ids: tells simplices apart quickly
+    Index facet[K];           // into facets()
+    Index adjacent[K];        // the vertex on all facets but facet[i]
+  };
+
+  // Working memory of Clip, one a thread.
+  struct Scratch {
+    std::vector<std::uint8_t> cut;
+    std::vector<double> excess;
+    std::vector<Index> stack, remap;
+    struct Crossing { Index kept, removed, slot; };  // slot: of the new vertex's edge in `removed`
+    std::vector<Crossing> crossings;
+  };
+
+  // A regular simplex of K+1 fake facets at distance `inradius` from p.
+  void Reset(double inradius);
+
+  // Cuts away { x : normal . x > offset }. Returns whether anything was cut. A half-space that
+  // would cut everything away (it cannot, for offset > 0, but in rounding) is refused.
+  bool Clip(std::uint32_t id, const double* normal, double offset, Scratch& scratch);
+
+  // Whether Clip with these arguments would cut: some vertex violates the half-space.
+  bool WouldCut(const double* normal, double offset) const {
+    for (const Vertex& v : vertices_)
+      if (Excess(v, normal, offset) > 0) return true;
+    return false;
+  }
+
+  const std::vector<Facet>& facets() const { return facets_; }
+  const std::vector<Vertex>& vertices() const { return vertices_; }
+
+  // max R_p, squared. A point farther from p than twice its root cannot matter.
+  double max_norm2() const { return max_norm2_; }
+  bool bounded() const { return !has_fake_; }  // no fake facet is left
+
+  bool HasFakeFacet(const Vertex& v) const {
+    for (Index f : v.facet)
+      if (IsFake(facets_[f].id)) return true;
+    return false;
+  }
+
+ private:
+  static double Excess(const Vertex& v, const double* normal, double offset) {
+    double s = -offset;
+    for (int a = 0; a < K; ++a) s += normal[a] * v.x[a];
+    return s;
+  }
+  void Locate(Vertex& v, const Vertex& kept, const Vertex& removed, double s, double t) const;
+  void Compact(Scratch& scratch);
+
+  std::vector<Facet> facets_;
+  std::vector<Vertex> vertices_;
+  double max_norm2_ = 0;
+  bool has_fake_ = true;
+};
+
+extern template class RestrictedVoronoiCell<1>;
+extern template class RestrictedVoronoiCell<2>;
+extern template class RestrictedVoronoiCell<3>;
+extern template class RestrictedVoronoiCell<4>;
+extern template class RestrictedVoronoiCell<5>;
+
+}  // namespace stellate::core

@@ -1,0 +1,499 @@
+#include "core/refinement/refinement.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+namespace stellate::core {
+namespace {
+
+// Closest points of answered points may move by this share of epsilon: positions wrong by 0.01
+// epsilon are still meshed well.
+constexpr double kIdempotenceTolerance = 1e-3;
+constexpr Eigen::Index kIdempotenceSample = 64;
+
+// Where R is large the image of a circumcentre may fall anywhere: one that comes nearer than this
+// share of epsilon to the sample would cost quality, so the step is shortened instead.
+constexpr double kCoarseSpacing = 0.5;
+constexpr double kCoarseRadius = 2;  // "large": beyond this many epsilon
+// Otherwise only points that coincide for all purposes are refused, as a share of epsilon,
+constexpr double kSamePoint = 1e-6;
+// and good points nearer to the sample than this share of the circumradius.
+constexpr double kGoodPointSpacing = 0.25;
+
+// Differences of closest points are taken over this share of epsilon: the error is its square over
+// the reach's, far below what directions may be wrong by (0.03).
+constexpr double kTangentStep = 0.01;
+
+// Cells begin as fake simplices a little larger than the step of the front.
+constexpr double kInradius = 1.2;
+constexpr double kDefaultAdvanceEpsilons = 3;
+constexpr double kDefaultAdvanceShare = 0.1;  // of the bounding box's diagonal
+
+}  // namespace
+
+ResolvedCriteria Resolve(const Specification& spec) {
+  const Criteria& c = spec.criteria;
+  ResolvedCriteria r;
+  r.epsilon = spec.epsilon;
+  r.radius_edge_bound = c.radius_edge_bound;
+  r.sliver_bound = c.sliver_bound.value_or(spec.dimension <= 2 ? 0.0 : 0.2);
+  r.picking_radius = c.picking_radius;
+  r.small_sliver_radius = c.small_sliver_radius;
+  r.candidates = c.candidates.value_or(spec.dimension <= 2 ? 1 : 10);
+  r.flat_alternations = c.flat_alternations;
+  double step = kDefaultAdvanceEpsilons * spec.epsilon;
+  if (spec.bounding_box) {
+    const double diagonal = (spec.bounding_box->upper - spec.bounding_box->lower).norm();
+    step = std::max(step, kDefaultAdvanceShare * diagonal);
+  }
+  r.advance_step = c.advance_step.value_or(step);
+  return r;
+}
+
+template <int K>
+Refinement<K>::Refinement(Specification spec)
+    : spec_(std::move(spec)),
+      criteria_(Resolve(spec_)),
+      complex_(spec_.ambient_dimension, spec_.epsilon,
+               kInradius * std::max(criteria_.advance_step, spec_.epsilon)),
+      tangent_finder_(K, spec_.ambient_dimension, kTangentStep * spec_.epsilon,
+                      spec_.random_seed) {
+  AskForSeeds();
+}
+
+template <int K>
+const QueryBatch* Refinement<K>::NextBatch() {
+  if (over_ || !batch_) return nullptr;
+  batch_->round = progress_.round + 1;
+  return &*batch_;
+}
+
+template <int K>
+Status Refinement<K>::CheckIdempotence(const Answers& answers) const {
+  if (idempotence_sample_.cols() == 0) return Status::Ok();
+  const AnswerBlock& again = answers.blocks.back();
+  for (Eigen::Index i = 0; i < idempotence_sample_.cols(); ++i) {
+    if (!again.found.empty() && !again.found[static_cast<std::size_t>(i)]) continue;
+    const double moved = (again.points.col(i) - idempotence_sample_.col(i)).norm();
+    if (moved <= kIdempotenceTolerance * spec_.epsilon) continue;
+    std::ostringstream out;
+    out << "closest_point is not idempotent: query " << i << " of block "
+        << answers.blocks.size() - 1 << " was a point that closest_point itself had returned, and it"
+        << " was moved by " << moved << ", more than " << kIdempotenceTolerance
+        << " epsilon; closest_point must leave points of the manifold where they are";
+    return {StatusCode::kOracleNotIdempotent, out.str()};
+  }
+  return Status::Ok();
+}
+
+template <int K>
+Expected<MeshDelta> Refinement<K>::Absorb(const Answers& answers) {
+  if (over_ || !batch_)
+    return Refuse(StatusCode::kFailedPrecondition, "Absorb without a batch: the run is over");
+  if (answers.blocks.size() != batch_->blocks.size())
+    return Refuse(StatusCode::kOracleShape,
+                  "got " + std::to_string(answers.blocks.size()) + " answer blocks for " +
+                      std::to_string(batch_->blocks.size()) + " query blocks; send one for each");
+  for (std::size_t b = 0; b < answers.blocks.size(); ++b) {
+    const QueryBlock& block = batch_->blocks[b];
+    if (answers.blocks[b].points.cols() != block.size())
+      return Refuse(StatusCode::kOracleShape,
+                    "block " + std::to_string(b) + " has " +
+                        std::to_string(answers.blocks[b].points.cols()) + " answers for " +
+                        std::to_string(block.size()) + " queries; send one for each");
+    if (Status s = CheckAnswers(spec_, block, 0, answers.blocks[b]); !s.ok())
+      return tl::unexpected<Status>(s);
+  }
+  if (Status s = CheckIdempotence(answers); !s.ok()) return tl::unexpected<Status>(s);
+  idempotence_sample_.resize(0, 0);
+
+  ++progress_.round;
+  ++report_.counts.rounds;
+  const auto size = static_cast<std::uint64_t>(batch_->size());
+  progress_.queries += size;
+  (stage_ == Stage::kTangents ? report_.counts.tangent_queries : report_.counts.queries) += size;
+  delta_ = {};
+  delta_.revision = progress_.round;
+  delta_.first_vertex = complex_.size();
+  batch_.reset();
+
+  switch (stage_) {
+    case Stage::kCertify:
+      certifier_->Absorb(answers.blocks);
+      if (const auto* blocks = certifier_->NextBlocks())
+        batch_ = QueryBatch{0, *blocks};
+      else
+        Finish(Termination::kConverged);
+      break;
+    case Stage::kTangents:
+      tangent_finder_.Absorb(answers.blocks.front());
+      if (const QueryBlock* more = tangent_finder_.Next())
+        AskAgain(*more, Stage::kTangents);
+      else
+        AfterTangents();
+      break;
+    case Stage::kSeeds:
+    case Stage::kPoints:
+    case Stage::kAlternate:
+      TakePoints(answers);
+      break;
+  }
+  if (batch_ && !over_ && progress_.round >= spec_.limits.max_rounds)
+    Finish(Termination::kRoundBudget);
+  if (batch_ && idempotence_sample_.cols() > 0) {
+    QueryBlock again;
+    again.points = idempotence_sample_;
+    batch_->blocks.push_back(std::move(again));
+  }
+  delta_.points = Eigen::Map<const Eigen::MatrixXd>(complex_.points().data(), complex_.d(),
+                                                    complex_.size())
+                      .rightCols(complex_.size() - static_cast<Eigen::Index>(delta_.first_vertex));
+  UpdateProgress();
+  return std::move(delta_);
+}
+
+// Sorts the answers back into candidates.
+template <int K>
+void Refinement<K>::TakePoints(const Answers& answers) {
+  const AnswerBlock& first = answers.blocks.front();
+  const auto is_found = [](const AnswerBlock& block, Eigen::Index i) {
+    return block.found.empty() ? std::uint8_t{1} : block.found[static_cast<std::size_t>(i)];
+  };
+  const int d = complex_.d();
+  const auto take = [&](Eigen::Index c, const AnswerBlock& block, Eigen::Index column) {
+    found_[static_cast<std::size_t>(c)] = is_found(block, column);
+    points_.col(c) = block.points.col(column);
+    if (block.tangents.size() == 0) return;
+    for (int i = 0; i < d; ++i)
+      for (int a = 0; a < K; ++a) tangents_(a * d + i, c) = block.tangents(i * K + a, column);
+  };
+  const Eigen::Index count =
+      stage_ == Stage::kPoints ? first_candidate_.back() : first.points.cols();
+  points_.resize(d, count);
+  found_.assign(static_cast<std::size_t>(count), 0);
+  tangents_.resize(d * K, count);
+  for (Eigen::Index c = 0; c < count; ++c) {
+    if (stage_ != Stage::kPoints) {
+      take(c, first, c);
+      continue;
+    }
+    const auto [block, column] = places_[static_cast<std::size_t>(c)];
+    take(c, answers.blocks[static_cast<std::size_t>(block)], column);
+  }
+  if (stage_ == Stage::kSeeds) {
+    targets_.clear();
+  } else if (alternations_left_ > 0) {
+    // Back to the flat of each candidate, and to M from there.
+    --alternations_left_;
+    QueryBlock block;
+    block.want_tangents = spec_.oracle.tangent_basis;
+    block.points = points_;
+    for (std::size_t i = 0; i < targets_.size(); ++i) {
+      const double* tangent = complex_.Tangent(targets_[i].star);
+      for (Eigen::Index c = first_candidate_[i]; c < first_candidate_[i + 1]; ++c) {
+        if (!found_[static_cast<std::size_t>(c)] || targets_[i].violation.fake) continue;
+        for (int a = 0; a < K; ++a) {
+          const Eigen::Map<const Eigen::VectorXd> t(tangent + a * d, d);
+          block.points.col(c) -= t * t.dot(points_.col(c) - candidates_.col(c));
+        }
+      }
+    }
+    return AskAgain(block, Stage::kAlternate);
+  }
+  AfterPoints();
+}
+
+template <int K>
+void Refinement<K>::AfterPoints() {
+  if (spec_.oracle.tangent_basis) return AfterTangents();
+  // Tangents of the points that were found, with the stars' own as guesses.
+  std::vector<Eigen::Index> known;
+  std::vector<const double*> guesses;
+  const auto add = [&](Eigen::Index c, const double* guess) {
+    if (!found_[static_cast<std::size_t>(c)]) return;
+    known.push_back(c);
+    guesses.push_back(guess);
+  };
+  if (targets_.empty()) {
+    for (Eigen::Index c = 0; c < points_.cols(); ++c) add(c, nullptr);
+  } else {
+    for (std::size_t i = 0; i < targets_.size(); ++i) {
+      // Far steps may turn any corner: no guess there.
+      const bool near = targets_[i].radius <= kCoarseRadius * criteria_.epsilon;
+      const double* guess = near ? complex_.Tangent(targets_[i].star) : nullptr;
+      for (Eigen::Index c = first_candidate_[i]; c < first_candidate_[i + 1]; ++c) add(c, guess);
+    }
+  }
+  if (known.empty()) return AfterTangents();
+  tangent_finder_.Start(points_(Eigen::all, known), std::move(guesses));
+  AskAgain(*tangent_finder_.Next(), Stage::kTangents);
+}
+
+template <int K>
+void Refinement<K>::AfterTangents() {
+  if (!spec_.oracle.tangent_basis) {
+    Eigen::Index next = 0;
+    for (Eigen::Index c = 0; c < points_.cols(); ++c) {
+      auto& found = found_[static_cast<std::size_t>(c)];
+      if (!found) continue;
+      tangents_.col(c) = tangent_finder_.tangents().col(next);
+      found = tangent_finder_.ok()[static_cast<std::size_t>(next++)];
+    }
+  }
+  if (targets_.empty())
+    InsertSeeds();
+  else
+    InsertTargets();
+  if (over_) return;
+  Commit();
+  Plan();
+}
+
+template <int K>
+void Refinement<K>::InsertSeeds() {
+  Eigen::Index found = 0;
+  for (const std::uint8_t f : found_) found += f;
+  if (found == 0) {
+    std::ostringstream out;
+    out << "no seed has a closest point on the manifold: " << points_.cols()
+        << (spec_.seeds.cols() > 0 ? " seeds were" : " points of the bounding box were")
+        << " tried; give seeds near the manifold, or a box that holds it";
+    if (!spec_.oracle.tangent_basis)
+      out << "; seeds where the manifold does not look " << K << "-dimensional count as not found";
+    return Fail({StatusCode::kNoSeeds, out.str()});
+  }
+  idempotence_sample_.resize(complex_.d(), std::min(found, kIdempotenceSample));
+  Eigen::Index sampled = 0;
+  for (Eigen::Index c = 0; c < points_.cols(); ++c) {
+    if (!found_[static_cast<std::size_t>(c)]) continue;
+    if (sampled < idempotence_sample_.cols()) idempotence_sample_.col(sampled++) = points_.col(c);
+    if (complex_.size() < spec_.limits.max_vertices &&
+        !complex_.AnyWithin(points_.col(c).data(), criteria_.epsilon))
+      complex_.Append(points_.col(c).data(), tangents_.col(c).data());
+    else
+      ++report_.counts.duplicates;
+  }
+}
+
+// R1 and R2 insert the image of the circumcentre if that mends anything; R3 and R4 the best of
+// their candidates, each judged against the complex as it was before the round.
+template <int K>
+void Refinement<K>::InsertTargets() {
+  std::vector<int> best(targets_.size(), 0);
+  tbb::parallel_for(std::size_t{0}, targets_.size(), [&](std::size_t i) {
+    if (targets_[i].violation.rule >= Rule::kSliver) best[i] = BestCandidate(i);
+  });
+  for (std::size_t i = 0; i < targets_.size(); ++i) {
+    if (targets_[i].violation.rule >= Rule::kSliver)
+      InsertGoodPoint(i, best[i]);
+    else
+      InsertRefined(i);
+  }
+}
+
+template <int K>
+void Refinement<K>::InsertRefined(std::size_t i) {
+  const Target<K>& t = targets_[i];
+  const Eigen::Index c = first_candidate_[i];
+  if (!found_[static_cast<std::size_t>(c)]) {
+    if (FindsFlats(t))
+      no_flat_[t.star] = 1;
+    else
+      Discourage(t.star);
+    return;
+  }
+  const double* y = points_.col(c).data();
+  double normal[K];
+  double excess = -0.5 * complex_.Project(t.star, y, normal);
+  for (int a = 0; a < K; ++a) excess += normal[a] * t.violation.x[a];
+  const bool coarse = t.violation.radius > kCoarseRadius * criteria_.epsilon;
+  const double spacing = (coarse ? kCoarseSpacing : kSamePoint) * criteria_.epsilon;
+  const bool duplicate = complex_.AnyWithin(y, spacing);
+  if (!(excess > 0) || duplicate) {
+    report_.counts.duplicates += duplicate;
+    return Discourage(t.star);
+  }
+  complex_.Append(y, tangents_.col(c).data());
+  ++(t.violation.rule == Rule::kSize ? report_.counts.inserted_size
+                                     : report_.counts.inserted_radius_edge);
+}
+
+template <int K>
+int Refinement<K>::BestCandidate(std::size_t i) const {
+  const Target<K>& t = targets_[i];
+  thread_local typename StarComplex<K>::Cell::Scratch scratch;
+  thread_local typename StarComplex<K>::Tentative tentative;
+  int best = -1, fewest = std::numeric_limits<int>::max();
+  for (Eigen::Index c = first_candidate_[i]; c < first_candidate_[i + 1] && fewest > 0; ++c) {
+    if (!found_[static_cast<std::size_t>(c)]) continue;
+    const double* y = points_.col(c).data();
+    double normal[K];
+    double excess = -0.5 * complex_.Project(t.star, y, normal);
+    for (int a = 0; a < K; ++a) excess += normal[a] * t.violation.x[a];
+    if (!(excess > 0) || complex_.AnyWithin(y, kGoodPointSpacing * t.radius)) continue;
+    const int index = static_cast<int>(c - first_candidate_[i]);
+    if (criteria_.candidates == 1) return index;
+    complex_.TryPoint(y, tangents_.col(c).data(), scratch, &tentative);
+    const int bad = CountBad<K>(complex_, y, tentative, criteria_.sliver_bound,
+                                criteria_.small_sliver_radius * t.radius, fewest);
+    if (bad < fewest) {
+      fewest = bad;
+      best = index;
+    }
+  }
+  return best;
+}
+
+template <int K>
+void Refinement<K>::InsertGoodPoint(std::size_t i, int best) {
+  const Target<K>& t = targets_[i];
+  if (best < 0) {
+    no_flat_[t.star] = 1;  // if that was why
+    return Discourage(t.star);
+  }
+  const Eigen::Index c = first_candidate_[i] + best;
+  const double* y = points_.col(c).data();
+  if (complex_.AnyWithin(y, kGoodPointSpacing * t.radius)) return;  // another of this round came near
+  complex_.Append(y, tangents_.col(c).data());
+  ++(t.violation.rule == Rule::kSliver ? report_.counts.inserted_sliver
+                                       : report_.counts.inserted_inconsistent);
+}
+
+// Brings the stars and all that is known of them up to date with the appended points.
+template <int K>
+void Refinement<K>::Commit() {
+  const std::uint32_t first = static_cast<std::uint32_t>(standing_.size());
+  const bool judged = !all_suspect_;
+  std::vector<std::uint32_t> around;
+  typename StarComplex<K>::Change change = complex_.Commit(judged ? &around : nullptr);
+  std::vector<std::uint32_t> touched = std::move(change.stars);
+  for (std::uint32_t p = first; p < complex_.size(); ++p) touched.push_back(p);
+  standing_.resize(complex_.size(), kFine);
+  discouraged_.resize(complex_.size(), 0);
+  no_flat_.resize(complex_.size(), 0);
+  delta_.added = std::move(change.added);
+  delta_.removed = std::move(change.removed);
+
+  std::vector<std::uint8_t> violates(touched.size());
+  tbb::parallel_for(std::size_t{0}, touched.size(), [&](std::size_t i) {
+    violates[i] = WorstSizeOrShape<K>(complex_, touched[i], criteria_.epsilon,
+                                      criteria_.radius_edge_bound)
+                      .has_value();
+  });
+  for (std::size_t i = 0; i < touched.size(); ++i) {
+    const std::uint32_t p = touched[i];
+    discouraged_[p] = no_flat_[p] = 0;
+    if (violates[i] && standing_[p] != kSizeOrShape) active_.push_back(p);
+    standing_[p] = violates[i] ? kSizeOrShape : kFine;
+  }
+  std::erase_if(active_, [&](std::uint32_t p) { return standing_[p] != kSizeOrShape; });
+  if (judged) {
+    suspects_.insert(suspects_.end(), around.begin(), around.end());
+    suspects_.insert(suspects_.end(), touched.begin(), touched.end());
+  }
+}
+
+template <int K>
+void Refinement<K>::StartCertificate() {
+  StarFacts facts;
+  facts.converged = true;
+  for (std::uint32_t p = 0; p < complex_.size(); ++p)
+    facts.max_circumradius =
+        std::max(facts.max_circumradius, std::sqrt(complex_.cell(p).max_norm2()));
+  certified_tangents_ = complex_.TangentMatrix();
+  certified_simplices_ = complex_.Simplices();
+  const MeshView view{K,
+                      complex_.d(),
+                      complex_.size(),
+                      complex_.points().data(),
+                      certified_tangents_.data(),
+                      &certified_simplices_};
+  certifier_ = std::make_unique<Certifier>(spec_, view, facts);
+  if (const auto* blocks = certifier_->NextBlocks()) {
+    batch_ = QueryBatch{0, *blocks};
+    stage_ = Stage::kCertify;
+  } else {
+    Finish(Termination::kConverged);
+  }
+}
+
+template <int K>
+void Refinement<K>::Fail(Status reason) {
+  if (!over_) report_.failure = std::move(reason);
+  Finish(Termination::kOracleFailed);
+}
+
+template <int K>
+void Refinement<K>::Finish(Termination termination) {
+  if (over_) return;
+  over_ = true;
+  batch_.reset();
+  report_.termination = termination;
+  report_.counts.vertices = complex_.size();
+  report_.counts.simplices = complex_.simplex_count();
+  Certificate& certificate = report_.certificate;
+  if (termination == Termination::kConverged) {
+    certificate = certifier_->certificate();
+  } else {
+    certificate.verdict = std::string("not certified: the run ended as ") +
+                          TerminationName(termination) + " before every rule held";
+    if (!report_.failure.message.empty()) certificate.verdict += ": " + report_.failure.message;
+    for (std::uint32_t p = 0; p < complex_.size() && p < standing_.size(); ++p) {
+      if (!complex_.cell(p).bounded()) continue;
+      certificate.inconsistent_simplices += CountInconsistent<K>(complex_, p);
+      certificate.max_circumradius =
+          std::max(certificate.max_circumradius, std::sqrt(complex_.cell(p).max_norm2()));
+    }
+  }
+  certifier_.reset();
+  certified_tangents_.resize(0, 0);
+  certified_simplices_ = {};
+  UpdateProgress();
+}
+
+template <int K>
+void Refinement<K>::UpdateProgress() {
+  progress_.vertices = complex_.size();
+  progress_.simplices = complex_.simplex_count();
+  if (over_) {
+    progress_.phase = Phase::kDone;
+    progress_.fraction = report_.termination == Termination::kConverged ? 1 : progress_.fraction;
+    return;
+  }
+  progress_.phase = stage_ == Stage::kCertify ? Phase::kCertifying
+                    : complex_.size() == 0    ? Phase::kSeeding
+                                              : Phase::kRefining;
+  progress_.bad_size = progress_.bad_radius_edge = progress_.unbounded_stars = 0;
+  // A cell of circumradius R will have to hold about (R / epsilon)^k / 2 more points.
+  double missing = 0;
+  for (const std::uint32_t p : active_) {
+    const auto& cell = complex_.cell(p);
+    const double ratio = std::sqrt(cell.max_norm2()) / criteria_.epsilon;
+    progress_.unbounded_stars += !cell.bounded();
+    ++(ratio > 1 ? progress_.bad_size : progress_.bad_radius_edge);
+    missing += 0.5 * std::pow(std::max(ratio, 1.0), K);
+  }
+  missing += static_cast<double>(blemished_.size());
+  const double have = static_cast<double>(complex_.size());
+  const double share = stage_ == Stage::kCertify ? 0.99 : 0.98 * have / (have + missing + 1);
+  progress_.fraction = std::max(progress_.fraction, share);
+}
+
+template <int K>
+Eigen::MatrixXd Refinement<K>::Points() const {
+  return Eigen::Map<const Eigen::MatrixXd>(complex_.points().data(), complex_.d(),
+                                           complex_.size());
+}
+
+template class Refinement<1>;
+template class Refinement<2>;
+template class Refinement<3>;
+template class Refinement<4>;
+template class Refinement<5>;
+
+}  // namespace stellate::core

@@ -1,0 +1,123 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "core/certificate/certifier.h"
+#include "core/complex/star_complex.h"
+#include "core/mesher.h"
+#include "core/refinement/independent_set.h"
+#include "core/refinement/rules.h"
+#include "core/refinement/tangent_finder.h"
+
+namespace stellate::core {
+
+// The constants of a run, defaults filled in for this k.
+struct ResolvedCriteria {
+  double epsilon, radius_edge_bound, sliver_bound, picking_radius, small_sliver_radius, advance_step;
+  int candidates, flat_alternations;
+};
+ResolvedCriteria Resolve(const Specification& spec);
+
+// The algorithm of Sec. 5.3.5 as the state machine of mesher.h, for one k.
+//
+// A round goes: Plan (which simplices break a rule, which of them can be mended together, what to
+// ask for that), answers, tangents where the client gives none, Insert. When no rule applies any
+// more the certifier asks its own questions.
+template <int K>
+class Refinement final : public Mesher {
+ public:
+  explicit Refinement(Specification spec);
+
+  const QueryBatch* NextBatch() override;
+  Expected<MeshDelta> Absorb(const Answers& answers) override;
+  void Cancel() override { Finish(Termination::kCancelled); }
+  void Fail(Status reason) override;
+
+  const Specification& specification() const override { return spec_; }
+  const Progress& progress() const override { return progress_; }
+  const Report& report() const override { return report_; }
+  Eigen::MatrixXd Points() const override;
+  Eigen::MatrixXd Tangents() const override { return complex_.TangentMatrix(); }
+  std::vector<std::uint32_t> Simplices() const override { return complex_.Simplices(); }
+
+ private:
+  enum class Stage { kSeeds, kPoints, kAlternate, kTangents, kCertify };
+
+  // Planning (refinement_plan.cc).
+  void AskForSeeds();
+  void Plan();
+  std::vector<Target<K>> SizeAndShapeTargets();
+  std::vector<Target<K>> SliverAndConsistencyTargets();
+  Target<K> Aim(std::uint32_t star, const Violation<K>& violation) const;
+  void AskForTargets();
+  void AskAgain(const QueryBlock& block, Stage stage);
+  bool FindsFlats(const Target<K>& target) const;
+
+  // Answers (refinement.cc).
+  Status CheckIdempotence(const Answers& answers) const;
+  void TakePoints(const Answers& answers);
+  void AfterPoints();
+  void AfterTangents();
+  void InsertSeeds();
+  void InsertTargets();
+  void InsertRefined(std::size_t target);
+  void InsertGoodPoint(std::size_t target, int best);
+  int BestCandidate(std::size_t target) const;
+  void Discourage(std::uint32_t star);
+  void Commit();
+  void StartCertificate();
+  void Finish(Termination termination);
+  void UpdateProgress();
+
+  Eigen::Index CandidateCount(const Target<K>& target) const {
+    return target.violation.rule >= Rule::kSliver ? criteria_.candidates : 1;
+  }
+
+  Specification spec_;
+  ResolvedCriteria criteria_;
+  StarComplex<K> complex_;
+  Progress progress_;
+  Report report_;
+
+  Stage stage_ = Stage::kSeeds;
+  std::optional<QueryBatch> batch_;
+  MeshDelta delta_;  // of the round being absorbed
+  bool over_ = false;
+
+  // The open round: targets, and the points asked for them, candidate by candidate.
+  std::vector<Target<K>> targets_;
+  std::vector<Eigen::Index> first_candidate_;         // by target; one past the last at the end
+  std::vector<std::pair<int, Eigen::Index>> places_;  // by candidate: block and column
+  Eigen::MatrixXd candidates_;                        // d x n, as asked for
+  Eigen::MatrixXd points_;                            // d x n, as answered
+  std::vector<std::uint8_t> found_;
+  Eigen::MatrixXd tangents_;  // (K rows of d) x n
+  TangentFinder tangent_finder_;
+  int alternations_left_ = 0;
+  Eigen::MatrixXd idempotence_sample_;  // d x m, asked for again with the next batch
+
+  // By star.
+  enum Standing : std::uint8_t { kFine, kSizeOrShape, kSliverOrInconsistent };
+  std::vector<std::uint8_t> standing_;
+  std::vector<std::uint8_t> discouraged_;  // failed attempts; above kGiveUp: left alone
+  std::vector<std::uint8_t> no_flat_;      // an intersection was not found: ask for closest points
+  std::vector<std::uint32_t> active_;      // stars with a violation of R1 or R2
+  std::vector<std::uint32_t> suspects_;    // stars to judge by R3 and R4
+  std::vector<std::uint32_t> blemished_;   // stars with a violation of R3 or R4
+  bool all_suspect_ = true;                // R3 and R4 were not judged yet
+  std::uint64_t before_good_points_ = 0;   // vertices when R1 and R2 first held
+
+  std::unique_ptr<Certifier> certifier_;
+  Eigen::MatrixXd certified_tangents_;
+  std::vector<std::uint32_t> certified_simplices_;
+};
+
+extern template class Refinement<1>;
+extern template class Refinement<2>;
+extern template class Refinement<3>;
+extern template class Refinement<4>;
+extern template class Refinement<5>;
+
+}  // namespace stellate::core

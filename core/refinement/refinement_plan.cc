@@ -1,0 +1,227 @@
+// How a round is planned: the questions of Refinement.
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/refinement/refinement.h"
+#include "core/sample/random.h"
+
+namespace stellate::core {
+namespace {
+
+// A star whose refinement failed this often in a row is left alone.
+constexpr int kGiveUp = 8;
+// Good points that no longer help: this many times the vertices that R1 and R2 needed.
+constexpr double kMostGrowth = 4;
+constexpr std::uint64_t kLeastGrowth = 2000;
+
+// A point of the unit ball of R^K, uniform.
+template <int K>
+void UniformInBall(Random& random, double* x) {
+  double norm2 = 0;
+  for (int a = 0; a < K; ++a) {
+    x[a] = random.Normal();
+    norm2 += x[a] * x[a];
+  }
+  const double scale = std::pow(random.Uniform(), 1.0 / K) / std::sqrt(norm2);
+  for (int a = 0; a < K; ++a) x[a] *= scale;
+}
+
+}  // namespace
+
+template <int K>
+void Refinement<K>::AskForSeeds() {
+  QueryBlock block;
+  block.kind = QueryKind::kClosestPoint;
+  block.want_tangents = spec_.oracle.tangent_basis;
+  if (spec_.seeds.cols() > 0) {
+    block.points = spec_.seeds;
+  } else {
+    const int count = spec_.box_seeds > 0 ? spec_.box_seeds : kDefaultBoxSeeds;
+    const BoundingBox& box = *spec_.bounding_box;
+    block.points.resize(spec_.ambient_dimension, count);
+    Random random(spec_.random_seed);
+    for (Eigen::Index i = 0; i < count; ++i)
+      for (Eigen::Index j = 0; j < block.points.rows(); ++j)
+        block.points(j, i) = box.lower[j] + random.Uniform() * (box.upper[j] - box.lower[j]);
+  }
+  AskAgain(block, Stage::kSeeds);
+}
+
+template <int K>
+void Refinement<K>::AskAgain(const QueryBlock& block, Stage stage) {
+  batch_.emplace();
+  batch_->blocks.push_back(block);
+  stage_ = stage;
+}
+
+template <int K>
+bool Refinement<K>::FindsFlats(const Target<K>& target) const {
+  return spec_.oracle.intersect_flat && !target.violation.fake && !no_flat_[target.star];
+}
+
+// Where to insert for a violation: at the circumcentre, but no farther out than the advance step,
+// and nearer after each failed attempt.
+template <int K>
+Target<K> Refinement<K>::Aim(std::uint32_t star, const Violation<K>& violation) const {
+  Target<K> target;
+  target.star = star;
+  target.violation = violation;
+  double scale = 1;
+  if (violation.rule < Rule::kSliver) {
+    scale = std::min(1.0, criteria_.advance_step / violation.radius);
+    if (violation.radius > criteria_.epsilon) scale = std::ldexp(scale, -discouraged_[star]);
+  }
+  for (int a = 0; a < K; ++a) target.x[a] = violation.x[a] * scale;
+  target.radius = violation.radius * scale;
+  return target;
+}
+
+template <int K>
+std::vector<Target<K>> Refinement<K>::SizeAndShapeTargets() {
+  std::vector<std::optional<Target<K>>> found(active_.size());
+  tbb::parallel_for(std::size_t{0}, active_.size(), [&](std::size_t i) {
+    const std::uint32_t p = active_[i];
+    if (discouraged_[p] > kGiveUp) return;
+    const auto violation =
+        WorstSizeOrShape<K>(complex_, p, criteria_.epsilon, criteria_.radius_edge_bound);
+    if (violation) found[i] = Aim(p, *violation);
+  });
+  std::vector<Target<K>> targets;
+  for (const auto& t : found)
+    if (t) targets.push_back(*t);
+  return targets;
+}
+
+template <int K>
+std::vector<Target<K>> Refinement<K>::SliverAndConsistencyTargets() {
+  if (all_suspect_) {
+    suspects_.resize(complex_.size());
+    for (std::uint32_t p = 0; p < complex_.size(); ++p) suspects_[p] = p;
+    all_suspect_ = false;
+    before_good_points_ = complex_.size();
+  }
+  suspects_.insert(suspects_.end(), blemished_.begin(), blemished_.end());
+  std::sort(suspects_.begin(), suspects_.end());
+  suspects_.erase(std::unique(suspects_.begin(), suspects_.end()), suspects_.end());
+  std::vector<std::optional<Violation<K>>> found(suspects_.size());
+  tbb::parallel_for(std::size_t{0}, suspects_.size(), [&](std::size_t i) {
+    found[i] = WorstSliverOrInconsistent<K>(complex_, suspects_[i], criteria_.sliver_bound);
+  });
+  std::vector<Target<K>> targets;
+  blemished_.clear();
+  progress_.bad_sliver = progress_.bad_inconsistent = 0;
+  for (std::size_t i = 0; i < suspects_.size(); ++i) {
+    const std::uint32_t p = suspects_[i];
+    standing_[p] = found[i] ? kSliverOrInconsistent : kFine;
+    if (!found[i]) continue;
+    blemished_.push_back(p);
+    ++(found[i]->rule == Rule::kSliver ? progress_.bad_sliver : progress_.bad_inconsistent);
+    if (discouraged_[p] <= kGiveUp) targets.push_back(Aim(p, *found[i]));
+  }
+  suspects_.clear();
+  return targets;
+}
+
+// Finds what to do next and asks for it, or ends the refinement.
+template <int K>
+void Refinement<K>::Plan() {
+  if (complex_.size() >= spec_.limits.max_vertices) return Finish(Termination::kVertexBudget);
+  std::vector<Target<K>> targets = SizeAndShapeTargets();
+  if (targets.empty()) {
+    if (!active_.empty()) return Finish(Termination::kNoProgress);
+    targets = SliverAndConsistencyTargets();
+    if (targets.empty()) {
+      if (!blemished_.empty()) return Finish(Termination::kNoProgress);
+      return StartCertificate();
+    }
+    const double most = std::max(kMostGrowth * static_cast<double>(before_good_points_),
+                                 static_cast<double>(before_good_points_ + kLeastGrowth));
+    if (static_cast<double>(complex_.size()) > most) return Finish(Termination::kNoProgress);
+  }
+  targets_ = SelectIndependent<K>(complex_, std::move(targets));
+  const std::uint64_t room = spec_.limits.max_vertices - complex_.size();
+  if (targets_.size() > room) targets_.resize(room);
+  AskForTargets();
+}
+
+template <int K>
+void Refinement<K>::AskForTargets() {
+  first_candidate_.assign(1, 0);
+  for (const Target<K>& t : targets_)
+    first_candidate_.push_back(first_candidate_.back() + CandidateCount(t));
+  const Eigen::Index count = first_candidate_.back();
+  const int d = complex_.d();
+  candidates_.resize(d, count);
+  places_.resize(static_cast<std::size_t>(count));
+  QueryBlock flats, closest;
+  flats.kind = QueryKind::kIntersectFlat;
+  flats.want_tangents = closest.want_tangents = spec_.oracle.tangent_basis;
+  Eigen::Index flat_count = 0;
+  for (std::size_t i = 0; i < targets_.size(); ++i)
+    if (FindsFlats(targets_[i])) flat_count += first_candidate_[i + 1] - first_candidate_[i];
+  flats.points.resize(d, flat_count);
+  flats.bases.resize(d * K, flat_count);
+  flats.radii.resize(flat_count);
+  closest.points.resize(d, count - flat_count);
+  const int closest_block = flat_count > 0 ? 1 : 0;
+  Eigen::Index next_flat = 0, next_closest = 0;
+  for (std::size_t i = 0; i < targets_.size(); ++i) {
+    const Target<K>& t = targets_[i];
+    const bool flat = FindsFlats(t);
+    Random random(spec_.random_seed ^ Mix64(t.star), progress_.round);
+    for (Eigen::Index c = first_candidate_[i]; c < first_candidate_[i + 1]; ++c) {
+      double x[K];
+      std::copy(t.x, t.x + K, x);
+      // The first candidate is the circumcentre itself, unless it already failed.
+      if (t.violation.rule >= Rule::kSliver && (c > first_candidate_[i] || discouraged_[t.star])) {
+        double step[K];
+        UniformInBall<K>(random, step);
+        for (int a = 0; a < K; ++a) x[a] += criteria_.picking_radius * t.radius * step[a];
+      }
+      complex_.Lift(t.star, x, candidates_.col(c).data());
+      if (!flat) {
+        places_[static_cast<std::size_t>(c)] = {closest_block, next_closest};
+        closest.points.col(next_closest++) = candidates_.col(c);
+        continue;
+      }
+      places_[static_cast<std::size_t>(c)] = {0, next_flat};
+      flats.points.col(next_flat) = candidates_.col(c);
+      const double* tangent = complex_.Tangent(t.star);
+      for (int j = 0; j < d; ++j)
+        for (int a = 0; a < K; ++a) flats.bases(j * K + a, next_flat) = tangent[a * d + j];
+      flats.radii[next_flat++] = t.radius;
+    }
+  }
+  batch_.emplace();
+  if (flat_count > 0) batch_->blocks.push_back(std::move(flats));
+  if (count > flat_count) batch_->blocks.push_back(std::move(closest));
+  stage_ = Stage::kPoints;
+  alternations_left_ = spec_.oracle.intersect_flat ? 0 : criteria_.flat_alternations - 1;
+}
+
+template <int K>
+void Refinement<K>::Discourage(std::uint32_t star) {
+  if (discouraged_[star] <= kGiveUp) ++discouraged_[star];
+}
+
+#define STELLATE_INSTANTIATE(K)                                                    \
+  template void Refinement<K>::AskForSeeds();                                      \
+  template void Refinement<K>::AskAgain(const QueryBlock&, Stage);                 \
+  template bool Refinement<K>::FindsFlats(const Target<K>&) const;                 \
+  template Target<K> Refinement<K>::Aim(std::uint32_t, const Violation<K>&) const; \
+  template std::vector<Target<K>> Refinement<K>::SizeAndShapeTargets();            \
+  template std::vector<Target<K>> Refinement<K>::SliverAndConsistencyTargets();    \
+  template void Refinement<K>::Plan();                                             \
+  template void Refinement<K>::AskForTargets();                                    \
+  template void Refinement<K>::Discourage(std::uint32_t);
+STELLATE_INSTANTIATE(1)
+STELLATE_INSTANTIATE(2)
+STELLATE_INSTANTIATE(3)
+STELLATE_INSTANTIATE(4)
+STELLATE_INSTANTIATE(5)
+#undef STELLATE_INSTANTIATE
+
+}  // namespace stellate::core

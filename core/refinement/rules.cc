@@ -1,0 +1,259 @@
+#include "core/refinement/rules.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace stellate::core {
+namespace {
+
+template <int K>
+Violation<K> AtVertex(Rule rule, const typename RestrictedVoronoiCell<K>::Vertex& v, bool fake) {
+  Violation<K> violation;
+  violation.rule = rule;
+  violation.radius = std::sqrt(v.norm2);
+  std::copy(v.x, v.x + K, violation.x);
+  violation.fake = fake;
+  return violation;
+}
+
+// Determinant of the j x j leading part of a symmetric matrix, by elimination.
+template <int K>
+double GramDeterminant(double (&g)[K][K], int j) {
+  double det = 1;
+  for (int c = 0; c < j; ++c) {
+    det *= g[c][c];
+    if (!(g[c][c] > 0)) return 0;
+    for (int r = c + 1; r < j; ++r) {
+      const double factor = g[r][c] / g[c][c];
+      for (int i = c + 1; i < j; ++i) g[r][i] -= factor * g[c][i];
+    }
+  }
+  return det;
+}
+
+template <int K>
+std::uint64_t KeyOf(const typename RestrictedVoronoiCell<K>::Vertex& v, std::uint32_t p) {
+  return v.key + Mix64(p);
+}
+
+}  // namespace
+
+template <int K>
+std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std::uint32_t p,
+                                             double epsilon, double radius_edge_bound) {
+  const auto& cell = complex.cell(p);
+  using Vertex = typename RestrictedVoronoiCell<K>::Vertex;
+  const Vertex* worst = nullptr;
+  bool worst_fake = false;
+  for (const Vertex& v : cell.vertices()) {
+    const bool fake = !cell.bounded() && cell.HasFakeFacet(v);
+    if ((fake || v.norm2 > epsilon * epsilon) && (!worst || v.norm2 > worst->norm2)) {
+      worst = &v;
+      worst_fake = fake;
+    }
+  }
+  if (worst) return AtVertex<K>(Rule::kSize, *worst, worst_fake);
+  double worst_rho2 = radius_edge_bound * radius_edge_bound;
+  for (const Vertex& v : cell.vertices()) {
+    double edge2 = INFINITY;
+    for (const auto f : v.facet) edge2 = std::min(edge2, 2 * cell.facets()[f].offset);
+    if (v.norm2 > worst_rho2 * edge2) {
+      worst_rho2 = v.norm2 / edge2;
+      worst = &v;
+    }
+  }
+  if (worst) return AtVertex<K>(Rule::kRadiusEdge, *worst, false);
+  return std::nullopt;
+}
+
+template <int K>
+bool ContainsSliver(const StarComplex<K>& complex, const double* p,
+                    const RestrictedVoronoiCell<K>& cell,
+                    const typename RestrictedVoronoiCell<K>::Vertex& v, double sliver_bound,
+                    const double* unborn) {
+  if (K < 2 || sliver_bound <= 0) return false;
+  const int d = complex.d();
+  const double* q[K];
+  for (int a = 0; a < K; ++a) {
+    const std::uint32_t id = cell.facets()[v.facet[a]].id;
+    q[a] = id < complex.size() ? complex.Point(id) : unborn;
+  }
+  double length2[K], gram[K][K];
+  for (int a = 0; a < K; ++a) length2[a] = SquaredDistance(p, q[a], d);
+  double between2[K][K];
+  for (int a = 0; a < K; ++a) {
+    gram[a][a] = length2[a];
+    for (int b = 0; b < a; ++b) {
+      between2[a][b] = SquaredDistance(q[a], q[b], d);
+      gram[a][b] = gram[b][a] = 0.5 * (length2[a] + length2[b] - between2[a][b]);
+    }
+  }
+  for (unsigned face = 1; face < (1u << K); ++face) {
+    const int j = std::popcount(face);
+    if (j < 2) continue;
+    int at[K], n = 0;
+    double diameter2 = 0;
+    for (int a = 0; a < K; ++a) {
+      if (!(face >> a & 1u)) continue;
+      diameter2 = std::max(diameter2, length2[a]);
+      for (int i = 0; i < n; ++i) diameter2 = std::max(diameter2, between2[a][at[i]]);
+      at[n++] = a;
+    }
+    double g[K][K];
+    for (int r = 0; r < j; ++r)
+      for (int c = 0; c < j; ++c) g[r][c] = gram[at[r]][at[c]];
+    double factorial = 1, bound = sliver_bound * sliver_bound, diameter2j = 1;
+    double bound2j = 1;
+    for (int i = 1; i <= j; ++i) {
+      factorial *= i;
+      bound2j *= bound;
+      diameter2j *= diameter2;
+    }
+    // Theta = vol / diameter^j < Theta0^j, squared.
+    if (GramDeterminant<K>(g, j) < bound2j * diameter2j * factorial * factorial) return true;
+  }
+  return false;
+}
+
+template <int K>
+const typename RestrictedVoronoiCell<K>::Vertex* FindSimplex(
+    const RestrictedVoronoiCell<K>& cell, std::uint32_t q,
+    const typename StarComplex<K>::Simplex& simplex, std::uint64_t key) {
+  const std::uint64_t wanted = key - Mix64(q);
+  for (const auto& v : cell.vertices()) {
+    if (v.key != wanted) continue;
+    bool same = true;
+    for (const auto f : v.facet) {
+      const std::uint32_t id = cell.facets()[f].id;
+      same = same && std::find(simplex.begin(), simplex.end(), id) != simplex.end();
+    }
+    if (same) return &v;
+  }
+  return nullptr;
+}
+
+namespace {
+
+template <int K>
+bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p,
+                  const typename StarComplex<K>::Vertex& v) {
+  typename StarComplex<K>::Simplex simplex;
+  if (!complex.SimplexOf(p, complex.cell(p), v, &simplex)) return false;
+  const std::uint64_t key = KeyOf<K>(v, p);
+  for (const std::uint32_t q : simplex)
+    if (q != p && !FindSimplex<K>(complex.cell(q), q, simplex, key)) return false;
+  return true;
+}
+
+}  // namespace
+
+template <int K>
+std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& complex,
+                                                      std::uint32_t p, double sliver_bound) {
+  using Vertex = typename StarComplex<K>::Vertex;
+  const auto& cell = complex.cell(p);
+  const Vertex* worst = nullptr;
+  if (sliver_bound > 0) {
+    for (const Vertex& v : cell.vertices())
+      if ((!worst || v.norm2 > worst->norm2) &&
+          ContainsSliver<K>(complex, complex.Point(p), cell, v, sliver_bound, nullptr))
+        worst = &v;
+    if (worst) return AtVertex<K>(Rule::kSliver, *worst, false);
+  }
+  for (const Vertex& v : cell.vertices())
+    if ((!worst || v.norm2 > worst->norm2) && !IsConsistent<K>(complex, p, v)) worst = &v;
+  if (worst) return AtVertex<K>(Rule::kInconsistent, *worst, false);
+  return std::nullopt;
+}
+
+template <int K>
+std::uint64_t CountInconsistent(const StarComplex<K>& complex, std::uint32_t p) {
+  std::uint64_t count = 0;
+  for (const auto& v : complex.cell(p).vertices()) count += !IsConsistent<K>(complex, p, v);
+  return count;
+}
+
+template <int K>
+int CountBad(const StarComplex<K>& complex, const double* point,
+             const typename StarComplex<K>::Tentative& tentative, double sliver_bound,
+             double small_radius, int enough) {
+  using Cell = RestrictedVoronoiCell<K>;
+  using Simplex = typename StarComplex<K>::Simplex;
+  const std::uint32_t id = complex.size();
+  const auto changed = [&](std::uint32_t q) -> const Cell* {
+    if (q == id) return &tentative.own;
+    const auto at = std::lower_bound(tentative.cut.begin(), tentative.cut.end(), q,
+                                     [](const auto& c, std::uint32_t x) { return c.first < x; });
+    return at != tentative.cut.end() && at->first == q ? &at->second : nullptr;
+  };
+  int bad = 0;
+  const auto survey = [&](std::uint32_t p, const double* at, const Cell& cell) {
+    Simplex simplex;
+    for (const auto& v : cell.vertices()) {
+      if (bad >= enough) return;
+      if (!complex.SimplexOf(p, cell, v, &simplex)) {
+        ++bad;
+        continue;
+      }
+      const bool fresh = simplex.back() == id;  // an old simplex was judged before
+      if (fresh && v.norm2 <= small_radius * small_radius &&
+          ContainsSliver<K>(complex, at, cell, v, sliver_bound, point)) {
+        ++bad;
+        continue;
+      }
+      const std::uint64_t key = KeyOf<K>(v, p);
+      for (const std::uint32_t q : simplex) {
+        if (q == p) continue;
+        const Cell* other = changed(q);
+        if (!other && !fresh) continue;
+        if (!other || !FindSimplex<K>(*other, q, simplex, key)) {
+          ++bad;
+          break;
+        }
+      }
+    }
+  };
+  survey(id, point, tentative.own);
+  for (const auto& [p, cell] : tentative.cut) survey(p, complex.Point(p), cell);
+  // Simplices that a cut star loses and an uncut one keeps.
+  for (const auto& [p, cell] : tentative.cut) {
+    Simplex simplex;
+    const Cell& before = complex.cell(p);
+    for (const auto& v : before.vertices()) {
+      if (bad >= enough) return bad;
+      if (!complex.SimplexOf(p, before, v, &simplex)) continue;
+      const std::uint64_t key = KeyOf<K>(v, p);
+      if (FindSimplex<K>(cell, p, simplex, key)) continue;
+      for (const std::uint32_t q : simplex)
+        if (q != p && !changed(q) && FindSimplex<K>(complex.cell(q), q, simplex, key)) {
+          ++bad;
+          break;
+        }
+    }
+  }
+  return bad;
+}
+
+#define STELLATE_INSTANTIATE(K)                                                                   \
+  template std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>&, std::uint32_t,     \
+                                                        double, double);                          \
+  template std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>&,           \
+                                                                 std::uint32_t, double);          \
+  template bool ContainsSliver(const StarComplex<K>&, const double*,                              \
+                               const RestrictedVoronoiCell<K>&,                                   \
+                               const RestrictedVoronoiCell<K>::Vertex&, double, const double*);   \
+  template const RestrictedVoronoiCell<K>::Vertex* FindSimplex<K>(                                \
+      const RestrictedVoronoiCell<K>&, std::uint32_t, const StarComplex<K>::Simplex&,             \
+      std::uint64_t);                                                                             \
+  template std::uint64_t CountInconsistent(const StarComplex<K>&, std::uint32_t);                 \
+  template int CountBad(const StarComplex<K>&, const double*, const StarComplex<K>::Tentative&,   \
+                        double, double, int);
+STELLATE_INSTANTIATE(1)
+STELLATE_INSTANTIATE(2)
+STELLATE_INSTANTIATE(3)
+STELLATE_INSTANTIATE(4)
+STELLATE_INSTANTIATE(5)
+#undef STELLATE_INSTANTIATE
+
+}  // namespace stellate::core

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "core/complex/star_complex.h"
+
+namespace stellate::core {
+
+// The refinement rules of Sec. 5.3.5, in their order.
+enum class Rule : std::uint8_t { kSize = 0, kRadiusEdge, kSliver, kInconsistent };
+
+// A simplex of star(p) that breaks a rule, given by its dual vertex in p's cell.
+template <int K>
+struct Violation {
+  Rule rule = Rule::kSize;
+  double radius = 0;  // R_p(sigma), length
+  double x[K] = {};   // c_p(sigma) in p's tangent coordinates
+  bool fake = false;  // not a simplex yet: the cell is unbounded there
+};
+
+// R1 and R2, which need star(p) alone: the worst simplex of the first rule that one breaks, by R_p
+// for R1 and by rho for R2. Of rho, star(p) looks at the edges at p: the others are at some other
+// vertex of the simplex, whose star looks at them.
+template <int K>
+std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std::uint32_t p,
+                                             double epsilon, double radius_edge_bound);
+
+// R3 and R4, which need the neighbours' stars: first the worst simplex, by R_p, that is or contains
+// a sliver, then the worst inconsistent one.
+template <int K>
+std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& complex,
+                                                      std::uint32_t p, double sliver_bound);
+
+// Whether the simplex on p and the facets of v is or contains a Theta0-sliver (Sec. 2.3): that is,
+// whether some face at p, of dimension 2 or more, has fatness below Theta0^j.
+template <int K>
+bool ContainsSliver(const StarComplex<K>& complex, const double* p,
+                    const RestrictedVoronoiCell<K>& cell,
+                    const typename RestrictedVoronoiCell<K>::Vertex& v, double sliver_bound,
+                    const double* unborn);
+
+// The vertex of `cell`, the cell of q, that is dual to a simplex on q, or nullptr. `key` is the sum
+// of Mix64 over all ids of the simplex.
+template <int K>
+const typename RestrictedVoronoiCell<K>::Vertex* FindSimplex(
+    const RestrictedVoronoiCell<K>& cell, std::uint32_t q,
+    const typename StarComplex<K>::Simplex& simplex, std::uint64_t key);
+
+// Simplices of star(p) that are missing from the star of one of their vertices.
+template <int K>
+std::uint64_t CountInconsistent(const StarComplex<K>& complex, std::uint32_t p);
+
+// How bad a tentative insertion would leave its surroundings: the new slivers of circumradius at
+// most `small_radius`, and the simplices that stars would disagree about. Counts no further than
+// `enough`.
+template <int K>
+int CountBad(const StarComplex<K>& complex, const double* point,
+             const typename StarComplex<K>::Tentative& tentative, double sliver_bound,
+             double small_radius, int enough);
+
+}  // namespace stellate::core

@@ -1,0 +1,94 @@
+#include "core/refinement/tangent_finder.h"
+
+#include <Eigen/SVD>
+
+#include "core/sample/random.h"
+
+namespace stellate::core {
+namespace {
+
+// Of a guess the derivative keeps cos(angle) of each direction: below this the guess was turned too
+// far (73 degrees) for the span to be trusted.
+constexpr double kLeastKept = 0.3;
+// Random directions lose most of their length where d is large; what must not happen is that one of
+// the k found directions is much weaker than another.
+constexpr double kLeastRatio = 1e-3;
+// The derivative has rank k: what lies beyond is curvature times step, or noise.
+constexpr double kMostBeyond = 0.3;
+
+}  // namespace
+
+TangentFinder::TangentFinder(int k, int d, double step, std::uint64_t seed)
+    : k_(k), d_(d), step_(step), seed_(seed) {}
+
+void TangentFinder::Start(const Eigen::MatrixXd& points, std::vector<const double*> guesses) {
+  points_ = points;
+  guesses_ = std::move(guesses);
+  tangents_ = Eigen::MatrixXd::Zero(k_ * d_, points.cols());
+  ok_.assign(static_cast<std::size_t>(points.cols()), 0);
+  open_.clear();
+  guessed_ = true;
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    open_.push_back(i);
+    guessed_ = guessed_ && guesses_[static_cast<std::size_t>(i)] != nullptr;
+  }
+  Ask();
+}
+
+void TangentFinder::Ask() {
+  const int m = guessed_ ? k_ : std::min(k_ + 4, d_);
+  const auto count = static_cast<Eigen::Index>(open_.size());
+  directions_.resize(d_, count * m);
+  block_.kind = QueryKind::kClosestPoint;
+  block_.points.resize(d_, count * m * 2);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Eigen::Index point = open_[static_cast<std::size_t>(i)];
+    Random random(seed_, static_cast<std::uint64_t>(point));
+    for (int j = 0; j < m; ++j) {
+      auto u = directions_.col(i * m + j);
+      if (guessed_) {
+        const double* guess = guesses_[static_cast<std::size_t>(point)] + j * d_;
+        u = Eigen::Map<const Eigen::VectorXd>(guess, d_);
+      } else {
+        for (int a = 0; a < d_; ++a) u[a] = random.Normal();
+        u.normalize();
+      }
+      block_.points.col((i * m + j) * 2) = points_.col(point) + step_ * u;
+      block_.points.col((i * m + j) * 2 + 1) = points_.col(point) - step_ * u;
+    }
+  }
+}
+
+void TangentFinder::Absorb(const AnswerBlock& answers) {
+  const int m = guessed_ ? k_ : std::min(k_ + 4, d_);
+  std::vector<Eigen::Index> again;
+  Eigen::MatrixXd derivative(d_, m);
+  for (std::size_t i = 0; i < open_.size(); ++i) {
+    bool complete = true;
+    for (int j = 0; j < m; ++j) {
+      const auto q = (static_cast<Eigen::Index>(i) * m + j) * 2;
+      if (!answers.found.empty())
+        complete = complete && answers.found[static_cast<std::size_t>(q)] &&
+                   answers.found[static_cast<std::size_t>(q) + 1];
+      derivative.col(j) = (answers.points.col(q) - answers.points.col(q + 1)) / (2 * step_);
+    }
+    const Eigen::Index point = open_[i];
+    if (complete) {
+      const Eigen::JacobiSVD<Eigen::MatrixXd> svd(derivative, Eigen::ComputeThinU);
+      const auto& s = svd.singularValues();
+      const bool spans = guessed_ ? s[k_ - 1] > kLeastKept : s[k_ - 1] > kLeastRatio * s[0];
+      const bool flat = m <= k_ || s[k_] < kMostBeyond * s[k_ - 1];
+      if (spans && flat) {
+        for (int a = 0; a < k_; ++a)
+          tangents_.col(point).segment(a * d_, d_) = svd.matrixU().col(a);
+        ok_[static_cast<std::size_t>(point)] = 1;
+      }
+    }
+    if (!ok_[static_cast<std::size_t>(point)] && guessed_) again.push_back(point);
+  }
+  open_ = std::move(again);
+  guessed_ = false;
+  if (!open_.empty()) Ask();
+}
+
+}  // namespace stellate::core

@@ -1,0 +1,143 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "core/sample/vector_ops.h"
+
+namespace stellate::core {
+
+// Points of R^d, each with a radius of influence, searched by distance alone: it works alike in
+// any d. Used for "whose star can a new point cut?" (influence 2 R_max) and "what is near?".
+//
+// A binary tree of balls over leaves of a few points. Each node knows the ball around its points
+// and its outreach: the largest distance from its centre at which one of its points still has
+// influence. Grown by insertion, rebuilt balanced whenever it has doubled: O(log n) a point.
+//
+// Deterministic. Queries are const and may run in parallel.
+class BallTree {
+ public:
+  // `coordinates` holds the points, d each, by id; borrowed, may grow and move between calls.
+  BallTree(int d, const std::vector<double>* coordinates) : d_(d), coordinates_(coordinates) {}
+
+  std::size_t size() const { return influence_.size(); }
+
+  // Adds the point with the next id, size().
+  void Insert(double influence);
+
+  // Growth takes effect at once; shrinking makes searches faster after Refit, never different.
+  void SetInfluence(std::uint32_t id, double influence);
+  void Refit();
+
+  // Calls visit(id) for each point p with |q - p| < influence(p), in no meaningful but a fixed
+  // order.
+  template <typename Visit>
+  void ForEachInfluencing(const double* q, Visit&& visit) const {
+    if (nodes_.empty()) return;
+    Influencing(0, SquaredDistance(q, Centre(0), d_), q, visit);
+  }
+
+  // Visits points roughly nearest first. `radius()` is asked again and again and may shrink;
+  // visit(id, squared distance) is called for the points within it.
+  template <typename Radius, typename Visit>
+  void VisitNear(const double* q, Radius&& radius, Visit&& visit) const {
+    if (nodes_.empty()) return;
+    Near(0, Distance(q, Centre(0), d_), q, radius, visit);
+  }
+
+  // Squared distance from q to the nearest point; infinity when empty.
+  double NearestSquaredDistance(const double* q) const {
+    double best = INFINITY;
+    VisitNear(
+        q, [&] { return std::sqrt(best); },
+        [&](std::uint32_t, double d2) {
+          if (d2 < best) best = d2;
+        });
+    return best;
+  }
+
+ private:
+  static constexpr int kLeafCapacity = 12;
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
+  struct Node {
+    double radius = 0;             // of the ball that holds its points
+    double outreach = 0;           // max over its points of distance + influence
+    std::uint32_t parent = kNone;
+    std::uint32_t children = kNone;  // the first of two, side by side; kNone: a leaf
+    std::uint32_t first = 0;         // leaf: its slots begin here
+    std::uint32_t count = 0;         // leaf: points held
+  };
+
+  const double* Point(std::uint32_t id) const {
+    return coordinates_->data() + static_cast<std::size_t>(id) * static_cast<std::size_t>(d_);
+  }
+  const double* Centre(std::uint32_t n) const {
+    return centres_.data() + static_cast<std::size_t>(n) * static_cast<std::size_t>(d_);
+  }
+  double* Centre(std::uint32_t n) {
+    return centres_.data() + static_cast<std::size_t>(n) * static_cast<std::size_t>(d_);
+  }
+
+  std::uint32_t NewNodes(int count);
+  void Build(std::uint32_t node, std::uint32_t* begin, std::uint32_t* end);
+  void MakeLeaf(std::uint32_t node, const std::uint32_t* begin, const std::uint32_t* end);
+  void Measure(std::uint32_t node, const std::uint32_t* begin, const std::uint32_t* end);
+  void Split(std::uint32_t node);
+  void Rebuild();
+
+  template <typename Visit>
+  void Influencing(std::uint32_t n, double d2, const double* q, Visit& visit) const {
+    const Node& node = nodes_[n];
+    if (d2 >= node.outreach * node.outreach) return;
+    if (node.children == kNone) {
+      for (std::uint32_t i = 0; i < node.count; ++i) {
+        const std::uint32_t id = slots_[node.first + i];
+        const double r = influence_[id];
+        if (SquaredDistance(q, Point(id), d_) < r * r) visit(id);
+      }
+      return;
+    }
+    const std::uint32_t a = node.children;
+    Influencing(a, SquaredDistance(q, Centre(a), d_), q, visit);
+    Influencing(a + 1, SquaredDistance(q, Centre(a + 1), d_), q, visit);
+  }
+
+  template <typename Radius, typename Visit>
+  void Near(std::uint32_t n, double distance, const double* q, Radius& radius, Visit& visit) const {
+    const Node& node = nodes_[n];
+    if (distance - node.radius > radius()) return;
+    if (node.children == kNone) {
+      for (std::uint32_t i = 0; i < node.count; ++i) {
+        const std::uint32_t id = slots_[node.first + i];
+        const double d2 = SquaredDistance(q, Point(id), d_);
+        const double r = radius();
+        if (d2 <= r * r) visit(id, d2);
+      }
+      return;
+    }
+    const std::uint32_t a = node.children;
+    const double da = Distance(q, Centre(a), d_);
+    const double db = Distance(q, Centre(a + 1), d_);
+    if (da <= db) {
+      Near(a, da, q, radius, visit);
+      Near(a + 1, db, q, radius, visit);
+    } else {
+      Near(a + 1, db, q, radius, visit);
+      Near(a, da, q, radius, visit);
+    }
+  }
+
+  int d_;
+  const std::vector<double>* coordinates_;
+  std::vector<Node> nodes_;
+  std::vector<double> centres_;        // d each
+  std::vector<std::uint32_t> slots_;   // leaves, kLeafCapacity each
+  std::vector<double> influence_;      // by id
+  std::vector<std::uint32_t> leaf_of_;  // by id
+  std::vector<std::uint32_t> stale_;   // leaves whose outreach may have shrunk
+  std::size_t built_ = 0;              // size at the last rebuild
+};
+
+}  // namespace stellate::core
