@@ -45,8 +45,9 @@ Status CheckShape(const Specification& spec, const QueryBlock& block, Index firs
         n > 0 && (answer.found.empty() ||
                   std::any_of(answer.found.begin(), answer.found.end(), [](auto f) { return f; }));
     if (block.want_tangents && any_found) {
-      return refuse("no tangent bases came but the query wants them: send n x d x k numbers, or "
-                    "declare that the oracle has no tangent_basis");
+      return refuse(
+          "no tangent bases came but the query wants them: send n x d x k numbers, or "
+          "declare that the oracle has no tangent_basis");
     }
     return Status::Ok();
   }
@@ -125,8 +126,8 @@ Status CheckTangent(const Specification& spec, const QueryBlock& block, Index qu
       if (!(error <= kOrthonormalTolerance)) {
         return {StatusCode::kOracleBadTangent,
                 Message(Where(block, query), ": the tangent basis is not orthonormal: vectors ", a,
-                        " and ", b, " have the inner product ", dot, ", off by ", error,
-                        " where ", kOrthonormalTolerance,
+                        " and ", b, " have the inner product ", dot, ", off by ", error, " where ",
+                        kOrthonormalTolerance,
                         " is allowed: orthonormalise it, columns being tangent vectors")};
       }
     }

@@ -9,9 +9,7 @@
 namespace stellate::core {
 namespace {
 
-Status Invalid(std::string message) {
-  return {StatusCode::kInvalidArgument, std::move(message)};
-}
+Status Invalid(std::string message) { return {StatusCode::kInvalidArgument, std::move(message)}; }
 
 Status TooLarge(std::string message) { return {StatusCode::kLimitExceeded, std::move(message)}; }
 
@@ -30,7 +28,8 @@ Status CheckDimensions(const Specification& spec) {
   }
   if (k > kMaxDimension) {
     return TooLarge(Message("dimension (k) is ", k, " but this build meshes manifolds of ",
-                            "dimension up to ", kMaxDimension, ": mesh a manifold of lower dimension"));
+                            "dimension up to ", kMaxDimension,
+                            ": mesh a manifold of lower dimension"));
   }
   if (d > kMaxAmbientDimension) {
     return TooLarge(Message("ambient_dimension (d) is ", d, " but may be at most ",
@@ -154,8 +153,8 @@ Status CheckLimits(const Specification& spec) {
         "limits.max_rounds is 0 but must be at least 1: a round is one batch of queries");
   }
   if (spec.threads < 0) {
-    return Invalid(Message("threads is ", spec.threads,
-                           " but must not be negative: 0 takes all cores"));
+    return Invalid(
+        Message("threads is ", spec.threads, " but must not be negative: 0 takes all cores"));
   }
   return Status::Ok();
 }

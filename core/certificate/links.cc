@@ -1,0 +1,245 @@
+#include "core/certificate/links.h"
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "core/certificate/fundamental_group.h"
+#include "core/message.h"
+#include "core/specification.h"
+
+namespace stellate::core {
+namespace {
+
+using SimplexIds = std::vector<std::uint32_t>;
+
+// A face and the simplices that have it: its link, in place.
+struct Face {
+  std::array<std::uint32_t, kMaxDimension> ids{};
+  int size = 0;
+
+  bool Has(std::uint32_t v) const {
+    return std::find(ids.begin(), ids.begin() + size, v) != ids.begin() + size;
+  }
+  Face With(std::uint32_t v) const {
+    Face f = *this;
+    f.ids[f.size++] = v;
+    return f;
+  }
+};
+
+class LinkChecker {
+ public:
+  explicit LinkChecker(const Adjacency& adjacency)
+      : adjacency_(adjacency),
+        list_(adjacency.list()),
+        k_(list_.k),
+        bad_(list_.vertices, 0),
+        flooded_(list_.size(), 0) {}
+
+  LinkReport Run() {
+    std::int64_t used = 0;
+    for (std::uint32_t v = 0; v < list_.vertices; ++v) {
+      const auto star = adjacency_.Star(v);
+      if (star.empty()) continue;
+      ++used;
+      Face face;
+      face.ids[face.size++] = v;
+      CheckLink(face, {star.begin(), star.end()});
+    }
+    for (std::uint32_t v = 0; v < list_.vertices; ++v) {
+      if (bad_[v]) ++report_.bad_links;
+    }
+    CountFaces(used);
+    return report_;
+  }
+
+ private:
+  // Vertices ascending of the link of `face`.
+  std::vector<std::uint32_t> LinkVertices(const Face& face, const SimplexIds& simplices) const {
+    std::vector<std::uint32_t> vertices;
+    vertices.reserve(simplices.size() * k_);
+    for (const std::uint32_t s : simplices) {
+      for (int i = 0; i <= k_; ++i) {
+        if (!face.Has(list_[s][i])) vertices.push_back(list_[s][i]);
+      }
+    }
+    std::sort(vertices.begin(), vertices.end());
+    vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+    return vertices;
+  }
+
+  // Each ridge of the link is in two of its simplices, and from one all others are reached
+  // across ridges.
+  const char* WhyNotClosedAndConnected(const Face& face, const SimplexIds& simplices) {
+    ++flood_;
+    std::size_t reached = 1;
+    stack_.assign(1, simplices.front());
+    flooded_[simplices.front()] = flood_;
+    while (!stack_.empty()) {
+      const std::uint32_t s = stack_.back();
+      stack_.pop_back();
+      for (int i = 0; i <= k_; ++i) {
+        if (face.Has(list_[s][i])) continue;
+        const std::uint32_t t = adjacency_.Across(s, i);
+        if (t == Adjacency::kNone) return "is not closed";
+        if (flooded_[t] == flood_) continue;
+        flooded_[t] = flood_;
+        ++reached;
+        stack_.push_back(t);
+      }
+    }
+    return reached == simplices.size() ? nullptr : "falls into several parts";
+  }
+
+  // Is the link of `face`, which all of `simplices` have, a sphere? If not, the vertices of the
+  // face have bad links. Faces of higher dimension are checked from their lowest vertex alone.
+  void CheckLink(const Face& face, const SimplexIds& simplices) {
+    const int n = k_ - face.size;  // dimension of the link
+    if (const char* why = WhyNotClosedAndConnected(face, simplices)) {
+      Blame(face, why);
+      // Counting goes on: the Euler characteristic is that of the complex as it is.
+    }
+    if (n < 2) return;
+    const std::vector<std::uint32_t> vertices = LinkVertices(face, simplices);
+    const std::int64_t top = static_cast<std::int64_t>(simplices.size());
+    const std::int64_t f0 = static_cast<std::int64_t>(vertices.size());
+    if (face.size == 1) link_vertices_ += f0;
+    if (n == 2) {
+      // V - E + F with E = 3 F / 2. A closed connected surface pinched somewhere has less than
+      // its normalisation, so 2 means a sphere.
+      if (2 * f0 - top != 4) Blame(face, "is not a sphere: wrong Euler characteristic");
+      return;
+    }
+    CheckFacesAround(face, simplices);
+    CheckLoops(face, simplices, vertices);
+  }
+
+  void CheckFacesAround(const Face& face, const SimplexIds& simplices) {
+    std::vector<std::uint64_t> pairs;  // (next vertex of a larger face, simplex)
+    for (const std::uint32_t s : simplices) {
+      for (int i = 0; i <= k_; ++i) {
+        const std::uint32_t w = list_[s][i];
+        if (w > face.ids[face.size - 1]) pairs.push_back(std::uint64_t{w} << 32 | s);
+      }
+    }
+    std::sort(pairs.begin(), pairs.end());
+    SimplexIds around;
+    for (std::size_t i = 0; i < pairs.size();) {
+      const std::uint32_t w = static_cast<std::uint32_t>(pairs[i] >> 32);
+      around.clear();
+      for (; i < pairs.size() && pairs[i] >> 32 == w; ++i) {
+        around.push_back(static_cast<std::uint32_t>(pairs[i]));
+      }
+      CheckLink(face.With(w), around);
+    }
+  }
+
+  void CheckLoops(const Face& face, const SimplexIds& simplices,
+                  const std::vector<std::uint32_t>& vertices) {
+    const TwoSkeleton skeleton = LinkSkeleton(face, simplices, vertices);
+    const std::int64_t f0 = skeleton.vertices;
+    const std::int64_t f1 = static_cast<std::int64_t>(skeleton.edges.size());
+    const std::int64_t f2 = static_cast<std::int64_t>(skeleton.triangles.size());
+    const std::int64_t top = static_cast<std::int64_t>(simplices.size());
+    if (face.size == 1) {
+      link_edges_ += f1;
+      link_triangles_ += f2;
+      if (bad_[face.ids[0]]) return;
+    }
+    // A closed 3-manifold always has Euler characteristic 0; for a closed 4-manifold without
+    // first homology 2 says that there is no second homology either.
+    if (k_ - face.size == 4 && 2 * (f0 - f1 + f2) - 5 * top + 2 * top != 4) {
+      Blame(face, "is not a sphere: wrong Euler characteristic");
+      return;
+    }
+    switch (ClassifyLoops(skeleton)) {
+      case LoopVerdict::kSimplyConnected:
+        break;
+      case LoopVerdict::kNoHomology:
+        report_.decided_exactly = false;
+        break;
+      case LoopVerdict::kHasHomology:
+        Blame(face, "is not a sphere: it has loops that do not contract");
+        break;
+    }
+  }
+
+  TwoSkeleton LinkSkeleton(const Face& face, const SimplexIds& simplices,
+                           const std::vector<std::uint32_t>& vertices) const {
+    using Edge = std::array<std::uint32_t, 2>;
+    using Triangle = std::array<std::uint32_t, 3>;
+    TwoSkeleton skeleton;
+    skeleton.vertices = static_cast<std::uint32_t>(vertices.size());
+    std::vector<Triangle> corners;
+    for (const std::uint32_t s : simplices) {
+      std::array<std::uint32_t, kMaxDimension + 1> local{};
+      int n = 0;
+      for (int i = 0; i <= k_; ++i) {
+        if (face.Has(list_[s][i])) continue;
+        local[n++] = static_cast<std::uint32_t>(
+            std::lower_bound(vertices.begin(), vertices.end(), list_[s][i]) - vertices.begin());
+      }
+      for (int a = 0; a < n; ++a) {
+        for (int b = a + 1; b < n; ++b) {
+          skeleton.edges.push_back({local[a], local[b]});
+          for (int c = b + 1; c < n; ++c) corners.push_back({local[a], local[b], local[c]});
+        }
+      }
+    }
+    const auto sort_unique = [](auto& items) {
+      std::sort(items.begin(), items.end());
+      items.erase(std::unique(items.begin(), items.end()), items.end());
+    };
+    sort_unique(skeleton.edges);
+    sort_unique(corners);
+    const auto edge_number = [&](std::uint32_t a, std::uint32_t b) {
+      return static_cast<std::uint32_t>(
+          std::lower_bound(skeleton.edges.begin(), skeleton.edges.end(), Edge{a, b}) -
+          skeleton.edges.begin());
+    };
+    skeleton.triangles.reserve(corners.size());
+    for (const auto& [a, b, c] : corners) {
+      skeleton.triangles.push_back({edge_number(a, b), edge_number(a, c), edge_number(b, c)});
+    }
+    return skeleton;
+  }
+
+  void Blame(const Face& face, const char* why) {
+    for (int i = 0; i < face.size; ++i) bad_[face.ids[i]] = 1;
+    if (!report_.first_bad_link.empty()) return;
+    report_.first_bad_link =
+        face.size == 1
+            ? Message("the link of vertex ", face.ids[0], " ", why)
+            : Message("the link of face ", NameSimplex(face.ids.data(), face.size), " ", why);
+  }
+
+  // A j-face is in the links of its j+1 vertices as a (j-1)-face.
+  void CountFaces(std::int64_t used_vertices) {
+    const std::int64_t facets = static_cast<std::int64_t>(adjacency_.facets());
+    std::array<std::int64_t, kMaxDimension + 1> f{};
+    f[0] = used_vertices;
+    if (k_ >= 3) f[1] = link_vertices_ / 2;
+    if (k_ >= 4) f[2] = link_edges_ / 3;
+    if (k_ >= 5) f[3] = link_triangles_ / 4;
+    if (k_ >= 2) f[k_ - 1] = facets;
+    f[k_] = list_.size();
+    for (int j = 0; j <= k_; ++j) report_.euler_characteristic += j % 2 == 0 ? f[j] : -f[j];
+  }
+
+  const Adjacency& adjacency_;
+  const SimplexList& list_;
+  const int k_;
+  LinkReport report_;
+  std::vector<std::uint8_t> bad_;       // by vertex
+  std::vector<std::uint64_t> flooded_;  // by simplex: number of the last flood that reached it
+  std::uint64_t flood_ = 0;
+  std::vector<std::uint32_t> stack_;
+  std::int64_t link_vertices_ = 0, link_edges_ = 0, link_triangles_ = 0;  // sums over vertices
+};
+
+}  // namespace
+
+LinkReport CheckLinks(const Adjacency& adjacency) { return LinkChecker(adjacency).Run(); }
+
+}  // namespace stellate::core

@@ -1,0 +1,145 @@
+#include "core/certificate/probes.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "core/sample/random.h"
+
+namespace stellate::core {
+namespace {
+
+// Streams of random numbers that no other part of the core uses.
+enum Stream : std::uint64_t { kSimplexStream = 0x6365727430, kVertexStream, kProbeStream };
+
+constexpr double kBoxMargin = 0.1;  // of the diagonal, around the mesh's own box
+
+using ConstPoint = Eigen::Map<const Eigen::VectorXd>;
+
+ConstPoint PointOf(const MeshView& mesh, std::uint32_t v) {
+  return ConstPoint(mesh.points + std::size_t{v} * mesh.d, mesh.d);
+}
+
+void SortUnique(std::vector<std::uint32_t>& ids) {
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+}
+
+// The `count` simplices of largest value.
+void AppendLargest(const std::vector<double>& values, std::uint32_t count,
+                   std::vector<std::uint32_t>& chosen) {
+  std::vector<std::uint32_t> order(values.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::nth_element(order.begin(), order.begin() + count, order.end(),
+                   [&values](std::uint32_t a, std::uint32_t b) {
+                     return values[a] != values[b] ? values[a] > values[b] : a < b;
+                   });
+  chosen.insert(chosen.end(), order.begin(), order.begin() + count);
+}
+
+Eigen::VectorXd PointInBox(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,
+                           Random& random) {
+  Eigen::VectorXd x(lower.size());
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    x[i] = lower[i] + random.Uniform() * (upper[i] - lower[i]);
+  }
+  return x;
+}
+
+Eigen::VectorXd PointNearSimplex(const MeshView& mesh, const std::uint32_t* ids, double push,
+                                 Random& random) {
+  // Exponential weights make a uniform point of the simplex.
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(mesh.d);
+  double total = 0;
+  for (int i = 0; i <= mesh.k; ++i) {
+    const double weight = -std::log(1 - random.Uniform());
+    x += weight * PointOf(mesh, ids[i]);
+    total += weight;
+  }
+  x /= total;
+  Eigen::VectorXd direction(mesh.d);
+  for (int i = 0; i < mesh.d; ++i) direction[i] = random.Normal();
+  return x + push * random.Uniform() * direction.normalized();
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> ChooseSimplices(const SimplexList& list, const MeshShape& shape,
+                                           std::uint64_t random_seed) {
+  std::vector<std::uint32_t> chosen;
+  if (list.size() <= kMaxBarycentres) {
+    chosen.resize(list.size());
+    std::iota(chosen.begin(), chosen.end(), 0u);
+    return chosen;
+  }
+  Random random(random_seed, kSimplexStream);
+  for (std::uint32_t n = 0; n < kMaxBarycentres; ++n) {
+    chosen.push_back(static_cast<std::uint32_t>(random.Next() % list.size()));
+  }
+  AppendLargest(shape.diameters, kExtremeBarycentres, chosen);
+  AppendLargest(shape.tilts, kExtremeBarycentres, chosen);
+  SortUnique(chosen);
+  return chosen;
+}
+
+std::vector<std::uint32_t> ChooseVertices(std::uint32_t vertices, std::uint64_t random_seed) {
+  std::vector<std::uint32_t> chosen;
+  if (vertices <= kMaxVertexProbes) {
+    chosen.resize(vertices);
+    std::iota(chosen.begin(), chosen.end(), 0u);
+    return chosen;
+  }
+  Random random(random_seed, kVertexStream);
+  for (std::uint32_t n = 0; n < kMaxVertexProbes; ++n) {
+    chosen.push_back(static_cast<std::uint32_t>(random.Next() % vertices));
+  }
+  SortUnique(chosen);
+  return chosen;
+}
+
+Eigen::MatrixXd Barycentres(const MeshView& mesh, const SimplexList& list,
+                            const std::vector<std::uint32_t>& chosen) {
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(mesh.d, static_cast<Eigen::Index>(chosen.size()));
+  for (std::size_t n = 0; n < chosen.size(); ++n) {
+    for (int i = 0; i <= mesh.k; ++i) result.col(n) += PointOf(mesh, list[chosen[n]][i]);
+  }
+  return result / (mesh.k + 1);
+}
+
+Eigen::MatrixXd CoverageProbes(const Specification& spec, const MeshView& mesh,
+                               const SimplexList& list, double push) {
+  Random random(spec.random_seed, kProbeStream);
+  std::vector<Eigen::VectorXd> probes;
+  for (int n = 0; n < kProbesOfAKind; ++n) {
+    const auto s = static_cast<std::uint32_t>(random.Next() % list.size());
+    probes.push_back(PointNearSimplex(mesh, list[s], push, random));
+  }
+
+  Eigen::VectorXd lower = PointOf(mesh, 0);
+  Eigen::VectorXd upper = lower;
+  for (std::uint32_t v = 1; v < mesh.vertices; ++v) {
+    lower = lower.cwiseMin(PointOf(mesh, v));
+    upper = upper.cwiseMax(PointOf(mesh, v));
+  }
+  const double margin = kBoxMargin * (upper - lower).norm();
+  lower.array() -= margin;
+  upper.array() += margin;
+  for (int n = 0; n < kProbesOfAKind; ++n) probes.push_back(PointInBox(lower, upper, random));
+
+  if (spec.bounding_box) {
+    for (int n = 0; n < kProbesOfAKind; ++n) {
+      probes.push_back(PointInBox(spec.bounding_box->lower, spec.bounding_box->upper, random));
+    }
+  }
+  const Eigen::Index seeds = std::min<Eigen::Index>(spec.seeds.cols(), kProbesOfAKind);
+  for (Eigen::Index n = 0; n < seeds; ++n) {
+    probes.push_back(spec.seeds.col(n * spec.seeds.cols() / seeds));
+  }
+
+  Eigen::MatrixXd result(mesh.d, static_cast<Eigen::Index>(probes.size()));
+  for (std::size_t n = 0; n < probes.size(); ++n) result.col(n) = probes[n];
+  return result;
+}
+
+}  // namespace stellate::core

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "core/certificate/certifier.h"
+#include "core/certificate/shape.h"
+#include "core/certificate/topology.h"
+#include "core/specification.h"
+
+namespace stellate::core {
+
+// Where the certifier looks. Their numbers bound the queries of a certificate, about 5000 in all,
+// whatever the size of the mesh; the checks that need no oracle see the whole mesh.
+inline constexpr std::uint32_t kMaxBarycentres = 2000;     // random ones, or all when no more
+inline constexpr std::uint32_t kExtremeBarycentres = 100;  // of largest diameter; of largest tilt
+inline constexpr std::uint32_t kMaxVertexProbes = 256;
+inline constexpr int kProbesOfAKind = 80;  // near the mesh; its box; the client's box; its seeds
+inline constexpr int kBallCount = 64;
+inline constexpr int kMaxBallSteps = 6;
+
+// Simplices whose barycentres are checked, ascending.
+std::vector<std::uint32_t> ChooseSimplices(const SimplexList& list, const MeshShape& shape,
+                                           std::uint64_t random_seed);
+// Vertices that must be their own closest points, ascending.
+std::vector<std::uint32_t> ChooseVertices(std::uint32_t vertices, std::uint64_t random_seed);
+
+Eigen::MatrixXd Barycentres(const MeshView& mesh, const SimplexList& list,
+                            const std::vector<std::uint32_t>& chosen);
+
+// Points whose closest points on M the mesh must cover: points of simplices pushed up to `push` in
+// random ambient directions, random points of the mesh's own box and of the client's, and seeds.
+Eigen::MatrixXd CoverageProbes(const Specification& spec, const MeshView& mesh,
+                               const SimplexList& list, double push);
+
+}  // namespace stellate::core

@@ -1,0 +1,86 @@
+#include "core/certificate/shrinking_balls.h"
+
+#include <limits>
+
+#include "core/sample/random.h"
+
+namespace stellate::core {
+namespace {
+
+constexpr double kTellingDistance = 0.5;  // of the longest edge at the vertex
+constexpr double kSettled = 1e-3;         // relative change of radius that ends a ball
+
+using ConstPoint = Eigen::Map<const Eigen::VectorXd>;
+
+ConstPoint PointOf(const MeshView& mesh, std::uint32_t v) {
+  return ConstPoint(mesh.points + std::size_t{v} * mesh.d, mesh.d);
+}
+
+}  // namespace
+
+ShrinkingBalls::ShrinkingBalls(const MeshView& mesh, const std::vector<double>& longest_edge,
+                               std::uint64_t random_seed, int count)
+    : mesh_(mesh), reach_(std::numeric_limits<double>::infinity()) {
+  const int d = mesh.d;
+  const int k = mesh.k;
+  Eigen::VectorXd lower = PointOf(mesh, 0);
+  Eigen::VectorXd upper = lower;
+  for (std::uint32_t v = 1; v < mesh.vertices; ++v) {
+    lower = lower.cwiseMin(PointOf(mesh, v));
+    upper = upper.cwiseMax(PointOf(mesh, v));
+  }
+  const double start = (upper - lower).norm() / 2;
+
+  Random random(random_seed, 0x62616c6c73);
+  for (int n = 0; n < count; ++n) {
+    Ball ball;
+    ball.vertex = static_cast<std::uint32_t>(random.Next() % mesh.vertices);
+    ball.radius = start;
+    ball.scale = kTellingDistance * longest_edge[ball.vertex];
+    ball.normal.resize(d);
+    for (int i = 0; i < d; ++i) ball.normal[i] = random.Normal();
+    using Basis = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const Eigen::Map<const Basis> tangent(mesh.tangents + std::size_t{ball.vertex} * d * k, d, k);
+    for (int pass = 0; pass < 2; ++pass) {
+      ball.normal -= tangent * (tangent.transpose() * ball.normal).eval();
+    }
+    const double length = ball.normal.norm();
+    if (!(length > 1e-6) || !(ball.scale > 0)) continue;
+    ball.normal /= length;
+    active_.push_back(std::move(ball));
+  }
+}
+
+Eigen::MatrixXd ShrinkingBalls::Centres() const {
+  Eigen::MatrixXd centres(mesh_.d, static_cast<Eigen::Index>(active_.size()));
+  for (std::size_t n = 0; n < active_.size(); ++n) {
+    const Ball& ball = active_[n];
+    centres.col(n) = PointOf(mesh_, ball.vertex) + ball.radius * ball.normal;
+  }
+  return centres;
+}
+
+void ShrinkingBalls::Absorb(const Eigen::MatrixXd& nearest,
+                            const std::vector<std::uint8_t>& found) {
+  std::vector<Ball> still;
+  for (std::size_t n = 0; n < active_.size(); ++n) {
+    if (!found.empty() && !found[n]) continue;
+    Ball& ball = active_[n];
+    const Eigen::VectorXd offset = nearest.col(n) - PointOf(mesh_, ball.vertex);
+    const double distance = offset.norm();
+    const double along = ball.normal.dot(offset);
+    if (distance < ball.scale || along <= 0) continue;
+    const double radius = distance * distance / (2 * along);
+    if (radius >= ball.radius) continue;
+    if (radius < reach_) {
+      reach_ = radius;
+      narrowest_ = ball.vertex;
+    }
+    const bool shrinks_on = radius < (1 - kSettled) * ball.radius;
+    ball.radius = radius;
+    if (shrinks_on) still.push_back(std::move(ball));
+  }
+  active_ = std::move(still);
+}
+
+}  // namespace stellate::core

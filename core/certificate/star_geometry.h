@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/certificate/certifier.h"
+#include "core/certificate/topology.h"
+
+namespace stellate::core {
+
+// What the stars look like from the tangent spaces of their centres.
+struct StarGeometry {
+  // Stars whose projection on the tangent space of their centre is not an embedding. Consistency
+  // alone does not exclude them when simplices are judged at common centres.
+  std::uint64_t unembedded_stars = 0;
+  std::string first_unembedded;  // plain words; empty if none
+
+  // The smallest |q - p|^2 / (2 dist(q, T_pM)) over mesh edges: an upper bound of the reach
+  // (Federer). Infinity for a flat mesh.
+  double reach = 0;
+  std::uint32_t narrowest_p = 0, narrowest_q = 0;  // where it is attained
+
+  std::vector<double> longest_edge;  // by vertex, length
+};
+
+// A star embeds when simplices that share a facet through its centre p lie on opposite sides of
+// it in T_pM, and one generic ray from p meets exactly one simplex: the first makes the radial
+// projection of the link a covering of the sphere of directions, the second makes it one-sheeted.
+// Time linear in the mesh.
+StarGeometry MeasureStars(const MeshView& mesh, const Adjacency& adjacency);
+
+}  // namespace stellate::core
