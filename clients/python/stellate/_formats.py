@@ -40,8 +40,8 @@ def _cells(mesh: Mesh) -> np.ndarray:
 def _refuse_solids(mesh: Mesh, name: str) -> None:
     if mesh.dimension > 2:
         raise SaveError(
-            f"{name} holds curves and surfaces, and this mesh has dimension {mesh.dimension}; save it "
-            + ("as .vtu or .txt" if mesh.dimension == 3 else "as .txt")
+            f"{name} holds curves and surfaces, and this mesh has dimension {mesh.dimension}; "
+            "save it " + ("as .vtu or .txt" if mesh.dimension == 3 else "as .txt")
         )
 
 
@@ -50,8 +50,8 @@ def _in_space(mesh: Mesh, name: str) -> np.ndarray:
     n, d = mesh.points.shape
     if d > 3:
         raise SaveError(
-            f"{name} holds points of space, and these have {d} coordinates; save them as .txt or .off "
-            "(all coordinates) or .vtu (the first three, all of them as point data)"
+            f"{name} holds points of space, and these have {d} coordinates; save them as .txt or "
+            ".off (all coordinates) or .vtu (the first three, all of them as point data)"
         )
     return np.hstack([mesh.points, np.zeros((n, 3 - d))])
 

@@ -61,7 +61,9 @@ class GrowingComplex:
         if not len(block):
             return
         if first != self._vertex_count:
-            raise ValueError(f"a delta starts at vertex {first}, and there are {self._vertex_count}")
+            raise ValueError(
+                f"a delta starts at vertex {first}, and there are {self._vertex_count}"
+            )
         needed = first + len(block)
         if needed > len(self._points):
             larger = np.empty((max(needed, 2 * len(self._points)), self._d))
@@ -81,7 +83,9 @@ class GrowingComplex:
         rows = np.ascontiguousarray(self._rows[candidates])
         drop = [i for i, row in zip(candidates, rows) if row.tobytes() in gone]
         if len(drop) != len(gone):
-            raise ValueError(f"a delta removes {len(gone) - len(drop)} simplices that are not there")
+            raise ValueError(
+                f"a delta removes {len(gone) - len(drop)} simplices that are not there"
+            )
         keep = np.ones(len(self._rows), dtype=bool)
         keep[drop] = False
         self._rows = self._rows[keep]

@@ -60,7 +60,7 @@ def _neighbours(simplices: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
 
 
 def signed_volume(points: np.ndarray, simplices: np.ndarray) -> float:
-    """d! times the volume that oriented (d-1)-simplices enclose in R^d; positive: normals outwards."""
+    """d! times the volume that oriented (d-1)-simplices enclose in R^d; > 0: normals outwards."""
     return float(np.linalg.det(points[simplices]).sum())
 
 

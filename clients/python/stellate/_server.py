@@ -17,6 +17,9 @@ from .errors import ServerNotFound, Unavailable
 _READY_SECONDS = 30.0
 _STOP_SECONDS = 10.0
 _LONGEST_SOCKET_PATH = 100  # the kernel takes 107 bytes
+# Over a unix socket the end of a client shows at once. One that answers no pings is merely busy in
+# an oracle that does not let go of the interpreter.
+_PRIVATE_FLAGS = ("--keepalive", "600", "--keepalive-timeout", "600")
 
 
 def find_stellated() -> str:
@@ -67,7 +70,7 @@ class Server:
         self._process: subprocess.Popen[bytes] | None = None
         self._start_error: OSError | None = None
         started = threading.Event()
-        command = [self._binary, "--listen", self.address, *arguments]
+        command = [self._binary, "--listen", self.address, *_PRIVATE_FLAGS, *arguments]
         # On Linux the kernel ends the server when the thread that started it ends: a thread of its
         # own stays for as long as the server runs.
         tie = shutil.which("setpriv")

@@ -148,7 +148,9 @@ def follow(client: Client, info: MeshInfo, on_progress: OnProgress | None) -> It
                 try:
                     complete = growth.absorb(event.delta)
                 except ValueError as error:
-                    raise StellateError(f"the server broke the protocol: {error}", "PROTOCOL") from error
+                    raise StellateError(
+                        f"the server broke the protocol: {error}", "PROTOCOL"
+                    ) from error
                 if complete:
                     yield Mesh(growth.points(), growth.simplices(), None, progress, growth.revision)
             elif kind == "progress":

@@ -99,7 +99,9 @@ class Client:
         self._own_server = Server() if server is None else None
         self._server = self._own_server if server is None else server
         if not isinstance(self._server, (str, Server)) or self._server == "":
-            raise InvalidArgument(f"server has to be 'host:port' or 'unix:/path', and is {server!r}")
+            raise InvalidArgument(
+                f"server has to be 'host:port' or 'unix:/path', and is {server!r}"
+            )
         address = self._server.address if isinstance(self._server, Server) else self._server
         self.address = address
         options = [
@@ -117,7 +119,9 @@ class Client:
         """Declares a mesh; nothing happens until somebody serves it. Keywords: see stellate.mesh."""
         checked = oracle if isinstance(oracle, CheckedOracle) else CheckedOracle(oracle)
         spec = mesh_spec(checked, epsilon, criteria)
-        return MeshInfo.from_wire(self._call(self._stub.CreateMesh, pb.CreateMeshRequest(spec=spec)))
+        return MeshInfo.from_wire(
+            self._call(self._stub.CreateMesh, pb.CreateMeshRequest(spec=spec))
+        )
 
     def get(self, name: str) -> MeshInfo:
         """A mesh as it stands. Raises MeshNotFound."""
@@ -135,7 +139,9 @@ class Client:
 
     def cancel(self, name: str) -> MeshInfo:
         """Ends a mesh; what there is of it stays readable. No effect when it is over."""
-        return MeshInfo.from_wire(self._call(self._stub.CancelMesh, pb.CancelMeshRequest(name=name)))
+        return MeshInfo.from_wire(
+            self._call(self._stub.CancelMesh, pb.CancelMeshRequest(name=name))
+        )
 
     def delete(self, name: str) -> None:
         """Cancels a mesh if it runs, and forgets it."""
@@ -144,7 +150,9 @@ class Client:
     def info(self) -> ServerInfo:
         """What the server is and allows."""
         answer = self._call(self._stub.GetServerInfo, pb.GetServerInfoRequest())
-        values = {field.name: getattr(answer, field.name) for field in dataclasses.fields(ServerInfo)}
+        values = {
+            field.name: getattr(answer, field.name) for field in dataclasses.fields(ServerInfo)
+        }
         return ServerInfo(**{**values, "protocols": tuple(values["protocols"])})
 
     def serve(self, oracle: Any, name: str, *, worker: str = "") -> str:

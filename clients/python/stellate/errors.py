@@ -112,7 +112,8 @@ class NotConverged(StellateError, ArithmeticError):
     def __init__(self, points: np.ndarray, converged: np.ndarray, message: str = "") -> None:
         converged = np.asarray(converged, dtype=bool)
         super().__init__(
-            message or f"no convergence for {np.count_nonzero(~converged)} of {converged.size} points"
+            message
+            or f"no convergence for {np.count_nonzero(~converged)} of {converged.size} points"
         )
         self.points = np.asarray(points, dtype=float)
         self.converged = converged

@@ -142,7 +142,9 @@ class ImplicitManifold:
         values = np.asarray(self._f(x), dtype=float)
         expected = (len(x), self.ambient_dimension - self.dimension)
         if values.shape != expected:
-            raise OracleError(f"f returned shape {values.shape}; it has to be {expected}", "ORACLE_SHAPE")
+            raise OracleError(
+                f"f returned shape {values.shape}; it has to be {expected}", "ORACLE_SHAPE"
+            )
         return values
 
     def _jacobian(self, x: np.ndarray) -> np.ndarray:
@@ -166,14 +168,20 @@ class ImplicitManifold:
             ahead = (part[:, None, :] + h * np.eye(d)).reshape(-1, d)
             behind = (part[:, None, :] - h * np.eye(d)).reshape(-1, d)
             change = self._values(ahead) - self._values(behind)
-            change = change.reshape(len(part), d, -1) / (ahead - behind).sum(axis=1).reshape(-1, d, 1)
+            change = change.reshape(len(part), d, -1) / (ahead - behind).sum(axis=1).reshape(
+                -1, d, 1
+            )
             jacobian[first : first + block] = change.transpose(0, 2, 1)
         return jacobian
 
     def _null_space(self, jacobian: np.ndarray) -> np.ndarray:
-        jacobian = np.where(np.isfinite(jacobian), jacobian, 0.0)  # a failed row must not sink others
+        jacobian = np.where(
+            np.isfinite(jacobian), jacobian, 0.0
+        )  # a failed row must not sink others
         _, _, vt = np.linalg.svd(jacobian, full_matrices=True)
-        return np.ascontiguousarray(vt[:, self.ambient_dimension - self.dimension :].transpose(0, 2, 1))
+        return np.ascontiguousarray(
+            vt[:, self.ambient_dimension - self.dimension :].transpose(0, 2, 1)
+        )
 
     def _descend_to_manifold(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gauss-Newton with halved steps from `start` down to M, straight towards it at the end."""
@@ -224,7 +232,12 @@ class ImplicitManifold:
         return y, converged
 
     def _halve_until_better(
-        self, y: np.ndarray, values: np.ndarray, alive: np.ndarray, rows: np.ndarray, step: np.ndarray
+        self,
+        y: np.ndarray,
+        values: np.ndarray,
+        alive: np.ndarray,
+        rows: np.ndarray,
+        step: np.ndarray,
     ) -> None:
         """Takes, in place, the longest of step, step/2, ... that lowers |F|; kills where none does."""
         fraction = 1.0

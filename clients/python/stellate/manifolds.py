@@ -175,5 +175,10 @@ def tanglecube() -> ImplicitManifold:
 
     corner = np.full(3, 2.5)
     return ImplicitManifold(
-        f, jacobian, ambient_dimension=3, dimension=2, bounding_box=(-corner, corner), thread_safe=True
+        f,
+        jacobian,
+        ambient_dimension=3,
+        dimension=2,
+        bounding_box=(-corner, corner),
+        thread_safe=True,
     )

@@ -151,12 +151,17 @@ class Report:
         lines = [
             ("mesh", f"{n.vertices:,} vertices, {n.simplices:,} simplices"),
             ("run", _TERMINATIONS.get(self.termination, self.termination.lower())),
-            ("took", f"{self.elapsed_seconds:.2f} s, {n.rounds:,} round trips, {n.queries:,} queries"),
+            (
+                "took",
+                f"{self.elapsed_seconds:.2f} s, {n.rounds:,} round trips, {n.queries:,} queries",
+            ),
             ("inserted for", inserted),
         ]
         if self.failure is not None:
             lines.append(("failure", f"{self.failure.reason}: {self.failure.message}"))
-        lines.append(("certificate", ("CERTIFIED. " if c.certified else "NOT CERTIFIED. ") + c.verdict))
+        lines.append(
+            ("certificate", ("CERTIFIED. " if c.certified else "NOT CERTIFIED. ") + c.verdict)
+        )
         if c.components:
             lines += _certificate_lines(c)
         lines += [("warning", text) for text in c.warnings]
@@ -173,7 +178,9 @@ def _certificate_lines(c: Certificate) -> list[tuple[str, str]]:
     )
     orientable = "orientable" if c.orientable else "not orientable"
     components = "1 component" if c.components == 1 else f"{c.components:,} components"
-    shape = f"largest circumradius {c.max_circumradius:.4g}, radius-edge ratio {c.max_radius_edge:.3g}"
+    shape = (
+        f"largest circumradius {c.max_circumradius:.4g}, radius-edge ratio {c.max_radius_edge:.3g}"
+    )
     shape += f"; smallest fatness {c.min_fatness:.3g}"
     if c.min_angle_degrees > 0:
         shape += f", angle {c.min_angle_degrees:.1f} degrees"

@@ -1,0 +1,204 @@
+"""Manifolds by equations, held to the laws of an oracle, and the ready-made ones with them."""
+
+import numpy as np
+import pytest
+
+import stellate
+from stellate import manifolds
+
+
+def implicit_torus(**options):
+    def f(x):
+        return ((np.hypot(x[:, 0], x[:, 1]) - 1) ** 2 + x[:, 2] ** 2 - 0.16)[:, None]
+
+    box = manifolds.Torus().bounding_box
+    return stellate.ImplicitManifold(
+        f, ambient_dimension=3, dimension=2, bounding_box=box, **options
+    )
+
+
+def implicit_rotations():
+    rows, columns = np.triu_indices(3)
+
+    def f(x):
+        r = x.reshape(-1, 3, 3)
+        return (r @ r.transpose(0, 2, 1) - np.eye(3))[:, rows, columns]
+
+    box = -np.ones(9), np.ones(9)
+    return stellate.ImplicitManifold(f, ambient_dimension=9, dimension=3, bounding_box=box)
+
+
+def implicit_circle(d):
+    def f(x):
+        return np.column_stack([x[:, 0] ** 2 + x[:, 1] ** 2 - 1, x[:, 2:]])
+
+    box = np.full(d, -1.5), np.full(d, 1.5)
+    return stellate.ImplicitManifold(f, ambient_dimension=d, dimension=1, bounding_box=box)
+
+
+ALL = {
+    "torus": manifolds.Torus(),
+    "circle in R^10": manifolds.Sphere(1, 10),
+    "S^4": manifolds.Sphere(4, radius=2.0),
+    "Clifford torus": manifolds.ProductOfCircles(),
+    "T^3": manifolds.ProductOfCircles((1, 0.8, 0.6)),
+    "SO(3)": manifolds.SpecialOrthogonal3(),
+    "ellipsoid": manifolds.ellipsoid(),
+    "ellipsoid S^3": manifolds.ellipsoid((1, 0.9, 0.8, 0.7)),
+    "tanglecube": manifolds.tanglecube(),
+    "torus by its equation": implicit_torus(),
+    "SO(3) by its equations": implicit_rotations(),
+    "circle by its equations": implicit_circle(4),
+}
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_laws_of_an_oracle(name, rng):
+    """Idempotent, perpendicular to the tangent space, tangents orthonormal: up to rounding."""
+    m = ALL[name]
+    lower, upper = m.bounding_box
+    x = rng.uniform(lower, upper, (500, m.ambient_dimension))
+    try:
+        p = m.closest_point(x)
+    except stellate.NotConverged as error:
+        assert error.converged.mean() > 0.97
+        x, p = x[error.converged], error.points[error.converged]
+    assert np.abs(m.closest_point(p) - p).max() < 1e-12
+    basis = m.tangent_basis(p)
+    k = m.dimension
+    assert basis.shape == (len(p), m.ambient_dimension, k)
+    assert np.abs(basis.transpose(0, 2, 1) @ basis - np.eye(k)).max() < 1e-13
+    assert np.abs(np.einsum("ndk,nd->nk", basis, x - p)).max() < 1e-8
+    # Tangent indeed: a step along it leaves M by its square only.
+    step = 1e-4
+    ahead = p + step * basis[:, :, 0]
+    assert np.linalg.norm(m.closest_point(ahead) - ahead, axis=1).max() < 100 * step**2
+
+
+@pytest.mark.parametrize(
+    "name", ["ellipsoid S^3", "torus by its equation", "SO(3) by its equations"]
+)
+def test_flats_are_met_where_asked(name, rng):
+    m = ALL[name]
+    p = m.closest_point(m.closest_point(rng.uniform(*m.bounding_box, (300, m.ambient_dimension))))
+    bases = m.tangent_basis(p)
+    radius = 0.05 * np.linalg.norm(m.bounding_box[1])
+    along = rng.normal(size=(len(p), m.dimension, 1))
+    centers = p + radius * (bases @ (along / np.linalg.norm(along, axis=1, keepdims=True)))[..., 0]
+    q, found = m.intersect_flat(centers, bases, np.full(len(p), radius))
+    assert found.all()
+    assert np.abs(np.einsum("ndk,nd->nk", bases, q - centers)).max() < 1e-12
+    assert np.linalg.norm(q - centers, axis=1).max() <= radius
+    assert np.abs(m.closest_point(q) - q).max() < 1e-10
+
+
+def test_flats_that_miss_the_manifold_or_meet_it_too_far_away():
+    m = manifolds.ellipsoid((1.0, 1.0, 1.0))
+    bases = np.broadcast_to(np.eye(3, 2), (3, 3, 2))  # flats are vertical lines
+    centers = np.array([[2.0, 0, 0], [0, 0, 0], [0, 0, 0.9]])
+    q, found = m.intersect_flat(centers, bases, np.array([5.0, 0.5, 0.5]))
+    assert found.tolist() == [False, False, True]
+    assert np.allclose(q[2], [0, 0, 1], atol=1e-14)
+
+
+def test_agrees_with_the_closed_form(rng):
+    closed = manifolds.Torus()
+    x = closed.closest_point(rng.uniform(*closed.bounding_box, (400, 3)))
+    x += rng.uniform(-0.1, 0.1, x.shape)
+    assert np.abs(implicit_torus().closest_point(x) - closed.closest_point(x)).max() < 1e-9
+    rotations = manifolds.SpecialOrthogonal3()
+    x = rotations.closest_point(rng.uniform(-1, 1, (100, 9))) + rng.uniform(-0.1, 0.1, (100, 9))
+    assert np.abs(implicit_rotations().closest_point(x) - rotations.closest_point(x)).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", ["tanglecube", "torus by its equation", "SO(3)", "torus", "S^4"])
+def test_answers_do_not_depend_on_the_batch(name, rng):
+    """Bit for bit, or a mesh would depend on how many workers there are."""
+    m = ALL[name]
+    x = m.closest_point(rng.uniform(*m.bounding_box, (101, m.ambient_dimension)))
+    x += rng.uniform(-0.05, 0.05, x.shape)
+    whole, bases = m.closest_point(x), m.tangent_basis(x)
+    for cut in ([1, 2, 50], [33], list(range(1, 101))):
+        parts = np.split(x, cut)
+        assert (
+            np.concatenate([m.closest_point(part) for part in parts]).tobytes() == whole.tobytes()
+        )
+        assert (
+            np.concatenate([m.tangent_basis(part) for part in parts]).tobytes() == bases.tobytes()
+        )
+
+
+def test_says_which_points_do_not_converge():
+    def f(x):  # a sphere of radius 1, and no way down from its centre
+        return (x * x).sum(axis=1, keepdims=True) - 1
+
+    box = -np.ones(3), np.ones(3)
+    m = stellate.ImplicitManifold(f, ambient_dimension=3, dimension=2, bounding_box=box)
+    with pytest.raises(stellate.NotConverged, match="1 of 3 points") as caught:
+        m.closest_point(np.array([[0.5, 0, 0], [0, 0, 0], [0, 0, 3.0]]))
+    assert caught.value.converged.tolist() == [True, False, True]
+    assert np.allclose(caught.value.points[[0, 2]], [[1, 0, 0], [0, 0, 1]])
+    assert isinstance(caught.value, stellate.StellateError)
+
+
+def test_a_function_without_zeros_converges_nowhere(rng):
+    def f(x):
+        return (x * x).sum(axis=1, keepdims=True) + 1
+
+    box = -np.ones(2), np.ones(2)
+    m = stellate.ImplicitManifold(f, ambient_dimension=2, dimension=1, bounding_box=box)
+    with pytest.raises(stellate.NotConverged) as caught:
+        m.closest_point(rng.uniform(-1, 1, (20, 2)))
+    assert not caught.value.converged.any()
+
+
+def test_values_that_are_not_numbers_spoil_their_own_points_alone(rng):
+    def f(x):
+        with np.errstate(invalid="ignore"):
+            return (np.sqrt(x[:, :1]) ** 2 + x[:, 1:] ** 2) - 1  # only defined on the right
+
+    m = stellate.ImplicitManifold(
+        f, ambient_dimension=2, dimension=1, bounding_box=([-1, -1], [2, 2])
+    )
+    with pytest.raises(stellate.NotConverged) as caught:
+        m.closest_point(np.array([[0.9, 0.1], [-0.5, 0.2]]))
+    assert caught.value.converged.tolist() == [True, False]
+
+
+def test_the_nearest_of_two_sheets_is_found():
+    m = manifolds.ellipsoid((2.0, 1.0))
+    p = m.closest_point(np.array([[1.2, 0.1], [1.2, -0.1], [0.0, 3.0]]))
+    assert (np.sign(p[:, 1]) == [1, -1, 1]).all()
+    angles = np.linspace(0, 2 * np.pi, 100001)
+    curve = np.column_stack([2 * np.cos(angles), np.sin(angles)])
+    nearest = np.linalg.norm(curve - [1.2, 0.1], axis=1).min()
+    assert np.linalg.norm(p[0] - [1.2, 0.1]) == pytest.approx(nearest, rel=1e-6)
+
+
+def test_wrong_shapes_are_named():
+    box = -np.ones(3), np.ones(3)
+    flat = stellate.ImplicitManifold(
+        lambda x: x[:, 0], ambient_dimension=3, dimension=2, bounding_box=box
+    )
+    with pytest.raises(stellate.OracleError, match=r"f returned shape \(4,\).*\(4, 1\)"):
+        flat.closest_point(np.ones((4, 3)))
+    bent = stellate.ImplicitManifold(
+        lambda x: x[:, :1], lambda x: x, ambient_dimension=3, dimension=2, bounding_box=box
+    )
+    with pytest.raises(stellate.OracleError, match=r"jacobian returned shape \(4, 3\)"):
+        bent.closest_point(np.ones((4, 3)))
+
+
+@pytest.mark.parametrize(
+    "changed, words",
+    [
+        ({"dimension": 0}, "dimension 0"),
+        ({"dimension": 3}, "dimension 3"),
+        ({"bounding_box": ([0, 0], [1, 1])}, "shapes"),
+        ({"bounding_box": ([0, 0, 0], [1, 0, 1])}, "empty"),
+    ],
+)
+def test_bad_declarations_are_refused(changed, words):
+    good = {"ambient_dimension": 3, "dimension": 2, "bounding_box": ([0, 0, 0], [1, 1, 1])}
+    with pytest.raises(stellate.InvalidArgument, match=words):
+        stellate.ImplicitManifold(lambda x: x[:, :1], **{**good, **changed})

@@ -1,0 +1,155 @@
+"""Files: what is written is read back the same."""
+
+import meshio
+import numpy as np
+import pytest
+import shapes
+import topology
+
+import stellate
+
+
+def outward(mesh, cells):
+    """Whether every triangle's normal points away from the inside of the torus's tube."""
+    a, b, c = (mesh.points[cells[:, i]] for i in range(3))
+    centre = (a + b + c) / 3
+    ring = centre * [1, 1, 0]
+    ring /= np.linalg.norm(ring, axis=1, keepdims=True)
+    return bool((np.einsum("ni,ni->n", np.cross(b - a, c - a), centre - ring) > 0).all())
+
+
+def test_shapes_are_what_they_claim():
+    topology.assert_closed_manifold(shapes.torus(), 0, [1, 2, 1])
+    topology.assert_closed_manifold(shapes.projective_plane(), 1, [1, 1, 1])
+    topology.assert_closed_manifold(shapes.simplex_boundary(3), 0, [1, 0, 0, 1])
+
+
+def test_the_topology_check_finds_faults():
+    torus = shapes.torus().simplices
+    assert not topology.is_closed(torus[1:])
+    assert not topology.is_closed(np.vstack([torus, torus[:1]]))
+    pinched = torus.copy()
+    pinched[pinched == 40] = 3  # two vertices far apart made one
+    assert topology.is_closed(np.sort(pinched, axis=1)) and not topology.is_manifold(pinched)
+
+
+@pytest.mark.parametrize(
+    "mesh", [shapes.polygon(9, 10), shapes.torus(), shapes.simplex_boundary(4)]
+)
+def test_txt_is_exact(mesh, tmp_path):
+    mesh = stellate.Mesh(mesh.points * np.pi + 1e-17, mesh.simplices)
+    mesh.save(tmp_path / "mesh.txt")
+    lines = (tmp_path / "mesh.txt").read_text().splitlines()
+    k, d = mesh.dimension, mesh.ambient_dimension
+    assert lines[0] == f"{k} {d} {len(mesh.points)} {len(mesh.simplices)}"
+    assert len(lines) == 1 + len(mesh.points) + len(mesh.simplices)
+    assert lines[1] == " ".join("%.17g" % x for x in mesh.points[0])
+    again = stellate.load_txt(tmp_path / "mesh.txt")
+    assert again.points.tobytes() == mesh.points.tobytes()
+    assert np.array_equal(again.simplices, mesh.simplices)
+
+
+def test_txt_of_something_else_is_refused(tmp_path):
+    (tmp_path / "no.txt").write_text("2 3 4 5\n1 2 3\n")
+    with pytest.raises(ValueError, match="do not fit"):
+        stellate.load_txt(tmp_path / "no.txt")
+
+
+@pytest.mark.parametrize("extension", [".vtu", ".vtk", ".obj", ".ply", ".off", ".stl"])
+def test_surfaces_are_read_back_with_outward_normals(extension, tmp_path):
+    mesh = shapes.torus()
+    mesh.save(tmp_path / f"torus{extension}")
+    again = meshio.read(tmp_path / f"torus{extension}")
+    cells = again.cells_dict["triangle"]
+    if extension != ".stl":  # which has triangles without common vertices
+        assert np.array_equal(again.points, mesh.points)
+        assert {tuple(row) for row in np.sort(cells, axis=1)} == {
+            tuple(row) for row in mesh.simplices
+        }
+    assert len(cells) == len(mesh.simplices)
+    corners = stellate.Mesh(np.asarray(again.points, dtype=float), cells)
+    assert outward(corners, cells)
+
+
+@pytest.mark.parametrize(
+    "mesh, cell", [(shapes.polygon(7), "line"), (shapes.simplex_boundary(3), "tetra")]
+)
+def test_vtu_of_curves_and_solids(mesh, cell, tmp_path):
+    mesh.save(tmp_path / "mesh.vtu")
+    again = meshio.read(tmp_path / "mesh.vtu")
+    assert np.array_equal(np.sort(again.cells_dict[cell], axis=1), mesh.simplices)
+    d = min(3, mesh.ambient_dimension)
+    assert np.array_equal(again.points[:, :d], mesh.points[:, :d])
+
+
+def test_vtu_beyond_space_keeps_all_coordinates(tmp_path):
+    mesh = shapes.projective_plane()
+    mesh.save(tmp_path / "mesh.vtu")
+    again = meshio.read(tmp_path / "mesh.vtu")
+    assert np.array_equal(again.points, mesh.points[:, :3])
+    assert np.array_equal(again.point_data["coordinates"], mesh.points)
+
+
+def test_curve_as_obj_and_ply(tmp_path):
+    shapes.polygon(5).save(tmp_path / "c.obj")
+    lines = (tmp_path / "c.obj").read_text().splitlines()
+    assert sum(line.startswith("v ") for line in lines) == 5
+    ends = [tuple(map(int, line.split()[1:])) for line in lines if line.startswith("l ")]
+    assert (
+        sorted(a for a, _ in ends) == sorted(b for _, b in ends) == [1, 2, 3, 4, 5]
+    )  # one way round
+    shapes.polygon(5).save(tmp_path / "c.ply")
+    header, _, body = (tmp_path / "c.ply").read_text().partition("end_header\n")
+    assert "element vertex 5" in header and "element edge 5" in header
+    assert len(body.splitlines()) == 10
+
+
+def test_off_of_any_dimension(tmp_path):
+    mesh = shapes.projective_plane()
+    mesh.save(tmp_path / "p.off")
+    lines = (tmp_path / "p.off").read_text().splitlines()
+    assert lines[:3] == ["nOFF", "5", "6 10 0"]
+    assert np.array_equal(np.array([line.split() for line in lines[3:9]], dtype=float), mesh.points)
+    assert np.array_equal([list(map(int, line.split()[1:])) for line in lines[9:]], mesh.simplices)
+
+
+@pytest.mark.parametrize(
+    "mesh, name, words",
+    [
+        (shapes.projective_plane(), "m.obj", "5 coordinates"),
+        (shapes.projective_plane(), "m.ply", "5 coordinates"),
+        (shapes.simplex_boundary(3), "m.off", "dimension 3"),
+        (shapes.simplex_boundary(4), "m.vtu", "dimension 4"),
+        (shapes.torus(), "m.docx", r"\.docx.*known: .*\.vtu"),
+        (shapes.torus(), "m", "no format"),
+    ],
+)
+def test_what_a_format_cannot_hold_is_said_and_nothing_written(mesh, name, words, tmp_path):
+    with pytest.raises(stellate.SaveError, match=words):
+        mesh.save(tmp_path / name)
+    assert not (tmp_path / name).exists()
+
+
+def test_orientation():
+    torus = shapes.torus().oriented_simplices()
+    directed = {tuple(edge) for row in torus for edge in (row[[0, 1]], row[[1, 2]], row[[2, 0]])}
+    assert len(directed) == 3 * len(torus)  # every edge once each way: neighbours agree
+    assert shapes.projective_plane().oriented_simplices() is None
+    solid = shapes.simplex_boundary(3)
+    volumes = np.linalg.det(solid.points[solid.oriented_simplices()])
+    assert (volumes > 0).all()
+    three = np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])  # a book with three pages
+    assert stellate.Mesh(np.eye(5, 4), three).oriented_simplices() is None
+
+
+def test_two_components_each_have_outward_normals():
+    one = shapes.torus()
+    far = stellate.Mesh(
+        np.vstack([one.points, one.points * [1, 1, -1] + [5, 0, 0]]),  # mirrored
+        np.vstack([one.simplices, one.simplices + len(one.points)]),
+    )
+    oriented = far.oriented_simplices()
+    half = len(one.simplices)
+    assert outward(one, oriented[:half])
+    moved = stellate.Mesh(far.points[len(one.points) :] - [5, 0, 0], one.simplices)
+    assert outward(moved, oriented[half:] - len(one.points))
