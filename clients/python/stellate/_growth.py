@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ._arrays import from_wire, indices_from_wire
+from ._generated import mesh_pb2
 from ._generated import stellate_pb2 as pb
 
 
@@ -17,7 +18,7 @@ class GrowingComplex:
         self._vertex_count = 0
         self._points = np.empty((1024, ambient_dimension))
         self._rows = np.empty((0, dimension + 1), dtype=np.uint32)
-        self._pending: list[pb.MeshDelta] = []
+        self._pending: list[mesh_pb2.MeshDelta] = []
 
     def absorb(self, chunk: pb.DeltaChunk) -> bool:
         """Takes one chunk; True when a revision is complete with it.

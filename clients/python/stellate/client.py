@@ -116,7 +116,7 @@ class Client:
         self._stub = rpc.StellateStub(self._channel)
 
     def create(self, oracle: Any, epsilon: float = 0.1, **criteria: Any) -> MeshInfo:
-        """Declares a mesh; nothing happens until somebody serves it. Keywords: see stellate.mesh."""
+        """Declares a mesh, which waits to be served. Keywords: see stellate.mesh."""
         checked = oracle if isinstance(oracle, CheckedOracle) else CheckedOracle(oracle)
         spec = mesh_spec(checked, epsilon, criteria)
         return MeshInfo.from_wire(
@@ -150,10 +150,10 @@ class Client:
     def info(self) -> ServerInfo:
         """What the server is and allows."""
         answer = self._call(self._stub.GetServerInfo, pb.GetServerInfoRequest())
-        values = {
+        values: dict[str, Any] = {
             field.name: getattr(answer, field.name) for field in dataclasses.fields(ServerInfo)
         }
-        return ServerInfo(**{**values, "protocols": tuple(values["protocols"])})
+        return ServerInfo(**{**values, "protocols": tuple(answer.protocols)})
 
     def serve(self, oracle: Any, name: str, *, worker: str = "") -> str:
         """Serves a mesh with this oracle until it is over; returns the state it ended in.

@@ -1,7 +1,7 @@
 """What can go wrong, as exceptions.
 
-Every error of ours is a StellateError with a stable upper-case `reason` (the protocol's ErrorReason)
-for programs and a message for people. An exception that an oracle raises is not among them: it
+Every error of ours is a StellateError with a stable upper-case `reason` for programs (the protocol's
+ErrorReason) and a message for people. An exception that an oracle raises is not among them: it
 reaches the caller as itself.
 """
 
@@ -147,7 +147,9 @@ _BY_CODE: dict[grpc.StatusCode, type[StellateError]] = {
 
 def error_class(reason: str) -> type[StellateError]:
     """The exception for one of the protocol's reasons."""
-    return OracleError if reason.startswith("ORACLE_") else _BY_REASON.get(reason, StellateError)
+    if reason.startswith("ORACLE_"):
+        return OracleError
+    return _BY_REASON.get(reason, StellateError)
 
 
 def from_rpc(error: grpc.RpcError) -> StellateError:

@@ -239,7 +239,7 @@ class ImplicitManifold:
         rows: np.ndarray,
         step: np.ndarray,
     ) -> None:
-        """Takes, in place, the longest of step, step/2, ... that lowers |F|; kills where none does."""
+        """Takes, in place, the longest of step, step/2, ... that lowers |F|; kills if none does."""
         fraction = 1.0
         for _ in range(30):
             if not rows.size:

@@ -76,7 +76,7 @@ class Sphere:
     def tangent_basis(self, points: np.ndarray) -> np.ndarray:
         k, d = self.dimension, self.ambient_dimension
         normal, _ = _unit(points[:, : k + 1])
-        # Householder: the reflection that takes the last axis to +-normal takes the others to it too.
+        # Householder's reflection takes the last axis to +-normal, so the others to its complement.
         mirror = normal.copy()
         mirror[:, k] += np.where(normal[:, k] >= 0, 1.0, -1.0)
         mirror, _ = _unit(mirror)
@@ -86,7 +86,7 @@ class Sphere:
 
 
 class ProductOfCircles:
-    """T^k as a product of circles in R^2k: the Clifford torus for k = 2, flat and without boundary."""
+    """T^k as a product of circles in R^2k: for k = 2 the Clifford torus. It is flat."""
 
     thread_safe = True
 
@@ -115,7 +115,7 @@ class ProductOfCircles:
 
 
 class SpecialOrthogonal3:
-    """SO(3), the rotations of space, as the matrices they are: k = 3 in R^9, rows after each other."""
+    """SO(3), the rotations of space, as 3 x 3 matrices, row after row: k = 3, d = 9."""
 
     dimension, ambient_dimension = 3, 9
     thread_safe = True

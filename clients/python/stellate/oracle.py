@@ -55,6 +55,7 @@ class CheckedOracle:
         self.bounding_box = _box(getattr(oracle, "bounding_box", None))
         self.seeds = _seeds(getattr(oracle, "seeds", None))
         shared = bool(getattr(oracle, "thread_safe", False))
+        self._one_at_a_time: contextlib.AbstractContextManager[Any]
         self._one_at_a_time = contextlib.nullcontext() if shared else threading.Lock()
 
     def closest_points(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -115,7 +116,8 @@ def _numbers(method: str, answer: Any, shape: tuple[int, ...], found: np.ndarray
             array = np.asarray(None)
     if array.dtype.kind not in "fiu":
         raise OracleError(
-            f"{method} returned {_describe(answer)}; it has to return real numbers of shape {shape}",
+            f"{method} returned {_describe(answer)}; it has to return real numbers "
+            f"of shape {shape}",
             "ORACLE_SHAPE",
         )
     if array.shape != shape:

@@ -189,7 +189,8 @@ def _certificate_lines(c: Certificate) -> list[tuple[str, str]]:
         ("manifold", f"{closed}; {links}"),
         (
             "stars",
-            f"{c.inconsistent_simplices:,} inconsistent simplices, {c.unembedded_stars:,} stars overlap, "
+            f"{c.inconsistent_simplices:,} inconsistent simplices, {c.unembedded_stars:,} stars "
+            "overlap, "
             f"{c.fibre_failures:,} of {c.fibre_samples:,} normal flats met wrongly",
         ),
         ("shape", shape),
