@@ -38,7 +38,8 @@ struct BoundingBox {
 struct Criteria {
   double radius_edge_bound = 2.0;            // rho0 of rule R2, no unit, > 1
   std::optional<double> sliver_bound;        // Theta0 of rule R3, no unit, in [0, 0.3]; 0 turns R3
-                                             // off. Default 0 for k <= 2, 0.2 for k >= 3
+                                             // off. Default 0 for k <= 2; 0.2, 0.15, 0.1 for
+                                             // k = 3, 4, 5
   double picking_radius = 0.4;               // delta: the picking region is B(c_p, delta R_p); in
                                              // (0, 1)
   double small_sliver_radius = 2.0;          // beta: only simplices of circumradius <= beta R_p
@@ -46,7 +47,8 @@ struct Criteria {
   std::optional<int> candidates;             // points tried in a picking region, 1..100. Default 1
                                              // for k <= 2, 10 for k >= 3
   std::optional<double> advance_step;        // h, length: how far the front steps over unknown
-                                             // ground. Default 3 epsilon
+                                             // ground. Default 3 epsilon, or a tenth of the
+                                             // bounding box's diagonal if that is more
   int flat_alternations = 1;                 // without intersect_flat: closest points taken when
                                              // alternating towards a flat, 1..20
 };

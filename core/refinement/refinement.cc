@@ -2,6 +2,7 @@
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -31,6 +32,10 @@ constexpr double kTangentStep = 0.01;
 
 // Cells begin as fake simplices a little larger than the step of the front.
 constexpr double kInradius = 1.2;
+// Theta0 by k: for k = 3 larger bounds do not terminate, for k <= 2 none is needed. A regular
+// simplex's fatness falls quickly with k, so the bound falls with it.
+constexpr double kDefaultSliverBound[kMaxDimension + 1] = {0, 0, 0, 0.2, 0.15, 0.1};
+
 constexpr double kDefaultAdvanceEpsilons = 3;
 constexpr double kDefaultAdvanceShare = 0.1;  // of the bounding box's diagonal
 
@@ -41,7 +46,7 @@ ResolvedCriteria Resolve(const Specification& spec) {
   ResolvedCriteria r;
   r.epsilon = spec.epsilon;
   r.radius_edge_bound = c.radius_edge_bound;
-  r.sliver_bound = c.sliver_bound.value_or(spec.dimension <= 2 ? 0.0 : 0.2);
+  r.sliver_bound = c.sliver_bound.value_or(kDefaultSliverBound[spec.dimension]);
   r.picking_radius = c.picking_radius;
   r.small_sliver_radius = c.small_sliver_radius;
   r.candidates = c.candidates.value_or(spec.dimension <= 2 ? 1 : 10);
@@ -122,6 +127,18 @@ Expected<MeshDelta> Refinement<K>::Absorb(const Answers& answers) {
   delta_.first_vertex = complex_.size();
   batch_.reset();
 
+  tbb::task_arena arena(spec_.threads > 0 ? spec_.threads : tbb::task_arena::automatic);
+  arena.execute([&] { Advance(answers); });
+  delta_.points = Eigen::Map<const Eigen::MatrixXd>(complex_.points().data(), complex_.d(),
+                                                    complex_.size())
+                      .rightCols(complex_.size() - static_cast<Eigen::Index>(delta_.first_vertex));
+  UpdateProgress();
+  return std::move(delta_);
+}
+
+// From the answers to the next batch, or to the end.
+template <int K>
+void Refinement<K>::Advance(const Answers& answers) {
   switch (stage_) {
     case Stage::kCertify:
       certifier_->Absorb(answers.blocks);
@@ -150,11 +167,6 @@ Expected<MeshDelta> Refinement<K>::Absorb(const Answers& answers) {
     again.points = idempotence_sample_;
     batch_->blocks.push_back(std::move(again));
   }
-  delta_.points = Eigen::Map<const Eigen::MatrixXd>(complex_.points().data(), complex_.d(),
-                                                    complex_.size())
-                      .rightCols(complex_.size() - static_cast<Eigen::Index>(delta_.first_vertex));
-  UpdateProgress();
-  return std::move(delta_);
 }
 
 // Sorts the answers back into candidates.

@@ -57,6 +57,7 @@ class Refinement final : public Mesher {
 
   // Answers (refinement.cc).
   Status CheckIdempotence(const Answers& answers) const;
+  void Advance(const Answers& answers);
   void TakePoints(const Answers& answers);
   void AfterPoints();
   void AfterTangents();
