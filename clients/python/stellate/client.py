@@ -150,10 +150,11 @@ class Client:
     def info(self) -> ServerInfo:
         """What the server is and allows."""
         answer = self._call(self._stub.GetServerInfo, pb.GetServerInfoRequest())
-        values: dict[str, Any] = {
-            field.name: getattr(answer, field.name) for field in dataclasses.fields(ServerInfo)
-        }
-        return ServerInfo(**{**values, "protocols": tuple(answer.protocols)})
+        plain = (
+            field.name for field in dataclasses.fields(ServerInfo) if field.name != "protocols"
+        )
+        values: dict[str, Any] = {name: getattr(answer, name) for name in plain}
+        return ServerInfo(protocols=tuple(answer.protocols), **values)
 
     def serve(self, oracle: Any, name: str, *, worker: str = "") -> str:
         """Serves a mesh with this oracle until it is over; returns the state it ended in.

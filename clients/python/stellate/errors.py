@@ -1,7 +1,7 @@
 """What can go wrong, as exceptions.
 
-Every error of ours is a StellateError with a stable upper-case `reason` for programs (the protocol's
-ErrorReason) and a message for people. An exception that an oracle raises is not among them: it
+Every error of ours is a StellateError with a stable upper-case `reason` for programs (one of the
+protocol's ErrorReason) and a message for people. An exception that an oracle raises is not among them: it
 reaches the caller as itself.
 """
 

@@ -56,7 +56,9 @@ class CheckedOracle:
         self.seeds = _seeds(getattr(oracle, "seeds", None))
         shared = bool(getattr(oracle, "thread_safe", False))
         self._one_at_a_time: contextlib.AbstractContextManager[Any]
-        self._one_at_a_time = contextlib.nullcontext() if shared else threading.Lock()
+        self._one_at_a_time = threading.Lock()
+        if shared:
+            self._one_at_a_time = contextlib.nullcontext()
 
     def closest_points(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(n, d) -> the closest points (n, d), and where they were found (n,)."""

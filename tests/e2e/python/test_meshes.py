@@ -1,0 +1,195 @@
+"""Manifolds meshed through the real server: certified, and right by an independent check."""
+
+import numpy as np
+import pytest
+import topology
+
+import stellate
+from stellate import manifolds
+
+
+def torus_knot(p=2, q=3):
+    """The (p, q) torus knot by its parametrisation alone: nearest samples, then Newton."""
+
+    class Knot:
+        dimension, ambient_dimension = 1, 3
+        bounding_box = np.full(3, -3.2), np.full(3, 3.2)
+
+        def curve(self, t):
+            r, dr = 2 + np.cos(q * t), -q * np.sin(q * t)
+            ddr = -q * q * np.cos(q * t)
+            c, s = np.cos(p * t), np.sin(p * t)
+            at = np.stack([r * c, r * s, -np.sin(q * t)], axis=-1)
+            speed = np.stack([dr * c - p * r * s, dr * s + p * r * c, -q * np.cos(q * t)], axis=-1)
+            bend = np.stack(
+                [
+                    ddr * c - 2 * p * dr * s - p * p * r * c,
+                    ddr * s + 2 * p * dr * c - p * p * r * s,
+                    q * q * np.sin(q * t),
+                ],
+                axis=-1,
+            )
+            return at, speed, bend
+
+        def parameter(self, x):
+            samples = np.linspace(0, 2 * np.pi, 600, endpoint=False)
+            at, _, _ = self.curve(samples)
+            t = samples[((x[:, None, :] - at) ** 2).sum(axis=2).argmin(axis=1)]
+            for _ in range(8):
+                at, speed, bend = self.curve(t)
+                slope = ((at - x) * speed).sum(axis=1)
+                t = t - slope / np.maximum(
+                    (speed * speed).sum(axis=1) + ((at - x) * bend).sum(axis=1), 1.0
+                )
+            return t
+
+        def closest_point(self, x):
+            return self.curve(self.parameter(x))[0]
+
+        def tangent_basis(self, x):
+            speed = self.curve(self.parameter(x))[1]
+            return (speed / np.sqrt((speed**2).sum(axis=1, keepdims=True)))[:, :, None]
+
+    return Knot()
+
+
+def implicit_clifford():
+    """x^2 + y^2 = 1, z^2 + w^2 = 1: codimension two, with a difference Jacobian."""
+
+    def f(x):
+        squares = x * x
+        return np.stack([squares[:, 0] + squares[:, 1], squares[:, 2] + squares[:, 3]], axis=1) - 1
+
+    box = np.full(4, -1.2), np.full(4, 1.2)
+    return stellate.ImplicitManifold(f, ambient_dimension=4, dimension=2, bounding_box=box)
+
+
+def implicit_torus():
+    """In space by its equation: with tangents and flats of its own."""
+
+    def f(x):
+        ring = np.sqrt(x[:, 0] ** 2 + x[:, 1] ** 2)
+        return ((ring - 1) ** 2 + x[:, 2] ** 2 - 0.16)[:, None]
+
+    box = manifolds.Torus().bounding_box
+    return stellate.ImplicitManifold(f, ambient_dimension=3, dimension=2, bounding_box=box)
+
+
+# name: (oracle, epsilon, Euler characteristic, Betti numbers over Z/2, orientable)
+MANIFOLDS = {
+    "circle in R^10": (manifolds.Sphere(1, 10), 0.2, 0, [1, 1], True),
+    "torus knot": (torus_knot(), 0.15, 0, [1, 1], True),
+    "ellipsoid": (manifolds.ellipsoid((1.0, 0.8, 0.6)), 0.12, 2, [1, 0, 1], True),
+    "torus": (manifolds.Torus(), 0.1, 0, [1, 2, 1], True),
+    "implicit torus": (implicit_torus(), 0.15, 0, [1, 2, 1], True),
+    "tanglecube": (manifolds.tanglecube(), 0.12, -8, [1, 10, 1], True),
+    "Clifford torus": (manifolds.ProductOfCircles(), 0.3, 0, [1, 2, 1], True),
+    "implicit Clifford torus": (implicit_clifford(), 0.35, 0, [1, 2, 1], True),
+    "ellipsoid S^3": (manifolds.ellipsoid((1.0, 0.9, 0.8, 1.1)), 0.3, 0, [1, 0, 0, 1], True),
+    "SO(3) in R^9": (manifolds.SpecialOrthogonal3(), 0.45, 0, [1, 1, 1, 1], True),
+}
+
+
+@pytest.mark.parametrize("name", MANIFOLDS)
+def test_manifold(name, server):
+    oracle, epsilon, euler, betti, orientable = MANIFOLDS[name]
+    mesh = stellate.mesh(oracle, epsilon, server=server)
+    certificate = mesh.report.certificate
+    assert mesh.report.termination == "CONVERGED"
+    assert mesh.certified, mesh.report
+    assert certificate.closed and certificate.links_are_spheres
+    assert certificate.components == 1
+    assert certificate.euler_characteristic == euler
+    assert certificate.orientable == orientable
+    assert certificate.max_circumradius <= epsilon * (1 + 1e-9)
+    counts = mesh.report.counts
+    assert (counts.vertices, counts.simplices) == (len(mesh.points), len(mesh.simplices))
+    topology.assert_closed_manifold(mesh, euler, betti)
+    assert (mesh.oriented_simplices() is not None) == orientable
+    on_manifold = oracle.closest_point(mesh.points)
+    assert np.abs(on_manifold - mesh.points).max() < 1e-9
+
+
+def test_oracle_with_nothing_but_closest_points(server):
+    """Tangents and flats are then found by the server."""
+
+    class Bare:
+        dimension, ambient_dimension = 2, 3
+        bounding_box = manifolds.Torus().bounding_box
+        closest_point = staticmethod(manifolds.Torus().closest_point)
+
+    mesh = stellate.mesh(Bare(), 0.15, server=server)
+    assert mesh.certified, mesh.report
+    topology.assert_closed_manifold(mesh, 0, [1, 2, 1])
+    assert mesh.report.counts.tangent_queries > 0
+
+
+def test_components_are_all_found_from_one_seed_each(server):
+    class TwoSpheres:
+        dimension, ambient_dimension = 2, 3
+        centres = np.array([[-2.0, 0, 0], [2.0, 0.3, 0]])
+        seeds = np.array([[-1.0, 0, 0], [2.0, 0.3, 1.0]])
+
+        def closest_point(self, x):
+            centre = self.centres[(x[:, 0] > 0).astype(int)]
+            away = x - centre
+            return centre + away / np.sqrt((away * away).sum(axis=1, keepdims=True))
+
+    mesh = stellate.mesh(TwoSpheres(), 0.25, server=server)
+    assert mesh.certified, mesh.report
+    assert mesh.report.certificate.components == topology.component_count(mesh.simplices) == 2
+    topology.assert_closed_manifold(mesh, 4, [2, 0, 2])
+
+
+def test_the_same_mesh_from_one_and_from_four_workers(server):
+    """Bit for bit, however the batches are cut."""
+    for oracle, epsilon in ((manifolds.Torus(), 0.1), (manifolds.tanglecube(), 0.2)):
+        one = stellate.mesh(oracle, epsilon, server=server)
+        four = stellate.mesh(oracle, epsilon, server=server, workers=4)
+        assert one.points.tobytes() == four.points.tobytes()
+        assert one.simplices.tobytes() == four.simplices.tobytes()
+        assert one.report.certificate == four.report.certificate
+
+
+def test_another_random_seed_gives_another_mesh(server):
+    first = stellate.mesh(manifolds.Torus(), 0.2, server=server, random_seed=1)
+    again = stellate.mesh(manifolds.Torus(), 0.2, server=server, random_seed=1)
+    other = stellate.mesh(manifolds.Torus(), 0.2, server=server, random_seed=2)
+    assert first.points.tobytes() == again.points.tobytes()
+    assert first.points.shape != other.points.shape or not (first.points == other.points).all()
+    topology.assert_closed_manifold(other, 0)
+
+
+def grid_seeds():
+    """Exactly symmetric: the vertices of a square grid on a flat torus in R^4."""
+    angle = 2 * np.pi * np.arange(12) / 12
+    u, v = (a.ravel() for a in np.meshgrid(angle, angle))
+    return np.stack([np.cos(u), np.sin(u), np.cos(v), np.sin(v)], axis=1)
+
+
+@pytest.mark.parametrize("repeats", [1, 3])
+def test_seeds_on_a_grid_and_given_again_and_again(repeats, server):
+    seeds = np.tile(grid_seeds(), (repeats, 1))
+    mesh = stellate.mesh(manifolds.ProductOfCircles(), 0.4, server=server, seeds=seeds)
+    assert mesh.certified, mesh.report
+    topology.assert_closed_manifold(mesh, 0, [1, 2, 1])
+    assert len(np.unique(mesh.points, axis=0)) == len(mesh.points)
+
+
+def test_epsilon_far_above_the_reach_is_never_certified(server):
+    """The tube's radius is 0.1: at epsilon 0.8 no mesh can follow it."""
+    mesh = stellate.mesh(manifolds.Torus(1.0, 0.1), 0.8, server=server)
+    assert not mesh.certified
+    assert any("reach" in warning for warning in mesh.report.warnings), mesh.report
+    assert mesh.report.certificate.epsilon_over_reach > 1
+    assert "NOT CERTIFIED" in str(mesh.report)
+
+
+@pytest.mark.parametrize(
+    "limit, end", [("max_vertices", "VERTEX_BUDGET"), ("max_rounds", "ROUND_BUDGET")]
+)
+def test_a_budget_that_is_spent_leaves_an_uncertified_mesh(limit, end, server):
+    mesh = stellate.mesh(manifolds.Torus(), 0.05, server=server, **{limit: 8})
+    assert mesh.report.termination == end
+    assert not mesh.certified
+    assert limit in str(mesh.report)

@@ -1,0 +1,96 @@
+"""Reports and progress, as people read them."""
+
+import dataclasses
+import io
+
+import pytest
+
+import stellate
+from stellate._generated import mesh_pb2
+
+
+def progress(**changed):
+    message = mesh_pb2.Progress(
+        phase=mesh_pb2.PHASE_REFINING,
+        round=7,
+        queries=4000,
+        vertices=3456,
+        fraction=0.43,
+        elapsed_seconds=1.5,
+        remaining_seconds=2.0,
+    )
+    return dataclasses.replace(stellate.Progress.from_wire(message), **changed)
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_a_live_line_on_a_terminal(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "100")
+    out = Terminal()
+    bar = stellate.progress_bar("torus", out)
+    bar(progress())
+    bar(progress(phase="DONE", fraction=1.0))
+    bar.close()
+    first, second = out.getvalue().split("\r")[1:]
+    assert first.startswith("torus  43 % │") and "3,456 vertices" in first and "2 s left" in first
+    assert second.startswith("torus 100 % │██████████") and second.endswith("\x1b[K\n")
+    assert all(len(line.replace("\x1b[K", "").strip()) < 100 for line in (first, second))
+
+
+@pytest.mark.parametrize("columns", ["20", "40", "80"])
+def test_a_line_never_wraps(columns, monkeypatch):
+    monkeypatch.setenv("COLUMNS", columns)
+    out = Terminal()
+    stellate.progress_bar("a rather long title", out)(progress())
+    assert len(out.getvalue().replace("\r", "").replace("\x1b[K", "")) < int(columns)
+
+
+def test_plain_lines_elsewhere_one_a_phase():
+    out = io.StringIO()
+    bar = stellate.progress_bar("torus", out)
+    for _ in range(50):
+        bar(progress())
+    bar(progress(phase="CERTIFYING"))
+    bar.close()
+    lines = out.getvalue().splitlines()
+    assert len(lines) == 2 and "refining, round 7" in lines[0] and "certifying" in lines[1]
+    assert "\r" not in out.getvalue() and "\x1b" not in out.getvalue()
+
+
+def report(certified):
+    message = mesh_pb2.Report(termination=mesh_pb2.TERMINATION_CONVERGED, elapsed_seconds=0.5)
+    message.counts.vertices = 1234
+    certificate = message.certificate
+    certificate.certified = certified
+    certificate.verdict = "a closed 2-manifold" if certified else "3 links are not spheres"
+    certificate.closed = True
+    certificate.bad_links = 0 if certified else 3
+    certificate.links_are_spheres = certified
+    certificate.components, certificate.euler_characteristic = 1, -8
+    certificate.warnings.append("epsilon is coarse")
+    return stellate.Report.from_wire(message)
+
+
+def test_a_report_reads_well():
+    text = str(report(True))
+    assert "CERTIFIED. a closed 2-manifold" in text and "NOT CERTIFIED" not in text
+    assert "1,234 vertices" in text and "Euler characteristic -8" in text
+    assert "warning  epsilon is coarse" in text
+    assert report(True).certified and report(True).warnings == ("epsilon is coarse",)
+
+
+def test_a_bad_mesh_is_called_bad():
+    text = str(report(False))
+    assert "NOT CERTIFIED. 3 links are not spheres" in text and "3 links are not spheres" in text
+    assert not report(False).certified
+
+
+def test_a_failure_is_told():
+    message = mesh_pb2.Report(termination=mesh_pb2.TERMINATION_ORACLE_FAILED)
+    message.failure.reason, message.failure.message = "ORACLE_NOT_FINITE", "query 3 is nan"
+    failed = stellate.Report.from_wire(message)
+    assert failed.failure == stellate.Failure("ORACLE_NOT_FINITE", "query 3 is nan")
+    assert "ORACLE_NOT_FINITE: query 3 is nan" in str(failed)
