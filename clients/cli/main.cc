@@ -1,0 +1,112 @@
+// stellate: meshes the catalogue's manifolds from the command line.
+#include <signal.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <stop_token>
+#include <string>
+#include <thread>
+
+#include "mesh_command.h"
+#include "stellate/catalogue.h"
+#include "stellate/client.h"
+
+namespace {
+
+using stellate::cli::Complain;
+
+// SIGINT and SIGTERM become a request to stop. Made before any other thread, so that all of them
+// leave the signals to this one's. A second signal ends the program at once.
+class StopOnSignal {
+ public:
+  StopOnSignal() {
+    sigemptyset(&signals_);
+    for (const int signal : {SIGINT, SIGTERM, SIGUSR1}) sigaddset(&signals_, signal);
+    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
+    thread_ = std::thread([this] {
+      int signal = 0;
+      sigwait(&signals_, &signal);
+      if (signal == SIGUSR1) return;  // from the destructor
+      std::thread([source = source_]() mutable { source.request_stop(); }).detach();
+      do {
+        sigwait(&signals_, &signal);
+      } while (signal != SIGUSR1 && signal != SIGINT && signal != SIGTERM);
+      if (signal != SIGUSR1) _exit(stellate::cli::kExitNotCertified);
+    });
+  }
+  ~StopOnSignal() {
+    pthread_kill(thread_.native_handle(), SIGUSR1);
+    thread_.join();
+  }
+  std::stop_token token() const { return source_.get_token(); }
+
+ private:
+  sigset_t signals_;
+  std::stop_source source_;
+  std::thread thread_;
+};
+
+int List() {
+  std::string syntax_width(22, ' ');
+  for (const stellate::CatalogueEntry& entry : stellate::ListManifolds()) {
+    std::printf("%-22s %s\n", entry.syntax.c_str(), entry.description.c_str());
+    const auto manifold = stellate::MakeManifold(entry.example, nullptr);
+    const stellate::ManifoldFacts& facts = manifold->facts();
+    std::string betti;
+    for (const int b : facts.betti_mod2) {
+      if (!betti.empty()) betti += ' ';
+      betti += std::to_string(b);
+    }
+    std::printf("%s e.g. %s: dimension %d in R^%d, Euler characteristic %d, Betti numbers mod 2 %s",
+                syntax_width.c_str(), facts.spec.c_str(), facts.dimension, facts.ambient_dimension,
+                facts.euler_characteristic, betti.c_str());
+    if (facts.reach) std::printf(", reach %.4g", *facts.reach);
+    std::printf("\n");
+  }
+  return stellate::cli::kExitCertified;
+}
+
+int Health(const std::string& server) {
+  const auto health = stellate::CheckHealth(server);
+  if (!health) return Complain(health.error());
+  std::cout << server << ": " << (health->serving ? "serving" : "not serving") << ", stellated "
+            << health->version << "\n"
+            << "limits: dimension " << health->max_dimension << " in R^"
+            << health->max_ambient_dimension << ", " << health->max_vertices << " vertices, "
+            << health->max_meshes << " meshes at once\n";
+  return health->serving ? stellate::cli::kExitCertified : stellate::cli::kExitFailed;
+}
+
+int Main(int argc, char** argv) {
+  CLI::App app("Meshes smooth manifolds of any dimension with a certificate.", "stellate");
+  app.set_version_flag("--version", "stellate " STELLATE_VERSION);
+  app.require_subcommand(1);
+  stellate::cli::MeshCommand mesh(app);
+  const CLI::App* list = app.add_subcommand("list", "Show the catalogue of manifolds");
+  CLI::App* health = app.add_subcommand("health", "Ask a server how it is");
+  std::string server = "127.0.0.1:7717";
+  health->add_option("--server", server, "host:port or unix:/path")->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    // Help and version come this way too, with status 0.
+    return app.exit(error) == 0 ? stellate::cli::kExitCertified : stellate::cli::kExitRefused;
+  }
+  if (list->parsed()) return List();
+  if (health->parsed()) return Health(server);
+  const StopOnSignal signals;
+  return mesh.Run(signals.token());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return Main(argc, argv);
+  } catch (const std::exception& error) {
+    std::cerr << "stellate: " << error.what() << "\n";
+    return stellate::cli::kExitFailed;
+  }
+}

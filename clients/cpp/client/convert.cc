@@ -1,0 +1,212 @@
+#include "convert.h"
+
+#include <bit>
+#include <cstring>
+#include <string>
+
+#include "client/status_details.pb.h"
+
+namespace stellate::client {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "arrays are copied as they are");
+
+Error Malformed(const std::string& what) {
+  return {ErrorCode::kServerFailed, "", "the server sent " + what};
+}
+
+// The first extent, provided that the others and the data's size agree.
+template <typename Message>
+Expected<Eigen::Index> Rows(const Message& array, const std::vector<std::uint32_t>& shape,
+                            size_t number_bytes) {
+  if (array.shape_size() == 0 && array.data().empty()) return 0;
+  bool fits = array.shape_size() == static_cast<int>(shape.size()) + 1;
+  size_t row = number_bytes;
+  for (size_t i = 0; fits && i < shape.size(); ++i) {
+    fits = array.shape(static_cast<int>(i) + 1) == shape[i];
+    row *= shape[i];
+  }
+  if (!fits || array.data().size() != row * array.shape(0)) {
+    return tl::unexpected(Malformed("an array of the wrong shape"));
+  }
+  return static_cast<Eigen::Index>(array.shape(0));
+}
+
+// The name of a status's ErrorInfo, if it carries one.
+std::string ReasonOf(const grpc::Status& status) {
+  Status details;
+  if (!details.ParseFromString(status.error_details())) return "";
+  for (const google::protobuf::Any& any : details.details()) {
+    ErrorInfo info;
+    if (any.type_url() == "type.googleapis.com/google.rpc.ErrorInfo" &&
+        info.ParseFromString(any.value()) && info.domain() == "stellate.v1") {
+      return info.reason();
+    }
+  }
+  return "";
+}
+
+}  // namespace
+
+void ToArray(const Eigen::MatrixXd& columns, const std::vector<std::uint32_t>& shape,
+             v1::Array* array) {
+  array->add_shape(static_cast<std::uint32_t>(columns.cols()));
+  for (const std::uint32_t extent : shape) array->add_shape(extent);
+  array->set_data(columns.data(), static_cast<size_t>(columns.size()) * sizeof(double));
+}
+
+Expected<Eigen::MatrixXd> FromArray(const v1::Array& array,
+                                    const std::vector<std::uint32_t>& shape) {
+  const Expected<Eigen::Index> rows = Rows(array, shape, sizeof(double));
+  if (!rows) return tl::unexpected(rows.error());
+  Eigen::Index height = 1;
+  for (const std::uint32_t extent : shape) height *= extent;
+  Eigen::MatrixXd columns(height, *rows);
+  if (!array.data().empty()) std::memcpy(columns.data(), array.data().data(), array.data().size());
+  return columns;
+}
+
+Expected<void> AppendIds(const v1::IndexArray& array, std::uint32_t width,
+                         std::vector<std::uint32_t>* ids) {
+  const Expected<Eigen::Index> rows = Rows(array, {width}, sizeof(std::uint32_t));
+  if (!rows) return tl::unexpected(rows.error());
+  if (array.data().empty()) return {};
+  const size_t old_size = ids->size();
+  ids->resize(old_size + static_cast<size_t>(*rows) * width);
+  std::memcpy(ids->data() + old_size, array.data().data(), array.data().size());
+  return {};
+}
+
+Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
+  const auto invalid = [](const std::string& why) {
+    return Fail(ErrorCode::kRefused, why, "INVALID_ARGUMENT");
+  };
+  if (oracle.dimension() < 1) {
+    return invalid("dimension is " + std::to_string(oracle.dimension()) + " but must be at least 1");
+  }
+  if (oracle.ambient_dimension() < 1) {
+    return invalid("ambient_dimension is " + std::to_string(oracle.ambient_dimension()) +
+                   " but must be at least 2");
+  }
+  if (options.workers < 1 || options.workers > 1024) {
+    return invalid("workers is " + std::to_string(options.workers) + " but must be 1 to 1024");
+  }
+  const std::uint32_t d = static_cast<std::uint32_t>(oracle.ambient_dimension());
+  v1::MeshSpec spec;
+  spec.set_dimension(static_cast<std::uint32_t>(oracle.dimension()));
+  spec.set_ambient_dimension(d);
+  spec.set_epsilon(options.epsilon);
+  spec.mutable_oracle()->set_intersect_flat(oracle.has_intersect_flat());
+  spec.mutable_oracle()->set_tangent_basis(oracle.has_tangent_basis());
+  if (const auto box = oracle.bounding_box()) {
+    // Shape [d]: a corner is one point, not a list of them.
+    for (const auto& [corner, array] :
+         {std::pair(&box->lower, spec.mutable_bounding_box()->mutable_lower()),
+          std::pair(&box->upper, spec.mutable_bounding_box()->mutable_upper())}) {
+      array->add_shape(static_cast<std::uint32_t>(corner->size()));
+      array->set_data(corner->data(), static_cast<size_t>(corner->size()) * sizeof(double));
+    }
+  }
+  if (const Eigen::MatrixXd seeds = oracle.seeds(); seeds.cols() > 0) {
+    ToArray(seeds, {static_cast<std::uint32_t>(seeds.rows())}, spec.mutable_seeds());
+  }
+  v1::Criteria& criteria = *spec.mutable_criteria();
+  if (options.radius_edge_bound) criteria.set_radius_edge_bound(*options.radius_edge_bound);
+  if (options.sliver_bound) criteria.set_sliver_bound(*options.sliver_bound);
+  if (options.picking_radius) criteria.set_picking_radius(*options.picking_radius);
+  if (options.small_sliver_radius) criteria.set_small_sliver_radius(*options.small_sliver_radius);
+  if (options.candidates) criteria.set_candidates(*options.candidates);
+  if (options.advance_step) criteria.set_advance_step(*options.advance_step);
+  if (options.flat_alternations) criteria.set_flat_alternations(*options.flat_alternations);
+  v1::MeshLimits& limits = *spec.mutable_limits();
+  if (options.max_vertices) limits.set_max_vertices(*options.max_vertices);
+  if (options.max_rounds) limits.set_max_rounds(*options.max_rounds);
+  if (options.worker_wait_seconds) limits.set_worker_wait_seconds(*options.worker_wait_seconds);
+  if (options.answer_seconds) limits.set_answer_seconds(*options.answer_seconds);
+  if (options.box_seeds) spec.set_box_seeds(*options.box_seeds);
+  spec.set_random_seed(options.random_seed);
+  spec.set_label(options.label);
+  return spec;
+}
+
+Progress FromProto(const v1::Progress& m) {
+  Progress p;
+  p.phase = v1::Phase_IsValid(m.phase()) ? static_cast<Phase>(m.phase()) : Phase::kUnknown;
+  p.round = m.round();
+  p.queries = m.queries();
+  p.vertices = m.vertices();
+  p.simplices = m.simplices();
+  p.unbounded_stars = m.unbounded_stars();
+  p.bad_size = m.bad_size();
+  p.bad_radius_edge = m.bad_radius_edge();
+  p.bad_sliver = m.bad_sliver();
+  p.bad_inconsistent = m.bad_inconsistent();
+  p.fraction = m.fraction();
+  p.elapsed_seconds = m.elapsed_seconds();
+  p.remaining_seconds = m.remaining_seconds();
+  return p;
+}
+
+Report FromProto(const v1::Report& m) {
+  Report r;
+  r.termination = v1::Termination_IsValid(m.termination())
+                      ? static_cast<Termination>(m.termination())
+                      : Termination::kUnknown;
+  r.failure_reason = m.failure().reason();
+  r.failure_message = m.failure().message();
+  r.elapsed_seconds = m.elapsed_seconds();
+  const v1::Counts& n = m.counts();
+  r.counts = {n.vertices(),        n.simplices(),
+              n.rounds(),          n.queries(),
+              n.tangent_queries(), n.inserted_size(),
+              n.inserted_radius_edge(), n.inserted_sliver(),
+              n.inserted_inconsistent(), n.duplicates()};
+  const v1::Certificate& c = m.certificate();
+  Certificate& out = r.certificate;
+  out.certified = c.certified();
+  out.verdict = c.verdict();
+  out.warnings.assign(c.warnings().begin(), c.warnings().end());
+  out.closed = c.closed();
+  out.bad_faces = c.bad_faces();
+  out.links_are_spheres = c.links_are_spheres();
+  out.links_decided_exactly = c.links_decided_exactly();
+  out.bad_links = c.bad_links();
+  out.inconsistent_simplices = c.inconsistent_simplices();
+  out.unembedded_stars = c.unembedded_stars();
+  out.fibre_failures = c.fibre_failures();
+  out.fibre_samples = c.fibre_samples();
+  out.max_circumradius = c.max_circumradius();
+  out.max_radius_edge = c.max_radius_edge();
+  out.min_fatness = c.min_fatness();
+  out.min_angle_degrees = c.min_angle_degrees();
+  out.max_tangent_angle_degrees = c.max_tangent_angle_degrees();
+  out.max_barycentre_distance = c.max_barycentre_distance();
+  out.estimated_reach = c.estimated_reach();
+  out.epsilon_over_reach = c.epsilon_over_reach();
+  out.components = c.components();
+  out.euler_characteristic = c.euler_characteristic();
+  out.orientable = c.orientable();
+  return r;
+}
+
+Error FromStatus(const grpc::Status& status) {
+  const std::string reason = ReasonOf(status);
+  ErrorCode code = ErrorCode::kServerFailed;
+  switch (status.error_code()) {
+    case grpc::StatusCode::INVALID_ARGUMENT:
+    case grpc::StatusCode::RESOURCE_EXHAUSTED:
+    case grpc::StatusCode::NOT_FOUND:
+    case grpc::StatusCode::FAILED_PRECONDITION:
+    case grpc::StatusCode::OUT_OF_RANGE:
+    case grpc::StatusCode::UNAUTHENTICATED:
+    case grpc::StatusCode::PERMISSION_DENIED:
+      code = ErrorCode::kRefused;
+      break;
+    default:
+      break;
+  }
+  if (reason.rfind("ORACLE_", 0) == 0) code = ErrorCode::kOracleFailed;
+  return {code, reason, status.error_message()};
+}
+
+}  // namespace stellate::client

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <grpcpp/support/status.h>
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "stellate/client.h"
+#include "stellate/v1/geometry.pb.h"
+#include "stellate/v1/mesh.pb.h"
+
+// Between the client's types and the wire's. Nothing here trusts the server: what does not fit
+// is an error, never a crash.
+namespace stellate::client {
+
+// A matrix column holds one query's or point's numbers, as an array's row does on the wire: with
+// `shape` the extents after the first, the bytes are the same.
+void ToArray(const Eigen::MatrixXd& columns, const std::vector<std::uint32_t>& shape,
+             v1::Array* array);
+Expected<Eigen::MatrixXd> FromArray(const v1::Array& array,
+                                    const std::vector<std::uint32_t>& shape);
+// Appends the ids of an [n, width] array to `ids`.
+Expected<void> AppendIds(const v1::IndexArray& array, std::uint32_t width,
+                         std::vector<std::uint32_t>* ids);
+
+// Errors: an option that the wire cannot carry (the server checks the rest).
+Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options);
+
+Progress FromProto(const v1::Progress& message);
+Report FromProto(const v1::Report& message);
+
+// The error that a failed call stands for.
+Error FromStatus(const grpc::Status& status);
+
+}  // namespace stellate::client

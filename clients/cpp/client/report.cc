@@ -1,0 +1,218 @@
+#include "stellate/report.h"
+
+#include <cmath>
+#include <cstdio>
+#include <iterator>
+#include <utility>
+
+namespace stellate {
+namespace {
+
+std::string Format(const char* format, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+// 1234567 as 1,234,567.
+std::string Grouped(std::uint64_t value) {
+  std::string text = std::to_string(value);
+  for (size_t i = text.size(); i > 3; i -= 3) text.insert(i - 3, 1, ',');
+  return text;
+}
+
+std::string Ending(Termination termination) {
+  switch (termination) {
+    case Termination::kConverged:
+      return "converged: no refinement rule applies any more";
+    case Termination::kVertexBudget:
+      return "stopped: max_vertices is spent";
+    case Termination::kRoundBudget:
+      return "stopped: max_rounds is spent";
+    case Termination::kCancelled:
+      return "cancelled";
+    case Termination::kOracleFailed:
+      return "the oracle failed";
+    case Termination::kNoProgress:
+      return "stopped: rules still apply, but refinement no longer helps";
+    case Termination::kUnknown:
+      break;
+  }
+  return "unknown";
+}
+
+class Lines {
+ public:
+  void Add(const std::string& title, const std::string& text) {
+    const size_t width = 13;
+    text_ += std::string(title.size() < width ? width - title.size() : 0, ' ') + title + "  " +
+             text + "\n";
+  }
+  std::string Take() { return std::move(text_); }
+
+ private:
+  std::string text_;
+};
+
+void AddCertificate(const Certificate& c, Lines& lines) {
+  lines.Add("topology", (c.components == 1 ? "1 component" : Grouped(c.components) + " components") +
+                            ", Euler characteristic " + std::to_string(c.euler_characteristic) +
+                            (c.orientable ? ", orientable" : ", not orientable"));
+  lines.Add("manifold",
+            (c.closed ? "closed" : "not closed (" + Grouped(c.bad_faces) + " bad faces)") + "; " +
+                (c.links_are_spheres
+                     ? std::string("every link a sphere (decided ") +
+                           (c.links_decided_exactly ? "exactly)" : "by homology)")
+                     : Grouped(c.bad_links) + " links are not spheres"));
+  lines.Add("stars", Grouped(c.inconsistent_simplices) + " inconsistent simplices, " +
+                         Grouped(c.unembedded_stars) + " stars overlap, " +
+                         Grouped(c.fibre_failures) + " of " + Grouped(c.fibre_samples) +
+                         " normal flats met wrongly");
+  std::string shape = "largest circumradius " + Format("%.4g", c.max_circumradius) +
+                      ", radius-edge ratio " + Format("%.3g", c.max_radius_edge) +
+                      "; smallest fatness " + Format("%.3g", c.min_fatness);
+  if (c.min_angle_degrees > 0) shape += ", angle " + Format("%.1f", c.min_angle_degrees) + " degrees";
+  lines.Add("shape", shape);
+  lines.Add("closeness", "barycentres within " + Format("%.3g", c.max_barycentre_distance) +
+                             " of the manifold, simplices within " +
+                             Format("%.1f", c.max_tangent_angle_degrees) +
+                             " degrees of its tangent spaces");
+  lines.Add("reach", "about " + Format("%.4g", c.estimated_reach) + ", epsilon is " +
+                         Format("%.3g", c.epsilon_over_reach) + " of it");
+}
+
+// A JSON object as it is written. Keys are ours and need no escaping.
+class JsonObject {
+ public:
+  void Raw(const char* key, const std::string& value) {
+    text_ += (text_.empty() ? "{\"" : ", \"") + std::string(key) + "\": " + value;
+  }
+  void Add(const char* key, std::uint64_t value) { Raw(key, std::to_string(value)); }
+  void Add(const char* key, bool value) { Raw(key, value ? "true" : "false"); }
+  void Add(const char* key, double value) {
+    // JSON knows no infinity and no NaN.
+    Raw(key, std::isfinite(value) ? Format("%.17g", value) : "null");
+  }
+  void Add(const char* key, const std::string& value) { Raw(key, Quoted(value)); }
+  std::string Take() { return text_.empty() ? "{}" : text_ + "}"; }
+
+  static std::string Quoted(const std::string& value) {
+    std::string text = "\"";
+    for (const char c : value) {
+      if (c == '"' || c == '\\') {
+        text += '\\';
+        text += c;
+      } else if (static_cast<unsigned char>(c) < 0x20) {
+        char escape[8];
+        std::snprintf(escape, sizeof escape, "\\u%04x", static_cast<unsigned>(c));
+        text += escape;
+      } else {
+        text += c;
+      }
+    }
+    return text + "\"";
+  }
+
+ private:
+  std::string text_;
+};
+
+std::string CountsJson(const Counts& n) {
+  JsonObject json;
+  json.Add("vertices", n.vertices);
+  json.Add("simplices", n.simplices);
+  json.Add("rounds", n.rounds);
+  json.Add("queries", n.queries);
+  json.Add("tangent_queries", n.tangent_queries);
+  json.Add("inserted_size", n.inserted_size);
+  json.Add("inserted_radius_edge", n.inserted_radius_edge);
+  json.Add("inserted_sliver", n.inserted_sliver);
+  json.Add("inserted_inconsistent", n.inserted_inconsistent);
+  json.Add("duplicates", n.duplicates);
+  return json.Take();
+}
+
+std::string CertificateJson(const Certificate& c) {
+  JsonObject json;
+  json.Add("certified", c.certified);
+  json.Add("verdict", c.verdict);
+  std::string warnings;
+  for (const std::string& warning : c.warnings) {
+    warnings += (warnings.empty() ? "" : ", ") + JsonObject::Quoted(warning);
+  }
+  json.Raw("warnings", "[" + warnings + "]");
+  json.Add("closed", c.closed);
+  json.Add("bad_faces", c.bad_faces);
+  json.Add("links_are_spheres", c.links_are_spheres);
+  json.Add("links_decided_exactly", c.links_decided_exactly);
+  json.Add("bad_links", c.bad_links);
+  json.Add("inconsistent_simplices", c.inconsistent_simplices);
+  json.Add("unembedded_stars", c.unembedded_stars);
+  json.Add("fibre_failures", c.fibre_failures);
+  json.Add("fibre_samples", c.fibre_samples);
+  json.Add("max_circumradius", c.max_circumradius);
+  json.Add("max_radius_edge", c.max_radius_edge);
+  json.Add("min_fatness", c.min_fatness);
+  json.Add("min_angle_degrees", c.min_angle_degrees);
+  json.Add("max_tangent_angle_degrees", c.max_tangent_angle_degrees);
+  json.Add("max_barycentre_distance", c.max_barycentre_distance);
+  json.Add("estimated_reach", c.estimated_reach);
+  json.Add("epsilon_over_reach", c.epsilon_over_reach);
+  json.Add("components", c.components);
+  json.Raw("euler_characteristic", std::to_string(c.euler_characteristic));
+  json.Add("orientable", c.orientable);
+  return json.Take();
+}
+
+}  // namespace
+
+const char* TerminationName(Termination termination) {
+  constexpr const char* kNames[] = {"UNKNOWN",   "CONVERGED",     "VERTEX_BUDGET", "ROUND_BUDGET",
+                                    "CANCELLED", "ORACLE_FAILED", "NO_PROGRESS"};
+  const size_t i = static_cast<size_t>(termination);
+  return i < std::size(kNames) ? kNames[i] : kNames[0];
+}
+
+const char* PhaseName(Phase phase) {
+  constexpr const char* kNames[] = {"UNKNOWN", "SEEDING", "REFINING", "CERTIFYING", "DONE"};
+  const size_t i = static_cast<size_t>(phase);
+  return i < std::size(kNames) ? kNames[i] : kNames[0];
+}
+
+std::string ToText(const Report& report) {
+  const Counts& n = report.counts;
+  const Certificate& c = report.certificate;
+  Lines lines;
+  lines.Add("mesh", Grouped(n.vertices) + " vertices, " + Grouped(n.simplices) + " simplices");
+  lines.Add("run", Ending(report.termination));
+  lines.Add("took", Format("%.2f", report.elapsed_seconds) + " s, " + Grouped(n.rounds) +
+                        " round trips, " + Grouped(n.queries) + " queries");
+  lines.Add("inserted for", "size " + Grouped(n.inserted_size) + ", radius-edge " +
+                                Grouped(n.inserted_radius_edge) + ", slivers " +
+                                Grouped(n.inserted_sliver) + ", inconsistencies " +
+                                Grouped(n.inserted_inconsistent));
+  if (!report.failure_reason.empty() || !report.failure_message.empty()) {
+    lines.Add("failure", report.failure_reason + ": " + report.failure_message);
+  }
+  lines.Add("certificate", (c.certified ? "CERTIFIED. " : "NOT CERTIFIED. ") + c.verdict);
+  if (c.components > 0) AddCertificate(c, lines);
+  for (const std::string& warning : c.warnings) lines.Add("warning", warning);
+  return lines.Take();
+}
+
+std::string ToJson(const Report& report) {
+  JsonObject json;
+  json.Add("termination", std::string(TerminationName(report.termination)));
+  if (!report.failure_reason.empty() || !report.failure_message.empty()) {
+    JsonObject failure;
+    failure.Add("reason", report.failure_reason);
+    failure.Add("message", report.failure_message);
+    json.Raw("failure", failure.Take());
+  }
+  json.Raw("counts", CountsJson(report.counts));
+  json.Raw("certificate", CertificateJson(report.certificate));
+  json.Add("elapsed_seconds", report.elapsed_seconds);
+  return json.Take();
+}
+
+}  // namespace stellate

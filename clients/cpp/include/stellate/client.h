@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "stellate/error.h"
+#include "stellate/mesh.h"
+#include "stellate/oracle.h"
+
+namespace stellate {
+
+// What to mesh and how. Absent values take the server's defaults; see mesh.proto for each.
+struct MeshOptions {
+  double epsilon = 0;  // largest circumradius of a simplex, a length; must be given
+
+  // "host:port" or "unix:/path". Empty: a private stellated is started for this mesh and stopped
+  // after it; found by $STELLATED, next to the running program, or on PATH.
+  std::string server;
+  // How many threads answer, each with a stream of its own. The oracle is called from all at once.
+  int workers = 1;
+  // Called on the calling thread. What it throws cancels the mesh and reaches the caller.
+  std::function<void(const Progress&)> on_progress;
+  // Cancels the mesh when stop is requested; the mesh so far is returned, not certified.
+  std::stop_token stop;
+
+  std::uint64_t random_seed = 1;
+  std::optional<std::uint64_t> max_vertices, max_rounds;
+  std::optional<std::uint32_t> box_seeds;
+
+  std::optional<double> radius_edge_bound;    // rho0 of rule R2
+  std::optional<double> sliver_bound;         // Theta0 of rule R3
+  std::optional<double> picking_radius;       // delta
+  std::optional<double> small_sliver_radius;  // beta
+  std::optional<std::uint32_t> candidates;    // tried in a picking region
+  std::optional<double> advance_step;         // h, a length
+  std::optional<std::uint32_t> flat_alternations;
+
+  std::optional<double> worker_wait_seconds, answer_seconds;
+  std::string label;  // shown in the server's lists and logs
+};
+
+// Meshes the oracle's manifold: offers the oracle to the server and collects the mesh.
+//
+// Returns a mesh whenever the run ends by itself, certified or not: read Mesh::report. An error when
+// the request is refused, the server cannot be reached, or the oracle's answers break a rule. An
+// exception out of the oracle reaches the caller as it is, and the server as a failed oracle.
+Expected<Mesh> MeshManifold(Oracle& oracle, const MeshOptions& options);
+
+struct ServerHealth {
+  bool serving = false;
+  std::string version;
+  std::vector<std::string> protocols;
+  std::uint32_t max_dimension = 0, max_ambient_dimension = 0, max_meshes = 0;
+  std::uint64_t max_vertices = 0, max_rounds = 0, max_message_bytes = 0;
+};
+
+// Asks a server how it is. kServerFailed when none answers within `timeout_seconds`.
+Expected<ServerHealth> CheckHealth(const std::string& server, double timeout_seconds = 5);
+
+}  // namespace stellate

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string>
+#include <tl/expected.hpp>
+#include <utility>
+
+namespace stellate {
+
+// Whose fault it is.
+enum class ErrorCode {
+  kRefused,       // the request makes no sense or asks for too much: mend it and try again
+  kOracleFailed,  // the oracle answered wrongly, or not at all
+  kServerFailed,  // no server found, none answers, or it broke off
+  kFileFailed,    // a file cannot be written, or its format cannot hold the mesh
+};
+
+struct Error {
+  ErrorCode code = ErrorCode::kServerFailed;
+  std::string reason;   // the server's stable name for it, e.g. "ORACLE_NOT_FINITE"; may be empty
+  std::string message;  // what was wrong, where, and what to do
+};
+
+template <typename T>
+using Expected = tl::expected<T, Error>;
+
+inline tl::unexpected<Error> Fail(ErrorCode code, std::string message, std::string reason = "") {
+  return tl::unexpected<Error>(Error{code, std::move(reason), std::move(message)});
+}
+
+}  // namespace stellate

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+
+#include "stellate/error.h"
+#include "stellate/report.h"
+
+namespace stellate {
+
+using SimplexMatrix = Eigen::Matrix<std::uint32_t, Eigen::Dynamic, Eigen::Dynamic>;
+
+// A simplicial k-complex in R^d.
+struct Mesh {
+  Eigen::MatrixXd points;   // d x n, a vertex a column
+  SimplexMatrix simplices;  // (k+1) x m; ascending ids in each column, columns in ascending order
+  Report report;
+
+  int dimension() const { return static_cast<int>(simplices.rows()) - 1; }
+  int ambient_dimension() const { return static_cast<int>(points.rows()); }
+
+  // Writes the format that the path's ending names:
+  //   .txt  any k and d: "k d nv ns", then nv lines of d coordinates (%.17g), then ns lines of k+1
+  //         ids from zero, in the order of `simplices`
+  //   .off  curves and surfaces; nOFF with all coordinates unless d = 3
+  //   .obj  curves and surfaces, d <= 3
+  //   .ply  curves and surfaces, d <= 3, ascii
+  //   .vtu  k <= 3; beyond d = 3 the first three coordinates, and all as point data "coordinates"
+  // The last four are oriented coherently where the mesh is orientable. kFileFailed when the format
+  // cannot hold the mesh or the file cannot be written.
+  Expected<void> Save(const std::string& path) const;
+};
+
+// The simplices with the ids in each reordered so that neighbours agree on their orientation; as
+// they are when the complex is not an orientable pseudomanifold.
+SimplexMatrix OrientedSimplices(const SimplexMatrix& simplices);
+
+}  // namespace stellate

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace stellate {
+
+// How a run ended. Every ending but kConverged leaves a mesh that is not certified.
+enum class Termination {
+  kUnknown = 0,
+  kConverged,     // no refinement rule applies any more
+  kVertexBudget,  // MeshOptions::max_vertices is spent
+  kRoundBudget,   // MeshOptions::max_rounds is spent
+  kCancelled,
+  kOracleFailed,
+  kNoProgress,  // rules still apply, but refinement no longer helps
+};
+const char* TerminationName(Termination termination);  // "CONVERGED", ...
+
+enum class Phase { kUnknown = 0, kSeeding, kRefining, kCertifying, kDone };
+const char* PhaseName(Phase phase);  // "SEEDING", ...
+
+// A picture of a mesh at work.
+struct Progress {
+  Phase phase = Phase::kUnknown;
+  std::uint64_t round = 0;    // batches of queries answered
+  std::uint64_t queries = 0;  // queries answered
+  std::uint64_t vertices = 0, simplices = 0;
+  std::uint64_t unbounded_stars = 0;  // stars on the advancing front
+  // Stars with a simplex that breaks rule R1, R2, R3, R4.
+  std::uint64_t bad_size = 0, bad_radius_edge = 0, bad_sliver = 0, bad_inconsistent = 0;
+  double fraction = 0;           // estimated share of the work done, 0..1
+  double elapsed_seconds = 0;    // since the mesh was created
+  double remaining_seconds = 0;  // an estimate; 0 when unknown
+};
+
+// What a mesh took.
+struct Counts {
+  std::uint64_t vertices = 0, simplices = 0;
+  std::uint64_t rounds = 0;   // round trips
+  std::uint64_t queries = 0;
+  std::uint64_t tangent_queries = 0;  // closest points spent on finding tangent bases
+  std::uint64_t inserted_size = 0;    // sample points that rule R1 inserted, then R2, R3, R4
+  std::uint64_t inserted_radius_edge = 0, inserted_sliver = 0, inserted_inconsistent = 0;
+  std::uint64_t duplicates = 0;  // answers that fell on an existing sample point
+};
+
+// What the server computed from the finished complex. Lengths are in the coordinates' unit.
+struct Certificate {
+  bool certified = false;  // every claim holds and the run converged
+  std::string verdict;     // plain words; the first thing wrong if not certified
+  std::vector<std::string> warnings;
+
+  bool closed = false;  // each (k-1)-face is in exactly two simplices
+  std::uint64_t bad_faces = 0;
+  bool links_are_spheres = false;
+  bool links_decided_exactly = false;  // k <= 3; above, by homology
+  std::uint64_t bad_links = 0;
+  std::uint64_t inconsistent_simplices = 0;
+  std::uint64_t unembedded_stars = 0;  // stars whose projection on the tangent space overlaps itself
+  std::uint64_t fibre_failures = 0;  // sampled normal flats that do not meet the mesh once nearby
+  std::uint64_t fibre_samples = 0;
+
+  double max_circumradius = 0;
+  double max_radius_edge = 0;
+  double min_fatness = 0;        // volume / diameter^k
+  double min_angle_degrees = 0;  // k = 2 only
+  double max_tangent_angle_degrees = 0;
+  double max_barycentre_distance = 0;  // of a simplex to the manifold
+  double estimated_reach = 0;          // an estimate from above
+  double epsilon_over_reach = 0;
+
+  std::uint64_t components = 0;
+  std::int64_t euler_characteristic = 0;
+  bool orientable = false;
+};
+
+struct Report {
+  Termination termination = Termination::kUnknown;
+  std::string failure_reason, failure_message;  // kOracleFailed only
+  Counts counts;
+  Certificate certificate;
+  double elapsed_seconds = 0;
+
+  bool certified() const { return certificate.certified; }
+};
+
+std::string ToText(const Report& report);  // several lines, for people
+std::string ToJson(const Report& report);  // one object, keys as in the protocol
+
+}  // namespace stellate

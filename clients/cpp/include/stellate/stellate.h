@@ -1,0 +1,9 @@
+#pragma once
+
+// The whole C++ client: write an Oracle, call MeshManifold, read Mesh::report, Mesh::Save.
+#include "stellate/catalogue.h"
+#include "stellate/client.h"
+#include "stellate/implicit.h"
+#include "stellate/mesh.h"
+#include "stellate/oracle.h"
+#include "stellate/pointwise.h"
