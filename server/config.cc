@@ -1,0 +1,119 @@
+#include "server/config.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+#include "core/message.h"
+
+namespace stellate::server {
+namespace {
+
+using core::Message;
+using core::Status;
+using core::StatusCode;
+
+constexpr std::size_t kMaxUnixPath = 107;  // what sockaddr_un holds
+constexpr std::size_t kMinMessageBytes = std::size_t{1} << 20;
+constexpr double kMaxSeconds = 366 * 86400.0;
+
+Status Invalid(std::string message) { return {StatusCode::kInvalidArgument, std::move(message)}; }
+
+}  // namespace
+
+bool ListenAddress::IsLoopback() const {
+  return IsUnix() || host == "localhost" || host == "::1" || host.starts_with("127.");
+}
+
+std::string ListenAddress::Target() const {
+  if (IsUnix()) return "unix:" + unix_path;
+  const bool v6 = host.find(':') != std::string::npos;
+  return (v6 ? "[" + host + "]" : host) + ":" + std::to_string(port);
+}
+
+core::Expected<ListenAddress> ParseListenAddress(const std::string& text) {
+  ListenAddress address;
+  if (text.starts_with("unix:")) {
+    address.unix_path = text.substr(text.starts_with("unix://") ? 7 : 5);
+    if (address.unix_path.empty() || address.unix_path.size() > kMaxUnixPath) {
+      return core::Refuse(StatusCode::kInvalidArgument,
+                          Message("--listen is \"", text, "\" but a unix socket's path has 1 to ",
+                                  kMaxUnixPath, " bytes: use a shorter one"));
+    }
+    return address;
+  }
+  const std::size_t colon = text.rfind(':');
+  const std::string port = colon == std::string::npos ? "" : text.substr(colon + 1);
+  const auto [end, error] = std::from_chars(port.data(), port.data() + port.size(), address.port);
+  const bool good_port = error == std::errc() && end == port.data() + port.size() &&
+                         address.port >= 0 && address.port <= 65535;
+  address.host = text.substr(0, std::min(colon, text.size()));
+  if (address.host.size() > 1 && address.host.front() == '[' && address.host.back() == ']') {
+    address.host = address.host.substr(1, address.host.size() - 2);
+  } else if (address.host.find(':') != std::string::npos) {
+    address.host.clear();  // an IPv6 address without brackets: where does the port begin?
+  }
+  if (!good_port || address.host.empty()) {
+    return core::Refuse(StatusCode::kInvalidArgument,
+                        Message("--listen is \"", text,
+                                "\" but must be HOST:PORT, [IPV6]:PORT or unix:/PATH; port ",
+                                "0 takes a free one"));
+  }
+  return address;
+}
+
+Status Validate(const Config& config) {
+  const auto address = ParseListenAddress(config.listen);
+  if (!address) return address.error();
+  if (!address->IsLoopback() && !config.insecure_listen) {
+    return Invalid(Message("--listen is \"", config.listen,
+                           "\", which others can reach in plain text: listen on 127.0.0.1 or a "
+                           "unix socket, or add --insecure-listen where the network is trusted"));
+  }
+  const struct {
+    const char* flag;
+    double value;
+    double least;
+  } times[] = {
+      {"--worker-wait", config.worker_wait_seconds, 0.001},
+      {"--answer-seconds", config.answer_seconds, 0.001},
+      {"--max-wait", config.max_wait_seconds, 0.001},
+      {"--keep-finished-seconds", config.keep_finished_seconds, 0},
+      {"--hello-seconds", config.hello_seconds, 0.001},
+      {"--drain-seconds", config.drain_seconds, 0},
+      {"--keepalive", config.keepalive_seconds, 0.1},
+      {"--keepalive-timeout", config.keepalive_timeout_seconds, 0.1},
+  };
+  for (const auto& [flag, value, least] : times) {
+    if (value >= least && value <= kMaxSeconds) continue;
+    return Invalid(
+        Message(flag, " is ", value, " but must be from ", least, " to ", kMaxSeconds, " seconds"));
+  }
+  const struct {
+    const char* flag;
+    std::uint64_t value, least, most;
+  } counts[] = {
+      {"--max-meshes", config.max_meshes, 1, 100'000},
+      {"--max-vertices", config.max_vertices, 1, std::numeric_limits<std::uint32_t>::max()},
+      {"--max-coordinates", config.max_coordinates, 1, std::uint64_t{1} << 48},
+      {"--max-ambient-dimension", static_cast<std::uint64_t>(config.max_ambient_dimension), 2,
+       core::kMaxAmbientDimension},
+      {"--max-rounds", config.max_rounds, 1, std::uint64_t{1} << 40},
+      {"--max-message-bytes", config.max_message_bytes, kMinMessageBytes, std::uint64_t{1} << 30},
+      {"--max-workers", config.max_workers, 1, 100'000},
+      {"--max-watchers", config.max_watchers, 1, 100'000},
+      {"--keep-finished-meshes", config.keep_finished_meshes, 0, 1'000'000},
+  };
+  for (const auto& [flag, value, least, most] : counts) {
+    if (value >= least && value <= most) continue;
+    return Invalid(Message(flag, " is ", value, " but must be from ", least, " to ", most));
+  }
+  return Status::Ok();
+}
+
+std::size_t ChunkBytes(const Config& config) {
+  return std::min(std::size_t{1} << 20, config.max_message_bytes / 2);
+}
+
+}  // namespace stellate::server

@@ -1,0 +1,177 @@
+#include "server/convert/mesh.h"
+
+#include "server/convert/arrays.h"
+#include "server/convert/spec.h"
+#include "server/error_map.h"
+
+namespace stellate::server {
+namespace {
+
+constexpr std::size_t kMaxFailureBytes = 4096;
+
+void SetTime(std::chrono::system_clock::time_point time, google::protobuf::Timestamp* out) {
+  using std::chrono::duration_cast, std::chrono::nanoseconds, std::chrono::seconds;
+  const auto since = time.time_since_epoch();
+  const auto whole = duration_cast<seconds>(since);
+  out->set_seconds(whole.count());
+  out->set_nanos(static_cast<std::int32_t>(duration_cast<nanoseconds>(since - whole).count()));
+}
+
+void ToProto(const core::Counts& counts, v1::Counts* out) {
+  out->set_vertices(counts.vertices);
+  out->set_simplices(counts.simplices);
+  out->set_rounds(counts.rounds);
+  out->set_queries(counts.queries);
+  out->set_tangent_queries(counts.tangent_queries);
+  out->set_inserted_size(counts.inserted_size);
+  out->set_inserted_radius_edge(counts.inserted_radius_edge);
+  out->set_inserted_sliver(counts.inserted_sliver);
+  out->set_inserted_inconsistent(counts.inserted_inconsistent);
+  out->set_duplicates(counts.duplicates);
+}
+
+void ToProto(const core::Certificate& c, v1::Certificate* out) {
+  out->set_certified(c.certified);
+  out->set_verdict(c.verdict);
+  for (const std::string& warning : c.warnings) out->add_warnings(warning);
+  out->set_closed(c.closed);
+  out->set_bad_faces(c.bad_faces);
+  out->set_links_are_spheres(c.links_are_spheres);
+  out->set_links_decided_exactly(c.links_decided_exactly);
+  out->set_bad_links(c.bad_links);
+  out->set_inconsistent_simplices(c.inconsistent_simplices);
+  out->set_unembedded_stars(c.unembedded_stars);
+  out->set_fibre_failures(c.fibre_failures);
+  out->set_fibre_samples(c.fibre_samples);
+  out->set_max_circumradius(c.max_circumradius);
+  out->set_max_radius_edge(c.max_radius_edge);
+  out->set_min_fatness(c.min_fatness);
+  out->set_min_angle_degrees(c.min_angle_degrees);
+  out->set_max_tangent_angle_degrees(c.max_tangent_angle_degrees);
+  out->set_max_barycentre_distance(c.max_barycentre_distance);
+  out->set_estimated_reach(c.estimated_reach);
+  out->set_epsilon_over_reach(c.epsilon_over_reach);
+  out->set_components(c.components);
+  out->set_euler_characteristic(c.euler_characteristic);
+  out->set_orientable(c.orientable);
+}
+
+}  // namespace
+
+v1::MeshState ToProto(SessionState state) {
+  switch (state) {
+    case SessionState::kWaiting:
+      return v1::MESH_STATE_WAITING;
+    case SessionState::kRunning:
+      return v1::MESH_STATE_RUNNING;
+    case SessionState::kSucceeded:
+      return v1::MESH_STATE_SUCCEEDED;
+    case SessionState::kStopped:
+      return v1::MESH_STATE_STOPPED;
+    case SessionState::kCancelled:
+      return v1::MESH_STATE_CANCELLED;
+    case SessionState::kFailed:
+      return v1::MESH_STATE_FAILED;
+  }
+  return v1::MESH_STATE_UNSPECIFIED;
+}
+
+v1::Phase ToProto(core::Phase phase) {
+  switch (phase) {
+    case core::Phase::kSeeding:
+      return v1::PHASE_SEEDING;
+    case core::Phase::kRefining:
+      return v1::PHASE_REFINING;
+    case core::Phase::kCertifying:
+      return v1::PHASE_CERTIFYING;
+    case core::Phase::kDone:
+      return v1::PHASE_DONE;
+  }
+  return v1::PHASE_UNSPECIFIED;
+}
+
+v1::Termination ToProto(core::Termination termination) {
+  switch (termination) {
+    case core::Termination::kRunning:
+      return v1::TERMINATION_UNSPECIFIED;
+    case core::Termination::kConverged:
+      return v1::TERMINATION_CONVERGED;
+    case core::Termination::kVertexBudget:
+      return v1::TERMINATION_VERTEX_BUDGET;
+    case core::Termination::kRoundBudget:
+      return v1::TERMINATION_ROUND_BUDGET;
+    case core::Termination::kCancelled:
+      return v1::TERMINATION_CANCELLED;
+    case core::Termination::kOracleFailed:
+      return v1::TERMINATION_ORACLE_FAILED;
+    case core::Termination::kNoProgress:
+      return v1::TERMINATION_NO_PROGRESS;
+  }
+  return v1::TERMINATION_UNSPECIFIED;
+}
+
+void ToProto(const SessionView& view, v1::Progress* out) {
+  const core::Progress& p = view.progress;
+  out->set_phase(ToProto(p.phase));
+  out->set_round(p.round);
+  out->set_queries(p.queries);
+  out->set_vertices(p.vertices);
+  out->set_simplices(p.simplices);
+  out->set_unbounded_stars(p.unbounded_stars);
+  out->set_bad_size(p.bad_size);
+  out->set_bad_radius_edge(p.bad_radius_edge);
+  out->set_bad_sliver(p.bad_sliver);
+  out->set_bad_inconsistent(p.bad_inconsistent);
+  out->set_fraction(p.fraction);
+  out->set_elapsed_seconds(view.elapsed_seconds);
+  out->set_remaining_seconds(view.remaining_seconds);
+}
+
+void ToProto(const core::Report& report, v1::Report* out) {
+  out->set_termination(ToProto(report.termination));
+  ToProto(report.counts, out->mutable_counts());
+  ToProto(report.certificate, out->mutable_certificate());
+}
+
+void ToProto(const Session& session, v1::Mesh* out) {
+  const SessionOptions& options = session.options();
+  const SessionView view = session.View();
+  out->set_name(options.name);
+  ToProto(options.spec, out->mutable_spec());
+  out->mutable_spec()->set_label(options.label);
+  v1::MeshLimits* const limits = out->mutable_spec()->mutable_limits();
+  limits->set_worker_wait_seconds(
+      std::chrono::duration<double>(options.dispatch.worker_wait).count());
+  limits->set_answer_seconds(std::chrono::duration<double>(options.dispatch.answer_limit).count());
+  out->set_state(ToProto(view.state));
+  SetTime(view.create_time, out->mutable_create_time());
+  if (view.end_time) SetTime(*view.end_time, out->mutable_end_time());
+  out->set_revision(view.revision);
+  ToProto(view, out->mutable_progress());
+  if (view.report) {
+    v1::Report* const report = out->mutable_report();
+    ToProto(*view.report, report);
+    report->set_elapsed_seconds(view.elapsed_seconds);
+    if (view.state == SessionState::kFailed) {
+      report->set_termination(v1::TERMINATION_ORACLE_FAILED);
+      report->mutable_failure()->set_reason(view.failure.reason);
+      report->mutable_failure()->set_message(Cut(view.failure.message, kMaxFailureBytes));
+    }
+  }
+  out->set_workers(static_cast<std::uint32_t>(view.workers));
+  out->set_watchers(static_cast<std::uint32_t>(view.watchers));
+}
+
+void ToProto(const DeltaPart& part, int k, int d, v1::DeltaChunk* out) {
+  const auto row_size = static_cast<std::size_t>(k) + 1;
+  const auto dimension = static_cast<std::size_t>(d);
+  v1::MeshDelta* const delta = out->mutable_delta();
+  delta->set_revision(part.revision);
+  delta->set_first_vertex(part.first_vertex);
+  ToProto(part.points.data(), {part.points.size() / dimension, dimension}, delta->mutable_points());
+  ToProto(part.added, row_size, delta->mutable_added());
+  ToProto(part.removed, row_size, delta->mutable_removed());
+  out->set_complete(part.complete);
+}
+
+}  // namespace stellate::server

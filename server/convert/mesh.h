@@ -1,0 +1,22 @@
+#pragma once
+
+#include "core/report.h"
+#include "server/session.h"
+#include "server/watch_log.h"
+#include "stellate/v1/mesh.pb.h"
+#include "stellate/v1/stellate.pb.h"
+
+namespace stellate::server {
+
+v1::MeshState ToProto(SessionState state);
+v1::Phase ToProto(core::Phase phase);
+v1::Termination ToProto(core::Termination termination);
+
+void ToProto(const SessionView& view, v1::Progress* out);
+void ToProto(const core::Report& report, v1::Report* out);
+// State, progress and report; no geometry, neither the mesh's nor the seeds'.
+void ToProto(const Session& session, v1::Mesh* out);
+// `d`: ambient dimension; `k`: dimension.
+void ToProto(const DeltaPart& part, int k, int d, v1::DeltaChunk* out);
+
+}  // namespace stellate::server

@@ -1,0 +1,77 @@
+#include "server/convert/oracle.h"
+
+#include <algorithm>
+
+#include "core/message.h"
+#include "server/convert/arrays.h"
+
+namespace stellate::server {
+namespace {
+
+using core::StatusCode;
+using Eigen::Index;
+
+}  // namespace
+
+void ToProto(const core::Specification& spec, v1::Welcome* welcome) {
+  welcome->set_dimension(spec.dimension);
+  welcome->set_ambient_dimension(spec.ambient_dimension);
+  welcome->mutable_oracle()->set_intersect_flat(spec.oracle.intersect_flat);
+  welcome->mutable_oracle()->set_tangent_basis(spec.oracle.tangent_basis);
+}
+
+void ToProto(const Chunk& chunk, const core::Specification& spec, v1::QueryChunk* out) {
+  const auto n = static_cast<std::size_t>(chunk.count);
+  const auto d = static_cast<std::size_t>(spec.ambient_dimension);
+  const auto k = static_cast<std::size_t>(spec.dimension);
+  const core::QueryBlock& block = chunk.block();
+  out->set_lease(chunk.lease);
+  out->set_want_tangents(block.want_tangents);
+  ToProto(block.points.col(chunk.first).data(), {n, d}, out->mutable_points());
+  if (block.kind == core::QueryKind::kClosestPoint) {
+    out->set_kind(v1::QUERY_KIND_CLOSEST_POINT);
+    return;
+  }
+  out->set_kind(v1::QUERY_KIND_INTERSECT_FLAT);
+  ToProto(block.bases.col(chunk.first).data(), {n, d, k}, out->mutable_bases());
+  ToProto(block.radii.data() + chunk.first, {n}, out->mutable_radii());
+}
+
+core::Expected<core::AnswerBlock> FromProto(const v1::AnswerChunk& answers, const Chunk& chunk,
+                                            const core::Specification& spec) {
+  const auto n = static_cast<std::uint64_t>(chunk.count);
+  const auto d = static_cast<std::uint64_t>(spec.ambient_dimension);
+  const auto k = static_cast<std::uint64_t>(spec.dimension);
+  core::AnswerBlock block;
+  core::Status status =
+      CheckArray(answers.points(), {n, d}, "answers.points", StatusCode::kOracleShape);
+  if (!status.ok()) return tl::unexpected(std::move(status));
+  block.points = MatrixFromProto(answers.points(), static_cast<Index>(d), chunk.count);
+
+  const std::string& found = answers.found();
+  if (!found.empty()) {
+    if (found.size() != n) {
+      return core::Refuse(StatusCode::kOracleShape,
+                          core::Message("answers.found has ", found.size(), " bytes but ", n,
+                                        " queries were asked: send one byte each, or none"));
+    }
+    const auto bad =
+        std::find_if(found.begin(), found.end(), [](char c) { return c != 0 && c != 1; });
+    if (bad != found.end()) {
+      return core::Refuse(
+          StatusCode::kOracleShape,
+          core::Message("answers.found is ", static_cast<unsigned char>(*bad), " for query ",
+                        chunk.first + (bad - found.begin()), " but must be 0 or 1"));
+    }
+    block.found.assign(found.begin(), found.end());
+  }
+  if (chunk.block().want_tangents && answers.has_tangents()) {
+    status =
+        CheckArray(answers.tangents(), {n, d, k}, "answers.tangents", StatusCode::kOracleShape);
+    if (!status.ok()) return tl::unexpected(std::move(status));
+    block.tangents = MatrixFromProto(answers.tangents(), static_cast<Index>(d * k), chunk.count);
+  }
+  return block;
+}
+
+}  // namespace stellate::server

@@ -1,0 +1,182 @@
+#include "server/convert/spec.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "core/message.h"
+#include "server/convert/arrays.h"
+
+namespace stellate::server {
+namespace {
+
+using core::Message;
+using core::Status;
+using core::StatusCode;
+using Eigen::Index;
+
+constexpr std::size_t kMaxLabelBytes = 128;
+
+Status Invalid(std::string message) { return {StatusCode::kInvalidArgument, std::move(message)}; }
+Status TooLarge(std::string message) { return {StatusCode::kLimitExceeded, std::move(message)}; }
+
+// Protobuf counts from 0 to 2^32 - 1; what an int cannot hold no rule would accept.
+Status ToInt(std::uint32_t value, const char* field, int* out) {
+  if (value > static_cast<std::uint32_t>(std::numeric_limits<int>::max())) {
+    return TooLarge(Message(field, " is ", value, " but must be far smaller"));
+  }
+  *out = static_cast<int>(value);
+  return Status::Ok();
+}
+
+Status ReadDimensions(const v1::MeshSpec& spec, const Config& config, core::Specification* out) {
+  Status status = ToInt(spec.dimension(), "dimension", &out->dimension);
+  if (!status.ok()) return status;
+  if (spec.ambient_dimension() > static_cast<std::uint32_t>(config.max_ambient_dimension)) {
+    return TooLarge(Message("ambient_dimension (d) is ", spec.ambient_dimension(),
+                            " but this server allows ", config.max_ambient_dimension,
+                            ": map the manifold into a space of lower dimension, or raise "
+                            "--max-ambient-dimension"));
+  }
+  return ToInt(spec.ambient_dimension(), "ambient_dimension", &out->ambient_dimension);
+}
+
+Status ReadPlace(const v1::MeshSpec& spec, core::Specification* out) {
+  const auto d = static_cast<std::uint64_t>(out->ambient_dimension);
+  if (spec.has_bounding_box()) {
+    core::BoundingBox box;
+    for (const bool lower : {true, false}) {
+      const v1::Array& array = lower ? spec.bounding_box().lower() : spec.bounding_box().upper();
+      const Status status =
+          CheckArray(array, {d}, lower ? "bounding_box.lower" : "bounding_box.upper",
+                     StatusCode::kInvalidArgument);
+      if (!status.ok()) return status;
+      (lower ? box.lower : box.upper) = MatrixFromProto(array, static_cast<Index>(d), 1);
+    }
+    out->bounding_box = std::move(box);
+  }
+  if (spec.has_seeds() && !(spec.seeds().data().empty() && spec.seeds().shape_size() == 0)) {
+    const v1::Array& seeds = spec.seeds();
+    // The number of seeds is the client's choice; a declared one that is not there fails here.
+    const std::uint64_t m = seeds.shape_size() > 0 ? seeds.shape(0) : 0;
+    const Status status = CheckArray(seeds, {m, d}, "seeds", StatusCode::kInvalidArgument);
+    if (!status.ok()) return status;
+    out->seeds = MatrixFromProto(seeds, static_cast<Index>(d), static_cast<Index>(m));
+  }
+  return ToInt(spec.box_seeds(), "box_seeds", &out->box_seeds);
+}
+
+Status ReadCriteria(const v1::MeshSpec& spec, core::Specification* out) {
+  const v1::Criteria& c = spec.criteria();
+  core::Criteria& to = out->criteria;
+  if (c.has_radius_edge_bound()) to.radius_edge_bound = c.radius_edge_bound();
+  if (c.has_sliver_bound()) to.sliver_bound = c.sliver_bound();
+  if (c.has_picking_radius()) to.picking_radius = c.picking_radius();
+  if (c.has_small_sliver_radius()) to.small_sliver_radius = c.small_sliver_radius();
+  if (c.has_advance_step()) {
+    if (c.advance_step() < spec.epsilon()) {
+      return Invalid(Message("criteria.advance_step is ", c.advance_step(),
+                             " but must be at least epsilon, ", spec.epsilon(),
+                             ": leave it unset for 3 epsilon"));
+    }
+    to.advance_step = c.advance_step();
+  }
+  if (c.has_candidates()) {
+    int candidates = 0;
+    const Status status = ToInt(c.candidates(), "criteria.candidates", &candidates);
+    if (!status.ok()) return status;
+    to.candidates = candidates;
+  }
+  if (!c.has_flat_alternations()) return Status::Ok();
+  return ToInt(c.flat_alternations(), "criteria.flat_alternations", &to.flat_alternations);
+}
+
+Status ReadSeconds(double value, double standard, double most, const char* field, double* out) {
+  *out = value == 0 ? std::min(standard, most) : value;
+  if (!(*out > 0)) {
+    return Invalid(Message(field, " is ", value,
+                           " but must be a number of seconds above 0: leave it 0 for the "
+                           "server's default"));
+  }
+  if (*out > most) {
+    return TooLarge(Message(field, " is ", value, " but this server allows ", most,
+                            ": ask for less, or raise --max-wait"));
+  }
+  return Status::Ok();
+}
+
+Status ReadLimits(const v1::MeshSpec& spec, const Config& config, MeshRequest* request) {
+  const v1::MeshLimits& limits = spec.limits();
+  const auto d = std::max<std::uint64_t>(request->spec.ambient_dimension, 1);
+  const std::uint64_t room = std::max<std::uint64_t>(config.max_coordinates / d, 1);
+  const std::uint64_t most_vertices = std::min(config.max_vertices, room);
+  core::Limits& to = request->spec.limits;
+  to.max_vertices = limits.max_vertices() == 0 ? most_vertices : limits.max_vertices();
+  if (to.max_vertices > most_vertices) {
+    return TooLarge(Message("limits.max_vertices is ", to.max_vertices, " but this server allows ",
+                            most_vertices, " in ", d,
+                            " dimensions: ask for fewer, or raise --max-vertices or "
+                            "--max-coordinates"));
+  }
+  to.max_rounds = limits.max_rounds() == 0 ? config.max_rounds : limits.max_rounds();
+  if (to.max_rounds > config.max_rounds) {
+    return TooLarge(Message("limits.max_rounds is ", to.max_rounds, " but this server allows ",
+                            config.max_rounds, ": ask for fewer, or raise --max-rounds"));
+  }
+  const Status status =
+      ReadSeconds(limits.worker_wait_seconds(), config.worker_wait_seconds, config.max_wait_seconds,
+                  "limits.worker_wait_seconds", &request->worker_wait_seconds);
+  if (!status.ok()) return status;
+  return ReadSeconds(limits.answer_seconds(), config.answer_seconds, config.max_wait_seconds,
+                     "limits.answer_seconds", &request->answer_seconds);
+}
+
+}  // namespace
+
+core::Expected<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config) {
+  MeshRequest request;
+  request.spec.epsilon = spec.epsilon();
+  request.spec.oracle.intersect_flat = spec.oracle().intersect_flat();
+  request.spec.oracle.tangent_basis = spec.oracle().tangent_basis();
+  request.spec.random_seed = spec.random_seed() == 0 ? 1 : spec.random_seed();
+  request.label = spec.label();
+  Status status = ReadDimensions(spec, config, &request.spec);
+  if (status.ok()) status = ReadPlace(spec, &request.spec);
+  if (status.ok()) status = ReadCriteria(spec, &request.spec);
+  if (status.ok()) status = ReadLimits(spec, config, &request);
+  if (status.ok() && request.label.size() > kMaxLabelBytes) {
+    status = Invalid(Message("label has ", request.label.size(), " bytes but may have ",
+                             kMaxLabelBytes, ": shorten it"));
+  }
+  if (status.ok()) status = core::Validate(request.spec);
+  if (!status.ok()) return tl::unexpected(std::move(status));
+  return request;
+}
+
+void ToProto(const core::Specification& spec, v1::MeshSpec* out) {
+  out->Clear();
+  out->set_dimension(spec.dimension);
+  out->set_ambient_dimension(spec.ambient_dimension);
+  out->set_epsilon(spec.epsilon);
+  out->mutable_oracle()->set_intersect_flat(spec.oracle.intersect_flat);
+  out->mutable_oracle()->set_tangent_basis(spec.oracle.tangent_basis);
+  if (spec.bounding_box) {
+    const auto d = static_cast<std::size_t>(spec.bounding_box->lower.size());
+    v1::BoundingBox* const box = out->mutable_bounding_box();
+    ToProto(spec.bounding_box->lower.data(), {d}, box->mutable_lower());
+    ToProto(spec.bounding_box->upper.data(), {d}, box->mutable_upper());
+  }
+  v1::Criteria* const criteria = out->mutable_criteria();
+  criteria->set_radius_edge_bound(spec.criteria.radius_edge_bound);
+  if (spec.criteria.sliver_bound) criteria->set_sliver_bound(*spec.criteria.sliver_bound);
+  criteria->set_picking_radius(spec.criteria.picking_radius);
+  criteria->set_small_sliver_radius(spec.criteria.small_sliver_radius);
+  if (spec.criteria.candidates) criteria->set_candidates(*spec.criteria.candidates);
+  if (spec.criteria.advance_step) criteria->set_advance_step(*spec.criteria.advance_step);
+  criteria->set_flat_alternations(spec.criteria.flat_alternations);
+  out->mutable_limits()->set_max_vertices(spec.limits.max_vertices);
+  out->mutable_limits()->set_max_rounds(spec.limits.max_rounds);
+  out->set_random_seed(spec.random_seed);
+  out->set_box_seeds(spec.box_seeds);
+}
+
+}  // namespace stellate::server

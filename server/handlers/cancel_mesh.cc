@@ -1,0 +1,15 @@
+#include "server/convert/mesh.h"
+#include "server/handlers/handlers.h"
+
+namespace stellate::server {
+
+grpc::Status CancelMesh(ServerState& service, const v1::CancelMeshRequest& request,
+                        v1::Mesh* mesh) {
+  const auto session = FindMesh(service, request.name());
+  if (!session) return session.error();
+  (*session)->Cancel();
+  ToProto(**session, mesh);
+  return grpc::Status::OK;
+}
+
+}  // namespace stellate::server

@@ -1,0 +1,32 @@
+#include "core/message.h"
+#include "server/error_map.h"
+#include "server/handlers/handlers.h"
+
+namespace stellate::server {
+
+tl::expected<std::shared_ptr<Session>, grpc::Status> FindMesh(const ServerState& service,
+                                                              const std::string& name,
+                                                              const std::string& field) {
+  if (!IsMeshName(name)) {
+    return tl::unexpected(
+        Refusal(v1::ERROR_REASON_INVALID_ARGUMENT,
+                core::Message(field, " is \"", Cut(name, 100),
+                              "\" but must be \"meshes/\" and 32 hexadecimal digits: use the name "
+                              "that CreateMesh returned"),
+                field));
+  }
+  auto session = service.store.Find(name);
+  if (session == nullptr) {
+    return tl::unexpected(Refusal(v1::ERROR_REASON_MESH_NOT_FOUND,
+                                  core::Message("there is no mesh ", name,
+                                                ": the name is wrong, or it was deleted, or it "
+                                                "ended too long ago to be kept")));
+  }
+  return session;
+}
+
+grpc::Status ShuttingDown() {
+  return Refusal(v1::ERROR_REASON_SHUTTING_DOWN, "the server is stopping: connect again later");
+}
+
+}  // namespace stellate::server

@@ -1,0 +1,20 @@
+#include "server/handlers/handlers.h"
+#include "server/server.h"
+
+namespace stellate::server {
+
+grpc::Status GetServerInfo(ServerState& service, const v1::GetServerInfoRequest&,
+                           v1::ServerInfo* info) {
+  const Config& config = service.config;
+  info->set_version(Version());
+  info->add_protocols("stellate.v1");
+  info->set_max_dimension(core::kMaxDimension);
+  info->set_max_ambient_dimension(static_cast<std::uint32_t>(config.max_ambient_dimension));
+  info->set_max_vertices(config.max_vertices);
+  info->set_max_rounds(config.max_rounds);
+  info->set_max_meshes(static_cast<std::uint32_t>(config.max_meshes));
+  info->set_max_message_bytes(config.max_message_bytes);
+  return grpc::Status::OK;
+}
+
+}  // namespace stellate::server

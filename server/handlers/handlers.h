@@ -1,0 +1,52 @@
+#pragma once
+
+#include <grpcpp/server_context.h>
+#include <grpcpp/support/server_callback.h>
+
+#include <atomic>
+#include <memory>
+#include <tl/expected.hpp>
+
+#include "server/config.h"
+#include "server/session_store.h"
+#include "server/streams.h"
+#include "stellate/v1/stellate.pb.h"
+
+namespace stellate::server {
+
+// What the handlers share.
+struct ServerState {
+  ServerState(const Config& config_in, StoreLimits limits, Session::MesherFactory factory)
+      : config(config_in), store(limits, std::move(factory)) {}
+
+  const Config config;
+  StreamRegistry streams;
+  SessionStore store;
+  std::atomic<bool> draining{false};  // no new meshes
+};
+
+// One function for each rpc, each in its own file. None of them waits for anything.
+grpc::Status CreateMesh(ServerState& service, const v1::CreateMeshRequest& request, v1::Mesh* mesh);
+grpc::Status GetMesh(ServerState& service, const v1::GetMeshRequest& request, v1::Mesh* mesh);
+grpc::Status ListMeshes(ServerState& service, const v1::ListMeshesRequest& request,
+                        v1::ListMeshesResponse* response);
+grpc::Status CancelMesh(ServerState& service, const v1::CancelMeshRequest& request, v1::Mesh* mesh);
+grpc::Status DeleteMesh(ServerState& service, const v1::DeleteMeshRequest& request,
+                        google::protobuf::Empty* empty);
+grpc::Status GetServerInfo(ServerState& service, const v1::GetServerInfoRequest& request,
+                           v1::ServerInfo* info);
+grpc::ServerBidiReactor<v1::ServeOracleRequest, v1::ServeOracleResponse>* ServeOracle(
+    ServerState& service, grpc::CallbackServerContext* context);
+grpc::ServerWriteReactor<v1::WatchMeshResponse>* WatchMesh(ServerState& service,
+                                                           grpc::CallbackServerContext* context,
+                                                           const v1::WatchMeshRequest& request);
+
+// The mesh of that name, or INVALID_ARGUMENT or NOT_FOUND. `field`: where the name stands.
+tl::expected<std::shared_ptr<Session>, grpc::Status> FindMesh(const ServerState& service,
+                                                              const std::string& name,
+                                                              const std::string& field = "name");
+
+// UNAVAILABLE: the server stops.
+grpc::Status ShuttingDown();
+
+}  // namespace stellate::server

@@ -1,0 +1,174 @@
+#include <optional>
+
+#include "core/message.h"
+#include "server/convert/mesh.h"
+#include "server/error_map.h"
+#include "server/handlers/handlers.h"
+
+namespace stellate::server {
+namespace {
+
+// How long a client may leave the end of its stream, or a deleted mesh, unread.
+constexpr auto kPatience = std::chrono::seconds(30);
+
+// One watcher's stream: a cursor in the mesh's history, and at most one message on its way. What
+// it does not read waits in the history, not here.
+class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>,
+                          public SessionWatcher,
+                          public Stream,
+                          public std::enable_shared_from_this<WatchStream> {
+ public:
+  WatchStream(ServerState& service, grpc::CallbackServerContext* context)
+      : service_(service), context_(context) {}
+
+  void Start(const v1::WatchMeshRequest& request) {
+    self_ = shared_from_this();
+    service_.streams.Add(self_);
+    grpc::Status status = Attach(request);
+    const std::lock_guard lock(mutex_);
+    if (!status.ok() && !end_) End(std::move(status));
+    Pump();
+  }
+
+  void OnWriteDone(bool ok) override {
+    const std::lock_guard lock(mutex_);
+    writing_ = false;
+    if (!ok && !end_) End(grpc::Status::CANCELLED);
+    Pump();
+  }
+
+  void OnCancel() override {
+    const std::lock_guard lock(mutex_);
+    if (!end_) End(grpc::Status::CANCELLED);
+    Pump();
+  }
+
+  void OnDone() override {
+    std::shared_ptr<WatchStream> self;  // outlives the lock
+    const std::lock_guard lock(mutex_);
+    done_ = true;
+    self = std::move(self_);
+  }
+
+  void Wake() override {
+    const std::lock_guard lock(mutex_);
+    progress_due_ = true;
+    Pump();
+  }
+
+  void Tick(TimePoint now) override {
+    const std::lock_guard lock(mutex_);
+    if (done_ || session_ == nullptr) return;
+    const bool stuck = (writing_ || finished_) && now - last_write_ > kPatience;
+    const bool of_use = !finished_ && service_.store.Find(session_->options().name) != nullptr;
+    if (stuck && !of_use) return context_->TryCancel();
+    progress_due_ = true;
+    Pump();
+  }
+
+  void StopServing() override {
+    const std::lock_guard lock(mutex_);
+    if (!end_) End(ShuttingDown());
+    // A client that does not read must not hold up the stop.
+    if (writing_ && !done_) context_->TryCancel();
+    Pump();
+  }
+
+ private:
+  grpc::Status Attach(const v1::WatchMeshRequest& request) {
+    auto session = FindMesh(service_, request.name());
+    if (!session) return session.error();
+    const std::uint64_t newest = (*session)->history().revision();
+    if (request.from_revision() > newest) {
+      return Refusal(v1::ERROR_REASON_REVISION_TOO_NEW,
+                     core::Message("from_revision is ", request.from_revision(),
+                                   " but the newest revision is ", newest,
+                                   ": watch from the last one that you have"),
+                     "from_revision");
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      at_ = request.from_revision();
+      geometry_ = !request.progress_only();
+      session_ = *session;
+    }
+    if ((*session)->AddWatcher(weak_from_this())) return grpc::Status::OK;
+    return Refusal(v1::ERROR_REASON_LIMIT_EXCEEDED,
+                   core::Message("the mesh has ", (*session)->options().max_watchers,
+                                 " watchers, the most that this server allows: end one first, or "
+                                 "raise --max-watchers"));
+  }
+
+  void End(grpc::Status status) { end_ = std::move(status); }
+
+  // Starts the next write, or the end, if none is on its way.
+  void Pump() {
+    if (writing_ || finished_) return;
+    if (end_) {
+      finished_ = true;
+      last_write_ = Clock::now();
+      return Finish(*end_);
+    }
+    if (session_ == nullptr) return;
+    const bool over = session_->HasEnded();  // before the revision: nothing follows then
+    response_.Clear();
+    if (geometry_ && !cursor_ && session_->history().revision() > at_) {
+      cursor_ = session_->history().Begin(at_);
+    }
+    if (cursor_) {
+      TakePart();
+    } else if (progress_due_) {
+      progress_due_ = false;
+      ToProto(session_->View(), response_.mutable_progress());
+    } else if (over) {
+      finished_ = true;
+      last_write_ = Clock::now();
+      ToProto(*session_, response_.mutable_final());
+      return StartWriteAndFinish(&response_, grpc::WriteOptions(), grpc::Status::OK);
+    } else {
+      return;
+    }
+    writing_ = true;
+    last_write_ = Clock::now();
+    StartWrite(&response_);
+  }
+
+  void TakePart() {
+    const core::Specification& spec = session_->options().spec;
+    const DeltaPart part = session_->history().Next(&*cursor_, ChunkBytes(service_.config));
+    ToProto(part, spec.dimension, spec.ambient_dimension, response_.mutable_delta());
+    if (!part.complete) return;
+    at_ = cursor_->to;
+    cursor_.reset();
+    progress_due_ = true;
+  }
+
+  ServerState& service_;
+  grpc::CallbackServerContext* const context_;
+
+  std::mutex mutex_;
+  std::shared_ptr<WatchStream> self_;
+  std::shared_ptr<Session> session_;
+  bool geometry_ = true;
+  std::uint64_t at_ = 0;  // the client has all up to this revision
+  std::optional<WatchLog::Cursor> cursor_;
+  bool progress_due_ = true;
+  bool writing_ = false;
+  bool finished_ = false;
+  bool done_ = false;
+  std::optional<grpc::Status> end_;
+  TimePoint last_write_ = Clock::now();
+  v1::WatchMeshResponse response_;
+};
+
+}  // namespace
+
+grpc::ServerWriteReactor<v1::WatchMeshResponse>* WatchMesh(ServerState& service,
+                                                           grpc::CallbackServerContext* context,
+                                                           const v1::WatchMeshRequest& request) {
+  const auto stream = std::make_shared<WatchStream>(service, context);
+  stream->Start(request);
+  return stream.get();
+}
+
+}  // namespace stellate::server

@@ -1,0 +1,110 @@
+// stellated: flags, logging, signals; the rest is Server.
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+
+#include "core/message.h"
+#include "server/flags.h"
+#include "server/health_check.h"
+#include "server/log.h"
+#include "server/server.h"
+
+namespace {
+
+using namespace stellate::server;  // NOLINT: this file is the program
+
+constexpr int kExitUsage = 2;
+constexpr auto kHealthLimit = std::chrono::seconds(5);
+
+sigset_t StopSignals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  return signals;
+}
+
+// The signal that came within `milliseconds`, or 0.
+int WaitForSignal(const sigset_t& signals, int milliseconds) {
+  const timespec limit{milliseconds / 1000, milliseconds % 1000 * 1'000'000L};
+  const int signal = sigtimedwait(&signals, nullptr, &limit);
+  return signal > 0 ? signal : 0;
+}
+
+int Fail(const std::string& message, int status) {
+  std::fprintf(stderr, "stellated: %s\n", message.c_str());
+  return status;
+}
+
+int RunHealthCheck(const Config& config) {
+  const auto address = ParseListenAddress(config.listen);
+  if (!address) return Fail(address.error().message, kExitUsage);
+  const std::string trouble = CheckHealth(address->Target(), kHealthLimit);
+  return trouble.empty() ? 0 : Fail(trouble, 1);
+}
+
+// Written beside and then renamed, so that whoever sees the file sees all of it.
+bool WriteReadyFile(const std::string& path, const std::string& address) {
+  const std::string draft = path + ".new";
+  std::ofstream file(draft);
+  file << address << "\n";
+  file.close();
+  return file.good() && std::rename(draft.c_str(), path.c_str()) == 0;
+}
+
+// Returns when it is time to stop. True: at once, as nobody is left to wait for.
+bool ServeUntilTold(const sigset_t& signals, bool with_parent, pid_t parent) {
+  while (true) {
+    if (const int signal = WaitForSignal(signals, 250)) {
+      Log(LogLevel::kInfo, {}, stellate::core::Message("signal ", signal, ": stopping"));
+      return false;
+    }
+    // Polled, as PR_SET_PDEATHSIG would fire when the parent's *thread* ends.
+    if (with_parent && getppid() != parent) {
+      Log(LogLevel::kInfo, {}, "the parent process is gone: stopping");
+      return true;
+    }
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const pid_t parent = getppid();
+  const auto [flags, exit_status] = ParseFlags(argc, argv);
+  if (exit_status) return *exit_status;
+  const Config& config = flags.config;
+  if (flags.health_check) return RunHealthCheck(config);
+
+  // Before gRPC starts its threads, which inherit the mask: then sigtimedwait alone sees them.
+  const sigset_t signals = StopSignals();
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  signal(SIGPIPE, SIG_IGN);
+  StartLogging(config.log_level, config.log_format);
+
+  auto server = Server::Start(config);
+  if (!server) return Fail(server.error().message, kExitUsage);
+  const std::string& address = (*server)->address();
+  std::printf("stellated listening on %s\n", address.c_str());
+  std::fflush(stdout);
+  Log(LogLevel::kInfo, {},
+      stellate::core::Message("stellated ", Version(), " listening on ", address));
+  if (!config.ready_file.empty() && !WriteReadyFile(config.ready_file, address)) {
+    return Fail("cannot write --ready-file " + config.ready_file, 1);
+  }
+
+  const bool at_once = ServeUntilTold(signals, flags.exit_with_parent, parent);
+  const std::chrono::duration<double> drain(at_once ? 0 : config.drain_seconds);
+  const bool clean = (*server)->Stop(std::chrono::duration_cast<Clock::duration>(drain),
+                                     [&] { return WaitForSignal(signals, 0) != 0; });
+  if (!config.ready_file.empty()) unlink(config.ready_file.c_str());
+  Log(LogLevel::kInfo, {}, "stopped");
+  // A mesher in the middle of a round cannot be asked to leave: the process takes it along.
+  if (!clean) std::_Exit(0);
+  return 0;
+}

@@ -1,0 +1,253 @@
+#include "server/oracle_pool.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/message.h"
+
+namespace stellate::server {
+namespace {
+
+using core::StatusCode;
+using Eigen::Index;
+
+double Seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
+
+}  // namespace
+
+OraclePool::OraclePool(const core::Specification& spec, DispatchOptions options,
+                       std::size_t max_workers)
+    : spec_(spec), options_(options), max_workers_(max_workers), dispatch_(options) {}
+
+core::Expected<WorkerId> OraclePool::Join(std::shared_ptr<OracleWorker> worker,
+                                          std::uint32_t max_chunk) {
+  std::vector<Delivery> deliveries;
+  WorkerId id = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    if (closed_) {
+      return core::Refuse(StatusCode::kFailedPrecondition,
+                          "the mesh is over and asks nothing any more: create another");
+    }
+    if (members_.size() >= max_workers_) {
+      return core::Refuse(StatusCode::kLimitExceeded,
+                          core::Message("the mesh has ", members_.size(),
+                                        " workers, the most that this server allows: let one go "
+                                        "first, or raise --max-workers"));
+    }
+    id = next_worker_++;
+    members_.emplace(id, std::move(worker));
+    worker_count_ = members_.size();
+    dispatch_.Join(id, max_chunk);
+    deliveries = AssignLocked(Clock::now());
+  }
+  changed_.notify_one();
+  Send(std::move(deliveries));
+  return id;
+}
+
+void OraclePool::Leave(WorkerId worker) {
+  std::vector<Delivery> deliveries;
+  std::shared_ptr<OracleWorker> gone;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto it = members_.find(worker);
+    if (it == members_.end()) return;
+    gone = std::move(it->second);
+    members_.erase(it);
+    worker_count_ = members_.size();
+    const TimePoint now = Clock::now();
+    dispatch_.Leave(worker, now);
+    deliveries = AssignLocked(now);
+  }
+  changed_.notify_one();
+  Send(std::move(deliveries));
+}
+
+core::Expected<std::optional<Chunk>> OraclePool::Claim(WorkerId worker, LeaseId lease_id) {
+  std::vector<Delivery> deliveries;
+  std::optional<Chunk> chunk;
+  {
+    const std::lock_guard lock(mutex_);
+    const TimePoint now = Clock::now();
+    Lease lease;
+    switch (dispatch_.Claim(worker, lease_id, now, &lease)) {
+      case Dispatch::ClaimResult::kUnknown:
+        return core::Refuse(StatusCode::kInvalidArgument,
+                            core::Message("answers.lease is ", lease_id,
+                                          " but no such chunk is waiting for this worker's answer: "
+                                          "answer each QueryChunk once, with its own lease"));
+      case Dispatch::ClaimResult::kLate:
+        break;
+      case Dispatch::ClaimResult::kClaimed:
+        chunk = Chunk{lease.id, round_, lease.block, lease.first, lease.count};
+        break;
+    }
+    deliveries = AssignLocked(now);
+  }
+  Send(std::move(deliveries));
+  return chunk;
+}
+
+core::Status OraclePool::Deliver(const Chunk& chunk, const core::AnswerBlock& answer) {
+  if (answer.points.cols() != chunk.count) {
+    return {StatusCode::kOracleShape,
+            core::Message("answers to lease ", chunk.lease, " hold ", answer.points.cols(),
+                          " points but the chunk has ", chunk.count,
+                          " queries: send one point for each query")};
+  }
+  const core::Status status = core::CheckAnswers(spec_, chunk.block(), chunk.first, answer);
+  if (!status.ok()) return status;
+
+  core::AnswerBlock& whole = chunk.round->answers.blocks[chunk.block_index];
+  whole.points.middleCols(chunk.first, chunk.count) = answer.points;
+  if (!answer.found.empty()) {
+    std::copy(answer.found.begin(), answer.found.end(), whole.found.begin() + chunk.first);
+  }
+  if (whole.tangents.cols() > 0 && answer.tangents.cols() == chunk.count) {
+    whole.tangents.middleCols(chunk.first, chunk.count) = answer.tangents;
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    if (round_ != chunk.round) return core::Status::Ok();
+    Lease lease;
+    lease.id = chunk.lease;
+    lease.count = chunk.count;
+    dispatch_.Settle(lease);
+  }
+  changed_.notify_one();
+  return core::Status::Ok();
+}
+
+void OraclePool::Fail(MeshFailure failure) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!failure_) failure_ = std::move(failure);
+  }
+  changed_.notify_one();
+}
+
+OraclePool::Outcome OraclePool::Ask(const core::QueryBatch& batch) {
+  std::shared_ptr<Round> round = MakeRound(batch);
+  std::unique_lock lock(mutex_);
+  round_ = round;
+  TimePoint now = Clock::now();
+  dispatch_.Begin(Measure(batch), now);
+  Outcome outcome;
+  while (true) {
+    now = Clock::now();
+    dispatch_.Expire(now);
+    if (!failure_ && dispatch_.failure(now) != Dispatch::Failure::kNone) {
+      failure_ = Describe(dispatch_.failure(now));
+    }
+    if (interrupted_) break;
+    if (failure_) {
+      outcome.failure = failure_;
+      break;
+    }
+    if (dispatch_.Done()) {
+      outcome.round = std::move(round);
+      break;
+    }
+    auto deliveries = AssignLocked(now);
+    if (!deliveries.empty()) {
+      lock.unlock();
+      Send(std::move(deliveries));
+      lock.lock();
+      continue;
+    }
+    const TimePoint deadline = dispatch_.NextDeadline();
+    if (deadline == TimePoint::max()) {
+      changed_.wait(lock);  // a claimed answer is being checked: its worker's thread will notify
+    } else {
+      changed_.wait_until(lock, deadline);
+    }
+  }
+  dispatch_.End();
+  round_.reset();
+  return outcome;
+}
+
+void OraclePool::Interrupt() {
+  {
+    const std::lock_guard lock(mutex_);
+    interrupted_ = true;
+  }
+  changed_.notify_one();
+}
+
+void OraclePool::Close(const WorkerEnd& end) {
+  std::vector<std::shared_ptr<OracleWorker>> workers;
+  {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+    const TimePoint now = Clock::now();
+    for (auto& [id, worker] : members_) {
+      dispatch_.Leave(id, now);
+      workers.push_back(std::move(worker));
+    }
+    members_.clear();
+    worker_count_ = 0;
+  }
+  for (const auto& worker : workers) worker->End(end);
+}
+
+std::vector<OraclePool::Delivery> OraclePool::AssignLocked(TimePoint now) {
+  std::vector<Delivery> deliveries;
+  if (interrupted_ || failure_) return deliveries;
+  for (const Lease& lease : dispatch_.Assign(now)) {
+    deliveries.push_back({members_.at(lease.worker),
+                          Chunk{lease.id, round_, lease.block, lease.first, lease.count}});
+  }
+  return deliveries;
+}
+
+std::shared_ptr<Round> OraclePool::MakeRound(const core::QueryBatch& batch) const {
+  auto round = std::make_shared<Round>();
+  round->batch = batch;
+  for (const core::QueryBlock& block : batch.blocks) {
+    const Index n = block.size();
+    core::AnswerBlock answers;
+    answers.points = Eigen::MatrixXd::Zero(spec_.ambient_dimension, n);
+    answers.found.assign(n, 1);
+    if (block.want_tangents) {
+      const Index basis_size = Index{spec_.ambient_dimension} * spec_.dimension;
+      answers.tangents = Eigen::MatrixXd::Zero(basis_size, n);
+    }
+    round->answers.blocks.push_back(std::move(answers));
+  }
+  return round;
+}
+
+std::vector<Dispatch::Block> OraclePool::Measure(const core::QueryBatch& batch) const {
+  const std::size_t point = sizeof(double) * spec_.ambient_dimension;
+  const std::size_t basis = point * spec_.dimension;
+  std::vector<Dispatch::Block> blocks;
+  for (const core::QueryBlock& block : batch.blocks) {
+    const bool flat = block.kind == core::QueryKind::kIntersectFlat;
+    const std::size_t question = point + (flat ? basis + sizeof(double) : 0);
+    const std::size_t answer = point + 1 + (block.want_tangents ? basis : 0);
+    blocks.push_back({block.size(), std::max(question, answer)});
+  }
+  return blocks;
+}
+
+MeshFailure OraclePool::Describe(Dispatch::Failure failure) const {
+  if (failure == Dispatch::Failure::kNoWorker) {
+    return {"NO_WORKER",
+            core::Message("no worker served the mesh for ", Seconds(options_.worker_wait),
+                          " seconds (limits.worker_wait_seconds): open ServeOracle for it, or "
+                          "allow a longer wait")};
+  }
+  return {"ANSWER_TIMEOUT", core::Message("an oracle left the same queries unanswered for ",
+                                          Seconds(options_.answer_limit),
+                                          " seconds (limits.answer_seconds), ", options_.max_leases,
+                                          " times: make it faster, take fewer queries in a chunk "
+                                          "(Hello.max_chunk_queries), or allow more time")};
+}
+
+void OraclePool::Send(std::vector<Delivery> deliveries) {
+  for (Delivery& delivery : deliveries) delivery.worker->Ask(std::move(delivery.chunk));
+}
+
+}  // namespace stellate::server

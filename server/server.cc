@@ -1,0 +1,251 @@
+#include "server/server.h"
+
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/resource_quota.h>
+#include <grpcpp/server_builder.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <condition_variable>
+#include <cstring>
+#include <mutex>
+#include <new>
+#include <thread>
+
+#include "core/message.h"
+#include "server/error_map.h"
+#include "stellate/v1/stellate.grpc.pb.h"
+
+namespace stellate::server {
+namespace {
+
+using core::Message;
+using core::Status;
+using core::StatusCode;
+
+constexpr auto kTick = std::chrono::seconds(1);
+constexpr auto kPoll = std::chrono::milliseconds(20);
+constexpr auto kLastWords = std::chrono::seconds(2);  // for streams to send what they have
+constexpr auto kLastRound = std::chrono::seconds(5);  // for meshers to notice a cancel
+constexpr int kMaxStreamsPerConnection = 1024;
+constexpr int kMaxSyncThreads = 64;  // reflection alone uses them
+
+// Unary rpcs: run the function, answer at once. No exception leaves a handler.
+template <typename Request, typename Response>
+grpc::ServerUnaryReactor* Reply(grpc::CallbackServerContext* context, ServerState& service,
+                                grpc::Status (*handler)(ServerState&, const Request&, Response*),
+                                const Request& request, Response* response) {
+  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
+  try {
+    reactor->Finish(handler(service, request, response));
+  } catch (const std::bad_alloc&) {
+    reactor->Finish(Refusal(v1::ERROR_REASON_LIMIT_EXCEEDED, "the server is out of memory"));
+  } catch (const std::exception& error) {
+    Log(LogLevel::kError, {}, Message("a handler failed: ", error.what()));
+    reactor->Finish(grpc::Status(grpc::StatusCode::INTERNAL, "a fault of the server"));
+  }
+  return reactor;
+}
+
+class Rpcs final : public v1::Stellate::CallbackService {
+ public:
+  explicit Rpcs(ServerState* service) : service_(*service) {}
+
+  using Context = grpc::CallbackServerContext;
+  grpc::ServerUnaryReactor* CreateMesh(Context* context, const v1::CreateMeshRequest* request,
+                                       v1::Mesh* mesh) override {
+    return Reply(context, service_, server::CreateMesh, *request, mesh);
+  }
+  grpc::ServerUnaryReactor* GetMesh(Context* context, const v1::GetMeshRequest* request,
+                                    v1::Mesh* mesh) override {
+    return Reply(context, service_, server::GetMesh, *request, mesh);
+  }
+  grpc::ServerUnaryReactor* ListMeshes(Context* context, const v1::ListMeshesRequest* request,
+                                       v1::ListMeshesResponse* response) override {
+    return Reply(context, service_, server::ListMeshes, *request, response);
+  }
+  grpc::ServerUnaryReactor* CancelMesh(Context* context, const v1::CancelMeshRequest* request,
+                                       v1::Mesh* mesh) override {
+    return Reply(context, service_, server::CancelMesh, *request, mesh);
+  }
+  grpc::ServerUnaryReactor* DeleteMesh(Context* context, const v1::DeleteMeshRequest* request,
+                                       google::protobuf::Empty* empty) override {
+    return Reply(context, service_, server::DeleteMesh, *request, empty);
+  }
+  grpc::ServerUnaryReactor* GetServerInfo(Context* context, const v1::GetServerInfoRequest* request,
+                                          v1::ServerInfo* info) override {
+    return Reply(context, service_, server::GetServerInfo, *request, info);
+  }
+  grpc::ServerBidiReactor<v1::ServeOracleRequest, v1::ServeOracleResponse>* ServeOracle(
+      Context* context) override {
+    return server::ServeOracle(service_, context);
+  }
+  grpc::ServerWriteReactor<v1::WatchMeshResponse>* WatchMesh(
+      Context* context, const v1::WatchMeshRequest* request) override {
+    return server::WatchMesh(service_, context, *request);
+  }
+
+ private:
+  ServerState& service_;
+};
+
+// gRPC would take over any socket file, a living server's too.
+Status ClearUnixPath(const std::string& path) {
+  struct stat info {};
+  if (lstat(path.c_str(), &info) != 0) return Status::Ok();
+  if (!S_ISSOCK(info.st_mode)) {
+    return {StatusCode::kFailedPrecondition, Message("--listen is unix:", path,
+                                                     " but a file that is no socket stands there: "
+                                                     "choose another path")};
+  }
+  const int probe = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::strncpy(address.sun_path, path.c_str(), sizeof(address.sun_path) - 1);
+  const int result = connect(probe, reinterpret_cast<sockaddr*>(&address), sizeof(address));
+  const bool refused = result != 0 && errno == ECONNREFUSED;
+  close(probe);
+  if (!refused) {
+    return {StatusCode::kFailedPrecondition,
+            Message("--listen is unix:", path,
+                    " but another server listens there: stop it, or "
+                    "choose another path")};
+  }
+  unlink(path.c_str());
+  return Status::Ok();
+}
+
+// Plain text for now; TLS credentials would be chosen here, from the configuration.
+std::shared_ptr<grpc::ServerCredentials> Credentials(const Config&) {
+  return grpc::InsecureServerCredentials();
+}
+
+int Milliseconds(double seconds) { return static_cast<int>(seconds * 1000); }
+
+void SetUp(const Config& config, grpc::ServerBuilder* builder) {
+  const int size = static_cast<int>(config.max_message_bytes);
+  builder->SetMaxReceiveMessageSize(size);
+  builder->SetMaxSendMessageSize(size);
+  // A frozen client is found by pings; clients may ping as often as they like.
+  builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, Milliseconds(config.keepalive_seconds));
+  builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS,
+                              Milliseconds(config.keepalive_timeout_seconds));
+  builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  builder->AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+  builder->AddChannelArgument(GRPC_ARG_HTTP2_MAX_PING_STRIKES, 0);
+  builder->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxStreamsPerConnection);
+  // Otherwise two servers share a port, and each client gets either.
+  builder->AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  grpc::ResourceQuota quota("stellated");
+  quota.SetMaxThreads(kMaxSyncThreads);
+  builder->SetResourceQuota(quota);
+}
+
+StoreLimits ToStoreLimits(const Config& config) {
+  return {config.max_meshes, config.keep_finished_meshes,
+          std::chrono::duration_cast<Clock::duration>(
+              std::chrono::duration<double>(config.keep_finished_seconds))};
+}
+
+}  // namespace
+
+const char* Version() { return STELLATE_VERSION; }
+
+// Members are destroyed from the last to the first: the server before what its calls use.
+class Server::Impl {
+ public:
+  Impl(const Config& config, Session::MesherFactory factory)
+      : service(config, ToStoreLimits(config), std::move(factory)), rpcs(&service) {}
+
+  void StartTicking() {
+    ticker = std::jthread([this](std::stop_token stop) {
+      std::unique_lock lock(tick_mutex);
+      while (!tick_wake.wait_for(lock, stop, kTick, [&stop] { return stop.stop_requested(); })) {
+        const TimePoint now = Clock::now();
+        service.streams.Tick(now);
+        service.store.Sweep(now);
+      }
+    });
+  }
+
+  ServerState service;
+  Rpcs rpcs;
+  std::unique_ptr<grpc::Server> server;
+  bool stopped = false;
+  std::mutex tick_mutex;
+  std::condition_variable_any tick_wake;
+  std::jthread ticker;
+};
+
+Server::Server(std::unique_ptr<Impl> impl, std::string address)
+    : impl_(std::move(impl)), address_(std::move(address)) {}
+
+Server::~Server() { Stop(Clock::duration::zero()); }
+
+core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
+                                                      Session::MesherFactory factory) {
+  Status status = Validate(config);
+  if (!status.ok()) return tl::unexpected(std::move(status));
+  ListenAddress address = *ParseListenAddress(config.listen);
+  if (address.IsUnix()) {
+    status = ClearUnixPath(address.unix_path);
+    if (!status.ok()) return tl::unexpected(std::move(status));
+  }
+  static std::once_flag plugins;
+  std::call_once(plugins, [] {
+    grpc::EnableDefaultHealthCheckService(true);
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  });
+
+  auto impl = std::make_unique<Impl>(config, std::move(factory));
+  grpc::ServerBuilder builder;
+  SetUp(config, &builder);
+  int port = 0;
+  builder.AddListeningPort(address.Target(), Credentials(config), &port);
+  builder.RegisterService(&impl->rpcs);
+  const mode_t mask = umask(0177);  // a unix socket is its owner's alone, from its first moment
+  impl->server = builder.BuildAndStart();
+  umask(mask);
+  if (impl->server == nullptr || port <= 0) {
+    return core::Refuse(StatusCode::kFailedPrecondition,
+                        Message("cannot listen on ", address.Target(),
+                                ": another program has it, or this machine does not; choose "
+                                "another --listen"));
+  }
+  if (!address.IsUnix()) address.port = port;
+  impl->server->GetHealthCheckService()->SetServingStatus(v1::Stellate::service_full_name(), true);
+  impl->StartTicking();
+  return std::unique_ptr<Server>(new Server(std::move(impl), address.Target()));
+}
+
+bool Server::Stop(Clock::duration drain, const std::function<bool()>& hurry) {
+  Impl& impl = *impl_;
+  if (impl.stopped) return true;
+  impl.stopped = true;
+  ServerState& service = impl.service;
+  impl.server->GetHealthCheckService()->SetServingStatus(false);
+  service.draining = true;
+
+  const TimePoint drained = Clock::now() + drain;
+  const auto wait_while = [&](TimePoint until, const auto& busy) {
+    while (busy() && Clock::now() < until && !hurry()) std::this_thread::sleep_for(kPoll);
+  };
+  wait_while(drained, [&] { return service.store.Running() > 0; });
+  // Streams of finished meshes end by themselves, once read.
+  if (service.store.Running() == 0) {
+    wait_while(std::min(drained, Clock::now() + kLastWords),
+               [&] { return service.streams.Count() > 0; });
+  }
+  service.streams.StopAll();
+  impl.server->Shutdown(std::chrono::system_clock::now() + kLastWords);
+  impl.server->Wait();
+  impl.ticker.request_stop();
+  impl.ticker.join();
+  return service.store.Stop(Clock::now() + kLastRound);
+}
+
+}  // namespace stellate::server

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <grpcpp/server.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "core/status.h"
+#include "server/config.h"
+#include "server/handlers/handlers.h"
+
+namespace stellate::server {
+
+const char* Version();
+
+// A running server. Several may live in one process, each with its own address.
+class Server {
+ public:
+  // Listens once this returns. kInvalidArgument: the configuration; kFailedPrecondition: the
+  // address is taken or cannot be bound.
+  static core::Expected<std::unique_ptr<Server>> Start(
+      const Config& config, Session::MesherFactory factory = core::Mesher::Create);
+  ~Server();
+
+  // What clients dial: "127.0.0.1:7717", "unix:/path".
+  const std::string& address() const { return address_; }
+
+  // Stops: no new meshes, then up to `drain` for running ones to end, then the rest is cancelled
+  // and every stream ends with UNAVAILABLE. `hurry` is asked now and then; true ends the drain.
+  // False: a mesh is still computing, and the process should exit without waiting for it.
+  bool Stop(
+      Clock::duration drain, const std::function<bool()>& hurry = [] { return false; });
+
+ private:
+  class Impl;
+  explicit Server(std::unique_ptr<Impl> impl, std::string address);
+
+  std::unique_ptr<Impl> impl_;
+  std::string address_;
+};
+
+}  // namespace stellate::server

@@ -1,0 +1,110 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/mesher.h"
+#include "server/log.h"
+#include "server/oracle_pool.h"
+#include "server/watch_log.h"
+
+namespace stellate::server {
+
+enum class SessionState { kWaiting, kRunning, kSucceeded, kStopped, kCancelled, kFailed };
+
+// What a session is made of, fixed for its life.
+struct SessionOptions {
+  std::string name;   // "meshes/<id>"
+  std::string label;  // the client's
+  core::Specification spec;
+  DispatchOptions dispatch;
+  std::size_t max_workers = 64;
+  std::size_t max_watchers = 64;
+};
+
+// A session at one moment.
+struct SessionView {
+  SessionState state = SessionState::kWaiting;
+  std::chrono::system_clock::time_point create_time;
+  std::optional<std::chrono::system_clock::time_point> end_time;
+  std::uint64_t revision = 0;
+  core::Progress progress;
+  double elapsed_seconds = 0;
+  double remaining_seconds = 0;        // 0: unknown
+  std::optional<core::Report> report;  // once it is over
+  MeshFailure failure;                 // when it failed
+  std::size_t workers = 0, watchers = 0;
+};
+
+// Told when a session has something new. Wake comes from any thread and must not block.
+class SessionWatcher {
+ public:
+  virtual ~SessionWatcher() = default;
+  virtual void Wake() = 0;
+};
+
+// One mesh: drives a core::Mesher on a thread of its own, asks the pool, keeps the history. Knows
+// nothing of the network.
+class Session {
+ public:
+  using MesherFactory =
+      std::function<core::Expected<std::unique_ptr<core::Mesher>>(core::Specification)>;
+
+  explicit Session(SessionOptions options, MesherFactory factory = core::Mesher::Create);
+
+  // Meshes to the end, on the calling thread. Once only.
+  void Run();
+  // Run has nothing left to do but return.
+  bool Over() const { return over_; }
+
+  // Ends the mesh; any thread, at once where Run waits, else after the round being computed.
+  void Cancel();
+
+  // False when there are too many.
+  bool AddWatcher(std::weak_ptr<SessionWatcher> watcher);
+
+  SessionView View() const;
+  bool HasEnded() const;  // state, report and history are final
+  LogContext log_context() const;
+  const SessionOptions& options() const { return options_; }
+  OraclePool& pool() { return pool_; }
+  const WatchLog& history() const { return history_; }
+
+ private:
+  void RunRounds(core::Mesher* mesher);
+  void RunRound(core::Mesher* mesher, const core::QueryBatch& batch);
+  void Fail(core::Mesher* mesher, MeshFailure failure, core::Status status);
+  void Publish(const core::Progress& progress);
+  void Finish(const core::Report* report);
+  SessionState FinalState(const core::Report* report) const;
+  void WakeWatchers();
+
+  const SessionOptions options_;
+  const MesherFactory factory_;
+  OraclePool pool_;
+  WatchLog history_;
+  const std::chrono::system_clock::time_point create_time_;
+  const TimePoint created_;
+  std::atomic<bool> cancelled_{false};
+  std::atomic<bool> over_{false};
+  core::Status blame_;  // Run's thread only: told to all workers at the end
+
+  mutable std::mutex mutex_;
+  std::optional<SessionState> final_state_;
+  std::optional<std::chrono::system_clock::time_point> end_time_;
+  double final_seconds_ = 0;
+  core::Progress progress_;
+  std::optional<core::Report> report_;
+  MeshFailure failure_;
+  std::vector<std::weak_ptr<SessionWatcher>> watchers_;
+};
+
+const char* SessionStateName(SessionState state);  // "SUCCEEDED", ...
+
+}  // namespace stellate::server

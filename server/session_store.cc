@@ -1,0 +1,177 @@
+#include "server/session_store.h"
+
+#include <sys/random.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <stdexcept>
+#include <utility>
+
+#include "core/message.h"
+
+namespace stellate::server {
+namespace {
+
+constexpr std::string_view kNamePrefix = "meshes/";
+constexpr std::size_t kNameBytes = 16;
+
+}  // namespace
+
+std::string NewMeshName() {
+  static constexpr char kHex[] = "0123456789abcdef";
+  std::array<unsigned char, kNameBytes> bytes;
+  ssize_t got = 0;
+  do {
+    got = getrandom(bytes.data(), bytes.size(), 0);
+  } while (got < 0 && errno == EINTR);
+  // A guessable name would open the mesh to anyone: better none.
+  if (got != static_cast<ssize_t>(bytes.size())) throw std::runtime_error("no random bytes");
+  std::string name(kNamePrefix);
+  for (const unsigned char byte : bytes) {
+    name += kHex[byte >> 4];
+    name += kHex[byte & 15];
+  }
+  return name;
+}
+
+bool IsMeshName(const std::string& name) {
+  if (name.size() != kNamePrefix.size() + 2 * kNameBytes || !name.starts_with(kNamePrefix)) {
+    return false;
+  }
+  return std::all_of(name.begin() + kNamePrefix.size(), name.end(),
+                     [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); });
+}
+
+SessionStore::SessionStore(StoreLimits limits, Session::MesherFactory factory)
+    : limits_(limits), factory_(std::move(factory)) {}
+
+SessionStore::~SessionStore() { Stop(TimePoint::max()); }
+
+core::Expected<std::shared_ptr<Session>> SessionStore::Create(SessionOptions options) {
+  const std::lock_guard lock(mutex_);
+  const auto running = static_cast<std::size_t>(
+      std::count_if(entries_.begin(), entries_.end(),
+                    [](const auto& e) { return !e.second.session->Over(); }) +
+      std::count_if(dying_.begin(), dying_.end(),
+                    [](const Entry& e) { return !e.session->Over(); }));
+  if (running >= limits_.max_running) {
+    return core::Refuse(core::StatusCode::kLimitExceeded,
+                        core::Message("the server runs ", running,
+                                      " meshes, the most that it allows: wait for one to end, "
+                                      "cancel one, or raise --max-meshes"));
+  }
+  if (stopped_) {
+    return core::Refuse(core::StatusCode::kFailedPrecondition, "the server is stopping");
+  }
+  options.name = NewMeshName();
+  auto session = std::make_shared<Session>(std::move(options), factory_);
+  const std::uint64_t number = next_number_++;
+  Entry entry{number, session, std::thread([session] { session->Run(); }), TimePoint::max()};
+  numbers_.emplace(session->options().name, number);
+  entries_.emplace(number, std::move(entry));
+  return session;
+}
+
+std::shared_ptr<Session> SessionStore::Find(const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  const auto it = numbers_.find(name);
+  return it == numbers_.end() ? nullptr : entries_.at(it->second).session;
+}
+
+bool SessionStore::Delete(const std::string& name) {
+  std::shared_ptr<Session> session;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto it = numbers_.find(name);
+    if (it == numbers_.end()) return false;
+    auto node = entries_.extract(it->second);
+    numbers_.erase(it);
+    session = node.mapped().session;
+    dying_.push_back(std::move(node.mapped()));
+  }
+  session->Cancel();
+  return true;
+}
+
+SessionStore::Page SessionStore::List(std::uint64_t after, std::size_t count) const {
+  const std::lock_guard lock(mutex_);
+  Page page;
+  auto it = entries_.upper_bound(after);
+  for (; it != entries_.end() && page.sessions.size() < count; ++it) {
+    page.sessions.push_back(it->second.session);
+    page.numbers.push_back(it->first);
+  }
+  page.more = it != entries_.end();
+  return page;
+}
+
+std::size_t SessionStore::Running() const {
+  const std::lock_guard lock(mutex_);
+  return std::count_if(entries_.begin(), entries_.end(),
+                       [](const auto& e) { return !e.second.session->Over(); });
+}
+
+std::vector<SessionStore::Entry> SessionStore::TakeDeadLocked() {
+  std::vector<Entry> dead;
+  std::erase_if(dying_, [&dead](Entry& entry) {
+    if (!entry.session->Over()) return false;
+    if (entry.thread.joinable()) entry.thread.join();  // it has nothing left to do
+    if (entry.session.use_count() > 1) return false;
+    dead.push_back(std::move(entry));
+    return true;
+  });
+  return dead;
+}
+
+void SessionStore::Sweep(TimePoint now) {
+  std::vector<Entry> dead;  // freeing a large mesh takes time: after the lock
+  const std::lock_guard lock(mutex_);
+  std::vector<std::uint64_t> finished;  // oldest end first
+  for (auto& [number, entry] : entries_) {
+    if (!entry.session->Over()) continue;
+    if (entry.over_since == TimePoint::max()) entry.over_since = now;
+    finished.push_back(number);
+  }
+  std::stable_sort(finished.begin(), finished.end(), [this](auto a, auto b) {
+    return entries_.at(a).over_since < entries_.at(b).over_since;
+  });
+  for (std::size_t i = 0; i < finished.size(); ++i) {
+    const bool too_many = finished.size() - i > limits_.keep_finished;
+    if (!too_many && now - entries_.at(finished[i]).over_since < limits_.keep_for) continue;
+    auto node = entries_.extract(finished[i]);
+    numbers_.erase(node.mapped().session->options().name);
+    dying_.push_back(std::move(node.mapped()));
+  }
+  dead = TakeDeadLocked();
+}
+
+bool SessionStore::Stop(TimePoint deadline) {
+  std::vector<Entry> all;
+  {
+    const std::lock_guard lock(mutex_);
+    stopped_ = true;
+    for (auto& [number, entry] : entries_) all.push_back(std::move(entry));
+    for (Entry& entry : dying_) all.push_back(std::move(entry));
+    entries_.clear();
+    numbers_.clear();
+    dying_.clear();
+  }
+  for (Entry& entry : all) entry.session->Cancel();
+  bool clean = true;
+  for (Entry& entry : all) {
+    while (!entry.session->Over() && Clock::now() < deadline) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    if (!entry.thread.joinable()) continue;
+    if (entry.session->Over()) {
+      entry.thread.join();
+    } else {
+      entry.thread.detach();
+      clean = false;
+    }
+  }
+  return clean;
+}
+
+}  // namespace stellate::server

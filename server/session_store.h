@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <unordered_map>
+#include <vector>
+
+#include "core/status.h"
+#include "server/session.h"
+
+namespace stellate::server {
+
+// "meshes/" and 128 random bits from the operating system, in hex.
+std::string NewMeshName();
+// Of the form that NewMeshName gives.
+bool IsMeshName(const std::string& name);
+
+struct StoreLimits {
+  std::size_t max_running = 64;
+  std::size_t keep_finished = 32;
+  Clock::duration keep_for = std::chrono::hours(1);
+};
+
+// Owns the meshes and their threads. No call but Stop waits for a mesh.
+class SessionStore {
+ public:
+  explicit SessionStore(StoreLimits limits, Session::MesherFactory factory = core::Mesher::Create);
+  ~SessionStore();
+
+  // Names the mesh and sets it going. kLimitExceeded: too many are running.
+  core::Expected<std::shared_ptr<Session>> Create(SessionOptions options);
+  std::shared_ptr<Session> Find(const std::string& name) const;  // null: none
+  // Cancels and forgets; false if there is none.
+  bool Delete(const std::string& name);
+
+  struct Page {
+    std::vector<std::shared_ptr<Session>> sessions;  // oldest first
+    std::vector<std::uint64_t> numbers;              // of each; later ones are greater
+    bool more = false;
+  };
+  Page List(std::uint64_t after, std::size_t count) const;
+
+  std::size_t Running() const;
+  // Forgets finished meshes that were kept long enough. To be called now and then.
+  void Sweep(TimePoint now);
+  // Cancels all and waits for their threads until `deadline`. False: some are still computing;
+  // they are left to themselves and the process must end.
+  bool Stop(TimePoint deadline);
+
+ private:
+  struct Entry {
+    std::uint64_t number = 0;
+    std::shared_ptr<Session> session;
+    std::thread thread;
+    TimePoint over_since = TimePoint::max();
+  };
+
+  // Deleted entries whose thread is done and which nobody else holds; to be destroyed unlocked.
+  std::vector<Entry> TakeDeadLocked();
+
+  const StoreLimits limits_;
+  const Session::MesherFactory factory_;
+  mutable std::mutex mutex_;
+  std::map<std::uint64_t, Entry> entries_;
+  std::unordered_map<std::string, std::uint64_t> numbers_;
+  std::vector<Entry> dying_;  // deleted; until their threads end and their watchers go
+  std::uint64_t next_number_ = 1;
+  bool stopped_ = false;
+};
+
+}  // namespace stellate::server
