@@ -164,8 +164,10 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
     Vertex& v = vertices_[created];
     v.facet[0] = new_facet;
     v.adjacent[0] = kept;
-    for (int s = 0, i = 1; s < K; ++s)
-      if (s != slot) v.facet[i++] = vertices_[removed].facet[s];
+    if constexpr (K > 1) {
+      for (int s = 0, i = 1; s < K; ++s)
+        if (s != slot) v.facet[i++] = vertices_[removed].facet[s];
+    }
     Vertex& k = vertices_[kept];
     for (int s = 0; s < K; ++s) {
       // The slot of kept's edge to `removed`: its facet is not on the edge.
