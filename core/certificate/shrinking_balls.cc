@@ -8,7 +8,9 @@ namespace stellate::core {
 namespace {
 
 constexpr double kTellingDistance = 0.5;  // of the longest edge at the vertex
-constexpr double kSettled = 1e-3;         // relative change of radius that ends a ball
+// A ball is asked about at slightly less than the radius found: the centre of the very ball that
+// touches M twice is on the medial axis, where oracles divide by zero.
+constexpr double kInside = 0.98;
 
 using ConstPoint = Eigen::Map<const Eigen::VectorXd>;
 
@@ -76,9 +78,8 @@ void ShrinkingBalls::Absorb(const Eigen::MatrixXd& nearest,
       reach_ = radius;
       narrowest_ = ball.vertex;
     }
-    const bool shrinks_on = radius < (1 - kSettled) * ball.radius;
-    ball.radius = radius;
-    if (shrinks_on) still.push_back(std::move(ball));
+    ball.radius = kInside * radius;
+    still.push_back(std::move(ball));
   }
   active_ = std::move(still);
 }

@@ -12,7 +12,8 @@ namespace stellate::core {
 // centre on a random normal of M at p, shrinks until M does not enter it any more. Whenever the
 // centre's nearest point y is inside, the ball through y, of radius |y - p|^2 / (2 n.(y - p)), is
 // smaller and still touches M at both p and y, so its radius bounds the reach. This finds both
-// curvature and bottlenecks between sheets. A few steps suffice; all balls take theirs together.
+// curvature and bottlenecks between sheets. A few steps suffice; all balls take theirs together;
+// one that M does not enter by more than two hundredths of its radius is settled.
 class ShrinkingBalls {
  public:
   // `longest_edge` by vertex: the sample's local scale, below which an answer says nothing.

@@ -1,0 +1,296 @@
+#include "core/certificate/certifier.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "core/sample/random.h"
+#include "tests/core/certificate/handmade_meshes.h"
+
+namespace stellate::core {
+namespace {
+
+bool Says(const std::string& text, const std::string& words) {
+  return text.find(words) != std::string::npos;
+}
+
+ClosestPoint OnRevolution(double big, double small) {
+  return [big, small](const Eigen::VectorXd& x) { return ClosestOnRevolution(big, small, x); };
+}
+
+HandmadeMesh RevolutionGrid(int n, double big, double small) {
+  return TorusGrid(2, n, [&](const Eigen::VectorXd& a) { return RevolutionPoint(big, small, a); });
+}
+
+// The sphere of radius 1 and another one elsewhere.
+ClosestPoint TwoSpheres(const Eigen::Vector3d& centre, double radius) {
+  return [centre, radius](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+    const Eigen::VectorXd a = x.normalized();
+    const Eigen::VectorXd b = centre + radius * (x - centre).normalized();
+    return (x - a).norm() <= (x - b).norm() ? a : b;
+  };
+}
+
+TEST(Certifier, CertifiesASphere) {
+  const HandmadeMesh mesh = Icosphere(3);
+  const CertifiedRun run = Certify(SpecificationFor(mesh, 0.2), mesh, ClosestOnSphere);
+  const Certificate& c = run.certificate;
+  EXPECT_TRUE(c.certified) << c.verdict;
+  EXPECT_TRUE(c.closed);
+  EXPECT_TRUE(c.links_are_spheres);
+  EXPECT_TRUE(c.links_decided_exactly);
+  EXPECT_TRUE(c.orientable);
+  EXPECT_EQ(c.components, 1u);
+  EXPECT_EQ(c.euler_characteristic, 2);
+  EXPECT_EQ(c.unembedded_stars, 0u);
+  EXPECT_EQ(c.fibre_failures, 0u);
+  EXPECT_GT(c.fibre_samples, 100u);
+  EXPECT_NEAR(c.estimated_reach, 1, 1e-6);
+  EXPECT_NEAR(c.epsilon_over_reach, 0.2, 1e-6);
+  EXPECT_GT(c.min_angle_degrees, 30);
+  EXPECT_LE(c.max_barycentre_distance, 0.2 * 0.2 / 2);
+  EXPECT_GT(c.max_barycentre_distance, 0);
+  EXPECT_TRUE(c.warnings.empty()) << c.warnings.front();
+}
+
+TEST(Certifier, CertifiesATorusWithTheSmallerOfItsTwoReaches) {
+  const HandmadeMesh mesh = RevolutionGrid(48, 1, 0.35);
+  const CertifiedRun run = Certify(SpecificationFor(mesh, 0.1), mesh, OnRevolution(1, 0.35));
+  EXPECT_TRUE(run.certificate.certified) << run.certificate.verdict;
+  EXPECT_EQ(run.certificate.euler_characteristic, 0);
+  EXPECT_TRUE(run.certificate.orientable);
+  EXPECT_NEAR(run.certificate.estimated_reach, 0.35, 0.01);
+}
+
+TEST(Certifier, CertifiesCurvesAndHigherDimensions) {
+  for (const auto& [k, n] : {std::pair{1, 30}, {2, 16}, {3, 12}}) {
+    const HandmadeMesh mesh = TorusGrid(k, n, CliffordPoint);
+    const double epsilon = 1.001 * std::sqrt(k) * std::sin(std::numbers::pi / n);
+    const CertifiedRun run = Certify(SpecificationFor(mesh, epsilon), mesh, ClosestOnClifford);
+    EXPECT_TRUE(run.certificate.certified) << k << ": " << run.certificate.verdict;
+    EXPECT_EQ(run.certificate.euler_characteristic, 0) << k;
+    EXPECT_EQ(run.certificate.components, 1u) << k;
+    EXPECT_TRUE(run.certificate.orientable) << k;
+    EXPECT_TRUE(run.certificate.links_decided_exactly) << k;
+    EXPECT_NEAR(run.certificate.estimated_reach, 1, 0.05) << k;
+  }
+}
+
+TEST(Certifier, DoesNotChangeWithTheUnit) {
+  for (const double scale : {1e-6, 1.0, 1e6}) {
+    HandmadeMesh mesh = Icosphere(2);
+    for (double& x : mesh.points) x *= scale;
+    const auto closest = [scale](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+      return scale * x.normalized();
+    };
+    const CertifiedRun run = Certify(SpecificationFor(mesh, 0.4 * scale), mesh, closest);
+    EXPECT_TRUE(run.certificate.certified) << run.certificate.verdict;
+    EXPECT_NEAR(run.certificate.estimated_reach / scale, 1, 1e-6);
+  }
+}
+
+TEST(Certifier, IsDeterministic) {
+  const HandmadeMesh mesh = RevolutionGrid(48, 1, 0.35);
+  const Specification spec = SpecificationFor(mesh, 0.1);
+  const CertifiedRun a = Certify(spec, mesh, OnRevolution(1, 0.35));
+  const CertifiedRun b = Certify(spec, mesh, OnRevolution(1, 0.35));
+  EXPECT_EQ(a.queries, b.queries);
+  EXPECT_EQ(a.certificate.estimated_reach, b.certificate.estimated_reach);
+  EXPECT_EQ(a.certificate.max_barycentre_distance, b.certificate.max_barycentre_distance);
+  EXPECT_EQ(a.certificate.fibre_samples, b.certificate.fibre_samples);
+}
+
+TEST(Certifier, AsksAboutAsMuchOfALargeMeshAsOfASmallOne) {
+  const HandmadeMesh mesh = Icosphere(6);
+  const CertifiedRun run = Certify(SpecificationFor(mesh, 0.03), mesh, ClosestOnSphere);
+  EXPECT_TRUE(run.certificate.certified) << run.certificate.verdict;
+  EXPECT_LE(run.queries, 5000);
+  EXPECT_LE(run.rounds, 8);
+}
+
+TEST(Certifier, TakesTangentsThatRideAlong) {
+  const HandmadeMesh mesh = Icosphere(3);
+  Specification spec = SpecificationFor(mesh, 0.2);
+  spec.oracle.tangent_basis = true;
+  const CertifiedRun with = Certify(spec, mesh, ClosestOnSphere, {0, 0, true}, Complement);
+  EXPECT_TRUE(with.certificate.certified) << with.certificate.verdict;
+  spec.oracle.tangent_basis = false;
+  const CertifiedRun without = Certify(spec, mesh, ClosestOnSphere);
+  EXPECT_LT(with.queries, without.queries);
+}
+
+TEST(Certifier, ForgivesASmallErrorAndMentionsIt) {
+  const HandmadeMesh mesh = Icosphere(3);
+  const auto noisy = [](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+    Random random(static_cast<std::uint64_t>(1e9 * (x[0] + 3 * x[1] + 7 * x[2])));
+    return x.normalized() * (1 + 0.001 * (random.Uniform() - 0.5));
+  };
+  const CertifiedRun run = Certify(SpecificationFor(mesh, 0.2), mesh, noisy);
+  EXPECT_TRUE(run.certificate.certified) << run.certificate.verdict;
+  ASSERT_EQ(run.certificate.warnings.size(), 1u);
+  EXPECT_TRUE(Says(run.certificate.warnings[0], "tighter tolerance"));
+}
+
+TEST(Certifier, RefusesAMissingTriangle) {
+  HandmadeMesh mesh = Icosphere(3);
+  mesh.RemoveSimplex(17);
+  const Certificate c = Certify(SpecificationFor(mesh, 0.2), mesh, ClosestOnSphere).certificate;
+  EXPECT_FALSE(c.certified);
+  EXPECT_FALSE(c.closed);
+  EXPECT_EQ(c.bad_faces, 3u);
+  EXPECT_EQ(c.bad_links, 3u);
+  EXPECT_EQ(c.unembedded_stars, 3u);
+  EXPECT_TRUE(Says(c.verdict, "not closed")) << c.verdict;
+  EXPECT_TRUE(Says(c.verdict, "is in 1 simplex")) << c.verdict;
+}
+
+TEST(Certifier, RefusesAVertexWithoutSimplices) {
+  HandmadeMesh mesh = Icosphere(3);
+  const Eigen::Vector3d p(0.6, 0.64, 0.48);
+  mesh.AddVertex(p, Complement(p));
+  const Certificate c = Certify(SpecificationFor(mesh, 0.2), mesh, ClosestOnSphere).certificate;
+  EXPECT_FALSE(c.certified);
+  EXPECT_TRUE(Says(c.verdict, "is in no simplex")) << c.verdict;
+}
+
+TEST(Certifier, RefusesADoubledSheet) {
+  HandmadeMesh mesh = Icosphere(3);
+  mesh.Append(Icosphere(3));
+  const Certificate c = Certify(SpecificationFor(mesh, 0.2), mesh, ClosestOnSphere).certificate;
+  EXPECT_TRUE(c.links_are_spheres);
+  EXPECT_EQ(c.components, 2u);
+  EXPECT_FALSE(c.certified);
+  EXPECT_EQ(c.fibre_failures, c.fibre_samples);
+  EXPECT_TRUE(Says(c.verdict, "meets the mesh 2 times")) << c.verdict;
+}
+
+TEST(Certifier, RefusesAFold) {
+  HandmadeMesh mesh = Icosphere(3);
+  // Push vertex 100 over its neighbours along the sphere.
+  std::uint32_t neighbour = 0;
+  for (std::size_t s = 0; s < mesh.size(); ++s) {
+    const std::uint32_t* t = &mesh.simplices[3 * s];
+    if (std::find(t, t + 3, 100u) != t + 3) neighbour = t[0] == 100 ? t[1] : t[0];
+  }
+  const Eigen::VectorXd p =
+      (mesh.Point(100) + 1.5 * (mesh.Point(neighbour) - mesh.Point(100))).normalized();
+  const Eigen::MatrixXd tangent = Complement(p);
+  for (int i = 0; i < 3; ++i) {
+    mesh.points[300 + i] = p[i];
+    for (int a = 0; a < 2; ++a) mesh.tangents[600 + 2 * i + a] = tangent(i, a);
+  }
+  const Certificate c = Certify(SpecificationFor(mesh, 0.6), mesh, ClosestOnSphere).certificate;
+  EXPECT_TRUE(c.links_are_spheres);
+  EXPECT_FALSE(c.certified);
+  EXPECT_GT(c.unembedded_stars, 0u);
+  EXPECT_TRUE(Says(c.verdict, "the star of vertex")) << c.verdict;
+}
+
+TEST(Certifier, RefusesAMissingComponent) {
+  const HandmadeMesh mesh = Icosphere(3);
+  const auto closest = TwoSpheres({5, 0, 0}, 1);
+  Specification spec = SpecificationFor(mesh, 0.2);
+  spec.bounding_box =
+      BoundingBox{Eigen::Vector3d(-1.5, -1.5, -1.5), Eigen::Vector3d(6.5, 1.5, 1.5)};
+  const Certificate by_box = Certify(spec, mesh, closest).certificate;
+  EXPECT_FALSE(by_box.certified);
+  EXPECT_TRUE(Says(by_box.verdict, "misses a part")) << by_box.verdict;
+
+  spec.bounding_box.reset();
+  spec.seeds = Eigen::Vector3d(6.1, 0, 0);
+  const Certificate by_seed = Certify(spec, mesh, closest).certificate;
+  EXPECT_FALSE(by_seed.certified);
+  EXPECT_TRUE(Says(by_seed.verdict, "misses a part")) << by_seed.verdict;
+}
+
+TEST(Certifier, RefusesAMissingSheetNearby) {
+  const HandmadeMesh mesh = Icosphere(3);
+  const Certificate c =
+      Certify(SpecificationFor(mesh, 0.2), mesh, TwoSpheres({0, 0, 0}, 1.25)).certificate;
+  EXPECT_FALSE(c.certified);
+}
+
+TEST(Certifier, RefusesASphereThatStandsForATorus) {
+  HandmadeMesh mesh = Icosphere(2);
+  const auto closest = OnRevolution(1, 0.3);
+  for (std::uint32_t v = 0; v < mesh.vertices(); ++v) {
+    const Eigen::VectorXd p = closest(mesh.Point(v) + Eigen::Vector3d(0.01, 0.02, 0));
+    const Eigen::VectorXd ring = Eigen::Vector3d(p[0], p[1], 0).normalized();
+    const Eigen::MatrixXd tangent = Complement((p - ring).normalized());
+    for (int i = 0; i < 3; ++i) {
+      mesh.points[3 * v + i] = p[i];
+      for (int a = 0; a < 2; ++a) mesh.tangents[6 * v + 2 * i + a] = tangent(i, a);
+    }
+  }
+  const Certificate c = Certify(SpecificationFor(mesh, 1.2), mesh, closest).certificate;
+  EXPECT_TRUE(c.links_are_spheres);
+  EXPECT_EQ(c.euler_characteristic, 2);
+  EXPECT_FALSE(c.certified);
+  EXPECT_GT(c.epsilon_over_reach, 3);
+  ASSERT_FALSE(c.warnings.empty());
+  EXPECT_TRUE(Says(c.warnings.back(), "times the estimated reach")) << c.warnings.back();
+}
+
+TEST(Certifier, WarnsWhenEpsilonIsCoarseForTheReach) {
+  const HandmadeMesh mesh = Icosphere(3);
+  const Certificate c = Certify(SpecificationFor(mesh, 0.9), mesh, ClosestOnSphere).certificate;
+  EXPECT_TRUE(c.certified) << c.verdict;
+  ASSERT_EQ(c.warnings.size(), 1u);
+  EXPECT_TRUE(Says(c.warnings[0], "epsilon is 0.9 times the estimated reach")) << c.warnings[0];
+}
+
+TEST(Certifier, RefusesVerticesOffTheManifold) {
+  const HandmadeMesh mesh = Icosphere(3);
+  const auto lying = [](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+    return 1.1 * x.normalized();
+  };
+  const Certificate c = Certify(SpecificationFor(mesh, 0.2), mesh, lying).certificate;
+  EXPECT_FALSE(c.certified);
+  EXPECT_TRUE(Says(c.verdict, "is not on the manifold")) << c.verdict;
+}
+
+TEST(Certifier, RefusesAnOracleThatFindsNothing) {
+  const HandmadeMesh mesh = Icosphere(3);
+  const auto mute = [](const Eigen::VectorXd&) { return Eigen::VectorXd(); };
+  const Certificate c = Certify(SpecificationFor(mesh, 0.2), mesh, mute).certificate;
+  EXPECT_FALSE(c.certified);
+  EXPECT_TRUE(Says(c.verdict, "no closest point")) << c.verdict;
+}
+
+TEST(Certifier, RefusesSimplicesLargerThanEpsilon) {
+  const HandmadeMesh mesh = Icosphere(3);
+  const Certificate c = Certify(SpecificationFor(mesh, 0.05), mesh, ClosestOnSphere).certificate;
+  EXPECT_FALSE(c.certified);
+  EXPECT_TRUE(Says(c.verdict, "more than epsilon = 0.05")) << c.verdict;
+}
+
+TEST(Certifier, RefusesWhatTheStarsSay) {
+  const HandmadeMesh mesh = Icosphere(3);
+  const Specification spec = SpecificationFor(mesh, 0.2);
+  const Certificate inconsistent = Certify(spec, mesh, ClosestOnSphere, {3, 0, true}).certificate;
+  EXPECT_FALSE(inconsistent.certified);
+  EXPECT_TRUE(Says(inconsistent.verdict, "3 simplices are in the star")) << inconsistent.verdict;
+  const Certificate unfinished = Certify(spec, mesh, ClosestOnSphere, {0, 0, false}).certificate;
+  EXPECT_FALSE(unfinished.certified);
+  EXPECT_TRUE(Says(unfinished.verdict, "rules still applied")) << unfinished.verdict;
+  const Certificate large = Certify(spec, mesh, ClosestOnSphere, {0, 0.3, true}).certificate;
+  EXPECT_FALSE(large.certified);
+  EXPECT_EQ(large.max_circumradius, 0.3);
+}
+
+TEST(Certifier, RefusesMalformedMeshesWithoutAsking) {
+  HandmadeMesh mesh = Icosphere(3);
+  mesh.simplices[5] = 100000;
+  const CertifiedRun bad_id = Certify(SpecificationFor(mesh, 0.2), mesh, ClosestOnSphere);
+  EXPECT_FALSE(bad_id.certificate.certified);
+  EXPECT_EQ(bad_id.rounds, 0);
+  EXPECT_TRUE(Says(bad_id.certificate.verdict, "100000")) << bad_id.certificate.verdict;
+
+  mesh.simplices.clear();
+  const CertifiedRun empty = Certify(SpecificationFor(mesh, 0.2), mesh, ClosestOnSphere);
+  EXPECT_FALSE(empty.certificate.certified);
+  EXPECT_EQ(empty.rounds, 0);
+}
+
+}  // namespace
+}  // namespace stellate::core
