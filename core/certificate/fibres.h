@@ -1,12 +1,13 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "core/certificate/certifier.h"
 #include "core/certificate/topology.h"
 #include "core/sample/ball_tree.h"
+#include "core/specification.h"
 
 namespace stellate::core {
 
@@ -28,11 +29,20 @@ class Fibres {
   // is d x k, orthonormal. When the flat passes so close to the boundary of a simplex that
   // rounding would decide, parallel ones, at most 0.02 reach_out to the side, are tried; -1 if
   // all of them do so too.
-  int CountHits(const double* x, const double* tangent, std::uint64_t random_key) const;
+  int CountHits(const double* x, const double* tangent, std::uint64_t random_key);
 
  private:
-  int CountHitsOnce(const double* x, const double* tangent,
-                    const std::vector<std::uint32_t>& nearby) const;
+  // A mesh vertex near x, its tangent coordinates relative to x.
+  struct NearVertex {
+    std::uint32_t id = 0;
+    std::array<double, kMaxDimension> flat{};
+  };
+
+  void Gather(const double* x, const double* tangent);
+  int CountHitsBeside(const double* x, const std::array<double, kMaxDimension>& shift) const;
+  // Is the simplex's point with these barycentric coordinates within reach_out of x?
+  bool IsWithinReach(const double* x, const std::uint32_t* ids, double first,
+                     const std::array<double, kMaxDimension>& others) const;
 
   const MeshView& mesh_;
   const Adjacency& adjacency_;
@@ -40,6 +50,8 @@ class Fibres {
   const double search_radius_;
   std::vector<double> coordinates_;
   BallTree tree_;
+  std::vector<NearVertex> near_;
+  std::vector<std::uint32_t> place_;  // by vertex: its place in near_, plus one; 0 if not there
 };
 
 }  // namespace stellate::core

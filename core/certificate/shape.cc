@@ -9,10 +9,28 @@
 #include "core/specification.h"
 
 namespace stellate::core {
+namespace {
+
+// Are all eigenvalues of the tilt below `bound`? Cholesky's factorisation of the difference.
+bool TiltsLess(const TiltMatrix& tilt, int k, double bound) {
+  TiltMatrix a = -tilt;
+  for (int i = 0; i < k; ++i) a(i, i) += bound;
+  for (int c = 0; c < k; ++c) {
+    if (!(a(c, c) > 0)) return false;
+    for (int r = c + 1; r < k; ++r) {
+      const double factor = a(r, c) / a(c, c);
+      for (int j = c + 1; j < k; ++j) a(r, j) -= factor * a(c, j);
+    }
+  }
+  return true;
+}
+
+}  // namespace
 
 MeshShape MeasureShape(const MeshView& mesh, const SimplexList& list) {
   const int k = mesh.k;
   const int d = mesh.d;
+  constexpr double kNegligible = 1e-14;  // difference of squared sines
   constexpr double kDegrees = 180 / std::numbers::pi;
   MeshShape shape;
   shape.diameters.resize(list.size());
@@ -37,10 +55,17 @@ MeshShape MeasureShape(const MeshView& mesh, const SimplexList& list) {
     double tilt = 0;
     for (int i = 0; i <= k; ++i) {
       const double* tangent = mesh.tangents + std::size_t{list[s][i]} * d * k;
-      const double bound = SumOfSquaredSines(frame, k, d, tangent, k);
-      tilt = std::max(tilt, bound);
+      if (frame.rank < k) {
+        tilt = k;
+        largest_sine2 = 1;
+        continue;
+      }
+      const TiltMatrix matrix = MeasureTilt(frame, k, d, tangent, k);
+      double sum = 0;
+      for (int a = 0; a < k; ++a) sum += matrix(a, a);
+      tilt = std::max(tilt, sum);
       // The angle itself is dearer, and seldom a new maximum.
-      if (bound <= largest_sine2) continue;
+      if (TiltsLess(matrix, k, largest_sine2 + kNegligible)) continue;
       const double sine = std::sin(AngleToTangent(frame, k, d, tangent, k));
       largest_sine2 = std::max(largest_sine2, sine * sine);
     }

@@ -157,18 +157,23 @@ bool ContainsSliver(SimplexVertices vertices, int d, double theta0) {
          });
 }
 
-double SumOfSquaredSines(const SimplexFrame& frame, int j, int d, const double* tangent, int k) {
-  if (frame.rank < j) return j;
-  double cosines2 = 0;
+TiltMatrix MeasureTilt(const SimplexFrame& frame, int j, int d, const double* tangent, int k) {
+  std::array<std::array<double, kMaxSimplexDimension>, kMaxSimplexDimension> cosines{};
   for (int a = 0; a < j; ++a) {
     const double* q = frame.directions.data() + a * d;
-    std::array<double, kMaxSimplexDimension> along{};
     for (int i = 0; i < d; ++i) {
-      for (int b = 0; b < k; ++b) along[b] += tangent[i * k + b] * q[i];
+      for (int b = 0; b < k; ++b) cosines[a][b] += tangent[i * k + b] * q[i];
     }
-    for (int b = 0; b < k; ++b) cosines2 += along[b] * along[b];
   }
-  return std::max(0.0, j - cosines2);
+  TiltMatrix tilt = TiltMatrix::Zero();
+  for (int a = 0; a < j; ++a) {
+    for (int b = 0; b <= a; ++b) {
+      double dot = 0;
+      for (int c = 0; c < k; ++c) dot += cosines[a][c] * cosines[b][c];
+      tilt(a, b) = tilt(b, a) = (a == b ? 1 : 0) - dot;
+    }
+  }
+  return tilt;
 }
 
 double AngleToTangent(const SimplexFrame& frame, int j, int d, const double* tangent, int k) {

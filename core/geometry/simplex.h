@@ -68,9 +68,12 @@ SimplexMeasures MeasureSimplex(SimplexVertices vertices, int d, const SimplexFra
 double AngleToTangent(SimplexVertices vertices, int d, const double* tangent, int k);
 double AngleToTangent(const SimplexFrame& frame, int j, int d, const double* tangent, int k);
 
-// Sum over the principal angles of their squared sines: at least the squared sine of
-// AngleToTangent, at most j times that, and much cheaper. j when degenerate.
-double SumOfSquaredSines(const SimplexFrame& frame, int j, int d, const double* tangent, int k);
+// I - (T^t Q)^t (T^t Q) in its upper left j x j block, Q being the frame's directions: its
+// eigenvalues are the squared sines of the principal angles, to about 1e-15. A cheap way to tell
+// that a simplex tilts less than some angle; AngleToTangent resolves small angles better.
+// REQUIRES: frame.rank == j.
+using TiltMatrix = Eigen::Matrix<double, kMaxSimplexDimension, kMaxSimplexDimension>;
+TiltMatrix MeasureTilt(const SimplexFrame& frame, int j, int d, const double* tangent, int k);
 
 // Smallest angle of a triangle, radians; 0 when degenerate.
 double SmallestTriangleAngle(SimplexVertices vertices, int d);

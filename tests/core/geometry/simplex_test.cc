@@ -208,7 +208,7 @@ TEST(AngleToTangent, IsTheTiltOfATiltedSimplex) {
       EXPECT_NEAR(AngleToTangent(simplex, d, basis.data(), j), angle, 1e-12) << j;
       const double expected =
           std::pow(std::sin(angle), 2) + (j > 1 ? std::pow(std::sin(angle / 2), 2) : 0);
-      EXPECT_NEAR(SumOfSquaredSines(FrameSimplex(simplex, d), j, d, basis.data(), j), expected,
+      EXPECT_NEAR(MeasureTilt(FrameSimplex(simplex, d), j, d, basis.data(), j).trace(), expected,
                   1e-12);
     }
   }
