@@ -1,0 +1,76 @@
+#include "core/certificate/star_geometry.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/core/certificate/handmade_meshes.h"
+
+namespace stellate::core {
+namespace {
+
+StarGeometry Measure(const HandmadeMesh& mesh) {
+  return MeasureStars(mesh.View(), Adjacency(mesh.List()));
+}
+
+// A star of six triangles round vertex 0 that goes round `turns` times.
+HandmadeMesh Umbrella(int turns) {
+  HandmadeMesh mesh;
+  const Eigen::MatrixXd plane = Eigen::MatrixXd::Identity(3, 2);
+  mesh.AddVertex(Eigen::Vector3d::Zero(), plane);
+  for (int i = 0; i < 6; ++i) {
+    const double angle = 2 * std::numbers::pi * turns * i / 6;
+    mesh.AddVertex(Eigen::Vector3d(std::cos(angle), std::sin(angle), 0.01 * i), plane);
+  }
+  for (std::uint32_t i = 0; i < 6; ++i) mesh.AddSimplex({0, 1 + i, 1 + (i + 1) % 6});
+  return mesh;
+}
+
+TEST(MeasureStars, GoodMeshesAreEmbeddedInEveryDimension) {
+  for (int k = 1; k <= 5; ++k) {
+    EXPECT_EQ(Measure(SimplexBoundary(k)).unembedded_stars, 0u) << k;
+  }
+  for (const auto& [k, n] : {std::pair{1, 9}, {2, 9}, {3, 8}, {4, 6}}) {
+    const StarGeometry stars = Measure(TorusGrid(k, n, CliffordPoint));
+    EXPECT_EQ(stars.unembedded_stars, 0u) << k << stars.first_unembedded;
+  }
+}
+
+TEST(MeasureStars, AStarThatGoesRoundTwiceIsNotEmbedded) {
+  // Only the rim's vertices have a boundary.
+  EXPECT_EQ(Measure(Umbrella(1)).first_unembedded, "the star of vertex 1 has a boundary");
+  EXPECT_EQ(Measure(Umbrella(2)).first_unembedded,
+            "the star of vertex 0 covers some directions of its tangent space more than once");
+}
+
+TEST(MeasureStars, AFoldedStarIsNotEmbedded) {
+  HandmadeMesh mesh = Umbrella(1);
+  std::swap_ranges(&mesh.points[3], &mesh.points[6], &mesh.points[6]);
+  EXPECT_EQ(Measure(mesh).first_unembedded,
+            "the star of vertex 0 folds over itself in its tangent space");
+}
+
+TEST(MeasureStars, AStarSeenEdgeOnIsNotEmbedded) {
+  HandmadeMesh mesh = SimplexBoundary(2);
+  // The tangent plane of vertex 0 turned to hold its normal and one of its triangles' edges.
+  const Eigen::Vector3d normal = mesh.Point(0);
+  const Eigen::Vector3d along = Eigen::Vector3d(mesh.Point(1) - mesh.Point(0));
+  const Eigen::Vector3d other = normal.cross(along).normalized();
+  for (int i = 0; i < 3; ++i) {
+    mesh.tangents[2 * i] = normal[i];
+    mesh.tangents[2 * i + 1] = other[i];
+  }
+  EXPECT_EQ(Measure(mesh).unembedded_stars, 1u);
+}
+
+TEST(MeasureStars, TheReachOfAUnitSphereIsOne) {
+  for (int k = 1; k <= 5; ++k) EXPECT_NEAR(Measure(SimplexBoundary(k)).reach, 1, 1e-12) << k;
+  EXPECT_NEAR(Measure(Icosphere(4)).reach, 1, 1e-9);
+}
+
+TEST(MeasureStars, KnowsTheLongestEdges) {
+  for (const double edge : Measure(CrossPolytope(2)).longest_edge) {
+    EXPECT_NEAR(edge, std::sqrt(2.0), 1e-14);
+  }
+}
+
+}  // namespace
+}  // namespace stellate::core
