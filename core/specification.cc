@@ -127,7 +127,7 @@ Status CheckCriteria(const Criteria& c) {
   }
   if (c.advance_step && !IsLength(*c.advance_step)) {
     return Invalid(Message("criteria.advance_step (h) is ", *c.advance_step, " but must be ",
-                           LengthRule(), ": leave it unset for 3 epsilon"));
+                           LengthRule(), ": leave it unset for the default"));
   }
   if (c.flat_alternations < 1 || c.flat_alternations > kMaxFlatAlternations) {
     return Invalid(Message("criteria.flat_alternations is ", c.flat_alternations,
