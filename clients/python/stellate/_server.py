@@ -19,7 +19,8 @@ _STOP_SECONDS = 10.0
 _LONGEST_SOCKET_PATH = 100  # the kernel takes 107 bytes
 # Over a unix socket the end of a client shows at once. One that answers no pings is merely busy in
 # an oracle that does not let go of the interpreter.
-_PRIVATE_FLAGS = ("--keepalive", "600", "--keepalive-timeout", "600")
+# When its client goes there is nobody left to finish a mesh for.
+_PRIVATE_FLAGS = ("--keepalive", "600", "--keepalive-timeout", "600", "--drain-seconds", "0")
 
 
 def find_stellated() -> str:

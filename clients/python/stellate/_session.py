@@ -17,7 +17,7 @@ from .report import Progress, Report
 
 OnProgress = Callable[[Progress], None]
 
-_FAREWELL_SECONDS = 5.0  # that an oracle may take to come to an end when nobody waits for it
+_FAREWELL_SECONDS = 2.0  # that an oracle may take to come to an end when nobody waits for it
 _RECONNECT_PAUSES = (0.1, 0.5, 1.0, 2.0, 4.0)
 
 
@@ -27,7 +27,9 @@ class _Workers:
     def __init__(self, client: Client, oracle: CheckedOracle, mesh: str, count: int) -> None:
         self.failure: BaseException | None = None
         self._stopping = threading.Event()
-        self._workers = [client.worker(oracle, mesh, f"python-{i + 1}") for i in range(count)]
+        self._workers = [
+            client.worker(oracle, mesh, f"python-{i + 1}", self._note) for i in range(count)
+        ]
         self._threads = [
             threading.Thread(target=self._run, args=(worker,), name=f"oracle-{i + 1}", daemon=True)
             for i, worker in enumerate(self._workers)
@@ -44,15 +46,13 @@ class _Workers:
                 # The watch notices a server that is gone for good, and says so.
                 if pause is None or self._stopping.wait(pause):
                     return
-            except StellateError as error:
-                # The server's refusals end the mesh, which the watch reports; ours come first.
-                if self.failure is None and "grpc_code" not in error.details:
-                    self.failure = error
+            except BaseException:
+                # What the oracle raised is noted, and what the server refuses the watch reports.
                 return
-            except BaseException as error:  # the oracle's own, whatever it is
-                if self.failure is None:
-                    self.failure = error
-                return
+
+    def _note(self, error: BaseException) -> None:
+        if self.failure is None:
+            self.failure = error
 
     def stop(self) -> None:
         self._stopping.set()

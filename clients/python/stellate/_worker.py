@@ -5,14 +5,14 @@ from __future__ import annotations
 import queue
 import threading
 import traceback
-from typing import Any, Iterator
+from typing import Any, Callable, Iterator
 
 import grpc
 
 from ._arrays import from_wire, to_wire
 from ._generated import oracle_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
-from .errors import from_rpc
+from .errors import InvalidArgument, from_rpc
 from .oracle import CheckedOracle
 
 _ANSWER_BYTES = 3_000_000  # an answer has to stay below the server's 4 MB
@@ -42,8 +42,16 @@ def answer(oracle: CheckedOracle, chunk: pb.QueryChunk) -> pb.AnswerChunk:
 class Worker:
     """Serves one mesh until it is over, or stop() is called."""
 
-    def __init__(self, stub: rpc.StellateStub, oracle: CheckedOracle, mesh: str, name: str) -> None:
-        self._stub, self._oracle = stub, oracle
+    def __init__(
+        self,
+        stub: rpc.StellateStub,
+        oracle: CheckedOracle,
+        mesh: str,
+        name: str,
+        on_failure: Callable[[BaseException], None] = lambda error: None,
+    ) -> None:
+        """`on_failure` is told what the oracle raised before the server is."""
+        self._stub, self._oracle, self._on_failure = stub, oracle, on_failure
         per_query = 8 * oracle.ambient_dimension * (oracle.dimension + 1) + 1
         self._hello = pb.Hello(
             mesh=mesh, worker=name, max_chunk_queries=max(1, _ANSWER_BYTES // per_query)
@@ -87,13 +95,39 @@ class Worker:
                     if isinstance(error, KeyboardInterrupt):
                         self._call.cancel()  # no failure of the oracle: another may go on
                         raise
+                    self._on_failure(error)
                     self._tell(requests, response.queries.lease, error)
                     raise
                 requests.put(pb.ServeOracleRequest(answers=reply))
+            elif kind == "welcome":
+                self._compare(response.welcome)
             elif kind == "over":
-                state = response.over.state
+                state = response.over.state.removeprefix("MESH_STATE_")
                 requests.put(None)
         return state
+
+    def _compare(self, welcome: pb.Welcome) -> None:
+        """Leaves the mesh alone if this oracle is not of its kind."""
+        mine = self._oracle
+        wanted = (welcome.dimension, welcome.ambient_dimension)
+        have = (mine.dimension, mine.ambient_dimension)
+        missing = [
+            name
+            for name, asked, able in (
+                ("intersect_flat", welcome.oracle.intersect_flat, mine.has_intersect_flat),
+                ("tangent_basis", welcome.oracle.tangent_basis, mine.has_tangent_basis),
+            )
+            if asked and not able
+        ]
+        problem = ""
+        if wanted != have:
+            problem = f"the mesh has dimension {wanted[0]} in R^{wanted[1]}, and this oracle's "
+            problem += f"manifold has dimension {have[0]} in R^{have[1]}"
+        elif missing:
+            problem = f"the mesh was declared with {' and '.join(missing)}, which this oracle lacks"
+        if problem:
+            self._call.cancel()
+            raise InvalidArgument(f"{problem}: all workers of a mesh have to serve one manifold")
 
     def _tell(
         self,

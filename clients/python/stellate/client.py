@@ -161,12 +161,18 @@ class Client:
 
         Raises: what the oracle raises, or StellateError.
         """
-        checked = oracle if isinstance(oracle, CheckedOracle) else CheckedOracle(oracle)
-        return self.worker(checked, name, worker).run()
+        return self.worker(oracle, name, worker).run()
 
-    def worker(self, oracle: CheckedOracle, name: str, worker: str = "") -> Worker:
-        """A worker for a thread of its own."""
-        return Worker(self._stub, oracle, name, worker)
+    def worker(
+        self,
+        oracle: Any,
+        name: str,
+        worker: str = "",
+        on_failure: Callable[[BaseException], None] = lambda error: None,
+    ) -> Worker:
+        """A worker for a thread of its own; `on_failure` is told of an exception of the oracle."""
+        checked = oracle if isinstance(oracle, CheckedOracle) else CheckedOracle(oracle)
+        return Worker(self._stub, checked, name, worker, on_failure)
 
     def watch(self, name: str, from_revision: int = 0, progress_only: bool = False) -> Watch:
         """The mesh's events as they come, in the protocol's own messages."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import re
+import textwrap
 from typing import Any
 
 from ._generated import mesh_pb2 as pb
@@ -99,6 +101,8 @@ class Failure:
     message: str
 
 
+_TITLE_WIDTH = 13
+_REPORT_WIDTH = 100
 _TERMINATIONS = {
     "CONVERGED": "converged: no refinement rule applies any more",
     "VERTEX_BUDGET": "stopped: max_vertices is spent",
@@ -159,13 +163,20 @@ class Report:
         ]
         if self.failure is not None:
             lines.append(("failure", f"{self.failure.reason}: {self.failure.message}"))
-        lines.append(
-            ("certificate", ("CERTIFIED. " if c.certified else "NOT CERTIFIED. ") + c.verdict)
-        )
+        mark = "CERTIFIED" if c.certified else "NOT CERTIFIED"
+        verdict = re.sub(r"^(not )?certified\W+", "", c.verdict, flags=re.IGNORECASE)
+        lines.append(("certificate", f"{mark}: {verdict}" if verdict else mark))
         if c.components:
             lines += _certificate_lines(c)
         lines += [("warning", text) for text in c.warnings]
-        return "\n".join(f"{title:>13}  {text}" for title, text in lines)
+        return "\n".join(_entry(title, text) for title, text in lines)
+
+
+def _entry(title: str, text: str) -> str:
+    indent = " " * (_TITLE_WIDTH + 2)
+    return textwrap.fill(
+        text, _REPORT_WIDTH, initial_indent=f"{title:>{_TITLE_WIDTH}}  ", subsequent_indent=indent
+    )
 
 
 def _certificate_lines(c: Certificate) -> list[tuple[str, str]]:

@@ -45,6 +45,7 @@ class FakeServer(rpc.StellateServicer):
     def __init__(self, streams=(), chunks=()):
         self.streams, self.chunks = list(streams), list(chunks)
         self.answers, self.watched_from, self.deleted = [], [], []
+        self.welcome = oracle_pb2.Welcome(dimension=1, ambient_dimension=2)
 
     def CreateMesh(self, request, context):
         return mesh_pb2.Mesh(name="meshes/x", spec=request.spec)
@@ -59,11 +60,11 @@ class FakeServer(rpc.StellateServicer):
     def ServeOracle(self, requests, context):
         hello = next(requests).hello
         self.hello = hello
-        yield oracle_pb2.ServeOracleResponse(welcome=oracle_pb2.Welcome())
+        yield oracle_pb2.ServeOracleResponse(welcome=self.welcome)
         for chunk in self.chunks:
             yield oracle_pb2.ServeOracleResponse(queries=chunk)
             self.answers.append(next(requests))
-        yield oracle_pb2.ServeOracleResponse(over=oracle_pb2.MeshOver(state="SUCCEEDED"))
+        yield oracle_pb2.ServeOracleResponse(over=oracle_pb2.MeshOver(state="MESH_STATE_SUCCEEDED"))
 
     def DeleteMesh(self, request, context):
         from google.protobuf import empty_pb2

@@ -72,6 +72,18 @@ def test_answers_carry_the_lease_and_the_hello_bounds_the_chunks():
     assert fake.hello.max_chunk_queries * (2 + 2) * 8 < 4 << 20
 
 
+def test_a_mesh_of_another_kind_is_not_served():
+    fake = FakeServer(chunks=[oracle_pb2.QueryChunk()])
+    with serving(fake) as address:
+        with pytest.raises(stellate.InvalidArgument, match=r"dimension 1 in R\^2.*2 in R\^3"):
+            stellate.serve(Sphere(2), "meshes/x", server=address)
+        fake.welcome.oracle.intersect_flat = True
+        with pytest.raises(
+            stellate.InvalidArgument, match="intersect_flat, which this oracle lacks"
+        ):
+            stellate.serve(CIRCLE, "meshes/x", server=address)
+
+
 def test_an_unknown_question_is_not_answered_with_nonsense():
     fake = FakeServer(chunks=[oracle_pb2.QueryChunk(lease=1, kind=9, points=to_wire(TRIANGLE))])
     with serving(fake) as address:

@@ -65,7 +65,9 @@ def report(certified):
     message.counts.vertices = 1234
     certificate = message.certificate
     certificate.certified = certified
-    certificate.verdict = "a closed 2-manifold" if certified else "3 links are not spheres"
+    certificate.verdict = (
+        "Certified: a closed 2-manifold" if certified else "3 links are not spheres"
+    )
     certificate.closed = True
     certificate.bad_links = 0 if certified else 3
     certificate.links_are_spheres = certified
@@ -76,7 +78,7 @@ def report(certified):
 
 def test_a_report_reads_well():
     text = str(report(True))
-    assert "CERTIFIED. a closed 2-manifold" in text and "NOT CERTIFIED" not in text
+    assert "CERTIFIED: a closed 2-manifold" in text and "NOT CERTIFIED" not in text
     assert "1,234 vertices" in text and "Euler characteristic -8" in text
     assert "warning  epsilon is coarse" in text
     assert report(True).certified and report(True).warnings == ("epsilon is coarse",)
@@ -84,8 +86,16 @@ def test_a_report_reads_well():
 
 def test_a_bad_mesh_is_called_bad():
     text = str(report(False))
-    assert "NOT CERTIFIED. 3 links are not spheres" in text and "3 links are not spheres" in text
+    assert "NOT CERTIFIED: 3 links are not spheres" in text
     assert not report(False).certified
+
+
+def test_long_lines_are_folded_under_their_title():
+    message = mesh_pb2.Report()
+    message.certificate.verdict = "not certified: " + "word " * 60
+    lines = str(stellate.Report.from_wire(message)).splitlines()
+    assert max(map(len, lines)) <= 100
+    assert "NOT CERTIFIED: word word" in lines[-4] and lines[-1].startswith(" " * 15 + "word")
 
 
 def test_a_failure_is_told():

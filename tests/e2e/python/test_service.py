@@ -1,5 +1,6 @@
 """Watching, cancelling, several workers, and the embedded server."""
 
+import contextlib
 import os
 import pathlib
 import signal
@@ -14,6 +15,13 @@ import topology
 
 import stellate
 from stellate import manifolds
+
+
+@pytest.fixture(autouse=True)
+def no_leftovers(client):
+    yield
+    for info in client.list():
+        client.delete(info.name)
 
 
 class Gate(manifolds.Torus):
@@ -89,7 +97,7 @@ def test_cancelled_by_another_client(client, server):
         except stellate.Cancelled as error:
             result.append(error)
 
-    thread = threading.Thread(target=run)
+    thread = threading.Thread(target=run, daemon=True)
     thread.start()
     gate.waiting.wait()
     (info,) = client.list()
@@ -110,7 +118,7 @@ def test_watched_by_name_from_the_beginning_by_many(client, server):
         *_, last = stellate.watch(info.name, server=server)
         results.append(last)
 
-    watchers = [threading.Thread(target=watch) for _ in range(3)]
+    watchers = [threading.Thread(target=watch, daemon=True) for _ in range(3)]
     for thread in watchers[:2]:
         thread.start()
     assert stellate.serve(oracle, info.name, server=server) == "SUCCEEDED"
@@ -136,10 +144,8 @@ def test_a_worker_that_leaves_mid_round_is_replaced(client):
     expected = stellate.mesh(manifolds.Torus(), 0.15, server=client)
     gate = Gate()
     info = client.create(gate, 0.15)
-    from stellate.oracle import CheckedOracle
-
-    leaving = client.worker(CheckedOracle(gate), info.name, "leaving")
-    thread = threading.Thread(target=leaving.run)
+    leaving = client.worker(gate, info.name, "leaving")
+    thread = threading.Thread(target=leaving.run, daemon=True)
     thread.start()
     gate.waiting.wait()
     leaving.stop()
@@ -225,30 +231,34 @@ except KeyboardInterrupt:
 """
 
 
-def run_program(repository, server):
+@contextlib.contextmanager
+def running_program(repository, server):
     package = str(repository / "clients" / "python")
     code = PROGRAM.format(package=package, server=repr(server) if server else None)
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
-    assert process.stdout.readline() == "running\n"
-    return process
+    try:
+        assert process.stdout.readline() == "running\n"
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
 
 
 def test_ctrl_c_cancels_the_mesh(repository, server, client):
-    process = run_program(repository, server.address)
-    assert len(list(client.list())) == 1
-    process.send_signal(signal.SIGINT)
-    assert process.communicate()[0] == "interrupted\n"
-    assert process.returncode == 0
+    with running_program(repository, server.address) as process:
+        assert len(list(client.list())) == 1
+        process.send_signal(signal.SIGINT)
+        assert process.stdout.read() == "interrupted\n"
+        assert process.wait() == 0
     assert list(client.list()) == []
 
 
 def test_a_client_that_is_killed_takes_its_server_with_it(repository):
-    process = run_program(repository, None)
-    listed = pathlib.Path(f"/proc/{process.pid}/task").glob("*/children")
-    (server_pid,) = {pid for path in listed for pid in path.read_text().split()}
-    process.kill()
-    process.communicate()
-    while pathlib.Path(f"/proc/{server_pid}/cmdline").exists():
-        if not pathlib.Path(f"/proc/{server_pid}/cmdline").read_bytes():
-            break  # ended, and not yet fetched by its new parent
-        time.sleep(0.01)
+    with running_program(repository, None) as process:
+        listed = pathlib.Path(f"/proc/{process.pid}/task").glob("*/children")
+        (server_pid,) = {pid for path in listed for pid in path.read_text().split()}
+    command_line = pathlib.Path(f"/proc/{server_pid}/cmdline")
+    with contextlib.suppress(OSError):  # gone between two looks
+        while command_line.read_bytes():  # empty once it ended and waits for its new parent
+            time.sleep(0.01)
