@@ -46,7 +46,7 @@ grpc::ServerUnaryReactor* Reply(grpc::CallbackServerContext* context, ServerStat
     reactor->Finish(Refusal(v1::ERROR_REASON_LIMIT_EXCEEDED, "the server is out of memory"));
   } catch (const std::exception& error) {
     Log(LogLevel::kError, {}, Message("a handler failed: ", error.what()));
-    reactor->Finish(grpc::Status(grpc::StatusCode::INTERNAL, "a fault of the server"));
+    reactor->Finish(Refusal(v1::ERROR_REASON_INTERNAL, "a fault of the server: see its log"));
   }
   return reactor;
 }
