@@ -1,0 +1,182 @@
+#include "core/sample/ball_tree.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "core/sample/random.h"
+
+namespace stellate::core {
+namespace {
+
+using Ids = std::vector<std::uint32_t>;
+
+// A tree with the plain list of all it should know beside it.
+class BallTreeTest : public ::testing::TestWithParam<int> {
+ protected:
+  BallTreeTest() : d_(GetParam()), random_(77, static_cast<std::uint64_t>(GetParam())) {}
+
+  // Points lie in the unit cube and, every third, in a small cluster: leaves of all sizes.
+  std::vector<double> Draw() {
+    const bool clustered = random_.Next() % 3 == 0;
+    std::vector<double> x(static_cast<std::size_t>(d_));
+    for (double& c : x) c = clustered ? 0.25 + 0.01 * random_.Uniform() : random_.Uniform();
+    return x;
+  }
+
+  double DrawInfluence() { return random_.Uniform() * 0.3 * std::sqrt(d_); }
+
+  void Insert(const std::vector<double>& x, double influence) {
+    coordinates_.insert(coordinates_.end(), x.begin(), x.end());
+    influence_.push_back(influence);
+    tree_.Insert(influence);
+  }
+
+  void SetInfluence(std::uint32_t id, double influence) {
+    influence_[id] = influence;
+    tree_.SetInfluence(id, influence);
+  }
+
+  double SquaredDistanceTo(std::uint32_t id, const std::vector<double>& q) const {
+    return SquaredDistance(q.data(), coordinates_.data() + id * q.size(), d_);
+  }
+
+  template <typename Keep>
+  Ids All(Keep&& keep) const {
+    Ids ids;
+    for (std::uint32_t id = 0; id < influence_.size(); ++id)
+      if (keep(id)) ids.push_back(id);
+    return ids;
+  }
+
+  void CheckQueriesFrom(const std::vector<double>& q) {
+    Ids got;
+    tree_.ForEachInfluencing(q.data(), [&](std::uint32_t id) { got.push_back(id); });
+    std::sort(got.begin(), got.end());
+    EXPECT_EQ(got, All([&](std::uint32_t id) {
+                return SquaredDistanceTo(id, q) < influence_[id] * influence_[id];
+              }));
+
+    const double radius = DrawInfluence();
+    got.clear();
+    tree_.VisitNear(
+        q.data(), [&] { return radius; },
+        [&](std::uint32_t id, double d2) {
+          EXPECT_EQ(d2, SquaredDistanceTo(id, q));
+          got.push_back(id);
+        });
+    std::sort(got.begin(), got.end());
+    EXPECT_EQ(got,
+              All([&](std::uint32_t id) { return SquaredDistanceTo(id, q) <= radius * radius; }));
+
+    double nearest = INFINITY;
+    for (std::uint32_t id = 0; id < influence_.size(); ++id)
+      nearest = std::min(nearest, SquaredDistanceTo(id, q));
+    EXPECT_EQ(tree_.NearestSquaredDistance(q.data()), nearest);
+  }
+
+  void CheckQueries(int count) {
+    ASSERT_EQ(tree_.size(), influence_.size());
+    for (int i = 0; i < count; ++i) CheckQueriesFrom(Draw());
+    for (int i = 0; i < count && !influence_.empty(); ++i) {
+      const auto at = static_cast<std::ptrdiff_t>(random_.Next() % influence_.size()) * d_;
+      CheckQueriesFrom({coordinates_.begin() + at, coordinates_.begin() + at + d_});
+    }
+  }
+
+  int d_;
+  Random random_;
+  std::vector<double> coordinates_, influence_;
+  BallTree tree_{d_, &coordinates_};
+};
+
+TEST_P(BallTreeTest, KnowsNothingWhenEmpty) {
+  const std::vector<double> q = Draw();
+  tree_.ForEachInfluencing(q.data(), [](std::uint32_t) { FAIL(); });
+  tree_.VisitNear(
+      q.data(), [] { return 1e9; }, [](std::uint32_t, double) { FAIL(); });
+  EXPECT_EQ(tree_.NearestSquaredDistance(q.data()), INFINITY);
+  EXPECT_EQ(tree_.size(), 0u);
+}
+
+TEST_P(BallTreeTest, AnswersAsAListWouldWhileItGrows) {
+  for (int n = 1; n <= 900; ++n) {
+    Insert(Draw(), DrawInfluence());
+    if (n < 40 || n % 50 == 0) CheckQueries(n < 40 ? 2 : 15);
+  }
+}
+
+TEST_P(BallTreeTest, TakesPointsInSortedOrder) {
+  for (int n = 0; n < 600; ++n) {
+    std::vector<double> x(static_cast<std::size_t>(d_), 0.0);
+    x[0] = n / 600.0;
+    Insert(x, DrawInfluence());
+  }
+  CheckQueries(40);
+}
+
+TEST_P(BallTreeTest, FollowsInfluencesUpAndDown) {
+  for (int n = 0; n < 500; ++n) Insert(Draw(), 0);
+  CheckQueries(10);
+  for (int round = 0; round < 12; ++round) {
+    for (int i = 0; i < 150; ++i)
+      SetInfluence(static_cast<std::uint32_t>(random_.Next() % influence_.size()),
+                   random_.Next() % 4 == 0 ? 0 : DrawInfluence());
+    CheckQueries(8);  // shrinking needs no Refit to be right
+    if (round % 2 == 0) tree_.Refit();
+    CheckQueries(8);
+    for (int i = 0; i < 60; ++i) Insert(Draw(), DrawInfluence());
+    CheckQueries(8);
+    tree_.Refit();
+    tree_.Refit();
+    CheckQueries(8);
+  }
+  for (std::uint32_t id = 0; id < influence_.size(); ++id) SetInfluence(id, 0);
+  tree_.Refit();
+  CheckQueries(10);
+}
+
+TEST_P(BallTreeTest, HoldsAnyNumberOfPointsInOnePlace) {
+  const std::vector<double> x = Draw();
+  for (int n = 0; n < 200; ++n) Insert(x, n % 3 == 0 ? DrawInfluence() : 0);
+  CheckQueries(10);
+  for (int n = 0; n < 200; ++n) Insert(n % 2 == 0 ? x : Draw(), DrawInfluence());
+  CheckQueries(20);
+  Ids here;
+  tree_.VisitNear(
+      x.data(), [] { return 0.0; }, [&](std::uint32_t id, double) { here.push_back(id); });
+  EXPECT_GE(here.size(), 300u);
+}
+
+TEST_P(BallTreeTest, AsksForTheRadiusAsItShrinks) {
+  for (int n = 0; n < 2000; ++n) Insert(Draw(), 0);
+  // The three nearest, by a radius that shrinks to the third nearest seen.
+  for (int i = 0; i < 20; ++i) {
+    const std::vector<double> q = Draw();
+    std::vector<double> best;
+    int visits = 0;
+    tree_.VisitNear(
+        q.data(), [&] { return best.size() < 3 ? INFINITY : std::sqrt(best[2]); },
+        [&](std::uint32_t, double d2) {
+          ++visits;
+          best.push_back(d2);
+          std::sort(best.begin(), best.end());
+          if (best.size() > 3) best.resize(3);
+        });
+    std::vector<double> expected;
+    for (std::uint32_t id = 0; id < influence_.size(); ++id)
+      expected.push_back(SquaredDistanceTo(id, q));
+    std::sort(expected.begin(), expected.end());
+    expected.resize(3);
+    EXPECT_EQ(best, expected);
+    if (d_ <= 3) {
+      EXPECT_LT(visits, 400);  // near ones come first: most are never visited
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Dimensions, BallTreeTest, ::testing::Values(2, 3, 30));
+
+}  // namespace
+}  // namespace stellate::core
