@@ -33,6 +33,12 @@ struct BoundingBox {
   Eigen::VectorXd lower, upper;  // d each
 };
 
+// Where a simplex of a star is judged when a point comes near.
+enum class Judging {
+  kFlats,         // in each vertex's tangent space alone, as the thesis has it
+  kCommonCentre,  // at one centre for all its vertices (core/geometry/common_centre.h)
+};
+
 // The constants of Chapter 5. The proofs' values are far too small to use; the defaults here are
 // the measured ones. nullopt means "the default for this k".
 struct Criteria {
@@ -49,6 +55,7 @@ struct Criteria {
   std::optional<double> advance_step;        // h, length: how far the front steps over unknown
                                              // ground. Default 3 epsilon, or a tenth of the
                                              // bounding box's diagonal if that is more
+  std::optional<Judging> judging;            // default kFlats for k <= 2, else kCommonCentre
   int flat_alternations = 1;                 // without intersect_flat: closest points taken when
                                              // alternating towards a flat, 1..20
 };

@@ -6,27 +6,102 @@
 #include <algorithm>
 #include <iterator>
 
+#include "core/geometry/common_centre.h"
+
 namespace stellate::core {
 
+namespace {
+
+// Simplices of a larger circumradius, in epsilon, are judged in the flats: far out the common centre
+// is no better, and they will be refined anyway.
+constexpr double kJudgedRadius = 1.3;
+
+// The sites of a pair of points: q - p, on the stack where d is small.
+class Step {
+ public:
+  explicit Step(int d) {
+    if (d > kSmall) heap_.resize(static_cast<std::size_t>(d));
+  }
+  double* data() { return heap_.empty() ? stack_ : heap_.data(); }
+
+ private:
+  static constexpr int kSmall = 16;
+  double stack_[kSmall];
+  std::vector<double> heap_;
+};
+
+}  // namespace
+
 template <int K>
-StarComplex<K>::StarComplex(int d, double epsilon, double inradius)
-    : d_(d), inradius_(inradius), weight_scale_(1e-10 * epsilon * epsilon), tree_(d, &points_) {}
+StarComplex<K>::StarComplex(int d, double epsilon, double inradius, Judging judging)
+    : d_(d),
+      inradius_(inradius),
+      judging_(judging),
+      judged_radius2_(kJudgedRadius * kJudgedRadius * epsilon * epsilon),
+      weight_scale_(1e-10 * epsilon * epsilon),
+      tree_(d, &points_) {}
+
+// Judges the vertices of one cell, p's.
+template <int K>
+class StarComplex<K>::CentreJudge final : public Cell::Judge {
+ public:
+  CentreJudge(const StarComplex& complex, const Site& p, const Site* guest)
+      : complex_(complex), p_(p), guest_(guest) {}
+
+  int d() const override { return complex_.d_; }
+
+  void Centre(const Cell& cell, Vertex& v, double* centre) const override {
+    const int n = d();
+    if (!Common(cell, v, centre)) {
+      std::fill(centre, centre + n, 0.0);
+      for (int a = 0; a < K; ++a)
+        for (int i = 0; i < n; ++i) centre[i] += v.x[a] * p_.tangent[a * n + i];
+      return;
+    }
+    v.norm2 = Dot(centre, centre, n);
+  }
+
+ private:
+  bool Common(const Cell& cell, const Vertex& v, double* centre) const {
+    std::uint32_t ids[K + 1];
+    ids[0] = p_.id;
+    for (int s = 0; s < K; ++s) {
+      ids[s + 1] = cell.facets()[v.facet[s]].id;
+      if (IsFake(ids[s + 1])) return false;
+    }
+    std::sort(ids, ids + K + 1);
+    const double* points[K + 1];
+    const double* tangents[K + 1];
+    for (int i = 0; i <= K; ++i) {
+      const Site site = ids[i] == p_.id                  ? p_
+                        : guest_ && ids[i] == guest_->id ? *guest_
+                                                         : complex_.At(ids[i]);
+      points[i] = site.point;
+      tangents[i] = site.tangent;
+    }
+    double radius2;
+    if (!CommonCentre<K>(d(), points, tangents, centre, &radius2)) return false;
+    if (radius2 > complex_.judged_radius2_) return false;
+    for (int i = 0; i < d(); ++i) centre[i] += points[0][i] - p_.point[i];
+    return true;
+  }
+
+  const StarComplex& complex_;
+  const Site& p_;
+  const Site* guest_;
+};
+
+template <int K>
+double StarComplex<K>::Project(const Site& p, const double* q, double* step, double* normal) const {
+  for (int i = 0; i < d_; ++i) step[i] = q[i] - p.point[i];
+  for (int a = 0; a < K; ++a) normal[a] = Dot(p.tangent + a * d_, step, d_);
+  return Dot(step, step, d_);
+}
 
 template <int K>
 double StarComplex<K>::Project(std::uint32_t p, const double* q, double* normal) const {
-  const double* at = Point(p);
-  const double* tangent = Tangent(p);
-  if (d_ <= 16) {  // the difference once, on the stack
-    double e[16];
-    for (int i = 0; i < d_; ++i) e[i] = q[i] - at[i];
-    for (int a = 0; a < K; ++a) normal[a] = Dot(tangent + a * d_, e, d_);
-    return Dot(e, e, d_);
-  }
-  thread_local std::vector<double> e;
-  e.resize(stride());
-  for (int i = 0; i < d_; ++i) e[static_cast<std::size_t>(i)] = q[i] - at[i];
-  for (int a = 0; a < K; ++a) normal[a] = Dot(tangent + a * d_, e.data(), d_);
-  return Dot(e.data(), e.data(), d_);
+  Step step(d_);
+  return Project(At(p), q, step.data(), normal);
 }
 
 template <int K>
@@ -41,21 +116,41 @@ void StarComplex<K>::Lift(std::uint32_t p, const double* x, double* point) const
 }
 
 template <int K>
-bool StarComplex<K>::ClipBy(Cell& cell, std::uint32_t p, std::uint32_t q,
+bool StarComplex<K>::ClipBy(Cell& cell, const Site& p, const Site& q, const Site* guest,
                             typename Cell::Scratch& scratch) const {
+  Step step(d_);
   double normal[K];
-  const double distance2 = Project(p, Point(q), normal);
-  return cell.Clip(q, normal, 0.5 * (distance2 + Weight(p) - Weight(q)), scratch);
+  const double distance2 = Project(p, q.point, step.data(), normal);
+  const double offset = 0.5 * (distance2 + Weight(p.id) - Weight(q.id));
+  if (judging_ == Judging::kFlats) return cell.Clip(q.id, normal, offset, scratch);
+  const CentreJudge judge(*this, p, guest);
+  return cell.Clip(q.id, normal, offset, scratch, &judge, step.data());
 }
 
 template <int K>
-void StarComplex<K>::BuildStar(std::uint32_t p, typename Cell::Scratch& scratch) {
-  Cell& cell = cells_[p];
-  cell.Reset(inradius_);
+bool StarComplex<K>::Cuts(const Cell& cell, const Site& p, const Site& q) const {
+  Step step(d_);
+  double normal[K];
+  const double distance2 = Project(p, q.point, step.data(), normal);
+  const double offset = 0.5 * (distance2 + Weight(p.id) - Weight(q.id));
+  if (judging_ == Judging::kFlats) return cell.WouldCut(normal, offset);
+  const CentreJudge judge(*this, p, nullptr);
+  return cell.WouldCut(normal, offset, &judge, step.data());
+}
+
+template <int K>
+void StarComplex<K>::BuildStar(const Site& p, const Site* guest, Cell& cell,
+                               typename Cell::Scratch& scratch) const {
+  if (judging_ == Judging::kFlats) {
+    cell.Reset(inradius_);
+  } else {
+    const CentreJudge judge(*this, p, guest);
+    cell.Reset(inradius_, &judge);
+  }
   tree_.VisitNear(
-      Point(p), [&] { return Influence(cell); },
+      p.point, [&] { return Influence(cell); },
       [&](std::uint32_t q, double) {
-        if (q != p) ClipBy(cell, p, q, scratch);
+        if (q != p.id) ClipBy(cell, p, At(q), guest, scratch);
       });
 }
 
@@ -111,15 +206,11 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(
   // Which old stars does each new point cut? Their influence is still that of before.
   std::vector<std::vector<std::uint32_t>> cut_by(count);
   tbb::parallel_for(std::uint32_t{0}, count, [&](std::uint32_t i) {
-    const double* q = Point(first + i);
-    const double weight = Weight(first + i);
-    tree_.ForEachInfluencing(q, [&](std::uint32_t p) {
-      double normal[K];
-      const double distance2 = Project(p, q, normal);
-      if (cells_[p].WouldCut(normal, 0.5 * (distance2 + Weight(p) - weight)))
-        cut_by[i].push_back(p);
+    const Site q = At(first + i);
+    tree_.ForEachInfluencing(q.point, [&](std::uint32_t p) {
+      if (Cuts(cells_[p], At(p), q)) cut_by[i].push_back(p);
     });
-    BuildStar(first + i, scratch.local());
+    BuildStar(q, nullptr, cells_[q.id], scratch.local());
   });
 
   std::vector<std::pair<std::uint32_t, std::uint32_t>> cuts;  // star, new point
@@ -152,7 +243,7 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(
     std::vector<Simplex> before, after;
     Owned(p, &before);
     for (std::size_t j = begins[i]; j < begins[i + 1]; ++j)
-      ClipBy(cells_[p], p, cuts[j].second, scratch.local());
+      ClipBy(cells_[p], At(p), At(cuts[j].second), nullptr, scratch.local());
     Owned(p, &after);
     std::set_difference(before.begin(), before.end(), after.begin(), after.end(),
                         std::back_inserter(swaps[i].removed));
@@ -182,30 +273,16 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(
 template <int K>
 void StarComplex<K>::TryPoint(const double* point, const double* tangent,
                               typename Cell::Scratch& scratch, Tentative* result) const {
-  const std::uint32_t id = size();
+  const Site guest{size(), point, tangent};
   result->cut.clear();
   tree_.ForEachInfluencing(point, [&](std::uint32_t p) {
-    double normal[K];
-    const double offset = 0.5 * (Project(p, point, normal) + Weight(p) - Weight(id));
-    if (!cells_[p].WouldCut(normal, offset)) return;
+    if (!Cuts(cells_[p], At(p), guest)) return;
     result->cut.emplace_back(p, cells_[p]);
-    result->cut.back().second.Clip(id, normal, offset, scratch);
+    ClipBy(result->cut.back().second, At(p), guest, &guest, scratch);
   });
   std::sort(result->cut.begin(), result->cut.end(),
             [](const auto& a, const auto& b) { return a.first < b.first; });
-  Cell& own = result->own;
-  own.Reset(inradius_);
-  thread_local std::vector<double> e;
-  e.resize(stride());
-  tree_.VisitNear(
-      point, [&] { return Influence(own); },
-      [&](std::uint32_t q, double) {
-        const double* at = Point(q);
-        for (int i = 0; i < d_; ++i) e[static_cast<std::size_t>(i)] = at[i] - point[i];
-        double normal[K];
-        for (int a = 0; a < K; ++a) normal[a] = Dot(tangent + a * d_, e.data(), d_);
-        own.Clip(q, normal, 0.5 * (Dot(e.data(), e.data(), d_) + Weight(id) - Weight(q)), scratch);
-      });
+  BuildStar(guest, &guest, result->own, scratch);
 }
 
 template <int K>

@@ -7,6 +7,7 @@
 
 #include "core/geometry/restricted_voronoi_cell.h"
 #include "core/sample/ball_tree.h"
+#include "core/specification.h"
 
 namespace stellate::core {
 
@@ -24,7 +25,8 @@ class StarComplex {
   // d         ambient dimension
   // epsilon   the size bound, length: sets the scale of the perturbing weights
   // inradius  of the fake simplex that each cell begins as, length
-  StarComplex(int d, double epsilon, double inradius);
+  // judging   where a simplex is judged: see Judging
+  StarComplex(int d, double epsilon, double inradius, Judging judging);
   StarComplex(const StarComplex&) = delete;
   StarComplex& operator=(const StarComplex&) = delete;
 
@@ -83,13 +85,29 @@ class StarComplex {
   double Weight(std::uint32_t id) const {
     return weight_scale_ * (static_cast<double>(Mix64(id) >> 11) * 0x1p-53);
   }
-  bool ClipBy(Cell& cell, std::uint32_t p, std::uint32_t q, typename Cell::Scratch& s) const;
-  void BuildStar(std::uint32_t p, typename Cell::Scratch& scratch);
+  // A point with its tangent basis, in the sample or not yet.
+  struct Site {
+    std::uint32_t id;
+    const double* point;
+    const double* tangent;
+  };
+  class CentreJudge;
+  Site At(std::uint32_t id) const { return {id, Point(id), Tangent(id)}; }
+  // Clips the cell of p by q, or only says whether it would. `guest` is a site that may be named by
+  // the cell's facets without being in the sample.
+  bool ClipBy(Cell& cell, const Site& p, const Site& q, const Site* guest,
+              typename Cell::Scratch& scratch) const;
+  bool Cuts(const Cell& cell, const Site& p, const Site& q) const;
+  double Project(const Site& p, const double* q, double* step, double* normal) const;
+  void BuildStar(const Site& p, const Site* guest, Cell& cell,
+                 typename Cell::Scratch& scratch) const;
   void Owned(std::uint32_t p, std::vector<Simplex>* simplices) const;
   double Influence(const Cell& cell) const { return 2 * std::sqrt(cell.max_norm2()) * (1 + 1e-9); }
 
   int d_;
   double inradius_;
+  Judging judging_;
+  double judged_radius2_;
   double weight_scale_;
   std::vector<double> points_, tangents_;
   std::vector<Cell> cells_;

@@ -38,10 +38,16 @@ bool Solve<2>(double (&m)[2][3], double* x) {
   return true;
 }
 
+// A point of an edge is no farther from p than the edge's farther end: this share is far above
+// rounding in a well-conditioned solve and far below any distance that matters.
+constexpr double kSlack = 1e-9;
+// A judged cell is no convex polytope, and its edges' ends are only about where the facets meet.
+constexpr double kJudgedSlack = 3;
+
 }  // namespace
 
 template <int K>
-void RestrictedVoronoiCell<K>::Reset(double inradius) {
+void RestrictedVoronoiCell<K>::Reset(double inradius, const Judge* judge) {
   // Vertices of a regular simplex, one coordinate at a time: all unit vectors, all pairwise dot
   // products -1/K.
   double n[K + 1][K] = {};
@@ -76,14 +82,19 @@ void RestrictedVoronoiCell<K>::Reset(double inradius) {
   }
   max_norm2_ = inradius * inradius * K * K;
   has_fake_ = true;
+  if (!judge) return;
+  const auto d = static_cast<std::size_t>(judge->d());
+  centres_.resize((K + 1) * d);
+  for (std::size_t i = 0; i <= K; ++i) judge->Centre(*this, vertices_[i], centres_.data() + i * d);
 }
 
 // The coordinates come from the facets alone, in the order of their ids, so that they do not
 // depend on the order of the cuts. Where the facets are too nearly parallel for that, the point is
-// interpolated on the edge that the cut crosses.
+// interpolated on the edge that the cut crosses. `slack`: how much farther from p than the edge's
+// farther end the point may lie.
 template <int K>
 void RestrictedVoronoiCell<K>::Locate(Vertex& v, const Vertex& kept, const Vertex& removed,
-                                      double s, double t) const {
+                                      double s, double t, double slack) const {
   Index order[K];
   std::copy(v.facet, v.facet + K, order);
   std::sort(order, order + K, [&](Index a, Index b) { return facets_[a].id < facets_[b].id; });
@@ -98,10 +109,8 @@ void RestrictedVoronoiCell<K>::Locate(Vertex& v, const Vertex& kept, const Verte
   const bool solved = Solve<K>(m, v.x);
   v.norm2 = 0;
   for (int a = 0; a < K; ++a) v.norm2 += v.x[a] * v.x[a];
-  // A point of the edge is no farther from p than its farther end; 1e-9 is far above rounding in a
-  // well-conditioned solve and far below any distance that matters.
   const double farther = std::max(kept.norm2, removed.norm2);
-  if (!solved || !(v.norm2 <= farther * (1 + 1e-9))) {
+  if (!solved || !(v.norm2 <= farther * (1 + slack))) {
     const double u = t > s ? -s / (t - s) : 0.0;  // s <= 0 < t: excess at kept, at removed
     v.norm2 = 0;
     for (int a = 0; a < K; ++a) {
@@ -113,12 +122,12 @@ void RestrictedVoronoiCell<K>::Locate(Vertex& v, const Vertex& kept, const Verte
 
 template <int K>
 bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, double offset,
-                                    Scratch& scratch) {
+                                    Scratch& scratch, const Judge* judge, const double* step) {
   const std::size_t old_count = vertices_.size();
   scratch.excess.resize(old_count);
   std::size_t worst = 0;
   for (std::size_t i = 0; i < old_count; ++i) {
-    scratch.excess[i] = Excess(vertices_[i], normal, offset);
+    scratch.excess[i] = Excess(i, normal, offset, judge, step);
     if (scratch.excess[i] > scratch.excess[worst]) worst = i;
   }
   if (!(scratch.excess[worst] > 0)) return false;
@@ -158,6 +167,8 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
   // One new vertex on each edge that crosses the plane. Its slot 0 holds the new facet, so that
   // adjacent[0] is the kept end of the edge; the edge's facets follow.
   vertices_.resize(old_count + scratch.crossings.size());
+  const std::size_t d = judge ? static_cast<std::size_t>(judge->d()) : 0;
+  centres_.resize(vertices_.size() * d);
   for (std::size_t c = 0; c < scratch.crossings.size(); ++c) {
     const auto [kept, removed, slot] = scratch.crossings[c];
     const Index created = static_cast<Index>(old_count + c);
@@ -178,7 +189,9 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
       }
     }
     vertices_[removed].adjacent[slot] = created;
-    Locate(v, k, vertices_[removed], scratch.excess[kept], scratch.excess[removed]);
+    Locate(v, k, vertices_[removed], scratch.excess[kept], scratch.excess[removed],
+           judge ? kJudgedSlack : kSlack);
+    if (judge) judge->Centre(*this, v, centres_.data() + created * d);
   }
 
   // Neighbours on the new facet: around each two-dimensional face, walk from the removed end of
@@ -208,13 +221,13 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
       }
     }
   }
-  Compact(scratch);
+  Compact(scratch, d);
   return true;
 }
 
 // Drops the cut vertices and the facets that no vertex is left on; recomputes what is cached.
 template <int K>
-void RestrictedVoronoiCell<K>::Compact(Scratch& scratch) {
+void RestrictedVoronoiCell<K>::Compact(Scratch& scratch, std::size_t d) {
   const std::size_t total = vertices_.size();
   const std::size_t old_count = scratch.cut.size();
   scratch.remap.resize(total);
@@ -222,10 +235,14 @@ void RestrictedVoronoiCell<K>::Compact(Scratch& scratch) {
   for (std::size_t i = 0; i < total; ++i) {
     if (i < old_count && scratch.cut[i]) continue;
     scratch.remap[i] = static_cast<Index>(count);
-    if (count != i) vertices_[count] = vertices_[i];
+    if (count != i) {
+      vertices_[count] = vertices_[i];
+      std::copy_n(centres_.data() + i * d, d, centres_.data() + count * d);
+    }
     ++count;
   }
   vertices_.resize(count);
+  centres_.resize(count * d);
   max_norm2_ = 0;
   scratch.cut.assign(facets_.size(), 0);
   for (Vertex& v : vertices_) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/sample/random.h"
+#include "core/sample/vector_ops.h"
 
 namespace stellate::core {
 
@@ -52,17 +53,32 @@ class RestrictedVoronoiCell {
     std::vector<Crossing> crossings;
   };
 
+  // Where the vertices are judged. Without one, at their place in T_pM: the cell is the convex
+  // polytope of Lemma 2.4.2. With one, at a centre in R^d that depends on the dual simplex alone:
+  // the cell is then a polytope in its combinatorics only.
+  class Judge {
+   public:
+    virtual ~Judge() = default;
+    virtual int d() const = 0;
+    // Writes the centre of v, relative to p (d numbers), and sets v.norm2 to its squared norm.
+    virtual void Centre(const RestrictedVoronoiCell& cell, Vertex& v, double* centre) const = 0;
+  };
+
   // A regular simplex of K+1 fake facets at distance `inradius` from p.
-  void Reset(double inradius);
+  void Reset(double inradius, const Judge* judge = nullptr);
 
   // Cuts away { x : normal . x > offset }. Returns whether anything was cut. A half-space that
-  // would cut everything away (it cannot, for offset > 0, but in rounding) is refused.
-  bool Clip(std::uint32_t id, const double* normal, double offset, Scratch& scratch);
+  // would cut everything away (it cannot, for offset > 0, but in rounding) is refused. With a
+  // judge, the same one for the cell's whole life, `step` is q - p (d numbers), and what is cut away
+  // is { c : step . c > offset }.
+  bool Clip(std::uint32_t id, const double* normal, double offset, Scratch& scratch,
+            const Judge* judge = nullptr, const double* step = nullptr);
 
   // Whether Clip with these arguments would cut: some vertex violates the half-space.
-  bool WouldCut(const double* normal, double offset) const {
-    for (const Vertex& v : vertices_)
-      if (Excess(v, normal, offset) > 0) return true;
+  bool WouldCut(const double* normal, double offset, const Judge* judge = nullptr,
+                const double* step = nullptr) const {
+    for (std::size_t i = 0; i < vertices_.size(); ++i)
+      if (Excess(i, normal, offset, judge, step) > 0) return true;
     return false;
   }
 
@@ -80,16 +96,23 @@ class RestrictedVoronoiCell {
   }
 
  private:
-  static double Excess(const Vertex& v, const double* normal, double offset) {
+  double Excess(std::size_t v, const double* normal, double offset, const Judge* judge,
+                const double* step) const {
+    if (judge) {
+      const int d = judge->d();
+      return Dot(step, centres_.data() + v * static_cast<std::size_t>(d), d) - offset;
+    }
     double s = -offset;
-    for (int a = 0; a < K; ++a) s += normal[a] * v.x[a];
+    for (int a = 0; a < K; ++a) s += normal[a] * vertices_[v].x[a];
     return s;
   }
-  void Locate(Vertex& v, const Vertex& kept, const Vertex& removed, double s, double t) const;
-  void Compact(Scratch& scratch);
+  void Locate(Vertex& v, const Vertex& kept, const Vertex& removed, double s, double t,
+              double slack) const;
+  void Compact(Scratch& scratch, std::size_t d);
 
   std::vector<Facet> facets_;
   std::vector<Vertex> vertices_;
+  std::vector<double> centres_;  // by vertex, d each, relative to p; empty without a judge
   double max_norm2_ = 0;
   bool has_fake_ = true;
 };

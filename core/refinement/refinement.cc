@@ -51,6 +51,7 @@ ResolvedCriteria Resolve(const Specification& spec) {
   r.small_sliver_radius = c.small_sliver_radius;
   r.candidates = c.candidates.value_or(spec.dimension <= 2 ? 1 : 10);
   r.flat_alternations = c.flat_alternations;
+  r.judging = c.judging.value_or(Judging::kFlats);
   double step = kDefaultAdvanceEpsilons * spec.epsilon;
   if (spec.bounding_box) {
     const double diagonal = (spec.bounding_box->upper - spec.bounding_box->lower).norm();
@@ -65,7 +66,7 @@ Refinement<K>::Refinement(Specification spec)
     : spec_(std::move(spec)),
       criteria_(Resolve(spec_)),
       complex_(spec_.ambient_dimension, spec_.epsilon,
-               kInradius * std::max(criteria_.advance_step, spec_.epsilon)),
+               kInradius * std::max(criteria_.advance_step, spec_.epsilon), criteria_.judging),
       tangent_finder_(K, spec_.ambient_dimension, kTangentStep * spec_.epsilon,
                       spec_.random_seed) {
   AskForSeeds();

@@ -17,6 +17,7 @@ namespace stellate::core {
 struct ResolvedCriteria {
   double epsilon, radius_edge_bound, sliver_bound, picking_radius, small_sliver_radius, advance_step;
   int candidates, flat_alternations;
+  Judging judging;
 };
 ResolvedCriteria Resolve(const Specification& spec);
 

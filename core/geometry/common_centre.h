@@ -1,0 +1,23 @@
+#pragma once
+
+namespace stellate::core {
+
+// One centre for a k-simplex, the same for the stars of all its vertices: a point equidistant from
+// them and, to third order, on M. Stars that judge a simplex at this centre, instead of each at the
+// circumcentre in its own tangent space, rarely disagree.
+//
+// With x the circumcentre of sigma in its affine hull, b its barycentric coordinates and P_i the
+// projection on the tangent space at v_i:
+//
+//   c = x + N ( sum_i b_i P_i (x - v_i) / 2 ),   N the projection on the normal space of sigma.
+//
+//   points    K+1 points of R^d, in an order that all stars share
+//   tangents  K rows of d for each, orthonormal
+//   centre    d, relative to points[0]
+//   radius2   of sigma's circumsphere in its hull, length squared
+// False, with nothing set, when sigma is flat to rounding. Cost O(d K^2).
+template <int K>
+bool CommonCentre(int d, const double* const* points, const double* const* tangents, double* centre,
+                  double* radius2);
+
+}  // namespace stellate::core
