@@ -1,0 +1,111 @@
+#include "core/refinement/independent_set.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "core/sample/random.h"
+#include "tests/core/support/samples.h"
+
+namespace stellate::core {
+namespace {
+
+using testing::AppendTo;
+using testing::Make;
+using testing::RandomSample;
+using testing::Sample;
+
+constexpr int kDimension = 2;
+using Targets = std::vector<Target<kDimension>>;
+
+class IndependentSetTest : public ::testing::Test {
+ protected:
+  IndependentSetTest() : sample_(RandomSample(*Make("torus:1:0.4@6"), 300, 1)) {
+    AppendTo(&complex_, sample_);
+    complex_.Commit();
+  }
+
+  Targets RandomTargets(std::uint64_t seed, double largest) const {
+    Random random(seed);
+    Targets targets(complex_.size());
+    for (std::uint32_t p = 0; p < complex_.size(); ++p) {
+      Target<kDimension>& t = targets[p];
+      t.star = p;
+      t.violation.rule = static_cast<Rule>(random.Next() % 4);
+      const double angle = 6.3 * random.Uniform();
+      // Few different radii, so that many targets tie.
+      t.radius = largest * static_cast<double>(1 + random.Next() % 5) / 5;
+      t.x[0] = t.radius * std::cos(angle);
+      t.x[1] = t.radius * std::sin(angle);
+    }
+    return targets;
+  }
+
+  // Whether a point at b's insertion point would lie in a's conflict ball.
+  bool Conflict(const Target<kDimension>& a, const Target<kDimension>& b) const {
+    double at[6], bt[6];
+    complex_.Lift(a.star, a.x, at);
+    complex_.Lift(b.star, b.x, bt);
+    const double reach = a.violation.rule >= Rule::kSliver ? 2 * a.radius : a.radius;
+    return Distance(at, bt, 6) < reach;
+  }
+
+  static std::vector<std::uint32_t> Stars(const Targets& targets) {
+    std::vector<std::uint32_t> stars;
+    for (const auto& t : targets) stars.push_back(t.star);
+    return stars;
+  }
+
+  Sample sample_;
+  StarComplex<kDimension> complex_{6, 0.3, 3, Judging::kFlats};
+};
+
+// First by rule, then by radius, then by star: the order in which targets are taken.
+bool Before(const Target<kDimension>& a, const Target<kDimension>& b) {
+  if (a.violation.rule != b.violation.rule) return a.violation.rule < b.violation.rule;
+  if (a.radius != b.radius) return a.radius > b.radius;
+  return a.star < b.star;
+}
+
+TEST_F(IndependentSetTest, IsGreedyIndependentAndMaximal) {
+  for (const double largest : {0.05, 0.2, 0.6}) {
+    const Targets targets = RandomTargets(7, largest);
+    const Targets chosen = SelectIndependent<kDimension>(complex_, targets);
+    ASSERT_FALSE(chosen.empty());
+    EXPECT_TRUE(std::is_sorted(chosen.begin(), chosen.end(), Before));
+    for (std::size_t i = 0; i < chosen.size(); ++i)
+      for (std::size_t j = i + 1; j < chosen.size(); ++j)
+        EXPECT_FALSE(Conflict(chosen[i], chosen[j]));
+    const std::vector<std::uint32_t> stars = Stars(chosen);
+    for (const auto& t : targets) {
+      if (std::find(stars.begin(), stars.end(), t.star) != stars.end()) continue;
+      EXPECT_TRUE(std::any_of(chosen.begin(), chosen.end(), [&](const auto& c) {
+        return Before(c, t) && Conflict(c, t);
+      })) << "star " << t.star << " was left out for nothing";
+    }
+  }
+}
+
+TEST_F(IndependentSetTest, TakesAllThatAreFarApart) {
+  EXPECT_EQ(SelectIndependent<kDimension>(complex_, RandomTargets(8, 1e-9)).size(),
+            complex_.size());
+}
+
+TEST_F(IndependentSetTest, DoesNotDependOnTheOrderOfTheTargets) {
+  Targets targets = RandomTargets(9, 0.3);
+  const auto chosen = Stars(SelectIndependent<kDimension>(complex_, targets));
+  Random random(3);
+  for (int shuffle = 0; shuffle < 5; ++shuffle) {
+    for (std::size_t i = targets.size(); i > 1; --i)
+      std::swap(targets[i - 1], targets[random.Next() % i]);
+    EXPECT_EQ(Stars(SelectIndependent<kDimension>(complex_, targets)), chosen);
+  }
+}
+
+TEST_F(IndependentSetTest, OfNothingIsNothing) {
+  EXPECT_TRUE(SelectIndependent<kDimension>(complex_, {}).empty());
+}
+
+}  // namespace
+}  // namespace stellate::core

@@ -1,0 +1,242 @@
+#include "core/refinement/refinement.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/core/support/in_process_run.h"
+
+namespace stellate::core {
+namespace {
+
+using testing::AppendTo;
+using testing::AsSet;
+using testing::Drive;
+using testing::ExpectGoodMesh;
+using testing::Make;
+using testing::RandomPointsOn;
+using testing::Run;
+using testing::Sample;
+using testing::SpecificationFor;
+using testing::StarOf;
+
+struct Case {
+  std::string manifold;
+  double epsilon;
+  bool intersect_flat = true;
+  bool tangents = true;
+  int alternations = 1;
+};
+
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.manifold << " epsilon " << c.epsilon << (c.intersect_flat ? "" : " without flats")
+       << (c.tangents ? "" : " without tangents") << " alternations " << c.alternations;
+}
+
+class Refinements : public ::testing::TestWithParam<Case> {
+ protected:
+  Specification Spec(Manifold& manifold) const {
+    Specification spec = SpecificationFor(manifold, GetParam().epsilon);
+    spec.oracle.intersect_flat = GetParam().intersect_flat;
+    spec.oracle.tangent_basis = GetParam().tangents;
+    spec.criteria.flat_alternations = GetParam().alternations;
+    return spec;
+  }
+};
+
+TEST_P(Refinements, GiveTheManifold) {
+  const auto manifold = Make(GetParam().manifold);
+  const Run run = Drive(Spec(*manifold), *manifold);
+  ExpectGoodMesh(run, manifold->facts());
+  EXPECT_LT(manifold->Distance(run.mesher->Points()).maxCoeff(), 1e-9);
+  const Counts& counts = run.report().counts;
+  EXPECT_EQ(counts.tangent_queries == 0, GetParam().tangents);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Catalogue, Refinements,
+    ::testing::Values(Case{"circle:10", 0.3}, Case{"torus-knot:2:3", 0.1}, Case{"torus", 0.2},
+                      Case{"ellipsoid", 0.25}, Case{"rp2", 0.4}, Case{"clifford-torus", 0.3},
+                      Case{"two-spheres", 0.3}, Case{"torus:1:0.4@20", 0.25}, Case{"so3", 0.8},
+                      Case{"flat-torus:3", 0.6}, Case{"sphere:4:5", 0.7}));
+
+INSTANTIATE_TEST_SUITE_P(PoorerOracles, Refinements,
+                         ::testing::Values(Case{"circle:10", 0.3, false, false},
+                                           Case{"torus", 0.2, false, true},
+                                           Case{"torus", 0.2, true, false},
+                                           Case{"torus", 0.2, false, false},
+                                           Case{"torus", 0.2, false, true, 3},
+                                           Case{"clifford-torus", 0.3, false, false, 3},
+                                           Case{"rp2", 0.4, true, false},
+                                           Case{"so3", 0.8, false, true},
+                                           Case{"so3", 0.8, true, false},
+                                           Case{"flat-torus:3", 0.6, false, false},
+                                           Case{"flat-torus:3", 0.7, false, true, 3}));
+
+// Rebuilds the stars from the finished points: what the run says of itself must be so.
+template <int K>
+void ExpectRulesHold(const Run& run, const Specification& spec) {
+  const ResolvedCriteria criteria = Resolve(spec);
+  Sample sample;
+  sample.d = spec.ambient_dimension;
+  sample.k = K;
+  sample.Append(run.mesher->Points(), run.mesher->Tangents());
+  StarComplex<K> complex(sample.d, spec.epsilon, criteria.advance_step, Judging::kFlats);
+  AppendTo(&complex, sample);
+  complex.Commit();
+  std::set<typename StarComplex<K>::Simplex> all;
+  for (std::uint32_t p = 0; p < complex.size(); ++p) {
+    EXPECT_FALSE(
+        WorstSizeOrShape<K>(complex, p, spec.epsilon, criteria.radius_edge_bound).has_value());
+    EXPECT_FALSE(WorstSliverOrInconsistent<K>(complex, p, criteria.sliver_bound).has_value());
+    EXPECT_EQ(CountInconsistent<K>(complex, p), 0u);
+    all.merge(StarOf(complex, p));
+  }
+  EXPECT_EQ(all, AsSet<K>(run.mesher->Simplices()));
+}
+
+template <int K>
+void ExpectRulesHoldOn(const std::string& name, double epsilon) {
+  const auto manifold = Make(name);
+  Specification spec = SpecificationFor(*manifold, epsilon);
+  spec.criteria.judging = Judging::kFlats;
+  const Run run = Drive(spec, *manifold);
+  ExpectGoodMesh(run, manifold->facts());
+  ExpectRulesHold<K>(run, spec);
+}
+
+TEST(Rules, HoldInTheRebuiltStars) {
+  ExpectRulesHoldOn<1>("torus-knot:2:3", 0.1);
+  ExpectRulesHoldOn<2>("torus", 0.15);
+  ExpectRulesHoldOn<2>("rp2", 0.3);
+  ExpectRulesHoldOn<3>("flat-torus:3", 0.5);
+  ExpectRulesHoldOn<3>("so3", 0.6);
+}
+
+TEST(Rules, TakeStricterCriteria) {
+  const auto manifold = Make("torus");
+  Specification spec = SpecificationFor(*manifold, 0.25);
+  spec.criteria.radius_edge_bound = 1.3;
+  spec.criteria.sliver_bound = 0.2;
+  spec.criteria.candidates = 5;
+  const Run run = Drive(spec, *manifold);
+  ExpectGoodMesh(run, manifold->facts());
+  ExpectRulesHold<2>(run, spec);
+}
+
+// A chord of the circle has R_p <= epsilon when the arc is at most about 2 epsilon.
+TEST(Refinement, UsesAsManyPointsAsTheSizeAsksFor) {
+  const auto manifold = Make("circle:3");
+  for (const double epsilon : {0.2, 0.05}) {
+    const Run run = Drive(SpecificationFor(*manifold, epsilon), *manifold);
+    const double fewest = std::numbers::pi / epsilon;
+    EXPECT_GE(static_cast<double>(run.report().counts.vertices), fewest);
+    EXPECT_LE(static_cast<double>(run.report().counts.vertices), 2.5 * fewest);
+  }
+}
+
+// Seeds.
+
+TEST(Seeds, OnARegularGridMeshAsWellAsAny) {
+  const auto manifold = Make("torus");
+  Specification spec = SpecificationFor(*manifold, 0.2);
+  spec.bounding_box.reset();
+  spec.seeds.resize(3, 9 * 9 * 3);
+  for (int i = 0, c = 0; i < 9; ++i)
+    for (int j = 0; j < 9; ++j)
+      for (int l = 0; l < 3; ++l) spec.seeds.col(c++) << (i - 4) * 0.35, (j - 4) * 0.35, (l - 1) * 0.4;
+  ExpectGoodMesh(Drive(spec, *manifold), manifold->facts());
+}
+
+// Every star sees the same exactly symmetric surroundings.
+TEST(Seeds, OnAGridOfTheFlatTorusMeshAsWellAsAny) {
+  for (const int k : {2, 3}) {
+    const auto manifold = Make(k == 2 ? "clifford-torus" : "flat-torus:3");
+    const Sample grid = testing::TorusGrid(k, k == 2 ? 16 : 10);
+    Specification spec = SpecificationFor(*manifold, k == 2 ? 0.25 : 0.6);
+    spec.bounding_box.reset();
+    spec.seeds = Eigen::Map<const Eigen::MatrixXd>(grid.points.data(), grid.d, grid.size());
+    const double radius = manifold->ClosestPoint(spec.seeds).points.col(0).norm();
+    spec.seeds *= radius / std::sqrt(k);
+    const Run run = Drive(spec, *manifold);
+    ExpectGoodMesh(run, manifold->facts());
+  }
+}
+
+TEST(Seeds, ManyTimesTheSameAreOne) {
+  const auto manifold = Make("ellipsoid");
+  const Eigen::MatrixXd points = RandomPointsOn(*manifold, 7, 5);
+  Specification once = SpecificationFor(*manifold, 0.3);
+  once.bounding_box.reset();
+  once.seeds = points;
+  Specification often = once;
+  often.seeds = points.replicate(1, 30);
+  const Run a = Drive(once, *manifold), b = Drive(often, *manifold);
+  ExpectGoodMesh(b, manifold->facts());
+  EXPECT_EQ(a.mesher->Points(), b.mesher->Points());
+  EXPECT_EQ(a.mesher->Simplices(), b.mesher->Simplices());
+  EXPECT_GE(b.report().counts.duplicates, 7u * 29u);
+}
+
+TEST(Seeds, OneCoversAComponent) {
+  for (const char* name : {"torus", "rp2", "so3", "torus-knot:2:3"}) {
+    const auto manifold = Make(name);
+    const double epsilon = manifold->dimension() == 3 ? 0.8 : manifold->dimension() == 2 ? 0.3 : 0.1;
+    Specification spec = SpecificationFor(*manifold, epsilon);
+    spec.bounding_box.reset();
+    spec.seeds = RandomPointsOn(*manifold, 1, 6);
+    ExpectGoodMesh(Drive(spec, *manifold), manifold->facts());
+  }
+}
+
+TEST(Seeds, OnlyTheComponentsTheyFallOnAreFound) {
+  const auto manifold = Make("two-spheres");
+  Specification spec = SpecificationFor(*manifold, 0.3);
+  spec.bounding_box.reset();
+  spec.seeds = RandomPointsOn(*manifold, 1, 7);
+  const Run run = Drive(spec, *manifold);
+  EXPECT_TRUE(run.report().certificate.certified) << run.report().certificate.verdict;
+  EXPECT_EQ(run.report().certificate.components, 1u);
+  EXPECT_EQ(run.report().certificate.euler_characteristic, 2);
+}
+
+TEST(Seeds, ThatNoClosestPointIsFoundForFailTheRun) {
+  const auto manifold = Make("torus");
+  for (const bool tangents : {true, false}) {
+    Specification spec = SpecificationFor(*manifold, 0.3);
+    spec.oracle.tangent_basis = tangents;
+    const Run run = Drive(spec, [&](const QueryBatch& batch) {
+      Answers answers = testing::AnswersOf(*manifold, batch);
+      for (AnswerBlock& block : answers.blocks)
+        block.found.assign(static_cast<std::size_t>(block.points.cols()), 0);
+      return answers;
+    });
+    EXPECT_EQ(run.report().termination, Termination::kOracleFailed);
+    EXPECT_EQ(run.report().failure.code, StatusCode::kNoSeeds);
+    EXPECT_NE(run.report().failure.message.find("seed"), std::string::npos);
+    EXPECT_FALSE(run.report().certificate.certified);
+    EXPECT_EQ(run.mesher->NextBatch(), nullptr);
+    EXPECT_EQ(run.mesher->Points().cols(), 0);
+  }
+}
+
+// An eps far above the reach must be refused a certificate, or be told of.
+TEST(Refinement, NeverCertifiesTheWrongTopologyQuietly) {
+  const auto manifold = Make("torus");
+  for (const double epsilon : {0.6, 0.9, 1.5}) {
+    for (const std::uint64_t seed : {1, 2, 3}) {
+      Specification spec = SpecificationFor(*manifold, epsilon);
+      spec.random_seed = seed;
+      const Run run = Drive(spec, *manifold);
+      const Certificate& c = run.report().certificate;
+      if (c.certified) {
+        EXPECT_EQ(c.euler_characteristic, 0) << epsilon << " " << seed;
+      } else {
+        EXPECT_FALSE(c.verdict.empty());
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace stellate::core

@@ -1,0 +1,286 @@
+#include "core/refinement/rules.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <vector>
+
+#include "core/geometry/simplex.h"
+#include "tests/core/support/in_process_run.h"
+#include "tests/core/support/samples.h"
+
+namespace stellate::core {
+namespace {
+
+using testing::AppendTo;
+using testing::Make;
+using testing::RandomSample;
+using testing::Sample;
+using testing::StarOf;
+
+template <int K>
+using Simplex = typename StarComplex<K>::Simplex;
+
+template <int K>
+std::unique_ptr<StarComplex<K>> Build(const Sample& sample) {
+  auto complex = std::make_unique<StarComplex<K>>(sample.d, 0.3, 3.0, Judging::kFlats);
+  AppendTo(complex.get(), sample);
+  complex->Commit();
+  return complex;
+}
+
+std::vector<const double*> Vertices(const Sample& sample, const std::vector<std::uint32_t>& ids) {
+  std::vector<const double*> vertices;
+  for (const std::uint32_t id : ids) vertices.push_back(sample.Point(id));
+  return vertices;
+}
+
+// Whether a face at p of dimension 2 or more is not Theta0-fat, face by face.
+bool HasThinFaceAt(const Sample& sample, const std::vector<std::uint32_t>& simplex,
+                   std::uint32_t p, double theta0) {
+  for (unsigned subset = 1; subset < (1u << simplex.size()); ++subset) {
+    std::vector<std::uint32_t> face;
+    for (std::size_t s = 0; s < simplex.size(); ++s)
+      if (subset >> s & 1) face.push_back(simplex[s]);
+    if (face.size() < 3 || std::find(face.begin(), face.end(), p) == face.end()) continue;
+    if (!IsFat(Vertices(sample, face), sample.d, theta0)) return true;
+  }
+  return false;
+}
+
+template <int K>
+bool IsInStars(const StarComplex<K>& complex, const Simplex<K>& simplex) {
+  return std::all_of(simplex.begin(), simplex.end(), [&](std::uint32_t q) {
+    return StarOf(complex, q).contains(simplex);
+  });
+}
+
+TEST(SizeAndShape, GiveTheWorstSimplexOfTheFirstRuleBroken) {
+  // In a plane the circumradius in T_p is that of the triangle.
+  const Sample sample = testing::FlatSample(2, 3, 400, 1);
+  const auto complex = Build<2>(sample);
+  int sizes = 0, shapes = 0, fine = 0, fakes = 0;
+  for (const double epsilon : {0.03, 0.1, 5.0}) {
+    for (const double rho0 : {1.2, 6.0}) {
+      for (std::uint32_t p = 0; p < complex->size(); ++p) {
+        const auto got = WorstSizeOrShape<2>(*complex, p, epsilon, rho0);
+        if (!complex->cell(p).bounded()) {
+          ASSERT_TRUE(got.has_value());
+          EXPECT_EQ(got->rule, Rule::kSize);
+          EXPECT_NEAR(got->radius, std::hypot(got->x[0], got->x[1]), 1e-12);
+          fakes += got->fake;
+          continue;
+        }
+        double largest = 0, worst_rho = 0;
+        for (const auto& s : StarOf(*complex, p)) {
+          const SimplexMeasures m =
+              MeasureSimplex(Vertices(sample, {s[0], s[1], s[2]}), sample.d);
+          largest = std::max(largest, m.circumradius);
+          double edge = INFINITY;
+          for (const std::uint32_t q : s)
+            if (q != p) edge = std::min(edge, Distance(sample.Point(p), sample.Point(q), 3));
+          worst_rho = std::max(worst_rho, m.circumradius / edge);
+        }
+        if (largest > epsilon) {
+          ASSERT_TRUE(got.has_value());
+          EXPECT_EQ(got->rule, Rule::kSize);
+          EXPECT_NEAR(got->radius, largest, 1e-6 * largest);
+          ++sizes;
+        } else if (worst_rho > rho0) {
+          ASSERT_TRUE(got.has_value());
+          EXPECT_EQ(got->rule, Rule::kRadiusEdge);
+          EXPECT_LE(got->radius, epsilon);
+          ++shapes;
+        } else {
+          EXPECT_FALSE(got.has_value());
+          ++fine;
+        }
+        if (got) {
+          EXPECT_FALSE(got->fake);
+          EXPECT_NEAR(got->radius, std::hypot(got->x[0], got->x[1]), 1e-12);
+        }
+      }
+    }
+  }
+  EXPECT_GT(sizes, 50);
+  EXPECT_GT(shapes, 50);
+  EXPECT_GT(fine, 50);
+  EXPECT_GT(fakes, 10);
+}
+
+template <int K>
+void ExpectSliversAsMeasured(const Sample& sample) {
+  const auto complex = Build<K>(sample);
+  int thin = 0, fat = 0;
+  for (const double theta0 : {0.1, 0.2, 0.3}) {
+    for (std::uint32_t p = 0; p < complex->size(); ++p) {
+      for (const auto& v : complex->cell(p).vertices()) {
+        Simplex<K> s;
+        if (!complex->SimplexOf(p, complex->cell(p), v, &s)) continue;
+        const bool expected = HasThinFaceAt(sample, {s.begin(), s.end()}, p, theta0);
+        EXPECT_EQ(ContainsSliver<K>(*complex, sample.Point(p), complex->cell(p), v, theta0, nullptr),
+                  expected);
+        ++(expected ? thin : fat);
+        EXPECT_FALSE(ContainsSliver<K>(*complex, sample.Point(p), complex->cell(p), v, 0, nullptr));
+      }
+    }
+  }
+  EXPECT_GT(thin, 20);
+  EXPECT_GT(fat, 20);
+}
+
+TEST(Slivers, AreTheThinFacesAtTheStarsPoint) {
+  ExpectSliversAsMeasured<2>(RandomSample(*Make("torus"), 200, 2));
+  ExpectSliversAsMeasured<3>(RandomSample(*Make("so3"), 200, 3));
+  ExpectSliversAsMeasured<4>(RandomSample(*Make("sphere:4:6"), 80, 4));
+}
+
+// All stars together see every sliver that the simplex has.
+TEST(Slivers, AreSeenFromSomeVertexOfTheSimplex) {
+  const Sample sample = RandomSample(*Make("flat-torus:3"), 250, 5);
+  const auto complex = Build<3>(sample);
+  int slivers = 0;
+  for (std::uint32_t p = 0; p < complex->size(); ++p) {
+    for (const auto& s : StarOf(*complex, p)) {
+      if (s[0] != p || !IsInStars(*complex, s)) continue;
+      std::uint64_t key = 0;
+      for (const std::uint32_t q : s) key += Mix64(q);
+      bool seen = false;
+      for (const std::uint32_t q : s) {
+        const auto* v = FindSimplex<3>(complex->cell(q), q, s, key);
+        ASSERT_NE(v, nullptr);
+        seen = seen || ContainsSliver<3>(*complex, sample.Point(q), complex->cell(q), *v, 0.2,
+                                         nullptr);
+      }
+      const std::vector<std::uint32_t> ids(s.begin(), s.end());
+      EXPECT_EQ(seen, ContainsSliver(Vertices(sample, ids), sample.d, 0.2));
+      slivers += seen;
+    }
+  }
+  EXPECT_GT(slivers, 10);
+}
+
+TEST(FindSimplex, FindsWhatTheStarHoldsAndNothingElse) {
+  const Sample sample = RandomSample(*Make("torus"), 150, 6);
+  const auto complex = Build<2>(sample);
+  for (std::uint32_t p = 0; p < complex->size(); ++p) {
+    for (const auto& s : StarOf(*complex, p)) {
+      std::uint64_t key = 0;
+      for (const std::uint32_t q : s) key += Mix64(q);
+      for (const std::uint32_t q : s) {
+        const auto* v = FindSimplex<2>(complex->cell(q), q, s, key);
+        EXPECT_EQ(v != nullptr, StarOf(*complex, q).contains(s));
+        Simplex<2> found;
+        if (!v) continue;
+        ASSERT_TRUE(complex->SimplexOf(q, complex->cell(q), *v, &found));
+        EXPECT_EQ(found, s);
+      }
+      Simplex<2> other = s;
+      other[2] = (other[2] + 1) % complex->size();
+      if (std::find(s.begin(), s.end(), other[2]) == s.end()) {
+        const std::uint64_t other_key = key - Mix64(s[2]) + Mix64(other[2]);
+        std::sort(other.begin(), other.end());
+        EXPECT_EQ(FindSimplex<2>(complex->cell(p), p, other, other_key) != nullptr,
+                  StarOf(*complex, p).contains(other));
+      }
+    }
+  }
+}
+
+template <int K>
+void ExpectConsistencyByDefinition(const Sample& sample, double sliver_bound) {
+  const auto complex = Build<K>(sample);
+  std::uint64_t inconsistent = 0, slivers = 0, fine = 0;
+  for (std::uint32_t p = 0; p < complex->size(); ++p) {
+    std::uint64_t expected = 0;
+    double worst_sliver = 0, worst_inconsistent = 0;
+    for (const auto& v : complex->cell(p).vertices()) {
+      const double radius = std::sqrt(v.norm2);
+      if (ContainsSliver<K>(*complex, sample.Point(p), complex->cell(p), v, sliver_bound, nullptr))
+        worst_sliver = std::max(worst_sliver, radius);
+      Simplex<K> s;
+      if (!complex->SimplexOf(p, complex->cell(p), v, &s) || !IsInStars(*complex, s)) {
+        ++expected;
+        worst_inconsistent = std::max(worst_inconsistent, radius);
+      }
+    }
+    EXPECT_EQ(CountInconsistent<K>(*complex, p), expected) << "star " << p;
+    const auto got = WorstSliverOrInconsistent<K>(*complex, p, sliver_bound);
+    ASSERT_EQ(got.has_value(), worst_sliver > 0 || expected > 0) << "star " << p;
+    if (!got) {
+      ++fine;
+      continue;
+    }
+    EXPECT_EQ(got->rule, worst_sliver > 0 ? Rule::kSliver : Rule::kInconsistent);
+    EXPECT_EQ(got->radius, worst_sliver > 0 ? worst_sliver : worst_inconsistent);
+    ++(worst_sliver > 0 ? slivers : inconsistent);
+  }
+  EXPECT_GT(inconsistent, 0u);
+  EXPECT_EQ(slivers > 0, sliver_bound > 0);
+  if (K == 2 && sliver_bound == 0) {
+    EXPECT_GT(fine, 0u);
+  }
+}
+
+TEST(Consistency, IsMembershipInTheStarsOfAllVertices) {
+  ExpectConsistencyByDefinition<1>(RandomSample(*Make("torus-knot:2:3"), 40, 7), 0);
+  ExpectConsistencyByDefinition<2>(RandomSample(*Make("torus"), 300, 8), 0);
+  ExpectConsistencyByDefinition<2>(RandomSample(*Make("torus"), 300, 8), 0.2);
+  ExpectConsistencyByDefinition<3>(RandomSample(*Make("flat-torus:3"), 150, 9), 0);
+  ExpectConsistencyByDefinition<3>(RandomSample(*Make("flat-torus:3"), 150, 9), 0.15);
+}
+
+// Into a mesh without a blemish: a candidate that counts no bad simplex leaves none, and one that
+// leaves some counts them.
+template <int K>
+void ExpectBadCountedRightly(const std::string& name, double epsilon) {
+  const auto manifold = Make(name);
+  Specification spec = testing::SpecificationFor(*manifold, epsilon);
+  spec.criteria.judging = Judging::kFlats;
+  const testing::Run run = testing::Drive(spec, *manifold);
+  ASSERT_TRUE(run.report().certificate.certified) << run.report().certificate.verdict;
+  Sample mesh;
+  mesh.d = spec.ambient_dimension;
+  mesh.k = K;
+  mesh.Append(run.mesher->Points(), run.mesher->Tangents());
+  const Sample candidates = RandomSample(*manifold, 60, 10);
+  const auto complex = Build<K>(mesh);
+  typename StarComplex<K>::Cell::Scratch scratch;
+  typename StarComplex<K>::Tentative tentative;
+  int good = 0, bad = 0;
+  for (std::uint32_t c = 0; c < candidates.size(); ++c) {
+    const double* point = candidates.Point(c);
+    complex->TryPoint(point, candidates.Tangent(c), scratch, &tentative);
+    const int count = CountBad<K>(*complex, point, tentative, 0, epsilon, 1'000'000);
+    for (const int enough : {0, 1, 2})
+      EXPECT_EQ(CountBad<K>(*complex, point, tentative, 0, epsilon, enough),
+                std::min(count, enough));
+    // A bound that every new simplex fails counts no fewer.
+    EXPECT_GE(CountBad<K>(*complex, point, tentative, K >= 2 ? 0.3 : 0, epsilon, 1'000'000), count);
+
+    Sample grown = mesh;
+    grown.points.insert(grown.points.end(), point, point + mesh.d);
+    grown.tangents.insert(grown.tangents.end(), candidates.Tangent(c),
+                          candidates.Tangent(c) + mesh.d * K);
+    const auto after = Build<K>(grown);
+    std::uint64_t inconsistent = 0;
+    for (std::uint32_t p = 0; p < after->size(); ++p) inconsistent += CountInconsistent<K>(*after, p);
+    EXPECT_EQ(count == 0, inconsistent == 0) << "candidate " << c;
+    ++(count == 0 ? good : bad);
+  }
+  EXPECT_GT(good, 0);
+  if (K >= 2) {
+    EXPECT_GT(bad, 0);
+  }
+}
+
+TEST(GoodPoints, AreThoseThatLeaveNothingBad) {
+  ExpectBadCountedRightly<1>("torus-knot:2:3", 0.2);
+  ExpectBadCountedRightly<2>("rp2", 0.4);
+  ExpectBadCountedRightly<3>("so3", 0.8);
+}
+
+}  // namespace
+}  // namespace stellate::core

@@ -1,0 +1,178 @@
+#include "core/refinement/tangent_finder.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <string>
+
+#include "core/sample/random.h"
+#include "tests/core/support/samples.h"
+
+namespace stellate::core {
+namespace {
+
+using testing::Make;
+using testing::RandomPointsOn;
+using testing::Sample;
+
+constexpr int kPoints = 40;
+constexpr double kStep = 0.003;
+
+class TangentFinderTest : public ::testing::TestWithParam<std::string> {
+ protected:
+  TangentFinderTest()
+      : manifold_(Make(GetParam())),
+        k_(manifold_->dimension()),
+        d_(manifold_->ambient_dimension()),
+        finder_(k_, d_, kStep, 1) {
+    exact_.k = k_;
+    exact_.d = d_;
+    points_ = RandomPointsOn(*manifold_, kPoints, 3);
+    exact_.Append(points_, manifold_->TangentBasis(points_));
+  }
+
+  // Answers until nothing is asked for. `missing`: whether a query goes unanswered.
+  template <typename Missing>
+  Eigen::Index Finish(Missing&& missing) {
+    Eigen::Index asked = 0;
+    while (const QueryBlock* block = finder_.Next()) {
+      EXPECT_EQ(block->kind, QueryKind::kClosestPoint);
+      EXPECT_FALSE(block->want_tangents);
+      AnswerBlock answers;
+      answers.points = manifold_->ClosestPoint(block->points).points;
+      answers.found.assign(static_cast<std::size_t>(block->size()), 1);
+      for (Eigen::Index j = 0; j < block->size(); ++j)
+        if (missing(asked + j)) answers.found[static_cast<std::size_t>(j)] = 0;
+      asked += block->size();
+      finder_.Absorb(answers);
+    }
+    return asked;
+  }
+  Eigen::Index Finish() {
+    return Finish([](Eigen::Index) { return false; });
+  }
+
+  Eigen::Map<const Eigen::MatrixXd> Exact(std::uint32_t i) const {
+    return {exact_.Tangent(i), d_, k_};
+  }
+
+  // Largest sine between the found tangent space of point i and the exact one.
+  double Error(std::uint32_t i) const {
+    const Eigen::Map<const Eigen::MatrixXd> found(finder_.tangents().col(i).data(), d_, k_);
+    return (found - Exact(i) * (Exact(i).transpose() * found)).operatorNorm();
+  }
+
+  void ExpectAllFound() const {
+    ASSERT_EQ(finder_.tangents().cols(), kPoints);
+    for (std::uint32_t i = 0; i < kPoints; ++i) {
+      EXPECT_TRUE(finder_.ok()[i]) << "point " << i;
+      const Eigen::Map<const Eigen::MatrixXd> found(finder_.tangents().col(i).data(), d_, k_);
+      EXPECT_LT((found.transpose() * found - Eigen::MatrixXd::Identity(k_, k_)).norm(), 1e-12);
+      EXPECT_LT(Error(i), 2e-3) << "point " << i;  // far below what meshing tolerates, 0.03
+    }
+  }
+
+  // The exact basis of point i, each vector turned by `angle` towards a random direction.
+  std::vector<double> Turned(std::uint32_t i, double angle) const {
+    Random random(i, 17);
+    Eigen::MatrixXd basis = Exact(i);
+    for (int a = 0; a < k_; ++a) {
+      Eigen::VectorXd u(d_);
+      for (double& x : u) x = random.Normal();
+      u -= Exact(i) * (Exact(i).transpose() * u);
+      basis.col(a) = std::cos(angle) * basis.col(a) + std::sin(angle) * u.normalized();
+    }
+    const Eigen::MatrixXd q = Eigen::HouseholderQR<Eigen::MatrixXd>(basis).householderQ() *
+                              Eigen::MatrixXd::Identity(d_, k_);
+    return {q.data(), q.data() + q.size()};
+  }
+
+  void StartWithGuesses(double angle) {
+    guesses_.clear();
+    std::vector<const double*> pointers;
+    for (std::uint32_t i = 0; i < kPoints; ++i) guesses_.push_back(Turned(i, angle));
+    for (const auto& g : guesses_) pointers.push_back(g.data());
+    finder_.Start(points_, pointers);
+  }
+
+  std::unique_ptr<Manifold> manifold_;
+  int k_, d_;
+  TangentFinder finder_;
+  Sample exact_;
+  Eigen::MatrixXd points_;
+  std::vector<std::vector<double>> guesses_;
+};
+
+TEST_P(TangentFinderTest, FindsTangentsFromNothing) {
+  finder_.Start(points_, std::vector<const double*>(kPoints, nullptr));
+  const Eigen::Index asked = Finish();
+  ExpectAllFound();
+  EXPECT_EQ(asked, kPoints * 2 * std::min(k_ + 4, d_));  // however large d is
+}
+
+TEST_P(TangentFinderTest, FindsTangentsNearAGuessInTwoQueriesADirection) {
+  StartWithGuesses(0.3);
+  const Eigen::Index asked = Finish();
+  ExpectAllFound();
+  EXPECT_EQ(asked, kPoints * 2 * k_);
+}
+
+TEST_P(TangentFinderTest, RecoversFromGuessesThatAreFarOff) {
+  if (d_ < 2 * k_) return SUCCEED();  // no room to be at right angles
+  StartWithGuesses(1.55);
+  const Eigen::Index asked = Finish();
+  ExpectAllFound();
+  EXPECT_EQ(asked, kPoints * 2 * (k_ + std::min(k_ + 4, d_)));
+}
+
+TEST_P(TangentFinderTest, SaysWhereAnswersWereMissing) {
+  finder_.Start(points_, std::vector<const double*>(kPoints, nullptr));
+  const Eigen::Index each = 2 * std::min(k_ + 4, d_);
+  Finish([&](Eigen::Index query) { return query / each % 3 == 0 && query % each == 1; });
+  for (std::uint32_t i = 0; i < kPoints; ++i) {
+    EXPECT_EQ(finder_.ok()[i] != 0, i % 3 != 0) << "point " << i;
+    if (i % 3 == 0)
+      EXPECT_EQ(finder_.tangents().col(i).norm(), 0);
+    else
+      EXPECT_LT(Error(i), 2e-3);
+  }
+}
+
+TEST_P(TangentFinderTest, TriesAgainWithoutAGuessWhereAnswersWereMissing) {
+  StartWithGuesses(0.2);
+  Finish([&](Eigen::Index query) { return query == 0; });
+  ExpectAllFound();
+}
+
+TEST_P(TangentFinderTest, IsDeterministicAndCanStartAgain) {
+  const std::vector<const double*> none(kPoints, nullptr);
+  finder_.Start(points_, none);
+  Finish();
+  const Eigen::MatrixXd first = finder_.tangents();
+  StartWithGuesses(0.3);
+  Finish();
+  finder_.Start(points_, none);
+  Finish();
+  EXPECT_EQ(finder_.tangents(), first);
+}
+
+INSTANTIATE_TEST_SUITE_P(Catalogue, TangentFinderTest,
+                         ::testing::Values("torus", "so3", "sphere:2:50", "rp2", "circle:10"));
+
+// A surface taken for a curve has no tangent line, and a curve taken for a surface no plane.
+TEST(TangentFinder, RefusesTheWrongDimension) {
+  for (const bool too_many : {false, true}) {
+    const auto manifold = Make(too_many ? "circle:10" : "flat-torus:4");
+    TangentFinder finder(too_many ? 2 : 1, manifold->ambient_dimension(), kStep, 1);
+    const Eigen::MatrixXd points = RandomPointsOn(*manifold, kPoints, 3);
+    finder.Start(points, std::vector<const double*>(kPoints, nullptr));
+    while (const QueryBlock* block = finder.Next())
+      finder.Absorb({manifold->ClosestPoint(block->points).points, {}, {}});
+    int refused = 0;
+    for (const std::uint8_t ok : finder.ok()) refused += !ok;
+    EXPECT_GE(refused, kPoints * 3 / 4) << manifold->facts().spec;
+  }
+}
+
+}  // namespace
+}  // namespace stellate::core
