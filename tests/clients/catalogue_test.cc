@@ -71,7 +71,9 @@ std::vector<std::string> Specs() {
 }
 
 std::string NameOf(const ::testing::TestParamInfo<std::string>& info) {
-  std::string name = "_" + std::to_string(info.index) + "_" + info.param;
+  std::string name = info.param;
+  name += '_';
+  name += std::to_string(info.index);
   for (char& c : name) {
     if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
   }

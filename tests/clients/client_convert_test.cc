@@ -1,0 +1,159 @@
+#include "convert.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <string>
+
+#include "client/status_details.pb.h"
+#include "mesh_builder.h"
+#include "stellate/catalogue.h"
+
+namespace stellate::client {
+namespace {
+
+TEST(Arrays, TravelAndComeBack) {
+  const Eigen::MatrixXd columns = Eigen::MatrixXd::Random(6, 5);
+  v1::Array array;
+  ToArray(columns, {3, 2}, &array);
+  ASSERT_EQ(array.shape_size(), 3);
+  EXPECT_EQ(array.shape(0), 5u);
+  EXPECT_EQ(array.data().size(), 6u * 5 * 8);
+  const auto back = FromArray(array, {3, 2});
+  ASSERT_TRUE(back.has_value());
+  EXPECT_EQ(*back, columns);
+}
+
+TEST(Arrays, OfTheWrongShapeAreErrors) {
+  v1::Array array;
+  ToArray(Eigen::MatrixXd::Ones(6, 5), {3, 2}, &array);
+  EXPECT_FALSE(FromArray(array, {6}).has_value());
+  EXPECT_FALSE(FromArray(array, {2, 3}).has_value());
+  EXPECT_FALSE(FromArray(array, {}).has_value());
+  v1::Array cut = array;
+  cut.mutable_data()->pop_back();
+  EXPECT_FALSE(FromArray(cut, {3, 2}).has_value());
+  v1::Array huge = array;
+  huge.set_shape(0, std::numeric_limits<std::uint32_t>::max());
+  EXPECT_FALSE(FromArray(huge, {3, 2}).has_value());
+  const auto empty = FromArray(v1::Array(), {3});
+  ASSERT_TRUE(empty.has_value());
+  EXPECT_EQ(empty->cols(), 0);
+}
+
+TEST(Spec, CarriesWhatIsGivenAndNothingElse) {
+  const auto manifold = MakeManifold("torus", nullptr);
+  MeshOptions options;
+  options.epsilon = 0.25;
+  const auto plain = ToSpec(*manifold, options);
+  ASSERT_TRUE(plain.has_value());
+  EXPECT_EQ(plain->dimension(), 2u);
+  EXPECT_EQ(plain->ambient_dimension(), 3u);
+  EXPECT_EQ(plain->epsilon(), 0.25);
+  EXPECT_TRUE(plain->oracle().tangent_basis() && plain->oracle().intersect_flat());
+  EXPECT_FALSE(plain->criteria().has_sliver_bound() || plain->criteria().has_candidates());
+  EXPECT_EQ(plain->bounding_box().lower().shape(0), 3u);
+  EXPECT_EQ(plain->bounding_box().lower().shape_size(), 1);
+  EXPECT_FALSE(plain->has_seeds());
+  options.sliver_bound = 0;
+  options.max_vertices = 7;
+  const auto fuller = ToSpec(*manifold, options);
+  ASSERT_TRUE(fuller.has_value());
+  EXPECT_TRUE(fuller->criteria().has_sliver_bound());
+  EXPECT_EQ(fuller->limits().max_vertices(), 7u);
+}
+
+TEST(Spec, RefusesWhatTheWireCannotSay) {
+  const auto manifold = MakeManifold("torus", nullptr);
+  MeshOptions options;
+  options.workers = 0;
+  const auto spec = ToSpec(*manifold, options);
+  ASSERT_FALSE(spec.has_value());
+  EXPECT_EQ(spec.error().code, ErrorCode::kRefused);
+  EXPECT_NE(spec.error().message.find("workers is 0"), std::string::npos);
+}
+
+TEST(Statuses, KeepTheReasonAndTellWhoseFault) {
+  ErrorInfo info;
+  info.set_reason("ORACLE_OFF_FLAT");
+  info.set_domain("stellate.v1");
+  Status details;
+  google::protobuf::Any* any = details.add_details();
+  any->set_type_url("type.googleapis.com/google.rpc.ErrorInfo");
+  any->set_value(info.SerializeAsString());
+  const Error oracle = FromStatus(grpc::Status(grpc::StatusCode::INVALID_ARGUMENT, "query 3 ...",
+                                               details.SerializeAsString()));
+  EXPECT_EQ(oracle.code, ErrorCode::kOracleFailed);
+  EXPECT_EQ(oracle.reason, "ORACLE_OFF_FLAT");
+  EXPECT_EQ(oracle.message, "query 3 ...");
+  EXPECT_EQ(FromStatus(grpc::Status(grpc::StatusCode::INVALID_ARGUMENT, "")).code,
+            ErrorCode::kRefused);
+  EXPECT_EQ(FromStatus(grpc::Status(grpc::StatusCode::UNAVAILABLE, "")).code,
+            ErrorCode::kServerFailed);
+  EXPECT_EQ(FromStatus(grpc::Status(grpc::StatusCode::NOT_FOUND, "", "no protobuf")).reason, "");
+}
+
+v1::MeshDelta Delta(std::uint64_t first, const Eigen::MatrixXd& points,
+                    const std::vector<std::uint32_t>& added,
+                    const std::vector<std::uint32_t>& removed) {
+  v1::MeshDelta delta;
+  delta.set_first_vertex(first);
+  ToArray(points, {2}, delta.mutable_points());
+  for (const auto& [ids, array] : {std::pair(&added, delta.mutable_added()),
+                                   std::pair(&removed, delta.mutable_removed())}) {
+    array->add_shape(static_cast<std::uint32_t>(ids->size() / 2));
+    array->add_shape(2);
+    array->set_data(ids->data(), ids->size() * 4);
+  }
+  return delta;
+}
+
+TEST(MeshBuilder, EndsWithWhatWasAddedAndNotRemoved) {
+  auto builder = MeshBuilder::Create(1, 2);
+  ASSERT_TRUE(builder.has_value());
+  const Eigen::MatrixXd points = Eigen::MatrixXd::Random(2, 4);
+  ASSERT_TRUE(builder->Absorb(Delta(0, points.leftCols(3), {0, 1, 1, 2, 0, 2}, {})));
+  ASSERT_TRUE(builder->Absorb(Delta(3, points.rightCols(1), {2, 3, 0, 3}, {0, 2, 0, 1})));
+  ASSERT_TRUE(builder->Absorb(Delta(4, Eigen::MatrixXd(2, 0), {0, 1}, {})));  // it comes back
+  const Expected<Mesh> mesh = builder->Take();
+  ASSERT_TRUE(mesh.has_value());
+  EXPECT_EQ(mesh->points, points);
+  SimplexMatrix expected(2, 4);
+  expected << 0, 0, 1, 2, 1, 3, 2, 3;
+  EXPECT_EQ(mesh->simplices, expected);
+}
+
+TEST(MeshBuilder, StaysRightThroughALongHistory) {
+  // A path whose last edge moves on a hundred thousand times: more removals than are kept.
+  auto builder = MeshBuilder::Create(1, 2);
+  ASSERT_TRUE(builder.has_value());
+  ASSERT_TRUE(builder->Absorb(Delta(0, Eigen::MatrixXd::Zero(2, 200), {0, 1}, {})));
+  for (std::uint32_t step = 0; step < 1000; ++step) {
+    std::vector<std::uint32_t> added, removed;
+    for (std::uint32_t i = 0; i < 100; ++i) {
+      std::vector<std::uint32_t>& ids = step % 2 == 0 ? added : removed;
+      ids.insert(ids.end(), {i, i + 100});
+    }
+    ASSERT_TRUE(builder->Absorb(Delta(200, Eigen::MatrixXd(2, 0), added, removed)));
+  }
+  const Expected<Mesh> mesh = builder->Take();
+  ASSERT_TRUE(mesh.has_value());
+  ASSERT_EQ(mesh->simplices.cols(), 1);
+  EXPECT_EQ(mesh->simplices(1, 0), 1u);
+}
+
+TEST(MeshBuilder, RefusesWhatMakesNoSense) {
+  auto builder = MeshBuilder::Create(1, 2);
+  ASSERT_TRUE(builder.has_value());
+  EXPECT_FALSE(builder->Absorb(Delta(5, Eigen::MatrixXd::Zero(2, 1), {}, {})));  // a gap
+  v1::MeshDelta wide = Delta(0, Eigen::MatrixXd(2, 0), {0, 1}, {});
+  wide.mutable_added()->set_shape(1, 3);
+  EXPECT_FALSE(builder->Absorb(wide));
+  ASSERT_TRUE(builder->Absorb(Delta(0, Eigen::MatrixXd::Zero(2, 1), {0, 1}, {})));
+  EXPECT_FALSE(builder->Take().has_value());  // vertex 1 never came
+  EXPECT_FALSE(MeshBuilder::Create(0, 2).has_value());
+  EXPECT_FALSE(MeshBuilder::Create(kMaxSimplexDimension + 1, 20).has_value());
+}
+
+}  // namespace
+}  // namespace stellate::client

@@ -1,0 +1,245 @@
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "stellate/mesh.h"
+
+namespace stellate {
+namespace {
+
+class MeshFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const ::testing::TestInfo* info = ::testing::UnitTest::GetInstance()->current_test_info();
+    directory_ = std::filesystem::temp_directory_path() /
+                 ("stellate-mesh-file-" + std::to_string(getpid()) + "-" + info->name());
+    std::filesystem::create_directories(directory_);
+  }
+  void TearDown() override { std::filesystem::remove_all(directory_); }
+
+  std::string Path(const std::string& name) const { return (directory_ / name).string(); }
+  std::string Saved(const Mesh& mesh, const std::string& name) {
+    const Expected<void> saved = mesh.Save(Path(name));
+    EXPECT_TRUE(saved.has_value()) << saved.error().message;
+    std::ifstream file(Path(name), std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  }
+  std::string Refusal(const Mesh& mesh, const std::string& name) {
+    const Expected<void> saved = mesh.Save(Path(name));
+    EXPECT_FALSE(saved.has_value());
+    EXPECT_FALSE(std::filesystem::exists(Path(name)));
+    if (saved) return "";
+    EXPECT_EQ(saved.error().code, ErrorCode::kFileFailed);
+    return saved.error().message;
+  }
+
+  std::filesystem::path directory_;
+};
+
+// A tetrahedron's boundary in R^d, with numbers that do not fit into few digits.
+Mesh Surface(int d) {
+  Mesh mesh;
+  mesh.points = Eigen::MatrixXd::Zero(d, 4);
+  mesh.points(0, 1) = 1.0 / 3;
+  mesh.points(1, 2) = -1e-300;
+  mesh.points(d - 1, 3) = 12345678.9;
+  mesh.simplices.resize(3, 4);
+  mesh.simplices << 0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3;
+  return mesh;
+}
+
+TEST_F(MeshFile, TxtHoldsEveryDigit) {
+  EXPECT_EQ(Saved(Surface(3), "a.txt"),
+            "2 3 4 4\n"
+            "0 0 0\n"
+            "0.33333333333333331 0 0\n"
+            "0 -1.0000000000000001e-300 0\n"
+            "0 0 12345678.9\n"
+            "0 1 2\n0 1 3\n0 2 3\n1 2 3\n");
+}
+
+TEST_F(MeshFile, TxtTakesAnyDimension) {
+  Mesh mesh;
+  mesh.points = Eigen::MatrixXd::Identity(7, 5);
+  mesh.simplices = SimplexMatrix(5, 1);
+  mesh.simplices << 0, 1, 2, 3, 4;
+  const std::string text = Saved(mesh, "a.txt");
+  EXPECT_EQ(text.substr(0, text.find('\n')), "4 7 5 1");
+  EXPECT_NE(text.find("\n0 1 2 3 4\n"), std::string::npos);
+}
+
+TEST_F(MeshFile, OffKeepsAllCoordinates) {
+  const std::string three = Saved(Surface(3), "a.off"), five = Saved(Surface(5), "b.off");
+  EXPECT_EQ(three.rfind("OFF\n4 4 0\n", 0), 0u) << three;
+  EXPECT_EQ(five.rfind("nOFF\n5\n4 4 0\n0 0 0 0 0\n", 0), 0u) << five;
+}
+
+// The faces of an oriented closed surface pass each edge once in each direction.
+void ExpectEdgesCancel(const std::vector<std::vector<int>>& faces) {
+  std::map<std::pair<int, int>, int> passed;
+  for (const std::vector<int>& face : faces) {
+    ASSERT_EQ(face.size(), 3u);
+    for (size_t i = 0; i < 3; ++i) ++passed[{face[i], face[(i + 1) % 3]}];
+  }
+  for (const auto& [edge, count] : passed) {
+    EXPECT_EQ(count, 1);
+    EXPECT_EQ((passed.count({edge.second, edge.first})), 1u);
+  }
+}
+
+std::vector<std::vector<int>> LinesAfter(const std::string& text, const std::string& prefix) {
+  std::vector<std::vector<int>> result;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.rfind(prefix, 0) != 0) continue;
+    std::istringstream numbers(line.substr(prefix.size()));
+    result.emplace_back(std::istream_iterator<int>(numbers), std::istream_iterator<int>());
+  }
+  return result;
+}
+
+TEST_F(MeshFile, ObjIsOrientedAndCountsFromOne) {
+  const std::string text = Saved(Surface(3), "a.obj");
+  const auto faces = LinesAfter(text, "f ");
+  ASSERT_EQ(faces.size(), 4u);
+  ExpectEdgesCancel(faces);
+  for (const auto& face : faces) {
+    for (const int id : face) EXPECT_TRUE(1 <= id && id <= 4);
+  }
+  EXPECT_NE(text.find("v 0.33333333333333331 0 0\n"), std::string::npos);
+}
+
+TEST_F(MeshFile, CurvesOfThePlaneGetAThirdCoordinate) {
+  Mesh mesh;
+  mesh.points = Eigen::MatrixXd::Identity(2, 2);
+  mesh.simplices = SimplexMatrix(2, 1);
+  mesh.simplices << 0, 1;
+  EXPECT_EQ(Saved(mesh, "a.obj"), "v 1 0 0\nv 0 1 0\nl 1 2\n");
+  const std::string ply = Saved(mesh, "a.ply");
+  EXPECT_NE(ply.find("element edge 1\nproperty int vertex1\nproperty int vertex2\nend_header\n"
+                     "1 0 0\n0 1 0\n0 1\n"),
+            std::string::npos)
+      << ply;
+}
+
+TEST_F(MeshFile, PlyHoldsFaces) {
+  const std::string text = Saved(Surface(3), "a.ply");
+  EXPECT_EQ(text.rfind("ply\nformat ascii 1.0\nelement vertex 4\n", 0), 0u);
+  EXPECT_NE(text.find("element face 4\nproperty list uchar int vertex_indices\n"),
+            std::string::npos);
+  ExpectEdgesCancel(LinesAfter(text, "3 "));
+}
+
+// The numbers of a VTU data array: base64 of the byte count and the bytes.
+template <typename Number>
+std::vector<Number> VtuNumbers(const std::string& xml, const std::string& name) {
+  const size_t array = xml.find("Name=\"" + name + "\"");
+  EXPECT_NE(array, std::string::npos) << name;
+  if (array == std::string::npos) return {};
+  const size_t start = xml.find('>', array) + 1;
+  std::string bytes;
+  std::uint32_t bits = 0;
+  int held = 0;
+  for (const char c : xml.substr(start, xml.find('<', start) - start)) {
+    if (c == '=') break;
+    const int digit = c >= 'a' ? c - 'a' + 26 : c >= 'A' ? c - 'A' : c == '+' ? 62 : c == '/' ? 63 : c - '0' + 52;
+    bits = bits << 6 | static_cast<std::uint32_t>(digit);
+    held += 6;
+    if (held >= 8) {
+      held -= 8;
+      bytes += static_cast<char>(bits >> held & 0xff);
+    }
+  }
+  std::uint64_t size = 0;
+  std::memcpy(&size, bytes.data(), sizeof size);
+  EXPECT_EQ(bytes.size(), sizeof size + size);
+  std::vector<Number> numbers(size / sizeof(Number));
+  std::memcpy(numbers.data(), bytes.data() + sizeof size, size);
+  return numbers;
+}
+
+TEST_F(MeshFile, VtuHoldsPointsAndCells) {
+  const Mesh mesh = Surface(3);
+  const std::string xml = Saved(mesh, "a.vtu");
+  EXPECT_NE(xml.find("NumberOfPoints=\"4\" NumberOfCells=\"4\""), std::string::npos);
+  const std::vector<double> points = VtuNumbers<double>(xml, "Points");
+  EXPECT_EQ(points, std::vector<double>(mesh.points.data(), mesh.points.data() + 12));
+  const auto ids = VtuNumbers<std::int64_t>(xml, "connectivity");
+  ASSERT_EQ(ids.size(), 12u);
+  std::vector<std::vector<int>> faces;
+  for (size_t i = 0; i < 12; i += 3) {
+    faces.push_back({static_cast<int>(ids[i]), static_cast<int>(ids[i + 1]),
+                     static_cast<int>(ids[i + 2])});
+  }
+  ExpectEdgesCancel(faces);
+  EXPECT_EQ(VtuNumbers<std::int64_t>(xml, "offsets"), (std::vector<std::int64_t>{3, 6, 9, 12}));
+  EXPECT_EQ(VtuNumbers<std::uint8_t>(xml, "types"), (std::vector<std::uint8_t>{5, 5, 5, 5}));
+  EXPECT_EQ(xml.find("coordinates"), std::string::npos);
+}
+
+TEST_F(MeshFile, VtuKeepsHighCoordinatesAsData) {
+  const Mesh mesh = Surface(6);
+  const std::string xml = Saved(mesh, "a.vtu");
+  EXPECT_EQ(VtuNumbers<double>(xml, "coordinates"),
+            std::vector<double>(mesh.points.data(), mesh.points.data() + 24));
+  EXPECT_EQ(VtuNumbers<double>(xml, "Points").size(), 12u);
+}
+
+TEST_F(MeshFile, RefusesWhatAFormatCannotHold) {
+  Mesh solid = Surface(3);
+  solid.simplices = SimplexMatrix(4, 1);
+  solid.simplices << 0, 1, 2, 3;
+  for (const std::string ending : {".obj", ".off", ".ply"}) {
+    EXPECT_NE(Refusal(solid, "a" + ending).find("dimension 3"), std::string::npos) << ending;
+  }
+  EXPECT_NE(Refusal(Surface(4), "a.obj").find("4 coordinates"), std::string::npos);
+  EXPECT_NE(Refusal(Surface(4), "a.ply").find("4 coordinates"), std::string::npos);
+  Mesh thick = Surface(5);
+  thick.simplices = SimplexMatrix::Zero(5, 0);
+  EXPECT_NE(Refusal(thick, "a.vtu").find("dimension 4"), std::string::npos);
+  EXPECT_NE(Refusal(thick, "a.stl").find("'.stl'"), std::string::npos);
+  EXPECT_NE(Refusal(thick, "plain").find(".txt"), std::string::npos);
+}
+
+TEST_F(MeshFile, SaysWhyAFileCannotBeWritten) {
+  EXPECT_NE(Refusal(Surface(3), "missing/a.txt").find("No such file"), std::string::npos);
+}
+
+TEST(OrientedSimplices, LeavesAOneSidedSurfaceAlone) {
+  SimplexMatrix plane(3, 10);  // the six-vertex projective plane
+  plane << 0, 0, 0, 0, 0, 1, 1, 1, 2, 2,  //
+      1, 1, 2, 3, 4, 2, 3, 4, 3, 3,       //
+      2, 3, 4, 5, 5, 5, 4, 5, 4, 5;
+  EXPECT_EQ(OrientedSimplices(plane), plane);
+}
+
+TEST(OrientedSimplices, LeavesABranchingComplexAlone) {
+  SimplexMatrix book(3, 3);  // three pages on one edge
+  book << 0, 0, 0, 1, 1, 1, 2, 3, 4;
+  EXPECT_EQ(OrientedSimplices(book), book);
+}
+
+TEST(OrientedSimplices, OrientsThreeSpheres) {
+  // The boundary of the 4-simplex: signs must alternate with the vertex left out.
+  SimplexMatrix sphere(4, 5);
+  for (int drop = 0; drop < 5; ++drop) {
+    for (int i = 0; i < 4; ++i) sphere(i, drop) = static_cast<std::uint32_t>(i < drop ? i : i + 1);
+  }
+  const SimplexMatrix oriented = OrientedSimplices(sphere);
+  for (int j = 0; j < 5; ++j) {
+    const bool swapped = oriented(2, j) > oriented(3, j);
+    EXPECT_EQ(swapped, j % 2 == 1) << j;
+  }
+}
+
+}  // namespace
+}  // namespace stellate

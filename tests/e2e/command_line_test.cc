@@ -1,0 +1,163 @@
+// The `stellate` program: what it prints, writes and exits with.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
+
+#include "live.h"
+
+namespace stellate::testing {
+namespace {
+
+class CommandLine : public Live {
+ protected:
+  struct Result {
+    int status = -1;
+    std::string output;  // standard output and error together
+  };
+  static std::string Program() {
+    const char* program = std::getenv("STELLATE");
+    return program != nullptr ? program : "stellate";
+  }
+  static Result Run(const std::string& arguments) {
+    Result result;
+    std::FILE* pipe = popen(("'" + Program() + "' " + arguments + " 2>&1").c_str(), "r");
+    if (pipe == nullptr) return result;
+    std::array<char, 4096> buffer;
+    while (const size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe)) {
+      result.output.append(buffer.data(), count);
+    }
+    const int status = pclose(pipe);
+    if (WIFEXITED(status)) result.status = WEXITSTATUS(status);
+    return result;
+  }
+  static Result OnServer(const std::string& arguments) {
+    return Run(arguments + " --server '" + Server() + "'");
+  }
+};
+
+TEST_F(CommandLine, CertifiedMeshExitsZeroAndWritesItsFiles) {
+  const auto directory =
+      std::filesystem::temp_directory_path() / ("stellate-cli-" + std::to_string(getpid()));
+  std::filesystem::create_directories(directory);
+  const std::string txt = (directory / "a.txt").string(), vtu = (directory / "a.vtu").string();
+  const Result result = OnServer("mesh torus --epsilon 0.2 -o " + txt + " -o " + vtu);
+  EXPECT_EQ(result.status, 0) << result.output;
+  EXPECT_NE(result.output.find("CERTIFIED"), std::string::npos) << result.output;
+  EXPECT_NE(result.output.find("Euler characteristic 0"), std::string::npos);
+  EXPECT_EQ(result.output.find('\r'), std::string::npos) << "no progress bar off a terminal";
+  std::ifstream file(txt);
+  int k = 0, d = 0, vertices = 0, simplices = 0;
+  file >> k >> d >> vertices >> simplices;
+  EXPECT_EQ(k, 2);
+  EXPECT_EQ(d, 3);
+  EXPECT_EQ(simplices, 2 * vertices);  // a torus
+  EXPECT_GT(std::filesystem::file_size(vtu), 0u);
+  std::filesystem::remove_all(directory);
+}
+
+TEST_F(CommandLine, JsonAndQuietSayWhatTheyShould) {
+  const Result json = OnServer("mesh circle:4 -e 0.3 --json");
+  EXPECT_EQ(json.status, 0);
+  EXPECT_EQ(json.output.front(), '{');
+  EXPECT_NE(json.output.find("\"certified\": true"), std::string::npos) << json.output;
+  const Result quiet = OnServer("mesh circle:4 -e 0.3 --quiet");
+  EXPECT_EQ(quiet.status, 0);
+  EXPECT_EQ(quiet.output, "");
+}
+
+TEST_F(CommandLine, ClosestPointsAloneWillDo) {
+  EXPECT_EQ(OnServer("mesh torus -e 0.2 --closest-point-only -q").status, 0);
+}
+
+TEST_F(CommandLine, UncertifiedMeshExitsOne) {
+  const Result result = OnServer("mesh torus --epsilon 0.2 --max-vertices 50");
+  EXPECT_EQ(result.status, 1) << result.output;
+  EXPECT_NE(result.output.find("NOT CERTIFIED"), std::string::npos) << result.output;
+}
+
+TEST_F(CommandLine, UsageAndRefusalsExitTwo) {
+  for (const std::string arguments :
+       {"", "frobnicate", "mesh", "mesh torus", "mesh torus --epsilon", "mesh torus -e x",
+        "mesh klein -e 1", "mesh torus -e 0.1 --no-such-flag"}) {
+    const Result result = Run(arguments);
+    EXPECT_EQ(result.status, 2) << arguments << ": " << result.output;
+    EXPECT_NE(result.output, "");
+  }
+  const Result refused = OnServer("mesh torus --epsilon -1");
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_NE(refused.output.find("INVALID_ARGUMENT: "), std::string::npos) << refused.output;
+  EXPECT_NE(refused.output.find("-1"), std::string::npos) << refused.output;
+  EXPECT_EQ(OnServer("mesh torus -e 0.2 -q -o /no/such/place.txt").status, 2);
+}
+
+TEST_F(CommandLine, ServerThatIsNotThereExitsThree) {
+  EXPECT_EQ(Run("mesh torus -e 0.2 --server unix:/nowhere/at/all").status, 3);
+  EXPECT_EQ(Run("health --server unix:/nowhere/at/all").status, 3);
+}
+
+TEST_F(CommandLine, HealthListVersionAndHelpExitZero) {
+  const Result health = OnServer("health");
+  EXPECT_EQ(health.status, 0) << health.output;
+  EXPECT_NE(health.output.find(": serving"), std::string::npos) << health.output;
+  const Result list = Run("list");
+  EXPECT_EQ(list.status, 0);
+  for (const CatalogueEntry& entry : ListManifolds()) {
+    EXPECT_NE(list.output.find(entry.syntax), std::string::npos) << entry.syntax;
+  }
+  EXPECT_EQ(Run("--version").output.rfind("stellate ", 0), 0u);
+  EXPECT_EQ(Run("--version").status, 0);
+  EXPECT_EQ(Run("mesh --help").status, 0);
+}
+
+TEST_F(CommandLine, CtrlCEndsItCleanly) {
+  // A mesh too large to finish, in a process group of its own as in a terminal's foreground.
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  const std::string program = Program();
+  const pid_t child = fork();
+  if (child == 0) {
+    setpgid(0, 0);
+    dup2(ends[1], STDOUT_FILENO);
+    close(ends[0]);
+    close(ends[1]);
+    execl(program.c_str(), program.c_str(), "mesh", "torus", "-e", "0.003", nullptr);
+    _exit(127);
+  }
+  close(ends[1]);
+  setpgid(child, child);
+  // Its own server is its child: once that is there, the mesh is about to start.
+  const std::string children =
+      "/proc/" + std::to_string(child) + "/task/" + std::to_string(child) + "/children";
+  for (std::string list; list.empty();) {
+    std::ifstream file(children);
+    list.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+    ASSERT_EQ(waitpid(child, nullptr, WNOHANG), 0) << "it ended by itself";
+    usleep(10'000);
+  }
+  usleep(500'000);  // well into the mesh; right at the start would do as well
+  kill(-child, SIGINT);
+  std::string output;
+  std::array<char, 4096> buffer;
+  for (ssize_t count; (count = read(ends[0], buffer.data(), buffer.size())) > 0;) {
+    output.append(buffer.data(), static_cast<size_t>(count));
+  }
+  close(ends[0]);
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status)) << "a signal ended it";
+  EXPECT_EQ(WEXITSTATUS(status), 1);
+  EXPECT_NE(output.find("cancelled"), std::string::npos) << output;
+}
+
+}  // namespace
+}  // namespace stellate::testing

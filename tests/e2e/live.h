@@ -1,0 +1,54 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+
+#include "embedded_server.h"
+#include "stellate/catalogue.h"
+#include "stellate/client.h"
+
+namespace stellate::testing {
+
+// One real stellated for all tests of a program, so that each finds it as the others left it.
+class Live : public ::testing::Test {
+ protected:
+  static const std::string& Server() {
+    static const std::unique_ptr<client::EmbeddedServer> server = [] {
+      auto started = client::EmbeddedServer::Start();
+      if (!started) ADD_FAILURE() << started.error().message;
+      return started ? std::move(*started) : nullptr;
+    }();
+    static const std::string address = server ? server->address() : "unix:/nowhere";
+    return address;
+  }
+
+  static MeshOptions At(double epsilon) {
+    MeshOptions options;
+    options.epsilon = epsilon;
+    options.server = Server();
+    return options;
+  }
+
+  static std::unique_ptr<Manifold> Make(const std::string& spec) {
+    std::string error;
+    auto manifold = MakeManifold(spec, &error);
+    EXPECT_NE(manifold, nullptr) << error;
+    return manifold;
+  }
+};
+
+// Same points, bit for bit, and same simplices.
+inline ::testing::AssertionResult AreIdentical(const Mesh& a, const Mesh& b) {
+  if (a.points.rows() != b.points.rows() || a.points.cols() != b.points.cols() ||
+      a.points != b.points) {
+    return ::testing::AssertionFailure() << "points differ";
+  }
+  if (a.simplices.cols() != b.simplices.cols() || a.simplices != b.simplices) {
+    return ::testing::AssertionFailure() << "simplices differ";
+  }
+  return ::testing::AssertionSuccess();
+}
+
+}  // namespace stellate::testing
