@@ -59,6 +59,7 @@ class StarComplex<K>::CentreJudge final : public Cell::Judge {
       return;
     }
     v.norm2 = Dot(centre, centre, n);
+    for (int a = 0; a < K; ++a) v.x[a] = Dot(p_.tangent + a * n, centre, n);
   }
 
  private:

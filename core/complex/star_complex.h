@@ -45,6 +45,7 @@ class StarComplex {
 
   std::uint32_t size() const { return static_cast<std::uint32_t>(points_.size() / stride()); }
   int d() const { return d_; }
+  Judging judging() const { return judging_; }
   const double* Point(std::uint32_t id) const { return points_.data() + id * stride(); }
   // K rows of d: row a is tangent vector a.
   const double* Tangent(std::uint32_t id) const { return tangents_.data() + id * stride() * K; }

@@ -137,22 +137,30 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
   scratch.cut.assign(old_count, 0);
   scratch.stack.assign(1, static_cast<Index>(worst));
   scratch.cut[worst] = 1;
-  std::size_t removed_count = 0;
-  scratch.crossings.clear();
   while (!scratch.stack.empty()) {
     const Index v = scratch.stack.back();
     scratch.stack.pop_back();
+    for (const Index w : vertices_[v].adjacent) {
+      if (scratch.cut[w] || !(scratch.excess[w] > 0)) continue;
+      scratch.cut[w] = 1;
+      scratch.stack.push_back(w);
+    }
+  }
+  if (judge) {
+    if (!Tidy(scratch)) return false;
+    scratch.facets = facets_;
+    scratch.vertices = vertices_;
+    scratch.centres = centres_;
+  }
+  scratch.crossings.clear();
+  std::size_t removed_count = 0;
+  for (std::size_t v = 0; v < old_count; ++v) {
+    if (!scratch.cut[v]) continue;
     ++removed_count;
     for (int s = 0; s < K; ++s) {
       const Index w = vertices_[v].adjacent[s];
-      if (scratch.excess[w] > 0) {
-        if (!scratch.cut[w]) {
-          scratch.cut[w] = 1;
-          scratch.stack.push_back(w);
-        }
-      } else {
-        scratch.crossings.push_back({w, v, static_cast<Index>(s)});
-      }
+      if (!scratch.cut[w])
+        scratch.crossings.push_back({w, static_cast<Index>(v), static_cast<Index>(s)});
     }
   }
   if (removed_count == old_count) return false;
@@ -194,18 +202,31 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
     if (judge) judge->Centre(*this, v, centres_.data() + created * d);
   }
 
-  // Neighbours on the new facet: around each two-dimensional face, walk from the removed end of
-  // one crossing edge through removed vertices to the next crossing edge.
+  if (!Stitch(scratch, old_count)) {
+    facets_ = scratch.facets;
+    vertices_ = scratch.vertices;
+    centres_ = scratch.centres;
+    return false;
+  }
+  Compact(scratch, d);
+  return true;
+}
+
+// Makes each vertex on the new facet a neighbour of its K-1 others: around each two-dimensional
+// face, walk from the removed end of one crossing edge through removed vertices to the next
+// crossing edge. False where that goes in circles: what was cut off is no ball.
+template <int K>
+bool RestrictedVoronoiCell<K>::Stitch(Scratch& scratch, std::size_t old_count) {
   for (std::size_t c = 0; c < scratch.crossings.size(); ++c) {
     Vertex& v = vertices_[old_count + c];
     for (int i = 1; i < K; ++i) {
       Index at = scratch.crossings[c].removed;
       Index entered = vertices_[at].facet[scratch.crossings[c].slot];  // not on the edge behind
       Index drop = v.facet[i];
-      while (true) {
+      for (std::size_t steps = 0;; ++steps) {
         const Vertex& here = vertices_[at];
-        int s = 0;
-        while (here.facet[s] != drop) ++s;
+        const int s = static_cast<int>(std::find(here.facet, here.facet + K, drop) - here.facet);
+        if (s == K || steps > old_count) return false;
         const Index next = here.adjacent[s];
         if (next >= old_count) {
           v.adjacent[i] = next;
@@ -221,8 +242,51 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
       }
     }
   }
-  Compact(scratch, d);
   return true;
+}
+
+// A judged cell is no convex polytope: a ball may take a bite that leaves a facet in pieces. Keeps
+// of each facet, and of the whole, the largest piece. False if nothing is left.
+template <int K>
+bool RestrictedVoronoiCell<K>::Tidy(Scratch& scratch) const {
+  const std::size_t count = vertices_.size();
+  constexpr std::size_t kWhole = static_cast<std::size_t>(-1);
+  const auto on = [&](const Vertex& v, std::size_t facet) {
+    return facet == kWhole ||
+           std::find(v.facet, v.facet + K, static_cast<Index>(facet)) != v.facet + K;
+  };
+  // Cuts off all but the largest piece; says whether anything was.
+  const auto keep_largest = [&](std::size_t facet) {
+    auto& seen = scratch.remap;
+    seen.assign(count, 0);
+    auto& pieces = scratch.pieces;
+    pieces.clear();
+    for (std::size_t start = 0; start < count; ++start) {
+      if (scratch.cut[start] || seen[start] || !on(vertices_[start], facet)) continue;
+      pieces.emplace_back(1, static_cast<Index>(start));
+      seen[start] = 1;
+      for (std::size_t i = 0; i < pieces.back().size(); ++i) {
+        for (const Index w : vertices_[pieces.back()[i]].adjacent) {
+          if (scratch.cut[w] || seen[w] || !on(vertices_[w], facet)) continue;
+          seen[w] = 1;
+          pieces.back().push_back(w);
+        }
+      }
+    }
+    if (pieces.size() < 2) return false;
+    std::size_t largest = 0;
+    for (std::size_t i = 1; i < pieces.size(); ++i)
+      if (pieces[i].size() > pieces[largest].size()) largest = i;
+    for (std::size_t i = 0; i < pieces.size(); ++i)
+      if (i != largest)
+        for (const Index v : pieces[i]) scratch.cut[v] = 1;
+    return true;
+  };
+  for (bool again = true; again;) {
+    again = keep_largest(kWhole);
+    for (std::size_t f = 0; f < facets_.size(); ++f) again |= keep_largest(f);
+  }
+  return std::find(scratch.cut.begin(), scratch.cut.end(), 0) != scratch.cut.end();
 }
 
 // Drops the cut vertices and the facets that no vertex is left on; recomputes what is cached.

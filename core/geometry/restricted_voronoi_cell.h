@@ -51,6 +51,11 @@ class RestrictedVoronoiCell {
     std::vector<Index> stack, remap;
     struct Crossing { Index kept, removed, slot; };  // slot: of the new vertex's edge in `removed`
     std::vector<Crossing> crossings;
+    // With a judge: the cell as it was, should the cut turn out to be impossible.
+    std::vector<Facet> facets;
+    std::vector<Vertex> vertices;
+    std::vector<double> centres;
+    std::vector<std::vector<Index>> pieces;
   };
 
   // Where the vertices are judged. Without one, at their place in T_pM: the cell is the convex
@@ -60,7 +65,8 @@ class RestrictedVoronoiCell {
    public:
     virtual ~Judge() = default;
     virtual int d() const = 0;
-    // Writes the centre of v, relative to p (d numbers), and sets v.norm2 to its squared norm.
+    // Writes the centre of v, relative to p (d numbers); sets v.norm2 to its squared norm and v.x
+    // to its tangent coordinates.
     virtual void Centre(const RestrictedVoronoiCell& cell, Vertex& v, double* centre) const = 0;
   };
 
@@ -70,7 +76,7 @@ class RestrictedVoronoiCell {
   // Cuts away { x : normal . x > offset }. Returns whether anything was cut. A half-space that
   // would cut everything away (it cannot, for offset > 0, but in rounding) is refused. With a
   // judge, the same one for the cell's whole life, `step` is q - p (d numbers), and what is cut away
-  // is { c : step . c > offset }.
+  // is { c : step . c > offset }; a cut that would leave no polytope is refused too.
   bool Clip(std::uint32_t id, const double* normal, double offset, Scratch& scratch,
             const Judge* judge = nullptr, const double* step = nullptr);
 
@@ -108,6 +114,8 @@ class RestrictedVoronoiCell {
   }
   void Locate(Vertex& v, const Vertex& kept, const Vertex& removed, double s, double t,
               double slack) const;
+  bool Tidy(Scratch& scratch) const;
+  bool Stitch(Scratch& scratch, std::size_t old_count);
   void Compact(Scratch& scratch, std::size_t d);
 
   std::vector<Facet> facets_;

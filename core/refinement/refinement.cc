@@ -51,7 +51,7 @@ ResolvedCriteria Resolve(const Specification& spec) {
   r.small_sliver_radius = c.small_sliver_radius;
   r.candidates = c.candidates.value_or(spec.dimension <= 2 ? 1 : 10);
   r.flat_alternations = c.flat_alternations;
-  r.judging = c.judging.value_or(Judging::kFlats);
+  r.judging = c.judging.value_or(spec.dimension <= 2 ? Judging::kFlats : Judging::kCommonCentre);
   double step = kDefaultAdvanceEpsilons * spec.epsilon;
   if (spec.bounding_box) {
     const double diagonal = (spec.bounding_box->upper - spec.bounding_box->lower).norm();

@@ -146,6 +146,48 @@ bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p,
   return true;
 }
 
+// The sign of the simplex on p and K facets' points, seen in T_pM.
+template <int K>
+double Orientation(const RestrictedVoronoiCell<K>& cell, const std::uint16_t* facets) {
+  double m[K][K];
+  for (int r = 0; r < K; ++r)
+    std::copy_n(cell.facets()[facets[r]].normal, K, m[r]);
+  double sign = 1;
+  for (int c = 0; c < K; ++c) {
+    int pivot = c;
+    for (int r = c + 1; r < K; ++r)
+      if (std::abs(m[r][c]) > std::abs(m[pivot][c])) pivot = r;
+    if (m[pivot][c] == 0) return 0;
+    if (pivot != c) {
+      std::swap(m[pivot], m[c]);
+      sign = -sign;
+    }
+    if (m[c][c] < 0) sign = -sign;
+    for (int r = c + 1; r < K; ++r) {
+      const double factor = m[r][c] / m[c][c];
+      for (int j = c + 1; j < K; ++j) m[r][j] -= factor * m[c][j];
+    }
+  }
+  return sign;
+}
+
+// Whether the simplex dual to v and a neighbour of it in star(p) overlap near the facet they share.
+template <int K>
+bool IsFolded(const RestrictedVoronoiCell<K>& cell,
+              const typename RestrictedVoronoiCell<K>::Vertex& v) {
+  const double here = Orientation<K>(cell, v.facet);
+  if (here == 0) return true;
+  for (int s = 0; s < K; ++s) {
+    const auto& w = cell.vertices()[v.adjacent[s]];
+    std::uint16_t facets[K];
+    std::copy(v.facet, v.facet + K, facets);
+    for (const std::uint16_t f : w.facet)
+      if (std::find(v.facet, v.facet + K, f) == v.facet + K) facets[s] = f;
+    if (Orientation<K>(cell, facets) * here >= 0) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 template <int K>
@@ -162,7 +204,10 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& comp
     if (worst) return AtVertex<K>(Rule::kSliver, *worst, false);
   }
   for (const Vertex& v : cell.vertices())
-    if ((!worst || v.norm2 > worst->norm2) && !IsConsistent<K>(complex, p, v)) worst = &v;
+    if ((!worst || v.norm2 > worst->norm2) &&
+        (!IsConsistent<K>(complex, p, v) ||
+         (complex.judging() == Judging::kCommonCentre && IsFolded<K>(cell, v))))
+      worst = &v;
   if (worst) return AtVertex<K>(Rule::kInconsistent, *worst, false);
   return std::nullopt;
 }
