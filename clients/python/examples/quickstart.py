@@ -61,8 +61,8 @@ def draw(mesh: stellate.Mesh, path: pathlib.Path) -> None:
         shade[:, None] * base + 0.12 * np.clip(normals @ key_light, 0, 1)[:, None] ** 8, 0, 1
     )
 
-    figure = plt.figure(figsize=(10, 6.6), dpi=160)
-    axes = figure.add_axes((0, 0, 1, 1), projection="3d", computed_zorder=False)
+    figure = plt.figure(figsize=(10, 6.6), dpi=90)
+    axes = figure.add_axes((-0.25, -0.4, 1.5, 1.8), projection="3d", computed_zorder=False)
     # Seen almost from afar, triangles that face away lie behind others: leave them out.
     elevation, azimuth = 38.0, -60.0
     e, a = np.radians([elevation, azimuth])
@@ -70,12 +70,16 @@ def draw(mesh: stellate.Mesh, path: pathlib.Path) -> None:
     front = normals @ eye > -0.15
     axes.add_collection3d(
         Poly3DCollection(
-            corners[front], facecolors=colours[front], edgecolors="#123047", linewidths=0.35
+            corners[front],
+            facecolors=colours[front],
+            edgecolors="#123047",
+            linewidths=0.35,
+            clip_on=False,
         )
     )
     reach = np.abs(mesh.points).max()
     for set_limit in (axes.set_xlim, axes.set_ylim, axes.set_zlim):
-        set_limit(-0.52 * reach, 0.52 * reach)
+        set_limit(-0.56 * reach, 0.56 * reach)
     axes.set_box_aspect((1, 1, 1))
     axes.set_proj_type("persp", focal_length=0.6)
     axes.view_init(elevation, azimuth)
@@ -89,9 +93,9 @@ def main() -> int:
     output.mkdir(parents=True, exist_ok=True)
     with stellate.Server() as server:  # a stellated of our own, for both
         torus = stellate.mesh(
-            Torus(), epsilon=0.1, server=server, on_progress=stellate.progress_bar("torus")
+            Torus(), epsilon=0.07, server=server, on_progress=stellate.progress_bar("torus")
         )
-        print(f"\nA torus in R^3, epsilon 0.1\n{torus.report}\n", flush=True)
+        print(f"\nA torus in R^3, epsilon 0.07\n{torus.report}\n", flush=True)
         so3 = stellate.mesh(
             SpecialOrthogonal3(),
             epsilon=0.4,
