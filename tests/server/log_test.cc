@@ -1,0 +1,30 @@
+#include "server/log.h"
+
+#include <gtest/gtest.h>
+
+namespace stellate::server {
+namespace {
+
+TEST(Log, JsonStringsEscapeWhatWouldBreakThem) {
+  EXPECT_EQ(JsonString("plain"), "\"plain\"");
+  EXPECT_EQ(JsonString("a\"b\\c"), "\"a\\\"b\\\\c\"");
+  EXPECT_EQ(JsonString("line\nend\x7f"), "\"line\\u000aend\\u007f\"");
+  EXPECT_EQ(JsonString("ε"), "\"ε\"");
+}
+
+TEST(Log, LinesNameTheMeshAndTheRound) {
+  ::testing::internal::CaptureStderr();
+  StartLogging(LogLevel::kInfo, LogFormat::kText);
+  Log(LogLevel::kInfo, {"meshes/ab", 7}, "a client's\nwords");
+  Log(LogLevel::kDebug, {}, "not shown");
+  StartLogging(LogLevel::kWarning, LogFormat::kJson);
+  Log(LogLevel::kWarning, {"meshes/cd", 8}, "say \"so\"");
+  const std::string text = ::testing::internal::GetCapturedStderr();
+  EXPECT_NE(text.find("[meshes/ab round 7] a client's words\n"), std::string::npos) << text;
+  EXPECT_EQ(text.find("not shown"), std::string::npos);
+  EXPECT_NE(text.find(R"("mesh":"meshes/cd","round":8,"message":"say \"so\""})"), std::string::npos)
+      << text;
+}
+
+}  // namespace
+}  // namespace stellate::server

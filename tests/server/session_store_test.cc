@@ -1,0 +1,105 @@
+#include "server/session_store.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <thread>
+
+#include "tests/server/sphere.h"
+
+namespace stellate::server {
+namespace {
+
+using namespace std::chrono_literals;
+
+SessionOptions Options(Clock::duration worker_wait = 60s) {
+  SessionOptions options;
+  options.spec = testing::SphereSpec(0.3);
+  options.dispatch.worker_wait = worker_wait;
+  return options;
+}
+
+void WaitUntilOver(const Session& session) {
+  while (!session.Over()) std::this_thread::sleep_for(1ms);
+}
+
+TEST(MeshName, IsOfItsFormAndNeverTheSame) {
+  std::set<std::string> names;
+  for (int i = 0; i < 1000; ++i) {
+    const std::string name = NewMeshName();
+    EXPECT_TRUE(IsMeshName(name)) << name;
+    EXPECT_TRUE(names.insert(name).second);
+  }
+}
+
+TEST(MeshName, OtherFormsAreTold) {
+  const std::string good = NewMeshName();
+  for (const std::string& bad :
+       {std::string(), std::string("meshes/"), good + "0", good.substr(0, good.size() - 1),
+        "other/" + good.substr(7), "meshes/" + std::string(32, 'g'),
+        "meshes/" + std::string(32, 'A'), std::string(1 << 20, 'a')}) {
+    EXPECT_FALSE(IsMeshName(bad)) << bad.substr(0, 50);
+  }
+}
+
+TEST(SessionStore, FindsListsAndDeletes) {
+  SessionStore store({});
+  const auto a = *store.Create(Options());
+  const auto b = *store.Create(Options());
+  EXPECT_EQ(store.Find(a->options().name), a);
+  const auto page = store.List(0, 1);
+  ASSERT_EQ(page.sessions.size(), 1u);
+  EXPECT_EQ(page.sessions[0], a) << "oldest first";
+  EXPECT_TRUE(page.more);
+  const auto rest = store.List(page.numbers[0], 10);
+  ASSERT_EQ(rest.sessions.size(), 1u);
+  EXPECT_EQ(rest.sessions[0], b);
+  EXPECT_FALSE(rest.more);
+  EXPECT_TRUE(store.Delete(a->options().name));
+  EXPECT_FALSE(store.Delete(a->options().name));
+  EXPECT_EQ(store.Find(a->options().name), nullptr);
+  EXPECT_EQ(a->View().state, SessionState::kCancelled);
+  WaitUntilOver(*a);
+  EXPECT_EQ(store.Running(), 1u);
+}
+
+TEST(SessionStore, RefusesMoreThanItsLimitAndTakesMoreWhenOneEnds) {
+  SessionStore store({2, 10, 1h});
+  const auto a = *store.Create(Options());
+  ASSERT_TRUE(store.Create(Options()));
+  const auto refused = store.Create(Options());
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, core::StatusCode::kLimitExceeded);
+  a->Cancel();
+  WaitUntilOver(*a);
+  EXPECT_TRUE(store.Create(Options()));
+}
+
+TEST(SessionStore, SweepForgetsFinishedMeshesByNumberAndAge) {
+  SessionStore store({10, 2, 1h});
+  std::vector<std::shared_ptr<Session>> sessions;
+  for (int i = 0; i < 4; ++i) sessions.push_back(*store.Create(Options()));
+  for (int i = 0; i < 3; ++i) {
+    sessions[i]->Cancel();
+    WaitUntilOver(*sessions[i]);
+  }
+  const TimePoint now = Clock::now();
+  store.Sweep(now);
+  EXPECT_EQ(store.Find(sessions[0]->options().name), nullptr) << "two are kept";
+  EXPECT_NE(store.Find(sessions[1]->options().name), nullptr);
+  store.Sweep(now + 2h);
+  EXPECT_EQ(store.Find(sessions[1]->options().name), nullptr);
+  EXPECT_EQ(store.Find(sessions[2]->options().name), nullptr);
+  EXPECT_NE(store.Find(sessions[3]->options().name), nullptr) << "it is running";
+}
+
+TEST(SessionStore, StopCancelsWhatRuns) {
+  SessionStore store({});
+  const auto session = *store.Create(Options());
+  EXPECT_TRUE(store.Stop(Clock::now() + 60s));
+  EXPECT_EQ(session->View().state, SessionState::kCancelled);
+  EXPECT_FALSE(store.Create(Options())) << "stopped";
+}
+
+}  // namespace
+}  // namespace stellate::server
