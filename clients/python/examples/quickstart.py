@@ -79,7 +79,7 @@ def draw(mesh: stellate.Mesh, path: pathlib.Path) -> None:
     )
     reach = np.abs(mesh.points).max()
     for set_limit in (axes.set_xlim, axes.set_ylim, axes.set_zlim):
-        set_limit(-0.56 * reach, 0.56 * reach)
+        set_limit(-0.86 * reach, 0.86 * reach)
     axes.set_box_aspect((1, 1, 1))
     axes.set_proj_type("persp", focal_length=0.6)
     axes.view_init(elevation, azimuth)

@@ -71,7 +71,9 @@ class Server:
         self._process: subprocess.Popen[bytes] | None = None
         self._start_error: OSError | None = None
         started = threading.Event()
-        command = [self._binary, "--listen", self.address, *_PRIVATE_FLAGS, *arguments]
+        ready = os.path.join(self._directory, "ready")
+        command = [self._binary, "--listen", self.address, "--ready-file", ready]
+        command += [*_PRIVATE_FLAGS, *arguments]
         # On Linux the kernel ends the server when the thread that started it ends: a thread of its
         # own stays for as long as the server runs.
         tie = shutil.which("setpriv")
@@ -85,7 +87,7 @@ class Server:
         try:
             if self._start_error is not None:
                 raise ServerNotFound(f"cannot start {self._binary}: {self._start_error}")
-            self._wait_for(socket)
+            self._wait_for(ready)
         except BaseException:
             self.close()
             raise
@@ -108,9 +110,9 @@ class Server:
             started.set()
         self._process.wait()
 
-    def _wait_for(self, socket: str) -> None:
+    def _wait_for(self, ready: str) -> None:
         deadline = time.monotonic() + _READY_SECONDS
-        while not os.path.exists(socket):
+        while not os.path.exists(ready):
             if not self.alive:
                 raise self.why_gone()
             if time.monotonic() > deadline:

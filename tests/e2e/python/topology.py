@@ -44,23 +44,50 @@ def component_count(simplices: np.ndarray) -> int:
     return sum(root(v) == v for v in parent)
 
 
-def _link_is_sphere(link: np.ndarray) -> bool:
-    """Whether a complex of dimension 0, 1 or 2 is a sphere."""
-    if link.shape[1] == 1:
-        return len(np.unique(link)) == 2
-    euler = {2: 0, 3: 2}[link.shape[1]]
-    if not is_closed(link) or component_count(link) != 1 or euler_characteristic(link) != euler:
+def _is_polygon(edges: list[tuple[int, ...]]) -> bool:
+    """Whether the edges are one closed cycle."""
+    neighbours = collections.defaultdict(list)
+    for a, b in edges:
+        neighbours[a].append(b)
+        neighbours[b].append(a)
+    if not edges or any(len(ends) != 2 for ends in neighbours.values()):
         return False
-    return link.shape[1] == 2 or is_manifold(link)
+    start = before = edges[0][0]
+    at, length = edges[0][1], 1
+    while at != start:
+        before, at = at, neighbours[at][neighbours[at][0] == before]
+        length += 1
+    return length == len(edges)
+
+
+def _links(simplices: list[tuple[int, ...]]) -> dict[int, list[tuple[int, ...]]]:
+    links = collections.defaultdict(list)
+    for row in simplices:
+        for i, v in enumerate(row):
+            links[v].append(row[:i] + row[i + 1 :])
+    return links
+
+
+def _is_sphere(link: list[tuple[int, ...]]) -> bool:
+    """Whether a complex of dimension 0, 1 or 2 is a sphere."""
+    width = len(link[0])
+    if width == 1:
+        return len(link) == len(set(link)) == 2
+    if width == 2:
+        return _is_polygon(link)
+    corners = {v for row in link for v in row}
+    edges = {pair for row in link for pair in itertools.combinations(row, 2)}
+    if len(corners) - len(edges) + len(link) != 2 or len(edges) * 2 != len(link) * 3:
+        return False
+    if not all(_is_polygon(around) for around in _links(link).values()):
+        return False
+    return component_count(np.array(link)) == 1
 
 
 def is_manifold(simplices: np.ndarray) -> bool:
     """Whether every vertex's link is a sphere; for k <= 3, where that can be read off."""
-    stars = collections.defaultdict(list)
-    for row in simplices.tolist():
-        for v in row:
-            stars[v].append([u for u in row if u != v])
-    return all(_link_is_sphere(np.array(link)) for link in stars.values())
+    rows = [tuple(row) for row in np.sort(simplices, axis=1).tolist()]
+    return all(_is_sphere(link) for link in _links(rows).values())
 
 
 def betti_numbers(simplices: np.ndarray) -> list[int]:
