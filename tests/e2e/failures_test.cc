@@ -1,5 +1,6 @@
 // Bad requests and lying oracles through the client: each refused by name, with the offending
 // value, and without harm to other meshes of the server.
+#include <Eigen/Geometry>
 #include <atomic>
 #include <chrono>
 #include <cmath>

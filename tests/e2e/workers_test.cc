@@ -176,7 +176,12 @@ TEST_F(Workers, NobodyComingEndsTheMeshByName) {
 
 TEST_F(Workers, ServingAMeshThatIsNotThereFailsClearly) {
   const auto torus = Make("torus:1:0.4");
-  client::Worker lost(*stub_, *torus, "meshes/no-such-mesh", "lost");
+  v1::DeleteMeshRequest request;
+  request.set_name(Create(*torus, At(0.1)));
+  grpc::ClientContext context;
+  google::protobuf::Empty nothing;
+  ASSERT_TRUE(stub_->DeleteMesh(&context, request, &nothing).ok());
+  client::Worker lost(*stub_, *torus, request.name(), "lost");
   lost.Run();
   ASSERT_TRUE(lost.error().has_value());
   EXPECT_EQ(lost.error()->reason, "MESH_NOT_FOUND");

@@ -9,7 +9,8 @@
 namespace stellate::testing {
 
 std::vector<int> BettiNumbers(const std::vector<Facet>& facets, int prime) {
-  using Tree = Gudhi::Simplex_tree<Gudhi::Simplex_tree_options_fast_persistence>;
+  // The default options take any vertex ids; the faster ones want 0, 1, 2, ... without a gap.
+  using Tree = Gudhi::Simplex_tree<>;
   using Cohomology =
       Gudhi::persistent_cohomology::Persistent_cohomology<Tree,
                                                           Gudhi::persistent_cohomology::Field_Zp>;

@@ -194,7 +194,8 @@ std::string ToText(const Report& report) {
   if (!report.failure_reason.empty() || !report.failure_message.empty()) {
     lines.Add("failure", report.failure_reason + ": " + report.failure_message);
   }
-  lines.Add("certificate", (c.certified ? "CERTIFIED. " : "NOT CERTIFIED. ") + c.verdict);
+  lines.Add("certificate", c.certified ? "CERTIFIED" : "NOT CERTIFIED");
+  if (!c.verdict.empty()) lines.Add("verdict", c.verdict);
   if (c.components > 0) AddCertificate(c, lines);
   for (const std::string& warning : c.warnings) lines.Add("warning", warning);
   return lines.Take();
