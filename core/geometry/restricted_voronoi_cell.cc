@@ -282,9 +282,21 @@ bool RestrictedVoronoiCell<K>::Tidy(Scratch& scratch) const {
         for (const Index v : pieces[i]) scratch.cut[v] = 1;
     return true;
   };
+  // The pieces of a polygon are counted by the edges that the cut crosses: two is one piece.
+  std::vector<std::uint16_t>& crossed = scratch.crossed;
   for (bool again = true; again;) {
     again = keep_largest(kWhole);
-    for (std::size_t f = 0; f < facets_.size(); ++f) again |= keep_largest(f);
+    crossed.assign(facets_.size(), 0);
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!scratch.cut[i]) continue;
+      for (int s = 0; s < K; ++s) {
+        if (scratch.cut[vertices_[i].adjacent[s]]) continue;
+        for (int r = 0; r < K; ++r)
+          if (r != s) ++crossed[vertices_[i].facet[r]];
+      }
+    }
+    for (std::size_t f = 0; f < facets_.size(); ++f)
+      if (crossed[f] > (K <= 3 ? 2 : 0)) again |= keep_largest(f);
   }
   return std::find(scratch.cut.begin(), scratch.cut.end(), 0) != scratch.cut.end();
 }

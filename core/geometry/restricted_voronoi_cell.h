@@ -48,7 +48,7 @@ class RestrictedVoronoiCell {
   struct Scratch {
     std::vector<std::uint8_t> cut;
     std::vector<double> excess;
-    std::vector<Index> stack, remap;
+    std::vector<Index> stack, remap, crossed;
     struct Crossing { Index kept, removed, slot; };  // slot: of the new vertex's edge in `removed`
     std::vector<Crossing> crossings;
     // With a judge: the cell as it was, should the cut turn out to be impossible.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "core/sample/vector_ops.h"
@@ -109,11 +110,22 @@ class BallTree {
     const Node& node = nodes_[n];
     if (distance - node.radius > radius()) return;
     if (node.children == kNone) {
+      // Nearest first: what is visited early may shrink the radius most.
+      std::pair<double, std::uint32_t> near[kLeafCapacity];
+      std::uint32_t count = 0;
+      const double reach = radius();
       for (std::uint32_t i = 0; i < node.count; ++i) {
         const std::uint32_t id = slots_[node.first + i];
         const double d2 = SquaredDistance(q, Point(id), d_);
+        if (!(d2 <= reach * reach)) continue;
+        std::uint32_t at = count++;
+        for (; at > 0 && near[at - 1].first > d2; --at) near[at] = near[at - 1];
+        near[at] = {d2, id};
+      }
+      for (std::uint32_t i = 0; i < count; ++i) {
         const double r = radius();
-        if (d2 <= r * r) visit(id, d2);
+        if (near[i].first > r * r) break;
+        visit(near[i].second, near[i].first);
       }
       return;
     }

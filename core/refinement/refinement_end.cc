@@ -1,0 +1,115 @@
+// How a run ends: the certificate, the report, and the progress towards them.
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/refinement/refinement.h"
+
+namespace stellate::core {
+
+template <int K>
+void Refinement<K>::StartCertificate() {
+  StarFacts facts;
+  facts.converged = true;
+  for (std::uint32_t p = 0; p < complex_.size(); ++p)
+    facts.max_circumradius =
+        std::max(facts.max_circumradius, std::sqrt(complex_.cell(p).max_norm2()));
+  certified_tangents_ = complex_.TangentMatrix();
+  certified_simplices_ = complex_.Simplices();
+  const MeshView view{K,
+                      complex_.d(),
+                      complex_.size(),
+                      complex_.points().data(),
+                      certified_tangents_.data(),
+                      &certified_simplices_};
+  certifier_ = std::make_unique<Certifier>(spec_, view, facts);
+  if (const auto* blocks = certifier_->NextBlocks()) {
+    batch_ = QueryBatch{0, *blocks};
+    stage_ = Stage::kCertify;
+  } else {
+    Finish(Termination::kConverged);
+  }
+}
+
+template <int K>
+void Refinement<K>::Fail(Status reason) {
+  if (!over_) report_.failure = std::move(reason);
+  Finish(Termination::kOracleFailed);
+}
+
+template <int K>
+void Refinement<K>::Finish(Termination termination) {
+  if (over_) return;
+  over_ = true;
+  batch_.reset();
+  report_.termination = termination;
+  report_.counts.vertices = complex_.size();
+  report_.counts.simplices = complex_.simplex_count();
+  Certificate& certificate = report_.certificate;
+  if (termination == Termination::kConverged) {
+    certificate = certifier_->certificate();
+  } else {
+    certificate.verdict = std::string("not certified: the run ended as ") +
+                          TerminationName(termination) + " before every rule held";
+    if (!report_.failure.message.empty()) certificate.verdict += ": " + report_.failure.message;
+    for (std::uint32_t p = 0; p < complex_.size() && p < standing_.size(); ++p) {
+      if (!complex_.cell(p).bounded()) continue;
+      certificate.inconsistent_simplices += CountInconsistent<K>(complex_, p);
+      certificate.max_circumradius =
+          std::max(certificate.max_circumradius, std::sqrt(complex_.cell(p).max_norm2()));
+    }
+  }
+  certifier_.reset();
+  certified_tangents_.resize(0, 0);
+  certified_simplices_ = {};
+  UpdateProgress();
+}
+
+template <int K>
+void Refinement<K>::UpdateProgress() {
+  progress_.vertices = complex_.size();
+  progress_.simplices = complex_.simplex_count();
+  if (over_) {
+    progress_.phase = Phase::kDone;
+    progress_.fraction = report_.termination == Termination::kConverged ? 1 : progress_.fraction;
+    return;
+  }
+  progress_.phase = stage_ == Stage::kCertify ? Phase::kCertifying
+                    : complex_.size() == 0    ? Phase::kSeeding
+                                              : Phase::kRefining;
+  progress_.bad_size = progress_.bad_radius_edge = progress_.unbounded_stars = 0;
+  // A cell of circumradius R will have to hold about (R / epsilon)^k / 2 more points.
+  double missing = 0;
+  for (const std::uint32_t p : active_) {
+    const auto& cell = complex_.cell(p);
+    const double ratio = std::sqrt(cell.max_norm2()) / criteria_.epsilon;
+    progress_.unbounded_stars += !cell.bounded();
+    ++(ratio > 1 ? progress_.bad_size : progress_.bad_radius_edge);
+    missing += 0.5 * std::pow(std::max(ratio, 1.0), K);
+  }
+  missing += static_cast<double>(blemished_.size());
+  const double have = static_cast<double>(complex_.size());
+  const double share = stage_ == Stage::kCertify ? 0.99 : 0.98 * have / (have + missing + 1);
+  progress_.fraction = std::max(progress_.fraction, share);
+}
+
+template <int K>
+Eigen::MatrixXd Refinement<K>::Points() const {
+  return Eigen::Map<const Eigen::MatrixXd>(complex_.points().data(), complex_.d(),
+                                           complex_.size());
+}
+
+#define STELLATE_INSTANTIATE(K)                           \
+  template void Refinement<K>::StartCertificate();        \
+  template void Refinement<K>::Fail(Status);              \
+  template void Refinement<K>::Finish(Termination);       \
+  template void Refinement<K>::UpdateProgress();          \
+  template Eigen::MatrixXd Refinement<K>::Points() const;
+STELLATE_INSTANTIATE(1)
+STELLATE_INSTANTIATE(2)
+STELLATE_INSTANTIATE(3)
+STELLATE_INSTANTIATE(4)
+STELLATE_INSTANTIATE(5)
+#undef STELLATE_INSTANTIATE
+
+}  // namespace stellate::core
