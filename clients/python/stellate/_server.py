@@ -34,8 +34,11 @@ def find_stellated() -> str:
         if path is None:
             raise ServerNotFound(f"$STELLATED is {named!r}, which is not a program that can be run")
         return path
-    build = pathlib.Path(__file__).resolve().parents[3] / "build"
-    built = [p for p in build.glob("*/bin/stellated") if os.access(p, os.X_OK)]
+    source_tree = pathlib.Path(__file__).resolve().parents[3]
+    built = []
+    if (source_tree / "proto" / "stellate").is_dir():  # not an installed package
+        candidates = source_tree.glob("build/*/bin/stellated")
+        built = [p for p in candidates if os.access(p, os.X_OK)]
     if built:
         # The release build before others, then the newest.
         return str(max(built, key=lambda p: (p.parts[-3] == "release", p.stat().st_mtime)))
@@ -43,7 +46,7 @@ def find_stellated() -> str:
     if path is None:
         raise ServerNotFound(
             "no server was given and no stellated found to start: pass server='host:port', or set "
-            f"$STELLATED to the binary, or build it under {build}, or put it on PATH"
+            "$STELLATED to the binary, or put it on PATH, or build it (clients/quickstart does)"
         )
     return path
 
