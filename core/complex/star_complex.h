@@ -57,6 +57,12 @@ class StarComplex {
   // Whether some sample point lies within `radius` of q.
   bool AnyWithin(const double* q, double radius) const;
 
+  // visit(id) for each sample point within `radius` of q.
+  template <typename Visit>
+  void ForEachWithin(const double* q, double radius, Visit&& visit) const {
+    tree_.VisitNear(q, [&] { return radius; }, [&](std::uint32_t id, double) { visit(id); });
+  }
+
   // q in p's tangent coordinates: normal = T_p^t (q - p), the return value |q - p|^2.
   double Project(std::uint32_t p, const double* q, double* normal) const;
   // p + T_p x.

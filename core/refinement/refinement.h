@@ -56,7 +56,7 @@ class Refinement final : public Mesher {
   void AskAgain(const QueryBlock& block, Stage stage);
   bool FindsFlats(const Target<K>& target) const;
 
-  // Answers (refinement.cc).
+  // Answers (refinement.cc); the end (refinement_end.cc).
   Status CheckIdempotence(const Answers& answers) const;
   void Advance(const Answers& answers);
   void TakePoints(const Answers& answers);
@@ -71,6 +71,7 @@ class Refinement final : public Mesher {
   void Commit();
   void StartCertificate();
   void Finish(Termination termination);
+  std::string WhatIsLeft() const;
   void UpdateProgress();
 
   Eigen::Index CandidateCount(const Target<K>& target) const {

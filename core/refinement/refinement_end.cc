@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/complex/consistency.h"
+#include "core/message.h"
 #include "core/refinement/refinement.h"
 
 namespace stellate::core {
@@ -58,11 +60,31 @@ void Refinement<K>::Finish(Termination termination) {
       certificate.max_circumradius =
           std::max(certificate.max_circumradius, std::sqrt(complex_.cell(p).max_norm2()));
     }
+    if (termination == Termination::kNoProgress) certificate.verdict += "; " + WhatIsLeft();
   }
   certifier_.reset();
   certified_tangents_.resize(0, 0);
   certified_simplices_ = {};
   UpdateProgress();
+}
+
+// What still breaks a rule, for people.
+template <int K>
+std::string Refinement<K>::WhatIsLeft() const {
+  std::string left;
+  if (!active_.empty())
+    left = Message(active_.size(), " stars break rule R1 or R2, the first that of vertex ",
+                   *std::min_element(active_.begin(), active_.end()), "; ");
+  left += Message(report_.certificate.inconsistent_simplices, " simplices are inconsistent");
+  for (std::uint32_t p = 0; p < complex_.size(); ++p) {
+    const auto found = FindInconsistentConfiguration<K>(complex_, p);
+    if (!found) continue;
+    left += Message(", the first in the star of vertex ", found->holder, " but not in that of ",
+                    found->refuser);
+    if (found->nearer) left += Message(", where vertex ", *found->nearer, " is nearer");
+    break;
+  }
+  return left + "; try a smaller epsilon";
 }
 
 template <int K>
@@ -102,6 +124,7 @@ Eigen::MatrixXd Refinement<K>::Points() const {
 #define STELLATE_INSTANTIATE(K)                           \
   template void Refinement<K>::StartCertificate();        \
   template void Refinement<K>::Fail(Status);              \
+  template std::string Refinement<K>::WhatIsLeft() const;              \
   template void Refinement<K>::Finish(Termination);       \
   template void Refinement<K>::UpdateProgress();          \
   template Eigen::MatrixXd Refinement<K>::Points() const;

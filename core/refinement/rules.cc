@@ -32,11 +32,6 @@ double GramDeterminant(double (&g)[K][K], int j) {
   return det;
 }
 
-template <int K>
-std::uint64_t KeyOf(const typename RestrictedVoronoiCell<K>::Vertex& v, std::uint32_t p) {
-  return v.key + Mix64(p);
-}
-
 }  // namespace
 
 template <int K>
@@ -116,35 +111,7 @@ bool ContainsSliver(const StarComplex<K>& complex, const double* p,
   return false;
 }
 
-template <int K>
-const typename RestrictedVoronoiCell<K>::Vertex* FindSimplex(
-    const RestrictedVoronoiCell<K>& cell, std::uint32_t q,
-    const typename StarComplex<K>::Simplex& simplex, std::uint64_t key) {
-  const std::uint64_t wanted = key - Mix64(q);
-  for (const auto& v : cell.vertices()) {
-    if (v.key != wanted) continue;
-    bool same = true;
-    for (const auto f : v.facet) {
-      const std::uint32_t id = cell.facets()[f].id;
-      same = same && std::find(simplex.begin(), simplex.end(), id) != simplex.end();
-    }
-    if (same) return &v;
-  }
-  return nullptr;
-}
-
 namespace {
-
-template <int K>
-bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p,
-                  const typename StarComplex<K>::Vertex& v) {
-  typename StarComplex<K>::Simplex simplex;
-  if (!complex.SimplexOf(p, complex.cell(p), v, &simplex)) return false;
-  const std::uint64_t key = KeyOf<K>(v, p);
-  for (const std::uint32_t q : simplex)
-    if (q != p && !FindSimplex<K>(complex.cell(q), q, simplex, key)) return false;
-  return true;
-}
 
 // The sign of the simplex on p and K facets' points, seen in T_pM.
 template <int K>
@@ -213,13 +180,6 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& comp
 }
 
 template <int K>
-std::uint64_t CountInconsistent(const StarComplex<K>& complex, std::uint32_t p) {
-  std::uint64_t count = 0;
-  for (const auto& v : complex.cell(p).vertices()) count += !IsConsistent<K>(complex, p, v);
-  return count;
-}
-
-template <int K>
 int CountBad(const StarComplex<K>& complex, const double* point,
              const typename StarComplex<K>::Tentative& tentative, double sliver_bound,
              double small_radius, int enough) {
@@ -247,7 +207,7 @@ int CountBad(const StarComplex<K>& complex, const double* point,
         ++bad;
         continue;
       }
-      const std::uint64_t key = KeyOf<K>(v, p);
+      const std::uint64_t key = SimplexKey<K>(v, p);
       for (const std::uint32_t q : simplex) {
         if (q == p) continue;
         const Cell* other = changed(q);
@@ -268,7 +228,7 @@ int CountBad(const StarComplex<K>& complex, const double* point,
     for (const auto& v : before.vertices()) {
       if (bad >= enough) return bad;
       if (!complex.SimplexOf(p, before, v, &simplex)) continue;
-      const std::uint64_t key = KeyOf<K>(v, p);
+      const std::uint64_t key = SimplexKey<K>(v, p);
       if (FindSimplex<K>(cell, p, simplex, key)) continue;
       for (const std::uint32_t q : simplex)
         if (q != p && !changed(q) && FindSimplex<K>(complex.cell(q), q, simplex, key)) {
@@ -280,19 +240,15 @@ int CountBad(const StarComplex<K>& complex, const double* point,
   return bad;
 }
 
-#define STELLATE_INSTANTIATE(K)                                                                   \
-  template std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>&, std::uint32_t,     \
-                                                        double, double);                          \
-  template std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>&,           \
-                                                                 std::uint32_t, double);          \
-  template bool ContainsSliver(const StarComplex<K>&, const double*,                              \
-                               const RestrictedVoronoiCell<K>&,                                   \
-                               const RestrictedVoronoiCell<K>::Vertex&, double, const double*);   \
-  template const RestrictedVoronoiCell<K>::Vertex* FindSimplex<K>(                                \
-      const RestrictedVoronoiCell<K>&, std::uint32_t, const StarComplex<K>::Simplex&,             \
-      std::uint64_t);                                                                             \
-  template std::uint64_t CountInconsistent(const StarComplex<K>&, std::uint32_t);                 \
-  template int CountBad(const StarComplex<K>&, const double*, const StarComplex<K>::Tentative&,   \
+#define STELLATE_INSTANTIATE(K)                                                                 \
+  template std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>&, std::uint32_t,   \
+                                                        double, double);                        \
+  template std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>&,         \
+                                                                 std::uint32_t, double);        \
+  template bool ContainsSliver(const StarComplex<K>&, const double*,                            \
+                               const RestrictedVoronoiCell<K>&,                                 \
+                               const RestrictedVoronoiCell<K>::Vertex&, double, const double*); \
+  template int CountBad(const StarComplex<K>&, const double*, const StarComplex<K>::Tentative&, \
                         double, double, int);
 STELLATE_INSTANTIATE(1)
 STELLATE_INSTANTIATE(2)

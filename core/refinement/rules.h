@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/complex/consistency.h"
 #include "core/complex/star_complex.h"
 
 namespace stellate::core {
@@ -41,17 +42,6 @@ bool ContainsSliver(const StarComplex<K>& complex, const double* p,
                     const RestrictedVoronoiCell<K>& cell,
                     const typename RestrictedVoronoiCell<K>::Vertex& v, double sliver_bound,
                     const double* unborn);
-
-// The vertex of `cell`, the cell of q, that is dual to a simplex on q, or nullptr. `key` is the sum
-// of Mix64 over all ids of the simplex.
-template <int K>
-const typename RestrictedVoronoiCell<K>::Vertex* FindSimplex(
-    const RestrictedVoronoiCell<K>& cell, std::uint32_t q,
-    const typename StarComplex<K>::Simplex& simplex, std::uint64_t key);
-
-// Simplices of star(p) that are missing from the star of one of their vertices.
-template <int K>
-std::uint64_t CountInconsistent(const StarComplex<K>& complex, std::uint32_t p);
 
 // How bad a tentative insertion would leave its surroundings: the new slivers of circumradius at
 // most `small_radius`, and the simplices that stars would disagree about. Counts no further than

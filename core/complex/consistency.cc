@@ -1,0 +1,120 @@
+#include "core/complex/consistency.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+
+namespace stellate::core {
+namespace {
+
+// c_q(sigma): the point of T_qM equidistant from sigma's vertices, in ambient coordinates.
+template <int K>
+Eigen::VectorXd CentreIn(const StarComplex<K>& complex, std::uint32_t q,
+                         const typename StarComplex<K>::Simplex& simplex) {
+  Eigen::Matrix<double, K, K> rows;
+  Eigen::Matrix<double, K, 1> rhs;
+  int r = 0;
+  for (const std::uint32_t v : simplex) {
+    if (v == q) continue;
+    double normal[K];
+    rhs[r] = 0.5 * complex.Project(q, complex.Point(v), normal);
+    for (int a = 0; a < K; ++a) rows(r, a) = normal[a];
+    ++r;
+  }
+  const Eigen::Matrix<double, K, 1> x = rows.fullPivLu().solve(rhs);
+  Eigen::VectorXd centre(complex.d());
+  complex.Lift(q, x.data(), centre.data());
+  return centre;
+}
+
+}  // namespace
+
+template <int K>
+const typename StarComplex<K>::Vertex* FindSimplex(const RestrictedVoronoiCell<K>& cell,
+                                                   std::uint32_t q,
+                                                   const typename StarComplex<K>::Simplex& simplex,
+                                                   std::uint64_t key) {
+  const std::uint64_t wanted = key - Mix64(q);
+  for (const auto& v : cell.vertices()) {
+    if (v.key != wanted) continue;
+    bool same = true;
+    for (const auto f : v.facet) {
+      const std::uint32_t id = cell.facets()[f].id;
+      same = same && std::find(simplex.begin(), simplex.end(), id) != simplex.end();
+    }
+    if (same) return &v;
+  }
+  return nullptr;
+}
+
+template <int K>
+bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p,
+                  const typename StarComplex<K>::Vertex& v) {
+  typename StarComplex<K>::Simplex simplex;
+  if (!complex.SimplexOf(p, complex.cell(p), v, &simplex)) return false;
+  const std::uint64_t key = SimplexKey<K>(v, p);
+  for (const std::uint32_t q : simplex)
+    if (q != p && !FindSimplex<K>(complex.cell(q), q, simplex, key)) return false;
+  return true;
+}
+
+template <int K>
+std::uint64_t CountInconsistent(const StarComplex<K>& complex, std::uint32_t p) {
+  std::uint64_t count = 0;
+  for (const auto& v : complex.cell(p).vertices()) count += !IsConsistent<K>(complex, p, v);
+  return count;
+}
+
+template <int K>
+std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(
+    const StarComplex<K>& complex, std::uint32_t p) {
+  InconsistentConfiguration<K> found;
+  found.holder = p;
+  for (const auto& v : complex.cell(p).vertices()) {
+    if (!complex.SimplexOf(p, complex.cell(p), v, &found.simplex)) continue;
+    const std::uint64_t key = SimplexKey<K>(v, p);
+    for (const std::uint32_t q : found.simplex) {
+      if (q == p || FindSimplex<K>(complex.cell(q), q, found.simplex, key)) continue;
+      found.refuser = q;
+      const Eigen::VectorXd from = CentreIn<K>(complex, p, found.simplex);
+      const Eigen::VectorXd to = CentreIn<K>(complex, q, found.simplex);
+      // |z - l|^2 - |z - q|^2 is linear in z: where it turns negative, l becomes nearer.
+      double first = 2;
+      const int d = complex.d();
+      const double radius = Distance(to.data(), complex.Point(q), d);
+      complex.ForEachWithin(to.data(), radius, [&](std::uint32_t l) {
+        const double* at = complex.Point(l);
+        const double start = SquaredDistance(from.data(), at, d) -
+                             SquaredDistance(from.data(), complex.Point(q), d);
+        const double end = SquaredDistance(to.data(), at, d) - radius * radius;
+        if (std::find(found.simplex.begin(), found.simplex.end(), l) != found.simplex.end() ||
+            !(end < 0))
+          return;
+        const double when = start <= 0 ? 0 : start / (start - end);
+        if (when < first || (when == first && l < *found.nearer)) {
+          first = when;
+          found.nearer = l;
+        }
+      });
+      return found;
+    }
+  }
+  return std::nullopt;
+}
+
+#define STELLATE_INSTANTIATE(K)                                                                  \
+  template const StarComplex<K>::Vertex* FindSimplex<K>(const RestrictedVoronoiCell<K>&,         \
+                                                        std::uint32_t,                           \
+                                                        const StarComplex<K>::Simplex&,          \
+                                                        std::uint64_t);                          \
+  template bool IsConsistent(const StarComplex<K>&, std::uint32_t, const StarComplex<K>::Vertex&); \
+  template std::uint64_t CountInconsistent(const StarComplex<K>&, std::uint32_t);                \
+  template std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(            \
+      const StarComplex<K>&, std::uint32_t);
+STELLATE_INSTANTIATE(1)
+STELLATE_INSTANTIATE(2)
+STELLATE_INSTANTIATE(3)
+STELLATE_INSTANTIATE(4)
+STELLATE_INSTANTIATE(5)
+#undef STELLATE_INSTANTIATE
+
+}  // namespace stellate::core

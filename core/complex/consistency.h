@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "core/complex/star_complex.h"
+
+namespace stellate::core {
+
+// A simplex is consistent when it is in the star of each of its vertices (Sec. 3.2): then the stars
+// glue to a manifold.
+
+// Tells simplices apart quickly: the sum of Mix64 over the ids of the simplex dual to v in star(p).
+template <int K>
+std::uint64_t SimplexKey(const typename StarComplex<K>::Vertex& v, std::uint32_t p) {
+  return v.key + Mix64(p);
+}
+
+// The vertex of `cell`, the cell of q, that is dual to a simplex on q with that key, or nullptr.
+template <int K>
+const typename StarComplex<K>::Vertex* FindSimplex(const RestrictedVoronoiCell<K>& cell,
+                                                   std::uint32_t q,
+                                                   const typename StarComplex<K>::Simplex& simplex,
+                                                   std::uint64_t key);
+
+// Whether the simplex dual to v in star(p) is in the stars of all its vertices.
+template <int K>
+bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p,
+                  const typename StarComplex<K>::Vertex& v);
+
+// Simplices of star(p) that are missing from the star of one of their vertices.
+template <int K>
+std::uint64_t CountInconsistent(const StarComplex<K>& complex, std::uint32_t p);
+
+// sigma is in star(p) but not in star(q), although q is a vertex of it: on the way from c_p(sigma)
+// to c_q(sigma), in the flat of points equidistant from sigma's vertices, `nearer` is the first
+// sample point that becomes nearer than they are. sigma and it are the (k+1)-simplex of Sec. 3.2.
+template <int K>
+struct InconsistentConfiguration {
+  typename StarComplex<K>::Simplex simplex;
+  std::uint32_t holder = 0;   // p
+  std::uint32_t refuser = 0;  // q
+  std::optional<std::uint32_t> nearer;  // none where rounding or a common centre decided
+};
+
+// The first inconsistent configuration of star(p), by vertex and then by id, if it has one.
+template <int K>
+std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(
+    const StarComplex<K>& complex, std::uint32_t p);
+
+}  // namespace stellate::core
