@@ -35,9 +35,9 @@ int Complain(const Error& error) {
 
 MeshCommand::MeshCommand(CLI::App& parent)
     : command_(parent.add_subcommand("mesh", "Mesh a manifold of the catalogue")) {
-  command_->add_option("manifold", manifold_, "e.g. torus:1:0.4; see 'stellate list'")
-      ->required();
-  command_->add_option("-e,--epsilon", options_.epsilon, "largest circumradius of a simplex, a length")
+  command_->add_option("manifold", manifold_, "e.g. torus:1:0.4; see 'stellate list'")->required();
+  command_
+      ->add_option("-e,--epsilon", options_.epsilon, "largest circumradius of a simplex, a length")
       ->required();
   command_->add_option("--server", options_.server,
                        "host:port or unix:/path; default: a private one is started");
@@ -61,19 +61,23 @@ MeshCommand::MeshCommand(CLI::App& parent)
 
 void MeshCommand::AddCriteria() {
   const std::string group = "Criteria (absent: the server's defaults)";
-  command_->add_option("--radius-edge", options_.radius_edge_bound, "rho0 of rule R2")->group(group);
-  command_->add_option("--sliver", options_.sliver_bound, "Theta0 of rule R3, 0: off")->group(group);
+  command_->add_option("--radius-edge", options_.radius_edge_bound, "rho0 of rule R2")
+      ->group(group);
+  command_->add_option("--sliver", options_.sliver_bound, "Theta0 of rule R3, 0: off")
+      ->group(group);
   command_->add_option("--picking-radius", options_.picking_radius, "delta of the picking region")
       ->group(group);
-  command_->add_option("--small-sliver-radius", options_.small_sliver_radius,
-                       "beta: which slivers count against a candidate")
+  command_
+      ->add_option("--small-sliver-radius", options_.small_sliver_radius,
+                   "beta: which slivers count against a candidate")
       ->group(group);
   command_->add_option("--candidates", options_.candidates, "tried in a picking region")
       ->group(group);
   command_->add_option("--advance-step", options_.advance_step, "h: the front's step, a length")
       ->group(group);
-  command_->add_option("--flat-alternations", options_.flat_alternations,
-                       "closest points towards a flat, without intersections")
+  command_
+      ->add_option("--flat-alternations", options_.flat_alternations,
+                   "closest points towards a flat, without intersections")
       ->group(group);
 }
 

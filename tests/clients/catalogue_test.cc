@@ -60,12 +60,15 @@ TEST_P(EveryManifold, HasFactsThatAgree) {
 }
 
 std::vector<std::string> Specs() {
-  std::vector<std::string> specs = {
-      "circle",        "sphere:3",         "sphere:4:7",       "ellipsoid:2:1",
-      "ellipsoid",     "rp2",              "torus",            "ellipsoid:1:0.9:0.8:0.7",
-      "so3@12",        "torus-knot:3:5",   "tanglecube@6",     "ellipsoid:1:1:0.5",
-      "sphere:2:100",  "clifford-torus@9", "two-spheres@5",    "ellipsoid:1:0.7:0.7:0.7",
-      "torus:1:0.4@100"};
+  std::vector<std::string> specs = {"circle",         "sphere:3",
+                                    "sphere:4:7",     "ellipsoid:2:1",
+                                    "ellipsoid",      "rp2",
+                                    "torus",          "ellipsoid:1:0.9:0.8:0.7",
+                                    "so3@12",         "torus-knot:3:5",
+                                    "tanglecube@6",   "ellipsoid:1:1:0.5",
+                                    "sphere:2:100",   "clifford-torus@9",
+                                    "two-spheres@5",  "ellipsoid:1:0.7:0.7:0.7",
+                                    "torus:1:0.4@100"};
   for (const CatalogueEntry& entry : ListManifolds()) specs.push_back(entry.example);
   return specs;
 }
@@ -115,8 +118,7 @@ TEST(ManifoldDistance, IsGlobalForTheTanglecubeAndTheKnot) {
     std::srand(7);
     const auto random_points = [&](Eigen::Index n) {
       const Eigen::MatrixXd unit = (Eigen::MatrixXd::Random(3, n).array() + 1) / 2;
-      return Eigen::MatrixXd(
-          ((box.upper - box.lower).asDiagonal() * unit).colwise() + box.lower);
+      return Eigen::MatrixXd(((box.upper - box.lower).asDiagonal() * unit).colwise() + box.lower);
     };
     const Eigen::MatrixXd points = manifold->ClosestPoint(random_points(4000)).points;
     const Eigen::MatrixXd queries = random_points(400);
@@ -152,10 +154,26 @@ TEST(TurnedManifold, IsIsometricToTheOriginal) {
 }
 
 TEST(MakeManifold, RefusesWithAReason) {
-  for (const std::string spec :
-       {"", "klein", "sphere:0", "sphere:2:2", "sphere:2.5", "torus:1:2", "torus:1:x", "torus:1:",
-        "torus-knot:2:4", "ellipsoid:1", "ellipsoid:1:-1", "ellipsoid:1:nan", "so3:2", "so3@8",
-        "so3@", "rp2:4", "circles", "circle:100000", "torus:1:0.4:3", "sphere:2:10@5"}) {
+  for (const std::string spec : {"",
+                                 "klein",
+                                 "sphere:0",
+                                 "sphere:2:2",
+                                 "sphere:2.5",
+                                 "torus:1:2",
+                                 "torus:1:x",
+                                 "torus:1:",
+                                 "torus-knot:2:4",
+                                 "ellipsoid:1",
+                                 "ellipsoid:1:-1",
+                                 "ellipsoid:1:nan",
+                                 "so3:2",
+                                 "so3@8",
+                                 "so3@",
+                                 "rp2:4",
+                                 "circles",
+                                 "circle:100000",
+                                 "torus:1:0.4:3",
+                                 "sphere:2:10@5"}) {
     std::string error;
     EXPECT_EQ(MakeManifold(spec, &error), nullptr) << spec;
     EXPECT_NE(error.find("'" + spec + "'"), std::string::npos) << error;

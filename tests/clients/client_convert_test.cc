@@ -1,11 +1,10 @@
-#include "convert.h"
-
 #include <gtest/gtest.h>
 
 #include <limits>
 #include <string>
 
 #include "client/status_details.pb.h"
+#include "convert.h"
 #include "mesh_builder.h"
 #include "stellate/catalogue.h"
 
@@ -81,8 +80,8 @@ TEST(Statuses, KeepTheReasonAndTellWhoseFault) {
   google::protobuf::Any* any = details.add_details();
   any->set_type_url("type.googleapis.com/google.rpc.ErrorInfo");
   any->set_value(info.SerializeAsString());
-  const Error oracle = FromStatus(grpc::Status(grpc::StatusCode::INVALID_ARGUMENT, "query 3 ...",
-                                               details.SerializeAsString()));
+  const Error oracle = FromStatus(
+      grpc::Status(grpc::StatusCode::INVALID_ARGUMENT, "query 3 ...", details.SerializeAsString()));
   EXPECT_EQ(oracle.code, ErrorCode::kOracleFailed);
   EXPECT_EQ(oracle.reason, "ORACLE_OFF_FLAT");
   EXPECT_EQ(oracle.message, "query 3 ...");
@@ -99,8 +98,8 @@ v1::MeshDelta Delta(std::uint64_t first, const Eigen::MatrixXd& points,
   v1::MeshDelta delta;
   delta.set_first_vertex(first);
   ToArray(points, {2}, delta.mutable_points());
-  for (const auto& [ids, array] : {std::pair(&added, delta.mutable_added()),
-                                   std::pair(&removed, delta.mutable_removed())}) {
+  for (const auto& [ids, array] :
+       {std::pair(&added, delta.mutable_added()), std::pair(&removed, delta.mutable_removed())}) {
     array->add_shape(static_cast<std::uint32_t>(ids->size() / 2));
     array->add_shape(2);
     array->set_data(ids->data(), ids->size() * 4);

@@ -93,14 +93,16 @@ TEST_F(SeededImplicit, CurveOfCodimensionTwoKeepsTheLaws) { Check(1, 3, CurveVal
 
 TEST_F(SeededImplicit, SphereInFiveDimensionsKeepsTheLaws) {
   Check(
-      4, 5, [](const Eigen::VectorXd& x) { return Eigen::VectorXd::Constant(1, x.squaredNorm() - 1); },
+      4, 5,
+      [](const Eigen::VectorXd& x) { return Eigen::VectorXd::Constant(1, x.squaredNorm() - 1); },
       [](const Eigen::VectorXd& x) { return Eigen::MatrixXd(2 * x.transpose()); }, 1e-10);
 }
 
 TEST(ImplicitOracle, SaysWhenItDoesNotConverge) {
   // x^2 + y^2 + 1 has no zero.
   ImplicitOracle nowhere(
-      1, 2, [](const Eigen::VectorXd& x) { return Eigen::VectorXd::Constant(1, x.squaredNorm() + 1); },
+      1, 2,
+      [](const Eigen::VectorXd& x) { return Eigen::VectorXd::Constant(1, x.squaredNorm() + 1); },
       {}, Cube(2, 1));
   const Answer answer = nowhere.ClosestPoint(Eigen::MatrixXd::Random(2, 10));
   for (Eigen::Index j = 0; j < 10; ++j) EXPECT_FALSE(answer.IsFound(j));

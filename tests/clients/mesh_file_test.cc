@@ -151,7 +151,11 @@ std::vector<Number> VtuNumbers(const std::string& xml, const std::string& name) 
   int held = 0;
   for (const char c : xml.substr(start, xml.find('<', start) - start)) {
     if (c == '=') break;
-    const int digit = c >= 'a' ? c - 'a' + 26 : c >= 'A' ? c - 'A' : c == '+' ? 62 : c == '/' ? 63 : c - '0' + 52;
+    const int digit = c >= 'a'   ? c - 'a' + 26
+                      : c >= 'A' ? c - 'A'
+                      : c == '+' ? 62
+                      : c == '/' ? 63
+                                 : c - '0' + 52;
     bits = bits << 6 | static_cast<std::uint32_t>(digit);
     held += 6;
     if (held >= 8) {
@@ -177,8 +181,8 @@ TEST_F(MeshFile, VtuHoldsPointsAndCells) {
   ASSERT_EQ(ids.size(), 12u);
   std::vector<std::vector<int>> faces;
   for (size_t i = 0; i < 12; i += 3) {
-    faces.push_back({static_cast<int>(ids[i]), static_cast<int>(ids[i + 1]),
-                     static_cast<int>(ids[i + 2])});
+    faces.push_back(
+        {static_cast<int>(ids[i]), static_cast<int>(ids[i + 1]), static_cast<int>(ids[i + 2])});
   }
   ExpectEdgesCancel(faces);
   EXPECT_EQ(VtuNumbers<std::int64_t>(xml, "offsets"), (std::vector<std::int64_t>{3, 6, 9, 12}));
@@ -215,7 +219,7 @@ TEST_F(MeshFile, SaysWhyAFileCannotBeWritten) {
 }
 
 TEST(OrientedSimplices, LeavesAOneSidedSurfaceAlone) {
-  SimplexMatrix plane(3, 10);  // the six-vertex projective plane
+  SimplexMatrix plane(3, 10);             // the six-vertex projective plane
   plane << 0, 0, 0, 0, 0, 1, 1, 1, 2, 2,  //
       1, 1, 2, 3, 4, 2, 3, 4, 3, 3,       //
       2, 3, 4, 5, 5, 5, 4, 5, 4, 5;

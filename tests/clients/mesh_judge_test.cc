@@ -66,8 +66,16 @@ TEST(Judge, KnowsMoebiusSevenVertexTorus) {
 }
 
 TEST(Judge, KnowsTheSixVertexProjectivePlane) {
-  const SimplexMatrix plane = Complex({{0, 1, 2}, {0, 1, 3}, {0, 2, 4}, {0, 3, 5}, {0, 4, 5},
-                                       {1, 2, 5}, {1, 3, 4}, {1, 4, 5}, {2, 3, 4}, {2, 3, 5}});
+  const SimplexMatrix plane = Complex({{0, 1, 2},
+                                       {0, 1, 3},
+                                       {0, 2, 4},
+                                       {0, 3, 5},
+                                       {0, 4, 5},
+                                       {1, 2, 5},
+                                       {1, 3, 4},
+                                       {1, 4, 5},
+                                       {2, 3, 4},
+                                       {2, 3, 5}});
   const Judgement judgement = Judge(plane, 6);
   EXPECT_TRUE(judgement.IsClosedManifold());
   EXPECT_FALSE(judgement.orientable);

@@ -6,7 +6,6 @@
 
 #include <array>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -24,9 +23,9 @@ class CommandLine : public Live {
     int status = -1;
     std::string output;  // standard output and error together
   };
+  // All programs of a build lie in one directory.
   static std::string Program() {
-    const char* program = std::getenv("STELLATE");
-    return program != nullptr ? program : "stellate";
+    return (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "stellate").string();
   }
   static Result Run(const std::string& arguments) {
     Result result;

@@ -91,12 +91,16 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{"nan_seed",
                 [](SpoiledOracle& o, MeshOptions&) { o.given_seeds = Eigen::Vector3d(0, kNaN, 0); },
                 "INVALID_ARGUMENT", "seeds"},
-        Option("radius_edge", [](MeshOptions& o) { o.radius_edge_bound = 0.5; },
-               "radius_edge_bound"),
-        Option("sliver", [](MeshOptions& o) { o.sliver_bound = 0.9; }, "sliver_bound"),
-        Option("picking_radius", [](MeshOptions& o) { o.picking_radius = -1; }, "picking_radius"),
-        Option("candidates", [](MeshOptions& o) { o.candidates = 1000; }, "candidates"),
-        Option("workers", [](MeshOptions& o) { o.workers = 0; }, "workers")),
+        Option(
+            "radius_edge", [](MeshOptions& o) { o.radius_edge_bound = 0.5; }, "radius_edge_bound"),
+        Option(
+            "sliver", [](MeshOptions& o) { o.sliver_bound = 0.9; }, "sliver_bound"),
+        Option(
+            "picking_radius", [](MeshOptions& o) { o.picking_radius = -1; }, "picking_radius"),
+        Option(
+            "candidates", [](MeshOptions& o) { o.candidates = 1000; }, "candidates"),
+        Option(
+            "workers", [](MeshOptions& o) { o.workers = 0; }, "workers")),
     [](const auto& request) { return request.param.name; });
 
 struct Lie {
@@ -138,54 +142,69 @@ Lie Tangents(const std::string& name, std::function<void(Eigen::MatrixXd&)> spoi
 INSTANTIATE_TEST_SUITE_P(
     Each, LyingOracle,
     ::testing::Values(
-        Closest("too_few_points",
-                [](const auto&, Answer& a) {
-                  a.points = Eigen::MatrixXd(a.points.leftCols(a.points.cols() - 1));
-                  a.found.pop_back();
-                },
-                "ORACLE_SHAPE"),
-        Closest("points_of_another_dimension",
-                [](const auto&, Answer& a) { a.points = Eigen::MatrixXd(a.points.topRows(2)); },
-                "ORACLE_SHAPE"),
-        Closest("found_flags_of_another_count",
-                [](const auto&, Answer& a) { a.found.push_back(1); }, "ORACLE_SHAPE"),
-        Closest("nan", [](const auto&, Answer& a) { a.points(1, a.points.cols() - 1) = kNaN; },
-                "ORACLE_NOT_FINITE"),
-        Closest("infinity", [](const auto&, Answer& a) { a.points(0, 0) = kInfinity; },
-                "ORACLE_NOT_FINITE"),
-        Closest("not_idempotent", [](const auto&, Answer& a) { a.points.array() += 0.03; },
-                "ORACLE_NOT_IDEMPOTENT"),
-        Closest("nothing_is_ever_found",
-                [](const auto&, Answer& a) { a.found.assign(a.found.size(), 0); }, "NO_SEEDS"),
-        Flat("off_the_flat",
-             [](const auto&, const Eigen::MatrixXd& bases, const auto&, Answer& a) {
-               // A step along the first tangent vector leaves the flat.
-               for (Eigen::Index j = 0; j < a.points.cols(); ++j) {
-                 for (int i = 0; i < 3; ++i) a.points(i, j) += 1e-2 * bases(2 * i, j);
-               }
-             },
-             "ORACLE_OFF_FLAT"),
-        Flat("outside_the_radius",
-             [](const Eigen::MatrixXd& centers, const Eigen::MatrixXd& bases,
-                const Eigen::VectorXd& radii, Answer& a) {
-               // Along the normal: in the flat, but too far.
-               for (Eigen::Index j = 0; j < a.points.cols(); ++j) {
-                 const Eigen::Vector3d u(bases(0, j), bases(2, j), bases(4, j));
-                 const Eigen::Vector3d v(bases(1, j), bases(3, j), bases(5, j));
-                 a.points.col(j) = centers.col(j) + 1.5 * radii[j] * u.cross(v);
-                 a.found[static_cast<size_t>(j)] = 1;
-               }
-             },
-             "ORACLE_OUTSIDE_RADIUS"),
-        Tangents("stretched", [](Eigen::MatrixXd& bases) { bases *= 1.1; }, "ORACLE_BAD_TANGENT"),
-        Tangents("the_same_vector_twice",
-                 [](Eigen::MatrixXd& bases) {
-                   for (int i = 0; i < 3; ++i) bases.row(2 * i + 1) = bases.row(2 * i);
-                 },
-                 "ORACLE_BAD_TANGENT"),
-        Tangents("nan_tangents", [](Eigen::MatrixXd& bases) { bases(0, 0) = kNaN; }, "ORACLE_NOT_FINITE"),
-        Tangents("too_few_vectors",
-                 [](Eigen::MatrixXd& bases) { bases = Eigen::MatrixXd(bases.topRows(3)); }, "ORACLE_SHAPE")),
+        Closest(
+            "too_few_points",
+            [](const auto&, Answer& a) {
+              a.points = Eigen::MatrixXd(a.points.leftCols(a.points.cols() - 1));
+              a.found.pop_back();
+            },
+            "ORACLE_SHAPE"),
+        Closest(
+            "points_of_another_dimension",
+            [](const auto&, Answer& a) { a.points = Eigen::MatrixXd(a.points.topRows(2)); },
+            "ORACLE_SHAPE"),
+        Closest(
+            "found_flags_of_another_count", [](const auto&, Answer& a) { a.found.push_back(1); },
+            "ORACLE_SHAPE"),
+        Closest(
+            "nan", [](const auto&, Answer& a) { a.points(1, a.points.cols() - 1) = kNaN; },
+            "ORACLE_NOT_FINITE"),
+        Closest(
+            "infinity", [](const auto&, Answer& a) { a.points(0, 0) = kInfinity; },
+            "ORACLE_NOT_FINITE"),
+        Closest(
+            "not_idempotent", [](const auto&, Answer& a) { a.points.array() += 0.03; },
+            "ORACLE_NOT_IDEMPOTENT"),
+        Closest(
+            "nothing_is_ever_found",
+            [](const auto&, Answer& a) { a.found.assign(a.found.size(), 0); }, "NO_SEEDS"),
+        Flat(
+            "off_the_flat",
+            [](const auto&, const Eigen::MatrixXd& bases, const auto&, Answer& a) {
+              // A step along the first tangent vector leaves the flat.
+              for (Eigen::Index j = 0; j < a.points.cols(); ++j) {
+                for (int i = 0; i < 3; ++i) a.points(i, j) += 1e-2 * bases(2 * i, j);
+              }
+            },
+            "ORACLE_OFF_FLAT"),
+        Flat(
+            "outside_the_radius",
+            [](const Eigen::MatrixXd& centers, const Eigen::MatrixXd& bases,
+               const Eigen::VectorXd& radii, Answer& a) {
+              // Along the normal: in the flat, but too far.
+              for (Eigen::Index j = 0; j < a.points.cols(); ++j) {
+                const Eigen::Vector3d u(bases(0, j), bases(2, j), bases(4, j));
+                const Eigen::Vector3d v(bases(1, j), bases(3, j), bases(5, j));
+                a.points.col(j) = centers.col(j) + 1.5 * radii[j] * u.cross(v);
+                a.found[static_cast<size_t>(j)] = 1;
+              }
+            },
+            "ORACLE_OUTSIDE_RADIUS"),
+        Tangents(
+            "stretched", [](Eigen::MatrixXd& bases) { bases *= 1.1; }, "ORACLE_BAD_TANGENT"),
+        Tangents(
+            "the_same_vector_twice",
+            [](Eigen::MatrixXd& bases) {
+              for (int i = 0; i < 3; ++i) bases.row(2 * i + 1) = bases.row(2 * i);
+            },
+            "ORACLE_BAD_TANGENT"),
+        Tangents(
+            "nan_tangents", [](Eigen::MatrixXd& bases) { bases(0, 0) = kNaN; },
+            "ORACLE_NOT_FINITE"),
+        Tangents(
+            "too_few_vectors",
+            [](Eigen::MatrixXd& bases) { bases = Eigen::MatrixXd(bases.topRows(3)); },
+            "ORACLE_SHAPE")),
     [](const auto& lie) { return lie.param.name; });
 
 class Failures : public Live {};

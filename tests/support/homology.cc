@@ -1,10 +1,11 @@
 #include "support/homology.h"
 
-// GUDHI prints to std::cout without saying so.
+// GUDHI prints to std::cout without including it.
+// clang-format off
 #include <iostream>
-
 #include <gudhi/Persistent_cohomology.h>
 #include <gudhi/Simplex_tree.h>
+// clang-format on
 
 namespace stellate::testing {
 

@@ -38,8 +38,8 @@ int Components(const std::vector<Facet>& facets) {
   for (const Facet& facet : facets) {
     for (const std::uint32_t v : facet) parent[root(v)] = root(facet.front());
   }
-  return static_cast<int>(std::count_if(parent.begin(), parent.end(),
-                                        [](const auto& entry) { return entry.first == entry.second; }));
+  return static_cast<int>(std::count_if(
+      parent.begin(), parent.end(), [](const auto& entry) { return entry.first == entry.second; }));
 }
 
 // By counting distinct faces of every dimension.
@@ -129,7 +129,8 @@ Judgement Judge(const SimplexMatrix& simplices, std::uint64_t vertices) {
 
 ::testing::AssertionResult IsFaithful(const Mesh& mesh, Manifold& manifold, double epsilon) {
   const auto wrong = [&] {
-    return ::testing::AssertionFailure() << manifold.facts().spec << " at epsilon " << epsilon << ": ";
+    return ::testing::AssertionFailure()
+           << manifold.facts().spec << " at epsilon " << epsilon << ": ";
   };
   if (!mesh.report.certified()) return wrong() << "not certified\n" << ToText(mesh.report);
   const Judgement seen = Judge(mesh.simplices, static_cast<std::uint64_t>(mesh.points.cols()));
@@ -142,10 +143,10 @@ Judgement Judge(const SimplexMatrix& simplices, std::uint64_t vertices) {
   if (seen.betti_mod2 != facts.betti_mod2 || seen.betti_mod3 != facts.betti_mod3 ||
       seen.orientable != facts.orientable ||
       seen.euler_characteristic != facts.euler_characteristic) {
-    return wrong() << "Euler characteristic " << seen.euler_characteristic << ", Betti numbers mod 2"
-                   << Show(seen.betti_mod2) << ", mod 3" << Show(seen.betti_mod3)
-                   << "; should be " << facts.euler_characteristic << "," << Show(facts.betti_mod2)
-                   << "," << Show(facts.betti_mod3);
+    return wrong() << "Euler characteristic " << seen.euler_characteristic
+                   << ", Betti numbers mod 2" << Show(seen.betti_mod2) << ", mod 3"
+                   << Show(seen.betti_mod3) << "; should be " << facts.euler_characteristic << ","
+                   << Show(facts.betti_mod2) << "," << Show(facts.betti_mod3);
   }
   const Certificate& claimed = mesh.report.certificate;
   if (claimed.euler_characteristic != seen.euler_characteristic ||

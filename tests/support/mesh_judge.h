@@ -13,7 +13,7 @@ namespace stellate::testing {
 
 // What a complex is, found from its simplices alone. Shares no code with the mesher.
 struct Judgement {
-  bool valid = true;  // ids in range, ascending and distinct, no simplex twice
+  bool valid = true;                  // ids in range, ascending and distinct, no simplex twice
   std::uint64_t unused_vertices = 0;  // in no simplex
   std::uint64_t bad_faces = 0;        // (k-1)-faces that are not in exactly two simplices
   std::uint64_t bad_links = 0;  // vertices whose link is no (k-1)-sphere: exact for k <= 3, above

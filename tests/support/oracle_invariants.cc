@@ -24,10 +24,10 @@ class Checker {
 
   AssertionResult Run() {
     if (k_ < 1 || k_ >= d_) return Broken("dimensions") << "k = " << k_ << ", d = " << d_;
-    for (auto law : {&Checker::FindPoints, &Checker::ClosestPointsAreClosest,
-                     &Checker::BatchingChangesNothing, &Checker::TangentsAreOrthonormal,
-                     &Checker::TangentsMatchDerivatives, &Checker::OffsetsAreNormal,
-                     &Checker::IntersectionsAreWhereAsked}) {
+    for (auto law :
+         {&Checker::FindPoints, &Checker::ClosestPointsAreClosest, &Checker::BatchingChangesNothing,
+          &Checker::TangentsAreOrthonormal, &Checker::TangentsMatchDerivatives,
+          &Checker::OffsetsAreNormal, &Checker::IntersectionsAreWhereAsked}) {
       if (AssertionResult result = (this->*law)(); !result) return result;
     }
     return AssertionSuccess();
@@ -100,8 +100,8 @@ class Checker {
       }
       const double own = (points_.col(j) - starts_.col(j)).norm();
       Eigen::Index nearest = 0;
-      const double seen =
-          std::sqrt((points_.colwise() - starts_.col(j)).colwise().squaredNorm().minCoeff(&nearest));
+      const double seen = std::sqrt(
+          (points_.colwise() - starts_.col(j)).colwise().squaredNorm().minCoeff(&nearest));
       if (own > seen + options_.tolerance * size_) {
         return Broken("no seen point is nearer than the closest point")
                << "from [" << starts_.col(j).transpose() << "] it is at " << own

@@ -47,8 +47,8 @@ Parsed Parse(const std::string& spec) {
   Parsed parsed;
   std::string rest = spec;
   if (const size_t at = rest.find('@'); at != std::string::npos) {
-    parsed.turned_into = Integer(Number(rest.substr(at + 1)), "the dimension after @", 2,
-                                 kMaxAmbientDimension);
+    parsed.turned_into =
+        Integer(Number(rest.substr(at + 1)), "the dimension after @", 2, kMaxAmbientDimension);
     rest.resize(at);
   }
   size_t colon = rest.find(':');

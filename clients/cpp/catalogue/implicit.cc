@@ -94,7 +94,8 @@ bool ImplicitOracle::Descend(const Eigen::VectorXd& x, Eigen::VectorXd& y, doubl
   const Eigen::VectorXd towards = tangent.transpose() * (x - y);
   *slope = towards.norm();
   if (*slope <= kTarget * length_) return false;
-  // The Hessian of the distance along M: I + sum lambda_j U^T (Hess F_j) U, with J^T lambda = x - y.
+  // The Hessian of the distance along M: I + sum lambda_j U^T (Hess F_j) U, with J^T lambda = x -
+  // y.
   const Eigen::MatrixXd jacobian = J(y);
   const Eigen::VectorXd lambda =
       jacobian.transpose().completeOrthogonalDecomposition().solve(x - y);

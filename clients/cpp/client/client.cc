@@ -75,8 +75,7 @@ class Run {
     // The mesh's own failure says most; a stream that the server refused says why it has none.
     if (broken) {
       for (const auto& worker : workers_) {
-        if (worker->error() &&
-            (given_up_ || worker->error()->code != ErrorCode::kServerFailed)) {
+        if (worker->error() && (given_up_ || worker->error()->code != ErrorCode::kServerFailed)) {
           return tl::unexpected(*worker->error());
         }
       }
@@ -104,8 +103,8 @@ class Run {
 
   void StartWorkers() {
     for (int i = 0; i < options_.workers; ++i) {
-      workers_.push_back(std::make_unique<client::Worker>(*stub_, oracle_, name_,
-                                                          "cpp-" + std::to_string(i + 1)));
+      workers_.push_back(
+          std::make_unique<client::Worker>(*stub_, oracle_, name_, "cpp-" + std::to_string(i + 1)));
     }
     for (const auto& worker : workers_) {
       threads_.emplace_back([this, w = worker.get()] {
@@ -167,7 +166,8 @@ class Run {
     }
     const grpc::Status status = stream->Finish();
     if (!ended_) {
-      if (status.ok()) return Fail(ErrorCode::kServerFailed, "the server ended the watch too early");
+      if (status.ok())
+        return Fail(ErrorCode::kServerFailed, "the server ended the watch too early");
       if (status.error_code() == grpc::StatusCode::CANCELLED) {
         return Fail(ErrorCode::kServerFailed, "the server broke off");
       }

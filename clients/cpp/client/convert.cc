@@ -82,7 +82,8 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
     return Fail(ErrorCode::kRefused, why, "INVALID_ARGUMENT");
   };
   if (oracle.dimension() < 1) {
-    return invalid("dimension is " + std::to_string(oracle.dimension()) + " but must be at least 1");
+    return invalid("dimension is " + std::to_string(oracle.dimension()) +
+                   " but must be at least 1");
   }
   if (oracle.ambient_dimension() < 1) {
     return invalid("ambient_dimension is " + std::to_string(oracle.ambient_dimension()) +
@@ -156,11 +157,16 @@ Report FromProto(const v1::Report& m) {
   r.failure_message = m.failure().message();
   r.elapsed_seconds = m.elapsed_seconds();
   const v1::Counts& n = m.counts();
-  r.counts = {n.vertices(),        n.simplices(),
-              n.rounds(),          n.queries(),
-              n.tangent_queries(), n.inserted_size(),
-              n.inserted_radius_edge(), n.inserted_sliver(),
-              n.inserted_inconsistent(), n.duplicates()};
+  r.counts = {n.vertices(),
+              n.simplices(),
+              n.rounds(),
+              n.queries(),
+              n.tangent_queries(),
+              n.inserted_size(),
+              n.inserted_radius_edge(),
+              n.inserted_sliver(),
+              n.inserted_inconsistent(),
+              n.duplicates()};
   const v1::Certificate& c = m.certificate();
   Certificate& out = r.certificate;
   out.certified = c.certified();

@@ -56,7 +56,8 @@ Expected<std::string> FindServer() {
     }
   }
   return Failed(
-      "no server was given and no stellated found to start: name a server, or set $STELLATED to the "
+      "no server was given and no stellated found to start: name a server, or set $STELLATED to "
+      "the "
       "binary, or put it next to this program or on PATH");
 }
 

@@ -32,8 +32,8 @@ class EmbeddedServer {
 
   std::string directory_, address_;
   pid_t process_ = -1;
-  int output_ = -1;      // read end of its standard output
-  std::thread drain_;    // so that whatever else it prints never blocks it
+  int output_ = -1;    // read end of its standard output
+  std::thread drain_;  // so that whatever else it prints never blocks it
 };
 
 }  // namespace stellate::client

@@ -102,8 +102,8 @@ Expected<void> MeshBuilder::Absorb(const v1::MeshDelta& delta) {
   }
   std::vector<std::uint32_t> added, removed;
   const std::uint32_t width = static_cast<std::uint32_t>(k_) + 1;
-  for (const auto& [array, ids] : {std::pair(&delta.added(), &added),
-                                   std::pair(&delta.removed(), &removed)}) {
+  for (const auto& [array, ids] :
+       {std::pair(&delta.added(), &added), std::pair(&delta.removed(), &removed)}) {
     if (const Expected<void> ok = AppendIds(*array, width, ids); !ok) {
       return tl::unexpected(ok.error());
     }

@@ -54,7 +54,9 @@ SimplexMatrix OrientedSimplices(const SimplexMatrix& simplices) {
             [&](const Side& a, const Side& b) { return faces.Compare(a, b) < 0; });
   // neighbour[j * width + i]: the side that shares the face opposite row i of simplex j.
   std::vector<Side> neighbour(static_cast<size_t>(m * width), Side{-1, 0});
-  const auto slot = [&](const Side& s) { return static_cast<size_t>(s.simplex * width + s.opposite); };
+  const auto slot = [&](const Side& s) {
+    return static_cast<size_t>(s.simplex * width + s.opposite);
+  };
   for (size_t i = 0; i < sides.size();) {
     size_t end = i + 1;
     while (end < sides.size() && faces.Compare(sides[i], sides[end]) == 0) ++end;

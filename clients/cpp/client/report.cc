@@ -55,15 +55,15 @@ class Lines {
 };
 
 void AddCertificate(const Certificate& c, Lines& lines) {
-  lines.Add("topology", (c.components == 1 ? "1 component" : Grouped(c.components) + " components") +
-                            ", Euler characteristic " + std::to_string(c.euler_characteristic) +
-                            (c.orientable ? ", orientable" : ", not orientable"));
+  lines.Add("topology",
+            (c.components == 1 ? "1 component" : Grouped(c.components) + " components") +
+                ", Euler characteristic " + std::to_string(c.euler_characteristic) +
+                (c.orientable ? ", orientable" : ", not orientable"));
   lines.Add("manifold",
             (c.closed ? "closed" : "not closed (" + Grouped(c.bad_faces) + " bad faces)") + "; " +
-                (c.links_are_spheres
-                     ? std::string("every link a sphere (decided ") +
-                           (c.links_decided_exactly ? "exactly)" : "by homology)")
-                     : Grouped(c.bad_links) + " links are not spheres"));
+                (c.links_are_spheres ? std::string("every link a sphere (decided ") +
+                                           (c.links_decided_exactly ? "exactly)" : "by homology)")
+                                     : Grouped(c.bad_links) + " links are not spheres"));
   lines.Add("stars", Grouped(c.inconsistent_simplices) + " inconsistent simplices, " +
                          Grouped(c.unembedded_stars) + " stars overlap, " +
                          Grouped(c.fibre_failures) + " of " + Grouped(c.fibre_samples) +
@@ -71,7 +71,8 @@ void AddCertificate(const Certificate& c, Lines& lines) {
   std::string shape = "largest circumradius " + Format("%.4g", c.max_circumradius) +
                       ", radius-edge ratio " + Format("%.3g", c.max_radius_edge) +
                       "; smallest fatness " + Format("%.3g", c.min_fatness);
-  if (c.min_angle_degrees > 0) shape += ", angle " + Format("%.1f", c.min_angle_degrees) + " degrees";
+  if (c.min_angle_degrees > 0)
+    shape += ", angle " + Format("%.1f", c.min_angle_degrees) + " degrees";
   lines.Add("shape", shape);
   lines.Add("closeness", "barycentres within " + Format("%.3g", c.max_barycentre_distance) +
                              " of the manifold, simplices within " +

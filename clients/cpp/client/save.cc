@@ -54,7 +54,8 @@ tl::unexpected<Error> CannotHold(const std::string& why) {
 
 Expected<void> CheckCurveOrSurface(const Mesh& mesh, const char* format) {
   if (mesh.dimension() <= 2) return {};
-  return CannotHold(std::string(format) + " holds curves and surfaces, and this mesh has dimension " +
+  return CannotHold(std::string(format) +
+                    " holds curves and surfaces, and this mesh has dimension " +
                     std::to_string(mesh.dimension()) +
                     (mesh.dimension() == 3 ? "; save it as .vtu or .txt" : "; save it as .txt"));
 }
@@ -154,12 +155,14 @@ std::string DataArray(const char* type, const char* name, int components, const 
 }
 
 Expected<std::string> Vtu(const Mesh& mesh) {
-  constexpr std::array<std::uint8_t, 4> kCellTypes = {1, 3, 5, 10};  // vertex, line, triangle, tetra
+  constexpr std::array<std::uint8_t, 4> kCellTypes = {1, 3, 5,
+                                                      10};  // vertex, line, triangle, tetra
   if (mesh.dimension() > 3) {
     return CannotHold("VTU holds simplices of dimension 3 at most, and this mesh has dimension " +
                       std::to_string(mesh.dimension()) + "; save it as .txt");
   }
-  const Eigen::Index n = mesh.points.cols(), m = mesh.simplices.cols(), width = mesh.simplices.rows();
+  const Eigen::Index n = mesh.points.cols(), m = mesh.simplices.cols(),
+                     width = mesh.simplices.rows();
   const Eigen::MatrixXd points = InSpace(mesh);
   const Eigen::Matrix<std::int64_t, Eigen::Dynamic, Eigen::Dynamic> connectivity =
       OrientedSimplices(mesh.simplices).cast<std::int64_t>();
@@ -172,9 +175,9 @@ Expected<std::string> Vtu(const Mesh& mesh) {
   std::string xml =
       "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" "
       "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<UnstructuredGrid>\n<Piece "
-      "NumberOfPoints=\"" + std::to_string(n) + "\" NumberOfCells=\"" + std::to_string(m) +
-      "\">\n<Points>\n" + DataArray("Float64", "Points", 3, points.data(), points.size()) +
-      "</Points>\n<Cells>\n" +
+      "NumberOfPoints=\"" +
+      std::to_string(n) + "\" NumberOfCells=\"" + std::to_string(m) + "\">\n<Points>\n" +
+      DataArray("Float64", "Points", 3, points.data(), points.size()) + "</Points>\n<Cells>\n" +
       DataArray("Int64", "connectivity", 1, connectivity.data(), connectivity.size()) +
       DataArray("Int64", "offsets", 1, offsets.data(), m) +
       DataArray("UInt8", "types", 1, types.data(), m) + "</Cells>\n";
@@ -208,8 +211,8 @@ Expected<void> Mesh::Save(const std::string& path) const {
     if (written) return {};
     return Fail(ErrorCode::kFileFailed, "cannot write " + path + ": " + std::strerror(errno));
   }
-  return Fail(ErrorCode::kFileFailed, "no format is known by the ending '" + ending + "' of " + path +
-                                          "; known: .txt .off .obj .ply .vtu");
+  return Fail(ErrorCode::kFileFailed, "no format is known by the ending '" + ending + "' of " +
+                                          path + "; known: .txt .off .obj .ply .vtu");
 }
 
 }  // namespace stellate

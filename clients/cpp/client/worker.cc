@@ -10,8 +10,8 @@
 namespace stellate::client {
 namespace {
 
-constexpr size_t kChunkBytes = 3 << 20;       // of numbers, under the 4 MB of a message
-constexpr size_t kMaxFailureBytes = 4000;     // OracleFailure.message takes 4096
+constexpr size_t kChunkBytes = 3 << 20;    // of numbers, under the 4 MB of a message
+constexpr size_t kMaxFailureBytes = 4000;  // OracleFailure.message takes 4096
 
 std::uint32_t MaxChunkQueries(const Oracle& oracle) {
   const size_t d = static_cast<size_t>(oracle.ambient_dimension());
@@ -49,8 +49,9 @@ bool Worker::Answer(const v1::QueryChunk& chunk, v1::AnswerChunk* answers) {
     error_ = Error{ErrorCode::kServerFailed, "", "the server sent queries that make no sense"};
     return false;
   }
-  stellate::Answer answer = flats ? oracle_.IntersectFlat(*points, *bases, radii->row(0).transpose())
-                                  : oracle_.ClosestPoint(*points);
+  stellate::Answer answer = flats
+                                ? oracle_.IntersectFlat(*points, *bases, radii->row(0).transpose())
+                                : oracle_.ClosestPoint(*points);
   if (chunk.want_tangents() && answer.tangents.size() == 0 && oracle_.has_tangent_basis()) {
     // Only where there is a point to ask about; the server skips the other rows.
     std::vector<Eigen::Index> found;
@@ -100,8 +101,7 @@ void Worker::Run() {
       exception_ = std::current_exception();
       request.Clear();
       request.mutable_failure()->set_lease(response.queries().lease());
-      request.mutable_failure()->set_message(
-          DescriptionOf(exception_).substr(0, kMaxFailureBytes));
+      request.mutable_failure()->set_message(DescriptionOf(exception_).substr(0, kMaxFailureBytes));
       open = false;
     }
     if (!stream->Write(request)) break;

@@ -17,8 +17,8 @@ class EllipsoidShape final : public PointwiseOracle {
  public:
   explicit EllipsoidShape(const std::vector<double>& axes)
       : PointwiseOracle(static_cast<int>(axes.size()) - 1, static_cast<int>(axes.size())),
-        axes_(Eigen::Map<const Eigen::ArrayXd>(axes.data(),
-                                               static_cast<Eigen::Index>(axes.size()))) {
+        axes_(
+            Eigen::Map<const Eigen::ArrayXd>(axes.data(), static_cast<Eigen::Index>(axes.size()))) {
     axes_.minCoeff(&shortest_);
   }
   std::optional<BoundingBox> bounding_box() const override {

@@ -70,9 +70,7 @@ class TwoSpheresShape final : public PointwiseOracle {
   }
 
  private:
-  static Eigen::Vector3d Center(const Eigen::VectorXd& x) {
-    return {x[0] < 0 ? -1.5 : 1.5, 0, 0};
-  }
+  static Eigen::Vector3d Center(const Eigen::VectorXd& x) { return {x[0] < 0 ? -1.5 : 1.5, 0, 0}; }
 };
 
 class CirclesShape final : public PointwiseOracle {
@@ -82,7 +80,8 @@ class CirclesShape final : public PointwiseOracle {
         radii_(std::move(radii)) {}
   std::optional<BoundingBox> bounding_box() const override {
     Eigen::VectorXd half(ambient_dimension());
-    for (int i = 0; i < dimension(); ++i) half.segment(2 * i, 2).setConstant(1.1 * radii_[Index(i)]);
+    for (int i = 0; i < dimension(); ++i)
+      half.segment(2 * i, 2).setConstant(1.1 * radii_[Index(i)]);
     return BoundingBox{-half, half};
   }
   bool Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const override {

@@ -24,8 +24,7 @@ class TorusShape final : public PointwiseOracle {
   }
   void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const override {
     const Eigen::Vector3d around = Around(y);
-    const Eigen::Vector2d normal =
-        Eigen::Vector2d(std::hypot(y[0], y[1]) - R_, y[2]).normalized();
+    const Eigen::Vector2d normal = Eigen::Vector2d(std::hypot(y[0], y[1]) - R_, y[2]).normalized();
     tangent.resize(3, 2);
     tangent.col(0) << -around[1], around[0], 0;
     tangent.col(1) = -normal[1] * around + normal[0] * Eigen::Vector3d::UnitZ();

@@ -45,9 +45,9 @@ struct MeshOptions {
 
 // Meshes the oracle's manifold: offers the oracle to the server and collects the mesh.
 //
-// Returns a mesh whenever the run ends by itself, certified or not: read Mesh::report. An error when
-// the request is refused, the server cannot be reached, or the oracle's answers break a rule. An
-// exception out of the oracle reaches the caller as it is, and the server as a failed oracle.
+// Returns a mesh whenever the run ends by itself, certified or not: read Mesh::report. An error
+// when the request is refused, the server cannot be reached, or the oracle's answers break a rule.
+// An exception out of the oracle reaches the caller as it is, and the server as a failed oracle.
 Expected<Mesh> MeshManifold(Oracle& oracle, const MeshOptions& options);
 
 struct ServerHealth {

@@ -39,7 +39,7 @@ struct Progress {
 // What a mesh took.
 struct Counts {
   std::uint64_t vertices = 0, simplices = 0;
-  std::uint64_t rounds = 0;   // round trips
+  std::uint64_t rounds = 0;  // round trips
   std::uint64_t queries = 0;
   std::uint64_t tangent_queries = 0;  // closest points spent on finding tangent bases
   std::uint64_t inserted_size = 0;    // sample points that rule R1 inserted, then R2, R3, R4
@@ -59,7 +59,8 @@ struct Certificate {
   bool links_decided_exactly = false;  // k <= 3; above, by homology
   std::uint64_t bad_links = 0;
   std::uint64_t inconsistent_simplices = 0;
-  std::uint64_t unembedded_stars = 0;  // stars whose projection on the tangent space overlaps itself
+  std::uint64_t unembedded_stars =
+      0;                             // stars whose projection on the tangent space overlaps itself
   std::uint64_t fibre_failures = 0;  // sampled normal flats that do not meet the mesh once nearby
   std::uint64_t fibre_samples = 0;
 
