@@ -12,7 +12,7 @@ namespace {
 using testing::AnswererFor;
 using testing::Drive;
 using testing::Make;
-using testing::Run;
+using testing::DrivenRun;
 using testing::SameMesh;
 using testing::SpecificationFor;
 
@@ -40,12 +40,12 @@ class Determinism : public ::testing::TestWithParam<Case> {
 
 TEST_P(Determinism, TheNumberOfThreadsDoesNotMatter) {
   spec_.threads = 1;
-  const Run one = Drive(spec_, *manifold_), again = Drive(spec_, *manifold_);
+  const DrivenRun one = Drive(spec_, *manifold_), again = Drive(spec_, *manifold_);
   ASSERT_EQ(one.report().termination, Termination::kConverged);
   EXPECT_TRUE(SameMesh(*one.mesher, *again.mesher));
   for (const int threads : {2, 4, 0}) {
     spec_.threads = threads;
-    const Run many = Drive(spec_, *manifold_);
+    const DrivenRun many = Drive(spec_, *manifold_);
     EXPECT_TRUE(SameMesh(*one.mesher, *many.mesher)) << threads << " threads";
     ASSERT_EQ(many.deltas.size(), one.deltas.size());
     for (std::size_t r = 0; r < one.deltas.size(); ++r) {
@@ -56,9 +56,9 @@ TEST_P(Determinism, TheNumberOfThreadsDoesNotMatter) {
 }
 
 TEST_P(Determinism, RandomSeedsGiveOtherMeshesOfTheSameManifold) {
-  const Run one = Drive(spec_, *manifold_);
+  const DrivenRun one = Drive(spec_, *manifold_);
   spec_.random_seed = 2;
-  const Run other = Drive(spec_, *manifold_);
+  const DrivenRun other = Drive(spec_, *manifold_);
   EXPECT_FALSE(SameMesh(*one.mesher, *other.mesher));
   EXPECT_EQ(other.report().termination, Termination::kConverged);
   EXPECT_EQ(other.report().certificate.euler_characteristic,
@@ -168,9 +168,9 @@ TEST_P(Invariance, UnitsAndPlaceDoNotMatter) {
     const auto [scale, shift] = GetParam();
     const Eigen::VectorXd by = Eigen::VectorXd::Constant(manifold->ambient_dimension(), shift);
     Moved moved(*manifold, scale, by);
-    const Run run = Drive(SpecificationFor(moved, scale * epsilon), moved);
+    const DrivenRun run = Drive(SpecificationFor(moved, scale * epsilon), moved);
     testing::ExpectGoodMesh(run, manifold->facts());
-    const Run plain = Drive(SpecificationFor(*manifold, epsilon), *manifold);
+    const DrivenRun plain = Drive(SpecificationFor(*manifold, epsilon), *manifold);
     const double ratio = static_cast<double>(run.report().counts.vertices) /
                          static_cast<double>(plain.report().counts.vertices);
     EXPECT_NEAR(ratio, 1, 0.1);

@@ -15,7 +15,7 @@ using testing::Drive;
 using testing::ExpectGoodMesh;
 using testing::Make;
 using testing::RandomPointsOn;
-using testing::Run;
+using testing::DrivenRun;
 using testing::Sample;
 using testing::SpecificationFor;
 using testing::StarOf;
@@ -46,7 +46,7 @@ class Refinements : public ::testing::TestWithParam<Case> {
 
 TEST_P(Refinements, GiveTheManifold) {
   const auto manifold = Make(GetParam().manifold);
-  const Run run = Drive(Spec(*manifold), *manifold);
+  const DrivenRun run = Drive(Spec(*manifold), *manifold);
   ExpectGoodMesh(run, manifold->facts());
   EXPECT_LT(manifold->Distance(run.mesher->Points()).maxCoeff(), 1e-9);
   const Counts& counts = run.report().counts;
@@ -75,7 +75,7 @@ INSTANTIATE_TEST_SUITE_P(PoorerOracles, Refinements,
 
 // Rebuilds the stars from the finished points: what the run says of itself must be so.
 template <int K>
-void ExpectRulesHold(const Run& run, const Specification& spec) {
+void ExpectRulesHold(const DrivenRun& run, const Specification& spec) {
   const ResolvedCriteria criteria = Resolve(spec);
   Sample sample;
   sample.d = spec.ambient_dimension;
@@ -100,7 +100,7 @@ void ExpectRulesHoldOn(const std::string& name, double epsilon) {
   const auto manifold = Make(name);
   Specification spec = SpecificationFor(*manifold, epsilon);
   spec.criteria.judging = Judging::kFlats;
-  const Run run = Drive(spec, *manifold);
+  const DrivenRun run = Drive(spec, *manifold);
   ExpectGoodMesh(run, manifold->facts());
   ExpectRulesHold<K>(run, spec);
 }
@@ -119,7 +119,7 @@ TEST(Rules, TakeStricterCriteria) {
   spec.criteria.radius_edge_bound = 1.3;
   spec.criteria.sliver_bound = 0.2;
   spec.criteria.candidates = 5;
-  const Run run = Drive(spec, *manifold);
+  const DrivenRun run = Drive(spec, *manifold);
   ExpectGoodMesh(run, manifold->facts());
   ExpectRulesHold<2>(run, spec);
 }
@@ -128,7 +128,7 @@ TEST(Rules, TakeStricterCriteria) {
 TEST(Refinement, UsesAsManyPointsAsTheSizeAsksFor) {
   const auto manifold = Make("circle:3");
   for (const double epsilon : {0.2, 0.05}) {
-    const Run run = Drive(SpecificationFor(*manifold, epsilon), *manifold);
+    const DrivenRun run = Drive(SpecificationFor(*manifold, epsilon), *manifold);
     const double fewest = std::numbers::pi / epsilon;
     EXPECT_GE(static_cast<double>(run.report().counts.vertices), fewest);
     EXPECT_LE(static_cast<double>(run.report().counts.vertices), 2.5 * fewest);
@@ -158,7 +158,7 @@ TEST(Seeds, OnAGridOfTheFlatTorusMeshAsWellAsAny) {
     spec.seeds = Eigen::Map<const Eigen::MatrixXd>(grid.points.data(), grid.d, grid.size());
     const double radius = manifold->ClosestPoint(spec.seeds).points.col(0).norm();
     spec.seeds *= radius / std::sqrt(k);
-    const Run run = Drive(spec, *manifold);
+    const DrivenRun run = Drive(spec, *manifold);
     ExpectGoodMesh(run, manifold->facts());
   }
 }
@@ -171,7 +171,7 @@ TEST(Seeds, ManyTimesTheSameAreOne) {
   once.seeds = points;
   Specification often = once;
   often.seeds = points.replicate(1, 30);
-  const Run a = Drive(once, *manifold), b = Drive(often, *manifold);
+  const DrivenRun a = Drive(once, *manifold), b = Drive(often, *manifold);
   ExpectGoodMesh(b, manifold->facts());
   EXPECT_EQ(a.mesher->Points(), b.mesher->Points());
   EXPECT_EQ(a.mesher->Simplices(), b.mesher->Simplices());
@@ -194,7 +194,7 @@ TEST(Seeds, OnlyTheComponentsTheyFallOnAreFound) {
   Specification spec = SpecificationFor(*manifold, 0.3);
   spec.bounding_box.reset();
   spec.seeds = RandomPointsOn(*manifold, 1, 7);
-  const Run run = Drive(spec, *manifold);
+  const DrivenRun run = Drive(spec, *manifold);
   EXPECT_TRUE(run.report().certificate.certified) << run.report().certificate.verdict;
   EXPECT_EQ(run.report().certificate.components, 1u);
   EXPECT_EQ(run.report().certificate.euler_characteristic, 2);
@@ -205,7 +205,7 @@ TEST(Seeds, ThatNoClosestPointIsFoundForFailTheRun) {
   for (const bool tangents : {true, false}) {
     Specification spec = SpecificationFor(*manifold, 0.3);
     spec.oracle.tangent_basis = tangents;
-    const Run run = Drive(spec, [&](const QueryBatch& batch) {
+    const DrivenRun run = Drive(spec, [&](const QueryBatch& batch) {
       Answers answers = testing::AnswersOf(*manifold, batch);
       for (AnswerBlock& block : answers.blocks)
         block.found.assign(static_cast<std::size_t>(block.points.cols()), 0);
@@ -227,7 +227,7 @@ TEST(Refinement, NeverCertifiesTheWrongTopologyQuietly) {
     for (const std::uint64_t seed : {1, 2, 3}) {
       Specification spec = SpecificationFor(*manifold, epsilon);
       spec.random_seed = seed;
-      const Run run = Drive(spec, *manifold);
+      const DrivenRun run = Drive(spec, *manifold);
       const Certificate& c = run.report().certificate;
       if (c.certified) {
         EXPECT_EQ(c.euler_characteristic, 0) << epsilon << " " << seed;

@@ -239,7 +239,7 @@ void ExpectBadCountedRightly(const std::string& name, double epsilon) {
   const auto manifold = Make(name);
   Specification spec = testing::SpecificationFor(*manifold, epsilon);
   spec.criteria.judging = Judging::kFlats;
-  const testing::Run run = testing::Drive(spec, *manifold);
+  const testing::DrivenRun run = testing::Drive(spec, *manifold);
   ASSERT_TRUE(run.report().certificate.certified) << run.report().certificate.verdict;
   Sample mesh;
   mesh.d = spec.ambient_dimension;
