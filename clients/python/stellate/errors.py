@@ -1,8 +1,8 @@
 """What can go wrong, as exceptions.
 
 Every error of ours is a StellateError with a stable upper-case `reason` for programs (one of the
-protocol's ErrorReason) and a message for people. An exception that an oracle raises is not among them: it
-reaches the caller as itself.
+protocol's ErrorReason) and a message for people. An exception that an oracle raises is not among
+them: it reaches the caller as itself.
 """
 
 from __future__ import annotations
