@@ -36,8 +36,7 @@ constexpr double kBarycentreNoise = 0.02;  // of the mesh size, for inexact orac
 // Within a well-sampled M each point has a vertex within its simplex' circumradius and height,
 // 1.5 times the mesh size.
 constexpr double kCoverageShare = 2;
-// eps / reach: what was seen to work reliably; beyond the second no theorem and no practice.
-constexpr double kCoarse = 0.8;
+// eps / reach beyond which there is no theorem and no practice.
 constexpr double kHopeless = 1.5;
 // Closest points that an oracle may fail to find near the mesh.
 constexpr double kUnansweredShare = 0.01;
@@ -395,12 +394,8 @@ class Certifier::Impl {
                                " times the estimated reach ", Brief(reach_),
                                ", far too coarse to tell the manifold's shape"));
     }
-    if (certificate_.epsilon_over_reach > kCoarse) {
-      findings_.Warn(Message("epsilon is ", Brief(certificate_.epsilon_over_reach),
-                             " times the estimated reach ", Brief(reach_),
-                             ": too coarse to trust the mesh's topology; take epsilon at most ",
-                             Brief(0.4 * reach_), "."));
-    }
+    if (std::string w = CoarsenessWarning(spec_.epsilon, reach_); !w.empty())
+      findings_.Warn(std::move(w));
   }
 
   const QueryBlock& BlockOf(Role role) const {

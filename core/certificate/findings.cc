@@ -6,6 +6,13 @@
 
 namespace stellate::core {
 
+std::string CoarsenessWarning(double epsilon, double reach) {
+  if (!(epsilon > kCoarse * reach)) return {};
+  return Message("epsilon is ", Brief(epsilon / reach), " times the estimated reach ", Brief(reach),
+                 ": too coarse to trust the mesh's topology; take epsilon at most ",
+                 Brief(0.4 * reach), ".");
+}
+
 void Findings::Refuse(Subject subject, std::string problem) {
   const auto place = std::lower_bound(problems_.begin(), problems_.end(), subject,
                                       [](const Problem& p, Subject s) { return p.subject < s; });

@@ -7,6 +7,12 @@
 
 namespace stellate::core {
 
+// eps / reach: up to this, meshing was seen to work reliably.
+inline constexpr double kCoarse = 0.8;
+
+// A warning for people where epsilon is above kCoarse times the (estimated) reach, else empty.
+std::string CoarsenessWarning(double epsilon, double reach);
+
 // What speaks against a mesh, in plain words: problems refuse it, warnings do not.
 class Findings {
  public:

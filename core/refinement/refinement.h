@@ -71,6 +71,7 @@ class Refinement final : public Mesher {
   void Commit();
   void StartCertificate();
   void Finish(Termination termination);
+  void DescribeUnfinished();
   std::string WhatIsLeft() const;
   void UpdateProgress();
 

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "core/certificate/findings.h"
 #include "core/complex/consistency.h"
 #include "core/message.h"
 #include "core/refinement/refinement.h"
@@ -54,18 +56,48 @@ void Refinement<K>::Finish(Termination termination) {
     certificate.verdict = std::string("not certified: the run ended as ") +
                           TerminationName(termination) + " before every rule held";
     if (!report_.failure.message.empty()) certificate.verdict += ": " + report_.failure.message;
-    for (std::uint32_t p = 0; p < complex_.size() && p < standing_.size(); ++p) {
-      if (!complex_.cell(p).bounded()) continue;
-      certificate.inconsistent_simplices += CountInconsistent<K>(complex_, p);
-      certificate.max_circumradius =
-          std::max(certificate.max_circumradius, std::sqrt(complex_.cell(p).max_norm2()));
-    }
+    // Whoever cancels a large mesh does not want to wait for it to be described.
+    if (termination != Termination::kCancelled && termination != Termination::kOracleFailed)
+      DescribeUnfinished();
     if (termination == Termination::kNoProgress) certificate.verdict += "; " + WhatIsLeft();
   }
   certifier_.reset();
   certified_tangents_.resize(0, 0);
   certified_simplices_ = {};
   UpdateProgress();
+}
+
+// What can be said without further questions of a mesh that did not converge. The reach comes from
+// neighbours alone: |q - p|^2 / (2 dist(q, T_pM)).
+template <int K>
+void Refinement<K>::DescribeUnfinished() {
+  Certificate& certificate = report_.certificate;
+  double reach = std::numeric_limits<double>::infinity();
+  for (std::uint32_t p = 0; p < complex_.size() && p < standing_.size(); ++p) {
+    const auto& cell = complex_.cell(p);
+    if (!cell.bounded()) continue;
+    certificate.inconsistent_simplices += CountInconsistent<K>(complex_, p);
+    certificate.max_circumradius =
+        std::max(certificate.max_circumradius, std::sqrt(cell.max_norm2()));
+    for (const auto& facet : cell.facets()) {
+      const double distance2 = 2 * facet.offset;
+      double along2 = 0;
+      for (int a = 0; a < K; ++a) along2 += facet.normal[a] * facet.normal[a];
+      const double away = std::sqrt(std::max(distance2 - along2, 0.0));
+      if (away > 0) reach = std::min(reach, distance2 / (2 * away));
+    }
+  }
+  if (std::isinf(reach)) {
+    certificate.warnings.push_back(
+        Message("no star could be closed: epsilon ", Brief(spec_.epsilon),
+                " may be far too coarse for the manifold, or the manifold not closed or not ", K,
+                "-dimensional."));
+    return;
+  }
+  certificate.estimated_reach = reach;
+  certificate.epsilon_over_reach = spec_.epsilon / reach;
+  if (std::string w = CoarsenessWarning(spec_.epsilon, reach); !w.empty())
+    certificate.warnings.push_back(std::move(w));
 }
 
 // What still breaks a rule, for people.
@@ -124,6 +156,7 @@ Eigen::MatrixXd Refinement<K>::Points() const {
 #define STELLATE_INSTANTIATE(K)                           \
   template void Refinement<K>::StartCertificate();        \
   template void Refinement<K>::Fail(Status);              \
+  template void Refinement<K>::DescribeUnfinished();                   \
   template std::string Refinement<K>::WhatIsLeft() const;              \
   template void Refinement<K>::Finish(Termination);       \
   template void Refinement<K>::UpdateProgress();          \
