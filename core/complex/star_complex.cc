@@ -140,19 +140,22 @@ bool StarComplex<K>::Cuts(const Cell& cell, const Site& p, const Site& q) const 
 }
 
 template <int K>
+template <typename Influencing>
 void StarComplex<K>::BuildStar(const Site& p, const Site* guest, Cell& cell,
-                               typename Cell::Scratch& scratch) const {
+                               typename Cell::Scratch& scratch,
+                               const Influencing& influencing) const {
   if (judging_ == Judging::kFlats) {
     cell.Reset(inradius_);
   } else {
     const CentreJudge judge(*this, p, guest);
     cell.Reset(inradius_, &judge);
   }
-  tree_.VisitNear(
+  tree_.VisitAround(
       p.point, [&] { return Influence(cell); },
       [&](std::uint32_t q, double) {
         if (q != p.id) ClipBy(cell, p, At(q), guest, scratch);
-      });
+      },
+      influencing);
 }
 
 template <int K>
@@ -208,10 +211,9 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(
   std::vector<std::vector<std::uint32_t>> cut_by(count);
   tbb::parallel_for(std::uint32_t{0}, count, [&](std::uint32_t i) {
     const Site q = At(first + i);
-    tree_.ForEachInfluencing(q.point, [&](std::uint32_t p) {
+    BuildStar(q, nullptr, cells_[q.id], scratch.local(), [&](std::uint32_t p) {
       if (Cuts(cells_[p], At(p), q)) cut_by[i].push_back(p);
     });
-    BuildStar(q, nullptr, cells_[q.id], scratch.local());
   });
 
   std::vector<std::pair<std::uint32_t, std::uint32_t>> cuts;  // star, new point
@@ -276,14 +278,13 @@ void StarComplex<K>::TryPoint(const double* point, const double* tangent,
                               typename Cell::Scratch& scratch, Tentative* result) const {
   const Site guest{size(), point, tangent};
   result->cut.clear();
-  tree_.ForEachInfluencing(point, [&](std::uint32_t p) {
+  BuildStar(guest, &guest, result->own, scratch, [&](std::uint32_t p) {
     if (!Cuts(cells_[p], At(p), guest)) return;
     result->cut.emplace_back(p, cells_[p]);
     ClipBy(result->cut.back().second, At(p), guest, &guest, scratch);
   });
   std::sort(result->cut.begin(), result->cut.end(),
             [](const auto& a, const auto& b) { return a.first < b.first; });
-  BuildStar(guest, &guest, result->own, scratch);
 }
 
 template <int K>

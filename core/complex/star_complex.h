@@ -106,8 +106,10 @@ class StarComplex {
               typename Cell::Scratch& scratch) const;
   bool Cuts(const Cell& cell, const Site& p, const Site& q) const;
   double Project(const Site& p, const double* q, double* step, double* normal) const;
-  void BuildStar(const Site& p, const Site* guest, Cell& cell,
-                 typename Cell::Scratch& scratch) const;
+  // Builds p's cell, and calls influencing(q) for each sample point whose cell p may cut.
+  template <typename Influencing>
+  void BuildStar(const Site& p, const Site* guest, Cell& cell, typename Cell::Scratch& scratch,
+                 const Influencing& influencing) const;
   void Owned(std::uint32_t p, std::vector<Simplex>* simplices) const;
   double Influence(const Cell& cell) const { return 2 * std::sqrt(cell.max_norm2()) * (1 + 1e-9); }
 

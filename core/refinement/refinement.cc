@@ -392,19 +392,21 @@ void Refinement<K>::Commit() {
   delta_.added = std::move(change.added);
   delta_.removed = std::move(change.removed);
 
-  std::vector<std::uint8_t> violates(touched.size());
+  std::vector<std::optional<Violation<K>>> violations(touched.size());
   tbb::parallel_for(std::size_t{0}, touched.size(), [&](std::size_t i) {
-    violates[i] = WorstSizeOrShape<K>(complex_, touched[i], criteria_.epsilon,
-                                      criteria_.radius_edge_bound)
-                      .has_value();
+    violations[i] = WorstSizeOrShape<K>(complex_, touched[i], criteria_.epsilon,
+                                        criteria_.radius_edge_bound);
   });
-  for (std::size_t i = 0; i < touched.size(); ++i) {
-    const std::uint32_t p = touched[i];
+  for (const std::uint32_t p : touched) {
     discouraged_[p] = no_flat_[p] = 0;
-    if (violates[i] && standing_[p] != kSizeOrShape) active_.push_back(p);
-    standing_[p] = violates[i] ? kSizeOrShape : kFine;
+    standing_[p] = kFine;
   }
-  std::erase_if(active_, [&](std::uint32_t p) { return standing_[p] != kSizeOrShape; });
+  std::erase_if(active_, [&](const Active& a) { return standing_[a.star] != kSizeOrShape; });
+  for (std::size_t i = 0; i < touched.size(); ++i) {
+    if (!violations[i]) continue;
+    standing_[touched[i]] = kSizeOrShape;
+    active_.push_back({touched[i], *violations[i]});
+  }
   if (judged) {
     suspects_.insert(suspects_.end(), around.begin(), around.end());
     suspects_.insert(suspects_.end(), touched.begin(), touched.end());

@@ -107,7 +107,11 @@ class Refinement final : public Mesher {
   std::vector<std::uint8_t> standing_;
   std::vector<std::uint8_t> discouraged_;  // failed attempts; above kGiveUp: left alone
   std::vector<std::uint8_t> no_flat_;      // an intersection was not found: ask for closest points
-  std::vector<std::uint32_t> active_;      // stars with a violation of R1 or R2
+  struct Active {
+    std::uint32_t star;
+    Violation<K> violation;
+  };
+  std::vector<Active> active_;  // the violations of R1 and R2, one a star
   std::vector<std::uint32_t> suspects_;    // stars to judge by R3 and R4
   std::vector<std::uint32_t> blemished_;   // stars with a violation of R3 or R4
   bool all_suspect_ = true;                // R3 and R4 were not judged yet

@@ -105,8 +105,8 @@ template <int K>
 std::string Refinement<K>::WhatIsLeft() const {
   std::string left;
   if (!active_.empty())
-    left = Message(active_.size(), " stars break rule R1 or R2, the first that of vertex ",
-                   *std::min_element(active_.begin(), active_.end()), "; ");
+    left = Message(active_.size(), " stars break rule R1 or R2, one of them that of vertex ",
+                   active_.front().star, "; ");
   left += Message(report_.certificate.inconsistent_simplices, " simplices are inconsistent");
   for (std::uint32_t p = 0; p < complex_.size(); ++p) {
     const auto found = FindInconsistentConfiguration<K>(complex_, p);
@@ -134,11 +134,10 @@ void Refinement<K>::UpdateProgress() {
   progress_.bad_size = progress_.bad_radius_edge = progress_.unbounded_stars = 0;
   // A cell of circumradius R will have to hold about (R / epsilon)^k / 2 more points.
   double missing = 0;
-  for (const std::uint32_t p : active_) {
-    const auto& cell = complex_.cell(p);
-    const double ratio = std::sqrt(cell.max_norm2()) / criteria_.epsilon;
-    progress_.unbounded_stars += !cell.bounded();
-    ++(ratio > 1 ? progress_.bad_size : progress_.bad_radius_edge);
+  for (const Active& a : active_) {
+    const double ratio = a.violation.radius / criteria_.epsilon;
+    progress_.unbounded_stars += !complex_.cell(a.star).bounded();
+    ++(a.violation.rule == Rule::kSize ? progress_.bad_size : progress_.bad_radius_edge);
     missing += 0.5 * std::pow(std::max(ratio, 1.0), K);
   }
   missing += static_cast<double>(blemished_.size());

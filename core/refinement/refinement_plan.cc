@@ -81,17 +81,10 @@ Target<K> Refinement<K>::Aim(std::uint32_t star, const Violation<K>& violation) 
 
 template <int K>
 std::vector<Target<K>> Refinement<K>::SizeAndShapeTargets() {
-  std::vector<std::optional<Target<K>>> found(active_.size());
-  tbb::parallel_for(std::size_t{0}, active_.size(), [&](std::size_t i) {
-    const std::uint32_t p = active_[i];
-    if (discouraged_[p] > kGiveUp) return;
-    const auto violation =
-        WorstSizeOrShape<K>(complex_, p, criteria_.epsilon, criteria_.radius_edge_bound);
-    if (violation) found[i] = Aim(p, *violation);
-  });
   std::vector<Target<K>> targets;
-  for (const auto& t : found)
-    if (t) targets.push_back(*t);
+  targets.reserve(active_.size());
+  for (const Active& a : active_)
+    if (discouraged_[a.star] <= kGiveUp) targets.push_back(Aim(a.star, a.violation));
   return targets;
 }
 

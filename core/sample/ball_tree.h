@@ -47,6 +47,14 @@ class BallTree {
     Near(0, Distance(q, Centre(0), d_), q, radius, visit);
   }
 
+  // Both searches in one descent: near(id, squared distance) as VisitNear, influencing(id) as
+  // ForEachInfluencing.
+  template <typename Radius, typename Near, typename Influencing>
+  void VisitAround(const double* q, Radius&& radius, Near&& near, Influencing&& influencing) const {
+    if (nodes_.empty()) return;
+    Around(0, Distance(q, Centre(0), d_), q, radius, near, influencing);
+  }
+
   // Squared distance from q to the nearest point; infinity when empty.
   double NearestSquaredDistance(const double* q) const {
     double best = INFINITY;
@@ -109,35 +117,58 @@ class BallTree {
   void Near(std::uint32_t n, double distance, const double* q, Radius& radius, Visit& visit) const {
     const Node& node = nodes_[n];
     if (distance - node.radius > radius()) return;
+    if (node.children == kNone) return NearInLeaf(node, q, radius, visit, [](auto, auto) {});
+    const auto [first, second] = NearerFirst(node, q);
+    Near(first.id, first.distance, q, radius, visit);
+    Near(second.id, second.distance, q, radius, visit);
+  }
+
+  template <typename Radius, typename NearVisit, typename InfluencingVisit>
+  void Around(std::uint32_t n, double distance, const double* q, Radius& radius, NearVisit& near,
+              InfluencingVisit& influencing) const {
+    const Node& node = nodes_[n];
+    if (distance >= node.outreach && distance - node.radius > radius()) return;
     if (node.children == kNone) {
-      // Nearest first: what is visited early may shrink the radius most.
-      std::pair<double, std::uint32_t> near[kLeafCapacity];
-      std::uint32_t count = 0;
-      const double reach = radius();
-      for (std::uint32_t i = 0; i < node.count; ++i) {
-        const std::uint32_t id = slots_[node.first + i];
-        const double d2 = SquaredDistance(q, Point(id), d_);
-        if (!(d2 <= reach * reach)) continue;
-        std::uint32_t at = count++;
-        for (; at > 0 && near[at - 1].first > d2; --at) near[at] = near[at - 1];
-        near[at] = {d2, id};
-      }
-      for (std::uint32_t i = 0; i < count; ++i) {
-        const double r = radius();
-        if (near[i].first > r * r) break;
-        visit(near[i].second, near[i].first);
-      }
+      NearInLeaf(node, q, radius, near, [&](std::uint32_t id, double d2) {
+        if (d2 < influence_[id] * influence_[id]) influencing(id);
+      });
       return;
     }
-    const std::uint32_t a = node.children;
-    const double da = Distance(q, Centre(a), d_);
-    const double db = Distance(q, Centre(a + 1), d_);
-    if (da <= db) {
-      Near(a, da, q, radius, visit);
-      Near(a + 1, db, q, radius, visit);
-    } else {
-      Near(a + 1, db, q, radius, visit);
-      Near(a, da, q, radius, visit);
+    const auto [first, second] = NearerFirst(node, q);
+    Around(first.id, first.distance, q, radius, near, influencing);
+    Around(second.id, second.distance, q, radius, near, influencing);
+  }
+
+  struct Child {
+    std::uint32_t id;
+    double distance;  // of its centre
+  };
+  std::pair<Child, Child> NearerFirst(const Node& node, const double* q) const {
+    const Child a{node.children, Distance(q, Centre(node.children), d_)};
+    const Child b{node.children + 1, Distance(q, Centre(node.children + 1), d_)};
+    return a.distance <= b.distance ? std::pair{a, b} : std::pair{b, a};
+  }
+
+  // Nearest first: what is visited early may shrink the radius most. `each` sees every point.
+  template <typename Radius, typename Visit, typename Each>
+  void NearInLeaf(const Node& node, const double* q, Radius& radius, Visit& visit,
+                  const Each& each) const {
+    std::pair<double, std::uint32_t> near[kLeafCapacity];
+    std::uint32_t count = 0;
+    const double reach = radius();
+    for (std::uint32_t i = 0; i < node.count; ++i) {
+      const std::uint32_t id = slots_[node.first + i];
+      const double d2 = SquaredDistance(q, Point(id), d_);
+      each(id, d2);
+      if (!(d2 <= reach * reach)) continue;
+      std::uint32_t at = count++;
+      for (; at > 0 && near[at - 1].first > d2; --at) near[at] = near[at - 1];
+      near[at] = {d2, id};
+    }
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const double r = radius();
+      if (near[i].first > r * r) break;
+      visit(near[i].second, near[i].first);
     }
   }
 

@@ -6,7 +6,8 @@ namespace stellate::core {
 
 // Inner loops over ambient coordinates. Four running sums: the compiler vectorises them, and the
 // order of additions depends on d alone, so that results do not depend on where an array lies.
-inline double Dot(const double* a, const double* b, int d) {
+// R^3, where most people live, is spelled out so that the calls vanish.
+inline double LongDot(const double* a, const double* b, int d) {
   double s0 = 0, s1 = 0, s2 = 0, s3 = 0;
   int i = 0;
   for (; i + 4 <= d; i += 4) {
@@ -19,7 +20,12 @@ inline double Dot(const double* a, const double* b, int d) {
   return (s0 + s1) + (s2 + s3);
 }
 
-inline double SquaredDistance(const double* a, const double* b, int d) {
+inline double Dot(const double* a, const double* b, int d) {
+  if (d == 3) return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  return LongDot(a, b, d);
+}
+
+inline double LongSquaredDistance(const double* a, const double* b, int d) {
   double s0 = 0, s1 = 0, s2 = 0, s3 = 0;
   int i = 0;
   for (; i + 4 <= d; i += 4) {
@@ -32,6 +38,14 @@ inline double SquaredDistance(const double* a, const double* b, int d) {
   }
   for (; i < d; ++i) s0 += (a[i] - b[i]) * (a[i] - b[i]);
   return (s0 + s1) + (s2 + s3);
+}
+
+inline double SquaredDistance(const double* a, const double* b, int d) {
+  if (d == 3) {
+    const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return x * x + y * y + z * z;
+  }
+  return LongSquaredDistance(a, b, d);
 }
 
 inline double Distance(const double* a, const double* b, int d) {
