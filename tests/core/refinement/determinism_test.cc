@@ -11,8 +11,8 @@ namespace {
 
 using testing::AnswererFor;
 using testing::Drive;
-using testing::Make;
 using testing::DrivenRun;
+using testing::Make;
 using testing::SameMesh;
 using testing::SpecificationFor;
 
@@ -124,9 +124,7 @@ class Moved final : public Oracle {
   int ambient_dimension() const override { return inner_.ambient_dimension(); }
   bool has_intersect_flat() const override { return true; }
   bool has_tangent_basis() const override { return true; }
-  Answer ClosestPoint(const Eigen::MatrixXd& x) override {
-    return Out(inner_.ClosestPoint(In(x)));
-  }
+  Answer ClosestPoint(const Eigen::MatrixXd& x) override { return Out(inner_.ClosestPoint(In(x))); }
   Answer IntersectFlat(const Eigen::MatrixXd& centers, const Eigen::MatrixXd& bases,
                        const Eigen::VectorXd& radii) override {
     return Out(inner_.IntersectFlat(In(centers), bases, radii / scale_));
@@ -179,8 +177,7 @@ TEST_P(Invariance, UnitsAndPlaceDoNotMatter) {
 
 INSTANTIATE_TEST_SUITE_P(Motions, Invariance,
                          ::testing::Values(Motion{1e-6, 0}, Motion{1e6, 0}, Motion{1, 1e4},
-                                           Motion{1, 1e6}, Motion{1e-6, -1e-2},
-                                           Motion{1e6, 1e9}));
+                                           Motion{1, 1e6}, Motion{1e-6, -1e-2}, Motion{1e6, 1e9}));
 
 }  // namespace
 }  // namespace stellate::core

@@ -80,9 +80,9 @@ TEST_F(IndependentSetTest, IsGreedyIndependentAndMaximal) {
     const std::vector<std::uint32_t> stars = Stars(chosen);
     for (const auto& t : targets) {
       if (std::find(stars.begin(), stars.end(), t.star) != stars.end()) continue;
-      EXPECT_TRUE(std::any_of(chosen.begin(), chosen.end(), [&](const auto& c) {
-        return Before(c, t) && Conflict(c, t);
-      })) << "star " << t.star << " was left out for nothing";
+      EXPECT_TRUE(std::any_of(chosen.begin(), chosen.end(),
+                              [&](const auto& c) { return Before(c, t) && Conflict(c, t); }))
+          << "star " << t.star << " was left out for nothing";
     }
   }
 }

@@ -12,10 +12,10 @@ namespace {
 using testing::AppendTo;
 using testing::AsSet;
 using testing::Drive;
+using testing::DrivenRun;
 using testing::ExpectGoodMesh;
 using testing::Make;
 using testing::RandomPointsOn;
-using testing::DrivenRun;
 using testing::Sample;
 using testing::SpecificationFor;
 using testing::StarOf;
@@ -53,25 +53,23 @@ TEST_P(Refinements, GiveTheManifold) {
   EXPECT_EQ(counts.tangent_queries == 0, GetParam().tangents);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Catalogue, Refinements,
-    ::testing::Values(Case{"circle:10", 0.3}, Case{"torus-knot:2:3", 0.1}, Case{"torus", 0.2},
-                      Case{"ellipsoid", 0.25}, Case{"rp2", 0.4}, Case{"clifford-torus", 0.3},
-                      Case{"two-spheres", 0.3}, Case{"torus:1:0.4@20", 0.25}, Case{"so3", 0.8},
-                      Case{"flat-torus:3", 0.6}, Case{"sphere:4:5", 0.7}));
+INSTANTIATE_TEST_SUITE_P(Catalogue, Refinements,
+                         ::testing::Values(Case{"circle:10", 0.3}, Case{"torus-knot:2:3", 0.1},
+                                           Case{"torus", 0.2}, Case{"ellipsoid", 0.25},
+                                           Case{"rp2", 0.4}, Case{"clifford-torus", 0.3},
+                                           Case{"two-spheres", 0.3}, Case{"torus:1:0.4@20", 0.25},
+                                           Case{"so3", 0.8}, Case{"flat-torus:3", 0.6},
+                                           Case{"sphere:4:5", 0.7}));
 
-INSTANTIATE_TEST_SUITE_P(PoorerOracles, Refinements,
-                         ::testing::Values(Case{"circle:10", 0.3, false, false},
-                                           Case{"torus", 0.2, false, true},
-                                           Case{"torus", 0.2, true, false},
-                                           Case{"torus", 0.2, false, false},
-                                           Case{"torus", 0.2, false, true, 3},
-                                           Case{"clifford-torus", 0.3, false, false, 3},
-                                           Case{"rp2", 0.4, true, false},
-                                           Case{"so3", 0.8, false, true},
-                                           Case{"so3", 0.8, true, false},
-                                           Case{"flat-torus:3", 0.6, false, false},
-                                           Case{"flat-torus:3", 0.7, false, true, 3}));
+INSTANTIATE_TEST_SUITE_P(
+    PoorerOracles, Refinements,
+    ::testing::Values(Case{"circle:10", 0.3, false, false}, Case{"torus", 0.2, false, true},
+                      Case{"torus", 0.2, true, false}, Case{"torus", 0.2, false, false},
+                      Case{"torus", 0.2, false, true, 3},
+                      Case{"clifford-torus", 0.3, false, false, 3}, Case{"rp2", 0.4, true, false},
+                      Case{"so3", 0.8, false, true}, Case{"so3", 0.8, true, false},
+                      Case{"flat-torus:3", 0.6, false, false},
+                      Case{"flat-torus:3", 0.7, false, true, 3}));
 
 // Rebuilds the stars from the finished points: what the run says of itself must be so.
 template <int K>
@@ -144,7 +142,8 @@ TEST(Seeds, OnARegularGridMeshAsWellAsAny) {
   spec.seeds.resize(3, 9 * 9 * 3);
   for (int i = 0, c = 0; i < 9; ++i)
     for (int j = 0; j < 9; ++j)
-      for (int l = 0; l < 3; ++l) spec.seeds.col(c++) << (i - 4) * 0.35, (j - 4) * 0.35, (l - 1) * 0.4;
+      for (int l = 0; l < 3; ++l)
+        spec.seeds.col(c++) << (i - 4) * 0.35, (j - 4) * 0.35, (l - 1) * 0.4;
   ExpectGoodMesh(Drive(spec, *manifold), manifold->facts());
 }
 
@@ -181,7 +180,9 @@ TEST(Seeds, ManyTimesTheSameAreOne) {
 TEST(Seeds, OneCoversAComponent) {
   for (const char* name : {"torus", "rp2", "so3", "torus-knot:2:3"}) {
     const auto manifold = Make(name);
-    const double epsilon = manifold->dimension() == 3 ? 0.8 : manifold->dimension() == 2 ? 0.3 : 0.1;
+    const double epsilon = manifold->dimension() == 3   ? 0.8
+                           : manifold->dimension() == 2 ? 0.3
+                                                        : 0.1;
     Specification spec = SpecificationFor(*manifold, epsilon);
     spec.bounding_box.reset();
     spec.seeds = RandomPointsOn(*manifold, 1, 6);

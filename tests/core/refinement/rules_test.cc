@@ -38,8 +38,8 @@ std::vector<const double*> Vertices(const Sample& sample, const std::vector<std:
 }
 
 // Whether a face at p of dimension 2 or more is not Theta0-fat, face by face.
-bool HasThinFaceAt(const Sample& sample, const std::vector<std::uint32_t>& simplex,
-                   std::uint32_t p, double theta0) {
+bool HasThinFaceAt(const Sample& sample, const std::vector<std::uint32_t>& simplex, std::uint32_t p,
+                   double theta0) {
   for (unsigned subset = 1; subset < (1u << simplex.size()); ++subset) {
     std::vector<std::uint32_t> face;
     for (std::size_t s = 0; s < simplex.size(); ++s)
@@ -52,9 +52,8 @@ bool HasThinFaceAt(const Sample& sample, const std::vector<std::uint32_t>& simpl
 
 template <int K>
 bool IsInStars(const StarComplex<K>& complex, const Simplex<K>& simplex) {
-  return std::all_of(simplex.begin(), simplex.end(), [&](std::uint32_t q) {
-    return StarOf(complex, q).contains(simplex);
-  });
+  return std::all_of(simplex.begin(), simplex.end(),
+                     [&](std::uint32_t q) { return StarOf(complex, q).contains(simplex); });
 }
 
 TEST(SizeAndShape, GiveTheWorstSimplexOfTheFirstRuleBroken) {
@@ -75,8 +74,7 @@ TEST(SizeAndShape, GiveTheWorstSimplexOfTheFirstRuleBroken) {
         }
         double largest = 0, worst_rho = 0;
         for (const auto& s : StarOf(*complex, p)) {
-          const SimplexMeasures m =
-              MeasureSimplex(Vertices(sample, {s[0], s[1], s[2]}), sample.d);
+          const SimplexMeasures m = MeasureSimplex(Vertices(sample, {s[0], s[1], s[2]}), sample.d);
           largest = std::max(largest, m.circumradius);
           double edge = INFINITY;
           for (const std::uint32_t q : s)
@@ -120,8 +118,9 @@ void ExpectSliversAsMeasured(const Sample& sample) {
         Simplex<K> s;
         if (!complex->SimplexOf(p, complex->cell(p), v, &s)) continue;
         const bool expected = HasThinFaceAt(sample, {s.begin(), s.end()}, p, theta0);
-        EXPECT_EQ(ContainsSliver<K>(*complex, sample.Point(p), complex->cell(p), v, theta0, nullptr),
-                  expected);
+        EXPECT_EQ(
+            ContainsSliver<K>(*complex, sample.Point(p), complex->cell(p), v, theta0, nullptr),
+            expected);
         ++(expected ? thin : fat);
         EXPECT_FALSE(ContainsSliver<K>(*complex, sample.Point(p), complex->cell(p), v, 0, nullptr));
       }
@@ -151,8 +150,8 @@ TEST(Slivers, AreSeenFromSomeVertexOfTheSimplex) {
       for (const std::uint32_t q : s) {
         const auto* v = FindSimplex<3>(complex->cell(q), q, s, key);
         ASSERT_NE(v, nullptr);
-        seen = seen || ContainsSliver<3>(*complex, sample.Point(q), complex->cell(q), *v, 0.2,
-                                         nullptr);
+        seen = seen ||
+               ContainsSliver<3>(*complex, sample.Point(q), complex->cell(q), *v, 0.2, nullptr);
       }
       const std::vector<std::uint32_t> ids(s.begin(), s.end());
       EXPECT_EQ(seen, ContainsSliver(Vertices(sample, ids), sample.d, 0.2));
@@ -266,7 +265,8 @@ void ExpectBadCountedRightly(const std::string& name, double epsilon) {
                           candidates.Tangent(c) + mesh.d * K);
     const auto after = Build<K>(grown);
     std::uint64_t inconsistent = 0;
-    for (std::uint32_t p = 0; p < after->size(); ++p) inconsistent += CountInconsistent<K>(*after, p);
+    for (std::uint32_t p = 0; p < after->size(); ++p)
+      inconsistent += CountInconsistent<K>(*after, p);
     EXPECT_EQ(count == 0, inconsistent == 0) << "candidate " << c;
     ++(count == 0 ? good : bad);
   }
