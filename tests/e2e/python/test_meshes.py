@@ -53,6 +53,34 @@ def torus_knot(p=2, q=3):
     return Knot()
 
 
+def projective_plane():
+    """RP^2 in R^6: the symmetric 3 x 3 projections on lines (Veronese), by eigenvectors."""
+
+    rows, columns = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
+    scale = np.array([1, 1, 1, 2**0.5, 2**0.5, 2**0.5])  # so that the norm is the matrix's
+
+    class Veronese:
+        dimension, ambient_dimension = 2, 6
+        bounding_box = np.full(6, -1.1), np.full(6, 1.1)
+
+        def frame(self, x):
+            matrices = np.zeros((len(x), 3, 3))
+            matrices[:, rows, columns] = matrices[:, columns, rows] = x / scale
+            return np.linalg.eigh(matrices)[1]  # the line last, its normal plane before
+
+        def closest_point(self, x):
+            line = self.frame(x)[:, :, 2]
+            return line[:, rows] * line[:, columns] * scale
+
+        def tangent_basis(self, x):
+            frame = self.frame(x)
+            line, plane = frame[:, :, 2:], frame[:, :, :2]
+            turned = line[:, rows] * plane[:, columns] + plane[:, rows] * line[:, columns]
+            return turned * scale[:, None] / 2**0.5
+
+    return Veronese()
+
+
 def implicit_clifford():
     """x^2 + y^2 = 1, z^2 + w^2 = 1: codimension two, with a difference Jacobian."""
 
@@ -85,6 +113,8 @@ MANIFOLDS = {
     "tanglecube": (manifolds.tanglecube(), 0.12, -8, [1, 10, 1], True),
     "Clifford torus": (manifolds.ProductOfCircles(), 0.3, 0, [1, 2, 1], True),
     "implicit Clifford torus": (implicit_clifford(), 0.35, 0, [1, 2, 1], True),
+    "RP^2 in R^6": (projective_plane(), 0.15, 1, [1, 1, 1], False),
+    "T^3 in R^6": (manifolds.ProductOfCircles((1.0, 1.0, 1.0)), 0.5, 0, [1, 3, 3, 1], True),
     "ellipsoid S^3": (manifolds.ellipsoid((1.0, 0.9, 0.8, 1.1)), 0.3, 0, [1, 0, 0, 1], True),
     "SO(3) in R^9": (manifolds.SpecialOrthogonal3(), 0.45, 0, [1, 1, 1, 1], True),
 }
