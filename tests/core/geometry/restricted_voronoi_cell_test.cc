@@ -1,0 +1,426 @@
+#include "core/geometry/restricted_voronoi_cell.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <map>
+#include <set>
+#include <type_traits>
+#include <vector>
+
+#include "core/sample/random.h"
+#include "tests/core/support/cells.h"
+
+namespace stellate::core {
+namespace {
+
+using testing::Canonical;
+using testing::CombinatoricsHold;
+
+template <int K>
+using Vec = Eigen::Matrix<double, K, 1>;
+
+template <int K>
+struct HalfSpace {
+  std::uint32_t id = 0;
+  Vec<K> normal;
+  double offset = 0;
+};
+
+template <int K>
+using HalfSpaces = std::vector<HalfSpace<K>>;
+
+// A weight such as StarComplex adds to each point, against degenerate positions, for lengths near
+// 1: far above rounding, far below anything geometric.
+double Weight(std::uint32_t id) { return 1e-10 * static_cast<double>(Mix64(id) >> 11) * 0x1p-53; }
+
+template <int K>
+Vec<K> RandomUnit(Random& random) {
+  Vec<K> u;
+  for (int a = 0; a < K; ++a) u[a] = random.Normal();
+  return u.normalized();
+}
+
+// Half-spaces tangent to spheres of radius 0.5 to 1.5, as a star's neighbours give them.
+template <int K>
+HalfSpaces<K> RandomHalfSpaces(int count, std::uint64_t seed) {
+  Random random(seed, K);
+  HalfSpaces<K> all(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) {
+    auto& h = all[static_cast<std::size_t>(i)];
+    h.id = static_cast<std::uint32_t>(i) * 7 + 3;
+    const double distance = 0.5 + random.Uniform();
+    h.normal = 2 * distance * RandomUnit<K>(random);
+    h.offset = 2 * distance * distance;
+  }
+  return all;
+}
+
+template <int K>
+HalfSpaces<K> Cube() {
+  HalfSpaces<K> all;
+  for (int a = 0; a < K; ++a)
+    for (const int sign : {-1, 1})
+      all.push_back({static_cast<std::uint32_t>(all.size()), sign * Vec<K>::Unit(a), 1});
+  return all;
+}
+
+// The neighbours of the origin in the integer grid: all but 2K of them touch the cube without
+// cutting it. With weights, what touches either misses or cuts a tiny corner off.
+template <int K>
+HalfSpaces<K> Grid(bool weighted) {
+  HalfSpaces<K> all;
+  int total = 1;
+  for (int a = 0; a < K; ++a) total *= 3;
+  for (int code = 0; code < total; ++code) {
+    Vec<K> q;
+    for (int a = 0, c = code; a < K; ++a, c /= 3) q[a] = c % 3 - 1;
+    const auto id = static_cast<std::uint32_t>(all.size());
+    const double weight = weighted ? Weight(id) : 0;
+    if (q.squaredNorm() > 0) all.push_back({id, q, 0.5 * (q.squaredNorm() - weight)});
+  }
+  return all;
+}
+
+template <typename T>
+void Shuffle(std::vector<T>* items, std::uint64_t seed) {
+  Random random(seed);
+  for (std::size_t i = items->size(); i > 1; --i)
+    std::swap((*items)[i - 1], (*items)[random.Next() % i]);
+}
+
+template <int K>
+RestrictedVoronoiCell<K> Cell(const HalfSpaces<K>& half_spaces, double inradius = 10) {
+  RestrictedVoronoiCell<K> cell;
+  cell.Reset(inradius);
+  typename RestrictedVoronoiCell<K>::Scratch scratch;
+  for (const auto& h : half_spaces) cell.Clip(h.id, h.normal.data(), h.offset, scratch);
+  return cell;
+}
+
+template <int K>
+using Vertices = std::map<std::vector<std::uint32_t>, Vec<K>>;  // by facet ids, ascending
+
+template <int K>
+Vertices<K> VerticesOf(const RestrictedVoronoiCell<K>& cell) {
+  Vertices<K> all;
+  for (const auto& v : cell.vertices()) {
+    std::vector<std::uint32_t> ids;
+    for (const auto f : v.facet) ids.push_back(cell.facets()[f].id);
+    std::sort(ids.begin(), ids.end());
+    all[ids] = Eigen::Map<const Vec<K>>(v.x);
+  }
+  return all;
+}
+
+// Each K of the half-spaces meet in a point, which is a vertex unless another cuts it off.
+template <int K>
+Vertices<K> BruteForceVertices(const HalfSpaces<K>& half_spaces) {
+  Vertices<K> all;
+  const int n = static_cast<int>(half_spaces.size());
+  std::vector<int> pick(K);
+  const auto try_subset = [&] {
+    Eigen::Matrix<double, K, K> m;
+    Vec<K> rhs;
+    std::vector<std::uint32_t> ids;
+    for (int r = 0; r < K; ++r) {
+      const auto& h = half_spaces[static_cast<std::size_t>(pick[static_cast<std::size_t>(r)])];
+      m.row(r) = h.normal.transpose();
+      rhs[r] = h.offset;
+      ids.push_back(h.id);
+    }
+    const Eigen::FullPivLU<Eigen::Matrix<double, K, K>> lu(m);
+    if (!lu.isInvertible()) return;
+    const Vec<K> x = lu.solve(rhs);
+    for (const auto& h : half_spaces)
+      if (std::find(ids.begin(), ids.end(), h.id) == ids.end() && h.normal.dot(x) > h.offset)
+        return;
+    std::sort(ids.begin(), ids.end());
+    all[ids] = x;
+  };
+  const auto choose = [&](auto&& self, int depth, int from) -> void {
+    if (depth == K) return try_subset();
+    for (int i = from; i < n; ++i) {
+      pick[static_cast<std::size_t>(depth)] = i;
+      self(self, depth + 1, i + 1);
+    }
+  };
+  choose(choose, 0, 0);
+  return all;
+}
+
+// The facets of the simplex that a cell begins as, as half-spaces.
+template <int K>
+HalfSpaces<K> FakeHalfSpaces(double inradius) {
+  RestrictedVoronoiCell<K> cell;
+  cell.Reset(inradius);
+  HalfSpaces<K> all;
+  for (const auto& f : cell.facets())
+    all.push_back({f.id, Eigen::Map<const Vec<K>>(f.normal), f.offset});
+  return all;
+}
+
+template <typename Dimension>
+class RestrictedVoronoiCellTest : public ::testing::Test {};
+
+using Dimensions = ::testing::Types<std::integral_constant<int, 1>, std::integral_constant<int, 2>,
+                                    std::integral_constant<int, 3>, std::integral_constant<int, 4>,
+                                    std::integral_constant<int, 5>>;
+TYPED_TEST_SUITE(RestrictedVoronoiCellTest, Dimensions);
+
+TYPED_TEST(RestrictedVoronoiCellTest, BeginsAsARegularSimplexOfFakeFacets) {
+  constexpr int K = TypeParam::value;
+  RestrictedVoronoiCell<K> cell;
+  cell.Reset(0.25);
+  EXPECT_TRUE(CombinatoricsHold(cell));
+  EXPECT_EQ(cell.vertices().size(), K + 1u);
+  EXPECT_FALSE(cell.bounded());
+  for (const auto& f : cell.facets()) {
+    EXPECT_TRUE(IsFake(f.id));
+    const double length = Eigen::Map<const Vec<K>>(f.normal).norm();
+    EXPECT_NEAR(f.offset / length, 0.25, 1e-14);
+  }
+  for (const auto& v : cell.vertices()) {
+    EXPECT_TRUE(cell.HasFakeFacet(v));
+    EXPECT_NEAR(v.norm2, 0.0625 * K * K, 1e-14);
+    for (const auto& w : cell.vertices()) {
+      const auto x = Eigen::Map<const Vec<K>>(v.x), y = Eigen::Map<const Vec<K>>(w.x);
+      EXPECT_NEAR(x.dot(y), &v == &w ? 0.0625 * K * K : -0.0625 * K, 1e-14);
+    }
+  }
+}
+
+TYPED_TEST(RestrictedVoronoiCellTest, IsTheCube) {
+  constexpr int K = TypeParam::value;
+  const auto cell = Cell<K>(Cube<K>());
+  EXPECT_TRUE(CombinatoricsHold(cell));
+  EXPECT_TRUE(cell.bounded());
+  EXPECT_EQ(cell.facets().size(), 2u * K);
+  EXPECT_EQ(cell.vertices().size(), 1u << K);
+  EXPECT_EQ(cell.max_norm2(), K);
+  std::set<std::vector<double>> corners;
+  for (const auto& v : cell.vertices()) {
+    EXPECT_FALSE(cell.HasFakeFacet(v));
+    for (const double x : v.x) EXPECT_EQ(std::abs(x), 1);
+    corners.emplace(v.x, v.x + K);
+  }
+  EXPECT_EQ(corners.size(), 1u << K);
+}
+
+// Where K > 2 more than K facets meet at each corner: weights split a corner into several vertices,
+// but they stay in its place.
+TYPED_TEST(RestrictedVoronoiCellTest, IsTheCrossPolytope) {
+  constexpr int K = TypeParam::value;
+  HalfSpaces<K> facets;
+  for (std::uint32_t signs = 0; signs < (1u << K); ++signs) {
+    Vec<K> normal;
+    for (int a = 0; a < K; ++a) normal[a] = signs >> a & 1 ? 1 : -1;
+    facets.push_back({signs, normal, 1 - Weight(signs)});
+  }
+  const auto cell = Cell<K>(facets);
+  EXPECT_TRUE(CombinatoricsHold(cell));
+  EXPECT_TRUE(cell.bounded());
+  EXPECT_EQ(cell.facets().size(), 1u << K);
+  std::set<std::pair<int, bool>> corners;
+  for (const auto& v : cell.vertices()) {
+    const auto x = Eigen::Map<const Vec<K>>(v.x);
+    Eigen::Index axis;
+    EXPECT_NEAR(x.cwiseAbs().maxCoeff(&axis), 1, 1e-8);
+    EXPECT_NEAR(x.norm(), 1, 1e-8);
+    corners.emplace(static_cast<int>(axis), x[axis] > 0);
+  }
+  EXPECT_EQ(corners.size(), 2u * K);
+}
+
+TYPED_TEST(RestrictedVoronoiCellTest, HasTheVerticesOfRandomHalfSpaces) {
+  constexpr int K = TypeParam::value;
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    const int count = K <= 3 ? 30 : K == 4 ? 24 : 18;
+    HalfSpaces<K> half_spaces = RandomHalfSpaces<K>(count, seed);
+    const auto cell = Cell<K>(half_spaces, 2);
+    EXPECT_TRUE(CombinatoricsHold(cell)) << "seed " << seed;
+    const HalfSpaces<K> fake = FakeHalfSpaces<K>(2);
+    half_spaces.insert(half_spaces.end(), fake.begin(), fake.end());
+    const Vertices<K> expected = BruteForceVertices<K>(half_spaces), got = VerticesOf<K>(cell);
+    ASSERT_EQ(got.size(), expected.size()) << "seed " << seed;
+    double farthest2 = 0;
+    bool any_fake = false;
+    for (const auto& [ids, x] : expected) {
+      const auto at = got.find(ids);
+      ASSERT_NE(at, got.end()) << "seed " << seed;
+      EXPECT_LT((at->second - x).norm(), 1e-9 * (1 + x.norm())) << "seed " << seed;
+      farthest2 = std::max(farthest2, x.squaredNorm());
+      any_fake = any_fake || IsFake(ids.back());
+    }
+    EXPECT_NEAR(cell.max_norm2(), farthest2, 1e-9 * farthest2);
+    EXPECT_EQ(cell.bounded(), !any_fake);
+  }
+}
+
+TYPED_TEST(RestrictedVoronoiCellTest, DoesNotDependOnTheOrderOfTheCuts) {
+  constexpr int K = TypeParam::value;
+  for (const std::uint64_t seed : {11, 12, 13}) {
+    HalfSpaces<K> half_spaces = RandomHalfSpaces<K>(40, seed);
+    const auto first = Canonical(Cell<K>(half_spaces, 3));
+    for (std::uint64_t order = 1; order <= 5; ++order) {
+      Shuffle(&half_spaces, order);
+      EXPECT_EQ(Canonical(Cell<K>(half_spaces, 3)), first) << "seed " << seed << " " << order;
+    }
+  }
+}
+
+TYPED_TEST(RestrictedVoronoiCellTest, SaysBeforehandWhetherItWouldBeCut) {
+  constexpr int K = TypeParam::value;
+  RestrictedVoronoiCell<K> cell;
+  cell.Reset(2);
+  typename RestrictedVoronoiCell<K>::Scratch scratch;
+  int cuts = 0, misses = 0;
+  for (const auto& h : RandomHalfSpaces<K>(150, 21)) {
+    const auto before = Canonical(cell);
+    const bool would = cell.WouldCut(h.normal.data(), h.offset);
+    const bool did = cell.Clip(h.id, h.normal.data(), h.offset, scratch);
+    EXPECT_EQ(would, did);
+    EXPECT_EQ(Canonical(cell) != before, did);
+    EXPECT_FALSE(cell.WouldCut(h.normal.data(), h.offset + 1e-9));
+    ++(did ? cuts : misses);
+  }
+  EXPECT_GT(cuts, 0);
+  EXPECT_GT(misses, 0);
+}
+
+TYPED_TEST(RestrictedVoronoiCellTest, OfAGridPointIsACubeWhicheverNeighbourComesFirst) {
+  constexpr int K = TypeParam::value;
+  HalfSpaces<K> neighbours = Grid<K>(true);
+  const auto first = Canonical(Cell<K>(neighbours));
+  for (std::uint64_t order = 1; order <= 4; ++order) {
+    Shuffle(&neighbours, order);
+    const auto cell = Cell<K>(neighbours);
+    EXPECT_EQ(Canonical(cell), first) << "order " << order;
+    EXPECT_TRUE(CombinatoricsHold(cell));
+    EXPECT_TRUE(cell.bounded());
+    std::set<std::vector<bool>> corners;
+    for (const auto& v : cell.vertices()) {
+      std::vector<bool> corner;
+      for (const double x : v.x) {
+        EXPECT_NEAR(std::abs(x), 0.5, 1e-9);
+        corner.push_back(x > 0);
+      }
+      corners.insert(corner);
+    }
+    EXPECT_EQ(corners.size(), 1u << K);
+    EXPECT_NEAR(cell.max_norm2(), 0.25 * K, 1e-9);
+  }
+}
+
+TYPED_TEST(RestrictedVoronoiCellTest, OfATurnedGridPointIsATurnedCube) {
+  constexpr int K = TypeParam::value;
+  using Matrix = Eigen::Matrix<double, K, K>;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    Random random(seed, 31);
+    Matrix m;
+    for (int i = 0; i < K * K; ++i) m(i) = random.Normal();
+    const Matrix turn = Eigen::HouseholderQR<Matrix>(m).householderQ();
+    HalfSpaces<K> neighbours = Grid<K>(true);
+    for (auto& h : neighbours) h.normal = turn * h.normal;
+    Shuffle(&neighbours, seed);
+    const auto cell = Cell<K>(neighbours);
+    EXPECT_TRUE(CombinatoricsHold(cell)) << "seed " << seed;
+    EXPECT_TRUE(cell.bounded());
+    EXPECT_NEAR(cell.max_norm2(), 0.25 * K, 1e-9);
+    std::set<std::vector<bool>> corners;
+    for (const auto& v : cell.vertices()) {
+      const Vec<K> x = turn.transpose() * Eigen::Map<const Vec<K>>(v.x);
+      std::vector<bool> corner;
+      for (int a = 0; a < K; ++a) {
+        EXPECT_NEAR(std::abs(x[a]), 0.5, 1e-9) << "seed " << seed;
+        corner.push_back(x[a] > 0);
+      }
+      corners.insert(corner);
+    }
+    EXPECT_EQ(corners.size(), 1u << K) << "seed " << seed;
+  }
+}
+
+// Duplicate sample points, told apart by their weights.
+TYPED_TEST(RestrictedVoronoiCellTest, IsHardlyChangedByTheSameHalfSpaceTwice) {
+  constexpr int K = TypeParam::value;
+  const HalfSpaces<K> once = RandomHalfSpaces<K>(25, 41);
+  HalfSpaces<K> twice = once;
+  for (const auto& h : once)
+    twice.push_back({h.id + 1, h.normal, h.offset + Weight(h.id) - Weight(h.id + 1)});
+  const auto expected = Cell<K>(once, 2), got = Cell<K>(twice, 2);
+  EXPECT_TRUE(CombinatoricsHold(got));
+  EXPECT_EQ(got.vertices().size(), expected.vertices().size());
+  for (const auto& v : expected.vertices()) {
+    const auto x = Eigen::Map<const Vec<K>>(v.x);
+    EXPECT_TRUE(std::any_of(got.vertices().begin(), got.vertices().end(), [&](const auto& w) {
+      return (x - Eigen::Map<const Vec<K>>(w.x)).norm() < 1e-6;
+    }));
+  }
+}
+
+// Without weights rounding decides what only touches, and may decide against itself: then the cut
+// is refused, and a cell is never lost.
+TYPED_TEST(RestrictedVoronoiCellTest, IsLeftAsItWasByACutThatIsRefused) {
+  constexpr int K = TypeParam::value;
+  using Matrix = Eigen::Matrix<double, K, K>;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    Random random(seed, 31);
+    Matrix m;
+    for (int i = 0; i < K * K; ++i) m(i) = random.Normal();
+    const Matrix turn = Eigen::HouseholderQR<Matrix>(m).householderQ();
+    HalfSpaces<K> neighbours = Grid<K>(false);
+    Shuffle(&neighbours, seed);
+    RestrictedVoronoiCell<K> cell;
+    cell.Reset(10);
+    typename RestrictedVoronoiCell<K>::Scratch scratch;
+    for (const auto& h : neighbours) {
+      const auto before = Canonical(cell);
+      const Vec<K> normal = turn * h.normal;
+      if (!cell.Clip(h.id, normal.data(), h.offset, scratch)) {
+        ASSERT_EQ(Canonical(cell), before) << "seed " << seed;
+      }
+      ASSERT_GT(cell.vertices().size(), static_cast<std::size_t>(K)) << "seed " << seed;
+    }
+  }
+}
+
+TYPED_TEST(RestrictedVoronoiCellTest, KeepsTheNearerOfTwoParallelHalfSpaces) {
+  constexpr int K = TypeParam::value;
+  auto cell = Cell<K>(Cube<K>());
+  typename RestrictedVoronoiCell<K>::Scratch scratch;
+  const Vec<K> normal = 3 * Vec<K>::Unit(0);
+  EXPECT_FALSE(cell.Clip(100, normal.data(), 3.0, scratch));  // the very same plane
+  EXPECT_FALSE(cell.Clip(101, normal.data(), 3.5, scratch));
+  EXPECT_TRUE(cell.Clip(102, normal.data(), 1.5, scratch));
+  EXPECT_TRUE(CombinatoricsHold(cell));
+  EXPECT_EQ(cell.vertices().size(), 1u << K);
+  std::set<std::uint32_t> ids;
+  for (const auto& f : cell.facets()) ids.insert(f.id);
+  EXPECT_TRUE(ids.contains(102));
+  EXPECT_FALSE(ids.contains(1));  // e_0 . x <= 1 of the cube
+  EXPECT_EQ(ids.size(), 2u * K);
+}
+
+TYPED_TEST(RestrictedVoronoiCellTest, RefusesToBeCutAwayWhole) {
+  constexpr int K = TypeParam::value;
+  auto cell = Cell<K>(Cube<K>());
+  const auto before = Canonical(cell);
+  typename RestrictedVoronoiCell<K>::Scratch scratch;
+  const Vec<K> normal = Vec<K>::Unit(0);
+  EXPECT_FALSE(cell.Clip(100, normal.data(), -2, scratch));
+  EXPECT_EQ(Canonical(cell), before);
+}
+
+TYPED_TEST(RestrictedVoronoiCellTest, CanBeUsedAgainAfterReset) {
+  constexpr int K = TypeParam::value;
+  auto cell = Cell<K>(RandomHalfSpaces<K>(30, 51), 2);
+  cell.Reset(10);
+  typename RestrictedVoronoiCell<K>::Scratch scratch;
+  for (const auto& h : Cube<K>()) cell.Clip(h.id, h.normal.data(), h.offset, scratch);
+  EXPECT_EQ(Canonical(cell), Canonical(Cell<K>(Cube<K>())));
+}
+
+}  // namespace
+}  // namespace stellate::core
