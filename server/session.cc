@@ -105,6 +105,7 @@ void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
     blame_ = core::Status::Ok();
     return;
   }
+  if (options_.observer != nullptr) options_.observer->OnRound(batch.size());
   if (LogEnabled(LogLevel::kDebug)) {
     Log(LogLevel::kDebug, {options_.name, batch.round},
         core::Message(batch.size(), " queries answered, ", mesher->progress().vertices,
@@ -164,6 +165,9 @@ void Session::Finish(const core::Report* report) {
   Log(state == SessionState::kFailed ? LogLevel::kWarning : LogLevel::kInfo, log_context(),
       core::Message(SessionStateName(state), " after ", final_seconds_, " s, ", progress_.vertices,
                     " vertices, ", progress_.simplices, " simplices; ", verdict));
+  if (options_.observer != nullptr) {
+    options_.observer->OnEnd(state, report != nullptr ? *report : core::Report{});
+  }
   pool_.Close({blame_});
   WakeWatchers();
   over_ = true;

@@ -18,14 +18,24 @@ namespace stellate::server {
 
 enum class SessionState { kWaiting, kRunning, kSucceeded, kStopped, kCancelled, kFailed };
 
+// Told what becomes of a session, for the metrics. From the session's thread; must not block.
+class SessionObserver {
+ public:
+  virtual ~SessionObserver() = default;
+  virtual void OnRound(std::size_t queries) = 0;  // answered
+  virtual void OnEnd(SessionState state, const core::Report& report) = 0;
+};
+
 // What a session is made of, fixed for its life.
 struct SessionOptions {
   std::string name;   // "meshes/<id>"
+  std::string owner;  // whose it is; empty where the server tells nobody apart
   std::string label;  // the client's
   core::Specification spec;
   DispatchOptions dispatch;
   std::size_t max_workers = 64;
   std::size_t max_watchers = 64;
+  std::shared_ptr<SessionObserver> observer;  // may be null
 };
 
 // A session at one moment.

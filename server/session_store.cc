@@ -94,16 +94,28 @@ bool SessionStore::Delete(const std::string& name) {
   return true;
 }
 
-SessionStore::Page SessionStore::List(std::uint64_t after, std::size_t count) const {
+SessionStore::Page SessionStore::List(std::uint64_t after, std::size_t count,
+                                      const std::string& owner) const {
   const std::lock_guard lock(mutex_);
   Page page;
-  auto it = entries_.upper_bound(after);
-  for (; it != entries_.end() && page.sessions.size() < count; ++it) {
+  for (auto it = entries_.upper_bound(after); it != entries_.end(); ++it) {
+    if (it->second.session->options().owner != owner) continue;
+    if (page.sessions.size() == count) {
+      page.more = true;
+      break;
+    }
     page.sessions.push_back(it->second.session);
     page.numbers.push_back(it->first);
   }
-  page.more = it != entries_.end();
   return page;
+}
+
+std::vector<std::shared_ptr<Session>> SessionStore::All() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::shared_ptr<Session>> all;
+  all.reserve(entries_.size());
+  for (const auto& [number, entry] : entries_) all.push_back(entry.session);
+  return all;
 }
 
 std::size_t SessionStore::Running() const {

@@ -43,7 +43,9 @@ class SessionStore {
     std::vector<std::uint64_t> numbers;              // of each; later ones are greater
     bool more = false;
   };
-  Page List(std::uint64_t after, std::size_t count) const;
+  // One owner's.
+  Page List(std::uint64_t after, std::size_t count, const std::string& owner = "") const;
+  std::vector<std::shared_ptr<Session>> All() const;  // everyone's
 
   std::size_t Running() const;
   // Forgets finished meshes that were kept long enough. To be called now and then.
