@@ -16,7 +16,7 @@ namespace {
 // is no better, and they will be refined anyway.
 constexpr double kJudgedRadius = 1.3;
 
-// The sites of a pair of points: q - p, on the stack where d is small.
+// Room for q - p, on the stack where d is small.
 class Step {
  public:
   explicit Step(int d) {
@@ -73,15 +73,17 @@ class StarComplex<K>::CentreJudge final : public Cell::Judge {
     std::sort(ids, ids + K + 1);
     const double* points[K + 1];
     const double* tangents[K + 1];
+    double weights[K + 1];
     for (int i = 0; i <= K; ++i) {
       const Site site = ids[i] == p_.id                  ? p_
                         : guest_ && ids[i] == guest_->id ? *guest_
                                                          : complex_.At(ids[i]);
       points[i] = site.point;
       tangents[i] = site.tangent;
+      weights[i] = complex_.Weight(site.id);
     }
     double radius2;
-    if (!CommonCentre<K>(d(), points, tangents, centre, &radius2)) return false;
+    if (!CommonCentre<K>(d(), points, tangents, weights, centre, &radius2)) return false;
     if (radius2 > complex_.judged_radius2_) return false;
     for (int i = 0; i < d(); ++i) centre[i] += points[0][i] - p_.point[i];
     return true;
@@ -137,6 +139,17 @@ bool StarComplex<K>::Cuts(const Cell& cell, const Site& p, const Site& q) const 
   if (judging_ == Judging::kFlats) return cell.WouldCut(normal, offset);
   const CentreJudge judge(*this, p, nullptr);
   return cell.WouldCut(normal, offset, &judge, step.data());
+}
+
+template <int K>
+bool StarComplex<K>::CutsVertex(std::uint32_t p, std::size_t vertex, const double* point) const {
+  Step step(d_);
+  double normal[K];
+  const Site site = At(p);
+  const double offset = 0.5 * Project(site, point, step.data(), normal);
+  if (judging_ == Judging::kFlats) return cells_[p].WouldCutVertex(vertex, normal, offset);
+  const CentreJudge judge(*this, site, nullptr);
+  return cells_[p].WouldCutVertex(vertex, normal, offset, &judge, step.data());
 }
 
 template <int K>

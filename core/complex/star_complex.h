@@ -63,6 +63,9 @@ class StarComplex {
     tree_.VisitNear(q, [&] { return radius; }, [&](std::uint32_t id, double) { visit(id); });
   }
 
+  // Whether a point would take the simplex dual to a vertex of p's cell out of star(p).
+  bool CutsVertex(std::uint32_t p, std::size_t vertex, const double* point) const;
+
   // q in p's tangent coordinates: normal = T_p^t (q - p), the return value |q - p|^2.
   double Project(std::uint32_t p, const double* q, double* normal) const;
   // p + T_p x.

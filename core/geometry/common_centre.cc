@@ -43,8 +43,8 @@ void Substitute(const double (&factor)[K][K], double* x) {
 }  // namespace
 
 template <int K>
-bool CommonCentre(int d, const double* const* points, const double* const* tangents, double* centre,
-                  double* radius2) {
+bool CommonCentre(int d, const double* const* points, const double* const* tangents,
+                  const double* weights, double* centre, double* radius2) {
   const auto n = static_cast<std::size_t>(d);
   thread_local std::vector<double> memory;
   memory.resize(n * (K + 2));
@@ -56,24 +56,25 @@ bool CommonCentre(int d, const double* const* points, const double* const* tange
   double* lift = memory.data() + K * n;
   double* away = lift + n;
 
-  double gram[K][K], weights[K];
+  double gram[K][K], barycentric[K];
   for (int r = 0; r < K; ++r)
     for (int c = 0; c <= r; ++c) gram[r][c] = Dot(edge[r], edge[c], d);
-  for (int r = 0; r < K; ++r) weights[r] = 0.5 * gram[r][r];
+  for (int r = 0; r < K; ++r)
+    barycentric[r] = 0.5 * (gram[r][r] + weights[0] - weights[r + 1]);
   if (!Factor<K>(gram)) return false;
-  Substitute<K>(gram, weights);  // x = v_0 + sum weights_i edge_i
+  Substitute<K>(gram, barycentric);  // x = v_0 + sum barycentric_i edge_i
 
   std::fill(centre, centre + d, 0.0);
   double first = 1;
   for (int i = 0; i < K; ++i) {
-    first -= weights[i];
-    for (int j = 0; j < d; ++j) centre[j] += weights[i] * edge[i][j];
+    first -= barycentric[i];
+    for (int j = 0; j < d; ++j) centre[j] += barycentric[i] * edge[i][j];
   }
   *radius2 = Dot(centre, centre, d);
 
   std::fill(lift, lift + d, 0.0);
   for (int i = 0; i <= K; ++i) {
-    const double b = 0.5 * (i == 0 ? first : weights[i - 1]);
+    const double b = 0.5 * (i == 0 ? first : barycentric[i - 1]);
     for (int j = 0; j < d; ++j) away[j] = centre[j] - (i == 0 ? 0.0 : edge[i - 1][j]);
     for (int a = 0; a < K; ++a) {
       const double* t = tangents[i] + a * d;
@@ -91,10 +92,15 @@ bool CommonCentre(int d, const double* const* points, const double* const* tange
   return true;
 }
 
-template bool CommonCentre<1>(int, const double* const*, const double* const*, double*, double*);
-template bool CommonCentre<2>(int, const double* const*, const double* const*, double*, double*);
-template bool CommonCentre<3>(int, const double* const*, const double* const*, double*, double*);
-template bool CommonCentre<4>(int, const double* const*, const double* const*, double*, double*);
-template bool CommonCentre<5>(int, const double* const*, const double* const*, double*, double*);
+template bool CommonCentre<1>(int, const double* const*, const double* const*, const double*,
+                              double*, double*);
+template bool CommonCentre<2>(int, const double* const*, const double* const*, const double*,
+                              double*, double*);
+template bool CommonCentre<3>(int, const double* const*, const double* const*, const double*,
+                              double*, double*);
+template bool CommonCentre<4>(int, const double* const*, const double* const*, const double*,
+                              double*, double*);
+template bool CommonCentre<5>(int, const double* const*, const double* const*, const double*,
+                              double*, double*);
 
 }  // namespace stellate::core

@@ -11,13 +11,16 @@ namespace stellate::core {
 //
 //   c = x + N ( sum_i b_i P_i (x - v_i) / 2 ),   N the projection on the normal space of sigma.
 //
+// The weights perturb it: c has the same power |c - v_i|^2 - weight_i to all vertices.
+//
 //   points    K+1 points of R^d, in an order that all stars share
 //   tangents  K rows of d for each, orthonormal
+//   weights   K+1, length squared
 //   centre    d, relative to points[0]
 //   radius2   of sigma's circumsphere in its hull, length squared
 // False, with nothing set, when sigma is flat to rounding. Cost O(d K^2).
 template <int K>
-bool CommonCentre(int d, const double* const* points, const double* const* tangents, double* centre,
-                  double* radius2);
+bool CommonCentre(int d, const double* const* points, const double* const* tangents,
+                  const double* weights, double* centre, double* radius2);
 
 }  // namespace stellate::core

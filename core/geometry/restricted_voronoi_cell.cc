@@ -146,8 +146,8 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
       scratch.stack.push_back(w);
     }
   }
-  if (judge) {
-    if (!Tidy(scratch)) return false;
+  if (judge && !Tidy(scratch)) return false;
+  if (K >= 3) {  // where Stitch may fail
     scratch.facets = facets_;
     scratch.vertices = vertices_;
     scratch.centres = centres_;

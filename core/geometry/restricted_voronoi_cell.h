@@ -23,8 +23,8 @@ inline constexpr bool IsFake(std::uint32_t id) { return id >= kFirstFakeId; }
 //
 // A simple polytope: each vertex lies on exactly K facets and has K neighbours; it is dual to the
 // k-simplex of star(p) on p and the K facets' points, and is that simplex's circumcentre c_p in
-// T_pM. Kept by clipping, one half-space at a time; what is cut off is found by walking, so that
-// the combinatorics stay those of a polytope whatever rounding does to the coordinates.
+// T_pM. Kept by clipping, one half-space at a time; what is cut off is found by walking, and a cut
+// that rounding makes impossible is refused, so that the combinatorics stay those of a polytope.
 template <int K>
 class RestrictedVoronoiCell {
  public:
@@ -51,7 +51,7 @@ class RestrictedVoronoiCell {
     std::vector<Index> stack, remap, crossed;
     struct Crossing { Index kept, removed, slot; };  // slot: of the new vertex's edge in `removed`
     std::vector<Crossing> crossings;
-    // With a judge: the cell as it was, should the cut turn out to be impossible.
+    // The cell as it was, should the cut turn out to be impossible.
     std::vector<Facet> facets;
     std::vector<Vertex> vertices;
     std::vector<double> centres;
@@ -83,9 +83,15 @@ class RestrictedVoronoiCell {
   // Whether Clip with these arguments would cut: some vertex violates the half-space.
   bool WouldCut(const double* normal, double offset, const Judge* judge = nullptr,
                 const double* step = nullptr) const {
-    for (std::size_t i = 0; i < vertices_.size(); ++i)
-      if (Excess(i, normal, offset, judge, step) > 0) return true;
+    for (std::size_t v = 0; v < vertices_.size(); ++v)
+      if (Excess(v, normal, offset, judge, step) > 0) return true;
     return false;
+  }
+
+  // Whether Clip with these arguments would cut vertex v off.
+  bool WouldCutVertex(std::size_t v, const double* normal, double offset,
+                      const Judge* judge = nullptr, const double* step = nullptr) const {
+    return Excess(v, normal, offset, judge, step) > 0;
   }
 
   const std::vector<Facet>& facets() const { return facets_; }

@@ -18,12 +18,14 @@ constexpr double kIdempotenceTolerance = 1e-3;
 constexpr Eigen::Index kIdempotenceSample = 64;
 
 // Where R is large the image of a circumcentre may fall anywhere: one that comes nearer than this
-// share of epsilon to the sample would cost quality, so the step is shortened instead.
+// share of epsilon, or of a shorter step, to the sample would cost quality, so the step is
+// shortened instead.
 constexpr double kCoarseSpacing = 0.5;
-constexpr double kCoarseRadius = 2;  // "large": beyond this many epsilon
-// Otherwise only points that coincide for all purposes are refused, as a share of epsilon,
-constexpr double kSamePoint = 1e-6;
-// and good points nearer to the sample than this share of the circumradius.
+// Otherwise the ball around the circumcentre is empty but for curvature. A point of it that has the
+// sample nearer than this share of the circumradius says that epsilon is too coarse for that; to
+// insert it could make edges shorter than the one that R2 complained of (rho0 = 2), without end.
+constexpr double kEmptyBall = 0.5;
+// Good points are chosen off the centre.
 constexpr double kGoodPointSpacing = 0.25;
 
 // Differences of closest points are taken over this share of epsilon: the error is its square over
@@ -237,8 +239,8 @@ void Refinement<K>::AfterPoints() {
   } else {
     for (std::size_t i = 0; i < targets_.size(); ++i) {
       // Far steps may turn any corner: no guess there.
-      const bool near = targets_[i].radius <= kCoarseRadius * criteria_.epsilon;
-      const double* guess = near ? complex_.Tangent(targets_[i].star) : nullptr;
+      const bool far = IsCoarse(targets_[i].violation);
+      const double* guess = far ? nullptr : complex_.Tangent(targets_[i].star);
       for (Eigen::Index c = first_candidate_[i]; c < first_candidate_[i + 1]; ++c) add(c, guess);
     }
   }
@@ -321,13 +323,11 @@ void Refinement<K>::InsertRefined(std::size_t i) {
     return;
   }
   const double* y = points_.col(c).data();
-  double normal[K];
-  double excess = -0.5 * complex_.Project(t.star, y, normal);
-  for (int a = 0; a < K; ++a) excess += normal[a] * t.violation.x[a];
-  const bool coarse = t.violation.radius > kCoarseRadius * criteria_.epsilon;
-  const double spacing = (coarse ? kCoarseSpacing : kSamePoint) * criteria_.epsilon;
+  const double spacing =
+      IsCoarse(t.violation) ? kCoarseSpacing * std::min(criteria_.epsilon, t.radius)
+                            : kEmptyBall * t.radius;
   const bool duplicate = complex_.AnyWithin(y, spacing);
-  if (!(excess > 0) || duplicate) {
+  if (duplicate || !complex_.CutsVertex(t.star, t.violation.vertex, y)) {
     report_.counts.duplicates += duplicate;
     return Discourage(t.star);
   }
@@ -345,10 +345,9 @@ int Refinement<K>::BestCandidate(std::size_t i) const {
   for (Eigen::Index c = first_candidate_[i]; c < first_candidate_[i + 1] && fewest > 0; ++c) {
     if (!found_[static_cast<std::size_t>(c)]) continue;
     const double* y = points_.col(c).data();
-    double normal[K];
-    double excess = -0.5 * complex_.Project(t.star, y, normal);
-    for (int a = 0; a < K; ++a) excess += normal[a] * t.violation.x[a];
-    if (!(excess > 0) || complex_.AnyWithin(y, kGoodPointSpacing * t.radius)) continue;
+    if (!complex_.CutsVertex(t.star, t.violation.vertex, y) ||
+        complex_.AnyWithin(y, kGoodPointSpacing * t.radius))
+      continue;
     const int index = static_cast<int>(c - first_candidate_[i]);
     if (criteria_.candidates == 1) return index;
     complex_.TryPoint(y, tangents_.col(c).data(), scratch, &tentative);

@@ -75,6 +75,10 @@ class Refinement final : public Mesher {
   std::string WhatIsLeft() const;
   void UpdateProgress();
 
+  // So large that M between may be anything: more than twice epsilon.
+  bool IsCoarse(const Violation<K>& violation) const {
+    return violation.radius > 2 * criteria_.epsilon;
+  }
   Eigen::Index CandidateCount(const Target<K>& target) const {
     return target.violation.rule >= Rule::kSliver ? criteria_.candidates : 1;
   }

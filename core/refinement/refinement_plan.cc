@@ -63,7 +63,7 @@ bool Refinement<K>::FindsFlats(const Target<K>& target) const {
 }
 
 // Where to insert for a violation: at the circumcentre, but no farther out than the advance step,
-// and nearer after each failed attempt.
+// and, where all is coarse, nearer after each failed attempt.
 template <int K>
 Target<K> Refinement<K>::Aim(std::uint32_t star, const Violation<K>& violation) const {
   Target<K> target;
@@ -72,7 +72,7 @@ Target<K> Refinement<K>::Aim(std::uint32_t star, const Violation<K>& violation) 
   double scale = 1;
   if (violation.rule < Rule::kSliver) {
     scale = std::min(1.0, criteria_.advance_step / violation.radius);
-    if (violation.radius > criteria_.epsilon) scale = std::ldexp(scale, -discouraged_[star]);
+    if (IsCoarse(violation)) scale = std::ldexp(scale, -discouraged_[star]);
   }
   for (int a = 0; a < K; ++a) target.x[a] = violation.x[a] * scale;
   target.radius = violation.radius * scale;
@@ -122,17 +122,16 @@ std::vector<Target<K>> Refinement<K>::SliverAndConsistencyTargets() {
 template <int K>
 void Refinement<K>::Plan() {
   if (complex_.size() >= spec_.limits.max_vertices) return Finish(Termination::kVertexBudget);
-  std::vector<Target<K>> targets = SizeAndShapeTargets();
-  if (targets.empty()) {
-    if (!active_.empty()) return Finish(Termination::kNoProgress);
-    targets = SliverAndConsistencyTargets();
-    if (targets.empty()) {
-      if (!blemished_.empty()) return Finish(Termination::kNoProgress);
-      return StartCertificate();
-    }
+  if (!all_suspect_) {
     const double most = std::max(kMostGrowth * static_cast<double>(before_good_points_),
                                  static_cast<double>(before_good_points_ + kLeastGrowth));
     if (static_cast<double>(complex_.size()) > most) return Finish(Termination::kNoProgress);
+  }
+  std::vector<Target<K>> targets = SizeAndShapeTargets();
+  if (targets.empty()) targets = SliverAndConsistencyTargets();
+  if (targets.empty()) {
+    if (!active_.empty() || !blemished_.empty()) return Finish(Termination::kNoProgress);
+    return StartCertificate();
   }
   targets_ = SelectIndependent<K>(complex_, std::move(targets));
   const std::uint64_t room = spec_.limits.max_vertices - complex_.size();
@@ -168,8 +167,8 @@ void Refinement<K>::AskForTargets() {
     for (Eigen::Index c = first_candidate_[i]; c < first_candidate_[i + 1]; ++c) {
       double x[K];
       std::copy(t.x, t.x + K, x);
-      // The first candidate is the circumcentre itself, unless it already failed.
-      if (t.violation.rule >= Rule::kSliver && (c > first_candidate_[i] || discouraged_[t.star])) {
+      // The first candidate is the circumcentre itself, unless that already failed.
+      if (c > first_candidate_[i] || (discouraged_[t.star] && !IsCoarse(t.violation))) {
         double step[K];
         UniformInBall<K>(random, step);
         for (int a = 0; a < K; ++a) x[a] += criteria_.picking_radius * t.radius * step[a];

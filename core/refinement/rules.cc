@@ -8,8 +8,10 @@ namespace stellate::core {
 namespace {
 
 template <int K>
-Violation<K> AtVertex(Rule rule, const typename RestrictedVoronoiCell<K>::Vertex& v, bool fake) {
+Violation<K> AtVertex(Rule rule, const RestrictedVoronoiCell<K>& cell,
+                      const typename RestrictedVoronoiCell<K>::Vertex& v, bool fake) {
   Violation<K> violation;
+  violation.vertex = static_cast<std::size_t>(&v - cell.vertices().data());
   violation.rule = rule;
   violation.radius = std::sqrt(v.norm2);
   std::copy(v.x, v.x + K, violation.x);
@@ -48,7 +50,7 @@ std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std:
       worst_fake = fake;
     }
   }
-  if (worst) return AtVertex<K>(Rule::kSize, *worst, worst_fake);
+  if (worst) return AtVertex<K>(Rule::kSize, cell, *worst, worst_fake);
   double worst_rho2 = radius_edge_bound * radius_edge_bound;
   for (const Vertex& v : cell.vertices()) {
     double edge2 = INFINITY;
@@ -58,7 +60,7 @@ std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std:
       worst = &v;
     }
   }
-  if (worst) return AtVertex<K>(Rule::kRadiusEdge, *worst, false);
+  if (worst) return AtVertex<K>(Rule::kRadiusEdge, cell, *worst, false);
   return std::nullopt;
 }
 
@@ -168,14 +170,14 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& comp
       if ((!worst || v.norm2 > worst->norm2) &&
           ContainsSliver<K>(complex, complex.Point(p), cell, v, sliver_bound, nullptr))
         worst = &v;
-    if (worst) return AtVertex<K>(Rule::kSliver, *worst, false);
+    if (worst) return AtVertex<K>(Rule::kSliver, cell, *worst, false);
   }
   for (const Vertex& v : cell.vertices())
     if ((!worst || v.norm2 > worst->norm2) &&
         (!IsConsistent<K>(complex, p, v) ||
          (complex.judging() == Judging::kCommonCentre && IsFolded<K>(cell, v))))
       worst = &v;
-  if (worst) return AtVertex<K>(Rule::kInconsistent, *worst, false);
+  if (worst) return AtVertex<K>(Rule::kInconsistent, cell, *worst, false);
   return std::nullopt;
 }
 

@@ -17,6 +17,7 @@ struct Violation {
   Rule rule = Rule::kSize;
   double radius = 0;  // R_p(sigma), length
   double x[K] = {};   // c_p(sigma) in p's tangent coordinates
+  std::size_t vertex = 0;  // of p's cell, as long as that does not change
   bool fake = false;  // not a simplex yet: the cell is unbounded there
 };
 
