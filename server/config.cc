@@ -20,6 +20,35 @@ constexpr double kMaxSeconds = 366 * 86400.0;
 
 Status Invalid(std::string message) { return {StatusCode::kInvalidArgument, std::move(message)}; }
 
+// Who may listen in, and to whom the server talks.
+Status ValidateSafety(const Config& config, const ListenAddress& address) {
+  const bool tls = !config.tls_certificate.empty();
+  if (tls != !config.tls_key.empty()) {
+    return Invalid("--tls-cert and --tls-key go together: give both or neither");
+  }
+  if (!tls && !config.tls_client_ca.empty()) {
+    return Invalid("--tls-client-ca needs TLS: give --tls-cert and --tls-key too");
+  }
+  if (!address.IsLoopback() && !tls) {
+    if (!config.insecure_listen) {
+      return Invalid(Message("--listen is \"", config.listen,
+                             "\", which others can reach in plain text: give --tls-cert and "
+                             "--tls-key, listen on 127.0.0.1 or a unix socket, or add "
+                             "--insecure-listen where the network is trusted"));
+    }
+    if (!config.token_file.empty()) {
+      return Invalid(Message("--token-file would have tokens sent to \"", config.listen,
+                             "\" in plain text, for others to read and use: give --tls-cert and "
+                             "--tls-key"));
+    }
+  }
+  if (config.metrics_listen.empty()) return Status::Ok();
+  const auto metrics = ParseListenAddress(config.metrics_listen, "--metrics-listen");
+  if (!metrics) return metrics.error();
+  if (metrics->IsUnix()) return Invalid("--metrics-listen must be HOST:PORT or [IPV6]:PORT");
+  return Status::Ok();
+}
+
 }  // namespace
 
 bool ListenAddress::IsLoopback() const {
@@ -32,13 +61,13 @@ std::string ListenAddress::Target() const {
   return (v6 ? "[" + host + "]" : host) + ":" + std::to_string(port);
 }
 
-core::Expected<ListenAddress> ParseListenAddress(const std::string& text) {
+core::Expected<ListenAddress> ParseListenAddress(const std::string& text, const std::string& flag) {
   ListenAddress address;
   if (text.starts_with("unix:")) {
     address.unix_path = text.substr(text.starts_with("unix://") ? 7 : 5);
     if (address.unix_path.empty() || address.unix_path.size() > kMaxUnixPath) {
       return core::Refuse(StatusCode::kInvalidArgument,
-                          Message("--listen is \"", text, "\" but a unix socket's path has 1 to ",
+                          Message(flag, " is \"", text, "\" but a unix socket's path has 1 to ",
                                   kMaxUnixPath, " bytes: use a shorter one"));
     }
     return address;
@@ -56,7 +85,7 @@ core::Expected<ListenAddress> ParseListenAddress(const std::string& text) {
   }
   if (!good_port || address.host.empty()) {
     return core::Refuse(StatusCode::kInvalidArgument,
-                        Message("--listen is \"", text,
+                        Message(flag, " is \"", text,
                                 "\" but must be HOST:PORT, [IPV6]:PORT or unix:/PATH; port ",
                                 "0 takes a free one"));
   }
@@ -66,11 +95,8 @@ core::Expected<ListenAddress> ParseListenAddress(const std::string& text) {
 Status Validate(const Config& config) {
   const auto address = ParseListenAddress(config.listen);
   if (!address) return address.error();
-  if (!address->IsLoopback() && !config.insecure_listen) {
-    return Invalid(Message("--listen is \"", config.listen,
-                           "\", which others can reach in plain text: listen on 127.0.0.1 or a "
-                           "unix socket, or add --insecure-listen where the network is trusted"));
-  }
+  const Status safety = ValidateSafety(config, *address);
+  if (!safety.ok()) return safety;
   const struct {
     const char* flag;
     double value;

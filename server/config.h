@@ -22,14 +22,19 @@ struct ListenAddress {
   std::string Target() const;  // as gRPC writes it
 };
 
-// "host:port", "[v6]:port", "unix:/path".
-core::Expected<ListenAddress> ParseListenAddress(const std::string& text);
+// "host:port", "[v6]:port", "unix:/path". `flag` is what a refusal names.
+core::Expected<ListenAddress> ParseListenAddress(const std::string& text,
+                                                 const std::string& flag = "--listen");
 
 // Everything that can be set, with its default. Times in seconds.
 struct Config {
   std::string listen = "127.0.0.1:7717";
   bool insecure_listen = false;  // plain text beyond this machine
   std::string ready_file;        // written with the address once the server listens
+  std::string tls_certificate, tls_key;  // PEM files; empty: plain text
+  std::string tls_client_ca;             // PEM file; clients need a certificate of this authority
+  std::string token_file;                // lines "owner token"; empty: no tokens
+  std::string metrics_listen;            // host:port for Prometheus; empty: none
 
   std::size_t max_meshes = 64;  // running at once
   std::uint64_t max_vertices = 10'000'000;

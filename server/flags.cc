@@ -33,6 +33,22 @@ ParsedFlags ParseFlags(int argc, char** argv) {
   app.add_flag("--exit-with-parent", flags.exit_with_parent,
                "Stop when the process that started this one is gone");
 
+  const auto safety = "Safety";
+  app.add_option("--tls-cert", config.tls_certificate,
+                 "PEM file with the server's certificate, and its chain: TLS instead of plain text")
+      ->group(safety);
+  app.add_option("--tls-key", config.tls_key, "PEM file with its private key")->group(safety);
+  app.add_option("--tls-client-ca", config.tls_client_ca,
+                 "PEM file: clients must show a certificate of one of these authorities. Its "
+                 "subject owns the client's meshes, unless there is a --token-file")
+      ->group(safety);
+  app.add_option("--token-file", config.token_file,
+                 "File of lines \"OWNER TOKEN\": clients must send one of these tokens, and see "
+                 "their owner's meshes alone. Read again when it changes, or after SIGHUP")
+      ->group(safety);
+  app.add_option("--metrics-listen", config.metrics_listen,
+                 "HOST:PORT to answer Prometheus at, http://HOST:PORT/metrics; default: nowhere");
+
   const auto limits = "Limits";
   app.add_option("--max-meshes", config.max_meshes, "Meshes running at once")->group(limits);
   app.add_option("--max-vertices", config.max_vertices, "Vertices of a mesh")->group(limits);

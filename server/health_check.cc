@@ -1,5 +1,6 @@
 #include "server/health_check.h"
 
+#include <google/protobuf/wrappers.pb.h>
 #include <grpcpp/channel.h>
 #include <grpcpp/client_context.h>
 #include <grpcpp/create_channel.h>
@@ -7,6 +8,7 @@
 #include <grpcpp/support/byte_buffer.h>
 
 #include <future>
+#include <utility>
 #include <vector>
 
 #include "core/message.h"
@@ -20,13 +22,17 @@ constexpr std::string_view kServing("\x08\x01", 2);  // HealthCheckResponse{stat
 
 }  // namespace
 
-std::string CheckHealth(const std::string& target, std::chrono::milliseconds limit) {
-  const auto channel = grpc::CreateChannel(target, grpc::InsecureChannelCredentials());
+std::string CheckHealth(const std::string& target, std::chrono::milliseconds limit,
+                        std::shared_ptr<grpc::ChannelCredentials> credentials,
+                        const std::string& service) {
+  const auto channel = grpc::CreateChannel(target, std::move(credentials));
   grpc::GenericStub stub(channel);
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + limit);
-  grpc::Slice empty;
-  grpc::ByteBuffer request(&empty, 1);  // HealthCheckRequest{}: the server as a whole
+  google::protobuf::StringValue question;  // on the wire what HealthCheckRequest{service} is
+  question.set_value(service);
+  const grpc::Slice slice(question.SerializeAsString());
+  grpc::ByteBuffer request(&slice, 1);
   grpc::ByteBuffer response;
   std::promise<grpc::Status> promise;
   stub.UnaryCall(&context, kMethod, grpc::StubOptions(), &request, &response,
@@ -36,8 +42,8 @@ std::string CheckHealth(const std::string& target, std::chrono::milliseconds lim
   std::vector<grpc::Slice> slices;
   std::string bytes;
   if (!response.Dump(&slices).ok()) return core::Message(target, " answers nonsense");
-  for (const grpc::Slice& slice : slices) {
-    bytes.append(reinterpret_cast<const char*>(slice.begin()), slice.size());
+  for (const grpc::Slice& part : slices) {
+    bytes.append(reinterpret_cast<const char*>(part.begin()), part.size());
   }
   return bytes == kServing ? "" : core::Message(target, " is not serving");
 }

@@ -13,6 +13,7 @@
 #include "server/health_check.h"
 #include "server/log.h"
 #include "server/server.h"
+#include "server/tls.h"
 
 namespace {
 
@@ -21,11 +22,13 @@ using namespace stellate::server;  // NOLINT: this file is the program
 constexpr int kExitUsage = 2;
 constexpr auto kHealthLimit = std::chrono::seconds(5);
 
-sigset_t StopSignals() {
+// SIGHUP has something to say only where there is a token file; elsewhere it ends the process.
+sigset_t Signals(const Config& config) {
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
+  if (!config.token_file.empty()) sigaddset(&signals, SIGHUP);
   return signals;
 }
 
@@ -44,7 +47,8 @@ int Fail(const std::string& message, int status) {
 int RunHealthCheck(const Config& config) {
   const auto address = ParseListenAddress(config.listen);
   if (!address) return Fail(address.error().message, kExitUsage);
-  const std::string trouble = CheckHealth(address->Target(), kHealthLimit);
+  const std::string trouble =
+      CheckHealth(address->Target(), kHealthLimit, SelfCheckCredentials(config));
   return trouble.empty() ? 0 : Fail(trouble, 1);
 }
 
@@ -58,9 +62,12 @@ bool WriteReadyFile(const std::string& path, const std::string& address) {
 }
 
 // Returns when it is time to stop. True: at once, as nobody is left to wait for.
-bool ServeUntilTold(const sigset_t& signals, bool with_parent, pid_t parent) {
+bool ServeUntilTold(Server* server, const sigset_t& signals, bool with_parent, pid_t parent) {
   while (true) {
-    if (const int signal = WaitForSignal(signals, 250)) {
+    const int signal = WaitForSignal(signals, 250);
+    if (signal == SIGHUP) {
+      server->ReloadTokens();
+    } else if (signal != 0) {
       Log(LogLevel::kInfo, {}, stellate::core::Message("signal ", signal, ": stopping"));
       return false;
     }
@@ -82,7 +89,7 @@ int main(int argc, char** argv) {
   if (flags.health_check) return RunHealthCheck(config);
 
   // Before gRPC starts its threads, which inherit the mask: then sigtimedwait alone sees them.
-  const sigset_t signals = StopSignals();
+  const sigset_t signals = Signals(config);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   signal(SIGPIPE, SIG_IGN);
   StartLogging(config.log_level, config.log_format);
@@ -98,10 +105,13 @@ int main(int argc, char** argv) {
     return Fail("cannot write --ready-file " + config.ready_file, 1);
   }
 
-  const bool at_once = ServeUntilTold(signals, flags.exit_with_parent, parent);
+  const bool at_once = ServeUntilTold(server->get(), signals, flags.exit_with_parent, parent);
   const std::chrono::duration<double> drain(at_once ? 0 : config.drain_seconds);
   const bool clean = (*server)->Stop(std::chrono::duration_cast<Clock::duration>(drain),
-                                     [&] { return WaitForSignal(signals, 0) != 0; });
+                                     [&] {
+                                       const int signal = WaitForSignal(signals, 0);
+                                       return signal != 0 && signal != SIGHUP;
+                                     });
   if (!config.ready_file.empty()) unlink(config.ready_file.c_str());
   Log(LogLevel::kInfo, {}, "stopped");
   // A mesher in the middle of a round cannot be asked to leave: the process takes it along.

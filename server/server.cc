@@ -18,6 +18,7 @@
 
 #include "core/message.h"
 #include "server/error_map.h"
+#include "server/tls.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 
 namespace stellate::server {
@@ -37,11 +38,13 @@ constexpr int kMaxSyncThreads = 64;  // reflection alone uses them
 // Unary rpcs: run the function, answer at once. No exception leaves a handler.
 template <typename Request, typename Response>
 grpc::ServerUnaryReactor* Reply(grpc::CallbackServerContext* context, ServerState& service,
-                                grpc::Status (*handler)(ServerState&, const Request&, Response*),
+                                grpc::Status (*handler)(const Call&, const Request&, Response*),
                                 const Request& request, Response* response) {
   grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
   try {
-    reactor->Finish(handler(service, request, response));
+    auto caller = Identify(service, *context);
+    reactor->Finish(caller ? handler({service, std::move(*caller)}, request, response)
+                           : caller.error());
   } catch (const std::bad_alloc&) {
     reactor->Finish(Refusal(v1::ERROR_REASON_LIMIT_EXCEEDED, "the server is out of memory"));
   } catch (const std::exception& error) {
@@ -119,11 +122,6 @@ Status ClearUnixPath(const std::string& path) {
   return Status::Ok();
 }
 
-// Plain text for now; TLS credentials would be chosen here, from the configuration.
-std::shared_ptr<grpc::ServerCredentials> Credentials(const Config&) {
-  return grpc::InsecureServerCredentials();
-}
-
 int Milliseconds(double seconds) { return static_cast<int>(seconds * 1000); }
 
 void SetUp(const Config& config, grpc::ServerBuilder* builder) {
@@ -161,11 +159,18 @@ class Server::Impl {
   Impl(const Config& config, Session::MesherFactory factory)
       : service(config, ToStoreLimits(config), std::move(factory)), rpcs(&service) {}
 
+  Status ListenForPrometheus() {
+    if (service.config.metrics_listen.empty()) return Status::Ok();
+    return service.metrics.Listen(service.config.metrics_listen,
+                                  [this] { return service.store.All(); });
+  }
+
   void StartTicking() {
     ticker = std::jthread([this](std::stop_token stop) {
       std::unique_lock lock(tick_mutex);
       while (!tick_wake.wait_for(lock, stop, kTick, [&stop] { return stop.stop_requested(); })) {
         const TimePoint now = Clock::now();
+        service.authenticator->Reload();  // before the streams ask it
         service.streams.Tick(now);
         service.store.Sweep(now);
       }
@@ -201,11 +206,18 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   });
 
+  auto credentials = ListenCredentials(config);
+  if (!credentials) return tl::unexpected(std::move(credentials.error()));
+  auto authenticator = Authenticator::Create(config);
+  if (!authenticator) return tl::unexpected(std::move(authenticator.error()));
   auto impl = std::make_unique<Impl>(config, std::move(factory));
+  impl->service.authenticator = std::move(*authenticator);
+  status = impl->ListenForPrometheus();
+  if (!status.ok()) return tl::unexpected(std::move(status));
   grpc::ServerBuilder builder;
   SetUp(config, &builder);
   int port = 0;
-  builder.AddListeningPort(address.Target(), Credentials(config), &port);
+  builder.AddListeningPort(address.Target(), *credentials, &port);
   builder.RegisterService(&impl->rpcs);
   const mode_t mask = umask(0177);  // a unix socket is its owner's alone, from its first moment
   impl->server = builder.BuildAndStart();
@@ -221,6 +233,10 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
   impl->StartTicking();
   return std::unique_ptr<Server>(new Server(std::move(impl), address.Target()));
 }
+
+int Server::metrics_port() const { return impl_->service.metrics.port(); }
+
+void Server::ReloadTokens() { impl_->service.authenticator->Reload(/*force=*/true); }
 
 bool Server::Stop(Clock::duration drain, const std::function<bool()>& hurry) {
   Impl& impl = *impl_;
@@ -245,6 +261,7 @@ bool Server::Stop(Clock::duration drain, const std::function<bool()>& hurry) {
   impl.server->Wait();
   impl.ticker.request_stop();
   impl.ticker.join();
+  service.metrics.StopListening();
   return service.store.Stop(Clock::now() + kLastRound);
 }
 

@@ -25,6 +25,11 @@ class Server {
 
   // What clients dial: "127.0.0.1:7717", "unix:/path".
   const std::string& address() const { return address_; }
+  // Where Prometheus is answered; 0: nowhere.
+  int metrics_port() const;
+
+  // Reads the token file again, as happens by itself within seconds of a change.
+  void ReloadTokens();
 
   // Stops: no new meshes, then up to `drain` for running ones to end, then the rest is cancelled
   // and every stream ends with UNAVAILABLE. `hurry` is asked now and then; true ends the drain.

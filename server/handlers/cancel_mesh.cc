@@ -3,9 +3,9 @@
 
 namespace stellate::server {
 
-grpc::Status CancelMesh(ServerState& service, const v1::CancelMeshRequest& request,
+grpc::Status CancelMesh(const Call& call, const v1::CancelMeshRequest& request,
                         v1::Mesh* mesh) {
-  const auto session = FindMesh(service, request.name());
+  const auto session = FindMesh(call.service, call.caller, request.name());
   if (!session) return session.error();
   (*session)->Cancel();
   ToProto(**session, mesh);

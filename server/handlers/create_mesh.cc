@@ -12,13 +12,16 @@ Clock::duration ToDuration(double seconds) {
 
 }  // namespace
 
-grpc::Status CreateMesh(ServerState& service, const v1::CreateMeshRequest& request,
+grpc::Status CreateMesh(const Call& call, const v1::CreateMeshRequest& request,
                         v1::Mesh* mesh) {
+  ServerState& service = call.service;
   if (service.draining) return ShuttingDown();
   auto parsed = FromProto(request.spec(), service.config);
   if (!parsed) return ToGrpc(parsed.error(), "spec.");
 
   SessionOptions options;
+  options.owner = call.caller.owner;
+  options.observer = service.metrics.observer();
   options.label = std::move(parsed->label);
   options.spec = std::move(parsed->spec);
   options.dispatch.answer_limit = ToDuration(parsed->answer_seconds);

@@ -2,11 +2,11 @@
 
 namespace stellate::server {
 
-grpc::Status DeleteMesh(ServerState& service, const v1::DeleteMeshRequest& request,
+grpc::Status DeleteMesh(const Call& call, const v1::DeleteMeshRequest& request,
                         google::protobuf::Empty*) {
-  const auto session = FindMesh(service, request.name());
+  const auto session = FindMesh(call.service, call.caller, request.name());
   if (!session) return session.error();
-  service.store.Delete(request.name());  // gone already: someone else was quicker
+  call.service.store.Delete(request.name());  // gone already: someone else was quicker
   return grpc::Status::OK;
 }
 

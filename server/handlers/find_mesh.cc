@@ -5,6 +5,7 @@
 namespace stellate::server {
 
 tl::expected<std::shared_ptr<Session>, grpc::Status> FindMesh(const ServerState& service,
+                                                              const Identity& caller,
                                                               const std::string& name,
                                                               const std::string& field) {
   if (!IsMeshName(name)) {
@@ -16,13 +17,20 @@ tl::expected<std::shared_ptr<Session>, grpc::Status> FindMesh(const ServerState&
                 field));
   }
   auto session = service.store.Find(name);
-  if (session == nullptr) {
+  if (session == nullptr || session->options().owner != caller.owner) {
     return tl::unexpected(Refusal(v1::ERROR_REASON_MESH_NOT_FOUND,
                                   core::Message("there is no mesh ", name,
                                                 ": the name is wrong, or it was deleted, or it "
                                                 "ended too long ago to be kept")));
   }
   return session;
+}
+
+tl::expected<Identity, grpc::Status> Identify(ServerState& service,
+                                              const grpc::ServerContextBase& context) {
+  auto identity = service.authenticator->Identify(context);
+  if (!identity) service.metrics.Refused();
+  return identity;
 }
 
 grpc::Status ShuttingDown() {

@@ -3,8 +3,8 @@
 
 namespace stellate::server {
 
-grpc::Status GetMesh(ServerState& service, const v1::GetMeshRequest& request, v1::Mesh* mesh) {
-  const auto session = FindMesh(service, request.name());
+grpc::Status GetMesh(const Call& call, const v1::GetMeshRequest& request, v1::Mesh* mesh) {
+  const auto session = FindMesh(call.service, call.caller, request.name());
   if (!session) return session.error();
   ToProto(**session, mesh);
   return grpc::Status::OK;

@@ -3,9 +3,9 @@
 
 namespace stellate::server {
 
-grpc::Status GetServerInfo(ServerState& service, const v1::GetServerInfoRequest&,
+grpc::Status GetServerInfo(const Call& call, const v1::GetServerInfoRequest&,
                            v1::ServerInfo* info) {
-  const Config& config = service.config;
+  const Config& config = call.service.config;
   info->set_version(Version());
   info->add_protocols("stellate.v1");
   info->set_max_dimension(core::kMaxDimension);

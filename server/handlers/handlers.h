@@ -7,7 +7,9 @@
 #include <memory>
 #include <tl/expected.hpp>
 
+#include "server/auth.h"
 #include "server/config.h"
+#include "server/metrics.h"
 #include "server/session_store.h"
 #include "server/streams.h"
 #include "stellate/v1/stellate.pb.h"
@@ -22,18 +24,30 @@ struct ServerState {
   const Config config;
   StreamRegistry streams;
   SessionStore store;
+  std::unique_ptr<Authenticator> authenticator;  // set before the first call
+  Metrics metrics;
   std::atomic<bool> draining{false};  // no new meshes
 };
 
+// A call and who makes it.
+struct Call {
+  ServerState& service;
+  Identity caller;
+};
+
+// Who calls, or UNAUTHENTICATED, counted.
+tl::expected<Identity, grpc::Status> Identify(ServerState& service,
+                                              const grpc::ServerContextBase& context);
+
 // One function for each rpc, each in its own file. None of them waits for anything.
-grpc::Status CreateMesh(ServerState& service, const v1::CreateMeshRequest& request, v1::Mesh* mesh);
-grpc::Status GetMesh(ServerState& service, const v1::GetMeshRequest& request, v1::Mesh* mesh);
-grpc::Status ListMeshes(ServerState& service, const v1::ListMeshesRequest& request,
+grpc::Status CreateMesh(const Call& call, const v1::CreateMeshRequest& request, v1::Mesh* mesh);
+grpc::Status GetMesh(const Call& call, const v1::GetMeshRequest& request, v1::Mesh* mesh);
+grpc::Status ListMeshes(const Call& call, const v1::ListMeshesRequest& request,
                         v1::ListMeshesResponse* response);
-grpc::Status CancelMesh(ServerState& service, const v1::CancelMeshRequest& request, v1::Mesh* mesh);
-grpc::Status DeleteMesh(ServerState& service, const v1::DeleteMeshRequest& request,
+grpc::Status CancelMesh(const Call& call, const v1::CancelMeshRequest& request, v1::Mesh* mesh);
+grpc::Status DeleteMesh(const Call& call, const v1::DeleteMeshRequest& request,
                         google::protobuf::Empty* empty);
-grpc::Status GetServerInfo(ServerState& service, const v1::GetServerInfoRequest& request,
+grpc::Status GetServerInfo(const Call& call, const v1::GetServerInfoRequest& request,
                            v1::ServerInfo* info);
 grpc::ServerBidiReactor<v1::ServeOracleRequest, v1::ServeOracleResponse>* ServeOracle(
     ServerState& service, grpc::CallbackServerContext* context);
@@ -41,8 +55,10 @@ grpc::ServerWriteReactor<v1::WatchMeshResponse>* WatchMesh(ServerState& service,
                                                            grpc::CallbackServerContext* context,
                                                            const v1::WatchMeshRequest& request);
 
-// The mesh of that name, or INVALID_ARGUMENT or NOT_FOUND. `field`: where the name stands.
+// The caller's mesh of that name, or INVALID_ARGUMENT or NOT_FOUND. Another owner's mesh is not
+// told from one that does not exist. `field`: where the name stands.
 tl::expected<std::shared_ptr<Session>, grpc::Status> FindMesh(const ServerState& service,
+                                                              const Identity& caller,
                                                               const std::string& name,
                                                               const std::string& field = "name");
 

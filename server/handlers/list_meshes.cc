@@ -14,7 +14,7 @@ constexpr std::uint32_t kLargestPage = 1000;
 }  // namespace
 
 // A page ends early when it grows too large for a message: boxes have d numbers each.
-grpc::Status ListMeshes(ServerState& service, const v1::ListMeshesRequest& request,
+grpc::Status ListMeshes(const Call& call, const v1::ListMeshesRequest& request,
                         v1::ListMeshesResponse* response) {
   std::uint64_t after = 0;
   const std::string& token = request.page_token();
@@ -28,13 +28,14 @@ grpc::Status ListMeshes(ServerState& service, const v1::ListMeshesRequest& reque
     }
   }
   const std::uint32_t size = request.page_size() == 0 ? kDefaultPage : request.page_size();
-  const SessionStore::Page page = service.store.List(after, std::min(size, kLargestPage));
+  const SessionStore::Page page =
+      call.service.store.List(after, std::min(size, kLargestPage), call.caller.owner);
   std::size_t bytes = 0;
   for (std::size_t i = 0; i < page.sessions.size(); ++i) {
     v1::Mesh* const mesh = response->add_meshes();
     ToProto(*page.sessions[i], mesh);
     bytes += mesh->ByteSizeLong();
-    const bool full = bytes >= ChunkBytes(service.config) / 2;
+    const bool full = bytes >= ChunkBytes(call.service.config) / 2;
     const bool last = i + 1 == page.sessions.size();
     if ((last && page.more) || (!last && full)) {
       response->set_next_page_token(std::to_string(page.numbers[i]));

@@ -1,5 +1,6 @@
 #include <deque>
 #include <optional>
+#include <unordered_map>
 
 #include "core/message.h"
 #include "server/convert/mesh.h"
@@ -23,11 +24,15 @@ class OracleStream final
       public std::enable_shared_from_this<OracleStream> {
  public:
   OracleStream(ServerState& service, grpc::CallbackServerContext* context)
-      : service_(service), context_(context), opened_(Clock::now()) {}
+      : service_(service),
+        context_(context),
+        caller_(Identify(service, *context)),
+        opened_(Clock::now()) {}
 
   void Start() {
     self_ = shared_from_this();
     service_.streams.Add(self_);
+    if (!caller_) return EndWith(caller_.error());
     ReadNext();
   }
 
@@ -37,6 +42,7 @@ class OracleStream final
       EndWith(grpc::Status::OK);
       return;
     }
+    service_.metrics.Received(request_.ByteSizeLong());
     Handle(request_);
     ReadNext();
   }
@@ -81,6 +87,10 @@ class OracleStream final
 
   void Tick(TimePoint now) override {
     const auto patience = std::chrono::duration<double>(service_.config.hello_seconds);
+    if (caller_ && !service_.authenticator->StillHolds(*caller_)) {
+      EndWith(TokenWithdrawn());
+      Leave();
+    }
     const std::lock_guard lock(mutex_);
     if (done_) return;
     if (end_) {
@@ -127,7 +137,7 @@ class OracleStream final
   }
 
   void Greet(const v1::Hello& hello) {
-    auto session = FindMesh(service_, hello.mesh(), "hello.mesh");
+    auto session = FindMesh(service_, *caller_, hello.mesh(), "hello.mesh");
     if (!session) return EndWith(session.error());
     if (hello.worker().size() > kMaxWorkerNameBytes) {
       return EndWith(Refusal(v1::ERROR_REASON_INVALID_ARGUMENT,
@@ -161,6 +171,7 @@ class OracleStream final
   }
 
   void TakeAnswers(const v1::AnswerChunk& answers) {
+    NoteAnswer(answers.lease());
     auto chunk = session_->pool().Claim(worker_, answers.lease());
     if (!chunk) return OutOfOrder(chunk.error().message);
     if (!*chunk) return;  // late: another has the work, or it is done
@@ -170,6 +181,14 @@ class OracleStream final
     EndWith(ToGrpc(status));
     session_->pool().Fail(ToMeshFailure(status));
     Leave();
+  }
+
+  void NoteAnswer(LeaseId lease) {
+    const std::lock_guard lock(mutex_);
+    const auto asked = asked_.find(lease);
+    if (asked == asked_.end()) return;
+    service_.metrics.Answered(std::chrono::duration<double>(Clock::now() - asked->second).count());
+    asked_.erase(asked);
   }
 
   void TakeFailure(const v1::OracleFailure& failure) {
@@ -224,20 +243,24 @@ class OracleStream final
       if (!over_) return Finish(*end_);
       response_.Clear();
       response_.mutable_over()->set_state(v1::MeshState_Name(ToProto(session_->View().state)));
+      service_.metrics.Sent(response_.ByteSizeLong());
       return StartWriteAndFinish(&response_, grpc::WriteOptions(), *end_);
     } else if (!queue_.empty()) {
       response_.Clear();
       ToProto(queue_.front(), session_->options().spec, response_.mutable_queries());
+      asked_[queue_.front().lease] = Clock::now();
       queue_.pop_front();
     } else {
       return;
     }
     writing_ = true;
+    service_.metrics.Sent(response_.ByteSizeLong());
     StartWrite(&response_);
   }
 
   ServerState& service_;
   grpc::CallbackServerContext* const context_;
+  const tl::expected<Identity, grpc::Status> caller_;
   const TimePoint opened_;
   v1::ServeOracleRequest request_;  // the reading side's alone, as are the next
   std::string worker_name_;
@@ -255,6 +278,7 @@ class OracleStream final
   std::optional<grpc::Status> end_;
   TimePoint ended_;
   std::deque<Chunk> queue_;
+  std::unordered_map<LeaseId, TimePoint> asked_;  // written, not answered yet
   v1::ServeOracleResponse response_;
 };
 

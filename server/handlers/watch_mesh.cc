@@ -19,7 +19,7 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
                           public std::enable_shared_from_this<WatchStream> {
  public:
   WatchStream(ServerState& service, grpc::CallbackServerContext* context)
-      : service_(service), context_(context) {}
+      : service_(service), context_(context), caller_(Identify(service, *context)) {}
 
   void Start(const v1::WatchMeshRequest& request) {
     self_ = shared_from_this();
@@ -59,6 +59,7 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
   void Tick(TimePoint now) override {
     const std::lock_guard lock(mutex_);
     if (done_ || session_ == nullptr) return;
+    if (!end_ && !service_.authenticator->StillHolds(*caller_)) End(TokenWithdrawn());
     const bool stuck = (writing_ || finished_) && now - last_write_ > kPatience;
     const bool of_use = !finished_ && service_.store.Find(session_->options().name) != nullptr;
     if (stuck && !of_use) return context_->TryCancel();
@@ -76,7 +77,8 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
 
  private:
   grpc::Status Attach(const v1::WatchMeshRequest& request) {
-    auto session = FindMesh(service_, request.name());
+    if (!caller_) return caller_.error();
+    auto session = FindMesh(service_, *caller_, request.name());
     if (!session) return session.error();
     const std::uint64_t newest = (*session)->history().revision();
     if (request.from_revision() > newest) {
@@ -124,12 +126,14 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
       finished_ = true;
       last_write_ = Clock::now();
       ToProto(*session_, response_.mutable_final());
+      service_.metrics.Sent(response_.ByteSizeLong());
       return StartWriteAndFinish(&response_, grpc::WriteOptions(), grpc::Status::OK);
     } else {
       return;
     }
     writing_ = true;
     last_write_ = Clock::now();
+    service_.metrics.Sent(response_.ByteSizeLong());
     StartWrite(&response_);
   }
 
@@ -145,6 +149,7 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
 
   ServerState& service_;
   grpc::CallbackServerContext* const context_;
+  const tl::expected<Identity, grpc::Status> caller_;
 
   std::mutex mutex_;
   std::shared_ptr<WatchStream> self_;

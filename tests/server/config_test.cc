@@ -50,6 +50,25 @@ TEST(Config, PlainTextBeyondThisMachineMustBeAskedFor) {
   EXPECT_TRUE(Validate(config).ok());
 }
 
+TEST(Config, TlsMakesAnAddressSafeAndTokensNeedItThere) {
+  Config config;
+  config.listen = "0.0.0.0:7717";
+  config.insecure_listen = true;
+  config.token_file = "tokens";
+  const core::Status status = Validate(config);
+  EXPECT_TRUE(status.message.starts_with("--token-file")) << status.message;
+  config.insecure_listen = false;
+  config.tls_certificate = "cert.pem";
+  EXPECT_TRUE(Validate(config).message.starts_with("--tls-cert")) << "the key is missing";
+  config.tls_key = "key.pem";
+  EXPECT_TRUE(Validate(config).ok());
+  config.listen = "127.0.0.1:7717";
+  config.tls_certificate = config.tls_key = "";
+  EXPECT_TRUE(Validate(config).ok()) << "tokens may stay on this machine in plain text";
+  config.tls_client_ca = "ca.pem";
+  EXPECT_TRUE(Validate(config).message.starts_with("--tls-client-ca"));
+}
+
 TEST(Config, RefusalsNameTheFlag) {
   const auto expect = [](const char* flag, auto set) {
     Config config;
@@ -66,6 +85,8 @@ TEST(Config, RefusalsNameTheFlag) {
   expect("--answer-seconds",
          [](Config* c) { c->answer_seconds = std::numeric_limits<double>::quiet_NaN(); });
   expect("--drain-seconds", [](Config* c) { c->drain_seconds = -1; });
+  expect("--metrics-listen", [](Config* c) { c->metrics_listen = "unix:/run/metrics"; });
+  expect("--metrics-listen", [](Config* c) { c->metrics_listen = "9090"; });
   expect("--keepalive",
          [](Config* c) { c->keepalive_seconds = std::numeric_limits<double>::infinity(); });
 }

@@ -66,6 +66,8 @@ TEST_F(ServerTest, HealthSaysNoOnceItStops) {
   Start();
   const std::string address = server_->address();
   EXPECT_EQ(CheckHealth(address, 60s), "");
+  EXPECT_EQ(
+      CheckHealth(address, 60s, grpc::InsecureChannelCredentials(), "stellate.v1.Stellate"), "");
   EXPECT_TRUE(server_->Stop(0s));
   EXPECT_NE(CheckHealth(address, 60s), "");
 }
@@ -94,6 +96,11 @@ TEST_F(ServerTest, StoppingLetsRunningMeshesEnd) {
   const grpc::Status status = Create(SpecOfSphere(), &refused);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAVAILABLE);
   EXPECT_EQ(ReasonIn(status), "SHUTTING_DOWN");
+  for (const char* service : {"", "stellate.v1.Stellate"}) {
+    const std::string health =
+        CheckHealth(server_->address(), 60s, grpc::InsecureChannelCredentials(), service);
+    EXPECT_NE(health.find("is not serving"), std::string::npos) << service << ": " << health;
+  }
   gate.set_value();
   EXPECT_EQ(watching.get().state(), v1::MESH_STATE_SUCCEEDED);
   EXPECT_TRUE(stopping.get());

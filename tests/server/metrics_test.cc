@@ -1,0 +1,160 @@
+// What Prometheus reads from a live server.
+
+#include "server/metrics.h"
+
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <map>
+#include <regex>
+#include <sstream>
+
+#include "tests/server/live_server.h"
+
+namespace stellate::server::testing {
+namespace {
+
+using namespace std::chrono_literals;
+
+class MetricsTest : public LiveServer {
+ protected:
+  void StartWithMetrics(Config config = {}) {
+    config.metrics_listen = "127.0.0.1:0";
+    Start(config);
+    ASSERT_GT(server_->metrics_port(), 0);
+  }
+
+  // The reply to GET /metrics, headers included; "" when nobody listens.
+  static std::string Get(int port) {
+    const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<std::uint16_t>(port));
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    std::string reply;
+    if (connect(socket, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0) {
+      const std::string request = "GET /metrics HTTP/1.0\r\n\r\n";
+      EXPECT_EQ(send(socket, request.data(), request.size(), 0),
+                static_cast<ssize_t>(request.size()));
+      char buffer[4096];
+      for (ssize_t n = 0; (n = recv(socket, buffer, sizeof(buffer), 0)) > 0;) {
+        reply.append(buffer, static_cast<std::size_t>(n));
+      }
+    }
+    close(socket);
+    return reply;
+  }
+
+  // Series and their values; checks that every line is what the text format allows.
+  std::map<std::string, double> Scrape() {
+    const std::string reply = Get(server_->metrics_port());
+    EXPECT_EQ(reply.find("HTTP/1.1 200"), 0u) << reply;
+    std::istringstream lines(reply.substr(std::min(reply.find("\r\n\r\n"), reply.size() - 4) + 4));
+    static const std::regex kSample(R"((\w+(?:\{\w+="[^"]*"\})?) ([-+0-9.eE]+|\+Inf|[Nn]a[Nn]))");
+    std::map<std::string, double> series;
+    for (std::string line; std::getline(lines, line);) {
+      if (line.empty() || line.starts_with("# HELP ") || line.starts_with("# TYPE ")) continue;
+      std::smatch match;
+      EXPECT_TRUE(std::regex_match(line, match, kSample)) << line;
+      if (!match.empty()) series[match[1]] = std::stod(match[2]);
+    }
+    return series;
+  }
+};
+
+TEST_F(MetricsTest, NobodyListensUnlessAsked) {
+  Start();
+  EXPECT_EQ(server_->metrics_port(), 0);
+}
+
+TEST_F(MetricsTest, CountsAMeshFromItsStartToItsEnd) {
+  StartWithMetrics();
+  EXPECT_EQ(Scrape().at("stellate_meshes{state=\"WAITING\"}"), 0);
+  const std::string name = CreateSphere();
+  EXPECT_EQ(Scrape().at("stellate_meshes{state=\"WAITING\"}"), 1);
+
+  std::atomic<bool> open{false};
+  RawWorker worker(stub_.get(), name, [&open](const v1::QueryChunk& queries) {
+    while (!open) std::this_thread::yield();
+    return RawWorker::Truly(queries);
+  });
+  std::thread watching([&] { WatchToEnd(name); });
+  while (worker.chunks() == 0 || LiveServer::Get(name).watchers() == 0) std::this_thread::yield();
+  auto series = Scrape();
+  EXPECT_EQ(series.at("stellate_meshes{state=\"RUNNING\"}"), 1);
+  EXPECT_EQ(series.at("stellate_meshes{state=\"WAITING\"}"), 0);
+  EXPECT_EQ(series.at("stellate_workers"), 1);
+  EXPECT_EQ(series.at("stellate_watchers"), 1);
+  EXPECT_EQ(series.at("stellate_rounds_total"), 0);
+  EXPECT_EQ(series.at("stellate_answer_seconds_count"), 0);
+
+  open = true;
+  watching.join();
+  EXPECT_TRUE(worker.Wait().ok());
+  const v1::Mesh mesh = LiveServer::Get(name);
+  series = Scrape();
+  EXPECT_EQ(series.at("stellate_meshes{state=\"SUCCEEDED\"}"), 1);
+  EXPECT_EQ(series.at("stellate_meshes_ended_total{state=\"SUCCEEDED\"}"), 1);
+  EXPECT_EQ(series.at("stellate_meshes_ended_total{state=\"FAILED\"}"), 0);
+  EXPECT_EQ(series.at("stellate_certificates_total{certified=\"true\"}"), 1);
+  EXPECT_EQ(series.at("stellate_certificates_total{certified=\"false\"}"), 0);
+  EXPECT_EQ(series.at("stellate_vertices"), mesh.progress().vertices());
+  EXPECT_GT(series.at("stellate_rounds_total"), 0);
+  EXPECT_GE(series.at("stellate_queries_total"), series.at("stellate_vertices"));
+  EXPECT_EQ(series.at("stellate_answer_seconds_count"), worker.chunks());
+  EXPECT_EQ(series.at("stellate_answer_seconds_bucket{le=\"+Inf\"}"), worker.chunks());
+  // A query is three numbers, and so is an answer.
+  const double least = 24 * series.at("stellate_queries_total");
+  EXPECT_GE(series.at("stellate_sent_bytes_total"), least);
+  EXPECT_GE(series.at("stellate_received_bytes_total"), least);
+
+  // What was counted stays counted when the mesh is gone.
+  v1::DeleteMeshRequest request;
+  request.set_name(name);
+  google::protobuf::Empty empty;
+  grpc::ClientContext context;
+  ASSERT_TRUE(stub_->DeleteMesh(&context, request, &empty).ok());
+  const auto after = Scrape();
+  EXPECT_EQ(after.at("stellate_meshes{state=\"SUCCEEDED\"}"), 0);
+  EXPECT_EQ(after.at("stellate_vertices"), 0);
+  EXPECT_EQ(after.at("stellate_rounds_total"), series.at("stellate_rounds_total"));
+}
+
+TEST_F(MetricsTest, AMeshThatEndsBadlyCountsAsNotCertified) {
+  StartWithMetrics();
+  const std::string name = CreateSphere();
+  RawWorker liar(stub_.get(), name, [](const v1::QueryChunk& queries) {
+    v1::ServeOracleRequest request;
+    *request.mutable_answers() = TrueAnswer(queries);
+    Poke(request.mutable_answers()->mutable_points(), 0, std::nan(""));
+    return std::optional(request);
+  });
+  EXPECT_EQ(WatchToEnd(name).state(), v1::MESH_STATE_FAILED);
+  const auto series = Scrape();
+  EXPECT_EQ(series.at("stellate_meshes_ended_total{state=\"FAILED\"}"), 1);
+  EXPECT_EQ(series.at("stellate_certificates_total{certified=\"false\"}"), 1);
+}
+
+TEST_F(MetricsTest, NamesNoMeshAndNoOwner) {
+  StartWithMetrics();
+  const std::string name = CreateSphere();
+  const std::string reply = Get(server_->metrics_port());
+  EXPECT_NE(reply.find("stellate_meshes"), std::string::npos);
+  EXPECT_EQ(reply.find(name.substr(name.find('/') + 1)), std::string::npos);
+}
+
+TEST_F(MetricsTest, ATakenPortIsRefusedAndAStoppedServerAnswersNoMore) {
+  StartWithMetrics();
+  const int port = server_->metrics_port();
+  Config config;
+  config.listen = "127.0.0.1:0";
+  config.metrics_listen = "127.0.0.1:" + std::to_string(port);
+  const auto second = Server::Start(config);
+  ASSERT_FALSE(second);
+  EXPECT_NE(second.error().message.find("--metrics-listen"), std::string::npos);
+  EXPECT_TRUE(server_->Stop(0s));
+  EXPECT_EQ(Get(port), "");
+}
+
+}  // namespace
+}  // namespace stellate::server::testing
