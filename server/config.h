@@ -31,6 +31,9 @@ struct Config {
   std::string listen = "127.0.0.1:7717";
   bool insecure_listen = false;  // plain text beyond this machine
   std::string ready_file;        // written with the address once the server listens
+  std::string data_dir;          // of the journal; empty: meshes live in memory alone
+  std::uint64_t max_journal_bytes = 0;  // 0: what the disk holds
+
   std::string tls_certificate, tls_key;  // PEM files; empty: plain text
   std::string tls_client_ca;             // PEM file; clients need a certificate of this authority
   std::string token_file;                // lines "owner token"; empty: no tokens

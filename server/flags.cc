@@ -28,6 +28,9 @@ ParsedFlags ParseFlags(int argc, char** argv) {
                "Allow plain text on an address that other machines reach");
   app.add_option("--ready-file", config.ready_file,
                  "File to write the address to, once the server listens");
+  app.add_option("--data-dir", config.data_dir,
+                 "Directory to record meshes in, so that they outlive the server; without it they "
+                 "live in memory alone");
   app.add_flag("--health-check", flags.health_check,
                "Ask the server at --listen whether it serves; exit 0 if so, else 1");
   app.add_flag("--exit-with-parent", flags.exit_with_parent,
@@ -59,6 +62,9 @@ ParsedFlags ParseFlags(int argc, char** argv) {
       ->group(limits);
   app.add_option("--max-rounds", config.max_rounds, "Rounds of a mesh")->group(limits);
   app.add_option("--max-message-bytes", config.max_message_bytes, "Largest message, both ways")
+      ->group(limits);
+  app.add_option("--max-journal-bytes", config.max_journal_bytes,
+                 "Size of the record in --data-dir; 0: what the disk holds")
       ->group(limits);
   app.add_option("--max-workers", config.max_workers, "Workers of a mesh")->group(limits);
   app.add_option("--max-watchers", config.max_watchers, "Watchers of a mesh")->group(limits);

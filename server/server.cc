@@ -165,6 +165,24 @@ class Server::Impl {
                                   [this] { return service.store.All(); });
   }
 
+  // Takes up the meshes of an earlier server.
+  Status OpenJournal() {
+    const Config& config = service.config;
+    if (config.data_dir.empty()) return Status::Ok();
+    auto journal = Journal::Open({config.data_dir, config.max_journal_bytes});
+    if (!journal) return std::move(journal.error());
+    service.journal = std::move(*journal);
+    service.store.RecordIn([this] { return service.journal->NewMesh(); });
+    for (SessionOptions& options : service.journal->TakeMeshes()) {
+      options.dispatch.chunk_bytes = ChunkBytes(config);
+      options.max_workers = config.max_workers;
+      options.max_watchers = config.max_watchers;
+      options.observer = service.metrics.observer();
+      service.store.Restore(std::move(options));
+    }
+    return Status::Ok();
+  }
+
   void StartTicking() {
     ticker = std::jthread([this](std::stop_token stop) {
       std::unique_lock lock(tick_mutex);
@@ -212,6 +230,8 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
   if (!authenticator) return tl::unexpected(std::move(authenticator.error()));
   auto impl = std::make_unique<Impl>(config, std::move(factory));
   impl->service.authenticator = std::move(*authenticator);
+  status = impl->OpenJournal();
+  if (!status.ok()) return tl::unexpected(std::move(status));
   status = impl->ListenForPrometheus();
   if (!status.ok()) return tl::unexpected(std::move(status));
   grpc::ServerBuilder builder;

@@ -16,6 +16,12 @@ MeshFailure ToFailure(const core::Status& status) {
   return {core::StatusCodeName(status.code), status.message};
 }
 
+// When it was created, on the clock that measures how long it takes.
+TimePoint CreatedAt(std::chrono::system_clock::time_point create_time) {
+  const auto age = std::chrono::system_clock::now() - create_time;
+  return Clock::now() - std::chrono::duration_cast<Clock::duration>(age);
+}
+
 }  // namespace
 
 const char* SessionStateName(SessionState state) {
@@ -41,8 +47,10 @@ Session::Session(SessionOptions options, MesherFactory factory)
       factory_(std::move(factory)),
       pool_(options_.spec, options_.dispatch, options_.max_workers),
       history_(options_.spec.dimension, options_.spec.ambient_dimension),
-      create_time_(std::chrono::system_clock::now()),
-      created_(Clock::now()) {}
+      create_time_(options_.record ? options_.record->create_time
+                                   : std::chrono::system_clock::now()),
+      created_(CreatedAt(create_time_)),
+      replaying_(options_.record.has_value()) {}
 
 void Session::Run() {
   std::unique_ptr<core::Mesher> mesher;
@@ -72,45 +80,101 @@ void Session::Run() {
 
 void Session::RunRounds(core::Mesher* mesher) {
   Log(LogLevel::kInfo, log_context(),
-      core::Message("meshing ", options_.label, options_.label.empty() ? "k = " : ": k = ",
-                    options_.spec.dimension, ", d = ", options_.spec.ambient_dimension,
+      core::Message(replaying_ ? "replaying " : "meshing ", options_.label,
+                    options_.label.empty() ? "k = " : ": k = ", options_.spec.dimension,
+                    ", d = ", options_.spec.ambient_dimension,
                     ", epsilon = ", options_.spec.epsilon));
+  if (options_.journal != nullptr && !options_.record) {
+    if (auto failure = options_.journal->WriteStart(options_, create_time_)) {
+      FailBlameless(mesher, std::move(*failure));
+    }
+  }
   while (true) {
     if (cancelled_) mesher->Cancel();
     const core::QueryBatch* const batch = mesher->NextBatch();
     Publish(mesher->progress());
     if (batch == nullptr) return;
+    if (replaying_ && ReplayRound(mesher, *batch)) continue;
     RunRound(mesher, *batch);
   }
+}
+
+// False when there is nothing to replay any more and the mesh goes on.
+bool Session::ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch) {
+  SessionJournal::Replay replay = options_.journal->ReadRound(batch);
+  if (replay.failure) {
+    FailBlameless(mesher, std::move(*replay.failure));
+  } else if (replay.answers) {
+    Absorb(mesher, *replay.answers);
+  } else {
+    replaying_ = false;
+    if (options_.record->end) {
+      RepeatEnd(mesher);
+    } else {
+      Log(LogLevel::kInfo, {options_.name, batch.round}, "replayed; going on with new answers");
+      return false;
+    }
+  }
+  return true;
+}
+
+// The recorded answers are used up, and the mesh ended here.
+void Session::RepeatEnd(core::Mesher* mesher) {
+  const SessionEnd& end = *options_.record->end;
+  if (end.state == SessionState::kFailed) return FailBlameless(mesher, end.failure);
+  if (end.state == SessionState::kCancelled) {
+    cancelled_ = true;
+    return mesher->Cancel();
+  }
+  FailBlameless(mesher, {"REPLAY_MISMATCH",
+                         "the recorded answers made a whole mesh once, and now do not: this "
+                         "server meshes differently from the one that recorded them; mesh anew"});
 }
 
 void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
   OraclePool::Outcome outcome = pool_.Ask(batch);
   if (outcome.failure) {
     // The worker at fault has been told on its own stream; the others are blameless.
-    core::Status status{StatusCode::kOracleFailed, outcome.failure->message};
-    Fail(mesher, std::move(*outcome.failure), std::move(status));
-    blame_ = core::Status::Ok();
+    FailBlameless(mesher, std::move(*outcome.failure));
     return;
   }
   if (!outcome.round) return;  // interrupted: the caller cancels
-  const auto delta = mesher->Absorb(outcome.round->answers);
-  if (!delta) {
-    Fail(mesher, ToFailure(delta.error()), delta.error());
-    return;
+  const core::Answers& answers = outcome.round->answers;
+  if (options_.journal != nullptr) {
+    if (auto failure = options_.journal->WriteRound(batch, answers)) {
+      FailBlameless(mesher, std::move(*failure));
+      return;
+    }
   }
-  const core::Status logged = history_.Append(*delta);
-  if (!logged.ok()) {
-    Fail(mesher, {"INTERNAL", core::Message("a fault of the server: ", logged.message)}, logged);
-    blame_ = core::Status::Ok();
-    return;
-  }
+  if (!Absorb(mesher, answers)) return;
   if (options_.observer != nullptr) options_.observer->OnRound(batch.size());
   if (LogEnabled(LogLevel::kDebug)) {
     Log(LogLevel::kDebug, {options_.name, batch.round},
         core::Message(batch.size(), " queries answered, ", mesher->progress().vertices,
                       " vertices"));
   }
+}
+
+bool Session::Absorb(core::Mesher* mesher, const core::Answers& answers) {
+  const auto delta = mesher->Absorb(answers);
+  if (!delta) {
+    Fail(mesher, ToFailure(delta.error()), delta.error());
+    return false;
+  }
+  const core::Status logged = history_.Append(*delta);
+  if (!logged.ok()) {
+    FailBlameless(mesher,
+                  {"INTERNAL", core::Message("a fault of the server: ", logged.message)});
+    return false;
+  }
+  return true;
+}
+
+// The mesh fails, but not by an answer of the workers that serve it now.
+void Session::FailBlameless(core::Mesher* mesher, MeshFailure failure) {
+  core::Status status{StatusCode::kOracleFailed, failure.message};
+  Fail(mesher, std::move(failure), std::move(status));
+  blame_ = core::Status::Ok();
 }
 
 void Session::Fail(core::Mesher* mesher, MeshFailure failure, core::Status status) {
@@ -146,27 +210,46 @@ SessionState Session::FinalState(const core::Report* report) const {
 }
 
 void Session::Finish(const core::Report* report) {
-  std::string verdict;
-  SessionState state;
+  SessionEnd end;
+  bool suspended = false;
   {
     const std::lock_guard lock(mutex_);
     if (report != nullptr && report->termination == core::Termination::kOracleFailed &&
         failure_.reason.empty()) {
       failure_ = ToFailure(report->failure);
     }
-    state = FinalState(report);
-    final_state_ = state;
-    report_ = report != nullptr ? *report : core::Report{};
-    end_time_ = std::chrono::system_clock::now();
-    final_seconds_ = std::chrono::duration<double>(Clock::now() - created_).count();
-    verdict = state == SessionState::kFailed ? failure_.reason + ": " + failure_.message
-                                             : report_->certificate.verdict;
+    end = {FinalState(report), std::chrono::system_clock::now(),
+           std::chrono::duration<double>(Clock::now() - created_).count(), failure_};
+    suspended = suspended_ && end.state == SessionState::kCancelled;
+    ending_ = true;
   }
-  Log(state == SessionState::kFailed ? LogLevel::kWarning : LogLevel::kInfo, log_context(),
-      core::Message(SessionStateName(state), " after ", final_seconds_, " s, ", progress_.vertices,
-                    " vertices, ", progress_.simplices, " simplices; ", verdict));
-  if (options_.observer != nullptr) {
-    options_.observer->OnEnd(state, report != nullptr ? *report : core::Report{});
+  const bool ended_before = options_.record && options_.record->end.has_value();
+  if (ended_before && end.state == options_.record->end->state) end = *options_.record->end;
+  // Before anyone hears of it, so that nobody finds it running later.
+  if (options_.journal != nullptr && !suspended && !ended_before) {
+    if (const auto failure = options_.journal->WriteEnd(end)) {
+      Log(LogLevel::kWarning, log_context(),
+          core::Message("the end of the mesh is not recorded: ", failure->message));
+    }
+  }
+  std::string verdict;
+  {
+    const std::lock_guard lock(mutex_);
+    final_state_ = end.state;
+    report_ = report != nullptr ? *report : core::Report{};
+    end_time_ = end.time;
+    final_seconds_ = end.elapsed_seconds;
+    verdict = suspended ? "until the server is back"
+              : end.state == SessionState::kFailed
+                  ? end.failure.reason + ": " + end.failure.message
+                  : report_->certificate.verdict;
+  }
+  Log(end.state == SessionState::kFailed ? LogLevel::kWarning : LogLevel::kInfo, log_context(),
+      core::Message(suspended ? "SUSPENDED" : SessionStateName(end.state), " after ",
+                    end.elapsed_seconds, " s, ", progress_.vertices, " vertices, ",
+                    progress_.simplices, " simplices; ", verdict));
+  if (options_.observer != nullptr && !ended_before) {
+    options_.observer->OnEnd(end.state, report != nullptr ? *report : core::Report{});
   }
   pool_.Close({blame_});
   WakeWatchers();
@@ -176,10 +259,22 @@ void Session::Finish(const core::Report* report) {
 void Session::Cancel() {
   {
     const std::lock_guard lock(mutex_);
-    if (final_state_) return;
+    if (ending_) return;
     cancelled_ = true;
   }
   pool_.Interrupt();
+}
+
+void Session::Suspend() {
+  {
+    const std::lock_guard lock(mutex_);
+    suspended_ = options_.journal != nullptr && !cancelled_;
+  }
+  Cancel();
+}
+
+std::uint64_t Session::PublishedRevision() const {
+  return std::max(history_.revision(), options_.record ? options_.record->rounds : 0);
 }
 
 bool Session::AddWatcher(std::weak_ptr<SessionWatcher> watcher) {

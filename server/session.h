@@ -12,6 +12,7 @@
 #include "core/mesher.h"
 #include "server/log.h"
 #include "server/oracle_pool.h"
+#include "server/session_journal.h"
 #include "server/watch_log.h"
 
 namespace stellate::server {
@@ -36,6 +37,8 @@ struct SessionOptions {
   std::size_t max_workers = 64;
   std::size_t max_watchers = 64;
   std::shared_ptr<SessionObserver> observer;  // may be null
+  std::shared_ptr<SessionJournal> journal;    // may be null: the mesh lives in memory alone
+  std::optional<SessionRecord> record;        // set: the journal has it from an earlier server
 };
 
 // A session at one moment.
@@ -76,10 +79,17 @@ class Session {
   // Ends the mesh; any thread, at once where Run waits, else after the round being computed.
   void Cancel();
 
+  // Ends this run of the mesh as Cancel does, because the server stops: with a journal, the next
+  // server goes on.
+  void Suspend();
+
   // False when there are too many.
   bool AddWatcher(std::weak_ptr<SessionWatcher> watcher);
 
   SessionView View() const;
+  // The newest revision that anyone may have seen: while a recorded mesh is replayed, the one at
+  // which the replay will end.
+  std::uint64_t PublishedRevision() const;
   bool HasEnded() const;  // state, report and history are final
   LogContext log_context() const;
   const SessionOptions& options() const { return options_; }
@@ -88,7 +98,11 @@ class Session {
 
  private:
   void RunRounds(core::Mesher* mesher);
+  bool ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch);
+  void RepeatEnd(core::Mesher* mesher);
   void RunRound(core::Mesher* mesher, const core::QueryBatch& batch);
+  bool Absorb(core::Mesher* mesher, const core::Answers& answers);
+  void FailBlameless(core::Mesher* mesher, MeshFailure failure);
   void Fail(core::Mesher* mesher, MeshFailure failure, core::Status status);
   void Publish(const core::Progress& progress);
   void Finish(const core::Report* report);
@@ -103,9 +117,12 @@ class Session {
   const TimePoint created_;
   std::atomic<bool> cancelled_{false};
   std::atomic<bool> over_{false};
+  bool replaying_;      // Run's thread only: the journal may know the next answers
   core::Status blame_;  // Run's thread only: told to all workers at the end
 
   mutable std::mutex mutex_;
+  bool ending_ = false;     // the final state is chosen, and being recorded
+  bool suspended_ = false;  // the server stopped it, not its owner
   std::optional<SessionState> final_state_;
   std::optional<std::chrono::system_clock::time_point> end_time_;
   double final_seconds_ = 0;

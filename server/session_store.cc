@@ -65,9 +65,25 @@ core::Expected<std::shared_ptr<Session>> SessionStore::Create(SessionOptions opt
     return core::Refuse(core::StatusCode::kFailedPrecondition, "the server is stopping");
   }
   options.name = NewMeshName();
+  if (new_journal_) options.journal = new_journal_();
+  return StartLocked(std::move(options), TimePoint::max());
+}
+
+void SessionStore::Restore(SessionOptions options) {
+  TimePoint over_since = TimePoint::max();
+  if (options.record->end) {
+    const auto age = std::chrono::system_clock::now() - options.record->end->time;
+    if (age >= limits_.keep_for) return options.journal->Forget();
+    over_since = Clock::now() - std::chrono::duration_cast<Clock::duration>(age);
+  }
+  const std::lock_guard lock(mutex_);
+  StartLocked(std::move(options), over_since);
+}
+
+std::shared_ptr<Session> SessionStore::StartLocked(SessionOptions options, TimePoint over_since) {
   auto session = std::make_shared<Session>(std::move(options), factory_);
   const std::uint64_t number = next_number_++;
-  Entry entry{number, session, std::thread([session] { session->Run(); }), TimePoint::max()};
+  Entry entry{number, session, std::thread([session] { session->Run(); }), over_since};
   numbers_.emplace(session->options().name, number);
   entries_.emplace(number, std::move(entry));
   return session;
@@ -88,6 +104,7 @@ bool SessionStore::Delete(const std::string& name) {
     auto node = entries_.extract(it->second);
     numbers_.erase(it);
     session = node.mapped().session;
+    if (session->options().journal != nullptr) session->options().journal->Forget();
     dying_.push_back(std::move(node.mapped()));
   }
   session->Cancel();
@@ -152,7 +169,9 @@ void SessionStore::Sweep(TimePoint now) {
     const bool too_many = finished.size() - i > limits_.keep_finished;
     if (!too_many && now - entries_.at(finished[i]).over_since < limits_.keep_for) continue;
     auto node = entries_.extract(finished[i]);
-    numbers_.erase(node.mapped().session->options().name);
+    const SessionOptions& options = node.mapped().session->options();
+    if (options.journal != nullptr) options.journal->Forget();
+    numbers_.erase(options.name);
     dying_.push_back(std::move(node.mapped()));
   }
   dead = TakeDeadLocked();
@@ -169,7 +188,7 @@ bool SessionStore::Stop(TimePoint deadline) {
     numbers_.clear();
     dying_.clear();
   }
-  for (Entry& entry : all) entry.session->Cancel();
+  for (Entry& entry : all) entry.session->Suspend();
   bool clean = true;
   for (Entry& entry : all) {
     while (!entry.session->Over() && Clock::now() < deadline) {

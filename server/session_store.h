@@ -29,11 +29,19 @@ struct StoreLimits {
 // Owns the meshes and their threads. No call but Stop waits for a mesh.
 class SessionStore {
  public:
+  // Where a new mesh is recorded.
+  using JournalFactory = std::function<std::shared_ptr<SessionJournal>()>;
+
   explicit SessionStore(StoreLimits limits, Session::MesherFactory factory = core::Mesher::Create);
   ~SessionStore();
 
   // Names the mesh and sets it going. kLimitExceeded: too many are running.
   core::Expected<std::shared_ptr<Session>> Create(SessionOptions options);
+  // Before the first Create.
+  void RecordIn(JournalFactory new_journal) { new_journal_ = std::move(new_journal); }
+  // Takes up a mesh that an earlier server recorded: options.journal and options.record are set.
+  // One that ended too long ago is forgotten instead.
+  void Restore(SessionOptions options);
   std::shared_ptr<Session> Find(const std::string& name) const;  // null: none
   // Cancels and forgets; false if there is none.
   bool Delete(const std::string& name);
@@ -50,7 +58,7 @@ class SessionStore {
   std::size_t Running() const;
   // Forgets finished meshes that were kept long enough. To be called now and then.
   void Sweep(TimePoint now);
-  // Cancels all and waits for their threads until `deadline`. False: some are still computing;
+  // Suspends all and waits for their threads until `deadline`. False: some are still computing;
   // they are left to themselves and the process must end.
   bool Stop(TimePoint deadline);
 
@@ -62,11 +70,14 @@ class SessionStore {
     TimePoint over_since = TimePoint::max();
   };
 
+  std::shared_ptr<Session> StartLocked(SessionOptions options, TimePoint over_since);
+
   // Deleted entries whose thread is done and which nobody else holds; to be destroyed unlocked.
   std::vector<Entry> TakeDeadLocked();
 
   const StoreLimits limits_;
   const Session::MesherFactory factory_;
+  JournalFactory new_journal_;
   mutable std::mutex mutex_;
   std::map<std::uint64_t, Entry> entries_;
   std::unordered_map<std::string, std::uint64_t> numbers_;

@@ -9,6 +9,7 @@
 
 #include "server/auth.h"
 #include "server/config.h"
+#include "server/journal.h"
 #include "server/metrics.h"
 #include "server/session_store.h"
 #include "server/streams.h"
@@ -23,6 +24,7 @@ struct ServerState {
 
   const Config config;
   StreamRegistry streams;
+  std::unique_ptr<Journal> journal;  // null: meshes live in memory alone
   SessionStore store;
   std::unique_ptr<Authenticator> authenticator;  // set before the first call
   Metrics metrics;

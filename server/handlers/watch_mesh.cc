@@ -80,7 +80,7 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
     if (!caller_) return caller_.error();
     auto session = FindMesh(service_, *caller_, request.name());
     if (!session) return session.error();
-    const std::uint64_t newest = (*session)->history().revision();
+    const std::uint64_t newest = (*session)->PublishedRevision();
     if (request.from_revision() > newest) {
       return Refusal(v1::ERROR_REASON_REVISION_TOO_NEW,
                      core::Message("from_revision is ", request.from_revision(),

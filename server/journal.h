@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/status.h"
+#include "server/session.h"
+#include "server/session_journal.h"
+
+namespace stellate::server {
+
+struct JournalOptions {
+  std::string directory;        // made if it is not there
+  std::uint64_t max_bytes = 0;  // of the journal's file; 0: what the disk holds
+};
+
+// The record of all meshes of a server, in one SQLite file of its data directory: for each its
+// specification, the answers of each round, and its end. Meshes write from their own threads, one
+// transaction a round, synced to the disk before the call returns.
+class Journal {
+ public:
+  // Opens the record of an earlier server, or begins one. Refuses, with kFailedPrecondition, words
+  // for people, and without changing a byte: a file that is no journal, one of another version,
+  // one that is damaged anywhere (every record is read), and one that another server has open.
+  static core::Expected<std::unique_ptr<Journal>> Open(const JournalOptions& options);
+  // Meshes still running keep their part of it open.
+  ~Journal();
+
+  // The meshes that were there when it was opened, oldest first: all of SessionOptions that is
+  // recorded, journal and record included.
+  std::vector<SessionOptions> TakeMeshes() { return std::move(meshes_); }
+
+  // For a new mesh.
+  std::shared_ptr<SessionJournal> NewMesh();
+
+ private:
+  class File;
+  class Mesh;
+
+  explicit Journal(std::shared_ptr<File> file) : file_(std::move(file)) {}
+
+  const std::shared_ptr<File> file_;
+  std::vector<SessionOptions> meshes_;
+};
+
+}  // namespace stellate::server
