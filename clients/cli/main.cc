@@ -68,8 +68,11 @@ int List() {
   return stellate::cli::kExitCertified;
 }
 
-int Health(const std::string& server) {
-  const auto health = stellate::CheckHealth(server);
+int Health(const std::string& server, const std::string& token_file,
+           stellate::Credentials credentials) {
+  const auto authorized = stellate::cli::Authorize(token_file, &credentials);
+  if (!authorized) return Complain(authorized.error());
+  const auto health = stellate::CheckHealth(server, 5, credentials);
   if (!health) return Complain(health.error());
   std::cout << server << ": " << (health->serving ? "serving" : "not serving") << ", stellated "
             << health->version << "\n"
@@ -88,6 +91,9 @@ int Main(int argc, char** argv) {
   CLI::App* health = app.add_subcommand("health", "Ask a server how it is");
   std::string server = "127.0.0.1:7717";
   health->add_option("--server", server, "host:port or unix:/path")->capture_default_str();
+  stellate::Credentials credentials;
+  std::string token_file;
+  stellate::cli::AddCredentials(health, &credentials, &token_file);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -95,7 +101,7 @@ int Main(int argc, char** argv) {
     return app.exit(error) == 0 ? stellate::cli::kExitCertified : stellate::cli::kExitRefused;
   }
   if (list->parsed()) return List();
-  if (health->parsed()) return Health(server);
+  if (health->parsed()) return Health(server, token_file, credentials);
   const StopOnSignal signals;
   return mesh.Run(signals.token());
 }

@@ -2,6 +2,8 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <cstdlib>
+#include <fstream>
 #include <iostream>
 #include <utility>
 
@@ -26,6 +28,37 @@ class ClosestPointOnly final : public Oracle {
 
 }  // namespace
 
+void AddCredentials(CLI::App* command, Credentials* credentials, std::string* token_file) {
+  const std::string group = "Safety";
+  command->add_flag("--tls", credentials->tls, "TLS, trusting the system's authorities")
+      ->group(group);
+  command->add_option("--tls-ca", credentials->tls_ca, "PEM file: TLS, trusting these instead")
+      ->group(group);
+  command
+      ->add_option("--tls-cert", credentials->tls_certificate,
+                   "PEM file with a client certificate, where the server asks for one")
+      ->group(group);
+  command->add_option("--tls-key", credentials->tls_key, "PEM file with its key")->group(group);
+  command
+      ->add_option("--token-file", *token_file,
+                   "file that holds the token alone; default: $STELLATE_TOKEN, if set")
+      ->group(group);
+}
+
+Expected<void> Authorize(const std::string& token_file, Credentials* credentials) {
+  if (token_file.empty()) {
+    const char* const token = std::getenv("STELLATE_TOKEN");
+    if (token != nullptr) credentials->token = token;
+    return {};
+  }
+  std::ifstream file(token_file);
+  std::string rest;
+  if (!(file >> credentials->token) || file >> rest) {
+    return Fail(ErrorCode::kRefused, token_file + " must hold one token and nothing else");
+  }
+  return {};
+}
+
 int Complain(const Error& error) {
   std::cerr << "stellate: " << (error.reason.empty() ? "" : error.reason + ": ") << error.message
             << "\n";
@@ -41,6 +74,7 @@ MeshCommand::MeshCommand(CLI::App& parent)
       ->required();
   command_->add_option("--server", options_.server,
                        "host:port or unix:/path; default: a private one is started");
+  AddCredentials(command_, &options_.credentials, &token_file_);
   command_->add_option("-o,--output", outputs_,
                        "file to write, .txt .off .obj .ply .vtu; may be given again");
   command_->add_option("--seed", options_.random_seed, "seed of everything random")
@@ -86,6 +120,10 @@ int MeshCommand::Run(std::stop_token stop) {
   const std::unique_ptr<Manifold> manifold = MakeManifold(manifold_, &why);
   if (manifold == nullptr) {
     return Complain({ErrorCode::kRefused, "", why + "; 'stellate list' shows what there is"});
+  }
+  if (!options_.server.empty()) {
+    const Expected<void> authorized = Authorize(token_file_, &options_.credentials);
+    if (!authorized) return Complain(authorized.error());
   }
   ClosestPointOnly poor(*manifold);
   Oracle& oracle = closest_point_only_ ? static_cast<Oracle&>(poor) : *manifold;

@@ -28,10 +28,15 @@ class MeshCommand {
 
   CLI::App* command_;
   MeshOptions options_;
-  std::string manifold_;
+  std::string manifold_, token_file_;
   std::vector<std::string> outputs_;
   bool json_ = false, quiet_ = false, closest_point_only_ = false;
 };
+
+// The options that say how to reach a server; --token-file is read by Authorize.
+void AddCredentials(CLI::App* command, Credentials* credentials, std::string* token_file);
+// Reads the token from the file or from $STELLATE_TOKEN, neither of which `ps` shows.
+Expected<void> Authorize(const std::string& token_file, Credentials* credentials);
 
 // Prints the error on standard error and gives the exit status that stands for it.
 int Complain(const Error& error);

@@ -1,9 +1,7 @@
 #include "stellate/client.h"
 
 #include <google/protobuf/wrappers.pb.h>
-#include <grpcpp/create_channel.h>
 #include <grpcpp/generic/generic_stub.h>
-#include <grpcpp/security/credentials.h>
 
 #include <chrono>
 #include <condition_variable>
@@ -12,6 +10,7 @@
 #include <thread>
 #include <utility>
 
+#include "channel.h"
 #include "convert.h"
 #include "embedded_server.h"
 #include "mesh_builder.h"
@@ -25,14 +24,6 @@ using client::FromStatus;
 
 constexpr auto kCallTime = std::chrono::seconds(30);     // for a unary call, connecting included
 constexpr auto kHousekeeping = std::chrono::seconds(5);  // for calls that clean up
-
-std::shared_ptr<grpc::Channel> Connect(const std::string& server) {
-  grpc::ChannelArguments arguments;
-  // Streams are quiet while the other side computes: pings find a peer that froze or vanished.
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 10'000);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10'000);
-  return grpc::CreateCustomChannel(server, grpc::InsecureChannelCredentials(), arguments);
-}
 
 void SetDeadline(grpc::ClientContext& context, std::chrono::seconds time) {
   context.set_deadline(std::chrono::system_clock::now() + time);
@@ -224,12 +215,18 @@ Expected<Mesh> MeshManifold(Oracle& oracle, const MeshOptions& options) {
     embedded = std::move(*started);
     server = embedded->address();
   }
-  Run run(Connect(server), oracle, options);
+  const auto channel =
+      client::Connect(server, options.server.empty() ? Credentials() : options.credentials);
+  if (!channel) return tl::unexpected(channel.error());
+  Run run(*channel, oracle, options);
   return run.Go();
 }
 
-Expected<ServerHealth> CheckHealth(const std::string& server, double timeout_seconds) {
-  const std::shared_ptr<grpc::Channel> channel = Connect(server);
+Expected<ServerHealth> CheckHealth(const std::string& server, double timeout_seconds,
+                                   const Credentials& credentials) {
+  const auto connected = client::Connect(server, credentials);
+  if (!connected) return tl::unexpected(connected.error());
+  const std::shared_ptr<grpc::Channel>& channel = *connected;
   const auto deadline = std::chrono::system_clock::now() +
                         std::chrono::duration_cast<std::chrono::system_clock::duration>(
                             std::chrono::duration<double>(timeout_seconds));

@@ -13,6 +13,7 @@ from . import _stubs
 _stubs.ensure()  # before anything imports them
 
 from . import manifolds  # noqa: E402
+from ._credentials import Credentials  # noqa: E402
 from ._face import mesh, serve, watch  # noqa: E402
 from ._mesh import Mesh, load_txt  # noqa: E402
 from ._server import Server, find_stellated  # noqa: E402
@@ -28,6 +29,7 @@ from .errors import (  # noqa: E402
     SaveError,
     ServerNotFound,
     StellateError,
+    Unauthenticated,
     Unavailable,
 )
 from .implicit import ImplicitManifold  # noqa: E402
@@ -42,6 +44,7 @@ __all__ = [
     "Certificate",
     "Client",
     "Counts",
+    "Credentials",
     "FailedPrecondition",
     "Failure",
     "ImplicitManifold",
@@ -61,6 +64,7 @@ __all__ = [
     "ServerInfo",
     "ServerNotFound",
     "StellateError",
+    "Unauthenticated",
     "Unavailable",
     "find_stellated",
     "load_txt",

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Any, Iterator
 
+from ._credentials import Credentials
 from ._mesh import Mesh
 from ._server import Server
 from ._session import OnProgress, Session, follow
 from .client import Client
+from .errors import InvalidArgument
 
 
 def mesh(
@@ -15,6 +17,7 @@ def mesh(
     epsilon: float = 0.1,
     server: str | Server | Client | None = None,
     on_progress: OnProgress | None = None,
+    credentials: Credentials | None = None,
     **criteria: Any,
 ) -> Mesh:
     """Meshes the manifold that an oracle knows.
@@ -27,6 +30,7 @@ def mesh(
         private unix socket and stops it afterwards.
       on_progress: called in this thread with a stellate.Progress now and then. If it raises, the
         mesh is cancelled.
+      credentials: a stellate.Credentials for `server`, where it wants TLS or a token.
       **criteria: radius_edge_bound, sliver_bound, picking_radius, small_sliver_radius, candidates,
         advance_step, flat_alternations; max_vertices, max_rounds, worker_wait_seconds,
         answer_seconds; random_seed, box_seeds, seeds, label: the protocol's MeshSpec says what each
@@ -42,7 +46,7 @@ def mesh(
       LimitExceeded, Unavailable, Cancelled, ServerNotFound. KeyboardInterrupt cancels the mesh.
     """
     last = None
-    for last in watch(oracle, epsilon, server, on_progress, **criteria):
+    for last in watch(oracle, epsilon, server, on_progress, credentials, **criteria):
         pass
     assert last is not None  # a watch ends with a finished mesh or an exception
     return last
@@ -53,6 +57,7 @@ def watch(
     epsilon: float = 0.1,
     server: str | Server | Client | None = None,
     on_progress: OnProgress | None = None,
+    credentials: Credentials | None = None,
     **criteria: Any,
 ) -> Iterator[Mesh]:
     """The mesh as it grows: an iterator over Mesh, the last of which has its report.
@@ -61,6 +66,10 @@ def watch(
     the name of a mesh in place of the oracle, a mesh that others made and serve is watched, from
     its beginning, and closing the iterator leaves it alone.
     """
+    if credentials is not None:
+        with _connect(server, credentials) as client:
+            yield from watch(oracle, epsilon, client, on_progress, **criteria)
+        return
     if isinstance(oracle, str):
         if criteria:
             raise TypeError(f"a mesh that exists already takes no {', '.join(criteria)}")
@@ -83,7 +92,20 @@ def _watch_by_name(
         yield from follow(client, client.get(name), on_progress)
 
 
-def serve(oracle: Any, mesh_name: str, *, server: str | Server | Client, worker: str = "") -> str:
+def _connect(server: str | Server | Client | None, credentials: Credentials | None) -> Client:
+    if isinstance(server, Client):
+        raise InvalidArgument("a Client has its credentials already: give it them")
+    return Client(server, credentials)
+
+
+def serve(
+    oracle: Any,
+    mesh_name: str,
+    *,
+    server: str | Server | Client,
+    worker: str = "",
+    credentials: Credentials | None = None,
+) -> str:
     """One more worker for a mesh: answers the server's questions until the mesh is over.
 
     All workers of a mesh have to answer for the same manifold. Ctrl-C takes this worker away; its
@@ -92,7 +114,7 @@ def serve(oracle: Any, mesh_name: str, *, server: str | Server | Client, worker:
     Returns: the state that the mesh ended in, e.g. "SUCCEEDED".
     Raises: what the oracle raises, after the server was told, or a StellateError.
     """
-    if isinstance(server, Client):
+    if isinstance(server, Client) and credentials is None:
         return server.serve(oracle, mesh_name, worker=worker)
-    with Client(server) as client:
+    with _connect(server, credentials) as client:
         return client.serve(oracle, mesh_name, worker=worker)

@@ -10,6 +10,7 @@ from typing import Any, Callable, Iterator, TypeVar
 
 import grpc
 
+from ._credentials import Credentials
 from ._generated import mesh_pb2
 from ._generated import stellate_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
@@ -93,9 +94,14 @@ class Client:
 
     Args:
       server: "host:port", "unix:/path", a stellate.Server, or None for a Server of its own.
+      credentials: TLS and a token, for a server that wants them.
     """
 
-    def __init__(self, server: str | Server | None = None) -> None:
+    def __init__(
+        self, server: str | Server | None = None, credentials: Credentials | None = None
+    ) -> None:
+        if server is None and credentials is not None:
+            raise InvalidArgument("credentials are for a server: say which")
         self._own_server = Server() if server is None else None
         self._server = self._own_server if server is None else server
         if not isinstance(self._server, (str, Server)) or self._server == "":
@@ -112,7 +118,7 @@ class Client:
         ]
         if address.startswith(("unix:", "localhost:", "127.", "[::1]:")):
             options.append(("grpc.enable_http_proxy", 0))  # proxies are for the outside
-        self._channel = grpc.insecure_channel(address, options)
+        self._channel = (credentials or Credentials()).channel(address, options)
         self._stub = rpc.StellateStub(self._channel)
 
     def create(self, oracle: Any, epsilon: float = 0.1, **criteria: Any) -> MeshInfo:

@@ -66,6 +66,12 @@ class FailedPrecondition(StellateError):
     default_reason = "FAILED_PRECONDITION"
 
 
+class Unauthenticated(StellateError, PermissionError):
+    """The server wants a token, and got none that it knows. See stellate.Credentials."""
+
+    default_reason = "UNAUTHENTICATED"
+
+
 class OracleError(StellateError):
     """The oracle's answers break a rule, or the mesh got none. Mend the oracle."""
 
@@ -126,6 +132,7 @@ _BY_REASON: dict[str, type[StellateError]] = {
     "MESH_NOT_FOUND": MeshNotFound,
     "FAILED_PRECONDITION": FailedPrecondition,
     "SHUTTING_DOWN": Unavailable,
+    "UNAUTHENTICATED": Unauthenticated,
     "REVISION_TOO_NEW": InvalidArgument,
     "NO_SEEDS": OracleError,
     "NO_WORKER": OracleError,
@@ -138,6 +145,7 @@ _BY_CODE: dict[grpc.StatusCode, type[StellateError]] = {
     grpc.StatusCode.RESOURCE_EXHAUSTED: LimitExceeded,
     grpc.StatusCode.NOT_FOUND: MeshNotFound,
     grpc.StatusCode.FAILED_PRECONDITION: FailedPrecondition,
+    grpc.StatusCode.UNAUTHENTICATED: Unauthenticated,
     grpc.StatusCode.ABORTED: OracleError,
     grpc.StatusCode.CANCELLED: Cancelled,
     grpc.StatusCode.UNAVAILABLE: Unavailable,

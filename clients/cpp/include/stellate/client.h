@@ -13,6 +13,14 @@
 
 namespace stellate {
 
+// For a server that wants TLS or a token. None of it: plain text. With any tls_ file, TLS.
+struct Credentials {
+  bool tls = false;                      // TLS, trusting the system's authorities
+  std::string tls_ca;                    // PEM file: trust these instead
+  std::string tls_certificate, tls_key;  // PEM files, for a server that asks for a certificate
+  std::string token;                     // over plain text only within this machine
+};
+
 // What to mesh and how. Absent values take the server's defaults; see mesh.proto for each.
 struct MeshOptions {
   double epsilon = 0;  // largest circumradius of a simplex, a length; must be given
@@ -20,6 +28,7 @@ struct MeshOptions {
   // "host:port" or "unix:/path". Empty: a private stellated is started for this mesh and stopped
   // after it; found by $STELLATED, next to the running program, or on PATH.
   std::string server;
+  Credentials credentials;  // for `server`
   // How many threads answer, each with a stream of its own. The oracle is called from all at once.
   int workers = 1;
   // Called on the calling thread. What it throws cancels the mesh and reaches the caller.
@@ -59,6 +68,7 @@ struct ServerHealth {
 };
 
 // Asks a server how it is. kServerFailed when none answers within `timeout_seconds`.
-Expected<ServerHealth> CheckHealth(const std::string& server, double timeout_seconds = 5);
+Expected<ServerHealth> CheckHealth(const std::string& server, double timeout_seconds = 5,
+                                   const Credentials& credentials = {});
 
 }  // namespace stellate

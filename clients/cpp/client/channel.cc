@@ -1,0 +1,103 @@
+#include "channel.h"
+
+#include <grpcpp/create_channel.h>
+#include <grpcpp/security/credentials.h>
+#include <grpcpp/support/client_interceptor.h>
+
+#include <fstream>
+#include <iterator>
+#include <utility>
+#include <vector>
+
+namespace stellate::client {
+namespace {
+
+// gRPC's own call credentials are refused on plain text even within one machine.
+class SendToken final : public grpc::experimental::Interceptor {
+ public:
+  explicit SendToken(const std::string& header) : header_(header) {}
+  void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
+    if (methods->QueryInterceptionHookPoint(
+            grpc::experimental::InterceptionHookPoints::PRE_SEND_INITIAL_METADATA)) {
+      methods->GetSendInitialMetadata()->emplace("authorization", header_);
+    }
+    methods->Proceed();
+  }
+
+ private:
+  const std::string& header_;
+};
+
+class SendTokenFactory final : public grpc::experimental::ClientInterceptorFactoryInterface {
+ public:
+  explicit SendTokenFactory(const std::string& token) : header_("Bearer " + token) {}
+  grpc::experimental::Interceptor* CreateClientInterceptor(
+      grpc::experimental::ClientRpcInfo*) override {
+    return new SendToken(header_);
+  }
+
+ private:
+  const std::string header_;
+};
+
+bool StaysOnThisMachine(const std::string& server) {
+  if (server.rfind("unix:", 0) == 0) return true;
+  const std::string host = server.substr(0, server.rfind(':'));
+  const bool number = host.find_first_not_of("0123456789.") == std::string::npos;
+  return host == "localhost" || host == "[::1]" || (number && host.rfind("127.", 0) == 0);
+}
+
+Expected<std::string> Read(const std::string& path) {
+  if (path.empty()) return std::string();
+  std::ifstream file(path, std::ios::binary);
+  std::string text(std::istreambuf_iterator<char>(file), {});
+  if (text.empty()) return Fail(ErrorCode::kRefused, path + " cannot be read, or is empty");
+  return text;
+}
+
+Expected<std::shared_ptr<grpc::ChannelCredentials>> Security(const Credentials& credentials) {
+  const bool tls = credentials.tls || !credentials.tls_ca.empty() ||
+                   !credentials.tls_certificate.empty() || !credentials.tls_key.empty();
+  if (!tls) return grpc::InsecureChannelCredentials();
+  if (credentials.tls_certificate.empty() != credentials.tls_key.empty()) {
+    return Fail(ErrorCode::kRefused, "a client certificate and its key go together: give both");
+  }
+  grpc::SslCredentialsOptions options;
+  const std::pair<const std::string&, std::string&> files[] = {
+      {credentials.tls_ca, options.pem_root_certs},
+      {credentials.tls_certificate, options.pem_cert_chain},
+      {credentials.tls_key, options.pem_private_key}};
+  for (const auto& [path, text] : files) {
+    Expected<std::string> read = Read(path);
+    if (!read) return tl::unexpected(read.error());
+    text = std::move(*read);
+  }
+  return grpc::SslCredentials(options);
+}
+
+}  // namespace
+
+Expected<std::shared_ptr<grpc::Channel>> Connect(const std::string& server,
+                                                 const Credentials& credentials) {
+  const auto security = Security(credentials);
+  if (!security) return tl::unexpected(security.error());
+  std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
+  if (!credentials.token.empty()) {
+    const bool plain = !credentials.tls && credentials.tls_ca.empty() &&
+                       credentials.tls_certificate.empty();
+    if (plain && !StaysOnThisMachine(server)) {
+      return Fail(ErrorCode::kRefused,
+                  "the token would go to " + server +
+                      " in plain text, for others to read and use: turn TLS on");
+    }
+    interceptors.push_back(std::make_unique<SendTokenFactory>(credentials.token));
+  }
+  grpc::ChannelArguments arguments;
+  // Streams are quiet while the other side computes: pings find a peer that froze or vanished.
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 10'000);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10'000);
+  return grpc::experimental::CreateCustomChannelWithInterceptors(server, *security, arguments,
+                                                                 std::move(interceptors));
+}
+
+}  // namespace stellate::client

@@ -1,0 +1,119 @@
+"""TLS, client certificates and tokens, from Python and from the command line."""
+
+import pathlib
+import subprocess
+
+import pytest
+
+import stellate
+from stellate import manifolds
+
+ALICE, BOB = "alice-0123456789abcdef", "bob-0123456789abcdef"
+
+
+def openssl(directory, *arguments):
+    subprocess.run(["openssl", *arguments], cwd=directory, check=True, capture_output=True)
+
+
+def new_key(name):
+    curve = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes")
+    return (*curve, "-subj", f"/CN={name}", "-keyout", f"{name}.key")
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """An authority, certificates of it for a server and a client, another authority, tokens."""
+    directory = tmp_path_factory.mktemp("certificates")
+    for authority in ("ca", "other"):
+        openssl(directory, "req", "-x509", *new_key(authority), "-out", f"{authority}.pem")
+    (directory / "names").write_text("subjectAltName=DNS:localhost,IP:127.0.0.1\n")
+    for name in ("server", "client"):
+        openssl(directory, "req", "-new", *new_key(name), "-out", f"{name}.csr")
+        sign = ("-CA", "ca.pem", "-CAkey", "ca.key", "-set_serial", "1", "-extfile", "names")
+        openssl(
+            directory, "x509", "-req", "-in", f"{name}.csr", *sign, "-out", f"{name}.pem"
+        )
+    (directory / "tokens").write_text(f"alice {ALICE}\nbob {BOB}\n")
+    (directory / "alice").write_text(ALICE + "\n")
+    return directory
+
+
+@pytest.fixture(scope="module")
+def address(files):
+    """A server that wants a client certificate and a token, on a port of the loopback."""
+    command = [stellate.find_stellated(), "--listen", "127.0.0.1:0", "--log-level", "off"]
+    command += ["--tls-cert", "server.pem", "--tls-key", "server.key", "--tls-client-ca", "ca.pem"]
+    command += ["--token-file", "tokens", "--drain-seconds", "0"]
+    with subprocess.Popen(command, cwd=files, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            yield process.stdout.readline().split()[-1]
+        finally:
+            process.terminate()
+
+
+@pytest.fixture
+def full(files):
+    return {"ca": files / "ca.pem", "certificate": files / "client.pem", "key": files / "client.key"}
+
+
+def test_a_mesh_over_mutual_tls_with_a_token(address, full):
+    credentials = stellate.Credentials(token=ALICE, **full)
+    mesh = stellate.mesh(manifolds.Torus(), 0.2, server=address, credentials=credentials)
+    assert mesh.certified
+
+
+def test_owners_do_not_see_each_other(address, full):
+    with (
+        stellate.Client(address, stellate.Credentials(token=ALICE, **full)) as alice,
+        stellate.Client(address, stellate.Credentials(token=BOB, **full)) as bob,
+    ):
+        name = alice.create(manifolds.Torus(), 0.2).name
+        assert [info.name for info in alice.list()] == [name]
+        assert list(bob.list()) == []
+        with pytest.raises(stellate.MeshNotFound):
+            bob.get(name)
+        with pytest.raises(stellate.MeshNotFound):
+            bob.serve(manifolds.Torus(), name)
+        with pytest.raises(stellate.MeshNotFound):
+            next(bob.watch(name))
+        alice.delete(name)
+
+
+def test_wrong_tokens_and_certificates_are_refused(address, files, full):
+    for token in (None, "wrong-0123456789abcdef"):
+        with stellate.Client(address, stellate.Credentials(token=token, **full)) as client:
+            with pytest.raises(stellate.Unauthenticated):
+                client.info()
+    for wrong in (
+        {"ca": files / "ca.pem"},  # no certificate
+        {**full, "ca": files / "other.pem"},
+        {**full, "certificate": files / "other.pem", "key": files / "other.key"},
+    ):
+        with stellate.Client(address, stellate.Credentials(token=ALICE, **wrong)) as client:
+            with pytest.raises(stellate.Unavailable):
+                client.info()
+
+
+def test_tokens_are_kept_secret():
+    assert ALICE not in repr(stellate.Credentials(token=ALICE))
+    for server in ("example.org:7717", "127.evil.example:7717"):
+        with pytest.raises(stellate.InvalidArgument, match="plain text"):
+            stellate.Client(server, stellate.Credentials(token=ALICE))
+    with pytest.raises(stellate.InvalidArgument):
+        stellate.Client(None, stellate.Credentials(token=ALICE))
+
+
+def test_the_command_line(address, files):
+    program = pathlib.Path(stellate.find_stellated()).with_name("stellate")
+
+    def run(*arguments):
+        command = [program, *arguments, "--server", address]
+        return subprocess.run(command, cwd=files, capture_output=True, text=True)
+
+    tls = ("--tls-ca", "ca.pem", "--tls-cert", "client.pem", "--tls-key", "client.key")
+    done = run("mesh", "torus", "-e", "0.2", *tls, "--token-file", "alice")
+    assert done.returncode == 0, done.stderr
+    assert run("health", *tls, "--token-file", "alice").returncode == 0
+    refused = run("mesh", "torus", "-e", "0.2", *tls)
+    assert refused.returncode == 2 and "UNAUTHENTICATED" in refused.stderr
+    assert run("health", "--tls-ca", "ca.pem", "--token-file", "alice").returncode == 3
