@@ -31,6 +31,8 @@ constexpr std::size_t kVersionAt = 60, kApplicationAt = 68;  // in the header, h
 constexpr std::uint32_t kApplication = 0x53744c74;
 constexpr std::size_t kPartBytes = std::size_t{1} << 24;  // SQLite takes less than 1 GB at once
 
+constexpr off_t kReserveBytes = off_t{16} << 20;
+
 constexpr char kMeshes[] = "CREATE TABLE meshes (id INTEGER PRIMARY KEY, start BLOB NOT NULL, "
                            "finish BLOB)";
 constexpr char kRounds[] = "CREATE TABLE rounds (mesh INTEGER NOT NULL REFERENCES meshes "
@@ -147,6 +149,8 @@ core::Expected<std::unique_ptr<JournalFile>> JournalFile::Open(const std::string
   status = file->Verify(path);
   if (!status.ok()) return tl::unexpected(std::move(status));
   sqlite.CheckpointOnClose(true);
+  file->reserve_ = directory + "/reserve";
+  file->Reserve();
   if (max_bytes > 0) {
     Statement size(sqlite, "PRAGMA page_size");
     const std::uint64_t page = size.Next() ? static_cast<std::uint64_t>(size.Number(0)) : 4096;
@@ -280,7 +284,26 @@ bool JournalFile::SetEnd(std::int64_t mesh, std::string end) {
       .Run();
 }
 
+// As much as the disk gives.
+void JournalFile::Reserve() {
+  const int reserve = open(reserve_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+  if (reserve < 0) return;
+  if (posix_fallocate(reserve, 0, kReserveBytes) != 0) unlink(reserve_.c_str());
+  close(reserve);
+}
+
+// To remove is to write first: on a full disk the log has no room for it but what was reserved.
 bool JournalFile::Remove(std::int64_t mesh) {
+  if (RemoveNow(mesh)) return true;
+  if (!database_->IsFull()) return false;
+  database_->Abandon();
+  unlink(reserve_.c_str());
+  const bool removed = RemoveNow(mesh);
+  if (removed) Reserve();
+  return removed;
+}
+
+bool JournalFile::RemoveNow(std::int64_t mesh) {
   const bool removed =
       Statement(*database_, "DELETE FROM meshes WHERE id = ?").Bind(0, mesh).Run();
   return removed && database_->Execute("PRAGMA incremental_vacuum") &&

@@ -50,11 +50,14 @@ class JournalFile {
  private:
   JournalFile() = default;
   core::Status Lock(const std::string& directory);
+  void Reserve();
+  bool RemoveNow(std::int64_t mesh);
   core::Status Verify(const std::string& path);
   core::Status VerifyRounds(const std::string& path);
   bool InsertRound(std::int64_t mesh, std::uint64_t round, std::uint64_t questions,
                    std::string_view answers);
 
+  std::string reserve_;  // path of a file whose space removals may use on a full disk
   int lock_ = -1;
   std::unique_ptr<Sqlite> database_;
   std::vector<StoredMesh> meshes_;

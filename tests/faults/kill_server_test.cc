@@ -76,31 +76,35 @@ struct Bytes {
   std::uint64_t revision = 0;
 };
 
-// Nothing if the server is gone before the end.
-std::optional<Bytes> Watch(v1::Stellate::Stub* stub, const std::string& name) {
-  // Waiting for the end first makes the geometry one change, without removals.
-  for (const bool progress_only : {true, false}) {
-    grpc::ClientContext context;
-    v1::WatchMeshRequest request;
-    request.set_name(name);
-    request.set_progress_only(progress_only);
-    const auto reader = stub->WatchMesh(&context, request);
-    Bytes bytes;
-    v1::WatchMeshResponse event;
-    while (reader->Read(&event)) {
-      if (event.has_delta()) {
-        bytes.points += event.delta().delta().points().data();
-        bytes.simplices += event.delta().delta().added().data();
-      }
-      if (event.has_final()) {
-        bytes.state = event.final().state();
-        bytes.revision = event.final().revision();
-      }
+// From a revision to the end; nothing if the server is gone before it.
+std::optional<Bytes> WatchFrom(v1::Stellate::Stub* stub, const std::string& name,
+                               std::uint64_t revision, bool progress_only) {
+  grpc::ClientContext context;
+  v1::WatchMeshRequest request;
+  request.set_name(name);
+  request.set_from_revision(revision);
+  request.set_progress_only(progress_only);
+  const auto reader = stub->WatchMesh(&context, request);
+  Bytes bytes;
+  v1::WatchMeshResponse event;
+  while (reader->Read(&event)) {
+    if (event.has_delta()) {
+      bytes.points += event.delta().delta().points().data();
+      bytes.simplices += event.delta().delta().added().data();
     }
-    if (!reader->Finish().ok() || bytes.state == v1::MESH_STATE_UNSPECIFIED) return std::nullopt;
-    if (!progress_only) return bytes;
+    if (event.has_final()) {
+      bytes.state = event.final().state();
+      bytes.revision = event.final().revision();
+    }
   }
-  return std::nullopt;
+  if (!reader->Finish().ok() || bytes.state == v1::MESH_STATE_UNSPECIFIED) return std::nullopt;
+  return bytes;
+}
+
+// Waiting for the end first makes the geometry one change, without removals.
+std::optional<Bytes> Watch(v1::Stellate::Stub* stub, const std::string& name) {
+  if (!WatchFrom(stub, name, 0, true)) return std::nullopt;
+  return WatchFrom(stub, name, 0, false);
 }
 
 class KillServer : public testing::LiveServer {
@@ -211,6 +215,11 @@ TEST_F(KillServer, EveryMeshResumesAndIsTheUndisturbedOne) {
   // Finished meshes are still there after one more, and cost no worker.
   server->Kill();
   server = Next();
+  // Who has it all hears of nothing new, even while the answers are replayed.
+  const auto nothing = WatchFrom(server->stub(), name, undisturbed->revision, false);
+  ASSERT_TRUE(nothing);
+  EXPECT_EQ(nothing->points, "");
+  EXPECT_EQ(nothing->revision, undisturbed->revision);
   const auto kept = Watch(server->stub(), name);
   ASSERT_TRUE(kept);
   ExpectSame(*kept, *undisturbed);
