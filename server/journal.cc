@@ -132,9 +132,8 @@ class Journal::Mesh final : public SessionJournal, public std::enable_shared_fro
 
   // False: to be tried again. From the removing thread.
   bool Remove() {
-    const auto failure = file_->Do("the removal of a mesh", [&](JournalFile& file) {
-      return id_ == 0 || file.Remove(id_);
-    });
+    const auto failure = file_->Do("the removal of a mesh",
+                                   [&](JournalFile& file) { return id_ == 0 || file.Remove(id_); });
     if (failure) Log(LogLevel::kWarning, {}, failure->message);
     return !failure;
   }

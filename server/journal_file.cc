@@ -33,12 +33,14 @@ constexpr std::size_t kPartBytes = std::size_t{1} << 24;  // SQLite takes less t
 
 constexpr off_t kReserveBytes = off_t{16} << 20;
 
-constexpr char kMeshes[] = "CREATE TABLE meshes (id INTEGER PRIMARY KEY, start BLOB NOT NULL, "
-                           "finish BLOB)";
-constexpr char kRounds[] = "CREATE TABLE rounds (mesh INTEGER NOT NULL REFERENCES meshes "
-                           "ON DELETE CASCADE, round INTEGER NOT NULL, part INTEGER NOT NULL, "
-                           "parts INTEGER NOT NULL, questions INTEGER NOT NULL, "
-                           "answers BLOB NOT NULL, PRIMARY KEY (mesh, round, part))";
+constexpr char kMeshes[] =
+    "CREATE TABLE meshes (id INTEGER PRIMARY KEY, start BLOB NOT NULL, "
+    "finish BLOB)";
+constexpr char kRounds[] =
+    "CREATE TABLE rounds (mesh INTEGER NOT NULL REFERENCES meshes "
+    "ON DELETE CASCADE, round INTEGER NOT NULL, part INTEGER NOT NULL, "
+    "parts INTEGER NOT NULL, questions INTEGER NOT NULL, "
+    "answers BLOB NOT NULL, PRIMARY KEY (mesh, round, part))";
 
 Status Refused(std::string message) {
   return {core::StatusCode::kFailedPrecondition, std::move(message)};
@@ -52,8 +54,8 @@ Status Damaged(const std::string& path, const std::string& what) {
 
 std::string StartPlace(std::int64_t id) { return Message("start/", id); }
 std::string EndPlace(std::int64_t id) { return Message("end/", id); }
-std::string RoundPlace(std::int64_t mesh, std::int64_t round, std::int64_t part,
-                       std::int64_t parts, std::uint64_t questions) {
+std::string RoundPlace(std::int64_t mesh, std::int64_t round, std::int64_t part, std::int64_t parts,
+                       std::uint64_t questions) {
   return Message("round/", mesh, "/", round, "/", part, "/", parts, "/", questions);
 }
 
@@ -76,8 +78,7 @@ Status MakeFile(const std::string& directory) {
     const std::string finish = Message("PRAGMA application_id=", kApplication,
                                        "; PRAGMA user_version=", kJournalVersion, "; COMMIT");
     for (const char* sql : {"PRAGMA auto_vacuum=INCREMENTAL", "PRAGMA journal_mode=WAL",
-                            "PRAGMA synchronous=FULL", "BEGIN", kMeshes, kRounds,
-                            finish.c_str()}) {
+                            "PRAGMA synchronous=FULL", "BEGIN", kMeshes, kRounds, finish.c_str()}) {
       if (!(*database)->Execute(sql)) return fail((*database)->error());
     }
   }
@@ -107,8 +108,9 @@ Status CheckHeader(const std::string& path) {
   };
   if (file.gcount() != kHeaderBytes || std::string_view(header, kMagic.size()) != kMagic ||
       number_at(kApplicationAt) != kApplication) {
-    return Refused(Message(path, " is no journal of a stellated, or its beginning is damaged; it "
-                                 "was left as it is: choose another --data-dir"));
+    return Refused(Message(path,
+                           " is no journal of a stellated, or its beginning is damaged; it "
+                           "was left as it is: choose another --data-dir"));
   }
   const std::uint32_t version = number_at(kVersionAt);
   if (version != kJournalVersion) {
@@ -304,8 +306,7 @@ bool JournalFile::Remove(std::int64_t mesh) {
 }
 
 bool JournalFile::RemoveNow(std::int64_t mesh) {
-  const bool removed =
-      Statement(*database_, "DELETE FROM meshes WHERE id = ?").Bind(0, mesh).Run();
+  const bool removed = Statement(*database_, "DELETE FROM meshes WHERE id = ?").Bind(0, mesh).Run();
   return removed && database_->Execute("PRAGMA incremental_vacuum") &&
          database_->Execute("PRAGMA wal_checkpoint(TRUNCATE)");
 }
@@ -320,8 +321,8 @@ JournalFile::StoredRound JournalFile::ReadRound(std::int64_t mesh, std::uint64_t
   while (rows.Next()) {
     stored.found = true;
     stored.questions = static_cast<std::uint64_t>(rows.Number(2));
-    const auto part = Unseal(rows.Bytes(3), RoundPlace(mesh, number, rows.Number(0),
-                                                       rows.Number(1), stored.questions));
+    const auto part = Unseal(
+        rows.Bytes(3), RoundPlace(mesh, number, rows.Number(0), rows.Number(1), stored.questions));
     if (part) stored.answers += *part;
     stored.intact = stored.intact && part.has_value();
   }

@@ -76,9 +76,7 @@ class Writer {
   std::string Take() { return std::move(out_); }
 
  private:
-  void Word(std::uint64_t word) {
-    out_.append(reinterpret_cast<const char*>(&word), sizeof(word));
-  }
+  void Word(std::uint64_t word) { out_.append(reinterpret_cast<const char*>(&word), sizeof(word)); }
   void Array(const void* data, std::size_t bytes) {
     Number(bytes);
     if (bytes > 0) out_.append(static_cast<const char*>(data), bytes);
@@ -281,8 +279,7 @@ std::optional<SessionEnd> DecodeEnd(std::string_view record) {
   reader.Bytes(end.failure.message);
   end.state = static_cast<SessionState>(state);
   end.time = ToTime(time);
-  const bool ended =
-      end.state >= SessionState::kSucceeded && end.state <= SessionState::kFailed;
+  const bool ended = end.state >= SessionState::kSucceeded && end.state <= SessionState::kFailed;
   if (!reader.Complete() || !ended) return std::nullopt;
   return end;
 }

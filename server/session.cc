@@ -81,9 +81,8 @@ void Session::Run() {
 void Session::RunRounds(core::Mesher* mesher) {
   Log(LogLevel::kInfo, log_context(),
       core::Message(replaying_ ? "replaying " : "meshing ", options_.label,
-                    options_.label.empty() ? "k = " : ": k = ", options_.spec.dimension,
-                    ", d = ", options_.spec.ambient_dimension,
-                    ", epsilon = ", options_.spec.epsilon));
+                    options_.label.empty() ? "k = " : ": k = ", options_.spec.dimension, ", d = ",
+                    options_.spec.ambient_dimension, ", epsilon = ", options_.spec.epsilon));
   if (options_.journal != nullptr && !options_.record) {
     if (auto failure = options_.journal->WriteStart(options_, create_time_)) {
       FailBlameless(mesher, std::move(*failure));
@@ -163,8 +162,7 @@ bool Session::Absorb(core::Mesher* mesher, const core::Answers& answers) {
   }
   const core::Status logged = history_.Append(*delta);
   if (!logged.ok()) {
-    FailBlameless(mesher,
-                  {"INTERNAL", core::Message("a fault of the server: ", logged.message)});
+    FailBlameless(mesher, {"INTERNAL", core::Message("a fault of the server: ", logged.message)});
     return false;
   }
   return true;
@@ -232,6 +230,10 @@ void Session::Finish(const core::Report* report) {
           core::Message("the end of the mesh is not recorded: ", failure->message));
     }
   }
+  // Counted before it can be seen, as whoever sees the end may look at the metrics next.
+  if (options_.observer != nullptr && !suspended && !ended_before) {
+    options_.observer->OnEnd(end.state, report != nullptr ? *report : core::Report{});
+  }
   std::string verdict;
   {
     const std::lock_guard lock(mutex_);
@@ -239,18 +241,14 @@ void Session::Finish(const core::Report* report) {
     report_ = report != nullptr ? *report : core::Report{};
     end_time_ = end.time;
     final_seconds_ = end.elapsed_seconds;
-    verdict = suspended ? "until the server is back"
-              : end.state == SessionState::kFailed
-                  ? end.failure.reason + ": " + end.failure.message
-                  : report_->certificate.verdict;
+    verdict = suspended                            ? "until the server is back"
+              : end.state == SessionState::kFailed ? end.failure.reason + ": " + end.failure.message
+                                                   : report_->certificate.verdict;
   }
   Log(end.state == SessionState::kFailed ? LogLevel::kWarning : LogLevel::kInfo, log_context(),
       core::Message(suspended ? "SUSPENDED" : SessionStateName(end.state), " after ",
                     end.elapsed_seconds, " s, ", progress_.vertices, " vertices, ",
                     progress_.simplices, " simplices; ", verdict));
-  if (options_.observer != nullptr && !ended_before) {
-    options_.observer->OnEnd(end.state, report != nullptr ? *report : core::Report{});
-  }
   pool_.Close({blame_});
   WakeWatchers();
   over_ = true;

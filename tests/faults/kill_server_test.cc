@@ -48,8 +48,8 @@ class ServerProcess {
       std::this_thread::sleep_for(2ms);
     }
     running_ = fs::exists(ready);
-    stub_ = v1::Stellate::NewStub(
-        grpc::CreateChannel(address_, grpc::InsecureChannelCredentials()));
+    stub_ =
+        v1::Stellate::NewStub(grpc::CreateChannel(address_, grpc::InsecureChannelCredentials()));
   }
   ~ServerProcess() { Kill(); }
 

@@ -106,8 +106,8 @@ void WriteTwoRounds(Journal& journal, Eigen::Index queries = 4) {
 }
 
 TEST_F(JournalTest, GivesBackWhatWasWritten) {
-  const auto now = std::chrono::time_point_cast<std::chrono::microseconds>(
-      std::chrono::system_clock::now());
+  const auto now =
+      std::chrono::time_point_cast<std::chrono::microseconds>(std::chrono::system_clock::now());
   const core::Answers answers = AnswersOf(4);
   const SessionEnd end{SessionState::kFailed, now, 1.5, {"NO_WORKER", "none came"}};
   {
@@ -151,8 +151,8 @@ TEST_F(JournalTest, LargeRoundsAreKeptInParts) {
 
 TEST_F(JournalTest, RefusesFilesThatAreNoJournals) {
   fs::create_directories(directory_);
-  for (const std::string& content : {std::string(), std::string("a letter\n"),
-                                     std::string(4096, 'x')}) {
+  for (const std::string& content :
+       {std::string(), std::string("a letter\n"), std::string(4096, 'x')}) {
     Overwrite(content);
     EXPECT_NE(Refusal().find("no journal"), std::string::npos);
   }
