@@ -84,10 +84,10 @@ core::Expected<ListenAddress> ParseListenAddress(const std::string& text, const 
     address.host.clear();  // an IPv6 address without brackets: where does the port begin?
   }
   if (!good_port || address.host.empty()) {
-    return core::Refuse(StatusCode::kInvalidArgument,
-                        Message(flag, " is \"", text,
-                                "\" but must be HOST:PORT, [IPV6]:PORT or unix:/PATH; port ",
-                                "0 takes a free one"));
+    return core::Refuse(
+        StatusCode::kInvalidArgument,
+        Message(flag, " is \"", text, "\" but must be HOST:PORT, [IPV6]:PORT or unix:/PATH; port ",
+                "0 takes a free one"));
   }
   return address;
 }

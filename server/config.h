@@ -29,9 +29,9 @@ core::Expected<ListenAddress> ParseListenAddress(const std::string& text,
 // Everything that can be set, with its default. Times in seconds.
 struct Config {
   std::string listen = "127.0.0.1:7717";
-  bool insecure_listen = false;  // plain text beyond this machine
-  std::string ready_file;        // written with the address once the server listens
-  std::string data_dir;          // of the journal; empty: meshes live in memory alone
+  bool insecure_listen = false;         // plain text beyond this machine
+  std::string ready_file;               // written with the address once the server listens
+  std::string data_dir;                 // of the journal; empty: meshes live in memory alone
   std::uint64_t max_journal_bytes = 0;  // 0: what the disk holds
 
   std::string tls_certificate, tls_key;  // PEM files; empty: plain text

@@ -107,11 +107,10 @@ int main(int argc, char** argv) {
 
   const bool at_once = ServeUntilTold(server->get(), signals, flags.exit_with_parent, parent);
   const std::chrono::duration<double> drain(at_once ? 0 : config.drain_seconds);
-  const bool clean = (*server)->Stop(std::chrono::duration_cast<Clock::duration>(drain),
-                                     [&] {
-                                       const int signal = WaitForSignal(signals, 0);
-                                       return signal != 0 && signal != SIGHUP;
-                                     });
+  const bool clean = (*server)->Stop(std::chrono::duration_cast<Clock::duration>(drain), [&] {
+    const int signal = WaitForSignal(signals, 0);
+    return signal != 0 && signal != SIGHUP;
+  });
   if (!config.ready_file.empty()) unlink(config.ready_file.c_str());
   Log(LogLevel::kInfo, {}, "stopped");
   // A mesher in the middle of a round cannot be asked to leave: the process takes it along.

@@ -82,9 +82,9 @@ class Metrics::Impl final : public SessionObserver {
  public:
   Impl() {
     auto& family = prometheus::BuildCounter()
-                      .Name("stellate_meshes_ended_total")
-                      .Help("Meshes that ended, by the state they ended in")
-                      .Register(*registry);
+                       .Name("stellate_meshes_ended_total")
+                       .Help("Meshes that ended, by the state they ended in")
+                       .Register(*registry);
     for (const SessionState state : kStates) {
       if (state == SessionState::kWaiting || state == SessionState::kRunning) continue;
       ended[state] = &family.Add({{"state", SessionStateName(state)}});
@@ -162,9 +162,7 @@ std::shared_ptr<SessionObserver> Metrics::observer() const { return impl_; }
 
 void Metrics::Answered(double seconds) { impl_->latency.Observe(seconds); }
 void Metrics::Refused() { impl_->refused.Increment(); }
-void Metrics::Received(std::size_t bytes) {
-  impl_->received.Increment(static_cast<double>(bytes));
-}
+void Metrics::Received(std::size_t bytes) { impl_->received.Increment(static_cast<double>(bytes)); }
 void Metrics::Sent(std::size_t bytes) { impl_->sent.Increment(static_cast<double>(bytes)); }
 
 }  // namespace stellate::server

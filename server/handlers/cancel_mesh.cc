@@ -3,8 +3,7 @@
 
 namespace stellate::server {
 
-grpc::Status CancelMesh(const Call& call, const v1::CancelMeshRequest& request,
-                        v1::Mesh* mesh) {
+grpc::Status CancelMesh(const Call& call, const v1::CancelMeshRequest& request, v1::Mesh* mesh) {
   const auto session = FindMesh(call.service, call.caller, request.name());
   if (!session) return session.error();
   (*session)->Cancel();

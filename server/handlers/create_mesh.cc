@@ -12,8 +12,7 @@ Clock::duration ToDuration(double seconds) {
 
 }  // namespace
 
-grpc::Status CreateMesh(const Call& call, const v1::CreateMeshRequest& request,
-                        v1::Mesh* mesh) {
+grpc::Status CreateMesh(const Call& call, const v1::CreateMeshRequest& request, v1::Mesh* mesh) {
   ServerState& service = call.service;
   if (service.draining) return ShuttingDown();
   auto parsed = FromProto(request.spec(), service.config);

@@ -83,8 +83,8 @@ Expected<std::shared_ptr<grpc::Channel>> Connect(const std::string& server,
   if (!security) return tl::unexpected(security.error());
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
   if (!credentials.token.empty()) {
-    const bool plain = !credentials.tls && credentials.tls_ca.empty() &&
-                       credentials.tls_certificate.empty();
+    const bool plain =
+        !credentials.tls && credentials.tls_ca.empty() && credentials.tls_certificate.empty();
     if (plain && !StaysOnThisMachine(server)) {
       return Fail(ErrorCode::kRefused,
                   "the token would go to " + server +
