@@ -72,6 +72,7 @@ SessionOptions Options(std::shared_ptr<SessionJournal> journal, double epsilon =
   options.owner = "somebody";
   options.label = "a sphere";
   options.spec = SphereSpec(epsilon);
+  options.spec.threads = 1;  // oneTBB itself is not built for ThreadSanitizer
   options.spec.seeds = Eigen::Vector3d::UnitX();
   options.spec.criteria.advance_step = 0.9;
   options.spec.criteria.judging = core::Judging::kCommonCentre;
