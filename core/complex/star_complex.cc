@@ -1,20 +1,29 @@
 #include "core/complex/star_complex.h"
 
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <iterator>
 
 #include "core/geometry/common_centre.h"
+#include "core/parallel.h"
 
 namespace stellate::core {
 
 namespace {
 
+// About as many neighbours as a star has.
+template <int K>
+inline constexpr int kNearestFirst = 4 << K;
+
 // Simplices of a larger circumradius, in epsilon, are judged in the flats: far out the common centre
 // is no better, and they will be refined anyway.
 constexpr double kJudgedRadius = 1.3;
+
+// One a thread, for the life of the thread.
+template <int K>
+typename RestrictedVoronoiCell<K>::Scratch& ThreadScratch() {
+  thread_local typename RestrictedVoronoiCell<K>::Scratch scratch;
+  return scratch;
+}
 
 // Room for q - p, on the stack where d is small.
 class Step {
@@ -142,6 +151,22 @@ bool StarComplex<K>::Cuts(const Cell& cell, const Site& p, const Site& q) const 
 }
 
 template <int K>
+int StarComplex<K>::Nearest(const double* q, int count,
+                            std::pair<double, std::uint32_t>* nearest) const {
+  int found = 0;
+  tree_.VisitNear(
+      q, [&] { return found < count ? INFINITY : std::sqrt(nearest[count - 1].first); },
+      [&](std::uint32_t id, double distance2) {
+        const std::pair<double, std::uint32_t> candidate{distance2, id};
+        if (found == count && !(candidate < nearest[count - 1])) return;
+        int at = found < count ? found++ : count - 1;
+        for (; at > 0 && candidate < nearest[at - 1]; --at) nearest[at] = nearest[at - 1];
+        nearest[at] = candidate;
+      });
+  return found;
+}
+
+template <int K>
 bool StarComplex<K>::CutsVertex(std::uint32_t p, std::size_t vertex, const double* point) const {
   Step step(d_);
   double normal[K];
@@ -163,10 +188,19 @@ void StarComplex<K>::BuildStar(const Site& p, const Site* guest, Cell& cell,
     const CentreJudge judge(*this, p, guest);
     cell.Reset(inradius_, &judge);
   }
+  // The nearest points close the cell, or nearly so: without them a search that happens to begin on
+  // one side of p would visit all of that side while the cell is open towards the other.
+  std::array<std::pair<double, std::uint32_t>, kNearestFirst<K>> nearest;
+  const auto last = nearest.begin() + Nearest(p.point, kNearestFirst<K>, nearest.data());
+  const std::pair farthest = last == nearest.begin() ? std::pair{-1.0, p.id} : last[-1];
+  for (auto q = nearest.begin(); q != last; ++q)
+    if (q->second != p.id) ClipBy(cell, p, At(q->second), guest, scratch);
   tree_.VisitAround(
       p.point, [&] { return Influence(cell); },
-      [&](std::uint32_t q, double) {
-        if (q != p.id) ClipBy(cell, p, At(q), guest, scratch);
+      [&](std::uint32_t q, double distance2) {
+        // Once by each point: a second cut by the same plane would be decided by rounding.
+        if (q != p.id && farthest < std::pair{distance2, q})
+          ClipBy(cell, p, At(q), guest, scratch);
       },
       influencing);
 }
@@ -218,13 +252,12 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(
   Change change;
   if (count == 0) return change;
   cells_.resize(size());
-  tbb::enumerable_thread_specific<typename Cell::Scratch> scratch;
 
   // Which old stars does each new point cut? Their influence is still that of before.
   std::vector<std::vector<std::uint32_t>> cut_by(count);
-  tbb::parallel_for(std::uint32_t{0}, count, [&](std::uint32_t i) {
+  ParallelFor(count, [&](std::uint32_t i) {
     const Site q = At(first + i);
-    BuildStar(q, nullptr, cells_[q.id], scratch.local(), [&](std::uint32_t p) {
+    BuildStar(q, nullptr, cells_[q.id], ThreadScratch<K>(), [&](std::uint32_t p) {
       if (Cuts(cells_[p], At(p), q)) cut_by[i].push_back(p);
     });
   });
@@ -254,12 +287,12 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(
     std::vector<Simplex> removed, added;
   };
   std::vector<Swap> swaps(change.stars.size() + count);
-  tbb::parallel_for(std::size_t{0}, change.stars.size(), [&](std::size_t i) {
+  ParallelFor(change.stars.size(), [&](std::size_t i) {
     const std::uint32_t p = change.stars[i];
     std::vector<Simplex> before, after;
     Owned(p, &before);
     for (std::size_t j = begins[i]; j < begins[i + 1]; ++j)
-      ClipBy(cells_[p], At(p), At(cuts[j].second), nullptr, scratch.local());
+      ClipBy(cells_[p], At(p), At(cuts[j].second), nullptr, ThreadScratch<K>());
     Owned(p, &after);
     std::set_difference(before.begin(), before.end(), after.begin(), after.end(),
                         std::back_inserter(swaps[i].removed));

@@ -45,6 +45,7 @@ class StarComplex {
 
   std::uint32_t size() const { return static_cast<std::uint32_t>(points_.size() / stride()); }
   int d() const { return d_; }
+  double inradius() const { return inradius_; }
   Judging judging() const { return judging_; }
   const double* Point(std::uint32_t id) const { return points_.data() + id * stride(); }
   // K rows of d: row a is tangent vector a.
@@ -62,6 +63,10 @@ class StarComplex {
   void ForEachWithin(const double* q, double radius, Visit&& visit) const {
     tree_.VisitNear(q, [&] { return radius; }, [&](std::uint32_t id, double) { visit(id); });
   }
+
+  // The `count` sample points nearest to q as (squared distance, id), nearest first; returns how many
+  // there are.
+  int Nearest(const double* q, int count, std::pair<double, std::uint32_t>* nearest) const;
 
   // Whether a point would take the simplex dual to a vertex of p's cell out of star(p).
   bool CutsVertex(std::uint32_t p, std::size_t vertex, const double* point) const;

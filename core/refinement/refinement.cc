@@ -1,13 +1,11 @@
 #include "core/refinement/refinement.h"
 
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <sstream>
+
+#include "core/parallel.h"
 
 namespace stellate::core {
 namespace {
@@ -53,6 +51,7 @@ ResolvedCriteria Resolve(const Specification& spec) {
   r.small_sliver_radius = c.small_sliver_radius;
   r.candidates = c.candidates.value_or(spec.dimension <= 2 ? 1 : 10);
   r.flat_alternations = c.flat_alternations;
+  r.ask_ahead = c.ask_ahead;
   r.judging = c.judging.value_or(spec.dimension <= 2 ? Judging::kFlats : Judging::kCommonCentre);
   double step = kDefaultAdvanceEpsilons * spec.epsilon;
   if (spec.bounding_box) {
@@ -130,8 +129,7 @@ Expected<MeshDelta> Refinement<K>::Absorb(const Answers& answers) {
   delta_.first_vertex = complex_.size();
   batch_.reset();
 
-  tbb::task_arena arena(spec_.threads > 0 ? spec_.threads : tbb::task_arena::automatic);
-  arena.execute([&] { Advance(answers); });
+  WithThreads(spec_.threads, [&] { Advance(answers); });
   delta_.points = Eigen::Map<const Eigen::MatrixXd>(complex_.points().data(), complex_.d(),
                                                     complex_.size())
                       .rightCols(complex_.size() - static_cast<Eigen::Index>(delta_.first_vertex));
@@ -157,7 +155,6 @@ void Refinement<K>::Advance(const Answers& answers) {
       else
         AfterTangents();
       break;
-    case Stage::kSeeds:
     case Stage::kPoints:
     case Stage::kAlternate:
       TakePoints(answers);
@@ -187,22 +184,20 @@ void Refinement<K>::TakePoints(const Answers& answers) {
     for (int i = 0; i < d; ++i)
       for (int a = 0; a < K; ++a) tangents_(a * d + i, c) = block.tangents(i * K + a, column);
   };
-  const Eigen::Index count =
-      stage_ == Stage::kPoints ? first_candidate_.back() : first.points.cols();
+  const bool sorted = stage_ == Stage::kPoints && purpose_ == Purpose::kTargets;
+  const Eigen::Index count = sorted ? first_candidate_.back() : first.points.cols();
   points_.resize(d, count);
   found_.assign(static_cast<std::size_t>(count), 0);
   tangents_.resize(d * K, count);
   for (Eigen::Index c = 0; c < count; ++c) {
-    if (stage_ != Stage::kPoints) {
+    if (!sorted) {
       take(c, first, c);
       continue;
     }
     const auto [block, column] = places_[static_cast<std::size_t>(c)];
     take(c, answers.blocks[static_cast<std::size_t>(block)], column);
   }
-  if (stage_ == Stage::kSeeds) {
-    targets_.clear();
-  } else if (alternations_left_ > 0) {
+  if (purpose_ == Purpose::kTargets && alternations_left_ > 0) {
     // Back to the flat of each candidate, and to M from there.
     --alternations_left_;
     QueryBlock block;
@@ -234,8 +229,9 @@ void Refinement<K>::AfterPoints() {
     known.push_back(c);
     guesses.push_back(guess);
   };
-  if (targets_.empty()) {
-    for (Eigen::Index c = 0; c < points_.cols(); ++c) add(c, nullptr);
+  if (purpose_ != Purpose::kTargets) {
+    for (Eigen::Index c = 0; c < points_.cols(); ++c)
+      add(c, purpose_ == Purpose::kAhead ? predicted_tangents_.col(c).data() : nullptr);
   } else {
     for (std::size_t i = 0; i < targets_.size(); ++i) {
       // Far steps may turn any corner: no guess there.
@@ -260,10 +256,17 @@ void Refinement<K>::AfterTangents() {
       found = tangent_finder_.ok()[static_cast<std::size_t>(next++)];
     }
   }
-  if (targets_.empty())
-    InsertSeeds();
-  else
-    InsertTargets();
+  switch (purpose_) {
+    case Purpose::kSeeds:
+      InsertSeeds();
+      break;
+    case Purpose::kTargets:
+      InsertTargets();
+      break;
+    case Purpose::kAhead:
+      InsertAhead();
+      break;
+  }
   if (over_) return;
   Commit();
   Plan();
@@ -300,7 +303,7 @@ void Refinement<K>::InsertSeeds() {
 template <int K>
 void Refinement<K>::InsertTargets() {
   std::vector<int> best(targets_.size(), 0);
-  tbb::parallel_for(std::size_t{0}, targets_.size(), [&](std::size_t i) {
+  ParallelFor(targets_.size(), [&](std::size_t i) {
     if (targets_[i].violation.rule >= Rule::kSliver) best[i] = BestCandidate(i);
   });
   for (std::size_t i = 0; i < targets_.size(); ++i) {
@@ -392,7 +395,7 @@ void Refinement<K>::Commit() {
   delta_.removed = std::move(change.removed);
 
   std::vector<std::optional<Violation<K>>> violations(touched.size());
-  tbb::parallel_for(std::size_t{0}, touched.size(), [&](std::size_t i) {
+  ParallelFor(touched.size(), [&](std::size_t i) {
     violations[i] = WorstSizeOrShape<K>(complex_, touched[i], criteria_.epsilon,
                                         criteria_.radius_edge_bound);
   });

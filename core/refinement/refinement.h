@@ -17,6 +17,7 @@ namespace stellate::core {
 struct ResolvedCriteria {
   double epsilon, radius_edge_bound, sliver_bound, picking_radius, small_sliver_radius, advance_step;
   int candidates, flat_alternations;
+  bool ask_ahead;
   Judging judging;
 };
 ResolvedCriteria Resolve(const Specification& spec);
@@ -44,7 +45,16 @@ class Refinement final : public Mesher {
   std::vector<std::uint32_t> Simplices() const override { return complex_.Simplices(); }
 
  private:
-  enum class Stage { kSeeds, kPoints, kAlternate, kTangents, kCertify };
+  enum class Stage { kPoints, kAlternate, kTangents, kCertify };
+  // What the points that are asked for are for.
+  enum class Purpose { kSeeds, kTargets, kAhead };
+
+  // A rehearsal: goes on from a sample, and stops where the certificate would begin.
+  Refinement(const Specification& spec, const StarComplex<K>& sample);
+
+  // Asking ahead (refinement_ahead.cc).
+  bool AskAhead(std::size_t targets);
+  void InsertAhead();
 
   // Planning (refinement_plan.cc).
   void AskForSeeds();
@@ -89,7 +99,9 @@ class Refinement final : public Mesher {
   Progress progress_;
   Report report_;
 
-  Stage stage_ = Stage::kSeeds;
+  const bool rehearsal_ = false;
+  Stage stage_ = Stage::kPoints;
+  Purpose purpose_ = Purpose::kSeeds;
   std::optional<QueryBatch> batch_;
   MeshDelta delta_;  // of the round being absorbed
   bool over_ = false;
@@ -104,6 +116,9 @@ class Refinement final : public Mesher {
   Eigen::MatrixXd tangents_;  // (K rows of d) x n
   TangentFinder tangent_finder_;
   int alternations_left_ = 0;
+  Eigen::MatrixXd predicted_tangents_;  // of points asked ahead, (K rows of d) x n
+  Eigen::VectorXd predicted_spacing_;  // of points asked ahead: half of it is kept clear
+  std::uint32_t ask_ahead_from_ = 0;   // vertices at which asking ahead is worth another try
   Eigen::MatrixXd idempotence_sample_;  // d x m, asked for again with the next batch
 
   // By star.

@@ -13,6 +13,7 @@ namespace stellate::core {
 
 template <int K>
 void Refinement<K>::StartCertificate() {
+  if (rehearsal_) return Finish(Termination::kConverged);
   StarFacts facts;
   facts.converged = true;
   for (std::uint32_t p = 0; p < complex_.size(); ++p)
@@ -46,6 +47,7 @@ void Refinement<K>::Finish(Termination termination) {
   if (over_) return;
   over_ = true;
   batch_.reset();
+  if (rehearsal_) return;
   report_.termination = termination;
   report_.counts.vertices = complex_.size();
   report_.counts.simplices = complex_.simplex_count();

@@ -1,11 +1,11 @@
 // How a round is planned: the questions of Refinement.
 
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "core/refinement/refinement.h"
+#include "core/parallel.h"
 #include "core/sample/random.h"
 
 namespace stellate::core {
@@ -47,7 +47,8 @@ void Refinement<K>::AskForSeeds() {
       for (Eigen::Index j = 0; j < block.points.rows(); ++j)
         block.points(j, i) = box.lower[j] + random.Uniform() * (box.upper[j] - box.lower[j]);
   }
-  AskAgain(block, Stage::kSeeds);
+  purpose_ = Purpose::kSeeds;
+  AskAgain(block, Stage::kPoints);
 }
 
 template <int K>
@@ -100,7 +101,7 @@ std::vector<Target<K>> Refinement<K>::SliverAndConsistencyTargets() {
   std::sort(suspects_.begin(), suspects_.end());
   suspects_.erase(std::unique(suspects_.begin(), suspects_.end()), suspects_.end());
   std::vector<std::optional<Violation<K>>> found(suspects_.size());
-  tbb::parallel_for(std::size_t{0}, suspects_.size(), [&](std::size_t i) {
+  ParallelFor(suspects_.size(), [&](std::size_t i) {
     found[i] = WorstSliverOrInconsistent<K>(complex_, suspects_[i], criteria_.sliver_bound);
   });
   std::vector<Target<K>> targets;
@@ -128,6 +129,7 @@ void Refinement<K>::Plan() {
     if (static_cast<double>(complex_.size()) > most) return Finish(Termination::kNoProgress);
   }
   std::vector<Target<K>> targets = SizeAndShapeTargets();
+  if (criteria_.ask_ahead && AskAhead(targets.size())) return;
   if (targets.empty()) targets = SliverAndConsistencyTargets();
   if (targets.empty()) {
     if (!active_.empty() || !blemished_.empty()) return Finish(Termination::kNoProgress);
@@ -191,6 +193,7 @@ void Refinement<K>::AskForTargets() {
   if (flat_count > 0) batch_->blocks.push_back(std::move(flats));
   if (count > flat_count) batch_->blocks.push_back(std::move(closest));
   stage_ = Stage::kPoints;
+  purpose_ = Purpose::kTargets;
   alternations_left_ = spec_.oracle.intersect_flat ? 0 : criteria_.flat_alternations - 1;
 }
 
