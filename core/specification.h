@@ -58,7 +58,7 @@ struct Criteria {
   std::optional<Judging> judging;            // default kFlats for k <= 2, else kCommonCentre
   bool ask_ahead = false;                    // rehearse on a guess of M first and ask for all that
                                              // it wants at once: a third of the round trips for
-                                             // k <= 2, less gain above; twice the processor time
+                                             // up to twice the processor time
   int flat_alternations = 1;                 // without intersect_flat: closest points taken when
                                              // alternating towards a flat, 1..20
 };

@@ -187,7 +187,7 @@ void LayOutSpecification(Archive& archive, Value& spec) {
   archive.Maybe(criteria.candidates);
   archive.Maybe(criteria.advance_step);
   archive.Maybe(criteria.judging);
-  if constexpr (requires { criteria.ask_ahead; }) archive.Number(criteria.ask_ahead);
+  archive.Number(criteria.ask_ahead);
   archive.Number(criteria.flat_alternations);
   archive.Number(spec.limits.max_vertices);
   archive.Number(spec.limits.max_rounds);

@@ -113,6 +113,14 @@ void MeshCommand::AddCriteria() {
       ->add_option("--flat-alternations", options_.flat_alternations,
                    "closest points towards a flat, without intersections")
       ->group(group);
+  command_
+      ->add_flag("--ask-ahead,!--no-ask-ahead", options_.ask_ahead,
+                 "refine a guess first: fewer round trips, more processor time")
+      ->group(group);
+  command_
+      ->add_flag("--common-centre,!--no-common-centre", options_.common_centre,
+                 "judge a simplex at one centre for all its vertices")
+      ->group(group);
 }
 
 int MeshCommand::Run(std::stop_token stop) {

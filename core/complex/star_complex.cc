@@ -10,9 +10,9 @@ namespace stellate::core {
 
 namespace {
 
-// About as many neighbours as a star has.
+// The point itself, and as many neighbours as close a cell.
 template <int K>
-inline constexpr int kNearestFirst = 4 << K;
+inline constexpr int kNearestFirst = 2 * K + 3;
 
 // Simplices of a larger circumradius, in epsilon, are judged in the flats: far out the common centre
 // is no better, and they will be refined anyway.
@@ -192,15 +192,15 @@ void StarComplex<K>::BuildStar(const Site& p, const Site* guest, Cell& cell,
   // one side of p would visit all of that side while the cell is open towards the other.
   std::array<std::pair<double, std::uint32_t>, kNearestFirst<K>> nearest;
   const auto last = nearest.begin() + Nearest(p.point, kNearestFirst<K>, nearest.data());
-  const std::pair farthest = last == nearest.begin() ? std::pair{-1.0, p.id} : last[-1];
   for (auto q = nearest.begin(); q != last; ++q)
     if (q->second != p.id) ClipBy(cell, p, At(q->second), guest, scratch);
   tree_.VisitAround(
       p.point, [&] { return Influence(cell); },
-      [&](std::uint32_t q, double distance2) {
+      [&](std::uint32_t q, double) {
         // Once by each point: a second cut by the same plane would be decided by rounding.
-        if (q != p.id && farthest < std::pair{distance2, q})
-          ClipBy(cell, p, At(q), guest, scratch);
+        const auto seen = std::find_if(nearest.begin(), last,
+                                       [q](const auto& near) { return near.second == q; });
+        if (q != p.id && seen == last) ClipBy(cell, p, At(q), guest, scratch);
       },
       influencing);
 }

@@ -20,9 +20,6 @@ constexpr int kRehearsedGoodPointRounds = 6;
 // True points fall elsewhere than predicted: one that comes nearer to another than this share of
 // the spacing that was planned for it would cost quality.
 constexpr double kKeptSpacing = 0.5;
-// From a coarse sample of a k-manifold, k >= 3, a rehearsal was seen to plan twice the points that M
-// needs; up to this circumradius, in epsilon, it is not.
-constexpr double kNearEnough = 2;
 // After a rehearsal that brought little, wait until the sample has grown by this factor.
 constexpr double kPatience = 1.5;
 
@@ -48,10 +45,8 @@ bool Refinement<K>::AskAhead(std::size_t targets) {
   if (count < ask_ahead_from_ || targets < kLeastTargets ||
       static_cast<double>(targets) < kLeastShare * count)
     return false;
-  for (const Active& a : active_) {
+  for (const Active& a : active_)
     if (!complex_.cell(a.star).bounded()) return false;  // the front has its own pace
-    if (K >= 3 && a.violation.radius > kNearEnough * spec_.epsilon) return false;
-  }
 
   const Surrogate<K> surrogate(complex_);
   Specification spec = spec_;

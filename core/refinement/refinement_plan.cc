@@ -197,9 +197,14 @@ void Refinement<K>::AskForTargets() {
   alternations_left_ = spec_.oracle.intersect_flat ? 0 : criteria_.flat_alternations - 1;
 }
 
+// In a rehearsal at once: what the surrogate refuses is left for true points, since shorter steps
+// would only crowd the border of what it knows.
 template <int K>
 void Refinement<K>::Discourage(std::uint32_t star) {
-  if (discouraged_[star] <= kGiveUp) ++discouraged_[star];
+  if (rehearsal_)
+    discouraged_[star] = kGiveUp + 1;
+  else if (discouraged_[star] <= kGiveUp)
+    ++discouraged_[star];
 }
 
 #define STELLATE_INSTANTIATE(K)                                                    \

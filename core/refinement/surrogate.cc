@@ -18,6 +18,9 @@ constexpr double kLeastCosine = 0.5;
 // Keeps the fit determined where neighbours are few; the terms are of order one after scaling.
 constexpr double kRidge = 1e-3;
 constexpr int kBlended = 3;
+// A quadric that misses its own neighbours by this share of their distance is none of M: the sample
+// is too coarse there.
+constexpr double kMostResidual = 0.1;
 
 // u_a u_b for a <= b; the diagonal halved, so that II(u, u) / 2 is the sum of term times form.
 template <int K>
@@ -47,7 +50,12 @@ void Surrogate<K>::Fit(std::uint32_t p) {
   rhs.setZero();
   const double* tangent = complex_.Tangent(p);
   Eigen::VectorXd away(d);
-  int used = 0;
+  struct Equation {
+    Eigen::Matrix<double, kTerms, 1> terms;
+    Eigen::VectorXd away;
+    double length;
+  };
+  std::vector<Equation> equations;
   for (const auto& facet : cell.facets()) {
     const double* q = complex_.Point(facet.id);
     double turned = 0;
@@ -71,13 +79,15 @@ void Surrogate<K>::Fit(std::uint32_t p) {
     away /= length2;
     normal += terms * terms.transpose();
     rhs += terms * away.transpose();
-    ++used;
+    equations.push_back({terms, away, std::sqrt(length2)});
   }
-  if (used < kTerms) return;
+  if (equations.size() < kTerms) return;
   normal.diagonal().array() += kRidge;
   const Eigen::Matrix<double, kTerms, Eigen::Dynamic> forms = normal.ldlt().solve(rhs);
   for (int t = 0; t < kTerms; ++t)
     for (int j = 0; j < d; ++j) forms_[p * form_size_ + static_cast<std::size_t>(t * d + j)] = forms(t, j);
+  for (const Equation& e : equations)
+    if ((forms.transpose() * e.terms - e.away).norm() * e.length > kMostResidual) return;
   fitted_[p] = 1;
 }
 

@@ -86,6 +86,10 @@ Status ReadCriteria(const v1::MeshSpec& spec, core::Specification* out) {
     if (!status.ok()) return status;
     to.candidates = candidates;
   }
+  to.ask_ahead = c.ask_ahead();
+  if (c.has_common_centre()) {
+    to.judging = c.common_centre() ? core::Judging::kCommonCentre : core::Judging::kFlats;
+  }
   if (!c.has_flat_alternations()) return Status::Ok();
   return ToInt(c.flat_alternations(), "criteria.flat_alternations", &to.flat_alternations);
 }
@@ -173,6 +177,10 @@ void ToProto(const core::Specification& spec, v1::MeshSpec* out) {
   if (spec.criteria.candidates) criteria->set_candidates(*spec.criteria.candidates);
   if (spec.criteria.advance_step) criteria->set_advance_step(*spec.criteria.advance_step);
   criteria->set_flat_alternations(spec.criteria.flat_alternations);
+  criteria->set_ask_ahead(spec.criteria.ask_ahead);
+  if (spec.criteria.judging) {
+    criteria->set_common_centre(*spec.criteria.judging == core::Judging::kCommonCentre);
+  }
   out->mutable_limits()->set_max_vertices(spec.limits.max_vertices);
   out->mutable_limits()->set_max_rounds(spec.limits.max_rounds);
   out->set_random_seed(spec.random_seed);

@@ -119,6 +119,8 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   if (options.candidates) criteria.set_candidates(*options.candidates);
   if (options.advance_step) criteria.set_advance_step(*options.advance_step);
   if (options.flat_alternations) criteria.set_flat_alternations(*options.flat_alternations);
+  if (options.ask_ahead) criteria.set_ask_ahead(*options.ask_ahead);
+  if (options.common_centre) criteria.set_common_centre(*options.common_centre);
   v1::MeshLimits& limits = *spec.mutable_limits();
   if (options.max_vertices) limits.set_max_vertices(*options.max_vertices);
   if (options.max_rounds) limits.set_max_rounds(*options.max_rounds);

@@ -47,6 +47,8 @@ struct MeshOptions {
   std::optional<std::uint32_t> candidates;    // tried in a picking region
   std::optional<double> advance_step;         // h, a length
   std::optional<std::uint32_t> flat_alternations;
+  std::optional<bool> ask_ahead;      // fewer round trips, more processor time
+  std::optional<bool> common_centre;  // judge simplices at a centre common to their vertices
 
   std::optional<double> worker_wait_seconds, answer_seconds;
   std::string label;  // shown in the server's lists and logs
