@@ -145,11 +145,13 @@ void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
       return;
     }
   }
+  const std::uint64_t round = batch.round;  // the batch is gone once it is absorbed
+  const auto queries = static_cast<std::size_t>(batch.size());
   if (!Absorb(mesher, answers)) return;
-  if (options_.observer != nullptr) options_.observer->OnRound(batch.size());
+  if (options_.observer != nullptr) options_.observer->OnRound(queries);
   if (LogEnabled(LogLevel::kDebug)) {
-    Log(LogLevel::kDebug, {options_.name, batch.round},
-        core::Message(batch.size(), " queries answered, ", mesher->progress().vertices,
+    Log(LogLevel::kDebug, {options_.name, round},
+        core::Message(queries, " queries answered, ", mesher->progress().vertices,
                       " vertices"));
   }
 }
