@@ -52,7 +52,12 @@ bool Worker::Answer(const v1::QueryChunk& chunk, v1::AnswerChunk* answers) {
   stellate::Answer answer = flats
                                 ? oracle_.IntersectFlat(*points, *bases, radii->row(0).transpose())
                                 : oracle_.ClosestPoint(*points);
-  if (chunk.want_tangents() && answer.tangents.size() == 0 && oracle_.has_tangent_basis()) {
+  // Points of a wrong shape are the server's to refuse; the oracle is not asked about them.
+  const bool in_shape =
+      answer.points.rows() == static_cast<Eigen::Index>(d) &&
+      (answer.found.empty() || answer.found.size() >= static_cast<std::size_t>(answer.points.cols()));
+  if (chunk.want_tangents() && in_shape && answer.tangents.size() == 0 &&
+      oracle_.has_tangent_basis()) {
     // Only where there is a point to ask about; the server skips the other rows.
     std::vector<Eigen::Index> found;
     for (Eigen::Index j = 0; j < answer.points.cols(); ++j) {
