@@ -176,6 +176,11 @@ void OraclePool::Interrupt() {
   changed_.notify_one();
 }
 
+void OraclePool::Shut() {
+  const std::lock_guard lock(mutex_);
+  closed_ = true;
+}
+
 void OraclePool::Close(const WorkerEnd& end) {
   std::vector<std::shared_ptr<OracleWorker>> workers;
   {

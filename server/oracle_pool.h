@@ -82,7 +82,9 @@ class OraclePool {
   // Makes Ask return, now and ever after.
   void Interrupt();
 
-  // No worker may join any more; those here are told.
+  // No worker may join any more.
+  void Shut();
+  // Shut, and those here are told.
   void Close(const WorkerEnd& end);
 
   std::size_t workers() const { return worker_count_; }

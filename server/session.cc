@@ -236,6 +236,8 @@ void Session::Finish(const core::Report* report) {
   if (options_.observer != nullptr && !suspended && !ended_before) {
     options_.observer->OnEnd(end.state, report != nullptr ? *report : core::Report{});
   }
+  // Whoever has seen the end finds the door shut.
+  pool_.Shut();
   std::string verdict;
   {
     const std::lock_guard lock(mutex_);

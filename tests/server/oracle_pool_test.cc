@@ -133,6 +133,9 @@ TEST_F(OraclePoolTest, WorkersAreCountedAndBounded) {
 TEST_F(OraclePoolTest, ClosingTellsTheWorkersAndTakesNoMore) {
   OraclePool pool(spec_, options_, 8);
   const auto worker = FakeWorker::Join(&pool);
+  pool.Shut();
+  EXPECT_EQ(FakeWorker::Join(&pool), nullptr);
+  EXPECT_EQ(pool.workers(), 1u) << "who is in may stay until the end";
   pool.Close({});
   worker->WaitForEnd();
   EXPECT_TRUE(worker->end().blame.ok());
