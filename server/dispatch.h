@@ -22,6 +22,16 @@ struct DispatchOptions {
   std::size_t chunk_bytes = std::size_t{1} << 20;  // of a chunk's queries, and of their answers
   int max_leases = 3;     // of one chunk, all timed out, before the round fails
   int max_in_flight = 2;  // chunks that one worker holds, so that it need not wait between two
+
+  // A chunk is a straggler once it has taken so many times what its worker's speed promises, and
+  // no less than the floor: an idle worker gets it as well. Without a speed to go by: so long.
+  double straggler_factor = 3;
+  Clock::duration straggler_floor = std::chrono::milliseconds(200);
+  Clock::duration straggler_unknown = std::chrono::seconds(2);
+
+  // Share of its queries that a worker is asked on top, from another's chunks, so that the answers
+  // can be compared. The first is due at once. 0: none.
+  double check_share = 0.01;
 };
 
 // A piece of a round given to one worker for a while.
@@ -31,13 +41,17 @@ struct Lease {
   std::size_t block = 0;
   Eigen::Index first = 0;
   Eigen::Index count = 0;
-  int timeouts = 0;   // earlier leases of this piece that ran out
-  TimePoint started;  // when the worker could start on it: chunks of one worker queue up
+  int timeouts = 0;       // earlier leases of this piece that ran out
+  TimePoint started;      // when the worker could start on it: chunks of one worker queue up
+  bool check = false;     // another has these queries: the answers are for comparing
+  LeaseId twin = 0;       // of the same piece, given to another too: the first answer counts
+  bool answered = false;  // the twin was first: this answer is for comparing
 };
 
 // Who answers what: cuts the blocks of a round into chunks, leases these to workers by their
-// measured speed, and takes back what a worker leaves undone. A plain state machine: no threads,
-// no clock of its own, no network. Times passed in must not go back.
+// measured speed, takes back what a worker leaves undone, gives stragglers to idle workers as
+// well, and has a sample of queries answered twice. A plain state machine: no threads, no clock of
+// its own, no network. Times passed in must not go back.
 class Dispatch {
  public:
   struct Block {
@@ -51,7 +65,9 @@ class Dispatch {
   void Begin(const std::vector<Block>& blocks, TimePoint now);
   void End();  // forgets the round; its leases become late
   bool Active() const { return active_; }
+  // Every query has an answer. Checks and beaten stragglers are not waited for.
   bool Done() const { return active_ && unsettled_ == 0; }
+  Eigen::Index unanswered() const { return unsettled_; }
 
   // `max_chunk` queries at most in one chunk; 0: no wish.
   void Join(WorkerId worker, std::uint32_t max_chunk);
@@ -63,17 +79,18 @@ class Dispatch {
 
   enum class ClaimResult {
     kClaimed,
+    kSecond,   // for comparing: another worker's answer counts
     kLate,     // the lease ended before; the answer is of no use and no harm
     kUnknown,  // never given to this worker, or answered more often than asked
   };
   // An answer came. The lease ends; the piece counts as answered once Settle is called.
   ClaimResult Claim(WorkerId worker, LeaseId id, TimePoint now, Lease* lease);
-  void Settle(const Lease& lease);
+  void Settle(const Lease& lease);  // kClaimed only
 
   // Takes back the chunks of workers that are too slow.
   void Expire(TimePoint now);
   Failure failure(TimePoint now) const;
-  // When Expire or failure next has something to say; TimePoint::max() if never.
+  // When Expire, failure or Assign next has something to say; TimePoint::max() if never.
   TimePoint NextDeadline() const;
 
  private:
@@ -86,14 +103,29 @@ class Dispatch {
   struct Worker {
     std::uint32_t max_chunk = 0;
     double speed = 0;              // queries per second, 0: not known yet
+    double least_seconds = 0;      // of a chunk so far: what the way there and back takes at least
+    double check_credit = 1;       // queries that it may be asked on top
     bool stalled = false;          // let a lease run out and has not answered since
     std::uint64_t unanswered = 0;  // chunks sent less answers come, late ones too
     std::deque<Lease> leases;      // oldest first; only the first one's time runs
+
+    // Is still at something that nobody waits for any more, or has stopped answering.
+    bool Lagging() const { return stalled || unanswered > leases.size(); }
+    bool Idle() const { return leases.empty() && !Lagging(); }
+    int InFlight() const;
+    bool Wants(Eigen::Index count) const { return max_chunk == 0 || count <= max_chunk; }
   };
 
   Eigen::Index ChunkSize(const Worker& worker, const Piece& piece) const;
   Worker* PickWorker(WorkerId* id);
   void TakeBack(Worker* worker, bool timed_out);
+  Lease* Find(LeaseId id);
+  Lease Give(WorkerId id, Lease lease, TimePoint now);
+  std::optional<Lease> NextCheck(WorkerId id, Worker* worker) const;
+  void BackUp(TimePoint now, std::vector<Lease>* leases);
+  TimePoint OverdueAt(const Worker& worker, std::size_t position) const;
+  // The most queries that an idle worker would take; 0: none is idle.
+  Eigen::Index IdleRoom() const;
 
   DispatchOptions options_;
   bool active_ = false;
@@ -106,6 +138,8 @@ class Dispatch {
   LeaseId first_of_round_ = 1;
   LeaseId next_lease_ = 1;
   TimePoint deserted_since_;  // last moment with a worker, or the start of the round
+  // The last chunk of the round given out, and the last one to any other worker: what to check by.
+  std::optional<Lease> newest_, newest_other_;
 };
 
 }  // namespace stellate::server

@@ -101,6 +101,12 @@ class Metrics::Impl final : public SessionObserver {
     (report.certificate.certified ? certified : uncertified).Increment();
   }
 
+  void OnBackUps(std::size_t chunks) override { backups.Increment(static_cast<double>(chunks)); }
+  void OnCompared(std::size_t queries) override {
+    compared.Increment(static_cast<double>(queries));
+  }
+  void OnDisagreement() override { disagreements.Increment(); }
+
   Counter& Count(const char* name, const char* help) {
     return prometheus::BuildCounter().Name(name).Help(help).Register(*registry).Add({});
   }
@@ -110,6 +116,12 @@ class Metrics::Impl final : public SessionObserver {
   Counter& rounds = Count("stellate_rounds_total", "Rounds of refinement that were answered");
   Counter& answered_queries =
       Count("stellate_queries_total", "Oracle queries of the rounds that were answered");
+  Counter& backups =
+      Count("stellate_backups_total", "Chunks of stragglers given to an idle worker as well");
+  Counter& compared = Count("stellate_compared_queries_total",
+                            "Queries that two workers answered and that were compared");
+  Counter& disagreements = Count("stellate_disagreements_total",
+                                 "Times that two workers answered one query differently");
   Counter& received = Count("stellate_received_bytes_total", "Bytes of stream messages received");
   Counter& sent = Count("stellate_sent_bytes_total", "Bytes of stream messages sent");
   Counter& refused =

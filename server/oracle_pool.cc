@@ -16,8 +16,12 @@ double Seconds(Clock::duration duration) { return std::chrono::duration<double>(
 }  // namespace
 
 OraclePool::OraclePool(const core::Specification& spec, DispatchOptions options,
-                       std::size_t max_workers)
-    : spec_(spec), options_(options), max_workers_(max_workers), dispatch_(options) {}
+                       std::size_t max_workers, std::shared_ptr<PoolObserver> observer)
+    : spec_(spec),
+      options_(options),
+      max_workers_(max_workers),
+      observer_(std::move(observer)),
+      dispatch_(options) {}
 
 core::Expected<WorkerId> OraclePool::Join(std::shared_ptr<OracleWorker> worker,
                                           std::uint32_t max_chunk) {
@@ -36,6 +40,7 @@ core::Expected<WorkerId> OraclePool::Join(std::shared_ptr<OracleWorker> worker,
                                         "first, or raise --max-workers"));
     }
     id = next_worker_++;
+    titles_[id] = worker->Title();
     members_.emplace(id, std::move(worker));
     worker_count_ = members_.size();
     dispatch_.Join(id, max_chunk);
@@ -71,7 +76,8 @@ core::Expected<std::optional<Chunk>> OraclePool::Claim(WorkerId worker, LeaseId 
     const std::lock_guard lock(mutex_);
     const TimePoint now = Clock::now();
     Lease lease;
-    switch (dispatch_.Claim(worker, lease_id, now, &lease)) {
+    const auto result = dispatch_.Claim(worker, lease_id, now, &lease);
+    switch (result) {
       case Dispatch::ClaimResult::kUnknown:
         return core::Refuse(StatusCode::kInvalidArgument,
                             core::Message("answers.lease is ", lease_id,
@@ -80,7 +86,14 @@ core::Expected<std::optional<Chunk>> OraclePool::Claim(WorkerId worker, LeaseId 
       case Dispatch::ClaimResult::kLate:
         break;
       case Dispatch::ClaimResult::kClaimed:
-        chunk = Chunk{lease.id, round_, lease.block, lease.first, lease.count};
+      case Dispatch::ClaimResult::kSecond:
+        chunk = Chunk{lease.id,
+                      round_,
+                      lease.block,
+                      lease.first,
+                      lease.count,
+                      worker,
+                      result == Dispatch::ClaimResult::kSecond};
         break;
     }
     deliveries = AssignLocked(now);
@@ -98,7 +111,22 @@ core::Status OraclePool::Deliver(const Chunk& chunk, const core::AnswerBlock& an
   }
   const core::Status status = core::CheckAnswers(spec_, chunk.block(), chunk.first, answer);
   if (!status.ok()) return status;
+  if (chunk.second) {
+    const auto second = std::make_shared<const SecondAnswer>(SecondAnswer{chunk, answer});
+    {
+      const std::lock_guard lock(mutex_);
+      if (round_ != chunk.round) return core::Status::Ok();
+      seconds_.push_back(second);
+    }
+    Compare(*second, chunk.first, chunk.count);
+  } else {
+    TakeOver(chunk, answer);
+  }
+  changed_.notify_one();
+  return core::Status::Ok();
+}
 
+void OraclePool::TakeOver(const Chunk& chunk, const core::AnswerBlock& answer) {
   core::AnswerBlock& whole = chunk.round->answers.blocks[chunk.block_index];
   whole.points.middleCols(chunk.first, chunk.count) = answer.points;
   if (!answer.found.empty()) {
@@ -107,16 +135,74 @@ core::Status OraclePool::Deliver(const Chunk& chunk, const core::AnswerBlock& an
   if (whole.tangents.cols() > 0 && answer.tangents.cols() == chunk.count) {
     whole.tangents.middleCols(chunk.first, chunk.count) = answer.tangents;
   }
+  std::vector<std::shared_ptr<const SecondAnswer>> seconds;
   {
     const std::lock_guard lock(mutex_);
-    if (round_ != chunk.round) return core::Status::Ok();
-    Lease lease;
-    lease.id = chunk.lease;
-    lease.count = chunk.count;
-    dispatch_.Settle(lease);
+    if (round_ != chunk.round) return;
+    auto& by = round_->answered_by[chunk.block_index];
+    std::fill_n(by.begin() + chunk.first, chunk.count, chunk.worker);
+    seconds = seconds_;
   }
-  changed_.notify_one();
-  return core::Status::Ok();
+  // Before the round can end: what two workers disagree about goes into no mesh.
+  for (const auto& second : seconds) {
+    const Chunk& other = second->chunk;
+    if (other.block_index != chunk.block_index) continue;
+    const Index first = std::max(chunk.first, other.first);
+    const Index end = std::min(chunk.first + chunk.count, other.first + other.count);
+    if (first < end) Compare(*second, first, end - first);
+  }
+  const std::lock_guard lock(mutex_);
+  if (round_ != chunk.round) return;
+  Lease lease;
+  lease.id = chunk.lease;
+  lease.count = chunk.count;
+  dispatch_.Settle(lease);
+}
+
+// Of the queries [first, first + count), those that have another worker's answer already. The
+// others' turn comes when it does.
+void OraclePool::Compare(const SecondAnswer& second, Index first, Index count) {
+  const Chunk& chunk = second.chunk;
+  std::vector<std::pair<Index, WorkerId>> others;
+  {
+    const std::lock_guard lock(mutex_);
+    if (round_ != chunk.round) return;
+    const auto& by = round_->answered_by[chunk.block_index];
+    for (Index q = first; q < first + count; ++q) {
+      const WorkerId other = by[static_cast<std::size_t>(q)];
+      if (other != 0 && other != chunk.worker) others.push_back({q, other});
+    }
+  }
+  // Answers that are taken over do not change any more.
+  const core::AnswerBlock& answers = chunk.round->answers.blocks[chunk.block_index];
+  for (const auto& [q, id] : others) {
+    Testimony counted{"", &answers, q};
+    Testimony own{"", &second.answer, q - chunk.first};
+    if (FindDisagreement(spec_, chunk.block(), q, counted, own).empty()) continue;
+    {
+      const std::lock_guard lock(mutex_);
+      counted.worker = TitleLocked(id);
+      own.worker = TitleLocked(chunk.worker);
+    }
+    if (observer_ != nullptr) observer_->OnDisagreement();
+    Fail({"WORKERS_DISAGREE",
+          core::Message("round ", chunk.round->batch.round, ", block ", chunk.block_index, ", ",
+                        FindDisagreement(spec_, chunk.block(), q, counted, own))});
+    break;
+  }
+  if (observer_ != nullptr && !others.empty()) observer_->OnCompared(others.size());
+}
+
+std::string OraclePool::TitleLocked(WorkerId worker) const {
+  const auto it = titles_.find(worker);
+  return it == titles_.end() || it->second.empty()
+             ? core::Message("worker number ", worker)
+             : core::Message("worker number ", worker, " (", it->second, ")");
+}
+
+std::size_t OraclePool::waiting() const {
+  const std::lock_guard lock(mutex_);
+  return static_cast<std::size_t>(dispatch_.unanswered());
 }
 
 void OraclePool::Fail(MeshFailure failure) {
@@ -131,6 +217,7 @@ OraclePool::Outcome OraclePool::Ask(const core::QueryBatch& batch) {
   std::shared_ptr<Round> round = MakeRound(batch);
   std::unique_lock lock(mutex_);
   round_ = round;
+  std::erase_if(titles_, [this](const auto& entry) { return !members_.contains(entry.first); });
   TimePoint now = Clock::now();
   dispatch_.Begin(Measure(batch), now);
   Outcome outcome;
@@ -165,6 +252,7 @@ OraclePool::Outcome OraclePool::Ask(const core::QueryBatch& batch) {
   }
   dispatch_.End();
   round_.reset();
+  seconds_.clear();
   return outcome;
 }
 
@@ -200,10 +288,13 @@ void OraclePool::Close(const WorkerEnd& end) {
 std::vector<OraclePool::Delivery> OraclePool::AssignLocked(TimePoint now) {
   std::vector<Delivery> deliveries;
   if (interrupted_ || failure_) return deliveries;
+  std::size_t backed_up = 0;
   for (const Lease& lease : dispatch_.Assign(now)) {
+    if (lease.twin != 0) ++backed_up;
     deliveries.push_back({members_.at(lease.worker),
                           Chunk{lease.id, round_, lease.block, lease.first, lease.count}});
   }
+  if (observer_ != nullptr && backed_up > 0) observer_->OnBackUps(backed_up);
   return deliveries;
 }
 
@@ -220,6 +311,7 @@ std::shared_ptr<Round> OraclePool::MakeRound(const core::QueryBatch& batch) cons
       answers.tangents = Eigen::MatrixXd::Zero(basis_size, n);
     }
     round->answers.blocks.push_back(std::move(answers));
+    round->answered_by.emplace_back(static_cast<std::size_t>(n), WorkerId{0});
   }
   return round;
 }

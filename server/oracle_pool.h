@@ -7,10 +7,12 @@
 #include <optional>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "core/batch.h"
 #include "core/specification.h"
+#include "server/cross_check.h"
 #include "server/dispatch.h"
 
 namespace stellate::server {
@@ -26,6 +28,8 @@ struct MeshFailure {
 struct Round {
   core::QueryBatch batch;
   core::Answers answers;  // of full size from the start
+  // Of each query of each block, whose answer it has; 0: nobody's yet. The pool's lock guards it.
+  std::vector<std::vector<WorkerId>> answered_by;
 };
 
 // A chunk for a worker: queries [first, first + count) of a block.
@@ -35,6 +39,8 @@ struct Chunk {
   std::size_t block_index = 0;
   Eigen::Index first = 0;
   Eigen::Index count = 0;
+  WorkerId worker = 0;  // of a claimed chunk: who answers
+  bool second = false;  // of a claimed chunk: another's answer counts, this one is compared with it
 
   const core::QueryBlock& block() const { return round->batch.blocks[block_index]; }
 };
@@ -51,6 +57,17 @@ class OracleWorker {
   virtual ~OracleWorker() = default;
   virtual void Ask(Chunk chunk) = 0;
   virtual void End(const WorkerEnd& end) = 0;
+  // For messages to people; asked once, as it joins. Empty: it has no name.
+  virtual std::string Title() const { return ""; }
+};
+
+// Told what a pool does, for the metrics. From any thread; must not block.
+class PoolObserver {
+ public:
+  virtual ~PoolObserver() = default;
+  virtual void OnBackUps(std::size_t chunks) = 0;    // given to an idle worker as well
+  virtual void OnCompared(std::size_t queries) = 0;  // answered by two workers
+  virtual void OnDisagreement() = 0;
 };
 
 // The workers of one mesh. The session's thread asks a whole round and waits; workers' streams
@@ -58,7 +75,8 @@ class OracleWorker {
 class OraclePool {
  public:
   // `max_workers` at once.
-  OraclePool(const core::Specification& spec, DispatchOptions options, std::size_t max_workers);
+  OraclePool(const core::Specification& spec, DispatchOptions options, std::size_t max_workers,
+             std::shared_ptr<PoolObserver> observer = nullptr);
 
   // kFailedPrecondition: the mesh is over. kLimitExceeded: too many workers.
   core::Expected<WorkerId> Join(std::shared_ptr<OracleWorker> worker, std::uint32_t max_chunk);
@@ -67,8 +85,9 @@ class OraclePool {
   // An answer to `lease` came. The chunk that it answers; nothing if the lease has ended, which is
   // no fault of the worker's; kInvalidArgument if it never was this worker's.
   core::Expected<std::optional<Chunk>> Claim(WorkerId worker, LeaseId lease);
-  // Checks the answers to a claimed chunk and takes them over. On error nothing is taken, and the
-  // caller should call Fail.
+  // Checks the answers to a claimed chunk and takes them over, or compares them with another
+  // worker's, who may come later. On error nothing is taken, and the caller should call Fail. Two
+  // workers that disagree fail the mesh, which is no error of this one.
   core::Status Deliver(const Chunk& chunk, const core::AnswerBlock& answer);
   // Ends the round, and with it the mesh. The first failure counts.
   void Fail(MeshFailure failure);
@@ -88,8 +107,15 @@ class OraclePool {
   void Close(const WorkerEnd& end);
 
   std::size_t workers() const { return worker_count_; }
+  // Queries of the round that have no answer yet.
+  std::size_t waiting() const;
 
  private:
+  // An answer for comparing, kept while the round lasts.
+  struct SecondAnswer {
+    Chunk chunk;
+    core::AnswerBlock answer;
+  };
   struct Delivery {
     std::shared_ptr<OracleWorker> worker;
     Chunk chunk;
@@ -99,11 +125,15 @@ class OraclePool {
   std::shared_ptr<Round> MakeRound(const core::QueryBatch& batch) const;
   std::vector<Dispatch::Block> Measure(const core::QueryBatch& batch) const;
   MeshFailure Describe(Dispatch::Failure failure) const;
+  void TakeOver(const Chunk& chunk, const core::AnswerBlock& answer);
+  void Compare(const SecondAnswer& second, Eigen::Index first, Eigen::Index count);
+  std::string TitleLocked(WorkerId worker) const;
   static void Send(std::vector<Delivery> deliveries);
 
   const core::Specification spec_;
   const DispatchOptions options_;
   const std::size_t max_workers_;
+  const std::shared_ptr<PoolObserver> observer_;  // may be null
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
@@ -112,6 +142,8 @@ class OraclePool {
   std::atomic<std::size_t> worker_count_{0};
   WorkerId next_worker_ = 1;
   std::shared_ptr<Round> round_;
+  std::vector<std::shared_ptr<const SecondAnswer>> seconds_;  // of the round
+  std::unordered_map<WorkerId, std::string> titles_;          // of those who answered in the round
   std::optional<MeshFailure> failure_;
   bool interrupted_ = false;
   bool closed_ = false;

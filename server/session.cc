@@ -45,7 +45,7 @@ const char* SessionStateName(SessionState state) {
 Session::Session(SessionOptions options, MesherFactory factory)
     : options_(std::move(options)),
       factory_(std::move(factory)),
-      pool_(options_.spec, options_.dispatch, options_.max_workers),
+      pool_(options_.spec, options_.dispatch, options_.max_workers, options_.observer),
       history_(options_.spec.dimension, options_.spec.ambient_dimension),
       create_time_(options_.record ? options_.record->create_time
                                    : std::chrono::system_clock::now()),
@@ -151,8 +151,7 @@ void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
   if (options_.observer != nullptr) options_.observer->OnRound(queries);
   if (LogEnabled(LogLevel::kDebug)) {
     Log(LogLevel::kDebug, {options_.name, round},
-        core::Message(queries, " queries answered, ", mesher->progress().vertices,
-                      " vertices"));
+        core::Message(queries, " queries answered, ", mesher->progress().vertices, " vertices"));
   }
 }
 

@@ -20,9 +20,8 @@ namespace stellate::server {
 enum class SessionState { kWaiting, kRunning, kSucceeded, kStopped, kCancelled, kFailed };
 
 // Told what becomes of a session, for the metrics. From the session's thread; must not block.
-class SessionObserver {
+class SessionObserver : public PoolObserver {
  public:
-  virtual ~SessionObserver() = default;
   virtual void OnRound(std::size_t queries) = 0;  // answered
   virtual void OnEnd(SessionState state, const core::Report& report) = 0;
 };

@@ -85,6 +85,10 @@ class OracleStream final
     }
   }
 
+  std::string Title() const override {
+    return core::Message(worker_name_, worker_name_.empty() ? "at " : " at ", context_->peer());
+  }
+
   void Tick(TimePoint now) override {
     const auto patience = std::chrono::duration<double>(service_.config.hello_seconds);
     if (caller_ && !service_.authenticator->StillHolds(*caller_)) {
@@ -197,10 +201,6 @@ class OracleStream final
     EndWith(Refusal(v1::ERROR_REASON_ORACLE_FAILED, words));
     session_->pool().Fail({"ORACLE_FAILED", words});
     Leave();
-  }
-
-  std::string Title() const {
-    return core::Message(worker_name_, worker_name_.empty() ? "at " : " at ", context_->peer());
   }
 
   // Gives its work back. Any number of times.

@@ -17,6 +17,7 @@ class DispatchTest : public ::testing::Test {
     options_.answer_limit = 10s;
     options_.worker_wait = 20s;
     options_.chunk_bytes = 1000;
+    options_.check_share = 0;
   }
 
   static TimePoint At(Clock::duration since) { return TimePoint{} + since; }

@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <condition_variable>
+#include <deque>
 #include <future>
 #include <limits>
+#include <mutex>
 
 #include "tests/server/fake_worker.h"
 #include "tests/server/sphere.h"
@@ -26,9 +30,64 @@ core::QueryBatch SomeQueries(int n) {
   return batch;
 }
 
+class Counts : public PoolObserver {
+ public:
+  void OnBackUps(std::size_t chunks) override { backups += chunks; }
+  void OnCompared(std::size_t queries) override { compared += queries; }
+  void OnDisagreement() override { ++disagreements; }
+
+  std::atomic<std::size_t> backups{0}, compared{0}, disagreements{0};
+};
+
+// A worker that answers when the test says so.
+class HandWorker : public OracleWorker {
+ public:
+  explicit HandWorker(std::string title) : title_(std::move(title)) {}
+
+  void Ask(Chunk chunk) override {
+    const std::lock_guard lock(mutex_);
+    chunks_.push_back(std::move(chunk));
+    changed_.notify_all();
+  }
+  void End(const WorkerEnd&) override {}
+  std::string Title() const override { return title_; }
+
+  // Waits for its next chunk.
+  Chunk Take() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return !chunks_.empty(); });
+    Chunk chunk = std::move(chunks_.front());
+    chunks_.pop_front();
+    return chunk;
+  }
+
+ private:
+  const std::string title_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Chunk> chunks_;
+};
+
+// Of a sphere a tenth larger; each answer is right as such.
+bool AnswerForALargerSphere(const Chunk& chunk, core::AnswerBlock* answer) {
+  FakeWorker::AnswerTruly(chunk, answer);
+  answer->points *= 1.1;
+  return true;
+}
+
 class OraclePoolTest : public ::testing::Test {
  protected:
   OraclePoolTest() { options_.chunk_bytes = 4000; }
+
+  void TakeAnswer(OraclePool* pool, WorkerId worker, const Chunk& chunk,
+                  const FakeWorker::Answer& answer = FakeWorker::AnswerTruly) {
+    core::AnswerBlock block;
+    answer(chunk, &block);
+    const auto claimed = pool->Claim(worker, chunk.lease);
+    ASSERT_TRUE(claimed);
+    ASSERT_TRUE(*claimed);
+    EXPECT_TRUE(pool->Deliver(**claimed, block).ok());
+  }
 
   // Asks on a thread of its own, as a session does.
   std::future<OraclePool::Outcome> Ask(OraclePool* pool) {
@@ -79,6 +138,93 @@ TEST_F(OraclePoolTest, AnotherTakesOverWhenAWorkerIsTooSlow) {
   silent->WaitForChunks(1);
   const auto other = FakeWorker::Join(&pool);
   ExpectAllAnswered(outcome.get());
+}
+
+// It never answers; with hours of patience the round ends all the same.
+TEST_F(OraclePoolTest, AnIdleWorkerAnswersForAStraggler) {
+  options_.answer_limit = 10h;
+  options_.straggler_unknown = options_.straggler_floor = 1ms;
+  const auto counts = std::make_shared<Counts>();
+  OraclePool pool(spec_, options_, 8, counts);
+  const auto silent =
+      FakeWorker::Join(&pool, [](const Chunk&, core::AnswerBlock*) { return false; });
+  auto outcome = Ask(&pool);
+  silent->WaitForChunks(1);
+  const auto other = FakeWorker::Join(&pool);
+  ExpectAllAnswered(outcome.get());
+  EXPECT_GT(counts->backups, 0u);
+  EXPECT_EQ(counts->disagreements, 0u);
+  EXPECT_EQ(silent->answered(), 0);
+}
+
+TEST_F(OraclePoolTest, WorkersThatAgreeAreComparedAndLeftInPeace) {
+  options_.straggler_unknown = options_.straggler_floor = 1h;
+  const auto counts = std::make_shared<Counts>();
+  OraclePool pool(spec_, options_, 8, counts);
+  const auto a = FakeWorker::Join(&pool);
+  const auto b = FakeWorker::Join(&pool);
+  ExpectAllAnswered(Ask(&pool).get());
+  EXPECT_GT(counts->compared, 0u);
+  EXPECT_EQ(counts->disagreements, 0u);
+}
+
+TEST_F(OraclePoolTest, WorkersThatServeDifferentManifoldsFailTheRound) {
+  options_.straggler_unknown = options_.straggler_floor = 1h;
+  for (const bool liar_first : {true, false}) {
+    const auto counts = std::make_shared<Counts>();
+    OraclePool pool(spec_, options_, 8, counts);
+    const auto a = FakeWorker::Join(
+        &pool, liar_first ? AnswerForALargerSphere : FakeWorker::Answer(FakeWorker::AnswerTruly));
+    const auto b = FakeWorker::Join(
+        &pool, liar_first ? FakeWorker::Answer(FakeWorker::AnswerTruly) : AnswerForALargerSphere);
+    const auto outcome = Ask(&pool).get();
+    ASSERT_TRUE(outcome.failure);
+    EXPECT_EQ(outcome.failure->reason, "WORKERS_DISAGREE");
+    for (const char* part : {"round 1", "block ", "closest_point query ", "worker number 1",
+                             "worker number 2", "the distances differ by "}) {
+      EXPECT_NE(outcome.failure->message.find(part), std::string::npos)
+          << part << " in " << outcome.failure->message;
+    }
+    EXPECT_GT(counts->disagreements, 0u);
+  }
+}
+
+// The straggler's answer comes after the other's, while a third worker holds up the round.
+TEST_F(OraclePoolTest, AStragglersOwnAnswerIsComparedWithTheOneThatCounts) {
+  options_.check_share = 0;
+  options_.straggler_unknown = 10h;
+  options_.straggler_floor = 0ms;
+  options_.straggler_factor = 0;
+  const auto counts = std::make_shared<Counts>();
+  OraclePool pool(spec_, options_, 8, counts);
+  core::QueryBatch batch;
+  batch.round = 1;
+  batch.blocks.resize(1);
+  batch.blocks[0].points = Eigen::MatrixXd::Random(3, 48);
+  auto outcome = std::async(std::launch::async, [&] { return pool.Ask(batch); });
+  const char* const names[] = {"slow", "quick", "holder"};
+  std::vector<std::shared_ptr<HandWorker>> workers;
+  std::vector<WorkerId> ids;
+  for (const char* name : names) {
+    workers.push_back(std::make_shared<HandWorker>(name));
+    ids.push_back(*pool.Join(workers.back(), 16));
+  }
+  // The first may have two of the three chunks: who came later backs it up.
+  const Chunk late = workers[0]->Take();
+  while (counts->compared == 0) {
+    const Chunk chunk = workers[1]->Take();
+    TakeAnswer(&pool, ids[1], chunk);
+    if (chunk.first != late.first) continue;
+    TakeAnswer(&pool, ids[0], late, AnswerForALargerSphere);
+    break;
+  }
+  EXPECT_EQ(counts->compared, static_cast<std::size_t>(late.count));
+  const auto result = outcome.get();
+  ASSERT_TRUE(result.failure);
+  EXPECT_EQ(result.failure->reason, "WORKERS_DISAGREE");
+  EXPECT_NE(result.failure->message.find("worker number 1 (slow)"), std::string::npos)
+      << result.failure->message;
+  EXPECT_NE(result.failure->message.find("worker number 2 (quick)"), std::string::npos);
 }
 
 TEST_F(OraclePoolTest, AnOracleThatNeverAnswersEndsTheRound) {
