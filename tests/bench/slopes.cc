@@ -1,5 +1,6 @@
 // Prints how accuracy, size and cost grow, as tables and fitted exponents, for built-in manifolds
-// meshed in this process. No assertions on anything: tests/core/refinement/slopes_test.cc has those.
+// meshed in this process. No assertions on anything: tests/core/refinement/slopes_test.cc has
+// those.
 //
 //   slopes [accuracy|dimension|size]...     default: all three
 
@@ -40,7 +41,9 @@ void Accuracy() {
       {"flat-torus:3", {0.4, 0.28, 0.2, 0.14}},
       {"so3", {0.5, 0.35, 0.25, 0.18}},
   };
-  std::puts("Accuracy: theory says vertices ~ eps^-k, Hausdorff distance ~ eps^2, angle ~ eps (degrees).\n");
+  std::puts(
+      "Accuracy: theory says vertices ~ eps^-k, Hausdorff distance ~ eps^2, angle ~ eps "
+      "(degrees).\n");
   for (const auto& range : ranges) {
     const std::unique_ptr<Manifold> manifold = Make(range.manifold);
     std::printf("%s (k = %d, d = %d)\n%10s%10s%11s%13s%12s%12s%11s\n", range.manifold,
@@ -56,9 +59,8 @@ void Accuracy() {
       max_angle.push_back(measured.max_angle);
       std::printf("%10g%10lld%11llu%13.3e%12.3f%12.3f%11s\n", epsilon,
                   static_cast<long long>(run.points.cols()),
-                  static_cast<unsigned long long>(run.report.counts.simplices),
-                  measured.hausdorff, measured.mean_angle * kDegrees,
-                  measured.max_angle * kDegrees, Verdict(run));
+                  static_cast<unsigned long long>(run.report.counts.simplices), measured.hausdorff,
+                  measured.mean_angle * kDegrees, measured.max_angle * kDegrees, Verdict(run));
       std::fflush(stdout);
     }
     std::printf("%10s%10.2f%11s%13.2f%12.2f%12.2f\n\n", "exponent",
