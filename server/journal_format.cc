@@ -1,7 +1,9 @@
 #include "server/journal_format.h"
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
+#include <limits>
 #include <type_traits>
 #include <utility>
 
@@ -108,7 +110,8 @@ class Reader {
     Number(rows);
     const std::string_view data = Array();
     const std::size_t size = data.size() / sizeof(double);
-    if (data.size() % sizeof(double) != 0 || (rows == 0 ? size != 0 : size % rows != 0)) {
+    if (rows > std::numeric_limits<Index>::max() || data.size() % sizeof(double) != 0 ||
+        (rows == 0 ? size != 0 : size % rows != 0)) {
       good_ = false;
     }
     if constexpr (Matrix::ColsAtCompileTime == 1) good_ = good_ && size == rows;
@@ -198,7 +201,12 @@ std::int64_t ToNumber(SystemTime time) {
   return std::chrono::duration_cast<Microseconds>(time.time_since_epoch()).count();
 }
 
-SystemTime ToTime(std::int64_t number) { return SystemTime(Microseconds(number)); }
+SystemTime ToTime(std::int64_t number) {
+  // The clock may count finer: what only a forged record can hold must not overflow it.
+  constexpr std::int64_t kFarthest =
+      std::chrono::duration_cast<Microseconds>(SystemTime::duration::max()).count();
+  return SystemTime(Microseconds(std::clamp(number, -kFarthest, kFarthest)));
+}
 
 }  // namespace
 
