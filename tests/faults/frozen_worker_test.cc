@@ -1,0 +1,52 @@
+// Workers that are frozen (SIGSTOP) at random moments, with chunks in their hands, and thawed
+// later: nobody hangs up, and yet the mesh goes on, and is bit for bit the undisturbed one.
+//
+// $STELLATE_FREEZES: how often (2); $STELLATE_FAULT_SEED: of the moments (1).
+
+#include <iostream>
+
+#include "tests/faults/fault_test.h"
+
+namespace stellate::server {
+namespace {
+
+using testing::Bytes;
+using testing::Process;
+
+class FrozenWorker : public testing::FaultTest {};
+
+TEST_F(FrozenWorker, TheMeshGoesOnAndIsTheUndisturbedOne) {
+  const int wanted = testing::FromEnvironment("STELLATE_FREEZES", 2);
+  auto server = Next({"--keepalive", "0.5", "--keepalive-timeout", "0.5"});
+  const std::optional<Bytes> undisturbed = Undisturbed(server->stub());
+  ASSERT_TRUE(undisturbed);
+  int freezes = 0, meshes = 0;
+  while (freezes < wanted) {
+    // Far more than this test may take: what frees a chunk is not its lease.
+    const std::string name = Create(server->stub(), 3000);
+    ++meshes;
+    const std::string program = std::getenv("FAULT_WORKER");
+    std::vector<std::unique_ptr<Process>> workers;
+    for (int i = 0; i < 2; ++i) {
+      workers.push_back(
+          std::make_unique<Process>(std::vector<std::string>{program, server->address(), name}));
+    }
+    std::jthread freezer([&, wait = Moment(), nap = Moment(), victim = random_() % 2] {
+      std::this_thread::sleep_for(wait);
+      workers[victim]->Freeze();
+      // One that sleeps on after the mesh is over does no harm either.
+      std::this_thread::sleep_for(3 * nap);
+      workers[victim]->Thaw();
+    });
+    const std::optional<Bytes> mesh = testing::Watch(server->stub(), name);
+    freezer.join();
+    ++freezes;
+    ASSERT_TRUE(mesh);
+    testing::ExpectSame(*mesh, *undisturbed);
+    if (HasFailure()) break;
+  }
+  std::cout << freezes << " freezes, " << meshes << " meshes\n";
+}
+
+}  // namespace
+}  // namespace stellate::server
