@@ -1,5 +1,8 @@
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
+
 #if defined(__SANITIZE_THREAD__)
 #include <atomic>
 #include <thread>
@@ -47,5 +50,17 @@ void WithThreads(int threads, const Work& work) {
   arena.execute(work);
 }
 #endif
+
+// The same in chunks whose borders depend on `count` alone, so that what bodies gather by chunk is
+// the same whatever the number of threads: body(chunk, begin, end).
+inline constexpr std::size_t kChunk = 64;
+inline std::size_t ChunkCount(std::size_t count) { return (count + kChunk - 1) / kChunk; }
+
+template <typename Body>
+void ParallelChunks(std::size_t count, const Body& body) {
+  ParallelFor(ChunkCount(count), [&](std::size_t chunk) {
+    body(chunk, chunk * kChunk, std::min(count, (chunk + 1) * kChunk));
+  });
+}
 
 }  // namespace stellate::core

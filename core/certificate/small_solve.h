@@ -15,13 +15,15 @@ struct SmallSystem {
   std::array<double, kMaxDimension> b;                             // right side, then solution
 
   // The determinant's sign, with the solution in b; 0, b undefined, when the determinant is
-  // within rounding of zero: below 1e-12 of the product of the column lengths.
-  int Solve(int n) {
-    double lengths = 1;
+  // within rounding of zero: below 1e-12 of the product of the column lengths. `n` unknowns: an
+  // int, or a std::integral_constant where it is known early.
+  template <typename Number>
+  int Solve(Number n) {
+    double lengths2 = 1;
     for (int c = 0; c < n; ++c) {
       double squared = 0;
       for (int r = 0; r < n; ++r) squared += a[r][c] * a[r][c];
-      lengths *= std::sqrt(squared);
+      lengths2 *= squared;
     }
     double determinant = 1;
     for (int c = 0; c < n; ++c) {
@@ -42,7 +44,7 @@ struct SmallSystem {
         b[r] -= factor * b[c];
       }
     }
-    if (!(std::abs(determinant) > 1e-12 * lengths)) return 0;
+    if (!(determinant * determinant > 1e-24 * lengths2)) return 0;
     for (int r = n - 1; r >= 0; --r) {
       for (int j = r + 1; j < n; ++j) b[r] -= a[r][j] * b[j];
       b[r] /= a[r][r];

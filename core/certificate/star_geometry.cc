@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
+#include <utility>
+#include <vector>
 
 #include "core/certificate/small_solve.h"
 #include "core/message.h"
+#include "core/parallel.h"
 #include "core/sample/random.h"
 #include "core/sample/vector_ops.h"
 
@@ -18,21 +22,17 @@ constexpr double kTellingEdge = 0.5;
 // A solution this little below zero, beside its largest entry, still counts as a hit of the ray.
 constexpr double kRayTolerance = 1e-12;
 
+// The stars of some of the vertices.
+template <int K>
 class StarMeasurer {
  public:
-  StarMeasurer(const MeshView& mesh, const Adjacency& adjacency)
-      : mesh_(mesh),
-        adjacency_(adjacency),
-        k_(mesh.k),
-        d_(mesh.d),
-        number_(mesh.vertices, 0),
-        index_of_(mesh.vertices, 0),
-        place_(adjacency.list().size(), 0) {}
-
-  StarGeometry Run() {
+  StarMeasurer(const MeshView& mesh, const Adjacency& adjacency, double* longest_edge)
+      : mesh_(mesh), adjacency_(adjacency), d_(mesh.d), longest_edge_(longest_edge) {
     result_.reach = std::numeric_limits<double>::infinity();
-    result_.longest_edge.assign(mesh_.vertices, 0);
-    for (std::uint32_t p = 0; p < mesh_.vertices; ++p) {
+  }
+
+  StarGeometry Run(std::size_t begin, std::size_t end) {
+    for (auto p = static_cast<std::uint32_t>(begin); p < end; ++p) {
       if (adjacency_.Star(p).empty()) continue;
       Project(p);
       MeasureReach(p);
@@ -47,67 +47,65 @@ class StarMeasurer {
 
  private:
   struct Neighbour {
-    std::uint32_t id;
+    double u[K];              // tangent coordinates
     double squared_distance;  // |q - p|^2
-    double off_tangent;       // dist(q, T_pM)
+    double off_tangent2;      // dist(q, T_pM)^2
   };
 
-  // Tangent coordinates of p's neighbours, numbered as they are met.
+  // p's neighbours as p sees them, each once; by simplex of the star, which they are.
   void Project(std::uint32_t p) {
+    ids_.clear();
     neighbours_.clear();
+    columns_.clear();
+    const double* centre = mesh_.points + std::size_t{p} * d_;
+    const double* tangent = mesh_.tangents + std::size_t{p} * d_ * K;
+    offset_.resize(d_);
     for (const std::uint32_t s : adjacency_.Star(p)) {
       const std::uint32_t* ids = adjacency_.list()[s];
-      for (int i = 0; i <= k_; ++i) {
-        if (ids[i] == p || number_[ids[i]] == p + 1) continue;
-        number_[ids[i]] = p + 1;
-        neighbours_.push_back({ids[i], 0, 0});
+      for (int i = 0; i <= K; ++i) {
+        if (ids[i] == p) continue;
+        const auto known = std::find(ids_.begin(), ids_.end(), ids[i]);
+        columns_.push_back(static_cast<std::uint32_t>(known - ids_.begin()));
+        if (known != ids_.end()) continue;
+        ids_.push_back(ids[i]);
+        Neighbour n{};
+        const double* q = mesh_.points + std::size_t{ids[i]} * d_;
+        for (int j = 0; j < d_; ++j) {
+          offset_[j] = q[j] - centre[j];
+          for (int a = 0; a < K; ++a) n.u[a] += tangent[j * K + a] * offset_[j];
+        }
+        n.squared_distance = Dot(offset_.data(), offset_.data(), d_);
+        for (int j = 0; j < d_; ++j) {
+          for (int a = 0; a < K; ++a) offset_[j] -= tangent[j * K + a] * n.u[a];
+        }
+        n.off_tangent2 = Dot(offset_.data(), offset_.data(), d_);
+        neighbours_.push_back(n);
       }
-    }
-    flat_.assign(neighbours_.size() * k_, 0.0);
-    const double* centre = mesh_.points + std::size_t{p} * d_;
-    const double* tangent = mesh_.tangents + std::size_t{p} * d_ * k_;
-    offset_.resize(d_);
-    for (std::size_t n = 0; n < neighbours_.size(); ++n) {
-      const double* q = mesh_.points + std::size_t{neighbours_[n].id} * d_;
-      double* u = flat_.data() + n * k_;
-      for (int i = 0; i < d_; ++i) {
-        offset_[i] = q[i] - centre[i];
-        for (int a = 0; a < k_; ++a) u[a] += tangent[i * k_ + a] * offset_[i];
-      }
-      neighbours_[n].squared_distance = Dot(offset_.data(), offset_.data(), d_);
-      for (int i = 0; i < d_; ++i) {
-        for (int a = 0; a < k_; ++a) offset_[i] -= tangent[i * k_ + a] * u[a];
-      }
-      neighbours_[n].off_tangent = std::sqrt(Dot(offset_.data(), offset_.data(), d_));
-      index_of_[neighbours_[n].id] = static_cast<std::uint32_t>(n);
     }
   }
 
   void MeasureReach(std::uint32_t p) {
     double longest2 = 0;
     for (const Neighbour& n : neighbours_) longest2 = std::max(longest2, n.squared_distance);
-    result_.longest_edge[p] = std::sqrt(longest2);
-    for (const Neighbour& n : neighbours_) {
+    longest_edge_[p] = std::sqrt(longest2);
+    for (std::size_t i = 0; i < neighbours_.size(); ++i) {
+      const Neighbour& n = neighbours_[i];
       if (n.squared_distance < kTellingEdge * kTellingEdge * longest2) continue;
-      const double reach = n.squared_distance / (2 * n.off_tangent);
+      const double reach = n.squared_distance / (2 * std::sqrt(n.off_tangent2));
       if (reach < result_.reach) {
         result_.reach = reach;
         result_.narrowest_p = p;
-        result_.narrowest_q = n.id;
+        result_.narrowest_q = ids_[i];
       }
     }
   }
 
-  // Fills the columns of `system` with the tangent coordinates of the simplex's other vertices,
-  // in the order of their ids.
-  void Fill(std::uint32_t p, std::uint32_t s, SmallSystem& system) const {
-    const std::uint32_t* ids = adjacency_.list()[s];
-    int column = 0;
-    for (int i = 0; i <= k_; ++i) {
-      if (ids[i] == p) continue;
-      const double* u = flat_.data() + std::size_t{index_of_[ids[i]]} * k_;
-      for (int r = 0; r < k_; ++r) system.a[r][column] = u[r];
-      ++column;
+  // Fills the columns of `system` with the tangent coordinates of the other vertices of the star's
+  // m-th simplex, in the order of their ids.
+  void Fill(std::size_t m, SmallSystem& system) const {
+    for (int c = 0; c < K; ++c) {
+      const double* u = neighbours_[columns_[m * K + static_cast<std::size_t>(c)]].u;
+      for (int r = 0; r < K; ++r) system.a[r][c] = u[r];
     }
   }
 
@@ -117,27 +115,24 @@ class StarMeasurer {
     Random random(0x5757, p);
     std::array<double, kMaxDimension> ray{};
     SmallSystem system;
-    Fill(p, star.front(), system);
-    for (int c = 0; c < k_; ++c) {
+    Fill(0, system);
+    for (int c = 0; c < K; ++c) {
       const double weight = 0.3 + 0.4 * random.Uniform();
-      for (int r = 0; r < k_; ++r) ray[r] += weight * system.a[r][c];
+      for (int r = 0; r < K; ++r) ray[r] += weight * system.a[r][c];
     }
 
     signs_.resize(star.size());
     int hits = 0;
     for (std::size_t m = 0; m < star.size(); ++m) {
-      place_[star[m]] = static_cast<std::uint32_t>(m);
-      Fill(p, star[m], system);
+      Fill(m, system);
       system.b = ray;
-      signs_[m] = system.Solve(k_);
+      signs_[m] = system.Solve(std::integral_constant<int, K>{});
       if (signs_[m] == 0) return "holds a simplex that is degenerate from its tangent space";
       double largest = 0;
-      for (int r = 0; r < k_; ++r) largest = std::max(largest, std::abs(system.b[r]));
+      for (int r = 0; r < K; ++r) largest = std::max(largest, std::abs(system.b[r]));
       const double floor = -kRayTolerance * largest;
-      if (std::all_of(system.b.begin(), system.b.begin() + k_,
-                      [floor](double x) { return x > floor; })) {
-        ++hits;
-      }
+      hits += std::all_of(system.b.begin(), system.b.begin() + K,
+                          [floor](double x) { return x > floor; });
     }
     if (const char* why = WhyFolded(p)) return why;
     return hits == 1 ? nullptr : "covers some directions of its tangent space more than once";
@@ -149,15 +144,17 @@ class StarMeasurer {
       const std::uint32_t s = star[m];
       const std::uint32_t* ids = adjacency_.list()[s];
       int column = -1;
-      for (int i = 0; i <= k_; ++i) {
+      for (int i = 0; i <= K; ++i) {
         if (ids[i] == p) continue;
         ++column;
         const std::uint32_t t = adjacency_.Across(s, i);
         if (t == Adjacency::kNone) return "has a boundary";
         if (t < s) continue;
         // With the apex moved behind the facet, the two determinants must differ in sign.
-        const int flips = (k_ - 1 - column) + (k_ - 1 - ApexColumn(p, s, t));
-        const int side = signs_[m] * signs_[place_[t]] * (flips % 2 == 0 ? 1 : -1);
+        const int flips = (K - 1 - column) + (K - 1 - ApexColumn(p, s, t));
+        const auto other = std::lower_bound(star.begin(), star.end(), t) - star.begin();
+        const int side =
+            signs_[m] * signs_[static_cast<std::size_t>(other)] * (flips % 2 == 0 ? 1 : -1);
         if (side > 0) return "folds over itself in its tangent space";
       }
     }
@@ -169,31 +166,63 @@ class StarMeasurer {
     const std::uint32_t* in_s = adjacency_.list()[s];
     const std::uint32_t* in_t = adjacency_.list()[t];
     int column = -1;
-    for (int i = 0; i <= k_; ++i) {
+    for (int i = 0; i <= K; ++i) {
       if (in_t[i] == p) continue;
       ++column;
-      if (!std::binary_search(in_s, in_s + k_ + 1, in_t[i])) break;
+      if (std::find(in_s, in_s + K + 1, in_t[i]) == in_s + K + 1) break;
     }
     return column;
   }
 
   const MeshView& mesh_;
   const Adjacency& adjacency_;
-  const int k_, d_;
+  const int d_;
+  double* const longest_edge_;  // by vertex
   StarGeometry result_;
+  std::vector<std::uint32_t> ids_;  // of the neighbours
   std::vector<Neighbour> neighbours_;
-  std::vector<double> flat_;             // neighbours x k: tangent coordinates
-  std::vector<double> offset_;           // d
-  std::vector<std::uint32_t> number_;    // by vertex: last centre seen from, plus one
-  std::vector<std::uint32_t> index_of_;  // by vertex: place among the neighbours
-  std::vector<std::uint32_t> place_;     // by simplex: place in the star
-  std::vector<int> signs_;               // by place in the star
+  std::vector<std::uint32_t>
+      columns_;                 // by simplex of the star, K each: places among the neighbours
+  std::vector<double> offset_;  // d
+  std::vector<int> signs_;      // by simplex of the star
 };
+
+template <int K>
+StarGeometry Measure(const MeshView& mesh, const Adjacency& adjacency) {
+  StarGeometry whole;
+  whole.reach = std::numeric_limits<double>::infinity();
+  whole.longest_edge.assign(mesh.vertices, 0);
+  std::vector<StarGeometry> parts(ChunkCount(mesh.vertices));
+  ParallelChunks(mesh.vertices, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    parts[chunk] = StarMeasurer<K>(mesh, adjacency, whole.longest_edge.data()).Run(begin, end);
+  });
+  for (StarGeometry& part : parts) {
+    if (part.reach < whole.reach) {
+      whole.reach = part.reach;
+      whole.narrowest_p = part.narrowest_p;
+      whole.narrowest_q = part.narrowest_q;
+    }
+    if (whole.unembedded_stars == 0) whole.first_unembedded = std::move(part.first_unembedded);
+    whole.unembedded_stars += part.unembedded_stars;
+  }
+  return whole;
+}
 
 }  // namespace
 
 StarGeometry MeasureStars(const MeshView& mesh, const Adjacency& adjacency) {
-  return StarMeasurer(mesh, adjacency).Run();
+  switch (mesh.k) {
+    case 1:
+      return Measure<1>(mesh, adjacency);
+    case 2:
+      return Measure<2>(mesh, adjacency);
+    case 3:
+      return Measure<3>(mesh, adjacency);
+    case 4:
+      return Measure<4>(mesh, adjacency);
+    default:
+      return Measure<5>(mesh, adjacency);
+  }
 }
 
 }  // namespace stellate::core

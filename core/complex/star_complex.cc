@@ -14,8 +14,8 @@ namespace {
 template <int K>
 inline constexpr int kNearestFirst = 2 * K + 3;
 
-// Simplices of a larger circumradius, in epsilon, are judged in the flats: far out the common centre
-// is no better, and they will be refined anyway.
+// Simplices of a larger circumradius, in epsilon, are judged in the flats: far out the common
+// centre is no better, and they will be refined anyway.
 constexpr double kJudgedRadius = 1.3;
 
 // One a thread, for the life of the thread.
@@ -54,24 +54,42 @@ StarComplex<K>::StarComplex(int d, double epsilon, double inradius, Judging judg
 template <int K>
 class StarComplex<K>::CentreJudge final : public Cell::Judge {
  public:
-  CentreJudge(const StarComplex& complex, const Site& p, const Site* guest)
-      : complex_(complex), p_(p), guest_(guest) {}
+  CentreJudge(const StarComplex& complex, const Site& p, const Site* guest,
+              const Site* newcomer = nullptr, const Cell* born = nullptr)
+      : complex_(complex), p_(p), guest_(guest), newcomer_(newcomer), born_(born) {}
 
   int d() const override { return complex_.d_; }
 
-  void Centre(const Cell& cell, Vertex& v, double* centre) const override {
+  bool Centre(const Cell& cell, Vertex& v, double* centre) const override {
     const int n = d();
-    if (!Common(cell, v, centre)) {
-      std::fill(centre, centre + n, 0.0);
-      for (int a = 0; a < K; ++a)
-        for (int i = 0; i < n; ++i) centre[i] += v.x[a] * p_.tangent[a * n + i];
-      return;
-    }
+    if (!(born_ && Known(v, centre)) && !Common(cell, v, centre)) return false;
     v.norm2 = Dot(centre, centre, n);
     for (int a = 0; a < K; ++a) v.x[a] = Dot(p_.tangent + a * n, centre, n);
+    return true;
+  }
+
+  void Lift(const Vertex& v, double* centre) const override {
+    const int n = d();
+    std::fill(centre, centre + n, 0.0);
+    for (int a = 0; a < K; ++a)
+      for (int i = 0; i < n; ++i) centre[i] += v.x[a] * p_.tangent[a * n + i];
   }
 
  private:
+  // The centre from the newcomer's star, which all simplices of the vertices that it creates are in
+  // if they are consistent.
+  bool Known(const Vertex& v, double* centre) const {
+    const std::uint64_t key = v.key + Mix64(p_.id) - Mix64(newcomer_->id);
+    const auto& vertices = born_->vertices();
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+      if (vertices[i].key != key || !vertices[i].judged) continue;
+      const double* const there = born_->Centre(i, d());
+      for (int j = 0; j < d(); ++j) centre[j] = there[j] + (newcomer_->point[j] - p_.point[j]);
+      return true;
+    }
+    return false;
+  }
+
   bool Common(const Cell& cell, const Vertex& v, double* centre) const {
     std::uint32_t ids[K + 1];
     ids[0] = p_.id;
@@ -101,6 +119,8 @@ class StarComplex<K>::CentreJudge final : public Cell::Judge {
   const StarComplex& complex_;
   const Site& p_;
   const Site* guest_;
+  const Site* newcomer_;
+  const Cell* born_;
 };
 
 template <int K>
@@ -129,13 +149,13 @@ void StarComplex<K>::Lift(std::uint32_t p, const double* x, double* point) const
 
 template <int K>
 bool StarComplex<K>::ClipBy(Cell& cell, const Site& p, const Site& q, const Site* guest,
-                            typename Cell::Scratch& scratch) const {
+                            const Cell* born, typename Cell::Scratch& scratch) const {
   Step step(d_);
   double normal[K];
   const double distance2 = Project(p, q.point, step.data(), normal);
   const double offset = 0.5 * (distance2 + Weight(p.id) - Weight(q.id));
   if (judging_ == Judging::kFlats) return cell.Clip(q.id, normal, offset, scratch);
-  const CentreJudge judge(*this, p, guest);
+  const CentreJudge judge(*this, p, guest, &q, born);
   return cell.Clip(q.id, normal, offset, scratch, &judge, step.data());
 }
 
@@ -177,9 +197,41 @@ bool StarComplex<K>::CutsVertex(std::uint32_t p, std::size_t vertex, const doubl
   return cells_[p].WouldCutVertex(vertex, normal, offset, &judge, step.data());
 }
 
+// The sample points that most likely close a cell around q, the nearest first: those nearest, or,
+// where a star near q is known, that star and the stars of its points nearest to q.
+template <int K>
+void StarComplex<K>::Neighbourhood(const double* q, std::uint32_t near,
+                                   std::vector<std::uint32_t>* ids) const {
+  ids->clear();
+  constexpr int kCount = kNearestFirst<K>;
+  std::array<std::pair<double, std::uint32_t>, kCount> nearest;
+  if (near == kNone || !cells_[near].bounded()) {
+    const int count = Nearest(q, kCount, nearest.data());
+    for (int i = 0; i < count; ++i) ids->push_back(nearest[static_cast<std::size_t>(i)].second);
+    return;
+  }
+  int count = 0;
+  const auto offer = [&](std::uint32_t id) {
+    const std::pair<double, std::uint32_t> candidate{SquaredDistance(q, Point(id), d_), id};
+    if (count == K + 1 && !(candidate < nearest[K])) return;
+    int at = count < K + 1 ? count++ : K;
+    for (; at > 0 && candidate < nearest[at - 1]; --at) nearest[at] = nearest[at - 1];
+    nearest[at] = candidate;
+  };
+  offer(near);
+  for (const auto& facet : cells_[near].facets())
+    if (!IsFake(facet.id)) offer(facet.id);
+  const auto add = [&](std::uint32_t id) {
+    if (!IsFake(id) && std::find(ids->begin(), ids->end(), id) == ids->end()) ids->push_back(id);
+  };
+  for (int i = 0; i < count; ++i) ids->push_back(nearest[i].second);
+  for (int i = 0; i < count; ++i)
+    for (const auto& facet : cells_[nearest[i].second].facets()) add(facet.id);
+}
+
 template <int K>
 template <typename Influencing>
-void StarComplex<K>::BuildStar(const Site& p, const Site* guest, Cell& cell,
+void StarComplex<K>::BuildStar(const Site& p, const Site* guest, std::uint32_t near, Cell& cell,
                                typename Cell::Scratch& scratch,
                                const Influencing& influencing) const {
   if (judging_ == Judging::kFlats) {
@@ -188,19 +240,19 @@ void StarComplex<K>::BuildStar(const Site& p, const Site* guest, Cell& cell,
     const CentreJudge judge(*this, p, guest);
     cell.Reset(inradius_, &judge);
   }
-  // The nearest points close the cell, or nearly so: without them a search that happens to begin on
+  // What closes the cell, or nearly so, comes first: without it a search that happens to begin on
   // one side of p would visit all of that side while the cell is open towards the other.
-  std::array<std::pair<double, std::uint32_t>, kNearestFirst<K>> nearest;
-  const auto last = nearest.begin() + Nearest(p.point, kNearestFirst<K>, nearest.data());
-  for (auto q = nearest.begin(); q != last; ++q)
-    if (q->second != p.id) ClipBy(cell, p, At(q->second), guest, scratch);
+  thread_local std::vector<std::uint32_t> first;
+  Neighbourhood(p.point, near, &first);
+  for (const std::uint32_t q : first)
+    if (q != p.id) ClipBy(cell, p, At(q), guest, nullptr, scratch);
+  double reach = Influence(cell);
   tree_.VisitAround(
-      p.point, [&] { return Influence(cell); },
+      p.point, [&] { return reach; },
       [&](std::uint32_t q, double) {
         // Once by each point: a second cut by the same plane would be decided by rounding.
-        const auto seen = std::find_if(nearest.begin(), last,
-                                       [q](const auto& near) { return near.second == q; });
-        if (q != p.id && seen == last) ClipBy(cell, p, At(q), guest, scratch);
+        if (q == p.id || std::find(first.begin(), first.end(), q) != first.end()) return;
+        if (ClipBy(cell, p, At(q), guest, nullptr, scratch)) reach = Influence(cell);
       },
       influencing);
 }
@@ -212,24 +264,31 @@ bool StarComplex<K>::SimplexOf(std::uint32_t p, const Cell& cell, const Vertex& 
   for (int s = 0; s < K; ++s) {
     const std::uint32_t id = cell.facets()[v.facet[s]].id;
     if (IsFake(id)) return false;
-    (*simplex)[static_cast<std::size_t>(s) + 1] = id;
+    std::size_t at = static_cast<std::size_t>(s) + 1;
+    for (; at > 0 && (*simplex)[at - 1] > id; --at) (*simplex)[at] = (*simplex)[at - 1];
+    (*simplex)[at] = id;
   }
-  std::sort(simplex->begin(), simplex->end());
   return true;
 }
 
 template <int K>
 void StarComplex<K>::Owned(std::uint32_t p, std::vector<Simplex>* simplices) const {
   simplices->clear();
+  const Cell& cell = cells_[p];
   Simplex s;
-  for (const Vertex& v : cells_[p].vertices())
-    if (SimplexOf(p, cells_[p], v, &s) && s[0] == p) simplices->push_back(s);
+  for (const Vertex& v : cell.vertices()) {
+    const bool lowest =
+        std::all_of(v.facet, v.facet + K, [&](auto f) { return cell.facets()[f].id > p; });
+    if (lowest && SimplexOf(p, cell, v, &s)) simplices->push_back(s);
+  }
   std::sort(simplices->begin(), simplices->end());
 }
 
 template <int K>
-std::uint32_t StarComplex<K>::Append(const double* point, const double* tangent) {
+std::uint32_t StarComplex<K>::Append(const double* point, const double* tangent,
+                                     std::uint32_t near) {
   const std::uint32_t id = size();
+  near_.push_back(near);
   points_.insert(points_.end(), point, point + d_);
   tangents_.insert(tangents_.end(), tangent, tangent + d_ * K);
   tree_.Insert(0);  // until Commit it is found by place, but has no influence
@@ -238,15 +297,11 @@ std::uint32_t StarComplex<K>::Append(const double* point, const double* tangent)
 
 template <int K>
 bool StarComplex<K>::AnyWithin(const double* q, double radius) const {
-  bool any = false;
-  tree_.VisitNear(
-      q, [&] { return any ? -1.0 : radius; }, [&](std::uint32_t, double) { any = true; });
-  return any;
+  return tree_.AnyWithin(q, radius);
 }
 
 template <int K>
-typename StarComplex<K>::Change StarComplex<K>::Commit(
-    std::vector<std::uint32_t>* around) {
+typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t>* around) {
   const auto first = static_cast<std::uint32_t>(cells_.size());
   const std::uint32_t count = size() - first;
   Change change;
@@ -254,24 +309,37 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(
   cells_.resize(size());
 
   // Which old stars does each new point cut? Their influence is still that of before.
-  std::vector<std::vector<std::uint32_t>> cut_by(count);
-  ParallelFor(count, [&](std::uint32_t i) {
-    const Site q = At(first + i);
-    BuildStar(q, nullptr, cells_[q.id], ThreadScratch<K>(), [&](std::uint32_t p) {
-      if (Cuts(cells_[p], At(p), q)) cut_by[i].push_back(p);
-    });
+  struct Cut {
+    std::uint32_t star, by;
+    bool operator<(const Cut& other) const {
+      return star != other.star ? star < other.star : by < other.by;
+    }
+  };
+  const std::size_t chunks = ChunkCount(count);
+  std::vector<std::vector<Cut>> cuts_by_chunk(chunks);
+  ParallelChunks(count, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    Cell cell;  // its memory is used again and again; what is kept is no larger than it must be
+    for (std::size_t i = begin; i < end; ++i) {
+      const Site q = At(first + static_cast<std::uint32_t>(i));
+      BuildStar(q, nullptr, near_[i], cell, ThreadScratch<K>(), [&](std::uint32_t p) {
+        if (Cuts(cells_[p], At(p), q)) cuts_by_chunk[chunk].push_back({p, q.id});
+      });
+      cells_[q.id] = cell;
+    }
   });
+  near_.clear();
 
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> cuts;  // star, new point
-  for (std::uint32_t i = 0; i < count; ++i)
-    for (const std::uint32_t p : cut_by[i]) cuts.emplace_back(p, first + i);
-  cut_by.clear();
+  std::vector<Cut> cuts;
+  for (std::vector<Cut>& some : cuts_by_chunk) {
+    cuts.insert(cuts.end(), some.begin(), some.end());
+    some = {};
+  }
   std::sort(cuts.begin(), cuts.end());
   std::vector<std::size_t> begins;
   for (std::size_t i = 0; i < cuts.size(); ++i) {
-    if (i == 0 || cuts[i].first != cuts[i - 1].first) {
+    if (i == 0 || cuts[i].star != cuts[i - 1].star) {
       begins.push_back(i);
-      change.stars.push_back(cuts[i].first);
+      change.stars.push_back(cuts[i].star);
     }
   }
   begins.push_back(cuts.size());
@@ -286,21 +354,29 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(
   struct Swap {
     std::vector<Simplex> removed, added;
   };
-  std::vector<Swap> swaps(change.stars.size() + count);
-  ParallelFor(change.stars.size(), [&](std::size_t i) {
-    const std::uint32_t p = change.stars[i];
+  std::vector<Swap> swaps(ChunkCount(change.stars.size()));
+  ParallelChunks(change.stars.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     std::vector<Simplex> before, after;
-    Owned(p, &before);
-    for (std::size_t j = begins[i]; j < begins[i + 1]; ++j)
-      ClipBy(cells_[p], At(p), At(cuts[j].second), nullptr, ThreadScratch<K>());
-    Owned(p, &after);
-    std::set_difference(before.begin(), before.end(), after.begin(), after.end(),
-                        std::back_inserter(swaps[i].removed));
-    std::set_difference(after.begin(), after.end(), before.begin(), before.end(),
-                        std::back_inserter(swaps[i].added));
+    Swap& swap = swaps[chunk];
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint32_t p = change.stars[i];
+      Owned(p, &before);
+      for (std::size_t j = begins[i]; j < begins[i + 1]; ++j)
+        ClipBy(cells_[p], At(p), At(cuts[j].by), nullptr, &cells_[cuts[j].by], ThreadScratch<K>());
+      Owned(p, &after);
+      std::set_difference(before.begin(), before.end(), after.begin(), after.end(),
+                          std::back_inserter(swap.removed));
+      std::set_difference(after.begin(), after.end(), before.begin(), before.end(),
+                          std::back_inserter(swap.added));
+    }
   });
-  for (std::uint32_t i = 0; i < count; ++i)
-    Owned(first + i, &swaps[change.stars.size() + i].added);
+  // A new point has the largest id of its simplices but for those among new points alone.
+  Swap& fresh = swaps.emplace_back();
+  std::vector<Simplex> owned;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    Owned(first + i, &owned);
+    fresh.added.insert(fresh.added.end(), owned.begin(), owned.end());
+  }
 
   if (around) {
     for (const std::uint32_t p : change.stars) note_neighbours(p);
@@ -320,15 +396,14 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(
 }
 
 template <int K>
-void StarComplex<K>::TryPoint(const double* point, const double* tangent,
+void StarComplex<K>::TryPoint(const double* point, const double* tangent, std::uint32_t near,
                               typename Cell::Scratch& scratch, Tentative* result) const {
   const Site guest{size(), point, tangent};
   result->cut.clear();
-  BuildStar(guest, &guest, result->own, scratch, [&](std::uint32_t p) {
-    if (!Cuts(cells_[p], At(p), guest)) return;
-    result->cut.emplace_back(p, cells_[p]);
-    ClipBy(result->cut.back().second, At(p), guest, &guest, scratch);
+  BuildStar(guest, &guest, near, result->own, scratch, [&](std::uint32_t p) {
+    if (Cuts(cells_[p], At(p), guest)) result->cut.emplace_back(p, cells_[p]);
   });
+  for (auto& [p, cell] : result->cut) ClipBy(cell, At(p), guest, &guest, &result->own, scratch);
   std::sort(result->cut.begin(), result->cut.end(),
             [](const auto& a, const auto& b) { return a.first < b.first; });
 }

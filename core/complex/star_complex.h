@@ -33,11 +33,17 @@ class StarComplex {
   // What an insertion did.
   struct Change {
     std::vector<std::uint32_t> stars;  // old stars that changed, ascending; new ones not among them
-    std::vector<std::uint32_t> added, removed;  // simplices held by their lowest vertex, K+1 ids each
+    std::vector<std::uint32_t> added,
+        removed;  // simplices held by their lowest vertex, K+1 ids each
   };
 
-  // A point waiting to be inserted by Commit. Later calls of NearestWithin see it.
-  std::uint32_t Append(const double* point, const double* tangent);
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
+  // A point waiting to be inserted by Commit. Later calls of AnyWithin see it. `near`, if known, is
+  // a sample point whose star it will change: its cell is found sooner. The cell is the same where
+  // stars are judged in flats; at common centres the order of the cuts may tell in a cell that is
+  // far from convex.
+  std::uint32_t Append(const double* point, const double* tangent, std::uint32_t near = kNone);
   // Builds the stars of the appended points and clips all others by them, in parallel; the result
   // does not depend on the number of threads. `around`, if given, gets the neighbours that changed
   // stars have or had (with repetitions): their simplices may have become inconsistent.
@@ -61,11 +67,12 @@ class StarComplex {
   // visit(id) for each sample point within `radius` of q.
   template <typename Visit>
   void ForEachWithin(const double* q, double radius, Visit&& visit) const {
-    tree_.VisitNear(q, [&] { return radius; }, [&](std::uint32_t id, double) { visit(id); });
+    tree_.VisitNear(
+        q, [&] { return radius; }, [&](std::uint32_t id, double) { visit(id); });
   }
 
-  // The `count` sample points nearest to q as (squared distance, id), nearest first; returns how many
-  // there are.
+  // The `count` sample points nearest to q as (squared distance, id), nearest first; returns how
+  // many there are.
   int Nearest(const double* q, int count, std::pair<double, std::uint32_t>* nearest) const;
 
   // Whether a point would take the simplex dual to a vertex of p's cell out of star(p).
@@ -82,8 +89,8 @@ class StarComplex {
     Cell own;
     std::vector<std::pair<std::uint32_t, Cell>> cut;
   };
-  void TryPoint(const double* point, const double* tangent, typename Cell::Scratch& scratch,
-                Tentative* result) const;
+  void TryPoint(const double* point, const double* tangent, std::uint32_t near,
+                typename Cell::Scratch& scratch, Tentative* result) const;
 
   // Simplices held by the star of their lowest vertex.
   std::vector<std::uint32_t> Simplices() const;
@@ -109,15 +116,17 @@ class StarComplex {
   class CentreJudge;
   Site At(std::uint32_t id) const { return {id, Point(id), Tangent(id)}; }
   // Clips the cell of p by q, or only says whether it would. `guest` is a site that may be named by
-  // the cell's facets without being in the sample.
-  bool ClipBy(Cell& cell, const Site& p, const Site& q, const Site* guest,
+  // the cell's facets without being in the sample. `born`: the star of q, if it is there already,
+  // where centres may be looked up.
+  bool ClipBy(Cell& cell, const Site& p, const Site& q, const Site* guest, const Cell* born,
               typename Cell::Scratch& scratch) const;
   bool Cuts(const Cell& cell, const Site& p, const Site& q) const;
   double Project(const Site& p, const double* q, double* step, double* normal) const;
   // Builds p's cell, and calls influencing(q) for each sample point whose cell p may cut.
   template <typename Influencing>
-  void BuildStar(const Site& p, const Site* guest, Cell& cell, typename Cell::Scratch& scratch,
-                 const Influencing& influencing) const;
+  void BuildStar(const Site& p, const Site* guest, std::uint32_t near, Cell& cell,
+                 typename Cell::Scratch& scratch, const Influencing& influencing) const;
+  void Neighbourhood(const double* q, std::uint32_t near, std::vector<std::uint32_t>* ids) const;
   void Owned(std::uint32_t p, std::vector<Simplex>* simplices) const;
   double Influence(const Cell& cell) const { return 2 * std::sqrt(cell.max_norm2()) * (1 + 1e-9); }
 
@@ -128,6 +137,7 @@ class StarComplex {
   double weight_scale_;
   std::vector<double> points_, tangents_;
   std::vector<Cell> cells_;
+  std::vector<std::uint32_t> near_;  // of the appended points
   BallTree tree_;
   std::uint64_t simplex_count_ = 0;
 };

@@ -1,6 +1,7 @@
 #include "core/geometry/common_centre.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -40,31 +41,53 @@ void Substitute(const double (&factor)[K][K], double* x) {
   }
 }
 
-}  // namespace
+// Room for `count` vectors of R^d, D = d where that is known early: on the stack then.
+template <int D, int count>
+class Vectors {
+ public:
+  explicit Vectors(int) {}
+  double* operator[](int i) { return memory_.data() + i * D; }
 
-template <int K>
-bool CommonCentre(int d, const double* const* points, const double* const* tangents,
-                  const double* weights, double* centre, double* radius2) {
-  const auto n = static_cast<std::size_t>(d);
-  thread_local std::vector<double> memory;
-  memory.resize(n * (K + 2));
+ private:
+  std::array<double, D * count> memory_;
+};
+
+template <int count>
+class Vectors<0, count> {
+ public:
+  explicit Vectors(int d) : d_(d) { Memory().resize(static_cast<std::size_t>(d * count)); }
+  double* operator[](int i) { return Memory().data() + i * d_; }
+
+ private:
+  static std::vector<double>& Memory() {
+    thread_local std::vector<double> memory;
+    return memory;
+  }
+  int d_;
+};
+
+// D: d, or 0 for any. Known early, the short loops unroll.
+template <int K, int D>
+bool CentreOf(int any_d, const double* const* points, const double* const* tangents,
+              const double* weights, double* centre, double* radius2) {
+  const int d = D > 0 ? D : any_d;
+  Vectors<D, K + 2> memory(d);
   double* edge[K];  // v_i - v_0
   for (int i = 0; i < K; ++i) {
-    edge[i] = memory.data() + static_cast<std::size_t>(i) * n;
+    edge[i] = memory[i];
     for (int j = 0; j < d; ++j) edge[i][j] = points[i + 1][j] - points[0][j];
   }
-  double* lift = memory.data() + K * n;
-  double* away = lift + n;
+  double* const lift = memory[K];
+  double* const away = memory[K + 1];
 
   double gram[K][K], barycentric[K];
   for (int r = 0; r < K; ++r)
     for (int c = 0; c <= r; ++c) gram[r][c] = Dot(edge[r], edge[c], d);
-  for (int r = 0; r < K; ++r)
-    barycentric[r] = 0.5 * (gram[r][r] + weights[0] - weights[r + 1]);
+  for (int r = 0; r < K; ++r) barycentric[r] = 0.5 * (gram[r][r] + weights[0] - weights[r + 1]);
   if (!Factor<K>(gram)) return false;
   Substitute<K>(gram, barycentric);  // x = v_0 + sum barycentric_i edge_i
 
-  std::fill(centre, centre + d, 0.0);
+  for (int j = 0; j < d; ++j) centre[j] = 0;
   double first = 1;
   for (int i = 0; i < K; ++i) {
     first -= barycentric[i];
@@ -72,12 +95,12 @@ bool CommonCentre(int d, const double* const* points, const double* const* tange
   }
   *radius2 = Dot(centre, centre, d);
 
-  std::fill(lift, lift + d, 0.0);
+  for (int j = 0; j < d; ++j) lift[j] = 0;
   for (int i = 0; i <= K; ++i) {
     const double b = 0.5 * (i == 0 ? first : barycentric[i - 1]);
-    for (int j = 0; j < d; ++j) away[j] = centre[j] - (i == 0 ? 0.0 : edge[i - 1][j]);
+    for (int j = 0; j < d; ++j) away[j] = i == 0 ? centre[j] : centre[j] - edge[i - 1][j];
     for (int a = 0; a < K; ++a) {
-      const double* t = tangents[i] + a * d;
+      const double* const t = tangents[i] + a * d;
       const double s = b * Dot(t, away, d);
       for (int j = 0; j < d; ++j) lift[j] += s * t[j];
     }
@@ -92,15 +115,37 @@ bool CommonCentre(int d, const double* const* points, const double* const* tange
   return true;
 }
 
-template bool CommonCentre<1>(int, const double* const*, const double* const*, const double*,
-                              double*, double*);
-template bool CommonCentre<2>(int, const double* const*, const double* const*, const double*,
-                              double*, double*);
-template bool CommonCentre<3>(int, const double* const*, const double* const*, const double*,
-                              double*, double*);
-template bool CommonCentre<4>(int, const double* const*, const double* const*, const double*,
-                              double*, double*);
-template bool CommonCentre<5>(int, const double* const*, const double* const*, const double*,
-                              double*, double*);
+}  // namespace
+
+template <int K>
+bool CommonCentre(int d, const double* const* points, const double* const* tangents,
+                  const double* weights, double* centre, double* radius2) {
+  switch (d) {
+#define STELLATE_CASE(D) \
+  case D:                \
+    return CentreOf<K, D>(d, points, tangents, weights, centre, radius2);
+    STELLATE_CASE(3)
+    STELLATE_CASE(4)
+    STELLATE_CASE(5)
+    STELLATE_CASE(6)
+    STELLATE_CASE(7)
+    STELLATE_CASE(8)
+    STELLATE_CASE(9)
+    STELLATE_CASE(10)
+#undef STELLATE_CASE
+    default:
+      return CentreOf<K, 0>(d, points, tangents, weights, centre, radius2);
+  }
+}
+
+#define STELLATE_INSTANTIATE(K)                                                                 \
+  template bool CommonCentre<K>(int, const double* const*, const double* const*, const double*, \
+                                double*, double*);
+STELLATE_INSTANTIATE(1)
+STELLATE_INSTANTIATE(2)
+STELLATE_INSTANTIATE(3)
+STELLATE_INSTANTIATE(4)
+STELLATE_INSTANTIATE(5)
+#undef STELLATE_INSTANTIATE
 
 }  // namespace stellate::core

@@ -44,6 +44,13 @@ constexpr double kSlack = 1e-9;
 // A judged cell is no convex polytope, and its edges' ends are only about where the facets meet.
 constexpr double kJudgedSlack = 3;
 
+// Cells are many and small, and hardly grow: no doubling.
+template <typename Item>
+void Grow(std::vector<Item>& items, std::size_t size) {
+  if (items.capacity() < size) items.reserve(size + 1);
+  items.resize(size);
+}
+
 }  // namespace
 
 template <int K>
@@ -70,8 +77,10 @@ void RestrictedVoronoiCell<K>::Reset(double inradius, const Judge* judge) {
       vertices_[i].x[a] = -n[i][a] * inradius * K;
     }
     facets_[i].offset = inradius * inradius;
+    facets_[i].vertices = K;
     vertices_[i].norm2 = inradius * inradius * K * K;
     vertices_[i].key = 0;
+    vertices_[i].judged = false;
     for (int j = 0, slot = 0; j <= K; ++j) {
       if (j == i) continue;
       vertices_[i].key += Mix64(facets_[static_cast<std::size_t>(j)].id);
@@ -85,7 +94,7 @@ void RestrictedVoronoiCell<K>::Reset(double inradius, const Judge* judge) {
   if (!judge) return;
   const auto d = static_cast<std::size_t>(judge->d());
   centres_.resize((K + 1) * d);
-  for (std::size_t i = 0; i <= K; ++i) judge->Centre(*this, vertices_[i], centres_.data() + i * d);
+  for (std::size_t i = 0; i <= K; ++i) judge->Lift(vertices_[i], centres_.data() + i * d);
 }
 
 // The coordinates come from the facets alone, in the order of their ids, so that they do not
@@ -97,12 +106,12 @@ void RestrictedVoronoiCell<K>::Locate(Vertex& v, const Vertex& kept, const Verte
                                       double s, double t, double slack) const {
   Index order[K];
   std::copy(v.facet, v.facet + K, order);
-  std::sort(order, order + K, [&](Index a, Index b) { return facets_[a].id < facets_[b].id; });
+  for (int i = 1; i < K; ++i)
+    for (int j = i; j > 0 && facets_[order[j]].id < facets_[order[j - 1]].id; --j)
+      std::swap(order[j], order[j - 1]);
   double m[K][K + 1];
-  v.key = 0;
   for (int r = 0; r < K; ++r) {
     const Facet& f = facets_[order[r]];
-    v.key += Mix64(f.id);
     for (int a = 0; a < K; ++a) m[r][a] = f.normal[a];
     m[r][K] = f.offset;
   }
@@ -121,16 +130,31 @@ void RestrictedVoronoiCell<K>::Locate(Vertex& v, const Vertex& kept, const Verte
 }
 
 template <int K>
+void RestrictedVoronoiCell<K>::SetKey(Vertex& v) const {
+  v.key = 0;
+  for (const Index f : v.facet) v.key += Mix64(facets_[f].id);
+}
+
+template <int K>
 bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, double offset,
                                     Scratch& scratch, const Judge* judge, const double* step) {
   const std::size_t old_count = vertices_.size();
-  scratch.excess.resize(old_count);
+  if (scratch.excess.size() < old_count) scratch.excess.resize(2 * old_count);
+  double* const excess = scratch.excess.data();
   std::size_t worst = 0;
   for (std::size_t i = 0; i < old_count; ++i) {
-    scratch.excess[i] = Excess(i, normal, offset, judge, step);
-    if (scratch.excess[i] > scratch.excess[worst]) worst = i;
+    excess[i] = Excess(i, normal, offset, judge, step);
+    if (excess[i] > excess[worst]) worst = i;
   }
-  if (!(scratch.excess[worst] > 0)) return false;
+  if (!(excess[worst] > 0)) return false;
+  Facet facet;
+  std::copy(normal, normal + K, facet.normal);
+  facet.offset = offset;
+  facet.id = id;
+  facet.vertices = 0;
+  if constexpr (K == 2) {
+    if (!judge) return ClipPolygon(facet, worst, scratch);
+  }
 
   // What a plane cuts off a polytope is connected: take the part around the worst vertex, and
   // leave what only rounding put beyond the plane.
@@ -141,74 +165,152 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
     const Index v = scratch.stack.back();
     scratch.stack.pop_back();
     for (const Index w : vertices_[v].adjacent) {
-      if (scratch.cut[w] || !(scratch.excess[w] > 0)) continue;
+      if (scratch.cut[w] || !(excess[w] > 0)) continue;
       scratch.cut[w] = 1;
       scratch.stack.push_back(w);
     }
   }
   if (judge && !Tidy(scratch)) return false;
-  if (K >= 3) {  // where Stitch may fail
-    scratch.facets = facets_;
-    scratch.vertices = vertices_;
-    scratch.centres = centres_;
-  }
   scratch.crossings.clear();
-  std::size_t removed_count = 0;
+  scratch.removed.clear();
   for (std::size_t v = 0; v < old_count; ++v) {
     if (!scratch.cut[v]) continue;
-    ++removed_count;
+    scratch.removed.push_back(static_cast<Index>(v));
     for (int s = 0; s < K; ++s) {
       const Index w = vertices_[v].adjacent[s];
       if (!scratch.cut[w])
-        scratch.crossings.push_back({w, static_cast<Index>(v), static_cast<Index>(s)});
+        scratch.crossings.push_back({w, 0, static_cast<Index>(v), static_cast<Index>(s)});
     }
   }
-  if (removed_count == old_count) return false;
-
-  const Index new_facet = static_cast<Index>(facets_.size());
-  Facet facet;
-  std::copy(normal, normal + K, facet.normal);
-  facet.offset = offset;
-  facet.id = id;
-  facets_.push_back(facet);
+  if (scratch.removed.size() == old_count) return false;
 
   // One new vertex on each edge that crosses the plane. Its slot 0 holds the new facet, so that
   // adjacent[0] is the kept end of the edge; the edge's facets follow.
-  vertices_.resize(old_count + scratch.crossings.size());
-  const std::size_t d = judge ? static_cast<std::size_t>(judge->d()) : 0;
-  centres_.resize(vertices_.size() * d);
+  const Index new_facet = static_cast<Index>(facets_.size());
+  Grow(facets_, facets_.size() + 1);
+  facets_.back() = facet;
+  Grow(vertices_, old_count + scratch.crossings.size());
   for (std::size_t c = 0; c < scratch.crossings.size(); ++c) {
-    const auto [kept, removed, slot] = scratch.crossings[c];
+    auto& crossing = scratch.crossings[c];
     const Index created = static_cast<Index>(old_count + c);
+    Vertex& removed = vertices_[crossing.removed];
+    Vertex& kept = vertices_[crossing.kept];
     Vertex& v = vertices_[created];
     v.facet[0] = new_facet;
-    v.adjacent[0] = kept;
+    v.adjacent[0] = crossing.kept;
     if constexpr (K > 1) {
       for (int s = 0, i = 1; s < K; ++s)
-        if (s != slot) v.facet[i++] = vertices_[removed].facet[s];
+        if (s != crossing.slot) v.facet[i++] = removed.facet[s];
     }
-    Vertex& k = vertices_[kept];
     for (int s = 0; s < K; ++s) {
       // The slot of kept's edge to `removed`: its facet is not on the edge.
-      if (k.adjacent[s] == removed &&
-          std::find(v.facet + 1, v.facet + K, k.facet[s]) == v.facet + K) {
-        k.adjacent[s] = created;
+      if (kept.adjacent[s] == crossing.removed &&
+          std::find(v.facet + 1, v.facet + K, kept.facet[s]) == v.facet + K) {
+        crossing.kept_slot = static_cast<Index>(s);
+        kept.adjacent[s] = created;
         break;
       }
     }
-    vertices_[removed].adjacent[slot] = created;
-    Locate(v, k, vertices_[removed], scratch.excess[kept], scratch.excess[removed],
-           judge ? kJudgedSlack : kSlack);
-    if (judge) judge->Centre(*this, v, centres_.data() + created * d);
+    removed.adjacent[crossing.slot] = created;
   }
-
   if (!Stitch(scratch, old_count)) {
-    facets_ = scratch.facets;
-    vertices_ = scratch.vertices;
-    centres_ = scratch.centres;
+    for (const auto& crossing : scratch.crossings) {
+      vertices_[crossing.kept].adjacent[crossing.kept_slot] = crossing.removed;
+      vertices_[crossing.removed].adjacent[crossing.slot] = crossing.kept;
+    }
+    vertices_.resize(old_count);
+    facets_.pop_back();
     return false;
   }
-  Compact(scratch, d);
+  const std::size_t d = judge ? static_cast<std::size_t>(judge->d()) : 0;
+  Grow(centres_, vertices_.size() * d);
+  for (std::size_t c = 0; c < scratch.crossings.size(); ++c) {
+    const auto& crossing = scratch.crossings[c];
+    Vertex& v = vertices_[old_count + c];
+    SetKey(v);
+    double* const centre = centres_.data() + (old_count + c) * d;
+    v.judged = judge && judge->Centre(*this, v, centre);
+    if (v.judged) continue;
+    Locate(v, vertices_[crossing.kept], vertices_[crossing.removed], excess[crossing.kept],
+           excess[crossing.removed], judge ? kJudgedSlack : kSlack);
+    if (judge) judge->Lift(v, centre);
+  }
+  for (const Index v : scratch.removed)
+    for (const Index f : vertices_[v].facet) --facets_[f].vertices;
+  for (std::size_t v = old_count; v < vertices_.size(); ++v)
+    for (const Index f : vertices_[v].facet) ++facets_[f].vertices;
+  for (auto v = scratch.removed.rbegin(); v != scratch.removed.rend(); ++v) DropVertex(*v, d);
+  DropFacets();
+  Measure();
+  return true;
+}
+
+// What is cut off a polygon is a chain, and two new vertices close the gap.
+template <int K>
+bool RestrictedVoronoiCell<K>::ClipPolygon(const Facet& facet, std::size_t worst,
+                                           Scratch& scratch) requires(K == 2) {
+  const double* const excess = scratch.excess.data();
+  const std::size_t count = vertices_.size();
+  auto& removed = scratch.removed;
+  removed.assign(1, static_cast<Index>(worst));
+  struct End {
+    Index last, slot;       // of the chain, and its slot of the edge that leaves it
+    Index kept, kept_slot;  // that edge's other end
+    Index created;          // the vertex that comes between
+  } ends[2];
+  for (Index side = 0; side < 2; ++side) {
+    End& end = ends[side];
+    end.last = static_cast<Index>(worst);
+    end.slot = side;
+    end.kept = vertices_[worst].adjacent[side];
+    while (excess[end.kept] > 0) {
+      if (removed.size() + 1 == count) return false;
+      const Index from = end.last;
+      end.last = end.kept;
+      removed.push_back(end.last);
+      end.slot = vertices_[end.last].adjacent[0] == from;
+      end.kept = vertices_[end.last].adjacent[end.slot];
+    }
+    end.kept_slot = vertices_[end.kept].adjacent[0] != end.last;
+  }
+  // The new facet takes the place of one that goes, and the new vertices those of cut ones.
+  Index created_facet = static_cast<Index>(facets_.size());
+  for (const Index v : removed)
+    for (const Index f : vertices_[v].facet)
+      if (--facets_[f].vertices == 0) created_facet = std::min(created_facet, f);
+  if (created_facet == facets_.size()) Grow(facets_, facets_.size() + 1);
+  facets_[created_facet] = facet;
+  facets_[created_facet].vertices = 2;
+  Vertex created[2];
+  for (int e = 0; e < 2; ++e) {
+    const End& end = ends[e];
+    const Vertex& last = vertices_[end.last];
+    created[e].judged = false;
+    created[e].facet[0] = created_facet;
+    created[e].facet[1] = last.facet[1 - end.slot];
+    ++facets_[created[e].facet[1]].vertices;
+    SetKey(created[e]);
+    Locate(created[e], vertices_[end.kept], last, excess[end.kept], excess[end.last], kSlack);
+  }
+  ends[0].created = removed[0];
+  if (removed.size() > 1) {
+    ends[1].created = removed[1];
+  } else {
+    ends[1].created = static_cast<Index>(count);
+    Grow(vertices_, count + 1);
+  }
+  for (int e = 0; e < 2; ++e) {
+    created[e].adjacent[0] = ends[e].kept;
+    created[e].adjacent[1] = ends[1 - e].created;
+    vertices_[ends[e].kept].adjacent[ends[e].kept_slot] = ends[e].created;
+  }
+  for (int e = 0; e < 2; ++e) vertices_[ends[e].created] = created[e];
+  if (removed.size() > 2) {
+    std::sort(removed.begin() + 2, removed.end());
+    for (std::size_t i = removed.size(); i-- > 2;) DropVertex(removed[i], 0);
+    DropFacets();
+  }
+  Measure();
   return true;
 }
 
@@ -216,7 +318,7 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
 // face, walk from the removed end of one crossing edge through removed vertices to the next
 // crossing edge. False where that goes in circles: what was cut off is no ball.
 template <int K>
-bool RestrictedVoronoiCell<K>::Stitch(Scratch& scratch, std::size_t old_count) {
+bool RestrictedVoronoiCell<K>::Stitch(const Scratch& scratch, std::size_t old_count) {
   for (std::size_t c = 0; c < scratch.crossings.size(); ++c) {
     Vertex& v = vertices_[old_count + c];
     for (int i = 1; i < K; ++i) {
@@ -257,7 +359,7 @@ bool RestrictedVoronoiCell<K>::Tidy(Scratch& scratch) const {
   };
   // Cuts off all but the largest piece; says whether anything was.
   const auto keep_largest = [&](std::size_t facet) {
-    auto& seen = scratch.remap;
+    auto& seen = scratch.seen;
     seen.assign(count, 0);
     auto& pieces = scratch.pieces;
     pieces.clear();
@@ -301,47 +403,43 @@ bool RestrictedVoronoiCell<K>::Tidy(Scratch& scratch) const {
   return std::find(scratch.cut.begin(), scratch.cut.end(), 0) != scratch.cut.end();
 }
 
-// Drops the cut vertices and the facets that no vertex is left on; recomputes what is cached.
+// The last vertex takes the place of one that no other is a neighbour of any more.
 template <int K>
-void RestrictedVoronoiCell<K>::Compact(Scratch& scratch, std::size_t d) {
-  const std::size_t total = vertices_.size();
-  const std::size_t old_count = scratch.cut.size();
-  scratch.remap.resize(total);
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < total; ++i) {
-    if (i < old_count && scratch.cut[i]) continue;
-    scratch.remap[i] = static_cast<Index>(count);
-    if (count != i) {
-      vertices_[count] = vertices_[i];
-      std::copy_n(centres_.data() + i * d, d, centres_.data() + count * d);
-    }
-    ++count;
+void RestrictedVoronoiCell<K>::DropVertex(std::size_t v, std::size_t d) {
+  const std::size_t last = vertices_.size() - 1;
+  if (v != last) {
+    for (const Index w : vertices_[last].adjacent)
+      for (Index& back : vertices_[w].adjacent)
+        if (back == last) back = static_cast<Index>(v);
+    vertices_[v] = vertices_[last];
+    std::copy_n(centres_.data() + last * d, d, centres_.data() + v * d);
   }
-  vertices_.resize(count);
-  centres_.resize(count * d);
+  vertices_.pop_back();
+  centres_.resize(last * d);
+}
+
+// Drops the facets that no vertex is left on.
+template <int K>
+void RestrictedVoronoiCell<K>::DropFacets() {
+  for (std::size_t f = facets_.size(); f-- > 0;) {
+    if (facets_[f].vertices > 0) continue;
+    const std::size_t last = facets_.size() - 1;
+    if (f != last) {
+      facets_[f] = facets_[last];
+      for (Vertex& v : vertices_)
+        for (Index& g : v.facet)
+          if (g == last) g = static_cast<Index>(f);
+    }
+    facets_.pop_back();
+  }
+}
+
+template <int K>
+void RestrictedVoronoiCell<K>::Measure() {
   max_norm2_ = 0;
-  scratch.cut.assign(facets_.size(), 0);
-  for (Vertex& v : vertices_) {
-    max_norm2_ = std::max(max_norm2_, v.norm2);
-    for (int s = 0; s < K; ++s) {
-      v.adjacent[s] = scratch.remap[v.adjacent[s]];
-      scratch.cut[v.facet[s]] = 1;
-    }
-  }
-  std::size_t kept = 0;
+  for (const Vertex& v : vertices_) max_norm2_ = std::max(max_norm2_, v.norm2);
   has_fake_ = false;
-  scratch.remap.resize(facets_.size());
-  for (std::size_t f = 0; f < facets_.size(); ++f) {
-    if (!scratch.cut[f]) continue;
-    scratch.remap[f] = static_cast<Index>(kept);
-    if (kept != f) facets_[kept] = facets_[f];
-    has_fake_ |= IsFake(facets_[kept].id);
-    ++kept;
-  }
-  if (kept == facets_.size()) return;
-  facets_.resize(kept);
-  for (Vertex& v : vertices_)
-    for (int s = 0; s < K; ++s) v.facet[s] = scratch.remap[v.facet[s]];
+  for (const Facet& f : facets_) has_fake_ |= IsFake(f.id);
 }
 
 template class RestrictedVoronoiCell<1>;

@@ -34,27 +34,27 @@ class RestrictedVoronoiCell {
     double normal[K];  // length
     double offset;     // length squared
     std::uint32_t id;  // sample point, or fake
+    Index vertices;    // how many lie on it
   };
 
   struct Vertex {
-    double x[K];              // c_p(sigma), tangent coordinates
-    double norm2;             // R_p(sigma)^2
-    std::uint64_t key;        // sum of Mix64 over the facets' ids: tells simplices apart quickly
-    Index facet[K];           // into facets()
-    Index adjacent[K];        // the vertex on all facets but facet[i]
+    double x[K];        // c_p(sigma), tangent coordinates
+    double norm2;       // R_p(sigma)^2
+    std::uint64_t key;  // sum of Mix64 over the facets' ids: tells simplices apart quickly
+    Index facet[K];     // into facets()
+    Index adjacent[K];  // the vertex on all facets but facet[i]
+    bool judged;        // not at its place in T_pM
   };
 
   // Working memory of Clip, one a thread.
   struct Scratch {
-    std::vector<std::uint8_t> cut;
     std::vector<double> excess;
-    std::vector<Index> stack, remap, crossed;
-    struct Crossing { Index kept, removed, slot; };  // slot: of the new vertex's edge in `removed`
+    std::vector<std::uint8_t> cut, seen;
+    std::vector<Index> stack, removed, crossed;
+    struct Crossing {
+      Index kept, kept_slot, removed, slot;
+    };  // an edge and its place at both ends
     std::vector<Crossing> crossings;
-    // The cell as it was, should the cut turn out to be impossible.
-    std::vector<Facet> facets;
-    std::vector<Vertex> vertices;
-    std::vector<double> centres;
     std::vector<std::vector<Index>> pieces;
   };
 
@@ -66,8 +66,10 @@ class RestrictedVoronoiCell {
     virtual ~Judge() = default;
     virtual int d() const = 0;
     // Writes the centre of v, relative to p (d numbers); sets v.norm2 to its squared norm and v.x
-    // to its tangent coordinates.
-    virtual void Centre(const RestrictedVoronoiCell& cell, Vertex& v, double* centre) const = 0;
+    // to its tangent coordinates. False, and nothing written, where v stays at its place in T_pM.
+    virtual bool Centre(const RestrictedVoronoiCell& cell, Vertex& v, double* centre) const = 0;
+    // Writes v's place in T_pM, relative to p (d numbers).
+    virtual void Lift(const Vertex& v, double* centre) const = 0;
   };
 
   // A regular simplex of K+1 fake facets at distance `inradius` from p.
@@ -75,8 +77,8 @@ class RestrictedVoronoiCell {
 
   // Cuts away { x : normal . x > offset }. Returns whether anything was cut. A half-space that
   // would cut everything away (it cannot, for offset > 0, but in rounding) is refused. With a
-  // judge, the same one for the cell's whole life, `step` is q - p (d numbers), and what is cut away
-  // is { c : step . c > offset }; a cut that would leave no polytope is refused too.
+  // judge, the same one for the cell's whole life, `step` is q - p (d numbers), and what is cut
+  // away is { c : step . c > offset }; a cut that would leave no polytope is refused too.
   bool Clip(std::uint32_t id, const double* normal, double offset, Scratch& scratch,
             const Judge* judge = nullptr, const double* step = nullptr);
 
@@ -92,6 +94,11 @@ class RestrictedVoronoiCell {
   bool WouldCutVertex(std::size_t v, const double* normal, double offset,
                       const Judge* judge = nullptr, const double* step = nullptr) const {
     return Excess(v, normal, offset, judge, step) > 0;
+  }
+
+  // Of a cell with a judge, of dimension d: the centre of vertex v, relative to p.
+  const double* Centre(std::size_t v, int d) const {
+    return centres_.data() + v * static_cast<std::size_t>(d);
   }
 
   const std::vector<Facet>& facets() const { return facets_; }
@@ -112,7 +119,7 @@ class RestrictedVoronoiCell {
                 const double* step) const {
     if (judge) {
       const int d = judge->d();
-      return Dot(step, centres_.data() + v * static_cast<std::size_t>(d), d) - offset;
+      return Dot(step, Centre(v, d), d) - offset;
     }
     double s = -offset;
     for (int a = 0; a < K; ++a) s += normal[a] * vertices_[v].x[a];
@@ -120,9 +127,13 @@ class RestrictedVoronoiCell {
   }
   void Locate(Vertex& v, const Vertex& kept, const Vertex& removed, double s, double t,
               double slack) const;
+  void SetKey(Vertex& v) const;
+  bool ClipPolygon(const Facet& facet, std::size_t worst, Scratch& scratch) requires(K == 2);
   bool Tidy(Scratch& scratch) const;
-  bool Stitch(Scratch& scratch, std::size_t old_count);
-  void Compact(Scratch& scratch, std::size_t d);
+  bool Stitch(const Scratch& scratch, std::size_t old_count);
+  void DropVertex(std::size_t v, std::size_t d);
+  void DropFacets();
+  void Measure();
 
   std::vector<Facet> facets_;
   std::vector<Vertex> vertices_;

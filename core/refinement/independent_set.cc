@@ -8,7 +8,7 @@ namespace stellate::core {
 
 template <int K>
 std::vector<Target<K>> SelectIndependent(const StarComplex<K>& complex,
-                                         std::vector<Target<K>> targets) {
+                                         std::vector<Target<K>> targets, std::size_t most) {
   std::sort(targets.begin(), targets.end(), [](const Target<K>& a, const Target<K>& b) {
     if (a.violation.rule != b.violation.rule) return a.violation.rule < b.violation.rule;
     if (a.radius != b.radius) return a.radius > b.radius;
@@ -20,6 +20,7 @@ std::vector<Target<K>> SelectIndependent(const StarComplex<K>& complex,
   BallTree balls(complex.d(), &centres);
   std::vector<double> centre(d);
   for (const Target<K>& t : targets) {
+    if (chosen.size() == most) break;
     complex.Lift(t.star, t.x, centre.data());
     bool conflict = false;
     balls.ForEachInfluencing(centre.data(), [&](std::uint32_t) { conflict = true; });
@@ -28,13 +29,20 @@ std::vector<Target<K>> SelectIndependent(const StarComplex<K>& complex,
     balls.Insert(t.violation.rule >= Rule::kSliver ? 2 * t.radius : t.radius);
     chosen.push_back(t);
   }
-  return chosen;
+  std::vector<Target<K>> ordered;
+  ordered.reserve(chosen.size());
+  for (const std::uint32_t i : balls.SpatialOrder()) ordered.push_back(chosen[i]);
+  return ordered;
 }
 
-template std::vector<Target<1>> SelectIndependent(const StarComplex<1>&, std::vector<Target<1>>);
-template std::vector<Target<2>> SelectIndependent(const StarComplex<2>&, std::vector<Target<2>>);
-template std::vector<Target<3>> SelectIndependent(const StarComplex<3>&, std::vector<Target<3>>);
-template std::vector<Target<4>> SelectIndependent(const StarComplex<4>&, std::vector<Target<4>>);
-template std::vector<Target<5>> SelectIndependent(const StarComplex<5>&, std::vector<Target<5>>);
+#define STELLATE_INSTANTIATE(K)                                                                    \
+  template std::vector<Target<K>> SelectIndependent(const StarComplex<K>&, std::vector<Target<K>>, \
+                                                    std::size_t);
+STELLATE_INSTANTIATE(1)
+STELLATE_INSTANTIATE(2)
+STELLATE_INSTANTIATE(3)
+STELLATE_INSTANTIATE(4)
+STELLATE_INSTANTIATE(5)
+#undef STELLATE_INSTANTIATE
 
 }  // namespace stellate::core

@@ -23,6 +23,9 @@ constexpr double kCoarseSpacing = 0.5;
 // sample nearer than this share of the circumradius says that epsilon is too coarse for that; to
 // insert it could make edges shorter than the one that R2 complained of (rho0 = 2), without end.
 constexpr double kEmptyBall = 0.5;
+// Targets of a round lie R apart: images no farther than this share of R from their targets lie at
+// least R / 2 apart, as far as the empty ball asks.
+constexpr double kCalm = 0.25;
 // Good points are chosen off the centre.
 constexpr double kGoodPointSpacing = 0.25;
 
@@ -68,8 +71,7 @@ Refinement<K>::Refinement(Specification spec)
       criteria_(Resolve(spec_)),
       complex_(spec_.ambient_dimension, spec_.epsilon,
                kInradius * std::max(criteria_.advance_step, spec_.epsilon), criteria_.judging),
-      tangent_finder_(K, spec_.ambient_dimension, kTangentStep * spec_.epsilon,
-                      spec_.random_seed) {
+      tangent_finder_(K, spec_.ambient_dimension, kTangentStep * spec_.epsilon, spec_.random_seed) {
   AskForSeeds();
 }
 
@@ -90,7 +92,8 @@ Status Refinement<K>::CheckIdempotence(const Answers& answers) const {
     if (moved <= kIdempotenceTolerance * spec_.epsilon) continue;
     std::ostringstream out;
     out << "closest_point is not idempotent: query " << i << " of block "
-        << answers.blocks.size() - 1 << " was a point that closest_point itself had returned, and it"
+        << answers.blocks.size() - 1
+        << " was a point that closest_point itself had returned, and it"
         << " was moved by " << moved << ", more than " << kIdempotenceTolerance
         << " epsilon; closest_point must leave points of the manifold where they are";
     return {StatusCode::kOracleNotIdempotent, out.str()};
@@ -109,10 +112,10 @@ Expected<MeshDelta> Refinement<K>::Absorb(const Answers& answers) {
   for (std::size_t b = 0; b < answers.blocks.size(); ++b) {
     const QueryBlock& block = batch_->blocks[b];
     if (answers.blocks[b].points.cols() != block.size())
-      return Refuse(StatusCode::kOracleShape,
-                    "block " + std::to_string(b) + " has " +
-                        std::to_string(answers.blocks[b].points.cols()) + " answers for " +
-                        std::to_string(block.size()) + " queries; send one for each");
+      return Refuse(StatusCode::kOracleShape, "block " + std::to_string(b) + " has " +
+                                                  std::to_string(answers.blocks[b].points.cols()) +
+                                                  " answers for " + std::to_string(block.size()) +
+                                                  " queries; send one for each");
     if (Status s = CheckAnswers(spec_, block, 0, answers.blocks[b]); !s.ok())
       return tl::unexpected<Status>(s);
   }
@@ -130,9 +133,9 @@ Expected<MeshDelta> Refinement<K>::Absorb(const Answers& answers) {
   batch_.reset();
 
   WithThreads(spec_.threads, [&] { Advance(answers); });
-  delta_.points = Eigen::Map<const Eigen::MatrixXd>(complex_.points().data(), complex_.d(),
-                                                    complex_.size())
-                      .rightCols(complex_.size() - static_cast<Eigen::Index>(delta_.first_vertex));
+  delta_.points =
+      Eigen::Map<const Eigen::MatrixXd>(complex_.points().data(), complex_.d(), complex_.size())
+          .rightCols(complex_.size() - static_cast<Eigen::Index>(delta_.first_vertex));
   UpdateProgress();
   return std::move(delta_);
 }
@@ -303,22 +306,47 @@ void Refinement<K>::InsertSeeds() {
 template <int K>
 void Refinement<K>::InsertTargets() {
   std::vector<int> best(targets_.size(), 0);
+  std::vector<Fitness> fitness(targets_.size());
   ParallelFor(targets_.size(), [&](std::size_t i) {
-    if (targets_[i].violation.rule >= Rule::kSliver) best[i] = BestCandidate(i);
+    if (targets_[i].violation.rule >= Rule::kSliver)
+      best[i] = BestCandidate(i);
+    else
+      fitness[i] = JudgeRefined(i);
   });
+  bool all_calm = true;
   for (std::size_t i = 0; i < targets_.size(); ++i) {
     if (targets_[i].violation.rule >= Rule::kSliver)
       InsertGoodPoint(i, best[i]);
     else
-      InsertRefined(i);
+      InsertRefined(i, fitness[i], &all_calm);
   }
 }
 
 template <int K>
-void Refinement<K>::InsertRefined(std::size_t i) {
+double Refinement<K>::Clearance(const Target<K>& t) const {
+  return IsCoarse(t.violation) ? kCoarseSpacing * std::min(criteria_.epsilon, t.radius)
+                               : kEmptyBall * t.radius;
+}
+
+template <int K>
+typename Refinement<K>::Fitness Refinement<K>::JudgeRefined(std::size_t i) const {
   const Target<K>& t = targets_[i];
   const Eigen::Index c = first_candidate_[i];
-  if (!found_[static_cast<std::size_t>(c)]) {
+  Fitness fitness;
+  fitness.found = found_[static_cast<std::size_t>(c)];
+  if (!fitness.found) return fitness;
+  const double* y = points_.col(c).data();
+  fitness.duplicate = complex_.AnyWithin(y, Clearance(t));
+  fitness.mends = !fitness.duplicate && complex_.CutsVertex(t.star, t.violation.vertex, y);
+  fitness.calm = Distance(y, candidates_.col(c).data(), complex_.d()) <= kCalm * t.radius;
+  return fitness;
+}
+
+template <int K>
+void Refinement<K>::InsertRefined(std::size_t i, Fitness fitness, bool* all_calm) {
+  const Target<K>& t = targets_[i];
+  const Eigen::Index c = first_candidate_[i];
+  if (!fitness.found) {
     if (FindsFlats(t))
       no_flat_[t.star] = 1;
     else
@@ -326,15 +354,14 @@ void Refinement<K>::InsertRefined(std::size_t i) {
     return;
   }
   const double* y = points_.col(c).data();
-  const double spacing =
-      IsCoarse(t.violation) ? kCoarseSpacing * std::min(criteria_.epsilon, t.radius)
-                            : kEmptyBall * t.radius;
-  const bool duplicate = complex_.AnyWithin(y, spacing);
-  if (duplicate || !complex_.CutsVertex(t.star, t.violation.vertex, y)) {
-    report_.counts.duplicates += duplicate;
+  // Another of this round may have come near, unless all have stayed near where they were aimed.
+  *all_calm = *all_calm && fitness.calm;
+  if (fitness.mends && !*all_calm) fitness.duplicate = complex_.AnyWithin(y, Clearance(t));
+  if (fitness.duplicate || !fitness.mends) {
+    report_.counts.duplicates += fitness.duplicate;
     return Discourage(t.star);
   }
-  complex_.Append(y, tangents_.col(c).data());
+  complex_.Append(y, tangents_.col(c).data(), t.star);
   ++(t.violation.rule == Rule::kSize ? report_.counts.inserted_size
                                      : report_.counts.inserted_radius_edge);
 }
@@ -353,7 +380,7 @@ int Refinement<K>::BestCandidate(std::size_t i) const {
       continue;
     const int index = static_cast<int>(c - first_candidate_[i]);
     if (criteria_.candidates == 1) return index;
-    complex_.TryPoint(y, tangents_.col(c).data(), scratch, &tentative);
+    complex_.TryPoint(y, tangents_.col(c).data(), t.star, scratch, &tentative);
     const int bad = CountBad<K>(complex_, y, tentative, criteria_.sliver_bound,
                                 criteria_.small_sliver_radius * t.radius, fewest);
     if (bad < fewest) {
@@ -373,8 +400,9 @@ void Refinement<K>::InsertGoodPoint(std::size_t i, int best) {
   }
   const Eigen::Index c = first_candidate_[i] + best;
   const double* y = points_.col(c).data();
-  if (complex_.AnyWithin(y, kGoodPointSpacing * t.radius)) return;  // another of this round came near
-  complex_.Append(y, tangents_.col(c).data());
+  if (complex_.AnyWithin(y, kGoodPointSpacing * t.radius))
+    return;  // another of this round came near
+  complex_.Append(y, tangents_.col(c).data(), t.star);
   ++(t.violation.rule == Rule::kSliver ? report_.counts.inserted_sliver
                                        : report_.counts.inserted_inconsistent);
 }
@@ -396,8 +424,8 @@ void Refinement<K>::Commit() {
 
   std::vector<std::optional<Violation<K>>> violations(touched.size());
   ParallelFor(touched.size(), [&](std::size_t i) {
-    violations[i] = WorstSizeOrShape<K>(complex_, touched[i], criteria_.epsilon,
-                                        criteria_.radius_edge_bound);
+    violations[i] =
+        WorstSizeOrShape<K>(complex_, touched[i], criteria_.epsilon, criteria_.radius_edge_bound);
   });
   for (const std::uint32_t p : touched) {
     discouraged_[p] = no_flat_[p] = 0;

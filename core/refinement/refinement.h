@@ -15,7 +15,8 @@ namespace stellate::core {
 
 // The constants of a run, defaults filled in for this k.
 struct ResolvedCriteria {
-  double epsilon, radius_edge_bound, sliver_bound, picking_radius, small_sliver_radius, advance_step;
+  double epsilon, radius_edge_bound, sliver_bound, picking_radius, small_sliver_radius,
+      advance_step;
   int candidates, flat_alternations;
   bool ask_ahead;
   Judging judging;
@@ -74,7 +75,16 @@ class Refinement final : public Mesher {
   void AfterTangents();
   void InsertSeeds();
   void InsertTargets();
-  void InsertRefined(std::size_t target);
+  // What becomes of the answer to a target of R1 or R2, seen from the complex before the round.
+  struct Fitness {
+    bool found = false;
+    bool duplicate = false;  // too near another point
+    bool mends = false;      // takes the violating simplex out of its star
+    bool calm = false;       // lies near where it was aimed
+  };
+  double Clearance(const Target<K>& target) const;
+  Fitness JudgeRefined(std::size_t target) const;
+  void InsertRefined(std::size_t target, Fitness fitness, bool* all_calm);
   void InsertGoodPoint(std::size_t target, int best);
   int BestCandidate(std::size_t target) const;
   void Discourage(std::uint32_t star);
@@ -117,8 +127,8 @@ class Refinement final : public Mesher {
   TangentFinder tangent_finder_;
   int alternations_left_ = 0;
   Eigen::MatrixXd predicted_tangents_;  // of points asked ahead, (K rows of d) x n
-  Eigen::VectorXd predicted_spacing_;  // of points asked ahead: half of it is kept clear
-  std::uint32_t ask_ahead_from_ = 0;   // vertices at which asking ahead is worth another try
+  Eigen::VectorXd predicted_spacing_;   // of points asked ahead: half of it is kept clear
+  std::uint32_t ask_ahead_from_ = 0;    // vertices at which asking ahead is worth another try
   Eigen::MatrixXd idempotence_sample_;  // d x m, asked for again with the next batch
 
   // By star.
@@ -130,11 +140,11 @@ class Refinement final : public Mesher {
     std::uint32_t star;
     Violation<K> violation;
   };
-  std::vector<Active> active_;  // the violations of R1 and R2, one a star
-  std::vector<std::uint32_t> suspects_;    // stars to judge by R3 and R4
-  std::vector<std::uint32_t> blemished_;   // stars with a violation of R3 or R4
-  bool all_suspect_ = true;                // R3 and R4 were not judged yet
-  std::uint64_t before_good_points_ = 0;   // vertices when R1 and R2 first held
+  std::vector<Active> active_;            // the violations of R1 and R2, one a star
+  std::vector<std::uint32_t> suspects_;   // stars to judge by R3 and R4
+  std::vector<std::uint32_t> blemished_;  // stars with a violation of R3 or R4
+  bool all_suspect_ = true;               // R3 and R4 were not judged yet
+  std::uint64_t before_good_points_ = 0;  // vertices when R1 and R2 first held
 
   std::unique_ptr<Certifier> certifier_;
   Eigen::MatrixXd certified_tangents_;

@@ -1,11 +1,10 @@
 // How a round is planned: the questions of Refinement.
 
-
 #include <algorithm>
 #include <cmath>
 
-#include "core/refinement/refinement.h"
 #include "core/parallel.h"
+#include "core/refinement/refinement.h"
 #include "core/sample/random.h"
 
 namespace stellate::core {
@@ -135,9 +134,8 @@ void Refinement<K>::Plan() {
     if (!active_.empty() || !blemished_.empty()) return Finish(Termination::kNoProgress);
     return StartCertificate();
   }
-  targets_ = SelectIndependent<K>(complex_, std::move(targets));
-  const std::uint64_t room = spec_.limits.max_vertices - complex_.size();
-  if (targets_.size() > room) targets_.resize(room);
+  targets_ = SelectIndependent<K>(complex_, std::move(targets),
+                                  spec_.limits.max_vertices - complex_.size());
   AskForTargets();
 }
 

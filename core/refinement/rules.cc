@@ -119,8 +119,7 @@ namespace {
 template <int K>
 double Orientation(const RestrictedVoronoiCell<K>& cell, const std::uint16_t* facets) {
   double m[K][K];
-  for (int r = 0; r < K; ++r)
-    std::copy_n(cell.facets()[facets[r]].normal, K, m[r]);
+  for (int r = 0; r < K; ++r) std::copy_n(cell.facets()[facets[r]].normal, K, m[r]);
   double sign = 1;
   for (int c = 0; c < K; ++c) {
     int pivot = c;
@@ -166,8 +165,12 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& comp
   const auto& cell = complex.cell(p);
   const Vertex* worst = nullptr;
   if (sliver_bound > 0) {
+    // In the star of its lowest vertex: if it is not there, it is inconsistent besides.
+    const auto held = [&](const Vertex& v) {
+      return std::all_of(v.facet, v.facet + K, [&](auto f) { return cell.facets()[f].id > p; });
+    };
     for (const Vertex& v : cell.vertices())
-      if ((!worst || v.norm2 > worst->norm2) &&
+      if ((!worst || v.norm2 > worst->norm2) && held(v) &&
           ContainsSliver<K>(complex, complex.Point(p), cell, v, sliver_bound, nullptr))
         worst = &v;
     if (worst) return AtVertex<K>(Rule::kSliver, cell, *worst, false);

@@ -97,7 +97,8 @@ void BallTree::Split(std::uint32_t node) {
   std::copy_n(slots_.begin() + first, kLeafCapacity, ids);
   const auto farthest = [&](std::uint32_t from) {
     return *std::max_element(ids, ids + kLeafCapacity, [&](std::uint32_t x, std::uint32_t y) {
-      return SquaredDistance(Point(from), Point(x), d_) < SquaredDistance(Point(from), Point(y), d_);
+      return SquaredDistance(Point(from), Point(x), d_) <
+             SquaredDistance(Point(from), Point(y), d_);
     });
   };
   const std::uint32_t a = farthest(ids[0]);
@@ -125,7 +126,7 @@ void BallTree::Insert(double influence) {
   const auto id = static_cast<std::uint32_t>(influence_.size());
   influence_.push_back(influence);
   leaf_of_.push_back(0);
-  if (nodes_.empty() || influence_.size() > 2 * built_ + 32) {
+  if (nodes_.empty() || influence_.size() > kRebuild * built_ + 32) {
     Rebuild();
     return;
   }
@@ -147,6 +148,25 @@ void BallTree::Insert(double influence) {
   slots_[leaf.first + leaf.count++] = id;
   leaf_of_[id] = n;
   if (leaf.count == kLeafCapacity) Split(n);
+}
+
+std::vector<std::uint32_t> BallTree::SpatialOrder() const {
+  std::vector<std::uint32_t> order;
+  order.reserve(size());
+  std::vector<std::uint32_t> stack;
+  if (!nodes_.empty()) stack.push_back(0);
+  while (!stack.empty()) {
+    const Node& node = nodes_[stack.back()];
+    stack.pop_back();
+    if (node.children == kNone) {
+      order.insert(order.end(), slots_.begin() + node.first,
+                   slots_.begin() + node.first + node.count);
+    } else {
+      stack.push_back(node.children + 1);
+      stack.push_back(node.children);
+    }
+  }
+  return order;
 }
 
 void BallTree::SetInfluence(std::uint32_t id, double influence) {

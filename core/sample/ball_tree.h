@@ -14,7 +14,7 @@ namespace stellate::core {
 //
 // A binary tree of balls over leaves of a few points. Each node knows the ball around its points
 // and its outreach: the largest distance from its centre at which one of its points still has
-// influence. Grown by insertion, rebuilt balanced whenever it has doubled: O(log n) a point.
+// influence. Grown by insertion, rebuilt balanced whenever it has grown fourfold: O(log n) a point.
 //
 // Deterministic. Queries are const and may run in parallel.
 class BallTree {
@@ -44,7 +44,7 @@ class BallTree {
   template <typename Radius, typename Visit>
   void VisitNear(const double* q, Radius&& radius, Visit&& visit) const {
     if (nodes_.empty()) return;
-    Near(0, Distance(q, Centre(0), d_), q, radius, visit);
+    Near(0, SquaredDistance(q, Centre(0), d_), q, radius, visit);
   }
 
   // Both searches in one descent: near(id, squared distance) as VisitNear, influencing(id) as
@@ -52,8 +52,17 @@ class BallTree {
   template <typename Radius, typename Near, typename Influencing>
   void VisitAround(const double* q, Radius&& radius, Near&& near, Influencing&& influencing) const {
     if (nodes_.empty()) return;
-    Around(0, Distance(q, Centre(0), d_), q, radius, near, influencing);
+    Around(0, SquaredDistance(q, Centre(0), d_), q, radius, near, influencing);
   }
+
+  // Whether some point lies within `radius` of q.
+  bool AnyWithin(const double* q, double radius) const {
+    return !nodes_.empty() && AnyWithin(0, SquaredDistance(q, Centre(0), d_), q, radius);
+  }
+
+  // All ids, near ones mostly close together: points handled in this order find in the cache what
+  // those before them have touched.
+  std::vector<std::uint32_t> SpatialOrder() const;
 
   // Squared distance from q to the nearest point; infinity when empty.
   double NearestSquaredDistance(const double* q) const {
@@ -68,11 +77,15 @@ class BallTree {
 
  private:
   static constexpr int kLeafCapacity = 12;
+  static constexpr std::size_t kRebuild = 4;
   static constexpr std::uint32_t kNone = 0xffffffffu;
+  // More than rounding can take from a distance in R^d, d up to thousands: no point is overlooked
+  // at the very border of a ball.
+  static constexpr double kRounding = 1 + 1e-12;
 
   struct Node {
-    double radius = 0;             // of the ball that holds its points
-    double outreach = 0;           // max over its points of distance + influence
+    double radius = 0;    // of the ball that holds its points
+    double outreach = 0;  // max over its points of distance + influence
     std::uint32_t parent = kNone;
     std::uint32_t children = kNone;  // the first of two, side by side; kNone: a leaf
     std::uint32_t first = 0;         // leaf: its slots begin here
@@ -99,7 +112,8 @@ class BallTree {
   template <typename Visit>
   void Influencing(std::uint32_t n, double d2, const double* q, Visit& visit) const {
     const Node& node = nodes_[n];
-    if (d2 >= node.outreach * node.outreach) return;
+    const double outreach = kRounding * node.outreach;
+    if (d2 >= outreach * outreach) return;
     if (node.children == kNone) {
       for (std::uint32_t i = 0; i < node.count; ++i) {
         const std::uint32_t id = slots_[node.first + i];
@@ -113,40 +127,57 @@ class BallTree {
     Influencing(a + 1, SquaredDistance(q, Centre(a + 1), d_), q, visit);
   }
 
+  // All distances are compared squared. d2: from q to the node's centre.
   template <typename Radius, typename Visit>
-  void Near(std::uint32_t n, double distance, const double* q, Radius& radius, Visit& visit) const {
+  void Near(std::uint32_t n, double d2, const double* q, Radius& radius, Visit& visit) const {
     const Node& node = nodes_[n];
-    if (distance - node.radius > radius()) return;
+    const double far = kRounding * (radius() + node.radius);
+    if (d2 > far * far) return;
     if (node.children == kNone) return NearInLeaf(node, q, radius, visit, [](auto, auto) {});
     const auto [first, second] = NearerFirst(node, q);
-    Near(first.id, first.distance, q, radius, visit);
-    Near(second.id, second.distance, q, radius, visit);
+    Near(first.id, first.d2, q, radius, visit);
+    Near(second.id, second.d2, q, radius, visit);
+  }
+
+  bool AnyWithin(std::uint32_t n, double d2, const double* q, double radius) const {
+    const Node& node = nodes_[n];
+    const double far = kRounding * (radius + node.radius);
+    if (d2 > far * far) return false;
+    if (node.children == kNone) {
+      for (std::uint32_t i = 0; i < node.count; ++i)
+        if (SquaredDistance(q, Point(slots_[node.first + i]), d_) <= radius * radius) return true;
+      return false;
+    }
+    const auto [first, second] = NearerFirst(node, q);
+    return AnyWithin(first.id, first.d2, q, radius) || AnyWithin(second.id, second.d2, q, radius);
   }
 
   template <typename Radius, typename NearVisit, typename InfluencingVisit>
-  void Around(std::uint32_t n, double distance, const double* q, Radius& radius, NearVisit& near,
+  void Around(std::uint32_t n, double d2, const double* q, Radius& radius, NearVisit& near,
               InfluencingVisit& influencing) const {
     const Node& node = nodes_[n];
-    if (distance >= node.outreach && distance - node.radius > radius()) return;
+    const double far = kRounding * (radius() + node.radius);
+    const double outreach = kRounding * node.outreach;
+    if (d2 >= outreach * outreach && d2 > far * far) return;
     if (node.children == kNone) {
-      NearInLeaf(node, q, radius, near, [&](std::uint32_t id, double d2) {
-        if (d2 < influence_[id] * influence_[id]) influencing(id);
+      NearInLeaf(node, q, radius, near, [&](std::uint32_t id, double distance2) {
+        if (distance2 < influence_[id] * influence_[id]) influencing(id);
       });
       return;
     }
     const auto [first, second] = NearerFirst(node, q);
-    Around(first.id, first.distance, q, radius, near, influencing);
-    Around(second.id, second.distance, q, radius, near, influencing);
+    Around(first.id, first.d2, q, radius, near, influencing);
+    Around(second.id, second.d2, q, radius, near, influencing);
   }
 
   struct Child {
     std::uint32_t id;
-    double distance;  // of its centre
+    double d2;  // from q to its centre
   };
   std::pair<Child, Child> NearerFirst(const Node& node, const double* q) const {
-    const Child a{node.children, Distance(q, Centre(node.children), d_)};
-    const Child b{node.children + 1, Distance(q, Centre(node.children + 1), d_)};
-    return a.distance <= b.distance ? std::pair{a, b} : std::pair{b, a};
+    const Child a{node.children, SquaredDistance(q, Centre(node.children), d_)};
+    const Child b{node.children + 1, SquaredDistance(q, Centre(node.children + 1), d_)};
+    return a.d2 <= b.d2 ? std::pair{a, b} : std::pair{b, a};
   }
 
   // Nearest first: what is visited early may shrink the radius most. `each` sees every point.
@@ -175,12 +206,12 @@ class BallTree {
   int d_;
   const std::vector<double>* coordinates_;
   std::vector<Node> nodes_;
-  std::vector<double> centres_;        // d each
-  std::vector<std::uint32_t> slots_;   // leaves, kLeafCapacity each
-  std::vector<double> influence_;      // by id
+  std::vector<double> centres_;         // d each
+  std::vector<std::uint32_t> slots_;    // leaves, kLeafCapacity each
+  std::vector<double> influence_;       // by id
   std::vector<std::uint32_t> leaf_of_;  // by id
-  std::vector<std::uint32_t> stale_;   // leaves whose outreach may have shrunk
-  std::size_t built_ = 0;              // size at the last rebuild
+  std::vector<std::uint32_t> stale_;    // leaves whose outreach may have shrunk
+  std::size_t built_ = 0;               // size at the last rebuild
 };
 
 }  // namespace stellate::core

@@ -20,7 +20,7 @@ inline double LongDot(const double* a, const double* b, int d) {
   return (s0 + s1) + (s2 + s3);
 }
 
-inline double Dot(const double* a, const double* b, int d) {
+[[gnu::always_inline]] inline double Dot(const double* a, const double* b, int d) {
   if (d == 3) return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   return LongDot(a, b, d);
 }
@@ -40,7 +40,7 @@ inline double LongSquaredDistance(const double* a, const double* b, int d) {
   return (s0 + s1) + (s2 + s3);
 }
 
-inline double SquaredDistance(const double* a, const double* b, int d) {
+[[gnu::always_inline]] inline double SquaredDistance(const double* a, const double* b, int d) {
   if (d == 3) {
     const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
     return x * x + y * y + z * z;

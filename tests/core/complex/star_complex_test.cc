@@ -172,11 +172,15 @@ TYPED_TEST(StarComplexTest, TryPointShowsWhatCommitWouldDo) {
   for (std::uint32_t i = 0; i < more.size(); ++i) {
     const std::uint32_t size = complex->size();
     const auto simplices = complex->Simplices();
-    complex->TryPoint(more.Point(i), more.Tangent(i), scratch, &tentative);
+    // With the star that it lies next to known, or not.
+    std::pair<double, std::uint32_t> nearest;
+    complex->Nearest(more.Point(i), 1, &nearest);
+    const std::uint32_t near = i % 2 == 0 ? nearest.second : StarComplex<K>::kNone;
+    complex->TryPoint(more.Point(i), more.Tangent(i), near, scratch, &tentative);
     EXPECT_EQ(complex->size(), size);
     EXPECT_EQ(complex->Simplices(), simplices);
 
-    ASSERT_EQ(complex->Append(more.Point(i), more.Tangent(i)), size);
+    ASSERT_EQ(complex->Append(more.Point(i), more.Tangent(i), near), size);
     const auto change = complex->Commit();
     EXPECT_EQ(Canonical(complex->cell(size)), Canonical(tentative.own));
     std::vector<std::uint32_t> cut;

@@ -61,6 +61,8 @@ class IndependentSetTest : public ::testing::Test {
   StarComplex<kDimension> complex_{6, 0.3, 3, Judging::kFlats};
 };
 
+constexpr std::size_t kAll = static_cast<std::size_t>(-1);
+
 // First by rule, then by radius, then by star: the order in which targets are taken.
 bool Before(const Target<kDimension>& a, const Target<kDimension>& b) {
   if (a.violation.rule != b.violation.rule) return a.violation.rule < b.violation.rule;
@@ -71,9 +73,9 @@ bool Before(const Target<kDimension>& a, const Target<kDimension>& b) {
 TEST_F(IndependentSetTest, IsGreedyIndependentAndMaximal) {
   for (const double largest : {0.05, 0.2, 0.6}) {
     const Targets targets = RandomTargets(7, largest);
-    const Targets chosen = SelectIndependent<kDimension>(complex_, targets);
+    Targets chosen = SelectIndependent<kDimension>(complex_, targets, kAll);
+    std::sort(chosen.begin(), chosen.end(), Before);
     ASSERT_FALSE(chosen.empty());
-    EXPECT_TRUE(std::is_sorted(chosen.begin(), chosen.end(), Before));
     for (std::size_t i = 0; i < chosen.size(); ++i)
       for (std::size_t j = i + 1; j < chosen.size(); ++j)
         EXPECT_FALSE(Conflict(chosen[i], chosen[j]));
@@ -88,23 +90,34 @@ TEST_F(IndependentSetTest, IsGreedyIndependentAndMaximal) {
 }
 
 TEST_F(IndependentSetTest, TakesAllThatAreFarApart) {
-  EXPECT_EQ(SelectIndependent<kDimension>(complex_, RandomTargets(8, 1e-9)).size(),
+  EXPECT_EQ(SelectIndependent<kDimension>(complex_, RandomTargets(8, 1e-9), kAll).size(),
             complex_.size());
 }
 
 TEST_F(IndependentSetTest, DoesNotDependOnTheOrderOfTheTargets) {
   Targets targets = RandomTargets(9, 0.3);
-  const auto chosen = Stars(SelectIndependent<kDimension>(complex_, targets));
+  const auto chosen = Stars(SelectIndependent<kDimension>(complex_, targets, kAll));
   Random random(3);
   for (int shuffle = 0; shuffle < 5; ++shuffle) {
     for (std::size_t i = targets.size(); i > 1; --i)
       std::swap(targets[i - 1], targets[random.Next() % i]);
-    EXPECT_EQ(Stars(SelectIndependent<kDimension>(complex_, targets)), chosen);
+    EXPECT_EQ(Stars(SelectIndependent<kDimension>(complex_, targets, kAll)), chosen);
   }
 }
 
+TEST_F(IndependentSetTest, TheFirstOfItAreTheWorst) {
+  const Targets targets = RandomTargets(10, 0.1);
+  Targets all = SelectIndependent<kDimension>(complex_, targets, kAll);
+  ASSERT_GT(all.size(), 20u);
+  Targets some = SelectIndependent<kDimension>(complex_, targets, 20);
+  std::sort(all.begin(), all.end(), Before);
+  std::sort(some.begin(), some.end(), Before);
+  all.resize(20);
+  EXPECT_EQ(Stars(some), Stars(all));
+}
+
 TEST_F(IndependentSetTest, OfNothingIsNothing) {
-  EXPECT_TRUE(SelectIndependent<kDimension>(complex_, {}).empty());
+  EXPECT_TRUE(SelectIndependent<kDimension>(complex_, {}, kAll).empty());
 }
 
 }  // namespace

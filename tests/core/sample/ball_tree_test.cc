@@ -51,6 +51,14 @@ class BallTreeTest : public ::testing::TestWithParam<int> {
   }
 
   void CheckQueriesFrom(const std::vector<double>& q) {
+    Ids order = tree_.SpatialOrder();
+    std::sort(order.begin(), order.end());
+    EXPECT_EQ(order, All([](std::uint32_t) { return true; }));
+    for (const double radius : {0.0, 0.1, 0.4, 2.0})
+      EXPECT_EQ(tree_.AnyWithin(q.data(), radius), !All([&](std::uint32_t id) {
+                                                      return SquaredDistanceTo(id, q) <=
+                                                             radius * radius;
+                                                    }).empty());
     Ids got;
     tree_.ForEachInfluencing(q.data(), [&](std::uint32_t id) { got.push_back(id); });
     std::sort(got.begin(), got.end());

@@ -49,7 +49,7 @@ template <int K>
     return ids;
   };
   std::set<Facets> faces;
-  Facets used;
+  std::map<std::uint32_t, std::size_t> used;  // by facet, how many vertices are on it
   double max_norm2 = 0;
   bool any_fake = false;
   for (std::size_t v = 0; v < vertices.size(); ++v) {
@@ -61,7 +61,7 @@ template <int K>
       const auto& facet = cell.facets()[vertices[v].facet[s]];
       key += Mix64(facet.id);
       norm2 += vertices[v].x[s] * vertices[v].x[s];
-      used.insert(facet.id);
+      ++used[facet.id];
       any_fake = any_fake || IsFake(facet.id);
 
       const std::size_t w = vertices[v].adjacent[s];
@@ -90,6 +90,10 @@ template <int K>
   if (euler != 1) return ::testing::AssertionFailure() << "K = " << K << ": Euler sum " << euler;
   if (used.size() != cell.facets().size())
     return ::testing::AssertionFailure() << "K = " << K << ": a facet without a vertex";
+  for (const auto& facet : cell.facets())
+    if (used.at(facet.id) != facet.vertices)
+      return ::testing::AssertionFailure()
+             << "K = " << K << ": wrong number of vertices on a facet";
   if (max_norm2 != cell.max_norm2())
     return ::testing::AssertionFailure() << "K = " << K << ": wrong largest norm";
   if (cell.bounded() == any_fake)
