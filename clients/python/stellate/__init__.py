@@ -4,8 +4,8 @@
     print(mesh.report)
     mesh.save("manifold.vtu")
 
-`stellate.Oracle` says what an oracle is; `stellate.ImplicitManifold` makes one from equations, and
-`stellate.manifolds` has a few ready.
+`stellate.Oracle` says what an oracle is, and `stellate.check` whether yours is one.
+`stellate.ImplicitManifold` makes one from equations, and `stellate.manifolds` has a few ready.
 """
 
 from . import _stubs
@@ -14,7 +14,9 @@ _stubs.ensure()  # before anything imports them
 
 from . import manifolds  # noqa: E402
 from ._credentials import Credentials  # noqa: E402
+from ._doctor import check  # noqa: E402
 from ._face import mesh, serve, watch  # noqa: E402
+from ._findings import CheckReport, Finding  # noqa: E402
 from ._mesh import Mesh, load_txt  # noqa: E402
 from ._server import Server, find_stellated  # noqa: E402
 from .client import Client, MeshInfo, ServerInfo  # noqa: E402
@@ -42,11 +44,13 @@ __version__ = "0.1.0"
 __all__ = [
     "Cancelled",
     "Certificate",
+    "CheckReport",
     "Client",
     "Counts",
     "Credentials",
     "FailedPrecondition",
     "Failure",
+    "Finding",
     "ImplicitManifold",
     "InvalidArgument",
     "LimitExceeded",
@@ -66,6 +70,7 @@ __all__ = [
     "StellateError",
     "Unauthenticated",
     "Unavailable",
+    "check",
     "find_stellated",
     "load_txt",
     "manifolds",

@@ -9,8 +9,16 @@ from ._generated import geometry_pb2 as pb
 
 def to_wire(array: np.ndarray) -> pb.Array:
     """Float64 numbers of any shape as a protocol Array."""
+    message = pb.Array()
+    fill(message, array)
+    return message
+
+
+def fill(message: pb.Array, array: np.ndarray) -> None:
+    """As to_wire, into an Array that is empty: without a copy of the message."""
     array = np.ascontiguousarray(array, dtype="<f8")
-    return pb.Array(shape=array.shape, data=array.tobytes())
+    message.shape.extend(array.shape)
+    message.data = array.tobytes()
 
 
 def from_wire(array: pb.Array, *shape: int) -> np.ndarray:

@@ -25,6 +25,9 @@ class GrowingComplex:
 
         Raises: ValueError if it does not fit what came before.
         """
+        revision = chunk.delta.revision
+        if revision <= self.revision or (self._pending and self._pending[-1].revision != revision):
+            raise ValueError(f"revision {revision} is out of order")
         self._pending.append(chunk.delta)
         if not chunk.complete:
             return False
@@ -40,12 +43,16 @@ class GrowingComplex:
             raise ValueError(
                 f"a simplex has vertex {int(self._rows.max())} of {self._vertex_count} vertices"
             )
-        self.revision = chunk.delta.revision
+        self.revision = revision
         return True
 
     def forget_pending(self) -> None:
         """Drops the chunks of a revision that was cut short: it will be sent again."""
         self._pending = []
+
+    def reset(self) -> None:
+        """Back to the empty mesh. What points() and simplices() gave stays what it is."""
+        self.__init__(self._k, self._d)
 
     def points(self) -> np.ndarray:
         """(n, d), read-only; vertices never change, so it stays true while the mesh grows."""

@@ -11,14 +11,13 @@ from ._growth import GrowingComplex
 from ._mesh import Mesh
 from ._server import Server
 from .client import Client, MeshInfo
-from .errors import Cancelled, StellateError, Unavailable, error_class
+from .errors import Cancelled, StellateError, error_class
 from .oracle import CheckedOracle
 from .report import Progress, Report
 
 OnProgress = Callable[[Progress], None]
 
 _FAREWELL_SECONDS = 2.0  # that an oracle may take to come to an end when nobody waits for it
-_RECONNECT_PAUSES = (0.1, 0.5, 1.0, 2.0, 4.0)
 
 
 class _Workers:
@@ -26,9 +25,9 @@ class _Workers:
 
     def __init__(self, client: Client, oracle: CheckedOracle, mesh: str, count: int) -> None:
         self.failure: BaseException | None = None
-        self._stopping = threading.Event()
         self._workers = [
-            client.worker(oracle, mesh, f"python-{i + 1}", self._note) for i in range(count)
+            client.worker(oracle, mesh, f"python-{i + 1}", self._note, quiet=True)
+            for i in range(count)
         ]
         self._threads = [
             threading.Thread(target=self._run, args=(worker,), name=f"oracle-{i + 1}", daemon=True)
@@ -38,26 +37,24 @@ class _Workers:
             thread.start()
 
     def _run(self, worker: Any) -> None:
-        for pause in (*_RECONNECT_PAUSES, None):
-            try:
-                worker.run()
-                return
-            except Unavailable:
-                # The watch notices a server that is gone for good, and says so.
-                if pause is None or self._stopping.wait(pause):
-                    return
-            except BaseException:
-                # What the oracle raised is noted, and what the server refuses the watch reports.
-                return
+        try:
+            worker.run()
+        except BaseException:
+            # What the oracle raised is noted; what the server refuses, or its absence, the watch
+            # reports.
+            return
 
     def _note(self, error: BaseException) -> None:
         if self.failure is None:
             self.failure = error
 
     def stop(self) -> None:
-        self._stopping.set()
         for worker in self._workers:
             worker.stop()
+
+    def finish(self) -> None:
+        for worker in self._workers:
+            worker.finish()
 
     def join(self, seconds: float | None) -> None:
         deadline = None if seconds is None else time.monotonic() + seconds
@@ -117,11 +114,13 @@ class Session:
         trace: TracebackType | None,
     ) -> None:
         try:
-            if not self._ended:
+            if self._ended:
+                self._workers.finish()
+            else:
                 self._workers.stop()
             self._workers.join(_FAREWELL_SECONDS)
             try:
-                self._client.delete(self.info.name)
+                self._client.delete(self.info.name, wait=False)
             except StellateError:
                 pass  # it ends with its server, or somebody else was first
         finally:
@@ -153,6 +152,8 @@ def follow(client: Client, info: MeshInfo, on_progress: OnProgress | None) -> It
                     ) from error
                 if complete:
                     yield Mesh(growth.points(), growth.simplices(), None, progress, growth.revision)
+            elif kind == "reset_mesh":
+                growth.reset()
             elif kind == "progress":
                 progress = Progress.from_wire(event.progress)
                 if on_progress is not None:

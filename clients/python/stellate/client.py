@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import datetime
-import time
 from types import TracebackType
 from typing import Any, Callable, Iterator, TypeVar
 
@@ -14,15 +13,17 @@ from ._credentials import Credentials
 from ._generated import mesh_pb2
 from ._generated import stellate_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
+from ._retry import Outage, Patience
 from ._server import Server
 from ._spec import mesh_spec
 from ._worker import Worker
-from .errors import InvalidArgument, StellateError, Unavailable, from_rpc
+from .errors import InvalidArgument, MeshNotFound, StellateError, Unavailable, from_rpc
 from .oracle import CheckedOracle
 from .report import Progress, Report
 
 _CALL_SECONDS = 30.0
-_RETRY_PAUSES = (0.1, 0.2, 0.5, 1.0, 2.0, 4.0)
+_CONNECT_SECONDS = 1.0
+_NO_PINGS = 1_000_000.0
 _LARGEST_MESSAGE = 64 << 20
 
 T = TypeVar("T")
@@ -95,10 +96,21 @@ class Client:
     Args:
       server: "host:port", "unix:/path", a stellate.Server, or None for a Server of its own.
       credentials: TLS and a token, for a server that wants them.
+      reconnect_seconds: how long a server that was there and went away is waited for; 0: not at
+        all. Calls are repeated where that does no harm, and streams carried on where they broke
+        off. It has to remember its meshes (stellated --data-dir). A server that cannot be reached
+        in the first place, or refuses, is an error at once. The logger "stellate" tells of it.
+      keepalive_seconds: how long a silent server is trusted before it is pinged; it has twice as
+        long to answer.
     """
 
     def __init__(
-        self, server: str | Server | None = None, credentials: Credentials | None = None
+        self,
+        server: str | Server | None = None,
+        credentials: Credentials | None = None,
+        *,
+        reconnect_seconds: float = 180.0,
+        keepalive_seconds: float = 4.0,
     ) -> None:
         if server is None and credentials is not None:
             raise InvalidArgument("credentials are for a server: say which")
@@ -110,24 +122,34 @@ class Client:
             )
         address = self._server.address if isinstance(self._server, Server) else self._server
         self.address = address
+        # A private server needs no pings: its end shows at once.
+        private = isinstance(self._server, Server)
+        ping = max(1, int(1000 * (_NO_PINGS if private else keepalive_seconds)))
         options = [
             ("grpc.max_receive_message_length", _LARGEST_MESSAGE),
             ("grpc.max_send_message_length", _LARGEST_MESSAGE),
-            ("grpc.keepalive_time_ms", 20_000),
-            ("grpc.keepalive_timeout_ms", 10_000),
+            ("grpc.keepalive_time_ms", ping),
+            ("grpc.keepalive_timeout_ms", 2 * ping),
+            ("grpc.http2.max_pings_without_data", 0),  # as many as it takes
+            # The pauses between attempts are ours; gRPC's own would be up to two minutes.
+            ("grpc.initial_reconnect_backoff_ms", 100),
+            ("grpc.max_reconnect_backoff_ms", 1000),
         ]
         if address.startswith(("unix:", "localhost:", "127.", "[::1]:")):
             options.append(("grpc.enable_http_proxy", 0))  # proxies are for the outside
         self._channel = (credentials or Credentials()).channel(address, options)
         self._stub = rpc.StellateStub(self._channel)
+        self._patience = Patience(reconnect_seconds, self._connect, self._why_hopeless)
 
     def create(self, oracle: Any, epsilon: float = 0.1, **criteria: Any) -> MeshInfo:
-        """Declares a mesh, which waits to be served. Keywords: see stellate.mesh."""
+        """Declares a mesh, which waits to be served. Keywords: see stellate.mesh.
+
+        Not repeated when the server is lost: whether it made the mesh would not be known.
+        """
         checked = oracle if isinstance(oracle, CheckedOracle) else CheckedOracle(oracle)
         spec = mesh_spec(checked, epsilon, criteria)
-        return MeshInfo.from_wire(
-            self._call(self._stub.CreateMesh, pb.CreateMeshRequest(spec=spec))
-        )
+        request = pb.CreateMeshRequest(spec=spec)
+        return MeshInfo.from_wire(self._call(self._stub.CreateMesh, request, once=True))
 
     def get(self, name: str) -> MeshInfo:
         """A mesh as it stands. Raises MeshNotFound."""
@@ -149,9 +171,15 @@ class Client:
             self._call(self._stub.CancelMesh, pb.CancelMeshRequest(name=name))
         )
 
-    def delete(self, name: str) -> None:
-        """Cancels a mesh if it runs, and forgets it."""
-        self._call(self._stub.DeleteMesh, pb.DeleteMeshRequest(name=name))
+    def delete(self, name: str, *, wait: bool = True) -> None:
+        """Cancels a mesh if it runs, and forgets it. Without `wait` a lost server is an error."""
+        outage = Outage(self._patience)
+        request = pb.DeleteMeshRequest(name=name)
+        try:
+            self._call(self._stub.DeleteMesh, request, outage, once=not wait)
+        except MeshNotFound:
+            if not outage.lasts:  # else an attempt whose answer was lost has done it
+                raise
 
     def info(self) -> ServerInfo:
         """What the server is and allows."""
@@ -175,25 +203,38 @@ class Client:
         name: str,
         worker: str = "",
         on_failure: Callable[[BaseException], None] = lambda error: None,
+        *,
+        quiet: bool = False,
     ) -> Worker:
-        """A worker for a thread of its own; `on_failure` is told of an exception of the oracle."""
+        """A worker for a thread of its own; `on_failure` is told of an exception of the oracle.
+
+        A `quiet` one leaves it to others to log that the server is lost.
+        """
         checked = oracle if isinstance(oracle, CheckedOracle) else CheckedOracle(oracle)
-        return Worker(self._stub, checked, name, worker, on_failure)
+        return Worker(self._stub, checked, name, worker, on_failure, self._patience, quiet)
 
     def watch(self, name: str, from_revision: int = 0, progress_only: bool = False) -> Watch:
         """The mesh's events as they come, in the protocol's own messages."""
-        return Watch(self, self._stub, name, from_revision, progress_only)
+        outage = Outage(self._patience)
+        return Watch(self._stub, outage, name, from_revision, progress_only)
 
     def get_spec(self, name: str) -> mesh_pb2.MeshSpec:
         """The specification in the protocol's own message."""
         return self._call(self._stub.GetMesh, pb.GetMeshRequest(name=name)).spec
 
-    def lost(self, error: StellateError) -> StellateError:
-        """A better error than `error` if what is behind it is the death of our own server."""
-        if isinstance(error, Unavailable) and isinstance(self._server, Server):
-            if not self._server.alive:
-                return self._server.why_gone()
-        return error
+    def _connect(self) -> None:
+        try:
+            self._stub.GetServerInfo(
+                pb.GetServerInfoRequest(), timeout=_CONNECT_SECONDS, wait_for_ready=True
+            )
+        except grpc.RpcError:
+            pass  # what is wrong the next attempt will tell
+
+    def _why_hopeless(self) -> StellateError | None:
+        """The end of our own server, which nobody will start again."""
+        if isinstance(self._server, Server) and not self._server.alive:
+            return self._server.why_gone()
+        return None
 
     def close(self) -> None:
         """Closes the connection, and stops the server if it is this client's own."""
@@ -201,12 +242,25 @@ class Client:
         if self._own_server is not None:
             self._own_server.close()
 
-    def _call(self, method: Callable[..., T], request: Any) -> T:
-        try:
-            # Refused connections are errors at once, except while the first one is being made.
-            return method(request, timeout=_CALL_SECONDS)
-        except grpc.RpcError as error:
-            raise self.lost(from_rpc(error)) from None
+    def _call(
+        self,
+        method: Callable[..., T],
+        request: Any,
+        outage: Outage | None = None,
+        *,
+        once: bool = False,
+    ) -> T:
+        outage = outage or Outage(self._patience)
+        while True:
+            try:
+                answer = method(request, timeout=_CALL_SECONDS)
+            except grpc.RpcError as error:
+                if once:
+                    outage.stop()
+                outage.wait_or_raise(error, from_rpc(error))
+            else:
+                outage.heard()
+                return answer
 
     def __enter__(self) -> Client:
         return self
@@ -229,18 +283,17 @@ class Watch:
 
     def __init__(
         self,
-        client: Client,
         stub: rpc.StellateStub,
+        outage: Outage,
         name: str,
         from_revision: int,
         progress_only: bool,
     ) -> None:
-        self._client, self._stub = client, stub
+        self._stub, self._outage = stub, outage
         self._request = pb.WatchMeshRequest(
             name=name, from_revision=from_revision, progress_only=progress_only
         )
         self._stream: Any = None
-        self._failures = 0
         self._over = False
         self.on_resume: Callable[[], None] = lambda: None
 
@@ -255,12 +308,15 @@ class Watch:
                 event = next(self._stream)
             except grpc.RpcError as error:
                 self._stream = None
-                self._pause_or_raise(from_rpc(error))
+                self._outage.wait_or_raise(error, self._explain(from_rpc(error)))
+                self.on_resume()
                 continue
-            self._failures = 0
+            self._outage.heard()
             kind = event.WhichOneof("event")
             if kind == "delta" and event.delta.complete:
                 self._request.from_revision = event.delta.delta.revision
+            elif kind == "reset_mesh":
+                self._request.from_revision = 0
             self._over = kind == "final"
             return event
         raise StopIteration
@@ -268,14 +324,16 @@ class Watch:
     def close(self) -> None:
         """Stops watching; the mesh goes on."""
         self._over = True
+        self._outage.stop()
         if self._stream is not None:
             self._stream.cancel()
 
-    def _pause_or_raise(self, error: StellateError) -> None:
-        error = self._client.lost(error)
-        resumable = isinstance(error, Unavailable) and error.reason != "SERVER_GONE"
-        if not resumable or self._failures >= len(_RETRY_PAUSES):
-            raise error from None
-        time.sleep(_RETRY_PAUSES[self._failures])
-        self._failures += 1
-        self.on_resume()
+    def _explain(self, error: StellateError) -> StellateError:
+        if isinstance(error, MeshNotFound) and self._outage.lasts:
+            return Unavailable(
+                "the server went away and came back without the mesh; it keeps meshes only with "
+                "--data-dir",
+                error.reason,
+                error.details,
+            )
+        return error

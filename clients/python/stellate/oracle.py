@@ -92,14 +92,20 @@ class CheckedOracle:
     def tangents(self, points: np.ndarray, found: np.ndarray) -> np.ndarray:
         """(n, d) -> (n, d, k) orthonormal bases; the rows that were not found hold any basis."""
         k, d = self.dimension, self.ambient_dimension
-        bases = np.broadcast_to(np.eye(d, k), (len(points), d, k)).copy()
-        on_manifold = np.ascontiguousarray(points[found])
+        everywhere = bool(found.all())
+        on_manifold = points.view() if everywhere else np.ascontiguousarray(points[found])
+        on_manifold.flags.writeable = False
+        bases = np.empty((0, d, k))
         if len(on_manifold):
             with self._one_at_a_time:
                 answer = self._oracle.tangent_basis(on_manifold)
-            everywhere = np.ones(len(on_manifold), dtype=bool)
-            bases[found] = _numbers("tangent_basis", answer, (len(on_manifold), d, k), everywhere)
-        return bases
+            all_rows = np.ones(len(on_manifold), dtype=bool)
+            bases = _numbers("tangent_basis", answer, (len(on_manifold), d, k), all_rows)
+        if everywhere:
+            return bases
+        spread = np.broadcast_to(np.eye(d, k), (len(points), d, k)).copy()
+        spread[found] = bases
+        return spread
 
 
 def _describe(value: Any) -> str:

@@ -97,7 +97,7 @@ def test_not_converged_becomes_not_found_and_its_tangents_are_not_asked_for():
         points=to_wire(POINTS),
         want_tangents=True,
     )
-    reply = answer(oracle, chunk)
+    reply = answer(oracle, chunk).answers
     assert reply.lease == 7
     assert reply.found == bytes([1, 0, 0])
     assert np.array_equal(from_wire(reply.points, 3, 3)[0], POINTS[0] * 2)

@@ -1,0 +1,123 @@
+"""Riding out the absence of a server."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import random
+import threading
+import time
+from typing import Callable
+
+import grpc
+
+from .errors import StellateError, Unavailable
+
+_log = logging.getLogger("stellate")
+
+_FIRST_PAUSE = 0.1
+_LONGEST_PAUSE = 5.0
+
+
+def is_transient(error: grpc.RpcError) -> bool:
+    """Whether the server, or the way to it, was lost, so that the same call may succeed later.
+
+    What a server drops arrives as CANCELLED where this side cancelled nothing.
+    """
+    code = error.code()
+    if code is grpc.StatusCode.UNKNOWN:
+        # What gRPC says of a stream whose connection went while it was being opened.
+        return "Stream removed" in (error.details() or "")
+    return code in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.CANCELLED)
+
+
+def pauses(rng: random.Random | None = None):
+    """0.1 s, doubled each time up to 5 s, each shortened at random by up to half.
+
+    So the clients of a server that comes back do not all come at once.
+    """
+    rng = rng or random.Random()
+    full = _FIRST_PAUSE
+    while True:
+        yield full * (1 - rng.random() / 2)
+        full = min(2 * full, _LONGEST_PAUSE)
+
+
+@dataclasses.dataclass
+class Patience:
+    """What the calls and streams of one client share."""
+
+    give_up_seconds: float
+    connect: Callable[[], object]  # waits a moment for a connection
+    hopeless: Callable[[], StellateError | None] = lambda: None  # why it will not come back
+    reached: bool = False  # something was heard of the server: it was there
+
+
+class Outage:
+    """The attempts at one call or stream. One thread makes them; any other may call stop().
+
+    A server is lost with a warning in the log and back with another; `quiet` streams, of which there
+    are several beside one that is not, leave that to it.
+    """
+
+    def __init__(self, patience: Patience, quiet: bool = False) -> None:
+        self._patience, self._quiet = patience, quiet
+        self._stopped = threading.Event()
+        self._attempts = 0
+        self._lost_at = 0.0
+        self._pauses = pauses()
+
+    @property
+    def lasts(self) -> bool:
+        """Whether the attempt under way follows on one that was broken off."""
+        return self._attempts > 0
+
+    @property
+    def stopped(self) -> bool:
+        return self._stopped.is_set()
+
+    def stop(self) -> None:
+        """Ends the wait, and lets no other begin."""
+        self._stopped.set()
+
+    def heard(self) -> None:
+        """The attempt brought something: the server is there."""
+        self._patience.reached = True
+        if not self._attempts:
+            return
+        if not self._quiet:
+            _log.warning("the server is back after %.1f s", time.monotonic() - self._lost_at)
+        self._attempts = 0
+        self._pauses = pauses()
+
+    def wait_or_raise(self, error: grpc.RpcError, as_ours: StellateError) -> None:
+        """Returns when it is time for another attempt.
+
+        Raises: `as_ours`, or what is behind it, where waiting is of no use or has been stopped.
+        """
+        if not is_transient(error):
+            raise as_ours from None
+        hopeless = self._patience.hopeless()
+        if hopeless is not None:
+            raise hopeless from None
+        if self.stopped or not self._patience.reached:
+            raise as_ours from None
+        now = time.monotonic()
+        if not self._attempts:
+            self._lost_at = now
+            if not self._quiet and self._patience.give_up_seconds > 0:
+                _log.warning(
+                    "lost the server (%s): trying again for up to %.0f s",
+                    as_ours,
+                    self._patience.give_up_seconds,
+                )
+        left = self._lost_at + self._patience.give_up_seconds - now
+        if left <= 0:
+            waited = f"; waited {now - self._lost_at:.1f} s for it" if self._attempts else ""
+            raise Unavailable(f"{as_ours}{waited}", as_ours.reason, as_ours.details) from None
+        self._attempts += 1
+        if self._stopped.wait(min(next(self._pauses), left)):
+            raise as_ours from None
+        # Connections come about only while somebody waits for them, and a stream that finds none
+        # fails at once.
+        self._patience.connect()

@@ -1,0 +1,278 @@
+"""stellate.check: each broken oracle is found out by the finding that names it."""
+
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import stellate
+from stellate import manifolds
+from stellate.__main__ import main
+from stellate._findings import all_words
+
+PACKAGE = str(pathlib.Path(stellate.__file__).parents[1])
+
+
+class Torus(manifolds.Torus):
+    """A torus that intersects flats too, and whose methods can be replaced."""
+
+    equations = stellate.ImplicitManifold(
+        lambda x: ((np.hypot(x[:, 0], x[:, 1]) - 1) ** 2 + x[:, 2] ** 2 - 0.16)[:, None],
+        ambient_dimension=3,
+        dimension=2,
+        bounding_box=manifolds.Torus().bounding_box,
+    )
+
+    def __init__(self, **attributes):
+        super().__init__()
+        vars(self).update(attributes)
+
+    def intersect_flat(self, centers, bases, radii):
+        return self.equations.intersect_flat(centers, bases, radii)
+
+
+GOOD = Torus()
+
+
+def project(x):
+    return manifolds.Torus().closest_point(x)
+
+
+def away_from(x):
+    """The point of the torus's tube across from the closest one: farther away."""
+    ring = x * [1, 1, 0]
+    ring = ring / np.linalg.norm(ring, axis=1, keepdims=True)
+    return 2 * ring - project(x)
+
+
+def on_the_ring(x):
+    """The torus, approached by way of a point beside the right one: idempotent all the same."""
+    p = project(x)
+    t = manifolds.Torus().tangent_basis(p)[:, :, 1]
+    return project(p + 0.3 * np.linalg.norm(x - p, axis=1, keepdims=True) * t)
+
+
+class Drifting:
+    def __init__(self):
+        self.calls = 0
+
+    def __call__(self, x):
+        self.calls += 1
+        return project(x + 1e-3 * self.calls)
+
+
+def crossed(x):
+    """Answers that depend on the number of their companions."""
+    return project(x + 1e-3 / len(x))
+
+
+def cube(x):
+    """The surface of [-1, 1]^3."""
+    p = np.clip(x, -1, 1)
+    inside = np.abs(x).max(axis=1) < 1
+    axis = np.abs(x[inside]).argmax(axis=1)
+    rows = np.flatnonzero(inside)
+    p[rows, axis] = np.where(x[rows, axis] >= 0, 1, -1)
+    return p
+
+
+def turned(points):
+    """Bases that lean out of the tangent plane by a tenth."""
+    basis = manifolds.Torus().tangent_basis(points)
+    normal = np.cross(basis[:, :, 0], basis[:, :, 1])
+    basis[:, :, 0] = (basis[:, :, 0] + 0.1 * normal) / np.sqrt(1.01)
+    return basis
+
+
+def flats(change):
+    def intersect(centers, bases, radii):
+        points, found = GOOD.intersect_flat(centers, bases, radii)
+        return change(points.copy(), found.copy(), centers, bases, radii)
+
+    return intersect
+
+
+def fail(*arguments):
+    raise ZeroDivisionError("on purpose")
+
+
+def nowhere(x):
+    raise stellate.NotConverged(x, np.zeros(len(x), dtype=bool))
+
+
+def hardly_anywhere(x):
+    raise stellate.NotConverged(project(x), np.abs(x).max(axis=1) < 0.7)
+
+
+def normal_of(bases):
+    return np.cross(bases[:, :, 0], bases[:, :, 1])
+
+
+BROKEN = {
+    "BAD_DIMENSIONS": Torus(dimension=3),
+    "NO_WHEREABOUTS": Torus(bounding_box=None),
+    "RAISED": Torus(closest_point=fail),
+    "WRONG_SHAPE": Torus(closest_point=lambda x: x[:, :2]),
+    "NOT_FINITE": Torus(closest_point=lambda x: x * np.nan),
+    "NOTHING_FOUND": Torus(closest_point=nowhere),
+    "MOSTLY_NOT_FOUND": Torus(closest_point=hardly_anywhere),
+    "OUTSIDE_BOX": Torus(bounding_box=(np.full(3, -1.0), np.full(3, 1.0))),
+    "NOT_DETERMINISTIC": Torus(closest_point=Drifting()),
+    "BATCH_DEPENDENT": Torus(closest_point=crossed),
+    "NOT_IDEMPOTENT": Torus(closest_point=lambda x: (x + project(x)) / 2),
+    "NOISY": Torus(closest_point=lambda x: project(x) + 1e-8 * np.sin(1e6 * x)),
+    "NOT_CLOSEST": Torus(
+        closest_point=lambda x: np.where(
+            (np.linalg.norm(x - project(x), axis=1) > 0.02)[:, None], away_from(x), project(x)
+        )
+    ),
+    "NOT_NORMAL": Torus(closest_point=on_the_ring),
+    "WRONG_DIMENSION": Torus(dimension=1, tangent_basis=None),
+    "TANGENT_NOT_ORTHONORMAL": Torus(tangent_basis=lambda p: 1.01 * GOOD.tangent_basis(p)),
+    "TANGENT_WRONG": Torus(tangent_basis=turned),
+    "ROUGH": Torus(
+        closest_point=cube,
+        tangent_basis=None,
+        intersect_flat=None,
+        bounding_box=(np.full(3, -1.1), np.full(3, 1.1)),
+    ),
+    "FLAT_MISSED": Torus(intersect_flat=flats(lambda p, f, c, t, r: (p, f & False))),
+    "FLAT_OFF": Torus(intersect_flat=flats(lambda p, f, c, t, r: (project(p + 0.01), f))),
+    "FLAT_OUTSIDE_RADIUS": Torus(
+        intersect_flat=flats(
+            lambda p, f, c, t, r: (GOOD.intersect_flat(c, t, np.full(len(c), 10.0)))
+        )
+    ),
+    "FLAT_OFF_MANIFOLD": Torus(
+        intersect_flat=flats(lambda p, f, c, t, r: (p + 0.01 * normal_of(t), f))
+    ),
+    "FLAT_NOT_NEAREST": Torus(
+        intersect_flat=flats(
+            lambda p, f, c, t, r: (p + 2 * (c - p) + 0.2 * (c - p), f)
+        )
+    ),
+}
+
+
+@pytest.mark.parametrize("code", BROKEN)
+def test_a_broken_oracle_is_found_out(code):
+    report = stellate.check(BROKEN[code])
+    assert code in report.codes, report
+    assert report.ok == all(f.severity != "error" for f in report.findings)
+    (finding,) = [f for f in report.findings if f.code == code]
+    assert finding.advice and code in str(report)
+    assert finding.severity == all_words()[code].severity
+
+
+@pytest.mark.parametrize(
+    "oracle",
+    [
+        GOOD,
+        manifolds.Torus(2, 0.3),
+        manifolds.Sphere(1),
+        manifolds.Sphere(2, 30),
+        manifolds.Sphere(3),
+        manifolds.ProductOfCircles(),
+        manifolds.ProductOfCircles((1, 0.7, 0.5)),
+        manifolds.SpecialOrthogonal3(),
+        manifolds.ellipsoid(),
+        manifolds.tanglecube(),
+    ],
+    ids=lambda oracle: f"{type(oracle).__name__}-{oracle.dimension}-{oracle.ambient_dimension}",
+)
+def test_a_good_oracle_passes(oracle):
+    report = stellate.check(oracle)
+    assert report.ok, report
+    assert report.pieces == 1
+    assert report.best_batch in report.rates and min(report.rates.values()) > 0
+    assert set(report.codes) <= {
+        "REACH", "PIECES", "SPEED", "SLOW", "NO_TANGENTS", "NOT_CLOSEST_FAR",
+    }  # fmt: skip
+
+
+def test_a_corner_does_not_hide_behind_tangents_of_its_own():
+    """A can: smooth but for two rims, and with tangent bases that are right everywhere else."""
+
+    def can(x):
+        r = np.hypot(x[:, 0], x[:, 1])[:, None]
+        side = np.concatenate([x[:, :2] / r, np.clip(x[:, 2:], -1, 1)], axis=1)
+        lid = np.concatenate(
+            [x[:, :2] * np.minimum(1, 1 / r), np.where(x[:, 2:] > 0, 1.0, -1.0)], axis=1
+        )
+        nearer = np.linalg.norm(x - side, axis=1) <= np.linalg.norm(x - lid, axis=1)
+        return np.where(nearer[:, None], side, lid)
+
+    box = np.full(3, -1.3), np.full(3, 1.3)
+    oracle = Torus(closest_point=can, tangent_basis=None, intersect_flat=None, bounding_box=box)
+    assert "ROUGH" in stellate.check(oracle).codes
+
+
+def test_the_reach_and_what_epsilon_suits_it():
+    report = stellate.check(GOOD, epsilon=0.3)
+    assert report.ok and "COARSE_EPSILON" in report.codes
+    assert report.reach == pytest.approx(0.4, rel=0.05)
+    assert "COARSE_EPSILON" not in stellate.check(GOOD, epsilon=0.1).codes
+
+
+def test_pieces_are_counted():
+    def two_spheres(x):
+        centre = np.where(x[:, :1] > 0, 1.5, -1.5) * [1.0, 0.0, 0.0]
+        away = x - centre
+        return centre + away / np.linalg.norm(away, axis=1, keepdims=True)
+
+    box = np.array([-2.6, -1.1, -1.1]), np.array([2.6, 1.1, 1.1])
+    oracle = Torus(
+        closest_point=two_spheres, tangent_basis=None, intersect_flat=None, bounding_box=box
+    )
+    report = stellate.check(oracle)
+    assert report.ok and report.pieces == 2, report
+
+
+def test_seeds_alone_will_do():
+    report = stellate.check(Torus(bounding_box=None, seeds=np.array([[1.4, 0, 0]])))
+    assert report.ok and report.samples > 100, report
+
+
+def test_the_same_questions_find_the_same():
+    codes = [stellate.check(BROKEN["NOT_NORMAL"], seed=7).findings[0] for _ in range(2)]
+    assert codes[0].message == codes[1].message
+
+
+def doctor(*arguments, cwd):
+    return subprocess.run(
+        [sys.executable, "-m", "stellate", "doctor", *arguments],
+        cwd=cwd,
+        env={"PYTHONPATH": PACKAGE, "PATH": "/usr/bin:/bin"},
+        capture_output=True,
+        text=True,
+    )
+
+
+def test_from_the_shell(tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "from stellate import manifolds\n"
+        "class Bad(manifolds.Torus):\n"
+        "    def closest_point(self, x):\n"
+        "        return x * 0.5\n"
+    )
+    good = doctor("stellate.manifolds:Torus", "--epsilon", "0.1", cwd=tmp_path)
+    assert good.returncode == 0 and "keeps its contract" in good.stdout, good
+    bad = doctor("mine:Bad", cwd=tmp_path)
+    assert bad.returncode == 1 and "NOT_IDEMPOTENT" in bad.stdout, bad
+    assert doctor("mine:Absent", cwd=tmp_path).returncode == 2
+
+
+@pytest.mark.parametrize("name", ["stellate.manifolds", "stellate.manifolds:Absent", "absent:Bad"])
+def test_what_is_no_oracle_is_refused(name, capsys):
+    assert main(["doctor", name]) == 2
+    assert "stellate: " in capsys.readouterr().err
+
+
+def test_all_words_are_put_to_use():
+    """Whatever findings.txt lists is tested above, or a plain measure."""
+    untested = set(all_words()) - set(BROKEN)
+    assert untested == {
+        "COARSE_EPSILON", "NOT_CLOSEST_FAR", "NO_TANGENTS", "PIECES", "REACH", "SLOW", "SPEED",
+    }  # fmt: skip
