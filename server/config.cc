@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
-#include <limits>
 
 #include "core/message.h"
+#include "server/memory_budget.h"
+#include "server/settings.h"
 
 namespace stellate::server {
 namespace {
@@ -15,8 +15,6 @@ using core::Status;
 using core::StatusCode;
 
 constexpr std::size_t kMaxUnixPath = 107;  // what sockaddr_un holds
-constexpr std::size_t kMinMessageBytes = std::size_t{1} << 20;
-constexpr double kMaxSeconds = 366 * 86400.0;
 
 Status Invalid(std::string message) { return {StatusCode::kInvalidArgument, std::move(message)}; }
 
@@ -97,49 +95,18 @@ Status Validate(const Config& config) {
   if (!address) return address.error();
   const Status safety = ValidateSafety(config, *address);
   if (!safety.ok()) return safety;
-  const struct {
-    const char* flag;
-    double value;
-    double least;
-  } times[] = {
-      {"--worker-wait", config.worker_wait_seconds, 0.001},
-      {"--answer-seconds", config.answer_seconds, 0.001},
-      {"--max-wait", config.max_wait_seconds, 0.001},
-      {"--keep-finished-seconds", config.keep_finished_seconds, 0},
-      {"--hello-seconds", config.hello_seconds, 0.001},
-      {"--drain-seconds", config.drain_seconds, 0},
-      {"--keepalive", config.keepalive_seconds, 0.1},
-      {"--keepalive-timeout", config.keepalive_timeout_seconds, 0.1},
-  };
-  for (const auto& [flag, value, least] : times) {
-    if (value >= least && value <= kMaxSeconds) continue;
-    return Invalid(
-        Message(flag, " is ", value, " but must be from ", least, " to ", kMaxSeconds, " seconds"));
-  }
-  const struct {
-    const char* flag;
-    std::uint64_t value, least, most;
-  } counts[] = {
-      {"--max-meshes", config.max_meshes, 1, 100'000},
-      {"--max-vertices", config.max_vertices, 1, std::numeric_limits<std::uint32_t>::max()},
-      {"--max-coordinates", config.max_coordinates, 1, std::uint64_t{1} << 48},
-      {"--max-ambient-dimension", static_cast<std::uint64_t>(config.max_ambient_dimension), 2,
-       core::kMaxAmbientDimension},
-      {"--max-rounds", config.max_rounds, 1, std::uint64_t{1} << 40},
-      {"--max-message-bytes", config.max_message_bytes, kMinMessageBytes, std::uint64_t{1} << 30},
-      {"--max-workers", config.max_workers, 1, 100'000},
-      {"--max-watchers", config.max_watchers, 1, 100'000},
-      {"--keep-finished-meshes", config.keep_finished_meshes, 0, 1'000'000},
-  };
-  for (const auto& [flag, value, least, most] : counts) {
-    if (value >= least && value <= most) continue;
-    return Invalid(Message(flag, " is ", value, " but must be from ", least, " to ", most));
-  }
-  return Status::Ok();
+  return CheckRanges(config);
+}
+
+Config WithDefaults(Config config) {
+  if (config.max_memory_bytes == 0) config.max_memory_bytes = MachineBytes() / 4 * 3;
+  if (config.owner_memory_bytes == 0) config.owner_memory_bytes = config.max_memory_bytes / 2;
+  if (config.owner_meshes == 0) config.owner_meshes = config.max_meshes;
+  return config;
 }
 
 std::size_t ChunkBytes(const Config& config) {
-  return std::min(std::size_t{1} << 20, config.max_message_bytes / 2);
+  return std::min(std::uint64_t{1} << 20, config.max_message_bytes / 2);
 }
 
 }  // namespace stellate::server

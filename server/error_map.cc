@@ -90,7 +90,8 @@ v1::ErrorReason ReasonOf(core::StatusCode code) {
   return v1::ERROR_REASON_UNSPECIFIED;
 }
 
-grpc::Status Refusal(v1::ErrorReason reason, const std::string& message, const std::string& field) {
+grpc::Status Refusal(v1::ErrorReason reason, const std::string& message, const std::string& field,
+                     const std::optional<LimitHit>& limit) {
   const grpc::StatusCode code = CodeOf(reason);
   Status details;
   details.set_code(code);
@@ -98,6 +99,11 @@ grpc::Status Refusal(v1::ErrorReason reason, const std::string& message, const s
   ErrorInfo info;
   info.set_reason(ReasonName(reason));
   info.set_domain("stellate.v1");
+  if (limit) {
+    (*info.mutable_metadata())["limit"] = limit->setting;
+    (*info.mutable_metadata())["value"] = limit->value;
+    (*info.mutable_metadata())["scope"] = limit->scope;
+  }
   Pack(info, "ErrorInfo", &details);
   if (!field.empty()) {
     BadRequest bad;
@@ -105,6 +111,13 @@ grpc::Status Refusal(v1::ErrorReason reason, const std::string& message, const s
     violation->set_field(field);
     violation->set_description(details.message());
     Pack(bad, "BadRequest", &details);
+  }
+  if (limit) {
+    QuotaFailure quota;
+    QuotaFailure::Violation* const violation = quota.add_violations();
+    violation->set_subject(limit->scope);
+    violation->set_description(limit->setting + " is " + limit->value);
+    Pack(quota, "QuotaFailure", &details);
   }
   return {code, details.message(), details.SerializeAsString()};
 }
@@ -124,11 +137,16 @@ std::string FieldOf(const std::string& message) {
 }
 
 grpc::Status ToGrpc(const core::Status& status, const std::string& prefix) {
+  return ToGrpc(Refused(status), prefix);
+}
+
+grpc::Status ToGrpc(const Refused& status, const std::string& prefix) {
   if (status.ok()) return grpc::Status::OK;
   const bool of_request = status.code == core::StatusCode::kInvalidArgument ||
                           status.code == core::StatusCode::kLimitExceeded;
   const std::string field = of_request ? FieldOf(status.message) : "";
-  return Refusal(ReasonOf(status.code), status.message, field.empty() ? "" : prefix + field);
+  return Refusal(ReasonOf(status.code), status.message, field.empty() ? "" : prefix + field,
+                 status.limit);
 }
 
 MeshFailure ToMeshFailure(const core::Status& status) {

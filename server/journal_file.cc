@@ -42,14 +42,14 @@ constexpr char kRounds[] =
     "parts INTEGER NOT NULL, questions INTEGER NOT NULL, "
     "answers BLOB NOT NULL, PRIMARY KEY (mesh, round, part))";
 
-Status Refused(std::string message) {
+Status Unusable(std::string message) {
   return {core::StatusCode::kFailedPrecondition, std::move(message)};
 }
 
 Status Damaged(const std::string& path, const std::string& what) {
-  return Refused(Message(path, " is damaged (", what,
-                         ") and was left as it is: put back a copy of it, or choose another "
-                         "--data-dir"));
+  return Unusable(Message(path, " is damaged (", what,
+                          ") and was left as it is: put back a copy of it, or choose another "
+                          "--data-dir"));
 }
 
 std::string StartPlace(std::int64_t id) { return Message("start/", id); }
@@ -66,13 +66,13 @@ Status MakeFile(const std::string& directory) {
   for (const char* suffix : {"", "-wal", "-shm", "-journal"}) unlink((draft + suffix).c_str());
   const int made = open(draft.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (made < 0) {
-    return Refused(Message("cannot write to --data-dir ", directory, ": ", std::strerror(errno)));
+    return Unusable(Message("cannot write to --data-dir ", directory, ": ", std::strerror(errno)));
   }
   close(made);
   {
     auto database = Sqlite::Open(draft, true);
     const auto fail = [&](const std::string& why) {
-      return Refused(Message("cannot begin a journal in ", directory, ": ", why));
+      return Unusable(Message("cannot begin a journal in ", directory, ": ", why));
     };
     if (!database) return fail(database.error().message);
     const std::string finish = Message("PRAGMA application_id=", kApplication,
@@ -83,7 +83,7 @@ Status MakeFile(const std::string& directory) {
     }
   }
   if (std::rename(draft.c_str(), path.c_str()) != 0) {
-    return Refused(Message("cannot make ", path, ": ", std::strerror(errno)));
+    return Unusable(Message("cannot make ", path, ": ", std::strerror(errno)));
   }
   const int folder = open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder >= 0) {
@@ -97,7 +97,7 @@ Status MakeFile(const std::string& directory) {
 Status CheckHeader(const std::string& path) {
   char header[kHeaderBytes] = {};
   std::ifstream file(path, std::ios::binary);
-  if (!file) return Refused(Message("cannot read ", path, ": ", std::strerror(errno)));
+  if (!file) return Unusable(Message("cannot read ", path, ": ", std::strerror(errno)));
   file.read(header, kHeaderBytes);
   const auto number_at = [&](std::size_t at) {
     std::uint32_t number = 0;
@@ -108,16 +108,16 @@ Status CheckHeader(const std::string& path) {
   };
   if (file.gcount() != kHeaderBytes || std::string_view(header, kMagic.size()) != kMagic ||
       number_at(kApplicationAt) != kApplication) {
-    return Refused(Message(path,
-                           " is no journal of a stellated, or its beginning is damaged; it "
-                           "was left as it is: choose another --data-dir"));
+    return Unusable(Message(path,
+                            " is no journal of a stellated, or its beginning is damaged; it "
+                            "was left as it is: choose another --data-dir"));
   }
   const std::uint32_t version = number_at(kVersionAt);
   if (version != kJournalVersion) {
-    return Refused(Message(path, " is a journal of version ", version,
-                           " but this server reads version ", kJournalVersion,
-                           "; it was left as it is: run the server that wrote it, or choose "
-                           "another --data-dir"));
+    return Unusable(Message(path, " is a journal of version ", version,
+                            " but this server reads version ", kJournalVersion,
+                            "; it was left as it is: run the server that wrote it, or choose "
+                            "another --data-dir"));
   }
   return Status::Ok();
 }
@@ -170,11 +170,11 @@ Status JournalFile::Lock(const std::string& directory) {
   const std::string path = directory + "/lock";
   lock_ = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (lock_ < 0) {
-    return Refused(Message("cannot write to --data-dir ", directory, ": ", std::strerror(errno)));
+    return Unusable(Message("cannot write to --data-dir ", directory, ": ", std::strerror(errno)));
   }
   if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
-    return Refused(Message("another server uses --data-dir ", directory,
-                           ": stop it, or choose another directory"));
+    return Unusable(Message("another server uses --data-dir ", directory,
+                            ": stop it, or choose another directory"));
   }
   return Status::Ok();
 }

@@ -44,11 +44,12 @@ int Fail(const std::string& message, int status) {
   return status;
 }
 
-int RunHealthCheck(const Config& config) {
+int RunHealthCheck(const Flags& flags) {
+  const Config& config = flags.config;
   const auto address = ParseListenAddress(config.listen);
   if (!address) return Fail(address.error().message, kExitUsage);
-  const std::string trouble =
-      CheckHealth(address->Target(), kHealthLimit, SelfCheckCredentials(config));
+  const std::string trouble = CheckHealth(address->Target(), kHealthLimit,
+                                          SelfCheckCredentials(config), flags.health_service);
   return trouble.empty() ? 0 : Fail(trouble, 1);
 }
 
@@ -86,7 +87,7 @@ int main(int argc, char** argv) {
   const auto [flags, exit_status] = ParseFlags(argc, argv);
   if (exit_status) return *exit_status;
   const Config& config = flags.config;
-  if (flags.health_check) return RunHealthCheck(config);
+  if (flags.health_check) return RunHealthCheck(flags);
 
   // Before gRPC starts its threads, which inherit the mask: then sigtimedwait alone sees them.
   const sigset_t signals = Signals(config);

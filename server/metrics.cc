@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/message.h"
+#include "server/memory_budget.h"
 
 namespace stellate::server {
 namespace {
@@ -49,25 +50,33 @@ class Census final : public prometheus::Collectable {
 
   std::vector<MetricFamily> Collect() const override {
     std::map<SessionState, int> states;
-    double workers = 0, watchers = 0, vertices = 0;
+    double workers = 0, watchers = 0, vertices = 0, waiting = 0, bytes = 0;
     for (const auto& session : sessions_()) {
       const SessionView view = session->View();
       ++states[view.state];
       workers += static_cast<double>(view.workers);
       watchers += static_cast<double>(view.watchers);
       vertices += static_cast<double>(view.progress.vertices);
+      waiting += static_cast<double>(view.waiting_queries);
+      bytes += static_cast<double>(view.bytes);
     }
     std::vector<MetricFamily> families = {
         Gauge("stellate_meshes", "Meshes that the server holds, by state"),
         Gauge("stellate_workers", "Open worker streams that serve a mesh"),
         Gauge("stellate_watchers", "Open watcher streams"),
-        Gauge("stellate_vertices", "Vertices of the meshes that the server holds")};
+        Gauge("stellate_vertices", "Vertices of the meshes that the server holds"),
+        Gauge("stellate_queries_waiting", "Queries of the rounds under way, not answered yet"),
+        Gauge("stellate_mesh_bytes", "Memory of the meshes that the server holds, estimated"),
+        Gauge("process_resident_memory_bytes", "Memory of the process")};
     for (const SessionState state : kStates) {
       Add(&families[0], states[state], "state", SessionStateName(state));
     }
     Add(&families[1], workers);
     Add(&families[2], watchers);
     Add(&families[3], vertices);
+    Add(&families[4], waiting);
+    Add(&families[5], bytes);
+    Add(&families[6], static_cast<double>(ResidentBytes()));
     return families;
   }
 
@@ -133,6 +142,11 @@ class Metrics::Impl final : public SessionObserver {
           .Register(*registry);
   Counter& certified = certificates.Add({{"certified", "true"}});
   Counter& uncertified = certificates.Add({{"certified", "false"}});
+  prometheus::Family<Counter>& limits =
+      prometheus::BuildCounter()
+          .Name("stellate_limit_refusals_total")
+          .Help("Calls refused as a limit was reached, by the setting that bounds it")
+          .Register(*registry);
   prometheus::Histogram& latency =
       prometheus::BuildHistogram()
           .Name("stellate_answer_seconds")
@@ -174,6 +188,9 @@ std::shared_ptr<SessionObserver> Metrics::observer() const { return impl_; }
 
 void Metrics::Answered(double seconds) { impl_->latency.Observe(seconds); }
 void Metrics::Refused() { impl_->refused.Increment(); }
+void Metrics::LimitReached(const std::string& setting) {
+  impl_->limits.Add({{"limit", setting}}).Increment();
+}
 void Metrics::Received(std::size_t bytes) { impl_->received.Increment(static_cast<double>(bytes)); }
 void Metrics::Sent(std::size_t bytes) { impl_->sent.Increment(static_cast<double>(bytes)); }
 

@@ -23,21 +23,22 @@ OraclePool::OraclePool(const core::Specification& spec, DispatchOptions options,
       observer_(std::move(observer)),
       dispatch_(options) {}
 
-core::Expected<WorkerId> OraclePool::Join(std::shared_ptr<OracleWorker> worker,
-                                          std::uint32_t max_chunk) {
+Allowed<WorkerId> OraclePool::Join(std::shared_ptr<OracleWorker> worker, std::uint32_t max_chunk) {
   std::vector<Delivery> deliveries;
   WorkerId id = 0;
   {
     const std::lock_guard lock(mutex_);
     if (closed_) {
-      return core::Refuse(StatusCode::kFailedPrecondition,
-                          "the mesh is over and asks nothing any more: create another");
+      return tl::unexpected(
+          Refused({StatusCode::kFailedPrecondition,
+                   "the mesh is over and asks nothing any more: create another"}));
     }
     if (members_.size() >= max_workers_) {
-      return core::Refuse(StatusCode::kLimitExceeded,
-                          core::Message("the mesh has ", members_.size(),
-                                        " workers, the most that this server allows: let one go "
-                                        "first, or raise --max-workers"));
+      return tl::unexpected(
+          Refused({"max-workers", core::Message(max_workers_), "mesh"},
+                  core::Message("the mesh has ", members_.size(),
+                                " workers, the most that this server allows: let one go first, or "
+                                "raise --max-workers")));
     }
     id = next_worker_++;
     titles_[id] = worker->Title();

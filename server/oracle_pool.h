@@ -14,6 +14,7 @@
 #include "core/specification.h"
 #include "server/cross_check.h"
 #include "server/dispatch.h"
+#include "server/limits.h"
 
 namespace stellate::server {
 
@@ -79,7 +80,7 @@ class OraclePool {
              std::shared_ptr<PoolObserver> observer = nullptr);
 
   // kFailedPrecondition: the mesh is over. kLimitExceeded: too many workers.
-  core::Expected<WorkerId> Join(std::shared_ptr<OracleWorker> worker, std::uint32_t max_chunk);
+  Allowed<WorkerId> Join(std::shared_ptr<OracleWorker> worker, std::uint32_t max_chunk);
   void Leave(WorkerId worker);
 
   // An answer to `lease` came. The chunk that it answers; nothing if the lease has ended, which is

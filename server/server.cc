@@ -30,9 +30,11 @@ using core::StatusCode;
 
 constexpr auto kTick = std::chrono::seconds(1);
 constexpr auto kPoll = std::chrono::milliseconds(20);
+constexpr auto kReturn = std::chrono::seconds(1);     // for a worker that lost its stream
 constexpr auto kLastWords = std::chrono::seconds(2);  // for streams to send what they have
 constexpr auto kLastRound = std::chrono::seconds(5);  // for meshers to notice a cancel
-constexpr int kMaxStreamsPerConnection = 1024;
+// The health of the process alone: it holds while the server drains.
+constexpr char kAlive[] = "alive";
 constexpr int kMaxSyncThreads = 64;  // reflection alone uses them
 
 // Unary rpcs: run the function, answer at once. No exception leaves a handler.
@@ -91,6 +93,10 @@ class Rpcs final : public v1::Stellate::CallbackService {
       Context* context, const v1::WatchMeshRequest* request) override {
     return server::WatchMesh(service_, context, *request);
   }
+  grpc::ServerWriteReactor<v1::DownloadMeshResponse>* DownloadMesh(
+      Context* context, const v1::DownloadMeshRequest* request) override {
+    return server::DownloadMesh(service_, context, *request);
+  }
 
  private:
   ServerState& service_;
@@ -135,7 +141,8 @@ void SetUp(const Config& config, grpc::ServerBuilder* builder) {
   builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder->AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   builder->AddChannelArgument(GRPC_ARG_HTTP2_MAX_PING_STRIKES, 0);
-  builder->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxStreamsPerConnection);
+  builder->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
+                              static_cast<int>(config.max_connection_streams));
   // Otherwise two servers share a port, and each client gets either.
   builder->AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   grpc::ResourceQuota quota("stellated");
@@ -146,7 +153,8 @@ void SetUp(const Config& config, grpc::ServerBuilder* builder) {
 StoreLimits ToStoreLimits(const Config& config) {
   return {config.max_meshes, config.keep_finished_meshes,
           std::chrono::duration_cast<Clock::duration>(
-              std::chrono::duration<double>(config.keep_finished_seconds))};
+              std::chrono::duration<double>(config.keep_finished_seconds)),
+          config.owner_meshes};
 }
 
 }  // namespace
@@ -174,10 +182,7 @@ class Server::Impl {
     service.journal = std::move(*journal);
     service.store.RecordIn([this] { return service.journal->NewMesh(); });
     for (SessionOptions& options : service.journal->TakeMeshes()) {
-      options.dispatch.chunk_bytes = ChunkBytes(config);
-      options.max_workers = config.max_workers;
-      options.max_watchers = config.max_watchers;
-      options.observer = service.metrics.observer();
+      Furnish(service, &options);
       service.store.Restore(std::move(options));
     }
     return Status::Ok();
@@ -228,7 +233,7 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
   if (!credentials) return tl::unexpected(std::move(credentials.error()));
   auto authenticator = Authenticator::Create(config);
   if (!authenticator) return tl::unexpected(std::move(authenticator.error()));
-  auto impl = std::make_unique<Impl>(config, std::move(factory));
+  auto impl = std::make_unique<Impl>(WithDefaults(config), std::move(factory));
   impl->service.authenticator = std::move(*authenticator);
   status = impl->OpenJournal();
   if (!status.ok()) return tl::unexpected(std::move(status));
@@ -249,7 +254,9 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
                                 "another --listen"));
   }
   if (!address.IsUnix()) address.port = port;
-  impl->server->GetHealthCheckService()->SetServingStatus(v1::Stellate::service_full_name(), true);
+  for (const char* name : {v1::Stellate::service_full_name(), kAlive}) {
+    impl->server->GetHealthCheckService()->SetServingStatus(name, true);
+  }
   impl->StartTicking();
   return std::unique_ptr<Server>(new Server(std::move(impl), address.Target()));
 }
@@ -263,14 +270,22 @@ bool Server::Stop(Clock::duration drain, const std::function<bool()>& hurry) {
   if (impl.stopped) return true;
   impl.stopped = true;
   ServerState& service = impl.service;
-  impl.server->GetHealthCheckService()->SetServingStatus(false);
+  for (const char* name : {"", v1::Stellate::service_full_name()}) {
+    impl.server->GetHealthCheckService()->SetServingStatus(name, false);
+  }
   service.draining = true;
 
   const TimePoint drained = Clock::now() + drain;
   const auto wait_while = [&](TimePoint until, const auto& busy) {
     while (busy() && Clock::now() < until && !hurry()) std::this_thread::sleep_for(kPoll);
   };
-  wait_while(drained, [&] { return service.store.Running() > 0; });
+  // A mesh that nobody serves gets no further, however long it is waited for.
+  TimePoint served = Clock::now();
+  wait_while(drained, [&] {
+    const TimePoint now = Clock::now();
+    if (service.store.Served() > 0) served = now;
+    return service.store.Running() > 0 && now - served < kReturn;
+  });
   // Streams of finished meshes end by themselves, once read.
   if (service.store.Running() == 0) {
     wait_while(std::min(drained, Clock::now() + kLastWords),

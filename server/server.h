@@ -31,8 +31,9 @@ class Server {
   // Reads the token file again, as happens by itself within seconds of a change.
   void ReloadTokens();
 
-  // Stops: no new meshes, then up to `drain` for running ones to end, then the rest is cancelled
-  // and every stream ends with UNAVAILABLE. `hurry` is asked now and then; true ends the drain.
+  // Stops: no new meshes, then up to `drain` for running ones to end, as long as any of them has a
+  // worker; then the rest is suspended, where there is a journal, or cancelled, and every stream
+  // ends with UNAVAILABLE. `hurry` is asked now and then; true ends the drain.
   // False: a mesh is still computing, and the process should exit without waiting for it.
   bool Stop(
       Clock::duration drain, const std::function<bool()>& hurry = [] { return false; });

@@ -75,6 +75,7 @@ void Session::Run() {
          core::Status::Ok());
   }
   mesher.reset();  // it is large, and watchers do not need it
+  if (options_.memory != nullptr) options_.memory->Insist(history_.MemoryBytes());
   Finish(report ? &*report : nullptr);
 }
 
@@ -93,9 +94,24 @@ void Session::RunRounds(core::Mesher* mesher) {
     const core::QueryBatch* const batch = mesher->NextBatch();
     Publish(mesher->progress());
     if (batch == nullptr) return;
+    if (!FitsMemory(mesher, static_cast<std::uint64_t>(batch->size()))) continue;
     if (replaying_ && ReplayRound(mesher, *batch)) continue;
     RunRound(mesher, *batch);
   }
+}
+
+// False, and the mesh has failed, if it has grown beyond what the server can hold.
+bool Session::FitsMemory(core::Mesher* mesher, std::uint64_t queries) {
+  if (options_.memory == nullptr) return true;
+  const std::uint64_t bytes =
+      EstimateMeshBytes(options_.spec, mesher->progress().vertices, queries);
+  if (replaying_) {
+    options_.memory->Insist(bytes);
+    return true;
+  }
+  auto refused = options_.memory->Set(bytes);
+  if (refused) FailBlameless(mesher, ToFailure(*refused));
+  return !refused;
 }
 
 // False when there is nothing to replay any more and the mesh goes on.
@@ -301,6 +317,8 @@ SessionView Session::View() const {
   SessionView view;
   view.revision = history_.revision();
   view.workers = pool_.workers();
+  view.waiting_queries = pool_.waiting();
+  if (options_.memory != nullptr) view.bytes = options_.memory->bytes();
   const std::lock_guard lock(mutex_);
   view.create_time = create_time_;
   view.end_time = end_time_;

@@ -11,6 +11,7 @@
 
 #include "core/mesher.h"
 #include "server/log.h"
+#include "server/memory_budget.h"
 #include "server/oracle_pool.h"
 #include "server/session_journal.h"
 #include "server/watch_log.h"
@@ -37,6 +38,7 @@ struct SessionOptions {
   std::size_t max_watchers = 64;
   std::shared_ptr<SessionObserver> observer;  // may be null
   std::shared_ptr<SessionJournal> journal;    // may be null: the mesh lives in memory alone
+  std::shared_ptr<MemoryBudget::Account> memory;  // may be null: nobody counts
   std::optional<SessionRecord> record;        // set: the journal has it from an earlier server
 };
 
@@ -52,6 +54,8 @@ struct SessionView {
   std::optional<core::Report> report;  // once it is over
   MeshFailure failure;                 // when it failed
   std::size_t workers = 0, watchers = 0;
+  std::size_t waiting_queries = 0;  // of this round, unanswered
+  std::uint64_t bytes = 0;          // estimated; 0 where nobody counts
 };
 
 // Told when a session has something new. Wake comes from any thread and must not block.
@@ -101,6 +105,7 @@ class Session {
   void RepeatEnd(core::Mesher* mesher);
   void RunRound(core::Mesher* mesher, const core::QueryBatch& batch);
   bool Absorb(core::Mesher* mesher, const core::Answers& answers);
+  bool FitsMemory(core::Mesher* mesher, std::uint64_t queries);
   void FailBlameless(core::Mesher* mesher, MeshFailure failure);
   void Fail(core::Mesher* mesher, MeshFailure failure, core::Status status);
   void Publish(const core::Progress& progress);

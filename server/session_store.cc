@@ -48,21 +48,33 @@ SessionStore::SessionStore(StoreLimits limits, Session::MesherFactory factory)
 
 SessionStore::~SessionStore() { Stop(TimePoint::max()); }
 
-core::Expected<std::shared_ptr<Session>> SessionStore::Create(SessionOptions options) {
+Allowed<std::shared_ptr<Session>> SessionStore::Create(SessionOptions options) {
   const std::lock_guard lock(mutex_);
-  const auto running = static_cast<std::size_t>(
-      std::count_if(entries_.begin(), entries_.end(),
-                    [](const auto& e) { return !e.second.session->Over(); }) +
-      std::count_if(dying_.begin(), dying_.end(),
-                    [](const Entry& e) { return !e.session->Over(); }));
+  std::size_t running = 0, owned = 0;
+  const auto count = [&](const Entry& entry) {
+    if (entry.session->Over()) return;
+    ++running;
+    if (entry.session->options().owner == options.owner) ++owned;
+  };
+  for (const auto& [number, entry] : entries_) count(entry);
+  for (const Entry& entry : dying_) count(entry);
   if (running >= limits_.max_running) {
-    return core::Refuse(core::StatusCode::kLimitExceeded,
-                        core::Message("the server runs ", running,
-                                      " meshes, the most that it allows: wait for one to end, "
-                                      "cancel one, or raise --max-meshes"));
+    return tl::unexpected(
+        Refused({"max-meshes", core::Message(limits_.max_running), "server"},
+                core::Message("the server runs ", running,
+                              " meshes, the most that it allows: wait for one to end, cancel one, "
+                              "or raise --max-meshes")));
+  }
+  if (!options.owner.empty() && owned >= limits_.max_running_of_owner) {
+    return tl::unexpected(
+        Refused({"owner-meshes", core::Message(limits_.max_running_of_owner), "owner"},
+                core::Message("you run ", owned,
+                              " meshes, the most that the server allows each owner: wait for one "
+                              "to end, cancel one, or raise --owner-meshes")));
   }
   if (stopped_) {
-    return core::Refuse(core::StatusCode::kFailedPrecondition, "the server is stopping");
+    return tl::unexpected(
+        Refused({core::StatusCode::kFailedPrecondition, "the server is stopping"}));
   }
   options.name = NewMeshName();
   if (new_journal_) options.journal = new_journal_();
@@ -139,6 +151,13 @@ std::size_t SessionStore::Running() const {
   const std::lock_guard lock(mutex_);
   return std::count_if(entries_.begin(), entries_.end(),
                        [](const auto& e) { return !e.second.session->Over(); });
+}
+
+std::size_t SessionStore::Served() const {
+  const std::lock_guard lock(mutex_);
+  return std::count_if(entries_.begin(), entries_.end(), [](const auto& e) {
+    return !e.second.session->Over() && e.second.session->pool().workers() > 0;
+  });
 }
 
 std::vector<SessionStore::Entry> SessionStore::TakeDeadLocked() {

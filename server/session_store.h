@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/status.h"
+#include "server/limits.h"
 #include "server/session.h"
 
 namespace stellate::server {
@@ -24,6 +25,7 @@ struct StoreLimits {
   std::size_t max_running = 64;
   std::size_t keep_finished = 32;
   Clock::duration keep_for = std::chrono::hours(1);
+  std::size_t max_running_of_owner = 64;  // where owners have names
 };
 
 // Owns the meshes and their threads. No call but Stop waits for a mesh.
@@ -36,7 +38,7 @@ class SessionStore {
   ~SessionStore();
 
   // Names the mesh and sets it going. kLimitExceeded: too many are running.
-  core::Expected<std::shared_ptr<Session>> Create(SessionOptions options);
+  Allowed<std::shared_ptr<Session>> Create(SessionOptions options);
   // Before the first Create.
   void RecordIn(JournalFactory new_journal) { new_journal_ = std::move(new_journal); }
   // Takes up a mesh that an earlier server recorded: options.journal and options.record are set.
@@ -56,6 +58,7 @@ class SessionStore {
   std::vector<std::shared_ptr<Session>> All() const;  // everyone's
 
   std::size_t Running() const;
+  std::size_t Served() const;  // running, with a worker
   // Forgets finished meshes that were kept long enough. To be called now and then.
   void Sweep(TimePoint now);
   // Suspends all and waits for their threads until `deadline`. False: some are still computing;

@@ -110,6 +110,29 @@ WatchLog::Cursor WatchLog::Begin(std::uint64_t from) const {
   return {from, marks_.size() - 1, mark.deaths, mark.vertices, mark.simplices};
 }
 
+std::uint64_t WatchLog::MemoryBytes() const {
+  constexpr std::uint64_t kAliveBytes = 40;  // a node of the set and its part of the table
+  const std::lock_guard lock(mutex_);
+  const Mark& end = marks_.back();
+  return points_.size() * sizeof(double) + rows_.size() * sizeof(std::uint32_t) +
+         lives_.size() * sizeof(Life) + deaths_.size() * sizeof(std::uint32_t) +
+         marks_.size() * sizeof(Mark) + (end.simplices - end.deaths) * kAliveBytes;
+}
+
+WatchLog::Snapshot WatchLog::At(std::uint64_t revision) const {
+  const std::lock_guard lock(mutex_);
+  const Mark& mark = marks_[revision];
+  return {mark.vertices, mark.simplices - mark.deaths, mark.vertices + mark.simplices};
+}
+
+WatchLog::Cursor WatchLog::BeginAt(std::uint64_t revision, std::uint64_t position) const {
+  const std::lock_guard lock(mutex_);
+  const Mark& mark = marks_[revision];
+  const std::size_t vertex = std::min<std::size_t>(position, mark.vertices);
+  // Nothing was there at revision 0, so nothing goes.
+  return {0, revision, mark.deaths, vertex, position - vertex};
+}
+
 void WatchLog::CopyRow(std::uint32_t simplex, std::vector<std::uint32_t>* out) const {
   for (std::size_t i = 0; i < row_size_; ++i) out->push_back(rows_[simplex * row_size_ + i]);
 }
@@ -144,9 +167,9 @@ DeltaPart WatchLog::Next(Cursor* cursor, std::size_t max_bytes) const {
     part.points.push_back(points_[cursor->vertex * d_ + i]);
   }
   cursor->vertex += points;
+  if (cursor->vertex < end.vertices) return part;  // a position is among vertices or simplices
   const std::size_t bytes_left = max_bytes - std::min(max_bytes, points * d_ * sizeof(double));
   std::size_t rows_left = points == 0 ? max_rows : bytes_left / row_bytes;
-  if (cursor->vertex < end.vertices) rows_left = 0;
   for (; cursor->added < end.simplices && scanned < kScanLimit; ++cursor->added, ++scanned) {
     const auto simplex = static_cast<std::uint32_t>(cursor->added);
     const Life& life = lives_[simplex];

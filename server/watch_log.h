@@ -55,17 +55,32 @@ class WatchLog {
   core::Status Append(const core::MeshDelta& delta);
 
   std::uint64_t revision() const;
+  std::uint64_t MemoryBytes() const;  // about what it holds
 
   // Where a reader stands between two revisions.
   struct Cursor {
     std::uint64_t from = 0, to = 0;
     std::size_t removed = 0, vertex = 0, added = 0;  // next to look at
+
+    std::uint64_t Position() const { return vertex + added; }
   };
+
   // From `from` to the newest revision; `from` must not lie beyond that.
   Cursor Begin(std::uint64_t from) const;
   // The next part, of about `max_bytes` at most: all removed simplices first, then vertices, then
   // added simplices. Looks at a bounded number of simplices, so a part may be small or empty.
   DeltaPart Next(Cursor* cursor, std::size_t max_bytes) const;
+
+  // The mesh as it was at a revision, to be read from the start or from where a reader stopped.
+  struct Snapshot {
+    std::uint64_t vertices = 0, simplices = 0;
+    std::uint64_t positions = 0;  // 0: the start; this: the end
+  };
+  // `revision` must not lie beyond the newest.
+  Snapshot At(std::uint64_t revision) const;
+  // `position` must not lie beyond At(revision).positions. The cursor's Position tells where the
+  // next part begins.
+  Cursor BeginAt(std::uint64_t revision, std::uint64_t position) const;
 
  private:
   struct Life {

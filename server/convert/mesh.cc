@@ -174,4 +174,13 @@ void ToProto(const DeltaPart& part, int k, int d, v1::DeltaChunk* out) {
   out->set_complete(part.complete);
 }
 
+void ToProto(const DeltaPart& part, int k, int d, v1::DownloadMeshResponse* out) {
+  const auto dimension = static_cast<std::size_t>(d);
+  out->set_revision(part.revision);
+  out->set_first_vertex(part.first_vertex);
+  ToProto(part.points.data(), {part.points.size() / dimension, dimension}, out->mutable_points());
+  ToProto(part.added, static_cast<std::size_t>(k) + 1, out->mutable_cells());
+  out->set_complete(part.complete);
+}
+
 }  // namespace stellate::server

@@ -18,5 +18,7 @@ void ToProto(const core::Report& report, v1::Report* out);
 void ToProto(const Session& session, v1::Mesh* out);
 // `d`: ambient dimension; `k`: dimension.
 void ToProto(const DeltaPart& part, int k, int d, v1::DeltaChunk* out);
+// Of a whole mesh: nothing is removed.
+void ToProto(const DeltaPart& part, int k, int d, v1::DownloadMeshResponse* out);
 
 }  // namespace stellate::server

@@ -17,22 +17,31 @@ using Eigen::Index;
 constexpr std::size_t kMaxLabelBytes = 128;
 
 Status Invalid(std::string message) { return {StatusCode::kInvalidArgument, std::move(message)}; }
-Status TooLarge(std::string message) { return {StatusCode::kLimitExceeded, std::move(message)}; }
+Refused TooLarge(const char* setting, std::uint64_t value, std::string message) {
+  return {{setting, Message(value), "mesh"}, std::move(message)};
+}
 
 // Protobuf counts from 0 to 2^32 - 1; what an int cannot hold no rule would accept.
 Status ToInt(std::uint32_t value, const char* field, int* out) {
   if (value > static_cast<std::uint32_t>(std::numeric_limits<int>::max())) {
-    return TooLarge(Message(field, " is ", value, " but must be far smaller"));
+    return {StatusCode::kLimitExceeded, Message(field, " is ", value, " but must be far smaller")};
   }
   *out = static_cast<int>(value);
   return Status::Ok();
 }
 
-Status ReadDimensions(const v1::MeshSpec& spec, const Config& config, core::Specification* out) {
+Refused ReadDimensions(const v1::MeshSpec& spec, const Config& config, core::Specification* out) {
   Status status = ToInt(spec.dimension(), "dimension", &out->dimension);
   if (!status.ok()) return status;
+  // What no server of this build can do, core::Validate says.
+  if (out->dimension > config.max_dimension && out->dimension <= core::kMaxDimension) {
+    return TooLarge("max-dimension", config.max_dimension,
+                    Message("dimension (k) is ", out->dimension, " but this server allows ",
+                            config.max_dimension, ": raise --max-dimension"));
+  }
   if (spec.ambient_dimension() > static_cast<std::uint32_t>(config.max_ambient_dimension)) {
-    return TooLarge(Message("ambient_dimension (d) is ", spec.ambient_dimension(),
+    return TooLarge("max-ambient-dimension", config.max_ambient_dimension,
+                    Message("ambient_dimension (d) is ", spec.ambient_dimension(),
                             " but this server allows ", config.max_ambient_dimension,
                             ": map the manifold into a space of lower dimension, or raise "
                             "--max-ambient-dimension"));
@@ -94,7 +103,7 @@ Status ReadCriteria(const v1::MeshSpec& spec, core::Specification* out) {
   return ToInt(c.flat_alternations(), "criteria.flat_alternations", &to.flat_alternations);
 }
 
-Status ReadSeconds(double value, double standard, double most, const char* field, double* out) {
+Refused ReadSeconds(double value, double standard, double most, const char* field, double* out) {
   *out = value == 0 ? std::min(standard, most) : value;
   if (!(*out > 0)) {
     return Invalid(Message(field, " is ", value,
@@ -102,13 +111,14 @@ Status ReadSeconds(double value, double standard, double most, const char* field
                            "server's default"));
   }
   if (*out > most) {
-    return TooLarge(Message(field, " is ", value, " but this server allows ", most,
-                            ": ask for less, or raise --max-wait"));
+    return {{"max-wait", Message(most), "mesh"},
+            Message(field, " is ", value, " but this server allows ", most,
+                    ": ask for less, or raise --max-wait")};
   }
   return Status::Ok();
 }
 
-Status ReadLimits(const v1::MeshSpec& spec, const Config& config, MeshRequest* request) {
+Refused ReadLimits(const v1::MeshSpec& spec, const Config& config, MeshRequest* request) {
   const v1::MeshLimits& limits = spec.limits();
   const auto d = std::max<std::uint64_t>(request->spec.ambient_dimension, 1);
   const std::uint64_t room = std::max<std::uint64_t>(config.max_coordinates / d, 1);
@@ -116,34 +126,38 @@ Status ReadLimits(const v1::MeshSpec& spec, const Config& config, MeshRequest* r
   core::Limits& to = request->spec.limits;
   to.max_vertices = limits.max_vertices() == 0 ? most_vertices : limits.max_vertices();
   if (to.max_vertices > most_vertices) {
-    return TooLarge(Message("limits.max_vertices is ", to.max_vertices, " but this server allows ",
+    const bool room_binds = room < config.max_vertices;
+    return TooLarge(room_binds ? "max-coordinates" : "max-vertices",
+                    room_binds ? config.max_coordinates : config.max_vertices,
+                    Message("limits.max_vertices is ", to.max_vertices, " but this server allows ",
                             most_vertices, " in ", d,
                             " dimensions: ask for fewer, or raise --max-vertices or "
                             "--max-coordinates"));
   }
   to.max_rounds = limits.max_rounds() == 0 ? config.max_rounds : limits.max_rounds();
   if (to.max_rounds > config.max_rounds) {
-    return TooLarge(Message("limits.max_rounds is ", to.max_rounds, " but this server allows ",
+    return TooLarge("max-rounds", config.max_rounds,
+                    Message("limits.max_rounds is ", to.max_rounds, " but this server allows ",
                             config.max_rounds, ": ask for fewer, or raise --max-rounds"));
   }
-  const Status status =
+  Refused refused =
       ReadSeconds(limits.worker_wait_seconds(), config.worker_wait_seconds, config.max_wait_seconds,
                   "limits.worker_wait_seconds", &request->worker_wait_seconds);
-  if (!status.ok()) return status;
+  if (!refused.ok()) return refused;
   return ReadSeconds(limits.answer_seconds(), config.answer_seconds, config.max_wait_seconds,
                      "limits.answer_seconds", &request->answer_seconds);
 }
 
 }  // namespace
 
-core::Expected<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config) {
+Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config) {
   MeshRequest request;
   request.spec.epsilon = spec.epsilon();
   request.spec.oracle.intersect_flat = spec.oracle().intersect_flat();
   request.spec.oracle.tangent_basis = spec.oracle().tangent_basis();
   request.spec.random_seed = spec.random_seed() == 0 ? 1 : spec.random_seed();
   request.label = spec.label();
-  Status status = ReadDimensions(spec, config, &request.spec);
+  Refused status = ReadDimensions(spec, config, &request.spec);
   if (status.ok()) status = ReadPlace(spec, &request.spec);
   if (status.ok()) status = ReadCriteria(spec, &request.spec);
   if (status.ok()) status = ReadLimits(spec, config, &request);

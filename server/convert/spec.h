@@ -4,6 +4,7 @@
 
 #include "core/specification.h"
 #include "server/config.h"
+#include "server/limits.h"
 #include "stellate/v1/mesh.pb.h"
 
 namespace stellate::server {
@@ -18,7 +19,7 @@ struct MeshRequest {
 
 // Errors: kInvalidArgument or kLimitExceeded, the message starting with the field's path in
 // MeshSpec. What it lets through core::Validate accepts too.
-core::Expected<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config);
+Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config);
 
 // Seeds are left out: there may be many, and whoever needs them sent them.
 void ToProto(const core::Specification& spec, v1::MeshSpec* out);

@@ -33,6 +33,19 @@ tl::expected<Identity, grpc::Status> Identify(ServerState& service,
   return identity;
 }
 
+grpc::Status Refuse(ServerState& service, const Refused& refused, const std::string& prefix) {
+  if (refused.limit) service.metrics.LimitReached(refused.limit->setting);
+  return ToGrpc(refused, prefix);
+}
+
+grpc::Status TooManyWatchers(ServerState& service, const Session& session) {
+  const std::size_t most = session.options().max_watchers;
+  return Refuse(service, {{"max-watchers", core::Message(most), "mesh"},
+                          core::Message("the mesh has ", most,
+                                        " watchers, the most that this server allows: end one "
+                                        "first, or raise --max-watchers")});
+}
+
 grpc::Status ShuttingDown() {
   return Refusal(v1::ERROR_REASON_SHUTTING_DOWN, "the server is stopping: connect again later");
 }

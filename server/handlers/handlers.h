@@ -10,6 +10,8 @@
 #include "server/auth.h"
 #include "server/config.h"
 #include "server/journal.h"
+#include "server/limits.h"
+#include "server/memory_budget.h"
 #include "server/metrics.h"
 #include "server/session_store.h"
 #include "server/streams.h"
@@ -20,9 +22,13 @@ namespace stellate::server {
 // What the handlers share.
 struct ServerState {
   ServerState(const Config& config_in, StoreLimits limits, Session::MesherFactory factory)
-      : config(config_in), store(limits, std::move(factory)) {}
+      : config(config_in),
+        memory(std::make_shared<MemoryBudget>(
+            MemoryBudget::Limits{config.max_memory_bytes, config.owner_memory_bytes})),
+        store(limits, std::move(factory)) {}
 
   const Config config;
+  const std::shared_ptr<MemoryBudget> memory;
   StreamRegistry streams;
   std::unique_ptr<Journal> journal;  // null: meshes live in memory alone
   SessionStore store;
@@ -41,6 +47,12 @@ struct Call {
 tl::expected<Identity, grpc::Status> Identify(ServerState& service,
                                               const grpc::ServerContextBase& context);
 
+// What a server decides about a mesh, whoever asked for it, into `options`, whose owner is set.
+void Furnish(ServerState& service, SessionOptions* options);
+
+// As ToGrpc; limits that were reached are counted.
+grpc::Status Refuse(ServerState& service, const Refused& refused, const std::string& prefix = "");
+
 // One function for each rpc, each in its own file. None of them waits for anything.
 grpc::Status CreateMesh(const Call& call, const v1::CreateMeshRequest& request, v1::Mesh* mesh);
 grpc::Status GetMesh(const Call& call, const v1::GetMeshRequest& request, v1::Mesh* mesh);
@@ -56,6 +68,9 @@ grpc::ServerBidiReactor<v1::ServeOracleRequest, v1::ServeOracleResponse>* ServeO
 grpc::ServerWriteReactor<v1::WatchMeshResponse>* WatchMesh(ServerState& service,
                                                            grpc::CallbackServerContext* context,
                                                            const v1::WatchMeshRequest& request);
+grpc::ServerWriteReactor<v1::DownloadMeshResponse>* DownloadMesh(
+    ServerState& service, grpc::CallbackServerContext* context,
+    const v1::DownloadMeshRequest& request);
 
 // The caller's mesh of that name, or INVALID_ARGUMENT or NOT_FOUND. Another owner's mesh is not
 // told from one that does not exist. `field`: where the name stands.
@@ -63,6 +78,9 @@ tl::expected<std::shared_ptr<Session>, grpc::Status> FindMesh(const ServerState&
                                                               const Identity& caller,
                                                               const std::string& name,
                                                               const std::string& field = "name");
+
+// RESOURCE_EXHAUSTED: AddWatcher refused.
+grpc::Status TooManyWatchers(ServerState& service, const Session& session);
 
 // UNAVAILABLE: the server stops.
 grpc::Status ShuttingDown();

@@ -160,7 +160,7 @@ class OracleStream final
     if (!id) {
       const std::lock_guard lock(mutex_);
       welcome_ = false;
-      EndLocked(ToGrpc(id.error()), false);
+      EndLocked(Refuse(service_, id.error()), false);
       return;
     }
     Log(LogLevel::kInfo, session_->log_context(), core::Message("worker ", Title(), " joined"));

@@ -95,10 +95,7 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
       session_ = *session;
     }
     if ((*session)->AddWatcher(weak_from_this())) return grpc::Status::OK;
-    return Refusal(v1::ERROR_REASON_LIMIT_EXCEEDED,
-                   core::Message("the mesh has ", (*session)->options().max_watchers,
-                                 " watchers, the most that this server allows: end one first, or "
-                                 "raise --max-watchers"));
+    return TooManyWatchers(service_, **session);
   }
 
   void End(grpc::Status status) { end_ = std::move(status); }
@@ -119,6 +116,10 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
     }
     if (cursor_) {
       TakePart();
+    } else if (geometry_ && over && at_ > session_->history().revision()) {
+      at_ = 0;
+      response_.mutable_reset_mesh()->set_reason(
+          "the mesh ended at an earlier revision than the one you have: forget your copy");
     } else if (progress_due_) {
       progress_due_ = false;
       ToProto(session_->View(), response_.mutable_progress());

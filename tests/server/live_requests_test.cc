@@ -129,6 +129,79 @@ TEST_F(LiveRequestsTest, MeshesBeyondTheLimitAreRefused) {
   const grpc::Status status = Create(SpecOfSphere(), &mesh);
   EXPECT_EQ(status.error_code(), StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_EQ(ReasonIn(status), "LIMIT_EXCEEDED");
+  EXPECT_EQ(LimitIn(status), "max-meshes=1 of server");
+}
+
+TEST_F(LiveRequestsTest, EachLimitIsNamedWithItsValue) {
+  Config config;
+  config.max_dimension = 1;
+  config.max_ambient_dimension = 50;
+  config.max_vertices = 1000;
+  config.max_coordinates = 30'000;
+  config.max_rounds = 10;
+  config.max_wait_seconds = 100;
+  Start(config);
+  const auto limit_of = [this](const std::function<void(v1::MeshSpec*)>& change) {
+    v1::MeshSpec spec = SpecOfSphere();
+    change(&spec);
+    v1::Mesh mesh;
+    const grpc::Status status = Create(spec, &mesh);
+    EXPECT_EQ(status.error_code(), StatusCode::RESOURCE_EXHAUSTED) << status.error_message();
+    EXPECT_EQ(ReasonIn(status), "LIMIT_EXCEEDED");
+    const std::string limit = LimitIn(status);
+    EXPECT_NE(status.error_message().find("--" + limit.substr(0, limit.find('='))),
+              std::string::npos)
+        << status.error_message();
+    return limit;
+  };
+  EXPECT_EQ(limit_of([](v1::MeshSpec*) {}), "max-dimension=1 of mesh");
+  const auto limit_of_curve = [&](const std::function<void(v1::MeshSpec*)>& change) {
+    return limit_of([&change](v1::MeshSpec* spec) {
+      spec->set_dimension(1);
+      change(spec);
+    });
+  };
+  EXPECT_EQ(limit_of_curve([](v1::MeshSpec* s) { s->set_ambient_dimension(51); }),
+            "max-ambient-dimension=50 of mesh");
+  EXPECT_EQ(limit_of_curve([](v1::MeshSpec* s) { s->mutable_limits()->set_max_vertices(1001); }),
+            "max-vertices=1000 of mesh");
+  EXPECT_EQ(limit_of_curve([](v1::MeshSpec* s) { s->mutable_limits()->set_max_rounds(11); }),
+            "max-rounds=10 of mesh");
+  EXPECT_EQ(limit_of_curve([](v1::MeshSpec* s) { s->mutable_limits()->set_answer_seconds(101); }),
+            "max-wait=100 of mesh");
+}
+
+TEST_F(LiveRequestsTest, WithoutMemoryLeftThereIsNoNewMesh) {
+  Config config;
+  config.max_memory_bytes = 1000;
+  Start(config);
+  v1::Mesh mesh;
+  const grpc::Status status = Create(SpecOfSphere(), &mesh);
+  EXPECT_EQ(status.error_code(), StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(LimitIn(status), "max-memory-bytes=1000 of server");
+}
+
+TEST_F(LiveRequestsTest, AMeshThatOutgrowsTheMemoryFailsAlone) {
+  Config config;
+  config.max_memory_bytes = 1'200'000;
+  Start(config);
+  const std::string large = CreateSphere(0.02);
+  {
+    RawWorker worker(stub_.get(), large);
+    const v1::Mesh mesh = WatchToEnd(large);
+    EXPECT_EQ(mesh.state(), v1::MESH_STATE_FAILED);
+    EXPECT_EQ(mesh.report().failure().reason(), "LIMIT_EXCEEDED");
+    EXPECT_NE(mesh.report().failure().message().find("--max-memory-bytes"), std::string::npos);
+    EXPECT_TRUE(worker.Wait().ok());
+  }
+  grpc::ClientContext context;
+  v1::DeleteMeshRequest request;
+  request.set_name(large);
+  google::protobuf::Empty empty;
+  ASSERT_TRUE(stub_->DeleteMesh(&context, request, &empty).ok());
+  const std::string small = CreateSphere(0.3);
+  RawWorker worker(stub_.get(), small);
+  EXPECT_EQ(WatchToEnd(small).state(), v1::MESH_STATE_SUCCEEDED);
 }
 
 TEST_F(LiveRequestsTest, AMessageOverTheLimitIsRefusedAndTheServerGoesOn) {
@@ -164,6 +237,12 @@ TEST_F(LiveRequestsTest, ServerInfoStatesTheLimits) {
   EXPECT_EQ(info.max_ambient_dimension(), 17u);
   EXPECT_EQ(info.max_dimension(), static_cast<unsigned>(core::kMaxDimension));
   EXPECT_EQ(info.max_message_bytes(), config.max_message_bytes);
+  EXPECT_EQ(info.owner_meshes(), config.owner_meshes);
+  EXPECT_EQ(info.max_workers(), config.max_workers);
+  EXPECT_EQ(info.max_watchers(), config.max_watchers);
+  EXPECT_EQ(info.check_share(), config.check_share);
+  EXPECT_GT(info.max_memory_bytes(), 0u) << "a part of the machine's";
+  EXPECT_EQ(info.owner_memory_bytes(), info.max_memory_bytes() / 2);
 }
 
 }  // namespace

@@ -75,6 +75,30 @@ TEST(SessionStore, RefusesMoreThanItsLimitAndTakesMoreWhenOneEnds) {
   EXPECT_TRUE(store.Create(Options()));
 }
 
+TEST(SessionStore, HoldsEachNamedOwnerToItsShare) {
+  SessionStore store({4, 10, 1h, 1});
+  const auto create = [&store](const std::string& owner) {
+    SessionOptions options = Options();
+    options.owner = owner;
+    return store.Create(std::move(options));
+  };
+  const auto first = create("alice");
+  ASSERT_TRUE(first);
+  const auto refused = create("alice");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, core::StatusCode::kLimitExceeded);
+  ASSERT_TRUE(refused.error().limit);
+  EXPECT_EQ(refused.error().limit->setting, "owner-meshes");
+  EXPECT_EQ(refused.error().limit->scope, "owner");
+  EXPECT_TRUE(create("bob"));
+  EXPECT_TRUE(create(""));
+  EXPECT_TRUE(create("")) << "nobody in particular";
+  EXPECT_EQ(create("carol").error().limit->setting, "max-meshes") << "the server is full";
+  (*first)->Cancel();
+  WaitUntilOver(**first);
+  EXPECT_TRUE(create("alice"));
+}
+
 TEST(SessionStore, SweepForgetsFinishedMeshesByNumberAndAge) {
   SessionStore store({10, 2, 1h});
   std::vector<std::shared_ptr<Session>> sessions;

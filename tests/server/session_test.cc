@@ -186,6 +186,29 @@ TEST(Session, AFaultOfTheMesherFailsOnlyItsMesh) {
   }
 }
 
+TEST(Session, AMeshThatOutgrowsTheMemoryFailsAndGivesItBack) {
+  SessionOptions options;
+  options.name = "meshes/00000000000000000000000000000000";
+  options.spec = SphereSpec(0.3);
+  // The first two rounds end with one vertex and two; a third would be too much.
+  const auto budget = std::make_shared<MemoryBudget>(
+      MemoryBudget::Limits{EstimateMeshBytes(options.spec, 1, 1), 0});
+  options.memory = MemoryBudget::Open(budget, "");
+  Session session(options, Faking({}));
+  std::thread thread([&session] { session.Run(); });
+  const auto worker = FakeWorker::Join(&session.pool());
+  thread.join();
+  const SessionView view = session.View();
+  EXPECT_EQ(view.state, SessionState::kFailed);
+  EXPECT_EQ(view.failure.reason, "LIMIT_EXCEEDED");
+  EXPECT_NE(view.failure.message.find("--max-memory-bytes"), std::string::npos);
+  EXPECT_EQ(view.revision, 2u);
+  EXPECT_EQ(view.bytes, session.history().MemoryBytes()) << "the mesher is gone";
+  EXPECT_EQ(budget->total(), view.bytes);
+  worker->WaitForEnd();
+  EXPECT_TRUE(worker->end().blame.ok());
+}
+
 TEST(Session, ARefusedSpecificationFailsTheMesh) {
   Running running([](core::Specification) -> core::Expected<std::unique_ptr<core::Mesher>> {
     return core::Refuse(core::StatusCode::kInvalidArgument, "epsilon is wrong");

@@ -27,6 +27,30 @@ inline std::string ReasonIn(const grpc::Status& status) {
   return "";
 }
 
+// "max-meshes=3 of server": the limit that a status's details name, "" if there is none. The
+// QuotaFailure must say the same.
+inline std::string LimitIn(const grpc::Status& status) {
+  const Status details = DetailsOf(status);
+  std::string limit, quota_words;
+  for (const auto& any : details.details()) {
+    ErrorInfo info;
+    QuotaFailure quota;
+    if (any.type_url() == "type.googleapis.com/google.rpc.ErrorInfo" &&
+        info.ParseFromString(any.value()) && info.metadata().contains("limit")) {
+      limit = info.metadata().at("limit") + "=" + info.metadata().at("value") + " of " +
+              info.metadata().at("scope");
+    }
+    if (any.type_url() == "type.googleapis.com/google.rpc.QuotaFailure" &&
+        quota.ParseFromString(any.value()) && quota.violations_size() == 1) {
+      std::string words = quota.violations(0).description();
+      const std::size_t is = words.find(" is ");
+      if (is != std::string::npos) words.replace(is, 4, "=");
+      quota_words = words + " of " + quota.violations(0).subject();
+    }
+  }
+  return limit == quota_words ? limit : "ErrorInfo and QuotaFailure differ: " + quota_words;
+}
+
 // The BadRequest's field in a status's details, "" if there is none.
 inline std::string FieldIn(const grpc::Status& status) {
   const Status details = DetailsOf(status);

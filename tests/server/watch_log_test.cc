@@ -156,5 +156,43 @@ TEST(WatchLog, RefusesWhatDoesNotFollow) {
   EXPECT_TRUE(log.Append(Delta(2, 4, 0, {}, {{1, 2, 3}})).ok()) << "a refusal changes nothing";
 }
 
+// Any revision, read in parts, each by a reader that knows but the position.
+TEST(WatchLog, EveryRevisionIsReadFromAnyPosition) {
+  std::mt19937 random(5);
+  History history;
+  history.Grow(12, &random);
+  for (std::uint64_t revision = 0; revision < history.states.size(); ++revision) {
+    const WatchLog::Snapshot snapshot = history.log.At(revision);
+    EXPECT_EQ(snapshot.vertices, history.vertices[revision]);
+    EXPECT_EQ(snapshot.simplices, history.states[revision].size());
+    for (const std::size_t bytes : {std::size_t{1}, std::size_t{200}, std::size_t{1} << 20}) {
+      Client client;
+      std::uint64_t position = 0;
+      for (bool complete = false; !complete;) {
+        WatchLog::Cursor cursor = history.log.BeginAt(revision, position);
+        const DeltaPart part = history.log.Next(&cursor, bytes);
+        EXPECT_TRUE(part.removed.empty());
+        EXPECT_TRUE(part.complete || cursor.Position() > position) << "it gets on";
+        client.Apply(part);
+        position = cursor.Position();
+        complete = part.complete;
+      }
+      EXPECT_EQ(position, snapshot.positions);
+      EXPECT_EQ(client.points.size(), kAmbient * snapshot.vertices);
+      EXPECT_EQ(client.state, history.states[revision]);
+    }
+  }
+}
+
+TEST(WatchLog, MemoryIsThatOfWhatItHolds) {
+  std::mt19937 random(6);
+  History history;
+  const std::uint64_t empty = history.log.MemoryBytes();
+  history.Grow(20, &random);
+  const WatchLog::Snapshot end = history.log.At(history.log.revision());
+  EXPECT_GE(history.log.MemoryBytes() - empty,
+            end.vertices * kAmbient * sizeof(double) + end.simplices * 3 * sizeof(std::uint32_t));
+}
+
 }  // namespace
 }  // namespace stellate::server

@@ -1,0 +1,105 @@
+#include "server/memory_budget.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <utility>
+
+#include "core/message.h"
+
+namespace stellate::server {
+namespace {
+
+using core::Message;
+
+// Beside coordinates: a vertex's star, its neighbours, its part of the search tree. By k.
+constexpr std::uint64_t kStarBytes[] = {0, 700, 1500, 5500, 25'000, 150'000};
+static_assert(std::size(kStarBytes) == core::kMaxDimension + 1);
+constexpr std::uint64_t kEmptyMeshBytes = std::uint64_t{1} << 16;  // one with nothing in it
+
+std::uint64_t PageBytes() { return static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)); }
+
+}  // namespace
+
+std::uint64_t EstimateMeshBytes(const core::Specification& spec, std::uint64_t vertices,
+                                std::uint64_t queries) {
+  const auto d = static_cast<std::uint64_t>(spec.ambient_dimension);
+  const auto k = static_cast<std::uint64_t>(std::clamp(spec.dimension, 1, core::kMaxDimension));
+  // A point and its tangent basis: in the sample, its search tree, and the history.
+  const std::uint64_t coordinates = 4 * sizeof(double) * d * (k + 1);
+  const auto seeds = static_cast<std::uint64_t>(spec.seeds.size()) * sizeof(double);
+  // Questions and answers with their bases, here and as the mesher has them.
+  const std::uint64_t message = 4 * sizeof(double) * d * (k + 1);
+  return kEmptyMeshBytes + seeds + vertices * (coordinates + kStarBytes[k]) + queries * message;
+}
+
+std::uint64_t MachineBytes() {
+  std::uint64_t bytes = static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * PageBytes();
+  std::uint64_t limit = 0;  // "max" where the container has none
+  if (std::ifstream("/sys/fs/cgroup/memory.max") >> limit && limit > 0) {
+    bytes = std::min(bytes, limit);
+  }
+  return bytes;
+}
+
+std::uint64_t ResidentBytes() {
+  std::uint64_t size = 0, resident = 0;
+  std::ifstream("/proc/self/statm") >> size >> resident;
+  return resident * PageBytes();
+}
+
+std::unique_ptr<MemoryBudget::Account> MemoryBudget::Open(std::shared_ptr<MemoryBudget> budget,
+                                                          std::string owner) {
+  return std::unique_ptr<Account>(new Account(std::move(budget), std::move(owner)));
+}
+
+std::optional<Refused> MemoryBudget::Set(Account* account, std::uint64_t bytes, bool insist) {
+  const std::lock_guard lock(mutex_);
+  const std::uint64_t old = account->bytes_;
+  std::uint64_t& owners = by_owner_[account->owner_];
+  const std::uint64_t total = total_ - old + bytes;
+  const std::uint64_t owned = owners - old + bytes;
+  if (bytes > old && !insist) {
+    constexpr char kAdvice[] =
+        "delete meshes that are no longer needed, ask for a larger epsilon or fewer vertices, or "
+        "raise --";
+    if (limits_.server > 0 && total > limits_.server) {
+      return Refused({"max-memory-bytes", Message(limits_.server), "server"},
+                     Message("the server's meshes would hold about ", total, " bytes, this one ",
+                             bytes, " of them, but the server allows ", limits_.server, ": ",
+                             kAdvice, "max-memory-bytes"));
+    }
+    if (limits_.owner > 0 && !account->owner_.empty() && owned > limits_.owner) {
+      return Refused({"owner-memory-bytes", Message(limits_.owner), "owner"},
+                     Message("your meshes would hold about ", owned, " bytes, this one ", bytes,
+                             " of them, but the server allows each owner ", limits_.owner, ": ",
+                             kAdvice, "owner-memory-bytes"));
+    }
+  }
+  total_ = total;
+  owners = owned;
+  account->bytes_ = bytes;
+  return std::nullopt;
+}
+
+void MemoryBudget::Release(Account* account) {
+  const std::lock_guard lock(mutex_);
+  total_ -= account->bytes_;
+  const auto owner = by_owner_.find(account->owner_);
+  if (owner == by_owner_.end()) return;
+  owner->second -= account->bytes_;
+  if (owner->second == 0) by_owner_.erase(owner);
+}
+
+std::uint64_t MemoryBudget::BytesOf(const Account* account) const {
+  const std::lock_guard lock(mutex_);
+  return account->bytes_;
+}
+
+std::uint64_t MemoryBudget::total() const {
+  const std::lock_guard lock(mutex_);
+  return total_;
+}
+
+}  // namespace stellate::server
