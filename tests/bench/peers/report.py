@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import subprocess
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -217,8 +218,10 @@ def plot(path: Path, rows: list[Row]) -> None:
                 [i + shift for i in range(len(values))], values, height, color=colour, label=label
             )
             axis.bar_label(bars, [count(value) for value in values], padding=2, fontsize=7)
+        # Bars on a scale of powers have no natural beginning: a power of ten, the same for all.
+        values = [getattr(row, key) for row in rows]
         axis.set_xscale("log")
-        axis.margins(x=0.15)
+        axis.set_xlim(10 ** math.floor(math.log10(min(values) / 2)), 3 * max(values))
         axis.set_title(title, fontsize=10)
         axis.spines[["top", "right"]].set_visible(False)
     axes[0].set_yticks(range(len(labels)), labels, fontsize=7)

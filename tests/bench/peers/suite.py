@@ -88,9 +88,9 @@ CASES: tuple[Case, ...] = (
     _cgal("torus in R³", "torus:1:0.4", 0.1, 0.16),
     _cgal("tanglecube in R³", "tanglecube", 0.2, 0.2),
     *_tangential(
-        "T² in R⁴", "clifford-torus", 2, 0.1, 0.28, ((10_000,), (100_000,)), ((10_000,), (100_000,))
+        "T² in R⁴", "clifford-torus", 2, 0.1, 0.28, ((10_000,), (100_000,)), ((10_000,), ())
     ),
-    *_tangential("S³ in R⁴", "sphere:3", 3, 0.3, 0.4, ((5_000,), (30_000,)), ((5_000,), (30_000,))),
+    *_tangential("S³ in R⁴", "sphere:3", 3, 0.3, 0.4, ((5_000,), (30_000,)), ((5_000,), ())),
     *_tangential("SO(3) in R⁹", "so3", 3, 0.5, 0.56, ((8_000,), ()), ((), (8_000,))),
     _coxeter("S² in R⁸", 2, ("sphere:2", "sphere:2:8"), ("--ambient", "8"), (0.5, 0.1), (100_000,)),
     _coxeter("S³ in R⁴", 3, ("sphere:3", "sphere:3"), (), (0.4, 0.3), (50_000,)),
