@@ -9,9 +9,12 @@
 #include <string>
 #include <thread>
 
+#include "doctor_command.h"
 #include "mesh_command.h"
+#include "server_options.h"
 #include "stellate/catalogue.h"
 #include "stellate/client.h"
+#include "top_command.h"
 
 namespace {
 
@@ -68,14 +71,13 @@ int List() {
   return stellate::cli::kExitCertified;
 }
 
-int Health(const std::string& server, const std::string& token_file,
-           stellate::Credentials credentials) {
-  const auto authorized = stellate::cli::Authorize(token_file, &credentials);
-  if (!authorized) return Complain(authorized.error());
-  const auto health = stellate::CheckHealth(server, 5, credentials);
+int Health(const stellate::cli::ServerOptions& server) {
+  const auto credentials = server.ReadCredentials();
+  if (!credentials) return Complain(credentials.error());
+  const auto health = stellate::CheckHealth(server.address(), 5, *credentials);
   if (!health) return Complain(health.error());
-  std::cout << server << ": " << (health->serving ? "serving" : "not serving") << ", stellated "
-            << health->version << "\n"
+  std::cout << server.address() << ": " << (health->serving ? "serving" : "not serving")
+            << ", stellated " << health->version << "\n"
             << "limits: dimension " << health->max_dimension << " in R^"
             << health->max_ambient_dimension << ", " << health->max_vertices << " vertices, "
             << health->max_meshes << " meshes at once\n";
@@ -88,12 +90,10 @@ int Main(int argc, char** argv) {
   app.require_subcommand(1);
   stellate::cli::MeshCommand mesh(app);
   const CLI::App* list = app.add_subcommand("list", "Show the catalogue of manifolds");
-  CLI::App* health = app.add_subcommand("health", "Ask a server how it is");
-  std::string server = "127.0.0.1:7717";
-  health->add_option("--server", server, "host:port or unix:/path")->capture_default_str();
-  stellate::Credentials credentials;
-  std::string token_file;
-  stellate::cli::AddCredentials(health, &credentials, &token_file);
+  const stellate::cli::DoctorCommand doctor(app);
+  const stellate::cli::TopCommand top(app);
+  CLI::App* const health = app.add_subcommand("health", "Ask a server how it is");
+  const stellate::cli::ServerOptions health_server(health, "127.0.0.1:7717");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -101,9 +101,10 @@ int Main(int argc, char** argv) {
     return app.exit(error) == 0 ? stellate::cli::kExitCertified : stellate::cli::kExitRefused;
   }
   if (list->parsed()) return List();
-  if (health->parsed()) return Health(server, token_file, credentials);
+  if (doctor.chosen()) return doctor.Run();
+  if (health->parsed()) return Health(health_server);
   const StopOnSignal signals;
-  return mesh.Run(signals.token());
+  return top.chosen() ? top.Run(signals.token()) : mesh.Run(signals.token());
 }
 
 }  // namespace

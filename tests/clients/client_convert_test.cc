@@ -92,10 +92,13 @@ TEST(Statuses, KeepTheReasonAndTellWhoseFault) {
   EXPECT_EQ(FromStatus(grpc::Status(grpc::StatusCode::NOT_FOUND, "", "no protobuf")).reason, "");
 }
 
-v1::MeshDelta Delta(std::uint64_t first, const Eigen::MatrixXd& points,
-                    const std::vector<std::uint32_t>& added,
-                    const std::vector<std::uint32_t>& removed) {
-  v1::MeshDelta delta;
+v1::DeltaChunk Delta(std::uint64_t revision, std::uint64_t first, const Eigen::MatrixXd& points,
+                     const std::vector<std::uint32_t>& added,
+                     const std::vector<std::uint32_t>& removed, bool complete = true) {
+  v1::DeltaChunk chunk;
+  chunk.set_complete(complete);
+  v1::MeshDelta& delta = *chunk.mutable_delta();
+  delta.set_revision(revision);
   delta.set_first_vertex(first);
   ToArray(points, {2}, delta.mutable_points());
   for (const auto& [ids, array] :
@@ -104,16 +107,16 @@ v1::MeshDelta Delta(std::uint64_t first, const Eigen::MatrixXd& points,
     array->add_shape(2);
     array->set_data(ids->data(), ids->size() * 4);
   }
-  return delta;
+  return chunk;
 }
 
 TEST(MeshBuilder, EndsWithWhatWasAddedAndNotRemoved) {
   auto builder = MeshBuilder::Create(1, 2);
   ASSERT_TRUE(builder.has_value());
   const Eigen::MatrixXd points = Eigen::MatrixXd::Random(2, 4);
-  ASSERT_TRUE(builder->Absorb(Delta(0, points.leftCols(3), {0, 1, 1, 2, 0, 2}, {})));
-  ASSERT_TRUE(builder->Absorb(Delta(3, points.rightCols(1), {2, 3, 0, 3}, {0, 2, 0, 1})));
-  ASSERT_TRUE(builder->Absorb(Delta(4, Eigen::MatrixXd(2, 0), {0, 1}, {})));  // it comes back
+  ASSERT_TRUE(builder->Absorb(Delta(1, 0, points.leftCols(3), {0, 1, 1, 2, 0, 2}, {})));
+  ASSERT_TRUE(builder->Absorb(Delta(2, 3, points.rightCols(1), {2, 3, 0, 3}, {0, 2, 0, 1})));
+  ASSERT_TRUE(builder->Absorb(Delta(5, 4, Eigen::MatrixXd(2, 0), {0, 1}, {})));  // it comes back
   const Expected<Mesh> mesh = builder->Take();
   ASSERT_TRUE(mesh.has_value());
   EXPECT_EQ(mesh->points, points);
@@ -126,14 +129,14 @@ TEST(MeshBuilder, StaysRightThroughALongHistory) {
   // A path whose last edge moves on a hundred thousand times: more removals than are kept.
   auto builder = MeshBuilder::Create(1, 2);
   ASSERT_TRUE(builder.has_value());
-  ASSERT_TRUE(builder->Absorb(Delta(0, Eigen::MatrixXd::Zero(2, 200), {0, 1}, {})));
+  ASSERT_TRUE(builder->Absorb(Delta(1, 0, Eigen::MatrixXd::Zero(2, 200), {0, 1}, {})));
   for (std::uint32_t step = 0; step < 1000; ++step) {
     std::vector<std::uint32_t> added, removed;
     for (std::uint32_t i = 0; i < 100; ++i) {
       std::vector<std::uint32_t>& ids = step % 2 == 0 ? added : removed;
       ids.insert(ids.end(), {i, i + 100});
     }
-    ASSERT_TRUE(builder->Absorb(Delta(200, Eigen::MatrixXd(2, 0), added, removed)));
+    ASSERT_TRUE(builder->Absorb(Delta(2 + step, 200, Eigen::MatrixXd(2, 0), added, removed)));
   }
   const Expected<Mesh> mesh = builder->Take();
   ASSERT_TRUE(mesh.has_value());
@@ -141,14 +144,37 @@ TEST(MeshBuilder, StaysRightThroughALongHistory) {
   EXPECT_EQ(mesh->simplices(1, 0), 1u);
 }
 
+TEST(MeshBuilder, TakesARevisionOnceAndWhole) {
+  auto builder = MeshBuilder::Create(1, 2);
+  ASSERT_TRUE(builder.has_value());
+  const Eigen::MatrixXd points = Eigen::MatrixXd::Random(2, 3);
+  ASSERT_TRUE(builder->Absorb(Delta(3, 0, points.leftCols(2), {0, 1}, {})));
+  // Cut short in the middle of revision 5, and sent again as 6.
+  ASSERT_TRUE(builder->Absorb(Delta(5, 2, points.rightCols(1), {}, {0, 1}, false)));
+  EXPECT_EQ(builder->revision(), 3u);
+  EXPECT_EQ(builder->Take()->points.cols(), 2);
+  builder->ForgetPending();
+  ASSERT_TRUE(builder->Absorb(Delta(6, 2, points.rightCols(1), {0, 2}, {0, 1})));
+  EXPECT_EQ(builder->revision(), 6u);
+  const Expected<Mesh> mesh = builder->Take();
+  ASSERT_TRUE(mesh.has_value());
+  EXPECT_EQ(mesh->points, points);
+  ASSERT_EQ(mesh->simplices.cols(), 1);
+  EXPECT_EQ(mesh->simplices(1, 0), 2u);
+  // What it has already is refused, and so is another revision before one is complete.
+  EXPECT_FALSE(builder->Absorb(Delta(6, 3, Eigen::MatrixXd(2, 0), {1, 2}, {})));
+  ASSERT_TRUE(builder->Absorb(Delta(7, 3, Eigen::MatrixXd(2, 0), {1, 2}, {}, false)));
+  EXPECT_FALSE(builder->Absorb(Delta(8, 3, Eigen::MatrixXd(2, 0), {}, {})));
+}
+
 TEST(MeshBuilder, RefusesWhatMakesNoSense) {
   auto builder = MeshBuilder::Create(1, 2);
   ASSERT_TRUE(builder.has_value());
-  EXPECT_FALSE(builder->Absorb(Delta(5, Eigen::MatrixXd::Zero(2, 1), {}, {})));  // a gap
-  v1::MeshDelta wide = Delta(0, Eigen::MatrixXd(2, 0), {0, 1}, {});
-  wide.mutable_added()->set_shape(1, 3);
-  EXPECT_FALSE(builder->Absorb(wide));
-  ASSERT_TRUE(builder->Absorb(Delta(0, Eigen::MatrixXd::Zero(2, 1), {0, 1}, {})));
+  EXPECT_FALSE(builder->Absorb(Delta(1, 5, Eigen::MatrixXd::Zero(2, 1), {}, {})));  // a gap
+  v1::DeltaChunk wide = Delta(1, 0, Eigen::MatrixXd(2, 0), {0, 1}, {});
+  wide.mutable_delta()->mutable_added()->set_shape(1, 3);
+  EXPECT_FALSE(builder->Absorb(std::move(wide)));
+  ASSERT_TRUE(builder->Absorb(Delta(1, 0, Eigen::MatrixXd::Zero(2, 1), {0, 1}, {})));
   EXPECT_FALSE(builder->Take().has_value());  // vertex 1 never came
   EXPECT_FALSE(MeshBuilder::Create(0, 2).has_value());
   EXPECT_FALSE(MeshBuilder::Create(kMaxSimplexDimension + 1, 20).has_value());

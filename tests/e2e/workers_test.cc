@@ -55,7 +55,7 @@ class Workers : public Live {
     v1::WatchMeshResponse response;
     while (stream->Read(&response)) {
       if (response.has_delta()) {
-        EXPECT_TRUE(builder->Absorb(response.delta().delta()).has_value());
+        EXPECT_TRUE(builder->Absorb(std::move(*response.mutable_delta())).has_value());
       }
       if (response.has_final()) ending.final = response.final();
     }

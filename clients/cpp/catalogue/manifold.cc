@@ -7,6 +7,20 @@ namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+// factor * x, column by column: a product of whole matrices rounds each column as its place among
+// the others has it, and then answers would depend on how a round is cut into chunks.
+template <typename Factor>
+Eigen::MatrixXd EachTimes(const Factor& factor, const Eigen::MatrixXd& x) {
+  Eigen::MatrixXd product(factor.rows(), x.cols());
+  Eigen::VectorXd column(x.rows()), result(factor.rows());
+  for (Eigen::Index j = 0; j < x.cols(); ++j) {
+    column = x.col(j);
+    result.noalias() = factor * column;
+    product.col(j) = result;
+  }
+  return product;
+}
+
 }  // namespace
 
 Manifold::Manifold(std::unique_ptr<PointwiseOracle> shape, ManifoldFacts facts,
@@ -15,8 +29,8 @@ Manifold::Manifold(std::unique_ptr<PointwiseOracle> shape, ManifoldFacts facts,
 
 Answer Manifold::ClosestPoint(const Eigen::MatrixXd& x) {
   if (frame_.size() == 0) return shape_->ClosestPoint(x);
-  Answer answer = shape_->ClosestPoint(frame_.transpose() * x);
-  answer.points = frame_ * answer.points;
+  Answer answer = shape_->ClosestPoint(EachTimes(frame_.transpose(), x));
+  answer.points = EachTimes(frame_, answer.points);
   return answer;
 }
 
@@ -25,14 +39,16 @@ Answer Manifold::IntersectFlat(const Eigen::MatrixXd& centers, const Eigen::Matr
   if (frame_.size() == 0) return shape_->IntersectFlat(centers, bases, radii);
   // With y = Q z, the flat { T^t y = T^t c } becomes { (Q^t T)^t z = T^t c } in the shape's space.
   const int d = ambient_dimension(), k = dimension();
-  const Eigen::MatrixXd starts = frame_.transpose() * centers;
+  const Eigen::MatrixXd starts = EachTimes(frame_.transpose(), centers);
   Answer answer;
   answer.points.setZero(d, centers.cols());
   answer.found.assign(static_cast<size_t>(centers.cols()), 0);
-  Eigen::VectorXd m(shape_->ambient_dimension());
+  Eigen::VectorXd m(shape_->ambient_dimension()), center;
+  Eigen::MatrixXd basis;
   for (Eigen::Index j = 0; j < centers.cols(); ++j) {
-    const Eigen::Map<const RowMajor> basis(bases.col(j).data(), d, k);
-    const Eigen::VectorXd level = basis.transpose() * centers.col(j);
+    center = centers.col(j);
+    basis = Eigen::Map<const RowMajor>(bases.col(j).data(), d, k);
+    const Eigen::VectorXd level = basis.transpose() * center;
     if (!shape_->Meet(starts.col(j), frame_.transpose() * basis, level, m)) continue;
     answer.points.col(j).noalias() = frame_ * m;
     const double distance = (answer.points.col(j) - centers.col(j)).norm();
@@ -44,7 +60,7 @@ Answer Manifold::IntersectFlat(const Eigen::MatrixXd& centers, const Eigen::Matr
 Eigen::MatrixXd Manifold::TangentBasis(const Eigen::MatrixXd& points) {
   if (frame_.size() == 0) return shape_->TangentBasis(points);
   const int d = ambient_dimension(), k = dimension(), inner = shape_->ambient_dimension();
-  const Eigen::MatrixXd small = shape_->TangentBasis(frame_.transpose() * points);
+  const Eigen::MatrixXd small = shape_->TangentBasis(EachTimes(frame_.transpose(), points));
   Eigen::MatrixXd bases(d * k, points.cols());
   for (Eigen::Index j = 0; j < points.cols(); ++j) {
     Eigen::Map<RowMajor>(bases.col(j).data(), d, k).noalias() =

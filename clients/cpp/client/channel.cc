@@ -4,6 +4,7 @@
 #include <grpcpp/security/credentials.h>
 #include <grpcpp/support/client_interceptor.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <utility>
@@ -78,7 +79,8 @@ Expected<std::shared_ptr<grpc::ChannelCredentials>> Security(const Credentials& 
 }  // namespace
 
 Expected<std::shared_ptr<grpc::Channel>> Connect(const std::string& server,
-                                                 const Credentials& credentials) {
+                                                 const Credentials& credentials,
+                                                 double keepalive_seconds) {
   const auto security = Security(credentials);
   if (!security) return tl::unexpected(security.error());
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
@@ -94,8 +96,13 @@ Expected<std::shared_ptr<grpc::Channel>> Connect(const std::string& server,
   }
   grpc::ChannelArguments arguments;
   // Streams are quiet while the other side computes: pings find a peer that froze or vanished.
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 10'000);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10'000);
+  const int ping = std::max(1, static_cast<int>(1000 * std::min(keepalive_seconds, 1e6)));
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, ping);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 2 * ping);
+  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);  // as many as it takes
+  // The pauses between attempts are ours to choose, and gRPC's own would be up to two minutes.
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
   return grpc::experimental::CreateCustomChannelWithInterceptors(server, *security, arguments,
                                                                  std::move(interceptors));
 }

@@ -10,9 +10,12 @@
 
 namespace stellate::client {
 
-// A channel to the server that sends the token, if there is one, with every call. kRefused: a file
-// that cannot be read, or a token that others could read on its way.
+// A channel to the server that sends the token, if there is one, with every call. A server that was
+// silent for `keepalive_seconds` is pinged, and counts as lost when it takes twice as long to
+// answer. kRefused: a file that cannot be read, or a token that others could read on its way.
+inline constexpr double kUsualKeepalive = 4, kNoPings = 1e6;
 Expected<std::shared_ptr<grpc::Channel>> Connect(const std::string& server,
-                                                 const Credentials& credentials);
+                                                 const Credentials& credentials,
+                                                 double keepalive_seconds = kUsualKeepalive);
 
 }  // namespace stellate::client

@@ -141,6 +141,13 @@ Expected<void> EmbeddedServer::AwaitReady() {
   return {};
 }
 
+bool EmbeddedServer::alive() const {
+  siginfo_t ended{};  // left for the destructor to collect
+  const int waited =
+      waitid(P_PID, static_cast<id_t>(process_), &ended, WEXITED | WNOHANG | WNOWAIT);
+  return waited == 0 && ended.si_pid == 0;
+}
+
 std::string EmbeddedServer::LogTail() const {
   std::ifstream file(directory_ + "/log");
   const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};

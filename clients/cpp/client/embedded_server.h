@@ -23,6 +23,7 @@ class EmbeddedServer {
   EmbeddedServer& operator=(const EmbeddedServer&) = delete;
 
   const std::string& address() const { return address_; }  // "unix:/..."
+  bool alive() const;                                      // from any thread
 
  private:
   EmbeddedServer() = default;

@@ -89,7 +89,21 @@ Expected<MeshBuilder> MeshBuilder::Create(int k, int d) {
   return MeshBuilder(k, d, std::move(log));
 }
 
-Expected<void> MeshBuilder::Absorb(const v1::MeshDelta& delta) {
+Expected<void> MeshBuilder::Absorb(v1::DeltaChunk&& chunk) {
+  const std::uint64_t revision = chunk.delta().revision();
+  if (revision <= revision_ || (!pending_.empty() && pending_.back().revision() != revision)) {
+    return tl::unexpected(Inconsistent("revision " + std::to_string(revision) + " out of order"));
+  }
+  pending_.push_back(std::move(*chunk.mutable_delta()));
+  if (!chunk.complete()) return {};
+  for (const v1::MeshDelta& delta : std::exchange(pending_, {})) {
+    if (const Expected<void> ok = Apply(delta); !ok) return ok;
+  }
+  revision_ = revision;
+  return {};
+}
+
+Expected<void> MeshBuilder::Apply(const v1::MeshDelta& delta) {
   const Expected<Eigen::MatrixXd> points =
       FromArray(delta.points(), {static_cast<std::uint32_t>(d_)});
   if (!points) return tl::unexpected(points.error());

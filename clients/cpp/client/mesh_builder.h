@@ -26,20 +26,31 @@ class SimplexLog {
 inline constexpr int kMaxSimplexDimension = 7;
 std::unique_ptr<SimplexLog> MakeSimplexLog(int k);
 
-// Puts a mesh together from a WatchMesh stream.
+// Puts a mesh together from WatchMesh streams. Chunks are kept until their revision is complete,
+// so that what a broken stream leaves undone can be sent again from revision() on.
 class MeshBuilder {
  public:
   // Errors: a k that this client cannot hold.
   static Expected<MeshBuilder> Create(int k, int d);
 
-  Expected<void> Absorb(const v1::MeshDelta& delta);
-  // The mesh so far. Errors: a simplex with a vertex that never came.
+  // Takes the chunk's arrays. Errors: what does not follow on revision() and what came before.
+  Expected<void> Absorb(v1::DeltaChunk&& chunk);
+  // The last complete revision; 0: none yet.
+  std::uint64_t revision() const { return revision_; }
+  // Drops the chunks of a revision that was cut short.
+  void ForgetPending() { pending_.clear(); }
+
+  // The mesh as of revision(). Errors: a simplex with a vertex that never came.
   Expected<Mesh> Take();
 
  private:
   MeshBuilder(int k, int d, std::unique_ptr<SimplexLog> log) : k_(k), d_(d), log_(std::move(log)) {}
 
+  Expected<void> Apply(const v1::MeshDelta& delta);
+
   int k_, d_;
+  std::uint64_t revision_ = 0;
+  std::vector<v1::MeshDelta> pending_;
   std::vector<double> coordinates_;  // of the vertices so far, one after another
   std::unique_ptr<SimplexLog> log_;
 };

@@ -1,7 +1,11 @@
 #include "worker.h"
 
 #include <algorithm>
+#include <condition_variable>
+#include <deque>
 #include <memory>
+#include <mutex>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -29,11 +33,71 @@ std::string DescriptionOf(const std::exception_ptr& exception) {
   }
 }
 
+// What the server sent, read on a thread of its own: the next chunk is on its way while one is
+// answered. The server bounds how many there can be.
+class Inbox {
+ public:
+  using Stream = grpc::ClientReaderWriterInterface<v1::ServeOracleRequest, v1::ServeOracleResponse>;
+  explicit Inbox(Stream& stream) : reader_([this, &stream] { ReadAll(stream); }) {}
+
+  // False at the end of the stream.
+  bool Next(v1::ServeOracleResponse* response) {
+    std::unique_lock lock(mutex_);
+    wake_.wait(lock, [this] { return ended_ || !unread_.empty(); });
+    if (unread_.empty()) return false;
+    response->Swap(&unread_.front());
+    unread_.pop_front();
+    return true;
+  }
+
+ private:
+  void ReadAll(Stream& stream) {
+    v1::ServeOracleResponse response;
+    while (stream.Read(&response)) {
+      const std::lock_guard lock(mutex_);
+      unread_.emplace_back().Swap(&response);
+      wake_.notify_one();
+    }
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+    wake_.notify_one();
+  }
+
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::deque<v1::ServeOracleResponse> unread_;
+  bool ended_ = false;
+  std::jthread reader_;  // joined before the rest goes
+};
+
 }  // namespace
 
 Worker::Worker(v1::Stellate::StubInterface& stub, Oracle& oracle, std::string mesh,
-               std::string name)
-    : stub_(stub), oracle_(oracle), mesh_(std::move(mesh)), name_(std::move(name)) {}
+               std::string name, ReconnectPolicy policy)
+    : stub_(stub),
+      oracle_(oracle),
+      mesh_(std::move(mesh)),
+      name_(std::move(name)),
+      attempts_(std::move(policy)) {}
+
+// Only where there is a point to ask about; the server skips the other columns.
+void Worker::AddTangents(stellate::Answer* answer) {
+  std::vector<Eigen::Index> found;
+  for (Eigen::Index j = 0; j < answer->points.cols(); ++j) {
+    if (answer->IsFound(j)) found.push_back(j);
+  }
+  if (static_cast<Eigen::Index>(found.size()) == answer->points.cols()) {
+    answer->tangents = oracle_.TangentBasis(answer->points);
+    return;
+  }
+  Eigen::MatrixXd tangents = oracle_.TangentBasis(answer->points(Eigen::all, found));
+  if (tangents.cols() == static_cast<Eigen::Index>(found.size())) {
+    answer->tangents.setZero(tangents.rows(), answer->points.cols());
+    answer->tangents(Eigen::all, found) = tangents;
+  } else {
+    answer->tangents = std::move(tangents);  // of the wrong size: the server says so
+  }
+}
 
 // False, with error_ set, when the chunk makes no sense. Lets the oracle's exceptions through.
 bool Worker::Answer(const v1::QueryChunk& chunk, v1::AnswerChunk* answers) {
@@ -53,23 +117,12 @@ bool Worker::Answer(const v1::QueryChunk& chunk, v1::AnswerChunk* answers) {
                                 ? oracle_.IntersectFlat(*points, *bases, radii->row(0).transpose())
                                 : oracle_.ClosestPoint(*points);
   // Points of a wrong shape are the server's to refuse; the oracle is not asked about them.
-  const bool in_shape =
-      answer.points.rows() == static_cast<Eigen::Index>(d) &&
-      (answer.found.empty() || answer.found.size() >= static_cast<std::size_t>(answer.points.cols()));
+  const bool in_shape = answer.points.rows() == static_cast<Eigen::Index>(d) &&
+                        (answer.found.empty() ||
+                         answer.found.size() >= static_cast<std::size_t>(answer.points.cols()));
   if (chunk.want_tangents() && in_shape && answer.tangents.size() == 0 &&
       oracle_.has_tangent_basis()) {
-    // Only where there is a point to ask about; the server skips the other rows.
-    std::vector<Eigen::Index> found;
-    for (Eigen::Index j = 0; j < answer.points.cols(); ++j) {
-      if (answer.IsFound(j)) found.push_back(j);
-    }
-    const Eigen::MatrixXd tangents = oracle_.TangentBasis(answer.points(Eigen::all, found));
-    if (tangents.cols() == static_cast<Eigen::Index>(found.size())) {
-      answer.tangents.setZero(tangents.rows(), answer.points.cols());
-      answer.tangents(Eigen::all, found) = tangents;
-    } else {
-      answer.tangents = tangents;  // of the wrong size: the server says so
-    }
+    AddTangents(&answer);
   }
   answers->set_lease(chunk.lease());
   // As the oracle has them: the server checks the shapes and names what is wrong with them.
@@ -85,37 +138,59 @@ bool Worker::Answer(const v1::QueryChunk& chunk, v1::AnswerChunk* answers) {
   return true;
 }
 
-void Worker::Run() {
-  const auto stream = stub_.ServeOracle(&context_);
+// Sets exception_, and makes the request say so, when the oracle throws. False: nothing to send.
+bool Worker::AnswerOrFail(const v1::QueryChunk& chunk, v1::ServeOracleRequest* request) {
+  request->Clear();
+  try {
+    return Answer(chunk, request->mutable_answers());
+  } catch (...) {
+    exception_ = std::current_exception();
+    request->Clear();
+    request->mutable_failure()->set_lease(chunk.lease());
+    request->mutable_failure()->set_message(DescriptionOf(exception_).substr(0, kMaxFailureBytes));
+    return true;
+  }
+}
+
+grpc::Status Worker::Serve() {
+  const auto stream = stub_.ServeOracle(&attempts_.Attempt());
   v1::ServeOracleRequest request;
   request.mutable_hello()->set_mesh(mesh_);
   request.mutable_hello()->set_worker(name_);
   request.mutable_hello()->set_max_chunk_queries(MaxChunkQueries(oracle_));
-  bool open = stream->Write(request), over = false;
-  v1::ServeOracleResponse response;
-  while (open && stream->Read(&response)) {
-    if (response.has_over()) over = true;
-    if (!response.has_queries()) continue;
-    request.Clear();
-    try {
-      if (!Answer(response.queries(), request.mutable_answers())) {
-        context_.TryCancel();
+  bool open = stream->Write(request);
+  {
+    Inbox inbox(*stream);
+    v1::ServeOracleResponse response;
+    while (open && !exception_ && inbox.Next(&response)) {
+      attempts_.Heard();
+      over_ = over_ || response.has_over();
+      if (!response.has_queries()) continue;
+      if (!AnswerOrFail(response.queries(), &request)) {
+        attempts_.Stop();
         break;
       }
-    } catch (...) {
-      exception_ = std::current_exception();
-      request.Clear();
-      request.mutable_failure()->set_lease(response.queries().lease());
-      request.mutable_failure()->set_message(DescriptionOf(exception_).substr(0, kMaxFailureBytes));
-      open = false;
+      open = stream->Write(request);
     }
-    if (!stream->Write(request)) break;
+    stream->WritesDone();
+    // What is left unread would keep Finish from returning.
+    while (inbox.Next(&response)) over_ = over_ || response.has_over();
   }
-  stream->WritesDone();
-  // What is left unread would keep Finish from returning.
-  while (stream->Read(&response)) over = over || response.has_over();
-  const grpc::Status status = stream->Finish();
-  if (!exception_ && !error_ && !over && !status.ok()) error_ = FromStatus(status);
+  return stream->Finish();
+}
+
+void Worker::Run() {
+  while (true) {
+    const grpc::Status status = Serve();
+    if (exception_ || error_ || over_ || status.ok()) return;
+    // It ended while this worker was away.
+    if (attempts_.reconnecting() && status.error_code() == grpc::StatusCode::FAILED_PRECONDITION) {
+      return;
+    }
+    if (attempts_.Again(status)) continue;
+    error_ = Explain(status, attempts_.reconnecting());
+    return;
+  }
 }
 
 }  // namespace stellate::client

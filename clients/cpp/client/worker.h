@@ -1,35 +1,43 @@
 #pragma once
 
-#include <grpcpp/client_context.h>
-
 #include <exception>
 #include <optional>
 #include <string>
 
+#include "reconnect.h"
 #include "stellate/client.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 
 namespace stellate::client {
 
-// One stream of answers. Run blocks its thread; Stop may be called from any other.
+// Answers for one mesh until it is over, over one stream at a time. Run blocks its thread, and has
+// a second one read ahead; the others may be called from any thread.
 class Worker {
  public:
-  Worker(v1::Stellate::StubInterface& stub, Oracle& oracle, std::string mesh, std::string name);
+  Worker(v1::Stellate::StubInterface& stub, Oracle& oracle, std::string mesh, std::string name,
+         ReconnectPolicy policy = {});
 
   void Run();
-  void Stop() { context_.TryCancel(); }
+  // Ends the stream: what is unanswered goes to another worker.
+  void Stop() { attempts_.Stop(); }
+  // The mesh is over: a lost stream is not opened again.
+  void Finish() { attempts_.Finish(); }
 
-  // After Run. What the oracle threw; else how the stream broke off, unless it ended in order.
+  // After Run. What the oracle threw; else how the last stream broke off, unless it ended in order.
   std::exception_ptr exception() const { return exception_; }
   const std::optional<Error>& error() const { return error_; }
 
  private:
+  grpc::Status Serve();
   bool Answer(const v1::QueryChunk& chunk, v1::AnswerChunk* answers);
+  bool AnswerOrFail(const v1::QueryChunk& chunk, v1::ServeOracleRequest* request);
+  void AddTangents(stellate::Answer* answer);
 
   v1::Stellate::StubInterface& stub_;
   Oracle& oracle_;
   const std::string mesh_, name_;
-  grpc::ClientContext context_;
+  Reconnector attempts_;
+  bool over_ = false;
   std::exception_ptr exception_;
   std::optional<Error> error_;
 };

@@ -21,6 +21,14 @@ struct Credentials {
   std::string token;                     // over plain text only within this machine
 };
 
+// A server that went away: restarted, frozen, or cut off.
+struct Outage {
+  bool over = false;    // it is back, and the mesh goes on
+  double seconds = 0;   // since it was lost
+  int attempts = 0;     // at coming back to it
+  std::string message;  // how it was lost, in gRPC's words
+};
+
 // What to mesh and how. Absent values take the server's defaults; see mesh.proto for each.
 struct MeshOptions {
   double epsilon = 0;  // largest circumradius of a simplex, a length; must be given
@@ -29,6 +37,14 @@ struct MeshOptions {
   // after it; found by $STELLATED, next to the running program, or on PATH.
   std::string server;
   Credentials credentials;  // for `server`
+  // A server that goes away while it meshes is waited for so long, its streams opened again and
+  // carried on; 0: not at all. It has to remember its meshes (stellated --data-dir). One that
+  // cannot be reached in the first place, or refuses, is an error at once.
+  double reconnect_seconds = 180;
+  // Called on the calling thread at every failed attempt to come back, and when it succeeded.
+  std::function<void(const Outage&)> on_outage;
+  // How long a silent server is trusted before it is pinged; it has twice as long to answer.
+  double keepalive_seconds = 4;
   // How many threads answer, each with a stream of its own. The oracle is called from all at once.
   int workers = 1;
   // Called on the calling thread. What it throws cancels the mesh and reaches the caller.

@@ -3,7 +3,9 @@
 // The whole C++ client: write an Oracle, call MeshManifold, read Mesh::report, Mesh::Save.
 #include "stellate/catalogue.h"
 #include "stellate/client.h"
+#include "stellate/doctor.h"
 #include "stellate/implicit.h"
 #include "stellate/mesh.h"
+#include "stellate/monitor.h"
 #include "stellate/oracle.h"
 #include "stellate/pointwise.h"

@@ -1,0 +1,38 @@
+#include "mesh_settings.h"
+
+namespace stellate::cli {
+namespace {
+
+using O = MeshOptions;
+
+constexpr MeshSetting kRun[] = {
+    {"--seed", &O::random_seed, "seed of everything random"},
+    {"--workers", &O::workers, "threads that answer the server"},
+    {"--max-vertices", &O::max_vertices, "stop there"},
+    {"--max-rounds", &O::max_rounds, "stop after so many round trips"},
+    {"--box-seeds", &O::box_seeds, "points of the box tried as seeds"},
+    {"--reconnect", &O::reconnect_seconds, "seconds to wait for a server that went away"},
+};
+
+constexpr MeshSetting kCriteria[] = {
+    {"--radius-edge", &O::radius_edge_bound, "rho0 of rule R2"},
+    {"--sliver", &O::sliver_bound, "Theta0 of rule R3, 0: off"},
+    {"--picking-radius", &O::picking_radius, "delta of the picking region"},
+    {"--small-sliver-radius", &O::small_sliver_radius,
+     "beta: which slivers count against a candidate"},
+    {"--candidates", &O::candidates, "tried in a picking region"},
+    {"--advance-step", &O::advance_step, "h: the front's step, a length"},
+    {"--flat-alternations", &O::flat_alternations,
+     "closest points towards a flat, without intersections"},
+    {"--ask-ahead,!--no-ask-ahead", &O::ask_ahead,
+     "refine a guess first: fewer round trips, more processor time"},
+    {"--common-centre,!--no-common-centre", &O::common_centre,
+     "judge a simplex at one centre for all its vertices"},
+};
+
+}  // namespace
+
+std::span<const MeshSetting> RunSettings() { return kRun; }
+std::span<const MeshSetting> CriteriaSettings() { return kCriteria; }
+
+}  // namespace stellate::cli

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <variant>
+
+#include "stellate/client.h"
+
+namespace stellate::cli {
+
+// A member of MeshOptions that an option of `stellate mesh` sets.
+using MeshField =
+    std::variant<double MeshOptions::*, int MeshOptions::*, std::uint64_t MeshOptions::*,
+                 std::optional<double> MeshOptions::*, std::optional<std::uint32_t> MeshOptions::*,
+                 std::optional<std::uint64_t> MeshOptions::*, std::optional<bool> MeshOptions::*>;
+
+struct MeshSetting {
+  const char* flag;  // as CLI11 takes it
+  MeshField field;
+  const char* help;
+};
+
+// What `stellate mesh --help` lists, in this order.
+std::span<const MeshSetting> RunSettings();
+std::span<const MeshSetting> CriteriaSettings();
+
+}  // namespace stellate::cli

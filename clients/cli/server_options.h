@@ -1,0 +1,34 @@
+#pragma once
+
+#include <CLI/App.hpp>
+#include <string>
+
+#include "stellate/client.h"
+
+namespace stellate::cli {
+
+// Exit statuses of every command.
+inline constexpr int kExitCertified = 0;  // or simply: done
+inline constexpr int kExitNotCertified = 1;
+inline constexpr int kExitRefused = 2;  // usage, a refused request, a file that cannot be written
+inline constexpr int kExitFailed = 3;   // the server or the oracle
+
+// The options that say how to reach a server.
+class ServerOptions {
+ public:
+  // An empty default stands for a private server.
+  ServerOptions(CLI::App* command, const std::string& default_address);
+
+  const std::string& address() const { return address_; }
+  // With the token from its file or from $STELLATE_TOKEN, neither of which `ps` shows.
+  Expected<Credentials> ReadCredentials() const;
+
+ private:
+  std::string address_, token_file_;
+  Credentials credentials_;
+};
+
+// Prints the error on standard error and gives the exit status that stands for it.
+int Complain(const Error& error);
+
+}  // namespace stellate::cli

@@ -1,0 +1,154 @@
+#include "stellate/monitor.h"
+
+#include <google/protobuf/wrappers.pb.h>
+#include <grpcpp/generic/generic_stub.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "channel.h"
+#include "convert.h"
+#include "stellate/v1/stellate.grpc.pb.h"
+
+namespace stellate {
+namespace {
+
+using client::FromProto;
+using client::FromStatus;
+using Deadline = std::chrono::system_clock::time_point;
+
+Deadline After(double seconds) {
+  return std::chrono::system_clock::now() +
+         std::chrono::duration_cast<std::chrono::system_clock::duration>(
+             std::chrono::duration<double>(seconds));
+}
+
+MeshStatus ToStatus(const v1::Mesh& m) {
+  MeshStatus mesh;
+  mesh.name = m.name();
+  mesh.label = m.spec().label();
+  mesh.state =
+      v1::MeshState_IsValid(m.state()) ? static_cast<MeshState>(m.state()) : MeshState::kUnknown;
+  mesh.dimension = static_cast<int>(m.spec().dimension());
+  mesh.ambient_dimension = static_cast<int>(m.spec().ambient_dimension());
+  mesh.epsilon = m.spec().epsilon();
+  mesh.progress = FromProto(m.progress());
+  mesh.revision = m.revision();
+  mesh.workers = m.workers();
+  mesh.watchers = m.watchers();
+  return mesh;
+}
+
+}  // namespace
+
+const char* MeshStateName(MeshState state) {
+  switch (state) {
+    case MeshState::kWaiting:
+      return "WAITING";
+    case MeshState::kRunning:
+      return "RUNNING";
+    case MeshState::kSucceeded:
+      return "SUCCEEDED";
+    case MeshState::kStopped:
+      return "STOPPED";
+    case MeshState::kCancelled:
+      return "CANCELLED";
+    case MeshState::kFailed:
+      return "FAILED";
+    case MeshState::kUnknown:
+      break;
+  }
+  return "UNKNOWN";
+}
+
+class Monitor::Impl {
+ public:
+  explicit Impl(const std::shared_ptr<grpc::Channel>& channel)
+      : health_(channel), stub_(v1::Stellate::NewStub(channel)) {}
+
+  // HealthCheckRequest { string service = 1 } and HealthCheckResponse { enum status = 1 } are on
+  // the wire what StringValue and UInt32Value are.
+  Expected<bool> Serving(Deadline deadline) {
+    grpc::ClientContext context;
+    context.set_deadline(deadline);
+    const google::protobuf::StringValue request;  // "": the server as a whole
+    google::protobuf::UInt32Value response;
+    std::mutex mutex;
+    std::condition_variable done;
+    std::optional<grpc::Status> status;
+    health_.UnaryCall(&context, "/grpc.health.v1.Health/Check", grpc::StubOptions(), &request,
+                      &response, [&](const grpc::Status& result) {
+                        const std::lock_guard lock(mutex);
+                        status = result;
+                        done.notify_one();
+                      });
+    std::unique_lock lock(mutex);
+    done.wait(lock, [&] { return status.has_value(); });
+    if (!status->ok()) return tl::unexpected(FromStatus(*status));
+    constexpr std::uint32_t kServing = 1;
+    return response.value() == kServing;
+  }
+
+  Expected<ServerHealth> Health(Deadline deadline) {
+    const Expected<bool> serving = Serving(deadline);
+    if (!serving) return tl::unexpected(serving.error());
+    grpc::ClientContext context;
+    context.set_deadline(deadline);
+    v1::ServerInfo info;
+    const grpc::Status status = stub_->GetServerInfo(&context, v1::GetServerInfoRequest(), &info);
+    if (!status.ok()) return tl::unexpected(FromStatus(status));
+    ServerHealth health;
+    health.serving = *serving;
+    health.version = info.version();
+    health.protocols.assign(info.protocols().begin(), info.protocols().end());
+    health.max_dimension = info.max_dimension();
+    health.max_ambient_dimension = info.max_ambient_dimension();
+    health.max_meshes = info.max_meshes();
+    health.max_vertices = info.max_vertices();
+    health.max_rounds = info.max_rounds();
+    health.max_message_bytes = info.max_message_bytes();
+    return health;
+  }
+
+  Expected<std::vector<MeshStatus>> Meshes(Deadline deadline) {
+    std::vector<MeshStatus> meshes;
+    v1::ListMeshesRequest request;
+    do {
+      grpc::ClientContext context;
+      context.set_deadline(deadline);
+      v1::ListMeshesResponse page;
+      const grpc::Status status = stub_->ListMeshes(&context, request, &page);
+      if (!status.ok()) return tl::unexpected(FromStatus(status));
+      for (const v1::Mesh& mesh : page.meshes()) meshes.push_back(ToStatus(mesh));
+      request.set_page_token(page.next_page_token());
+    } while (!request.page_token().empty());
+    return meshes;
+  }
+
+ private:
+  grpc::TemplatedGenericStub<google::protobuf::StringValue, google::protobuf::UInt32Value> health_;
+  const std::unique_ptr<v1::Stellate::Stub> stub_;
+};
+
+Monitor::Monitor(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Monitor::Monitor(Monitor&&) noexcept = default;
+Monitor::~Monitor() = default;
+
+Expected<Monitor> Monitor::Connect(const std::string& server, const Credentials& credentials) {
+  const auto channel = client::Connect(server, credentials);
+  if (!channel) return tl::unexpected(channel.error());
+  return Monitor(std::make_unique<Impl>(*channel));
+}
+
+Expected<ServerHealth> Monitor::Health(double timeout_seconds) {
+  return impl_->Health(After(timeout_seconds));
+}
+
+Expected<std::vector<MeshStatus>> Monitor::Meshes(double timeout_seconds) {
+  return impl_->Meshes(After(timeout_seconds));
+}
+
+}  // namespace stellate

@@ -1,0 +1,111 @@
+#include "reconnect.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "convert.h"
+
+namespace stellate::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Seconds = std::chrono::duration<double>;
+
+}  // namespace
+
+bool IsTransient(const grpc::Status& status) {
+  switch (status.error_code()) {
+    case grpc::StatusCode::UNAVAILABLE:
+    case grpc::StatusCode::CANCELLED:
+      return true;
+    case grpc::StatusCode::UNKNOWN:
+      // What gRPC says of a stream whose connection went while it was being opened.
+      return status.error_message().find("Stream removed") != std::string::npos;
+    default:
+      return false;
+  }
+}
+
+Error Explain(const grpc::Status& status, bool reconnecting) {
+  Error error = FromStatus(status);
+  if (reconnecting && status.error_code() == grpc::StatusCode::NOT_FOUND) {
+    error.code = ErrorCode::kServerFailed;
+    error.message =
+        "the server went away and came back without the mesh; it keeps meshes only with --data-dir";
+  }
+  return error;
+}
+
+std::chrono::duration<double> Backoff::Next() {
+  const Seconds full = next_;
+  next_ = std::min(2 * next_, kLongest);
+  return full * (1 - std::uniform_real_distribution<double>(0, 0.5)(random_));
+}
+
+Reconnector::Reconnector(ReconnectPolicy policy)
+    : policy_(std::move(policy)), backoff_(std::random_device{}()) {}
+
+grpc::ClientContext& Reconnector::Attempt() {
+  const std::lock_guard lock(mutex_);
+  context_ = std::make_unique<grpc::ClientContext>();
+  if (stopped_) context_->TryCancel();
+  return *context_;
+}
+
+void Reconnector::Heard() {
+  if (attempts_ == 0) return;
+  const Outage outage{true, Seconds(Clock::now() - lost_).count(), attempts_, ""};
+  attempts_ = 0;
+  backoff_.Reset();
+  if (policy_.on_outage) policy_.on_outage(outage);
+}
+
+bool Reconnector::Again(const grpc::Status& status) {
+  if (!IsTransient(status)) return false;
+  if (policy_.hopeless && policy_.hopeless()) return false;
+  const Clock::time_point now = Clock::now();
+  if (attempts_ == 0) lost_ = now;
+  const Seconds left = policy_.give_up - Seconds(now - lost_);
+  if (left <= Seconds(0) || stopped()) return false;
+  ++attempts_;
+  if (policy_.on_outage) {
+    policy_.on_outage({false, Seconds(now - lost_).count(), attempts_, status.error_message()});
+  }
+  const Seconds pause = std::min(backoff_.Next(), left);
+  {
+    std::unique_lock lock(mutex_);
+    if (wake_.wait_for(lock, pause, [this] { return stopped_ || finished_; })) return false;
+  }
+  Connect();
+  return !stopped();
+}
+
+// Connections come about only while somebody waits for them, and a call that finds none fails
+// at once.
+void Reconnector::Connect() {
+  constexpr int kSlices = 20;
+  constexpr auto kSlice = std::chrono::milliseconds(50);
+  for (int i = 0; policy_.channel && i < kSlices && !stopped(); ++i) {
+    if (policy_.channel->WaitForConnected(std::chrono::system_clock::now() + kSlice)) return;
+  }
+}
+
+void Reconnector::Stop() {
+  const std::lock_guard lock(mutex_);
+  stopped_ = true;
+  if (context_) context_->TryCancel();
+  wake_.notify_all();
+}
+
+void Reconnector::Finish() {
+  const std::lock_guard lock(mutex_);
+  finished_ = true;
+  wake_.notify_all();
+}
+
+bool Reconnector::stopped() const {
+  const std::lock_guard lock(mutex_);
+  return stopped_ || finished_;
+}
+
+}  // namespace stellate::client

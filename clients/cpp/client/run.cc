@@ -1,0 +1,226 @@
+#include "run.h"
+
+#include <google/protobuf/empty.pb.h>
+
+#include <chrono>
+#include <cstdio>
+#include <stop_token>
+#include <utility>
+
+#include "convert.h"
+
+namespace stellate::client {
+namespace {
+
+constexpr auto kCallTime = std::chrono::seconds(30);     // for a unary call, connecting included
+constexpr auto kHousekeeping = std::chrono::seconds(5);  // for calls that clean up
+
+void SetDeadline(grpc::ClientContext& context, std::chrono::seconds time) {
+  context.set_deadline(std::chrono::system_clock::now() + time);
+}
+
+}  // namespace
+
+Run::Run(const std::shared_ptr<grpc::Channel>& channel, Oracle& oracle, const MeshOptions& options,
+         std::function<bool()> hopeless)
+    : channel_(channel),
+      stub_(v1::Stellate::NewStub(channel)),
+      oracle_(oracle),
+      options_(options),
+      hopeless_(std::move(hopeless)) {
+  ReconnectPolicy policy = Policy();
+  policy.on_outage = options.on_outage;
+  watch_ = std::make_unique<Reconnector>(std::move(policy));
+}
+
+Run::~Run() {
+  if (!name_.empty()) {
+    grpc::ClientContext context;
+    SetDeadline(context, kHousekeeping);
+    context.set_wait_for_ready(ended_);  // unless the server is lost, it may be just coming back
+    v1::DeleteMeshRequest request;
+    request.set_name(name_);
+    google::protobuf::Empty ignored;
+    stub_->DeleteMesh(&context, request, &ignored);
+  }
+  for (const auto& worker : workers_) worker->Stop();
+  JoinWorkers();
+}
+
+ReconnectPolicy Run::Policy() const {
+  return {std::chrono::duration<double>(options_.reconnect_seconds), channel_, hopeless_, {}};
+}
+
+Expected<Mesh> Run::Go() {
+  if (const Expected<void> created = Create(); !created) return tl::unexpected(created.error());
+  StartWorkers();
+  Expected<Mesh> mesh = [this] {
+    const std::stop_callback cancel(options_.stop, [this] { Cancel(); });
+    return Watch();
+  }();
+  const bool broken = !mesh.has_value() && !ended_;
+  const bool given_up = [this] {
+    const std::lock_guard lock(mutex_);
+    return given_up_;
+  }();
+  for (const auto& worker : workers_) {
+    if (broken) {
+      worker->Stop();
+    } else {
+      worker->Finish();
+    }
+  }
+  JoinWorkers();
+  for (const auto& worker : workers_) {
+    if (worker->exception()) std::rethrow_exception(worker->exception());
+  }
+  // The mesh's own failure says most; a stream that the server refused says why it has none.
+  if (broken) {
+    for (const auto& worker : workers_) {
+      if (worker->error() && (given_up || worker->error()->code != ErrorCode::kServerFailed)) {
+        return tl::unexpected(*worker->error());
+      }
+    }
+  }
+  return mesh;
+}
+
+// Not tried again when it fails: whether the server made the mesh would not be known.
+Expected<void> Run::Create() {
+  const Expected<v1::MeshSpec> spec = ToSpec(oracle_, options_);
+  if (!spec) return tl::unexpected(spec.error());
+  auto builder = MeshBuilder::Create(oracle_.dimension(), oracle_.ambient_dimension());
+  if (!builder) return tl::unexpected(builder.error());
+  builder_ = std::make_unique<MeshBuilder>(std::move(*builder));
+  grpc::ClientContext context;
+  SetDeadline(context, kCallTime);
+  v1::CreateMeshRequest request;
+  *request.mutable_spec() = *spec;
+  v1::Mesh mesh;
+  const grpc::Status status = stub_->CreateMesh(&context, request, &mesh);
+  if (!status.ok()) return tl::unexpected(FromStatus(status));
+  name_ = mesh.name();
+  return {};
+}
+
+void Run::StartWorkers() {
+  for (int i = 0; i < options_.workers; ++i) {
+    workers_.push_back(
+        std::make_unique<Worker>(*stub_, oracle_, name_, "cpp-" + std::to_string(i + 1), Policy()));
+  }
+  for (const auto& worker : workers_) {
+    threads_.emplace_back([this, w = worker.get()] {
+      w->Run();
+      WorkerEnded(*w);
+    });
+  }
+}
+
+// When the last worker is gone without the mesh being over nobody is left to answer.
+void Run::WorkerEnded(const Worker& worker) {
+  const std::lock_guard lock(mutex_);
+  ++ended_workers_;
+  if (worker.error() && ended_workers_ == workers_.size() &&
+      worker.error()->code == ErrorCode::kServerFailed) {
+    given_up_ = true;
+    watch_->Stop();
+  }
+}
+
+void Run::JoinWorkers() {
+  for (std::thread& thread : threads_) thread.join();
+  threads_.clear();
+}
+
+void Run::Cancel() {
+  grpc::ClientContext context;
+  SetDeadline(context, kHousekeeping);
+  v1::CancelMeshRequest request;
+  request.set_name(name_);
+  v1::Mesh ignored;
+  // A server that is away cannot say how the mesh ends: do not wait for it.
+  if (!stub_->CancelMesh(&context, request, &ignored).ok()) watch_->Stop();
+}
+
+// One stream. Sets ended_ when the server said how the mesh ended. Errors: a stream that makes no
+// sense; how it broke off is its status.
+Expected<void> Run::WatchOnce(v1::Mesh* final, grpc::Status* status) {
+  v1::WatchMeshRequest request;
+  request.set_name(name_);
+  request.set_from_revision(builder_->revision());
+  grpc::ClientContext& context = watch_->Attempt();
+  const auto stream = stub_->WatchMesh(&context, request);
+  v1::WatchMeshResponse response;
+  while (stream->Read(&response)) {
+    watch_->Heard();
+    if (response.has_delta()) {
+      if (const auto ok = builder_->Absorb(std::move(*response.mutable_delta())); !ok) {
+        context.TryCancel();
+        return ok;
+      }
+    } else if (response.has_progress()) {
+      if (options_.on_progress) options_.on_progress(FromProto(response.progress()));
+    } else if (response.has_final()) {
+      final->Swap(response.mutable_final());
+      ended_ = true;
+    }
+  }
+  *status = stream->Finish();
+  builder_->ForgetPending();
+  return {};
+}
+
+// Reads the mesh to its end.
+Expected<Mesh> Run::Watch() {
+  v1::Mesh final;
+  grpc::Status status;
+  do {
+    if (const auto ok = WatchOnce(&final, &status); !ok) return tl::unexpected(ok.error());
+    if (ended_) return Conclude(final);
+  } while (watch_->Again(status));
+  if (status.ok()) {
+    return Fail(ErrorCode::kServerFailed, "the server ended the watch too early");
+  }
+  return tl::unexpected(LostFor(status));
+}
+
+// What to say when a watch cannot be carried on.
+Error Run::LostFor(const grpc::Status& status) const {
+  Error error = Explain(status, watch_->reconnecting());
+  if (status.error_code() == grpc::StatusCode::NOT_FOUND) return error;
+  if (watch_->stopped() && options_.stop.stop_requested()) {
+    error.message = "cancelled while the server was away: " + error.message;
+  } else if (status.error_code() == grpc::StatusCode::CANCELLED) {
+    error.message = "the server broke off";
+  } else if (watch_->reconnecting()) {
+    char waited[64];
+    std::snprintf(waited, sizeof waited, "; waited %.4g s for it", options_.reconnect_seconds);
+    error.message += waited;
+  }
+  return error;
+}
+
+Expected<Mesh> Run::Conclude(const v1::Mesh& final) {
+  if (final.state() == v1::MESH_STATE_FAILED) {
+    const v1::Failure& failure = final.report().failure();
+    const bool oracle = failure.reason().rfind("ORACLE_", 0) == 0 ||
+                        failure.reason() == "ANSWER_TIMEOUT" || failure.reason() == "NO_SEEDS";
+    return Fail(oracle ? ErrorCode::kOracleFailed : ErrorCode::kServerFailed, failure.message(),
+                failure.reason());
+  }
+  Expected<Mesh> mesh = builder_->Take();
+  if (!mesh) return mesh;
+  mesh->report = FromProto(final.report());
+  const Counts& counts = mesh->report.counts;
+  if (counts.vertices != static_cast<std::uint64_t>(mesh->points.cols()) ||
+      counts.simplices != static_cast<std::uint64_t>(mesh->simplices.cols())) {
+    return Fail(ErrorCode::kServerFailed, "the server reports " + std::to_string(counts.vertices) +
+                                              " vertices and " + std::to_string(counts.simplices) +
+                                              " simplices but sent " +
+                                              std::to_string(mesh->points.cols()) + " and " +
+                                              std::to_string(mesh->simplices.cols()));
+  }
+  return mesh;
+}
+
+}  // namespace stellate::client

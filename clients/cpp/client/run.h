@@ -1,0 +1,60 @@
+#pragma once
+
+#include <grpcpp/channel.h>
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "mesh_builder.h"
+#include "reconnect.h"
+#include "stellate/client.h"
+#include "stellate/v1/stellate.grpc.pb.h"
+#include "worker.h"
+
+namespace stellate::client {
+
+// One mesh on one server, from its creation to its end. Lost streams are opened again and carried
+// on: the watch from the last revision that it has, the workers with whatever is asked next.
+class Run {
+ public:
+  // `hopeless`: whether a lost server will not come back.
+  Run(const std::shared_ptr<grpc::Channel>& channel, Oracle& oracle, const MeshOptions& options,
+      std::function<bool()> hopeless);
+  // Whatever happens the mesh is gone from the server, and no thread is left in the oracle.
+  ~Run();
+
+  Expected<Mesh> Go();
+
+ private:
+  Expected<void> Create();
+  void StartWorkers();
+  void WorkerEnded(const Worker& worker);
+  void JoinWorkers();
+  void Cancel();
+  Expected<Mesh> Watch();
+  Expected<void> WatchOnce(v1::Mesh* final, grpc::Status* status);
+  Expected<Mesh> Conclude(const v1::Mesh& final);
+  Error LostFor(const grpc::Status& status) const;
+  ReconnectPolicy Policy() const;
+
+  const std::shared_ptr<grpc::Channel> channel_;
+  const std::unique_ptr<v1::Stellate::Stub> stub_;
+  Oracle& oracle_;
+  const MeshOptions& options_;
+  const std::function<bool()> hopeless_;
+  std::string name_;
+  std::unique_ptr<MeshBuilder> builder_;
+  std::unique_ptr<Reconnector> watch_;
+  bool ended_ = false;  // the server said how
+  std::vector<std::unique_ptr<Worker>> workers_;
+  std::vector<std::thread> threads_;
+  std::mutex mutex_;
+  size_t ended_workers_ = 0;
+  bool given_up_ = false;  // the last worker lost the server
+};
+
+}  // namespace stellate::client

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+#include "findings.h"
+#include "probe.h"
+#include "stellate/doctor.h"
+
+namespace stellate::doctor {
+
+// The laws of an oracle, one after another; what breaks one is added to the report.
+class Examination {
+ public:
+  Examination(Oracle& oracle, const CheckOptions& options)
+      : options_(options), probe_(oracle, options.random_seed) {}
+
+  CheckReport Run();
+
+ private:
+  void ObeyLaws();
+  // The first finding of each kind is kept.
+  void Add(Finding finding);
+  void Add(const std::string& code, std::initializer_list<Value> values) {
+    Add(MakeFinding(code, values));
+  }
+  bool Has(const std::string& code) const { return report_.Find(code) != nullptr; }
+
+  // Of closest points.
+  void AnswersRepeat();
+  void AnswersStay();
+  void NoneSeenIsNearer(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, const char* code);
+  void NearPointsComeBack();
+  // Of dimension, tangents and smoothness.
+  void DimensionIsRight(double share);
+  void TangentsAreRight();
+  void EstimateReach();
+  void IsSmooth();
+  // Of flats.
+  void FlatsAreMet();
+  void Meet(const Eigen::MatrixXd& centers, const std::vector<Basis>& bases);
+  void RadiiAreKept(const Eigen::MatrixXd& centers, const std::vector<Basis>& bases,
+                    const Eigen::VectorXd& distances);
+  void MeasureSpeed();
+
+  // A length within which M should look like its tangent spaces.
+  double Near() const;
+  // Where two points count as the same.
+  double Slack() const { return 1e-6 * probe_.size; }
+
+  const CheckOptions options_;
+  Probe probe_;
+  CheckReport report_;
+};
+
+}  // namespace stellate::doctor

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "stellate/client.h"
+#include "stellate/error.h"
+#include "stellate/report.h"
+
+namespace stellate {
+
+enum class MeshState {
+  kUnknown = 0,
+  kWaiting,  // for a worker
+  kRunning,
+  kSucceeded,
+  kStopped,  // a budget was spent, or no progress
+  kCancelled,
+  kFailed,
+};
+const char* MeshStateName(MeshState state);  // "WAITING", ...
+
+// A mesh on a server, without its geometry.
+struct MeshStatus {
+  std::string name;   // "meshes/<id>": who knows it may serve and watch the mesh
+  std::string label;  // free text of whoever made it
+  MeshState state = MeshState::kUnknown;
+  int dimension = 0, ambient_dimension = 0;
+  double epsilon = 0;
+  Progress progress;
+  std::uint64_t revision = 0;
+  std::uint32_t workers = 0, watchers = 0;
+
+  bool over() const { return state != MeshState::kWaiting && state != MeshState::kRunning; }
+};
+
+// Watches over a server: one connection, opened anew by itself when it is lost.
+class Monitor {
+ public:
+  // kRefused: credentials that cannot be used. Whether anybody is there shows in the calls.
+  static Expected<Monitor> Connect(const std::string& server, const Credentials& credentials = {});
+  Monitor(Monitor&&) noexcept;
+  ~Monitor();
+
+  // kServerFailed when none answers within `timeout_seconds`.
+  Expected<ServerHealth> Health(double timeout_seconds = 5);
+  // All meshes that these credentials show, oldest first.
+  Expected<std::vector<MeshStatus>> Meshes(double timeout_seconds = 5);
+
+ private:
+  class Impl;
+  explicit Monitor(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace stellate

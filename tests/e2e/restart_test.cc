@@ -1,0 +1,171 @@
+// A server that is killed, stopped or frozen in the middle of a mesh, and comes back: the client
+// waits, and the mesh is the undisturbed one.
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "live.h"
+#include "support/spoiled_oracle.h"
+
+namespace stellate::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A stellated that can be ended and started again on the same address and data.
+class MortalServer {
+ public:
+  explicit MortalServer(const std::string& directory) : directory_(directory) {
+    fs::remove_all(directory);
+    fs::create_directories(directory);
+    Start();
+  }
+  ~MortalServer() {
+    if (pid_ > 0) End(SIGKILL);
+    fs::remove_all(directory_);
+  }
+
+  void Start(bool with_memory = true) {
+    const std::string ready = directory_ + "/ready", data = directory_ + "/data";
+    const std::string listen = address(), program = std::getenv("STELLATED");
+    fs::remove(ready);
+    std::vector<const char*> arguments = {
+        program.c_str(), "--listen", listen.c_str(),       "--ready-file",    ready.c_str(),
+        "--log-level",   "off",      "--exit-with-parent", "--drain-seconds", "0"};
+    if (with_memory) arguments.insert(arguments.end(), {"--data-dir", data.c_str()});
+    arguments.push_back(nullptr);
+    pid_ = fork();
+    if (pid_ == 0) {
+      execv(program.c_str(), const_cast<char* const*>(arguments.data()));
+      _exit(127);
+    }
+    while (!fs::exists(ready) && waitpid(pid_, nullptr, WNOHANG) == 0) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    EXPECT_TRUE(fs::exists(ready)) << "the server did not start";
+  }
+  void End(int with_signal) {
+    kill(pid_, with_signal);
+    waitpid(pid_, nullptr, 0);
+    pid_ = 0;
+  }
+  void Send(int with_signal) const { kill(pid_, with_signal); }
+  std::string address() const { return "unix:" + directory_ + "/socket"; }
+
+ private:
+  const std::string directory_;
+  pid_t pid_ = 0;
+};
+
+class Restart : public ::testing::Test {
+ protected:
+  Restart()
+      : server_((fs::temp_directory_path() / ("stellate-restart-" + std::to_string(getpid())))
+                    .string()),
+        torus_(MakeManifold("torus:1:0.4", nullptr)),
+        oracle_(*torus_) {
+    options_.epsilon = 0.15;
+    options_.server = server_.address();
+    options_.on_outage = [this](const Outage& outage) {
+      ++(outage.over ? returns_ : failures_);
+      if (!outage.over && on_failure_) on_failure_();
+    };
+  }
+
+  // Has `happens` come to pass while the oracle is at the first batch after `rounds` others.
+  void AfterRounds(int rounds, std::function<void()> happens) {
+    oracle_.on_flat = [=, this, calls = 0](const auto&, const auto&, const auto&, Answer&) mutable {
+      if (++calls % (rounds + 1) == 0 && disasters_ > 0) {
+        --disasters_;
+        happens();
+      }
+    };
+  }
+
+  void ExpectTheUndisturbedMesh() {
+    const Expected<Mesh> mesh = MeshManifold(oracle_, options_);
+    ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
+    EXPECT_EQ(disasters_, 0) << "nothing happened";
+    EXPECT_GE(failures_, 1);
+    EXPECT_GE(returns_, 1);
+    options_.keepalive_seconds = 60;
+    const Expected<Mesh> undisturbed = MeshManifold(*torus_, options_);
+    ASSERT_TRUE(undisturbed.has_value()) << undisturbed.error().message;
+    EXPECT_TRUE(AreIdentical(*mesh, *undisturbed));
+    EXPECT_TRUE(mesh->report.certified());
+  }
+
+  MortalServer server_;
+  const std::unique_ptr<Manifold> torus_;
+  SpoiledOracle oracle_;
+  MeshOptions options_;
+  int disasters_ = 1;
+  int failures_ = 0, returns_ = 0;
+  std::function<void()> on_failure_;
+};
+
+TEST_F(Restart, KilledTwiceTheServerIsWaitedFor) {
+  disasters_ = 2;
+  AfterRounds(3, [this] {
+    server_.End(SIGKILL);
+    server_.Start();
+  });
+  ExpectTheUndisturbedMesh();
+}
+
+TEST_F(Restart, AStoppedServerIsWaitedFor) {
+  AfterRounds(4, [this] {
+    server_.End(SIGTERM);
+    server_.Start();
+  });
+  ExpectTheUndisturbedMesh();
+}
+
+TEST_F(Restart, AFrozenServerIsFoundByPings) {
+  options_.keepalive_seconds = 0.5;
+  AfterRounds(3, [this] { server_.Send(SIGSTOP); });
+  on_failure_ = [this] { server_.Send(SIGCONT); };
+  ExpectTheUndisturbedMesh();
+}
+
+TEST_F(Restart, AServerThatStaysAwayIsGivenUp) {
+  options_.reconnect_seconds = 0.2;
+  AfterRounds(2, [this] { server_.End(SIGKILL); });
+  const Expected<Mesh> mesh = MeshManifold(oracle_, options_);
+  ASSERT_FALSE(mesh.has_value());
+  EXPECT_EQ(mesh.error().code, ErrorCode::kServerFailed);
+}
+
+TEST_F(Restart, AServerThatForgotIsNotWaitedFor) {
+  AfterRounds(2, [this] {
+    server_.End(SIGKILL);
+    server_.Start(/*with_memory=*/false);
+  });
+  const Expected<Mesh> mesh = MeshManifold(oracle_, options_);
+  ASSERT_FALSE(mesh.has_value());
+  EXPECT_EQ(mesh.error().code, ErrorCode::kServerFailed);
+  EXPECT_NE(mesh.error().message.find("--data-dir"), std::string::npos) << mesh.error().message;
+}
+
+TEST_F(Restart, TheWaitCanBeCancelled) {
+  std::stop_source source;
+  options_.stop = source.get_token();
+  AfterRounds(2, [this] { server_.End(SIGKILL); });
+  on_failure_ = [&source] { source.request_stop(); };
+  const Expected<Mesh> mesh = MeshManifold(oracle_, options_);
+  ASSERT_FALSE(mesh.has_value());
+  EXPECT_NE(mesh.error().message.find("cancelled"), std::string::npos) << mesh.error().message;
+}
+
+}  // namespace
+}  // namespace stellate::testing
