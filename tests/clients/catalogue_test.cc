@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <string>
@@ -151,6 +152,26 @@ TEST(TurnedManifold, IsIsometricToTheOriginal) {
   EXPECT_NEAR(eigenvalues[0], 1, 1e-10);
   EXPECT_NEAR(eigenvalues[1], 1 / 0.64, 1e-10);
   EXPECT_NEAR(eigenvalues[2], 4, 1e-10);
+}
+
+// Rounds are cut into chunks as workers come and go, and the mesh must not show it.
+TEST(TurnedManifold, AnswersAloneAsInABatch) {
+  const auto manifold = MakeManifold("torus@20", nullptr);
+  constexpr Eigen::Index kCount = 37;
+  const Eigen::MatrixXd x = Eigen::MatrixXd::Random(20, kCount);
+  const Eigen::MatrixXd points = manifold->ClosestPoint(x).points;
+  const Eigen::MatrixXd tangents = manifold->TangentBasis(points);
+  const Eigen::VectorXd radii = Eigen::VectorXd::Constant(kCount, 1.0);
+  const Answer met = manifold->IntersectFlat(points, tangents, radii);
+  for (Eigen::Index first = 0; first < kCount; first += 5) {
+    const Eigen::Index count = std::min<Eigen::Index>(5, kCount - first);
+    const Eigen::MatrixXd part = points.middleCols(first, count);
+    const Eigen::MatrixXd bases = tangents.middleCols(first, count);
+    EXPECT_EQ(manifold->ClosestPoint(x.middleCols(first, count)).points, part);
+    EXPECT_EQ(manifold->TangentBasis(part), bases);
+    const Answer again = manifold->IntersectFlat(part, bases, radii.segment(first, count));
+    EXPECT_EQ(again.points, met.points.middleCols(first, count));
+  }
 }
 
 TEST(MakeManifold, RefusesWithAReason) {
