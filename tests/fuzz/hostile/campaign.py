@@ -43,7 +43,8 @@ class Campaign:
         ready = folder / "ready"
         self._log = open(folder / "log", "wb")
         self._server = subprocess.Popen(
-            [os.environ["STELLATED"], "--listen", "127.0.0.1:0", "--ready-file", str(ready)],
+            [os.environ["STELLATED"], "--listen", "127.0.0.1:0", "--ready-file", str(ready)]
+            + ["--keep-finished-meshes", "1"],  # what is kept on purpose is no growth
             stdout=subprocess.DEVNULL,
             stderr=self._log,
         )
