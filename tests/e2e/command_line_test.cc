@@ -118,6 +118,33 @@ TEST_F(CommandLine, HealthListVersionAndHelpExitZero) {
   EXPECT_EQ(Run("mesh --help").status, 0);
 }
 
+TEST_F(CommandLine, DoctorFindsTheCatalogueInGoodHealth) {
+  const Result good = Run("doctor torus:1:0.4 --epsilon 0.3");
+  EXPECT_EQ(good.status, 0) << good.output;
+  EXPECT_NE(good.output.find("keeps its contract"), std::string::npos) << good.output;
+  EXPECT_NE(good.output.find("COARSE_EPSILON"), std::string::npos) << good.output;
+  EXPECT_EQ(Run("doctor klein").status, 2);
+}
+
+TEST_F(CommandLine, TopShowsTheMeshesOnce) {
+  const auto torus = Make("torus:1:0.4");
+  std::string during;
+  MeshOptions options = At(0.1);
+  options.label = "seen at the top";
+  options.on_progress = [&during](const Progress&) {
+    if (during.empty()) during = OnServer("top --once --sort vertices").output;
+  };
+  ASSERT_TRUE(MeshManifold(*torus, options).has_value());
+  EXPECT_NE(during.find("seen at the top"), std::string::npos) << during;
+  EXPECT_NE(during.find("VERTICES"), std::string::npos) << during;
+  EXPECT_EQ(during.find('\033'), std::string::npos) << "plain off a terminal";
+  const Result after = OnServer("top --once");
+  EXPECT_EQ(after.status, 0);
+  EXPECT_EQ(after.output.find("seen at the top"), std::string::npos) << after.output;
+  EXPECT_EQ(Run("top --once --server unix:/nowhere/at/all").status, 3);
+  EXPECT_EQ(Run("top --sort beauty").status, 2);
+}
+
 TEST_F(CommandLine, CtrlCEndsItCleanly) {
   // A mesh too large to finish, in a process group of its own as in a terminal's foreground.
   int ends[2];
