@@ -87,6 +87,10 @@ TEST_F(MetricsTest, CountsAMeshFromItsStartToItsEnd) {
   EXPECT_EQ(series.at("stellate_watchers"), 1);
   EXPECT_EQ(series.at("stellate_rounds_total"), 0);
   EXPECT_EQ(series.at("stellate_answer_seconds_count"), 0);
+  EXPECT_GT(series.at("stellate_queries_waiting"), 0);
+  EXPECT_GT(series.at("stellate_mesh_bytes"), 0);
+  EXPECT_GT(series.at("process_resident_memory_bytes"), series.at("stellate_mesh_bytes"));
+  EXPECT_EQ(series.at("stellate_backups_total"), 0) << "nobody is idle";
 
   open = true;
   watching.join();
@@ -100,6 +104,9 @@ TEST_F(MetricsTest, CountsAMeshFromItsStartToItsEnd) {
   EXPECT_EQ(series.at("stellate_certificates_total{certified=\"false\"}"), 0);
   EXPECT_EQ(series.at("stellate_vertices"), mesh.progress().vertices());
   EXPECT_GT(series.at("stellate_rounds_total"), 0);
+  EXPECT_EQ(series.at("stellate_queries_waiting"), 0);
+  EXPECT_EQ(series.at("stellate_compared_queries_total"), 0) << "one worker alone";
+  EXPECT_EQ(series.at("stellate_disagreements_total"), 0);
   EXPECT_GE(series.at("stellate_queries_total"), series.at("stellate_vertices"));
   EXPECT_EQ(series.at("stellate_answer_seconds_count"), worker.chunks());
   EXPECT_EQ(series.at("stellate_answer_seconds_bucket{le=\"+Inf\"}"), worker.chunks());
@@ -117,6 +124,7 @@ TEST_F(MetricsTest, CountsAMeshFromItsStartToItsEnd) {
   const auto after = Scrape();
   EXPECT_EQ(after.at("stellate_meshes{state=\"SUCCEEDED\"}"), 0);
   EXPECT_EQ(after.at("stellate_vertices"), 0);
+  EXPECT_EQ(after.at("stellate_mesh_bytes"), 0);
   EXPECT_EQ(after.at("stellate_rounds_total"), series.at("stellate_rounds_total"));
 }
 
@@ -133,6 +141,23 @@ TEST_F(MetricsTest, AMeshThatEndsBadlyCountsAsNotCertified) {
   const auto series = Scrape();
   EXPECT_EQ(series.at("stellate_meshes_ended_total{state=\"FAILED\"}"), 1);
   EXPECT_EQ(series.at("stellate_certificates_total{certified=\"false\"}"), 1);
+}
+
+TEST_F(MetricsTest, CountsWhatLimitsRefuse) {
+  Config config;
+  config.max_meshes = 1;
+  config.max_rounds = 10;
+  StartWithMetrics(config);
+  CreateSphere();
+  v1::Mesh mesh;
+  EXPECT_FALSE(Create(SpecOfSphere(), &mesh).ok());
+  EXPECT_FALSE(Create(SpecOfSphere(), &mesh).ok());
+  v1::MeshSpec spec = SpecOfSphere();
+  spec.mutable_limits()->set_max_rounds(11);
+  EXPECT_FALSE(Create(spec, &mesh).ok());
+  const auto series = Scrape();
+  EXPECT_EQ(series.at("stellate_limit_refusals_total{limit=\"max-meshes\"}"), 2);
+  EXPECT_EQ(series.at("stellate_limit_refusals_total{limit=\"max-rounds\"}"), 1);
 }
 
 TEST_F(MetricsTest, NamesNoMeshAndNoOwner) {

@@ -66,8 +66,8 @@ TEST_F(ServerTest, HealthSaysNoOnceItStops) {
   Start();
   const std::string address = server_->address();
   EXPECT_EQ(CheckHealth(address, 60s), "");
-  EXPECT_EQ(
-      CheckHealth(address, 60s, grpc::InsecureChannelCredentials(), "stellate.v1.Stellate"), "");
+  EXPECT_EQ(CheckHealth(address, 60s, grpc::InsecureChannelCredentials(), "stellate.v1.Stellate"),
+            "");
   EXPECT_TRUE(server_->Stop(0s));
   EXPECT_NE(CheckHealth(address, 60s), "");
 }
@@ -101,10 +101,23 @@ TEST_F(ServerTest, StoppingLetsRunningMeshesEnd) {
         CheckHealth(server_->address(), 60s, grpc::InsecureChannelCredentials(), service);
     EXPECT_NE(health.find("is not serving"), std::string::npos) << service << ": " << health;
   }
+  EXPECT_EQ(CheckHealth(server_->address(), 60s, grpc::InsecureChannelCredentials(), "alive"), "");
   gate.set_value();
   EXPECT_EQ(watching.get().state(), v1::MESH_STATE_SUCCEEDED);
   EXPECT_TRUE(stopping.get());
   EXPECT_TRUE(worker.Wait().ok());
+}
+
+// With hours to drain, this ends because nobody serves the mesh.
+TEST_F(ServerTest, StoppingDoesNotWaitForAMeshThatNobodyServes) {
+  Start();
+  const std::string name = CreateSphere();
+  {
+    RawWorker worker(stub_.get(), name,
+                     [](const v1::QueryChunk&) { return std::optional<v1::ServeOracleRequest>(); });
+    while (worker.chunks() == 0) std::this_thread::yield();
+  }
+  EXPECT_TRUE(server_->Stop(10h));
 }
 
 TEST_F(ServerTest, StoppingInAHurryEndsStreamsWithUnavailable) {
