@@ -22,7 +22,8 @@ namespace stellate::core {
 //   const Report& report = (*mesher)->report();
 //
 // Deterministic: the specification and the answers determine the mesh bit for bit, whatever
-// Specification::threads. One thread at a time may use a Mesher; nothing here blocks, logs or
+// Specification::threads. But for Interrupt, one thread at a time may use a
+// Mesher; nothing here blocks, logs or
 // reads a clock.
 class Mesher {
  public:
@@ -38,6 +39,11 @@ class Mesher {
   // kFailedPrecondition without a current batch) nothing has changed: the same batch may be
   // answered again, or Fail called.
   virtual Expected<MeshDelta> Absorb(const Answers& answers) = 0;
+
+  // Makes an Absorb under way, and every later one, return soon: refused with kCancelled, and with
+  // the mesh of no use any more but to be cancelled. The one call that any thread may make at any
+  // time.
+  virtual void Interrupt() = 0;
 
   // End the run now, with the mesh as it stands. No effect once it is over.
   virtual void Cancel() = 0;

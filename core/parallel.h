@@ -1,15 +1,16 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 
 #if defined(__SANITIZE_THREAD__)
-#include <atomic>
 #include <thread>
 #include <vector>
 #else
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
+#include <tbb/task_group.h>
 #endif
 
 namespace stellate::core {
@@ -19,7 +20,22 @@ namespace stellate::core {
 //
 // Under ThreadSanitizer plain threads do the work: Debian's oneTBB is not instrumented, so that
 // every hand-over between its workers would look like a race and hide the real ones.
+// Thrown out of work that was interrupted.
+struct Interrupted {};
+
 #if defined(__SANITIZE_THREAD__)
+// Ends the work of another thread, once and for all.
+class Interruption {
+ public:
+  void Raise() { raised_ = true; }
+  bool raised() const { return raised_; }
+
+ private:
+  std::atomic<bool> raised_ = false;
+};
+
+inline void ThrowIfInterrupted() {}
+
 inline constexpr int kSanitizedThreads = 3;
 
 template <typename Index, typename Body>
@@ -34,20 +50,53 @@ void ParallelFor(Index count, const Body& body) {
 }
 
 template <typename Work>
-void WithThreads(int, const Work& work) {
+bool WithThreads(int, Interruption& interruption, const Work& work) {
   work();
+  return !interruption.raised();
 }
 #else
+// Ends the work of another thread, once and for all.
+class Interruption {
+ public:
+  void Raise() {
+    raised_ = true;
+    context_.cancel_group_execution();
+  }
+  bool raised() const { return raised_; }
+  tbb::task_group_context& context() { return context_; }
+
+ private:
+  std::atomic<bool> raised_ = false;  // oneTBB forgets once a group has been waited for
+  tbb::task_group_context context_{tbb::task_group_context::isolated};
+};
+
+// For long stretches of work on one thread.
+inline void ThrowIfInterrupted() {
+  if (tbb::is_current_task_group_canceling()) throw Interrupted{};
+}
+
 template <typename Index, typename Body>
 void ParallelFor(Index count, const Body& body) {
   tbb::parallel_for(Index{0}, count, body);
+  ThrowIfInterrupted();
 }
 
-// Runs work() so that the ParallelFor in it use at most so many threads; 0: all cores.
+// Runs work() so that the ParallelFor in it use at most so many threads; 0: all cores. False if it
+// was interrupted, at any point.
 template <typename Work>
-void WithThreads(int threads, const Work& work) {
+bool WithThreads(int threads, Interruption& interruption, const Work& work) {
+  if (interruption.raised()) return false;
   tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
-  arena.execute(work);
+  arena.execute([&] {
+    tbb::task_group group(interruption.context());
+    group.run_and_wait([&] {
+      try {
+        work();
+      } catch (const Interrupted&) {
+      }
+    });
+  });
+  return !interruption.raised();
 }
 #endif
 

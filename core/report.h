@@ -84,7 +84,7 @@ struct Certificate {
   double max_tangent_angle_degrees = 0;  // largest angle of a simplex to its vertices' tangents
   double max_barycentre_distance = 0;  // to M, length
   double estimated_reach = 0;          // length; an estimate from above
-  double epsilon_over_reach = 0;
+  double epsilon_over_reach = 0;  // graded sizes: the largest R_p over the local feature size
 
   std::uint64_t components = 0;
   std::int64_t euler_characteristic = 0;

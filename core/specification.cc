@@ -129,6 +129,14 @@ Status CheckCriteria(const Criteria& c) {
     return Invalid(Message("criteria.advance_step (h) is ", *c.advance_step, " but must be ",
                            LengthRule(), ": leave it unset for the default"));
   }
+  if (c.size_rate && !(*c.size_rate > 0 && *c.size_rate <= 1)) {
+    return Invalid(Message("criteria.size_rate is ", *c.size_rate,
+                           " but must be in (0, 1]: 0.3 is a good mesh"));
+  }
+  if (c.max_deviation && !(*c.max_deviation >= kMinLength && *c.max_deviation <= kMaxLength)) {
+    return Invalid(Message("criteria.max_deviation is ", *c.max_deviation,
+                           " but must be a positive length"));
+  }
   if (c.flat_alternations < 1 || c.flat_alternations > kMaxFlatAlternations) {
     return Invalid(Message("criteria.flat_alternations is ", c.flat_alternations,
                            " but must be between 1 and ", kMaxFlatAlternations,

@@ -59,13 +59,23 @@ struct Criteria {
   bool ask_ahead = false;                    // rehearse on a guess of M first and ask for all that
                                              // it wants at once: a third of the round trips for
                                              // up to twice the processor time
+  // Adaptive size: where the mesh must be finer than epsilon, which stays the upper bound. Both go by
+  // the local feature size that the sample shows: the smallest |q - p|^2 / (2 dist(q, T_pM)) over a
+  // star, made 1-Lipschitz over neighbours. It sees curvature, not another sheet coming near, and
+  // never asks for less than epsilon / 64, since noise in the answers looks like curvature.
+  std::optional<double> size_rate;           // R_p <= size_rate * size(p), no unit, in (0, 1]
+  std::optional<double> max_deviation;       // the Hausdorff target, a length, > 0: R_p^2 / (2
+                                             // size(p)), the circumcentre's distance to M, stays
+                                             // below it
   int flat_alternations = 1;                 // without intersect_flat: closest points taken when
                                              // alternating towards a flat, 1..20
 };
 
 struct Limits {
   std::uint64_t max_vertices = 10'000'000;
-  std::uint64_t max_rounds = 100'000;  // batches of queries
+  std::uint64_t max_rounds = 100'000;   // batches of queries
+  std::uint64_t max_batch_queries = 0;  // a larger round is asked in several batches, for the same
+                                        // mesh; 0: no limit
 };
 
 // All that determines a mesh, together with the answers.

@@ -16,6 +16,7 @@ const char* StatusCodeName(StatusCode code) {
     case StatusCode::kOracleNotIdempotent: return "ORACLE_NOT_IDEMPOTENT";
     case StatusCode::kOracleFailed: return "ORACLE_FAILED";
     case StatusCode::kFailedPrecondition: return "FAILED_PRECONDITION";
+    case StatusCode::kCancelled: return "CANCELLED";
   }
   return "UNKNOWN";
 }

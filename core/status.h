@@ -20,6 +20,7 @@ enum class StatusCode {
   kOracleNotIdempotent,  // closest_point moves a point that it returned itself
   kOracleFailed,         // the oracle reported a failure of its own, or vanished
   kFailedPrecondition,   // a call out of order
+  kCancelled,            // the caller interrupted it
 };
 
 // A refusal: the code for programs, the message for people. The message names the offending

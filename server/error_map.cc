@@ -55,6 +55,7 @@ constexpr CoreRow kReasons[] = {
     {core::StatusCode::kOracleNotIdempotent, v1::ERROR_REASON_ORACLE_NOT_IDEMPOTENT},
     {core::StatusCode::kOracleFailed, v1::ERROR_REASON_ORACLE_FAILED},
     {core::StatusCode::kFailedPrecondition, v1::ERROR_REASON_FAILED_PRECONDITION},
+    {core::StatusCode::kCancelled, v1::ERROR_REASON_FAILED_PRECONDITION},
 };
 
 std::string ReasonName(v1::ErrorReason reason) {

@@ -191,9 +191,12 @@ void LayOutSpecification(Archive& archive, Value& spec) {
   archive.Maybe(criteria.advance_step);
   archive.Maybe(criteria.judging);
   archive.Number(criteria.ask_ahead);
+  archive.Maybe(criteria.size_rate);
+  archive.Maybe(criteria.max_deviation);
   archive.Number(criteria.flat_alternations);
   archive.Number(spec.limits.max_vertices);
   archive.Number(spec.limits.max_rounds);
+  archive.Number(spec.limits.max_batch_queries);
   archive.Number(spec.threads);
 }
 

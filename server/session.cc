@@ -59,6 +59,7 @@ void Session::Run() {
     auto made = factory_(options_.spec);
     if (made) {
       mesher = std::move(*made);
+      Expose(mesher.get());
       RunRounds(mesher.get());
       report = mesher->report();
     } else {
@@ -74,9 +75,16 @@ void Session::Run() {
     Fail(nullptr, {"INTERNAL", core::Message("a fault of the server: ", error.what())},
          core::Status::Ok());
   }
+  Expose(nullptr);
   mesher.reset();  // it is large, and watchers do not need it
   if (options_.memory != nullptr) options_.memory->Insist(history_.MemoryBytes());
   Finish(report ? &*report : nullptr);
+}
+
+// What Cancel may interrupt in the middle of a round.
+void Session::Expose(core::Mesher* mesher) {
+  const std::lock_guard lock(mutex_);
+  computing_ = mesher;
 }
 
 void Session::RunRounds(core::Mesher* mesher) {
@@ -174,7 +182,10 @@ void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
 bool Session::Absorb(core::Mesher* mesher, const core::Answers& answers) {
   const auto delta = mesher->Absorb(answers);
   if (!delta) {
-    Fail(mesher, ToFailure(delta.error()), delta.error());
+    if (delta.error().code == StatusCode::kCancelled)
+      mesher->Cancel();
+    else
+      Fail(mesher, ToFailure(delta.error()), delta.error());
     return false;
   }
   const core::Status logged = history_.Append(*delta);
@@ -278,6 +289,7 @@ void Session::Cancel() {
     const std::lock_guard lock(mutex_);
     if (ending_) return;
     cancelled_ = true;
+    if (computing_ != nullptr) computing_->Interrupt();
   }
   pool_.Interrupt();
 }

@@ -100,6 +100,7 @@ class Session {
   const WatchLog& history() const { return history_; }
 
  private:
+  void Expose(core::Mesher* mesher);
   void RunRounds(core::Mesher* mesher);
   bool ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch);
   void RepeatEnd(core::Mesher* mesher);
@@ -125,6 +126,7 @@ class Session {
   core::Status blame_;  // Run's thread only: told to all workers at the end
 
   mutable std::mutex mutex_;
+  core::Mesher* computing_ = nullptr;  // while it lives
   bool ending_ = false;     // the final state is chosen, and being recorded
   bool suspended_ = false;  // the server stopped it, not its owner
   std::optional<SessionState> final_state_;

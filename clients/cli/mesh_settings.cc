@@ -10,6 +10,7 @@ constexpr MeshSetting kRun[] = {
     {"--workers", &O::workers, "threads that answer the server"},
     {"--max-vertices", &O::max_vertices, "stop there"},
     {"--max-rounds", &O::max_rounds, "stop after so many round trips"},
+    {"--max-batch-queries", &O::max_batch_queries, "ask larger rounds in several batches"},
     {"--box-seeds", &O::box_seeds, "points of the box tried as seeds"},
     {"--reconnect", &O::reconnect_seconds, "seconds to wait for a server that went away"},
 };
@@ -26,6 +27,9 @@ constexpr MeshSetting kCriteria[] = {
      "closest points towards a flat, without intersections"},
     {"--ask-ahead,!--no-ask-ahead", &O::ask_ahead,
      "refine a guess first: fewer round trips, more processor time"},
+    {"--size-rate", &O::size_rate, "R_p at most this share of the local feature size"},
+    {"--max-deviation", &O::max_deviation, 
+     "circumcentres at most so far from the manifold, a length"},
     {"--common-centre,!--no-common-centre", &O::common_centre,
      "judge a simplex at one centre for all its vertices"},
 };

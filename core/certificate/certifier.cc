@@ -18,6 +18,7 @@
 #include "core/certificate/topology.h"
 #include "core/geometry/simplex.h"
 #include "core/message.h"
+#include "core/parallel.h"
 #include "core/sample/random.h"
 
 namespace stellate::core {
@@ -60,7 +61,7 @@ bool Found(const AnswerBlock& answer, Eigen::Index j) {
 // The checks that need no oracle run at construction; then come the rounds of queries:
 //   1. barycentres, vertices, coverage probes, and the first step of the balls;
 //   2. tangents at the probes' closest points, by differences, if the oracle sends none;
-//   2.. further steps of the balls, until all are settled.
+//      and with them the second step of the balls.
 class Certifier::Impl {
  public:
   Impl(const Specification& spec, const MeshView& mesh, const StarFacts& facts)
@@ -126,8 +127,11 @@ class Certifier::Impl {
       return false;
     }
     adjacency_.emplace(list);
+    ThrowIfInterrupted();
     const Connectivity connectivity = ComputeConnectivity(*adjacency_);
+    ThrowIfInterrupted();
     const LinkReport links = CheckLinks(*adjacency_);
+    ThrowIfInterrupted();
     certificate_.bad_faces = adjacency_->bad_facets();
     certificate_.closed = certificate_.bad_faces == 0;
     certificate_.components = connectivity.components;
@@ -193,8 +197,9 @@ class Certifier::Impl {
                                "), more than epsilon = ", Brief(spec_.epsilon)));
     }
     size_ = std::min(shape_.max_circumradius, spec_.epsilon);
-    fibres_.emplace(mesh_, *adjacency_, size_, shape_.max_diameter);
+    fibres_.emplace(mesh_, *adjacency_, shape_.max_diameter);
     balls_.emplace(mesh_, stars.longest_edge, spec_.random_seed, kBallCount);
+    longest_edge_ = std::move(stars.longest_edge);
   }
 
   void Ask(Role role, Eigen::MatrixXd points, bool want_tangents = false) {
@@ -228,6 +233,11 @@ class Certifier::Impl {
     if (first && !spec_.oracle.tangent_basis) Ask(Role::kDifferences, DifferencePoints());
     if (ball_steps_ < kMaxBallSteps) Ask(Role::kBalls, balls_->Centres());
     if (blocks_.empty()) Finish();
+  }
+
+  // How far from the mesh M may be at a vertex.
+  double LocalSize(std::uint32_t v) const {
+    return facts_.max_size_ratio > 0 ? std::min(size_, longest_edge_[v]) : size_;
   }
 
   Eigen::Map<const Eigen::VectorXd> Vertex(std::uint32_t v) const {
@@ -371,7 +381,8 @@ class Certifier::Impl {
     for (std::size_t n = 0; n < probes_.size(); ++n) {
       const Probe& probe = probes_[n];
       const int hits =
-          fibres_->CountHits(probe.x.data(), probe.tangent.data(), Mix64(spec_.random_seed) + n);
+          fibres_->CountHits(probe.x.data(), probe.tangent.data(), LocalSize(probe.nearest.vertex),
+                             Mix64(spec_.random_seed) + n);
       if (hits < 0) continue;  // undecided by rounding
       ++certificate_.fibre_samples;
       if (hits == 1) continue;
@@ -379,7 +390,8 @@ class Certifier::Impl {
       findings_.Refuse(Findings::kFibres,
                        Message("the normal flat of the manifold at its point ", NamePoint(probe.x),
                                ", near vertex ", probe.nearest.vertex, ", meets the mesh ", hits,
-                               " times within ", Brief(size_), " instead of once"));
+                               " times within ", Brief(LocalSize(probe.nearest.vertex)),
+                               " instead of once"));
     }
     probes_.clear();
   }
@@ -387,15 +399,24 @@ class Certifier::Impl {
   void JudgeReach() {
     reach_ = std::min(reach_, balls_->reach());
     certificate_.estimated_reach = reach_;
-    certificate_.epsilon_over_reach = spec_.epsilon / reach_;
-    if (size_ > kHopeless * reach_) {
+    const bool graded = facts_.max_size_ratio > 0;
+    certificate_.epsilon_over_reach =
+        graded ? std::max(facts_.max_size_ratio, balls_->coarseness()) : spec_.epsilon / reach_;
+    if (graded ? certificate_.epsilon_over_reach > kHopeless : size_ > kHopeless * reach_) {
       findings_.Refuse(Findings::kReach,
                        Message("the mesh size ", Brief(size_), " is ", Brief(size_ / reach_),
                                " times the estimated reach ", Brief(reach_),
                                ", far too coarse to tell the manifold's shape"));
     }
-    if (std::string w = CoarsenessWarning(spec_.epsilon, reach_); !w.empty())
-      findings_.Warn(std::move(w));
+    const double coarse = graded ? certificate_.epsilon_over_reach * reach_ : spec_.epsilon;
+    if (std::string w = CoarsenessWarning(coarse, reach_); !w.empty()) findings_.Warn(std::move(w));
+    if (spec_.criteria.max_deviation &&
+        certificate_.max_barycentre_distance > *spec_.criteria.max_deviation) {
+      findings_.Warn(Message("a barycentre lies ", Brief(certificate_.max_barycentre_distance),
+                             " from the manifold, more than max_deviation = ",
+                             Brief(*spec_.criteria.max_deviation),
+                             ": the curvature was underestimated there; take epsilon smaller."));
+    }
   }
 
   const QueryBlock& BlockOf(Role role) const {
@@ -419,6 +440,7 @@ class Certifier::Impl {
   std::optional<ShrinkingBalls> balls_;
   MeshShape shape_;
   double reach_ = 0;
+  std::vector<double> longest_edge_;  // by vertex
   double size_ = 0;  // the mesh's own: its largest circumradius, epsilon at most
   std::vector<std::uint32_t> chosen_simplices_, chosen_vertices_;
   std::string barycentre_problem_;

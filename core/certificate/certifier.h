@@ -25,6 +25,7 @@ struct StarFacts {
   std::uint64_t inconsistent_simplices = 0;
   double max_circumradius = 0;  // max R_p(sigma)
   bool converged = false;       // no rule applies any more
+  double max_size_ratio = 0;    // max R_p / size(p) where the size is graded, else 0
 };
 
 // Proves or refutes that a finished mesh is what was asked for. A state machine like Mesher: it

@@ -17,14 +17,10 @@ constexpr int kSideSteps = 6;
 
 }  // namespace
 
-Fibres::Fibres(const MeshView& mesh, const Adjacency& adjacency, double reach_out,
-               double max_diameter)
+Fibres::Fibres(const MeshView& mesh, const Adjacency& adjacency, double max_diameter)
     : mesh_(mesh),
       adjacency_(adjacency),
-      reach_out_(reach_out),
-      // Simplices much larger than asked for are refused for their size; searching for them would
-      // turn each sample into a search of the whole mesh.
-      search_radius_((1 + kSideStep) * reach_out + std::min(max_diameter, 4 * reach_out)),
+      max_diameter_(max_diameter),
       coordinates_(mesh.points, mesh.points + mesh.vertices * static_cast<std::uint64_t>(mesh.d)),
       tree_(mesh.d, &coordinates_),
       place_(mesh.vertices, 0) {
@@ -49,8 +45,11 @@ Fibres::Nearest Fibres::NearestVertex(const double* x) const {
 void Fibres::Gather(const double* x, const double* tangent) {
   for (const NearVertex& v : near_) place_[v.id] = 0;
   near_.clear();
+  // Simplices much larger than asked for are refused for their size; searching for them would turn
+  // each sample into a search of the whole mesh.
+  const double radius = (1 + kSideStep) * reach_out_ + std::min(max_diameter_, 4 * reach_out_);
   tree_.VisitNear(
-      x, [&] { return search_radius_; },
+      x, [&] { return radius; },
       [&](std::uint32_t v, double) {
         near_.push_back({v, {}});
       });
@@ -64,7 +63,9 @@ void Fibres::Gather(const double* x, const double* tangent) {
   }
 }
 
-int Fibres::CountHits(const double* x, const double* tangent, std::uint64_t random_key) {
+int Fibres::CountHits(const double* x, const double* tangent, double reach_out,
+                      std::uint64_t random_key) {
+  reach_out_ = reach_out;
   Gather(x, tangent);
   std::array<double, kMaxDimension> shift{};
   int hits = CountHitsBeside(x, shift);

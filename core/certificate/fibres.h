@@ -15,8 +15,8 @@ namespace stellate::core {
 // mesh is M seen along its normals: nothing missing, nothing doubled, nothing bridged.
 class Fibres {
  public:
-  // `reach_out`: how far along a fibre to look; `max_diameter`: of the mesh's simplices.
-  Fibres(const MeshView& mesh, const Adjacency& adjacency, double reach_out, double max_diameter);
+  // `max_diameter`: of the mesh's simplices.
+  Fibres(const MeshView& mesh, const Adjacency& adjacency, double max_diameter);
 
   // The mesh vertex nearest to x, and its distance.
   struct Nearest {
@@ -29,7 +29,8 @@ class Fibres {
   // is d x k, orthonormal. When the flat passes so close to the boundary of a simplex that
   // rounding would decide, parallel ones, at most 0.02 reach_out to the side, are tried; -1 if
   // all of them do so too.
-  int CountHits(const double* x, const double* tangent, std::uint64_t random_key);
+  int CountHits(const double* x, const double* tangent, double reach_out,
+                std::uint64_t random_key);
 
  private:
   // A mesh vertex near x, its tangent coordinates relative to x.
@@ -46,8 +47,8 @@ class Fibres {
 
   const MeshView& mesh_;
   const Adjacency& adjacency_;
-  const double reach_out_;
-  const double search_radius_;
+  const double max_diameter_;
+  double reach_out_ = 0;
   std::vector<double> coordinates_;
   BallTree tree_;
   std::vector<NearVertex> near_;

@@ -18,7 +18,7 @@ inline constexpr std::uint32_t kExtremeBarycentres = 100;  // of largest diamete
 inline constexpr std::uint32_t kMaxVertexProbes = 256;
 inline constexpr int kProbesOfAKind = 80;  // near the mesh; its box; the client's box; its seeds
 inline constexpr int kBallCount = 64;
-inline constexpr int kMaxBallSteps = 6;
+inline constexpr int kMaxBallSteps = 2;
 
 // Simplices whose barycentres are checked, ascending.
 std::vector<std::uint32_t> ChooseSimplices(const SimplexList& list, const MeshShape& shape,

@@ -1,6 +1,9 @@
 #include "core/certificate/shrinking_balls.h"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "core/sample/random.h"
 
@@ -11,6 +14,7 @@ constexpr double kTellingDistance = 0.5;  // of the longest edge at the vertex
 // A ball is asked about at slightly less than the radius found: the centre of the very ball that
 // touches M twice is on the medial axis, where oracles divide by zero.
 constexpr double kInside = 0.98;
+constexpr int kLadder = 6;
 
 using ConstPoint = Eigen::Map<const Eigen::VectorXd>;
 
@@ -37,7 +41,7 @@ ShrinkingBalls::ShrinkingBalls(const MeshView& mesh, const std::vector<double>& 
   for (int n = 0; n < count; ++n) {
     Ball ball;
     ball.vertex = static_cast<std::uint32_t>(random.Next() % mesh.vertices);
-    ball.radius = start;
+    for (int rung = 0; rung < kLadder; ++rung) ball.radii.push_back(std::ldexp(start, -rung));
     ball.scale = kTellingDistance * longest_edge[ball.vertex];
     ball.normal.resize(d);
     for (int i = 0; i < d; ++i) ball.normal[i] = random.Normal();
@@ -54,31 +58,40 @@ ShrinkingBalls::ShrinkingBalls(const MeshView& mesh, const std::vector<double>& 
 }
 
 Eigen::MatrixXd ShrinkingBalls::Centres() const {
-  Eigen::MatrixXd centres(mesh_.d, static_cast<Eigen::Index>(active_.size()));
-  for (std::size_t n = 0; n < active_.size(); ++n) {
-    const Ball& ball = active_[n];
-    centres.col(n) = PointOf(mesh_, ball.vertex) + ball.radius * ball.normal;
-  }
+  Eigen::Index count = 0;
+  for (const Ball& ball : active_) count += static_cast<Eigen::Index>(ball.radii.size());
+  Eigen::MatrixXd centres(mesh_.d, count);
+  Eigen::Index next = 0;
+  for (const Ball& ball : active_)
+    for (const double radius : ball.radii)
+      centres.col(next++) = PointOf(mesh_, ball.vertex) + radius * ball.normal;
   return centres;
 }
 
 void ShrinkingBalls::Absorb(const Eigen::MatrixXd& nearest,
                             const std::vector<std::uint8_t>& found) {
   std::vector<Ball> still;
-  for (std::size_t n = 0; n < active_.size(); ++n) {
-    if (!found.empty() && !found[n]) continue;
-    Ball& ball = active_[n];
-    const Eigen::VectorXd offset = nearest.col(n) - PointOf(mesh_, ball.vertex);
-    const double distance = offset.norm();
-    const double along = ball.normal.dot(offset);
-    if (distance < ball.scale || along <= 0) continue;
-    const double radius = distance * distance / (2 * along);
-    if (radius >= ball.radius) continue;
-    if (radius < reach_) {
-      reach_ = radius;
+  Eigen::Index next = 0;
+  for (Ball& ball : active_) {
+    double narrowest = std::numeric_limits<double>::infinity();
+    for (const double asked : ball.radii) {
+      const Eigen::Index n = next++;
+      if (!found.empty() && !found[static_cast<std::size_t>(n)]) continue;
+      const Eigen::VectorXd offset = nearest.col(n) - PointOf(mesh_, ball.vertex);
+      const double distance = offset.norm();
+      const double along = ball.normal.dot(offset);
+      if (distance < ball.scale || along <= 0) continue;
+      const double radius = distance * distance / (2 * along);
+      if (radius < asked) narrowest = std::min(narrowest, radius);
+    }
+    if (std::isinf(narrowest)) continue;
+    const double circumradius = ball.scale / kTellingDistance * std::numbers::inv_sqrt3;
+    coarseness_ = std::max(coarseness_, circumradius / narrowest);
+    if (narrowest < reach_) {
+      reach_ = narrowest;
       narrowest_ = ball.vertex;
     }
-    ball.radius = kInside * radius;
+    ball.radii.assign(1, kInside * narrowest);
     still.push_back(std::move(ball));
   }
   active_ = std::move(still);

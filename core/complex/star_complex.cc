@@ -50,6 +50,19 @@ StarComplex<K>::StarComplex(int d, double epsilon, double inradius, Judging judg
       weight_scale_(1e-10 * epsilon * epsilon),
       tree_(d, &points_) {}
 
+template <int K>
+StarComplex<K>::StarComplex(const StarComplex& other)
+    : d_(other.d_),
+      inradius_(other.inradius_),
+      judging_(other.judging_),
+      judged_radius2_(other.judged_radius2_),
+      weight_scale_(other.weight_scale_),
+      points_(other.points_),
+      tangents_(other.tangents_),
+      cells_(other.cells_),
+      tree_(other.tree_, &points_),
+      simplex_count_(other.simplex_count_) {}
+
 // Judges the vertices of one cell, p's.
 template <int K>
 class StarComplex<K>::CentreJudge final : public Cell::Judge {

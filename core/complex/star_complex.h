@@ -27,7 +27,7 @@ class StarComplex {
   // inradius  of the fake simplex that each cell begins as, length
   // judging   where a simplex is judged: see Judging
   StarComplex(int d, double epsilon, double inradius, Judging judging);
-  StarComplex(const StarComplex&) = delete;
+  StarComplex(const StarComplex& other);
   StarComplex& operator=(const StarComplex&) = delete;
 
   // What an insertion did.

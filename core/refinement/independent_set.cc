@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/parallel.h"
 #include "core/sample/ball_tree.h"
 
 namespace stellate::core {
@@ -21,6 +22,7 @@ std::vector<Target<K>> SelectIndependent(const StarComplex<K>& complex,
   std::vector<double> centre(d);
   for (const Target<K>& t : targets) {
     if (chosen.size() == most) break;
+    if (chosen.size() % 1024 == 0) ThrowIfInterrupted();
     complex.Lift(t.star, t.x, centre.data());
     bool conflict = false;
     balls.ForEachInfluencing(centre.data(), [&](std::uint32_t) { conflict = true; });

@@ -1,6 +1,7 @@
 #include "core/refinement/refinement.h"
 
 #include <algorithm>
+#include <functional>
 #include <cmath>
 #include <limits>
 #include <sstream>
@@ -26,6 +27,12 @@ constexpr double kEmptyBall = 0.5;
 // Targets of a round lie R apart: images no farther than this share of R from their targets lie at
 // least R / 2 apart, as far as the empty ball asks.
 constexpr double kCalm = 0.25;
+// What is rehearsed can wait until it is known better.
+constexpr double kRehearsedSpacing = 0.9;
+// Shorter edges than this share of a star's longest say little of curvature and much of noise.
+constexpr double kTellingEdge = 0.5;
+// The finest graded size, in epsilon.
+constexpr double kFinest = 1.0 / 64;
 // Good points are chosen off the centre.
 constexpr double kGoodPointSpacing = 0.25;
 
@@ -56,6 +63,8 @@ ResolvedCriteria Resolve(const Specification& spec) {
   r.flat_alternations = c.flat_alternations;
   r.ask_ahead = c.ask_ahead;
   r.judging = c.judging.value_or(spec.dimension <= 2 ? Judging::kFlats : Judging::kCommonCentre);
+  r.size_rate = c.size_rate.value_or(INFINITY);
+  r.max_deviation = c.max_deviation.value_or(INFINITY);
   double step = kDefaultAdvanceEpsilons * spec.epsilon;
   if (spec.bounding_box) {
     const double diagonal = (spec.bounding_box->upper - spec.bounding_box->lower).norm();
@@ -75,11 +84,21 @@ Refinement<K>::Refinement(Specification spec)
   AskForSeeds();
 }
 
+// What the client has in hand: the round's batch or a part of it.
+template <int K>
+QueryBatch& Refinement<K>::OpenBatch() {
+  const std::uint64_t most = spec_.limits.max_batch_queries;
+  if (most == 0 || static_cast<std::uint64_t>(batch_->size()) <= most) return *batch_;
+  if (!parts_) parts_.emplace(*batch_, most);
+  return parts_->part();
+}
+
 template <int K>
 const QueryBatch* Refinement<K>::NextBatch() {
   if (over_ || !batch_) return nullptr;
-  batch_->round = progress_.round + 1;
-  return &*batch_;
+  QueryBatch& batch = OpenBatch();
+  batch.round = progress_.round + 1;
+  return &batch;
 }
 
 template <int K>
@@ -105,34 +124,52 @@ template <int K>
 Expected<MeshDelta> Refinement<K>::Absorb(const Answers& answers) {
   if (over_ || !batch_)
     return Refuse(StatusCode::kFailedPrecondition, "Absorb without a batch: the run is over");
-  if (answers.blocks.size() != batch_->blocks.size())
+  const QueryBatch& asked = OpenBatch();
+  if (answers.blocks.size() != asked.blocks.size())
     return Refuse(StatusCode::kOracleShape,
                   "got " + std::to_string(answers.blocks.size()) + " answer blocks for " +
-                      std::to_string(batch_->blocks.size()) + " query blocks; send one for each");
+                      std::to_string(asked.blocks.size()) + " query blocks; send one for each");
   for (std::size_t b = 0; b < answers.blocks.size(); ++b) {
-    const QueryBlock& block = batch_->blocks[b];
+    const QueryBlock& block = asked.blocks[b];
     if (answers.blocks[b].points.cols() != block.size())
       return Refuse(StatusCode::kOracleShape, "block " + std::to_string(b) + " has " +
                                                   std::to_string(answers.blocks[b].points.cols()) +
                                                   " answers for " + std::to_string(block.size()) +
                                                   " queries; send one for each");
+    if (rehearsal_) continue;
     if (Status s = CheckAnswers(spec_, block, 0, answers.blocks[b]); !s.ok())
       return tl::unexpected<Status>(s);
   }
-  if (Status s = CheckIdempotence(answers); !s.ok()) return tl::unexpected<Status>(s);
-  idempotence_sample_.resize(0, 0);
+  const bool complete = !parts_ || parts_->is_last();
+  const std::optional<Answers> joined =
+      complete && parts_ ? std::optional(parts_->With(answers)) : std::nullopt;
+  const Answers& all = joined ? *joined : answers;
+  if (complete) {
+    if (Status s = CheckIdempotence(all); !s.ok()) return tl::unexpected<Status>(s);
+    idempotence_sample_.resize(0, 0);
+  }
 
   ++progress_.round;
   ++report_.counts.rounds;
-  const auto size = static_cast<std::uint64_t>(batch_->size());
+  const auto size = static_cast<std::uint64_t>(asked.size());
   progress_.queries += size;
   (stage_ == Stage::kTangents ? report_.counts.tangent_queries : report_.counts.queries) += size;
   delta_ = {};
   delta_.revision = progress_.round;
   delta_.first_vertex = complex_.size();
+  if (!complete) {
+    parts_->Take(answers);
+    delta_.points.resize(complex_.d(), 0);
+    if (progress_.round >= spec_.limits.max_rounds) Finish(Termination::kRoundBudget);
+    UpdateProgress();
+    return std::move(delta_);
+  }
+  parts_.reset();
   batch_.reset();
+  ++whole_rounds_;
 
-  WithThreads(spec_.threads, [&] { Advance(answers); });
+  if (!WithThreads(spec_.threads, interruption_, [&] { Advance(all); }))
+    return Refuse(StatusCode::kCancelled, "the computation was interrupted");
   delta_.points =
       Eigen::Map<const Eigen::MatrixXd>(complex_.points().data(), complex_.d(), complex_.size())
           .rightCols(complex_.size() - static_cast<Eigen::Index>(delta_.first_vertex));
@@ -188,7 +225,8 @@ void Refinement<K>::TakePoints(const Answers& answers) {
       for (int a = 0; a < K; ++a) tangents_(a * d + i, c) = block.tangents(i * K + a, column);
   };
   const bool sorted = stage_ == Stage::kPoints && purpose_ == Purpose::kTargets;
-  const Eigen::Index count = sorted ? first_candidate_.back() : first.points.cols();
+  const Eigen::Index count =
+      sorted ? static_cast<Eigen::Index>(places_.size()) : first.points.cols();
   points_.resize(d, count);
   found_.assign(static_cast<std::size_t>(count), 0);
   tangents_.resize(d * K, count);
@@ -233,15 +271,16 @@ void Refinement<K>::AfterPoints() {
     guesses.push_back(guess);
   };
   if (purpose_ != Purpose::kTargets) {
-    for (Eigen::Index c = 0; c < points_.cols(); ++c)
-      add(c, purpose_ == Purpose::kAhead ? predicted_tangents_.col(c).data() : nullptr);
+    for (Eigen::Index c = 0; c < points_.cols(); ++c) add(c, nullptr);
   } else {
     for (std::size_t i = 0; i < targets_.size(); ++i) {
       // Far steps may turn any corner: no guess there.
-      const bool far = IsCoarse(targets_[i].violation);
+      const bool far = IsCoarse(targets_[i].star, targets_[i].violation);
       const double* guess = far ? nullptr : complex_.Tangent(targets_[i].star);
       for (Eigen::Index c = first_candidate_[i]; c < first_candidate_[i + 1]; ++c) add(c, guess);
     }
+    for (Eigen::Index i = 0; i < ahead_.size(); ++i)
+      add(first_candidate_.back() + i, ahead_.tangents.col(i).data());
   }
   if (known.empty()) return AfterTangents();
   tangent_finder_.Start(points_(Eigen::all, known), std::move(guesses));
@@ -265,8 +304,6 @@ void Refinement<K>::AfterTangents() {
       break;
     case Purpose::kTargets:
       InsertTargets();
-      break;
-    case Purpose::kAhead:
       InsertAhead();
       break;
   }
@@ -315,6 +352,7 @@ void Refinement<K>::InsertTargets() {
   });
   bool all_calm = true;
   for (std::size_t i = 0; i < targets_.size(); ++i) {
+    if (i % 1024 == 0) ThrowIfInterrupted();
     if (targets_[i].violation.rule >= Rule::kSliver)
       InsertGoodPoint(i, best[i]);
     else
@@ -324,8 +362,10 @@ void Refinement<K>::InsertTargets() {
 
 template <int K>
 double Refinement<K>::Clearance(const Target<K>& t) const {
-  return IsCoarse(t.violation) ? kCoarseSpacing * std::min(criteria_.epsilon, t.radius)
-                               : kEmptyBall * t.radius;
+  const double coarse = rehearsal_ ? kRehearsedSpacing : kCoarseSpacing;
+  const double empty = rehearsal_ ? kRehearsedSpacing : kEmptyBall;
+  return IsCoarse(t.star, t.violation) ? coarse * std::min(SizeBound(t.star), t.radius)
+                                       : empty * t.radius;
 }
 
 template <int K>
@@ -338,7 +378,8 @@ typename Refinement<K>::Fitness Refinement<K>::JudgeRefined(std::size_t i) const
   const double* y = points_.col(c).data();
   fitness.duplicate = complex_.AnyWithin(y, Clearance(t));
   fitness.mends = !fitness.duplicate && complex_.CutsVertex(t.star, t.violation.vertex, y);
-  fitness.calm = Distance(y, candidates_.col(c).data(), complex_.d()) <= kCalm * t.radius;
+  fitness.calm =
+      !rehearsal_ && Distance(y, candidates_.col(c).data(), complex_.d()) <= kCalm * t.radius;
   return fitness;
 }
 
@@ -347,7 +388,7 @@ void Refinement<K>::InsertRefined(std::size_t i, Fitness fitness, bool* all_calm
   const Target<K>& t = targets_[i];
   const Eigen::Index c = first_candidate_[i];
   if (!fitness.found) {
-    if (FindsFlats(t))
+    if (FindsFlats(t) && !rehearsal_)
       no_flat_[t.star] = 1;
     else
       Discourage(t.star);
@@ -361,9 +402,28 @@ void Refinement<K>::InsertRefined(std::size_t i, Fitness fitness, bool* all_calm
     report_.counts.duplicates += fitness.duplicate;
     return Discourage(t.star);
   }
-  complex_.Append(y, tangents_.col(c).data(), t.star);
-  ++(t.violation.rule == Rule::kSize ? report_.counts.inserted_size
-                                     : report_.counts.inserted_radius_edge);
+  Insert(c, t.violation.rule, t.star);
+}
+
+template <int K>
+void Refinement<K>::Insert(Eigen::Index c, Rule rule, std::uint32_t near) {
+  complex_.Append(points_.col(c).data(), tangents_.col(c).data(), near);
+  if (rehearsal_) inserted_rules_.push_back(rule);
+  Counts& counts = report_.counts;
+  switch (rule) {
+    case Rule::kSize:
+      ++counts.inserted_size;
+      break;
+    case Rule::kRadiusEdge:
+      ++counts.inserted_radius_edge;
+      break;
+    case Rule::kSliver:
+      ++counts.inserted_sliver;
+      break;
+    case Rule::kInconsistent:
+      ++counts.inserted_inconsistent;
+      break;
+  }
 }
 
 template <int K>
@@ -402,9 +462,97 @@ void Refinement<K>::InsertGoodPoint(std::size_t i, int best) {
   const double* y = points_.col(c).data();
   if (complex_.AnyWithin(y, kGoodPointSpacing * t.radius))
     return;  // another of this round came near
-  complex_.Append(y, tangents_.col(c).data(), t.star);
-  ++(t.violation.rule == Rule::kSliver ? report_.counts.inserted_sliver
-                                       : report_.counts.inserted_inconsistent);
+  Insert(c, t.violation.rule, t.star);
+}
+
+// |q - p|^2 / (2 dist(q, T_pM)) bounds the reach from above for any q of M (Federer); over the edges
+// of a star, short ones left out, it is the radius of curvature there.
+template <int K>
+double Refinement<K>::SizeSeenFrom(std::uint32_t p) const {
+  const auto& cell = complex_.cell(p);
+  double longest2 = 0;
+  for (const auto& facet : cell.facets())
+    if (!IsFake(facet.id)) longest2 = std::max(longest2, 2 * facet.offset);
+  double size = INFINITY;
+  for (const auto& facet : cell.facets()) {
+    const double distance2 = 2 * facet.offset;
+    if (IsFake(facet.id) || distance2 < kTellingEdge * kTellingEdge * longest2) continue;
+    double along2 = 0;
+    for (int a = 0; a < K; ++a) along2 += facet.normal[a] * facet.normal[a];
+    const double away = std::sqrt(std::max(distance2 - along2, 0.0));
+    if (away > 0) size = std::min(size, distance2 / (2 * away));
+  }
+  return size;
+}
+
+// What is seen from there, from the neighbours, and from all when that was last spread.
+template <int K>
+double Refinement<K>::LocalSize(std::uint32_t p) const {
+  double size = size_seen_[p];
+  for (const auto& facet : complex_.cell(p).facets()) {
+    if (IsFake(facet.id)) continue;
+    const double there = facet.id < local_size_.size()
+                             ? std::min(local_size_[facet.id], size_seen_[facet.id])
+                             : size_seen_[facet.id];
+    size = std::min(size, there + std::sqrt(2 * facet.offset));
+  }
+  return size;
+}
+
+// The largest 1-Lipschitz function over the edges of the stars that is nowhere above what is seen.
+template <int K>
+void Refinement<K>::SpreadSizes() {
+  using Entry = std::pair<double, std::uint32_t>;
+  std::vector<Entry> queue;
+  for (std::uint32_t p = 0; p < complex_.size(); ++p)
+    if (size_seen_[p] < INFINITY) queue.emplace_back(size_seen_[p], p);
+  std::make_heap(queue.begin(), queue.end(), std::greater<>());
+  local_size_ = size_seen_;
+  while (!queue.empty()) {
+    std::pop_heap(queue.begin(), queue.end(), std::greater<>());
+    const auto [size, p] = queue.back();
+    queue.pop_back();
+    if (size > local_size_[p]) continue;
+    for (const auto& facet : complex_.cell(p).facets()) {
+      if (IsFake(facet.id)) continue;
+      const double there = size + std::sqrt(2 * facet.offset);
+      if (!(there < local_size_[facet.id])) continue;
+      local_size_[facet.id] = there;
+      queue.emplace_back(there, facet.id);
+      std::push_heap(queue.begin(), queue.end(), std::greater<>());
+    }
+  }
+}
+
+template <int K>
+double Refinement<K>::SizeBound(std::uint32_t p) const {
+  if (!criteria_.graded()) return criteria_.epsilon;
+  const double size = LocalSize(p);
+  const double bound =
+      std::min(criteria_.size_rate * size, std::sqrt(2 * criteria_.max_deviation * size));
+  return std::clamp(bound, kFinest * criteria_.epsilon, criteria_.epsilon);
+}
+
+// A star's bound also follows its neighbours, whose sizes may have changed after it was judged.
+template <int K>
+void Refinement<K>::JudgeAllSizes() {
+  SpreadSizes();
+  std::vector<std::optional<Violation<K>>> violations(complex_.size());
+  ParallelFor(complex_.size(), [&](std::uint32_t p) {
+    violations[p] =
+        WorstSizeOrShape<K>(complex_, p, SizeBound(p), criteria_.radius_edge_bound);
+  });
+  active_.clear();
+  for (std::uint32_t p = 0; p < complex_.size(); ++p) {
+    if (violations[p]) {
+      standing_[p] = kSizeOrShape;
+      active_.push_back({p, *violations[p]});
+    } else if (standing_[p] == kSizeOrShape) {
+      standing_[p] = kFine;
+    }
+  }
+  sizes_judged_ = true;
+  sizes_judged_at_ = complex_.size();
 }
 
 // Brings the stars and all that is known of them up to date with the appended points.
@@ -422,10 +570,16 @@ void Refinement<K>::Commit() {
   delta_.added = std::move(change.added);
   delta_.removed = std::move(change.removed);
 
+  if (criteria_.graded()) {
+    size_seen_.resize(complex_.size(), INFINITY);
+    ParallelFor(touched.size(),
+                [&](std::size_t i) { size_seen_[touched[i]] = SizeSeenFrom(touched[i]); });
+    sizes_judged_ = false;
+  }
   std::vector<std::optional<Violation<K>>> violations(touched.size());
   ParallelFor(touched.size(), [&](std::size_t i) {
-    violations[i] =
-        WorstSizeOrShape<K>(complex_, touched[i], criteria_.epsilon, criteria_.radius_edge_bound);
+    violations[i] = WorstSizeOrShape<K>(complex_, touched[i], SizeBound(touched[i]),
+                                        criteria_.radius_edge_bound);
   });
   for (const std::uint32_t p : touched) {
     discouraged_[p] = no_flat_[p] = 0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -7,6 +8,8 @@
 #include "core/certificate/certifier.h"
 #include "core/complex/star_complex.h"
 #include "core/mesher.h"
+#include "core/parallel.h"
+#include "core/refinement/batch_parts.h"
 #include "core/refinement/independent_set.h"
 #include "core/refinement/rules.h"
 #include "core/refinement/tangent_finder.h"
@@ -20,6 +23,8 @@ struct ResolvedCriteria {
   int candidates, flat_alternations;
   bool ask_ahead;
   Judging judging;
+  double size_rate, max_deviation;  // infinity: no such criterion
+  bool graded() const { return std::isfinite(size_rate) || std::isfinite(max_deviation); }
 };
 ResolvedCriteria Resolve(const Specification& spec);
 
@@ -35,6 +40,7 @@ class Refinement final : public Mesher {
 
   const QueryBatch* NextBatch() override;
   Expected<MeshDelta> Absorb(const Answers& answers) override;
+  void Interrupt() override { interruption_.Raise(); }
   void Cancel() override { Finish(Termination::kCancelled); }
   void Fail(Status reason) override;
 
@@ -48,13 +54,25 @@ class Refinement final : public Mesher {
  private:
   enum class Stage { kPoints, kAlternate, kTangents, kCertify };
   // What the points that are asked for are for.
-  enum class Purpose { kSeeds, kTargets, kAhead };
+  enum class Purpose { kSeeds, kTargets };
 
-  // A rehearsal: goes on from a sample, and stops where the certificate would begin.
-  Refinement(const Specification& spec, const StarComplex<K>& sample);
+  // Points that a rehearsal wants, in the order of their insertion.
+  struct Ahead {
+    Eigen::MatrixXd points;    // d x n
+    Eigen::MatrixXd tangents;  // (K rows of d) x n, predicted
+    Eigen::VectorXd spacing;   // n, predicted distance to the nearest
+    std::vector<Rule> rules;   // n, what they are for
+
+    Eigen::Index size() const { return points.cols(); }
+  };
+
+  // A rehearsal: goes on from where `original` is, with an oracle that is not the client's, and
+  // stops where the certificate would begin.
+  explicit Refinement(const Refinement& original);
 
   // Asking ahead (refinement_ahead.cc).
-  bool AskAhead(std::size_t targets);
+  void AskAhead();
+  void Rehearse(Refinement& rehearsal) const;
   void InsertAhead();
 
   // Planning (refinement_plan.cc).
@@ -68,6 +86,7 @@ class Refinement final : public Mesher {
   bool FindsFlats(const Target<K>& target) const;
 
   // Answers (refinement.cc); the end (refinement_end.cc).
+  QueryBatch& OpenBatch();
   Status CheckIdempotence(const Answers& answers) const;
   void Advance(const Answers& answers);
   void TakePoints(const Answers& answers);
@@ -88,16 +107,22 @@ class Refinement final : public Mesher {
   void InsertGoodPoint(std::size_t target, int best);
   int BestCandidate(std::size_t target) const;
   void Discourage(std::uint32_t star);
+  void Insert(Eigen::Index candidate, Rule rule, std::uint32_t near);
   void Commit();
+  double SizeSeenFrom(std::uint32_t star) const;
+  double LocalSize(std::uint32_t star) const;
+  void SpreadSizes();
+  double SizeBound(std::uint32_t star) const;
+  void JudgeAllSizes();
   void StartCertificate();
   void Finish(Termination termination);
   void DescribeUnfinished();
   std::string WhatIsLeft() const;
   void UpdateProgress();
 
-  // So large that M between may be anything: more than twice epsilon.
-  bool IsCoarse(const Violation<K>& violation) const {
-    return violation.radius > 2 * criteria_.epsilon;
+  // So large that M between may be anything: more than twice the size asked for.
+  bool IsCoarse(std::uint32_t star, const Violation<K>& violation) const {
+    return violation.radius > 2 * SizeBound(star);
   }
   Eigen::Index CandidateCount(const Target<K>& target) const {
     return target.violation.rule >= Rule::kSliver ? criteria_.candidates : 1;
@@ -105,14 +130,18 @@ class Refinement final : public Mesher {
 
   Specification spec_;
   ResolvedCriteria criteria_;
+  Interruption interruption_;
   StarComplex<K> complex_;
   Progress progress_;
   Report report_;
 
   const bool rehearsal_ = false;
+  std::vector<Rule> inserted_rules_;  // of a rehearsal's points
   Stage stage_ = Stage::kPoints;
   Purpose purpose_ = Purpose::kSeeds;
   std::optional<QueryBatch> batch_;
+  std::optional<BatchParts> parts_;  // of batch_, if that is too large to ask at once
+  std::uint64_t whole_rounds_ = 0;   // rounds in which parts count once
   MeshDelta delta_;  // of the round being absorbed
   bool over_ = false;
 
@@ -126,13 +155,16 @@ class Refinement final : public Mesher {
   Eigen::MatrixXd tangents_;  // (K rows of d) x n
   TangentFinder tangent_finder_;
   int alternations_left_ = 0;
-  Eigen::MatrixXd predicted_tangents_;  // of points asked ahead, (K rows of d) x n
-  Eigen::VectorXd predicted_spacing_;   // of points asked ahead: half of it is kept clear
-  std::uint32_t ask_ahead_from_ = 0;    // vertices at which asking ahead is worth another try
+  Ahead ahead_;                // asked for with the targets' candidates, after them
+  bool ahead_failed_ = false;  // the last round that asked ahead had nothing of it
   Eigen::MatrixXd idempotence_sample_;  // d x m, asked for again with the next batch
 
   // By star.
   enum Standing : std::uint8_t { kFine, kSizeOrShape, kSliverOrInconsistent };
+  std::vector<double> size_seen_;   // where the size is graded: the local feature size seen from it
+  std::vector<double> local_size_;  // the same, 1-Lipschitz over the stars, when last spread
+  std::uint32_t sizes_judged_at_ = 0;  // vertices then
+  bool sizes_judged_ = false;          // nothing has changed since
   std::vector<std::uint8_t> standing_;
   std::vector<std::uint8_t> discouraged_;  // failed attempts; above kGiveUp: left alone
   std::vector<std::uint8_t> no_flat_;      // an intersection was not found: ask for closest points

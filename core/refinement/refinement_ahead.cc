@@ -11,101 +11,119 @@
 namespace stellate::core {
 namespace {
 
-// Fewer targets than this, or than this share of the stars, are asked for as they are.
-constexpr std::size_t kLeastTargets = 20;
-constexpr double kLeastShare = 0.02;
 // R3 and R4 are rehearsed for so many rounds: what is inconsistent on the surrogate is mostly
 // inconsistent on M, but not to the last simplex.
-constexpr int kRehearsedGoodPointRounds = 6;
+constexpr int kRehearsedGoodPointRounds = 12;
 // True points fall elsewhere than predicted: one that comes nearer to another than this share of
 // the spacing that was planned for it would cost quality.
-constexpr double kKeptSpacing = 0.5;
-// After a rehearsal that brought little, wait until the sample has grown by this factor.
-constexpr double kPatience = 1.5;
+constexpr double kKeptSpacing = 0.95;
+// A target is left to the rehearsal when that has a point within this share of its circumradius.
+constexpr double kMended = 0.9;
+// A rehearsal that wants so many times what seems to be missing is on the wrong track.
+constexpr double kMostWanted = 4;
 
 }  // namespace
 
 template <int K>
-Refinement<K>::Refinement(const Specification& spec, const StarComplex<K>& sample)
-    : spec_(spec),
-      criteria_(Resolve(spec_)),
-      complex_(spec_.ambient_dimension, spec_.epsilon, sample.inradius(), sample.judging()),
+Refinement<K>::Refinement(const Refinement& original)
+    : spec_(original.spec_),
+      criteria_(original.criteria_),
+      complex_(original.complex_),
+      progress_(original.progress_),
       rehearsal_(true),
-      tangent_finder_(K, spec_.ambient_dimension, spec_.epsilon, spec_.random_seed) {
-  for (std::uint32_t p = 0; p < sample.size(); ++p)
-    complex_.Append(sample.Point(p), sample.Tangent(p));
-  Commit();
-  Plan();
+      whole_rounds_(original.whole_rounds_),
+      tangent_finder_(original.tangent_finder_),
+      size_seen_(original.size_seen_),
+      local_size_(original.local_size_),
+      sizes_judged_at_(original.sizes_judged_at_),
+      sizes_judged_(original.sizes_judged_),
+      standing_(original.standing_),
+      discouraged_(original.discouraged_),
+      no_flat_(original.no_flat_.size()),
+      active_(original.active_),
+      suspects_(original.suspects_),
+      blemished_(original.blemished_),
+      all_suspect_(original.all_suspect_),
+      before_good_points_(original.before_good_points_) {
+  spec_.oracle = {.intersect_flat = true, .tangent_basis = true};
+  spec_.limits.max_rounds = std::numeric_limits<std::uint64_t>::max();
+  spec_.limits.max_batch_queries = 0;
+  criteria_.ask_ahead = false;
+  criteria_.flat_alternations = 1;
 }
 
-// Whether the batch of the next round was planned so.
+// Answers a rehearsal until it needs no more, or knows no more.
 template <int K>
-bool Refinement<K>::AskAhead(std::size_t targets) {
-  const std::uint32_t count = complex_.size();
-  if (count < ask_ahead_from_ || targets < kLeastTargets ||
-      static_cast<double>(targets) < kLeastShare * count)
-    return false;
+void Refinement<K>::Rehearse(Refinement& rehearsal) const {
+  double missing = 0;
   for (const Active& a : active_)
-    if (!complex_.cell(a.star).bounded()) return false;  // the front has its own pace
-
-  const Surrogate<K> surrogate(complex_);
-  Specification spec = spec_;
-  spec.oracle = {.intersect_flat = false, .tangent_basis = true};
-  spec.criteria.ask_ahead = false;
-  spec.limits.max_rounds = std::numeric_limits<std::uint64_t>::max();
-  Refinement rehearsal(spec, complex_);
+    missing += std::pow(std::max(a.violation.radius / criteria_.epsilon, 1.0), K);
+  const double most = complex_.size() + kMostWanted * (missing + complex_.size());
+  Surrogate<K> surrogate(complex_, criteria_.advance_step, criteria_.epsilon);
+  rehearsal.Plan();
   for (int good_rounds = 0; good_rounds < kRehearsedGoodPointRounds;) {
+    if (interruption_.raised()) throw Interrupted{};
     const QueryBatch* batch = rehearsal.NextBatch();
-    if (!batch) break;
+    if (!batch || rehearsal.complex_.size() > most) return;
     Answers answers;
     for (const QueryBlock& block : batch->blocks) answers.blocks.push_back(surrogate.Answer(block));
-    if (!rehearsal.Absorb(answers)) break;
-    good_rounds += !rehearsal.all_suspect_;
+    good_rounds += rehearsal.targets_.front().violation.rule >= Rule::kSliver;
+    if (!rehearsal.Absorb(answers)) return;
   }
-  const std::uint32_t wanted = rehearsal.complex_.size() - count;
-  if (wanted <= targets) {
-    ask_ahead_from_ = static_cast<std::uint32_t>(kPatience * count);
-    return false;
-  }
+}
 
+// Adds what a rehearsal wants to the round; targets that it mends need not be asked for.
+template <int K>
+void Refinement<K>::AskAhead() {
+  const std::uint32_t count = complex_.size();
+  Refinement rehearsal(*this);
+  Rehearse(rehearsal);
+  const StarComplex<K>& rehearsed = rehearsal.complex_;
+  const auto wanted = static_cast<Eigen::Index>(rehearsed.size() - count);
   const int d = complex_.d();
-  QueryBlock block;
-  block.want_tangents = spec_.oracle.tangent_basis;
-  block.points.resize(d, wanted);
-  predicted_tangents_.resize(d * K, wanted);
-  predicted_spacing_.resize(wanted);
-  for (std::uint32_t i = 0; i < wanted; ++i) {
-    const std::uint32_t p = count + i;
-    std::copy_n(rehearsal.complex_.Point(p), d, block.points.col(i).data());
-    std::copy_n(rehearsal.complex_.Tangent(p), d * K, predicted_tangents_.col(i).data());
+  ahead_.points.resize(d, wanted);
+  ahead_.tangents.resize(d * K, wanted);
+  ahead_.spacing.resize(wanted);
+  ahead_.rules = std::move(rehearsal.inserted_rules_);
+  for (Eigen::Index i = 0; i < wanted; ++i) {
+    const std::uint32_t p = count + static_cast<std::uint32_t>(i);
+    std::copy_n(rehearsed.Point(p), d, ahead_.points.col(i).data());
+    std::copy_n(rehearsed.Tangent(p), d * K, ahead_.tangents.col(i).data());
     double nearest2 = INFINITY;
-    for (const auto& facet : rehearsal.complex_.cell(p).facets())
-      nearest2 = std::min(nearest2, 2 * facet.offset);
-    predicted_spacing_[i] = std::sqrt(nearest2);
+    for (const auto& facet : rehearsed.cell(p).facets())
+      if (!IsFake(facet.id)) nearest2 = std::min(nearest2, 2 * facet.offset);
+    ahead_.spacing[i] = std::isinf(nearest2) ? criteria_.epsilon : std::sqrt(nearest2);
   }
-  purpose_ = Purpose::kAhead;
-  AskAgain(block, Stage::kPoints);
-  return true;
+  std::vector<double> centre(static_cast<std::size_t>(d));
+  std::erase_if(targets_, [&](const Target<K>& t) {
+    complex_.Lift(t.star, t.x, centre.data());
+    bool mended = false;
+    rehearsed.ForEachWithin(centre.data(), kMended * t.radius,
+                            [&](std::uint32_t p) { mended = mended || p >= count; });
+    return mended;
+  });
 }
 
 template <int K>
 void Refinement<K>::InsertAhead() {
-  for (Eigen::Index c = 0; c < points_.cols(); ++c) {
+  for (Eigen::Index i = 0; i < ahead_.size(); ++i) {
     if (complex_.size() >= spec_.limits.max_vertices) break;
+    const Eigen::Index c = first_candidate_.back() + i;
     if (!found_[static_cast<std::size_t>(c)]) continue;
-    if (complex_.AnyWithin(points_.col(c).data(), kKeptSpacing * predicted_spacing_[c])) {
+    if (complex_.AnyWithin(points_.col(c).data(), kKeptSpacing * ahead_.spacing[i])) {
       ++report_.counts.duplicates;
       continue;
     }
-    complex_.Append(points_.col(c).data(), tangents_.col(c).data());
-    ++report_.counts.inserted_size;
+    Insert(c, ahead_.rules[static_cast<std::size_t>(i)], StarComplex<K>::kNone);
   }
-  predicted_tangents_.resize(0, 0);
+  ahead_failed_ = complex_.size() == delta_.first_vertex;
+  ahead_ = {};
 }
 
-#define STELLATE_INSTANTIATE(K)                                                              \
-  template Refinement<K>::Refinement(const Specification&, const StarComplex<K>&);           \
-  template bool Refinement<K>::AskAhead(std::size_t);                                        \
+#define STELLATE_INSTANTIATE(K)                                \
+  template Refinement<K>::Refinement(const Refinement&);       \
+  template void Refinement<K>::Rehearse(Refinement<K>&) const; \
+  template void Refinement<K>::AskAhead();                     \
   template void Refinement<K>::InsertAhead();
 STELLATE_INSTANTIATE(1)
 STELLATE_INSTANTIATE(2)

@@ -16,9 +16,11 @@ void Refinement<K>::StartCertificate() {
   if (rehearsal_) return Finish(Termination::kConverged);
   StarFacts facts;
   facts.converged = true;
-  for (std::uint32_t p = 0; p < complex_.size(); ++p)
-    facts.max_circumradius =
-        std::max(facts.max_circumradius, std::sqrt(complex_.cell(p).max_norm2()));
+  for (std::uint32_t p = 0; p < complex_.size(); ++p) {
+    const double radius = std::sqrt(complex_.cell(p).max_norm2());
+    facts.max_circumradius = std::max(facts.max_circumradius, radius);
+    if (criteria_.graded()) facts.max_size_ratio = std::max(facts.max_size_ratio, radius / LocalSize(p));
+  }
   certified_tangents_ = complex_.TangentMatrix();
   certified_simplices_ = complex_.Simplices();
   const MeshView view{K,
@@ -47,6 +49,7 @@ void Refinement<K>::Finish(Termination termination) {
   if (over_) return;
   over_ = true;
   batch_.reset();
+  parts_.reset();
   if (rehearsal_) return;
   report_.termination = termination;
   report_.counts.vertices = complex_.size();

@@ -16,6 +16,15 @@ constexpr int kGiveUp = 8;
 constexpr double kMostGrowth = 4;
 constexpr std::uint64_t kLeastGrowth = 2000;
 
+// A rehearsal that begins from many seeds needs no front: this share of the vertices to come, as
+// far as the box tells, within limits.
+constexpr double kSeedShare = 0.05;
+constexpr double kLeastAheadSeeds[kMaxDimension + 1] = {0, 100, 300, 300, 1000, 1000};
+constexpr double kMostAheadSeeds[kMaxDimension + 1] = {0, 100, 1000, 1000, 3000, 3000};
+
+// Graded sizes are spread over all stars anew whenever the sample has grown so much.
+constexpr double kSizesGrowth = 1.25;
+
 // A point of the unit ball of R^K, uniform.
 template <int K>
 void UniformInBall(Random& random, double* x) {
@@ -28,6 +37,13 @@ void UniformInBall(Random& random, double* x) {
   for (int a = 0; a < K; ++a) x[a] *= scale;
 }
 
+int SeedsToAskAheadFrom(const Specification& spec) {
+  const double width = (spec.bounding_box->upper - spec.bounding_box->lower).norm();
+  const double vertices = std::pow(width / spec.epsilon, spec.dimension);
+  return static_cast<int>(std::clamp(kSeedShare * vertices, kLeastAheadSeeds[spec.dimension],
+                                     kMostAheadSeeds[spec.dimension]));
+}
+
 }  // namespace
 
 template <int K>
@@ -38,8 +54,10 @@ void Refinement<K>::AskForSeeds() {
   if (spec_.seeds.cols() > 0) {
     block.points = spec_.seeds;
   } else {
-    const int count = spec_.box_seeds > 0 ? spec_.box_seeds : kDefaultBoxSeeds;
     const BoundingBox& box = *spec_.bounding_box;
+    const int count = spec_.box_seeds > 0      ? spec_.box_seeds
+                      : criteria_.ask_ahead ? SeedsToAskAheadFrom(spec_)
+                                               : kDefaultBoxSeeds;
     block.points.resize(spec_.ambient_dimension, count);
     Random random(spec_.random_seed);
     for (Eigen::Index i = 0; i < count; ++i)
@@ -72,7 +90,7 @@ Target<K> Refinement<K>::Aim(std::uint32_t star, const Violation<K>& violation) 
   double scale = 1;
   if (violation.rule < Rule::kSliver) {
     scale = std::min(1.0, criteria_.advance_step / violation.radius);
-    if (IsCoarse(violation)) scale = std::ldexp(scale, -discouraged_[star]);
+    if (IsCoarse(star, violation)) scale = std::ldexp(scale, -discouraged_[star]);
   }
   for (int a = 0; a < K; ++a) target.x[a] = violation.x[a] * scale;
   target.radius = violation.radius * scale;
@@ -128,7 +146,11 @@ void Refinement<K>::Plan() {
     if (static_cast<double>(complex_.size()) > most) return Finish(Termination::kNoProgress);
   }
   std::vector<Target<K>> targets = SizeAndShapeTargets();
-  if (criteria_.ask_ahead && AskAhead(targets.size())) return;
+  if (criteria_.graded() && ((targets.empty() && !sizes_judged_) ||
+                             complex_.size() > kSizesGrowth * sizes_judged_at_)) {
+    JudgeAllSizes();
+    targets = SizeAndShapeTargets();
+  }
   if (targets.empty()) targets = SliverAndConsistencyTargets();
   if (targets.empty()) {
     if (!active_.empty() || !blemished_.empty()) return Finish(Termination::kNoProgress);
@@ -136,6 +158,7 @@ void Refinement<K>::Plan() {
   }
   targets_ = SelectIndependent<K>(complex_, std::move(targets),
                                   spec_.limits.max_vertices - complex_.size());
+  if (criteria_.ask_ahead && !ahead_failed_) AskAhead();
   AskForTargets();
 }
 
@@ -158,17 +181,18 @@ void Refinement<K>::AskForTargets() {
   flats.bases.resize(d * K, flat_count);
   flats.radii.resize(flat_count);
   closest.points.resize(d, count - flat_count);
+  if (rehearsal_) closest.radii.resize(count - flat_count);  // what the surrogate is asked for
   const int closest_block = flat_count > 0 ? 1 : 0;
   Eigen::Index next_flat = 0, next_closest = 0;
   for (std::size_t i = 0; i < targets_.size(); ++i) {
     const Target<K>& t = targets_[i];
     const bool flat = FindsFlats(t);
-    Random random(spec_.random_seed ^ Mix64(t.star), progress_.round);
+    Random random(spec_.random_seed ^ Mix64(t.star), whole_rounds_);
     for (Eigen::Index c = first_candidate_[i]; c < first_candidate_[i + 1]; ++c) {
       double x[K];
       std::copy(t.x, t.x + K, x);
       // The first candidate is the circumcentre itself, unless that already failed.
-      if (c > first_candidate_[i] || (discouraged_[t.star] && !IsCoarse(t.violation))) {
+      if (c > first_candidate_[i] || (discouraged_[t.star] && !IsCoarse(t.star, t.violation))) {
         double step[K];
         UniformInBall<K>(random, step);
         for (int a = 0; a < K; ++a) x[a] += criteria_.picking_radius * t.radius * step[a];
@@ -176,6 +200,7 @@ void Refinement<K>::AskForTargets() {
       complex_.Lift(t.star, x, candidates_.col(c).data());
       if (!flat) {
         places_[static_cast<std::size_t>(c)] = {closest_block, next_closest};
+        if (rehearsal_) closest.radii[next_closest] = t.radius;
         closest.points.col(next_closest++) = candidates_.col(c);
         continue;
       }
@@ -190,9 +215,18 @@ void Refinement<K>::AskForTargets() {
   batch_.emplace();
   if (flat_count > 0) batch_->blocks.push_back(std::move(flats));
   if (count > flat_count) batch_->blocks.push_back(std::move(closest));
+  if (ahead_.size() > 0) {
+    const int block = static_cast<int>(batch_->blocks.size());
+    QueryBlock ahead;
+    ahead.want_tangents = spec_.oracle.tangent_basis;
+    ahead.points = ahead_.points;
+    batch_->blocks.push_back(std::move(ahead));
+    for (Eigen::Index i = 0; i < ahead_.size(); ++i) places_.emplace_back(block, i);
+  }
   stage_ = Stage::kPoints;
   purpose_ = Purpose::kTargets;
-  alternations_left_ = spec_.oracle.intersect_flat ? 0 : criteria_.flat_alternations - 1;
+  const bool alternates = !spec_.oracle.intersect_flat && ahead_.size() == 0;
+  alternations_left_ = alternates ? criteria_.flat_alternations - 1 : 0;
 }
 
 // In a rehearsal at once: what the surrogate refuses is left for true points, since shorter steps

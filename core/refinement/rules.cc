@@ -163,6 +163,7 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& comp
                                                       std::uint32_t p, double sliver_bound) {
   using Vertex = typename StarComplex<K>::Vertex;
   const auto& cell = complex.cell(p);
+  if (!cell.bounded()) return std::nullopt;  // R1 gave up there: nothing to judge yet
   const Vertex* worst = nullptr;
   if (sliver_bound > 0) {
     // In the star of its lowest vertex: if it is not there, it is inconsistent besides.

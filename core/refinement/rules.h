@@ -28,7 +28,7 @@ template <int K>
 std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std::uint32_t p,
                                              double epsilon, double radius_edge_bound);
 
-// R3 and R4, which need the neighbours' stars: first the worst simplex, by R_p, that is or contains
+// R3 and R4, which need the neighbours' stars, and star(p) closed: first the worst simplex, by R_p, that is or contains
 // a sliver and whose lowest vertex p is, then the worst one that is inconsistent, or, where stars are judged at common centres,
 // that lies on the same side as a neighbour of the facet they share in T_pM: such a star is no
 // embedded disk although all its vertices agree on it.

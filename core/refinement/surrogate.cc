@@ -1,6 +1,6 @@
 #include "core/refinement/surrogate.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,126 +10,245 @@
 namespace stellate::core {
 namespace {
 
-// Quadrics are trusted as far as two of them agree, as a share of the distance to their points.
-constexpr double kDisagreement = 0.3;
+// A guess is taken when its uncertainty is below this share of the sample's spacing: then its slope
+// is about right, and a smooth error of the height moves closest points all alike;
+constexpr double kSure = 0.1;
+// or below this share of the spacing that the point is for.
+constexpr double kSureForSpacing = 0.25;
+// Where points shift by a few hundredths of epsilon, many simplices that were to be just smaller
+// than epsilon are just larger, and each costs a vertex. So what is not known this well, as a
+// share of the spacing, is planned this much coarser at first, unless the sample is so fine, in
+// epsilon, that the guesses will not become better.
+constexpr double kExact = 0.02;
+constexpr double kMargin = 1.15;
+constexpr double kFine = 1.6;
 // Neighbours whose tangent space is turned further than this are around a corner: |T_p^t T_q| is
 // the cosine.
 constexpr double kLeastCosine = 0.5;
-// Keeps the fit determined where neighbours are few; the terms are of order one after scaling.
-constexpr double kRidge = 1e-3;
-constexpr int kBlended = 3;
-// A quadric that misses its own neighbours by this share of their distance is none of M: the sample
-// is too coarse there.
-constexpr double kMostResidual = 0.1;
-
-// u_a u_b for a <= b; the diagonal halved, so that II(u, u) / 2 is the sum of term times form.
-template <int K>
-void Terms(const double* u, double* terms) {
-  for (int a = 0, t = 0; a < K; ++a)
-    for (int b = a; b < K; ++b) terms[t++] = (a == b ? 0.5 : 1.0) * u[a] * u[b];
-}
+// Keep the fit determined where neighbours are few; the terms are of order one after scaling.
+constexpr double kQuadraticRidge = 1e-6;
+constexpr double kCubicRidge = 1e-4;
+// What a fit is trusted at best, as a share of the neighbours' distance; and where there are hardly
+// more equations than coefficients.
+constexpr double kLeastDoubt = 0.003;
+constexpr double kScantDoubt = 0.03;
 
 }  // namespace
 
+// u_a u_b for a <= b, then u_a u_b u_c for a <= b <= c.
 template <int K>
-Surrogate<K>::Surrogate(const StarComplex<K>& complex)
-    : complex_(complex),
-      form_size_(static_cast<std::size_t>(kTerms) * static_cast<std::size_t>(complex.d())),
-      forms_(complex.size() * form_size_),
-      fitted_(complex.size()) {
-  ParallelFor(complex.size(), [this](std::uint32_t p) { Fit(p); });
+void Surrogate<K>::Terms(const double* v, double* terms) {
+  int t = 0;
+  for (int a = 0; a < K; ++a)
+    for (int b = a; b < K; ++b) terms[t++] = v[a] * v[b];
+  for (int a = 0; a < K; ++a)
+    for (int b = a; b < K; ++b)
+      for (int c = b; c < K; ++c) terms[t++] = v[a] * v[b] * v[c];
+}
+
+// slopes[a]: the derivatives of the terms along axis a.
+template <int K>
+void Surrogate<K>::Slopes(const double* v, double (*slopes)[kTerms]) {
+  for (int s = 0; s < K; ++s) {
+    int t = 0;
+    for (int a = 0; a < K; ++a)
+      for (int b = a; b < K; ++b) slopes[s][t++] = (a == s ? v[b] : 0) + (b == s ? v[a] : 0);
+    for (int a = 0; a < K; ++a)
+      for (int b = a; b < K; ++b)
+        for (int c = b; c < K; ++c)
+          slopes[s][t++] =
+              (a == s ? v[b] * v[c] : 0) + (b == s ? v[a] * v[c] : 0) + (c == s ? v[a] * v[b] : 0);
+  }
 }
 
 template <int K>
-void Surrogate<K>::Fit(std::uint32_t p) {
+Surrogate<K>::Surrogate(const StarComplex<K>& complex, double step, double epsilon)
+    : complex_(complex),
+      step_(step),
+      epsilon_(epsilon),
+      form_size_(static_cast<std::size_t>(kTerms) * static_cast<std::size_t>(complex.d())),
+      slot_(complex.size(), kNone) {}
+
+template <int K>
+void Surrogate<K>::Fit(std::uint32_t p, std::uint32_t slot) {
+  using Frame = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, K>>;
   const auto& cell = complex_.cell(p);
   const int d = complex_.d();
-  if (!cell.bounded()) return;
-  Eigen::Matrix<double, kTerms, kTerms> normal = Eigen::Matrix<double, kTerms, kTerms>::Zero();
-  Eigen::Matrix<double, kTerms, Eigen::Dynamic> rhs(kTerms, d);
-  rhs.setZero();
-  const double* tangent = complex_.Tangent(p);
-  Eigen::VectorXd away(d);
-  struct Equation {
-    Eigen::Matrix<double, kTerms, 1> terms;
-    Eigen::VectorXd away;
+  const Frame tangent(complex_.Tangent(p), d, K);
+  struct Neighbour {
+    double u[K];
     double length;
+    Eigen::VectorXd away;                             // q off the tangent plane
+    Eigen::Matrix<double, Eigen::Dynamic, K> slopes;  // d of away / d u
   };
-  std::vector<Equation> equations;
+  std::vector<Neighbour> neighbours;
+  double total = 0;
   for (const auto& facet : cell.facets()) {
-    const double* q = complex_.Point(facet.id);
-    double turned = 0;
-    for (int a = 0; a < K; ++a)
-      for (int b = 0; b < K; ++b) {
-        const double c = Dot(tangent + a * d, complex_.Tangent(facet.id) + b * d, d);
-        turned += c * c;
-      }
-    if (turned < K - 1 + kLeastCosine * kLeastCosine) continue;
+    if (IsFake(facet.id)) continue;
+    const Frame other(complex_.Tangent(facet.id), d, K);
+    const Eigen::Matrix<double, K, K> turn = tangent.transpose() * other;
+    if (turn.squaredNorm() < K - 1 + kLeastCosine * kLeastCosine) continue;
+    Neighbour n;
     double length2 = 0;
-    for (int a = 0; a < K; ++a) length2 += facet.normal[a] * facet.normal[a];
-    if (!(length2 > 0)) continue;
-    for (int j = 0; j < d; ++j) {
-      away[j] = q[j] - complex_.Point(p)[j];
-      for (int a = 0; a < K; ++a) away[j] -= facet.normal[a] * tangent[a * d + j];
+    for (int a = 0; a < K; ++a) {
+      n.u[a] = facet.normal[a];
+      length2 += n.u[a] * n.u[a];
     }
-    // Divided by |u|^2 the equations are all of the curvature's size.
-    Eigen::Matrix<double, kTerms, 1> terms;
-    Terms<K>(facet.normal, terms.data());
-    terms /= length2;
-    away /= length2;
-    normal += terms * terms.transpose();
-    rhs += terms * away.transpose();
-    equations.push_back({terms, away, std::sqrt(length2)});
+    const double* q = complex_.Point(facet.id);
+    const double* at = complex_.Point(p);
+    n.away.resize(d);
+    for (int j = 0; j < d; ++j) n.away[j] = q[j] - at[j];
+    n.away -= tangent * Eigen::Map<const Eigen::Matrix<double, K, 1>>(n.u);
+    if (!(length2 > n.away.squaredNorm())) continue;
+    n.length = std::sqrt(length2);
+    n.slopes = (other - tangent * turn) * turn.inverse();
+    total += n.length;
+    neighbours.push_back(std::move(n));
   }
-  if (equations.size() < kTerms) return;
-  normal.diagonal().array() += kRidge;
-  const Eigen::Matrix<double, kTerms, Eigen::Dynamic> forms = normal.ldlt().solve(rhs);
+  Graph& graph = graphs_[slot];
+  graph = {};
+  double* out = forms_.data() + slot * form_size_;
+  std::fill(out, out + form_size_, 0.0);
+  if (neighbours.size() <= K) return;
+  const double scale = total / static_cast<double>(neighbours.size());
+
+  // Sizes known at run time only: unrolled for k = 5 this would be a megabyte of code.
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(kTerms, kTerms);
+  Eigen::MatrixXd rhs = Eigen::MatrixXd::Zero(kTerms, d);
+  Eigen::VectorXd terms(kTerms);
+  double slopes[K][kTerms];
+  for (const Neighbour& n : neighbours) {
+    double v[K];
+    for (int a = 0; a < K; ++a) v[a] = n.u[a] / scale;
+    // Divided by |u|^2 places, and by |u| slopes, are all of the curvature's size.
+    const double weight = scale / n.length;
+    Terms(v, terms.data());
+    terms *= weight * weight;
+    normal.selfadjointView<Eigen::Lower>().rankUpdate(terms);
+    rhs.noalias() += terms * ((weight * weight) * n.away.transpose());
+    Slopes(v, slopes);
+    for (int a = 0; a < K; ++a) {
+      terms = Eigen::Map<const Eigen::VectorXd>(slopes[a], kTerms) * weight;
+      normal.selfadjointView<Eigen::Lower>().rankUpdate(terms);
+      rhs.noalias() += terms * ((weight * scale) * n.slopes.col(a).transpose());
+    }
+  }
+  for (int t = 0; t < kTerms; ++t) normal(t, t) += t < kQuadratic ? kQuadraticRidge : kCubicRidge;
+  const Eigen::MatrixXd forms = normal.ldlt().solve(rhs);
+  graph.scale = scale;
+  const bool scant = static_cast<double>(neighbours.size() * (K + 1)) < 1.5 * kTerms;
+  graph.error = (scant ? kScantDoubt : kLeastDoubt) * scale;
+  for (const Neighbour& n : neighbours) {
+    double v[K];
+    for (int a = 0; a < K; ++a) v[a] = n.u[a] / scale;
+    Terms(v, terms.data());
+    graph.error = std::max(graph.error, (forms.transpose() * terms - n.away).norm());
+  }
   for (int t = 0; t < kTerms; ++t)
-    for (int j = 0; j < d; ++j) forms_[p * form_size_ + static_cast<std::size_t>(t * d + j)] = forms(t, j);
-  for (const Equation& e : equations)
-    if ((forms.transpose() * e.terms - e.away).norm() * e.length > kMostResidual) return;
-  fitted_[p] = 1;
+    for (int j = 0; j < d; ++j) out[t * d + j] = forms(t, j);
+}
+
+// By how much a graph may be wrong at |u| = length.
+template <int K>
+double Surrogate<K>::Doubt(const Graph& graph, double length) const {
+  if (graph.scale == 0) return length * length / (2 * step_);
+  const double beyond = std::max(1.0, length / graph.scale);
+  return graph.error * beyond * beyond * beyond * beyond;
 }
 
 template <int K>
-bool Surrogate<K>::Predict(const double* x, double* point, double* tangent) const {
-  const int d = complex_.d();
-  std::array<std::pair<double, std::uint32_t>, kBlended> nearest;
-  const int found = complex_.Nearest(x, kBlended, nearest.data());
-  if (found == 0) return false;
-  std::fill(point, point + d, 0.0);
-  std::fill(tangent, tangent + K * d, 0.0);
-  thread_local std::vector<double> guesses;
-  guesses.resize(static_cast<std::size_t>(found * d));
-  double total = 0;
-  for (int i = 0; i < found; ++i) {
-    const std::uint32_t p = nearest[static_cast<std::size_t>(i)].second;
-    if (!fitted_[p]) return false;
-    double u[K], terms[kTerms];
-    complex_.Project(p, x, u);
-    Terms<K>(u, terms);
-    double* guess = guesses.data() + i * d;
-    complex_.Lift(p, u, guess);
-    for (int t = 0; t < kTerms; ++t)
-      for (int j = 0; j < d; ++j) guess[j] += terms[t] * Form(p)[t * d + j];
-    const double weight =
-        1 / (nearest[static_cast<std::size_t>(i)].first + std::numeric_limits<double>::min());
-    total += weight;
-    for (int j = 0; j < d; ++j) point[j] += weight * guess[j];
-    if (i > 0) continue;
-    // Tangents from the nearest quadric: T_a + sum_b II(e_a, e_b) u_b.
-    std::copy_n(complex_.Tangent(p), K * d, tangent);
-    for (int a = 0, t = 0; a < K; ++a)
-      for (int b = a; b < K; ++b, ++t)
-        for (int j = 0; j < d; ++j) {
-          tangent[a * d + j] += Form(p)[t * d + j] * u[b];
-          if (a != b) tangent[b * d + j] += Form(p)[t * d + j] * u[a];
-        }
+typename Surrogate<K>::Near Surrogate<K>::FindNear(const double* x) const {
+  Near near;
+  near.count = complex_.Nearest(x, kBlended + 1, near.points.data());
+  if (near.count == kBlended + 1) {
+    near.radius2 = near.points[kBlended].first;
+    --near.count;
+  } else if (near.count > 0) {
+    near.radius2 = 2 * near.points[static_cast<std::size_t>(near.count) - 1].first;
   }
+  return near;
+}
+
+template <int K>
+void Surrogate<K>::Prepare(const std::vector<Near>& near) {
+  std::vector<std::uint32_t> unknown;
+  for (const Near& n : near)
+    for (int i = 0; i < n.count; ++i) {
+      const std::uint32_t p = n.points[static_cast<std::size_t>(i)].second;
+      if (slot_[p] != kNone) continue;
+      slot_[p] = static_cast<std::uint32_t>(graphs_.size() + unknown.size());
+      unknown.push_back(p);
+    }
+  const std::size_t first = graphs_.size();
+  graphs_.resize(first + unknown.size());
+  forms_.resize(graphs_.size() * form_size_);
+  ParallelFor(unknown.size(),
+              [&](std::size_t i) { Fit(unknown[i], static_cast<std::uint32_t>(first + i)); });
+}
+
+template <int K>
+bool Surrogate<K>::Blend(const Near& near, const double* x, double* point, double* tangent,
+                         Guess* guess) const {
+  const int d = complex_.d();
+  thread_local std::vector<double> guesses;
+  guesses.resize(static_cast<std::size_t>(kBlended * d));
+  double weights[kBlended];
+  double total = 0, doubt = 0, spacing = 0;
+  std::fill(point, point + d, 0.0);
+  int nearest = -1;
+  for (int i = 0; i < near.count; ++i) {
+    const std::uint32_t p = near.points[static_cast<std::size_t>(i)].second;
+    double u[K], v[K], terms[kTerms];
+    const double distance2 = complex_.Project(p, x, u);
+    double along2 = 0;
+    for (int a = 0; a < K; ++a) along2 += u[a] * u[a];
+    const double off2 = std::max(distance2 - along2, 0.0);
+    weights[i] = 0;
+    // Another sheet's points are across.
+    if (distance2 >= near.radius2 || off2 >= along2) continue;
+    const double far = 1 - distance2 / near.radius2;
+    const double across = 1 - off2 / along2;
+    const double weight = far * far * far * across * across;
+    const Graph& graph = graphs_[slot_[p]];
+    double* y = guesses.data() + i * d;
+    complex_.Lift(p, u, y);
+    if (graph.scale > 0) {
+      for (int a = 0; a < K; ++a) v[a] = u[a] / graph.scale;
+      Terms(v, terms);
+      const double* form = forms_.data() + slot_[p] * form_size_;
+      for (int t = 0; t < kTerms; ++t)
+        for (int j = 0; j < d; ++j) y[j] += terms[t] * form[t * d + j];
+    }
+    weights[i] = weight;
+    total += weight;
+    doubt += weight * Doubt(graph, std::sqrt(along2));
+    spacing += weight * (graph.scale > 0 ? graph.scale : step_);
+    for (int j = 0; j < d; ++j) point[j] += weight * y[j];
+    if (nearest < 0) nearest = i;
+  }
+  if (!(total > 0)) return false;
   for (int j = 0; j < d; ++j) point[j] /= total;
-  for (int i = 0; i < found; ++i) {
-    const double from = std::sqrt(nearest[static_cast<std::size_t>(i)].first);
-    if (Distance(point, guesses.data() + i * d, d) > kDisagreement * from) return false;
+  double spread2 = 0;
+  for (int i = 0; i < near.count; ++i)
+    if (weights[i] > 0) spread2 += weights[i] * SquaredDistance(point, guesses.data() + i * d, d);
+  guess->uncertainty = std::max(std::sqrt(spread2 / total), doubt / total);
+  guess->spacing = spacing / total;
+  if (!tangent) return true;
+
+  // Of the nearest graph: T_a + dN / du_a, made orthonormal.
+  const std::uint32_t p = near.points[static_cast<std::size_t>(nearest)].second;
+  const Graph& graph = graphs_[slot_[p]];
+  std::copy_n(complex_.Tangent(p), K * d, tangent);
+  if (graph.scale > 0) {
+    double u[K], slopes[K][kTerms];
+    complex_.Project(p, x, u);
+    for (int a = 0; a < K; ++a) u[a] /= graph.scale;
+    Slopes(u, slopes);
+    const double* form = forms_.data() + slot_[p] * form_size_;
+    for (int a = 0; a < K; ++a)
+      for (int t = 0; t < kTerms; ++t)
+        for (int j = 0; j < d; ++j)
+          tangent[a * d + j] += slopes[a][t] / graph.scale * form[t * d + j];
   }
   for (int a = 0; a < K; ++a) {  // Gram and Schmidt, twice for rounding
     double* t = tangent + a * d;
@@ -146,17 +265,50 @@ bool Surrogate<K>::Predict(const double* x, double* point, double* tangent) cons
 }
 
 template <int K>
-AnswerBlock Surrogate<K>::Answer(const QueryBlock& block) const {
+bool Surrogate<K>::Predict(const Near& near, const double* x, const double* flat, double spacing,
+                           double* point, double* tangent) const {
   const int d = complex_.d();
+  thread_local std::vector<double> from;
+  from.resize(static_cast<std::size_t>(d));
+  Guess guess;
+  // Off the graphs each sees x elsewhere; near them they can be compared.
+  if (!Blend(near, x, point, nullptr, &guess)) return false;
+  std::copy_n(point, d, from.data());
+  for (int a = 0; flat && a < K; ++a) {  // back to the flat
+    double along = 0;
+    for (int j = 0; j < d; ++j) along += flat[j * K + a] * (point[j] - x[j]);
+    for (int j = 0; j < d; ++j) from[j] -= along * flat[j * K + a];
+  }
+  if (!Blend(near, from.data(), point, tangent, &guess)) return false;
+  if (spacing < kMargin * epsilon_ && guess.uncertainty > kExact * spacing &&
+      guess.spacing > kFine * epsilon_)
+    return false;
+  return guess.uncertainty <= std::max(kSure * guess.spacing, kSureForSpacing * spacing);
+}
+
+template <int K>
+AnswerBlock Surrogate<K>::Answer(const QueryBlock& block) {
+  const int d = complex_.d();
+  const auto count = static_cast<std::size_t>(block.size());
+  std::vector<Near> near(count);
+  ParallelFor(count, [&](std::size_t i) {
+    near[i] = FindNear(block.points.col(static_cast<Eigen::Index>(i)).data());
+  });
+  Prepare(near);
   AnswerBlock answer;
-  answer.points.resize(d, block.size());
+  answer.points.setZero(d, block.size());
   answer.tangents.setZero(d * K, block.size());
-  answer.found.assign(static_cast<std::size_t>(block.size()), 0);
-  ParallelFor(block.size(), [&](Eigen::Index i) {
+  answer.found.assign(count, 0);
+  ParallelFor(count, [&](std::size_t c) {
+    const auto i = static_cast<Eigen::Index>(c);
     thread_local std::vector<double> tangent;
     tangent.resize(static_cast<std::size_t>(K * d));
-    const bool ok = Predict(block.points.col(i).data(), answer.points.col(i).data(), tangent.data());
-    answer.found[static_cast<std::size_t>(i)] = ok;
+    const double spacing = block.radii.size() > 0 ? block.radii[i] : 0;
+    const double* flat =
+        block.kind == QueryKind::kIntersectFlat ? block.bases.col(i).data() : nullptr;
+    const bool ok = Predict(near[c], block.points.col(i).data(), flat, spacing,
+                            answer.points.col(i).data(), tangent.data());
+    answer.found[c] = ok;
     for (int j = 0; ok && j < d; ++j)
       for (int a = 0; a < K; ++a)
         answer.tangents(j * K + a, i) = tangent[static_cast<std::size_t>(a * d + j)];

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "core/batch.h"
@@ -9,35 +10,65 @@
 
 namespace stellate::core {
 
-// What M looks like between the sample points, guessed at no query cost: at each point p a quadric
+// What M looks like between the sample points, guessed at no query cost: at each point p a graph
+// over its tangent space,
 //
-//   y(u) = p + T_p u + II_p(u, u) / 2,   u in R^K,
+//   y(u) = p + T_p u + N_p(u),   u in R^K,   N_p a polynomial of degrees 2 and 3,
 //
-// fitted to its neighbours in the star, and blended between the nearest. Good enough to plan by,
-// never to mesh by: what is planned on it is asked for before it is inserted.
+// fitted to the places and the tangent spaces of p's neighbours in the star. The graphs of the
+// nearest points are blended by weights that vanish before a graph drops out, so the guessed M has
+// no seams: where it is off it is off smoothly, and what is well spaced on it is well spaced on M.
+// Good enough to plan by, never to mesh by: what is planned on it is asked for.
 template <int K>
 class Surrogate {
  public:
-  // Fits the bounded stars of `complex`, which is borrowed and must not change.
-  explicit Surrogate(const StarComplex<K>& complex);
+  // complex  borrowed, must not change
+  // step     how far from a point without neighbours its tangent plane means something, length
+  // epsilon  the spacing that the points are for in the end, length
+  Surrogate(const StarComplex<K>& complex, double step, double epsilon);
 
-  // The point of the guessed M near x and its tangent basis (K rows of d). False where the quadrics
-  // of the nearest points disagree, or where there are none.
-  bool Predict(const double* x, double* point, double* tangent) const;
-
-  // Answers closest-point queries, with tangents; not found where Predict refuses. In parallel.
-  AnswerBlock Answer(const QueryBlock& block) const;
+  // Answers queries of both kinds, with tangents. `block.radii`, for closest points too, holds the
+  // spacing that each point is for: not found where M is not known well enough for that. In
+  // parallel; the same whatever was asked before.
+  AnswerBlock Answer(const QueryBlock& block);
 
  private:
-  static constexpr int kTerms = K * (K + 1) / 2;
+  static constexpr int kQuadratic = K * (K + 1) / 2;
+  static constexpr int kTerms = kQuadratic + K * (K + 1) * (K + 2) / 6;
+  static constexpr int kBlended = 3 * K;
+  static constexpr std::uint32_t kNone = 0xffffffffu;
 
-  void Fit(std::uint32_t p);
-  const double* Form(std::uint32_t p) const { return forms_.data() + p * form_size_; }
+  struct Graph {
+    double scale = 0;  // the neighbours' mean distance: u is divided by it; 0: no neighbours
+    double error = 0;  // by which it misses its neighbours, length
+  };
+  // The nearest points, and how far the next is: weights vanish there.
+  struct Near {
+    std::array<std::pair<double, std::uint32_t>, kBlended + 1> points;
+    int count = 0;
+    double radius2 = 0;
+  };
+  struct Guess {
+    double uncertainty = 0;  // length
+    double spacing = 0;      // of the sample here, length
+  };
+
+  static void Terms(const double* v, double* terms);
+  static void Slopes(const double* v, double (*slopes)[kTerms]);
+  Near FindNear(const double* x) const;
+  void Prepare(const std::vector<Near>& near);
+  void Fit(std::uint32_t p, std::uint32_t slot);
+  double Doubt(const Graph& graph, double length) const;
+  bool Blend(const Near& near, const double* x, double* point, double* tangent, Guess* guess) const;
+  bool Predict(const Near& near, const double* x, const double* flat, double spacing, double* point,
+               double* tangent) const;
 
   const StarComplex<K>& complex_;
+  double step_, epsilon_;
   std::size_t form_size_;
-  std::vector<double> forms_;         // by point: II(e_a, e_b), a <= b, d each
-  std::vector<std::uint8_t> fitted_;  // by point
+  std::vector<std::uint32_t> slot_;  // by point; kNone: not fitted yet
+  std::vector<Graph> graphs_;        // by slot
+  std::vector<double> forms_;        // by slot: kTerms coefficients, d each
 };
 
 extern template class Surrogate<1>;

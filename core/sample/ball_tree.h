@@ -22,6 +22,11 @@ class BallTree {
   // `coordinates` holds the points, d each, by id; borrowed, may grow and move between calls.
   BallTree(int d, const std::vector<double>* coordinates) : d_(d), coordinates_(coordinates) {}
 
+  // A copy that searches a copy of the points.
+  BallTree(const BallTree& other, const std::vector<double>* coordinates) : BallTree(other) {
+    coordinates_ = coordinates;
+  }
+
   std::size_t size() const { return influence_.size(); }
 
   // Adds the point with the next id, size().

@@ -96,6 +96,8 @@ Status ReadCriteria(const v1::MeshSpec& spec, core::Specification* out) {
     to.candidates = candidates;
   }
   to.ask_ahead = c.ask_ahead();
+  if (c.has_size_rate()) to.size_rate = c.size_rate();
+  if (c.has_max_deviation()) to.max_deviation = c.max_deviation();
   if (c.has_common_centre()) {
     to.judging = c.common_centre() ? core::Judging::kCommonCentre : core::Judging::kFlats;
   }
@@ -134,6 +136,7 @@ Refused ReadLimits(const v1::MeshSpec& spec, const Config& config, MeshRequest* 
                             " dimensions: ask for fewer, or raise --max-vertices or "
                             "--max-coordinates"));
   }
+  to.max_batch_queries = limits.max_batch_queries();
   to.max_rounds = limits.max_rounds() == 0 ? config.max_rounds : limits.max_rounds();
   if (to.max_rounds > config.max_rounds) {
     return TooLarge("max-rounds", config.max_rounds,
@@ -192,11 +195,14 @@ void ToProto(const core::Specification& spec, v1::MeshSpec* out) {
   if (spec.criteria.advance_step) criteria->set_advance_step(*spec.criteria.advance_step);
   criteria->set_flat_alternations(spec.criteria.flat_alternations);
   criteria->set_ask_ahead(spec.criteria.ask_ahead);
+  if (spec.criteria.size_rate) criteria->set_size_rate(*spec.criteria.size_rate);
+  if (spec.criteria.max_deviation) criteria->set_max_deviation(*spec.criteria.max_deviation);
   if (spec.criteria.judging) {
     criteria->set_common_centre(*spec.criteria.judging == core::Judging::kCommonCentre);
   }
   out->mutable_limits()->set_max_vertices(spec.limits.max_vertices);
   out->mutable_limits()->set_max_rounds(spec.limits.max_rounds);
+  out->mutable_limits()->set_max_batch_queries(spec.limits.max_batch_queries);
   out->set_random_seed(spec.random_seed);
   out->set_box_seeds(spec.box_seeds);
 }

@@ -58,6 +58,9 @@ TEST(ConvertSpec, RoundTrip) {
   spec.mutable_criteria()->set_sliver_bound(0.1);
   spec.mutable_criteria()->set_candidates(5);
   spec.mutable_criteria()->set_advance_step(1.5);
+  spec.mutable_criteria()->set_size_rate(0.3);
+  spec.mutable_criteria()->set_max_deviation(0.01);
+  spec.mutable_limits()->set_max_batch_queries(4000);
   spec.set_random_seed(42);
   spec.set_label("a sphere");
   spec.mutable_limits()->set_max_vertices(5000);
@@ -75,6 +78,7 @@ TEST(ConvertSpec, RoundTrip) {
   EXPECT_EQ(back.criteria().SerializeAsString(), spec.criteria().SerializeAsString());
   EXPECT_EQ(back.bounding_box().SerializeAsString(), spec.bounding_box().SerializeAsString());
   EXPECT_EQ(back.limits().max_vertices(), 5000u);
+  EXPECT_EQ(back.limits().max_batch_queries(), 4000u);
 }
 
 TEST(ConvertSpec, SeedsBecomeColumns) {

@@ -76,6 +76,8 @@ SessionOptions Options(std::shared_ptr<SessionJournal> journal, double epsilon =
   options.spec.seeds = Eigen::Vector3d::UnitX();
   options.spec.criteria.advance_step = 0.9;
   options.spec.criteria.judging = core::Judging::kCommonCentre;
+  options.spec.criteria.size_rate = 0.4;
+  options.spec.limits.max_batch_queries = 5000;
   options.dispatch.worker_wait = std::chrono::seconds(77);
   options.journal = std::move(journal);
   return options;

@@ -120,10 +120,13 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   if (options.advance_step) criteria.set_advance_step(*options.advance_step);
   if (options.flat_alternations) criteria.set_flat_alternations(*options.flat_alternations);
   if (options.ask_ahead) criteria.set_ask_ahead(*options.ask_ahead);
+  if (options.size_rate) criteria.set_size_rate(*options.size_rate);
+  if (options.max_deviation) criteria.set_max_deviation(*options.max_deviation);
   if (options.common_centre) criteria.set_common_centre(*options.common_centre);
   v1::MeshLimits& limits = *spec.mutable_limits();
   if (options.max_vertices) limits.set_max_vertices(*options.max_vertices);
   if (options.max_rounds) limits.set_max_rounds(*options.max_rounds);
+  if (options.max_batch_queries) limits.set_max_batch_queries(*options.max_batch_queries);
   if (options.worker_wait_seconds) limits.set_worker_wait_seconds(*options.worker_wait_seconds);
   if (options.answer_seconds) limits.set_answer_seconds(*options.answer_seconds);
   if (options.box_seeds) spec.set_box_seeds(*options.box_seeds);

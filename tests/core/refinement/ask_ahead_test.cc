@@ -1,10 +1,14 @@
-// Asking ahead: fewer round trips, the same guarantee, about the same size.
+// Asking ahead: a handful of round trips, the same guarantee, size and shape.
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
 #include <string>
+#include <vector>
 
 #include "core/refinement/surrogate.h"
+#include "core/sample/random.h"
 #include "tests/core/support/in_process_run.h"
 
 namespace stellate::core {
@@ -36,7 +40,7 @@ class AskAhead : public ::testing::TestWithParam<Case> {
   }
 };
 
-TEST_P(AskAhead, TakesFewerRoundsForAsGoodAMesh) {
+TEST_P(AskAhead, TakesFarFewerRoundsForAsGoodAMesh) {
   const auto manifold = Make(GetParam().manifold);
   Specification plain_spec = Spec(*manifold);
   plain_spec.criteria.ask_ahead = false;
@@ -44,9 +48,16 @@ TEST_P(AskAhead, TakesFewerRoundsForAsGoodAMesh) {
   const DrivenRun ahead = Drive(Spec(*manifold), *manifold);
   ExpectGoodMesh(ahead, manifold->facts());
   EXPECT_LT(manifold->Distance(ahead.mesher->Points()).maxCoeff(), 1e-9);
-  EXPECT_LT(ahead.report().counts.rounds, plain.report().counts.rounds);
-  EXPECT_LT(static_cast<double>(ahead.report().counts.vertices),
-            1.15 * static_cast<double>(plain.report().counts.vertices));
+  const Counts& a = ahead.report().counts;
+  const Counts& p = plain.report().counts;
+  EXPECT_LT(2 * a.rounds, p.rounds);
+  EXPECT_LT(static_cast<double>(a.vertices), 1.07 * static_cast<double>(p.vertices));
+  // The worst simplex of one run is chance: `tests/bench/run rounds` compares over seeds.
+  EXPECT_GT(ahead.report().certificate.min_fatness, 0.6 * plain.report().certificate.min_fatness);
+  if (manifold->dimension() == 2) {
+    EXPECT_GT(ahead.report().certificate.min_angle_degrees,
+              plain.report().certificate.min_angle_degrees - 5);
+  }
 }
 
 TEST_P(AskAhead, IsDeterministicForAnyNumberOfThreads) {
@@ -62,10 +73,88 @@ TEST_P(AskAhead, IsDeterministicForAnyNumberOfThreads) {
 
 INSTANTIATE_TEST_SUITE_P(Catalogue, AskAhead,
                          ::testing::Values(Case{"torus", 0.08}, Case{"sphere:2:10", 0.08},
-                                           Case{"torus", 0.1, false}, Case{"rp2", 0.12}));
+                                           Case{"torus", 0.1, false}, Case{"rp2", 0.12},
+                                           Case{"two-spheres", 0.15}, Case{"so3", 0.5}));
 
-// On a sample of spacing h the quadrics are right to third order in h.
-TEST(Surrogate, ConvergesToThirdOrder) {
+// What an oracle gets wrong costs rounds, never the guarantee.
+
+Specification AheadOnTorus(Manifold& torus, double epsilon) {
+  Specification spec = SpecificationFor(torus, epsilon);
+  spec.criteria.ask_ahead = true;
+  spec.oracle.intersect_flat = false;  // what is tampered with below must not leave its flat
+  return spec;
+}
+
+// A number in [0, 1) that depends on a point alone.
+double Hash(const Eigen::VectorXd& x) {
+  std::uint64_t h = 0;
+  for (Eigen::Index i = 0; i < x.size(); ++i) h = Mix64(h ^ std::bit_cast<std::uint64_t>(x[i]));
+  return static_cast<double>(h >> 11) * 0x1p-53;
+}
+
+TEST(AskAheadFaults, AnswersThatAreMissingHereAndThereAreDoneWithout) {
+  const auto torus = Make("torus");
+  const auto mesher = testing::NewMesher(AheadOnTorus(*torus, 0.1));
+  while (const QueryBatch* batch = mesher->NextBatch()) {
+    Answers answers = testing::AnswersOf(*torus, *batch);
+    for (std::size_t b = 0; b < batch->blocks.size(); ++b) {
+      if (mesher->progress().phase == Phase::kCertifying) continue;
+      std::vector<std::uint8_t>& found = answers.blocks[b].found;
+      found.assign(static_cast<std::size_t>(batch->blocks[b].size()), 1);
+      for (Eigen::Index i = 0; i < batch->blocks[b].size(); ++i)
+        found[static_cast<std::size_t>(i)] = Hash(batch->blocks[b].points.col(i)) > 0.2;
+    }
+    ASSERT_TRUE(mesher->Absorb(answers));
+  }
+  EXPECT_EQ(mesher->report().termination, Termination::kConverged);
+  EXPECT_TRUE(mesher->report().certificate.certified) << mesher->report().certificate.verdict;
+}
+
+TEST(AskAheadFaults, APlaceThatIsNeverFoundEndsTheRun) {
+  const auto torus = Make("torus");
+  Specification spec = AheadOnTorus(*torus, 0.3);
+  spec.limits.max_rounds = 5000;
+  const DrivenRun run = Drive(spec, [&](const QueryBatch& batch) {
+    Answers answers = testing::AnswersOf(*torus, batch);
+    for (AnswerBlock& block : answers.blocks) {
+      block.found.assign(static_cast<std::size_t>(block.points.cols()), 1);
+      for (Eigen::Index i = 0; i < block.points.cols(); ++i)
+        block.found[static_cast<std::size_t>(i)] = block.points(0, i) < 1.1;
+    }
+    return answers;
+  });
+  EXPECT_EQ(run.report().termination, Termination::kNoProgress);
+  EXPECT_FALSE(run.report().certificate.certified);
+}
+
+TEST(AskAheadFaults, NoiseAtItsToleranceIsMeshed) {
+  const auto torus = Make("torus");
+  const double epsilon = 0.1;
+  const DrivenRun run = Drive(AheadOnTorus(*torus, epsilon), [&](const QueryBatch& batch) {
+    Answers answers = testing::AnswersOf(*torus, batch);
+    for (AnswerBlock& block : answers.blocks)
+      for (Eigen::Index i = 0; i < block.points.cols(); ++i) {
+        const Eigen::VectorXd y = block.points.col(i);
+        const Eigen::Vector3d normal = Eigen::Vector3d(y).normalized();
+        block.points.col(i) += 3e-4 * epsilon * (Hash(y) - 0.5) * normal;
+      }
+    return answers;
+  });
+  EXPECT_EQ(run.report().termination, Termination::kConverged);
+  EXPECT_TRUE(run.report().certificate.certified) << run.report().certificate.verdict;
+}
+
+TEST(AskAheadFaults, ABudgetOfVerticesIsKept) {
+  const auto torus = Make("torus");
+  Specification spec = AheadOnTorus(*torus, 0.05);
+  spec.limits.max_vertices = 1000;
+  const DrivenRun run = Drive(spec, *torus);
+  EXPECT_EQ(run.report().termination, Termination::kVertexBudget);
+  EXPECT_EQ(run.report().counts.vertices, 1000u);
+}
+
+// On a sample of spacing h the graphs are right to fourth order in h.
+TEST(Surrogate, ConvergesToFourthOrder) {
   const auto torus = Make("torus");
   double errors[2];
   for (const int level : {0, 1}) {
@@ -81,7 +170,7 @@ TEST(Surrogate, ConvergesToThirdOrder) {
       complex.Append(points.col(i).data(), rows);
     }
     complex.Commit();
-    const Surrogate<2> surrogate(complex);
+    Surrogate<2> surrogate(complex, h, h);
     QueryBlock block;
     block.points = 0.5 * (points.leftCols(points.cols() - 1) + points.rightCols(points.cols() - 1));
     const Eigen::MatrixXd near = torus->ClosestPoint(block.points).points;
@@ -97,12 +186,11 @@ TEST(Surrogate, ConvergesToThirdOrder) {
     for (Eigen::Index i = 0; i < answer.points.cols(); ++i) {
       if (!answer.found[static_cast<std::size_t>(i)]) continue;
       ++answered;
-      errors[level] =
-          std::max(errors[level], torus->Distance(answer.points.col(i)).maxCoeff());
+      errors[level] = std::max(errors[level], torus->Distance(answer.points.col(i)).maxCoeff());
     }
     EXPECT_GT(answered, local.size() / 2);
   }
-  EXPECT_LT(errors[1], errors[0] / 4);  // 8 in theory; the largest error is a noisy measure
+  EXPECT_LT(errors[1], errors[0] / 8);  // 16 in theory; the largest error is a noisy measure
 }
 
 }  // namespace

@@ -54,6 +54,7 @@ struct MeshOptions {
 
   std::uint64_t random_seed = 1;
   std::optional<std::uint64_t> max_vertices, max_rounds;
+  std::optional<std::uint64_t> max_batch_queries;  // larger rounds are asked in several batches
   std::optional<std::uint32_t> box_seeds;
 
   std::optional<double> radius_edge_bound;    // rho0 of rule R2
@@ -64,6 +65,8 @@ struct MeshOptions {
   std::optional<double> advance_step;         // h, a length
   std::optional<std::uint32_t> flat_alternations;
   std::optional<bool> ask_ahead;      // fewer round trips, more processor time
+  std::optional<double> size_rate;      // R_p at most this share of the local feature size, (0, 1]
+  std::optional<double> max_deviation;  // circumcentres at most so far from M, a length
   std::optional<bool> common_centre;  // judge simplices at a centre common to their vertices
 
   std::optional<double> worker_wait_seconds, answer_seconds;
