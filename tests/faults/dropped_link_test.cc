@@ -20,7 +20,7 @@ class DroppedLink : public testing::FaultTest {};
 
 TEST_F(DroppedLink, TheMeshGoesOnAndIsTheUndisturbedOne) {
   const int wanted = testing::FromEnvironment("STELLATE_DROPS", 6);
-  auto server = Next({"--keepalive", "0.5", "--keepalive-timeout", "0.5"});
+  auto server = Next();
   const std::optional<Bytes> undisturbed = Undisturbed(server->stub());
   ASSERT_TRUE(undisturbed);
   const std::string bad_link = directory_ + "/relay";

@@ -1,7 +1,8 @@
 // Workers that are frozen (SIGSTOP) at random moments, with chunks in their hands, and thawed
 // later: nobody hangs up, and yet the mesh goes on, and is bit for bit the undisturbed one.
 //
-// $STELLATE_FREEZES: how often (2); $STELLATE_FAULT_SEED: of the moments (1).
+// $STELLATE_FREEZES: how often (2); $STELLATE_NAP_SECONDS: for how long at most (1);
+// $STELLATE_FAULT_SEED: of the moments (1).
 
 #include <iostream>
 
@@ -10,6 +11,7 @@
 namespace stellate::server {
 namespace {
 
+using namespace std::chrono_literals;
 using testing::Bytes;
 using testing::Process;
 
@@ -17,7 +19,8 @@ class FrozenWorker : public testing::FaultTest {};
 
 TEST_F(FrozenWorker, TheMeshGoesOnAndIsTheUndisturbedOne) {
   const int wanted = testing::FromEnvironment("STELLATE_FREEZES", 2);
-  auto server = Next({"--keepalive", "0.5", "--keepalive-timeout", "0.5"});
+  const double longest_nap = testing::FromEnvironment("STELLATE_NAP_SECONDS", 1);
+  auto server = Next();
   const std::optional<Bytes> undisturbed = Undisturbed(server->stub());
   ASSERT_TRUE(undisturbed);
   int freezes = 0, meshes = 0;
@@ -31,14 +34,19 @@ TEST_F(FrozenWorker, TheMeshGoesOnAndIsTheUndisturbedOne) {
       workers.push_back(
           std::make_unique<Process>(std::vector<std::string>{program, server->address(), name}));
     }
-    std::jthread freezer([&, wait = Moment(), nap = Moment(), victim = random_() % 2] {
+    std::uniform_real_distribution<double> nap(0, longest_nap);
+    std::jthread freezer([&, wait = Moment(), asleep = std::chrono::duration<double>(nap(random_)),
+                          victim = random_() % 2](std::stop_token over) {
       std::this_thread::sleep_for(wait);
       workers[victim]->Freeze();
-      // One that sleeps on after the mesh is over does no harm either.
-      std::this_thread::sleep_for(3 * nap);
+      const auto until = std::chrono::steady_clock::now() + asleep;
+      while (!over.stop_requested() && std::chrono::steady_clock::now() < until) {
+        std::this_thread::sleep_for(2ms);
+      }
       workers[victim]->Thaw();
     });
     const std::optional<Bytes> mesh = testing::Watch(server->stub(), name);
+    freezer.request_stop();
     freezer.join();
     ++freezes;
     ASSERT_TRUE(mesh);
