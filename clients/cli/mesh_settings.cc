@@ -28,7 +28,7 @@ constexpr MeshSetting kCriteria[] = {
     {"--ask-ahead,!--no-ask-ahead", &O::ask_ahead,
      "refine a guess first: fewer round trips, more processor time"},
     {"--size-rate", &O::size_rate, "R_p at most this share of the local feature size"},
-    {"--max-deviation", &O::max_deviation, 
+    {"--max-deviation", &O::max_deviation,
      "circumcentres at most so far from the manifold, a length"},
     {"--common-centre,!--no-common-centre", &O::common_centre,
      "judge a simplex at one centre for all its vertices"},

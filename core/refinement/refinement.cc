@@ -1,8 +1,8 @@
 #include "core/refinement/refinement.h"
 
 #include <algorithm>
-#include <functional>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <sstream>
 
@@ -149,6 +149,8 @@ Expected<MeshDelta> Refinement<K>::Absorb(const Answers& answers) {
     idempotence_sample_.resize(0, 0);
   }
 
+  const Progress before = progress_;
+  const Counts counts_before = report_.counts;
   ++progress_.round;
   ++report_.counts.rounds;
   const auto size = static_cast<std::uint64_t>(asked.size());
@@ -168,8 +170,11 @@ Expected<MeshDelta> Refinement<K>::Absorb(const Answers& answers) {
   batch_.reset();
   ++whole_rounds_;
 
-  if (!WithThreads(spec_.threads, interruption_, [&] { Advance(all); }))
+  if (!WithThreads(spec_.threads, interruption_, [&] { Advance(all); })) {
+    progress_ = before;
+    report_.counts = counts_before;
     return Refuse(StatusCode::kCancelled, "the computation was interrupted");
+  }
   delta_.points =
       Eigen::Map<const Eigen::MatrixXd>(complex_.points().data(), complex_.d(), complex_.size())
           .rightCols(complex_.size() - static_cast<Eigen::Index>(delta_.first_vertex));
@@ -465,8 +470,8 @@ void Refinement<K>::InsertGoodPoint(std::size_t i, int best) {
   Insert(c, t.violation.rule, t.star);
 }
 
-// |q - p|^2 / (2 dist(q, T_pM)) bounds the reach from above for any q of M (Federer); over the edges
-// of a star, short ones left out, it is the radius of curvature there.
+// |q - p|^2 / (2 dist(q, T_pM)) bounds the reach from above for any q of M (Federer); over the
+// edges of a star, short ones left out, it is the radius of curvature there.
 template <int K>
 double Refinement<K>::SizeSeenFrom(std::uint32_t p) const {
   const auto& cell = complex_.cell(p);
@@ -539,8 +544,7 @@ void Refinement<K>::JudgeAllSizes() {
   SpreadSizes();
   std::vector<std::optional<Violation<K>>> violations(complex_.size());
   ParallelFor(complex_.size(), [&](std::uint32_t p) {
-    violations[p] =
-        WorstSizeOrShape<K>(complex_, p, SizeBound(p), criteria_.radius_edge_bound);
+    violations[p] = WorstSizeOrShape<K>(complex_, p, SizeBound(p), criteria_.radius_edge_bound);
   });
   active_.clear();
   for (std::uint32_t p = 0; p < complex_.size(); ++p) {

@@ -19,7 +19,8 @@ void Refinement<K>::StartCertificate() {
   for (std::uint32_t p = 0; p < complex_.size(); ++p) {
     const double radius = std::sqrt(complex_.cell(p).max_norm2());
     facts.max_circumradius = std::max(facts.max_circumradius, radius);
-    if (criteria_.graded()) facts.max_size_ratio = std::max(facts.max_size_ratio, radius / LocalSize(p));
+    if (criteria_.graded())
+      facts.max_size_ratio = std::max(facts.max_size_ratio, radius / LocalSize(p));
   }
   certified_tangents_ = complex_.TangentMatrix();
   certified_simplices_ = complex_.Simplices();
@@ -52,8 +53,10 @@ void Refinement<K>::Finish(Termination termination) {
   parts_.reset();
   if (rehearsal_) return;
   report_.termination = termination;
-  report_.counts.vertices = complex_.size();
-  report_.counts.simplices = complex_.simplex_count();
+  // What a round that was interrupted has left behind was never handed out.
+  const bool whole = !interruption_.raised();
+  report_.counts.vertices = whole ? complex_.size() : progress_.vertices;
+  report_.counts.simplices = whole ? complex_.simplex_count() : progress_.simplices;
   Certificate& certificate = report_.certificate;
   if (termination == Termination::kConverged) {
     certificate = certifier_->certificate();
@@ -69,7 +72,10 @@ void Refinement<K>::Finish(Termination termination) {
   certifier_.reset();
   certified_tangents_.resize(0, 0);
   certified_simplices_ = {};
-  UpdateProgress();
+  if (whole)
+    UpdateProgress();
+  else
+    progress_.phase = Phase::kDone;
 }
 
 // What can be said without further questions of a mesh that did not converge. The reach comes from
@@ -153,15 +159,14 @@ void Refinement<K>::UpdateProgress() {
 
 template <int K>
 Eigen::MatrixXd Refinement<K>::Points() const {
-  return Eigen::Map<const Eigen::MatrixXd>(complex_.points().data(), complex_.d(),
-                                           complex_.size());
+  return Eigen::Map<const Eigen::MatrixXd>(complex_.points().data(), complex_.d(), complex_.size());
 }
 
 #define STELLATE_INSTANTIATE(K)                           \
   template void Refinement<K>::StartCertificate();        \
   template void Refinement<K>::Fail(Status);              \
-  template void Refinement<K>::DescribeUnfinished();                   \
-  template std::string Refinement<K>::WhatIsLeft() const;              \
+  template void Refinement<K>::DescribeUnfinished();      \
+  template std::string Refinement<K>::WhatIsLeft() const; \
   template void Refinement<K>::Finish(Termination);       \
   template void Refinement<K>::UpdateProgress();          \
   template Eigen::MatrixXd Refinement<K>::Points() const;

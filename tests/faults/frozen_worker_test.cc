@@ -4,6 +4,7 @@
 // $STELLATE_FREEZES: how often (2); $STELLATE_NAP_SECONDS: for how long at most (1);
 // $STELLATE_FAULT_SEED: of the moments (1).
 
+#include <filesystem>
 #include <iostream>
 
 #include "tests/faults/fault_test.h"
@@ -28,7 +29,8 @@ TEST_F(FrozenWorker, TheMeshGoesOnAndIsTheUndisturbedOne) {
     // Far more than this test may take: what frees a chunk is not its lease.
     const std::string name = Create(server->stub(), 3000);
     ++meshes;
-    const std::string program = std::getenv("FAULT_WORKER");
+    const std::string program =
+        std::filesystem::path(std::getenv("STELLATED")).replace_filename("fault_worker");
     std::vector<std::unique_ptr<Process>> workers;
     for (int i = 0; i < 2; ++i) {
       workers.push_back(

@@ -19,7 +19,12 @@ TEST(Interrupt, EndsWhatFollows) {
   const auto torus = Make("torus");
   const auto mesher = NewMesher(SpecificationFor(*torus, 0.1));
   const auto answer = AnswererFor(*torus);
-  ASSERT_TRUE(mesher->Absorb(answer(*mesher->NextBatch())));
+  std::uint64_t vertices = 0;
+  for (int round = 0; round < 5; ++round) {
+    const auto delta = mesher->Absorb(answer(*mesher->NextBatch()));
+    ASSERT_TRUE(delta);
+    vertices += static_cast<std::uint64_t>(delta->points.cols());
+  }
   mesher->Interrupt();
   const auto delta = mesher->Absorb(answer(*mesher->NextBatch()));
   ASSERT_FALSE(delta);
@@ -27,6 +32,8 @@ TEST(Interrupt, EndsWhatFollows) {
   mesher->Cancel();
   EXPECT_EQ(mesher->NextBatch(), nullptr);
   EXPECT_EQ(mesher->report().termination, Termination::kCancelled);
+  EXPECT_EQ(mesher->report().counts.vertices, vertices) << "what was handed out, no more";
+  EXPECT_EQ(mesher->report().counts.rounds, 5u);
 }
 
 // At any moment of a run, be it in the middle of a round.
@@ -41,16 +48,20 @@ TEST(Interrupt, ComesFromAnyThreadAtAnyTime) {
       mesher->Interrupt();
     });
     StatusCode last = StatusCode::kOk;
+    std::uint64_t vertices = 0;
     while (const QueryBatch* batch = mesher->NextBatch()) {
       const Answers answers = answer(*batch);
       ++round;
-      if (const auto delta = mesher->Absorb(answers); !delta) {
+      if (const auto delta = mesher->Absorb(answers)) {
+        vertices += static_cast<std::uint64_t>(delta->points.cols());
+      } else {
         last = delta.error().code;
         mesher->Cancel();
       }
     }
     round = at;
     other.join();
+    EXPECT_EQ(mesher->report().counts.vertices, vertices);
     // It may have come too late.
     if (last == StatusCode::kOk) {
       EXPECT_EQ(mesher->report().termination, Termination::kConverged);
