@@ -100,6 +100,12 @@ Status CheckSeeds(const Specification& spec) {
     return Invalid(Message("box_seeds is ", spec.box_seeds, " but must be between 0 and ",
                            kMaxBoxSeeds, "; 0 asks for the default"));
   }
+  if (std::int64_t{spec.box_seeds} * spec.ambient_dimension > kMaxBoxSeedCoordinates) {
+    return {StatusCode::kLimitExceeded,
+            Message("box_seeds is ", spec.box_seeds, " but in R^", spec.ambient_dimension,
+                    " may be at most ", kMaxBoxSeedCoordinates / spec.ambient_dimension,
+                    ": a few hundred find all but the smallest components")};
+  }
   return Status::Ok();
 }
 
@@ -134,8 +140,8 @@ Status CheckCriteria(const Criteria& c) {
                            " but must be in (0, 1]: 0.3 is a good mesh"));
   }
   if (c.max_deviation && !(*c.max_deviation >= kMinLength && *c.max_deviation <= kMaxLength)) {
-    return Invalid(Message("criteria.max_deviation is ", *c.max_deviation,
-                           " but must be a positive length"));
+    return Invalid(
+        Message("criteria.max_deviation is ", *c.max_deviation, " but must be a positive length"));
   }
   if (c.flat_alternations < 1 || c.flat_alternations > kMaxFlatAlternations) {
     return Invalid(Message("criteria.flat_alternations is ", c.flat_alternations,

@@ -21,6 +21,7 @@ inline constexpr double kMaxSliverBound = 0.3;   // refinement does not terminat
 inline constexpr int kMaxCandidates = 100;
 inline constexpr int kMaxFlatAlternations = 20;
 inline constexpr int kMaxBoxSeeds = 100'000;
+inline constexpr std::int64_t kMaxBoxSeedCoordinates = 4'000'000;  // box_seeds times d
 
 // What the client's oracle can do beyond closest_point, which it must have (Sec. 5.3.1).
 struct OracleCapabilities {
@@ -57,8 +58,8 @@ struct Criteria {
                                              // bounding box's diagonal if that is more
   std::optional<Judging> judging;            // default kFlats for k <= 2, else kCommonCentre
   bool ask_ahead = false;                    // rehearse on a guess of M first and ask for all that
-                                             // it wants at once: a third of the round trips for
-                                             // up to twice the processor time
+                                             // it wants at once: a handful of round trips for
+                                             // two to three times the processor time
   // Adaptive size: where the mesh must be finer than epsilon, which stays the upper bound. Both go by
   // the local feature size that the sample shows: the smallest |q - p|^2 / (2 dist(q, T_pM)) over a
   // star, made 1-Lipschitz over neighbours. It sees curvature, not another sheet coming near, and

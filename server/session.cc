@@ -1,5 +1,7 @@
 #include "server/session.h"
 
+#include <malloc.h>
+
 #include <algorithm>
 #include <exception>
 #include <new>
@@ -77,6 +79,7 @@ void Session::Run() {
   }
   Expose(nullptr);
   mesher.reset();  // it is large, and watchers do not need it
+  malloc_trim(0);  // the allocator would keep the memory of each mesh's own thread
   if (options_.memory != nullptr) options_.memory->Insist(history_.MemoryBytes());
   Finish(report ? &*report : nullptr);
 }

@@ -3,6 +3,7 @@
 #include <limits>
 #include <string>
 
+#include "channel.h"
 #include "client/status_details.pb.h"
 #include "convert.h"
 #include "mesh_builder.h"
@@ -165,6 +166,29 @@ TEST(MeshBuilder, TakesARevisionOnceAndWhole) {
   EXPECT_FALSE(builder->Absorb(Delta(6, 3, Eigen::MatrixXd(2, 0), {1, 2}, {})));
   ASSERT_TRUE(builder->Absorb(Delta(7, 3, Eigen::MatrixXd(2, 0), {1, 2}, {}, false)));
   EXPECT_FALSE(builder->Absorb(Delta(8, 3, Eigen::MatrixXd(2, 0), {}, {})));
+}
+
+TEST(MeshBuilder, BeginsAnewWhenTheServerDoes) {
+  auto builder = MeshBuilder::Create(1, 2);
+  ASSERT_TRUE(builder.has_value());
+  const Eigen::MatrixXd points = Eigen::MatrixXd::Random(2, 3);
+  ASSERT_TRUE(builder->Absorb(Delta(7, 0, points, {0, 1}, {})));
+  ASSERT_TRUE(builder->Absorb(Delta(8, 3, points.leftCols(1), {}, {}, false)));
+  builder->Reset();
+  EXPECT_EQ(builder->revision(), 0u);
+  ASSERT_TRUE(builder->Absorb(Delta(2, 0, points.leftCols(2), {0, 1}, {})));
+  const Expected<Mesh> mesh = builder->Take();
+  ASSERT_TRUE(mesh.has_value());
+  EXPECT_EQ(mesh->points, points.leftCols(2));
+  EXPECT_EQ(mesh->simplices.cols(), 1);
+}
+
+TEST(Addresses, TellThisMachineFromOthers) {
+  for (const char* here :
+       {"unix:/run/s", "localhost:1", "127.0.0.1:7717", "127.3.2.1:1", "[::1]:5"})
+    EXPECT_TRUE(StaysOnThisMachine(here)) << here;
+  for (const char* away : {"example.org:7717", "10.0.0.1:1", "127.example.org:1", "[fe80::1]:5"})
+    EXPECT_FALSE(StaysOnThisMachine(away)) << away;
 }
 
 TEST(MeshBuilder, RefusesWhatMakesNoSense) {

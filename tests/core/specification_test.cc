@@ -88,6 +88,13 @@ TEST(Validate, NamesTheFieldAndTheValueOfWhatItRefuses) {
        }},
       {"box_seeds is -1 ", [](auto& s) { s.box_seeds = -1; }},
       {"box_seeds is 100001 ", [](auto& s) { s.box_seeds = 100001; }},
+      {"box_seeds is 100000 but in R^3000 may be at most 1333",
+       [](auto& s) {
+         s.ambient_dimension = 3000;
+         s.bounding_box = BoundingBox{Eigen::VectorXd::Zero(3000), Eigen::VectorXd::Ones(3000)};
+         s.box_seeds = 100000;
+       },
+       StatusCode::kLimitExceeded},
       {"criteria.radius_edge_bound (rho0) is 1 ",
        [](auto& s) { s.criteria.radius_edge_bound = 1; }},
       {"criteria.radius_edge_bound (rho0) is NaN ",

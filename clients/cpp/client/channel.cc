@@ -41,12 +41,16 @@ class SendTokenFactory final : public grpc::experimental::ClientInterceptorFacto
   const std::string header_;
 };
 
+}  // namespace
+
 bool StaysOnThisMachine(const std::string& server) {
   if (server.rfind("unix:", 0) == 0) return true;
   const std::string host = server.substr(0, server.rfind(':'));
   const bool number = host.find_first_not_of("0123456789.") == std::string::npos;
   return host == "localhost" || host == "[::1]" || (number && host.rfind("127.", 0) == 0);
 }
+
+namespace {
 
 Expected<std::string> Read(const std::string& path) {
   if (path.empty()) return std::string();

@@ -18,4 +18,7 @@ Expected<std::shared_ptr<grpc::Channel>> Connect(const std::string& server,
                                                  const Credentials& credentials,
                                                  double keepalive_seconds = kUsualKeepalive);
 
+// Whether a server's address is a unix socket or the loopback.
+bool StaysOnThisMachine(const std::string& server);
+
 }  // namespace stellate::client

@@ -23,7 +23,10 @@ Expected<Mesh> MeshManifold(Oracle& oracle, const MeshOptions& options) {
       embedded ? client::Connect(server, {}, client::kNoPings)
                : client::Connect(server, options.credentials, options.keepalive_seconds);
   if (!channel) return tl::unexpected(channel.error());
-  client::Run run(*channel, oracle, options,
+  MeshOptions effective = options;
+  // Round trips are what a far server costs.
+  if (!options.ask_ahead && !client::StaysOnThisMachine(server)) effective.ask_ahead = true;
+  client::Run run(*channel, oracle, effective,
                   [&embedded] { return embedded && !embedded->alive(); });
   return run.Go();
 }

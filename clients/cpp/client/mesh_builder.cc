@@ -89,6 +89,13 @@ Expected<MeshBuilder> MeshBuilder::Create(int k, int d) {
   return MeshBuilder(k, d, std::move(log));
 }
 
+void MeshBuilder::Reset() {
+  revision_ = 0;
+  pending_.clear();
+  coordinates_.clear();
+  log_ = MakeSimplexLog(k_);
+}
+
 Expected<void> MeshBuilder::Absorb(v1::DeltaChunk&& chunk) {
   const std::uint64_t revision = chunk.delta().revision();
   if (revision <= revision_ || (!pending_.empty() && pending_.back().revision() != revision)) {

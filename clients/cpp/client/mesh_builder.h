@@ -37,6 +37,8 @@ class MeshBuilder {
   Expected<void> Absorb(v1::DeltaChunk&& chunk);
   // The last complete revision; 0: none yet.
   std::uint64_t revision() const { return revision_; }
+  // Drops everything: the server begins anew.
+  void Reset();
   // Drops the chunks of a revision that was cut short.
   void ForgetPending() { pending_.clear(); }
 

@@ -40,7 +40,7 @@ class Credentials:
             )
             channel = grpc.secure_channel(address, security, options)
         else:
-            if self.token is not None and not _stays_on_this_machine(address):
+            if self.token is not None and not stays_on_this_machine(address):
                 raise InvalidArgument(
                     f"the token would go to {address} in plain text, for others to read and use: "
                     "turn TLS on"
@@ -53,7 +53,8 @@ def _read(path: str | os.PathLike[str] | None) -> bytes | None:
     return None if path is None else pathlib.Path(path).read_bytes()
 
 
-def _stays_on_this_machine(address: str) -> bool:
+def stays_on_this_machine(address: str) -> bool:
+    """Whether a server's address is a unix socket or the loopback."""
     if address.startswith("unix:"):
         return True
     host = address.rpartition(":")[0]

@@ -9,7 +9,7 @@ from typing import Any, Callable, Iterator, TypeVar
 
 import grpc
 
-from ._credentials import Credentials
+from ._credentials import Credentials, stays_on_this_machine
 from ._generated import mesh_pb2
 from ._generated import stellate_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
@@ -147,6 +147,8 @@ class Client:
         Not repeated when the server is lost: whether it made the mesh would not be known.
         """
         checked = oracle if isinstance(oracle, CheckedOracle) else CheckedOracle(oracle)
+        if criteria.get("ask_ahead") is None and not stays_on_this_machine(self.address):
+            criteria["ask_ahead"] = True  # round trips are what a far server costs
         spec = mesh_spec(checked, epsilon, criteria)
         request = pb.CreateMeshRequest(spec=spec)
         return MeshInfo.from_wire(self._call(self._stub.CreateMesh, request, once=True))

@@ -139,3 +139,25 @@ def test_the_fake_speaks_the_whole_service():
     """A guard for the tests above: a renamed rpc would make them pass for the wrong reason."""
     for name in ("CreateMesh", "WatchMesh", "ServeOracle", "DeleteMesh"):
         assert name in vars(FakeServer) and hasattr(fake_server.rpc.StellateServicer, name)
+
+
+@pytest.mark.parametrize(
+    "address, asked, wanted",
+    [
+        ("unix:/nowhere", None, False),
+        ("127.0.0.1:9", None, False),
+        ("far.example.org:9", None, True),
+        ("far.example.org:9", False, False),
+        ("unix:/nowhere", True, True),
+    ],
+)
+def test_far_servers_are_asked_ahead(monkeypatch, address, asked, wanted):
+    specs = []
+
+    def create(self, method, request, **_):
+        specs.append(request.spec)
+        return mesh_pb2.Mesh(name="meshes/x")
+
+    monkeypatch.setattr(stellate.Client, "_call", create)
+    stellate.Client(address).create(CIRCLE, 0.1, ask_ahead=asked)
+    assert specs[0].criteria.ask_ahead is wanted

@@ -64,7 +64,9 @@ struct MeshOptions {
   std::optional<std::uint32_t> candidates;    // tried in a picking region
   std::optional<double> advance_step;         // h, a length
   std::optional<std::uint32_t> flat_alternations;
-  std::optional<bool> ask_ahead;      // fewer round trips, more processor time
+  // A handful of round trips for two to three times the processor time; on unless the server is on
+  // this machine.
+  std::optional<bool> ask_ahead;
   std::optional<double> size_rate;      // R_p at most this share of the local feature size, (0, 1]
   std::optional<double> max_deviation;  // circumcentres at most so far from M, a length
   std::optional<bool> common_centre;  // judge simplices at a centre common to their vertices
