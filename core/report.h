@@ -70,7 +70,8 @@ struct Certificate {
   bool closed = false;                   // each (k-1)-face is in exactly two simplices
   std::uint64_t bad_faces = 0;
   bool links_are_spheres = false;        // each vertex link is a (k-1)-sphere
-  bool links_decided_exactly = false;    // k <= 3; above, homology of the links
+  bool links_decided_exactly = false;    // k <= 3 always; k = 4 where the links' fundamental
+                                         // groups and homology settle it
   std::uint64_t bad_links = 0;
   std::uint64_t inconsistent_simplices = 0;  // in a star but not in all its vertices' stars
   std::uint64_t unembedded_stars = 0;  // stars whose projection on the tangent space overlaps itself

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <sstream>
 
@@ -29,10 +28,6 @@ constexpr double kEmptyBall = 0.5;
 constexpr double kCalm = 0.25;
 // What is rehearsed can wait until it is known better.
 constexpr double kRehearsedSpacing = 0.9;
-// Shorter edges than this share of a star's longest say little of curvature and much of noise.
-constexpr double kTellingEdge = 0.5;
-// The finest graded size, in epsilon.
-constexpr double kFinest = 1.0 / 64;
 // Good points are chosen off the centre.
 constexpr double kGoodPointSpacing = 0.25;
 
@@ -468,95 +463,6 @@ void Refinement<K>::InsertGoodPoint(std::size_t i, int best) {
   if (complex_.AnyWithin(y, kGoodPointSpacing * t.radius))
     return;  // another of this round came near
   Insert(c, t.violation.rule, t.star);
-}
-
-// |q - p|^2 / (2 dist(q, T_pM)) bounds the reach from above for any q of M (Federer); over the
-// edges of a star, short ones left out, it is the radius of curvature there.
-template <int K>
-double Refinement<K>::SizeSeenFrom(std::uint32_t p) const {
-  const auto& cell = complex_.cell(p);
-  double longest2 = 0;
-  for (const auto& facet : cell.facets())
-    if (!IsFake(facet.id)) longest2 = std::max(longest2, 2 * facet.offset);
-  double size = INFINITY;
-  for (const auto& facet : cell.facets()) {
-    const double distance2 = 2 * facet.offset;
-    if (IsFake(facet.id) || distance2 < kTellingEdge * kTellingEdge * longest2) continue;
-    double along2 = 0;
-    for (int a = 0; a < K; ++a) along2 += facet.normal[a] * facet.normal[a];
-    const double away = std::sqrt(std::max(distance2 - along2, 0.0));
-    if (away > 0) size = std::min(size, distance2 / (2 * away));
-  }
-  return size;
-}
-
-// What is seen from there, from the neighbours, and from all when that was last spread.
-template <int K>
-double Refinement<K>::LocalSize(std::uint32_t p) const {
-  double size = size_seen_[p];
-  for (const auto& facet : complex_.cell(p).facets()) {
-    if (IsFake(facet.id)) continue;
-    const double there = facet.id < local_size_.size()
-                             ? std::min(local_size_[facet.id], size_seen_[facet.id])
-                             : size_seen_[facet.id];
-    size = std::min(size, there + std::sqrt(2 * facet.offset));
-  }
-  return size;
-}
-
-// The largest 1-Lipschitz function over the edges of the stars that is nowhere above what is seen.
-template <int K>
-void Refinement<K>::SpreadSizes() {
-  using Entry = std::pair<double, std::uint32_t>;
-  std::vector<Entry> queue;
-  for (std::uint32_t p = 0; p < complex_.size(); ++p)
-    if (size_seen_[p] < INFINITY) queue.emplace_back(size_seen_[p], p);
-  std::make_heap(queue.begin(), queue.end(), std::greater<>());
-  local_size_ = size_seen_;
-  while (!queue.empty()) {
-    std::pop_heap(queue.begin(), queue.end(), std::greater<>());
-    const auto [size, p] = queue.back();
-    queue.pop_back();
-    if (size > local_size_[p]) continue;
-    for (const auto& facet : complex_.cell(p).facets()) {
-      if (IsFake(facet.id)) continue;
-      const double there = size + std::sqrt(2 * facet.offset);
-      if (!(there < local_size_[facet.id])) continue;
-      local_size_[facet.id] = there;
-      queue.emplace_back(there, facet.id);
-      std::push_heap(queue.begin(), queue.end(), std::greater<>());
-    }
-  }
-}
-
-template <int K>
-double Refinement<K>::SizeBound(std::uint32_t p) const {
-  if (!criteria_.graded()) return criteria_.epsilon;
-  const double size = LocalSize(p);
-  const double bound =
-      std::min(criteria_.size_rate * size, std::sqrt(2 * criteria_.max_deviation * size));
-  return std::clamp(bound, kFinest * criteria_.epsilon, criteria_.epsilon);
-}
-
-// A star's bound also follows its neighbours, whose sizes may have changed after it was judged.
-template <int K>
-void Refinement<K>::JudgeAllSizes() {
-  SpreadSizes();
-  std::vector<std::optional<Violation<K>>> violations(complex_.size());
-  ParallelFor(complex_.size(), [&](std::uint32_t p) {
-    violations[p] = WorstSizeOrShape<K>(complex_, p, SizeBound(p), criteria_.radius_edge_bound);
-  });
-  active_.clear();
-  for (std::uint32_t p = 0; p < complex_.size(); ++p) {
-    if (violations[p]) {
-      standing_[p] = kSizeOrShape;
-      active_.push_back({p, *violations[p]});
-    } else if (standing_[p] == kSizeOrShape) {
-      standing_[p] = kFine;
-    }
-  }
-  sizes_judged_ = true;
-  sizes_judged_at_ = complex_.size();
 }
 
 // Brings the stars and all that is known of them up to date with the appended points.

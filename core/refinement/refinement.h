@@ -109,16 +109,18 @@ class Refinement final : public Mesher {
   void Discourage(std::uint32_t star);
   void Insert(Eigen::Index candidate, Rule rule, std::uint32_t near);
   void Commit();
-  double SizeSeenFrom(std::uint32_t star) const;
-  double LocalSize(std::uint32_t star) const;
-  void SpreadSizes();
-  double SizeBound(std::uint32_t star) const;
-  void JudgeAllSizes();
   void StartCertificate();
   void Finish(Termination termination);
   void DescribeUnfinished();
   std::string WhatIsLeft() const;
   void UpdateProgress();
+
+  // Graded sizes (refinement_size.cc).
+  double SizeSeenFrom(std::uint32_t star) const;
+  double LocalSize(std::uint32_t star) const;
+  void SpreadSizes();
+  double SizeBound(std::uint32_t star) const;  // of R1
+  void JudgeAllSizes();
 
   // So large that M between may be anything: more than twice the size asked for.
   bool IsCoarse(std::uint32_t star, const Violation<K>& violation) const {

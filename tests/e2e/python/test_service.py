@@ -1,6 +1,7 @@
 """Watching, cancelling, several workers, and the embedded server."""
 
 import contextlib
+import itertools
 import os
 import pathlib
 import signal
@@ -171,10 +172,15 @@ def test_server_info(client):
     assert info.max_dimension >= 5 and info.max_ambient_dimension >= 100
 
 
-def children():
-    """The processes started by this one."""
-    path = pathlib.Path(f"/proc/{os.getpid()}/task")
-    return {pid for task in path.iterdir() for pid in (task / "children").read_text().split()}
+def children(pid="self"):
+    """The processes that a process has started. Its threads come and go while we look."""
+    for attempt in itertools.count():
+        try:
+            tasks = list(pathlib.Path(f"/proc/{pid}/task").iterdir())
+            return {child for task in tasks for child in (task / "children").read_text().split()}
+        except (FileNotFoundError, ProcessLookupError):
+            if attempt == 1000:
+                raise
 
 
 def test_the_embedded_server_comes_and_goes():
@@ -260,8 +266,7 @@ def test_ctrl_c_cancels_the_mesh(repository, server, client):
 
 def test_a_client_that_is_killed_takes_its_server_with_it(repository):
     with running_program(repository, None) as process:
-        listed = pathlib.Path(f"/proc/{process.pid}/task").glob("*/children")
-        (server_pid,) = {pid for path in listed for pid in path.read_text().split()}
+        (server_pid,) = children(process.pid)
     command_line = pathlib.Path(f"/proc/{server_pid}/cmdline")
     with contextlib.suppress(OSError):  # gone between two looks
         while command_line.read_bytes():  # empty once it ended and waits for its new parent
