@@ -96,6 +96,12 @@ class Journal::Mesh final : public SessionJournal, public std::enable_shared_fro
     });
   }
 
+  std::optional<MeshFailure> WithdrawRound(std::uint64_t round) override {
+    return file_->Do("the withdrawal of a round", [&](JournalFile& file) {
+      return forgotten_ || id_ == 0 || file.DropRound(id_, round);
+    });
+  }
+
   std::optional<MeshFailure> WriteEnd(const SessionEnd& end) override {
     return file_->Do("the end of the mesh", [&](JournalFile& file) {
       return forgotten_ || id_ == 0 || file.SetEnd(id_, EncodeEnd(end));

@@ -186,7 +186,7 @@ bool Session::Absorb(core::Mesher* mesher, const core::Answers& answers) {
   const auto delta = mesher->Absorb(answers);
   if (!delta) {
     if (delta.error().code == StatusCode::kCancelled)
-      mesher->Cancel();
+      CancelInRound(mesher);
     else
       Fail(mesher, ToFailure(delta.error()), delta.error());
     return false;
@@ -197,6 +197,20 @@ bool Session::Absorb(core::Mesher* mesher, const core::Answers& answers) {
     return false;
   }
   return true;
+}
+
+// What the round would have led to was never seen, and must not appear when the mesh is replayed. A
+// suspended mesh keeps it, to go on from there.
+void Session::CancelInRound(core::Mesher* mesher) {
+  mesher->Cancel();
+  const bool suspended = [this] {
+    const std::lock_guard lock(mutex_);
+    return suspended_;
+  }();
+  if (options_.journal == nullptr || replaying_ || suspended) return;
+  if (const auto failure = options_.journal->WithdrawRound(mesher->progress().round + 1)) {
+    Log(LogLevel::kWarning, log_context(), failure->message);
+  }
 }
 
 // The mesh fails, but not by an answer of the workers that serve it now.

@@ -40,6 +40,8 @@ class SessionJournal {
   // Before anyone may see what the answers lead to.
   virtual std::optional<MeshFailure> WriteRound(const core::QueryBatch& batch,
                                                 const core::Answers& answers) = 0;
+  // The last round's answers led to nothing that anyone saw: the mesh was cancelled first.
+  virtual std::optional<MeshFailure> WithdrawRound(std::uint64_t round) = 0;
   virtual std::optional<MeshFailure> WriteEnd(const SessionEnd& end) = 0;
 
   struct Replay {

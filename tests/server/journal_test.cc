@@ -299,23 +299,27 @@ TEST_F(JournalTest, AMeshStoppedAgainAndAgainIsTheUndisturbedOne) {
   EXPECT_EQ(kept.simplices, whole.simplices);
 }
 
-TEST_F(JournalTest, ACancelledMeshStaysCancelled) {
-  SessionView before;
-  {
+// Cancelled at any moment, in the middle of a round too.
+TEST_F(JournalTest, ACancelledMeshStaysAsItWas) {
+  for (const std::uint64_t revision : {1, 2, 3, 5, 8, 10, 12, 14}) {
+    SessionView before;
+    {
+      const auto journal = Open();
+      Session session(Options(journal->NewMesh(), 0.1));
+      std::thread thread([&] { session.Run(); });
+      const auto worker = FakeWorker::Join(&session.pool());
+      while (session.View().revision < revision && !session.HasEnded()) std::this_thread::yield();
+      session.Cancel();
+      thread.join();
+      before = session.View();
+    }
     const auto journal = Open();
-    Session session(Options(journal->NewMesh()));
-    std::thread thread([&] { session.Run(); });
-    const auto worker = FakeWorker::Join(&session.pool());
-    while (session.View().revision < 2) std::this_thread::yield();
-    session.Cancel();
-    thread.join();
-    before = session.View();
+    auto meshes = journal->TakeMeshes();
+    const Outcome after = Mesh(std::move(meshes.back()), 0, false);
+    EXPECT_EQ(after.view.state, before.state);
+    EXPECT_EQ(after.view.revision, before.revision);
+    EXPECT_EQ(after.view.progress.vertices, before.progress.vertices);
   }
-  const auto journal = Open();
-  const Outcome after = Mesh(std::move(journal->TakeMeshes().at(0)), 0, false);
-  EXPECT_EQ(before.state, SessionState::kCancelled);
-  EXPECT_EQ(after.view.state, SessionState::kCancelled);
-  EXPECT_EQ(after.view.revision, before.revision);
 }
 
 // Writes as told.
@@ -329,6 +333,7 @@ struct FailingJournal : SessionJournal {
     if (batch.round < 3) return std::nullopt;
     return MeshFailure{"JOURNAL_FULL", "no room"};
   }
+  std::optional<MeshFailure> WithdrawRound(std::uint64_t) override { return std::nullopt; }
   std::optional<MeshFailure> WriteEnd(const SessionEnd& end) override {
     state = end.state;
     return MeshFailure{"JOURNAL_FULL", "no room"};
