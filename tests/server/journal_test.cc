@@ -9,6 +9,7 @@
 #include <fstream>
 #include <thread>
 
+#include "core/message.h"
 #include "server/journal_format.h"
 #include "tests/server/fake_worker.h"
 #include "tests/server/sphere.h"
@@ -168,7 +169,7 @@ TEST_F(JournalTest, RefusesOtherVersionsAndOtherTables) {
   WriteTwoRounds(*Open());
   Sql("PRAGMA user_version=99");
   EXPECT_NE(Refusal().find("version 99"), std::string::npos);
-  Sql("PRAGMA user_version=1; CREATE TABLE more (x)");
+  Sql(core::Message("PRAGMA user_version=", kJournalVersion, "; CREATE TABLE more (x)"));
   EXPECT_NE(Refusal().find("damaged"), std::string::npos);
 }
 
