@@ -1,5 +1,7 @@
 #include "server/config.h"
 
+#include <arpa/inet.h>
+
 #include <algorithm>
 #include <charconv>
 
@@ -50,7 +52,10 @@ Status ValidateSafety(const Config& config, const ListenAddress& address) {
 }  // namespace
 
 bool ListenAddress::IsLoopback() const {
-  return IsUnix() || host == "localhost" || host == "::1" || host.starts_with("127.");
+  in_addr v4{};  // a name may begin with "127." and stand for any machine
+  const bool numbers = inet_pton(AF_INET, host.c_str(), &v4) == 1;
+  return IsUnix() || host == "localhost" || host == "::1" ||
+         (numbers && (ntohl(v4.s_addr) >> 24) == 127);
 }
 
 std::string ListenAddress::Target() const {

@@ -44,6 +44,7 @@ struct Config {
   std::uint64_t max_memory_bytes = 0;   // of all meshes, estimated; 0: WithDefaults says
   std::uint64_t max_journal_bytes = 0;  // 0: what the disk holds
   std::uint64_t max_message_bytes = std::uint64_t{4} << 20;
+  std::uint64_t max_connections = 2048;  // over TCP
   std::uint64_t max_connection_streams = 1024;
 
   // Of each owner, where the server tells owners apart.

@@ -18,6 +18,7 @@
 
 #include "core/message.h"
 #include "server/error_map.h"
+#include "server/listener.h"
 #include "server/tls.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 
@@ -134,6 +135,10 @@ void SetUp(const Config& config, grpc::ServerBuilder* builder) {
   const int size = static_cast<int>(config.max_message_bytes);
   builder->SetMaxReceiveMessageSize(size);
   builder->SetMaxSendMessageSize(size);
+  // gRPC inflates a message before it measures it: 4 MB of zeros, packed, would take gigabytes.
+  for (const auto algorithm : {GRPC_COMPRESS_DEFLATE, GRPC_COMPRESS_GZIP}) {
+    builder->SetCompressionAlgorithmSupportStatus(algorithm, false);
+  }
   // A frozen client is found by pings; clients may ping as often as they like.
   builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, Milliseconds(config.keepalive_seconds));
   builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS,
@@ -143,8 +148,6 @@ void SetUp(const Config& config, grpc::ServerBuilder* builder) {
   builder->AddChannelArgument(GRPC_ARG_HTTP2_MAX_PING_STRIKES, 0);
   builder->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
                               static_cast<int>(config.max_connection_streams));
-  // Otherwise two servers share a port, and each client gets either.
-  builder->AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   grpc::ResourceQuota quota("stellated");
   quota.SetMaxThreads(kMaxSyncThreads);
   builder->SetResourceQuota(quota);
@@ -188,6 +191,42 @@ class Server::Impl {
     return Status::Ok();
   }
 
+  // On a unix socket gRPC listens itself: only the server's own user gets that far.
+  Status Listen(ListenAddress* address, std::shared_ptr<grpc::ServerCredentials> credentials,
+                grpc::ServerBuilder* builder) {
+    std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor;
+    int unix_port = 0;
+    if (address->IsUnix()) {
+      builder->AddListeningPort(address->Target(), std::move(credentials), &unix_port);
+    } else {
+      auto opened = Listener::Open(*address, service.config.max_connections);
+      if (!opened) return std::move(opened.error());
+      listener = std::move(*opened);
+      address->port = listener->port();
+      acceptor = builder->experimental().AddExternalConnectionAcceptor(
+          grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
+          std::move(credentials));
+    }
+    builder->RegisterService(&rpcs);
+    const mode_t mask = umask(0177);  // a unix socket is its owner's alone, from its first moment
+    server = builder->BuildAndStart();
+    umask(mask);
+    if (server == nullptr || (address->IsUnix() && unix_port <= 0)) {
+      return {StatusCode::kFailedPrecondition,
+              Message("cannot listen on ", address->Target(), ": choose another --listen")};
+    }
+    if (listener == nullptr) return Status::Ok();
+    listener->Start(
+        [acceptor = std::shared_ptr(std::move(acceptor))](int listener_fd, int fd) {
+          grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
+          connection.listener_fd = listener_fd;
+          connection.fd = fd;
+          acceptor->HandleNewConnection(&connection);
+        },
+        [this] { service.metrics.LimitReached("max-connections"); });
+    return Status::Ok();
+  }
+
   void StartTicking() {
     ticker = std::jthread([this](std::stop_token stop) {
       std::unique_lock lock(tick_mutex);
@@ -203,6 +242,7 @@ class Server::Impl {
   ServerState service;
   Rpcs rpcs;
   std::unique_ptr<grpc::Server> server;
+  std::unique_ptr<Listener> listener;  // TCP alone
   bool stopped = false;
   std::mutex tick_mutex;
   std::condition_variable_any tick_wake;
@@ -241,19 +281,8 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
   if (!status.ok()) return tl::unexpected(std::move(status));
   grpc::ServerBuilder builder;
   SetUp(config, &builder);
-  int port = 0;
-  builder.AddListeningPort(address.Target(), *credentials, &port);
-  builder.RegisterService(&impl->rpcs);
-  const mode_t mask = umask(0177);  // a unix socket is its owner's alone, from its first moment
-  impl->server = builder.BuildAndStart();
-  umask(mask);
-  if (impl->server == nullptr || port <= 0) {
-    return core::Refuse(StatusCode::kFailedPrecondition,
-                        Message("cannot listen on ", address.Target(),
-                                ": another program has it, or this machine does not; choose "
-                                "another --listen"));
-  }
-  if (!address.IsUnix()) address.port = port;
+  status = impl->Listen(&address, std::move(*credentials), &builder);
+  if (!status.ok()) return tl::unexpected(std::move(status));
   for (const char* name : {v1::Stellate::service_full_name(), kAlive}) {
     impl->server->GetHealthCheckService()->SetServingStatus(name, true);
   }
@@ -292,6 +321,7 @@ bool Server::Stop(Clock::duration drain, const std::function<bool()>& hurry) {
                [&] { return service.streams.Count() > 0; });
   }
   service.streams.StopAll();
+  if (impl.listener != nullptr) impl.listener->Stop();
   impl.server->Shutdown(std::chrono::system_clock::now() + kLastWords);
   impl.server->Wait();
   impl.ticker.request_stop();

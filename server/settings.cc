@@ -103,6 +103,8 @@ const std::vector<Setting>& Settings() {
        "Size of the record in --data-dir; 0: what the disk holds", 0, kBytes},
       {kServerLimits, "--max-message-bytes", &Config::max_message_bytes,
        "Largest message, both ways", kMebibyte, 1024 * kMebibyte},
+      {kServerLimits, "--max-connections", &Config::max_connections,
+       "Connections open at once; further ones are closed", 1, 1'000'000},
       {kServerLimits, "--max-connection-streams", &Config::max_connection_streams,
        "Calls open at once on one connection; more wait in the client", 4, 1'000'000},
 

@@ -21,6 +21,8 @@ TEST(ListenAddress, ReadsTcpAndUnix) {
       {"0.0.0.0:1", "0.0.0.0:1", false},
       {"[::]:1", "[::]:1", false},
       {"example.org:443", "example.org:443", false},
+      {"127.example.org:443", "127.example.org:443", false},
+      {"127.1.2.3:443", "127.1.2.3:443", true},
   };
   for (const auto& [text, target, loopback] : cases) {
     const auto address = ParseListenAddress(text);

@@ -1,0 +1,115 @@
+#include "server/listener.h"
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <condition_variable>
+#include <mutex>
+
+namespace stellate::server {
+namespace {
+
+constexpr int kMany = 8;
+
+// Keeps what a listener hands over.
+class Taken {
+ public:
+  ~Taken() {
+    for (const int fd : fds_) close(fd);
+  }
+  Listener::Taker Take() {
+    return [this](int, int fd) {
+      const std::lock_guard lock(mutex_);
+      fds_.push_back(fd);
+      changed_.notify_all();
+    };
+  }
+  void Await(std::size_t count) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return fds_.size() >= count; });
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<int> fds_;
+};
+
+int Connect(int port) {
+  sockaddr_in place{};
+  place.sin_family = AF_INET;
+  place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  place.sin_port = htons(static_cast<in_port_t>(port));
+  const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  EXPECT_EQ(connect(fd, reinterpret_cast<sockaddr*>(&place), sizeof(place)), 0);
+  return fd;
+}
+
+std::unique_ptr<Listener> OnLoopback(std::size_t max_connections) {
+  auto listener = Listener::Open(*ParseListenAddress("127.0.0.1:0"), max_connections);
+  EXPECT_TRUE(listener);
+  return listener ? std::move(*listener) : nullptr;
+}
+
+// gRPC's own listener is deaf from then on.
+TEST(Listener, GoesOnOnceThereAreFilesAgain) {
+  const auto listener = OnLoopback(100);
+  std::vector<int> clients;
+  for (int i = 0; i < kMany; ++i) clients.push_back(Connect(listener->port()));
+  Taken taken;
+  // The next descriptor but one is out of bounds; what Start itself needs is the next.
+  rlimit old{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &old), 0);
+  const int next = dup(0);
+  close(next);
+  rlimit few = old;
+  few.rlim_cur = static_cast<rlim_t>(next) + 2;
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &few), 0);
+  listener->Start(taken.Take(), [] {});
+  taken.Await(1);
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &old), 0);
+  taken.Await(kMany);
+  for (const int fd : clients) close(fd);
+}
+
+TEST(Listener, TellsOfEachConnectionThatIsOneTooMany) {
+  const auto listener = OnLoopback(2);
+  Taken taken;
+  std::atomic<int> refused{0};
+  listener->Start(taken.Take(), [&refused] { ++refused; });
+  std::vector<int> clients;
+  for (int i = 0; i < kMany; ++i) clients.push_back(Connect(listener->port()));
+  for (int i = 2; i < kMany; ++i) {
+    char byte = 0;
+    EXPECT_LE(recv(clients[static_cast<std::size_t>(i)], &byte, 1, 0), 0);
+  }
+  listener->Stop();
+  EXPECT_EQ(refused, kMany - 2);
+  for (const int fd : clients) close(fd);
+}
+
+TEST(Listener, ListensOnEveryAddressOfAName) {
+  auto listener = Listener::Open(*ParseListenAddress("localhost:0"), 4);
+  ASSERT_TRUE(listener);
+  EXPECT_GT((*listener)->port(), 0);
+  Taken taken;
+  (*listener)->Start(taken.Take(), [] {});
+  const int client = Connect((*listener)->port());
+  taken.Await(1);
+  close(client);
+}
+
+TEST(Listener, AddressesOfOthersAndTakenPortsAreRefused) {
+  EXPECT_FALSE(Listener::Open(*ParseListenAddress("192.0.2.1:0"), 4));
+  const auto listener = OnLoopback(4);
+  const auto second =
+      Listener::Open(*ParseListenAddress("127.0.0.1:" + std::to_string(listener->port())), 4);
+  ASSERT_FALSE(second);
+  EXPECT_NE(second.error().message.find("--listen"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace stellate::server
