@@ -15,7 +15,7 @@ _stubs.ensure()  # before anything imports them
 from . import manifolds  # noqa: E402
 from ._credentials import Credentials  # noqa: E402
 from ._doctor import check  # noqa: E402
-from ._face import mesh, serve, watch  # noqa: E402
+from ._face import download, mesh, serve, watch  # noqa: E402
 from ._findings import CheckReport, Finding  # noqa: E402
 from ._mesh import Mesh, load_txt  # noqa: E402
 from ._server import Server, find_stellated  # noqa: E402
@@ -71,6 +71,7 @@ __all__ = [
     "Unauthenticated",
     "Unavailable",
     "check",
+    "download",
     "find_stellated",
     "load_txt",
     "manifolds",

@@ -1,10 +1,12 @@
-"""stellate.mesh, stellate.watch and stellate.serve."""
+"""stellate.mesh, stellate.watch, stellate.serve and stellate.download."""
 
 from __future__ import annotations
 
+import os
 from typing import Any, Iterator
 
 from ._credentials import Credentials
+from ._download import OnPart, fetch
 from ._mesh import Mesh
 from ._server import Server
 from ._session import OnProgress, Session, follow
@@ -92,6 +94,49 @@ def _watch_by_name(
         return
     with Client(server) as client:
         yield from follow(client, client.get(name), on_progress)
+
+
+def download(
+    mesh_name: str,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    server: str | Server | Client,
+    unfinished: str = "refuse",
+    revision: int = 0,
+    on_progress: OnProgress | None = None,
+    on_part: OnPart | None = None,
+    credentials: Credentials | None = None,
+) -> Mesh:
+    """Fetches a mesh that is on a server; it stays there. A broken stream is resumed.
+
+    Args:
+      mesh_name: "meshes/<id>", as Client.create and Client.list give it.
+      path: where to write it as well, as Mesh.save does.
+      server: "host:port", "unix:/path", a stellate.Server or Client.
+      unfinished: what to do about a mesh that is not over: "refuse" it, "wait" for its end, however
+        long that takes, or "take" it as it is now; "take" fetches what there is of a failed or
+        cancelled mesh, too.
+      revision: any that the mesh has had, whatever became of the mesh; 0: the newest.
+      on_progress: called in this thread with a stellate.Progress while the mesh is waited for.
+      on_part: called at each part that comes, with the vertices and simplices that are here, and
+        those of the whole mesh.
+      credentials: as for stellate.mesh.
+
+    Returns:
+      The mesh, with its report if it is the last revision of one that is over.
+
+    Raises:
+      MeshNotFound; FailedPrecondition for a mesh that is refused because it is not over; how the
+      mesh failed, or Cancelled, with what there is of it in the exception's `mesh`; Unavailable.
+    """
+    if isinstance(server, Client) and credentials is None:
+        mesh = fetch(server, mesh_name, revision, unfinished, on_progress, on_part)
+    else:
+        with _connect(server, credentials) as client:
+            mesh = fetch(client, mesh_name, revision, unfinished, on_progress, on_part)
+    if path is not None:
+        mesh.save(path)
+    return mesh
 
 
 def _connect(server: str | Server | Client | None, credentials: Credentials | None) -> Client:

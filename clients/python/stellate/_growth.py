@@ -9,6 +9,11 @@ from ._generated import mesh_pb2
 from ._generated import stellate_pb2 as pb
 
 
+def in_order(rows: np.ndarray) -> np.ndarray:
+    """A copy as int64, rows in lexicographic order."""
+    return rows[np.lexsort(rows.T[::-1])].astype(np.int64)
+
+
 class GrowingComplex:
     """Vertices and simplices as of the last complete revision."""
 
@@ -62,8 +67,7 @@ class GrowingComplex:
 
     def simplices(self) -> np.ndarray:
         """(m, k+1) int64, ids ascending in each row, rows in lexicographic order."""
-        order = np.lexsort(self._rows.T[::-1])
-        return self._rows[order].astype(np.int64)
+        return in_order(self._rows)
 
     def _append_points(self, first: int, block: np.ndarray) -> None:
         if not len(block):

@@ -11,7 +11,7 @@ from typing import Callable
 
 import grpc
 
-from .errors import StellateError, Unavailable
+from .errors import MeshNotFound, StellateError, Unavailable
 
 _log = logging.getLogger("stellate")
 
@@ -89,6 +89,17 @@ class Outage:
             _log.warning("the server is back after %.1f s", time.monotonic() - self._lost_at)
         self._attempts = 0
         self._pauses = pauses()
+
+    def explain(self, error: StellateError) -> StellateError:
+        """What a mesh that is not there means when it was there before."""
+        if isinstance(error, MeshNotFound) and self.lasts:
+            return Unavailable(
+                "the server went away and came back without the mesh; it keeps meshes only with "
+                "--data-dir",
+                error.reason,
+                error.details,
+            )
+        return error
 
     def wait_or_raise(self, error: grpc.RpcError, as_ours: StellateError) -> None:
         """Returns when it is time for another attempt.

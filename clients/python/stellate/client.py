@@ -10,6 +10,7 @@ from typing import Any, Callable, Iterator, TypeVar
 import grpc
 
 from ._credentials import Credentials, stays_on_this_machine
+from ._download import Parts
 from ._generated import mesh_pb2
 from ._generated import stellate_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
@@ -17,7 +18,7 @@ from ._retry import Outage, Patience
 from ._server import Server
 from ._spec import mesh_spec
 from ._worker import Worker
-from .errors import InvalidArgument, MeshNotFound, StellateError, Unavailable, from_rpc
+from .errors import InvalidArgument, MeshNotFound, StellateError, from_rpc
 from .oracle import CheckedOracle
 from .report import Progress, Report
 
@@ -220,6 +221,13 @@ class Client:
         outage = Outage(self._patience)
         return Watch(self._stub, outage, name, from_revision, progress_only)
 
+    def parts(self, name: str, revision: int = 0) -> Parts:
+        """A mesh as it was at one revision, 0 being the newest, in the protocol's own messages.
+
+        See stellate.download for the mesh itself.
+        """
+        return Parts(self._stub, Outage(self._patience), name, revision)
+
     def get_spec(self, name: str) -> mesh_pb2.MeshSpec:
         """The specification in the protocol's own message."""
         return self._call(self._stub.GetMesh, pb.GetMeshRequest(name=name)).spec
@@ -310,7 +318,7 @@ class Watch:
                 event = next(self._stream)
             except grpc.RpcError as error:
                 self._stream = None
-                self._outage.wait_or_raise(error, self._explain(from_rpc(error)))
+                self._outage.wait_or_raise(error, self._outage.explain(from_rpc(error)))
                 self.on_resume()
                 continue
             self._outage.heard()
@@ -329,13 +337,3 @@ class Watch:
         self._outage.stop()
         if self._stream is not None:
             self._stream.cancel()
-
-    def _explain(self, error: StellateError) -> StellateError:
-        if isinstance(error, MeshNotFound) and self._outage.lasts:
-            return Unavailable(
-                "the server went away and came back without the mesh; it keeps meshes only with "
-                "--data-dir",
-                error.reason,
-                error.details,
-            )
-        return error

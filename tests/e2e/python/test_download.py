@@ -1,0 +1,206 @@
+"""Fetching meshes that are on a server."""
+
+import threading
+
+import grpc
+import numpy as np
+import pytest
+
+import stellate
+from stellate import manifolds
+from stellate._arrays import to_wire
+from stellate._generated import mesh_pb2, stellate_pb2
+
+from fake_server import FakeServer, indices, serving
+
+UNKNOWN = "meshes/" + 32 * "0"
+
+
+@pytest.fixture(scope="module")
+def finished(server):
+    """The name of a finished mesh, and the mesh as it was watched."""
+    with stellate.Client(server) as client:
+        name = client.create(manifolds.Torus(), 0.3).name
+        assert client.serve(manifolds.Torus(), name) == "SUCCEEDED"
+        *_, mesh = stellate.watch(name, server=client)
+        yield name, mesh
+        client.delete(name)
+
+
+def assert_same(a, b):
+    assert a.points.tobytes() == b.points.tobytes()
+    assert a.simplices.tobytes() == b.simplices.tobytes()
+
+
+def test_a_finished_mesh_is_fetched_with_its_report(finished, server, tmp_path):
+    name, watched = finished
+    parts = []
+    path = tmp_path / "torus.txt"
+    mesh = stellate.download(name, path, server=server, on_part=lambda *here: parts.append(here))
+    assert_same(mesh, watched)
+    assert mesh.report == watched.report and mesh.certified
+    assert mesh.revision == watched.revision
+    assert_same(stellate.load_txt(path), watched)
+    assert parts[-1] == 2 * (len(mesh.points) + len(mesh.simplices),)
+    assert_same(stellate.download(name, server=server), watched)  # it is still there
+
+
+def test_any_revision_is_fetched(finished, client):
+    name, watched = finished
+    early = stellate.download(name, server=client, revision=2)
+    assert early.revision == 2 and early.report is None
+    assert 0 < len(early.points) < len(watched.points)
+    assert early.points.tobytes() == watched.points[: len(early.points)].tobytes()
+    last = stellate.download(name, server=client, revision=watched.revision)
+    assert last.report == watched.report
+    with pytest.raises(stellate.InvalidArgument, match=str(watched.revision + 1)):
+        stellate.download(name, server=client, revision=watched.revision + 1)
+
+
+def test_a_mesh_that_is_not_there(client, tmp_path):
+    with pytest.raises(stellate.MeshNotFound):
+        stellate.download(UNKNOWN, server=client)
+    name = client.create(manifolds.Torus(), 0.3).name
+    client.delete(name)
+    with pytest.raises(stellate.MeshNotFound):
+        stellate.download(name, tmp_path / "none.txt", server=client, unfinished="wait")
+    assert not (tmp_path / "none.txt").exists()
+
+
+def test_a_mesh_that_is_not_over(finished, client):
+    name = client.create(manifolds.Torus(), 0.3).name
+    with pytest.raises(stellate.FailedPrecondition, match="not over: WAITING"):
+        stellate.download(name, server=client)
+    empty = stellate.download(name, server=client, unfinished="take")
+    assert empty.points.shape == (0, 3) and empty.simplices.shape == (0, 3)
+    assert empty.report is None
+    with pytest.raises(ValueError, match="unfinished"):
+        stellate.download(name, server=client, unfinished="maybe")
+
+    worker = threading.Thread(target=lambda: client.serve(manifolds.Torus(), name))
+    seen = []
+    worker.start()
+    mesh = stellate.download(name, server=client, unfinished="wait", on_progress=seen.append)
+    worker.join()
+    assert mesh.certified
+    assert_same(mesh, finished[1])
+    client.delete(name)
+
+
+def test_a_cancelled_and_a_failed_mesh(client):
+    name = client.create(manifolds.Torus(), 0.3).name
+    client.cancel(name)
+    with pytest.raises(stellate.Cancelled) as caught:
+        stellate.download(name, server=client)
+    assert caught.value.mesh.report.termination == "CANCELLED"
+    client.delete(name)
+
+    class Wrong(manifolds.Torus):
+        def closest_point(self, points):
+            return super().closest_point(points) * np.nan
+
+    name = client.create(Wrong(), 0.3).name
+    with pytest.raises(stellate.StellateError):
+        client.serve(Wrong(), name)
+    with pytest.raises(stellate.OracleError) as caught:
+        stellate.download(name, server=client, unfinished="wait")
+    assert caught.value.reason == "ORACLE_FAILED"
+    taken = stellate.download(name, server=client, unfinished="take")
+    assert taken.report.failure.reason == "ORACLE_FAILED" and taken.points.shape[1] == 3
+    client.delete(name)
+
+
+class Scattered(FakeServer):
+    """A hexagon, sent a row at a time; `breaks`: after so many parts the stream is broken off."""
+
+    points = np.array([[np.cos(a), np.sin(a)] for a in np.arange(6) * np.pi / 3])
+    cells = np.array([[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [0, 5]])
+
+    def __init__(self, breaks=(), code=grpc.StatusCode.UNAVAILABLE):
+        super().__init__()
+        self.breaks, self.code, self.asked = list(breaks), code, []
+
+    def GetServerInfo(self, request, context):
+        return stellate_pb2.ServerInfo(version="fake")
+
+    def GetMesh(self, request, context):
+        mesh = mesh_pb2.Mesh(name=request.name, state=mesh_pb2.MESH_STATE_SUCCEEDED, revision=7)
+        mesh.spec.dimension, mesh.spec.ambient_dimension = 1, 2
+        mesh.report.termination = mesh_pb2.TERMINATION_CONVERGED
+        mesh.end_time.GetCurrentTime()
+        return mesh
+
+    def DownloadMesh(self, request, context):
+        self.asked.append((request.revision, request.position))
+        sent = 0
+        for position in range(request.position, 12):
+            if self.breaks and sent == self.breaks[0]:
+                self.breaks.pop(0)
+                context.abort(self.code, "broken by the test")
+            sent += 1
+            yield self.part(position)
+
+    def part(self, position):
+        part = stellate_pb2.DownloadMeshResponse(
+            revision=7, vertices=6, simplices=6, first_vertex=min(position, 6)
+        )
+        if position < 6:
+            part.points.CopyFrom(to_wire(self.points[position : position + 1]))
+        else:
+            part.cells.CopyFrom(indices(self.cells[position - 6 : position - 5]))
+        part.next_position = position + 1
+        part.complete = position == 11
+        return part
+
+
+def test_a_broken_download_goes_on_where_it_was():
+    fake = Scattered(breaks=[4, 0, 5])
+    with serving(fake) as address:
+        mesh = stellate.download("meshes/x", server=address)
+    assert fake.asked == [(0, 0), (7, 4), (7, 4), (7, 9)]
+    assert mesh.points.tobytes() == Scattered.points.tobytes()
+    assert mesh.simplices.tolist() == sorted(Scattered.cells.tolist())
+    assert mesh.report.termination == "CONVERGED"
+
+
+def test_a_download_that_cannot_be_resumed():
+    with serving(Scattered(breaks=[4])) as address:
+        with stellate.Client(address, reconnect_seconds=0) as client:
+            with pytest.raises(stellate.Unavailable, match="broken by the test"):
+                stellate.download("meshes/x", server=client)
+
+    class Forgetful(Scattered):
+        def DownloadMesh(self, request, context):
+            if request.position > 0:
+                context.abort(grpc.StatusCode.NOT_FOUND, "no such mesh")
+            yield from super().DownloadMesh(request, context)
+
+    with serving(Forgetful(breaks=[4])) as address:
+        with pytest.raises(stellate.Unavailable, match="--data-dir"):
+            stellate.download("meshes/x", server=address)
+    fake = Scattered(breaks=[4], code=grpc.StatusCode.RESOURCE_EXHAUSTED)
+    with serving(fake) as address:
+        with pytest.raises(stellate.LimitExceeded):
+            stellate.download("meshes/x", server=address)
+    assert len(fake.asked) == 1
+
+
+@pytest.mark.parametrize("fault", ["skips", "promises", "ends", "refers"])
+def test_a_server_that_makes_no_sense(fault):
+    class Faulty(Scattered):
+        def DownloadMesh(self, request, context):
+            for part in super().DownloadMesh(request, context):
+                if fault == "skips" and part.first_vertex == 2:
+                    continue
+                if fault == "promises":
+                    part.simplices = 8
+                if fault == "ends" and part.complete:
+                    return
+                if fault == "refers" and part.complete:
+                    part.cells.CopyFrom(indices([[0, 9]]))
+                yield part
+
+    with serving(Faulty()) as address:
+        with pytest.raises(stellate.StellateError) as caught:
+            stellate.download("meshes/x", server=address)
+    assert caught.value.reason == "PROTOCOL"
