@@ -11,6 +11,7 @@
 #include "core/message.h"
 #include "server/flags.h"
 #include "server/health_check.h"
+#include "server/library_log.h"
 #include "server/log.h"
 #include "server/server.h"
 #include "server/tls.h"
@@ -94,6 +95,7 @@ int main(int argc, char** argv) {
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   signal(SIGPIPE, SIG_IGN);
   StartLogging(config.log_level, config.log_format);
+  stellate::server::TakeLibraryLogs();
 
   auto server = Server::Start(config);
   if (!server) return Fail(server.error().message, kExitUsage);

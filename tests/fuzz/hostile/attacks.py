@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import collections
 import dataclasses
+import functools
 import random
 import struct
 import threading
+import zlib
 from typing import Any, Callable, Iterator
 
 import grpc
@@ -25,6 +27,7 @@ SERVICE = "/stellate.v1.Stellate/"
 UNARY = ("CreateMesh", "GetMesh", "ListMeshes", "CancelMesh", "DeleteMesh", "GetServerInfo")
 _DEADLINE = 60.0  # a call that takes longer hangs
 _HUGE = 2**32 - 1
+_UNPACKED_MB = 256  # of a packed message
 
 
 class Breach(Exception):
@@ -304,6 +307,50 @@ def floods(target: Target) -> None:
     target.delete(mine)
 
 
+@functools.cache
+def _packed() -> bytes:
+    """A quarter of a megabyte that stands for a thousand times as much."""
+    packer = zlib.compressobj(9, wbits=31)
+    zeros = bytes(1 << 20)
+    return b"".join(packer.compress(zeros) for _ in range(_UNPACKED_MB)) + packer.flush()
+
+
+def packed_messages(target: Target) -> None:
+    """Messages that grow when they are unpacked. None may be: the campaign looks at the peak."""
+    message = raw.grpc_message(_packed(), compressed=1)
+    places = [SERVICE + rpc for rpc in (*UNARY, "ServeOracle", "WatchMesh", "DownloadMesh")]
+    places += ["/grpc.health.v1.Health/Check"]
+    places += ["/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"]
+    for _ in range(target.scale):
+        for place in places:
+            connection = target.connect()
+            connection.open(1, place, {"grpc-encoding": "gzip"})
+            for at in range(0, len(message), 16_000):
+                connection.data(1, message[at : at + 16_000])
+            connection.close()
+        call = target.channel.unary_unary(SERVICE + "GetMesh")
+        try:
+            call(bytes(100_000), timeout=_DEADLINE, compression=grpc.Compression.Gzip)
+            target.must_refuse(True, "a packed message")
+        except grpc.RpcError as error:
+            target.note(error)
+
+
+def unread_replies(target: Target) -> None:
+    """Pings, settings and calls whose replies nobody reads: they must not pile up."""
+    pings = 2000 * target.scale * raw.frame(raw.PING, 0, 0, bytes(8))
+    settings = 2000 * target.scale * raw.frame(raw.SETTINGS, 0, 0)
+    calls = b"".join(
+        raw.frame(raw.HEADERS, raw.END_HEADERS | raw.END_STREAM, 1 + 2 * number,
+                  raw.header_block(SERVICE + "Nothing"))
+        for number in range(200 * target.scale)
+    )
+    for flood in (pings, settings, calls):
+        connection = target.connect()
+        connection.send_unread(flood)
+        connection.close()
+
+
 def other_protocols(target: Target) -> None:
     """What is no HTTP/2 at all, and HTTP/2 that breaks its rules: the server hangs up."""
     rng = target.random
@@ -405,6 +452,8 @@ ATTACKS: tuple[Callable[[Target], None], ...] = (
     giant_shapes,
     half_open,
     floods,
+    packed_messages,
+    unread_replies,
     other_protocols,
     deaf_watchers,
 )

@@ -5,13 +5,15 @@
 Starts $STELLATED. A round is every attack once, in random order, from two threads at once. All the
 while honest meshes are made by the command line ($STELLATE); each has to be the same, byte for byte,
 as the one made before the first attack. The server has to live, to answer, to stop when it is told,
-and to hold no more memory in the end than early on, but for --slack-mb.
+to hold no more memory in the end than early on, nor ever more than after a round, but for --slack-mb,
+and to keep its log in order: every line an object, of which a flood makes few.
 """
 
 from __future__ import annotations
 
 import argparse
 import collections
+import json
 import os
 import pathlib
 import random
@@ -31,6 +33,7 @@ import stellate  # noqa: E402
 from attacks import ATTACKS, Target  # noqa: E402
 
 _PATIENCE = 120.0  # seconds for anything that has to come to an end
+_LOG_LINES_A_SECOND = 12  # ten, and how many there were besides
 _WARM_ROUNDS = 2  # before memory is compared: arenas and buffers fill up
 
 
@@ -44,7 +47,8 @@ class Campaign:
         self._log = open(folder / "log", "wb")
         self._server = subprocess.Popen(
             [os.environ["STELLATED"], "--listen", "127.0.0.1:0", "--ready-file", str(ready)]
-            + ["--keep-finished-meshes", "1"],  # what is kept on purpose is no growth
+            + ["--keep-finished-meshes", "1"]  # what is kept on purpose is no growth
+            + ["--log-format", "json"],
             stdout=subprocess.DEVNULL,
             stderr=self._log,
         )
@@ -71,12 +75,13 @@ class Campaign:
             while not self._problems and self._goes_on(rounds, time.monotonic() - begin):
                 self._round(rounds)
                 rounds += 1
-                memory.append(self._resident_kb())
+                memory.append(self._status_kb("VmRSS"))
         finally:
             self._over.set()
             honest.join()
-        self._check_memory(memory)
+        self._check_memory(memory, self._status_kb("VmHWM"))
         self._stop()
+        self._check_log(time.monotonic() - begin)
         print(f"{rounds} rounds of {len(ATTACKS)} attacks; calls taken: {self._taken}, refused: "
               f"{', '.join(f'{code} {n}' for code, n in self._codes.most_common())}")
         print(f"{self._honest} honest meshes, each the same; {reference.count(10)} lines")
@@ -141,20 +146,39 @@ class Campaign:
                 return
             self._honest += 1
 
-    def _resident_kb(self) -> int:
+    def _status_kb(self, field: str) -> int:
         status = pathlib.Path(f"/proc/{self._server.pid}/status")
         for line in status.read_text().splitlines() if status.exists() else []:
-            if line.startswith("VmRSS:"):
+            if line.startswith(field + ":"):
                 return int(line.split()[1])
         return 0
 
-    def _check_memory(self, memory: list[int]) -> None:
+    def _check_memory(self, memory: list[int], peak: int) -> None:
+        slack = self._arguments.slack_mb
+        above = (peak - max(memory, default=peak)) / 1024
+        if above > slack:
+            self._problems.append(f"the server held {above:.0f} MB more for a moment")
         warm = memory[_WARM_ROUNDS - 1 :]
         if len(warm) < 2:
             return
         growth = (warm[-1] - warm[0]) / 1024
-        if growth > self._arguments.slack_mb:
+        if growth > slack:
             self._problems.append(f"the server grew by {growth:.0f} MB: {_brief(memory)}")
+
+    def _check_log(self, seconds: float) -> None:
+        """What libraries say of strangers goes through the server's log, and is rationed."""
+        self._log.flush()
+        lines = (self._folder / "log").read_text(errors="replace").splitlines()
+        of_libraries = 0
+        for line in lines:
+            try:
+                of_libraries += json.loads(line)["message"].startswith("libraries: ")
+            except (ValueError, KeyError, TypeError):
+                self._problems.append(f"a line of the log that is no object: {line}")
+                return
+        print(f"log: {len(lines)} lines, {of_libraries} of them of libraries")
+        if of_libraries > _LOG_LINES_A_SECOND * (seconds + 2):
+            self._problems.append(f"strangers made the server log {of_libraries} lines of libraries")
 
     def _stop(self) -> None:
         if self._server.poll() is None:

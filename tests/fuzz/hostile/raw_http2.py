@@ -10,6 +10,7 @@ PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
 DATA, HEADERS, PRIORITY, RST_STREAM, SETTINGS, PUSH, PING, GOAWAY, WINDOW, CONTINUATION = range(10)
 END_STREAM, END_HEADERS = 0x1, 0x4
 _GATHER = 60.0  # seconds that a server may take to say anything
+_STUCK = 0.5  # seconds without a byte taken: the server waits for us to read
 
 
 def grpc_message(body: bytes, declared: int | None = None, compressed: int = 0) -> bytes:
@@ -77,9 +78,20 @@ class Connection:
             else:
                 raise TimeoutError("the server neither reads nor writes")
 
-    def open(self, stream: int, path: str, flags: int = END_HEADERS) -> None:
+    def send_unread(self, data: bytes) -> None:
+        """Sends and reads nothing, until the server takes no more."""
+        view = memoryview(data)
+        while view and not self.closed:
+            if not select.select([], [self._socket], [], _STUCK)[1]:
+                return
+            try:
+                view = view[self._socket.send(view) :]
+            except OSError:
+                self.closed = True
+
+    def open(self, stream: int, path: str, extra: dict[str, str] | None = None) -> None:
         """Begins a call."""
-        self.send(frame(HEADERS, flags, stream, header_block(path)))
+        self.send(frame(HEADERS, END_HEADERS, stream, header_block(path, extra)))
 
     def data(self, stream: int, payload: bytes, flags: int = 0) -> None:
         """A part of a call's messages."""
