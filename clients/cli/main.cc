@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "doctor_command.h"
+#include "download_command.h"
 #include "mesh_command.h"
 #include "server_options.h"
 #include "stellate/catalogue.h"
@@ -91,6 +92,7 @@ int Main(int argc, char** argv) {
   stellate::cli::MeshCommand mesh(app);
   const CLI::App* list = app.add_subcommand("list", "Show the catalogue of manifolds");
   const stellate::cli::DoctorCommand doctor(app);
+  stellate::cli::DownloadCommand download(app);
   const stellate::cli::TopCommand top(app);
   CLI::App* const health = app.add_subcommand("health", "Ask a server how it is");
   const stellate::cli::ServerOptions health_server(health, "127.0.0.1:7717");
@@ -104,6 +106,7 @@ int Main(int argc, char** argv) {
   if (doctor.chosen()) return doctor.Run();
   if (health->parsed()) return Health(health_server);
   const StopOnSignal signals;
+  if (download.chosen()) return download.Run(signals.token());
   return top.chosen() ? top.Run(signals.token()) : mesh.Run(signals.token());
 }
 

@@ -1,7 +1,6 @@
 #include "mesh_command.h"
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <iostream>
 #include <memory>
 #include <type_traits>
@@ -42,15 +41,6 @@ void Add(CLI::App* to, const MeshSetting& setting, MeshOptions* options) {
         }
       },
       setting.field);
-}
-
-void Tell(const Outage& outage, double patience) {
-  if (outage.over) {
-    std::fprintf(stderr, "stellate: the server is back after %.1f s\n", outage.seconds);
-  } else if (outage.attempts == 1) {
-    std::fprintf(stderr, "stellate: lost the server (%s): trying again for up to %.0f s\n",
-                 outage.message.c_str(), patience);
-  }
 }
 
 }  // namespace

@@ -35,16 +35,23 @@ std::string Doing(const Progress& p) {
   return "agreeing";
 }
 
+std::string Bar(double fraction) {
+  const double share = std::isfinite(fraction) ? std::clamp(fraction, 0.0, 1.0) : 0;
+  const int filled = static_cast<int>(std::lround(share * kBarWidth));
+  char bar[64];
+  std::snprintf(bar, sizeof bar, "[%s%s] %3d %%",
+                std::string(static_cast<size_t>(filled), '#').c_str(),
+                std::string(static_cast<size_t>(kBarWidth - filled), '.').c_str(),
+                static_cast<int>(share * 100));
+  return bar;
+}
+
 }  // namespace
 
 std::string ProgressLine(const Progress& p, int width) {
-  const double share = std::isfinite(p.fraction) ? std::clamp(p.fraction, 0.0, 1.0) : 0;
-  const int filled = static_cast<int>(std::lround(share * kBarWidth));
   char line[256];
-  std::snprintf(line, sizeof line, "[%s%s] %3d %%  %-10s  %llu vertices, round %llu, %.1f s",
-                std::string(static_cast<size_t>(filled), '#').c_str(),
-                std::string(static_cast<size_t>(kBarWidth - filled), '.').c_str(),
-                static_cast<int>(share * 100), Doing(p).c_str(),
+  std::snprintf(line, sizeof line, "%s  %-10s  %llu vertices, round %llu, %.1f s",
+                Bar(p.fraction).c_str(), Doing(p).c_str(),
                 static_cast<unsigned long long>(p.vertices),
                 static_cast<unsigned long long>(p.round), p.elapsed_seconds);
   return std::string(line).substr(0, static_cast<size_t>(std::max(1, width)));
@@ -53,9 +60,20 @@ std::string ProgressLine(const Progress& p, int width) {
 ProgressBar::ProgressBar(bool quiet) : drawing_(!quiet && isatty(STDERR_FILENO) == 1) {}
 
 void ProgressBar::Show(const Progress& progress) {
-  if (!drawing_) return;
   // One column short of the edge, where some terminals wrap.
-  std::fprintf(stderr, "\r\033[K%s", ProgressLine(progress, TerminalWidth() - 1).c_str());
+  if (drawing_) Draw(ProgressLine(progress, TerminalWidth() - 1));
+}
+
+void ProgressBar::ShowPart(std::uint64_t received, std::uint64_t all) {
+  if (!drawing_) return;
+  const double share = all > 0 ? static_cast<double>(received) / static_cast<double>(all) : 1;
+  const std::string line =
+      Bar(share) + "  " + std::to_string(received) + " of " + std::to_string(all) + " fetched";
+  Draw(line.substr(0, static_cast<size_t>(std::max(1, TerminalWidth() - 1))));
+}
+
+void ProgressBar::Draw(const std::string& line) {
+  std::fprintf(stderr, "\r\033[K%s", line.c_str());
   std::fflush(stderr);
   shown_ = true;
 }

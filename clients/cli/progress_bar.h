@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "stellate/report.h"
@@ -12,9 +13,12 @@ class ProgressBar {
   explicit ProgressBar(bool quiet);
   ~ProgressBar() { Clear(); }
   void Show(const Progress& progress);
+  void ShowPart(std::uint64_t received, std::uint64_t all);  // of a mesh that is fetched
   void Clear();
 
  private:
+  void Draw(const std::string& line);
+
   bool drawing_;
   bool shown_ = false;
 };

@@ -1,6 +1,7 @@
 #include "server_options.h"
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
@@ -37,6 +38,15 @@ Expected<Credentials> ServerOptions::ReadCredentials() const {
     return Fail(ErrorCode::kRefused, token_file_ + " must hold one token and nothing else");
   }
   return credentials;
+}
+
+void Tell(const Outage& outage, double patience) {
+  if (outage.over) {
+    std::fprintf(stderr, "stellate: the server is back after %.1f s\n", outage.seconds);
+  } else if (outage.attempts == 1) {
+    std::fprintf(stderr, "stellate: lost the server (%s): trying again for up to %.0f s\n",
+                 outage.message.c_str(), patience);
+  }
 }
 
 int Complain(const Error& error) {

@@ -118,6 +118,16 @@ TEST_F(CommandLine, HealthListVersionAndHelpExitZero) {
   EXPECT_EQ(Run("mesh --help").status, 0);
 }
 
+TEST_F(CommandLine, DownloadRefusesWhatItCannotFetch) {
+  const std::string none = "meshes/00000000000000000000000000000000";
+  const Result result = OnServer("download " + none + " -o a.txt");
+  EXPECT_EQ(result.status, 2);
+  EXPECT_NE(result.output.find("MESH_NOT_FOUND"), std::string::npos) << result.output;
+  EXPECT_EQ(OnServer("download " + none).status, 2) << "nowhere to write it";
+  EXPECT_EQ(OnServer("download " + none + " -o a.txt --wait --unfinished").status, 2);
+  EXPECT_EQ(Run("download " + none + " -o a.txt --server unix:/nowhere/at/all").status, 3);
+}
+
 TEST_F(CommandLine, DoctorFindsTheCatalogueInGoodHealth) {
   const Result good = Run("doctor torus:1:0.4 --epsilon 0.3");
   EXPECT_EQ(good.status, 0) << good.output;

@@ -110,6 +110,15 @@ Expected<void> MeshBuilder::Absorb(v1::DeltaChunk&& chunk) {
   return {};
 }
 
+Expected<void> MeshBuilder::Add(v1::DownloadMeshResponse&& part) {
+  v1::MeshDelta delta;
+  delta.set_first_vertex(part.first_vertex());
+  delta.mutable_points()->Swap(part.mutable_points());
+  delta.mutable_added()->Swap(part.mutable_cells());
+  if (delta.added().shape_size() > 0) parts_simplices_ += delta.added().shape(0);
+  return Apply(delta);
+}
+
 Expected<void> MeshBuilder::Apply(const v1::MeshDelta& delta) {
   const Expected<Eigen::MatrixXd> points =
       FromArray(delta.points(), {static_cast<std::uint32_t>(d_)});

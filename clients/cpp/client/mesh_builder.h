@@ -39,6 +39,12 @@ class MeshBuilder {
   std::uint64_t revision() const { return revision_; }
   // Drops everything: the server begins anew.
   void Reset();
+  // Takes a part of a download, which is never sent again. Errors: what does not follow on the
+  // parts before it.
+  Expected<void> Add(v1::DownloadMeshResponse&& part);
+  // Of the parts so far.
+  std::uint64_t vertices() const { return coordinates_.size() / static_cast<std::size_t>(d_); }
+  std::uint64_t simplices() const { return parts_simplices_; }
   // Drops the chunks of a revision that was cut short.
   void ForgetPending() { pending_.clear(); }
 
@@ -55,6 +61,7 @@ class MeshBuilder {
   std::vector<v1::MeshDelta> pending_;
   std::vector<double> coordinates_;  // of the vertices so far, one after another
   std::unique_ptr<SimplexLog> log_;
+  std::uint64_t parts_simplices_ = 0;
 };
 
 }  // namespace stellate::client

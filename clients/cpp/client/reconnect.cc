@@ -1,6 +1,7 @@
 #include "reconnect.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <utility>
 
 #include "convert.h"
@@ -78,6 +79,19 @@ bool Reconnector::Again(const grpc::Status& status) {
   }
   Connect();
   return !stopped();
+}
+
+Error Reconnector::Lost(const grpc::Status& status) const {
+  Error error = Explain(status, reconnecting());
+  if (status.error_code() == grpc::StatusCode::NOT_FOUND) return error;
+  if (status.error_code() == grpc::StatusCode::CANCELLED) {
+    error.message = "the server broke off";
+  } else if (reconnecting()) {
+    char waited[64];
+    std::snprintf(waited, sizeof waited, "; waited %.4g s for it", policy_.give_up.count());
+    error.message += waited;
+  }
+  return error;
 }
 
 // Connections come about only while somebody waits for them, and a call that finds none fails

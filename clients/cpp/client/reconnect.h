@@ -60,6 +60,9 @@ class Reconnector {
   // Whether the last attempt follows on one that was broken off.
   bool reconnecting() const { return attempts_ > 0; }
 
+  // What to say when no other attempt is made after `status`.
+  Error Lost(const grpc::Status& status) const;
+
   // Cancels the attempt under way, and makes no other.
   void Stop();
   // Makes no other.

@@ -3,7 +3,6 @@
 #include <google/protobuf/empty.pb.h>
 
 #include <chrono>
-#include <cstdio>
 #include <stop_token>
 #include <utility>
 
@@ -188,28 +187,23 @@ Expected<Mesh> Run::Watch() {
 
 // What to say when a watch cannot be carried on.
 Error Run::LostFor(const grpc::Status& status) const {
+  const bool cancelled = watch_->stopped() && options_.stop.stop_requested();
+  if (!cancelled || status.error_code() == grpc::StatusCode::NOT_FOUND) return watch_->Lost(status);
   Error error = Explain(status, watch_->reconnecting());
-  if (status.error_code() == grpc::StatusCode::NOT_FOUND) return error;
-  if (watch_->stopped() && options_.stop.stop_requested()) {
-    error.message = "cancelled while the server was away: " + error.message;
-  } else if (status.error_code() == grpc::StatusCode::CANCELLED) {
-    error.message = "the server broke off";
-  } else if (watch_->reconnecting()) {
-    char waited[64];
-    std::snprintf(waited, sizeof waited, "; waited %.4g s for it", options_.reconnect_seconds);
-    error.message += waited;
-  }
+  error.message = "cancelled while the server was away: " + error.message;
   return error;
 }
 
+Error WhyFailed(const v1::Mesh& mesh) {
+  const v1::Failure& failure = mesh.report().failure();
+  const bool oracle = failure.reason().rfind("ORACLE_", 0) == 0 ||
+                      failure.reason() == "ANSWER_TIMEOUT" || failure.reason() == "NO_SEEDS";
+  return {oracle ? ErrorCode::kOracleFailed : ErrorCode::kServerFailed, failure.reason(),
+          failure.message()};
+}
+
 Expected<Mesh> Run::Conclude(const v1::Mesh& final) {
-  if (final.state() == v1::MESH_STATE_FAILED) {
-    const v1::Failure& failure = final.report().failure();
-    const bool oracle = failure.reason().rfind("ORACLE_", 0) == 0 ||
-                        failure.reason() == "ANSWER_TIMEOUT" || failure.reason() == "NO_SEEDS";
-    return Fail(oracle ? ErrorCode::kOracleFailed : ErrorCode::kServerFailed, failure.message(),
-                failure.reason());
-  }
+  if (final.state() == v1::MESH_STATE_FAILED) return tl::unexpected(WhyFailed(final));
   Expected<Mesh> mesh = builder_->Take();
   if (!mesh) return mesh;
   mesh->report = FromProto(final.report());

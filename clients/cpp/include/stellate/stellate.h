@@ -4,6 +4,7 @@
 #include "stellate/catalogue.h"
 #include "stellate/client.h"
 #include "stellate/doctor.h"
+#include "stellate/download.h"
 #include "stellate/implicit.h"
 #include "stellate/mesh.h"
 #include "stellate/monitor.h"

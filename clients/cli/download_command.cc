@@ -1,0 +1,75 @@
+#include "download_command.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <iostream>
+#include <utility>
+
+#include "progress_bar.h"
+
+namespace stellate::cli {
+
+DownloadCommand::DownloadCommand(CLI::App& parent)
+    : command_(parent.add_subcommand("download", "Fetch a mesh that is on a server")),
+      server_(command_, "127.0.0.1:7717") {
+  command_->add_option("mesh", mesh_, "its whole name: meshes/ and 32 digits")->required();
+  command_
+      ->add_option("-o,--output", outputs_,
+                   "file to write, .txt .off .obj .ply .vtu; may be given again")
+      ->required();
+  CLI::Option* const wait =
+      command_->add_flag("--wait", wait_, "wait for the end of a mesh that is not over");
+  command_->add_flag("--unfinished", unfinished_, "take a mesh as it is, over or failed or not")
+      ->excludes(wait);
+  command_->add_option("--revision", options_.revision, "the mesh as of this one; 0: the newest")
+      ->capture_default_str()
+      ->excludes(wait);
+  command_
+      ->add_option("--reconnect", options_.reconnect_seconds,
+                   "seconds that a server which went away is waited for")
+      ->capture_default_str();
+  command_->add_flag("--json", json_, "print the report as JSON");
+  command_->add_flag("-q,--quiet", quiet_, "no progress and no report");
+  command_->footer(
+      "Exit status: 0 certified, 1 not certified, 2 usage or refused, 3 server or oracle failed.");
+}
+
+int DownloadCommand::Run(std::stop_token stop) {
+  Expected<Credentials> credentials = server_.ReadCredentials();
+  if (!credentials) return Complain(credentials.error());
+  options_.server = server_.address();
+  options_.credentials = std::move(*credentials);
+  if (wait_) options_.unfinished = Unfinished::kWait;
+  if (unfinished_) options_.unfinished = Unfinished::kTake;
+  ProgressBar bar(quiet_);
+  options_.stop = std::move(stop);
+  options_.on_progress = [&bar](const Progress& progress) { bar.Show(progress); };
+  options_.on_part = [&bar](auto received, auto all) { bar.ShowPart(received, all); };
+  options_.on_outage = [this, &bar](const Outage& outage) {
+    bar.Clear();
+    Tell(outage, options_.reconnect_seconds);
+  };
+  const Expected<Mesh> mesh = DownloadMesh(mesh_, options_);
+  bar.Clear();
+  return mesh ? Deliver(*mesh) : Complain(mesh.error());
+}
+
+int DownloadCommand::Deliver(const Mesh& mesh) const {
+  int status = mesh.report.certified() ? kExitCertified : kExitNotCertified;
+  for (const std::string& path : outputs_) {
+    if (const Expected<void> saved = mesh.Save(path); !saved) status = Complain(saved.error());
+  }
+  const bool has_report = mesh.report.termination != Termination::kUnknown;
+  if (json_) {
+    std::cout << ToJson(mesh.report) << "\n";
+  } else if (!quiet_ && has_report) {
+    std::cout << ToText(mesh.report);
+  } else if (!quiet_) {
+    std::printf("%lld vertices, %lld simplices, not the end of the mesh\n",
+                static_cast<long long>(mesh.points.cols()),
+                static_cast<long long>(mesh.simplices.cols()));
+  }
+  return status;
+}
+
+}  // namespace stellate::cli

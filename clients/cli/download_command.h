@@ -1,0 +1,31 @@
+#pragma once
+
+#include <CLI/App.hpp>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "server_options.h"
+#include "stellate/download.h"
+
+namespace stellate::cli {
+
+// `stellate download`.
+class DownloadCommand {
+ public:
+  explicit DownloadCommand(CLI::App& parent);
+  bool chosen() const { return command_->parsed(); }
+  int Run(std::stop_token stop);
+
+ private:
+  int Deliver(const Mesh& mesh) const;
+
+  CLI::App* command_;
+  ServerOptions server_;
+  DownloadOptions options_;
+  std::string mesh_;
+  std::vector<std::string> outputs_;
+  bool wait_ = false, unfinished_ = false, json_ = false, quiet_ = false;
+};
+
+}  // namespace stellate::cli

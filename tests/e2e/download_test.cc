@@ -1,0 +1,341 @@
+// Meshes that are on a server, fetched by their name.
+#include "stellate/download.h"
+
+#include <grpcpp/create_channel.h>
+#include <grpcpp/server_builder.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <deque>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "convert.h"
+#include "live.h"
+#include "stellate/v1/stellate.grpc.pb.h"
+#include "support/spoiled_oracle.h"
+#include "worker.h"
+
+namespace stellate::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+class DownloadTest : public Live {
+ protected:
+  DownloadTest()
+      : stub_(v1::Stellate::NewStub(
+            grpc::CreateChannel(Server(), grpc::InsecureChannelCredentials()))),
+        torus_(Make("torus:1:0.4")) {
+    options_.server = Server();
+  }
+
+  std::string Create(Oracle& oracle, double epsilon = 0.3) {
+    grpc::ClientContext context;
+    v1::CreateMeshRequest request;
+    *request.mutable_spec() = client::ToSpec(oracle, At(epsilon)).value();
+    v1::Mesh mesh;
+    EXPECT_TRUE(stub_->CreateMesh(&context, request, &mesh).ok());
+    return mesh.name();
+  }
+
+  void Serve(Oracle& oracle, const std::string& name) {
+    client::Worker(*stub_, oracle, name, "test", {}).Run();
+  }
+
+  std::string Finished() {
+    const std::string name = Create(*torus_);
+    Serve(*torus_, name);
+    return name;
+  }
+
+  // As MeshManifold collects it.
+  Mesh Watched() { return MeshManifold(*torus_, At(0.3)).value(); }
+
+  void Delete(const std::string& name) {
+    grpc::ClientContext context;
+    v1::DeleteMeshRequest request;
+    request.set_name(name);
+    google::protobuf::Empty empty;
+    EXPECT_TRUE(stub_->DeleteMesh(&context, request, &empty).ok());
+  }
+
+  const std::unique_ptr<v1::Stellate::Stub> stub_;
+  const std::unique_ptr<Manifold> torus_;
+  DownloadOptions options_;
+};
+
+TEST_F(DownloadTest, AFinishedMeshComesWithItsReport) {
+  const std::string name = Finished();
+  std::pair<std::uint64_t, std::uint64_t> last;
+  options_.unfinished = Unfinished::kWait;
+  options_.on_part = [&last](auto received, auto all) { last = {received, all}; };
+  const Expected<Mesh> mesh = DownloadMesh(name, options_);
+  ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
+  EXPECT_TRUE(AreIdentical(*mesh, Watched()));
+  EXPECT_TRUE(mesh->report.certified());
+  EXPECT_EQ(last.first, mesh->report.counts.vertices + mesh->report.counts.simplices);
+  EXPECT_EQ(last.first, last.second);
+  Delete(name);
+}
+
+TEST_F(DownloadTest, AnEarlierRevisionComesWithoutAReport) {
+  const std::string name = Finished();
+  options_.revision = 2;
+  const Expected<Mesh> mesh = DownloadMesh(name, options_);
+  ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
+  const Mesh watched = Watched();
+  EXPECT_GT(mesh->points.cols(), 0);
+  EXPECT_LT(mesh->points.cols(), watched.points.cols());
+  EXPECT_EQ(mesh->points, watched.points.leftCols(mesh->points.cols()));
+  EXPECT_EQ(mesh->report.termination, Termination::kUnknown);
+  options_.revision = 1'000'000;
+  const Expected<Mesh> none = DownloadMesh(name, options_);
+  ASSERT_FALSE(none.has_value());
+  EXPECT_EQ(none.error().reason, "REVISION_TOO_NEW");
+  Delete(name);
+}
+
+TEST_F(DownloadTest, AMeshThatIsNotOverIsRefusedTakenOrWaitedFor) {
+  const std::string name = Create(*torus_);
+  const Expected<Mesh> refused = DownloadMesh(name, options_);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().code, ErrorCode::kRefused);
+  EXPECT_NE(refused.error().message.find("not over: WAITING"), std::string::npos)
+      << refused.error().message;
+
+  options_.unfinished = Unfinished::kTake;
+  const Expected<Mesh> taken = DownloadMesh(name, options_);
+  ASSERT_TRUE(taken.has_value()) << taken.error().message;
+  EXPECT_EQ(taken->points.cols(), 0);
+  EXPECT_EQ(taken->ambient_dimension(), 3);
+  EXPECT_EQ(taken->report.termination, Termination::kUnknown);
+
+  options_.unfinished = Unfinished::kWait;
+  std::thread worker([&] { Serve(*torus_, name); });
+  const Expected<Mesh> mesh = DownloadMesh(name, options_);
+  worker.join();
+  ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
+  EXPECT_TRUE(AreIdentical(*mesh, Watched()));
+  EXPECT_TRUE(mesh->report.certified());
+  Delete(name);
+}
+
+TEST_F(DownloadTest, AMeshThatIsNotThereIsRefused) {
+  const std::string name = Create(*torus_);
+  Delete(name);
+  for (const Unfinished unfinished : {Unfinished::kRefuse, Unfinished::kWait, Unfinished::kTake}) {
+    options_.unfinished = unfinished;
+    const Expected<Mesh> mesh = DownloadMesh(name, options_);
+    ASSERT_FALSE(mesh.has_value());
+    EXPECT_EQ(mesh.error().reason, "MESH_NOT_FOUND");
+  }
+  EXPECT_EQ(DownloadMesh("torus", options_).error().reason, "INVALID_ARGUMENT");
+  options_.server.clear();
+  EXPECT_EQ(DownloadMesh(name, options_).error().code, ErrorCode::kRefused);
+}
+
+TEST_F(DownloadTest, AFailedMeshSaysWhyAndIsTakenWhenAskedFor) {
+  SpoiledOracle spoiled(*torus_);
+  spoiled.on_closest = [](const auto&, Answer& answer) { answer.points *= std::nan(""); };
+  spoiled.on_flat = [](const auto&, const auto&, const auto&, Answer& answer) {
+    answer.points *= std::nan("");
+  };
+  const std::string name = Create(spoiled);
+  Serve(spoiled, name);
+  options_.unfinished = Unfinished::kWait;
+  const Expected<Mesh> failed = DownloadMesh(name, options_);
+  ASSERT_FALSE(failed.has_value());
+  EXPECT_EQ(failed.error().code, ErrorCode::kOracleFailed);
+  EXPECT_EQ(failed.error().reason, "ORACLE_NOT_FINITE");
+  options_.unfinished = Unfinished::kTake;
+  const Expected<Mesh> taken = DownloadMesh(name, options_);
+  ASSERT_TRUE(taken.has_value()) << taken.error().message;
+  EXPECT_EQ(taken->report.failure_reason, "ORACLE_NOT_FINITE");
+  Delete(name);
+}
+
+// All programs of a build lie in one directory.
+int RunStellate(const std::string& arguments) {
+  std::string command = fs::read_symlink("/proc/self/exe").parent_path() / "stellate";
+  command.append(" ").append(arguments);
+  const int status = std::system(command.c_str());
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+std::string ReadFile(const fs::path& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+TEST_F(DownloadTest, TheCommandLineWritesTheSameFile) {
+  const fs::path directory =
+      fs::temp_directory_path() / ("stellate-fetch-" + std::to_string(getpid()));
+  fs::create_directories(directory);
+  const fs::path fetched = directory / "fetched.txt", watched = directory / "watched.txt";
+  const std::string on_server = " --server '" + Server() + "' -o " + fetched.string();
+  ASSERT_TRUE(Watched().Save(watched).has_value());
+
+  const std::string name = Finished();
+  EXPECT_EQ(RunStellate("download --wait -q " + name + on_server), 0);
+  EXPECT_EQ(ReadFile(fetched), ReadFile(watched));
+  const std::string unserved = Create(*torus_);
+  EXPECT_EQ(RunStellate("download -q " + unserved + on_server), 2) << "it is not over";
+  EXPECT_EQ(RunStellate("download --unfinished -q " + unserved + on_server), 1);
+  EXPECT_EQ(ReadFile(fetched), "2 3 0 0\n");
+  Delete(name);
+  Delete(unserved);
+  fs::remove_all(directory);
+}
+
+// A hexagon in the plane, sent a row at a time.
+class Scattered final : public v1::Stellate::Service {
+ public:
+  std::deque<int> breaks;  // after so many parts each stream in turn is broken off
+  grpc::Status with{grpc::StatusCode::UNAVAILABLE, "broken by the test"};
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> asked;  // revision, position
+  std::function<void(v1::DownloadMeshResponse*)> spoil;
+
+  grpc::Status GetMesh(grpc::ServerContext*, const v1::GetMeshRequest* request,
+                       v1::Mesh* mesh) override {
+    mesh->set_name(request->name());
+    mesh->set_state(v1::MESH_STATE_SUCCEEDED);
+    mesh->set_revision(7);
+    mesh->mutable_spec()->set_dimension(1);
+    mesh->mutable_spec()->set_ambient_dimension(2);
+    mesh->mutable_report()->set_termination(v1::TERMINATION_CONVERGED);
+    mesh->mutable_end_time()->set_seconds(1);
+    return grpc::Status::OK;
+  }
+
+  grpc::Status DownloadMesh(grpc::ServerContext*, const v1::DownloadMeshRequest* request,
+                            grpc::ServerWriter<v1::DownloadMeshResponse>* writer) override {
+    asked.emplace_back(request->revision(), request->position());
+    int sent = 0;
+    for (std::uint64_t position = request->position(); position < 12; ++position, ++sent) {
+      if (!breaks.empty() && breaks.front() == sent) {
+        breaks.pop_front();
+        return with;
+      }
+      v1::DownloadMeshResponse part = Part(position);
+      if (spoil) spoil(&part);
+      writer->Write(part);
+    }
+    return grpc::Status::OK;
+  }
+
+ private:
+  static v1::DownloadMeshResponse Part(std::uint64_t position) {
+    v1::DownloadMeshResponse part;
+    part.set_revision(7);
+    part.set_vertices(6);
+    part.set_simplices(6);
+    part.set_first_vertex(std::min<std::uint64_t>(position, 6));
+    if (position < 6) {
+      const double point[] = {static_cast<double>(position), 0.5};
+      part.mutable_points()->add_shape(1);
+      part.mutable_points()->add_shape(2);
+      part.mutable_points()->set_data(point, sizeof point);
+    } else {
+      const auto i = static_cast<std::uint32_t>(11 - position);  // not in order
+      const std::uint32_t cell[] = {i == 5 ? 0 : i, i == 5 ? 5 : i + 1};
+      part.mutable_cells()->add_shape(1);
+      part.mutable_cells()->add_shape(2);
+      part.mutable_cells()->set_data(cell, sizeof cell);
+    }
+    part.set_next_position(position + 1);
+    part.set_complete(position == 11);
+    return part;
+  }
+};
+
+class BrokenDownload : public ::testing::Test {
+ protected:
+  BrokenDownload() {
+    grpc::ServerBuilder builder;
+    int port = 0;
+    builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port);
+    builder.RegisterService(&fake_);
+    server_ = builder.BuildAndStart();
+    options_.server = "127.0.0.1:" + std::to_string(port);
+    options_.on_outage = [this](const Outage& outage) { outages_ += outage.over ? 0 : 1; };
+  }
+  Expected<Mesh> Fetch() { return DownloadMesh("meshes/x", options_); }
+
+  Scattered fake_;
+  std::unique_ptr<grpc::Server> server_;
+  DownloadOptions options_;
+  int outages_ = 0;
+};
+
+TEST_F(BrokenDownload, GoesOnWhereItWas) {
+  fake_.breaks = {4, 0, 5};
+  const Expected<Mesh> mesh = Fetch();
+  ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
+  using Asked = std::vector<std::pair<std::uint64_t, std::uint64_t>>;
+  EXPECT_EQ(fake_.asked, (Asked{{0, 0}, {7, 4}, {7, 4}, {7, 9}}));
+  EXPECT_EQ(outages_, 3);
+  ASSERT_EQ(mesh->points.cols(), 6);
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(mesh->points.col(i), Eigen::Vector2d(i, 0.5));
+  SimplexMatrix cells(2, 6);
+  cells << 0, 0, 1, 2, 3, 4,  //
+      1, 5, 2, 3, 4, 5;
+  EXPECT_EQ(mesh->simplices, cells);
+  EXPECT_EQ(mesh->report.termination, Termination::kConverged);
+}
+
+TEST_F(BrokenDownload, IsNotResumedWhereThatIsOfNoUse) {
+  options_.reconnect_seconds = 0;
+  fake_.breaks = {4};
+  Expected<Mesh> mesh = Fetch();
+  ASSERT_FALSE(mesh.has_value());
+  EXPECT_EQ(mesh.error().code, ErrorCode::kServerFailed);
+  EXPECT_NE(mesh.error().message.find("broken by the test"), std::string::npos);
+  options_.reconnect_seconds = 60;
+  fake_.breaks = {4};
+  fake_.with = {grpc::StatusCode::RESOURCE_EXHAUSTED, "too many"};
+  mesh = Fetch();
+  ASSERT_FALSE(mesh.has_value());
+  EXPECT_EQ(mesh.error().code, ErrorCode::kRefused);
+  EXPECT_EQ(fake_.asked.size(), 2u);
+}
+
+TEST_F(BrokenDownload, EndsWhenItIsStopped) {
+  std::stop_source source;
+  options_.stop = source.get_token();
+  options_.on_part = [&source](auto, auto) { source.request_stop(); };
+  fake_.breaks = {4};
+  const Expected<Mesh> mesh = Fetch();
+  ASSERT_FALSE(mesh.has_value());
+  EXPECT_EQ(mesh.error().reason, "CANCELLED");
+}
+
+TEST_F(BrokenDownload, PartsThatDoNotFitAreTheServersFault) {
+  const std::vector<std::function<void(v1::DownloadMeshResponse*)>> faults = {
+      [](auto* part) { part->set_first_vertex(part->first_vertex() + 1); },
+      [](auto* part) { part->set_simplices(8); }, [](auto* part) { part->set_complete(false); },
+      [](auto* part) { part->mutable_points()->set_data("short"); },
+      [](auto* part) {
+        const std::uint32_t cell[] = {0, 9};
+        if (part->complete()) part->mutable_cells()->set_data(cell, sizeof cell);
+      }};
+  for (const auto& fault : faults) {
+    fake_.spoil = fault;
+    const Expected<Mesh> mesh = Fetch();
+    ASSERT_FALSE(mesh.has_value());
+    EXPECT_EQ(mesh.error().code, ErrorCode::kServerFailed) << mesh.error().message;
+  }
+}
+
+}  // namespace
+}  // namespace stellate::testing
