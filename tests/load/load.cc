@@ -1,9 +1,10 @@
-// What a server bears. Prints figures, and fails only when a mesh comes out wrong.
+// What a server bears. Prints figures, and fails when a mesh comes out wrong or memory grows.
 //
 //   load many [MESHES]        that many at once (100), two workers and two watchers each
 //   load idle [MESHES]        that many without a worker (1000)
 //   load soak [SECONDS]       meshes without end (600), and where memory goes
-//   load overhead [EPSILON]   the same mesh in this process, over loopback, and from numpy
+//   load cancel [CANCELS]     meshes of 10,000 vertices cancelled so often (100), of more less
+//   often load overhead [EPSILON]   the same mesh in this process, over loopback, and from numpy
 
 #include "tests/load/load.h"
 
@@ -16,7 +17,8 @@ int main(int argc, char** argv) {
   if (what == "many") return stellate::load::Many(number > 0 ? static_cast<int>(number) : 100);
   if (what == "idle") return stellate::load::Idle(number > 0 ? static_cast<int>(number) : 1000);
   if (what == "soak") return stellate::load::Soak(number > 0 ? number : 600);
+  if (what == "cancel") return stellate::load::Cancel(number > 0 ? static_cast<int>(number) : 100);
   if (what == "overhead") return stellate::load::Overhead(number > 0 ? number : 0.02);
-  std::cerr << "usage: load many|idle|soak|overhead [NUMBER]\n";
+  std::cerr << "usage: load many|idle|soak|cancel|overhead [NUMBER]\n";
   return 2;
 }

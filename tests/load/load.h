@@ -14,6 +14,7 @@ int Many(int meshes);
 int Idle(int meshes);
 int Soak(double seconds);
 int Overhead(double epsilon);
+int Cancel(int cancels);
 
 class Stopwatch {
  public:

@@ -55,6 +55,33 @@ long Watch(v1::Stellate::Stub* stub, const std::string& name) {
   return reader->Finish().ok() && told == vertices ? told : -1;
 }
 
+// Watches a mesh and leaves it, so often. False if the server still counts watchers half a minute
+// later.
+bool ComeAndGo(v1::Stellate::Stub* stub, const std::string& name, int times) {
+  for (int i = 0; i < times; ++i) {
+    grpc::ClientContext context;
+    v1::WatchMeshRequest request;
+    request.set_name(name);
+    const auto reader = stub->WatchMesh(&context, request);
+    v1::WatchMeshResponse event;
+    if (!reader->Read(&event)) Die("a watch ended: " + reader->Finish().error_message());
+    context.TryCancel();
+    while (reader->Read(&event)) {
+    }
+    reader->Finish();
+  }
+  for (int i = 0; i < 600; ++i) {
+    grpc::ClientContext context;
+    v1::GetMeshRequest request;
+    request.set_name(name);
+    v1::Mesh mesh;
+    if (!stub->GetMesh(&context, request, &mesh).ok()) Die("the mesh that was watched is gone");
+    if (mesh.watchers() == 0) return true;
+    std::this_thread::sleep_for(50ms);
+  }
+  return false;
+}
+
 }  // namespace
 
 int Many(int meshes) {
@@ -127,6 +154,7 @@ int Idle(int meshes) {
   const auto stub = StubFor(server.address());
   const ServerProcess::Usage before = server.usage();
   const auto manifold = Make(kManifold);
+  std::string watched;
   for (int i = 0; i < meshes; ++i) {
     grpc::ClientContext context;
     v1::CreateMeshRequest request;
@@ -145,11 +173,15 @@ int Idle(int meshes) {
     v1::Mesh mesh;
     const grpc::Status status = stub->CreateMesh(&context, request, &mesh);
     if (!status.ok()) Die("mesh " + std::to_string(i) + ": " + status.error_message());
+    watched = mesh.name();
   }
   const ServerProcess::Usage created = server.usage();
   constexpr auto kQuiet = 10s;
   std::this_thread::sleep_for(kQuiet);
   const ServerProcess::Usage later = server.usage();
+  constexpr int kWatches = 1000;
+  const bool forgotten = ComeAndGo(stub.get(), watched, kWatches);
+  const ServerProcess::Usage after = server.usage();
   const Mesh mesh = MeshOn(server.address(), kManifold, kEpsilon, 1);
   const bool same = AreIdentical(mesh, reference);
   const std::size_t listed = List(stub.get()).size();
@@ -157,11 +189,13 @@ int Idle(int meshes) {
               (created.resident_mb - before.resident_mb) * 1024 / meshes, created.threads);
   std::printf("  processor time in %d idle seconds: %.2f s\n", static_cast<int>(kQuiet.count()),
               later.processor_seconds - created.processor_seconds);
+  std::printf("  one of them watched and left %d times: %+.1f MB%s\n", kWatches,
+              after.resident_mb - later.resident_mb, forgotten ? "" : ", and NOT FORGOTTEN");
   std::printf("  %zu listed; a mesh among them is %s\n", listed,
               same ? "bit-identical" : "DIFFERENT");
   const int status = server.Stop();
   if (status != 0) std::printf("  the server left with %d\n", status);
-  return same && status == 0 ? 0 : 1;
+  return same && forgotten && status == 0 ? 0 : 1;
 }
 
 }  // namespace stellate::load

@@ -10,11 +10,16 @@
 namespace stellate::load {
 namespace {
 
+// What the memory may grow by from the middle of a soak to its end, however long it is, by the line
+// that fits it best. Meshes come and go in it, so that single samples are some 20 MB apart.
+constexpr double kMostGrowthMb = 16;
+constexpr double kShortestJudged = 120;  // seconds: before that, kept meshes are still filling up
+
 struct Sample {
   double seconds = 0, resident_mb = 0;
 };
 
-// Least squares, in MB an hour.
+// Least squares, in MB a second.
 double Slope(const std::vector<Sample>& samples) {
   double n = 0, x = 0, y = 0, xx = 0, xy = 0;
   for (const Sample& sample : samples) {
@@ -25,7 +30,7 @@ double Slope(const std::vector<Sample>& samples) {
     xy += sample.seconds * sample.resident_mb;
   }
   const double spread = n * xx - x * x;
-  return spread > 0 ? (n * xy - x * y) / spread * 3600 : 0;
+  return spread > 0 ? (n * xy - x * y) / spread : 0;
 }
 
 }  // namespace
@@ -87,10 +92,14 @@ int Soak(double seconds) {
     const std::size_t at = (samples.size() - 1) * static_cast<std::size_t>(i) / 10;
     std::printf(" %.0f", samples[at].resident_mb);
   }
-  std::printf("\n  slope over the second half: %+.1f MB an hour\n", Slope(later));
+  const double growth = Slope(later) * seconds / 2;
+  std::printf("\n  growth over the second half: %+.1f MB; at most %.0f MB is allowed%s\n", growth,
+              kMostGrowthMb, seconds < kShortestJudged ? ", and not judged: too short" : "");
+  const bool flat = growth <= kMostGrowthMb || seconds < kShortestJudged;
+  if (!flat) std::printf("  the memory is NOT FLAT\n");
   const int status = server.Stop();
   if (status != 0) std::printf("  the server left with %d\n", status);
-  return different == 0 && status == 0 ? 0 : 1;
+  return different == 0 && flat && status == 0 ? 0 : 1;
 }
 
 }  // namespace stellate::load

@@ -1,0 +1,164 @@
+// How soon a cancelled mesh lets go of its thread: meshes of several sizes, each cancelled at a
+// moment drawn from the time that an undisturbed one takes.
+
+#include <grpcpp/create_channel.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <optional>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "convert.h"
+#include "stellate/v1/stellate.grpc.pb.h"
+#include "tests/load/load.h"
+#include "tests/load/server_process.h"
+#include "worker.h"
+
+namespace stellate::load {
+namespace {
+
+constexpr char kManifold[] = "torus";
+constexpr double kSoon = 0.1;  // seconds
+
+struct Size {
+  double epsilon;
+  int cancels;
+};
+
+// One mesh with a worker, and its end seen through a watch.
+class Run {
+ public:
+  Run(v1::Stellate::Stub& stub, Oracle& oracle, double epsilon) : stub_(stub) {
+    grpc::ClientContext context;
+    v1::CreateMeshRequest request;
+    MeshOptions options;
+    options.epsilon = epsilon;
+    const auto spec = client::ToSpec(oracle, options);
+    if (!spec) Die(spec.error().message);
+    *request.mutable_spec() = *spec;
+    v1::Mesh mesh;
+    const grpc::Status status = stub_.CreateMesh(&context, request, &mesh);
+    if (!status.ok()) Die(status.error_message());
+    name_ = mesh.name();
+    worker_.emplace(stub_, oracle, name_, "cancelled", client::ReconnectPolicy{});
+    serving_ = std::jthread([this] { worker_->Run(); });
+    watching_ = std::jthread([this] { Watch(); });
+  }
+
+  // Deletes it.
+  ~Run() {
+    grpc::ClientContext context;
+    v1::DeleteMeshRequest request;
+    request.set_name(name_);
+    google::protobuf::Empty empty;
+    stub_.DeleteMesh(&context, request, &empty);
+  }
+
+  // Seconds that the call took.
+  double Cancel() {
+    grpc::ClientContext context;
+    v1::CancelMeshRequest request;
+    request.set_name(name_);
+    v1::Mesh mesh;
+    const Stopwatch watch;
+    const grpc::Status status = stub_.CancelMesh(&context, request, &mesh);
+    const double seconds = watch.seconds();
+    if (!status.ok()) Die(status.error_message());
+    return seconds;
+  }
+
+  // When the server has told how it ended: its thread has nothing left to do.
+  v1::Mesh AwaitEnd() {
+    watching_.join();
+    return final_;
+  }
+
+ private:
+  void Watch() {
+    grpc::ClientContext context;
+    v1::WatchMeshRequest request;
+    request.set_name(name_);
+    request.set_progress_only(true);
+    const auto reader = stub_.WatchMesh(&context, request);
+    v1::WatchMeshResponse event;
+    while (reader->Read(&event)) {
+      if (event.has_final()) final_ = event.final();
+    }
+    reader->Finish();
+  }
+
+  v1::Stellate::Stub& stub_;
+  std::string name_;
+  v1::Mesh final_;  // the watching thread's until it is joined
+  std::optional<client::Worker> worker_;
+  std::jthread serving_, watching_;
+};
+
+void Print(const char* what, std::vector<double> seconds) {
+  std::sort(seconds.begin(), seconds.end());
+  const auto at = [&](double share) {
+    return 1e3 * seconds[static_cast<std::size_t>(share * static_cast<double>(seconds.size() - 1))];
+  };
+  const auto late =
+      std::count_if(seconds.begin(), seconds.end(), [](double s) { return s > kSoon; });
+  std::printf(
+      "    %-18s median %6.1f ms, nine in ten %6.1f ms, worst %6.1f ms; %ld beyond %.0f ms\n", what,
+      at(0.5), at(0.9), at(1), static_cast<long>(late), 1e3 * kSoon);
+}
+
+// The number of meshes that ended in another way than they should.
+int CancelAt(v1::Stellate::Stub& stub, Oracle& oracle, const Size& size, std::mt19937_64& random) {
+  const Stopwatch whole_watch;
+  const v1::Mesh whole = Run(stub, oracle, size.epsilon).AwaitEnd();
+  const double whole_seconds = whole_watch.seconds();
+  std::printf("  %lu vertices, %.2f s undisturbed; cancelled %d times\n",
+              static_cast<unsigned long>(whole.progress().vertices()), whole_seconds, size.cancels);
+  std::uniform_real_distribution<double> moment(0, whole_seconds);
+  std::vector<double> returned, freed;
+  int too_late = 0, wrong = whole.state() == v1::MESH_STATE_SUCCEEDED ? 0 : 1;
+  for (int i = 0; i < size.cancels; ++i) {
+    Run run(stub, oracle, size.epsilon);
+    std::this_thread::sleep_for(std::chrono::duration<double>(moment(random)));
+    const Stopwatch watch;
+    const double seconds = run.Cancel();
+    const v1::MeshState state = run.AwaitEnd().state();
+    if (state == v1::MESH_STATE_CANCELLED) {
+      returned.push_back(seconds);
+      freed.push_back(watch.seconds());
+    } else {
+      ++(state == v1::MESH_STATE_SUCCEEDED ? too_late : wrong);
+    }
+  }
+  if (too_late > 0) std::printf("    %d were over before\n", too_late);
+  if (!freed.empty()) {
+    Print("the call returns", returned);
+    Print("the thread is free", freed);
+  }
+  std::fflush(stdout);
+  return wrong;
+}
+
+}  // namespace
+
+int Cancel(int cancels) {
+  ServerProcess server;
+  const auto stub = v1::Stellate::NewStub(
+      grpc::CreateChannel(server.address(), grpc::InsecureChannelCredentials()));
+  const auto oracle = Make(kManifold);
+  std::mt19937_64 random(1);
+  std::printf("a %s, cancelled at random moments\n", kManifold);
+  int wrong = 0;
+  for (const Size& size :
+       {Size{0.033, cancels}, Size{0.0105, (cancels + 1) / 2}, Size{0.0033, (cancels + 9) / 10}}) {
+    wrong += CancelAt(*stub, *oracle, size, random);
+  }
+  if (wrong > 0) std::printf("  %d ended in another way than they should\n", wrong);
+  const int status = server.Stop();
+  if (status != 0) std::printf("  the server left with %d\n", status);
+  return wrong == 0 && status == 0 ? 0 : 1;
+}
+
+}  // namespace stellate::load
