@@ -110,24 +110,27 @@ void Print(const char* what, std::vector<double> seconds) {
 }
 
 // The number of meshes that ended in another way than they should.
-int CancelAt(v1::Stellate::Stub& stub, Oracle& oracle, const Size& size, std::mt19937_64& random) {
+int CancelAt(const ServerProcess& server, v1::Stellate::Stub& stub, Oracle& oracle,
+             const Size& size, std::mt19937_64& random) {
   const Stopwatch whole_watch;
   const v1::Mesh whole = Run(stub, oracle, size.epsilon).AwaitEnd();
   const double whole_seconds = whole_watch.seconds();
   std::printf("  %lu vertices, %.2f s undisturbed; cancelled %d times\n",
               static_cast<unsigned long>(whole.progress().vertices()), whole_seconds, size.cancels);
   std::uniform_real_distribution<double> moment(0, whole_seconds);
-  std::vector<double> returned, freed;
+  std::vector<double> returned, freed, processor;
   int too_late = 0, wrong = whole.state() == v1::MESH_STATE_SUCCEEDED ? 0 : 1;
   for (int i = 0; i < size.cancels; ++i) {
     Run run(stub, oracle, size.epsilon);
     std::this_thread::sleep_for(std::chrono::duration<double>(moment(random)));
+    const double processor_before = server.usage().processor_seconds;
     const Stopwatch watch;
     const double seconds = run.Cancel();
     const v1::MeshState state = run.AwaitEnd().state();
     if (state == v1::MESH_STATE_CANCELLED) {
       returned.push_back(seconds);
       freed.push_back(watch.seconds());
+      processor.push_back(server.usage().processor_seconds - processor_before);
     } else {
       ++(state == v1::MESH_STATE_SUCCEEDED ? too_late : wrong);
     }
@@ -136,6 +139,7 @@ int CancelAt(v1::Stellate::Stub& stub, Oracle& oracle, const Size& size, std::mt
   if (!freed.empty()) {
     Print("the call returns", returned);
     Print("the thread is free", freed);
+    Print("its processor time", processor);  // which other programs do not lengthen
   }
   std::fflush(stdout);
   return wrong;
@@ -153,7 +157,7 @@ int Cancel(int cancels) {
   int wrong = 0;
   for (const Size& size :
        {Size{0.033, cancels}, Size{0.0105, (cancels + 1) / 2}, Size{0.0033, (cancels + 9) / 10}}) {
-    wrong += CancelAt(*stub, *oracle, size, random);
+    wrong += CancelAt(server, *stub, *oracle, size, random);
   }
   if (wrong > 0) std::printf("  %d ended in another way than they should\n", wrong);
   const int status = server.Stop();
