@@ -39,11 +39,20 @@ Status CheckShape(const Specification& spec, const QueryBlock& block, Index firs
     return refuse("found has ", answer.found.size(), " flags for ", n,
                   " points: send one for each, or none when all were found");
   }
+  const bool any_found =
+      n > 0 && (answer.found.empty() ||
+                std::any_of(answer.found.begin(), answer.found.end(), [](auto f) { return f; }));
+  if (answer.sizes.size() == 0 && block.want_sizes && any_found) {
+    return refuse(
+        "no sizes came but the query wants them: send one length for each point, or declare that "
+        "the oracle has no local_size");
+  }
+  if (answer.sizes.size() != 0 && answer.sizes.size() != n) {
+    return refuse("sizes hold ", answer.sizes.size(), " numbers for ", n,
+                  " points: send one length for each");
+  }
   const Index basis_size = d * spec.dimension;
   if (answer.tangents.size() == 0) {
-    const bool any_found =
-        n > 0 && (answer.found.empty() ||
-                  std::any_of(answer.found.begin(), answer.found.end(), [](auto f) { return f; }));
     if (block.want_tangents && any_found) {
       return refuse(
           "no tangent bases came but the query wants them: send n x d x k numbers, or "
@@ -135,6 +144,16 @@ Status CheckTangent(const Specification& spec, const QueryBlock& block, Index qu
   return Status::Ok();
 }
 
+Status CheckSize(const QueryBlock& block, Index query, double size) {
+  const auto refuse = [&](StatusCode code) -> Status {
+    return {code, Message(Where(block, query), ": the size at the answer is ", size,
+                          " but must be a length between ", kMinLength, " and ", kMaxLength,
+                          ": give a large one where epsilon alone is to decide")};
+  };
+  if (!IsUsable(size)) return refuse(StatusCode::kOracleNotFinite);
+  return size >= kMinLength ? Status::Ok() : refuse(StatusCode::kOracleBadSize);
+}
+
 }  // namespace
 
 Status CheckAnswers(const Specification& spec, const QueryBlock& block, Eigen::Index first,
@@ -153,6 +172,7 @@ Status CheckAnswers(const Specification& spec, const QueryBlock& block, Eigen::I
       status = CheckFinite(block, query, "tangent basis", basis, answer.tangents.rows());
       if (status.ok()) status = CheckTangent(spec, block, query, basis);
     }
+    if (status.ok() && answer.sizes.size() > 0) status = CheckSize(block, query, answer.sizes[j]);
     if (!status.ok()) return status;
   }
   return Status::Ok();

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -22,6 +24,7 @@ struct QueryBlock {
                            // coordinate i of tangent vector a; orthonormal
   Eigen::VectorXd radii;   // n, kIntersectFlat only: look no farther than this from c
   bool want_tangents = false;  // the answers must carry tangent bases
+  bool want_sizes = false;     // ... and local sizes
 
   Eigen::Index size() const { return points.cols(); }
 };
@@ -42,6 +45,7 @@ struct AnswerBlock {
   Eigen::MatrixXd points;           // d x n; ignored where not found
   std::vector<std::uint8_t> found;  // n, 1 or 0; empty: all found
   Eigen::MatrixXd tangents;         // (d k) x n laid out as QueryBlock::bases, or empty
+  Eigen::VectorXd sizes;            // n lengths, of the points; ignored where not found; or empty
 };
 
 struct Answers {
@@ -60,15 +64,23 @@ inline constexpr double kRadiusTolerance = 1e-6;
 // Largest |T^t T - I| entry. Admits bases computed in single precision. The mesher itself
 // tolerates directions wrong by 0.03, so this asks for orthonormality, not for accuracy.
 inline constexpr double kOrthonormalTolerance = 1e-6;
+// How much larger a point's size may be when it is told again, as a share of the larger: sizes
+// guide the mesh and need not be exact, but must be a function of the point.
+inline constexpr double kSameSizeTolerance = 0.1;
 // Added to the first two, as a share of the largest coordinate involved: what rounding alone does
 // to a point far from the origin.
 inline constexpr double kRoundingTolerance = 1e-13;
 
 // Checks the answers to queries [first, first + answer.points.cols()) of `block` against what can
 // be checked without asking again: counts, finiteness, on the flat, within the radius, orthonormal
-// tangents. The message holds the query's index in the block, the value and the rule broken.
-// Pure; any thread. Cost O(n d k^2).
+// tangents, positive sizes. The message holds the query's index in the block, the value and the
+// rule broken. Pure; any thread. Cost O(n d k^2).
 Status CheckAnswers(const Specification& spec, const QueryBlock& block, Eigen::Index first,
                     const AnswerBlock& answer);
+
+// Whether two sizes may be of one point.
+inline bool AreOneSize(double a, double b) {
+  return std::abs(a - b) <= kSameSizeTolerance * std::max(a, b);
+}
 
 }  // namespace stellate::core

@@ -27,6 +27,7 @@ inline constexpr std::int64_t kMaxBoxSeedCoordinates = 4'000'000;  // box_seeds 
 struct OracleCapabilities {
   bool intersect_flat = false;  // answers "the point of M nearest c in c + T^perp"
   bool tangent_basis = false;   // sends an orthonormal tangent basis with every point of M
+  bool local_size = false;      // says how large things are at every point of M: see size_rate
 };
 
 // Axis-aligned box, ambient coordinates, lower < upper in each.
@@ -56,14 +57,20 @@ struct Criteria {
   std::optional<double> advance_step;        // h, length: how far the front steps over unknown
                                              // ground. Default 3 epsilon, or a tenth of the
                                              // bounding box's diagonal if that is more
-  std::optional<Judging> judging;            // default kFlats for k <= 2, else kCommonCentre
+  std::optional<Judging> judging;            // default kFlats for k <= 2 and for graded sizes, else
+                                             // kCommonCentre
   bool ask_ahead = false;                    // rehearse on a guess of M first and ask for all that
                                              // it wants at once: a handful of round trips for
                                              // two to three times the processor time
-  // Adaptive size: where the mesh must be finer than epsilon, which stays the upper bound. Both go by
-  // the local feature size that the sample shows: the smallest |q - p|^2 / (2 dist(q, T_pM)) over a
-  // star, made 1-Lipschitz over neighbours. It sees curvature, not another sheet coming near, and
-  // never asks for less than epsilon / 64, since noise in the answers looks like curvature.
+  // Adaptive size: where the mesh must be finer than epsilon, which stays the upper bound. Both go
+  // by size(p), p a vertex:
+  // - what the client says of p, where OracleCapabilities::local_size: its local feature size or
+  //   another positive length, taken as it is. Nothing is assumed of the field between vertices: a
+  //   dip that no vertex falls into goes unseen, which a 1-Lipschitz field does not have where the
+  //   rate is below 1. Never finer than epsilon / 1024; a field that asks for more is a warning.
+  // - else the local feature size that the sample shows: the smallest |q - p|^2 / (2 dist(q, T_pM))
+  //   over a star, made 1-Lipschitz over neighbours. It sees curvature, not another sheet coming
+  //   near, and is never finer than epsilon / 64, since noise in the answers looks like curvature.
   std::optional<double> size_rate;           // R_p <= size_rate * size(p), no unit, in (0, 1]
   std::optional<double> max_deviation;       // the Hausdorff target, a length, > 0: R_p^2 / (2
                                              // size(p)), the circumcentre's distance to M, stays

@@ -13,6 +13,8 @@ const char* StatusCodeName(StatusCode code) {
     case StatusCode::kOracleOffFlat: return "ORACLE_OFF_FLAT";
     case StatusCode::kOracleOutsideRadius: return "ORACLE_OUTSIDE_RADIUS";
     case StatusCode::kOracleBadTangent: return "ORACLE_BAD_TANGENT";
+    case StatusCode::kOracleBadSize:
+      return "ORACLE_BAD_SIZE";
     case StatusCode::kOracleNotIdempotent: return "ORACLE_NOT_IDEMPOTENT";
     case StatusCode::kOracleFailed: return "ORACLE_FAILED";
     case StatusCode::kFailedPrecondition: return "FAILED_PRECONDITION";

@@ -80,9 +80,16 @@ std::string FindDisagreement(const core::Specification& spec, const core::QueryB
                             flat ? " apart" : "", ", more than the ", Brief(tolerance), " (",
                             kDisagreementTolerance, " epsilon) allowed"));
   }
+  if (apart > tolerance) return "";
+  const bool both_sizes = a.answers->sizes.size() > 0 && b.answers->sizes.size() > 0;
+  if (both_sizes && !core::AreOneSize(a.answers->sizes[a.at], b.answers->sizes[b.at])) {
+    return complain(Message("the sizes there are ", Brief(a.answers->sizes[a.at]), " and ",
+                            Brief(b.answers->sizes[b.at]), ", more than a share of ",
+                            core::kSameSizeTolerance, " apart"));
+  }
   const Index k = spec.dimension;
   const bool both_tangents = a.answers->tangents.size() > 0 && b.answers->tangents.size() > 0;
-  if (apart > tolerance || !both_tangents) return "";
+  if (!both_tangents) return "";
   const double sine = LargestSine(a.answers->tangents.col(a.at).data(),
                                   b.answers->tangents.col(b.at).data(), x.size(), k);
   if (sine <= kTangentDisagreement) return "";

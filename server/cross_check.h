@@ -31,8 +31,8 @@ struct Testimony {
 //
 // Closest points: a point on the medial axis has several, so their distances to the query are
 // compared and not the points. Intersections: the points themselves. Tangent spaces, not their
-// bases: where the points agree. "Not found" contradicts nothing but an intersection well inside
-// the radius: whether a solver converges is a matter of luck in some places.
+// bases, and sizes: where the points agree. "Not found" contradicts nothing but an intersection
+// well inside the radius: whether a solver converges is a matter of luck in some places.
 std::string FindDisagreement(const core::Specification& spec, const core::QueryBlock& block,
                              Eigen::Index query, const Testimony& a, const Testimony& b);
 

@@ -174,6 +174,7 @@ void LayOutSpecification(Archive& archive, Value& spec) {
   archive.Number(spec.epsilon);
   archive.Number(spec.oracle.intersect_flat);
   archive.Number(spec.oracle.tangent_basis);
+  archive.Number(spec.oracle.local_size);
   if (archive.Has(spec.bounding_box.has_value())) {
     if constexpr (!std::is_const_v<Value>) spec.bounding_box.emplace();
     archive.Numbers(spec.bounding_box->lower);
@@ -249,6 +250,7 @@ std::string EncodeAnswers(const core::Answers& answers) {
     writer.Numbers(block.points);
     writer.Bytes(block.found);
     writer.Numbers(block.tangents);
+    writer.Numbers(block.sizes);
   }
   return writer.Take();
 }
@@ -263,6 +265,7 @@ std::optional<core::Answers> DecodeAnswers(std::string_view record) {
     reader.Numbers(block.points);
     reader.Bytes(block.found);
     reader.Numbers(block.tangents);
+    reader.Numbers(block.sizes);
   }
   if (!reader.Complete()) return std::nullopt;
   return answers;
@@ -301,6 +304,7 @@ std::uint64_t DigestOf(const core::QueryBatch& batch) {
   for (const core::QueryBlock& block : batch.blocks) {
     digest.Add(static_cast<std::uint64_t>(block.kind));
     digest.Add(block.want_tangents);
+    digest.Add(block.want_sizes);
     digest.Add(block.points);
     digest.Add(block.bases);
     digest.Add(block.radii);

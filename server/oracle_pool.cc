@@ -136,6 +136,9 @@ void OraclePool::TakeOver(const Chunk& chunk, const core::AnswerBlock& answer) {
   if (whole.tangents.cols() > 0 && answer.tangents.cols() == chunk.count) {
     whole.tangents.middleCols(chunk.first, chunk.count) = answer.tangents;
   }
+  if (whole.sizes.size() > 0 && answer.sizes.size() == chunk.count) {
+    whole.sizes.segment(chunk.first, chunk.count) = answer.sizes;
+  }
   std::vector<std::shared_ptr<const SecondAnswer>> seconds;
   {
     const std::lock_guard lock(mutex_);
@@ -311,6 +314,7 @@ std::shared_ptr<Round> OraclePool::MakeRound(const core::QueryBatch& batch) cons
       const Index basis_size = Index{spec_.ambient_dimension} * spec_.dimension;
       answers.tangents = Eigen::MatrixXd::Zero(basis_size, n);
     }
+    if (block.want_sizes) answers.sizes = Eigen::VectorXd::Zero(n);
     round->answers.blocks.push_back(std::move(answers));
     round->answered_by.emplace_back(static_cast<std::size_t>(n), WorkerId{0});
   }
@@ -324,7 +328,8 @@ std::vector<Dispatch::Block> OraclePool::Measure(const core::QueryBatch& batch) 
   for (const core::QueryBlock& block : batch.blocks) {
     const bool flat = block.kind == core::QueryKind::kIntersectFlat;
     const std::size_t question = point + (flat ? basis + sizeof(double) : 0);
-    const std::size_t answer = point + 1 + (block.want_tangents ? basis : 0);
+    const std::size_t answer =
+        point + 1 + (block.want_tangents ? basis : 0) + (block.want_sizes ? sizeof(double) : 0);
     blocks.push_back({block.size(), std::max(question, answer)});
   }
   return blocks;

@@ -27,7 +27,9 @@ constexpr MeshSetting kCriteria[] = {
      "closest points towards a flat, without intersections"},
     {"--ask-ahead,!--no-ask-ahead", &O::ask_ahead,
      "refine a guess first: fewer round trips, more processor time"},
-    {"--size-rate", &O::size_rate, "R_p at most this share of the local feature size"},
+    {"--size-rate", &O::size_rate,
+     "R_p at most this share of the local size: the manifold's own where it is known, or "
+     "estimated"},
     {"--max-deviation", &O::max_deviation,
      "circumcentres at most so far from the manifold, a length"},
     {"--common-centre,!--no-common-centre", &O::common_centre,

@@ -41,6 +41,7 @@ void BatchParts::Cut() {
     QueryBlock piece;
     piece.kind = block.kind;
     piece.want_tangents = block.want_tangents;
+    piece.want_sizes = block.want_sizes;
     piece.points = block.points.middleCols(from, count);
     if (block.bases.size() > 0) piece.bases = block.bases.middleCols(from, count);
     if (block.radii.size() > 0) piece.radii = block.radii.segment(from, count);
@@ -57,10 +58,16 @@ Answers BatchParts::With(const Answers& answers) const {
     block.points.middleCols(from, count) = piece.points;
     if (!piece.found.empty())
       std::copy(piece.found.begin(), piece.found.end(), block.found.begin() + from);
-    if (!whole_.blocks[b].want_tangents) return;
-    if (block.tangents.size() == 0)
-      block.tangents.setZero(piece.tangents.rows(), whole_.blocks[b].size());
-    block.tangents.middleCols(from, count) = piece.tangents;
+    const QueryBlock& asked = whole_.blocks[b];
+    // Where nothing was found they may be missing.
+    if (asked.want_tangents && piece.tangents.size() > 0) {
+      if (block.tangents.size() == 0) block.tangents.setZero(piece.tangents.rows(), asked.size());
+      block.tangents.middleCols(from, count) = piece.tangents;
+    }
+    if (asked.want_sizes && piece.sizes.size() > 0) {
+      if (block.sizes.size() == 0) block.sizes.setZero(asked.size());
+      block.sizes.segment(from, count) = piece.sizes;
+    }
   });
   return all;
 }

@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
+#include <utility>
 
+#include "core/message.h"
 #include "core/parallel.h"
 
 namespace stellate::core {
@@ -13,23 +14,8 @@ namespace {
 // Closest points of answered points may move by this share of epsilon: positions wrong by 0.01
 // epsilon are still meshed well.
 constexpr double kIdempotenceTolerance = 1e-3;
-constexpr Eigen::Index kIdempotenceSample = 64;
-
-// Where R is large the image of a circumcentre may fall anywhere: one that comes nearer than this
-// share of epsilon, or of a shorter step, to the sample would cost quality, so the step is
-// shortened instead.
-constexpr double kCoarseSpacing = 0.5;
-// Otherwise the ball around the circumcentre is empty but for curvature. A point of it that has the
-// sample nearer than this share of the circumradius says that epsilon is too coarse for that; to
-// insert it could make edges shorter than the one that R2 complained of (rho0 = 2), without end.
-constexpr double kEmptyBall = 0.5;
-// Targets of a round lie R apart: images no farther than this share of R from their targets lie at
-// least R / 2 apart, as far as the empty ball asks.
-constexpr double kCalm = 0.25;
-// What is rehearsed can wait until it is known better.
-constexpr double kRehearsedSpacing = 0.9;
-// Good points are chosen off the centre.
-constexpr double kGoodPointSpacing = 0.25;
+// A point moved by no more of the distances between numbers there was moved by rounding.
+constexpr double kRoundings = 64;
 
 // Differences of closest points are taken over this share of epsilon: the error is its square over
 // the reach's, far below what directions may be wrong by (0.03).
@@ -57,9 +43,13 @@ ResolvedCriteria Resolve(const Specification& spec) {
   r.candidates = c.candidates.value_or(spec.dimension <= 2 ? 1 : 10);
   r.flat_alternations = c.flat_alternations;
   r.ask_ahead = c.ask_ahead;
-  r.judging = c.judging.value_or(spec.dimension <= 2 ? Judging::kFlats : Judging::kCommonCentre);
   r.size_rate = c.size_rate.value_or(INFINITY);
   r.max_deviation = c.max_deviation.value_or(INFINITY);
+  // Common centres mean something well below the local feature size; they are looked for up to
+  // epsilon, which is far above it where the size is graded.
+  const bool flats = spec.dimension <= 2 || r.graded();
+  r.judging = c.judging.value_or(flats ? Judging::kFlats : Judging::kCommonCentre);
+  r.sizes_given = r.graded() && spec.oracle.local_size;
   double step = kDefaultAdvanceEpsilons * spec.epsilon;
   if (spec.bounding_box) {
     const double diagonal = (spec.bounding_box->upper - spec.bounding_box->lower).norm();
@@ -103,14 +93,25 @@ Status Refinement<K>::CheckIdempotence(const Answers& answers) const {
   for (Eigen::Index i = 0; i < idempotence_sample_.cols(); ++i) {
     if (!again.found.empty() && !again.found[static_cast<std::size_t>(i)]) continue;
     const double moved = (again.points.col(i) - idempotence_sample_.col(i)).norm();
-    if (moved <= kIdempotenceTolerance * spec_.epsilon) continue;
-    std::ostringstream out;
-    out << "closest_point is not idempotent: query " << i << " of block "
-        << answers.blocks.size() - 1
-        << " was a point that closest_point itself had returned, and it"
-        << " was moved by " << moved << ", more than " << kIdempotenceTolerance
-        << " epsilon; closest_point must leave points of the manifold where they are";
-    return {StatusCode::kOracleNotIdempotent, out.str()};
+    if (moved <= kIdempotenceTolerance * spec_.epsilon) {
+      if (again.sizes.size() == 0 || AreOneSize(again.sizes[i], idempotence_sizes_[i])) continue;
+      return {StatusCode::kOracleBadSize,
+              Message("query ", i, " of block ", answers.blocks.size() - 1,
+                      " was a point that closest_point itself had returned: its size was ",
+                      idempotence_sizes_[i], " then and is ", again.sizes[i],
+                      " now; the size must depend on the point alone")};
+    }
+    std::string message = Message(
+        "closest_point is not idempotent: query ", i, " of block ", answers.blocks.size() - 1,
+        " was a point that closest_point itself had returned, and it was moved by ", moved,
+        ", more than ", kIdempotenceTolerance,
+        " epsilon; closest_point must leave points of the manifold where they are");
+    const double apart = std::numeric_limits<double>::epsilon() *
+                         idempotence_sample_.col(i).lpNorm<Eigen::Infinity>();
+    if (moved <= kRoundings * apart)
+      message += Message("; there, so far from the origin for this epsilon, numbers are ",
+                         Brief(apart), " apart: move the manifold nearer");
+    return {StatusCode::kOracleNotIdempotent, std::move(message)};
   }
   return Status::Ok();
 }
@@ -205,6 +206,7 @@ void Refinement<K>::Advance(const Answers& answers) {
   if (batch_ && idempotence_sample_.cols() > 0) {
     QueryBlock again;
     again.points = idempotence_sample_;
+    again.want_sizes = criteria_.sizes_given;
     batch_->blocks.push_back(std::move(again));
   }
 }
@@ -220,6 +222,7 @@ void Refinement<K>::TakePoints(const Answers& answers) {
   const auto take = [&](Eigen::Index c, const AnswerBlock& block, Eigen::Index column) {
     found_[static_cast<std::size_t>(c)] = is_found(block, column);
     points_.col(c) = block.points.col(column);
+    if (criteria_.sizes_given && block.sizes.size() > 0) sizes_[c] = block.sizes[column];
     if (block.tangents.size() == 0) return;
     for (int i = 0; i < d; ++i)
       for (int a = 0; a < K; ++a) tangents_(a * d + i, c) = block.tangents(i * K + a, column);
@@ -230,6 +233,7 @@ void Refinement<K>::TakePoints(const Answers& answers) {
   points_.resize(d, count);
   found_.assign(static_cast<std::size_t>(count), 0);
   tangents_.resize(d * K, count);
+  sizes_.resize(criteria_.sizes_given ? count : 0);
   for (Eigen::Index c = 0; c < count; ++c) {
     if (!sorted) {
       take(c, first, c);
@@ -241,8 +245,7 @@ void Refinement<K>::TakePoints(const Answers& answers) {
   if (purpose_ == Purpose::kTargets && alternations_left_ > 0) {
     // Back to the flat of each candidate, and to M from there.
     --alternations_left_;
-    QueryBlock block;
-    block.want_tangents = spec_.oracle.tangent_basis;
+    QueryBlock block = NewBlock(QueryKind::kClosestPoint);
     block.points = points_;
     for (std::size_t i = 0; i < targets_.size(); ++i) {
       const double* tangent = complex_.Tangent(targets_[i].star);
@@ -265,10 +268,12 @@ void Refinement<K>::AfterPoints() {
   // Tangents of the points that were found, with the stars' own as guesses.
   std::vector<Eigen::Index> known;
   std::vector<const double*> guesses;
+  std::vector<double> shares;
   const auto add = [&](Eigen::Index c, const double* guess) {
     if (!found_[static_cast<std::size_t>(c)]) return;
     known.push_back(c);
     guesses.push_back(guess);
+    if (criteria_.sizes_given) shares.push_back(BoundFor(sizes_[c]) / criteria_.epsilon);
   };
   if (purpose_ != Purpose::kTargets) {
     for (Eigen::Index c = 0; c < points_.cols(); ++c) add(c, nullptr);
@@ -283,7 +288,7 @@ void Refinement<K>::AfterPoints() {
       add(first_candidate_.back() + i, ahead_.tangents.col(i).data());
   }
   if (known.empty()) return AfterTangents();
-  tangent_finder_.Start(points_(Eigen::all, known), std::move(guesses));
+  tangent_finder_.Start(points_(Eigen::all, known), std::move(guesses), std::move(shares));
   AskAgain(*tangent_finder_.Next(), Stage::kTangents);
 }
 
@@ -312,159 +317,6 @@ void Refinement<K>::AfterTangents() {
   Plan();
 }
 
-template <int K>
-void Refinement<K>::InsertSeeds() {
-  Eigen::Index found = 0;
-  for (const std::uint8_t f : found_) found += f;
-  if (found == 0) {
-    std::ostringstream out;
-    out << "no seed has a closest point on the manifold: " << points_.cols()
-        << (spec_.seeds.cols() > 0 ? " seeds were" : " points of the bounding box were")
-        << " tried; give seeds near the manifold, or a box that holds it";
-    if (!spec_.oracle.tangent_basis)
-      out << "; seeds where the manifold does not look " << K << "-dimensional count as not found";
-    return Fail({StatusCode::kNoSeeds, out.str()});
-  }
-  idempotence_sample_.resize(complex_.d(), std::min(found, kIdempotenceSample));
-  Eigen::Index sampled = 0;
-  for (Eigen::Index c = 0; c < points_.cols(); ++c) {
-    if (!found_[static_cast<std::size_t>(c)]) continue;
-    if (sampled < idempotence_sample_.cols()) idempotence_sample_.col(sampled++) = points_.col(c);
-    if (complex_.size() < spec_.limits.max_vertices &&
-        !complex_.AnyWithin(points_.col(c).data(), criteria_.epsilon))
-      complex_.Append(points_.col(c).data(), tangents_.col(c).data());
-    else
-      ++report_.counts.duplicates;
-  }
-}
-
-// R1 and R2 insert the image of the circumcentre if that mends anything; R3 and R4 the best of
-// their candidates, each judged against the complex as it was before the round.
-template <int K>
-void Refinement<K>::InsertTargets() {
-  std::vector<int> best(targets_.size(), 0);
-  std::vector<Fitness> fitness(targets_.size());
-  ParallelFor(targets_.size(), [&](std::size_t i) {
-    if (targets_[i].violation.rule >= Rule::kSliver)
-      best[i] = BestCandidate(i);
-    else
-      fitness[i] = JudgeRefined(i);
-  });
-  bool all_calm = true;
-  for (std::size_t i = 0; i < targets_.size(); ++i) {
-    if (i % 1024 == 0) ThrowIfInterrupted();
-    if (targets_[i].violation.rule >= Rule::kSliver)
-      InsertGoodPoint(i, best[i]);
-    else
-      InsertRefined(i, fitness[i], &all_calm);
-  }
-}
-
-template <int K>
-double Refinement<K>::Clearance(const Target<K>& t) const {
-  const double coarse = rehearsal_ ? kRehearsedSpacing : kCoarseSpacing;
-  const double empty = rehearsal_ ? kRehearsedSpacing : kEmptyBall;
-  return IsCoarse(t.star, t.violation) ? coarse * std::min(SizeBound(t.star), t.radius)
-                                       : empty * t.radius;
-}
-
-template <int K>
-typename Refinement<K>::Fitness Refinement<K>::JudgeRefined(std::size_t i) const {
-  const Target<K>& t = targets_[i];
-  const Eigen::Index c = first_candidate_[i];
-  Fitness fitness;
-  fitness.found = found_[static_cast<std::size_t>(c)];
-  if (!fitness.found) return fitness;
-  const double* y = points_.col(c).data();
-  fitness.duplicate = complex_.AnyWithin(y, Clearance(t));
-  fitness.mends = !fitness.duplicate && complex_.CutsVertex(t.star, t.violation.vertex, y);
-  fitness.calm =
-      !rehearsal_ && Distance(y, candidates_.col(c).data(), complex_.d()) <= kCalm * t.radius;
-  return fitness;
-}
-
-template <int K>
-void Refinement<K>::InsertRefined(std::size_t i, Fitness fitness, bool* all_calm) {
-  const Target<K>& t = targets_[i];
-  const Eigen::Index c = first_candidate_[i];
-  if (!fitness.found) {
-    if (FindsFlats(t) && !rehearsal_)
-      no_flat_[t.star] = 1;
-    else
-      Discourage(t.star);
-    return;
-  }
-  const double* y = points_.col(c).data();
-  // Another of this round may have come near, unless all have stayed near where they were aimed.
-  *all_calm = *all_calm && fitness.calm;
-  if (fitness.mends && !*all_calm) fitness.duplicate = complex_.AnyWithin(y, Clearance(t));
-  if (fitness.duplicate || !fitness.mends) {
-    report_.counts.duplicates += fitness.duplicate;
-    return Discourage(t.star);
-  }
-  Insert(c, t.violation.rule, t.star);
-}
-
-template <int K>
-void Refinement<K>::Insert(Eigen::Index c, Rule rule, std::uint32_t near) {
-  complex_.Append(points_.col(c).data(), tangents_.col(c).data(), near);
-  if (rehearsal_) inserted_rules_.push_back(rule);
-  Counts& counts = report_.counts;
-  switch (rule) {
-    case Rule::kSize:
-      ++counts.inserted_size;
-      break;
-    case Rule::kRadiusEdge:
-      ++counts.inserted_radius_edge;
-      break;
-    case Rule::kSliver:
-      ++counts.inserted_sliver;
-      break;
-    case Rule::kInconsistent:
-      ++counts.inserted_inconsistent;
-      break;
-  }
-}
-
-template <int K>
-int Refinement<K>::BestCandidate(std::size_t i) const {
-  const Target<K>& t = targets_[i];
-  thread_local typename StarComplex<K>::Cell::Scratch scratch;
-  thread_local typename StarComplex<K>::Tentative tentative;
-  int best = -1, fewest = std::numeric_limits<int>::max();
-  for (Eigen::Index c = first_candidate_[i]; c < first_candidate_[i + 1] && fewest > 0; ++c) {
-    if (!found_[static_cast<std::size_t>(c)]) continue;
-    const double* y = points_.col(c).data();
-    if (!complex_.CutsVertex(t.star, t.violation.vertex, y) ||
-        complex_.AnyWithin(y, kGoodPointSpacing * t.radius))
-      continue;
-    const int index = static_cast<int>(c - first_candidate_[i]);
-    if (criteria_.candidates == 1) return index;
-    complex_.TryPoint(y, tangents_.col(c).data(), t.star, scratch, &tentative);
-    const int bad = CountBad<K>(complex_, y, tentative, criteria_.sliver_bound,
-                                criteria_.small_sliver_radius * t.radius, fewest);
-    if (bad < fewest) {
-      fewest = bad;
-      best = index;
-    }
-  }
-  return best;
-}
-
-template <int K>
-void Refinement<K>::InsertGoodPoint(std::size_t i, int best) {
-  const Target<K>& t = targets_[i];
-  if (best < 0) {
-    no_flat_[t.star] = 1;  // if that was why
-    return Discourage(t.star);
-  }
-  const Eigen::Index c = first_candidate_[i] + best;
-  const double* y = points_.col(c).data();
-  if (complex_.AnyWithin(y, kGoodPointSpacing * t.radius))
-    return;  // another of this round came near
-  Insert(c, t.violation.rule, t.star);
-}
-
 // Brings the stars and all that is known of them up to date with the appended points.
 template <int K>
 void Refinement<K>::Commit() {
@@ -480,7 +332,7 @@ void Refinement<K>::Commit() {
   delta_.added = std::move(change.added);
   delta_.removed = std::move(change.removed);
 
-  if (criteria_.graded()) {
+  if (criteria_.estimates_sizes()) {
     size_seen_.resize(complex_.size(), INFINITY);
     ParallelFor(touched.size(),
                 [&](std::size_t i) { size_seen_[touched[i]] = SizeSeenFrom(touched[i]); });

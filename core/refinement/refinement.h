@@ -24,7 +24,9 @@ struct ResolvedCriteria {
   bool ask_ahead;
   Judging judging;
   double size_rate, max_deviation;  // infinity: no such criterion
+  bool sizes_given;                 // graded by what the client says
   bool graded() const { return std::isfinite(size_rate) || std::isfinite(max_deviation); }
+  bool estimates_sizes() const { return graded() && !sizes_given; }
 };
 ResolvedCriteria Resolve(const Specification& spec);
 
@@ -83,9 +85,11 @@ class Refinement final : public Mesher {
   Target<K> Aim(std::uint32_t star, const Violation<K>& violation) const;
   void AskForTargets();
   void AskAgain(const QueryBlock& block, Stage stage);
+  // Without queries: asks for all that is needed of a point of M that may be inserted.
+  QueryBlock NewBlock(QueryKind kind) const;
   bool FindsFlats(const Target<K>& target) const;
 
-  // Answers (refinement.cc); the end (refinement_end.cc).
+  // Answers (refinement.cc), insertion (refinement_insert.cc), the end (refinement_end.cc).
   QueryBatch& OpenBatch();
   Status CheckIdempotence(const Answers& answers) const;
   void Advance(const Answers& answers);
@@ -107,6 +111,7 @@ class Refinement final : public Mesher {
   void InsertGoodPoint(std::size_t target, int best);
   int BestCandidate(std::size_t target) const;
   void Discourage(std::uint32_t star);
+  void Append(Eigen::Index candidate, std::uint32_t near);
   void Insert(Eigen::Index candidate, Rule rule, std::uint32_t near);
   void Commit();
   void StartCertificate();
@@ -117,10 +122,14 @@ class Refinement final : public Mesher {
 
   // Graded sizes (refinement_size.cc).
   double SizeSeenFrom(std::uint32_t star) const;
-  double LocalSize(std::uint32_t star) const;
+  double LocalSize(std::uint32_t star) const;  // estimated
   void SpreadSizes();
+  double WantedFor(double size) const;  // circumradius
+  double BoundFor(double size) const;   // the same within what is meshed
+  double FinestBound() const;
   double SizeBound(std::uint32_t star) const;  // of R1
   void JudgeAllSizes();
+  void DescribeSizes(StarFacts* facts);
 
   // So large that M between may be anything: more than twice the size asked for.
   bool IsCoarse(std::uint32_t star, const Violation<K>& violation) const {
@@ -155,15 +164,19 @@ class Refinement final : public Mesher {
   Eigen::MatrixXd points_;                            // d x n, as answered
   std::vector<std::uint8_t> found_;
   Eigen::MatrixXd tangents_;  // (K rows of d) x n
+  Eigen::VectorXd sizes_;     // n, where the client gives them
   TangentFinder tangent_finder_;
   int alternations_left_ = 0;
   Ahead ahead_;                // asked for with the targets' candidates, after them
   bool ahead_failed_ = false;  // the last round that asked ahead had nothing of it
   Eigen::MatrixXd idempotence_sample_;  // d x m, asked for again with the next batch
+  Eigen::VectorXd idempotence_sizes_;   // m, as told first
 
   // By star.
   enum Standing : std::uint8_t { kFine, kSizeOrShape, kSliverOrInconsistent };
-  std::vector<double> size_seen_;   // where the size is graded: the local feature size seen from it
+  std::vector<double> given_size_;  // where the client gives them
+  // Where they are estimated, and by the certificate in any case:
+  std::vector<double> size_seen_;   // the local feature size seen from the star
   std::vector<double> local_size_;  // the same, 1-Lipschitz over the stars, when last spread
   std::uint32_t sizes_judged_at_ = 0;  // vertices then
   bool sizes_judged_ = false;          // nothing has changed since
@@ -181,6 +194,7 @@ class Refinement final : public Mesher {
   std::uint64_t before_good_points_ = 0;  // vertices when R1 and R2 first held
 
   std::unique_ptr<Certifier> certifier_;
+  std::uint64_t too_fine_ = 0;  // stars whose given size asks for less than is meshed
   Eigen::MatrixXd certified_tangents_;
   std::vector<std::uint32_t> certified_simplices_;
 };

@@ -33,6 +33,7 @@ Refinement<K>::Refinement(const Refinement& original)
       rehearsal_(true),
       whole_rounds_(original.whole_rounds_),
       tangent_finder_(original.tangent_finder_),
+      given_size_(original.given_size_),
       size_seen_(original.size_seen_),
       local_size_(original.local_size_),
       sizes_judged_at_(original.sizes_judged_at_),
@@ -45,7 +46,7 @@ Refinement<K>::Refinement(const Refinement& original)
       blemished_(original.blemished_),
       all_suspect_(original.all_suspect_),
       before_good_points_(original.before_good_points_) {
-  spec_.oracle = {.intersect_flat = true, .tangent_basis = true};
+  spec_.oracle.intersect_flat = spec_.oracle.tangent_basis = true;
   spec_.limits.max_rounds = std::numeric_limits<std::uint64_t>::max();
   spec_.limits.max_batch_queries = 0;
   criteria_.ask_ahead = false;
@@ -57,9 +58,10 @@ template <int K>
 void Refinement<K>::Rehearse(Refinement& rehearsal) const {
   double missing = 0;
   for (const Active& a : active_)
-    missing += std::pow(std::max(a.violation.radius / criteria_.epsilon, 1.0), K);
+    missing += std::pow(std::max(a.violation.radius / SizeBound(a.star), 1.0), K);
   const double most = complex_.size() + kMostWanted * (missing + complex_.size());
-  Surrogate<K> surrogate(complex_, criteria_.advance_step, criteria_.epsilon);
+  Surrogate<K> surrogate(complex_, criteria_.advance_step, criteria_.epsilon,
+                         criteria_.sizes_given ? given_size_.data() : nullptr);
   rehearsal.Plan();
   for (int good_rounds = 0; good_rounds < kRehearsedGoodPointRounds;) {
     if (interruption_.raised()) throw Interrupted{};

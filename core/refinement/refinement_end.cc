@@ -19,9 +19,8 @@ void Refinement<K>::StartCertificate() {
   for (std::uint32_t p = 0; p < complex_.size(); ++p) {
     const double radius = std::sqrt(complex_.cell(p).max_norm2());
     facts.max_circumradius = std::max(facts.max_circumradius, radius);
-    if (criteria_.graded())
-      facts.max_size_ratio = std::max(facts.max_size_ratio, radius / LocalSize(p));
   }
+  if (criteria_.graded()) DescribeSizes(&facts);
   certified_tangents_ = complex_.TangentMatrix();
   certified_simplices_ = complex_.Simplices();
   const MeshView view{K,
@@ -60,6 +59,11 @@ void Refinement<K>::Finish(Termination termination) {
   Certificate& certificate = report_.certificate;
   if (termination == Termination::kConverged) {
     certificate = certifier_->certificate();
+    if (too_fine_ > 0)
+      certificate.warnings.push_back(Message("the sizes given ask for circumradii below ",
+                                             Brief(FinestBound()), " at ", too_fine_,
+                                             " vertices, finer than is meshed at epsilon ",
+                                             Brief(spec_.epsilon), ": take epsilon smaller."));
   } else {
     certificate.verdict = std::string("not certified: the run ended as ") +
                           TerminationName(termination) + " before every rule held";
@@ -146,7 +150,7 @@ void Refinement<K>::UpdateProgress() {
   // A cell of circumradius R will have to hold about (R / epsilon)^k / 2 more points.
   double missing = 0;
   for (const Active& a : active_) {
-    const double ratio = a.violation.radius / criteria_.epsilon;
+    const double ratio = a.violation.radius / SizeBound(a.star);
     progress_.unbounded_stars += !complex_.cell(a.star).bounded();
     ++(a.violation.rule == Rule::kSize ? progress_.bad_size : progress_.bad_radius_edge);
     missing += 0.5 * std::pow(std::max(ratio, 1.0), K);

@@ -48,9 +48,7 @@ int SeedsToAskAheadFrom(const Specification& spec) {
 
 template <int K>
 void Refinement<K>::AskForSeeds() {
-  QueryBlock block;
-  block.kind = QueryKind::kClosestPoint;
-  block.want_tangents = spec_.oracle.tangent_basis;
+  QueryBlock block = NewBlock(QueryKind::kClosestPoint);
   if (spec_.seeds.cols() > 0) {
     block.points = spec_.seeds;
   } else {
@@ -66,6 +64,15 @@ void Refinement<K>::AskForSeeds() {
   }
   purpose_ = Purpose::kSeeds;
   AskAgain(block, Stage::kPoints);
+}
+
+template <int K>
+QueryBlock Refinement<K>::NewBlock(QueryKind kind) const {
+  QueryBlock block;
+  block.kind = kind;
+  block.want_tangents = spec_.oracle.tangent_basis;
+  block.want_sizes = criteria_.sizes_given;
+  return block;
 }
 
 template <int K>
@@ -87,13 +94,14 @@ Target<K> Refinement<K>::Aim(std::uint32_t star, const Violation<K>& violation) 
   Target<K> target;
   target.star = star;
   target.violation = violation;
-  double scale = 1;
+  // Many steps are as long as they may be: exactly so, lest rounding say which comes first.
+  target.radius = violation.radius;
   if (violation.rule < Rule::kSliver) {
-    scale = std::min(1.0, criteria_.advance_step / violation.radius);
-    if (IsCoarse(star, violation)) scale = std::ldexp(scale, -discouraged_[star]);
+    target.radius = std::min(target.radius, criteria_.advance_step);
+    if (IsCoarse(star, violation)) target.radius = std::ldexp(target.radius, -discouraged_[star]);
   }
+  const double scale = target.radius / violation.radius;
   for (int a = 0; a < K; ++a) target.x[a] = violation.x[a] * scale;
-  target.radius = violation.radius * scale;
   return target;
 }
 
@@ -146,8 +154,8 @@ void Refinement<K>::Plan() {
     if (static_cast<double>(complex_.size()) > most) return Finish(Termination::kNoProgress);
   }
   std::vector<Target<K>> targets = SizeAndShapeTargets();
-  if (criteria_.graded() && ((targets.empty() && !sizes_judged_) ||
-                             complex_.size() > kSizesGrowth * sizes_judged_at_)) {
+  if (criteria_.estimates_sizes() &&
+      ((targets.empty() && !sizes_judged_) || complex_.size() > kSizesGrowth * sizes_judged_at_)) {
     JudgeAllSizes();
     targets = SizeAndShapeTargets();
   }
@@ -171,9 +179,8 @@ void Refinement<K>::AskForTargets() {
   const int d = complex_.d();
   candidates_.resize(d, count);
   places_.resize(static_cast<std::size_t>(count));
-  QueryBlock flats, closest;
-  flats.kind = QueryKind::kIntersectFlat;
-  flats.want_tangents = closest.want_tangents = spec_.oracle.tangent_basis;
+  QueryBlock flats = NewBlock(QueryKind::kIntersectFlat);
+  QueryBlock closest = NewBlock(QueryKind::kClosestPoint);
   Eigen::Index flat_count = 0;
   for (std::size_t i = 0; i < targets_.size(); ++i)
     if (FindsFlats(targets_[i])) flat_count += first_candidate_[i + 1] - first_candidate_[i];
@@ -217,8 +224,7 @@ void Refinement<K>::AskForTargets() {
   if (count > flat_count) batch_->blocks.push_back(std::move(closest));
   if (ahead_.size() > 0) {
     const int block = static_cast<int>(batch_->blocks.size());
-    QueryBlock ahead;
-    ahead.want_tangents = spec_.oracle.tangent_basis;
+    QueryBlock ahead = NewBlock(QueryKind::kClosestPoint);
     ahead.points = ahead_.points;
     batch_->blocks.push_back(std::move(ahead));
     for (Eigen::Index i = 0; i < ahead_.size(); ++i) places_.emplace_back(block, i);
@@ -242,6 +248,7 @@ void Refinement<K>::Discourage(std::uint32_t star) {
 #define STELLATE_INSTANTIATE(K)                                                    \
   template void Refinement<K>::AskForSeeds();                                      \
   template void Refinement<K>::AskAgain(const QueryBlock&, Stage);                 \
+  template QueryBlock Refinement<K>::NewBlock(QueryKind) const;                    \
   template bool Refinement<K>::FindsFlats(const Target<K>&) const;                 \
   template Target<K> Refinement<K>::Aim(std::uint32_t, const Violation<K>&) const; \
   template std::vector<Target<K>> Refinement<K>::SizeAndShapeTargets();            \

@@ -12,8 +12,10 @@ namespace {
 
 // Shorter edges than this share of a star's longest say little of curvature and much of noise.
 constexpr double kTellingEdge = 0.5;
-// The finest graded size, in epsilon.
-constexpr double kFinest = 1.0 / 64;
+// The finest graded sizes, in epsilon: an estimate may come of noise; what is given is meant, but
+// below it the weights of StarComplex would no longer be small against circumradii.
+constexpr double kFinestEstimated = 1.0 / 64;
+constexpr double kFinestGiven = 1.0 / 1024;
 
 }  // namespace
 
@@ -77,12 +79,43 @@ void Refinement<K>::SpreadSizes() {
 }
 
 template <int K>
+double Refinement<K>::WantedFor(double size) const {
+  const double by_deviation = std::sqrt(2 * criteria_.max_deviation * size);
+  return std::min(criteria_.size_rate * size, by_deviation);
+}
+
+template <int K>
+double Refinement<K>::FinestBound() const {
+  return (criteria_.sizes_given ? kFinestGiven : kFinestEstimated) * criteria_.epsilon;
+}
+
+template <int K>
+double Refinement<K>::BoundFor(double size) const {
+  return std::clamp(WantedFor(size), FinestBound(), criteria_.epsilon);
+}
+
+// Of given sizes the star's own alone: where they differ within a simplex, the star of the vertex
+// that has the smallest sees to it.
+template <int K>
 double Refinement<K>::SizeBound(std::uint32_t p) const {
   if (!criteria_.graded()) return criteria_.epsilon;
-  const double size = LocalSize(p);
-  const double bound =
-      std::min(criteria_.size_rate * size, std::sqrt(2 * criteria_.max_deviation * size));
-  return std::clamp(bound, kFinest * criteria_.epsilon, criteria_.epsilon);
+  return BoundFor(criteria_.sizes_given ? given_size_[p] : LocalSize(p));
+}
+
+// How coarse the mesh is, the certificate judges by what the sample shows: given sizes need not be
+// local feature sizes.
+template <int K>
+void Refinement<K>::DescribeSizes(StarFacts* facts) {
+  if (criteria_.sizes_given) {
+    size_seen_.resize(complex_.size());
+    ParallelFor(complex_.size(), [&](std::uint32_t p) { size_seen_[p] = SizeSeenFrom(p); });
+    SpreadSizes();
+    for (const double size : given_size_) too_fine_ += WantedFor(size) < FinestBound();
+  }
+  for (std::uint32_t p = 0; p < complex_.size(); ++p) {
+    const double radius = std::sqrt(complex_.cell(p).max_norm2());
+    facts->max_size_ratio = std::max(facts->max_size_ratio, radius / LocalSize(p));
+  }
 }
 
 // A star's bound also follows its neighbours, whose sizes may have changed after it was judged.
@@ -110,7 +143,11 @@ void Refinement<K>::JudgeAllSizes() {
   template double Refinement<K>::SizeSeenFrom(std::uint32_t) const; \
   template double Refinement<K>::LocalSize(std::uint32_t) const;    \
   template void Refinement<K>::SpreadSizes();                       \
+  template double Refinement<K>::WantedFor(double) const;           \
+  template double Refinement<K>::FinestBound() const;               \
+  template double Refinement<K>::BoundFor(double) const;            \
   template double Refinement<K>::SizeBound(std::uint32_t) const;    \
+  template void Refinement<K>::DescribeSizes(StarFacts*);           \
   template void Refinement<K>::JudgeAllSizes();
 STELLATE_INSTANTIATE(1)
 STELLATE_INSTANTIATE(2)

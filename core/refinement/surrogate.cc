@@ -62,8 +62,10 @@ void Surrogate<K>::Slopes(const double* v, double (*slopes)[kTerms]) {
 }
 
 template <int K>
-Surrogate<K>::Surrogate(const StarComplex<K>& complex, double step, double epsilon)
+Surrogate<K>::Surrogate(const StarComplex<K>& complex, double step, double epsilon,
+                        const double* sizes)
     : complex_(complex),
+      sizes_(sizes),
       step_(step),
       epsilon_(epsilon),
       form_size_(static_cast<std::size_t>(kTerms) * static_cast<std::size_t>(complex.d())),
@@ -193,7 +195,7 @@ bool Surrogate<K>::Blend(const Near& near, const double* x, double* point, doubl
   thread_local std::vector<double> guesses;
   guesses.resize(static_cast<std::size_t>(kBlended * d));
   double weights[kBlended];
-  double total = 0, doubt = 0, spacing = 0;
+  double total = 0, doubt = 0, spacing = 0, size = 0;
   std::fill(point, point + d, 0.0);
   int nearest = -1;
   for (int i = 0; i < near.count; ++i) {
@@ -223,6 +225,7 @@ bool Surrogate<K>::Blend(const Near& near, const double* x, double* point, doubl
     total += weight;
     doubt += weight * Doubt(graph, std::sqrt(along2));
     spacing += weight * (graph.scale > 0 ? graph.scale : step_);
+    if (sizes_) size += weight * sizes_[p];
     for (int j = 0; j < d; ++j) point[j] += weight * y[j];
     if (nearest < 0) nearest = i;
   }
@@ -233,6 +236,7 @@ bool Surrogate<K>::Blend(const Near& near, const double* x, double* point, doubl
     if (weights[i] > 0) spread2 += weights[i] * SquaredDistance(point, guesses.data() + i * d, d);
   guess->uncertainty = std::max(std::sqrt(spread2 / total), doubt / total);
   guess->spacing = spacing / total;
+  guess->size = size / total;
   if (!tangent) return true;
 
   // Of the nearest graph: T_a + dN / du_a, made orthonormal.
@@ -266,7 +270,7 @@ bool Surrogate<K>::Blend(const Near& near, const double* x, double* point, doubl
 
 template <int K>
 bool Surrogate<K>::Predict(const Near& near, const double* x, const double* flat, double spacing,
-                           double* point, double* tangent) const {
+                           double* point, double* tangent, double* size) const {
   const int d = complex_.d();
   thread_local std::vector<double> from;
   from.resize(static_cast<std::size_t>(d));
@@ -280,6 +284,7 @@ bool Surrogate<K>::Predict(const Near& near, const double* x, const double* flat
     for (int j = 0; j < d; ++j) from[j] -= along * flat[j * K + a];
   }
   if (!Blend(near, from.data(), point, tangent, &guess)) return false;
+  *size = guess.size;
   if (spacing < kMargin * epsilon_ && guess.uncertainty > kExact * spacing &&
       guess.spacing > kFine * epsilon_)
     return false;
@@ -299,6 +304,7 @@ AnswerBlock Surrogate<K>::Answer(const QueryBlock& block) {
   answer.points.setZero(d, block.size());
   answer.tangents.setZero(d * K, block.size());
   answer.found.assign(count, 0);
+  Eigen::VectorXd sizes = Eigen::VectorXd::Zero(block.size());
   ParallelFor(count, [&](std::size_t c) {
     const auto i = static_cast<Eigen::Index>(c);
     thread_local std::vector<double> tangent;
@@ -307,12 +313,13 @@ AnswerBlock Surrogate<K>::Answer(const QueryBlock& block) {
     const double* flat =
         block.kind == QueryKind::kIntersectFlat ? block.bases.col(i).data() : nullptr;
     const bool ok = Predict(near[c], block.points.col(i).data(), flat, spacing,
-                            answer.points.col(i).data(), tangent.data());
+                            answer.points.col(i).data(), tangent.data(), &sizes[i]);
     answer.found[c] = ok;
     for (int j = 0; ok && j < d; ++j)
       for (int a = 0; a < K; ++a)
         answer.tangents(j * K + a, i) = tangent[static_cast<std::size_t>(a * d + j)];
   });
+  if (block.want_sizes) answer.sizes = std::move(sizes);
   return answer;
 }
 

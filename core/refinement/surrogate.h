@@ -25,11 +25,14 @@ class Surrogate {
   // complex  borrowed, must not change
   // step     how far from a point without neighbours its tangent plane means something, length
   // epsilon  the spacing that the points are for in the end, length
-  Surrogate(const StarComplex<K>& complex, double step, double epsilon);
+  // sizes    of the sample points, borrowed, or nullptr; between them they are blended like the
+  //          graphs: right to second order, where the least of a few would ask for far too much
+  Surrogate(const StarComplex<K>& complex, double step, double epsilon,
+            const double* sizes = nullptr);
 
-  // Answers queries of both kinds, with tangents. `block.radii`, for closest points too, holds the
-  // spacing that each point is for: not found where M is not known well enough for that. In
-  // parallel; the same whatever was asked before.
+  // Answers queries of both kinds, with tangents and what sizes there are. `block.radii`, for
+  // closest points too, holds the spacing that each point is for: not found where M is not known
+  // well enough for that. In parallel; the same whatever was asked before.
   AnswerBlock Answer(const QueryBlock& block);
 
  private:
@@ -51,6 +54,7 @@ class Surrogate {
   struct Guess {
     double uncertainty = 0;  // length
     double spacing = 0;      // of the sample here, length
+    double size = 0;
   };
 
   static void Terms(const double* v, double* terms);
@@ -61,9 +65,10 @@ class Surrogate {
   double Doubt(const Graph& graph, double length) const;
   bool Blend(const Near& near, const double* x, double* point, double* tangent, Guess* guess) const;
   bool Predict(const Near& near, const double* x, const double* flat, double spacing, double* point,
-               double* tangent) const;
+               double* tangent, double* size) const;
 
   const StarComplex<K>& complex_;
+  const double* sizes_;
   double step_, epsilon_;
   std::size_t form_size_;
   std::vector<std::uint32_t> slot_;  // by point; kNone: not fitted yet

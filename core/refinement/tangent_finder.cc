@@ -21,9 +21,11 @@ constexpr double kMostBeyond = 0.3;
 TangentFinder::TangentFinder(int k, int d, double step, std::uint64_t seed)
     : k_(k), d_(d), step_(step), seed_(seed) {}
 
-void TangentFinder::Start(const Eigen::MatrixXd& points, std::vector<const double*> guesses) {
+void TangentFinder::Start(const Eigen::MatrixXd& points, std::vector<const double*> guesses,
+                          std::vector<double> shares) {
   points_ = points;
   guesses_ = std::move(guesses);
+  shares_ = std::move(shares);
   tangents_ = Eigen::MatrixXd::Zero(k_ * d_, points.cols());
   ok_.assign(static_cast<std::size_t>(points.cols()), 0);
   open_.clear();
@@ -53,8 +55,8 @@ void TangentFinder::Ask() {
         for (int a = 0; a < d_; ++a) u[a] = random.Normal();
         u.normalize();
       }
-      block_.points.col((i * m + j) * 2) = points_.col(point) + step_ * u;
-      block_.points.col((i * m + j) * 2 + 1) = points_.col(point) - step_ * u;
+      block_.points.col((i * m + j) * 2) = points_.col(point) + StepAt(point) * u;
+      block_.points.col((i * m + j) * 2 + 1) = points_.col(point) - StepAt(point) * u;
     }
   }
 }
@@ -64,15 +66,15 @@ void TangentFinder::Absorb(const AnswerBlock& answers) {
   std::vector<Eigen::Index> again;
   Eigen::MatrixXd derivative(d_, m);
   for (std::size_t i = 0; i < open_.size(); ++i) {
+    const Eigen::Index point = open_[i];
     bool complete = true;
     for (int j = 0; j < m; ++j) {
       const auto q = (static_cast<Eigen::Index>(i) * m + j) * 2;
       if (!answers.found.empty())
         complete = complete && answers.found[static_cast<std::size_t>(q)] &&
                    answers.found[static_cast<std::size_t>(q) + 1];
-      derivative.col(j) = (answers.points.col(q) - answers.points.col(q + 1)) / (2 * step_);
+      derivative.col(j) = (answers.points.col(q) - answers.points.col(q + 1)) / (2 * StepAt(point));
     }
-    const Eigen::Index point = open_[i];
     if (complete) {
       const Eigen::JacobiSVD<Eigen::MatrixXd> svd(derivative, Eigen::ComputeThinU);
       const auto& s = svd.singularValues();

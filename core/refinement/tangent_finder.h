@@ -17,8 +17,11 @@ class TangentFinder {
   // step: how far from M to look, length.
   TangentFinder(int k, int d, double step, std::uint64_t seed);
 
-  // Points y on M, d x n; guesses one a point: K rows of d (as StarComplex::Tangent) or nullptr.
-  void Start(const Eigen::MatrixXd& points, std::vector<const double*> guesses);
+  // Points y on M, d x n; guesses one a point: K rows of d (as StarComplex::Tangent) or nullptr;
+  // shares of `step` to look at, one a point, or empty: where M is known to bend more than
+  // elsewhere.
+  void Start(const Eigen::MatrixXd& points, std::vector<const double*> guesses,
+             std::vector<double> shares = {});
 
   // The closest-point queries still needed, or nullptr when Result() is complete.
   const QueryBlock* Next() const { return open_.empty() ? nullptr : &block_; }
@@ -31,6 +34,9 @@ class TangentFinder {
 
  private:
   void Ask();
+  double StepAt(Eigen::Index point) const {
+    return shares_.empty() ? step_ : shares_[static_cast<std::size_t>(point)] * step_;
+  }
 
   int k_, d_;
   double step_;
@@ -38,6 +44,7 @@ class TangentFinder {
   bool guessed_ = false;  // the open questions lie along guesses
   Eigen::MatrixXd points_, tangents_, directions_;
   std::vector<const double*> guesses_;
+  std::vector<double> shares_;
   std::vector<std::uint8_t> ok_;
   std::vector<Eigen::Index> open_;  // points whose tangents are asked for
   QueryBlock block_;

@@ -18,6 +18,7 @@ void ToProto(const core::Specification& spec, v1::Welcome* welcome) {
   welcome->set_ambient_dimension(spec.ambient_dimension);
   welcome->mutable_oracle()->set_intersect_flat(spec.oracle.intersect_flat);
   welcome->mutable_oracle()->set_tangent_basis(spec.oracle.tangent_basis);
+  welcome->mutable_oracle()->set_local_size(spec.oracle.local_size);
 }
 
 void ToProto(const Chunk& chunk, const core::Specification& spec, v1::QueryChunk* out) {
@@ -27,6 +28,7 @@ void ToProto(const Chunk& chunk, const core::Specification& spec, v1::QueryChunk
   const core::QueryBlock& block = chunk.block();
   out->set_lease(chunk.lease);
   out->set_want_tangents(block.want_tangents);
+  out->set_want_sizes(block.want_sizes);
   ToProto(block.points.col(chunk.first).data(), {n, d}, out->mutable_points());
   if (block.kind == core::QueryKind::kClosestPoint) {
     out->set_kind(v1::QUERY_KIND_CLOSEST_POINT);
@@ -70,6 +72,11 @@ core::Expected<core::AnswerBlock> FromProto(const v1::AnswerChunk& answers, cons
         CheckArray(answers.tangents(), {n, d, k}, "answers.tangents", StatusCode::kOracleShape);
     if (!status.ok()) return tl::unexpected(std::move(status));
     block.tangents = MatrixFromProto(answers.tangents(), static_cast<Index>(d * k), chunk.count);
+  }
+  if (chunk.block().want_sizes && answers.has_sizes()) {
+    status = CheckArray(answers.sizes(), {n}, "answers.sizes", StatusCode::kOracleShape);
+    if (!status.ok()) return tl::unexpected(std::move(status));
+    block.sizes = MatrixFromProto(answers.sizes(), chunk.count, 1);
   }
   return block;
 }

@@ -158,6 +158,7 @@ Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config) {
   request.spec.epsilon = spec.epsilon();
   request.spec.oracle.intersect_flat = spec.oracle().intersect_flat();
   request.spec.oracle.tangent_basis = spec.oracle().tangent_basis();
+  request.spec.oracle.local_size = spec.oracle().local_size();
   request.spec.random_seed = spec.random_seed() == 0 ? 1 : spec.random_seed();
   request.label = spec.label();
   Refused status = ReadDimensions(spec, config, &request.spec);
@@ -180,6 +181,7 @@ void ToProto(const core::Specification& spec, v1::MeshSpec* out) {
   out->set_epsilon(spec.epsilon);
   out->mutable_oracle()->set_intersect_flat(spec.oracle.intersect_flat);
   out->mutable_oracle()->set_tangent_basis(spec.oracle.tangent_basis);
+  out->mutable_oracle()->set_local_size(spec.oracle.local_size);
   if (spec.bounding_box) {
     const auto d = static_cast<std::size_t>(spec.bounding_box->lower.size());
     v1::BoundingBox* const box = out->mutable_bounding_box();

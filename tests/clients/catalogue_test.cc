@@ -174,6 +174,70 @@ TEST(TurnedManifold, AnswersAloneAsInABatch) {
   }
 }
 
+// The medial axis is where the largest balls are centred that touch M and hold none of it: those
+// that touch at sample points, along random normals, are found by bisection.
+TEST(LocalSize, IsTheDistanceToTheMedialAxis) {
+  for (const std::string spec : {"sphere:2:5", "two-spheres", "torus:1:0.4", "torus:1:0.9@4",
+                                 "circles:1:0.5", "ellipsoid:3:2:1", "ellipsoid:1:1:10",
+                                 "ellipsoid:1:5", "ellipsoid:1:1:1", "so3", "rp2:5"}) {
+    const std::unique_ptr<Manifold> manifold = Make(spec);
+    ASSERT_TRUE(manifold->has_local_size()) << spec;
+    const int d = manifold->ambient_dimension(), k = manifold->dimension();
+    const BoundingBox box = *manifold->bounding_box();
+    std::srand(5);
+    const Eigen::Index count = 600;
+    const Eigen::MatrixXd unit = (Eigen::MatrixXd::Random(d, count).array() + 1) / 2;
+    const Eigen::MatrixXd points =
+        manifold->ClosestPoint(((box.upper - box.lower).asDiagonal() * unit).colwise() + box.lower)
+            .points;
+    const Eigen::MatrixXd bases = manifold->TangentBasis(points);
+    Eigen::MatrixXd normals = Eigen::MatrixXd::Random(d, count);
+    for (Eigen::Index j = 0; j < count; ++j) {
+      for (int pass = 0; pass < 2; ++pass) {
+        for (int a = 0; a < k; ++a) {
+          Eigen::VectorXd t(d);
+          for (int i = 0; i < d; ++i) t[i] = bases(i * k + a, j);
+          normals.col(j) -= t * t.dot(normals.col(j));
+        }
+        normals.col(j).normalize();
+      }
+    }
+    const double most = 4 * (box.upper - box.lower).norm();
+    Eigen::VectorXd low = Eigen::VectorXd::Zero(count),
+                    high = Eigen::VectorXd::Constant(count, most);
+    for (int step = 0; step < 40; ++step) {
+      const Eigen::VectorXd radius = (low + high) / 2;
+      const Eigen::VectorXd empty =
+          manifold->Distance(points + normals * radius.asDiagonal()) - radius;
+      for (Eigen::Index j = 0; j < count; ++j)
+        (empty[j] > -1e-9 * radius[j] ? low : high)[j] = radius[j];
+    }
+    const Eigen::VectorXd sizes = manifold->LocalSize(points);
+    const double reach = *manifold->facts().reach;
+    EXPECT_GE(sizes.minCoeff(), reach * (1 - 1e-9)) << spec;
+    double largest_gap = 0;
+    for (Eigen::Index j = 0; j < count; ++j) {
+      double nearest = most;
+      for (Eigen::Index c = 0; c < count; ++c) {
+        if (high[c] == most) continue;  // the medial axis is not that way
+        const Eigen::VectorXd centre = points.col(c) + low[c] * normals.col(c);
+        nearest = std::min(nearest, (centre - points.col(j)).norm());
+      }
+      EXPECT_GE(nearest, sizes[j] * (1 - 1e-3)) << spec << " at " << points.col(j).transpose();
+      largest_gap = std::max(largest_gap, nearest / sizes[j]);
+    }
+    EXPECT_LT(largest_gap, 2) << spec;
+    // It is 1-Lipschitz, and a column's does not depend on the others.
+    EXPECT_EQ(manifold->LocalSize(points.col(7))[0], sizes[7]) << spec;
+    for (Eigen::Index j = 1; j < count; ++j) {
+      EXPECT_LE(std::abs(sizes[j] - sizes[j - 1]),
+                (points.col(j) - points.col(j - 1)).norm() + 1e-9)
+          << spec;
+    }
+  }
+  EXPECT_FALSE(Make("tanglecube")->has_local_size());
+}
+
 TEST(MakeManifold, RefusesWithAReason) {
   for (const std::string spec : {"",
                                  "klein",

@@ -51,6 +51,8 @@ TEST(Spec, CarriesWhatIsGivenAndNothingElse) {
   EXPECT_EQ(plain->ambient_dimension(), 3u);
   EXPECT_EQ(plain->epsilon(), 0.25);
   EXPECT_TRUE(plain->oracle().tangent_basis() && plain->oracle().intersect_flat());
+  EXPECT_TRUE(plain->oracle().local_size());
+  EXPECT_FALSE(ToSpec(*MakeManifold("tanglecube", nullptr), options)->oracle().local_size());
   EXPECT_FALSE(plain->criteria().has_sliver_bound() || plain->criteria().has_candidates());
   EXPECT_EQ(plain->bounding_box().lower().shape(0), 3u);
   EXPECT_EQ(plain->bounding_box().lower().shape_size(), 1);

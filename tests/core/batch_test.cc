@@ -165,6 +165,38 @@ TEST_P(CheckAnswersTest, RefusesTangentsThatAreNotOrthonormal) {
   EXPECT_EQ(Check(closest_, unset), StatusCode::kOk) << message_;
 }
 
+TEST_P(CheckAnswersTest, RefusesSizesThatAreNone) {
+  AnswerBlock answer;
+  answer.points = closest_.points;
+  answer.sizes = Eigen::VectorXd::Constant(4, scale());
+  EXPECT_EQ(Check(closest_, answer), StatusCode::kOk) << "not wanted, but right";
+  closest_.want_sizes = true;
+  EXPECT_EQ(Check(closest_, answer), StatusCode::kOk) << message_;
+
+  AnswerBlock bad = answer;
+  bad.sizes[2] = 0;
+  EXPECT_EQ(Check(closest_, bad), StatusCode::kOracleBadSize);
+  EXPECT_TRUE(Says("query 2") && Says("size")) << message_;
+  bad.sizes[2] = -scale();
+  EXPECT_EQ(Check(closest_, bad), StatusCode::kOracleBadSize);
+  for (const double value : {kNaN, kInfinity, -kInfinity, 1e300}) {
+    bad.sizes[2] = value;
+    EXPECT_EQ(Check(closest_, bad), StatusCode::kOracleNotFinite) << value;
+  }
+  bad.found = {1, 1, 0, 1};
+  EXPECT_EQ(Check(closest_, bad), StatusCode::kOk) << message_;
+
+  AnswerBlock few = answer;
+  few.sizes.conservativeResize(3);
+  EXPECT_EQ(Check(closest_, few), StatusCode::kOracleShape);
+  EXPECT_TRUE(Says("3 numbers for 4 points")) << message_;
+  few.sizes.resize(0);
+  EXPECT_EQ(Check(closest_, few), StatusCode::kOracleShape);
+  EXPECT_TRUE(Says("local_size")) << message_;
+  few.found = {0, 0, 0, 0};
+  EXPECT_EQ(Check(closest_, few), StatusCode::kOk) << message_;
+}
+
 INSTANTIATE_TEST_SUITE_P(Scales, CheckAnswersTest, ::testing::Values(1e-6, 1.0, 1e6));
 
 }  // namespace

@@ -69,10 +69,10 @@ class MortalServer {
 
 class Restart : public ::testing::Test {
  protected:
-  Restart()
+  explicit Restart(const std::string& manifold = "torus:1:0.4")
       : server_((fs::temp_directory_path() / ("stellate-restart-" + std::to_string(getpid())))
                     .string()),
-        torus_(MakeManifold("torus:1:0.4", nullptr)),
+        torus_(MakeManifold(manifold, nullptr)),
         oracle_(*torus_) {
     options_.epsilon = 0.15;
     options_.server = server_.address();
@@ -117,6 +117,23 @@ class Restart : public ::testing::Test {
 TEST_F(Restart, KilledTwiceTheServerIsWaitedFor) {
   disasters_ = 2;
   AfterRounds(3, [this] {
+    server_.End(SIGKILL);
+    server_.Start();
+  });
+  ExpectTheUndisturbedMesh();
+}
+
+class GradedRestart : public Restart {
+ protected:
+  GradedRestart() : Restart("torus:1:0.8") {
+    options_.epsilon = 0.4;
+    options_.size_rate = 0.3;
+  }
+};
+
+TEST_F(GradedRestart, SizesAreReplayed) {
+  disasters_ = 2;
+  AfterRounds(6, [this] {
     server_.End(SIGKILL);
     server_.Start();
   });

@@ -34,6 +34,7 @@ Asked MakeChunk(Script* script) {
   core::QueryBlock block;
   block.points = MatrixXd::Constant(d, first + count, 0.5);
   block.want_tangents = (kind & 1) != 0;
+  block.want_sizes = (kind & 4) != 0;
   if ((kind & 2) != 0) {
     block.kind = core::QueryKind::kIntersectFlat;
     MatrixXd basis = MatrixXd::Zero(d * k, 1);
@@ -51,7 +52,7 @@ Asked MakeChunk(Script* script) {
 
 std::vector<std::string> Seeds() {
   std::vector<std::string> seeds;
-  for (int choice = 0; choice < 48; ++choice) {
+  for (int choice = 0; choice < 96; ++choice) {
     std::string head{static_cast<char>(choice % 3), static_cast<char>(choice / 3 % 4), 1, 3,
                      static_cast<char>(choice / 12)};
     Script script(reinterpret_cast<const std::uint8_t*>(head.data()), head.size());
@@ -68,6 +69,10 @@ std::vector<std::string> Seeds() {
     for (std::size_t a = 0; a < k; ++a) tangents.row(static_cast<Index>(a * k + a)).setOnes();
     if (block.want_tangents) {
       server::ToProto(tangents.data(), {n, d, k}, answers.mutable_tangents());
+    }
+    if (block.want_sizes) {
+      const Eigen::VectorXd sizes = Eigen::VectorXd::Ones(asked.chunk.count);
+      server::ToProto(sizes.data(), {n}, answers.mutable_sizes());
     }
     seeds.push_back(head + answers.SerializeAsString());
     answers.mutable_points()->set_shape(0, 0xffffffffu);
@@ -101,6 +106,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   Require(block->tangents.size() == 0 ||
               (block->tangents.rows() == d * asked.spec.dimension && block->tangents.cols() == n),
           "one basis for each query, or none");
+  Require(block->sizes.size() == 0 || block->sizes.size() == n, "one size for each, or none");
   const core::Status status =
       core::CheckAnswers(asked.spec, asked.chunk.block(), asked.chunk.first, *block);
   if (!status.ok()) {
@@ -110,6 +116,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   for (Eigen::Index j = 0; j < n; ++j) {
     const bool found = block->found.empty() || block->found[static_cast<std::size_t>(j)] != 0;
     Require(!found || block->points.col(j).allFinite(), "points that were taken are finite");
+    Require(!found || block->sizes.size() == 0 || block->sizes[j] > 0, "sizes are positive");
   }
   return 0;
 }

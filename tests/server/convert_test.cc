@@ -154,7 +154,7 @@ class ConvertOracleTest : public ::testing::Test {
     block.points = Eigen::MatrixXd::Random(3, 5);
     block.bases = Eigen::MatrixXd::Random(6, 5);
     block.radii = Eigen::VectorXd::Random(5);
-    block.want_tangents = true;
+    block.want_tangents = block.want_sizes = true;
     chunk_.round = std::make_shared<Round>();
     chunk_.round->batch.blocks = {block};
     chunk_.lease = 9;
@@ -163,6 +163,7 @@ class ConvertOracleTest : public ::testing::Test {
     good_.set_lease(9);
     *good_.mutable_points() = Numbers({1, 2, 3, 4, 5, 6}, {2, 3});
     *good_.mutable_tangents() = Numbers(std::vector<double>(12, 0.5), {2, 3, 2});
+    *good_.mutable_sizes() = Numbers({0.25, 0.5}, {2});
     good_.set_found(std::string("\1\0", 2));
   }
 
@@ -178,6 +179,7 @@ TEST_F(ConvertOracleTest, AChunkCarriesItsColumns) {
   EXPECT_EQ(out.lease(), 9u);
   EXPECT_EQ(out.kind(), v1::QUERY_KIND_INTERSECT_FLAT);
   EXPECT_TRUE(out.want_tangents());
+  EXPECT_TRUE(out.want_sizes());
   EXPECT_EQ(ShapeText(out.bases().shape()), "[2, 3, 2]");
   EXPECT_EQ(MatrixFromProto(out.points(), 3, 2), block.points.middleCols(1, 2));
   EXPECT_EQ(MatrixFromProto(out.bases(), 6, 2), block.bases.middleCols(1, 2));
@@ -195,6 +197,15 @@ TEST_F(ConvertOracleTest, AnswersAreReadColumnByColumn) {
   EXPECT_EQ(answer->points(2, 1), 6);
   EXPECT_EQ(answer->found, (std::vector<std::uint8_t>{1, 0}));
   EXPECT_EQ(answer->tangents.cols(), 2);
+  EXPECT_EQ(answer->sizes, Eigen::Vector2d(0.25, 0.5));
+}
+
+TEST_F(ConvertOracleTest, SizesThatWereNotAskedForAreIgnored) {
+  chunk_.round->batch.blocks[0].want_sizes = false;
+  good_.mutable_sizes()->add_shape(9);
+  const auto answer = FromProto(good_, chunk_, spec_);
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->sizes.size(), 0);
 }
 
 TEST_F(ConvertOracleTest, TangentsThatWereNotAskedForAreIgnored) {
@@ -228,6 +239,12 @@ TEST_F(ConvertOracleTest, MalformedAnswersAreRefused) {
   expect_refused("tangents flat", [](Answers* a) {
     *a->mutable_tangents() = Numbers(std::vector<double>(12), {2, 6});
   });
+  expect_refused("sizes too few", [](Answers* a) { *a->mutable_sizes() = Numbers({1}, {1}); });
+  expect_refused("sizes in a column", [](Answers* a) {
+    *a->mutable_sizes() = Numbers({1, 2}, {2, 1});
+  });
+  expect_refused("sizes' bytes missing",
+                 [](Answers* a) { a->mutable_sizes()->mutable_data()->pop_back(); });
   expect_refused("tangents declared only", [](Answers* a) { a->mutable_tangents()->clear_data(); });
 }
 

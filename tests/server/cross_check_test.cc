@@ -96,6 +96,18 @@ TEST_F(CrossCheckTest, TangentSpacesAreComparedAndNotTheirBases) {
   EXPECT_EQ(Compare(ClosestPoint(0, 0, 0), a, b), "") << "other points, other tangents";
 }
 
+TEST_F(CrossCheckTest, SizesOfOnePointAgreeToATenth) {
+  AnswerBlock a = Found(0, 0, 1), b = Found(0, 0, 1);
+  a.sizes = Eigen::VectorXd::Constant(1, 1.0);
+  b.sizes = Eigen::VectorXd::Constant(1, 0.901);
+  EXPECT_EQ(Compare(ClosestPoint(0, 0, 2), a, b), "");
+  b.sizes[0] = 0.899;
+  EXPECT_NE(Compare(ClosestPoint(0, 0, 2), a, b).find("sizes there are 1 and 0.899"),
+            std::string::npos);
+  b.points.col(0) << 1, 0, 0;
+  EXPECT_EQ(Compare(ClosestPoint(0, 0, 0), a, b), "") << "other points, other sizes";
+}
+
 TEST_F(CrossCheckTest, RoundingFarFromTheOriginIsForgiven) {
   const double far = 1e12;  // where doubles are 1e-4 apart
   EXPECT_EQ(Compare(Flat(far, 0, 0, 1), Found(far, 0, 0.5), Found(far, 0, 0.5 + 0.1)), "");

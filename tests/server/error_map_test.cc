@@ -24,6 +24,7 @@ TEST(ErrorMap, EachCoreCodeHasItsStatusAndReason) {
       {StatusCode::kOracleOffFlat, grpc::StatusCode::INVALID_ARGUMENT},
       {StatusCode::kOracleOutsideRadius, grpc::StatusCode::INVALID_ARGUMENT},
       {StatusCode::kOracleBadTangent, grpc::StatusCode::INVALID_ARGUMENT},
+      {StatusCode::kOracleBadSize, grpc::StatusCode::INVALID_ARGUMENT},
       {StatusCode::kOracleNotIdempotent, grpc::StatusCode::INVALID_ARGUMENT},
       {StatusCode::kOracleFailed, grpc::StatusCode::ABORTED},
       {StatusCode::kFailedPrecondition, grpc::StatusCode::FAILED_PRECONDITION},

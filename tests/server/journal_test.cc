@@ -78,6 +78,7 @@ SessionOptions Options(std::shared_ptr<SessionJournal> journal, double epsilon =
   options.spec.criteria.advance_step = 0.9;
   options.spec.criteria.judging = core::Judging::kCommonCentre;
   options.spec.criteria.size_rate = 0.4;
+  options.spec.oracle.local_size = true;
   options.spec.limits.max_batch_queries = 5000;
   options.dispatch.worker_wait = std::chrono::seconds(77);
   options.journal = std::move(journal);
@@ -98,6 +99,7 @@ core::Answers AnswersOf(Eigen::Index queries) {
   answers.blocks[0].points = Eigen::MatrixXd::Random(3, queries);
   answers.blocks[0].found.assign(static_cast<std::size_t>(queries), 1);
   answers.blocks[0].tangents = Eigen::MatrixXd::Random(6, queries);
+  answers.blocks[0].sizes = Eigen::VectorXd::Random(queries);
   return answers;
 }
 
@@ -151,6 +153,7 @@ TEST_F(JournalTest, LargeRoundsAreKeptInParts) {
   ASSERT_TRUE(replay.answers);
   EXPECT_EQ(replay.answers->blocks[0].points, answers.blocks[0].points);
   EXPECT_EQ(replay.answers->blocks[0].tangents, answers.blocks[0].tangents);
+  EXPECT_EQ(replay.answers->blocks[0].sizes, answers.blocks[0].sizes);
 }
 
 TEST_F(JournalTest, RefusesFilesThatAreNoJournals) {

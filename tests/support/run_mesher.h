@@ -26,13 +26,14 @@ inline double ProcessorSeconds() {
   return static_cast<double>(std::clock()) / static_cast<double>(CLOCKS_PER_SEC);
 }
 
-// What a client would declare of `oracle`.
+// What a client would declare of `oracle`, but for its sizes.
 inline core::Specification SpecificationFor(const Oracle& oracle, double epsilon) {
   core::Specification spec;
   spec.dimension = oracle.dimension();
   spec.ambient_dimension = oracle.ambient_dimension();
   spec.epsilon = epsilon;
-  spec.oracle = {oracle.has_intersect_flat(), oracle.has_tangent_basis()};
+  spec.oracle.intersect_flat = oracle.has_intersect_flat();
+  spec.oracle.tangent_basis = oracle.has_tangent_basis();
   if (const auto box = oracle.bounding_box()) {
     spec.bounding_box = core::BoundingBox{box->lower, box->upper};
   }
@@ -49,8 +50,11 @@ inline core::Answers AnswersOf(Oracle& oracle, const core::QueryBatch& batch) {
     if (block.want_tangents && answer.tangents.size() == 0) {
       answer.tangents = oracle.TangentBasis(answer.points);
     }
-    answers.blocks.push_back(
-        {std::move(answer.points), std::move(answer.found), std::move(answer.tangents)});
+    if (block.want_sizes && answer.sizes.size() == 0) {
+      answer.sizes = oracle.LocalSize(answer.points);
+    }
+    answers.blocks.push_back({std::move(answer.points), std::move(answer.found),
+                              std::move(answer.tangents), std::move(answer.sizes)});
   }
   return answers;
 }

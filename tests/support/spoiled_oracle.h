@@ -14,6 +14,7 @@ class SpoiledOracle final : public Oracle {
   explicit SpoiledOracle(Oracle& good)
       : intersects(good.has_intersect_flat()),
         has_tangents(good.has_tangent_basis()),
+        has_sizes(good.has_local_size()),
         k(good.dimension()),
         d(good.ambient_dimension()),
         box(good.bounding_box()),
@@ -21,7 +22,7 @@ class SpoiledOracle final : public Oracle {
         good_(good) {}
 
   // What it says of itself.
-  bool intersects, has_tangents;
+  bool intersects, has_tangents, has_sizes;
   int k, d;
   std::optional<BoundingBox> box;
   Eigen::MatrixXd given_seeds;
@@ -32,11 +33,13 @@ class SpoiledOracle final : public Oracle {
                      const Eigen::VectorXd& radii, Answer&)>
       on_flat;
   std::function<void(Eigen::MatrixXd& tangents)> on_tangents;
+  std::function<void(const Eigen::MatrixXd& points, Eigen::VectorXd& sizes)> on_sizes;
 
   int dimension() const override { return k; }
   int ambient_dimension() const override { return d; }
   bool has_intersect_flat() const override { return intersects; }
   bool has_tangent_basis() const override { return has_tangents; }
+  bool has_local_size() const override { return has_sizes; }
   std::optional<BoundingBox> bounding_box() const override { return box; }
   Eigen::MatrixXd seeds() const override { return given_seeds; }
 
@@ -55,6 +58,12 @@ class SpoiledOracle final : public Oracle {
     Eigen::MatrixXd tangents = good_.TangentBasis(points);
     if (on_tangents) on_tangents(tangents);
     return tangents;
+  }
+  Eigen::VectorXd LocalSize(const Eigen::MatrixXd& points) override {
+    Eigen::VectorXd sizes =
+        good_.has_local_size() ? good_.LocalSize(points) : Eigen::VectorXd::Ones(points.cols());
+    if (on_sizes) on_sizes(points, sizes);
+    return sizes;
   }
 
  private:

@@ -69,6 +69,12 @@ Eigen::MatrixXd Manifold::TangentBasis(const Eigen::MatrixXd& points) {
   return bases;
 }
 
+// An isometry moves the medial axis along.
+Eigen::VectorXd Manifold::LocalSize(const Eigen::MatrixXd& points) {
+  if (frame_.size() == 0) return shape_->LocalSize(points);
+  return shape_->LocalSize(EachTimes(frame_.transpose(), points));
+}
+
 std::optional<BoundingBox> Manifold::bounding_box() const {
   const std::optional<BoundingBox> box = shape_->bounding_box();
   if (!box || frame_.size() == 0) return box;

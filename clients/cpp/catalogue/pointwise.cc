@@ -58,6 +58,19 @@ Eigen::MatrixXd PointwiseOracle::TangentBasis(const Eigen::MatrixXd& points) {
   return bases;
 }
 
+Eigen::VectorXd PointwiseOracle::LocalSize(const Eigen::MatrixXd& points) {
+  Eigen::VectorXd sizes(points.cols()), point;
+  for (Eigen::Index j = 0; j < points.cols(); ++j) {
+    point = points.col(j);
+    sizes[j] = SizeAt(point);
+  }
+  return sizes;
+}
+
+double PointwiseOracle::SizeAt(const Eigen::VectorXd& /*y*/) const {
+  throw std::logic_error("this oracle has no local sizes");
+}
+
 bool PointwiseOracle::Meet(const Eigen::VectorXd& start, const Eigen::MatrixXd& basis,
                            const Eigen::VectorXd& level, Eigen::VectorXd& m) const {
   if (!Project(start, m)) return false;

@@ -99,6 +99,7 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   spec.set_epsilon(options.epsilon);
   spec.mutable_oracle()->set_intersect_flat(oracle.has_intersect_flat());
   spec.mutable_oracle()->set_tangent_basis(oracle.has_tangent_basis());
+  spec.mutable_oracle()->set_local_size(oracle.has_local_size());
   if (const auto box = oracle.bounding_box()) {
     // Shape [d]: a corner is one point, not a list of them.
     for (const auto& [corner, array] :

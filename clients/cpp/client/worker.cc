@@ -20,7 +20,7 @@ constexpr size_t kMaxFailureBytes = 4000;  // OracleFailure.message takes 4096
 std::uint32_t MaxChunkQueries(const Oracle& oracle) {
   const size_t d = static_cast<size_t>(oracle.ambient_dimension());
   const size_t k = static_cast<size_t>(oracle.dimension());
-  return static_cast<std::uint32_t>(std::max<size_t>(1, kChunkBytes / (8 * (d + d * k + 1))));
+  return static_cast<std::uint32_t>(std::max<size_t>(1, kChunkBytes / (8 * (d + d * k + 2))));
 }
 
 std::string DescriptionOf(const std::exception_ptr& exception) {
@@ -31,6 +31,14 @@ std::string DescriptionOf(const std::exception_ptr& exception) {
   } catch (...) {
     return "an exception that is no std::exception";
   }
+}
+
+std::vector<Eigen::Index> FoundOf(const Answer& answer) {
+  std::vector<Eigen::Index> found;
+  for (Eigen::Index j = 0; j < answer.points.cols(); ++j) {
+    if (answer.IsFound(j)) found.push_back(j);
+  }
+  return found;
 }
 
 // What the server sent, read on a thread of its own: the next chunk is on its way while one is
@@ -82,10 +90,7 @@ Worker::Worker(v1::Stellate::StubInterface& stub, Oracle& oracle, std::string me
 
 // Only where there is a point to ask about; the server skips the other columns.
 void Worker::AddTangents(stellate::Answer* answer) {
-  std::vector<Eigen::Index> found;
-  for (Eigen::Index j = 0; j < answer->points.cols(); ++j) {
-    if (answer->IsFound(j)) found.push_back(j);
-  }
+  const std::vector<Eigen::Index> found = FoundOf(*answer);
   if (static_cast<Eigen::Index>(found.size()) == answer->points.cols()) {
     answer->tangents = oracle_.TangentBasis(answer->points);
     return;
@@ -96,6 +101,21 @@ void Worker::AddTangents(stellate::Answer* answer) {
     answer->tangents(Eigen::all, found) = tangents;
   } else {
     answer->tangents = std::move(tangents);  // of the wrong size: the server says so
+  }
+}
+
+void Worker::AddSizes(stellate::Answer* answer) {
+  const std::vector<Eigen::Index> found = FoundOf(*answer);
+  if (static_cast<Eigen::Index>(found.size()) == answer->points.cols()) {
+    answer->sizes = oracle_.LocalSize(answer->points);
+    return;
+  }
+  Eigen::VectorXd sizes = oracle_.LocalSize(answer->points(Eigen::all, found));
+  if (sizes.size() == static_cast<Eigen::Index>(found.size())) {
+    answer->sizes.setZero(answer->points.cols());
+    answer->sizes(found) = sizes;
+  } else {
+    answer->sizes = std::move(sizes);
   }
 }
 
@@ -124,6 +144,9 @@ bool Worker::Answer(const v1::QueryChunk& chunk, v1::AnswerChunk* answers) {
       oracle_.has_tangent_basis()) {
     AddTangents(&answer);
   }
+  if (chunk.want_sizes() && in_shape && answer.sizes.size() == 0 && oracle_.has_local_size()) {
+    AddSizes(&answer);
+  }
   answers->set_lease(chunk.lease());
   // As the oracle has them: the server checks the shapes and names what is wrong with them.
   ToArray(answer.points, {static_cast<std::uint32_t>(answer.points.rows())},
@@ -134,6 +157,9 @@ bool Worker::Answer(const v1::QueryChunk& chunk, v1::AnswerChunk* answers) {
     const std::vector<std::uint32_t> shape =
         rows == d * k ? std::vector<std::uint32_t>{d, k} : std::vector<std::uint32_t>{rows};
     ToArray(answer.tangents, shape, answers->mutable_tangents());
+  }
+  if (chunk.want_sizes() && answer.sizes.size() > 0) {
+    ToArray(answer.sizes.transpose(), {}, answers->mutable_sizes());
   }
   return true;
 }

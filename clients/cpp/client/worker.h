@@ -32,6 +32,7 @@ class Worker {
   bool Answer(const v1::QueryChunk& chunk, v1::AnswerChunk* answers);
   bool AnswerOrFail(const v1::QueryChunk& chunk, v1::ServeOracleRequest* request);
   void AddTangents(stellate::Answer* answer);
+  void AddSizes(stellate::Answer* answer);
 
   v1::Stellate::StubInterface& stub_;
   Oracle& oracle_;

@@ -43,6 +43,8 @@ def answer(oracle: CheckedOracle, chunk: pb.QueryChunk) -> pb.ServeOracleRequest
         reply.found = found.astype("u1").tobytes()
     if chunk.want_tangents:
         fill(reply.tangents, oracle.tangents(answers, found))
+    if chunk.want_sizes:
+        fill(reply.sizes, oracle.sizes(answers, found))
     return request
 
 
@@ -97,7 +99,7 @@ class Worker:
     ) -> None:
         """`on_failure` is told what the oracle raised before the server is. `quiet`: no log."""
         self._stub, self._oracle, self._on_failure = stub, oracle, on_failure
-        per_query = 8 * oracle.ambient_dimension * (oracle.dimension + 1) + 1
+        per_query = 8 * oracle.ambient_dimension * (oracle.dimension + 1) + 9
         self._hello = pb.Hello(
             mesh=mesh, worker=name, max_chunk_queries=max(1, _ANSWER_BYTES // per_query)
         )
@@ -190,6 +192,7 @@ class Worker:
             for name, asked, able in (
                 ("intersect_flat", welcome.oracle.intersect_flat, mine.has_intersect_flat),
                 ("tangent_basis", welcome.oracle.tangent_basis, mine.has_tangent_basis),
+                ("local_size", welcome.oracle.local_size, mine.has_local_size),
             )
             if asked and not able
         ]

@@ -25,6 +25,7 @@ class ImplicitManifold:
       dimension: k.
       bounding_box: (lower (d,), upper (d,)) around M. Its size is the length scale of the solvers.
       seeds: (m, d) points near M, instead of random points of the box.
+      local_size: (n, d) -> (n,), at points of M; see stellate.Oracle.
       max_iterations: of each solver.
       thread_safe: f and jacobian may be called by several threads at once.
     """
@@ -38,6 +39,7 @@ class ImplicitManifold:
         dimension: int,
         bounding_box: Sequence[Any],
         seeds: np.ndarray | None = None,
+        local_size: Callable[[np.ndarray], np.ndarray] | None = None,
         max_iterations: int = 100,
         thread_safe: bool = False,
     ) -> None:
@@ -58,6 +60,7 @@ class ImplicitManifold:
         self.ambient_dimension = ambient_dimension
         self.bounding_box = lower, upper
         self.seeds = seeds
+        self.local_size = local_size
         self.thread_safe = thread_safe
         self._f = f
         self._given_jacobian = jacobian

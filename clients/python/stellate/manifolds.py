@@ -50,6 +50,10 @@ class Torus:
         along = np.stack([-ring[:, 1], ring[:, 0], np.zeros(len(points))], axis=1)
         return np.stack([along, np.cross(normal, along)], axis=2)
 
+    def local_size(self, points: np.ndarray) -> np.ndarray:
+        """To the medial axis: the circle inside the tube, and the axis of revolution."""
+        return np.minimum(self.minor, np.hypot(points[:, 0], points[:, 1]))
+
 
 class Sphere:
     """The round k-sphere in the first k+1 coordinates of R^d; the circle for k = 1."""
@@ -84,6 +88,9 @@ class Sphere:
         bases[:, : k + 1] = np.eye(k + 1, k) - 2 * mirror[:, :, None] * mirror[:, None, :k]
         return bases
 
+    def local_size(self, points: np.ndarray) -> np.ndarray:
+        return np.full(len(points), self.radius)
+
 
 class ProductOfCircles:
     """T^k as a product of circles in R^2k: for k = 2 the Clifford torus. It is flat."""
@@ -113,6 +120,9 @@ class ProductOfCircles:
             bases[:, 2 * a + 1, a] = directions[:, a, 0]
         return bases
 
+    def local_size(self, points: np.ndarray) -> np.ndarray:
+        return np.full(len(points), self.radii.min())
+
 
 class SpecialOrthogonal3:
     """SO(3), the rotations of space, as 3 x 3 matrices, row after row: k = 3, d = 9."""
@@ -141,6 +151,9 @@ class SpecialOrthogonal3:
         rotations = points.reshape(-1, 1, 3, 3)
         return (rotations @ self._GENERATORS).reshape(-1, 3, 9).transpose(0, 2, 1)
 
+    def local_size(self, points: np.ndarray) -> np.ndarray:
+        return np.full(len(points), np.sqrt(2.0))
+
 
 def ellipsoid(axes: Sequence[float] = (1.0, 0.8, 0.6)) -> ImplicitManifold:
     """The ellipsoid of the given semi-axes in R^d, k = d - 1, by its equation."""
@@ -153,6 +166,24 @@ def ellipsoid(axes: Sequence[float] = (1.0, 0.8, 0.6)) -> ImplicitManifold:
     def jacobian(x: np.ndarray) -> np.ndarray:
         return (2.0 * x / squares)[:, None, :]
 
+    inner = (squares - squares.min()) / np.sqrt(squares)
+
+    def local_size(y: np.ndarray) -> np.ndarray:
+        """To the medial axis: the solid ellipsoid of semi-axes `inner`, flat in the shortest axes.
+
+        Its nearest point to y outside is inner^2 y / (inner^2 + t), with t by Newton's method, which
+        climbs to its root from zero.
+        """
+        t = np.zeros((len(y), 1))
+        for _ in range(60):
+            below = np.maximum(inner**2 + t, 1e-300)
+            terms = (inner * y / below) ** 2
+            excess = terms.sum(axis=1, keepdims=True) - 1.0
+            slope = 2.0 * (terms / below).sum(axis=1, keepdims=True)
+            t += np.where(excess > 0.0, excess / np.where(excess > 0.0, slope, 1.0), 0.0)
+        off = np.where(inner > 0.0, t / np.maximum(inner**2 + t, 1e-300), 1.0)
+        return np.sqrt(((off * y) ** 2).sum(axis=1))
+
     corner = 1.1 * np.sqrt(squares)
     return ImplicitManifold(
         f,
@@ -160,6 +191,7 @@ def ellipsoid(axes: Sequence[float] = (1.0, 0.8, 0.6)) -> ImplicitManifold:
         ambient_dimension=d,
         dimension=d - 1,
         bounding_box=(-corner, corner),
+        local_size=local_size,
         thread_safe=True,
     )
 

@@ -25,6 +25,9 @@ class Oracle(Protocol):
         or found = False where there is none. Without it the server asks for closest points only.
       tangent_basis(points (n, d)) -> (n, d, k): orthonormal columns that span the tangent space at
         points of M. Without it the server finds tangent spaces from closest points.
+      local_size(points (n, d)) -> (n,): how large things are at points of M: the local feature size
+        there, or any positive lengths of yours. With size_rate or max_deviation the mesh goes by it;
+        without it the server estimates. A point's size must not depend on anything else.
       bounding_box: (lower (d,), upper (d,)), where to look for M, or
       seeds: (m, d), points near M, one at least on each component. One of the two is needed.
       thread_safe: True lets several workers call it at once.
@@ -52,6 +55,7 @@ class CheckedOracle:
             raise InvalidArgument(f"{type(oracle).__name__} has no method closest_point(points)")
         self.has_intersect_flat = callable(getattr(oracle, "intersect_flat", None))
         self.has_tangent_basis = callable(getattr(oracle, "tangent_basis", None))
+        self.has_local_size = callable(getattr(oracle, "local_size", None))
         self.bounding_box = _box(getattr(oracle, "bounding_box", None))
         self.seeds = _seeds(getattr(oracle, "seeds", None))
         shared = bool(getattr(oracle, "thread_safe", False))
@@ -91,20 +95,31 @@ class CheckedOracle:
 
     def tangents(self, points: np.ndarray, found: np.ndarray) -> np.ndarray:
         """(n, d) -> (n, d, k) orthonormal bases; the rows that were not found hold any basis."""
-        k, d = self.dimension, self.ambient_dimension
+        anywhere = np.eye(self.ambient_dimension, self.dimension)
+        return self._at_found("tangent_basis", points, found, anywhere)
+
+    def sizes(self, points: np.ndarray, found: np.ndarray) -> np.ndarray:
+        """(n, d) -> (n,) lengths; the rows that were not found hold any."""
+        return self._at_found("local_size", points, found, np.ones(()))
+
+    def _at_found(
+        self, method: str, points: np.ndarray, found: np.ndarray, anywhere: np.ndarray
+    ) -> np.ndarray:
+        """What the method says of the points that were found, and `anywhere` for the others."""
         everywhere = bool(found.all())
         on_manifold = points.view() if everywhere else np.ascontiguousarray(points[found])
         on_manifold.flags.writeable = False
-        bases = np.empty((0, d, k))
-        if len(on_manifold):
+        count = len(on_manifold)
+        values = np.empty((0, *anywhere.shape))
+        if count:
             with self._one_at_a_time:
-                answer = self._oracle.tangent_basis(on_manifold)
-            all_rows = np.ones(len(on_manifold), dtype=bool)
-            bases = _numbers("tangent_basis", answer, (len(on_manifold), d, k), all_rows)
+                answer = getattr(self._oracle, method)(on_manifold)
+            all_rows = np.ones(count, dtype=bool)
+            values = _numbers(method, answer, (count, *anywhere.shape), all_rows)
         if everywhere:
-            return bases
-        spread = np.broadcast_to(np.eye(d, k), (len(points), d, k)).copy()
-        spread[found] = bases
+            return values
+        spread = np.broadcast_to(anywhere, (len(points), *anywhere.shape)).copy()
+        spread[found] = values
         return spread
 
 

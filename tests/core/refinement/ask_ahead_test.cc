@@ -51,7 +51,9 @@ TEST_P(AskAhead, TakesFarFewerRoundsForAsGoodAMesh) {
   const Counts& a = ahead.report().counts;
   const Counts& p = plain.report().counts;
   EXPECT_LT(2 * a.rounds, p.rounds);
-  EXPECT_LT(static_cast<double>(a.vertices), 1.07 * static_cast<double>(p.vertices));
+  // So coarse a mesh of SO(3) takes 1.08 times as many, from 1.05 to 1.12 by random seed.
+  const double most = manifold->dimension() == 3 ? 1.15 : 1.07;
+  EXPECT_LT(static_cast<double>(a.vertices), most * static_cast<double>(p.vertices));
   // The worst simplex of one run is chance: `tests/bench/run rounds` compares over seeds.
   EXPECT_GT(ahead.report().certificate.min_fatness, 0.6 * plain.report().certificate.min_fatness);
   if (manifold->dimension() == 2) {

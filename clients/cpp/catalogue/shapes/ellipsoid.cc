@@ -20,6 +20,7 @@ class EllipsoidShape final : public PointwiseOracle {
         axes_(
             Eigen::Map<const Eigen::ArrayXd>(axes.data(), static_cast<Eigen::Index>(axes.size()))) {
     axes_.minCoeff(&shortest_);
+    medial_ = (axes_.square() - axes_[shortest_] * axes_[shortest_]) / axes_;
   }
   std::optional<BoundingBox> bounding_box() const override {
     return BoundingBox{-1.1 * axes_.matrix(), 1.1 * axes_.matrix()};
@@ -65,10 +66,32 @@ class EllipsoidShape final : public PointwiseOracle {
   void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const override {
     ComplementOf((y.array() / axes_.square()).matrix().normalized(), tangent);
   }
+  // Inner normals meet where the shortest coordinates vanish: the medial axis is the solid
+  // ellipsoid there of semi-axes b_i = (a_i^2 - min a^2) / a_i. Its nearest point, from outside, is
+  // found as Project's is.
+  bool has_local_size() const override { return true; }
+  double SizeAt(const Eigen::VectorXd& y) const override {
+    const auto wide = medial_ > 0;
+    const Eigen::ArrayXd squares = medial_.square();
+    const Eigen::ArrayXd by = wide.select(medial_ * y.array().abs(), 0.0);
+    double t = 0;
+    for (int i = 0; i < kMaxIterations; ++i) {
+      const Eigen::ArrayXd below = (squares + t).max(kTiny);
+      const Eigen::ArrayXd terms = (by / below).square();
+      const double excess = terms.sum() - 1;
+      if (!(excess > 0)) break;  // inside, or arrived
+      const double next = t + excess / (2 * (terms / below).sum());
+      if (!(next > t)) break;
+      t = next;
+    }
+    const Eigen::ArrayXd off = wide.select(t / (squares + t).max(kTiny), 1.0);
+    return (off * y.array()).matrix().norm();
+  }
 
  private:
   static constexpr double kTiny = std::numeric_limits<double>::min();
   Eigen::ArrayXd axes_;
+  Eigen::ArrayXd medial_;  // b
   Eigen::Index shortest_ = 0;
 };
 

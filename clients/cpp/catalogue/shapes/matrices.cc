@@ -38,6 +38,9 @@ class RotationsShape final : public PointwiseOracle {
       tangent.col(a) = Eigen::Map<const Eigen::VectorXd>(column.data(), 9);
     }
   }
+  // Any rotation is like any other: the reach.
+  bool has_local_size() const override { return true; }
+  double SizeAt(const Eigen::VectorXd& /*y*/) const override { return std::sqrt(2.0); }
 };
 
 // Symmetric matrices as R^6 with the Frobenius metric.
@@ -91,6 +94,9 @@ class ProjectivePlaneShape final : public PointwiseOracle {
                                                 : Eigen::VectorXd(trace_free_ * column);
     }
   }
+  // Any line is like any other: the reach.
+  bool has_local_size() const override { return true; }
+  double SizeAt(const Eigen::VectorXd& /*y*/) const override { return std::sqrt(0.5); }
 
  private:
   // The nearest v v^T has v the eigenvector of the largest eigenvalue; a multiple of the identity

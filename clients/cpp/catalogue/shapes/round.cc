@@ -1,4 +1,5 @@
 // Spheres and products of circles: everything in closed form.
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -48,6 +49,8 @@ class SphereShape final : public PointwiseOracle {
   void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const override {
     ComplementOf(y.normalized(), tangent);
   }
+  bool has_local_size() const override { return true; }
+  double SizeAt(const Eigen::VectorXd& /*y*/) const override { return 1; }
 };
 
 class TwoSpheresShape final : public PointwiseOracle {
@@ -68,6 +71,9 @@ class TwoSpheresShape final : public PointwiseOracle {
   void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const override {
     ComplementOf((y - Center(y)).normalized(), tangent);
   }
+  // The medial axis is the two centres, and the plane between.
+  bool has_local_size() const override { return true; }
+  double SizeAt(const Eigen::VectorXd& y) const override { return std::min(1.0, std::abs(y[0])); }
 
  private:
   static Eigen::Vector3d Center(const Eigen::VectorXd& x) { return {x[0] < 0 ? -1.5 : 1.5, 0, 0}; }
@@ -102,6 +108,11 @@ class CirclesShape final : public PointwiseOracle {
       tangent(2 * i, i) = -y[2 * i + 1] / norm;
       tangent(2 * i + 1, i) = y[2 * i] / norm;
     }
+  }
+  // Where some circle is at its centre.
+  bool has_local_size() const override { return true; }
+  double SizeAt(const Eigen::VectorXd& /*y*/) const override {
+    return *std::min_element(radii_.begin(), radii_.end());
   }
 
  private:

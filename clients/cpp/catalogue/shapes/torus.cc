@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "shapes/shapes.h"
@@ -28,6 +29,11 @@ class TorusShape final : public PointwiseOracle {
     tangent.resize(3, 2);
     tangent.col(0) << -around[1], around[0], 0;
     tangent.col(1) = -normal[1] * around + normal[0] * Eigen::Vector3d::UnitZ();
+  }
+  // The medial axis is the circle inside the tube, and the axis of revolution.
+  bool has_local_size() const override { return true; }
+  double SizeAt(const Eigen::VectorXd& y) const override {
+    return std::min(r_, std::hypot(y[0], y[1]));
   }
 
  private:

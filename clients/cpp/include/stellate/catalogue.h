@@ -33,10 +33,13 @@ class Manifold final : public Oracle {
   int ambient_dimension() const override { return facts_.ambient_dimension; }
   bool has_intersect_flat() const override { return true; }
   bool has_tangent_basis() const override { return true; }
+  // The local feature size, exactly, where it is known in closed form.
+  bool has_local_size() const override { return shape_->has_local_size(); }
   Answer ClosestPoint(const Eigen::MatrixXd& x) override;
   Answer IntersectFlat(const Eigen::MatrixXd& centers, const Eigen::MatrixXd& bases,
                        const Eigen::VectorXd& radii) override;
   Eigen::MatrixXd TangentBasis(const Eigen::MatrixXd& points) override;
+  Eigen::VectorXd LocalSize(const Eigen::MatrixXd& points) override;
   std::optional<BoundingBox> bounding_box() const override;
 
   const ManifoldFacts& facts() const { return facts_; }

@@ -67,7 +67,8 @@ struct MeshOptions {
   // A handful of round trips for two to three times the processor time; on unless the server is on
   // this machine.
   std::optional<bool> ask_ahead;
-  std::optional<double> size_rate;      // R_p at most this share of the local feature size, (0, 1]
+  // R_p at most this share of the local size, (0, 1]: the oracle's if it has one, else estimated.
+  std::optional<double> size_rate;
   std::optional<double> max_deviation;  // circumcentres at most so far from M, a length
   std::optional<bool> common_centre;  // judge simplices at a centre common to their vertices
 

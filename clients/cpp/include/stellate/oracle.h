@@ -18,6 +18,7 @@ struct Answer {
   Eigen::MatrixXd points;           // d x n; ignored where not found
   std::vector<std::uint8_t> found;  // n, 1 or 0; empty: all found
   Eigen::MatrixXd tangents;         // (d k) x n laid out as a basis (see Oracle), or empty
+  Eigen::VectorXd sizes;            // n, of the points, or empty
 
   bool IsFound(Eigen::Index j) const { return found.empty() || found[static_cast<size_t>(j)] != 0; }
 };
@@ -55,6 +56,15 @@ class Oracle {
   virtual bool has_tangent_basis() const { return false; }
   virtual Eigen::MatrixXd TangentBasis(const Eigen::MatrixXd& /*points*/) {
     throw std::logic_error("this oracle has no tangent bases");
+  }
+
+  // How large things are at points of M (d x n), one positive length each: the local feature size
+  // there, or any size field of yours. MeshOptions::size_rate and max_deviation go by it then; it
+  // is asked for only with them, and only where the answer did not bring its own. Without, the
+  // server estimates. A point's size must depend on the point alone.
+  virtual bool has_local_size() const { return false; }
+  virtual Eigen::VectorXd LocalSize(const Eigen::MatrixXd& /*points*/) {
+    throw std::logic_error("this oracle has no local sizes");
   }
 
   // Where to look for M: a box, or points near M, one at least on each component that is wanted.

@@ -9,7 +9,7 @@ namespace stellate {
 // An oracle written one point at a time: say where the closest point is and what the tangent
 // space there is, and batches and flat intersections follow.
 //
-// Project and Tangent must be safe to call from several threads.
+// Project, Tangent and SizeAt must be safe to call from several threads.
 class PointwiseOracle : public Oracle {
  public:
   int dimension() const final { return dimension_; }
@@ -21,11 +21,15 @@ class PointwiseOracle : public Oracle {
   Answer IntersectFlat(const Eigen::MatrixXd& centers, const Eigen::MatrixXd& bases,
                        const Eigen::VectorXd& radii) override;
   Eigen::MatrixXd TangentBasis(const Eigen::MatrixXd& points) override;
+  Eigen::VectorXd LocalSize(const Eigen::MatrixXd& points) override;
 
   // y := a point of M nearest to x. False when none was found.
   virtual bool Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const = 0;
   // tangent (d x k) := an orthonormal basis of the tangent space at y, a point of M.
   virtual void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const = 0;
+
+  // The size at y, a point of M: override it together with has_local_size.
+  virtual double SizeAt(const Eigen::VectorXd& y) const;
 
   // m := the point of M with basis^T m = level that Newton's method along M reaches from the
   // closest point of `start`. That is the nearest one when M is nearly flat on the way; false when
