@@ -66,8 +66,15 @@ void Log(LogLevel level, const LogContext& context, const std::string& message) 
     if (!context.mesh.empty()) {
       line = "[" + context.mesh + " round " + std::to_string(context.round) + "] ";
     }
-    // A client's words must not forge a line of the log.
-    for (const char c : message) line += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+    // A client's words must not forge a line of the log, nor command the terminal that shows it.
+    unsigned char before = 0;
+    for (const char c : message) {
+      const auto byte = static_cast<unsigned char>(c);
+      const bool latin = before == 0xc2 && byte >= 0x80 && byte < 0xa0;  // U+0080 to U+009F
+      if (latin) line.back() = ' ';
+      line += byte < 0x20 || byte == 0x7f || latin ? ' ' : c;
+      before = byte;
+    }
   }
   Logger().log(ToSpdlog(level), std::string_view(line));
 }

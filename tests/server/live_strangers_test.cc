@@ -98,6 +98,18 @@ TEST_F(LiveStrangersTest, ConnectionsBeyondTheLimitAreClosedUntilOthersGo) {
   EXPECT_TRUE(IsServed());
 }
 
+TEST_F(LiveStrangersTest, ConnectionsThatSayNothingAreClosed) {
+  Config config;
+  config.hello_seconds = 0.2;
+  StartTcp(config);
+  const int silent = Connect();
+  char bytes[4096];
+  // What the server says first, and then the end.
+  while (recv(silent, bytes, sizeof(bytes), 0) > 0) continue;
+  close(silent);
+  EXPECT_TRUE(IsServed());
+}
+
 // Reflection runs on threads, of which there are few.
 TEST_F(LiveStrangersTest, ReflectionStreamsHoldUpNobody) {
   Start();

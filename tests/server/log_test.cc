@@ -15,12 +15,14 @@ TEST(Log, JsonStringsEscapeWhatWouldBreakThem) {
 TEST(Log, LinesNameTheMeshAndTheRound) {
   ::testing::internal::CaptureStderr();
   StartLogging(LogLevel::kInfo, LogFormat::kText);
-  Log(LogLevel::kInfo, {"meshes/ab", 7}, "a client's\nwords");
+  Log(LogLevel::kInfo, {"meshes/ab", 7}, "a client's\nwords\x7f\xc2\x9b[2J\x1b[2J\xce\xb5");
   Log(LogLevel::kDebug, {}, "not shown");
   StartLogging(LogLevel::kWarning, LogFormat::kJson);
   Log(LogLevel::kWarning, {"meshes/cd", 8}, "say \"so\"");
   const std::string text = ::testing::internal::GetCapturedStderr();
-  EXPECT_NE(text.find("[meshes/ab round 7] a client's words\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("[meshes/ab round 7] a client's words   [2J [2J\xce\xb5\n"),
+            std::string::npos)
+      << text;
   EXPECT_EQ(text.find("not shown"), std::string::npos);
   EXPECT_NE(text.find(R"("mesh":"meshes/cd","round":8,"message":"say \"so\""})"), std::string::npos)
       << text;

@@ -9,6 +9,7 @@
 #include <regex>
 #include <sstream>
 
+#include "tests/server/certificates.h"
 #include "tests/server/live_server.h"
 
 namespace stellate::server::testing {
@@ -160,12 +161,31 @@ TEST_F(MetricsTest, CountsWhatLimitsRefuse) {
   EXPECT_EQ(series.at("stellate_limit_refusals_total{limit=\"max-rounds\"}"), 1);
 }
 
-TEST_F(MetricsTest, NamesNoMeshAndNoOwner) {
-  StartWithMetrics();
-  const std::string name = CreateSphere();
+TEST_F(MetricsTest, NamesNoMeshNoOwnerAndNoToken) {
+  const ScratchDirectory directory;
+  WriteFile(directory / "tokens", "alice alice-0123456789abcdef\n");
+  Config config;
+  config.token_file = directory / "tokens";
+  config.owner_meshes = 1;
+  StartWithMetrics(config);
+  v1::CreateMeshRequest request;
+  *request.mutable_spec() = SpecOfSphere();
+  request.mutable_spec()->set_label("a-label");
+  v1::Mesh mesh;
+  for (const char* token : {"alice-0123456789abcdef", "alice-0123456789abcdef", "nobody"}) {
+    grpc::ClientContext context;  // the second is one too many, the third unknown
+    context.AddMetadata("authorization", std::string("Bearer ") + token);
+    stub_->CreateMesh(&context, request, &mesh);
+  }
   const std::string reply = Get(server_->metrics_port());
-  EXPECT_NE(reply.find("stellate_meshes"), std::string::npos);
-  EXPECT_EQ(reply.find(name.substr(name.find('/') + 1)), std::string::npos);
+  EXPECT_NE(reply.find("stellate_meshes{state=\"WAITING\"} 1"), std::string::npos) << reply;
+  EXPECT_NE(reply.find("stellate_limit_refusals_total{limit=\"owner-meshes\"} 1"),
+            std::string::npos)
+      << reply;
+  for (const std::string& word : {mesh.name().substr(mesh.name().find('/') + 1),
+                                  std::string("alice"), std::string("a-label")}) {
+    EXPECT_EQ(reply.find(word), std::string::npos) << reply;
+  }
 }
 
 TEST_F(MetricsTest, ATakenPortIsRefusedAndAStoppedServerAnswersNoMore) {
