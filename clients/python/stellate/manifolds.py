@@ -171,8 +171,8 @@ def ellipsoid(axes: Sequence[float] = (1.0, 0.8, 0.6)) -> ImplicitManifold:
     def local_size(y: np.ndarray) -> np.ndarray:
         """To the medial axis: the solid ellipsoid of semi-axes `inner`, flat in the shortest axes.
 
-        Its nearest point to y outside is inner^2 y / (inner^2 + t), with t by Newton's method, which
-        climbs to its root from zero.
+        Its nearest point to y outside is inner^2 y / (inner^2 + t), with t by Newton's method,
+        which climbs to its root from zero.
         """
         t = np.zeros((len(y), 1))
         for _ in range(60):

@@ -26,8 +26,8 @@ class Oracle(Protocol):
       tangent_basis(points (n, d)) -> (n, d, k): orthonormal columns that span the tangent space at
         points of M. Without it the server finds tangent spaces from closest points.
       local_size(points (n, d)) -> (n,): how large things are at points of M: the local feature size
-        there, or any positive lengths of yours. With size_rate or max_deviation the mesh goes by it;
-        without it the server estimates. A point's size must not depend on anything else.
+        there, or any positive lengths of yours. With size_rate or max_deviation the mesh goes by
+        it; without it the server estimates. A point's size must depend on the point alone.
       bounding_box: (lower (d,), upper (d,)), where to look for M, or
       seeds: (m, d), points near M, one at least on each component. One of the two is needed.
       thread_safe: True lets several workers call it at once.
