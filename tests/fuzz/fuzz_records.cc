@@ -22,7 +22,7 @@ std::vector<std::string> Seeds() {
   seeds.push_back('\0' + server::EncodeStart(options, {}));
   core::Answers answers;
   answers.blocks.push_back(
-      {Eigen::MatrixXd::Ones(3, 4), {1, 0, 1, 1}, Eigen::MatrixXd::Ones(6, 4)});
+      {Eigen::MatrixXd::Ones(3, 4), {1, 0, 1, 1}, Eigen::MatrixXd::Ones(6, 4), {}});
   answers.blocks.push_back({Eigen::MatrixXd::Ones(3, 1), {}, {}, Eigen::VectorXd::Ones(1)});
   seeds.push_back('\1' + server::EncodeAnswers(answers));
   seeds.push_back('\1' + server::EncodeAnswers({}));
