@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <vector>
 
 #if defined(__SANITIZE_THREAD__)
 #include <thread>
-#include <vector>
 #else
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 #include <tbb/task_arena.h>
 #include <tbb/task_group.h>
 #endif
@@ -49,6 +50,11 @@ void ParallelFor(Index count, const Body& body) {
   for (std::thread& thread : threads) thread.join();
 }
 
+template <typename Item, typename Less>
+void ParallelSort(std::vector<Item>& items, const Less& less) {
+  std::sort(items.begin(), items.end(), less);
+}
+
 template <typename Work>
 bool WithThreads(int, Interruption& interruption, const Work& work) {
   work();
@@ -81,6 +87,13 @@ void ParallelFor(Index count, const Body& body) {
   ThrowIfInterrupted();
 }
 
+// `less` is a strict total order: equal items would end up in any order.
+template <typename Item, typename Less>
+void ParallelSort(std::vector<Item>& items, const Less& less) {
+  tbb::parallel_sort(items.begin(), items.end(), less);
+  ThrowIfInterrupted();
+}
+
 // Runs work() so that the ParallelFor in it use at most so many threads; 0: all cores. False if it
 // was interrupted, at any point.
 template <typename Work>
@@ -101,14 +114,21 @@ bool WithThreads(int threads, Interruption& interruption, const Work& work) {
 #endif
 
 // The same in chunks whose borders depend on `count` alone, so that what bodies gather by chunk is
-// the same whatever the number of threads: body(chunk, begin, end).
-inline constexpr std::size_t kChunk = 64;
-inline std::size_t ChunkCount(std::size_t count) { return (count + kChunk - 1) / kChunk; }
+// the same whatever the number of threads: body(chunk, begin, end). Large enough to share working
+// memory, small enough for some dozens of threads.
+inline std::size_t ChunkSize(std::size_t count) {
+  return std::clamp<std::size_t>(count / 256, 1, 64);
+}
+inline std::size_t ChunkCount(std::size_t count) {
+  const std::size_t size = ChunkSize(count);
+  return (count + size - 1) / size;
+}
 
 template <typename Body>
 void ParallelChunks(std::size_t count, const Body& body) {
+  const std::size_t size = ChunkSize(count);
   ParallelFor(ChunkCount(count), [&](std::size_t chunk) {
-    body(chunk, chunk * kChunk, std::min(count, (chunk + 1) * kChunk));
+    body(chunk, chunk * size, std::min(count, (chunk + 1) * size));
   });
 }
 

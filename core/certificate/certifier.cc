@@ -110,8 +110,8 @@ class Certifier::Impl {
   // A point of M that the mesh must cover.
   struct Probe {
     Eigen::VectorXd x;
-    Fibres::Nearest nearest;
-    std::vector<double> tangent;  // d x k, C order
+    NearestVertex nearest;
+    std::vector<double> tangent;  // k x d, C order
   };
 
   bool CheckComplex() {
@@ -128,10 +128,14 @@ class Certifier::Impl {
     }
     adjacency_.emplace(list);
     ThrowIfInterrupted();
-    const Connectivity connectivity = ComputeConnectivity(*adjacency_);
-    ThrowIfInterrupted();
-    const LinkReport links = CheckLinks(*adjacency_);
-    ThrowIfInterrupted();
+    Connectivity connectivity;
+    LinkReport links;
+    ParallelFor(2, [&](int part) {
+      if (part == 0)
+        connectivity = ComputeConnectivity(*adjacency_);
+      else
+        links = CheckLinks(*adjacency_);
+    });
     certificate_.bad_faces = adjacency_->bad_facets();
     certificate_.closed = certificate_.bad_faces == 0;
     certificate_.components = connectivity.components;
@@ -197,7 +201,6 @@ class Certifier::Impl {
                                "), more than epsilon = ", Brief(spec_.epsilon)));
     }
     size_ = std::min(shape_.max_circumradius, spec_.epsilon);
-    fibres_.emplace(mesh_, *adjacency_, shape_.max_diameter);
     balls_.emplace(mesh_, stars.longest_edge, spec_.random_seed, kBallCount);
     longest_edge_ = std::move(stars.longest_edge);
   }
@@ -215,6 +218,8 @@ class Certifier::Impl {
   void AskFirst() {
     const SimplexList& list = adjacency_->list();
     chosen_simplices_ = ChooseSimplices(list, shape_, spec_.random_seed);
+    shape_.diameters = {};
+    shape_.tilts = {};
     chosen_vertices_ = ChooseVertices(list.vertices, spec_.random_seed);
     Ask(Role::kBarycentres, Barycentres(mesh_, list, chosen_simplices_));
     Eigen::MatrixXd vertices(mesh_.d, static_cast<Eigen::Index>(chosen_vertices_.size()));
@@ -312,11 +317,20 @@ class Certifier::Impl {
   }
 
   void TakeProbes(const AnswerBlock& answer) {
+    std::vector<Eigen::Index> found;
+    std::vector<double> points;
     for (Eigen::Index j = 0; j < answer.points.cols(); ++j) {
       if (!Found(answer, j)) continue;
+      found.push_back(j);
+      points.insert(points.end(), answer.points.col(j).begin(), answer.points.col(j).end());
+    }
+    const std::vector<NearestVertex> nearest =
+        FindNearestVertices(mesh_, points, kCoverageShare * size_);
+    for (std::size_t n = 0; n < found.size(); ++n) {
+      const Eigen::Index j = found[n];
       Probe probe;
       probe.x = answer.points.col(j);
-      probe.nearest = fibres_->NearestVertex(probe.x.data());
+      probe.nearest = nearest[n];
       if (probe.nearest.distance > kCoverageShare * size_) {
         ++certificate_.fibre_samples;
         ++certificate_.fibre_failures;
@@ -328,12 +342,12 @@ class Certifier::Impl {
         continue;
       }
       if (answer.tangents.size() > 0) {
-        const double* t = answer.tangents.col(j).data();
-        probe.tangent.assign(t, t + answer.tangents.rows());
+        for (int a = 0; a < mesh_.k; ++a)
+          for (int i = 0; i < mesh_.d; ++i)
+            probe.tangent.push_back(answer.tangents(i * mesh_.k + a, j));
       } else {
-        const std::size_t width = static_cast<std::size_t>(mesh_.d) * mesh_.k;
-        const double* t = mesh_.tangents + width * probe.nearest.vertex;
-        probe.tangent.assign(t, t + width);
+        const double* t = mesh_.Tangent(probe.nearest.vertex);
+        probe.tangent.assign(t, t + mesh_.d * mesh_.k);
       }
       probes_.push_back(std::move(probe));
     }
@@ -350,7 +364,8 @@ class Certifier::Impl {
         auto point = points.col(static_cast<Eigen::Index>(n) * k + a);
         point = probes_[n].x;
         for (int i = 0; i < mesh_.d; ++i) {
-          point[i] += kDifferenceStep * size_ * probes_[n].tangent[i * k + a];
+          point[i] += kDifferenceStep * size_ *
+                      probes_[n].tangent[static_cast<std::size_t>(a * mesh_.d + i)];
         }
       }
     }
@@ -371,27 +386,31 @@ class Certifier::Impl {
       const Eigen::HouseholderQR<Eigen::MatrixXd> qr(steps);
       const Eigen::MatrixXd basis = qr.householderQ() * Eigen::MatrixXd::Identity(mesh_.d, k);
       for (int i = 0; i < mesh_.d; ++i) {
-        for (Eigen::Index a = 0; a < k; ++a) probes_[n].tangent[i * k + a] = basis(i, a);
+        for (Eigen::Index a = 0; a < k; ++a)
+          probes_[n].tangent[static_cast<std::size_t>(a * mesh_.d + i)] = basis(i, a);
       }
     }
     JudgeFibres();
   }
 
   void JudgeFibres() {
+    std::vector<Fibre> fibres;
+    for (std::size_t n = 0; n < probes_.size(); ++n)
+      fibres.push_back({probes_[n].x.data(), probes_[n].tangent.data(),
+                        LocalSize(probes_[n].nearest.vertex), Mix64(spec_.random_seed) + n});
+    const std::vector<int> counted = CountHits(mesh_, *adjacency_, shape_.max_diameter, fibres);
     for (std::size_t n = 0; n < probes_.size(); ++n) {
       const Probe& probe = probes_[n];
-      const int hits =
-          fibres_->CountHits(probe.x.data(), probe.tangent.data(), LocalSize(probe.nearest.vertex),
-                             Mix64(spec_.random_seed) + n);
+      const int hits = counted[n];
       if (hits < 0) continue;  // undecided by rounding
       ++certificate_.fibre_samples;
       if (hits == 1) continue;
       ++certificate_.fibre_failures;
-      findings_.Refuse(Findings::kFibres,
-                       Message("the normal flat of the manifold at its point ", NamePoint(probe.x),
-                               ", near vertex ", probe.nearest.vertex, ", meets the mesh ", hits,
-                               " times within ", Brief(LocalSize(probe.nearest.vertex)),
-                               " instead of once"));
+      findings_.Refuse(
+          Findings::kFibres,
+          Message("the normal flat of the manifold at its point ", NamePoint(probe.x),
+                  ", near vertex ", probe.nearest.vertex, ", meets the mesh ", hits,
+                  " times within ", Brief(LocalSize(probe.nearest.vertex)), " instead of once"));
     }
     probes_.clear();
   }
@@ -412,10 +431,10 @@ class Certifier::Impl {
     if (std::string w = CoarsenessWarning(coarse, reach_); !w.empty()) findings_.Warn(std::move(w));
     if (spec_.criteria.max_deviation &&
         certificate_.max_barycentre_distance > *spec_.criteria.max_deviation) {
-      findings_.Warn(Message("a barycentre lies ", Brief(certificate_.max_barycentre_distance),
-                             " from the manifold, more than max_deviation = ",
-                             Brief(*spec_.criteria.max_deviation),
-                             ": the curvature was underestimated there; take epsilon smaller."));
+      findings_.Warn(Message(
+          "a barycentre lies ", Brief(certificate_.max_barycentre_distance),
+          " from the manifold, more than max_deviation = ", Brief(*spec_.criteria.max_deviation),
+          ": the curvature was underestimated there; take epsilon smaller."));
     }
   }
 
@@ -436,12 +455,11 @@ class Certifier::Impl {
   Certificate certificate_;
   Findings findings_;
   std::optional<Adjacency> adjacency_;
-  std::optional<Fibres> fibres_;
   std::optional<ShrinkingBalls> balls_;
   MeshShape shape_;
   double reach_ = 0;
   std::vector<double> longest_edge_;  // by vertex
-  double size_ = 0;  // the mesh's own: its largest circumradius, epsilon at most
+  double size_ = 0;                   // the mesh's own: its largest circumradius, epsilon at most
   std::vector<std::uint32_t> chosen_simplices_, chosen_vertices_;
   std::string barycentre_problem_;
   std::vector<Probe> probes_;

@@ -16,8 +16,11 @@ struct MeshView {
   int k = 0, d = 0;
   std::uint64_t vertices = 0;
   const double* points = nullptr;    // vertices x d, C order
-  const double* tangents = nullptr;  // vertices x d x k, C order, orthonormal columns
+  const double* tangents = nullptr;  // vertices x k x d, C order, orthonormal rows
   const std::vector<std::uint32_t>* simplices = nullptr;  // k+1 ascending vertex ids each
+
+  const double* Point(std::uint32_t v) const { return points + std::size_t{v} * d; }
+  const double* Tangent(std::uint32_t v) const { return tangents + std::size_t{v} * d * k; }
 };
 
 // What only the stars know.

@@ -6,53 +6,38 @@
 
 #include "core/certificate/certifier.h"
 #include "core/certificate/topology.h"
-#include "core/sample/ball_tree.h"
 #include "core/specification.h"
 
 namespace stellate::core {
 
 // How a mesh meets the normal flats (fibres) of M. If each fibre meets it exactly once nearby, the
 // mesh is M seen along its normals: nothing missing, nothing doubled, nothing bridged.
-class Fibres {
- public:
-  // `max_diameter`: of the mesh's simplices.
-  Fibres(const MeshView& mesh, const Adjacency& adjacency, double max_diameter);
+//
+// The points of M that are asked about are few and the mesh is large: each call takes all points
+// and goes through the mesh once, in parallel.
 
-  // The mesh vertex nearest to x, and its distance.
-  struct Nearest {
-    std::uint32_t vertex = 0;
-    double distance = 0;
-  };
-  Nearest NearestVertex(const double* x) const;
-
-  // The number of points within reach_out of x where the flat x + T^perp meets the mesh; tangent
-  // is d x k, orthonormal. When the flat passes so close to the boundary of a simplex that
-  // rounding would decide, parallel ones, at most 0.02 reach_out to the side, are tried; -1 if
-  // all of them do so too.
-  int CountHits(const double* x, const double* tangent, double reach_out,
-                std::uint64_t random_key);
-
- private:
-  // A mesh vertex near x, its tangent coordinates relative to x.
-  struct NearVertex {
-    std::uint32_t id = 0;
-    std::array<double, kMaxDimension> flat{};
-  };
-
-  void Gather(const double* x, const double* tangent);
-  int CountHitsBeside(const double* x, const std::array<double, kMaxDimension>& shift) const;
-  // Is the simplex's point with these barycentric coordinates within reach_out of x?
-  bool IsWithinReach(const double* x, const std::uint32_t* ids, double first,
-                     const std::array<double, kMaxDimension>& others) const;
-
-  const MeshView& mesh_;
-  const Adjacency& adjacency_;
-  const double max_diameter_;
-  double reach_out_ = 0;
-  std::vector<double> coordinates_;
-  BallTree tree_;
-  std::vector<NearVertex> near_;
-  std::vector<std::uint32_t> place_;  // by vertex: its place in near_, plus one; 0 if not there
+// The mesh vertex nearest to a point, the lowest of several, and its distance.
+struct NearestVertex {
+  std::uint32_t vertex = 0;
+  double distance = 0;
 };
+// Quick for points that have a vertex within `near`. `points`: d each, C order.
+std::vector<NearestVertex> FindNearestVertices(const MeshView& mesh,
+                                               const std::vector<double>& points, double near);
+
+// The flat x + T^perp.
+struct Fibre {
+  const double* x;        // d
+  const double* tangent;  // k x d, C order, orthonormal rows
+  double reach_out;       // length
+  std::uint64_t random_key;
+};
+
+// The number of points within reach_out of x where each fibre meets the mesh. When a flat passes so
+// close to the boundary of a simplex that rounding would decide, parallel ones, at most 0.02
+// reach_out to the side, are tried; -1 if all of them do so too. `max_diameter`: of the mesh's
+// simplices.
+std::vector<int> CountHits(const MeshView& mesh, const Adjacency& adjacency, double max_diameter,
+                           const std::vector<Fibre>& fibres);
 
 }  // namespace stellate::core

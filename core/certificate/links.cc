@@ -6,6 +6,7 @@
 
 #include "core/certificate/fundamental_group.h"
 #include "core/message.h"
+#include "core/parallel.h"
 #include "core/specification.h"
 
 namespace stellate::core {
@@ -28,30 +29,31 @@ struct Face {
   }
 };
 
+// What a part of the vertices has to say.
+struct LinksOfPart {
+  LinkReport report;
+  std::vector<std::uint32_t> blamed;  // vertices, with repetitions
+  std::int64_t used_vertices = 0;
+  // Sums over the vertices.
+  std::int64_t link_vertices = 0, link_edges = 0, link_triangles = 0;
+};
+
 class LinkChecker {
  public:
   explicit LinkChecker(const Adjacency& adjacency)
-      : adjacency_(adjacency),
-        list_(adjacency.list()),
-        k_(list_.k),
-        bad_(list_.vertices, 0),
-        flooded_(list_.size(), 0) {}
+      : adjacency_(adjacency), list_(adjacency.list()), k_(list_.k) {}
 
-  LinkReport Run() {
-    std::int64_t used = 0;
-    for (std::uint32_t v = 0; v < list_.vertices; ++v) {
+  LinksOfPart Run(std::uint32_t begin, std::uint32_t end) {
+    for (std::uint32_t v = begin; v < end; ++v) {
       const auto star = adjacency_.Star(v);
       if (star.empty()) continue;
-      ++used;
+      ++part_.used_vertices;
       Face face;
       face.ids[face.size++] = v;
+      blamed_here_ = false;
       CheckLink(face, {star.begin(), star.end()});
     }
-    for (std::uint32_t v = 0; v < list_.vertices; ++v) {
-      if (bad_[v]) ++report_.bad_links;
-    }
-    CountFaces(used);
-    return report_;
+    return std::move(part_);
   }
 
  private:
@@ -70,12 +72,12 @@ class LinkChecker {
   }
 
   // Each ridge of the link is in two of its simplices, and from one all others are reached
-  // across ridges.
+  // across ridges. `simplices` ascend.
   const char* WhyNotClosedAndConnected(const Face& face, const SimplexIds& simplices) {
-    ++flood_;
     std::size_t reached = 1;
     stack_.assign(1, simplices.front());
-    flooded_[simplices.front()] = flood_;
+    flooded_.assign(simplices.size(), 0);
+    flooded_[0] = 1;
     while (!stack_.empty()) {
       const std::uint32_t s = stack_.back();
       stack_.pop_back();
@@ -83,8 +85,10 @@ class LinkChecker {
         if (face.Has(list_[s][i])) continue;
         const std::uint32_t t = adjacency_.Across(s, i);
         if (t == Adjacency::kNone) return "is not closed";
-        if (flooded_[t] == flood_) continue;
-        flooded_[t] = flood_;
+        const auto at = std::lower_bound(simplices.begin(), simplices.end(), t);
+        std::uint8_t& flooded = flooded_[static_cast<std::size_t>(at - simplices.begin())];
+        if (flooded) continue;
+        flooded = 1;
         ++reached;
         stack_.push_back(t);
       }
@@ -104,7 +108,7 @@ class LinkChecker {
     const std::vector<std::uint32_t> vertices = LinkVertices(face, simplices);
     const std::int64_t top = static_cast<std::int64_t>(simplices.size());
     const std::int64_t f0 = static_cast<std::int64_t>(vertices.size());
-    if (face.size == 1) link_vertices_ += f0;
+    if (face.size == 1) part_.link_vertices += f0;
     if (n == 2) {
       // V - E + F with E = 3 F / 2. A closed connected surface pinched somewhere has less than
       // its normalisation, so 2 means a sphere.
@@ -143,9 +147,9 @@ class LinkChecker {
     const std::int64_t f2 = static_cast<std::int64_t>(skeleton.triangles.size());
     const std::int64_t top = static_cast<std::int64_t>(simplices.size());
     if (face.size == 1) {
-      link_edges_ += f1;
-      link_triangles_ += f2;
-      if (bad_[face.ids[0]]) return;
+      part_.link_edges += f1;
+      part_.link_triangles += f2;
+      if (blamed_here_) return;
     }
     // A closed 3-manifold always has Euler characteristic 0; for a closed 4-manifold without
     // first homology 2 says that there is no second homology either.
@@ -157,7 +161,7 @@ class LinkChecker {
       case LoopVerdict::kSimplyConnected:
         break;
       case LoopVerdict::kNoHomology:
-        report_.decided_exactly = false;
+        part_.report.decided_exactly = false;
         break;
       case LoopVerdict::kHasHomology:
         Blame(face, "is not a sphere: it has loops that do not contract");
@@ -206,40 +210,64 @@ class LinkChecker {
   }
 
   void Blame(const Face& face, const char* why) {
-    for (int i = 0; i < face.size; ++i) bad_[face.ids[i]] = 1;
-    if (!report_.first_bad_link.empty()) return;
-    report_.first_bad_link =
+    part_.blamed.insert(part_.blamed.end(), face.ids.begin(), face.ids.begin() + face.size);
+    blamed_here_ = true;
+    if (!part_.report.first_bad_link.empty()) return;
+    part_.report.first_bad_link =
         face.size == 1
             ? Message("the link of vertex ", face.ids[0], " ", why)
             : Message("the link of face ", NameSimplex(face.ids.data(), face.size), " ", why);
   }
 
-  // A j-face is in the links of its j+1 vertices as a (j-1)-face.
-  void CountFaces(std::int64_t used_vertices) {
-    const std::int64_t facets = static_cast<std::int64_t>(adjacency_.facets());
-    std::array<std::int64_t, kMaxDimension + 1> f{};
-    f[0] = used_vertices;
-    if (k_ >= 3) f[1] = link_vertices_ / 2;
-    if (k_ >= 4) f[2] = link_edges_ / 3;
-    if (k_ >= 5) f[3] = link_triangles_ / 4;
-    if (k_ >= 2) f[k_ - 1] = facets;
-    f[k_] = list_.size();
-    for (int j = 0; j <= k_; ++j) report_.euler_characteristic += j % 2 == 0 ? f[j] : -f[j];
-  }
-
   const Adjacency& adjacency_;
   const SimplexList& list_;
   const int k_;
-  LinkReport report_;
-  std::vector<std::uint8_t> bad_;       // by vertex
-  std::vector<std::uint64_t> flooded_;  // by simplex: number of the last flood that reached it
-  std::uint64_t flood_ = 0;
+  LinksOfPart part_;
+  bool blamed_here_ = false;           // the vertex at hand
+  std::vector<std::uint8_t> flooded_;  // by simplex of the link at hand
   std::vector<std::uint32_t> stack_;
-  std::int64_t link_vertices_ = 0, link_edges_ = 0, link_triangles_ = 0;  // sums over vertices
 };
+
+// A j-face is in the links of its j+1 vertices as a (j-1)-face.
+std::int64_t EulerCharacteristic(const Adjacency& adjacency, const LinksOfPart& all) {
+  const int k = adjacency.list().k;
+  std::array<std::int64_t, kMaxDimension + 1> f{};
+  f[0] = all.used_vertices;
+  if (k >= 3) f[1] = all.link_vertices / 2;
+  if (k >= 4) f[2] = all.link_edges / 3;
+  if (k >= 5) f[3] = all.link_triangles / 4;
+  if (k >= 2) f[k - 1] = static_cast<std::int64_t>(adjacency.facets());
+  f[k] = adjacency.list().size();
+  std::int64_t chi = 0;
+  for (int j = 0; j <= k; ++j) chi += j % 2 == 0 ? f[j] : -f[j];
+  return chi;
+}
 
 }  // namespace
 
-LinkReport CheckLinks(const Adjacency& adjacency) { return LinkChecker(adjacency).Run(); }
+LinkReport CheckLinks(const Adjacency& adjacency) {
+  const std::uint32_t vertices = adjacency.list().vertices;
+  std::vector<LinksOfPart> parts(ChunkCount(vertices));
+  ParallelChunks(vertices, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    parts[chunk] = LinkChecker(adjacency).Run(static_cast<std::uint32_t>(begin),
+                                              static_cast<std::uint32_t>(end));
+  });
+  LinksOfPart all;
+  for (LinksOfPart& part : parts) {
+    all.used_vertices += part.used_vertices;
+    all.link_vertices += part.link_vertices;
+    all.link_edges += part.link_edges;
+    all.link_triangles += part.link_triangles;
+    all.blamed.insert(all.blamed.end(), part.blamed.begin(), part.blamed.end());
+    all.report.decided_exactly = all.report.decided_exactly && part.report.decided_exactly;
+    if (all.report.first_bad_link.empty())
+      all.report.first_bad_link = std::move(part.report.first_bad_link);
+  }
+  std::sort(all.blamed.begin(), all.blamed.end());
+  all.blamed.erase(std::unique(all.blamed.begin(), all.blamed.end()), all.blamed.end());
+  all.report.bad_links = all.blamed.size();
+  all.report.euler_characteristic = EulerCharacteristic(adjacency, all);
+  return std::move(all.report);
+}
 
 }  // namespace stellate::core

@@ -27,7 +27,7 @@ void SortUnique(std::vector<std::uint32_t>& ids) {
 }
 
 // The `count` simplices of largest value.
-void AppendLargest(const std::vector<double>& values, std::uint32_t count,
+void AppendLargest(const std::vector<float>& values, std::uint32_t count,
                    std::vector<std::uint32_t>& chosen) {
   std::vector<std::uint32_t> order(values.size());
   std::iota(order.begin(), order.end(), 0u);

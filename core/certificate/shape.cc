@@ -37,8 +37,7 @@ struct Extremes {
 };
 
 Extremes MeasurePart(const MeshView& mesh, const SimplexList& list, std::uint32_t begin,
-                     std::uint32_t end, std::vector<double>& diameters,
-                     std::vector<double>& tilts) {
+                     std::uint32_t end, std::vector<float>& diameters, std::vector<float>& tilts) {
   const int k = mesh.k;
   const int d = mesh.d;
   constexpr double kNegligible = 1e-14;  // difference of squared sines
@@ -46,7 +45,7 @@ Extremes MeasurePart(const MeshView& mesh, const SimplexList& list, std::uint32_
   std::array<const double*, kMaxDimension + 1> corners{};
   const SimplexVertices vertices(corners.data(), static_cast<std::size_t>(k) + 1);
   for (std::uint32_t s = begin; s < end; ++s) {
-    for (int i = 0; i <= k; ++i) corners[i] = mesh.points + std::size_t{list[s][i]} * d;
+    for (int i = 0; i <= k; ++i) corners[i] = mesh.Point(list[s][i]);
     const SimplexFrame frame = FrameSimplex(vertices, d);
     const SimplexMeasures m = MeasureSimplex(vertices, d, frame);
     if (m.circumradius > part.circumradius) {
@@ -60,7 +59,7 @@ Extremes MeasurePart(const MeshView& mesh, const SimplexList& list, std::uint32_
 
     double tilt = 0;
     for (int i = 0; i <= k; ++i) {
-      const double* tangent = mesh.tangents + std::size_t{list[s][i]} * d * k;
+      const double* tangent = mesh.Tangent(list[s][i]);
       if (frame.rank < k) {
         tilt = k;
         part.sine2 = 1;
@@ -75,8 +74,8 @@ Extremes MeasurePart(const MeshView& mesh, const SimplexList& list, std::uint32_
       const double sine = std::sin(AngleToTangent(frame, k, d, tangent, k));
       part.sine2 = std::max(part.sine2, sine * sine);
     }
-    diameters[s] = m.diameter;
-    tilts[s] = tilt;
+    diameters[s] = static_cast<float>(m.diameter);
+    tilts[s] = static_cast<float>(tilt);
   }
   return part;
 }

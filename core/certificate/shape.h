@@ -18,8 +18,8 @@ struct MeshShape {
   double min_angle_degrees = 0;  // k = 2; else 0
   double max_tangent_angle_degrees = 0;
 
-  std::vector<double> diameters;  // by simplex, length
-  std::vector<double> tilts;      // by simplex: largest sum of squared sines to a vertex's tangents
+  std::vector<float> diameters;  // by simplex, length
+  std::vector<float> tilts;      // by simplex: largest sum of squared sines to a vertex's tangents
 };
 
 // Time linear in the mesh; O(d k^2) a simplex.

@@ -45,8 +45,7 @@ ShrinkingBalls::ShrinkingBalls(const MeshView& mesh, const std::vector<double>& 
     ball.scale = kTellingDistance * longest_edge[ball.vertex];
     ball.normal.resize(d);
     for (int i = 0; i < d; ++i) ball.normal[i] = random.Normal();
-    using Basis = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    const Eigen::Map<const Basis> tangent(mesh.tangents + std::size_t{ball.vertex} * d * k, d, k);
+    const Eigen::Map<const Eigen::MatrixXd> tangent(mesh.Tangent(ball.vertex), d, k);
     for (int pass = 0; pass < 2; ++pass) {
       ball.normal -= tangent * (tangent.transpose() * ball.normal).eval();
     }

@@ -57,8 +57,8 @@ class StarMeasurer {
     ids_.clear();
     neighbours_.clear();
     columns_.clear();
-    const double* centre = mesh_.points + std::size_t{p} * d_;
-    const double* tangent = mesh_.tangents + std::size_t{p} * d_ * K;
+    const double* centre = mesh_.Point(p);
+    const double* tangent = mesh_.Tangent(p);
     offset_.resize(d_);
     for (const std::uint32_t s : adjacency_.Star(p)) {
       const std::uint32_t* ids = adjacency_.list()[s];
@@ -69,14 +69,12 @@ class StarMeasurer {
         if (known != ids_.end()) continue;
         ids_.push_back(ids[i]);
         Neighbour n{};
-        const double* q = mesh_.points + std::size_t{ids[i]} * d_;
-        for (int j = 0; j < d_; ++j) {
-          offset_[j] = q[j] - centre[j];
-          for (int a = 0; a < K; ++a) n.u[a] += tangent[j * K + a] * offset_[j];
-        }
+        const double* q = mesh_.Point(ids[i]);
+        for (int j = 0; j < d_; ++j) offset_[j] = q[j] - centre[j];
+        for (int a = 0; a < K; ++a) n.u[a] = Dot(tangent + a * d_, offset_.data(), d_);
         n.squared_distance = Dot(offset_.data(), offset_.data(), d_);
-        for (int j = 0; j < d_; ++j) {
-          for (int a = 0; a < K; ++a) offset_[j] -= tangent[j * K + a] * n.u[a];
+        for (int a = 0; a < K; ++a) {
+          for (int j = 0; j < d_; ++j) offset_[j] -= tangent[a * d_ + j] * n.u[a];
         }
         n.off_tangent2 = Dot(offset_.data(), offset_.data(), d_);
         neighbours_.push_back(n);

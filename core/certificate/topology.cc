@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "core/message.h"
+#include "core/parallel.h"
 #include "core/specification.h"
 
 namespace stellate::core {
@@ -68,12 +69,27 @@ Adjacency::Adjacency(const SimplexList& list) : list_(list) {
   MatchFacets();
 }
 
-// Each facet is matched at its lowest vertex, among the few that share it.
+// Each facet is matched at its lowest vertex, among the few that share it: parts of the vertices
+// write to different places.
 void Adjacency::MatchFacets() {
-  const int k = list_.k;
   across_.assign(list_.ids->size(), kNone);
+  std::vector<FacetCount> parts(ChunkCount(list_.vertices));
+  ParallelChunks(list_.vertices, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    parts[chunk] =
+        MatchFacetsOf(static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end));
+  });
+  for (FacetCount& part : parts) {
+    facets_.all += part.all;
+    if (facets_.bad == 0) facets_.first_bad = std::move(part.first_bad);
+    facets_.bad += part.bad;
+  }
+}
+
+Adjacency::FacetCount Adjacency::MatchFacetsOf(std::uint32_t begin, std::uint32_t end) {
+  const int k = list_.k;
+  FacetCount count;
   std::vector<FacetSide> sides;
-  for (std::uint32_t v = 0; v < list_.vertices; ++v) {
+  for (std::uint32_t v = begin; v < end; ++v) {
     sides.clear();
     for (const std::uint32_t s : Star(v)) {
       const std::uint32_t* ids = list_[s];
@@ -84,9 +100,9 @@ void Adjacency::MatchFacets() {
         FacetSide side;
         side.simplex = s;
         side.omitted = static_cast<std::uint32_t>(omit);
-        int count = 0;
+        int rest = 0;
         for (int i = 0; i <= k; ++i) {
-          if (i != omit && ids[i] != v) side.rest[count++] = ids[i];
+          if (i != omit && ids[i] != v) side.rest[rest++] = ids[i];
         }
         sides.push_back(side);
       }
@@ -95,29 +111,28 @@ void Adjacency::MatchFacets() {
       return a.rest != b.rest ? a.rest < b.rest : a.simplex < b.simplex;
     });
     for (std::size_t i = 0; i < sides.size();) {
-      std::size_t end = i + 1;
-      while (end < sides.size() && sides[end].SameFacet(sides[i])) ++end;
-      ++facets_;
+      std::size_t next = i + 1;
+      while (next < sides.size() && sides[next].SameFacet(sides[i])) ++next;
+      ++count.all;
       const FacetSide& a = sides[i];
-      const FacetSide& b = sides[end - 1];
+      const FacetSide& b = sides[next - 1];
       // Two copies of one simplex share all facets, yet bound nothing.
-      const bool good = end - i == 2 && list_[a.simplex][a.omitted] != list_[b.simplex][b.omitted];
+      const bool good = next - i == 2 && list_[a.simplex][a.omitted] != list_[b.simplex][b.omitted];
       if (good) {
         across_[static_cast<std::size_t>(a.simplex) * (k + 1) + a.omitted] = b.simplex;
         across_[static_cast<std::size_t>(b.simplex) * (k + 1) + b.omitted] = a.simplex;
-      } else {
-        if (bad_facets_++ == 0) {
-          std::array<std::uint32_t, kMaxDimension> ids{};
-          ids[0] = v;
-          std::copy_n(a.rest.begin(), k - 1, ids.begin() + 1);
-          first_bad_facet_ = Message("face ", NameSimplex(ids.data(), k), " is in ", end - i,
-                                     end - i == 1 ? " simplex" : " simplices",
-                                     end - i == 2 ? " that are the same" : "");
-        }
+      } else if (count.bad++ == 0) {
+        std::array<std::uint32_t, kMaxDimension> ids{};
+        ids[0] = v;
+        std::copy_n(a.rest.begin(), k - 1, ids.begin() + 1);
+        count.first_bad = Message("face ", NameSimplex(ids.data(), k), " is in ", next - i,
+                                  next - i == 1 ? " simplex" : " simplices",
+                                  next - i == 2 ? " that are the same" : "");
       }
-      i = end;
+      i = next;
     }
   }
+  return count;
 }
 
 Connectivity ComputeConnectivity(const Adjacency& adjacency) {

@@ -46,21 +46,24 @@ class Adjacency {
     return across_[static_cast<std::size_t>(s) * (list_.k + 1) + i];
   }
 
-  std::uint64_t facets() const { return facets_; }          // distinct (k-1)-faces
-  std::uint64_t bad_facets() const { return bad_facets_; }  // not in exactly two simplices
+  std::uint64_t facets() const { return facets_.all; }      // distinct (k-1)-faces
+  std::uint64_t bad_facets() const { return facets_.bad; }  // not in exactly two simplices
   // The first bad facet in id order, with the number of simplices it is in; empty if none.
-  const std::string& first_bad_facet() const { return first_bad_facet_; }
+  const std::string& first_bad_facet() const { return facets_.first_bad; }
 
  private:
+  struct FacetCount {
+    std::uint64_t all = 0, bad = 0;
+    std::string first_bad;
+  };
   void MatchFacets();
+  FacetCount MatchFacetsOf(std::uint32_t begin, std::uint32_t end);
 
   SimplexList list_;
   std::vector<std::uint64_t> begin_;
   std::vector<std::uint32_t> incident_;
   std::vector<std::uint32_t> across_;
-  std::uint64_t facets_ = 0;
-  std::uint64_t bad_facets_ = 0;
-  std::string first_bad_facet_;
+  FacetCount facets_;
 };
 
 struct Connectivity {

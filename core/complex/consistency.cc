@@ -29,29 +29,32 @@ Eigen::VectorXd CentreIn(const StarComplex<K>& complex, std::uint32_t q,
 }  // namespace
 
 template <int K>
-const typename StarComplex<K>::Vertex* FindSimplex(const RestrictedVoronoiCell<K>& cell,
-                                                   std::uint32_t q,
-                                                   const typename StarComplex<K>::Simplex& simplex,
-                                                   std::uint64_t key) {
-  const std::uint64_t wanted = key - Mix64(q);
-  for (const auto& v : cell.vertices()) {
-    if (v.key != wanted) continue;
-    bool same = true;
-    for (const auto f : v.facet) {
-      const std::uint32_t id = cell.facets()[f].id;
-      same = same && std::find(simplex.begin(), simplex.end(), id) != simplex.end();
-    }
-    if (same) return &v;
+std::optional<std::size_t> FindSimplex(const RestrictedVoronoiCell<K>& cell, std::uint32_t q,
+                                       const typename StarComplex<K>::Simplex& simplex,
+                                       std::uint64_t key) {
+  const auto holds = [&](std::size_t v) {
+    for (int s = 0; s < K; ++s)
+      if (std::find(simplex.begin(), simplex.end(), cell.id(cell.facet(v, s))) == simplex.end())
+        return false;
+    return true;
+  };
+  if constexpr (K == 2) {  // no key is quicker than the ids themselves
+    if (std::find(simplex.begin(), simplex.end(), q) == simplex.end()) return std::nullopt;
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+      if (holds(v)) return v;
+  } else {
+    const std::uint64_t wanted = key - Mix64(q);
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+      if (cell.key(v) == wanted && holds(v)) return v;
   }
-  return nullptr;
+  return std::nullopt;
 }
 
 template <int K>
-bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p,
-                  const typename StarComplex<K>::Vertex& v) {
+bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p, std::size_t v) {
   typename StarComplex<K>::Simplex simplex;
   if (!complex.SimplexOf(p, complex.cell(p), v, &simplex)) return false;
-  const std::uint64_t key = SimplexKey<K>(v, p);
+  const std::uint64_t key = SimplexKey<K>(complex.cell(p), v, p);
   for (const std::uint32_t q : simplex)
     if (q != p && !FindSimplex<K>(complex.cell(q), q, simplex, key)) return false;
   return true;
@@ -60,7 +63,8 @@ bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p,
 template <int K>
 std::uint64_t CountInconsistent(const StarComplex<K>& complex, std::uint32_t p) {
   std::uint64_t count = 0;
-  for (const auto& v : complex.cell(p).vertices()) count += !IsConsistent<K>(complex, p, v);
+  for (std::size_t v = 0; v < complex.cell(p).vertex_count(); ++v)
+    count += !IsConsistent<K>(complex, p, v);
   return count;
 }
 
@@ -69,9 +73,9 @@ std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(
     const StarComplex<K>& complex, std::uint32_t p) {
   InconsistentConfiguration<K> found;
   found.holder = p;
-  for (const auto& v : complex.cell(p).vertices()) {
+  for (std::size_t v = 0; v < complex.cell(p).vertex_count(); ++v) {
     if (!complex.SimplexOf(p, complex.cell(p), v, &found.simplex)) continue;
-    const std::uint64_t key = SimplexKey<K>(v, p);
+    const std::uint64_t key = SimplexKey<K>(complex.cell(p), v, p);
     for (const std::uint32_t q : found.simplex) {
       if (q == p || FindSimplex<K>(complex.cell(q), q, found.simplex, key)) continue;
       found.refuser = q;
@@ -83,8 +87,8 @@ std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(
       const double radius = Distance(to.data(), complex.Point(q), d);
       complex.ForEachWithin(to.data(), radius, [&](std::uint32_t l) {
         const double* at = complex.Point(l);
-        const double start = SquaredDistance(from.data(), at, d) -
-                             SquaredDistance(from.data(), complex.Point(q), d);
+        const double start =
+            SquaredDistance(from.data(), at, d) - SquaredDistance(from.data(), complex.Point(q), d);
         const double end = SquaredDistance(to.data(), at, d) - radius * radius;
         if (std::find(found.simplex.begin(), found.simplex.end(), l) != found.simplex.end() ||
             !(end < 0))
@@ -101,14 +105,13 @@ std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(
   return std::nullopt;
 }
 
-#define STELLATE_INSTANTIATE(K)                                                                  \
-  template const StarComplex<K>::Vertex* FindSimplex<K>(const RestrictedVoronoiCell<K>&,         \
-                                                        std::uint32_t,                           \
-                                                        const StarComplex<K>::Simplex&,          \
-                                                        std::uint64_t);                          \
-  template bool IsConsistent(const StarComplex<K>&, std::uint32_t, const StarComplex<K>::Vertex&); \
-  template std::uint64_t CountInconsistent(const StarComplex<K>&, std::uint32_t);                \
-  template std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(            \
+#define STELLATE_INSTANTIATE(K)                                                       \
+  template std::optional<std::size_t> FindSimplex<K>(                                 \
+      const RestrictedVoronoiCell<K>&, std::uint32_t, const StarComplex<K>::Simplex&, \
+      std::uint64_t);                                                                 \
+  template bool IsConsistent(const StarComplex<K>&, std::uint32_t, std::size_t);      \
+  template std::uint64_t CountInconsistent(const StarComplex<K>&, std::uint32_t);     \
+  template std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration( \
       const StarComplex<K>&, std::uint32_t);
 STELLATE_INSTANTIATE(1)
 STELLATE_INSTANTIATE(2)

@@ -10,23 +10,22 @@ namespace stellate::core {
 // A simplex is consistent when it is in the star of each of its vertices (Sec. 3.2): then the stars
 // glue to a manifold.
 
-// Tells simplices apart quickly: the sum of Mix64 over the ids of the simplex dual to v in star(p).
+// Tells simplices apart quickly: the sum of Mix64 over the ids of the simplex dual to vertex v of
+// p's cell.
 template <int K>
-std::uint64_t SimplexKey(const typename StarComplex<K>::Vertex& v, std::uint32_t p) {
-  return v.key + Mix64(p);
+std::uint64_t SimplexKey(const RestrictedVoronoiCell<K>& cell, std::size_t v, std::uint32_t p) {
+  return cell.key(v) + Mix64(p);
 }
 
-// The vertex of `cell`, the cell of q, that is dual to a simplex on q with that key, or nullptr.
+// The vertex of `cell`, the cell of q, that is dual to a simplex on q with that key, or nothing.
 template <int K>
-const typename StarComplex<K>::Vertex* FindSimplex(const RestrictedVoronoiCell<K>& cell,
-                                                   std::uint32_t q,
-                                                   const typename StarComplex<K>::Simplex& simplex,
-                                                   std::uint64_t key);
+std::optional<std::size_t> FindSimplex(const RestrictedVoronoiCell<K>& cell, std::uint32_t q,
+                                       const typename StarComplex<K>::Simplex& simplex,
+                                       std::uint64_t key);
 
-// Whether the simplex dual to v in star(p) is in the stars of all its vertices.
+// Whether the simplex dual to vertex v of p's cell is in the stars of all its vertices.
 template <int K>
-bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p,
-                  const typename StarComplex<K>::Vertex& v);
+bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p, std::size_t v);
 
 // Simplices of star(p) that are missing from the star of one of their vertices.
 template <int K>
@@ -38,8 +37,8 @@ std::uint64_t CountInconsistent(const StarComplex<K>& complex, std::uint32_t p);
 template <int K>
 struct InconsistentConfiguration {
   typename StarComplex<K>::Simplex simplex;
-  std::uint32_t holder = 0;   // p
-  std::uint32_t refuser = 0;  // q
+  std::uint32_t holder = 0;             // p
+  std::uint32_t refuser = 0;            // q
   std::optional<std::uint32_t> nearer;  // none where rounding or a common centre decided
 };
 

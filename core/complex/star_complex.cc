@@ -1,6 +1,7 @@
 #include "core/complex/star_complex.h"
 
 #include <algorithm>
+#include <functional>
 #include <iterator>
 
 #include "core/geometry/common_centre.h"
@@ -63,69 +64,78 @@ StarComplex<K>::StarComplex(const StarComplex& other)
       tree_(other.tree_, &points_),
       simplex_count_(other.simplex_count_) {}
 
-// Judges the vertices of one cell, p's.
+// What the cell of p may ask.
 template <int K>
-class StarComplex<K>::CentreJudge final : public Cell::Judge {
+class StarComplex<K>::Around final : public Surroundings<K> {
  public:
-  CentreJudge(const StarComplex& complex, const Site& p, const Site* guest,
-              const Site* newcomer = nullptr, const Cell* born = nullptr)
+  Around(const StarComplex& complex, const Site& p, const Site* guest,
+         const Site* newcomer = nullptr, const Cell* born = nullptr)
       : complex_(complex), p_(p), guest_(guest), newcomer_(newcomer), born_(born) {}
 
-  int d() const override { return complex_.d_; }
+  double HalfSpace(std::uint32_t id, double* normal) const override {
+    if (IsFake(id))
+      return FakeHalfSpace<K>(static_cast<int>(id - kFirstFakeId), complex_.inradius_, normal);
+    Step step(complex_.d_);
+    return complex_.HalfSpace(p_, Find(id), step.data(), normal);
+  }
 
-  bool Centre(const Cell& cell, Vertex& v, double* centre) const override {
-    const int n = d();
-    if (!(born_ && Known(v, centre)) && !Common(cell, v, centre)) return false;
-    v.norm2 = Dot(centre, centre, n);
-    for (int a = 0; a < K; ++a) v.x[a] = Dot(p_.tangent + a * n, centre, n);
+  int judged_in() const override { return complex_.judging_ == Judging::kFlats ? 0 : complex_.d_; }
+
+  bool Centre(const std::uint32_t* ids, std::uint64_t key, double* x,
+              double* centre) const override {
+    if (!(born_ && Known(key, centre)) && !Common(ids, centre)) return false;
+    const int n = complex_.d_;
+    for (int a = 0; a < K; ++a) x[a] = Dot(p_.tangent + a * n, centre, n);
     return true;
   }
 
-  void Lift(const Vertex& v, double* centre) const override {
-    const int n = d();
+  void Lift(const double* x, double* centre) const override {
+    const int n = complex_.d_;
     std::fill(centre, centre + n, 0.0);
     for (int a = 0; a < K; ++a)
-      for (int i = 0; i < n; ++i) centre[i] += v.x[a] * p_.tangent[a * n + i];
+      for (int i = 0; i < n; ++i) centre[i] += x[a] * p_.tangent[a * n + i];
   }
 
  private:
+  Site Find(std::uint32_t id) const {
+    return id == p_.id ? p_ : guest_ && id == guest_->id ? *guest_ : complex_.At(id);
+  }
+
   // The centre from the newcomer's star, which all simplices of the vertices that it creates are in
   // if they are consistent.
-  bool Known(const Vertex& v, double* centre) const {
-    const std::uint64_t key = v.key + Mix64(p_.id) - Mix64(newcomer_->id);
-    const auto& vertices = born_->vertices();
-    for (std::size_t i = 0; i < vertices.size(); ++i) {
-      if (vertices[i].key != key || !vertices[i].judged) continue;
-      const double* const there = born_->Centre(i, d());
-      for (int j = 0; j < d(); ++j) centre[j] = there[j] + (newcomer_->point[j] - p_.point[j]);
+  bool Known(std::uint64_t key_in_p, double* centre) const {
+    const std::uint64_t key = key_in_p + Mix64(p_.id) - Mix64(newcomer_->id);
+    for (std::size_t i = 0; i < born_->vertex_count(); ++i) {
+      if (born_->key(i) != key || !born_->judged(i)) continue;
+      const double* const there = born_->Centre(i);
+      for (int j = 0; j < complex_.d_; ++j)
+        centre[j] = there[j] + (newcomer_->point[j] - p_.point[j]);
       return true;
     }
     return false;
   }
 
-  bool Common(const Cell& cell, const Vertex& v, double* centre) const {
+  bool Common(const std::uint32_t* others, double* centre) const {
     std::uint32_t ids[K + 1];
     ids[0] = p_.id;
     for (int s = 0; s < K; ++s) {
-      ids[s + 1] = cell.facets()[v.facet[s]].id;
-      if (IsFake(ids[s + 1])) return false;
+      if (IsFake(others[s])) return false;
+      ids[s + 1] = others[s];
     }
     std::sort(ids, ids + K + 1);
     const double* points[K + 1];
     const double* tangents[K + 1];
     double weights[K + 1];
     for (int i = 0; i <= K; ++i) {
-      const Site site = ids[i] == p_.id                  ? p_
-                        : guest_ && ids[i] == guest_->id ? *guest_
-                                                         : complex_.At(ids[i]);
+      const Site site = Find(ids[i]);
       points[i] = site.point;
       tangents[i] = site.tangent;
       weights[i] = complex_.Weight(site.id);
     }
     double radius2;
-    if (!CommonCentre<K>(d(), points, tangents, weights, centre, &radius2)) return false;
+    if (!CommonCentre<K>(complex_.d_, points, tangents, weights, centre, &radius2)) return false;
     if (radius2 > complex_.judged_radius2_) return false;
-    for (int i = 0; i < d(); ++i) centre[i] += points[0][i] - p_.point[i];
+    for (int i = 0; i < complex_.d_; ++i) centre[i] += points[0][i] - p_.point[i];
     return true;
   }
 
@@ -161,26 +171,44 @@ void StarComplex<K>::Lift(std::uint32_t p, const double* x, double* point) const
 }
 
 template <int K>
+double StarComplex<K>::HalfSpace(const Site& p, const Site& q, double* step, double* normal) const {
+  return 0.5 * (Project(p, q.point, step, normal) + Weight(p.id) - Weight(q.id));
+}
+
+template <int K>
+double StarComplex<K>::HalfSpace(std::uint32_t p, std::size_t facet, double* normal) const {
+  if constexpr (K == 2) {
+    const Site site = At(p);
+    return Around(*this, site, nullptr).HalfSpace(cells_[p].id(facet), normal);
+  } else {
+    std::copy_n(cells_[p].normal(facet), K, normal);
+    return cells_[p].offset(facet);
+  }
+}
+
+template <int K>
+double StarComplex<K>::EdgeLength2(std::uint32_t p, std::size_t facet) const {
+  if constexpr (K == 2)
+    return SquaredDistance(Point(p), Point(cells_[p].id(facet)), d_);
+  else
+    return 2 * cells_[p].offset(facet);
+}
+
+template <int K>
 bool StarComplex<K>::ClipBy(Cell& cell, const Site& p, const Site& q, const Site* guest,
                             const Cell* born, typename Cell::Scratch& scratch) const {
   Step step(d_);
   double normal[K];
-  const double distance2 = Project(p, q.point, step.data(), normal);
-  const double offset = 0.5 * (distance2 + Weight(p.id) - Weight(q.id));
-  if (judging_ == Judging::kFlats) return cell.Clip(q.id, normal, offset, scratch);
-  const CentreJudge judge(*this, p, guest, &q, born);
-  return cell.Clip(q.id, normal, offset, scratch, &judge, step.data());
+  const double offset = HalfSpace(p, q, step.data(), normal);
+  return cell.Clip(q.id, normal, offset, scratch, Around(*this, p, guest, &q, born), step.data());
 }
 
 template <int K>
 bool StarComplex<K>::Cuts(const Cell& cell, const Site& p, const Site& q) const {
   Step step(d_);
   double normal[K];
-  const double distance2 = Project(p, q.point, step.data(), normal);
-  const double offset = 0.5 * (distance2 + Weight(p.id) - Weight(q.id));
-  if (judging_ == Judging::kFlats) return cell.WouldCut(normal, offset);
-  const CentreJudge judge(*this, p, nullptr);
-  return cell.WouldCut(normal, offset, &judge, step.data());
+  const double offset = HalfSpace(p, q, step.data(), normal);
+  return cell.WouldCut(normal, offset, step.data());
 }
 
 template <int K>
@@ -205,9 +233,7 @@ bool StarComplex<K>::CutsVertex(std::uint32_t p, std::size_t vertex, const doubl
   double normal[K];
   const Site site = At(p);
   const double offset = 0.5 * Project(site, point, step.data(), normal);
-  if (judging_ == Judging::kFlats) return cells_[p].WouldCutVertex(vertex, normal, offset);
-  const CentreJudge judge(*this, site, nullptr);
-  return cells_[p].WouldCutVertex(vertex, normal, offset, &judge, step.data());
+  return cells_[p].WouldCutVertex(vertex, normal, offset, step.data());
 }
 
 // The sample points that most likely close a cell around q, the nearest first: those nearest, or,
@@ -232,14 +258,16 @@ void StarComplex<K>::Neighbourhood(const double* q, std::uint32_t near,
     nearest[at] = candidate;
   };
   offer(near);
-  for (const auto& facet : cells_[near].facets())
-    if (!IsFake(facet.id)) offer(facet.id);
+  for (std::size_t f = 0; f < cells_[near].facet_count(); ++f)
+    if (!IsFake(cells_[near].id(f))) offer(cells_[near].id(f));
   const auto add = [&](std::uint32_t id) {
     if (!IsFake(id) && std::find(ids->begin(), ids->end(), id) == ids->end()) ids->push_back(id);
   };
   for (int i = 0; i < count; ++i) ids->push_back(nearest[i].second);
-  for (int i = 0; i < count; ++i)
-    for (const auto& facet : cells_[nearest[i].second].facets()) add(facet.id);
+  for (int i = 0; i < count; ++i) {
+    const Cell& cell = cells_[nearest[i].second];
+    for (std::size_t f = 0; f < cell.facet_count(); ++f) add(cell.id(f));
+  }
 }
 
 template <int K>
@@ -247,12 +275,7 @@ template <typename Influencing>
 void StarComplex<K>::BuildStar(const Site& p, const Site* guest, std::uint32_t near, Cell& cell,
                                typename Cell::Scratch& scratch,
                                const Influencing& influencing) const {
-  if (judging_ == Judging::kFlats) {
-    cell.Reset(inradius_);
-  } else {
-    const CentreJudge judge(*this, p, guest);
-    cell.Reset(inradius_, &judge);
-  }
+  cell.Reset(inradius_, Around(*this, p, guest));
   // What closes the cell, or nearly so, comes first: without it a search that happens to begin on
   // one side of p would visit all of that side while the cell is open towards the other.
   thread_local std::vector<std::uint32_t> first;
@@ -271,11 +294,11 @@ void StarComplex<K>::BuildStar(const Site& p, const Site* guest, std::uint32_t n
 }
 
 template <int K>
-bool StarComplex<K>::SimplexOf(std::uint32_t p, const Cell& cell, const Vertex& v,
+bool StarComplex<K>::SimplexOf(std::uint32_t p, const Cell& cell, std::size_t v,
                                Simplex* simplex) const {
   (*simplex)[0] = p;
   for (int s = 0; s < K; ++s) {
-    const std::uint32_t id = cell.facets()[v.facet[s]].id;
+    const std::uint32_t id = cell.id(cell.facet(v, s));
     if (IsFake(id)) return false;
     std::size_t at = static_cast<std::size_t>(s) + 1;
     for (; at > 0 && (*simplex)[at - 1] > id; --at) (*simplex)[at] = (*simplex)[at - 1];
@@ -289,9 +312,9 @@ void StarComplex<K>::Owned(std::uint32_t p, std::vector<Simplex>* simplices) con
   simplices->clear();
   const Cell& cell = cells_[p];
   Simplex s;
-  for (const Vertex& v : cell.vertices()) {
-    const bool lowest =
-        std::all_of(v.facet, v.facet + K, [&](auto f) { return cell.facets()[f].id > p; });
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+    bool lowest = true;
+    for (int i = 0; i < K; ++i) lowest = lowest && cell.id(cell.facet(v, i)) > p;
     if (lowest && SimplexOf(p, cell, v, &s)) simplices->push_back(s);
   }
   std::sort(simplices->begin(), simplices->end());
@@ -347,7 +370,7 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
     cuts.insert(cuts.end(), some.begin(), some.end());
     some = {};
   }
-  std::sort(cuts.begin(), cuts.end());
+  ParallelSort(cuts, std::less<>());
   std::vector<std::size_t> begins;
   for (std::size_t i = 0; i < cuts.size(); ++i) {
     if (i == 0 || cuts[i].star != cuts[i - 1].star) {
@@ -358,8 +381,9 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
   begins.push_back(cuts.size());
 
   const auto note_neighbours = [&](std::uint32_t p) {
-    for (const auto& facet : cells_[p].facets())
-      if (!IsFake(facet.id)) around->push_back(facet.id);
+    const Cell& cell = cells_[p];
+    for (std::size_t f = 0; f < cell.facet_count(); ++f)
+      if (!IsFake(cell.id(f))) around->push_back(cell.id(f));
   };
   if (around)
     for (const std::uint32_t p : change.stars) note_neighbours(p);
@@ -367,7 +391,7 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
   struct Swap {
     std::vector<Simplex> removed, added;
   };
-  std::vector<Swap> swaps(ChunkCount(change.stars.size()));
+  std::vector<Swap> swaps(ChunkCount(change.stars.size()) + chunks);
   ParallelChunks(change.stars.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     std::vector<Simplex> before, after;
     Swap& swap = swaps[chunk];
@@ -384,12 +408,14 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
     }
   });
   // A new point has the largest id of its simplices but for those among new points alone.
-  Swap& fresh = swaps.emplace_back();
-  std::vector<Simplex> owned;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    Owned(first + i, &owned);
-    fresh.added.insert(fresh.added.end(), owned.begin(), owned.end());
-  }
+  ParallelChunks(count, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    std::vector<Simplex> owned;
+    std::vector<Simplex>& added = swaps[swaps.size() - chunks + chunk].added;
+    for (std::size_t i = begin; i < end; ++i) {
+      Owned(first + static_cast<std::uint32_t>(i), &owned);
+      added.insert(added.end(), owned.begin(), owned.end());
+    }
+  });
 
   if (around) {
     for (const std::uint32_t p : change.stars) note_neighbours(p);

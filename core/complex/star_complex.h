@@ -19,7 +19,6 @@ template <int K>
 class StarComplex {
  public:
   using Cell = RestrictedVoronoiCell<K>;
-  using Vertex = typename Cell::Vertex;
   using Simplex = std::array<std::uint32_t, K + 1>;  // ascending ids
 
   // d         ambient dimension
@@ -58,8 +57,12 @@ class StarComplex {
   const double* Tangent(std::uint32_t id) const { return tangents_.data() + id * stride() * K; }
   const Cell& cell(std::uint32_t id) const { return cells_[id]; }
 
-  // The simplex dual to a vertex of star(p), or false if a facet of it is fake.
-  bool SimplexOf(std::uint32_t p, const Cell& cell, const Vertex& v, Simplex* simplex) const;
+  // The simplex dual to vertex v of p's cell, or false if a facet of it is fake.
+  bool SimplexOf(std::uint32_t p, const Cell& cell, std::size_t v, Simplex* simplex) const;
+  // The half-space of a facet of p's cell: writes the normal, T_p^t (q - p), returns the offset.
+  double HalfSpace(std::uint32_t p, std::size_t facet, double* normal) const;
+  // |q - p|^2 for the sample point q of a facet of p's cell, but for the weights' share.
+  double EdgeLength2(std::uint32_t p, std::size_t facet) const;
 
   // Whether some sample point lies within `radius` of q.
   bool AnyWithin(const double* q, double radius) const;
@@ -113,7 +116,7 @@ class StarComplex {
     const double* point;
     const double* tangent;
   };
-  class CentreJudge;
+  class Around;
   Site At(std::uint32_t id) const { return {id, Point(id), Tangent(id)}; }
   // Clips the cell of p by q, or only says whether it would. `guest` is a site that may be named by
   // the cell's facets without being in the sample. `born`: the star of q, if it is there already,
@@ -122,6 +125,7 @@ class StarComplex {
               typename Cell::Scratch& scratch) const;
   bool Cuts(const Cell& cell, const Site& p, const Site& q) const;
   double Project(const Site& p, const double* q, double* step, double* normal) const;
+  double HalfSpace(const Site& p, const Site& q, double* step, double* normal) const;
   // Builds p's cell, and calls influencing(q) for each sample point whose cell p may cut.
   template <typename Influencing>
   void BuildStar(const Site& p, const Site* guest, std::uint32_t near, Cell& cell,

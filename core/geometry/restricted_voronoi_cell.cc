@@ -2,47 +2,10 @@
 
 #include <utility>
 
+#include "core/geometry/half_spaces.h"
+
 namespace stellate::core {
 namespace {
-
-// Solves the K x K system rows . x = rhs by elimination with partial pivoting. False if singular.
-template <int K>
-bool Solve(double (&m)[K][K + 1], double* x) {
-  for (int c = 0; c < K; ++c) {
-    int pivot = c;
-    for (int r = c + 1; r < K; ++r)
-      if (std::abs(m[r][c]) > std::abs(m[pivot][c])) pivot = r;
-    if (m[pivot][c] == 0) return false;
-    if (pivot != c) std::swap(m[pivot], m[c]);
-    const double inverse = 1.0 / m[c][c];
-    for (int r = c + 1; r < K; ++r) {
-      const double factor = m[r][c] * inverse;
-      for (int j = c + 1; j <= K; ++j) m[r][j] -= factor * m[c][j];
-    }
-  }
-  for (int r = K - 1; r >= 0; --r) {
-    double s = m[r][K];
-    for (int j = r + 1; j < K; ++j) s -= m[r][j] * x[j];
-    x[r] = s / m[r][r];
-  }
-  return true;
-}
-
-template <>
-bool Solve<2>(double (&m)[2][3], double* x) {
-  const double det = m[0][0] * m[1][1] - m[0][1] * m[1][0];
-  if (det == 0) return false;
-  const double inverse = 1.0 / det;
-  x[0] = (m[0][2] * m[1][1] - m[0][1] * m[1][2]) * inverse;
-  x[1] = (m[0][0] * m[1][2] - m[0][2] * m[1][0]) * inverse;
-  return true;
-}
-
-// A point of an edge is no farther from p than the edge's farther end: this share is far above
-// rounding in a well-conditioned solve and far below any distance that matters.
-constexpr double kSlack = 1e-9;
-// A judged cell is no convex polytope, and its edges' ends are only about where the facets meet.
-constexpr double kJudgedSlack = 3;
 
 // Cells are many and small, and hardly grow: no doubling.
 template <typename Item>
@@ -54,79 +17,43 @@ void Grow(std::vector<Item>& items, std::size_t size) {
 }  // namespace
 
 template <int K>
-void RestrictedVoronoiCell<K>::Reset(double inradius, const Judge* judge) {
-  // Vertices of a regular simplex, one coordinate at a time: all unit vectors, all pairwise dot
-  // products -1/K.
-  double n[K + 1][K] = {};
-  for (int a = 0; a < K; ++a) {
-    double rest = 1;
-    for (int b = 0; b < a; ++b) rest -= n[a][b] * n[a][b];
-    n[a][a] = std::sqrt(rest);
-    for (int i = a + 1; i <= K; ++i) {
-      double s = -1.0 / K;
-      for (int b = 0; b < a; ++b) s -= n[a][b] * n[i][b];
-      n[i][a] = s / n[a][a];
-    }
-  }
+void RestrictedVoronoiCell<K>::Reset(double inradius, const Surroundings<K>& around) {
   facets_.resize(K + 1);
   vertices_.resize(K + 1);
-  for (int i = 0; i <= K; ++i) facets_[i].id = kFirstFakeId + static_cast<std::uint32_t>(i);
   for (int i = 0; i <= K; ++i) {
-    for (int a = 0; a < K; ++a) {
-      facets_[i].normal[a] = n[i][a] * inradius;
-      vertices_[i].x[a] = -n[i][a] * inradius * K;
-    }
-    facets_[i].offset = inradius * inradius;
+    facets_[i].id = kFirstFakeId + static_cast<std::uint32_t>(i);
+    facets_[i].offset = FakeHalfSpace<K>(i, inradius, facets_[i].normal);
     facets_[i].vertices = K;
+  }
+  for (int i = 0; i <= K; ++i) {
+    for (int a = 0; a < K; ++a) vertices_[i].x[a] = -facets_[i].normal[a] * K;
     vertices_[i].norm2 = inradius * inradius * K * K;
-    vertices_[i].key = 0;
     vertices_[i].judged = false;
     for (int j = 0, slot = 0; j <= K; ++j) {
       if (j == i) continue;
-      vertices_[i].key += Mix64(facets_[static_cast<std::size_t>(j)].id);
       vertices_[i].facet[slot] = static_cast<Index>(j);  // vertex i is on all facets but facet i
       vertices_[i].adjacent[slot] = static_cast<Index>(j);
       ++slot;
     }
+    SetKey(vertices_[i]);
   }
   max_norm2_ = inradius * inradius * K * K;
   has_fake_ = true;
-  if (!judge) return;
-  const auto d = static_cast<std::size_t>(judge->d());
-  centres_.resize((K + 1) * d);
-  for (std::size_t i = 0; i <= K; ++i) judge->Lift(vertices_[i], centres_.data() + i * d);
+  d_ = static_cast<std::size_t>(around.judged_in());
+  centres_.resize((K + 1) * d_);
+  if (d_ == 0) return;
+  for (std::size_t i = 0; i <= K; ++i) around.Lift(vertices_[i].x, centres_.data() + i * d_);
 }
 
-// The coordinates come from the facets alone, in the order of their ids, so that they do not
-// depend on the order of the cuts. Where the facets are too nearly parallel for that, the point is
-// interpolated on the edge that the cut crosses. `slack`: how much farther from p than the edge's
-// farther end the point may lie.
 template <int K>
 void RestrictedVoronoiCell<K>::Locate(Vertex& v, const Vertex& kept, const Vertex& removed,
                                       double s, double t, double slack) const {
-  Index order[K];
-  std::copy(v.facet, v.facet + K, order);
-  for (int i = 1; i < K; ++i)
-    for (int j = i; j > 0 && facets_[order[j]].id < facets_[order[j - 1]].id; --j)
-      std::swap(order[j], order[j - 1]);
-  double m[K][K + 1];
-  for (int r = 0; r < K; ++r) {
-    const Facet& f = facets_[order[r]];
-    for (int a = 0; a < K; ++a) m[r][a] = f.normal[a];
-    m[r][K] = f.offset;
+  HalfSpaceRef<K> planes[K];
+  for (int i = 0; i < K; ++i) {
+    const Facet& f = facets_[v.facet[i]];
+    planes[i] = {f.id, f.normal, f.offset};
   }
-  const bool solved = Solve<K>(m, v.x);
-  v.norm2 = 0;
-  for (int a = 0; a < K; ++a) v.norm2 += v.x[a] * v.x[a];
-  const double farther = std::max(kept.norm2, removed.norm2);
-  if (!solved || !(v.norm2 <= farther * (1 + slack))) {
-    const double u = t > s ? -s / (t - s) : 0.0;  // s <= 0 < t: excess at kept, at removed
-    v.norm2 = 0;
-    for (int a = 0; a < K; ++a) {
-      v.x[a] = kept.x[a] + u * (removed.x[a] - kept.x[a]);
-      v.norm2 += v.x[a] * v.x[a];
-    }
-  }
+  v.norm2 = Meet<K>(planes, {kept.x, kept.norm2, s}, {removed.x, removed.norm2, t}, slack, v.x);
 }
 
 template <int K>
@@ -137,13 +64,14 @@ void RestrictedVoronoiCell<K>::SetKey(Vertex& v) const {
 
 template <int K>
 bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, double offset,
-                                    Scratch& scratch, const Judge* judge, const double* step) {
+                                    Scratch& scratch, const Surroundings<K>& around,
+                                    const double* step) {
   const std::size_t old_count = vertices_.size();
   if (scratch.excess.size() < old_count) scratch.excess.resize(2 * old_count);
   double* const excess = scratch.excess.data();
   std::size_t worst = 0;
   for (std::size_t i = 0; i < old_count; ++i) {
-    excess[i] = Excess(i, normal, offset, judge, step);
+    excess[i] = Excess(i, normal, offset, step);
     if (excess[i] > excess[worst]) worst = i;
   }
   if (!(excess[worst] > 0)) return false;
@@ -152,9 +80,6 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
   facet.offset = offset;
   facet.id = id;
   facet.vertices = 0;
-  if constexpr (K == 2) {
-    if (!judge) return ClipPolygon(facet, worst, scratch);
-  }
 
   // What a plane cuts off a polytope is connected: take the part around the worst vertex, and
   // leave what only rounding put beyond the plane.
@@ -170,7 +95,7 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
       scratch.stack.push_back(w);
     }
   }
-  if (judge && !Tidy(scratch)) return false;
+  if (d_ > 0 && !Tidy(scratch)) return false;
   scratch.crossings.clear();
   scratch.removed.clear();
   for (std::size_t v = 0; v < old_count; ++v) {
@@ -222,94 +147,29 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
     facets_.pop_back();
     return false;
   }
-  const std::size_t d = judge ? static_cast<std::size_t>(judge->d()) : 0;
-  Grow(centres_, vertices_.size() * d);
+  Grow(centres_, vertices_.size() * d_);
   for (std::size_t c = 0; c < scratch.crossings.size(); ++c) {
     const auto& crossing = scratch.crossings[c];
     Vertex& v = vertices_[old_count + c];
     SetKey(v);
-    double* const centre = centres_.data() + (old_count + c) * d;
-    v.judged = judge && judge->Centre(*this, v, centre);
-    if (v.judged) continue;
+    double* const centre = centres_.data() + (old_count + c) * d_;
+    std::uint32_t ids[K];
+    for (int i = 0; i < K; ++i) ids[i] = facets_[v.facet[i]].id;
+    v.judged = d_ > 0 && around.Centre(ids, v.key, v.x, centre);
+    if (v.judged) {
+      v.norm2 = Dot(centre, centre, static_cast<int>(d_));
+      continue;
+    }
     Locate(v, vertices_[crossing.kept], vertices_[crossing.removed], excess[crossing.kept],
-           excess[crossing.removed], judge ? kJudgedSlack : kSlack);
-    if (judge) judge->Lift(v, centre);
+           excess[crossing.removed], d_ > 0 ? kJudgedSlack : kSlack);
+    if (d_ > 0) around.Lift(v.x, centre);
   }
   for (const Index v : scratch.removed)
     for (const Index f : vertices_[v].facet) --facets_[f].vertices;
   for (std::size_t v = old_count; v < vertices_.size(); ++v)
     for (const Index f : vertices_[v].facet) ++facets_[f].vertices;
-  for (auto v = scratch.removed.rbegin(); v != scratch.removed.rend(); ++v) DropVertex(*v, d);
+  for (auto v = scratch.removed.rbegin(); v != scratch.removed.rend(); ++v) DropVertex(*v);
   DropFacets();
-  Measure();
-  return true;
-}
-
-// What is cut off a polygon is a chain, and two new vertices close the gap.
-template <int K>
-bool RestrictedVoronoiCell<K>::ClipPolygon(const Facet& facet, std::size_t worst,
-                                           Scratch& scratch) requires(K == 2) {
-  const double* const excess = scratch.excess.data();
-  const std::size_t count = vertices_.size();
-  auto& removed = scratch.removed;
-  removed.assign(1, static_cast<Index>(worst));
-  struct End {
-    Index last, slot;       // of the chain, and its slot of the edge that leaves it
-    Index kept, kept_slot;  // that edge's other end
-    Index created;          // the vertex that comes between
-  } ends[2];
-  for (Index side = 0; side < 2; ++side) {
-    End& end = ends[side];
-    end.last = static_cast<Index>(worst);
-    end.slot = side;
-    end.kept = vertices_[worst].adjacent[side];
-    while (excess[end.kept] > 0) {
-      if (removed.size() + 1 == count) return false;
-      const Index from = end.last;
-      end.last = end.kept;
-      removed.push_back(end.last);
-      end.slot = vertices_[end.last].adjacent[0] == from;
-      end.kept = vertices_[end.last].adjacent[end.slot];
-    }
-    end.kept_slot = vertices_[end.kept].adjacent[0] != end.last;
-  }
-  // The new facet takes the place of one that goes, and the new vertices those of cut ones.
-  Index created_facet = static_cast<Index>(facets_.size());
-  for (const Index v : removed)
-    for (const Index f : vertices_[v].facet)
-      if (--facets_[f].vertices == 0) created_facet = std::min(created_facet, f);
-  if (created_facet == facets_.size()) Grow(facets_, facets_.size() + 1);
-  facets_[created_facet] = facet;
-  facets_[created_facet].vertices = 2;
-  Vertex created[2];
-  for (int e = 0; e < 2; ++e) {
-    const End& end = ends[e];
-    const Vertex& last = vertices_[end.last];
-    created[e].judged = false;
-    created[e].facet[0] = created_facet;
-    created[e].facet[1] = last.facet[1 - end.slot];
-    ++facets_[created[e].facet[1]].vertices;
-    SetKey(created[e]);
-    Locate(created[e], vertices_[end.kept], last, excess[end.kept], excess[end.last], kSlack);
-  }
-  ends[0].created = removed[0];
-  if (removed.size() > 1) {
-    ends[1].created = removed[1];
-  } else {
-    ends[1].created = static_cast<Index>(count);
-    Grow(vertices_, count + 1);
-  }
-  for (int e = 0; e < 2; ++e) {
-    created[e].adjacent[0] = ends[e].kept;
-    created[e].adjacent[1] = ends[1 - e].created;
-    vertices_[ends[e].kept].adjacent[ends[e].kept_slot] = ends[e].created;
-  }
-  for (int e = 0; e < 2; ++e) vertices_[ends[e].created] = created[e];
-  if (removed.size() > 2) {
-    std::sort(removed.begin() + 2, removed.end());
-    for (std::size_t i = removed.size(); i-- > 2;) DropVertex(removed[i], 0);
-    DropFacets();
-  }
   Measure();
   return true;
 }
@@ -405,17 +265,17 @@ bool RestrictedVoronoiCell<K>::Tidy(Scratch& scratch) const {
 
 // The last vertex takes the place of one that no other is a neighbour of any more.
 template <int K>
-void RestrictedVoronoiCell<K>::DropVertex(std::size_t v, std::size_t d) {
+void RestrictedVoronoiCell<K>::DropVertex(std::size_t v) {
   const std::size_t last = vertices_.size() - 1;
   if (v != last) {
     for (const Index w : vertices_[last].adjacent)
       for (Index& back : vertices_[w].adjacent)
         if (back == last) back = static_cast<Index>(v);
     vertices_[v] = vertices_[last];
-    std::copy_n(centres_.data() + last * d, d, centres_.data() + v * d);
+    std::copy_n(centres_.data() + last * d_, d_, centres_.data() + v * d_);
   }
   vertices_.pop_back();
-  centres_.resize(last * d);
+  centres_.resize(last * d_);
 }
 
 // Drops the facets that no vertex is left on.
@@ -442,8 +302,31 @@ void RestrictedVoronoiCell<K>::Measure() {
   for (const Facet& f : facets_) has_fake_ |= IsFake(f.id);
 }
 
+template <int K>
+double FakeHalfSpace(int i, double inradius, double* normal) {
+  // Unit normals of all facets, one coordinate at a time: all pairwise dot products -1/K.
+  double n[K + 1][K] = {};
+  for (int a = 0; a < K; ++a) {
+    double rest = 1;
+    for (int b = 0; b < a; ++b) rest -= n[a][b] * n[a][b];
+    n[a][a] = std::sqrt(rest);
+    for (int j = a + 1; j <= K; ++j) {
+      double s = -1.0 / K;
+      for (int b = 0; b < a; ++b) s -= n[a][b] * n[j][b];
+      n[j][a] = s / n[a][a];
+    }
+  }
+  for (int a = 0; a < K; ++a) normal[a] = n[i][a] * inradius;
+  return inradius * inradius;
+}
+
+template double FakeHalfSpace<1>(int, double, double*);
+template double FakeHalfSpace<2>(int, double, double*);
+template double FakeHalfSpace<3>(int, double, double*);
+template double FakeHalfSpace<4>(int, double, double*);
+template double FakeHalfSpace<5>(int, double, double*);
+
 template class RestrictedVoronoiCell<1>;
-template class RestrictedVoronoiCell<2>;
 template class RestrictedVoronoiCell<3>;
 template class RestrictedVoronoiCell<4>;
 template class RestrictedVoronoiCell<5>;

@@ -161,9 +161,7 @@ TiltMatrix MeasureTilt(const SimplexFrame& frame, int j, int d, const double* ta
   std::array<std::array<double, kMaxSimplexDimension>, kMaxSimplexDimension> cosines{};
   for (int a = 0; a < j; ++a) {
     const double* q = frame.directions.data() + a * d;
-    for (int i = 0; i < d; ++i) {
-      for (int b = 0; b < k; ++b) cosines[a][b] += tangent[i * k + b] * q[i];
-    }
+    for (int b = 0; b < k; ++b) cosines[a][b] = Dot(tangent + b * d, q, d);
   }
   TiltMatrix tilt = TiltMatrix::Zero();
   for (int a = 0; a < j; ++a) {
@@ -186,9 +184,8 @@ double AngleToTangent(const SimplexFrame& frame, int j, int d, const double* tan
     const double* q = frame.directions.data() + a * d;
     double* n = residuals.data() + a * d;
     for (int b = 0; b < k; ++b) {
-      double along = 0;
-      for (int i = 0; i < d; ++i) along += tangent[i * k + b] * q[i];
-      for (int i = 0; i < d; ++i) n[i] -= along * tangent[i * k + b];
+      const double along = Dot(tangent + b * d, q, d);
+      for (int i = 0; i < d; ++i) n[i] -= along * tangent[b * d + i];
     }
   }
   Eigen::MatrixXd gram(j, j);

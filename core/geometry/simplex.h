@@ -63,7 +63,7 @@ SimplexFrame FrameSimplex(SimplexVertices vertices, int d);
 SimplexMeasures MeasureSimplex(SimplexVertices vertices, int d, const SimplexFrame& frame);
 
 // Largest angle, radians in [0, pi/2], that a direction of the simplex's affine hull makes with
-// the space spanned by `tangent`: d x k in C order, orthonormal columns, j <= k. Right angle for
+// the space spanned by `tangent`: k x d in C order, orthonormal rows, j <= k. Right angle for
 // a degenerate simplex; 0 for a vertex.
 double AngleToTangent(SimplexVertices vertices, int d, const double* tangent, int k);
 double AngleToTangent(const SimplexFrame& frame, int j, int d, const double* tangent, int k);

@@ -1,39 +1,125 @@
 #include "core/refinement/independent_set.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "core/parallel.h"
 #include "core/sample/ball_tree.h"
 
 namespace stellate::core {
+namespace {
+
+// Longer lists of conflicts are not kept but found again: space is linear in the targets.
+constexpr std::uint32_t kMostListed = 48;
+
+template <int K>
+double Reach(const Target<K>& t) {
+  return t.violation.rule >= Rule::kSliver ? 2 * t.radius : t.radius;
+}
+
+// The conflicts between targets, each with the stronger ones: those that are taken before it and
+// whose conflict balls its insertion point lies in.
+template <int K>
+class Conflicts {
+ public:
+  Conflicts(const StarComplex<K>& complex, const std::vector<Target<K>>& targets,
+            const std::vector<std::uint32_t>& rank)
+      : rank_(rank),
+        d_(static_cast<std::size_t>(complex.d())),
+        chunk_size_(ChunkSize(targets.size())),
+        centres_(targets.size() * d_),
+        balls_(complex.d(), &centres_),
+        lists_(ChunkCount(targets.size())),
+        spans_(targets.size()) {
+    ParallelFor(targets.size(), [&](std::size_t i) {
+      complex.Lift(targets[i].star, targets[i].x, centres_.data() + i * d_);
+    });
+    std::vector<double> reaches;
+    reaches.reserve(targets.size());
+    for (const Target<K>& t : targets) reaches.push_back(Reach(t));
+    balls_.Assign(std::move(reaches));
+    ParallelChunks(targets.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+      std::vector<std::uint32_t>& list = lists_[chunk];
+      for (std::size_t i = begin; i < end; ++i) {
+        Span& span = spans_[i];
+        span.begin = static_cast<std::uint32_t>(list.size());
+        ForEachStronger(i, [&](std::uint32_t j) {
+          if (span.count++ < kMostListed) list.push_back(j);
+        });
+        if (span.count > kMostListed) list.resize(span.begin);
+      }
+    });
+  }
+
+  // Whether a stronger conflict of target i is among the chosen.
+  bool AnyChosen(std::size_t i, const std::vector<std::uint8_t>& chosen) const {
+    const Span& span = spans_[i];
+    bool any = false;
+    if (span.count > kMostListed) {
+      ForEachStronger(i, [&](std::uint32_t j) { any = any || chosen[j]; });
+      return any;
+    }
+    const std::uint32_t* const list = lists_[i / chunk_size_].data() + span.begin;
+    return std::any_of(list, list + span.count, [&](std::uint32_t j) { return chosen[j] != 0; });
+  }
+
+  // Near targets have near places.
+  std::uint32_t PlaceOf(std::uint32_t i) const { return balls_.PlaceOf(i); }
+
+ private:
+  template <typename Visit>
+  void ForEachStronger(std::size_t i, const Visit& visit) const {
+    balls_.ForEachInfluencing(centres_.data() + i * d_, [&](std::uint32_t j) {
+      if (rank_[j] < rank_[i]) visit(j);
+    });
+  }
+
+  struct Span {
+    std::uint32_t begin = 0, count = 0;
+  };
+
+  const std::vector<std::uint32_t>& rank_;
+  const std::size_t d_;
+  const std::size_t chunk_size_;
+  std::vector<double> centres_;                    // by target, d each
+  BallTree balls_;                                 // the conflict balls around them
+  std::vector<std::vector<std::uint32_t>> lists_;  // by chunk of targets
+  std::vector<Span> spans_;                        // by target: its part of the chunk's list
+};
+
+}  // namespace
 
 template <int K>
 std::vector<Target<K>> SelectIndependent(const StarComplex<K>& complex,
                                          std::vector<Target<K>> targets, std::size_t most) {
-  std::sort(targets.begin(), targets.end(), [](const Target<K>& a, const Target<K>& b) {
+  std::vector<std::uint32_t> order(targets.size());
+  std::iota(order.begin(), order.end(), 0u);
+  ParallelSort(order, [&](std::uint32_t i, std::uint32_t j) {
+    const Target<K>& a = targets[i];
+    const Target<K>& b = targets[j];
     if (a.violation.rule != b.violation.rule) return a.violation.rule < b.violation.rule;
     if (a.radius != b.radius) return a.radius > b.radius;
     return a.star < b.star;
   });
-  std::vector<Target<K>> chosen;
-  std::vector<double> centres;
-  const auto d = static_cast<std::size_t>(complex.d());
-  BallTree balls(complex.d(), &centres);
-  std::vector<double> centre(d);
-  for (const Target<K>& t : targets) {
-    if (chosen.size() == most) break;
-    if (chosen.size() % 1024 == 0) ThrowIfInterrupted();
-    complex.Lift(t.star, t.x, centre.data());
-    bool conflict = false;
-    balls.ForEachInfluencing(centre.data(), [&](std::uint32_t) { conflict = true; });
-    if (conflict) continue;
-    centres.insert(centres.end(), centre.begin(), centre.end());
-    balls.Insert(t.violation.rule >= Rule::kSliver ? 2 * t.radius : t.radius);
-    chosen.push_back(t);
+  std::vector<std::uint32_t> rank(targets.size());
+  for (std::uint32_t r = 0; r < order.size(); ++r) rank[order[r]] = r;
+  const Conflicts<K> conflicts(complex, targets, rank);
+
+  std::vector<std::uint8_t> is_chosen(targets.size(), 0);
+  std::vector<std::uint32_t> chosen;
+  for (std::size_t r = 0; r < order.size() && chosen.size() < most; ++r) {
+    if (r % 1024 == 0) ThrowIfInterrupted();
+    if (conflicts.AnyChosen(order[r], is_chosen)) continue;
+    is_chosen[order[r]] = 1;
+    chosen.push_back(order[r]);
   }
+  ParallelSort(chosen, [&](std::uint32_t i, std::uint32_t j) {
+    const std::uint32_t a = conflicts.PlaceOf(i), b = conflicts.PlaceOf(j);
+    return a != b ? a < b : targets[i].star < targets[j].star;
+  });
   std::vector<Target<K>> ordered;
   ordered.reserve(chosen.size());
-  for (const std::uint32_t i : balls.SpatialOrder()) ordered.push_back(chosen[i]);
+  for (const std::uint32_t i : chosen) ordered.push_back(targets[i]);
   return ordered;
 }
 

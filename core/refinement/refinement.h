@@ -153,7 +153,7 @@ class Refinement final : public Mesher {
   std::optional<QueryBatch> batch_;
   std::optional<BatchParts> parts_;  // of batch_, if that is too large to ask at once
   std::uint64_t whole_rounds_ = 0;   // rounds in which parts count once
-  MeshDelta delta_;  // of the round being absorbed
+  MeshDelta delta_;                  // of the round being absorbed
   bool over_ = false;
 
   // The open round: targets, and the points asked for them, candidate by candidate.
@@ -167,8 +167,8 @@ class Refinement final : public Mesher {
   Eigen::VectorXd sizes_;     // n, where the client gives them
   TangentFinder tangent_finder_;
   int alternations_left_ = 0;
-  Ahead ahead_;                // asked for with the targets' candidates, after them
-  bool ahead_failed_ = false;  // the last round that asked ahead had nothing of it
+  Ahead ahead_;                         // asked for with the targets' candidates, after them
+  bool ahead_failed_ = false;           // the last round that asked ahead had nothing of it
   Eigen::MatrixXd idempotence_sample_;  // d x m, asked for again with the next batch
   Eigen::VectorXd idempotence_sizes_;   // m, as told first
 
@@ -195,7 +195,6 @@ class Refinement final : public Mesher {
 
   std::unique_ptr<Certifier> certifier_;
   std::uint64_t too_fine_ = 0;  // stars whose given size asks for less than is meshed
-  Eigen::MatrixXd certified_tangents_;
   std::vector<std::uint32_t> certified_simplices_;
 };
 

@@ -92,8 +92,9 @@ void Refinement<K>::AskAhead() {
     std::copy_n(rehearsed.Point(p), d, ahead_.points.col(i).data());
     std::copy_n(rehearsed.Tangent(p), d * K, ahead_.tangents.col(i).data());
     double nearest2 = INFINITY;
-    for (const auto& facet : rehearsed.cell(p).facets())
-      if (!IsFake(facet.id)) nearest2 = std::min(nearest2, 2 * facet.offset);
+    const auto& cell = rehearsed.cell(p);
+    for (std::size_t f = 0; f < cell.facet_count(); ++f)
+      if (!IsFake(cell.id(f))) nearest2 = std::min(nearest2, rehearsed.EdgeLength2(p, f));
     ahead_.spacing[i] = std::isinf(nearest2) ? criteria_.epsilon : std::sqrt(nearest2);
   }
   std::vector<double> centre(static_cast<std::size_t>(d));

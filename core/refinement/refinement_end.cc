@@ -21,13 +21,12 @@ void Refinement<K>::StartCertificate() {
     facts.max_circumradius = std::max(facts.max_circumradius, radius);
   }
   if (criteria_.graded()) DescribeSizes(&facts);
-  certified_tangents_ = complex_.TangentMatrix();
   certified_simplices_ = complex_.Simplices();
   const MeshView view{K,
                       complex_.d(),
                       complex_.size(),
                       complex_.points().data(),
-                      certified_tangents_.data(),
+                      complex_.Tangent(0),
                       &certified_simplices_};
   certifier_ = std::make_unique<Certifier>(spec_, view, facts);
   if (const auto* blocks = certifier_->NextBlocks()) {
@@ -74,7 +73,6 @@ void Refinement<K>::Finish(Termination termination) {
     if (termination == Termination::kNoProgress) certificate.verdict += "; " + WhatIsLeft();
   }
   certifier_.reset();
-  certified_tangents_.resize(0, 0);
   certified_simplices_ = {};
   if (whole)
     UpdateProgress();
@@ -94,10 +92,11 @@ void Refinement<K>::DescribeUnfinished() {
     certificate.inconsistent_simplices += CountInconsistent<K>(complex_, p);
     certificate.max_circumradius =
         std::max(certificate.max_circumradius, std::sqrt(cell.max_norm2()));
-    for (const auto& facet : cell.facets()) {
-      const double distance2 = 2 * facet.offset;
+    for (std::size_t f = 0; f < cell.facet_count(); ++f) {
+      double along[K];
+      const double distance2 = 2 * complex_.HalfSpace(p, f, along);
       double along2 = 0;
-      for (int a = 0; a < K; ++a) along2 += facet.normal[a] * facet.normal[a];
+      for (const double a : along) along2 += a * a;
       const double away = std::sqrt(std::max(distance2 - along2, 0.0));
       if (away > 0) reach = std::min(reach, distance2 / (2 * away));
     }

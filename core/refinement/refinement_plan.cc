@@ -53,9 +53,9 @@ void Refinement<K>::AskForSeeds() {
     block.points = spec_.seeds;
   } else {
     const BoundingBox& box = *spec_.bounding_box;
-    const int count = spec_.box_seeds > 0      ? spec_.box_seeds
+    const int count = spec_.box_seeds > 0   ? spec_.box_seeds
                       : criteria_.ask_ahead ? SeedsToAskAheadFrom(spec_)
-                                               : kDefaultBoxSeeds;
+                                            : kDefaultBoxSeeds;
     block.points.resize(spec_.ambient_dimension, count);
     Random random(spec_.random_seed);
     for (Eigen::Index i = 0; i < count; ++i)
@@ -105,12 +105,32 @@ Target<K> Refinement<K>::Aim(std::uint32_t star, const Violation<K>& violation) 
   return target;
 }
 
+// A simplex is mostly the worst one of several of its vertices' stars: the lowest of them has the
+// target, unless an attempt from there has failed.
 template <int K>
 std::vector<Target<K>> Refinement<K>::SizeAndShapeTargets() {
+  constexpr std::uint16_t kNone = 0xffff;
+  std::vector<std::uint16_t> worst(complex_.size(), kNone);
+  for (const Active& a : active_) worst[a.star] = static_cast<std::uint16_t>(a.violation.vertex);
+  const auto is_seen_from_lower = [&](const Active& a) {
+    typename StarComplex<K>::Simplex simplex, other;
+    if (!complex_.SimplexOf(a.star, complex_.cell(a.star), a.violation.vertex, &simplex))
+      return false;
+    for (const std::uint32_t q : simplex) {
+      if (q == a.star) return false;
+      if (worst[q] != kNone && discouraged_[q] == 0 &&
+          complex_.SimplexOf(q, complex_.cell(q), worst[q], &other) && other == simplex)
+        return true;
+    }
+    return false;
+  };
+  std::vector<std::uint8_t> is_target(active_.size());
+  ParallelFor(active_.size(), [&](std::size_t i) {
+    is_target[i] = discouraged_[active_[i].star] <= kGiveUp && !is_seen_from_lower(active_[i]);
+  });
   std::vector<Target<K>> targets;
-  targets.reserve(active_.size());
-  for (const Active& a : active_)
-    if (discouraged_[a.star] <= kGiveUp) targets.push_back(Aim(a.star, a.violation));
+  for (std::size_t i = 0; i < active_.size(); ++i)
+    if (is_target[i]) targets.push_back(Aim(active_[i].star, active_[i].violation));
   return targets;
 }
 
@@ -192,6 +212,12 @@ void Refinement<K>::AskForTargets() {
   const int closest_block = flat_count > 0 ? 1 : 0;
   Eigen::Index next_flat = 0, next_closest = 0;
   for (std::size_t i = 0; i < targets_.size(); ++i) {
+    const bool flat = FindsFlats(targets_[i]);
+    for (Eigen::Index c = first_candidate_[i]; c < first_candidate_[i + 1]; ++c)
+      places_[static_cast<std::size_t>(c)] =
+          flat ? std::pair{0, next_flat++} : std::pair{closest_block, next_closest++};
+  }
+  ParallelFor(targets_.size(), [&](std::size_t i) {
     const Target<K>& t = targets_[i];
     const bool flat = FindsFlats(t);
     Random random(spec_.random_seed ^ Mix64(t.star), whole_rounds_);
@@ -205,20 +231,19 @@ void Refinement<K>::AskForTargets() {
         for (int a = 0; a < K; ++a) x[a] += criteria_.picking_radius * t.radius * step[a];
       }
       complex_.Lift(t.star, x, candidates_.col(c).data());
+      const Eigen::Index column = places_[static_cast<std::size_t>(c)].second;
       if (!flat) {
-        places_[static_cast<std::size_t>(c)] = {closest_block, next_closest};
-        if (rehearsal_) closest.radii[next_closest] = t.radius;
-        closest.points.col(next_closest++) = candidates_.col(c);
+        if (rehearsal_) closest.radii[column] = t.radius;
+        closest.points.col(column) = candidates_.col(c);
         continue;
       }
-      places_[static_cast<std::size_t>(c)] = {0, next_flat};
-      flats.points.col(next_flat) = candidates_.col(c);
+      flats.points.col(column) = candidates_.col(c);
       const double* tangent = complex_.Tangent(t.star);
       for (int j = 0; j < d; ++j)
-        for (int a = 0; a < K; ++a) flats.bases(j * K + a, next_flat) = tangent[a * d + j];
-      flats.radii[next_flat++] = t.radius;
+        for (int a = 0; a < K; ++a) flats.bases(j * K + a, column) = tangent[a * d + j];
+      flats.radii[column] = t.radius;
     }
-  }
+  });
   batch_.emplace();
   if (flat_count > 0) batch_->blocks.push_back(std::move(flats));
   if (count > flat_count) batch_->blocks.push_back(std::move(closest));

@@ -25,14 +25,16 @@ template <int K>
 double Refinement<K>::SizeSeenFrom(std::uint32_t p) const {
   const auto& cell = complex_.cell(p);
   double longest2 = 0;
-  for (const auto& facet : cell.facets())
-    if (!IsFake(facet.id)) longest2 = std::max(longest2, 2 * facet.offset);
+  for (std::size_t f = 0; f < cell.facet_count(); ++f)
+    if (!IsFake(cell.id(f))) longest2 = std::max(longest2, complex_.EdgeLength2(p, f));
   double size = INFINITY;
-  for (const auto& facet : cell.facets()) {
-    const double distance2 = 2 * facet.offset;
-    if (IsFake(facet.id) || distance2 < kTellingEdge * kTellingEdge * longest2) continue;
+  for (std::size_t f = 0; f < cell.facet_count(); ++f) {
+    if (IsFake(cell.id(f))) continue;
+    double along[K];
+    const double distance2 = 2 * complex_.HalfSpace(p, f, along);
+    if (distance2 < kTellingEdge * kTellingEdge * longest2) continue;
     double along2 = 0;
-    for (int a = 0; a < K; ++a) along2 += facet.normal[a] * facet.normal[a];
+    for (const double a : along) along2 += a * a;
     const double away = std::sqrt(std::max(distance2 - along2, 0.0));
     if (away > 0) size = std::min(size, distance2 / (2 * away));
   }
@@ -43,12 +45,13 @@ double Refinement<K>::SizeSeenFrom(std::uint32_t p) const {
 template <int K>
 double Refinement<K>::LocalSize(std::uint32_t p) const {
   double size = size_seen_[p];
-  for (const auto& facet : complex_.cell(p).facets()) {
-    if (IsFake(facet.id)) continue;
-    const double there = facet.id < local_size_.size()
-                             ? std::min(local_size_[facet.id], size_seen_[facet.id])
-                             : size_seen_[facet.id];
-    size = std::min(size, there + std::sqrt(2 * facet.offset));
+  const auto& cell = complex_.cell(p);
+  for (std::size_t f = 0; f < cell.facet_count(); ++f) {
+    const std::uint32_t q = cell.id(f);
+    if (IsFake(q)) continue;
+    const double there =
+        q < local_size_.size() ? std::min(local_size_[q], size_seen_[q]) : size_seen_[q];
+    size = std::min(size, there + std::sqrt(complex_.EdgeLength2(p, f)));
   }
   return size;
 }
@@ -67,12 +70,14 @@ void Refinement<K>::SpreadSizes() {
     const auto [size, p] = queue.back();
     queue.pop_back();
     if (size > local_size_[p]) continue;
-    for (const auto& facet : complex_.cell(p).facets()) {
-      if (IsFake(facet.id)) continue;
-      const double there = size + std::sqrt(2 * facet.offset);
-      if (!(there < local_size_[facet.id])) continue;
-      local_size_[facet.id] = there;
-      queue.emplace_back(there, facet.id);
+    const auto& cell = complex_.cell(p);
+    for (std::size_t f = 0; f < cell.facet_count(); ++f) {
+      const std::uint32_t q = cell.id(f);
+      if (IsFake(q)) continue;
+      const double there = size + std::sqrt(complex_.EdgeLength2(p, f));
+      if (!(there < local_size_[q])) continue;
+      local_size_[q] = there;
+      queue.emplace_back(there, q);
       std::push_heap(queue.begin(), queue.end(), std::greater<>());
     }
   }

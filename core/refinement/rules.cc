@@ -3,18 +3,18 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <vector>
 
 namespace stellate::core {
 namespace {
 
 template <int K>
-Violation<K> AtVertex(Rule rule, const RestrictedVoronoiCell<K>& cell,
-                      const typename RestrictedVoronoiCell<K>::Vertex& v, bool fake) {
+Violation<K> AtVertex(Rule rule, const RestrictedVoronoiCell<K>& cell, std::size_t v, bool fake) {
   Violation<K> violation;
-  violation.vertex = static_cast<std::size_t>(&v - cell.vertices().data());
+  violation.vertex = v;
   violation.rule = rule;
-  violation.radius = std::sqrt(v.norm2);
-  std::copy(v.x, v.x + K, violation.x);
+  violation.radius = std::sqrt(cell.norm2(v));
+  std::copy_n(cell.x(v), K, violation.x);
   violation.fake = fake;
   return violation;
 }
@@ -40,24 +40,34 @@ template <int K>
 std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std::uint32_t p,
                                              double epsilon, double radius_edge_bound) {
   const auto& cell = complex.cell(p);
-  using Vertex = typename RestrictedVoronoiCell<K>::Vertex;
-  const Vertex* worst = nullptr;
-  bool worst_fake = false;
-  for (const Vertex& v : cell.vertices()) {
-    const bool fake = !cell.bounded() && cell.HasFakeFacet(v);
-    if ((fake || v.norm2 > epsilon * epsilon) && (!worst || v.norm2 > worst->norm2)) {
-      worst = &v;
+  std::optional<std::size_t> worst;
+  double worst_norm2 = 0;
+  if (!cell.bounded() || cell.max_norm2() > epsilon * epsilon) {
+    bool worst_fake = false;
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      const bool fake = !cell.bounded() && cell.HasFakeFacet(v);
+      const double norm2 = cell.norm2(v);
+      if (!(fake || norm2 > epsilon * epsilon) || (worst && !(norm2 > worst_norm2))) continue;
+      worst = v;
+      worst_norm2 = norm2;
       worst_fake = fake;
     }
+    if (worst) return AtVertex<K>(Rule::kSize, cell, *worst, worst_fake);
   }
-  if (worst) return AtVertex<K>(Rule::kSize, cell, *worst, worst_fake);
+  thread_local std::vector<double> edges2;
+  edges2.clear();
+  for (std::size_t f = 0; f < cell.facet_count(); ++f) edges2.push_back(complex.EdgeLength2(p, f));
   double worst_rho2 = radius_edge_bound * radius_edge_bound;
-  for (const Vertex& v : cell.vertices()) {
+  // Mostly the longest radius is short enough for the shortest edge.
+  if (cell.max_norm2() <= worst_rho2 * *std::min_element(edges2.begin(), edges2.end()))
+    return std::nullopt;
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
     double edge2 = INFINITY;
-    for (const auto f : v.facet) edge2 = std::min(edge2, 2 * cell.facets()[f].offset);
-    if (v.norm2 > worst_rho2 * edge2) {
-      worst_rho2 = v.norm2 / edge2;
-      worst = &v;
+    for (int s = 0; s < K; ++s) edge2 = std::min(edge2, edges2[cell.facet(v, s)]);
+    const double norm2 = cell.norm2(v);
+    if (norm2 > worst_rho2 * edge2) {
+      worst_rho2 = norm2 / edge2;
+      worst = v;
     }
   }
   if (worst) return AtVertex<K>(Rule::kRadiusEdge, cell, *worst, false);
@@ -66,14 +76,13 @@ std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std:
 
 template <int K>
 bool ContainsSliver(const StarComplex<K>& complex, const double* p,
-                    const RestrictedVoronoiCell<K>& cell,
-                    const typename RestrictedVoronoiCell<K>::Vertex& v, double sliver_bound,
+                    const RestrictedVoronoiCell<K>& cell, std::size_t v, double sliver_bound,
                     const double* unborn) {
   if (K < 2 || sliver_bound <= 0) return false;
   const int d = complex.d();
   const double* q[K];
   for (int a = 0; a < K; ++a) {
-    const std::uint32_t id = cell.facets()[v.facet[a]].id;
+    const std::uint32_t id = cell.id(cell.facet(v, a));
     q[a] = id < complex.size() ? complex.Point(id) : unborn;
   }
   double length2[K], gram[K][K];
@@ -117,9 +126,9 @@ namespace {
 
 // The sign of the simplex on p and K facets' points, seen in T_pM.
 template <int K>
-double Orientation(const RestrictedVoronoiCell<K>& cell, const std::uint16_t* facets) {
+double Orientation(const StarComplex<K>& complex, std::uint32_t p, const std::uint16_t* facets) {
   double m[K][K];
-  for (int r = 0; r < K; ++r) std::copy_n(cell.facets()[facets[r]].normal, K, m[r]);
+  for (int r = 0; r < K; ++r) complex.HalfSpace(p, facets[r], m[r]);
   double sign = 1;
   for (int c = 0; c < K; ++c) {
     int pivot = c;
@@ -141,17 +150,19 @@ double Orientation(const RestrictedVoronoiCell<K>& cell, const std::uint16_t* fa
 
 // Whether the simplex dual to v and a neighbour of it in star(p) overlap near the facet they share.
 template <int K>
-bool IsFolded(const RestrictedVoronoiCell<K>& cell,
-              const typename RestrictedVoronoiCell<K>::Vertex& v) {
-  const double here = Orientation<K>(cell, v.facet);
-  if (here == 0) return true;
+bool IsFolded(const StarComplex<K>& complex, std::uint32_t p, std::size_t v) {
+  const RestrictedVoronoiCell<K>& cell = complex.cell(p);
+  std::uint16_t here[K];
+  for (int s = 0; s < K; ++s) here[s] = cell.facet(v, s);
+  const double side = Orientation<K>(complex, p, here);
+  if (side == 0) return true;
   for (int s = 0; s < K; ++s) {
-    const auto& w = cell.vertices()[v.adjacent[s]];
-    std::uint16_t facets[K];
-    std::copy(v.facet, v.facet + K, facets);
-    for (const std::uint16_t f : w.facet)
-      if (std::find(v.facet, v.facet + K, f) == v.facet + K) facets[s] = f;
-    if (Orientation<K>(cell, facets) * here >= 0) return true;
+    const std::size_t w = cell.adjacent(v, s);
+    std::uint16_t there[K];
+    std::copy(here, here + K, there);
+    for (int r = 0; r < K; ++r)
+      if (std::find(here, here + K, cell.facet(w, r)) == here + K) there[s] = cell.facet(w, r);
+    if (Orientation<K>(complex, p, there) * side >= 0) return true;
   }
   return false;
 }
@@ -161,26 +172,28 @@ bool IsFolded(const RestrictedVoronoiCell<K>& cell,
 template <int K>
 std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& complex,
                                                       std::uint32_t p, double sliver_bound) {
-  using Vertex = typename StarComplex<K>::Vertex;
   const auto& cell = complex.cell(p);
   if (!cell.bounded()) return std::nullopt;  // R1 gave up there: nothing to judge yet
-  const Vertex* worst = nullptr;
+  std::optional<std::size_t> worst;
+  const auto is_worse = [&](std::size_t v) { return !worst || cell.norm2(v) > cell.norm2(*worst); };
   if (sliver_bound > 0) {
     // In the star of its lowest vertex: if it is not there, it is inconsistent besides.
-    const auto held = [&](const Vertex& v) {
-      return std::all_of(v.facet, v.facet + K, [&](auto f) { return cell.facets()[f].id > p; });
+    const auto held = [&](std::size_t v) {
+      for (int s = 0; s < K; ++s)
+        if (cell.id(cell.facet(v, s)) < p) return false;
+      return true;
     };
-    for (const Vertex& v : cell.vertices())
-      if ((!worst || v.norm2 > worst->norm2) && held(v) &&
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+      if (is_worse(v) && held(v) &&
           ContainsSliver<K>(complex, complex.Point(p), cell, v, sliver_bound, nullptr))
-        worst = &v;
+        worst = v;
     if (worst) return AtVertex<K>(Rule::kSliver, cell, *worst, false);
   }
-  for (const Vertex& v : cell.vertices())
-    if ((!worst || v.norm2 > worst->norm2) &&
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+    if (is_worse(v) &&
         (!IsConsistent<K>(complex, p, v) ||
-         (complex.judging() == Judging::kCommonCentre && IsFolded<K>(cell, v))))
-      worst = &v;
+         (complex.judging() == Judging::kCommonCentre && IsFolded<K>(complex, p, v))))
+      worst = v;
   if (worst) return AtVertex<K>(Rule::kInconsistent, cell, *worst, false);
   return std::nullopt;
 }
@@ -201,19 +214,19 @@ int CountBad(const StarComplex<K>& complex, const double* point,
   int bad = 0;
   const auto survey = [&](std::uint32_t p, const double* at, const Cell& cell) {
     Simplex simplex;
-    for (const auto& v : cell.vertices()) {
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
       if (bad >= enough) return;
       if (!complex.SimplexOf(p, cell, v, &simplex)) {
         ++bad;
         continue;
       }
       const bool fresh = simplex.back() == id;  // an old simplex was judged before
-      if (fresh && v.norm2 <= small_radius * small_radius &&
+      if (fresh && cell.norm2(v) <= small_radius * small_radius &&
           ContainsSliver<K>(complex, at, cell, v, sliver_bound, point)) {
         ++bad;
         continue;
       }
-      const std::uint64_t key = SimplexKey<K>(v, p);
+      const std::uint64_t key = SimplexKey<K>(cell, v, p);
       for (const std::uint32_t q : simplex) {
         if (q == p) continue;
         const Cell* other = changed(q);
@@ -231,10 +244,10 @@ int CountBad(const StarComplex<K>& complex, const double* point,
   for (const auto& [p, cell] : tentative.cut) {
     Simplex simplex;
     const Cell& before = complex.cell(p);
-    for (const auto& v : before.vertices()) {
+    for (std::size_t v = 0; v < before.vertex_count(); ++v) {
       if (bad >= enough) return bad;
       if (!complex.SimplexOf(p, before, v, &simplex)) continue;
-      const std::uint64_t key = SimplexKey<K>(v, p);
+      const std::uint64_t key = SimplexKey<K>(before, v, p);
       if (FindSimplex<K>(cell, p, simplex, key)) continue;
       for (const std::uint32_t q : simplex)
         if (q != p && !changed(q) && FindSimplex<K>(complex.cell(q), q, simplex, key)) {
@@ -252,8 +265,8 @@ int CountBad(const StarComplex<K>& complex, const double* point,
   template std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>&,         \
                                                                  std::uint32_t, double);        \
   template bool ContainsSliver(const StarComplex<K>&, const double*,                            \
-                               const RestrictedVoronoiCell<K>&,                                 \
-                               const RestrictedVoronoiCell<K>::Vertex&, double, const double*); \
+                               const RestrictedVoronoiCell<K>&, std::size_t, double,            \
+                               const double*);                                                  \
   template int CountBad(const StarComplex<K>&, const double*, const StarComplex<K>::Tentative&, \
                         double, double, int);
 STELLATE_INSTANTIATE(1)

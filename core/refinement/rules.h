@@ -15,10 +15,10 @@ enum class Rule : std::uint8_t { kSize = 0, kRadiusEdge, kSliver, kInconsistent 
 template <int K>
 struct Violation {
   Rule rule = Rule::kSize;
-  double radius = 0;  // R_p(sigma), length
-  double x[K] = {};   // c_p(sigma) in p's tangent coordinates
+  double radius = 0;       // R_p(sigma), length
+  double x[K] = {};        // c_p(sigma) in p's tangent coordinates
   std::size_t vertex = 0;  // of p's cell, as long as that does not change
-  bool fake = false;  // not a simplex yet: the cell is unbounded there
+  bool fake = false;       // not a simplex yet: the cell is unbounded there
 };
 
 // R1 and R2, which need star(p) alone: the worst simplex of the first rule that one breaks, by R_p
@@ -28,10 +28,11 @@ template <int K>
 std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std::uint32_t p,
                                              double epsilon, double radius_edge_bound);
 
-// R3 and R4, which need the neighbours' stars, and star(p) closed: first the worst simplex, by R_p, that is or contains
-// a sliver and whose lowest vertex p is, then the worst one that is inconsistent, or, where stars are judged at common centres,
-// that lies on the same side as a neighbour of the facet they share in T_pM: such a star is no
-// embedded disk although all its vertices agree on it.
+// R3 and R4, which need the neighbours' stars, and star(p) closed: first the worst simplex, by R_p,
+// that is or contains a sliver and whose lowest vertex p is, then the worst one that is
+// inconsistent, or, where stars are judged at common centres, that lies on the same side as a
+// neighbour of the facet they share in T_pM: such a star is no embedded disk although all its
+// vertices agree on it.
 template <int K>
 std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& complex,
                                                       std::uint32_t p, double sliver_bound);
@@ -40,8 +41,7 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& comp
 // whether some face at p, of dimension 2 or more, has fatness below Theta0^j.
 template <int K>
 bool ContainsSliver(const StarComplex<K>& complex, const double* p,
-                    const RestrictedVoronoiCell<K>& cell,
-                    const typename RestrictedVoronoiCell<K>::Vertex& v, double sliver_bound,
+                    const RestrictedVoronoiCell<K>& cell, std::size_t v, double sliver_bound,
                     const double* unborn);
 
 // How bad a tentative insertion would leave its surroundings: the new slivers of circumradius at

@@ -85,18 +85,17 @@ void Surrogate<K>::Fit(std::uint32_t p, std::uint32_t slot) {
   };
   std::vector<Neighbour> neighbours;
   double total = 0;
-  for (const auto& facet : cell.facets()) {
-    if (IsFake(facet.id)) continue;
-    const Frame other(complex_.Tangent(facet.id), d, K);
+  for (std::size_t f = 0; f < cell.facet_count(); ++f) {
+    const std::uint32_t neighbour = cell.id(f);
+    if (IsFake(neighbour)) continue;
+    const Frame other(complex_.Tangent(neighbour), d, K);
     const Eigen::Matrix<double, K, K> turn = tangent.transpose() * other;
     if (turn.squaredNorm() < K - 1 + kLeastCosine * kLeastCosine) continue;
     Neighbour n;
+    complex_.HalfSpace(p, f, n.u);
     double length2 = 0;
-    for (int a = 0; a < K; ++a) {
-      n.u[a] = facet.normal[a];
-      length2 += n.u[a] * n.u[a];
-    }
-    const double* q = complex_.Point(facet.id);
+    for (const double u : n.u) length2 += u * u;
+    const double* q = complex_.Point(neighbour);
     const double* at = complex_.Point(p);
     n.away.resize(d);
     for (int j = 0; j < d; ++j) n.away[j] = q[j] - at[j];

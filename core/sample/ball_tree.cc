@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "core/parallel.h"
+
 namespace stellate::core {
 
 std::uint32_t BallTree::NewNodes(int count) {
@@ -29,23 +31,29 @@ void BallTree::Measure(std::uint32_t node, const std::uint32_t* begin, const std
   nodes_[node].outreach = outreach;
 }
 
-void BallTree::MakeLeaf(std::uint32_t node, const std::uint32_t* begin, const std::uint32_t* end) {
-  const auto first = static_cast<std::uint32_t>(slots_.size());
-  slots_.resize(slots_.size() + kLeafCapacity);
+void BallTree::MakeLeaf(std::uint32_t node, std::uint32_t first_slot, const std::uint32_t* begin,
+                        const std::uint32_t* end) {
   nodes_[node].children = kNone;
-  nodes_[node].first = first;
+  nodes_[node].first = first_slot;
   nodes_[node].count = static_cast<std::uint32_t>(end - begin);
-  std::copy(begin, end, slots_.begin() + first);
+  std::copy(begin, end, slots_.begin() + first_slot);
   for (const std::uint32_t* i = begin; i != end; ++i) leaf_of_[*i] = node;
 }
 
-// Halves along the line through two far points, down to leaves two thirds full.
-void BallTree::Build(std::uint32_t node, std::uint32_t* begin, std::uint32_t* end) {
+// How many leaves a balanced tree of so many points has.
+std::uint32_t BallTree::LeafCount(std::size_t points) {
+  if (points <= kBuiltLeaf) return 1;
+  if (points % 2 == 0) return 2 * LeafCount(points / 2);
+  return LeafCount(points / 2) + LeafCount(points - points / 2);
+}
+
+// Halves along the line through two far points. The nodes below take the places from `place.node`
+// on, the leaves the slots from `place.slot` on: where each goes is known before any is there, and
+// large halves are built in parallel.
+void BallTree::Build(std::uint32_t node, Place place, std::uint32_t* begin, std::uint32_t* end) {
   Measure(node, begin, end);
-  if (end - begin <= kLeafCapacity * 2 / 3) {
-    MakeLeaf(node, begin, end);
-    return;
-  }
+  const auto count = static_cast<std::size_t>(end - begin);
+  if (count <= kBuiltLeaf) return MakeLeaf(node, place.slot, begin, end);
   const auto farthest = [&](const double* from) {
     const std::uint32_t* best = begin;
     double most = -1;
@@ -63,31 +71,42 @@ void BallTree::Build(std::uint32_t node, std::uint32_t* begin, std::uint32_t* en
   std::vector<double> axis(static_cast<std::size_t>(d_));
   for (int j = 0; j < d_; ++j) axis[static_cast<std::size_t>(j)] = b[j] - a[j];
   std::vector<std::pair<double, std::uint32_t>> along;
-  along.reserve(static_cast<std::size_t>(end - begin));
+  along.reserve(count);
   for (const std::uint32_t* i = begin; i != end; ++i)
     along.emplace_back(Dot(axis.data(), Point(*i), d_), *i);
-  const auto middle = along.begin() + static_cast<std::ptrdiff_t>(along.size() / 2);
+  const auto middle = along.begin() + static_cast<std::ptrdiff_t>(count / 2);
   std::nth_element(along.begin(), middle, along.end());
-  for (std::size_t i = 0; i < along.size(); ++i) begin[i] = along[i].second;
-  std::uint32_t* half = begin + along.size() / 2;
+  for (std::size_t i = 0; i < count; ++i) begin[i] = along[i].second;
   along = {};
-  const std::uint32_t children = NewNodes(2);
+  std::uint32_t* const half = begin + count / 2;
+  const std::uint32_t children = place.node;
   nodes_[node].children = children;
   nodes_[children].parent = nodes_[children + 1].parent = node;
-  Build(children, begin, half);
-  Build(children + 1, half, end);
+  const std::uint32_t leaves = LeafCount(count / 2);
+  const Place left{place.node + 2, place.slot};
+  const Place right{left.node + 2 * (leaves - 1), place.slot + leaves * kLeafCapacity};
+  const auto build = [&](int child) {
+    child == 0 ? Build(children, left, begin, half) : Build(children + 1, right, half, end);
+  };
+  if (count < kBuiltAlone) {
+    build(0);
+    build(1);
+  } else {
+    ParallelFor(2, build);
+  }
 }
 
 void BallTree::Rebuild() {
   built_ = influence_.size();
-  nodes_.clear();
-  centres_.clear();
-  slots_.clear();
   stale_.clear();
+  const std::uint32_t leaves = LeafCount(built_);
+  nodes_.assign(2 * std::size_t{leaves} - 1, {});
+  centres_.assign(nodes_.size() * static_cast<std::size_t>(d_), 0.0);
+  slots_.resize(std::size_t{leaves} * kLeafCapacity);
   std::vector<std::uint32_t> ids(built_);
   std::iota(ids.begin(), ids.end(), 0u);
-  NewNodes(1);
-  Build(0, ids.data(), ids.data() + ids.size());
+  Build(0, {1, 0}, ids.data(), ids.data() + ids.size());
+  built_nodes_ = nodes_.size();
 }
 
 // A full leaf becomes two, each around one of two far points.
@@ -119,7 +138,18 @@ void BallTree::Split(std::uint32_t node) {
   nodes_[children].count = static_cast<std::uint32_t>(half - ids);
   std::copy(ids, half, slots_.begin() + first);
   for (std::uint32_t* i = ids; i != half; ++i) leaf_of_[*i] = children;
-  MakeLeaf(children + 1, half, ids + kLeafCapacity);
+  const auto slot = static_cast<std::uint32_t>(slots_.size());
+  slots_.resize(slots_.size() + kLeafCapacity);
+  MakeLeaf(children + 1, slot, half, ids + kLeafCapacity);
+}
+
+void BallTree::Assign(std::vector<double> influences) {
+  influence_ = std::move(influences);
+  leaf_of_.assign(influence_.size(), 0);
+  if (influence_.empty())
+    nodes_.clear();
+  else
+    Rebuild();
 }
 
 void BallTree::Insert(double influence) {
@@ -148,25 +178,6 @@ void BallTree::Insert(double influence) {
   slots_[leaf.first + leaf.count++] = id;
   leaf_of_[id] = n;
   if (leaf.count == kLeafCapacity) Split(n);
-}
-
-std::vector<std::uint32_t> BallTree::SpatialOrder() const {
-  std::vector<std::uint32_t> order;
-  order.reserve(size());
-  std::vector<std::uint32_t> stack;
-  if (!nodes_.empty()) stack.push_back(0);
-  while (!stack.empty()) {
-    const Node& node = nodes_[stack.back()];
-    stack.pop_back();
-    if (node.children == kNone) {
-      order.insert(order.end(), slots_.begin() + node.first,
-                   slots_.begin() + node.first + node.count);
-    } else {
-      stack.push_back(node.children + 1);
-      stack.push_back(node.children);
-    }
-  }
-  return order;
 }
 
 void BallTree::SetInfluence(std::uint32_t id, double influence) {

@@ -32,6 +32,9 @@ class BallTree {
   // Adds the point with the next id, size().
   void Insert(double influence);
 
+  // Makes it the tree of the points 0 to influences.size() - 1, built balanced and in parallel.
+  void Assign(std::vector<double> influences);
+
   // Growth takes effect at once; shrinking makes searches faster after Refit, never different.
   void SetInfluence(std::uint32_t id, double influence);
   void Refit();
@@ -65,9 +68,13 @@ class BallTree {
     return !nodes_.empty() && AnyWithin(0, SquaredDistance(q, Centre(0), d_), q, radius);
   }
 
-  // All ids, near ones mostly close together: points handled in this order find in the cache what
-  // those before them have touched.
-  std::vector<std::uint32_t> SpatialOrder() const;
+  // Points in the order of their places are mostly near the ones before them: handled so, they find
+  // in the cache what those have touched.
+  std::uint32_t PlaceOf(std::uint32_t id) const {
+    std::uint32_t node = leaf_of_[id];
+    while (node >= built_nodes_) node = nodes_[node].parent;
+    return node;
+  }
 
   // Squared distance from q to the nearest point; infinity when empty.
   double NearestSquaredDistance(const double* q) const {
@@ -82,6 +89,8 @@ class BallTree {
 
  private:
   static constexpr int kLeafCapacity = 12;
+  static constexpr std::size_t kBuiltLeaf = 8;      // points of a leaf at most, when built
+  static constexpr std::size_t kBuiltAlone = 4096;  // fewer points are not worth a second thread
   static constexpr std::size_t kRebuild = 4;
   static constexpr std::uint32_t kNone = 0xffffffffu;
   // More than rounding can take from a distance in R^d, d up to thousands: no point is overlooked
@@ -108,8 +117,14 @@ class BallTree {
   }
 
   std::uint32_t NewNodes(int count);
-  void Build(std::uint32_t node, std::uint32_t* begin, std::uint32_t* end);
-  void MakeLeaf(std::uint32_t node, const std::uint32_t* begin, const std::uint32_t* end);
+  // Where the descendants of a node go.
+  struct Place {
+    std::uint32_t node, slot;
+  };
+  static std::uint32_t LeafCount(std::size_t points);
+  void Build(std::uint32_t node, Place place, std::uint32_t* begin, std::uint32_t* end);
+  void MakeLeaf(std::uint32_t node, std::uint32_t first_slot, const std::uint32_t* begin,
+                const std::uint32_t* end);
   void Measure(std::uint32_t node, const std::uint32_t* begin, const std::uint32_t* end);
   void Split(std::uint32_t node);
   void Rebuild();
@@ -217,6 +232,7 @@ class BallTree {
   std::vector<std::uint32_t> leaf_of_;  // by id
   std::vector<std::uint32_t> stale_;    // leaves whose outreach may have shrunk
   std::size_t built_ = 0;               // size at the last rebuild
+  std::size_t built_nodes_ = 0;         // nodes then, numbered along the tree
 };
 
 }  // namespace stellate::core

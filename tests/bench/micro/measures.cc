@@ -53,7 +53,7 @@ void SimplexAngleToTangent(benchmark::State& state) {
   const int d = static_cast<int>(state.range(0));
   const RandomSimplex<K> simplex(d);
   std::vector<double> tangent(static_cast<std::size_t>(d * K), 0);
-  for (std::size_t a = 0; a < K; ++a) tangent[a * K + a] = 1;
+  for (std::size_t a = 0; a < K; ++a) tangent[a * static_cast<std::size_t>(d) + a] = 1;
   for (auto _ : state) {
     benchmark::DoNotOptimize(AngleToTangent(simplex.vertices, d, tangent.data(), K));
   }

@@ -18,7 +18,7 @@ namespace {
 
 // `n` half-spaces tangent to spheres of radius about 1: the neighbours of a well-sampled point.
 template <int K>
-struct HalfSpaces {
+struct HalfSpaces final : Surroundings<K> {
   std::vector<std::array<double, K>> normals;
   std::vector<double> offsets;
 
@@ -40,11 +40,25 @@ struct HalfSpaces {
 
   void Cut(RestrictedVoronoiCell<K>& cell,
            typename RestrictedVoronoiCell<K>::Scratch& scratch) const {
-    cell.Reset(10);
+    cell.Reset(kInradius, *this);
     for (std::size_t i = 0; i < normals.size(); ++i) {
-      cell.Clip(static_cast<std::uint32_t>(i), normals[i].data(), offsets[i], scratch);
+      cell.Clip(static_cast<std::uint32_t>(i), normals[i].data(), offsets[i], scratch, *this);
     }
   }
+
+  double HalfSpace(std::uint32_t id, double* normal) const override {
+    if (IsFake(id)) return FakeHalfSpace<K>(static_cast<int>(id - kFirstFakeId), kInradius, normal);
+    std::copy_n(normals[id].data(), K, normal);
+    return offsets[id];
+  }
+  int judged_in() const override { return 0; }
+  bool Centre(const std::uint32_t*, std::uint64_t, double*, double*) const override {
+    return false;
+  }
+  void Lift(const double*, double*) const override {}
+
+ private:
+  static constexpr double kInradius = 10;
 };
 
 template <int K>
@@ -56,7 +70,7 @@ void CellBuild(benchmark::State& state) {
     neighbours.Cut(cell, scratch);
     benchmark::DoNotOptimize(cell.max_norm2());
   }
-  state.counters["cell_vertices"] = static_cast<double>(cell.vertices().size());
+  state.counters["cell_vertices"] = static_cast<double>(cell.vertex_count());
   state.SetItemsProcessed(state.iterations() * state.range(0));
 }
 BENCHMARK(CellBuild<1>)->Arg(8);
@@ -73,15 +87,15 @@ void CellClipCopy(benchmark::State& state) {
   typename RestrictedVoronoiCell<K>::Scratch scratch;
   neighbours.Cut(cell, scratch);
   // Cuts the farthest vertex off, half-way.
-  const auto& vertices = cell.vertices();
-  const auto farthest = std::max_element(vertices.begin(), vertices.end(),
-                                         [](auto& a, auto& b) { return a.norm2 < b.norm2; });
+  std::size_t farthest = 0;
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+    if (cell.norm2(v) > cell.norm2(farthest)) farthest = v;
   std::array<double, K> normal;
-  for (int a = 0; a < K; ++a) normal[a] = farthest->x[a];
-  const double offset = 0.9 * farthest->norm2;
+  std::copy_n(cell.x(farthest), K, normal.begin());
+  const double offset = 0.9 * cell.norm2(farthest);
   for (auto _ : state) {
     copy = cell;
-    benchmark::DoNotOptimize(copy.Clip(1000, normal.data(), offset, scratch));
+    benchmark::DoNotOptimize(copy.Clip(1000, normal.data(), offset, scratch, neighbours));
   }
 }
 BENCHMARK(CellClipCopy<2>)->Arg(12);

@@ -177,7 +177,7 @@ TEST(Certifier, RefusesAFold) {
   const Eigen::MatrixXd tangent = Complement(p);
   for (int i = 0; i < 3; ++i) {
     mesh.points[300 + i] = p[i];
-    for (int a = 0; a < 2; ++a) mesh.tangents[600 + 2 * i + a] = tangent(i, a);
+    for (int a = 0; a < 2; ++a) mesh.tangents[600 + 3 * a + i] = tangent(i, a);
   }
   const Certificate c = Certify(SpecificationFor(mesh, 0.6), mesh, ClosestOnSphere).certificate;
   EXPECT_TRUE(c.links_are_spheres);
@@ -219,7 +219,7 @@ TEST(Certifier, RefusesASphereThatStandsForATorus) {
     const Eigen::MatrixXd tangent = Complement((p - ring).normalized());
     for (int i = 0; i < 3; ++i) {
       mesh.points[3 * v + i] = p[i];
-      for (int a = 0; a < 2; ++a) mesh.tangents[6 * v + 2 * i + a] = tangent(i, a);
+      for (int a = 0; a < 2; ++a) mesh.tangents[6 * v + 3 * a + i] = tangent(i, a);
     }
   }
   const Certificate c = Certify(SpecificationFor(mesh, 1.2), mesh, closest).certificate;

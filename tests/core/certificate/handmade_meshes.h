@@ -21,7 +21,7 @@ namespace stellate::core {
 struct HandmadeMesh {
   int k = 0, d = 0;
   std::vector<double> points;    // n x d
-  std::vector<double> tangents;  // n x d x k
+  std::vector<double> tangents;  // n x k x d
   std::vector<std::uint32_t> simplices;
 
   std::uint32_t vertices() const { return static_cast<std::uint32_t>(points.size()) / d; }
@@ -36,9 +36,7 @@ struct HandmadeMesh {
     d = static_cast<int>(p.size());
     k = static_cast<int>(tangent.cols());
     points.insert(points.end(), p.begin(), p.end());
-    for (int i = 0; i < d; ++i) {
-      for (int a = 0; a < k; ++a) tangents.push_back(tangent(i, a));
-    }
+    tangents.insert(tangents.end(), tangent.data(), tangent.data() + d * k);
     return vertices() - 1;
   }
   void AddSimplex(std::vector<std::uint32_t> ids) {

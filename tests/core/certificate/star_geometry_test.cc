@@ -55,8 +55,8 @@ TEST(MeasureStars, AStarSeenEdgeOnIsNotEmbedded) {
   const Eigen::Vector3d along = Eigen::Vector3d(mesh.Point(1) - mesh.Point(0));
   const Eigen::Vector3d other = normal.cross(along).normalized();
   for (int i = 0; i < 3; ++i) {
-    mesh.tangents[2 * i] = normal[i];
-    mesh.tangents[2 * i + 1] = other[i];
+    mesh.tangents[i] = normal[i];
+    mesh.tangents[3 + i] = other[i];
   }
   EXPECT_EQ(Measure(mesh).unembedded_stars, 1u);
 }

@@ -21,6 +21,7 @@ using testing::AppendTo;
 using testing::AsSet;
 using testing::Canonical;
 using testing::CombinatoricsHold;
+using testing::GivenHalfSpaces;
 using testing::Make;
 using testing::RandomSample;
 using testing::Sample;
@@ -69,16 +70,16 @@ TYPED_TEST(StarComplexTest, ClipsEachCellByAllThatMatter) {
   const Sample sample = SampleOfDimension<K>(K == 4 ? 120 : 250, 1);
   const auto complex = Build<K>(sample);
   ASSERT_EQ(complex->size(), sample.size());
-  typename StarComplex<K>::Cell::Scratch scratch;
   for (std::uint32_t p = 0; p < sample.size(); ++p) {
     // By the definition: cut by every other point, in the order of their ids.
     typename StarComplex<K>::Cell cell;
-    cell.Reset(kInradius);
+    GivenHalfSpaces<K> given(kInradius);
+    cell.Reset(kInradius, given);
     for (std::uint32_t q = 0; q < sample.size(); ++q) {
       if (q == p) continue;
       double normal[K];
       const double distance2 = complex->Project(p, sample.Point(q), normal);
-      cell.Clip(q, normal, 0.5 * distance2, scratch);
+      given.Clip(cell, q, normal, 0.5 * distance2);
     }
     const auto expected = Canonical(cell), got = Canonical(complex->cell(p));
     ASSERT_EQ(got.size(), expected.size()) << "star " << p;
@@ -102,18 +103,20 @@ TYPED_TEST(StarComplexTest, HasCircumcentresOfEmptyBalls) {
   std::vector<double> centre(static_cast<std::size_t>(sample.d));
   int simplices = 0;
   for (std::uint32_t p = 0; p < sample.size(); ++p) {
-    for (const auto& v : complex->cell(p).vertices()) {
-      complex->Lift(p, v.x, centre.data());
-      const double tolerance = 1e-8 * (1 + v.norm2);
+    const auto& cell = complex->cell(p);
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      complex->Lift(p, cell.x(v), centre.data());
+      const double norm2 = cell.norm2(v);
+      const double tolerance = 1e-8 * (1 + norm2);
       for (std::uint32_t q = 0; q < sample.size(); ++q)
-        EXPECT_GE(SquaredDistance(centre.data(), sample.Point(q), sample.d), v.norm2 - tolerance);
+        EXPECT_GE(SquaredDistance(centre.data(), sample.Point(q), sample.d), norm2 - tolerance);
       typename StarComplex<K>::Simplex simplex;
       if (!complex->SimplexOf(p, complex->cell(p), v, &simplex)) continue;
       ++simplices;
       EXPECT_TRUE(std::is_sorted(simplex.begin(), simplex.end()));
       EXPECT_TRUE(std::binary_search(simplex.begin(), simplex.end(), p));
       for (const std::uint32_t q : simplex)
-        EXPECT_NEAR(SquaredDistance(centre.data(), sample.Point(q), sample.d), v.norm2, tolerance);
+        EXPECT_NEAR(SquaredDistance(centre.data(), sample.Point(q), sample.d), norm2, tolerance);
     }
   }
   EXPECT_GT(simplices, 100);
@@ -219,8 +222,9 @@ TYPED_TEST(StarComplexTest, ChangesAddUpToTheComplex) {
     for (const std::uint32_t p : changed) {
       for (const auto& [ids, bits] : before[p])
         for (const std::uint32_t q : ids) EXPECT_TRUE(IsFake(q) || listed.contains(q));
-      for (const auto& facet : complex->cell(p).facets())
-        EXPECT_TRUE(IsFake(facet.id) || listed.contains(facet.id));
+      const auto& cell = complex->cell(p);
+      for (std::size_t f = 0; f < cell.facet_count(); ++f)
+        EXPECT_TRUE(IsFake(cell.id(f)) || listed.contains(cell.id(f)));
     }
   }
   EXPECT_TRUE(complex->Commit().stars.empty());  // nothing was appended
@@ -304,7 +308,7 @@ TYPED_TEST(StarComplexTest, DuplicatePointsDoNoHarm) {
   sample.tangents.insert(sample.tangents.end(), once.tangents.begin(), once.tangents.end());
   const auto complex = Build<K>(sample, TypeParam::kJudging);
   for (std::uint32_t p = 0; p < complex->size(); ++p) {
-    EXPECT_GE(complex->cell(p).vertices().size(), K + 1u);
+    EXPECT_GE(complex->cell(p).vertex_count(), K + 1u);
     EXPECT_TRUE(std::isfinite(complex->cell(p).max_norm2()));
   }
 }

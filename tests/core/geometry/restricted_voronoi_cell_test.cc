@@ -17,6 +17,7 @@ namespace {
 
 using testing::Canonical;
 using testing::CombinatoricsHold;
+using testing::GivenHalfSpaces;
 
 template <int K>
 using Vec = Eigen::Matrix<double, K, 1>;
@@ -93,10 +94,16 @@ void Shuffle(std::vector<T>* items, std::uint64_t seed) {
 template <int K>
 RestrictedVoronoiCell<K> Cell(const HalfSpaces<K>& half_spaces, double inradius = 10) {
   RestrictedVoronoiCell<K> cell;
-  cell.Reset(inradius);
-  typename RestrictedVoronoiCell<K>::Scratch scratch;
-  for (const auto& h : half_spaces) cell.Clip(h.id, h.normal.data(), h.offset, scratch);
+  GivenHalfSpaces<K> given(inradius);
+  cell.Reset(inradius, given);
+  for (const auto& h : half_spaces) given.Clip(cell, h.id, h.normal.data(), h.offset);
   return cell;
+}
+
+// Where a vertex is.
+template <int K>
+Vec<K> Place(const RestrictedVoronoiCell<K>& cell, std::size_t v) {
+  return Eigen::Map<const Vec<K>>(cell.x(v));
 }
 
 template <int K>
@@ -105,11 +112,11 @@ using Vertices = std::map<std::vector<std::uint32_t>, Vec<K>>;  // by facet ids,
 template <int K>
 Vertices<K> VerticesOf(const RestrictedVoronoiCell<K>& cell) {
   Vertices<K> all;
-  for (const auto& v : cell.vertices()) {
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
     std::vector<std::uint32_t> ids;
-    for (const auto f : v.facet) ids.push_back(cell.facets()[f].id);
+    for (int s = 0; s < K; ++s) ids.push_back(cell.id(cell.facet(v, s)));
     std::sort(ids.begin(), ids.end());
-    all[ids] = Eigen::Map<const Vec<K>>(v.x);
+    all[ids] = Place<K>(cell, v);
   }
   return all;
 }
@@ -153,11 +160,12 @@ Vertices<K> BruteForceVertices(const HalfSpaces<K>& half_spaces) {
 // The facets of the simplex that a cell begins as, as half-spaces.
 template <int K>
 HalfSpaces<K> FakeHalfSpaces(double inradius) {
-  RestrictedVoronoiCell<K> cell;
-  cell.Reset(inradius);
   HalfSpaces<K> all;
-  for (const auto& f : cell.facets())
-    all.push_back({f.id, Eigen::Map<const Vec<K>>(f.normal), f.offset});
+  for (int i = 0; i <= K; ++i) {
+    Vec<K> normal;
+    const double offset = FakeHalfSpace<K>(i, inradius, normal.data());
+    all.push_back({kFirstFakeId + static_cast<std::uint32_t>(i), normal, offset});
+  }
   return all;
 }
 
@@ -172,21 +180,26 @@ TYPED_TEST_SUITE(RestrictedVoronoiCellTest, Dimensions);
 TYPED_TEST(RestrictedVoronoiCellTest, BeginsAsARegularSimplexOfFakeFacets) {
   constexpr int K = TypeParam::value;
   RestrictedVoronoiCell<K> cell;
-  cell.Reset(0.25);
+  cell.Reset(0.25, GivenHalfSpaces<K>(0.25));
   EXPECT_TRUE(CombinatoricsHold(cell));
-  EXPECT_EQ(cell.vertices().size(), K + 1u);
+  EXPECT_EQ(cell.vertex_count(), K + 1u);
   EXPECT_FALSE(cell.bounded());
-  for (const auto& f : cell.facets()) {
-    EXPECT_TRUE(IsFake(f.id));
-    const double length = Eigen::Map<const Vec<K>>(f.normal).norm();
-    EXPECT_NEAR(f.offset / length, 0.25, 1e-14);
-  }
-  for (const auto& v : cell.vertices()) {
+  for (std::size_t f = 0; f < cell.facet_count(); ++f) EXPECT_TRUE(IsFake(cell.id(f)));
+  for (const auto& h : FakeHalfSpaces<K>(0.25))
+    EXPECT_NEAR(h.offset / h.normal.norm(), 0.25, 1e-14);
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
     EXPECT_TRUE(cell.HasFakeFacet(v));
-    EXPECT_NEAR(v.norm2, 0.0625 * K * K, 1e-14);
-    for (const auto& w : cell.vertices()) {
-      const auto x = Eigen::Map<const Vec<K>>(v.x), y = Eigen::Map<const Vec<K>>(w.x);
-      EXPECT_NEAR(x.dot(y), &v == &w ? 0.0625 * K * K : -0.0625 * K, 1e-14);
+    EXPECT_NEAR(cell.norm2(v), 0.0625 * K * K, 1e-14);
+    for (std::size_t w = 0; w < cell.vertex_count(); ++w)
+      EXPECT_NEAR(Place<K>(cell, v).dot(Place<K>(cell, w)), v == w ? 0.0625 * K * K : -0.0625 * K,
+                  1e-14);
+  }
+  // Each vertex is on the borders of its facets.
+  const HalfSpaces<K> fake = FakeHalfSpaces<K>(0.25);
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+    for (int s = 0; s < K; ++s) {
+      const auto& h = fake[cell.id(cell.facet(v, s)) - kFirstFakeId];
+      EXPECT_NEAR(h.normal.dot(Place<K>(cell, v)), h.offset, 1e-14);
     }
   }
 }
@@ -196,14 +209,14 @@ TYPED_TEST(RestrictedVoronoiCellTest, IsTheCube) {
   const auto cell = Cell<K>(Cube<K>());
   EXPECT_TRUE(CombinatoricsHold(cell));
   EXPECT_TRUE(cell.bounded());
-  EXPECT_EQ(cell.facets().size(), 2u * K);
-  EXPECT_EQ(cell.vertices().size(), 1u << K);
+  EXPECT_EQ(cell.facet_count(), 2u * K);
+  EXPECT_EQ(cell.vertex_count(), 1u << K);
   EXPECT_EQ(cell.max_norm2(), K);
   std::set<std::vector<double>> corners;
-  for (const auto& v : cell.vertices()) {
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
     EXPECT_FALSE(cell.HasFakeFacet(v));
-    for (const double x : v.x) EXPECT_EQ(std::abs(x), 1);
-    corners.emplace(v.x, v.x + K);
+    for (int a = 0; a < K; ++a) EXPECT_EQ(std::abs(cell.x(v)[a]), 1);
+    corners.emplace(cell.x(v), cell.x(v) + K);
   }
   EXPECT_EQ(corners.size(), 1u << K);
 }
@@ -221,10 +234,10 @@ TYPED_TEST(RestrictedVoronoiCellTest, IsTheCrossPolytope) {
   const auto cell = Cell<K>(facets);
   EXPECT_TRUE(CombinatoricsHold(cell));
   EXPECT_TRUE(cell.bounded());
-  EXPECT_EQ(cell.facets().size(), 1u << K);
+  EXPECT_EQ(cell.facet_count(), 1u << K);
   std::set<std::pair<int, bool>> corners;
-  for (const auto& v : cell.vertices()) {
-    const auto x = Eigen::Map<const Vec<K>>(v.x);
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+    const Vec<K> x = Place<K>(cell, v);
     Eigen::Index axis;
     EXPECT_NEAR(x.cwiseAbs().maxCoeff(&axis), 1, 1e-8);
     EXPECT_NEAR(x.norm(), 1, 1e-8);
@@ -273,13 +286,13 @@ TYPED_TEST(RestrictedVoronoiCellTest, DoesNotDependOnTheOrderOfTheCuts) {
 TYPED_TEST(RestrictedVoronoiCellTest, SaysBeforehandWhetherItWouldBeCut) {
   constexpr int K = TypeParam::value;
   RestrictedVoronoiCell<K> cell;
-  cell.Reset(2);
-  typename RestrictedVoronoiCell<K>::Scratch scratch;
+  GivenHalfSpaces<K> given(2);
+  cell.Reset(2, given);
   int cuts = 0, misses = 0;
   for (const auto& h : RandomHalfSpaces<K>(150, 21)) {
     const auto before = Canonical(cell);
     const bool would = cell.WouldCut(h.normal.data(), h.offset);
-    const bool did = cell.Clip(h.id, h.normal.data(), h.offset, scratch);
+    const bool did = given.Clip(cell, h.id, h.normal.data(), h.offset);
     EXPECT_EQ(would, did);
     EXPECT_EQ(Canonical(cell) != before, did);
     EXPECT_FALSE(cell.WouldCut(h.normal.data(), h.offset + 1e-9));
@@ -300,9 +313,9 @@ TYPED_TEST(RestrictedVoronoiCellTest, OfAGridPointIsACubeWhicheverNeighbourComes
     EXPECT_TRUE(CombinatoricsHold(cell));
     EXPECT_TRUE(cell.bounded());
     std::set<std::vector<bool>> corners;
-    for (const auto& v : cell.vertices()) {
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
       std::vector<bool> corner;
-      for (const double x : v.x) {
+      for (const double x : Place<K>(cell, v)) {
         EXPECT_NEAR(std::abs(x), 0.5, 1e-9);
         corner.push_back(x > 0);
       }
@@ -329,8 +342,8 @@ TYPED_TEST(RestrictedVoronoiCellTest, OfATurnedGridPointIsATurnedCube) {
     EXPECT_TRUE(cell.bounded());
     EXPECT_NEAR(cell.max_norm2(), 0.25 * K, 1e-9);
     std::set<std::vector<bool>> corners;
-    for (const auto& v : cell.vertices()) {
-      const Vec<K> x = turn.transpose() * Eigen::Map<const Vec<K>>(v.x);
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      const Vec<K> x = turn.transpose() * Place<K>(cell, v);
       std::vector<bool> corner;
       for (int a = 0; a < K; ++a) {
         EXPECT_NEAR(std::abs(x[a]), 0.5, 1e-9) << "seed " << seed;
@@ -351,12 +364,12 @@ TYPED_TEST(RestrictedVoronoiCellTest, IsHardlyChangedByTheSameHalfSpaceTwice) {
     twice.push_back({h.id + 1, h.normal, h.offset + Weight(h.id) - Weight(h.id + 1)});
   const auto expected = Cell<K>(once, 2), got = Cell<K>(twice, 2);
   EXPECT_TRUE(CombinatoricsHold(got));
-  EXPECT_EQ(got.vertices().size(), expected.vertices().size());
-  for (const auto& v : expected.vertices()) {
-    const auto x = Eigen::Map<const Vec<K>>(v.x);
-    EXPECT_TRUE(std::any_of(got.vertices().begin(), got.vertices().end(), [&](const auto& w) {
-      return (x - Eigen::Map<const Vec<K>>(w.x)).norm() < 1e-6;
-    }));
+  EXPECT_EQ(got.vertex_count(), expected.vertex_count());
+  for (std::size_t v = 0; v < expected.vertex_count(); ++v) {
+    double nearest = INFINITY;
+    for (std::size_t w = 0; w < got.vertex_count(); ++w)
+      nearest = std::min(nearest, (Place<K>(expected, v) - Place<K>(got, w)).norm());
+    EXPECT_LT(nearest, 1e-6);
   }
 }
 
@@ -373,31 +386,33 @@ TYPED_TEST(RestrictedVoronoiCellTest, IsLeftAsItWasByACutThatIsRefused) {
     HalfSpaces<K> neighbours = Grid<K>(false);
     Shuffle(&neighbours, seed);
     RestrictedVoronoiCell<K> cell;
-    cell.Reset(10);
-    typename RestrictedVoronoiCell<K>::Scratch scratch;
+    GivenHalfSpaces<K> given(10);
+    cell.Reset(10, given);
     for (const auto& h : neighbours) {
       const auto before = Canonical(cell);
       const Vec<K> normal = turn * h.normal;
-      if (!cell.Clip(h.id, normal.data(), h.offset, scratch)) {
+      if (!given.Clip(cell, h.id, normal.data(), h.offset)) {
         ASSERT_EQ(Canonical(cell), before) << "seed " << seed;
       }
-      ASSERT_GT(cell.vertices().size(), static_cast<std::size_t>(K)) << "seed " << seed;
+      ASSERT_GT(cell.vertex_count(), static_cast<std::size_t>(K)) << "seed " << seed;
     }
   }
 }
 
 TYPED_TEST(RestrictedVoronoiCellTest, KeepsTheNearerOfTwoParallelHalfSpaces) {
   constexpr int K = TypeParam::value;
-  auto cell = Cell<K>(Cube<K>());
-  typename RestrictedVoronoiCell<K>::Scratch scratch;
+  RestrictedVoronoiCell<K> cell;
+  GivenHalfSpaces<K> given(10);
+  cell.Reset(10, given);
+  for (const auto& h : Cube<K>()) given.Clip(cell, h.id, h.normal.data(), h.offset);
   const Vec<K> normal = 3 * Vec<K>::Unit(0);
-  EXPECT_FALSE(cell.Clip(100, normal.data(), 3.0, scratch));  // the very same plane
-  EXPECT_FALSE(cell.Clip(101, normal.data(), 3.5, scratch));
-  EXPECT_TRUE(cell.Clip(102, normal.data(), 1.5, scratch));
+  EXPECT_FALSE(given.Clip(cell, 100, normal.data(), 3.0));  // the very same plane
+  EXPECT_FALSE(given.Clip(cell, 101, normal.data(), 3.5));
+  EXPECT_TRUE(given.Clip(cell, 102, normal.data(), 1.5));
   EXPECT_TRUE(CombinatoricsHold(cell));
-  EXPECT_EQ(cell.vertices().size(), 1u << K);
+  EXPECT_EQ(cell.vertex_count(), 1u << K);
   std::set<std::uint32_t> ids;
-  for (const auto& f : cell.facets()) ids.insert(f.id);
+  for (std::size_t f = 0; f < cell.facet_count(); ++f) ids.insert(cell.id(f));
   EXPECT_TRUE(ids.contains(102));
   EXPECT_FALSE(ids.contains(1));  // e_0 . x <= 1 of the cube
   EXPECT_EQ(ids.size(), 2u * K);
@@ -407,18 +422,41 @@ TYPED_TEST(RestrictedVoronoiCellTest, RefusesToBeCutAwayWhole) {
   constexpr int K = TypeParam::value;
   auto cell = Cell<K>(Cube<K>());
   const auto before = Canonical(cell);
-  typename RestrictedVoronoiCell<K>::Scratch scratch;
+  GivenHalfSpaces<K> given(10);
   const Vec<K> normal = Vec<K>::Unit(0);
-  EXPECT_FALSE(cell.Clip(100, normal.data(), -2, scratch));
+  EXPECT_FALSE(given.Clip(cell, 100, normal.data(), -2));
   EXPECT_EQ(Canonical(cell), before);
+}
+
+// Whether many vertices or few, and whether what is copied to had many or few.
+TYPED_TEST(RestrictedVoronoiCellTest, IsCopiedWhole) {
+  constexpr int K = TypeParam::value;
+  std::vector<RestrictedVoronoiCell<K>> cells;
+  cells.push_back(Cell<K>(Cube<K>()));
+  for (const int count : {5, 40, 300}) cells.push_back(Cell<K>(RandomHalfSpaces<K>(count, 61), 2));
+  if (K == 2) {
+    EXPECT_GT(cells.back().vertex_count(), 8u);
+  }
+  for (const auto& from : cells) {
+    const RestrictedVoronoiCell<K> made(from);
+    EXPECT_EQ(Canonical(made), Canonical(from));
+    for (const auto& to : cells) {
+      RestrictedVoronoiCell<K> copy(to);
+      copy = from;
+      EXPECT_EQ(Canonical(copy), Canonical(from));
+      EXPECT_TRUE(CombinatoricsHold(copy));
+      const RestrictedVoronoiCell<K> moved(std::move(copy));
+      EXPECT_EQ(Canonical(moved), Canonical(from));
+    }
+  }
 }
 
 TYPED_TEST(RestrictedVoronoiCellTest, CanBeUsedAgainAfterReset) {
   constexpr int K = TypeParam::value;
   auto cell = Cell<K>(RandomHalfSpaces<K>(30, 51), 2);
-  cell.Reset(10);
-  typename RestrictedVoronoiCell<K>::Scratch scratch;
-  for (const auto& h : Cube<K>()) cell.Clip(h.id, h.normal.data(), h.offset, scratch);
+  GivenHalfSpaces<K> given(10);
+  cell.Reset(10, given);
+  for (const auto& h : Cube<K>()) given.Clip(cell, h.id, h.normal.data(), h.offset);
   EXPECT_EQ(Canonical(cell), Canonical(Cell<K>(Cube<K>())));
 }
 

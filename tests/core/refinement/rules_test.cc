@@ -114,7 +114,7 @@ void ExpectSliversAsMeasured(const Sample& sample) {
   int thin = 0, fat = 0;
   for (const double theta0 : {0.1, 0.2, 0.3}) {
     for (std::uint32_t p = 0; p < complex->size(); ++p) {
-      for (const auto& v : complex->cell(p).vertices()) {
+      for (std::size_t v = 0; v < complex->cell(p).vertex_count(); ++v) {
         Simplex<K> s;
         if (!complex->SimplexOf(p, complex->cell(p), v, &s)) continue;
         const bool expected = HasThinFaceAt(sample, {s.begin(), s.end()}, p, theta0);
@@ -148,8 +148,8 @@ TEST(Slivers, AreSeenFromSomeVertexOfTheSimplex) {
       for (const std::uint32_t q : s) key += Mix64(q);
       bool seen = false;
       for (const std::uint32_t q : s) {
-        const auto* v = FindSimplex<3>(complex->cell(q), q, s, key);
-        ASSERT_NE(v, nullptr);
+        const auto v = FindSimplex<3>(complex->cell(q), q, s, key);
+        ASSERT_TRUE(v.has_value());
         seen = seen ||
                ContainsSliver<3>(*complex, sample.Point(q), complex->cell(q), *v, 0.2, nullptr);
       }
@@ -169,8 +169,8 @@ TEST(FindSimplex, FindsWhatTheStarHoldsAndNothingElse) {
       std::uint64_t key = 0;
       for (const std::uint32_t q : s) key += Mix64(q);
       for (const std::uint32_t q : s) {
-        const auto* v = FindSimplex<2>(complex->cell(q), q, s, key);
-        EXPECT_EQ(v != nullptr, StarOf(*complex, q).contains(s));
+        const auto v = FindSimplex<2>(complex->cell(q), q, s, key);
+        EXPECT_EQ(v.has_value(), StarOf(*complex, q).contains(s));
         Simplex<2> found;
         if (!v) continue;
         ASSERT_TRUE(complex->SimplexOf(q, complex->cell(q), *v, &found));
@@ -181,7 +181,7 @@ TEST(FindSimplex, FindsWhatTheStarHoldsAndNothingElse) {
       if (std::find(s.begin(), s.end(), other[2]) == s.end()) {
         const std::uint64_t other_key = key - Mix64(s[2]) + Mix64(other[2]);
         std::sort(other.begin(), other.end());
-        EXPECT_EQ(FindSimplex<2>(complex->cell(p), p, other, other_key) != nullptr,
+        EXPECT_EQ(FindSimplex<2>(complex->cell(p), p, other, other_key).has_value(),
                   StarOf(*complex, p).contains(other));
       }
     }
@@ -195,8 +195,8 @@ void ExpectConsistencyByDefinition(const Sample& sample, double sliver_bound) {
   for (std::uint32_t p = 0; p < complex->size(); ++p) {
     std::uint64_t expected = 0;
     double worst_sliver = 0, worst_inconsistent = 0;
-    for (const auto& v : complex->cell(p).vertices()) {
-      const double radius = std::sqrt(v.norm2);
+    for (std::size_t v = 0; v < complex->cell(p).vertex_count(); ++v) {
+      const double radius = std::sqrt(complex->cell(p).norm2(v));
       Simplex<K> s;
       const bool real = complex->SimplexOf(p, complex->cell(p), v, &s);
       // Slivers are judged in the star of their lowest vertex.

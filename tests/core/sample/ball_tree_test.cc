@@ -51,9 +51,6 @@ class BallTreeTest : public ::testing::TestWithParam<int> {
   }
 
   void CheckQueriesFrom(const std::vector<double>& q) {
-    Ids order = tree_.SpatialOrder();
-    std::sort(order.begin(), order.end());
-    EXPECT_EQ(order, All([](std::uint32_t) { return true; }));
     for (const double radius : {0.0, 0.1, 0.4, 2.0})
       EXPECT_EQ(tree_.AnyWithin(q.data(), radius), !All([&](std::uint32_t id) {
                                                       return SquaredDistanceTo(id, q) <=
@@ -113,6 +110,51 @@ TEST_P(BallTreeTest, AnswersAsAListWouldWhileItGrows) {
     Insert(Draw(), DrawInfluence());
     if (n < 40 || n % 50 == 0) CheckQueries(n < 40 ? 2 : 15);
   }
+}
+
+TEST_P(BallTreeTest, AnswersTheSameWhenGivenAllPointsAtOnce) {
+  for (const int n : {1, 2, 8, 9, 100, 777, 9000}) {
+    coordinates_.clear();
+    influence_.clear();
+    for (int i = 0; i < n; ++i) {
+      const std::vector<double> p = Draw();
+      coordinates_.insert(coordinates_.end(), p.begin(), p.end());
+      influence_.push_back(DrawInfluence());
+    }
+    tree_.Assign(influence_);
+    CheckQueries(n < 1000 ? 15 : 3);
+    for (int i = 0; i < 20; ++i) Insert(Draw(), DrawInfluence());  // and it still grows
+    CheckQueries(5);
+  }
+  coordinates_.clear();
+  influence_.clear();
+  tree_.Assign({});
+  EXPECT_EQ(tree_.size(), 0u);
+  EXPECT_EQ(tree_.NearestSquaredDistance(Draw().data()), INFINITY);
+}
+
+// Points of one place are few, and on the whole much nearer to each other than any two.
+TEST_P(BallTreeTest, PlacesKeepNearPointsTogether) {
+  constexpr std::uint32_t kCount = 2000;
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    const std::vector<double> p = Draw();
+    coordinates_.insert(coordinates_.end(), p.begin(), p.end());
+    influence_.push_back(0);
+  }
+  tree_.Assign(influence_);
+  Ids order = All([](std::uint32_t) { return true; });
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return std::pair(tree_.PlaceOf(a), a) < std::pair(tree_.PlaceOf(b), b);
+  });
+  const auto tour = [&](const Ids& ids) {
+    double length = 0;
+    for (std::size_t i = 1; i < ids.size(); ++i) {
+      const double* p = coordinates_.data() + ids[i - 1] * static_cast<std::size_t>(d_);
+      length += std::sqrt(SquaredDistanceTo(ids[i], {p, p + d_}));
+    }
+    return length;
+  };
+  EXPECT_LT(tour(order), 0.9 * tour(All([](std::uint32_t) { return true; })));
 }
 
 TEST_P(BallTreeTest, TakesPointsInSortedOrder) {

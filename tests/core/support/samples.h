@@ -116,7 +116,7 @@ template <int K>
 std::set<typename StarComplex<K>::Simplex> StarOf(const StarComplex<K>& complex, std::uint32_t p) {
   std::set<typename StarComplex<K>::Simplex> star;
   typename StarComplex<K>::Simplex simplex;
-  for (const auto& v : complex.cell(p).vertices())
+  for (std::size_t v = 0; v < complex.cell(p).vertex_count(); ++v)
     if (complex.SimplexOf(p, complex.cell(p), v, &simplex)) star.insert(simplex);
   return star;
 }
