@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/complex/blocks.h"
 #include "core/geometry/restricted_voronoi_cell.h"
 #include "core/sample/ball_tree.h"
 #include "core/specification.h"
@@ -140,7 +141,7 @@ class StarComplex {
   double judged_radius2_;
   double weight_scale_;
   std::vector<double> points_, tangents_;
-  std::vector<Cell> cells_;
+  Blocks<Cell> cells_;
   std::vector<std::uint32_t> near_;  // of the appended points
   BallTree tree_;
   std::uint64_t simplex_count_ = 0;

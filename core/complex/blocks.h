@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+namespace stellate::core {
+
+// A vector that grows without moving what it holds: there is never an old copy beside the new one,
+// and no room for as many items again.
+template <typename T>
+class Blocks {
+ public:
+  Blocks() = default;
+  Blocks(const Blocks& other) {
+    resize(other.size_);
+    for (std::size_t i = 0; i < size_; ++i) (*this)[i] = other[i];
+  }
+  Blocks& operator=(const Blocks&) = delete;
+
+  std::size_t size() const { return size_; }
+
+  // REQUIRES: size >= size().
+  void resize(std::size_t size) {
+    while (blocks_.size() * kBlock < size) blocks_.push_back(std::make_unique<T[]>(kBlock));
+    size_ = size;
+  }
+
+  T& operator[](std::size_t i) { return blocks_[i / kBlock][i % kBlock]; }
+  const T& operator[](std::size_t i) const { return blocks_[i / kBlock][i % kBlock]; }
+
+ private:
+  static constexpr std::size_t kBlock = 1024;
+
+  std::vector<std::unique_ptr<T[]>> blocks_;
+  std::size_t size_ = 0;
+};
+
+}  // namespace stellate::core
