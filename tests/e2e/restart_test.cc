@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "live.h"
+#include "stellate/monitor.h"
 #include "support/spoiled_oracle.h"
 
 namespace stellate::testing {
@@ -60,6 +61,11 @@ class MortalServer {
     pid_ = 0;
   }
   void Send(int with_signal) const { kill(pid_, with_signal); }
+  // Returns once all its threads stand still.
+  void Freeze() const {
+    Send(SIGSTOP);
+    waitpid(pid_, nullptr, WUNTRACED);
+  }
   std::string address() const { return "unix:" + directory_ + "/socket"; }
 
  private:
@@ -182,6 +188,21 @@ TEST_F(Restart, TheWaitCanBeCancelled) {
   const Expected<Mesh> mesh = MeshManifold(oracle_, options_);
   ASSERT_FALSE(mesh.has_value());
   EXPECT_NE(mesh.error().message.find("cancelled"), std::string::npos) << mesh.error().message;
+}
+
+TEST_F(Restart, CallsToAFrozenServerEndAtTheirDeadlines) {
+  Monitor monitor = Monitor::Connect(server_.address()).value();
+  ASSERT_TRUE(monitor.Health(60).has_value());
+  server_.Freeze();
+  const auto health = monitor.Health(0.3);
+  const auto meshes = monitor.Meshes(0.3);
+  server_.Send(SIGCONT);
+  ASSERT_FALSE(health.has_value());
+  EXPECT_EQ(health.error().code, ErrorCode::kServerFailed);
+  ASSERT_FALSE(meshes.has_value());
+  EXPECT_EQ(meshes.error().code, ErrorCode::kServerFailed);
+  while (!monitor.Meshes(60).has_value()) {  // the test's limit ends it
+  }
 }
 
 }  // namespace
