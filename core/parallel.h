@@ -113,6 +113,11 @@ bool WithThreads(int threads, Interruption& interruption, const Work& work) {
 }
 #endif
 
+// A stretch of work on one thread looks up every so many steps of it.
+inline void LookUp(std::size_t step) {
+  if (step % 4096 == 0) ThrowIfInterrupted();
+}
+
 // The same in chunks whose borders depend on `count` alone, so that what bodies gather by chunk is
 // the same whatever the number of threads: body(chunk, begin, end). Large enough to share working
 // memory, small enough for some dozens of threads.

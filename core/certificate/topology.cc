@@ -46,6 +46,7 @@ std::string CheckSimplexList(const SimplexList& list) {
     return Message("the mesh has ", list.ids->size() / width, " simplices, too many to check");
   }
   for (std::uint32_t s = 0; s < list.size(); ++s) {
+    LookUp(s);
     const std::uint32_t* ids = list[s];
     for (std::size_t i = 0; i < width; ++i) {
       if (ids[i] >= list.vertices || (i > 0 && ids[i] <= ids[i - 1])) {
@@ -64,6 +65,7 @@ Adjacency::Adjacency(const SimplexList& list) : list_(list) {
   incident_.resize(list_.ids->size());
   std::vector<std::uint64_t> next(begin_.begin(), begin_.end() - 1);
   for (std::uint32_t s = 0; s < list_.size(); ++s) {
+    LookUp(s);
     for (int i = 0; i <= list_.k; ++i) incident_[next[list_[s][i]]++] = s;
   }
   MatchFacets();
@@ -143,6 +145,7 @@ Connectivity ComputeConnectivity(const Adjacency& adjacency) {
   std::vector<std::uint32_t> parent(list.vertices);
   std::iota(parent.begin(), parent.end(), 0u);
   for (std::uint32_t s = 0; s < list.size(); ++s) {
+    LookUp(s);
     for (int i = 1; i <= k; ++i) {
       const std::uint32_t a = Root(parent, list[s][0]);
       const std::uint32_t b = Root(parent, list[s][i]);
@@ -161,11 +164,13 @@ Connectivity ComputeConnectivity(const Adjacency& adjacency) {
   result.orientable = true;
   std::vector<std::int8_t> sign(list.size(), 0);
   std::vector<std::uint32_t> stack;
+  std::size_t steps = 0;
   for (std::uint32_t start = 0; start < list.size() && result.orientable; ++start) {
     if (sign[start] != 0) continue;
     sign[start] = 1;
     stack.push_back(start);
     while (!stack.empty()) {
+      LookUp(steps++);
       const std::uint32_t s = stack.back();
       stack.pop_back();
       for (int i = 0; i <= k; ++i) {

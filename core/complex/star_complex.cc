@@ -421,8 +421,12 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
     for (const std::uint32_t p : change.stars) note_neighbours(p);
     for (std::uint32_t p = first; p < size(); ++p) note_neighbours(p);
   }
-  for (const std::uint32_t p : change.stars) tree_.SetInfluence(p, Influence(cells_[p]));
-  for (std::uint32_t p = first; p < size(); ++p) tree_.SetInfluence(p, Influence(cells_[p]));
+  const auto set_influence = [&](std::uint32_t p, std::size_t step) {
+    LookUp(step);
+    tree_.SetInfluence(p, Influence(cells_[p]));
+  };
+  for (std::size_t i = 0; i < change.stars.size(); ++i) set_influence(change.stars[i], i);
+  for (std::uint32_t p = first; p < size(); ++p) set_influence(p, p);
   tree_.Refit();
   for (const Swap& swap : swaps) {
     for (const Simplex& s : swap.removed)
@@ -453,6 +457,7 @@ std::vector<std::uint32_t> StarComplex<K>::Simplices() const {
   all.reserve(simplex_count_ * (K + 1));
   std::vector<Simplex> owned;
   for (std::uint32_t p = 0; p < cells_.size(); ++p) {
+    LookUp(p);
     Owned(p, &owned);
     for (const Simplex& s : owned) all.insert(all.end(), s.begin(), s.end());
   }

@@ -108,7 +108,7 @@ std::vector<Target<K>> SelectIndependent(const StarComplex<K>& complex,
   std::vector<std::uint8_t> is_chosen(targets.size(), 0);
   std::vector<std::uint32_t> chosen;
   for (std::size_t r = 0; r < order.size() && chosen.size() < most; ++r) {
-    if (r % 1024 == 0) ThrowIfInterrupted();
+    LookUp(r);
     if (conflicts.AnyChosen(order[r], is_chosen)) continue;
     is_chosen[order[r]] = 1;
     chosen.push_back(order[r]);

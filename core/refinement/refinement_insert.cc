@@ -76,7 +76,7 @@ void Refinement<K>::InsertTargets() {
   });
   bool all_calm = true;
   for (std::size_t i = 0; i < targets_.size(); ++i) {
-    if (i % 1024 == 0) ThrowIfInterrupted();
+    LookUp(i);
     if (targets_[i].violation.rule >= Rule::kSliver)
       InsertGoodPoint(i, best[i]);
     else

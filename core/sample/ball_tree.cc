@@ -196,7 +196,9 @@ void BallTree::SetInfluence(std::uint32_t id, double influence) {
 void BallTree::Refit() {
   std::sort(stale_.begin(), stale_.end());
   stale_.erase(std::unique(stale_.begin(), stale_.end()), stale_.end());
+  std::size_t steps = 0;
   for (const std::uint32_t leaf : stale_) {
+    LookUp(steps++);
     if (nodes_[leaf].children != kNone) continue;  // split since: measured then
     double outreach = 0;
     for (std::uint32_t i = 0; i < nodes_[leaf].count; ++i) {
