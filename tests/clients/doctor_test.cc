@@ -56,6 +56,12 @@ Broken Flats(const std::string& code,
   return {code, [spoil](SpoiledOracle& oracle) { oracle.on_flat = spoil; }};
 }
 
+Broken Sizes(const std::string& code, std::function<void(Eigen::VectorXd& sizes)> spoil) {
+  return {code, [spoil](SpoiledOracle& oracle) {
+            oracle.on_sizes = [spoil](const auto&, Eigen::VectorXd& sizes) { spoil(sizes); };
+          }};
+}
+
 // The surface of [-1, 1]^3.
 void Cube(const Eigen::MatrixXd& x, Answer& a) {
   a.points = x.cwiseMax(-1).cwiseMin(1);
@@ -142,6 +148,9 @@ INSTANTIATE_TEST_SUITE_P(
                      turned.col(1).normalize();
                    }
                  }),
+        Sizes("SIZE_WRONG", [](Eigen::VectorXd& sizes) { sizes[sizes.size() / 2] = 0; }),
+        Sizes("SIZE_CHANGES",
+              [calls = 0](Eigen::VectorXd& sizes) mutable { sizes *= 1 + 1e-3 * ++calls; }),
         Flats("FLAT_MISSED", [](const auto&, const auto&, const auto&,
                                 Answer& a) { a.found.assign(a.found.size(), 0); }),
         Flats("FLAT_OFF",

@@ -68,6 +68,7 @@ void Examination::ObeyLaws() {
   probe_.FindTangents();
   DimensionIsRight(0.5);
   TangentsAreRight();
+  SizesAreLengths();
   if (!Has("WRONG_DIMENSION")) {
     EstimateReach();
     NearPointsComeBack();

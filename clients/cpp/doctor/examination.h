@@ -35,6 +35,7 @@ class Examination {
   // Of dimension, tangents and smoothness.
   void DimensionIsRight(double share);
   void TangentsAreRight();
+  void SizesAreLengths();
   void EstimateReach();
   void IsSmooth();
   // Of flats.

@@ -12,6 +12,7 @@ namespace {
 constexpr double kSafeRatio = 0.4;  // of epsilon and the reach
 constexpr double kTolerated = 3;    // degrees
 constexpr double kCorner = 10;      // degrees
+constexpr double kLeastLength = 1e-45;  // that servers take
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double Degrees(double radians) { return radians * 180 / std::numbers::pi; }
@@ -138,6 +139,22 @@ void Examination::TangentsAreRight() {
     if (degrees > kTolerated) {
       Add("TANGENT_WRONG", {{"query", query}, {"degrees", degrees}});
       probe_.trusts_given = false;
+    }
+  }
+}
+
+void Examination::SizesAreLengths() {
+  if (!probe_.gives_sizes()) return;
+  const Vector sizes = probe_.GivenSizes(probe_.some);
+  for (Eigen::Index j = 0; j < sizes.size(); ++j) {
+    if (sizes[j] >= kLeastLength && sizes[j] <= 1 / kLeastLength) continue;
+    return Add("SIZE_WRONG", {{"query", Vector(probe_.some.col(j))}, {"size", sizes[j]}});
+  }
+  for (Eigen::Index j = 0; j < sizes.size(); ++j) {
+    const Vector query = probe_.some.col(j);
+    const double alone = probe_.GivenSizes(query)[0];
+    if (!(std::abs(alone - sizes[j]) <= 1e-9 * sizes[j])) {
+      return Add("SIZE_CHANGES", {{"query", query}, {"size", sizes[j]}, {"other", alone}});
     }
   }
 }

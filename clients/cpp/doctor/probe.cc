@@ -119,6 +119,16 @@ std::vector<Basis> Probe::GivenTangents(const Eigen::MatrixXd& at) {
   return bases;
 }
 
+Eigen::VectorXd Probe::GivenSizes(const Eigen::MatrixXd& at) {
+  queries += static_cast<std::uint64_t>(at.cols());
+  Eigen::VectorXd sizes = Guarded("LocalSize", at.cols(), [&] { return oracle_.LocalSize(at); });
+  if (sizes.size() != at.cols()) {
+    WrongShape("LocalSize returned " + std::to_string(sizes.size()) + " sizes for " +
+               std::to_string(at.cols()) + " points");
+  }
+  return sizes;
+}
+
 double Probe::Uniform(double low, double high) {
   // The engine's output is fixed by the standard, the distributions' is not.
   return low + (high - low) * std::ldexp(static_cast<double>(random_() >> 11), -53);

@@ -34,11 +34,13 @@ class Probe {
   int d() const { return d_; }
   bool gives_tangents() const { return gives_tangents_; }
   bool intersects_flats() const { return oracle_.has_intersect_flat(); }
+  bool gives_sizes() const { return oracle_.has_local_size(); }
 
   Answered Closest(const Eigen::MatrixXd& x);
   Answered Intersect(const Eigen::MatrixXd& centers, const std::vector<Basis>& bases,
                      const Eigen::VectorXd& radii);
   std::vector<Basis> GivenTangents(const Eigen::MatrixXd& points);
+  Eigen::VectorXd GivenSizes(const Eigen::MatrixXd& points);
 
   // Fills starts and points; `add` takes what is wrong with them.
   void FindPoints(const std::function<void(Finding)>& add);

@@ -66,6 +66,7 @@ class _Examination:
         if "NOT_DETERMINISTIC" in self._findings or "NOT_IDEMPOTENT" in self._findings:
             return self._measure_speed(probe)  # the rest needs points of M
         probe.find_tangents(self.add)
+        self._sizes_are_lengths(probe)
         for law in (self._dimension_is_right, self._tangents_are_right):
             law(probe)
         if "WRONG_DIMENSION" not in self._findings:
@@ -186,6 +187,22 @@ class _Examination:
                     rank=int(probe.ranks[row]),
                     k=probe.dimension,
                 )
+            )
+
+    def _sizes_are_lengths(self, probe: Probe) -> None:
+        if not probe.has_local_size:
+            return
+        p = probe.some
+        sizes = probe.sizes(p)
+        row = _first(~((sizes >= 1e-45) & (sizes <= 1e45)))
+        if row is not None:
+            self.add(Finding.of("SIZE_WRONG", query=p[row], size=sizes[row]))
+            return
+        alone = np.concatenate([probe.sizes(one[None]) for one in p])
+        row = _first(np.abs(sizes - alone) > 1e-9 * sizes)
+        if row is not None:
+            self.add(
+                Finding.of("SIZE_CHANGES", query=p[row], size=sizes[row], other=alone[row])
             )
 
     def _tangents_are_right(self, probe: Probe) -> None:

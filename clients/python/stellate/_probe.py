@@ -43,6 +43,7 @@ class Probe:
         self.dimension, self.ambient_dimension = checked.dimension, checked.ambient_dimension
         self.has_tangent_basis = checked.has_tangent_basis
         self.has_intersect_flat = checked.has_intersect_flat
+        self.has_local_size = checked.has_local_size
         self.random = np.random.default_rng(seed)
         self.queries = 0
         self.starts = self.points = self.some = np.empty((0, self.ambient_dimension))
@@ -60,6 +61,10 @@ class Probe:
     def _given_at(self, p: np.ndarray) -> np.ndarray:
         everywhere = np.ones(len(p), dtype=bool)
         return self._ask("tangent_basis", self._oracle.tangents, p, everywhere)
+
+    def sizes(self, p: np.ndarray) -> np.ndarray:
+        everywhere = np.ones(len(p), dtype=bool)
+        return self._ask("local_size", self._oracle.sizes, p, everywhere)
 
     def _ask(self, method: str, ask: Callable[..., Any], *arrays: np.ndarray) -> Any:
         self.queries += len(arrays[0])

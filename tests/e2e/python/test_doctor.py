@@ -132,6 +132,8 @@ BROKEN = {
     "WRONG_DIMENSION": Torus(dimension=1, tangent_basis=None),
     "TANGENT_NOT_ORTHONORMAL": Torus(tangent_basis=lambda p: 1.01 * GOOD.tangent_basis(p)),
     "TANGENT_WRONG": Torus(tangent_basis=turned),
+    "SIZE_WRONG": Torus(local_size=lambda p: np.where(p[:, 0] > 0, 0.4, -0.4)),
+    "SIZE_CHANGES": Torus(local_size=lambda p: 0.4 + 0.001 / np.full(len(p), len(p))),
     "ROUGH": Torus(
         closest_point=cube,
         tangent_basis=None,
