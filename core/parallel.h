@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 #if defined(__SANITIZE_THREAD__)
@@ -94,13 +95,33 @@ void ParallelSort(std::vector<Item>& items, const Less& less) {
   ThrowIfInterrupted();
 }
 
+// An arena of so many threads, 0: all cores, that nobody else uses meanwhile. Arenas are kept and
+// used again: oneTBB leaves the clean-up of one that had work to its own threads, and while these
+// are busy elsewhere every arena given up stays in memory for good.
+class ArenaLease {
+ public:
+  explicit ArenaLease(int threads);
+  ~ArenaLease();
+  ArenaLease(const ArenaLease&) = delete;
+  ArenaLease& operator=(const ArenaLease&) = delete;
+
+  tbb::task_arena& operator*() const { return *arena_; }
+
+ private:
+  const int threads_;
+  std::unique_ptr<tbb::task_arena> arena_;
+};
+
+// Those of this process: as many as were ever in use at once.
+std::size_t ArenaCount();
+
 // Runs work() so that the ParallelFor in it use at most so many threads; 0: all cores. False if it
 // was interrupted, at any point.
 template <typename Work>
 bool WithThreads(int threads, Interruption& interruption, const Work& work) {
   if (interruption.raised()) return false;
-  tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
-  arena.execute([&] {
+  const ArenaLease arena(threads);
+  (*arena).execute([&] {
     tbb::task_group group(interruption.context());
     group.run_and_wait([&] {
       try {

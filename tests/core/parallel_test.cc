@@ -1,0 +1,77 @@
+#include "core/parallel.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <barrier>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+namespace stellate::core {
+namespace {
+
+int Sum(int threads) {
+  Interruption interruption;
+  std::atomic<int> sum = 0;
+  EXPECT_TRUE(
+      WithThreads(threads, interruption, [&] { ParallelFor(100, [&](int i) { sum += i; }); }));
+  return sum;
+}
+
+TEST(Parallel, EveryIndexIsCalledOnce) {
+  for (const int threads : {0, 1, 2}) EXPECT_EQ(Sum(threads), 4950);
+}
+
+#if !defined(__SANITIZE_THREAD__)
+TEST(Parallel, InterruptedWorkIsNotBegun) {
+  Interruption interruption;
+  interruption.Raise();
+  bool begun = false;
+  EXPECT_FALSE(WithThreads(0, interruption, [&] { begun = true; }));
+  EXPECT_FALSE(begun);
+}
+
+TEST(Parallel, WorkEndsWhereItIsInterrupted) {
+  Interruption interruption;
+  bool after = false;
+  EXPECT_FALSE(WithThreads(0, interruption, [&] {
+    ParallelFor(100, [&](int) { interruption.Raise(); });
+    after = true;
+  }));
+  EXPECT_FALSE(after);
+}
+
+// One given up would stay in memory for as long as others have work.
+TEST(Parallel, ArenasAreUsedAgain) {
+  constexpr int kAtOnce = 3;
+  const std::size_t before = ArenaCount();
+  std::barrier together(kAtOnce);
+  std::vector<std::thread> threads;
+  for (int t = 0; t < kAtOnce; ++t) {
+    threads.emplace_back([&] {
+      for (int i = 0; i < 50; ++i) {
+        EXPECT_EQ(Sum(0), 4950);
+        EXPECT_EQ(Sum(1), 4950);
+        together.arrive_and_wait();
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_LE(ArenaCount(), before + 2 * kAtOnce);
+}
+
+TEST(Parallel, AnArenaComesBackFromWorkThatThrows) {
+  Sum(2);
+  const std::size_t before = ArenaCount();
+  Interruption interruption;
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_THROW(WithThreads(2, interruption, [] { throw std::runtime_error("full"); }),
+                 std::runtime_error);
+  }
+  EXPECT_EQ(ArenaCount(), before);
+}
+#endif
+
+}  // namespace
+}  // namespace stellate::core
