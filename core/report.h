@@ -41,7 +41,8 @@ struct Progress {
 
 // What changed in one round. Vertex ids count up from 0 and never change. While the mesh grows, a
 // simplex is in it when the star of its lowest vertex holds it; once all stars are consistent that
-// is the union of the stars.
+// is the union of the stars. For k >= 4 the last delta may put other simplices in the place of the
+// few that stars still disagree about (core/complex/cavities.h).
 struct MeshDelta {
   std::uint64_t revision = 0;      // 1, 2, ...: one a round
   std::uint64_t first_vertex = 0;  // id of the first new vertex

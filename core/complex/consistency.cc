@@ -26,6 +26,30 @@ Eigen::VectorXd CentreIn(const StarComplex<K>& complex, std::uint32_t q,
   return centre;
 }
 
+// The sign of the simplex on p and K facets' points, seen in T_pM.
+template <int K>
+double Orientation(const StarComplex<K>& complex, std::uint32_t p, const std::uint16_t* facets) {
+  double m[K][K];
+  for (int r = 0; r < K; ++r) complex.HalfSpace(p, facets[r], m[r]);
+  double sign = 1;
+  for (int c = 0; c < K; ++c) {
+    int pivot = c;
+    for (int r = c + 1; r < K; ++r)
+      if (std::abs(m[r][c]) > std::abs(m[pivot][c])) pivot = r;
+    if (m[pivot][c] == 0) return 0;
+    if (pivot != c) {
+      std::swap(m[pivot], m[c]);
+      sign = -sign;
+    }
+    if (m[c][c] < 0) sign = -sign;
+    for (int r = c + 1; r < K; ++r) {
+      const double factor = m[r][c] / m[c][c];
+      for (int j = c + 1; j < K; ++j) m[r][j] -= factor * m[c][j];
+    }
+  }
+  return sign;
+}
+
 }  // namespace
 
 template <int K>
@@ -58,6 +82,24 @@ bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p, std::size_t v)
   for (const std::uint32_t q : simplex)
     if (q != p && !FindSimplex<K>(complex.cell(q), q, simplex, key)) return false;
   return true;
+}
+
+template <int K>
+bool IsFolded(const StarComplex<K>& complex, std::uint32_t p, std::size_t v) {
+  const RestrictedVoronoiCell<K>& cell = complex.cell(p);
+  std::uint16_t here[K];
+  for (int s = 0; s < K; ++s) here[s] = cell.facet(v, s);
+  const double side = Orientation<K>(complex, p, here);
+  if (side == 0) return true;
+  for (int s = 0; s < K; ++s) {
+    const std::size_t w = cell.adjacent(v, s);
+    std::uint16_t there[K];
+    std::copy(here, here + K, there);
+    for (int r = 0; r < K; ++r)
+      if (std::find(here, here + K, cell.facet(w, r)) == here + K) there[s] = cell.facet(w, r);
+    if (Orientation<K>(complex, p, there) * side >= 0) return true;
+  }
+  return false;
 }
 
 template <int K>
@@ -110,6 +152,7 @@ std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(
       const RestrictedVoronoiCell<K>&, std::uint32_t, const StarComplex<K>::Simplex&, \
       std::uint64_t);                                                                 \
   template bool IsConsistent(const StarComplex<K>&, std::uint32_t, std::size_t);      \
+  template bool IsFolded(const StarComplex<K>&, std::uint32_t, std::size_t);          \
   template std::uint64_t CountInconsistent(const StarComplex<K>&, std::uint32_t);     \
   template std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration( \
       const StarComplex<K>&, std::uint32_t);

@@ -27,6 +27,11 @@ std::optional<std::size_t> FindSimplex(const RestrictedVoronoiCell<K>& cell, std
 template <int K>
 bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p, std::size_t v);
 
+// Whether the simplex dual to vertex v of p's cell and a neighbour of it in star(p) overlap near
+// the facet they share, seen in T_pM. Only stars that are judged at common centres can be folded.
+template <int K>
+bool IsFolded(const StarComplex<K>& complex, std::uint32_t p, std::size_t v);
+
 // Simplices of star(p) that are missing from the star of one of their vertices.
 template <int K>
 std::uint64_t CountInconsistent(const StarComplex<K>& complex, std::uint32_t p);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/geometry/half_spaces.h"
 #include "core/sample/vector_ops.h"
 
 namespace stellate::core {
@@ -66,12 +67,134 @@ class Vectors<0, count> {
   int d_;
 };
 
+// An orthonormal basis of the mean of the tangent spaces, sum_i b_i P_i, the steps of a power
+// iteration from that of the heaviest vertex: K rows of d. False if they have no such mean.
+constexpr int kMeanSteps = 2;
+constexpr double kLeastWeight = -0.25;  // of thin simplices they have no bound
+template <int K>
+bool MeanTangent(int d, const double* const* tangents, const double* barycentric, double* mean,
+                 double* next) {
+  const int heaviest =
+      static_cast<int>(std::max_element(barycentric, barycentric + K + 1) - barycentric);
+  double weight[K + 1];
+  for (int i = 0; i <= K; ++i) weight[i] = std::max(barycentric[i], kLeastWeight);
+  std::copy_n(tangents[heaviest], K * d, mean);
+  for (int step = 0; step < kMeanSteps; ++step) {
+    for (int a = 0; a < K; ++a) {
+      double* const row = next + a * d;
+      std::fill(row, row + d, 0.0);
+      for (int i = 0; i <= K; ++i)
+        for (int b = 0; b < K; ++b) {
+          const double* const t = tangents[i] + b * d;
+          const double s = weight[i] * Dot(t, mean + a * d, d);
+          for (int j = 0; j < d; ++j) row[j] += s * t[j];
+        }
+      for (int b = 0; b < a; ++b) {
+        const double s = Dot(row, next + b * d, d);
+        for (int j = 0; j < d; ++j) row[j] -= s * next[b * d + j];
+      }
+      const double length = std::sqrt(Dot(row, row, d));
+      if (!(length > kFlat)) return false;
+      for (int j = 0; j < d; ++j) row[j] /= length;
+    }
+    std::copy_n(next, K * d, mean);
+  }
+  return true;
+}
+
+// From v_i to c the tangent space turns: with A = Tm T_i^t between the mean tangent space's basis
+// and v_i's, and C = A A^t (squared cosines), the lift is T_i^t A^t f(C) w, w the tangent
+// coordinates of x - v_i, f(c) = 1 / (c + sqrt c): exact where curvature is constant, as on spheres
+// and products of circles. f is taken as (11 + c) / (4 + 20 c), right to second order at c = 1 and
+// to 1 % for turns up to 45 degrees. False beyond that: what lies so far off is anybody's guess.
+constexpr double kMostTurned = 0.75;
+template <int K>
+bool AddTurnedLift(int d, const double* tangent, const double* mean, double b, const double* away,
+                   double* lift) {
+  double a_rows[K][K], c[K][K], w[K], z[K];
+  for (int r = 0; r < K; ++r) {
+    w[r] = Dot(mean + r * d, away, d);
+    for (int s = 0; s < K; ++s) a_rows[r][s] = Dot(mean + r * d, tangent + s * d, d);
+  }
+  double system[K][K + 1];
+  for (int r = 0; r < K; ++r) {
+    for (int s = 0; s < K; ++s) {
+      c[r][s] = Dot(a_rows[r], a_rows[s], K);
+      system[r][s] = 20 * c[r][s] + (r == s ? 4 : 0);
+    }
+    system[r][K] = w[r];
+  }
+  double turn = K;  // sum of squared sines
+  for (int r = 0; r < K; ++r) turn -= c[r][r];
+  if (turn > kMostTurned || !SolveSquare<K>(system, z)) return false;
+  double f[K];
+  for (int r = 0; r < K; ++r) f[r] = 11 * z[r] + Dot(c[r], z, K);
+  for (int s = 0; s < K; ++s) {
+    double along = 0;
+    for (int r = 0; r < K; ++r) along += a_rows[r][s] * f[r];
+    for (int j = 0; j < d; ++j) lift[j] += b * along * tangent[s * d + j];
+  }
+  return true;
+}
+
+// Takes off what lies along the simplex, so that distances to its vertices stay equal.
+template <int K>
+void DropAlong(int d, const double* const* edge, const double (&factor)[K][K], double* x) {
+  double along[K];
+  for (int i = 0; i < K; ++i) along[i] = Dot(edge[i], x, d);
+  Substitute<K>(factor, along);
+  for (int i = 0; i < K; ++i)
+    for (int j = 0; j < d; ++j) x[j] -= along[i] * edge[i][j];
+}
+
+constexpr int kTurnsToHeight = 5;
+
+// The centre again, for simplices that are large beside the reach. `away` has room for d numbers,
+// `rows` for 2 K d.
+template <int K>
+bool TurnedLift(int d, const double* const* tangents, const double* const* edge,
+                const double (&factor)[K][K], const double* barycentric, const double* centre,
+                double* away, double* rows, double* lift) {
+  double* const mean = rows;
+  if (!MeanTangent<K>(d, tangents, barycentric, mean, rows + K * d)) return false;
+  std::fill(lift, lift + d, 0.0);
+  for (int i = 0; i <= K; ++i) {
+    for (int j = 0; j < d; ++j) away[j] = i == 0 ? centre[j] : centre[j] - edge[i - 1][j];
+    if (!AddTurnedLift<K>(d, tangents[i], mean, barycentric[i], away, lift)) return false;
+  }
+  // Of the lift only what is normal to the mean tangent space is meant.
+  const auto drop_tangential = [&](double* x) {
+    for (int a = 0; a < K; ++a) {
+      const double s = Dot(mean + a * d, x, d);
+      for (int j = 0; j < d; ++j) x[j] -= s * mean[a * d + j];
+    }
+  };
+  drop_tangential(lift);
+  // Towards the point at that height that is equidistant from the vertices, by turns: a simplex
+  // that stands off the tangent spaces has it far away, where none of this holds, and stops short.
+  double* const wanted = rows + K * d;
+  double* const gap = wanted + d;
+  std::copy_n(lift, d, wanted);
+  DropAlong<K>(d, edge, factor, lift);
+  for (int turn = 1; turn < kTurnsToHeight; ++turn) {
+    for (int j = 0; j < d; ++j) gap[j] = wanted[j] - lift[j];
+    drop_tangential(gap);
+    DropAlong<K>(d, edge, factor, gap);
+    for (int j = 0; j < d; ++j) lift[j] += gap[j];
+  }
+  return true;
+}
+
+// The smallest K whose simplices, at the sizes that can be afforded, are so large beside the reach
+// that the first lift leaves too many inconsistent.
+constexpr int kTurns = 4;
+
 // D: d, or 0 for any. Known early, the short loops unroll.
 template <int K, int D>
 bool CentreOf(int any_d, const double* const* points, const double* const* tangents,
               const double* weights, double* centre, double* radius2) {
   const int d = D > 0 ? D : any_d;
-  Vectors<D, K + 2> memory(d);
+  Vectors<D, K + 2 + (K >= kTurns ? 2 * K : 0)> memory(d);
   double* edge[K];  // v_i - v_0
   for (int i = 0; i < K; ++i) {
     edge[i] = memory[i];
@@ -95,22 +218,26 @@ bool CentreOf(int any_d, const double* const* points, const double* const* tange
   }
   *radius2 = Dot(centre, centre, d);
 
-  for (int j = 0; j < d; ++j) lift[j] = 0;
+  double b[K + 1];
+  b[0] = first;
+  std::copy_n(barycentric, K, b + 1);
+  bool lifted = false;
+  if constexpr (K >= kTurns)
+    lifted = TurnedLift<K>(d, tangents, edge, gram, b, centre, away, memory[K + 2], lift);
+  if (lifted) {
+    for (int j = 0; j < d; ++j) centre[j] += lift[j];
+    return true;
+  }
+  std::fill(lift, lift + d, 0.0);
   for (int i = 0; i <= K; ++i) {
-    const double b = 0.5 * (i == 0 ? first : barycentric[i - 1]);
     for (int j = 0; j < d; ++j) away[j] = i == 0 ? centre[j] : centre[j] - edge[i - 1][j];
     for (int a = 0; a < K; ++a) {
       const double* const t = tangents[i] + a * d;
-      const double s = b * Dot(t, away, d);
+      const double s = 0.5 * b[i] * Dot(t, away, d);
       for (int j = 0; j < d; ++j) lift[j] += s * t[j];
     }
   }
-  // Off what lies along the simplex, so that the distances to its vertices stay equal.
-  double along[K];
-  for (int i = 0; i < K; ++i) along[i] = Dot(edge[i], lift, d);
-  Substitute<K>(gram, along);
-  for (int i = 0; i < K; ++i)
-    for (int j = 0; j < d; ++j) lift[j] -= along[i] * edge[i][j];
+  DropAlong<K>(d, edge, gram, lift);
   for (int j = 0; j < d; ++j) centre[j] += lift[j];
   return true;
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/certificate/certifier.h"
+#include "core/complex/cavities.h"
 #include "core/complex/star_complex.h"
 #include "core/mesher.h"
 #include "core/parallel.h"
@@ -51,7 +52,9 @@ class Refinement final : public Mesher {
   const Report& report() const override { return report_; }
   Eigen::MatrixXd Points() const override;
   Eigen::MatrixXd Tangents() const override { return complex_.TangentMatrix(); }
-  std::vector<std::uint32_t> Simplices() const override { return complex_.Simplices(); }
+  std::vector<std::uint32_t> Simplices() const override {
+    return filled_over_ ? filled_.simplices : complex_.Simplices();
+  }
 
  private:
   enum class Stage { kPoints, kAlternate, kTangents, kCertify };
@@ -82,6 +85,8 @@ class Refinement final : public Mesher {
   void Plan();
   std::vector<Target<K>> SizeAndShapeTargets();
   std::vector<Target<K>> SliverAndConsistencyTargets();
+  void FillCavitiesIfAny(const std::vector<std::optional<Violation<K>>>& found);
+  bool IsFilled(std::uint32_t star, const Violation<K>& violation) const;
   Target<K> Aim(std::uint32_t star, const Violation<K>& violation) const;
   void AskForTargets();
   void AskAgain(const QueryBlock& block, Stage stage);
@@ -115,6 +120,11 @@ class Refinement final : public Mesher {
   void Insert(Eigen::Index candidate, Rule rule, std::uint32_t near);
   void Commit();
   void StartCertificate();
+  void HandOutFilled();
+  double MaxAgreedNorm2(std::uint32_t p) const;
+  std::uint64_t SimplexCount() const {
+    return filled_over_ ? filled_.simplices.size() / (K + 1) : complex_.simplex_count();
+  }
   void Finish(Termination termination);
   void DescribeUnfinished();
   std::string WhatIsLeft() const;
@@ -176,8 +186,8 @@ class Refinement final : public Mesher {
   enum Standing : std::uint8_t { kFine, kSizeOrShape, kSliverOrInconsistent };
   std::vector<double> given_size_;  // where the client gives them
   // Where they are estimated, and by the certificate in any case:
-  std::vector<double> size_seen_;   // the local feature size seen from the star
-  std::vector<double> local_size_;  // the same, 1-Lipschitz over the stars, when last spread
+  std::vector<double> size_seen_;      // the local feature size seen from the star
+  std::vector<double> local_size_;     // the same, 1-Lipschitz over the stars, when last spread
   std::uint32_t sizes_judged_at_ = 0;  // vertices then
   bool sizes_judged_ = false;          // nothing has changed since
   std::vector<std::uint8_t> standing_;
@@ -187,11 +197,14 @@ class Refinement final : public Mesher {
     std::uint32_t star;
     Violation<K> violation;
   };
-  std::vector<Active> active_;            // the violations of R1 and R2, one a star
-  std::vector<std::uint32_t> suspects_;   // stars to judge by R3 and R4
-  std::vector<std::uint32_t> blemished_;  // stars with a violation of R3 or R4
-  bool all_suspect_ = true;               // R3 and R4 were not judged yet
-  std::uint64_t before_good_points_ = 0;  // vertices when R1 and R2 first held
+  std::vector<Active> active_;               // the violations of R1 and R2, one a star
+  std::vector<std::uint32_t> suspects_;      // stars to judge by R3 and R4
+  std::vector<std::uint32_t> blemished_;     // stars with a violation of R3 or R4
+  std::vector<std::uint32_t> filled_stars_;  // such stars that filling their cavities mends
+  FilledCavities filled_;                    // of the complex as it is, if filled_stars_ has any
+  bool filled_over_ = false;                 // the mesh is the filled one, no more the stars' union
+  bool all_suspect_ = true;                  // R3 and R4 were not judged yet
+  std::uint64_t before_good_points_ = 0;     // vertices when R1 and R2 first held
 
   std::unique_ptr<Certifier> certifier_;
   std::uint64_t too_fine_ = 0;  // stars whose given size asks for less than is meshed

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "core/certificate/findings.h"
@@ -11,17 +12,66 @@
 
 namespace stellate::core {
 
+// From here on the mesh is the filled one; the round's delta says what that changes.
+template <int K>
+void Refinement<K>::HandOutFilled() {
+  using Simplex = typename StarComplex<K>::Simplex;
+  const auto sorted = [](const std::vector<std::uint32_t>& ids) {
+    std::vector<Simplex> simplices(ids.size() / (K + 1));
+    for (std::size_t i = 0; i < ids.size(); ++i) simplices[i / (K + 1)][i % (K + 1)] = ids[i];
+    std::sort(simplices.begin(), simplices.end());
+    return simplices;
+  };
+  // A - B + C, where C is disjoint from what is left of A.
+  const auto change = [](const std::vector<Simplex>& a, const std::vector<Simplex>& b,
+                         const std::vector<Simplex>& c, std::vector<std::uint32_t>* ids) {
+    std::vector<Simplex> all;
+    std::set_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(all));
+    all.insert(all.end(), c.begin(), c.end());
+    std::sort(all.begin(), all.end());
+    ids->clear();
+    for (const Simplex& s : all) ids->insert(ids->end(), s.begin(), s.end());
+  };
+  const std::vector<Simplex> before = sorted(complex_.Simplices()),
+                             after = sorted(filled_.simplices);
+  std::vector<Simplex> lost, won, lost_now, won_now;
+  std::set_difference(before.begin(), before.end(), after.begin(), after.end(),
+                      std::back_inserter(lost));
+  std::set_difference(after.begin(), after.end(), before.begin(), before.end(),
+                      std::back_inserter(won));
+  const std::vector<Simplex> added = sorted(delta_.added), removed = sorted(delta_.removed);
+  std::set_difference(won.begin(), won.end(), removed.begin(), removed.end(),
+                      std::back_inserter(won_now));
+  std::set_difference(lost.begin(), lost.end(), added.begin(), added.end(),
+                      std::back_inserter(lost_now));
+  change(added, lost, won_now, &delta_.added);
+  change(removed, won, lost_now, &delta_.removed);
+  filled_over_ = true;
+}
+
+// max R_p over the simplices that all stars agree on, squared: the others are not in the mesh.
+template <int K>
+double Refinement<K>::MaxAgreedNorm2(std::uint32_t p) const {
+  const auto& cell = complex_.cell(p);
+  double most = 0;
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+    if (cell.norm2(v) > most && IsConsistent<K>(complex_, p, v)) most = cell.norm2(v);
+  return most;
+}
+
 template <int K>
 void Refinement<K>::StartCertificate() {
   if (rehearsal_) return Finish(Termination::kConverged);
+  if (!filled_stars_.empty()) HandOutFilled();
   StarFacts facts;
   facts.converged = true;
   for (std::uint32_t p = 0; p < complex_.size(); ++p) {
-    const double radius = std::sqrt(complex_.cell(p).max_norm2());
+    const double radius =
+        std::sqrt(filled_over_ ? MaxAgreedNorm2(p) : complex_.cell(p).max_norm2());
     facts.max_circumradius = std::max(facts.max_circumradius, radius);
   }
   if (criteria_.graded()) DescribeSizes(&facts);
-  certified_simplices_ = complex_.Simplices();
+  certified_simplices_ = Simplices();
   const MeshView view{K,
                       complex_.d(),
                       complex_.size(),
@@ -54,7 +104,7 @@ void Refinement<K>::Finish(Termination termination) {
   // What a round that was interrupted has left behind was never handed out.
   const bool whole = !interruption_.raised();
   report_.counts.vertices = whole ? complex_.size() : progress_.vertices;
-  report_.counts.simplices = whole ? complex_.simplex_count() : progress_.simplices;
+  report_.counts.simplices = whole ? SimplexCount() : progress_.simplices;
   Certificate& certificate = report_.certificate;
   if (termination == Termination::kConverged) {
     certificate = certifier_->certificate();
@@ -63,6 +113,11 @@ void Refinement<K>::Finish(Termination termination) {
                                              Brief(FinestBound()), " at ", too_fine_,
                                              " vertices, finer than is meshed at epsilon ",
                                              Brief(spec_.epsilon), ": take epsilon smaller."));
+    if (filled_over_)
+      certificate.warnings.push_back(
+          Message("Stars disagreed about ", filled_.inconsistent, " simplices in ",
+                  filled_.cavities, " places; ", filled_.filling,
+                  " simplices fill these instead, not all of them Delaunay."));
   } else {
     certificate.verdict = std::string("not certified: the run ended as ") +
                           TerminationName(termination) + " before every rule held";
@@ -136,7 +191,7 @@ std::string Refinement<K>::WhatIsLeft() const {
 template <int K>
 void Refinement<K>::UpdateProgress() {
   progress_.vertices = complex_.size();
-  progress_.simplices = complex_.simplex_count();
+  progress_.simplices = SimplexCount();
   if (over_) {
     progress_.phase = Phase::kDone;
     progress_.fraction = report_.termination == Termination::kConverged ? 1 : progress_.fraction;
@@ -165,13 +220,15 @@ Eigen::MatrixXd Refinement<K>::Points() const {
   return Eigen::Map<const Eigen::MatrixXd>(complex_.points().data(), complex_.d(), complex_.size());
 }
 
-#define STELLATE_INSTANTIATE(K)                           \
-  template void Refinement<K>::StartCertificate();        \
-  template void Refinement<K>::Fail(Status);              \
-  template void Refinement<K>::DescribeUnfinished();      \
-  template std::string Refinement<K>::WhatIsLeft() const; \
-  template void Refinement<K>::Finish(Termination);       \
-  template void Refinement<K>::UpdateProgress();          \
+#define STELLATE_INSTANTIATE(K)                                       \
+  template void Refinement<K>::HandOutFilled();                       \
+  template double Refinement<K>::MaxAgreedNorm2(std::uint32_t) const; \
+  template void Refinement<K>::StartCertificate();                    \
+  template void Refinement<K>::Fail(Status);                          \
+  template void Refinement<K>::DescribeUnfinished();                  \
+  template std::string Refinement<K>::WhatIsLeft() const;             \
+  template void Refinement<K>::Finish(Termination);                   \
+  template void Refinement<K>::UpdateProgress();                      \
   template Eigen::MatrixXd Refinement<K>::Points() const;
 STELLATE_INSTANTIATE(1)
 STELLATE_INSTANTIATE(2)

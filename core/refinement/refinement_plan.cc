@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/complex/consistency.h"
 #include "core/parallel.h"
 #include "core/refinement/refinement.h"
 #include "core/sample/random.h"
@@ -24,6 +25,9 @@ constexpr double kMostAheadSeeds[kMaxDimension + 1] = {0, 100, 1000, 1000, 3000,
 
 // Graded sizes are spread over all stars anew whenever the sample has grown so much.
 constexpr double kSizesGrowth = 1.25;
+
+// Where cavities are filled: below, good points mend the few stars that disagree.
+constexpr int kFirstFilled = 4;
 
 // A point of the unit ball of R^K, uniform.
 template <int K>
@@ -143,25 +147,51 @@ std::vector<Target<K>> Refinement<K>::SliverAndConsistencyTargets() {
     before_good_points_ = complex_.size();
   }
   suspects_.insert(suspects_.end(), blemished_.begin(), blemished_.end());
+  suspects_.insert(suspects_.end(), filled_stars_.begin(), filled_stars_.end());
   std::sort(suspects_.begin(), suspects_.end());
   suspects_.erase(std::unique(suspects_.begin(), suspects_.end()), suspects_.end());
   std::vector<std::optional<Violation<K>>> found(suspects_.size());
   ParallelFor(suspects_.size(), [&](std::size_t i) {
     found[i] = WorstSliverOrInconsistent<K>(complex_, suspects_[i], criteria_.sliver_bound);
   });
+  FillCavitiesIfAny(found);
   std::vector<Target<K>> targets;
   blemished_.clear();
+  filled_stars_.clear();
   progress_.bad_sliver = progress_.bad_inconsistent = 0;
   for (std::size_t i = 0; i < suspects_.size(); ++i) {
     const std::uint32_t p = suspects_[i];
     standing_[p] = found[i] ? kSliverOrInconsistent : kFine;
     if (!found[i]) continue;
+    if (IsFilled(p, *found[i])) {
+      filled_stars_.push_back(p);
+      continue;
+    }
     blemished_.push_back(p);
     ++(found[i]->rule == Rule::kSliver ? progress_.bad_sliver : progress_.bad_inconsistent);
     if (discouraged_[p] <= kGiveUp) targets.push_back(Aim(p, *found[i]));
   }
   suspects_.clear();
   return targets;
+}
+
+template <int K>
+void Refinement<K>::FillCavitiesIfAny(const std::vector<std::optional<Violation<K>>>& found) {
+  filled_ = {};
+  if (K < kFirstFilled || criteria_.judging != Judging::kCommonCentre) return;
+  if (std::none_of(found.begin(), found.end(), [](const auto& v) { return v.has_value(); })) return;
+  filled_ = FillCavities<K>(
+      complex_, {criteria_.epsilon, criteria_.radius_edge_bound, criteria_.sliver_bound});
+}
+
+// Whether the violating simplex is not in the mesh anyway, its cavity being filled without it.
+template <int K>
+bool Refinement<K>::IsFilled(std::uint32_t star, const Violation<K>& violation) const {
+  if (filled_.cavities == 0 || violation.fake ||
+      std::binary_search(filled_.unfilled.begin(), filled_.unfilled.end(), star))
+    return false;
+  return violation.rule == Rule::kInconsistent ||
+         !IsConsistent<K>(complex_, star, violation.vertex);
 }
 
 // Finds what to do next and asks for it, or ends the refinement.
@@ -181,7 +211,10 @@ void Refinement<K>::Plan() {
   }
   if (targets.empty()) targets = SliverAndConsistencyTargets();
   if (targets.empty()) {
-    if (!active_.empty() || !blemished_.empty()) return Finish(Termination::kNoProgress);
+    const bool all_filled = std::all_of(active_.begin(), active_.end(), [&](const Active& a) {
+      return IsFilled(a.star, a.violation);
+    });
+    if (!all_filled || !blemished_.empty()) return Finish(Termination::kNoProgress);
     return StartCertificate();
   }
   targets_ = SelectIndependent<K>(complex_, std::move(targets),
@@ -270,16 +303,18 @@ void Refinement<K>::Discourage(std::uint32_t star) {
     ++discouraged_[star];
 }
 
-#define STELLATE_INSTANTIATE(K)                                                    \
-  template void Refinement<K>::AskForSeeds();                                      \
-  template void Refinement<K>::AskAgain(const QueryBlock&, Stage);                 \
-  template QueryBlock Refinement<K>::NewBlock(QueryKind) const;                    \
-  template bool Refinement<K>::FindsFlats(const Target<K>&) const;                 \
-  template Target<K> Refinement<K>::Aim(std::uint32_t, const Violation<K>&) const; \
-  template std::vector<Target<K>> Refinement<K>::SizeAndShapeTargets();            \
-  template std::vector<Target<K>> Refinement<K>::SliverAndConsistencyTargets();    \
-  template void Refinement<K>::Plan();                                             \
-  template void Refinement<K>::AskForTargets();                                    \
+#define STELLATE_INSTANTIATE(K)                                                                    \
+  template void Refinement<K>::AskForSeeds();                                                      \
+  template void Refinement<K>::AskAgain(const QueryBlock&, Stage);                                 \
+  template QueryBlock Refinement<K>::NewBlock(QueryKind) const;                                    \
+  template bool Refinement<K>::FindsFlats(const Target<K>&) const;                                 \
+  template Target<K> Refinement<K>::Aim(std::uint32_t, const Violation<K>&) const;                 \
+  template std::vector<Target<K>> Refinement<K>::SizeAndShapeTargets();                            \
+  template std::vector<Target<K>> Refinement<K>::SliverAndConsistencyTargets();                    \
+  template void Refinement<K>::FillCavitiesIfAny(const std::vector<std::optional<Violation<K>>>&); \
+  template bool Refinement<K>::IsFilled(std::uint32_t, const Violation<K>&) const;                 \
+  template void Refinement<K>::Plan();                                                             \
+  template void Refinement<K>::AskForTargets();                                                    \
   template void Refinement<K>::Discourage(std::uint32_t);
 STELLATE_INSTANTIATE(1)
 STELLATE_INSTANTIATE(2)

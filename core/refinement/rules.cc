@@ -122,53 +122,6 @@ bool ContainsSliver(const StarComplex<K>& complex, const double* p,
   return false;
 }
 
-namespace {
-
-// The sign of the simplex on p and K facets' points, seen in T_pM.
-template <int K>
-double Orientation(const StarComplex<K>& complex, std::uint32_t p, const std::uint16_t* facets) {
-  double m[K][K];
-  for (int r = 0; r < K; ++r) complex.HalfSpace(p, facets[r], m[r]);
-  double sign = 1;
-  for (int c = 0; c < K; ++c) {
-    int pivot = c;
-    for (int r = c + 1; r < K; ++r)
-      if (std::abs(m[r][c]) > std::abs(m[pivot][c])) pivot = r;
-    if (m[pivot][c] == 0) return 0;
-    if (pivot != c) {
-      std::swap(m[pivot], m[c]);
-      sign = -sign;
-    }
-    if (m[c][c] < 0) sign = -sign;
-    for (int r = c + 1; r < K; ++r) {
-      const double factor = m[r][c] / m[c][c];
-      for (int j = c + 1; j < K; ++j) m[r][j] -= factor * m[c][j];
-    }
-  }
-  return sign;
-}
-
-// Whether the simplex dual to v and a neighbour of it in star(p) overlap near the facet they share.
-template <int K>
-bool IsFolded(const StarComplex<K>& complex, std::uint32_t p, std::size_t v) {
-  const RestrictedVoronoiCell<K>& cell = complex.cell(p);
-  std::uint16_t here[K];
-  for (int s = 0; s < K; ++s) here[s] = cell.facet(v, s);
-  const double side = Orientation<K>(complex, p, here);
-  if (side == 0) return true;
-  for (int s = 0; s < K; ++s) {
-    const std::size_t w = cell.adjacent(v, s);
-    std::uint16_t there[K];
-    std::copy(here, here + K, there);
-    for (int r = 0; r < K; ++r)
-      if (std::find(here, here + K, cell.facet(w, r)) == here + K) there[s] = cell.facet(w, r);
-    if (Orientation<K>(complex, p, there) * side >= 0) return true;
-  }
-  return false;
-}
-
-}  // namespace
-
 template <int K>
 std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& complex,
                                                       std::uint32_t p, double sliver_bound) {

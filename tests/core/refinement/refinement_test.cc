@@ -59,7 +59,8 @@ INSTANTIATE_TEST_SUITE_P(Catalogue, Refinements,
                                            Case{"rp2", 0.4}, Case{"clifford-torus", 0.3},
                                            Case{"two-spheres", 0.3}, Case{"torus:1:0.4@20", 0.25},
                                            Case{"so3", 0.8}, Case{"flat-torus:3", 0.6},
-                                           Case{"sphere:4:5", 0.7}));
+                                           Case{"sphere:4:5", 0.7},
+                                           Case{"ellipsoid:1:0.9:0.85:0.8:0.7", 0.45}));
 
 INSTANTIATE_TEST_SUITE_P(
     PoorerOracles, Refinements,

@@ -1,0 +1,462 @@
+#include "core/complex/cavities.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <numeric>
+
+#include "core/complex/consistency.h"
+#include "core/geometry/simplex.h"
+#include "core/parallel.h"
+
+namespace stellate::core {
+namespace {
+
+// Cavities of no more vertices than this also try simplices that no star holds.
+constexpr std::size_t kAllSubsets = 11;
+// Larger cavities are left alone.
+constexpr std::size_t kMostVertices = 48;
+// Simplices placed, in one cavity, before the search is given up.
+constexpr int kMostSteps = 4000;
+
+template <int N>
+double Determinant(double (&m)[N][N]) {
+  double det = 1;
+  for (int c = 0; c < N; ++c) {
+    int pivot = c;
+    for (int r = c + 1; r < N; ++r)
+      if (std::abs(m[r][c]) > std::abs(m[pivot][c])) pivot = r;
+    if (m[pivot][c] == 0) return 0;
+    if (pivot != c) {
+      std::swap(m[pivot], m[c]);
+      det = -det;
+    }
+    det *= m[c][c];
+    for (int r = c + 1; r < N; ++r) {
+      const double factor = m[r][c] / m[c][c];
+      for (int j = c + 1; j < N; ++j) m[r][j] -= factor * m[c][j];
+    }
+  }
+  return det;
+}
+
+inline int Sign(double x) { return (x > 0) - (x < 0); }
+
+// The stars' simplices, parted into those that all agree on and the doubtful ones.
+template <int K>
+struct Census {
+  using Simplex = typename StarComplex<K>::Simplex;
+  using Facet = std::array<std::uint32_t, K>;
+
+  explicit Census(const StarComplex<K>& whole) : complex(whole) {
+    const std::uint32_t n = complex.size();
+    const std::size_t chunks = ChunkCount(n);
+    std::vector<std::vector<Simplex>> owned(chunks), doubts(chunks);
+    ParallelChunks(n, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i)
+        Survey(static_cast<std::uint32_t>(i), owned[chunk], doubts[chunk]);
+    });
+    for (std::size_t c = 0; c < chunks; ++c) {
+      agreed.insert(agreed.end(), owned[c].begin(), owned[c].end());
+      all_doubts.insert(all_doubts.end(), doubts[c].begin(), doubts[c].end());
+    }
+    std::sort(all_doubts.begin(), all_doubts.end());
+    doubtful = all_doubts;
+    doubtful.erase(std::unique(doubtful.begin(), doubtful.end()), doubtful.end());
+    std::sort(agreed.begin(), agreed.end());
+    std::vector<Simplex> rest;
+    std::set_difference(agreed.begin(), agreed.end(), doubtful.begin(), doubtful.end(),
+                        std::back_inserter(rest));
+    agreed = std::move(rest);
+  }
+
+  // In how many stars a doubtful simplex was found.
+  int Holders(const Simplex& s) const {
+    const auto range = std::equal_range(all_doubts.begin(), all_doubts.end(), s);
+    return static_cast<int>(range.second - range.first);
+  }
+  bool IsDoubtful(const Simplex& s) const {
+    return std::binary_search(doubtful.begin(), doubtful.end(), s);
+  }
+
+  // The agreed simplices that have a facet: two at most, as the facet is an edge of a cell.
+  int AgreedOn(const Facet& facet, Simplex (&found)[2]) const {
+    const std::uint32_t p = facet[0];
+    const auto& cell = complex.cell(p);
+    int count = 0;
+    Simplex s;
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      int has = 0;
+      for (int i = 0; i < K; ++i)
+        has += std::binary_search(facet.begin() + 1, facet.end(), cell.id(cell.facet(v, i)));
+      if (has < K - 1 || !complex.SimplexOf(p, cell, v, &s) || IsDoubtful(s)) continue;
+      if (count < 2) found[count] = s;
+      ++count;
+    }
+    return std::min(count, 2);
+  }
+
+  const StarComplex<K>& complex;
+  std::vector<Simplex> agreed, doubtful, all_doubts;
+
+ private:
+  void Survey(std::uint32_t p, std::vector<Simplex>& owned, std::vector<Simplex>& doubts) const {
+    const auto& cell = complex.cell(p);
+    Simplex s;
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      if (!complex.SimplexOf(p, cell, v, &s)) continue;
+      if (!IsConsistent<K>(complex, p, v) || IsFolded<K>(complex, p, v))
+        doubts.push_back(s);
+      else if (s[0] == p)
+        owned.push_back(s);
+    }
+  }
+};
+
+template <int K>
+class Cavity {
+ public:
+  using Simplex = typename StarComplex<K>::Simplex;
+  using Facet = typename Census<K>::Facet;
+
+  Cavity(const Census<K>& census, const FillingRules& rules, std::vector<Simplex> doubtful)
+      : census_(census), complex_(census.complex), rules_(rules), doubtful_(std::move(doubtful)) {
+    for (const Simplex& s : doubtful_) vertices_.insert(vertices_.end(), s.begin(), s.end());
+    std::sort(vertices_.begin(), vertices_.end());
+    vertices_.erase(std::unique(vertices_.begin(), vertices_.end()), vertices_.end());
+  }
+
+  const std::vector<std::uint32_t>& vertices() const { return vertices_; }
+  const std::vector<Simplex>& filling() const { return filling_; }
+
+  bool Fill() {
+    if (vertices_.size() > kMostVertices || !Orient() || !FindBoundary()) return false;
+    for (const Simplex& s : doubtful_) Propose(s);
+    if (Search()) return true;
+    if (vertices_.size() > kAllSubsets) return false;
+    candidates_.clear();
+    by_facet_.assign(by_facet_.size(), {});
+    Simplex s;
+    ProposeAll(0, 0, s);
+    return Search();
+  }
+
+ private:
+  enum State : std::int8_t { kMinus = -1, kFree = 0, kPlus = 1, kClosed = 2 };
+  struct Candidate {
+    Simplex simplex;
+    std::array<int, K + 1> facet;
+    std::array<std::int8_t, K + 1> side;
+    int holders;
+    double fatness;
+  };
+
+  std::size_t Place(std::uint32_t v) const {
+    return static_cast<std::size_t>(std::lower_bound(vertices_.begin(), vertices_.end(), v) -
+                                    vertices_.begin());
+  }
+
+  static Facet Without(const Simplex& s, int i) {
+    Facet facet;
+    std::copy(s.begin(), s.begin() + i, facet.begin());
+    std::copy(s.begin() + i + 1, s.end(), facet.begin() + i);
+    return facet;
+  }
+
+  // How each vertex's tangent basis is oriented beside that of the vertex nearest to all.
+  bool Orient() {
+    const int d = complex_.d();
+    std::uint32_t middle = vertices_.front();
+    double least = INFINITY;
+    for (const std::uint32_t p : vertices_) {
+      double farthest = 0;
+      for (const std::uint32_t q : vertices_)
+        farthest = std::max(farthest, SquaredDistance(complex_.Point(p), complex_.Point(q), d));
+      if (farthest < least) {
+        least = farthest;
+        middle = p;
+      }
+    }
+    for (const std::uint32_t p : vertices_) {
+      double m[K][K];
+      for (int a = 0; a < K; ++a)
+        for (int b = 0; b < K; ++b)
+          m[a][b] = Dot(complex_.Tangent(middle) + a * d, complex_.Tangent(p) + b * d, d);
+      orientation_.push_back(Sign(Determinant<K>(m)));
+      if (orientation_.back() == 0) return false;
+    }
+    return true;
+  }
+
+  // The sign of a simplex, its vertices ascending, in p's tangent space.
+  int SignAt(std::uint32_t p, const Simplex& s) const {
+    const int d = complex_.d();
+    double m[K][K];
+    for (int i = 0; i < K; ++i) {
+      const double* const at = complex_.Point(s[static_cast<std::size_t>(i) + 1]);
+      for (int a = 0; a < K; ++a) {
+        const double* const t = complex_.Tangent(p) + a * d;
+        m[i][a] = 0;
+        for (int j = 0; j < d; ++j) m[i][a] += t[j] * (at[j] - complex_.Point(s[0])[j]);
+      }
+    }
+    return Sign(Determinant<K>(m)) * orientation_[Place(p)];
+  }
+
+  // The orientation of a simplex seen from some vertices of the cavity, or 0 if they differ.
+  template <typename Vertices>
+  int OrientationOf(const Simplex& s, const Vertices& from) const {
+    const int first = SignAt(from[0], s);
+    for (const std::uint32_t p : from)
+      if (SignAt(p, s) != first) return 0;
+    return first;
+  }
+
+  // The facets of doubtful simplices that an agreed one is on, from its other side.
+  bool FindBoundary() {
+    for (const Simplex& s : doubtful_) {
+      for (int i = 0; i <= K; ++i) {
+        const Facet facet = Without(s, i);
+        if (!facets_.emplace(facet, static_cast<int>(state_.size())).second) continue;
+        Simplex agreed[2];
+        const int count = census_.AgreedOn(facet, agreed);
+        state_.push_back(count == 2 ? kClosed : kFree);
+        by_facet_.emplace_back();
+        if (count != 1) continue;
+        const int side = SideOf(agreed[0], facet);
+        if (side == 0) return false;
+        state_.back() = static_cast<State>(-side);
+      }
+    }
+    loose_.assign(vertices_.size(), 1);
+    for (std::size_t i = 0; i < vertices_.size(); ++i) {
+      const auto& cell = complex_.cell(vertices_[i]);
+      Simplex s;
+      for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+        if (complex_.SimplexOf(vertices_[i], cell, v, &s) && !census_.IsDoubtful(s)) {
+          loose_[i] = 0;
+          break;
+        }
+    }
+    return true;
+  }
+
+  // On which side of a facet an agreed simplex lies, seen from the facet's vertices: its apex may
+  // be no vertex of the cavity.
+  int SideOf(const Simplex& s, const Facet& facet) const {
+    std::size_t apex = 0;
+    while (apex < K && s[apex] == facet[apex]) ++apex;
+    const int orientation = OrientationOf(s, facet);
+    return apex % 2 == 0 ? orientation : -orientation;
+  }
+
+  void ProposeAll(std::size_t next, int chosen, Simplex& s) {
+    if (chosen == K + 1) return Propose(s);
+    for (std::size_t i = next; i < vertices_.size(); ++i) {
+      s[static_cast<std::size_t>(chosen)] = vertices_[i];
+      ProposeAll(i + 1, chosen + 1, s);
+    }
+  }
+
+  void Propose(const Simplex& s) {
+    const double* corners[K + 1];
+    for (std::size_t i = 0; i <= K; ++i) corners[i] = complex_.Point(s[i]);
+    const SimplexVertices span(corners, K + 1);
+    const SimplexMeasures measures = MeasureSimplex(span, complex_.d());
+    if (!(measures.circumradius <= rules_.epsilon) ||
+        !(measures.RadiusEdgeRatio() <= rules_.radius_edge_bound))
+      return;
+    if (rules_.sliver_bound > 0 && ContainsSliver(span, complex_.d(), rules_.sliver_bound)) return;
+    const int orientation = OrientationOf(s, s);
+    if (orientation == 0) return;
+    Candidate c{s, {}, {}, census_.Holders(s), measures.Fatness()};
+    for (int i = 0; i <= K; ++i) {
+      const Facet facet = Without(s, i);
+      const auto [at, fresh] = facets_.emplace(facet, static_cast<int>(state_.size()));
+      if (fresh) {
+        // A facet of agreed simplices that is not on this cavity's boundary is none of its own.
+        Simplex agreed[2];
+        state_.push_back(census_.AgreedOn(facet, agreed) > 0 ? kClosed : kFree);
+        by_facet_.emplace_back();
+      }
+      const auto slot = static_cast<std::size_t>(i);
+      c.facet[slot] = at->second;
+      c.side[slot] = static_cast<std::int8_t>(i % 2 == 0 ? orientation : -orientation);
+      if (!Fits(c, slot)) return;
+    }
+    for (const int f : c.facet)
+      by_facet_[static_cast<std::size_t>(f)].push_back(static_cast<int>(candidates_.size()));
+    candidates_.push_back(c);
+  }
+
+  bool Fits(const Candidate& c, std::size_t slot) const {
+    const State state = state_[static_cast<std::size_t>(c.facet[slot])];
+    return state == kFree || state == c.side[slot];
+  }
+  bool Fits(const Candidate& c) const {
+    for (std::size_t i = 0; i <= K; ++i)
+      if (!Fits(c, i)) return false;
+    return true;
+  }
+
+  bool Search() {
+    for (auto& list : by_facet_)
+      std::sort(list.begin(), list.end(), [&](int a, int b) {
+        const Candidate& x = candidates_[static_cast<std::size_t>(a)];
+        const Candidate& y = candidates_[static_cast<std::size_t>(b)];
+        if (x.holders != y.holders) return x.holders > y.holders;
+        return x.fatness != y.fatness ? x.fatness > y.fatness : x.simplex < y.simplex;
+      });
+    steps_ = 0;
+    placed_.clear();
+    return Extend();
+  }
+
+  // Closes the open facet with the fewest choices, and all after it.
+  bool Extend() {
+    int chosen = -1;
+    std::size_t fewest = candidates_.size() + 1;
+    for (std::size_t f = 0; f < state_.size() && fewest > 0; ++f) {
+      if (state_[f] != kPlus && state_[f] != kMinus) continue;
+      std::size_t choices = 0;
+      for (const int c : by_facet_[f]) choices += Fits(candidates_[static_cast<std::size_t>(c)]);
+      if (choices >= fewest) continue;
+      fewest = choices;
+      chosen = static_cast<int>(f);
+    }
+    if (chosen < 0) return Complete();
+    if (fewest == 0) return false;
+    const std::vector<int>& choices = by_facet_[static_cast<std::size_t>(chosen)];
+    for (const int c : choices) {
+      const Candidate& candidate = candidates_[static_cast<std::size_t>(c)];
+      if (!Fits(candidate)) continue;
+      if (++steps_ > kMostSteps) return false;
+      std::array<State, K + 1> before;
+      for (std::size_t i = 0; i <= K; ++i) {
+        State& state = state_[static_cast<std::size_t>(candidate.facet[i])];
+        before[i] = state;
+        state = state == kFree ? static_cast<State>(-candidate.side[i]) : kClosed;
+      }
+      placed_.push_back(c);
+      if (Extend()) return true;
+      placed_.pop_back();
+      for (std::size_t i = 0; i <= K; ++i)
+        state_[static_cast<std::size_t>(candidate.facet[i])] = before[i];
+    }
+    return false;
+  }
+
+  // No vertex may be left without a simplex.
+  bool Complete() {
+    std::vector<std::uint8_t> left = loose_;
+    for (const int c : placed_)
+      for (const std::uint32_t v : candidates_[static_cast<std::size_t>(c)].simplex)
+        left[Place(v)] = 0;
+    if (std::find(left.begin(), left.end(), 1) != left.end()) return false;
+    filling_.clear();
+    for (const int c : placed_)
+      filling_.push_back(candidates_[static_cast<std::size_t>(c)].simplex);
+    return true;
+  }
+
+  const Census<K>& census_;
+  const StarComplex<K>& complex_;
+  const FillingRules& rules_;
+  std::vector<Simplex> doubtful_;
+  std::vector<std::uint32_t> vertices_;  // ascending
+  std::vector<int> orientation_;         // by vertex
+  std::vector<std::uint8_t> loose_;      // by vertex: in no agreed simplex
+  std::map<Facet, int> facets_;
+  std::vector<State> state_;                // by facet: the side that is still to be covered
+  std::vector<std::vector<int>> by_facet_;  // candidates
+  std::vector<Candidate> candidates_;
+  std::vector<int> placed_;
+  std::vector<Simplex> filling_;
+  int steps_ = 0;
+};
+
+// Doubtful simplices that share a facet lie in one cavity, unless agreed ones are on both its
+// sides.
+template <int K>
+std::vector<std::vector<typename StarComplex<K>::Simplex>> PartDoubtful(const Census<K>& census) {
+  using Facet = typename Census<K>::Facet;
+  const auto& doubtful = census.doubtful;
+  std::vector<std::pair<Facet, std::uint32_t>> facets;
+  facets.reserve(doubtful.size() * (K + 1));
+  for (std::size_t s = 0; s < doubtful.size(); ++s)
+    for (int i = 0; i <= K; ++i) {
+      Facet facet;
+      std::copy(doubtful[s].begin(), doubtful[s].begin() + i, facet.begin());
+      std::copy(doubtful[s].begin() + i + 1, doubtful[s].end(), facet.begin() + i);
+      facets.emplace_back(facet, static_cast<std::uint32_t>(s));
+    }
+  std::sort(facets.begin(), facets.end());
+  std::vector<std::size_t> parent(doubtful.size());
+  std::iota(parent.begin(), parent.end(), std::size_t{0});
+  const auto root = [&](std::size_t s) {
+    while (parent[s] != s) s = parent[s] = parent[parent[s]];
+    return s;
+  };
+  for (std::size_t i = 0; i + 1 < facets.size(); ++i) {
+    if (facets[i].first != facets[i + 1].first) continue;
+    const std::size_t a = root(facets[i].second), b = root(facets[i + 1].second);
+    if (a == b) continue;
+    typename StarComplex<K>::Simplex agreed[2];
+    if (census.AgreedOn(facets[i].first, agreed) < 2) parent[std::max(a, b)] = std::min(a, b);
+  }
+  std::vector<std::size_t> number(doubtful.size());
+  std::vector<std::vector<typename StarComplex<K>::Simplex>> parts;
+  for (std::size_t s = 0; s < doubtful.size(); ++s) {
+    const std::size_t r = root(s);
+    if (r == s) {
+      number[s] = parts.size();
+      parts.emplace_back();
+    }
+    parts[number[r]].push_back(doubtful[s]);
+  }
+  return parts;
+}
+
+}  // namespace
+
+template <int K>
+FilledCavities FillCavities(const StarComplex<K>& complex, const FillingRules& rules) {
+  const Census<K> census(complex);
+  std::vector<Cavity<K>> cavities;
+  for (auto& part : PartDoubtful<K>(census)) cavities.emplace_back(census, rules, std::move(part));
+  std::vector<std::uint8_t> filled(cavities.size());
+  ParallelFor(cavities.size(), [&](std::size_t i) { filled[i] = cavities[i].Fill(); });
+  FilledCavities result;
+  result.inconsistent = census.doubtful.size();
+  result.cavities = cavities.size();
+  auto all = census.agreed;
+  for (std::size_t i = 0; i < cavities.size(); ++i) {
+    const Cavity<K>& cavity = cavities[i];
+    if (filled[i]) {
+      ++result.filled;
+      result.filling += cavity.filling().size();
+      all.insert(all.end(), cavity.filling().begin(), cavity.filling().end());
+      continue;
+    }
+    const auto& at = cavity.vertices();
+    result.unfilled.insert(result.unfilled.end(), at.begin(), at.end());
+    if (at.size() > result.largest_unfilled.size()) result.largest_unfilled = at;
+  }
+  std::sort(result.unfilled.begin(), result.unfilled.end());
+  result.unfilled.erase(std::unique(result.unfilled.begin(), result.unfilled.end()),
+                        result.unfilled.end());
+  std::sort(all.begin(), all.end());
+  result.simplices.reserve(all.size() * (K + 1));
+  for (const auto& s : all) result.simplices.insert(result.simplices.end(), s.begin(), s.end());
+  return result;
+}
+
+template FilledCavities FillCavities<1>(const StarComplex<1>&, const FillingRules&);
+template FilledCavities FillCavities<2>(const StarComplex<2>&, const FillingRules&);
+template FilledCavities FillCavities<3>(const StarComplex<3>&, const FillingRules&);
+template FilledCavities FillCavities<4>(const StarComplex<4>&, const FillingRules&);
+template FilledCavities FillCavities<5>(const StarComplex<5>&, const FillingRules&);
+
+}  // namespace stellate::core
