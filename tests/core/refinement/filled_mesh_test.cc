@@ -1,0 +1,89 @@
+// Meshes whose cavities were filled: k >= 4. STELLATE_FILLED_SEEDS asks for T^4 in R^8 besides,
+// with so many seeds; each takes minutes.
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <numeric>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "tests/core/support/in_process_run.h"
+#include "tests/core/support/samples.h"
+
+namespace stellate::core {
+namespace {
+
+using testing::AsSet;
+using testing::Drive;
+using testing::DrivenRun;
+using testing::ExpectGoodMesh;
+using testing::Make;
+using testing::SpecificationFor;
+
+constexpr int kDimension = 4;
+
+DrivenRun Mesh(Manifold& manifold, double epsilon, std::uint64_t seed) {
+  Specification spec = SpecificationFor(manifold, epsilon);
+  spec.random_seed = seed;
+  return Drive(spec, manifold);
+}
+
+bool IsFilled(const DrivenRun& run) {
+  for (const std::string& warning : run.report().certificate.warnings)
+    if (warning.find("fill these instead") != std::string::npos) return true;
+  return false;
+}
+
+// The last round swaps the fillings in for what the stars disagreed about.
+void ExpectDeltasToTellAll(const DrivenRun& run) {
+  std::set<StarComplex<kDimension>::Simplex> replayed;
+  for (const MeshDelta& delta : run.deltas) {
+    for (const auto& s : AsSet<kDimension>(delta.removed)) EXPECT_EQ(replayed.erase(s), 1u);
+    for (const auto& s : AsSet<kDimension>(delta.added)) EXPECT_TRUE(replayed.insert(s).second);
+  }
+  EXPECT_EQ(replayed, AsSet<kDimension>(run.mesher->Simplices()));
+}
+
+TEST(FilledMesh, OfAnEllipsoidIsToldByItsDeltas) {
+  const auto manifold = Make("ellipsoid:1:0.9:0.85:0.8:0.7");
+  int filled = 0;
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    const DrivenRun run = Mesh(*manifold, 0.45, seed);
+    ExpectGoodMesh(run, manifold->facts());
+    ExpectDeltasToTellAll(run);
+    filled += IsFilled(run);
+  }
+  EXPECT_GT(filled, 0);
+}
+
+std::vector<std::uint64_t> CampaignSeeds() {
+  const char* const count = std::getenv("STELLATE_FILLED_SEEDS");
+  std::vector<std::uint64_t> seeds(count ? std::strtoull(count, nullptr, 10) : 0);
+  std::iota(seeds.begin(), seeds.end(), 1u);
+  return seeds;
+}
+
+class FourTorus : public ::testing::TestWithParam<std::uint64_t> {};
+
+TEST_P(FourTorus, IsCertified) {
+  const auto manifold = Make("flat-torus:4");
+  const DrivenRun run = Mesh(*manifold, 0.8, GetParam());
+  ExpectGoodMesh(run, manifold->facts());
+  ExpectDeltasToTellAll(run);
+  EXPECT_TRUE(IsFilled(run));
+  const Counts& counts = run.report().counts;
+  RecordProperty("vertices", static_cast<int>(counts.vertices));
+  RecordProperty("rounds", static_cast<int>(counts.rounds));
+  std::printf("%d vertices, %d simplices, %d rounds, fatness %.2g\n",
+              static_cast<int>(counts.vertices), static_cast<int>(counts.simplices),
+              static_cast<int>(counts.rounds), run.report().certificate.min_fatness);
+}
+
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(FourTorus);
+INSTANTIATE_TEST_SUITE_P(Campaign, FourTorus, ::testing::ValuesIn(CampaignSeeds()));
+
+}  // namespace
+}  // namespace stellate::core
