@@ -10,6 +10,7 @@ import logging
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -24,6 +25,8 @@ sys.path.insert(0, str(ROOT / "clients" / "python"))
 import stellate  # noqa: E402
 
 OWNERS = {name: f"{name}-0123456789abcdef" for name in ("ada", "ben", "cleo", "dan", "eve", "flo")}
+# Debian has it where only root's PATH leads.
+HAPROXY = shutil.which("haproxy", path=os.environ.get("PATH", "") + ":/usr/sbin") or "haproxy"
 PATIENCE = 100.0  # seconds: for a hang, not for a measurement
 _EPSILON = 0.15
 
@@ -106,7 +109,7 @@ class Balancer(unittest.TestCase):
         )
         self.assertEqual((fronts, servers), (1, 2))
         (folder / "haproxy.cfg").write_text(text)
-        self.haproxy = subprocess.Popen(["haproxy", "-db", "-f", str(folder / "haproxy.cfg")])
+        self.haproxy = subprocess.Popen([HAPROXY, "-db", "-f", str(folder / "haproxy.cfg")])
         self.addCleanup(self.haproxy.wait, PATIENCE)
         self.addCleanup(self.haproxy.kill)
         while not (folder / "front").exists():
