@@ -35,6 +35,7 @@ constexpr Work kTable[] = {
     {"so3", 0.2},
 };
 constexpr int kRuns = 3;
+constexpr std::uint64_t kMostVertices = 100'000'000;
 
 struct Outcome {
   double seconds = 0;
@@ -54,6 +55,7 @@ std::uint64_t Fingerprint(const Mesher& mesher) {
 Outcome Run(stellate::Manifold& manifold, double epsilon, int threads) {
   stellate::core::Specification spec = stellate::testing::SpecificationFor(manifold, epsilon);
   spec.threads = threads;
+  spec.limits.max_vertices = kMostVertices;
   auto created = Mesher::Create(spec);
   if (!created) {
     std::fprintf(stderr, "%s\n", created.error().message.c_str());
