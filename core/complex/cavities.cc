@@ -14,7 +14,7 @@
 namespace stellate::core {
 namespace {
 
-// Cavities of no more vertices than this also try simplices that no star holds.
+// Cavities of no more vertices than this also try simplices that no star holds: 462 for k = 4.
 constexpr std::size_t kAllSubsets = 11;
 // Larger cavities are left alone.
 constexpr std::size_t kMostVertices = 48;

@@ -72,7 +72,7 @@ class RestrictedVoronoiCell<2> {
     std::vector<std::uint8_t> judged;  // by vertex
   };
 
-  // More vertices than fit inside: some one cell in fifty, and most while the sample is coarse.
+  // For more vertices than fit inside: six is the mean, so that few finished cells need it.
   struct Outside {
     std::vector<double> corners;
     std::vector<std::uint32_t> ids;
