@@ -217,13 +217,19 @@ void OraclePool::Fail(MeshFailure failure) {
   changed_.notify_one();
 }
 
-OraclePool::Outcome OraclePool::Ask(const core::QueryBatch& batch) {
+OraclePool::Outcome OraclePool::Ask(const core::QueryBatch& batch,
+                                    const std::function<void()>& meanwhile) {
   std::shared_ptr<Round> round = MakeRound(batch);
   std::unique_lock lock(mutex_);
   round_ = round;
   std::erase_if(titles_, [this](const auto& entry) { return !members_.contains(entry.first); });
   TimePoint now = Clock::now();
   dispatch_.Begin(Measure(batch), now);
+  auto first_deliveries = AssignLocked(now);
+  lock.unlock();
+  Send(std::move(first_deliveries));
+  meanwhile();
+  lock.lock();
   Outcome outcome;
   while (true) {
     now = Clock::now();

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -97,8 +98,10 @@ class OraclePool {
     std::shared_ptr<Round> round;        // set when every query was answered
     std::optional<MeshFailure> failure;  // set when the round failed; neither: interrupted
   };
-  // Session's thread only. Every wait in it ends: with answers, or by a limit of the options.
-  Outcome Ask(const core::QueryBatch& batch);
+  // Session's thread only. Does `meanwhile` once the workers have the questions, or there are none.
+  // Every wait in it ends: with answers, or by a limit of the options.
+  Outcome Ask(
+      const core::QueryBatch& batch, const std::function<void()>& meanwhile = [] {});
   // Makes Ask return, now and ever after.
   void Interrupt();
 

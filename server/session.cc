@@ -78,10 +78,11 @@ void Session::Run() {
          core::Status::Ok());
   }
   Expose(nullptr);
-  mesher.reset();  // it is large, and watchers do not need it
-  malloc_trim(0);  // the allocator would keep the memory of each mesh's own thread
   if (options_.memory != nullptr) options_.memory->Insist(history_.MemoryBytes());
   Finish(report ? &*report : nullptr);
+  mesher.reset();  // it is large, and watchers, who have heard the end, do not need it
+  malloc_trim(0);  // the allocator would keep the memory of each mesh's own thread
+  over_ = true;
 }
 
 // What Cancel may interrupt in the middle of a round.
@@ -103,8 +104,10 @@ void Session::RunRounds(core::Mesher* mesher) {
   while (true) {
     if (cancelled_) mesher->Cancel();
     const core::QueryBatch* const batch = mesher->NextBatch();
-    Publish(mesher->progress());
-    if (batch == nullptr) return;
+    if (batch == nullptr) {
+      if (auto failure = Show(mesher)) FailBlameless(mesher, std::move(*failure));
+      return;
+    }
     if (!FitsMemory(mesher, static_cast<std::uint64_t>(batch->size()))) continue;
     if (replaying_ && ReplayRound(mesher, *batch)) continue;
     RunRound(mesher, *batch);
@@ -131,7 +134,11 @@ bool Session::ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch) {
   if (replay.failure) {
     FailBlameless(mesher, std::move(*replay.failure));
   } else if (replay.answers) {
-    Absorb(mesher, *replay.answers);
+    if (auto failure = Show(mesher)) {
+      FailBlameless(mesher, std::move(*failure));
+    } else {
+      Absorb(mesher, *replay.answers);
+    }
   } else {
     replaying_ = false;
     if (options_.record->end) {
@@ -157,8 +164,11 @@ void Session::RepeatEnd(core::Mesher* mesher) {
                          "server meshes differently from the one that recorded them; mesh anew"});
 }
 
+// While the workers are at this round's queries, watchers are shown what the last one led to.
 void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
-  OraclePool::Outcome outcome = pool_.Ask(batch);
+  OraclePool::Outcome outcome = pool_.Ask(batch, [&] {
+    if (auto failure = Show(mesher)) pool_.Fail(std::move(*failure));
+  });
   if (outcome.failure) {
     // The worker at fault has been told on its own stream; the others are blameless.
     FailBlameless(mesher, std::move(*outcome.failure));
@@ -183,7 +193,7 @@ void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
 }
 
 bool Session::Absorb(core::Mesher* mesher, const core::Answers& answers) {
-  const auto delta = mesher->Absorb(answers);
+  auto delta = mesher->Absorb(answers);
   if (!delta) {
     if (delta.error().code == StatusCode::kCancelled)
       CancelInRound(mesher);
@@ -191,12 +201,25 @@ bool Session::Absorb(core::Mesher* mesher, const core::Answers& answers) {
       Fail(mesher, ToFailure(delta.error()), delta.error());
     return false;
   }
-  const core::Status logged = history_.Append(*delta);
-  if (!logged.ok()) {
-    FailBlameless(mesher, {"INTERNAL", core::Message("a fault of the server: ", logged.message)});
-    return false;
-  }
+  unseen_ = std::move(*delta);
   return true;
+}
+
+// How the mesh stands, and what has changed since it was last shown.
+std::optional<MeshFailure> Session::Show(core::Mesher* mesher) {
+  if (unseen_) {
+    const core::Status logged = history_.Append(*unseen_);
+    unseen_.reset();
+    if (!logged.ok()) {
+      return MeshFailure{"INTERNAL", core::Message("a fault of the server: ", logged.message)};
+    }
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    progress_ = mesher->progress();
+  }
+  WakeWatchers();
+  return {};
 }
 
 // What the round would have led to was never seen, and must not appear when the mesh is replayed. A
@@ -227,14 +250,6 @@ void Session::Fail(core::Mesher* mesher, MeshFailure failure, core::Status statu
   }
   blame_ = status;
   if (mesher != nullptr) mesher->Fail(std::move(status));
-}
-
-void Session::Publish(const core::Progress& progress) {
-  {
-    const std::lock_guard lock(mutex_);
-    progress_ = progress;
-  }
-  WakeWatchers();
 }
 
 SessionState Session::FinalState(const core::Report* report) const {
@@ -298,7 +313,6 @@ void Session::Finish(const core::Report* report) {
                     progress_.simplices, " simplices; ", verdict));
   pool_.Close({blame_});
   WakeWatchers();
-  over_ = true;
 }
 
 void Session::Cancel() {

@@ -36,10 +36,10 @@ struct SessionOptions {
   DispatchOptions dispatch;
   std::size_t max_workers = 64;
   std::size_t max_watchers = 64;
-  std::shared_ptr<SessionObserver> observer;  // may be null
-  std::shared_ptr<SessionJournal> journal;    // may be null: the mesh lives in memory alone
+  std::shared_ptr<SessionObserver> observer;      // may be null
+  std::shared_ptr<SessionJournal> journal;        // may be null: the mesh lives in memory alone
   std::shared_ptr<MemoryBudget::Account> memory;  // may be null: nobody counts
-  std::optional<SessionRecord> record;        // set: the journal has it from an earlier server
+  std::optional<SessionRecord> record;            // set: the journal has it from an earlier server
 };
 
 // A session at one moment.
@@ -106,11 +106,11 @@ class Session {
   void RepeatEnd(core::Mesher* mesher);
   void RunRound(core::Mesher* mesher, const core::QueryBatch& batch);
   bool Absorb(core::Mesher* mesher, const core::Answers& answers);
+  std::optional<MeshFailure> Show(core::Mesher* mesher);
   void CancelInRound(core::Mesher* mesher);
   bool FitsMemory(core::Mesher* mesher, std::uint64_t queries);
   void FailBlameless(core::Mesher* mesher, MeshFailure failure);
   void Fail(core::Mesher* mesher, MeshFailure failure, core::Status status);
-  void Publish(const core::Progress& progress);
   void Finish(const core::Report* report);
   SessionState FinalState(const core::Report* report) const;
   void WakeWatchers();
@@ -125,11 +125,12 @@ class Session {
   std::atomic<bool> over_{false};
   bool replaying_;      // Run's thread only: the journal may know the next answers
   core::Status blame_;  // Run's thread only: told to all workers at the end
+  std::optional<core::MeshDelta> unseen_;  // Run's thread only: absorbed, not in the history yet
 
   mutable std::mutex mutex_;
   core::Mesher* computing_ = nullptr;  // while it lives
-  bool ending_ = false;     // the final state is chosen, and being recorded
-  bool suspended_ = false;  // the server stopped it, not its owner
+  bool ending_ = false;                // the final state is chosen, and being recorded
+  bool suspended_ = false;             // the server stopped it, not its owner
   std::optional<SessionState> final_state_;
   std::optional<std::chrono::system_clock::time_point> end_time_;
   double final_seconds_ = 0;

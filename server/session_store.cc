@@ -52,7 +52,7 @@ Allowed<std::shared_ptr<Session>> SessionStore::Create(SessionOptions options) {
   const std::lock_guard lock(mutex_);
   std::size_t running = 0, owned = 0;
   const auto count = [&](const Entry& entry) {
-    if (entry.session->Over()) return;
+    if (entry.session->HasEnded()) return;
     ++running;
     if (entry.session->options().owner == options.owner) ++owned;
   };

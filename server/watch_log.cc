@@ -11,8 +11,8 @@ namespace {
 using core::Status;
 using core::StatusCode;
 
-// Stands for a row that is looked up but not stored.
-constexpr std::uint32_t kProbe = std::numeric_limits<std::uint32_t>::max();
+// The end of a list of simplices.
+constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 // Simplices looked at for one part: bounds the time spent under the lock.
 constexpr std::size_t kScanLimit = std::size_t{1} << 18;
 
@@ -25,29 +25,27 @@ Status OutOfStep(std::string message) {
 WatchLog::WatchLog(int dimension, int ambient_dimension)
     : row_size_(static_cast<std::size_t>(dimension) + 1),
       d_(ambient_dimension),
+      points_(d_),
+      rows_(row_size_),
+      lives_(1),
+      deaths_(1),
       marks_(1),
-      alive_(0, RowHash{this}, RowEqual{this}) {}
+      next_(1) {}
 
-std::size_t WatchLog::RowHash::operator()(std::uint32_t simplex) const {
-  std::uint64_t hash = 0x9e3779b97f4a7c15u;
-  for (std::size_t i = 0; i < log->row_size_; ++i) {
-    const std::uint32_t id =
-        simplex == kProbe ? log->probe_[i] : log->rows_[simplex * log->row_size_ + i];
-    hash = (hash ^ id) * 0xff51afd7ed558ccdu;
-    hash ^= hash >> 32;
-  }
-  return hash;
+// Takes a simplex from the living; kNone if it is not among them.
+std::uint32_t WatchLog::Unlink(const std::uint32_t* row) {
+  if (row[0] >= first_of_.size()) return kNone;
+  std::uint32_t* link = &first_of_[row[0]];
+  while (*link != kNone && !std::equal(row, row + row_size_, rows_[*link])) link = next_[*link];
+  const std::uint32_t simplex = *link;
+  if (simplex != kNone) *link = *next_[simplex];
+  return simplex;
 }
 
-bool WatchLog::RowEqual::operator()(std::uint32_t a, std::uint32_t b) const {
-  if (a == b) return true;
-  for (std::size_t i = 0; i < log->row_size_; ++i) {
-    const auto id = [&](std::uint32_t s) {
-      return s == kProbe ? log->probe_[i] : log->rows_[s * log->row_size_ + i];
-    };
-    if (id(a) != id(b)) return false;
-  }
-  return true;
+void WatchLog::Link(std::uint32_t simplex) {
+  std::uint32_t& first = first_of_[*rows_[simplex]];
+  *next_[simplex] = first;
+  first = simplex;
 }
 
 Status WatchLog::Append(const core::MeshDelta& delta) {
@@ -65,36 +63,40 @@ Status WatchLog::Append(const core::MeshDelta& delta) {
   }
   const std::size_t first_simplex = last.simplices;
   const std::size_t new_simplices = delta.added.size() / row_size_;
-  if (first_simplex + new_simplices >= kProbe) {
+  if (first_simplex + new_simplices >= kNone) {
     return OutOfStep(core::Message("the mesh has had ", first_simplex + new_simplices,
                                    " simplices, more than the log can number"));
   }
+  for (std::size_t i = 0; i < new_simplices; ++i) {
+    if (delta.added[i * row_size_] < last.vertices + new_vertices) continue;
+    return OutOfStep(core::Message("revision ", revision, " adds a simplex with vertex ",
+                                   delta.added[i * row_size_], ", which is not there"));
+  }
   std::vector<std::uint32_t> dying;
+  dying.reserve(delta.removed.size() / row_size_);
   for (std::size_t r = 0; r + row_size_ <= delta.removed.size(); r += row_size_) {
-    probe_ = delta.removed.data() + r;
-    const auto it = alive_.find(kProbe);
-    if (it == alive_.end()) {
-      for (const std::uint32_t simplex : dying) alive_.insert(simplex);
+    const std::uint32_t simplex = Unlink(delta.removed.data() + r);
+    if (simplex == kNone) {
+      for (const std::uint32_t other : dying) Link(other);
       return OutOfStep(
           core::Message("revision ", revision, " removes a simplex that is not there"));
     }
-    dying.push_back(*it);
-    alive_.erase(it);
+    dying.push_back(simplex);
   }
+  const std::vector<Life> births(new_simplices, Life{revision, 0});
   {
     const std::lock_guard lock(mutex_);
-    for (const std::uint32_t simplex : dying) {
-      lives_[simplex].died = revision;
-      deaths_.PushBack(simplex);
-    }
-    const double* coordinates = delta.points.data();
-    for (std::size_t i = 0; i < new_vertices * d_; ++i) points_.PushBack(coordinates[i]);
-    for (std::size_t i = 0; i < new_simplices * row_size_; ++i) rows_.PushBack(delta.added[i]);
-    for (std::size_t i = 0; i < new_simplices; ++i) lives_.PushBack({revision, 0});
+    for (const std::uint32_t simplex : dying) lives_[simplex]->died = revision;
+    deaths_.Append(dying.data(), dying.size());
+    points_.Append(delta.points.data(), new_vertices);
+    rows_.Append(delta.added.data(), new_simplices);
+    lives_.Append(births.data(), new_simplices);
     marks_.push_back({last.vertices + new_vertices, first_simplex + new_simplices, deaths_.size()});
   }
+  first_of_.resize(marks_.back().vertices, kNone);
+  next_.Append(delta.added.data(), new_simplices);  // any numbers: Link sets them
   for (std::size_t i = 0; i < new_simplices; ++i) {
-    alive_.insert(static_cast<std::uint32_t>(first_simplex + i));
+    Link(static_cast<std::uint32_t>(first_simplex + i));
   }
   return Status::Ok();
 }
@@ -111,12 +113,11 @@ WatchLog::Cursor WatchLog::Begin(std::uint64_t from) const {
 }
 
 std::uint64_t WatchLog::MemoryBytes() const {
-  constexpr std::uint64_t kAliveBytes = 40;  // a node of the set and its part of the table
   const std::lock_guard lock(mutex_);
-  const Mark& end = marks_.back();
-  return points_.size() * sizeof(double) + rows_.size() * sizeof(std::uint32_t) +
-         lives_.size() * sizeof(Life) + deaths_.size() * sizeof(std::uint32_t) +
-         marks_.size() * sizeof(Mark) + (end.simplices - end.deaths) * kAliveBytes;
+  const std::uint64_t of_vertex = d_ * sizeof(double) + sizeof(std::uint32_t);
+  const std::uint64_t of_simplex = (row_size_ + 1) * sizeof(std::uint32_t) + sizeof(Life);
+  return points_.size() * of_vertex + rows_.size() * of_simplex +
+         deaths_.size() * sizeof(std::uint32_t) + marks_.size() * sizeof(Mark);
 }
 
 WatchLog::Snapshot WatchLog::At(std::uint64_t revision) const {
@@ -133,52 +134,65 @@ WatchLog::Cursor WatchLog::BeginAt(std::uint64_t revision, std::uint64_t positio
   return {0, revision, mark.deaths, vertex, position - vertex};
 }
 
-void WatchLog::CopyRow(std::uint32_t simplex, std::vector<std::uint32_t>* out) const {
-  for (std::size_t i = 0; i < row_size_; ++i) out->push_back(rows_[simplex * row_size_ + i]);
-}
-
 DeltaPart WatchLog::Next(Cursor* cursor, std::size_t max_bytes) const {
   const std::size_t row_bytes = row_size_ * sizeof(std::uint32_t);
+  const std::size_t point_bytes = d_ * sizeof(double);
   const std::size_t max_rows = std::max<std::size_t>(max_bytes / row_bytes, 1);
-  const std::size_t max_points = std::max<std::size_t>(max_bytes / (d_ * sizeof(double)), 1);
   DeltaPart part;
   part.revision = cursor->to;
   std::size_t scanned = 0;
 
   const std::lock_guard lock(mutex_);
   const Mark& end = marks_[cursor->to];
-  // Gone: was there at `from`, is not at `to`. Deaths are in order, so those up to `to` suffice.
-  for (; cursor->removed < end.deaths && scanned < kScanLimit; ++cursor->removed, ++scanned) {
-    const std::uint32_t simplex = deaths_[cursor->removed];
-    if (lives_[simplex].born > cursor->from) continue;
-    if (part.removed.size() >= max_rows * row_size_) break;
-    CopyRow(simplex, &part.removed);
-  }
-  if (cursor->removed < end.deaths || !part.removed.empty()) {
-    part.first_vertex = cursor->vertex;
-    part.complete = cursor->removed == end.deaths && cursor->vertex == end.vertices &&
-                    cursor->added == end.simplices;
-    return part;
-  }
   part.first_vertex = cursor->vertex;
-  const std::size_t points = std::min(end.vertices - cursor->vertex, max_points);
+  // Gone: was there at `from`, is not at `to`. Deaths are in order, so those up to `to` suffice.
+  part.removed.reserve(std::min({end.deaths - cursor->removed, max_rows, kScanLimit}) * row_size_);
+  for (; cursor->removed < end.deaths && scanned < kScanLimit; ++cursor->removed, ++scanned) {
+    const std::uint32_t simplex = *deaths_[cursor->removed];
+    if (lives_[simplex]->born > cursor->from) continue;
+    if (part.removed.size() >= max_rows * row_size_) break;
+    const std::uint32_t* const row = rows_[simplex];
+    part.removed.insert(part.removed.end(), row, row + row_size_);
+  }
+  if (cursor->removed < end.deaths) return part;
+
+  // A part with nothing in it yet takes one of whatever comes next, however large.
+  std::size_t left = max_bytes - std::min(max_bytes, part.removed.size() * sizeof(std::uint32_t));
+  const auto room_for = [&left](std::size_t bytes, bool empty) {
+    return std::max(left / bytes, std::size_t{empty ? 1u : 0u});
+  };
+  std::size_t points =
+      std::min(end.vertices - cursor->vertex, room_for(point_bytes, part.removed.empty()));
+  left -= std::min(left, points * point_bytes);
   part.points.reserve(points * d_);
-  for (std::size_t i = 0; i < points * d_; ++i) {
-    part.points.push_back(points_[cursor->vertex * d_ + i]);
+  while (points > 0) {
+    const std::size_t run = std::min(points, points_.Run(cursor->vertex));
+    const double* const first = points_[cursor->vertex];
+    part.points.insert(part.points.end(), first, first + run * d_);
+    cursor->vertex += run;
+    points -= run;
   }
-  cursor->vertex += points;
   if (cursor->vertex < end.vertices) return part;  // a position is among vertices or simplices
-  const std::size_t bytes_left = max_bytes - std::min(max_bytes, points * d_ * sizeof(double));
-  std::size_t rows_left = points == 0 ? max_rows : bytes_left / row_bytes;
-  for (; cursor->added < end.simplices && scanned < kScanLimit; ++cursor->added, ++scanned) {
-    const auto simplex = static_cast<std::uint32_t>(cursor->added);
-    const Life& life = lives_[simplex];
-    if (life.died != 0 && life.died <= cursor->to) continue;
-    if (part.added.size() >= rows_left * row_size_) break;
-    CopyRow(simplex, &part.added);
-  }
-  part.complete = cursor->vertex == end.vertices && cursor->added == end.simplices;
+  AppendAdded(cursor, end.simplices,
+              room_for(row_bytes, part.removed.empty() && part.points.empty()), &part);
+  part.complete = cursor->added == end.simplices;
   return part;
+}
+
+// Alive at `to`, from the cursor on: `max_rows` at most.
+void WatchLog::AppendAdded(Cursor* cursor, std::size_t end, std::size_t max_rows,
+                           DeltaPart* part) const {
+  const std::size_t stop = std::min(end, cursor->added + kScanLimit);
+  part->added.reserve(std::min(stop - cursor->added, max_rows) * row_size_);
+  std::size_t rows = 0;
+  for (; cursor->added < stop; ++cursor->added) {
+    const Life& life = *lives_[cursor->added];
+    if (life.died != 0 && life.died <= cursor->to) continue;
+    if (rows == max_rows) return;
+    ++rows;
+    const std::uint32_t* const row = rows_[cursor->added];
+    part->added.insert(part->added.end(), row, row + row_size_);
+  }
 }
 
 }  // namespace stellate::server

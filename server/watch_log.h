@@ -1,10 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <bit>
 #include <cstdint>
 #include <memory>
 #include <mutex>
-#include <unordered_set>
 #include <vector>
 
 #include "core/report.h"
@@ -12,21 +13,44 @@
 
 namespace stellate::server {
 
-// An array that only grows, in blocks that never move: appending is cheap whatever the size.
+// Rows of `width` numbers each, of which there come only more, in blocks that never move: appending
+// is cheap whatever the size, and a row lies in one piece.
 template <typename T>
-class GrowingArray {
+class GrowingRows {
  public:
+  explicit GrowingRows(std::size_t width)
+      : width_(width),
+        shift_(std::countr_zero(std::bit_floor(std::max(kBlock / width, std::size_t{1})))) {}
+
   std::size_t size() const { return size_; }
-  T& operator[](std::size_t i) { return blocks_[i / kBlock][i % kBlock]; }
-  const T& operator[](std::size_t i) const { return blocks_[i / kBlock][i % kBlock]; }
-  void PushBack(T value) {
-    if (size_ % kBlock == 0) blocks_.push_back(std::make_unique<T[]>(kBlock));
-    blocks_[size_ / kBlock][size_ % kBlock] = value;
-    ++size_;
+  T* operator[](std::size_t row) { return blocks_[row >> shift_].get() + Offset(row); }
+  const T* operator[](std::size_t row) const { return blocks_[row >> shift_].get() + Offset(row); }
+  // From `row` on, how many lie in one piece with it.
+  std::size_t Run(std::size_t row) const {
+    return std::min(size_ - row, RowsOfBlock() - (row & (RowsOfBlock() - 1)));
+  }
+  void Append(const T* rows, std::size_t count) {
+    while (count > 0) {
+      if (size_ >> shift_ == blocks_.size()) {
+        blocks_.push_back(std::make_unique_for_overwrite<T[]>(RowsOfBlock() * width_));
+      }
+      const std::size_t place = size_ & (RowsOfBlock() - 1);
+      const std::size_t fits = std::min(count, RowsOfBlock() - place);
+      std::copy_n(rows, fits * width_, blocks_.back().get() + place * width_);
+      size_ += fits;
+      rows += fits * width_;
+      count -= fits;
+    }
   }
 
  private:
-  static constexpr std::size_t kBlock = std::size_t{1} << 14;
+  static constexpr std::size_t kBlock = std::size_t{1} << 14;  // numbers, about
+
+  std::size_t RowsOfBlock() const { return std::size_t{1} << shift_; }
+  std::size_t Offset(std::size_t row) const { return (row & (RowsOfBlock() - 1)) * width_; }
+
+  const std::size_t width_;
+  const int shift_;
   std::vector<std::unique_ptr<T[]>> blocks_;
   std::size_t size_ = 0;
 };
@@ -36,7 +60,7 @@ struct DeltaPart {
   std::uint64_t revision = 0;  // where the change leads
   std::uint64_t first_vertex = 0;
   std::vector<double> points;                 // d each
-  std::vector<std::uint32_t> added, removed;  // k+1 each; never both in one part
+  std::vector<std::uint32_t> added, removed;  // k+1 each; one in both went and came back
   bool complete = false;                      // the last part
 };
 
@@ -67,8 +91,8 @@ class WatchLog {
 
   // From `from` to the newest revision; `from` must not lie beyond that.
   Cursor Begin(std::uint64_t from) const;
-  // The next part, of about `max_bytes` at most: all removed simplices first, then vertices, then
-  // added simplices. Looks at a bounded number of simplices, so a part may be small or empty.
+  // The next part, of `max_bytes` at most: all removed simplices first, then vertices, then added
+  // simplices. Looks at a bounded number of simplices, so a part may be small or empty.
   DeltaPart Next(Cursor* cursor, std::size_t max_bytes) const;
 
   // The mesh as it was at a revision, to be read from the start or from where a reader stopped.
@@ -87,34 +111,27 @@ class WatchLog {
     std::uint64_t born = 0;
     std::uint64_t died = 0;  // 0: alive
   };
-  struct RowHash {
-    const WatchLog* log;
-    std::size_t operator()(std::uint32_t simplex) const;
-  };
-  struct RowEqual {
-    const WatchLog* log;
-    bool operator()(std::uint32_t a, std::uint32_t b) const;
-  };
-  using Rows = std::unordered_set<std::uint32_t, RowHash, RowEqual>;
-
-  void CopyRow(std::uint32_t simplex, std::vector<std::uint32_t>* out) const;
+  std::uint32_t Unlink(const std::uint32_t* row);
+  void Link(std::uint32_t simplex);
+  void AppendAdded(Cursor* cursor, std::size_t end, std::size_t max_rows, DeltaPart* part) const;
 
   const std::size_t row_size_;  // k + 1
   const std::size_t d_;
 
   mutable std::mutex mutex_;
-  GrowingArray<double> points_;
-  GrowingArray<std::uint32_t> rows_;    // ids of each simplex that ever was
-  GrowingArray<Life> lives_;            // by simplex
-  GrowingArray<std::uint32_t> deaths_;  // simplices in the order in which they went
+  GrowingRows<double> points_;
+  GrowingRows<std::uint32_t> rows_;    // ids of each simplex that ever was
+  GrowingRows<Life> lives_;            // by simplex
+  GrowingRows<std::uint32_t> deaths_;  // simplices in the order in which they went
   struct Mark {
     std::size_t vertices = 0, simplices = 0, deaths = 0;
   };
   std::vector<Mark> marks_;  // sizes at each revision, 0 first
 
-  // The appending thread's own: simplices alive now, found by their vertices.
-  Rows alive_;
-  const std::uint32_t* probe_ = nullptr;  // the row that kProbe stands for
+  // The appending thread's own: simplices alive now, in a list for each vertex that is the lowest
+  // of any. A list is no longer than a star is large.
+  std::vector<std::uint32_t> first_of_;  // by vertex
+  GrowingRows<std::uint32_t> next_;      // by simplex
 };
 
 }  // namespace stellate::server

@@ -120,16 +120,15 @@ TEST(MeshBuilder, EndsWithWhatWasAddedAndNotRemoved) {
   ASSERT_TRUE(builder->Absorb(Delta(1, 0, points.leftCols(3), {0, 1, 1, 2, 0, 2}, {})));
   ASSERT_TRUE(builder->Absorb(Delta(2, 3, points.rightCols(1), {2, 3, 0, 3}, {0, 2, 0, 1})));
   ASSERT_TRUE(builder->Absorb(Delta(5, 4, Eigen::MatrixXd(2, 0), {0, 1}, {})));  // it comes back
-  const Expected<Mesh> mesh = builder->Take();
-  ASSERT_TRUE(mesh.has_value());
-  EXPECT_EQ(mesh->points, points);
+  const Mesh mesh = builder->Take();
+  EXPECT_EQ(mesh.points, points);
   SimplexMatrix expected(2, 4);
   expected << 0, 0, 1, 2, 1, 3, 2, 3;
-  EXPECT_EQ(mesh->simplices, expected);
+  EXPECT_EQ(mesh.simplices, expected);
 }
 
 TEST(MeshBuilder, StaysRightThroughALongHistory) {
-  // A path whose last edge moves on a hundred thousand times: more removals than are kept.
+  // A hundred edges come and go five hundred times.
   auto builder = MeshBuilder::Create(1, 2);
   ASSERT_TRUE(builder.has_value());
   ASSERT_TRUE(builder->Absorb(Delta(1, 0, Eigen::MatrixXd::Zero(2, 200), {0, 1}, {})));
@@ -141,10 +140,9 @@ TEST(MeshBuilder, StaysRightThroughALongHistory) {
     }
     ASSERT_TRUE(builder->Absorb(Delta(2 + step, 200, Eigen::MatrixXd(2, 0), added, removed)));
   }
-  const Expected<Mesh> mesh = builder->Take();
-  ASSERT_TRUE(mesh.has_value());
-  ASSERT_EQ(mesh->simplices.cols(), 1);
-  EXPECT_EQ(mesh->simplices(1, 0), 1u);
+  const Mesh mesh = builder->Take();
+  ASSERT_EQ(mesh.simplices.cols(), 1);
+  EXPECT_EQ(mesh.simplices(1, 0), 1u);
 }
 
 TEST(MeshBuilder, TakesARevisionOnceAndWhole) {
@@ -155,15 +153,14 @@ TEST(MeshBuilder, TakesARevisionOnceAndWhole) {
   // Cut short in the middle of revision 5, and sent again as 6.
   ASSERT_TRUE(builder->Absorb(Delta(5, 2, points.rightCols(1), {}, {0, 1}, false)));
   EXPECT_EQ(builder->revision(), 3u);
-  EXPECT_EQ(builder->Take()->points.cols(), 2);
+  EXPECT_EQ(builder->Take().points.cols(), 2);
   builder->ForgetPending();
   ASSERT_TRUE(builder->Absorb(Delta(6, 2, points.rightCols(1), {0, 2}, {0, 1})));
   EXPECT_EQ(builder->revision(), 6u);
-  const Expected<Mesh> mesh = builder->Take();
-  ASSERT_TRUE(mesh.has_value());
-  EXPECT_EQ(mesh->points, points);
-  ASSERT_EQ(mesh->simplices.cols(), 1);
-  EXPECT_EQ(mesh->simplices(1, 0), 2u);
+  const Mesh mesh = builder->Take();
+  EXPECT_EQ(mesh.points, points);
+  ASSERT_EQ(mesh.simplices.cols(), 1);
+  EXPECT_EQ(mesh.simplices(1, 0), 2u);
   // What it has already is refused, and so is another revision before one is complete.
   EXPECT_FALSE(builder->Absorb(Delta(6, 3, Eigen::MatrixXd(2, 0), {1, 2}, {})));
   ASSERT_TRUE(builder->Absorb(Delta(7, 3, Eigen::MatrixXd(2, 0), {1, 2}, {}, false)));
@@ -179,10 +176,9 @@ TEST(MeshBuilder, BeginsAnewWhenTheServerDoes) {
   builder->Reset();
   EXPECT_EQ(builder->revision(), 0u);
   ASSERT_TRUE(builder->Absorb(Delta(2, 0, points.leftCols(2), {0, 1}, {})));
-  const Expected<Mesh> mesh = builder->Take();
-  ASSERT_TRUE(mesh.has_value());
-  EXPECT_EQ(mesh->points, points.leftCols(2));
-  EXPECT_EQ(mesh->simplices.cols(), 1);
+  const Mesh mesh = builder->Take();
+  EXPECT_EQ(mesh.points, points.leftCols(2));
+  EXPECT_EQ(mesh.simplices.cols(), 1);
 }
 
 TEST(Addresses, TellThisMachineFromOthers) {
@@ -200,8 +196,14 @@ TEST(MeshBuilder, RefusesWhatMakesNoSense) {
   v1::DeltaChunk wide = Delta(1, 0, Eigen::MatrixXd(2, 0), {0, 1}, {});
   wide.mutable_delta()->mutable_added()->set_shape(1, 3);
   EXPECT_FALSE(builder->Absorb(std::move(wide)));
-  ASSERT_TRUE(builder->Absorb(Delta(1, 0, Eigen::MatrixXd::Zero(2, 1), {0, 1}, {})));
-  EXPECT_FALSE(builder->Take().has_value());  // vertex 1 never came
+  // Vertex 1 never came.
+  EXPECT_FALSE(builder->Absorb(Delta(1, 0, Eigen::MatrixXd::Zero(2, 1), {0, 1}, {})));
+  for (const std::vector<std::uint32_t>& absent :
+       {std::vector{1u, 2u}, {0u, 2u}, {4000000000u, 1u}}) {
+    auto other = MeshBuilder::Create(1, 2);
+    ASSERT_TRUE(other->Absorb(Delta(1, 0, Eigen::MatrixXd::Zero(2, 3), {0, 1}, {})));
+    EXPECT_FALSE(other->Absorb(Delta(2, 3, Eigen::MatrixXd(2, 0), {}, absent)));
+  }
   EXPECT_FALSE(MeshBuilder::Create(0, 2).has_value());
   EXPECT_FALSE(MeshBuilder::Create(kMaxSimplexDimension + 1, 20).has_value());
 }

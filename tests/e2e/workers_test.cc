@@ -60,9 +60,7 @@ class Workers : public Live {
       if (response.has_final()) ending.final = response.final();
     }
     EXPECT_TRUE(stream->Finish().ok());
-    Expected<Mesh> mesh = builder->Take();
-    EXPECT_TRUE(mesh.has_value());
-    if (mesh) ending.mesh = std::move(*mesh);
+    ending.mesh = builder->Take();
     return ending;
   }
 

@@ -66,15 +66,19 @@ Expected<Eigen::MatrixXd> FromArray(const v1::Array& array,
   return columns;
 }
 
-Expected<void> AppendIds(const v1::IndexArray& array, std::uint32_t width,
-                         std::vector<std::uint32_t>* ids) {
-  const Expected<Eigen::Index> rows = Rows(array, {width}, sizeof(std::uint32_t));
+Expected<void> AppendNumbers(const v1::Array& array, const std::vector<std::uint32_t>& shape,
+                             std::vector<double>* numbers) {
+  const Expected<Eigen::Index> rows = Rows(array, shape, sizeof(double));
   if (!rows) return tl::unexpected(rows.error());
   if (array.data().empty()) return {};
-  const size_t old_size = ids->size();
-  ids->resize(old_size + static_cast<size_t>(*rows) * width);
-  std::memcpy(ids->data() + old_size, array.data().data(), array.data().size());
+  const size_t old_size = numbers->size();
+  numbers->resize(old_size + array.data().size() / sizeof(double));
+  std::memcpy(numbers->data() + old_size, array.data().data(), array.data().size());
   return {};
+}
+
+Expected<Eigen::Index> CountRows(const v1::IndexArray& array, std::uint32_t width) {
+  return Rows(array, {width}, sizeof(std::uint32_t));
 }
 
 Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {

@@ -20,9 +20,11 @@ void ToArray(const Eigen::MatrixXd& columns, const std::vector<std::uint32_t>& s
              v1::Array* array);
 Expected<Eigen::MatrixXd> FromArray(const v1::Array& array,
                                     const std::vector<std::uint32_t>& shape);
-// Appends the ids of an [n, width] array to `ids`.
-Expected<void> AppendIds(const v1::IndexArray& array, std::uint32_t width,
-                         std::vector<std::uint32_t>* ids);
+// As FromArray, at the end of `numbers`.
+Expected<void> AppendNumbers(const v1::Array& array, const std::vector<std::uint32_t>& shape,
+                             std::vector<double>* numbers);
+// The rows of an [n, width] array, which has what they need.
+Expected<Eigen::Index> CountRows(const v1::IndexArray& array, std::uint32_t width);
 
 // Errors: an option that the wire cannot carry (the server checks the rest).
 Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options);

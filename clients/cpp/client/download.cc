@@ -152,10 +152,9 @@ class Download {
   }
 
   Expected<Mesh> Conclude() {
-    Expected<Mesh> mesh = builder_->Take();
-    if (!mesh) return mesh;
-    const auto vertices = static_cast<std::uint64_t>(mesh->points.cols());
-    const auto simplices = static_cast<std::uint64_t>(mesh->simplices.cols());
+    Mesh mesh = builder_->Take();
+    const auto vertices = static_cast<std::uint64_t>(mesh.points.cols());
+    const auto simplices = static_cast<std::uint64_t>(mesh.simplices.cols());
     if (vertices != vertices_ || simplices != simplices_) {
       return Fail(ErrorCode::kServerFailed, "the server announced " + std::to_string(vertices_) +
                                                 " vertices and " + std::to_string(simplices_) +
@@ -163,7 +162,7 @@ class Download {
                                                 " and " + std::to_string(simplices));
     }
     if (HasEnded(status_) && revision_ == status_.revision()) {
-      mesh->report = FromProto(status_.report());
+      mesh.report = FromProto(status_.report());
     }
     return mesh;
   }

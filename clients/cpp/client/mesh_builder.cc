@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <iterator>
+#include <cstring>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -11,44 +12,79 @@
 namespace stellate::client {
 namespace {
 
+// A list for each vertex that is the lowest of any simplex, no longer than a star is large.
 template <size_t N>
-class FixedLog final : public SimplexLog {
+class FixedSet final : public SimplexSet {
  public:
-  void Append(const std::vector<std::uint32_t>& ids, bool removed) override {
-    std::vector<Simplex>& log = removed ? removed_ : added_;
-    for (size_t i = 0; i + N <= ids.size(); i += N) {
-      Simplex& simplex = log.emplace_back();
-      std::copy_n(ids.begin() + static_cast<std::ptrdiff_t>(i), N, simplex.begin());
+  bool Add(const char* ids, Eigen::Index count, std::uint64_t vertices) override {
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Simplex simplex = Read(ids, i);
+      if (*std::max_element(simplex.begin(), simplex.end()) >= vertices) return false;
+      if (simplex[0] >= first_of_.size()) first_of_.resize(vertices, kNone);
+      std::uint32_t place = free_;
+      if (place == kNone) {
+        place = static_cast<std::uint32_t>(nodes_.size());
+        nodes_.emplace_back();
+      } else {
+        free_ = nodes_[place].next;
+      }
+      nodes_[place] = {simplex, first_of_[simplex[0]]};
+      first_of_[simplex[0]] = place;
+      ++size_;
     }
-    if (removed_.size() > kSlack + added_.size() / 2) Compact();
+    return true;
   }
 
-  SimplexMatrix Take() override {
-    Compact();
-    SimplexMatrix simplices(N, static_cast<Eigen::Index>(added_.size()));
-    for (size_t j = 0; j < added_.size(); ++j) {
-      std::copy(added_[j].begin(), added_[j].end(),
-                simplices.col(static_cast<Eigen::Index>(j)).begin());
+  bool Remove(const char* ids, Eigen::Index count) override {
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Simplex simplex = Read(ids, i);
+      if (simplex[0] >= first_of_.size()) return false;
+      std::uint32_t* link = &first_of_[simplex[0]];
+      while (*link != kNone && nodes_[*link].simplex != simplex) link = &nodes_[*link].next;
+      if (*link == kNone) return false;
+      const std::uint32_t place = *link;
+      *link = std::exchange(nodes_[place].next, free_);
+      free_ = place;
+      --size_;
+    }
+    return true;
+  }
+
+  SimplexMatrix Sorted() const override {
+    SimplexMatrix simplices(N, static_cast<Eigen::Index>(size_));
+    Eigen::Index column = 0;
+    std::vector<Simplex> star;
+    for (const std::uint32_t first : first_of_) {
+      star.clear();
+      for (std::uint32_t s = first; s != kNone; s = nodes_[s].next) {
+        star.push_back(nodes_[s].simplex);
+      }
+      std::sort(star.begin(), star.end());
+      for (const Simplex& simplex : star) {
+        std::copy(simplex.begin(), simplex.end(), simplices.col(column++).begin());
+      }
     }
     return simplices;
   }
 
  private:
   using Simplex = std::array<std::uint32_t, N>;
-  static constexpr size_t kSlack = 10'000;
+  struct Node {
+    Simplex simplex;
+    std::uint32_t next;
+  };
+  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
-  // As multisets, since a simplex may come, go and come back between two calls.
-  void Compact() {
-    std::sort(added_.begin(), added_.end());
-    std::sort(removed_.begin(), removed_.end());
-    std::vector<Simplex> left;
-    std::set_difference(added_.begin(), added_.end(), removed_.begin(), removed_.end(),
-                        std::back_inserter(left));
-    added_ = std::move(left);
-    removed_.clear();
+  static Simplex Read(const char* ids, Eigen::Index i) {
+    Simplex simplex;
+    std::memcpy(simplex.data(), ids + static_cast<size_t>(i) * sizeof(Simplex), sizeof(Simplex));
+    return simplex;
   }
 
-  std::vector<Simplex> added_, removed_;
+  std::vector<std::uint32_t> first_of_;  // by vertex
+  std::vector<Node> nodes_;
+  std::uint32_t free_ = kNone;  // a list of its own
+  size_t size_ = 0;
 };
 
 Error Inconsistent(const std::string& what) {
@@ -57,43 +93,43 @@ Error Inconsistent(const std::string& what) {
 
 }  // namespace
 
-std::unique_ptr<SimplexLog> MakeSimplexLog(int k) {
+std::unique_ptr<SimplexSet> MakeSimplexSet(int k) {
   switch (k) {
     case 1:
-      return std::make_unique<FixedLog<2>>();
+      return std::make_unique<FixedSet<2>>();
     case 2:
-      return std::make_unique<FixedLog<3>>();
+      return std::make_unique<FixedSet<3>>();
     case 3:
-      return std::make_unique<FixedLog<4>>();
+      return std::make_unique<FixedSet<4>>();
     case 4:
-      return std::make_unique<FixedLog<5>>();
+      return std::make_unique<FixedSet<5>>();
     case 5:
-      return std::make_unique<FixedLog<6>>();
+      return std::make_unique<FixedSet<6>>();
     case 6:
-      return std::make_unique<FixedLog<7>>();
+      return std::make_unique<FixedSet<7>>();
     case kMaxSimplexDimension:
-      return std::make_unique<FixedLog<8>>();
+      return std::make_unique<FixedSet<8>>();
     default:
       return nullptr;
   }
 }
 
 Expected<MeshBuilder> MeshBuilder::Create(int k, int d) {
-  std::unique_ptr<SimplexLog> log = MakeSimplexLog(k);
-  if (log == nullptr) {
+  std::unique_ptr<SimplexSet> set = MakeSimplexSet(k);
+  if (set == nullptr) {
     return Fail(ErrorCode::kRefused,
                 "dimension is " + std::to_string(k) + " but this client holds meshes of 1 to " +
                     std::to_string(kMaxSimplexDimension),
                 "LIMIT_EXCEEDED");
   }
-  return MeshBuilder(k, d, std::move(log));
+  return MeshBuilder(k, d, std::move(set));
 }
 
 void MeshBuilder::Reset() {
   revision_ = 0;
   pending_.clear();
   coordinates_.clear();
-  log_ = MakeSimplexLog(k_);
+  simplex_set_ = MakeSimplexSet(k_);
 }
 
 Expected<void> MeshBuilder::Absorb(v1::DeltaChunk&& chunk) {
@@ -119,41 +155,38 @@ Expected<void> MeshBuilder::Add(v1::DownloadMeshResponse&& part) {
   return Apply(delta);
 }
 
+// Removes first: a simplex that goes and comes back stands in both.
 Expected<void> MeshBuilder::Apply(const v1::MeshDelta& delta) {
-  const Expected<Eigen::MatrixXd> points =
-      FromArray(delta.points(), {static_cast<std::uint32_t>(d_)});
-  if (!points) return tl::unexpected(points.error());
-  if (points->cols() > 0) {
-    if (delta.first_vertex() * static_cast<std::uint64_t>(d_) != coordinates_.size()) {
-      return tl::unexpected(Inconsistent("vertices from " + std::to_string(delta.first_vertex()) +
-                                         " on, out of order"));
-    }
-    coordinates_.insert(coordinates_.end(), points->data(), points->data() + points->size());
+  const size_t known = coordinates_.size();
+  if (const Expected<void> ok =
+          AppendNumbers(delta.points(), {static_cast<std::uint32_t>(d_)}, &coordinates_);
+      !ok) {
+    return ok;
   }
-  std::vector<std::uint32_t> added, removed;
+  if (coordinates_.size() > known &&
+      delta.first_vertex() * static_cast<std::uint64_t>(d_) != known) {
+    return tl::unexpected(Inconsistent("vertices from " + std::to_string(delta.first_vertex()) +
+                                       " on, out of order"));
+  }
   const std::uint32_t width = static_cast<std::uint32_t>(k_) + 1;
-  for (const auto& [array, ids] :
-       {std::pair(&delta.added(), &added), std::pair(&delta.removed(), &removed)}) {
-    if (const Expected<void> ok = AppendIds(*array, width, ids); !ok) {
-      return tl::unexpected(ok.error());
-    }
+  const Expected<Eigen::Index> removed = CountRows(delta.removed(), width);
+  if (!removed) return tl::unexpected(removed.error());
+  const Expected<Eigen::Index> added = CountRows(delta.added(), width);
+  if (!added) return tl::unexpected(added.error());
+  if (!simplex_set_->Remove(delta.removed().data().data(), *removed)) {
+    return tl::unexpected(Inconsistent("word that a simplex goes which is not there"));
   }
-  log_->Append(added, false);
-  log_->Append(removed, true);
+  if (!simplex_set_->Add(delta.added().data().data(), *added, vertices())) {
+    return tl::unexpected(Inconsistent("a simplex with a vertex that it never sent"));
+  }
   return {};
 }
 
-Expected<Mesh> MeshBuilder::Take() {
+Mesh MeshBuilder::Take() const {
   Mesh mesh;
   mesh.points = Eigen::Map<const Eigen::MatrixXd>(
       coordinates_.data(), d_, static_cast<Eigen::Index>(coordinates_.size()) / d_);
-  mesh.simplices = log_->Take();
-  if (mesh.simplices.size() > 0 &&
-      static_cast<Eigen::Index>(mesh.simplices.maxCoeff()) >= mesh.points.cols()) {
-    return tl::unexpected(Inconsistent("a simplex with vertex " +
-                                       std::to_string(mesh.simplices.maxCoeff()) +
-                                       ", which it never sent"));
-  }
+  mesh.simplices = simplex_set_->Sorted();
   return mesh;
 }
 

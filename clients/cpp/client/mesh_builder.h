@@ -11,20 +11,22 @@
 
 namespace stellate::client {
 
-// Added and removed simplices as they come, and what is left of them at the end. Sorted now and
-// then, so that memory stays proportional to the mesh and not to its history.
-class SimplexLog {
+// The simplices of a mesh as they come and go. Memory is that of the most there were at a time.
+class SimplexSet {
  public:
-  virtual ~SimplexLog() = default;
-  // Ids of whole simplices, one after another.
-  virtual void Append(const std::vector<std::uint32_t>& ids, bool removed) = 0;
+  virtual ~SimplexSet() = default;
+  // `count` simplices of k+1 uint32 each; `ids` need not be aligned. False, and the set is of no
+  // use any more, where a vertex is not below `vertices`.
+  virtual bool Add(const char* ids, Eigen::Index count, std::uint64_t vertices) = 0;
+  // False, and the set is of no use any more, where one is not there.
+  virtual bool Remove(const char* ids, Eigen::Index count) = 0;
   // (k+1) x m, columns in ascending order.
-  virtual SimplexMatrix Take() = 0;
+  virtual SimplexMatrix Sorted() const = 0;
 };
 
 // Null unless 1 <= k <= kMaxSimplexDimension.
 inline constexpr int kMaxSimplexDimension = 7;
-std::unique_ptr<SimplexLog> MakeSimplexLog(int k);
+std::unique_ptr<SimplexSet> MakeSimplexSet(int k);
 
 // Puts a mesh together from WatchMesh streams. Chunks are kept until their revision is complete,
 // so that what a broken stream leaves undone can be sent again from revision() on.
@@ -48,11 +50,12 @@ class MeshBuilder {
   // Drops the chunks of a revision that was cut short.
   void ForgetPending() { pending_.clear(); }
 
-  // The mesh as of revision(). Errors: a simplex with a vertex that never came.
-  Expected<Mesh> Take();
+  // The mesh as of revision().
+  Mesh Take() const;
 
  private:
-  MeshBuilder(int k, int d, std::unique_ptr<SimplexLog> log) : k_(k), d_(d), log_(std::move(log)) {}
+  MeshBuilder(int k, int d, std::unique_ptr<SimplexSet> set)
+      : k_(k), d_(d), simplex_set_(std::move(set)) {}
 
   Expected<void> Apply(const v1::MeshDelta& delta);
 
@@ -60,7 +63,7 @@ class MeshBuilder {
   std::uint64_t revision_ = 0;
   std::vector<v1::MeshDelta> pending_;
   std::vector<double> coordinates_;  // of the vertices so far, one after another
-  std::unique_ptr<SimplexLog> log_;
+  std::unique_ptr<SimplexSet> simplex_set_;
   std::uint64_t parts_simplices_ = 0;
 };
 

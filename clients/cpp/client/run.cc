@@ -204,17 +204,16 @@ Error WhyFailed(const v1::Mesh& mesh) {
 
 Expected<Mesh> Run::Conclude(const v1::Mesh& final) {
   if (final.state() == v1::MESH_STATE_FAILED) return tl::unexpected(WhyFailed(final));
-  Expected<Mesh> mesh = builder_->Take();
-  if (!mesh) return mesh;
-  mesh->report = FromProto(final.report());
-  const Counts& counts = mesh->report.counts;
-  if (counts.vertices != static_cast<std::uint64_t>(mesh->points.cols()) ||
-      counts.simplices != static_cast<std::uint64_t>(mesh->simplices.cols())) {
+  Mesh mesh = builder_->Take();
+  mesh.report = FromProto(final.report());
+  const Counts& counts = mesh.report.counts;
+  if (counts.vertices != static_cast<std::uint64_t>(mesh.points.cols()) ||
+      counts.simplices != static_cast<std::uint64_t>(mesh.simplices.cols())) {
     return Fail(ErrorCode::kServerFailed, "the server reports " + std::to_string(counts.vertices) +
                                               " vertices and " + std::to_string(counts.simplices) +
                                               " simplices but sent " +
-                                              std::to_string(mesh->points.cols()) + " and " +
-                                              std::to_string(mesh->simplices.cols()));
+                                              std::to_string(mesh.points.cols()) + " and " +
+                                              std::to_string(mesh.simplices.cols()));
   }
   return mesh;
 }
