@@ -49,11 +49,13 @@ def mesh(
       What the oracle raises, as itself; OracleError for answers that break a rule; InvalidArgument,
       LimitExceeded, Unavailable, Cancelled, ServerNotFound. KeyboardInterrupt cancels the mesh.
     """
-    last = None
-    for last in watch(oracle, epsilon, server, on_progress, credentials, **criteria):
-        pass
-    assert last is not None  # a watch ends with a finished mesh or an exception
-    return last
+    if credentials is not None:
+        with _connect(server, credentials) as client:
+            return mesh(oracle, epsilon, client, on_progress, **criteria)
+    workers = criteria.pop("workers", 1)
+    with Session(oracle, epsilon, server, on_progress, workers, criteria, every=False) as session:
+        (finished,) = session  # or an exception
+        return finished
 
 
 def watch(

@@ -9,26 +9,69 @@ from ._generated import mesh_pb2
 from ._generated import stellate_pb2 as pb
 
 
+def _keys(rows: np.ndarray) -> np.ndarray:
+    """(n,) numbers that are ordered as the rows are, lexicographically."""
+    bits = max(1, int(rows.max(initial=0)).bit_length())
+    keys, used = rows[:, 0].astype(np.uint64), bits
+    for column in rows.T[1:]:
+        if used + bits > 64:  # their ranks need fewer bits
+            keys = np.unique(keys, return_inverse=True)[1].astype(np.uint64)
+            used = len(rows).bit_length()
+        keys = (keys << np.uint64(bits)) | column
+        used += bits
+    return keys
+
+
 def in_order(rows: np.ndarray) -> np.ndarray:
     """A copy as int64, rows in lexicographic order."""
-    return rows[np.lexsort(rows.T[::-1])].astype(np.int64)
+    return rows[np.argsort(_keys(rows), kind="stable")].astype(np.int64)
+
+
+def _net(rows: np.ndarray, removed: int) -> np.ndarray:
+    """What is left in lexicographic order when the last `removed` rows cancel one like them each.
+
+    Raises: ValueError if there is none, or a row is there twice.
+    """
+    keys = _keys(rows)
+    order = np.argsort(keys, kind="stable")
+    keys = keys[order]
+    first = np.flatnonzero(np.append(True, keys[1:] != keys[:-1]))
+    count = np.where(order < len(rows) - removed, 1, -1)
+    count = np.add.reduceat(count, first)
+    if (count < 0).any():
+        raise ValueError(
+            f"a delta removes {-int(count[count < 0].sum())} simplices that are not there"
+        )
+    if (count > 1).any():
+        raise ValueError(f"a delta adds {int((count > 1).sum())} simplices that are there already")
+    return rows[order[first[count == 1]]]
+
+
+_UNSETTLED = 100_000  # removed simplices at least; else half of those that are there
 
 
 class GrowingComplex:
-    """Vertices and simplices as of the last complete revision."""
+    """Vertices and simplices as of the last complete revision.
+
+    What comes and goes is put aside, and settled for many revisions at once.
+    """
 
     def __init__(self, dimension: int, ambient_dimension: int) -> None:
         self._k, self._d = dimension, ambient_dimension
         self.revision = 0
         self._vertex_count = 0
         self._points = np.empty((1024, ambient_dimension))
-        self._rows = np.empty((0, dimension + 1), dtype=np.uint32)
+        self._rows = np.empty((0, dimension + 1), dtype=np.uint32)  # in lexicographic order
+        self._added: list[np.ndarray] = []
+        self._removed: list[np.ndarray] = []
+        self._removed_count = 0
         self._pending: list[mesh_pb2.MeshDelta] = []
 
     def absorb(self, chunk: pb.DeltaChunk) -> bool:
         """Takes one chunk; True when a revision is complete with it.
 
-        Raises: ValueError if it does not fit what came before.
+        Raises: ValueError if it does not fit what came before. A simplex that goes and is not there,
+        or that comes and is, may show later: in whatever settles.
         """
         revision = chunk.delta.revision
         if revision <= self.revision or (self._pending and self._pending[-1].revision != revision):
@@ -42,12 +85,16 @@ class GrowingComplex:
         removed = [indices_from_wire(delta.removed, -1, self._k + 1) for delta in pending]
         for first, block in points:
             self._append_points(first, block)
-        self._remove(np.concatenate(removed))
-        self._rows = np.concatenate([self._rows, *added])
-        if self._rows.size and int(self._rows.max()) >= self._vertex_count:
-            raise ValueError(
-                f"a simplex has vertex {int(self._rows.max())} of {self._vertex_count} vertices"
-            )
+        for rows in added:
+            if rows.size and int(rows.max()) >= self._vertex_count:
+                raise ValueError(
+                    f"a simplex has vertex {int(rows.max())} of {self._vertex_count} vertices"
+                )
+        self._added += [rows for rows in added if len(rows)]
+        self._removed += [rows for rows in removed if len(rows)]
+        self._removed_count += sum(map(len, removed))
+        if self._removed_count > max(_UNSETTLED, len(self._rows) // 2):
+            self.settle()
         self.revision = revision
         return True
 
@@ -67,7 +114,16 @@ class GrowingComplex:
 
     def simplices(self) -> np.ndarray:
         """(m, k+1) int64, ids ascending in each row, rows in lexicographic order."""
-        return in_order(self._rows)
+        self.settle()
+        return self._rows.astype(np.int64)
+
+    def settle(self) -> None:
+        """Makes simplices() cheap. Raises: ValueError as absorb does."""
+        if not self._added and not self._removed:
+            return
+        rows = np.concatenate([self._rows, *self._added, *self._removed])
+        self._rows = _net(rows, self._removed_count)
+        self._added, self._removed, self._removed_count = [], [], 0
 
     def _append_points(self, first: int, block: np.ndarray) -> None:
         if not len(block):
@@ -83,21 +139,3 @@ class GrowingComplex:
             self._points = larger
         self._points[first:needed] = block
         self._vertex_count = needed
-
-    def _remove(self, removed: np.ndarray) -> None:
-        if not len(removed):
-            return
-        # Few rows share their vertices with the removed ones: only those are compared.
-        touched = np.zeros(max(self._vertex_count, int(removed.max()) + 1), dtype=bool)
-        touched[removed] = True
-        candidates = np.flatnonzero(touched[self._rows].all(axis=1))
-        gone = {row.tobytes() for row in np.ascontiguousarray(removed)}
-        rows = np.ascontiguousarray(self._rows[candidates])
-        drop = [i for i, row in zip(candidates, rows) if row.tobytes() in gone]
-        if len(drop) != len(gone):
-            raise ValueError(
-                f"a delta removes {len(gone) - len(drop)} simplices that are not there"
-            )
-        keep = np.ones(len(self._rows), dtype=bool)
-        keep[drop] = False
-        self._rows = self._rows[keep]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from types import TracebackType
-from typing import Any, Callable, Iterator
+from typing import Any, Callable, Iterator, TypeVar
 
 from ._growth import GrowingComplex
 from ._mesh import Mesh
@@ -14,6 +14,8 @@ from .client import Client, MeshInfo
 from .errors import Cancelled, StellateError, error_class
 from .oracle import CheckedOracle
 from .report import Progress, Report
+
+T = TypeVar("T")
 
 OnProgress = Callable[[Progress], None]
 
@@ -76,11 +78,13 @@ class Session:
         on_progress: OnProgress | None,
         workers: int,
         criteria: dict[str, Any],
+        every: bool = True,
     ) -> None:
+        """`every`: iterating gives the mesh at every revision, and not only when it is finished."""
         if int(workers) != workers or workers < 1:
             raise ValueError(f"workers has to be a whole number from 1 on, and is {workers!r}")
         checked = CheckedOracle(oracle)
-        self._on_progress = on_progress
+        self._on_progress, self._every = on_progress, every
         self._owns_client = not isinstance(server, Client)
         self._client = server if isinstance(server, Client) else Client(server)
         try:
@@ -92,9 +96,9 @@ class Session:
         self._workers = _Workers(self._client, checked, self.info.name, int(workers))
 
     def __iter__(self) -> Iterator[Mesh]:
-        """The mesh at every revision, the last with its report. Raises how it failed."""
+        """The mesh as it grows, the last with its report. Raises how it failed."""
         try:
-            yield from follow(self._client, self.info, self._on_progress)
+            yield from follow(self._client, self.info, self._on_progress, self._every)
         except StellateError as error:
             if self._workers.failure is None:
                 raise
@@ -134,8 +138,13 @@ class Session:
             self._client.close()
 
 
-def follow(client: Client, info: MeshInfo, on_progress: OnProgress | None) -> Iterator[Mesh]:
-    """A mesh at every revision until its end. Closing the iterator leaves the mesh alone."""
+def follow(
+    client: Client, info: MeshInfo, on_progress: OnProgress | None, every: bool = True
+) -> Iterator[Mesh]:
+    """A mesh at every revision until its end, or at its end alone.
+
+    Closing the iterator leaves the mesh alone.
+    """
     growth = GrowingComplex(info.dimension, info.ambient_dimension)
     watch = client.watch(info.name)
     watch.on_resume = growth.forget_pending
@@ -144,20 +153,17 @@ def follow(client: Client, info: MeshInfo, on_progress: OnProgress | None) -> It
         for event in watch:
             kind = event.WhichOneof("event")
             if kind == "delta":
-                try:
-                    complete = growth.absorb(event.delta)
-                except ValueError as error:
-                    raise StellateError(
-                        f"the server broke the protocol: {error}", "PROTOCOL"
-                    ) from error
-                if complete:
-                    yield Mesh(growth.points(), growth.simplices(), None, progress, growth.revision)
+                if _sound(growth.absorb, event.delta) and every:
+                    simplices = _sound(growth.simplices)
+                    yield Mesh(growth.points(), simplices, None, progress, growth.revision)
             elif kind == "reset_mesh":
                 growth.reset()
             elif kind == "progress":
                 progress = Progress.from_wire(event.progress)
                 if on_progress is not None:
                     on_progress(progress)
+                if progress.phase == "CERTIFYING":
+                    _sound(growth.settle)  # while the server is busy
             elif kind == "final":
                 final = MeshInfo.from_wire(event.final)
                 if on_progress is not None and progress != final.progress:
@@ -167,8 +173,17 @@ def follow(client: Client, info: MeshInfo, on_progress: OnProgress | None) -> It
         watch.close()
 
 
+def _sound(step: Callable[..., T], *arguments: Any) -> T:
+    """A step of a GrowingComplex, whose complaints are about the server."""
+    try:
+        return step(*arguments)
+    except ValueError as error:
+        raise StellateError(f"the server broke the protocol: {error}", "PROTOCOL") from error
+
+
 def _finished(growth: GrowingComplex, final: MeshInfo) -> Mesh:
-    mesh = Mesh(growth.points(), growth.simplices(), final.report, final.progress, growth.revision)
+    simplices = _sound(growth.simplices)
+    mesh = Mesh(growth.points(), simplices, final.report, final.progress, growth.revision)
     if final.state == "CANCELLED":
         raise Cancelled("the mesh was cancelled", mesh=mesh)
     if final.state == "FAILED":

@@ -7,7 +7,7 @@ import shapes
 import stellate
 from stellate._arrays import from_wire, indices_from_wire, to_wire
 from stellate._generated import geometry_pb2, mesh_pb2, stellate_pb2
-from stellate._growth import GrowingComplex
+from stellate._growth import GrowingComplex, in_order
 
 
 def test_round_trip_keeps_every_bit(rng):
@@ -59,7 +59,8 @@ def delta(revision, first, points, added, removed, complete=True):
     return stellate_pb2.DeltaChunk(delta=body, complete=complete)
 
 
-def test_deltas_add_up(rng):
+@pytest.mark.parametrize("step", [1, 4, 100])
+def test_deltas_add_up(rng, step):
     """Random additions and removals, in chunks, against a set kept by hand."""
     growth, expected, points = GrowingComplex(2, 3), set(), np.empty((0, 3))
     for revision in range(1, 20):
@@ -76,7 +77,9 @@ def test_deltas_add_up(rng):
         expected = (expected - gone) | fresh
         assert growth.revision == revision
         assert np.array_equal(growth.points(), points)
-        assert np.array_equal(growth.simplices(), sorted(expected))
+        if revision % step == 0:  # several are settled at once
+            assert np.array_equal(growth.simplices(), sorted(expected))
+    assert np.array_equal(growth.simplices(), sorted(expected))
 
 
 def test_earlier_snapshots_stay_true():
@@ -97,6 +100,21 @@ def test_a_revision_cut_short_is_forgotten():
     assert np.array_equal(growth.points(), np.eye(3))
 
 
+def test_rows_of_any_size_are_put_in_order(rng):
+    """Ids that fill 32 bits, and rows too long for one number."""
+    rows = rng.integers(0, 3, size=(500, 8)).astype(np.uint32) * np.uint32(2**31 - 1)
+    assert np.array_equal(in_order(rows), sorted(rows.tolist()))
+    assert in_order(rows[:0]).shape == (0, 8)
+
+
+def test_a_simplex_that_comes_twice_is_refused():
+    growth = GrowingComplex(2, 3)
+    growth.absorb(delta(1, 0, np.eye(3), [[0, 1, 2]], []))
+    growth.absorb(delta(2, 3, np.empty((0, 3)), [[0, 1, 2]], []))
+    with pytest.raises(ValueError, match="already"):
+        growth.simplices()
+
+
 @pytest.mark.parametrize(
     "chunk, words",
     [
@@ -107,7 +125,9 @@ def test_a_revision_cut_short_is_forgotten():
 )
 def test_deltas_that_do_not_fit_are_refused(chunk, words):
     with pytest.raises(ValueError, match=words):
-        GrowingComplex(2, 3).absorb(chunk)
+        growth = GrowingComplex(2, 3)
+        growth.absorb(chunk)
+        growth.simplices()
 
 
 def test_mesh_describes_itself():
