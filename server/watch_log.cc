@@ -155,6 +155,11 @@ DeltaPart WatchLog::Next(Cursor* cursor, std::size_t max_bytes) const {
     part.removed.insert(part.removed.end(), row, row + row_size_);
   }
   if (cursor->removed < end.deaths) return part;
+  // What goes and comes back over several revisions stands in two parts.
+  if (cursor->to - cursor->from > 1 && !part.removed.empty()) {
+    part.complete = cursor->vertex == end.vertices && cursor->added == end.simplices;
+    return part;
+  }
 
   // A part with nothing in it yet takes one of whatever comes next, however large.
   std::size_t left = max_bytes - std::min(max_bytes, part.removed.size() * sizeof(std::uint32_t));

@@ -60,7 +60,7 @@ struct DeltaPart {
   std::uint64_t revision = 0;  // where the change leads
   std::uint64_t first_vertex = 0;
   std::vector<double> points;                 // d each
-  std::vector<std::uint32_t> added, removed;  // k+1 each; one in both went and came back
+  std::vector<std::uint32_t> added, removed;  // k+1 each; none is in both
   bool complete = false;                      // the last part
 };
 

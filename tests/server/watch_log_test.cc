@@ -34,6 +34,13 @@ struct Client {
   State state;
 
   void Apply(const DeltaPart& part) {
+    std::set<Triangle> gone;
+    for (std::size_t i = 0; i < part.removed.size(); i += 3) {
+      gone.emplace(part.removed.begin() + i, part.removed.begin() + i + 3);
+    }
+    for (std::size_t i = 0; i < part.added.size(); i += 3) {
+      EXPECT_FALSE(gone.contains({part.added.begin() + i, part.added.begin() + i + 3}));
+    }
     if (!part.points.empty()) {
       EXPECT_EQ(part.first_vertex * kAmbient, points.size());
     }
