@@ -9,6 +9,7 @@
 #if defined(__SANITIZE_THREAD__)
 #include <thread>
 #else
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 #include <tbb/task_arena.h>
@@ -17,11 +18,16 @@
 
 namespace stellate::core {
 
-// Calls body(i) for each i in [0, count), in parallel and in no order. The bodies must not touch
-// each other's data; then results do not depend on the number of threads.
+// ParallelFor calls body(i) for each i in [0, count), in parallel and in no order. The bodies must
+// not touch each other's data; then results do not depend on the number of threads.
+//
+// Work can be interrupted. It looks up in all that it does: before each body, at the end of each
+// parallel stretch, and with LookUp in each loop on one thread that is as long as the mesh is
+// large. What it leaves behind is then of no use.
 //
 // Under ThreadSanitizer plain threads do the work: Debian's oneTBB is not instrumented, so that
 // every hand-over between its workers would look like a race and hide the real ones.
+
 // Thrown out of work that was interrupted.
 struct Interrupted {};
 
@@ -36,6 +42,7 @@ class Interruption {
   std::atomic<bool> raised_ = false;
 };
 
+inline bool IsInterrupted() { return false; }
 inline void ThrowIfInterrupted() {}
 
 inline constexpr int kSanitizedThreads = 3;
@@ -77,14 +84,26 @@ class Interruption {
   tbb::task_group_context context_{tbb::task_group_context::isolated};
 };
 
-// For long stretches of work on one thread.
-inline void ThrowIfInterrupted() {
-  if (tbb::is_current_task_group_canceling()) throw Interrupted{};
+// For tests: told of each look-up, by the thread that looks up.
+inline std::atomic<void (*)()> on_look_up = nullptr;
+
+inline bool IsInterrupted() {
+  if (void (*const told)() = on_look_up.load(std::memory_order_relaxed)) told();
+  return tbb::is_current_task_group_canceling();
 }
 
+// For long stretches of work on one thread.
+inline void ThrowIfInterrupted() {
+  if (IsInterrupted()) throw Interrupted{};
+}
+
+// oneTBB looks up before each of its tasks, which may be thousands of bodies: too many where a body
+// takes long.
 template <typename Index, typename Body>
 void ParallelFor(Index count, const Body& body) {
-  tbb::parallel_for(Index{0}, count, body);
+  tbb::parallel_for(tbb::blocked_range<Index>(0, count), [&body](const auto& range) {
+    for (Index i = range.begin(); i < range.end() && !IsInterrupted(); ++i) body(i);
+  });
   ThrowIfInterrupted();
 }
 

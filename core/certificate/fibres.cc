@@ -25,7 +25,10 @@ template <typename Visit>
 void ForEachVertex(const MeshView& mesh, const Visit& visit) {
   ParallelFor((mesh.vertices + kPart - 1) / kPart, [&](std::uint64_t part) {
     const std::uint64_t end = std::min<std::uint64_t>(mesh.vertices, (part + 1) * kPart);
-    for (std::uint64_t v = part * kPart; v < end; ++v) visit(part, static_cast<std::uint32_t>(v));
+    for (std::uint64_t v = part * kPart; v < end; ++v) {
+      if (v % 4096 == 0 && IsInterrupted()) return;
+      visit(part, static_cast<std::uint32_t>(v));
+    }
   });
 }
 

@@ -254,6 +254,7 @@ LinkReport CheckLinks(const Adjacency& adjacency) {
   });
   LinksOfPart all;
   for (LinksOfPart& part : parts) {
+    ThrowIfInterrupted();
     all.used_vertices += part.used_vertices;
     all.link_vertices += part.link_vertices;
     all.link_edges += part.link_edges;

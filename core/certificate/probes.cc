@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/parallel.h"
 #include "core/sample/random.h"
 
 namespace stellate::core {
@@ -31,6 +32,7 @@ void AppendLargest(const std::vector<float>& values, std::uint32_t count,
                    std::vector<std::uint32_t>& chosen) {
   std::vector<std::uint32_t> order(values.size());
   std::iota(order.begin(), order.end(), 0u);
+  ThrowIfInterrupted();
   std::nth_element(order.begin(), order.begin() + count, order.end(),
                    [&values](std::uint32_t a, std::uint32_t b) {
                      return values[a] != values[b] ? values[a] > values[b] : a < b;
@@ -119,6 +121,7 @@ Eigen::MatrixXd CoverageProbes(const Specification& spec, const MeshView& mesh,
   Eigen::VectorXd lower = PointOf(mesh, 0);
   Eigen::VectorXd upper = lower;
   for (std::uint32_t v = 1; v < mesh.vertices; ++v) {
+    LookUp(v);
     lower = lower.cwiseMin(PointOf(mesh, v));
     upper = upper.cwiseMax(PointOf(mesh, v));
   }

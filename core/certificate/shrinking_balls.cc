@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "core/parallel.h"
 #include "core/sample/random.h"
 
 namespace stellate::core {
@@ -32,6 +33,7 @@ ShrinkingBalls::ShrinkingBalls(const MeshView& mesh, const std::vector<double>& 
   Eigen::VectorXd lower = PointOf(mesh, 0);
   Eigen::VectorXd upper = lower;
   for (std::uint32_t v = 1; v < mesh.vertices; ++v) {
+    LookUp(v);
     lower = lower.cwiseMin(PointOf(mesh, v));
     upper = upper.cwiseMax(PointOf(mesh, v));
   }

@@ -60,7 +60,10 @@ std::string CheckSimplexList(const SimplexList& list) {
 
 Adjacency::Adjacency(const SimplexList& list) : list_(list) {
   begin_.assign(static_cast<std::size_t>(list_.vertices) + 1, 0);
-  for (const std::uint32_t id : *list_.ids) ++begin_[id + 1];
+  for (std::size_t i = 0; i < list_.ids->size(); ++i) {
+    LookUp(i);
+    ++begin_[(*list_.ids)[i] + 1];
+  }
   std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
   incident_.resize(list_.ids->size());
   std::vector<std::uint64_t> next(begin_.begin(), begin_.end() - 1);
@@ -81,6 +84,7 @@ void Adjacency::MatchFacets() {
         MatchFacetsOf(static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end));
   });
   for (FacetCount& part : parts) {
+    ThrowIfInterrupted();
     facets_.all += part.all;
     if (facets_.bad == 0) facets_.first_bad = std::move(part.first_bad);
     facets_.bad += part.bad;
@@ -153,6 +157,7 @@ Connectivity ComputeConnectivity(const Adjacency& adjacency) {
     }
   }
   for (std::uint32_t v = 0; v < list.vertices; ++v) {
+    LookUp(v);
     if (adjacency.Star(v).empty()) {
       if (result.isolated_vertices++ == 0) result.first_isolated = v;
     } else if (Root(parent, v) == v) {

@@ -4,6 +4,8 @@
 #include <memory>
 #include <vector>
 
+#include "core/parallel.h"
+
 namespace stellate::core {
 
 // A vector that grows without moving what it holds: there is never an old copy beside the new one,
@@ -14,7 +16,10 @@ class Blocks {
   Blocks() = default;
   Blocks(const Blocks& other) {
     resize(other.size_);
-    for (std::size_t i = 0; i < size_; ++i) (*this)[i] = other[i];
+    for (std::size_t i = 0; i < size_; ++i) {
+      LookUp(i);
+      (*this)[i] = other[i];
+    }
   }
   Blocks& operator=(const Blocks&) = delete;
 
@@ -22,7 +27,10 @@ class Blocks {
 
   // REQUIRES: size >= size().
   void resize(std::size_t size) {
-    while (blocks_.size() * kBlock < size) blocks_.push_back(std::make_unique<T[]>(kBlock));
+    while (blocks_.size() * kBlock < size) {
+      ThrowIfInterrupted();  // a thread's first touch of memory is slow
+      blocks_.push_back(std::make_unique<T[]>(kBlock));
+    }
     size_ = size;
   }
 

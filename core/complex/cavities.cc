@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <map>
 #include <numeric>
@@ -62,10 +63,10 @@ struct Census {
       agreed.insert(agreed.end(), owned[c].begin(), owned[c].end());
       all_doubts.insert(all_doubts.end(), doubts[c].begin(), doubts[c].end());
     }
-    std::sort(all_doubts.begin(), all_doubts.end());
+    ParallelSort(all_doubts, std::less<>());
     doubtful = all_doubts;
     doubtful.erase(std::unique(doubtful.begin(), doubtful.end()), doubtful.end());
-    std::sort(agreed.begin(), agreed.end());
+    ParallelSort(agreed, std::less<>());
     std::vector<Simplex> rest;
     std::set_difference(agreed.begin(), agreed.end(), doubtful.begin(), doubtful.end(),
                         std::back_inserter(rest));
@@ -392,7 +393,7 @@ std::vector<std::vector<typename StarComplex<K>::Simplex>> PartDoubtful(const Ce
       std::copy(doubtful[s].begin() + i + 1, doubtful[s].end(), facet.begin() + i);
       facets.emplace_back(facet, static_cast<std::uint32_t>(s));
     }
-  std::sort(facets.begin(), facets.end());
+  ParallelSort(facets, std::less<>());
   std::vector<std::size_t> parent(doubtful.size());
   std::iota(parent.begin(), parent.end(), std::size_t{0});
   const auto root = [&](std::size_t s) {
@@ -400,6 +401,7 @@ std::vector<std::vector<typename StarComplex<K>::Simplex>> PartDoubtful(const Ce
     return s;
   };
   for (std::size_t i = 0; i + 1 < facets.size(); ++i) {
+    LookUp(i);
     if (facets[i].first != facets[i + 1].first) continue;
     const std::size_t a = root(facets[i].second), b = root(facets[i + 1].second);
     if (a == b) continue;
@@ -447,7 +449,7 @@ FilledCavities FillCavities(const StarComplex<K>& complex, const FillingRules& r
   std::sort(result.unfilled.begin(), result.unfilled.end());
   result.unfilled.erase(std::unique(result.unfilled.begin(), result.unfilled.end()),
                         result.unfilled.end());
-  std::sort(all.begin(), all.end());
+  ParallelSort(all, std::less<>());
   result.simplices.reserve(all.size() * (K + 1));
   for (const auto& s : all) result.simplices.insert(result.simplices.end(), s.begin(), s.end());
   return result;

@@ -355,7 +355,7 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
   std::vector<std::vector<Cut>> cuts_by_chunk(chunks);
   ParallelChunks(count, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     Cell cell;  // its memory is used again and again; what is kept is no larger than it must be
-    for (std::size_t i = begin; i < end; ++i) {
+    for (std::size_t i = begin; i < end && !IsInterrupted(); ++i) {
       const Site q = At(first + static_cast<std::uint32_t>(i));
       BuildStar(q, nullptr, near_[i], cell, ThreadScratch<K>(), [&](std::uint32_t p) {
         if (Cuts(cells_[p], At(p), q)) cuts_by_chunk[chunk].push_back({p, q.id});
@@ -366,13 +366,19 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
   near_.clear();
 
   std::vector<Cut> cuts;
-  for (std::vector<Cut>& some : cuts_by_chunk) {
+  std::size_t cut_count = 0;
+  for (const std::vector<Cut>& some : cuts_by_chunk) cut_count += some.size();
+  cuts.reserve(cut_count);
+  for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
+    LookUp(chunk * ChunkSize(count));
+    std::vector<Cut>& some = cuts_by_chunk[chunk];
     cuts.insert(cuts.end(), some.begin(), some.end());
     some = {};
   }
   ParallelSort(cuts, std::less<>());
   std::vector<std::size_t> begins;
   for (std::size_t i = 0; i < cuts.size(); ++i) {
+    LookUp(i);
     if (i == 0 || cuts[i].star != cuts[i - 1].star) {
       begins.push_back(i);
       change.stars.push_back(cuts[i].star);
@@ -380,13 +386,14 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
   }
   begins.push_back(cuts.size());
 
-  const auto note_neighbours = [&](std::uint32_t p) {
+  const auto note_neighbours = [&](std::uint32_t p, std::size_t step) {
+    LookUp(step);
     const Cell& cell = cells_[p];
     for (std::size_t f = 0; f < cell.facet_count(); ++f)
       if (!IsFake(cell.id(f))) around->push_back(cell.id(f));
   };
   if (around)
-    for (const std::uint32_t p : change.stars) note_neighbours(p);
+    for (std::size_t i = 0; i < change.stars.size(); ++i) note_neighbours(change.stars[i], i);
 
   struct Swap {
     std::vector<Simplex> removed, added;
@@ -395,7 +402,7 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
   ParallelChunks(change.stars.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     std::vector<Simplex> before, after;
     Swap& swap = swaps[chunk];
-    for (std::size_t i = begin; i < end; ++i) {
+    for (std::size_t i = begin; i < end && !IsInterrupted(); ++i) {
       const std::uint32_t p = change.stars[i];
       Owned(p, &before);
       for (std::size_t j = begins[i]; j < begins[i + 1]; ++j)
@@ -418,8 +425,8 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
   });
 
   if (around) {
-    for (const std::uint32_t p : change.stars) note_neighbours(p);
-    for (std::uint32_t p = first; p < size(); ++p) note_neighbours(p);
+    for (std::size_t i = 0; i < change.stars.size(); ++i) note_neighbours(change.stars[i], i);
+    for (std::uint32_t p = first; p < size(); ++p) note_neighbours(p, p);
   }
   const auto set_influence = [&](std::uint32_t p, std::size_t step) {
     LookUp(step);
@@ -429,6 +436,7 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
   for (std::uint32_t p = first; p < size(); ++p) set_influence(p, p);
   tree_.Refit();
   for (const Swap& swap : swaps) {
+    ThrowIfInterrupted();
     for (const Simplex& s : swap.removed)
       change.removed.insert(change.removed.end(), s.begin(), s.end());
     for (const Simplex& s : swap.added) change.added.insert(change.added.end(), s.begin(), s.end());

@@ -36,7 +36,10 @@ class Conflicts {
     });
     std::vector<double> reaches;
     reaches.reserve(targets.size());
-    for (const Target<K>& t : targets) reaches.push_back(Reach(t));
+    for (std::size_t i = 0; i < targets.size(); ++i) {
+      LookUp(i);
+      reaches.push_back(Reach(targets[i]));
+    }
     balls_.Assign(std::move(reaches));
     ParallelChunks(targets.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
       std::vector<std::uint32_t>& list = lists_[chunk];
@@ -102,7 +105,10 @@ std::vector<Target<K>> SelectIndependent(const StarComplex<K>& complex,
     return a.star < b.star;
   });
   std::vector<std::uint32_t> rank(targets.size());
-  for (std::uint32_t r = 0; r < order.size(); ++r) rank[order[r]] = r;
+  for (std::uint32_t r = 0; r < order.size(); ++r) {
+    LookUp(r);
+    rank[order[r]] = r;
+  }
   const Conflicts<K> conflicts(complex, targets, rank);
 
   std::vector<std::uint8_t> is_chosen(targets.size(), 0);
@@ -119,7 +125,10 @@ std::vector<Target<K>> SelectIndependent(const StarComplex<K>& complex,
   });
   std::vector<Target<K>> ordered;
   ordered.reserve(chosen.size());
-  for (const std::uint32_t i : chosen) ordered.push_back(targets[i]);
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    LookUp(i);
+    ordered.push_back(targets[chosen[i]]);
+  }
   return ordered;
 }
 

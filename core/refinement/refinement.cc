@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "core/message.h"
@@ -145,8 +146,8 @@ Expected<MeshDelta> Refinement<K>::Absorb(const Answers& answers) {
     idempotence_sample_.resize(0, 0);
   }
 
-  const Progress before = progress_;
-  const Counts counts_before = report_.counts;
+  const Progress progress_before = progress_;
+  const Report report_before = report_;
   ++progress_.round;
   ++report_.counts.rounds;
   const auto size = static_cast<std::uint64_t>(asked.size());
@@ -155,26 +156,33 @@ Expected<MeshDelta> Refinement<K>::Absorb(const Answers& answers) {
   delta_ = {};
   delta_.revision = progress_.round;
   delta_.first_vertex = complex_.size();
-  if (!complete) {
-    parts_->Take(answers);
-    delta_.points.resize(complex_.d(), 0);
-    if (progress_.round >= spec_.limits.max_rounds) Finish(Termination::kRoundBudget);
-    UpdateProgress();
-    return std::move(delta_);
+  if (complete) {
+    parts_.reset();
+    batch_.reset();
+    ++whole_rounds_;
   }
-  parts_.reset();
-  batch_.reset();
-  ++whole_rounds_;
 
-  if (!WithThreads(spec_.threads, interruption_, [&] { Advance(all); })) {
-    progress_ = before;
-    report_.counts = counts_before;
+  const auto advance = [&] {
+    if (complete)
+      Advance(all);
+    else
+      parts_->Take(answers);
+    if (!over_ && batch_ && progress_.round >= spec_.limits.max_rounds)
+      Finish(Termination::kRoundBudget);
+    UpdateProgress();
+  };
+  if (rehearsal_) {
+    advance();  // within the original's round, and interrupted with it
+  } else if (!WithThreads(spec_.threads, interruption_, advance)) {
+    // It may have ended in the very moment, but nobody has seen that.
+    over_ = false;
+    progress_ = progress_before;
+    report_ = report_before;
     return Refuse(StatusCode::kCancelled, "the computation was interrupted");
   }
   delta_.points =
       Eigen::Map<const Eigen::MatrixXd>(complex_.points().data(), complex_.d(), complex_.size())
           .rightCols(complex_.size() - static_cast<Eigen::Index>(delta_.first_vertex));
-  UpdateProgress();
   return std::move(delta_);
 }
 
@@ -201,8 +209,6 @@ void Refinement<K>::Advance(const Answers& answers) {
       TakePoints(answers);
       break;
   }
-  if (batch_ && !over_ && progress_.round >= spec_.limits.max_rounds)
-    Finish(Termination::kRoundBudget);
   if (batch_ && idempotence_sample_.cols() > 0) {
     QueryBlock again;
     again.points = idempotence_sample_;
@@ -235,6 +241,7 @@ void Refinement<K>::TakePoints(const Answers& answers) {
   tangents_.resize(d * K, count);
   sizes_.resize(criteria_.sizes_given ? count : 0);
   for (Eigen::Index c = 0; c < count; ++c) {
+    LookUp(static_cast<std::size_t>(c));
     if (!sorted) {
       take(c, first, c);
       continue;
@@ -248,6 +255,7 @@ void Refinement<K>::TakePoints(const Answers& answers) {
     QueryBlock block = NewBlock(QueryKind::kClosestPoint);
     block.points = points_;
     for (std::size_t i = 0; i < targets_.size(); ++i) {
+      LookUp(i);
       const double* tangent = complex_.Tangent(targets_[i].star);
       for (Eigen::Index c = first_candidate_[i]; c < first_candidate_[i + 1]; ++c) {
         if (!found_[static_cast<std::size_t>(c)] || targets_[i].violation.fake) continue;
@@ -279,6 +287,7 @@ void Refinement<K>::AfterPoints() {
     for (Eigen::Index c = 0; c < points_.cols(); ++c) add(c, nullptr);
   } else {
     for (std::size_t i = 0; i < targets_.size(); ++i) {
+      LookUp(i);
       // Far steps may turn any corner: no guess there.
       const bool far = IsCoarse(targets_[i].star, targets_[i].violation);
       const double* guess = far ? nullptr : complex_.Tangent(targets_[i].star);
@@ -325,7 +334,8 @@ void Refinement<K>::Commit() {
   std::vector<std::uint32_t> around;
   typename StarComplex<K>::Change change = complex_.Commit(judged ? &around : nullptr);
   std::vector<std::uint32_t> touched = std::move(change.stars);
-  for (std::uint32_t p = first; p < complex_.size(); ++p) touched.push_back(p);
+  touched.resize(touched.size() + complex_.size() - first);
+  std::iota(touched.end() - (complex_.size() - first), touched.end(), first);
   standing_.resize(complex_.size(), kFine);
   discouraged_.resize(complex_.size(), 0);
   no_flat_.resize(complex_.size(), 0);
@@ -343,12 +353,18 @@ void Refinement<K>::Commit() {
     violations[i] = WorstSizeOrShape<K>(complex_, touched[i], SizeBound(touched[i]),
                                         criteria_.radius_edge_bound);
   });
-  for (const std::uint32_t p : touched) {
+  for (std::size_t i = 0; i < touched.size(); ++i) {
+    LookUp(i);
+    const std::uint32_t p = touched[i];
     discouraged_[p] = no_flat_[p] = 0;
     standing_[p] = kFine;
   }
-  std::erase_if(active_, [&](const Active& a) { return standing_[a.star] != kSizeOrShape; });
+  std::erase_if(active_, [&, step = std::size_t{0}](const Active& a) mutable {
+    LookUp(step++);
+    return standing_[a.star] != kSizeOrShape;
+  });
   for (std::size_t i = 0; i < touched.size(); ++i) {
+    LookUp(i);
     if (!violations[i]) continue;
     standing_[touched[i]] = kSizeOrShape;
     active_.push_back({touched[i], *violations[i]});

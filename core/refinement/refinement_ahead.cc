@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/parallel.h"
 #include "core/refinement/refinement.h"
 #include "core/refinement/surrogate.h"
 
@@ -57,14 +58,16 @@ Refinement<K>::Refinement(const Refinement& original)
 template <int K>
 void Refinement<K>::Rehearse(Refinement& rehearsal) const {
   double missing = 0;
-  for (const Active& a : active_)
+  for (std::size_t i = 0; i < active_.size(); ++i) {
+    LookUp(i);
+    const Active& a = active_[i];
     missing += std::pow(std::max(a.violation.radius / SizeBound(a.star), 1.0), K);
+  }
   const double most = complex_.size() + kMostWanted * (missing + complex_.size());
   Surrogate<K> surrogate(complex_, criteria_.advance_step, criteria_.epsilon,
                          criteria_.sizes_given ? given_size_.data() : nullptr);
   rehearsal.Plan();
   for (int good_rounds = 0; good_rounds < kRehearsedGoodPointRounds;) {
-    if (interruption_.raised()) throw Interrupted{};
     const QueryBatch* batch = rehearsal.NextBatch();
     if (!batch || rehearsal.complex_.size() > most) return;
     Answers answers;
@@ -88,6 +91,7 @@ void Refinement<K>::AskAhead() {
   ahead_.spacing.resize(wanted);
   ahead_.rules = std::move(rehearsal.inserted_rules_);
   for (Eigen::Index i = 0; i < wanted; ++i) {
+    LookUp(static_cast<std::size_t>(i));
     const std::uint32_t p = count + static_cast<std::uint32_t>(i);
     std::copy_n(rehearsed.Point(p), d, ahead_.points.col(i).data());
     std::copy_n(rehearsed.Tangent(p), d * K, ahead_.tangents.col(i).data());
@@ -98,7 +102,8 @@ void Refinement<K>::AskAhead() {
     ahead_.spacing[i] = std::isinf(nearest2) ? criteria_.epsilon : std::sqrt(nearest2);
   }
   std::vector<double> centre(static_cast<std::size_t>(d));
-  std::erase_if(targets_, [&](const Target<K>& t) {
+  std::erase_if(targets_, [&, step = std::size_t{0}](const Target<K>& t) mutable {
+    LookUp(step++);
     complex_.Lift(t.star, t.x, centre.data());
     bool mended = false;
     rehearsed.ForEachWithin(centre.data(), kMended * t.radius,
@@ -110,6 +115,7 @@ void Refinement<K>::AskAhead() {
 template <int K>
 void Refinement<K>::InsertAhead() {
   for (Eigen::Index i = 0; i < ahead_.size(); ++i) {
+    LookUp(static_cast<std::size_t>(i));
     if (complex_.size() >= spec_.limits.max_vertices) break;
     const Eigen::Index c = first_candidate_.back() + i;
     if (!found_[static_cast<std::size_t>(c)]) continue;

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <limits>
 
 #include "core/certificate/findings.h"
 #include "core/complex/consistency.h"
 #include "core/message.h"
+#include "core/parallel.h"
 #include "core/refinement/refinement.h"
 
 namespace stellate::core {
@@ -18,8 +20,10 @@ void Refinement<K>::HandOutFilled() {
   using Simplex = typename StarComplex<K>::Simplex;
   const auto sorted = [](const std::vector<std::uint32_t>& ids) {
     std::vector<Simplex> simplices(ids.size() / (K + 1));
-    for (std::size_t i = 0; i < ids.size(); ++i) simplices[i / (K + 1)][i % (K + 1)] = ids[i];
-    std::sort(simplices.begin(), simplices.end());
+    ParallelFor(simplices.size(), [&](std::size_t i) {
+      std::copy_n(ids.data() + i * (K + 1), K + 1, simplices[i].begin());
+    });
+    ParallelSort(simplices, std::less<>());
     return simplices;
   };
   // A - B + C, where C is disjoint from what is left of A.
@@ -28,8 +32,9 @@ void Refinement<K>::HandOutFilled() {
     std::vector<Simplex> all;
     std::set_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(all));
     all.insert(all.end(), c.begin(), c.end());
-    std::sort(all.begin(), all.end());
+    ParallelSort(all, std::less<>());
     ids->clear();
+    ids->reserve(all.size() * (K + 1));
     for (const Simplex& s : all) ids->insert(ids->end(), s.begin(), s.end());
   };
   const std::vector<Simplex> before = sorted(complex_.Simplices()),
@@ -66,6 +71,7 @@ void Refinement<K>::StartCertificate() {
   StarFacts facts;
   facts.converged = true;
   for (std::uint32_t p = 0; p < complex_.size(); ++p) {
+    LookUp(p);
     const double radius =
         std::sqrt(filled_over_ ? MaxAgreedNorm2(p) : complex_.cell(p).max_norm2());
     facts.max_circumradius = std::max(facts.max_circumradius, radius);
@@ -142,6 +148,7 @@ void Refinement<K>::DescribeUnfinished() {
   Certificate& certificate = report_.certificate;
   double reach = std::numeric_limits<double>::infinity();
   for (std::uint32_t p = 0; p < complex_.size() && p < standing_.size(); ++p) {
+    LookUp(p);
     const auto& cell = complex_.cell(p);
     if (!cell.bounded()) continue;
     certificate.inconsistent_simplices += CountInconsistent<K>(complex_, p);
@@ -178,6 +185,7 @@ std::string Refinement<K>::WhatIsLeft() const {
                    active_.front().star, "; ");
   left += Message(report_.certificate.inconsistent_simplices, " simplices are inconsistent");
   for (std::uint32_t p = 0; p < complex_.size(); ++p) {
+    LookUp(p);
     const auto found = FindInconsistentConfiguration<K>(complex_, p);
     if (!found) continue;
     left += Message(", the first in the star of vertex ", found->holder, " but not in that of ",
@@ -203,7 +211,9 @@ void Refinement<K>::UpdateProgress() {
   progress_.bad_size = progress_.bad_radius_edge = progress_.unbounded_stars = 0;
   // A cell of circumradius R will have to hold about (R / epsilon)^k / 2 more points.
   double missing = 0;
+  std::size_t step = 0;
   for (const Active& a : active_) {
+    LookUp(step++);
     const double ratio = a.violation.radius / SizeBound(a.star);
     progress_.unbounded_stars += !complex_.cell(a.star).bounded();
     ++(a.violation.rule == Rule::kSize ? progress_.bad_size : progress_.bad_radius_edge);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <numeric>
 
 #include "core/complex/consistency.h"
 #include "core/parallel.h"
@@ -115,7 +117,10 @@ template <int K>
 std::vector<Target<K>> Refinement<K>::SizeAndShapeTargets() {
   constexpr std::uint16_t kNone = 0xffff;
   std::vector<std::uint16_t> worst(complex_.size(), kNone);
-  for (const Active& a : active_) worst[a.star] = static_cast<std::uint16_t>(a.violation.vertex);
+  for (std::size_t i = 0; i < active_.size(); ++i) {
+    LookUp(i);
+    worst[active_[i].star] = static_cast<std::uint16_t>(active_[i].violation.vertex);
+  }
   const auto is_seen_from_lower = [&](const Active& a) {
     typename StarComplex<K>::Simplex simplex, other;
     if (!complex_.SimplexOf(a.star, complex_.cell(a.star), a.violation.vertex, &simplex))
@@ -133,8 +138,11 @@ std::vector<Target<K>> Refinement<K>::SizeAndShapeTargets() {
     is_target[i] = discouraged_[active_[i].star] <= kGiveUp && !is_seen_from_lower(active_[i]);
   });
   std::vector<Target<K>> targets;
-  for (std::size_t i = 0; i < active_.size(); ++i)
+  targets.reserve(static_cast<std::size_t>(std::count(is_target.begin(), is_target.end(), 1)));
+  for (std::size_t i = 0; i < active_.size(); ++i) {
+    LookUp(i);
     if (is_target[i]) targets.push_back(Aim(active_[i].star, active_[i].violation));
+  }
   return targets;
 }
 
@@ -142,13 +150,13 @@ template <int K>
 std::vector<Target<K>> Refinement<K>::SliverAndConsistencyTargets() {
   if (all_suspect_) {
     suspects_.resize(complex_.size());
-    for (std::uint32_t p = 0; p < complex_.size(); ++p) suspects_[p] = p;
+    std::iota(suspects_.begin(), suspects_.end(), 0u);
     all_suspect_ = false;
     before_good_points_ = complex_.size();
   }
   suspects_.insert(suspects_.end(), blemished_.begin(), blemished_.end());
   suspects_.insert(suspects_.end(), filled_stars_.begin(), filled_stars_.end());
-  std::sort(suspects_.begin(), suspects_.end());
+  ParallelSort(suspects_, std::less<>());
   suspects_.erase(std::unique(suspects_.begin(), suspects_.end()), suspects_.end());
   std::vector<std::optional<Violation<K>>> found(suspects_.size());
   ParallelFor(suspects_.size(), [&](std::size_t i) {
@@ -160,6 +168,7 @@ std::vector<Target<K>> Refinement<K>::SliverAndConsistencyTargets() {
   filled_stars_.clear();
   progress_.bad_sliver = progress_.bad_inconsistent = 0;
   for (std::size_t i = 0; i < suspects_.size(); ++i) {
+    LookUp(i);
     const std::uint32_t p = suspects_[i];
     standing_[p] = found[i] ? kSliverOrInconsistent : kFine;
     if (!found[i]) continue;
@@ -235,8 +244,10 @@ void Refinement<K>::AskForTargets() {
   QueryBlock flats = NewBlock(QueryKind::kIntersectFlat);
   QueryBlock closest = NewBlock(QueryKind::kClosestPoint);
   Eigen::Index flat_count = 0;
-  for (std::size_t i = 0; i < targets_.size(); ++i)
+  for (std::size_t i = 0; i < targets_.size(); ++i) {
+    LookUp(i);
     if (FindsFlats(targets_[i])) flat_count += first_candidate_[i + 1] - first_candidate_[i];
+  }
   flats.points.resize(d, flat_count);
   flats.bases.resize(d * K, flat_count);
   flats.radii.resize(flat_count);
@@ -245,6 +256,7 @@ void Refinement<K>::AskForTargets() {
   const int closest_block = flat_count > 0 ? 1 : 0;
   Eigen::Index next_flat = 0, next_closest = 0;
   for (std::size_t i = 0; i < targets_.size(); ++i) {
+    LookUp(i);
     const bool flat = FindsFlats(targets_[i]);
     for (Eigen::Index c = first_candidate_[i]; c < first_candidate_[i + 1]; ++c)
       places_[static_cast<std::size_t>(c)] =

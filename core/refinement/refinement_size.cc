@@ -65,7 +65,8 @@ void Refinement<K>::SpreadSizes() {
     if (size_seen_[p] < INFINITY) queue.emplace_back(size_seen_[p], p);
   std::make_heap(queue.begin(), queue.end(), std::greater<>());
   local_size_ = size_seen_;
-  while (!queue.empty()) {
+  for (std::size_t step = 0; !queue.empty(); ++step) {
+    LookUp(step);
     std::pop_heap(queue.begin(), queue.end(), std::greater<>());
     const auto [size, p] = queue.back();
     queue.pop_back();
@@ -118,6 +119,7 @@ void Refinement<K>::DescribeSizes(StarFacts* facts) {
     for (const double size : given_size_) too_fine_ += WantedFor(size) < FinestBound();
   }
   for (std::uint32_t p = 0; p < complex_.size(); ++p) {
+    LookUp(p);
     const double radius = std::sqrt(complex_.cell(p).max_norm2());
     facts->max_size_ratio = std::max(facts->max_size_ratio, radius / LocalSize(p));
   }
@@ -133,6 +135,7 @@ void Refinement<K>::JudgeAllSizes() {
   });
   active_.clear();
   for (std::uint32_t p = 0; p < complex_.size(); ++p) {
+    LookUp(p);
     if (violations[p]) {
       standing_[p] = kSizeOrShape;
       active_.push_back({p, *violations[p]});

@@ -173,13 +173,16 @@ typename Surrogate<K>::Near Surrogate<K>::FindNear(const double* x) const {
 template <int K>
 void Surrogate<K>::Prepare(const std::vector<Near>& near) {
   std::vector<std::uint32_t> unknown;
-  for (const Near& n : near)
+  for (std::size_t at = 0; at < near.size(); ++at) {
+    LookUp(at);
+    const Near& n = near[at];
     for (int i = 0; i < n.count; ++i) {
       const std::uint32_t p = n.points[static_cast<std::size_t>(i)].second;
       if (slot_[p] != kNone) continue;
       slot_[p] = static_cast<std::uint32_t>(graphs_.size() + unknown.size());
       unknown.push_back(p);
     }
+  }
   const std::size_t first = graphs_.size();
   graphs_.resize(first + unknown.size());
   forms_.resize(graphs_.size() * form_size_);

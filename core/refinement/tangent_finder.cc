@@ -2,6 +2,7 @@
 
 #include <Eigen/SVD>
 
+#include "core/parallel.h"
 #include "core/sample/random.h"
 
 namespace stellate::core {
@@ -44,6 +45,7 @@ void TangentFinder::Ask() {
   block_.kind = QueryKind::kClosestPoint;
   block_.points.resize(d_, count * m * 2);
   for (Eigen::Index i = 0; i < count; ++i) {
+    LookUp(static_cast<std::size_t>(i));
     const Eigen::Index point = open_[static_cast<std::size_t>(i)];
     Random random(seed_, static_cast<std::uint64_t>(point));
     for (int j = 0; j < m; ++j) {
@@ -63,10 +65,9 @@ void TangentFinder::Ask() {
 
 void TangentFinder::Absorb(const AnswerBlock& answers) {
   const int m = guessed_ ? k_ : std::min(k_ + 4, d_);
-  std::vector<Eigen::Index> again;
-  Eigen::MatrixXd derivative(d_, m);
-  for (std::size_t i = 0; i < open_.size(); ++i) {
+  ParallelFor(open_.size(), [&](std::size_t i) {
     const Eigen::Index point = open_[i];
+    Eigen::MatrixXd derivative(d_, m);
     bool complete = true;
     for (int j = 0; j < m; ++j) {
       const auto q = (static_cast<Eigen::Index>(i) * m + j) * 2;
@@ -75,19 +76,19 @@ void TangentFinder::Absorb(const AnswerBlock& answers) {
                    answers.found[static_cast<std::size_t>(q) + 1];
       derivative.col(j) = (answers.points.col(q) - answers.points.col(q + 1)) / (2 * StepAt(point));
     }
-    if (complete) {
-      const Eigen::JacobiSVD<Eigen::MatrixXd> svd(derivative, Eigen::ComputeThinU);
-      const auto& s = svd.singularValues();
-      const bool spans = guessed_ ? s[k_ - 1] > kLeastKept : s[k_ - 1] > kLeastRatio * s[0];
-      const bool flat = m <= k_ || s[k_] < kMostBeyond * s[k_ - 1];
-      if (spans && flat) {
-        for (int a = 0; a < k_; ++a)
-          tangents_.col(point).segment(a * d_, d_) = svd.matrixU().col(a);
-        ok_[static_cast<std::size_t>(point)] = 1;
-      }
+    if (!complete) return;
+    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(derivative, Eigen::ComputeThinU);
+    const auto& s = svd.singularValues();
+    const bool spans = guessed_ ? s[k_ - 1] > kLeastKept : s[k_ - 1] > kLeastRatio * s[0];
+    const bool flat = m <= k_ || s[k_] < kMostBeyond * s[k_ - 1];
+    if (spans && flat) {
+      for (int a = 0; a < k_; ++a) tangents_.col(point).segment(a * d_, d_) = svd.matrixU().col(a);
+      ok_[static_cast<std::size_t>(point)] = 1;
     }
+  });
+  std::vector<Eigen::Index> again;
+  for (const Eigen::Index point : open_)
     if (!ok_[static_cast<std::size_t>(point)] && guessed_) again.push_back(point);
-  }
   open_ = std::move(again);
   guessed_ = false;
   if (!open_.empty()) Ask();

@@ -1,6 +1,7 @@
 #include "core/sample/ball_tree.h"
 
 #include <algorithm>
+#include <functional>
 #include <numeric>
 
 #include "core/parallel.h"
@@ -194,7 +195,7 @@ void BallTree::SetInfluence(std::uint32_t id, double influence) {
 }
 
 void BallTree::Refit() {
-  std::sort(stale_.begin(), stale_.end());
+  ParallelSort(stale_, std::less<>());
   stale_.erase(std::unique(stale_.begin(), stale_.end()), stale_.end());
   std::size_t steps = 0;
   for (const std::uint32_t leaf : stale_) {

@@ -42,6 +42,31 @@ TEST(Parallel, WorkEndsWhereItIsInterrupted) {
   EXPECT_FALSE(after);
 }
 
+// However many bodies oneTBB takes for one task.
+TEST(Parallel, NoBodyBeginsOnceInterrupted) {
+  Interruption interruption;
+  int begun = 0;
+  EXPECT_FALSE(WithThreads(1, interruption, [&] {
+    ParallelFor(100'000, [&](int) {
+      ++begun;
+      interruption.Raise();
+    });
+  }));
+  EXPECT_EQ(begun, 1);
+}
+
+TEST(Parallel, ALongLoopLooksUpNowAndThen) {
+  Interruption interruption;
+  std::size_t step = 0;
+  EXPECT_FALSE(WithThreads(1, interruption, [&] {
+    for (;; ++step) {
+      LookUp(step);
+      if (step == 5000) interruption.Raise();
+    }
+  }));
+  EXPECT_EQ(step, 8192u);
+}
+
 // One given up would stay in memory for as long as others have work.
 TEST(Parallel, ArenasAreUsedAgain) {
   constexpr int kAtOnce = 3;

@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <memory>
+#include <string>
 #include <thread>
 
+#include "core/parallel.h"
 #include "tests/core/support/in_process_run.h"
 
 namespace stellate::core {
@@ -71,6 +74,121 @@ TEST(Interrupt, ComesFromAnyThreadAtAnyTime) {
     }
   }
 }
+
+#if !defined(__SANITIZE_THREAD__)
+// Counts the look-ups of a run on one thread, and interrupts it at one of them.
+std::uint64_t look_ups, interrupt_at;
+Mesher* looking_up;
+
+void CountLookUp() {
+  if (++look_ups == interrupt_at) looking_up->Interrupt();
+}
+
+class AtALookUp : public ::testing::Test {
+ protected:
+  ~AtALookUp() override { on_look_up = nullptr; }
+
+  struct Ended {
+    std::unique_ptr<Mesher> mesher;
+    bool interrupted = false;
+    Progress progress;              // when the last delta was handed out
+    Counts counts;                  // the same
+    std::uint64_t vertices = 0;     // of all deltas
+    std::uint64_t looks_after = 0;  // of the interrupted round, once it was interrupted
+  };
+
+  static Ended Run(Specification spec, const testing::Answerer& answer, std::uint64_t at) {
+    spec.threads = 1;
+    Ended run;
+    run.mesher = NewMesher(spec);
+    looking_up = run.mesher.get();
+    look_ups = 0;
+    interrupt_at = at;
+    on_look_up = &CountLookUp;
+    while (const QueryBatch* batch = run.mesher->NextBatch()) {
+      const auto delta = run.mesher->Absorb(answer(*batch));
+      if (!delta) {
+        EXPECT_EQ(delta.error().code, StatusCode::kCancelled);
+        run.interrupted = true;
+        run.looks_after = look_ups - at;
+        break;
+      }
+      run.vertices += static_cast<std::uint64_t>(delta->points.cols());
+      run.progress = run.mesher->progress();
+      run.counts = run.mesher->report().counts;
+    }
+    on_look_up = nullptr;
+    return run;
+  }
+
+  // At moments spread over the whole run, its first and its last included.
+  static void InterruptAtMany(const Specification& spec, Oracle& oracle,
+                              std::uint64_t moments = 25) {
+    // Each of the few stretches of work that are within each other looks up as it ends.
+    constexpr std::uint64_t kMostLooksAfter = 16;
+    const auto answer = AnswererFor(oracle);
+    ASSERT_FALSE(Run(spec, answer, 0).interrupted);
+    const std::uint64_t all = look_ups;
+    ASSERT_GT(all, 1000u);
+    for (std::uint64_t moment = 0; moment < moments; ++moment) {
+      const std::uint64_t at = 1 + moment * (all - 1) / (moments - 1);
+      SCOPED_TRACE("at look-up " + std::to_string(at) + " of " + std::to_string(all));
+      const Ended run = Run(spec, answer, at);
+      ASSERT_TRUE(run.interrupted);
+      EXPECT_LE(run.looks_after, kMostLooksAfter);
+      const Progress& progress = run.mesher->progress();
+      EXPECT_EQ(progress.round, run.progress.round);
+      EXPECT_EQ(progress.vertices, run.progress.vertices);
+      EXPECT_EQ(progress.simplices, run.progress.simplices);
+      EXPECT_EQ(progress.queries, run.progress.queries);
+      EXPECT_EQ(run.mesher->report().termination, Termination::kRunning);
+      run.mesher->Cancel();
+      EXPECT_EQ(run.mesher->NextBatch(), nullptr);
+      const Report& report = run.mesher->report();
+      EXPECT_EQ(report.termination, Termination::kCancelled);
+      EXPECT_FALSE(report.certificate.certified);
+      EXPECT_EQ(report.counts.vertices, run.vertices);
+      EXPECT_EQ(report.counts.rounds, run.counts.rounds);
+      EXPECT_EQ(report.counts.queries, run.counts.queries);
+      EXPECT_EQ(report.counts.tangent_queries, run.counts.tangent_queries);
+      EXPECT_EQ(report.counts.inserted_size, run.counts.inserted_size);
+      EXPECT_EQ(report.counts.duplicates, run.counts.duplicates);
+    }
+  }
+};
+
+TEST_F(AtALookUp, OfAPlainRun) {
+  const auto torus = Make("torus");
+  InterruptAtMany(SpecificationFor(*torus, 0.2), *torus);
+}
+
+TEST_F(AtALookUp, OfARunWithGoodPoints) {
+  const auto so3 = Make("so3");
+  InterruptAtMany(SpecificationFor(*so3, 0.8), *so3, 9);
+}
+
+TEST_F(AtALookUp, OfARunThatFindsTangentsItself) {
+  const auto torus = Make("torus");
+  Specification spec = SpecificationFor(*torus, 0.2);
+  spec.oracle.intersect_flat = spec.oracle.tangent_basis = false;
+  InterruptAtMany(spec, *torus);
+}
+
+TEST_F(AtALookUp, OfARehearsal) {
+  const auto torus = Make("torus");
+  Specification spec = SpecificationFor(*torus, 0.2);
+  spec.criteria.ask_ahead = true;
+  InterruptAtMany(spec, *torus);
+}
+
+TEST_F(AtALookUp, OfARunInPartsThatIsCutShort) {
+  const auto torus = Make("torus");
+  Specification spec = SpecificationFor(*torus, 0.1);
+  spec.limits.max_batch_queries = 20;
+  spec.limits.max_rounds = 30;
+  InterruptAtMany(spec, *torus);
+}
+#endif
 
 }  // namespace
 }  // namespace stellate::core
