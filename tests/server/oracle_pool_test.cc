@@ -52,6 +52,10 @@ class HandWorker : public OracleWorker {
   void End(const WorkerEnd&) override {}
   std::string Title() const override { return title_; }
 
+  std::size_t Held() {
+    const std::lock_guard lock(mutex_);
+    return chunks_.size();
+  }
   // Waits for its next chunk.
   Chunk Take() {
     std::unique_lock lock(mutex_);
@@ -115,6 +119,31 @@ TEST_F(OraclePoolTest, AnswersStandWhereTheirQueriesStood) {
   const auto b = FakeWorker::Join(&pool);
   const auto c = FakeWorker::Join(&pool);
   ExpectAllAnswered(Ask(&pool).get());
+}
+
+TEST_F(OraclePoolTest, TheTimeThatWorkersTakeIsUsedOnce) {
+  OraclePool pool(spec_, options_, 8);
+  int times = 0;
+  const auto worker = std::make_shared<HandWorker>("");
+  const WorkerId id = *pool.Join(worker, 0);
+  const auto answered = pool.Ask(batch_, [&] {
+    ++times;
+    EXPECT_GT(worker->Held(), 0u) << "the questions are out";
+    while (worker->Held() > 0) TakeAnswer(&pool, id, worker->Take());
+  });
+  EXPECT_EQ(times, 1);
+  ExpectAllAnswered(answered);
+
+  pool.Leave(id);
+  const auto interrupted = pool.Ask(batch_, [&] {
+    ++times;
+    pool.Interrupt();
+  });
+  EXPECT_EQ(times, 2) << "without a worker, too";
+  EXPECT_FALSE(interrupted.round);
+  EXPECT_FALSE(interrupted.failure);
+  EXPECT_FALSE(pool.Ask(batch_, [&] { ++times; }).round);
+  EXPECT_EQ(times, 3) << "and where no question goes out any more";
 }
 
 TEST_F(OraclePoolTest, AnotherTakesOverWhenAWorkerLeavesInTheMiddle) {

@@ -241,6 +241,23 @@ TEST(Session, WatchersAreWokenEachRoundAndBounded) {
   EXPECT_GE(first->wakes, 3);
 }
 
+TEST(Session, WhatARoundLedToIsShownBeforeTheNextIsAnswered) {
+  Running running(Faking({}));
+  std::atomic<int> seen{0};
+  const auto worker = FakeWorker::Join(
+      &running.session->pool(), [&](const Chunk& chunk, core::AnswerBlock* answer) {
+        const TimePoint patience = Clock::now() + 60s;
+        while (running.session->history().revision() + 1 < chunk.round->batch.round) {
+          if (Clock::now() > patience) return false;
+          std::this_thread::sleep_for(1ms);
+        }
+        ++seen;
+        return FakeWorker::AnswerTruly(chunk, answer);
+      });
+  EXPECT_EQ(running.Finish().revision, 3u);
+  EXPECT_EQ(seen, 3);
+}
+
 // The real mesher, and workers that answer for the sphere.
 std::vector<double> MeshSphere(int workers, std::vector<std::uint32_t>* simplices) {
   Running running;

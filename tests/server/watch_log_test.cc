@@ -158,8 +158,22 @@ TEST(WatchLog, RefusesWhatDoesNotFollow) {
   EXPECT_FALSE(log.Append(Delta(3, 4, 1, {}, {})).ok()) << "a revision left out";
   EXPECT_FALSE(log.Append(Delta(2, 9, 1, {}, {})).ok()) << "vertices left out";
   EXPECT_FALSE(log.Append(Delta(2, 4, 0, {}, {{1, 2, 3}, {0, 1, 3}})).ok()) << "not there";
+  EXPECT_FALSE(log.Append(Delta(2, 4, 0, {}, {{9, 10, 11}})).ok()) << "not even its vertices";
+  EXPECT_FALSE(log.Append(Delta(2, 4, 1, {{5, 6, 7}}, {})).ok()) << "a vertex left out";
   EXPECT_EQ(log.revision(), 1u);
   EXPECT_TRUE(log.Append(Delta(2, 4, 0, {}, {{1, 2, 3}})).ok()) << "a refusal changes nothing";
+}
+
+TEST(WatchLog, ARevisionIsOnePartWhereItFits) {
+  WatchLog log(kDimension, kAmbient);
+  ASSERT_TRUE(log.Append(Delta(1, 0, 4, {{0, 1, 2}, {1, 2, 3}}, {})).ok());
+  ASSERT_TRUE(log.Append(Delta(2, 4, 1, {{0, 1, 4}, {0, 2, 4}}, {{0, 1, 2}})).ok());
+  WatchLog::Cursor cursor = log.Begin(1);
+  const DeltaPart part = log.Next(&cursor, 1000);
+  EXPECT_TRUE(part.complete);
+  EXPECT_EQ(part.removed, (Triangle{0, 1, 2}));
+  EXPECT_EQ(part.points.size(), 3u);
+  EXPECT_EQ(part.added, (Triangle{0, 1, 4, 0, 2, 4}));
 }
 
 // Any revision, read in parts, each by a reader that knows but the position.
