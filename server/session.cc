@@ -78,10 +78,10 @@ void Session::Run() {
          core::Status::Ok());
   }
   Expose(nullptr);
-  if (options_.memory != nullptr) options_.memory->Insist(history_.MemoryBytes());
   Finish(report ? &*report : nullptr);
   mesher.reset();  // it is large, and watchers, who have heard the end, do not need it
   malloc_trim(0);  // the allocator would keep the memory of each mesh's own thread
+  if (options_.memory != nullptr) options_.memory->Insist(history_.MemoryBytes());
   over_ = true;
 }
 

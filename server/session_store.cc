@@ -15,6 +15,9 @@ namespace {
 
 constexpr std::string_view kNamePrefix = "meshes/";
 constexpr std::size_t kNameBytes = 16;
+// Meshes that have ended, and are being taken apart, take no place of those that run, but there may
+// be no more of them than of those, or than this.
+constexpr std::size_t kLeastEnding = 16;
 
 }  // namespace
 
@@ -50,9 +53,13 @@ SessionStore::~SessionStore() { Stop(TimePoint::max()); }
 
 Allowed<std::shared_ptr<Session>> SessionStore::Create(SessionOptions options) {
   const std::lock_guard lock(mutex_);
-  std::size_t running = 0, owned = 0;
+  std::size_t running = 0, owned = 0, ending = 0;
   const auto count = [&](const Entry& entry) {
-    if (entry.session->HasEnded()) return;
+    if (entry.session->Over()) return;
+    if (entry.session->HasEnded()) {
+      ++ending;
+      return;
+    }
     ++running;
     if (entry.session->options().owner == options.owner) ++owned;
   };
@@ -64,6 +71,11 @@ Allowed<std::shared_ptr<Session>> SessionStore::Create(SessionOptions options) {
                 core::Message("the server runs ", running,
                               " meshes, the most that it allows: wait for one to end, cancel one, "
                               "or raise --max-meshes")));
+  }
+  if (ending >= std::max(limits_.max_running, kLeastEnding)) {
+    return tl::unexpected(Refused({"max-meshes", core::Message(limits_.max_running), "server"},
+                                  core::Message("the server is still taking apart ", ending,
+                                                " meshes that ended: ask again in a moment")));
   }
   if (!options.owner.empty() && owned >= limits_.max_running_of_owner) {
     return tl::unexpected(

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <future>
 #include <set>
 #include <thread>
 
@@ -72,6 +73,70 @@ TEST(SessionStore, RefusesMoreThanItsLimitAndTakesMoreWhenOneEnds) {
   EXPECT_EQ(refused.error().code, core::StatusCode::kLimitExceeded);
   a->Cancel();
   WaitUntilOver(*a);
+  EXPECT_TRUE(store.Create(Options()));
+}
+
+// A mesher that asks for one point, and is not destroyed before the test says so.
+class SlowToGo : public core::Mesher {
+ public:
+  SlowToGo(core::Specification spec, std::shared_future<void> gate)
+      : spec_(std::move(spec)), gate_(std::move(gate)) {
+    batch_.round = 1;
+    batch_.blocks.resize(1);
+    batch_.blocks[0].points = Eigen::MatrixXd::Constant(3, 1, 1.0);
+  }
+  ~SlowToGo() override { gate_.wait(); }
+
+  const core::QueryBatch* NextBatch() override { return over_ ? nullptr : &batch_; }
+  core::Expected<core::MeshDelta> Absorb(const core::Answers&) override {
+    return core::Refuse(core::StatusCode::kCancelled, "never asked");
+  }
+  void Interrupt() override {}
+  void Cancel() override { over_ = true; }
+  void Fail(core::Status) override { over_ = true; }
+  const core::Specification& specification() const override { return spec_; }
+  const core::Progress& progress() const override { return progress_; }
+  const core::Report& report() const override { return report_; }
+  Eigen::MatrixXd Points() const override { return {}; }
+  Eigen::MatrixXd Tangents() const override { return {}; }
+  std::vector<std::uint32_t> Simplices() const override { return {}; }
+
+ private:
+  const core::Specification spec_;
+  const std::shared_future<void> gate_;
+  core::QueryBatch batch_;
+  core::Progress progress_;
+  core::Report report_;
+  bool over_ = false;
+};
+
+TEST(SessionStore, MeshesBeingTakenApartTakeNoPlaceButAreBounded) {
+  constexpr std::size_t kMostEnding = 16;
+  std::promise<void> gate;
+  SessionStore store({1, 100, 1h},
+                     [future = gate.get_future().share()](core::Specification spec)
+                         -> core::Expected<std::unique_ptr<core::Mesher>> {
+                       return std::make_unique<SlowToGo>(std::move(spec), future);
+                     });
+  const auto budget = std::make_shared<MemoryBudget>(MemoryBudget::Limits{});
+  std::vector<std::shared_ptr<Session>> ended;
+  for (std::size_t i = 0; i < kMostEnding; ++i) {
+    SessionOptions options = Options();
+    options.memory = MemoryBudget::Open(budget, "");
+    auto created = store.Create(std::move(options));
+    ASSERT_TRUE(created) << i << " are being taken apart";
+    ended.push_back(std::move(*created));
+    while (ended.back()->View().bytes == 0) std::this_thread::sleep_for(1ms);  // it has begun
+    ended.back()->Cancel();
+    while (!ended.back()->HasEnded()) std::this_thread::sleep_for(1ms);
+    EXPECT_FALSE(ended.back()->Over());
+  }
+  EXPECT_GT(budget->total(), 0u) << "their memory is not there for others yet";
+  const auto refused = store.Create(Options());
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().limit->setting, "max-meshes");
+  gate.set_value();
+  for (const auto& session : ended) WaitUntilOver(*session);
   EXPECT_TRUE(store.Create(Options()));
 }
 
