@@ -113,9 +113,10 @@ Listener::~Listener() {
   if (wake_ >= 0) close(wake_);
 }
 
-void Listener::Start(Taker take, std::function<void()> refused) {
+void Listener::Start(Taker take, std::function<void()> refused, std::function<bool()> later) {
   take_ = std::move(take);
   refused_ = std::move(refused);
+  later_ = std::move(later);
   wake_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
 }
@@ -140,6 +141,7 @@ void Listener::Run(const std::stop_token& stop) {
 
 void Listener::Accept(int socket, const std::stop_token& stop) {
   while (!stop.stop_requested()) {
+    if (later_()) return Pause();
     const int fd = accept4(socket, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (fd < 0) {
       if (errno == EAGAIN || errno == EWOULDBLOCK) return;

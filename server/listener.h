@@ -33,7 +33,10 @@ class Listener {
   std::size_t max_connections() const { return max_connections_; }
 
   // Accepts, on a thread of its own. `refused` is told of each connection that was one too many.
-  void Start(Taker take, std::function<void()> refused);
+  // While `later` says so, connections wait in the kernel.
+  void Start(
+      Taker take, std::function<void()> refused,
+      std::function<bool()> later = [] { return false; });
   // Nothing is handed over after this.
   void Stop();
 
@@ -50,6 +53,7 @@ class Listener {
   int wake_ = -1;  // readable once it is to stop
   Taker take_;
   std::function<void()> refused_;
+  std::function<bool()> later_;
   // What was handed over: a socket, and its number among all sockets there ever were, by which one
   // that was closed is told from another that got the same descriptor.
   std::vector<std::pair<int, ino_t>> open_;

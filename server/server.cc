@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "core/message.h"
+#include "server/connection_guard.h"
 #include "server/error_map.h"
 #include "server/listener.h"
 #include "server/tls.h"
@@ -33,10 +34,15 @@ constexpr auto kTick = std::chrono::seconds(1);
 constexpr auto kPoll = std::chrono::milliseconds(20);
 constexpr auto kReturn = std::chrono::seconds(1);     // for a worker that lost its stream
 constexpr auto kLastWords = std::chrono::seconds(2);  // for streams to send what they have
+constexpr auto kLook = std::chrono::milliseconds(2);       // whether they have
+constexpr auto kFarewell = std::chrono::milliseconds(50);  // for clients to take leave
 constexpr auto kLastRound = std::chrono::seconds(5);  // for meshers to notice a cancel
 // The health of the process alone: it holds while the server drains.
 constexpr char kAlive[] = "alive";
 constexpr int kMaxSyncThreads = 64;  // reflection alone uses them
+// Beside the calls that a connection may have open: those that its client has reset, and that gRPC
+// is not done with. 5 MB; a client that waits for anything has a few.
+constexpr std::size_t kResetCalls = 256;
 
 // Unary rpcs: run the function, answer at once. No exception leaves a handler.
 template <typename Request, typename Response>
@@ -148,6 +154,7 @@ void SetUp(const Config& config, grpc::ServerBuilder* builder) {
   builder->AddChannelArgument(GRPC_ARG_HTTP2_MAX_PING_STRIKES, 0);
   builder->AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS,
                               Milliseconds(config.hello_seconds));
+  builder->AddChannelArgument(GRPC_ARG_ENABLE_CHANNELZ, 1);  // the connection guard asks it
   builder->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
                               static_cast<int>(config.max_connection_streams));
   grpc::ResourceQuota quota("stellated");
@@ -218,14 +225,19 @@ class Server::Impl {
               Message("cannot listen on ", address->Target(), ": choose another --listen")};
     }
     if (listener == nullptr) return Status::Ok();
+    guard = std::make_unique<ConnectionGuard>(
+        address->port, service.config.max_connection_streams + kResetCalls,
+        [this] { service.metrics.LimitReached("max-connection-streams"); });
     listener->Start(
-        [acceptor = std::shared_ptr(std::move(acceptor))](int listener_fd, int fd) {
+        [this, acceptor = std::shared_ptr(std::move(acceptor))](int listener_fd, int fd) {
           grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
           connection.listener_fd = listener_fd;
           connection.fd = fd;
+          guard->Watch(fd);
           acceptor->HandleNewConnection(&connection);
         },
-        [this] { service.metrics.LimitReached("max-connections"); });
+        [this] { service.metrics.LimitReached("max-connections"); },
+        [this] { return guard->IsBehind(); });
     return Status::Ok();
   }
 
@@ -244,7 +256,8 @@ class Server::Impl {
   ServerState service;
   Rpcs rpcs;
   std::unique_ptr<grpc::Server> server;
-  std::unique_ptr<Listener> listener;  // TCP alone
+  std::unique_ptr<ConnectionGuard> guard;  // TCP alone, as the next
+  std::unique_ptr<Listener> listener;
   bool stopped = false;
   std::mutex tick_mutex;
   std::condition_variable_any tick_wake;
@@ -324,7 +337,12 @@ bool Server::Stop(Clock::duration drain, const std::function<bool()>& hurry) {
   }
   service.streams.StopAll();
   if (impl.listener != nullptr) impl.listener->Stop();
-  impl.server->Shutdown(std::chrono::system_clock::now() + kLastWords);
+  // gRPC also waits for clients that have no call open and do not look at their connection.
+  const TimePoint said = Clock::now() + kLastWords;
+  while (service.streams.Count() > 0 && Clock::now() < said) {
+    std::this_thread::sleep_for(kLook);
+  }
+  impl.server->Shutdown(std::chrono::system_clock::now() + kFarewell);
   impl.server->Wait();
   impl.ticker.request_stop();
   impl.ticker.join();

@@ -106,7 +106,9 @@ const std::vector<Setting>& Settings() {
       {kServerLimits, "--max-connections", &Config::max_connections,
        "Connections open at once; further ones are closed", 1, 1'000'000},
       {kServerLimits, "--max-connection-streams", &Config::max_connection_streams,
-       "Calls open at once on one connection; more wait in the client", 4, 1'000'000},
+       "Calls open at once on one connection; more wait in the client. A TCP connection with 256 "
+       "more that are open, or reset and not done with, is closed",
+       4, 1'000'000},
 
       {kOwnerLimits, "--owner-meshes", &Config::owner_meshes,
        "Meshes running at once; 0: as many as the server allows", 0, 100'000},

@@ -25,6 +25,8 @@ SERVICE = "/stellate.v1.Stellate/"
 UNARY = ("CreateMesh", "GetMesh", "ListMeshes", "CancelMesh", "DeleteMesh", "GetServerInfo")
 _DEADLINE = 60.0  # a call that takes longer hangs
 _HUGE = 2**32 - 1
+_RESETS = 30_000
+_MANY_CALLS = 5000  # above --max-connection-streams
 _UNPACKED = 96 << 20  # bytes of a packed message
 
 
@@ -305,6 +307,31 @@ def floods(target: Target) -> None:
     target.delete(mine)
 
 
+def rapid_resets(target: Target) -> None:
+    """Calls reset as fast as they are made, and connections made as fast as they are closed."""
+    path = SERVICE + target.random.choice(("WatchMesh", "GetServerInfo", "Nothing"))
+    for _ in range(3):
+        connection = target.connect()
+        block = raw.header_block(path)
+        for first in range(0, _RESETS, 500):
+            connection.send(b"".join(
+                raw.frame(raw.HEADERS, raw.END_HEADERS, stream, block)
+                + raw.frame(raw.RST_STREAM, 0, stream, struct.pack(">I", 8))
+                for stream in range(1 + 2 * first, 1 + 2 * (first + 500), 2)
+            ))
+        connection.close()
+
+
+def unbounded_calls(target: Target) -> None:
+    """Open calls beyond the bound, by a client that never acknowledges it: it is hung up on."""
+    for path in ("ServeOracle", "WatchMesh", "CreateMesh"):
+        connection = target.connect()
+        for number in range(_MANY_CALLS):
+            connection.open(1 + 2 * number, SERVICE + path)
+        connection.until_closed()
+        connection.close()
+
+
 def packed_messages(target: Target) -> None:
     """Messages that grow a thousandfold when they are unpacked: none may be."""
     places = [SERVICE + rpc for rpc in (*UNARY, "ServeOracle", "WatchMesh", "DownloadMesh")]
@@ -440,6 +467,8 @@ ATTACKS: tuple[Callable[[Target], None], ...] = (
     giant_shapes,
     half_open,
     floods,
+    rapid_resets,
+    unbounded_calls,
     packed_messages,
     unread_replies,
     other_protocols,

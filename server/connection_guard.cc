@@ -1,0 +1,213 @@
+#include "server/connection_guard.h"
+
+#include <fcntl.h>
+#include <linux/tcp.h>
+#include <malloc.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/epoll.h>
+#include <sys/eventfd.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include "core/message.h"
+#include "server/log.h"
+
+namespace stellate::server {
+namespace {
+
+using core::Message;
+
+constexpr int kMostEvents = 1024;
+constexpr int kPauseMilliseconds = 20;     // between two looks: some hundred calls may come
+constexpr std::uint64_t kFewBytes = 4096;  // too little for many calls, 16 bytes each at least
+constexpr std::size_t kFewCalls = 64;
+constexpr std::uint64_t kCallBytes = 64;  // of a call that has come and is not read yet, about
+constexpr auto kLogPause = std::chrono::seconds(1);
+constexpr auto kWary = std::chrono::seconds(5);
+
+// Zero: it is no socket any more.
+ino_t NumberOf(int fd) {
+  struct stat info {};
+  return fstat(fd, &info) == 0 && S_ISSOCK(info.st_mode) ? info.st_ino : 0;
+}
+
+std::uint64_t BytesReceived(int fd) {
+  tcp_info info{};
+  socklen_t size = sizeof(info);
+  return getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &size) == 0 ? info.tcpi_bytes_received : 0;
+}
+
+// Received, and not taken by gRPC yet.
+std::uint64_t BytesWaiting(int fd) {
+  int bytes = 0;
+  return ioctl(fd, FIONREAD, &bytes) == 0 && bytes > 0 ? static_cast<std::uint64_t>(bytes) : 0;
+}
+
+}  // namespace
+
+ConnectionGuard::ConnectionGuard(int port, std::size_t most_calls, std::function<void()> closed)
+    : port_(port),
+      most_calls_(most_calls),
+      closed_(std::move(closed)),
+      epoll_(epoll_create1(EPOLL_CLOEXEC)),
+      wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  epoll_event event{};  // of key 0, which no connection has
+  event.events = EPOLLIN;
+  epoll_ctl(epoll_, EPOLL_CTL_ADD, wake_, &event);
+  thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
+}
+
+ConnectionGuard::~ConnectionGuard() {
+  thread_.request_stop();
+  const std::uint64_t one = 1;
+  [[maybe_unused]] const auto written = write(wake_, &one, sizeof(one));
+  thread_.join();
+  close(epoll_);
+  close(wake_);
+}
+
+void ConnectionGuard::Watch(int fd) {
+  Connection connection;
+  connection.fd = fd;
+  connection.number = NumberOf(fd);
+  connection.peer = PeerOf(fd);
+  newcomer_ = true;
+  const std::lock_guard lock(mutex_);
+  connections_.emplace(++last_key_, std::move(connection));
+  // Once for all that came meanwhile. It ends when gRPC closes the descriptor.
+  epoll_event event{};
+  event.events = EPOLLIN | EPOLLRDHUP | EPOLLET;
+  event.data.u64 = last_key_;
+  epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event);
+}
+
+bool ConnectionGuard::IsBehind() const { return behind_ || (wary_ && newcomer_); }
+
+void ConnectionGuard::Run(const std::stop_token& stop) {
+  std::vector<epoll_event> events(kMostEvents);
+  while (!stop.stop_requested()) {
+    const bool idle = busy_.empty() && gone_.empty() && !wary_;
+    const int count = epoll_wait(epoll_, events.data(), kMostEvents, idle ? -1 : 0);
+    {
+      const std::lock_guard lock(mutex_);
+      for (int i = 0; i < count; ++i) {
+        const epoll_event& event = events[static_cast<std::size_t>(i)];
+        const auto found = connections_.find(event.data.u64);
+        if (found == connections_.end()) continue;  // it is to stop
+        busy_.insert(found->first);
+        if ((event.events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0) found->second.ending = true;
+      }
+      Look();
+    }
+    CountLeftBehind();
+    if (wary_ && Clock::now() > wary_until_) GiveBack();
+    pollfd wake{wake_, POLLIN, 0};
+    poll(&wake, 1, kPauseMilliseconds);
+    newcomer_ = false;
+  }
+}
+
+void ConnectionGuard::Look() {
+  const bool sweep = connections_.size() > 2 * swept_ + kMostEvents;
+  if (sweep) {
+    for (const auto& [key, connection] : connections_) busy_.insert(key);
+  }
+  FindIds();
+  ending_calls_ = 0;
+  for (auto key = busy_.begin(); key != busy_.end();) {
+    const auto found = connections_.find(*key);
+    Connection& connection = found->second;
+    const bool open = NumberOf(connection.fd) == connection.number;
+    const bool calm = !open || IsCalm(&connection);
+    if (open && connection.ending) {
+      ending_calls_ += connection.calls + BytesWaiting(connection.fd) / kCallBytes;
+    }
+    if (!open) {
+      if (connection.id != 0) gone_.push_back(connection.id);
+      connections_.erase(found);
+    }
+    key = calm ? busy_.erase(key) : std::next(key);
+  }
+  if (sweep) swept_ = connections_.size();
+}
+
+// Nothing can come of it before more bytes come.
+bool ConnectionGuard::IsCalm(Connection* connection) {
+  const std::uint64_t bytes = BytesReceived(connection->fd);
+  if (connection->id == 0) return bytes < kFewBytes && !connection->ending;
+  const bool waits = connection->ending || BytesWaiting(connection->fd) >= kFewBytes;
+  if (!waits && connection->calls <= kFewCalls && bytes - connection->bytes < kFewBytes) {
+    return true;
+  }
+  const auto calls = CallsHeld(connection->id);
+  connection->bytes = bytes;
+  connection->calls = calls.value_or(0);
+  if (!calls) connection->id = 0;  // gRPC is about to close it, or it was another's of that name
+  if (connection->calls > most_calls_ && !connection->closed) Close(connection);
+  return calls && !waits && *calls <= kFewCalls;
+}
+
+void ConnectionGuard::FindIds() {
+  std::unordered_map<std::string_view, Connection*> unknown;
+  for (const std::uint64_t key : busy_) {
+    Connection& connection = connections_.at(key);
+    if (connection.id == 0) unknown.emplace(connection.peer, &connection);
+  }
+  if (unknown.empty()) return;
+  ForEachConnection([&](std::string_view peer, ConnectionId id) {
+    const auto found = unknown.find(peer);
+    if (found != unknown.end() && CameToPort(port_, id)) found->second->id = id;
+  });
+}
+
+void ConnectionGuard::CountLeftBehind() {
+  std::size_t calls = ending_calls_;
+  std::erase_if(gone_, [&calls](ConnectionId id) {
+    const std::size_t left = CallsHeld(id).value_or(0);
+    calls += left;
+    return left == 0;
+  });
+  behind_ = calls > most_calls_ / 4;
+  if (!behind_) return;
+  wary_ = true;
+  wary_until_ = Clock::now() + kWary;
+}
+
+// What the calls had; without this the allocator keeps it.
+void ConnectionGuard::GiveBack() {
+  wary_ = false;
+  malloc_trim(0);
+}
+
+void ConnectionGuard::Close(Connection* connection) {
+  connection->closed = connection->ending = true;
+  closed_();  // first, lest the client know of it before
+  const int fd = fcntl(connection->fd, F_DUPFD_CLOEXEC, 0);  // stays the same from here on
+  if (NumberOf(fd) == connection->number) {
+    // Not shutdown(2): it would leave gRPC what has come already, megabytes of it.
+    sockaddr nowhere{};
+    nowhere.sa_family = AF_UNSPEC;
+    connect(fd, &nowhere, sizeof(nowhere));
+  }
+  close(fd);
+  const auto now = Clock::now();
+  wary_ = true;
+  wary_until_ = now + kWary;
+  ++unsaid_;
+  if (now - said_ < kLogPause) return;
+  Log(LogLevel::kWarning, {},
+      Message("closed ", unsaid_, " connections; the last, of ", connection->peer, ", had ",
+              connection->calls, " calls that were open or were reset faster than they end; ",
+              "--max-connection-streams allows ", most_calls_));
+  said_ = now;
+  unsaid_ = 0;
+}
+
+}  // namespace stellate::server

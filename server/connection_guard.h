@@ -1,0 +1,85 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <set>
+#include <string>
+#include <thread>
+#include <unordered_map>
+#include <vector>
+
+#include "server/channelz.h"
+
+namespace stellate::server {
+
+// Closes TCP connections whose calls pile up. gRPC 1.51 bounds the calls open on a connection, but
+// not before the client has acknowledged the bound; and it takes new calls faster than it lets go
+// of those that the client resets (CVE-2023-44487). Either takes 10 to 20 kB a call, without end.
+class ConnectionGuard {
+ public:
+  // `port`: where the server listens. A connection may have `most_calls` calls that gRPC has not
+  // let go of; `closed` is told, on another thread, of each that had more.
+  ConnectionGuard(int port, std::size_t most_calls, std::function<void()> closed);
+  ~ConnectionGuard();
+
+  // Has to be told of every connection, before gRPC has it. One thread at a time.
+  void Watch(int fd);
+
+  // It is not the time to accept another connection: those that are gone have left many calls
+  // It is not the time to accept another connection: those that are gone have left many calls
+  // behind, or did so lately, and the last newcomer has not been looked at yet.
+  bool IsBehind() const;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Connection {
+    int fd = -1;
+    ino_t number = 0;         // by which it is told from another that got the same descriptor
+    std::string peer;         // as gRPC writes it
+    ConnectionId id = 0;      // 0: not known yet
+    std::uint64_t bytes = 0;  // received, and
+    std::size_t calls = 0;    // held, when it was last asked about
+    bool ending = false;      // either side has hung up
+    bool closed = false;      // by this guard
+  };
+
+  void Run(const std::stop_token& stop);
+  void Look();
+  bool IsCalm(Connection* connection);
+  void FindIds();
+  void CountLeftBehind();
+  void GiveBack();
+  void Close(Connection* connection);
+
+  const int port_;
+  const std::size_t most_calls_;
+  const std::function<void()> closed_;
+  const int epoll_;
+  const int wake_;  // readable once it is to stop
+
+  std::mutex mutex_;  // of the connections
+  std::uint64_t last_key_ = 0;
+  std::unordered_map<std::uint64_t, Connection> connections_;
+
+  // Of the thread.
+  std::set<std::uint64_t> busy_;    // to be looked at again
+  std::vector<ConnectionId> gone_;  // may have left calls behind
+  std::size_t ending_calls_ = 0;    // of those that are about to be gone
+  std::size_t swept_ = 0;           // how many were left when all were last looked at
+  std::size_t unsaid_ = 0;          // were closed since the log last said so
+  Clock::time_point said_;
+  Clock::time_point wary_until_;
+
+  std::atomic<bool> behind_{false};
+  std::atomic<bool> wary_{false};
+  std::atomic<bool> newcomer_{false};  // not looked at yet
+  std::jthread thread_;
+};
+
+}  // namespace stellate::server
