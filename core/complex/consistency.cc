@@ -31,6 +31,11 @@ template <int K>
 double Orientation(const StarComplex<K>& complex, std::uint32_t p, const std::uint16_t* facets) {
   double m[K][K];
   for (int r = 0; r < K; ++r) complex.HalfSpace(p, facets[r], m[r]);
+  if constexpr (K == 3) {  // by far the most often
+    return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) +
+           m[0][1] * (m[1][2] * m[2][0] - m[1][0] * m[2][2]) +
+           m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+  }
   double sign = 1;
   for (int c = 0; c < K; ++c) {
     int pivot = c;
@@ -56,20 +61,15 @@ template <int K>
 std::optional<std::size_t> FindSimplex(const RestrictedVoronoiCell<K>& cell, std::uint32_t q,
                                        const typename StarComplex<K>::Simplex& simplex,
                                        std::uint64_t key) {
-  const auto holds = [&](std::size_t v) {
-    for (int s = 0; s < K; ++s)
-      if (std::find(simplex.begin(), simplex.end(), cell.id(cell.facet(v, s))) == simplex.end())
-        return false;
-    return true;
-  };
   if constexpr (K == 2) {  // no key is quicker than the ids themselves
-    if (std::find(simplex.begin(), simplex.end(), q) == simplex.end()) return std::nullopt;
+    const auto has = [&](std::uint32_t id) {
+      return std::find(simplex.begin(), simplex.end(), id) != simplex.end();
+    };
+    if (!has(q)) return std::nullopt;
     for (std::size_t v = 0; v < cell.vertex_count(); ++v)
-      if (holds(v)) return v;
-  } else {
-    const std::uint64_t wanted = key - Mix64(q);
-    for (std::size_t v = 0; v < cell.vertex_count(); ++v)
-      if (cell.key(v) == wanted && holds(v)) return v;
+      if (has(cell.id(cell.facet(v, 0))) && has(cell.id(cell.facet(v, 1)))) return v;
+  } else if (const std::size_t v = cell.Find(key - Mix64(q)); v < cell.vertex_count()) {
+    return v;
   }
   return std::nullopt;
 }

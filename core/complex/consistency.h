@@ -11,7 +11,7 @@ namespace stellate::core {
 // glue to a manifold.
 
 // Tells simplices apart quickly: the sum of Mix64 over the ids of the simplex dual to vertex v of
-// p's cell.
+// p's cell. Two simplices have one key once in 2^64 pairs; the certificate does not go by keys.
 template <int K>
 std::uint64_t SimplexKey(const RestrictedVoronoiCell<K>& cell, std::size_t v, std::uint32_t p) {
   return cell.key(v) + Mix64(p);

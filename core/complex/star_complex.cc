@@ -105,14 +105,12 @@ class StarComplex<K>::Around final : public Surroundings<K> {
   // if they are consistent.
   bool Known(std::uint64_t key_in_p, double* centre) const {
     const std::uint64_t key = key_in_p + Mix64(p_.id) - Mix64(newcomer_->id);
-    for (std::size_t i = 0; i < born_->vertex_count(); ++i) {
-      if (born_->key(i) != key || !born_->judged(i)) continue;
-      const double* const there = born_->Centre(i);
-      for (int j = 0; j < complex_.d_; ++j)
-        centre[j] = there[j] + (newcomer_->point[j] - p_.point[j]);
-      return true;
-    }
-    return false;
+    const std::size_t v = born_->Find(key);
+    if (v == born_->vertex_count() || !born_->judged(v)) return false;
+    const double* const there = born_->Centre(v);
+    for (int j = 0; j < complex_.d_; ++j)
+      centre[j] = there[j] + (newcomer_->point[j] - p_.point[j]);
+    return true;
   }
 
   bool Common(const std::uint32_t* others, double* centre) const {
@@ -385,6 +383,11 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
     }
   }
   begins.push_back(cuts.size());
+  // New points that follow each other are mostly near each other: stars in the order in which these
+  // come to them find in the cache what their neighbours have read.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> turns(change.stars.size());
+  for (std::uint32_t i = 0; i < turns.size(); ++i) turns[i] = {cuts[begins[i]].by, i};
+  ParallelSort(turns, std::less<>());
 
   const auto note_neighbours = [&](std::uint32_t p, std::size_t step) {
     LookUp(step);
@@ -402,7 +405,8 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
   ParallelChunks(change.stars.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     std::vector<Simplex> before, after;
     Swap& swap = swaps[chunk];
-    for (std::size_t i = begin; i < end && !IsInterrupted(); ++i) {
+    for (std::size_t turn = begin; turn < end && !IsInterrupted(); ++turn) {
+      const std::size_t i = turns[turn].second;
       const std::uint32_t p = change.stars[i];
       Owned(p, &before);
       for (std::size_t j = begins[i]; j < begins[i + 1]; ++j)

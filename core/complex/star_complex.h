@@ -79,6 +79,9 @@ class StarComplex {
   // many there are.
   int Nearest(const double* q, int count, std::pair<double, std::uint32_t>* nearest) const;
 
+  // Points in the order of their places are mostly near the ones before them.
+  std::uint32_t PlaceOf(std::uint32_t id) const { return tree_.PlaceOf(id); }
+
   // Whether a point would take the simplex dual to a vertex of p's cell out of star(p).
   bool CutsVertex(std::uint32_t p, std::size_t vertex, const double* point) const;
 

@@ -9,10 +9,12 @@ namespace {
 
 // Cells are many and small, and hardly grow: no doubling.
 template <typename Item>
-void Grow(std::vector<Item>& items, std::size_t size) {
-  if (items.capacity() < size) items.reserve(size + 1);
+void Grow(std::vector<Item>& items, std::size_t size, std::size_t spare) {
+  if (items.capacity() < size) items.reserve(size + spare);
   items.resize(size);
 }
+constexpr std::size_t kSpareFacets = 2;
+constexpr std::size_t kSpareVertices = 4;  // what two facets more come with, for K = 3
 
 }  // namespace
 
@@ -20,6 +22,7 @@ template <int K>
 void RestrictedVoronoiCell<K>::Reset(double inradius, const Surroundings<K>& around) {
   facets_.resize(K + 1);
   vertices_.resize(K + 1);
+  keys_.resize(K + 1);
   for (int i = 0; i <= K; ++i) {
     facets_[i].id = kFirstFakeId + static_cast<std::uint32_t>(i);
     facets_[i].offset = FakeHalfSpace<K>(i, inradius, facets_[i].normal);
@@ -35,7 +38,7 @@ void RestrictedVoronoiCell<K>::Reset(double inradius, const Surroundings<K>& aro
       vertices_[i].adjacent[slot] = static_cast<Index>(j);
       ++slot;
     }
-    SetKey(vertices_[i]);
+    keys_[i] = KeyOf(vertices_[i]);
   }
   max_norm2_ = inradius * inradius * K * K;
   has_fake_ = true;
@@ -57,9 +60,27 @@ void RestrictedVoronoiCell<K>::Locate(Vertex& v, const Vertex& kept, const Verte
 }
 
 template <int K>
-void RestrictedVoronoiCell<K>::SetKey(Vertex& v) const {
-  v.key = 0;
-  for (const Index f : v.facet) v.key += Mix64(facets_[f].id);
+std::uint64_t RestrictedVoronoiCell<K>::KeyOf(const Vertex& v) const {
+  std::uint64_t key = 0;
+  for (const Index f : v.facet) key += Mix64(facets_[f].id);
+  return key;
+}
+
+template <int K>
+std::size_t RestrictedVoronoiCell<K>::Excesses(const double* normal, double offset,
+                                               const double* step, double* excess) const {
+  const std::size_t count = vertices_.size();
+  if (d_ > 0) {
+    DotRows(centres_.data(), count, step, static_cast<int>(d_), excess);
+  } else {
+    for (std::size_t v = 0; v < count; ++v) excess[v] = Dot(normal, vertices_[v].x, K);
+  }
+  std::size_t worst = 0;
+  for (std::size_t v = 0; v < count; ++v) {
+    excess[v] -= offset;
+    if (excess[v] > excess[worst]) worst = v;
+  }
+  return worst;
 }
 
 template <int K>
@@ -69,11 +90,7 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
   const std::size_t old_count = vertices_.size();
   if (scratch.excess.size() < old_count) scratch.excess.resize(2 * old_count);
   double* const excess = scratch.excess.data();
-  std::size_t worst = 0;
-  for (std::size_t i = 0; i < old_count; ++i) {
-    excess[i] = Excess(i, normal, offset, step);
-    if (excess[i] > excess[worst]) worst = i;
-  }
+  const std::size_t worst = Excesses(normal, offset, step, excess);
   if (!(excess[worst] > 0)) return false;
   Facet facet;
   std::copy(normal, normal + K, facet.normal);
@@ -95,26 +112,20 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
       scratch.stack.push_back(w);
     }
   }
-  if (d_ > 0 && !Tidy(scratch)) return false;
-  scratch.crossings.clear();
-  scratch.removed.clear();
-  for (std::size_t v = 0; v < old_count; ++v) {
-    if (!scratch.cut[v]) continue;
-    scratch.removed.push_back(static_cast<Index>(v));
-    for (int s = 0; s < K; ++s) {
-      const Index w = vertices_[v].adjacent[s];
-      if (!scratch.cut[w])
-        scratch.crossings.push_back({w, 0, static_cast<Index>(v), static_cast<Index>(s)});
-    }
+  FindCrossings(scratch);
+  const bool is_disc = IsDisc(scratch);
+  if (d_ > 0 && !is_disc) {
+    if (!Tidy(scratch)) return false;
+    FindCrossings(scratch);
   }
   if (scratch.removed.size() == old_count) return false;
 
   // One new vertex on each edge that crosses the plane. Its slot 0 holds the new facet, so that
   // adjacent[0] is the kept end of the edge; the edge's facets follow.
   const Index new_facet = static_cast<Index>(facets_.size());
-  Grow(facets_, facets_.size() + 1);
+  Grow(facets_, facets_.size() + 1, kSpareFacets);
   facets_.back() = facet;
-  Grow(vertices_, old_count + scratch.crossings.size());
+  Grow(vertices_, old_count + scratch.crossings.size(), kSpareVertices);
   for (std::size_t c = 0; c < scratch.crossings.size(); ++c) {
     auto& crossing = scratch.crossings[c];
     const Index created = static_cast<Index>(old_count + c);
@@ -138,7 +149,9 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
     }
     removed.adjacent[crossing.slot] = created;
   }
-  if (!Stitch(scratch, old_count)) {
+  if (is_disc) {
+    Match(scratch, old_count);
+  } else if (!Stitch(scratch, old_count)) {
     for (const auto& crossing : scratch.crossings) {
       vertices_[crossing.kept].adjacent[crossing.kept_slot] = crossing.removed;
       vertices_[crossing.removed].adjacent[crossing.slot] = crossing.kept;
@@ -147,15 +160,16 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
     facets_.pop_back();
     return false;
   }
-  Grow(centres_, vertices_.size() * d_);
+  Grow(keys_, vertices_.size(), kSpareVertices);
+  Grow(centres_, vertices_.size() * d_, kSpareVertices * d_);
   for (std::size_t c = 0; c < scratch.crossings.size(); ++c) {
     const auto& crossing = scratch.crossings[c];
     Vertex& v = vertices_[old_count + c];
-    SetKey(v);
+    const std::uint64_t key = keys_[old_count + c] = KeyOf(v);
     double* const centre = centres_.data() + (old_count + c) * d_;
     std::uint32_t ids[K];
     for (int i = 0; i < K; ++i) ids[i] = facets_[v.facet[i]].id;
-    v.judged = d_ > 0 && around.Centre(ids, v.key, v.x, centre);
+    v.judged = d_ > 0 && around.Centre(ids, key, v.x, centre);
     if (v.judged) {
       v.norm2 = Dot(centre, centre, static_cast<int>(d_));
       continue;
@@ -172,6 +186,72 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
   DropFacets();
   Measure();
   return true;
+}
+
+// What is cut off, and the edges that the cut crosses.
+template <int K>
+void RestrictedVoronoiCell<K>::FindCrossings(Scratch& scratch) const {
+  scratch.crossings.clear();
+  scratch.removed.clear();
+  for (std::size_t v = 0; v < vertices_.size(); ++v) {
+    if (!scratch.cut[v]) continue;
+    scratch.removed.push_back(static_cast<Index>(v));
+    for (int s = 0; s < K; ++s) {
+      const Index w = vertices_[v].adjacent[s];
+      if (!scratch.cut[w])
+        scratch.crossings.push_back({w, 0, static_cast<Index>(v), static_cast<Index>(s)});
+    }
+  }
+}
+
+// For K = 3, whether the crossed edges, two on each facet that has any, go round in one circle:
+// what is cut off is a disc of the cell's border then, as is what is kept. Notes which they are.
+template <int K>
+bool RestrictedVoronoiCell<K>::IsDisc(Scratch& scratch) const {
+  if (K != 3) return false;
+  constexpr Index kNone = 0xffff;
+  const auto& crossings = scratch.crossings;
+  auto& on_facet = scratch.on_facet;
+  on_facet.assign(facets_.size(), {kNone, kNone});
+  // Calls visit(facet) for the two facets that a crossed edge is on.
+  const auto for_each_facet = [&](std::size_t c, const auto& visit) {
+    for (int s = 0; s < K; ++s)
+      if (s != crossings[c].slot) visit(vertices_[crossings[c].removed].facet[s]);
+  };
+  bool twice = !crossings.empty();
+  for (std::size_t c = 0; c < crossings.size(); ++c) {
+    for_each_facet(c, [&](Index f) {
+      auto& [first, second] = on_facet[f];
+      twice = twice && second == kNone;
+      (first == kNone ? first : second) = static_cast<Index>(c);
+    });
+  }
+  if (!twice) return false;
+  std::size_t at = 0, steps = 0;
+  Index through = kNone;
+  do {
+    Index next_through = kNone;
+    for_each_facet(at, [&](Index f) {
+      if (f != through) next_through = f;
+    });
+    through = next_through;
+    const auto& [first, second] = on_facet[through];
+    at = first == at ? second : first;
+    ++steps;
+  } while (at != 0);
+  return steps == crossings.size();
+}
+
+// Stitch where what is cut off is a disc.
+template <int K>
+void RestrictedVoronoiCell<K>::Match(const Scratch& scratch, std::size_t old_count) {
+  for (std::size_t c = 0; c < scratch.crossings.size(); ++c) {
+    Vertex& v = vertices_[old_count + c];
+    for (int i = 1; i < K; ++i) {
+      const auto& [first, second] = scratch.on_facet[v.facet[K - i]];  // the one not dropped
+      v.adjacent[i] = static_cast<Index>(old_count + (first == c ? second : first));
+    }
+  }
 }
 
 // Makes each vertex on the new facet a neighbour of its K-1 others: around each two-dimensional
@@ -272,9 +352,11 @@ void RestrictedVoronoiCell<K>::DropVertex(std::size_t v) {
       for (Index& back : vertices_[w].adjacent)
         if (back == last) back = static_cast<Index>(v);
     vertices_[v] = vertices_[last];
+    keys_[v] = keys_[last];
     std::copy_n(centres_.data() + last * d_, d_, centres_.data() + v * d_);
   }
   vertices_.pop_back();
+  keys_.pop_back();
   centres_.resize(last * d_);
 }
 

@@ -69,6 +69,7 @@ class RestrictedVoronoiCell {
       Index kept, kept_slot, removed, slot;
     };  // an edge and its place at both ends
     std::vector<Crossing> crossings;
+    std::vector<std::array<Index, 2>> on_facet;  // the crossings on each facet, where they are two
     std::vector<std::vector<Index>> pieces;
   };
 
@@ -105,7 +106,13 @@ class RestrictedVoronoiCell {
   const double* x(std::size_t v) const { return vertices_[v].x; }   // c_p, tangent coordinates
   double norm2(std::size_t v) const { return vertices_[v].norm2; }  // R_p^2
   // The sum of Mix64 over the facets' ids: tells simplices apart quickly.
-  std::uint64_t key(std::size_t v) const { return vertices_[v].key; }
+  std::uint64_t key(std::size_t v) const { return keys_[v]; }
+  // The first vertex from `from` on with that key; vertex_count() if there is none.
+  std::size_t Find(std::uint64_t key, std::size_t from = 0) const {
+    return static_cast<std::size_t>(
+        std::find(keys_.begin() + static_cast<std::ptrdiff_t>(from), keys_.end(), key) -
+        keys_.begin());
+  }
   Index facet(std::size_t v, int slot) const { return vertices_[v].facet[slot]; }
   // The vertex on all facets of v but that one.
   Index adjacent(std::size_t v, int slot) const { return vertices_[v].adjacent[slot]; }
@@ -134,22 +141,25 @@ class RestrictedVoronoiCell {
   struct Vertex {
     double x[K];
     double norm2;
-    std::uint64_t key;
     Index facet[K];
     Index adjacent[K];
     bool judged;
   };
 
   double Excess(std::size_t v, const double* normal, double offset, const double* step) const {
-    if (d_ > 0) return Dot(step, Centre(v), static_cast<int>(d_)) - offset;
-    double s = -offset;
-    for (int a = 0; a < K; ++a) s += normal[a] * vertices_[v].x[a];
-    return s;
+    return (d_ > 0 ? Dot(step, Centre(v), static_cast<int>(d_)) : Dot(normal, vertices_[v].x, K)) -
+           offset;
   }
+  // Writes the excess of each vertex, returns the place of the largest.
+  std::size_t Excesses(const double* normal, double offset, const double* step,
+                       double* excess) const;
   void Locate(Vertex& v, const Vertex& kept, const Vertex& removed, double s, double t,
               double slack) const;
-  void SetKey(Vertex& v) const;
+  std::uint64_t KeyOf(const Vertex& v) const;
+  void FindCrossings(Scratch& scratch) const;
+  bool IsDisc(Scratch& scratch) const;
   bool Tidy(Scratch& scratch) const;
+  void Match(const Scratch& scratch, std::size_t old_count);
   bool Stitch(const Scratch& scratch, std::size_t old_count);
   void DropVertex(std::size_t v);
   void DropFacets();
@@ -157,8 +167,9 @@ class RestrictedVoronoiCell {
 
   std::vector<Facet> facets_;
   std::vector<Vertex> vertices_;
-  std::vector<double> centres_;  // by vertex, d_ each, relative to p
-  std::size_t d_ = 0;            // 0: vertices are at their places in T_pM
+  std::vector<std::uint64_t> keys_;  // by vertex, apart from what is not looked through
+  std::vector<double> centres_;      // by vertex, d_ each, relative to p
+  std::size_t d_ = 0;                // 0: vertices are at their places in T_pM
   double max_norm2_ = 0;
   bool has_fake_ = true;
 };

@@ -49,6 +49,10 @@ class RestrictedVoronoiCell<2> {
   const double* x(std::size_t v) const { return corners() + 2 * v; }
   double norm2(std::size_t v) const;
   std::uint64_t key(std::size_t v) const { return Mix64(id(v)) + Mix64(id(Next(v))); }
+  std::size_t Find(std::uint64_t wanted, std::size_t from = 0) const {
+    while (from < count_ && key(from) != wanted) ++from;
+    return from;
+  }
   Index facet(std::size_t v, int slot) const { return static_cast<Index>(slot == 0 ? v : Next(v)); }
   Index adjacent(std::size_t v, int slot) const {
     return static_cast<Index>(slot == 0 ? Next(v) : Previous(v));

@@ -43,6 +43,22 @@ void UniformInBall(Random& random, double* x) {
   for (int a = 0; a < K; ++a) x[a] *= scale;
 }
 
+// The order in which to go through `ids` so that neighbours follow each other: what one star's
+// judge has read of theirs is in the cache for the next.
+template <int K>
+std::vector<std::uint32_t> InOrderOfPlace(const StarComplex<K>& complex,
+                                          const std::vector<std::uint32_t>& ids) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> places(ids.size());
+  ParallelFor(ids.size(), [&](std::size_t i) {
+    places[i] = {complex.PlaceOf(ids[i]), static_cast<std::uint32_t>(i)};
+  });
+  ParallelSort(places, std::less<>());
+  std::vector<std::uint32_t> order;
+  order.reserve(places.size());
+  for (const auto& [place, i] : places) order.push_back(i);
+  return order;
+}
+
 int SeedsToAskAheadFrom(const Specification& spec) {
   const double width = (spec.bounding_box->upper - spec.bounding_box->lower).norm();
   const double vertices = std::pow(width / spec.epsilon, spec.dimension);
@@ -159,8 +175,10 @@ std::vector<Target<K>> Refinement<K>::SliverAndConsistencyTargets() {
   ParallelSort(suspects_, std::less<>());
   suspects_.erase(std::unique(suspects_.begin(), suspects_.end()), suspects_.end());
   std::vector<std::optional<Violation<K>>> found(suspects_.size());
+  const std::vector<std::uint32_t> near = InOrderOfPlace<K>(complex_, suspects_);
   ParallelFor(suspects_.size(), [&](std::size_t i) {
-    found[i] = WorstSliverOrInconsistent<K>(complex_, suspects_[i], criteria_.sliver_bound);
+    found[near[i]] =
+        WorstSliverOrInconsistent<K>(complex_, suspects_[near[i]], criteria_.sliver_bound);
   });
   FillCavitiesIfAny(found);
   std::vector<Target<K>> targets;

@@ -1,13 +1,15 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 
 namespace stellate::core {
 
 // Inner loops over ambient coordinates. Four running sums: the compiler vectorises them, and the
 // order of additions depends on d alone, so that results do not depend on where an array lies.
-// R^3, where most people live, is spelled out so that the calls vanish.
-inline double LongDot(const double* a, const double* b, int d) {
+// R^3, where most people live, is spelled out so that the calls vanish, as they do where the
+// compiler knows d.
+[[gnu::always_inline]] inline double UnrolledDot(const double* a, const double* b, int d) {
   double s0 = 0, s1 = 0, s2 = 0, s3 = 0;
   int i = 0;
   for (; i + 4 <= d; i += 4) {
@@ -20,9 +22,38 @@ inline double LongDot(const double* a, const double* b, int d) {
   return (s0 + s1) + (s2 + s3);
 }
 
+inline double LongDot(const double* a, const double* b, int d) { return UnrolledDot(a, b, d); }
+
 [[gnu::always_inline]] inline double Dot(const double* a, const double* b, int d) {
   if (d == 3) return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  return LongDot(a, b, d);
+  return __builtin_constant_p(d) ? UnrolledDot(a, b, d) : LongDot(a, b, d);
+}
+
+// dots[i] = row i . v, of `count` rows of d numbers each. D: d, or 0 for any.
+template <int D>
+inline void DotRowsOf(const double* rows, std::size_t count, const double* v, int any_d,
+                      double* dots) {
+  const int d = D > 0 ? D : any_d;
+  for (std::size_t i = 0; i < count; ++i, rows += d) dots[i] = Dot(rows, v, d);
+}
+
+inline void DotRows(const double* rows, std::size_t count, const double* v, int d, double* dots) {
+  switch (d) {
+#define STELLATE_CASE(D) \
+  case D:                \
+    return DotRowsOf<D>(rows, count, v, d, dots);
+    STELLATE_CASE(3)
+    STELLATE_CASE(4)
+    STELLATE_CASE(5)
+    STELLATE_CASE(6)
+    STELLATE_CASE(7)
+    STELLATE_CASE(8)
+    STELLATE_CASE(9)
+    STELLATE_CASE(10)
+#undef STELLATE_CASE
+    default:
+      return DotRowsOf<0>(rows, count, v, d, dots);
+  }
 }
 
 inline double LongSquaredDistance(const double* a, const double* b, int d) {
