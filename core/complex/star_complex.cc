@@ -374,20 +374,25 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
     some = {};
   }
   ParallelSort(cuts, std::less<>());
-  std::vector<std::size_t> begins;
-  for (std::size_t i = 0; i < cuts.size(); ++i) {
-    LookUp(i);
-    if (i == 0 || cuts[i].star != cuts[i - 1].star) {
-      begins.push_back(i);
-      change.stars.push_back(cuts[i].star);
-    }
-  }
-  begins.push_back(cuts.size());
   // New points that follow each other are mostly near each other: stars in the order in which these
   // come to them find in the cache what their neighbours have read.
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> turns(change.stars.size());
-  for (std::uint32_t i = 0; i < turns.size(); ++i) turns[i] = {cuts[begins[i]].by, i};
+  struct Turn {
+    std::uint32_t first, star;  // `first` is the first that cuts the star
+    std::size_t begin, end;     // its cuts
+    bool operator<(const Turn& other) const {
+      return first != other.first ? first < other.first : star < other.star;
+    }
+  };
+  std::vector<Turn> turns;
+  for (std::size_t i = 0; i < cuts.size(); ++i) {
+    LookUp(i);
+    if (i == 0 || cuts[i].star != cuts[i - 1].star)
+      turns.push_back({cuts[i].by, cuts[i].star, i, i});
+    ++turns.back().end;
+  }
   ParallelSort(turns, std::less<>());
+  change.stars.reserve(turns.size());
+  for (const Turn& turn : turns) change.stars.push_back(turn.star);
 
   const auto note_neighbours = [&](std::uint32_t p, std::size_t step) {
     LookUp(step);
@@ -401,15 +406,14 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
   struct Swap {
     std::vector<Simplex> removed, added;
   };
-  std::vector<Swap> swaps(ChunkCount(change.stars.size()) + chunks);
-  ParallelChunks(change.stars.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+  std::vector<Swap> swaps(ChunkCount(turns.size()) + chunks);
+  ParallelChunks(turns.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     std::vector<Simplex> before, after;
     Swap& swap = swaps[chunk];
-    for (std::size_t turn = begin; turn < end && !IsInterrupted(); ++turn) {
-      const std::size_t i = turns[turn].second;
-      const std::uint32_t p = change.stars[i];
+    for (std::size_t i = begin; i < end && !IsInterrupted(); ++i) {
+      const std::uint32_t p = turns[i].star;
       Owned(p, &before);
-      for (std::size_t j = begins[i]; j < begins[i + 1]; ++j)
+      for (std::size_t j = turns[i].begin; j < turns[i].end; ++j)
         ClipBy(cells_[p], At(p), At(cuts[j].by), nullptr, &cells_[cuts[j].by], ThreadScratch<K>());
       Owned(p, &after);
       std::set_difference(before.begin(), before.end(), after.begin(), after.end(),

@@ -32,7 +32,8 @@ class StarComplex {
 
   // What an insertion did.
   struct Change {
-    std::vector<std::uint32_t> stars;  // old stars that changed, ascending; new ones not among them
+    // Old stars that changed, neighbours mostly after each other; new ones are not among them.
+    std::vector<std::uint32_t> stars;
     std::vector<std::uint32_t> added,
         removed;  // simplices held by their lowest vertex, K+1 ids each
   };

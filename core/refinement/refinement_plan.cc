@@ -55,7 +55,10 @@ std::vector<std::uint32_t> InOrderOfPlace(const StarComplex<K>& complex,
   ParallelSort(places, std::less<>());
   std::vector<std::uint32_t> order;
   order.reserve(places.size());
-  for (const auto& [place, i] : places) order.push_back(i);
+  for (const auto& [place, i] : places) {
+    LookUp(order.size());
+    order.push_back(i);
+  }
   return order;
 }
 
