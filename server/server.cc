@@ -32,11 +32,11 @@ using core::StatusCode;
 
 constexpr auto kTick = std::chrono::seconds(1);
 constexpr auto kPoll = std::chrono::milliseconds(20);
-constexpr auto kReturn = std::chrono::seconds(1);     // for a worker that lost its stream
-constexpr auto kLastWords = std::chrono::seconds(2);  // for streams to send what they have
+constexpr auto kReturn = std::chrono::seconds(1);          // for a worker that lost its stream
+constexpr auto kLastWords = std::chrono::seconds(2);       // for streams to send what they have
 constexpr auto kLook = std::chrono::milliseconds(2);       // whether they have
-constexpr auto kFarewell = std::chrono::milliseconds(50);  // for clients to take leave
-constexpr auto kLastRound = std::chrono::seconds(5);  // for meshers to notice a cancel
+constexpr auto kFarewell = std::chrono::milliseconds(20);  // for clients to take leave
+constexpr auto kLastRound = std::chrono::seconds(5);       // for meshers to notice a cancel
 // The health of the process alone: it holds while the server drains.
 constexpr char kAlive[] = "alive";
 constexpr int kMaxSyncThreads = 64;  // reflection alone uses them

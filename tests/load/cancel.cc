@@ -1,5 +1,6 @@
-// How soon a cancelled mesh lets go of its thread: meshes of several sizes, each cancelled at a
-// moment drawn from the time that an undisturbed one takes.
+// How soon a cancelled mesh ends, and how soon nothing is left of it: meshes of several sizes, each
+// cancelled at a moment drawn from the time that an undisturbed one takes. And beside the largest:
+// calls with a deadline, and a server that is told to stop.
 
 #include <grpcpp/create_channel.h>
 
@@ -22,11 +23,27 @@ namespace {
 
 constexpr char kManifold[] = "torus";
 constexpr double kSoon = 0.1;  // seconds
+constexpr double kLargest = 0.0033;
 
 struct Size {
   double epsilon;
   int cancels;
 };
+
+// Seconds until the server does nothing any more but wait.
+double SecondsOfWork(const ServerProcess& server) {
+  constexpr double kQuiet = 0.15;    // seconds
+  constexpr double kWaiting = 1e-3;  // seconds of processor time between two looks
+  const Stopwatch watch;
+  double processor = server.usage().processor_seconds, last = 0;
+  while (watch.seconds() < last + kQuiet) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    const double now = server.usage().processor_seconds;
+    if (now > processor + kWaiting) last = watch.seconds();
+    processor = now;
+  }
+  return last;
+}
 
 // One mesh with a worker, and its end seen through a watch.
 class Run {
@@ -55,6 +72,7 @@ class Run {
     request.set_name(name_);
     google::protobuf::Empty empty;
     stub_.DeleteMesh(&context, request, &empty);
+    worker_->Stop();  // the server may be gone
   }
 
   // Seconds that the call took.
@@ -70,7 +88,9 @@ class Run {
     return seconds;
   }
 
-  // When the server has told how it ended: its thread has nothing left to do.
+  const std::string& name() const { return name_; }
+
+  // When the server has told how it ended: its place is free for another.
   v1::Mesh AwaitEnd() {
     watching_.join();
     return final_;
@@ -111,14 +131,14 @@ void Print(const char* what, std::vector<double> seconds) {
 
 // The number of meshes that ended in another way than they should.
 int CancelAt(const ServerProcess& server, v1::Stellate::Stub& stub, Oracle& oracle,
-             const Size& size, std::mt19937_64& random) {
+             const Size& size, std::mt19937_64& random, double* undisturbed) {
   const Stopwatch whole_watch;
   const v1::Mesh whole = Run(stub, oracle, size.epsilon).AwaitEnd();
-  const double whole_seconds = whole_watch.seconds();
+  const double whole_seconds = *undisturbed = whole_watch.seconds();
   std::printf("  %lu vertices, %.2f s undisturbed; cancelled %d times\n",
               static_cast<unsigned long>(whole.progress().vertices()), whole_seconds, size.cancels);
   std::uniform_real_distribution<double> moment(0, whole_seconds);
-  std::vector<double> returned, freed, processor;
+  std::vector<double> returned, told, processor, worked;
   int too_late = 0, wrong = whole.state() == v1::MESH_STATE_SUCCEEDED ? 0 : 1;
   for (int i = 0; i < size.cancels; ++i) {
     Run run(stub, oracle, size.epsilon);
@@ -129,18 +149,95 @@ int CancelAt(const ServerProcess& server, v1::Stellate::Stub& stub, Oracle& orac
     const v1::MeshState state = run.AwaitEnd().state();
     if (state == v1::MESH_STATE_CANCELLED) {
       returned.push_back(seconds);
-      freed.push_back(watch.seconds());
+      told.push_back(watch.seconds());
+      worked.push_back(told.back() + SecondsOfWork(server));
       processor.push_back(server.usage().processor_seconds - processor_before);
     } else {
       ++(state == v1::MESH_STATE_SUCCEEDED ? too_late : wrong);
     }
   }
   if (too_late > 0) std::printf("    %d were over before\n", too_late);
-  if (!freed.empty()) {
+  if (!told.empty()) {
     Print("the call returns", returned);
-    Print("the thread is free", freed);
+    Print("the end is told", told);
+    Print("no work is left", worked);
     Print("its processor time", processor);  // which other programs do not lengthen
   }
+  std::fflush(stdout);
+  return wrong;
+}
+
+// Calls about a mesh that is being computed, each with a deadline: how long they take.
+int KeepDeadlines(v1::Stellate::Stub& stub, Oracle& oracle) {
+  std::printf("  while one of the largest is computed, calls whose deadline is after %.0f ms\n",
+              1e3 * kSoon);
+  Run run(stub, oracle, kLargest);
+  std::vector<double> got, watched, downloaded;
+  const auto soon = [] {
+    return std::chrono::system_clock::now() + std::chrono::duration_cast<std::chrono::milliseconds>(
+                                                  std::chrono::duration<double>(kSoon));
+  };
+  int wrong = 0;
+  for (v1::Mesh mesh; !mesh.has_report();) {
+    {
+      grpc::ClientContext context;
+      context.set_deadline(soon());
+      v1::GetMeshRequest request;
+      request.set_name(run.name());
+      const Stopwatch watch;
+      wrong += !stub.GetMesh(&context, request, &mesh).ok();
+      got.push_back(watch.seconds());
+    }
+    {
+      grpc::ClientContext context;
+      context.set_deadline(soon());
+      v1::WatchMeshRequest request;
+      request.set_name(run.name());
+      const Stopwatch watch;
+      const auto reader = stub.WatchMesh(&context, request);
+      for (v1::WatchMeshResponse event; reader->Read(&event);) {
+      }
+      const bool late = reader->Finish().error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
+      if (late) watched.push_back(watch.seconds() - kSoon);
+    }
+    {
+      grpc::ClientContext context;
+      context.set_deadline(soon());
+      v1::DownloadMeshRequest request;
+      request.set_name(run.name());
+      const Stopwatch watch;
+      const auto reader = stub.DownloadMesh(&context, request);
+      for (v1::DownloadMeshResponse part; reader->Read(&part);) {
+      }
+      const bool late = reader->Finish().error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
+      if (late) downloaded.push_back(watch.seconds() - kSoon);
+    }
+  }
+  run.AwaitEnd();
+  Print("GetMesh returns", got);
+  if (!watched.empty()) Print("WatchMesh after it", watched);
+  if (!downloaded.empty()) Print("DownloadMesh, too", downloaded);
+  std::fflush(stdout);
+  return wrong;
+}
+
+// A server that is told to stop, and to wait for no mesh, while it computes one.
+int StopAt(Oracle& oracle, double whole_seconds, int stops, std::mt19937_64& random) {
+  std::printf("  the server told to stop %d times while it computes one of the largest\n", stops);
+  std::uniform_real_distribution<double> moment(0, whole_seconds);
+  std::vector<double> gone;
+  int wrong = 0;
+  for (int i = 0; i < stops; ++i) {
+    ServerProcess server({"--drain-seconds", "0"});
+    const auto stub = v1::Stellate::NewStub(
+        grpc::CreateChannel(server.address(), grpc::InsecureChannelCredentials()));
+    Run run(*stub, oracle, kLargest);
+    std::this_thread::sleep_for(std::chrono::duration<double>(moment(random)));
+    const Stopwatch watch;
+    wrong += server.Stop() != 0;
+    gone.push_back(watch.seconds());
+  }
+  Print("the process is gone", gone);
   std::fflush(stdout);
   return wrong;
 }
@@ -155,10 +252,13 @@ int Cancel(int cancels) {
   std::mt19937_64 random(1);
   std::printf("a %s, cancelled at random moments\n", kManifold);
   int wrong = 0;
-  for (const Size& size :
-       {Size{0.033, cancels}, Size{0.0105, (cancels + 1) / 2}, Size{0.0033, (cancels + 9) / 10}}) {
-    wrong += CancelAt(server, *stub, *oracle, size, random);
+  double whole_seconds = 0;  // of the largest
+  for (const Size& size : {Size{0.033, cancels}, Size{0.0105, (cancels + 1) / 2},
+                           Size{kLargest, (3 * cancels + 9) / 10}}) {
+    wrong += CancelAt(server, *stub, *oracle, size, random, &whole_seconds);
   }
+  wrong += KeepDeadlines(*stub, *oracle);
+  wrong += StopAt(*oracle, whole_seconds, (cancels + 9) / 10, random);
   if (wrong > 0) std::printf("  %d ended in another way than they should\n", wrong);
   const int status = server.Stop();
   if (status != 0) std::printf("  the server left with %d\n", status);

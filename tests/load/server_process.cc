@@ -6,6 +6,7 @@
 
 #include <chrono>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -71,16 +72,12 @@ ServerProcess::Usage ServerProcess::usage() const {
     if (key == "VmHWM:") usage.peak_mb = value / 1024;
     if (key == "Threads:") usage.threads = static_cast<int>(value);
   }
-  std::ifstream stat(folder + "/stat");
-  std::string text{std::istreambuf_iterator<char>(stat), {}};
-  const auto after_name = text.rfind(')');
-  if (after_name == std::string::npos) return usage;
-  std::istringstream fields(text.substr(after_name + 2));
-  std::string skipped;
-  for (int i = 0; i < 11; ++i) fields >> skipped;
-  double user = 0, system = 0;
-  fields >> user >> system;
-  usage.processor_seconds = (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));
+  clockid_t clock;
+  timespec time{};
+  if (clock_getcpuclockid(pid_, &clock) == 0 && clock_gettime(clock, &time) == 0) {
+    usage.processor_seconds =
+        static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  }
   return usage;
 }
 
