@@ -28,9 +28,8 @@ constexpr int kMostEvents = 1024;
 constexpr int kPauseMilliseconds = 20;     // between two looks: some hundred calls may come
 constexpr std::uint64_t kFewBytes = 4096;  // too little for many calls, 16 bytes each at least
 constexpr std::size_t kFewCalls = 64;
-constexpr std::uint64_t kCallBytes = 64;  // of a call that has come and is not read yet, about
 constexpr auto kLogPause = std::chrono::seconds(1);
-constexpr auto kWary = std::chrono::seconds(5);
+constexpr auto kQuiet = std::chrono::seconds(5);  // after a storm
 
 // Zero: it is no socket any more.
 ino_t NumberOf(int fd) {
@@ -78,7 +77,6 @@ void ConnectionGuard::Watch(int fd) {
   connection.fd = fd;
   connection.number = NumberOf(fd);
   connection.peer = PeerOf(fd);
-  newcomer_ = true;
   const std::lock_guard lock(mutex_);
   connections_.emplace(++last_key_, std::move(connection));
   // Once for all that came meanwhile. It ends when gRPC closes the descriptor.
@@ -88,12 +86,10 @@ void ConnectionGuard::Watch(int fd) {
   epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event);
 }
 
-bool ConnectionGuard::IsBehind() const { return behind_ || (wary_ && newcomer_); }
-
 void ConnectionGuard::Run(const std::stop_token& stop) {
   std::vector<epoll_event> events(kMostEvents);
   while (!stop.stop_requested()) {
-    const bool idle = busy_.empty() && gone_.empty() && !wary_;
+    const bool idle = busy_.empty() && gone_.empty() && !untidy_;
     const int count = epoll_wait(epoll_, events.data(), kMostEvents, idle ? -1 : 0);
     {
       const std::lock_guard lock(mutex_);
@@ -107,10 +103,9 @@ void ConnectionGuard::Run(const std::stop_token& stop) {
       Look();
     }
     CountLeftBehind();
-    if (wary_ && Clock::now() > wary_until_) GiveBack();
+    if (untidy_ && Clock::now() > quiet_at_) GiveBack();
     pollfd wake{wake_, POLLIN, 0};
     poll(&wake, 1, kPauseMilliseconds);
-    newcomer_ = false;
   }
 }
 
@@ -126,11 +121,9 @@ void ConnectionGuard::Look() {
     Connection& connection = found->second;
     const bool open = NumberOf(connection.fd) == connection.number;
     const bool calm = !open || IsCalm(&connection);
-    if (open && connection.ending) {
-      ending_calls_ += connection.calls + BytesWaiting(connection.fd) / kCallBytes;
-    }
+    if (open && connection.closed) ending_calls_ += connection.calls;
     if (!open) {
-      if (connection.id != 0) gone_.push_back(connection.id);
+      if (connection.closed && connection.id != 0) gone_.push_back(connection.id);
       connections_.erase(found);
     }
     key = calm ? busy_.erase(key) : std::next(key);
@@ -175,14 +168,11 @@ void ConnectionGuard::CountLeftBehind() {
     return left == 0;
   });
   behind_ = calls > most_calls_ / 4;
-  if (!behind_) return;
-  wary_ = true;
-  wary_until_ = Clock::now() + kWary;
 }
 
 // What the calls had; without this the allocator keeps it.
 void ConnectionGuard::GiveBack() {
-  wary_ = false;
+  untidy_ = false;
   malloc_trim(0);
 }
 
@@ -198,8 +188,8 @@ void ConnectionGuard::Close(Connection* connection) {
   }
   close(fd);
   const auto now = Clock::now();
-  wary_ = true;
-  wary_until_ = now + kWary;
+  untidy_ = true;
+  quiet_at_ = now + kQuiet;
   ++unsaid_;
   if (now - said_ < kLogPause) return;
   Log(LogLevel::kWarning, {},

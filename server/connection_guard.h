@@ -31,10 +31,8 @@ class ConnectionGuard {
   // Has to be told of every connection, before gRPC has it. One thread at a time.
   void Watch(int fd);
 
-  // It is not the time to accept another connection: those that are gone have left many calls
-  // It is not the time to accept another connection: those that are gone have left many calls
-  // behind, or did so lately, and the last newcomer has not been looked at yet.
-  bool IsBehind() const;
+  // Connections that were closed have left so many calls behind that others should wait.
+  bool IsBehind() const { return behind_; }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -70,15 +68,14 @@ class ConnectionGuard {
   // Of the thread.
   std::set<std::uint64_t> busy_;    // to be looked at again
   std::vector<ConnectionId> gone_;  // may have left calls behind
-  std::size_t ending_calls_ = 0;    // of those that are about to be gone
+  std::size_t ending_calls_ = 0;    // of those that are closed and not gone yet
   std::size_t swept_ = 0;           // how many were left when all were last looked at
   std::size_t unsaid_ = 0;          // were closed since the log last said so
   Clock::time_point said_;
-  Clock::time_point wary_until_;
+  bool untidy_ = false;  // memory is to be given back once it is quiet
+  Clock::time_point quiet_at_;
 
   std::atomic<bool> behind_{false};
-  std::atomic<bool> wary_{false};
-  std::atomic<bool> newcomer_{false};  // not looked at yet
   std::jthread thread_;
 };
 

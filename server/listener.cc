@@ -24,6 +24,7 @@ using core::Message;
 
 constexpr std::size_t kOtherFiles = 256;  // the journal, metrics, certificates, what gRPC opens
 constexpr int kPauseMilliseconds = 100;   // while there is no file left to accept with
+constexpr int kLaterMilliseconds = 20;    // while connections are to wait
 
 // How many connections there can be, when so many are wanted.
 std::size_t Allowed(std::size_t wanted) {
@@ -67,6 +68,12 @@ int PortOf(int fd) {
 ino_t NumberOf(int fd) {
   struct stat info {};
   return fstat(fd, &info) == 0 && S_ISSOCK(info.st_mode) ? info.st_ino : 0;
+}
+
+// The client has gone before it was accepted.
+bool HungUp(int fd) {
+  pollfd state{fd, POLLRDHUP, 0};
+  return poll(&state, 1, 0) > 0;
 }
 
 }  // namespace
@@ -141,15 +148,19 @@ void Listener::Run(const std::stop_token& stop) {
 
 void Listener::Accept(int socket, const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    if (later_()) return Pause();
+    if (later_()) return Pause(kLaterMilliseconds);
     const int fd = accept4(socket, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (fd < 0) {
       if (errno == EAGAIN || errno == EWOULDBLOCK) return;
       // No files, no memory: connections wait in the kernel. Else the client is gone already.
-      if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM) return Pause();
+      if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM) {
+        return Pause(kPauseMilliseconds);
+      }
       continue;
     }
-    if (!IsFull()) {
+    if (HungUp(fd)) {  // storms leave many, and what they said would all be answered
+      close(fd);
+    } else if (!IsFull()) {
       open_.emplace_back(fd, NumberOf(fd));
       take_(socket, fd);
     } else {
@@ -173,9 +184,9 @@ bool Listener::IsFull() {
   return full;
 }
 
-void Listener::Pause() const {
+void Listener::Pause(int milliseconds) const {
   pollfd wake{wake_, POLLIN, 0};
-  poll(&wake, 1, kPauseMilliseconds);
+  poll(&wake, 1, milliseconds);
 }
 
 }  // namespace stellate::server

@@ -2,6 +2,7 @@
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <netinet/tcp.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -98,6 +99,46 @@ TEST(Listener, TellsOfEachConnectionThatIsOneTooMany) {
   listener->Stop();
   EXPECT_EQ(refused, kMany - 2);
   for (const int fd : clients) close(fd);
+}
+
+// The kernel of the other side has acknowledged that nothing more will come.
+void HangUp(int client) {
+  ASSERT_EQ(shutdown(client, SHUT_WR), 0);
+  tcp_info info{};
+  do {
+    socklen_t size = sizeof(info);
+    ASSERT_EQ(getsockopt(client, IPPROTO_TCP, TCP_INFO, &info, &size), 0);
+  } while (info.tcpi_state == TCP_FIN_WAIT1);
+}
+
+TEST(Listener, ClientsThatHungUpWhileTheyWaitedAreNotTaken) {
+  const auto listener = OnLoopback(1);
+  std::vector<int> clients;
+  for (int i = 0; i < kMany; ++i) {
+    clients.push_back(Connect(listener->port()));
+    HangUp(clients.back());
+  }
+  clients.push_back(Connect(listener->port()));
+  Taken taken;
+  std::atomic<int> refused{0};
+  listener->Start(taken.Take(), [&refused] { ++refused; });
+  taken.Await(1);
+  listener->Stop();
+  EXPECT_EQ(refused, 0) << "the one that is there was the only one to be counted";
+  for (const int fd : clients) close(fd);
+}
+
+TEST(Listener, ConnectionsWaitWhileTheyAreToldTo) {
+  const auto listener = OnLoopback(kMany);
+  std::atomic<int> asked{0};
+  Taken taken;
+  listener->Start(
+      taken.Take(), [] {}, [&asked] { return ++asked <= 3; });
+  const int client = Connect(listener->port());
+  taken.Await(1);
+  listener->Stop();
+  EXPECT_GT(asked, 3);
+  close(client);
 }
 
 TEST(Listener, ListensOnEveryAddressOfAName) {
