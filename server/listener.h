@@ -32,7 +32,8 @@ class Listener {
   int port() const { return port_; }
   std::size_t max_connections() const { return max_connections_; }
 
-  // Accepts, on a thread of its own, all whose clients are still there. `refused` is told of each connection that was one too many.
+  // Accepts, on a thread of its own, all whose clients are still there. `refused` is told of each
+  // connection that was one too many.
   // While `later` says so, connections wait in the kernel.
   void Start(
       Taker take, std::function<void()> refused,
