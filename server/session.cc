@@ -80,7 +80,9 @@ void Session::Run() {
   Expose(nullptr);
   Finish(report ? &*report : nullptr);
   mesher.reset();  // it is large, and watchers, who have heard the end, do not need it
-  malloc_trim(0);  // the allocator would keep the memory of each mesh's own thread
+  // The allocator would keep the memory of each mesh's own thread. A server that stops has it back
+  // sooner by leaving.
+  if (!stopping_) malloc_trim(0);
   if (options_.memory != nullptr) options_.memory->Insist(history_.MemoryBytes());
   over_ = true;
 }
@@ -326,6 +328,7 @@ void Session::Cancel() {
 }
 
 void Session::Suspend() {
+  stopping_ = true;
   {
     const std::lock_guard lock(mutex_);
     suspended_ = options_.journal != nullptr && !cancelled_;

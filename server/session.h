@@ -123,6 +123,7 @@ class Session {
   const std::chrono::system_clock::time_point create_time_;
   const TimePoint created_;
   std::atomic<bool> cancelled_{false};
+  std::atomic<bool> stopping_{false};  // the server does
   std::atomic<bool> over_{false};
   bool replaying_;      // Run's thread only: the journal may know the next answers
   core::Status blame_;  // Run's thread only: told to all workers at the end
