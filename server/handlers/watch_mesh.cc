@@ -135,7 +135,9 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
     writing_ = true;
     last_write_ = Clock::now();
     service_.metrics.Sent(response_.ByteSizeLong());
-    StartWrite(&response_);
+    grpc::WriteOptions options;
+    if (progress_due_) options.set_buffer_hint();  // it goes out with the progress that follows
+    StartWrite(&response_, options);
   }
 
   void TakePart() {
