@@ -1,5 +1,6 @@
 #include "server/journal.h"
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <deque>
@@ -96,12 +97,6 @@ class Journal::Mesh final : public SessionJournal, public std::enable_shared_fro
     });
   }
 
-  std::optional<MeshFailure> WithdrawRound(std::uint64_t round) override {
-    return file_->Do("the withdrawal of a round", [&](JournalFile& file) {
-      return forgotten_ || id_ == 0 || file.DropRound(id_, round);
-    });
-  }
-
   std::optional<MeshFailure> WriteEnd(const SessionEnd& end) override {
     return file_->Do("the end of the mesh", [&](JournalFile& file) {
       return forgotten_ || id_ == 0 || file.SetEnd(id_, EncodeEnd(end));
@@ -182,6 +177,7 @@ core::Expected<std::unique_ptr<Journal>> Journal::Open(const JournalOptions& opt
                                   ") that makes no sense; it was left as it is: choose another "
                                   "--data-dir"));
     }
+    if (record.end) record.rounds = std::min(record.rounds, record.end->rounds);
     recorded.record = std::move(record);
     recorded.journal = std::make_shared<Mesh>(journal->file_, mesh.id);
     journal->meshes_.push_back(std::move(recorded));

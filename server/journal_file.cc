@@ -278,13 +278,6 @@ bool JournalFile::InsertRound(std::int64_t mesh, std::uint64_t round, std::uint6
   return true;
 }
 
-bool JournalFile::DropRound(std::int64_t mesh, std::uint64_t round) {
-  return Statement(*database_, "DELETE FROM rounds WHERE mesh = ? AND round = ?")
-      .Bind(0, mesh)
-      .Bind(1, static_cast<std::int64_t>(round))
-      .Run();
-}
-
 bool JournalFile::SetEnd(std::int64_t mesh, std::string end) {
   end += SealOf(end, EndPlace(mesh));
   return Statement(*database_, "UPDATE meshes SET finish = ? WHERE id = ?")

@@ -33,7 +33,6 @@ class JournalFile {
   bool AddMesh(std::string start, std::int64_t* id);
   bool AddRound(std::int64_t mesh, std::uint64_t round, std::uint64_t questions,
                 std::string_view answers);
-  bool DropRound(std::int64_t mesh, std::uint64_t round);
   bool SetEnd(std::int64_t mesh, std::string end);
   // And gives the space back to the disk.
   bool Remove(std::int64_t mesh);

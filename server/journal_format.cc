@@ -278,6 +278,7 @@ std::string EncodeEnd(const SessionEnd& end) {
   writer.Number(end.elapsed_seconds);
   writer.Bytes(end.failure.reason);
   writer.Bytes(end.failure.message);
+  writer.Number(end.rounds);
   return writer.Take();
 }
 
@@ -291,6 +292,7 @@ std::optional<SessionEnd> DecodeEnd(std::string_view record) {
   reader.Number(end.elapsed_seconds);
   reader.Bytes(end.failure.reason);
   reader.Bytes(end.failure.message);
+  reader.Number(end.rounds);
   end.state = static_cast<SessionState>(state);
   end.time = ToTime(time);
   const bool ended = end.state >= SessionState::kSucceeded && end.state <= SessionState::kFailed;

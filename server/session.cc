@@ -132,7 +132,8 @@ bool Session::FitsMemory(core::Mesher* mesher, std::uint64_t queries) {
 
 // False when there is nothing to replay any more and the mesh goes on.
 bool Session::ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch) {
-  SessionJournal::Replay replay = options_.journal->ReadRound(batch);
+  SessionJournal::Replay replay;
+  if (batch.round <= options_.record->rounds) replay = options_.journal->ReadRound(batch);
   if (replay.failure) {
     FailBlameless(mesher, std::move(*replay.failure));
   } else if (replay.answers) {
@@ -197,8 +198,9 @@ void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
 bool Session::Absorb(core::Mesher* mesher, const core::Answers& answers) {
   auto delta = mesher->Absorb(answers);
   if (!delta) {
+    // What the round would have led to nobody has seen; a suspended mesh goes on from its answers.
     if (delta.error().code == StatusCode::kCancelled)
-      CancelInRound(mesher);
+      mesher->Cancel();
     else
       Fail(mesher, ToFailure(delta.error()), delta.error());
     return false;
@@ -222,20 +224,6 @@ std::optional<MeshFailure> Session::Show(core::Mesher* mesher) {
   }
   WakeWatchers();
   return {};
-}
-
-// What the round would have led to was never seen, and must not appear when the mesh is replayed. A
-// suspended mesh keeps it, to go on from there.
-void Session::CancelInRound(core::Mesher* mesher) {
-  mesher->Cancel();
-  const bool suspended = [this] {
-    const std::lock_guard lock(mutex_);
-    return suspended_;
-  }();
-  if (options_.journal == nullptr || replaying_ || suspended) return;
-  if (const auto failure = options_.journal->WithdrawRound(mesher->progress().round + 1)) {
-    Log(LogLevel::kWarning, log_context(), failure->message);
-  }
 }
 
 // The mesh fails, but not by an answer of the workers that serve it now.
@@ -279,7 +267,8 @@ void Session::Finish(const core::Report* report) {
       failure_ = ToFailure(report->failure);
     }
     end = {FinalState(report), std::chrono::system_clock::now(),
-           std::chrono::duration<double>(Clock::now() - created_).count(), failure_};
+           std::chrono::duration<double>(Clock::now() - created_).count(), failure_,
+           progress_.round};
     suspended = suspended_ && end.state == SessionState::kCancelled;
     ending_ = true;
   }

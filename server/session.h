@@ -108,7 +108,6 @@ class Session {
   void RunRound(core::Mesher* mesher, const core::QueryBatch& batch);
   bool Absorb(core::Mesher* mesher, const core::Answers& answers);
   std::optional<MeshFailure> Show(core::Mesher* mesher);
-  void CancelInRound(core::Mesher* mesher);
   bool FitsMemory(core::Mesher* mesher, std::uint64_t queries);
   void FailBlameless(core::Mesher* mesher, MeshFailure failure);
   void Fail(core::Mesher* mesher, MeshFailure failure, core::Status status);

@@ -17,7 +17,8 @@ struct SessionEnd {
   SessionState state{};
   std::chrono::system_clock::time_point time;
   double elapsed_seconds = 0;
-  MeshFailure failure;  // when it failed
+  MeshFailure failure;       // when it failed
+  std::uint64_t rounds = 0;  // that led to it; what a later one would have led to nobody has seen
 };
 
 // What a journal knows of a mesh that an earlier server left.
@@ -40,8 +41,6 @@ class SessionJournal {
   // Before anyone may see what the answers lead to.
   virtual std::optional<MeshFailure> WriteRound(const core::QueryBatch& batch,
                                                 const core::Answers& answers) = 0;
-  // The last round's answers led to nothing that anyone saw: the mesh was cancelled first.
-  virtual std::optional<MeshFailure> WithdrawRound(std::uint64_t round) = 0;
   virtual std::optional<MeshFailure> WriteEnd(const SessionEnd& end) = 0;
 
   struct Replay {

@@ -115,12 +115,13 @@ TEST_F(JournalTest, GivesBackWhatWasWritten) {
   const auto now =
       std::chrono::time_point_cast<std::chrono::microseconds>(std::chrono::system_clock::now());
   const core::Answers answers = AnswersOf(4);
-  const SessionEnd end{SessionState::kFailed, now, 1.5, {"NO_WORKER", "none came"}};
+  const SessionEnd end{SessionState::kFailed, now, 1.5, {"NO_WORKER", "none came"}, 1};
   {
     const auto journal = Open();
     const auto mesh = journal->NewMesh();
     ASSERT_FALSE(mesh->WriteStart(Options(mesh), now));
     ASSERT_FALSE(mesh->WriteRound(Batch(1), answers));
+    ASSERT_FALSE(mesh->WriteRound(Batch(2), answers));  // led to nothing: cancelled, say
     ASSERT_FALSE(mesh->WriteEnd(end));
   }
   const auto meshes = Open()->TakeMeshes();
@@ -134,7 +135,7 @@ TEST_F(JournalTest, GivesBackWhatWasWritten) {
   const auto replay = back.journal->ReadRound(Batch(1));
   ASSERT_TRUE(replay.answers);
   EXPECT_EQ(EncodeAnswers(*replay.answers), EncodeAnswers(answers));
-  const auto beyond = back.journal->ReadRound(Batch(2));
+  const auto beyond = back.journal->ReadRound(Batch(3));
   EXPECT_FALSE(beyond.answers || beyond.failure);
   const auto other = back.journal->ReadRound(Batch(1, 2.0));
   ASSERT_TRUE(other.failure);
@@ -337,7 +338,6 @@ struct FailingJournal : SessionJournal {
     if (batch.round < 3) return std::nullopt;
     return MeshFailure{"JOURNAL_FULL", "no room"};
   }
-  std::optional<MeshFailure> WithdrawRound(std::uint64_t) override { return std::nullopt; }
   std::optional<MeshFailure> WriteEnd(const SessionEnd& end) override {
     state = end.state;
     return MeshFailure{"JOURNAL_FULL", "no room"};

@@ -40,7 +40,8 @@ class FixedSet final : public SimplexSet {
       const Simplex simplex = Read(ids, i);
       if (simplex[0] >= first_of_.size()) return false;
       std::uint32_t* link = &first_of_[simplex[0]];
-      while (*link != kNone && nodes_[*link].simplex != simplex) link = &nodes_[*link].next;
+      while (*link != kNone && !AreEqual(nodes_[*link].simplex, simplex))
+        link = &nodes_[*link].next;
       if (*link == kNone) return false;
       const std::uint32_t place = *link;
       *link = std::exchange(nodes_[place].next, free_);
@@ -74,6 +75,13 @@ class FixedSet final : public SimplexSet {
     std::uint32_t next;
   };
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+
+  // Without the call that operator== makes for a few bytes.
+  static bool AreEqual(const Simplex& a, const Simplex& b) {
+    bool equal = true;
+    for (size_t i = 0; i < N; ++i) equal = equal && a[i] == b[i];
+    return equal;
+  }
 
   static Simplex Read(const char* ids, Eigen::Index i) {
     Simplex simplex;
