@@ -3,8 +3,8 @@
 //   load many [MESHES]        that many at once (100), two workers and two watchers each
 //   load idle [MESHES]        that many without a worker (1000)
 //   load soak [SECONDS]       meshes without end (600), and where memory goes
-//   load cancel [CANCELS]     meshes of 10,000 vertices cancelled so often (100), of more less
-//   often load overhead [EPSILON]   the same mesh in this process, over loopback, and from numpy
+//   load cancel [CANCELS]     meshes cancelled so often (100), those of more vertices less often
+//   load overhead [EPSILON]   the same mesh in this process, over loopback, and from numpy
 
 #include "tests/load/load.h"
 
