@@ -252,22 +252,9 @@ bool CentreOf(int any_d, const double* const* points, const double* const* tange
 template <int K>
 bool CommonCentre(int d, const double* const* points, const double* const* tangents,
                   const double* weights, double* centre, double* radius2) {
-  switch (d) {
-#define STELLATE_CASE(D) \
-  case D:                \
-    return CentreOf<K, D>(d, points, tangents, weights, centre, radius2);
-    STELLATE_CASE(3)
-    STELLATE_CASE(4)
-    STELLATE_CASE(5)
-    STELLATE_CASE(6)
-    STELLATE_CASE(7)
-    STELLATE_CASE(8)
-    STELLATE_CASE(9)
-    STELLATE_CASE(10)
-#undef STELLATE_CASE
-    default:
-      return CentreOf<K, 0>(d, points, tangents, weights, centre, radius2);
-  }
+  return WithDimension(d, [&](auto known) {
+    return CentreOf<K, known()>(d, points, tangents, weights, centre, radius2);
+  });
 }
 
 #define STELLATE_INSTANTIATE(K)                                                                 \

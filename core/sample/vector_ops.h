@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <type_traits>
 
 namespace stellate::core {
 
@@ -29,19 +30,14 @@ inline double LongDot(const double* a, const double* b, int d) { return Unrolled
   return __builtin_constant_p(d) ? UnrolledDot(a, b, d) : LongDot(a, b, d);
 }
 
-// dots[i] = row i . v, of `count` rows of d numbers each. D: d, or 0 for any.
-template <int D>
-inline void DotRowsOf(const double* rows, std::size_t count, const double* v, int any_d,
-                      double* dots) {
-  const int d = D > 0 ? D : any_d;
-  for (std::size_t i = 0; i < count; ++i, rows += d) dots[i] = Dot(rows, v, d);
-}
-
-inline void DotRows(const double* rows, std::size_t count, const double* v, int d, double* dots) {
+// call(std::integral_constant<int, D>()), D = d where d is small and 0 elsewhere: with a D known
+// early the loops over coordinates unroll.
+template <typename Call>
+inline auto WithDimension(int d, const Call& call) {
   switch (d) {
 #define STELLATE_CASE(D) \
   case D:                \
-    return DotRowsOf<D>(rows, count, v, d, dots);
+    return call(std::integral_constant<int, D>());
     STELLATE_CASE(3)
     STELLATE_CASE(4)
     STELLATE_CASE(5)
@@ -52,8 +48,18 @@ inline void DotRows(const double* rows, std::size_t count, const double* v, int 
     STELLATE_CASE(10)
 #undef STELLATE_CASE
     default:
-      return DotRowsOf<0>(rows, count, v, d, dots);
+      return call(std::integral_constant<int, 0>());
   }
+}
+
+// dots[i] = row i . v, of `count` rows of d numbers each.
+inline void DotRows(const double* rows, std::size_t count, const double* v, int any_d,
+                    double* dots) {
+  WithDimension(any_d, [&](auto known) {
+    const int d = known() > 0 ? known() : any_d;
+    const double* row = rows;
+    for (std::size_t i = 0; i < count; ++i, row += d) dots[i] = Dot(row, v, d);
+  });
 }
 
 inline double LongSquaredDistance(const double* a, const double* b, int d) {
