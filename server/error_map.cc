@@ -4,7 +4,7 @@
 #include <cctype>
 #include <string_view>
 
-#include "server/status_details.pb.h"
+#include "stellate/rpc/status_details.pb.h"
 
 namespace stellate::server {
 namespace {
@@ -65,7 +65,7 @@ std::string ReasonName(v1::ErrorReason reason) {
 }
 
 // Any names the standard types, so that every client's usual library reads them.
-void Pack(const google::protobuf::Message& message, const char* type, Status* status) {
+void Pack(const google::protobuf::Message& message, const char* type, rpc::Status* status) {
   google::protobuf::Any* const any = status->add_details();
   any->set_type_url(std::string("type.googleapis.com/google.rpc.") + type);
   any->set_value(message.SerializeAsString());
@@ -96,10 +96,10 @@ v1::ErrorReason ReasonOf(core::StatusCode code) {
 grpc::Status Refusal(v1::ErrorReason reason, const std::string& message, const std::string& field,
                      const std::optional<LimitHit>& limit) {
   const grpc::StatusCode code = CodeOf(reason);
-  Status details;
+  rpc::Status details;
   details.set_code(code);
   details.set_message(Cut(message, kMaxMessageBytes));
-  ErrorInfo info;
+  rpc::ErrorInfo info;
   info.set_reason(ReasonName(reason));
   info.set_domain("stellate.v1");
   if (limit) {
@@ -109,15 +109,15 @@ grpc::Status Refusal(v1::ErrorReason reason, const std::string& message, const s
   }
   Pack(info, "ErrorInfo", &details);
   if (!field.empty()) {
-    BadRequest bad;
-    BadRequest::FieldViolation* const violation = bad.add_field_violations();
+    rpc::BadRequest bad;
+    rpc::BadRequest::FieldViolation* const violation = bad.add_field_violations();
     violation->set_field(field);
     violation->set_description(details.message());
     Pack(bad, "BadRequest", &details);
   }
   if (limit) {
-    QuotaFailure quota;
-    QuotaFailure::Violation* const violation = quota.add_violations();
+    rpc::QuotaFailure quota;
+    rpc::QuotaFailure::Violation* const violation = quota.add_violations();
     violation->set_subject(limit->scope);
     violation->set_description(limit->setting + " is " + limit->value);
     Pack(quota, "QuotaFailure", &details);

@@ -4,10 +4,10 @@
 #include <string>
 
 #include "channel.h"
-#include "client/status_details.pb.h"
 #include "convert.h"
 #include "mesh_builder.h"
 #include "stellate/catalogue.h"
+#include "stellate/rpc/status_details.pb.h"
 
 namespace stellate::client {
 namespace {
@@ -76,10 +76,10 @@ TEST(Spec, RefusesWhatTheWireCannotSay) {
 }
 
 TEST(Statuses, KeepTheReasonAndTellWhoseFault) {
-  ErrorInfo info;
+  rpc::ErrorInfo info;
   info.set_reason("ORACLE_OFF_FLAT");
   info.set_domain("stellate.v1");
-  Status details;
+  rpc::Status details;
   google::protobuf::Any* any = details.add_details();
   any->set_type_url("type.googleapis.com/google.rpc.ErrorInfo");
   any->set_value(info.SerializeAsString());

@@ -4,21 +4,21 @@
 
 #include <string>
 
-#include "server/status_details.pb.h"
+#include "stellate/rpc/status_details.pb.h"
 
 namespace stellate::server::testing {
 
-inline Status DetailsOf(const grpc::Status& status) {
-  Status details;
+inline rpc::Status DetailsOf(const grpc::Status& status) {
+  rpc::Status details;
   details.ParseFromString(status.error_details());
   return details;
 }
 
 // The ErrorInfo's reason in a status's details, "" if there is none.
 inline std::string ReasonIn(const grpc::Status& status) {
-  const Status details = DetailsOf(status);
+  const rpc::Status details = DetailsOf(status);
   for (const auto& any : details.details()) {
-    ErrorInfo info;
+    rpc::ErrorInfo info;
     if (any.type_url() == "type.googleapis.com/google.rpc.ErrorInfo" &&
         info.ParseFromString(any.value()) && info.domain() == "stellate.v1") {
       return info.reason();
@@ -30,11 +30,11 @@ inline std::string ReasonIn(const grpc::Status& status) {
 // "max-meshes=3 of server": the limit that a status's details name, "" if there is none. The
 // QuotaFailure must say the same.
 inline std::string LimitIn(const grpc::Status& status) {
-  const Status details = DetailsOf(status);
+  const rpc::Status details = DetailsOf(status);
   std::string limit, quota_words;
   for (const auto& any : details.details()) {
-    ErrorInfo info;
-    QuotaFailure quota;
+    rpc::ErrorInfo info;
+    rpc::QuotaFailure quota;
     if (any.type_url() == "type.googleapis.com/google.rpc.ErrorInfo" &&
         info.ParseFromString(any.value()) && info.metadata().contains("limit")) {
       limit = info.metadata().at("limit") + "=" + info.metadata().at("value") + " of " +
@@ -53,9 +53,9 @@ inline std::string LimitIn(const grpc::Status& status) {
 
 // The BadRequest's field in a status's details, "" if there is none.
 inline std::string FieldIn(const grpc::Status& status) {
-  const Status details = DetailsOf(status);
+  const rpc::Status details = DetailsOf(status);
   for (const auto& any : details.details()) {
-    BadRequest bad;
+    rpc::BadRequest bad;
     if (any.type_url() == "type.googleapis.com/google.rpc.BadRequest" &&
         bad.ParseFromString(any.value()) && bad.field_violations_size() == 1) {
       return bad.field_violations(0).field();

@@ -4,7 +4,7 @@
 #include <cstring>
 #include <string>
 
-#include "client/status_details.pb.h"
+#include "stellate/rpc/status_details.pb.h"
 
 namespace stellate::client {
 namespace {
@@ -34,10 +34,10 @@ Expected<Eigen::Index> Rows(const Message& array, const std::vector<std::uint32_
 
 // The name of a status's ErrorInfo, if it carries one.
 std::string ReasonOf(const grpc::Status& status) {
-  Status details;
+  rpc::Status details;
   if (!details.ParseFromString(status.error_details())) return "";
   for (const google::protobuf::Any& any : details.details()) {
-    ErrorInfo info;
+    rpc::ErrorInfo info;
     if (any.type_url() == "type.googleapis.com/google.rpc.ErrorInfo" &&
         info.ParseFromString(any.value()) && info.domain() == "stellate.v1") {
       return info.reason();

@@ -18,14 +18,12 @@ import tempfile
 
 _PACKAGE = pathlib.Path(__file__).resolve().parent
 _GENERATED = _PACKAGE / "_generated"
-_CLIENT_PROTOS = _PACKAGE.parent / "protos"
-_SERVICE_PROTOS = _PACKAGE.parent.parent.parent / "proto"
+_PROTOS = _PACKAGE.parent.parent.parent / "proto"
 
 
 def _sources() -> list[pathlib.Path]:
     """The .proto files, or none when this is not a source tree."""
-    service = sorted((_SERVICE_PROTOS / "stellate" / "v1").glob("*.proto"))
-    return service + sorted(_CLIENT_PROTOS.glob("*.proto")) if service else []
+    return sorted((_PROTOS / "stellate").glob("*/*.proto"))
 
 
 def _fingerprint(sources: list[pathlib.Path]) -> str:
@@ -61,7 +59,7 @@ def _generate(sources: list[pathlib.Path], fingerprint: str) -> None:
     with tempfile.TemporaryDirectory(dir=_PACKAGE, prefix=".generated-") as scratch:
         command = [argument.replace("OUT", scratch) for argument in compiler]
         command += [f"--python_out={scratch}", f"--pyi_out={scratch}"]
-        command += [f"-I{_SERVICE_PROTOS}", f"-I{_CLIENT_PROTOS}", *map(str, sources)]
+        command += [f"-I{_PROTOS}", *map(str, sources)]
         result = subprocess.run(command, capture_output=True, text=True)
         if result.returncode != 0:
             raise ImportError(f"protoc failed:\n{result.stderr}")
