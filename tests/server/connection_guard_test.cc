@@ -5,6 +5,7 @@
 #include <grpcpp/create_channel.h>
 
 #include "tests/server/live_server.h"
+#include "tests/server/loopback.h"
 #include "tests/server/raw_http2.h"
 
 namespace stellate::server::testing {
@@ -16,39 +17,17 @@ constexpr int kTooMany = 3000;
 
 class ConnectionGuardTest : public LiveServer {
  protected:
-  void StartTcp() {
+  void StartGuarded() {
     Config config;
-    config.listen = "127.0.0.1:0";
     config.metrics_listen = "127.0.0.1:0";
     config.max_connection_streams = kStreams;
     config.hello_seconds = 3600;  // nothing else ends what a stranger holds
-    auto server = Server::Start(config);
-    ASSERT_TRUE(server) << server.error().message;
-    server_ = std::move(*server);
-    stub_ = NewStub();
-  }
-
-  int port() const {
-    const std::string& address = server_->address();
-    return std::stoi(address.substr(address.find(':') + 1));
+    StartTcp(config);
   }
 
   // How many connections were closed, as /metrics says.
   std::string Closed() const {
-    const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    sockaddr_in place{};
-    place.sin_family = AF_INET;
-    place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    place.sin_port = htons(static_cast<in_port_t>(server_->metrics_port()));
-    EXPECT_EQ(connect(fd, reinterpret_cast<sockaddr*>(&place), sizeof(place)), 0);
-    const std::string request = "GET /metrics HTTP/1.0\r\n\r\n";
-    EXPECT_EQ(send(fd, request.data(), request.size(), 0), static_cast<ssize_t>(request.size()));
-    std::string reply;
-    char bytes[4096];
-    for (ssize_t n = 0; (n = recv(fd, bytes, sizeof(bytes), 0)) > 0;) {
-      reply.append(bytes, static_cast<std::size_t>(n));
-    }
-    close(fd);
+    const std::string reply = GetMetrics(server_->metrics_port());
     const std::string series = "stellate_limit_refusals_total{limit=\"max-connection-streams\"} ";
     const std::size_t at = reply.find(series);
     if (at == std::string::npos) return "none";
@@ -65,7 +44,7 @@ class ConnectionGuardTest : public LiveServer {
 
 // gRPC itself bounds them once the client has acknowledged the bound, which this one does not.
 TEST_F(ConnectionGuardTest, CallsThatAreHeldOpenBeyondTheBoundCloseTheirConnectionAlone) {
-  StartTcp();
+  StartGuarded();
   ASSERT_TRUE(MeshesWell());
   for (const char* rpc : {"ServeOracle", "WatchMesh", "GetServerInfo"}) {
     RawHttp2 stranger(port());
@@ -79,7 +58,7 @@ TEST_F(ConnectionGuardTest, CallsThatAreHeldOpenBeyondTheBoundCloseTheirConnecti
 }
 
 TEST_F(ConnectionGuardTest, CallsThatAreResetFewAtATimeAreLeftAlone) {
-  StartTcp();
+  StartGuarded();
   RawHttp2 hasty(port());
   for (const char* rpc : {"ServeOracle", "WatchMesh", "GetServerInfo"}) {
     hasty.Call(rpc, kAllowed / 4, /*reset=*/true);
@@ -93,7 +72,7 @@ TEST_F(ConnectionGuardTest, CallsThatAreResetFewAtATimeAreLeftAlone) {
 // Whether one of these storms is cut depends on how fast the machine is; that it harms nobody does
 // not.
 TEST_F(ConnectionGuardTest, StormsOfResetsHarmNobodyElse) {
-  StartTcp();
+  StartGuarded();
   std::thread storm([this] {
     for (const char* rpc : {"WatchMesh", "Nothing"}) {
       RawHttp2 stranger(port());

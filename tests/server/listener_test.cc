@@ -1,17 +1,19 @@
 #include "server/listener.h"
 
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <netinet/tcp.h>
 #include <sys/resource.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <condition_variable>
 #include <mutex>
 
+#include "tests/server/loopback.h"
+
 namespace stellate::server {
 namespace {
+
+using testing::ConnectTo;
 
 constexpr int kMany = 8;
 
@@ -39,16 +41,6 @@ class Taken {
   std::vector<int> fds_;
 };
 
-int Connect(int port) {
-  sockaddr_in place{};
-  place.sin_family = AF_INET;
-  place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  place.sin_port = htons(static_cast<in_port_t>(port));
-  const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  EXPECT_EQ(connect(fd, reinterpret_cast<sockaddr*>(&place), sizeof(place)), 0);
-  return fd;
-}
-
 std::unique_ptr<Listener> OnLoopback(std::size_t max_connections) {
   auto listener = Listener::Open(*ParseListenAddress("127.0.0.1:0"), max_connections);
   EXPECT_TRUE(listener);
@@ -62,13 +54,13 @@ TEST(Listener, GoesOnOnceThereAreFilesAgain) {
     const auto before = OnLoopback(100);
     Taken taken;
     before->Start(taken.Take(), [] {});
-    const int client = Connect(before->port());
+    const int client = ConnectTo(before->port());
     taken.Await(1);
     close(client);
   }
   const auto listener = OnLoopback(100);
   std::vector<int> clients;
-  for (int i = 0; i < kMany; ++i) clients.push_back(Connect(listener->port()));
+  for (int i = 0; i < kMany; ++i) clients.push_back(ConnectTo(listener->port()));
   Taken taken;
   // The next descriptor but one is out of bounds; what Start itself needs is the next.
   rlimit old{};
@@ -91,7 +83,7 @@ TEST(Listener, TellsOfEachConnectionThatIsOneTooMany) {
   std::atomic<int> refused{0};
   listener->Start(taken.Take(), [&refused] { ++refused; });
   std::vector<int> clients;
-  for (int i = 0; i < kMany; ++i) clients.push_back(Connect(listener->port()));
+  for (int i = 0; i < kMany; ++i) clients.push_back(ConnectTo(listener->port()));
   for (int i = 2; i < kMany; ++i) {
     char byte = 0;
     EXPECT_LE(recv(clients[static_cast<std::size_t>(i)], &byte, 1, 0), 0);
@@ -115,10 +107,10 @@ TEST(Listener, ClientsThatHungUpWhileTheyWaitedAreNotTaken) {
   const auto listener = OnLoopback(1);
   std::vector<int> clients;
   for (int i = 0; i < kMany; ++i) {
-    clients.push_back(Connect(listener->port()));
+    clients.push_back(ConnectTo(listener->port()));
     HangUp(clients.back());
   }
-  clients.push_back(Connect(listener->port()));
+  clients.push_back(ConnectTo(listener->port()));
   Taken taken;
   std::atomic<int> refused{0};
   listener->Start(taken.Take(), [&refused] { ++refused; });
@@ -134,7 +126,7 @@ TEST(Listener, ConnectionsWaitWhileTheyAreToldTo) {
   Taken taken;
   listener->Start(
       taken.Take(), [] {}, [&asked] { return ++asked <= 3; });
-  const int client = Connect(listener->port());
+  const int client = ConnectTo(listener->port());
   taken.Await(1);
   listener->Stop();
   EXPECT_GT(asked, 3);
@@ -147,7 +139,7 @@ TEST(Listener, ListensOnEveryAddressOfAName) {
   EXPECT_GT((*listener)->port(), 0);
   Taken taken;
   (*listener)->Start(taken.Take(), [] {});
-  const int client = Connect((*listener)->port());
+  const int client = ConnectTo((*listener)->port());
   taken.Await(1);
   close(client);
 }

@@ -132,11 +132,8 @@ class LiveSafetyTest : public LiveServer {
     const std::string files = authority_.Issue("server");
     config.tls_certificate = files + ".pem";
     config.tls_key = files + ".key";
-    config.listen = "127.0.0.1:0";
     config_ = config;
-    auto server = Server::Start(config);
-    ASSERT_TRUE(server) << server.error().message;
-    server_ = std::move(*server);
+    StartTcp(config);
   }
 
   static std::shared_ptr<grpc::ChannelCredentials> Tls(const TestAuthority& trusted,

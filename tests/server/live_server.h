@@ -22,7 +22,7 @@
 
 namespace stellate::server::testing {
 
-// A server in this process on a unix socket of its own, and raw stubs to it.
+// A server in this process, on a unix socket of its own or a port, and raw stubs to it.
 class LiveServer : public ::testing::Test {
  protected:
   using Stream = grpc::ClientReaderWriter<v1::ServeOracleRequest, v1::ServeOracleResponse>;
@@ -31,6 +31,21 @@ class LiveServer : public ::testing::Test {
     static std::atomic<int> count{0};
     config.listen = "unix:" + ::testing::TempDir() + "stellate-" + std::to_string(getpid()) + "-" +
                     std::to_string(count++);
+    StartAsTold(config);
+  }
+
+  // On a port of the loopback.
+  void StartTcp(Config config = {}) {
+    config.listen = "127.0.0.1:0";
+    StartAsTold(config);
+  }
+
+  int port() const {
+    const std::string& address = server_->address();
+    return std::stoi(address.substr(address.find(':') + 1));
+  }
+
+  void StartAsTold(const Config& config) {
     auto server = Server::Start(config);
     ASSERT_TRUE(server) << server.error().message;
     server_ = std::move(*server);

@@ -1,8 +1,6 @@
 // What a stranger may try before anybody asks who it is, and what others may read afterwards.
 
-#include <arpa/inet.h>
 #include <grpcpp/generic/generic_stub.h>
-#include <sys/socket.h>
 
 #include <filesystem>
 #include <future>
@@ -10,6 +8,7 @@
 #include "server/health_check.h"
 #include "tests/server/certificates.h"
 #include "tests/server/live_server.h"
+#include "tests/server/loopback.h"
 
 namespace stellate::server::testing {
 namespace {
@@ -22,28 +21,6 @@ constexpr char kReflection[] = "/grpc.reflection.v1alpha.ServerReflection/Server
 
 class LiveStrangersTest : public LiveServer {
  protected:
-  // On a port of the loopback.
-  void StartTcp(Config config = {}) {
-    config.listen = "127.0.0.1:0";
-    auto server = Server::Start(config);
-    ASSERT_TRUE(server) << server.error().message;
-    server_ = std::move(*server);
-    stub_ = NewStub();
-  }
-
-  // A connection that says nothing.
-  int Connect() const {
-    const std::string& address = server_->address();
-    sockaddr_in place{};
-    place.sin_family = AF_INET;
-    place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    place.sin_port =
-        htons(static_cast<in_port_t>(std::stoi(address.substr(address.find(':') + 1))));
-    const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    EXPECT_EQ(connect(fd, reinterpret_cast<sockaddr*>(&place), sizeof(place)), 0);
-    return fd;
-  }
-
   // A new client's call, until the server has room for it.
   bool IsServed() {
     grpc::ClientContext context;
@@ -88,9 +65,9 @@ TEST_F(LiveStrangersTest, ConnectionsBeyondTheLimitAreClosedUntilOthersGo) {
   config.max_connections = 3;
   StartTcp(config);
   std::vector<int> held;
-  for (int i = 0; i < 3; ++i) held.push_back(Connect());
+  for (int i = 0; i < 3; ++i) held.push_back(ConnectTo(port()));
   for (int i = 0; i < 20; ++i) {
-    const int more = Connect();
+    const int more = ConnectTo(port());
     EXPECT_TRUE(IsHungUpOn(more));
     close(more);
   }
@@ -102,7 +79,7 @@ TEST_F(LiveStrangersTest, ConnectionsThatSayNothingAreClosed) {
   Config config;
   config.hello_seconds = 0.2;
   StartTcp(config);
-  const int silent = Connect();
+  const int silent = ConnectTo(port());  // and says nothing
   char bytes[4096];
   // What the server says first, and then the end.
   while (recv(silent, bytes, sizeof(bytes), 0) > 0) continue;

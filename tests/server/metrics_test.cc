@@ -2,15 +2,13 @@
 
 #include "server/metrics.h"
 
-#include <netinet/in.h>
-#include <sys/socket.h>
-
 #include <map>
 #include <regex>
 #include <sstream>
 
 #include "tests/server/certificates.h"
 #include "tests/server/live_server.h"
+#include "tests/server/loopback.h"
 
 namespace stellate::server::testing {
 namespace {
@@ -25,30 +23,9 @@ class MetricsTest : public LiveServer {
     ASSERT_GT(server_->metrics_port(), 0);
   }
 
-  // The reply to GET /metrics, headers included; "" when nobody listens.
-  static std::string Get(int port) {
-    const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(static_cast<std::uint16_t>(port));
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    std::string reply;
-    if (connect(socket, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0) {
-      const std::string request = "GET /metrics HTTP/1.0\r\n\r\n";
-      EXPECT_EQ(send(socket, request.data(), request.size(), 0),
-                static_cast<ssize_t>(request.size()));
-      char buffer[4096];
-      for (ssize_t n = 0; (n = recv(socket, buffer, sizeof(buffer), 0)) > 0;) {
-        reply.append(buffer, static_cast<std::size_t>(n));
-      }
-    }
-    close(socket);
-    return reply;
-  }
-
   // Series and their values; checks that every line is what the text format allows.
   std::map<std::string, double> Scrape() {
-    const std::string reply = Get(server_->metrics_port());
+    const std::string reply = GetMetrics(server_->metrics_port());
     EXPECT_EQ(reply.find("HTTP/1.1 200"), 0u) << reply;
     std::istringstream lines(reply.substr(std::min(reply.find("\r\n\r\n"), reply.size() - 4) + 4));
     static const std::regex kSample(R"((\w+(?:\{\w+="[^"]*"\})?) ([-+0-9.eE]+|\+Inf|[Nn]a[Nn]))");
@@ -80,7 +57,7 @@ TEST_F(MetricsTest, CountsAMeshFromItsStartToItsEnd) {
     return RawWorker::Truly(queries);
   });
   std::thread watching([&] { WatchToEnd(name); });
-  while (worker.chunks() == 0 || LiveServer::Get(name).watchers() == 0) std::this_thread::yield();
+  while (worker.chunks() == 0 || Get(name).watchers() == 0) std::this_thread::yield();
   auto series = Scrape();
   EXPECT_EQ(series.at("stellate_meshes{state=\"RUNNING\"}"), 1);
   EXPECT_EQ(series.at("stellate_meshes{state=\"WAITING\"}"), 0);
@@ -96,7 +73,7 @@ TEST_F(MetricsTest, CountsAMeshFromItsStartToItsEnd) {
   open = true;
   watching.join();
   EXPECT_TRUE(worker.Wait().ok());
-  const v1::Mesh mesh = LiveServer::Get(name);
+  const v1::Mesh mesh = Get(name);
   series = Scrape();
   EXPECT_EQ(series.at("stellate_meshes{state=\"SUCCEEDED\"}"), 1);
   EXPECT_EQ(series.at("stellate_meshes_ended_total{state=\"SUCCEEDED\"}"), 1);
@@ -177,7 +154,7 @@ TEST_F(MetricsTest, NamesNoMeshNoOwnerAndNoToken) {
     context.AddMetadata("authorization", std::string("Bearer ") + token);
     stub_->CreateMesh(&context, request, &mesh);
   }
-  const std::string reply = Get(server_->metrics_port());
+  const std::string reply = GetMetrics(server_->metrics_port());
   EXPECT_NE(reply.find("stellate_meshes{state=\"WAITING\"} 1"), std::string::npos) << reply;
   EXPECT_NE(reply.find("stellate_limit_refusals_total{limit=\"owner-meshes\"} 1"),
             std::string::npos)
@@ -198,7 +175,7 @@ TEST_F(MetricsTest, ATakenPortIsRefusedAndAStoppedServerAnswersNoMore) {
   ASSERT_FALSE(second);
   EXPECT_NE(second.error().message.find("--metrics-listen"), std::string::npos);
   EXPECT_TRUE(server_->Stop(0s));
-  EXPECT_EQ(Get(port), "");
+  EXPECT_EQ(GetMetrics(port), "");
 }
 
 }  // namespace

@@ -1,12 +1,12 @@
 #pragma once
 
-#include <arpa/inet.h>
-#include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <cstdint>
 #include <string>
+
+#include "tests/server/loopback.h"
 
 namespace stellate::server::testing {
 
@@ -14,12 +14,7 @@ namespace stellate::server::testing {
 // beyond every bound, and reset at once. To a port of the loopback.
 class RawHttp2 {
  public:
-  explicit RawHttp2(int port) : fd_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
-    sockaddr_in place{};
-    place.sin_family = AF_INET;
-    place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    place.sin_port = htons(static_cast<in_port_t>(port));
-    EXPECT_EQ(connect(fd_, reinterpret_cast<sockaddr*>(&place), sizeof(place)), 0);
+  explicit RawHttp2(int port) : fd_(ConnectTo(port)) {
     Send("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + Frame(kSettings, 0, 0, ""));
   }
   ~RawHttp2() { close(fd_); }

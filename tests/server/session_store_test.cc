@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "tests/server/sphere.h"
+#include "tests/support/stub_mesher.h"
 
 namespace stellate::server {
 namespace {
@@ -77,37 +78,19 @@ TEST(SessionStore, RefusesMoreThanItsLimitAndTakesMoreWhenOneEnds) {
 }
 
 // A mesher that asks for one point, and is not destroyed before the test says so.
-class SlowToGo : public core::Mesher {
+class SlowToGo : public stellate::testing::StubMesher {
  public:
   SlowToGo(core::Specification spec, std::shared_future<void> gate)
-      : spec_(std::move(spec)), gate_(std::move(gate)) {
-    batch_.round = 1;
-    batch_.blocks.resize(1);
-    batch_.blocks[0].points = Eigen::MatrixXd::Constant(3, 1, 1.0);
-  }
+      : StubMesher(std::move(spec)), gate_(std::move(gate)) {}
   ~SlowToGo() override { gate_.wait(); }
 
-  const core::QueryBatch* NextBatch() override { return over_ ? nullptr : &batch_; }
+  const core::QueryBatch* NextBatch() override { return IsOver() ? nullptr : &batch_; }
   core::Expected<core::MeshDelta> Absorb(const core::Answers&) override {
     return core::Refuse(core::StatusCode::kCancelled, "never asked");
   }
-  void Interrupt() override {}
-  void Cancel() override { over_ = true; }
-  void Fail(core::Status) override { over_ = true; }
-  const core::Specification& specification() const override { return spec_; }
-  const core::Progress& progress() const override { return progress_; }
-  const core::Report& report() const override { return report_; }
-  Eigen::MatrixXd Points() const override { return {}; }
-  Eigen::MatrixXd Tangents() const override { return {}; }
-  std::vector<std::uint32_t> Simplices() const override { return {}; }
 
  private:
-  const core::Specification spec_;
   const std::shared_future<void> gate_;
-  core::QueryBatch batch_;
-  core::Progress progress_;
-  core::Report report_;
-  bool over_ = false;
 };
 
 TEST(SessionStore, MeshesBeingTakenApartTakeNoPlaceButAreBounded) {

@@ -9,6 +9,7 @@
 
 #include "tests/server/fake_worker.h"
 #include "tests/server/sphere.h"
+#include "tests/support/stub_mesher.h"
 
 namespace stellate::server {
 namespace {
@@ -18,7 +19,7 @@ using testing::FakeWorker;
 using testing::SphereSpec;
 
 // A mesher that asks one point a round and adds it, as told by the test.
-class FakeMesher : public core::Mesher {
+class FakeMesher : public stellate::testing::StubMesher {
  public:
   struct Plan {
     int rounds = 3;
@@ -28,20 +29,17 @@ class FakeMesher : public core::Mesher {
     std::shared_future<void> gate;    // Absorb waits for it, or to be interrupted
   };
 
-  FakeMesher(core::Specification spec, Plan plan) : spec_(std::move(spec)), plan_(std::move(plan)) {
-    block_.points = Eigen::MatrixXd::Constant(3, 1, 1.0);
-    block_.want_tangents = true;
-    batch_.blocks = {block_};
+  FakeMesher(core::Specification spec, Plan plan)
+      : StubMesher(std::move(spec)), plan_(std::move(plan)) {
+    batch_.blocks[0].want_tangents = true;
   }
 
   const core::QueryBatch* NextBatch() override {
-    if (report_.termination != core::Termination::kRunning) return nullptr;
     if (progress_.round == static_cast<std::uint64_t>(plan_.rounds)) {
-      report_.termination = core::Termination::kConverged;
-      return nullptr;
+      End(core::Termination::kConverged);
     }
     batch_.round = progress_.round + 1;
-    return &batch_;
+    return IsOver() ? nullptr : &batch_;
   }
 
   core::Expected<core::MeshDelta> Absorb(const core::Answers& answers) override {
@@ -60,29 +58,9 @@ class FakeMesher : public core::Mesher {
   }
 
   void Interrupt() override { interrupted_ = true; }
-  void Cancel() override {
-    if (report_.termination == core::Termination::kRunning) {
-      report_.termination = core::Termination::kCancelled;
-    }
-  }
-  void Fail(core::Status reason) override {
-    report_.termination = core::Termination::kOracleFailed;
-    report_.failure = std::move(reason);
-  }
-  const core::Specification& specification() const override { return spec_; }
-  const core::Progress& progress() const override { return progress_; }
-  const core::Report& report() const override { return report_; }
-  Eigen::MatrixXd Points() const override { return {}; }
-  Eigen::MatrixXd Tangents() const override { return {}; }
-  std::vector<std::uint32_t> Simplices() const override { return {}; }
 
  private:
-  core::Specification spec_;
-  Plan plan_;
-  core::QueryBlock block_;
-  core::QueryBatch batch_;
-  core::Progress progress_;
-  core::Report report_;
+  const Plan plan_;
   std::atomic<bool> interrupted_ = false;
 };
 
