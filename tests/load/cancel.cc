@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <memory>
 #include <optional>
 #include <random>
 #include <string>
@@ -167,51 +168,48 @@ int CancelAt(const ServerProcess& server, v1::Stellate::Stub& stub, Oracle& orac
   return wrong;
 }
 
+std::chrono::system_clock::time_point Soon() {
+  return std::chrono::system_clock::now() + std::chrono::duration_cast<std::chrono::milliseconds>(
+                                                std::chrono::duration<double>(kSoon));
+}
+
+// Reads a stream about a mesh, with a deadline, until it ends. Adds by how much it was late, if it
+// was its deadline that ended it.
+template <typename Request, typename Response>
+void ReadUntilLate(v1::Stellate::Stub& stub, const std::string& name,
+                   std::unique_ptr<grpc::ClientReader<Response>> (v1::Stellate::Stub::*call)(
+                       grpc::ClientContext*, const Request&),
+                   std::vector<double>* late) {
+  grpc::ClientContext context;
+  context.set_deadline(Soon());
+  Request request;
+  request.set_name(name);
+  const Stopwatch watch;
+  const auto reader = (stub.*call)(&context, request);
+  for (Response response; reader->Read(&response);) {
+  }
+  if (reader->Finish().error_code() == grpc::StatusCode::DEADLINE_EXCEEDED) {
+    late->push_back(watch.seconds() - kSoon);
+  }
+}
+
 // Calls about a mesh that is being computed, each with a deadline: how long they take.
 int KeepDeadlines(v1::Stellate::Stub& stub, Oracle& oracle) {
   std::printf("  while one of the largest is computed, calls whose deadline is after %.0f ms\n",
               1e3 * kSoon);
   Run run(stub, oracle, kLargest);
   std::vector<double> got, watched, downloaded;
-  const auto soon = [] {
-    return std::chrono::system_clock::now() + std::chrono::duration_cast<std::chrono::milliseconds>(
-                                                  std::chrono::duration<double>(kSoon));
-  };
   int wrong = 0;
   for (v1::Mesh mesh; !mesh.has_report();) {
-    {
-      grpc::ClientContext context;
-      context.set_deadline(soon());
-      v1::GetMeshRequest request;
-      request.set_name(run.name());
-      const Stopwatch watch;
-      wrong += !stub.GetMesh(&context, request, &mesh).ok();
-      got.push_back(watch.seconds());
-    }
-    {
-      grpc::ClientContext context;
-      context.set_deadline(soon());
-      v1::WatchMeshRequest request;
-      request.set_name(run.name());
-      const Stopwatch watch;
-      const auto reader = stub.WatchMesh(&context, request);
-      for (v1::WatchMeshResponse event; reader->Read(&event);) {
-      }
-      const bool late = reader->Finish().error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
-      if (late) watched.push_back(watch.seconds() - kSoon);
-    }
-    {
-      grpc::ClientContext context;
-      context.set_deadline(soon());
-      v1::DownloadMeshRequest request;
-      request.set_name(run.name());
-      const Stopwatch watch;
-      const auto reader = stub.DownloadMesh(&context, request);
-      for (v1::DownloadMeshResponse part; reader->Read(&part);) {
-      }
-      const bool late = reader->Finish().error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
-      if (late) downloaded.push_back(watch.seconds() - kSoon);
-    }
+    grpc::ClientContext context;
+    context.set_deadline(Soon());
+    v1::GetMeshRequest request;
+    request.set_name(run.name());
+    const Stopwatch watch;
+    wrong += !stub.GetMesh(&context, request, &mesh).ok();
+    got.push_back(watch.seconds());
+    ReadUntilLate(stub, run.name(), &v1::Stellate::Stub::WatchMesh, &watched);
+    ReadUntilLate(stub, run.name(), &v1::Stellate::Stub::DownloadMesh, &downloaded);
   }
   run.AwaitEnd();
   Print("GetMesh returns", got);
@@ -222,13 +220,13 @@ int KeepDeadlines(v1::Stellate::Stub& stub, Oracle& oracle) {
 }
 
 // A server that is told to stop, and to wait for no mesh, while it computes one.
-int StopAt(Oracle& oracle, double whole_seconds, int stops, std::mt19937_64& random) {
+int StopAt(Oracle& oracle, double whole_seconds, int stops, bool durable, std::mt19937_64& random) {
   std::printf("  the server told to stop %d times while it computes one of the largest\n", stops);
   std::uniform_real_distribution<double> moment(0, whole_seconds);
   std::vector<double> gone;
   int wrong = 0;
   for (int i = 0; i < stops; ++i) {
-    ServerProcess server({"--drain-seconds", "0"});
+    ServerProcess server({"--drain-seconds", "0"}, durable);
     const auto stub = v1::Stellate::NewStub(
         grpc::CreateChannel(server.address(), grpc::InsecureChannelCredentials()));
     Run run(*stub, oracle, kLargest);
@@ -244,13 +242,14 @@ int StopAt(Oracle& oracle, double whole_seconds, int stops, std::mt19937_64& ran
 
 }  // namespace
 
-int Cancel(int cancels) {
-  ServerProcess server;
+int Cancel(int cancels, bool durable) {
+  ServerProcess server({}, durable);
   const auto stub = v1::Stellate::NewStub(
       grpc::CreateChannel(server.address(), grpc::InsecureChannelCredentials()));
   const auto oracle = Make(kManifold);
   std::mt19937_64 random(1);
-  std::printf("a %s, cancelled at random moments\n", kManifold);
+  std::printf("a %s, cancelled at random moments%s\n", kManifold,
+              durable ? ", by a server with a data directory" : "");
   int wrong = 0;
   double whole_seconds = 0;  // of the largest
   for (const Size& size : {Size{0.033, cancels}, Size{0.0105, (cancels + 1) / 2},
@@ -258,7 +257,7 @@ int Cancel(int cancels) {
     wrong += CancelAt(server, *stub, *oracle, size, random, &whole_seconds);
   }
   wrong += KeepDeadlines(*stub, *oracle);
-  wrong += StopAt(*oracle, whole_seconds, (cancels + 9) / 10, random);
+  wrong += StopAt(*oracle, whole_seconds, (cancels + 9) / 10, durable, random);
   if (wrong > 0) std::printf("  %d ended in another way than they should\n", wrong);
   const int status = server.Stop();
   if (status != 0) std::printf("  the server left with %d\n", status);

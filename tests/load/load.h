@@ -14,7 +14,7 @@ int Many(int meshes);
 int Idle(int meshes);
 int Soak(double seconds);
 int Overhead(double epsilon);
-int Cancel(int cancels);
+int Cancel(int cancels, bool durable);  // durable: by servers with a data directory
 
 class Stopwatch {
  public:

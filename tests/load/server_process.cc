@@ -25,7 +25,7 @@ void Die(const std::string& message) {
   std::exit(1);
 }
 
-ServerProcess::ServerProcess(const std::vector<std::string>& flags) {
+ServerProcess::ServerProcess(const std::vector<std::string>& flags, bool durable) {
   const char* const program = std::getenv("STELLATED");
   if (program == nullptr) Die("$STELLATED must name the server's binary");
   std::string name = (fs::temp_directory_path() / "stellate-load-XXXXXX").string();
@@ -35,6 +35,7 @@ ServerProcess::ServerProcess(const std::vector<std::string>& flags) {
   std::vector<std::string> command{program, "--listen",    "127.0.0.1:0", "--ready-file",
                                    ready,   "--log-level", "warning"};
   command.insert(command.end(), flags.begin(), flags.end());
+  if (durable) command.insert(command.end(), {"--data-dir", directory_ + "/data"});
   std::vector<char*> arguments;
   for (std::string& word : command) arguments.push_back(word.data());
   arguments.push_back(nullptr);

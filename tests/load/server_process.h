@@ -11,7 +11,8 @@ namespace stellate::load {
 // A stellated on a free port of this machine, with what it takes of it. Killed when this goes.
 class ServerProcess {
  public:
-  explicit ServerProcess(const std::vector<std::string>& flags = {});
+  // `durable`: with a data directory of its own, which goes with it.
+  explicit ServerProcess(const std::vector<std::string>& flags = {}, bool durable = false);
   ~ServerProcess();
   ServerProcess(const ServerProcess&) = delete;
   ServerProcess& operator=(const ServerProcess&) = delete;
