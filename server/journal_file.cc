@@ -29,7 +29,11 @@ constexpr std::string_view kMagic("SQLite format 3\0", 16);
 constexpr std::size_t kHeaderBytes = 100;
 constexpr std::size_t kVersionAt = 60, kApplicationAt = 68;  // in the header, high byte first
 constexpr std::uint32_t kApplication = 0x53744c74;
-constexpr std::size_t kPartBytes = std::size_t{1} << 24;  // SQLite takes less than 1 GB at once
+constexpr std::size_t kPartBytes = std::size_t{1} << 20;  // SQLite copies a large one several times
+constexpr int kLogPages = 1000;                           // 4 MB
+
+constexpr std::int64_t kRemovedBytes = std::int64_t{8} << 20;  // at once
+constexpr int kPagesGivenBack = 512;  // at once: each may be another's, moved
 
 constexpr off_t kReserveBytes = off_t{16} << 20;
 
@@ -182,7 +186,9 @@ Status JournalFile::Lock(const std::string& directory) {
 Status JournalFile::Verify(const std::string& path) {
   for (const char* sql :
        {"PRAGMA locking_mode=EXCLUSIVE", "PRAGMA synchronous=FULL", "PRAGMA foreign_keys=ON",
-        "PRAGMA temp_store=MEMORY", "PRAGMA journal_size_limit=67108864"}) {
+        "PRAGMA temp_store=MEMORY", "PRAGMA journal_size_limit=67108864",
+        // What is removed is cut off the file: to write zeros over it first would only take longer.
+        "PRAGMA secure_delete=FAST"}) {
     if (!database_->Execute(sql)) return Damaged(path, database_->error());
   }
   Statement check(*database_, "PRAGMA quick_check(1)");
@@ -295,21 +301,67 @@ void JournalFile::Reserve() {
 }
 
 // To remove is to write first: on a full disk the log has no room for it but what was reserved.
-bool JournalFile::Remove(std::int64_t mesh) {
-  if (RemoveNow(mesh)) return true;
+template <typename Action>
+bool JournalFile::WithReserve(Action action) {
+  if (action()) return true;
   if (!database_->IsFull()) return false;
   database_->Abandon();
   unlink(reserve_.c_str());
-  const bool removed = RemoveNow(mesh);
-  if (removed) Reserve();
-  return removed;
+  return action();
 }
 
-bool JournalFile::RemoveNow(std::int64_t mesh) {
-  const bool removed = Statement(*database_, "DELETE FROM meshes WHERE id = ?").Bind(0, mesh).Run();
-  return removed && database_->Execute("PRAGMA incremental_vacuum") &&
-         database_->Execute("PRAGMA wal_checkpoint(TRUNCATE)");
+bool JournalFile::RemoveSome(std::int64_t mesh, std::string mark, bool* done) {
+  mark += SealOf(mark, EndPlace(mesh));
+  return WithReserve([&] { return RemoveRounds(mesh, mark, done); });
 }
+
+// The last ones first: what is left has no gap.
+bool JournalFile::RemoveRounds(std::int64_t mesh, const std::string& mark, bool* done) {
+  std::int64_t first = 0, bytes = 0;
+  {
+    Statement rounds(*database_,
+                     "SELECT round, sum(length(answers)) FROM rounds WHERE mesh = ? "
+                     "GROUP BY round ORDER BY round DESC");
+    rounds.Bind(0, mesh);
+    while (bytes < kRemovedBytes && rounds.Next()) {
+      first = rounds.Number(0);
+      bytes += rounds.Number(1);
+    }
+    *done = bytes < kRemovedBytes || !rounds.Next();
+    if (rounds.failed()) return false;
+  }
+  if (*done) {
+    return Statement(*database_, "DELETE FROM meshes WHERE id = ?").Bind(0, mesh).Run();
+  }
+  // The mark may take the room of what goes with it.
+  return database_->Execute("BEGIN IMMEDIATE") &&
+         Statement(*database_, "DELETE FROM rounds WHERE mesh = ? AND round >= ?")
+             .Bind(0, mesh)
+             .Bind(1, first)
+             .Run() &&
+         Statement(*database_, "UPDATE meshes SET finish = ? WHERE id = ?")
+             .Bind(0, mark)
+             .Bind(1, mesh)
+             .Run() &&
+         database_->Execute("COMMIT");
+}
+
+bool JournalFile::GiveBackSome(bool* done) {
+  const bool given = WithReserve([&] {
+    *done = !HasSpaceToGiveBack();
+    if (*done) return database_->Execute("PRAGMA wal_checkpoint(TRUNCATE)");
+    return database_->Execute(Message("PRAGMA incremental_vacuum(", kPagesGivenBack, ")").c_str());
+  });
+  if (given && *done && access(reserve_.c_str(), F_OK) != 0) Reserve();
+  return given;
+}
+
+bool JournalFile::HasSpaceToGiveBack() {
+  Statement pages(*database_, "PRAGMA freelist_count");
+  return pages.Next() && pages.Number(0) > 0;
+}
+
+bool JournalFile::IsLogLong() const { return database_->log_pages() >= kLogPages; }
 
 JournalFile::StoredRound JournalFile::ReadRound(std::int64_t mesh, std::uint64_t round) {
   const auto number = static_cast<std::int64_t>(round);

@@ -29,13 +29,21 @@ class JournalFile {
   // What was there when it was opened, by id.
   std::vector<StoredMesh> TakeMeshes() { return std::move(meshes_); }
 
-  // Each of these is one transaction.
+  // Each of these is one transaction at most.
   bool AddMesh(std::string start, std::int64_t* id);
   bool AddRound(std::int64_t mesh, std::uint64_t round, std::uint64_t questions,
                 std::string_view answers);
   bool SetEnd(std::int64_t mesh, std::string end);
-  // And gives the space back to the disk.
-  bool Remove(std::int64_t mesh);
+  // Removes a bounded piece of a mesh, at least a round; sets `done` once nothing is left of it.
+  // All but the last call set its end to `mark`, so that a mesh of which something is missing shows
+  // it.
+  bool RemoveSome(std::int64_t mesh, std::string mark, bool* done);
+  // Gives a bounded piece of what was removed back to the disk; sets `done` once nothing is left.
+  bool GiveBackSome(bool* done);
+  bool HasSpaceToGiveBack();
+  // Records go to a log first: moves them to their place, which no other call does.
+  bool Checkpoint() { return database_->Checkpoint(); }
+  bool IsLogLong() const;
 
   struct StoredRound {
     bool found = false;
@@ -51,7 +59,9 @@ class JournalFile {
   JournalFile() = default;
   core::Status Lock(const std::string& directory);
   void Reserve();
-  bool RemoveNow(std::int64_t mesh);
+  template <typename Action>
+  bool WithReserve(Action action);
+  bool RemoveRounds(std::int64_t mesh, const std::string& mark, bool* done);
   core::Status Verify(const std::string& path);
   core::Status VerifyRounds(const std::string& path);
   bool InsertRound(std::int64_t mesh, std::uint64_t round, std::uint64_t questions,

@@ -300,6 +300,14 @@ std::optional<SessionEnd> DecodeEnd(std::string_view record) {
   return end;
 }
 
+SessionEnd RemovedEnd() { return {SessionState::kCancelled, {}, 0, {"REMOVED", ""}, 0}; }
+
+bool IsRemoved(const SessionEnd& end) {
+  const SessionEnd removed = RemovedEnd();
+  return end.state == removed.state && end.time == removed.time &&
+         end.failure.reason == removed.failure.reason;
+}
+
 std::uint64_t DigestOf(const core::QueryBatch& batch) {
   Digest digest;
   digest.Add(batch.round);

@@ -29,6 +29,10 @@ std::optional<core::Answers> DecodeAnswers(std::string_view record);
 
 std::string EncodeEnd(const SessionEnd& end);
 std::optional<SessionEnd> DecodeEnd(std::string_view record);
+// The end of a mesh that is being removed, and may lack rounds. So long ago that a server to which
+// it meant nothing would keep it no longer.
+SessionEnd RemovedEnd();
+bool IsRemoved(const SessionEnd& end);
 
 // Tells whether a mesher asks what it asked before.
 std::uint64_t DigestOf(const core::QueryBatch& batch);

@@ -4,6 +4,15 @@
 
 namespace stellate::server {
 
+Sqlite::Sqlite(sqlite3* database) : database_(database) {
+  const auto count = [](void* self, sqlite3*, const char*, int pages) {
+    static_cast<Sqlite*>(self)->log_pages_ = pages;
+    return SQLITE_OK;
+  };
+  // In the place of SQLite's own, which moves a long log at the end of a write.
+  sqlite3_wal_hook(database_, count, this);
+}
+
 core::Expected<std::unique_ptr<Sqlite>> Sqlite::Open(const std::string& path, bool create) {
   sqlite3* database = nullptr;
   const int flags = SQLITE_OPEN_READWRITE | (create ? SQLITE_OPEN_CREATE : 0);
@@ -26,6 +35,12 @@ bool Sqlite::Execute(const char* sql) {
 bool Sqlite::CheckpointOnClose(bool yes) {
   return sqlite3_db_config(database_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, yes ? 0 : 1, nullptr) ==
          SQLITE_OK;
+}
+
+bool Sqlite::Checkpoint() {
+  if (!Execute("PRAGMA wal_checkpoint(PASSIVE)")) return false;
+  log_pages_ = 0;
+  return true;
 }
 
 void Sqlite::Abandon() {

@@ -24,6 +24,10 @@ class Sqlite {
   bool Execute(const char* sql);
   // Whether what is in the write-ahead log goes into the main file when this is closed.
   bool CheckpointOnClose(bool yes);
+  // Moves what is in the write-ahead log into the main file. Nothing else does before it is closed.
+  bool Checkpoint();
+  // Of the write-ahead log, since it was last moved.
+  int log_pages() const { return log_pages_; }
   // Ends a transaction that could not be completed.
   void Abandon();
 
@@ -34,8 +38,9 @@ class Sqlite {
 
  private:
   friend class Statement;
-  explicit Sqlite(sqlite3* database) : database_(database) {}
+  explicit Sqlite(sqlite3* database);
   sqlite3* const database_;
+  int log_pages_ = 0;
 };
 
 // One statement; parameters and columns count from 0. What is bound must outlive its use.

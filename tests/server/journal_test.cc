@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "core/message.h"
+#include "server/journal_file.h"
 #include "server/journal_format.h"
 #include "tests/server/fake_worker.h"
 #include "tests/server/sphere.h"
@@ -103,12 +104,16 @@ core::Answers AnswersOf(Eigen::Index queries) {
   return answers;
 }
 
-void WriteTwoRounds(Journal& journal, Eigen::Index queries = 4) {
+void WriteRounds(Journal& journal, std::uint64_t rounds, Eigen::Index queries) {
   const auto mesh = journal.NewMesh();
   EXPECT_FALSE(mesh->WriteStart(Options(mesh), std::chrono::system_clock::now()));
-  for (const std::uint64_t round : {1, 2}) {
+  for (std::uint64_t round = 1; round <= rounds; ++round) {
     EXPECT_FALSE(mesh->WriteRound(Batch(round), AnswersOf(queries)));
   }
+}
+
+void WriteTwoRounds(Journal& journal, Eigen::Index queries = 4) {
+  WriteRounds(journal, 2, queries);
 }
 
 TEST_F(JournalTest, GivesBackWhatWasWritten) {
@@ -244,6 +249,69 @@ TEST_F(JournalTest, DeletionGivesSpaceBackAndIsNotUndoneByALateWrite) {
   }
   EXPECT_LT(fs::file_size(file()), 100'000u);
   EXPECT_TRUE(Open()->TakeMeshes().empty());
+}
+
+TEST_F(JournalTest, TheLogIsMovedIntoTheFileWhileItIsOpen) {
+  const auto journal = Open();
+  WriteTwoRounds(*journal, 60'000);
+  while (fs::file_size(file()) < 9'000'000) std::this_thread::yield();  // soon: by another thread
+}
+
+// A server killed between any two pieces of a removal leaves the mesh whole, or nothing of it to be
+// seen; the next one removes the rest, and harms no other mesh.
+TEST_F(JournalTest, ARemovalCutOffAnywhereLeavesAllOfAMeshOrNone) {
+  constexpr std::uint64_t kRounds = 5;
+  {
+    const auto journal = Open();
+    WriteTwoRounds(*journal);
+    WriteRounds(*journal, kRounds, 60'000);  // 5 MB each: more than is removed at once
+    WriteTwoRounds(*journal, 2000);
+  }
+  auto removing = JournalFile::Open(directory_, 0);
+  ASSERT_TRUE(removing);
+  const std::int64_t large = (*removing)->TakeMeshes().at(1).id;
+  int pieces = 0;
+  // What the next server makes of it.
+  const auto resume = [&] {
+    const std::string killed = directory_ + "/killed";
+    fs::remove_all(killed);
+    fs::create_directory(killed);
+    for (const char* name : {"/journal.sqlite", "/journal.sqlite-wal"}) {
+      fs::copy_file(directory_ + name, killed + name);
+    }
+    {
+      const auto journal = Journal::Open({killed, 0});
+      ASSERT_TRUE(journal) << journal.error().message << " after " << pieces << " pieces";
+      std::vector<std::uint64_t> rounds;
+      for (const SessionOptions& mesh : (*journal)->TakeMeshes()) {
+        rounds.push_back(mesh.record->rounds);
+        for (std::uint64_t round = 1; round <= mesh.record->rounds; ++round) {
+          EXPECT_TRUE(mesh.journal->ReadRound(Batch(round)).answers);
+        }
+      }
+      using Rounds = std::vector<std::uint64_t>;
+      EXPECT_EQ(rounds, pieces == 0 ? (Rounds{2, kRounds, 2}) : (Rounds{2, 2}));
+    }
+    if (pieces > 0) {
+      EXPECT_LT(fs::file_size(killed + "/journal.sqlite"), 1'000'000u) << pieces << " pieces";
+      auto rest = JournalFile::Open(killed, 0);
+      ASSERT_TRUE(rest);
+      EXPECT_EQ((*rest)->TakeMeshes().size(), 2u);
+    }
+  };
+  bool removed = false, given_back = false;
+  while (!given_back) {
+    if (pieces <= 3 || pieces % 4 == 0) resume();
+    if (!removed) {
+      ASSERT_TRUE((*removing)->RemoveSome(large, EncodeEnd(RemovedEnd()), &removed));
+      EXPECT_EQ(removed, pieces == 2) << "two rounds, two more, and the last";
+    } else {
+      ASSERT_TRUE((*removing)->GiveBackSome(&given_back));
+    }
+    ++pieces;
+  }
+  EXPECT_GT(pieces, 5);
+  EXPECT_LT(fs::file_size(file()), 1'000'000u);
 }
 
 struct Outcome {
