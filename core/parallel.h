@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstddef>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #if defined(__SANITIZE_THREAD__)
@@ -175,6 +176,36 @@ void ParallelChunks(std::size_t count, const Body& body) {
   ParallelFor(ChunkCount(count), [&](std::size_t chunk) {
     body(chunk, chunk * size, std::min(count, (chunk + 1) * size));
   });
+}
+
+// What was found in parts, one after the other.
+template <typename Item>
+std::vector<Item> Concatenate(std::vector<std::vector<Item>> parts) {
+  std::vector<std::size_t> begins;
+  begins.reserve(parts.size());
+  std::size_t count = 0;
+  for (const std::vector<Item>& part : parts) {
+    begins.push_back(count);
+    count += part.size();
+  }
+  std::vector<Item> all(count);
+  ParallelFor(parts.size(), [&](std::size_t i) {
+    std::copy(parts[i].begin(), parts[i].end(),
+              all.begin() + static_cast<std::ptrdiff_t>(begins[i]));
+    parts[i] = {};
+  });
+  return all;
+}
+
+// Gathers what gather(i, &found) finds for each i in [0, count), in the order of i. Looks up once a
+// chunk.
+template <typename Item, typename Gather>
+std::vector<Item> ParallelGather(std::size_t count, const Gather& gather) {
+  std::vector<std::vector<Item>> parts(ChunkCount(count));
+  ParallelChunks(count, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) gather(i, &parts[chunk]);
+  });
+  return Concatenate(std::move(parts));
 }
 
 }  // namespace stellate::core

@@ -60,7 +60,17 @@ class StarComplex {
   const Cell& cell(std::uint32_t id) const { return cells_[id]; }
 
   // The simplex dual to vertex v of p's cell, or false if a facet of it is fake.
-  bool SimplexOf(std::uint32_t p, const Cell& cell, std::size_t v, Simplex* simplex) const;
+  bool SimplexOf(std::uint32_t p, const Cell& cell, std::size_t v, Simplex* simplex) const {
+    (*simplex)[0] = p;
+    for (int s = 0; s < K; ++s) {
+      const std::uint32_t id = cell.id(cell.facet(v, s));
+      if (IsFake(id)) return false;
+      std::size_t at = static_cast<std::size_t>(s) + 1;
+      for (; at > 0 && (*simplex)[at - 1] > id; --at) (*simplex)[at] = (*simplex)[at - 1];
+      (*simplex)[at] = id;
+    }
+    return true;
+  }
   // The half-space of a facet of p's cell: writes the normal, T_p^t (q - p), returns the offset.
   double HalfSpace(std::uint32_t p, std::size_t facet, double* normal) const;
   // |q - p|^2 for the sample point q of a facet of p's cell, but for the weights' share.
@@ -129,14 +139,50 @@ class StarComplex {
   bool ClipBy(Cell& cell, const Site& p, const Site& q, const Site* guest, const Cell* born,
               typename Cell::Scratch& scratch) const;
   bool Cuts(const Cell& cell, const Site& p, const Site& q) const;
-  double Project(const Site& p, const double* q, double* step, double* normal) const;
-  double HalfSpace(const Site& p, const Site& q, double* step, double* normal) const;
+  double Project(const Site& p, const double* q, double* step, double* normal) const {
+    for (int i = 0; i < d_; ++i) step[i] = q[i] - p.point[i];
+    for (int a = 0; a < K; ++a) normal[a] = Dot(p.tangent + a * d_, step, d_);
+    return Dot(step, step, d_);
+  }
+  double HalfSpace(const Site& p, const Site& q, double* step, double* normal) const {
+    return 0.5 * (Project(p, q.point, step, normal) + Weight(p.id) - Weight(q.id));
+  }
+  // The cell of p before any other point is known.
+  void ResetCell(Cell& cell, const Site& p, const Site* guest) const;
   // Builds p's cell, and calls influencing(q) for each sample point whose cell p may cut.
   template <typename Influencing>
   void BuildStar(const Site& p, const Site* guest, std::uint32_t near, Cell& cell,
                  typename Cell::Scratch& scratch, const Influencing& influencing) const;
   void Neighbourhood(const double* q, std::uint32_t near, std::vector<std::uint32_t>* ids) const;
-  void Owned(std::uint32_t p, std::vector<Simplex>* simplices) const;
+  // Calls visit(v, simplex) for the simplices of star(p) of which p is the lowest vertex.
+  template <typename Visit>
+  void ForEachOwned(std::uint32_t p, const Visit& visit) const {
+    const Cell& cell = cells_[p];
+    Simplex simplex;
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      bool lowest = true;
+      for (int i = 0; i < K; ++i) lowest = lowest && cell.id(cell.facet(v, i)) > p;
+      if (lowest && SimplexOf(p, cell, v, &simplex)) visit(v, simplex);
+    }
+  }
+  // Commit, step by step.
+  struct Cut {
+    std::uint32_t star, by;
+    bool operator<(const Cut& other) const {
+      return star != other.star ? star < other.star : by < other.by;
+    }
+  };
+  struct Turn {
+    std::uint32_t first, star;  // the first new point that cuts the star
+    std::size_t begin, end;     // its cuts
+    bool operator<(const Turn& other) const {
+      return first != other.first ? first < other.first : star < other.star;
+    }
+  };
+  std::vector<Cut> BuildNewStars(std::uint32_t first);
+  static std::vector<Turn> InTurns(const std::vector<Cut>& cuts);
+  void CutStars(const std::vector<Turn>& turns, const std::vector<Cut>& cuts, std::uint32_t first,
+                Change* change);
   double Influence(const Cell& cell) const { return 2 * std::sqrt(cell.max_norm2()) * (1 + 1e-9); }
 
   int d_;

@@ -1,0 +1,238 @@
+// How points are inserted: the stars of the new ones, and the cuts that they make in the old.
+
+#include <algorithm>
+#include <functional>
+
+#include "core/complex/star_complex.h"
+#include "core/parallel.h"
+
+namespace stellate::core {
+
+namespace {
+
+// The point itself, and as many neighbours as close a cell.
+template <int K>
+inline constexpr int kNearestFirst = 2 * K + 3;
+
+// One a thread, for the life of the thread.
+template <int K>
+typename RestrictedVoronoiCell<K>::Scratch& ThreadScratch() {
+  thread_local typename RestrictedVoronoiCell<K>::Scratch scratch;
+  return scratch;
+}
+
+}  // namespace
+
+// The sample points that most likely close a cell around q, the nearest first: those nearest, or,
+// where a star near q is known, that star and the stars of its points nearest to q.
+template <int K>
+void StarComplex<K>::Neighbourhood(const double* q, std::uint32_t near,
+                                   std::vector<std::uint32_t>* ids) const {
+  ids->clear();
+  constexpr int kCount = kNearestFirst<K>;
+  std::array<std::pair<double, std::uint32_t>, kCount> nearest;
+  if (near == kNone || !cells_[near].bounded()) {
+    const int count = Nearest(q, kCount, nearest.data());
+    for (int i = 0; i < count; ++i) ids->push_back(nearest[static_cast<std::size_t>(i)].second);
+    return;
+  }
+  int count = 0;
+  const auto offer = [&](std::uint32_t id) {
+    const std::pair<double, std::uint32_t> candidate{SquaredDistance(q, Point(id), d_), id};
+    if (count == K + 1 && !(candidate < nearest[K])) return;
+    int at = count < K + 1 ? count++ : K;
+    for (; at > 0 && candidate < nearest[at - 1]; --at) nearest[at] = nearest[at - 1];
+    nearest[at] = candidate;
+  };
+  offer(near);
+  for (std::size_t f = 0; f < cells_[near].facet_count(); ++f)
+    if (!IsFake(cells_[near].id(f))) offer(cells_[near].id(f));
+  const auto add = [&](std::uint32_t id) {
+    if (!IsFake(id) && std::find(ids->begin(), ids->end(), id) == ids->end()) ids->push_back(id);
+  };
+  for (int i = 0; i < count; ++i) ids->push_back(nearest[i].second);
+  for (int i = 0; i < count; ++i) {
+    const Cell& cell = cells_[nearest[i].second];
+    for (std::size_t f = 0; f < cell.facet_count(); ++f) add(cell.id(f));
+  }
+}
+
+template <int K>
+template <typename Influencing>
+void StarComplex<K>::BuildStar(const Site& p, const Site* guest, std::uint32_t near, Cell& cell,
+                               typename Cell::Scratch& scratch,
+                               const Influencing& influencing) const {
+  ResetCell(cell, p, guest);
+  // What closes the cell, or nearly so, comes first: without it a search that happens to begin on
+  // one side of p would visit all of that side while the cell is open towards the other.
+  thread_local std::vector<std::uint32_t> first;
+  Neighbourhood(p.point, near, &first);
+  for (const std::uint32_t q : first)
+    if (q != p.id) ClipBy(cell, p, At(q), guest, nullptr, scratch);
+  double reach = Influence(cell);
+  tree_.VisitAround(
+      p.point, [&] { return reach; },
+      [&](std::uint32_t q, double) {
+        // Once by each point: a second cut by the same plane would be decided by rounding.
+        if (q == p.id || std::find(first.begin(), first.end(), q) != first.end()) return;
+        if (ClipBy(cell, p, At(q), guest, nullptr, scratch)) reach = Influence(cell);
+      },
+      influencing);
+}
+
+template <int K>
+std::uint32_t StarComplex<K>::Append(const double* point, const double* tangent,
+                                     std::uint32_t near) {
+  const std::uint32_t id = size();
+  near_.push_back(near);
+  points_.insert(points_.end(), point, point + d_);
+  tangents_.insert(tangents_.end(), tangent, tangent + d_ * K);
+  tree_.Insert(0);  // until Commit it is found by place, but has no influence
+  return id;
+}
+
+// Also says which old stars each new point cuts, by star: their influence is still that of before.
+template <int K>
+std::vector<typename StarComplex<K>::Cut> StarComplex<K>::BuildNewStars(std::uint32_t first) {
+  cells_.resize(size());
+  std::vector<Cut> cuts = ParallelGather<Cut>(near_.size(), [&](std::size_t i, auto* found) {
+    thread_local Cell cell;  // its memory is used again; what is kept is no larger than it must be
+    const Site q = At(first + static_cast<std::uint32_t>(i));
+    BuildStar(q, nullptr, near_[i], cell, ThreadScratch<K>(), [&](std::uint32_t p) {
+      if (Cuts(cells_[p], At(p), q)) found->push_back({p, q.id});
+    });
+    cells_[q.id] = cell;
+  });
+  near_.clear();
+  ParallelSort(cuts, std::less<>());
+  return cuts;
+}
+
+// New points that follow each other are mostly near each other: stars in the order in which these
+// come to them find in the cache what their neighbours have read.
+template <int K>
+std::vector<typename StarComplex<K>::Turn> StarComplex<K>::InTurns(const std::vector<Cut>& cuts) {
+  std::vector<Turn> turns = ParallelGather<Turn>(cuts.size(), [&](std::size_t i, auto* found) {
+    if (i > 0 && cuts[i].star == cuts[i - 1].star) return;
+    std::size_t end = i + 1;
+    while (end < cuts.size() && cuts[end].star == cuts[i].star) ++end;
+    found->push_back({cuts[i].by, cuts[i].star, i, end});
+  });
+  ParallelSort(turns, std::less<>());
+  return turns;
+}
+
+// Clips the old stars. A simplex that a cut creates has the new point that cuts, and so an id from
+// `first` on; one without is as old as the star.
+template <int K>
+void StarComplex<K>::CutStars(const std::vector<Turn>& turns, const std::vector<Cut>& cuts,
+                              std::uint32_t first, Change* change) {
+  const std::uint32_t count = size() - first;
+  std::vector<std::vector<std::uint32_t>> removed(ChunkCount(turns.size()));
+  std::vector<std::vector<std::uint32_t>> added(removed.size() + ChunkCount(count));
+  std::vector<double> influence(turns.size() + count);
+  const auto append = [](const Simplex& s, std::vector<std::uint32_t>* ids) {
+    ids->insert(ids->end(), s.begin(), s.end());
+  };
+  ParallelChunks(turns.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    std::vector<std::pair<std::uint64_t, Simplex>> before;
+    for (std::size_t i = begin; i < end && !IsInterrupted(); ++i) {
+      const std::uint32_t p = turns[i].star;
+      Cell& cell = cells_[p];
+      before.clear();
+      ForEachOwned(p, [&](std::size_t v, const Simplex& s) { before.push_back({cell.key(v), s}); });
+      for (std::size_t j = turns[i].begin; j < turns[i].end; ++j)
+        ClipBy(cell, At(p), At(cuts[j].by), nullptr, &cells_[cuts[j].by], ThreadScratch<K>());
+      for (const auto& [key, s] : before)
+        if (cell.Find(key) == cell.vertex_count()) append(s, &removed[chunk]);
+      ForEachOwned(p, [&](std::size_t, const Simplex& s) {
+        if (s.back() >= first) append(s, &added[chunk]);
+      });
+      influence[i] = Influence(cell);
+    }
+  });
+  // A new point has the largest id of its simplices but for those among new points alone.
+  ParallelChunks(count, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint32_t p = first + static_cast<std::uint32_t>(i);
+      ForEachOwned(
+          p, [&](std::size_t, const Simplex& s) { append(s, &added[removed.size() + chunk]); });
+      influence[turns.size() + i] = Influence(cells_[p]);
+    }
+  });
+  for (std::size_t i = 0; i < influence.size(); ++i) {
+    LookUp(i);
+    const bool is_new = i >= turns.size();
+    tree_.SetInfluence(
+        is_new ? first + static_cast<std::uint32_t>(i - turns.size()) : turns[i].star,
+        influence[i]);
+  }
+  tree_.Refit();
+  change->removed = Concatenate(std::move(removed));
+  change->added = Concatenate(std::move(added));
+  simplex_count_ += change->added.size() / (K + 1);
+  simplex_count_ -= change->removed.size() / (K + 1);
+}
+
+template <int K>
+typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t>* around) {
+  const auto first = static_cast<std::uint32_t>(cells_.size());
+  Change change;
+  if (size() == first) return change;
+  const std::vector<Cut> cuts = BuildNewStars(first);
+  const std::vector<Turn> turns = InTurns(cuts);
+  change.stars = ParallelGather<std::uint32_t>(
+      turns.size(), [&](std::size_t i, auto* found) { found->push_back(turns[i].star); });
+
+  const auto note_neighbours = [&](std::size_t count, const auto& star) {
+    const auto found =
+        ParallelGather<std::uint32_t>(count, [&](std::size_t i, std::vector<std::uint32_t>* ids) {
+          const Cell& cell = cells_[star(i)];
+          for (std::size_t f = 0; f < cell.facet_count(); ++f)
+            if (!IsFake(cell.id(f))) ids->push_back(cell.id(f));
+        });
+    around->insert(around->end(), found.begin(), found.end());
+  };
+  const auto changed = [&](std::size_t i) { return turns[i].star; };
+  const auto born = [&](std::size_t i) { return first + static_cast<std::uint32_t>(i); };
+  if (around) note_neighbours(turns.size(), changed);
+  CutStars(turns, cuts, first, &change);
+  if (around) {
+    note_neighbours(turns.size(), changed);
+    note_neighbours(size() - first, born);
+  }
+  return change;
+}
+
+template <int K>
+void StarComplex<K>::TryPoint(const double* point, const double* tangent, std::uint32_t near,
+                              typename Cell::Scratch& scratch, Tentative* result) const {
+  const Site guest{size(), point, tangent};
+  result->cut.clear();
+  BuildStar(guest, &guest, near, result->own, scratch, [&](std::uint32_t p) {
+    if (Cuts(cells_[p], At(p), guest)) result->cut.emplace_back(p, cells_[p]);
+  });
+  for (auto& [p, cell] : result->cut) ClipBy(cell, At(p), guest, &guest, &result->own, scratch);
+  std::sort(result->cut.begin(), result->cut.end(),
+            [](const auto& a, const auto& b) { return a.first < b.first; });
+}
+
+#define STELLATE_INSTANTIATE(K)                                                                \
+  template void StarComplex<K>::Neighbourhood(const double*, std::uint32_t,                    \
+                                              std::vector<std::uint32_t>*) const;              \
+  template std::uint32_t StarComplex<K>::Append(const double*, const double*, std::uint32_t);  \
+  template std::vector<StarComplex<K>::Cut> StarComplex<K>::BuildNewStars(std::uint32_t);      \
+  template std::vector<StarComplex<K>::Turn> StarComplex<K>::InTurns(const std::vector<Cut>&); \
+  template void StarComplex<K>::CutStars(const std::vector<Turn>&, const std::vector<Cut>&,    \
+                                         std::uint32_t, Change*);                              \
+  template StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t>*);         \
+  template void StarComplex<K>::TryPoint(const double*, const double*, std::uint32_t,          \
+                                         typename Cell::Scratch&, Tentative*) const;
+STELLATE_INSTANTIATE(1)
+STELLATE_INSTANTIATE(2)
+STELLATE_INSTANTIATE(3)
+STELLATE_INSTANTIATE(4)
+STELLATE_INSTANTIATE(5)
+#undef STELLATE_INSTANTIATE
+
+}  // namespace stellate::core
