@@ -95,24 +95,31 @@ bool Polygon::Clip(std::uint32_t id, const double* normal, double offset, Scratc
   locate(first, Previous(first), first, created[0]);
   locate(after, after, last, created[1]);
 
-  Rotate(after);
-  const std::size_t kept = count - cut;
-  Resize(kept + 2);
-  ids()[kept + 1] = id;
+  // The created take the place of the chain, or, where it goes over the end, come last.
+  const bool over_end = first > last;
+  const std::size_t size = count - cut + 2;
+  const std::size_t place = over_end ? size - 2 : first;
+  const std::uint32_t side = ids()[first];
+  if (size > count) Resize(size);
+  Move(last + 1, over_end ? first : count, over_end ? 0 : first + 2);
+  if (size < count) Resize(size);
+  ids()[place] = side;
+  ids()[place + 1] = id;
   for (std::size_t e = 0; e < 2; ++e) {
-    std::copy_n(created[e].x, 2, corners() + 2 * (kept + e));
+    std::copy_n(created[e].x, 2, corners() + 2 * (place + e));
     if (!centres_) continue;
     std::copy_n(created[e].centre.data(), centres_->d,
-                centres_->at.data() + (kept + e) * centres_->d);
-    centres_->judged[kept + e] = created[e].judged;
+                centres_->at.data() + (place + e) * centres_->d);
+    centres_->judged[place + e] = created[e].judged;
   }
   Measure();
   return true;
 }
 
-// Makes room for, or leaves, so many vertices.
+// Makes room for, or leaves, so many vertices. Comes back inside only with some to spare: a cell in
+// the making goes to and fro.
 void Polygon::Resize(std::size_t count) {
-  if (count > kInline) {
+  if (count > kInline || (outside_ && count + kSpare > kInline)) {
     if (!outside_) {
       outside_ = std::make_unique<Outside>();
       outside_->corners.assign(corners_, corners_ + 2 * kInline);
@@ -132,21 +139,33 @@ void Polygon::Resize(std::size_t count) {
   count_ = static_cast<Index>(count);
 }
 
-// Begins to count vertices and facets from `first`.
-void Polygon::Rotate(std::size_t first) {
-  if (first == 0) return;
-  std::rotate(ids(), ids() + first, ids() + count_);
-  std::rotate(corners(), corners() + 2 * first, corners() + 2 * std::size_t{count_});
+// Moves the vertices [begin, end), each with its first facet, to the places from `to` on.
+void Polygon::Move(std::size_t begin, std::size_t end, std::size_t to) {
+  const auto move = [&](auto* items, std::size_t width) {
+    auto* const first = items + begin * width;
+    auto* const last = items + end * width;
+    if (to < begin)
+      std::copy(first, last, items + to * width);
+    else
+      std::copy_backward(first, last, items + (to + end - begin) * width);
+  };
+  if (to == begin) return;
+  move(ids(), 1);
+  move(corners(), 2);
   if (!centres_) return;
-  auto& at = centres_->at;
-  auto& judged = centres_->judged;
-  std::rotate(at.begin(), at.begin() + static_cast<std::ptrdiff_t>(first * centres_->d), at.end());
-  std::rotate(judged.begin(), judged.begin() + static_cast<std::ptrdiff_t>(first), judged.end());
+  move(centres_->at.data(), centres_->d);
+  move(centres_->judged.data(), 1);
 }
 
 void Polygon::Measure() {
   max_norm2_ = 0;
-  for (std::size_t v = 0; v < count_; ++v) max_norm2_ = std::max(max_norm2_, norm2(v));
+  if (centres_) {
+    for (std::size_t v = 0; v < count_; ++v) max_norm2_ = std::max(max_norm2_, norm2(v));
+  } else {
+    const double* const x = corners();
+    for (std::size_t i = 0; i < 2 * std::size_t{count_}; i += 2)
+      max_norm2_ = std::max(max_norm2_, x[i] * x[i] + x[i + 1] * x[i + 1]);
+  }
   has_fake_ = has_fake_ && std::any_of(ids(), ids() + count_, IsFake);
 }
 

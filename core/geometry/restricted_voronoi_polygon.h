@@ -69,6 +69,7 @@ class RestrictedVoronoiCell<2> {
 
  private:
   static constexpr std::size_t kInline = 8;
+  static constexpr std::size_t kSpare = 2;
 
   struct Centres {
     std::size_t d;
@@ -92,7 +93,7 @@ class RestrictedVoronoiCell<2> {
     return normal[0] * x(v)[0] + normal[1] * x(v)[1] - offset;
   }
   void Resize(std::size_t count);
-  void Rotate(std::size_t first);
+  void Move(std::size_t begin, std::size_t end, std::size_t to);
   void Measure();
 
   double corners_[2 * kInline];
