@@ -310,8 +310,7 @@ bool JournalFile::WithReserve(Action action) {
   return action();
 }
 
-bool JournalFile::RemoveSome(std::int64_t mesh, std::string mark, bool* done) {
-  mark += SealOf(mark, EndPlace(mesh));
+bool JournalFile::RemoveSome(std::int64_t mesh, const std::string& mark, bool* done) {
   return WithReserve([&] { return RemoveRounds(mesh, mark, done); });
 }
 
@@ -333,16 +332,14 @@ bool JournalFile::RemoveRounds(std::int64_t mesh, const std::string& mark, bool*
   if (*done) {
     return Statement(*database_, "DELETE FROM meshes WHERE id = ?").Bind(0, mesh).Run();
   }
+  const auto remove = [&] {
+    return Statement(*database_, "DELETE FROM rounds WHERE mesh = ? AND round >= ?")
+        .Bind(0, mesh)
+        .Bind(1, first)
+        .Run();
+  };
   // The mark may take the room of what goes with it.
-  return database_->Execute("BEGIN IMMEDIATE") &&
-         Statement(*database_, "DELETE FROM rounds WHERE mesh = ? AND round >= ?")
-             .Bind(0, mesh)
-             .Bind(1, first)
-             .Run() &&
-         Statement(*database_, "UPDATE meshes SET finish = ? WHERE id = ?")
-             .Bind(0, mark)
-             .Bind(1, mesh)
-             .Run() &&
+  return database_->Execute("BEGIN IMMEDIATE") && remove() && SetEnd(mesh, mark) &&
          database_->Execute("COMMIT");
 }
 

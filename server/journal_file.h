@@ -37,7 +37,7 @@ class JournalFile {
   // Removes a bounded piece of a mesh, at least a round; sets `done` once nothing is left of it.
   // All but the last call set its end to `mark`, so that a mesh of which something is missing shows
   // it.
-  bool RemoveSome(std::int64_t mesh, std::string mark, bool* done);
+  bool RemoveSome(std::int64_t mesh, const std::string& mark, bool* done);
   // Gives a bounded piece of what was removed back to the disk; sets `done` once nothing is left.
   bool GiveBackSome(bool* done);
   bool HasSpaceToGiveBack();

@@ -43,7 +43,8 @@ class Sqlite {
   int log_pages_ = 0;
 };
 
-// One statement; parameters and columns count from 0. What is bound must outlive its use.
+// One statement; parameters and columns count from 0. What is bound must outlive its use. Gone, it
+// leaves its own result to be asked for: one that failed must be the last to go.
 class Statement {
  public:
   Statement(Sqlite& database, const char* sql);

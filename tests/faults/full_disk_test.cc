@@ -9,6 +9,7 @@
 
 #include <iostream>
 
+#include "server/journal.h"
 #include "tests/faults/fault_test.h"
 
 namespace stellate::server {
@@ -72,10 +73,34 @@ class FailingDisk : public testing::FaultTest {
   }
 };
 
-struct Unmount {
-  std::string path;
-  ~Unmount() { EXPECT_EQ(umount2(path.c_str(), MNT_DETACH), 0); }
+// A small file system in memory, where the program may mount one.
+class SmallDisk {
+ public:
+  SmallDisk(const std::string& path, const char* size) : path_(path) {
+    std::filesystem::create_directories(path);
+    mounted_ = mount("stellate", path.c_str(), "tmpfs", 0, size) == 0;
+  }
+  ~SmallDisk() {
+    if (mounted_) {
+      EXPECT_EQ(umount2(path_.c_str(), MNT_DETACH), 0);
+    }
+  }
+  bool mounted() const { return mounted_; }
+  static constexpr char kMissing[] = "SKIPPED: needs the right to mount a small file system";
+
+ private:
+  const std::string path_;
+  bool mounted_ = false;
 };
+
+// Fills it.
+void Drop(const std::string& ballast) {
+  const int file = open(ballast.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+  const std::string block(4096, 'x');
+  while (write(file, block.data(), block.size()) > 0) {
+  }
+  close(file);
+}
 
 TEST_F(FailingDisk, RefusedWritesHarmNothingElse) {
   Run([](testing::ServerProcess* server) { server->process().LimitFiles(0); },
@@ -86,21 +111,52 @@ TEST_F(FailingDisk, RefusedWritesHarmNothingElse) {
 
 TEST_F(FailingDisk, AFullDiskHarmsNothingElse) {
   data_ = directory_ + "/disk";
-  std::filesystem::create_directories(data_);
-  if (mount("stellate", data_.c_str(), "tmpfs", 0, "size=64m") != 0) {
-    GTEST_SKIP() << "SKIPPED: needs the right to mount a small file system";
-  }
-  const Unmount unmount{data_};
+  const SmallDisk disk(data_, "size=64m");
+  if (!disk.mounted()) GTEST_SKIP() << SmallDisk::kMissing;
   const std::string ballast = data_ + "/ballast";
-  Run(
-      [&](testing::ServerProcess*) {
-        const int file = open(ballast.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
-        const std::string block(4096, 'x');
-        while (write(file, block.data(), block.size()) > 0) {
-        }
-        close(file);
-      },
+  Run([&](testing::ServerProcess*) { Drop(ballast); },
       [&](testing::ServerProcess*) { std::filesystem::remove(ballast); });
+}
+
+std::shared_ptr<SessionJournal> Begin(Journal* journal) {
+  const auto mesh = journal->NewMesh();
+  SessionOptions options;
+  options.name = "meshes/0123456789abcdef0123456789abcdef";
+  options.spec = testing::SphereSpec(0.1);
+  EXPECT_FALSE(mesh->WriteStart(options, {}));
+  return mesh;
+}
+
+// A mesh too large to be removed in one piece, and not a byte left to say so.
+TEST_F(FailingDisk, ADeletionMakesRoomOnAFullDisk) {
+  data_ = directory_ + "/disk";
+  const SmallDisk disk(data_, "size=48m");
+  if (!disk.mounted()) GTEST_SKIP() << SmallDisk::kMissing;
+  core::QueryBatch batch;
+  core::Answers answers;
+  answers.blocks.resize(1);
+  answers.blocks[0].points = Eigen::MatrixXd::Random(3, 50'000);
+  {
+    const auto journal = Journal::Open({data_});
+    ASSERT_TRUE(journal) << journal.error().message;
+    const auto mesh = Begin(journal->get());
+    std::optional<MeshFailure> failure;
+    while (!failure) {
+      ++batch.round;
+      failure = mesh->WriteRound(batch, answers);
+    }
+    EXPECT_EQ(failure->reason, "JOURNAL_FULL");
+    EXPECT_GT(batch.round, 10u) << "12 MB, of which 8 are removed at once";
+    Drop(data_ + "/ballast");
+    mesh->Forget();
+  }
+  EXPECT_LT(std::filesystem::file_size(data_ + "/journal.sqlite"), 1'000'000u);
+  const auto journal = Journal::Open({data_});
+  ASSERT_TRUE(journal) << journal.error().message;
+  EXPECT_TRUE((*journal)->TakeMeshes().empty());
+  const auto mesh = Begin(journal->get());
+  batch.round = 1;
+  EXPECT_FALSE(mesh->WriteRound(batch, answers)) << "there is room again";
 }
 
 }  // namespace
