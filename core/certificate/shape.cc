@@ -6,12 +6,91 @@
 #include <limits>
 #include <numbers>
 
-#include "core/geometry/simplex.h"
+#include "core/geometry/simplex_frame.h"
 #include "core/parallel.h"
 #include "core/specification.h"
 
 namespace stellate::core {
 namespace {
+
+constexpr double kNegligible = 1e-14;  // difference of squared sines
+
+// A simplex as simplex.h wants it.
+class Corners {
+ public:
+  Corners(const MeshView& mesh, const SimplexList& list) : mesh_(mesh), list_(list) {}
+
+  [[gnu::always_inline]] SimplexVertices Of(std::uint32_t s, int k) {
+    const std::uint32_t* ids = list_[s];
+    for (int i = 0; i <= k; ++i) at_[i] = mesh_.Point(ids[i]);
+    return {at_.data(), static_cast<std::size_t>(k) + 1};
+  }
+
+ private:
+  const MeshView& mesh_;
+  const SimplexList& list_;
+  std::array<const double*, kMaxDimension + 1> at_{};
+};
+
+// Of some of the simplices.
+struct Extremes {
+  double circumradius = 0, diameter = 0, radius_edge = 0;
+  double fatness = std::numeric_limits<double>::infinity();
+  double tilt = -1;
+  std::uint32_t largest = 0, longest = 0, most_tilted = 0;  // of circumradius, radius-edge, tilt
+
+  void Take(const Extremes& other) {
+    if (other.circumradius > circumradius) {
+      circumradius = other.circumradius;
+      largest = other.largest;
+    }
+    if (other.radius_edge > radius_edge) {
+      radius_edge = other.radius_edge;
+      longest = other.longest;
+    }
+    if (other.tilt > tilt) {
+      tilt = other.tilt;
+      most_tilted = other.most_tilted;
+    }
+    diameter = std::max(diameter, other.diameter);
+    fatness = std::min(fatness, other.fatness);
+  }
+};
+
+// k and d are constants where they are usual.
+[[gnu::always_inline]] inline Extremes MeasurePart(const MeshView& mesh, const SimplexList& list,
+                                                   std::uint32_t begin, std::uint32_t end, int k,
+                                                   int d, MeshShape& shape) {
+  Extremes part;
+  Corners corners(mesh, list);
+  SimplexFrame frame;
+  frame.directions.resize(static_cast<std::size_t>(k) * static_cast<std::size_t>(d));
+  for (std::uint32_t s = begin; s < end; ++s) {
+    const SimplexVertices vertices = corners.Of(s, k);
+    TakeFrame(vertices, k, d, frame);
+    const SimplexMeasures m =
+        k > 1 ? MeasureFramed(vertices, k, d, frame) : MeasureSimplex(vertices, d, frame);
+    Extremes one{m.circumradius, m.diameter, m.RadiusEdgeRatio(), m.Fatness(), 0, s, s, s};
+    for (int i = 0; i <= k; ++i) {
+      const double tilt =
+          frame.rank < k ? k : SumOfSquaredSines(frame, k, d, mesh.Tangent(list[s][i]), k);
+      one.tilt = std::max(one.tilt, tilt);
+    }
+    part.Take(one);
+    shape.diameters[s] = static_cast<float>(m.diameter);
+    shape.tilts[s] = static_cast<float>(one.tilt);
+  }
+  return part;
+}
+
+template <int K>
+Extremes MeasurePart(const MeshView& mesh, const SimplexList& list, std::uint32_t begin,
+                     std::uint32_t end, MeshShape& shape) {
+  return WithDimension(mesh.d, [&](auto known) {
+    const int d = known() > 0 ? known() : mesh.d;
+    return MeasurePart(mesh, list, begin, end, K, d, shape);
+  });
+}
 
 // Are all eigenvalues of the tilt below `bound`? Cholesky's factorisation of the difference.
 bool TiltsLess(const TiltMatrix& tilt, int k, double bound) {
@@ -27,57 +106,42 @@ bool TiltsLess(const TiltMatrix& tilt, int k, double bound) {
   return true;
 }
 
-// Of some of the simplices.
-struct Extremes {
-  double circumradius = 0, diameter = 0, radius_edge = 0;
-  double fatness = std::numeric_limits<double>::infinity();
-  double angle = std::numbers::pi;
-  double sine2 = 0;           // of the angle to the tangent spaces
-  std::uint32_t largest = 0;  // where the circumradius is attained
-};
-
-Extremes MeasurePart(const MeshView& mesh, const SimplexList& list, std::uint32_t begin,
-                     std::uint32_t end, std::vector<float>& diameters, std::vector<float>& tilts) {
+// The larger of `sine2` and the squared sine of the largest angle between the simplex and a tangent
+// space at a vertex of it.
+double LargerSine2(const MeshView& mesh, const SimplexList& list, Corners& corners, std::uint32_t s,
+                   double sine2) {
   const int k = mesh.k;
-  const int d = mesh.d;
-  constexpr double kNegligible = 1e-14;  // difference of squared sines
-  Extremes part;
-  std::array<const double*, kMaxDimension + 1> corners{};
-  const SimplexVertices vertices(corners.data(), static_cast<std::size_t>(k) + 1);
-  for (std::uint32_t s = begin; s < end; ++s) {
-    for (int i = 0; i <= k; ++i) corners[i] = mesh.Point(list[s][i]);
-    const SimplexFrame frame = FrameSimplex(vertices, d);
-    const SimplexMeasures m = MeasureSimplex(vertices, d, frame);
-    if (m.circumradius > part.circumradius) {
-      part.circumradius = m.circumradius;
-      part.largest = s;
-    }
-    part.diameter = std::max(part.diameter, m.diameter);
-    part.radius_edge = std::max(part.radius_edge, m.RadiusEdgeRatio());
-    part.fatness = std::min(part.fatness, m.Fatness());
-    if (k == 2) part.angle = std::min(part.angle, SmallestTriangleAngle(vertices, d));
-
-    double tilt = 0;
-    for (int i = 0; i <= k; ++i) {
-      const double* tangent = mesh.Tangent(list[s][i]);
-      if (frame.rank < k) {
-        tilt = k;
-        part.sine2 = 1;
-        continue;
-      }
-      const TiltMatrix matrix = MeasureTilt(frame, k, d, tangent, k);
-      double sum = 0;
-      for (int a = 0; a < k; ++a) sum += matrix(a, a);
-      tilt = std::max(tilt, sum);
-      // The angle itself is dearer, and seldom a new maximum.
-      if (TiltsLess(matrix, k, part.sine2 + kNegligible)) continue;
-      const double sine = std::sin(AngleToTangent(frame, k, d, tangent, k));
-      part.sine2 = std::max(part.sine2, sine * sine);
-    }
-    diameters[s] = static_cast<float>(m.diameter);
-    tilts[s] = static_cast<float>(tilt);
+  const SimplexFrame frame = FrameSimplex(corners.Of(s, k), mesh.d);
+  if (frame.rank < k) return 1;
+  for (int i = 0; i <= k; ++i) {
+    const double* tangent = mesh.Tangent(list[s][i]);
+    const double bound = sine2 + kNegligible;
+    if (SumOfSquaredSines(frame, k, mesh.d, tangent, k) < bound) continue;
+    // The angle itself is dearer, and seldom a new maximum.
+    if (TiltsLess(MeasureTilt(frame, k, mesh.d, tangent, k), k, bound)) continue;
+    const double sine = std::sin(AngleToTangent(frame, k, mesh.d, tangent, k));
+    sine2 = std::max(sine2, sine * sine);
   }
-  return part;
+  return sine2;
+}
+
+// A simplex' tilt is the sum of the squared sines that the largest is sought of, so that few need
+// a second look.
+double MaxSine2(const MeshView& mesh, const SimplexList& list, const MeshShape& shape,
+                std::uint32_t most_tilted) {
+  Corners corners(mesh, list);
+  const double start = LargerSine2(mesh, list, corners, most_tilted, 0);
+  std::vector<double> parts(ChunkCount(list.size()), start);
+  ParallelChunks(list.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    Corners own(mesh, list);
+    double& sine2 = parts[chunk];
+    for (std::size_t s = begin; s < end; ++s) {
+      // Rounding keeps the order.
+      if (shape.tilts[s] < static_cast<float>(sine2 + kNegligible)) continue;
+      sine2 = LargerSine2(mesh, list, own, static_cast<std::uint32_t>(s), sine2);
+    }
+  });
+  return *std::max_element(parts.begin(), parts.end());
 }
 
 }  // namespace
@@ -85,32 +149,32 @@ Extremes MeasurePart(const MeshView& mesh, const SimplexList& list, std::uint32_
 MeshShape MeasureShape(const MeshView& mesh, const SimplexList& list) {
   constexpr double kDegrees = 180 / std::numbers::pi;
   MeshShape shape;
+  if (list.size() == 0) return shape;
   shape.diameters.resize(list.size());
   shape.tilts.resize(list.size());
   std::vector<Extremes> parts(ChunkCount(list.size()));
-  ParallelChunks(list.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
-    parts[chunk] = MeasurePart(mesh, list, static_cast<std::uint32_t>(begin),
-                               static_cast<std::uint32_t>(end), shape.diameters, shape.tilts);
+  ParallelChunks(list.size(), [&](std::size_t chunk, std::size_t from, std::size_t to) {
+    const auto begin = static_cast<std::uint32_t>(from), end = static_cast<std::uint32_t>(to);
+    parts[chunk] = mesh.k == 2   ? MeasurePart<2>(mesh, list, begin, end, shape)
+                   : mesh.k == 3 ? MeasurePart<3>(mesh, list, begin, end, shape)
+                                 : MeasurePart(mesh, list, begin, end, mesh.k, mesh.d, shape);
   });
   Extremes all;
-  for (const Extremes& part : parts) {
-    if (part.circumradius > all.circumradius) {
-      all.circumradius = part.circumradius;
-      all.largest = part.largest;
-    }
-    all.diameter = std::max(all.diameter, part.diameter);
-    all.radius_edge = std::max(all.radius_edge, part.radius_edge);
-    all.fatness = std::min(all.fatness, part.fatness);
-    all.angle = std::min(all.angle, part.angle);
-    all.sine2 = std::max(all.sine2, part.sine2);
-  }
+  for (const Extremes& part : parts) all.Take(part);
   shape.max_circumradius = all.circumradius;
   shape.largest = all.largest;
   shape.max_diameter = all.diameter;
   shape.max_radius_edge = all.radius_edge;
   shape.min_fatness = std::min(shape.min_fatness, all.fatness);
-  shape.min_angle_degrees = mesh.k == 2 && list.size() > 0 ? all.angle * kDegrees : 0;
-  shape.max_tangent_angle_degrees = std::asin(std::min(1.0, std::sqrt(all.sine2))) * kDegrees;
+  if (mesh.k == 2) {
+    // An angle's sine is half the opposite edge over the circumradius: the smallest angle is where
+    // the radius-edge ratio is largest.
+    Corners corners(mesh, list);
+    shape.min_angle_degrees =
+        SmallestTriangleAngle(corners.Of(all.longest, mesh.k), mesh.d) * kDegrees;
+  }
+  const double sine2 = MaxSine2(mesh, list, shape, all.most_tilted);
+  shape.max_tangent_angle_degrees = std::asin(std::min(1.0, std::sqrt(sine2))) * kDegrees;
   return shape;
 }
 

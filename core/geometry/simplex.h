@@ -52,10 +52,10 @@ bool ContainsSliver(SimplexVertices vertices, int d, double theta0);
 // are right to rounding where a Gram determinant would lose half of the digits.
 struct SimplexFrame {
   int rank = 0;                                        // j, or less when degenerate
-  std::vector<double> directions;                      // rank x d, C order, orthonormal
+  std::vector<double> directions;                      // j x d, C order: `rank` orthonormal rows
   std::array<double, kMaxSimplexDimension> heights{};  // of each vertex over those before, length
-  // Column a: the edge from the first vertex to the a-th taken, along the directions.
-  Eigen::Matrix<double, kMaxSimplexDimension, kMaxSimplexDimension> edges;
+  // [a]: the edge from the first vertex to the a-th taken, along the first a + 1 directions.
+  std::array<std::array<double, kMaxSimplexDimension>, kMaxSimplexDimension> edges{};
 };
 SimplexFrame FrameSimplex(SimplexVertices vertices, int d);
 

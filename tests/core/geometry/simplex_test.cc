@@ -8,6 +8,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/geometry/simplex_frame.h"
 #include "core/sample/random.h"
 
 namespace stellate::core {
@@ -221,6 +222,32 @@ TEST(SmallestTriangleAngle, KnownTriangles) {
       0, 0, 1e-9;
   EXPECT_NEAR(SmallestTriangleAngle(Simplex(v), 2), 1e-9, 1e-20);
   EXPECT_EQ(SmallestTriangleAngle(Simplex(Eigen::MatrixXd::Ones(2, 3)), 2), 0);
+}
+
+TEST(SmallestTriangleAngle, IsTheSmallestOfThreeWhicheverVertexComesFirst) {
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    const Simplex simplex = RandomSimplex(2, 4, seed);
+    double smallest = kInfinity;
+    for (int a = 0; a < 3; ++a) {
+      const Eigen::VectorXd u = simplex.columns.col((a + 1) % 3) - simplex.columns.col(a);
+      const Eigen::VectorXd v = simplex.columns.col((a + 2) % 3) - simplex.columns.col(a);
+      smallest = std::min(smallest, std::acos(u.dot(v) / u.norm() / v.norm()));
+    }
+    EXPECT_NEAR(SmallestTriangleAngle(simplex, 4), smallest, 1e-12);
+    const SimplexMeasures m = simplex.Measures();
+    EXPECT_NEAR(std::sin(smallest), m.shortest_edge / (2 * m.circumradius), 1e-12);
+  }
+}
+
+TEST(SumOfSquaredSines, IsTheTraceOfTheTilt) {
+  for (int j = 1; j <= 5; ++j) {
+    for (const int d : {j + 1, j + 4}) {
+      const Eigen::MatrixXd tangent = RandomOrthonormal(d, j, d);
+      const SimplexFrame frame = FrameSimplex(RandomSimplex(j, d, j), d);
+      EXPECT_NEAR(SumOfSquaredSines(frame, j, d, tangent.data(), j),
+                  MeasureTilt(frame, j, d, tangent.data(), j).trace(), 1e-14);
+    }
+  }
 }
 
 }  // namespace

@@ -1,0 +1,119 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/geometry/simplex.h"
+#include "core/sample/vector_ops.h"
+
+namespace stellate::core {
+
+// The inner loops of simplex.h, for callers that measure very many simplices of one kind: where j
+// and d are constants they unroll, and nothing is allocated. The numbers are the same.
+
+// A height this small beside the diameter is rounding error: the simplex is degenerate.
+inline constexpr double kDegenerateHeight = 1e-14;
+
+// FrameSimplex of j + 1 vertices. REQUIRES: frame.directions has room for j x d.
+[[gnu::always_inline]] inline void TakeFrame(SimplexVertices vertices, int j, int d,
+                                             SimplexFrame& frame) {
+  double* const e = frame.directions.data();
+  double longest = 0;
+  for (int a = 0; a < j; ++a) {
+    for (int i = 0; i < d; ++i) e[a * d + i] = vertices[a + 1][i] - vertices[0][i];
+    longest = std::max(longest, Dot(e + a * d, e + a * d, d));
+    frame.heights[a] = 0;
+  }
+  longest = std::sqrt(longest);
+
+  frame.rank = 0;
+  for (int step = 0; step < j; ++step) {
+    int farthest = step;
+    double height2 = -1;
+    for (int a = step; a < j; ++a) {
+      const double h2 = Dot(e + a * d, e + a * d, d);
+      if (h2 > height2) {
+        height2 = h2;
+        farthest = a;
+      }
+    }
+    double* const u = e + step * d;
+    if (farthest != step) {
+      for (int i = 0; i < d; ++i) std::swap(u[i], e[farthest * d + i]);
+      for (int b = 0; b < step; ++b) std::swap(frame.edges[step][b], frame.edges[farthest][b]);
+    }
+    for (int b = 0; b < step; ++b) {
+      const double s = Dot(u, e + b * d, d);
+      frame.edges[step][b] += s;
+      for (int i = 0; i < d; ++i) u[i] -= s * e[b * d + i];
+    }
+    const double height = std::sqrt(Dot(u, u, d));
+    if (!(height > kDegenerateHeight * longest)) return;
+    frame.heights[step] = height;
+    frame.edges[step][step] = height;
+    for (int i = 0; i < d; ++i) u[i] /= height;
+    for (int a = step + 1; a < j; ++a) {
+      const double s = Dot(e + a * d, u, d);
+      frame.edges[a][step] = s;
+      for (int i = 0; i < d; ++i) e[a * d + i] -= s * u[i];
+    }
+    ++frame.rank;
+  }
+}
+
+// The circumcentre c of vertex 0 and the edges r_i, lower triangular: 2 r_i . c = |r_i|^2.
+[[gnu::always_inline]] inline double FrameCircumradius(const SimplexFrame& frame, int j) {
+  if (frame.rank < j) return std::numeric_limits<double>::infinity();
+  double c[kMaxSimplexDimension];
+  double squared = 0;
+  for (int i = 0; i < j; ++i) {
+    double value = 0;
+    for (int a = 0; a <= i; ++a) value += frame.edges[i][a] * frame.edges[i][a];
+    value /= 2;
+    for (int a = 0; a < i; ++a) value -= frame.edges[i][a] * c[a];
+    c[i] = value / frame.edges[i][i];
+    squared += c[i] * c[i];
+  }
+  return std::sqrt(squared);
+}
+
+// MeasureSimplex of j + 1 vertices, j >= 2, whose frame is at hand.
+[[gnu::always_inline]] inline SimplexMeasures MeasureFramed(SimplexVertices vertices, int j, int d,
+                                                            const SimplexFrame& frame) {
+  SimplexMeasures m;
+  m.dimension = j;
+  double longest2 = 0;
+  double shortest2 = std::numeric_limits<double>::infinity();
+  for (int a = 0; a <= j; ++a) {
+    for (int b = a + 1; b <= j; ++b) {
+      const double e2 = SquaredDistance(vertices[a], vertices[b], d);
+      longest2 = std::max(longest2, e2);
+      shortest2 = std::min(shortest2, e2);
+    }
+  }
+  m.diameter = std::sqrt(longest2);
+  m.shortest_edge = std::sqrt(shortest2);
+  for (int i = 0; i < j; ++i) m.volume *= frame.heights[i] / (i + 1);
+  m.circumradius = FrameCircumradius(frame, j);
+  return m;
+}
+
+// The trace of MeasureTilt, the sum of the squared sines of the principal angles: no less than the
+// largest of them. REQUIRES: frame.rank == j.
+[[gnu::always_inline]] inline double SumOfSquaredSines(const SimplexFrame& frame, int j, int d,
+                                                       const double* tangent, int k) {
+  double sum = 0;
+  for (int a = 0; a < j; ++a) {
+    double inside = 0;
+    for (int b = 0; b < k; ++b) {
+      const double cosine = Dot(tangent + b * d, frame.directions.data() + a * d, d);
+      inside += cosine * cosine;
+    }
+    sum += 1 - inside;
+  }
+  return sum;
+}
+
+}  // namespace stellate::core
