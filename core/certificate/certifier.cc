@@ -143,6 +143,7 @@ class Certifier::Impl {
     certificate_.bad_links = links.bad_links + connectivity.isolated_vertices;
     certificate_.links_are_spheres = certificate_.bad_links == 0;
     certificate_.links_decided_exactly = links.decided_exactly;
+    orientation_ = std::move(connectivity.orientation);
     certificate_.euler_characteristic = links.euler_characteristic;
 
     if (!certificate_.closed) {
@@ -177,7 +178,8 @@ class Certifier::Impl {
   }
 
   void CheckShape() {
-    StarGeometry stars = MeasureStars(mesh_, *adjacency_);
+    StarGeometry stars = MeasureStars(mesh_, *adjacency_, orientation_);
+    orientation_ = {};
     certificate_.unembedded_stars = stars.unembedded_stars;
     reach_ = stars.reach;
     if (stars.unembedded_stars > 0) {
@@ -324,8 +326,7 @@ class Certifier::Impl {
       found.push_back(j);
       points.insert(points.end(), answer.points.col(j).begin(), answer.points.col(j).end());
     }
-    const std::vector<NearestVertex> nearest =
-        FindNearestVertices(mesh_, points, kCoverageShare * size_);
+    const std::vector<NearestVertex> nearest = FindNearestVertices(mesh_, points, size_);
     for (std::size_t n = 0; n < found.size(); ++n) {
       const Eigen::Index j = found[n];
       Probe probe;
@@ -456,6 +457,7 @@ class Certifier::Impl {
   Findings findings_;
   std::optional<Adjacency> adjacency_;
   std::optional<ShrinkingBalls> balls_;
+  std::vector<std::int8_t> orientation_;  // until the stars are measured
   MeshShape shape_;
   double reach_ = 0;
   std::vector<double> longest_edge_;  // by vertex

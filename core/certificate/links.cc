@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 #include <vector>
 
 #include "core/certificate/fundamental_group.h"
+#include "core/certificate/small_index.h"
 #include "core/message.h"
 #include "core/parallel.h"
 #include "core/specification.h"
@@ -13,6 +15,9 @@ namespace stellate::core {
 namespace {
 
 using SimplexIds = std::vector<std::uint32_t>;
+
+constexpr const char* kNotClosed = "is not closed";
+constexpr const char* kSeveralParts = "falls into several parts";
 
 // A face and the simplices that have it: its link, in place.
 struct Face {
@@ -48,15 +53,83 @@ class LinkChecker {
       const auto star = adjacency_.Star(v);
       if (star.empty()) continue;
       ++part_.used_vertices;
-      Face face;
-      face.ids[face.size++] = v;
       blamed_here_ = false;
-      CheckLink(face, {star.begin(), star.end()});
+      if (k_ == 2)
+        CheckCircle(v, star);
+      else if (k_ == 3)
+        CheckSphere(v, star);
+      else
+        CheckLink(FaceOf(v), {star.begin(), star.end()});
     }
     return std::move(part_);
   }
 
  private:
+  using Star = std::span<const std::uint32_t>;
+
+  static Face FaceOf(std::uint32_t v) {
+    Face face;
+    face.ids[face.size++] = v;
+    return face;
+  }
+
+  // CheckLink of a vertex, k = 2: going round it from triangle to triangle passes all of them.
+  void CheckCircle(std::uint32_t v, Star star) {
+    std::size_t passed = 0;
+    std::uint32_t last = Adjacency::kNone;
+    std::uint32_t s = star.front();
+    do {
+      const std::uint32_t* across = adjacency_.Across(s);
+      const int a = list_[s][0] == v ? 1 : 0;  // the two triangles beside s that have v
+      const int b = list_[s][2] == v ? 1 : 2;
+      if (across[a] == Adjacency::kNone || across[b] == Adjacency::kNone) {
+        Blame(FaceOf(v), kNotClosed);
+        return;
+      }
+      const std::uint32_t next = across[a] == last ? across[b] : across[a];
+      last = s;
+      s = next;
+      ++passed;
+    } while (s != star.front());
+    if (passed < star.size()) Blame(FaceOf(v), kSeveralParts);
+  }
+
+  // The same for k = 3: a flood of the link's triangles finds its vertices too, as each but the
+  // first triangle is reached across an edge and can bring one new vertex.
+  void CheckSphere(std::uint32_t v, Star star) {
+    simplex_index_.Clear(star.size());
+    vertex_index_.Clear(star.size());
+    stack_.assign(1, star.front());
+    simplex_index_.Number(star.front());
+    for (int i = 0; i <= 3; ++i) vertex_index_.Number(list_[star.front()][i]);
+    while (!stack_.empty()) {
+      const std::uint32_t s = stack_.back();
+      stack_.pop_back();
+      for (int i = 0; i <= 3; ++i) {
+        if (list_[s][i] == v) continue;
+        const std::uint32_t t = adjacency_.Across(s, i);
+        if (t == Adjacency::kNone) return CheckLink(FaceOf(v), {star.begin(), star.end()});
+        const std::uint32_t known = simplex_index_.size();
+        if (simplex_index_.Number(t) < known) continue;
+        vertex_index_.Number(list_[t][adjacency_.Apex(s, t)]);
+        stack_.push_back(t);
+      }
+    }
+    if (simplex_index_.size() < star.size())
+      return CheckLink(FaceOf(v), {star.begin(), star.end()});
+    const std::int64_t vertices = vertex_index_.size() - 1;  // but v
+    part_.link_vertices += vertices;
+    CheckSurface(FaceOf(v), vertices, static_cast<std::int64_t>(star.size()));
+  }
+
+  // V - E + F with E = 3 F / 2. A closed connected surface pinched somewhere has less than its
+  // normalisation, so 2 means a sphere.
+  void CheckSurface(const Face& face, std::int64_t vertices, std::int64_t triangles) {
+    if (2 * vertices - triangles != 4) {
+      Blame(face, "is not a sphere: wrong Euler characteristic");
+    }
+  }
+
   // Vertices ascending of the link of `face`.
   std::vector<std::uint32_t> LinkVertices(const Face& face, const SimplexIds& simplices) const {
     std::vector<std::uint32_t> vertices;
@@ -84,7 +157,7 @@ class LinkChecker {
       for (int i = 0; i <= k_; ++i) {
         if (face.Has(list_[s][i])) continue;
         const std::uint32_t t = adjacency_.Across(s, i);
-        if (t == Adjacency::kNone) return "is not closed";
+        if (t == Adjacency::kNone) return kNotClosed;
         const auto at = std::lower_bound(simplices.begin(), simplices.end(), t);
         std::uint8_t& flooded = flooded_[static_cast<std::size_t>(at - simplices.begin())];
         if (flooded) continue;
@@ -93,7 +166,7 @@ class LinkChecker {
         stack_.push_back(t);
       }
     }
-    return reached == simplices.size() ? nullptr : "falls into several parts";
+    return reached == simplices.size() ? nullptr : kSeveralParts;
   }
 
   // Is the link of `face`, which all of `simplices` have, a sphere? If not, the vertices of the
@@ -110,9 +183,7 @@ class LinkChecker {
     const std::int64_t f0 = static_cast<std::int64_t>(vertices.size());
     if (face.size == 1) part_.link_vertices += f0;
     if (n == 2) {
-      // V - E + F with E = 3 F / 2. A closed connected surface pinched somewhere has less than
-      // its normalisation, so 2 means a sphere.
-      if (2 * f0 - top != 4) Blame(face, "is not a sphere: wrong Euler characteristic");
+      CheckSurface(face, f0, top);
       return;
     }
     CheckFacesAround(face, simplices);
@@ -226,6 +297,7 @@ class LinkChecker {
   bool blamed_here_ = false;           // the vertex at hand
   std::vector<std::uint8_t> flooded_;  // by simplex of the link at hand
   std::vector<std::uint32_t> stack_;
+  SmallIndex simplex_index_, vertex_index_;
 };
 
 // A j-face is in the links of its j+1 vertices as a (j-1)-face.

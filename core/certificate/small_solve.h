@@ -8,6 +8,12 @@
 
 namespace stellate::core {
 
+// The determinant of a matrix with these column lengths, squared and multiplied, is not within
+// rounding of zero.
+inline bool IsTellingDeterminant(double determinant, double lengths2) {
+  return determinant * determinant > 1e-24 * lengths2;
+}
+
 // A linear system of at most kMaxDimension unknowns, solved in place by elimination with row
 // pivoting. Inner loop of the tests that ask on which side, or inside which simplex, a point is.
 struct SmallSystem {
@@ -44,7 +50,7 @@ struct SmallSystem {
         b[r] -= factor * b[c];
       }
     }
-    if (!(determinant * determinant > 1e-24 * lengths2)) return 0;
+    if (!IsTellingDeterminant(determinant, lengths2)) return 0;
     for (int r = n - 1; r >= 0; --r) {
       for (int j = r + 1; j < n; ++j) b[r] -= a[r][j] * b[j];
       b[r] /= a[r][r];

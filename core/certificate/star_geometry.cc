@@ -1,12 +1,14 @@
 #include "core/certificate/star_geometry.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "core/certificate/small_index.h"
 #include "core/certificate/small_solve.h"
 #include "core/message.h"
 #include "core/parallel.h"
@@ -21,121 +23,201 @@ namespace {
 constexpr double kTellingEdge = 0.5;
 // A solution this little below zero, beside its largest entry, still counts as a hit of the ray.
 constexpr double kRayTolerance = 1e-12;
+constexpr const char* kFolded = "folds over itself in its tangent space";
+
+template <int K>
+using Columns = std::array<const double*, K>;  // of a K x K matrix
+
+// The sign of the columns' determinant, and |determinant| times the solution of columns . b = ray;
+// 0 when the determinant is within rounding of zero, as SmallSystem says.
+template <int K>
+int Solve(const Columns<K>& u, const std::array<double, K>& ray, std::array<double, K>& b) {
+  SmallSystem system;
+  for (int r = 0; r < K; ++r) {
+    for (int c = 0; c < K; ++c) system.a[r][c] = u[c][r];
+    system.b[r] = ray[r];
+  }
+  const int sign = system.Solve(std::integral_constant<int, K>{});
+  std::copy_n(system.b.begin(), K, b.begin());
+  return sign;
+}
+
+// By Cramer's rule.
+template <>
+int Solve<2>(const Columns<2>& u, const std::array<double, 2>& ray, std::array<double, 2>& b) {
+  const double determinant = u[0][0] * u[1][1] - u[0][1] * u[1][0];
+  const double lengths2 =
+      (u[0][0] * u[0][0] + u[0][1] * u[0][1]) * (u[1][0] * u[1][0] + u[1][1] * u[1][1]);
+  if (!IsTellingDeterminant(determinant, lengths2)) return 0;
+  const int sign = determinant > 0 ? 1 : -1;
+  b[0] = sign * (ray[0] * u[1][1] - ray[1] * u[1][0]);
+  b[1] = sign * (u[0][0] * ray[1] - u[0][1] * ray[0]);
+  return sign;
+}
+
+inline std::array<double, 3> Cross(const double* a, const double* b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+template <>
+int Solve<3>(const Columns<3>& u, const std::array<double, 3>& ray, std::array<double, 3>& b) {
+  const std::array<std::array<double, 3>, 3> normals{Cross(u[1], u[2]), Cross(u[2], u[0]),
+                                                     Cross(u[0], u[1])};
+  const double determinant = Dot(u[0], normals[0].data(), 3);
+  double lengths2 = 1;
+  for (const double* column : u) lengths2 *= Dot(column, column, 3);
+  if (!IsTellingDeterminant(determinant, lengths2)) return 0;
+  const int sign = determinant > 0 ? 1 : -1;
+  for (int c = 0; c < 3; ++c) b[c] = sign * Dot(ray.data(), normals[c].data(), 3);
+  return sign;
+}
 
 // The stars of some of the vertices.
 template <int K>
 class StarMeasurer {
  public:
-  StarMeasurer(const MeshView& mesh, const Adjacency& adjacency, double* longest_edge)
-      : mesh_(mesh), adjacency_(adjacency), d_(mesh.d), longest_edge_(longest_edge) {
+  StarMeasurer(const MeshView& mesh, const Adjacency& adjacency,
+               std::span<const std::int8_t> orientation, double* longest_edge)
+      : mesh_(mesh),
+        adjacency_(adjacency),
+        orientation_(adjacency.bad_facets() == 0 ? orientation : std::span<const std::int8_t>()),
+        longest_edge_(longest_edge) {
     result_.reach = std::numeric_limits<double>::infinity();
   }
 
   StarGeometry Run(std::size_t begin, std::size_t end) {
-    for (auto p = static_cast<std::uint32_t>(begin); p < end; ++p) {
-      if (adjacency_.Star(p).empty()) continue;
-      Project(p);
-      MeasureReach(p);
-      if (const char* why = WhyNotEmbedded(p)) {
-        if (result_.unembedded_stars++ == 0) {
-          result_.first_unembedded = Message("the star of vertex ", p, " ", why);
+    WithDimension(mesh_.d, [&](auto known) {
+      const int d = known() > 0 ? known() : mesh_.d;
+      for (auto p = static_cast<std::uint32_t>(begin); p < end; ++p) {
+        if (adjacency_.Star(p).empty()) continue;
+        Project(p, d);
+        MeasureReach(p);
+        if (const char* why = WhyNotEmbedded(p)) {
+          if (result_.unembedded_stars++ == 0) {
+            result_.first_unembedded = Message("the star of vertex ", p, " ", why);
+          }
         }
       }
-    }
+    });
     return std::move(result_);
   }
 
  private:
+  static constexpr int kUsualDimension = 10;  // up to here d is a constant
+
   struct Neighbour {
     double u[K];              // tangent coordinates
     double squared_distance;  // |q - p|^2
     double off_tangent2;      // dist(q, T_pM)^2
+    std::uint32_t id;
   };
 
-  // p's neighbours as p sees them, each once; by simplex of the star, which they are.
-  void Project(std::uint32_t p) {
-    ids_.clear();
-    neighbours_.clear();
-    columns_.clear();
+  // p's neighbours as p sees them, each once; by simplex of the star, which they are. d is a
+  // constant where it is usual.
+  [[gnu::always_inline]] void Project(std::uint32_t p, int d) {
+    const auto star = adjacency_.Star(p);
+    index_.Clear(star.size());
+    columns_.resize(star.size() * K);
+    neighbours_.resize(std::max(neighbours_.size(), columns_.size()));  // no more than that
+    std::uint32_t* column = columns_.data();
     const double* centre = mesh_.Point(p);
     const double* tangent = mesh_.Tangent(p);
-    offset_.resize(d_);
-    for (const std::uint32_t s : adjacency_.Star(p)) {
+    double usual[kUsualDimension];
+    if (d > kUsualDimension) offset_.resize(static_cast<std::size_t>(d));
+    double* const offset = d > kUsualDimension ? offset_.data() : usual;
+    for (const std::uint32_t s : star) {
       const std::uint32_t* ids = adjacency_.list()[s];
       for (int i = 0; i <= K; ++i) {
         if (ids[i] == p) continue;
-        const auto known = std::find(ids_.begin(), ids_.end(), ids[i]);
-        columns_.push_back(static_cast<std::uint32_t>(known - ids_.begin()));
-        if (known != ids_.end()) continue;
-        ids_.push_back(ids[i]);
-        Neighbour n{};
+        const std::uint32_t known = index_.size();
+        const std::uint32_t number = index_.Number(ids[i]);
+        *column++ = number;
+        if (index_.size() == known) continue;
+        Neighbour& n = neighbours_[number];
+        n.id = ids[i];
         const double* q = mesh_.Point(ids[i]);
-        for (int j = 0; j < d_; ++j) offset_[j] = q[j] - centre[j];
-        for (int a = 0; a < K; ++a) n.u[a] = Dot(tangent + a * d_, offset_.data(), d_);
-        n.squared_distance = Dot(offset_.data(), offset_.data(), d_);
+        for (int j = 0; j < d; ++j) offset[j] = q[j] - centre[j];
+        for (int a = 0; a < K; ++a) n.u[a] = Dot(tangent + a * d, offset, d);
+        n.squared_distance = Dot(offset, offset, d);
         for (int a = 0; a < K; ++a) {
-          for (int j = 0; j < d_; ++j) offset_[j] -= tangent[a * d_ + j] * n.u[a];
+          for (int j = 0; j < d; ++j) offset[j] -= tangent[a * d + j] * n.u[a];
         }
-        n.off_tangent2 = Dot(offset_.data(), offset_.data(), d_);
-        neighbours_.push_back(n);
+        n.off_tangent2 = Dot(offset, offset, d);
       }
     }
   }
 
   void MeasureReach(std::uint32_t p) {
+    const std::span<const Neighbour> neighbours(neighbours_.data(), index_.size());
     double longest2 = 0;
-    for (const Neighbour& n : neighbours_) longest2 = std::max(longest2, n.squared_distance);
+    for (const Neighbour& n : neighbours) longest2 = std::max(longest2, n.squared_distance);
     longest_edge_[p] = std::sqrt(longest2);
-    for (std::size_t i = 0; i < neighbours_.size(); ++i) {
-      const Neighbour& n = neighbours_[i];
+    for (const Neighbour& n : neighbours) {
       if (n.squared_distance < kTellingEdge * kTellingEdge * longest2) continue;
       const double reach = n.squared_distance / (2 * std::sqrt(n.off_tangent2));
       if (reach < result_.reach) {
         result_.reach = reach;
         result_.narrowest_p = p;
-        result_.narrowest_q = ids_[i];
+        result_.narrowest_q = n.id;
       }
     }
   }
 
-  // Fills the columns of `system` with the tangent coordinates of the other vertices of the star's
-  // m-th simplex, in the order of their ids.
-  void Fill(std::size_t m, SmallSystem& system) const {
-    for (int c = 0; c < K; ++c) {
-      const double* u = neighbours_[columns_[m * K + static_cast<std::size_t>(c)]].u;
-      for (int r = 0; r < K; ++r) system.a[r][c] = u[r];
-    }
+  // The tangent coordinates of the other vertices of the star's m-th simplex, in the order of their
+  // ids.
+  Columns<K> ColumnsOf(std::size_t m) const {
+    Columns<K> u;
+    for (int c = 0; c < K; ++c) u[c] = neighbours_[columns_[m * K + static_cast<std::size_t>(c)]].u;
+    return u;
   }
 
   const char* WhyNotEmbedded(std::uint32_t p) {
     const auto star = adjacency_.Star(p);
     // A ray well inside the first simplex, with weights that no symmetry shares.
     Random random(0x5757, p);
-    std::array<double, kMaxDimension> ray{};
-    SmallSystem system;
-    Fill(0, system);
-    for (int c = 0; c < K; ++c) {
+    std::array<double, K> ray{};
+    for (const double* column : ColumnsOf(0)) {
       const double weight = 0.3 + 0.4 * random.Uniform();
-      for (int r = 0; r < K; ++r) ray[r] += weight * system.a[r][c];
+      for (int r = 0; r < K; ++r) ray[r] += weight * column[r];
     }
 
     signs_.resize(star.size());
     int hits = 0;
     for (std::size_t m = 0; m < star.size(); ++m) {
-      Fill(m, system);
-      system.b = ray;
-      signs_[m] = system.Solve(std::integral_constant<int, K>{});
+      std::array<double, K> b;
+      signs_[m] = Solve<K>(ColumnsOf(m), ray, b);
       if (signs_[m] == 0) return "holds a simplex that is degenerate from its tangent space";
-      double largest = 0;
-      for (int r = 0; r < K; ++r) largest = std::max(largest, std::abs(system.b[r]));
-      const double floor = -kRayTolerance * largest;
-      hits += std::all_of(system.b.begin(), system.b.begin() + K,
-                          [floor](double x) { return x > floor; });
+      double smallest = b[0], largest = std::abs(b[0]);
+      for (int r = 1; r < K; ++r) {
+        smallest = std::min(smallest, b[r]);
+        largest = std::max(largest, std::abs(b[r]));
+      }
+      hits += smallest > -kRayTolerance * largest;
     }
-    if (const char* why = WhyFolded(p)) return why;
+    if (orientation_.empty()) {
+      if (const char* why = WhyFolded(p)) return why;
+    } else if (!IsOriented(p)) {
+      return kFolded;
+    }
     return hits == 1 ? nullptr : "covers some directions of its tangent space more than once";
   }
 
+  // Projected, all simplices of the star must be oriented alike, or all against the orientation of
+  // the mesh: p's place decides the sign with p moved to the front.
+  bool IsOriented(std::uint32_t p) const {
+    const auto star = adjacency_.Star(p);
+    int all = 0;
+    for (std::size_t m = 0; m < star.size(); ++m) {
+      const std::uint32_t* ids = adjacency_.list()[star[m]];
+      int side = signs_[m] * orientation_[star[m]];
+      for (int i = 0; ids[i] != p; ++i) side = -side;
+      if (side == -all) return false;
+      all = side;
+    }
+    return true;
+  }
+
+  // Without an orientation, facet by facet.
   const char* WhyFolded(std::uint32_t p) const {
     const auto star = adjacency_.Star(p);
     for (std::size_t m = 0; m < star.size(); ++m) {
@@ -149,50 +231,41 @@ class StarMeasurer {
         if (t == Adjacency::kNone) return "has a boundary";
         if (t < s) continue;
         // With the apex moved behind the facet, the two determinants must differ in sign.
-        const int flips = (K - 1 - column) + (K - 1 - ApexColumn(p, s, t));
+        const int apex = adjacency_.Apex(s, t);
+        const int apex_column = apex - (p < adjacency_.list()[t][apex]);
+        const int flips = (K - 1 - column) + (K - 1 - apex_column);
         const auto other = std::lower_bound(star.begin(), star.end(), t) - star.begin();
         const int side =
             signs_[m] * signs_[static_cast<std::size_t>(other)] * (flips % 2 == 0 ? 1 : -1);
-        if (side > 0) return "folds over itself in its tangent space";
+        if (side > 0) return kFolded;
       }
     }
     return nullptr;
   }
 
-  // The column of t's vertex that is not in s.
-  int ApexColumn(std::uint32_t p, std::uint32_t s, std::uint32_t t) const {
-    const std::uint32_t* in_s = adjacency_.list()[s];
-    const std::uint32_t* in_t = adjacency_.list()[t];
-    int column = -1;
-    for (int i = 0; i <= K; ++i) {
-      if (in_t[i] == p) continue;
-      ++column;
-      if (std::find(in_s, in_s + K + 1, in_t[i]) == in_s + K + 1) break;
-    }
-    return column;
-  }
-
   const MeshView& mesh_;
   const Adjacency& adjacency_;
-  const int d_;
-  double* const longest_edge_;  // by vertex
+  const std::span<const std::int8_t> orientation_;  // empty when it does not help
+  double* const longest_edge_;                      // by vertex
   StarGeometry result_;
-  std::vector<std::uint32_t> ids_;  // of the neighbours
-  std::vector<Neighbour> neighbours_;
+  SmallIndex index_;                   // of the neighbours
+  std::vector<Neighbour> neighbours_;  // by number in the index; then some of stars before
   std::vector<std::uint32_t>
       columns_;                 // by simplex of the star, K each: places among the neighbours
-  std::vector<double> offset_;  // d
+  std::vector<double> offset_;  // d, where that is large
   std::vector<int> signs_;      // by simplex of the star
 };
 
 template <int K>
-StarGeometry Measure(const MeshView& mesh, const Adjacency& adjacency) {
+StarGeometry Measure(const MeshView& mesh, const Adjacency& adjacency,
+                     std::span<const std::int8_t> orientation) {
   StarGeometry whole;
   whole.reach = std::numeric_limits<double>::infinity();
   whole.longest_edge.assign(mesh.vertices, 0);
   std::vector<StarGeometry> parts(ChunkCount(mesh.vertices));
   ParallelChunks(mesh.vertices, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
-    parts[chunk] = StarMeasurer<K>(mesh, adjacency, whole.longest_edge.data()).Run(begin, end);
+    parts[chunk] =
+        StarMeasurer<K>(mesh, adjacency, orientation, whole.longest_edge.data()).Run(begin, end);
   });
   for (StarGeometry& part : parts) {
     if (part.reach < whole.reach) {
@@ -208,19 +281,10 @@ StarGeometry Measure(const MeshView& mesh, const Adjacency& adjacency) {
 
 }  // namespace
 
-StarGeometry MeasureStars(const MeshView& mesh, const Adjacency& adjacency) {
-  switch (mesh.k) {
-    case 1:
-      return Measure<1>(mesh, adjacency);
-    case 2:
-      return Measure<2>(mesh, adjacency);
-    case 3:
-      return Measure<3>(mesh, adjacency);
-    case 4:
-      return Measure<4>(mesh, adjacency);
-    default:
-      return Measure<5>(mesh, adjacency);
-  }
+StarGeometry MeasureStars(const MeshView& mesh, const Adjacency& adjacency,
+                          std::span<const std::int8_t> orientation) {
+  return WithMeshDimension(mesh.k,
+                           [&](auto k) { return Measure<k()>(mesh, adjacency, orientation); });
 }
 
 }  // namespace stellate::core

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -27,7 +28,9 @@ struct StarGeometry {
 // A star embeds when simplices that share a facet through its centre p lie on opposite sides of
 // it in T_pM, and one generic ray from p meets exactly one simplex: the first makes the radial
 // projection of the link a covering of the sphere of directions, the second makes it one-sheeted.
-// Time linear in the mesh.
-StarGeometry MeasureStars(const MeshView& mesh, const Adjacency& adjacency);
+// `orientation`: of a closed mesh, as Connectivity has it, makes the first question quick; empty if
+// there is none. Time linear in the mesh.
+StarGeometry MeasureStars(const MeshView& mesh, const Adjacency& adjacency,
+                          std::span<const std::int8_t> orientation = {});
 
 }  // namespace stellate::core

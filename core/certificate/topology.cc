@@ -11,13 +11,45 @@
 namespace stellate::core {
 namespace {
 
-// One side of a facet: its vertices but the lowest, and the simplex it bounds.
-struct FacetSide {
-  std::array<std::uint32_t, kMaxDimension - 1> rest{};
-  std::uint32_t simplex = 0;
-  std::uint32_t omitted = 0;  // number of the opposite vertex in the simplex
+// One side of a facet, sorted by the facet, then by the simplex.
+template <int K>
+class FacetSide {
+ public:
+  FacetSide() = default;
+  // Of the simplex with these vertices, v among them, but the one left out; v is the facet's
+  // lowest.
+  FacetSide(std::uint32_t simplex, const std::uint32_t* ids, std::uint32_t v, int omitted)
+      : omitted_(static_cast<std::uint32_t>(omitted)) {
+    for (int i = 1; i <= K; ++i)
+      if (i != omitted && ids[i] != v) Append(ids[i]);
+    Append(simplex);
+  }
 
-  bool SameFacet(const FacetSide& other) const { return rest == other.rest; }
+  std::uint32_t simplex() const { return static_cast<std::uint32_t>(digits_[kWords - 1]); }
+  std::uint32_t omitted() const { return omitted_; }  // number of the opposite vertex
+
+  bool SameFacet(const FacetSide& other) const {
+    bool same = digits_[kWords - 1] >> 32 == other.digits_[kWords - 1] >> 32;
+    for (int w = 0; w + 1 < kWords; ++w) same = same && digits_[w] == other.digits_[w];
+    return same;
+  }
+  bool operator<(const FacetSide& other) const {
+    for (int w = 0; w + 1 < kWords; ++w)
+      if (digits_[w] != other.digits_[w]) return digits_[w] < other.digits_[w];
+    return digits_[kWords - 1] < other.digits_[kWords - 1];
+  }
+
+ private:
+  // The facet's vertices but v, ascending, then the simplex: K ids, as digits of one large number.
+  static constexpr int kWords = (K + 1) / 2;
+
+  void Append(std::uint32_t id) {
+    for (int w = 0; w + 1 < kWords; ++w) digits_[w] = digits_[w] << 32 | digits_[w + 1] >> 32;
+    digits_[kWords - 1] = digits_[kWords - 1] << 32 | id;
+  }
+
+  std::array<std::uint64_t, kWords> digits_{};
+  std::uint32_t omitted_ = 0;
 };
 
 std::uint32_t Root(std::vector<std::uint32_t>& parent, std::uint32_t v) {
@@ -26,6 +58,64 @@ std::uint32_t Root(std::vector<std::uint32_t>& parent, std::uint32_t v) {
     v = parent[v];
   }
   return v;
+}
+
+std::uint64_t CountComponents(const Adjacency& adjacency) {
+  const SimplexList& list = adjacency.list();
+  std::vector<std::uint32_t> parent(list.vertices);
+  std::iota(parent.begin(), parent.end(), 0u);
+  for (std::uint32_t s = 0; s < list.size(); ++s) {
+    LookUp(s);
+    for (int i = 1; i <= list.k; ++i) {
+      const std::uint32_t a = Root(parent, list[s][0]);
+      const std::uint32_t b = Root(parent, list[s][i]);
+      parent[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  std::uint64_t components = 0;
+  for (std::uint32_t v = 0; v < list.vertices; ++v) {
+    LookUp(v);
+    if (!adjacency.Star(v).empty() && Root(parent, v) == v) ++components;
+  }
+  return components;
+}
+
+// Facets inherit opposite orientations from their two sides: sign_s (-1)^i = -sign_t (-1)^j.
+// Returns the number of parts that facets join.
+std::size_t Orient(const Adjacency& adjacency, Connectivity& result) {
+  const SimplexList& list = adjacency.list();
+  const int k = list.k;
+  result.orientable = true;
+  result.orientation.assign(list.size(), 0);
+  std::int8_t* const sign = result.orientation.data();
+  std::vector<std::uint32_t> stack;
+  std::size_t steps = 0;
+  std::size_t parts = 0;
+  for (std::uint32_t start = 0; start < list.size(); ++start) {
+    if (sign[start] != 0) continue;
+    ++parts;
+    sign[start] = 1;
+    stack.push_back(start);
+    while (!stack.empty()) {
+      LookUp(steps++);
+      const std::uint32_t s = stack.back();
+      stack.pop_back();
+      for (int i = 0; i <= k; ++i) {
+        const std::uint32_t t = adjacency.Across(s, i);
+        if (t == Adjacency::kNone) continue;
+        const int j = adjacency.Apex(s, t);
+        const auto wanted = static_cast<std::int8_t>((i + j) % 2 == 0 ? -sign[s] : sign[s]);
+        if (sign[t] == 0) {
+          sign[t] = wanted;
+          stack.push_back(t);
+        } else if (sign[t] != wanted) {
+          result.orientable = false;
+        }
+      }
+    }
+  }
+  if (!result.orientable) result.orientation.clear();
+  return parts;
 }
 
 }  // namespace
@@ -80,8 +170,9 @@ void Adjacency::MatchFacets() {
   across_.assign(list_.ids->size(), kNone);
   std::vector<FacetCount> parts(ChunkCount(list_.vertices));
   ParallelChunks(list_.vertices, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
-    parts[chunk] =
-        MatchFacetsOf(static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end));
+    parts[chunk] = WithMeshDimension(list_.k, [&](auto k) {
+      return MatchFacetsOf<k()>(static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end));
+    });
   });
   for (FacetCount& part : parts) {
     ThrowIfInterrupted();
@@ -91,47 +182,38 @@ void Adjacency::MatchFacets() {
   }
 }
 
+template <int K>
 Adjacency::FacetCount Adjacency::MatchFacetsOf(std::uint32_t begin, std::uint32_t end) {
-  const int k = list_.k;
   FacetCount count;
-  std::vector<FacetSide> sides;
+  std::vector<FacetSide<K>> sides;
   for (std::uint32_t v = begin; v < end; ++v) {
     sides.clear();
     for (const std::uint32_t s : Star(v)) {
       const std::uint32_t* ids = list_[s];
-      const int lowest_omitted = ids[0] == v ? 1 : 0;
-      if (lowest_omitted == 0 && ids[1] != v) continue;
-      const int highest_omitted = ids[0] == v ? k : 0;
-      for (int omit = lowest_omitted; omit <= highest_omitted; ++omit) {
-        FacetSide side;
-        side.simplex = s;
-        side.omitted = static_cast<std::uint32_t>(omit);
-        int rest = 0;
-        for (int i = 0; i <= k; ++i) {
-          if (i != omit && ids[i] != v) side.rest[rest++] = ids[i];
-        }
-        sides.push_back(side);
-      }
+      // v is lowest in the simplex, or once the lowest is left out.
+      if (ids[0] != v && ids[1] != v) continue;
+      const int first = ids[0] == v ? 1 : 0;
+      const int last = ids[0] == v ? K : 0;
+      for (int omit = first; omit <= last; ++omit) sides.emplace_back(s, ids, v, omit);
     }
-    std::sort(sides.begin(), sides.end(), [](const FacetSide& a, const FacetSide& b) {
-      return a.rest != b.rest ? a.rest < b.rest : a.simplex < b.simplex;
-    });
+    std::sort(sides.begin(), sides.end());
     for (std::size_t i = 0; i < sides.size();) {
       std::size_t next = i + 1;
       while (next < sides.size() && sides[next].SameFacet(sides[i])) ++next;
       ++count.all;
-      const FacetSide& a = sides[i];
-      const FacetSide& b = sides[next - 1];
+      const FacetSide<K>& a = sides[i];
+      const FacetSide<K>& b = sides[next - 1];
       // Two copies of one simplex share all facets, yet bound nothing.
-      const bool good = next - i == 2 && list_[a.simplex][a.omitted] != list_[b.simplex][b.omitted];
+      const bool good =
+          next - i == 2 && list_[a.simplex()][a.omitted()] != list_[b.simplex()][b.omitted()];
       if (good) {
-        across_[static_cast<std::size_t>(a.simplex) * (k + 1) + a.omitted] = b.simplex;
-        across_[static_cast<std::size_t>(b.simplex) * (k + 1) + b.omitted] = a.simplex;
+        across_[static_cast<std::size_t>(a.simplex()) * (K + 1) + a.omitted()] = b.simplex();
+        across_[static_cast<std::size_t>(b.simplex()) * (K + 1) + b.omitted()] = a.simplex();
       } else if (count.bad++ == 0) {
-        std::array<std::uint32_t, kMaxDimension> ids{};
-        ids[0] = v;
-        std::copy_n(a.rest.begin(), k - 1, ids.begin() + 1);
-        count.first_bad = Message("face ", NameSimplex(ids.data(), k), " is in ", next - i,
+        std::array<std::uint32_t, K> ids{};
+        std::remove_copy(list_[a.simplex()], list_[a.simplex()] + K + 1, ids.begin(),
+                         list_[a.simplex()][a.omitted()]);
+        count.first_bad = Message("face ", NameSimplex(ids.data(), K), " is in ", next - i,
                                   next - i == 1 ? " simplex" : " simplices",
                                   next - i == 2 ? " that are the same" : "");
       }
@@ -143,57 +225,15 @@ Adjacency::FacetCount Adjacency::MatchFacetsOf(std::uint32_t begin, std::uint32_
 
 Connectivity ComputeConnectivity(const Adjacency& adjacency) {
   const SimplexList& list = adjacency.list();
-  const int k = list.k;
   Connectivity result;
-
-  std::vector<std::uint32_t> parent(list.vertices);
-  std::iota(parent.begin(), parent.end(), 0u);
-  for (std::uint32_t s = 0; s < list.size(); ++s) {
-    LookUp(s);
-    for (int i = 1; i <= k; ++i) {
-      const std::uint32_t a = Root(parent, list[s][0]);
-      const std::uint32_t b = Root(parent, list[s][i]);
-      parent[std::max(a, b)] = std::min(a, b);
-    }
-  }
+  const std::size_t parts = Orient(adjacency, result);
   for (std::uint32_t v = 0; v < list.vertices; ++v) {
     LookUp(v);
-    if (adjacency.Star(v).empty()) {
-      if (result.isolated_vertices++ == 0) result.first_isolated = v;
-    } else if (Root(parent, v) == v) {
-      ++result.components;
-    }
+    if (!adjacency.Star(v).empty()) continue;
+    if (result.isolated_vertices++ == 0) result.first_isolated = v;
   }
-
-  // Facets inherit opposite orientations from their two sides: sign_s (-1)^i = -sign_t (-1)^j.
-  result.orientable = true;
-  std::vector<std::int8_t> sign(list.size(), 0);
-  std::vector<std::uint32_t> stack;
-  std::size_t steps = 0;
-  for (std::uint32_t start = 0; start < list.size() && result.orientable; ++start) {
-    if (sign[start] != 0) continue;
-    sign[start] = 1;
-    stack.push_back(start);
-    while (!stack.empty()) {
-      LookUp(steps++);
-      const std::uint32_t s = stack.back();
-      stack.pop_back();
-      for (int i = 0; i <= k; ++i) {
-        const std::uint32_t t = adjacency.Across(s, i);
-        if (t == Adjacency::kNone) continue;
-        int j = 0;
-        // The vertex of t that is not in s.
-        while (std::binary_search(list[s], list[s] + k + 1, list[t][j])) ++j;
-        const std::int8_t wanted = static_cast<std::int8_t>((i + j) % 2 == 0 ? -sign[s] : sign[s]);
-        if (sign[t] == 0) {
-          sign[t] = wanted;
-          stack.push_back(t);
-        } else if (sign[t] != wanted) {
-          result.orientable = false;
-        }
-      }
-    }
-  }
+  // Parts that no facet joins may still meet in smaller faces.
+  result.components = parts > 1 ? CountComponents(adjacency) : parts;
   return result;
 }
 

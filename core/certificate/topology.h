@@ -3,7 +3,10 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
+
+#include "core/specification.h"
 
 namespace stellate::core {
 
@@ -22,6 +25,24 @@ struct SimplexList {
 // Empty when the list is well formed: whole simplices, ids ascending and below `vertices`, fewer
 // than 2^32 - 2 simplices. Else says in plain words which simplex is not.
 std::string CheckSimplexList(const SimplexList& list);
+
+// call(std::integral_constant<int, K>()), K = k, 1 to kMaxDimension.
+template <typename Call>
+auto WithMeshDimension(int k, const Call& call) {
+  static_assert(kMaxDimension == 5);
+  switch (k) {
+    case 1:
+      return call(std::integral_constant<int, 1>());
+    case 2:
+      return call(std::integral_constant<int, 2>());
+    case 3:
+      return call(std::integral_constant<int, 3>());
+    case 4:
+      return call(std::integral_constant<int, 4>());
+    default:
+      return call(std::integral_constant<int, 5>());
+  }
+}
 
 // Which simplices meet at a vertex and which share a facet.
 //
@@ -42,8 +63,16 @@ class Adjacency {
 
   // The simplex across the facet opposite vertex number i of simplex s; kNone unless that facet
   // is in exactly two simplices, on different vertex sets.
-  std::uint32_t Across(std::uint32_t s, int i) const {
-    return across_[static_cast<std::size_t>(s) * (list_.k + 1) + i];
+  std::uint32_t Across(std::uint32_t s, int i) const { return Across(s)[i]; }
+  // All k + 1 of them. No simplex is across two facets: the two would have all vertices in common.
+  const std::uint32_t* Across(std::uint32_t s) const {
+    return across_.data() + static_cast<std::size_t>(s) * (list_.k + 1);
+  }
+  // The number of t's vertex that is not in s. REQUIRES: t is across a facet of s.
+  int Apex(std::uint32_t s, std::uint32_t t) const {
+    int j = 0;
+    while (Across(t)[j] != s) ++j;
+    return j;
   }
 
   std::uint64_t facets() const { return facets_.all; }      // distinct (k-1)-faces
@@ -57,6 +86,7 @@ class Adjacency {
     std::string first_bad;
   };
   void MatchFacets();
+  template <int K>
   FacetCount MatchFacetsOf(std::uint32_t begin, std::uint32_t end);
 
   SimplexList list_;
@@ -71,6 +101,9 @@ struct Connectivity {
   std::uint64_t isolated_vertices = 0;  // in no simplex
   std::uint32_t first_isolated = 0;     // meaningful if there is one
   bool orientable = false;  // neighbours across facets can be oriented alike, facets being good
+  // By simplex, 1 or -1: of the order of its ids. Neighbours across facets are oriented alike.
+  // Empty unless orientable.
+  std::vector<std::int8_t> orientation;
 };
 
 Connectivity ComputeConnectivity(const Adjacency& adjacency);

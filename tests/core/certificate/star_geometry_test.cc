@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/sample/random.h"
 #include "tests/core/certificate/handmade_meshes.h"
 
 namespace stellate::core {
@@ -31,6 +32,29 @@ TEST(MeasureStars, GoodMeshesAreEmbeddedInEveryDimension) {
   for (const auto& [k, n] : {std::pair{1, 9}, {2, 9}, {3, 8}, {4, 6}}) {
     const StarGeometry stars = Measure(TorusGrid(k, n, CliffordPoint));
     EXPECT_EQ(stars.unembedded_stars, 0u) << k << stars.first_unembedded;
+  }
+}
+
+TEST(MeasureStars, AnOrientationMakesNoDifference) {
+  for (HandmadeMesh mesh :
+       {SimplexBoundary(1), Icosphere(2), TorusGrid(2, 9, CliffordPoint),
+        TorusGrid(3, 8, CliffordPoint), SimplexBoundary(4), SimplexBoundary(5)}) {
+    Random random(5);
+    std::uint64_t most = 0;
+    for (const double by : {0.0, 0.1, 0.2, 0.4}) {
+      for (double& x : mesh.points) x += by * random.Normal();
+      const Adjacency adjacency(mesh.List());
+      const Connectivity connectivity = ComputeConnectivity(adjacency);
+      ASSERT_EQ(connectivity.orientation.size(), mesh.size());
+      const StarGeometry by_facets = MeasureStars(mesh.View(), adjacency);
+      const StarGeometry by_orientation =
+          MeasureStars(mesh.View(), adjacency, connectivity.orientation);
+      EXPECT_EQ(by_facets.unembedded_stars, by_orientation.unembedded_stars);
+      EXPECT_EQ(by_facets.first_unembedded, by_orientation.first_unembedded);
+      most = std::max(most, by_facets.unembedded_stars);
+      EXPECT_TRUE(by > 0 || most == 0);
+    }
+    EXPECT_TRUE(most > 0 || mesh.k == 1);
   }
 }
 

@@ -75,6 +75,39 @@ TEST(Connectivity, CountsComponentsAndIsolatedVertices) {
   EXPECT_EQ(Euler(mesh), 4);
 }
 
+TEST(Connectivity, PartsThatMeetInAVertexAreOneComponent) {
+  HandmadeMesh mesh = CrossPolytope(2);
+  mesh.Append(CrossPolytope(2));
+  mesh.Append(CrossPolytope(2));
+  mesh.Merge(6, 0);
+  const Connectivity c = ComputeConnectivity(Adjacency(mesh.List()));
+  EXPECT_EQ(c.components, 2u);
+  EXPECT_EQ(c.isolated_vertices, 1u);
+  EXPECT_TRUE(c.orientable);
+}
+
+TEST(Connectivity, OrientsNeighboursAlike) {
+  EXPECT_TRUE(ComputeConnectivity(Adjacency(KleinBottle(7).List())).orientation.empty());
+  for (const HandmadeMesh& mesh : {SimplexBoundary(1), Icosphere(1), TorusGrid(3, 5, CliffordPoint),
+                                   CrossPolytope(4), CrossPolytope(5)}) {
+    const Adjacency adjacency(mesh.List());
+    const Connectivity c = ComputeConnectivity(adjacency);
+    ASSERT_EQ(c.orientation.size(), mesh.size());
+    for (std::uint32_t s = 0; s < mesh.size(); ++s) {
+      EXPECT_EQ(std::abs(c.orientation[s]), 1);
+      for (int i = 0; i <= mesh.k; ++i) {
+        const std::uint32_t t = adjacency.Across(s, i);
+        const int j = adjacency.Apex(s, t);
+        const std::uint32_t* ids = mesh.List()[s];
+        EXPECT_EQ(std::find(ids, ids + mesh.k + 1, mesh.List()[t][j]), ids + mesh.k + 1);
+        // The shared facet gets opposite orientations from its two sides.
+        EXPECT_EQ(c.orientation[s] * (i % 2 == 0 ? 1 : -1),
+                  -c.orientation[t] * (j % 2 == 0 ? 1 : -1));
+      }
+    }
+  }
+}
+
 TEST(Connectivity, TellsOrientableFromNonOrientable) {
   EXPECT_TRUE(ComputeConnectivity(Adjacency(TorusGrid(2, 7, CliffordPoint).List())).orientable);
   EXPECT_FALSE(ComputeConnectivity(Adjacency(KleinBottle(7).List())).orientable);
