@@ -4,15 +4,19 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
+#include "core/certificate/ball_grid.h"
+#include "core/certificate/small_index.h"
 #include "core/certificate/small_solve.h"
 #include "core/parallel.h"
-#include "core/sample/ball_tree.h"
 #include "core/sample/random.h"
+#include "core/sample/vector_ops.h"
 
 namespace stellate::core {
 namespace {
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kBoundary = 1e-9;  // barycentric coordinates this small are left to rounding
 constexpr double kSideStep = 0.02;  // of reach_out
 constexpr int kSideSteps = 6;
@@ -20,15 +24,12 @@ constexpr int kSideSteps = 6;
 // The mesh's vertices are gone through in parts of so many.
 constexpr std::uint32_t kPart = 1 << 15;
 
-// visit(part, v) for each vertex of the mesh, part by part, in parallel.
-template <typename Visit>
-void ForEachVertex(const MeshView& mesh, const Visit& visit) {
+// body(part, begin, end) for each part of the vertices, in parallel.
+template <typename Body>
+void ForEachPart(const MeshView& mesh, const Body& body) {
   ParallelFor((mesh.vertices + kPart - 1) / kPart, [&](std::uint64_t part) {
     const std::uint64_t end = std::min<std::uint64_t>(mesh.vertices, (part + 1) * kPart);
-    for (std::uint64_t v = part * kPart; v < end; ++v) {
-      if (v % 4096 == 0 && IsInterrupted()) return;
-      visit(part, static_cast<std::uint32_t>(v));
-    }
+    body(part, static_cast<std::uint32_t>(part * kPart), static_cast<std::uint32_t>(end));
   });
 }
 
@@ -36,55 +37,34 @@ std::size_t PartCount(const MeshView& mesh) {
   return static_cast<std::size_t>((mesh.vertices + kPart - 1) / kPart);
 }
 
-// For each of these points, the nearest of each part, as far as `candidates(v, visit)` says that
-// vertex v may be the nearest.
-template <typename Candidates>
-std::vector<NearestVertex> NearestOf(const MeshView& mesh, const std::vector<double>& points,
-                                     const Candidates& candidates) {
-  const std::size_t count = points.size() / static_cast<std::size_t>(mesh.d);
-  constexpr double kFar = std::numeric_limits<double>::infinity();
-  std::vector<std::vector<NearestVertex>> parts(PartCount(mesh));
-  for (auto& part : parts) part.assign(count, {0, kFar});
-  ForEachVertex(mesh, [&](std::uint64_t part, std::uint32_t v) {
-    candidates(v, [&](std::uint32_t i) {
-      const double squared =
-          SquaredDistance(points.data() + std::size_t{i} * mesh.d, mesh.Point(v), mesh.d);
-      NearestVertex& nearest = parts[part][i];
-      if (squared < nearest.distance) nearest = {v, squared};
-    });
-  });
-  std::vector<NearestVertex> all(count, {0, kFar});
-  for (const auto& part : parts)
-    for (std::size_t i = 0; i < count; ++i)
-      if (part[i].distance < all[i].distance) all[i] = part[i];
-  for (NearestVertex& nearest : all) nearest.distance = std::sqrt(nearest.distance);
-  return all;
-}
-
-// A mesh vertex near x, its tangent coordinates relative to x.
-struct NearVertex {
-  std::uint32_t id = 0;
-  std::array<double, kMaxDimension> flat{};
-};
-
-// One fibre and what of the mesh is near it.
+// One fibre and the simplices that may meet it: those with a vertex in `near`, ascending, that is
+// no farther than `beside` from it.
 class FibreCounter {
  public:
   FibreCounter(const MeshView& mesh, const Adjacency& adjacency, const Fibre& fibre,
-               const std::vector<std::uint32_t>& near)
+               const std::vector<std::uint32_t>& near, double beside)
       : mesh_(mesh), adjacency_(adjacency), fibre_(fibre) {
+    corner_index_.Clear(near.size());
+    std::vector<std::uint32_t> close;
     for (const std::uint32_t v : near) {
-      NearVertex& n = near_.emplace_back();
-      n.id = v;
-      const double* p = mesh.Point(v);
-      for (int a = 0; a < mesh.k; ++a)
-        for (int c = 0; c < mesh.d; ++c)
-          n.flat[a] += fibre.tangent[a * mesh.d + c] * (p[c] - fibre.x[c]);
+      const double* flat = corners_[Corner(v)].data();
+      if (Dot(flat, flat, mesh.k) <= beside * beside) close.push_back(v);
+    }
+    for (const std::uint32_t v : close) {
+      for (const std::uint32_t s : adjacency.Star(v)) {
+        const std::uint32_t* ids = adjacency.list()[s];
+        int i = 0;
+        while (!std::binary_search(close.begin(), close.end(), ids[i])) ++i;
+        if (ids[i] != v) continue;  // each simplex once
+        Candidate& candidate = candidates_.emplace_back();
+        candidate.simplex = s;
+        for (i = 0; i <= mesh.k; ++i) candidate.corners[i] = Corner(ids[i]);
+      }
     }
   }
 
   int Count() const {
-    std::array<double, kMaxDimension> shift{};
+    Flat shift{};
     int hits = CountBeside(shift);
     Random random(fibre_.random_key, 0x66696272);
     for (int step = 0; hits < 0 && step < kSideSteps; ++step) {
@@ -96,65 +76,68 @@ class FibreCounter {
   }
 
  private:
-  // The vertices are ascending.
-  const NearVertex* Find(std::uint32_t id) const {
-    const auto at = std::lower_bound(near_.begin(), near_.end(), id,
-                                     [](const NearVertex& v, std::uint32_t x) { return v.id < x; });
-    return at != near_.end() && at->id == id ? &*at : nullptr;
+  // Tangent coordinates relative to x.
+  using Flat = std::array<double, kMaxDimension>;
+
+  struct Candidate {
+    std::uint32_t simplex = 0;
+    std::array<std::uint32_t, kMaxDimension + 1> corners{};
+  };
+
+  std::uint32_t Corner(std::uint32_t v) {
+    const std::uint32_t corner = corner_index_.Number(v);
+    if (corner < corners_.size()) return corner;
+    Flat& flat = corners_.emplace_back();
+    offset_.resize(static_cast<std::size_t>(mesh_.d));
+    for (int c = 0; c < mesh_.d; ++c) offset_[c] = mesh_.Point(v)[c] - fibre_.x[c];
+    DotRows(fibre_.tangent, static_cast<std::size_t>(mesh_.k), offset_.data(), mesh_.d,
+            flat.data());
+    return corner;
   }
 
   // Where the flat meets a simplex's hull, in barycentric coordinates: projected on the tangent
   // space the flat is the point `shift`.
-  int CountBeside(const std::array<double, kMaxDimension>& shift) const {
+  int CountBeside(const Flat& shift) const {
     const int k = mesh_.k;
-    const SimplexList& list = adjacency_.list();
     int hits = 0;
     std::array<const double*, kMaxDimension + 1> flat{};
-    for (const NearVertex& v : near_) {
-      for (const std::uint32_t s : adjacency_.Star(v.id)) {
-        const std::uint32_t* ids = list[s];
-        if (ids[0] != v.id) continue;  // each simplex once
-        bool may_hit = true;
-        for (int i = 0; i <= k && may_hit; ++i) {
-          const NearVertex* corner = Find(ids[i]);
-          may_hit = corner != nullptr;
-          if (may_hit) flat[i] = corner->flat.data();
+    for (const Candidate& candidate : candidates_) {
+      const std::uint32_t* ids = adjacency_.list()[candidate.simplex];
+      for (int i = 0; i <= k; ++i) flat[i] = corners_[candidate.corners[i]].data();
+      bool may_hit = true;
+      for (int a = 0; a < k && may_hit; ++a) {
+        double low = flat[0][a], high = low;
+        for (int i = 1; i <= k; ++i) {
+          low = std::min(low, flat[i][a]);
+          high = std::max(high, flat[i][a]);
         }
-        for (int a = 0; a < k && may_hit; ++a) {
-          double low = flat[0][a], high = low;
-          for (int i = 1; i <= k; ++i) {
-            low = std::min(low, flat[i][a]);
-            high = std::max(high, flat[i][a]);
-          }
-          const double slack = kBoundary * (high - low);
-          may_hit = low - slack <= shift[a] && shift[a] <= high + slack;
-        }
-        if (!may_hit) continue;
-
-        SmallSystem system;
-        for (int r = 0; r < k; ++r) {
-          for (int c = 0; c < k; ++c) system.a[r][c] = flat[c + 1][r] - flat[0][r];
-          system.b[r] = shift[r] - flat[0][r];
-        }
-        if (system.Solve(k) == 0) continue;  // parallel to the flat: generic flats miss it
-        double first = 1;
-        double lowest = 1;
-        for (int c = 0; c < k; ++c) {
-          first -= system.b[c];
-          lowest = std::min(lowest, system.b[c]);
-        }
-        lowest = std::min(lowest, first);
-        if (lowest < -kBoundary || !IsWithinReach(ids, first, system.b)) continue;
-        if (lowest <= kBoundary) return -1;
-        ++hits;
+        const double slack = kBoundary * (high - low);
+        may_hit = low - slack <= shift[a] && shift[a] <= high + slack;
       }
+      if (!may_hit) continue;
+
+      SmallSystem system;
+      for (int r = 0; r < k; ++r) {
+        for (int c = 0; c < k; ++c) system.a[r][c] = flat[c + 1][r] - flat[0][r];
+        system.b[r] = shift[r] - flat[0][r];
+      }
+      if (system.Solve(k) == 0) continue;  // parallel to the flat: generic flats miss it
+      double first = 1;
+      double lowest = 1;
+      for (int c = 0; c < k; ++c) {
+        first -= system.b[c];
+        lowest = std::min(lowest, system.b[c]);
+      }
+      lowest = std::min(lowest, first);
+      if (lowest < -kBoundary || !IsWithinReach(ids, first, system.b)) continue;
+      if (lowest <= kBoundary) return -1;
+      ++hits;
     }
     return hits;
   }
 
   // Is the simplex's point with these barycentric coordinates within reach_out of x?
-  bool IsWithinReach(const std::uint32_t* ids, double first,
-                     const std::array<double, kMaxDimension>& others) const {
+  bool IsWithinReach(const std::uint32_t* ids, double first, const Flat& others) const {
     const std::size_t d = static_cast<std::size_t>(mesh_.d);
     double squared = 0;
     for (std::size_t c = 0; c < d; ++c) {
@@ -168,60 +151,86 @@ class FibreCounter {
   const MeshView& mesh_;
   const Adjacency& adjacency_;
   const Fibre& fibre_;
-  std::vector<NearVertex> near_;
+  std::vector<Candidate> candidates_;
+  SmallIndex corner_index_;
+  std::vector<Flat> corners_;   // by number
+  std::vector<double> offset_;  // d
 };
 
 }  // namespace
 
 std::vector<NearestVertex> FindNearestVertices(const MeshView& mesh,
                                                const std::vector<double>& points, double near) {
-  BallTree tree(mesh.d, &points);
-  const std::size_t count = points.size() / static_cast<std::size_t>(mesh.d);
-  for (std::size_t i = 0; i < count; ++i) tree.Insert(near);
-  std::vector<NearestVertex> nearest = NearestOf(
-      mesh, points,
-      [&](std::uint32_t v, const auto& visit) { tree.ForEachInfluencing(mesh.Point(v), visit); });
-  // Few or none: such a point is far from the whole mesh.
-  std::vector<std::size_t> far;
-  std::vector<double> far_points;
-  for (std::size_t i = 0; i < count; ++i) {
-    if (!std::isinf(nearest[i].distance)) continue;
-    far.push_back(i);
-    const double* x = points.data() + i * static_cast<std::size_t>(mesh.d);
-    far_points.insert(far_points.end(), x, x + mesh.d);
+  const std::size_t d = static_cast<std::size_t>(mesh.d);
+  std::vector<NearestVertex> nearest(points.size() / d, {0, kInfinity});
+  std::vector<std::size_t> sought(nearest.size());
+  std::iota(sought.begin(), sought.end(), std::size_t{0});
+  if (!(near > 0)) near = kInfinity;
+  // Few are left after the first round, those that are far from the mesh.
+  for (bool last = false; !sought.empty() && !last; near *= 4) {
+    last = std::isinf(near);
+    std::vector<double> centres;
+    for (const std::size_t i : sought)
+      centres.insert(centres.end(), points.data() + i * d, points.data() + (i + 1) * d);
+    const BallGrid balls(mesh.d, centres.data(), std::vector<double>(sought.size(), near));
+    std::vector<std::vector<NearestVertex>> parts(PartCount(mesh));
+    ForEachPart(mesh, [&](std::uint64_t part, std::uint32_t begin, std::uint32_t end) {
+      parts[part].assign(sought.size(), {0, kInfinity});
+      NearestVertex* const best = parts[part].data();
+      for (std::uint32_t v = begin; v < end; ++v) {
+        if (v % 4096 == 0 && IsInterrupted()) return;
+        balls.ForEachAround(mesh.Point(v), [&](std::uint32_t i, double squared) {
+          if (squared < best[i].distance) best[i] = {v, squared};
+        });
+      }
+    });
+    std::vector<std::size_t> still;
+    for (std::size_t n = 0; n < sought.size(); ++n) {
+      NearestVertex best{0, kInfinity};
+      for (const auto& part : parts)
+        if (part[n].distance < best.distance) best = part[n];
+      if (std::isinf(best.distance))
+        still.push_back(sought[n]);
+      else
+        nearest[sought[n]] = {best.vertex, std::sqrt(best.distance)};
+    }
+    sought = std::move(still);
   }
-  if (far.empty()) return nearest;
-  const std::vector<NearestVertex> found =
-      NearestOf(mesh, far_points, [&](std::uint32_t, const auto& visit) {
-        for (std::uint32_t i = 0; i < far.size(); ++i) visit(i);
-      });
-  for (std::size_t i = 0; i < far.size(); ++i) nearest[far[i]] = found[i];
   return nearest;
 }
 
 std::vector<int> CountHits(const MeshView& mesh, const Adjacency& adjacency, double max_diameter,
                            const std::vector<Fibre>& fibres) {
-  std::vector<double> points;
-  for (const Fibre& f : fibres) points.insert(points.end(), f.x, f.x + mesh.d);
-  BallTree tree(mesh.d, &points);
+  // Each point of a simplex has a vertex within this share of its diameter (Jung).
+  const double jung = std::sqrt(mesh.k / (2.0 * (mesh.k + 1)));
+  std::vector<double> points, radii, beside;
   for (const Fibre& f : fibres) {
+    points.insert(points.end(), f.x, f.x + mesh.d);
     // Simplices much larger than asked for are refused for their size; searching for them would
     // turn each sample into a search of the whole mesh.
-    tree.Insert((1 + kSideStep) * f.reach_out + std::min(max_diameter, 4 * f.reach_out));
+    const double to_vertex = jung * std::min(max_diameter, 4 * f.reach_out);
+    radii.push_back((1 + kSideStep) * f.reach_out + to_vertex);
+    beside.push_back(2 * kSideStep * f.reach_out + to_vertex);
   }
+  const BallGrid balls(mesh.d, points.data(), std::move(radii));
   struct Pair {
     std::uint32_t fibre, vertex;
   };
   std::vector<std::vector<Pair>> parts(PartCount(mesh));
-  ForEachVertex(mesh, [&](std::uint64_t part, std::uint32_t v) {
-    tree.ForEachInfluencing(mesh.Point(v), [&](std::uint32_t i) { parts[part].push_back({i, v}); });
+  ForEachPart(mesh, [&](std::uint64_t part, std::uint32_t begin, std::uint32_t end) {
+    for (std::uint32_t v = begin; v < end; ++v) {
+      if (v % 4096 == 0 && IsInterrupted()) return;
+      balls.ForEachAround(mesh.Point(v), [&](std::uint32_t i, double) {
+        parts[part].push_back({i, v});
+      });
+    }
   });
   std::vector<std::vector<std::uint32_t>> near(fibres.size());
   for (const auto& part : parts)
     for (const Pair& pair : part) near[pair.fibre].push_back(pair.vertex);
   std::vector<int> hits(fibres.size());
   ParallelFor(fibres.size(), [&](std::size_t i) {
-    hits[i] = FibreCounter(mesh, adjacency, fibres[i], near[i]).Count();
+    hits[i] = FibreCounter(mesh, adjacency, fibres[i], near[i], beside[i]).Count();
   });
   return hits;
 }

@@ -21,7 +21,7 @@ struct NearestVertex {
   std::uint32_t vertex = 0;
   double distance = 0;
 };
-// Quick for points that have a vertex within `near`. `points`: d each, C order.
+// `points`: d each, C order. `near`: a length within which most have a vertex.
 std::vector<NearestVertex> FindNearestVertices(const MeshView& mesh,
                                                const std::vector<double>& points, double near);
 

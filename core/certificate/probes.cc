@@ -67,6 +67,21 @@ Eigen::VectorXd PointNearSimplex(const MeshView& mesh, const std::uint32_t* ids,
 
 }  // namespace
 
+MeshBox BoxOf(const MeshView& mesh) {
+  MeshBox box{PointOf(mesh, 0), PointOf(mesh, 0)};
+  double* const lower = box.lower.data();
+  double* const upper = box.upper.data();
+  for (std::uint32_t v = 1; v < mesh.vertices; ++v) {
+    LookUp(v);
+    const double* x = mesh.Point(v);
+    for (int i = 0; i < mesh.d; ++i) {
+      lower[i] = std::min(lower[i], x[i]);
+      upper[i] = std::max(upper[i], x[i]);
+    }
+  }
+  return box;
+}
+
 std::vector<std::uint32_t> ChooseSimplices(const SimplexList& list, const MeshShape& shape,
                                            std::uint64_t random_seed) {
   std::vector<std::uint32_t> chosen;
@@ -118,13 +133,7 @@ Eigen::MatrixXd CoverageProbes(const Specification& spec, const MeshView& mesh,
     probes.push_back(PointNearSimplex(mesh, list[s], push, random));
   }
 
-  Eigen::VectorXd lower = PointOf(mesh, 0);
-  Eigen::VectorXd upper = lower;
-  for (std::uint32_t v = 1; v < mesh.vertices; ++v) {
-    LookUp(v);
-    lower = lower.cwiseMin(PointOf(mesh, v));
-    upper = upper.cwiseMax(PointOf(mesh, v));
-  }
+  auto [lower, upper] = BoxOf(mesh);
   const double margin = kBoxMargin * (upper - lower).norm();
   lower.array() -= margin;
   upper.array() += margin;

@@ -20,6 +20,12 @@ inline constexpr int kProbesOfAKind = 80;  // near the mesh; its box; the client
 inline constexpr int kBallCount = 64;
 inline constexpr int kMaxBallSteps = 2;
 
+// The smallest box that holds the mesh's vertices.
+struct MeshBox {
+  Eigen::VectorXd lower, upper;
+};
+MeshBox BoxOf(const MeshView& mesh);
+
 // Simplices whose barycentres are checked, ascending.
 std::vector<std::uint32_t> ChooseSimplices(const SimplexList& list, const MeshShape& shape,
                                            std::uint64_t random_seed);

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numbers>
 
-#include "core/parallel.h"
+#include "core/certificate/probes.h"
 #include "core/sample/random.h"
 
 namespace stellate::core {
@@ -30,14 +30,8 @@ ShrinkingBalls::ShrinkingBalls(const MeshView& mesh, const std::vector<double>& 
     : mesh_(mesh), reach_(std::numeric_limits<double>::infinity()) {
   const int d = mesh.d;
   const int k = mesh.k;
-  Eigen::VectorXd lower = PointOf(mesh, 0);
-  Eigen::VectorXd upper = lower;
-  for (std::uint32_t v = 1; v < mesh.vertices; ++v) {
-    LookUp(v);
-    lower = lower.cwiseMin(PointOf(mesh, v));
-    upper = upper.cwiseMax(PointOf(mesh, v));
-  }
-  const double start = (upper - lower).norm() / 2;
+  const MeshBox box = BoxOf(mesh);
+  const double start = (box.upper - box.lower).norm() / 2;
 
   Random random(random_seed, 0x62616c6c73);
   for (int n = 0; n < count; ++n) {
