@@ -117,9 +117,8 @@ class StarComplex<K>::Around final : public Surroundings<K> {
       tangents[i] = site.tangent;
       weights[i] = complex_.Weight(site.id);
     }
-    double radius2;
-    if (!CommonCentre<K>(complex_.d_, points, tangents, weights, centre, &radius2)) return false;
-    if (radius2 > complex_.judged_radius2_) return false;
+    if (!CommonCentre<K>(complex_.d_, points, tangents, weights, complex_.judged_radius2_, centre))
+      return false;
     for (int i = 0; i < complex_.d_; ++i) centre[i] += points[0][i] - p_.point[i];
     return true;
   }

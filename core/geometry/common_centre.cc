@@ -190,16 +190,22 @@ bool TurnedLift(int d, const double* const* tangents, const double* const* edge,
   return true;
 }
 
-// The smallest K whose simplices, at the sizes that can be afforded, are so large beside the reach
-// that the first lift leaves too many inconsistent.
-constexpr int kTurns = 4;
+// Whether the first lift leaves too many inconsistent: where simplices are large beside the reach.
+// From K = 4 on they all are, at the sizes that can be afforded; for K = 3 those that M bends away
+// from by more than this share of the circumradius, half its ratio to the reach.
+constexpr int kTurns = 3;
+constexpr double kBent = 0.15;
+template <int K>
+bool IsLarge(double lift2, double radius2) {
+  return K > kTurns || (K == kTurns && lift2 > kBent * kBent * radius2);
+}
 
 // D: d, or 0 for any. Known early, the short loops unroll.
 template <int K, int D>
 bool CentreOf(int any_d, const double* const* points, const double* const* tangents,
-              const double* weights, double* centre, double* radius2) {
+              const double* weights, double most2, double* centre) {
   const int d = D > 0 ? D : any_d;
-  Vectors<D, K + 2 + (K >= kTurns ? 2 * K : 0)> memory(d);
+  Vectors<D, K + 2 + (K >= kTurns ? 1 + 2 * K : 0)> memory(d);
   double* edge[K];  // v_i - v_0
   for (int i = 0; i < K; ++i) {
     edge[i] = memory[i];
@@ -211,6 +217,8 @@ bool CentreOf(int any_d, const double* const* points, const double* const* tange
   double gram[K][K], barycentric[K];
   for (int r = 0; r < K; ++r)
     for (int c = 0; c <= r; ++c) gram[r][c] = Dot(edge[r], edge[c], d);
+  for (int r = 0; r < K; ++r)
+    if (gram[r][r] > 4 * most2) return false;  // no chord is longer than the diameter
   for (int r = 0; r < K; ++r) barycentric[r] = 0.5 * (gram[r][r] + weights[0] - weights[r + 1]);
   if (!Factor<K>(gram)) return false;
   Substitute<K>(gram, barycentric);  // x = v_0 + sum barycentric_i edge_i
@@ -221,18 +229,12 @@ bool CentreOf(int any_d, const double* const* points, const double* const* tange
     first -= barycentric[i];
     for (int j = 0; j < d; ++j) centre[j] += barycentric[i] * edge[i][j];
   }
-  *radius2 = Dot(centre, centre, d);
+  const double radius2 = Dot(centre, centre, d);
+  if (radius2 > most2) return false;
 
   double b[K + 1];
   b[0] = first;
   std::copy_n(barycentric, K, b + 1);
-  bool lifted = false;
-  if constexpr (K >= kTurns)
-    lifted = TurnedLift<K>(d, tangents, edge, gram, b, centre, away, memory[K + 2], lift);
-  if (lifted) {
-    for (int j = 0; j < d; ++j) centre[j] += lift[j];
-    return true;
-  }
   std::fill(lift, lift + d, 0.0);
   for (int i = 0; i <= K; ++i) {
     for (int j = 0; j < d; ++j) away[j] = i == 0 ? centre[j] : centre[j] - edge[i - 1][j];
@@ -243,6 +245,12 @@ bool CentreOf(int any_d, const double* const* points, const double* const* tange
     }
   }
   DropAlong<K>(d, edge, gram, lift);
+  if constexpr (K >= kTurns) {
+    double* const turned = memory[K + 2];
+    if (IsLarge<K>(Dot(lift, lift, d), radius2) &&
+        TurnedLift<K>(d, tangents, edge, gram, b, centre, away, memory[K + 3], turned))
+      std::copy_n(turned, d, lift);
+  }
   for (int j = 0; j < d; ++j) centre[j] += lift[j];
   return true;
 }
@@ -251,15 +259,15 @@ bool CentreOf(int any_d, const double* const* points, const double* const* tange
 
 template <int K>
 bool CommonCentre(int d, const double* const* points, const double* const* tangents,
-                  const double* weights, double* centre, double* radius2) {
+                  const double* weights, double most2, double* centre) {
   return WithDimension(d, [&](auto known) {
-    return CentreOf<K, known()>(d, points, tangents, weights, centre, radius2);
+    return CentreOf<K, known()>(d, points, tangents, weights, most2, centre);
   });
 }
 
 #define STELLATE_INSTANTIATE(K)                                                                 \
   template bool CommonCentre<K>(int, const double* const*, const double* const*, const double*, \
-                                double*, double*);
+                                double, double*);
 STELLATE_INSTANTIATE(1)
 STELLATE_INSTANTIATE(2)
 STELLATE_INSTANTIATE(3)
