@@ -1,6 +1,5 @@
 // Laws that hold for any manifold in any place, unit and position, tried on random ones. The
-// default run tries a few; STELLATE_PROPERTY_TRIALS says how many of each, STELLATE_PROPERTY_SEED
-// where to begin (target property_campaign).
+// default run tries a few, property_campaign many.
 
 #include <gtest/gtest.h>
 
@@ -8,31 +7,28 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <memory>
 #include <ostream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/core/support/in_process_run.h"
 #include "tests/core/support/transformed.h"
+#include "tests/core/support/trials.h"
 
 namespace stellate::core {
 namespace {
 
 using testing::Drive;
 using testing::DrivenRun;
+using testing::ForEachTrial;
 using testing::Make;
 using testing::Motion;
 using testing::RandomSignedPermutation;
 using testing::RandomTurn;
 using testing::SpecificationFor;
 using testing::Transformed;
-
-std::uint64_t Setting(const char* name, std::uint64_t otherwise) {
-  const char* text = std::getenv(name);
-  return text ? std::strtoull(text, nullptr, 10) : otherwise;
-}
 
 struct Shape {
   const char* manifold;
@@ -66,13 +62,10 @@ class Properties : public ::testing::TestWithParam<Shape> {
 
   template <typename Trial>
   void Try(const Trial& trial, std::uint64_t by_default = 2) {
-    const std::uint64_t first = Setting("STELLATE_PROPERTY_SEED", 1);
-    const std::uint64_t trials = Setting("STELLATE_PROPERTY_TRIALS", by_default);
-    for (std::uint64_t seed = first; seed < first + trials; ++seed) {
-      SCOPED_TRACE("seed " + std::to_string(seed));
+    ForEachTrial(by_default, [&](std::uint64_t seed) {
       Random random(seed, 7);
       trial(seed, random);
-    }
+    });
   }
 
   // The certificate is the manifold's, by this program's own count.
@@ -333,12 +326,11 @@ class SymmetricSamples : public ::testing::TestWithParam<Symmetric> {};
 TEST_P(SymmetricSamples, MeshLikeAnyOthers) {
   const auto manifold = Make(GetParam().manifold);
   const int d = manifold->ambient_dimension();
-  const std::uint64_t first = Setting("STELLATE_PROPERTY_SEED", 1);
-  for (std::uint64_t seed = first; seed < first + Setting("STELLATE_PROPERTY_TRIALS", 3); ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
+  bool exact = true;  // the first
+  ForEachTrial(3, [&](std::uint64_t seed) {
     Random random(seed, 8);
     Motion motion = Motion::None(d);
-    if (seed > first) {  // the first as exact as it is
+    if (!std::exchange(exact, false)) {
       motion.scale = std::pow(10.0, 12 * random.Uniform() - 6);
       motion.turn =
           random.Uniform() < 0.5 ? RandomTurn(d, random) : RandomSignedPermutation(d, random, true);
@@ -360,7 +352,7 @@ TEST_P(SymmetricSamples, MeshLikeAnyOthers) {
     EXPECT_GE(run.report().counts.duplicates, static_cast<std::uint64_t>(2 * seeds.cols()));
     EXPECT_EQ(testing::TopologyOf(run.mesher->Simplices(), manifold->dimension()).used_vertices,
               static_cast<std::uint64_t>(run.mesher->Points().cols()));
-  }
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(Grids, SymmetricSamples, ::testing::ValuesIn(kSymmetric),
