@@ -8,8 +8,8 @@ namespace stellate::core {
 
 // Inner loops over ambient coordinates. Four running sums: the compiler vectorises them, and the
 // order of additions depends on d alone, so that results do not depend on where an array lies.
-// R^3, where most people live, is spelled out so that the calls vanish, as they do where the
-// compiler knows d.
+// R^3, where most people live, and R^4 are spelled out so that the calls vanish, as they do where
+// the compiler knows d.
 [[gnu::always_inline]] inline double UnrolledDot(const double* a, const double* b, int d) {
   double s0 = 0, s1 = 0, s2 = 0, s3 = 0;
   int i = 0;
@@ -27,6 +27,7 @@ inline double LongDot(const double* a, const double* b, int d) { return Unrolled
 
 [[gnu::always_inline]] inline double Dot(const double* a, const double* b, int d) {
   if (d == 3) return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  if (d == 4) return (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]);
   return __builtin_constant_p(d) ? UnrolledDot(a, b, d) : LongDot(a, b, d);
 }
 
@@ -81,6 +82,10 @@ inline double LongSquaredDistance(const double* a, const double* b, int d) {
   if (d == 3) {
     const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
     return x * x + y * y + z * z;
+  }
+  if (d == 4) {
+    const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2], w = a[3] - b[3];
+    return (x * x + y * y) + (z * z + w * w);
   }
   return LongSquaredDistance(a, b, d);
 }
