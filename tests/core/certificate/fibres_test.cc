@@ -61,7 +61,7 @@ TEST(BallGrid, MayBeEmptyOrFlat) {
 
 TEST(FindNearestVertices, FindsTheLowestOfTheNearestHoweverFar) {
   HandmadeMesh mesh = Icosphere(3);
-  mesh.Append(mesh);  // each vertex twice
+  mesh.Append(HandmadeMesh(mesh));  // each vertex twice
   std::vector<double> points = RandomPoints(3, 100, 0.7, 1);
   for (const double x : {100.0, -1e6, 1e9}) points.insert(points.end(), {x, 1, 2});
   for (const double near : {0.0, 1e-3, 0.1, 10.0}) {
