@@ -8,7 +8,7 @@ import os
 import numpy as np
 
 from . import _formats
-from ._orientation import components, orient, signed_volume
+from ._orientation import orient, turn_outwards
 from .report import Progress, Report
 
 
@@ -51,14 +51,12 @@ class Mesh:
 
         A hypersurface (k = d - 1) gets its normals outwards, component by component.
         """
-        oriented = orient(self.simplices)
-        if oriented is None or self.dimension != self.ambient_dimension - 1:
-            return oriented
-        label = components(oriented, len(self.points))
-        for component in np.unique(label):
-            rows = np.flatnonzero(label == component)
-            if signed_volume(self.points, oriented[rows]) < 0:
-                oriented[rows, :2] = oriented[rows][:, [1, 0]]
+        turned = orient(self.simplices)
+        if turned is None:
+            return None
+        oriented, component = turned
+        if self.dimension == self.ambient_dimension - 1:
+            turn_outwards(self.points, oriented, component)
         return oriented
 
     def save(self, path: str | os.PathLike[str]) -> None:

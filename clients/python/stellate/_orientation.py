@@ -5,46 +5,37 @@ from __future__ import annotations
 import numpy as np
 
 
-def orient(simplices: np.ndarray) -> np.ndarray | None:
+def orient(simplices: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """The same simplices, some with their first two vertices exchanged, so that all agree.
 
-    In each component the first simplex stays as it is. Simplices agree when they induce opposite
-    orientations on the facet they share. None if that cannot be: the complex is not orientable, or
-    a facet is in more than two simplices. Rows have to be ascending. Cost O(m log m).
+    Simplices agree when they induce opposite orientations on the facet they share; in each
+    component the first one stays as it is. Rows have to be ascending. Cost O(m log m).
+
+    Returns: the simplices, and for each the first simplex of its component, where components hang
+      together by facets. None if that cannot be: the complex is not orientable, or a facet is in
+      more than two simplices.
     """
     count = len(simplices)
     neighbours = _neighbours(simplices)
     if neighbours is None:
         return None
-    pairs, agree = neighbours
-    source = np.concatenate([pairs[:, 0], pairs[:, 1]])
-    order = np.argsort(source, kind="stable")
-    target = np.concatenate([pairs[:, 1], pairs[:, 0]])[order]
-    relation = np.where(np.concatenate([agree, agree])[order], 1, -1).astype(np.int8)
-    start = np.searchsorted(source[order], np.arange(count + 1))
-    side = np.zeros(count, dtype=np.int8)  # 1: stays, -1: turned, 0: not reached yet
-    for seed in range(count):
-        if side[seed]:
-            continue
-        side[seed] = 1
-        front = np.array([seed])
-        while front.size:
-            lengths = start[front + 1] - start[front]
-            ends = np.cumsum(lengths)
-            edges = np.arange(ends[-1]) + np.repeat(start[front] - (ends - lengths), lengths)
-            reached = target[edges]
-            wanted = np.repeat(side[front], lengths) * relation[edges]
-            fresh = side[reached] == 0
-            side[reached[fresh]] = wanted[fresh]
-            if (side[reached] != wanted).any():
-                return None
-            front = np.unique(reached[fresh])
+    a, b, agree = neighbours
+    # Each simplex s is there twice, as it is (2 s) and turned (2 s + 1). What agrees is joined: the
+    # two halves of an orientable component stay apart.
+    b_like_a = 2 * b + ~agree
+    label = _components(
+        2 * count, np.concatenate([2 * a, 2 * a + 1]), np.concatenate([b_like_a, b_like_a ^ 1])
+    )
+    stays, turned = label[0::2], label[1::2]
+    if (stays == turned).any():
+        return None
     oriented = simplices.copy()
-    oriented[side < 0, :2] = simplices[side < 0][:, [1, 0]]
-    return oriented
+    rows = np.flatnonzero(stays > turned)  # joined with their component's first one turned
+    oriented[rows, :2] = simplices[rows][:, [1, 0]]
+    return oriented, stays // 2
 
 
-def _neighbours(simplices: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+def _neighbours(simplices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Pairs of simplices that share a facet, and whether they agree; None if three share one."""
     count, width = simplices.shape
     facets = np.concatenate([np.delete(simplices, i, axis=1) for i in range(width)])
@@ -56,22 +47,44 @@ def _neighbours(simplices: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     if (equal[1:] & equal[:-1]).any():
         return None
     first = np.flatnonzero(equal)
-    return np.stack([owner[first], owner[first + 1]], axis=1), sign[first] != sign[first + 1]
+    return owner[first], owner[first + 1], sign[first] != sign[first + 1]
 
 
-def signed_volume(points: np.ndarray, simplices: np.ndarray) -> float:
-    """d! times the volume that oriented (d-1)-simplices enclose in R^d; > 0: normals outwards."""
-    return float(np.linalg.det(points[simplices]).sum())
+def _components(count: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """For each node of a graph with edges a[i], b[i] the least node of its component.
+
+    Boruvka's algorithm: every tree takes its first edge that leaves it, so that each round at least
+    halves the number of trees that have one.
+    """
+    tree = np.arange(count)
+    trees = count
+    while a.size:
+        nodes = np.arange(trees)
+        parent = nodes.copy()
+        # Of several values assigned to one place the last one stays: here the first edge's.
+        ends, others = np.stack([a, b], axis=1).ravel(), np.stack([b, a], axis=1).ravel()
+        parent[ends[::-1]] = others[::-1]
+        mutual = (parent[parent] == nodes) & (nodes < parent)  # both took the same edge
+        parent[mutual] = nodes[mutual]
+        while True:
+            above = parent[parent]
+            if (above == parent).all():
+                break
+            parent = above
+        roots, of_root = np.unique(parent, return_inverse=True)
+        trees, tree, a, b = len(roots), of_root[tree], of_root[a], of_root[b]
+        apart = a != b
+        a, b = a[apart], b[apart]
+    least = np.empty(trees, dtype=np.int64)
+    least[tree[::-1]] = np.arange(count)[::-1]
+    return least[tree]
 
 
-def components(simplices: np.ndarray, vertex_count: int) -> np.ndarray:
-    """For each simplex the least vertex of its component."""
-    label = np.arange(vertex_count)
-    while True:
-        least = label[simplices].min(axis=1)
-        lower = label.copy()
-        np.minimum.at(lower, simplices, least[:, None])
-        lower = lower[lower]
-        if (lower == label).all():
-            return label[simplices[:, 0]]
-        label = lower
+def turn_outwards(points: np.ndarray, oriented: np.ndarray, component: np.ndarray) -> None:
+    """Turns, in place, the components of a hypersurface whose normals point inwards.
+
+    `component`: of each simplex, a row of `oriented`.
+    """
+    volumes = np.linalg.det(points[oriented])  # (k+1)! times those of the cones from the origin
+    inwards = np.bincount(component, weights=volumes)[component] < 0
+    oriented[inwards, :2] = oriented[inwards][:, [1, 0]]

@@ -1,5 +1,7 @@
 """Files: what is written is read back the same."""
 
+import sys
+
 import meshio
 import numpy as np
 import pytest
@@ -153,3 +155,75 @@ def test_two_components_each_have_outward_normals():
     assert outward(one, oriented[:half])
     moved = stellate.Mesh(far.points[len(one.points) :] - [5, 0, 0], one.simplices)
     assert outward(moved, oriented[half:] - len(one.points))
+
+
+def renumbered(mesh, rng):
+    """The same complex with its vertices numbered at random."""
+    number = rng.permutation(len(mesh.points))
+    points = np.empty_like(mesh.points)
+    points[number] = mesh.points
+    simplices = np.sort(number[mesh.simplices], axis=1)
+    return stellate.Mesh(points, simplices[np.lexsort(simplices.T[::-1])])
+
+
+def oriented_one_by_one(simplices):
+    """What orienting is: the first simplex of a component stays, the others follow a neighbour."""
+    owners = {}
+    for row, simplex in enumerate(simplices.tolist()):
+        for i in range(len(simplex)):
+            owners.setdefault(tuple(simplex[:i] + simplex[i + 1 :]), []).append((row, (-1) ** i))
+    side = {}
+    for first in range(len(simplices)):
+        if first in side:
+            continue
+        side[first], front = 1, [first]
+        while front:
+            row = front.pop()
+            simplex = simplices[row].tolist()
+            for i in range(len(simplex)):
+                for other, sign in owners[tuple(simplex[:i] + simplex[i + 1 :])]:
+                    if other not in side:
+                        side[other] = -side[row] * sign * (-1) ** i
+                        front.append(other)
+    turned = simplices.copy()
+    for row in (row for row, kept in side.items() if kept < 0):
+        turned[row, :2] = simplices[row, [1, 0]]
+    return turned
+
+
+def test_many_components_are_oriented_as_one_by_one(rng):
+    for flat in (shapes.polygon(11, 4), shapes.torus(6, 5), shapes.simplex_boundary(3)):
+        copies, n = 7, len(flat.points)
+        pieces = stellate.Mesh(
+            np.zeros((copies * n, flat.dimension + 4)),  # no hypersurface: nothing is outwards
+            np.concatenate([flat.simplices + i * n for i in range(copies)]),
+        )
+        mesh = renumbered(pieces, rng)
+        expected = oriented_one_by_one(mesh.simplices)
+        assert np.array_equal(mesh.oriented_simplices(), expected)
+
+
+def steps_to_orient(mesh):
+    """How many lines of the package run, each over arrays as long as the mesh."""
+    count = 0
+
+    def trace(frame, event, argument):
+        nonlocal count
+        count += event == "line" and "stellate" in frame.f_code.co_filename
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        assert mesh.oriented_simplices() is not None
+    finally:
+        sys.settrace(before)
+    return count
+
+
+def test_orienting_takes_linear_time(rng):
+    curve = shapes.polygon(500, 3), shapes.polygon(32_000, 3)
+    for small, large in (curve, (shapes.torus(25, 20), shapes.torus(200, 160))):
+        few = steps_to_orient(renumbered(small, rng))
+        many = steps_to_orient(renumbered(large, rng))
+        assert many < 2 * few  # for 64 times the vertices: with their logarithm, not with a root
