@@ -40,11 +40,18 @@ void Dispatch::Begin(const std::vector<Block>& blocks, TimePoint now) {
   deserted_since_ = now;
   first_of_round_ = next_lease_;
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
-    const Index n = blocks_[b].queries;
-    if (n == 0) continue;
-    pending_.push_back({b, 0, n, 0});
-    pending_queries_ += n;
-    unsettled_ += n;
+    Index next = 0;
+    const auto ask_until = [&](Index end) {
+      if (end <= next) return;
+      pending_.push_back({b, next, end - next, 0});
+      pending_queries_ += end - next;
+      unsettled_ += end - next;
+    };
+    for (const auto& [first, end] : blocks_[b].answered) {
+      ask_until(first);
+      next = end;
+    }
+    ask_until(blocks_[b].queries);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace stellate::server {
@@ -57,6 +58,8 @@ class Dispatch {
   struct Block {
     Eigen::Index queries = 0;
     std::size_t bytes_per_query = 0;  // the larger of question and answer
+    // Queries [first, second) that have their answers from the start; ascending and disjoint.
+    std::vector<std::pair<Eigen::Index, Eigen::Index>> answered = {};
   };
   enum class Failure { kNone, kNoWorker, kAnswerTimeout };
 

@@ -13,6 +13,20 @@ using Eigen::Index;
 
 double Seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
+void CopyInto(const core::AnswerBlock& answer, Index first, core::AnswerBlock* whole) {
+  const Index count = answer.points.cols();
+  whole->points.middleCols(first, count) = answer.points;
+  if (!answer.found.empty()) {
+    std::copy(answer.found.begin(), answer.found.end(), whole->found.begin() + first);
+  }
+  if (whole->tangents.cols() > 0 && answer.tangents.cols() == count) {
+    whole->tangents.middleCols(first, count) = answer.tangents;
+  }
+  if (whole->sizes.size() > 0 && answer.sizes.size() == count) {
+    whole->sizes.segment(first, count) = answer.sizes;
+  }
+}
+
 }  // namespace
 
 OraclePool::OraclePool(const core::Specification& spec, DispatchOptions options,
@@ -128,17 +142,7 @@ core::Status OraclePool::Deliver(const Chunk& chunk, const core::AnswerBlock& an
 }
 
 void OraclePool::TakeOver(const Chunk& chunk, const core::AnswerBlock& answer) {
-  core::AnswerBlock& whole = chunk.round->answers.blocks[chunk.block_index];
-  whole.points.middleCols(chunk.first, chunk.count) = answer.points;
-  if (!answer.found.empty()) {
-    std::copy(answer.found.begin(), answer.found.end(), whole.found.begin() + chunk.first);
-  }
-  if (whole.tangents.cols() > 0 && answer.tangents.cols() == chunk.count) {
-    whole.tangents.middleCols(chunk.first, chunk.count) = answer.tangents;
-  }
-  if (whole.sizes.size() > 0 && answer.sizes.size() == chunk.count) {
-    whole.sizes.segment(chunk.first, chunk.count) = answer.sizes;
-  }
+  CopyInto(answer, chunk.first, &chunk.round->answers.blocks[chunk.block_index]);
   std::vector<std::shared_ptr<const SecondAnswer>> seconds;
   {
     const std::lock_guard lock(mutex_);
@@ -155,6 +159,7 @@ void OraclePool::TakeOver(const Chunk& chunk, const core::AnswerBlock& answer) {
     const Index end = std::min(chunk.first + chunk.count, other.first + other.count);
     if (first < end) Compare(*second, first, end - first);
   }
+  if (on_answered_) on_answered_(chunk.round, chunk.block_index, chunk.first, chunk.count);
   const std::lock_guard lock(mutex_);
   if (round_ != chunk.round) return;
   Lease lease;
@@ -218,13 +223,17 @@ void OraclePool::Fail(MeshFailure failure) {
 }
 
 OraclePool::Outcome OraclePool::Ask(const core::QueryBatch& batch,
-                                    const std::function<void()>& meanwhile) {
+                                    const std::function<void()>& meanwhile,
+                                    const std::vector<PartOfRound>& known) {
   std::shared_ptr<Round> round = MakeRound(batch);
+  for (const PartOfRound& part : known) {
+    CopyInto(part.answers, part.first, &round->answers.blocks[part.block_index]);
+  }
   std::unique_lock lock(mutex_);
   round_ = round;
   std::erase_if(titles_, [this](const auto& entry) { return !members_.contains(entry.first); });
   TimePoint now = Clock::now();
-  dispatch_.Begin(Measure(batch), now);
+  dispatch_.Begin(Measure(batch, known), now);
   auto first_deliveries = AssignLocked(now);
   lock.unlock();
   Send(std::move(first_deliveries));
@@ -327,7 +336,8 @@ std::shared_ptr<Round> OraclePool::MakeRound(const core::QueryBatch& batch) cons
   return round;
 }
 
-std::vector<Dispatch::Block> OraclePool::Measure(const core::QueryBatch& batch) const {
+std::vector<Dispatch::Block> OraclePool::Measure(const core::QueryBatch& batch,
+                                                 const std::vector<PartOfRound>& known) const {
   const std::size_t point = sizeof(double) * spec_.ambient_dimension;
   const std::size_t basis = point * spec_.dimension;
   std::vector<Dispatch::Block> blocks;
@@ -337,6 +347,10 @@ std::vector<Dispatch::Block> OraclePool::Measure(const core::QueryBatch& batch) 
     const std::size_t answer =
         point + 1 + (block.want_tangents ? basis : 0) + (block.want_sizes ? sizeof(double) : 0);
     blocks.push_back({block.size(), std::max(question, answer)});
+  }
+  for (const PartOfRound& part : known) {
+    const Index end = part.first + part.answers.points.cols();
+    blocks[part.block_index].answered.push_back({part.first, end});
   }
   return blocks;
 }

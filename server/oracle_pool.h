@@ -34,6 +34,13 @@ struct Round {
   std::vector<std::vector<WorkerId>> answered_by;
 };
 
+// Answers to some queries of a round: `first` and those after it.
+struct PartOfRound {
+  std::size_t block_index = 0;
+  Eigen::Index first = 0;
+  core::AnswerBlock answers;
+};
+
 // A chunk for a worker: queries [first, first + count) of a block.
 struct Chunk {
   LeaseId lease = 0;
@@ -99,9 +106,17 @@ class OraclePool {
     std::optional<MeshFailure> failure;  // set when the round failed; neither: interrupted
   };
   // Session's thread only. Does `meanwhile` once the workers have the questions, or there are none.
-  // Every wait in it ends: with answers, or by a limit of the options.
+  // Every wait in it ends: with answers, or by a limit of the options. What is `known` is asked of
+  // nobody: answers to this very batch, ascending by block and query, no query twice.
   Outcome Ask(
-      const core::QueryBatch& batch, const std::function<void()>& meanwhile = [] {});
+      const core::QueryBatch& batch, const std::function<void()>& meanwhile = [] {},
+      const std::vector<PartOfRound>& known = {});
+  // Told of queries [first, first + count) of a block as their answers are taken over: they change
+  // no more while the round lives. From any thread; must not block.
+  using OnAnswered = std::function<void(const std::shared_ptr<const Round>& round,
+                                        std::size_t block, Eigen::Index first, Eigen::Index count)>;
+  // Before the first Ask.
+  void TellOfAnswers(OnAnswered on_answered) { on_answered_ = std::move(on_answered); }
   // Makes Ask return, now and ever after.
   void Interrupt();
 
@@ -127,7 +142,8 @@ class OraclePool {
 
   std::vector<Delivery> AssignLocked(TimePoint now);
   std::shared_ptr<Round> MakeRound(const core::QueryBatch& batch) const;
-  std::vector<Dispatch::Block> Measure(const core::QueryBatch& batch) const;
+  std::vector<Dispatch::Block> Measure(const core::QueryBatch& batch,
+                                       const std::vector<PartOfRound>& known) const;
   MeshFailure Describe(Dispatch::Failure failure) const;
   void TakeOver(const Chunk& chunk, const core::AnswerBlock& answer);
   void Compare(const SecondAnswer& second, Eigen::Index first, Eigen::Index count);
@@ -138,6 +154,7 @@ class OraclePool {
   const DispatchOptions options_;
   const std::size_t max_workers_;
   const std::shared_ptr<PoolObserver> observer_;  // may be null
+  OnAnswered on_answered_;                        // may be empty
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;

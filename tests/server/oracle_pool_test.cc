@@ -121,6 +121,41 @@ TEST_F(OraclePoolTest, AnswersStandWhereTheirQueriesStood) {
   ExpectAllAnswered(Ask(&pool).get());
 }
 
+// As many as each block has of them, wherever they stand; a round may need nobody.
+TEST_F(OraclePoolTest, WhatIsKnownIsAskedOfNobody) {
+  const auto part = [&](std::size_t block, Eigen::Index first, Eigen::Index count) {
+    return PartOfRound{block, first, AnswerSphere(batch_.blocks[block], first, count)};
+  };
+  OraclePool pool(spec_, options_, 8);
+  std::mutex mutex;
+  std::vector<int> asked(2 * 700, 0), told(2 * 700, 0);
+  const auto count = [&](std::vector<int>* which, std::size_t block, Eigen::Index first,
+                         Eigen::Index n) {
+    const std::lock_guard lock(mutex);
+    for (Eigen::Index i = 0; i < n; ++i) ++(*which)[block * 700 + first + i];
+  };
+  pool.TellOfAnswers([&](const std::shared_ptr<const Round>& round, std::size_t block,
+                         Eigen::Index first, Eigen::Index n) {
+    EXPECT_EQ(round->answers.blocks[block].points.middleCols(first, n),
+              AnswerSphere(batch_.blocks[block], first, n).points);
+    count(&told, block, first, n);
+  });
+  const auto worker = FakeWorker::Join(&pool, [&](const Chunk& chunk, core::AnswerBlock* answer) {
+    count(&asked, chunk.block_index, chunk.first, chunk.count);
+    return FakeWorker::AnswerTruly(chunk, answer);
+  });
+  const std::vector<PartOfRound> known = {part(0, 0, 10), part(0, 300, 1), part(0, 301, 99),
+                                          part(1, 699, 1)};
+  ExpectAllAnswered(pool.Ask(batch_, [] {}, known));
+  for (std::size_t q = 0; q < asked.size(); ++q) {
+    const bool was_known = q < 10 || (q >= 300 && q < 400) || q == 1399;
+    EXPECT_EQ(asked[q], was_known ? 0 : 1) << q;
+    EXPECT_EQ(told[q], asked[q]) << q;
+  }
+  worker->Leave();
+  ExpectAllAnswered(pool.Ask(batch_, [] {}, {part(0, 0, 700), part(1, 0, 700)}));
+}
+
 TEST_F(OraclePoolTest, TheTimeThatWorkersTakeIsUsedOnce) {
   OraclePool pool(spec_, options_, 8);
   int times = 0;
