@@ -1,0 +1,141 @@
+"""Blocks of commands, and what else is run as a program."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import signal
+import subprocess
+import tomllib
+from typing import Any
+
+import yaml
+
+from blocks import ROOT, Block, Wrong
+from surroundings import BUILD, PATIENCE, Surroundings
+
+_EXCEPTIONS = ("background", "leave_out", "status")
+# A line that goes on as in another terminal has said what it says, or the block has failed.
+_AWAIT = """
+await() {  # LOG PROCESS TEXT
+  until grep -qsF -- "$3" "$1"; do
+    kill -0 "$2" 2>/dev/null || { cat "$1"; return 1; }
+    sleep 0.02
+  done
+}
+"""
+_SHOWN = 60  # lines of what failed
+
+
+def must(command: list[str], around: Surroundings, text: str | None = None) -> str:
+    """What a program prints. It and all that it started have ended when this returns.
+
+    Raises: Wrong, with all that it printed, unless its status is 0.
+    """
+    process = subprocess.Popen(
+        command, cwd=around.here, env=around.environment(), text=True, start_new_session=True,
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+    )  # fmt: skip
+    try:
+        printed, _ = process.communicate(text, timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        raise Wrong(f"it does not end. It printed:\n{_end(process.communicate()[0])}") from None
+    finally:
+        try:
+            os.killpg(process.pid, signal.SIGKILL)  # what it left running
+        except ProcessLookupError:
+            pass
+    if process.returncode:
+        raise Wrong(f"status {process.returncode}. It printed:\n{_end(printed)}")
+    return printed
+
+
+def _end(printed: str) -> str:
+    return "\n".join(printed.splitlines()[-_SHOWN:])
+
+
+def python(before: str, text: str, around: Surroundings) -> None:
+    """The block, after what the page takes for granted."""
+    (around.here / "block.py").write_text(before + "\n" + text)
+    must(["python3", "block.py"], around)
+
+
+def commands(text: str) -> list[str]:
+    """A block's commands: lines, with those that go on after them."""
+    found: list[str] = []
+    begun = ""
+    for line in text.splitlines():
+        begun += line + "\n"
+        if line.endswith("\\"):
+            continue
+        test = subprocess.run(["bash", "-n"], input=begun, capture_output=True, text=True)
+        if test.returncode == 0 and "here-document" not in test.stderr:
+            found.append(begun)
+            begun = ""
+    if begun.strip():
+        raise Wrong(f"these are no commands:\n{begun}")
+    return found
+
+
+def run(before: str, text: str, entry: dict[str, Any], around: Surroundings) -> None:
+    """As bash runs it: all of its commands have to go well."""
+    script = ["set -euo pipefail", _AWAIT, before]
+    unused = {start for key in _EXCEPTIONS for start in entry.get(key, ())}
+    for number, command in enumerate(commands(text)):
+        log = f".block-{number}.log"
+        key, start = next(
+            ((key, start) for key in _EXCEPTIONS for start in entry.get(key, ())
+             if command.lstrip().startswith(start)), ("", ""))  # fmt: skip
+        unused.discard(start)
+        if key == "background":
+            says = shlex.quote(entry[key][start])
+            script.append(f"{{ exec {command}}} >{log} 2>&1 &\nawait {log} $! {says}")
+        elif key == "status":
+            script.append(f"status=0\n{{ {command}}} || status=$?\n[[ $status == {entry[key][start]} ]]")
+        elif not key:
+            script.append(command)
+    if unused:
+        raise Wrong(f"no command of the block begins with {sorted(unused)}")
+    (around.here / "block.sh").write_text("\n".join(script))
+    must(["bash", "block.sh"], around)
+
+
+def check(block: Block, around: Surroundings) -> None:
+    """What can be said of a block that is not run."""
+    text = around.fill_in(block.entry, block.text)
+    try:
+        if block.kind == "bash":
+            for command in commands(text):
+                _programs_exist(command)
+        elif block.kind == "python":
+            compile(text, "block", "exec")
+        elif block.kind == "toml":
+            tomllib.loads(text)
+        elif block.kind == "yaml":
+            list(yaml.safe_load_all(text))
+    except (SyntaxError, ValueError, yaml.YAMLError) as error:
+        raise Wrong(f"no {block.kind}: {error}") from None
+
+
+def _programs_exist(command: str) -> None:
+    """Ours, and the targets of the build."""
+    words = shlex.split(command, comments=True)
+    for word in words:
+        ours = re.fullmatch(r"(\./)?((tests|docker|clients)/[\w./-]+)", word)
+        if ours and not (ROOT / ours[2]).exists():
+            raise Wrong(f"there is no {word}")
+        if built := re.fullmatch(r"build/release/bin/(\w+)", word):
+            _target_exists(built[1])
+    if words[:2] == ["cmake", "--build"] and "--target" in words:
+        for target in words[words.index("--target") + 1 :]:
+            _target_exists(target)
+
+
+def _target_exists(target: str) -> None:
+    targets = subprocess.run(
+        ["cmake", "--build", str(BUILD), "--target", "help"], capture_output=True, text=True
+    )
+    if not re.search(rf"^{re.escape(target)}: ", targets.stdout, re.M):
+        raise Wrong(f"the build has no target {target}")
