@@ -28,6 +28,7 @@ DownloadCommand::DownloadCommand(CLI::App& parent)
       ->add_option("--reconnect", options_.reconnect_seconds,
                    "seconds that a server which went away is waited for")
       ->capture_default_str();
+  command_->add_option("--report", report_, "file for the report as JSON");
   command_->add_flag("--json", json_, "print the report as JSON");
   command_->add_flag("-q,--quiet", quiet_, "no progress and no report");
   command_->footer(
@@ -58,6 +59,10 @@ int DownloadCommand::Deliver(const Mesh& mesh) const {
   int status = mesh.report.certified() ? kExitCertified : kExitNotCertified;
   for (const std::string& path : outputs_) {
     if (const Expected<void> saved = mesh.Save(path); !saved) status = Complain(saved.error());
+  }
+  if (!report_.empty()) {
+    const Expected<void> saved = SaveJson(mesh.report, report_);
+    if (!saved) status = Complain(saved.error());
   }
   const bool has_report = mesh.report.termination != Termination::kUnknown;
   if (json_) {

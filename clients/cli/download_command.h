@@ -25,6 +25,7 @@ class DownloadCommand {
   DownloadOptions options_;
   std::string mesh_;
   std::vector<std::string> outputs_;
+  std::string report_;
   bool wait_ = false, unfinished_ = false, json_ = false, quiet_ = false;
 };
 

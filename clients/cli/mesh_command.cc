@@ -60,6 +60,7 @@ MeshCommand::MeshCommand(CLI::App& parent)
   for (const MeshSetting& setting : CriteriaSettings()) Add(criteria, setting, &options_);
   command_->add_flag("--closest-point-only", closest_point_only_,
                      "offer neither flat intersections nor tangent bases");
+  command_->add_option("--report", report_, "file for the report as JSON");
   command_->add_flag("--json", json_, "print the report as JSON");
   command_->add_flag("-q,--quiet", quiet_, "no progress and no report");
   command_->footer(
@@ -97,6 +98,10 @@ int MeshCommand::Deliver(const Mesh& mesh) const {
   int status = mesh.report.certified() ? kExitCertified : kExitNotCertified;
   for (const std::string& path : outputs_) {
     if (const Expected<void> saved = mesh.Save(path); !saved) status = Complain(saved.error());
+  }
+  if (!report_.empty()) {
+    const Expected<void> saved = SaveJson(mesh.report, report_);
+    if (!saved) status = Complain(saved.error());
   }
   if (json_) {
     std::cout << ToJson(mesh.report) << "\n";

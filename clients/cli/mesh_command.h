@@ -25,6 +25,7 @@ class MeshCommand {
   MeshOptions options_;
   std::string manifold_;
   std::vector<std::string> outputs_;
+  std::string report_;
   bool json_ = false, quiet_ = false, closest_point_only_ = false;
 };
 

@@ -190,6 +190,21 @@ TEST_F(MeshFile, VtuHoldsPointsAndCells) {
   EXPECT_EQ(xml.find("coordinates"), std::string::npos);
 }
 
+TEST_F(MeshFile, VtuSaysWhatTheMeshIs) {
+  Mesh mesh = Surface(3);
+  EXPECT_EQ(Saved(mesh, "a.vtu").find("\"epsilon\""), std::string::npos);
+  mesh.report.termination = Termination::kVertexBudget;
+  mesh.report.epsilon = 0.1;
+  mesh.report.certificate.verdict = "not certified: max_vertices is spent";
+  const std::string xml = Saved(mesh, "a.vtu");
+  EXPECT_EQ(VtuNumbers<double>(xml, "epsilon"), std::vector<double>{0.1});
+  EXPECT_EQ(VtuNumbers<std::uint8_t>(xml, "certified"), std::vector<std::uint8_t>{0});
+  const auto verdict = VtuNumbers<char>(xml, "verdict");
+  EXPECT_EQ(std::string(verdict.begin(), verdict.end()), mesh.report.certificate.verdict);
+  const auto version = VtuNumbers<char>(xml, "version");
+  EXPECT_EQ(std::string(version.begin(), version.begin() + 9), "stellate ");
+}
+
 TEST_F(MeshFile, VtuKeepsHighCoordinatesAsData) {
   const Mesh mesh = Surface(6);
   const std::string xml = Saved(mesh, "a.vtu");

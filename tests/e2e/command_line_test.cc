@@ -49,7 +49,8 @@ TEST_F(CommandLine, CertifiedMeshExitsZeroAndWritesItsFiles) {
       std::filesystem::temp_directory_path() / ("stellate-cli-" + std::to_string(getpid()));
   std::filesystem::create_directories(directory);
   const std::string txt = (directory / "a.txt").string(), vtu = (directory / "a.vtu").string();
-  const Result result = OnServer("mesh torus --epsilon 0.2 -o " + txt + " -o " + vtu);
+  const Result result = OnServer("mesh torus --epsilon 0.2 -o " + txt + " -o " + vtu +
+                                 " --report " + (directory / "a.json").string());
   EXPECT_EQ(result.status, 0) << result.output;
   EXPECT_NE(result.output.find("CERTIFIED"), std::string::npos) << result.output;
   EXPECT_NE(result.output.find("Euler characteristic 0"), std::string::npos);
@@ -61,6 +62,10 @@ TEST_F(CommandLine, CertifiedMeshExitsZeroAndWritesItsFiles) {
   EXPECT_EQ(d, 3);
   EXPECT_EQ(simplices, 2 * vertices);  // a torus
   EXPECT_GT(std::filesystem::file_size(vtu), 0u);
+  std::ifstream report(directory / "a.json");
+  std::string json;
+  std::getline(report, json);
+  EXPECT_EQ(json.rfind("{\"termination\": \"CONVERGED\", \"epsilon\": 0.2", 0), 0u) << json;
   std::filesystem::remove_all(directory);
 }
 

@@ -158,8 +158,10 @@ Progress FromProto(const v1::Progress& m) {
   return p;
 }
 
-Report FromProto(const v1::Report& m) {
+Report ReportOf(const v1::Mesh& mesh) {
+  const v1::Report& m = mesh.report();
   Report r;
+  r.epsilon = mesh.spec().epsilon();
   r.termination = v1::Termination_IsValid(m.termination())
                       ? static_cast<Termination>(m.termination())
                       : Termination::kUnknown;

@@ -30,7 +30,7 @@ Expected<Eigen::Index> CountRows(const v1::IndexArray& array, std::uint32_t widt
 Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options);
 
 Progress FromProto(const v1::Progress& message);
-Report FromProto(const v1::Report& message);
+Report ReportOf(const v1::Mesh& mesh);
 
 // The error that a failed call stands for.
 Error FromStatus(const grpc::Status& status);

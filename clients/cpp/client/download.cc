@@ -162,7 +162,7 @@ class Download {
                                                 " and " + std::to_string(simplices));
     }
     if (HasEnded(status_) && revision_ == status_.revision()) {
-      mesh.report = FromProto(status_.report());
+      mesh.report = ReportOf(status_);
     }
     return mesh;
   }

@@ -3,7 +3,10 @@
 #include <cmath>
 #include <cstdio>
 #include <iterator>
+#include <limits>
 #include <utility>
+
+#include "write_file.h"
 
 namespace stellate {
 namespace {
@@ -195,6 +198,9 @@ std::string ToText(const Report& report) {
   if (!report.failure_reason.empty() || !report.failure_message.empty()) {
     lines.Add("failure", report.failure_reason + ": " + report.failure_message);
   }
+  if (!report.epsilon_reason.empty()) {
+    lines.Add("epsilon", Format("%g", report.epsilon) + ", " + report.epsilon_reason);
+  }
   lines.Add("certificate", c.certified ? "CERTIFIED" : "NOT CERTIFIED");
   if (!c.verdict.empty()) lines.Add("verdict", c.verdict);
   if (c.components > 0) AddCertificate(c, lines);
@@ -211,10 +217,18 @@ std::string ToJson(const Report& report) {
     failure.Add("message", report.failure_message);
     json.Raw("failure", failure.Take());
   }
+  json.Add("epsilon",
+           report.epsilon > 0 ? report.epsilon : std::numeric_limits<double>::quiet_NaN());
+  json.Add("epsilon_reason", report.epsilon_reason);
   json.Raw("counts", CountsJson(report.counts));
   json.Raw("certificate", CertificateJson(report.certificate));
   json.Add("elapsed_seconds", report.elapsed_seconds);
+  json.Add("version", std::string(STELLATE_VERSION));
   return json.Take();
+}
+
+Expected<void> SaveJson(const Report& report, const std::string& path) {
+  return client::WriteFile(path, ToJson(report) + "\n");
 }
 
 }  // namespace stellate

@@ -205,7 +205,7 @@ Error WhyFailed(const v1::Mesh& mesh) {
 Expected<Mesh> Run::Conclude(const v1::Mesh& final) {
   if (final.state() == v1::MESH_STATE_FAILED) return tl::unexpected(WhyFailed(final));
   Mesh mesh = builder_->Take();
-  mesh.report = FromProto(final.report());
+  mesh.report = ReportOf(final);
   const Counts& counts = mesh.report.counts;
   if (counts.vertices != static_cast<std::uint64_t>(mesh.points.cols()) ||
       counts.simplices != static_cast<std::uint64_t>(mesh.simplices.cols())) {

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "stellate/mesh.h"
+#include "write_file.h"
 
 namespace stellate {
 namespace {
@@ -144,14 +144,37 @@ std::string Base64(std::string_view bytes) {
 // A DataArray element with its numbers inline, as VTK reads them: the byte count, then the bytes.
 template <typename Number>
 std::string DataArray(const char* type, const char* name, int components, const Number* data,
-                      Eigen::Index count) {
+                      Eigen::Index count, const std::string& more = "") {
   const std::uint64_t size = static_cast<std::uint64_t>(count) * sizeof(Number);
   std::string bytes(sizeof size + size, '\0');
   std::memcpy(bytes.data(), &size, sizeof size);
   if (size > 0) std::memcpy(bytes.data() + sizeof size, data, size);
   return std::string("<DataArray type=\"") + type + "\" Name=\"" + name +
-         "\" NumberOfComponents=\"" + std::to_string(components) + "\" format=\"binary\">" +
+         "\" NumberOfComponents=\"" + std::to_string(components) + "\"" + more + " format=\"binary\">" +
          Base64(bytes) + "</DataArray>\n";
+}
+
+template <typename Number>
+std::string Field(const char* type, const char* name, const Number* data, size_t count) {
+  return DataArray(type, name, 1, data, static_cast<Eigen::Index>(count),
+                   " NumberOfTuples=\"" + std::to_string(count) + "\"");
+}
+
+// Text as its bytes, which every reader takes.
+std::string Field(const char* name, const std::string& text) {
+  return Field("UInt8", name, text.data(), text.size());
+}
+
+// What the file says of the whole mesh.
+std::string FieldData(const Report& report) {
+  std::string xml = "<FieldData>\n" + Field("version", "stellate " STELLATE_VERSION);
+  if (report.termination != Termination::kUnknown) {
+    const std::uint8_t certified = report.certified() ? 1 : 0;
+    xml += Field("UInt8", "certified", &certified, 1) +
+           Field("verdict", report.certificate.verdict);
+  }
+  if (report.epsilon > 0) xml += Field("Float64", "epsilon", &report.epsilon, 1);
+  return xml + "</FieldData>\n";
 }
 
 Expected<std::string> Vtu(const Mesh& mesh) {
@@ -174,8 +197,8 @@ Expected<std::string> Vtu(const Mesh& mesh) {
                                         kCellTypes[static_cast<size_t>(mesh.dimension())]);
   std::string xml =
       "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" "
-      "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<UnstructuredGrid>\n<Piece "
-      "NumberOfPoints=\"" +
+      "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<UnstructuredGrid>\n" +
+      FieldData(mesh.report) + "<Piece NumberOfPoints=\"" +
       std::to_string(n) + "\" NumberOfCells=\"" + std::to_string(m) + "\">\n<Points>\n" +
       DataArray("Float64", "Points", 3, points.data(), points.size()) + "</Points>\n<Cells>\n" +
       DataArray("Int64", "connectivity", 1, connectivity.data(), connectivity.size()) +
@@ -204,12 +227,7 @@ Expected<void> Mesh::Save(const std::string& path) const {
     if (ending != format.ending) continue;
     const Expected<std::string> text = format.write(*this);  // in full before the file is touched
     if (!text) return tl::unexpected(text.error());
-    std::FILE* file = std::fopen(path.c_str(), "wb");
-    bool written =
-        file != nullptr && std::fwrite(text->data(), 1, text->size(), file) == text->size();
-    if (file != nullptr && std::fclose(file) != 0) written = false;
-    if (written) return {};
-    return Fail(ErrorCode::kFileFailed, "cannot write " + path + ": " + std::strerror(errno));
+    return client::WriteFile(path, *text);
   }
   return Fail(ErrorCode::kFileFailed, "no format is known by the ending '" + ending + "' of " +
                                           path + "; known: .txt .off .obj .ply .vtu");

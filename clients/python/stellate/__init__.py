@@ -19,6 +19,7 @@ from ._face import download, mesh, serve, watch  # noqa: E402
 from ._findings import CheckReport, Finding  # noqa: E402
 from ._mesh import Mesh, load_txt  # noqa: E402
 from ._server import Server, find_stellated  # noqa: E402
+from ._version import __version__  # noqa: E402
 from .client import Client, MeshInfo, ServerInfo  # noqa: E402
 from .errors import (  # noqa: E402
     Cancelled,
@@ -26,6 +27,7 @@ from .errors import (  # noqa: E402
     InvalidArgument,
     LimitExceeded,
     MeshNotFound,
+    NotCertified,
     NotConverged,
     OracleError,
     SaveError,
@@ -33,13 +35,12 @@ from .errors import (  # noqa: E402
     StellateError,
     Unauthenticated,
     Unavailable,
+    UncertifiedWarning,
 )
 from .implicit import ImplicitManifold  # noqa: E402
 from .oracle import Oracle  # noqa: E402
 from .progress import ProgressBar, progress_bar  # noqa: E402
 from .report import Certificate, Counts, Failure, Progress, Report  # noqa: E402
-
-__version__ = "0.1.0"
 
 __all__ = [
     "Cancelled",
@@ -57,6 +58,7 @@ __all__ = [
     "Mesh",
     "MeshInfo",
     "MeshNotFound",
+    "NotCertified",
     "NotConverged",
     "Oracle",
     "OracleError",
@@ -70,6 +72,7 @@ __all__ = [
     "StellateError",
     "Unauthenticated",
     "Unavailable",
+    "UncertifiedWarning",
     "check",
     "download",
     "find_stellated",

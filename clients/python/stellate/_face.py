@@ -11,7 +11,7 @@ from ._mesh import Mesh
 from ._server import Server
 from ._session import OnProgress, Session, follow
 from .client import Client
-from .errors import InvalidArgument
+from .errors import InvalidArgument, NotCertified
 
 
 def mesh(
@@ -20,6 +20,7 @@ def mesh(
     server: str | Server | Client | None = None,
     on_progress: OnProgress | None = None,
     credentials: Credentials | None = None,
+    require_certified: bool = False,
     **criteria: Any,
 ) -> Mesh:
     """Meshes the manifold that an oracle knows.
@@ -33,6 +34,7 @@ def mesh(
       on_progress: called in this thread with a stellate.Progress now and then. If it raises, the
         mesh is cancelled.
       credentials: a stellate.Credentials for `server`, where it wants TLS or a token.
+      require_certified: a mesh that is not certified is an error, NotCertified.
       **criteria: radius_edge_bound, sliver_bound, picking_radius, small_sliver_radius, candidates,
         advance_step, flat_alternations, ask_ahead, common_centre, size_rate, max_deviation;
         max_vertices, max_rounds, max_batch_queries, worker_wait_seconds, answer_seconds;
@@ -43,19 +45,31 @@ def mesh(
 
     Returns:
       The mesh. It may be uncertified, when a budget was spent or epsilon is too coarse: its report
-      says so, and why.
+      says so, and why; `require_certified` makes it an exception.
 
     Raises:
       What the oracle raises, as itself; OracleError for answers that break a rule; InvalidArgument,
-      LimitExceeded, Unavailable, Cancelled, ServerNotFound. KeyboardInterrupt cancels the mesh.
+      LimitExceeded, Unavailable, Cancelled, ServerNotFound, NotCertified. KeyboardInterrupt cancels the mesh.
     """
     if credentials is not None:
         with _connect(server, credentials) as client:
-            return mesh(oracle, epsilon, client, on_progress, **criteria)
+            return mesh(
+                oracle,
+                epsilon,
+                client,
+                on_progress,
+                require_certified=require_certified,
+                **criteria,
+            )
     workers = criteria.pop("workers", 1)
     with Session(oracle, epsilon, server, on_progress, workers, criteria, every=False) as session:
         (finished,) = session  # or an exception
-        return finished
+    if require_certified and not finished.certified:
+        raise NotCertified(
+            f"the mesh is not certified: {finished.report.what_failed}; it is the exception's mesh",
+            mesh=finished,
+        )
+    return finished
 
 
 def watch(

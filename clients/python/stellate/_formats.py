@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Iterator
 
 import numpy as np
 
+from . import _vtu
 from .errors import SaveError
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ _VTK_CELLS = {1: "line", 2: "triangle", 3: "tetra"}
 def save(mesh: Mesh, path: str) -> None:
     """Mesh.save."""
     extension = os.path.splitext(path)[1].lower()
-    own = {".txt": _txt, ".off": _off, ".obj": _obj, ".ply": _ply}.get(extension)
+    own = {".txt": _txt, ".off": _off, ".obj": _obj, ".ply": _ply, ".vtu": _as_vtu}.get(extension)
     if own is None:
         _with_meshio(mesh, path, extension)
         return
@@ -99,13 +100,22 @@ def _ply(mesh: Mesh) -> Iterator[str]:
     yield from _lines(_cells(mesh), "%d", "" if mesh.dimension == 1 else "3 ")
 
 
+def _as_vtu(mesh: Mesh) -> Iterator[str]:
+    if mesh.dimension not in _vtu.DIMENSIONS:
+        raise SaveError(
+            "VTU holds simplices of dimension 3 at most, and this mesh has dimension "
+            f"{mesh.dimension}; save it as .txt"
+        )
+    yield from _vtu.lines(mesh, _cells(mesh))
+
+
 def _with_meshio(mesh: Mesh, path: str, extension: str) -> None:
     try:
         import meshio
     except ImportError:
         raise SaveError(
             f"{extension or 'this'} files are written by meshio, which is not installed "
-            "(python3-meshio); .txt .off .obj .ply need nothing"
+            "(python3-meshio); .txt .off .obj .ply .vtu need nothing"
         ) from None
     if extension not in meshio.extension_to_filetypes:
         known = ".txt " + " ".join(sorted(meshio.extension_to_filetypes))

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import warnings
 
 import numpy as np
 
 from . import _formats
 from ._orientation import orient, turn_outwards
+from .errors import UncertifiedWarning
 from .report import Progress, Report
 
 
@@ -20,7 +22,7 @@ class Mesh:
       points: (n, d) float64, the sample points.
       simplices: (m, k+1) int64, zero-based ids of points, ascending in each row, rows in
         lexicographic order.
-      report: how it ended and what is proved; None while the mesh grows.
+      report: how it ended and what is proved; None while the mesh grows, or if that is not known.
       progress: how it stood at this revision; None if that is not known.
       revision: one for each round that changed the mesh.
     """
@@ -66,16 +68,29 @@ class Mesh:
         .off  any d (nOFF when d is not 3), k <= 2.
         .obj  .ply  curves and surfaces, d <= 3.
         .vtu  and what else meshio knows: k <= 3. When d > 3 the points are the first three
-              coordinates, and all of them are the point data "coordinates".
+              coordinates, and all of them are the point data "coordinates". The field data of a
+              .vtu are "epsilon", "certified" (0 or 1), "verdict" and "version" (UTF-8 bytes).
 
         Surfaces are written with their triangles turned to agree where they are orientable.
 
         Raises: SaveError when the format cannot hold this mesh, OSError.
+        Warns: UncertifiedWarning for a mesh whose report says that it is not certified.
         """
+        if self.report is not None and not self.report.certified:
+            warnings.warn(
+                f"{os.fspath(path)} gets a mesh that is NOT CERTIFIED: {self.report.what_failed}",
+                UncertifiedWarning,
+                stacklevel=2,
+            )
         _formats.save(self, os.fspath(path))
 
     def __repr__(self) -> str:
-        state = "growing" if self.report is None else self.report.termination
+        if self.report is None:
+            state = "no report"
+        elif self.report.certified:
+            state = "CERTIFIED"
+        else:
+            state = f"NOT CERTIFIED ({self.report.termination})"
         return (
             f"<stellate.Mesh k={self.dimension} d={self.ambient_dimension} "
             f"{len(self.points)} points, {len(self.simplices)} simplices, {state}>"

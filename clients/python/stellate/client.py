@@ -60,6 +60,9 @@ class MeshInfo:
                 return None
             return getattr(mesh, field).ToDatetime(tzinfo=datetime.timezone.utc)
 
+        report = None
+        if mesh.HasField("report"):
+            report = Report.from_wire(mesh.report, mesh.spec.epsilon or None)
         return cls(
             name=mesh.name,
             state=mesh_pb2.MeshState.Name(mesh.state).removeprefix("MESH_STATE_"),
@@ -71,7 +74,7 @@ class MeshInfo:
             end_time=at("end_time"),
             revision=mesh.revision,
             progress=Progress.from_wire(mesh.progress),
-            report=Report.from_wire(mesh.report) if mesh.HasField("report") else None,
+            report=report,
             workers=mesh.workers,
             watchers=mesh.watchers,
         )

@@ -102,6 +102,19 @@ class SaveError(StellateError, ValueError):
     default_reason = "FORMAT"
 
 
+class NotCertified(StellateError):
+    """The mesh is finished and not proved good, which stellate.mesh was told to insist on.
+
+    The mesh is the exception's `mesh`, and its report says what is wrong.
+    """
+
+    default_reason = "NOT_CERTIFIED"
+
+
+class UncertifiedWarning(UserWarning):
+    """A mesh is written to a file that is not certified."""
+
+
 class NotConverged(StellateError, ArithmeticError):
     """Closest points that were not found for some of a batch.
 

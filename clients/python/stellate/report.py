@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+import math
 import re
 import textwrap
 from typing import Any
 
 from ._generated import mesh_pb2 as pb
+from ._version import __version__
 
 
 def _copy_fields(cls: type, message: Any) -> Any:
@@ -122,6 +125,8 @@ class Report:
     counts: Counts
     certificate: Certificate
     elapsed_seconds: float
+    epsilon: float | None = None  # that the mesh was made with; None if that is not known
+    epsilon_reason: str = ""  # why it is what it is, where it was not given
 
     @property
     def certified(self) -> bool:
@@ -133,8 +138,34 @@ class Report:
         """What to know about the mesh, certified or not."""
         return self.certificate.warnings
 
+    @property
+    def what_failed(self) -> str:
+        """The first thing that keeps the mesh from being certified; "" if it is."""
+        return "" if self.certified else _plain_verdict(self.certificate)
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of it as plain values for JSON, with the names of the protocol.
+
+        The same as the shell's --report writes: what is not known, infinite or no number is None,
+        and "failure" is there for a mesh that failed.
+        """
+        whole: dict[str, Any] = {"termination": self.termination}
+        if self.failure is not None:
+            whole["failure"] = dataclasses.asdict(self.failure)
+        whole["epsilon"] = self.epsilon
+        whole["epsilon_reason"] = self.epsilon_reason
+        whole["counts"] = dataclasses.asdict(self.counts)
+        whole["certificate"] = dataclasses.asdict(self.certificate)
+        whole["elapsed_seconds"] = self.elapsed_seconds
+        whole["version"] = __version__
+        return _for_json(whole)
+
+    def to_json(self, indent: int | None = None) -> str:
+        """to_dict() as a JSON text; `indent` as json.dumps takes it."""
+        return json.dumps(self.to_dict(), indent=indent, ensure_ascii=False, allow_nan=False)
+
     @classmethod
-    def from_wire(cls, message: pb.Report) -> Report:
+    def from_wire(cls, message: pb.Report, epsilon: float | None = None) -> Report:
         failure = None
         if message.HasField("failure"):
             failure = Failure(message.failure.reason, message.failure.message)
@@ -144,6 +175,7 @@ class Report:
             counts=_copy_fields(Counts, message.counts),
             certificate=_copy_fields(Certificate, message.certificate),
             elapsed_seconds=message.elapsed_seconds,
+            epsilon=epsilon,
         )
 
     def __str__(self) -> str:
@@ -163,13 +195,28 @@ class Report:
         ]
         if self.failure is not None:
             lines.append(("failure", f"{self.failure.reason}: {self.failure.message}"))
+        if self.epsilon_reason:
+            lines.append(("epsilon", f"{self.epsilon:g}, {self.epsilon_reason}"))
         mark = "CERTIFIED" if c.certified else "NOT CERTIFIED"
-        verdict = re.sub(r"^(not )?certified\W+", "", c.verdict, flags=re.IGNORECASE)
+        verdict = _plain_verdict(c)
         lines.append(("certificate", f"{mark}: {verdict}" if verdict else mark))
         if c.components:
             lines += _certificate_lines(c)
         lines += [("warning", text) for text in c.warnings]
         return "\n".join(_entry(title, text) for title, text in lines)
+
+
+def _plain_verdict(c: Certificate) -> str:
+    """Without the word that says whether it is certified."""
+    return re.sub(r"^(not )?certified\W+", "", c.verdict, flags=re.IGNORECASE)
+
+
+def _for_json(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _for_json(entry) for key, entry in value.items()}
+    if isinstance(value, tuple):
+        return list(value)
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _entry(title: str, text: str) -> str:

@@ -133,5 +133,5 @@ def test_deltas_that_do_not_fit_are_refused(chunk, words):
 def test_mesh_describes_itself():
     mesh = shapes.torus()
     assert (mesh.dimension, mesh.ambient_dimension, mesh.certified) == (2, 3, False)
-    assert "k=2 d=3 84 points, 168 simplices, growing" in repr(mesh)
+    assert "k=2 d=3 84 points, 168 simplices, no report" in repr(mesh)
     assert isinstance(mesh, stellate.Mesh)

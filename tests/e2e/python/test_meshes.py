@@ -234,3 +234,12 @@ def test_a_budget_that_is_spent_leaves_an_uncertified_mesh(limit, end, server):
     assert mesh.report.termination == end
     assert not mesh.certified
     assert limit in str(mesh.report)
+
+
+def test_a_mesh_that_has_to_be_certified(server):
+    torus = stellate.manifolds.Torus()
+    with pytest.raises(stellate.NotCertified, match="VERTEX_BUDGET") as caught:
+        stellate.mesh(torus, 0.2, server, max_vertices=60, require_certified=True)
+    assert caught.value.mesh.report.termination == "VERTEX_BUDGET"
+    assert caught.value.mesh.report.epsilon == 0.2
+    assert stellate.mesh(torus, 0.2, server, require_certified=True).certified

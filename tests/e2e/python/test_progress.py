@@ -2,7 +2,9 @@
 
 import dataclasses
 import io
+import json
 
+import numpy as np
 import pytest
 
 import stellate
@@ -73,7 +75,7 @@ def report(certified):
     certificate.links_are_spheres = certified
     certificate.components, certificate.euler_characteristic = 1, -8
     certificate.warnings.append("epsilon is coarse")
-    return stellate.Report.from_wire(message)
+    return stellate.Report.from_wire(message, 0.1)
 
 
 def test_a_report_reads_well():
@@ -104,3 +106,44 @@ def test_a_failure_is_told():
     failed = stellate.Report.from_wire(message)
     assert failed.failure == stellate.Failure("ORACLE_NOT_FINITE", "query 3 is nan")
     assert "ORACLE_NOT_FINITE: query 3 is nan" in str(failed)
+
+
+def test_a_mesh_says_that_it_is_not_certified():
+    mesh = stellate.Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]]), report(False))
+    for text in (repr(mesh), str(mesh)):
+        assert "NOT CERTIFIED (CONVERGED)" in text
+    good = repr(dataclasses.replace(mesh, report=report(True)))
+    assert good.endswith(" 3 points, 1 simplices, CERTIFIED>")
+
+
+# What the C++ client writes of the same report: see report_test.cc.
+AS_JSON = (
+    '{"termination": "ORACLE_FAILED", "failure": {"reason": "ORACLE_RAISED", "message": '
+    '"a \\"quote\\""}, "epsilon": 0.1, "epsilon_reason": "", "counts": {"vertices": 1234567, '
+    '"simplices": 42, "rounds": 0, "queries": 0, "tangent_queries": 0, "inserted_size": 0, '
+    '"inserted_radius_edge": 0, "inserted_sliver": 0, "inserted_inconsistent": 0, "duplicates": 0}'
+    ', "certificate": {"certified": false, "verdict": "3 links", "warnings": ["coarse", "dear"], '
+    '"closed": false, "bad_faces": 0, "links_are_spheres": false, "links_decided_exactly": false, '
+    '"bad_links": 3, "inconsistent_simplices": 0, "unembedded_stars": 0, "fibre_failures": 0, '
+    '"fibre_samples": 0, "max_circumradius": 0.25, "max_radius_edge": 0, "min_fatness": 0, '
+    '"min_angle_degrees": 0, "max_tangent_angle_degrees": 0, "max_barycentre_distance": 0, '
+    '"estimated_reach": null, "epsilon_over_reach": 0, "components": 1, '
+    '"euler_characteristic": -8, "orientable": false}, "elapsed_seconds": 0.5, '
+    f'"version": "{stellate.__version__}"}}'
+)
+
+
+def test_a_report_is_the_json_of_all_clients():
+    message = mesh_pb2.Report(termination=mesh_pb2.TERMINATION_ORACLE_FAILED, elapsed_seconds=0.5)
+    message.failure.reason, message.failure.message = "ORACLE_RAISED", 'a "quote"'
+    message.counts.vertices, message.counts.simplices = 1234567, 42
+    certificate = message.certificate
+    certificate.verdict, certificate.bad_links = "3 links", 3
+    certificate.warnings.extend(["coarse", "dear"])
+    certificate.max_circumradius, certificate.estimated_reach = 0.25, float("inf")
+    certificate.components, certificate.euler_characteristic = 1, -8
+    ours = stellate.Report.from_wire(message, 0.1)
+    assert list(json.loads(AS_JSON)) == list(ours.to_dict())  # in this order
+    assert json.loads(ours.to_json()) == json.loads(AS_JSON) == ours.to_dict()
+    assert len(ours.to_json(indent=2).splitlines()) > 40
+    assert stellate.Report.from_wire(message).to_dict()["epsilon"] is None

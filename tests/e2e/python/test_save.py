@@ -1,6 +1,8 @@
 """Files: what is written is read back the same."""
 
+import dataclasses
 import sys
+import warnings
 
 import meshio
 import numpy as np
@@ -9,6 +11,7 @@ import shapes
 import topology
 
 import stellate
+from stellate._generated import mesh_pb2
 
 
 def outward(mesh, cells):
@@ -90,6 +93,45 @@ def test_vtu_beyond_space_keeps_all_coordinates(tmp_path):
     again = meshio.read(tmp_path / "mesh.vtu")
     assert np.array_equal(again.points, mesh.points[:, :3])
     assert np.array_equal(again.point_data["coordinates"], mesh.points)
+
+
+def finished(mesh, certified):
+    message = mesh_pb2.Report(termination=mesh_pb2.TERMINATION_VERTEX_BUDGET)
+    message.certificate.certified = certified
+    message.certificate.verdict = "certified: \N{GREEK SMALL LETTER CHI} = 0" if certified else "no"
+    return dataclasses.replace(mesh, report=stellate.Report.from_wire(message, 0.1))
+
+
+def test_vtu_says_what_the_mesh_is(tmp_path):
+    mesh = finished(shapes.torus(), True)
+    mesh.save(tmp_path / "mesh.vtu")
+    said = meshio.read(tmp_path / "mesh.vtu").field_data
+    assert said["epsilon"].ravel().tolist() == [0.1]
+    assert said["certified"].ravel().tolist() == [1]
+    verdict = bytes(said["verdict"].ravel()).decode()
+    assert verdict == mesh.report.certificate.verdict == "certified: \u03c7 = 0"
+    assert bytes(said["version"].ravel()).decode() == f"stellate {stellate.__version__}"
+    shapes.torus().save(tmp_path / "unknown.vtu")
+    assert set(meshio.read(tmp_path / "unknown.vtu").field_data) == {"version"}
+
+
+def test_vtu_of_many_blocks(tmp_path):
+    mesh = shapes.torus(400, 301)
+    mesh.save(tmp_path / "mesh.vtu")
+    again = meshio.read(tmp_path / "mesh.vtu")
+    assert again.points.tobytes() == mesh.points.tobytes()
+    assert np.array_equal(np.sort(again.cells_dict["triangle"], axis=1), mesh.simplices)
+
+
+def test_saving_what_is_not_certified_warns(tmp_path):
+    mesh = finished(shapes.torus(), False)
+    with pytest.warns(stellate.UncertifiedWarning, match="m.txt .*NOT CERTIFIED: no") as caught:
+        mesh.save(tmp_path / "m.txt")
+    assert caught[0].filename == __file__
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        finished(shapes.torus(), True).save(tmp_path / "m.txt")
+        shapes.torus().save(tmp_path / "m.txt")  # of which nothing is known
 
 
 def test_curve_as_obj_and_ply(tmp_path):

@@ -26,7 +26,8 @@ struct Mesh {
   //   .off  curves and surfaces; nOFF with all coordinates unless d = 3
   //   .obj  curves and surfaces, d <= 3
   //   .ply  curves and surfaces, d <= 3, ascii
-  //   .vtu  k <= 3; beyond d = 3 the first three coordinates, and all as point data "coordinates"
+  //   .vtu  k <= 3; beyond d = 3 the first three coordinates, and all as point data "coordinates";
+  //         field data "epsilon", "certified" (0 or 1), "verdict" and "version" (UTF-8 bytes)
   // The last four are oriented coherently where the mesh is orientable. kFileFailed when the format
   // cannot hold the mesh or the file cannot be written.
   Expected<void> Save(const std::string& path) const;

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "stellate/error.h"
+
 namespace stellate {
 
 // How a run ended. Every ending but kConverged leaves a mesh that is not certified.
@@ -84,11 +86,16 @@ struct Report {
   Counts counts;
   Certificate certificate;
   double elapsed_seconds = 0;
+  double epsilon = 0;          // that the mesh was made with; 0: not known
+  std::string epsilon_reason;  // why it is what it is, where it was not given
 
   bool certified() const { return certificate.certified; }
 };
 
 std::string ToText(const Report& report);  // several lines, for people
-std::string ToJson(const Report& report);  // one object, keys as in the protocol
+// One object in one line, keys as in the protocol; null for infinite, no number and not known.
+std::string ToJson(const Report& report);
+// ToJson into a file. kFileFailed when it cannot be written.
+Expected<void> SaveJson(const Report& report, const std::string& path);
 
 }  // namespace stellate
