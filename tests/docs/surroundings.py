@@ -14,6 +14,7 @@ import fcntl
 import os
 import pathlib
 import re
+import runpy
 import shutil
 import socket
 import struct
@@ -74,9 +75,12 @@ class Surroundings:
 
     def _grow_tree(self, fresh: bool) -> None:
         # Scripts find the tree by their own place: what they lie in has to be a copy.
+        # Stubs are made first, lest somebody else's import makes them while they are copied.
+        runpy.run_path(str(ROOT / "clients/python/stellate/_stubs.py"))["ensure"]()
+        passing = shutil.ignore_patterns("__pycache__", ".generated-*")
         for item in ROOT.iterdir():
             if item.name in ("clients", "docker", "proto"):
-                shutil.copytree(item, self.here / item.name, symlinks=True)
+                shutil.copytree(item, self.here / item.name, symlinks=True, ignore=passing)
             elif item.name not in ("build", ".git"):
                 (self.here / item.name).symlink_to(item)
         programs = self.here / ".programs"
