@@ -1,6 +1,7 @@
 #include "server/server.h"
 
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/server_builder.h>
@@ -19,6 +20,7 @@
 #include "core/message.h"
 #include "server/connection_guard.h"
 #include "server/error_map.h"
+#include "server/header_bound.h"
 #include "server/listener.h"
 #include "server/tls.h"
 #include "stellate/v1/stellate.grpc.pb.h"
@@ -157,6 +159,7 @@ void SetUp(const Config& config, grpc::ServerBuilder* builder) {
   builder->AddChannelArgument(GRPC_ARG_ENABLE_CHANNELZ, 1);  // the connection guard asks it
   builder->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
                               static_cast<int>(config.max_connection_streams));
+  builder->AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, static_cast<int>(kMostMetadataBytes));
   grpc::ResourceQuota quota("stellated");
   quota.SetMaxThreads(kMaxSyncThreads);
   builder->SetResourceQuota(quota);
@@ -249,8 +252,20 @@ class Server::Impl {
         service.authenticator->Reload();  // before the streams ask it
         service.streams.Tick(now);
         service.store.Sweep(now);
+        CountHeaderBlocks();
       }
     });
+  }
+
+  // Of every server in this process, as nothing tells whose they were.
+  void CountHeaderBlocks() {
+    const std::uint64_t closed = EndlessHeaderBlocks() - header_blocks;
+    if (closed == 0) return;
+    header_blocks += closed;
+    for (std::uint64_t i = 0; i < closed; ++i) service.metrics.LimitReached("header-bytes");
+    Log(LogLevel::kWarning, {},
+        Message("closed ", closed, " connections whose headers were longer than ", kMostHeaderBytes,
+                " bytes or came in more than ", kMostHeaderFrames, " frames"));
   }
 
   ServerState service;
@@ -259,6 +274,7 @@ class Server::Impl {
   std::unique_ptr<ConnectionGuard> guard;  // TCP alone, as the next
   std::unique_ptr<Listener> listener;
   bool stopped = false;
+  std::uint64_t header_blocks = EndlessHeaderBlocks();  // that were counted
   std::mutex tick_mutex;
   std::condition_variable_any tick_wake;
   std::jthread ticker;
@@ -280,6 +296,11 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
   }
   static std::once_flag plugins;
   std::call_once(plugins, [] {
+    if (!HeaderBlocksEnd()) {
+      Log(LogLevel::kWarning, {},
+          Message("gRPC ", grpc::Version(), " takes headers without end (CVE-2023-33953), which ",
+                  "stops the server for everybody: let strangers reach it through a proxy alone"));
+    }
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   });

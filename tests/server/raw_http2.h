@@ -5,6 +5,8 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "tests/server/loopback.h"
 
@@ -21,21 +23,47 @@ class RawHttp2 {
 
   // Begins `count` calls of an rpc; `reset`: and gives each up at once.
   void Call(const std::string& rpc, int count, bool reset) {
-    std::string header;
-    for (const auto& [name, value] : {std::pair<std::string, std::string>{":method", "POST"},
-                                      {":scheme", "http"},
-                                      {":path", "/stellate.v1.Stellate/" + rpc},
-                                      {":authority", "localhost"},
-                                      {"content-type", "application/grpc"},
-                                      {"te", "trailers"}}) {
-      header += std::string(1, '\0') + static_cast<char>(name.size()) + name;
-      header += static_cast<char>(value.size()) + value;
-    }
+    const std::string header = HeadersOf(rpc);
     for (int i = 0; i < count; ++i, stream_ += 2) {
       std::string frames = Frame(kHeaders, kEndHeaders, stream_, header);
       if (reset) frames += Frame(kReset, 0, stream_, std::string("\0\0\0\x08", 4));
       if (!Send(frames)) return;
     }
+  }
+
+  // What HPACK makes of a call's headers, and of some of the caller's own.
+  static std::string HeadersOf(const std::string& rpc,
+                               const std::vector<std::pair<std::string, std::string>>& more = {}) {
+    std::string block;
+    const auto add = [&block](const std::string& name, const std::string& value) {
+      block += std::string(1, '\0') + Prefixed(name) + Prefixed(value);
+    };
+    add(":method", "POST");
+    add(":scheme", "http");
+    add(":path", "/stellate.v1.Stellate/" + rpc);
+    add(":authority", "localhost");
+    add("content-type", "application/grpc");
+    add("te", "trailers");
+    for (const auto& [name, value] : more) add(name, value);
+    return block;
+  }
+
+  // A new call's headers, in frames of at most so many bytes. False: the connection is closed.
+  bool Headers(const std::string& block, std::size_t frame_bytes, bool end) {
+    for (std::size_t at = 0; at < block.size() || at == 0; at += frame_bytes) {
+      const bool last = end && at + frame_bytes >= block.size();
+      if (!Send(Frame(at == 0 ? kHeaders : kContinuation, last ? kEndHeaders : 0, stream_,
+                      block.substr(at, frame_bytes)))) {
+        return false;
+      }
+    }
+    if (end) stream_ += 2;
+    return true;
+  }
+
+  // More of the headers whose end did not come.
+  bool MoreHeaders(const std::string& block) {
+    return Send(Frame(kContinuation, 0, stream_, block));
   }
 
   // Waits until the server has closed the connection, whatever it says before.
@@ -59,7 +87,7 @@ class RawHttp2 {
   }
 
  private:
-  static constexpr char kHeaders = 1, kReset = 3, kSettings = 4, kPing = 6;
+  static constexpr char kHeaders = 1, kReset = 3, kSettings = 4, kPing = 6, kContinuation = 9;
   static constexpr char kAck = 1, kEndHeaders = 4;
 
   static std::string Frame(char kind, char flags, std::uint32_t stream,
@@ -71,6 +99,15 @@ class RawHttp2 {
     frame[4] = flags;
     for (std::size_t i = 0; i < 4; ++i) frame[5 + i] = static_cast<char>(stream >> (24 - 8 * i));
     return frame + payload;
+  }
+
+  // A string of HPACK: its length and itself.
+  static std::string Prefixed(const std::string& text) {
+    if (text.size() < 127) return static_cast<char>(text.size()) + text;
+    std::string length(1, 127);
+    std::size_t rest = text.size() - 127;
+    for (; rest >= 128; rest /= 128) length += static_cast<char>(rest % 128 | 128);
+    return length + static_cast<char>(rest) + text;
   }
 
   bool Send(const std::string& bytes) {

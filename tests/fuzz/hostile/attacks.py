@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import collections
 import dataclasses
+import itertools
 import random
 import struct
 import threading
@@ -20,6 +21,7 @@ from stellate._spec import mesh_spec
 from stellate.oracle import CheckedOracle
 
 import raw_http2 as raw
+from strangers import ENDLESS
 
 SERVICE = "/stellate.v1.Stellate/"
 UNARY = ("CreateMesh", "GetMesh", "ListMeshes", "CancelMesh", "DeleteMesh", "GetServerInfo")
@@ -390,6 +392,28 @@ def other_protocols(target: Target) -> None:
         connection.close()
 
 
+def endless_headers(target: Target) -> None:
+    """Header blocks without end: each is cut, and its stranger comes again."""
+    for words in ENDLESS:
+        for _ in range(4 * target.scale):
+            connection = target.connect()
+            for part in itertools.islice(words(), 100):
+                connection.send(part)
+            connection.until_closed()
+            connection.close()
+
+
+def bad_headers(target: Target) -> None:
+    """Headers that no call may have, among more of them than a call may have."""
+    for _ in range(target.scale):
+        for bad in ({"te": "x"}, {":scheme": "x"}, {"grpclb_client_stats": "x"}, {"x-bin": "***"}):
+            for more in ({}, {"big": "y" * 9000}):
+                connection = target.connect()
+                connection.open(1, SERVICE + "GetServerInfo", {**bad, **more})
+                connection.data(1, raw.grpc_message(b""), raw.END_STREAM)
+                connection.close()
+
+
 def deaf_watchers(target: Target) -> None:
     """Watchers and workers that ask for everything and read nothing."""
     no_window = struct.pack(">HI", 4, 0)  # SETTINGS_INITIAL_WINDOW_SIZE = 0
@@ -471,6 +495,8 @@ ATTACKS: tuple[Callable[[Target], None], ...] = (
     unbounded_calls,
     packed_messages,
     unread_replies,
+    endless_headers,
+    bad_headers,
     other_protocols,
     deaf_watchers,
 )
