@@ -1,8 +1,10 @@
 #include "mesh_command.h"
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <iostream>
 #include <memory>
+#include <string>
 #include <type_traits>
 #include <utility>
 
@@ -50,7 +52,11 @@ MeshCommand::MeshCommand(CLI::App& parent)
       server_(command_, "") {
   command_->add_option("manifold", manifold_, "e.g. torus:1:0.4; see 'stellate list'")->required();
   command_
-      ->add_option("-e,--epsilon", options_.epsilon, "largest circumradius of a simplex, a length")
+      ->add_option_function<std::string>(
+          "-e,--epsilon", [this](const std::string& text) { SetEpsilon(text); },
+          "largest circumradius of a simplex, a length; or auto: a quarter of the reach that "
+          "'stellate doctor' finds")
+      ->type_name("FLOAT|auto")
       ->required();
   command_->add_option("-o,--output", outputs_,
                        "file to write, .txt .off .obj .ply .vtu; may be given again");
@@ -65,6 +71,12 @@ MeshCommand::MeshCommand(CLI::App& parent)
   command_->add_flag("-q,--quiet", quiet_, "no progress and no report");
   command_->footer(
       "Exit status: 0 certified, 1 not certified, 2 usage or refused, 3 server or oracle failed.");
+}
+
+void MeshCommand::SetEpsilon(const std::string& text) {
+  options_.auto_epsilon = text == "auto";
+  if (options_.auto_epsilon || CLI::detail::lexical_cast(text, options_.epsilon)) return;
+  throw CLI::ValidationError("--epsilon", "has to be a length or auto, and is '" + text + "'");
 }
 
 int MeshCommand::Run(std::stop_token stop) {
@@ -84,6 +96,9 @@ int MeshCommand::Run(std::stop_token stop) {
   ProgressBar bar(quiet_);
   options_.label = ("stellate mesh " + manifold_).substr(0, kMaxLabel);
   options_.stop = std::move(stop);
+  options_.on_epsilon = [this](double epsilon, const std::string& reason) {
+    if (!quiet_) std::fprintf(stderr, "epsilon %g, %s\n", epsilon, reason.c_str());
+  };
   options_.on_progress = [&bar](const Progress& progress) { bar.Show(progress); };
   options_.on_outage = [this, &bar](const Outage& outage) {
     bar.Clear();

@@ -18,6 +18,7 @@ class MeshCommand {
   int Run(std::stop_token stop);
 
  private:
+  void SetEpsilon(const std::string& text);
   int Deliver(const Mesh& mesh) const;
 
   CLI::App* command_;

@@ -10,8 +10,10 @@
 #include <ostream>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "stellate/catalogue.h"
+#include "stellate/client.h"
 #include "support/spoiled_oracle.h"
 
 namespace stellate {
@@ -211,6 +213,29 @@ TEST(Check, EpsilonIsHeldAgainstTheReach) {
   EXPECT_NEAR(*coarse.reach, 0.4, 0.02);
   options.epsilon = 0.1;
   EXPECT_EQ(Check(*torus, options).Find("COARSE_EPSILON"), nullptr);
+}
+
+TEST(ChooseEpsilon, IsAQuarterOfTheReachWhateverTheUnit) {
+  for (const auto& [spec, expected] :
+       {std::pair("torus:1:0.4", 0.1), std::pair("torus:1000:400", 100.0)}) {
+    const auto manifold = MakeManifold(spec, nullptr);
+    const auto chosen = ChooseEpsilon(*manifold);
+    ASSERT_TRUE(chosen.has_value()) << chosen.error().message;
+    EXPECT_NEAR(chosen->epsilon, expected, 0.05 * expected);
+    EXPECT_EQ(chosen->reason.rfind("a quarter of the reach, about ", 0), 0u) << chosen->reason;
+  }
+}
+
+TEST(ChooseEpsilon, RefusesAnOracleThatBreaksItsContract) {
+  const auto torus = MakeManifold("torus:1:0.4", nullptr);
+  SpoiledOracle oracle(*torus);
+  oracle.on_closest = [](const Eigen::MatrixXd& x, Answer& a) { a.points = (a.points + x) / 2; };
+  const auto chosen = ChooseEpsilon(oracle);
+  ASSERT_FALSE(chosen.has_value());
+  EXPECT_EQ(chosen.error().code, ErrorCode::kOracleFailed);
+  EXPECT_NE(chosen.error().message.find("error NOT_IDEMPOTENT"), std::string::npos)
+      << chosen.error().message;
+  EXPECT_EQ(chosen.error().message.find("note "), std::string::npos) << chosen.error().message;
 }
 
 TEST(Check, ReadsWell) {

@@ -83,6 +83,19 @@ TEST_F(CommandLine, ClosestPointsAloneWillDo) {
   EXPECT_EQ(OnServer("mesh torus -e 0.2 --closest-point-only -q").status, 0);
 }
 
+TEST_F(CommandLine, AutomaticEpsilonIsAQuarterOfTheReach) {
+  const Result result = OnServer("mesh torus:1000:400 --epsilon auto");
+  EXPECT_EQ(result.status, 0) << result.output;
+  EXPECT_EQ(result.output.rfind("epsilon 100, a quarter of the reach, about 4", 0), 0u)
+      << result.output;
+  EXPECT_NE(result.output.find("      epsilon  100, a quarter of"), std::string::npos)
+      << result.output;
+  const Result wrong = OnServer("mesh torus --epsilon aut");
+  EXPECT_EQ(wrong.status, 2);
+  EXPECT_NE(wrong.output.find("has to be a length or auto, and is 'aut'"), std::string::npos)
+      << wrong.output;
+}
+
 TEST_F(CommandLine, UncertifiedMeshExitsOne) {
   const Result result = OnServer("mesh torus --epsilon 0.2 --max-vertices 50");
   EXPECT_EQ(result.status, 1) << result.output;

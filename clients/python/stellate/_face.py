@@ -16,7 +16,7 @@ from .errors import InvalidArgument, NotCertified
 
 def mesh(
     oracle: Any,
-    epsilon: float = 0.1,
+    epsilon: float | str,
     server: str | Server | Client | None = None,
     on_progress: OnProgress | None = None,
     credentials: Credentials | None = None,
@@ -28,7 +28,9 @@ def mesh(
     Args:
       oracle: see stellate.Oracle.
       epsilon: the largest circumradius of a simplex, a length. The mesh lies within about
-        epsilon^2 / (2 reach) of the manifold; 0.4 reach and below is safe.
+        epsilon^2 / (2 reach) of the manifold; 0.4 reach and below is safe. The number of vertices
+        grows with epsilon^-k. "auto": a quarter of the reach that stellate.check finds, to two
+        digits; `on_progress.note`, if there is one, and the report are told what and why.
       server: "host:port", "unix:/path", a stellate.Server or Client; None starts a stellated on a
         private unix socket and stops it afterwards.
       on_progress: called in this thread with a stellate.Progress now and then. If it raises, the
@@ -48,7 +50,8 @@ def mesh(
       says so, and why; `require_certified` makes it an exception.
 
     Raises:
-      What the oracle raises, as itself; OracleError for answers that break a rule; InvalidArgument,
+      What the oracle raises, as itself; OracleError for answers that break a rule, and for "auto"
+      where stellate.check finds an error; InvalidArgument,
       LimitExceeded, Unavailable, Cancelled, ServerNotFound, NotCertified. KeyboardInterrupt cancels the mesh.
     """
     if credentials is not None:
@@ -74,7 +77,7 @@ def mesh(
 
 def watch(
     oracle: Any,
-    epsilon: float = 0.1,
+    epsilon: float | str | None = None,
     server: str | Server | Client | None = None,
     on_progress: OnProgress | None = None,
     credentials: Credentials | None = None,
@@ -95,6 +98,8 @@ def watch(
             raise TypeError(f"a mesh that exists already takes no {', '.join(criteria)}")
         yield from _watch_by_name(oracle, server, on_progress)
         return
+    if epsilon is None:
+        raise TypeError("watch() needs epsilon, a length or 'auto', to mesh an oracle's manifold")
     workers = criteria.pop("workers", 1)
     with Session(oracle, epsilon, server, on_progress, workers, criteria) as session:
         yield from session

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import dataclasses
+import logging
 import threading
 import time
 from types import TracebackType
 from typing import Any, Callable, Iterator, TypeVar
 
+from ._epsilon import choose
 from ._growth import GrowingComplex
 from ._mesh import Mesh
 from ._server import Server
+from ._spec import mesh_spec
 from .client import Client, MeshInfo
 from .errors import Cancelled, StellateError, error_class
 from .oracle import CheckedOracle
 from .report import Progress, Report
 
 T = TypeVar("T")
+
+_log = logging.getLogger("stellate")
 
 OnProgress = Callable[[Progress], None]
 
@@ -73,7 +79,7 @@ class Session:
     def __init__(
         self,
         oracle: Any,
-        epsilon: float,
+        epsilon: float | str,
         server: str | Server | Client | None,
         on_progress: OnProgress | None,
         workers: int,
@@ -84,6 +90,10 @@ class Session:
         if int(workers) != workers or workers < 1:
             raise ValueError(f"workers has to be a whole number from 1 on, and is {workers!r}")
         checked = CheckedOracle(oracle)
+        mesh_spec(checked, 1.0, criteria)  # what is misspelt shows before the oracle is probed
+        epsilon, self._epsilon_reason = choose(oracle, epsilon)
+        if self._epsilon_reason:
+            _note(on_progress, f"epsilon {epsilon:g}, {self._epsilon_reason}")
         self._on_progress, self._every = on_progress, every
         self._owns_client = not isinstance(server, Client)
         self._client = server if isinstance(server, Client) else Client(server)
@@ -98,8 +108,11 @@ class Session:
     def __iter__(self) -> Iterator[Mesh]:
         """The mesh as it grows, the last with its report. Raises how it failed."""
         try:
-            yield from follow(self._client, self.info, self._on_progress, self._every)
+            for mesh in follow(self._client, self.info, self._on_progress, self._every):
+                yield self._told(mesh)
         except StellateError as error:
+            if error.mesh is not None:
+                error.mesh = self._told(error.mesh)
             if self._workers.failure is None:
                 raise
             # Our own exception says more than the server's account of it.
@@ -107,6 +120,13 @@ class Session:
                 self._workers.failure.mesh = error.mesh
             raise self._workers.failure from None
         self._ended = True
+
+    def _told(self, mesh: Mesh) -> Mesh:
+        """With what the server does not know: why epsilon is what it is."""
+        if mesh.report is None or not self._epsilon_reason:
+            return mesh
+        report = dataclasses.replace(mesh.report, epsilon_reason=self._epsilon_reason)
+        return dataclasses.replace(mesh, report=report)
 
     def __enter__(self) -> Session:
         return self
@@ -136,6 +156,14 @@ class Session:
     def _close_client(self) -> None:
         if self._owns_client:
             self._client.close()
+
+
+def _note(on_progress: OnProgress | None, text: str) -> None:
+    """Tells the log, and an `on_progress` that shows text."""
+    _log.info("%s", text)
+    note = getattr(on_progress, "note", None)
+    if callable(note):
+        note(text)
 
 
 def follow(

@@ -11,6 +11,7 @@ import grpc
 
 from ._credentials import Credentials, stays_on_this_machine
 from ._download import Parts
+from ._epsilon import choose
 from ._generated import mesh_pb2
 from ._generated import stellate_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
@@ -145,15 +146,15 @@ class Client:
         self._stub = rpc.StellateStub(self._channel)
         self._patience = Patience(reconnect_seconds, self._connect, self._why_hopeless)
 
-    def create(self, oracle: Any, epsilon: float = 0.1, **criteria: Any) -> MeshInfo:
-        """Declares a mesh, which waits to be served. Keywords: see stellate.mesh.
+    def create(self, oracle: Any, epsilon: float | str, **criteria: Any) -> MeshInfo:
+        """Declares a mesh, which waits to be served. epsilon and keywords: see stellate.mesh.
 
         Not repeated when the server is lost: whether it made the mesh would not be known.
         """
         checked = oracle if isinstance(oracle, CheckedOracle) else CheckedOracle(oracle)
         if criteria.get("ask_ahead") is None and not stays_on_this_machine(self.address):
             criteria["ask_ahead"] = True  # round trips are what a far server costs
-        spec = mesh_spec(checked, epsilon, criteria)
+        spec = mesh_spec(checked, choose(oracle, epsilon)[0], criteria)
         request = pb.CreateMeshRequest(spec=spec)
         return MeshInfo.from_wire(self._call(self._stub.CreateMesh, request, once=True))
 

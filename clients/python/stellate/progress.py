@@ -45,6 +45,12 @@ class ProgressBar:
             self._file.write(f"{self._title}{self._numbers(progress)}\n")
         self._file.flush()
 
+    def note(self, text: str) -> None:
+        """A line of its own. Called by stellate.mesh with what it has chosen."""
+        self._file.write(("\r\x1b[K" if self._open else "") + self._title + text + "\n")
+        self._file.flush()
+        self._open = False
+
     def close(self) -> None:
         """Ends the live line. Called by stellate.mesh when the mesh is over."""
         if self._open:

@@ -31,7 +31,7 @@ def test_a_watch_survives_broken_connections():
         ]
     )
     with serving(fake) as address:
-        mesh = stellate.mesh(CIRCLE, server=address)
+        mesh = stellate.mesh(CIRCLE, 0.1, server=address)
     assert fake.watched_from == [0, 1, 1]
     assert np.array_equal(mesh.points, TRIANGLE) and np.array_equal(mesh.simplices, EDGES)
     assert mesh.report.termination == "CONVERGED"
@@ -41,7 +41,7 @@ def test_a_watch_survives_broken_connections():
 def test_a_server_that_breaks_the_protocol_is_found_out():
     with serving(FakeServer([[delta(1, 5, TRIANGLE, EDGES), final()]])) as address:
         with pytest.raises(stellate.StellateError, match="vertex 5") as caught:
-            stellate.mesh(CIRCLE, server=address)
+            stellate.mesh(CIRCLE, 0.1, server=address)
     assert caught.value.reason == "PROTOCOL"
 
 
@@ -49,7 +49,7 @@ def test_a_mesh_cancelled_by_others_keeps_what_there_is():
     fake = FakeServer([[delta(1, 0, TRIANGLE, EDGES), final(mesh_pb2.MESH_STATE_CANCELLED)]])
     with serving(fake) as address:
         with pytest.raises(stellate.Cancelled) as caught:
-            stellate.mesh(CIRCLE, server=address)
+            stellate.mesh(CIRCLE, 0.1, server=address)
     assert np.array_equal(caught.value.mesh.simplices, EDGES)
 
 
@@ -95,19 +95,19 @@ def test_an_unknown_question_is_not_answered_with_nonsense():
 
 def test_nobody_listens():
     with pytest.raises(stellate.Unavailable):
-        stellate.mesh(CIRCLE, server="127.0.0.1:1")
+        stellate.mesh(CIRCLE, 0.1, server="127.0.0.1:1")
 
 
 @pytest.mark.parametrize("server", ["", 7])
 def test_an_address_that_is_none(server):
     with pytest.raises(stellate.InvalidArgument, match="host:port"):
-        stellate.mesh(CIRCLE, server=server)
+        stellate.mesh(CIRCLE, 0.1, server=server)
 
 
 def test_no_binary_to_start(monkeypatch, tmp_path):
     monkeypatch.setenv("STELLATED", str(tmp_path / "absent"))
     with pytest.raises(stellate.ServerNotFound, match="STELLATED.*absent"):
-        stellate.mesh(CIRCLE)
+        stellate.mesh(CIRCLE, 0.1)
 
 
 def program(path, text):
@@ -122,7 +122,7 @@ def test_a_binary_that_dies_says_why(monkeypatch, tmp_path):
     )
     before = set(threading.enumerate())
     with pytest.raises(stellate.Unavailable, match=r"status 3(.|\n)*no luck today"):
-        stellate.mesh(CIRCLE)
+        stellate.mesh(CIRCLE, 0.1)
     assert set(threading.enumerate()) <= before
 
 

@@ -205,7 +205,7 @@ def test_requests_that_make_no_sense(changed, keywords, words, server):
     for name, value in changed.items():
         setattr(oracle, name, value)
     with pytest.raises(stellate.InvalidArgument, match=words) as caught:
-        stellate.mesh(oracle, server=server, **keywords)
+        stellate.mesh(oracle, server=server, **{"epsilon": 0.1, **keywords})
     assert caught.value.reason == "INVALID_ARGUMENT"
     assert isinstance(caught.value, ValueError)
 
@@ -216,7 +216,7 @@ def test_requests_beyond_the_limits(k, d, client):
     assert k > limits.max_dimension or d > limits.max_ambient_dimension
     oracle = manifolds.Sphere(k, d)
     with pytest.raises(stellate.LimitExceeded) as caught:
-        stellate.mesh(oracle, server=client)
+        stellate.mesh(oracle, 0.1, server=client)
     assert caught.value.reason == "LIMIT_EXCEEDED"
 
 

@@ -31,7 +31,10 @@ struct Outage {
 
 // What to mesh and how. Absent values take the server's defaults; see mesh.proto for each.
 struct MeshOptions {
-  double epsilon = 0;  // largest circumradius of a simplex, a length; must be given
+  double epsilon = 0;  // largest circumradius of a simplex, a length; must be given, or else:
+  bool auto_epsilon = false;  // ChooseEpsilon says it, before the server is asked
+  // Called on the calling thread with what it said; Report::epsilon_reason keeps it.
+  std::function<void(double epsilon, const std::string& reason)> on_epsilon;
 
   // "host:port" or "unix:/path". Empty: a private stellated is started for this mesh and stopped
   // after it; found by $STELLATED, next to the running program, or on PATH.
@@ -75,6 +78,15 @@ struct MeshOptions {
   std::optional<double> worker_wait_seconds, answer_seconds;
   std::string label;  // shown in the server's lists and logs
 };
+
+struct ChosenEpsilon {
+  double epsilon = 0;
+  std::string reason;  // in words
+};
+
+// A quarter of the reach that Check finds, to two digits. kOracleFailed, with what was found, where
+// the oracle breaks its contract.
+Expected<ChosenEpsilon> ChooseEpsilon(Oracle& oracle);
 
 // Meshes the oracle's manifold: offers the oracle to the server and collects the mesh.
 //

@@ -1,0 +1,42 @@
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+
+#include "stellate/client.h"
+#include "stellate/doctor.h"
+
+namespace stellate {
+namespace {
+
+constexpr double kShareOfReach = 4;  // half the coarseness that is safe: the reach is from above
+
+std::string Show(const char* format, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+}  // namespace
+
+Expected<ChosenEpsilon> ChooseEpsilon(Oracle& oracle) {
+  CheckReport report = Check(oracle);
+  if (!report.ok()) {
+    std::erase_if(report.findings, [](const Finding& f) { return f.severity != Severity::kError; });
+    return Fail(ErrorCode::kOracleFailed,
+                "the reach is taken from the oracle's answers, and they cannot be trusted:\n" +
+                    ToText(report),
+                "ORACLE_BREAKS_CONTRACT");
+  }
+  if (!report.reach || !std::isfinite(*report.reach)) {
+    return Fail(ErrorCode::kOracleFailed,
+                "the reach is taken from the oracle's answers, and they show none: say how large "
+                "epsilon shall be",
+                "ORACLE_NO_REACH");
+  }
+  const double chosen = std::strtod(Show("%.2g", *report.reach / kShareOfReach).c_str(), nullptr);
+  return ChosenEpsilon{chosen, "a quarter of the reach, about " + Show("%.3g", *report.reach) +
+                                   " by " + std::to_string(report.queries) + " queries"};
+}
+
+}  // namespace stellate

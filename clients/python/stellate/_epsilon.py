@@ -1,0 +1,44 @@
+"""epsilon="auto": a size from what the oracle's answers show."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ._doctor import check
+from .errors import InvalidArgument, OracleError
+
+AUTO = "auto"
+_SHARE_OF_REACH = 4  # half the coarseness that is safe, as the reach is estimated from above
+
+
+def choose(oracle: Any, epsilon: float | str) -> tuple[float, str]:
+    """epsilon as it is and "", or for "auto" a quarter of the reach that check() finds, and why.
+
+    Raises: OracleError with what check() found where the oracle breaks its contract.
+    """
+    if not isinstance(epsilon, str):
+        return epsilon, ""
+    if epsilon != AUTO:
+        raise InvalidArgument(
+            f"epsilon has to be a length in the coordinates' unit, or 'auto', and is {epsilon!r}",
+            details={"fields": {"epsilon": "no length"}},
+        )
+    report = check(oracle)
+    if not report.ok:
+        errors = [finding for finding in report.findings if finding.severity == "error"]
+        raise OracleError(
+            "epsilon='auto' takes the reach from the oracle's answers, and they cannot be trusted:\n"
+            + "\n".join(map(str, errors)),
+            "ORACLE_BREAKS_CONTRACT",
+        )
+    if report.reach is None or not math.isfinite(report.reach):
+        raise OracleError(
+            "epsilon='auto' takes the reach from the oracle's answers, and they show none: say how "
+            "large epsilon shall be",
+            "ORACLE_NO_REACH",
+        )
+    chosen = float(f"{report.reach / _SHARE_OF_REACH:.2g}")
+    return chosen, (
+        f"a quarter of the reach, about {report.reach:.3g} by {report.queries:,} queries"
+    )

@@ -1,0 +1,78 @@
+"""epsilon: always asked for, or found from the oracle's answers."""
+
+import io
+
+import numpy as np
+import pytest
+
+import stellate
+from stellate import manifolds
+
+
+def test_epsilon_has_no_default(client):
+    for call in (stellate.mesh, client.create, lambda oracle: next(stellate.watch(oracle))):
+        with pytest.raises(TypeError, match="epsilon"):
+            call(manifolds.Torus())
+
+
+@pytest.mark.parametrize(
+    "oracle, expected",
+    [(manifolds.Torus(1000.0, 400.0), 100.0), (manifolds.Sphere(2, radius=1e-3), 0.00025)],
+)
+def test_auto_goes_by_the_reach_whatever_the_unit(oracle, expected, server):
+    seen = io.StringIO()
+    mesh = stellate.mesh(oracle, "auto", server, on_progress=stellate.progress_bar("m:", seen))
+    report = mesh.report
+    assert report.certified and report.epsilon == pytest.approx(expected, rel=0.05)
+    assert report.epsilon == float(f"{report.epsilon:.2g}")
+    assert report.epsilon_reason.startswith("a quarter of the reach, about ")
+    assert report.to_dict()["epsilon_reason"] == report.epsilon_reason
+    said = f"{report.epsilon:g}, {report.epsilon_reason}"
+    assert f"epsilon  {said}" in str(report)
+    assert seen.getvalue().splitlines()[0] == f"m: epsilon {said}"
+    given = stellate.mesh(oracle, report.epsilon, server)
+    assert np.array_equal(given.points, mesh.points) and given.report.epsilon_reason == ""
+
+
+def test_auto_is_the_same_by_any_way(client):
+    chosen = client.get(client.create(manifolds.Torus(), "auto").name).epsilon
+    *_, last = stellate.watch(manifolds.Torus(), "auto", client)
+    assert last.report.epsilon == chosen == pytest.approx(0.1, rel=0.05)
+
+
+class Doubled(manifolds.Torus):
+    """Answers half the way to the torus: no closest points."""
+
+    def closest_point(self, x):
+        return (x + super().closest_point(x)) / 2
+
+
+def test_auto_refuses_an_oracle_that_breaks_its_contract(server):
+    with pytest.raises(stellate.OracleError, match="NOT_IDEMPOTENT") as caught:
+        stellate.mesh(Doubled(), "auto", server)
+    assert caught.value.reason == "ORACLE_BREAKS_CONTRACT"
+
+
+def test_what_is_misspelt_is_said_before_the_oracle_is_asked(server):
+    class Untouchable(manifolds.Torus):
+        def closest_point(self, x):
+            raise AssertionError("was asked")
+
+    with pytest.raises(stellate.InvalidArgument, match="'aut'"):
+        stellate.mesh(Untouchable(), "aut", server)
+    with pytest.raises(TypeError, match="max_vertices"):
+        stellate.mesh(Untouchable(), "auto", server, max_vertex=10)
+
+
+def test_a_note_breaks_a_live_line():
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    screen = Terminal()
+    bar = stellate.ProgressBar("t", screen)
+    bar._open = True
+    bar.note("epsilon 0.1")
+    assert screen.getvalue() == "\r\x1b[Kt epsilon 0.1\n"
+    bar.close()
+    assert screen.getvalue().count("\n") == 1
