@@ -53,7 +53,8 @@ void StartLogging(LogLevel level, LogFormat wanted) {
 
 bool LogEnabled(LogLevel level) { return Logger().should_log(ToSpdlog(level)); }
 
-void Log(LogLevel level, const LogContext& context, const std::string& message) {
+void Log(LogLevel level, const LogContext& context, const std::string& message,
+         const LogFields& fields) {
   if (!LogEnabled(level)) return;
   std::string line;
   if (format == LogFormat::kJson) {
@@ -61,14 +62,14 @@ void Log(LogLevel level, const LogContext& context, const std::string& message) 
       line = "\"mesh\":" + JsonString(context.mesh) +
              ",\"round\":" + std::to_string(context.round) + ",";
     }
-    line += "\"message\":" + JsonString(message);
+    line += "\"message\":" + JsonString(message) + fields.json();
   } else {
     if (!context.mesh.empty()) {
       line = "[" + context.mesh + " round " + std::to_string(context.round) + "] ";
     }
     // A client's words must not forge a line of the log, nor command the terminal that shows it.
     unsigned char before = 0;
-    for (const char c : message) {
+    for (const char c : message + fields.text()) {
       const auto byte = static_cast<unsigned char>(c);
       const bool latin = before == 0xc2 && byte >= 0x80 && byte < 0xa0;  // U+0080 to U+009F
       if (latin) line.back() = ' ';

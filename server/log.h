@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <string>
 
+#include "server/log_fields.h"
+
 namespace stellate::server {
 
 enum class LogLevel { kTrace, kDebug, kInfo, kWarning, kError, kOff };
@@ -19,7 +21,9 @@ struct LogContext {
 
 bool LogEnabled(LogLevel level);
 // One line, with the mesh's name and round. JSON: an object with time, level, mesh, round, message.
-void Log(LogLevel level, const LogContext& context, const std::string& message);
+// The fields follow: as members of the object, or NAME=VALUE after the message.
+void Log(LogLevel level, const LogContext& context, const std::string& message,
+         const LogFields& fields = {});
 
 // `text` as a JSON string, quotes included; control characters are escaped.
 std::string JsonString(const std::string& text);

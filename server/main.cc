@@ -70,7 +70,7 @@ bool ServeUntilTold(Server* server, const sigset_t& signals, bool with_parent, p
     if (signal == SIGHUP) {
       server->ReloadTokens();
     } else if (signal != 0) {
-      Log(LogLevel::kInfo, {}, stellate::core::Message("signal ", signal, ": stopping"));
+      Log(LogLevel::kInfo, {}, "stopping", stellate::server::LogFields().Add("signal", signal));
       return false;
     }
     // Polled, as PR_SET_PDEATHSIG would fire when the parent's *thread* ends.
@@ -102,8 +102,8 @@ int main(int argc, char** argv) {
   const std::string& address = (*server)->address();
   std::printf("stellated listening on %s\n", address.c_str());
   std::fflush(stdout);
-  Log(LogLevel::kInfo, {},
-      stellate::core::Message("stellated ", Version(), " listening on ", address));
+  Log(LogLevel::kInfo, {}, "listening",
+      stellate::server::LogFields().Add("version", Version()).Add("address", address));
   if (!config.ready_file.empty() && !WriteReadyFile(config.ready_file, address)) {
     return Fail("cannot write --ready-file " + config.ready_file, 1);
   }

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "core/message.h"
-#include "server/memory_budget.h"
+#include "server/process_metrics.h"
 
 namespace stellate::server {
 namespace {
@@ -50,7 +50,7 @@ class Census final : public prometheus::Collectable {
 
   std::vector<MetricFamily> Collect() const override {
     std::map<SessionState, int> states;
-    double workers = 0, watchers = 0, vertices = 0, waiting = 0, bytes = 0;
+    double workers = 0, watchers = 0, vertices = 0, waiting = 0, bytes = 0, idle = 0;
     for (const auto& session : sessions_()) {
       const SessionView view = session->View();
       ++states[view.state];
@@ -59,6 +59,7 @@ class Census final : public prometheus::Collectable {
       vertices += static_cast<double>(view.progress.vertices);
       waiting += static_cast<double>(view.waiting_queries);
       bytes += static_cast<double>(view.bytes);
+      if (view.workers == 0 && view.waiting_queries > 0 && !session->HasEnded()) ++idle;
     }
     std::vector<MetricFamily> families = {
         Gauge("stellate_meshes", "Meshes that the server holds, by state"),
@@ -67,7 +68,7 @@ class Census final : public prometheus::Collectable {
         Gauge("stellate_vertices", "Vertices of the meshes that the server holds"),
         Gauge("stellate_queries_waiting", "Queries of the rounds under way, not answered yet"),
         Gauge("stellate_mesh_bytes", "Memory of the meshes that the server holds, estimated"),
-        Gauge("process_resident_memory_bytes", "Memory of the process")};
+        Gauge("stellate_meshes_idle", "Meshes that have questions and no worker")};
     for (const SessionState state : kStates) {
       Add(&families[0], states[state], "state", SessionStateName(state));
     }
@@ -76,7 +77,7 @@ class Census final : public prometheus::Collectable {
     Add(&families[3], vertices);
     Add(&families[4], waiting);
     Add(&families[5], bytes);
-    Add(&families[6], static_cast<double>(ResidentBytes()));
+    Add(&families[6], idle);
     return families;
   }
 
@@ -155,6 +156,7 @@ class Metrics::Impl final : public SessionObserver {
           .Add({}, kLatencyBuckets);
 
   std::shared_ptr<Census> census;
+  const std::shared_ptr<ProcessMetrics> process = std::make_shared<ProcessMetrics>();
   std::unique_ptr<prometheus::Exposer> exposer;
 };
 
@@ -173,6 +175,7 @@ core::Status Metrics::Listen(const std::string& address, Sessions sessions) {
   }
   impl_->exposer->RegisterCollectable(impl_->registry);
   impl_->exposer->RegisterCollectable(impl_->census);
+  impl_->exposer->RegisterCollectable(impl_->process);
   return core::Status::Ok();
 }
 

@@ -24,6 +24,28 @@ TimePoint CreatedAt(std::chrono::system_clock::time_point create_time) {
   return Clock::now() - std::chrono::duration_cast<Clock::duration>(age);
 }
 
+// Fields that tell a mesh from others, where its name says nothing.
+LogFields WhatItIs(const SessionOptions& options) {
+  return LogFields().Add("owner", options.owner).Add("label", options.label);
+}
+
+LogFields EndFields(const SessionOptions& options, const SessionEnd& end, bool suspended,
+                    const core::Report& report, const core::Progress& progress) {
+  LogFields fields = WhatItIs(options);
+  fields.Add("state", suspended ? "SUSPENDED" : SessionStateName(end.state))
+      .Add("certified", report.certificate.certified)
+      .Add("seconds", end.elapsed_seconds)
+      .Add("vertices", progress.vertices)
+      .Add("simplices", progress.simplices)
+      .Add("queries", progress.queries);
+  if (end.state == SessionState::kFailed) {
+    fields.Add("reason", end.failure.reason).Add("failure", end.failure.message);
+  } else if (!suspended) {
+    fields.Add("verdict", report.certificate.verdict);
+  }
+  return fields;
+}
+
 }  // namespace
 
 const char* SessionStateName(SessionState state) {
@@ -94,10 +116,11 @@ void Session::Expose(core::Mesher* mesher) {
 }
 
 void Session::RunRounds(core::Mesher* mesher) {
-  Log(LogLevel::kInfo, log_context(),
-      core::Message(replaying_ ? "replaying " : "meshing ", options_.label,
-                    options_.label.empty() ? "k = " : ": k = ", options_.spec.dimension, ", d = ",
-                    options_.spec.ambient_dimension, ", epsilon = ", options_.spec.epsilon));
+  Log(LogLevel::kInfo, log_context(), replaying_ ? "replaying" : "meshing",
+      WhatItIs(options_)
+          .Add("dimension", options_.spec.dimension)
+          .Add("ambient_dimension", options_.spec.ambient_dimension)
+          .Add("epsilon", options_.spec.epsilon));
   if (options_.journal != nullptr && !options_.record) {
     if (auto failure = options_.journal->WriteStart(options_, create_time_)) {
       FailBlameless(mesher, std::move(*failure));
@@ -191,7 +214,8 @@ void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
   if (options_.observer != nullptr) options_.observer->OnRound(queries);
   if (LogEnabled(LogLevel::kDebug)) {
     Log(LogLevel::kDebug, {options_.name, round},
-        core::Message(queries, " queries answered, ", mesher->progress().vertices, " vertices"));
+        "round answered",
+        LogFields().Add("queries", queries).Add("vertices", mesher->progress().vertices));
   }
 }
 
@@ -287,21 +311,17 @@ void Session::Finish(const core::Report* report) {
   }
   // Whoever has seen the end finds the door shut.
   pool_.Shut();
-  std::string verdict;
+  LogFields fields;
   {
     const std::lock_guard lock(mutex_);
     final_state_ = end.state;
     report_ = report != nullptr ? *report : core::Report{};
     end_time_ = end.time;
     final_seconds_ = end.elapsed_seconds;
-    verdict = suspended                            ? "until the server is back"
-              : end.state == SessionState::kFailed ? end.failure.reason + ": " + end.failure.message
-                                                   : report_->certificate.verdict;
+    fields = EndFields(options_, end, suspended, *report_, progress_);
   }
   Log(end.state == SessionState::kFailed ? LogLevel::kWarning : LogLevel::kInfo, log_context(),
-      core::Message(suspended ? "SUSPENDED" : SessionStateName(end.state), " after ",
-                    end.elapsed_seconds, " s, ", progress_.vertices, " vertices, ",
-                    progress_.simplices, " simplices; ", verdict));
+      suspended ? "mesh suspended until the server is back" : "mesh ended", fields);
   pool_.Close({blame_});
   WakeWatchers();
 }

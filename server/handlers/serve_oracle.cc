@@ -163,7 +163,8 @@ class OracleStream final
       EndLocked(Refuse(service_, id.error()), false);
       return;
     }
-    Log(LogLevel::kInfo, session_->log_context(), core::Message("worker ", Title(), " joined"));
+    Log(LogLevel::kInfo, session_->log_context(), "worker joined",
+        LogFields().Add("worker", worker_name_).Add("address", context_->peer()));
     bool ended = false;
     {
       const std::lock_guard lock(mutex_);
@@ -213,7 +214,8 @@ class OracleStream final
       left_ = true;
     }
     session_->pool().Leave(worker);
-    Log(LogLevel::kInfo, session_->log_context(), core::Message("worker ", worker_name_, " left"));
+    Log(LogLevel::kInfo, session_->log_context(), "worker left",
+        LogFields().Add("worker", worker_name_).Add("address", context_->peer()));
   }
 
   void EndWith(grpc::Status status, bool mesh_over = false) {

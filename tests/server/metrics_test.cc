@@ -2,6 +2,9 @@
 
 #include "server/metrics.h"
 
+#include <algorithm>
+#include <chrono>
+#include <fstream>
 #include <map>
 #include <regex>
 #include <sstream>
@@ -28,7 +31,7 @@ class MetricsTest : public LiveServer {
     const std::string reply = GetMetrics(server_->metrics_port());
     EXPECT_EQ(reply.find("HTTP/1.1 200"), 0u) << reply;
     std::istringstream lines(reply.substr(std::min(reply.find("\r\n\r\n"), reply.size() - 4) + 4));
-    static const std::regex kSample(R"((\w+(?:\{\w+="[^"]*"\})?) ([-+0-9.eE]+|\+Inf|[Nn]a[Nn]))");
+    static const std::regex kSample(R"((\w+(?:\{\w+="[^"]*"(?:,\w+="[^"]*")*\})?) ([-+0-9.eE]+|\+Inf|[Nn]a[Nn]))");
     std::map<std::string, double> series;
     for (std::string line; std::getline(lines, line);) {
       if (line.empty() || line.starts_with("# HELP ") || line.starts_with("# TYPE ")) continue;
@@ -50,6 +53,8 @@ TEST_F(MetricsTest, CountsAMeshFromItsStartToItsEnd) {
   EXPECT_EQ(Scrape().at("stellate_meshes{state=\"WAITING\"}"), 0);
   const std::string name = CreateSphere();
   EXPECT_EQ(Scrape().at("stellate_meshes{state=\"WAITING\"}"), 1);
+  while (Scrape().at("stellate_queries_waiting") == 0) std::this_thread::yield();
+  EXPECT_EQ(Scrape().at("stellate_meshes_idle"), 1);
 
   std::atomic<bool> open{false};
   RawWorker worker(stub_.get(), name, [&open](const v1::QueryChunk& queries) {
@@ -61,6 +66,7 @@ TEST_F(MetricsTest, CountsAMeshFromItsStartToItsEnd) {
   auto series = Scrape();
   EXPECT_EQ(series.at("stellate_meshes{state=\"RUNNING\"}"), 1);
   EXPECT_EQ(series.at("stellate_meshes{state=\"WAITING\"}"), 0);
+  EXPECT_EQ(series.at("stellate_meshes_idle"), 0);
   EXPECT_EQ(series.at("stellate_workers"), 1);
   EXPECT_EQ(series.at("stellate_watchers"), 1);
   EXPECT_EQ(series.at("stellate_rounds_total"), 0);
@@ -119,6 +125,36 @@ TEST_F(MetricsTest, AMeshThatEndsBadlyCountsAsNotCertified) {
   const auto series = Scrape();
   EXPECT_EQ(series.at("stellate_meshes_ended_total{state=\"FAILED\"}"), 1);
   EXPECT_EQ(series.at("stellate_certificates_total{certified=\"false\"}"), 1);
+}
+
+TEST_F(MetricsTest, SaysWhatTheProcessIsAndUses) {
+  const auto before = std::chrono::system_clock::now().time_since_epoch();
+  StartWithMetrics();
+  auto series = Scrape();
+  const auto info = std::find_if(series.begin(), series.end(), [](const auto& one) {
+    return one.first.starts_with("stellate_build_info{");
+  });
+  ASSERT_NE(info, series.end());
+  EXPECT_EQ(info->second, 1);
+  EXPECT_NE(info->first.find(core::Message("version=\"", Version(), "\"")), std::string::npos);
+  EXPECT_NE(info->first.find("grpc=\"1."), std::string::npos);
+
+  // This process began before it asked, and not before the machine did.
+  const double now = std::chrono::duration<double>(before).count();
+  EXPECT_LE(series.at("process_start_time_seconds"), now + 1);
+  EXPECT_GT(series.at("process_start_time_seconds"), now - 3600);
+  EXPECT_GT(series.at("process_virtual_memory_bytes"), series.at("process_resident_memory_bytes"));
+  EXPECT_GE(series.at("process_threads"), 2);
+  EXPECT_GT(series.at("process_max_fds"), series.at("process_open_fds"));
+  const ScratchDirectory directory;
+  std::vector<std::ofstream> files(20);
+  for (std::size_t i = 0; i < files.size(); ++i) files[i].open(directory / std::to_string(i));
+  const double open = series.at("process_open_fds");
+  const double used = series.at("process_cpu_seconds_total");
+  EXPECT_GT(used, 0);
+  series = Scrape();
+  EXPECT_GE(series.at("process_open_fds"), open + 15);  // some connection may have closed
+  EXPECT_GT(series.at("process_cpu_seconds_total"), used);
 }
 
 TEST_F(MetricsTest, CountsWhatLimitsRefuse) {
