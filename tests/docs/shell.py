@@ -91,7 +91,7 @@ def run(before: str, text: str, entry: dict[str, Any], around: Surroundings) -> 
         unused.discard(start)
         if key == "background":
             says = shlex.quote(entry[key][start])
-            script.append(f"{{ exec {command}}} >{log} 2>&1 &\nawait {log} $! {says}")
+            script.append(f"rm -f {log}\n{{ exec {command}}} >{log} 2>&1 &\nawait {log} $! {says}")
         elif key == "status":
             script.append(f"status=0\n{{ {command}}} || status=$?\n[[ $status == {entry[key][start]} ]]")
         elif not key:
