@@ -4,8 +4,13 @@
 #include <spdlog/spdlog.h>
 
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <string_view>
+
+#include "core/message.h"
+#include "server/line_ration.h"
+#include "text/printable.h"
 
 namespace stellate::server {
 namespace {
@@ -41,6 +46,46 @@ spdlog::logger& Logger() {
   return *logger;
 }
 
+// A client that keeps to its limits says less; all day long, ten a second are 200 MB.
+constexpr int kBurst = 100;
+constexpr double kLinesASecond = 10;
+// Who writes lines, each with a ration of its own.
+constexpr char kServer[] = "the server";
+constexpr char kLibraries[] = "libraries";
+constexpr char kMeshesOf[] = "meshes of owner ";
+
+LineRation& Ration() {
+  static LineRation ration(kBurst, kLinesASecond);
+  return ration;
+}
+
+void Write(LogLevel level, const LogContext& context, const std::string& message,
+           const LogFields& fields) {
+  std::string line;
+  if (format == LogFormat::kJson) {
+    if (!context.mesh.empty()) {
+      line = "\"mesh\":" + JsonString(context.mesh) +
+             ",\"round\":" + std::to_string(context.round) + ",";
+    }
+    line += "\"message\":" + JsonString(message) + fields.json();
+  } else {
+    if (!context.mesh.empty()) {
+      line = "[" + context.mesh + " round " + std::to_string(context.round) + "] ";
+    }
+    line += message + fields.text();
+  }
+  // A client's words must not forge a line of the log, nor command the terminal that shows it.
+  Logger().log(ToSpdlog(level), std::string_view(text::Printable(line)));
+}
+
+// Finer lines are there for whoever asked for them.
+void LogFor(const std::string& party, LogLevel level, const LogContext& context,
+            const std::string& message, const LogFields& fields) {
+  if (!LogEnabled(level)) return;
+  if (level >= LogLevel::kInfo && !Ration().Take(party, std::chrono::steady_clock::now())) return;
+  Write(level, context, message, fields);
+}
+
 }  // namespace
 
 void StartLogging(LogLevel level, LogFormat wanted) {
@@ -55,29 +100,20 @@ bool LogEnabled(LogLevel level) { return Logger().should_log(ToSpdlog(level)); }
 
 void Log(LogLevel level, const LogContext& context, const std::string& message,
          const LogFields& fields) {
-  if (!LogEnabled(level)) return;
-  std::string line;
-  if (format == LogFormat::kJson) {
-    if (!context.mesh.empty()) {
-      line = "\"mesh\":" + JsonString(context.mesh) +
-             ",\"round\":" + std::to_string(context.round) + ",";
-    }
-    line += "\"message\":" + JsonString(message) + fields.json();
-  } else {
-    if (!context.mesh.empty()) {
-      line = "[" + context.mesh + " round " + std::to_string(context.round) + "] ";
-    }
-    // A client's words must not forge a line of the log, nor command the terminal that shows it.
-    unsigned char before = 0;
-    for (const char c : message + fields.text()) {
-      const auto byte = static_cast<unsigned char>(c);
-      const bool latin = before == 0xc2 && byte >= 0x80 && byte < 0xa0;  // U+0080 to U+009F
-      if (latin) line.back() = ' ';
-      line += byte < 0x20 || byte == 0x7f || latin ? ' ' : c;
-      before = byte;
-    }
+  const std::string party = context.mesh.empty() ? kServer : kMeshesOf + context.owner;
+  LogFor(party, level, context, message, fields);
+}
+
+void LogLibrary(LogLevel level, const std::string& message) {
+  LogFor(kLibraries, level, {}, core::Message(kLibraries, ": ", message), {});
+}
+
+void LogLeftOut() {
+  for (const auto& [party, lines] : Ration().TakeLeftOut(std::chrono::steady_clock::now())) {
+    Write(LogLevel::kWarning, {}, core::Message(party, ": more lines were left out"),
+          LogFields().Add("lines", lines));
   }
-  Logger().log(ToSpdlog(level), std::string_view(line));
+  }
 }
 
 std::string JsonString(const std::string& text) {

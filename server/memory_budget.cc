@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/message.h"
+#include "server/cgroup.h"
 
 namespace stellate::server {
 namespace {
@@ -35,12 +36,8 @@ std::uint64_t EstimateMeshBytes(const core::Specification& spec, std::uint64_t v
 }
 
 std::uint64_t MachineBytes() {
-  std::uint64_t bytes = static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * PageBytes();
-  std::uint64_t limit = 0;  // "max" where the container has none
-  if (std::ifstream("/sys/fs/cgroup/memory.max") >> limit && limit > 0) {
-    bytes = std::min(bytes, limit);
-  }
-  return bytes;
+  const auto machine = static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * PageBytes();
+  return std::min(machine, CgroupMemoryLimit().value_or(machine));
 }
 
 std::uint64_t ResidentBytes() {

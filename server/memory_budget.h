@@ -18,7 +18,8 @@ namespace stellate::server {
 std::uint64_t EstimateMeshBytes(const core::Specification& spec, std::uint64_t vertices,
                                 std::uint64_t queries);
 
-// Bytes of memory that this process may have: the machine's, or its container's if that is less.
+// Bytes of memory that this process may have: the machine's, or what a control group allows if
+// that is less.
 std::uint64_t MachineBytes();
 // Bytes of memory that this process has now; 0 where the system does not say.
 std::uint64_t ResidentBytes();

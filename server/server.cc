@@ -253,6 +253,7 @@ class Server::Impl {
         service.streams.Tick(now);
         service.store.Sweep(now);
         CountHeaderBlocks();
+        LogLeftOut();
       }
     });
   }
@@ -367,6 +368,7 @@ bool Server::Stop(Clock::duration drain, const std::function<bool()>& hurry) {
   impl.server->Wait();
   impl.ticker.request_stop();
   impl.ticker.join();
+  LogLeftOut();
   service.metrics.StopListening();
   return service.store.Stop(Clock::now() + kLastRound);
 }

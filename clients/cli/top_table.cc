@@ -6,6 +6,8 @@
 #include <tuple>
 #include <utility>
 
+#include "text/printable.h"
+
 namespace stellate::cli {
 namespace {
 
@@ -79,18 +81,13 @@ std::string Counted(size_t count, const std::string& noun) {
 }  // namespace
 
 std::string Tame(const std::string& text, size_t columns) {
-  std::string tame;
-  size_t points = 0;
-  for (size_t i = 0; i < text.size(); ++i) {
-    const unsigned char c = static_cast<unsigned char>(text[i]);
-    const bool continues = (c & 0xC0) == 0x80;
+  std::string tame = text::Printable(text, '?');
+  size_t points = 0, end = 0;
+  for (; end < tame.size(); ++end) {
+    const bool continues = (static_cast<unsigned char>(tame[end]) & 0xC0) == 0x80;
     if (!continues && ++points > columns) break;
-    // C1 controls are two bytes of UTF-8.
-    const bool c1 =
-        c == 0xC2 && i + 1 < text.size() && static_cast<unsigned char>(text[i + 1]) < 0xA0;
-    if (c1) ++i;
-    tame += c1 || c < 0x20 || c == 0x7F ? '?' : text[i];
   }
+  tame.resize(end);
   return tame;
 }
 

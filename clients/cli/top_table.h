@@ -37,7 +37,7 @@ class TopTable {
   std::map<std::string, Seen> seen_;  // by name, a moment ago
 };
 
-// Text of strangers made safe for a terminal: no control characters, at most `columns` code points.
+// Text of strangers made safe for a terminal (text/printable.h), of `columns` code points at most.
 std::string Tame(const std::string& text, size_t columns);
 
 // "4.2s", "3m12s", "5h07m"; "-" for nothing.

@@ -105,6 +105,17 @@ TEST(Tame, KeepsStrangersFromTheTerminal) {
   EXPECT_EQ(Tame("a\033[2Jb\x7f\n", 20), "a?[2Jb??");
   EXPECT_EQ(Tame("x\xC2\x9Bm", 20), "x?m");          // a control of eight bits, in UTF-8
   EXPECT_EQ(Tame("t\xC3\xB6rus", 3), "t\xC3\xB6r");  // cut between characters
+  EXPECT_EQ(Tame("a\u202Eb\u2066c\u200Fd\u2028e", 20), "a?b?c?d?e") << "order of writing";
+  EXPECT_EQ(Tame("a\xFF\xC3(", 20), "a?" "?(") << "no UTF-8";
+}
+
+TEST(TopTable, LabelsCommandNoTerminal) {
+  TopTable table(TopOrder::kState);
+  table.Update({Mesh("aaaaaaaaaa", "evil\u202E\033[2J", MeshState::kRunning, 10, 5)}, 0);
+  for (const int width : {0, 200}) {
+    const std::string line = table.Lines(width, 0).back();
+    EXPECT_NE(line.find("evil??[2J"), std::string::npos) << line;
+  }
 }
 
 TEST(ShortTime, IsShort) {
