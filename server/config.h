@@ -40,7 +40,6 @@ struct Config {
 
   // Of the server.
   std::uint64_t max_meshes = 64;  // running at once
-  std::uint64_t keep_finished_meshes = 32;
   std::uint64_t max_memory_bytes = 0;   // of all meshes, estimated; 0: WithDefaults says
   std::uint64_t max_journal_bytes = 0;  // 0: what the disk holds
   std::uint64_t max_message_bytes = std::uint64_t{4} << 20;
@@ -49,6 +48,7 @@ struct Config {
 
   // Of each owner, where the server tells owners apart.
   std::uint64_t owner_meshes = 32;       // running at once; 0: as many as the server
+  std::uint64_t keep_finished_meshes = 32;
   std::uint64_t owner_memory_bytes = 0;  // 0: WithDefaults says
 
   // Of each mesh.

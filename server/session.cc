@@ -18,10 +18,10 @@ MeshFailure ToFailure(const core::Status& status) {
   return {core::StatusCodeName(status.code), status.message};
 }
 
-// When it was created, on the clock that measures how long it takes.
+// When it was created, on the clock that measures how long it takes. The clock on the wall may have
+// been set back since.
 TimePoint CreatedAt(std::chrono::system_clock::time_point create_time) {
-  const auto age = std::chrono::system_clock::now() - create_time;
-  return Clock::now() - std::chrono::duration_cast<Clock::duration>(age);
+  return Clock::now() - AgeOf(create_time);
 }
 
 // Fields that tell a mesh from others, where its name says nothing.
@@ -47,6 +47,11 @@ LogFields EndFields(const SessionOptions& options, const SessionEnd& end, bool s
 }
 
 }  // namespace
+
+Clock::duration AgeOf(std::chrono::system_clock::time_point time) {
+  const auto age = std::chrono::system_clock::now() - time;
+  return std::max(std::chrono::duration_cast<Clock::duration>(age), Clock::duration::zero());
+}
 
 const char* SessionStateName(SessionState state) {
   switch (state) {
@@ -170,7 +175,8 @@ bool Session::ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch) {
     if (options_.record->end) {
       RepeatEnd(mesher);
     } else {
-      Log(LogLevel::kInfo, {options_.name, batch.round}, "replayed; going on with new answers");
+      Log(LogLevel::kInfo, {options_.name, batch.round, options_.owner},
+          "replayed; going on with new answers");
       return false;
     }
   }
@@ -213,8 +219,7 @@ void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
   if (!Absorb(mesher, answers)) return;
   if (options_.observer != nullptr) options_.observer->OnRound(queries);
   if (LogEnabled(LogLevel::kDebug)) {
-    Log(LogLevel::kDebug, {options_.name, round},
-        "round answered",
+    Log(LogLevel::kDebug, {options_.name, round, options_.owner}, "round answered",
         LogFields().Add("queries", queries).Add("vertices", mesher->progress().vertices));
   }
 }
@@ -290,7 +295,7 @@ void Session::Finish(const core::Report* report) {
         failure_.reason.empty()) {
       failure_ = ToFailure(report->failure);
     }
-    end = {FinalState(report), std::chrono::system_clock::now(),
+    end = {FinalState(report), std::max(std::chrono::system_clock::now(), create_time_),
            std::chrono::duration<double>(Clock::now() - created_).count(), failure_,
            progress_.round};
     suspended = suspended_ && end.state == SessionState::kCancelled;
@@ -400,6 +405,11 @@ SessionView Session::View() const {
   return view;
 }
 
+bool Session::HasVertices() const {
+  const std::lock_guard lock(mutex_);
+  return progress_.vertices > 0;
+}
+
 bool Session::HasEnded() const {
   const std::lock_guard lock(mutex_);
   return final_state_.has_value();
@@ -407,7 +417,7 @@ bool Session::HasEnded() const {
 
 LogContext Session::log_context() const {
   const std::lock_guard lock(mutex_);
-  return {options_.name, progress_.round};
+  return {options_.name, progress_.round, options_.owner};
 }
 
 }  // namespace stellate::server

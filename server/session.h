@@ -94,8 +94,9 @@ class Session {
   // The newest revision that anyone may have seen: while a recorded mesh is replayed, the one at
   // which the replay will end.
   std::uint64_t PublishedRevision() const;
+  bool HasVertices() const;
   bool HasEnded() const;  // state, report and history are final
-  LogContext log_context() const;
+  LogContext log_context() const;  // in the round that was last shown
   const SessionOptions& options() const { return options_; }
   OraclePool& pool() { return pool_; }
   const WatchLog& history() const { return history_; }

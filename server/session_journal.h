@@ -21,6 +21,9 @@ struct SessionEnd {
   std::uint64_t rounds = 0;  // that led to it; what a later one would have led to nobody has seen
 };
 
+// How long ago that was; zero if the clock was set back to before it.
+Clock::duration AgeOf(std::chrono::system_clock::time_point time);
+
 // What a journal knows of a mesh that an earlier server left.
 struct SessionRecord {
   std::chrono::system_clock::time_point create_time;

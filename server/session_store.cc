@@ -6,6 +6,7 @@
 #include <array>
 #include <cerrno>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 
 #include "core/message.h"
@@ -18,6 +19,8 @@ constexpr std::size_t kNameBytes = 16;
 // Meshes that have ended, and are being taken apart, take no place of those that run, but there may
 // be no more of them than of those, or than this.
 constexpr std::size_t kLeastEnding = 16;
+// For a client to fetch what it has heard the end of.
+constexpr auto kGrace = std::chrono::minutes(1);
 
 }  // namespace
 
@@ -90,15 +93,26 @@ Allowed<std::shared_ptr<Session>> SessionStore::Create(SessionOptions options) {
   }
   options.name = NewMeshName();
   if (new_journal_) options.journal = new_journal_();
-  return StartLocked(std::move(options), TimePoint::max());
+  try {
+    return StartLocked(std::move(options), TimePoint::max());
+  } catch (const std::system_error&) {
+    return tl::unexpected(Refused(
+        {core::StatusCode::kLimitExceeded,
+         "the system gives the server no thread for another mesh: wait for one to end, cancel one, "
+         "or raise the limit on its processes (ulimit -u, TasksMax, the pids of its cgroup)"}));
+  }
 }
 
 void SessionStore::Restore(SessionOptions options) {
   TimePoint over_since = TimePoint::max();
   if (options.record->end) {
-    const auto age = std::chrono::system_clock::now() - options.record->end->time;
+    SessionEnd& end = *options.record->end;
+    const Clock::duration age = AgeOf(end.time);
     if (age >= limits_.keep_for) return options.journal->Forget();
-    over_since = Clock::now() - std::chrono::duration_cast<Clock::duration>(age);
+    over_since = Clock::now() - age;
+    // As a server recorded it that did not look whether its clock had been set back.
+    end.time = std::max(end.time, options.record->create_time);
+    end.elapsed_seconds = std::max(end.elapsed_seconds, 0.0);
   }
   const std::lock_guard lock(mutex_);
   StartLocked(std::move(options), over_since);
@@ -184,22 +198,45 @@ std::vector<SessionStore::Entry> SessionStore::TakeDeadLocked() {
   return dead;
 }
 
+// What Sweep is to forget.
+std::vector<std::uint64_t> SessionStore::OutlivedLocked(TimePoint now) {
+  struct Finished {
+    bool has_vertices = false;
+    TimePoint over_since;
+    std::uint64_t number = 0;
+
+    auto operator<=>(const Finished&) const = default;
+  };
+  std::vector<std::uint64_t> outlived;
+  std::map<std::string, std::vector<Finished>> by_owner;
+  for (auto& [number, entry] : entries_) {
+    if (!entry.session->Over()) continue;
+    if (entry.thread.joinable()) entry.thread.join();  // it has nothing left to do
+    if (entry.over_since == TimePoint::max()) entry.over_since = now;
+    if (now - entry.over_since >= limits_.keep_for) {
+      outlived.push_back(number);
+    } else {
+      by_owner[entry.session->options().owner].push_back(
+          {entry.session->HasVertices(), entry.over_since, number});
+    }
+  }
+  for (auto& [owner, finished] : by_owner) {
+    std::size_t excess = finished.size() - std::min(finished.size(), limits_.keep_finished);
+    if (excess > 0) std::sort(finished.begin(), finished.end());
+    for (auto it = finished.begin(); it != finished.end() && excess > 0; ++it) {
+      if (it->has_vertices && now - it->over_since < kGrace) continue;
+      outlived.push_back(it->number);
+      --excess;
+    }
+  }
+  return outlived;
+}
+
 void SessionStore::Sweep(TimePoint now) {
   std::vector<Entry> dead;  // freeing a large mesh takes time: after the lock
   const std::lock_guard lock(mutex_);
-  std::vector<std::uint64_t> finished;  // oldest end first
-  for (auto& [number, entry] : entries_) {
-    if (!entry.session->Over()) continue;
-    if (entry.over_since == TimePoint::max()) entry.over_since = now;
-    finished.push_back(number);
-  }
-  std::stable_sort(finished.begin(), finished.end(), [this](auto a, auto b) {
-    return entries_.at(a).over_since < entries_.at(b).over_since;
-  });
-  for (std::size_t i = 0; i < finished.size(); ++i) {
-    const bool too_many = finished.size() - i > limits_.keep_finished;
-    if (!too_many && now - entries_.at(finished[i]).over_since < limits_.keep_for) continue;
-    auto node = entries_.extract(finished[i]);
+  for (const std::uint64_t number : OutlivedLocked(now)) {
+    auto node = entries_.extract(number);
     const SessionOptions& options = node.mapped().session->options();
     if (options.journal != nullptr) options.journal->Forget();
     numbers_.erase(options.name);

@@ -23,7 +23,7 @@ bool IsMeshName(const std::string& name);
 
 struct StoreLimits {
   std::size_t max_running = 64;
-  std::size_t keep_finished = 32;
+  std::size_t keep_finished = 32;  // of each owner; see Sweep
   Clock::duration keep_for = std::chrono::hours(1);
   std::size_t max_running_of_owner = 64;  // where owners have names
 };
@@ -37,7 +37,8 @@ class SessionStore {
   explicit SessionStore(StoreLimits limits, Session::MesherFactory factory = core::Mesher::Create);
   ~SessionStore();
 
-  // Names the mesh and sets it going. kLimitExceeded: too many are running.
+  // Names the mesh and sets it going. kLimitExceeded: too many are running, or the system gives no
+  // thread for it.
   Allowed<std::shared_ptr<Session>> Create(SessionOptions options);
   // Before the first Create.
   void RecordIn(JournalFactory new_journal) { new_journal_ = std::move(new_journal); }
@@ -59,7 +60,10 @@ class SessionStore {
 
   std::size_t Running() const;
   std::size_t Served() const;  // running, with a worker
-  // Forgets finished meshes that were kept long enough. To be called now and then.
+  // Forgets finished meshes that were kept long enough, and what an owner has beyond his number:
+  // first those without a vertex, then the oldest, but none of these within a minute of its end. So
+  // whoever is told apart from nobody can not have another's result forgotten by making and
+  // cancelling meshes. To be called now and then.
   void Sweep(TimePoint now);
   // Suspends all and waits for their threads until `deadline`. False: some are still computing;
   // they are left to themselves and the process must end.
@@ -74,6 +78,8 @@ class SessionStore {
   };
 
   std::shared_ptr<Session> StartLocked(SessionOptions options, TimePoint over_since);
+
+  std::vector<std::uint64_t> OutlivedLocked(TimePoint now);
 
   // Deleted entries whose thread is done and which nobody else holds; to be destroyed unlocked.
   std::vector<Entry> TakeDeadLocked();

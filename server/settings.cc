@@ -94,8 +94,6 @@ const std::vector<Setting>& Settings() {
        "owner's meshes alone. Read again when it changes, or after SIGHUP"},
 
       {kServerLimits, "--max-meshes", &Config::max_meshes, "Meshes running at once", 1, 100'000},
-      {kServerLimits, "--keep-finished-meshes", &Config::keep_finished_meshes,
-       "How many finished meshes can be read", 0, 1'000'000},
       {kServerLimits, "--max-memory-bytes", &Config::max_memory_bytes,
        "Estimated memory of all meshes; 0: three quarters of what the machine or container has", 0,
        kBytes},
@@ -112,6 +110,11 @@ const std::vector<Setting>& Settings() {
 
       {kOwnerLimits, "--owner-meshes", &Config::owner_meshes,
        "Meshes running at once; 0: as many as the server allows", 0, 100'000},
+      {kOwnerLimits, "--keep-finished-meshes", &Config::keep_finished_meshes,
+       "Finished meshes that can be read, of all clients together where they are not told apart. "
+       "What is beyond is forgotten, first what has no vertex, nothing else within a minute of its "
+       "end",
+       0, 1'000'000},
       {kOwnerLimits, "--owner-memory-bytes", &Config::owner_memory_bytes,
        "Estimated memory of an owner's meshes; 0: half of the server's", 0, kBytes},
 

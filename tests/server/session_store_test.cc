@@ -147,22 +147,160 @@ TEST(SessionStore, HoldsEachNamedOwnerToItsShare) {
   EXPECT_TRUE(create("alice"));
 }
 
-TEST(SessionStore, SweepForgetsFinishedMeshesByNumberAndAge) {
-  SessionStore store({10, 2, 1h});
-  std::vector<std::shared_ptr<Session>> sessions;
-  for (int i = 0; i < 4; ++i) sessions.push_back(*store.Create(Options()));
-  for (int i = 0; i < 3; ++i) {
-    sessions[i]->Cancel();
-    WaitUntilOver(*sessions[i]);
+// A mesher that has so many vertices at once, and then asks for more until it is cancelled.
+class Founded : public stellate::testing::StubMesher {
+ public:
+  Founded(core::Specification spec, std::uint64_t vertices) : StubMesher(std::move(spec)) {
+    progress_.vertices = vertices;
   }
-  const TimePoint now = Clock::now();
-  store.Sweep(now);
-  EXPECT_EQ(store.Find(sessions[0]->options().name), nullptr) << "two are kept";
-  EXPECT_NE(store.Find(sessions[1]->options().name), nullptr);
-  store.Sweep(now + 2h);
-  EXPECT_EQ(store.Find(sessions[1]->options().name), nullptr);
-  EXPECT_EQ(store.Find(sessions[2]->options().name), nullptr);
-  EXPECT_NE(store.Find(sessions[3]->options().name), nullptr) << "it is running";
+
+  const core::QueryBatch* NextBatch() override { return IsOver() ? nullptr : &batch_; }
+  core::Expected<core::MeshDelta> Absorb(const core::Answers&) override {
+    return core::Refuse(core::StatusCode::kCancelled, "never asked");
+  }
+};
+
+class SweepTest : public ::testing::Test {
+ protected:
+  static constexpr std::size_t kKept = 2;
+
+  // Of a mesh that has been cancelled.
+  std::string Finished(const std::string& owner, bool with_vertices = true) {
+    SessionOptions options = Options();
+    options.owner = owner;
+    options.spec.epsilon = with_vertices ? 0.3 : kBarren;
+    const auto session = *store_.Create(std::move(options));
+    while (with_vertices && !session->HasVertices()) std::this_thread::sleep_for(1ms);
+    session->Cancel();
+    WaitUntilOver(*session);
+    return session->options().name;
+  }
+  std::vector<std::string> Several(std::size_t count, const std::string& owner,
+                                   bool with_vertices = true) {
+    std::vector<std::string> names;
+    while (names.size() < count) names.push_back(Finished(owner, with_vertices));
+    return names;
+  }
+  std::size_t Kept(const std::vector<std::string>& names) const {
+    return std::count_if(names.begin(), names.end(),
+                         [this](const std::string& name) { return store_.Find(name) != nullptr; });
+  }
+
+  static constexpr double kBarren = 0.2;  // an epsilon that gives no vertices
+  const TimePoint now_ = Clock::now();
+  SessionStore store_{
+      {100, kKept, 1h},
+      [](core::Specification spec) -> core::Expected<std::unique_ptr<core::Mesher>> {
+        const std::uint64_t vertices = spec.epsilon == kBarren ? 0 : 3;
+        return std::make_unique<Founded>(std::move(spec), vertices);
+      }};
+};
+
+TEST_F(SweepTest, OneOwnersMeshesPushOutNoneOfAnothers) {
+  const std::string result = Finished("alice");
+  store_.Sweep(now_);
+  const auto flood = Several(33, "mallory");
+  store_.Sweep(now_ + 2min);
+  store_.Sweep(now_ + 4min);
+  EXPECT_NE(store_.Find(result), nullptr);
+  EXPECT_EQ(Kept(flood), kKept) << "what they push out is their own";
+}
+
+TEST_F(SweepTest, TheOldestGoButNoneWithinAMinuteOfItsEnd) {
+  const auto names = Several(4, "alice");
+  store_.Sweep(now_);
+  store_.Sweep(now_ + 59s);
+  EXPECT_EQ(Kept(names), 4u);
+  store_.Sweep(now_ + 60s);
+  EXPECT_EQ(store_.Find(names[0]), nullptr);
+  EXPECT_EQ(store_.Find(names[1]), nullptr);
+  EXPECT_NE(store_.Find(names[2]), nullptr);
+  store_.Sweep(now_ + 1h);
+  EXPECT_EQ(Kept(names), 0u);
+}
+
+TEST_F(SweepTest, WhatHasNoVertexGoesFirstAndAtOnce) {
+  for (const std::string owner : {"alice", ""}) {
+    const std::string result = Finished(owner);
+    store_.Sweep(now_);
+    const auto flood = Several(33, owner, /*with_vertices=*/false);
+    store_.Sweep(now_ + 10min);
+    EXPECT_NE(store_.Find(result), nullptr) << "owner \"" << owner << "\"";
+    EXPECT_EQ(Kept(flood), kKept - 1) << "owner \"" << owner << "\"";
+  }
+}
+
+TEST_F(SweepTest, ARunningMeshStays) {
+  const auto running = *store_.Create(Options());
+  store_.Sweep(now_ + 2h);
+  EXPECT_NE(store_.Find(running->options().name), nullptr);
+}
+
+// Knows nothing, and remembers how the mesh ended.
+class BlankJournal : public SessionJournal {
+ public:
+  std::optional<MeshFailure> WriteStart(const SessionOptions&,
+                                        std::chrono::system_clock::time_point) override {
+    return std::nullopt;
+  }
+  std::optional<MeshFailure> WriteRound(const core::QueryBatch&, const core::Answers&) override {
+    return std::nullopt;
+  }
+  std::optional<MeshFailure> WriteEnd(const SessionEnd& written) override {
+    end = written;
+    return std::nullopt;
+  }
+  Replay ReadRound(const core::QueryBatch&) override { return {}; }
+  void Forget() override {}
+
+  std::optional<SessionEnd> end;
+};
+
+class ClockSetBackTest : public ::testing::Test {
+ protected:
+  // A mesh that an earlier server recorded when its clock was two hours fast.
+  std::shared_ptr<Session> Restore(std::optional<SessionEnd> end) {
+    SessionOptions options = Options();
+    options.name = NewMeshName();
+    options.journal = journal_;
+    options.record = SessionRecord{created_, 0, std::move(end)};
+    const std::string name = options.name;
+    store_.Restore(std::move(options));
+    return store_.Find(name);
+  }
+
+  const std::chrono::system_clock::time_point created_ = std::chrono::system_clock::now() + 2h;
+  const std::shared_ptr<BlankJournal> journal_ = std::make_shared<BlankJournal>();
+  SessionStore store_{{}};
+};
+
+TEST_F(ClockSetBackTest, AMeshEndsNotBeforeItBegan) {
+  const auto session = Restore(std::nullopt);
+  ASSERT_NE(session, nullptr);
+  EXPECT_GE(session->View().elapsed_seconds, 0);
+  session->Cancel();
+  WaitUntilOver(*session);
+  const SessionView view = session->View();
+  EXPECT_GE(view.elapsed_seconds, 0);
+  EXPECT_LT(view.elapsed_seconds, 3600);
+  EXPECT_GE(*view.end_time, view.create_time);
+  ASSERT_TRUE(journal_->end);
+  EXPECT_GE(journal_->end->time, created_) << "on the disk as well";
+  EXPECT_GE(journal_->end->elapsed_seconds, 0);
+}
+
+TEST_F(ClockSetBackTest, ARecordWithNegativeTimesIsReadWithoutThem) {
+  const auto session =
+      Restore(SessionEnd{SessionState::kCancelled, created_ - 1h, -3600, {}, 0});
+  ASSERT_NE(session, nullptr);
+  WaitUntilOver(*session);
+  const SessionView view = session->View();
+  EXPECT_EQ(view.elapsed_seconds, 0);
+  EXPECT_GE(*view.end_time, view.create_time);
+  store_.Sweep(Clock::now() + 59min);
+  EXPECT_NE(store_.Find(session->options().name), nullptr) << "kept from now on";
+  store_.Sweep(Clock::now() + 61min);
+  EXPECT_EQ(store_.Find(session->options().name), nullptr);
 }
 
 TEST(SessionStore, StopCancelsWhatRuns) {
