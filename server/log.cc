@@ -113,7 +113,6 @@ void LogLeftOut() {
     Write(LogLevel::kWarning, {}, core::Message(party, ": more lines were left out"),
           LogFields().Add("lines", lines));
   }
-  }
 }
 
 std::string JsonString(const std::string& text) {
