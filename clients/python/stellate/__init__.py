@@ -24,6 +24,7 @@ from .client import Client, MeshInfo, ServerInfo  # noqa: E402
 from .errors import (  # noqa: E402
     Cancelled,
     FailedPrecondition,
+    Interrupted,
     InvalidArgument,
     LimitExceeded,
     MeshNotFound,
@@ -53,6 +54,7 @@ __all__ = [
     "Failure",
     "Finding",
     "ImplicitManifold",
+    "Interrupted",
     "InvalidArgument",
     "LimitExceeded",
     "Mesh",

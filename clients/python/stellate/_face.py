@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from typing import Any, Iterator
 
+from ._checkpoint import Checkpoint
 from ._credentials import Credentials
 from ._download import OnPart, fetch
+from ._follow import Following, OnProgress
+from ._interrupt import Interrupts, told
 from ._mesh import Mesh
 from ._server import Server
-from ._session import OnProgress, Session, follow
+from ._session import Session
 from .client import Client
 from .errors import InvalidArgument, NotCertified
 
@@ -21,6 +25,7 @@ def mesh(
     on_progress: OnProgress | None = None,
     credentials: Credentials | None = None,
     require_certified: bool = False,
+    checkpoint: str | os.PathLike[str] | None = None,
     **criteria: Any,
 ) -> Mesh:
     """Meshes the manifold that an oracle knows.
@@ -37,6 +42,9 @@ def mesh(
         mesh is cancelled.
       credentials: a stellate.Credentials for `server`, where it wants TLS or a token.
       require_certified: a mesh that is not certified is an error, NotCertified.
+      checkpoint: a directory, made if it is not there, in which the mesh outlives this program: the
+        same call goes on where it was interrupted or killed, the server died, or the oracle raised,
+        and returns at once when the mesh is finished.
       **criteria: radius_edge_bound, sliver_bound, picking_radius, small_sliver_radius, candidates,
         advance_step, flat_alternations, ask_ahead, common_centre, size_rate, max_deviation;
         max_vertices, max_rounds, max_batch_queries, worker_wait_seconds, answer_seconds;
@@ -52,20 +60,27 @@ def mesh(
     Raises:
       What the oracle raises, as itself; OracleError for answers that break a rule, and for "auto"
       where stellate.check finds an error; InvalidArgument,
-      LimitExceeded, Unavailable, Cancelled, ServerNotFound, NotCertified. KeyboardInterrupt cancels the mesh.
+      LimitExceeded, Unavailable, Cancelled, ServerNotFound, NotCertified; FailedPrecondition
+      where another process is meshing in the checkpoint. Ctrl-C cancels the mesh, or leaves it to
+      the checkpoint, and is Interrupted, a KeyboardInterrupt with the mesh so far; a second Ctrl-C
+      does not wait for that.
     """
-    if credentials is not None:
-        with _connect(server, credentials) as client:
-            return mesh(
-                oracle,
-                epsilon,
-                client,
-                on_progress,
-                require_certified=require_certified,
-                **criteria,
-            )
-    workers = criteria.pop("workers", 1)
-    with Session(oracle, epsilon, server, on_progress, workers, criteria, every=False) as session:
+    with contextlib.ExitStack() as stack:
+        interrupts = stack.enter_context(Interrupts())
+        kept = None
+        if checkpoint is not None:
+            if server is not None:
+                raise InvalidArgument(
+                    "checkpoint is for a private server: one that is named keeps meshes itself, "
+                    "with --data-dir"
+                )
+            kept = stack.enter_context(Checkpoint(checkpoint))
+        if credentials is not None:
+            server = stack.enter_context(_connect(server, credentials))
+        session = stack.enter_context(
+            Session(oracle, epsilon, server, on_progress, criteria, every=False, checkpoint=kept)
+        )
+        interrupts.on_first = session.interrupt
         (finished,) = session  # or an exception
     if require_certified and not finished.certified:
         raise NotCertified(
@@ -100,9 +115,16 @@ def watch(
         return
     if epsilon is None:
         raise TypeError("watch() needs epsilon, a length or 'auto', to mesh an oracle's manifold")
-    workers = criteria.pop("workers", 1)
-    with Session(oracle, epsilon, server, on_progress, workers, criteria) as session:
-        yield from session
+    interrupts = Interrupts()
+    with Session(oracle, epsilon, server, on_progress, criteria) as session:
+        interrupts.on_first = session.interrupt
+        meshes = iter(session)
+        while True:
+            with interrupts:
+                grown = next(meshes, None)
+            if grown is None:
+                return
+            yield grown
 
 
 def _watch_by_name(
@@ -111,10 +133,10 @@ def _watch_by_name(
     if server is None:
         raise TypeError("to watch a mesh by its name, say on which server it is")
     if isinstance(server, Client):
-        yield from follow(server, server.get(name), on_progress)
+        yield from Following(server, server.get(name), on_progress)
         return
     with Client(server) as client:
-        yield from follow(client, client.get(name), on_progress)
+        yield from Following(client, client.get(name), on_progress)
 
 
 def download(
@@ -150,14 +172,20 @@ def download(
       MeshNotFound; FailedPrecondition for a mesh that is refused because it is not over; how the
       mesh failed, or Cancelled, with what there is of it in the exception's `mesh`; Unavailable.
     """
-    if isinstance(server, Client) and credentials is None:
-        mesh = fetch(server, mesh_name, revision, unfinished, on_progress, on_part)
-    else:
-        with _connect(server, credentials) as client:
-            mesh = fetch(client, mesh_name, revision, unfinished, on_progress, on_part)
+    with _client(server, credentials) as client, told(f"{mesh_name} is left on its server"):
+        mesh = fetch(client, mesh_name, revision, unfinished, on_progress, on_part)
     if path is not None:
         mesh.save(path)
     return mesh
+
+
+def _client(
+    server: str | Server | Client, credentials: Credentials | None
+) -> contextlib.AbstractContextManager[Client]:
+    """The client that was given, which stays open, or one for the time being."""
+    if isinstance(server, Client) and credentials is None:
+        return contextlib.nullcontext(server)
+    return _connect(server, credentials)
 
 
 def _connect(server: str | Server | Client | None, credentials: Credentials | None) -> Client:
@@ -182,7 +210,5 @@ def serve(
     Returns: the state that the mesh ended in, e.g. "SUCCEEDED".
     Raises: what the oracle raises, after the server was told, or a StellateError.
     """
-    if isinstance(server, Client) and credentials is None:
-        return server.serve(oracle, mesh_name, worker=worker)
-    with _connect(server, credentials) as client:
+    with _client(server, credentials) as client, told("this worker left; others have its work"):
         return client.serve(oracle, mesh_name, worker=worker)

@@ -139,15 +139,20 @@ class Server:
             "SERVER_GONE",
         )
 
-    def close(self) -> None:
-        """Stops the server and removes its directory. May be called again."""
-        if self._process is not None and self._keeper.is_alive():
-            self._process.send_signal(signal.SIGTERM)
-            self._keeper.join(_STOP_SECONDS)
-            if self._keeper.is_alive():
+    def close(self, *, at_once: bool = False) -> None:
+        """Stops the server and removes its directory. May be called again.
+
+        `at_once` does not ask it to stop, and kills it; what it has recorded stays.
+        """
+        try:
+            if self._process is not None and self._keeper.is_alive() and not at_once:
+                self._process.send_signal(signal.SIGTERM)
+                self._keeper.join(_STOP_SECONDS)
+        finally:  # also when that was interrupted
+            if self._process is not None and self._keeper.is_alive():
                 self._process.kill()
-        self._keeper.join()
-        shutil.rmtree(self._directory, ignore_errors=True)
+            self._keeper.join()
+            shutil.rmtree(self._directory, ignore_errors=True)
 
     def __enter__(self) -> Server:
         return self

@@ -7,23 +7,19 @@ import logging
 import threading
 import time
 from types import TracebackType
-from typing import Any, Callable, Iterator, TypeVar
+from typing import Any, Callable, Iterator
 
+from ._checkpoint import Checkpoint
 from ._epsilon import choose
-from ._growth import GrowingComplex
+from ._follow import Following, OnProgress
 from ._mesh import Mesh
 from ._server import Server
 from ._spec import mesh_spec
 from .client import Client, MeshInfo
-from .errors import Cancelled, StellateError, error_class
+from .errors import Interrupted, StellateError
 from .oracle import CheckedOracle
-from .report import Progress, Report
-
-T = TypeVar("T")
 
 _log = logging.getLogger("stellate")
-
-OnProgress = Callable[[Progress], None]
 
 _FAREWELL_SECONDS = 2.0  # that an oracle may take to come to an end when nobody waits for it
 
@@ -31,8 +27,17 @@ _FAREWELL_SECONDS = 2.0  # that an oracle may take to come to an end when nobody
 class _Workers:
     """Threads that serve one mesh with one oracle. The first exception of any is kept."""
 
-    def __init__(self, client: Client, oracle: CheckedOracle, mesh: str, count: int) -> None:
+    def __init__(
+        self,
+        client: Client,
+        oracle: CheckedOracle,
+        mesh: str,
+        count: int,
+        on_failure: Callable[[BaseException], None],
+    ) -> None:
+        """`on_failure` is told of each; what it raises in turn, the server is not told."""
         self.failure: BaseException | None = None
+        self._on_failure = on_failure
         self._workers = [
             client.worker(oracle, mesh, f"python-{i + 1}", self._note, quiet=True)
             for i in range(count)
@@ -55,6 +60,7 @@ class _Workers:
     def _note(self, error: BaseException) -> None:
         if self.failure is None:
             self.failure = error
+        self._on_failure(error)
 
     def stop(self) -> None:
         for worker in self._workers:
@@ -73,7 +79,8 @@ class _Workers:
 class Session:
     """A mesh that is created, served and watched, as a context manager.
 
-    Leaving it early cancels the mesh; leaving it at all deletes the mesh from the server.
+    Leaving it early cancels the mesh; leaving it at all deletes the mesh from the server. With a
+    checkpoint it stays there until it is finished.
     """
 
     def __init__(
@@ -82,44 +89,133 @@ class Session:
         epsilon: float | str,
         server: str | Server | Client | None,
         on_progress: OnProgress | None,
-        workers: int,
         criteria: dict[str, Any],
+        *,
         every: bool = True,
+        checkpoint: Checkpoint | None = None,
     ) -> None:
         """`every`: iterating gives the mesh at every revision, and not only when it is finished."""
+        workers = criteria.pop("workers", 1)
         if int(workers) != workers or workers < 1:
             raise ValueError(f"workers has to be a whole number from 1 on, and is {workers!r}")
         checked = CheckedOracle(oracle)
         mesh_spec(checked, 1.0, criteria)  # what is misspelt shows before the oracle is probed
-        epsilon, self._epsilon_reason = choose(oracle, epsilon)
+        choice = checkpoint.choose_epsilon if checkpoint is not None else choose
+        epsilon, self._epsilon_reason = choice(oracle, epsilon)
         if self._epsilon_reason:
             _note(on_progress, f"epsilon {epsilon:g}, {self._epsilon_reason}")
-        self._on_progress, self._every = on_progress, every
+        self._on_progress, self._checkpoint = on_progress, checkpoint
+        self._interrupted = self._ended = False
+        self._server: Server | None = None
+        self._client: Client | None = None
+        self._workers: _Workers | None = None
+        self._kept = None
+        if checkpoint is not None:
+            checkpoint.require(mesh_spec(checked, epsilon, criteria))
+            self._kept = checkpoint.finished()
+            if self._kept is not None:
+                return
         self._owns_client = not isinstance(server, Client)
-        self._client = server if isinstance(server, Client) else Client(server)
         try:
-            self.info = self._client.create(checked, epsilon, **criteria)
+            if server is None:
+                server = self._server = Server(*(checkpoint.flags if checkpoint else ()))
+            self._client = server if isinstance(server, Client) else Client(server)
+            self._info = self._declare(checked, epsilon, criteria)
         except BaseException:
-            self._close_client()
+            self._close_connection()
             raise
-        self._ended = False
-        self._workers = _Workers(self._client, checked, self.info.name, int(workers))
+        self._following = Following(self._client, self._info, on_progress, every)
+        self._workers = _Workers(
+            self._client, checked, self._info.name, int(workers), self._on_failure
+        )
+
+    def _declare(self, oracle: CheckedOracle, epsilon: float, criteria: dict[str, Any]) -> MeshInfo:
+        """A new mesh, or the one that the checkpoint has."""
+        if self._checkpoint is None:
+            return self._client.create(oracle, epsilon, **criteria)
+        kept = None
+        for info in self._client.list():
+            if info.name == self._checkpoint.name and info.state not in ("FAILED", "CANCELLED"):
+                kept = info
+            else:  # a failed one would fail again, and others were never put down
+                self._client.delete(info.name)
+        if kept is not None:
+            return kept
+        info = self._client.create(oracle, epsilon, **criteria)
+        spec = mesh_spec(oracle, epsilon, criteria)
+        self._checkpoint.note(spec, info.name, self._epsilon_reason)
+        return info
+
+    def _on_failure(self, error: BaseException) -> None:
+        """Without a checkpoint it fails the mesh; with one the mesh waits for a better oracle."""
+        if self._checkpoint is not None:
+            self._following.stop()
+            raise error
 
     def __iter__(self) -> Iterator[Mesh]:
         """The mesh as it grows, the last with its report. Raises how it failed."""
+        if self._kept is not None:
+            yield self._kept
+            return
+        mesh = None
         try:
-            for mesh in follow(self._client, self.info, self._on_progress, self._every):
-                yield self._told(mesh)
+            for mesh in self._following:
+                mesh = self._told(mesh)
+                if mesh.report is not None:
+                    self._finish(mesh)
+                yield mesh
         except StellateError as error:
             if error.mesh is not None:
-                error.mesh = self._told(error.mesh)
-            if self._workers.failure is None:
-                raise
-            # Our own exception says more than the server's account of it.
-            if isinstance(self._workers.failure, StellateError):
-                self._workers.failure.mesh = error.mesh
+                error.mesh = mesh = self._told(error.mesh)
+            if not self._interrupted:
+                raise self._best_reason(error) from None
+        if self._interrupted:
+            raise self._interruption(mesh)
+        if self._workers.failure is not None and not self._ended:
             raise self._workers.failure from None
+
+    def _finish(self, mesh: Mesh) -> None:
         self._ended = True
+        if self._checkpoint is not None:
+            self._checkpoint.keep(mesh)
+
+    def _best_reason(self, error: StellateError) -> BaseException:
+        """Our own exception says more than the server's account of it."""
+        ours = self._workers.failure
+        if ours is None:
+            return error
+        if isinstance(ours, StellateError):
+            ours.mesh = error.mesh
+        return ours
+
+    def interrupt(self) -> None:
+        """From another thread: iterating ends as soon as it can, with Interrupted."""
+        self._interrupted = True
+        if self._checkpoint is not None:
+            self._following.stop()
+            self._workers.stop()
+            return
+        try:
+            self._client.cancel(self._info.name, wait=False)
+        except StellateError:
+            self._following.stop()  # a server that is away cannot say how the mesh ends
+
+    def _interruption(self, mesh: Mesh | None) -> Interrupted:
+        mesh = mesh or self._following.so_far()
+        size = f"{len(mesh.points):,} vertices"
+        if self._ended:
+            return Interrupted(f"the mesh was finished: {size}, the exception's mesh", mesh)
+        if self._checkpoint is None:
+            return Interrupted(
+                f"the mesh is cancelled; what there was of it, {size}, is the exception's mesh. "
+                "With checkpoint='directory' the same call would go on from there",
+                mesh,
+            )
+        return Interrupted(
+            f"the mesh, {size} so far, is kept in {self._checkpoint.directory}: the same call goes "
+            "on from there",
+            mesh,
+        )
 
     def _told(self, mesh: Mesh) -> Mesh:
         """With what the server does not know: why epsilon is what it is."""
@@ -137,25 +233,36 @@ class Session:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        second = self._interrupted and isinstance(error, KeyboardInterrupt)
+        at_once = second and not isinstance(error, Interrupted)
         try:
-            if self._ended:
-                self._workers.finish()
-            else:
-                self._workers.stop()
-            self._workers.join(_FAREWELL_SECONDS)
-            try:
-                self._client.delete(self.info.name, wait=False)
-            except StellateError:
-                pass  # it ends with its server, or somebody else was first
+            if self._workers is not None and not at_once:
+                self._leave()
         finally:
-            self._close_client()
+            self._close_connection(at_once)
+            if self._checkpoint is not None and (self._ended or self._kept is not None):
+                self._checkpoint.forget_server()
             close = getattr(self._on_progress, "close", None)
             if callable(close):
                 close()
 
-    def _close_client(self) -> None:
-        if self._owns_client:
+    def _leave(self) -> None:
+        if self._ended:
+            self._workers.finish()
+        else:
+            self._workers.stop()
+        self._workers.join(_FAREWELL_SECONDS)
+        if self._checkpoint is None:
+            try:
+                self._client.delete(self._info.name, wait=False)
+            except StellateError:
+                pass  # it ends with its server, or somebody else was first
+
+    def _close_connection(self, at_once: bool = False) -> None:
+        if self._client is not None and self._owns_client:
             self._client.close()
+        if self._server is not None:
+            self._server.close(at_once=at_once)
 
 
 def _note(on_progress: OnProgress | None, text: str) -> None:
@@ -164,59 +271,3 @@ def _note(on_progress: OnProgress | None, text: str) -> None:
     note = getattr(on_progress, "note", None)
     if callable(note):
         note(text)
-
-
-def follow(
-    client: Client, info: MeshInfo, on_progress: OnProgress | None, every: bool = True
-) -> Iterator[Mesh]:
-    """A mesh at every revision until its end, or at its end alone.
-
-    Closing the iterator leaves the mesh alone.
-    """
-    growth = GrowingComplex(info.dimension, info.ambient_dimension)
-    watch = client.watch(info.name)
-    watch.on_resume = growth.forget_pending
-    progress: Progress | None = None
-    try:
-        for event in watch:
-            kind = event.WhichOneof("event")
-            if kind == "delta":
-                if _sound(growth.absorb, event.delta) and every:
-                    simplices = _sound(growth.simplices)
-                    yield Mesh(growth.points(), simplices, None, progress, growth.revision)
-            elif kind == "reset_mesh":
-                growth.reset()
-            elif kind == "progress":
-                progress = Progress.from_wire(event.progress)
-                if on_progress is not None:
-                    on_progress(progress)
-                if progress.phase == "CERTIFYING":
-                    _sound(growth.settle)  # while the server is busy
-            elif kind == "final":
-                final = MeshInfo.from_wire(event.final)
-                if on_progress is not None and progress != final.progress:
-                    on_progress(final.progress)
-                yield _finished(growth, final)
-    finally:
-        watch.close()
-
-
-def _sound(step: Callable[..., T], *arguments: Any) -> T:
-    """A step of a GrowingComplex, whose complaints are about the server."""
-    try:
-        return step(*arguments)
-    except ValueError as error:
-        raise StellateError(f"the server broke the protocol: {error}", "PROTOCOL") from error
-
-
-def _finished(growth: GrowingComplex, final: MeshInfo) -> Mesh:
-    simplices = _sound(growth.simplices)
-    mesh = Mesh(growth.points(), simplices, final.report, final.progress, growth.revision)
-    if final.state == "CANCELLED":
-        raise Cancelled("the mesh was cancelled", mesh=mesh)
-    if final.state == "FAILED":
-        failure = final.report.failure if isinstance(final.report, Report) else None
-        reason = failure.reason if failure else "ORACLE_FAILED"
-        message = failure.message if failure else "the mesh failed, and the server does not say why"
-        raise error_class(reason)(message, reason, mesh=mesh)
-    return mesh

@@ -172,11 +172,13 @@ class Client:
                 return
             request.page_token = page.next_page_token
 
-    def cancel(self, name: str) -> MeshInfo:
-        """Ends a mesh; what there is of it stays readable. No effect when it is over."""
-        return MeshInfo.from_wire(
-            self._call(self._stub.CancelMesh, pb.CancelMeshRequest(name=name))
-        )
+    def cancel(self, name: str, *, wait: bool = True) -> MeshInfo:
+        """Ends a mesh; what there is of it stays readable. No effect when it is over.
+
+        Without `wait` a lost server is an error.
+        """
+        request = pb.CancelMeshRequest(name=name)
+        return MeshInfo.from_wire(self._call(self._stub.CancelMesh, request, once=not wait))
 
     def delete(self, name: str, *, wait: bool = True) -> None:
         """Cancels a mesh if it runs, and forgets it. Without `wait` a lost server is an error."""
@@ -319,6 +321,8 @@ class Watch:
             try:
                 if self._stream is None:
                     self._stream = self._stub.WatchMesh(self._request)
+                    if self._outage.stopped:  # by another thread, which saw no stream
+                        self._stream.cancel()
                 event = next(self._stream)
             except grpc.RpcError as error:
                 self._stream = None
@@ -331,7 +335,7 @@ class Watch:
                 self._request.from_revision = event.delta.delta.revision
             elif kind == "reset_mesh":
                 self._request.from_revision = 0
-            self._over = kind == "final"
+            self._over = self._over or kind == "final"
             return event
         raise StopIteration
 

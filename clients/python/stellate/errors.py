@@ -72,6 +72,19 @@ class Unauthenticated(StellateError, PermissionError):
     default_reason = "UNAUTHENTICATED"
 
 
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C while there was work to do. Programs that catch KeyboardInterrupt catch it.
+
+    Attributes:
+      mesh: what there is of the mesh; None if there is none, or at a second Ctrl-C, which ends
+        everything at once.
+    """
+
+    def __init__(self, message: str, mesh: Mesh | None = None) -> None:
+        super().__init__(message)
+        self.mesh = mesh
+
+
 class OracleError(StellateError):
     """The oracle's answers break a rule, or the mesh got none. Mend the oracle."""
 

@@ -165,6 +165,18 @@ class Report:
         return json.dumps(self.to_dict(), indent=indent, ensure_ascii=False, allow_nan=False)
 
     @classmethod
+    def from_fields(cls, fields: dict[str, Any]) -> Report:
+        """Back from dataclasses.asdict(report)."""
+        failure, certificate = fields["failure"], dict(fields["certificate"])
+        certificate["warnings"] = tuple(certificate["warnings"])
+        more = {
+            "failure": failure and Failure(**failure),
+            "counts": Counts(**fields["counts"]),
+            "certificate": Certificate(**certificate),
+        }
+        return cls(**{**fields, **more})
+
+    @classmethod
     def from_wire(cls, message: pb.Report, epsilon: float | None = None) -> Report:
         failure = None
         if message.HasField("failure"):

@@ -1,0 +1,207 @@
+"""A directory in which one mesh outlives the processes that make it."""
+
+from __future__ import annotations
+
+import dataclasses
+import fcntl
+import hashlib
+import json
+import os
+import shutil
+import zipfile
+from types import TracebackType
+from typing import IO, Any, Callable
+
+import numpy as np
+from google.protobuf.json_format import MessageToDict
+
+from ._epsilon import AUTO, choose
+from ._generated import mesh_pb2 as pb
+from ._mesh import Mesh
+from .errors import FailedPrecondition, InvalidArgument
+from .report import Progress, Report
+
+_LAYOUT = 1  # of the files
+
+
+class Checkpoint:
+    """The directory while one process works in it. A context manager.
+
+    lock        held by that process
+    mesh.json   what is meshed, and its name on the private server
+    server/     that server's --data-dir, until the mesh is finished
+    mesh.npz    the finished mesh
+
+    Raises, when entered: FailedPrecondition if another process is at work in it, OSError.
+    """
+
+    def __init__(self, directory: str | os.PathLike[str]) -> None:
+        self.directory = os.fspath(directory)
+        self._server_directory = os.path.join(self.directory, "server")
+        self._record_path = os.path.join(self.directory, "mesh.json")
+        self._mesh_path = os.path.join(self.directory, "mesh.npz")
+        self._record: dict[str, Any] = {}
+        self._lock: IO[str] | None = None
+
+    def __enter__(self) -> Checkpoint:
+        os.makedirs(self.directory, mode=0o700, exist_ok=True)
+        self._lock = open(os.path.join(self.directory, "lock"), "w")
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self._lock.close()
+            raise FailedPrecondition(
+                f"another process is meshing in the checkpoint {self.directory}: wait for its end, "
+                "or take another directory"
+            ) from None
+        try:
+            self._record = self._read()
+        except BaseException:
+            self._lock.close()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        assert self._lock is not None
+        self._lock.close()
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """For the private server."""
+        return "--data-dir", self._server_directory
+
+    @property
+    def name(self) -> str:
+        """The mesh's name on the private server; "" if none was made yet."""
+        return self._record.get("name", "")
+
+    def choose_epsilon(self, oracle: Any, epsilon: float | str) -> tuple[float, str]:
+        """As _epsilon.choose, which is asked for "auto" only once."""
+        if epsilon == AUTO and self._record.get("epsilon_reason"):
+            return self._record["spec"]["epsilon"], self._record["epsilon_reason"]
+        return choose(oracle, epsilon)
+
+    def require(self, spec: pb.MeshSpec) -> None:
+        """Raises InvalidArgument if this is the directory of a mesh of another specification."""
+        if self._record and self._record["digest"] != _digest(spec):
+            differences = _differences(self._record["spec"], _plain(spec))
+            raise InvalidArgument(
+                f"the checkpoint {self.directory} is of a mesh of another specification: "
+                f"{'; '.join(differences) or 'by its digest'}. Take another directory, or remove it"
+            )
+
+    def note(self, spec: pb.MeshSpec, name: str, epsilon_reason: str) -> None:
+        """Puts down what is meshed, before it is."""
+        self._record = {
+            "layout": _LAYOUT,
+            "name": name,
+            "digest": _digest(spec),
+            "epsilon_reason": epsilon_reason,
+            "spec": _plain(spec),
+        }
+        text = json.dumps(self._record, indent=1) + "\n"
+        self._replace(self._record_path, lambda file: file.write(text.encode()))
+
+    def finished(self) -> Mesh | None:
+        """The mesh, if it is finished."""
+        if not os.path.exists(self._mesh_path):
+            return None
+        try:
+            with np.load(self._mesh_path, allow_pickle=False) as kept:
+                points, simplices = kept["points"], kept["simplices"]
+                about = json.loads(str(kept["about"]))
+            progress = about["progress"] and Progress(**about["progress"])
+            report = Report.from_fields(about["report"])
+            return Mesh(points, simplices, report, progress, about["revision"])
+        except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+            raise InvalidArgument(
+                f"{self._mesh_path} is no mesh that was kept ({error}): remove {self.directory}"
+            ) from error
+
+    def keep(self, mesh: Mesh) -> None:
+        """Keeps a finished mesh, which needs its server no more."""
+        about = {
+            "report": mesh.report and dataclasses.asdict(mesh.report),
+            "progress": mesh.progress and dataclasses.asdict(mesh.progress),
+            "revision": mesh.revision,
+        }
+        self._replace(
+            self._mesh_path,
+            lambda file: np.savez(
+                file,
+                points=mesh.points,
+                simplices=mesh.simplices,
+                about=np.array(json.dumps(about)),
+            ),
+        )
+
+    def forget_server(self) -> None:
+        """Removes what the server of a finished mesh has left."""
+        shutil.rmtree(self._server_directory, ignore_errors=True)
+
+    def _read(self) -> dict[str, Any]:
+        try:
+            with open(self._record_path) as file:
+                record = json.load(file)
+            if record["layout"] == _LAYOUT and record["name"] and record["digest"]:
+                return record
+            problem = f"layout {record['layout']}"
+        except FileNotFoundError:
+            return {}
+        except (ValueError, KeyError, TypeError) as error:
+            problem = str(error)
+        raise InvalidArgument(
+            f"{self._record_path} is no record of this version's ({problem}): take another "
+            f"directory, or remove {self.directory}"
+        )
+
+    def _replace(self, path: str, write: Callable[[IO[bytes]], object]) -> None:
+        """The whole file or none of it, also when the machine goes down."""
+        with open(path + ".new", "wb") as file:
+            write(file)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(path + ".new", path)
+        directory = os.open(self.directory, os.O_RDONLY)
+        try:
+            os.fsync(directory)
+        finally:
+            os.close(directory)
+
+
+def _essence(spec: pb.MeshSpec) -> pb.MeshSpec:
+    """What determines the mesh."""
+    copy = pb.MeshSpec()
+    copy.CopyFrom(spec)
+    copy.ClearField("label")
+    return copy
+
+
+def _plain(spec: pb.MeshSpec) -> dict[str, Any]:
+    return MessageToDict(_essence(spec), preserving_proto_field_name=True)
+
+
+def _digest(spec: pb.MeshSpec) -> str:
+    return hashlib.sha256(_essence(spec).SerializeToString(deterministic=True)).hexdigest()
+
+
+def _differences(there: dict[str, Any], here: dict[str, Any], within: str = "") -> list[str]:
+    found = []
+    for name in {**there, **here}:
+        a, b = there.get(name), here.get(name)
+        if a == b:
+            continue
+        either = a if isinstance(a, dict) else b
+        if isinstance(either, dict) and "data" not in either:
+            found += _differences(a or {}, b or {}, f"{within}{name}.")
+        elif isinstance(either, dict):  # an array
+            found.append(f"{within}{name} differs")
+        else:
+            there_it, here_it = ("not given" if x is None else x for x in (a, b))
+            found.append(f"{within}{name} is {there_it} there and {here_it} here")
+    return found

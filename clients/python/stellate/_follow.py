@@ -1,0 +1,88 @@
+"""Watching a mesh to its end."""
+
+from __future__ import annotations
+
+from typing import Any, Callable, Iterator, TypeVar
+
+from ._growth import GrowingComplex
+from ._mesh import Mesh
+from .client import Client, MeshInfo
+from .errors import Cancelled, StellateError, error_class
+from .report import Progress, Report
+
+T = TypeVar("T")
+
+OnProgress = Callable[[Progress], None]
+
+
+class Following:
+    """A mesh at every revision until its end, or at its end alone, as an iterator.
+
+    Closing the iterator leaves the mesh alone.
+    """
+
+    def __init__(
+        self, client: Client, info: MeshInfo, on_progress: OnProgress | None, every: bool = True
+    ) -> None:
+        self._on_progress, self._every = on_progress, every
+        self._growth = GrowingComplex(info.dimension, info.ambient_dimension)
+        self._watch = client.watch(info.name)
+        self._watch.on_resume = self._growth.forget_pending
+        self._progress: Progress | None = None
+
+    def __iter__(self) -> Iterator[Mesh]:
+        growth = self._growth
+        try:
+            for event in self._watch:
+                kind = event.WhichOneof("event")
+                if kind == "delta":
+                    if _sound(growth.absorb, event.delta) and self._every:
+                        yield self.so_far()
+                elif kind == "reset_mesh":
+                    growth.reset()
+                elif kind == "progress":
+                    self._note(Progress.from_wire(event.progress))
+                    if self._progress.phase == "CERTIFYING":
+                        _sound(growth.settle)  # while the server is busy
+                elif kind == "final":
+                    final = MeshInfo.from_wire(event.final)
+                    if self._progress != final.progress:
+                        self._note(final.progress)
+                    yield _finished(growth, final)
+        finally:
+            self._watch.close()
+
+    def so_far(self) -> Mesh:
+        """The mesh at its last complete revision."""
+        simplices = _sound(self._growth.simplices)
+        return Mesh(self._growth.points(), simplices, None, self._progress, self._growth.revision)
+
+    def stop(self) -> None:
+        """From another thread: the iterator ends soon, with or without an exception."""
+        self._watch.close()
+
+    def _note(self, progress: Progress) -> None:
+        self._progress = progress
+        if self._on_progress is not None:
+            self._on_progress(progress)
+
+
+def _sound(step: Callable[..., T], *arguments: Any) -> T:
+    """A step of a GrowingComplex, whose complaints are about the server."""
+    try:
+        return step(*arguments)
+    except ValueError as error:
+        raise StellateError(f"the server broke the protocol: {error}", "PROTOCOL") from error
+
+
+def _finished(growth: GrowingComplex, final: MeshInfo) -> Mesh:
+    simplices = _sound(growth.simplices)
+    mesh = Mesh(growth.points(), simplices, final.report, final.progress, growth.revision)
+    if final.state == "CANCELLED":
+        raise Cancelled("the mesh was cancelled", mesh=mesh)
+    if final.state == "FAILED":
+        failure = final.report.failure if isinstance(final.report, Report) else None
+        reason = failure.reason if failure else "ORACLE_FAILED"
+        message = failure.message if failure else "the mesh failed, and the server does not say why"
+        raise error_class(reason)(message, reason, mesh=mesh)
+    return mesh
