@@ -1,0 +1,273 @@
+"""Equations F(x) = 0, F: R^d -> R^m, solved for whole batches of points at once.
+
+Each point's course is its own: how a batch is cut never changes an answer, not even by a rounding
+error.
+"""
+
+from __future__ import annotations
+
+from typing import Callable, Iterator, NamedTuple
+
+import numpy as np
+
+from .errors import OracleError
+
+_MAX_VALUES = 4_000_000  # numbers in one call for differences
+_FIRST_STEP = 6e-6  # of central differences: about the cube root of the rounding unit
+_SECOND_STEP = 1e-4  # of second differences: about its fourth root
+_SLOW = 0.25  # a Jacobian that lowers |F| by less than that is too old
+
+Batched = Callable[[np.ndarray], np.ndarray]
+# (jacobian (n, m, d), values (n, m), x (n, d), rows (n,) of the batch) -> steps (n, d)
+StepFrom = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+
+
+class Solution(NamedTuple):
+    points: np.ndarray  # (n, d), meaningful where converged
+    values: np.ndarray  # (n, m), of F there
+    converged: np.ndarray  # (n,)
+
+
+class Equations:
+    """F with its derivatives.
+
+    Args:
+      f: (n, d) -> (n, m).
+      jacobian: (n, d) -> (n, m, d), or None for differences of f. Differences are dear, so that
+        steps share them: each corrects the Jacobian by what it has seen (Broyden).
+      scale: a length, of the solvers' steps and differences.
+    """
+
+    def __init__(
+        self,
+        f: Batched,
+        jacobian: Batched | None,
+        shape: tuple[int, int],
+        scale: float,
+        max_iterations: int,
+    ) -> None:
+        """`shape`: (m, d)."""
+        self._f, self._given, self.shape = f, jacobian, shape
+        self._scale, self._max_iterations = scale, max_iterations
+        self.tolerance = 1e-12 * scale  # of a Newton step, a length
+
+    def values(self, x: np.ndarray) -> np.ndarray:
+        """F at the rows of x."""
+        expected = (len(x), self.shape[0])
+        if not len(x):
+            return np.empty(expected)
+        values = _as_numbers(self._f(x), "f")
+        if values.shape != expected:
+            raise OracleError(
+                f"f returned shape {values.shape}; it has to be {expected}", "ORACLE_SHAPE"
+            )
+        return values
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """(n, m, d), as given or by differences, in one call for as many rows as fit."""
+        m, d = self.shape
+        if self._given is None:
+            jacobian = np.empty((len(x), m, d))
+            for part in _blocks(len(x), 2 * d * d):
+                jacobian[part] = self._differences(x[part])
+            return jacobian
+        if not len(x):
+            return np.empty((0, m, d))
+        jacobian = _as_numbers(self._given(x), "jacobian")
+        if jacobian.shape != (len(x), m, d):
+            raise OracleError(
+                f"jacobian returned shape {jacobian.shape}; it has to be {(len(x), m, d)}",
+                "ORACLE_SHAPE",
+            )
+        return jacobian
+
+    def _differences(self, x: np.ndarray) -> np.ndarray:
+        (m, d), n = self.shape, len(x)
+        h = _FIRST_STEP * self._scale * np.eye(d)
+        ahead = (x[:, None, :] + h).reshape(-1, d)
+        behind = (x[:, None, :] - h).reshape(-1, d)
+        values = self.values(np.concatenate([ahead, behind]))
+        change = (values[: n * d] - values[n * d :]).reshape(n, d, m)
+        change /= (ahead - behind).sum(axis=1).reshape(n, d, 1)
+        return change.transpose(0, 2, 1)
+
+    def curvature(
+        self, y: np.ndarray, values: np.ndarray, multipliers: np.ndarray, tangents: np.ndarray
+    ) -> np.ndarray:
+        """sum_i l_i T^t (d^2 F_i) T at y, for l (n, m) and T (n, d, k): (n, k, k)."""
+        k = tangents.shape[2]
+        curvature = np.empty((len(y), k, k))
+        m, d = self.shape
+        step = self._second_differences if self._given is None else self._jacobian_differences
+        for part in _blocks(len(y), 2 * k * max(m, k) * d):
+            curvature[part] = step(y[part], values[part], multipliers[part], tangents[part])
+        return curvature
+
+    def _jacobian_differences(
+        self, y: np.ndarray, values: np.ndarray, multipliers: np.ndarray, tangents: np.ndarray
+    ) -> np.ndarray:
+        """From how J^t l changes along each tangent direction."""
+        n, d, k = tangents.shape
+        h = 1e-5 * self._scale
+        along = h * tangents.transpose(0, 2, 1)
+        around = np.concatenate([y[:, None, :] + along, y[:, None, :] - along], axis=1)
+        jacobian = self.jacobian(around.reshape(-1, d)).reshape(n, 2 * k, *self.shape)
+        curvature = np.empty((n, k, k))
+        for a in range(k):
+            change = (jacobian[:, a] - jacobian[:, k + a]) / (2 * h)
+            change = (multipliers[:, None, :] @ change)[:, 0, :]
+            curvature[:, :, a] = (tangents.transpose(0, 2, 1) @ change[..., None])[..., 0]
+        return curvature
+
+    def _second_differences(
+        self, y: np.ndarray, values: np.ndarray, multipliers: np.ndarray, tangents: np.ndarray
+    ) -> np.ndarray:
+        """From l F at y + h t_a and y + h (t_a + t_b) and across from there: k^2 + k values."""
+        n, d, k = tangents.shape
+        h = _SECOND_STEP * self._scale
+        t = tangents.transpose(0, 2, 1)
+        first, second = np.triu_indices(k, 1)
+        along = h * np.concatenate([t, t[:, first] + t[:, second]], axis=1)
+        count = along.shape[1]
+        around = np.concatenate([y[:, None, :] + along, y[:, None, :] - along], axis=1)
+        seen = self.values(around.reshape(-1, d)).reshape(n, 2, count, -1).sum(axis=1)
+        # l F(y + v) - 2 l F(y) + l F(y - v), over h^2
+        bend = ((seen - 2 * values[:, None, :]) * multipliers[:, None, :]).sum(axis=2) / h**2
+        curvature = np.empty((n, k, k))
+        diagonal = np.arange(k)
+        curvature[:, diagonal, diagonal] = bend[:, :k]
+        mixed = (bend[:, k:] - bend[:, first] - bend[:, second]) / 2
+        curvature[:, first, second] = curvature[:, second, first] = mixed
+        return curvature
+
+    def drive(
+        self, start: np.ndarray, step_from: StepFrom, jacobian: np.ndarray | None = None
+    ) -> Solution:
+        """Drives F to zero from each row of `start`; steps are halved until |F| falls.
+
+        `jacobian`: of points near `start`, which saves computing it where Jacobians are shared.
+        """
+        y = np.array(start, dtype=float)
+        values = self.values(y)
+        alive = np.isfinite(values).all(axis=1)
+        converged = np.zeros(len(y), dtype=bool)
+        jacobians = _Shared(self, y, jacobian)
+        for _ in range(self._max_iterations):
+            rows = np.flatnonzero(alive & ~converged)
+            if not rows.size:
+                break
+            step = step_from(jacobians.at(rows), values[rows], y[rows], rows)
+            usable = np.isfinite(step).all(axis=1)
+            jacobians.renew_or_kill(rows[~usable], alive)
+            rows, step = rows[usable], step[usable]
+            length = norms(step)
+            step *= np.minimum(1.0, 0.25 * self._scale / np.maximum(length, 1e-300))[:, None]
+            # A step this short lands on M to rounding; halving could only see noise.
+            short = length <= self.tolerance * 1e4
+            y[rows[short]] += step[short]
+            converged[rows[length <= self.tolerance]] = True
+            values[rows[short]] = self.values(y[rows[short]])
+            self._halve_until_better(y, values, jacobians, alive, rows[~short], step[~short])
+        return Solution(y, values, converged)
+
+    def _halve_until_better(
+        self,
+        y: np.ndarray,
+        values: np.ndarray,
+        jacobians: _Shared,
+        alive: np.ndarray,
+        rows: np.ndarray,
+        step: np.ndarray,
+    ) -> None:
+        """Takes, in place, the longest of step, step/2, ... that lowers |F|; kills if none does."""
+        fraction = 1.0
+        for _ in range(30):
+            if not rows.size:
+                return
+            trial = y[rows] + fraction * step
+            trial_values = self.values(trial)
+            with np.errstate(invalid="ignore"):
+                size, trial_size = norms(values[rows]), norms(trial_values)
+                better = trial_size <= (1 - 1e-4 * fraction) * size
+            taken = rows[better]
+            slow = (trial_size > _SLOW * size)[better]
+            change = trial_values[better] - values[taken]
+            jacobians.moved(taken, fraction * step[better], change, slow)
+            y[taken], values[taken] = trial[better], trial_values[better]
+            rows, step = rows[~better], step[~better]
+            fraction /= 2
+        jacobians.renew_or_kill(rows, alive)
+
+
+class _Shared:
+    """The Jacobians of a batch on its way, each at its point or taken along to the next ones."""
+
+    def __init__(self, equations: Equations, y: np.ndarray, near: np.ndarray | None) -> None:
+        self._equations, self._y = equations, y
+        self._shares = equations._given is None
+        self._old = np.ones(len(y), dtype=bool)  # has to be computed
+        self._exact = np.zeros(len(y), dtype=bool)  # is of the very point
+        self._now = np.empty((len(y), *equations.shape))
+        if near is not None and self._shares:
+            self._now[:], self._old[:] = near, False
+
+    def at(self, rows: np.ndarray) -> np.ndarray:
+        old = rows[self._old[rows]]
+        if old.size:
+            self._now[old] = self._equations.jacobian(self._y[old])
+            self._old[old], self._exact[old] = not self._shares, True
+        return self._now[rows]
+
+    def moved(
+        self, rows: np.ndarray, step: np.ndarray, change: np.ndarray, slow: np.ndarray
+    ) -> None:
+        """After a step the Jacobian is made to map it to what it has changed in F."""
+        self._exact[rows] = False
+        if not self._shares:
+            return
+        self._old[rows[slow]] = True
+        rows, step, change = rows[~slow], step[~slow], change[~slow]
+        missing = change - (self._now[rows] @ step[..., None])[..., 0]
+        along = step / (step * step).sum(axis=1)[:, None]
+        self._now[rows] += missing[:, :, None] * along[:, None, :]
+
+    def renew_or_kill(self, rows: np.ndarray, alive: np.ndarray) -> None:
+        """Where no step helps: with a Jacobian of another point that is no verdict yet."""
+        alive[rows[self._exact[rows]]] = False
+        self._old[rows] = True
+
+
+def norms(rows: np.ndarray) -> np.ndarray:
+    return np.sqrt((rows * rows).sum(axis=1))
+
+
+def solve(systems: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solves each system; NaN for one that is singular, as it has to be alone with its failure."""
+    try:
+        return np.linalg.solve(systems, right)
+    except np.linalg.LinAlgError:
+        solution = np.full(right.shape, np.nan)
+        for i, (system, b) in enumerate(zip(systems, right)):
+            try:
+                solution[i] = np.linalg.solve(system, b)
+            except np.linalg.LinAlgError:
+                continue
+        return solution
+
+
+def _as_numbers(answer: object, name: str) -> np.ndarray:
+    values = np.asarray(answer)
+    if values.dtype in (np.float32, np.float16):
+        raise OracleError(
+            f"{name} returned {values.dtype} numbers; points are found to twelve digits, which "
+            "takes float64 throughout (for a function of jax's say jacobian='jax')",
+            "ORACLE_PRECISION",
+        )
+    return values.astype(float, copy=False)
+
+
+def _blocks(count: int, numbers: int) -> Iterator[slice]:
+    """Slices of rows that take so many numbers each."""
+    size = max(1, _MAX_VALUES // numbers)
+    for first in range(0, count, size):
+        yield slice(first, first + size)
