@@ -13,10 +13,7 @@ DownloadCommand::DownloadCommand(CLI::App& parent)
     : command_(parent.add_subcommand("download", "Fetch a mesh that is on a server")),
       server_(command_, "127.0.0.1:7717") {
   command_->add_option("mesh", mesh_, "its whole name: meshes/ and 32 digits")->required();
-  command_
-      ->add_option("-o,--output", outputs_,
-                   "file to write, .txt .off .obj .ply .vtu; may be given again")
-      ->required();
+  outputs_.AddTo(command_)->required();
   CLI::Option* const wait =
       command_->add_flag("--wait", wait_, "wait for the end of a mesh that is not over");
   command_->add_flag("--unfinished", unfinished_, "take a mesh as it is, over or failed or not")
@@ -44,6 +41,7 @@ int DownloadCommand::Run(std::stop_token stop) {
   if (unfinished_) options_.unfinished = Unfinished::kTake;
   ProgressBar bar(quiet_);
   options_.stop = std::move(stop);
+  options_.on_found = [this](int k, int d) { return outputs_.Check(k, d); };
   options_.on_progress = [&bar](const Progress& progress) { bar.Show(progress); };
   options_.on_part = [&bar](auto received, auto all) { bar.ShowPart(received, all); };
   options_.on_outage = [this, &bar](const Outage& outage) {
@@ -56,10 +54,7 @@ int DownloadCommand::Run(std::stop_token stop) {
 }
 
 int DownloadCommand::Deliver(const Mesh& mesh) const {
-  int status = mesh.report.certified() ? kExitCertified : kExitNotCertified;
-  for (const std::string& path : outputs_) {
-    if (const Expected<void> saved = mesh.Save(path); !saved) status = Complain(saved.error());
-  }
+  int status = outputs_.Write(mesh, mesh.report.certified() ? kExitCertified : kExitNotCertified);
   if (!report_.empty()) {
     const Expected<void> saved = SaveJson(mesh.report, report_);
     if (!saved) status = Complain(saved.error());

@@ -3,8 +3,8 @@
 #include <CLI/App.hpp>
 #include <stop_token>
 #include <string>
-#include <vector>
 
+#include "outputs.h"
 #include "server_options.h"
 #include "stellate/download.h"
 
@@ -24,7 +24,7 @@ class DownloadCommand {
   ServerOptions server_;
   DownloadOptions options_;
   std::string mesh_;
-  std::vector<std::string> outputs_;
+  Outputs outputs_;
   std::string report_;
   bool wait_ = false, unfinished_ = false, json_ = false, quiet_ = false;
 };

@@ -58,8 +58,7 @@ MeshCommand::MeshCommand(CLI::App& parent)
           "'stellate doctor' finds")
       ->type_name("FLOAT|auto")
       ->required();
-  command_->add_option("-o,--output", outputs_,
-                       "file to write, .txt .off .obj .ply .vtu; may be given again");
+  outputs_.AddTo(command_);
   for (const MeshSetting& setting : RunSettings()) Add(command_, setting, &options_);
   CLI::App* const criteria =
       command_->add_option_group("Criteria", "absent: the server's defaults");
@@ -84,6 +83,9 @@ int MeshCommand::Run(std::stop_token stop) {
   const std::unique_ptr<Manifold> manifold = MakeManifold(manifold_, &why);
   if (manifold == nullptr) {
     return Complain({ErrorCode::kRefused, "", why + "; 'stellate list' shows what there is"});
+  }
+  if (const auto ok = outputs_.Check(manifold->dimension(), manifold->ambient_dimension()); !ok) {
+    return Complain(ok.error());
   }
   options_.server = server_.address();
   if (!options_.server.empty()) {
@@ -110,10 +112,7 @@ int MeshCommand::Run(std::stop_token stop) {
 }
 
 int MeshCommand::Deliver(const Mesh& mesh) const {
-  int status = mesh.report.certified() ? kExitCertified : kExitNotCertified;
-  for (const std::string& path : outputs_) {
-    if (const Expected<void> saved = mesh.Save(path); !saved) status = Complain(saved.error());
-  }
+  int status = outputs_.Write(mesh, mesh.report.certified() ? kExitCertified : kExitNotCertified);
   if (!report_.empty()) {
     const Expected<void> saved = SaveJson(mesh.report, report_);
     if (!saved) status = Complain(saved.error());

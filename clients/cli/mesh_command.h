@@ -3,8 +3,8 @@
 #include <CLI/App.hpp>
 #include <stop_token>
 #include <string>
-#include <vector>
 
+#include "outputs.h"
 #include "server_options.h"
 #include "stellate/client.h"
 
@@ -25,7 +25,7 @@ class MeshCommand {
   ServerOptions server_;
   MeshOptions options_;
   std::string manifold_;
-  std::vector<std::string> outputs_;
+  Outputs outputs_;
   std::string report_;
   bool json_ = false, quiet_ = false, closest_point_only_ = false;
 };

@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
@@ -220,13 +223,91 @@ TEST_F(MeshFile, RefusesWhatAFormatCannotHold) {
   for (const std::string ending : {".obj", ".off", ".ply"}) {
     EXPECT_NE(Refusal(solid, "a" + ending).find("dimension 3"), std::string::npos) << ending;
   }
-  EXPECT_NE(Refusal(Surface(4), "a.obj").find("4 coordinates"), std::string::npos);
-  EXPECT_NE(Refusal(Surface(4), "a.ply").find("4 coordinates"), std::string::npos);
+  EXPECT_NE(Refusal(Surface(4), "a.obj").find("in R^4"), std::string::npos);
+  EXPECT_NE(Refusal(Surface(4), "a.ply").find("in R^4"), std::string::npos);
   Mesh thick = Surface(5);
   thick.simplices = SimplexMatrix::Zero(5, 0);
   EXPECT_NE(Refusal(thick, "a.vtu").find("dimension 4"), std::string::npos);
-  EXPECT_NE(Refusal(thick, "a.stl").find("'.stl'"), std::string::npos);
+  EXPECT_NE(Refusal(thick, "a.stl").find("surfaces"), std::string::npos);
+  EXPECT_NE(Refusal(thick, "a.wkt").find("'.wkt'"), std::string::npos);
+  EXPECT_NE(Refusal(Surface(4), "a.stl").find("known for it: .txt .off .vtu"), std::string::npos);
+  EXPECT_NE(Refusal(Surface(4), "a.msh").find("points of space"), std::string::npos);
+  EXPECT_NE(Refusal(thick, "a.msh").find("dimension 3 at most"), std::string::npos);
   EXPECT_NE(Refusal(thick, "plain").find(".txt"), std::string::npos);
+}
+
+TEST_F(MeshFile, WhatWouldBeRefusedIsKnownBefore) {
+  EXPECT_TRUE(CheckSave(Path("a.STL"), 2, 3).has_value());
+  EXPECT_TRUE(CheckSave(Path("a.txt"), 7, 9).has_value());
+  EXPECT_TRUE(CheckSave("in_this_folder.txt", 2, 3).has_value());
+  for (const char* name : {"a.stl", "a.msh", "a.wkt", "missing/a.txt"}) {
+    EXPECT_FALSE(CheckSave(Path(name), 2, 4).has_value()) << name;
+  }
+  std::filesystem::create_directory(Path("folder.txt"));
+  EXPECT_FALSE(CheckSave(Path("folder.txt"), 2, 3).has_value());
+  EXPECT_FALSE(std::filesystem::exists(Path("a.STL")));
+}
+
+TEST_F(MeshFile, MshIsGmshs) {
+  Mesh mesh = Surface(3);
+  mesh.points.rightCols(1).setConstant(0.5);
+  EXPECT_EQ(Saved(mesh, "a.msh"),
+            "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n"
+            "2 0.33333333333333331 0 0\n3 0 -1e-300 0\n4 0.5 0.5 0.5\n$EndNodes\n"
+            "$Elements\n4\n1 2 2 1 1 1 2 3\n2 2 2 1 1 1 4 2\n3 2 2 1 1 1 3 4\n"
+            "4 2 2 1 1 2 4 3\n$EndElements\n");
+}
+
+TEST_F(MeshFile, StlHoldsTrianglesWithNormalsOutwards) {
+  Mesh mesh = Surface(3);
+  mesh.points.setZero();
+  mesh.points.rightCols(3).setIdentity();
+  mesh.points.colwise() += Eigen::Vector3d(5, 0, 0);  // the origin lies outside
+  const std::string bytes = Saved(mesh, "a.stl");
+  std::uint32_t count = 0;
+  ASSERT_EQ(bytes.size(), 84u + 4 * 50);
+  EXPECT_NE(bytes.substr(0, 5), "solid");
+  std::memcpy(&count, bytes.data() + 80, sizeof count);
+  EXPECT_EQ(count, 4u);
+  const Eigen::Vector3f inside(5.1f, 0.1f, 0.1f);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    Eigen::Matrix<float, 3, 4> facet;  // normal, corners
+    std::memcpy(facet.data(), bytes.data() + 84 + 50 * i, sizeof facet);
+    const Eigen::Vector3f across =
+        (facet.col(2) - facet.col(1)).cross(facet.col(3) - facet.col(1)).normalized();
+    EXPECT_LT((across - facet.col(0)).norm(), 1e-5f) << i;
+    EXPECT_GT(across.dot(facet.col(1) - inside), 0) << i;
+  }
+  mesh.points.colwise() += Eigen::Vector3d(1e9, 0, 0);
+  EXPECT_NE(Refusal(mesh, "b.stl").find("single precision"), std::string::npos);
+}
+
+TEST_F(MeshFile, AFileIsReplacedWholeOrNotAtAll) {
+  std::ofstream(Path("real.txt")) << "old";
+  std::filesystem::permissions(Path("real.txt"), std::filesystem::perms::owner_all);
+  std::filesystem::create_symlink("real.txt", Path("link.txt"));
+  Saved(Surface(3), "link.txt");
+  EXPECT_TRUE(std::filesystem::is_symlink(Path("link.txt")));
+  EXPECT_EQ(std::filesystem::status(Path("real.txt")).permissions(),
+            std::filesystem::perms::owner_all);
+  EXPECT_GT(std::filesystem::file_size(Path("real.txt")), 3u);
+  // A file may grow to so many bytes here: what does not fit leaves the old one.
+  rlimit limit{}, before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  limit = before;
+  limit.rlim_cur = 20;
+  const auto ignored = signal(SIGXFSZ, SIG_IGN);
+  setrlimit(RLIMIT_FSIZE, &limit);
+  std::ofstream(Path("small.txt")) << "old";
+  const Expected<void> saved = Surface(3).Save(Path("small.txt"));
+  setrlimit(RLIMIT_FSIZE, &before);
+  signal(SIGXFSZ, ignored);
+  ASSERT_FALSE(saved.has_value());
+  EXPECT_NE(saved.error().message.find("File too large"), std::string::npos);
+  EXPECT_EQ(std::filesystem::file_size(Path("small.txt")), 3u);
+  for (const auto& entry : std::filesystem::directory_iterator(directory_)) {
+    EXPECT_EQ(entry.path().string().find(".part-"), std::string::npos) << entry.path();
+  }
 }
 
 TEST_F(MeshFile, SaysWhyAFileCannotBeWritten) {

@@ -39,11 +39,15 @@ class Download {
   Expected<Mesh> Go() {
     const std::stop_callback cancel(options_.stop, [this] { attempts_.Stop(); });
     if (const auto ok = Look(); !ok) return tl::unexpected(ok.error());
+    const auto k = static_cast<int>(status_.spec().dimension());
+    const auto d = static_cast<int>(status_.spec().ambient_dimension());
+    if (options_.on_found) {
+      if (const auto ok = options_.on_found(k, d); !ok) return tl::unexpected(ok.error());
+    }
     if (options_.revision == 0) {
       if (const auto ok = Settle(); !ok) return tl::unexpected(ok.error());
     }
-    auto builder = MeshBuilder::Create(static_cast<int>(status_.spec().dimension()),
-                                       static_cast<int>(status_.spec().ambient_dimension()));
+    auto builder = MeshBuilder::Create(k, d);
     if (!builder) return tl::unexpected(builder.error());
     builder_ = std::make_unique<MeshBuilder>(std::move(*builder));
     if (const auto ok = Fetch(); !ok) return tl::unexpected(ok.error());

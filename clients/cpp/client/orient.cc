@@ -1,3 +1,4 @@
+#include <Eigen/LU>
 #include <algorithm>
 #include <cstdint>
 #include <utility>
@@ -35,13 +36,19 @@ class Faces {
   const SimplexMatrix& simplices_;
 };
 
+// The other orientation.
+void Turn(SimplexMatrix::ColXpr simplex) {
+  std::swap(simplex[simplex.size() - 2], simplex[simplex.size() - 1]);
+}
+
 // With ids ascending, the face opposite row i is induced the orientation (-1)^i; two neighbours
 // agree when they induce opposite ones on their common face.
 bool SameSignAgrees(const Side& a, const Side& b) { return (a.opposite + b.opposite) % 2 != 0; }
 
-}  // namespace
-
-SimplexMatrix OrientedSimplices(const SimplexMatrix& simplices) {
+// OrientedSimplices, and for each simplex the first of its component, where components hang
+// together by faces; empty if the complex is not orientable.
+SimplexMatrix Orient(const SimplexMatrix& simplices, std::vector<Eigen::Index>* component) {
+  component->clear();
   const Eigen::Index m = simplices.cols(), width = simplices.rows();
   if (m == 0 || width < 2) return simplices;
   std::vector<Side> sides;
@@ -68,6 +75,7 @@ SimplexMatrix OrientedSimplices(const SimplexMatrix& simplices) {
     i = end;
   }
   std::vector<int> sign(static_cast<size_t>(m), 0);
+  std::vector<Eigen::Index> first(static_cast<size_t>(m), 0);
   std::vector<Eigen::Index> stack;
   for (Eigen::Index start = 0; start < m; ++start) {
     if (sign[static_cast<size_t>(start)] != 0) continue;
@@ -76,6 +84,7 @@ SimplexMatrix OrientedSimplices(const SimplexMatrix& simplices) {
     while (!stack.empty()) {
       const Eigen::Index j = stack.back();
       stack.pop_back();
+      first[static_cast<size_t>(j)] = start;
       for (Eigen::Index i = 0; i < width; ++i) {
         const Side other = neighbour[slot({j, i})];
         if (other.simplex < 0) continue;
@@ -93,9 +102,34 @@ SimplexMatrix OrientedSimplices(const SimplexMatrix& simplices) {
   }
   SimplexMatrix oriented = simplices;
   for (Eigen::Index j = 0; j < m; ++j) {
-    if (sign[static_cast<size_t>(j)] < 0) {
-      std::swap(oriented(width - 2, j), oriented(width - 1, j));
-    }
+    if (sign[static_cast<size_t>(j)] < 0) Turn(oriented.col(j));
+  }
+  *component = std::move(first);
+  return oriented;
+}
+
+}  // namespace
+
+SimplexMatrix OrientedSimplices(const SimplexMatrix& simplices) {
+  std::vector<Eigen::Index> component;
+  return Orient(simplices, &component);
+}
+
+SimplexMatrix OrientedSimplices(const Mesh& mesh) {
+  std::vector<Eigen::Index> component;
+  SimplexMatrix oriented = Orient(mesh.simplices, &component);
+  const int d = mesh.ambient_dimension();
+  if (component.empty() || mesh.dimension() != d - 1) return oriented;
+  // d! times what each component encloses, as cones from the origin; below zero with normals
+  // inwards.
+  std::vector<double> volume(component.size(), 0);
+  Eigen::MatrixXd corners(d, d);
+  for (Eigen::Index j = 0; j < oriented.cols(); ++j) {
+    for (int i = 0; i < d; ++i) corners.col(i) = mesh.points.col(oriented(i, j));
+    volume[static_cast<size_t>(component[static_cast<size_t>(j)])] += corners.determinant();
+  }
+  for (Eigen::Index j = 0; j < oriented.cols(); ++j) {
+    if (volume[static_cast<size_t>(component[static_cast<size_t>(j)])] < 0) Turn(oriented.col(j));
   }
   return oriented;
 }

@@ -17,6 +17,7 @@ from ._credentials import Credentials  # noqa: E402
 from ._doctor import check  # noqa: E402
 from ._face import download, mesh, serve, watch  # noqa: E402
 from ._findings import CheckReport, Finding  # noqa: E402
+from ._formats import check_save  # noqa: E402
 from ._mesh import Mesh, load_txt  # noqa: E402
 from ._server import Server, find_stellated  # noqa: E402
 from ._version import __version__  # noqa: E402
@@ -76,6 +77,7 @@ __all__ = [
     "Unavailable",
     "UncertifiedWarning",
     "check",
+    "check_save",
     "download",
     "find_stellated",
     "load_txt",

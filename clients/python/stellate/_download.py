@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any, Callable
 
 import grpc
 import numpy as np
 
 from ._arrays import from_wire, indices_from_wire
+from ._formats import check_save
 from ._generated import stellate_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
 from ._growth import in_order
@@ -74,11 +76,14 @@ def fetch(
     unfinished: str,
     on_progress: OnProgress | None,
     on_part: OnPart | None,
+    path: str | os.PathLike[str] | None = None,
 ) -> Mesh:
-    """See stellate.download."""
+    """See stellate.download. The file is not written here."""
     if unfinished not in UNFINISHED:
         raise ValueError(f"unfinished has to be one of {UNFINISHED}, and is {unfinished!r}")
     info = client.get(name)
+    if path is not None:
+        check_save(path, info.dimension, info.ambient_dimension)
     as_it_is = revision > 0 or unfinished == "take"
     # A mesh that was just cancelled is over, but its last round may be being computed still.
     if info.end_time is None and not as_it_is:

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import contextlib
 import os
-from typing import Any, Iterator
+from typing import Any, Iterator, Sequence, Union
 
 from ._checkpoint import Checkpoint
 from ._credentials import Credentials
 from ._download import OnPart, fetch
 from ._follow import Following, OnProgress
+from ._formats import check_save
 from ._interrupt import Interrupts, told
 from ._mesh import Mesh
 from ._server import Server
 from ._session import Session
 from .client import Client
-from .errors import InvalidArgument, NotCertified
+from .errors import InvalidArgument, NotCertified, SaveError
+from .oracle import CheckedOracle
+
+Path = Union[str, "os.PathLike[str]"]
 
 
 def mesh(
@@ -26,6 +30,7 @@ def mesh(
     credentials: Credentials | None = None,
     require_certified: bool = False,
     checkpoint: str | os.PathLike[str] | None = None,
+    save: Path | Sequence[Path] = (),
     **criteria: Any,
 ) -> Mesh:
     """Meshes the manifold that an oracle knows.
@@ -45,6 +50,8 @@ def mesh(
       checkpoint: a directory, made if it is not there, in which the mesh outlives this program: the
         same call goes on where it was interrupted or killed, the server died, or the oracle raised,
         and returns at once when the mesh is finished.
+      save: a file or several to write the mesh to, certified or not, as Mesh.save does. What their
+        formats cannot hold is an error before anything is meshed.
       **criteria: radius_edge_bound, sliver_bound, picking_radius, small_sliver_radius, candidates,
         advance_step, flat_alternations, ask_ahead, common_centre, size_rate, max_deviation;
         max_vertices, max_rounds, max_batch_queries, worker_wait_seconds, answer_seconds;
@@ -60,11 +67,15 @@ def mesh(
     Raises:
       What the oracle raises, as itself; OracleError for answers that break a rule, and for "auto"
       where stellate.check finds an error; InvalidArgument,
-      LimitExceeded, Unavailable, Cancelled, ServerNotFound, NotCertified; FailedPrecondition
-      where another process is meshing in the checkpoint. Ctrl-C cancels the mesh, or leaves it to
-      the checkpoint, and is Interrupted, a KeyboardInterrupt with the mesh so far; a second Ctrl-C
-      does not wait for that.
+      LimitExceeded, Unavailable, Cancelled, ServerNotFound, NotCertified; SaveError, which has the
+      mesh where there is one already; OSError; FailedPrecondition where another process is meshing in
+      the checkpoint. Ctrl-C cancels the mesh, or leaves it to the checkpoint, and is Interrupted, a
+      KeyboardInterrupt with the mesh so far; a second Ctrl-C does not wait for that.
     """
+    files = [save] if isinstance(save, (str, os.PathLike)) else list(save)
+    checked = CheckedOracle(oracle)
+    for file in files:
+        check_save(file, checked.dimension, checked.ambient_dimension)
     with contextlib.ExitStack() as stack:
         interrupts = stack.enter_context(Interrupts())
         kept = None
@@ -82,6 +93,11 @@ def mesh(
         )
         interrupts.on_first = session.interrupt
         (finished,) = session  # or an exception
+    for file in files:
+        try:
+            finished.save(file)
+        except (OSError, SaveError) as error:
+            raise SaveError(f"{error}; the mesh is the exception's", mesh=finished) from error
     if require_certified and not finished.certified:
         raise NotCertified(
             f"the mesh is not certified: {finished.report.what_failed}; it is the exception's mesh",
@@ -154,7 +170,8 @@ def download(
 
     Args:
       mesh_name: "meshes/<id>", as Client.create and Client.list give it.
-      path: where to write it as well, as Mesh.save does.
+      path: where to write it as well, as Mesh.save does. What its format cannot hold is an error
+        before anything is waited for or fetched.
       server: "host:port", "unix:/path", a stellate.Server or Client.
       unfinished: what to do about a mesh that is not over: "refuse" it, "wait" for its end, however
         long that takes, or "take" it as it is now; "take" fetches what there is of a failed or
@@ -173,7 +190,7 @@ def download(
       mesh failed, or Cancelled, with what there is of it in the exception's `mesh`; Unavailable.
     """
     with _client(server, credentials) as client, told(f"{mesh_name} is left on its server"):
-        mesh = fetch(client, mesh_name, revision, unfinished, on_progress, on_part)
+        mesh = fetch(client, mesh_name, revision, unfinished, on_progress, on_part, path)
     if path is not None:
         mesh.save(path)
     return mesh

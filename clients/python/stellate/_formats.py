@@ -2,30 +2,123 @@
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
+import importlib.util
 import os
-from typing import TYPE_CHECKING, Iterator
+import secrets
+import stat
+from typing import TYPE_CHECKING, Callable, Iterator
 
 import numpy as np
 
-from . import _vtu
+from . import _meshio, _vtu
 from .errors import SaveError
 
 if TYPE_CHECKING:
     from ._mesh import Mesh
 
-_VTK_CELLS = {1: "line", 2: "triangle", 3: "tetra"}
+_ANY = 1 << 30
+_DEBIAN = {"meshio": "python3-meshio", "h5py": "python3-h5py", "netCDF4": "python3-netcdf4"}
+
+
+def check_save(path: str | os.PathLike[str], dimension: int, ambient_dimension: int) -> None:
+    """What Mesh.save would refuse of any k-mesh in R^d, asked before there is a mesh to lose.
+
+    Raises: SaveError when the format that the ending says cannot hold such a mesh, or wants a package
+      that is not installed; OSError when the folder is not there or cannot be written to.
+    """
+    path = os.fspath(path)
+    _choose(path, dimension, ambient_dimension)
+    if os.path.isdir(path):
+        raise IsADirectoryError(f"{path} is a folder")
+    place = path if _is_special(path) else os.path.dirname(os.path.realpath(path))
+    if not os.path.exists(place):
+        raise FileNotFoundError(f"cannot write {path}: there is no folder {place}")
+    if not os.access(place, os.W_OK):
+        raise PermissionError(f"cannot write {path}: {place} cannot be written to")
 
 
 def save(mesh: Mesh, path: str) -> None:
     """Mesh.save."""
-    extension = os.path.splitext(path)[1].lower()
-    own = {".txt": _txt, ".off": _off, ".obj": _obj, ".ply": _ply, ".vtu": _as_vtu}.get(extension)
-    if own is None:
-        _with_meshio(mesh, path, extension)
+    form = _choose(path, mesh.dimension, mesh.ambient_dimension)
+    if form.meshio is not None:
+        with _replaced(path) as draft:
+            _meshio.write(form.meshio, mesh, _cells(mesh), draft)
         return
-    text = "\n".join(own(mesh)) + "\n"  # in full before the file is touched
-    with open(path, "w") as file:
-        file.write(text)
+    contents = form.contents(mesh)  # in full before any file is touched
+    with _replaced(path) as draft, open(draft, "wb") as file:
+        file.write(contents)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Format:
+    """What a file format can hold, and who writes it: we, or meshio."""
+
+    least_dimension: int
+    largest_dimension: int
+    largest_ambient_dimension: int
+    holds: str
+    contents: Callable[[Mesh], bytes] = lambda mesh: b""
+    meshio: _meshio.MeshioFormat | None = None
+
+    def takes(self, k: int, d: int) -> bool:
+        return (
+            self.least_dimension <= k <= self.largest_dimension
+            and d <= self.largest_ambient_dimension
+        )
+
+
+def _choose(path: str, k: int, d: int) -> _Format:
+    """The format of a path. Raises SaveError if it is not one for k-simplices in R^d."""
+    ending = os.path.splitext(path)[1].lower()
+    known = " ".join(name for name, form in _FORMATS.items() if form.takes(k, d))
+    form = _FORMATS.get(ending)
+    if form is None:
+        raise SaveError(
+            f"no format is known by the ending {ending!r} of {path}; known for this mesh: {known}"
+        )
+    if not form.takes(k, d):
+        fits = form.least_dimension <= k <= form.largest_dimension
+        raise SaveError(
+            f"{ending} holds {'points of space' if fits else form.holds}, and {path} would get a mesh "
+            f"of dimension {k} in R^{d}; known for it: {known}"
+        )
+    needed = [] if form.meshio is None else ["meshio", form.meshio.package]
+    for package in filter(None, needed):
+        if importlib.util.find_spec(package) is None:
+            raise SaveError(
+                f"{ending} files are written with {package}, which is not installed "
+                f"({_DEBIAN[package]}, or pip install {package})"
+            )
+    return form
+
+
+def _is_special(path: str) -> bool:
+    """A pipe or a device: written as it is, since nothing may take its place."""
+    return os.path.exists(path) and not stat.S_ISREG(os.stat(path).st_mode)
+
+
+@contextlib.contextmanager
+def _replaced(path: str) -> Iterator[str]:
+    """A file to write that takes the path's place when it is whole, and goes if it is not."""
+    if _is_special(path):
+        yield path
+        return
+    target = os.path.realpath(path)
+    root, ending = os.path.splitext(target)  # which meshio goes by
+    draft = f"{root}.part-{secrets.token_hex(4)}{ending}"
+    try:
+        yield draft
+        if os.path.exists(target):
+            os.chmod(draft, stat.S_IMODE(os.stat(target).st_mode))
+        with open(draft, "rb") as written:
+            os.fsync(written.fileno())
+        os.replace(draft, target)
+    except BaseException:
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(draft)
+        raise
 
 
 def _lines(rows: np.ndarray, number: str, prefix: str = "") -> Iterator[str]:
@@ -38,22 +131,9 @@ def _cells(mesh: Mesh) -> np.ndarray:
     return mesh.simplices if oriented is None else oriented
 
 
-def _refuse_solids(mesh: Mesh, name: str) -> None:
-    if mesh.dimension > 2:
-        raise SaveError(
-            f"{name} holds curves and surfaces, and this mesh has dimension {mesh.dimension}; "
-            "save it " + ("as .vtu or .txt" if mesh.dimension == 3 else "as .txt")
-        )
-
-
-def _in_space(mesh: Mesh, name: str) -> np.ndarray:
-    """The points with three coordinates, zeros added; an error if there are more."""
+def _in_space(mesh: Mesh) -> np.ndarray:
+    """The points with three coordinates, zeros added."""
     n, d = mesh.points.shape
-    if d > 3:
-        raise SaveError(
-            f"{name} holds points of space, and these have {d} coordinates; save them as .txt or "
-            ".off (all coordinates) or .vtu (the first three, all of them as point data)"
-        )
     return np.hstack([mesh.points, np.zeros((n, 3 - d))])
 
 
@@ -64,7 +144,6 @@ def _txt(mesh: Mesh) -> Iterator[str]:
 
 
 def _off(mesh: Mesh) -> Iterator[str]:
-    _refuse_solids(mesh, "OFF")
     if mesh.ambient_dimension == 3:
         yield "OFF"
     else:
@@ -76,15 +155,13 @@ def _off(mesh: Mesh) -> Iterator[str]:
 
 
 def _obj(mesh: Mesh) -> Iterator[str]:
-    points = _in_space(mesh, "OBJ")
-    _refuse_solids(mesh, "OBJ")
+    points = _in_space(mesh)
     yield from _lines(points, "%.17g", "v ")
     yield from _lines(_cells(mesh) + 1, "%d", "l " if mesh.dimension == 1 else "f ")
 
 
 def _ply(mesh: Mesh) -> Iterator[str]:
-    points = _in_space(mesh, "PLY")
-    _refuse_solids(mesh, "PLY")
+    points = _in_space(mesh)
     yield "ply"
     yield "format ascii 1.0"
     yield f"element vertex {len(points)}"
@@ -100,39 +177,67 @@ def _ply(mesh: Mesh) -> Iterator[str]:
     yield from _lines(_cells(mesh), "%d", "" if mesh.dimension == 1 else "3 ")
 
 
-def _as_vtu(mesh: Mesh) -> Iterator[str]:
-    if mesh.dimension not in _vtu.DIMENSIONS:
-        raise SaveError(
-            "VTU holds simplices of dimension 3 at most, and this mesh has dimension "
-            f"{mesh.dimension}; save it as .txt"
-        )
-    yield from _vtu.lines(mesh, _cells(mesh))
+def _msh(mesh: Mesh) -> Iterator[str]:
+    """Gmsh's format 2.2, which every version of it reads, and most others who read .msh."""
+    element_type = {1: 1, 2: 2, 3: 4}[mesh.dimension]  # line, triangle, tetrahedron
+    yield "$MeshFormat\n2.2 0 8\n$EndMeshFormat"
+    yield f"$Nodes\n{len(mesh.points)}"
+    yield from (f"{i} {line}" for i, line in enumerate(_lines(_in_space(mesh), "%.17g"), 1))
+    yield f"$EndNodes\n$Elements\n{len(mesh.simplices)}"
+    # Two tags for each element: it is of physical group 1 and of geometrical entity 1.
+    rows = _lines(_cells(mesh) + 1, "%d", f"{element_type} 2 1 1 ")
+    yield from (f"{i} {line}" for i, line in enumerate(rows, 1))
+    yield "$EndElements"
 
 
-def _with_meshio(mesh: Mesh, path: str, extension: str) -> None:
-    try:
-        import meshio
-    except ImportError:
-        raise SaveError(
-            f"{extension or 'this'} files are written by meshio, which is not installed "
-            "(python3-meshio); .txt .off .obj .ply .vtu need nothing"
-        ) from None
-    if extension not in meshio.extension_to_filetypes:
-        known = ".txt " + " ".join(sorted(meshio.extension_to_filetypes))
-        raise SaveError(f"no format is known by the ending {extension!r} of {path}; known: {known}")
-    cell = _VTK_CELLS.get(mesh.dimension)
-    if cell is None:
-        raise SaveError(
-            f"{extension} holds simplices of dimension 3 at most, and this mesh has dimension "
-            f"{mesh.dimension}; save it as .txt"
+_STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
+
+
+def _stl(mesh: Mesh) -> bytes:
+    """Binary: a header that says nothing, and never "solid", and a record a triangle."""
+    corners = mesh.points[_cells(mesh)]
+    facets = np.zeros(len(corners), _STL_FACET)
+    facets["corners"] = corners
+    ends = facets["corners"]
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        if (ends[:, i] == ends[:, j]).all(axis=1).any():
+            raise SaveError(
+                "STL has single precision, in which vertices of this mesh fall together: save it as "
+                ".ply, or move it nearer to the origin"
+            )
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    facets["normal"] = normals / np.where(lengths > 0, lengths, 1)
+    return b" " * 80 + np.uint32(len(facets)).astype("<u4").tobytes() + facets.tobytes()
+
+
+def _vtu_lines(mesh: Mesh) -> Iterator[str]:
+    return _vtu.lines(mesh, _cells(mesh))
+
+
+def _text(lines: Callable[[Mesh], Iterator[str]]) -> Callable[[Mesh], bytes]:
+    return lambda mesh: ("\n".join(lines(mesh)) + "\n").encode()
+
+
+_LOW = "curves and surfaces"
+_CELLULAR = "simplices of dimension 3 at most"
+
+_FORMATS = {
+    ".txt": _Format(0, _ANY, _ANY, "anything", _text(_txt)),
+    ".off": _Format(1, 2, _ANY, _LOW, _text(_off)),
+    ".obj": _Format(1, 2, 3, _LOW, _text(_obj)),
+    ".ply": _Format(1, 2, 3, _LOW, _text(_ply)),
+    ".stl": _Format(2, 2, 3, "surfaces", _stl),
+    ".msh": _Format(1, 3, 3, _CELLULAR, _text(_msh)),
+    ".vtu": _Format(1, 3, _ANY, _CELLULAR, _text(_vtu_lines)),
+    **{
+        ending: _Format(
+            form.least_dimension,
+            3,
+            _ANY if form.point_data else 3,
+            {1: _CELLULAR, 2: "surfaces and solids", 3: "solids"}[form.least_dimension],
+            meshio=form,
         )
-    n, d = mesh.points.shape
-    space = np.zeros((n, 3))
-    space[:, : min(d, 3)] = mesh.points[:, :3]
-    point_data = {"coordinates": np.ascontiguousarray(mesh.points)} if d > 3 else {}
-    try:
-        meshio.Mesh(space, [(cell, _cells(mesh))], point_data=point_data).write(path)
-    except Exception as error:  # meshio has no base class for what its writers raise
-        if isinstance(error, OSError):
-            raise
-        raise SaveError(f"meshio cannot write this mesh to {path}: {error}") from error
+        for ending, form in _meshio.FORMATS.items()
+    },
+}

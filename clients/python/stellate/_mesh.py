@@ -67,13 +67,19 @@ class Mesh:
         .txt  any k and d, exact: "k d nv ns", then nv lines of coordinates, then ns lines of ids.
         .off  any d (nOFF when d is not 3), k <= 2.
         .obj  .ply  curves and surfaces, d <= 3.
-        .vtu  and what else meshio knows: k <= 3. When d > 3 the points are the first three
-              coordinates, and all of them are the point data "coordinates". The field data of a
-              .vtu are "epsilon", "certified" (0 or 1), "verdict" and "version" (UTF-8 bytes).
+        .stl  surfaces of space, binary, in single precision as the format has it.
+        .msh  k <= 3, d <= 3: Gmsh's, version 2.2.
+        .vtu  k <= 3. When d > 3 the points are the first three coordinates, and all of them are the
+              point data "coordinates". Its field data are "epsilon", "certified" (0 or 1), "verdict"
+              and "version" (UTF-8 bytes).
+        .vtk, as .vtu, and .avs .bdf .cgns .dat .dato .e .exo .f3grid .fem .h5m .hmf .inp .mdpa .med
+        .mesh .meshb .nas .post .su2 .tec .vol .xdmf .xmf .xml, d <= 3, by meshio.
 
-        Surfaces are written with their triangles turned to agree where they are orientable.
+        Surfaces are written with their triangles turned to agree where they are orientable. A file
+        that was there is replaced when the new one is whole.
 
-        Raises: SaveError when the format cannot hold this mesh, OSError.
+        Raises: SaveError when the format cannot hold this mesh, OSError. What can be known before
+          there is a mesh, stellate.check_save tells.
         Warns: UncertifiedWarning for a mesh whose report says that it is not certified.
         """
         if self.report is not None and not self.report.certified:

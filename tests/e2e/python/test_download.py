@@ -1,5 +1,7 @@
 """Fetching meshes that are on a server."""
 
+import pathlib
+import subprocess
 import threading
 
 import grpc
@@ -43,6 +45,18 @@ def test_a_finished_mesh_is_fetched_with_its_report(finished, server, tmp_path):
     assert_same(stellate.load_txt(path), watched)
     assert parts[-1] == 2 * (len(mesh.points) + len(mesh.simplices),)
     assert_same(stellate.download(name, server=server), watched)  # it is still there
+
+
+def test_what_a_format_cannot_hold_is_refused_before_anything_is_waited_for(client, tmp_path):
+    name = client.create(manifolds.SpecialOrthogonal3(), 0.4).name  # which nobody serves
+    with pytest.raises(stellate.SaveError, match="surfaces"):
+        stellate.download(name, tmp_path / "so3.stl", server=client, unfinished="wait")
+    program = pathlib.Path(stellate.find_stellated()).with_name("stellate")
+    command = [program, "download", name, "-o", "so3.stl", "--wait", "--server", client.address]
+    refused = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    assert refused.returncode == 2 and "surfaces" in refused.stderr
+    assert not list(tmp_path.iterdir())
+    client.delete(name)
 
 
 def test_any_revision_is_fetched(finished, client):

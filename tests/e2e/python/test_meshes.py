@@ -243,3 +243,35 @@ def test_a_mesh_that_has_to_be_certified(server):
     assert caught.value.mesh.report.termination == "VERTEX_BUDGET"
     assert caught.value.mesh.report.epsilon == 0.2
     assert stellate.mesh(torus, 0.2, server, require_certified=True).certified
+
+
+def test_a_mesh_is_saved_where_it_was_asked(server, tmp_path):
+    files = [tmp_path / "torus.stl", tmp_path / "torus.msh"]
+    stellate.mesh(manifolds.Torus(), 0.3, server, save=files)
+    assert all(file.stat().st_size > 1000 for file in files)
+
+
+def test_what_cannot_be_saved_is_refused_before_meshing(tmp_path):
+    def never(progress):
+        raise AssertionError("it is being meshed")
+
+    for name in ("so3.stl", "so3.msh", "so3.wkt"):
+        with pytest.raises(stellate.SaveError):
+            stellate.mesh(
+                manifolds.SpecialOrthogonal3(), 0.4, "unix:/nowhere", never, save=tmp_path / name
+            )
+    with pytest.raises(FileNotFoundError):
+        stellate.mesh(manifolds.Torus(), 0.3, "unix:/nowhere", save=tmp_path / "no" / "such.txt")
+
+
+def test_a_mesh_that_could_not_be_written_is_the_exceptions(server, tmp_path):
+    folder = tmp_path / "folder"
+    folder.mkdir()
+
+    def remove(progress):
+        if folder.exists():
+            folder.rmdir()
+
+    with pytest.raises(stellate.SaveError, match="No such file") as lost:
+        stellate.mesh(manifolds.Torus(), 0.3, server, remove, save=folder / "torus.txt")
+    assert lost.value.mesh.certified

@@ -4,6 +4,9 @@ import dataclasses
 import sys
 import warnings
 
+import importlib.util
+import resource
+
 import meshio
 import numpy as np
 import pytest
@@ -11,6 +14,7 @@ import shapes
 import topology
 
 import stellate
+from stellate import _formats
 from stellate._generated import mesh_pb2
 
 
@@ -60,7 +64,7 @@ def test_txt_of_something_else_is_refused(tmp_path):
         stellate.load_txt(tmp_path / "no.txt")
 
 
-@pytest.mark.parametrize("extension", [".vtu", ".vtk", ".obj", ".ply", ".off", ".stl"])
+@pytest.mark.parametrize("extension", [".vtu", ".vtk", ".obj", ".ply", ".off", ".stl", ".msh"])
 def test_surfaces_are_read_back_with_outward_normals(extension, tmp_path):
     mesh = shapes.torus()
     mesh.save(tmp_path / f"torus{extension}")
@@ -160,11 +164,17 @@ def test_off_of_any_dimension(tmp_path):
 @pytest.mark.parametrize(
     "mesh, name, words",
     [
-        (shapes.projective_plane(), "m.obj", "5 coordinates"),
-        (shapes.projective_plane(), "m.ply", "5 coordinates"),
+        (shapes.projective_plane(), "m.obj", r"in R\^5; known for it: .txt .off .vtu"),
+        (shapes.projective_plane(), "m.ply", "points of space"),
+        (shapes.projective_plane(), "m.mesh", "points of space"),  # it has no point data
         (shapes.simplex_boundary(3), "m.off", "dimension 3"),
+        (shapes.simplex_boundary(3), "m.stl", "surfaces, .*dimension 3"),
         (shapes.simplex_boundary(4), "m.vtu", "dimension 4"),
-        (shapes.torus(), "m.docx", r"\.docx.*known: .*\.vtu"),
+        (shapes.simplex_boundary(4), "m.msh", "dimension 3 at most.*known for it: .txt$"),
+        (shapes.polygon(5), "m.stl", "surfaces"),
+        (shapes.polygon(5), "m.bdf", "solids"),
+        (shapes.torus(), "m.wkt", "no format"),
+        (shapes.torus(), "m.docx", r"\.docx.*known for this mesh: .*\.vtu"),
         (shapes.torus(), "m", "no format"),
     ],
 )
@@ -172,6 +182,94 @@ def test_what_a_format_cannot_hold_is_said_and_nothing_written(mesh, name, words
     with pytest.raises(stellate.SaveError, match=words):
         mesh.save(tmp_path / name)
     assert not (tmp_path / name).exists()
+    with pytest.raises(stellate.SaveError, match=words):  # before there is a mesh
+        stellate.check_save(tmp_path / name, mesh.dimension, mesh.ambient_dimension)
+
+
+SOLID = shapes.simplex_boundary(3)
+SOLIDS = stellate.Mesh(SOLID.points[:, :3].copy(), SOLID.simplices[:1])
+
+
+@pytest.mark.parametrize("mesh", [shapes.polygon(7), shapes.torus(), SOLIDS])
+@pytest.mark.parametrize("ending", sorted(_formats._FORMATS))
+def test_what_is_written_is_read_back(ending, mesh, tmp_path):
+    path = tmp_path / f"mesh{ending}"
+    if not _formats._FORMATS[ending].takes(mesh.dimension, mesh.ambient_dimension):
+        with pytest.raises(stellate.SaveError):
+            mesh.save(path)
+        return
+    mesh.save(path)
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]  # and nothing beside it
+    space = np.hstack([mesh.points, np.zeros((len(mesh.points), 3 - mesh.ambient_dimension))])
+    if ending == ".txt":
+        again, cells = stellate.load_txt(path), stellate.load_txt(path).simplices
+        space = mesh.points
+    elif mesh.dimension == 1 and ending in (".off", ".obj", ".ply"):
+        return  # meshio reads no curves there; see test_curve_as_obj_and_ply
+    else:
+        again = meshio.read(path, "gmsh" if ending == ".msh" else None)
+        assert len(again.cells) == 1
+        cells = again.cells[0].data
+    if ending == ".stl":  # meshio joins the corners again, in an order of its own
+        order = [int(np.abs(space - p).sum(axis=1).argmin()) for p in again.points]
+        assert np.allclose(again.points, space[order], rtol=0, atol=1e-6)
+        cells = np.array(order)[cells]
+    else:
+        assert np.array_equal(again.points, space)
+    assert {tuple(row) for row in np.sort(cells, axis=1)} == {tuple(row) for row in mesh.simplices}
+
+
+def test_vtk_beyond_space_keeps_all_coordinates(tmp_path):
+    mesh = shapes.projective_plane()
+    mesh.save(tmp_path / "mesh.vtk")
+    again = meshio.read(tmp_path / "mesh.vtk")
+    assert np.array_equal(again.point_data["coordinates"], mesh.points)
+
+
+def test_a_package_that_is_missing_is_named(tmp_path, monkeypatch):
+    find = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name == "h5py" else find(name)
+    )
+    with pytest.raises(stellate.SaveError, match="h5py, which is not installed .python3-h5py"):
+        stellate.check_save(tmp_path / "mesh.med", 2, 3)
+    stellate.check_save(tmp_path / "mesh.vtk", 2, 3)
+
+
+def test_places_that_cannot_be_written_are_known_before(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        stellate.check_save(tmp_path / "missing" / "mesh.txt", 2, 3)
+    (tmp_path / "folder.txt").mkdir()
+    with pytest.raises(IsADirectoryError):
+        stellate.check_save(tmp_path / "folder.txt", 2, 3)
+    stellate.check_save("mesh.txt", 2, 3)  # here
+
+
+def test_a_file_is_replaced_whole_or_not_at_all(tmp_path, monkeypatch):
+    (tmp_path / "real.txt").write_text("old")
+    (tmp_path / "real.txt").chmod(0o640)
+    (tmp_path / "link.txt").symlink_to("real.txt")
+    shapes.torus().save(tmp_path / "link.txt")
+    assert (tmp_path / "link.txt").is_symlink()
+    assert (tmp_path / "real.txt").stat().st_mode & 0o777 == 0o640
+    before = (tmp_path / "real.txt").read_bytes()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))  # Python ignores SIGXFSZ
+    try:
+        for name in ("real.txt", "new.vtk"):
+            with pytest.raises(OSError):
+                shapes.torus().save(tmp_path / name)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert (tmp_path / "real.txt").read_bytes() == before
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["link.txt", "real.txt"]
+
+
+def test_stl_is_refused_where_single_precision_is_too_coarse(tmp_path):
+    far = stellate.Mesh(shapes.torus().points + 1e9, shapes.torus().simplices)
+    with pytest.raises(stellate.SaveError, match="single precision"):
+        far.save(tmp_path / "far.stl")
+    assert not list(tmp_path.iterdir())
 
 
 def test_orientation():

@@ -30,6 +30,9 @@ struct DownloadOptions {
   double reconnect_seconds = 180;
   std::function<void(const Outage&)> on_outage;
   double keepalive_seconds = 4;  // as in MeshOptions
+  // Called once it is known what kind of mesh it is, before anything is waited for or fetched. An
+  // error ends the download with it.
+  std::function<Expected<void>(int dimension, int ambient_dimension)> on_found;
   // Called on the calling thread: while the mesh is waited for, and at each part that comes, with
   // the vertices and simplices that are here and those of the whole mesh.
   std::function<void(const Progress&)> on_progress;

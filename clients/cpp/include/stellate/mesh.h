@@ -24,17 +24,24 @@ struct Mesh {
   //   .txt  any k and d: "k d nv ns", then nv lines of d coordinates (%.17g), then ns lines of k+1
   //         ids from zero, in the order of `simplices`
   //   .off  curves and surfaces; nOFF with all coordinates unless d = 3
-  //   .obj  curves and surfaces, d <= 3
-  //   .ply  curves and surfaces, d <= 3, ascii
+  //   .obj  .ply  curves and surfaces, d <= 3, text
+  //   .stl  surfaces of space, binary, in single precision as the format has it
+  //   .msh  k <= 3, d <= 3: Gmsh's, version 2.2, text
   //   .vtu  k <= 3; beyond d = 3 the first three coordinates, and all as point data "coordinates";
   //         field data "epsilon", "certified" (0 or 1), "verdict" and "version" (UTF-8 bytes)
-  // The last four are oriented coherently where the mesh is orientable. kFileFailed when the format
-  // cannot hold the mesh or the file cannot be written.
+  // All but .txt are oriented as by OrientedSimplices(mesh). The file is replaced when the new one is
+  // whole. kFileFailed when the format cannot hold the mesh or the file cannot be written.
   Expected<void> Save(const std::string& path) const;
 };
+
+// What Save would refuse, asked before there is a mesh: kFileFailed for a path whose format holds no
+// mesh of these dimensions, or whose folder is not there or cannot be written to.
+Expected<void> CheckSave(const std::string& path, int dimension, int ambient_dimension);
 
 // The simplices with the ids in each reordered so that neighbours agree on their orientation; as
 // they are when the complex is not an orientable pseudomanifold.
 SimplexMatrix OrientedSimplices(const SimplexMatrix& simplices);
+// The same, and the normals of a hypersurface (k = d - 1) outwards, component by component.
+SimplexMatrix OrientedSimplices(const Mesh& mesh);
 
 }  // namespace stellate

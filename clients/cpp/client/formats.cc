@@ -1,0 +1,150 @@
+#include "formats.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <string_view>
+#include <type_traits>
+
+namespace stellate::client {
+namespace {
+
+// Text that grows by snprintf's formats.
+class Text {
+ public:
+  void Add(std::string_view piece) { text_ += piece; }
+  void Add(double value) {
+    char number[32];
+    std::snprintf(number, sizeof number, "%.17g", value);
+    text_ += number;
+  }
+  template <typename Columns>
+  void AddNumbers(const Columns& column) {
+    for (Eigen::Index i = 0; i < column.size(); ++i) {
+      if (i > 0) text_ += ' ';
+      if constexpr (std::is_floating_point_v<typename Columns::Scalar>) {
+        Add(column[i]);
+      } else {
+        text_ += std::to_string(column[i]);
+      }
+    }
+  }
+  // A line for each column: the prefix and the column's numbers.
+  template <typename Matrix>
+  void AddLines(std::string_view prefix, const Matrix& matrix) {
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
+      text_ += prefix;
+      AddNumbers(matrix.col(j));
+      text_ += '\n';
+    }
+  }
+  const std::string& str() const { return text_; }
+
+ private:
+  std::string text_;
+};
+
+}  // namespace
+
+Eigen::MatrixXd InSpace(const Mesh& mesh) {
+  Eigen::MatrixXd points = Eigen::MatrixXd::Zero(3, mesh.points.cols());
+  const Eigen::Index rows = std::min<Eigen::Index>(3, mesh.points.rows());
+  points.topRows(rows) = mesh.points.topRows(rows);
+  return points;
+}
+
+std::string Txt(const Mesh& mesh) {
+  Text text;
+  text.Add(std::to_string(mesh.dimension()) + " " + std::to_string(mesh.ambient_dimension()) + " " +
+           std::to_string(mesh.points.cols()) + " " + std::to_string(mesh.simplices.cols()) + "\n");
+  text.AddLines("", mesh.points);
+  text.AddLines("", mesh.simplices);
+  return text.str();
+}
+
+std::string Off(const Mesh& mesh) {
+  Text text;
+  text.Add(mesh.ambient_dimension() == 3
+               ? "OFF\n"
+               : "nOFF\n" + std::to_string(mesh.ambient_dimension()) + "\n");
+  text.Add(std::to_string(mesh.points.cols()) + " " + std::to_string(mesh.simplices.cols()) +
+           " 0\n");
+  text.AddLines("", mesh.points);
+  text.AddLines(std::to_string(mesh.simplices.rows()) + " ", OrientedSimplices(mesh));
+  return text.str();
+}
+
+std::string Obj(const Mesh& mesh) {
+  Text text;
+  text.AddLines("v ", InSpace(mesh));
+  const SimplexMatrix from_one = OrientedSimplices(mesh).array() + 1;
+  text.AddLines(mesh.dimension() == 1 ? "l " : "f ", from_one);
+  return text.str();
+}
+
+std::string Ply(const Mesh& mesh) {
+  const bool curve = mesh.dimension() == 1;
+  Text text;
+  text.Add("ply\nformat ascii 1.0\nelement vertex " + std::to_string(mesh.points.cols()) +
+           "\nproperty double x\nproperty double y\nproperty double z\nelement " +
+           (curve ? "edge " : "face ") + std::to_string(mesh.simplices.cols()) +
+           (curve ? "\nproperty int vertex1\nproperty int vertex2"
+                  : "\nproperty list uchar int vertex_indices") +
+           "\nend_header\n");
+  text.AddLines("", InSpace(mesh));
+  text.AddLines(curve ? "" : "3 ", OrientedSimplices(mesh));
+  return text.str();
+}
+
+std::string Msh(const Mesh& mesh) {
+  constexpr int kElementTypes[] = {15, 1, 2, 4};  // point, line, triangle, tetrahedron
+  const Eigen::MatrixXd points = InSpace(mesh);
+  const SimplexMatrix simplices = OrientedSimplices(mesh).array() + 1;
+  Text text;
+  text.Add("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n" + std::to_string(points.cols()) + "\n");
+  for (Eigen::Index j = 0; j < points.cols(); ++j) {
+    text.Add(std::to_string(j + 1) + " ");
+    text.AddLines("", points.col(j));
+  }
+  // Two tags for each element: it is of physical group 1 and of geometrical entity 1.
+  std::string type(1, ' ');
+  type += std::to_string(kElementTypes[mesh.dimension()]);
+  type += " 2 1 1 ";
+  text.Add("$EndNodes\n$Elements\n" + std::to_string(simplices.cols()) + "\n");
+  for (Eigen::Index j = 0; j < simplices.cols(); ++j) {
+    text.AddLines(std::to_string(j + 1) + type, simplices.col(j));
+  }
+  text.Add("$EndElements\n");
+  return text.str();
+}
+
+Expected<std::string> Stl(const Mesh& mesh) {
+  const SimplexMatrix triangles = OrientedSimplices(mesh);
+  std::string bytes(80, ' ');  // a header that says nothing, and never "solid"
+  const auto add = [&bytes](const auto& value) {
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  add(static_cast<std::uint32_t>(triangles.cols()));
+  for (Eigen::Index j = 0; j < triangles.cols(); ++j) {
+    Eigen::Matrix3d corners;
+    for (Eigen::Index i = 0; i < 3; ++i) corners.col(i) = mesh.points.col(triangles(i, j));
+    const Eigen::Matrix3f single = corners.cast<float>();
+    if (single.col(0) == single.col(1) || single.col(1) == single.col(2) ||
+        single.col(2) == single.col(0)) {
+      return Fail(ErrorCode::kFileFailed,
+                  "STL has single precision, in which vertices of this mesh fall together: save it "
+                  "as .ply, or move it nearer to the origin");
+    }
+    const Eigen::Vector3d normal =
+        (corners.col(1) - corners.col(0)).cross(corners.col(2) - corners.col(0)).normalized();
+    const Eigen::Vector3f rounded = normal.cast<float>();
+    bytes.append(reinterpret_cast<const char*>(rounded.data()), sizeof(float) * 3);
+    bytes.append(reinterpret_cast<const char*>(single.data()), sizeof(float) * 9);
+    add(std::uint16_t{0});
+  }
+  return bytes;
+}
+
+}  // namespace stellate::client

@@ -1,0 +1,101 @@
+// VTK's XML files of unstructured grids.
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "formats.h"
+
+namespace stellate::client {
+namespace {
+
+std::string Base64(std::string_view bytes) {
+  constexpr std::string_view kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t triple = 0;
+    for (size_t j = 0; j < 3; ++j) {
+      triple = triple << 8 | (i + j < bytes.size() ? static_cast<unsigned char>(bytes[i + j]) : 0u);
+    }
+    for (size_t j = 0; j < 4; ++j) {
+      text += i + j <= bytes.size() ? kDigits[triple >> (18 - 6 * j) & 63] : '=';
+    }
+  }
+  return text;
+}
+
+// A DataArray element with its numbers inline, as VTK reads them: the byte count, then the bytes.
+template <typename Number>
+std::string DataArray(const char* type, const char* name, int components, const Number* data,
+                      Eigen::Index count, const std::string& more = "") {
+  const std::uint64_t size = static_cast<std::uint64_t>(count) * sizeof(Number);
+  std::string bytes(sizeof size + size, '\0');
+  std::memcpy(bytes.data(), &size, sizeof size);
+  if (size > 0) std::memcpy(bytes.data() + sizeof size, data, size);
+  return std::string("<DataArray type=\"") + type + "\" Name=\"" + name +
+         "\" NumberOfComponents=\"" + std::to_string(components) + "\"" + more +
+         " format=\"binary\">" + Base64(bytes) + "</DataArray>\n";
+}
+
+template <typename Number>
+std::string Field(const char* type, const char* name, const Number* data, size_t count) {
+  return DataArray(type, name, 1, data, static_cast<Eigen::Index>(count),
+                   " NumberOfTuples=\"" + std::to_string(count) + "\"");
+}
+
+// Text as its bytes, which every reader takes.
+std::string Field(const char* name, const std::string& text) {
+  return Field("UInt8", name, text.data(), text.size());
+}
+
+// What the file says of the whole mesh.
+std::string FieldData(const Report& report) {
+  std::string xml = "<FieldData>\n" + Field("version", "stellate " STELLATE_VERSION);
+  if (report.termination != Termination::kUnknown) {
+    const std::uint8_t certified = report.certified() ? 1 : 0;
+    xml +=
+        Field("UInt8", "certified", &certified, 1) + Field("verdict", report.certificate.verdict);
+  }
+  if (report.epsilon > 0) xml += Field("Float64", "epsilon", &report.epsilon, 1);
+  return xml + "</FieldData>\n";
+}
+
+}  // namespace
+
+std::string Vtu(const Mesh& mesh) {
+  // vertex, line, triangle, tetrahedron
+  constexpr std::array<std::uint8_t, 4> kCellTypes = {1, 3, 5, 10};
+  const Eigen::Index n = mesh.points.cols(), m = mesh.simplices.cols(),
+                     width = mesh.simplices.rows();
+  const Eigen::MatrixXd points = InSpace(mesh);
+  const Eigen::Matrix<std::int64_t, Eigen::Dynamic, Eigen::Dynamic> connectivity =
+      OrientedSimplices(mesh).cast<std::int64_t>();
+  std::vector<std::int64_t> offsets(static_cast<size_t>(m));
+  for (size_t i = 0; i < offsets.size(); ++i) {
+    offsets[i] = static_cast<std::int64_t>(i + 1) * static_cast<std::int64_t>(width);
+  }
+  const std::vector<std::uint8_t> types(static_cast<size_t>(m),
+                                        kCellTypes[static_cast<size_t>(mesh.dimension())]);
+  std::string xml =
+      "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" "
+      "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<UnstructuredGrid>\n" +
+      FieldData(mesh.report) + "<Piece NumberOfPoints=\"" + std::to_string(n) +
+      "\" NumberOfCells=\"" + std::to_string(m) + "\">\n<Points>\n" +
+      DataArray("Float64", "Points", 3, points.data(), points.size()) + "</Points>\n<Cells>\n" +
+      DataArray("Int64", "connectivity", 1, connectivity.data(), connectivity.size()) +
+      DataArray("Int64", "offsets", 1, offsets.data(), m) +
+      DataArray("UInt8", "types", 1, types.data(), m) + "</Cells>\n";
+  if (mesh.ambient_dimension() > 3) {
+    xml += "<PointData>\n" +
+           DataArray("Float64", "coordinates", mesh.ambient_dimension(), mesh.points.data(),
+                     mesh.points.size()) +
+           "</PointData>\n";
+  }
+  return xml + "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
+}
+
+}  // namespace stellate::client

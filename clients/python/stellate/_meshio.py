@@ -1,0 +1,80 @@
+"""What meshio writes well: each read back the same, point for point and simplex for simplex."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, Mapping
+
+import numpy as np
+
+from .errors import SaveError
+
+if TYPE_CHECKING:
+    from ._mesh import Mesh
+
+_CELLS = {1: "line", 2: "triangle", 3: "tetra"}
+
+
+@dataclasses.dataclass(frozen=True)
+class MeshioFormat:
+    """One of meshio's file formats, by its name there.
+
+    Attributes:
+      least_dimension: of the simplices that it holds; the largest is 3.
+      point_data: whether it holds numbers beside the points.
+      package: that meshio needs for it.
+    """
+
+    name: str
+    least_dimension: int = 1
+    point_data: bool = False
+    package: str | None = None
+    options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+
+
+_XDMF = MeshioFormat("xdmf", options={"data_format": "XML"})  # in one file
+
+FORMATS = {
+    ".vtk": MeshioFormat("vtk", point_data=True),
+    ".xdmf": _XDMF,
+    ".xmf": _XDMF,
+    ".avs": MeshioFormat("avsucd"),
+    ".bdf": MeshioFormat("nastran", least_dimension=3),
+    ".cgns": MeshioFormat("cgns", least_dimension=3, package="h5py"),
+    ".dat": MeshioFormat("tecplot"),
+    ".dato": MeshioFormat("permas"),
+    ".e": MeshioFormat("exodus", package="netCDF4"),
+    ".exo": MeshioFormat("exodus", package="netCDF4"),
+    ".f3grid": MeshioFormat("flac3d", least_dimension=3),
+    ".fem": MeshioFormat("nastran", least_dimension=3),
+    ".h5m": MeshioFormat("h5m", package="h5py"),
+    ".hmf": MeshioFormat("hmf", package="h5py"),
+    ".inp": MeshioFormat("abaqus"),
+    ".mdpa": MeshioFormat("mdpa"),
+    ".med": MeshioFormat("med", package="h5py"),
+    ".mesh": MeshioFormat("medit"),
+    ".meshb": MeshioFormat("medit"),
+    ".nas": MeshioFormat("nastran", least_dimension=3),
+    ".post": MeshioFormat("permas"),
+    ".su2": MeshioFormat("su2", least_dimension=3),
+    ".tec": MeshioFormat("tecplot"),
+    ".vol": MeshioFormat("netgen"),
+    ".xml": MeshioFormat("dolfin-xml", least_dimension=2),
+}
+
+
+def write(form: MeshioFormat, mesh: Mesh, cells: np.ndarray, path: str) -> None:
+    """Writes a mesh with these oriented cells, that the format can hold, to a file."""
+    import meshio
+
+    n, d = mesh.points.shape
+    space = np.zeros((n, 3))
+    space[:, : min(d, 3)] = mesh.points[:, :3]
+    point_data = {"coordinates": np.ascontiguousarray(mesh.points)} if d > 3 else {}
+    one = meshio.Mesh(space, [(_CELLS[mesh.dimension], cells)], point_data=point_data)
+    try:
+        meshio.write(path, one, form.name, **form.options)
+    except Exception as error:  # meshio has no base class for what its writers raise
+        if isinstance(error, OSError):
+            raise
+        raise SaveError(f"meshio cannot write this mesh as {form.name}: {error!r}") from error
