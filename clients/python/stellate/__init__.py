@@ -15,6 +15,7 @@ _stubs.ensure()  # before anything imports them
 from . import manifolds  # noqa: E402
 from ._credentials import Credentials  # noqa: E402
 from ._doctor import check  # noqa: E402
+from ._executors import ExecutorWorkers, workers_on  # noqa: E402
 from ._face import download, mesh, serve, watch  # noqa: E402
 from ._findings import CheckReport, Finding  # noqa: E402
 from ._formats import check_save  # noqa: E402
@@ -24,6 +25,7 @@ from ._version import __version__  # noqa: E402
 from .client import Client, MeshInfo, ServerInfo  # noqa: E402
 from .errors import (  # noqa: E402
     Cancelled,
+    ExecutorError,
     FailedPrecondition,
     Interrupted,
     InvalidArgument,
@@ -51,6 +53,8 @@ __all__ = [
     "Client",
     "Counts",
     "Credentials",
+    "ExecutorError",
+    "ExecutorWorkers",
     "FailedPrecondition",
     "Failure",
     "Finding",
@@ -86,4 +90,5 @@ __all__ = [
     "progress_bar",
     "serve",
     "watch",
+    "workers_on",
 ]

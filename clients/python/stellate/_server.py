@@ -1,4 +1,4 @@
-"""A stellated of one's own: found, started on a private unix socket, and stopped."""
+"""A stellated of one's own: found, started, and stopped."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import os
 import pathlib
 import shutil
 import signal
+import socket
 import subprocess
 import tempfile
 import threading
@@ -17,10 +18,11 @@ from .errors import ServerNotFound, Unavailable
 _READY_SECONDS = 30.0
 _STOP_SECONDS = 10.0
 _LONGEST_SOCKET_PATH = 100  # the kernel takes 107 bytes
+# When its client goes there is nobody left to finish a mesh for.
+_OWN_FLAGS = ("--drain-seconds", "0")
 # Over a unix socket the end of a client shows at once. One that answers no pings is merely busy in
 # an oracle that does not let go of the interpreter.
-# When its client goes there is nobody left to finish a mesh for.
-_PRIVATE_FLAGS = ("--keepalive", "600", "--keepalive-timeout", "600", "--drain-seconds", "0")
+_PRIVATE_FLAGS = ("--keepalive", "600", "--keepalive-timeout", "600")
 
 
 def find_stellated() -> str:
@@ -51,32 +53,75 @@ def find_stellated() -> str:
     return path
 
 
+def _from_elsewhere(address: str) -> str:
+    """The address that another machine uses for one that is listened on."""
+    host, _, port = address.rpartition(":")
+    return f"{socket.gethostname()}:{port}" if host in ("0.0.0.0", "[::]") else address
+
+
 class Server:
-    """A private stellated, for as many meshes as one likes. A context manager.
+    """A stellated of this process's own, for as many meshes as one likes. A context manager.
 
         with stellate.Server() as server:
             mesh = stellate.mesh(oracle, server=server)
 
-    It listens on a unix socket in a directory that only this user may enter, and ends with this
-    process whatever happens to it.
+    It listens on a unix socket in a directory that only this user may enter, or, with `listen`, for
+    workers on other machines too. It ends with this process whatever happens to it.
+
+    Attributes:
+      address: where clients reach it, "unix:/path" or "host:port".
     """
 
-    def __init__(self, *arguments: str, binary: str | None = None) -> None:
-        """Starts it; `arguments` are more flags for stellated."""
+    def __init__(
+        self,
+        *arguments: str,
+        binary: str | None = None,
+        listen: str | None = None,
+        token_file: str | os.PathLike[str] | None = None,
+        tls_cert: str | os.PathLike[str] | None = None,
+        tls_key: str | os.PathLike[str] | None = None,
+        tls_client_ca: str | os.PathLike[str] | None = None,
+        insecure_listen: bool = False,
+    ) -> None:
+        """Starts it, and returns when it listens.
+
+        Args:
+          *arguments: more flags for stellated, e.g. "--data-dir", "meshes".
+          binary: the program; see find_stellated.
+          listen: "host:port" to be reached at; port 0 takes a free one. With "0.0.0.0:port" or
+            "[::]:port" it listens on every address, and `address` has this machine's name.
+          token_file: lines "OWNER TOKEN"; clients must send one of the tokens.
+          tls_cert, tls_key: PEM files; the certificate has to bear the name in `address`.
+          tls_client_ca: PEM file; clients must show a certificate of these authorities.
+          insecure_listen: take plain text from other machines, whoever they are: for a network where
+            everybody who can connect may. Without it, and without TLS, such a `listen` is refused.
+
+        Raises: ServerNotFound; Unavailable with the server's words if it does not start.
+        """
         self._binary = binary or find_stellated()
         self._directory = tempfile.mkdtemp(prefix="stellate-")
         if len(self._directory) + len("/socket") > _LONGEST_SOCKET_PATH:
             os.rmdir(self._directory)
             self._directory = tempfile.mkdtemp(prefix="stellate-", dir="/tmp")
         self._log = os.path.join(self._directory, "log")
-        socket = os.path.join(self._directory, "socket")
-        self.address = f"unix:{socket}"
+        self.private = listen is None
+        self.address = listen or f"unix:{os.path.join(self._directory, 'socket')}"
         self._process: subprocess.Popen[bytes] | None = None
         self._start_error: OSError | None = None
         started = threading.Event()
         ready = os.path.join(self._directory, "ready")
-        command = [self._binary, "--listen", self.address, "--ready-file", ready]
-        command += [*_PRIVATE_FLAGS, *arguments]
+        command = [self._binary, "--listen", self.address, "--ready-file", ready, *_OWN_FLAGS]
+        command += _PRIVATE_FLAGS if self.private else ()
+        files = {
+            "--token-file": token_file,
+            "--tls-cert": tls_cert,
+            "--tls-key": tls_key,
+            "--tls-client-ca": tls_client_ca,
+        }
+        for flag, path in files.items():
+            command += [] if path is None else [flag, os.fspath(path)]
+        command += ["--insecure-listen"] if insecure_listen else []
+        command += arguments
         # On Linux the kernel ends the server when the thread that started it ends: a thread of its
         # own stays for as long as the server runs.
         tie = shutil.which("setpriv")
@@ -91,6 +136,8 @@ class Server:
             if self._start_error is not None:
                 raise ServerNotFound(f"cannot start {self._binary}: {self._start_error}")
             self._wait_for(ready)
+            if not self.private:
+                self.address = _from_elsewhere(pathlib.Path(ready).read_text().strip())
         except BaseException:
             self.close()
             raise

@@ -15,7 +15,7 @@ from ._generated import stellate_pb2_grpc as rpc
 from ._generated.mesh_pb2 import MeshState
 from ._generated.stellate_pb2 import GetMeshRequest
 from ._retry import Outage, Patience
-from .errors import FailedPrecondition, InvalidArgument, StellateError, from_rpc
+from .errors import ExecutorError, FailedPrecondition, InvalidArgument, StellateError, from_rpc
 from .oracle import CheckedOracle
 
 _ANSWER_BYTES = 3_000_000  # an answer has to stay below the server's 4 MB
@@ -46,6 +46,9 @@ def answer(oracle: CheckedOracle, chunk: pb.QueryChunk) -> pb.ServeOracleRequest
     if chunk.want_sizes:
         fill(reply.sizes, oracle.sizes(answers, found))
     return request
+
+
+Ask = Callable[[CheckedOracle, pb.QueryChunk], pb.ServeOracleRequest]
 
 
 class _Broken(Exception):
@@ -96,8 +99,13 @@ class Worker:
         on_failure: Callable[[BaseException], None],
         patience: Patience,
         quiet: bool = False,
+        ask: Ask = answer,
     ) -> None:
-        """`on_failure` is told what the oracle raised before the server is. `quiet`: no log."""
+        """`on_failure` is told what the oracle raised before the server is. `quiet`: no log.
+
+        `ask` has the oracle answer a chunk, somewhere. Its ExecutorError ends this worker alone.
+        """
+        self._ask = ask
         self._stub, self._oracle, self._on_failure = stub, oracle, on_failure
         per_query = 8 * oracle.ambient_dimension * (oracle.dimension + 1) + 9
         self._hello = pb.Hello(
@@ -119,8 +127,10 @@ class Worker:
                 if self._stopped.is_set():
                     return ""
                 ours = from_rpc(broken.error)
-                if isinstance(ours, FailedPrecondition) and self._outage.lasts:
-                    return self._how_it_ended()  # while this worker was away
+                if isinstance(ours, FailedPrecondition):
+                    state = self._how_it_ended()  # before this worker came, or while it was away
+                    if state:
+                        return state
                 try:
                     self._outage.wait_or_raise(broken.error, ours)
                 except StellateError:
@@ -160,8 +170,8 @@ class Worker:
             kind = response.WhichOneof("message")
             if kind == "queries":
                 try:
-                    reply = answer(self._oracle, response.queries)
-                except KeyboardInterrupt:
+                    reply = self._ask(self._oracle, response.queries)
+                except (KeyboardInterrupt, ExecutorError):
                     raise  # no failure of the oracle: another worker may go on
                 except BaseException as error:
                     self._on_failure(error)

@@ -18,7 +18,7 @@ from ._generated import stellate_pb2_grpc as rpc
 from ._retry import Outage, Patience
 from ._server import Server
 from ._spec import mesh_spec
-from ._worker import Worker
+from ._worker import Ask, Worker, answer
 from .errors import InvalidArgument, MeshNotFound, StellateError, from_rpc
 from .oracle import CheckedOracle
 from .report import Progress, Report
@@ -128,7 +128,7 @@ class Client:
         address = self._server.address if isinstance(self._server, Server) else self._server
         self.address = address
         # A private server needs no pings: its end shows at once.
-        private = isinstance(self._server, Server)
+        private = isinstance(self._server, Server) and self._server.private
         ping = max(1, int(1000 * (_NO_PINGS if private else keepalive_seconds)))
         options = [
             ("grpc.max_receive_message_length", _LARGEST_MESSAGE),
@@ -214,13 +214,15 @@ class Client:
         on_failure: Callable[[BaseException], None] = lambda error: None,
         *,
         quiet: bool = False,
+        ask: Ask = answer,
     ) -> Worker:
         """A worker for a thread of its own; `on_failure` is told of an exception of the oracle.
 
-        A `quiet` one leaves it to others to log that the server is lost.
+        A `quiet` one leaves it to others to log that the server is lost. `ask` has the oracle
+        answer a chunk of questions, somewhere else perhaps: see stellate.workers_on.
         """
         checked = oracle if isinstance(oracle, CheckedOracle) else CheckedOracle(oracle)
-        return Worker(self._stub, checked, name, worker, on_failure, self._patience, quiet)
+        return Worker(self._stub, checked, name, worker, on_failure, self._patience, quiet, ask)
 
     def watch(self, name: str, from_revision: int = 0, progress_only: bool = False) -> Watch:
         """The mesh's events as they come, in the protocol's own messages."""

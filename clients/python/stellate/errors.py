@@ -91,6 +91,12 @@ class OracleError(StellateError):
     default_reason = "ORACLE_FAILED"
 
 
+class ExecutorError(StellateError):
+    """An executor that lost what it was given. The mesh is still there: see stellate.workers_on."""
+
+    default_reason = "EXECUTOR"
+
+
 class Cancelled(StellateError):
     """The mesh was cancelled by somebody else."""
 
@@ -205,4 +211,35 @@ def from_rpc(error: grpc.RpcError) -> StellateError:
     kind_of_error = error_class(reason) if reason else _BY_CODE.get(code, StellateError)
     if kind_of_error is StellateError:
         kind_of_error = _BY_CODE.get(code, StellateError)
-    return kind_of_error(message or code.name, reason or None, details)
+    advice = _advice(code, message)
+    words = f"{message or code.name}; {advice}" if advice else message or code.name
+    return kind_of_error(words, reason or None, details)
+
+
+def _advice(code: grpc.StatusCode, message: str) -> str:
+    """What is likely to help where the two sides do not agree how to connect.
+
+    gRPC's own words and those of its TLS library are all there is to go by.
+    """
+    if code is grpc.StatusCode.UNAUTHENTICATED:
+        return "give a token with Credentials(token=...), in the shell --token-file FILE"
+    if code is not grpc.StatusCode.UNAVAILABLE:
+        return ""
+    said = message.lower().replace("_", " ")
+    if "wrong version number" in said:
+        return (
+            "the server speaks plain text: leave tls, ca and certificate out of the Credentials, in "
+            "the shell --tls, --tls-ca and --tls-cert"
+        )
+    if "certificate verify failed" in said:
+        return (
+            "the server's certificate is of no authority that is trusted here: Credentials(ca=...), "
+            "in the shell --tls-ca FILE, names one"
+        )
+    if "failed to connect" in said and ("socket closed" in said or "connection reset" in said):
+        return (
+            "does the server want TLS? Credentials(tls=True) or Credentials(ca=...), in the shell "
+            "--tls or --tls-ca FILE. Or a client certificate? certificate= and key=, in the shell "
+            "--tls-cert and --tls-key"
+        )
+    return ""
