@@ -1,10 +1,12 @@
-"""Standing workers: serve every mesh on a server that bears the manifold's label.
+"""Standing workers: serve every mesh on a server that bears their label.
 
     oracle-worker --manifold torus --server HOST:7717
+    oracle-worker --oracle shapes:torus --server HOST:7717          an oracle of yours
     oracle-worker --make torus --epsilon 0.05 --server HOST:7717    declare one, and wait for it
 
-Whoever declares a mesh labels it with the manifold's name; every worker of that manifold then joins
-it, whenever it comes. Workers hold no state: any number may run, start and stop at any time.
+Whoever declares a mesh labels it with the manifold's name, or with MODULE:OBJECT; every worker of
+that label then joins it, whenever it comes. Workers hold no state: any number may run, start and stop
+at any time.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from typing import Any, Callable
 
 import stellate
 from stellate import manifolds
+from stellate._command_line import Refused, add_server, credentials_of, load
 
 MANIFOLDS: dict[str, Callable[[], Any]] = {
     "torus": manifolds.Torus,
@@ -33,12 +36,16 @@ _LOOK_SECONDS = 1.0  # between two looks for meshes
 _RESOLVE_SECONDS = 10.0  # between two looks for servers
 
 
+def oracle_of(name: str) -> Any:
+    """A manifold of the list, or the oracle that MODULE:OBJECT names. Raises: Refused."""
+    return MANIFOLDS[name]() if name in MANIFOLDS else load(name)
+
+
 class StandingWorker:
     """Joins each mesh of its label once, in a thread for each."""
 
-    def __init__(self, client: stellate.Client, label: str) -> None:
-        self._client, self._label = client, label
-        self._oracle = MANIFOLDS[label]()
+    def __init__(self, client: stellate.Client, label: str, oracle: Any) -> None:
+        self._client, self._label, self._oracle = client, label, oracle
         self._name = f"{label}@{socket.gethostname()}"
         self._serving: dict[str, threading.Thread] = {}
 
@@ -60,10 +67,10 @@ class StandingWorker:
             print(f"{name}: {error}", flush=True)
 
 
-def serve_on(address: str, label: str) -> None:
+def serve_on(address: str, label: str, oracle: Any, credentials: stellate.Credentials) -> None:
     """Meshes of one server, until the process is told to stop."""
-    with stellate.Client(address) as client:
-        worker = StandingWorker(client, label)
+    with stellate.Client(address, credentials) as client:
+        worker = StandingWorker(client, label, oracle)
         while True:
             try:
                 worker.look()
@@ -72,7 +79,7 @@ def serve_on(address: str, label: str) -> None:
             time.sleep(_LOOK_SECONDS)
 
 
-def serve_on_all(server: str, label: str) -> None:
+def serve_on_all(server: str, label: str, oracle: Any, credentials: stellate.Credentials) -> None:
     """Meshes of every server behind a name, those that come later too."""
     host, port = server.rsplit(":", 1)
     known: set[str] = set()
@@ -87,13 +94,14 @@ def serve_on_all(server: str, label: str) -> None:
             address = f"{ip}:{place[1]}"
             if address not in known:
                 known.add(address)
-                threading.Thread(target=serve_on, args=(address, label), daemon=True).start()
+                arguments = (address, label, oracle, credentials)
+                threading.Thread(target=serve_on, args=arguments, daemon=True).start()
         time.sleep(_RESOLVE_SECONDS)
 
 
-def make(client: stellate.Client, label: str, epsilon: float) -> int:
+def make(client: stellate.Client, label: str, oracle: Any, epsilon: float) -> int:
     """Declares a mesh for the standing workers and waits for its end."""
-    info = client.create(MANIFOLDS[label](), epsilon, label=label)
+    info = client.create(oracle, epsilon, label=label)
     last = None
     for last in stellate.watch(info.name, server=client):
         pass
@@ -102,26 +110,41 @@ def make(client: stellate.Client, label: str, epsilon: float) -> int:
     return 0 if last.certified else 1
 
 
+def run(arguments: argparse.Namespace) -> int:
+    """What the command line asks for."""
+    label = arguments.make or arguments.manifold or arguments.oracle
+    oracle, credentials = oracle_of(label), credentials_of(arguments)
+    if arguments.make:
+        with stellate.Client(arguments.server, credentials) as client:
+            return make(client, label, oracle, arguments.epsilon)
+    serve = serve_on_all if arguments.all_servers else serve_on
+    serve(arguments.server, label, oracle, credentials)
+    return 0
+
+
 def main() -> int:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--manifold", choices=sorted(MANIFOLDS), help="serve meshes of this label")
-    what.add_argument("--make", choices=sorted(MANIFOLDS), help="declare a mesh and wait for it")
+    what.add_argument(
+        "--oracle", metavar="MODULE:OBJECT", help="serve meshes of this label with this oracle"
+    )
+    what.add_argument(
+        "--make", metavar="LABEL", help="declare a mesh of this manifold or oracle, and wait for it"
+    )
     parser.add_argument("--epsilon", type=float, default=0.1)
-    parser.add_argument("--server", default=os.environ.get("STELLATE_SERVER", "stellated:7717"))
+    add_server(parser, os.environ.get("STELLATE_SERVER", "stellated:7717"))
     parser.add_argument(
         "--all-servers", action="store_true", help="serve every address that the name stands for"
     )
     arguments = parser.parse_args()
     # As the first process of a container it would otherwise not hear of it.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    if arguments.make:
-        with stellate.Client(arguments.server) as client:
-            return make(client, arguments.make, arguments.epsilon)
-    serve = serve_on_all if arguments.all_servers else serve_on
-    serve(arguments.server, arguments.manifold)
-    return 0
+    try:
+        return run(arguments)
+    except Refused as error:
+        parser.error(str(error))
 
 
 if __name__ == "__main__":

@@ -95,6 +95,25 @@ TEST(Statuses, KeepTheReasonAndTellWhoseFault) {
   EXPECT_EQ(FromStatus(grpc::Status(grpc::StatusCode::NOT_FOUND, "", "no protobuf")).reason, "");
 }
 
+// In gRPC's own words; python_test_safety has real servers say them.
+TEST(FromStatus, NamesTheFlagThatHelps) {
+  using enum grpc::StatusCode;
+  const auto said = [](grpc::StatusCode code, const std::string& words) {
+    return FromStatus(grpc::Status(code, words)).message;
+  };
+  const auto names = [](const std::string& message, const char* words) {
+    return message.find(words) != std::string::npos;
+  };
+  const std::string connect = "failed to connect to all addresses; last error: ";
+  EXPECT_TRUE(names(said(UNAUTHENTICATED, "no token came"), "--token-file"));
+  EXPECT_TRUE(names(said(UNAVAILABLE, connect + "Socket closed"), "want TLS? --tls"));
+  EXPECT_TRUE(names(said(UNAVAILABLE, connect + "wrong version number"), "plain text"));
+  EXPECT_TRUE(
+      names(said(UNAVAILABLE, connect + "certificate verify failed"), "--tls-ca FILE names"));
+  EXPECT_EQ(said(UNAVAILABLE, "Socket closed"), "Socket closed");  // it was there
+  EXPECT_EQ(said(UNAVAILABLE, connect + "Connection refused"), connect + "Connection refused");
+}
+
 v1::DeltaChunk Delta(std::uint64_t revision, std::uint64_t first, const Eigen::MatrixXd& points,
                      const std::vector<std::uint32_t>& added,
                      const std::vector<std::uint32_t>& removed, bool complete = true) {

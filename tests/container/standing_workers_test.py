@@ -55,6 +55,18 @@ class StandingWorkers(unittest.TestCase):
         self.assertEqual(made.returncode, 0, report)
         self.assertIn("Euler characteristic 0", report)
 
+    def test_workers_with_an_oracle_of_the_users_own(self) -> None:
+        folder = pathlib.Path(self.folder.name)
+        (folder / "shapes.py").write_text("from stellate import manifolds\nring = manifolds.Torus()\n")
+        self.environment["PYTHONPATH"] += os.pathsep + str(folder)
+        self.start("--oracle", "shapes:ring")
+        self.start("--manifold", "torus")  # another label: leaves it alone
+        made = self.start("--make", "shapes:ring", "--epsilon", "0.2")
+        report, _ = made.communicate(timeout=PATIENCE)
+        self.assertEqual(made.returncode, 0, report)
+        absent = self.start("--oracle", "shapes:absent")
+        self.assertEqual(absent.wait(PATIENCE), 2)
+
 
 if __name__ == "__main__":
     unittest.main()

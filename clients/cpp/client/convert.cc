@@ -207,6 +207,35 @@ Report ReportOf(const v1::Mesh& mesh) {
   return r;
 }
 
+namespace {
+
+// What is likely to help where the two sides do not agree how to connect; gRPC's own words and
+// those of its TLS library are all there is to go by.
+std::string_view Advice(const grpc::Status& status) {
+  const auto says = [&status](std::string_view words) {
+    return status.error_message().find(words) != std::string::npos;
+  };
+  if (status.error_code() == grpc::StatusCode::UNAUTHENTICATED) {
+    return "give a token with --token-file FILE or $STELLATE_TOKEN (in C++ Credentials::token)";
+  }
+  if (status.error_code() != grpc::StatusCode::UNAVAILABLE) return "";
+  if (says("wrong version number")) {
+    return "the server speaks plain text: leave --tls, --tls-ca and --tls-cert away (in C++ "
+           "Credentials::tls, tls_ca, tls_certificate)";
+  }
+  if (says("certificate verify failed")) {
+    return "the server's certificate is of no authority that is trusted here: --tls-ca FILE names "
+           "one (in C++ Credentials::tls_ca)";
+  }
+  if (says("failed to connect") && (says("Socket closed") || says("Connection reset"))) {
+    return "does the server want TLS? --tls or --tls-ca FILE. Or a client certificate? --tls-cert "
+           "and --tls-key (in C++ Credentials)";
+  }
+  return "";
+}
+
+}  // namespace
+
 Error FromStatus(const grpc::Status& status) {
   const std::string reason = ReasonOf(status);
   ErrorCode code = ErrorCode::kServerFailed;
@@ -224,7 +253,12 @@ Error FromStatus(const grpc::Status& status) {
       break;
   }
   if (reason.rfind("ORACLE_", 0) == 0) code = ErrorCode::kOracleFailed;
-  return {code, reason, status.error_message()};
+  std::string message = status.error_message();
+  if (const std::string_view advice = Advice(status); !advice.empty()) {
+    message += "; ";
+    message += advice;
+  }
+  return {code, reason, std::move(message)};
 }
 
 }  // namespace stellate::client

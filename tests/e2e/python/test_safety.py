@@ -94,6 +94,38 @@ def test_wrong_tokens_and_certificates_are_refused(address, files, full):
                 client.info()
 
 
+@pytest.fixture(scope="module")
+def plain():
+    with stellate.Server(listen="127.0.0.1:0") as server:
+        yield server.address
+
+
+def test_errors_name_what_helps(address, plain, files, full):
+    """In Python and in the shell: each refusal with the words that name the flag."""
+    tls = ("--tls-ca", "ca.pem", "--tls-cert", "client.pem", "--tls-key", "client.key")
+    for server, credentials, flags, words, flag in (
+        (address, {}, (), "want TLS", "--tls-ca FILE"),
+        (address, {"ca": files / "ca.pem"}, tls[:2], "client certificate", "--tls-cert"),
+        (address, {**full, "ca": files / "other.pem"}, ("--tls-ca", "other.pem", *tls[2:]),
+         "no authority that is trusted", "--tls-ca FILE"),
+        (address, full, tls, "give a token", "--token-file FILE"),
+        (plain, full, tls, "speaks plain text", "--tls-ca"),
+    ):  # fmt: skip
+        with stellate.Client(server, stellate.Credentials(**credentials)) as client:
+            with pytest.raises(stellate.StellateError, match=words) as refused:
+                client.info()
+        assert flag in str(refused.value)
+        with pytest.raises(stellate.StellateError, match=words):
+            stellate.serve(
+                manifolds.Torus(), "meshes/" + "0" * 32, server=server,
+                credentials=stellate.Credentials(**credentials),
+            )  # fmt: skip
+        program = pathlib.Path(stellate.find_stellated()).with_name("stellate")
+        command = [program, "health", "--server", server, *flags]
+        said = subprocess.run(command, cwd=files, capture_output=True, text=True)
+        assert said.returncode in (2, 3) and words in said.stderr and flag in said.stderr
+
+
 def test_tokens_are_kept_secret():
     assert ALICE not in repr(stellate.Credentials(token=ALICE))
     for server in ("example.org:7717", "127.evil.example:7717"):

@@ -1,0 +1,325 @@
+"""python -m stellate: meshes the manifold of an oracle of yours, from the shell.
+
+An oracle is named MODULE:OBJECT, such as shapes:torus for the object, the class or the function
+`torus` of ./shapes.py; a class or a function is called for the oracle.
+
+Exit status: 0 certified, or all is well; 1 not certified, or the doctor found errors; 2 usage or
+refused; 3 the server or the oracle failed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import concurrent.futures as futures
+import importlib
+import multiprocessing
+import os
+import pathlib
+import sys
+import traceback
+from typing import Any, Sequence
+
+from ._credentials import Credentials
+from ._doctor import check
+from ._executors import workers_on
+from ._face import download, mesh
+from ._formats import check_save
+from ._mesh import Mesh
+from ._version import __version__
+from .client import Client
+from .errors import (
+    FailedPrecondition,
+    Interrupted,
+    InvalidArgument,
+    LimitExceeded,
+    MeshNotFound,
+    SaveError,
+    StellateError,
+    Unauthenticated,
+)
+from .progress import progress_bar
+
+_WELL, _NOT_CERTIFIED, _REFUSED, _FAILED = range(4)
+_OURS_TO_MEND = (
+    InvalidArgument, LimitExceeded, MeshNotFound, FailedPrecondition, Unauthenticated, SaveError,
+)  # fmt: skip
+_LABEL_BYTES = 128
+
+_RUN: list[tuple[str, type, str]] = [
+    ("random-seed", int, "seed of everything random"),
+    ("workers", int, "threads that call the oracle, where it says thread_safe = True"),
+    ("max-vertices", int, "stop there"),
+    ("max-rounds", int, "stop after so many round trips"),
+    ("max-batch-queries", int, "ask larger rounds in several batches"),
+    ("box-seeds", int, "points of the box tried as seeds"),
+    ("worker-wait-seconds", float, "how long the mesh waits for a worker"),
+    ("answer-seconds", float, "how long a worker may take for a chunk of questions"),
+]
+_CRITERIA: list[tuple[str, type, str]] = [
+    ("radius-edge-bound", float, "rho0 of rule R2"),
+    ("sliver-bound", float, "Theta0 of rule R3, 0: off"),
+    ("picking-radius", float, "delta of the picking region"),
+    ("small-sliver-radius", float, "beta: which slivers count against a candidate"),
+    ("candidates", int, "tried in a picking region"),
+    ("advance-step", float, "h: the front's step, a length"),
+    ("flat-alternations", int, "closest points towards a flat, without intersections"),
+    ("ask-ahead", bool, "refine a guess first: fewer round trips, more processor time"),
+    ("size-rate", float, "R_p at most this share of the local size"),
+    ("max-deviation", float, "circumcentres at most so far from the manifold, a length"),
+    ("common-centre", bool, "judge a simplex at one centre for all its vertices"),
+]
+
+
+class Refused(Exception):
+    """Something on the command line makes no sense."""
+
+
+def load(name: str) -> Any:
+    """The oracle that "module:attribute.path" names, the current folder's modules included.
+
+    A class or a function is called for it. Raises: Refused.
+    """
+    module_name, colon, path = name.partition(":")
+    if not colon or not path:
+        raise Refused(f"'{name}' has to be MODULE:OBJECT, such as shapes:torus")
+    if os.getcwd() not in sys.path:
+        sys.path.insert(0, os.getcwd())
+    try:
+        found: Any = importlib.import_module(module_name)
+        for attribute in path.split("."):
+            found = getattr(found, attribute)
+        if not hasattr(found, "closest_point") or isinstance(found, type):
+            found = found()
+    except (ImportError, AttributeError, ValueError, TypeError, StellateError) as error:
+        raise Refused(f"{name}: {error}") from error
+    return found
+
+
+def add_server(to: argparse.ArgumentParser, default: str | None) -> None:
+    """--server and what goes with it."""
+    to.add_argument(
+        "--server",
+        default=default,
+        help="host:port or unix:/path; default: "
+        + (default or "a private one, which is started and stopped"),
+    )
+    safety = to.add_argument_group("safety")
+    safety.add_argument("--tls", action="store_true", help="trusting the system's authorities")
+    safety.add_argument("--tls-ca", metavar="FILE", help="PEM: TLS, trusting these instead")
+    safety.add_argument("--tls-cert", metavar="FILE", help="PEM: a client certificate")
+    safety.add_argument("--tls-key", metavar="FILE", help="PEM: its key")
+    safety.add_argument(
+        "--token-file",
+        metavar="FILE",
+        help="that holds the token alone; default: $STELLATE_TOKEN, if set",
+    )
+
+
+def credentials_of(options: argparse.Namespace) -> Credentials | None:
+    """What --tls and its kin say. Raises: Refused."""
+    token = os.environ.get("STELLATE_TOKEN")
+    if options.token_file is not None:
+        words = pathlib.Path(options.token_file).read_text().split()
+        if len(words) != 1:
+            raise Refused(f"{options.token_file} must hold one token and nothing else")
+        token = words[0]
+    if options.server is None:
+        return None
+    return Credentials(token, options.tls_ca, options.tls_cert, options.tls_key, options.tls)
+
+
+def _settings(options: argparse.Namespace) -> dict[str, Any]:
+    names = [flag.replace("-", "_") for flag, _, _ in (*_RUN, *_CRITERIA)]
+    given = {name: getattr(options, name, None) for name in names}
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def _bar(options: argparse.Namespace) -> Any:
+    return None if options.quiet else progress_bar()
+
+
+def _deliver(finished: Mesh, options: argparse.Namespace) -> int:
+    """What a mesh is told by; the exit status that stands for it."""
+    report = finished.report
+    if options.report is not None and report is not None:
+        pathlib.Path(options.report).write_text(report.to_json() + "\n")
+    if options.json and report is not None:
+        print(report.to_json())
+    elif not options.quiet:
+        print(report if report is not None else finished)
+    return _WELL if finished.certified else _NOT_CERTIFIED
+
+
+def _mesh(options: argparse.Namespace) -> int:
+    oracle, settings = load(options.oracle), _settings(options)
+    label = f"stellate {options.oracle}".encode()[:_LABEL_BYTES].decode(errors="ignore")
+    credentials = credentials_of(options)
+    try:
+        finished = mesh(
+            oracle, options.epsilon, options.server, _bar(options), credentials,
+            save=options.output, label=label, checkpoint=options.checkpoint, **settings,
+        )  # fmt: skip
+    except Interrupted as stopped:
+        if stopped.mesh is None:
+            raise
+        print(f"stellate: {stopped}", file=sys.stderr)
+        finished = stopped.mesh
+        for path in options.output:
+            finished.save(path)
+    return _deliver(finished, options)
+
+
+def _declare(options: argparse.Namespace) -> int:
+    oracle, settings = load(options.oracle), _settings(options)
+    label = options.label or options.oracle
+    with Client(options.server, credentials_of(options)) as client:
+        print(client.create(oracle, options.epsilon, label=label, **settings).name)
+    return _WELL
+
+
+def _serve(options: argparse.Namespace) -> int:
+    oracle = load(options.oracle)
+    with Client(options.server, credentials_of(options)) as client:
+        if options.processes is None:
+            state = client.serve(oracle, options.mesh, worker=options.worker)
+        else:
+            count = options.processes
+            spawn = multiprocessing.get_context("spawn")  # gRPC's threads do not outlive a fork
+            with futures.ProcessPoolExecutor(count, spawn) as pool, workers_on(
+                pool, oracle, options.mesh, count, server=client, worker=options.worker
+            ) as crew:
+                state = max(crew.wait())
+    print(state)
+    return _FAILED if state == "FAILED" else _WELL
+
+
+def _download(options: argparse.Namespace) -> int:
+    unfinished = "wait" if options.wait else "take" if options.unfinished else "refuse"
+    first, *others = options.output
+    with Client(options.server, credentials_of(options)) as client:
+        info = client.get(options.mesh)
+        for path in others:
+            check_save(path, info.dimension, info.ambient_dimension)
+        finished = download(
+            options.mesh, first, server=client, unfinished=unfinished, revision=options.revision,
+            on_progress=_bar(options),
+        )  # fmt: skip
+    for path in others:
+        finished.save(path)
+    return _deliver(finished, options)
+
+
+def _doctor(options: argparse.Namespace) -> int:
+    report = check(load(options.oracle), options.epsilon, seed=options.seed)
+    print(report)
+    return _WELL if report.ok else _NOT_CERTIFIED
+
+
+def _epsilon(text: str) -> float | str:
+    try:
+        return text if text == "auto" else float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"has to be a length or auto, and is '{text}'") from None
+
+
+def _add_settings(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "-e", "--epsilon", type=_epsilon, required=True,
+        help="largest circumradius of a simplex, a length; or auto: a quarter of the reach that the "
+        "doctor finds",
+    )  # fmt: skip
+    criteria = command.add_argument_group("criteria", "absent: the server's defaults")
+    for to, settings in ((command, _RUN), (criteria, _CRITERIA)):
+        for flag, kind, words in settings:
+            if kind is bool:
+                to.add_argument(f"--{flag}", action=argparse.BooleanOptionalAction, help=words)
+            else:
+                to.add_argument(f"--{flag}", type=kind, metavar="N", help=words)
+
+
+def _add_results(command: argparse.ArgumentParser, required: bool) -> None:
+    command.add_argument(
+        "-o", "--output", action="append", default=None if required else [], required=required,
+        metavar="FILE", help="to write the mesh to, .txt .vtu .stl .msh ...; may be given again",
+    )  # fmt: skip
+    command.add_argument("--report", metavar="FILE", help="for the report as JSON")
+    command.add_argument("--json", action="store_true", help="print the report as JSON")
+    command.add_argument("-q", "--quiet", action="store_true", help="no progress, no report")
+
+
+def _parser() -> argparse.ArgumentParser:
+    about, *more = __doc__.split("\n\n", 1)
+    parser = argparse.ArgumentParser(
+        "python -m stellate", description=about, epilog="\n".join(more),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    parser.add_argument("--version", action="version", version=f"stellate {__version__}")
+    commands = parser.add_subparsers(dest="command", required=True)
+
+    def add(name: str, run: Any, words: str) -> argparse.ArgumentParser:
+        command = commands.add_parser(name, help=words, description=words)
+        command.set_defaults(run=run)
+        return command
+
+    def add_oracle(to: argparse.ArgumentParser) -> None:
+        to.add_argument("oracle", metavar="MODULE:OBJECT", help="an oracle, or what makes one")
+
+    one = add("mesh", _mesh, "mesh the manifold of an oracle")
+    add_oracle(one)
+    _add_settings(one)
+    one.add_argument(
+        "--checkpoint", metavar="FOLDER",
+        help="in which the mesh outlives this program: the same command goes on with it",
+    )  # fmt: skip
+    _add_results(one, required=False)
+    add_server(one, None)
+
+    one = add("declare", _declare, "declare a mesh, for others to serve, and print its name")
+    add_oracle(one)
+    _add_settings(one)
+    one.add_argument("--label", help="that lists show; default: MODULE:OBJECT")
+    add_server(one, "127.0.0.1:7717")
+
+    one = add("serve", _serve, "answer a mesh's questions until it is over, beside other workers")
+    add_oracle(one)
+    one.add_argument("mesh", help="its whole name: meshes/ and 32 digits")
+    one.add_argument("--processes", type=int, metavar="N", help="of this machine, that answer")
+    one.add_argument("--worker", default="", help="what the server's log calls this one")
+    add_server(one, "127.0.0.1:7717")
+
+    one = add("download", _download, "fetch a mesh that is on a server")
+    one.add_argument("mesh", help="its whole name: meshes/ and 32 digits")
+    _add_results(one, required=True)
+    how = one.add_mutually_exclusive_group()
+    how.add_argument("--wait", action="store_true", help="for the end of a mesh that is not over")
+    how.add_argument("--unfinished", action="store_true", help="as it is, over or failed or not")
+    how.add_argument("--revision", type=int, default=0, metavar="N", help="0: the newest")
+    add_server(one, "127.0.0.1:7717")
+
+    one = add("doctor", _doctor, "probe an oracle for its contract")
+    add_oracle(one)
+    one.add_argument("-e", "--epsilon", type=float, help="that a mesh is planned with")
+    one.add_argument("--seed", type=int, default=1, help="of the random questions")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; its exit status."""
+    options = _parser().parse_args(arguments)
+    try:
+        return options.run(options)
+    except KeyboardInterrupt as stopped:
+        print(f"stellate: {stopped or 'stopped'}", file=sys.stderr)
+        return _NOT_CERTIFIED
+    except Refused as error:
+        print(f"stellate: {error}", file=sys.stderr)
+        return _REFUSED
+    except StellateError as error:
+        print(f"stellate: {error.reason}: {error}", file=sys.stderr)
+        return _REFUSED if isinstance(error, _OURS_TO_MEND) else _FAILED
+    except OSError as error:
+        print(f"stellate: {error}", file=sys.stderr)
+        return _REFUSED
+    except Exception:
+        traceback.print_exc()  # of the oracle: where it went wrong is what its author needs
+        return _FAILED

@@ -1,0 +1,148 @@
+"""`python -m stellate`, as a user's shell runs it."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+import stellate
+from stellate import manifolds
+
+SHAPES = """
+import os, time
+from stellate import manifolds
+
+torus = manifolds.Torus()
+so3 = manifolds.SpecialOrthogonal3
+
+class Broken(manifolds.Torus):
+    def closest_point(self, x):
+        raise RuntimeError("the solver has no licence")
+
+class Slow(manifolds.Torus):
+    def closest_point(self, x):
+        time.sleep(0.002 * len(x))
+        return super().closest_point(x)
+
+class Marking(manifolds.Torus):
+    def closest_point(self, x):
+        open(f"process-{os.getpid()}", "w").close()
+        return super().closest_point(x)
+"""
+
+
+@pytest.fixture
+def shell(tmp_path, repository):
+    """Runs the command line in a folder with shapes.py."""
+    (tmp_path / "shapes.py").write_text(SHAPES)
+    environment = {**os.environ, "PYTHONPATH": str(repository / "clients" / "python")}
+
+    def run(*arguments, start=subprocess.run, **more):
+        return start(
+            [sys.executable, "-m", "stellate", *map(str, arguments)], cwd=tmp_path,
+            env={**environment, **more}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+
+    return run
+
+
+def test_mesh_writes_what_was_asked_for(shell, tmp_path):
+    done = shell(
+        "mesh", "shapes:torus", "-e", "0.3", "-o", "a.txt", "-o", "a.stl", "--report", "a.json",
+        "--max-rounds", "1000", "--no-ask-ahead",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "CERTIFIED" in done.stdout and "vertices" in done.stderr
+    same = stellate.mesh(manifolds.Torus(), 0.3, ask_ahead=False)
+    assert stellate.load_txt(tmp_path / "a.txt").points.tobytes() == same.points.tobytes()
+    assert (tmp_path / "a.stl").stat().st_size == 84 + 50 * len(same.simplices)
+    assert json.loads((tmp_path / "a.json").read_text())["certificate"]
+
+
+def test_an_uncertified_mesh_exits_one(shell):
+    done = shell("mesh", "shapes:torus", "-e", "0.2", "--max-vertices", "50", "--json", "-q")
+    assert done.returncode == 1, done.stderr
+    assert json.loads(done.stdout)["termination"] == "VERTEX_BUDGET"
+
+
+def test_ctrl_c_keeps_what_there_is(shell, tmp_path):
+    command = ["mesh", "shapes:Slow", "-e", "0.05", "-o", "part.txt"]
+    with shell(*command, start=subprocess.Popen) as running:
+        for line in running.stderr:
+            if "refining" in line:
+                break
+        running.send_signal(signal.SIGINT)
+        output, complaints = running.communicate(timeout=100)
+    assert running.returncode == 1, complaints
+    assert "NOT CERTIFIED" in output and "Traceback" not in complaints
+    assert len(stellate.load_txt(tmp_path / "part.txt").points) > 0
+
+
+def test_declare_serve_and_download(shell, server, tmp_path):
+    at = ("--server", server.address)
+    name = shell("declare", "shapes:torus", "-e", "0.3", "--label", "mine", *at).stdout.strip()
+    with stellate.Client(server) as client:
+        assert client.get(name).label == "mine" and client.get(name).state == "WAITING"
+    early = shell("download", name, "-o", "a.txt", *at)
+    assert early.returncode == 2 and "not over" in early.stderr
+    served = shell("serve", "shapes:Marking", name, "--processes", "2", *at)
+    assert (served.returncode, served.stdout) == (0, "SUCCEEDED\n"), served.stderr
+    assert list(tmp_path.glob("process-*"))
+    late = shell("serve", "shapes:torus", name, *at)
+    assert (late.returncode, late.stdout) == (0, "SUCCEEDED\n"), late.stderr
+    done = shell("download", name, "-o", "a.txt", "-o", "a.msh", "-q", *at)
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
+    assert (tmp_path / "a.txt").exists() and (tmp_path / "a.msh").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["mesh", "shapes:absent", "-e", "0.3"], "has no attribute 'absent'"),
+        (["mesh", "shapes", "-e", "0.3"], "MODULE:OBJECT"),
+        (["mesh", "absent:torus", "-e", "0.3"], "No module named 'absent'"),
+        (["mesh", "shapes:torus"], "--epsilon"),
+        (["mesh", "shapes:torus", "-e", "fine"], "length or auto"),
+        (["mesh", "shapes:torus", "-e", "-1"], "INVALID_ARGUMENT"),
+        (["mesh", "shapes:so3", "-e", "0.4", "-o", "so3.stl"], "surfaces"),
+        (["mesh", "shapes:torus", "-e", "0.3", "-o", "no/such.txt"], "there is no folder"),
+        (["serve", "shapes:torus", "meshes/" + 32 * "0"], "MESH_NOT_FOUND"),
+        (["download", "meshes/" + 32 * "0", "-o", "a.txt"], "MESH_NOT_FOUND"),
+        (["frobnicate"], "invalid choice"),
+    ],
+)
+def test_refusals_exit_two(arguments, words, shell, server):
+    at = ["--server", server.address] if arguments[0] != "frobnicate" else []
+    refused = shell(*arguments, *at)
+    assert refused.returncode == 2 and words in refused.stderr, refused
+
+
+def test_failures_exit_three(shell):
+    broken = shell("mesh", "shapes:Broken", "-e", "0.3", "-q")
+    assert broken.returncode == 3
+    assert "has no licence" in broken.stderr and "shapes.py" in broken.stderr  # where it was
+    gone = shell("mesh", "shapes:torus", "-e", "0.3", "--server", "unix:/nowhere/at/all")
+    assert gone.returncode == 3 and "stellate: UNAVAILABLE: " in gone.stderr
+
+
+def test_tokens_come_from_a_file_or_the_environment(shell, tmp_path):
+    token = "alice-0123456789abcdef"
+    (tmp_path / "tokens").write_text(f"alice {token}\n")
+    (tmp_path / "mine").write_text(token + "\n")
+    with stellate.Server(listen="127.0.0.1:0", token_file=tmp_path / "tokens") as server:
+        mesh = ("mesh", "shapes:torus", "-e", "0.3", "-q", "--server", server.address)
+        refused = shell(*mesh)
+        assert refused.returncode == 2 and "--token-file" in refused.stderr
+        assert shell(*mesh, "--token-file", "mine").returncode == 0
+        assert shell(*mesh, STELLATE_TOKEN=token).returncode == 0
+        (tmp_path / "two").write_text(f"alice {token}\n")
+        assert "one token and nothing else" in shell(*mesh, "--token-file", "two").stderr
+
+
+def test_help(shell):
+    assert "MODULE:OBJECT" in shell("--help").stdout
+    for command in ("mesh", "declare", "serve", "download", "doctor"):
+        assert shell(command, "--help").returncode == 0
