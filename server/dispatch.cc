@@ -9,16 +9,20 @@ namespace {
 
 using Eigen::Index;
 
-constexpr Index kFirstChunk = 64;     // for a worker of unknown speed: a dear oracle must not choke
-constexpr Index kSmallestChunk = 16;  // below that the message costs more than its queries
-constexpr double kSpeedMemory = 0.5;  // weight of the past in the running mean of a speed
-constexpr double kMostChecked = 16;   // queries at a time
+constexpr double kSoon =
+    0.01;  // seconds: of work that lasts no longer there is always more to give
+constexpr double kWorthWhile = 0.1;  // share of a worker's time that asking ahead should save it
+constexpr double kMostChecked = 16;  // queries at a time
 
 double Seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
 // Multiplicative hashing: a different place in each chunk, the same in each run.
 Index Scatter(LeaseId id, Index range) {
   return static_cast<Index>((id * 0x9e3779b97f4a7c15u >> 33) % static_cast<std::uint64_t>(range));
+}
+
+Pace::Chunk Timed(const Lease& lease, TimePoint end) {
+  return {static_cast<double>(lease.count), Seconds(end - lease.started), lease.cut, lease.queued};
 }
 
 // One worker at a time answers it, and one with room for it is idle.
@@ -67,7 +71,9 @@ void Dispatch::End() {
 }
 
 void Dispatch::Join(WorkerId worker, std::uint32_t max_chunk) {
-  workers_[worker].max_chunk = max_chunk;
+  Worker& joined = workers_[worker];
+  joined.max_chunk = max_chunk;
+  joined.pace = Pace({Seconds(options_.chunk_target), Seconds(options_.answer_limit)});
 }
 
 void Dispatch::Leave(WorkerId worker, TimePoint now) {
@@ -88,60 +94,75 @@ void Dispatch::TakeBack(Worker* worker, bool timed_out) {
   for (auto it = worker->leases.rbegin(); it != worker->leases.rend(); ++it) {
     const bool oldest = std::next(it) == worker->leases.rend();
     if (it->check || it->answered) continue;
+    // Only the oldest had its time. Several queries may have been too much at once.
+    const int timeouts = it->timeouts + (timed_out && oldest && it->count == 1 ? 1 : 0);
     if (Lease* const twin = Find(it->twin)) {
       twin->twin = 0;
-      twin->timeouts = it->timeouts + (timed_out && oldest ? 1 : 0);
+      twin->timeouts = timeouts;
       continue;
     }
-    Piece piece{it->block, it->first, it->count, it->timeouts};
-    pending_queries_ += piece.count;
-    if (!timed_out || !oldest) {
-      pending_.push_front(piece);
-      continue;
-    }
-    // Only the oldest had its time. Perhaps it was too much at once: try it in two halves.
-    ++piece.timeouts;
-    timed_out_ = timed_out_ || piece.timeouts >= options_.max_leases;
-    const Index half = piece.count / 2;
-    if (half > 0) {
-      pending_.push_front({piece.block, piece.first + half, piece.count - half, piece.timeouts});
-      piece.count = half;
-    }
-    pending_.push_front(piece);
+    timed_out_ = timed_out_ || timeouts >= options_.max_leases;
+    pending_.push_front({it->block, it->first, it->count, timeouts});
+    pending_queries_ += it->count;
   }
   worker->leases.clear();
 }
 
-Index Dispatch::ChunkSize(const Worker& worker, const Piece& piece) const {
+// Alone, a worker takes all. Among many, smaller pieces towards the end let all end together; a
+// piece that takes less than what comes with each would make no end sooner.
+Index Dispatch::ShareOfTheRest(const Worker& worker) const {
   const auto crew = static_cast<Index>(workers_.size());
-  // Alone, a worker takes all. Among many, smaller pieces towards the end let all end together.
-  Index n = crew == 1 ? pending_queries_ : (pending_queries_ + 2 * crew - 1) / (2 * crew);
-  n = std::max(n, kSmallestChunk);
-  if (worker.speed > 0) {
-    const double fits = std::min(worker.speed * Seconds(options_.chunk_target), 1e9);
-    n = std::min(n, std::max<Index>(static_cast<Index>(fits), 1));
-  } else {
-    n = std::min(n, kFirstChunk);
-  }
-  const std::size_t bytes = std::max<std::size_t>(blocks_[piece.block].bytes_per_query, 1);
-  n = std::min(n, static_cast<Index>(options_.chunk_bytes / bytes));
-  if (worker.max_chunk > 0) n = std::min(n, static_cast<Index>(worker.max_chunk));
-  return std::clamp<Index>(n, 1, piece.count);
+  if (crew == 1) return pending_queries_;
+  const Index share = (pending_queries_ + 2 * crew - 1) / (2 * crew);
+  const double least = std::max(Seconds(options_.least_share), worker.pace.fixed());
+  const double queries =
+      std::min(static_cast<double>(pending_queries_), least / worker.pace.each());
+  return std::max(share, static_cast<Index>(queries));
 }
 
-// The worker with the fewest chunks, the fastest of these. One that lags is asked only when there
-// is no other, and for one chunk at a time.
+// Moves the front of the piece into the lease.
+void Dispatch::Cut(const Worker& worker, Piece* piece, Lease* lease) const {
+  const std::size_t bytes = std::max<std::size_t>(blocks_[piece->block].bytes_per_query, 1);
+  auto full = static_cast<Index>(std::min(worker.pace.FullChunk(), 1e9));
+  full = std::min(full, static_cast<Index>(options_.chunk_bytes / bytes));
+  if (worker.max_chunk > 0) full = std::min(full, static_cast<Index>(worker.max_chunk));
+  full = std::max<Index>(full, 1);
+  lease->block = piece->block;
+  lease->first = piece->first;
+  lease->count = std::min({full, ShareOfTheRest(worker), piece->count});
+  lease->cut = lease->count < full;
+  lease->timeouts = piece->timeouts;
+  piece->first += lease->count;
+  piece->count -= lease->count;
+}
+
+// Besides those that it has: so that it need not wait between two. Towards a round's end that would
+// keep dear queries from others who are idle sooner.
+bool Dispatch::MayHaveAnother(const Worker& worker) const {
+  const int in_flight = worker.InFlight();
+  if (in_flight == 0) return true;
+  const Pace& pace = worker.pace;
+  if (in_flight >= options_.max_in_flight || worker.Lagging() || !pace.settled()) return false;
+  const auto crew = static_cast<double>(workers_.size());
+  if (crew == 1 || static_cast<double>(pending_queries_) > 2 * crew * pace.FullChunk()) return true;
+  double held = 0;
+  for (const Lease& lease : worker.leases) held += pace.Seconds(static_cast<double>(lease.count));
+  return held <= std::max(kSoon, pace.fixed() / kWorthWhile);
+}
+
+// The worker with the fewest chunks, the quickest of these, or whoever is not known yet. One that
+// lags is asked only when there is no other, and for one chunk at a time.
 Dispatch::Worker* Dispatch::PickWorker(WorkerId* id) {
   const bool any_lively = std::any_of(workers_.begin(), workers_.end(),
                                       [](const auto& entry) { return !entry.second.Lagging(); });
   Worker* best = nullptr;
   for (auto& [candidate_id, candidate] : workers_) {
-    const bool lags = candidate.Lagging();
-    if (lags && any_lively) continue;
+    if (candidate.Lagging() && any_lively) continue;
+    if (!MayHaveAnother(candidate)) continue;
     const int in_flight = candidate.InFlight();
-    if (in_flight >= (lags ? 1 : options_.max_in_flight)) continue;
-    const bool better = best == nullptr || in_flight < best->InFlight() ||
-                        (in_flight == best->InFlight() && candidate.speed > best->speed);
+    const bool better =
+        best == nullptr || in_flight < best->InFlight() ||
+        (in_flight == best->InFlight() && candidate.pace.Seconds(1) < best->pace.Seconds(1));
     if (!better) continue;
     best = &candidate;
     *id = candidate_id;
@@ -164,6 +185,7 @@ Lease Dispatch::Give(WorkerId id, Lease lease, TimePoint now) {
   lease.worker = id;
   lease.started = now;
   Worker& worker = workers_.at(id);
+  lease.queued = !worker.leases.empty();
   worker.leases.push_back(lease);
   ++worker.unanswered;
   return lease;
@@ -180,16 +202,10 @@ std::vector<Lease> Dispatch::Assign(TimePoint now) {
       worker->check_credit -= static_cast<double>(check->count);
       leases.push_back(Give(id, *check, now));
     }
-    Piece& piece = pending_.front();
     Lease lease;
-    lease.block = piece.block;
-    lease.first = piece.first;
-    lease.count = ChunkSize(*worker, piece);
-    lease.timeouts = piece.timeouts;
-    piece.first += lease.count;
-    piece.count -= lease.count;
+    Cut(*worker, &pending_.front(), &lease);
     pending_queries_ -= lease.count;
-    if (piece.count == 0) pending_.pop_front();
+    if (pending_.front().count == 0) pending_.pop_front();
     lease = Give(id, lease, now);
     leases.push_back(lease);
     const double earned = options_.check_share * static_cast<double>(lease.count);
@@ -219,16 +235,17 @@ std::optional<Lease> Dispatch::NextCheck(WorkerId id, Worker* worker) const {
 }
 
 TimePoint Dispatch::OverdueAt(const Worker& worker, std::size_t position) const {
-  double speed = worker.speed;
-  if (speed <= 0) {
-    for (const auto& [id, other] : workers_) speed = std::max(speed, other.speed);
+  const Pace* pace = &worker.pace;
+  for (const auto& [id, other] : workers_) {
+    if (worker.pace.known() || !other.pace.known()) continue;
+    if (!pace->known() || other.pace.Seconds(1) < pace->Seconds(1)) pace = &other.pace;
   }
   const TimePoint started = worker.leases.front().started;
-  if (speed <= 0) return started + options_.straggler_unknown;
-  Index queries = 0;
-  for (std::size_t i = 0; i <= position; ++i) queries += worker.leases[i].count;
-  const double expected = std::max(static_cast<double>(queries) / speed,
-                                   worker.least_seconds * static_cast<double>(position + 1));
+  if (!pace->known()) return started + options_.straggler_unknown;
+  double expected = 0;
+  for (std::size_t i = 0; i <= position; ++i) {
+    expected += pace->AtMost(static_cast<double>(worker.leases[i].count));
+  }
   const double patience = std::min(options_.straggler_factor * expected, 1e6);
   return started + std::max(options_.straggler_floor, std::chrono::duration_cast<Clock::duration>(
                                                           std::chrono::duration<double>(patience)));
@@ -244,7 +261,7 @@ Index Dispatch::IdleRoom() const {
   return room;
 }
 
-// Stragglers, oldest first, to idle workers, fastest first.
+// Stragglers, oldest first, to idle workers, quickest first.
 void Dispatch::BackUp(TimePoint now, std::vector<Lease>* leases) {
   while (const Index room = IdleRoom()) {
     Lease* straggler = nullptr;
@@ -259,7 +276,7 @@ void Dispatch::BackUp(TimePoint now, std::vector<Lease>* leases) {
     WorkerId best = 0;
     for (const auto& [id, worker] : workers_) {
       if (!worker.Idle() || !worker.Wants(straggler->count)) continue;
-      if (best == 0 || worker.speed > workers_.at(best).speed) best = id;
+      if (best == 0 || worker.pace.Seconds(1) < workers_.at(best).pace.Seconds(1)) best = id;
     }
     Lease copy = *straggler;
     copy.twin = straggler->id;
@@ -281,13 +298,8 @@ Dispatch::ClaimResult Dispatch::Claim(WorkerId worker_id, LeaseId id, TimePoint 
   *lease = *it;
   const bool oldest = it == worker.leases.begin();
   worker.leases.erase(it);
-  if (!lease->check) {  // a handful of queries says nothing of its speed
-    const double seconds = std::max(Seconds(now - lease->started), 1e-6);
-    const double speed = static_cast<double>(lease->count) / seconds;
-    worker.least_seconds = worker.speed > 0 ? std::min(worker.least_seconds, seconds) : seconds;
-    worker.speed =
-        worker.speed > 0 ? kSpeedMemory * worker.speed + (1 - kSpeedMemory) * speed : speed;
-  }
+  // A handful of queries to check says nothing.
+  if (!lease->check) worker.pace.Answered(Timed(*lease, now));
   if (oldest && !worker.leases.empty()) worker.leases.front().started = now;  // the next in line
   if (lease->check || lease->answered) return ClaimResult::kSecond;
   if (Lease* const twin = Find(lease->twin)) {
@@ -306,6 +318,7 @@ void Dispatch::Expire(TimePoint now) {
     if (worker.leases.empty()) continue;
     if (now - worker.leases.front().started < options_.answer_limit) continue;
     worker.stalled = true;
+    worker.pace.BeginAgain();
     TakeBack(&worker, /*timed_out=*/true);
   }
 }

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "server/pace.h"
+
 namespace stellate::server {
 
 using Clock = std::chrono::steady_clock;
@@ -17,15 +19,19 @@ using WorkerId = std::uint64_t;
 using LeaseId = std::uint64_t;
 
 struct DispatchOptions {
-  Clock::duration answer_limit = std::chrono::seconds(60);        // for one chunk
-  Clock::duration worker_wait = std::chrono::seconds(60);         // with queries and no worker
-  Clock::duration chunk_target = std::chrono::milliseconds(250);  // what a chunk should take
+  Clock::duration answer_limit = std::chrono::seconds(60);  // for one chunk
+  Clock::duration worker_wait = std::chrono::seconds(60);   // with queries and no worker
+  // What a chunk should take, unless its worker's fixed cost (a start, a licence, a schedule) would
+  // be more than a quarter of it.
+  Clock::duration chunk_target = std::chrono::milliseconds(250);
+  // What is left of a round is shared among the crew, but not in pieces that take less.
+  Clock::duration least_share = std::chrono::milliseconds(1);
   std::size_t chunk_bytes = std::size_t{1} << 20;  // of a chunk's queries, and of their answers
-  int max_leases = 3;     // of one chunk, all timed out, before the round fails
+  int max_leases = 3;     // of one query alone, all timed out, before the round fails
   int max_in_flight = 2;  // chunks that one worker holds, so that it need not wait between two
 
-  // A chunk is a straggler once it has taken so many times what its worker's speed promises, and
-  // no less than the floor: an idle worker gets it as well. Without a speed to go by: so long.
+  // A chunk is a straggler once it has taken so many times what its worker's pace promises, and
+  // no less than the floor: an idle worker gets it as well. Without a pace to go by: so long.
   double straggler_factor = 3;
   Clock::duration straggler_floor = std::chrono::milliseconds(200);
   Clock::duration straggler_unknown = std::chrono::seconds(2);
@@ -42,17 +48,22 @@ struct Lease {
   std::size_t block = 0;
   Eigen::Index first = 0;
   Eigen::Index count = 0;
-  int timeouts = 0;       // earlier leases of this piece that ran out
+  int timeouts = 0;       // earlier leases of this query alone that ran out
   TimePoint started;      // when the worker could start on it: chunks of one worker queue up
+  bool cut = false;       // smaller than its worker might have had: the round ended, or is shared
+  bool queued = false;    // given while its worker had others
   bool check = false;     // another has these queries: the answers are for comparing
   LeaseId twin = 0;       // of the same piece, given to another too: the first answer counts
   bool answered = false;  // the twin was first: this answer is for comparing
 };
 
 // Who answers what: cuts the blocks of a round into chunks, leases these to workers by their
-// measured speed, takes back what a worker leaves undone, gives stragglers to idle workers as
+// measured pace, takes back what a worker leaves undone, gives stragglers to idle workers as
 // well, and has a sample of queries answered twice. A plain state machine: no threads, no clock of
 // its own, no network. Times passed in must not go back.
+//
+// A chunk is what fits the worker's pace. Towards a round's end what is left is shared among the
+// crew.
 class Dispatch {
  public:
   struct Block {
@@ -105,8 +116,7 @@ class Dispatch {
   };
   struct Worker {
     std::uint32_t max_chunk = 0;
-    double speed = 0;              // queries per second, 0: not known yet
-    double least_seconds = 0;      // of a chunk so far: what the way there and back takes at least
+    Pace pace{Pace::Aim{}};
     double check_credit = 1;       // queries that it may be asked on top
     bool stalled = false;          // let a lease run out and has not answered since
     std::uint64_t unanswered = 0;  // chunks sent less answers come, late ones too
@@ -119,7 +129,9 @@ class Dispatch {
     bool Wants(Eigen::Index count) const { return max_chunk == 0 || count <= max_chunk; }
   };
 
-  Eigen::Index ChunkSize(const Worker& worker, const Piece& piece) const;
+  Eigen::Index ShareOfTheRest(const Worker& worker) const;
+  void Cut(const Worker& worker, Piece* piece, Lease* lease) const;
+  bool MayHaveAnother(const Worker& worker) const;
   Worker* PickWorker(WorkerId* id);
   void TakeBack(Worker* worker, bool timed_out);
   Lease* Find(LeaseId id);

@@ -362,11 +362,10 @@ MeshFailure OraclePool::Describe(Dispatch::Failure failure) const {
                           " seconds (limits.worker_wait_seconds): open ServeOracle for it, or "
                           "allow a longer wait")};
   }
-  return {"ANSWER_TIMEOUT", core::Message("an oracle left the same queries unanswered for ",
-                                          Seconds(options_.answer_limit),
-                                          " seconds (limits.answer_seconds), ", options_.max_leases,
-                                          " times: make it faster, take fewer queries in a chunk "
-                                          "(Hello.max_chunk_queries), or allow more time")};
+  return {"ANSWER_TIMEOUT",
+          core::Message("an oracle left a query that it was asked alone unanswered for ",
+                        Seconds(options_.answer_limit), " seconds (limits.answer_seconds), ",
+                        options_.max_leases, " times: make it faster, or allow more time")};
 }
 
 void OraclePool::Send(std::vector<Delivery> deliveries) {

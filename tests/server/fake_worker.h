@@ -24,16 +24,15 @@ class FakeWorker : public OracleWorker {
     return true;
   }
 
-  // Joins `pool`, which must outlive it.
+  // Joins `pool`, which must outlive it. When the last that is returned goes it works no more: the
+  // pool may be the last to know it, on its own thread.
   static std::shared_ptr<FakeWorker> Join(OraclePool* pool, Answer answer = AnswerTruly) {
     auto worker = std::shared_ptr<FakeWorker>(new FakeWorker(pool, std::move(answer)));
     const auto id = pool->Join(worker, 0);
     if (!id) return nullptr;
     worker->Start(*id);
-    return worker;
+    return {worker.get(), [worker](FakeWorker* held) { held->Stop(); }};
   }
-
-  ~FakeWorker() override { Stop(); }
 
   void Ask(Chunk chunk) override {
     const std::lock_guard lock(mutex_);

@@ -26,11 +26,11 @@ class StragglersTest : public ::testing::Test {
     options_.check_share = 0;
   }
 
-  // Two workers have ten queries each; the second has answered, in one second.
+  // Two workers have a query each; the second has answered, in one second.
   void BeginWithOneLate(Dispatch* dispatch) {
     dispatch->Join(1, 10);
     dispatch->Join(2, 10);
-    dispatch->Begin({{20, 8}}, At(0s));
+    dispatch->Begin({{2, 8}}, At(0s));
     const auto leases = dispatch->Assign(At(0s));
     ASSERT_EQ(leases.size(), 2u);
     ASSERT_EQ(leases[0].worker, 1u);
@@ -52,7 +52,7 @@ class StragglersTest : public ::testing::Test {
 TEST_F(StragglersTest, AnIdleWorkerIsGivenWhatIsFarOverdueAndTheFirstAnswerCounts) {
   Dispatch dispatch(options_);
   BeginWithOneLate(&dispatch);
-  // Ten queries a second is the only speed known, and three times that time is patience enough.
+  // A query a second is the only pace known, and three times that time is patience enough.
   EXPECT_EQ(dispatch.NextDeadline(), At(3s));
   EXPECT_TRUE(dispatch.Assign(At(2999ms)).empty());
   const auto backup = dispatch.Assign(At(3s));
@@ -139,7 +139,7 @@ TEST_F(StragglersTest, WhoHasNotFinishedAnOldChunkIsAskedLast) {
 TEST_F(StragglersTest, WithoutAnySpeedPatienceIsFixed) {
   Dispatch dispatch(options_);
   dispatch.Join(1, 0);
-  dispatch.Begin({{10, 8}}, At(0s));
+  dispatch.Begin({{1, 8}}, At(0s));
   ASSERT_EQ(dispatch.Assign(At(0s)).size(), 1u);
   EXPECT_EQ(dispatch.NextDeadline(), At(100s)) << "nobody is idle";
   dispatch.Join(2, 0);
@@ -151,33 +151,38 @@ TEST_F(StragglersTest, WithoutAnySpeedPatienceIsFixed) {
 TEST_F(StragglersTest, ShortChunksHaveTheFloorAndLongWaysTheirRoundTrip) {
   Dispatch dispatch(options_);
   dispatch.Join(1, 0);
-  dispatch.Begin({{64, 8}}, At(0s));
+  dispatch.Begin({{1, 8}}, At(0s));
   Settle(&dispatch, dispatch.Assign(At(0s)).at(0), At(1ms));
   dispatch.End();
-  dispatch.Begin({{64, 8}}, At(1s));
+  dispatch.Begin({{8, 8}}, At(1s));
   ASSERT_EQ(dispatch.Assign(At(1s)).size(), 1u);
   dispatch.Join(2, 0);
   EXPECT_EQ(dispatch.NextDeadline(), At(1s + options_.straggler_floor));
 
-  Dispatch far(options_);  // one query takes as long as 64: it is the way
+  Dispatch far(options_);  // one query takes as long as two: it is the way
   far.Join(1, 0);
-  far.Begin({{64, 8}}, At(0s));
+  far.Begin({{3, 8}}, At(0s));
   Settle(&far, far.Assign(At(0s)).at(0), At(400ms));
+  Settle(&far, far.Assign(At(400ms)).at(0), At(800ms));
   far.End();
   far.Begin({{1, 8}}, At(1s));
   ASSERT_EQ(far.Assign(At(1s)).size(), 1u);
   far.Join(2, 0);
-  EXPECT_EQ(far.NextDeadline(), At(2200ms));
+  EXPECT_GT(far.NextDeadline(), At(2s));
+  EXPECT_LE(far.NextDeadline(), At(2200ms));
 }
 
 TEST_F(StragglersTest, NobodyIsGivenMoreThanItWishesFor) {
   Dispatch dispatch(options_);
   dispatch.Join(1, 0);
-  dispatch.Begin({{10, 8}}, At(0s));
-  ASSERT_EQ(dispatch.Assign(At(0s)).size(), 1u);
-  dispatch.Join(2, 9);
+  dispatch.Begin({{1, 8}}, At(0s));
+  Settle(&dispatch, dispatch.Assign(At(0s)).at(0), At(1ms));
+  dispatch.End();
+  dispatch.Begin({{8, 8}}, At(1s));
+  ASSERT_EQ(dispatch.Assign(At(1s)).at(0).count, 8);
+  dispatch.Join(2, 7);
   EXPECT_TRUE(dispatch.Assign(At(50s)).empty());
-  EXPECT_EQ(dispatch.NextDeadline(), At(100s)) << "or the caller would spin";
+  EXPECT_EQ(dispatch.NextDeadline(), At(101s)) << "or the caller would spin";
 }
 
 TEST_F(StragglersTest, AFewQueriesAreAskedOfTwo) {
@@ -223,7 +228,7 @@ TEST_F(StragglersTest, ACheckComesBeforeTheFirstChunkAndNotToOneAlone) {
   options_.check_share = 0.01;
   Dispatch dispatch(options_);
   dispatch.Join(1, 0);
-  dispatch.Begin({{16, 8}}, At(0s));
+  dispatch.Begin({{1, 8}}, At(0s));
   auto leases = dispatch.Assign(At(0s));
   ASSERT_EQ(leases.size(), 1u);
   EXPECT_FALSE(leases[0].check);
@@ -231,7 +236,7 @@ TEST_F(StragglersTest, ACheckComesBeforeTheFirstChunkAndNotToOneAlone) {
   dispatch.End();
 
   dispatch.Join(2, 0);
-  dispatch.Begin({{32, 8}}, At(2s));
+  dispatch.Begin({{9, 8}}, At(2s));
   leases = dispatch.Assign(At(2s));
   ASSERT_EQ(leases.size(), 3u);
   EXPECT_FALSE(leases[0].check);
@@ -304,7 +309,7 @@ TEST_F(StragglersTest, HoweverWorkersBehaveEveryQueryCountsOnce) {
     for (const int times : counted) ASSERT_EQ(times, 1) << "round " << round;
     dispatch.End();
   }
-  EXPECT_GT(backups, 100u);
+  EXPECT_GT(backups, 50u);
   EXPECT_GT(seconds, 100u);
 }
 
