@@ -5,8 +5,8 @@
     oracle-worker --make torus --epsilon 0.05 --server HOST:7717    declare one, and wait for it
 
 Whoever declares a mesh labels it with the manifold's name, or with MODULE:OBJECT; every worker of
-that label then joins it, whenever it comes. Workers hold no state: any number may run, start and stop
-at any time.
+that label then joins it, whenever it comes. Workers hold no state: any number may run, start and
+stop at any time.
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ class Gate:
         self._folder = tempfile.TemporaryDirectory(prefix="gate-")
         self.folder = self._folder.name
         (pathlib.Path(self.folder) / "shut").touch()
-        os.environ["GATE"] = self.folder  # for the processes of engines that are started from here on
+        os.environ["GATE"] = self.folder  # for an engine's processes that are started later
 
     def held(self) -> int:
         """A process that waits at the gate, with questions leased to it."""

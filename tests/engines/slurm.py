@@ -64,8 +64,13 @@ class Slurm:
                 folder=self.folder, host=self.host, ports=_free_ports(2), user=getpass.getuser()
             )
         )
-        self.settings = {"SLURM_CONF": str(configuration)}  # for the environment of its commands
+        self._configuration = str(configuration)
         self._daemons: list[subprocess.Popen[bytes]] = []
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """For Slurm's commands, and what they start."""
+        return {**os.environ, "SLURM_CONF": self._configuration}
 
     def __enter__(self) -> Slurm:
         try:
@@ -96,25 +101,25 @@ class Slurm:
         with open(self.folder / f"{program}.out", "wb") as output:
             self._daemons.append(
                 subprocess.Popen(
-                    [path, *arguments], env={**os.environ, **self.settings}, stdout=output, stderr=output
+                    [path, *arguments], env=self.environment, stdout=output, stderr=output
                 )
             )
 
     def run(self, *command: str, **more: Any) -> str:
         """What a command of Slurm's prints. Raises CalledProcessError."""
         done = subprocess.run(
-            command, env={**os.environ, **self.settings}, check=True, capture_output=True, text=True, **more
+            command, env=self.environment, check=True, capture_output=True, text=True, **more
         )
         return done.stdout
 
     def works(self, *command: str) -> bool:
-        done = subprocess.run(command, env={**os.environ, **self.settings}, capture_output=True, text=True)
+        done = subprocess.run(command, env=self.environment, capture_output=True, text=True)
         return done.returncode == 0 and "DOWN" not in done.stdout
 
     def __exit__(self, *_: object) -> None:
         if len(self._daemons) == 3:
             subprocess.run(
-                ["scancel", f"--user={getpass.getuser()}"], env={**os.environ, **self.settings}, capture_output=True
+                ["scancel", f"--user={getpass.getuser()}"], env=self.environment, capture_output=True
             )
         for daemon in reversed(self._daemons):
             daemon.terminate()

@@ -21,7 +21,7 @@ def test_srun(slurm):
     with gated.Gate() as gate, gated.declared(gate) as (client, name, undisturbed):
         with subprocess.Popen(
             ["srun", "-n", "3", *gated.pilot(client, name)],
-            env={**os.environ, **slurm.settings}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            env=slurm.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         ) as job:  # fmt: skip
             os.kill(gate.held(), signal.SIGKILL)
             gate.open()

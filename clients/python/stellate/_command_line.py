@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import concurrent.futures as futures
+import contextlib
 import importlib
 import multiprocessing
 import os
@@ -45,28 +46,30 @@ _OURS_TO_MEND = (
 )  # fmt: skip
 _LABEL_BYTES = 128
 
-_RUN: list[tuple[str, type, str]] = [
-    ("random-seed", int, "seed of everything random"),
-    ("workers", int, "threads that call the oracle, where it says thread_safe = True"),
-    ("max-vertices", int, "stop there"),
-    ("max-rounds", int, "stop after so many round trips"),
-    ("max-batch-queries", int, "ask larger rounds in several batches"),
-    ("box-seeds", int, "points of the box tried as seeds"),
-    ("worker-wait-seconds", float, "how long the mesh waits for a worker"),
-    ("answer-seconds", float, "how long a worker may take for a chunk of questions"),
+# The flags of the program `stellate`, and those that only one's own oracle needs; the keywords of
+# stellate.mesh; their types.
+_RUN: list[tuple[str, str, type, str]] = [
+    ("--seed", "random_seed", int, "seed of everything random"),
+    ("--workers", "workers", int, "threads that call the oracle, if it has thread_safe = True"),
+    ("--max-vertices", "max_vertices", int, "stop there"),
+    ("--max-rounds", "max_rounds", int, "stop after so many round trips"),
+    ("--max-batch-queries", "max_batch_queries", int, "ask larger rounds in several batches"),
+    ("--box-seeds", "box_seeds", int, "points of the box tried as seeds"),
+    ("--worker-wait", "worker_wait_seconds", float, "seconds that the mesh waits for a worker"),
+    ("--answer", "answer_seconds", float, "seconds that a worker may take for a chunk"),
 ]
-_CRITERIA: list[tuple[str, type, str]] = [
-    ("radius-edge-bound", float, "rho0 of rule R2"),
-    ("sliver-bound", float, "Theta0 of rule R3, 0: off"),
-    ("picking-radius", float, "delta of the picking region"),
-    ("small-sliver-radius", float, "beta: which slivers count against a candidate"),
-    ("candidates", int, "tried in a picking region"),
-    ("advance-step", float, "h: the front's step, a length"),
-    ("flat-alternations", int, "closest points towards a flat, without intersections"),
-    ("ask-ahead", bool, "refine a guess first: fewer round trips, more processor time"),
-    ("size-rate", float, "R_p at most this share of the local size"),
-    ("max-deviation", float, "circumcentres at most so far from the manifold, a length"),
-    ("common-centre", bool, "judge a simplex at one centre for all its vertices"),
+_CRITERIA: list[tuple[str, str, type, str]] = [
+    ("--radius-edge", "radius_edge_bound", float, "rho0 of rule R2"),
+    ("--sliver", "sliver_bound", float, "Theta0 of rule R3, 0: off"),
+    ("--picking-radius", "picking_radius", float, "delta of the picking region"),
+    ("--small-sliver-radius", "small_sliver_radius", float, "beta: which slivers count"),
+    ("--candidates", "candidates", int, "tried in a picking region"),
+    ("--advance-step", "advance_step", float, "h: the front's step, a length"),
+    ("--flat-alternations", "flat_alternations", int, "closest points towards a flat"),
+    ("--ask-ahead", "ask_ahead", bool, "refine a guess first: fewer round trips, more work"),
+    ("--size-rate", "size_rate", float, "R_p at most this share of the local size"),
+    ("--max-deviation", "max_deviation", float, "circumcentres so far off at most, a length"),
+    ("--common-centre", "common_centre", bool, "judge a simplex at one centre"),
 ]
 
 
@@ -129,9 +132,14 @@ def credentials_of(options: argparse.Namespace) -> Credentials | None:
 
 
 def _settings(options: argparse.Namespace) -> dict[str, Any]:
-    names = [flag.replace("-", "_") for flag, _, _ in (*_RUN, *_CRITERIA)]
-    given = {name: getattr(options, name, None) for name in names}
+    given = {name: getattr(options, name) for _, name, _, _ in (*_RUN, *_CRITERIA)}
     return {name: value for name, value in given.items() if value is not None}
+
+
+def _connected(options: argparse.Namespace) -> Client:
+    return Client(
+        options.server, credentials_of(options), reconnect_seconds=options.reconnect
+    )
 
 
 def _bar(options: argparse.Namespace) -> Any:
@@ -153,12 +161,14 @@ def _deliver(finished: Mesh, options: argparse.Namespace) -> int:
 def _mesh(options: argparse.Namespace) -> int:
     oracle, settings = load(options.oracle), _settings(options)
     label = f"stellate {options.oracle}".encode()[:_LABEL_BYTES].decode(errors="ignore")
-    credentials = credentials_of(options)
     try:
-        finished = mesh(
-            oracle, options.epsilon, options.server, _bar(options), credentials,
-            save=options.output, label=label, checkpoint=options.checkpoint, **settings,
-        )  # fmt: skip
+        with contextlib.ExitStack() as stack:
+            finished = mesh(
+                oracle, options.epsilon,
+                None if options.server is None else stack.enter_context(_connected(options)),
+                _bar(options), save=options.output, label=label, checkpoint=options.checkpoint,
+                **settings,
+            )  # fmt: skip
     except Interrupted as stopped:
         if stopped.mesh is None:
             raise
@@ -172,14 +182,14 @@ def _mesh(options: argparse.Namespace) -> int:
 def _declare(options: argparse.Namespace) -> int:
     oracle, settings = load(options.oracle), _settings(options)
     label = options.label or options.oracle
-    with Client(options.server, credentials_of(options)) as client:
+    with _connected(options) as client:
         print(client.create(oracle, options.epsilon, label=label, **settings).name)
     return _WELL
 
 
 def _serve(options: argparse.Namespace) -> int:
     oracle = load(options.oracle)
-    with Client(options.server, credentials_of(options)) as client:
+    with _connected(options) as client:
         if options.processes is None:
             state = client.serve(oracle, options.mesh, worker=options.worker)
         else:
@@ -196,7 +206,7 @@ def _serve(options: argparse.Namespace) -> int:
 def _download(options: argparse.Namespace) -> int:
     unfinished = "wait" if options.wait else "take" if options.unfinished else "refuse"
     first, *others = options.output
-    with Client(options.server, credentials_of(options)) as client:
+    with _connected(options) as client:
         info = client.get(options.mesh)
         for path in others:
             check_save(path, info.dimension, info.ambient_dimension)
@@ -225,16 +235,17 @@ def _epsilon(text: str) -> float | str:
 def _add_settings(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "-e", "--epsilon", type=_epsilon, required=True,
-        help="largest circumradius of a simplex, a length; or auto: a quarter of the reach that the "
-        "doctor finds",
+        help="largest circumradius of a simplex, a length; or auto: a quarter of the reach that "
+        "the doctor finds",
     )  # fmt: skip
     criteria = command.add_argument_group("criteria", "absent: the server's defaults")
     for to, settings in ((command, _RUN), (criteria, _CRITERIA)):
-        for flag, kind, words in settings:
+        for flag, name, kind, words in settings:
             if kind is bool:
-                to.add_argument(f"--{flag}", action=argparse.BooleanOptionalAction, help=words)
+                both = argparse.BooleanOptionalAction
+                to.add_argument(flag, dest=name, action=both, help=words)
             else:
-                to.add_argument(f"--{flag}", type=kind, metavar="N", help=words)
+                to.add_argument(flag, dest=name, type=kind, metavar="N", help=words)
 
 
 def _add_results(command: argparse.ArgumentParser, required: bool) -> None:
@@ -245,6 +256,14 @@ def _add_results(command: argparse.ArgumentParser, required: bool) -> None:
     command.add_argument("--report", metavar="FILE", help="for the report as JSON")
     command.add_argument("--json", action="store_true", help="print the report as JSON")
     command.add_argument("-q", "--quiet", action="store_true", help="no progress, no report")
+
+
+def _add_connection(command: argparse.ArgumentParser, default: str | None) -> None:
+    add_server(command, default)
+    command.add_argument(
+        "--reconnect", type=float, default=180.0, metavar="SECONDS",
+        help="that a server which went away is waited for; default: 180",
+    )  # fmt: skip
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -272,20 +291,20 @@ def _parser() -> argparse.ArgumentParser:
         help="in which the mesh outlives this program: the same command goes on with it",
     )  # fmt: skip
     _add_results(one, required=False)
-    add_server(one, None)
+    _add_connection(one, None)
 
     one = add("declare", _declare, "declare a mesh, for others to serve, and print its name")
     add_oracle(one)
     _add_settings(one)
     one.add_argument("--label", help="that lists show; default: MODULE:OBJECT")
-    add_server(one, "127.0.0.1:7717")
+    _add_connection(one, "127.0.0.1:7717")
 
     one = add("serve", _serve, "answer a mesh's questions until it is over, beside other workers")
     add_oracle(one)
     one.add_argument("mesh", help="its whole name: meshes/ and 32 digits")
     one.add_argument("--processes", type=int, metavar="N", help="of this machine, that answer")
     one.add_argument("--worker", default="", help="what the server's log calls this one")
-    add_server(one, "127.0.0.1:7717")
+    _add_connection(one, "127.0.0.1:7717")
 
     one = add("download", _download, "fetch a mesh that is on a server")
     one.add_argument("mesh", help="its whole name: meshes/ and 32 digits")
@@ -294,7 +313,7 @@ def _parser() -> argparse.ArgumentParser:
     how.add_argument("--wait", action="store_true", help="for the end of a mesh that is not over")
     how.add_argument("--unfinished", action="store_true", help="as it is, over or failed or not")
     how.add_argument("--revision", type=int, default=0, metavar="N", help="0: the newest")
-    add_server(one, "127.0.0.1:7717")
+    _add_connection(one, "127.0.0.1:7717")
 
     one = add("doctor", _doctor, "probe an oracle for its contract")
     add_oracle(one)

@@ -143,9 +143,9 @@ class ExecutorWorkers:
         self._pool = _Pool(executor)
         self._workers = [
             client.worker(
-                self._checked, mesh_name, f"{worker}-{i + 1}", self._note, quiet=i > 0, ask=self._ask
+                self._checked, mesh_name, f"{worker}-{i}", self._note, quiet=i > 1, ask=self._ask
             )
-            for i in range(int(slots))
+            for i in range(1, int(slots) + 1)
         ]
         self._left = len(self._workers)
         self._threads = [

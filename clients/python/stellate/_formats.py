@@ -25,8 +25,8 @@ _DEBIAN = {"meshio": "python3-meshio", "h5py": "python3-h5py", "netCDF4": "pytho
 def check_save(path: str | os.PathLike[str], dimension: int, ambient_dimension: int) -> None:
     """What Mesh.save would refuse of any k-mesh in R^d, asked before there is a mesh to lose.
 
-    Raises: SaveError when the format that the ending says cannot hold such a mesh, or wants a package
-      that is not installed; OSError when the folder is not there or cannot be written to.
+    Raises: SaveError when the format that the ending says cannot hold such a mesh, or wants a
+      package that is not installed; OSError when the folder is not there or cannot be written to.
     """
     path = os.fspath(path)
     _choose(path, dimension, ambient_dimension)
@@ -81,8 +81,8 @@ def _choose(path: str, k: int, d: int) -> _Format:
     if not form.takes(k, d):
         fits = form.least_dimension <= k <= form.largest_dimension
         raise SaveError(
-            f"{ending} holds {'points of space' if fits else form.holds}, and {path} would get a mesh "
-            f"of dimension {k} in R^{d}; known for it: {known}"
+            f"{ending} holds {'points of space' if fits else form.holds}, and {path} would get a "
+            f"mesh of dimension {k} in R^{d}; known for it: {known}"
         )
     needed = [] if form.meshio is None else ["meshio", form.meshio.package]
     for package in filter(None, needed):
@@ -202,8 +202,8 @@ def _stl(mesh: Mesh) -> bytes:
     for i, j in ((0, 1), (1, 2), (2, 0)):
         if (ends[:, i] == ends[:, j]).all(axis=1).any():
             raise SaveError(
-                "STL has single precision, in which vertices of this mesh fall together: save it as "
-                ".ply, or move it nearer to the origin"
+                "STL has single precision, in which vertices of this mesh fall together: save it "
+                "as .ply, or move it nearer to the origin"
             )
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)

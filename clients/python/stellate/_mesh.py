@@ -70,8 +70,8 @@ class Mesh:
         .stl  surfaces of space, binary, in single precision as the format has it.
         .msh  k <= 3, d <= 3: Gmsh's, version 2.2.
         .vtu  k <= 3. When d > 3 the points are the first three coordinates, and all of them are the
-              point data "coordinates". Its field data are "epsilon", "certified" (0 or 1), "verdict"
-              and "version" (UTF-8 bytes).
+              point data "coordinates". Its field data are "epsilon", "certified" (0 or 1),
+              "verdict" and "version" (UTF-8 bytes).
         .vtk, as .vtu, and .avs .bdf .cgns .dat .dato .e .exo .f3grid .fem .h5m .hmf .inp .mdpa .med
         .mesh .meshb .nas .post .su2 .tec .vol .xdmf .xmf .xml, d <= 3, by meshio.
 

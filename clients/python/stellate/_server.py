@@ -93,8 +93,8 @@ class Server:
           token_file: lines "OWNER TOKEN"; clients must send one of the tokens.
           tls_cert, tls_key: PEM files; the certificate has to bear the name in `address`.
           tls_client_ca: PEM file; clients must show a certificate of these authorities.
-          insecure_listen: take plain text from other machines, whoever they are: for a network where
-            everybody who can connect may. Without it, and without TLS, such a `listen` is refused.
+          insecure_listen: take plain text from other machines, whoever they are: for a network
+            where everybody who can connect may. Without it, and without TLS, such a `listen` is refused.
 
         Raises: ServerNotFound; Unavailable with the server's words if it does not start.
         """

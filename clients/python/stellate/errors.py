@@ -228,13 +228,13 @@ def _advice(code: grpc.StatusCode, message: str) -> str:
     said = message.lower().replace("_", " ")
     if "wrong version number" in said:
         return (
-            "the server speaks plain text: leave tls, ca and certificate out of the Credentials, in "
-            "the shell --tls, --tls-ca and --tls-cert"
+            "the server speaks plain text: leave tls, ca and certificate out of the Credentials, "
+            "in the shell --tls, --tls-ca and --tls-cert"
         )
     if "certificate verify failed" in said:
         return (
-            "the server's certificate is of no authority that is trusted here: Credentials(ca=...), "
-            "in the shell --tls-ca FILE, names one"
+            "the server's certificate is of no authority that is trusted here: "
+            "Credentials(ca=...), in the shell --tls-ca FILE, names one"
         )
     if "failed to connect" in said and ("socket closed" in said or "connection reset" in said):
         return (
