@@ -20,7 +20,7 @@ from gated import until
 
 CONFIGURATION = """\
 ClusterName=stellate
-SlurmctldHost={host}
+SlurmctldHost={host}(127.0.0.1)
 SlurmUser={user}
 SlurmdUser={user}
 AuthType=auth/munge
@@ -42,8 +42,9 @@ SelectType=select/cons_tres
 SelectTypeParameters=CR_CPU
 JobRequeue=1
 ReturnToService=2
+CommunicationParameters=NoCtldInAddrAny,NoInAddrAny
 SchedulerParameters=sched_interval=1,bf_interval=1
-NodeName={host} CPUs=8
+NodeName={host} NodeAddr=127.0.0.1 CPUs=8
 SlurmdParameters=config_overrides
 PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 """
