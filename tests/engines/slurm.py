@@ -6,6 +6,7 @@ that user's.
 
 from __future__ import annotations
 
+import contextlib
 import getpass
 import os
 import pathlib
@@ -41,6 +42,7 @@ SwitchType=switch/none
 SelectType=select/cons_tres
 SelectTypeParameters=CR_CPU
 JobRequeue=1
+KillWait=2
 ReturnToService=2
 CommunicationParameters=NoCtldInAddrAny,NoInAddrAny
 SchedulerParameters=sched_interval=1,bf_interval=1
@@ -119,9 +121,7 @@ class Slurm:
 
     def __exit__(self, *_: object) -> None:
         if len(self._daemons) == 3:
-            subprocess.run(
-                ["scancel", f"--user={getpass.getuser()}"], env=self.environment, capture_output=True
-            )
+            self._end_jobs()
         for daemon in reversed(self._daemons):
             daemon.terminate()
             try:
@@ -130,6 +130,12 @@ class Slurm:
                 daemon.kill()
                 daemon.wait()
         shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _end_jobs(self) -> None:
+        """Before the daemons go: what a job leaves behind would wait for them for ever."""
+        with contextlib.suppress(subprocess.CalledProcessError, AssertionError):
+            self.run("scancel", f"--user={getpass.getuser()}")
+            until(lambda: not self.run("squeue", "-h"), "jobs do not end")
 
     def _last_words(self) -> str:
         files = [*self.folder.glob("*.out"), *self.folder.glob("*.log")]
