@@ -114,4 +114,8 @@ std::size_t ChunkBytes(const Config& config) {
   return std::min(std::uint64_t{1} << 20, config.max_message_bytes / 2);
 }
 
+std::size_t PartBytes(const Config& config) {
+  return std::min(std::size_t{1} << 17, ChunkBytes(config));
+}
+
 }  // namespace stellate::server

@@ -87,5 +87,7 @@ Config WithDefaults(Config config);
 
 // Arrays travel in chunks of about this size.
 std::size_t ChunkBytes(const Config& config);
+// Of a mesh that is sent to whoever may read it slowly, or not at all: a part.
+std::size_t PartBytes(const Config& config);
 
 }  // namespace stellate::server

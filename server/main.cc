@@ -7,6 +7,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <memory>
+#include <system_error>
+#include <utility>
 
 #include "core/message.h"
 #include "server/flags.h"
@@ -14,6 +17,7 @@
 #include "server/library_log.h"
 #include "server/log.h"
 #include "server/server.h"
+#include "server/threads.h"
 #include "server/tls.h"
 
 namespace {
@@ -23,13 +27,14 @@ using namespace stellate::server;  // NOLINT: this file is the program
 constexpr int kExitUsage = 2;
 constexpr auto kHealthLimit = std::chrono::seconds(5);
 
-// SIGHUP has something to say only where there is a token file; elsewhere it ends the process.
+// SIGHUP has something to say only where there are files to read again; elsewhere it ends the
+// process.
 sigset_t Signals(const Config& config) {
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
-  if (!config.token_file.empty()) sigaddset(&signals, SIGHUP);
+  if (!config.token_file.empty() || !config.tls_certificate.empty()) sigaddset(&signals, SIGHUP);
   return signals;
 }
 
@@ -63,12 +68,26 @@ bool WriteReadyFile(const std::string& path, const std::string& address) {
   return file.good() && std::rename(draft.c_str(), path.c_str()) == 0;
 }
 
+stellate::core::Expected<std::unique_ptr<Server>> StartServer(const Config& config) {
+  auto threads = CheckThreads(LeastThreads());
+  if (!threads.ok()) return tl::unexpected(std::move(threads));
+  try {
+    return Server::Start(config);
+  } catch (const std::system_error& error) {  // each recorded mesh that goes on needs a thread
+    return stellate::core::Refuse(
+        stellate::core::StatusCode::kFailedPrecondition,
+        stellate::core::Message("the system refuses a thread or a file: ", error.what(),
+                                ": raise the limits of this process (ulimit -u, ulimit -n, the "
+                                "pids of its control group)"));
+  }
+}
+
 // Returns when it is time to stop. True: at once, as nobody is left to wait for.
 bool ServeUntilTold(Server* server, const sigset_t& signals, bool with_parent, pid_t parent) {
   while (true) {
     const int signal = WaitForSignal(signals, 250);
     if (signal == SIGHUP) {
-      server->ReloadTokens();
+      server->ReloadFiles();
     } else if (signal != 0) {
       Log(LogLevel::kInfo, {}, "stopping", stellate::server::LogFields().Add("signal", signal));
       return false;
@@ -97,7 +116,7 @@ int main(int argc, char** argv) {
   StartLogging(config.log_level, config.log_format);
   stellate::server::TakeLibraryLogs();
 
-  auto server = Server::Start(config);
+  auto server = StartServer(config);
   if (!server) return Fail(server.error().message, kExitUsage);
   const std::string& address = (*server)->address();
   std::printf("stellated listening on %s\n", address.c_str());

@@ -18,6 +18,13 @@ using core::Message;
 constexpr std::uint64_t kStarBytes[] = {0, 700, 1500, 5500, 25'000, 150'000};
 static_assert(std::size(kStarBytes) == core::kMaxDimension + 1);
 constexpr std::uint64_t kEmptyMeshBytes = std::uint64_t{1} << 16;  // one with nothing in it
+constexpr std::uint64_t kFinishedBytes = std::uint64_t{1} << 14;   // beside history and seeds
+constexpr std::uint64_t kCallBytes = std::uint64_t{1} << 15;       // that sends nothing
+constexpr std::uint64_t kLeastOfStreams = std::uint64_t{4} << 20;
+
+std::uint64_t SeedBytes(const core::Specification& spec) {
+  return static_cast<std::uint64_t>(spec.seeds.size()) * sizeof(double);
+}
 
 std::uint64_t PageBytes() { return static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)); }
 
@@ -29,10 +36,18 @@ std::uint64_t EstimateMeshBytes(const core::Specification& spec, std::uint64_t v
   const auto k = static_cast<std::uint64_t>(std::clamp(spec.dimension, 1, core::kMaxDimension));
   // A point and its tangent basis: in the sample, its search tree, and the history.
   const std::uint64_t coordinates = 4 * sizeof(double) * d * (k + 1);
-  const auto seeds = static_cast<std::uint64_t>(spec.seeds.size()) * sizeof(double);
+  const std::uint64_t seeds = 3 * SeedBytes(spec);  // the mesh's, its pool's, the mesher's
   // Questions and answers with their bases, here and as the mesher has them.
   const std::uint64_t message = 4 * sizeof(double) * d * (k + 1);
   return kEmptyMeshBytes + seeds + vertices * (coordinates + kStarBytes[k]) + queries * message;
+}
+
+std::uint64_t EstimateFinishedBytes(const core::Specification& spec) {
+  return kFinishedBytes + 2 * SeedBytes(spec);
+}
+
+std::uint64_t EstimateStreamBytes(const core::Specification& spec, std::uint64_t part) {
+  return kCallBytes + 2 * std::max(part, SeedBytes(spec));
 }
 
 std::uint64_t MachineBytes() {
@@ -51,6 +66,36 @@ std::unique_ptr<MemoryBudget::Account> MemoryBudget::Open(std::shared_ptr<Memory
   return std::unique_ptr<Account>(new Account(std::move(budget), std::move(owner)));
 }
 
+// Of a limit that is set.
+std::uint64_t MemoryBudget::Share(std::uint64_t limit) const {
+  return what_ == Of::kMeshes ? limit : std::max(limit / 8, kLeastOfStreams);
+}
+
+// Whether sums of so many bytes are within the limits, `bytes` of them this account's.
+std::optional<Refused> MemoryBudget::Check(const std::string& owner, std::uint64_t bytes,
+                                           std::uint64_t total, std::uint64_t owned) const {
+  const bool meshes = what_ == Of::kMeshes;
+  const auto refuse = [&](const char* setting, const char* scope, std::uint64_t limit,
+                          const std::string& whose, std::uint64_t sum, const char* whom) {
+    return Refused(
+        {setting, Message(limit), scope},
+        Message(whose, meshes ? " meshes" : " watchers, downloads and workers",
+                " would hold about ", sum, " bytes, this one ", bytes, " of them, but the server allows ", whom,
+                Share(limit), meshes ? "" : Message(", a part of --", setting), ": ",
+                meshes ? "delete meshes that are no longer needed, ask for a larger epsilon or "
+                         "fewer vertices"
+                       : "end those that are not needed",
+                ", or raise --", setting));
+  };
+  if (limits_.server > 0 && total > Share(limits_.server)) {
+    return refuse("max-memory-bytes", "server", limits_.server, "the server's", total, "");
+  }
+  if (limits_.owner > 0 && !owner.empty() && owned > Share(limits_.owner)) {
+    return refuse("owner-memory-bytes", "owner", limits_.owner, "your", owned, "each owner ");
+  }
+  return std::nullopt;
+}
+
 std::optional<Refused> MemoryBudget::Set(Account* account, std::uint64_t bytes, bool insist) {
   const std::lock_guard lock(mutex_);
   const std::uint64_t old = account->bytes_;
@@ -58,21 +103,7 @@ std::optional<Refused> MemoryBudget::Set(Account* account, std::uint64_t bytes, 
   const std::uint64_t total = total_ - old + bytes;
   const std::uint64_t owned = owners - old + bytes;
   if (bytes > old && !insist) {
-    constexpr char kAdvice[] =
-        "delete meshes that are no longer needed, ask for a larger epsilon or fewer vertices, or "
-        "raise --";
-    if (limits_.server > 0 && total > limits_.server) {
-      return Refused({"max-memory-bytes", Message(limits_.server), "server"},
-                     Message("the server's meshes would hold about ", total, " bytes, this one ",
-                             bytes, " of them, but the server allows ", limits_.server, ": ",
-                             kAdvice, "max-memory-bytes"));
-    }
-    if (limits_.owner > 0 && !account->owner_.empty() && owned > limits_.owner) {
-      return Refused({"owner-memory-bytes", Message(limits_.owner), "owner"},
-                     Message("your meshes would hold about ", owned, " bytes, this one ", bytes,
-                             " of them, but the server allows each owner ", limits_.owner, ": ",
-                             kAdvice, "owner-memory-bytes"));
-    }
+    if (auto refused = Check(account->owner_, bytes, total, owned)) return refused;
   }
   total_ = total;
   owners = owned;

@@ -18,6 +18,13 @@ namespace stellate::server {
 std::uint64_t EstimateMeshBytes(const core::Specification& spec, std::uint64_t vertices,
                                 std::uint64_t queries);
 
+// What one of no more rounds holds beside its history: itself, and its seeds.
+std::uint64_t EstimateFinishedBytes(const core::Specification& spec);
+
+// What an open call on a mesh holds while its client reads nothing: itself, and a message of `part`
+// bytes, or one that repeats the specification, as it is and as it is sent.
+std::uint64_t EstimateStreamBytes(const core::Specification& spec, std::uint64_t part);
+
 // Bytes of memory that this process may have: the machine's, or what a control group allows if
 // that is less.
 std::uint64_t MachineBytes();
@@ -32,16 +39,19 @@ class MemoryBudget {
     std::uint64_t server = 0;
     std::uint64_t owner = 0;
   };
-  explicit MemoryBudget(Limits limits) : limits_(limits) {}
+  // Open calls have a budget of their own, an eighth of the limits (and 4 MiB at least), so that
+  // finished meshes that fill the budget of meshes can still be read.
+  enum class Of { kMeshes, kStreams };
+  explicit MemoryBudget(Limits limits, Of what = Of::kMeshes) : limits_(limits), what_(what) {}
 
-  // One mesh's part, given back when this goes. Holds no more than it was last set to.
+  // One mesh's or call's part, given back when this goes. Holds no more than it was last set to.
   class Account {
    public:
     ~Account() { budget_->Release(this); }
     Account(const Account&) = delete;
     Account& operator=(const Account&) = delete;
 
-    // What the mesh is estimated to hold now. kLimitExceeded, with the old value kept, if it grew
+    // What it is estimated to hold now. kLimitExceeded, with the old value kept, if it grew
     // and the budget does not allow it; one that shrinks is always allowed.
     std::optional<Refused> Set(std::uint64_t bytes) { return budget_->Set(this, bytes, false); }
     // For a mesh that is there already, from an earlier server.
@@ -58,17 +68,21 @@ class MemoryBudget {
     std::uint64_t bytes_ = 0;  // the budget's lock guards it
   };
 
-  // For a new mesh of `owner`, with nothing in it.
+  // For a new mesh or call of `owner`, with nothing in it.
   static std::unique_ptr<Account> Open(std::shared_ptr<MemoryBudget> budget, std::string owner);
 
   std::uint64_t total() const;
 
  private:
   std::optional<Refused> Set(Account* account, std::uint64_t bytes, bool insist);
+  std::optional<Refused> Check(const std::string& owner, std::uint64_t bytes, std::uint64_t total,
+                               std::uint64_t owned) const;
+  std::uint64_t Share(std::uint64_t limit) const;
   void Release(Account* account);
   std::uint64_t BytesOf(const Account* account) const;
 
   const Limits limits_;
+  const Of what_;
   mutable std::mutex mutex_;
   std::uint64_t total_ = 0;
   std::map<std::string, std::uint64_t> by_owner_;

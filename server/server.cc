@@ -249,6 +249,7 @@ class Server::Impl {
       std::unique_lock lock(tick_mutex);
       while (!tick_wake.wait_for(lock, stop, kTick, [&stop] { return stop.stop_requested(); })) {
         const TimePoint now = Clock::now();
+        tls->Reload();
         service.authenticator->Reload();  // before the streams ask it
         service.streams.Tick(now);
         service.store.Sweep(now);
@@ -271,6 +272,7 @@ class Server::Impl {
 
   ServerState service;
   Rpcs rpcs;
+  std::unique_ptr<TlsFiles> tls;
   std::unique_ptr<grpc::Server> server;
   std::unique_ptr<ConnectionGuard> guard;  // TCP alone, as the next
   std::unique_ptr<Listener> listener;
@@ -306,11 +308,12 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   });
 
-  auto credentials = ListenCredentials(config);
-  if (!credentials) return tl::unexpected(std::move(credentials.error()));
+  auto tls = TlsFiles::Open(config);
+  if (!tls) return tl::unexpected(std::move(tls.error()));
   auto authenticator = Authenticator::Create(config);
   if (!authenticator) return tl::unexpected(std::move(authenticator.error()));
   auto impl = std::make_unique<Impl>(WithDefaults(config), std::move(factory));
+  impl->tls = std::move(*tls);
   impl->service.authenticator = std::move(*authenticator);
   status = impl->OpenJournal();
   if (!status.ok()) return tl::unexpected(std::move(status));
@@ -318,7 +321,7 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
   if (!status.ok()) return tl::unexpected(std::move(status));
   grpc::ServerBuilder builder;
   SetUp(config, &builder);
-  status = impl->Listen(&address, std::move(*credentials), &builder);
+  status = impl->Listen(&address, impl->tls->Credentials(), &builder);
   if (!status.ok()) return tl::unexpected(std::move(status));
   for (const char* name : {v1::Stellate::service_full_name(), kAlive}) {
     impl->server->GetHealthCheckService()->SetServingStatus(name, true);
@@ -329,7 +332,10 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
 
 int Server::metrics_port() const { return impl_->service.metrics.port(); }
 
-void Server::ReloadTokens() { impl_->service.authenticator->Reload(/*force=*/true); }
+void Server::ReloadFiles() {
+  impl_->tls->Reload(/*force=*/true);
+  impl_->service.authenticator->Reload(/*force=*/true);
+}
 
 bool Server::Stop(Clock::duration drain, const std::function<bool()>& hurry) {
   Impl& impl = *impl_;

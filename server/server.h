@@ -28,8 +28,8 @@ class Server {
   // Where Prometheus is answered; 0: nowhere.
   int metrics_port() const;
 
-  // Reads the token file again, as happens by itself within seconds of a change.
-  void ReloadTokens();
+  // Reads the token file, and those of TLS, again, as happens by itself within seconds of a change.
+  void ReloadFiles();
 
   // Stops: no new meshes, then up to `drain` for running ones to end, as long as any of them has a
   // worker; then the rest is suspended, where there is a journal, or cancelled, and every stream

@@ -110,7 +110,9 @@ void Session::Run() {
   // The allocator would keep the memory of each mesh's own thread. A server that stops has it back
   // sooner by leaving.
   if (!stopping_) malloc_trim(0);
-  if (options_.memory != nullptr) options_.memory->Insist(history_.MemoryBytes());
+  if (options_.memory != nullptr) {
+    options_.memory->Insist(EstimateFinishedBytes(options_.spec) + history_.MemoryBytes());
+  }
   over_ = true;
 }
 

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/message.h"
+#include "server/file_stamp.h"
 #include "server/log.h"
 
 namespace stellate::server {
@@ -34,14 +35,6 @@ bool IsTokenCharacter(unsigned char c) { return c > ' ' && c < 0x7f; }
 
 tl::unexpected<core::Status> BadLine(std::size_t number, const std::string& rule) {
   return core::Refuse(StatusCode::kInvalidArgument, Message("line ", number, " ", rule));
-}
-
-// Changes with every way of replacing a file: in place, by renaming, by a symbolic link.
-std::string StampOf(const std::string& path) {
-  struct stat info {};
-  if (stat(path.c_str(), &info) != 0) return "";
-  return Message(info.st_dev, ".", info.st_ino, ".", info.st_size, ".", info.st_mtim.tv_sec, ".",
-                 info.st_mtim.tv_nsec, ".", info.st_ctim.tv_sec, ".", info.st_ctim.tv_nsec);
 }
 
 core::Expected<TokenTable> Read(const std::string& path) {
@@ -126,7 +119,7 @@ std::optional<std::string> TokenTable::OwnerOf(const TokenDigest& digest) const 
 
 core::Expected<std::unique_ptr<TokenFile>> TokenFile::Open(const std::string& path) {
   std::unique_ptr<TokenFile> file(new TokenFile(path));
-  file->stamp_ = StampOf(path);  // before reading: a change in between is found by Reload
+  file->stamp_ = FileStamp(path);  // before reading: a change in between is found by Reload
   auto table = Read(path);
   if (!table) {
     return core::Refuse(StatusCode::kInvalidArgument,
@@ -147,7 +140,7 @@ std::optional<std::string> TokenFile::OwnerOf(const TokenDigest& digest) const {
 }
 
 void TokenFile::Reload(bool force) {
-  std::string stamp = StampOf(path_);
+  std::string stamp = FileStamp(path_);
   {
     const std::lock_guard lock(mutex_);
     if (stamp == stamp_ && !force) return;

@@ -98,6 +98,7 @@ Status WatchLog::Append(const core::MeshDelta& delta) {
   for (std::size_t i = 0; i < new_simplices; ++i) {
     Link(static_cast<std::uint32_t>(first_simplex + i));
   }
+  appenders_bytes_ = first_of_.capacity() * sizeof(first_of_[0]) + next_.bytes();
   return Status::Ok();
 }
 
@@ -114,10 +115,8 @@ WatchLog::Cursor WatchLog::Begin(std::uint64_t from) const {
 
 std::uint64_t WatchLog::MemoryBytes() const {
   const std::lock_guard lock(mutex_);
-  const std::uint64_t of_vertex = d_ * sizeof(double) + sizeof(std::uint32_t);
-  const std::uint64_t of_simplex = (row_size_ + 1) * sizeof(std::uint32_t) + sizeof(Life);
-  return points_.size() * of_vertex + rows_.size() * of_simplex +
-         deaths_.size() * sizeof(std::uint32_t) + marks_.size() * sizeof(Mark);
+  return points_.bytes() + rows_.bytes() + lives_.bytes() + deaths_.bytes() +
+         marks_.capacity() * sizeof(Mark) + appenders_bytes_;
 }
 
 WatchLog::Snapshot WatchLog::At(std::uint64_t revision) const {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cstdint>
 #include <memory>
@@ -20,9 +21,13 @@ class GrowingRows {
  public:
   explicit GrowingRows(std::size_t width)
       : width_(width),
-        shift_(std::countr_zero(std::bit_floor(std::max(kBlock / width, std::size_t{1})))) {}
+        shift_(std::countr_zero(
+            std::bit_floor(std::max(kBlockBytes / (width * sizeof(T)), std::size_t{1})))) {}
 
   std::size_t size() const { return size_; }
+  std::size_t bytes() const {  // in memory
+    return blocks_.size() * (RowsOfBlock() * width_ * sizeof(T) + sizeof(blocks_[0]));
+  }
   T* operator[](std::size_t row) { return blocks_[row >> shift_].get() + Offset(row); }
   const T* operator[](std::size_t row) const { return blocks_[row >> shift_].get() + Offset(row); }
   // From `row` on, how many lie in one piece with it.
@@ -44,7 +49,7 @@ class GrowingRows {
   }
 
  private:
-  static constexpr std::size_t kBlock = std::size_t{1} << 14;  // numbers, about
+  static constexpr std::size_t kBlockBytes = std::size_t{1} << 14;  // about
 
   std::size_t RowsOfBlock() const { return std::size_t{1} << shift_; }
   std::size_t Offset(std::size_t row) const { return (row & (RowsOfBlock() - 1)) * width_; }
@@ -79,7 +84,7 @@ class WatchLog {
   core::Status Append(const core::MeshDelta& delta);
 
   std::uint64_t revision() const;
-  std::uint64_t MemoryBytes() const;  // about what it holds
+  std::uint64_t MemoryBytes() const;  // that it holds
 
   // Where a reader stands between two revisions.
   struct Cursor {
@@ -132,6 +137,7 @@ class WatchLog {
   // of any. A list is no longer than a star is large.
   std::vector<std::uint32_t> first_of_;  // by vertex
   GrowingRows<std::uint32_t> next_;      // by simplex
+  std::atomic<std::uint64_t> appenders_bytes_{0};  // of these two, for others to know
 };
 
 }  // namespace stellate::server

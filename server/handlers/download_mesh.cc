@@ -85,8 +85,11 @@ class DownloadStream final : public grpc::ServerWriteReactor<v1::DownloadMeshRes
                                    "that it came with"),
                      "position");
     }
+    auto memory = CountStream(service_, **session, PartBytes(service_.config));
+    if (!memory) return memory.error();
     {
       const std::lock_guard lock(mutex_);
+      memory_ = std::move(*memory);
       revision_ = request.revision() > 0 ? request.revision() : newest;
       position_ = request.position();
       session_ = *session;
@@ -146,7 +149,7 @@ class DownloadStream final : public grpc::ServerWriteReactor<v1::DownloadMeshRes
 
   void TakePart() {
     const core::Specification& spec = session_->options().spec;
-    const DeltaPart part = session_->history().Next(&*cursor_, ChunkBytes(service_.config));
+    const DeltaPart part = session_->history().Next(&*cursor_, PartBytes(service_.config));
     ToProto(part, spec.dimension, spec.ambient_dimension, &response_);
     response_.set_vertices(snapshot_.vertices);
     response_.set_simplices(snapshot_.simplices);
@@ -160,6 +163,7 @@ class DownloadStream final : public grpc::ServerWriteReactor<v1::DownloadMeshRes
   std::mutex mutex_;
   std::shared_ptr<DownloadStream> self_;
   std::shared_ptr<Session> session_;
+  std::unique_ptr<MemoryBudget::Account> memory_;
   std::uint64_t revision_ = 0;
   std::uint64_t position_ = 0;
   WatchLog::Snapshot snapshot_;

@@ -38,6 +38,14 @@ grpc::Status Refuse(ServerState& service, const Refused& refused, const std::str
   return ToGrpc(refused, prefix);
 }
 
+tl::expected<std::unique_ptr<MemoryBudget::Account>, grpc::Status> CountStream(
+    ServerState& service, const Session& session, std::uint64_t part) {
+  auto memory = MemoryBudget::Open(service.stream_memory, session.options().owner);
+  const auto full = memory->Set(EstimateStreamBytes(session.options().spec, part));
+  if (full) return tl::unexpected(Refuse(service, *full));
+  return memory;
+}
+
 grpc::Status TooManyWatchers(ServerState& service, const Session& session) {
   const std::size_t most = session.options().max_watchers;
   return Refuse(service, {{"max-watchers", core::Message(most), "mesh"},

@@ -25,10 +25,13 @@ struct ServerState {
       : config(config_in),
         memory(std::make_shared<MemoryBudget>(
             MemoryBudget::Limits{config.max_memory_bytes, config.owner_memory_bytes})),
+        stream_memory(std::make_shared<MemoryBudget>(
+            MemoryBudget::Limits{config.max_memory_bytes, config.owner_memory_bytes},
+            MemoryBudget::Of::kStreams)),
         store(limits, std::move(factory)) {}
 
   const Config config;
-  const std::shared_ptr<MemoryBudget> memory;
+  const std::shared_ptr<MemoryBudget> memory, stream_memory;
   StreamRegistry streams;
   std::unique_ptr<Journal> journal;  // null: meshes live in memory alone
   SessionStore store;
@@ -78,6 +81,11 @@ tl::expected<std::shared_ptr<Session>, grpc::Status> FindMesh(const ServerState&
                                                               const Identity& caller,
                                                               const std::string& name,
                                                               const std::string& field = "name");
+
+// Counts an open call on the caller's mesh that sends messages of `part` bytes, as long as what it
+// returns lives; or RESOURCE_EXHAUSTED.
+tl::expected<std::unique_ptr<MemoryBudget::Account>, grpc::Status> CountStream(
+    ServerState& service, const Session& session, std::uint64_t part);
 
 // RESOURCE_EXHAUSTED: AddWatcher refused.
 grpc::Status TooManyWatchers(ServerState& service, const Session& session);

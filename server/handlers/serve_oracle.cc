@@ -149,10 +149,13 @@ class OracleStream final
                                            " bytes but may have ", kMaxWorkerNameBytes),
                              "hello.worker"));
     }
+    auto memory = CountStream(service_, **session, 0);  // questions are part of the mesh's round
+    if (!memory) return EndWith(memory.error());
     worker_name_ = hello.worker();
     {
       const std::lock_guard lock(mutex_);
       session_ = *session;
+      memory_ = std::move(*memory);
       welcome_ = true;
     }
     // Questions may come before Join returns.
@@ -270,6 +273,7 @@ class OracleStream final
   std::mutex mutex_;
   std::shared_ptr<OracleStream> self_;
   std::shared_ptr<Session> session_;  // set once, by Hello
+  std::unique_ptr<MemoryBudget::Account> memory_;
   WorkerId worker_ = 0;               // set once, by Hello
   bool left_ = false;
   bool welcome_ = false;

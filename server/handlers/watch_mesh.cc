@@ -88,8 +88,12 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
                                    ": watch from the last one that you have"),
                      "from_revision");
     }
+    const std::uint64_t part = request.progress_only() ? 0 : PartBytes(service_.config);
+    auto memory = CountStream(service_, **session, part);
+    if (!memory) return memory.error();
     {
       const std::lock_guard lock(mutex_);
+      memory_ = std::move(*memory);
       at_ = request.from_revision();
       geometry_ = !request.progress_only();
       session_ = *session;
@@ -142,7 +146,7 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
 
   void TakePart() {
     const core::Specification& spec = session_->options().spec;
-    const DeltaPart part = session_->history().Next(&*cursor_, ChunkBytes(service_.config));
+    const DeltaPart part = session_->history().Next(&*cursor_, PartBytes(service_.config));
     ToProto(part, spec.dimension, spec.ambient_dimension, response_.mutable_delta());
     if (!part.complete) return;
     at_ = cursor_->to;
@@ -157,6 +161,7 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
   std::mutex mutex_;
   std::shared_ptr<WatchStream> self_;
   std::shared_ptr<Session> session_;
+  std::unique_ptr<MemoryBudget::Account> memory_;
   bool geometry_ = true;
   std::uint64_t at_ = 0;  // the client has all up to this revision
   std::optional<WatchLog::Cursor> cursor_;

@@ -257,7 +257,7 @@ TEST_F(LiveSafetyTest, TokensComeAndGoWithoutARestart) {
   v1::Mesh mesh;
   while (mesh.watchers() == 0) ASSERT_TRUE(alice.Get(name, &mesh).ok());
   WriteTokens(std::string("carol carol-0123456789abcdef\nbob ") + kBob + "\n");
-  server_->ReloadTokens();
+  server_->ReloadFiles();
   EXPECT_TRUE(carol.Info().ok());
   EXPECT_TRUE(bob.Info().ok());
   EXPECT_EQ(alice.Info().error_code(), StatusCode::UNAUTHENTICATED);
@@ -281,7 +281,7 @@ TEST_F(LiveSafetyTest, TokensAreNeverLogged) {
   EXPECT_TRUE(alice.Watch(name).ok());
   serving.join();
   WriteTokens("alice alice-broken\n");
-  server_->ReloadTokens();
+  server_->ReloadFiles();
   server_->Stop(0s);
   StartLogging(LogLevel::kWarning, LogFormat::kText);
   const std::string log = ::testing::internal::GetCapturedStderr();
@@ -341,6 +341,30 @@ TEST_F(LiveSafetyTest, ARenewedCertificateNeedsNoRestart) {
   WriteFile(config_.tls_certificate, ReadFile(files + ".pem"));
   while (!Secure(Tls(next)).Info().ok()) std::this_thread::sleep_for(200ms);
   EXPECT_EQ(Secure(Tls(authority_)).Info().error_code(), StatusCode::UNAVAILABLE);
+}
+
+// As a garbage token file: what was read before stays in force.
+TEST_F(LiveSafetyTest, AGarbageClientAuthorityShutsNobodyOut) {
+  const TestAuthority clients("clients"), next("next");
+  Config config;
+  config.tls_client_ca = clients.certificate();
+  StartWithTls(config);
+  const auto mine = Tls(authority_, clients.Issue("me"));
+  const auto other = Tls(authority_, next.Issue("you"));
+  const std::string before = ReadFile(clients.certificate());
+  EXPECT_TRUE(Secure(mine).Info().ok());
+  WriteFile(config_.tls_client_ca, "garbage");
+  server_->ReloadFiles();
+  // gRPC looks every two seconds, without a word: longer than it takes to notice.
+  for (int i = 0; i < 15; ++i) {
+    EXPECT_TRUE(Secure(mine).Info().ok());
+    std::this_thread::sleep_for(200ms);
+  }
+  EXPECT_EQ(Secure(other).Info().error_code(), StatusCode::UNAVAILABLE);
+  WriteFile(config_.tls_client_ca, before + ReadFile(next.certificate()));
+  server_->ReloadFiles();
+  while (!Secure(other).Info().ok()) std::this_thread::sleep_for(200ms);
+  EXPECT_TRUE(Secure(mine).Info().ok());
 }
 
 TEST_F(LiveSafetyTest, TheHealthCheckGoesThroughMutualTls) {

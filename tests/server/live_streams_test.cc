@@ -216,6 +216,50 @@ TEST_F(LiveStreamsTest, ClientsThatVanishAreForgotten) {
   EXPECT_EQ(Get(name).state(), v1::MESH_STATE_WAITING);
 }
 
+// Of watchers that read nothing, one owner, or all clients that are not told apart, may have so
+// many as fit an eighth of the memory.
+TEST_F(LiveStreamsTest, WatchersThatReadNothingAreCountedInMemory) {
+  Config config;
+  config.max_memory_bytes = std::uint64_t{64} << 20;
+  config.max_watchers = 1000;
+  Start(config);
+  const std::string name = CreateSphere();
+  v1::WatchMeshRequest request;
+  request.set_name(name);
+  struct Watcher {
+    grpc::ClientContext context;
+    std::unique_ptr<grpc::ClientReader<v1::WatchMeshResponse>> reader;
+    ~Watcher() { context.TryCancel(); }
+  };
+  std::vector<std::unique_ptr<Watcher>> silent;
+  grpc::Status refused;
+  while (refused.ok() && silent.size() < config.max_watchers) {
+    auto watcher = std::make_unique<Watcher>();
+    watcher->reader = stub_->WatchMesh(&watcher->context, request);
+    v1::WatchMeshResponse first;
+    if (watcher->reader->Read(&first)) {  // where it stands now
+      silent.push_back(std::move(watcher));
+    } else {
+      refused = watcher->reader->Finish();
+    }
+  }
+  EXPECT_EQ(refused.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(ReasonIn(refused), "LIMIT_EXCEEDED");
+  EXPECT_NE(refused.error_message().find("max-memory-bytes"), std::string::npos)
+      << refused.error_message();
+  const std::uint64_t each = EstimateStreamBytes(SphereSpec(0.3), PartBytes(config));
+  EXPECT_EQ(silent.size(), config.max_memory_bytes / 8 / each);
+  EXPECT_GT(silent.size(), 8u) << "or nobody could follow a mesh";
+  silent.clear();
+  v1::WatchMeshResponse event;
+  bool watched = false;
+  while (!watched) {  // once the server has heard that they are gone
+    grpc::ClientContext context;
+    watched = stub_->WatchMesh(&context, request)->Read(&event);
+    context.TryCancel();
+  }
+}
+
 TEST_F(LiveStreamsTest, DeletingAMeshEndsItsStreams) {
   Start();
   const std::string name = CreateSphere();

@@ -5,6 +5,7 @@
 #include <thread>
 #include <vector>
 
+#include "core/message.h"
 #include "tests/server/sphere.h"
 
 namespace stellate::server {
@@ -86,6 +87,32 @@ TEST(MemoryBudget, EstimatesGrowWithTheMeshAndTheRound) {
   EXPECT_GT(EstimateMeshBytes(spec, 100'000, 1000), mesh);
   spec.ambient_dimension = 100;
   EXPECT_GT(EstimateMeshBytes(spec, 100'000, 0), 2 * mesh);
+}
+
+TEST(MemoryBudget, SeedsAreCountedEvenOfWhatIsFinished) {
+  core::Specification spec = testing::SphereSpec(0.1);
+  const std::uint64_t few = EstimateFinishedBytes(spec);
+  spec.seeds = Eigen::MatrixXd::Zero(3, 100'000);
+  EXPECT_GE(EstimateFinishedBytes(spec), few + 2 * 100'000 * 3 * sizeof(double));
+  EXPECT_GE(EstimateStreamBytes(spec, 0), 2 * 100'000 * 3 * sizeof(double)) << "they are sent";
+}
+
+TEST(MemoryBudget, OpenCallsHaveAnEighth) {
+  constexpr std::uint64_t kMebi = std::uint64_t{1} << 20;
+  const auto streams = std::make_shared<MemoryBudget>(
+      MemoryBudget::Limits{80 * kMebi, 64 * kMebi}, MemoryBudget::Of::kStreams);
+  const auto alice = MemoryBudget::Open(streams, "alice");
+  EXPECT_FALSE(alice->Set(8 * kMebi));
+  const auto more = MemoryBudget::Open(streams, "alice");
+  const auto refused = more->Set(1);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->limit->setting, "owner-memory-bytes");
+  EXPECT_EQ(refused->limit->value, core::Message(64 * kMebi));
+  EXPECT_NE(refused->message.find("allows each owner 8388608"), std::string::npos)
+      << refused->message;
+  const auto bob = MemoryBudget::Open(streams, "bob");
+  EXPECT_EQ(bob->Set(3 * kMebi)->limit->setting, "max-memory-bytes");
+  EXPECT_FALSE(bob->Set(2 * kMebi));
 }
 
 TEST(MemoryBudget, TheMachineIsMeasured) {

@@ -6,6 +6,7 @@
 #include <set>
 #include <thread>
 
+#include "tests/server/no_more_threads.h"
 #include "tests/server/sphere.h"
 #include "tests/support/stub_mesher.h"
 
@@ -120,6 +121,19 @@ TEST(SessionStore, MeshesBeingTakenApartTakeNoPlaceButAreBounded) {
   EXPECT_EQ(refused.error().limit->setting, "max-meshes");
   gate.set_value();
   for (const auto& session : ended) WaitUntilOver(*session);
+  EXPECT_TRUE(store.Create(Options()));
+}
+
+TEST(SessionStore, AMeshWithoutAThreadIsRefusedAndTheNextOneIsNot) {
+  SessionStore store({});
+  {
+    const testing::NoMoreThreads none;
+    const auto refused = store.Create(Options());
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, core::StatusCode::kLimitExceeded);
+    EXPECT_NE(refused.error().message.find("thread"), std::string::npos);
+  }
+  EXPECT_EQ(store.List(0, 10).sessions.size(), 0u);
   EXPECT_TRUE(store.Create(Options()));
 }
 

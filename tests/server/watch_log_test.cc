@@ -1,10 +1,30 @@
 #include "server/watch_log.h"
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <algorithm>
+#include <atomic>
+#include <cstdlib>
+#include <new>
 #include <random>
 #include <set>
+
+namespace {
+std::atomic<std::uint64_t> allocated{0};  // on the heap, in this process
+}  // namespace
+
+void* operator new(std::size_t size) {
+  void* const block = std::malloc(size);
+  if (block == nullptr) throw std::bad_alloc();
+  allocated += malloc_usable_size(block);
+  return block;
+}
+void operator delete(void* block) noexcept {
+  allocated -= malloc_usable_size(block);
+  std::free(block);
+}
+void operator delete(void* block, std::size_t) noexcept { operator delete(block); }
 
 namespace stellate::server {
 namespace {
@@ -204,14 +224,28 @@ TEST(WatchLog, EveryRevisionIsReadFromAnyPosition) {
   }
 }
 
-TEST(WatchLog, MemoryIsThatOfWhatItHolds) {
-  std::mt19937 random(6);
-  History history;
-  const std::uint64_t empty = history.log.MemoryBytes();
-  history.Grow(20, &random);
-  const WatchLog::Snapshot end = history.log.At(history.log.revision());
-  EXPECT_GE(history.log.MemoryBytes() - empty,
-            end.vertices * kAmbient * sizeof(double) + end.simplices * 3 * sizeof(std::uint32_t));
+// A strip of triangles, all in one round.
+core::MeshDelta Strip(std::uint32_t vertices) {
+  core::MeshDelta delta;
+  delta.revision = 1;
+  delta.points = Eigen::MatrixXd::Zero(kAmbient, vertices);
+  for (std::uint32_t v = 0; v + 2 < vertices; ++v) {
+    delta.added.insert(delta.added.end(), {v, v + 1, v + 2});
+  }
+  return delta;
+}
+
+TEST(WatchLog, MemoryIsThatOfTheHeap) {
+  for (const std::uint32_t vertices : {3u, 1000u, 100'000u}) {
+    const core::MeshDelta delta = Strip(vertices);
+    const std::uint64_t before = allocated;
+    const auto log = std::make_unique<WatchLog>(2, kAmbient);
+    ASSERT_TRUE(log->Append(delta).ok());
+    const auto held = static_cast<double>(allocated - before);
+    const auto counted = static_cast<double>(log->MemoryBytes());
+    EXPECT_GE(counted, 0.9 * held) << vertices;
+    EXPECT_LE(counted, 1.1 * held) << vertices;
+  }
 }
 
 }  // namespace
