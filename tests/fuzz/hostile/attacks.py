@@ -431,6 +431,29 @@ def deaf_watchers(target: Target) -> None:
     target.delete(mine)
 
 
+def silent_watchers(target: Target) -> None:
+    """Watchers and downloads by the hundred, of which none is read."""
+    mine = target.create()
+    watch = stellate_pb2.WatchMeshRequest(name=mine).SerializeToString()
+    download = stellate_pb2.DownloadMeshRequest(name=mine).SerializeToString()
+    connection = target.connect()
+    for number in range(200 * target.scale):
+        path, body = (("WatchMesh", watch), ("DownloadMesh", download))[number % 2]
+        connection.open(1 + 2 * number, SERVICE + path)
+        connection.data(1 + 2 * number, raw.grpc_message(body), raw.END_STREAM)
+    connection.close()
+    target.delete(mine)
+
+
+def made_and_cancelled(target: Target) -> None:
+    """More meshes than are kept, each cancelled at once."""
+    for _ in range(33 * target.scale):
+        name = target.create()
+        target.unary(
+            "CancelMesh", stellate_pb2.CancelMeshRequest(name=name).SerializeToString()
+        )
+
+
 class _Worker:
     """A worker's stream, message by message."""
 
@@ -499,4 +522,6 @@ ATTACKS: tuple[Callable[[Target], None], ...] = (
     bad_headers,
     other_protocols,
     deaf_watchers,
+    silent_watchers,
+    made_and_cancelled,
 )
