@@ -77,6 +77,10 @@ ParsedFlags ParseFlags(int argc, const char* const* argv) {
   add_command("--health-service", &flags.health_service,
               "What to ask it about: stellate.v1.Stellate, or \"alive\", which holds while it "
               "drains too; default: the server as a whole");
+  add_command("--health-cert", &flags.health_certificate,
+              "PEM file with the certificate that it shows, where --tls-client-ca would not take "
+              "--tls-cert");
+  add_command("--health-key", &flags.health_key, "PEM file with its private key");
   add_command("--exit-with-parent", &flags.exit_with_parent,
               "Stop when the process that started this one is gone");
   for (const Setting& setting : Settings()) AddSetting(&app, setting, &flags.config);

@@ -9,6 +9,7 @@ namespace stellate::server {
 struct Flags {
   Config config;
   bool health_check = false;
+  std::string health_certificate, health_key;  // shown by it; empty: the server's own
   std::string health_service;  // whose health --health-check asks for; empty: the whole server's
   bool exit_with_parent = false;
 };

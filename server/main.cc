@@ -51,7 +51,11 @@ int Fail(const std::string& message, int status) {
 }
 
 int RunHealthCheck(const Flags& flags) {
-  const Config& config = flags.config;
+  Config config = flags.config;
+  if (!flags.health_certificate.empty() && !config.tls_certificate.empty()) {
+    config.tls_certificate = flags.health_certificate;
+    config.tls_key = flags.health_key;
+  }
   const auto address = ParseListenAddress(config.listen);
   if (!address) return Fail(address.error().message, kExitUsage);
   const std::string trouble = CheckHealth(address->Target(), kHealthLimit,

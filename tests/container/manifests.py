@@ -15,22 +15,22 @@ import subprocess
 import sys
 from typing import Any, Iterator
 
-import yaml
 from kubernetes.client import models
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-MANIFESTS = ROOT / "docker" / "kubernetes"
-WORKER = [sys.executable, "-B", str(ROOT / "docker" / "oracle_worker.py")]
-Object = dict[str, Any]
-Objects = dict[tuple[str, str], Object]
+import manifest_safety
+from kubernetes_objects import (
+    ROOT, Object, Objects, arguments_of, container_of, find, kustomization, pod_of, version, workloads,
+)  # fmt: skip
 
-# Newer than Debian's client, which knows the first by its name before that.
+WORKER = [sys.executable, "-B", str(ROOT / "docker" / "oracle_worker.py")]
+
+# Newer than Debian's client, which knows it by its name before that.
 _MODELS = {("autoscaling/v2", "HorizontalPodAutoscaler"): "V2beta2HorizontalPodAutoscaler"}
-_NEWER_FIELDS = {"V1Probe": {"grpc": {"port": int, "service": str}}}
 # What is served by every Kubernetes from 1.25 on.
 _VERSIONS = {
     "Namespace": "v1",
     "Service": "v1",
+    "NetworkPolicy": "networking.k8s.io/v1",
     "StatefulSet": "apps/v1",
     "Deployment": "apps/v1",
     "PodDisruptionBudget": "policy/v1",
@@ -39,39 +39,10 @@ _VERSIONS = {
 _QUANTITY = re.compile(r"[0-9]+(\.[0-9]+)?(m|k|M|G|T|Ki|Mi|Gi|Ti)?")
 
 
-def load() -> Objects:
-    """All of them, by kind and name."""
-    found = {}
-    for resource in kustomization()["resources"]:
-        for item in yaml.safe_load_all((MANIFESTS / resource).read_text()):
-            found[item["kind"], item["metadata"]["name"]] = item
-    return found
-
-
-def kustomization() -> Object:
-    """What kubectl applies."""
-    return yaml.safe_load((MANIFESTS / "kustomization.yaml").read_text())
-
-
-def pod_of(item: Object) -> Object:
-    """A workload's pod."""
-    return item["spec"]["template"]["spec"]
-
-
-def container_of(item: Object) -> Object:
-    """Its one container."""
-    return pod_of(item)["containers"][0]
-
-
-def arguments_of(item: Object) -> dict[str, str]:
-    """What its program is given; "" for flags without a value."""
-    pairs = (argument.partition("=") for argument in container_of(item)["args"])
-    return {flag: value for flag, _, value in pairs}
-
-
 def problems(objects: Objects) -> list[str]:
     """All that is wrong. Later rules take for granted what earlier ones see to."""
-    rules = (_schema, _placement, _programs, _selectors, _ports, _volumes, _numbers, _confinement)
+    rules = (_schema, _placement, _programs, _selectors, _ports, _volumes, _numbers, _confinement,
+             manifest_safety.ways_in, manifest_safety.policies)  # fmt: skip
     for rule in rules:
         if found := list(rule(objects)):
             return found
@@ -120,13 +91,8 @@ def _object_misfits(value: Any, kind: str, path: str) -> Iterator[str]:
         return
     model = getattr(models, kind)
     fields = {model.attribute_map[name]: t for name, t in model.openapi_types.items()}
-    newer = _NEWER_FIELDS.get(kind, {})
     for key, element in value.items():
-        if key in newer:
-            for inner, content in element.items():
-                if not isinstance(content, newer[key].get(inner, ())):
-                    yield f"{path}.{key}.{inner} is no field, or of the wrong type"
-        elif key not in fields:
+        if key not in fields:
             yield f"{path}.{key}: {kind} has no such field"
         else:
             yield from misfits(element, fields[key], f"{path}.{key}")
@@ -136,17 +102,16 @@ def _object_misfits(value: Any, kind: str, path: str) -> Iterator[str]:
         yield f"{path}: {error}"
 
 
-def workloads(objects: Objects) -> dict[str, Object]:
-    """What has pods, by name."""
-    return {name: o for (kind, name), o in objects.items() if kind in ("StatefulSet", "Deployment")}
-
-
 def _placement(objects: Objects) -> Iterator[str]:
     namespaces = {name for kind, name in objects if kind == "Namespace"}
     for (kind, name), item in objects.items():
         if kind != "Namespace" and item["metadata"].get("namespace") not in namespaces:
             yield f"{kind}/{name} is in no namespace of ours"
     known = {image["name"] for image in kustomization()["images"]}
+    for image in kustomization()["images"]:
+        ours = image["name"].startswith("stellate")
+        if not re.fullmatch(r"\d+\.\d+\.\d+", image["newTag"]) or ours and image["newTag"] != version():
+            yield f"{image['name']} is of no version: {image['newTag']}"
     for name, item in workloads(objects).items():
         if len(pod_of(item)["containers"]) != 1:
             yield f"{name} has to have one container"
@@ -184,18 +149,9 @@ def _selectors(objects: Objects) -> Iterator[str]:
     if sorted(guarded) != sorted(labels):
         yield f"PodDisruptionBudgets guard {guarded}"
     for name, item in workloads(objects).items():
-        for term in _find(pod_of(item), "podAffinityTerm"):
+        for term in find(pod_of(item), "podAffinityTerm"):
             if selected(term["labelSelector"]["matchLabels"]) != [name]:
                 yield f"{name}: its affinity is for other pods"
-
-
-def _find(tree: Any, key: str) -> Iterator[Any]:
-    for inner, value in tree.items() if isinstance(tree, dict) else enumerate(
-        tree if isinstance(tree, list) else []
-    ):
-        if inner == key:
-            yield value
-        yield from _find(value, key)
 
 
 def _ports(objects: Objects) -> Iterator[str]:
@@ -208,13 +164,18 @@ def _ports(objects: Objects) -> Iterator[str]:
     scraped = server["spec"]["template"]["metadata"]["annotations"]["prometheus.io/port"]
     if scraped != str(ports.get("metrics")):
         yield f"Prometheus is sent to port {scraped}"
-    for probe in ("startupProbe", "readinessProbe", "livenessProbe"):
-        asked = container.get(probe, {})
-        port = asked.get("grpc", {}).get("port", asked.get("tcpSocket", {}).get("port"))
-        if ports.get(port, port) != ports.get("grpc"):
-            yield f"{probe} asks port {port}"
-    if "grpc" not in container.get("readinessProbe", {}):
-        yield "readinessProbe does not ask the health service"
+    for probe, service in (
+        ("startupProbe", ""), ("readinessProbe", "stellate.v1.Stellate"), ("livenessProbe", "alive"),
+    ):  # fmt: skip
+        asked = container.get(probe, {}).get("exec", {}).get("command", [])
+        wanted = ["stellated-health"] + [f"--health-service={service}"] * bool(service)
+        if asked != wanted:
+            yield f"{probe} asks {asked}, not {wanted}"
+    front = container_of(objects["Deployment", "proxy"])
+    for probe in ("readinessProbe", "livenessProbe"):
+        asked = front.get(probe, {}).get("tcpSocket", {}).get("port")
+        if asked not in {port["name"] for port in front["ports"]}:
+            yield f"the proxy's {probe} asks port {asked}"
     service = objects.get(("Service", server["spec"]["serviceName"]))
     if service is None or service["spec"].get("clusterIP") != "None":
         return (yield f"there is no headless Service {server['spec']['serviceName']}")
@@ -222,11 +183,12 @@ def _ports(objects: Objects) -> Iterator[str]:
         target = port.get("targetPort", port["port"])
         if target not in ports and target not in ports.values():
             yield f"the Service leads to port {target}"
-    offered = {f"{service['metadata']['name']}:{port['port']}" for port in service["spec"]["ports"]
-               if ports.get(port.get("targetPort")) == ports.get("grpc")}
+    way_in = objects["Service", "proxy"]
+    offered = {f"{way_in['metadata']['name']}:{port['port']}" for port in way_in["spec"]["ports"]
+               if port.get("targetPort") in {port["name"] for port in front["ports"]}}
     for name, item in workloads(objects).items():
-        asked_for = arguments_of(item).get("--server", "")
-        if item is not server and asked_for not in offered:
+        asked_for = arguments_of(item).get("--server")
+        if asked_for is not None and asked_for not in offered:
             yield f"{name} looks for a server at {asked_for}"
 
 
@@ -234,8 +196,11 @@ def _volumes(objects: Objects) -> Iterator[str]:
     server = objects["StatefulSet", "stellated"]
     claims = {c["metadata"]["name"]: c["spec"] for c in server["spec"]["volumeClaimTemplates"]}
     mounts = {m["name"]: m for m in container_of(server).get("volumeMounts", [])}
-    if set(claims) != set(mounts):
-        yield f"volumes {sorted(claims)}, but mounts {sorted(mounts)}"
+    for name, item in workloads(objects).items():
+        has = {volume["name"]: volume for volume in pod_of(item).get("volumes", [])}
+        wanted = {m["name"] for m in container_of(item).get("volumeMounts", [])}
+        if {*has, *(claims if item is server else ())} != wanted:
+            yield f"{name}: volumes {sorted(has)}, but mounts {sorted(wanted)}"
     for name, claim in claims.items():
         if claim["accessModes"] != ["ReadWriteOnce"]:
             yield f"volume {name}: two servers cannot share a directory"
@@ -290,7 +255,7 @@ def _confinement(objects: Objects) -> Iterator[str]:
             if context.get(field) != value:
                 yield f"{name}: {field} is {context.get(field)}"
         for forbidden in ("hostNetwork", "hostPID", "hostIPC", "hostPath", "hostPort"):
-            if any(_find(pod, forbidden)):
+            if any(find(pod, forbidden)):
                 yield f"{name} has {forbidden}"
         if "memory" not in container["resources"].get("limits", {}):
             yield f"{name} may take all memory"

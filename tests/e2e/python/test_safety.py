@@ -62,6 +62,22 @@ def test_a_mesh_over_mutual_tls_with_a_token(address, full):
     assert mesh.certified
 
 
+def test_health_under_mutual_tls(files, tmp_path):
+    """The server's certificate is of another authority than its clients'."""
+    program = stellate.find_stellated()
+    server = ["--tls-cert", "server.pem", "--tls-key", "server.key", "--tls-client-ca", "other.pem"]
+    command = [program, "--listen", "127.0.0.1:0", *server, "--ready-file", str(tmp_path / "ready")]
+    with subprocess.Popen(command, cwd=files, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            listen = ["--listen", process.stdout.readline().split()[-1]]
+            ask = [program, "--health-check", *listen, *server]
+            assert subprocess.run(ask, cwd=files, capture_output=True).returncode == 1
+            ask += ["--health-cert", "other.pem", "--health-key", "other.key"]
+            assert subprocess.run(ask, cwd=files).returncode == 0
+        finally:
+            process.terminate()
+
+
 def test_owners_do_not_see_each_other(address, full):
     with (
         stellate.Client(address, stellate.Credentials(token=ALICE, **full)) as alice,

@@ -1,0 +1,66 @@
+"""The Kubernetes objects of docker/kubernetes, and what they are made of."""
+
+from __future__ import annotations
+
+import pathlib
+import re
+from typing import Any, Iterator
+
+import yaml
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+MANIFESTS = ROOT / "docker" / "kubernetes"
+Object = dict[str, Any]
+Objects = dict[tuple[str, str], Object]
+
+
+def load() -> Objects:
+    """All of them, by kind and name."""
+    found = {}
+    for resource in kustomization()["resources"]:
+        for item in yaml.safe_load_all((MANIFESTS / resource).read_text()):
+            found[item["kind"], item["metadata"]["name"]] = item
+    return found
+
+
+def kustomization() -> Object:
+    """What kubectl applies."""
+    return yaml.safe_load((MANIFESTS / "kustomization.yaml").read_text())
+
+
+def pod_of(item: Object) -> Object:
+    """A workload's pod."""
+    return item["spec"]["template"]["spec"]
+
+
+def container_of(item: Object) -> Object:
+    """Its one container."""
+    return pod_of(item)["containers"][0]
+
+
+def arguments_of(item: Object) -> dict[str, str]:
+    """What its program is given; "" for flags without a value."""
+    pairs = (argument.partition("=") for argument in container_of(item).get("args", []))
+    return {flag: value for flag, _, value in pairs}
+
+
+def workloads(objects: Objects) -> dict[str, Object]:
+    """What has pods, by name."""
+    return {name: o for (kind, name), o in objects.items() if kind in ("StatefulSet", "Deployment")}
+
+
+def version() -> str:
+    """Of this source tree."""
+    found = re.search(r"^project\(stellate VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text(), re.M)
+    assert found is not None
+    return found[1]
+
+
+def find(tree: Any, key: str) -> Iterator[Any]:
+    """All that is under that key, however deep."""
+    for inner, value in tree.items() if isinstance(tree, dict) else enumerate(
+        tree if isinstance(tree, list) else []
+    ):
+        if inner == key:
+            yield value
+        yield from find(value, key)
