@@ -26,7 +26,7 @@ or, for a block that cannot run here,
 
 At the top of a table, `paths = { "/etc/stellate" = "etc" }` has the page's blocks write into their
 scratch folder what would go there, and `fresh = true` gives them a source tree in which nothing is
-built.
+built. With `service = true` systemctl starts and stops what packaging/install installs, in `root`.
 """
 
 from __future__ import annotations

@@ -16,6 +16,7 @@ import pathlib
 import re
 import runpy
 import shutil
+import signal
 import socket
 import struct
 import subprocess
@@ -67,11 +68,18 @@ class Surroundings:
         self.here = folder
         self._servers: list[subprocess.Popen] = []
         self._mesh: str | None = None
-        self._grow_tree(fresh=page.table.get("fresh", False))
         self.paths = {}
         for path, name in page.table.get("paths", {}).items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             self.paths[path] = str(folder / name)
+        self._grow_tree(fresh=page.table.get("fresh", False))
+        self._service = page.table.get("service", False)
+        if self._service:
+            stand_in = pathlib.Path(__file__).resolve().parent / "systemctl"
+            (folder / ".programs" / "systemctl").symlink_to(stand_in)
+            for name in ("stellated.service", "stellated.toml"):  # they go into the scratch folder
+                file = folder / "packaging" / name
+                file.write_text(self.fill_in({}, file.read_text()))
 
     def _grow_tree(self, fresh: bool) -> None:
         # Scripts find the tree by their own place: what they lie in has to be a copy.
@@ -79,7 +87,7 @@ class Surroundings:
         runpy.run_path(str(ROOT / "clients/python/stellate/_stubs.py"))["ensure"]()
         passing = shutil.ignore_patterns("__pycache__", ".generated-*")
         for item in ROOT.iterdir():
-            if item.name in ("clients", "docker", "proto"):
+            if item.name in ("clients", "docker", "packaging", "proto"):
                 shutil.copytree(item, self.here / item.name, symlinks=True, ignore=passing)
             elif item.name not in ("build", ".git"):
                 (self.here / item.name).symlink_to(item)
@@ -110,6 +118,7 @@ class Surroundings:
             "STELLATED": str(BUILD / "bin" / "stellated"),
             "STELLATE_BUILD": str(BUILD),
             "token": TOKEN,
+            **({"here": str(self.here), "DESTDIR": f"{self.here}/root"} if self._service else {}),
         }
 
     def fill_in(self, entry: dict[str, Any], text: str) -> str:
@@ -159,6 +168,13 @@ class Surroundings:
             server.kill()
             server.wait()
         self._servers.clear()
+
+    def close(self) -> None:
+        """Ends what a page started as a service."""
+        try:
+            os.kill(int((self.here / ".pid").read_text()), signal.SIGKILL)
+        except (OSError, ValueError):
+            pass  # none, or stopped
 
     def certify(self) -> None:
         """ca.pem; server.pem and server.key; me.pem and me.key; tokens, my-token."""
