@@ -26,17 +26,17 @@ def no_leftovers(client):
 
 
 class Gate(manifolds.Torus):
-    """A torus that answers a few batches and then waits until it may go on."""
+    """A torus that answers for a few rounds, in whatever chunks, and waits until it may go on."""
 
-    def __init__(self, batches=4):
+    def __init__(self, questions=300):
         super().__init__()
-        self.left, self.waiting, self.go_on = batches, threading.Event(), threading.Event()
+        self.left, self.waiting, self.go_on = questions, threading.Event(), threading.Event()
 
     def closest_point(self, points):
-        self.left -= 1
-        if self.left < 0:
+        if self.left <= 0:
             self.waiting.set()
             self.go_on.wait()
+        self.left -= len(points)
         return super().closest_point(points)
 
 
