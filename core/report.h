@@ -79,6 +79,9 @@ struct Certificate {
   std::uint64_t fibre_failures = 0;    // sampled normal flats that do not meet the mesh once nearby
   std::uint64_t fibre_samples = 0;
 
+  std::uint64_t answers_held = 0;  // answers of the whole run, beside vertices, that were held
+                                   // against the mesh
+
   double max_circumradius = 0;        // max R_p(sigma), length
   double max_radius_edge = 0;         // max rho, no unit
   double min_fatness = 0;             // min Theta of the k-simplices, no unit

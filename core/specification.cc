@@ -96,6 +96,11 @@ Status CheckSeeds(const Specification& spec) {
       }
     }
   }
+  if (spec.components < 0 || spec.components > kMaxComponents) {
+    return Invalid(Message("components is ", spec.components, " but must be between 0 and ",
+                           kMaxComponents,
+                           ": say how many the manifold has at least, or 0 if that is not known"));
+  }
   if (spec.box_seeds < 0 || spec.box_seeds > kMaxBoxSeeds) {
     return Invalid(Message("box_seeds is ", spec.box_seeds, " but must be between 0 and ",
                            kMaxBoxSeeds, "; 0 asks for the default"));

@@ -21,6 +21,7 @@ inline constexpr double kMaxSliverBound = 0.3;   // refinement does not terminat
 inline constexpr int kMaxCandidates = 100;
 inline constexpr int kMaxFlatAlternations = 20;
 inline constexpr int kMaxBoxSeeds = 100'000;
+inline constexpr int kMaxComponents = 1'000'000;  // that may be declared
 inline constexpr std::int64_t kMaxBoxSeedCoordinates = 4'000'000;  // box_seeds times d
 
 // What the client's oracle can do beyond closest_point, which it must have (Sec. 5.3.1).
@@ -79,6 +80,12 @@ struct Criteria {
                                              // alternating towards a flat, 1..20
 };
 
+// How much a certificate asks of the oracle.
+enum class Audit {
+  kStandard,  // a few thousand questions, whatever the size of the mesh
+  kThorough,  // about every vertex and every simplex
+};
+
 struct Limits {
   std::uint64_t max_vertices = 10'000'000;
   std::uint64_t max_rounds = 100'000;   // batches of queries
@@ -95,8 +102,10 @@ struct Specification {
   std::optional<BoundingBox> bounding_box;  // seeds are drawn from it when none are given
   Eigen::MatrixXd seeds;                    // d x m, near M, may be empty
   int box_seeds = 0;                        // points drawn from the box; 0: the default
+  int components = 0;  // that M has at least; a mesh with fewer is refused. 0: not known
   std::uint64_t random_seed = 1;            // of everything random
   Criteria criteria;
+  Audit audit = Audit::kStandard;
   Limits limits;
   int threads = 0;  // 0: all cores. Never changes the mesh.
 };

@@ -5,9 +5,12 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <string>
+#include <utility>
 
+#include "core/certificate/evidence.h"
 #include "core/certificate/fibres.h"
 #include "core/certificate/findings.h"
 #include "core/certificate/links.h"
@@ -15,6 +18,7 @@
 #include "core/certificate/shape.h"
 #include "core/certificate/shrinking_balls.h"
 #include "core/certificate/star_geometry.h"
+#include "core/certificate/tangent_check.h"
 #include "core/certificate/topology.h"
 #include "core/geometry/simplex.h"
 #include "core/message.h"
@@ -34,13 +38,17 @@ constexpr double kNoticeablePositionError = 1e-3;
 // of M: 0.27 R at R = 0.5 reach, half of R at 0.8 reach. Beyond that M is somewhere else.
 constexpr double kBarycentreShare = 0.5;
 constexpr double kBarycentreNoise = 0.02;  // of the mesh size, for inexact oracles
-// Within a well-sampled M each point has a vertex within its simplex' circumradius and height,
-// 1.5 times the mesh size.
-constexpr double kCoverageShare = 2;
-// eps / reach beyond which there is no theorem and no practice.
-constexpr double kHopeless = 1.5;
+// Where M is smooth a barycentre lies straight above its closest point; at a rim it leans over. The
+// tangent space there is known from the vertices', to the second order of size over reach.
+constexpr double kLean = 0.5;
 // Closest points that an oracle may fail to find near the mesh.
 constexpr double kUnansweredShare = 0.01;
+// Two points of M so much nearer to each other than the mesh size are on two sides of something.
+constexpr double kThin = 0.25;
+// Answers are taken to be wrong by this share of the mesh size, and by a few roundings, even where
+// none is seen to be: what lies nearer together than ten times that is one point.
+constexpr double kLeastError = 1e-7;
+constexpr double kRounding = 16 * std::numeric_limits<double>::epsilon();
 // Step of tangents by differences, as a share of the mesh size: above the noise, below curvature.
 constexpr double kDifferenceStep = 0.1;
 
@@ -59,13 +67,17 @@ bool Found(const AnswerBlock& answer, Eigen::Index j) {
 }  // namespace
 
 // The checks that need no oracle run at construction; then come the rounds of queries:
-//   1. barycentres, vertices, coverage probes, and the first step of the balls;
+//   1. barycentres, vertices, coverage probes, small steps that hold given tangent spaces against
+//      closest points, and the first step of the balls;
 //   2. tangents at the probes' closest points, by differences, if the oracle sends none;
-//      and with them the second step of the balls.
+//      and with them the second step of the balls;
+//   of a thorough audit, also balls at the barycentres' closest points.
+// All answers, and those that were known before, are then held against the mesh.
 class Certifier::Impl {
  public:
-  Impl(const Specification& spec, const MeshView& mesh, const StarFacts& facts)
-      : spec_(spec), mesh_(mesh), facts_(facts) {
+  Impl(const Specification& spec, const MeshView& mesh, const StarFacts& facts,
+       std::vector<double> known)
+      : spec_(spec), mesh_(mesh), facts_(facts), seen_(std::move(known)) {
     certificate_.inconsistent_simplices = facts.inconsistent_simplices;
     certificate_.max_circumradius = facts.max_circumradius;
     if (!CheckComplex()) {
@@ -80,13 +92,15 @@ class Certifier::Impl {
 
   void Absorb(const std::vector<AnswerBlock>& answers) {
     if (finished_) return;
+    // What it says of the oracle's own error the others need.
+    for (std::size_t b = 0; b < blocks_.size(); ++b)
+      if (roles_[b] == Role::kVertices) JudgeVertices(answers[b]);
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
       switch (roles_[b]) {
         case Role::kBarycentres:
           JudgeBarycentres(answers[b]);
           break;
         case Role::kVertices:
-          JudgeVertices(answers[b]);
           break;
         case Role::kProbes:
           TakeProbes(answers[b]);
@@ -94,8 +108,14 @@ class Certifier::Impl {
         case Role::kDifferences:
           TakeDifferences(answers[b]);
           break;
+        case Role::kTangents:
+          JudgeTangents(answers[b]);
+          break;
         case Role::kBalls:
-          balls_->Absorb(answers[b].points, answers[b].found);
+          balls_->Absorb(answers[b].points, answers[b].found, position_error_);
+          break;
+        case Role::kFeet:
+          feet_->Absorb(answers[b].points, answers[b].found, position_error_);
           break;
       }
     }
@@ -103,9 +123,11 @@ class Certifier::Impl {
   }
 
   const Certificate& certificate() const { return certificate_; }
+  const std::vector<double>& uncovered() const { return uncovered_; }
+  std::vector<double>& seen() { return seen_; }
 
  private:
-  enum class Role { kBarycentres, kVertices, kProbes, kDifferences, kBalls };
+  enum class Role { kBarycentres, kVertices, kProbes, kTangents, kDifferences, kBalls, kFeet };
 
   // A point of M that the mesh must cover.
   struct Probe {
@@ -146,6 +168,14 @@ class Certifier::Impl {
     orientation_ = std::move(connectivity.orientation);
     certificate_.euler_characteristic = links.euler_characteristic;
 
+    if (certificate_.components < static_cast<std::uint64_t>(spec_.components)) {
+      findings_.Refuse(
+          Findings::kComponents,
+          Message("the mesh has ", certificate_.components,
+                  certificate_.components == 1 ? " component" : " components", " where ",
+                  spec_.components,
+                  " were declared: give a seed on each, or a smaller epsilon if two came out as one"));
+    }
     if (!certificate_.closed) {
       findings_.Refuse(
           Findings::kComplex,
@@ -203,8 +233,19 @@ class Certifier::Impl {
                                "), more than epsilon = ", Brief(spec_.epsilon)));
     }
     size_ = std::min(shape_.max_circumradius, spec_.epsilon);
-    balls_.emplace(mesh_, stars.longest_edge, spec_.random_seed, kBallCount);
     longest_edge_ = std::move(stars.longest_edge);
+    narrowest_ = {stars.narrowest_p,
+                  (Vertex(stars.narrowest_p) - Vertex(stars.narrowest_q)).norm()};
+    balls_.emplace(mesh_, longest_edge_);
+    balls_->AddLadders(spec_.random_seed, kBallCount);
+    const std::uint64_t step =
+        spec_.audit == Audit::kThorough
+            ? 1
+            : std::max<std::uint64_t>(kBallStride, mesh_.vertices / kMaxBallPairs);
+    for (std::uint64_t v = 0; v < mesh_.vertices; v += step) {
+      const auto id = static_cast<std::uint32_t>(v);
+      balls_->AddPair(id, kPairRadius * LocalSize(id), spec_.random_seed);
+    }
   }
 
   void Ask(Role role, Eigen::MatrixXd points, bool want_tangents = false) {
@@ -219,7 +260,13 @@ class Certifier::Impl {
 
   void AskFirst() {
     const SimplexList& list = adjacency_->list();
-    chosen_simplices_ = ChooseSimplices(list, shape_, spec_.random_seed);
+    if (spec_.audit == Audit::kThorough) {
+      chosen_simplices_.resize(list.size());
+      std::iota(chosen_simplices_.begin(), chosen_simplices_.end(), 0u);
+      feet_.emplace(mesh_, longest_edge_);
+    } else {
+      chosen_simplices_ = ChooseSimplices(list, shape_, spec_.random_seed);
+    }
     shape_.diameters = {};
     shape_.tilts = {};
     chosen_vertices_ = ChooseVertices(list.vertices, spec_.random_seed);
@@ -230,6 +277,10 @@ class Certifier::Impl {
     }
     Ask(Role::kVertices, std::move(vertices));
     Ask(Role::kProbes, CoverageProbes(spec_, mesh_, list, size_), spec_.oracle.tangent_basis);
+    if (spec_.oracle.tangent_basis) {
+      tangent_check_.emplace(mesh_, size_, spec_.random_seed);
+      Ask(Role::kTangents, tangent_check_->Questions());
+    }
     Ask(Role::kBalls, balls_->Centres());
   }
 
@@ -239,6 +290,7 @@ class Certifier::Impl {
     roles_.clear();
     if (first && !spec_.oracle.tangent_basis) Ask(Role::kDifferences, DifferencePoints());
     if (ball_steps_ < kMaxBallSteps) Ask(Role::kBalls, balls_->Centres());
+    if (feet_ && ball_steps_ <= kMaxBallSteps) Ask(Role::kFeet, feet_->Centres());
     if (blocks_.empty()) Finish();
   }
 
@@ -249,6 +301,45 @@ class Certifier::Impl {
 
   Eigen::Map<const Eigen::VectorXd> Vertex(std::uint32_t v) const {
     return {mesh_.points + std::size_t{v} * mesh_.d, mesh_.d};
+  }
+
+  // The closest point of a simplex' barycentre, against that simplex.
+  void HoldFoot(const std::uint32_t* ids, const Eigen::VectorXd& y) {
+    for (int i = 0; i <= mesh_.k; ++i) {
+      const Eigen::Map<const Eigen::MatrixXd> tangent(mesh_.Tangent(ids[i]), mesh_.d, mesh_.k);
+      const Eigen::VectorXd step = y - Vertex(ids[i]);
+      const double distance = step.norm();
+      const double away = (step - tangent * (tangent.transpose() * step)).norm();
+      if (IsTelling(distance, away, longest_edge_[ids[i]], position_error_))
+        TakeReach(distance * distance / (2 * away), {ids[i], distance});
+    }
+  }
+
+  void JudgeTangents(const AnswerBlock& answer) {
+    std::string problem = tangent_check_->Judge(answer, position_error_);
+    if (!problem.empty()) findings_.Refuse(Findings::kTangents, std::move(problem));
+  }
+
+  // How much of a step off M at a simplex lies along M, by its vertices' tangent spaces.
+  double Lean(const std::uint32_t* ids, const Eigen::VectorXd& step) const {
+    Eigen::VectorXd along = Eigen::VectorXd::Zero(mesh_.d);
+    for (int i = 0; i <= mesh_.k; ++i) {
+      const Eigen::Map<const Eigen::MatrixXd> tangent(mesh_.Tangent(ids[i]), mesh_.d, mesh_.k);
+      along += tangent * (tangent.transpose() * step);
+    }
+    return along.norm() / (mesh_.k + 1);
+  }
+
+  // An orthonormal basis, nearly of the tangent space of M under a simplex.
+  Eigen::MatrixXd TangentsUnder(const std::uint32_t* ids) const {
+    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(mesh_.d, mesh_.k);
+    const Eigen::Map<const Eigen::MatrixXd> first(mesh_.Tangent(ids[0]), mesh_.d, mesh_.k);
+    for (int i = 0; i <= mesh_.k; ++i) {
+      const Eigen::Map<const Eigen::MatrixXd> tangent(mesh_.Tangent(ids[i]), mesh_.d, mesh_.k);
+      sum += tangent * (tangent.transpose() * first);
+    }
+    return Eigen::HouseholderQR<Eigen::MatrixXd>(sum).householderQ() *
+           Eigen::MatrixXd::Identity(mesh_.d, mesh_.k);
   }
 
   void JudgeBarycentres(const AnswerBlock& answer) {
@@ -265,6 +356,20 @@ class Certifier::Impl {
       certificate_.max_barycentre_distance =
           std::max(certificate_.max_barycentre_distance, distance);
       const std::uint32_t* ids = list[chosen_simplices_[static_cast<std::size_t>(j)]];
+      const Eigen::VectorXd step = asked.col(j) - answer.points.col(j);
+      if (feet_)
+        feet_->AddPair(ids[0], answer.points.col(j), TangentsUnder(ids),
+                       kPairRadius * LocalSize(ids[0]),
+                       ~(Mix64(spec_.random_seed) + static_cast<std::uint64_t>(j)));
+      if (distance > kBarycentreNoise * size_ && Lean(ids, step) > kLean * distance) {
+        findings_.Refuse(
+            Findings::kRim,
+            Message("the manifold may end under simplex ", NameSimplex(ids, mesh_.k + 1),
+                    ": its barycentre is ", Brief(distance), " away from the closest point ",
+                    NamePoint(answer.points.col(j)),
+                    ", and not straight above it; holes and boundaries are not meshed"));
+      }
+      HoldFoot(ids, answer.points.col(j));
       const double bound =
           kBarycentreShare * std::min(Circumradius(ids), spec_.epsilon) + kBarycentreNoise * size_;
       if (distance - bound <= worst_excess) continue;
@@ -311,6 +416,7 @@ class Certifier::Impl {
                                  Brief(error), " away"));
       }
     }
+    position_error_ = std::max({worst, kLeastError * size_, kRounding * LargestCoordinate()});
     if (worst > kNoticeablePositionError * size_ && worst <= kPositionTolerance * size_) {
       findings_.Warn(Message("The oracle moves points that it returned itself by up to ",
                              Brief(worst), ", ", Brief(100 * worst / size_),
@@ -331,6 +437,7 @@ class Certifier::Impl {
       const Eigen::Index j = found[n];
       Probe probe;
       probe.x = answer.points.col(j);
+      seen_.insert(seen_.end(), probe.x.begin(), probe.x.end());
       probe.nearest = nearest[n];
       if (probe.nearest.distance > kCoverageShare * size_) {
         ++certificate_.fibre_samples;
@@ -416,26 +523,78 @@ class Certifier::Impl {
     probes_.clear();
   }
 
+  double LargestCoordinate() const {
+    const MeshBox box = BoxOf(mesh_);
+    return std::max(box.lower.cwiseAbs().maxCoeff(), box.upper.cwiseAbs().maxCoeff());
+  }
+
+  // All that was ever answered, against the mesh.
+  void JudgeEvidence() {
+    for (const auto* balls : {&balls_, &feet_})
+      if (*balls) seen_.insert(seen_.end(), (*balls)->met().begin(), (*balls)->met().end());
+    const bool graded = facts_.max_size_ratio > 0;
+    const std::uint64_t vertices =
+        spec_.audit == Audit::kThorough ? mesh_.vertices : kMaxVerticesHeld;
+    const Evidence evidence =
+        HoldAgainst(mesh_, seen_, longest_edge_, size_, graded, position_error_, vertices);
+    coarseness_ = evidence.coarseness;
+    TakeReach(evidence.reach, {evidence.vertex, evidence.distance});
+    certificate_.answers_held =
+        seen_.size() / static_cast<std::size_t>(mesh_.d) + chosen_simplices_.size();
+    for (const std::uint64_t i : evidence.uncovered) {
+      const double* y = seen_.data() + i * static_cast<std::size_t>(mesh_.d);
+      uncovered_.insert(uncovered_.end(), y, y + mesh_.d);
+    }
+    if (evidence.uncovered.empty()) return;
+    const Eigen::VectorXd y = Eigen::Map<const Eigen::VectorXd>(uncovered_.data(), mesh_.d);
+    findings_.Refuse(Findings::kCoverage,
+                     Message("the mesh misses a part of the manifold: the oracle answered with ",
+                             NamePoint(y), ", and no vertex is near; answers like it: ",
+                             evidence.uncovered.size()));
+  }
+
+  // Where M was seen narrow: at a vertex, and how far from there the other side is.
+  struct Narrow {
+    std::uint32_t vertex = 0;
+    double across = 0;
+  };
+  void TakeReach(double reach, Narrow where) {
+    if (reach >= reach_) return;
+    reach_ = reach;
+    narrowest_ = where;
+  }
+
   void JudgeReach() {
-    reach_ = std::min(reach_, balls_->reach());
+    for (const auto* balls : {&balls_, &feet_}) {
+      if (!*balls) continue;
+      coarseness_ = std::max(coarseness_, (*balls)->coarseness());
+      TakeReach((*balls)->reach(), {(*balls)->narrowest(), (*balls)->distance()});
+    }
     certificate_.estimated_reach = reach_;
     const bool graded = facts_.max_size_ratio > 0;
-    certificate_.epsilon_over_reach =
-        graded ? std::max(facts_.max_size_ratio, balls_->coarseness()) : spec_.epsilon / reach_;
-    if (graded ? certificate_.epsilon_over_reach > kHopeless : size_ > kHopeless * reach_) {
-      findings_.Refuse(Findings::kReach,
-                       Message("the mesh size ", Brief(size_), " is ", Brief(size_ / reach_),
-                               " times the estimated reach ", Brief(reach_),
-                               ", far too coarse to tell the manifold's shape"));
+    const double ratio = graded ? std::max(facts_.max_size_ratio, coarseness_) : size_ / reach_;
+    certificate_.epsilon_over_reach = graded ? ratio : spec_.epsilon / reach_;
+    if (ratio > kCoarse) {
+      findings_.Refuse(
+          Findings::kReach,
+          Message("too coarse to trust: ",
+                  TooCoarse(ratio, reach_, Message("near vertex ", narrowest_.vertex, " at ",
+                                                   NamePoint(Vertex(narrowest_.vertex)))),
+                  narrowest_.across < kThin * size_
+                      ? Message(". Two points of it there are only ", Brief(narrowest_.across),
+                                " apart: if nothing so thin should be there, check the dimension (a "
+                                "wall is no surface, a wire no curve)")
+                      : std::string()));
     }
-    const double coarse = graded ? certificate_.epsilon_over_reach * reach_ : spec_.epsilon;
-    if (std::string w = CoarsenessWarning(coarse, reach_); !w.empty()) findings_.Warn(std::move(w));
     if (spec_.criteria.max_deviation &&
         certificate_.max_barycentre_distance > *spec_.criteria.max_deviation) {
-      findings_.Warn(Message(
-          "a barycentre lies ", Brief(certificate_.max_barycentre_distance),
-          " from the manifold, more than max_deviation = ", Brief(*spec_.criteria.max_deviation),
-          ": the curvature was underestimated there; take epsilon smaller."));
+      findings_.Refuse(
+          Findings::kDeviation,
+          Message("a barycentre lies ", Brief(certificate_.max_barycentre_distance),
+                  " from the manifold, more than max_deviation = ",
+                  Brief(*spec_.criteria.max_deviation),
+                  ": the manifold bends more there than the vertices show; take epsilon smaller, or "
+                  "max_deviation"));
     }
   }
 
@@ -446,8 +605,11 @@ class Certifier::Impl {
 
   void Finish() {
     finished_ = true;
-    if (balls_) JudgeReach();
-    findings_.Conclude(mesh_.k, certificate_);
+    if (balls_) {
+      JudgeEvidence();
+      JudgeReach();
+    }
+    findings_.Conclude(mesh_.k, spec_, certificate_);
   }
 
   const Specification spec_;
@@ -457,26 +619,36 @@ class Certifier::Impl {
   Findings findings_;
   std::optional<Adjacency> adjacency_;
   std::optional<ShrinkingBalls> balls_;
+  std::optional<ShrinkingBalls> feet_;  // of a thorough audit: at the barycentres' closest points
+  std::optional<TangentCheck> tangent_check_;
   std::vector<std::int8_t> orientation_;  // until the stars are measured
   MeshShape shape_;
   double reach_ = 0;
+  Narrow narrowest_;
+  double coarseness_ = 0;
+  double position_error_ = 0;  // of the oracle, as seen at the vertices
   std::vector<double> longest_edge_;  // by vertex
   double size_ = 0;                   // the mesh's own: its largest circumradius, epsilon at most
   std::vector<std::uint32_t> chosen_simplices_, chosen_vertices_;
   std::string barycentre_problem_;
   std::vector<Probe> probes_;
+  std::vector<double> seen_;       // points of M that were answered, d each
+  std::vector<double> uncovered_;  // those that no vertex is near to
   int ball_steps_ = 0;
   bool finished_ = false;
   std::vector<QueryBlock> blocks_;
   std::vector<Role> roles_;
 };
 
-Certifier::Certifier(const Specification& spec, const MeshView& mesh, const StarFacts& facts)
-    : impl_(std::make_unique<Impl>(spec, mesh, facts)) {}
+Certifier::Certifier(const Specification& spec, const MeshView& mesh, const StarFacts& facts,
+                     std::vector<double> known)
+    : impl_(std::make_unique<Impl>(spec, mesh, facts, std::move(known))) {}
 Certifier::~Certifier() = default;
 
 const std::vector<QueryBlock>* Certifier::NextBlocks() { return impl_->NextBlocks(); }
 void Certifier::Absorb(const std::vector<AnswerBlock>& answers) { impl_->Absorb(answers); }
 const Certificate& Certifier::certificate() const { return impl_->certificate(); }
+const std::vector<double>& Certifier::Uncovered() const { return impl_->uncovered(); }
+std::vector<double> Certifier::TakeSeen() { return std::move(impl_->seen()); }
 
 }  // namespace stellate::core

@@ -35,7 +35,9 @@ struct StarFacts {
 // asks for closest points in a few batches, then holds the certificate.
 class Certifier {
  public:
-  Certifier(const Specification& spec, const MeshView& mesh, const StarFacts& facts);
+  // `known`: points of M, d each, that were answered before and are no vertices.
+  Certifier(const Specification& spec, const MeshView& mesh, const StarFacts& facts,
+            std::vector<double> known = {});
   ~Certifier();
 
   // The next closest-point queries, or nullptr when the certificate is complete.
@@ -43,6 +45,11 @@ class Certifier {
   // Answers have passed CheckAnswers.
   void Absorb(const std::vector<AnswerBlock>& answers);
   const Certificate& certificate() const;
+  // Once it is complete: points of M, d each, that the mesh has no vertex near. Where there are any
+  // it is refused, but may become right when they are inserted.
+  const std::vector<double>& Uncovered() const;
+  // All that it knew or was answered, d each.
+  std::vector<double> TakeSeen();
 
  private:
   class Impl;

@@ -6,11 +6,12 @@
 
 namespace stellate::core {
 
-std::string CoarsenessWarning(double epsilon, double reach) {
-  if (!(epsilon > kCoarse * reach)) return {};
-  return Message("epsilon is ", Brief(epsilon / reach), " times the estimated reach ", Brief(reach),
-                 ": too coarse to trust the mesh's topology; take epsilon at most ",
-                 Brief(0.4 * reach), ".");
+std::string TooCoarse(double ratio, double reach, const std::string& where) {
+  return Message("the mesh size is ", Brief(ratio), " times the estimated reach ", Brief(reach),
+                 where.empty() ? "" : ", which was seen ", where,
+                 ": the manifold bends that sharply, or comes so near to itself, there; take epsilon "
+                 "at most ",
+                 Brief(0.4 * reach));
 }
 
 void Findings::Refuse(Subject subject, std::string problem) {
@@ -20,7 +21,7 @@ void Findings::Refuse(Subject subject, std::string problem) {
   problems_.insert(place, {subject, std::move(problem)});
 }
 
-void Findings::Conclude(int k, Certificate& certificate) const {
+void Findings::Conclude(int k, const Specification& spec, Certificate& certificate) const {
   certificate.certified = clean();
   certificate.warnings = warnings_;
   if (!clean()) {
@@ -37,10 +38,16 @@ void Findings::Conclude(int k, Certificate& certificate) const {
       " manifold of dimension ", k, " with ", components,
       components == 1 ? " component" : " components", " and Euler characteristic ",
       certificate.euler_characteristic,
-      "; each star embeds in the tangent space of its centre and ", certificate.fibre_samples,
-      " sampled normal flats meet the mesh once. Components of the manifold that no seed or "
-      "sampled "
-      "point fell on cannot be excluded.");
+      ". Decided on the whole mesh: it is closed, and each star embeds in the tangent space of its "
+      "centre. Sampled: ",
+      certificate.fibre_samples, " normal flats meet the mesh once, ",
+      spec.audit == Audit::kThorough ? "balls at every vertex and simplex" : "balls at some vertices",
+      " show no reach below ", Brief(certificate.estimated_reach), ", and all of ",
+      certificate.answers_held,
+      " answers that are no vertices lie on the mesh. Assumed: that the manifold has no boundary, and "
+      "no part narrower than epsilon that no question came near. Components of the manifold that no "
+      "seed or sampled point fell on cannot be excluded",
+      components == static_cast<std::uint64_t>(spec.components) ? ", but as many were declared." : ".");
 }
 
 }  // namespace stellate::core

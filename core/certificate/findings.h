@@ -4,14 +4,15 @@
 #include <vector>
 
 #include "core/report.h"
+#include "core/specification.h"
 
 namespace stellate::core {
 
-// eps / reach: up to this, meshing was seen to work reliably.
+// Mesh size over reach: up to this, meshing was seen to work reliably; coarser meshes are refused.
 inline constexpr double kCoarse = 0.8;
 
-// A warning for people where epsilon is above kCoarse times the (estimated) reach, else empty.
-std::string CoarsenessWarning(double epsilon, double reach);
+// That a mesh is `ratio` times as coarse as a reach, and what to do; `where` it was seen, or empty.
+std::string TooCoarse(double ratio, double reach, const std::string& where);
 
 // What speaks against a mesh, in plain words: problems refuse it, warnings do not.
 class Findings {
@@ -24,10 +25,14 @@ class Findings {
     kStars,
     kSize,
     kVertices,
+    kTangents,
+    kReach,
+    kRim,
     kBarycentres,
     kCoverage,
     kFibres,
-    kReach,
+    kComponents,
+    kDeviation,
     kConvergence,
   };
 
@@ -37,7 +42,7 @@ class Findings {
 
   bool clean() const { return problems_.empty(); }
   // Sets certified, verdict and warnings from these findings and the certificate's values.
-  void Conclude(int k, Certificate& certificate) const;
+  void Conclude(int k, const Specification& spec, Certificate& certificate) const;
 
  private:
   struct Problem {

@@ -19,6 +19,14 @@ inline constexpr std::uint32_t kMaxVertexProbes = 256;
 inline constexpr int kProbesOfAKind = 80;  // near the mesh; its box; the client's box; its seeds
 inline constexpr int kBallCount = 64;
 inline constexpr int kMaxBallSteps = 2;
+// Balls of this radius, in mesh sizes, on either side of every eighth vertex, a bounded number of
+// them; of all vertices in a thorough audit. A sheet that such a ball meets is nearer than twice
+// the reach that the mesh size needs.
+inline constexpr double kPairRadius = 2.5;
+inline constexpr std::uint64_t kBallStride = 8;
+inline constexpr std::uint64_t kMaxBallPairs = 512;
+// Vertices held against the tangent spaces of those near them.
+inline constexpr std::uint64_t kMaxVerticesHeld = 256;
 
 // The smallest box that holds the mesh's vertices.
 struct MeshBox {

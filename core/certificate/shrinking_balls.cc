@@ -2,91 +2,117 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
+#include "core/certificate/evidence.h"
 #include "core/certificate/probes.h"
-#include "core/sample/random.h"
 
 namespace stellate::core {
 namespace {
 
-constexpr double kTellingDistance = 0.5;  // of the longest edge at the vertex
 // A ball is asked about at slightly less than the radius found: the centre of the very ball that
 // touches M twice is on the medial axis, where oracles divide by zero.
 constexpr double kInside = 0.98;
 constexpr int kLadder = 6;
-
-using ConstPoint = Eigen::Map<const Eigen::VectorXd>;
-
-ConstPoint PointOf(const MeshView& mesh, std::uint32_t v) {
-  return ConstPoint(mesh.points + std::size_t{v} * mesh.d, mesh.d);
-}
+constexpr double kMet = 1e-3;  // of the longest edge
+// Sine of the angle by which the tangent space at a point that is no vertex may be wrong.
+constexpr double kTilt = 0.15;
 
 }  // namespace
 
-ShrinkingBalls::ShrinkingBalls(const MeshView& mesh, const std::vector<double>& longest_edge,
-                               std::uint64_t random_seed, int count)
-    : mesh_(mesh), reach_(std::numeric_limits<double>::infinity()) {
-  const int d = mesh.d;
-  const int k = mesh.k;
-  const MeshBox box = BoxOf(mesh);
-  const double start = (box.upper - box.lower).norm() / 2;
+Eigen::VectorXd ShrinkingBalls::PointOf(const Ball& ball) const {
+  if (ball.point.size() > 0) return ball.point;
+  return Eigen::Map<const Eigen::VectorXd>(mesh_.Point(ball.vertex), mesh_.d);
+}
 
+Eigen::MatrixXd ShrinkingBalls::TangentsOf(std::uint32_t v) const {
+  return Eigen::Map<const Eigen::MatrixXd>(mesh_.Tangent(v), mesh_.d, mesh_.k);
+}
+
+// A random direction across the tangents; false if there is none.
+bool ShrinkingBalls::AimAcross(const Eigen::MatrixXd& tangents, Random& random, Ball* ball) const {
+  ball->normal.resize(mesh_.d);
+  for (int i = 0; i < mesh_.d; ++i) ball->normal[i] = random.Normal();
+  for (int pass = 0; pass < 2; ++pass)
+    ball->normal -= tangents * (tangents.transpose() * ball->normal).eval();
+  const double length = ball->normal.norm();
+  if (!(length > 1e-6) || !(longest_edge_[ball->vertex] > 0)) return false;
+  ball->normal /= length;
+  return true;
+}
+
+void ShrinkingBalls::AddLadders(std::uint64_t random_seed, int count) {
+  const MeshBox box = BoxOf(mesh_);
   Random random(random_seed, 0x62616c6c73);
   for (int n = 0; n < count; ++n) {
     Ball ball;
-    ball.vertex = static_cast<std::uint32_t>(random.Next() % mesh.vertices);
-    for (int rung = 0; rung < kLadder; ++rung) ball.radii.push_back(std::ldexp(start, -rung));
-    ball.scale = kTellingDistance * longest_edge[ball.vertex];
-    ball.normal.resize(d);
-    for (int i = 0; i < d; ++i) ball.normal[i] = random.Normal();
-    const Eigen::Map<const Eigen::MatrixXd> tangent(mesh.Tangent(ball.vertex), d, k);
-    for (int pass = 0; pass < 2; ++pass) {
-      ball.normal -= tangent * (tangent.transpose() * ball.normal).eval();
-    }
-    const double length = ball.normal.norm();
-    if (!(length > 1e-6) || !(ball.scale > 0)) continue;
-    ball.normal /= length;
-    active_.push_back(std::move(ball));
+    ball.vertex = static_cast<std::uint32_t>(random.Next() % mesh_.vertices);
+    ball.rungs = kLadder;
+    ball.radius = (box.upper - box.lower).norm() / 2;
+    if (AimAcross(TangentsOf(ball.vertex), random, &ball)) active_.push_back(std::move(ball));
   }
+}
+
+void ShrinkingBalls::AddPair(std::uint32_t v, double radius, std::uint64_t random_seed) {
+  AddPair(v, {}, TangentsOf(v), radius, Mix64(random_seed) + v);
+}
+
+void ShrinkingBalls::AddPair(std::uint32_t v, const Eigen::VectorXd& point,
+                             const Eigen::MatrixXd& tangents, double radius,
+                             std::uint64_t random_key) {
+  Random random(random_key, 0x70616972);
+  Ball ball;
+  ball.vertex = v;
+  ball.radius = radius;
+  ball.point = point;
+  if (!AimAcross(tangents, random, &ball)) return;
+  active_.push_back(ball);
+  ball.normal = -ball.normal;
+  active_.push_back(std::move(ball));
 }
 
 Eigen::MatrixXd ShrinkingBalls::Centres() const {
   Eigen::Index count = 0;
-  for (const Ball& ball : active_) count += static_cast<Eigen::Index>(ball.radii.size());
+  for (const Ball& ball : active_) count += ball.rungs;
   Eigen::MatrixXd centres(mesh_.d, count);
   Eigen::Index next = 0;
   for (const Ball& ball : active_)
-    for (const double radius : ball.radii)
-      centres.col(next++) = PointOf(mesh_, ball.vertex) + radius * ball.normal;
+    for (int rung = 0; rung < ball.rungs; ++rung)
+      centres.col(next++) = PointOf(ball) + std::ldexp(ball.radius, -rung) * ball.normal;
   return centres;
 }
 
-void ShrinkingBalls::Absorb(const Eigen::MatrixXd& nearest,
-                            const std::vector<std::uint8_t>& found) {
+void ShrinkingBalls::Absorb(const Eigen::MatrixXd& nearest, const std::vector<std::uint8_t>& found,
+                            double position_error) {
   std::vector<Ball> still;
   Eigen::Index next = 0;
   for (Ball& ball : active_) {
-    double narrowest = std::numeric_limits<double>::infinity();
-    for (const double asked : ball.radii) {
+    const double edge = longest_edge_[ball.vertex];
+    double narrowest = std::numeric_limits<double>::infinity(), across = 0;
+    for (int rung = 0; rung < ball.rungs; ++rung) {
       const Eigen::Index n = next++;
       if (!found.empty() && !found[static_cast<std::size_t>(n)]) continue;
-      const Eigen::VectorXd offset = nearest.col(n) - PointOf(mesh_, ball.vertex);
+      const Eigen::VectorXd offset = nearest.col(n) - PointOf(ball);
       const double distance = offset.norm();
-      const double along = ball.normal.dot(offset);
-      if (distance < ball.scale || along <= 0) continue;
+      if (distance > kMet * edge) met_.insert(met_.end(), nearest.col(n).begin(), nearest.col(n).end());
+      const bool exact = ball.point.size() == 0;
+      const double along = ball.normal.dot(offset) - (exact ? 0 : kTilt * distance);
+      const double far = exact ? edge : std::numeric_limits<double>::infinity();
+      if (along <= 0 || !IsTelling(distance, along, far, position_error)) continue;
       const double radius = distance * distance / (2 * along);
-      if (radius < asked) narrowest = std::min(narrowest, radius);
+      if (radius >= std::ldexp(ball.radius, -rung) || radius >= narrowest) continue;
+      narrowest = radius;
+      across = distance;
     }
     if (std::isinf(narrowest)) continue;
-    const double circumradius = ball.scale / kTellingDistance * std::numbers::inv_sqrt3;
-    coarseness_ = std::max(coarseness_, circumradius / narrowest);
+    coarseness_ = std::max(coarseness_, edge * std::numbers::inv_sqrt3 / narrowest);
     if (narrowest < reach_) {
       reach_ = narrowest;
       narrowest_ = ball.vertex;
+      distance_ = across;
     }
-    ball.radii.assign(1, kInside * narrowest);
+    ball.rungs = 1;
+    ball.radius = kInside * narrowest;
     still.push_back(std::move(ball));
   }
   active_ = std::move(still);

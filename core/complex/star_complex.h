@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -154,15 +155,23 @@ class StarComplex {
   void BuildStar(const Site& p, const Site* guest, std::uint32_t near, Cell& cell,
                  typename Cell::Scratch& scratch, const Influencing& influencing) const;
   void Neighbourhood(const double* q, std::uint32_t near, std::vector<std::uint32_t>* ids) const;
-  // Calls visit(v, simplex) for the simplices of star(p) of which p is the lowest vertex.
+  // Calls visit(v, simplex) for the simplices of star(p) of which p is the lowest vertex, once for
+  // each: at common centres a cell that is far from convex may hold one at two vertices.
   template <typename Visit>
   void ForEachOwned(std::uint32_t p, const Visit& visit) const {
     const Cell& cell = cells_[p];
     Simplex simplex;
+    thread_local std::vector<std::uint64_t> keys;
+    keys.clear();
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
       bool lowest = true;
       for (int i = 0; i < K; ++i) lowest = lowest && cell.id(cell.facet(v, i)) > p;
-      if (lowest && SimplexOf(p, cell, v, &simplex)) visit(v, simplex);
+      if (!lowest || !SimplexOf(p, cell, v, &simplex)) continue;
+      if (judging_ == Judging::kCommonCentre) {
+        if (std::find(keys.begin(), keys.end(), cell.key(v)) != keys.end()) continue;
+        keys.push_back(cell.key(v));
+      }
+      visit(v, simplex);
     }
   }
   // Commit, step by step.

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <utility>
 
+#include "core/certificate/findings.h"
 #include "core/message.h"
 #include "core/parallel.h"
 
@@ -194,7 +195,8 @@ void Refinement<K>::Advance(const Answers& answers) {
       certifier_->Absorb(answers.blocks);
       if (const auto* blocks = certifier_->NextBlocks())
         batch_ = QueryBatch{0, *blocks};
-      else
+      else if (filled_over_ || certifier_->certificate().epsilon_over_reach > kCoarse ||
+               !AskForEvidence(certifier_->Uncovered()))
         Finish(Termination::kConverged);
       break;
     case Stage::kTangents:
@@ -303,6 +305,8 @@ void Refinement<K>::AfterPoints() {
 
 template <int K>
 void Refinement<K>::AfterTangents() {
+  answered_ = found_;
+  used_.assign(found_.size(), 0);
   if (!spec_.oracle.tangent_basis) {
     Eigen::Index next = 0;
     for (Eigen::Index c = 0; c < points_.cols(); ++c) {
@@ -320,8 +324,12 @@ void Refinement<K>::AfterTangents() {
       InsertTargets();
       InsertAhead();
       break;
+    case Purpose::kEvidence:
+      InsertEvidence();
+      break;
   }
   if (over_) return;
+  KeepAsEvidence();
   Commit();
   Plan();
 }

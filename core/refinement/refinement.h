@@ -59,7 +59,7 @@ class Refinement final : public Mesher {
  private:
   enum class Stage { kPoints, kAlternate, kTangents, kCertify };
   // What the points that are asked for are for.
-  enum class Purpose { kSeeds, kTargets };
+  enum class Purpose { kSeeds, kTargets, kEvidence };
 
   // Points that a rehearsal wants, in the order of their insertion.
   struct Ahead {
@@ -120,6 +120,20 @@ class Refinement final : public Mesher {
   void Insert(Eigen::Index candidate, Rule rule, std::uint32_t near);
   void Commit();
   void StartCertificate();
+
+  // Answers that were not inserted (refinement_evidence.cc).
+  void KeepAsEvidence();
+  std::vector<double> UncoveredEvidence() const;
+  double ClearanceOf(const double* y, std::uint32_t* nearest) const;
+  bool AskForEvidence(const std::vector<double>& points);
+  void InsertEvidence();
+
+  // What goes on without end (refinement_stop.cc).
+  bool HasLeftBox();
+  bool HasStalled();
+  std::string WhyStopped() const;
+  void WarnOfBox(Certificate* certificate) const;
+
   void HandOutFilled();
   double MaxAgreedNorm2(std::uint32_t p) const;
   std::uint64_t SimplexCount() const {
@@ -173,6 +187,8 @@ class Refinement final : public Mesher {
   Eigen::MatrixXd candidates_;                        // d x n, as asked for
   Eigen::MatrixXd points_;                            // d x n, as answered
   std::vector<std::uint8_t> found_;
+  std::vector<std::uint8_t> answered_;  // found, whether or not tangents were
+  std::vector<std::uint8_t> used_;      // inserted
   Eigen::MatrixXd tangents_;  // (K rows of d) x n
   Eigen::VectorXd sizes_;     // n, where the client gives them
   TangentFinder tangent_finder_;
@@ -205,6 +221,18 @@ class Refinement final : public Mesher {
   bool filled_over_ = false;                 // the mesh is the filled one, no more the stars' union
   bool all_suspect_ = true;                  // R3 and R4 were not judged yet
   std::uint64_t before_good_points_ = 0;     // vertices when R1 and R2 first held
+
+  // Points of M that were answered and are no vertices, d each: the mesh must cover them.
+  std::vector<double> evidence_;
+  int evidence_rounds_ = 0;
+
+  std::uint32_t boxed_ = 0;            // vertices held against the client's box
+  std::uint64_t outside_box_ = 0;      // those that lie outside
+  double farthest_outside_ = 0;        // of them, length
+  std::uint64_t left_then_ = ~std::uint64_t{0};  // violations, at the last progress
+  std::uint64_t stalled_rounds_ = 0;   // since then
+  bool front_moved_ = false;           // in the round
+  bool judges_all_ = true;             // all_suspect_ of the round before
 
   std::unique_ptr<Certifier> certifier_;
   std::uint64_t too_fine_ = 0;  // stars whose given size asks for less than is meshed

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <limits>
 
+#include "core/certificate/evidence.h"
 #include "core/certificate/findings.h"
 #include "core/complex/consistency.h"
 #include "core/message.h"
@@ -13,6 +14,13 @@
 #include "core/refinement/refinement.h"
 
 namespace stellate::core {
+namespace {
+
+// Of epsilon: answers wrong by more do not go unnoticed (CheckIdempotence), and points of a run that
+// does not end may lie so near to each other that this tells what they seem to bend by.
+constexpr double kLikelyError = 1e-3;
+
+}  // namespace
 
 // From here on the mesh is the filled one; the round's delta says what that changes.
 template <int K>
@@ -67,6 +75,7 @@ double Refinement<K>::MaxAgreedNorm2(std::uint32_t p) const {
 template <int K>
 void Refinement<K>::StartCertificate() {
   if (rehearsal_) return Finish(Termination::kConverged);
+  if (AskForEvidence(UncoveredEvidence())) return;
   if (!filled_stars_.empty()) HandOutFilled();
   StarFacts facts;
   facts.converged = true;
@@ -84,7 +93,7 @@ void Refinement<K>::StartCertificate() {
                       complex_.points().data(),
                       complex_.Tangent(0),
                       &certified_simplices_};
-  certifier_ = std::make_unique<Certifier>(spec_, view, facts);
+  certifier_ = std::make_unique<Certifier>(spec_, view, facts, std::move(evidence_));
   if (const auto* blocks = certifier_->NextBlocks()) {
     batch_ = QueryBatch{0, *blocks};
     stage_ = Stage::kCertify;
@@ -131,8 +140,9 @@ void Refinement<K>::Finish(Termination termination) {
     // Whoever cancels a large mesh does not want to wait for it to be described.
     if (termination != Termination::kCancelled && termination != Termination::kOracleFailed)
       DescribeUnfinished();
-    if (termination == Termination::kNoProgress) certificate.verdict += "; " + WhatIsLeft();
+    if (termination == Termination::kNoProgress) certificate.verdict += "; " + WhyStopped();
   }
+  if (whole) WarnOfBox(&certificate);
   certifier_.reset();
   certified_simplices_ = {};
   if (whole)
@@ -160,7 +170,8 @@ void Refinement<K>::DescribeUnfinished() {
       double along2 = 0;
       for (const double a : along) along2 += a * a;
       const double away = std::sqrt(std::max(distance2 - along2, 0.0));
-      if (away > 0) reach = std::min(reach, distance2 / (2 * away));
+      if (IsTelling(std::sqrt(distance2), away, spec_.epsilon, kLikelyError * spec_.epsilon))
+        reach = std::min(reach, distance2 / (2 * away));
     }
   }
   if (std::isinf(reach)) {
@@ -172,8 +183,8 @@ void Refinement<K>::DescribeUnfinished() {
   }
   certificate.estimated_reach = reach;
   certificate.epsilon_over_reach = spec_.epsilon / reach;
-  if (std::string w = CoarsenessWarning(spec_.epsilon, reach); !w.empty())
-    certificate.warnings.push_back(std::move(w));
+  if (spec_.epsilon > kCoarse * reach)
+    certificate.warnings.push_back(TooCoarse(spec_.epsilon / reach, reach, "") + ".");
 }
 
 // What still breaks a rule, for people.

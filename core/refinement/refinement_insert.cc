@@ -126,6 +126,7 @@ void Refinement<K>::InsertRefined(std::size_t i, Fitness fitness, bool* all_calm
     report_.counts.duplicates += fitness.duplicate;
     return Discourage(t.star);
   }
+  front_moved_ = front_moved_ || t.violation.fake;
   Insert(c, t.violation.rule, t.star);
 }
 
@@ -133,6 +134,7 @@ template <int K>
 void Refinement<K>::Append(Eigen::Index c, std::uint32_t near) {
   complex_.Append(points_.col(c).data(), tangents_.col(c).data(), near);
   if (criteria_.sizes_given) given_size_.push_back(sizes_[c]);
+  used_[static_cast<std::size_t>(c)] = 1;
 }
 
 template <int K>

@@ -228,6 +228,7 @@ bool Refinement<K>::IsFilled(std::uint32_t star, const Violation<K>& violation) 
 template <int K>
 void Refinement<K>::Plan() {
   if (complex_.size() >= spec_.limits.max_vertices) return Finish(Termination::kVertexBudget);
+  if (HasLeftBox()) return Finish(Termination::kNoProgress);
   if (!all_suspect_) {
     const double most = std::max(kMostGrowth * static_cast<double>(before_good_points_),
                                  static_cast<double>(before_good_points_ + kLeastGrowth));
@@ -247,6 +248,7 @@ void Refinement<K>::Plan() {
     if (!all_filled || !blemished_.empty()) return Finish(Termination::kNoProgress);
     return StartCertificate();
   }
+  if (HasStalled()) return Finish(Termination::kNoProgress);
   targets_ = SelectIndependent<K>(complex_, std::move(targets),
                                   spec_.limits.max_vertices - complex_.size());
   if (criteria_.ask_ahead && !ahead_failed_) AskAhead();

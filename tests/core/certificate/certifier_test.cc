@@ -227,16 +227,6 @@ TEST(Certifier, RefusesASphereThatStandsForATorus) {
   EXPECT_EQ(c.euler_characteristic, 2);
   EXPECT_FALSE(c.certified);
   EXPECT_GT(c.epsilon_over_reach, 3);
-  ASSERT_FALSE(c.warnings.empty());
-  EXPECT_TRUE(Says(c.warnings.back(), "times the estimated reach")) << c.warnings.back();
-}
-
-TEST(Certifier, WarnsWhenEpsilonIsCoarseForTheReach) {
-  const HandmadeMesh mesh = Icosphere(3);
-  const Certificate c = Certify(SpecificationFor(mesh, 0.9), mesh, ClosestOnSphere).certificate;
-  EXPECT_TRUE(c.certified) << c.verdict;
-  ASSERT_EQ(c.warnings.size(), 1u);
-  EXPECT_TRUE(Says(c.warnings[0], "epsilon is 0.9 times the estimated reach")) << c.warnings[0];
 }
 
 TEST(Certifier, RefusesVerticesOffTheManifold) {

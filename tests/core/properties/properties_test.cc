@@ -49,7 +49,7 @@ constexpr Shape kShapes[] = {{"circle:3", 0.3},
                              {"two-spheres", 0.3},
                              {"so3", 0.8, true, 1e10},
                              {"flat-torus:3", 0.7},
-                             {"ellipsoid:1:0.9:0.8:0.7", 0.45}};
+                             {"ellipsoid:1:0.9:0.8:0.76", 0.45}};
 
 void PrintTo(const Shape& s, std::ostream* out) { *out << s.manifold; }
 
