@@ -182,6 +182,8 @@ void LayOutSpecification(Archive& archive, Value& spec) {
   }
   archive.Numbers(spec.seeds);
   archive.Number(spec.box_seeds);
+  archive.Number(spec.components);
+  archive.Number(spec.audit);
   archive.Number(spec.random_seed);
   auto& criteria = spec.criteria;
   archive.Number(criteria.radius_edge_bound);

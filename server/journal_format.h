@@ -14,7 +14,7 @@ namespace stellate::server {
 
 // How a journal's records are laid out: little-endian numbers of 8 bytes, strings and arrays after
 // their sizes. A change of any of these is a new kJournalVersion.
-inline constexpr std::uint32_t kJournalVersion = 4;
+inline constexpr std::uint32_t kJournalVersion = 5;
 
 // Name, owner, label, specification, and the two times that a client may ask for. What the server
 // decides (chunk sizes, numbers of workers) is not recorded: the next server may decide otherwise.

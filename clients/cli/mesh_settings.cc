@@ -12,6 +12,7 @@ constexpr MeshSetting kRun[] = {
     {"--max-rounds", &O::max_rounds, "stop after so many round trips"},
     {"--max-batch-queries", &O::max_batch_queries, "ask larger rounds in several batches"},
     {"--box-seeds", &O::box_seeds, "points of the box tried as seeds"},
+    {"--components", &O::components, "that the manifold has at least: fewer are not certified"},
     {"--reconnect", &O::reconnect_seconds, "seconds to wait for a server that went away"},
 };
 

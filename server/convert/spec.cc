@@ -71,7 +71,24 @@ Status ReadPlace(const v1::MeshSpec& spec, core::Specification* out) {
     if (!status.ok()) return status;
     out->seeds = MatrixFromProto(seeds, static_cast<Index>(d), static_cast<Index>(m));
   }
-  return ToInt(spec.box_seeds(), "box_seeds", &out->box_seeds);
+  const Status status = ToInt(spec.box_seeds(), "box_seeds", &out->box_seeds);
+  if (!status.ok()) return status;
+  return ToInt(spec.components(), "components", &out->components);
+}
+
+Status ReadAudit(const v1::MeshSpec& spec, core::Specification* out) {
+  switch (spec.audit()) {
+    case v1::AUDIT_UNSPECIFIED:
+    case v1::AUDIT_STANDARD:
+      out->audit = core::Audit::kStandard;
+      return Status::Ok();
+    case v1::AUDIT_THOROUGH:
+      out->audit = core::Audit::kThorough;
+      return Status::Ok();
+    default:
+      return Invalid(Message("audit is ", static_cast<int>(spec.audit()),
+                             " but this server knows AUDIT_STANDARD and AUDIT_THOROUGH alone"));
+  }
 }
 
 Status ReadCriteria(const v1::MeshSpec& spec, core::Specification* out) {
@@ -163,6 +180,7 @@ Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config) {
   request.label = spec.label();
   Refused status = ReadDimensions(spec, config, &request.spec);
   if (status.ok()) status = ReadPlace(spec, &request.spec);
+  if (status.ok()) status = ReadAudit(spec, &request.spec);
   if (status.ok()) status = ReadCriteria(spec, &request.spec);
   if (status.ok()) status = ReadLimits(spec, config, &request);
   if (status.ok() && request.label.size() > kMaxLabelBytes) {
@@ -207,6 +225,8 @@ void ToProto(const core::Specification& spec, v1::MeshSpec* out) {
   out->mutable_limits()->set_max_batch_queries(spec.limits.max_batch_queries);
   out->set_random_seed(spec.random_seed);
   out->set_box_seeds(spec.box_seeds);
+  out->set_components(static_cast<std::uint32_t>(spec.components));
+  out->set_audit(spec.audit == core::Audit::kThorough ? v1::AUDIT_THOROUGH : v1::AUDIT_STANDARD);
 }
 
 }  // namespace stellate::server

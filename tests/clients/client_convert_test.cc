@@ -57,12 +57,18 @@ TEST(Spec, CarriesWhatIsGivenAndNothingElse) {
   EXPECT_EQ(plain->bounding_box().lower().shape(0), 3u);
   EXPECT_EQ(plain->bounding_box().lower().shape_size(), 1);
   EXPECT_FALSE(plain->has_seeds());
+  EXPECT_EQ(plain->components(), 0u);
+  EXPECT_EQ(plain->audit(), v1::AUDIT_UNSPECIFIED);
   options.sliver_bound = 0;
   options.max_vertices = 7;
+  options.components = 2;
+  options.thorough_audit = true;
   const auto fuller = ToSpec(*manifold, options);
   ASSERT_TRUE(fuller.has_value());
   EXPECT_TRUE(fuller->criteria().has_sliver_bound());
   EXPECT_EQ(fuller->limits().max_vertices(), 7u);
+  EXPECT_EQ(fuller->components(), 2u);
+  EXPECT_EQ(fuller->audit(), v1::AUDIT_THOROUGH);
 }
 
 TEST(Spec, RefusesWhatTheWireCannotSay) {

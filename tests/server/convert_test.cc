@@ -63,6 +63,8 @@ TEST(ConvertSpec, RoundTrip) {
   spec.mutable_limits()->set_max_batch_queries(4000);
   spec.set_random_seed(42);
   spec.set_label("a sphere");
+  spec.set_components(3);
+  spec.set_audit(v1::AUDIT_THOROUGH);
   spec.mutable_limits()->set_max_vertices(5000);
   spec.mutable_limits()->set_answer_seconds(3);
   const auto request = FromProto(spec, Config{});
@@ -75,6 +77,8 @@ TEST(ConvertSpec, RoundTrip) {
   ToProto(request->spec, &back);
   EXPECT_EQ(back.epsilon(), 0.25);
   EXPECT_EQ(back.random_seed(), 42u);
+  EXPECT_EQ(back.components(), 3u);
+  EXPECT_EQ(back.audit(), v1::AUDIT_THOROUGH);
   EXPECT_EQ(back.criteria().SerializeAsString(), spec.criteria().SerializeAsString());
   EXPECT_EQ(back.bounding_box().SerializeAsString(), spec.bounding_box().SerializeAsString());
   EXPECT_EQ(back.limits().max_vertices(), 5000u);
@@ -134,6 +138,9 @@ TEST(ConvertSpec, RefusalsStartWithTheField) {
          [](Spec* s) { s->mutable_limits()->set_answer_seconds(-1); });
   expect("limits.answer_seconds", StatusCode::kLimitExceeded,
          [](Spec* s) { s->mutable_limits()->set_answer_seconds(1e9); });
+  expect("audit", StatusCode::kInvalidArgument,
+         [](Spec* s) { s->set_audit(static_cast<v1::Audit>(7)); });
+  expect("components", StatusCode::kInvalidArgument, [](Spec* s) { s->set_components(2'000'000); });
   expect("label", StatusCode::kInvalidArgument,
          [](Spec* s) { s->set_label(std::string(129, 'x')); });
 }

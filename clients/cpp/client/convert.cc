@@ -135,6 +135,8 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   if (options.worker_wait_seconds) limits.set_worker_wait_seconds(*options.worker_wait_seconds);
   if (options.answer_seconds) limits.set_answer_seconds(*options.answer_seconds);
   if (options.box_seeds) spec.set_box_seeds(*options.box_seeds);
+  if (options.components) spec.set_components(*options.components);
+  if (options.thorough_audit) spec.set_audit(v1::AUDIT_THOROUGH);
   spec.set_random_seed(options.random_seed);
   spec.set_label(options.label);
   return spec;

@@ -55,7 +55,9 @@ def mesh(
       **criteria: radius_edge_bound, sliver_bound, picking_radius, small_sliver_radius, candidates,
         advance_step, flat_alternations, ask_ahead, common_centre, size_rate, max_deviation;
         max_vertices, max_rounds, max_batch_queries, worker_wait_seconds, answer_seconds;
-        random_seed, box_seeds, seeds, label: the protocol's MeshSpec says what each is. size_rate
+        random_seed, box_seeds, seeds, components, label: the protocol's MeshSpec says what each
+        is. audit: "standard", or "thorough", which asks about every vertex and every simplex
+        before it certifies. components: a mesh with fewer is not certified. size_rate
         and max_deviation go by the oracle's local_size where it has one. ask_ahead is on unless the
         server is on this machine. workers: how many threads call the oracle, which takes effect
         when the oracle says `thread_safe = True`; the mesh is the same for any number.

@@ -13,6 +13,8 @@ from .errors import InvalidArgument
 from .oracle import CheckedOracle
 
 _CRITERIA = {field.name for field in pb.Criteria.DESCRIPTOR.fields}
+_PLAIN = {"random_seed", "label", "box_seeds", "components"}
+_AUDITS = {"standard": pb.AUDIT_STANDARD, "thorough": pb.AUDIT_THOROUGH}
 _LIMITS = {field.name for field in pb.MeshLimits.DESCRIPTOR.fields}
 
 
@@ -41,8 +43,10 @@ def mesh_spec(oracle: CheckedOracle, epsilon: float, criteria: dict[str, Any]) -
             _set(spec.criteria, name, value)
         elif name in _LIMITS:
             _set(spec.limits, name, value)
-        elif name in ("random_seed", "label", "box_seeds"):
+        elif name in _PLAIN:
             _set(spec, name, value)
+        elif name == "audit":
+            _set(spec, name, _audit(value))
         elif name == "seeds":
             spec.seeds.CopyFrom(to_wire(_points(value)))
         else:
@@ -61,6 +65,15 @@ def _set(message: Any, name: str, value: Any) -> None:
         ) from None
 
 
+def _audit(value: Any) -> int:
+    if value not in _AUDITS:
+        raise InvalidArgument(
+            f"audit is {value!r} but must be 'standard' or 'thorough'",
+            details={"fields": {"audit": "must be 'standard' or 'thorough'"}},
+        )
+    return _AUDITS[value]
+
+
 def _points(seeds: Any) -> np.ndarray:
     try:
         return np.asarray(seeds, dtype=np.float64)
@@ -69,7 +82,7 @@ def _points(seeds: Any) -> np.ndarray:
 
 
 def _unknown(name: str) -> str:
-    known = sorted(_CRITERIA | _LIMITS | {"random_seed", "label", "box_seeds", "seeds", "workers"})
+    known = sorted(_CRITERIA | _LIMITS | _PLAIN | {"audit", "seeds", "workers"})
     near = difflib.get_close_matches(name, known, 1)
     hint = f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(known)}"
     return f"unknown keyword {name!r}{hint}"

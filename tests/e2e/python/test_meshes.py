@@ -208,15 +208,29 @@ def test_seeds_on_a_grid_and_given_again_and_again(repeats, server):
 
 @pytest.mark.parametrize("epsilon", [0.6, 1.0, 1.5, 3.0])
 def test_epsilon_far_above_the_reach_is_told_and_never_certified_wrongly(epsilon, server):
-    """The reach is 0.4. Where the mesh follows the torus all the same, there is a warning."""
+    """The reach is 0.4. Above 0.8 of it no mesh is certified, and the report says so."""
     mesh = stellate.mesh(manifolds.Torus(), epsilon, server=server)
     if mesh.report.termination == "CONVERGED":
         assert mesh.report.certificate.epsilon_over_reach > 1
-        assert any("reach" in warning for warning in mesh.report.warnings), mesh.report
-    else:
-        assert not mesh.certified
-    if mesh.certified:
-        topology.assert_closed_manifold(mesh, 0, [1, 2, 1])
+    assert not mesh.certified
+
+
+def test_what_is_declared_and_asked_for_is_held_against_the_mesh(server):
+    plain = stellate.mesh(manifolds.Torus(), 0.2, server=server)
+    assert "no boundary" in plain.report.certificate.verdict
+    two = stellate.mesh(manifolds.Torus(), 0.2, server=server, components=2)
+    assert not two.certified
+    assert "2 were declared" in two.report.certificate.verdict
+    assert np.array_equal(two.points, plain.points)
+    thorough = stellate.mesh(
+        manifolds.Torus(), 0.2, server=server, components=1, audit="thorough"
+    )
+    assert thorough.certified, thorough.report
+    assert "balls at every vertex and simplex" in thorough.report.certificate.verdict
+    assert thorough.report.counts.queries > plain.report.counts.queries
+    assert np.array_equal(thorough.points, plain.points)
+    with pytest.raises(stellate.InvalidArgument, match="audit"):
+        stellate.mesh(manifolds.Torus(), 0.2, server=server, audit="deep")
 
 
 def test_a_mesh_too_coarse_to_follow_is_not_certified(server):

@@ -59,6 +59,8 @@ struct MeshOptions {
   std::optional<std::uint64_t> max_vertices, max_rounds;
   std::optional<std::uint64_t> max_batch_queries;  // larger rounds are asked in several batches
   std::optional<std::uint32_t> box_seeds;
+  std::optional<std::uint32_t> components;  // that M has at least; with fewer it is not certified
+  bool thorough_audit = false;  // ask about every vertex and every simplex before certifying
 
   std::optional<double> radius_edge_bound;    // rho0 of rule R2
   std::optional<double> sliver_bound;         // Theta0 of rule R3

@@ -67,7 +67,7 @@ class Oracle {
     throw std::logic_error("this oracle has no local sizes");
   }
 
-  // Where to look for M: a box, or points near M, one at least on each component that is wanted.
+  // Where to look for M: a box, or points near M, one at least on each component.
   virtual std::optional<BoundingBox> bounding_box() const { return std::nullopt; }
   virtual Eigen::MatrixXd seeds() const { return {}; }  // d x m
 };
