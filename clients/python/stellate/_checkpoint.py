@@ -44,7 +44,12 @@ class Checkpoint:
         self._lock: IO[str] | None = None
 
     def __enter__(self) -> Checkpoint:
-        os.makedirs(self.directory, mode=0o700, exist_ok=True)
+        try:
+            os.makedirs(self.directory, mode=0o700, exist_ok=True)
+        except FileExistsError:
+            raise InvalidArgument(
+                f"checkpoint has to be a directory, and {self.directory} is a file"
+            ) from None
         self._lock = open(os.path.join(self.directory, "lock"), "w")
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers
 import time
 from typing import Any, Callable
 
@@ -33,6 +34,8 @@ def check(oracle: Any, epsilon: float | None = None, *, seed: int = 1) -> CheckR
     Returns:
       All that was found, `ok` if no error is among it. Exceptions of the oracle are findings too.
     """
+    if epsilon is not None and not isinstance(epsilon, numbers.Real):
+        raise InvalidArgument(f"epsilon has to be a length, and is {epsilon!r}")
     examination = _Examination(epsilon, seed)
     try:
         examination.run(oracle)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import numbers
 from typing import Any
+
+import numpy as np
 
 from ._doctor import check
 from .errors import InvalidArgument, OracleError
@@ -17,9 +20,9 @@ def choose(oracle: Any, epsilon: float | str) -> tuple[float, str]:
 
     Raises: OracleError with what check() found where the oracle breaks its contract.
     """
-    if not isinstance(epsilon, str):
-        return epsilon, ""
-    if epsilon != AUTO:
+    if isinstance(epsilon, numbers.Real) and not isinstance(epsilon, (bool, np.bool_)):
+        return float(epsilon), ""  # the server says which lengths will do
+    if not isinstance(epsilon, str) or epsilon != AUTO:
         raise InvalidArgument(
             f"epsilon has to be a length in the coordinates' unit, or 'auto', and is {epsilon!r}",
             details={"fields": {"epsilon": "no length"}},

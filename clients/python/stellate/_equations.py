@@ -56,12 +56,7 @@ class Equations:
         expected = (len(x), self.shape[0])
         if not len(x):
             return np.empty(expected)
-        values = _as_numbers(self._f(x), "f")
-        if values.shape != expected:
-            raise OracleError(
-                f"f returned shape {values.shape}; it has to be {expected}", "ORACLE_SHAPE"
-            )
-        return values
+        return _as_numbers(self._f(x), "f", expected)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """(n, m, d), as given or by differences, in one call for as many rows as fit."""
@@ -73,13 +68,7 @@ class Equations:
             return jacobian
         if not len(x):
             return np.empty((0, m, d))
-        jacobian = _as_numbers(self._given(x), "jacobian")
-        if jacobian.shape != (len(x), m, d):
-            raise OracleError(
-                f"jacobian returned shape {jacobian.shape}; it has to be {(len(x), m, d)}",
-                "ORACLE_SHAPE",
-            )
-        return jacobian
+        return _as_numbers(self._given(x), "jacobian", (len(x), m, d))
 
     def _differences(self, x: np.ndarray) -> np.ndarray:
         (m, d), n = self.shape, len(x)
@@ -255,8 +244,16 @@ def solve(systems: np.ndarray, right: np.ndarray) -> np.ndarray:
         return solution
 
 
-def _as_numbers(answer: object, name: str) -> np.ndarray:
+def _as_numbers(answer: object, name: str, shape: tuple[int, ...]) -> np.ndarray:
     values = np.asarray(answer)
+    if values.shape != shape or values.dtype.kind not in "fiu":
+        got = f"shape {values.shape}" if values.dtype.kind in "fiu" else type(answer).__name__
+        hint = "; [:, None] makes a column" if (*values.shape, 1) == shape else ""
+        raise OracleError(
+            f"{name} returned {got}; it has to be {shape} for a batch of {shape[0]} points, "
+            f"a row each{hint}",
+            "ORACLE_SHAPE",
+        )
     if values.dtype in (np.float32, np.float16):
         raise OracleError(
             f"{name} returned {values.dtype} numbers; points are found to twelve digits, which "

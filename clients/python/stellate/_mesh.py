@@ -105,14 +105,18 @@ class Mesh:
 
 def load_txt(path: str | os.PathLike[str]) -> Mesh:
     """Reads the .txt format back, to the last bit. Raises ValueError if it is something else."""
-    with open(path) as file:
-        header = file.readline().split()
-        if len(header) != 4:
-            raise ValueError(f"{os.fspath(path)}: the first line has to be 'k d nv ns'")
-        k, d, vertex_count, simplex_count = map(int, header)
+    name = os.fspath(path)
+    with open(path, errors="replace") as file:
+        try:
+            k, d, vertex_count, simplex_count = map(int, file.readline().split())
+        except ValueError:
+            raise ValueError(f"{name}: the first line has to be 'k d nv ns'") from None
         body = file.read().split()
     if len(body) != vertex_count * d + simplex_count * (k + 1):
-        raise ValueError(f"{os.fspath(path)}: {len(body)} numbers do not fit its first line")
-    points = np.array(body[: vertex_count * d], dtype=float).reshape(vertex_count, d)
-    simplices = np.array(body[vertex_count * d :], dtype=np.int64).reshape(simplex_count, k + 1)
-    return Mesh(points, simplices)
+        raise ValueError(f"{name}: {len(body)} numbers do not fit its first line")
+    try:
+        points = np.array(body[: vertex_count * d], dtype=float)
+        simplices = np.array(body[vertex_count * d :], dtype=np.int64)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+    return Mesh(points.reshape(vertex_count, d), simplices.reshape(simplex_count, k + 1))

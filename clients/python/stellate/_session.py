@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import logging
+import numbers
 import threading
 import time
 from types import TracebackType
@@ -16,8 +17,9 @@ from ._mesh import Mesh
 from ._server import Server
 from ._spec import mesh_spec
 from .client import Client, MeshInfo
-from .errors import Interrupted, StellateError
+from .errors import Interrupted, InvalidArgument, StellateError
 from .oracle import CheckedOracle
+from .progress import progress_bar
 
 _log = logging.getLogger("stellate")
 
@@ -96,8 +98,13 @@ class Session:
     ) -> None:
         """`every`: iterating gives the mesh at every revision, and not only when it is finished."""
         workers = criteria.pop("workers", 1)
-        if int(workers) != workers or workers < 1:
-            raise ValueError(f"workers has to be a whole number from 1 on, and is {workers!r}")
+        if not isinstance(workers, numbers.Integral) or workers < 1:
+            raise InvalidArgument(f"workers has to be a whole number from 1 on, and is {workers!r}")
+        if on_progress is progress_bar or not (on_progress is None or callable(on_progress)):
+            raise InvalidArgument(
+                "on_progress has to be a function of a Progress, such as stellate.progress_bar(), "
+                f"and is {on_progress!r}"
+            )
         checked = CheckedOracle(oracle)
         mesh_spec(checked, 1.0, criteria)  # what is misspelt shows before the oracle is probed
         choice = checkpoint.choose_epsilon if checkpoint is not None else choose

@@ -6,12 +6,19 @@ import difflib
 from typing import Any
 
 import numpy as np
+from google.protobuf.descriptor import FieldDescriptor
 
 from ._arrays import to_wire
 from ._generated import mesh_pb2 as pb
 from .errors import InvalidArgument
 from .oracle import CheckedOracle
 
+_WHOLE = {
+    FieldDescriptor.CPPTYPE_INT32,
+    FieldDescriptor.CPPTYPE_INT64,
+    FieldDescriptor.CPPTYPE_UINT32,
+    FieldDescriptor.CPPTYPE_UINT64,
+}
 _CRITERIA = {field.name for field in pb.Criteria.DESCRIPTOR.fields}
 _PLAIN = {"random_seed", "label", "box_seeds", "components"}
 _AUDITS = {"standard": pb.AUDIT_STANDARD, "thorough": pb.AUDIT_THOROUGH}
@@ -57,6 +64,9 @@ def mesh_spec(oracle: CheckedOracle, epsilon: float, criteria: dict[str, Any]) -
 def _set(message: Any, name: str, value: Any) -> None:
     if isinstance(value, np.generic):
         value = value.item()
+    field = message.DESCRIPTOR.fields_by_name[name]
+    if isinstance(value, float) and value.is_integer() and field.cpp_type in _WHOLE:
+        value = int(value)  # 1e6
     try:
         setattr(message, name, value)
     except (TypeError, ValueError) as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import datetime
+import re
 from types import TracebackType
 from typing import Any, Callable, Iterator, TypeVar
 
@@ -126,6 +127,10 @@ class Client:
                 f"server has to be 'host:port' or 'unix:/path', and is {server!r}"
             )
         address = self._server.address if isinstance(self._server, Server) else self._server
+        if not address.startswith("unix:") and not re.fullmatch(r"[^/]*:[0-9]+", address):
+            raise InvalidArgument(
+                f"server has to be 'host:port' or 'unix:/path', and is {address!r}"
+            )
         self.address = address
         # A private server needs no pings: its end shows at once.
         private = isinstance(self._server, Server) and self._server.private

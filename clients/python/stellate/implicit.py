@@ -41,12 +41,21 @@ class ImplicitManifold:
         max_iterations: int = 100,
         thread_safe: bool = False,
     ) -> None:
-        if not 1 <= dimension < ambient_dimension:
+        for name, function in (("f", f), ("jacobian", jacobian)):
+            if not callable(function) and not isinstance(function, (str, type(None))):
+                raise InvalidArgument(f"{name} has to be a function, and is {function!r}")
+        sizes = np.asarray([dimension, ambient_dimension])
+        if sizes.dtype.kind not in "iu" or not 1 <= dimension < ambient_dimension:
             raise InvalidArgument(
-                "an implicit manifold needs 1 <= dimension < ambient_dimension, and has "
-                f"dimension {dimension}, ambient_dimension {ambient_dimension}"
+                "an implicit manifold needs whole numbers 1 <= dimension < ambient_dimension, and "
+                f"has dimension {dimension!r}, ambient_dimension {ambient_dimension!r}"
             )
-        lower, upper = (np.asarray(corner, dtype=float) for corner in bounding_box)
+        try:
+            lower, upper = (np.asarray(corner, dtype=float) for corner in bounding_box)
+        except (TypeError, ValueError):
+            raise InvalidArgument(
+                f"bounding_box has to be a pair of corners (lower, upper), and is {bounding_box!r}"
+            ) from None
         if lower.shape != (ambient_dimension,) or upper.shape != lower.shape:
             raise InvalidArgument(
                 f"bounding_box has corners of shapes {lower.shape} and {upper.shape}; both have to "

@@ -175,6 +175,10 @@ def _flags(method: str, found: Any, count: int) -> np.ndarray:
 
 
 def _whole_number(oracle: Any, name: str) -> int:
+    if isinstance(oracle, type):
+        raise InvalidArgument(
+            f"{oracle.__name__} is a class: give an object of it, such as {oracle.__name__}()"
+        )
     try:
         value = getattr(oracle, name)
     except AttributeError:
