@@ -8,6 +8,7 @@ import hashlib
 import json
 import os
 import shutil
+import time
 import zipfile
 from types import TracebackType
 from typing import IO, Any, Callable
@@ -22,6 +23,7 @@ from .errors import FailedPrecondition, InvalidArgument
 from .report import Progress, Report
 
 _LAYOUT = 1  # of the files
+_LAST_SERVER_SECONDS = 60.0  # it has been told to stop, and may be busy with a round
 
 
 class Checkpoint:
@@ -75,9 +77,22 @@ class Checkpoint:
         assert self._lock is not None
         self._lock.close()
 
-    @property
-    def flags(self) -> tuple[str, ...]:
-        """For the private server."""
+    def server_flags(self) -> tuple[str, ...]:
+        """For the private server, once that of a killed process has come to its end."""
+        deadline = time.monotonic() + _LAST_SERVER_SECONDS
+        lock = os.path.join(self._server_directory, "lock")  # as stellated has it
+        while os.path.exists(lock):
+            with open(lock) as file:
+                try:
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    break
+                except BlockingIOError:
+                    pass
+            if time.monotonic() > deadline:
+                raise FailedPrecondition(
+                    f"the server of an earlier call still uses {self._server_directory}: end it"
+                )
+            time.sleep(0.05)
         return "--data-dir", self._server_directory
 
     @property
@@ -111,6 +126,11 @@ class Checkpoint:
         }
         text = json.dumps(self._record, indent=1) + "\n"
         self._replace(self._record_path, lambda file: file.write(text.encode()))
+
+    def forget(self) -> None:
+        """The next call begins anew."""
+        os.remove(self._record_path)
+        self._record = {}
 
     def finished(self) -> Mesh | None:
         """The mesh, if it is finished."""

@@ -125,7 +125,7 @@ class Session:
         self._owns_client = not isinstance(server, Client)
         try:
             if server is None:
-                server = self._server = Server(*(checkpoint.flags if checkpoint else ()))
+                server = self._server = Server(*(checkpoint.server_flags() if checkpoint else ()))
             self._client = server if isinstance(server, Client) else Client(server)
             self._info = self._declare(checked, epsilon, criteria)
         except BaseException:
@@ -142,9 +142,9 @@ class Session:
             return self._client.create(oracle, epsilon, **criteria)
         kept = None
         for info in self._client.list():
-            if info.name == self._checkpoint.name and info.state not in ("FAILED", "CANCELLED"):
+            if info.name == self._checkpoint.name:
                 kept = info
-            else:  # a failed one would fail again, and others were never put down
+            else:  # was forgotten, or never put down
                 self._client.delete(info.name)
         if kept is not None:
             return kept
@@ -172,8 +172,11 @@ class Session:
                     self._finish(mesh)
                 yield mesh
         except StellateError as error:
-            if error.mesh is not None:
+            if error.mesh is not None:  # the server says that it is over
                 error.mesh = mesh = self._told(error.mesh)
+                full = error.reason.startswith("JOURNAL_")  # with more room it goes on
+                if self._checkpoint is not None and not full:
+                    self._checkpoint.forget()  # it would fail again
             if not self._interrupted:
                 raise self._best_reason(error) from None
         if self._interrupted:
