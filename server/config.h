@@ -43,7 +43,8 @@ struct Config {
   std::uint64_t max_memory_bytes = 0;   // of all meshes, estimated; 0: WithDefaults says
   std::uint64_t max_journal_bytes = 0;  // 0: what the disk holds
   std::uint64_t max_message_bytes = std::uint64_t{4} << 20;
-  std::uint64_t max_connections = 2048;  // over TCP
+  std::uint64_t max_unread_bytes = std::uint64_t{64} << 20;  // of requests that are not whole
+  std::uint64_t max_connections = 2048;                      // over TCP
   std::uint64_t max_connection_streams = 1024;
 
   // Of each owner, where the server tells owners apart.
@@ -67,7 +68,8 @@ struct Config {
   double answer_seconds = 60;       // when the client does not say
   double max_wait_seconds = 3600;   // most that a client may ask for either
   double keep_finished_seconds = 3600;
-  double hello_seconds = 10;  // for a worker's first message
+  double hello_seconds = 10;    // for a worker's first message
+  double request_seconds = 60;  // for a request to be whole
 
   double drain_seconds = 10;  // for running meshes to end, after SIGTERM
   double keepalive_seconds = 2;

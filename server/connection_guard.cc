@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <functional>
 #include <string_view>
 #include <utility>
 
@@ -26,8 +27,12 @@ using core::Message;
 
 constexpr int kMostEvents = 1024;
 constexpr int kPauseMilliseconds = 20;     // between two looks: some hundred calls may come
+constexpr int kHurryMilliseconds = 2;      // while much is unread: some megabytes may come
 constexpr std::uint64_t kFewBytes = 4096;  // too little for many calls, 16 bytes each at least
 constexpr std::size_t kFewCalls = 64;
+constexpr std::int64_t kLittle = 256 << 10;       // unread: a request or two, as most are
+constexpr double kMoment = 0.01;                  // seconds that anybody may hold anything for
+constexpr auto kAwake = std::chrono::seconds(1);  // after something came
 constexpr auto kLogPause = std::chrono::seconds(1);
 constexpr auto kQuiet = std::chrono::seconds(5);  // after a storm
 
@@ -51,9 +56,12 @@ std::uint64_t BytesWaiting(int fd) {
 
 }  // namespace
 
-ConnectionGuard::ConnectionGuard(int port, std::size_t most_calls, std::function<void()> closed)
+ConnectionGuard::ConnectionGuard(int port, const Limits& limits,
+                                 std::function<void(const char* setting)> closed)
     : port_(port),
-      most_calls_(most_calls),
+      limits_(limits),
+      unread_(std::make_shared<UnreadOfAll>(limits.unread_bytes * 2 / 3,
+                                            limits.request_bytes + kLittle)),
       closed_(std::move(closed)),
       epoll_(epoll_create1(EPOLL_CLOEXEC)),
       wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
@@ -77,6 +85,8 @@ void ConnectionGuard::Watch(int fd) {
   connection.fd = fd;
   connection.number = NumberOf(fd);
   connection.peer = PeerOf(fd);
+  connection.unread = CountUnread(fd, unread_);
+  connection.moved = connection.light = Clock::now();
   const std::lock_guard lock(mutex_);
   connections_.emplace(++last_key_, std::move(connection));
   // Once for all that came meanwhile. It ends when gRPC closes the descriptor.
@@ -89,10 +99,13 @@ void ConnectionGuard::Watch(int fd) {
 void ConnectionGuard::Run(const std::stop_token& stop) {
   std::vector<epoll_event> events(kMostEvents);
   while (!stop.stop_requested()) {
-    const bool idle = busy_.empty() && gone_.empty() && !untidy_;
+    const bool idle = busy_.empty() && gone_.empty() && !untidy_ && unread_->bytes == 0 &&
+                      Clock::now() > awake_until_;
     const int count = epoll_wait(epoll_, events.data(), kMostEvents, idle ? -1 : 0);
+    if (count > 0) awake_until_ = Clock::now() + kAwake;
     {
       const std::lock_guard lock(mutex_);
+      if (idle) NothingWasUnread();
       for (int i = 0; i < count; ++i) {
         const epoll_event& event = events[static_cast<std::size_t>(i)];
         const auto found = connections_.find(event.data.u64);
@@ -100,12 +113,13 @@ void ConnectionGuard::Run(const std::stop_token& stop) {
         busy_.insert(found->first);
         if ((event.events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0) found->second.ending = true;
       }
+      BoundUnread();  // first, as the other takes longer
       Look();
     }
     CountLeftBehind();
     if (untidy_ && Clock::now() > quiet_at_) GiveBack();
     pollfd wake{wake_, POLLIN, 0};
-    poll(&wake, 1, kPauseMilliseconds);
+    poll(&wake, 1, hurried_ ? kHurryMilliseconds : kPauseMilliseconds);
   }
 }
 
@@ -143,7 +157,12 @@ bool ConnectionGuard::IsCalm(Connection* connection) {
   connection->bytes = bytes;
   connection->calls = calls.value_or(0);
   if (!calls) connection->id = 0;  // gRPC is about to close it, or it was another's of that name
-  if (connection->calls > most_calls_ && !connection->closed) Close(connection);
+  if (connection->calls > limits_.calls && !connection->closed) {
+    Close(
+        connection, "max-connection-streams",
+        Message("had ", connection->calls, " calls that were open or were reset faster than they ",
+                "end; --max-connection-streams allows ", limits_.calls));
+  }
   return calls && !waits && *calls <= kFewCalls;
 }
 
@@ -167,7 +186,53 @@ void ConnectionGuard::CountLeftBehind() {
     calls += left;
     return left == 0;
   });
-  behind_ = calls > most_calls_ / 4;
+  behind_ = calls > limits_.calls / 4;
+}
+
+// Until now, while nobody looked.
+void ConnectionGuard::NothingWasUnread() {
+  const auto now = Clock::now();
+  for (auto& [key, connection] : connections_) connection.moved = connection.light = now;
+}
+
+void ConnectionGuard::BoundUnread() {
+  const auto now = Clock::now();
+  std::int64_t total = 0;
+  std::vector<std::pair<double, Connection*>> holders;
+  for (auto& [key, connection] : connections_) {
+    const std::int64_t bytes = connection.unread->bytes;
+    const std::uint64_t whole = connection.unread->whole;
+    if (bytes == 0 || whole != connection.whole) connection.moved = now;
+    if (bytes < kLittle) connection.light = now;
+    connection.whole = whole;
+    if (bytes == 0 || connection.closed) continue;
+    if (now - connection.moved > limits_.request_time) {
+      Close(&connection, "request-seconds",
+            Message("had sent a part of a request, and no whole one for ",
+                    limits_.request_time.count(), " seconds"));
+      continue;
+    }
+    total += bytes;
+    // Of a connection that many share, messages become whole all the time.
+    const std::chrono::duration<double> held = now - std::min(connection.moved, connection.light);
+    holders.emplace_back(static_cast<double>(bytes) * std::max(held.count(), kMoment), &connection);
+  }
+  const std::int64_t most = limits_.unread_bytes / 2;  // more comes before the next look
+  hurried_ = total > most / 2;
+  if (hurried_) {
+    untidy_ = true;
+    quiet_at_ = now + kQuiet;
+  }
+  if (total <= most) return;
+  std::sort(holders.begin(), holders.end(), std::greater<>());
+  for (const auto& [weight, connection] : holders) {
+    if (total <= most) return;
+    const std::int64_t bytes = connection->unread->bytes;
+    total -= bytes;
+    Close(connection, "max-unread-bytes",
+          Message("held ", bytes, " bytes of unfinished requests; --max-unread-bytes allows all ",
+                  "connections ", limits_.unread_bytes));
+  }
 }
 
 // What the calls had; without this the allocator keeps it.
@@ -176,9 +241,10 @@ void ConnectionGuard::GiveBack() {
   malloc_trim(0);
 }
 
-void ConnectionGuard::Close(Connection* connection) {
+void ConnectionGuard::Close(Connection* connection, const char* setting,
+                            const std::string& reason) {
   connection->closed = connection->ending = true;
-  closed_();  // first, lest the client know of it before
+  closed_(setting);  // first, lest the client know of it before
   const int fd = fcntl(connection->fd, F_DUPFD_CLOEXEC, 0);  // stays the same from here on
   if (NumberOf(fd) == connection->number) {
     // Not shutdown(2): it would leave gRPC what has come already, megabytes of it.
@@ -193,9 +259,7 @@ void ConnectionGuard::Close(Connection* connection) {
   ++unsaid_;
   if (now - said_ < kLogPause) return;
   Log(LogLevel::kWarning, {},
-      Message("closed ", unsaid_, " connections; the last, of ", connection->peer, ", had ",
-              connection->calls, " calls that were open or were reset faster than they end; ",
-              "--max-connection-streams allows ", most_calls_));
+      Message("closed ", unsaid_, " connections; the last, of ", connection->peer, ", ", reason));
   said_ = now;
   unsaid_ = 0;
 }

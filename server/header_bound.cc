@@ -31,19 +31,20 @@ bool LacksHeaderBound(std::string_view version) {
 
 }  // namespace stellate::server
 
-#ifndef STELLATE_REPLACES_HEADER_PARSER
+#ifndef STELLATE_REPLACES_GRPC_PARTS
 
 bool stellate::server::HeaderBlocksEnd() { return !LacksHeaderBound(grpc::Version()); }
 
 #else
 
 #include <absl/status/status.h>
-#include <dlfcn.h>
 #include <grpc/slice.h>
 
 #include <algorithm>
 #include <mutex>
 #include <unordered_map>
+
+#include "server/replaced.h"
 
 struct grpc_metadata_batch;
 
@@ -73,18 +74,13 @@ namespace {
 using stellate::server::kMostHeaderBytes;
 using stellate::server::kMostHeaderFrames;
 using stellate::server::kMostMetadataBytes;
+using stellate::server::Original;
 
 constexpr char kDestroy[] = "_ZN9grpc_core11HPackParserD1Ev";
 constexpr char kBeginFrame[] =
     "_ZN9grpc_core11HPackParser10BeginFrameEP19grpc_metadata_batchjNS0_8BoundaryENS0_"
     "8PriorityENS0_7LogInfoE";
 constexpr char kParse[] = "_ZN9grpc_core11HPackParser5ParseERK10grpc_sliceb";
-
-// gRPC's own function of that name, as a function whose first argument is the parser.
-template <typename Function>
-Function* Original(const char* name) {
-  return reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
-}
 
 // What has come of a block that has not ended.
 struct Block {
@@ -160,13 +156,9 @@ absl::Status HPackParser::Parse(const grpc_slice& slice, bool is_last) {
 
 }  // namespace grpc_core
 
-// The names have to lead gRPC here, and from here on to gRPC.
 bool stellate::server::HeaderBlocksEnd() {
-  for (const char* name : {grpc_core::kDestroy, grpc_core::kBeginFrame, grpc_core::kParse}) {
-    void* const original = dlsym(RTLD_NEXT, name);
-    if (original == nullptr || original == dlsym(RTLD_DEFAULT, name)) return false;
-  }
-  return true;
+  return IsReplaced(grpc_core::kDestroy) && IsReplaced(grpc_core::kBeginFrame) &&
+         IsReplaced(grpc_core::kParse);
 }
 
 #endif

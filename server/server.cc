@@ -41,6 +41,7 @@ constexpr auto kFarewell = std::chrono::milliseconds(20);  // for clients to tak
 constexpr auto kLastRound = std::chrono::seconds(5);       // for meshers to notice a cancel
 // The health of the process alone: it holds while the server drains.
 constexpr char kAlive[] = "alive";
+constexpr int kReadBytes = 64 << 10;
 constexpr int kMaxSyncThreads = 64;  // reflection alone uses them
 // Beside the calls that a connection may have open: those that its client has reset, and that gRPC
 // is not done with. 5 MB; a client that waits for anything has a few.
@@ -160,8 +161,12 @@ void SetUp(const Config& config, grpc::ServerBuilder* builder) {
   builder->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
                               static_cast<int>(config.max_connection_streams));
   builder->AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, static_cast<int>(kMostMetadataBytes));
+  // What is read at once is kept until the last of it was used: 4 MB, unless it is said.
+  builder->AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kReadBytes);
   grpc::ResourceQuota quota("stellated");
   quota.SetMaxThreads(kMaxSyncThreads);
+  // The worse way, as unread.h says.
+  if (!CountsUnread()) quota.Resize(config.max_unread_bytes);
   builder->SetResourceQuota(quota);
 }
 
@@ -229,8 +234,12 @@ class Server::Impl {
     }
     if (listener == nullptr) return Status::Ok();
     guard = std::make_unique<ConnectionGuard>(
-        address->port, service.config.max_connection_streams + kResetCalls,
-        [this] { service.metrics.LimitReached("max-connection-streams"); });
+        address->port,
+        ConnectionGuard::Limits{service.config.max_connection_streams + kResetCalls,
+                                static_cast<std::int64_t>(service.config.max_unread_bytes),
+                                static_cast<std::int64_t>(service.config.max_message_bytes),
+                                std::chrono::duration<double>(service.config.request_seconds)},
+        [this](const char* setting) { service.metrics.LimitReached(setting); });
     listener->Start(
         [this, acceptor = std::shared_ptr(std::move(acceptor))](int listener_fd, int fd) {
           grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;

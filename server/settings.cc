@@ -101,6 +101,10 @@ const std::vector<Setting>& Settings() {
        "Size of the record in --data-dir; 0: what the disk holds", 0, kBytes},
       {kServerLimits, "--max-message-bytes", &Config::max_message_bytes,
        "Largest message, both ways", kMebibyte, 1024 * kMebibyte},
+      {kServerLimits, "--max-unread-bytes", &Config::max_unread_bytes,
+       "Memory for requests that have begun to come and are not whole yet, of all TCP connections; "
+       "beyond it those are closed that hold most for longest",
+       16 * kMebibyte, kBytes},
       {kServerLimits, "--max-connections", &Config::max_connections,
        "Connections open at once; further ones are closed", 1, 1'000'000},
       {kServerLimits, "--max-connection-streams", &Config::max_connection_streams,
@@ -147,6 +151,10 @@ const std::vector<Setting>& Settings() {
        "How long a finished mesh can be read", 0, kYear},
       {kTimes, "--hello-seconds", &Config::hello_seconds,
        "Time for a connection's handshake, and for a worker's first message", kMoment, kYear},
+      {kTimes, "--request-seconds", &Config::request_seconds,
+       "Time for a request to be whole; a TCP connection that began one and finished none is "
+       "closed",
+       kMoment, kYear},
       {kTimes, "--drain-seconds", &Config::drain_seconds,
        "Time for meshes that are served to end after SIGTERM; a second signal ends it", 0, kYear},
       {kTimes, "--keepalive", &Config::keepalive_seconds, "Time between pings to a silent client",

@@ -66,6 +66,21 @@ class RawHttp2 {
     return Send(Frame(kContinuation, 0, stream_, block));
   }
 
+  // Begins a call and sends the first `bytes` of a message of `declared` ones. A message's part
+  // must not be larger than what a server takes unasked, 60,000 bytes on a connection. False: it is
+  // closed.
+  bool Request(const std::string& rpc, std::uint32_t declared, std::size_t bytes) {
+    std::string message(1, '\0');
+    for (int shift = 24; shift >= 0; shift -= 8) message += static_cast<char>(declared >> shift);
+    message += std::string(bytes, '\0');
+    std::string frames = Frame(kHeaders, kEndHeaders, stream_, HeadersOf(rpc));
+    for (std::size_t at = 0; at < message.size(); at += kFrameBytes) {
+      frames += Frame(kData, 0, stream_, message.substr(at, kFrameBytes));
+    }
+    stream_ += 2;
+    return Send(frames);
+  }
+
   // Waits until the server has closed the connection, whatever it says before.
   void AwaitEnd() {
     char bytes[4096];
@@ -87,7 +102,9 @@ class RawHttp2 {
   }
 
  private:
-  static constexpr char kHeaders = 1, kReset = 3, kSettings = 4, kPing = 6, kContinuation = 9;
+  static constexpr std::size_t kFrameBytes = 16 << 10;
+  static constexpr char kData = 0, kHeaders = 1, kReset = 3, kSettings = 4, kPing = 6,
+                        kContinuation = 9;
   static constexpr char kAck = 1, kEndHeaders = 4;
 
   static std::string Frame(char kind, char flags, std::uint32_t stream,

@@ -11,6 +11,7 @@ import itertools
 import random
 import struct
 import threading
+import time
 from typing import Any, Callable, Iterator
 
 import grpc
@@ -21,7 +22,7 @@ from stellate._spec import mesh_spec
 from stellate.oracle import CheckedOracle
 
 import raw_http2 as raw
-from strangers import ENDLESS
+from strangers import ENDLESS, HALF, STRANGERS
 
 SERVICE = "/stellate.v1.Stellate/"
 UNARY = ("CreateMesh", "GetMesh", "ListMeshes", "CancelMesh", "DeleteMesh", "GetServerInfo")
@@ -403,6 +404,12 @@ def endless_headers(target: Target) -> None:
             connection.close()
 
 
+def half_messages(target: Target) -> None:
+    """Calls by the hundred, each of which lacks the end of its message."""
+    for kind in HALF:
+        STRANGERS[kind](target.host, target.port, time.time() + 0.5 * target.scale, 0)
+
+
 def bad_headers(target: Target) -> None:
     """Headers that no call may have, among more of them than a call may have."""
     for _ in range(target.scale):
@@ -519,6 +526,7 @@ ATTACKS: tuple[Callable[[Target], None], ...] = (
     packed_messages,
     unread_replies,
     endless_headers,
+    half_messages,
     bad_headers,
     other_protocols,
     deaf_watchers,
