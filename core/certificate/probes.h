@@ -24,7 +24,7 @@ inline constexpr int kMaxBallSteps = 2;
 // the reach that the mesh size needs.
 inline constexpr double kPairRadius = 2.5;
 inline constexpr std::uint64_t kBallStride = 8;
-inline constexpr std::uint64_t kMaxBallPairs = 512;
+inline constexpr std::uint64_t kMaxBallPairs = 256;
 // Vertices held against the tangent spaces of those near them.
 inline constexpr std::uint64_t kMaxVerticesHeld = 256;
 
