@@ -110,6 +110,11 @@ Config WithDefaults(Config config) {
   return config;
 }
 
+double MaxWaitSeconds(const Config& config) {
+  if (config.max_wait_seconds > 0) return config.max_wait_seconds;
+  return config.data_dir.empty() ? 3600 : 30 * 86400.0;
+}
+
 std::size_t ChunkBytes(const Config& config) {
   return std::min(std::uint64_t{1} << 20, config.max_message_bytes / 2);
 }

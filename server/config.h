@@ -39,7 +39,7 @@ struct Config {
   std::string metrics_listen;            // host:port for Prometheus; empty: none
 
   // Of the server.
-  std::uint64_t max_meshes = 64;  // running at once
+  std::uint64_t max_meshes = 64;        // running at once
   std::uint64_t max_memory_bytes = 0;   // of all meshes, estimated; 0: WithDefaults says
   std::uint64_t max_journal_bytes = 0;  // 0: what the disk holds
   std::uint64_t max_message_bytes = std::uint64_t{4} << 20;
@@ -48,7 +48,7 @@ struct Config {
   std::uint64_t max_connection_streams = 1024;
 
   // Of each owner, where the server tells owners apart.
-  std::uint64_t owner_meshes = 32;       // running at once; 0: as many as the server
+  std::uint64_t owner_meshes = 32;  // running at once; 0: as many as the server
   std::uint64_t keep_finished_meshes = 32;
   std::uint64_t owner_memory_bytes = 0;  // 0: WithDefaults says
 
@@ -66,7 +66,8 @@ struct Config {
 
   double worker_wait_seconds = 60;  // when the client does not say
   double answer_seconds = 60;       // when the client does not say
-  double max_wait_seconds = 3600;   // most that a client may ask for either
+  double busy_seconds = 3600;       // when the client does not say
+  double max_wait_seconds = 0;      // most that a client may ask for of these; 0: MaxWaitSeconds
   double keep_finished_seconds = 3600;
   double hello_seconds = 10;    // for a worker's first message
   double request_seconds = 60;  // for a request to be whole
@@ -86,6 +87,10 @@ core::Status Validate(const Config& config);
 
 // Puts numbers for zeros that stand for a part of this machine, or of the server's own limit.
 Config WithDefaults(Config config);
+
+// The most that a client may ask for: an hour, and 30 days where meshes outlive the server, since
+// batch queues take their time, unless the config says.
+double MaxWaitSeconds(const Config& config);
 
 // Arrays travel in chunks of about this size.
 std::size_t ChunkBytes(const Config& config);

@@ -313,10 +313,28 @@ void Dispatch::Settle(const Lease& lease) {
   if (active_ && lease.id >= first_of_round_) unsettled_ -= lease.count;
 }
 
+void Dispatch::Busy(WorkerId worker_id, LeaseId id, TimePoint now) {
+  const auto entry = workers_.find(worker_id);
+  if (entry == workers_.end()) return;
+  Worker& worker = entry->second;
+  worker.pace.MayTake(Seconds(std::max(options_.busy_limit, options_.answer_limit)));
+  for (Lease& lease : worker.leases) {
+    if (lease.id == id) lease.heard = now;
+  }
+}
+
+// Of a lease whose time runs.
+TimePoint Dispatch::EndOf(const Lease& lease) const {
+  const TimePoint silent = lease.started + options_.answer_limit;
+  if (lease.heard <= lease.started) return silent;
+  return std::min(lease.heard + options_.answer_limit,
+                  std::max(silent, lease.started + options_.busy_limit));
+}
+
 void Dispatch::Expire(TimePoint now) {
   for (auto& [id, worker] : workers_) {
     if (worker.leases.empty()) continue;
-    if (now - worker.leases.front().started < options_.answer_limit) continue;
+    if (now < EndOf(worker.leases.front())) continue;
     worker.stalled = true;
     worker.pace.BeginAgain();
     TakeBack(&worker, /*timed_out=*/true);
@@ -340,7 +358,7 @@ TimePoint Dispatch::NextDeadline() const {
   const Index room = pending_.empty() ? IdleRoom() : 0;
   for (const auto& [id, worker] : workers_) {
     if (worker.leases.empty()) continue;
-    next = std::min(next, worker.leases.front().started + options_.answer_limit);
+    next = std::min(next, EndOf(worker.leases.front()));
     for (std::size_t i = 0; room > 0 && i < worker.leases.size(); ++i) {
       if (MayBackUp(worker.leases[i], room)) next = std::min(next, OverdueAt(worker, i));
     }

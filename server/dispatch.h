@@ -19,7 +19,8 @@ using WorkerId = std::uint64_t;
 using LeaseId = std::uint64_t;
 
 struct DispatchOptions {
-  Clock::duration answer_limit = std::chrono::seconds(60);  // for one chunk
+  Clock::duration answer_limit = std::chrono::seconds(60);  // for one chunk, without a word
+  Clock::duration busy_limit = std::chrono::hours(1);       // for one chunk, with words
   Clock::duration worker_wait = std::chrono::seconds(60);   // with queries and no worker
   // What a chunk should take, unless its worker's fixed cost (a start, a licence, a schedule) would
   // be more than a quarter of it.
@@ -50,6 +51,7 @@ struct Lease {
   Eigen::Index count = 0;
   int timeouts = 0;       // earlier leases of this query alone that ran out
   TimePoint started;      // when the worker could start on it: chunks of one worker queue up
+  TimePoint heard;        // when its worker last said that it is at it
   bool cut = false;       // smaller than its worker might have had: the round ended, or is shared
   bool queued = false;    // given while its worker had others
   bool check = false;     // another has these queries: the answers are for comparing
@@ -100,6 +102,8 @@ class Dispatch {
   // An answer came. The lease ends; the piece counts as answered once Settle is called.
   ClaimResult Claim(WorkerId worker, LeaseId id, TimePoint now, Lease* lease);
   void Settle(const Lease& lease);  // kClaimed only
+  // The worker is still at it. A lease that it does not have is none of its business.
+  void Busy(WorkerId worker, LeaseId id, TimePoint now);
 
   // Takes back the chunks of workers that are too slow.
   void Expire(TimePoint now);
@@ -138,6 +142,7 @@ class Dispatch {
   Lease Give(WorkerId id, Lease lease, TimePoint now);
   std::optional<Lease> NextCheck(WorkerId id, Worker* worker) const;
   void BackUp(TimePoint now, std::vector<Lease>* leases);
+  TimePoint EndOf(const Lease& lease) const;
   TimePoint OverdueAt(const Worker& worker, std::size_t position) const;
   // The most queries that an idle worker would take; 0: none is idle.
   Eigen::Index IdleRoom() const;

@@ -225,6 +225,7 @@ std::string EncodeStart(const SessionOptions& options, SystemTime create_time) {
   writer.Number(options.dispatch.answer_limit.count());
   writer.Number(options.dispatch.worker_wait.count());
   LayOutSpecification(writer, options.spec);
+  writer.Number(options.dispatch.busy_limit.count());
   return writer.Take();
 }
 
@@ -232,6 +233,7 @@ bool DecodeStart(std::string_view record, SessionOptions* options, SystemTime* c
   Reader reader(record);
   std::int64_t time = 0;
   Clock::rep answer_limit = 0, worker_wait = 0;
+  Clock::rep busy_limit = options->dispatch.busy_limit.count();
   reader.Bytes(options->name);
   reader.Bytes(options->owner);
   reader.Bytes(options->label);
@@ -239,9 +241,11 @@ bool DecodeStart(std::string_view record, SessionOptions* options, SystemTime* c
   reader.Number(answer_limit);
   reader.Number(worker_wait);
   LayOutSpecification(reader, options->spec);
+  if (!reader.Complete()) reader.Number(busy_limit);  // earlier records end before it
   *create_time = ToTime(time);
   options->dispatch.answer_limit = Clock::duration(answer_limit);
   options->dispatch.worker_wait = Clock::duration(worker_wait);
+  options->dispatch.busy_limit = Clock::duration(busy_limit);
   return reader.Complete();
 }
 

@@ -117,6 +117,11 @@ core::Expected<std::optional<Chunk>> OraclePool::Claim(WorkerId worker, LeaseId 
   return chunk;
 }
 
+void OraclePool::Busy(WorkerId worker, LeaseId lease) {
+  const std::lock_guard lock(mutex_);
+  dispatch_.Busy(worker, lease, Clock::now());  // puts off deadlines: nobody need wake up
+}
+
 core::Status OraclePool::Deliver(const Chunk& chunk, const core::AnswerBlock& answer) {
   if (answer.points.cols() != chunk.count) {
     return {StatusCode::kOracleShape,
@@ -364,7 +369,9 @@ MeshFailure OraclePool::Describe(Dispatch::Failure failure) const {
   }
   return {"ANSWER_TIMEOUT",
           core::Message("an oracle left a query that it was asked alone unanswered for ",
-                        Seconds(options_.answer_limit), " seconds (limits.answer_seconds), ",
+                        Seconds(options_.answer_limit), " seconds (limits.answer_seconds), or ",
+                        Seconds(options_.busy_limit),
+                        " while saying that it was busy (limits.busy_seconds), ",
                         options_.max_leases, " times: make it faster, or allow more time")};
 }
 

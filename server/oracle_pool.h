@@ -94,6 +94,8 @@ class OraclePool {
   // An answer to `lease` came. The chunk that it answers; nothing if the lease has ended, which is
   // no fault of the worker's; kInvalidArgument if it never was this worker's.
   core::Expected<std::optional<Chunk>> Claim(WorkerId worker, LeaseId lease);
+  // The worker is still at a lease's chunk.
+  void Busy(WorkerId worker, LeaseId lease);
   // Checks the answers to a claimed chunk and takes them over, or compares them with another
   // worker's, who may come later. On error nothing is taken, and the caller should call Fail. Two
   // workers that disagree fail the mesh, which is no error of this one.

@@ -29,6 +29,7 @@ class Pace {
   };
 
   explicit Pace(Aim aim) : aim_(aim) {}
+  void MayTake(double seconds) { aim_.limit = seconds; }
 
   void Answered(const Chunk& chunk);
   // A chunk took longer than it may, and who knows how long.

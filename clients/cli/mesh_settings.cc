@@ -8,6 +8,10 @@ using O = MeshOptions;
 constexpr MeshSetting kRun[] = {
     {"--seed", &O::random_seed, "seed of everything random"},
     {"--workers", &O::workers, "threads that answer the server"},
+    {"--max-chunk", &O::max_chunk, "most points that the oracle is asked at once"},
+    {"--worker-wait", &O::worker_wait_seconds, "seconds that the mesh waits for a worker"},
+    {"--answer", &O::answer_seconds, "that a worker may be silent over a chunk of queries"},
+    {"--busy", &O::busy_seconds, "that a worker may take for one in all"},
     {"--max-vertices", &O::max_vertices, "stop there"},
     {"--max-rounds", &O::max_rounds, "stop after so many round trips"},
     {"--max-batch-queries", &O::max_batch_queries, "ask larger rounds in several batches"},

@@ -143,6 +143,7 @@ void ToProto(const Session& session, v1::Mesh* out) {
   limits->set_worker_wait_seconds(
       std::chrono::duration<double>(options.dispatch.worker_wait).count());
   limits->set_answer_seconds(std::chrono::duration<double>(options.dispatch.answer_limit).count());
+  limits->set_busy_seconds(std::chrono::duration<double>(options.dispatch.busy_limit).count());
   out->set_state(ToProto(view.state));
   SetTime(view.create_time, out->mutable_create_time());
   if (view.end_time) SetTime(*view.end_time, out->mutable_end_time());

@@ -160,12 +160,23 @@ Refused ReadLimits(const v1::MeshSpec& spec, const Config& config, MeshRequest* 
                     Message("limits.max_rounds is ", to.max_rounds, " but this server allows ",
                             config.max_rounds, ": ask for fewer, or raise --max-rounds"));
   }
-  Refused refused =
-      ReadSeconds(limits.worker_wait_seconds(), config.worker_wait_seconds, config.max_wait_seconds,
-                  "limits.worker_wait_seconds", &request->worker_wait_seconds);
+  const double most = MaxWaitSeconds(config);
+  Refused refused = ReadSeconds(limits.worker_wait_seconds(), config.worker_wait_seconds, most,
+                                "limits.worker_wait_seconds", &request->worker_wait_seconds);
   if (!refused.ok()) return refused;
-  return ReadSeconds(limits.answer_seconds(), config.answer_seconds, config.max_wait_seconds,
-                     "limits.answer_seconds", &request->answer_seconds);
+  refused = ReadSeconds(limits.answer_seconds(), config.answer_seconds, most,
+                        "limits.answer_seconds", &request->answer_seconds);
+  if (!refused.ok()) return refused;
+  refused = ReadSeconds(limits.busy_seconds(), config.busy_seconds, most, "limits.busy_seconds",
+                        &request->busy_seconds);
+  if (!refused.ok()) return refused;
+  if (limits.busy_seconds() == 0) {
+    request->busy_seconds = std::max(request->busy_seconds, request->answer_seconds);
+  }
+  if (request->busy_seconds >= request->answer_seconds) return Status::Ok();
+  return Invalid(Message("limits.busy_seconds is ", request->busy_seconds,
+                         " but must be limits.answer_seconds (", request->answer_seconds,
+                         ") or more: a worker may take that long without a word"));
 }
 
 }  // namespace

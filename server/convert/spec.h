@@ -15,6 +15,7 @@ struct MeshRequest {
   std::string label;
   double worker_wait_seconds = 0;
   double answer_seconds = 0;
+  double busy_seconds = 0;
 };
 
 // Errors: kInvalidArgument or kLimitExceeded, the message starting with the field's path in

@@ -37,6 +37,7 @@ grpc::Status CreateMesh(const Call& call, const v1::CreateMeshRequest& request, 
   options.label = std::move(parsed->label);
   options.spec = std::move(parsed->spec);
   options.dispatch.answer_limit = ToDuration(parsed->answer_seconds);
+  options.dispatch.busy_limit = ToDuration(parsed->busy_seconds);
   options.dispatch.worker_wait = ToDuration(parsed->worker_wait_seconds);
   Furnish(service, &options);
   const auto full = options.memory->Set(EstimateMeshBytes(options.spec, kFirstVertices, 0));

@@ -130,8 +130,11 @@ class OracleStream final
       case v1::ServeOracleRequest::kFailure:
         if (greeted) return TakeFailure(request.failure());
         return OutOfOrder("a failure came before Hello: send Hello first");
+      case v1::ServeOracleRequest::kBusy:
+        if (greeted) return session_->pool().Busy(worker_, request.busy().lease());
+        return OutOfOrder("busy came before Hello: send Hello first");
       case v1::ServeOracleRequest::MESSAGE_NOT_SET:
-        return OutOfOrder("an empty message came: send hello, answers or failure");
+        return OutOfOrder("an empty message came: send hello, answers, failure or busy");
     }
   }
 
@@ -243,6 +246,8 @@ class OracleStream final
       welcome_ = false;
       response_.Clear();
       ToProto(session_->options().spec, response_.mutable_welcome());
+      response_.mutable_welcome()->set_answer_seconds(
+          std::chrono::duration<double>(session_->options().dispatch.answer_limit).count());
     } else if (end_) {
       finished_ = true;
       if (!over_) return Finish(*end_);

@@ -163,6 +163,55 @@ TEST_F(Workers, WhoNeverAnswersEndsTheMeshByName) {
   silent.Leave();
 }
 
+// Its first calls take longer than three leases together.
+TEST_F(Workers, WhoIsSlowSaysSoAndIsWaitedFor) {
+  const auto circle = Make("sphere:1");
+  SpoiledOracle slow(*circle);
+  int calls = 0;
+  slow.on_closest = [&calls](const Eigen::MatrixXd&, Answer&) {
+    if (++calls <= 2) std::this_thread::sleep_for(std::chrono::milliseconds(800));
+  };
+  MeshOptions options = At(0.3);
+  options.answer_seconds = 0.2;
+  const auto mesh = MeshManifold(slow, options);
+  ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
+  EXPECT_TRUE(mesh->report.certificate.certified);
+}
+
+TEST_F(Workers, WhoSaysItIsBusyForEverEndsTheMeshByName) {
+  const auto circle = Make("sphere:1");
+  SpoiledOracle hung(*circle);
+  std::atomic<bool> over = false;
+  hung.on_closest = [&over](const Eigen::MatrixXd&, Answer&) { over.wait(false); };
+  MeshOptions options = At(0.3);
+  options.answer_seconds = 0.1;
+  options.busy_seconds = 0.5;
+  const std::string name = Create(hung, options);
+  client::Worker worker(*stub_, hung, name, "hung");
+  std::thread thread([&worker] { worker.Run(); });
+  const Ending ending = Watch(name, 1, 2);
+  EXPECT_EQ(ending.final.state(), v1::MESH_STATE_FAILED);
+  EXPECT_EQ(ending.final.report().failure().reason(), "ANSWER_TIMEOUT");
+  over = true;
+  over.notify_all();
+  thread.join();
+}
+
+TEST_F(Workers, NoMoreAtOnceThanTheOracleWants) {
+  const auto torus = Make("torus:1:0.4");
+  SpoiledOracle narrow(*torus);
+  Eigen::Index most = 0;
+  narrow.on_closest = [&most](const Eigen::MatrixXd& x, Answer&) {
+    most = std::max(most, x.cols());
+  };
+  MeshOptions options = At(0.2);
+  options.max_chunk = 7;
+  ASSERT_TRUE(MeshManifold(narrow, options).has_value());
+  EXPECT_EQ(most, 7);
+  options.max_chunk = 0;
+  EXPECT_FALSE(MeshManifold(narrow, options).has_value());
+}
+
 TEST_F(Workers, NobodyComingEndsTheMeshByName) {
   const auto torus = Make("torus:1:0.4");
   MeshOptions options = At(0.1);

@@ -302,6 +302,46 @@ TEST_F(DispatchTest, AnOracleThatHasBecomeSlowIsTriedWithOneQuery) {
   EXPECT_EQ(dispatch.failure(now), Dispatch::Failure::kNone);
 }
 
+TEST_F(DispatchTest, AWorkerThatSaysItIsBusyKeepsItsLeaseForAWhile) {
+  options_.busy_limit = 60s;
+  Dispatch dispatch(options_);
+  dispatch.Join(1, 0);
+  dispatch.Begin({{1, 8}}, At(0s));
+  auto lease = dispatch.Assign(At(0s)).at(0);
+  for (auto now = At(8s); now < At(60s); now += 8s) {
+    dispatch.Expire(now);
+    dispatch.Busy(1, lease.id, now);
+    dispatch.Busy(1, lease.id + 1, now);  // not given
+    dispatch.Busy(2, lease.id, now);      // not there
+    EXPECT_EQ(dispatch.NextDeadline(), std::min(now + 10s, At(60s)));
+  }
+  dispatch.Expire(At(59s));
+  EXPECT_TRUE(dispatch.Assign(At(59s)).empty());
+  dispatch.Expire(At(60s));  // said so at 56 s and may take 60 s in all
+  lease = dispatch.Assign(At(60s)).at(0);
+  EXPECT_EQ(dispatch.failure(At(60s)), Dispatch::Failure::kNone);
+  dispatch.Busy(1, lease.id, At(69s));
+  dispatch.Expire(At(78s));
+  Answer(&dispatch, lease, At(78s));
+  EXPECT_TRUE(dispatch.Done());
+}
+
+TEST_F(DispatchTest, AHungOracleThatSaysItIsBusyFailsAfterThreeTimesTheLimit) {
+  options_.busy_limit = 60s;
+  Dispatch dispatch(options_);
+  dispatch.Join(1, 0);
+  dispatch.Begin({{1, 8}}, At(0s));
+  LeaseId lease = 0;
+  auto now = At(0s);
+  for (; dispatch.failure(now) == Dispatch::Failure::kNone && now < At(1000s); now += 5s) {
+    for (const Lease& given : dispatch.Assign(now)) lease = given.id;
+    dispatch.Busy(1, lease, now);
+    dispatch.Expire(now);
+  }
+  EXPECT_EQ(dispatch.failure(now), Dispatch::Failure::kAnswerTimeout);
+  EXPECT_LE(now, At(200s));
+}
+
 TEST_F(DispatchTest, ChunksInAWorkersQueueDoNotAge) {
   Dispatch dispatch(options_);
   dispatch.Join(1, 4);

@@ -71,6 +71,15 @@ TEST_F(StragglersTest, AnIdleWorkerIsGivenWhatIsFarOverdueAndTheFirstAnswerCount
   EXPECT_EQ(dispatch.Claim(1, late_.id, At(5s), &claimed_), Claim::kUnknown) << "twice";
 }
 
+TEST_F(StragglersTest, WhoSaysItIsBusyIsBackedUpAsWell) {
+  Dispatch dispatch(options_);
+  BeginWithOneLate(&dispatch);
+  dispatch.Busy(1, late_.id, At(2s));
+  const auto backup = dispatch.Assign(At(3s));
+  ASSERT_EQ(backup.size(), 1u);
+  EXPECT_EQ(backup[0].twin, late_.id);
+}
+
 TEST_F(StragglersTest, TheStragglerMayBeTheFirst) {
   Dispatch dispatch(options_);
   BeginWithOneLate(&dispatch);

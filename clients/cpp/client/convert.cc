@@ -93,6 +93,7 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
     return invalid("ambient_dimension is " + std::to_string(oracle.ambient_dimension()) +
                    " but must be at least 2");
   }
+  if (options.max_chunk == 0u) return invalid("max_chunk is 0 but must be 1 or more");
   if (options.workers < 1 || options.workers > 1024) {
     return invalid("workers is " + std::to_string(options.workers) + " but must be 1 to 1024");
   }
@@ -134,6 +135,7 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   if (options.max_batch_queries) limits.set_max_batch_queries(*options.max_batch_queries);
   if (options.worker_wait_seconds) limits.set_worker_wait_seconds(*options.worker_wait_seconds);
   if (options.answer_seconds) limits.set_answer_seconds(*options.answer_seconds);
+  if (options.busy_seconds) limits.set_busy_seconds(*options.busy_seconds);
   if (options.box_seeds) spec.set_box_seeds(*options.box_seeds);
   if (options.components) spec.set_components(*options.components);
   if (options.thorough_audit) spec.set_audit(v1::AUDIT_THOROUGH);

@@ -104,8 +104,8 @@ Expected<void> Run::Create() {
 
 void Run::StartWorkers() {
   for (int i = 0; i < options_.workers; ++i) {
-    workers_.push_back(
-        std::make_unique<Worker>(*stub_, oracle_, name_, "cpp-" + std::to_string(i + 1), Policy()));
+    workers_.push_back(std::make_unique<Worker>(
+        *stub_, oracle_, name_, "cpp-" + std::to_string(i + 1), Policy(), options_.max_chunk));
   }
   for (const auto& worker : workers_) {
     threads_.emplace_back([this, w = worker.get()] {

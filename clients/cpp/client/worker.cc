@@ -1,10 +1,13 @@
 #include "worker.h"
 
 #include <algorithm>
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <stop_token>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -15,6 +18,7 @@ namespace stellate::client {
 namespace {
 
 constexpr size_t kChunkBytes = 3 << 20;    // of numbers, under the 4 MB of a message
+constexpr double kBusyShare = 0.25;        // of the time that the server bears silence
 constexpr size_t kMaxFailureBytes = 4000;  // OracleFailure.message takes 4096
 
 std::uint32_t MaxChunkQueries(const Oracle& oracle) {
@@ -41,11 +45,59 @@ std::vector<Eigen::Index> FoundOf(const Answer& answer) {
   return found;
 }
 
+using Seconds = std::chrono::duration<double>;
+using Stream = grpc::ClientReaderWriterInterface<v1::ServeOracleRequest, v1::ServeOracleResponse>;
+
+// What is sent to the server. While the oracle is at a chunk another thread says so now and then,
+// lest the server take a slow worker for a dead one.
+class Outbox {
+ public:
+  explicit Outbox(Stream& stream) : stream_(stream) {}
+
+  bool Write(const v1::ServeOracleRequest& request) {
+    const std::lock_guard lock(mutex_);
+    busy_with_.reset();
+    return stream_.Write(request);
+  }
+
+  void End() {
+    const std::lock_guard lock(mutex_);
+    busy_with_.reset();
+    stream_.WritesDone();
+  }
+
+  // The oracle is at the chunk, until the next Write.
+  void Begin(std::uint64_t lease) {
+    const std::lock_guard lock(mutex_);
+    busy_with_ = lease;
+  }
+
+  // Says so every `interval`, from now on.
+  void SayBusyEvery(Seconds interval) {
+    if (teller_.joinable()) return;
+    teller_ = std::jthread([this, interval](const std::stop_token& stop) {
+      std::unique_lock lock(mutex_);
+      while (!wake_.wait_for(lock, stop, interval, [&stop] { return stop.stop_requested(); })) {
+        if (!busy_with_) continue;
+        v1::ServeOracleRequest request;
+        request.mutable_busy()->set_lease(*busy_with_);
+        stream_.Write(request);
+      }
+    });
+  }
+
+ private:
+  Stream& stream_;
+  std::mutex mutex_;
+  std::condition_variable_any wake_;
+  std::optional<std::uint64_t> busy_with_;
+  std::jthread teller_;  // joined before the rest goes
+};
+
 // What the server sent, read on a thread of its own: the next chunk is on its way while one is
 // answered. The server bounds how many there can be.
 class Inbox {
  public:
-  using Stream = grpc::ClientReaderWriterInterface<v1::ServeOracleRequest, v1::ServeOracleResponse>;
   explicit Inbox(Stream& stream) : reader_([this, &stream] { ReadAll(stream); }) {}
 
   // False at the end of the stream.
@@ -81,11 +133,12 @@ class Inbox {
 }  // namespace
 
 Worker::Worker(v1::Stellate::StubInterface& stub, Oracle& oracle, std::string mesh,
-               std::string name, ReconnectPolicy policy)
+               std::string name, ReconnectPolicy policy, std::optional<std::uint32_t> max_chunk)
     : stub_(stub),
       oracle_(oracle),
       mesh_(std::move(mesh)),
       name_(std::move(name)),
+      max_chunk_(std::min(MaxChunkQueries(oracle), max_chunk.value_or(MaxChunkQueries(oracle)))),
       attempts_(std::move(policy)) {}
 
 // Only where there is a point to ask about; the server skips the other columns.
@@ -183,22 +236,27 @@ grpc::Status Worker::Serve() {
   v1::ServeOracleRequest request;
   request.mutable_hello()->set_mesh(mesh_);
   request.mutable_hello()->set_worker(name_);
-  request.mutable_hello()->set_max_chunk_queries(MaxChunkQueries(oracle_));
+  request.mutable_hello()->set_max_chunk_queries(max_chunk_);
   bool open = stream->Write(request);
   {
     Inbox inbox(*stream);
+    Outbox outbox(*stream);
     v1::ServeOracleResponse response;
     while (open && !exception_ && inbox.Next(&response)) {
       attempts_.Heard();
       over_ = over_ || response.has_over();
+      if (response.welcome().answer_seconds() > 0) {
+        outbox.SayBusyEvery(Seconds(kBusyShare * response.welcome().answer_seconds()));
+      }
       if (!response.has_queries()) continue;
+      outbox.Begin(response.queries().lease());
       if (!AnswerOrFail(response.queries(), &request)) {
         attempts_.Stop();
         break;
       }
-      open = stream->Write(request);
+      open = outbox.Write(request);
     }
-    stream->WritesDone();
+    outbox.End();
     // What is left unread would keep Finish from returning.
     while (inbox.Next(&response)) over_ = over_ || response.has_over();
   }

@@ -15,7 +15,7 @@ namespace stellate::client {
 class Worker {
  public:
   Worker(v1::Stellate::StubInterface& stub, Oracle& oracle, std::string mesh, std::string name,
-         ReconnectPolicy policy = {});
+         ReconnectPolicy policy = {}, std::optional<std::uint32_t> max_chunk = {});
 
   void Run();
   // Ends the stream: what is unanswered goes to another worker.
@@ -37,6 +37,7 @@ class Worker {
   v1::Stellate::StubInterface& stub_;
   Oracle& oracle_;
   const std::string mesh_, name_;
+  const std::uint32_t max_chunk_;
   Reconnector attempts_;
   bool over_ = false;
   std::exception_ptr exception_;

@@ -50,13 +50,15 @@ _LABEL_BYTES = 128
 # stellate.mesh; their types.
 _RUN: list[tuple[str, str, type, str]] = [
     ("--seed", "random_seed", int, "seed of everything random"),
+    ("--max-chunk", "max_chunk", int, "most points that the oracle is asked at once"),
     ("--workers", "workers", int, "threads that call the oracle, if it has thread_safe = True"),
     ("--max-vertices", "max_vertices", int, "stop there"),
     ("--max-rounds", "max_rounds", int, "stop after so many round trips"),
     ("--max-batch-queries", "max_batch_queries", int, "ask larger rounds in several batches"),
     ("--box-seeds", "box_seeds", int, "points of the box tried as seeds"),
     ("--worker-wait", "worker_wait_seconds", float, "seconds that the mesh waits for a worker"),
-    ("--answer", "answer_seconds", float, "seconds that a worker may take for a chunk"),
+    ("--answer", "answer_seconds", float, "seconds that a worker may be silent over a chunk"),
+    ("--busy", "busy_seconds", float, "seconds that it may take for one in all"),
 ]
 _CRITERIA: list[tuple[str, str, type, str]] = [
     ("--radius-edge", "radius_edge_bound", float, "rho0 of rule R2"),
@@ -191,12 +193,15 @@ def _serve(options: argparse.Namespace) -> int:
     oracle = load(options.oracle)
     with _connected(options) as client:
         if options.processes is None:
-            state = client.serve(oracle, options.mesh, worker=options.worker)
+            state = client.serve(
+                oracle, options.mesh, worker=options.worker, max_chunk=options.max_chunk
+            )
         else:
             count = options.processes
             spawn = multiprocessing.get_context("spawn")  # gRPC's threads do not outlive a fork
             with futures.ProcessPoolExecutor(count, spawn) as pool, workers_on(
-                pool, oracle, options.mesh, count, server=client, worker=options.worker
+                pool, oracle, options.mesh, count, server=client, worker=options.worker,
+                max_chunk=options.max_chunk,
             ) as crew:
                 state = max(crew.wait())
     print(state)
@@ -304,6 +309,7 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("mesh", help="its whole name: meshes/ and 32 digits")
     one.add_argument("--processes", type=int, metavar="N", help="of this machine, that answer")
     one.add_argument("--worker", default="", help="what the server's log calls this one")
+    one.add_argument("--max-chunk", type=int, metavar="N", help="most points asked at once")
     _add_connection(one, "127.0.0.1:7717")
 
     one = add("download", _download, "fetch a mesh that is on a server")

@@ -127,6 +127,7 @@ class ExecutorWorkers:
         server: str | Server | Client,
         credentials: Credentials | None,
         worker: str,
+        max_chunk: int | None,
     ) -> None:
         if int(slots) != slots or slots < 1:
             raise ValueError(f"slots has to be a whole number from 1 on, and is {slots!r}")
@@ -143,8 +144,9 @@ class ExecutorWorkers:
         self._pool = _Pool(executor)
         self._workers = [
             client.worker(
-                self._checked, mesh_name, f"{worker}-{i}", self._note, quiet=i > 1, ask=self._ask
-            )
+                self._checked, mesh_name, f"{worker}-{i}", self._note, quiet=i > 1, ask=self._ask,
+                max_chunk=max_chunk,
+            )  # fmt: skip
             for i in range(1, int(slots) + 1)
         ]
         self._left = len(self._workers)
@@ -272,6 +274,7 @@ def workers_on(
     server: str | Server | Client,
     credentials: Credentials | None = None,
     worker: str = "executor",
+    max_chunk: int | None = None,
 ) -> ExecutorWorkers:
     """Workers for a mesh whose oracle runs on an executor: processes, Dask, MPI.
 
@@ -294,5 +297,8 @@ def workers_on(
       mesh_name: "meshes/<id>", as Client.create gives it.
       server, credentials: as for stellate.serve.
       worker: what the server's log calls them, with the slot's number.
+      max_chunk: the most points that the oracle is asked at once.
     """
-    return ExecutorWorkers(executor, oracle, mesh_name, slots, server, credentials, worker)
+    return ExecutorWorkers(
+        executor, oracle, mesh_name, slots, server, credentials, worker, max_chunk
+    )

@@ -54,13 +54,16 @@ def mesh(
         formats cannot hold is an error before anything is meshed.
       **criteria: radius_edge_bound, sliver_bound, picking_radius, small_sliver_radius, candidates,
         advance_step, flat_alternations, ask_ahead, common_centre, size_rate, max_deviation;
-        max_vertices, max_rounds, max_batch_queries, worker_wait_seconds, answer_seconds;
-        random_seed, box_seeds, seeds, components, label: the protocol's MeshSpec says what each
+        max_vertices, max_rounds, max_batch_queries, worker_wait_seconds, answer_seconds,
+        busy_seconds; random_seed, box_seeds, seeds, components, label: the protocol's MeshSpec says
+        what each
         is. audit: "standard", or "thorough", which asks about every vertex and every simplex
         before it certifies. components: a mesh with fewer is not certified. size_rate
         and max_deviation go by the oracle's local_size where it has one. ask_ahead is on unless the
         server is on this machine. workers: how many threads call the oracle, which takes effect
-        when the oracle says `thread_safe = True`; the mesh is the same for any number.
+        when the oracle says `thread_safe = True`; the mesh is the same for any number. max_chunk:
+        the most points that the oracle is asked at once; by default as many as take it a quarter of
+        a second, or four times what a call of it costs.
 
     Returns:
       The mesh. It may be uncertified, when a budget was spent or epsilon is too coarse: its report
@@ -219,6 +222,7 @@ def serve(
     *,
     server: str | Server | Client,
     worker: str = "",
+    max_chunk: int | None = None,
     credentials: Credentials | None = None,
 ) -> str:
     """One more worker for a mesh: answers the server's questions until the mesh is over.
@@ -226,8 +230,12 @@ def serve(
     All workers of a mesh have to answer for the same manifold. Ctrl-C takes this worker away; its
     work goes to the others.
 
+    A worker that comes when the mesh is over returns its state at once, so a late batch job is a
+    success. `worker` is its name, for logs; `max_chunk` the most points that the oracle is asked at
+    once, as in stellate.mesh.
+
     Returns: the state that the mesh ended in, e.g. "SUCCEEDED".
-    Raises: what the oracle raises, after the server was told, or a StellateError.
+    Raises: MeshNotFound, also for a mesh that was over and is not kept any more; what the oracle raises, after the server was told, or a StellateError.
     """
     with _client(server, credentials) as client, told("this worker left; others have its work"):
-        return client.serve(oracle, mesh_name, worker=worker)
+        return client.serve(oracle, mesh_name, worker=worker, max_chunk=max_chunk)

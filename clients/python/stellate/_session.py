@@ -18,6 +18,7 @@ from ._server import Server
 from ._spec import mesh_spec
 from .client import Client, MeshInfo
 from .errors import Interrupted, InvalidArgument, StellateError
+from ._worker import check_max_chunk
 from .oracle import CheckedOracle
 from .progress import progress_bar
 
@@ -35,13 +36,16 @@ class _Workers:
         oracle: CheckedOracle,
         mesh: str,
         count: int,
+        max_chunk: int | None,
         on_failure: Callable[[BaseException], None],
     ) -> None:
         """`on_failure` is told of each; what it raises in turn, the server is not told."""
         self.failure: BaseException | None = None
         self._on_failure = on_failure
         self._workers = [
-            client.worker(oracle, mesh, f"python-{i + 1}", self._note, quiet=True)
+            client.worker(
+                oracle, mesh, f"python-{i + 1}", self._note, quiet=True, max_chunk=max_chunk
+            )
             for i in range(count)
         ]
         self._threads = [
@@ -105,6 +109,7 @@ class Session:
                 "on_progress has to be a function of a Progress, such as stellate.progress_bar(), "
                 f"and is {on_progress!r}"
             )
+        max_chunk = check_max_chunk(criteria.pop("max_chunk", None))
         checked = CheckedOracle(oracle)
         mesh_spec(checked, 1.0, criteria)  # what is misspelt shows before the oracle is probed
         choice = checkpoint.choose_epsilon if checkpoint is not None else choose
@@ -133,7 +138,7 @@ class Session:
             raise
         self._following = Following(self._client, self._info, on_progress, every)
         self._workers = _Workers(
-            self._client, checked, self._info.name, int(workers), self._on_failure
+            self._client, checked, self._info.name, int(workers), max_chunk, self._on_failure
         )
 
     def _declare(self, oracle: CheckedOracle, epsilon: float, criteria: dict[str, Any]) -> MeshInfo:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numbers
 import queue
 import threading
+import time
 import traceback
 from typing import Any, Callable, Iterator
 
@@ -21,6 +23,8 @@ from .oracle import CheckedOracle
 _ANSWER_BYTES = 3_000_000  # an answer has to stay below the server's 4 MB
 _MESSAGE_BYTES = 4000
 _CALL_SECONDS = 30.0
+_LOOK_AGAIN_SECONDS = 0.1
+_BUSY_SHARE = 0.25  # of the time that the server bears silence
 
 
 def answer(oracle: CheckedOracle, chunk: pb.QueryChunk) -> pb.ServeOracleRequest:
@@ -49,6 +53,15 @@ def answer(oracle: CheckedOracle, chunk: pb.QueryChunk) -> pb.ServeOracleRequest
 
 
 Ask = Callable[[CheckedOracle, pb.QueryChunk], pb.ServeOracleRequest]
+
+
+def check_max_chunk(max_chunk: int | None) -> int | None:
+    """As a whole number. Raises: InvalidArgument."""
+    if max_chunk is None:
+        return None
+    if not isinstance(max_chunk, numbers.Integral) or max_chunk < 1:
+        raise InvalidArgument(f"max_chunk has to be a whole number from 1 on, and is {max_chunk!r}")
+    return int(max_chunk)
 
 
 class _Broken(Exception):
@@ -87,6 +100,53 @@ class _Inbox:
             yield response
 
 
+class _Outbox:
+    """What is sent to the server, until end().
+
+    While the oracle is at a chunk another thread says so now and then, lest the server take a slow
+    worker for a dead one.
+    """
+
+    def __init__(self) -> None:
+        self._requests: queue.SimpleQueue[pb.ServeOracleRequest | None] = queue.SimpleQueue()
+        self._busy_with: int | None = None
+        self._ended = threading.Event()
+        self._teller: threading.Thread | None = None
+
+    def put(self, request: pb.ServeOracleRequest) -> None:
+        self._busy_with = None
+        self._requests.put(request)
+
+    def begin(self, lease: int) -> None:
+        """The oracle is at the chunk, until the next put()."""
+        self._busy_with = lease
+
+    def say_busy_every(self, seconds: float) -> None:
+        if self._teller is None:
+            self._teller = threading.Thread(
+                target=self._tell, args=(seconds,), name="busy", daemon=True
+            )
+            self._teller.start()
+
+    def _tell(self, seconds: float) -> None:
+        while not self._ended.wait(seconds):
+            lease = self._busy_with
+            if lease is not None:
+                self._requests.put(pb.ServeOracleRequest(busy=pb.Busy(lease=lease)))
+
+    def end(self) -> None:
+        self._ended.set()
+        self._busy_with = None
+        self._requests.put(None)
+
+    def __iter__(self) -> Iterator[pb.ServeOracleRequest]:
+        while True:
+            request = self._requests.get()
+            if request is None:
+                return
+            yield request
+
+
 class Worker:
     """Serves one mesh until it is over, or stop() is called; a lost stream is opened again."""
 
@@ -100,16 +160,21 @@ class Worker:
         patience: Patience,
         quiet: bool = False,
         ask: Ask = answer,
+        max_chunk: int | None = None,
     ) -> None:
         """`on_failure` is told what the oracle raised before the server is. `quiet`: no log.
 
+        `max_chunk`: the most queries that the oracle is asked at once; None: the server decides.
         `ask` has the oracle answer a chunk, somewhere. Its ExecutorError ends this worker alone.
         """
         self._ask = ask
         self._stub, self._oracle, self._on_failure = stub, oracle, on_failure
         per_query = 8 * oracle.ambient_dimension * (oracle.dimension + 1) + 9
+        most = max(1, _ANSWER_BYTES // per_query)
         self._hello = pb.Hello(
-            mesh=mesh, worker=name, max_chunk_queries=max(1, _ANSWER_BYTES // per_query)
+            mesh=mesh,
+            worker=name,
+            max_chunk_queries=min(most, check_max_chunk(max_chunk) or most),
         )
         self._call: Any = None
         self._outage = Outage(patience, quiet)
@@ -150,47 +215,56 @@ class Worker:
         self._outage.stop()
 
     def _serve(self) -> str:
-        requests: queue.SimpleQueue[pb.ServeOracleRequest | None] = queue.SimpleQueue()
-        requests.put(pb.ServeOracleRequest(hello=self._hello))
-        call = self._call = self._stub.ServeOracle(_until_none(requests))
+        outbox = _Outbox()
+        outbox.put(pb.ServeOracleRequest(hello=self._hello))
+        call = self._call = self._stub.ServeOracle(iter(outbox))
         if self._stopped.is_set():
             call.cancel()
         try:
-            return self._answer_all(requests, _Inbox(call))
+            return self._answer_all(outbox, _Inbox(call))
         finally:
-            requests.put(None)
+            outbox.end()
             call.cancel()  # unless it has ended
 
-    def _answer_all(
-        self, requests: queue.SimpleQueue[pb.ServeOracleRequest | None], inbox: _Inbox
-    ) -> str:
+    def _answer_all(self, outbox: _Outbox, inbox: _Inbox) -> str:
         state = ""
         for response in inbox:
             self._outage.heard()
             kind = response.WhichOneof("message")
             if kind == "queries":
+                outbox.begin(response.queries.lease)
                 try:
                     reply = self._ask(self._oracle, response.queries)
                 except (KeyboardInterrupt, ExecutorError):
                     raise  # no failure of the oracle: another worker may go on
                 except BaseException as error:
                     self._on_failure(error)
-                    self._tell(requests, inbox, response.queries.lease, error)
+                    self._tell(outbox, inbox, response.queries.lease, error)
                     raise
-                requests.put(reply)
+                outbox.put(reply)
             elif kind == "welcome":
                 self._compare(response.welcome)
+                if response.welcome.answer_seconds > 0:
+                    outbox.say_busy_every(_BUSY_SHARE * response.welcome.answer_seconds)
             elif kind == "over":
                 state = response.over.state.removeprefix("MESH_STATE_")
-                requests.put(None)
+                outbox.end()
         return state
 
     def _how_it_ended(self) -> str:
-        try:
-            mesh = self._stub.GetMesh(GetMeshRequest(name=self._hello.mesh), timeout=_CALL_SECONDS)
-        except grpc.RpcError:
-            return ""
-        return MeshState.Name(mesh.state).removeprefix("MESH_STATE_")
+        """Of a mesh that takes no more workers; "" if that cannot be found out."""
+        request = GetMeshRequest(name=self._hello.mesh)
+        give_up = time.monotonic() + _CALL_SECONDS
+        while True:
+            try:
+                mesh = self._stub.GetMesh(request, timeout=_CALL_SECONDS)
+            except grpc.RpcError:
+                return ""
+            if mesh.HasField("end_time"):
+                return MeshState.Name(mesh.state).removeprefix("MESH_STATE_")
+            # It is just about to end.
+            if time.monotonic() > give_up or self._stopped.wait(_LOOK_AGAIN_SECONDS):
+                return ""
 
     def _compare(self, welcome: pb.Welcome) -> None:
         """Leaves the mesh alone if this oracle is not of its kind."""
@@ -217,7 +291,7 @@ class Worker:
 
     def _tell(
         self,
-        requests: queue.SimpleQueue[pb.ServeOracleRequest | None],
+        outbox: _Outbox,
         inbox: _Inbox,
         lease: int,
         error: BaseException,
@@ -226,20 +300,11 @@ class Worker:
         said = traceback.format_exception_only(type(error), error)[-1].strip()
         message = said.encode()[:_MESSAGE_BYTES].decode(errors="ignore")
         failure = pb.OracleFailure(lease=lease, message=message)
-        requests.put(pb.ServeOracleRequest(failure=failure))
-        requests.put(None)
+        outbox.put(pb.ServeOracleRequest(failure=failure))
+        outbox.end()
         try:
             for _ in inbox:
                 pass
         except _Broken:
             pass  # ABORTED, as announced
 
-
-def _until_none(
-    requests: queue.SimpleQueue[pb.ServeOracleRequest | None],
-) -> Iterator[pb.ServeOracleRequest]:
-    while True:
-        request = requests.get()
-        if request is None:
-            return
-        yield request

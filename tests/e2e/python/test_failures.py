@@ -160,7 +160,9 @@ def test_an_oracle_that_never_answers_is_given_up(server):
 
     try:
         with pytest.raises(stellate.OracleError) as caught:
-            stellate.mesh(Torus(closest_point=hang), 0.1, server=server, answer_seconds=0.2)
+            stellate.mesh(
+                Torus(closest_point=hang), 0.1, server=server, answer_seconds=0.2, busy_seconds=0.5
+            )
     finally:
         never.set()
     assert caught.value.reason == "ANSWER_TIMEOUT"

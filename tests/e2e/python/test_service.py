@@ -139,6 +139,45 @@ def test_watched_by_name_from_the_beginning_by_many(client, server):
         client.get(info.name)
 
 
+class Slow(manifolds.ProductOfCircles):
+    """Circles whose first calls take longer than three leases together."""
+
+    def __init__(self, calls):
+        super().__init__((1.0,))
+        self.left, self.most = calls, 0
+
+    def closest_point(self, points):
+        self.most = max(self.most, len(points))
+        self.left -= 1
+        if self.left >= 0:
+            time.sleep(0.8)
+        return super().closest_point(points)
+
+
+def test_a_slow_worker_says_so_and_is_waited_for(server):
+    mesh = stellate.mesh(Slow(2), 0.3, server=server, answer_seconds=0.2)
+    assert mesh.certified
+
+
+def test_no_more_points_at_once_than_the_oracle_wants(client):
+    oracle = Slow(0)
+    stellate.mesh(oracle, 0.05, server=client, max_chunk=3)
+    assert oracle.most == 3
+    info = client.create(oracle, 0.05)
+    oracle.most = 0
+    assert stellate.serve(oracle, info.name, server=client, max_chunk=2) == "SUCCEEDED"
+    assert oracle.most == 2
+    for wrong in (0, -1, 1.5):
+        with pytest.raises(stellate.InvalidArgument, match="max_chunk"):
+            stellate.serve(oracle, info.name, server=client, max_chunk=wrong)
+
+
+def test_a_worker_that_comes_late_is_told_how_it_ended(client):
+    info = client.create(manifolds.ProductOfCircles((1.0,)), 0.3)
+    client.cancel(info.name)
+    assert client.serve(manifolds.ProductOfCircles((1.0,)), info.name) == "CANCELLED"
+
+
 def test_a_worker_that_leaves_mid_round_is_replaced(client):
     """The first worker stops with a chunk in its hands; the second finishes the mesh, the same."""
     expected = stellate.mesh(manifolds.Torus(), 0.15, server=client)

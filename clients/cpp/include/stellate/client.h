@@ -50,6 +50,9 @@ struct MeshOptions {
   double keepalive_seconds = 4;
   // How many threads answer, each with a stream of its own. The oracle is called from all at once.
   int workers = 1;
+  // The most points that the oracle is asked at once. By default as many as take it a quarter of a
+  // second, or four times what a call of it costs.
+  std::optional<std::uint32_t> max_chunk;
   // Called on the calling thread. What it throws cancels the mesh and reaches the caller.
   std::function<void(const Progress&)> on_progress;
   // Cancels the mesh when stop is requested; the mesh so far is returned, not certified.
@@ -75,9 +78,9 @@ struct MeshOptions {
   // R_p at most this share of the local size, (0, 1]: the oracle's if it has one, else estimated.
   std::optional<double> size_rate;
   std::optional<double> max_deviation;  // circumcentres at most so far from M, a length
-  std::optional<bool> common_centre;  // judge simplices at a centre common to their vertices
+  std::optional<bool> common_centre;    // judge simplices at a centre common to their vertices
 
-  std::optional<double> worker_wait_seconds, answer_seconds;
+  std::optional<double> worker_wait_seconds, answer_seconds, busy_seconds;
   std::string label;  // shown in the server's lists and logs
 };
 
