@@ -16,7 +16,7 @@ constexpr double kInside = 0.98;
 constexpr int kLadder = 6;
 constexpr double kMet = 1e-3;  // of the longest edge
 // Sine of the angle by which the tangent space at a point that is no vertex may be wrong.
-constexpr double kTilt = 0.15;
+constexpr double kTilt = 0.25;
 
 }  // namespace
 

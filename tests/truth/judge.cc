@@ -10,7 +10,7 @@ namespace stellate::truth {
 namespace {
 
 // A runaway is as telling at this size as at any other. By k.
-constexpr std::uint64_t kMostVertices[] = {0, 10'000, 12'000, 5'000};
+constexpr std::uint64_t kMostVertices[] = {0, 10'000, 12'000, 8'000};
 
 bool IsRight(const Case& c, const testing::FinishedRun& run) {
   const auto corners = static_cast<std::size_t>(c.shape->k()) + 1;
