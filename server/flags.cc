@@ -83,6 +83,13 @@ ParsedFlags ParseFlags(int argc, const char* const* argv) {
   add_command("--health-key", &flags.health_key, "PEM file with its private key");
   add_command("--exit-with-parent", &flags.exit_with_parent,
               "Stop when the process that started this one is gone");
+  add_command("--verify-data-dir", &flags.verify_data_dir,
+              "Read every record in --data-dir, change nothing, say what there is, and exit; 0 if "
+              "it is sound, else 1");
+  add_command("--salvage", &flags.salvage,
+              "Where the record in --data-dir is damaged, begin a new one with all that can be "
+              "read, keep the damaged files beside it, say what is lost, and exit; 0 if that "
+              "succeeds, else 1");
   for (const Setting& setting : Settings()) AddSetting(&app, setting, &flags.config);
 
   try {

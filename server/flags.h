@@ -12,6 +12,7 @@ struct Flags {
   std::string health_certificate, health_key;  // shown by it; empty: the server's own
   std::string health_service;  // whose health --health-check asks for; empty: the whole server's
   bool exit_with_parent = false;
+  bool verify_data_dir = false, salvage = false;  // instead of serving
 };
 
 // Reads the command line and the configuration file that it names; what stands on the command line

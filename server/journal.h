@@ -8,22 +8,27 @@
 #include "core/status.h"
 #include "server/session.h"
 #include "server/session_journal.h"
+#include "server/shared_journal.h"
 
 namespace stellate::server {
 
 struct JournalOptions {
-  std::string directory;        // made if it is not there
-  std::uint64_t max_bytes = 0;  // of the journal's file; 0: what the disk holds
+  std::string directory;          // made if it is not there
+  std::uint64_t max_bytes = 0;    // of the journal's file; 0: what the disk holds
+  std::uint64_t owner_bytes = 0;  // of the records of an owner's meshes, where owners have names;
+                                  // 0: no limit
 };
 
 // The record of all meshes of a server, in one SQLite file of its data directory: for each its
-// specification, the answers of each round, and its end. Meshes write from their own threads, one
-// transaction a round, synced to the disk before the call returns.
+// specification, the answers of each round, and its end; once it has ended, the mesh itself in the
+// place of the answers. Meshes write from their own threads, one transaction a round, synced to the
+// disk before the call returns.
 class Journal {
  public:
-  // Opens the record of an earlier server, or begins one. Refuses, with kFailedPrecondition, words
-  // for people, and without changing a byte: a file that is no journal, one of another version,
-  // one that is damaged anywhere (every record is read), and one that another server has open.
+  // Opens the record of an earlier server, or begins one; one of the version before is taken over.
+  // Refuses, with kFailedPrecondition, words for people, and without changing a byte: a file that
+  // is no journal, one of another version, one that is damaged anywhere (every record is read, and
+  // none is missing), and one that another server has open.
   static core::Expected<std::unique_ptr<Journal>> Open(const JournalOptions& options);
   // Meshes still running keep their part of it open.
   ~Journal();
@@ -34,14 +39,15 @@ class Journal {
 
   // For a new mesh.
   std::shared_ptr<SessionJournal> NewMesh();
+  // Bytes of the records of an owner's meshes; the file has a twentieth or so on top.
+  std::uint64_t OwnerBytes(const std::string& owner) const { return file_->OwnerBytes(owner); }
 
  private:
-  class File;
-  class Mesh;
+  Journal(std::shared_ptr<SharedJournal> file, std::uint64_t owner_bytes);
+  bool Take(std::int64_t id, const JournalFile::StoredMesh& stored, std::uint64_t bytes);
 
-  explicit Journal(std::shared_ptr<File> file) : file_(std::move(file)) {}
-
-  const std::shared_ptr<File> file_;
+  const std::shared_ptr<SharedJournal> file_;
+  const std::uint64_t owner_bytes_;
   std::vector<SessionOptions> meshes_;
 };
 

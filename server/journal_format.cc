@@ -1,174 +1,21 @@
 #include "server/journal_format.h"
 
 #include <algorithm>
-#include <bit>
-#include <cstring>
-#include <limits>
-#include <type_traits>
-#include <utility>
+
+#include "server/record_bytes.h"
 
 namespace stellate::server {
 namespace {
-
-static_assert(std::endian::native == std::endian::little, "records are copied, not converted");
 
 using Eigen::Index;
 using Microseconds = std::chrono::microseconds;
 using SystemTime = std::chrono::system_clock::time_point;
 
-constexpr std::size_t kWord = 8;
-
-class Digest {
- public:
-  void Add(std::uint64_t word) {
-    state_ = (state_ ^ word) * 0xff51afd7ed558ccdu;
-    state_ ^= state_ >> 32;
-  }
-  void Add(const void* data, std::size_t bytes) {
-    Add(bytes);
-    const char* at = static_cast<const char*>(data);
-    for (; bytes >= kWord; at += kWord, bytes -= kWord) {
-      std::uint64_t word;
-      std::memcpy(&word, at, kWord);
-      Add(word);
-    }
-    std::uint64_t rest = 0;
-    if (bytes > 0) std::memcpy(&rest, at, bytes);
-    Add(rest);
-  }
-  void Add(const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
-    Add(static_cast<std::uint64_t>(matrix.rows()));
-    Add(matrix.data(), static_cast<std::size_t>(matrix.size()) * sizeof(double));
-  }
-  std::uint64_t value() const { return state_; }
-
- private:
-  std::uint64_t state_ = 0x9e3779b97f4a7c15u;
-};
-
-// Both take the same fields in the same order, so that one function lays out either way.
-class Writer {
- public:
-  template <typename T>
-  void Number(const T& value) {
-    static_assert(sizeof(T) <= kWord);
-    if constexpr (std::is_floating_point_v<T>) {
-      Word(std::bit_cast<std::uint64_t>(static_cast<double>(value)));
-    } else {
-      Word(static_cast<std::uint64_t>(value));
-    }
-  }
-  void Bytes(const std::string& bytes) { Array(bytes.data(), bytes.size()); }
-  void Bytes(const std::vector<std::uint8_t>& bytes) { Array(bytes.data(), bytes.size()); }
-  template <typename Matrix>
-  void Numbers(const Matrix& matrix) {
-    Number(matrix.rows());
-    Array(matrix.data(), static_cast<std::size_t>(matrix.size()) * sizeof(double));
-  }
-  template <typename T>
-  void Maybe(const std::optional<T>& value) {
-    Number(value.has_value());
-    if (value) Number(*value);
-  }
-  bool Has(bool value) {
-    Number(value);
-    return value;
-  }
-
-  std::string Take() { return std::move(out_); }
-
- private:
-  void Word(std::uint64_t word) { out_.append(reinterpret_cast<const char*>(&word), sizeof(word)); }
-  void Array(const void* data, std::size_t bytes) {
-    Number(bytes);
-    if (bytes > 0) out_.append(static_cast<const char*>(data), bytes);
-  }
-  std::string out_;
-};
-
-class Reader {
- public:
-  explicit Reader(std::string_view in) : in_(in) {}
-
-  template <typename T>
-  void Number(T& value) {
-    const std::uint64_t word = Word();
-    if constexpr (std::is_floating_point_v<T>) {
-      value = std::bit_cast<double>(word);
-    } else {
-      value = static_cast<T>(word);
-    }
-  }
-  template <typename Container>
-  void Bytes(Container& bytes) {
-    const std::string_view data = Array();
-    bytes.assign(data.begin(), data.end());
-  }
-  template <typename Matrix>
-  void Numbers(Matrix& matrix) {
-    std::uint64_t rows = 0;
-    Number(rows);
-    const std::string_view data = Array();
-    const std::size_t size = data.size() / sizeof(double);
-    if (rows > std::numeric_limits<Index>::max() || data.size() % sizeof(double) != 0 ||
-        (rows == 0 ? size != 0 : size % rows != 0)) {
-      good_ = false;
-    }
-    if constexpr (Matrix::ColsAtCompileTime == 1) good_ = good_ && size == rows;
-    if (!good_) return;
-    if constexpr (Matrix::ColsAtCompileTime == 1) {
-      matrix.resize(static_cast<Index>(rows));
-    } else {
-      matrix.resize(static_cast<Index>(rows), rows == 0 ? 0 : static_cast<Index>(size / rows));
-    }
-    if (size > 0) std::memcpy(matrix.data(), data.data(), data.size());
-  }
-  template <typename T>
-  void Maybe(std::optional<T>& value) {
-    value.reset();
-    if (!Has(false)) return;
-    T read{};
-    Number(read);
-    value = read;
-  }
-  bool Has(bool) {
-    bool has = false;
-    Number(has);
-    return has && good_;
-  }
-
-  bool good() const { return good_; }
-  bool Complete() const { return good_ && in_.empty(); }
-
- private:
-  std::uint64_t Word() {
-    std::uint64_t word = 0;
-    if (in_.size() < kWord) {
-      good_ = false;
-      return 0;
-    }
-    std::memcpy(&word, in_.data(), kWord);
-    in_.remove_prefix(kWord);
-    return word;
-  }
-  std::string_view Array() {
-    const std::uint64_t bytes = Word();
-    if (bytes > in_.size()) {
-      good_ = false;
-      return {};
-    }
-    const std::string_view data = in_.substr(0, bytes);
-    in_.remove_prefix(bytes);
-    return data;
-  }
-
-  std::string_view in_;
-  bool good_ = true;
-};
+constexpr std::size_t kPartBytes = std::size_t{1} << 20;  // SQLite copies a large one several times
 
 // `Value` is const when writing.
 template <typename Archive, typename Value>
-void LayOutSpecification(Archive& archive, Value& spec) {
+void LayOutSpecification(Archive& archive, Value& spec, bool has_audit = true) {
   archive.Number(spec.dimension);
   archive.Number(spec.ambient_dimension);
   archive.Number(spec.epsilon);
@@ -182,8 +29,10 @@ void LayOutSpecification(Archive& archive, Value& spec) {
   }
   archive.Numbers(spec.seeds);
   archive.Number(spec.box_seeds);
-  archive.Number(spec.components);
-  archive.Number(spec.audit);
+  if (has_audit) {
+    archive.Number(spec.components);
+    archive.Number(spec.audit);
+  }
   archive.Number(spec.random_seed);
   auto& criteria = spec.criteria;
   archive.Number(criteria.radius_edge_bound);
@@ -214,10 +63,139 @@ SystemTime ToTime(std::int64_t number) {
   return SystemTime(Microseconds(std::clamp(number, -kFarthest, kFarthest)));
 }
 
+template <typename Archive, typename Value>
+void LayOutProgress(Archive& archive, Value& progress) {
+  archive.Number(progress.phase);
+  archive.Number(progress.round);
+  archive.Number(progress.queries);
+  archive.Number(progress.vertices);
+  archive.Number(progress.simplices);
+  archive.Number(progress.unbounded_stars);
+  archive.Number(progress.bad_size);
+  archive.Number(progress.bad_radius_edge);
+  archive.Number(progress.bad_sliver);
+  archive.Number(progress.bad_inconsistent);
+  archive.Number(progress.fraction);
+}
+
+template <typename Archive, typename Value>
+void LayOutReport(Archive& archive, Value& report) {
+  archive.Number(report.termination);
+  archive.Number(report.failure.code);
+  archive.Bytes(report.failure.message);
+  auto& counts = report.counts;
+  archive.Number(counts.vertices);
+  archive.Number(counts.simplices);
+  archive.Number(counts.rounds);
+  archive.Number(counts.queries);
+  archive.Number(counts.tangent_queries);
+  archive.Number(counts.inserted_size);
+  archive.Number(counts.inserted_radius_edge);
+  archive.Number(counts.inserted_sliver);
+  archive.Number(counts.inserted_inconsistent);
+  archive.Number(counts.duplicates);
+  auto& certificate = report.certificate;
+  archive.Number(certificate.certified);
+  archive.Bytes(certificate.verdict);
+  archive.Strings(certificate.warnings);
+  archive.Number(certificate.closed);
+  archive.Number(certificate.bad_faces);
+  archive.Number(certificate.links_are_spheres);
+  archive.Number(certificate.links_decided_exactly);
+  archive.Number(certificate.bad_links);
+  archive.Number(certificate.inconsistent_simplices);
+  archive.Number(certificate.unembedded_stars);
+  archive.Number(certificate.fibre_failures);
+  archive.Number(certificate.fibre_samples);
+  archive.Number(certificate.answers_held);
+  archive.Number(certificate.max_circumradius);
+  archive.Number(certificate.max_radius_edge);
+  archive.Number(certificate.min_fatness);
+  archive.Number(certificate.min_angle_degrees);
+  archive.Number(certificate.max_tangent_angle_degrees);
+  archive.Number(certificate.max_barycentre_distance);
+  archive.Number(certificate.estimated_reach);
+  archive.Number(certificate.epsilon_over_reach);
+  archive.Number(certificate.components);
+  archive.Number(certificate.euler_characteristic);
+  archive.Number(certificate.orientable);
+}
+
+core::AnswerBlock Columns(const core::AnswerBlock& block, Index first, Index count) {
+  core::AnswerBlock some;
+  some.points = block.points.middleCols(first, count);
+  if (!block.found.empty()) {
+    some.found.assign(block.found.begin() + first, block.found.begin() + first + count);
+  }
+  if (block.tangents.cols() > 0) some.tangents = block.tangents.middleCols(first, count);
+  if (block.sizes.size() > 0) some.sizes = block.sizes.segment(first, count);
+  return some;
+}
+
+template <typename Archive, typename Value>
+void LayOutAnswers(Archive& archive, Value& answers) {
+  archive.Numbers(answers.points);
+  archive.Bytes(answers.found);
+  archive.Numbers(answers.tangents);
+  archive.Numbers(answers.sizes);
+}
+
+template <typename Archive, typename Value>
+void LayOutState(Archive& archive, Value& state) {
+  archive.Number(state.identity);
+  archive.Number(state.commits);
+  archive.Number(state.next_mesh);
+  archive.Number(state.records);
+  archive.Number(state.sum);
+}
+
+template <typename Archive, typename Value>
+void LayOutRound(Archive& archive, Value& round) {
+  archive.Number(round.questions);
+  archive.Number(round.answers);
+  archive.Number(round.parts);
+  archive.Number(round.vertices);
+}
+
+template <typename Value, typename LayOut>
+std::string Encoded(const Value& value, LayOut lay_out) {
+  RecordWriter writer;
+  lay_out(writer, value);
+  return writer.Take();
+}
+
+template <typename Value, typename LayOut>
+std::optional<Value> Decoded(std::string_view record, LayOut lay_out) {
+  RecordReader reader(record);
+  Value value;
+  lay_out(reader, value);
+  if (!reader.Complete()) return std::nullopt;
+  return value;
+}
+
 }  // namespace
 
+std::uint64_t SealOf(std::string_view record, const Place& place) {
+  RecordDigest digest;
+  digest.Add(static_cast<std::uint64_t>(place.mesh));
+  digest.Add(static_cast<std::uint64_t>(place.kind));
+  digest.Add(static_cast<std::uint64_t>(place.number));
+  digest.Add(static_cast<std::uint64_t>(place.part));
+  digest.Add(record.data(), record.size());
+  return digest.value();
+}
+
+std::string EncodeState(const JournalState& state) {
+  return Encoded(state, [](auto& archive, auto& value) { LayOutState(archive, value); });
+}
+
+std::optional<JournalState> DecodeState(std::string_view record) {
+  return Decoded<JournalState>(record,
+                               [](auto& archive, auto& value) { LayOutState(archive, value); });
+}
+
 std::string EncodeStart(const SessionOptions& options, SystemTime create_time) {
-  Writer writer;
+  RecordWriter writer;
   writer.Bytes(options.name);
   writer.Bytes(options.owner);
   writer.Bytes(options.label);
@@ -230,7 +208,12 @@ std::string EncodeStart(const SessionOptions& options, SystemTime create_time) {
 }
 
 bool DecodeStart(std::string_view record, SessionOptions* options, SystemTime* create_time) {
-  Reader reader(record);
+  return DecodeEarlierStart(record, kJournalVersion, options, create_time);
+}
+
+bool DecodeEarlierStart(std::string_view record, std::uint32_t version, SessionOptions* options,
+                        SystemTime* create_time) {
+  RecordReader reader(record);
   std::int64_t time = 0;
   Clock::rep answer_limit = 0, worker_wait = 0;
   Clock::rep busy_limit = options->dispatch.busy_limit.count();
@@ -240,7 +223,7 @@ bool DecodeStart(std::string_view record, SessionOptions* options, SystemTime* c
   reader.Number(time);
   reader.Number(answer_limit);
   reader.Number(worker_wait);
-  LayOutSpecification(reader, options->spec);
+  LayOutSpecification(reader, options->spec, /*has_audit=*/version != 4);
   if (!reader.Complete()) reader.Number(busy_limit);  // earlier records end before it
   *create_time = ToTime(time);
   options->dispatch.answer_limit = Clock::duration(answer_limit);
@@ -249,36 +232,86 @@ bool DecodeStart(std::string_view record, SessionOptions* options, SystemTime* c
   return reader.Complete();
 }
 
-std::string EncodeAnswers(const core::Answers& answers) {
-  Writer writer;
-  writer.Number(answers.blocks.size());
-  for (const core::AnswerBlock& block : answers.blocks) {
-    writer.Numbers(block.points);
-    writer.Bytes(block.found);
-    writer.Numbers(block.tangents);
-    writer.Numbers(block.sizes);
+std::vector<AnswerRange> Merged(std::vector<AnswerRange> ranges) {
+  std::sort(ranges.begin(), ranges.end());
+  std::vector<AnswerRange> merged;
+  for (const AnswerRange& range : ranges) {
+    if (!merged.empty() && merged.back().block == range.block && merged.back().end >= range.first) {
+      merged.back().end = std::max(merged.back().end, range.end);
+    } else {
+      merged.push_back(range);
+    }
   }
-  return writer.Take();
+  return merged;
 }
 
-std::optional<core::Answers> DecodeAnswers(std::string_view record) {
-  Reader reader(record);
-  std::uint64_t blocks = 0;
-  reader.Number(blocks);
-  core::Answers answers;
-  for (std::uint64_t i = 0; i < blocks && reader.good(); ++i) {
-    core::AnswerBlock& block = answers.blocks.emplace_back();
-    reader.Numbers(block.points);
-    reader.Bytes(block.found);
-    reader.Numbers(block.tangents);
-    reader.Numbers(block.sizes);
+std::vector<AnswerRange> Missing(const std::vector<AnswerRange>& ranges,
+                                 const std::vector<Index>& sizes) {
+  std::vector<AnswerRange> missing;
+  auto range = ranges.begin();
+  for (std::size_t block = 0; block < sizes.size(); ++block) {
+    Index next = 0;
+    for (; range != ranges.end() && range->block == block; ++range) {
+      if (range->first > next) missing.push_back({block, next, range->first});
+      next = range->end;
+    }
+    if (next < sizes[block]) missing.push_back({block, next, sizes[block]});
+  }
+  return missing;
+}
+
+bool EncodeAnswers(const core::Answers& answers, const std::vector<AnswerRange>& ranges,
+                   std::uint64_t questions, const std::function<bool(const std::string&)>& take) {
+  RecordWriter writer;
+  const auto begin = [&] {
+    writer = RecordWriter();
+    writer.Number(questions);
+  };
+  begin();
+  bool empty = true;
+  for (const AnswerRange& range : ranges) {
+    const core::AnswerBlock& block = answers.blocks[range.block];
+    const auto column = static_cast<std::size_t>(block.points.rows() + block.tangents.rows() + 2);
+    const auto most = std::max<Index>(static_cast<Index>(kPartBytes / (column * kWord)), 1);
+    for (Index first = range.first; first < range.end; first += most) {
+      writer.Number(range.block);
+      writer.Number(first);
+      const core::AnswerBlock some = Columns(block, first, std::min(most, range.end - first));
+      LayOutAnswers(writer, some);
+      empty = writer.size() >= kPartBytes;
+      if (!empty) continue;
+      if (!take(writer.Take())) return false;
+      begin();
+    }
+  }
+  return empty || take(writer.Take());
+}
+
+std::optional<RecordedAnswers> DecodeAnswers(std::string_view record) {
+  RecordReader reader(record);
+  RecordedAnswers recorded;
+  reader.Number(recorded.questions);
+  while (reader.good() && !reader.Complete()) {
+    PartOfRound& part = recorded.parts.emplace_back();
+    reader.Number(part.block_index);
+    reader.Number(part.first);
+    LayOutAnswers(reader, part.answers);
   }
   if (!reader.Complete()) return std::nullopt;
-  return answers;
+  return recorded;
+}
+
+std::string EncodeRound(const RecordedRound& round) {
+  return Encoded(round, [](auto& archive, auto& value) { LayOutRound(archive, value); });
+}
+
+std::optional<RecordedRound> DecodeRound(std::string_view record) {
+  return Decoded<RecordedRound>(record,
+                                [](auto& archive, auto& value) { LayOutRound(archive, value); });
 }
 
 std::string EncodeEnd(const SessionEnd& end) {
-  Writer writer;
+  RecordWriter writer;
   writer.Number(static_cast<int>(end.state));
   writer.Number(ToNumber(end.time));
   writer.Number(end.elapsed_seconds);
@@ -289,7 +322,7 @@ std::string EncodeEnd(const SessionEnd& end) {
 }
 
 std::optional<SessionEnd> DecodeEnd(std::string_view record) {
-  Reader reader(record);
+  RecordReader reader(record);
   SessionEnd end;
   int state = 0;
   std::int64_t time = 0;
@@ -306,16 +339,30 @@ std::optional<SessionEnd> DecodeEnd(std::string_view record) {
   return end;
 }
 
-SessionEnd RemovedEnd() { return {SessionState::kCancelled, {}, 0, {"REMOVED", ""}, 0}; }
+std::string EncodeResult(const SessionResult& result, std::uint64_t parts) {
+  RecordWriter writer;
+  LayOutProgress(writer, result.progress);
+  LayOutReport(writer, result.report);
+  writer.Number(result.revision);
+  writer.Number(result.history_bytes);
+  writer.Number(parts);
+  return writer.Take();
+}
 
-bool IsRemoved(const SessionEnd& end) {
-  const SessionEnd removed = RemovedEnd();
-  return end.state == removed.state && end.time == removed.time &&
-         end.failure.reason == removed.failure.reason;
+std::optional<SessionResult> DecodeResult(std::string_view record, std::uint64_t* parts) {
+  RecordReader reader(record);
+  SessionResult result;
+  LayOutProgress(reader, result.progress);
+  LayOutReport(reader, result.report);
+  reader.Number(result.revision);
+  reader.Number(result.history_bytes);
+  reader.Number(*parts);
+  if (!reader.Complete()) return std::nullopt;
+  return result;
 }
 
 std::uint64_t DigestOf(const core::QueryBatch& batch) {
-  Digest digest;
+  RecordDigest digest;
   digest.Add(batch.round);
   for (const core::QueryBlock& block : batch.blocks) {
     digest.Add(static_cast<std::uint64_t>(block.kind));
@@ -328,19 +375,15 @@ std::uint64_t DigestOf(const core::QueryBatch& batch) {
   return digest.value();
 }
 
-std::string SealOf(std::string_view record, std::string_view place) {
-  Digest digest;
-  digest.Add(place.data(), place.size());
-  digest.Add(record.data(), record.size());
-  const std::uint64_t value = digest.value();
-  return {reinterpret_cast<const char*>(&value), sizeof(value)};
-}
-
-std::optional<std::string_view> Unseal(std::string_view sealed, std::string_view place) {
-  if (sealed.size() < kWord) return std::nullopt;
-  const std::string_view record = sealed.substr(0, sealed.size() - kWord);
-  if (sealed.substr(record.size()) != SealOf(record, place)) return std::nullopt;
-  return record;
+std::uint64_t DigestOf(const core::Answers& answers) {
+  RecordDigest digest;
+  for (const core::AnswerBlock& block : answers.blocks) {
+    digest.Add(block.points);
+    digest.Add(block.found.data(), block.found.size());
+    digest.Add(block.tangents);
+    digest.Add(block.sizes);
+  }
+  return digest.value();
 }
 
 }  // namespace stellate::server

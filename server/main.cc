@@ -16,6 +16,7 @@
 #include "server/health_check.h"
 #include "server/library_log.h"
 #include "server/log.h"
+#include "server/salvage.h"
 #include "server/server.h"
 #include "server/threads.h"
 #include "server/tls.h"
@@ -61,6 +62,15 @@ int RunHealthCheck(const Flags& flags) {
   const std::string trouble = CheckHealth(address->Target(), kHealthLimit,
                                           SelfCheckCredentials(config), flags.health_service);
   return trouble.empty() ? 0 : Fail(trouble, 1);
+}
+
+int RunOnDataDir(const Flags& flags) {
+  const std::string& path = flags.config.data_dir;
+  if (path.empty()) return Fail("--data-dir is not set: name the directory to look at", kExitUsage);
+  const auto found = flags.salvage ? SalvageDataDir(path) : VerifyDataDir(path);
+  if (!found) return Fail(found.error().message, 1);
+  std::fputs(found->c_str(), stdout);
+  return 0;
 }
 
 // Written beside and then renamed, so that whoever sees the file sees all of it.
@@ -112,6 +122,7 @@ int main(int argc, char** argv) {
   if (exit_status) return *exit_status;
   const Config& config = flags.config;
   if (flags.health_check) return RunHealthCheck(flags);
+  if (flags.verify_data_dir || flags.salvage) return RunOnDataDir(flags);
 
   // Before gRPC starts its threads, which inherit the mask: then sigtimedwait alone sees them.
   const sigset_t signals = Signals(config);

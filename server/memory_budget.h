@@ -1,11 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "core/specification.h"
 #include "server/limits.h"
@@ -53,7 +55,14 @@ class MemoryBudget {
 
     // What it is estimated to hold now. kLimitExceeded, with the old value kept, if it grew
     // and the budget does not allow it; one that shrinks is always allowed.
-    std::optional<Refused> Set(std::uint64_t bytes) { return budget_->Set(this, bytes, false); }
+    // First what nobody needs is given up, as MakeRoomBy says.
+    std::optional<Refused> Set(std::uint64_t bytes) {
+      auto refused = TrySet(bytes);
+      if (refused && budget_->make_room_ && budget_->make_room_()) refused = TrySet(bytes);
+      return refused;
+    }
+    // The same, of what there is.
+    std::optional<Refused> TrySet(std::uint64_t bytes) { return budget_->Set(this, bytes, false); }
     // For a mesh that is there already, from an earlier server.
     void Insist(std::uint64_t bytes) { budget_->Set(this, bytes, true); }
     std::uint64_t bytes() const { return budget_->BytesOf(this); }
@@ -67,6 +76,9 @@ class MemoryBudget {
     const std::string owner_;
     std::uint64_t bytes_ = 0;  // the budget's lock guards it
   };
+
+  // Gives up memory that nobody needs; false: there was none. Any thread. Before the first Open.
+  void MakeRoomBy(std::function<bool()> make_room) { make_room_ = std::move(make_room); }
 
   // For a new mesh or call of `owner`, with nothing in it.
   static std::unique_ptr<Account> Open(std::shared_ptr<MemoryBudget> budget, std::string owner);
@@ -83,6 +95,7 @@ class MemoryBudget {
 
   const Limits limits_;
   const Of what_;
+  std::function<bool()> make_room_;
   mutable std::mutex mutex_;
   std::uint64_t total_ = 0;
   std::map<std::string, std::uint64_t> by_owner_;

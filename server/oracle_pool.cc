@@ -29,6 +29,25 @@ void CopyInto(const core::AnswerBlock& answer, Index first, core::AnswerBlock* w
 
 }  // namespace
 
+core::Answers EmptyAnswers(int dimension, int ambient_dimension, const core::QueryBatch& batch) {
+  core::Answers answers;
+  for (const core::QueryBlock& block : batch.blocks) {
+    const Index n = block.size();
+    core::AnswerBlock& empty = answers.blocks.emplace_back();
+    empty.points = Eigen::MatrixXd::Zero(ambient_dimension, n);
+    empty.found.assign(n, 1);
+    if (block.want_tangents) {
+      empty.tangents = Eigen::MatrixXd::Zero(Index{ambient_dimension} * dimension, n);
+    }
+    if (block.want_sizes) empty.sizes = Eigen::VectorXd::Zero(n);
+  }
+  return answers;
+}
+
+void PutAnswers(const PartOfRound& part, core::Answers* answers) {
+  CopyInto(part.answers, part.first, &answers->blocks[part.block_index]);
+}
+
 OraclePool::OraclePool(const core::Specification& spec, DispatchOptions options,
                        std::size_t max_workers, std::shared_ptr<PoolObserver> observer)
     : spec_(spec),
@@ -231,9 +250,7 @@ OraclePool::Outcome OraclePool::Ask(const core::QueryBatch& batch,
                                     const std::function<void()>& meanwhile,
                                     const std::vector<PartOfRound>& known) {
   std::shared_ptr<Round> round = MakeRound(batch);
-  for (const PartOfRound& part : known) {
-    CopyInto(part.answers, part.first, &round->answers.blocks[part.block_index]);
-  }
+  for (const PartOfRound& part : known) PutAnswers(part, &round->answers);
   std::unique_lock lock(mutex_);
   round_ = round;
   std::erase_if(titles_, [this](const auto& entry) { return !members_.contains(entry.first); });
@@ -325,18 +342,9 @@ std::vector<OraclePool::Delivery> OraclePool::AssignLocked(TimePoint now) {
 std::shared_ptr<Round> OraclePool::MakeRound(const core::QueryBatch& batch) const {
   auto round = std::make_shared<Round>();
   round->batch = batch;
+  round->answers = EmptyAnswers(spec_.dimension, spec_.ambient_dimension, batch);
   for (const core::QueryBlock& block : batch.blocks) {
-    const Index n = block.size();
-    core::AnswerBlock answers;
-    answers.points = Eigen::MatrixXd::Zero(spec_.ambient_dimension, n);
-    answers.found.assign(n, 1);
-    if (block.want_tangents) {
-      const Index basis_size = Index{spec_.ambient_dimension} * spec_.dimension;
-      answers.tangents = Eigen::MatrixXd::Zero(basis_size, n);
-    }
-    if (block.want_sizes) answers.sizes = Eigen::VectorXd::Zero(n);
-    round->answers.blocks.push_back(std::move(answers));
-    round->answered_by.emplace_back(static_cast<std::size_t>(n), WorkerId{0});
+    round->answered_by.emplace_back(static_cast<std::size_t>(block.size()), WorkerId{0});
   }
   return round;
 }

@@ -41,6 +41,11 @@ struct PartOfRound {
   core::AnswerBlock answers;
 };
 
+// Of the shape that a batch asks for, with nothing in it: what is put into it are its answers.
+core::Answers EmptyAnswers(int dimension, int ambient_dimension, const core::QueryBatch& batch);
+// `first` and those after it must be there; what is more than was asked for is left out.
+void PutAnswers(const PartOfRound& part, core::Answers* answers);
+
 // A chunk for a worker: queries [first, first + count) of a block.
 struct Chunk {
   LeaseId lease = 0;

@@ -75,11 +75,36 @@ Session::Session(SessionOptions options, MesherFactory factory)
     : options_(std::move(options)),
       factory_(std::move(factory)),
       pool_(options_.spec, options_.dispatch, options_.max_workers, options_.observer),
-      history_(options_.spec.dimension, options_.spec.ambient_dimension),
       create_time_(options_.record ? options_.record->create_time
                                    : std::chrono::system_clock::now()),
       created_(CreatedAt(create_time_)),
-      replaying_(options_.record.has_value()) {}
+      replaying_(options_.record.has_value()) {
+  if (options_.journal != nullptr) {
+    pool_.TellOfAnswers([journal = options_.journal.get()](const auto& round, std::size_t block,
+                                                           auto first, auto count) {
+      journal->TakeAnswers(round, block, first, count);
+    });
+  }
+  if (!options_.record || !options_.record->result) {
+    history_ = std::make_shared<WatchLog>(options_.spec.dimension, options_.spec.ambient_dimension);
+    return;
+  }
+  const SessionEnd& end = *options_.record->end;
+  const SessionResult& result = *options_.record->result;
+  replaying_ = false;
+  final_state_ = end.state;
+  end_time_ = end.time;
+  final_seconds_ = end.elapsed_seconds;
+  failure_ = end.failure;
+  progress_ = result.progress;
+  report_ = result.report;
+  revision_ = result.revision;
+  history_bytes_ = result.history_bytes;
+  result_is_recorded_ = true;
+  pool_.Shut();
+  CountHistory();
+  over_ = true;
+}
 
 void Session::Run() {
   std::unique_ptr<core::Mesher> mesher;
@@ -110,10 +135,10 @@ void Session::Run() {
   // The allocator would keep the memory of each mesh's own thread. A server that stops has it back
   // sooner by leaving.
   if (!stopping_) malloc_trim(0);
-  if (options_.memory != nullptr) {
-    options_.memory->Insist(EstimateFinishedBytes(options_.spec) + history_.MemoryBytes());
-  }
+  RecordResult();
+  CountHistory();
   over_ = true;
+  EndReplay();
 }
 
 // What Cancel may interrupt in the middle of a round.
@@ -134,16 +159,19 @@ void Session::RunRounds(core::Mesher* mesher) {
     }
   }
   while (true) {
-    if (cancelled_) mesher->Cancel();
+    if (abandoned_ || (cancelled_ && !replaying_)) mesher->Cancel();
     const core::QueryBatch* const batch = mesher->NextBatch();
     if (batch == nullptr) {
       if (auto failure = Show(mesher)) FailBlameless(mesher, std::move(*failure));
       return;
     }
     if (!FitsMemory(mesher, static_cast<std::uint64_t>(batch->size()))) continue;
-    if (replaying_ && ReplayRound(mesher, *batch)) continue;
-    RunRound(mesher, *batch);
+    replaying_ ? ReplayRound(mesher, *batch) : RunRound(mesher, *batch);
   }
+}
+
+std::uint64_t Session::ReplayBytes() const {
+  return EstimateMeshBytes(options_.spec, options_.record ? options_.record->vertices : 0, 0);
 }
 
 // False, and the mesh has failed, if it has grown beyond what the server can hold.
@@ -152,7 +180,7 @@ bool Session::FitsMemory(core::Mesher* mesher, std::uint64_t queries) {
   const std::uint64_t bytes =
       EstimateMeshBytes(options_.spec, mesher->progress().vertices, queries);
   if (replaying_) {
-    options_.memory->Insist(bytes);
+    options_.memory->Insist(std::max(bytes, ReplayBytes()));  // its own, all the while
     return true;
   }
   auto refused = options_.memory->Set(bytes);
@@ -160,29 +188,27 @@ bool Session::FitsMemory(core::Mesher* mesher, std::uint64_t queries) {
   return !refused;
 }
 
-// False when there is nothing to replay any more and the mesh goes on.
-bool Session::ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch) {
-  SessionJournal::Replay replay;
-  if (batch.round <= options_.record->rounds) replay = options_.journal->ReadRound(batch);
-  if (replay.failure) {
-    FailBlameless(mesher, std::move(*replay.failure));
-  } else if (replay.answers) {
-    if (auto failure = Show(mesher)) {
-      FailBlameless(mesher, std::move(*failure));
-    } else {
-      Absorb(mesher, *replay.answers);
-    }
-  } else {
-    replaying_ = false;
-    if (options_.record->end) {
-      RepeatEnd(mesher);
-    } else {
-      Log(LogLevel::kInfo, {options_.name, batch.round, options_.owner},
-          "replayed; going on with new answers");
-      return false;
-    }
+// Where there is nothing to replay any more, only says so: the mesh goes on from this batch, unless
+// it was cancelled meanwhile.
+void Session::ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch) {
+  if (batch.round > options_.record->rounds) {
+    EndReplay();
+    if (options_.record->end) return RepeatEnd(mesher);
+    Log(LogLevel::kInfo, {options_.name, batch.round, options_.owner},
+        "replayed; going on with new answers");
+    return;
   }
-  return true;
+  SessionJournal::Known known = options_.journal->BeginRound(batch);
+  if (!known.failure) known.failure = Show(mesher);
+  if (known.failure) {
+    FailBlameless(mesher, std::move(*known.failure));
+  } else {
+    Absorb(mesher, *known.answers);
+  }
+}
+
+void Session::EndReplay() {
+  if (replaying_.exchange(false) && options_.on_replayed) options_.on_replayed();
 }
 
 // The recorded answers are used up, and the mesh ended here.
@@ -200,9 +226,15 @@ void Session::RepeatEnd(core::Mesher* mesher) {
 
 // While the workers are at this round's queries, watchers are shown what the last one led to.
 void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
-  OraclePool::Outcome outcome = pool_.Ask(batch, [&] {
-    if (auto failure = Show(mesher)) pool_.Fail(std::move(*failure));
-  });
+  SessionJournal::Known known;
+  if (options_.journal != nullptr) known = options_.journal->BeginRound(batch);
+  if (known.failure) return FailBlameless(mesher, std::move(*known.failure));
+  OraclePool::Outcome outcome = pool_.Ask(
+      batch,
+      [&] {
+        if (auto failure = Show(mesher)) pool_.Fail(std::move(*failure));
+      },
+      known.parts);
   if (outcome.failure) {
     // The worker at fault has been told on its own stream; the others are blameless.
     FailBlameless(mesher, std::move(*outcome.failure));
@@ -211,7 +243,8 @@ void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
   if (!outcome.round) return;  // interrupted: the caller cancels
   const core::Answers& answers = outcome.round->answers;
   if (options_.journal != nullptr) {
-    if (auto failure = options_.journal->WriteRound(batch, answers)) {
+    const std::uint64_t vertices = mesher->progress().vertices;
+    if (auto failure = options_.journal->WriteRound(batch, answers, vertices)) {
       FailBlameless(mesher, std::move(*failure));
       return;
     }
@@ -243,7 +276,7 @@ bool Session::Absorb(core::Mesher* mesher, const core::Answers& answers) {
 // How the mesh stands, and what has changed since it was last shown.
 std::optional<MeshFailure> Session::Show(core::Mesher* mesher) {
   if (unseen_) {
-    const core::Status logged = history_.Append(*unseen_);
+    const core::Status logged = history_->Append(*unseen_);  // it is there until the end
     unseen_.reset();
     if (!logged.ok()) {
       return MeshFailure{"INTERNAL", core::Message("a fault of the server: ", logged.message)};
@@ -307,11 +340,15 @@ void Session::Finish(const core::Report* report) {
   if (ended_before && end.state == options_.record->end->state) end = *options_.record->end;
   // Before anyone hears of it, so that nobody finds it running later.
   if (options_.journal != nullptr && !suspended && !ended_before) {
-    if (const auto failure = options_.journal->WriteEnd(end)) {
+    const auto failure = options_.journal->WriteEnd(end);
+    end_is_recorded_ = !failure;
+    if (failure) {
       Log(LogLevel::kWarning, log_context(),
           core::Message("the end of the mesh is not recorded: ", failure->message));
     }
   }
+  // A replay that got there, and not one that failed on its way.
+  if (ended_before) end_is_recorded_ = !abandoned_ && progress_.round == end.rounds;
   // Counted before it can be seen, as whoever sees the end may look at the metrics next.
   if (options_.observer != nullptr && !suspended && !ended_before) {
     options_.observer->OnEnd(end.state, report != nullptr ? *report : core::Report{});
@@ -333,93 +370,21 @@ void Session::Finish(const core::Report* report) {
   WakeWatchers();
 }
 
-void Session::Cancel() {
-  {
-    const std::lock_guard lock(mutex_);
-    if (ending_) return;
-    cancelled_ = true;
-    if (computing_ != nullptr) computing_->Interrupt();
+// The mesh itself, in the place of the answers that led to it. Until then, or if the disk has no
+// room for it, the next server replays these once more.
+void Session::RecordResult() {
+  if (!end_is_recorded_) return;
+  const SessionResult result{progress_, *report_, history_->revision(), history_->MemoryBytes()};
+  if (const auto failure = options_.journal->WriteResult(result, *history_)) {
+    Log(LogLevel::kWarning, log_context(),
+        core::Message("the next server will have to replay the mesh: ", failure->message));
+    return;
   }
-  pool_.Interrupt();
-}
-
-void Session::Suspend() {
-  stopping_ = true;
-  {
-    const std::lock_guard lock(mutex_);
-    suspended_ = options_.journal != nullptr && !cancelled_;
-  }
-  Cancel();
-}
-
-std::uint64_t Session::PublishedRevision() const {
-  return std::max(history_.revision(), options_.record ? options_.record->rounds : 0);
-}
-
-bool Session::AddWatcher(std::weak_ptr<SessionWatcher> watcher) {
   const std::lock_guard lock(mutex_);
-  std::erase_if(watchers_, [](const auto& w) { return w.expired(); });
-  if (watchers_.size() >= options_.max_watchers) return false;
-  watchers_.push_back(std::move(watcher));
-  return true;
-}
-
-void Session::WakeWatchers() {
-  std::vector<std::shared_ptr<SessionWatcher>> watchers;
-  {
-    const std::lock_guard lock(mutex_);
-    for (const auto& weak : watchers_) {
-      if (auto watcher = weak.lock()) watchers.push_back(std::move(watcher));
-    }
-  }
-  for (const auto& watcher : watchers) watcher->Wake();
-}
-
-SessionView Session::View() const {
-  SessionView view;
-  view.revision = history_.revision();
-  view.workers = pool_.workers();
-  view.waiting_queries = pool_.waiting();
-  if (options_.memory != nullptr) view.bytes = options_.memory->bytes();
-  const std::lock_guard lock(mutex_);
-  view.create_time = create_time_;
-  view.end_time = end_time_;
-  view.progress = progress_;
-  view.report = report_;
-  view.failure = failure_;
-  view.watchers =
-      std::count_if(watchers_.begin(), watchers_.end(), [](const auto& w) { return !w.expired(); });
-  if (final_state_) {
-    view.state = *final_state_;
-    view.elapsed_seconds = final_seconds_;
-    view.progress.phase = core::Phase::kDone;
-    return view;
-  }
-  view.elapsed_seconds = std::chrono::duration<double>(Clock::now() - created_).count();
-  if (view.progress.fraction > 0.02 && view.progress.fraction <= 1) {
-    view.remaining_seconds =
-        view.elapsed_seconds * (1 - view.progress.fraction) / view.progress.fraction;
-  }
-  // A cancelled mesh is over for its owner, even while its last round is being computed.
-  view.state = cancelled_          ? SessionState::kCancelled
-               : view.workers == 0 ? SessionState::kWaiting
-                                   : SessionState::kRunning;
-  return view;
-}
-
-bool Session::HasVertices() const {
-  const std::lock_guard lock(mutex_);
-  return progress_.vertices > 0;
-}
-
-bool Session::HasEnded() const {
-  const std::lock_guard lock(mutex_);
-  return final_state_.has_value();
-}
-
-LogContext Session::log_context() const {
-  const std::lock_guard lock(mutex_);
-  return {options_.name, progress_.round, options_.owner};
+  revision_ = result.revision;
+  history_bytes_ = result.history_bytes;
+  result_is_recorded_ = true;
+  history_used_ = Clock::now();
 }
 
 }  // namespace stellate::server

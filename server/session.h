@@ -40,6 +40,7 @@ struct SessionOptions {
   std::shared_ptr<SessionJournal> journal;        // may be null: the mesh lives in memory alone
   std::shared_ptr<MemoryBudget::Account> memory;  // may be null: nobody counts
   std::optional<SessionRecord> record;            // set: the journal has it from an earlier server
+  std::function<void()> on_replayed;              // after it, or when Run is over; may be empty
 };
 
 // A session at one moment.
@@ -65,8 +66,8 @@ class SessionWatcher {
   virtual void Wake() = 0;
 };
 
-// One mesh: drives a core::Mesher on a thread of its own, asks the pool, keeps the history. Knows
-// nothing of the network.
+// One mesh: drives a core::Mesher on a thread of its own, asks the pool, keeps the history, in
+// memory or, once it is over, in its journal. Knows nothing of the network.
 class Session {
  public:
   using MesherFactory =
@@ -74,37 +75,58 @@ class Session {
 
   explicit Session(SessionOptions options, MesherFactory factory = core::Mesher::Create);
 
-  // Meshes to the end, on the calling thread. Once only.
+  // Meshes to the end, on the calling thread. Once only, and not at all when it is Over before: a
+  // finished mesh that its journal has whole.
   void Run();
   // Run has nothing left to do but return, and the memory of the mesher is given back. It follows
   // HasEnded at once, but for a tenth of a second or so after millions of vertices.
   bool Over() const { return over_; }
 
-  // Ends the mesh; any thread, at once where Run waits, else after the round being computed.
+  // Ends the mesh; any thread, at once where Run waits, else after the round being computed, or
+  // after the replay. One that had ended before its replay stays as it was.
   void Cancel();
 
-  // Ends this run of the mesh as Cancel does, because the server stops: with a journal, the next
-  // server goes on.
+  // Ends Run as soon as can be: nobody wants the mesh any more.
+  void Abandon();
+  // The same for one that was never run and will not be.
+  void AbandonUnrun();
+  // As Abandon, because the server stops: with a journal, the next server goes on.
   void Suspend();
+
+  bool IsReplaying() const { return replaying_; }
+  bool IsCancelled() const { return cancelled_; }
+  // What the mesh will hold when its replay is over, in bytes.
+  std::uint64_t ReplayBytes() const;
 
   // False when there are too many.
   bool AddWatcher(std::weak_ptr<SessionWatcher> watcher);
 
   SessionView View() const;
+  std::uint64_t revision() const;  // the newest that can be read
   // The newest revision that anyone may have seen: while a recorded mesh is replayed, the one at
   // which the replay will end.
   std::uint64_t PublishedRevision() const;
   bool HasVertices() const;
-  bool HasEnded() const;  // state, report and history are final
+  bool HasEnded() const;           // state, report and history are final
   LogContext log_context() const;  // in the round that was last shown
   const SessionOptions& options() const { return options_; }
   OraclePool& pool() { return pool_; }
-  const WatchLog& history() const { return history_; }
+
+  // Null: the journal has it, and it is not in memory. Whoever holds it keeps it there.
+  std::shared_ptr<const WatchLog> history() const;
+  // Reads it back, if the memory budget allows, and wakes the watchers. May take a while.
+  enum class Loading { kDone, kNoMemory, kFailed };
+  Loading LoadHistory();
+  // kFailed came of it.
+  bool HistoryIsLost() const;
+  // Takes it from memory, if the journal has it and nobody has held it for so long.
+  bool PutAwayHistory(Clock::duration unused);
 
  private:
   void Expose(core::Mesher* mesher);
   void RunRounds(core::Mesher* mesher);
-  bool ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch);
+  void ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch);
+  void EndReplay();
   void RepeatEnd(core::Mesher* mesher);
   void RunRound(core::Mesher* mesher, const core::QueryBatch& batch);
   bool Absorb(core::Mesher* mesher, const core::Answers& answers);
@@ -113,23 +135,33 @@ class Session {
   void FailBlameless(core::Mesher* mesher, MeshFailure failure);
   void Fail(core::Mesher* mesher, MeshFailure failure, core::Status status);
   void Finish(const core::Report* report);
+  void RecordResult();
+  void CountHistory();
+  void Interrupt();
   SessionState FinalState(const core::Report* report) const;
   void WakeWatchers();
 
   const SessionOptions options_;
   const MesherFactory factory_;
   OraclePool pool_;
-  WatchLog history_;
   const std::chrono::system_clock::time_point create_time_;
   const TimePoint created_;
   std::atomic<bool> cancelled_{false};
+  std::atomic<bool> abandoned_{false};
   std::atomic<bool> stopping_{false};  // the server does
   std::atomic<bool> over_{false};
-  bool replaying_;      // Run's thread only: the journal may know the next answers
-  core::Status blame_;  // Run's thread only: told to all workers at the end
+  std::atomic<bool> replaying_;            // the journal has the next answers
+  bool end_is_recorded_ = false;           // Run's thread only
+  core::Status blame_;                     // Run's thread only: told to all workers at the end
   std::optional<core::MeshDelta> unseen_;  // Run's thread only: absorbed, not in the history yet
 
   mutable std::mutex mutex_;
+  std::shared_ptr<WatchLog> history_;  // null: only in the journal
+  std::uint64_t revision_ = 0;         // the last, where the journal has it
+  std::uint64_t history_bytes_ = 0;    // in memory, about; where the journal has it
+  bool result_is_recorded_ = false;
+  bool history_is_lost_ = false;
+  mutable TimePoint history_used_;
   core::Mesher* computing_ = nullptr;  // while it lives
   bool ending_ = false;                // the final state is chosen, and being recorded
   bool suspended_ = false;             // the server stopped it, not its owner

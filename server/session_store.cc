@@ -1,5 +1,6 @@
 #include "server/session_store.h"
 
+#include <malloc.h>
 #include <sys/random.h>
 
 #include <algorithm>
@@ -21,6 +22,10 @@ constexpr std::size_t kNameBytes = 16;
 constexpr std::size_t kLeastEnding = 16;
 // For a client to fetch what it has heard the end of.
 constexpr auto kGrace = std::chrono::minutes(1);
+// Replays at once: what each holds beyond its share, for a round, must not add up.
+constexpr std::ptrdiff_t kReplays = 2;
+// How long a history that the journal has stays in memory, unread.
+constexpr auto kUnread = std::chrono::seconds(10);
 
 }  // namespace
 
@@ -93,14 +98,18 @@ Allowed<std::shared_ptr<Session>> SessionStore::Create(SessionOptions options) {
   }
   options.name = NewMeshName();
   if (new_journal_) options.journal = new_journal_();
+  Entry& entry = AddLocked(std::move(options), TimePoint::max());
   try {
-    return StartLocked(std::move(options), TimePoint::max());
+    StartLocked(&entry);
   } catch (const std::system_error&) {
+    numbers_.erase(entry.session->options().name);
+    entries_.erase(entry.number);
     return tl::unexpected(Refused(
         {core::StatusCode::kLimitExceeded,
          "the system gives the server no thread for another mesh: wait for one to end, cancel one, "
          "or raise the limit on its processes (ulimit -u, TasksMax, the pids of its cgroup)"}));
   }
+  return entry.session;
 }
 
 void SessionStore::Restore(SessionOptions options) {
@@ -115,16 +124,55 @@ void SessionStore::Restore(SessionOptions options) {
     end.elapsed_seconds = std::max(end.elapsed_seconds, 0.0);
   }
   const std::lock_guard lock(mutex_);
-  StartLocked(std::move(options), over_since);
+  options.on_replayed = [this] { Advance(); };
+  const Entry& entry = AddLocked(std::move(options), over_since);
+  if (entry.session->Over()) return;
+  unreplayed_.push_back(entry.number);
+  AdvanceLocked();
 }
 
-std::shared_ptr<Session> SessionStore::StartLocked(SessionOptions options, TimePoint over_since) {
+SessionStore::Entry& SessionStore::AddLocked(SessionOptions options, TimePoint over_since) {
   auto session = std::make_shared<Session>(std::move(options), factory_);
   const std::uint64_t number = next_number_++;
-  Entry entry{number, session, std::thread([session] { session->Run(); }), over_since};
   numbers_.emplace(session->options().name, number);
-  entries_.emplace(number, std::move(entry));
-  return session;
+  return entries_.emplace(number, Entry{number, std::move(session), {}, over_since}).first->second;
+}
+
+void SessionStore::StartLocked(Entry* entry) {
+  entry->thread = std::thread([session = entry->session] { session->Run(); });
+}
+
+void SessionStore::Advance() {
+  const std::lock_guard lock(mutex_);
+  AdvanceLocked();
+}
+
+void SessionStore::AdvanceLocked() {
+  if (stopped_) return;
+  auto replays = std::count_if(entries_.begin(), entries_.end(), [](const auto& numbered) {
+    const Entry& entry = numbered.second;
+    return entry.thread.joinable() && entry.session->IsReplaying();
+  });
+  std::erase_if(unreplayed_, [&](std::uint64_t number) {
+    Entry& entry = entries_.at(number);
+    const auto& memory = entry.session->options().memory;
+    if (replays >= kReplays) return false;
+    if (memory != nullptr && memory->TrySet(entry.session->ReplayBytes())) return false;
+    try {
+      StartLocked(&entry);
+    } catch (const std::system_error&) {
+      return false;  // no thread is to be had: later
+    }
+    ++replays;
+    return true;
+  });
+}
+
+bool SessionStore::PutAwayHistories() {
+  bool any = false;
+  for (const auto& session : All()) any = session->PutAwayHistory(Clock::duration::zero()) || any;
+  if (any) malloc_trim(0);
+  return any;
 }
 
 std::shared_ptr<Session> SessionStore::Find(const std::string& name) const {
@@ -135,6 +183,7 @@ std::shared_ptr<Session> SessionStore::Find(const std::string& name) const {
 
 bool SessionStore::Delete(const std::string& name) {
   std::shared_ptr<Session> session;
+  bool was_run = true;
   {
     const std::lock_guard lock(mutex_);
     const auto it = numbers_.find(name);
@@ -143,9 +192,10 @@ bool SessionStore::Delete(const std::string& name) {
     numbers_.erase(it);
     session = node.mapped().session;
     if (session->options().journal != nullptr) session->options().journal->Forget();
+    was_run = std::erase(unreplayed_, node.key()) == 0;
     dying_.push_back(std::move(node.mapped()));
   }
-  session->Cancel();
+  was_run ? session->Abandon() : session->AbandonUnrun();
   return true;
 }
 
@@ -233,6 +283,9 @@ std::vector<std::uint64_t> SessionStore::OutlivedLocked(TimePoint now) {
 }
 
 void SessionStore::Sweep(TimePoint now) {
+  bool any = false;
+  for (const auto& session : All()) any = session->PutAwayHistory(kUnread) || any;
+  if (any) malloc_trim(0);
   std::vector<Entry> dead;  // freeing a large mesh takes time: after the lock
   const std::lock_guard lock(mutex_);
   for (const std::uint64_t number : OutlivedLocked(now)) {
@@ -243,9 +296,11 @@ void SessionStore::Sweep(TimePoint now) {
     dying_.push_back(std::move(node.mapped()));
   }
   dead = TakeDeadLocked();
+  AdvanceLocked();
 }
 
 bool SessionStore::Stop(TimePoint deadline) {
+  shelf_.Stop();
   std::vector<Entry> all;
   {
     const std::lock_guard lock(mutex_);
@@ -255,14 +310,15 @@ bool SessionStore::Stop(TimePoint deadline) {
     entries_.clear();
     numbers_.clear();
     dying_.clear();
+    unreplayed_.clear();
   }
   for (Entry& entry : all) entry.session->Suspend();
   bool clean = true;
   for (Entry& entry : all) {
+    if (!entry.thread.joinable()) continue;
     while (!entry.session->Over() && Clock::now() < deadline) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
-    if (!entry.thread.joinable()) continue;
     if (entry.session->Over()) {
       entry.thread.join();
     } else {

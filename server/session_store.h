@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "core/status.h"
+#include "server/history_shelf.h"
 #include "server/limits.h"
 #include "server/session.h"
 
@@ -43,11 +45,20 @@ class SessionStore {
   // Before the first Create.
   void RecordIn(JournalFactory new_journal) { new_journal_ = std::move(new_journal); }
   // Takes up a mesh that an earlier server recorded: options.journal and options.record are set.
-  // One that ended too long ago is forgotten instead.
+  // One that ended too long ago is forgotten instead. One that its journal has whole is there at
+  // once; others are replayed a few at a time, the oldest first, as the memory budget allows.
   void Restore(SessionOptions options);
   std::shared_ptr<Session> Find(const std::string& name) const;  // null: none
   // Cancels and forgets; false if there is none.
   bool Delete(const std::string& name);
+
+  // The history of a mesh. Null: it is being read back from the journal, and the mesh's watchers
+  // are woken when it is there, or lost.
+  std::shared_ptr<const WatchLog> OpenHistory(const std::shared_ptr<Session>& session) {
+    return shelf_.Open(session);
+  }
+  // Takes from memory what the journal has, and nobody reads. False: there was nothing.
+  bool PutAwayHistories();
 
   struct Page {
     std::vector<std::shared_ptr<Session>> sessions;  // oldest first
@@ -77,7 +88,11 @@ class SessionStore {
     TimePoint over_since = TimePoint::max();
   };
 
-  std::shared_ptr<Session> StartLocked(SessionOptions options, TimePoint over_since);
+  Entry& AddLocked(SessionOptions options, TimePoint over_since);
+  void StartLocked(Entry* entry);
+  // Starts replays that are due.
+  void Advance();
+  void AdvanceLocked();
 
   std::vector<std::uint64_t> OutlivedLocked(TimePoint now);
 
@@ -91,8 +106,10 @@ class SessionStore {
   std::map<std::uint64_t, Entry> entries_;
   std::unordered_map<std::string, std::uint64_t> numbers_;
   std::vector<Entry> dying_;  // deleted; until their threads end and their watchers go
+  std::deque<std::uint64_t> unreplayed_;
   std::uint64_t next_number_ = 1;
   bool stopped_ = false;
+  HistoryShelf shelf_;
 };
 
 }  // namespace stellate::server

@@ -20,6 +20,30 @@ Status OutOfStep(std::string message) {
   return {StatusCode::kFailedPrecondition, std::move(message)};
 }
 
+template <typename T>
+bool WriteRows(const GrowingRows<T>& rows, std::size_t width, const WatchLog::Sink& write) {
+  for (std::size_t row = 0; row < rows.size(); row += rows.Run(row)) {
+    if (!write(rows[row], rows.Run(row) * width * sizeof(T))) return false;
+  }
+  return true;
+}
+
+// Takes memory only for what is there.
+template <typename T>
+bool ReadInto(GrowingRows<T>* rows, std::size_t width, std::uint64_t count,
+              const WatchLog::Source& read) {
+  constexpr std::uint64_t kAtOnce = 4096;
+  std::vector<T> some;
+  for (std::uint64_t left = count; left > 0;) {
+    const std::uint64_t take = std::min(left, kAtOnce);
+    some.resize(take * width);
+    if (!read(some.data(), some.size() * sizeof(T))) return false;
+    rows->Append(some.data(), take);
+    left -= take;
+  }
+  return true;
+}
+
 }  // namespace
 
 WatchLog::WatchLog(int dimension, int ambient_dimension)
@@ -52,6 +76,7 @@ Status WatchLog::Append(const core::MeshDelta& delta) {
   // The appending thread alone writes, so it reads without the lock.
   const std::uint64_t revision = marks_.size();
   const Mark& last = marks_.back();
+  if (complete_) return OutOfStep("the mesh is over and changes no more");
   if (delta.revision != revision) {
     return OutOfStep(core::Message("a change leads to revision ", delta.revision, " but ", revision,
                                    " is the next"));
@@ -100,6 +125,61 @@ Status WatchLog::Append(const core::MeshDelta& delta) {
   }
   appenders_bytes_ = first_of_.capacity() * sizeof(first_of_[0]) + next_.bytes();
   return Status::Ok();
+}
+
+bool WatchLog::Write(const Sink& write) const {
+  const std::uint64_t revisions = marks_.size() - 1;
+  return write(&revisions, sizeof(revisions)) &&
+         write(marks_.data() + 1, revisions * sizeof(Mark)) && WriteRows(points_, d_, write) &&
+         WriteRows(rows_, row_size_, write) && WriteRows(deaths_, 1, write);
+}
+
+core::Expected<std::unique_ptr<WatchLog>> WatchLog::Read(int dimension, int ambient_dimension,
+                                                         const Source& read) {
+  auto log = std::make_unique<WatchLog>(dimension, ambient_dimension);
+  log->complete_ = true;
+  if (!log->ReadRows(read) || !log->ReckonLives()) {
+    return tl::unexpected(OutOfStep("these are not the bytes of a mesh's history"));
+  }
+  return log;
+}
+
+bool WatchLog::ReadRows(const Source& read) {
+  std::uint64_t revisions = 0;
+  if (!read(&revisions, sizeof(revisions))) return false;
+  for (std::uint64_t revision = 1; revision <= revisions; ++revision) {
+    const Mark last = marks_.back();
+    Mark mark;
+    if (!read(&mark, sizeof(mark)) || mark.vertices < last.vertices ||
+        mark.simplices < last.simplices || mark.deaths < last.deaths) {
+      return false;
+    }
+    marks_.push_back(mark);
+  }
+  const Mark& end = marks_.back();
+  return end.vertices <= kNone && end.simplices < kNone &&
+         ReadInto(&points_, d_, end.vertices, read) &&
+         ReadInto(&rows_, row_size_, end.simplices, read) &&
+         ReadInto(&deaths_, 1, end.deaths, read);
+}
+
+// From the order of births and deaths.
+bool WatchLog::ReckonLives() {
+  for (std::uint64_t revision = 1; revision < marks_.size(); ++revision) {
+    const Mark &from = marks_[revision - 1], &to = marks_[revision];
+    for (std::uint64_t i = from.deaths; i < to.deaths; ++i) {
+      const std::uint32_t simplex = *deaths_[i];
+      if (simplex >= lives_.size() || lives_[simplex]->died != 0) return false;
+      lives_[simplex]->died = revision;
+    }
+    const Life birth{revision, 0};
+    for (std::uint64_t simplex = from.simplices; simplex < to.simplices; ++simplex) {
+      const std::uint32_t* const row = rows_[simplex];
+      if (*std::max_element(row, row + row_size_) >= to.vertices) return false;
+      lives_.Append(&birth, 1);
+    }
+  }
+  return true;
 }
 
 std::uint64_t WatchLog::revision() const {

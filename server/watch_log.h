@@ -5,6 +5,7 @@
 #include <atomic>
 #include <bit>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -83,6 +84,16 @@ class WatchLog {
   // gap, or a simplex goes that is not there.
   core::Status Append(const core::MeshDelta& delta);
 
+  // All of it as bytes, little-endian, in pieces. False: `write` was. Only while nothing is
+  // appended.
+  using Sink = std::function<bool(const void* data, std::size_t bytes)>;
+  bool Write(const Sink& write) const;
+  // From what Write wrote; `read` gives the next bytes, or false if there are no more. What comes
+  // back takes no changes. kFailedPrecondition: no such bytes.
+  using Source = std::function<bool(void* data, std::size_t bytes)>;
+  static core::Expected<std::unique_ptr<WatchLog>> Read(int dimension, int ambient_dimension,
+                                                        const Source& read);
+
   std::uint64_t revision() const;
   std::uint64_t MemoryBytes() const;  // that it holds
 
@@ -116,6 +127,8 @@ class WatchLog {
     std::uint64_t born = 0;
     std::uint64_t died = 0;  // 0: alive
   };
+  bool ReadRows(const Source& read);
+  bool ReckonLives();
   std::uint32_t Unlink(const std::uint32_t* row);
   void Link(std::uint32_t simplex);
   void AppendAdded(Cursor* cursor, std::size_t end, std::size_t max_rows, DeltaPart* part) const;
@@ -129,9 +142,10 @@ class WatchLog {
   GrowingRows<Life> lives_;            // by simplex
   GrowingRows<std::uint32_t> deaths_;  // simplices in the order in which they went
   struct Mark {
-    std::size_t vertices = 0, simplices = 0, deaths = 0;
+    std::uint64_t vertices = 0, simplices = 0, deaths = 0;
   };
   std::vector<Mark> marks_;  // sizes at each revision, 0 first
+  bool complete_ = false;    // nothing is appended any more
 
   // The appending thread's own: simplices alive now, in a list for each vertex that is the lowest
   // of any. A list is no longer than a star is large.

@@ -105,17 +105,23 @@ class DownloadStream final : public grpc::ServerWriteReactor<v1::DownloadMeshRes
                    "revision");
   }
 
-  // Once the history has got as far; a recorded mesh may be in the middle of its replay.
+  // Once the history has got as far: a recorded mesh may be in the middle of its replay, or on the
+  // disk.
   void Begin() {
     const bool over = session_->HasEnded();  // before the revision: nothing follows then
-    const std::uint64_t newest = session_->history().revision();
+    history_ = service_.store.OpenHistory(session_);
+    if (history_ == nullptr) {
+      end_ = NoHistory(service_, *session_, Clock::now() - attached_);
+      return;
+    }
+    const std::uint64_t newest = history_->revision();
     if (newest < revision_) {
       if (over) end_ = NoSuchRevision(revision_, newest);
       return;
     }
-    snapshot_ = session_->history().At(revision_);
+    snapshot_ = history_->At(revision_);
     if (position_ <= snapshot_.positions) {
-      cursor_ = session_->history().BeginAt(revision_, position_);
+      cursor_ = history_->BeginAt(revision_, position_);
       return;
     }
     end_ = Refusal(v1::ERROR_REASON_INVALID_ARGUMENT,
@@ -131,6 +137,7 @@ class DownloadStream final : public grpc::ServerWriteReactor<v1::DownloadMeshRes
     if (!end_ && session_ != nullptr && !cursor_) Begin();
     if (end_) {
       finished_ = true;
+      history_.reset();
       last_write_ = Clock::now();
       return Finish(*end_);
     }
@@ -141,6 +148,7 @@ class DownloadStream final : public grpc::ServerWriteReactor<v1::DownloadMeshRes
     service_.metrics.Sent(response_.ByteSizeLong());
     if (response_.complete()) {
       finished_ = true;
+      history_.reset();
       return StartWriteAndFinish(&response_, grpc::WriteOptions(), grpc::Status::OK);
     }
     writing_ = true;
@@ -149,7 +157,7 @@ class DownloadStream final : public grpc::ServerWriteReactor<v1::DownloadMeshRes
 
   void TakePart() {
     const core::Specification& spec = session_->options().spec;
-    const DeltaPart part = session_->history().Next(&*cursor_, PartBytes(service_.config));
+    const DeltaPart part = history_->Next(&*cursor_, PartBytes(service_.config));
     ToProto(part, spec.dimension, spec.ambient_dimension, &response_);
     response_.set_vertices(snapshot_.vertices);
     response_.set_simplices(snapshot_.simplices);
@@ -166,13 +174,15 @@ class DownloadStream final : public grpc::ServerWriteReactor<v1::DownloadMeshRes
   std::unique_ptr<MemoryBudget::Account> memory_;
   std::uint64_t revision_ = 0;
   std::uint64_t position_ = 0;
+  std::shared_ptr<const WatchLog> history_;  // while it is read
   WatchLog::Snapshot snapshot_;
   std::optional<WatchLog::Cursor> cursor_;
   bool writing_ = false;
   bool finished_ = false;
   bool done_ = false;
   std::optional<grpc::Status> end_;
-  TimePoint last_write_ = Clock::now();
+  const TimePoint attached_ = Clock::now();
+  TimePoint last_write_ = attached_;
   v1::DownloadMeshResponse response_;
 };
 

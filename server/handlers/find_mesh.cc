@@ -3,6 +3,11 @@
 #include "server/handlers/handlers.h"
 
 namespace stellate::server {
+namespace {
+
+constexpr auto kHistoryWait = std::chrono::seconds(30);  // for memory
+
+}  // namespace
 
 tl::expected<std::shared_ptr<Session>, grpc::Status> FindMesh(const ServerState& service,
                                                               const Identity& caller,
@@ -52,6 +57,19 @@ grpc::Status TooManyWatchers(ServerState& service, const Session& session) {
                           core::Message("the mesh has ", most,
                                         " watchers, the most that this server allows: end one "
                                         "first, or raise --max-watchers")});
+}
+
+std::optional<grpc::Status> NoHistory(ServerState& service, const Session& session,
+                                      Clock::duration waited) {
+  if (session.HistoryIsLost()) {
+    return Refusal(v1::ERROR_REASON_INTERNAL,
+                   "the server cannot read the mesh back from its record: see its log");
+  }
+  if (waited < kHistoryWait) return std::nullopt;
+  return Refuse(service,
+                {{"max-memory-bytes", core::Message(service.config.max_memory_bytes), "server"},
+                 "the mesh is on the server's disk, and it has no memory to read it back: "
+                 "ask again when other meshes have ended, or raise --max-memory-bytes"});
 }
 
 grpc::Status ShuttingDown() {

@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <tl/expected.hpp>
 
 #include "server/auth.h"
@@ -28,7 +29,9 @@ struct ServerState {
         stream_memory(std::make_shared<MemoryBudget>(
             MemoryBudget::Limits{config.max_memory_bytes, config.owner_memory_bytes},
             MemoryBudget::Of::kStreams)),
-        store(limits, std::move(factory)) {}
+        store(limits, std::move(factory)) {
+    memory->MakeRoomBy([this] { return store.PutAwayHistories(); });
+  }
 
   const Config config;
   const std::shared_ptr<MemoryBudget> memory, stream_memory;
@@ -89,6 +92,11 @@ tl::expected<std::unique_ptr<MemoryBudget::Account>, grpc::Status> CountStream(
 
 // RESOURCE_EXHAUSTED: AddWatcher refused.
 grpc::Status TooManyWatchers(ServerState& service, const Session& session);
+
+// Of a mesh whose history is on the disk and has not come for so long. RESOURCE_EXHAUSTED: the
+// server has no memory for it; INTERNAL: it cannot be read back; nothing: wait on.
+std::optional<grpc::Status> NoHistory(ServerState& service, const Session& session,
+                                      Clock::duration waited);
 
 // UNAVAILABLE: the server stops.
 grpc::Status ShuttingDown();

@@ -109,25 +109,27 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
     if (writing_ || finished_) return;
     if (end_) {
       finished_ = true;
+      history_.reset();
       last_write_ = Clock::now();
       return Finish(*end_);
     }
     if (session_ == nullptr) return;
     const bool over = session_->HasEnded();  // before the revision: nothing follows then
     response_.Clear();
-    if (geometry_ && !cursor_ && session_->history().revision() > at_) {
-      cursor_ = session_->history().Begin(at_);
-    }
+    const std::uint64_t newest = session_->revision();
+    const bool behind = geometry_ && !cursor_ && newest > at_;
+    if (behind) Begin();
+    if (end_) return Pump();
     if (cursor_) {
       TakePart();
-    } else if (geometry_ && over && at_ > session_->history().revision()) {
+    } else if (geometry_ && over && at_ > newest) {
       at_ = 0;
       response_.mutable_reset_mesh()->set_reason(
           "the mesh ended at an earlier revision than the one you have: forget your copy");
     } else if (progress_due_) {
       progress_due_ = false;
       ToProto(session_->View(), response_.mutable_progress());
-    } else if (over) {
+    } else if (over && !behind) {
       finished_ = true;
       last_write_ = Clock::now();
       ToProto(*session_, response_.mutable_final());
@@ -144,13 +146,28 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
     StartWrite(&response_, options);
   }
 
+  // What the client lacks may be on the disk, and come later.
+  void Begin() {
+    const TimePoint now = Clock::now();
+    const auto history = service_.store.OpenHistory(session_);
+    if (history != nullptr) {
+      history_ = history;
+      cursor_ = history_->Begin(at_);
+      wanted_since_.reset();
+      return;
+    }
+    if (!wanted_since_) wanted_since_ = now;
+    end_ = NoHistory(service_, *session_, now - *wanted_since_);
+  }
+
   void TakePart() {
     const core::Specification& spec = session_->options().spec;
-    const DeltaPart part = session_->history().Next(&*cursor_, PartBytes(service_.config));
+    const DeltaPart part = history_->Next(&*cursor_, PartBytes(service_.config));
     ToProto(part, spec.dimension, spec.ambient_dimension, response_.mutable_delta());
     if (!part.complete) return;
     at_ = cursor_->to;
     cursor_.reset();
+    history_.reset();
     progress_due_ = true;
   }
 
@@ -163,8 +180,10 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
   std::shared_ptr<Session> session_;
   std::unique_ptr<MemoryBudget::Account> memory_;
   bool geometry_ = true;
-  std::uint64_t at_ = 0;  // the client has all up to this revision
+  std::uint64_t at_ = 0;                     // the client has all up to this revision
+  std::shared_ptr<const WatchLog> history_;  // with the cursor
   std::optional<WatchLog::Cursor> cursor_;
+  std::optional<TimePoint> wanted_since_;  // the history
   bool progress_due_ = true;
   bool writing_ = false;
   bool finished_ = false;

@@ -57,6 +57,7 @@ class Process {
     const rlimit limit{bytes, RLIM_INFINITY};
     ASSERT_EQ(prlimit(pid_, RLIMIT_FSIZE, &limit, nullptr), 0);
   }
+  pid_t id() const { return pid_; }
   bool Ended() {
     if (pid_ > 0 && waitpid(pid_, nullptr, WNOHANG) != 0) pid_ = 0;
     return pid_ == 0;

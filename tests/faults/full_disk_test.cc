@@ -133,9 +133,9 @@ TEST_F(FailingDisk, ADeletionMakesRoomOnAFullDisk) {
   const SmallDisk disk(data_, "size=48m");
   if (!disk.mounted()) GTEST_SKIP() << SmallDisk::kMissing;
   core::QueryBatch batch;
-  core::Answers answers;
-  answers.blocks.resize(1);
-  answers.blocks[0].points = Eigen::MatrixXd::Random(3, 50'000);
+  batch.blocks.resize(1);
+  batch.blocks[0].points = Eigen::MatrixXd::Random(3, 50'000);
+  const core::Answers answers = EmptyAnswers(2, 3, batch);
   {
     const auto journal = Journal::Open({data_});
     ASSERT_TRUE(journal) << journal.error().message;
@@ -143,7 +143,8 @@ TEST_F(FailingDisk, ADeletionMakesRoomOnAFullDisk) {
     std::optional<MeshFailure> failure;
     while (!failure) {
       ++batch.round;
-      failure = mesh->WriteRound(batch, answers);
+      mesh->BeginRound(batch);
+      failure = mesh->WriteRound(batch, answers, 0);
     }
     EXPECT_EQ(failure->reason, "JOURNAL_FULL");
     EXPECT_GT(batch.round, 10u) << "12 MB, of which 8 are removed at once";
@@ -156,7 +157,8 @@ TEST_F(FailingDisk, ADeletionMakesRoomOnAFullDisk) {
   EXPECT_TRUE((*journal)->TakeMeshes().empty());
   const auto mesh = Begin(journal->get());
   batch.round = 1;
-  EXPECT_FALSE(mesh->WriteRound(batch, answers)) << "there is room again";
+  mesh->BeginRound(batch);
+  EXPECT_FALSE(mesh->WriteRound(batch, answers, 0)) << "there is room again";
 }
 
 }  // namespace

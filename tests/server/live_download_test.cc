@@ -152,31 +152,83 @@ TEST_F(LiveDownloadTest, ADownloadCountsAsAWatcher) {
   }
 }
 
-// The next server meshes differently, so that its replay ends before the revision that a watcher
-// has: it is told to forget that.
-TEST_F(LiveDownloadTest, AWatcherOfALostRevisionIsReset) {
-  const std::string directory = ::testing::TempDir() + "stellate-reset-" + std::to_string(getpid());
-  std::filesystem::remove_all(directory);
-  Config config;
-  config.data_dir = directory;
-  Start(config);
+// A server on a data directory, and then another that meshes differently.
+class TwoVersions : public LiveDownloadTest {
+ protected:
+  TwoVersions()
+      : directory_(::testing::TempDir() + "stellate-versions-" + std::to_string(getpid())) {
+    std::filesystem::remove_all(directory_);
+    Config config;
+    config.data_dir = directory_;
+    Start(config);
+  }
+  ~TwoVersions() override {
+    server_.reset();
+    std::filesystem::remove_all(directory_);
+  }
+
+  void StartTheOther() {
+    server_.reset();
+    Config config;
+    config.data_dir = directory_;
+    config.listen = "unix:" + directory_ + "/socket";
+    auto other = Server::Start(config, [](core::Specification spec) {
+      spec.random_seed += 1;
+      return core::Mesher::Create(std::move(spec));
+    });
+    ASSERT_TRUE(other) << other.error().message;
+    server_ = std::move(*other);
+    stub_ = NewStub();
+  }
+
+  const std::string directory_;
+};
+
+TEST_F(TwoVersions, AFinishedMeshOutlivesItsVersion) {
   const std::string name = CreateSphere();
   {
     RawWorker worker(stub_.get(), name);
     EXPECT_EQ(WatchToEnd(name).state(), v1::MESH_STATE_SUCCEEDED);
   }
-  const std::uint64_t revision = Get(name).revision();
-  ASSERT_GT(revision, 0u);
-  server_.reset();
+  const v1::Mesh mesh = Get(name);
+  const auto content_of = [&] {
+    grpc::ClientContext context;
+    v1::DownloadMeshRequest request;
+    request.set_name(name);
+    const auto reader = stub_->DownloadMesh(&context, request);
+    std::string content;
+    v1::DownloadMeshResponse part;
+    while (reader->Read(&part)) content += part.points().data() + part.cells().data();
+    EXPECT_TRUE(reader->Finish().ok());
+    return content;
+  };
+  const std::string content = content_of();
+  StartTheOther();
+  const v1::Mesh kept = Get(name);
+  EXPECT_EQ(kept.state(), v1::MESH_STATE_SUCCEEDED) << "at once";
+  EXPECT_EQ(kept.revision(), mesh.revision());
+  EXPECT_EQ(kept.report().SerializeAsString(), mesh.report().SerializeAsString());
+  EXPECT_TRUE(content_of() == content);
+  EXPECT_EQ(WatchToEnd(name).state(), v1::MESH_STATE_SUCCEEDED);
+}
 
-  config.listen = "unix:" + directory + "/socket";
-  auto other = Server::Start(config, [](core::Specification spec) {
-    spec.random_seed += 1;
-    return core::Mesher::Create(std::move(spec));
-  });
-  ASSERT_TRUE(other) << other.error().message;
-  server_ = std::move(*other);
-  stub_ = NewStub();
+// Its replay ends before the revision that a watcher has: it is told to forget that.
+TEST_F(TwoVersions, AWatcherOfALostRevisionIsReset) {
+  const std::string name = CreateSphere();
+  std::uint64_t revision = 0;
+  {
+    std::atomic<bool> enough{false};
+    RawWorker worker(stub_.get(), name,
+                     [&](const v1::QueryChunk& queries) -> std::optional<v1::ServeOracleRequest> {
+                       if (enough) return std::nullopt;
+                       return RawWorker::Truly(queries);
+                     });
+    while (Get(name).revision() < 3) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    enough = true;
+    revision = Get(name).revision();
+    server_.reset();
+  }
+  StartTheOther();
   grpc::ClientContext context;
   v1::WatchMeshRequest request;
   request.set_name(name);
@@ -195,8 +247,6 @@ TEST_F(LiveDownloadTest, AWatcherOfALostRevisionIsReset) {
   EXPECT_EQ(final.state(), v1::MESH_STATE_FAILED);
   EXPECT_EQ(final.report().failure().reason(), "REPLAY_MISMATCH");
   EXPECT_LT(final.revision(), revision);
-  server_.reset();
-  std::filesystem::remove_all(directory);
 }
 
 }  // namespace

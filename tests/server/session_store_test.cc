@@ -6,6 +6,7 @@
 #include <set>
 #include <thread>
 
+#include "tests/server/blank_journal.h"
 #include "tests/server/no_more_threads.h"
 #include "tests/server/sphere.h"
 #include "tests/support/stub_mesher.h"
@@ -250,22 +251,13 @@ TEST_F(SweepTest, ARunningMeshStays) {
   EXPECT_NE(store_.Find(running->options().name), nullptr);
 }
 
-// Knows nothing, and remembers how the mesh ended.
-class BlankJournal : public SessionJournal {
+// Remembers how the mesh ended.
+class EndJournal : public testing::BlankJournal {
  public:
-  std::optional<MeshFailure> WriteStart(const SessionOptions&,
-                                        std::chrono::system_clock::time_point) override {
-    return std::nullopt;
-  }
-  std::optional<MeshFailure> WriteRound(const core::QueryBatch&, const core::Answers&) override {
-    return std::nullopt;
-  }
   std::optional<MeshFailure> WriteEnd(const SessionEnd& written) override {
     end = written;
     return std::nullopt;
   }
-  Replay ReadRound(const core::QueryBatch&) override { return {}; }
-  void Forget() override {}
 
   std::optional<SessionEnd> end;
 };
@@ -277,14 +269,14 @@ class ClockSetBackTest : public ::testing::Test {
     SessionOptions options = Options();
     options.name = NewMeshName();
     options.journal = journal_;
-    options.record = SessionRecord{created_, 0, std::move(end)};
+    options.record = SessionRecord{created_, 0, 0, std::move(end), {}};
     const std::string name = options.name;
     store_.Restore(std::move(options));
     return store_.Find(name);
   }
 
   const std::chrono::system_clock::time_point created_ = std::chrono::system_clock::now() + 2h;
-  const std::shared_ptr<BlankJournal> journal_ = std::make_shared<BlankJournal>();
+  const std::shared_ptr<EndJournal> journal_ = std::make_shared<EndJournal>();
   SessionStore store_{{}};
 };
 
@@ -304,8 +296,7 @@ TEST_F(ClockSetBackTest, AMeshEndsNotBeforeItBegan) {
 }
 
 TEST_F(ClockSetBackTest, ARecordWithNegativeTimesIsReadWithoutThem) {
-  const auto session =
-      Restore(SessionEnd{SessionState::kCancelled, created_ - 1h, -3600, {}, 0});
+  const auto session = Restore(SessionEnd{SessionState::kCancelled, created_ - 1h, -3600, {}, 0});
   ASSERT_NE(session, nullptr);
   WaitUntilOver(*session);
   const SessionView view = session->View();

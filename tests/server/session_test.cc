@@ -186,7 +186,7 @@ TEST(Session, AMeshThatOutgrowsTheMemoryFailsAndGivesItBack) {
   EXPECT_NE(view.failure.message.find("--max-memory-bytes"), std::string::npos);
   EXPECT_EQ(view.revision, 2u);
   EXPECT_EQ(view.bytes, EstimateFinishedBytes(session.options().spec) +
-                            session.history().MemoryBytes())
+                            session.history()->MemoryBytes())
       << "the mesher is gone";
   EXPECT_EQ(budget->total(), view.bytes);
   worker->WaitForEnd();
@@ -227,7 +227,7 @@ TEST(Session, WhatARoundLedToIsShownBeforeTheNextIsAnswered) {
   const auto worker = FakeWorker::Join(
       &running.session->pool(), [&](const Chunk& chunk, core::AnswerBlock* answer) {
         const TimePoint patience = Clock::now() + 60s;
-        while (running.session->history().revision() + 1 < chunk.round->batch.round) {
+        while (running.session->history()->revision() + 1 < chunk.round->batch.round) {
           if (Clock::now() > patience) return false;
           std::this_thread::sleep_for(1ms);
         }
@@ -247,7 +247,7 @@ std::vector<double> MeshSphere(int workers, std::vector<std::uint32_t>* simplice
   EXPECT_EQ(view.state, SessionState::kSucceeded);
   EXPECT_TRUE(view.report->certificate.certified) << view.report->certificate.verdict;
   EXPECT_EQ(view.report->certificate.euler_characteristic, 2);
-  const WatchLog& log = running.session->history();
+  const WatchLog& log = *running.session->history();
   WatchLog::Cursor cursor = log.Begin(0);
   std::vector<double> points;
   for (DeltaPart part; !part.complete;) {
