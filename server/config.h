@@ -50,7 +50,8 @@ struct Config {
   // Of each owner, where the server tells owners apart.
   std::uint64_t owner_meshes = 32;  // running at once; 0: as many as the server
   std::uint64_t keep_finished_meshes = 32;
-  std::uint64_t owner_memory_bytes = 0;  // 0: WithDefaults says
+  std::uint64_t owner_memory_bytes = 0;   // 0: WithDefaults says
+  std::uint64_t owner_journal_bytes = 0;  // 0: half of what the record may have
 
   // Of each mesh.
   std::uint64_t max_vertices = 10'000'000;

@@ -2,10 +2,12 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/status.h"
+#include "server/limits.h"
 #include "server/session.h"
 #include "server/session_journal.h"
 #include "server/shared_journal.h"
@@ -18,6 +20,9 @@ struct JournalOptions {
   std::uint64_t owner_bytes = 0;  // of the records of an owner's meshes, where owners have names;
                                   // 0: no limit
 };
+
+// Half of what a journal may have: of its limit, or of what the disk has free for it and it holds.
+std::uint64_t DefaultOwnerBytes(const std::string& directory, std::uint64_t max_bytes);
 
 // The record of all meshes of a server, in one SQLite file of its data directory: for each its
 // specification, the answers of each round, and its end; once it has ended, the mesh itself in the
@@ -39,15 +44,19 @@ class Journal {
 
   // For a new mesh.
   std::shared_ptr<SessionJournal> NewMesh();
+  // Whether the record of a new mesh of `owner` has room for its first `bytes`, and what to do if
+  // not. Any thread; does not wait.
+  std::optional<Refused> RefuseNewMesh(const std::string& owner, std::uint64_t bytes) const;
+
   // Bytes of the records of an owner's meshes; the file has a twentieth or so on top.
   std::uint64_t OwnerBytes(const std::string& owner) const { return file_->OwnerBytes(owner); }
 
  private:
-  Journal(std::shared_ptr<SharedJournal> file, std::uint64_t owner_bytes);
+  Journal(std::shared_ptr<SharedJournal> file, JournalOptions options);
   bool Take(std::int64_t id, const JournalFile::StoredMesh& stored, std::uint64_t bytes);
 
   const std::shared_ptr<SharedJournal> file_;
-  const std::uint64_t owner_bytes_;
+  const JournalOptions options_;
   std::vector<SessionOptions> meshes_;
 };
 

@@ -52,7 +52,7 @@ constexpr double kLinesASecond = 10;
 // Who writes lines, each with a ration of its own.
 constexpr char kServer[] = "the server";
 constexpr char kLibraries[] = "libraries";
-constexpr char kMeshesOf[] = "meshes of owner ";
+constexpr char kMeshes[] = "meshes";  // of an owner
 
 LineRation& Ration() {
   static LineRation ration(kBurst, kLinesASecond);
@@ -100,7 +100,8 @@ bool LogEnabled(LogLevel level) { return Logger().should_log(ToSpdlog(level)); }
 
 void Log(LogLevel level, const LogContext& context, const std::string& message,
          const LogFields& fields) {
-  const std::string party = context.mesh.empty() ? kServer : kMeshesOf + context.owner;
+  std::string party = context.mesh.empty() ? kServer : kMeshes;
+  if (!context.owner.empty()) party += " of owner " + context.owner;
   LogFor(party, level, context, message, fields);
 }
 

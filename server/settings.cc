@@ -121,6 +121,10 @@ const std::vector<Setting>& Settings() {
        0, 1'000'000},
       {kOwnerLimits, "--owner-memory-bytes", &Config::owner_memory_bytes,
        "Estimated memory of an owner's meshes; 0: half of the server's", 0, kBytes},
+      {kOwnerLimits, "--owner-journal-bytes", &Config::owner_journal_bytes,
+       "Size of an owner's records in --data-dir; 0: half of --max-journal-bytes, or of what the "
+       "disk has for them at the start",
+       0, kBytes},
 
       {kMeshLimits, "--max-vertices", &Config::max_vertices, "Vertices", 1,
        std::numeric_limits<std::uint32_t>::max()},

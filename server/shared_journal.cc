@@ -175,10 +175,16 @@ std::uint64_t SharedJournal::OwnerBytes(const std::string& owner) const {
   return it == owner_bytes_.end() ? 0 : it->second;
 }
 
+std::uint64_t SharedJournal::TotalBytes() const {
+  const std::lock_guard lock(due_mutex_);
+  return total_bytes_;
+}
+
 void SharedJournal::CountFor(const std::string& owner, std::int64_t bytes) {
   const std::lock_guard lock(due_mutex_);
   std::uint64_t& total = owner_bytes_[owner];
   total += static_cast<std::uint64_t>(bytes);
+  total_bytes_ += static_cast<std::uint64_t>(bytes);
   if (total == 0) owner_bytes_.erase(owner);
 }
 

@@ -55,6 +55,7 @@ class SharedJournal {
 
   // Bytes of all records of an owner's meshes.
   std::uint64_t OwnerBytes(const std::string& owner) const;
+  std::uint64_t TotalBytes() const;  // of everyone's
   void CountFor(const std::string& owner, std::int64_t bytes);
 
  private:
@@ -77,6 +78,7 @@ class SharedJournal {
   bool log_is_long_ = false;
   bool space_is_due_ = false;  // of what was removed
   std::map<std::string, std::uint64_t> owner_bytes_;
+  std::uint64_t total_bytes_ = 0;
   std::jthread writer_, keeper_;
 };
 

@@ -9,6 +9,12 @@ namespace {
 // Room for so many vertices must be left for a mesh to be begun.
 constexpr std::uint64_t kFirstVertices = 100;
 
+// What a mesh records before it gets anywhere: its specification, and some answers.
+std::uint64_t FirstRecordBytes(const core::Specification& spec) {
+  constexpr std::uint64_t kFirst = std::uint64_t{1} << 16;
+  return kFirst + static_cast<std::uint64_t>(spec.seeds.size()) * sizeof(double);
+}
+
 Clock::duration ToDuration(double seconds) {
   return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
 }
@@ -42,6 +48,11 @@ grpc::Status CreateMesh(const Call& call, const v1::CreateMeshRequest& request, 
   Furnish(service, &options);
   const auto full = options.memory->Set(EstimateMeshBytes(options.spec, kFirstVertices, 0));
   if (full) return Refuse(service, *full);
+  if (service.journal != nullptr) {
+    const auto no_room =
+        service.journal->RefuseNewMesh(options.owner, FirstRecordBytes(options.spec));
+    if (no_room) return Refuse(service, *no_room);
+  }
   const auto session = service.store.Create(std::move(options));
   if (!session) return Refuse(service, session.error());
   ToProto(**session, mesh);

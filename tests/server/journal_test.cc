@@ -131,6 +131,13 @@ TEST_F(JournalTest, AnOwnerHasHisShareAndDeletionGivesItBack) {
   while (!failure) failure = WriteOneRound(mesh.get(), round++, 100);
   EXPECT_EQ(failure->reason, "JOURNAL_FULL");
   EXPECT_GT(round, 10u);
+  constexpr std::uint64_t kMesh = 50'000;
+  const auto refused = (*opened)->RefuseNewMesh("somebody", kMesh);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->code, core::StatusCode::kLimitExceeded);
+  EXPECT_EQ(refused->limit->setting, "owner-journal-bytes");
+  EXPECT_EQ(refused->limit->scope, "owner");
+  EXPECT_FALSE((*opened)->RefuseNewMesh("somebody else", kMesh));
   EXPECT_FALSE(mesh->WriteEnd({SessionState::kFailed, {}, 0, *failure, round}));
   SessionOptions options = RecordedSphere(others);
   options.owner = "somebody else";
@@ -138,6 +145,7 @@ TEST_F(JournalTest, AnOwnerHasHisShareAndDeletionGivesItBack) {
   EXPECT_FALSE(WriteOneRound(others.get(), 1, 100));
   mesh->Forget();
   while ((*opened)->OwnerBytes("somebody") > 0) std::this_thread::yield();
+  EXPECT_FALSE((*opened)->RefuseNewMesh("somebody", kMesh));
   EXPECT_GT((*opened)->OwnerBytes("somebody else"), 0u);
 }
 
@@ -152,9 +160,13 @@ TEST_F(JournalTest, AFullFileFailsTheRoundAloneAndDeletionMakesRoom) {
   ASSERT_FALSE(small->WriteStart(RecordedSphere(small), {}));
   ASSERT_FALSE(large->WriteStart(RecordedSphere(large), {}));
   ASSERT_FALSE(WriteOneRound(large.get(), 1, 8000));
+  EXPECT_FALSE(journal->RefuseNewMesh("", 1000));
   const auto failure = WriteOneRound(large.get(), 2, 8000);
   ASSERT_TRUE(failure);
   EXPECT_EQ(failure->reason, "JOURNAL_FULL");
+  const auto refused = journal->RefuseNewMesh("", 1 << 20);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->limit->setting, "max-journal-bytes");
   EXPECT_FALSE(WriteOneRound(small.get(), 1)) << "others are unharmed";
   large->Forget();
   std::optional<MeshFailure> still;

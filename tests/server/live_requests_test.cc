@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "tests/server/certificates.h"
 #include "tests/server/live_server.h"
 
 namespace stellate::server::testing {
@@ -169,6 +170,40 @@ TEST_F(LiveRequestsTest, EachLimitIsNamedWithItsValue) {
             "max-rounds=10 of mesh");
   EXPECT_EQ(limit_of_curve([](v1::MeshSpec* s) { s->mutable_limits()->set_answer_seconds(101); }),
             "max-wait=100 of mesh");
+}
+
+// Not a mesh that ends at once as JOURNAL_FULL.
+TEST_F(LiveRequestsTest, WithoutRoomInTheRecordThereIsNoNewMesh) {
+  const ScratchDirectory directory;
+  Config config;
+  config.data_dir = directory / "data";
+  config.max_journal_bytes = 500'000;
+  config.max_meshes = 1000;
+  Start(config);
+  v1::MeshSpec spec = SpecOfSphere();
+  const std::vector<double> seeds(3 * 3000, 1.0);
+  ToProto(seeds.data(), {3000, 3}, spec.mutable_seeds());
+  std::vector<std::string> names;
+  grpc::Status status;
+  while (status.ok()) {
+    v1::Mesh mesh;
+    status = Create(spec, &mesh);
+    if (status.ok()) names.push_back(mesh.name());
+  }
+  EXPECT_EQ(status.error_code(), StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(ReasonIn(status), "LIMIT_EXCEEDED");
+  EXPECT_EQ(LimitIn(status), "max-journal-bytes=500000 of server");
+  EXPECT_NE(status.error_message().find("delete meshes"), std::string::npos);
+  for (const std::string& name : names) {
+    grpc::ClientContext context;
+    v1::DeleteMeshRequest request;
+    request.set_name(name);
+    google::protobuf::Empty empty;
+    EXPECT_TRUE(stub_->DeleteMesh(&context, request, &empty).ok());
+  }
+  v1::Mesh mesh;
+  while (!Create(spec, &mesh).ok()) std::this_thread::yield();  // the removal is another thread's
+  server_.reset();  // before its directory goes
 }
 
 TEST_F(LiveRequestsTest, WithoutMemoryLeftThereIsNoNewMesh) {
