@@ -22,6 +22,18 @@ const char* TerminationName(Termination t) {
   return "UNKNOWN";
 }
 
+const char* CertificateLevelName(CertificateLevel level) {
+  switch (level) {
+    case CertificateLevel::kRefused:
+      return "REFUSED";
+    case CertificateLevel::kSampled:
+      return "SAMPLED";
+    case CertificateLevel::kProved:
+      return "PROVED";
+  }
+  return "UNKNOWN";
+}
+
 const char* PhaseName(Phase p) {
   switch (p) {
     case Phase::kSeeding:

@@ -62,6 +62,14 @@ struct Counts {
   std::uint64_t duplicates = 0;            // answers that fell on an existing sample point
 };
 
+// How far a certificate goes.
+enum class CertificateLevel {
+  kRefused = 0,  // a check failed, or the run did not converge
+  kSampled,      // every check passed; some look at samples
+  kProved,       // and a theorem holds, of the declared reach alone
+};
+const char* CertificateLevelName(CertificateLevel level);  // "SAMPLED", ...
+
 // The certificate: computed from the finished complex and never assumed.
 struct Certificate {
   bool certified = false;             // every claim below holds, and the run converged
@@ -71,8 +79,8 @@ struct Certificate {
   bool closed = false;                   // each (k-1)-face is in exactly two simplices
   std::uint64_t bad_faces = 0;
   bool links_are_spheres = false;        // each vertex link is a (k-1)-sphere
-  bool links_decided_exactly = false;    // k <= 3 always; k = 4 where the links' fundamental
-                                         // groups and homology settle it
+  bool links_decided_exactly = false;    // k <= 3, or a closed mesh whose stars embed; k = 4 also
+                                         // where the links' fundamental groups and homology do
   std::uint64_t bad_links = 0;
   std::uint64_t inconsistent_simplices = 0;  // in a star but not in all its vertices' stars
   std::uint64_t unembedded_stars = 0;  // stars whose projection on the tangent space overlaps itself
@@ -90,6 +98,13 @@ struct Certificate {
   double max_barycentre_distance = 0;  // to M, length
   double estimated_reach = 0;          // length; an estimate from above
   double epsilon_over_reach = 0;  // graded sizes: the largest R_p over the local feature size
+
+  // Where the client declared a reach (Specification::declared_reach), else 0.
+  CertificateLevel level = CertificateLevel::kRefused;
+  double declared_reach = 0;   // length
+  bool reach_refuted = false;  // points of M contradict it: the verdict names them
+  double proved_distance = 0;  // kProved: no point of the mesh or of the components of M that it
+                               // meets is farther from the other; a length
 
   std::uint64_t components = 0;
   std::int64_t euler_characteristic = 0;

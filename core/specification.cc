@@ -1,7 +1,9 @@
 #include "core/specification.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 
 #include "core/message.h"
@@ -114,6 +116,43 @@ Status CheckSeeds(const Specification& spec) {
   return Status::Ok();
 }
 
+// Seeds that cover a box lie in the middle of cells whose corners are this share of the reach away,
+// and a little off it, so that symmetric manifolds have none on their axes: oracles divide by zero
+// there. By that share of a cell at most, which adds twice as much of the distance to a corner: less
+// than a whole reach is left.
+constexpr double kCoverShare = 0.97;
+constexpr double kOffMiddle = 0.01;
+
+// How many seeds along each axis.
+Eigen::VectorXd CoverCounts(const Specification& spec) {
+  const BoundingBox& box = *spec.bounding_box;
+  const double cell = 2 * kCoverShare * *spec.declared_reach /
+                      std::sqrt(static_cast<double>(spec.ambient_dimension));
+  return ((box.upper - box.lower) / cell).array().ceil().max(1.0);
+}
+
+Status CheckReach(const Specification& spec) {
+  if (spec.declared_reach && !IsLength(*spec.declared_reach)) {
+    return Invalid(Message("declared_reach is ", *spec.declared_reach, " but must be ",
+                           LengthRule(), ": a lower bound of the manifold's reach"));
+  }
+  if (!spec.cover_box) return Status::Ok();
+  if (!spec.declared_reach || !spec.bounding_box || spec.seeds.cols() > 0) {
+    return Invalid(
+        "cover_box is set: give declared_reach and bounding_box, by which the seeds are laid, and "
+        "no seeds");
+  }
+  const double count = CoverCounts(spec).prod();
+  const double most = std::min<double>(
+      kMaxBoxSeeds, static_cast<double>(kMaxBoxSeedCoordinates / spec.ambient_dimension));
+  if (!(count <= most)) {
+    return TooLarge(Message("cover_box has to lay ", Brief(count), " seeds into this box for ",
+                            "declared_reach = ", *spec.declared_reach, ", but at most ", most,
+                            " may be: give a smaller box, or seeds on each component instead"));
+  }
+  return Status::Ok();
+}
+
 Status CheckCriteria(const Criteria& c) {
   if (!(c.radius_edge_bound > 1 && c.radius_edge_bound <= kMaxLength)) {
     return Invalid(Message("criteria.radius_edge_bound (rho0) is ", c.radius_edge_bound,
@@ -187,9 +226,27 @@ Status Validate(const Specification& spec) {
     status = CheckBox(*spec.bounding_box, spec.ambient_dimension);
   }
   if (status.ok()) status = CheckSeeds(spec);
+  if (status.ok()) status = CheckReach(spec);
   if (status.ok()) status = CheckCriteria(spec.criteria);
   if (status.ok()) status = CheckLimits(spec);
   return status;
+}
+
+Eigen::MatrixXd CoverOfBox(const Specification& spec) {
+  if (!spec.cover_box) return {};
+  const BoundingBox& box = *spec.bounding_box;
+  const Eigen::VectorXd counts = CoverCounts(spec);
+  Eigen::MatrixXd seeds(spec.ambient_dimension, static_cast<Eigen::Index>(counts.prod()));
+  Eigen::VectorXd at = Eigen::VectorXd::Zero(spec.ambient_dimension);
+  Eigen::ArrayXd off(spec.ambient_dimension);  // another for each axis
+  for (Eigen::Index a = 0; a < off.size(); ++a)
+    off[a] = kOffMiddle * std::fmod((static_cast<double>(a) + 1) * std::numbers::phi, 1);
+  for (Eigen::Index i = 0; i < seeds.cols(); ++i) {
+    const Eigen::ArrayXd share = (at.array() + 0.5 + off) / counts.array();
+    seeds.col(i) = box.lower.array() + share * (box.upper - box.lower).array();
+    for (Eigen::Index a = 0; a < at.size() && ++at[a] == counts[a]; ++a) at[a] = 0;
+  }
+  return seeds;
 }
 
 }  // namespace stellate::core

@@ -103,12 +103,23 @@ struct Specification {
   Eigen::MatrixXd seeds;                    // d x m, near M, may be empty
   int box_seeds = 0;                        // points drawn from the box; 0: the default
   int components = 0;  // that M has at least; a mesh with fewer is refused. 0: not known
+  // The client promises that M's reach is at least this, a length: the mesh is refined until that
+  // promise and the mesh prove its topology (core/certificate/proof.h), or refute the promise.
+  std::optional<double> declared_reach;
+  // Seeds are laid so densely into the box that every component of M in it is found, which the
+  // declared reach makes finite: CoverOfBox. Needs both, and no seeds.
+  bool cover_box = false;
   std::uint64_t random_seed = 1;            // of everything random
   Criteria criteria;
   Audit audit = Audit::kStandard;
   Limits limits;
   int threads = 0;  // 0: all cores. Never changes the mesh.
 };
+
+// The seeds that cover the box, d x n: every point of it is nearer than the declared reach to one,
+// so that the component of M which a point of M in the box belongs to is nearest to that one.
+// Columns 0 where `cover_box` is not set.
+Eigen::MatrixXd CoverOfBox(const Specification& spec);
 
 // kInvalidArgument or kLimitExceeded with the offending field and value, else Ok.
 Status Validate(const Specification& spec);

@@ -15,7 +15,7 @@ constexpr std::size_t kPartBytes = std::size_t{1} << 20;  // SQLite copies a lar
 
 // `Value` is const when writing.
 template <typename Archive, typename Value>
-void LayOutSpecification(Archive& archive, Value& spec, bool has_audit = true) {
+void LayOutSpecification(Archive& archive, Value& spec, std::uint32_t version = kJournalVersion) {
   archive.Number(spec.dimension);
   archive.Number(spec.ambient_dimension);
   archive.Number(spec.epsilon);
@@ -29,9 +29,13 @@ void LayOutSpecification(Archive& archive, Value& spec, bool has_audit = true) {
   }
   archive.Numbers(spec.seeds);
   archive.Number(spec.box_seeds);
-  if (has_audit) {
+  if (version > 4) {
     archive.Number(spec.components);
     archive.Number(spec.audit);
+  }
+  if (version > 5) {
+    archive.Maybe(spec.declared_reach);
+    archive.Number(spec.cover_box);
   }
   archive.Number(spec.random_seed);
   auto& criteria = spec.criteria;
@@ -119,6 +123,10 @@ void LayOutReport(Archive& archive, Value& report) {
   archive.Number(certificate.components);
   archive.Number(certificate.euler_characteristic);
   archive.Number(certificate.orientable);
+  archive.Number(certificate.level);
+  archive.Number(certificate.declared_reach);
+  archive.Number(certificate.reach_refuted);
+  archive.Number(certificate.proved_distance);
 }
 
 core::AnswerBlock Columns(const core::AnswerBlock& block, Index first, Index count) {
@@ -223,7 +231,7 @@ bool DecodeEarlierStart(std::string_view record, std::uint32_t version, SessionO
   reader.Number(time);
   reader.Number(answer_limit);
   reader.Number(worker_wait);
-  LayOutSpecification(reader, options->spec, /*has_audit=*/version != 4);
+  LayOutSpecification(reader, options->spec, version);
   if (!reader.Complete()) reader.Number(busy_limit);  // earlier records end before it
   *create_time = ToTime(time);
   options->dispatch.answer_limit = Clock::duration(answer_limit);

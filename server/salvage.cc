@@ -197,13 +197,12 @@ Status Salvage::SortMesh(std::int64_t mesh, const Shelf& shelf) {
       if (status.ok() && !kept) status = RemoveOne({mesh, RecordKind::kAnswers, round, part});
     }
   }
-  const bool lost = shelf.end || !shelf.rounds.empty();
+  // Any of what a mesh leaves once it is over tells that it was.
+  const bool had_finished = shelf.end || !shelf.result.empty() || !shelf.history.empty();
+  const bool had_more = !shelf.rounds.empty() && shelf.rounds.rbegin()->first > whole;
   findings_ += Message("kept: ", options.name, ", to go on from round ", whole,
-                       shelf.end ? "; lost: that it had finished" : "",
-                       lost && !shelf.rounds.empty() && shelf.rounds.rbegin()->first > whole
-                           ? "; lost: some rounds"
-                           : "",
-                       "\n");
+                       had_finished ? "; lost: that it had finished" : "",
+                       had_more ? "; lost: some rounds" : "", "\n");
   return status;
 }
 

@@ -17,6 +17,8 @@ constexpr MeshSetting kRun[] = {
     {"--max-batch-queries", &O::max_batch_queries, "ask larger rounds in several batches"},
     {"--box-seeds", &O::box_seeds, "points of the box tried as seeds"},
     {"--components", &O::components, "that the manifold has at least: fewer are not certified"},
+    {"--reach", &O::reach, "declare a lower bound of the reach, to have the mesh proved"},
+    {"--cover-box", &O::cover_box, "miss no component in the bounding box; needs --reach"},
     {"--reconnect", &O::reconnect_seconds, "seconds to wait for a server that went away"},
 };
 

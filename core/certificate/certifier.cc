@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "core/certificate/declared_reach.h"
 #include "core/certificate/evidence.h"
 #include "core/certificate/fibres.h"
 #include "core/certificate/findings.h"
@@ -51,14 +52,6 @@ constexpr double kLeastError = 1e-7;
 constexpr double kRounding = 16 * std::numeric_limits<double>::epsilon();
 // Step of tangents by differences, as a share of the mesh size: above the noise, below curvature.
 constexpr double kDifferenceStep = 0.1;
-
-std::string NamePoint(const Eigen::VectorXd& x) {
-  std::string name = "(";
-  for (Eigen::Index i = 0; i < std::min<Eigen::Index>(x.size(), 6); ++i) {
-    name += Message(i > 0 ? ", " : "", Brief(x[i]));
-  }
-  return name + (x.size() > 6 ? ", ...)" : ")");
-}
 
 bool Found(const AnswerBlock& answer, Eigen::Index j) {
   return answer.found.empty() || answer.found[static_cast<std::size_t>(j)] != 0;
@@ -190,9 +183,6 @@ class Certifier::Impl {
     if (links.bad_links > 0) {
       findings_.Refuse(Findings::kLinks,
                        Message(links.first_bad_link, "; vertices like it: ", links.bad_links));
-    } else if (!links.decided_exactly) {
-      findings_.Warn(
-          "Some vertex links have the homology of a sphere, but were not shown to be spheres.");
     }
     if (facts_.inconsistent_simplices > 0) {
       findings_.Refuse(
@@ -212,6 +202,14 @@ class Certifier::Impl {
     orientation_ = {};
     certificate_.unembedded_stars = stars.unembedded_stars;
     reach_ = stars.reach;
+    // The link of a star that embeds is the sphere of directions of its tangent space
+    // (docs/proof.md, (a)).
+    if (certificate_.closed && stars.unembedded_stars == 0)
+      certificate_.links_decided_exactly = true;
+    if (certificate_.links_are_spheres && !certificate_.links_decided_exactly) {
+      findings_.Warn(
+          "Some vertex links have the homology of a sphere, but were not shown to be spheres.");
+    }
     if (stars.unembedded_stars > 0) {
       findings_.Refuse(Findings::kStars, Message(stars.first_unembedded,
                                                  "; stars like it: ", stars.unembedded_stars));
@@ -233,6 +231,7 @@ class Certifier::Impl {
                                "), more than epsilon = ", Brief(spec_.epsilon)));
     }
     size_ = std::min(shape_.max_circumradius, spec_.epsilon);
+    if (spec_.declared_reach) HoldDeclaredReach(stars);
     longest_edge_ = std::move(stars.longest_edge);
     narrowest_ = {stars.narrowest_p,
                   (Vertex(stars.narrowest_p) - Vertex(stars.narrowest_q)).norm()};
@@ -246,6 +245,15 @@ class Certifier::Impl {
       const auto id = static_cast<std::uint32_t>(v);
       balls_->AddPair(id, kPairRadius * LocalSize(id), spec_.random_seed);
     }
+  }
+
+  void HoldDeclaredReach(const StarGeometry& stars) {
+    const double reach = *spec_.declared_reach;
+    declared_.emplace(
+        mesh_, ReachClaim{reach, std::asin(std::min(1.0, facts_.tangent_error_length / reach))});
+    if (std::isfinite(stars.reach)) declared_->HoldAgainstEdge(stars.narrowest_p, stars.narrowest_q);
+    if (certificate_.closed && stars.unembedded_stars == 0)
+      declared_->Prove(*adjacency_, shape_);
   }
 
   void Ask(Role role, Eigen::MatrixXd points, bool want_tangents = false) {
@@ -356,6 +364,8 @@ class Certifier::Impl {
       certificate_.max_barycentre_distance =
           std::max(certificate_.max_barycentre_distance, distance);
       const std::uint32_t* ids = list[chosen_simplices_[static_cast<std::size_t>(j)]];
+      const double circumradius = Circumradius(ids);
+      if (declared_) declared_->HoldAgainstDistance(ids, circumradius, distance);
       const Eigen::VectorXd step = asked.col(j) - answer.points.col(j);
       if (feet_)
         feet_->AddPair(ids[0], answer.points.col(j), TangentsUnder(ids),
@@ -371,7 +381,7 @@ class Certifier::Impl {
       }
       HoldFoot(ids, answer.points.col(j));
       const double bound =
-          kBarycentreShare * std::min(Circumradius(ids), spec_.epsilon) + kBarycentreNoise * size_;
+          kBarycentreShare * std::min(circumradius, spec_.epsilon) + kBarycentreNoise * size_;
       if (distance - bound <= worst_excess) continue;
       worst_excess = distance - bound;
       barycentre_problem_ =
@@ -609,6 +619,10 @@ class Certifier::Impl {
       JudgeEvidence();
       JudgeReach();
     }
+    if (declared_) {
+      declared_->HoldAgainstBall(balls_->narrowest(), balls_->reach(), balls_->distance());
+      declared_->Conclude(position_error_, facts_.covers_box, findings_, certificate_);
+    }
     findings_.Conclude(mesh_.k, spec_, certificate_);
   }
 
@@ -621,6 +635,7 @@ class Certifier::Impl {
   std::optional<ShrinkingBalls> balls_;
   std::optional<ShrinkingBalls> feet_;  // of a thorough audit: at the barycentres' closest points
   std::optional<TangentCheck> tangent_check_;
+  std::optional<DeclaredReach> declared_;
   std::vector<std::int8_t> orientation_;  // until the stars are measured
   MeshShape shape_;
   double reach_ = 0;

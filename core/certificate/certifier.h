@@ -29,6 +29,9 @@ struct StarFacts {
   double max_circumradius = 0;  // max R_p(sigma)
   bool converged = false;       // no rule applies any more
   double max_size_ratio = 0;    // max R_p / size(p) where the size is graded, else 0
+  bool covers_box = false;      // every component of M in the bounding box is met, if the declared
+                                // reach is true
+  double tangent_error_length = 0;  // sin(tangent_error) times the reach (TangentFinder), length
 };
 
 // Proves or refutes that a finished mesh is what was asked for. A state machine like Mesher: it

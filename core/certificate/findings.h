@@ -1,6 +1,8 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/report.h"
@@ -33,6 +35,7 @@ class Findings {
     kFibres,
     kComponents,
     kDeviation,
+    kDeclaredReach,
     kConvergence,
   };
 
@@ -40,8 +43,15 @@ class Findings {
   void Refuse(Subject subject, std::string problem);
   void Warn(std::string warning) { warnings_.push_back(std::move(warning)); }
 
+  // A theorem about this mesh, in plain words, that holds if nothing refuses it. `covered`: it knows
+  // every component of M.
+  void Prove(std::string theorem, bool covered) {
+    theorem_ = std::move(theorem);
+    covered_ = covered;
+  }
+
   bool clean() const { return problems_.empty(); }
-  // Sets certified, verdict and warnings from these findings and the certificate's values.
+  // Sets certified, level, verdict and warnings from these findings and the certificate's values.
   void Conclude(int k, const Specification& spec, Certificate& certificate) const;
 
  private:
@@ -51,6 +61,11 @@ class Findings {
   };
   std::vector<Problem> problems_;  // by subject
   std::vector<std::string> warnings_;
+  std::string theorem_;
+  bool covered_ = false;
 };
+
+// "(0.5, 1, ...)": the first coordinates of a point, as messages name it.
+std::string NamePoint(const Eigen::VectorXd& x);
 
 }  // namespace stellate::core

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/certificate/findings.h"
+#include "core/geometry/reach.h"
 #include "core/message.h"
 #include "core/parallel.h"
 
@@ -23,11 +24,18 @@ constexpr double kRoundings = 64;
 // the reach's, far below what directions may be wrong by (0.03).
 constexpr double kTangentStep = 0.01;
 
+// With a declared reach: what tangents found by differences may be wrong by, radians.
+constexpr double kTangentError = 0.03;
+
 // Cells begin as fake simplices a little larger than the step of the front.
 constexpr double kInradius = 1.2;
 // Theta0 by k: for k = 3 larger bounds do not terminate, for k <= 2 none is needed. A regular
 // simplex's fatness falls quickly with k, so the bound falls with it.
 constexpr double kDefaultSliverBound[kMaxDimension + 1] = {0, 0, 0, 0.2, 0.15, 0.1};
+
+// With a declared reach: M turns by no more under a simplex of the size asked for, radians. The rest
+// of the right angle is for the simplex itself.
+constexpr double kProofTurn = 0.7;
 
 constexpr double kDefaultAdvanceEpsilons = 3;
 constexpr double kDefaultAdvanceShare = 0.1;  // of the bounding box's diagonal
@@ -38,8 +46,12 @@ ResolvedCriteria Resolve(const Specification& spec) {
   const Criteria& c = spec.criteria;
   ResolvedCriteria r;
   r.epsilon = spec.epsilon;
+  if (spec.declared_reach) {
+    r.shape.reach = *spec.declared_reach;
+    r.epsilon = std::min(r.epsilon, RadiusThatTurns(kProofTurn, r.shape.reach));
+  }
   r.radius_edge_bound = c.radius_edge_bound;
-  r.sliver_bound = c.sliver_bound.value_or(kDefaultSliverBound[spec.dimension]);
+  r.shape.sliver_bound = c.sliver_bound.value_or(kDefaultSliverBound[spec.dimension]);
   r.picking_radius = c.picking_radius;
   r.small_sliver_radius = c.small_sliver_radius;
   r.candidates = c.candidates.value_or(spec.dimension <= 2 ? 1 : 10);
@@ -52,7 +64,7 @@ ResolvedCriteria Resolve(const Specification& spec) {
   const bool flats = spec.dimension <= 2 || r.graded();
   r.judging = c.judging.value_or(flats ? Judging::kFlats : Judging::kCommonCentre);
   r.sizes_given = r.graded() && spec.oracle.local_size;
-  double step = kDefaultAdvanceEpsilons * spec.epsilon;
+  double step = kDefaultAdvanceEpsilons * r.epsilon;
   if (spec.bounding_box) {
     const double diagonal = (spec.bounding_box->upper - spec.bounding_box->lower).norm();
     step = std::max(step, kDefaultAdvanceShare * diagonal);
@@ -65,9 +77,10 @@ template <int K>
 Refinement<K>::Refinement(Specification spec)
     : spec_(std::move(spec)),
       criteria_(Resolve(spec_)),
-      complex_(spec_.ambient_dimension, spec_.epsilon,
-               kInradius * std::max(criteria_.advance_step, spec_.epsilon), criteria_.judging),
-      tangent_finder_(K, spec_.ambient_dimension, kTangentStep * spec_.epsilon, spec_.random_seed) {
+      complex_(spec_.ambient_dimension, criteria_.epsilon,
+               kInradius * std::max(criteria_.advance_step, criteria_.epsilon), criteria_.judging),
+      tangent_finder_(K, spec_.ambient_dimension, kTangentStep * criteria_.epsilon,
+                      spec_.random_seed, kTangentError * spec_.declared_reach.value_or(INFINITY)) {
   AskForSeeds();
 }
 

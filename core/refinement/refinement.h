@@ -19,8 +19,8 @@ namespace stellate::core {
 
 // The constants of a run, defaults filled in for this k.
 struct ResolvedCriteria {
-  double epsilon, radius_edge_bound, sliver_bound, picking_radius, small_sliver_radius,
-      advance_step;
+  double epsilon, radius_edge_bound, picking_radius, small_sliver_radius, advance_step;
+  ShapeBounds shape;
   int candidates, flat_alternations;
   bool ask_ahead;
   Judging judging;
@@ -234,6 +234,7 @@ class Refinement final : public Mesher {
   bool front_moved_ = false;           // in the round
   bool judges_all_ = true;             // all_suspect_ of the round before
 
+  bool covers_box_ = false;  // each seed of a covered box has its closest point
   std::unique_ptr<Certifier> certifier_;
   std::uint64_t too_fine_ = 0;  // stars whose given size asks for less than is meshed
   std::vector<std::uint32_t> certified_simplices_;

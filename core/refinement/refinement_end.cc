@@ -79,6 +79,8 @@ void Refinement<K>::StartCertificate() {
   if (!filled_stars_.empty()) HandOutFilled();
   StarFacts facts;
   facts.converged = true;
+  facts.covers_box = covers_box_;
+  if (!spec_.oracle.tangent_basis) facts.tangent_error_length = tangent_finder_.error_length();
   for (std::uint32_t p = 0; p < complex_.size(); ++p) {
     LookUp(p);
     const double radius =

@@ -35,6 +35,7 @@ template <int K>
 void Refinement<K>::InsertSeeds() {
   Eigen::Index found = 0;
   for (const std::uint8_t f : found_) found += f;
+  covers_box_ = spec_.cover_box && found == points_.cols();
   if (found == 0) {
     std::ostringstream out;
     out << "no seed has a closest point on the manifold: " << points_.cols()
@@ -173,7 +174,7 @@ int Refinement<K>::BestCandidate(std::size_t i) const {
     const int index = static_cast<int>(c - first_candidate_[i]);
     if (criteria_.candidates == 1) return index;
     complex_.TryPoint(y, tangents_.col(c).data(), t.star, scratch, &tentative);
-    const int bad = CountBad<K>(complex_, y, tentative, criteria_.sliver_bound,
+    const int bad = CountBad<K>(complex_, y, tentative, criteria_.shape,
                                 criteria_.small_sliver_radius * t.radius, fewest);
     if (bad < fewest) {
       fewest = bad;

@@ -76,6 +76,8 @@ void Refinement<K>::AskForSeeds() {
   QueryBlock block = NewBlock(QueryKind::kClosestPoint);
   if (spec_.seeds.cols() > 0) {
     block.points = spec_.seeds;
+  } else if (spec_.cover_box) {
+    block.points = CoverOfBox(spec_);
   } else {
     const BoundingBox& box = *spec_.bounding_box;
     const int count = spec_.box_seeds > 0   ? spec_.box_seeds
@@ -181,7 +183,7 @@ std::vector<Target<K>> Refinement<K>::SliverAndConsistencyTargets() {
   const std::vector<std::uint32_t> near = InOrderOfPlace<K>(complex_, suspects_);
   ParallelFor(suspects_.size(), [&](std::size_t i) {
     found[near[i]] =
-        WorstSliverOrInconsistent<K>(complex_, suspects_[near[i]], criteria_.sliver_bound);
+        WorstSliverOrInconsistent<K>(complex_, suspects_[near[i]], criteria_.shape);
   });
   FillCavitiesIfAny(found);
   std::vector<Target<K>> targets;
@@ -195,6 +197,10 @@ std::vector<Target<K>> Refinement<K>::SliverAndConsistencyTargets() {
     if (!found[i]) continue;
     if (IsFilled(p, *found[i])) {
       filled_stars_.push_back(p);
+      continue;
+    }
+    if (found[i]->lean && discouraged_[p] > kGiveUp) {
+      standing_[p] = kFine;  // it will not yield: the certificate says so
       continue;
     }
     blemished_.push_back(p);
@@ -211,7 +217,7 @@ void Refinement<K>::FillCavitiesIfAny(const std::vector<std::optional<Violation<
   if (K < kFirstFilled || criteria_.judging != Judging::kCommonCentre) return;
   if (std::none_of(found.begin(), found.end(), [](const auto& v) { return v.has_value(); })) return;
   filled_ = FillCavities<K>(
-      complex_, {criteria_.epsilon, criteria_.radius_edge_bound, criteria_.sliver_bound});
+      complex_, {criteria_.epsilon, criteria_.radius_edge_bound, criteria_.shape.sliver_bound});
 }
 
 // Whether the violating simplex is not in the mesh anyway, its cavity being filled without it.
@@ -232,7 +238,10 @@ void Refinement<K>::Plan() {
   if (!all_suspect_) {
     const double most = std::max(kMostGrowth * static_cast<double>(before_good_points_),
                                  static_cast<double>(before_good_points_ + kLeastGrowth));
-    if (static_cast<double>(complex_.size()) > most) return Finish(Termination::kNoProgress);
+    if (static_cast<double>(complex_.size()) > most) {
+      if (!std::isfinite(criteria_.shape.reach)) return Finish(Termination::kNoProgress);
+      criteria_.shape.reach = INFINITY;  // unproved, but a mesh
+    }
   }
   std::vector<Target<K>> targets = SizeAndShapeTargets();
   if (criteria_.estimates_sizes() &&

@@ -1,12 +1,21 @@
 #include "core/refinement/rules.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
+#include <numbers>
 #include <vector>
+
+#include "core/geometry/reach.h"
+#include "core/geometry/simplex_frame.h"
 
 namespace stellate::core {
 namespace {
+
+// Simplices lean at least so much less than a proof allows, radians: what tangents found by
+// differences may be wrong by where epsilon is half of the reach, with some to spare.
+constexpr double kLeanMargin = 0.05;
 
 template <int K>
 Violation<K> AtVertex(Rule rule, const RestrictedVoronoiCell<K>& cell, std::size_t v, bool fake) {
@@ -123,22 +132,56 @@ bool ContainsSliver(const StarComplex<K>& complex, const double* p,
 }
 
 template <int K>
+bool LeansTooFar(const StarComplex<K>& complex, std::uint32_t p, const double* at,
+                 const RestrictedVoronoiCell<K>& cell, std::size_t v, double reach,
+                 const double* unborn) {
+  if (!std::isfinite(reach)) return false;
+  const int d = complex.d();
+  std::array<const double*, K + 1> corners;
+  std::array<std::uint32_t, K + 1> ids;
+  corners[0] = at;
+  ids[0] = p;
+  double diameter2 = 0;
+  for (int a = 0; a < K; ++a) {
+    ids[a + 1] = cell.id(cell.facet(v, a));
+    corners[a + 1] = ids[a + 1] < complex.size() ? complex.Point(ids[a + 1]) : unborn;
+    for (int b = 0; b <= a; ++b)
+      diameter2 = std::max(diameter2, SquaredDistance(corners[a + 1], corners[b], d));
+  }
+  const double turn = LargestTurn(JungRatio(K) * std::sqrt(diameter2), reach);
+  const double most = std::numbers::pi / 2 - kLeanMargin - turn;
+  if (most <= 0) return true;
+  thread_local SimplexFrame frame;
+  frame.directions.resize(static_cast<std::size_t>(K * d));
+  TakeFrame({corners.data(), corners.size()}, K, d, frame);
+  if (frame.rank < K) return true;
+  const double sine = std::sin(most);
+  for (const std::uint32_t id : ids) {
+    if (id >= complex.size()) continue;
+    // The sum is no less than the largest: mostly that is enough to know.
+    if (SumOfSquaredSines(frame, K, d, complex.Tangent(id), K) < sine * sine) continue;
+    if (AngleToTangent(frame, K, d, complex.Tangent(id), K) >= most) return true;
+  }
+  return false;
+}
+
+template <int K>
 std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& complex,
-                                                      std::uint32_t p, double sliver_bound) {
+                                                      std::uint32_t p, const ShapeBounds& bounds) {
   const auto& cell = complex.cell(p);
   if (!cell.bounded()) return std::nullopt;  // R1 gave up there: nothing to judge yet
   std::optional<std::size_t> worst;
   const auto is_worse = [&](std::size_t v) { return !worst || cell.norm2(v) > cell.norm2(*worst); };
-  if (sliver_bound > 0) {
-    // In the star of its lowest vertex: if it is not there, it is inconsistent besides.
-    const auto held = [&](std::size_t v) {
-      for (int s = 0; s < K; ++s)
-        if (cell.id(cell.facet(v, s)) < p) return false;
-      return true;
-    };
+  // In the star of its lowest vertex: if it is not there, it is inconsistent besides.
+  const auto held = [&](std::size_t v) {
+    for (int s = 0; s < K; ++s)
+      if (cell.id(cell.facet(v, s)) < p) return false;
+    return true;
+  };
+  if (bounds.sliver_bound > 0) {
     for (std::size_t v = 0; v < cell.vertex_count(); ++v)
       if (is_worse(v) && held(v) &&
-          ContainsSliver<K>(complex, complex.Point(p), cell, v, sliver_bound, nullptr))
+          ContainsSliver<K>(complex, complex.Point(p), cell, v, bounds.sliver_bound, nullptr))
         worst = v;
     if (worst) return AtVertex<K>(Rule::kSliver, cell, *worst, false);
   }
@@ -148,12 +191,20 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& comp
          (complex.judging() == Judging::kCommonCentre && IsFolded<K>(complex, p, v))))
       worst = v;
   if (worst) return AtVertex<K>(Rule::kInconsistent, cell, *worst, false);
-  return std::nullopt;
+  if (!std::isfinite(bounds.reach)) return std::nullopt;
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+    if (is_worse(v) && held(v) &&
+        LeansTooFar<K>(complex, p, complex.Point(p), cell, v, bounds.reach, nullptr))
+      worst = v;
+  if (!worst) return std::nullopt;
+  Violation<K> violation = AtVertex<K>(Rule::kSliver, cell, *worst, false);
+  violation.lean = true;
+  return violation;
 }
 
 template <int K>
 int CountBad(const StarComplex<K>& complex, const double* point,
-             const typename StarComplex<K>::Tentative& tentative, double sliver_bound,
+             const typename StarComplex<K>::Tentative& tentative, const ShapeBounds& bounds,
              double small_radius, int enough) {
   using Cell = RestrictedVoronoiCell<K>;
   using Simplex = typename StarComplex<K>::Simplex;
@@ -175,7 +226,8 @@ int CountBad(const StarComplex<K>& complex, const double* point,
       }
       const bool fresh = simplex.back() == id;  // an old simplex was judged before
       if (fresh && cell.norm2(v) <= small_radius * small_radius &&
-          ContainsSliver<K>(complex, at, cell, v, sliver_bound, point)) {
+          (ContainsSliver<K>(complex, at, cell, v, bounds.sliver_bound, point) ||
+           LeansTooFar<K>(complex, p, at, cell, v, bounds.reach, point))) {
         ++bad;
         continue;
       }
@@ -216,12 +268,14 @@ int CountBad(const StarComplex<K>& complex, const double* point,
   template std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>&, std::uint32_t,   \
                                                         double, double);                        \
   template std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>&,         \
-                                                                 std::uint32_t, double);        \
+                                                                 std::uint32_t, const ShapeBounds&); \
   template bool ContainsSliver(const StarComplex<K>&, const double*,                            \
                                const RestrictedVoronoiCell<K>&, std::size_t, double,            \
                                const double*);                                                  \
+  template bool LeansTooFar(const StarComplex<K>&, std::uint32_t, const double*,                \
+                            const RestrictedVoronoiCell<K>&, std::size_t, double, const double*); \
   template int CountBad(const StarComplex<K>&, const double*, const StarComplex<K>::Tentative&, \
-                        double, double, int);
+                        const ShapeBounds&, double, int);
 STELLATE_INSTANTIATE(1)
 STELLATE_INSTANTIATE(2)
 STELLATE_INSTANTIATE(3)

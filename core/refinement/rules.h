@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 
@@ -12,6 +13,14 @@ namespace stellate::core {
 enum class Rule : std::uint8_t { kSize = 0, kRadiusEdge, kSliver, kInconsistent };
 
 // A simplex of star(p) that breaks a rule, given by its dual vertex in p's cell.
+// What R3 asks of a simplex's shape.
+struct ShapeBounds {
+  double sliver_bound = 0;  // Theta0; 0: none
+  // Of the declared reach, length: no simplex may lean so far from a vertex's tangent space that
+  // ProveFromReach would fail (core/certificate/proof.h). Infinity: they may.
+  double reach = INFINITY;
+};
+
 template <int K>
 struct Violation {
   Rule rule = Rule::kSize;
@@ -19,6 +28,7 @@ struct Violation {
   double x[K] = {};        // c_p(sigma) in p's tangent coordinates
   std::size_t vertex = 0;  // of p's cell, as long as that does not change
   bool fake = false;       // not a simplex yet: the cell is unbounded there
+  bool lean = false;       // of R3: it is no sliver, but leans too far for a proof
 };
 
 // R1 and R2, which need star(p) alone: the worst simplex of the first rule that one breaks, by R_p
@@ -32,10 +42,10 @@ std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std:
 // that is or contains a sliver and whose lowest vertex p is, then the worst one that is
 // inconsistent, or, where stars are judged at common centres, that lies on the same side as a
 // neighbour of the facet they share in T_pM: such a star is no embedded disk although all its
-// vertices agree on it.
+// vertices agree on it; last the worst one whose lowest vertex p is and that leans too far.
 template <int K>
 std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& complex,
-                                                      std::uint32_t p, double sliver_bound);
+                                                      std::uint32_t p, const ShapeBounds& bounds);
 
 // Whether the simplex on p and the facets of v is or contains a Theta0-sliver (Sec. 2.3): that is,
 // whether some face at p, of dimension 2 or more, has fatness below Theta0^j.
@@ -44,12 +54,20 @@ bool ContainsSliver(const StarComplex<K>& complex, const double* p,
                     const RestrictedVoronoiCell<K>& cell, std::size_t v, double sliver_bound,
                     const double* unborn);
 
+// Whether the simplex on p and the facets of v leans too far from the tangent space of one of its
+// vertices for a proof from this reach, or is so large that M itself may turn too far under it.
+// `unborn` as above: it has no tangent space yet.
+template <int K>
+bool LeansTooFar(const StarComplex<K>& complex, std::uint32_t p, const double* at,
+                 const RestrictedVoronoiCell<K>& cell, std::size_t v, double reach,
+                 const double* unborn);
+
 // How bad a tentative insertion would leave its surroundings: the new slivers of circumradius at
 // most `small_radius`, and the simplices that stars would disagree about. Counts no further than
 // `enough`.
 template <int K>
 int CountBad(const StarComplex<K>& complex, const double* point,
-             const typename StarComplex<K>::Tentative& tentative, double sliver_bound,
+             const typename StarComplex<K>::Tentative& tentative, const ShapeBounds& bounds,
              double small_radius, int enough);
 
 }  // namespace stellate::core

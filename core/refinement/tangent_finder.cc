@@ -1,6 +1,8 @@
 #include "core/refinement/tangent_finder.h"
 
 #include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
 
 #include "core/parallel.h"
 #include "core/sample/random.h"
@@ -19,8 +21,8 @@ constexpr double kMostBeyond = 0.3;
 
 }  // namespace
 
-TangentFinder::TangentFinder(int k, int d, double step, std::uint64_t seed)
-    : k_(k), d_(d), step_(step), seed_(seed) {}
+TangentFinder::TangentFinder(int k, int d, double step, std::uint64_t seed, double most_error)
+    : k_(k), d_(d), step_(step), most_error_(most_error), seed_(seed) {}
 
 void TangentFinder::Start(const Eigen::MatrixXd& points, std::vector<const double*> guesses,
                           std::vector<double> shares) {
@@ -29,6 +31,8 @@ void TangentFinder::Start(const Eigen::MatrixXd& points, std::vector<const doubl
   shares_ = std::move(shares);
   tangents_ = Eigen::MatrixXd::Zero(k_ * d_, points.cols());
   ok_.assign(static_cast<std::size_t>(points.cols()), 0);
+  errors_.assign(static_cast<std::size_t>(points.cols()), 0);
+  again_ = false;
   open_.clear();
   guessed_ = true;
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
@@ -84,14 +88,33 @@ void TangentFinder::Absorb(const AnswerBlock& answers) {
     if (spans && flat) {
       for (int a = 0; a < k_; ++a) tangents_.col(point).segment(a * d_, d_) = svd.matrixU().col(a);
       ok_[static_cast<std::size_t>(point)] = 1;
+      errors_[static_cast<std::size_t>(point)] =
+          std::sqrt(static_cast<double>(m)) * 2 * StepAt(point) / s[k_ - 1];
     }
   });
-  std::vector<Eigen::Index> again;
-  for (const Eigen::Index point : open_)
-    if (!ok_[static_cast<std::size_t>(point)] && guessed_) again.push_back(point);
-  open_ = std::move(again);
-  guessed_ = false;
-  if (!open_.empty()) Ask();
+  AskMore();
+}
+
+// Guesses that were turned too far give way to random directions, and what these showed poorly is
+// looked at again along itself.
+void TangentFinder::AskMore() {
+  std::vector<Eigen::Index> open;
+  if (guessed_ && !again_) {
+    for (const Eigen::Index point : open_)
+      if (!ok_[static_cast<std::size_t>(point)]) open.push_back(point);
+    guessed_ = false;
+  }
+  if (open.empty() && !again_) {
+    again_ = guessed_ = true;
+    for (Eigen::Index point = 0; point < points_.cols(); ++point) {
+      if (!(errors_[static_cast<std::size_t>(point)] > most_error_)) continue;
+      guesses_[static_cast<std::size_t>(point)] = tangents_.col(point).data();
+      open.push_back(point);
+    }
+  }
+  open_ = std::move(open);
+  if (!open_.empty()) return Ask();
+  for (const double error : errors_) error_length_ = std::max(error_length_, error);
 }
 
 }  // namespace stellate::core

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "core/batch.h"
@@ -15,7 +16,10 @@ namespace stellate::core {
 class TangentFinder {
  public:
   // step: how far from M to look, length.
-  TangentFinder(int k, int d, double step, std::uint64_t seed);
+  // most_error: what the error_length of a point should not be above. Where it is, the point is asked
+  // about once more, along what was found.
+  TangentFinder(int k, int d, double step, std::uint64_t seed,
+                double most_error = std::numeric_limits<double>::infinity());
 
   // Points y on M, d x n; guesses one a point: K rows of d (as StarComplex::Tangent) or nullptr;
   // shares of `step` to look at, one a point, or empty: where M is known to bend more than
@@ -32,14 +36,25 @@ class TangentFinder {
   const Eigen::MatrixXd& tangents() const { return tangents_; }
   const std::vector<std::uint8_t>& ok() const { return ok_; }
 
+  // Of all that were ever found: the sine of the largest angle to the true tangent space is at most
+  // this length over the reach. The differences' ends are points of M within 2 step of y, so
+  // that none is farther from the tangent space than (2 step)^2 / 2 reach (Federer): the columns of
+  // the derivative by 2 step / reach, the span of the k directions found by sqrt(m) times that over
+  // the least singular value.
+  double error_length() const { return error_length_; }
+
  private:
   void Ask();
+  void AskMore();
   double StepAt(Eigen::Index point) const {
     return shares_.empty() ? step_ : shares_[static_cast<std::size_t>(point)] * step_;
   }
 
   int k_, d_;
-  double step_;
+  double step_, most_error_;
+  double error_length_ = 0;
+  std::vector<double> errors_;  // by point, length
+  bool again_ = false;          // the open points have tangents already
   std::uint64_t seed_;
   bool guessed_ = false;  // the open questions lie along guesses
   Eigen::MatrixXd points_, tangents_, directions_;

@@ -30,6 +30,18 @@ void ToProto(const core::Counts& counts, v1::Counts* out) {
   out->set_duplicates(counts.duplicates);
 }
 
+v1::CertificateLevel ToProto(core::CertificateLevel level) {
+  switch (level) {
+    case core::CertificateLevel::kRefused:
+      return v1::CERTIFICATE_LEVEL_REFUSED;
+    case core::CertificateLevel::kSampled:
+      return v1::CERTIFICATE_LEVEL_SAMPLED;
+    case core::CertificateLevel::kProved:
+      return v1::CERTIFICATE_LEVEL_PROVED;
+  }
+  return v1::CERTIFICATE_LEVEL_UNSPECIFIED;
+}
+
 void ToProto(const core::Certificate& c, v1::Certificate* out) {
   out->set_certified(c.certified);
   out->set_verdict(c.verdict);
@@ -54,6 +66,10 @@ void ToProto(const core::Certificate& c, v1::Certificate* out) {
   out->set_components(c.components);
   out->set_euler_characteristic(c.euler_characteristic);
   out->set_orientable(c.orientable);
+  out->set_level(ToProto(c.level));
+  out->set_declared_reach(c.declared_reach);
+  out->set_reach_refuted(c.reach_refuted);
+  out->set_proved_distance(c.proved_distance);
 }
 
 }  // namespace

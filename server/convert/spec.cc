@@ -71,6 +71,8 @@ Status ReadPlace(const v1::MeshSpec& spec, core::Specification* out) {
     if (!status.ok()) return status;
     out->seeds = MatrixFromProto(seeds, static_cast<Index>(d), static_cast<Index>(m));
   }
+  if (spec.has_declared_reach()) out->declared_reach = spec.declared_reach();
+  out->cover_box = spec.cover_box();
   const Status status = ToInt(spec.box_seeds(), "box_seeds", &out->box_seeds);
   if (!status.ok()) return status;
   return ToInt(spec.components(), "components", &out->components);
@@ -238,6 +240,8 @@ void ToProto(const core::Specification& spec, v1::MeshSpec* out) {
   out->set_box_seeds(spec.box_seeds);
   out->set_components(static_cast<std::uint32_t>(spec.components));
   out->set_audit(spec.audit == core::Audit::kThorough ? v1::AUDIT_THOROUGH : v1::AUDIT_STANDARD);
+  if (spec.declared_reach) out->set_declared_reach(*spec.declared_reach);
+  out->set_cover_box(spec.cover_box);
 }
 
 }  // namespace stellate::server

@@ -81,7 +81,9 @@ TEST(ReportJson, IsThatOfAllClients) {
       R"("fibre_samples": 0, "max_circumradius": 0.25, "max_radius_edge": 0, "min_fatness": 0, )"
       R"("min_angle_degrees": 0, "max_tangent_angle_degrees": 0, "max_barycentre_distance": 0, )"
       R"("estimated_reach": null, "epsilon_over_reach": 0, "components": 1, )"
-      R"("euler_characteristic": -8, "orientable": false}, "elapsed_seconds": 0.5, )"
+      R"("euler_characteristic": -8, "orientable": false, "level": "UNKNOWN", )"
+      R"("declared_reach": 0, "reach_refuted": false, "proved_distance": 0}, )"
+      R"("elapsed_seconds": 0.5, )"
       R"("version": "0.1.0"})");
   report.epsilon = 0;
   EXPECT_NE(ToJson(report).find("\"epsilon\": null"), std::string::npos);

@@ -168,14 +168,14 @@ class Version4 {
   }
 
  private:
-  // Without two numbers that were added since.
+  // Without what was added since: two numbers, a number that is not there, and another.
   static std::string StartOf(SessionOptions options) {
     const auto now = std::chrono::system_clock::now();
     const std::string start = EncodeStart(options, now);
     options.spec.components = 1;
     const std::string other = EncodeStart(options, now);
     const auto added = std::mismatch(start.begin(), start.end(), other.begin()).first;
-    return std::string(start.begin(), added) + std::string(added + 2 * kWord, start.end());
+    return std::string(start.begin(), added) + std::string(added + 4 * kWord, start.end());
   }
   static std::string Sealed(std::string record, const std::string& place) {
     RecordDigest digest;

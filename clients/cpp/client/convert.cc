@@ -139,6 +139,8 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   if (options.box_seeds) spec.set_box_seeds(*options.box_seeds);
   if (options.components) spec.set_components(*options.components);
   if (options.thorough_audit) spec.set_audit(v1::AUDIT_THOROUGH);
+  if (options.reach) spec.set_declared_reach(*options.reach);
+  if (options.cover_box) spec.set_cover_box(*options.cover_box);
   spec.set_random_seed(options.random_seed);
   spec.set_label(options.label);
   return spec;
@@ -208,6 +210,11 @@ Report ReportOf(const v1::Mesh& mesh) {
   out.components = c.components();
   out.euler_characteristic = c.euler_characteristic();
   out.orientable = c.orientable();
+  out.level = v1::CertificateLevel_IsValid(c.level()) ? static_cast<CertificateLevel>(c.level())
+                                                      : CertificateLevel::kUnknown;
+  out.declared_reach = c.declared_reach();
+  out.reach_refuted = c.reach_refuted();
+  out.proved_distance = c.proved_distance();
   return r;
 }
 

@@ -83,6 +83,14 @@ void AddCertificate(const Certificate& c, Lines& lines) {
                              " degrees of its tangent spaces");
   lines.Add("reach", "about " + Format("%.4g", c.estimated_reach) + ", epsilon is " +
                          Format("%.3g", c.epsilon_over_reach) + " of it");
+  if (c.declared_reach > 0) {
+    lines.Add("declared", "a reach of " + Format("%.4g", c.declared_reach) +
+                              (c.reach_refuted ? ", refuted"
+                               : c.level == CertificateLevel::kProved
+                                   ? ": within " + Format("%.3g", c.proved_distance) +
+                                         " of the manifold, proved"
+                                   : ": nothing proved from it"));
+  }
 }
 
 // A JSON object as it is written. Keys are ours and need no escaping.
@@ -165,6 +173,10 @@ std::string CertificateJson(const Certificate& c) {
   json.Add("components", c.components);
   json.Raw("euler_characteristic", std::to_string(c.euler_characteristic));
   json.Add("orientable", c.orientable);
+  json.Add("level", std::string(CertificateLevelName(c.level)));
+  json.Add("declared_reach", c.declared_reach);
+  json.Add("reach_refuted", c.reach_refuted);
+  json.Add("proved_distance", c.proved_distance);
   return json.Take();
 }
 
@@ -174,6 +186,12 @@ const char* TerminationName(Termination termination) {
   constexpr const char* kNames[] = {"UNKNOWN",   "CONVERGED",     "VERTEX_BUDGET", "ROUND_BUDGET",
                                     "CANCELLED", "ORACLE_FAILED", "NO_PROGRESS"};
   const size_t i = static_cast<size_t>(termination);
+  return i < std::size(kNames) ? kNames[i] : kNames[0];
+}
+
+const char* CertificateLevelName(CertificateLevel level) {
+  constexpr const char* kNames[] = {"UNKNOWN", "REFUSED", "SAMPLED", "PROVED"};
+  const size_t i = static_cast<size_t>(level);
   return i < std::size(kNames) ? kNames[i] : kNames[0];
 }
 
@@ -201,7 +219,9 @@ std::string ToText(const Report& report) {
   if (!report.epsilon_reason.empty()) {
     lines.Add("epsilon", Format("%g", report.epsilon) + ", " + report.epsilon_reason);
   }
-  lines.Add("certificate", c.certified ? "CERTIFIED" : "NOT CERTIFIED");
+  lines.Add("certificate", !c.certified                           ? "NOT CERTIFIED"
+                           : c.level == CertificateLevel::kProved ? "PROVED"
+                                                                  : "CERTIFIED");
   if (!c.verdict.empty()) lines.Add("verdict", c.verdict);
   if (c.components > 0) AddCertificate(c, lines);
   for (const std::string& warning : c.warnings) lines.Add("warning", warning);

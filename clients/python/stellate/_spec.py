@@ -20,7 +20,15 @@ _WHOLE = {
     FieldDescriptor.CPPTYPE_UINT64,
 }
 _CRITERIA = {field.name for field in pb.Criteria.DESCRIPTOR.fields}
-_PLAIN = {"random_seed", "label", "box_seeds", "components"}
+# Keywords, and the fields of MeshSpec that they set.
+_SPEC = {
+    "random_seed": "random_seed",
+    "label": "label",
+    "box_seeds": "box_seeds",
+    "components": "components",
+    "reach": "declared_reach",
+    "cover_box": "cover_box",
+}
 _AUDITS = {"standard": pb.AUDIT_STANDARD, "thorough": pb.AUDIT_THOROUGH}
 _LIMITS = {field.name for field in pb.MeshLimits.DESCRIPTOR.fields}
 
@@ -50,8 +58,8 @@ def mesh_spec(oracle: CheckedOracle, epsilon: float, criteria: dict[str, Any]) -
             _set(spec.criteria, name, value)
         elif name in _LIMITS:
             _set(spec.limits, name, value)
-        elif name in _PLAIN:
-            _set(spec, name, value)
+        elif name in _SPEC:
+            _set(spec, _SPEC[name], value)
         elif name == "audit":
             _set(spec, name, _audit(value))
         elif name == "seeds":
@@ -92,7 +100,7 @@ def _points(seeds: Any) -> np.ndarray:
 
 
 def _unknown(name: str) -> str:
-    known = sorted(_CRITERIA | _LIMITS | _PLAIN | {"audit", "seeds", "workers"})
+    known = sorted(_CRITERIA | _LIMITS | set(_SPEC) | {"audit", "seeds", "workers"})
     near = difflib.get_close_matches(name, known, 1)
     hint = f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(known)}"
     return f"unknown keyword {name!r}{hint}"

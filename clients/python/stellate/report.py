@@ -77,7 +77,7 @@ class Certificate:
     closed: bool  # every (k-1)-face is in exactly two simplices
     bad_faces: int
     links_are_spheres: bool
-    links_decided_exactly: bool  # k <= 3; above, by homology
+    links_decided_exactly: bool  # k <= 3, or a closed mesh whose stars embed
     bad_links: int
     inconsistent_simplices: int
     unembedded_stars: int  # stars whose projection on the tangent space overlaps itself
@@ -94,6 +94,10 @@ class Certificate:
     components: int
     euler_characteristic: int
     orientable: bool
+    level: str  # "REFUSED", "SAMPLED" or "PROVED": from the declared reach; else "UNKNOWN"
+    declared_reach: float  # 0: none
+    reach_refuted: bool  # points of the manifold contradict it; the verdict names them
+    proved_distance: float  # PROVED: bounds the Hausdorff distance to the components it meets
 
 
 @dataclasses.dataclass(frozen=True)
@@ -185,7 +189,7 @@ class Report:
             termination=_enum_name(pb.Termination, message.termination, "TERMINATION_"),
             failure=failure,
             counts=_copy_fields(Counts, message.counts),
-            certificate=_copy_fields(Certificate, message.certificate),
+            certificate=_certificate(message.certificate),
             elapsed_seconds=message.elapsed_seconds,
             epsilon=epsilon,
         )
@@ -209,7 +213,9 @@ class Report:
             lines.append(("failure", f"{self.failure.reason}: {self.failure.message}"))
         if self.epsilon_reason:
             lines.append(("epsilon", f"{self.epsilon:g}, {self.epsilon_reason}"))
-        mark = "CERTIFIED" if c.certified else "NOT CERTIFIED"
+        mark = "NOT CERTIFIED"
+        if c.certified:
+            mark = "PROVED" if c.level == "PROVED" else "CERTIFIED"
         verdict = _plain_verdict(c)
         lines.append(("certificate", f"{mark}: {verdict}" if verdict else mark))
         if c.components:
@@ -218,9 +224,15 @@ class Report:
         return "\n".join(_entry(title, text) for title, text in lines)
 
 
+def _certificate(message: pb.Certificate) -> Certificate:
+    level = _enum_name(pb.CertificateLevel, message.level, "CERTIFICATE_LEVEL_")
+    plain = _copy_fields(Certificate, message)
+    return dataclasses.replace(plain, level="UNKNOWN" if level == "UNSPECIFIED" else level)
+
+
 def _plain_verdict(c: Certificate) -> str:
     """Without the word that says whether it is certified."""
-    return re.sub(r"^(not )?certified\W+", "", c.verdict, flags=re.IGNORECASE)
+    return re.sub(r"^((not )?certified|proved)\W+", "", c.verdict, flags=re.IGNORECASE)
 
 
 def _for_json(value: Any) -> Any:
@@ -254,7 +266,7 @@ def _certificate_lines(c: Certificate) -> list[tuple[str, str]]:
     shape += f"; smallest fatness {c.min_fatness:.3g}"
     if c.min_angle_degrees > 0:
         shape += f", angle {c.min_angle_degrees:.1f} degrees"
-    return [
+    lines = [
         ("topology", f"{components}, Euler characteristic {c.euler_characteristic}, {orientable}"),
         ("manifold", f"{closed}; {links}"),
         (
@@ -271,3 +283,11 @@ def _certificate_lines(c: Certificate) -> list[tuple[str, str]]:
         ),
         ("reach", f"about {c.estimated_reach:.4g}, epsilon is {c.epsilon_over_reach:.3g} of it"),
     ]
+    if c.declared_reach > 0:
+        what = ": nothing proved from it"
+        if c.reach_refuted:
+            what = ", refuted"
+        elif c.level == "PROVED":
+            what = f": within {c.proved_distance:.3g} of the manifold, proved"
+        lines.append(("declared", f"a reach of {c.declared_reach:.4g}{what}"))
+    return lines

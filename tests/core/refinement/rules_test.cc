@@ -209,7 +209,7 @@ void ExpectConsistencyByDefinition(const Sample& sample, double sliver_bound) {
       }
     }
     EXPECT_EQ(CountInconsistent<K>(*complex, p), expected) << "star " << p;
-    const auto got = WorstSliverOrInconsistent<K>(*complex, p, sliver_bound);
+    const auto got = WorstSliverOrInconsistent<K>(*complex, p, {sliver_bound});
     if (!complex->cell(p).bounded()) {  // R1's, not yet to be judged by others
       EXPECT_FALSE(got) << "star " << p;
       inconsistent += expected > 0;
@@ -260,12 +260,13 @@ void ExpectBadCountedRightly(const std::string& name, double epsilon) {
   for (std::uint32_t c = 0; c < candidates.size(); ++c) {
     const double* point = candidates.Point(c);
     complex->TryPoint(point, candidates.Tangent(c), StarComplex<K>::kNone, scratch, &tentative);
-    const int count = CountBad<K>(*complex, point, tentative, 0, epsilon, 1'000'000);
+    const int count = CountBad<K>(*complex, point, tentative, {}, epsilon, 1'000'000);
     for (const int enough : {0, 1, 2})
-      EXPECT_EQ(CountBad<K>(*complex, point, tentative, 0, epsilon, enough),
+      EXPECT_EQ(CountBad<K>(*complex, point, tentative, {}, epsilon, enough),
                 std::min(count, enough));
     // A bound that every new simplex fails counts no fewer.
-    EXPECT_GE(CountBad<K>(*complex, point, tentative, K >= 2 ? 0.3 : 0, epsilon, 1'000'000), count);
+    const ShapeBounds thick{K >= 2 ? 0.3 : 0};
+    EXPECT_GE(CountBad<K>(*complex, point, tentative, thick, epsilon, 1'000'000), count);
 
     Sample grown = mesh;
     grown.points.insert(grown.points.end(), point, point + mesh.d);

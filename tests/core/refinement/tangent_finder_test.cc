@@ -125,6 +125,25 @@ TEST_P(TangentFinderTest, RecoversFromGuessesThatAreFarOff) {
   EXPECT_EQ(asked, kPoints * 2 * (k_ + std::min(k_ + 4, d_)));
 }
 
+// The bound holds for the true reach, and what random directions show poorly is looked at again.
+TEST_P(TangentFinderTest, BoundsWhatItMayBeWrongBy) {
+  const double reach = manifold_->facts().reach.value_or(0);
+  if (reach == 0) return SUCCEED();
+  finder_.Start(points_, std::vector<const double*>(kPoints, nullptr));
+  Finish();
+  const double poor = finder_.error_length();
+  for (std::uint32_t i = 0; i < kPoints; ++i) EXPECT_LE(Error(i), poor / reach) << "point " << i;
+  const double most = 3 * kStep * std::sqrt(k_);
+  finder_ = TangentFinder(k_, d_, kStep, 1, most);
+  finder_.Start(points_, std::vector<const double*>(kPoints, nullptr));
+  Finish();
+  ExpectAllFound();
+  EXPECT_LE(finder_.error_length(), most);
+  EXPECT_GT(finder_.error_length(), 0);
+  for (std::uint32_t i = 0; i < kPoints; ++i)
+    EXPECT_LE(Error(i), finder_.error_length() / reach) << "point " << i;
+}
+
 TEST_P(TangentFinderTest, SaysWhereAnswersWereMissing) {
   finder_.Start(points_, std::vector<const double*>(kPoints, nullptr));
   const Eigen::Index each = 2 * std::min(k_ + 4, d_);

@@ -64,6 +64,11 @@ struct MeshOptions {
   std::optional<std::uint32_t> box_seeds;
   std::optional<std::uint32_t> components;  // that M has at least; with fewer it is not certified
   bool thorough_audit = false;  // ask about every vertex and every simplex before certifying
+  // A promise: the manifold's reach is at least this length. The mesh is refined until the promise
+  // proves its topology, or is refuted; see docs/proof.md.
+  std::optional<double> reach;
+  // Look for every component in the bounding box, which `reach` makes finite.
+  std::optional<bool> cover_box;
 
   std::optional<double> radius_edge_bound;    // rho0 of rule R2
   std::optional<double> sliver_bound;         // Theta0 of rule R3

@@ -49,6 +49,15 @@ struct Counts {
   std::uint64_t duplicates = 0;  // answers that fell on an existing sample point
 };
 
+// How far a certificate goes.
+enum class CertificateLevel {
+  kUnknown,  // of a server that knows no levels
+  kRefused,
+  kSampled,  // every check passed; some look at samples of the manifold
+  kProved,   // and if its reach is as declared, the mesh is isotopic to the components it meets
+};
+const char* CertificateLevelName(CertificateLevel level);  // "PROVED", ...
+
 // What the server computed from the finished complex. Lengths are in the coordinates' unit.
 struct Certificate {
   bool certified = false;  // every claim holds and the run converged
@@ -58,7 +67,7 @@ struct Certificate {
   bool closed = false;  // each (k-1)-face is in exactly two simplices
   std::uint64_t bad_faces = 0;
   bool links_are_spheres = false;
-  bool links_decided_exactly = false;  // k <= 3; above, by homology
+  bool links_decided_exactly = false;  // k <= 3, or a closed mesh whose stars embed
   std::uint64_t bad_links = 0;
   std::uint64_t inconsistent_simplices = 0;
   std::uint64_t unembedded_stars =
@@ -78,6 +87,11 @@ struct Certificate {
   std::uint64_t components = 0;
   std::int64_t euler_characteristic = 0;
   bool orientable = false;
+
+  CertificateLevel level = CertificateLevel::kUnknown;
+  double declared_reach = 0;   // MeshOptions::reach; 0: none
+  bool reach_refuted = false;  // points of the manifold contradict it; the verdict names them
+  double proved_distance = 0;  // kProved: a bound of the Hausdorff distance to these components
 };
 
 struct Report {
