@@ -52,11 +52,12 @@ def changelog(package: str) -> str:
 
 class Advisories(unittest.TestCase):
     def test_the_versions_are_those_that_were_looked_at(self) -> None:
+        """But for Debian's own updates of them, whose changelogs the next test but one reads."""
         there = installed()
         for entry in packages():
             for package, version in there.get(entry["source"], []):
                 self.assertEqual(
-                    version, entry["version"],
+                    version.partition("+deb12u")[0], entry["version"].partition("+deb12u")[0],
                     f"{package} has moved: see docker/advisories.toml for what to look at again",
                 )  # fmt: skip
             self.assertIn(entry["source"], there, "nothing of it is shipped any more")
