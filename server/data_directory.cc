@@ -149,7 +149,12 @@ core::Expected<std::unique_ptr<JournalFile>> DataDirectory::TakeJournal() const 
   auto file = OpenJournal();
   if (!file) return file;
   // A copy of the file alone has no mark, and that of a server that was killed may lag.
-  status = JournalMark::Make(mark(), (*file)->mark_state());
+  // Made beside its place too: a server that fails here, or is killed, leaves the one that was.
+  const std::string draft = Message(path_, "/mark.new");
+  status = JournalMark::Make(draft, (*file)->mark_state());
+  if (status.ok() && std::rename(draft.c_str(), mark().c_str()) != 0) {
+    status = Unusable(Message("cannot make ", mark(), ": ", std::strerror(errno)));
+  }
   auto beside = JournalMark::Open(mark());
   if (status.ok() && !beside) status = std::move(beside.error());
   if (!status.ok()) return tl::unexpected(std::move(status));

@@ -39,7 +39,7 @@ std::atomic<int> calls{0};  // NOLINT
 
 bool IsOurs(const char* path) {
   return !plan.directory.empty() && std::string_view(path).starts_with(plan.directory) &&
-         std::string_view(path).find("/journal") != std::string_view::npos;
+         std::string_view(path).size() > plan.directory.size();
 }
 
 bool IsOurs(int file) {
