@@ -19,10 +19,10 @@ enum class QueryKind {
 // n x d x k in C order, so conversion is a copy.
 struct QueryBlock {
   QueryKind kind = QueryKind::kClosestPoint;
-  Eigen::MatrixXd points;  // d x n: x, or the flat's point c
-  Eigen::MatrixXd bases;   // (d k) x n, kIntersectFlat only: entry i*k + a of a column is
-                           // coordinate i of tangent vector a; orthonormal
-  Eigen::VectorXd radii;   // n, kIntersectFlat only: look no farther than this from c
+  Eigen::MatrixXd points;      // d x n: x, or the flat's point c
+  Eigen::MatrixXd bases;       // (d k) x n, kIntersectFlat only: entry i*k + a of a column is
+                               // coordinate i of tangent vector a; orthonormal
+  Eigen::VectorXd radii;       // n, kIntersectFlat only: look no farther than this from c
   bool want_tangents = false;  // the answers must carry tangent bases
   bool want_sizes = false;     // ... and local sizes
 

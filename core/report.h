@@ -27,16 +27,16 @@ const char* PhaseName(Phase p);  // "SEEDING", ...
 // A cheap picture of a running mesh. After the last round it is final.
 struct Progress {
   Phase phase = Phase::kSeeding;
-  std::uint64_t round = 0;       // batches absorbed
-  std::uint64_t queries = 0;     // answered so far
+  std::uint64_t round = 0;    // batches absorbed
+  std::uint64_t queries = 0;  // answered so far
   std::uint64_t vertices = 0;
   std::uint64_t simplices = 0;
-  std::uint64_t unbounded_stars = 0;  // stars on the advancing front
-  std::uint64_t bad_size = 0;         // stars with a simplex that breaks R1
-  std::uint64_t bad_radius_edge = 0;  // ... R2
-  std::uint64_t bad_sliver = 0;       // ... R3
-  std::uint64_t bad_inconsistent = 0; // ... R4; R3 and R4 are counted once R1 and R2 hold
-  double fraction = 0;                // estimated share of the work done, 0..1
+  std::uint64_t unbounded_stars = 0;   // stars on the advancing front
+  std::uint64_t bad_size = 0;          // stars with a simplex that breaks R1
+  std::uint64_t bad_radius_edge = 0;   // ... R2
+  std::uint64_t bad_sliver = 0;        // ... R3
+  std::uint64_t bad_inconsistent = 0;  // ... R4; R3 and R4 are counted once R1 and R2 hold
+  double fraction = 0;                 // estimated share of the work done, 0..1
 };
 
 // What changed in one round. Vertex ids count up from 0 and never change. While the mesh grows, a
@@ -44,22 +44,22 @@ struct Progress {
 // is the union of the stars. For k >= 4 the last delta may put other simplices in the place of the
 // few that stars still disagree about (core/complex/cavities.h).
 struct MeshDelta {
-  std::uint64_t revision = 0;      // 1, 2, ...: one a round
-  std::uint64_t first_vertex = 0;  // id of the first new vertex
-  Eigen::MatrixXd points;          // d x (new vertices)
+  std::uint64_t revision = 0;                 // 1, 2, ...: one a round
+  std::uint64_t first_vertex = 0;             // id of the first new vertex
+  Eigen::MatrixXd points;                     // d x (new vertices)
   std::vector<std::uint32_t> added, removed;  // simplices, k+1 ascending vertex ids each
 };
 
 struct Counts {
   std::uint64_t vertices = 0, simplices = 0;
-  std::uint64_t rounds = 0;             // batches asked, certificate included
-  std::uint64_t queries = 0;            // closest points and intersections, tangents excluded
-  std::uint64_t tangent_queries = 0;    // closest points spent on finding tangent bases
-  std::uint64_t inserted_size = 0;         // points inserted by rule R1 (the front included)
-  std::uint64_t inserted_radius_edge = 0;  // R2
-  std::uint64_t inserted_sliver = 0;       // R3
-  std::uint64_t inserted_inconsistent = 0; // R4
-  std::uint64_t duplicates = 0;            // answers that fell on an existing sample point
+  std::uint64_t rounds = 0;                 // batches asked, certificate included
+  std::uint64_t queries = 0;                // closest points and intersections, tangents excluded
+  std::uint64_t tangent_queries = 0;        // closest points spent on finding tangent bases
+  std::uint64_t inserted_size = 0;          // points inserted by rule R1 (the front included)
+  std::uint64_t inserted_radius_edge = 0;   // R2
+  std::uint64_t inserted_sliver = 0;        // R3
+  std::uint64_t inserted_inconsistent = 0;  // R4
+  std::uint64_t duplicates = 0;             // answers that fell on an existing sample point
 };
 
 // How far a certificate goes.
@@ -76,27 +76,28 @@ struct Certificate {
   std::string verdict;                // plain words; the first thing wrong if not certified
   std::vector<std::string> warnings;  // plain words; may be non-empty on a certified mesh
 
-  bool closed = false;                   // each (k-1)-face is in exactly two simplices
+  bool closed = false;  // each (k-1)-face is in exactly two simplices
   std::uint64_t bad_faces = 0;
-  bool links_are_spheres = false;        // each vertex link is a (k-1)-sphere
-  bool links_decided_exactly = false;    // k <= 3, or a closed mesh whose stars embed; k = 4 also
-                                         // where the links' fundamental groups and homology do
+  bool links_are_spheres = false;      // each vertex link is a (k-1)-sphere
+  bool links_decided_exactly = false;  // k <= 3, or a closed mesh whose stars embed; k = 4 also
+                                       // where the links' fundamental groups and homology do
   std::uint64_t bad_links = 0;
   std::uint64_t inconsistent_simplices = 0;  // in a star but not in all its vertices' stars
-  std::uint64_t unembedded_stars = 0;  // stars whose projection on the tangent space overlaps itself
-  std::uint64_t fibre_failures = 0;    // sampled normal flats that do not meet the mesh once nearby
+  std::uint64_t unembedded_stars =
+      0;                             // stars whose projection on the tangent space overlaps itself
+  std::uint64_t fibre_failures = 0;  // sampled normal flats that do not meet the mesh once nearby
   std::uint64_t fibre_samples = 0;
 
   std::uint64_t answers_held = 0;  // answers of the whole run, beside vertices, that were held
                                    // against the mesh
 
-  double max_circumradius = 0;        // max R_p(sigma), length
-  double max_radius_edge = 0;         // max rho, no unit
-  double min_fatness = 0;             // min Theta of the k-simplices, no unit
-  double min_angle_degrees = 0;       // k = 2: smallest triangle angle; else 0
+  double max_circumradius = 0;           // max R_p(sigma), length
+  double max_radius_edge = 0;            // max rho, no unit
+  double min_fatness = 0;                // min Theta of the k-simplices, no unit
+  double min_angle_degrees = 0;          // k = 2: smallest triangle angle; else 0
   double max_tangent_angle_degrees = 0;  // largest angle of a simplex to its vertices' tangents
-  double max_barycentre_distance = 0;  // to M, length
-  double estimated_reach = 0;          // length; an estimate from above
+  double max_barycentre_distance = 0;    // to M, length
+  double estimated_reach = 0;            // length; an estimate from above
   double epsilon_over_reach = 0;  // graded sizes: the largest R_p over the local feature size
 
   // Where the client declared a reach (Specification::declared_reach), else 0.

@@ -118,8 +118,8 @@ Status CheckSeeds(const Specification& spec) {
 
 // Seeds that cover a box lie in the middle of cells whose corners are this share of the reach away,
 // and a little off it, so that symmetric manifolds have none on their axes: oracles divide by zero
-// there. By that share of a cell at most, which adds twice as much of the distance to a corner: less
-// than a whole reach is left.
+// there. By that share of a cell at most, which adds twice as much of the distance to a corner:
+// less than a whole reach is left.
 constexpr double kCoverShare = 0.97;
 constexpr double kOffMiddle = 0.01;
 

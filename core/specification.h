@@ -17,11 +17,11 @@ inline constexpr int kDefaultBoxSeeds = 100;       // points drawn from the box 
 inline constexpr double kMinLength = 1e-45;
 inline constexpr double kMaxLength = 1e45;
 
-inline constexpr double kMaxSliverBound = 0.3;   // refinement does not terminate above
+inline constexpr double kMaxSliverBound = 0.3;  // refinement does not terminate above
 inline constexpr int kMaxCandidates = 100;
 inline constexpr int kMaxFlatAlternations = 20;
 inline constexpr int kMaxBoxSeeds = 100'000;
-inline constexpr int kMaxComponents = 1'000'000;  // that may be declared
+inline constexpr int kMaxComponents = 1'000'000;                   // that may be declared
 inline constexpr std::int64_t kMaxBoxSeedCoordinates = 4'000'000;  // box_seeds times d
 
 // What the client's oracle can do beyond closest_point, which it must have (Sec. 5.3.1).
@@ -45,24 +45,24 @@ enum class Judging {
 // The constants of Chapter 5. The proofs' values are far too small to use; the defaults here are
 // the measured ones. nullopt means "the default for this k".
 struct Criteria {
-  double radius_edge_bound = 2.0;            // rho0 of rule R2, no unit, > 1
-  std::optional<double> sliver_bound;        // Theta0 of rule R3, no unit, in [0, 0.3]; 0 turns R3
-                                             // off. Default 0 for k <= 2; 0.2, 0.15, 0.1 for
-                                             // k = 3, 4, 5
-  double picking_radius = 0.4;               // delta: the picking region is B(c_p, delta R_p); in
-                                             // (0, 1)
-  double small_sliver_radius = 2.0;          // beta: only simplices of circumradius <= beta R_p
-                                             // count against a candidate; >= 1
-  std::optional<int> candidates;             // points tried in a picking region, 1..100. Default 1
-                                             // for k <= 2, 10 for k >= 3
-  std::optional<double> advance_step;        // h, length: how far the front steps over unknown
-                                             // ground. Default 3 epsilon, or a tenth of the
-                                             // bounding box's diagonal if that is more
-  std::optional<Judging> judging;            // default kFlats for k <= 2 and for graded sizes, else
-                                             // kCommonCentre
-  bool ask_ahead = false;                    // rehearse on a guess of M first and ask for all that
-                                             // it wants at once: a handful of round trips for
-                                             // two to three times the processor time
+  double radius_edge_bound = 2.0;      // rho0 of rule R2, no unit, > 1
+  std::optional<double> sliver_bound;  // Theta0 of rule R3, no unit, in [0, 0.3]; 0 turns R3
+                                       // off. Default 0 for k <= 2; 0.2, 0.15, 0.1 for
+                                       // k = 3, 4, 5
+  double picking_radius = 0.4;         // delta: the picking region is B(c_p, delta R_p); in
+                                       // (0, 1)
+  double small_sliver_radius = 2.0;    // beta: only simplices of circumradius <= beta R_p
+                                       // count against a candidate; >= 1
+  std::optional<int> candidates;       // points tried in a picking region, 1..100. Default 1
+                                       // for k <= 2, 10 for k >= 3
+  std::optional<double> advance_step;  // h, length: how far the front steps over unknown
+                                       // ground. Default 3 epsilon, or a tenth of the
+                                       // bounding box's diagonal if that is more
+  std::optional<Judging> judging;      // default kFlats for k <= 2 and for graded sizes, else
+                                       // kCommonCentre
+  bool ask_ahead = false;              // rehearse on a guess of M first and ask for all that
+                                       // it wants at once: a handful of round trips for
+                                       // two to three times the processor time
   // Adaptive size: where the mesh must be finer than epsilon, which stays the upper bound. Both go
   // by size(p), p a vertex:
   // - what the client says of p, where OracleCapabilities::local_size: its local feature size or
@@ -72,12 +72,12 @@ struct Criteria {
   // - else the local feature size that the sample shows: the smallest |q - p|^2 / (2 dist(q, T_pM))
   //   over a star, made 1-Lipschitz over neighbours. It sees curvature, not another sheet coming
   //   near, and is never finer than epsilon / 64, since noise in the answers looks like curvature.
-  std::optional<double> size_rate;           // R_p <= size_rate * size(p), no unit, in (0, 1]
-  std::optional<double> max_deviation;       // the Hausdorff target, a length, > 0: R_p^2 / (2
-                                             // size(p)), the circumcentre's distance to M, stays
-                                             // below it
-  int flat_alternations = 1;                 // without intersect_flat: closest points taken when
-                                             // alternating towards a flat, 1..20
+  std::optional<double> size_rate;      // R_p <= size_rate * size(p), no unit, in (0, 1]
+  std::optional<double> max_deviation;  // the Hausdorff target, a length, > 0: R_p^2 / (2
+                                        // size(p)), the circumcentre's distance to M, stays
+                                        // below it
+  int flat_alternations = 1;            // without intersect_flat: closest points taken when
+                                        // alternating towards a flat, 1..20
 };
 
 // How much a certificate asks of the oracle.
@@ -109,7 +109,7 @@ struct Specification {
   // Seeds are laid so densely into the box that every component of M in it is found, which the
   // declared reach makes finite: CoverOfBox. Needs both, and no seeds.
   bool cover_box = false;
-  std::uint64_t random_seed = 1;            // of everything random
+  std::uint64_t random_seed = 1;  // of everything random
   Criteria criteria;
   Audit audit = Audit::kStandard;
   Limits limits;

@@ -61,7 +61,9 @@ class StandingWorker:
 
     def _serve(self, name: str) -> None:
         try:
-            print(f"{name}: {self._client.serve(self._oracle, name, worker=self._name)}", flush=True)
+            print(
+                f"{name}: {self._client.serve(self._oracle, name, worker=self._name)}", flush=True
+            )
         except stellate.StellateError as error:
             # It ended, or the server did; the next look tells which.
             print(f"{name}: {error}", flush=True)
@@ -103,8 +105,8 @@ def make(client: stellate.Client, label: str, oracle: Any, epsilon: float) -> in
     """Declares a mesh for the standing workers and waits for its end."""
     info = client.create(oracle, epsilon, label=label)
     last = None
-    for last in stellate.watch(info.name, server=client):
-        pass
+    for progress in stellate.watch(info.name, server=client):
+        last = progress
     assert last is not None and last.report is not None
     print(last.report)
     return 0 if last.certified else 1

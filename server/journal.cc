@@ -46,9 +46,8 @@ core::Expected<std::unique_ptr<Journal>> Journal::Open(const JournalOptions& opt
   const auto stored = file.TakeMeshes();
   std::map<std::int64_t, std::uint64_t> bytes;
   for (const auto& [id, mesh] : stored) bytes[id] = file.BytesOf(id);
-  std::unique_ptr<Journal> journal(
-      new Journal(std::make_shared<SharedJournal>(std::move(*directory), std::move(*opened)),
-                  options));
+  std::unique_ptr<Journal> journal(new Journal(
+      std::make_shared<SharedJournal>(std::move(*directory), std::move(*opened)), options));
   for (const auto& [id, mesh] : stored) {
     if (journal->Take(id, mesh, bytes[id])) continue;
     return core::Refuse(core::StatusCode::kFailedPrecondition,
@@ -72,10 +71,10 @@ std::optional<Refused> Journal::RefuseNewMesh(const std::string& owner, std::uin
   };
   if (options_.owner_bytes > 0 && !owner.empty() &&
       file_->OwnerBytes(owner) + bytes > options_.owner_bytes) {
-    return refuse("owner-journal-bytes", options_.owner_bytes, "owner",
-                  Message("the records of your meshes have ", file_->OwnerBytes(owner),
-                          " bytes of the ", options_.owner_bytes,
-                          " that the server allows each owner"));
+    return refuse(
+        "owner-journal-bytes", options_.owner_bytes, "owner",
+        Message("the records of your meshes have ", file_->OwnerBytes(owner), " bytes of the ",
+                options_.owner_bytes, " that the server allows each owner"));
   }
   const std::uint64_t total = file_->TotalBytes();
   const std::uint64_t size = total + total / kOverhead + kEmptyFile;

@@ -80,8 +80,9 @@ std::optional<Refused> MemoryBudget::Check(const std::string& owner, std::uint64
     return Refused(
         {setting, Message(limit), scope},
         Message(whose, meshes ? " meshes" : " watchers, downloads and workers",
-                " would hold about ", sum, " bytes, this one ", bytes, " of them, but the server allows ", whom,
-                Share(limit), meshes ? "" : Message(", a part of --", setting), ": ",
+                " would hold about ", sum, " bytes, this one ", bytes,
+                " of them, but the server allows ", whom, Share(limit),
+                meshes ? "" : Message(", a part of --", setting), ": ",
                 meshes ? "delete meshes that are no longer needed, ask for a larger epsilon or "
                          "fewer vertices"
                        : "end those that are not needed",

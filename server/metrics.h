@@ -32,7 +32,7 @@ class Metrics {
 
   // Oracle streams: a chunk was answered, `seconds` after it was sent.
   void Answered(double seconds);
-  void Refused();  // a call came without a good token
+  void Refused();                                 // a call came without a good token
   void LimitReached(const std::string& setting);  // a call was refused by that limit
   // Bytes of messages on streams, before compression and framing.
   void Received(std::size_t bytes);

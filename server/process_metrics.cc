@@ -67,8 +67,8 @@ std::optional<double> ProcessorSeconds() {
 std::optional<double> OpenFiles() {
   std::error_code error;
   double count = 0;
-  for (std::filesystem::directory_iterator file("/proc/self/fd", error), end;
-       !error && file != end; file.increment(error)) {
+  for (std::filesystem::directory_iterator file("/proc/self/fd", error), end; !error && file != end;
+       file.increment(error)) {
     ++count;
   }
   if (error) return {};
@@ -93,8 +93,10 @@ MetricFamily BuildInfo() {
   prometheus::ClientMetric metric;
   metric.label = {{"version", Version()}, {"grpc", grpc::Version()}, {"compiler", __VERSION__}};
   metric.gauge.value = 1;
-  return {"stellate_build_info", "1; the labels say what this server is built of",
-          MetricType::Gauge, {std::move(metric)}};
+  return {"stellate_build_info",
+          "1; the labels say what this server is built of",
+          MetricType::Gauge,
+          {std::move(metric)}};
 }
 
 }  // namespace

@@ -197,10 +197,9 @@ class Server::Impl {
   Status OpenJournal() {
     const Config& config = service.config;
     if (config.data_dir.empty()) return Status::Ok();
-    const std::uint64_t share =
-        config.owner_journal_bytes > 0
-            ? config.owner_journal_bytes
-            : DefaultOwnerBytes(config.data_dir, config.max_journal_bytes);
+    const std::uint64_t share = config.owner_journal_bytes > 0
+                                    ? config.owner_journal_bytes
+                                    : DefaultOwnerBytes(config.data_dir, config.max_journal_bytes);
     auto journal = Journal::Open({config.data_dir, config.max_journal_bytes, share});
     if (!journal) return std::move(journal.error());
     service.journal = std::move(*journal);

@@ -140,9 +140,7 @@ Status TlsFiles::TakeOver(const Texts& texts) {
   return Status::Ok();
 }
 
-std::string TlsFiles::PathOf(File file) const {
-  return Message("/proc/self/fd/", copies_[file]);
-}
+std::string TlsFiles::PathOf(File file) const { return Message("/proc/self/fd/", copies_[file]); }
 
 void TlsFiles::Reload(bool force) {
   if (paths_[kCertificate].empty()) return;

@@ -149,8 +149,8 @@ class WatchLog {
 
   // The appending thread's own: simplices alive now, in a list for each vertex that is the lowest
   // of any. A list is no longer than a star is large.
-  std::vector<std::uint32_t> first_of_;  // by vertex
-  GrowingRows<std::uint32_t> next_;      // by simplex
+  std::vector<std::uint32_t> first_of_;            // by vertex
+  GrowingRows<std::uint32_t> next_;                // by simplex
   std::atomic<std::uint64_t> appenders_bytes_{0};  // of these two, for others to know
 };
 

@@ -65,13 +65,15 @@ MeshCommand::MeshCommand(CLI::App& parent)
   for (const MeshSetting& setting : CriteriaSettings()) Add(criteria, setting, &options_);
   command_->add_flag("--closest-point-only", closest_point_only_,
                      "offer neither flat intersections nor tangent bases");
-  command_->add_option("--audit",
-                       [this](const CLI::results_t& given) {
-                         options_.thorough_audit = given.back() == "thorough";
-                         return true;
-                       },
-                       "how much is asked before certifying: standard, or thorough, which is about "
-                       "every vertex and every simplex")
+  command_
+      ->add_option(
+          "--audit",
+          [this](const CLI::results_t& given) {
+            options_.thorough_audit = given.back() == "thorough";
+            return true;
+          },
+          "how much is asked before certifying: standard, or thorough, which is about "
+          "every vertex and every simplex")
       ->check(CLI::IsMember({"standard", "thorough"}))
       ->type_name("LEVEL")
       ->default_str("standard");

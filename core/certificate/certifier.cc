@@ -164,10 +164,11 @@ class Certifier::Impl {
     if (certificate_.components < static_cast<std::uint64_t>(spec_.components)) {
       findings_.Refuse(
           Findings::kComponents,
-          Message("the mesh has ", certificate_.components,
-                  certificate_.components == 1 ? " component" : " components", " where ",
-                  spec_.components,
-                  " were declared: give a seed on each, or a smaller epsilon if two came out as one"));
+          Message(
+              "the mesh has ", certificate_.components,
+              certificate_.components == 1 ? " component" : " components", " where ",
+              spec_.components,
+              " were declared: give a seed on each, or a smaller epsilon if two came out as one"));
     }
     if (!certificate_.closed) {
       findings_.Refuse(
@@ -251,9 +252,9 @@ class Certifier::Impl {
     const double reach = *spec_.declared_reach;
     declared_.emplace(
         mesh_, ReachClaim{reach, std::asin(std::min(1.0, facts_.tangent_error_length / reach))});
-    if (std::isfinite(stars.reach)) declared_->HoldAgainstEdge(stars.narrowest_p, stars.narrowest_q);
-    if (certificate_.closed && stars.unembedded_stars == 0)
-      declared_->Prove(*adjacency_, shape_);
+    if (std::isfinite(stars.reach))
+      declared_->HoldAgainstEdge(stars.narrowest_p, stars.narrowest_q);
+    if (certificate_.closed && stars.unembedded_stars == 0) declared_->Prove(*adjacency_, shape_);
   }
 
   void Ask(Role role, Eigen::MatrixXd points, bool want_tangents = false) {
@@ -557,10 +558,10 @@ class Certifier::Impl {
     }
     if (evidence.uncovered.empty()) return;
     const Eigen::VectorXd y = Eigen::Map<const Eigen::VectorXd>(uncovered_.data(), mesh_.d);
-    findings_.Refuse(Findings::kCoverage,
-                     Message("the mesh misses a part of the manifold: the oracle answered with ",
-                             NamePoint(y), ", and no vertex is near; answers like it: ",
-                             evidence.uncovered.size()));
+    findings_.Refuse(
+        Findings::kCoverage,
+        Message("the mesh misses a part of the manifold: the oracle answered with ", NamePoint(y),
+                ", and no vertex is near; answers like it: ", evidence.uncovered.size()));
   }
 
   // Where M was seen narrow: at a vertex, and how far from there the other side is.
@@ -587,24 +588,27 @@ class Certifier::Impl {
     if (ratio > kCoarse) {
       findings_.Refuse(
           Findings::kReach,
-          Message("too coarse to trust: ",
-                  TooCoarse(ratio, reach_, Message("near vertex ", narrowest_.vertex, " at ",
-                                                   NamePoint(Vertex(narrowest_.vertex)))),
-                  narrowest_.across < kThin * size_
-                      ? Message(". Two points of it there are only ", Brief(narrowest_.across),
-                                " apart: if nothing so thin should be there, check the dimension (a "
-                                "wall is no surface, a wire no curve)")
-                      : std::string()));
+          Message(
+              "too coarse to trust: ",
+              TooCoarse(ratio, reach_,
+                        Message("near vertex ", narrowest_.vertex, " at ",
+                                NamePoint(Vertex(narrowest_.vertex)))),
+              narrowest_.across < kThin * size_
+                  ? Message(". Two points of it there are only ", Brief(narrowest_.across),
+                            " apart: if nothing so thin should be there, check the dimension (a "
+                            "wall is no surface, a wire no curve)")
+                  : std::string()));
     }
     if (spec_.criteria.max_deviation &&
         certificate_.max_barycentre_distance > *spec_.criteria.max_deviation) {
       findings_.Refuse(
           Findings::kDeviation,
-          Message("a barycentre lies ", Brief(certificate_.max_barycentre_distance),
-                  " from the manifold, more than max_deviation = ",
-                  Brief(*spec_.criteria.max_deviation),
-                  ": the manifold bends more there than the vertices show; take epsilon smaller, or "
-                  "max_deviation"));
+          Message(
+              "a barycentre lies ", Brief(certificate_.max_barycentre_distance),
+              " from the manifold, more than max_deviation = ",
+              Brief(*spec_.criteria.max_deviation),
+              ": the manifold bends more there than the vertices show; take epsilon smaller, or "
+              "max_deviation"));
     }
   }
 
@@ -641,7 +645,7 @@ class Certifier::Impl {
   double reach_ = 0;
   Narrow narrowest_;
   double coarseness_ = 0;
-  double position_error_ = 0;  // of the oracle, as seen at the vertices
+  double position_error_ = 0;         // of the oracle, as seen at the vertices
   std::vector<double> longest_edge_;  // by vertex
   double size_ = 0;                   // the mesh's own: its largest circumradius, epsilon at most
   std::vector<std::uint32_t> chosen_simplices_, chosen_vertices_;

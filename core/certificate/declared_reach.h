@@ -37,7 +37,7 @@ class DeclaredReach {
 
  private:
   struct Witness {
-    double reach = 0;         // no larger, if positions and tangents are exact
+    double reach = 0;             // no larger, if positions and tangents are exact
     double length = 0, away = 0;  // of Contradicts, lengths
     std::string text;
   };

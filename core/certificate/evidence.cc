@@ -64,8 +64,8 @@ class Holder {
       evidence->vertex = v;
       evidence->distance = distance;
     });
-    if (self == kNobody && !(nearest <= kCoverageShare * kCoverageShare * nearest_size *
-                                            nearest_size))
+    if (self == kNobody &&
+        !(nearest <= kCoverageShare * kCoverageShare * nearest_size * nearest_size))
       evidence->uncovered.push_back(index);
   }
 

@@ -43,8 +43,8 @@ class Findings {
   void Refuse(Subject subject, std::string problem);
   void Warn(std::string warning) { warnings_.push_back(std::move(warning)); }
 
-  // A theorem about this mesh, in plain words, that holds if nothing refuses it. `covered`: it knows
-  // every component of M.
+  // A theorem about this mesh, in plain words, that holds if nothing refuses it. `covered`: it
+  // knows every component of M.
   void Prove(std::string theorem, bool covered) {
     theorem_ = std::move(theorem);
     covered_ = covered;

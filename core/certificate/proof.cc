@@ -78,8 +78,7 @@ class AngleCondition {
   Extent Decide() const {
     std::vector<Extent> parts(ChunkCount(list_.size()));
     ParallelChunks(list_.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
-      for (std::size_t s = begin; s < end; ++s)
-        Judge(static_cast<std::uint32_t>(s), &parts[chunk]);
+      for (std::size_t s = begin; s < end; ++s) Judge(static_cast<std::uint32_t>(s), &parts[chunk]);
     });
     Extent all;
     for (const Extent& part : parts) all.Take(part);
@@ -90,7 +89,8 @@ class AngleCondition {
   void Judge(std::uint32_t s, Extent* part) const {
     const double jung = jung_ * shape_.diameters[s] * (1 + kFloatMargin);
     const double tilt = shape_.tilts[s] * (1 + kFloatMargin);
-    const bool easy = tilt < 1 && Holds(std::asin(std::sqrt(tilt)), LargestTurn(jung, claim_.reach));
+    const bool easy =
+        tilt < 1 && Holds(std::asin(std::sqrt(tilt)), LargestTurn(jung, claim_.reach));
     if (easy && jung <= part->rho) return;
     const Corners corners = CornersOf(mesh_, list_[s]);
     const SimplexFrame frame = FrameSimplex(corners.vertices(), mesh_.d);
@@ -126,7 +126,8 @@ double DistanceAtLeast(const double* p, const Corners& corners, int d) {
   const int n = static_cast<int>(corners.count);
   std::vector<double> offsets(static_cast<std::size_t>(n * d));
   for (int i = 0; i < n; ++i)
-    for (int c = 0; c < d; ++c) offsets[static_cast<std::size_t>(i * d + c)] = corners.at[i][c] - p[c];
+    for (int c = 0; c < d; ++c)
+      offsets[static_cast<std::size_t>(i * d + c)] = corners.at[i][c] - p[c];
   Eigen::Matrix<double, kMaxDimension + 1, kMaxDimension + 1> gram;
   double longest2 = 0;
   for (int i = 0; i < n; ++i) {
@@ -248,9 +249,8 @@ std::string FindOtherSheet(const MeshView& mesh, const Adjacency& adjacency, con
 std::string DescribeLeaning(const MeshView& mesh, const SimplexList& list, const Extent& extent,
                             const ReachClaim& claim) {
   const Leaning& worst = extent.worst;
-  std::string text =
-      Message("simplex ", NameSimplex(list[worst.simplex], mesh.k + 1), " leans by ",
-              Brief(worst.alpha * kDegrees), " degrees from a tangent space");
+  std::string text = Message("simplex ", NameSimplex(list[worst.simplex], mesh.k + 1), " leans by ",
+                             Brief(worst.alpha * kDegrees), " degrees from a tangent space");
   const double turn = kRight - claim.tangent_error - worst.alpha;
   if (!(worst.rho < claim.reach))
     return text + Message(" and its enclosing ball may have the radius ", Brief(worst.rho),
@@ -271,7 +271,8 @@ std::string DescribeLeaning(const MeshView& mesh, const SimplexList& list, const
 bool Contradicts(const ReachClaim& claim, double length, double away, double noise) {
   const double allowed = length * length / (2 * claim.reach);
   // Positions that are wrong by `noise` change `away` by twice that, and the length by as much.
-  const double blame = (2 + 2 * length / claim.reach) * noise + std::sin(claim.tangent_error) * length;
+  const double blame =
+      (2 + 2 * length / claim.reach) * noise + std::sin(claim.tangent_error) * length;
   return away * (1 - kLengthMargin) > allowed * (1 + kLengthMargin) + blame;
 }
 

@@ -94,7 +94,8 @@ void ShrinkingBalls::Absorb(const Eigen::MatrixXd& nearest, const std::vector<st
       if (!found.empty() && !found[static_cast<std::size_t>(n)]) continue;
       const Eigen::VectorXd offset = nearest.col(n) - PointOf(ball);
       const double distance = offset.norm();
-      if (distance > kMet * edge) met_.insert(met_.end(), nearest.col(n).begin(), nearest.col(n).end());
+      if (distance > kMet * edge)
+        met_.insert(met_.end(), nearest.col(n).begin(), nearest.col(n).end());
       const bool exact = ball.point.size() == 0;
       const double along = ball.normal.dot(offset) - (exact ? 0 : kTilt * distance);
       const double far = exact ? edge : std::numeric_limits<double>::infinity();

@@ -12,10 +12,10 @@ namespace stellate::core {
 
 // Estimates the reach from above by shrinking balls: a ball tangent to M at a point p of it, its
 // centre on a normal of M at p, shrinks until M does not enter it any more. Whenever the centre's
-// nearest point y is inside, the ball through y, of radius |y - p|^2 / (2 n.(y - p)), is smaller and
-// still touches M at both p and y, so its radius bounds the reach. This finds both curvature and
-// bottlenecks between sheets. All balls take their steps together. A ball that M does not enter by
-// more than two hundredths of its radius is settled.
+// nearest point y is inside, the ball through y, of radius |y - p|^2 / (2 n.(y - p)), is smaller
+// and still touches M at both p and y, so its radius bounds the reach. This finds both curvature
+// and bottlenecks between sheets. All balls take their steps together. A ball that M does not enter
+// by more than two hundredths of its radius is settled.
 class ShrinkingBalls {
  public:
   // `longest_edge` by vertex: the sample's local scale; answers that tell nothing at that scale
@@ -29,8 +29,8 @@ class ShrinkingBalls {
   void AddLadders(std::uint64_t random_seed, int count);
   // Two balls of one radius on either side of vertex v.
   void AddPair(std::uint32_t v, double radius, std::uint64_t random_seed);
-  // The same at a point of M near v where `tangents` (d x k) nearly span the tangent space: only what
-  // lies steeply above them counts, and for no more than they allow.
+  // The same at a point of M near v where `tangents` (d x k) nearly span the tangent space: only
+  // what lies steeply above them counts, and for no more than they allow.
   void AddPair(std::uint32_t v, const Eigen::VectorXd& point, const Eigen::MatrixXd& tangents,
                double radius, std::uint64_t random_key);
 

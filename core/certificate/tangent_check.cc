@@ -46,18 +46,17 @@ std::string TangentCheck::Judge(const AnswerBlock& answer, double position_error
     if (!answer.found.empty() && !answer.found[i]) continue;
     const Step& step = steps_[i];
     const Eigen::VectorXd moved =
-        answer.points.col(j) -
-        Eigen::Map<const Eigen::VectorXd>(mesh_.Point(step.vertex), mesh_.d);
+        answer.points.col(j) - Eigen::Map<const Eigen::VectorXd>(mesh_.Point(step.vertex), mesh_.d);
     const double off = step.across ? moved.norm() : (moved - step.to).norm();
     if (off <= kTolerance * length_ + kErrors * position_error) continue;
-    return Message("at vertex ", step.vertex, " the tangent space that the oracle gave is not that ",
-                   "of its closest points: a step of ", Brief(length_),
-                   step.across ? " across it should come back to the vertex, and comes back "
-                               : " along it should stay where it is, and is moved by ",
-                   Brief(off), step.across ? " away" : "",
-                   "; is the manifold really ", mesh_.k,
-                   "-dimensional there (a wall is no surface, a wire no curve), and are the tangent "
-                   "bases right?");
+    return Message(
+        "at vertex ", step.vertex, " the tangent space that the oracle gave is not that ",
+        "of its closest points: a step of ", Brief(length_),
+        step.across ? " across it should come back to the vertex, and comes back "
+                    : " along it should stay where it is, and is moved by ",
+        Brief(off), step.across ? " away" : "", "; is the manifold really ", mesh_.k,
+        "-dimensional there (a wall is no surface, a wire no curve), and are the tangent "
+        "bases right?");
   }
   return {};
 }

@@ -30,8 +30,8 @@ class VertexGrid {
     int axis = 0;
     do {
       std::uint64_t cell = 0;
-      for (int a = 0; a < axes_; ++a) cell = cell * static_cast<std::uint64_t>(cells_[a]) +
-                                             static_cast<std::uint64_t>(at[a]);
+      for (int a = 0; a < axes_; ++a)
+        cell = cell * static_cast<std::uint64_t>(cells_[a]) + static_cast<std::uint64_t>(at[a]);
       for (std::uint32_t i = begin_[cell]; i < begin_[cell + 1]; ++i) {
         double along2 = 0;
         for (int a = 0; a < axes_; ++a) {

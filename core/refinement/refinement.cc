@@ -33,8 +33,8 @@ constexpr double kInradius = 1.2;
 // simplex's fatness falls quickly with k, so the bound falls with it.
 constexpr double kDefaultSliverBound[kMaxDimension + 1] = {0, 0, 0, 0.2, 0.15, 0.1};
 
-// With a declared reach: M turns by no more under a simplex of the size asked for, radians. The rest
-// of the right angle is for the simplex itself.
+// With a declared reach: M turns by no more under a simplex of the size asked for, radians. The
+// rest of the right angle is for the simplex itself.
 constexpr double kProofTurn = 0.7;
 
 constexpr double kDefaultAdvanceEpsilons = 3;

@@ -189,8 +189,8 @@ class Refinement final : public Mesher {
   std::vector<std::uint8_t> found_;
   std::vector<std::uint8_t> answered_;  // found, whether or not tangents were
   std::vector<std::uint8_t> used_;      // inserted
-  Eigen::MatrixXd tangents_;  // (K rows of d) x n
-  Eigen::VectorXd sizes_;     // n, where the client gives them
+  Eigen::MatrixXd tangents_;            // (K rows of d) x n
+  Eigen::VectorXd sizes_;               // n, where the client gives them
   TangentFinder tangent_finder_;
   int alternations_left_ = 0;
   Ahead ahead_;                         // asked for with the targets' candidates, after them
@@ -226,13 +226,13 @@ class Refinement final : public Mesher {
   std::vector<double> evidence_;
   int evidence_rounds_ = 0;
 
-  std::uint32_t boxed_ = 0;            // vertices held against the client's box
-  std::uint64_t outside_box_ = 0;      // those that lie outside
-  double farthest_outside_ = 0;        // of them, length
+  std::uint32_t boxed_ = 0;                      // vertices held against the client's box
+  std::uint64_t outside_box_ = 0;                // those that lie outside
+  double farthest_outside_ = 0;                  // of them, length
   std::uint64_t left_then_ = ~std::uint64_t{0};  // violations, at the last progress
-  std::uint64_t stalled_rounds_ = 0;   // since then
-  bool front_moved_ = false;           // in the round
-  bool judges_all_ = true;             // all_suspect_ of the round before
+  std::uint64_t stalled_rounds_ = 0;             // since then
+  bool front_moved_ = false;                     // in the round
+  bool judges_all_ = true;                       // all_suspect_ of the round before
 
   bool covers_box_ = false;  // each seed of a covered box has its closest point
   std::unique_ptr<Certifier> certifier_;

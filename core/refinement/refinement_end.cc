@@ -16,8 +16,8 @@
 namespace stellate::core {
 namespace {
 
-// Of epsilon: answers wrong by more do not go unnoticed (CheckIdempotence), and points of a run that
-// does not end may lie so near to each other that this tells what they seem to bend by.
+// Of epsilon: answers wrong by more do not go unnoticed (CheckIdempotence), and points of a run
+// that does not end may lie so near to each other that this tells what they seem to bend by.
 constexpr double kLikelyError = 1e-3;
 
 }  // namespace

@@ -59,9 +59,8 @@ bool Refinement<K>::AskForEvidence(const std::vector<double>& points) {
     std::pair<double, std::uint32_t> nearest;
     complex_.Nearest(y, 1, &nearest);
     const double apart = std::min(criteria_.epsilon, std::sqrt(nearest.first) / 2);
-    if (std::none_of(chosen.begin(), chosen.end(), [&](const double* other) {
-          return Distance(y, other, complex_.d()) < apart;
-        }))
+    if (std::none_of(chosen.begin(), chosen.end(),
+                     [&](const double* other) { return Distance(y, other, complex_.d()) < apart; }))
       chosen.push_back(y);
   }
   QueryBlock block = NewBlock(QueryKind::kClosestPoint);
@@ -89,11 +88,11 @@ void Refinement<K>::InsertEvidence() {
   filled_stars_.clear();
 }
 
-#define STELLATE_INSTANTIATE(K)                                                             \
-  template void Refinement<K>::KeepAsEvidence();                                            \
-  template double Refinement<K>::ClearanceOf(const double*, std::uint32_t*) const;          \
-  template std::vector<double> Refinement<K>::UncoveredEvidence() const;                    \
-  template bool Refinement<K>::AskForEvidence(const std::vector<double>&);                  \
+#define STELLATE_INSTANTIATE(K)                                                    \
+  template void Refinement<K>::KeepAsEvidence();                                   \
+  template double Refinement<K>::ClearanceOf(const double*, std::uint32_t*) const; \
+  template std::vector<double> Refinement<K>::UncoveredEvidence() const;           \
+  template bool Refinement<K>::AskForEvidence(const std::vector<double>&);         \
   template void Refinement<K>::InsertEvidence();
 STELLATE_INSTANTIATE(1)
 STELLATE_INSTANTIATE(2)

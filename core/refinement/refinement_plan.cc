@@ -182,8 +182,7 @@ std::vector<Target<K>> Refinement<K>::SliverAndConsistencyTargets() {
   std::vector<std::optional<Violation<K>>> found(suspects_.size());
   const std::vector<std::uint32_t> near = InOrderOfPlace<K>(complex_, suspects_);
   ParallelFor(suspects_.size(), [&](std::size_t i) {
-    found[near[i]] =
-        WorstSliverOrInconsistent<K>(complex_, suspects_[near[i]], criteria_.shape);
+    found[near[i]] = WorstSliverOrInconsistent<K>(complex_, suspects_[near[i]], criteria_.shape);
   });
   FillCavitiesIfAny(found);
   std::vector<Target<K>> targets;

@@ -78,10 +78,10 @@ void Refinement<K>::WarnOfBox(Certificate* certificate) const {
               "unbounded?"));
 }
 
-#define STELLATE_INSTANTIATE(K)                                    \
-  template bool Refinement<K>::HasLeftBox();                       \
-  template bool Refinement<K>::HasStalled();                       \
-  template std::string Refinement<K>::WhyStopped() const;          \
+#define STELLATE_INSTANTIATE(K)                           \
+  template bool Refinement<K>::HasLeftBox();              \
+  template bool Refinement<K>::HasStalled();              \
+  template std::string Refinement<K>::WhyStopped() const; \
   template void Refinement<K>::WarnOfBox(Certificate*) const;
 STELLATE_INSTANTIATE(1)
 STELLATE_INSTANTIATE(2)

@@ -264,17 +264,17 @@ int CountBad(const StarComplex<K>& complex, const double* point,
   return bad;
 }
 
-#define STELLATE_INSTANTIATE(K)                                                                 \
-  template std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>&, std::uint32_t,   \
-                                                        double, double);                        \
-  template std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>&,         \
-                                                                 std::uint32_t, const ShapeBounds&); \
-  template bool ContainsSliver(const StarComplex<K>&, const double*,                            \
-                               const RestrictedVoronoiCell<K>&, std::size_t, double,            \
-                               const double*);                                                  \
-  template bool LeansTooFar(const StarComplex<K>&, std::uint32_t, const double*,                \
+#define STELLATE_INSTANTIATE(K)                                                                   \
+  template std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>&, std::uint32_t,     \
+                                                        double, double);                          \
+  template std::optional<Violation<K>> WorstSliverOrInconsistent(                                 \
+      const StarComplex<K>&, std::uint32_t, const ShapeBounds&);                                  \
+  template bool ContainsSliver(const StarComplex<K>&, const double*,                              \
+                               const RestrictedVoronoiCell<K>&, std::size_t, double,              \
+                               const double*);                                                    \
+  template bool LeansTooFar(const StarComplex<K>&, std::uint32_t, const double*,                  \
                             const RestrictedVoronoiCell<K>&, std::size_t, double, const double*); \
-  template int CountBad(const StarComplex<K>&, const double*, const StarComplex<K>::Tentative&, \
+  template int CountBad(const StarComplex<K>&, const double*, const StarComplex<K>::Tentative&,   \
                         const ShapeBounds&, double, int);
 STELLATE_INSTANTIATE(1)
 STELLATE_INSTANTIATE(2)

@@ -9,15 +9,15 @@
 
 namespace stellate::core {
 
-// Tangent spaces for clients that cannot give them (Sec. 5.3.1): the derivative of the closest-point
-// map at y on M is the projection on T_yM, so differences of closest points along a few directions
-// span it. With a guess (the tangent basis of a nearby sample point) k directions do, else k + 4
-// random ones, whatever d is: 2k closest points a vertex.
+// Tangent spaces for clients that cannot give them (Sec. 5.3.1): the derivative of the
+// closest-point map at y on M is the projection on T_yM, so differences of closest points along a
+// few directions span it. With a guess (the tangent basis of a nearby sample point) k directions
+// do, else k + 4 random ones, whatever d is: 2k closest points a vertex.
 class TangentFinder {
  public:
   // step: how far from M to look, length.
-  // most_error: what the error_length of a point should not be above. Where it is, the point is asked
-  // about once more, along what was found.
+  // most_error: what the error_length of a point should not be above. Where it is, the point is
+  // asked about once more, along what was found.
   TangentFinder(int k, int d, double step, std::uint64_t seed,
                 double most_error = std::numeric_limits<double>::infinity());
 

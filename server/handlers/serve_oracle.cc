@@ -279,7 +279,7 @@ class OracleStream final
   std::shared_ptr<OracleStream> self_;
   std::shared_ptr<Session> session_;  // set once, by Hello
   std::unique_ptr<MemoryBudget::Account> memory_;
-  WorkerId worker_ = 0;               // set once, by Hello
+  WorkerId worker_ = 0;  // set once, by Hello
   bool left_ = false;
   bool welcome_ = false;
   bool writing_ = false;

@@ -106,7 +106,10 @@ TEST(Tame, KeepsStrangersFromTheTerminal) {
   EXPECT_EQ(Tame("x\xC2\x9Bm", 20), "x?m");          // a control of eight bits, in UTF-8
   EXPECT_EQ(Tame("t\xC3\xB6rus", 3), "t\xC3\xB6r");  // cut between characters
   EXPECT_EQ(Tame("a\u202Eb\u2066c\u200Fd\u2028e", 20), "a?b?c?d?e") << "order of writing";
-  EXPECT_EQ(Tame("a\xFF\xC3(", 20), "a?" "?(") << "no UTF-8";
+  EXPECT_EQ(Tame("a\xFF\xC3(", 20),
+            "a?"
+            "?(")
+      << "no UTF-8";
 }
 
 TEST(TopTable, LabelsCommandNoTerminal) {

@@ -11,9 +11,10 @@ import subprocess
 import sys
 import tempfile
 import time
-import tomllib
 import unittest
 from typing import Any
+
+import tomllib
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "fuzz" / "hostile"))
@@ -33,7 +34,9 @@ def packages() -> list[dict[str, Any]]:
 def installed() -> dict[str, list[tuple[str, str]]]:
     """Debian's packages of this machine, and their versions, by source package."""
     form = "${source:Package}\\t${source:Version}\\t${Package}\\n"
-    lines = subprocess.run(["dpkg-query", "-W", "-f", form], capture_output=True, text=True, check=True)
+    lines = subprocess.run(
+        ["dpkg-query", "-W", "-f", form], capture_output=True, text=True, check=True
+    )
     found: dict[str, list[tuple[str, str]]] = {}
     for line in lines.stdout.splitlines():
         source, version, package = line.split("\t")
@@ -46,7 +49,9 @@ def changelog(package: str) -> str:
     for name in ("changelog.Debian.gz", "changelog.gz"):
         file = pathlib.Path("/usr/share/doc") / package / name
         if file.exists():
-            return subprocess.run(["zcat", file], capture_output=True, text=True, errors="replace").stdout
+            return subprocess.run(
+                ["zcat", file], capture_output=True, text=True, errors="replace"
+            ).stdout
     return ""
 
 
@@ -71,7 +76,9 @@ class Advisories(unittest.TestCase):
                     self.assertNotIn(advisory["id"], seen)
                     seen.add(advisory["id"])
                     self.assertEqual(advisory.keys(), {"id", "what", "answer", "shown"})
-                    self.assertTrue(all(len(text) > 20 for text in advisory.values() if " " in text))
+                    self.assertTrue(
+                        all(len(text) > 20 for text in advisory.values() if " " in text)
+                    )
                     self.assertTrue((ROOT / advisory["shown"]).exists(), advisory["shown"])
 
     def test_none_is_mended_already(self) -> None:
@@ -80,7 +87,9 @@ class Advisories(unittest.TestCase):
             for package, _ in there.get(entry["source"], []):
                 mended = changelog(package)
                 for advisory in entry["advisory"]:
-                    self.assertNotIn(advisory["id"], mended, f"{package} has mended it: take it out")
+                    self.assertNotIn(
+                        advisory["id"], mended, f"{package} has mended it: take it out"
+                    )
 
     def test_users_are_told(self) -> None:
         page = (ROOT / "docs" / "safety.md").read_text()
@@ -155,7 +164,9 @@ class BillOfMaterials(unittest.TestCase):
         self.assertEqual(self.bill["metadata"]["component"]["version"], "1.2.3")
         refs = [component["bom-ref"] for component in self.bill["components"]]
         self.assertEqual(len(refs), len(set(refs)))
-        purl = re.compile(r"pkg:deb/debian/[a-z0-9.+%B-]+@[A-Za-z0-9.~%-]+\?arch=\w+&distro=debian-\d+")
+        purl = re.compile(
+            r"pkg:deb/debian/[a-z0-9.+%B-]+@[A-Za-z0-9.~%-]+\?arch=\w+&distro=debian-\d+"
+        )
         for component in self.bill["components"]:
             if component["type"] == "library":
                 self.assertRegex(component["purl"], purl)
@@ -164,16 +175,26 @@ class BillOfMaterials(unittest.TestCase):
 
     def test_it_holds_what_dpkg_knows(self) -> None:
         form = "${db:Status-Status} ${Package} ${Version}\\n"
-        known = subprocess.run(["dpkg-query", "-W", "-f", form], capture_output=True, text=True).stdout
-        wanted = {tuple(line.split()[1:]) for line in known.splitlines() if line.startswith("installed ")}
+        known = subprocess.run(
+            ["dpkg-query", "-W", "-f", form], capture_output=True, text=True
+        ).stdout
+        wanted = {
+            tuple(line.split()[1:]) for line in known.splitlines() if line.startswith("installed ")
+        }
         listed = {
-            (c["name"], c["version"]) for c in self.bill["components"] if c["bom-ref"].startswith("image:")
+            (c["name"], c["version"])
+            for c in self.bill["components"]
+            if c["bom-ref"].startswith("image:")
         }
         self.assertEqual(listed, wanted)
-        compiled = {c["name"] for c in self.bill["components"] if c["bom-ref"].startswith("compiled-in:")}
+        compiled = {
+            c["name"] for c in self.bill["components"] if c["bom-ref"].startswith("compiled-in:")
+        }
         self.assertEqual(compiled, {"libeigen3-dev", "libcli11-dev"})
         (ours,) = (c for c in self.bill["components"] if c["type"] == "file")
-        digest = subprocess.run(["sha256sum", self.file], capture_output=True, text=True).stdout.split()[0]
+        digest = subprocess.run(
+            ["sha256sum", self.file], capture_output=True, text=True
+        ).stdout.split()[0]
         self.assertEqual(ours["hashes"], [{"alg": "SHA-256", "content": digest}])
         self.assertEqual(self.run_it(*self.command), self.text, "the same twice")
 

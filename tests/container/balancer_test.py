@@ -207,8 +207,14 @@ class Balancer(unittest.TestCase):
             for _ in range(5):
                 with self.subTest(headers=list(headers)):
                     rude = self.connect()
-                    rude.sendall(raw.frame(raw.HEADERS, 5, 1, raw.header_block(
-                        "/stellate.v1.Stellate/GetServerInfo", headers)))
+                    rude.sendall(
+                        raw.frame(
+                            raw.HEADERS,
+                            5,
+                            1,
+                            raw.header_block("/stellate.v1.Stellate/GetServerInfo", headers),
+                        )
+                    )
                     rude.settimeout(1)
                     self.listen(rude)
                     self.assertTrue(friend.info().version)

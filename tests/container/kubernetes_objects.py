@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pathlib
 import re
-from typing import Any, Iterator
+from collections.abc import Iterator
+from typing import Any
 
 import yaml
 
@@ -51,15 +52,19 @@ def workloads(objects: Objects) -> dict[str, Object]:
 
 def version() -> str:
     """Of this source tree."""
-    found = re.search(r"^project\(stellate VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text(), re.M)
+    found = re.search(
+        r"^project\(stellate VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text(), re.M
+    )
     assert found is not None
     return found[1]
 
 
 def find(tree: Any, key: str) -> Iterator[Any]:
     """All that is under that key, however deep."""
-    for inner, value in tree.items() if isinstance(tree, dict) else enumerate(
-        tree if isinstance(tree, list) else []
+    for inner, value in (
+        tree.items()
+        if isinstance(tree, dict)
+        else enumerate(tree if isinstance(tree, list) else [])
     ):
         if inner == key:
             yield value

@@ -8,10 +8,19 @@ import pathlib
 import re
 import subprocess
 import tempfile
-from typing import Iterator
+from collections.abc import Iterator
 
 from kubernetes_objects import (
-    MANIFESTS, ROOT, Object, Objects, arguments_of, container_of, find, kustomization, pod_of, workloads,
+    MANIFESTS,
+    ROOT,
+    Object,
+    Objects,
+    arguments_of,
+    container_of,
+    find,
+    kustomization,
+    pod_of,
+    workloads,
 )  # fmt: skip
 
 
@@ -34,7 +43,9 @@ def ways_in(objects: Objects) -> Iterator[str]:
         f"STELLATED_{i}": f"stellated-{i}.{server['spec']['serviceName']}.{namespace}.svc.cluster.local:7717"
         for i in range(server["spec"]["replicas"])
     }
-    given = {e["name"]: e["value"] for e in container_of(objects["Deployment", "proxy"]).get("env", [])}
+    given = {
+        e["name"]: e["value"] for e in container_of(objects["Deployment", "proxy"]).get("env", [])
+    }
     if given != wanted:
         yield f"the proxy leads to {given}, and servers are {wanted}"
     used = set(re.findall(r"STELLATED_\d+", (MANIFESTS / "haproxy.cfg").read_text()))
@@ -46,7 +57,9 @@ def ways_in(objects: Objects) -> Iterator[str]:
 
 def policies(objects: Objects) -> Iterator[str]:
     """Who may speak with whom, both ends agreeing; everybody else may not."""
-    found = {name: item["spec"] for (kind, name), item in objects.items() if kind == "NetworkPolicy"}
+    found = {
+        name: item["spec"] for (kind, name), item in objects.items() if kind == "NetworkPolicy"
+    }
     closed = {"podSelector": {}, "policyTypes": ["Ingress", "Egress"]}
     if closed not in found.values():
         yield "no NetworkPolicy closes the namespace"

@@ -13,13 +13,21 @@ import pathlib
 import re
 import subprocess
 import sys
-from typing import Any, Iterator
-
-from kubernetes.client import models
+from collections.abc import Iterator
+from typing import Any
 
 import manifest_safety
+from kubernetes.client import models
 from kubernetes_objects import (
-    ROOT, Object, Objects, arguments_of, container_of, find, kustomization, pod_of, version, workloads,
+    ROOT,
+    Objects,
+    arguments_of,
+    container_of,
+    find,
+    kustomization,
+    pod_of,
+    version,
+    workloads,
 )  # fmt: skip
 
 WORKER = [sys.executable, "-B", str(ROOT / "docker" / "oracle_worker.py")]
@@ -110,7 +118,11 @@ def _placement(objects: Objects) -> Iterator[str]:
     known = {image["name"] for image in kustomization()["images"]}
     for image in kustomization()["images"]:
         ours = image["name"].startswith("stellate")
-        if not re.fullmatch(r"\d+\.\d+\.\d+", image["newTag"]) or ours and image["newTag"] != version():
+        if (
+            not re.fullmatch(r"\d+\.\d+\.\d+", image["newTag"])
+            or ours
+            and image["newTag"] != version()
+        ):
             yield f"{image['name']} is of no version: {image['newTag']}"
     for name, item in workloads(objects).items():
         if len(pod_of(item)["containers"]) != 1:
@@ -184,8 +196,11 @@ def _ports(objects: Objects) -> Iterator[str]:
         if target not in ports and target not in ports.values():
             yield f"the Service leads to port {target}"
     way_in = objects["Service", "proxy"]
-    offered = {f"{way_in['metadata']['name']}:{port['port']}" for port in way_in["spec"]["ports"]
-               if port.get("targetPort") in {port["name"] for port in front["ports"]}}
+    offered = {
+        f"{way_in['metadata']['name']}:{port['port']}"
+        for port in way_in["spec"]["ports"]
+        if port.get("targetPort") in {port["name"] for port in front["ports"]}
+    }
     for name, item in workloads(objects).items():
         asked_for = arguments_of(item).get("--server")
         if asked_for is not None and asked_for not in offered:

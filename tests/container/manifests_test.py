@@ -20,11 +20,10 @@ import time
 import unittest
 from typing import Any
 
-import yaml
-
 import kubernetes_objects
 import manifest_safety
 import manifests
+import yaml
 from kubernetes_objects import ROOT
 
 sys.path.insert(0, str(ROOT / "clients" / "python"))
@@ -95,7 +94,12 @@ MISTAKES: list[tuple[tuple[str, str], str, Any, str]] = [
     (_WORKERS, f"{_CONTAINER}.args.0", "--manifold=tours", "tours"),
     (_WORKERS, f"{_CONTAINER}.args.2", "--tls-cas=/etc/stellate/ca.pem", "--tls-cas"),
     (_SERVER, f"{_CONTAINER}.args.1", "--insecure-listen", "no --tls-cert"),
-    (_SERVER, f"{_CONTAINER}.args.3", "--token-file=/etc/stellate/token", "token, which is not mounted"),
+    (
+        _SERVER,
+        f"{_CONTAINER}.args.3",
+        "--token-file=/etc/stellate/token",
+        "token, which is not mounted",
+    ),
     (_WORKERS, f"{_CONTAINER}.args.3", "--epsilon=0.1", "no --token-file"),
     (_SERVER, "spec.template.spec.volumes.0.secret.items.0.key", "tls.crt", "makes no tls.crt"),
     (_SERVER, "spec.replicas", 3, "servers are"),
@@ -103,7 +107,12 @@ MISTAKES: list[tuple[tuple[str, str], str, Any, str]] = [
     (_PROXY, "spec.template.spec.volumes.0.configMap.name", "haproxy", "no ConfigMap"),
     (_SERVICE, "spec.publishNotReadyAddresses", _GONE, "loses the names"),
     (_CLOSED, "spec.policyTypes", ["Ingress"], "closes the namespace"),
-    (_POLICY, "spec.podSelector.matchLabels", {"app": "x"}, "0 NetworkPolicies are about stellated"),
+    (
+        _POLICY,
+        "spec.podSelector.matchLabels",
+        {"app": "x"},
+        "0 NetworkPolicies are about stellated",
+    ),
     (_POLICY, "spec.ingress.0.ports.0.port", "gprc", "let in to at port gprc"),
     (_POLICY, "spec.ingress.0", {"ports": [{"port": "grpc"}]}, "may be called by"),
 ]
@@ -191,7 +200,10 @@ class ServerOfTheManifest(unittest.TestCase):
         # Without a token, or in plain text, nobody gets in.
         client = stellate.Credentials(ca=str(self.folder / "secrets" / "ca.pem"))
         token = (self.folder / "secrets" / "me.token").read_text().strip()
-        for credentials, error in ((None, stellate.Unavailable), (client, stellate.Unauthenticated)):
+        for credentials, error in (
+            (None, stellate.Unavailable),
+            (client, stellate.Unauthenticated),
+        ):
             with stellate.Client(f"localhost:{port}", credentials) as stranger:
                 self.assertRaises(error, stranger.info)
         with stellate.Client(
@@ -329,7 +341,10 @@ class Pins(unittest.TestCase):
         lines = (self.folder / ".env").read_text().splitlines()
         self.assertEqual(self.pin("--check").returncode, 0)
         self.assertTrue(
-            any(re.fullmatch(r"STELLATE_BASE=debian:bookworm-slim@sha256:[0-9a-f]{64}", x) for x in lines)
+            any(
+                re.fullmatch(r"STELLATE_BASE=debian:bookworm-slim@sha256:[0-9a-f]{64}", x)
+                for x in lines
+            )
         )
         # Another tag is another image.
         text = (self.folder / "images.txt").read_text()

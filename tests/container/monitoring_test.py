@@ -60,7 +60,9 @@ def questions() -> dict[str, str]:
 
 class Files(unittest.TestCase):
     def test_every_alert_fires_and_is_silent_in_its_test(self) -> None:
-        done = subprocess.run(["promtool", "test", "rules", RULES_TEST], capture_output=True, text=True)
+        done = subprocess.run(
+            ["promtool", "test", "rules", RULES_TEST], capture_output=True, text=True
+        )
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         tested = {case["name"] for case in yaml.safe_load(RULES_TEST.read_text())["tests"]}
         wanted = {f"{r['alert']} {does}" for r in rules() for does in ("fires", "is silent")}
@@ -68,7 +70,9 @@ class Files(unittest.TestCase):
 
     def test_prometheus_takes_its_configuration(self) -> None:
         done = subprocess.run(
-            ["promtool", "check", "config", PROMETHEUS / "prometheus.yml"], capture_output=True, text=True
+            ["promtool", "check", "config", PROMETHEUS / "prometheus.yml"],
+            capture_output=True,
+            text=True,
         )
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.assertIn(f"SUCCESS: {len(rules())} rules found", done.stdout)
@@ -79,7 +83,11 @@ class Files(unittest.TestCase):
         taken: set[tuple[int, int]] = set()
         for panel in board["panels"]:
             where = panel["gridPos"]
-            cells = {(where["x"] + i, where["y"] + j) for i in range(where["w"]) for j in range(where["h"])}
+            cells = {
+                (where["x"] + i, where["y"] + j)
+                for i in range(where["w"])
+                for j in range(where["h"])
+            }
             self.assertFalse(cells & taken, f"{panel['title']} lies on another")
             self.assertLessEqual(where["x"] + where["w"], 24, panel["title"])
             taken |= cells
@@ -167,7 +175,9 @@ class Live(unittest.TestCase):
     def ask(cls, expression: str) -> list[dict[str, Any]]:
         """What Prometheus answers. Raises: urllib's HTTPError where it is no expression."""
         query = urllib.parse.urlencode({"query": expression})
-        with urllib.request.urlopen(f"{cls.prometheus}/api/v1/query?{query}", timeout=PATIENCE) as reply:
+        with urllib.request.urlopen(
+            f"{cls.prometheus}/api/v1/query?{query}", timeout=PATIENCE
+        ) as reply:
             return json.load(reply)["data"]["result"]
 
     @classmethod
@@ -190,7 +200,7 @@ class Live(unittest.TestCase):
             used = set(_NAME.findall(rule["expr"]))
             self.assertLessEqual(used, names, rule["alert"])
             for name, inside in re.findall(r"(\w+)\{([^}]*)\}", rule["expr"]):
-                if re.search(r'state=', inside):  # their values, too, are some that occur
+                if re.search(r"state=", inside):  # their values, too, are some that occur
                     self.assertTrue(self.ask(f"{name}{{{inside}}}"), rule["alert"])
 
     def test_the_idle_mesh_is_seen(self) -> None:
@@ -203,7 +213,9 @@ class Live(unittest.TestCase):
             told = set(re.findall(r"^# TYPE (\w+) ", reply.read().decode(), re.M))
         page = (ROOT / "docs" / "metrics.md").read_text()
         rows = re.findall(r"^\| (`.*?) \|", page, re.M)
-        listed = {re.sub(r"\{.*", "", name) for row in rows for name in re.findall(r"`([^`]+)`", row)}
+        listed = {
+            re.sub(r"\{.*", "", name) for row in rows for name in re.findall(r"`([^`]+)`", row)
+        }
         own = {name for name in told if name.startswith(("stellate_", "process_"))}
         self.assertEqual({name for name in listed if _NAME.fullmatch(name)}, own)
         for expression in filter(_NAME.search, re.findall(r"^ {4}(\S.*)$", page, re.M)):

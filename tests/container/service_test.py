@@ -8,12 +8,15 @@ import pathlib
 import re
 import subprocess
 import tempfile
-import tomllib
 import unittest
+
+import tomllib
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PACKAGING = ROOT / "packaging"
-_EXPOSURE = 20  # tenths: what `systemd-analyze security` makes of the unit, 0 to 100; lower is better
+_EXPOSURE = (
+    20  # tenths: what `systemd-analyze security` makes of the unit, 0 to 100; lower is better
+)
 
 
 def run(*command: str | pathlib.Path) -> subprocess.CompletedProcess[str]:
@@ -54,15 +57,19 @@ class Service(unittest.TestCase):
 
     def test_the_unit_is_confined(self) -> None:
         unit = PACKAGING / "stellated.service"
-        done = run("systemd-analyze", "security", "--offline=true", f"--threshold={_EXPOSURE}", unit)
+        done = run(
+            "systemd-analyze", "security", "--offline=true", f"--threshold={_EXPOSURE}", unit
+        )
         self.assertEqual(done.returncode, 0, done.stdout[-2000:] + done.stderr)
 
     def test_systemd_makes_the_user_and_the_directories(self) -> None:
         for _ in range(2):
             done = run("systemd-sysusers", f"--root={self.root}", "stellate.conf")
             self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertRegex((self.root / "etc/passwd").read_text(),
-                         r"\nstellate:!?\*?x?:\d+:\d+:Stellate:/var/lib/stellate:/usr/sbin/nologin\n")
+        self.assertRegex(
+            (self.root / "etc/passwd").read_text(),
+            r"\nstellate:!?\*?x?:\d+:\d+:Stellate:/var/lib/stellate:/usr/sbin/nologin\n",
+        )
         if os.geteuid() == 0:  # they are given away
             done = run("systemd-tmpfiles", "--create", f"--root={self.root}", "stellate.conf")
             self.assertEqual(done.returncode, 0, done.stderr)
@@ -79,7 +86,9 @@ class Service(unittest.TestCase):
         program, *arguments = service["ExecStart"].split()
         self.assertEqual(program, "/usr/local/bin/stellated")
         self.assertEqual(arguments, ["--config", "/etc/stellate/stellated.toml"])
-        done = run(os.environ["STELLATED"], "--config", PACKAGING / "stellated.toml", "--print-config")
+        done = run(
+            os.environ["STELLATED"], "--config", PACKAGING / "stellated.toml", "--print-config"
+        )
         self.assertEqual(done.returncode, 0, done.stderr)
         printed = tomllib.loads(done.stdout)
         self.assertEqual({key: printed[key] for key in config}, config)

@@ -57,7 +57,9 @@ class StandingWorkers(unittest.TestCase):
 
     def test_workers_with_an_oracle_of_the_users_own(self) -> None:
         folder = pathlib.Path(self.folder.name)
-        (folder / "shapes.py").write_text("from stellate import manifolds\nring = manifolds.Torus()\n")
+        (folder / "shapes.py").write_text(
+            "from stellate import manifolds\nring = manifolds.Torus()\n"
+        )
         self.environment["PYTHONPATH"] += os.pathsep + str(folder)
         self.start("--oracle", "shapes:ring")
         self.start("--manifold", "torus")  # another label: leaves it alone

@@ -33,9 +33,9 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-import tomllib
 from typing import Any
 
+import tomllib
 from markdown_it import MarkdownIt
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -112,7 +112,9 @@ def match(path: str, text: str, table: dict[str, Any], where: str) -> Page:
         entries.remove(entry)
         blocks.append(Block(line, token.info, token.content, entry))
     for entry in entries:
-        wrong.append(f"{where}: no block of {path} is left that begins with {entry.get('starts')!r}")
+        wrong.append(
+            f"{where}: no block of {path} is left that begins with {entry.get('starts')!r}"
+        )
     if wrong:
         raise Wrong("\n".join(wrong))
     return Page(path, table, blocks)

@@ -7,11 +7,10 @@ import re
 import shlex
 import signal
 import subprocess
-import tomllib
 from typing import Any
 
+import tomllib
 import yaml
-
 from blocks import ROOT, Block, Wrong
 from surroundings import BUILD, PATIENCE, Surroundings
 
@@ -93,7 +92,9 @@ def run(before: str, text: str, entry: dict[str, Any], around: Surroundings) -> 
             says = shlex.quote(entry[key][start])
             script.append(f"rm -f {log}\n{{ exec {command}}} >{log} 2>&1 &\nawait {log} $! {says}")
         elif key == "status":
-            script.append(f"status=0\n{{ {command}}} || status=$?\n[[ $status == {entry[key][start]} ]]")
+            script.append(
+                f"status=0\n{{ {command}}} || status=$?\n[[ $status == {entry[key][start]} ]]"
+            )
         elif not key:
             script.append(command)
     if unused:

@@ -178,6 +178,7 @@ class Surroundings:
 
     def certify(self) -> None:
         """ca.pem; server.pem and server.key; me.pem and me.key; tokens, my-token."""
+
         def openssl(*arguments: str) -> None:
             subprocess.run(["openssl", *arguments], cwd=self.here, check=True, capture_output=True)
 

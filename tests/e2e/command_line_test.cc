@@ -119,8 +119,9 @@ TEST_F(CommandLine, UsageAndRefusalsExitTwo) {
 
 // With a server that is not there: 2, and not 3, says that it was not even looked for.
 TEST_F(CommandLine, FilesAreRefusedBeforeMeshing) {
-  for (const std::string arguments : {"torus -e 0.2 -o a.wkt", "so3 -e 0.4 -o a.txt -o a.stl",
-                                      "circle:4 -e 0.3 -o a.msh", "torus -e 0.2 -o /no/such/a.txt"}) {
+  for (const std::string arguments :
+       {"torus -e 0.2 -o a.wkt", "so3 -e 0.4 -o a.txt -o a.stl", "circle:4 -e 0.3 -o a.msh",
+        "torus -e 0.2 -o /no/such/a.txt"}) {
     const Result result = Run("mesh " + arguments + " --server unix:/nowhere/at/all");
     EXPECT_EQ(result.status, 2) << arguments << ": " << result.output;
   }

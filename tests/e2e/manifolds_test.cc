@@ -56,8 +56,8 @@ INSTANTIATE_TEST_SUITE_P(Promise, PoorOracle,
 
 class TooCoarse : public Live, public ::testing::WithParamInterface<Case> {};
 
-// What comes out may look like a fine closed surface, of the wrong topology. Only one that the rules
-// refined far enough to be right may be certified, whatever epsilon was.
+// What comes out may look like a fine closed surface, of the wrong topology. Only one that the
+// rules refined far enough to be right may be certified, whatever epsilon was.
 TEST_P(TooCoarse, IsNeverFalselyCertifiedAndSaysWhy) {
   const auto manifold = Make(GetParam().spec);
   for (const std::uint64_t seed : {1, 2, 3}) {

@@ -12,7 +12,7 @@ import pathlib
 import sys
 import tempfile
 import time
-from typing import Iterator
+from collections.abc import Iterator
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "clients" / "python"), str(pathlib.Path(__file__).resolve().parent)]

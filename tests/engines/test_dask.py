@@ -13,9 +13,12 @@ from distributed import Client, LocalCluster
 @pytest.fixture
 def cluster():
     dask.config.set({"distributed.worker.daemon": True, "distributed.comm.timeouts.connect": "60s"})
-    with LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
-    ) as running, Client(running) as client:
+    with (
+        LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
+        ) as running,
+        Client(running) as client,
+    ):
         yield client
 
 

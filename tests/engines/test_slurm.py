@@ -46,7 +46,9 @@ def test_array_with_requeue(slurm):
         gate.open()
         for task in (1, 2):
             gated.until(
-                lambda: "PENDING" in slurm.run("squeue", "-h", "-j", f"{array}_{task}", "-o", "%T"),
+                lambda task=task: (
+                    "PENDING" in slurm.run("squeue", "-h", "-j", f"{array}_{task}", "-o", "%T")
+                ),
                 "the task was not queued again",
             )
             slurm.run("scontrol", "update", f"JobId={array}_{task}", "StartTime=now")

@@ -36,8 +36,9 @@ void CheckAnswers(const server::RecordedAnswers& recorded) {
               "written answers can be read");
       for (const server::PartOfRound& same : again->parts) {
         const auto twice = EncodedPart(same, again->questions);
-        Require(again->parts.size() > 1 || (twice.size() == 1 && twice.front().size() == once.size()),
-                "and are as long");
+        Require(
+            again->parts.size() > 1 || (twice.size() == 1 && twice.front().size() == once.size()),
+            "and are as long");
       }
     }
   }

@@ -23,7 +23,6 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "clients" / "python"))
 
 import stellate  # noqa: E402
-
 from numpy_client import Timed  # noqa: E402
 
 _DENSITY = 0.65 * 4 * 3.141592653589793  # vertices of the unit sphere are about this / epsilon^2
@@ -113,12 +112,19 @@ def main() -> int:
             server.wait()
     same = (near.vertices, near.rounds, near.queries) == (far.vertices, far.rounds, far.queries)
     latency = far.rounds * rtt
-    print(f"sphere, epsilon {epsilon:.5f}: {far.vertices} vertices, {far.rounds} rounds, "
-          f"{far.queries} queries, ask ahead: {'yes' if arguments.ask_ahead else 'no'}, "
-          f"certified: {far.certified}, same counts near and far: {same}")
-    for where, one in (("next to the server", near), (f"round trip {arguments.rtt_ms:.0f} ms", far)):
-        print(f"  {where:<18} {one.seconds:6.2f} s; processor time: server {one.server:.2f} s, "
-              f"client {one.client:.2f} s, of which oracle {one.oracle:.2f} s")
+    print(
+        f"sphere, epsilon {epsilon:.5f}: {far.vertices} vertices, {far.rounds} rounds, "
+        f"{far.queries} queries, ask ahead: {'yes' if arguments.ask_ahead else 'no'}, "
+        f"certified: {far.certified}, same counts near and far: {same}"
+    )
+    for where, one in (
+        ("next to the server", near),
+        (f"round trip {arguments.rtt_ms:.0f} ms", far),
+    ):
+        print(
+            f"  {where:<18} {one.seconds:6.2f} s; processor time: server {one.server:.2f} s, "
+            f"client {one.client:.2f} s, of which oracle {one.oracle:.2f} s"
+        )
     print(f"  latency            {latency:6.2f} s, a round trip for each round")
     print(f"  transfer           {far.seconds - near.seconds - latency:6.2f} s, what the path adds")
     print(f"  computing          {near.seconds:6.2f} s, as next to the server")

@@ -203,7 +203,7 @@ TEST_F(LiveRequestsTest, WithoutRoomInTheRecordThereIsNoNewMesh) {
   }
   v1::Mesh mesh;
   while (!Create(spec, &mesh).ok()) std::this_thread::yield();  // the removal is another thread's
-  server_.reset();  // before its directory goes
+  server_.reset();                                              // before its directory goes
 }
 
 TEST_F(LiveRequestsTest, WithoutMemoryLeftThereIsNoNewMesh) {

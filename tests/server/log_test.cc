@@ -25,8 +25,7 @@ TEST(Log, LinesNameTheMeshAndTheRound) {
   StartLogging(LogLevel::kWarning, LogFormat::kJson);
   Log(LogLevel::kWarning, {"meshes/cd", 8}, "say \"so\"");
   const std::string text = ::testing::internal::GetCapturedStderr();
-  EXPECT_NE(text.find("[meshes/ab round 7] a client's words  [2J [2J\xce\xb5\n"),
-            std::string::npos)
+  EXPECT_NE(text.find("[meshes/ab round 7] a client's words  [2J [2J\xce\xb5\n"), std::string::npos)
       << text;
   EXPECT_EQ(text.find("not shown"), std::string::npos);
   EXPECT_NE(text.find(R"("mesh":"meshes/cd","round":8,"message":"say \"so\""})"), std::string::npos)
@@ -46,9 +45,8 @@ TEST(Log, FieldsAreForPrograms) {
   EXPECT_EQ(fields.text(),
             " state=FAILED label=\"\" words=\"a \\\"b\\\"\\u000a\" tricky=\"a=b\" certified=false"
             " vertices=12 seconds=0.25 epsilon=NaN");
-  EXPECT_EQ(fields.json(),
-            R"(,"state":"FAILED","label":"","words":"a \"b\"\u000a","tricky":"a=b")"
-            R"(,"certified":false,"vertices":12,"seconds":0.25,"epsilon":null)");
+  EXPECT_EQ(fields.json(), R"(,"state":"FAILED","label":"","words":"a \"b\"\u000a","tricky":"a=b")"
+                           R"(,"certified":false,"vertices":12,"seconds":0.25,"epsilon":null)");
 
   ::testing::internal::CaptureStderr();
   StartLogging(LogLevel::kInfo, LogFormat::kText);

@@ -99,8 +99,8 @@ TEST(MemoryBudget, SeedsAreCountedEvenOfWhatIsFinished) {
 
 TEST(MemoryBudget, OpenCallsHaveAnEighth) {
   constexpr std::uint64_t kMebi = std::uint64_t{1} << 20;
-  const auto streams = std::make_shared<MemoryBudget>(
-      MemoryBudget::Limits{80 * kMebi, 64 * kMebi}, MemoryBudget::Of::kStreams);
+  const auto streams = std::make_shared<MemoryBudget>(MemoryBudget::Limits{80 * kMebi, 64 * kMebi},
+                                                      MemoryBudget::Of::kStreams);
   const auto alice = MemoryBudget::Open(streams, "alice");
   EXPECT_FALSE(alice->Set(8 * kMebi));
   const auto more = MemoryBudget::Open(streams, "alice");

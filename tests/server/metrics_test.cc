@@ -31,7 +31,8 @@ class MetricsTest : public LiveServer {
     const std::string reply = GetMetrics(server_->metrics_port());
     EXPECT_EQ(reply.find("HTTP/1.1 200"), 0u) << reply;
     std::istringstream lines(reply.substr(std::min(reply.find("\r\n\r\n"), reply.size() - 4) + 4));
-    static const std::regex kSample(R"((\w+(?:\{\w+="[^"]*"(?:,\w+="[^"]*")*\})?) ([-+0-9.eE]+|\+Inf|[Nn]a[Nn]))");
+    static const std::regex kSample(
+        R"((\w+(?:\{\w+="[^"]*"(?:,\w+="[^"]*")*\})?) ([-+0-9.eE]+|\+Inf|[Nn]a[Nn]))");
     std::map<std::string, double> series;
     for (std::string line; std::getline(lines, line);) {
       if (line.empty() || line.starts_with("# HELP ") || line.starts_with("# TYPE ")) continue;

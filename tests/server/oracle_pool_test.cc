@@ -146,7 +146,8 @@ TEST_F(OraclePoolTest, WhatIsKnownIsAskedOfNobody) {
   });
   const std::vector<PartOfRound> known = {part(0, 0, 10), part(0, 300, 1), part(0, 301, 99),
                                           part(1, 699, 1)};
-  ExpectAllAnswered(pool.Ask(batch_, [] {}, known));
+  ExpectAllAnswered(pool.Ask(
+      batch_, [] {}, known));
   for (std::size_t q = 0; q < asked.size(); ++q) {
     const bool was_known = q < 10 || (q >= 300 && q < 400) || q == 1399;
     EXPECT_EQ(asked[q], was_known ? 0 : 1) << q;

@@ -185,8 +185,8 @@ TEST(Session, AMeshThatOutgrowsTheMemoryFailsAndGivesItBack) {
   EXPECT_EQ(view.failure.reason, "LIMIT_EXCEEDED");
   EXPECT_NE(view.failure.message.find("--max-memory-bytes"), std::string::npos);
   EXPECT_EQ(view.revision, 2u);
-  EXPECT_EQ(view.bytes, EstimateFinishedBytes(session.options().spec) +
-                            session.history()->MemoryBytes())
+  EXPECT_EQ(view.bytes,
+            EstimateFinishedBytes(session.options().spec) + session.history()->MemoryBytes())
       << "the mesher is gone";
   EXPECT_EQ(budget->total(), view.bytes);
   worker->WaitForEnd();

@@ -100,11 +100,12 @@ const char* NameOf(Outcome outcome) {
 }
 
 void Print(const std::string& name, const Tally& t) {
-  std::printf("%-20s %5llu %6llu %6llu %6llu %7llu %6llu  %4llu/%-4llu %4llu/%-4llu %6llu %7llu %7.1f\n",
-              name.c_str(), Wide(t.runs), Wide(t.outcomes[0]), Wide(t.outcomes[1]),
-              Wide(t.outcomes[2]), Wide(t.outcomes[3]), Wide(t.outcomes[4]),
-              Wide(t.honest_certified), Wide(t.honest), Wide(t.reach_near), Wide(t.reach_told),
-              Wide(Median(t.rounds_unfinished)), Wide(Median(t.queries_certified)), t.seconds);
+  std::printf(
+      "%-20s %5llu %6llu %6llu %6llu %7llu %6llu  %4llu/%-4llu %4llu/%-4llu %6llu %7llu %7.1f\n",
+      name.c_str(), Wide(t.runs), Wide(t.outcomes[0]), Wide(t.outcomes[1]), Wide(t.outcomes[2]),
+      Wide(t.outcomes[3]), Wide(t.outcomes[4]), Wide(t.honest_certified), Wide(t.honest),
+      Wide(t.reach_near), Wide(t.reach_told), Wide(Median(t.rounds_unfinished)),
+      Wide(Median(t.queries_certified)), t.seconds);
 }
 
 }  // namespace
@@ -126,11 +127,12 @@ int main(int argc, char** argv) {
       wrong += run.outcome == Outcome::kFalse && !IsBeyondSeeing(family);
       const bool lost = c.epsilon <= 0.4 * c.shape->Reach() && run.outcome > Outcome::kUnseen;
       if (!s.verbose && run.outcome != Outcome::kFalse && !lost) continue;
-      std::printf("%s --family %s --case %llu --seed %llu: k %d, d %d, epsilon %.4g, reach %.4g "
-                  "(told %.4g), %llu vertices, %llu rounds: %s\n",
-                  NameOf(run.outcome), family.c_str(), Wide(n), Wide(s.seed), c.shape->k(),
-                  c.shape->d(), c.epsilon, c.shape->Reach(), run.estimated_reach,
-                  Wide(run.counts.vertices), Wide(run.counts.rounds), run.told.c_str());
+      std::printf(
+          "%s --family %s --case %llu --seed %llu: k %d, d %d, epsilon %.4g, reach %.4g "
+          "(told %.4g), %llu vertices, %llu rounds: %s\n",
+          NameOf(run.outcome), family.c_str(), Wide(n), Wide(s.seed), c.shape->k(), c.shape->d(),
+          c.epsilon, c.shape->Reach(), run.estimated_reach, Wide(run.counts.vertices),
+          Wide(run.counts.rounds), run.told.c_str());
       std::fflush(stdout);
     }
   }

@@ -43,8 +43,7 @@ using Maker = std::function<void(Case&, Dice&)>;
 void NestedSpheres(Case& c, Dice& dice) {
   const int k = dice.Int(1, 3);
   c.epsilon = dice.Uniform(0.15, 0.4);
-  c.shape = ConcentricSpheres(k, dice.Int(2, k == 1 ? 3 : 2),
-                              std::min(0.4, Gap(c.epsilon, dice)));
+  c.shape = ConcentricSpheres(k, dice.Int(2, k == 1 ? 3 : 2), std::min(0.4, Gap(c.epsilon, dice)));
 }
 
 void NeighbouringSpheres(Case& c, Dice& dice) {
@@ -154,8 +153,8 @@ void Products(Case& c, Dice& dice) {
   c.epsilon = dice.Uniform(0.2, 0.35);
   const double gap = std::min(0.4, Gap(c.epsilon, dice));
   const ShapePtr circle = Curves({Circle(0, 0, 0.8)});
-  const ShapePtr pair = dice.Coin() ? ConcentricSpheres(1, 2, gap)
-                                    : Curves({StarShaped(0, 0, {1, 0, 1 - gap})});
+  const ShapePtr pair =
+      dice.Coin() ? ConcentricSpheres(1, 2, gap) : Curves({StarShaped(0, 0, {1, 0, 1 - gap})});
   c.shape = Product(pair, circle);
 }
 
@@ -201,10 +200,18 @@ void Anything(Case& c, Dice& dice) {
     return Curve(cosines, sines);
   };
   switch (dice.Int(0, 7)) {
-    case 0: c.shape = Curves({StarShaped(0, 0, radial(false))}); break;
-    case 1: c.shape = Curves({space_curve(dice.Int(3, 5))}); break;
-    case 2: c.shape = Revolution({StarShaped(0, 0, radial(true))}, true, dice.Int(1, 2)); break;
-    case 3: c.shape = Revolution({StarShaped(2.4, 0, radial(false))}, false, 1); break;
+    case 0:
+      c.shape = Curves({StarShaped(0, 0, radial(false))});
+      break;
+    case 1:
+      c.shape = Curves({space_curve(dice.Int(3, 5))});
+      break;
+    case 2:
+      c.shape = Revolution({StarShaped(0, 0, radial(true))}, true, dice.Int(1, 2));
+      break;
+    case 3:
+      c.shape = Revolution({StarShaped(2.4, 0, radial(false))}, false, 1);
+      break;
     case 4:
       c.shape = Product(Curves({StarShaped(0, 0, radial(false))}), Curves({Circle(0, 0, 0.6)}));
       break;

@@ -43,8 +43,8 @@ class Shape {
   virtual VectorXd Closest(const VectorXd& x, MatrixXd* tangent) const = 0;
   virtual std::vector<int> Betti() const = 0;  // 0..k
   virtual double Reach() const = 0;
-  virtual MatrixXd Seeds() const = 0;  // a point of each component
-  virtual double Radius() const = 0;   // of a ball around the origin that holds it
+  virtual MatrixXd Seeds() const = 0;                  // a point of each component
+  virtual double Radius() const = 0;                   // of a ball around the origin that holds it
   virtual int Component(const VectorXd& y) const = 0;  // that a point of it is on, 0 .. b_0 - 1
   // Where knots and links are to be judged: the curves themselves.
   virtual const std::vector<Curve>* curves() const { return nullptr; }

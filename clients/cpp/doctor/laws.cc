@@ -9,9 +9,9 @@
 namespace stellate::doctor {
 namespace {
 
-constexpr double kSafeRatio = 0.4;  // of epsilon and the reach
-constexpr double kTolerated = 3;    // degrees
-constexpr double kCorner = 10;      // degrees
+constexpr double kSafeRatio = 0.4;      // of epsilon and the reach
+constexpr double kTolerated = 3;        // degrees
+constexpr double kCorner = 10;          // degrees
 constexpr double kLeastLength = 1e-45;  // that servers take
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 

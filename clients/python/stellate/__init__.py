@@ -21,7 +21,7 @@ from ._findings import CheckReport, Finding  # noqa: E402
 from ._formats import check_save  # noqa: E402
 from ._mesh import Mesh, load_txt  # noqa: E402
 from ._server import Server, find_stellated  # noqa: E402
-from ._version import __version__  # noqa: E402
+from ._version import __version__ as __version__  # noqa: E402
 from .client import Client, MeshInfo, ServerInfo  # noqa: E402
 from .errors import (  # noqa: E402
     Cancelled,

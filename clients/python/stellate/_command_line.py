@@ -18,7 +18,8 @@ import os
 import pathlib
 import sys
 import traceback
-from typing import Any, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 from ._credentials import Credentials
 from ._doctor import check
@@ -139,9 +140,7 @@ def _settings(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _connected(options: argparse.Namespace) -> Client:
-    return Client(
-        options.server, credentials_of(options), reconnect_seconds=options.reconnect
-    )
+    return Client(options.server, credentials_of(options), reconnect_seconds=options.reconnect)
 
 
 def _bar(options: argparse.Namespace) -> Any:
@@ -199,10 +198,18 @@ def _serve(options: argparse.Namespace) -> int:
         else:
             count = options.processes
             spawn = multiprocessing.get_context("spawn")  # gRPC's threads do not outlive a fork
-            with futures.ProcessPoolExecutor(count, spawn) as pool, workers_on(
-                pool, oracle, options.mesh, count, server=client, worker=options.worker,
-                max_chunk=options.max_chunk,
-            ) as crew:
+            with (
+                futures.ProcessPoolExecutor(count, spawn) as pool,
+                workers_on(
+                    pool,
+                    oracle,
+                    options.mesh,
+                    count,
+                    server=client,
+                    worker=options.worker,
+                    max_chunk=options.max_chunk,
+                ) as crew,
+            ):
                 state = max(crew.wait())
     print(state)
     return _FAILED if state == "FAILED" else _WELL

@@ -46,7 +46,9 @@ class Credentials:
                     "turn TLS on"
                 )
             channel = grpc.insecure_channel(address, options)
-        return channel if self.token is None else grpc.intercept_channel(channel, _Token(self.token))
+        return (
+            channel if self.token is None else grpc.intercept_channel(channel, _Token(self.token))
+        )
 
 
 def _read(path: str | os.PathLike[str] | None) -> bytes | None:

@@ -204,9 +204,7 @@ class _Examination:
         alone = np.concatenate([probe.sizes(one[None]) for one in p])
         row = _first(np.abs(sizes - alone) > 1e-9 * sizes)
         if row is not None:
-            self.add(
-                Finding.of("SIZE_CHANGES", query=p[row], size=sizes[row], other=alone[row])
-            )
+            self.add(Finding.of("SIZE_CHANGES", query=p[row], size=sizes[row], other=alone[row]))
 
     def _tangents_are_right(self, probe: Probe) -> None:
         if not probe.has_tangent_basis:
@@ -336,7 +334,7 @@ class _Examination:
         asked = probe.queries
         for batch in _BATCHES:
             x = probe.starts[np.arange(batch) % len(probe.starts)]
-            seconds = _seconds(lambda: probe.closest(x))
+            seconds = _seconds(lambda x=x: probe.closest(x))
             self._rates[batch] = batch / seconds
             if seconds > 10 * _SPEED_SECONDS:
                 break

@@ -144,7 +144,12 @@ class ExecutorWorkers:
         self._pool = _Pool(executor)
         self._workers = [
             client.worker(
-                self._checked, mesh_name, f"{worker}-{i}", self._note, quiet=i > 1, ask=self._ask,
+                self._checked,
+                mesh_name,
+                f"{worker}-{i}",
+                self._note,
+                quiet=i > 1,
+                ask=self._ask,
                 max_chunk=max_chunk,
             )  # fmt: skip
             for i in range(1, int(slots) + 1)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import os
-from typing import Any, Iterator, Sequence, Union
+from collections.abc import Iterator, Sequence
+from typing import Any, Union
 
 from ._checkpoint import Checkpoint
 from ._credentials import Credentials
@@ -237,7 +238,8 @@ def serve(
     once, as in stellate.mesh.
 
     Returns: the state that the mesh ended in, e.g. "SUCCEEDED".
-    Raises: MeshNotFound, also for a mesh that was over and is not kept any more; what the oracle raises, after the server was told, or a StellateError.
+    Raises: MeshNotFound, also for a mesh that was over and is not kept any more; what the oracle
+        raises, after the server was told, or a StellateError.
     """
     with _client(server, credentials) as client, told("this worker left; others have its work"):
         return client.serve(oracle, mesh_name, worker=worker, max_chunk=max_chunk)

@@ -6,7 +6,8 @@ import dataclasses
 import functools
 import importlib.resources
 import textwrap
-from typing import Any, Mapping
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class Words:
     advice: str
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def all_words() -> Mapping[str, Words]:
     """The findings that there are, by code."""
     text = importlib.resources.files(__package__).joinpath("findings.txt").read_text("utf-8")

@@ -8,7 +8,8 @@ import importlib.util
 import os
 import secrets
 import stat
-from typing import TYPE_CHECKING, Callable, Iterator
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Callable
 
 import numpy as np
 

@@ -76,9 +76,7 @@ class Probe:
             raise Stop(Finding.of(code, what=str(error))) from error
         except Exception as error:
             what = f"{type(error).__name__}: {error}"
-            raise Stop(
-                Finding.of("RAISED", method=method, n=len(arrays[0]), what=what)
-            ) from error
+            raise Stop(Finding.of("RAISED", method=method, n=len(arrays[0]), what=what)) from error
 
     # What is drawn from them.
 
@@ -93,9 +91,7 @@ class Probe:
             raise Stop(Finding.of("NOTHING_FOUND", n=len(starts), query=starts[0]))
         if len(lost) > len(starts) / 2:
             add(
-                Finding.of(
-                    "MOSTLY_NOT_FOUND", lost=len(lost), n=len(starts), query=starts[lost[0]]
-                )
+                Finding.of("MOSTLY_NOT_FOUND", lost=len(lost), n=len(starts), query=starts[lost[0]])
             )
         self.starts, self.points = starts[found], answers[found]
         self.size = float(norms(np.ptp(self.points, axis=0)))
@@ -119,9 +115,9 @@ class Probe:
                 parts.append(near + 0.3 * spread * self._random_units(len(near)))
         if box is not None:
             lower, upper = box
-            if lower.shape == upper.shape == (d,) and (lower < upper).all():
-                if np.isfinite(upper - lower).all():
-                    parts.append(lower + (upper - lower) * self.random.random((_STARTS, d)))
+            ordered = lower.shape == upper.shape == (d,) and (lower < upper).all()
+            if ordered and np.isfinite(upper - lower).all():
+                parts.append(lower + (upper - lower) * self.random.random((_STARTS, d)))
         if not sum(map(len, parts)):
             raise Stop(Finding.of("NO_WHEREABOUTS", d=d))
         return np.concatenate(parts)

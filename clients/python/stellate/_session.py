@@ -7,8 +7,9 @@ import logging
 import numbers
 import threading
 import time
+from collections.abc import Iterator
 from types import TracebackType
-from typing import Any, Callable, Iterator
+from typing import Any, Callable
 
 from ._checkpoint import Checkpoint
 from ._epsilon import choose
@@ -16,9 +17,9 @@ from ._follow import Following, OnProgress
 from ._mesh import Mesh
 from ._server import Server
 from ._spec import mesh_spec
+from ._worker import check_max_chunk
 from .client import Client, MeshInfo
 from .errors import Interrupted, InvalidArgument, StellateError
-from ._worker import check_max_chunk
 from .oracle import CheckedOracle
 from .progress import progress_bar
 

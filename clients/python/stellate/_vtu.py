@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import base64
 import zlib
-from typing import TYPE_CHECKING, Iterator
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -74,9 +75,7 @@ def _array(name: str, values: np.ndarray, more: str = "") -> str:
     """A DataArray with its numbers inline: base64 of the blocks' sizes, base64 of the blocks."""
     kind = _TYPES[values.dtype.newbyteorder("<").str]
     raw = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<")).tobytes()
-    blocks = [
-        zlib.compress(raw[i : i + _BLOCK_BYTES], 1) for i in range(0, len(raw), _BLOCK_BYTES)
-    ]
+    blocks = [zlib.compress(raw[i : i + _BLOCK_BYTES], 1) for i in range(0, len(raw), _BLOCK_BYTES)]
     head = [len(blocks), _BLOCK_BYTES, len(raw) % _BLOCK_BYTES, *map(len, blocks)]
     sizes = np.array(head, dtype="<u8").tobytes()
     inline = base64.b64encode(sizes) + base64.b64encode(b"".join(blocks))

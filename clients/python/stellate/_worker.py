@@ -7,7 +7,8 @@ import queue
 import threading
 import time
 import traceback
-from typing import Any, Callable, Iterator
+from collections.abc import Iterator
+from typing import Any, Callable
 
 import grpc
 
@@ -307,4 +308,3 @@ class Worker:
                 pass
         except _Broken:
             pass  # ABORTED, as announced
-

@@ -7,7 +7,8 @@ them: it reaches the caller as itself.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Mapping
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import grpc
 import numpy as np

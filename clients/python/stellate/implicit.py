@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Callable, Sequence
+from collections.abc import Sequence
+from typing import Any, Callable
 
 import numpy as np
 
@@ -216,9 +217,7 @@ class ImplicitManifold:
             rows = np.flatnonzero(~best.converged)
             if not rows.size:
                 break
-            there, there_values, landed = self._descend_to_manifold(
-                y[rows] + fraction * step[rows]
-            )
+            there, there_values, landed = self._descend_to_manifold(y[rows] + fraction * step[rows])
             better = landed & (norms(there - x[rows]) < norms(y[rows] - x[rows]))
             moved = rows[better]
             best.points[moved], best.values[moved] = there[better], there_values[better]

@@ -5,7 +5,7 @@ Answers never depend on the rest of the batch: sums run over the last axis, one 
 
 from __future__ import annotations
 
-from typing import Sequence
+from collections.abc import Sequence
 
 import numpy as np
 

@@ -43,8 +43,8 @@ TEST(Evidence, PointsOfTheMeshAreNoEvidenceAgainstIt) {
 TEST(Evidence, ASheetNearerThanAnEdgeBoundsTheReach) {
   const HandmadeMesh mesh = Icosphere(3);
   const Eigen::Vector3d y = 0.98 * mesh.Point(7);
-  const Evidence evidence = HoldAgainst(mesh.View(), {y[0], y[1], y[2]}, LongestEdges(mesh, 0.15),
-                                        0.1, false, 1e-12, 1);
+  const Evidence evidence =
+      HoldAgainst(mesh.View(), {y[0], y[1], y[2]}, LongestEdges(mesh, 0.15), 0.1, false, 1e-12, 1);
   EXPECT_NEAR(evidence.reach, 0.01, 1e-9);
   EXPECT_EQ(evidence.narrowest, 0u);
   EXPECT_EQ(evidence.vertex, 7u);

@@ -47,8 +47,8 @@ struct OnSphere {
   // Orthonormal rows across (1, ..., 1).
   static Tangent PlaneBasis() { return TangentAt(Vector::Ones().normalized()); }
   static Tangent TangentAt(const Vector& p) {
-    const Eigen::Matrix<double, K + 1, K + 1> q = Eigen::HouseholderQR<Vector>(p).householderQ() *
-                                                  Eigen::Matrix<double, K + 1, K + 1>::Identity();
+    const Eigen::MatrixXd q = Eigen::HouseholderQR<Eigen::MatrixXd>(p).householderQ() *
+                              Eigen::MatrixXd::Identity(K + 1, K + 1);
     return q.rightCols(K).transpose();
   }
 

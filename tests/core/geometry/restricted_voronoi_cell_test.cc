@@ -128,8 +128,8 @@ Vertices<K> BruteForceVertices(const HalfSpaces<K>& half_spaces) {
   const int n = static_cast<int>(half_spaces.size());
   std::vector<int> pick(K);
   const auto try_subset = [&] {
-    Eigen::Matrix<double, K, K> m;
-    Vec<K> rhs;
+    Eigen::MatrixXd m(K, K);  // of any size: compiling a decomposition for each K takes a minute
+    Eigen::VectorXd rhs(K);
     std::vector<std::uint32_t> ids;
     for (int r = 0; r < K; ++r) {
       const auto& h = half_spaces[static_cast<std::size_t>(pick[static_cast<std::size_t>(r)])];
@@ -137,7 +137,7 @@ Vertices<K> BruteForceVertices(const HalfSpaces<K>& half_spaces) {
       rhs[r] = h.offset;
       ids.push_back(h.id);
     }
-    const Eigen::FullPivLU<Eigen::Matrix<double, K, K>> lu(m);
+    const Eigen::FullPivLU<Eigen::MatrixXd> lu(m);
     if (!lu.isInvertible()) return;
     const Vec<K> x = lu.solve(rhs);
     for (const auto& h : half_spaces)
@@ -155,6 +155,13 @@ Vertices<K> BruteForceVertices(const HalfSpaces<K>& half_spaces) {
   };
   choose(choose, 0, 0);
   return all;
+}
+
+// An orthogonal matrix.
+Eigen::MatrixXd RandomTurn(int k, Random& random) {
+  Eigen::MatrixXd m(k, k);
+  for (int i = 0; i < k * k; ++i) m(i) = random.Normal();
+  return Eigen::HouseholderQR<Eigen::MatrixXd>(m).householderQ();
 }
 
 // The facets of the simplex that a cell begins as, as half-spaces.
@@ -328,12 +335,9 @@ TYPED_TEST(RestrictedVoronoiCellTest, OfAGridPointIsACubeWhicheverNeighbourComes
 
 TYPED_TEST(RestrictedVoronoiCellTest, OfATurnedGridPointIsATurnedCube) {
   constexpr int K = TypeParam::value;
-  using Matrix = Eigen::Matrix<double, K, K>;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     Random random(seed, 31);
-    Matrix m;
-    for (int i = 0; i < K * K; ++i) m(i) = random.Normal();
-    const Matrix turn = Eigen::HouseholderQR<Matrix>(m).householderQ();
+    const Eigen::MatrixXd turn = RandomTurn(K, random);
     HalfSpaces<K> neighbours = Grid<K>(true);
     for (auto& h : neighbours) h.normal = turn * h.normal;
     Shuffle(&neighbours, seed);
@@ -377,12 +381,9 @@ TYPED_TEST(RestrictedVoronoiCellTest, IsHardlyChangedByTheSameHalfSpaceTwice) {
 // is refused, and a cell is never lost.
 TYPED_TEST(RestrictedVoronoiCellTest, IsLeftAsItWasByACutThatIsRefused) {
   constexpr int K = TypeParam::value;
-  using Matrix = Eigen::Matrix<double, K, K>;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     Random random(seed, 31);
-    Matrix m;
-    for (int i = 0; i < K * K; ++i) m(i) = random.Normal();
-    const Matrix turn = Eigen::HouseholderQR<Matrix>(m).householderQ();
+    const Eigen::MatrixXd turn = RandomTurn(K, random);
     HalfSpaces<K> neighbours = Grid<K>(false);
     Shuffle(&neighbours, seed);
     RestrictedVoronoiCell<K> cell;

@@ -52,8 +52,7 @@ TEST_P(TrueReach, ProvesTheMesh) {
   EXPECT_TRUE(Says(c.verdict, "as declared")) << c.verdict;
   EXPECT_GE(c.proved_distance, c.max_barycentre_distance);
   EXPECT_LT(c.proved_distance, reach);
-  const testing::Topology topology =
-      TopologyOf(run.mesher->Simplices(), manifold->dimension());
+  const testing::Topology topology = TopologyOf(run.mesher->Simplices(), manifold->dimension());
   EXPECT_EQ(topology.euler_characteristic, manifold->facts().euler_characteristic);
 }
 

@@ -40,8 +40,8 @@ Specification SurfaceIn(double half_box, double epsilon) {
   spec.dimension = 2;
   spec.ambient_dimension = 3;
   spec.epsilon = epsilon;
-  spec.bounding_box = BoundingBox{Eigen::Vector3d::Constant(-half_box),
-                                  Eigen::Vector3d::Constant(half_box)};
+  spec.bounding_box =
+      BoundingBox{Eigen::Vector3d::Constant(-half_box), Eigen::Vector3d::Constant(half_box)};
   return spec;
 }
 
@@ -108,8 +108,7 @@ TEST(MissedParts, ABoxThatIsALittleTooSmallIsWarnedOf) {
   EXPECT_TRUE(run.report().certificate.certified) << run.report().certificate.verdict;
   ASSERT_EQ(run.report().certificate.warnings.size(), 1u);
   EXPECT_TRUE(Says(run.report().certificate.warnings[0], "leaves the bounding box"));
-  EXPECT_TRUE(
-      Drive(SurfaceIn(1.2, 0.2), AnswererOf(Sphere)).report().certificate.warnings.empty());
+  EXPECT_TRUE(Drive(SurfaceIn(1.2, 0.2), AnswererOf(Sphere)).report().certificate.warnings.empty());
 }
 
 // Pairs of orthonormal vectors of R^4: V(2, 4), of dimension 5, in R^8.

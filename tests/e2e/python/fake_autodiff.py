@@ -89,7 +89,9 @@ def fake_torch():
 
     autograd = types.SimpleNamespace(grad=grad)
     enable_grad = contextlib.nullcontext
-    return {"torch": types.SimpleNamespace(tensor=tensor, enable_grad=enable_grad, autograd=autograd)}
+    return {
+        "torch": types.SimpleNamespace(tensor=tensor, enable_grad=enable_grad, autograd=autograd)
+    }
 
 
 def provide(library, monkeypatch):

@@ -7,7 +7,6 @@ from concurrent import futures
 
 import grpc
 import numpy as np
-
 from stellate._arrays import to_wire
 from stellate._generated import geometry_pb2, mesh_pb2, oracle_pb2, stellate_pb2
 from stellate._generated import stellate_pb2_grpc as rpc

@@ -3,7 +3,6 @@
 import itertools
 
 import numpy as np
-
 import stellate
 
 
@@ -25,7 +24,7 @@ def simplex_boundary(dimension: int) -> stellate.Mesh:
 
 def projective_plane(ambient_dimension: int = 5) -> stellate.Mesh:
     """RP^2 with six vertices, not orientable."""
-    triangles = "012 023 034 045 015 124 235 134 245 135".split()
+    triangles = ["012", "023", "034", "045", "015", "124", "235", "134", "245", "135"]
     rows = np.array([[int(c) for c in t] for t in triangles])
     return stellate.Mesh(np.eye(6, ambient_dimension) + 0.1, rows)
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import shapes
-
 import stellate
 from stellate._arrays import from_wire, indices_from_wire, to_wire
 from stellate._generated import geometry_pb2, mesh_pb2, stellate_pb2

@@ -11,7 +11,6 @@ import threading
 
 import numpy as np
 import pytest
-
 import stellate
 from stellate import manifolds
 
@@ -171,7 +170,9 @@ def test_a_server_that_comes_to_its_end_is_waited_for(tmp_path):
     timer.join()
 
 
-@pytest.mark.parametrize("name, damage", [("mesh.json", "{"), ("mesh.json", "[]"), ("mesh.npz", "x")])
+@pytest.mark.parametrize(
+    "name, damage", [("mesh.json", "{"), ("mesh.json", "[]"), ("mesh.npz", "x")]
+)
 def test_a_damaged_directory_is_named(name, damage, tmp_path):
     stellate.mesh(manifolds.Torus(), 0.3, checkpoint=tmp_path)
     (tmp_path / name).write_text(damage)

@@ -8,9 +8,8 @@ import fake_server
 import grpc
 import numpy as np
 import pytest
-from fake_server import FakeServer, delta, final, serving
-
 import stellate
+from fake_server import FakeServer, delta, final, serving
 from stellate._arrays import to_wire
 from stellate._generated import mesh_pb2, oracle_pb2
 from stellate.manifolds import Sphere
@@ -47,9 +46,8 @@ def test_a_server_that_breaks_the_protocol_is_found_out():
 
 def test_a_mesh_cancelled_by_others_keeps_what_there_is():
     fake = FakeServer([[delta(1, 0, TRIANGLE, EDGES), final(mesh_pb2.MESH_STATE_CANCELLED)]])
-    with serving(fake) as address:
-        with pytest.raises(stellate.Cancelled) as caught:
-            stellate.mesh(CIRCLE, 0.1, server=address)
+    with serving(fake) as address, pytest.raises(stellate.Cancelled) as caught:
+        stellate.mesh(CIRCLE, 0.1, server=address)
     assert np.array_equal(caught.value.mesh.simplices, EDGES)
 
 
@@ -86,9 +84,8 @@ def test_a_mesh_of_another_kind_is_not_served():
 
 def test_an_unknown_question_is_not_answered_with_nonsense():
     fake = FakeServer(chunks=[oracle_pb2.QueryChunk(lease=1, kind=9, points=to_wire(TRIANGLE))])
-    with serving(fake) as address:
-        with pytest.raises(ValueError, match="kind 9"):
-            stellate.serve(CIRCLE, "meshes/x", server=address)
+    with serving(fake) as address, pytest.raises(ValueError, match="kind 9"):
+        stellate.serve(CIRCLE, "meshes/x", server=address)
     assert fake.answers[0].WhichOneof("message") == "failure"
     assert "kind 9" in fake.answers[0].failure.message
 

@@ -5,10 +5,9 @@ import sys
 import fake_autodiff
 import numpy as np
 import pytest
+import stellate
 import topology
 from test_implicit import implicit_rotations, implicit_torus
-
-import stellate
 
 SQUARE = (np.full(4, -1.3), np.full(4, 1.3))
 LIBRARIES = ["autograd", "jax", "torch"]
@@ -57,7 +56,9 @@ def test_meshes_with_derivatives_of_its_own(monkeypatch, server):
 @pytest.mark.parametrize("library", LIBRARIES)
 def test_a_library_that_is_not_there_is_named(library, monkeypatch):
     monkeypatch.setitem(sys.modules, library, None)
-    with pytest.raises(stellate.InvalidArgument, match=f"needs {library}, which cannot be imported"):
+    with pytest.raises(
+        stellate.InvalidArgument, match=f"needs {library}, which cannot be imported"
+    ):
         made(library)
 
 

@@ -6,7 +6,6 @@ import sys
 
 import numpy as np
 import pytest
-
 import stellate
 from stellate import manifolds
 from stellate._command_line import main
@@ -143,17 +142,13 @@ BROKEN = {
     "FLAT_MISSED": Torus(intersect_flat=flats(lambda p, f, c, t, r: (p, f & False))),
     "FLAT_OFF": Torus(intersect_flat=flats(lambda p, f, c, t, r: (project(p + 0.01), f))),
     "FLAT_OUTSIDE_RADIUS": Torus(
-        intersect_flat=flats(
-            lambda p, f, c, t, r: (GOOD.intersect_flat(c, t, np.full(len(c), 10.0)))
-        )
+        intersect_flat=flats(lambda p, f, c, t, r: GOOD.intersect_flat(c, t, np.full(len(c), 10.0)))
     ),
     "FLAT_OFF_MANIFOLD": Torus(
         intersect_flat=flats(lambda p, f, c, t, r: (p + 0.01 * normal_of(t), f))
     ),
     "FLAT_NOT_NEAREST": Torus(
-        intersect_flat=flats(
-            lambda p, f, c, t, r: (p + 2 * (c - p) + 0.2 * (c - p), f)
-        )
+        intersect_flat=flats(lambda p, f, c, t, r: (p + 2 * (c - p) + 0.2 * (c - p), f))
     ),
 }
 

@@ -7,13 +7,11 @@ import threading
 import grpc
 import numpy as np
 import pytest
-
 import stellate
+from fake_server import FakeServer, indices, serving
 from stellate import manifolds
 from stellate._arrays import to_wire
 from stellate._generated import mesh_pb2, stellate_pb2
-
-from fake_server import FakeServer, indices, serving
 
 UNKNOWN = "meshes/" + 32 * "0"
 
@@ -193,9 +191,8 @@ def test_a_download_that_cannot_be_resumed():
         with pytest.raises(stellate.Unavailable, match="--data-dir"):
             stellate.download("meshes/x", server=address)
     fake = Scattered(breaks=[4], code=grpc.StatusCode.RESOURCE_EXHAUSTED)
-    with serving(fake) as address:
-        with pytest.raises(stellate.LimitExceeded):
-            stellate.download("meshes/x", server=address)
+    with serving(fake) as address, pytest.raises(stellate.LimitExceeded):
+        stellate.download("meshes/x", server=address)
     assert len(fake.asked) == 1
 
 
@@ -214,7 +211,6 @@ def test_a_server_that_makes_no_sense(fault):
                     part.cells.CopyFrom(indices([[0, 9]]))
                 yield part
 
-    with serving(Faulty()) as address:
-        with pytest.raises(stellate.StellateError) as caught:
-            stellate.download("meshes/x", server=address)
+    with serving(Faulty()) as address, pytest.raises(stellate.StellateError) as caught:
+        stellate.download("meshes/x", server=address)
     assert caught.value.reason == "PROTOCOL"

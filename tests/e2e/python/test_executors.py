@@ -9,7 +9,6 @@ import threading
 
 import numpy as np
 import pytest
-
 import stellate
 from stellate import manifolds
 
@@ -188,9 +187,8 @@ def test_what_cannot_be_sent_is_said(client, declare, tmp_path):
     oracle = Torus(tmp_path)
     oracle.lock = threading.Lock()
     name = declare(oracle)
-    with processes(1) as pool:
-        with pytest.raises(stellate.ExecutorError, match="pickle"):
-            stellate.workers_on(pool, oracle, name, 1, server=client).wait()
+    with processes(1) as pool, pytest.raises(stellate.ExecutorError, match="pickle"):
+        stellate.workers_on(pool, oracle, name, 1, server=client).wait()
     assert not client.get(name).over
 
 

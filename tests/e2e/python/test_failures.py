@@ -4,9 +4,8 @@ import threading
 
 import numpy as np
 import pytest
-import topology
-
 import stellate
+import topology
 from stellate import manifolds
 
 

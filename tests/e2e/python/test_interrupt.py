@@ -8,7 +8,6 @@ import subprocess
 import sys
 
 import pytest
-
 import stellate
 
 PROGRAM = """
@@ -73,7 +72,9 @@ def gone(pid):
     return True
 
 
-@pytest.mark.parametrize("call", [MESH, MESH.replace("stellate.mesh(", "list(stellate.watch(") + ")"])
+@pytest.mark.parametrize(
+    "call", [MESH, MESH.replace("stellate.mesh(", "list(stellate.watch(") + ")"]
+)
 def test_the_exception_has_the_mesh_so_far(call):
     with running(CAUGHT.format(call=call.replace("\n", ""))) as (process, servers):
         process.send_signal(signal.SIGINT)
@@ -87,7 +88,9 @@ def test_not_caught_it_says_what_happened_and_nothing_of_the_machinery():
     with running(MESH) as (process, _):
         process.send_signal(signal.SIGINT)
         _, complaints = process.communicate()
-    assert complaints.splitlines()[-1].startswith("stellate.errors.Interrupted: the mesh is cancelled")
+    assert complaints.splitlines()[-1].startswith(
+        "stellate.errors.Interrupted: the mesh is cancelled"
+    )
     assert "grpc" not in complaints and "During handling" not in complaints
     assert complaints.count("  File ") <= 4, complaints
 
@@ -135,7 +138,9 @@ stellate.serve(Seen(), {name!r}, server={server.address!r})
     with running(body) as (process, _):
         process.send_signal(signal.SIGINT)
         _, complaints = process.communicate()
-        assert complaints.splitlines()[-1].startswith("stellate.errors.Interrupted: this worker left")
+        assert complaints.splitlines()[-1].startswith(
+            "stellate.errors.Interrupted: this worker left"
+        )
         assert "grpc" not in complaints
     assert not client.get(name).over
     client.delete(name)

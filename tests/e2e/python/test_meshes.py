@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-import topology
-
 import stellate
+import topology
 from stellate import manifolds
 
 
@@ -222,9 +221,7 @@ def test_what_is_declared_and_asked_for_is_held_against_the_mesh(server):
     assert not two.certified
     assert "2 were declared" in two.report.certificate.verdict
     assert np.array_equal(two.points, plain.points)
-    thorough = stellate.mesh(
-        manifolds.Torus(), 0.2, server=server, components=1, audit="thorough"
-    )
+    thorough = stellate.mesh(manifolds.Torus(), 0.2, server=server, components=1, audit="thorough")
     assert thorough.certified, thorough.report
     assert "balls at every vertex and simplex" in thorough.report.certificate.verdict
     assert thorough.report.counts.queries > plain.report.counts.queries

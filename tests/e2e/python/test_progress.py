@@ -6,7 +6,6 @@ import json
 
 import numpy as np
 import pytest
-
 import stellate
 from stellate._generated import mesh_pb2
 

@@ -1,7 +1,6 @@
 """A declared reach through the real server: proved, refuted, refused."""
 
 import pytest
-
 import stellate
 from stellate import manifolds
 

@@ -4,9 +4,8 @@ import subprocess
 import sys
 
 import meshio
-import topology
-
 import stellate
+import topology
 
 
 def test_quickstart(repository, tmp_path):

@@ -8,7 +8,6 @@ import subprocess
 import time
 
 import pytest
-
 import stellate
 from stellate import _retry, manifolds
 

@@ -4,7 +4,6 @@ import pathlib
 import subprocess
 
 import pytest
-
 import stellate
 from stellate import manifolds
 
@@ -30,9 +29,7 @@ def files(tmp_path_factory):
     for name in ("server", "client"):
         openssl(directory, "req", "-new", *new_key(name), "-out", f"{name}.csr")
         sign = ("-CA", "ca.pem", "-CAkey", "ca.key", "-set_serial", "1", "-extfile", "names")
-        openssl(
-            directory, "x509", "-req", "-in", f"{name}.csr", *sign, "-out", f"{name}.pem"
-        )
+        openssl(directory, "x509", "-req", "-in", f"{name}.csr", *sign, "-out", f"{name}.pem")
     (directory / "tokens").write_text(f"alice {ALICE}\nbob {BOB}\n")
     (directory / "alice").write_text(ALICE + "\n")
     return directory
@@ -53,7 +50,11 @@ def address(files):
 
 @pytest.fixture
 def full(files):
-    return {"ca": files / "ca.pem", "certificate": files / "client.pem", "key": files / "client.key"}
+    return {
+        "ca": files / "ca.pem",
+        "certificate": files / "client.pem",
+        "key": files / "client.key",
+    }
 
 
 def test_a_mesh_over_mutual_tls_with_a_token(address, full):

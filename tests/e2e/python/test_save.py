@@ -1,19 +1,17 @@
 """Files: what is written is read back the same."""
 
 import dataclasses
-import sys
-import warnings
-
 import importlib.util
 import resource
+import sys
+import warnings
 
 import meshio
 import numpy as np
 import pytest
 import shapes
-import topology
-
 import stellate
+import topology
 from stellate import _formats
 from stellate._generated import mesh_pb2
 
@@ -52,7 +50,7 @@ def test_txt_is_exact(mesh, tmp_path):
     k, d = mesh.dimension, mesh.ambient_dimension
     assert lines[0] == f"{k} {d} {len(mesh.points)} {len(mesh.simplices)}"
     assert len(lines) == 1 + len(mesh.points) + len(mesh.simplices)
-    assert lines[1] == " ".join("%.17g" % x for x in mesh.points[0])
+    assert lines[1] == " ".join(f"{x:.17g}" for x in mesh.points[0])
     again = stellate.load_txt(tmp_path / "mesh.txt")
     assert again.points.tobytes() == mesh.points.tobytes()
     assert np.array_equal(again.simplices, mesh.simplices)

@@ -12,9 +12,8 @@ import time
 
 import numpy as np
 import pytest
-import topology
-
 import stellate
+import topology
 from stellate import manifolds
 
 

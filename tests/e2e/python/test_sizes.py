@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-import topology
-
 import stellate
+import topology
 from stellate import manifolds
 from stellate.oracle import CheckedOracle
 

@@ -12,16 +12,16 @@ import random
 import struct
 import threading
 import time
-from typing import Any, Callable, Iterator
+from collections.abc import Iterator
+from typing import Any, Callable
 
 import grpc
 import numpy as np
+import raw_http2 as raw
 import stellate
 from stellate._generated import mesh_pb2, oracle_pb2, stellate_pb2
 from stellate._spec import mesh_spec
 from stellate.oracle import CheckedOracle
-
-import raw_http2 as raw
 from strangers import ENDLESS, HALF, STRANGERS
 
 SERVICE = "/stellate.v1.Stellate/"
@@ -317,11 +317,13 @@ def rapid_resets(target: Target) -> None:
         connection = target.connect()
         block = raw.header_block(path)
         for first in range(0, _RESETS, 500):
-            connection.send(b"".join(
-                raw.frame(raw.HEADERS, raw.END_HEADERS, stream, block)
-                + raw.frame(raw.RST_STREAM, 0, stream, struct.pack(">I", 8))
-                for stream in range(1 + 2 * first, 1 + 2 * (first + 500), 2)
-            ))
+            connection.send(
+                b"".join(
+                    raw.frame(raw.HEADERS, raw.END_HEADERS, stream, block)
+                    + raw.frame(raw.RST_STREAM, 0, stream, struct.pack(">I", 8))
+                    for stream in range(1 + 2 * first, 1 + 2 * (first + 500), 2)
+                )
+            )
         connection.close()
 
 
@@ -359,8 +361,12 @@ def unread_replies(target: Target) -> None:
     pings = 2000 * target.scale * raw.frame(raw.PING, 0, 0, bytes(8))
     settings = 2000 * target.scale * raw.frame(raw.SETTINGS, 0, 0)
     calls = b"".join(
-        raw.frame(raw.HEADERS, raw.END_HEADERS | raw.END_STREAM, 1 + 2 * number,
-                  raw.header_block(SERVICE + "Nothing"))
+        raw.frame(
+            raw.HEADERS,
+            raw.END_HEADERS | raw.END_STREAM,
+            1 + 2 * number,
+            raw.header_block(SERVICE + "Nothing"),
+        )
         for number in range(200 * target.scale)
     )
     for flood in (pings, settings, calls):
@@ -456,9 +462,7 @@ def made_and_cancelled(target: Target) -> None:
     """More meshes than are kept, each cancelled at once."""
     for _ in range(33 * target.scale):
         name = target.create()
-        target.unary(
-            "CancelMesh", stellate_pb2.CancelMeshRequest(name=name).SerializeToString()
-        )
+        target.unary("CancelMesh", stellate_pb2.CancelMeshRequest(name=name).SerializeToString())
 
 
 class _Worker:

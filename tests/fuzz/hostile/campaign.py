@@ -30,7 +30,6 @@ sys.path.insert(0, str(ROOT / "clients" / "python"))
 
 import grpc  # noqa: E402
 import stellate  # noqa: E402
-
 from attacks import ATTACKS, Target  # noqa: E402
 
 _PATIENCE = 120.0  # seconds for anything that has to come to an end
@@ -85,8 +84,10 @@ class Campaign:
         self._check_memory(memory, self._status_kb("VmHWM") - idle)
         self._stop()
         self._check_log(time.monotonic() - begin)
-        print(f"{rounds} rounds of {len(ATTACKS)} attacks; calls taken: {self._taken}, refused: "
-              f"{', '.join(f'{code} {n}' for code, n in self._codes.most_common())}")
+        print(
+            f"{rounds} rounds of {len(ATTACKS)} attacks; calls taken: {self._taken}, refused: "
+            f"{', '.join(f'{code} {n}' for code, n in self._codes.most_common())}"
+        )
         print(f"{self._honest} honest meshes, each the same; {reference.count(10)} lines")
         print(f"resident memory after each round, MB: {_brief(memory)}")
         for problem in self._problems:
@@ -111,8 +112,10 @@ class Campaign:
         for thread in halves:
             thread.join()
         if self._server.poll() is not None:
-            self._problems.append(f"the server ended with {self._server.returncode}; its last "
-                                  f"words: {self._last_words()}")
+            self._problems.append(
+                f"the server ended with {self._server.returncode}; its last "
+                f"words: {self._last_words()}"
+            )
 
     def _attack(self, attacks: list, seed: str) -> None:
         host, port = self._address.rsplit(":", 1)
@@ -181,7 +184,9 @@ class Campaign:
                 return
         print(f"log: {len(lines)} lines, {of_libraries} of them of libraries")
         if of_libraries > _LOG_BURST + _LOG_LINES_A_SECOND * (seconds + 2):
-            self._problems.append(f"strangers made the server log {of_libraries} lines of libraries")
+            self._problems.append(
+                f"strangers made the server log {of_libraries} lines of libraries"
+            )
 
     def _stop(self) -> None:
         if self._server.poll() is None:

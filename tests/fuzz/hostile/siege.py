@@ -27,7 +27,6 @@ sys.path.insert(0, str(ROOT / "clients" / "python"))
 
 import grpc  # noqa: E402
 from stellate._generated import stellate_pb2, stellate_pb2_grpc  # noqa: E402
-
 from strangers import STRANGERS  # noqa: E402
 
 _TOKEN = "honest-0123456789abcdef"
@@ -71,7 +70,8 @@ class Honest:
             request = stellate_pb2.GetMeshRequest(name="x" * (_LARGE if kind == "large" else 1))
             try:
                 stellate_pb2_grpc.StellateStub(channel).GetMesh(
-                    request, timeout=_PATIENCE, metadata=self._metadata)
+                    request, timeout=_PATIENCE, metadata=self._metadata
+                )
             except grpc.RpcError as error:
                 if error.code() != grpc.StatusCode.INVALID_ARGUMENT:
                     self.failures[f"{kind}: {error.code().name} {error.details()}"] += 1
@@ -129,8 +129,9 @@ def siege(folder: pathlib.Path, arguments: argparse.Namespace) -> int:
     end = time.time() + arguments.seconds
     share = max(1, arguments.connections // _PROCESSES)
     strangers = [
-        multiprocessing.Process(target=_besiege, args=(
-            arguments.kind, host, int(port), share, end, arguments.mbit))
+        multiprocessing.Process(
+            target=_besiege, args=(arguments.kind, host, int(port), share, end, arguments.mbit)
+        )
         for _ in range(min(_PROCESSES, arguments.connections))
     ]
     for stranger in strangers:
@@ -143,12 +144,16 @@ def siege(folder: pathlib.Path, arguments: argparse.Namespace) -> int:
     after = _memory_mb(server, "VmRSS")
     server.send_signal(signal.SIGTERM)
     server.wait(_PATIENCE)
-    print(f"{arguments.kind}, {arguments.connections} strangers, {arguments.seconds:.0f} s: memory "
-          f"before, at most, after: {before:.0f}, {peak:.0f}, {after:.0f} MB")
+    print(
+        f"{arguments.kind}, {arguments.connections} strangers, {arguments.seconds:.0f} s: memory "
+        f"before, at most, after: {before:.0f}, {peak:.0f}, {after:.0f} MB"
+    )
     for kind, times in honest.times.items():
         if times:
-            print(f"  {kind}: {len(times)}, median {_percentile(times, 0.5):.3f} s, "
-                  f"p99 {_percentile(times, 0.99):.3f} s, worst {max(times):.3f} s")
+            print(
+                f"  {kind}: {len(times)}, median {_percentile(times, 0.5):.3f} s, "
+                f"p99 {_percentile(times, 0.99):.3f} s, worst {max(times):.3f} s"
+            )
     for failure, count in honest.failures.most_common():
         print(f"  FAILED {count} times: {failure}")
     return 1 if honest.failures else 0

@@ -8,7 +8,8 @@ import select
 import socket
 import struct
 import time
-from typing import Callable, Iterator
+from collections.abc import Iterator
+from typing import Callable
 
 import raw_http2 as raw
 
@@ -44,8 +45,9 @@ def endless_number() -> Iterator[bytes]:
     yield from itertools.repeat(raw.frame(raw.CONTINUATION, 0, 1, b"\x80" * _FRAME))
 
 
-def _say(host: str, port: int, end: float, mbit: float,
-         words: Callable[[], Iterator[bytes]]) -> None:
+def _say(
+    host: str, port: int, end: float, mbit: float, words: Callable[[], Iterator[bytes]]
+) -> None:
     """Says them at that rate; hung up on, again from the start."""
     while time.time() < end:
         try:

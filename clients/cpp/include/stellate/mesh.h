@@ -29,13 +29,13 @@ struct Mesh {
   //   .msh  k <= 3, d <= 3: Gmsh's, version 2.2, text
   //   .vtu  k <= 3; beyond d = 3 the first three coordinates, and all as point data "coordinates";
   //         field data "epsilon", "certified" (0 or 1), "verdict" and "version" (UTF-8 bytes)
-  // All but .txt are oriented as by OrientedSimplices(mesh). The file is replaced when the new one is
-  // whole. kFileFailed when the format cannot hold the mesh or the file cannot be written.
+  // All but .txt are oriented as by OrientedSimplices(mesh). The file is replaced when the new one
+  // is whole. kFileFailed when the format cannot hold the mesh or the file cannot be written.
   Expected<void> Save(const std::string& path) const;
 };
 
-// What Save would refuse, asked before there is a mesh: kFileFailed for a path whose format holds no
-// mesh of these dimensions, or whose folder is not there or cannot be written to.
+// What Save would refuse, asked before there is a mesh: kFileFailed for a path whose format holds
+// no mesh of these dimensions, or whose folder is not there or cannot be written to.
 Expected<void> CheckSave(const std::string& path, int dimension, int ambient_dimension);
 
 // The simplices with the ids in each reordered so that neighbours agree on their orientation; as
