@@ -12,14 +12,14 @@
 #include <utility>
 
 #include "core/message.h"
-#include "server/flags.h"
-#include "server/health_check.h"
-#include "server/library_log.h"
-#include "server/log.h"
-#include "server/salvage.h"
+#include "server/base/library_log.h"
+#include "server/base/log.h"
+#include "server/base/threads.h"
+#include "server/config/flags.h"
+#include "server/net/health_check.h"
+#include "server/net/tls.h"
+#include "server/salvage/salvage.h"
 #include "server/server.h"
-#include "server/threads.h"
-#include "server/tls.h"
 
 namespace {
 

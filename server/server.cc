@@ -18,11 +18,11 @@
 #include <thread>
 
 #include "core/message.h"
-#include "server/connection_guard.h"
-#include "server/error_map.h"
-#include "server/header_bound.h"
-#include "server/listener.h"
-#include "server/tls.h"
+#include "server/convert/error_map.h"
+#include "server/grpc_parts/header_bound.h"
+#include "server/net/connection_guard.h"
+#include "server/net/listener.h"
+#include "server/net/tls.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 
 namespace stellate::server {

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "core/status.h"
-#include "server/config.h"
-#include "server/handlers/handlers.h"
+#include "server/config/config.h"
+#include "server/rpc/handlers.h"
 
 namespace stellate::server {
 

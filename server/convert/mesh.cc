@@ -1,8 +1,8 @@
 #include "server/convert/mesh.h"
 
 #include "server/convert/arrays.h"
+#include "server/convert/error_map.h"
 #include "server/convert/spec.h"
-#include "server/error_map.h"
 
 namespace stellate::server {
 namespace {

@@ -1,8 +1,8 @@
 #pragma once
 
 #include "core/report.h"
-#include "server/session.h"
-#include "server/watch_log.h"
+#include "server/history/watch_log.h"
+#include "server/session/session.h"
 #include "stellate/v1/mesh.pb.h"
 #include "stellate/v1/stellate.pb.h"
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "core/batch.h"
-#include "server/oracle_pool.h"
+#include "server/oracles/oracle_pool.h"
 #include "stellate/v1/oracle.pb.h"
 
 namespace stellate::server {

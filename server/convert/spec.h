@@ -3,8 +3,8 @@
 #include <string>
 
 #include "core/specification.h"
-#include "server/config.h"
-#include "server/limits.h"
+#include "server/base/limits.h"
+#include "server/config/config.h"
 #include "stellate/v1/mesh.pb.h"
 
 namespace stellate::server {

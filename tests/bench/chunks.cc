@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "server/dispatch.h"
+#include "server/oracles/dispatch.h"
 #include "tests/support/run_mesher.h"
 
 namespace {

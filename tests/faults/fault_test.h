@@ -16,7 +16,7 @@
 #include <thread>
 #include <vector>
 
-#include "tests/server/live_server.h"
+#include "tests/server/support/live_server.h"
 
 namespace stellate::server::testing {
 

@@ -9,9 +9,9 @@
 #include <map>
 #include <random>
 
-#include "server/salvage.h"
+#include "server/salvage/salvage.h"
 #include "tests/faults/fault_test.h"
-#include "tests/server/journal_fixture.h"
+#include "tests/server/support/journal_fixture.h"
 
 namespace stellate::server {
 namespace {

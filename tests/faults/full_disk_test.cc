@@ -9,7 +9,7 @@
 
 #include <iostream>
 
-#include "server/journal.h"
+#include "server/journal/journal.h"
 #include "tests/faults/fault_test.h"
 
 namespace stellate::server {

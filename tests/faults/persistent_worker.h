@@ -8,7 +8,7 @@
 #include <string>
 #include <thread>
 
-#include "tests/server/live_server.h"
+#include "tests/server/support/live_server.h"
 
 namespace stellate::server::testing {
 

@@ -18,11 +18,11 @@
 #include <iostream>
 #include <map>
 
-#include "server/log.h"
-#include "server/record_bytes.h"
-#include "server/salvage.h"
+#include "server/base/log.h"
+#include "server/records/record_bytes.h"
+#include "server/salvage/salvage.h"
 #include "tests/faults/fault_test.h"
-#include "tests/server/journal_fixture.h"
+#include "tests/server/support/journal_fixture.h"
 
 namespace {
 

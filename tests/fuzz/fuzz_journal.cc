@@ -9,7 +9,7 @@
 #include <iterator>
 #include <map>
 
-#include "server/journal.h"
+#include "server/journal/journal.h"
 #include "tests/fuzz/scripted_session.h"
 
 namespace stellate::fuzz {

@@ -1,9 +1,9 @@
 // The records inside a journal, with their seals taken off: refused, or read as what would be
 // written again. An input is one byte that chooses the kind, and the record.
 
-#include "server/journal_format.h"
+#include "server/records/journal_format.h"
 #include "tests/fuzz/target.h"
-#include "tests/server/sphere.h"
+#include "tests/server/support/sphere.h"
 
 namespace stellate::fuzz {
 namespace {

@@ -6,9 +6,9 @@
 #include "core/mesher.h"
 #include "server/convert/arrays.h"
 #include "server/convert/spec.h"
-#include "server/journal_format.h"
+#include "server/records/journal_format.h"
 #include "tests/fuzz/target.h"
-#include "tests/server/sphere.h"
+#include "tests/server/support/sphere.h"
 
 namespace stellate::fuzz {
 namespace {

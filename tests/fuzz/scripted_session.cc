@@ -7,7 +7,7 @@
 #include <set>
 #include <vector>
 
-#include "tests/server/sphere.h"
+#include "tests/server/support/sphere.h"
 
 namespace stellate::fuzz {
 namespace {

@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "server/session.h"
+#include "server/session/session.h"
 #include "tests/fuzz/target.h"
 
 namespace stellate::fuzz {

@@ -1,0 +1,89 @@
+#include "server/auth/auth.h"
+
+#include <grpc/grpc_security_constants.h>
+#include <grpcpp/security/auth_context.h>
+#include <strings.h>
+
+#include <string_view>
+#include <utility>
+
+#include "server/convert/error_map.h"
+
+namespace stellate::server {
+namespace {
+
+constexpr char kHeader[] = "authorization";
+constexpr std::string_view kScheme = "Bearer ";
+
+tl::unexpected<grpc::Status> Unauthenticated(const std::string& message) {
+  return tl::unexpected(Refusal(v1::ERROR_REASON_UNAUTHENTICATED, message));
+}
+
+std::string FirstProperty(const grpc::AuthContext& context, const char* name) {
+  const auto values = context.FindPropertyValues(name);
+  return values.empty() ? "" : std::string(values.front().data(), values.front().size());
+}
+
+// What the certificate authority vouches for. '=' keeps these apart from owners of tokens.
+std::string OwnerIn(const grpc::AuthContext& context) {
+  std::string subject = FirstProperty(context, GRPC_X509_SUBJECT_PROPERTY_NAME);
+  if (!subject.empty()) return subject;
+  const std::string name = FirstProperty(context, GRPC_X509_SAN_PROPERTY_NAME);
+  return name.empty() ? "" : "SAN=" + name;
+}
+
+tl::expected<TokenDigest, grpc::Status> TokenIn(const grpc::ServerContextBase& context) {
+  const auto [first, last] = context.client_metadata().equal_range(kHeader);
+  if (first == last) {
+    return Unauthenticated(
+        "no token came: send the metadata \"authorization\" with \"Bearer TOKEN\"");
+  }
+  const std::string_view value(first->second.data(), first->second.size());
+  if (std::next(first) != last || value.size() <= kScheme.size() ||
+      strncasecmp(value.data(), kScheme.data(), kScheme.size()) != 0) {
+    return Unauthenticated("the metadata \"authorization\" must be one value, \"Bearer TOKEN\"");
+  }
+  return Digest(value.substr(kScheme.size()));
+}
+
+}  // namespace
+
+core::Expected<std::unique_ptr<Authenticator>> Authenticator::Create(const Config& config) {
+  auto authenticator = std::make_unique<Authenticator>();
+  authenticator->by_certificate_ = !config.tls_client_ca.empty();
+  if (config.token_file.empty()) return authenticator;
+  auto tokens = TokenFile::Open(config.token_file);
+  if (!tokens) return tl::unexpected(std::move(tokens.error()));
+  authenticator->tokens_ = std::move(*tokens);
+  return authenticator;
+}
+
+tl::expected<Identity, grpc::Status> Authenticator::Identify(
+    const grpc::ServerContextBase& context) const {
+  if (tokens_ != nullptr) {
+    const auto digest = TokenIn(context);
+    if (!digest) return tl::unexpected(digest.error());
+    auto owner = tokens_->OwnerOf(*digest);
+    if (!owner) return Unauthenticated("the token is not known to this server");
+    return Identity{std::move(*owner), *digest};
+  }
+  if (!by_certificate_) return Identity{};
+  std::string owner = OwnerIn(*context.auth_context());
+  if (owner.empty()) return Unauthenticated("the client certificate names nobody");
+  return Identity{std::move(owner), std::nullopt};
+}
+
+bool Authenticator::StillHolds(const Identity& identity) const {
+  return tokens_ == nullptr ||
+         (identity.token && tokens_->OwnerOf(*identity.token) == identity.owner);
+}
+
+void Authenticator::Reload(bool force) {
+  if (tokens_ != nullptr) tokens_->Reload(force);
+}
+
+grpc::Status TokenWithdrawn() {
+  return Refusal(v1::ERROR_REASON_UNAUTHENTICATED, "the token is not valid any more");
+}
+
+}  // namespace stellate::server

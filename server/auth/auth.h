@@ -1,0 +1,44 @@
+#pragma once
+
+#include <grpcpp/server_context.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <tl/expected.hpp>
+
+#include "core/status.h"
+#include "server/auth/tokens.h"
+#include "server/config/config.h"
+
+namespace stellate::server {
+
+// Who calls. Meshes belong to owners; an owner sees his own alone.
+struct Identity {
+  std::string owner;  // empty: the server tells nobody apart
+  std::optional<TokenDigest> token;
+};
+
+// Tells callers apart: by bearer token if there is a token file, else by the client certificate if
+// those are asked for, else not at all. Any thread; never waits.
+class Authenticator {
+ public:
+  static core::Expected<std::unique_ptr<Authenticator>> Create(const Config& config);
+
+  // UNAUTHENTICATED: no token, or none that is known. Neither is logged.
+  tl::expected<Identity, grpc::Status> Identify(const grpc::ServerContextBase& context) const;
+  // False once the token was taken out of the file: for streams, which may outlive it.
+  bool StillHolds(const Identity& identity) const;
+
+  // Reads the token file again, if it changed or if `force`.
+  void Reload(bool force = false);
+
+ private:
+  std::unique_ptr<TokenFile> tokens_;
+  bool by_certificate_ = false;
+};
+
+// UNAUTHENTICATED: the token was good once.
+grpc::Status TokenWithdrawn();
+
+}  // namespace stellate::server

@@ -1,0 +1,101 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "core/specification.h"
+#include "core/status.h"
+#include "server/base/log.h"
+
+namespace stellate::server {
+
+// Where to listen: a TCP host and port, or a unix socket.
+struct ListenAddress {
+  std::string unix_path;  // set: a unix socket
+  std::string host;       // brackets taken off
+  int port = 0;           // 0: any free one
+
+  bool IsUnix() const { return !unix_path.empty(); }
+  bool IsLoopback() const;     // reachable from this machine alone
+  std::string Target() const;  // as gRPC writes it
+};
+
+// "host:port", "[v6]:port", "unix:/path". `flag` is what a refusal names.
+core::Expected<ListenAddress> ParseListenAddress(const std::string& text,
+                                                 const std::string& flag = "--listen");
+
+// Everything that can be set, with its default; settings.h says what each is for. Times in seconds.
+struct Config {
+  std::string listen = "127.0.0.1:7717";
+  bool insecure_listen = false;  // plain text beyond this machine
+  std::string ready_file;        // written with the address once the server listens
+  std::string data_dir;          // of the journal; empty: meshes live in memory alone
+
+  std::string tls_certificate, tls_key;  // PEM files; empty: plain text
+  std::string tls_client_ca;             // PEM file; clients need a certificate of this authority
+  std::string token_file;                // lines "owner token"; empty: no tokens
+  std::string metrics_listen;            // host:port for Prometheus; empty: none
+
+  // Of the server.
+  std::uint64_t max_meshes = 64;        // running at once
+  std::uint64_t max_memory_bytes = 0;   // of all meshes, estimated; 0: WithDefaults says
+  std::uint64_t max_journal_bytes = 0;  // 0: what the disk holds
+  std::uint64_t max_message_bytes = std::uint64_t{4} << 20;
+  std::uint64_t max_unread_bytes = std::uint64_t{64} << 20;  // of requests that are not whole
+  std::uint64_t max_connections = 2048;                      // over TCP
+  std::uint64_t max_connection_streams = 1024;
+
+  // Of each owner, where the server tells owners apart.
+  std::uint64_t owner_meshes = 32;  // running at once; 0: as many as the server
+  std::uint64_t keep_finished_meshes = 32;
+  std::uint64_t owner_memory_bytes = 0;   // 0: WithDefaults says
+  std::uint64_t owner_journal_bytes = 0;  // 0: half of what the record may have
+
+  // Of each mesh.
+  std::uint64_t max_vertices = 10'000'000;
+  std::uint64_t max_coordinates = std::uint64_t{1} << 30;  // vertices x d
+  int max_dimension = core::kMaxDimension;
+  int max_ambient_dimension = core::kMaxAmbientDimension;
+  std::uint64_t max_rounds = 100'000;
+  std::uint64_t max_workers = 64;
+  std::uint64_t max_watchers = 64;
+
+  int max_in_flight = 2;      // chunks that one worker holds
+  double check_share = 0.01;  // of the queries, asked of two workers
+
+  double worker_wait_seconds = 60;  // when the client does not say
+  double answer_seconds = 60;       // when the client does not say
+  double busy_seconds = 3600;       // when the client does not say
+  double max_wait_seconds = 0;      // most that a client may ask for of these; 0: MaxWaitSeconds
+  double keep_finished_seconds = 3600;
+  double hello_seconds = 10;    // for a worker's first message
+  double request_seconds = 60;  // for a request to be whole
+
+  double drain_seconds = 10;  // for running meshes to end, after SIGTERM
+  double keepalive_seconds = 2;
+  double keepalive_timeout_seconds = 5;
+
+  LogLevel log_level = LogLevel::kInfo;
+  LogFormat log_format = LogFormat::kText;
+
+  bool operator==(const Config&) const = default;
+};
+
+// kInvalidArgument naming the flag, its value and what to do.
+core::Status Validate(const Config& config);
+
+// Puts numbers for zeros that stand for a part of this machine, or of the server's own limit.
+Config WithDefaults(Config config);
+
+// The most that a client may ask for: an hour, and 30 days where meshes outlive the server, since
+// batch queues take their time, unless the config says.
+double MaxWaitSeconds(const Config& config);
+
+// Arrays travel in chunks of about this size.
+std::size_t ChunkBytes(const Config& config);
+// Of a mesh that is sent to whoever may read it slowly, or not at all: a part.
+std::size_t PartBytes(const Config& config);
+
+}  // namespace stellate::server

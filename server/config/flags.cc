@@ -1,0 +1,118 @@
+#include "server/config/flags.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <iostream>
+#include <string>
+#include <type_traits>
+
+#include "server/config/settings.h"
+#include "server/server.h"
+
+namespace stellate::server {
+namespace {
+
+constexpr int kExitUsage = 2;
+
+// A choice is given by name.
+template <typename T>
+CLI::Option* AddChoice(CLI::App* app, const Setting& setting, T* value, const char* current,
+                       bool (*read)(const std::string&, T*)) {
+  return app
+      ->add_option_function<std::string>(
+          setting.flag,
+          [setting, value, read](const std::string& text) {
+            if (read(text, value)) return;
+            throw CLI::ValidationError(setting.flag,
+                                       "\"" + text + "\" is none of its choices: " + setting.help);
+          },
+          setting.help)
+      ->default_str(current);
+}
+
+void AddSetting(CLI::App* app, const Setting& setting, Config* config) {
+  CLI::Option* const option = std::visit(
+      [&](auto field) {
+        auto& value = config->*field;
+        using T = std::decay_t<decltype(value)>;
+        if constexpr (std::is_same_v<T, bool>) {
+          return app->add_flag(setting.flag, value, setting.help);
+        } else if constexpr (std::is_same_v<T, LogLevel>) {
+          return AddChoice(app, setting, &value, LogLevelName(value), ReadLogLevel);
+        } else if constexpr (std::is_same_v<T, LogFormat>) {
+          return AddChoice(app, setting, &value, LogFormatName(value), ReadLogFormat);
+        } else {
+          return app->add_option(setting.flag, value, setting.help);
+        }
+      },
+      setting.field);
+  if (*setting.group != '\0') option->group(setting.group);
+}
+
+}  // namespace
+
+ParsedFlags ParseFlags(int argc, const char* const* argv) {
+  ParsedFlags parsed;
+  Flags& flags = parsed.flags;
+  bool print_config = false;
+  CLI::App app("stellated: meshes smooth manifolds for clients that serve their oracles.");
+  app.option_defaults()->always_capture_default();
+  app.set_version_flag("--version", std::string("stellated ") + Version());
+  app.set_config("--config", "",
+                 "File of lines \"KEY = VALUE\", the keys being these flags without dashes");
+  app.allow_config_extras(CLI::config_extras_mode::error);
+
+  const auto add_command = [&app](const char* flag, auto* value, const char* help) {
+    using T = std::decay_t<decltype(*value)>;
+    if constexpr (std::is_same_v<T, bool>) {
+      app.add_flag(flag, *value, help)->configurable(false);
+    } else {
+      app.add_option(flag, *value, help)->configurable(false);
+    }
+  };
+  add_command("--print-config", &print_config,
+              "Print a configuration file with every setting as it stands, and exit");
+  add_command("--health-check", &flags.health_check,
+              "Ask the server at --listen whether it serves; exit 0 if so, else 1");
+  add_command("--health-service", &flags.health_service,
+              "What to ask it about: stellate.v1.Stellate, or \"alive\", which holds while it "
+              "drains too; default: the server as a whole");
+  add_command("--health-cert", &flags.health_certificate,
+              "PEM file with the certificate that it shows, where --tls-client-ca would not take "
+              "--tls-cert");
+  add_command("--health-key", &flags.health_key, "PEM file with its private key");
+  add_command("--exit-with-parent", &flags.exit_with_parent,
+              "Stop when the process that started this one is gone");
+  add_command("--verify-data-dir", &flags.verify_data_dir,
+              "Read every record in --data-dir, change nothing, say what there is, and exit; 0 if "
+              "it is sound, else 1");
+  add_command("--salvage", &flags.salvage,
+              "Where the record in --data-dir is damaged, begin a new one with all that can be "
+              "read, keep the damaged files beside it, say what is lost, and exit; 0 if that "
+              "succeeds, else 1");
+  for (const Setting& setting : Settings()) AddSetting(&app, setting, &flags.config);
+
+  try {
+    app.parse(argc, argv);
+    if (print_config) {
+      std::fputs(ToConfigFile(flags.config).c_str(), stdout);
+      parsed.exit_status = 0;
+    }
+  } catch (const CLI::ConfigError& error) {
+    // Its words are about INI files; what it could not place is their last part.
+    const std::string words = error.what();
+    const std::string key = words.substr(words.rfind(' ') + 1);
+    const bool known = words.find("not allowed") != std::string::npos;
+    std::fprintf(
+        stderr, "stellated: --config: %s\n",
+        known ? words.c_str()
+              : ("there is no setting \"" + key + "\": --print-config prints those that there are")
+                    .c_str());
+    parsed.exit_status = kExitUsage;
+  } catch (const CLI::ParseError& error) {
+    parsed.exit_status = app.exit(error) == 0 ? 0 : kExitUsage;
+  }
+  return parsed;
+}
+
+}  // namespace stellate::server

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <optional>
+
+#include "server/config/config.h"
+
+namespace stellate::server {
+
+struct Flags {
+  Config config;
+  bool health_check = false;
+  std::string health_certificate, health_key;  // shown by it; empty: the server's own
+  std::string health_service;  // whose health --health-check asks for; empty: the whole server's
+  bool exit_with_parent = false;
+  bool verify_data_dir = false, salvage = false;  // instead of serving
+};
+
+// Reads the command line and the configuration file that it names; what stands on the command line
+// comes first. When there is nothing more to do (--help, --version, --print-config, a mistake),
+// prints what there is to say and returns the exit status instead.
+struct ParsedFlags {
+  Flags flags;
+  std::optional<int> exit_status;
+};
+ParsedFlags ParseFlags(int argc, const char* const* argv);
+
+}  // namespace stellate::server

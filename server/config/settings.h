@@ -1,0 +1,41 @@
+#pragma once
+
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "server/config/config.h"
+
+namespace stellate::server {
+
+// One thing that can be set: a flag of the command line, and under its name without the dashes a
+// key of the configuration file.
+struct Setting {
+  using Field =
+      std::variant<std::string Config::*, bool Config::*, int Config::*, std::uint64_t Config::*,
+                   double Config::*, LogLevel Config::*, LogFormat Config::*>;
+  const char* group;  // of --help; empty: the first one
+  const char* flag;   // "--max-meshes"
+  Field field;
+  const char* help;
+  double least = 0, most = 0;  // of a number
+
+  std::string Key() const { return flag + 2; }
+};
+
+// Every one, in the order of --help. A new setting is a member of Config and a row of this table.
+const std::vector<Setting>& Settings();
+
+// kInvalidArgument naming the flag, its value and what it may be, where a number is out of range.
+core::Status CheckRanges(const Config& config);
+
+// A configuration file with every setting, as --config reads it.
+std::string ToConfigFile(const Config& config);
+
+// Names of the choices, and what they stand for; nullptr and false: no such name.
+const char* LogLevelName(LogLevel level);
+const char* LogFormatName(LogFormat format);
+bool ReadLogLevel(const std::string& name, LogLevel* level);
+bool ReadLogFormat(const std::string& name, LogFormat* format);
+
+}  // namespace stellate::server

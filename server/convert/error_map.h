@@ -1,0 +1,40 @@
+#pragma once
+
+#include <grpcpp/support/status.h>
+
+#include <optional>
+#include <string>
+
+#include "core/status.h"
+#include "server/base/limits.h"
+#include "server/oracles/oracle_pool.h"
+#include "stellate/v1/errors.pb.h"
+
+namespace stellate::server {
+
+// The one place where refusals become gRPC statuses. Each carries google.rpc.ErrorInfo (domain
+// "stellate.v1", the reason's name without prefix), where a field of the request is to blame
+// google.rpc.BadRequest, and where a limit was reached google.rpc.QuotaFailure, the limit standing
+// in ErrorInfo.metadata too. Messages are cut so that they fit into a reply's trailers.
+grpc::Status Refusal(v1::ErrorReason reason, const std::string& message,
+                     const std::string& field = "",
+                     const std::optional<LimitHit>& limit = std::nullopt);
+
+// The code that a reason travels with, as errors.proto states it.
+grpc::StatusCode CodeOf(v1::ErrorReason reason);
+
+v1::ErrorReason ReasonOf(core::StatusCode code);  // UNSPECIFIED for kOk alone
+
+// OK for Ok. `prefix` goes before the field that the message starts with, if it names one.
+grpc::Status ToGrpc(const core::Status& status, const std::string& prefix = "");
+grpc::Status ToGrpc(const Refused& refused, const std::string& prefix = "");
+
+MeshFailure ToMeshFailure(const core::Status& status);
+
+// "epsilon" of "epsilon is -1 but ..."; empty when the message does not start with a field.
+std::string FieldOf(const std::string& message);
+
+// At most `limit` bytes of `text`, never cutting a UTF-8 character.
+std::string Cut(const std::string& text, std::size_t limit);
+
+}  // namespace stellate::server

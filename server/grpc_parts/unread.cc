@@ -1,0 +1,246 @@
+#include "server/grpc_parts/unread.h"
+
+#include <mutex>
+#include <unordered_map>
+
+namespace stellate::server {
+namespace {
+
+// Whose connection has a descriptor. The last to have it stays: there are only so many.
+class Connections {
+ public:
+  std::shared_ptr<Unread> Add(int fd, std::shared_ptr<UnreadOfAll> all) {
+    auto unread = std::make_shared<Unread>(std::move(all));
+    const std::lock_guard lock(mutex_);
+    connections_[fd] = unread;
+    return unread;
+  }
+
+  std::shared_ptr<Unread> Find(int fd) {
+    const std::lock_guard lock(mutex_);
+    const auto found = connections_.find(fd);
+    return found == connections_.end() ? nullptr : found->second;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::unordered_map<int, std::shared_ptr<Unread>> connections_;
+};
+
+// Outlives every connection.
+Connections& AllConnections() {
+  static auto& connections = *new Connections;
+  return connections;
+}
+
+}  // namespace
+
+std::shared_ptr<Unread> CountUnread(int fd, std::shared_ptr<UnreadOfAll> all) {
+  return AllConnections().Add(fd, std::move(all));
+}
+
+}  // namespace stellate::server
+
+#ifndef STELLATE_REPLACES_GRPC_PARTS
+
+bool stellate::server::CountsUnread() { return false; }
+
+#else
+
+#include <absl/status/status.h>
+#include <absl/types/variant.h>
+#include <grpc/slice_buffer.h>
+
+#include <algorithm>
+#include <array>
+
+#include "server/grpc_parts/replaced.h"
+
+struct grpc_chttp2_transport;
+struct grpc_endpoint;
+struct grpc_stream_refcount;
+struct grpc_transport;
+
+// gRPC's, as they are.
+grpc_endpoint* grpc_transport_get_endpoint(grpc_transport* transport);
+int grpc_endpoint_get_fd(grpc_endpoint* endpoint);
+
+namespace grpc_core {
+class Arena;
+class SliceBuffer;  // a grpc_slice_buffer
+struct Pending {};
+template <typename T>
+using Poll = absl::variant<Pending, T>;
+}  // namespace grpc_core
+
+// As gRPC 1.51 declares it, where it is replaced: a call, as its connection sees it.
+struct __attribute__((visibility("default"))) grpc_chttp2_stream {
+  // `server_data`: set on the server's side.
+  grpc_chttp2_stream(grpc_chttp2_transport* transport, grpc_stream_refcount* refcount,
+                     const void* server_data, grpc_core::Arena* arena);
+  ~grpc_chttp2_stream();
+};
+
+// A part of a message came; an error closes the connection.
+__attribute__((visibility("default"))) absl::Status grpc_chttp2_data_parser_parse(
+    void* parser, grpc_chttp2_transport* transport, grpc_chttp2_stream* stream,
+    const grpc_slice& slice, int is_last);
+
+// Takes a message out, if one is whole.
+__attribute__((visibility("default"))) grpc_core::Poll<absl::Status>
+grpc_deframe_unprocessed_incoming_frames(grpc_chttp2_stream* stream,
+                                         std::int64_t* min_progress_size,
+                                         grpc_core::SliceBuffer* out, std::uint32_t* flags);
+
+namespace stellate::server {
+namespace {
+
+constexpr char kBegin[] =
+    "_ZN18grpc_chttp2_streamC1EP21grpc_chttp2_transportP20grpc_stream_refcountPKvPN9grpc_"
+    "core5ArenaE";
+constexpr char kEnd[] = "_ZN18grpc_chttp2_streamD1Ev";
+constexpr char kParse[] =
+    "_Z29grpc_chttp2_data_parser_parsePvP21grpc_chttp2_transportP18grpc_chttp2_streamRK10grpc_"
+    "slicei";
+constexpr char kDeframe[] =
+    "_Z40grpc_deframe_unprocessed_incoming_framesP18grpc_chttp2_streamPlPN9grpc_"
+    "core11SliceBufferEPj";
+constexpr std::int64_t kPrefixBytes = 5;  // before each message: its length
+
+using Key = const grpc_chttp2_stream*;
+
+// The calls of connections that are counted.
+class Streams {
+ public:
+  void Begin(Key key, std::shared_ptr<Unread> unread) {
+    Part& part = PartOf(key);
+    const std::lock_guard lock(part.mutex);
+    Stream& stream = part.streams[key];
+    stream.unread = std::move(unread);
+    Count(&stream, kCallBytes);
+  }
+
+  // False: it is too much.
+  bool Add(Key key, std::int64_t bytes) {
+    Part& part = PartOf(key);
+    const std::lock_guard lock(part.mutex);
+    const auto found = part.streams.find(key);
+    if (found == part.streams.end()) return true;
+    Count(&found->second, bytes);
+    const Unread& unread = *found->second.unread;
+    const std::int64_t most = unread.all->most;
+    const double over = static_cast<double>(unread.all->bytes - most) / static_cast<double>(most);
+    const double spared = (1 - 2 * over) * static_cast<double>(unread.all->most_of_one);
+    return over <= 0 ||
+           static_cast<double>(unread.bytes) <= std::max<double>(spared, 4 * kCallBytes);
+  }
+
+  void Take(Key key, std::int64_t bytes) {
+    Part& part = PartOf(key);
+    const std::lock_guard lock(part.mutex);
+    const auto found = part.streams.find(key);
+    if (found == part.streams.end()) return;
+    Stream& stream = found->second;
+    Count(&stream, -bytes - (stream.is_new ? kCallBytes : 0));
+    stream.is_new = false;
+    ++stream.unread->whole;
+  }
+
+  void End(Key key) {
+    Part& part = PartOf(key);
+    const std::lock_guard lock(part.mutex);
+    const auto found = part.streams.find(key);
+    if (found == part.streams.end()) return;
+    Count(&found->second, -found->second.bytes);
+    part.streams.erase(found);
+  }
+
+ private:
+  struct Stream {
+    std::shared_ptr<Unread> unread;
+    std::int64_t bytes = 0;  // its share
+    bool is_new = true;      // its first message was not taken yet
+  };
+  struct Part {  // connections read at the same time
+    std::mutex mutex;
+    std::unordered_map<Key, Stream> streams;
+  };
+
+  static void Count(Stream* stream, std::int64_t bytes) {
+    stream->bytes += bytes;
+    stream->unread->bytes += bytes;
+    stream->unread->all->bytes += bytes;
+  }
+
+  Part& PartOf(Key key) { return parts_[std::hash<Key>()(key) / 64 % parts_.size()]; }
+
+  std::array<Part, 16> parts_;
+};
+
+// Outlives every connection.
+Streams& AllStreams() {
+  static auto& streams = *new Streams;
+  return streams;
+}
+
+std::int64_t LengthOf(const grpc_core::SliceBuffer* buffer) {
+  if (buffer == nullptr) return 0;
+  return static_cast<std::int64_t>(reinterpret_cast<const grpc_slice_buffer*>(buffer)->length);
+}
+
+}  // namespace
+
+bool CountsUnread() {
+  return IsReplaced(kBegin) && IsReplaced(kEnd) && IsReplaced(kParse) && IsReplaced(kDeframe);
+}
+
+}  // namespace stellate::server
+
+namespace server = stellate::server;
+
+grpc_chttp2_stream::grpc_chttp2_stream(grpc_chttp2_transport* transport,
+                                       grpc_stream_refcount* refcount, const void* server_data,
+                                       grpc_core::Arena* arena) {
+  static auto* const begin =
+      server::Original<void(grpc_chttp2_stream*, grpc_chttp2_transport*, grpc_stream_refcount*,
+                            const void*, grpc_core::Arena*)>(server::kBegin);
+  begin(this, transport, refcount, server_data, arena);
+  if (server_data == nullptr) return;
+  auto unread = server::AllConnections().Find(grpc_endpoint_get_fd(
+      grpc_transport_get_endpoint(reinterpret_cast<grpc_transport*>(transport))));
+  if (unread != nullptr) server::AllStreams().Begin(this, std::move(unread));
+}
+
+grpc_chttp2_stream::~grpc_chttp2_stream() {
+  static auto* const end = server::Original<void(grpc_chttp2_stream*)>(server::kEnd);
+  server::AllStreams().End(this);
+  end(this);
+}
+
+absl::Status grpc_chttp2_data_parser_parse(void* parser, grpc_chttp2_transport* transport,
+                                           grpc_chttp2_stream* stream, const grpc_slice& slice,
+                                           int is_last) {
+  static auto* const parse = server::Original<absl::Status(
+      void*, grpc_chttp2_transport*, grpc_chttp2_stream*, const grpc_slice&, int)>(server::kParse);
+  if (!server::AllStreams().Add(stream, static_cast<std::int64_t>(GRPC_SLICE_LENGTH(slice)))) {
+    return absl::ResourceExhaustedError("too many requests are not whole");
+  }
+  return parse(parser, transport, stream, slice, is_last);
+}
+
+grpc_core::Poll<absl::Status> grpc_deframe_unprocessed_incoming_frames(
+    grpc_chttp2_stream* stream, std::int64_t* min_progress_size, grpc_core::SliceBuffer* out,
+    std::uint32_t* flags) {
+  static auto* const deframe = server::Original<grpc_core::Poll<absl::Status>(
+      grpc_chttp2_stream*, std::int64_t*, grpc_core::SliceBuffer*, std::uint32_t*)>(
+      server::kDeframe);
+  const std::int64_t before = server::LengthOf(out);
+  auto result = deframe(stream, min_progress_size, out, flags);
+  const auto* const status = absl::get_if<absl::Status>(&result);
+  if (out != nullptr && status != nullptr && status->ok()) {
+    server::AllStreams().Take(stream, server::LengthOf(out) - before + server::kPrefixBytes);
+  }
+  return result;
+}
+
+#endif

@@ -1,0 +1,282 @@
+#include "server/history/watch_log.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "core/message.h"
+
+namespace stellate::server {
+namespace {
+
+using core::Status;
+using core::StatusCode;
+
+// The end of a list of simplices.
+constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+// Simplices looked at for one part: bounds the time spent under the lock.
+constexpr std::size_t kScanLimit = std::size_t{1} << 18;
+
+Status OutOfStep(std::string message) {
+  return {StatusCode::kFailedPrecondition, std::move(message)};
+}
+
+template <typename T>
+bool WriteRows(const GrowingRows<T>& rows, std::size_t width, const WatchLog::Sink& write) {
+  for (std::size_t row = 0; row < rows.size(); row += rows.Run(row)) {
+    if (!write(rows[row], rows.Run(row) * width * sizeof(T))) return false;
+  }
+  return true;
+}
+
+// Takes memory only for what is there.
+template <typename T>
+bool ReadInto(GrowingRows<T>* rows, std::size_t width, std::uint64_t count,
+              const WatchLog::Source& read) {
+  constexpr std::uint64_t kAtOnce = 4096;
+  std::vector<T> some;
+  for (std::uint64_t left = count; left > 0;) {
+    const std::uint64_t take = std::min(left, kAtOnce);
+    some.resize(take * width);
+    if (!read(some.data(), some.size() * sizeof(T))) return false;
+    rows->Append(some.data(), take);
+    left -= take;
+  }
+  return true;
+}
+
+}  // namespace
+
+WatchLog::WatchLog(int dimension, int ambient_dimension)
+    : row_size_(static_cast<std::size_t>(dimension) + 1),
+      d_(ambient_dimension),
+      points_(d_),
+      rows_(row_size_),
+      lives_(1),
+      deaths_(1),
+      marks_(1),
+      next_(1) {}
+
+// Takes a simplex from the living; kNone if it is not among them.
+std::uint32_t WatchLog::Unlink(const std::uint32_t* row) {
+  if (row[0] >= first_of_.size()) return kNone;
+  std::uint32_t* link = &first_of_[row[0]];
+  while (*link != kNone && !std::equal(row, row + row_size_, rows_[*link])) link = next_[*link];
+  const std::uint32_t simplex = *link;
+  if (simplex != kNone) *link = *next_[simplex];
+  return simplex;
+}
+
+void WatchLog::Link(std::uint32_t simplex) {
+  std::uint32_t& first = first_of_[*rows_[simplex]];
+  *next_[simplex] = first;
+  first = simplex;
+}
+
+Status WatchLog::Append(const core::MeshDelta& delta) {
+  // The appending thread alone writes, so it reads without the lock.
+  const std::uint64_t revision = marks_.size();
+  const Mark& last = marks_.back();
+  if (complete_) return OutOfStep("the mesh is over and changes no more");
+  if (delta.revision != revision) {
+    return OutOfStep(core::Message("a change leads to revision ", delta.revision, " but ", revision,
+                                   " is the next"));
+  }
+  const auto new_vertices = static_cast<std::size_t>(delta.points.cols());
+  if (new_vertices > 0 && delta.first_vertex != last.vertices) {
+    return OutOfStep(core::Message("new vertices start at ", delta.first_vertex, " but ",
+                                   last.vertices, " is the next id"));
+  }
+  const std::size_t first_simplex = last.simplices;
+  const std::size_t new_simplices = delta.added.size() / row_size_;
+  if (first_simplex + new_simplices >= kNone) {
+    return OutOfStep(core::Message("the mesh has had ", first_simplex + new_simplices,
+                                   " simplices, more than the log can number"));
+  }
+  for (std::size_t i = 0; i < new_simplices; ++i) {
+    if (delta.added[i * row_size_] < last.vertices + new_vertices) continue;
+    return OutOfStep(core::Message("revision ", revision, " adds a simplex with vertex ",
+                                   delta.added[i * row_size_], ", which is not there"));
+  }
+  std::vector<std::uint32_t> dying;
+  dying.reserve(delta.removed.size() / row_size_);
+  for (std::size_t r = 0; r + row_size_ <= delta.removed.size(); r += row_size_) {
+    const std::uint32_t simplex = Unlink(delta.removed.data() + r);
+    if (simplex == kNone) {
+      for (const std::uint32_t other : dying) Link(other);
+      return OutOfStep(
+          core::Message("revision ", revision, " removes a simplex that is not there"));
+    }
+    dying.push_back(simplex);
+  }
+  const std::vector<Life> births(new_simplices, Life{revision, 0});
+  {
+    const std::lock_guard lock(mutex_);
+    for (const std::uint32_t simplex : dying) lives_[simplex]->died = revision;
+    deaths_.Append(dying.data(), dying.size());
+    points_.Append(delta.points.data(), new_vertices);
+    rows_.Append(delta.added.data(), new_simplices);
+    lives_.Append(births.data(), new_simplices);
+    marks_.push_back({last.vertices + new_vertices, first_simplex + new_simplices, deaths_.size()});
+  }
+  first_of_.resize(marks_.back().vertices, kNone);
+  next_.Append(delta.added.data(), new_simplices);  // any numbers: Link sets them
+  for (std::size_t i = 0; i < new_simplices; ++i) {
+    Link(static_cast<std::uint32_t>(first_simplex + i));
+  }
+  appenders_bytes_ = first_of_.capacity() * sizeof(first_of_[0]) + next_.bytes();
+  return Status::Ok();
+}
+
+bool WatchLog::Write(const Sink& write) const {
+  const std::uint64_t revisions = marks_.size() - 1;
+  return write(&revisions, sizeof(revisions)) &&
+         write(marks_.data() + 1, revisions * sizeof(Mark)) && WriteRows(points_, d_, write) &&
+         WriteRows(rows_, row_size_, write) && WriteRows(deaths_, 1, write);
+}
+
+core::Expected<std::unique_ptr<WatchLog>> WatchLog::Read(int dimension, int ambient_dimension,
+                                                         const Source& read) {
+  auto log = std::make_unique<WatchLog>(dimension, ambient_dimension);
+  log->complete_ = true;
+  if (!log->ReadRows(read) || !log->ReckonLives()) {
+    return tl::unexpected(OutOfStep("these are not the bytes of a mesh's history"));
+  }
+  return log;
+}
+
+bool WatchLog::ReadRows(const Source& read) {
+  std::uint64_t revisions = 0;
+  if (!read(&revisions, sizeof(revisions))) return false;
+  for (std::uint64_t revision = 1; revision <= revisions; ++revision) {
+    const Mark last = marks_.back();
+    Mark mark;
+    if (!read(&mark, sizeof(mark)) || mark.vertices < last.vertices ||
+        mark.simplices < last.simplices || mark.deaths < last.deaths) {
+      return false;
+    }
+    marks_.push_back(mark);
+  }
+  const Mark& end = marks_.back();
+  return end.vertices <= kNone && end.simplices < kNone &&
+         ReadInto(&points_, d_, end.vertices, read) &&
+         ReadInto(&rows_, row_size_, end.simplices, read) &&
+         ReadInto(&deaths_, 1, end.deaths, read);
+}
+
+// From the order of births and deaths.
+bool WatchLog::ReckonLives() {
+  for (std::uint64_t revision = 1; revision < marks_.size(); ++revision) {
+    const Mark &from = marks_[revision - 1], &to = marks_[revision];
+    for (std::uint64_t i = from.deaths; i < to.deaths; ++i) {
+      const std::uint32_t simplex = *deaths_[i];
+      if (simplex >= lives_.size() || lives_[simplex]->died != 0) return false;
+      lives_[simplex]->died = revision;
+    }
+    const Life birth{revision, 0};
+    for (std::uint64_t simplex = from.simplices; simplex < to.simplices; ++simplex) {
+      const std::uint32_t* const row = rows_[simplex];
+      if (*std::max_element(row, row + row_size_) >= to.vertices) return false;
+      lives_.Append(&birth, 1);
+    }
+  }
+  return true;
+}
+
+std::uint64_t WatchLog::revision() const {
+  const std::lock_guard lock(mutex_);
+  return marks_.size() - 1;
+}
+
+WatchLog::Cursor WatchLog::Begin(std::uint64_t from) const {
+  const std::lock_guard lock(mutex_);
+  const Mark& mark = marks_[from];
+  return {from, marks_.size() - 1, mark.deaths, mark.vertices, mark.simplices};
+}
+
+std::uint64_t WatchLog::MemoryBytes() const {
+  const std::lock_guard lock(mutex_);
+  return points_.bytes() + rows_.bytes() + lives_.bytes() + deaths_.bytes() +
+         marks_.capacity() * sizeof(Mark) + appenders_bytes_;
+}
+
+WatchLog::Snapshot WatchLog::At(std::uint64_t revision) const {
+  const std::lock_guard lock(mutex_);
+  const Mark& mark = marks_[revision];
+  return {mark.vertices, mark.simplices - mark.deaths, mark.vertices + mark.simplices};
+}
+
+WatchLog::Cursor WatchLog::BeginAt(std::uint64_t revision, std::uint64_t position) const {
+  const std::lock_guard lock(mutex_);
+  const Mark& mark = marks_[revision];
+  const std::size_t vertex = std::min<std::size_t>(position, mark.vertices);
+  // Nothing was there at revision 0, so nothing goes.
+  return {0, revision, mark.deaths, vertex, position - vertex};
+}
+
+DeltaPart WatchLog::Next(Cursor* cursor, std::size_t max_bytes) const {
+  const std::size_t row_bytes = row_size_ * sizeof(std::uint32_t);
+  const std::size_t point_bytes = d_ * sizeof(double);
+  const std::size_t max_rows = std::max<std::size_t>(max_bytes / row_bytes, 1);
+  DeltaPart part;
+  part.revision = cursor->to;
+  std::size_t scanned = 0;
+
+  const std::lock_guard lock(mutex_);
+  const Mark& end = marks_[cursor->to];
+  part.first_vertex = cursor->vertex;
+  // Gone: was there at `from`, is not at `to`. Deaths are in order, so those up to `to` suffice.
+  part.removed.reserve(std::min({end.deaths - cursor->removed, max_rows, kScanLimit}) * row_size_);
+  for (; cursor->removed < end.deaths && scanned < kScanLimit; ++cursor->removed, ++scanned) {
+    const std::uint32_t simplex = *deaths_[cursor->removed];
+    if (lives_[simplex]->born > cursor->from) continue;
+    if (part.removed.size() >= max_rows * row_size_) break;
+    const std::uint32_t* const row = rows_[simplex];
+    part.removed.insert(part.removed.end(), row, row + row_size_);
+  }
+  if (cursor->removed < end.deaths) return part;
+  // What goes and comes back over several revisions stands in two parts.
+  if (cursor->to - cursor->from > 1 && !part.removed.empty()) {
+    part.complete = cursor->vertex == end.vertices && cursor->added == end.simplices;
+    return part;
+  }
+
+  // A part with nothing in it yet takes one of whatever comes next, however large.
+  std::size_t left = max_bytes - std::min(max_bytes, part.removed.size() * sizeof(std::uint32_t));
+  const auto room_for = [&left](std::size_t bytes, bool empty) {
+    return std::max(left / bytes, std::size_t{empty ? 1u : 0u});
+  };
+  std::size_t points =
+      std::min(end.vertices - cursor->vertex, room_for(point_bytes, part.removed.empty()));
+  left -= std::min(left, points * point_bytes);
+  part.points.reserve(points * d_);
+  while (points > 0) {
+    const std::size_t run = std::min(points, points_.Run(cursor->vertex));
+    const double* const first = points_[cursor->vertex];
+    part.points.insert(part.points.end(), first, first + run * d_);
+    cursor->vertex += run;
+    points -= run;
+  }
+  if (cursor->vertex < end.vertices) return part;  // a position is among vertices or simplices
+  AppendAdded(cursor, end.simplices,
+              room_for(row_bytes, part.removed.empty() && part.points.empty()), &part);
+  part.complete = cursor->added == end.simplices;
+  return part;
+}
+
+// Alive at `to`, from the cursor on: `max_rows` at most.
+void WatchLog::AppendAdded(Cursor* cursor, std::size_t end, std::size_t max_rows,
+                           DeltaPart* part) const {
+  const std::size_t stop = std::min(end, cursor->added + kScanLimit);
+  part->added.reserve(std::min(stop - cursor->added, max_rows) * row_size_);
+  std::size_t rows = 0;
+  for (; cursor->added < stop; ++cursor->added) {
+    const Life& life = *lives_[cursor->added];
+    if (life.died != 0 && life.died <= cursor->to) continue;
+    if (rows == max_rows) return;
+    ++rows;
+    const std::uint32_t* const row = rows_[cursor->added];
+    part->added.insert(part->added.end(), row, row + row_size_);
+  }
+}
+
+}  // namespace stellate::server

@@ -1,0 +1,370 @@
+#include "server/journal/recorded_mesh.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "core/message.h"
+
+namespace stellate::server {
+namespace {
+
+using core::Message;
+using Eigen::Index;
+using Found = JournalFile::Found;
+
+constexpr std::size_t kHistoryBytes = std::size_t{1} << 20;  // of a record
+
+std::vector<Index> SizesOf(const core::QueryBatch& batch) {
+  std::vector<Index> sizes;
+  for (const core::QueryBlock& block : batch.blocks) sizes.push_back(block.size());
+  return sizes;
+}
+
+MeshFailure Unreadable(const std::string& what) {
+  return {"JOURNAL_FAILED", Message("the record of ", what, " cannot be read back")};
+}
+
+}  // namespace
+
+RecordedMesh::RecordedMesh(std::shared_ptr<SharedJournal> journal, std::uint64_t owner_limit,
+                           std::int64_t id, const JournalFile::StoredMesh& stored,
+                           const SessionOptions& options, std::uint64_t bytes)
+    : journal_(std::move(journal)),
+      owner_limit_(owner_limit),
+      id_(id),
+      counted_(bytes),
+      has_history_(stored.has_history),
+      rounds_(stored.rounds),
+      has_answers_(stored.has_answers) {
+  SetShape(options);
+  journal_->CountFor(owner_, static_cast<std::int64_t>(bytes));
+}
+
+void RecordedMesh::SetShape(const SessionOptions& options) {
+  owner_ = options.owner;
+  dimension_ = options.spec.dimension;
+  ambient_dimension_ = options.spec.ambient_dimension;
+}
+
+// Writes of about `bytes`, unless the mesh is not wanted any more.
+std::optional<MeshFailure> RecordedMesh::Do(const char* what, Turns::Place place,
+                                            std::uint64_t bytes,
+                                            const std::function<bool(JournalFile*)>& action) {
+  if (forgotten_) return std::nullopt;
+  if (auto refused = RefuseShare(bytes)) return refused;
+  return journal_->Do(what, place, [&](JournalFile* file) {
+    // Under the file's lock: a removal comes before, and is seen here, or after, and sees the id.
+    if (forgotten_) return true;
+    const bool done = action(file);
+    Recount(*file);
+    return done;
+  });
+}
+
+std::optional<MeshFailure> RecordedMesh::RefuseShare(std::uint64_t bytes) const {
+  if (owner_limit_ == 0 || owner_.empty() || bytes == 0) return std::nullopt;
+  const std::uint64_t owned = journal_->OwnerBytes(owner_);
+  if (owned + bytes <= owner_limit_) return std::nullopt;
+  return MeshFailure{"JOURNAL_FULL",
+                     Message("the records of your meshes have ", owned, " bytes, and ", bytes,
+                             " more are beyond the ", owner_limit_,
+                             " that the server allows each owner: delete meshes that are no longer "
+                             "needed, then mesh anew")};
+}
+
+void RecordedMesh::Recount(const JournalFile& file) {
+  const std::uint64_t bytes = file.BytesOf(id_);
+  journal_->CountFor(owner_, static_cast<std::int64_t>(bytes - counted_));
+  counted_ = bytes;
+}
+
+std::optional<MeshFailure> RecordedMesh::WriteStart(
+    const SessionOptions& options, std::chrono::system_clock::time_point create_time) {
+  SetShape(options);
+  const std::string record = EncodeStart(options, create_time);
+  return Do("the mesh", Turns::Place::kLast, record.size(), [&](JournalFile* file) {
+    std::int64_t id = 0;
+    const bool written = file->Transact([&] {
+      id = file->NewMesh();
+      return file->Put({id, RecordKind::kStart}, record);
+    });
+    if (written) id_ = id;
+    return written;
+  });
+}
+
+SessionJournal::Known RecordedMesh::BeginRound(const core::QueryBatch& batch) {
+  const std::uint64_t questions = DigestOf(batch);
+  {
+    const std::lock_guard lock(mutex_);
+    round_ = static_cast<std::int64_t>(batch.round);
+    questions_ = questions;
+    sizes_ = SizesOf(batch);
+    pending_.clear();
+    answers_.reset();
+  }
+  written_.clear();
+  next_part_ = 0;
+  if (batch.round <= rounds_) return ReadRound(batch);
+  if (std::exchange(has_answers_, false) && batch.round == rounds_ + 1) {
+    return ReadPartOfRound(batch);
+  }
+  return {};
+}
+
+// False: it cannot be read. A part that is not there is no fault here.
+bool RecordedMesh::ReadAnswers(JournalFile* file, std::int64_t round, std::int64_t part,
+                               RecordedAnswers* answers, Found* found) const {
+  std::string record;
+  *found = file->Read({id_, RecordKind::kAnswers, round, part}, &record);
+  if (*found != Found::kYes) return *found == Found::kNo;
+  auto decoded = DecodeAnswers(record);
+  if (!decoded) return false;
+  *answers = std::move(*decoded);
+  return std::all_of(answers->parts.begin(), answers->parts.end(),
+                     [this](const PartOfRound& one) { return Fits(one); });
+}
+
+bool RecordedMesh::Fits(const PartOfRound& part) const {
+  const core::AnswerBlock& answers = part.answers;
+  const Index count = answers.points.cols();
+  return part.block_index < sizes_.size() && part.first >= 0 && count <= sizes_[part.block_index] &&
+         part.first <= sizes_[part.block_index] - count &&
+         answers.points.rows() == ambient_dimension_ &&
+         (answers.found.empty() || static_cast<Index>(answers.found.size()) == count) &&
+         (answers.tangents.cols() == 0 ||
+          answers.tangents.rows() == Index{ambient_dimension_} * dimension_);
+}
+
+SessionJournal::Known RecordedMesh::ReadRound(const core::QueryBatch& batch) {
+  const auto number = static_cast<std::int64_t>(batch.round);
+  Known known{{}, {}, Unreadable(Message("round ", batch.round))};
+  journal_->Do("nothing", Turns::Place::kLast, [&](JournalFile* file) {
+    std::string record;
+    if (file->Read({id_, RecordKind::kRound, number}, &record) != Found::kYes) return true;
+    const auto round = DecodeRound(record);
+    if (!round) return true;
+    if (round->questions != questions_) {
+      known.failure = MeshFailure{"REPLAY_MISMATCH",
+                                  Message("in round ", batch.round,
+                                          " this server asks other questions than the server that "
+                                          "recorded the answers: mesh anew")};
+      return true;
+    }
+    core::Answers answers = EmptyAnswers(dimension_, ambient_dimension_, batch);
+    for (std::uint64_t part = 0; part < round->parts; ++part) {
+      RecordedAnswers some;
+      Found found;
+      if (!ReadAnswers(file, number, static_cast<std::int64_t>(part), &some, &found)) return true;
+      for (const PartOfRound& one : some.parts) server::PutAnswers(one, &answers);
+    }
+    if (DigestOf(answers) != round->answers) return true;
+    known.answers = std::move(answers);
+    known.failure.reset();
+    return true;
+  });
+  return known;
+}
+
+SessionJournal::Known RecordedMesh::ReadPartOfRound(const core::QueryBatch& batch) {
+  const auto number = static_cast<std::int64_t>(batch.round);
+  Known known;
+  bool others = false;  // another version of the mesher asked them
+  auto failure =
+      journal_->Do("the answers of a round", Turns::Place::kLast, [&](JournalFile* file) {
+        Found found = Found::kYes;
+        for (std::int64_t part = 0; found == Found::kYes; ++part) {
+          RecordedAnswers some;
+          if (!ReadAnswers(file, number, part, &some, &found)) {
+            known.failure = Unreadable(Message("some of round ", batch.round));
+            return true;
+          }
+          if (found != Found::kYes) break;
+          others = others || some.questions != questions_;
+          next_part_ = part + 1;
+          for (PartOfRound& one : some.parts) {
+            written_.push_back({one.block_index, one.first, one.first + one.answers.points.cols()});
+            known.parts.push_back(std::move(one));
+          }
+        }
+        if (!others) return true;
+        written_.clear();
+        known = {};
+        return file->Transact([&] {
+          while (next_part_ > 0) {
+            if (!file->Remove({id_, RecordKind::kAnswers, number, --next_part_})) return false;
+          }
+          return true;
+        });
+      });
+  if (failure) known.failure = std::move(failure);
+  std::sort(known.parts.begin(), known.parts.end(), [](const auto& a, const auto& b) {
+    return std::pair(a.block_index, a.first) < std::pair(b.block_index, b.first);
+  });
+  return known;
+}
+
+void RecordedMesh::TakeAnswers(const std::shared_ptr<const Round>& round, std::size_t block,
+                               Index first, Index count) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (round_ == 0 || round->batch.round != static_cast<std::uint64_t>(round_)) return;
+    answers_ = round;
+    pending_.push_back({block, first, first + count});
+  }
+  journal_->WriteAnswersLater(shared_from_this());
+}
+
+bool RecordedMesh::HasAnswers() const {
+  const std::lock_guard lock(mutex_);
+  return !pending_.empty() && !forgotten_;
+}
+
+bool RecordedMesh::WriteAnswers(JournalFile* file) {
+  std::shared_ptr<const Round> round;
+  draft_part_ = next_part_;
+  {
+    const std::lock_guard lock(mutex_);
+    draft_ = Merged(std::exchange(pending_, {}));
+    round = answers_;
+  }
+  // An owner who has used up his share hears of it at the end of the round.
+  if (draft_.empty() || RefuseShare(1)) return true;
+  return PutAnswers(file, round->answers, draft_, &draft_part_);
+}
+
+void RecordedMesh::AnswersWritten(bool written) {
+  if (written && draft_part_ > next_part_) {
+    next_part_ = draft_part_;
+    written_.insert(written_.end(), draft_.begin(), draft_.end());
+  }
+  draft_.clear();
+}
+
+bool RecordedMesh::PutAnswers(JournalFile* file, const core::Answers& answers,
+                              const std::vector<AnswerRange>& ranges,
+                              std::int64_t* next_part) const {
+  return EncodeAnswers(answers, ranges, questions_, [&](const std::string& record) {
+    return file->Put({id_, RecordKind::kAnswers, round_, (*next_part)++}, record);
+  });
+}
+
+std::optional<MeshFailure> RecordedMesh::WriteRound(const core::QueryBatch& batch,
+                                                    const core::Answers& answers,
+                                                    std::uint64_t vertices) {
+  {
+    const std::lock_guard lock(mutex_);  // the rest is written here
+    pending_.clear();
+    answers_.reset();
+  }
+  RecordedRound round{questions_, DigestOf(answers), 0, vertices};
+  auto failure = Do("the answers of a round", Turns::Place::kLast, 1, [&](JournalFile* file) {
+    return file->Transact([&] {
+      std::int64_t parts = next_part_;
+      if (!PutAnswers(file, answers, Missing(Merged(written_), sizes_), &parts)) return false;
+      round.parts = static_cast<std::uint64_t>(parts);
+      return file->Put({id_, RecordKind::kRound, round_}, EncodeRound(round));
+    });
+  });
+  if (!failure) rounds_ = batch.round;
+  return failure;
+}
+
+// It is short, and others wait for it.
+std::optional<MeshFailure> RecordedMesh::WriteEnd(const SessionEnd& end) {
+  return Do("the end of the mesh", Turns::Place::kFirst, 0, [&](JournalFile* file) {
+    return id_ == 0 || file->Transact([&] {
+      return file->Put({id_, RecordKind::kEnd}, EncodeEnd(end));
+    });
+  });
+}
+
+std::optional<MeshFailure> RecordedMesh::WriteResult(const SessionResult& result,
+                                                     const WatchLog& history) {
+  if (id_ == 0) return std::nullopt;
+  std::optional<MeshFailure> failure;
+  // Of a server that was killed as it wrote.
+  for (bool done = !has_history_; !done && !failure;) {
+    failure = Do("the finished mesh", Turns::Place::kLast, 0, [&](JournalFile* file) {
+      return file->RemoveSome(id_, JournalFile::Kinds::kHistory, &done);
+    });
+    done = done || forgotten_;
+  }
+  has_history_ = true;
+  std::string record;
+  std::int64_t parts = 0;
+  const auto put = [&] {
+    failure = Do("the finished mesh", Turns::Place::kLast, record.size(), [&](JournalFile* file) {
+      return file->Transact([&] {
+        return file->Put({id_, RecordKind::kHistoryPart, 0, parts}, record);
+      });
+    });
+    ++parts;
+    record.clear();
+    return !failure;
+  };
+  const auto add = [&](const void* data, std::size_t bytes) {
+    for (const char* at = static_cast<const char*>(data); bytes > 0;) {
+      const std::size_t take = std::min(bytes, kHistoryBytes - record.size());
+      record.append(at, take);
+      at += take;
+      bytes -= take;
+      if (record.size() == kHistoryBytes && !put()) return false;
+    }
+    return true;
+  };
+  if (!failure && history.Write(add) && (record.empty() || put())) {
+    failure = Do("the finished mesh", Turns::Place::kFirst, 0, [&](JournalFile* file) {
+      return file->Transact([&] {
+        return file->Put({id_, RecordKind::kResult},
+                         EncodeResult(result, static_cast<std::uint64_t>(parts)));
+      });
+    });
+  }
+  if (!failure) RemoveRounds();
+  return failure;
+}
+
+core::Expected<std::unique_ptr<WatchLog>> RecordedMesh::ReadHistory() {
+  std::string record;
+  std::size_t used = 0;
+  std::int64_t part = 0;
+  const auto read = [&](void* data, std::size_t bytes) {
+    for (char* at = static_cast<char*>(data); bytes > 0;) {
+      if (used == record.size()) {
+        Found found = Found::kNo;
+        journal_->Do("nothing", Turns::Place::kLast, [&](JournalFile* file) {
+          found = file->Read({id_, RecordKind::kHistoryPart, 0, part++}, &record);
+          return true;
+        });
+        used = 0;
+        if (found != Found::kYes) return false;
+      }
+      const std::size_t take = std::min(bytes, record.size() - used);
+      std::memcpy(at, record.data() + used, take);
+      at += take;
+      used += take;
+      bytes -= take;
+    }
+    return true;
+  };
+  return WatchLog::Read(dimension_, ambient_dimension_, read);
+}
+
+void RecordedMesh::RemoveRounds() { journal_->RemoveLater(shared_from_this()); }
+
+void RecordedMesh::Forget() {
+  if (!forgotten_.exchange(true)) journal_->RemoveLater(shared_from_this());
+}
+
+bool RecordedMesh::RemoveSome(JournalFile* file, bool* done) {
+  *done = id_ == 0;
+  if (*done) return true;
+  const auto kinds = forgotten_ ? JournalFile::Kinds::kAll : JournalFile::Kinds::kRounds;
+  const bool removed = file->RemoveSome(id_, kinds, done);
+  Recount(*file);
+  return removed;
+}
+
+}  // namespace stellate::server

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "server/journal/shared_journal.h"
+#include "server/records/journal_format.h"
+#include "server/session/session_journal.h"
+#include "server/storage/journal_file.h"
+
+namespace stellate::server {
+
+// A mesh's place in a shared journal.
+class RecordedMesh final : public SessionJournal,
+                           public SharedJournal::Mesh,
+                           public std::enable_shared_from_this<RecordedMesh> {
+ public:
+  // A new one. `owner_limit`: most bytes that the records of one owner's meshes may have, where
+  // owners have names; 0: none.
+  RecordedMesh(std::shared_ptr<SharedJournal> journal, std::uint64_t owner_limit)
+      : journal_(std::move(journal)), owner_limit_(owner_limit) {}
+  // One that is there: `options` as they were recorded.
+  RecordedMesh(std::shared_ptr<SharedJournal> journal, std::uint64_t owner_limit, std::int64_t id,
+               const JournalFile::StoredMesh& stored, const SessionOptions& options,
+               std::uint64_t bytes);
+
+  std::optional<MeshFailure> WriteStart(const SessionOptions& options,
+                                        std::chrono::system_clock::time_point create_time) override;
+  Known BeginRound(const core::QueryBatch& batch) override;
+  void TakeAnswers(const std::shared_ptr<const Round>& round, std::size_t block, Eigen::Index first,
+                   Eigen::Index count) override;
+  std::optional<MeshFailure> WriteRound(const core::QueryBatch& batch, const core::Answers& answers,
+                                        std::uint64_t vertices) override;
+  std::optional<MeshFailure> WriteEnd(const SessionEnd& end) override;
+  std::optional<MeshFailure> WriteResult(const SessionResult& result,
+                                         const WatchLog& history) override;
+  core::Expected<std::unique_ptr<WatchLog>> ReadHistory() override;
+  void Forget() override;
+
+  bool HasAnswers() const override;
+  bool WriteAnswers(JournalFile* file) override;
+  void AnswersWritten(bool written) override;
+  bool RemoveSome(JournalFile* file, bool* done) override;
+  // Its result is recorded: what led to it can go.
+  void RemoveRounds();
+
+ private:
+  void SetShape(const SessionOptions& options);
+  std::optional<MeshFailure> Do(const char* what, Turns::Place place, std::uint64_t bytes,
+                                const std::function<bool(JournalFile*)>& action);
+  std::optional<MeshFailure> RefuseShare(std::uint64_t bytes) const;
+  void Recount(const JournalFile& file);
+  bool PutAnswers(JournalFile* file, const core::Answers& answers,
+                  const std::vector<AnswerRange>& ranges, std::int64_t* next_part) const;
+  Known ReadRound(const core::QueryBatch& batch);
+  Known ReadPartOfRound(const core::QueryBatch& batch);
+  bool ReadAnswers(JournalFile* file, std::int64_t round, std::int64_t part,
+                   RecordedAnswers* answers, JournalFile::Found* found) const;
+  bool Fits(const PartOfRound& part) const;
+
+  const std::shared_ptr<SharedJournal> journal_;
+  const std::uint64_t owner_limit_;
+  std::string owner_;
+  int dimension_ = 0, ambient_dimension_ = 0;
+  std::atomic<bool> forgotten_{false};
+
+  // Whoever has the file to himself.
+  std::int64_t id_ = 0;               // 0: not recorded
+  std::uint64_t counted_ = 0;         // of its bytes, for its owner
+  bool has_history_ = false;          // some of it
+  std::vector<AnswerRange> written_;  // of the round
+  std::int64_t next_part_ = 0, draft_part_ = 0;
+  std::vector<AnswerRange> draft_;  // written once the transaction is
+
+  // The session's thread alone.
+  std::uint64_t rounds_ = 0;  // that are whole
+  bool has_answers_ = false;  // of the one after these
+
+  mutable std::mutex mutex_;
+  std::int64_t round_ = 0;  // under way; 0: none
+  std::uint64_t questions_ = 0;
+  std::vector<Eigen::Index> sizes_;
+  std::shared_ptr<const Round> answers_;
+  std::vector<AnswerRange> pending_;  // answered and not written
+};
+
+}  // namespace stellate::server

@@ -1,0 +1,191 @@
+#include "server/journal/shared_journal.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/message.h"
+#include "server/base/log.h"
+
+namespace stellate::server {
+namespace {
+
+using core::Message;
+
+constexpr auto kRetry = std::chrono::seconds(1);  // of a removal that failed
+constexpr auto kSync = std::chrono::seconds(1);   // of the mark
+// Answers are gathered for so long, and so many times as long as it took to write the last ones, so
+// that the disk is theirs for a tenth of the time or so. A round that is over sooner is written at
+// once and whole.
+constexpr Clock::duration kGather = std::chrono::milliseconds(50);
+constexpr Clock::duration kLongestGather = std::chrono::milliseconds(250);
+constexpr int kGatherShare = 10;
+
+}  // namespace
+
+std::optional<MeshFailure> SharedJournal::Do(const char* what, Turns::Place place,
+                                             const std::function<bool(JournalFile*)>& action) {
+  std::optional<MeshFailure> failure;
+  bool is_long = false;
+  {
+    const Turn turn(turns_, place);
+    if (!action(file_.get())) failure = WhyNot(what);
+    is_long = file_->IsLogLong();
+  }
+  if (is_long) NoteLongLog();
+  return failure;
+}
+
+MeshFailure SharedJournal::WhyNot(const char* what) {
+  Sqlite& database = file_->database();
+  const bool full = database.IsFull();
+  MeshFailure failure{full ? "JOURNAL_FULL" : "JOURNAL_FAILED",
+                      Message("the server cannot record ", what, ": ", database.error(),
+                              full ? "; free space by deleting meshes, then mesh anew" : "")};
+  file_->Abandon();
+  return failure;
+}
+
+void SharedJournal::StartThreads() {
+  space_is_due_ = file_->HasSpaceToGiveBack();  // that an earlier server did not come to
+  writer_ = std::jthread([this](std::stop_token stop) { Write(stop); });
+  keeper_ = std::jthread([this](std::stop_token stop) { Keep(stop); });
+}
+
+void SharedJournal::StopThreads() {
+  {
+    const std::lock_guard lock(due_mutex_);  // nothing is due any more after this
+    writer_.request_stop();
+    keeper_.request_stop();
+  }
+  if (writer_.joinable()) writer_.join();
+  if (keeper_.joinable()) keeper_.join();
+}
+
+void SharedJournal::WriteAnswersLater(std::shared_ptr<Mesh> mesh) {
+  {
+    const std::lock_guard lock(due_mutex_);
+    if (std::find(writing_.begin(), writing_.end(), mesh) != writing_.end()) return;
+    writing_.push_back(std::move(mesh));
+  }
+  answers_due_.notify_one();
+}
+
+void SharedJournal::RemoveLater(std::shared_ptr<Mesh> mesh) {
+  {
+    const std::lock_guard lock(due_mutex_);
+    if (keeper_.get_stop_token().stop_requested()) return;
+    removing_.push_back(std::move(mesh));
+  }
+  work_due_.notify_one();
+}
+
+void SharedJournal::NoteLongLog() {
+  {
+    const std::lock_guard lock(due_mutex_);
+    log_is_long_ = true;
+  }
+  work_due_.notify_one();
+}
+
+// All meshes' answers in one transaction.
+void SharedJournal::Write(std::stop_token stop) {
+  std::unique_lock lock(due_mutex_);
+  Clock::duration gather = kGather;
+  while (answers_due_.wait(lock, stop, [this] { return !writing_.empty(); })) {
+    answers_due_.wait_for(lock, stop, gather, [] { return false; });
+    const auto meshes = std::exchange(writing_, {});
+    lock.unlock();
+    const TimePoint begin = Clock::now();
+    // If this fails the end of the round, which writes what is missing, says why.
+    Do("answers", Turns::Place::kLast, [&meshes](JournalFile* file) {
+      std::vector<Mesh*> ready;
+      for (const auto& mesh : meshes) {
+        if (mesh->HasAnswers()) ready.push_back(mesh.get());
+      }
+      const bool written = ready.empty() || file->Transact([&] {
+        return std::all_of(ready.begin(), ready.end(),
+                           [&](Mesh* mesh) { return mesh->WriteAnswers(file); });
+      });
+      for (Mesh* const mesh : ready) mesh->AnswersWritten(written);
+      return written;
+    });
+    gather = std::clamp(kGatherShare * (Clock::now() - begin), kGather, kLongestGather);
+    lock.lock();
+  }
+}
+
+void SharedJournal::Keep(std::stop_token stop) {
+  std::unique_lock lock(due_mutex_);
+  const auto is_due = [this] { return log_is_long_ || space_is_due_ || !removing_.empty(); };
+  while (true) {
+    if (!work_due_.wait_for(lock, stop, kSync, is_due)) {  // told to stop, until nothing is due
+      if (stop.stop_requested()) return;
+      lock.unlock();
+      Do("the mark", Turns::Place::kFirst,
+         [](JournalFile* file) { return file->SyncMark(), true; });
+      lock.lock();
+      continue;
+    }
+    if (std::exchange(log_is_long_, false)) {
+      lock.unlock();
+      Checkpoint();
+      lock.lock();
+      continue;
+    }
+    const std::shared_ptr<Mesh> mesh = removing_.empty() ? nullptr : removing_.front();
+    bool done = false;
+    lock.unlock();
+    const bool kept = mesh != nullptr ? RemoveSome(mesh.get(), &done) : GiveBackSome(&done);
+    lock.lock();
+    if (!kept) done = stop.stop_requested();  // the rest is the next server's
+    if (mesh == nullptr) {
+      space_is_due_ = !done;
+    } else {
+      space_is_due_ = true;
+      if (done || !kept) removing_.pop_front();
+      if (!done && !kept) removing_.push_back(mesh);  // behind others
+    }
+    if (!done && !kept) work_due_.wait_for(lock, stop, kRetry, [] { return false; });
+  }
+}
+
+void SharedJournal::Checkpoint() {
+  const Turn turn(turns_, Turns::Place::kFirst);
+  // If this fails the log grows on, until a write fails and says why.
+  if (!file_->Checkpoint()) file_->Abandon();
+}
+
+bool SharedJournal::RemoveSome(Mesh* mesh, bool* done) {
+  const auto failure = Do("the removal of a mesh", Turns::Place::kLast,
+                          [&](JournalFile* file) { return mesh->RemoveSome(file, done); });
+  if (failure) Log(LogLevel::kWarning, {}, failure->message);
+  return !failure;
+}
+
+bool SharedJournal::GiveBackSome(bool* done) {
+  const auto failure = Do("what was removed", Turns::Place::kLast,
+                          [&](JournalFile* file) { return file->GiveBackSome(done); });
+  if (failure) Log(LogLevel::kWarning, {}, failure->message);
+  return !failure;
+}
+
+std::uint64_t SharedJournal::OwnerBytes(const std::string& owner) const {
+  const std::lock_guard lock(due_mutex_);
+  const auto it = owner_bytes_.find(owner);
+  return it == owner_bytes_.end() ? 0 : it->second;
+}
+
+std::uint64_t SharedJournal::TotalBytes() const {
+  const std::lock_guard lock(due_mutex_);
+  return total_bytes_;
+}
+
+void SharedJournal::CountFor(const std::string& owner, std::int64_t bytes) {
+  const std::lock_guard lock(due_mutex_);
+  std::uint64_t& total = owner_bytes_[owner];
+  total += static_cast<std::uint64_t>(bytes);
+  total_bytes_ += static_cast<std::uint64_t>(bytes);
+  if (total == 0) owner_bytes_.erase(owner);
+}
+
+}  // namespace stellate::server

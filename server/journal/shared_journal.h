@@ -1,0 +1,85 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/journal/turns.h"
+#include "server/oracles/oracle_pool.h"
+#include "server/storage/data_directory.h"
+#include "server/storage/journal_file.h"
+
+namespace stellate::server {
+
+// A journal's file for many threads, and two threads that work at it: one writes the answers of
+// rounds that are not whole yet, the other removes what is not needed any more and keeps the file
+// in order, in pieces, between which others write. Neither those who answer nor those who delete
+// wait for the disk.
+class SharedJournal {
+ public:
+  // What the two threads do for a mesh; both have the file to themselves meanwhile.
+  class Mesh {
+   public:
+    virtual ~Mesh() = default;
+    virtual bool HasAnswers() const = 0;
+    // In a transaction. False: the disk's fault.
+    virtual bool WriteAnswers(JournalFile* file) = 0;
+    // What WriteAnswers wrote since is on the disk, or not.
+    virtual void AnswersWritten(bool written) = 0;
+    // One piece; `done` once nothing is left.
+    virtual bool RemoveSome(JournalFile* file, bool* done) = 0;
+  };
+
+  SharedJournal(std::unique_ptr<DataDirectory> directory, std::unique_ptr<JournalFile> file)
+      : directory_(std::move(directory)), file_(std::move(file)) {}
+
+  // Runs `action` on the file, alone. What went wrong, if it returned false: the server cannot
+  // record `what`.
+  std::optional<MeshFailure> Do(const char* what, Turns::Place place,
+                                const std::function<bool(JournalFile*)>& action);
+
+  void StartThreads();
+  // What is due is tried once more.
+  void StopThreads();
+  void WriteAnswersLater(std::shared_ptr<Mesh> mesh);
+  void RemoveLater(std::shared_ptr<Mesh> mesh);
+
+  // Bytes of all records of an owner's meshes.
+  std::uint64_t OwnerBytes(const std::string& owner) const;
+  std::uint64_t TotalBytes() const;  // of everyone's
+  void CountFor(const std::string& owner, std::int64_t bytes);
+
+ private:
+  MeshFailure WhyNot(const char* what);
+  void NoteLongLog();
+  void Write(std::stop_token stop);
+  void Keep(std::stop_token stop);
+  void Checkpoint();
+  bool RemoveSome(Mesh* mesh, bool* done);
+  bool GiveBackSome(bool* done);
+
+  const std::unique_ptr<DataDirectory> directory_;  // not another's before the file is closed
+  Turns turns_;
+  const std::unique_ptr<JournalFile> file_;
+
+  mutable std::mutex due_mutex_;  // of all that follows; never held while the disk is waited for
+  std::condition_variable_any answers_due_, work_due_;
+  std::vector<std::shared_ptr<Mesh>> writing_;  // have answers
+  std::deque<std::shared_ptr<Mesh>> removing_;
+  bool log_is_long_ = false;
+  bool space_is_due_ = false;  // of what was removed
+  std::map<std::string, std::uint64_t> owner_bytes_;
+  std::uint64_t total_bytes_ = 0;
+  std::jthread writer_, keeper_;
+};
+
+}  // namespace stellate::server

@@ -1,0 +1,200 @@
+#include "server/metrics/metrics.h"
+
+#include <prometheus/counter.h>
+#include <prometheus/exposer.h>
+#include <prometheus/gauge.h>
+#include <prometheus/histogram.h>
+#include <prometheus/metric_family.h>
+#include <prometheus/registry.h>
+
+#include <map>
+#include <utility>
+
+#include "core/message.h"
+#include "server/metrics/process_metrics.h"
+
+namespace stellate::server {
+namespace {
+
+using prometheus::Counter;
+using prometheus::MetricFamily;
+
+// From a native oracle on loopback to a slow one far away.
+const prometheus::Histogram::BucketBoundaries kLatencyBuckets = {
+    0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60};
+
+constexpr SessionState kStates[] = {SessionState::kWaiting,   SessionState::kRunning,
+                                    SessionState::kSucceeded, SessionState::kStopped,
+                                    SessionState::kCancelled, SessionState::kFailed};
+
+MetricFamily Gauge(const char* name, const char* help) {
+  MetricFamily family;
+  family.name = name;
+  family.help = help;
+  family.type = prometheus::MetricType::Gauge;
+  return family;
+}
+
+void Add(MetricFamily* family, double value, const char* label = nullptr,
+         const std::string& label_value = "") {
+  prometheus::ClientMetric metric;
+  if (label != nullptr) metric.label.push_back({label, label_value});
+  metric.gauge.value = value;
+  family->metric.push_back(std::move(metric));
+}
+
+// Gauges, counted from the meshes that the server holds.
+class Census final : public prometheus::Collectable {
+ public:
+  explicit Census(Metrics::Sessions sessions) : sessions_(std::move(sessions)) {}
+
+  std::vector<MetricFamily> Collect() const override {
+    std::map<SessionState, int> states;
+    double workers = 0, watchers = 0, vertices = 0, waiting = 0, bytes = 0, idle = 0;
+    for (const auto& session : sessions_()) {
+      const SessionView view = session->View();
+      ++states[view.state];
+      workers += static_cast<double>(view.workers);
+      watchers += static_cast<double>(view.watchers);
+      vertices += static_cast<double>(view.progress.vertices);
+      waiting += static_cast<double>(view.waiting_queries);
+      bytes += static_cast<double>(view.bytes);
+      if (view.workers == 0 && view.waiting_queries > 0 && !session->HasEnded()) ++idle;
+    }
+    std::vector<MetricFamily> families = {
+        Gauge("stellate_meshes", "Meshes that the server holds, by state"),
+        Gauge("stellate_workers", "Open worker streams that serve a mesh"),
+        Gauge("stellate_watchers", "Open watcher streams"),
+        Gauge("stellate_vertices", "Vertices of the meshes that the server holds"),
+        Gauge("stellate_queries_waiting", "Queries of the rounds under way, not answered yet"),
+        Gauge("stellate_mesh_bytes", "Memory of the meshes that the server holds, estimated"),
+        Gauge("stellate_meshes_idle", "Meshes that have questions and no worker")};
+    for (const SessionState state : kStates) {
+      Add(&families[0], states[state], "state", SessionStateName(state));
+    }
+    Add(&families[1], workers);
+    Add(&families[2], watchers);
+    Add(&families[3], vertices);
+    Add(&families[4], waiting);
+    Add(&families[5], bytes);
+    Add(&families[6], idle);
+    return families;
+  }
+
+ private:
+  const Metrics::Sessions sessions_;
+};
+
+}  // namespace
+
+// Sessions hold it as their observer and may outlive Metrics.
+class Metrics::Impl final : public SessionObserver {
+ public:
+  Impl() {
+    auto& family = prometheus::BuildCounter()
+                       .Name("stellate_meshes_ended_total")
+                       .Help("Meshes that ended, by the state they ended in")
+                       .Register(*registry);
+    for (const SessionState state : kStates) {
+      if (state == SessionState::kWaiting || state == SessionState::kRunning) continue;
+      ended[state] = &family.Add({{"state", SessionStateName(state)}});
+    }
+  }
+
+  void OnRound(std::size_t queries) override {
+    rounds.Increment();
+    answered_queries.Increment(static_cast<double>(queries));
+  }
+
+  void OnEnd(SessionState state, const core::Report& report) override {
+    ended.at(state)->Increment();
+    (report.certificate.certified ? certified : uncertified).Increment();
+  }
+
+  void OnBackUps(std::size_t chunks) override { backups.Increment(static_cast<double>(chunks)); }
+  void OnCompared(std::size_t queries) override {
+    compared.Increment(static_cast<double>(queries));
+  }
+  void OnDisagreement() override { disagreements.Increment(); }
+
+  Counter& Count(const char* name, const char* help) {
+    return prometheus::BuildCounter().Name(name).Help(help).Register(*registry).Add({});
+  }
+
+  const std::shared_ptr<prometheus::Registry> registry = std::make_shared<prometheus::Registry>();
+  std::map<SessionState, Counter*> ended;
+  Counter& rounds = Count("stellate_rounds_total", "Rounds of refinement that were answered");
+  Counter& answered_queries =
+      Count("stellate_queries_total", "Oracle queries of the rounds that were answered");
+  Counter& backups =
+      Count("stellate_backups_total", "Chunks of stragglers given to an idle worker as well");
+  Counter& compared = Count("stellate_compared_queries_total",
+                            "Queries that two workers answered and that were compared");
+  Counter& disagreements = Count("stellate_disagreements_total",
+                                 "Times that two workers answered one query differently");
+  Counter& received = Count("stellate_received_bytes_total", "Bytes of stream messages received");
+  Counter& sent = Count("stellate_sent_bytes_total", "Bytes of stream messages sent");
+  Counter& refused =
+      Count("stellate_unauthenticated_total", "Calls refused for want of a good token");
+  prometheus::Family<Counter>& certificates =
+      prometheus::BuildCounter()
+          .Name("stellate_certificates_total")
+          .Help("Meshes that ended, by what their certificate says")
+          .Register(*registry);
+  Counter& certified = certificates.Add({{"certified", "true"}});
+  Counter& uncertified = certificates.Add({{"certified", "false"}});
+  prometheus::Family<Counter>& limits =
+      prometheus::BuildCounter()
+          .Name("stellate_limit_refusals_total")
+          .Help("Calls refused as a limit was reached, by the setting that bounds it")
+          .Register(*registry);
+  prometheus::Histogram& latency =
+      prometheus::BuildHistogram()
+          .Name("stellate_answer_seconds")
+          .Help("From handing a chunk of queries to a worker's stream to its answer")
+          .Register(*registry)
+          .Add({}, kLatencyBuckets);
+
+  std::shared_ptr<Census> census;
+  const std::shared_ptr<ProcessMetrics> process = std::make_shared<ProcessMetrics>();
+  std::unique_ptr<prometheus::Exposer> exposer;
+};
+
+Metrics::Metrics() : impl_(std::make_shared<Impl>()) {}
+Metrics::~Metrics() { StopListening(); }
+
+core::Status Metrics::Listen(const std::string& address, Sessions sessions) {
+  impl_->census = std::make_shared<Census>(std::move(sessions));
+  try {
+    impl_->exposer = std::make_unique<prometheus::Exposer>(address, /*num_threads=*/2);
+  } catch (const std::exception&) {
+    return {core::StatusCode::kFailedPrecondition,
+            core::Message("cannot listen on ", address,
+                          ": another program has it, or this machine does not; choose another "
+                          "--metrics-listen")};
+  }
+  impl_->exposer->RegisterCollectable(impl_->registry);
+  impl_->exposer->RegisterCollectable(impl_->census);
+  impl_->exposer->RegisterCollectable(impl_->process);
+  return core::Status::Ok();
+}
+
+int Metrics::port() const {
+  if (impl_->exposer == nullptr) return 0;
+  const auto ports = impl_->exposer->GetListeningPorts();
+  return ports.empty() ? 0 : ports.front();
+}
+
+void Metrics::StopListening() { impl_->exposer.reset(); }
+
+std::shared_ptr<SessionObserver> Metrics::observer() const { return impl_; }
+
+void Metrics::Answered(double seconds) { impl_->latency.Observe(seconds); }
+void Metrics::Refused() { impl_->refused.Increment(); }
+void Metrics::LimitReached(const std::string& setting) {
+  impl_->limits.Add({{"limit", setting}}).Increment();
+}
+void Metrics::Received(std::size_t bytes) { impl_->received.Increment(static_cast<double>(bytes)); }
+void Metrics::Sent(std::size_t bytes) { impl_->sent.Increment(static_cast<double>(bytes)); }
+
+}  // namespace stellate::server

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/status.h"
+#include "server/session/session.h"
+
+namespace stellate::server {
+
+// What the server counts, in Prometheus's text format; docs/metrics.md lists it. Counters are kept
+// as things happen and cost an atomic addition; gauges are counted when somebody asks. No metric
+// names an owner or a mesh.
+class Metrics {
+ public:
+  Metrics();
+  ~Metrics();
+
+  // Where the meshes are to be found, for the gauges. Must outlive Listen's answers.
+  using Sessions = std::function<std::vector<std::shared_ptr<Session>>()>;
+  // Answers http://address/metrics from now on. kFailedPrecondition: the address is taken.
+  core::Status Listen(const std::string& address, Sessions sessions);
+  int port() const;  // 0: does not listen
+  void StopListening();
+
+  // Given to each session.
+  std::shared_ptr<SessionObserver> observer() const;
+
+  // Oracle streams: a chunk was answered, `seconds` after it was sent.
+  void Answered(double seconds);
+  void Refused();                                 // a call came without a good token
+  void LimitReached(const std::string& setting);  // a call was refused by that limit
+  // Bytes of messages on streams, before compression and framing.
+  void Received(std::size_t bytes);
+  void Sent(std::size_t bytes);
+
+ private:
+  class Impl;
+  std::shared_ptr<Impl> impl_;
+};
+
+}  // namespace stellate::server

@@ -1,0 +1,267 @@
+#include "server/net/connection_guard.h"
+
+#include <fcntl.h>
+#include <linux/tcp.h>
+#include <malloc.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/epoll.h>
+#include <sys/eventfd.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <functional>
+#include <string_view>
+#include <utility>
+
+#include "core/message.h"
+#include "server/base/log.h"
+
+namespace stellate::server {
+namespace {
+
+using core::Message;
+
+constexpr int kMostEvents = 1024;
+constexpr int kPauseMilliseconds = 20;     // between two looks: some hundred calls may come
+constexpr int kHurryMilliseconds = 2;      // while much is unread: some megabytes may come
+constexpr std::uint64_t kFewBytes = 4096;  // too little for many calls, 16 bytes each at least
+constexpr std::size_t kFewCalls = 64;
+constexpr std::int64_t kLittle = 256 << 10;       // unread: a request or two, as most are
+constexpr double kMoment = 0.01;                  // seconds that anybody may hold anything for
+constexpr auto kAwake = std::chrono::seconds(1);  // after something came
+constexpr auto kLogPause = std::chrono::seconds(1);
+constexpr auto kQuiet = std::chrono::seconds(5);  // after a storm
+
+// Zero: it is no socket any more.
+ino_t NumberOf(int fd) {
+  struct stat info {};
+  return fstat(fd, &info) == 0 && S_ISSOCK(info.st_mode) ? info.st_ino : 0;
+}
+
+std::uint64_t BytesReceived(int fd) {
+  tcp_info info{};
+  socklen_t size = sizeof(info);
+  return getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &size) == 0 ? info.tcpi_bytes_received : 0;
+}
+
+// Received, and not taken by gRPC yet.
+std::uint64_t BytesWaiting(int fd) {
+  int bytes = 0;
+  return ioctl(fd, FIONREAD, &bytes) == 0 && bytes > 0 ? static_cast<std::uint64_t>(bytes) : 0;
+}
+
+}  // namespace
+
+ConnectionGuard::ConnectionGuard(int port, const Limits& limits,
+                                 std::function<void(const char* setting)> closed)
+    : port_(port),
+      limits_(limits),
+      unread_(std::make_shared<UnreadOfAll>(limits.unread_bytes * 2 / 3,
+                                            limits.request_bytes + kLittle)),
+      closed_(std::move(closed)),
+      epoll_(epoll_create1(EPOLL_CLOEXEC)),
+      wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  epoll_event event{};  // of key 0, which no connection has
+  event.events = EPOLLIN;
+  epoll_ctl(epoll_, EPOLL_CTL_ADD, wake_, &event);
+  thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
+}
+
+ConnectionGuard::~ConnectionGuard() {
+  thread_.request_stop();
+  const std::uint64_t one = 1;
+  [[maybe_unused]] const auto written = write(wake_, &one, sizeof(one));
+  thread_.join();
+  close(epoll_);
+  close(wake_);
+}
+
+void ConnectionGuard::Watch(int fd) {
+  Connection connection;
+  connection.fd = fd;
+  connection.number = NumberOf(fd);
+  connection.peer = PeerOf(fd);
+  connection.unread = CountUnread(fd, unread_);
+  connection.moved = connection.light = Clock::now();
+  const std::lock_guard lock(mutex_);
+  connections_.emplace(++last_key_, std::move(connection));
+  // Once for all that came meanwhile. It ends when gRPC closes the descriptor.
+  epoll_event event{};
+  event.events = EPOLLIN | EPOLLRDHUP | EPOLLET;
+  event.data.u64 = last_key_;
+  epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event);
+}
+
+void ConnectionGuard::Run(const std::stop_token& stop) {
+  std::vector<epoll_event> events(kMostEvents);
+  while (!stop.stop_requested()) {
+    const bool idle = busy_.empty() && gone_.empty() && !untidy_ && unread_->bytes == 0 &&
+                      Clock::now() > awake_until_;
+    const int count = epoll_wait(epoll_, events.data(), kMostEvents, idle ? -1 : 0);
+    if (count > 0) awake_until_ = Clock::now() + kAwake;
+    {
+      const std::lock_guard lock(mutex_);
+      if (idle) NothingWasUnread();
+      for (int i = 0; i < count; ++i) {
+        const epoll_event& event = events[static_cast<std::size_t>(i)];
+        const auto found = connections_.find(event.data.u64);
+        if (found == connections_.end()) continue;  // it is to stop
+        busy_.insert(found->first);
+        if ((event.events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0) found->second.ending = true;
+      }
+      BoundUnread();  // first, as the other takes longer
+      Look();
+    }
+    CountLeftBehind();
+    if (untidy_ && Clock::now() > quiet_at_) GiveBack();
+    pollfd wake{wake_, POLLIN, 0};
+    poll(&wake, 1, hurried_ ? kHurryMilliseconds : kPauseMilliseconds);
+  }
+}
+
+void ConnectionGuard::Look() {
+  const bool sweep = connections_.size() > 2 * swept_ + kMostEvents;
+  if (sweep) {
+    for (const auto& [key, connection] : connections_) busy_.insert(key);
+  }
+  FindIds();
+  ending_calls_ = 0;
+  for (auto key = busy_.begin(); key != busy_.end();) {
+    const auto found = connections_.find(*key);
+    Connection& connection = found->second;
+    const bool open = NumberOf(connection.fd) == connection.number;
+    const bool calm = !open || IsCalm(&connection);
+    if (open && connection.closed) ending_calls_ += connection.calls;
+    if (!open) {
+      if (connection.closed && connection.id != 0) gone_.push_back(connection.id);
+      connections_.erase(found);
+    }
+    key = calm ? busy_.erase(key) : std::next(key);
+  }
+  if (sweep) swept_ = connections_.size();
+}
+
+// Nothing can come of it before more bytes come.
+bool ConnectionGuard::IsCalm(Connection* connection) {
+  const std::uint64_t bytes = BytesReceived(connection->fd);
+  if (connection->id == 0) return bytes < kFewBytes && !connection->ending;
+  const bool waits = connection->ending || BytesWaiting(connection->fd) >= kFewBytes;
+  if (!waits && connection->calls <= kFewCalls && bytes - connection->bytes < kFewBytes) {
+    return true;
+  }
+  const auto calls = CallsHeld(connection->id);
+  connection->bytes = bytes;
+  connection->calls = calls.value_or(0);
+  if (!calls) connection->id = 0;  // gRPC is about to close it, or it was another's of that name
+  if (connection->calls > limits_.calls && !connection->closed) {
+    Close(
+        connection, "max-connection-streams",
+        Message("had ", connection->calls, " calls that were open or were reset faster than they ",
+                "end; --max-connection-streams allows ", limits_.calls));
+  }
+  return calls && !waits && *calls <= kFewCalls;
+}
+
+void ConnectionGuard::FindIds() {
+  std::unordered_map<std::string_view, Connection*> unknown;
+  for (const std::uint64_t key : busy_) {
+    Connection& connection = connections_.at(key);
+    if (connection.id == 0) unknown.emplace(connection.peer, &connection);
+  }
+  if (unknown.empty()) return;
+  ForEachConnection([&](std::string_view peer, ConnectionId id) {
+    const auto found = unknown.find(peer);
+    if (found != unknown.end() && CameToPort(port_, id)) found->second->id = id;
+  });
+}
+
+void ConnectionGuard::CountLeftBehind() {
+  std::size_t calls = ending_calls_;
+  std::erase_if(gone_, [&calls](ConnectionId id) {
+    const std::size_t left = CallsHeld(id).value_or(0);
+    calls += left;
+    return left == 0;
+  });
+  behind_ = calls > limits_.calls / 4;
+}
+
+// Until now, while nobody looked.
+void ConnectionGuard::NothingWasUnread() {
+  const auto now = Clock::now();
+  for (auto& [key, connection] : connections_) connection.moved = connection.light = now;
+}
+
+void ConnectionGuard::BoundUnread() {
+  const auto now = Clock::now();
+  std::int64_t total = 0;
+  std::vector<std::pair<double, Connection*>> holders;
+  for (auto& [key, connection] : connections_) {
+    const std::int64_t bytes = connection.unread->bytes;
+    const std::uint64_t whole = connection.unread->whole;
+    if (bytes == 0 || whole != connection.whole) connection.moved = now;
+    if (bytes < kLittle) connection.light = now;
+    connection.whole = whole;
+    if (bytes == 0 || connection.closed) continue;
+    if (now - connection.moved > limits_.request_time) {
+      Close(&connection, "request-seconds",
+            Message("had sent a part of a request, and no whole one for ",
+                    limits_.request_time.count(), " seconds"));
+      continue;
+    }
+    total += bytes;
+    // Of a connection that many share, messages become whole all the time.
+    const std::chrono::duration<double> held = now - std::min(connection.moved, connection.light);
+    holders.emplace_back(static_cast<double>(bytes) * std::max(held.count(), kMoment), &connection);
+  }
+  const std::int64_t most = limits_.unread_bytes / 2;  // more comes before the next look
+  hurried_ = total > most / 2;
+  if (hurried_) {
+    untidy_ = true;
+    quiet_at_ = now + kQuiet;
+  }
+  if (total <= most) return;
+  std::sort(holders.begin(), holders.end(), std::greater<>());
+  for (const auto& [weight, connection] : holders) {
+    if (total <= most) return;
+    const std::int64_t bytes = connection->unread->bytes;
+    total -= bytes;
+    Close(connection, "max-unread-bytes",
+          Message("held ", bytes, " bytes of unfinished requests; --max-unread-bytes allows all ",
+                  "connections ", limits_.unread_bytes));
+  }
+}
+
+// What the calls had; without this the allocator keeps it.
+void ConnectionGuard::GiveBack() {
+  untidy_ = false;
+  malloc_trim(0);
+}
+
+void ConnectionGuard::Close(Connection* connection, const char* setting,
+                            const std::string& reason) {
+  connection->closed = connection->ending = true;
+  closed_(setting);  // first, lest the client know of it before
+  const int fd = fcntl(connection->fd, F_DUPFD_CLOEXEC, 0);  // stays the same from here on
+  if (NumberOf(fd) == connection->number) {
+    // Not shutdown(2): it would leave gRPC what has come already, megabytes of it.
+    sockaddr nowhere{};
+    nowhere.sa_family = AF_UNSPEC;
+    connect(fd, &nowhere, sizeof(nowhere));
+  }
+  close(fd);
+  const auto now = Clock::now();
+  untidy_ = true;
+  quiet_at_ = now + kQuiet;
+  ++unsaid_;
+  if (now - said_ < kLogPause) return;
+  Log(LogLevel::kWarning, {},
+      Message("closed ", unsaid_, " connections; the last, of ", connection->peer, ", ", reason));
+  said_ = now;
+  unsaid_ = 0;
+}
+
+}  // namespace stellate::server

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+#include <thread>
+#include <unordered_map>
+#include <vector>
+
+#include "server/grpc_parts/unread.h"
+#include "server/net/channelz.h"
+
+namespace stellate::server {
+
+// Closes TCP connections whose calls, or what was begun of their messages, pile up. gRPC 1.51
+// bounds the calls open on a connection, but not before the client has acknowledged the bound; and
+// it takes new calls faster than it lets go of those that the client resets (CVE-2023-44487).
+// Either takes 10 to 20 kB a call, without end. For messages that never become whole: unread.h.
+class ConnectionGuard {
+ public:
+  struct Limits {
+    std::size_t calls = 0;  // of a connection, that gRPC has not let go of
+    // Of all connections; those are closed that hold most for longest.
+    std::int64_t unread_bytes = 0;
+    std::int64_t request_bytes = 0;                // the largest request
+    std::chrono::duration<double> request_time{};  // for a connection's next request to be whole
+  };
+
+  // `port`: where the server listens. `closed` is told, on another thread, of each connection that
+  // is closed, and by which setting.
+  ConnectionGuard(int port, const Limits& limits, std::function<void(const char* setting)> closed);
+  ~ConnectionGuard();
+
+  // Has to be told of every connection, before gRPC has it. One thread at a time.
+  void Watch(int fd);
+
+  // Connections that were closed have left so many calls behind that others should wait.
+  bool IsBehind() const { return behind_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Connection {
+    int fd = -1;
+    ino_t number = 0;         // by which it is told from another that got the same descriptor
+    std::string peer;         // as gRPC writes it
+    ConnectionId id = 0;      // 0: not known yet
+    std::uint64_t bytes = 0;  // received, and
+    std::size_t calls = 0;    // held, when it was last asked about
+    bool ending = false;      // either side has hung up
+    bool closed = false;      // by this guard
+    std::shared_ptr<Unread> unread;
+    std::uint64_t whole = 0;       // messages, when they last were counted
+    Clock::time_point moved = {};  // when one became whole, or nothing was unread
+    Clock::time_point light = {};  // when it held little
+  };
+
+  void Run(const std::stop_token& stop);
+  void Look();
+  bool IsCalm(Connection* connection);
+  void FindIds();
+  void CountLeftBehind();
+  void NothingWasUnread();
+  void BoundUnread();
+  void GiveBack();
+  void Close(Connection* connection, const char* setting, const std::string& reason);
+
+  const int port_;
+  const Limits limits_;
+  const std::shared_ptr<UnreadOfAll> unread_;
+  const std::function<void(const char* setting)> closed_;
+  const int epoll_;
+  const int wake_;  // readable once it is to stop
+
+  std::mutex mutex_;  // of the connections
+  std::uint64_t last_key_ = 0;
+  std::unordered_map<std::uint64_t, Connection> connections_;
+
+  // Of the thread.
+  std::set<std::uint64_t> busy_;    // to be looked at again
+  std::vector<ConnectionId> gone_;  // may have left calls behind
+  std::size_t ending_calls_ = 0;    // of those that are closed and not gone yet
+  bool hurried_ = false;            // much is unread
+  Clock::time_point awake_until_;   // gRPC may not have read yet what came
+  std::size_t swept_ = 0;           // how many were left when all were last looked at
+  std::size_t unsaid_ = 0;          // were closed since the log last said so
+  Clock::time_point said_;
+  bool untidy_ = false;  // memory is to be given back once it is quiet
+  Clock::time_point quiet_at_;
+
+  std::atomic<bool> behind_{false};
+  std::jthread thread_;
+};
+
+}  // namespace stellate::server

@@ -1,0 +1,100 @@
+#include "server/oracles/cross_check.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/message.h"
+
+namespace stellate::server {
+namespace {
+
+using core::Brief;
+using core::Message;
+using Eigen::Index;
+
+constexpr Index kMostCoordinates = 12;  // of a point, in a message
+
+std::string PointText(const Eigen::VectorXd& point) {
+  std::string text = "(";
+  for (Index i = 0; i < std::min(point.size(), kMostCoordinates); ++i) {
+    text += (i > 0 ? ", " : "") + Message(point[i]);
+  }
+  if (point.size() > kMostCoordinates) text += ", ...";
+  return text + ")";
+}
+
+// Sine of the angle at which the worst vector of basis `b` leaves the span of basis `a`; both d x k
+// in C order, orthonormal.
+double LargestSine(const double* a, const double* b, Index d, Index k) {
+  double worst = 0;
+  for (Index v = 0; v < k; ++v) {
+    Eigen::VectorXd rest(d);
+    for (Index i = 0; i < d; ++i) rest[i] = b[i * k + v];
+    for (Index u = 0; u < k; ++u) {
+      double dot = 0;
+      for (Index i = 0; i < d; ++i) dot += a[i * k + u] * b[i * k + v];
+      for (Index i = 0; i < d; ++i) rest[i] -= dot * a[i * k + u];
+    }
+    worst = std::max(worst, rest.norm());
+  }
+  return worst;
+}
+
+}  // namespace
+
+bool Testimony::found() const {
+  return answers->found.empty() || answers->found[static_cast<std::size_t>(at)] != 0;
+}
+
+std::string FindDisagreement(const core::Specification& spec, const core::QueryBlock& block,
+                             Index query, const Testimony& a, const Testimony& b) {
+  const bool flat = block.kind == core::QueryKind::kIntersectFlat;
+  const Eigen::VectorXd x = block.points.col(query);
+  const auto point = [](const Testimony& t) { return t.answers->points.col(t.at); };
+  const auto says = [&](const Testimony& t) {
+    return Message(t.worker, " answered ",
+                   t.found() ? PointText(point(t)) + ", " + Brief((point(t) - x).norm()) + " away"
+                             : "\"not found\"");
+  };
+  const auto complain = [&](const std::string& rule) {
+    return Message(flat ? "intersect_flat query " : "closest_point query ", query, " at ",
+                   PointText(x), ": ", says(a), ", and ", says(b), "; ", rule,
+                   ": serve one manifold by all workers");
+  };
+
+  if (!a.found() && !b.found()) return "";
+  if (a.found() != b.found()) {
+    const double distance = (point(a.found() ? a : b) - x).norm();
+    if (!flat || distance > kSurelyInside * block.radii[query]) return "";
+    return complain("an intersection well inside the radius, " + Brief(block.radii[query]) +
+                    ", is found by all");
+  }
+  const double largest = std::max({x.lpNorm<Eigen::Infinity>(), point(a).lpNorm<Eigen::Infinity>(),
+                                   point(b).lpNorm<Eigen::Infinity>()});
+  const double tolerance =
+      kDisagreementTolerance * spec.epsilon + core::kRoundingTolerance * largest;
+  const double apart = (point(a) - point(b)).norm();
+  const double gap = flat ? apart : std::abs((point(a) - x).norm() - (point(b) - x).norm());
+  if (gap > tolerance) {
+    return complain(Message(flat ? "the points are " : "the distances differ by ", Brief(gap),
+                            flat ? " apart" : "", ", more than the ", Brief(tolerance), " (",
+                            kDisagreementTolerance, " epsilon) allowed"));
+  }
+  if (apart > tolerance) return "";
+  const bool both_sizes = a.answers->sizes.size() > 0 && b.answers->sizes.size() > 0;
+  if (both_sizes && !core::AreOneSize(a.answers->sizes[a.at], b.answers->sizes[b.at])) {
+    return complain(Message("the sizes there are ", Brief(a.answers->sizes[a.at]), " and ",
+                            Brief(b.answers->sizes[b.at]), ", more than a share of ",
+                            core::kSameSizeTolerance, " apart"));
+  }
+  const Index k = spec.dimension;
+  const bool both_tangents = a.answers->tangents.size() > 0 && b.answers->tangents.size() > 0;
+  if (!both_tangents) return "";
+  const double sine = LargestSine(a.answers->tangents.col(a.at).data(),
+                                  b.answers->tangents.col(b.at).data(), x.size(), k);
+  if (sine <= kTangentDisagreement) return "";
+  return complain(Message("their tangent spaces are turned against each other by an angle of sine ",
+                          Brief(sine), ", more than the ", kTangentDisagreement, " allowed"));
+}
+
+}  // namespace stellate::server

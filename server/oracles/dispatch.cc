@@ -1,0 +1,369 @@
+#include "server/oracles/dispatch.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+namespace stellate::server {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kSoon =
+    0.01;  // seconds: of work that lasts no longer there is always more to give
+constexpr double kWorthWhile = 0.1;  // share of a worker's time that asking ahead should save it
+constexpr double kMostChecked = 16;  // queries at a time
+
+double Seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
+
+// Multiplicative hashing: a different place in each chunk, the same in each run.
+Index Scatter(LeaseId id, Index range) {
+  return static_cast<Index>((id * 0x9e3779b97f4a7c15u >> 33) % static_cast<std::uint64_t>(range));
+}
+
+Pace::Chunk Timed(const Lease& lease, TimePoint end) {
+  return {static_cast<double>(lease.count), Seconds(end - lease.started), lease.cut, lease.queued};
+}
+
+// One worker at a time answers it, and one with room for it is idle.
+bool MayBackUp(const Lease& lease, Index room) {
+  return !lease.check && !lease.answered && lease.twin == 0 && lease.count <= room;
+}
+
+}  // namespace
+
+int Dispatch::Worker::InFlight() const {
+  return static_cast<int>(
+      std::count_if(leases.begin(), leases.end(), [](const Lease& l) { return !l.check; }));
+}
+
+void Dispatch::Begin(const std::vector<Block>& blocks, TimePoint now) {
+  End();
+  active_ = true;
+  blocks_ = blocks;
+  deserted_since_ = now;
+  first_of_round_ = next_lease_;
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    Index next = 0;
+    const auto ask_until = [&](Index end) {
+      if (end <= next) return;
+      pending_.push_back({b, next, end - next, 0});
+      pending_queries_ += end - next;
+      unsettled_ += end - next;
+    };
+    for (const auto& [first, end] : blocks_[b].answered) {
+      ask_until(first);
+      next = end;
+    }
+    ask_until(blocks_[b].queries);
+  }
+}
+
+void Dispatch::End() {
+  active_ = false;
+  timed_out_ = false;
+  pending_.clear();
+  pending_queries_ = 0;
+  unsettled_ = 0;
+  newest_.reset();
+  newest_other_.reset();
+  for (auto& [id, worker] : workers_) worker.leases.clear();
+}
+
+void Dispatch::Join(WorkerId worker, std::uint32_t max_chunk) {
+  Worker& joined = workers_[worker];
+  joined.max_chunk = max_chunk;
+  joined.pace = Pace({Seconds(options_.chunk_target), Seconds(options_.answer_limit)});
+}
+
+void Dispatch::Leave(WorkerId worker, TimePoint now) {
+  const auto it = workers_.find(worker);
+  if (it == workers_.end()) return;
+  TakeBack(&it->second, /*timed_out=*/false);
+  workers_.erase(it);
+  if (workers_.empty()) deserted_since_ = now;
+}
+
+// Its pieces go to the front: others may be waiting for just these. What another worker has too,
+// or has answered, is that one's business.
+void Dispatch::TakeBack(Worker* worker, bool timed_out) {
+  if (worker->leases.empty()) return;
+  const WorkerId id = worker->leases.front().worker;
+  if (newest_ && newest_->worker == id) newest_.reset();
+  if (newest_other_ && newest_other_->worker == id) newest_other_.reset();
+  for (auto it = worker->leases.rbegin(); it != worker->leases.rend(); ++it) {
+    const bool oldest = std::next(it) == worker->leases.rend();
+    if (it->check || it->answered) continue;
+    // Only the oldest had its time. Several queries may have been too much at once.
+    const int timeouts = it->timeouts + (timed_out && oldest && it->count == 1 ? 1 : 0);
+    if (Lease* const twin = Find(it->twin)) {
+      twin->twin = 0;
+      twin->timeouts = timeouts;
+      continue;
+    }
+    timed_out_ = timed_out_ || timeouts >= options_.max_leases;
+    pending_.push_front({it->block, it->first, it->count, timeouts});
+    pending_queries_ += it->count;
+  }
+  worker->leases.clear();
+}
+
+// Alone, a worker takes all. Among many, smaller pieces towards the end let all end together; a
+// piece that takes less than what comes with each would make no end sooner.
+Index Dispatch::ShareOfTheRest(const Worker& worker) const {
+  const auto crew = static_cast<Index>(workers_.size());
+  if (crew == 1) return pending_queries_;
+  const Index share = (pending_queries_ + 2 * crew - 1) / (2 * crew);
+  const double least = std::max(Seconds(options_.least_share), worker.pace.fixed());
+  const double queries =
+      std::min(static_cast<double>(pending_queries_), least / worker.pace.each());
+  return std::max(share, static_cast<Index>(queries));
+}
+
+// Moves the front of the piece into the lease.
+void Dispatch::Cut(const Worker& worker, Piece* piece, Lease* lease) const {
+  const std::size_t bytes = std::max<std::size_t>(blocks_[piece->block].bytes_per_query, 1);
+  auto full = static_cast<Index>(std::min(worker.pace.FullChunk(), 1e9));
+  full = std::min(full, static_cast<Index>(options_.chunk_bytes / bytes));
+  if (worker.max_chunk > 0) full = std::min(full, static_cast<Index>(worker.max_chunk));
+  full = std::max<Index>(full, 1);
+  lease->block = piece->block;
+  lease->first = piece->first;
+  lease->count = std::min({full, ShareOfTheRest(worker), piece->count});
+  lease->cut = lease->count < full;
+  lease->timeouts = piece->timeouts;
+  piece->first += lease->count;
+  piece->count -= lease->count;
+}
+
+// Besides those that it has: so that it need not wait between two. Towards a round's end that would
+// keep dear queries from others who are idle sooner.
+bool Dispatch::MayHaveAnother(const Worker& worker) const {
+  const int in_flight = worker.InFlight();
+  if (in_flight == 0) return true;
+  const Pace& pace = worker.pace;
+  if (in_flight >= options_.max_in_flight || worker.Lagging() || !pace.settled()) return false;
+  const auto crew = static_cast<double>(workers_.size());
+  if (crew == 1 || static_cast<double>(pending_queries_) > 2 * crew * pace.FullChunk()) return true;
+  double held = 0;
+  for (const Lease& lease : worker.leases) held += pace.Seconds(static_cast<double>(lease.count));
+  return held <= std::max(kSoon, pace.fixed() / kWorthWhile);
+}
+
+// The worker with the fewest chunks, the quickest of these, or whoever is not known yet. One that
+// lags is asked only when there is no other, and for one chunk at a time.
+Dispatch::Worker* Dispatch::PickWorker(WorkerId* id) {
+  const bool any_lively = std::any_of(workers_.begin(), workers_.end(),
+                                      [](const auto& entry) { return !entry.second.Lagging(); });
+  Worker* best = nullptr;
+  for (auto& [candidate_id, candidate] : workers_) {
+    if (candidate.Lagging() && any_lively) continue;
+    if (!MayHaveAnother(candidate)) continue;
+    const int in_flight = candidate.InFlight();
+    const bool better =
+        best == nullptr || in_flight < best->InFlight() ||
+        (in_flight == best->InFlight() && candidate.pace.Seconds(1) < best->pace.Seconds(1));
+    if (!better) continue;
+    best = &candidate;
+    *id = candidate_id;
+  }
+  return best;
+}
+
+Lease* Dispatch::Find(LeaseId id) {
+  if (id == 0) return nullptr;
+  for (auto& [worker_id, worker] : workers_) {
+    for (Lease& lease : worker.leases) {
+      if (lease.id == id) return &lease;
+    }
+  }
+  return nullptr;
+}
+
+Lease Dispatch::Give(WorkerId id, Lease lease, TimePoint now) {
+  lease.id = next_lease_++;
+  lease.worker = id;
+  lease.started = now;
+  Worker& worker = workers_.at(id);
+  lease.queued = !worker.leases.empty();
+  worker.leases.push_back(lease);
+  ++worker.unanswered;
+  return lease;
+}
+
+std::vector<Lease> Dispatch::Assign(TimePoint now) {
+  std::vector<Lease> leases;
+  WorkerId id = 0;
+  while (active_ && !pending_.empty()) {
+    Worker* const worker = PickWorker(&id);
+    if (worker == nullptr) break;
+    // Before its own chunk, which then cannot be used before the check is.
+    if (const auto check = NextCheck(id, worker)) {
+      worker->check_credit -= static_cast<double>(check->count);
+      leases.push_back(Give(id, *check, now));
+    }
+    Lease lease;
+    Cut(*worker, &pending_.front(), &lease);
+    pending_queries_ -= lease.count;
+    if (pending_.front().count == 0) pending_.pop_front();
+    lease = Give(id, lease, now);
+    leases.push_back(lease);
+    const double earned = options_.check_share * static_cast<double>(lease.count);
+    worker->check_credit = std::min(worker->check_credit + earned, kMostChecked);
+    if (newest_ && newest_->worker != id) newest_other_ = newest_;
+    newest_ = lease;
+  }
+  if (active_ && pending_.empty()) BackUp(now, &leases);
+  return leases;
+}
+
+// Some queries of another worker's newest chunk, if it is time to ask `worker` any.
+std::optional<Lease> Dispatch::NextCheck(WorkerId id, Worker* worker) const {
+  if (options_.check_share <= 0 || worker->check_credit < 1 || worker->Lagging()) return {};
+  const auto& other = newest_ && newest_->worker != id ? newest_ : newest_other_;
+  if (!other || other->worker == id) return {};
+  Index n = std::min(static_cast<Index>(worker->check_credit), other->count);
+  if (!worker->Wants(n)) n = static_cast<Index>(worker->max_chunk);
+  const std::size_t bytes = std::max<std::size_t>(blocks_[other->block].bytes_per_query, 1);
+  n = std::clamp<Index>(static_cast<Index>(options_.chunk_bytes / bytes), 1, n);
+  Lease check;
+  check.check = true;
+  check.block = other->block;
+  check.first = other->first + Scatter(next_lease_, other->count - n + 1);
+  check.count = n;
+  return check;
+}
+
+TimePoint Dispatch::OverdueAt(const Worker& worker, std::size_t position) const {
+  const Pace* pace = &worker.pace;
+  for (const auto& [id, other] : workers_) {
+    if (worker.pace.known() || !other.pace.known()) continue;
+    if (!pace->known() || other.pace.Seconds(1) < pace->Seconds(1)) pace = &other.pace;
+  }
+  const TimePoint started = worker.leases.front().started;
+  if (!pace->known()) return started + options_.straggler_unknown;
+  double expected = 0;
+  for (std::size_t i = 0; i <= position; ++i) {
+    expected += pace->AtMost(static_cast<double>(worker.leases[i].count));
+  }
+  const double patience = std::min(options_.straggler_factor * expected, 1e6);
+  return started + std::max(options_.straggler_floor, std::chrono::duration_cast<Clock::duration>(
+                                                          std::chrono::duration<double>(patience)));
+}
+
+Index Dispatch::IdleRoom() const {
+  Index room = 0;
+  for (const auto& [id, worker] : workers_) {
+    if (!worker.Idle()) continue;
+    if (worker.max_chunk == 0) return std::numeric_limits<Index>::max();
+    room = std::max(room, static_cast<Index>(worker.max_chunk));
+  }
+  return room;
+}
+
+// Stragglers, oldest first, to idle workers, quickest first.
+void Dispatch::BackUp(TimePoint now, std::vector<Lease>* leases) {
+  while (const Index room = IdleRoom()) {
+    Lease* straggler = nullptr;
+    for (auto& [id, worker] : workers_) {
+      for (std::size_t i = 0; i < worker.leases.size(); ++i) {
+        Lease& lease = worker.leases[i];
+        if (straggler != nullptr && straggler->id < lease.id) continue;
+        if (MayBackUp(lease, room) && OverdueAt(worker, i) <= now) straggler = &lease;
+      }
+    }
+    if (straggler == nullptr) return;
+    WorkerId best = 0;
+    for (const auto& [id, worker] : workers_) {
+      if (!worker.Idle() || !worker.Wants(straggler->count)) continue;
+      if (best == 0 || worker.pace.Seconds(1) < workers_.at(best).pace.Seconds(1)) best = id;
+    }
+    Lease copy = *straggler;
+    copy.twin = straggler->id;
+    leases->push_back(Give(best, copy, now));
+    straggler->twin = leases->back().id;
+  }
+}
+
+Dispatch::ClaimResult Dispatch::Claim(WorkerId worker_id, LeaseId id, TimePoint now, Lease* lease) {
+  const auto entry = workers_.find(worker_id);
+  if (entry == workers_.end()) return ClaimResult::kLate;
+  Worker& worker = entry->second;
+  if (id == 0 || id >= next_lease_ || worker.unanswered == 0) return ClaimResult::kUnknown;
+  --worker.unanswered;
+  worker.stalled = false;
+  const auto it = std::find_if(worker.leases.begin(), worker.leases.end(),
+                               [id](const Lease& l) { return l.id == id; });
+  if (it == worker.leases.end()) return ClaimResult::kLate;
+  *lease = *it;
+  const bool oldest = it == worker.leases.begin();
+  worker.leases.erase(it);
+  // A handful of queries to check says nothing.
+  if (!lease->check) worker.pace.Answered(Timed(*lease, now));
+  if (oldest && !worker.leases.empty()) worker.leases.front().started = now;  // the next in line
+  if (lease->check || lease->answered) return ClaimResult::kSecond;
+  if (Lease* const twin = Find(lease->twin)) {
+    twin->answered = true;
+    twin->twin = 0;
+  }
+  return ClaimResult::kClaimed;
+}
+
+void Dispatch::Settle(const Lease& lease) {
+  if (active_ && lease.id >= first_of_round_) unsettled_ -= lease.count;
+}
+
+void Dispatch::Busy(WorkerId worker_id, LeaseId id, TimePoint now) {
+  const auto entry = workers_.find(worker_id);
+  if (entry == workers_.end()) return;
+  Worker& worker = entry->second;
+  worker.pace.MayTake(Seconds(std::max(options_.busy_limit, options_.answer_limit)));
+  for (Lease& lease : worker.leases) {
+    if (lease.id == id) lease.heard = now;
+  }
+}
+
+// Of a lease whose time runs.
+TimePoint Dispatch::EndOf(const Lease& lease) const {
+  const TimePoint silent = lease.started + options_.answer_limit;
+  if (lease.heard <= lease.started) return silent;
+  return std::min(lease.heard + options_.answer_limit,
+                  std::max(silent, lease.started + options_.busy_limit));
+}
+
+void Dispatch::Expire(TimePoint now) {
+  for (auto& [id, worker] : workers_) {
+    if (worker.leases.empty()) continue;
+    if (now < EndOf(worker.leases.front())) continue;
+    worker.stalled = true;
+    worker.pace.BeginAgain();
+    TakeBack(&worker, /*timed_out=*/true);
+  }
+}
+
+Dispatch::Failure Dispatch::failure(TimePoint now) const {
+  if (!active_) return Failure::kNone;
+  if (timed_out_) return Failure::kAnswerTimeout;
+  // A piece claimed but not yet settled is being checked: that worker's answer still counts.
+  if (workers_.empty() && pending_queries_ > 0 && now - deserted_since_ >= options_.worker_wait) {
+    return Failure::kNoWorker;
+  }
+  return Failure::kNone;
+}
+
+TimePoint Dispatch::NextDeadline() const {
+  TimePoint next = TimePoint::max();
+  if (!active_) return next;
+  if (workers_.empty()) next = deserted_since_ + options_.worker_wait;
+  const Index room = pending_.empty() ? IdleRoom() : 0;
+  for (const auto& [id, worker] : workers_) {
+    if (worker.leases.empty()) continue;
+    next = std::min(next, EndOf(worker.leases.front()));
+    for (std::size_t i = 0; room > 0 && i < worker.leases.size(); ++i) {
+      if (MayBackUp(worker.leases[i], room)) next = std::min(next, OverdueAt(worker, i));
+    }
+  }
+  return next;
+}
+
+}  // namespace stellate::server

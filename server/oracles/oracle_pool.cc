@@ -1,0 +1,390 @@
+#include "server/oracles/oracle_pool.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/message.h"
+
+namespace stellate::server {
+namespace {
+
+using core::StatusCode;
+using Eigen::Index;
+
+double Seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
+
+void CopyInto(const core::AnswerBlock& answer, Index first, core::AnswerBlock* whole) {
+  const Index count = answer.points.cols();
+  whole->points.middleCols(first, count) = answer.points;
+  if (!answer.found.empty()) {
+    std::copy(answer.found.begin(), answer.found.end(), whole->found.begin() + first);
+  }
+  if (whole->tangents.cols() > 0 && answer.tangents.cols() == count) {
+    whole->tangents.middleCols(first, count) = answer.tangents;
+  }
+  if (whole->sizes.size() > 0 && answer.sizes.size() == count) {
+    whole->sizes.segment(first, count) = answer.sizes;
+  }
+}
+
+}  // namespace
+
+core::Answers EmptyAnswers(int dimension, int ambient_dimension, const core::QueryBatch& batch) {
+  core::Answers answers;
+  for (const core::QueryBlock& block : batch.blocks) {
+    const Index n = block.size();
+    core::AnswerBlock& empty = answers.blocks.emplace_back();
+    empty.points = Eigen::MatrixXd::Zero(ambient_dimension, n);
+    empty.found.assign(n, 1);
+    if (block.want_tangents) {
+      empty.tangents = Eigen::MatrixXd::Zero(Index{ambient_dimension} * dimension, n);
+    }
+    if (block.want_sizes) empty.sizes = Eigen::VectorXd::Zero(n);
+  }
+  return answers;
+}
+
+void PutAnswers(const PartOfRound& part, core::Answers* answers) {
+  CopyInto(part.answers, part.first, &answers->blocks[part.block_index]);
+}
+
+OraclePool::OraclePool(const core::Specification& spec, DispatchOptions options,
+                       std::size_t max_workers, std::shared_ptr<PoolObserver> observer)
+    : spec_(spec),
+      options_(options),
+      max_workers_(max_workers),
+      observer_(std::move(observer)),
+      dispatch_(options) {}
+
+Allowed<WorkerId> OraclePool::Join(std::shared_ptr<OracleWorker> worker, std::uint32_t max_chunk) {
+  std::vector<Delivery> deliveries;
+  WorkerId id = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    if (closed_) {
+      return tl::unexpected(
+          Refused({StatusCode::kFailedPrecondition,
+                   "the mesh is over and asks nothing any more: create another"}));
+    }
+    if (members_.size() >= max_workers_) {
+      return tl::unexpected(
+          Refused({"max-workers", core::Message(max_workers_), "mesh"},
+                  core::Message("the mesh has ", members_.size(),
+                                " workers, the most that this server allows: let one go first, or "
+                                "raise --max-workers")));
+    }
+    id = next_worker_++;
+    titles_[id] = worker->Title();
+    members_.emplace(id, std::move(worker));
+    worker_count_ = members_.size();
+    dispatch_.Join(id, max_chunk);
+    deliveries = AssignLocked(Clock::now());
+  }
+  changed_.notify_one();
+  Send(std::move(deliveries));
+  return id;
+}
+
+void OraclePool::Leave(WorkerId worker) {
+  std::vector<Delivery> deliveries;
+  std::shared_ptr<OracleWorker> gone;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto it = members_.find(worker);
+    if (it == members_.end()) return;
+    gone = std::move(it->second);
+    members_.erase(it);
+    worker_count_ = members_.size();
+    const TimePoint now = Clock::now();
+    dispatch_.Leave(worker, now);
+    deliveries = AssignLocked(now);
+  }
+  changed_.notify_one();
+  Send(std::move(deliveries));
+}
+
+core::Expected<std::optional<Chunk>> OraclePool::Claim(WorkerId worker, LeaseId lease_id) {
+  std::vector<Delivery> deliveries;
+  std::optional<Chunk> chunk;
+  {
+    const std::lock_guard lock(mutex_);
+    const TimePoint now = Clock::now();
+    Lease lease;
+    const auto result = dispatch_.Claim(worker, lease_id, now, &lease);
+    switch (result) {
+      case Dispatch::ClaimResult::kUnknown:
+        return core::Refuse(StatusCode::kInvalidArgument,
+                            core::Message("answers.lease is ", lease_id,
+                                          " but no such chunk is waiting for this worker's answer: "
+                                          "answer each QueryChunk once, with its own lease"));
+      case Dispatch::ClaimResult::kLate:
+        break;
+      case Dispatch::ClaimResult::kClaimed:
+      case Dispatch::ClaimResult::kSecond:
+        chunk = Chunk{lease.id,
+                      round_,
+                      lease.block,
+                      lease.first,
+                      lease.count,
+                      worker,
+                      result == Dispatch::ClaimResult::kSecond};
+        break;
+    }
+    deliveries = AssignLocked(now);
+  }
+  Send(std::move(deliveries));
+  return chunk;
+}
+
+void OraclePool::Busy(WorkerId worker, LeaseId lease) {
+  const std::lock_guard lock(mutex_);
+  dispatch_.Busy(worker, lease, Clock::now());  // puts off deadlines: nobody need wake up
+}
+
+core::Status OraclePool::Deliver(const Chunk& chunk, const core::AnswerBlock& answer) {
+  if (answer.points.cols() != chunk.count) {
+    return {StatusCode::kOracleShape,
+            core::Message("answers to lease ", chunk.lease, " hold ", answer.points.cols(),
+                          " points but the chunk has ", chunk.count,
+                          " queries: send one point for each query")};
+  }
+  const core::Status status = core::CheckAnswers(spec_, chunk.block(), chunk.first, answer);
+  if (!status.ok()) return status;
+  if (chunk.second) {
+    const auto second = std::make_shared<const SecondAnswer>(SecondAnswer{chunk, answer});
+    {
+      const std::lock_guard lock(mutex_);
+      if (round_ != chunk.round) return core::Status::Ok();
+      seconds_.push_back(second);
+    }
+    Compare(*second, chunk.first, chunk.count);
+  } else {
+    TakeOver(chunk, answer);
+  }
+  changed_.notify_one();
+  return core::Status::Ok();
+}
+
+void OraclePool::TakeOver(const Chunk& chunk, const core::AnswerBlock& answer) {
+  CopyInto(answer, chunk.first, &chunk.round->answers.blocks[chunk.block_index]);
+  std::vector<std::shared_ptr<const SecondAnswer>> seconds;
+  {
+    const std::lock_guard lock(mutex_);
+    if (round_ != chunk.round) return;
+    auto& by = round_->answered_by[chunk.block_index];
+    std::fill_n(by.begin() + chunk.first, chunk.count, chunk.worker);
+    seconds = seconds_;
+  }
+  // Before the round can end: what two workers disagree about goes into no mesh.
+  for (const auto& second : seconds) {
+    const Chunk& other = second->chunk;
+    if (other.block_index != chunk.block_index) continue;
+    const Index first = std::max(chunk.first, other.first);
+    const Index end = std::min(chunk.first + chunk.count, other.first + other.count);
+    if (first < end) Compare(*second, first, end - first);
+  }
+  if (on_answered_) on_answered_(chunk.round, chunk.block_index, chunk.first, chunk.count);
+  const std::lock_guard lock(mutex_);
+  if (round_ != chunk.round) return;
+  Lease lease;
+  lease.id = chunk.lease;
+  lease.count = chunk.count;
+  dispatch_.Settle(lease);
+}
+
+// Of the queries [first, first + count), those that have another worker's answer already. The
+// others' turn comes when it does.
+void OraclePool::Compare(const SecondAnswer& second, Index first, Index count) {
+  const Chunk& chunk = second.chunk;
+  std::vector<std::pair<Index, WorkerId>> others;
+  {
+    const std::lock_guard lock(mutex_);
+    if (round_ != chunk.round) return;
+    const auto& by = round_->answered_by[chunk.block_index];
+    for (Index q = first; q < first + count; ++q) {
+      const WorkerId other = by[static_cast<std::size_t>(q)];
+      if (other != 0 && other != chunk.worker) others.push_back({q, other});
+    }
+  }
+  // Answers that are taken over do not change any more.
+  const core::AnswerBlock& answers = chunk.round->answers.blocks[chunk.block_index];
+  for (const auto& [q, id] : others) {
+    Testimony counted{"", &answers, q};
+    Testimony own{"", &second.answer, q - chunk.first};
+    if (FindDisagreement(spec_, chunk.block(), q, counted, own).empty()) continue;
+    {
+      const std::lock_guard lock(mutex_);
+      counted.worker = TitleLocked(id);
+      own.worker = TitleLocked(chunk.worker);
+    }
+    if (observer_ != nullptr) observer_->OnDisagreement();
+    Fail({"WORKERS_DISAGREE",
+          core::Message("round ", chunk.round->batch.round, ", block ", chunk.block_index, ", ",
+                        FindDisagreement(spec_, chunk.block(), q, counted, own))});
+    break;
+  }
+  if (observer_ != nullptr && !others.empty()) observer_->OnCompared(others.size());
+}
+
+std::string OraclePool::TitleLocked(WorkerId worker) const {
+  const auto it = titles_.find(worker);
+  return it == titles_.end() || it->second.empty()
+             ? core::Message("worker number ", worker)
+             : core::Message("worker number ", worker, " (", it->second, ")");
+}
+
+std::size_t OraclePool::waiting() const {
+  const std::lock_guard lock(mutex_);
+  return static_cast<std::size_t>(dispatch_.unanswered());
+}
+
+void OraclePool::Fail(MeshFailure failure) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!failure_) failure_ = std::move(failure);
+  }
+  changed_.notify_one();
+}
+
+OraclePool::Outcome OraclePool::Ask(const core::QueryBatch& batch,
+                                    const std::function<void()>& meanwhile,
+                                    const std::vector<PartOfRound>& known) {
+  std::shared_ptr<Round> round = MakeRound(batch);
+  for (const PartOfRound& part : known) PutAnswers(part, &round->answers);
+  std::unique_lock lock(mutex_);
+  round_ = round;
+  std::erase_if(titles_, [this](const auto& entry) { return !members_.contains(entry.first); });
+  TimePoint now = Clock::now();
+  dispatch_.Begin(Measure(batch, known), now);
+  auto first_deliveries = AssignLocked(now);
+  lock.unlock();
+  Send(std::move(first_deliveries));
+  meanwhile();
+  lock.lock();
+  Outcome outcome;
+  while (true) {
+    now = Clock::now();
+    dispatch_.Expire(now);
+    if (!failure_ && dispatch_.failure(now) != Dispatch::Failure::kNone) {
+      failure_ = Describe(dispatch_.failure(now));
+    }
+    if (interrupted_) break;
+    if (failure_) {
+      outcome.failure = failure_;
+      break;
+    }
+    if (dispatch_.Done()) {
+      outcome.round = std::move(round);
+      break;
+    }
+    auto deliveries = AssignLocked(now);
+    if (!deliveries.empty()) {
+      lock.unlock();
+      Send(std::move(deliveries));
+      lock.lock();
+      continue;
+    }
+    const TimePoint deadline = dispatch_.NextDeadline();
+    if (deadline == TimePoint::max()) {
+      changed_.wait(lock);  // a claimed answer is being checked: its worker's thread will notify
+    } else {
+      changed_.wait_until(lock, deadline);
+    }
+  }
+  dispatch_.End();
+  round_.reset();
+  seconds_.clear();
+  return outcome;
+}
+
+void OraclePool::Interrupt() {
+  {
+    const std::lock_guard lock(mutex_);
+    interrupted_ = true;
+  }
+  changed_.notify_one();
+}
+
+void OraclePool::Shut() {
+  const std::lock_guard lock(mutex_);
+  closed_ = true;
+}
+
+void OraclePool::Close(const WorkerEnd& end) {
+  std::vector<std::shared_ptr<OracleWorker>> workers;
+  {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+    const TimePoint now = Clock::now();
+    for (auto& [id, worker] : members_) {
+      dispatch_.Leave(id, now);
+      workers.push_back(std::move(worker));
+    }
+    members_.clear();
+    worker_count_ = 0;
+  }
+  for (const auto& worker : workers) worker->End(end);
+}
+
+std::vector<OraclePool::Delivery> OraclePool::AssignLocked(TimePoint now) {
+  std::vector<Delivery> deliveries;
+  if (interrupted_ || failure_) return deliveries;
+  std::size_t backed_up = 0;
+  for (const Lease& lease : dispatch_.Assign(now)) {
+    if (lease.twin != 0) ++backed_up;
+    deliveries.push_back({members_.at(lease.worker),
+                          Chunk{lease.id, round_, lease.block, lease.first, lease.count}});
+  }
+  if (observer_ != nullptr && backed_up > 0) observer_->OnBackUps(backed_up);
+  return deliveries;
+}
+
+std::shared_ptr<Round> OraclePool::MakeRound(const core::QueryBatch& batch) const {
+  auto round = std::make_shared<Round>();
+  round->batch = batch;
+  round->answers = EmptyAnswers(spec_.dimension, spec_.ambient_dimension, batch);
+  for (const core::QueryBlock& block : batch.blocks) {
+    round->answered_by.emplace_back(static_cast<std::size_t>(block.size()), WorkerId{0});
+  }
+  return round;
+}
+
+std::vector<Dispatch::Block> OraclePool::Measure(const core::QueryBatch& batch,
+                                                 const std::vector<PartOfRound>& known) const {
+  const std::size_t point = sizeof(double) * spec_.ambient_dimension;
+  const std::size_t basis = point * spec_.dimension;
+  std::vector<Dispatch::Block> blocks;
+  for (const core::QueryBlock& block : batch.blocks) {
+    const bool flat = block.kind == core::QueryKind::kIntersectFlat;
+    const std::size_t question = point + (flat ? basis + sizeof(double) : 0);
+    const std::size_t answer =
+        point + 1 + (block.want_tangents ? basis : 0) + (block.want_sizes ? sizeof(double) : 0);
+    blocks.push_back({block.size(), std::max(question, answer)});
+  }
+  for (const PartOfRound& part : known) {
+    const Index end = part.first + part.answers.points.cols();
+    blocks[part.block_index].answered.push_back({part.first, end});
+  }
+  return blocks;
+}
+
+MeshFailure OraclePool::Describe(Dispatch::Failure failure) const {
+  if (failure == Dispatch::Failure::kNoWorker) {
+    return {"NO_WORKER",
+            core::Message("no worker served the mesh for ", Seconds(options_.worker_wait),
+                          " seconds (limits.worker_wait_seconds): open ServeOracle for it, or "
+                          "allow a longer wait")};
+  }
+  return {"ANSWER_TIMEOUT",
+          core::Message("an oracle left a query that it was asked alone unanswered for ",
+                        Seconds(options_.answer_limit), " seconds (limits.answer_seconds), or ",
+                        Seconds(options_.busy_limit),
+                        " while saying that it was busy (limits.busy_seconds), ",
+                        options_.max_leases, " times: make it faster, or allow more time")};
+}
+
+void OraclePool::Send(std::vector<Delivery> deliveries) {
+  for (Delivery& delivery : deliveries) delivery.worker->Ask(std::move(delivery.chunk));
+}
+
+}  // namespace stellate::server

@@ -1,0 +1,119 @@
+#include "server/oracles/pace.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stellate::server {
+namespace {
+
+constexpr std::size_t kRemembered = 16;  // chunks
+constexpr double kFading = 0.8;          // weight of a chunk, as against the next
+constexpr double kShortest = 1e-6;       // seconds: below that clocks tell nothing
+// Weight of what the fixed cost was held to be, as against all chunks: sizes a tenth apart are too
+// few to tell it by, twofold ones are enough.
+constexpr double kHeldTo = 0.01;
+constexpr double kLeastError = 0.03;  // relative, of times: no two chunks show that there is less
+
+constexpr double kFixedShare = 0.25;  // of a chunk's time, at most, where the chunk may be larger
+constexpr double kGrowth = 2;         // of chunks, at most
+constexpr double kFastGrowth = 8;     // of chunks whose queries take less than this share:
+constexpr double kFast = 0.1;
+constexpr double kTellingSize =
+    4;                           // a chunk that was cut so much smaller tells little of the pace,
+constexpr double kSurprise = 2;  // unless it took so many times what it should have
+
+}  // namespace
+
+bool Pace::SizesDiffer() const {
+  return std::any_of(newest_.begin(), newest_.end(), [this](const Chunk& chunk) {
+    return chunk.queries != newest_.front().queries;
+  });
+}
+
+double Pace::AtMost(double queries) const {
+  if (!known() || SizesDiffer()) return Seconds(queries);
+  return std::max(Seconds(queries), Seconds(newest_.front().queries));
+}
+
+double Pace::Largest() const {
+  double largest = 0;
+  for (const Chunk& chunk : newest_) largest = std::max(largest, chunk.queries);
+  return largest;
+}
+
+double Pace::Whole() const { return std::max(aim_.seconds, fixed_ / kFixedShare); }
+
+double Pace::FullChunk() const {
+  if (!known()) return 1;
+  const double room = std::max(aim_.limit - fixed_, 0.0) / 2;
+  const double seconds = std::min(Whole() - fixed_, room);
+  double queries = each_ > 0 ? seconds / each_ : reach_;
+  // Two sizes tell what is fixed.
+  const double twofold = 2 * Largest();
+  if (!SizesDiffer() && each_ * twofold < room) queries = std::max(queries, twofold);
+  return std::clamp(queries, 1.0, reach_);
+}
+
+void Pace::Answered(const Chunk& chunk) {
+  const bool telling = !chunk.cut || !SizesDiffer() || kTellingSize * chunk.queries >= Largest() ||
+                       chunk.seconds > kSurprise * Seconds(chunk.queries);
+  if (!telling) return;
+  // One that travelled while another was answered seems to have taken nothing for it.
+  const bool overlapped = chunk.queued && kSurprise * chunk.seconds < Seconds(chunk.queries);
+  if (!overlapped) {
+    newest_.push_back(chunk);
+    Fit();
+  }
+  const bool guess = !SizesDiffer();  // all of it may be the queries'
+  const double fixed = guess ? 0 : fixed_;
+  const double each = guess ? chunk.seconds / chunk.queries : each_;
+  const bool fast = each * chunk.queries < kFast * (Whole() - fixed);
+  const double more = (fast ? kFastGrowth : kGrowth) * chunk.queries;
+  if (fixed + each * more <= aim_.limit) reach_ = std::max(reach_, more);
+}
+
+void Pace::Fit() {
+  if (newest_.size() > kRemembered) newest_.pop_front();
+  // Errors are relative to what was expected: relative to what came, the fastest would win.
+  const bool first = newest_.size() == 1;
+  double weight = 1, sum = 0, sum_n = 0, sum_nn = 0, sum_t = 0, sum_nt = 0;
+  for (auto chunk = newest_.rbegin(); chunk != newest_.rend(); ++chunk, weight *= kFading) {
+    const double n = chunk->queries;
+    const double t = std::max(chunk->seconds, kShortest);
+    const double expected = first ? t : std::max(Seconds(n), kShortest);
+    const double w = weight / (expected * expected);
+    sum += w;
+    sum_n += w * n;
+    sum_nn += w * n * n;
+    sum_t += w * t;
+    sum_nt += w * n * t;
+  }
+  const double held = kHeldTo * sum;
+  const double all = sum + held;
+  const double determinant = all * sum_nn - sum_n * sum_n;
+  line_each_ = (all * sum_nt - sum_n * (sum_t + held * line_fixed_)) / determinant;
+  line_fixed_ = (sum_t + held * line_fixed_ - line_each_ * sum_n) / all;
+  if (line_each_ < 0) {  // larger chunks were quicker: all that is seen is fixed
+    line_each_ = 0;
+    line_fixed_ = sum_t / sum;
+  } else if (line_fixed_ < 0) {
+    line_fixed_ = 0;
+    line_each_ = sum_nt / sum_nn;
+  }
+  fixed_ = std::max(line_fixed_ - Doubt(sum_nn, determinant), 0.0);
+  each_ = std::max((sum_nt - fixed_ * sum_n) / sum_nn, 0.0);
+}
+
+// The standard error of the line's fixed cost, by how the chunks scatter about it.
+double Pace::Doubt(double sum_nn, double determinant) const {
+  double errors = kLeastError * kLeastError, count = 0, weight = 1;
+  for (auto chunk = newest_.rbegin(); chunk != newest_.rend(); ++chunk, weight *= kFading) {
+    const double expected = std::max(line_fixed_ + line_each_ * chunk->queries, kShortest);
+    const double error = chunk->seconds / expected - 1;
+    errors += weight * error * error;
+    count += weight;
+  }
+  return std::sqrt(errors / std::max(count - 1, 1.0) * sum_nn / determinant);
+}
+
+}  // namespace stellate::server

@@ -1,0 +1,397 @@
+#include "server/records/journal_format.h"
+
+#include <algorithm>
+
+#include "server/records/record_bytes.h"
+
+namespace stellate::server {
+namespace {
+
+using Eigen::Index;
+using Microseconds = std::chrono::microseconds;
+using SystemTime = std::chrono::system_clock::time_point;
+
+constexpr std::size_t kPartBytes = std::size_t{1} << 20;  // SQLite copies a large one several times
+
+// `Value` is const when writing.
+template <typename Archive, typename Value>
+void LayOutSpecification(Archive& archive, Value& spec, std::uint32_t version = kJournalVersion) {
+  archive.Number(spec.dimension);
+  archive.Number(spec.ambient_dimension);
+  archive.Number(spec.epsilon);
+  archive.Number(spec.oracle.intersect_flat);
+  archive.Number(spec.oracle.tangent_basis);
+  archive.Number(spec.oracle.local_size);
+  if (archive.Has(spec.bounding_box.has_value())) {
+    if constexpr (!std::is_const_v<Value>) spec.bounding_box.emplace();
+    archive.Numbers(spec.bounding_box->lower);
+    archive.Numbers(spec.bounding_box->upper);
+  }
+  archive.Numbers(spec.seeds);
+  archive.Number(spec.box_seeds);
+  if (version > 4) {
+    archive.Number(spec.components);
+    archive.Number(spec.audit);
+  }
+  if (version > 5) {
+    archive.Maybe(spec.declared_reach);
+    archive.Number(spec.cover_box);
+  }
+  archive.Number(spec.random_seed);
+  auto& criteria = spec.criteria;
+  archive.Number(criteria.radius_edge_bound);
+  archive.Maybe(criteria.sliver_bound);
+  archive.Number(criteria.picking_radius);
+  archive.Number(criteria.small_sliver_radius);
+  archive.Maybe(criteria.candidates);
+  archive.Maybe(criteria.advance_step);
+  archive.Maybe(criteria.judging);
+  archive.Number(criteria.ask_ahead);
+  archive.Maybe(criteria.size_rate);
+  archive.Maybe(criteria.max_deviation);
+  archive.Number(criteria.flat_alternations);
+  archive.Number(spec.limits.max_vertices);
+  archive.Number(spec.limits.max_rounds);
+  archive.Number(spec.limits.max_batch_queries);
+  archive.Number(spec.threads);
+}
+
+std::int64_t ToNumber(SystemTime time) {
+  return std::chrono::duration_cast<Microseconds>(time.time_since_epoch()).count();
+}
+
+SystemTime ToTime(std::int64_t number) {
+  // The clock may count finer: what only a forged record can hold must not overflow it.
+  constexpr std::int64_t kFarthest =
+      std::chrono::duration_cast<Microseconds>(SystemTime::duration::max()).count();
+  return SystemTime(Microseconds(std::clamp(number, -kFarthest, kFarthest)));
+}
+
+template <typename Archive, typename Value>
+void LayOutProgress(Archive& archive, Value& progress) {
+  archive.Number(progress.phase);
+  archive.Number(progress.round);
+  archive.Number(progress.queries);
+  archive.Number(progress.vertices);
+  archive.Number(progress.simplices);
+  archive.Number(progress.unbounded_stars);
+  archive.Number(progress.bad_size);
+  archive.Number(progress.bad_radius_edge);
+  archive.Number(progress.bad_sliver);
+  archive.Number(progress.bad_inconsistent);
+  archive.Number(progress.fraction);
+}
+
+template <typename Archive, typename Value>
+void LayOutReport(Archive& archive, Value& report) {
+  archive.Number(report.termination);
+  archive.Number(report.failure.code);
+  archive.Bytes(report.failure.message);
+  auto& counts = report.counts;
+  archive.Number(counts.vertices);
+  archive.Number(counts.simplices);
+  archive.Number(counts.rounds);
+  archive.Number(counts.queries);
+  archive.Number(counts.tangent_queries);
+  archive.Number(counts.inserted_size);
+  archive.Number(counts.inserted_radius_edge);
+  archive.Number(counts.inserted_sliver);
+  archive.Number(counts.inserted_inconsistent);
+  archive.Number(counts.duplicates);
+  auto& certificate = report.certificate;
+  archive.Number(certificate.certified);
+  archive.Bytes(certificate.verdict);
+  archive.Strings(certificate.warnings);
+  archive.Number(certificate.closed);
+  archive.Number(certificate.bad_faces);
+  archive.Number(certificate.links_are_spheres);
+  archive.Number(certificate.links_decided_exactly);
+  archive.Number(certificate.bad_links);
+  archive.Number(certificate.inconsistent_simplices);
+  archive.Number(certificate.unembedded_stars);
+  archive.Number(certificate.fibre_failures);
+  archive.Number(certificate.fibre_samples);
+  archive.Number(certificate.answers_held);
+  archive.Number(certificate.max_circumradius);
+  archive.Number(certificate.max_radius_edge);
+  archive.Number(certificate.min_fatness);
+  archive.Number(certificate.min_angle_degrees);
+  archive.Number(certificate.max_tangent_angle_degrees);
+  archive.Number(certificate.max_barycentre_distance);
+  archive.Number(certificate.estimated_reach);
+  archive.Number(certificate.epsilon_over_reach);
+  archive.Number(certificate.components);
+  archive.Number(certificate.euler_characteristic);
+  archive.Number(certificate.orientable);
+  archive.Number(certificate.level);
+  archive.Number(certificate.declared_reach);
+  archive.Number(certificate.reach_refuted);
+  archive.Number(certificate.proved_distance);
+}
+
+core::AnswerBlock Columns(const core::AnswerBlock& block, Index first, Index count) {
+  core::AnswerBlock some;
+  some.points = block.points.middleCols(first, count);
+  if (!block.found.empty()) {
+    some.found.assign(block.found.begin() + first, block.found.begin() + first + count);
+  }
+  if (block.tangents.cols() > 0) some.tangents = block.tangents.middleCols(first, count);
+  if (block.sizes.size() > 0) some.sizes = block.sizes.segment(first, count);
+  return some;
+}
+
+template <typename Archive, typename Value>
+void LayOutAnswers(Archive& archive, Value& answers) {
+  archive.Numbers(answers.points);
+  archive.Bytes(answers.found);
+  archive.Numbers(answers.tangents);
+  archive.Numbers(answers.sizes);
+}
+
+template <typename Archive, typename Value>
+void LayOutState(Archive& archive, Value& state) {
+  archive.Number(state.identity);
+  archive.Number(state.commits);
+  archive.Number(state.next_mesh);
+  archive.Number(state.records);
+  archive.Number(state.sum);
+}
+
+template <typename Archive, typename Value>
+void LayOutRound(Archive& archive, Value& round) {
+  archive.Number(round.questions);
+  archive.Number(round.answers);
+  archive.Number(round.parts);
+  archive.Number(round.vertices);
+}
+
+template <typename Value, typename LayOut>
+std::string Encoded(const Value& value, LayOut lay_out) {
+  RecordWriter writer;
+  lay_out(writer, value);
+  return writer.Take();
+}
+
+template <typename Value, typename LayOut>
+std::optional<Value> Decoded(std::string_view record, LayOut lay_out) {
+  RecordReader reader(record);
+  Value value;
+  lay_out(reader, value);
+  if (!reader.Complete()) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+std::uint64_t SealOf(std::string_view record, const Place& place) {
+  RecordDigest digest;
+  digest.Add(static_cast<std::uint64_t>(place.mesh));
+  digest.Add(static_cast<std::uint64_t>(place.kind));
+  digest.Add(static_cast<std::uint64_t>(place.number));
+  digest.Add(static_cast<std::uint64_t>(place.part));
+  digest.Add(record.data(), record.size());
+  return digest.value();
+}
+
+std::string EncodeState(const JournalState& state) {
+  return Encoded(state, [](auto& archive, auto& value) { LayOutState(archive, value); });
+}
+
+std::optional<JournalState> DecodeState(std::string_view record) {
+  return Decoded<JournalState>(record,
+                               [](auto& archive, auto& value) { LayOutState(archive, value); });
+}
+
+std::string EncodeStart(const SessionOptions& options, SystemTime create_time) {
+  RecordWriter writer;
+  writer.Bytes(options.name);
+  writer.Bytes(options.owner);
+  writer.Bytes(options.label);
+  writer.Number(ToNumber(create_time));
+  writer.Number(options.dispatch.answer_limit.count());
+  writer.Number(options.dispatch.worker_wait.count());
+  LayOutSpecification(writer, options.spec);
+  writer.Number(options.dispatch.busy_limit.count());
+  return writer.Take();
+}
+
+bool DecodeStart(std::string_view record, SessionOptions* options, SystemTime* create_time) {
+  return DecodeEarlierStart(record, kJournalVersion, options, create_time);
+}
+
+bool DecodeEarlierStart(std::string_view record, std::uint32_t version, SessionOptions* options,
+                        SystemTime* create_time) {
+  RecordReader reader(record);
+  std::int64_t time = 0;
+  Clock::rep answer_limit = 0, worker_wait = 0;
+  Clock::rep busy_limit = options->dispatch.busy_limit.count();
+  reader.Bytes(options->name);
+  reader.Bytes(options->owner);
+  reader.Bytes(options->label);
+  reader.Number(time);
+  reader.Number(answer_limit);
+  reader.Number(worker_wait);
+  LayOutSpecification(reader, options->spec, version);
+  if (!reader.Complete()) reader.Number(busy_limit);  // earlier records end before it
+  *create_time = ToTime(time);
+  options->dispatch.answer_limit = Clock::duration(answer_limit);
+  options->dispatch.worker_wait = Clock::duration(worker_wait);
+  options->dispatch.busy_limit = Clock::duration(busy_limit);
+  return reader.Complete();
+}
+
+std::vector<AnswerRange> Merged(std::vector<AnswerRange> ranges) {
+  std::sort(ranges.begin(), ranges.end());
+  std::vector<AnswerRange> merged;
+  for (const AnswerRange& range : ranges) {
+    if (!merged.empty() && merged.back().block == range.block && merged.back().end >= range.first) {
+      merged.back().end = std::max(merged.back().end, range.end);
+    } else {
+      merged.push_back(range);
+    }
+  }
+  return merged;
+}
+
+std::vector<AnswerRange> Missing(const std::vector<AnswerRange>& ranges,
+                                 const std::vector<Index>& sizes) {
+  std::vector<AnswerRange> missing;
+  auto range = ranges.begin();
+  for (std::size_t block = 0; block < sizes.size(); ++block) {
+    Index next = 0;
+    for (; range != ranges.end() && range->block == block; ++range) {
+      if (range->first > next) missing.push_back({block, next, range->first});
+      next = range->end;
+    }
+    if (next < sizes[block]) missing.push_back({block, next, sizes[block]});
+  }
+  return missing;
+}
+
+bool EncodeAnswers(const core::Answers& answers, const std::vector<AnswerRange>& ranges,
+                   std::uint64_t questions, const std::function<bool(const std::string&)>& take) {
+  RecordWriter writer;
+  const auto begin = [&] {
+    writer = RecordWriter();
+    writer.Number(questions);
+  };
+  begin();
+  bool empty = true;
+  for (const AnswerRange& range : ranges) {
+    const core::AnswerBlock& block = answers.blocks[range.block];
+    const auto column = static_cast<std::size_t>(block.points.rows() + block.tangents.rows() + 2);
+    const auto most = std::max<Index>(static_cast<Index>(kPartBytes / (column * kWord)), 1);
+    for (Index first = range.first; first < range.end; first += most) {
+      writer.Number(range.block);
+      writer.Number(first);
+      const core::AnswerBlock some = Columns(block, first, std::min(most, range.end - first));
+      LayOutAnswers(writer, some);
+      empty = writer.size() >= kPartBytes;
+      if (!empty) continue;
+      if (!take(writer.Take())) return false;
+      begin();
+    }
+  }
+  return empty || take(writer.Take());
+}
+
+std::optional<RecordedAnswers> DecodeAnswers(std::string_view record) {
+  RecordReader reader(record);
+  RecordedAnswers recorded;
+  reader.Number(recorded.questions);
+  while (reader.good() && !reader.Complete()) {
+    PartOfRound& part = recorded.parts.emplace_back();
+    reader.Number(part.block_index);
+    reader.Number(part.first);
+    LayOutAnswers(reader, part.answers);
+  }
+  if (!reader.Complete()) return std::nullopt;
+  return recorded;
+}
+
+std::string EncodeRound(const RecordedRound& round) {
+  return Encoded(round, [](auto& archive, auto& value) { LayOutRound(archive, value); });
+}
+
+std::optional<RecordedRound> DecodeRound(std::string_view record) {
+  return Decoded<RecordedRound>(record,
+                                [](auto& archive, auto& value) { LayOutRound(archive, value); });
+}
+
+std::string EncodeEnd(const SessionEnd& end) {
+  RecordWriter writer;
+  writer.Number(static_cast<int>(end.state));
+  writer.Number(ToNumber(end.time));
+  writer.Number(end.elapsed_seconds);
+  writer.Bytes(end.failure.reason);
+  writer.Bytes(end.failure.message);
+  writer.Number(end.rounds);
+  return writer.Take();
+}
+
+std::optional<SessionEnd> DecodeEnd(std::string_view record) {
+  RecordReader reader(record);
+  SessionEnd end;
+  int state = 0;
+  std::int64_t time = 0;
+  reader.Number(state);
+  reader.Number(time);
+  reader.Number(end.elapsed_seconds);
+  reader.Bytes(end.failure.reason);
+  reader.Bytes(end.failure.message);
+  reader.Number(end.rounds);
+  end.state = static_cast<SessionState>(state);
+  end.time = ToTime(time);
+  const bool ended = end.state >= SessionState::kSucceeded && end.state <= SessionState::kFailed;
+  if (!reader.Complete() || !ended) return std::nullopt;
+  return end;
+}
+
+std::string EncodeResult(const SessionResult& result, std::uint64_t parts) {
+  RecordWriter writer;
+  LayOutProgress(writer, result.progress);
+  LayOutReport(writer, result.report);
+  writer.Number(result.revision);
+  writer.Number(result.history_bytes);
+  writer.Number(parts);
+  return writer.Take();
+}
+
+std::optional<SessionResult> DecodeResult(std::string_view record, std::uint64_t* parts) {
+  RecordReader reader(record);
+  SessionResult result;
+  LayOutProgress(reader, result.progress);
+  LayOutReport(reader, result.report);
+  reader.Number(result.revision);
+  reader.Number(result.history_bytes);
+  reader.Number(*parts);
+  if (!reader.Complete()) return std::nullopt;
+  return result;
+}
+
+std::uint64_t DigestOf(const core::QueryBatch& batch) {
+  RecordDigest digest;
+  digest.Add(batch.round);
+  for (const core::QueryBlock& block : batch.blocks) {
+    digest.Add(static_cast<std::uint64_t>(block.kind));
+    digest.Add(block.want_tangents);
+    digest.Add(block.want_sizes);
+    digest.Add(block.points);
+    digest.Add(block.bases);
+    digest.Add(block.radii);
+  }
+  return digest.value();
+}
+
+std::uint64_t DigestOf(const core::Answers& answers) {
+  RecordDigest digest;
+  for (const core::AnswerBlock& block : answers.blocks) {
+    digest.Add(block.points);
+    digest.Add(block.found.data(), block.found.size());
+    digest.Add(block.tangents);
+    digest.Add(block.sizes);
+  }
+  return digest.value();
+}
+
+}  // namespace stellate::server

@@ -1,0 +1,14 @@
+#include "server/convert/mesh.h"
+#include "server/rpc/handlers.h"
+
+namespace stellate::server {
+
+grpc::Status CancelMesh(const Call& call, const v1::CancelMeshRequest& request, v1::Mesh* mesh) {
+  const auto session = FindMesh(call.service, call.caller, request.name());
+  if (!session) return session.error();
+  (*session)->Cancel();
+  ToProto(**session, mesh);
+  return grpc::Status::OK;
+}
+
+}  // namespace stellate::server

@@ -1,0 +1,13 @@
+#include "server/rpc/handlers.h"
+
+namespace stellate::server {
+
+grpc::Status DeleteMesh(const Call& call, const v1::DeleteMeshRequest& request,
+                        google::protobuf::Empty*) {
+  const auto session = FindMesh(call.service, call.caller, request.name());
+  if (!session) return session.error();
+  call.service.store.Delete(request.name());  // gone already: someone else was quicker
+  return grpc::Status::OK;
+}
+
+}  // namespace stellate::server

@@ -1,0 +1,48 @@
+#include <charconv>
+
+#include "core/message.h"
+#include "server/convert/error_map.h"
+#include "server/convert/mesh.h"
+#include "server/rpc/handlers.h"
+
+namespace stellate::server {
+namespace {
+
+constexpr std::uint32_t kDefaultPage = 100;
+constexpr std::uint32_t kLargestPage = 1000;
+
+}  // namespace
+
+// A page ends early when it grows too large for a message: boxes have d numbers each.
+grpc::Status ListMeshes(const Call& call, const v1::ListMeshesRequest& request,
+                        v1::ListMeshesResponse* response) {
+  std::uint64_t after = 0;
+  const std::string& token = request.page_token();
+  if (!token.empty()) {
+    const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), after);
+    if (error != std::errc() || end != token.data() + token.size()) {
+      return Refusal(v1::ERROR_REASON_INVALID_ARGUMENT,
+                     core::Message("page_token is \"", Cut(token, 100),
+                                   "\" but must be a next_page_token of an earlier reply"),
+                     "page_token");
+    }
+  }
+  const std::uint32_t size = request.page_size() == 0 ? kDefaultPage : request.page_size();
+  const SessionStore::Page page =
+      call.service.store.List(after, std::min(size, kLargestPage), call.caller.owner);
+  std::size_t bytes = 0;
+  for (std::size_t i = 0; i < page.sessions.size(); ++i) {
+    v1::Mesh* const mesh = response->add_meshes();
+    ToProto(*page.sessions[i], mesh);
+    bytes += mesh->ByteSizeLong();
+    const bool full = bytes >= ChunkBytes(call.service.config) / 2;
+    const bool last = i + 1 == page.sessions.size();
+    if ((last && page.more) || (!last && full)) {
+      response->set_next_page_token(std::to_string(page.numbers[i]));
+      break;
+    }
+  }
+  return grpc::Status::OK;
+}
+
+}  // namespace stellate::server

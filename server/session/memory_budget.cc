@@ -1,0 +1,134 @@
+#include "server/session/memory_budget.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <utility>
+
+#include "core/message.h"
+#include "server/base/cgroup.h"
+
+namespace stellate::server {
+namespace {
+
+using core::Message;
+
+// Beside coordinates: a vertex's star, its neighbours, its part of the search tree. By k.
+constexpr std::uint64_t kStarBytes[] = {0, 700, 1500, 5500, 25'000, 150'000};
+static_assert(std::size(kStarBytes) == core::kMaxDimension + 1);
+constexpr std::uint64_t kEmptyMeshBytes = std::uint64_t{1} << 16;  // one with nothing in it
+constexpr std::uint64_t kFinishedBytes = std::uint64_t{1} << 14;   // beside history and seeds
+constexpr std::uint64_t kCallBytes = std::uint64_t{1} << 15;       // that sends nothing
+constexpr std::uint64_t kLeastOfStreams = std::uint64_t{4} << 20;
+
+std::uint64_t SeedBytes(const core::Specification& spec) {
+  return static_cast<std::uint64_t>(spec.seeds.size()) * sizeof(double);
+}
+
+std::uint64_t PageBytes() { return static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)); }
+
+}  // namespace
+
+std::uint64_t EstimateMeshBytes(const core::Specification& spec, std::uint64_t vertices,
+                                std::uint64_t queries) {
+  const auto d = static_cast<std::uint64_t>(spec.ambient_dimension);
+  const auto k = static_cast<std::uint64_t>(std::clamp(spec.dimension, 1, core::kMaxDimension));
+  // A point and its tangent basis: in the sample, its search tree, and the history.
+  const std::uint64_t coordinates = 4 * sizeof(double) * d * (k + 1);
+  const std::uint64_t seeds = 3 * SeedBytes(spec);  // the mesh's, its pool's, the mesher's
+  // Questions and answers with their bases, here and as the mesher has them.
+  const std::uint64_t message = 4 * sizeof(double) * d * (k + 1);
+  return kEmptyMeshBytes + seeds + vertices * (coordinates + kStarBytes[k]) + queries * message;
+}
+
+std::uint64_t EstimateFinishedBytes(const core::Specification& spec) {
+  return kFinishedBytes + 2 * SeedBytes(spec);
+}
+
+std::uint64_t EstimateStreamBytes(const core::Specification& spec, std::uint64_t part) {
+  return kCallBytes + 2 * std::max(part, SeedBytes(spec));
+}
+
+std::uint64_t MachineBytes() {
+  const auto machine = static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * PageBytes();
+  return std::min(machine, CgroupMemoryLimit().value_or(machine));
+}
+
+std::uint64_t ResidentBytes() {
+  std::uint64_t size = 0, resident = 0;
+  std::ifstream("/proc/self/statm") >> size >> resident;
+  return resident * PageBytes();
+}
+
+std::unique_ptr<MemoryBudget::Account> MemoryBudget::Open(std::shared_ptr<MemoryBudget> budget,
+                                                          std::string owner) {
+  return std::unique_ptr<Account>(new Account(std::move(budget), std::move(owner)));
+}
+
+// Of a limit that is set.
+std::uint64_t MemoryBudget::Share(std::uint64_t limit) const {
+  return what_ == Of::kMeshes ? limit : std::max(limit / 8, kLeastOfStreams);
+}
+
+// Whether sums of so many bytes are within the limits, `bytes` of them this account's.
+std::optional<Refused> MemoryBudget::Check(const std::string& owner, std::uint64_t bytes,
+                                           std::uint64_t total, std::uint64_t owned) const {
+  const bool meshes = what_ == Of::kMeshes;
+  const auto refuse = [&](const char* setting, const char* scope, std::uint64_t limit,
+                          const std::string& whose, std::uint64_t sum, const char* whom) {
+    return Refused(
+        {setting, Message(limit), scope},
+        Message(whose, meshes ? " meshes" : " watchers, downloads and workers",
+                " would hold about ", sum, " bytes, this one ", bytes,
+                " of them, but the server allows ", whom, Share(limit),
+                meshes ? "" : Message(", a part of --", setting), ": ",
+                meshes ? "delete meshes that are no longer needed, ask for a larger epsilon or "
+                         "fewer vertices"
+                       : "end those that are not needed",
+                ", or raise --", setting));
+  };
+  if (limits_.server > 0 && total > Share(limits_.server)) {
+    return refuse("max-memory-bytes", "server", limits_.server, "the server's", total, "");
+  }
+  if (limits_.owner > 0 && !owner.empty() && owned > Share(limits_.owner)) {
+    return refuse("owner-memory-bytes", "owner", limits_.owner, "your", owned, "each owner ");
+  }
+  return std::nullopt;
+}
+
+std::optional<Refused> MemoryBudget::Set(Account* account, std::uint64_t bytes, bool insist) {
+  const std::lock_guard lock(mutex_);
+  const std::uint64_t old = account->bytes_;
+  std::uint64_t& owners = by_owner_[account->owner_];
+  const std::uint64_t total = total_ - old + bytes;
+  const std::uint64_t owned = owners - old + bytes;
+  if (bytes > old && !insist) {
+    if (auto refused = Check(account->owner_, bytes, total, owned)) return refused;
+  }
+  total_ = total;
+  owners = owned;
+  account->bytes_ = bytes;
+  return std::nullopt;
+}
+
+void MemoryBudget::Release(Account* account) {
+  const std::lock_guard lock(mutex_);
+  total_ -= account->bytes_;
+  const auto owner = by_owner_.find(account->owner_);
+  if (owner == by_owner_.end()) return;
+  owner->second -= account->bytes_;
+  if (owner->second == 0) by_owner_.erase(owner);
+}
+
+std::uint64_t MemoryBudget::BytesOf(const Account* account) const {
+  const std::lock_guard lock(mutex_);
+  return account->bytes_;
+}
+
+std::uint64_t MemoryBudget::total() const {
+  const std::lock_guard lock(mutex_);
+  return total_;
+}
+
+}  // namespace stellate::server

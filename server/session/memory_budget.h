@@ -1,0 +1,104 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "core/specification.h"
+#include "server/base/limits.h"
+
+namespace stellate::server {
+
+// What a running mesh of this specification holds with so many vertices, in bytes, its history
+// included, while a round of so many queries is under way. An estimate, fitted to measured
+// processes: within a factor of two for k <= 4.
+std::uint64_t EstimateMeshBytes(const core::Specification& spec, std::uint64_t vertices,
+                                std::uint64_t queries);
+
+// What one of no more rounds holds beside its history: itself, and its seeds.
+std::uint64_t EstimateFinishedBytes(const core::Specification& spec);
+
+// What an open call on a mesh holds while its client reads nothing: itself, and a message of `part`
+// bytes, or one that repeats the specification, as it is and as it is sent.
+std::uint64_t EstimateStreamBytes(const core::Specification& spec, std::uint64_t part);
+
+// Bytes of memory that this process may have: the machine's, or what a control group allows if
+// that is less.
+std::uint64_t MachineBytes();
+// Bytes of memory that this process has now; 0 where the system does not say.
+std::uint64_t ResidentBytes();
+
+// Keeps the estimates of all meshes below a budget, and those of each owner's. Any thread.
+class MemoryBudget {
+ public:
+  // 0: no limit. `owner` holds for named owners.
+  struct Limits {
+    std::uint64_t server = 0;
+    std::uint64_t owner = 0;
+  };
+  // Open calls have a budget of their own, an eighth of the limits (and 4 MiB at least), so that
+  // finished meshes that fill the budget of meshes can still be read.
+  enum class Of { kMeshes, kStreams };
+  explicit MemoryBudget(Limits limits, Of what = Of::kMeshes) : limits_(limits), what_(what) {}
+
+  // One mesh's or call's part, given back when this goes. Holds no more than it was last set to.
+  class Account {
+   public:
+    ~Account() { budget_->Release(this); }
+    Account(const Account&) = delete;
+    Account& operator=(const Account&) = delete;
+
+    // What it is estimated to hold now. kLimitExceeded, with the old value kept, if it grew
+    // and the budget does not allow it; one that shrinks is always allowed.
+    // First what nobody needs is given up, as MakeRoomBy says.
+    std::optional<Refused> Set(std::uint64_t bytes) {
+      auto refused = TrySet(bytes);
+      if (refused && budget_->make_room_ && budget_->make_room_()) refused = TrySet(bytes);
+      return refused;
+    }
+    // The same, of what there is.
+    std::optional<Refused> TrySet(std::uint64_t bytes) { return budget_->Set(this, bytes, false); }
+    // For a mesh that is there already, from an earlier server.
+    void Insist(std::uint64_t bytes) { budget_->Set(this, bytes, true); }
+    std::uint64_t bytes() const { return budget_->BytesOf(this); }
+
+   private:
+    friend class MemoryBudget;
+    Account(std::shared_ptr<MemoryBudget> budget, std::string owner)
+        : budget_(std::move(budget)), owner_(std::move(owner)) {}
+
+    const std::shared_ptr<MemoryBudget> budget_;
+    const std::string owner_;
+    std::uint64_t bytes_ = 0;  // the budget's lock guards it
+  };
+
+  // Gives up memory that nobody needs; false: there was none. Any thread. Before the first Open.
+  void MakeRoomBy(std::function<bool()> make_room) { make_room_ = std::move(make_room); }
+
+  // For a new mesh or call of `owner`, with nothing in it.
+  static std::unique_ptr<Account> Open(std::shared_ptr<MemoryBudget> budget, std::string owner);
+
+  std::uint64_t total() const;
+
+ private:
+  std::optional<Refused> Set(Account* account, std::uint64_t bytes, bool insist);
+  std::optional<Refused> Check(const std::string& owner, std::uint64_t bytes, std::uint64_t total,
+                               std::uint64_t owned) const;
+  std::uint64_t Share(std::uint64_t limit) const;
+  void Release(Account* account);
+  std::uint64_t BytesOf(const Account* account) const;
+
+  const Limits limits_;
+  const Of what_;
+  std::function<bool()> make_room_;
+  mutable std::mutex mutex_;
+  std::uint64_t total_ = 0;
+  std::map<std::string, std::uint64_t> by_owner_;
+};
+
+}  // namespace stellate::server

@@ -1,0 +1,390 @@
+#include "server/session/session.h"
+
+#include <malloc.h>
+
+#include <algorithm>
+#include <exception>
+#include <new>
+#include <utility>
+
+#include "core/message.h"
+
+namespace stellate::server {
+namespace {
+
+using core::StatusCode;
+
+MeshFailure ToFailure(const core::Status& status) {
+  return {core::StatusCodeName(status.code), status.message};
+}
+
+// When it was created, on the clock that measures how long it takes. The clock on the wall may have
+// been set back since.
+TimePoint CreatedAt(std::chrono::system_clock::time_point create_time) {
+  return Clock::now() - AgeOf(create_time);
+}
+
+// Fields that tell a mesh from others, where its name says nothing.
+LogFields WhatItIs(const SessionOptions& options) {
+  return LogFields().Add("owner", options.owner).Add("label", options.label);
+}
+
+LogFields EndFields(const SessionOptions& options, const SessionEnd& end, bool suspended,
+                    const core::Report& report, const core::Progress& progress) {
+  LogFields fields = WhatItIs(options);
+  fields.Add("state", suspended ? "SUSPENDED" : SessionStateName(end.state))
+      .Add("certified", report.certificate.certified)
+      .Add("seconds", end.elapsed_seconds)
+      .Add("vertices", progress.vertices)
+      .Add("simplices", progress.simplices)
+      .Add("queries", progress.queries);
+  if (end.state == SessionState::kFailed) {
+    fields.Add("reason", end.failure.reason).Add("failure", end.failure.message);
+  } else if (!suspended) {
+    fields.Add("verdict", report.certificate.verdict);
+  }
+  return fields;
+}
+
+}  // namespace
+
+Clock::duration AgeOf(std::chrono::system_clock::time_point time) {
+  const auto age = std::chrono::system_clock::now() - time;
+  return std::max(std::chrono::duration_cast<Clock::duration>(age), Clock::duration::zero());
+}
+
+const char* SessionStateName(SessionState state) {
+  switch (state) {
+    case SessionState::kWaiting:
+      return "WAITING";
+    case SessionState::kRunning:
+      return "RUNNING";
+    case SessionState::kSucceeded:
+      return "SUCCEEDED";
+    case SessionState::kStopped:
+      return "STOPPED";
+    case SessionState::kCancelled:
+      return "CANCELLED";
+    case SessionState::kFailed:
+      return "FAILED";
+  }
+  return "UNKNOWN";
+}
+
+Session::Session(SessionOptions options, MesherFactory factory)
+    : options_(std::move(options)),
+      factory_(std::move(factory)),
+      pool_(options_.spec, options_.dispatch, options_.max_workers, options_.observer),
+      create_time_(options_.record ? options_.record->create_time
+                                   : std::chrono::system_clock::now()),
+      created_(CreatedAt(create_time_)),
+      replaying_(options_.record.has_value()) {
+  if (options_.journal != nullptr) {
+    pool_.TellOfAnswers([journal = options_.journal.get()](const auto& round, std::size_t block,
+                                                           auto first, auto count) {
+      journal->TakeAnswers(round, block, first, count);
+    });
+  }
+  if (!options_.record || !options_.record->result) {
+    history_ = std::make_shared<WatchLog>(options_.spec.dimension, options_.spec.ambient_dimension);
+    return;
+  }
+  const SessionEnd& end = *options_.record->end;
+  const SessionResult& result = *options_.record->result;
+  replaying_ = false;
+  final_state_ = end.state;
+  end_time_ = end.time;
+  final_seconds_ = end.elapsed_seconds;
+  failure_ = end.failure;
+  progress_ = result.progress;
+  report_ = result.report;
+  revision_ = result.revision;
+  history_bytes_ = result.history_bytes;
+  result_is_recorded_ = true;
+  pool_.Shut();
+  CountHistory();
+  over_ = true;
+}
+
+void Session::Run() {
+  std::unique_ptr<core::Mesher> mesher;
+  std::optional<core::Report> report;
+  try {
+    auto made = factory_(options_.spec);
+    if (made) {
+      mesher = std::move(*made);
+      Expose(mesher.get());
+      RunRounds(mesher.get());
+      report = mesher->report();
+    } else {
+      Fail(nullptr, ToFailure(made.error()), made.error());
+    }
+  } catch (const std::bad_alloc&) {
+    Fail(nullptr,
+         {"LIMIT_EXCEEDED",
+          "the server ran out of memory for this mesh: ask for a larger epsilon "
+          "or fewer vertices"},
+         core::Status::Ok());
+  } catch (const std::exception& error) {
+    Fail(nullptr, {"INTERNAL", core::Message("a fault of the server: ", error.what())},
+         core::Status::Ok());
+  }
+  Expose(nullptr);
+  Finish(report ? &*report : nullptr);
+  mesher.reset();  // it is large, and watchers, who have heard the end, do not need it
+  // The allocator would keep the memory of each mesh's own thread. A server that stops has it back
+  // sooner by leaving.
+  if (!stopping_) malloc_trim(0);
+  RecordResult();
+  CountHistory();
+  over_ = true;
+  EndReplay();
+}
+
+// What Cancel may interrupt in the middle of a round.
+void Session::Expose(core::Mesher* mesher) {
+  const std::lock_guard lock(mutex_);
+  computing_ = mesher;
+}
+
+void Session::RunRounds(core::Mesher* mesher) {
+  Log(LogLevel::kInfo, log_context(), replaying_ ? "replaying" : "meshing",
+      WhatItIs(options_)
+          .Add("dimension", options_.spec.dimension)
+          .Add("ambient_dimension", options_.spec.ambient_dimension)
+          .Add("epsilon", options_.spec.epsilon));
+  if (options_.journal != nullptr && !options_.record) {
+    if (auto failure = options_.journal->WriteStart(options_, create_time_)) {
+      FailBlameless(mesher, std::move(*failure));
+    }
+  }
+  while (true) {
+    if (abandoned_ || (cancelled_ && !replaying_)) mesher->Cancel();
+    const core::QueryBatch* const batch = mesher->NextBatch();
+    if (batch == nullptr) {
+      if (auto failure = Show(mesher)) FailBlameless(mesher, std::move(*failure));
+      return;
+    }
+    if (!FitsMemory(mesher, static_cast<std::uint64_t>(batch->size()))) continue;
+    replaying_ ? ReplayRound(mesher, *batch) : RunRound(mesher, *batch);
+  }
+}
+
+std::uint64_t Session::ReplayBytes() const {
+  return EstimateMeshBytes(options_.spec, options_.record ? options_.record->vertices : 0, 0);
+}
+
+// False, and the mesh has failed, if it has grown beyond what the server can hold.
+bool Session::FitsMemory(core::Mesher* mesher, std::uint64_t queries) {
+  if (options_.memory == nullptr) return true;
+  const std::uint64_t bytes =
+      EstimateMeshBytes(options_.spec, mesher->progress().vertices, queries);
+  if (replaying_) {
+    options_.memory->Insist(std::max(bytes, ReplayBytes()));  // its own, all the while
+    return true;
+  }
+  auto refused = options_.memory->Set(bytes);
+  if (refused) FailBlameless(mesher, ToFailure(*refused));
+  return !refused;
+}
+
+// Where there is nothing to replay any more, only says so: the mesh goes on from this batch, unless
+// it was cancelled meanwhile.
+void Session::ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch) {
+  if (batch.round > options_.record->rounds) {
+    EndReplay();
+    if (options_.record->end) return RepeatEnd(mesher);
+    Log(LogLevel::kInfo, {options_.name, batch.round, options_.owner},
+        "replayed; going on with new answers");
+    return;
+  }
+  SessionJournal::Known known = options_.journal->BeginRound(batch);
+  if (!known.failure) known.failure = Show(mesher);
+  if (known.failure) {
+    FailBlameless(mesher, std::move(*known.failure));
+  } else {
+    Absorb(mesher, *known.answers);
+  }
+}
+
+void Session::EndReplay() {
+  if (replaying_.exchange(false) && options_.on_replayed) options_.on_replayed();
+}
+
+// The recorded answers are used up, and the mesh ended here.
+void Session::RepeatEnd(core::Mesher* mesher) {
+  const SessionEnd& end = *options_.record->end;
+  if (end.state == SessionState::kFailed) return FailBlameless(mesher, end.failure);
+  if (end.state == SessionState::kCancelled) {
+    cancelled_ = true;
+    return mesher->Cancel();
+  }
+  FailBlameless(mesher, {"REPLAY_MISMATCH",
+                         "the recorded answers made a whole mesh once, and now do not: this "
+                         "server meshes differently from the one that recorded them; mesh anew"});
+}
+
+// While the workers are at this round's queries, watchers are shown what the last one led to.
+void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
+  SessionJournal::Known known;
+  if (options_.journal != nullptr) known = options_.journal->BeginRound(batch);
+  if (known.failure) return FailBlameless(mesher, std::move(*known.failure));
+  OraclePool::Outcome outcome = pool_.Ask(
+      batch,
+      [&] {
+        if (auto failure = Show(mesher)) pool_.Fail(std::move(*failure));
+      },
+      known.parts);
+  if (outcome.failure) {
+    // The worker at fault has been told on its own stream; the others are blameless.
+    FailBlameless(mesher, std::move(*outcome.failure));
+    return;
+  }
+  if (!outcome.round) return;  // interrupted: the caller cancels
+  const core::Answers& answers = outcome.round->answers;
+  if (options_.journal != nullptr) {
+    const std::uint64_t vertices = mesher->progress().vertices;
+    if (auto failure = options_.journal->WriteRound(batch, answers, vertices)) {
+      FailBlameless(mesher, std::move(*failure));
+      return;
+    }
+  }
+  const std::uint64_t round = batch.round;  // the batch is gone once it is absorbed
+  const auto queries = static_cast<std::size_t>(batch.size());
+  if (!Absorb(mesher, answers)) return;
+  if (options_.observer != nullptr) options_.observer->OnRound(queries);
+  if (LogEnabled(LogLevel::kDebug)) {
+    Log(LogLevel::kDebug, {options_.name, round, options_.owner}, "round answered",
+        LogFields().Add("queries", queries).Add("vertices", mesher->progress().vertices));
+  }
+}
+
+bool Session::Absorb(core::Mesher* mesher, const core::Answers& answers) {
+  auto delta = mesher->Absorb(answers);
+  if (!delta) {
+    // What the round would have led to nobody has seen; a suspended mesh goes on from its answers.
+    if (delta.error().code == StatusCode::kCancelled)
+      mesher->Cancel();
+    else
+      Fail(mesher, ToFailure(delta.error()), delta.error());
+    return false;
+  }
+  unseen_ = std::move(*delta);
+  return true;
+}
+
+// How the mesh stands, and what has changed since it was last shown.
+std::optional<MeshFailure> Session::Show(core::Mesher* mesher) {
+  if (unseen_) {
+    const core::Status logged = history_->Append(*unseen_);  // it is there until the end
+    unseen_.reset();
+    if (!logged.ok()) {
+      return MeshFailure{"INTERNAL", core::Message("a fault of the server: ", logged.message)};
+    }
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    progress_ = mesher->progress();
+  }
+  WakeWatchers();
+  return {};
+}
+
+// The mesh fails, but not by an answer of the workers that serve it now.
+void Session::FailBlameless(core::Mesher* mesher, MeshFailure failure) {
+  core::Status status{StatusCode::kOracleFailed, failure.message};
+  Fail(mesher, std::move(failure), std::move(status));
+  blame_ = core::Status::Ok();
+}
+
+void Session::Fail(core::Mesher* mesher, MeshFailure failure, core::Status status) {
+  {
+    const std::lock_guard lock(mutex_);
+    failure_ = std::move(failure);
+  }
+  blame_ = status;
+  if (mesher != nullptr) mesher->Fail(std::move(status));
+}
+
+SessionState Session::FinalState(const core::Report* report) const {
+  if (!failure_.reason.empty()) return SessionState::kFailed;
+  if (cancelled_ || report == nullptr) return SessionState::kCancelled;
+  switch (report->termination) {
+    case core::Termination::kConverged:
+      return SessionState::kSucceeded;
+    case core::Termination::kCancelled:
+      return SessionState::kCancelled;
+    case core::Termination::kOracleFailed:
+      return SessionState::kFailed;
+    default:
+      return SessionState::kStopped;
+  }
+}
+
+void Session::Finish(const core::Report* report) {
+  SessionEnd end;
+  bool suspended = false;
+  {
+    const std::lock_guard lock(mutex_);
+    if (report != nullptr && report->termination == core::Termination::kOracleFailed &&
+        failure_.reason.empty()) {
+      failure_ = ToFailure(report->failure);
+    }
+    end = {FinalState(report), std::max(std::chrono::system_clock::now(), create_time_),
+           std::chrono::duration<double>(Clock::now() - created_).count(), failure_,
+           progress_.round};
+    suspended = suspended_ && end.state == SessionState::kCancelled;
+    ending_ = true;
+  }
+  const bool ended_before = options_.record && options_.record->end.has_value();
+  if (ended_before && end.state == options_.record->end->state) end = *options_.record->end;
+  // Before anyone hears of it, so that nobody finds it running later.
+  if (options_.journal != nullptr && !suspended && !ended_before) {
+    const auto failure = options_.journal->WriteEnd(end);
+    end_is_recorded_ = !failure;
+    if (failure) {
+      Log(LogLevel::kWarning, log_context(),
+          core::Message("the end of the mesh is not recorded: ", failure->message));
+    }
+  }
+  // A replay that got there, and not one that failed on its way.
+  if (ended_before) end_is_recorded_ = !abandoned_ && progress_.round == end.rounds;
+  // Counted before it can be seen, as whoever sees the end may look at the metrics next.
+  if (options_.observer != nullptr && !suspended && !ended_before) {
+    options_.observer->OnEnd(end.state, report != nullptr ? *report : core::Report{});
+  }
+  // Whoever has seen the end finds the door shut.
+  pool_.Shut();
+  LogFields fields;
+  {
+    const std::lock_guard lock(mutex_);
+    final_state_ = end.state;
+    report_ = report != nullptr ? *report : core::Report{};
+    end_time_ = end.time;
+    final_seconds_ = end.elapsed_seconds;
+    fields = EndFields(options_, end, suspended, *report_, progress_);
+  }
+  Log(end.state == SessionState::kFailed ? LogLevel::kWarning : LogLevel::kInfo, log_context(),
+      suspended ? "mesh suspended until the server is back" : "mesh ended", fields);
+  pool_.Close({blame_});
+  WakeWatchers();
+}
+
+// The mesh itself, in the place of the answers that led to it. Until then, or if the disk has no
+// room for it, the next server replays these once more.
+void Session::RecordResult() {
+  if (!end_is_recorded_) return;
+  const SessionResult result{progress_, *report_, history_->revision(), history_->MemoryBytes()};
+  if (const auto failure = options_.journal->WriteResult(result, *history_)) {
+    Log(LogLevel::kWarning, log_context(),
+        core::Message("the next server will have to replay the mesh: ", failure->message));
+    return;
+  }
+  const std::lock_guard lock(mutex_);
+  revision_ = result.revision;
+  history_bytes_ = result.history_bytes;
+  result_is_recorded_ = true;
+  history_used_ = Clock::now();
+}
+
+}  // namespace stellate::server

@@ -1,0 +1,81 @@
+#include "server/convert/error_map.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/server/support/status_matchers.h"
+
+namespace stellate::server {
+namespace {
+
+using core::StatusCode;
+using testing::DetailsOf;
+using testing::FieldIn;
+using testing::ReasonIn;
+
+TEST(ErrorMap, EachCoreCodeHasItsStatusAndReason) {
+  const struct {
+    StatusCode code;
+    grpc::StatusCode status;
+  } cases[] = {
+      {StatusCode::kInvalidArgument, grpc::StatusCode::INVALID_ARGUMENT},
+      {StatusCode::kLimitExceeded, grpc::StatusCode::RESOURCE_EXHAUSTED},
+      {StatusCode::kOracleShape, grpc::StatusCode::INVALID_ARGUMENT},
+      {StatusCode::kOracleNotFinite, grpc::StatusCode::INVALID_ARGUMENT},
+      {StatusCode::kOracleOffFlat, grpc::StatusCode::INVALID_ARGUMENT},
+      {StatusCode::kOracleOutsideRadius, grpc::StatusCode::INVALID_ARGUMENT},
+      {StatusCode::kOracleBadTangent, grpc::StatusCode::INVALID_ARGUMENT},
+      {StatusCode::kOracleBadSize, grpc::StatusCode::INVALID_ARGUMENT},
+      {StatusCode::kOracleNotIdempotent, grpc::StatusCode::INVALID_ARGUMENT},
+      {StatusCode::kOracleFailed, grpc::StatusCode::ABORTED},
+      {StatusCode::kFailedPrecondition, grpc::StatusCode::FAILED_PRECONDITION},
+  };
+  for (const auto& [code, expected] : cases) {
+    const grpc::Status status = ToGrpc({code, "words"});
+    EXPECT_EQ(status.error_code(), expected) << core::StatusCodeName(code);
+    EXPECT_EQ(status.error_message(), "words");
+    // The core's names and the protocol's are the same words.
+    EXPECT_EQ(ReasonIn(status), core::StatusCodeName(code));
+    EXPECT_EQ(DetailsOf(status).code(), expected);
+  }
+  EXPECT_TRUE(ToGrpc(core::Status::Ok()).ok());
+  EXPECT_EQ(ReasonOf(StatusCode::kNoSeeds), v1::ERROR_REASON_NO_SEEDS);
+}
+
+TEST(ErrorMap, EachReasonOfAReplyHasACode) {
+  for (int value = 1; value < v1::ERROR_REASON_NO_SEEDS; ++value) {
+    if (!v1::ErrorReason_IsValid(value)) continue;
+    const auto reason = static_cast<v1::ErrorReason>(value);
+    const bool internal = v1::ErrorReason_Name(reason) == "ERROR_REASON_INTERNAL";
+    EXPECT_EQ(CodeOf(reason) == grpc::StatusCode::INTERNAL, internal) << value;
+  }
+}
+
+TEST(ErrorMap, TheFieldAtFaultIsFoundInTheMessage) {
+  EXPECT_EQ(FieldOf("epsilon is -1 but must be more"), "epsilon");
+  EXPECT_EQ(FieldOf("dimension (k) is 0"), "dimension");
+  EXPECT_EQ(FieldOf("bounding_box.lower has 2 coordinates"), "bounding_box.lower");
+  EXPECT_EQ(FieldOf("neither seeds nor bounding_box is given"), "bounding_box");
+  EXPECT_EQ(FieldOf("the server runs 3 meshes"), "");
+  EXPECT_EQ(FieldOf(""), "");
+  EXPECT_EQ(FieldIn(ToGrpc({StatusCode::kInvalidArgument, "epsilon is -1"}, "spec.")),
+            "spec.epsilon");
+  EXPECT_EQ(FieldIn(ToGrpc({StatusCode::kInvalidArgument, "no field"}, "spec.")), "");
+}
+
+TEST(ErrorMap, LongMessagesFitIntoTrailers) {
+  std::string long_words;
+  for (int i = 0; i < 5000; ++i) long_words += "é";
+  const grpc::Status status = Refusal(v1::ERROR_REASON_INVALID_ARGUMENT, "x" + long_words, "field");
+  EXPECT_LT(3 * status.error_message().size() + status.error_details().size() * 4 / 3, 8000u);
+  EXPECT_EQ(FieldIn(status), "field") << "cut between characters, or it would not parse";
+}
+
+TEST(ErrorMap, CutKeepsCharactersWhole) {
+  EXPECT_EQ(Cut("abc", 5), "abc");
+  EXPECT_EQ(Cut("abc", 2), "ab");
+  EXPECT_EQ(Cut("aé", 2), "a");
+  EXPECT_EQ(Cut("é", 1), "");
+}
+
+}  // namespace
+}  // namespace stellate::server

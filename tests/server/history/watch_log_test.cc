@@ -1,0 +1,252 @@
+#include "server/history/watch_log.h"
+
+#include <gtest/gtest.h>
+#include <malloc.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstdlib>
+#include <new>
+#include <random>
+#include <set>
+
+namespace {
+std::atomic<std::uint64_t> allocated{0};  // on the heap, in this process
+}  // namespace
+
+void* operator new(std::size_t size) {
+  void* const block = std::malloc(size);
+  if (block == nullptr) throw std::bad_alloc();
+  allocated += malloc_usable_size(block);
+  return block;
+}
+void operator delete(void* block) noexcept {
+  allocated -= malloc_usable_size(block);
+  std::free(block);
+}
+void operator delete(void* block, std::size_t) noexcept { operator delete(block); }
+
+namespace stellate::server {
+namespace {
+
+using Triangle = std::vector<std::uint32_t>;
+using State = std::multiset<Triangle>;
+
+constexpr int kDimension = 2, kAmbient = 3;
+
+core::MeshDelta Delta(std::uint64_t revision, std::uint64_t first, int vertices,
+                      const std::vector<Triangle>& added, const std::vector<Triangle>& removed) {
+  core::MeshDelta delta;
+  delta.revision = revision;
+  delta.first_vertex = first;
+  delta.points.resize(kAmbient, vertices);
+  for (int j = 0; j < vertices; ++j)
+    delta.points.col(j).setConstant(static_cast<double>(first) + j);
+  for (const auto& t : added) delta.added.insert(delta.added.end(), t.begin(), t.end());
+  for (const auto& t : removed) delta.removed.insert(delta.removed.end(), t.begin(), t.end());
+  return delta;
+}
+
+// A client: what it holds after reading parts in order.
+struct Client {
+  std::uint64_t revision = 0;
+  std::vector<double> points;
+  State state;
+
+  void Apply(const DeltaPart& part) {
+    std::set<Triangle> gone;
+    for (std::size_t i = 0; i < part.removed.size(); i += 3) {
+      gone.emplace(part.removed.begin() + i, part.removed.begin() + i + 3);
+    }
+    for (std::size_t i = 0; i < part.added.size(); i += 3) {
+      EXPECT_FALSE(gone.contains({part.added.begin() + i, part.added.begin() + i + 3}));
+    }
+    if (!part.points.empty()) {
+      EXPECT_EQ(part.first_vertex * kAmbient, points.size());
+    }
+    points.insert(points.end(), part.points.begin(), part.points.end());
+    for (std::size_t i = 0; i < part.removed.size(); i += 3) {
+      const auto it = state.find(Triangle(part.removed.begin() + i, part.removed.begin() + i + 3));
+      ASSERT_NE(it, state.end()) << "removed but not there";
+      state.erase(it);
+    }
+    for (std::size_t i = 0; i < part.added.size(); i += 3) {
+      state.insert(Triangle(part.added.begin() + i, part.added.begin() + i + 3));
+    }
+    if (part.complete) revision = part.revision;
+  }
+
+  void CatchUp(const WatchLog& log, std::size_t max_bytes) {
+    WatchLog::Cursor cursor = log.Begin(revision);
+    for (DeltaPart part;;) {
+      part = log.Next(&cursor, max_bytes);
+      Apply(part);
+      if (part.complete) return;
+    }
+  }
+};
+
+// Random growth; states[r] is the mesh at revision r.
+struct History {
+  WatchLog log{kDimension, kAmbient};
+  std::vector<State> states{State{}};
+  std::vector<std::size_t> vertices{0};
+
+  void Grow(int revisions, std::mt19937* random) {
+    for (int i = 0; i < revisions; ++i) {
+      const auto revision = states.size();
+      const auto first = static_cast<std::uint32_t>(vertices.back());
+      State state = states.back();
+      std::vector<Triangle> removed, added;
+      for (auto it = state.begin(); it != state.end();) {
+        if ((*random)() % 3 == 0) {
+          removed.push_back(*it);
+          it = state.erase(it);
+        } else {
+          ++it;
+        }
+      }
+      for (int t = 0; t < 6; ++t) {
+        // Few vertices, so that the same triangle goes and comes again.
+        const std::uint32_t limit = std::min(first + 3, 6u);
+        Triangle triangle{static_cast<std::uint32_t>((*random)() % (limit - 2)), limit - 2,
+                          limit - 1};
+        if (state.contains(triangle)) continue;
+        state.insert(triangle);
+        added.push_back(triangle);
+      }
+      ASSERT_TRUE(log.Append(Delta(revision, first, 3, added, removed)).ok());
+      states.push_back(state);
+      vertices.push_back(first + 3);
+    }
+  }
+};
+
+class WatchLogTest : public ::testing::TestWithParam<std::size_t> {};
+
+// Whatever was read before and however small the parts, the state arrived at is the same.
+TEST_P(WatchLogTest, AnyRevisionLeadsToAnyLaterOne) {
+  std::mt19937 random(7);
+  History history;
+  std::vector<Client> clients(1);
+  for (int step = 0; step < 12; ++step) {
+    history.Grow(1 + step % 3, &random);
+    clients.push_back(clients[random() % clients.size()]);
+    clients.back().CatchUp(history.log, GetParam());
+  }
+  for (Client client : clients) {
+    ASSERT_EQ(client.state, history.states[client.revision]);
+    client.CatchUp(history.log, GetParam());
+    EXPECT_EQ(client.revision, history.states.size() - 1);
+    EXPECT_EQ(client.state, history.states.back());
+    ASSERT_EQ(client.points.size(), history.vertices.back() * kAmbient);
+    for (std::size_t i = 0; i < client.points.size(); ++i) {
+      EXPECT_EQ(client.points[i], static_cast<double>(i / kAmbient));
+    }
+  }
+}
+INSTANTIATE_TEST_SUITE_P(PartSizes, WatchLogTest, ::testing::Values(24, 60, 1 << 20));
+
+TEST(WatchLog, APartBegunBeforeMoreCameLeadsWhereItSaid) {
+  std::mt19937 random(11);
+  History history;
+  history.Grow(5, &random);
+  Client client;
+  WatchLog::Cursor cursor = history.log.Begin(0);
+  client.Apply(history.log.Next(&cursor, 24));
+  history.Grow(5, &random);  // between two parts
+  while (client.revision == 0) client.Apply(history.log.Next(&cursor, 24));
+  EXPECT_EQ(client.revision, 5u);
+  EXPECT_EQ(client.state, history.states[5]);
+}
+
+TEST(WatchLog, PartsKeepToTheirSize) {
+  std::mt19937 random(3);
+  History history;
+  history.Grow(30, &random);
+  WatchLog::Cursor cursor = history.log.Begin(0);
+  for (bool complete = false; !complete;) {
+    const DeltaPart part = history.log.Next(&cursor, 100);
+    EXPECT_LE(8 * part.points.size() + 4 * (part.added.size() + part.removed.size()), 100u);
+    complete = part.complete;
+  }
+}
+
+TEST(WatchLog, RefusesWhatDoesNotFollow) {
+  WatchLog log(kDimension, kAmbient);
+  ASSERT_TRUE(log.Append(Delta(1, 0, 4, {{0, 1, 2}, {1, 2, 3}}, {})).ok());
+  EXPECT_FALSE(log.Append(Delta(3, 4, 1, {}, {})).ok()) << "a revision left out";
+  EXPECT_FALSE(log.Append(Delta(2, 9, 1, {}, {})).ok()) << "vertices left out";
+  EXPECT_FALSE(log.Append(Delta(2, 4, 0, {}, {{1, 2, 3}, {0, 1, 3}})).ok()) << "not there";
+  EXPECT_FALSE(log.Append(Delta(2, 4, 0, {}, {{9, 10, 11}})).ok()) << "not even its vertices";
+  EXPECT_FALSE(log.Append(Delta(2, 4, 1, {{5, 6, 7}}, {})).ok()) << "a vertex left out";
+  EXPECT_EQ(log.revision(), 1u);
+  EXPECT_TRUE(log.Append(Delta(2, 4, 0, {}, {{1, 2, 3}})).ok()) << "a refusal changes nothing";
+}
+
+TEST(WatchLog, ARevisionIsOnePartWhereItFits) {
+  WatchLog log(kDimension, kAmbient);
+  ASSERT_TRUE(log.Append(Delta(1, 0, 4, {{0, 1, 2}, {1, 2, 3}}, {})).ok());
+  ASSERT_TRUE(log.Append(Delta(2, 4, 1, {{0, 1, 4}, {0, 2, 4}}, {{0, 1, 2}})).ok());
+  WatchLog::Cursor cursor = log.Begin(1);
+  const DeltaPart part = log.Next(&cursor, 1000);
+  EXPECT_TRUE(part.complete);
+  EXPECT_EQ(part.removed, (Triangle{0, 1, 2}));
+  EXPECT_EQ(part.points.size(), 3u);
+  EXPECT_EQ(part.added, (Triangle{0, 1, 4, 0, 2, 4}));
+}
+
+// Any revision, read in parts, each by a reader that knows but the position.
+TEST(WatchLog, EveryRevisionIsReadFromAnyPosition) {
+  std::mt19937 random(5);
+  History history;
+  history.Grow(12, &random);
+  for (std::uint64_t revision = 0; revision < history.states.size(); ++revision) {
+    const WatchLog::Snapshot snapshot = history.log.At(revision);
+    EXPECT_EQ(snapshot.vertices, history.vertices[revision]);
+    EXPECT_EQ(snapshot.simplices, history.states[revision].size());
+    for (const std::size_t bytes : {std::size_t{1}, std::size_t{200}, std::size_t{1} << 20}) {
+      Client client;
+      std::uint64_t position = 0;
+      for (bool complete = false; !complete;) {
+        WatchLog::Cursor cursor = history.log.BeginAt(revision, position);
+        const DeltaPart part = history.log.Next(&cursor, bytes);
+        EXPECT_TRUE(part.removed.empty());
+        EXPECT_TRUE(part.complete || cursor.Position() > position) << "it gets on";
+        client.Apply(part);
+        position = cursor.Position();
+        complete = part.complete;
+      }
+      EXPECT_EQ(position, snapshot.positions);
+      EXPECT_EQ(client.points.size(), kAmbient * snapshot.vertices);
+      EXPECT_EQ(client.state, history.states[revision]);
+    }
+  }
+}
+
+// A strip of triangles, all in one round.
+core::MeshDelta Strip(std::uint32_t vertices) {
+  core::MeshDelta delta;
+  delta.revision = 1;
+  delta.points = Eigen::MatrixXd::Zero(kAmbient, vertices);
+  for (std::uint32_t v = 0; v + 2 < vertices; ++v) {
+    delta.added.insert(delta.added.end(), {v, v + 1, v + 2});
+  }
+  return delta;
+}
+
+TEST(WatchLog, MemoryIsThatOfTheHeap) {
+  for (const std::uint32_t vertices : {3u, 1000u, 100'000u}) {
+    const core::MeshDelta delta = Strip(vertices);
+    const std::uint64_t before = allocated;
+    const auto log = std::make_unique<WatchLog>(2, kAmbient);
+    ASSERT_TRUE(log->Append(delta).ok());
+    const auto held = static_cast<double>(allocated - before);
+    const auto counted = static_cast<double>(log->MemoryBytes());
+    EXPECT_GE(counted, 0.9 * held) << vertices;
+    EXPECT_LE(counted, 1.1 * held) << vertices;
+  }
+}
+
+}  // namespace
+}  // namespace stellate::server

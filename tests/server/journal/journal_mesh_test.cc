@@ -1,0 +1,199 @@
+// Whole meshes, and the servers that they outlive.
+
+#include "tests/server/support/blank_journal.h"
+#include "tests/server/support/journal_fixture.h"
+
+namespace stellate::server {
+namespace {
+
+using testing::ExpectSame;
+using testing::FakeWorker;
+using testing::JournalTest;
+using testing::Outcome;
+using testing::RecordedSphere;
+using testing::RunMesh;
+
+TEST_F(JournalTest, AMeshStoppedAgainAndAgainIsTheUndisturbedOne) {
+  const Outcome whole = RunMesh(RecordedSphere(nullptr));
+  ASSERT_EQ(whole.view.state, SessionState::kSucceeded);
+  ASSERT_GT(whole.view.revision, 6u);
+  {
+    const auto journal = Open();
+    RunMesh(RecordedSphere(journal->NewMesh()), 1);
+  }
+  std::uint64_t before = 0;
+  for (const std::uint64_t stop_at : {3, 5}) {
+    const auto journal = Open();
+    auto meshes = journal->TakeMeshes();
+    ASSERT_EQ(meshes.size(), 1u);
+    EXPECT_FALSE(meshes[0].record->end) << "a stop of the server is no end";
+    EXPECT_GE(meshes[0].record->rounds, before);
+    before = RunMesh(std::move(meshes[0]), stop_at).view.revision;
+    EXPECT_GE(before, stop_at);
+  }
+  {
+    const auto journal = Open();
+    const Outcome resumed = RunMesh(std::move(journal->TakeMeshes().at(0)));
+    ExpectSame(resumed, whole);
+  }
+  const auto journal = Open();
+  auto meshes = journal->TakeMeshes();
+  ASSERT_TRUE(meshes.at(0).record->result) << "no replay is needed";
+  const Outcome kept = RunMesh(std::move(meshes[0]), 0, false);
+  EXPECT_EQ(kept.view.report->certificate.verdict, whole.view.report->certificate.verdict);
+  EXPECT_EQ(kept.view.progress.vertices, whole.view.progress.vertices);
+  ExpectSame(kept, whole);
+}
+
+// Every revision that it ever had, bit for bit, without a question or a mesher: another version of
+// that may ask what it likes.
+TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
+  SessionView before;
+  std::vector<std::string> wholes;
+  const auto all_of = [](const WatchLog& history) {
+    std::vector<std::string> revisions;
+    for (std::uint64_t revision = 1; revision <= history.revision(); ++revision) {
+      WatchLog::Cursor cursor = history.BeginAt(revision, 0);
+      std::string& bytes = revisions.emplace_back();
+      for (DeltaPart part; !part.complete;) {
+        part = history.Next(&cursor, 1 << 12);
+        bytes.append(reinterpret_cast<const char*>(part.points.data()),
+                     part.points.size() * sizeof(double));
+        bytes.append(reinterpret_cast<const char*>(part.added.data()),
+                     part.added.size() * sizeof(std::uint32_t));
+      }
+    }
+    return revisions;
+  };
+  std::uint64_t bytes = 0;
+  {
+    const auto journal = Open();
+    Session session(RecordedSphere(journal->NewMesh(), 0.1));
+    std::thread thread([&] { session.Run(); });
+    const auto worker = FakeWorker::Join(&session.pool());
+    thread.join();
+    before = session.View();
+    wholes = all_of(*session.history());
+    bytes = session.history()->MemoryBytes();
+  }
+  const auto journal = Open();
+  auto meshes = journal->TakeMeshes();
+  const auto budget = std::make_shared<MemoryBudget>(MemoryBudget::Limits{bytes / 2, 0});
+  meshes.at(0).memory = MemoryBudget::Open(budget, "");
+  Session session(std::move(meshes[0]), [](core::Specification) {
+    ADD_FAILURE() << "nobody needs a mesher";
+    return core::Refuse(core::StatusCode::kInvalidArgument, "none");
+  });
+  EXPECT_TRUE(session.Over() && session.HasEnded());
+  EXPECT_EQ(session.history(), nullptr);
+  EXPECT_EQ(session.View().revision, before.revision);
+  EXPECT_EQ(session.PublishedRevision(), before.revision);
+  EXPECT_EQ(session.View().report->certificate.euler_characteristic, 2);
+  EXPECT_EQ(budget->total(), EstimateFinishedBytes(session.options().spec));
+  EXPECT_EQ(session.LoadHistory(), Session::Loading::kNoMemory);
+  EXPECT_EQ(session.history(), nullptr);
+
+  budget->MakeRoomBy([&] { return true; });
+  const auto larger = std::make_shared<MemoryBudget>(MemoryBudget::Limits{2 * bytes, 0});
+  auto again = journal->TakeMeshes();
+  EXPECT_TRUE(again.empty());
+  const auto reopened = [&] {
+    SessionOptions options = session.options();
+    options.memory = MemoryBudget::Open(larger, "");
+    return options;
+  };
+  Session readable(reopened());
+  ASSERT_EQ(readable.LoadHistory(), Session::Loading::kDone);
+  EXPECT_GE(larger->total(), readable.history()->MemoryBytes());
+  EXPECT_TRUE(all_of(*readable.history()) == wholes);
+  {
+    const auto held = readable.history();
+    EXPECT_FALSE(readable.PutAwayHistory(Clock::duration::zero())) << "somebody reads it";
+  }
+  EXPECT_FALSE(readable.PutAwayHistory(std::chrono::hours(1))) << "somebody has just read it";
+  EXPECT_TRUE(readable.PutAwayHistory(Clock::duration::zero()));
+  EXPECT_EQ(readable.history(), nullptr);
+  EXPECT_EQ(larger->total(), EstimateFinishedBytes(session.options().spec));
+  EXPECT_EQ(readable.LoadHistory(), Session::Loading::kDone) << "and back again";
+}
+
+// As a server leaves it that was killed between the end and the result.
+TEST_F(JournalTest, AnEndWithoutItsResultIsReplayedAndThenRecorded) {
+  const Outcome whole = RunMesh(RecordedSphere(nullptr));
+  {
+    const auto journal = Open();
+    RunMesh(RecordedSphere(journal->NewMesh()), 2);
+  }
+  {
+    const auto journal = Open();
+    auto meshes = journal->TakeMeshes();
+    const std::uint64_t rounds = meshes.at(0).record->rounds;
+    ASSERT_FALSE(meshes[0].journal->WriteEnd(
+        {SessionState::kCancelled, std::chrono::system_clock::now(), 1, {}, rounds}));
+  }
+  for (int server = 0; server < 2; ++server) {
+    const auto journal = Open();
+    auto meshes = journal->TakeMeshes();
+    EXPECT_EQ(meshes.at(0).record->result.has_value(), server == 1);
+    const std::uint64_t rounds =
+        server == 0 ? meshes[0].record->rounds : meshes[0].record->result->revision;
+    const Outcome outcome = RunMesh(std::move(meshes[0]), 0, false);
+    EXPECT_EQ(outcome.view.state, SessionState::kCancelled);
+    EXPECT_EQ(outcome.view.revision, rounds);
+    ASSERT_LE(outcome.points.size(), whole.points.size());
+    EXPECT_TRUE(std::equal(outcome.points.begin(), outcome.points.end(), whole.points.begin()));
+  }
+}
+
+// Cancelled at any moment, in the middle of a round too.
+TEST_F(JournalTest, ACancelledMeshStaysAsItWas) {
+  for (const std::uint64_t revision : {1, 2, 3, 5, 8, 10, 12, 14}) {
+    SessionView before;
+    {
+      const auto journal = Open();
+      Session session(RecordedSphere(journal->NewMesh(), 0.1));
+      std::thread thread([&] { session.Run(); });
+      const auto worker = FakeWorker::Join(&session.pool());
+      while (session.View().revision < revision && !session.HasEnded()) std::this_thread::yield();
+      session.Cancel();
+      thread.join();
+      before = session.View();
+    }
+    const auto journal = Open();
+    auto meshes = journal->TakeMeshes();
+    const Outcome after = RunMesh(std::move(meshes.back()), 0, false);
+    EXPECT_EQ(after.view.state, before.state);
+    EXPECT_EQ(after.view.revision, before.revision);
+    EXPECT_EQ(after.view.progress.vertices, before.progress.vertices);
+  }
+}
+
+// Writes as told.
+struct FailingJournal : testing::BlankJournal {
+  std::optional<MeshFailure> WriteRound(const core::QueryBatch& batch, const core::Answers&,
+                                        std::uint64_t) override {
+    if (batch.round < 3) return std::nullopt;
+    return MeshFailure{"JOURNAL_FULL", "no room"};
+  }
+  std::optional<MeshFailure> WriteEnd(const SessionEnd& end) override {
+    state = end.state;
+    return MeshFailure{"JOURNAL_FULL", "no room"};
+  }
+  std::optional<MeshFailure> WriteResult(const SessionResult&, const WatchLog&) override {
+    ADD_FAILURE() << "its end is not recorded";
+    return std::nullopt;
+  }
+  SessionState state{};
+};
+
+TEST(SessionJournal, ARoundThatCannotBeRecordedIsNotPublished) {
+  const auto journal = std::make_shared<FailingJournal>();
+  const Outcome outcome = RunMesh(RecordedSphere(journal));
+  EXPECT_EQ(outcome.view.state, SessionState::kFailed);
+  EXPECT_EQ(outcome.view.failure.reason, "JOURNAL_FULL");
+  EXPECT_EQ(outcome.view.revision, 2u);
+  EXPECT_EQ(journal->state, SessionState::kFailed);
+}
+
+}  // namespace
+}  // namespace stellate::server

@@ -1,0 +1,294 @@
+// Requests to a live server, good and bad, through raw stubs.
+
+#include <limits>
+
+#include "tests/server/support/certificates.h"
+#include "tests/server/support/live_server.h"
+
+namespace stellate::server::testing {
+namespace {
+
+using grpc::StatusCode;
+
+class LiveRequestsTest : public LiveServer {
+ protected:
+  void ExpectRefused(const char* field, StatusCode code,
+                     const std::function<void(v1::MeshSpec*)>& change) {
+    v1::MeshSpec spec = SpecOfSphere();
+    change(&spec);
+    v1::Mesh mesh;
+    const grpc::Status status = Create(spec, &mesh);
+    EXPECT_EQ(status.error_code(), code) << field << ": " << status.error_message();
+    EXPECT_EQ(FieldIn(status), std::string("spec.") + field) << status.error_message();
+    EXPECT_EQ(ReasonIn(status),
+              code == StatusCode::INVALID_ARGUMENT ? "INVALID_ARGUMENT" : "LIMIT_EXCEEDED");
+  }
+};
+
+TEST_F(LiveRequestsTest, BadSpecificationsAreRefusedOneByOne) {
+  Config config;
+  config.max_ambient_dimension = 50;
+  Start(config);
+  const std::string other = CreateSphere();
+  using Spec = v1::MeshSpec;
+  const auto invalid = StatusCode::INVALID_ARGUMENT;
+  ExpectRefused("dimension", invalid, [](Spec* s) { s->set_dimension(0); });
+  ExpectRefused("dimension", invalid, [](Spec* s) { s->set_dimension(3); });
+  ExpectRefused("ambient_dimension", StatusCode::RESOURCE_EXHAUSTED,
+                [](Spec* s) { s->set_ambient_dimension(51); });
+  for (const double epsilon : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(),
+                               std::numeric_limits<double>::infinity()}) {
+    ExpectRefused("epsilon", invalid, [epsilon](Spec* s) { s->set_epsilon(epsilon); });
+  }
+  ExpectRefused("bounding_box", invalid, [](Spec* s) {
+    s->mutable_bounding_box()->mutable_lower()->Swap(s->mutable_bounding_box()->mutable_upper());
+  });
+  ExpectRefused("bounding_box", invalid, [](Spec* s) {
+    *s->mutable_bounding_box()->mutable_upper() = s->bounding_box().lower();
+  });
+  ExpectRefused("bounding_box", invalid, [](Spec* s) { s->clear_bounding_box(); });
+  ExpectRefused("label", invalid, [](Spec* s) { s->set_label(std::string(200, 'x')); });
+  // Nothing of it harmed the mesh beside.
+  RawWorker worker(stub_.get(), other);
+  EXPECT_EQ(WatchToEnd(other).state(), v1::MESH_STATE_SUCCEEDED);
+}
+
+TEST_F(LiveRequestsTest, NamesThatAreNoMeshAreTold) {
+  Start();
+  for (const auto& [name, code, reason] :
+       {std::tuple("meshes/x", StatusCode::INVALID_ARGUMENT, "INVALID_ARGUMENT"),
+        std::tuple("meshes/00000000000000000000000000000000", StatusCode::NOT_FOUND,
+                   "MESH_NOT_FOUND")}) {
+    v1::Mesh mesh;
+    google::protobuf::Empty empty;
+    v1::GetMeshRequest get;
+    get.set_name(name);
+    v1::CancelMeshRequest cancel;
+    cancel.set_name(name);
+    v1::DeleteMeshRequest remove;
+    remove.set_name(name);
+    v1::WatchMeshRequest watch;
+    watch.set_name(name);
+    grpc::ClientContext contexts[4];
+    const auto reader = stub_->WatchMesh(&contexts[3], watch);
+    v1::WatchMeshResponse event;
+    EXPECT_FALSE(reader->Read(&event));
+    const grpc::Status statuses[] = {stub_->GetMesh(&contexts[0], get, &mesh),
+                                     stub_->CancelMesh(&contexts[1], cancel, &mesh),
+                                     stub_->DeleteMesh(&contexts[2], remove, &empty),
+                                     reader->Finish(), RawWorker(stub_.get(), name).Wait()};
+    for (const grpc::Status& status : statuses) {
+      EXPECT_EQ(status.error_code(), code) << status.error_message();
+      EXPECT_EQ(ReasonIn(status), reason);
+    }
+  }
+}
+
+TEST_F(LiveRequestsTest, AMeshIsMadeListedCancelledAndDeleted) {
+  Start();
+  const std::string a = CreateSphere();
+  const std::string b = CreateSphere();
+  EXPECT_EQ(Get(a).state(), v1::MESH_STATE_WAITING);
+  v1::ListMeshesRequest list;
+  list.set_page_size(1);
+  v1::ListMeshesResponse first, second;
+  grpc::ClientContext contexts[5];
+  ASSERT_TRUE(stub_->ListMeshes(&contexts[0], list, &first).ok());
+  ASSERT_EQ(first.meshes_size(), 1);
+  EXPECT_EQ(first.meshes(0).name(), a);
+  list.set_page_token(first.next_page_token());
+  ASSERT_TRUE(stub_->ListMeshes(&contexts[1], list, &second).ok());
+  ASSERT_EQ(second.meshes_size(), 1);
+  EXPECT_EQ(second.meshes(0).name(), b);
+  EXPECT_EQ(second.next_page_token(), "");
+
+  v1::CancelMeshRequest cancel;
+  cancel.set_name(a);
+  v1::Mesh mesh;
+  ASSERT_TRUE(stub_->CancelMesh(&contexts[2], cancel, &mesh).ok());
+  EXPECT_EQ(mesh.state(), v1::MESH_STATE_CANCELLED);
+  const v1::Mesh final = WatchToEnd(a);
+  EXPECT_EQ(final.state(), v1::MESH_STATE_CANCELLED);
+  EXPECT_EQ(final.report().termination(), v1::TERMINATION_CANCELLED);
+  EXPECT_FALSE(final.report().certificate().certified());
+  EXPECT_TRUE(final.has_end_time());
+
+  v1::DeleteMeshRequest remove;
+  remove.set_name(a);
+  google::protobuf::Empty empty;
+  ASSERT_TRUE(stub_->DeleteMesh(&contexts[3], remove, &empty).ok());
+  EXPECT_EQ(stub_->DeleteMesh(&contexts[4], remove, &empty).error_code(), StatusCode::NOT_FOUND);
+  EXPECT_EQ(Get(b).state(), v1::MESH_STATE_WAITING);
+}
+
+TEST_F(LiveRequestsTest, MeshesBeyondTheLimitAreRefused) {
+  Config config;
+  config.max_meshes = 1;
+  Start(config);
+  CreateSphere();
+  v1::Mesh mesh;
+  const grpc::Status status = Create(SpecOfSphere(), &mesh);
+  EXPECT_EQ(status.error_code(), StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(ReasonIn(status), "LIMIT_EXCEEDED");
+  EXPECT_EQ(LimitIn(status), "max-meshes=1 of server");
+}
+
+TEST_F(LiveRequestsTest, EachLimitIsNamedWithItsValue) {
+  Config config;
+  config.max_dimension = 1;
+  config.max_ambient_dimension = 50;
+  config.max_vertices = 1000;
+  config.max_coordinates = 30'000;
+  config.max_rounds = 10;
+  config.max_wait_seconds = 100;
+  Start(config);
+  const auto limit_of = [this](const std::function<void(v1::MeshSpec*)>& change) {
+    v1::MeshSpec spec = SpecOfSphere();
+    change(&spec);
+    v1::Mesh mesh;
+    const grpc::Status status = Create(spec, &mesh);
+    EXPECT_EQ(status.error_code(), StatusCode::RESOURCE_EXHAUSTED) << status.error_message();
+    EXPECT_EQ(ReasonIn(status), "LIMIT_EXCEEDED");
+    const std::string limit = LimitIn(status);
+    EXPECT_NE(status.error_message().find("--" + limit.substr(0, limit.find('='))),
+              std::string::npos)
+        << status.error_message();
+    return limit;
+  };
+  EXPECT_EQ(limit_of([](v1::MeshSpec*) {}), "max-dimension=1 of mesh");
+  const auto limit_of_curve = [&](const std::function<void(v1::MeshSpec*)>& change) {
+    return limit_of([&change](v1::MeshSpec* spec) {
+      spec->set_dimension(1);
+      change(spec);
+    });
+  };
+  EXPECT_EQ(limit_of_curve([](v1::MeshSpec* s) { s->set_ambient_dimension(51); }),
+            "max-ambient-dimension=50 of mesh");
+  EXPECT_EQ(limit_of_curve([](v1::MeshSpec* s) { s->mutable_limits()->set_max_vertices(1001); }),
+            "max-vertices=1000 of mesh");
+  EXPECT_EQ(limit_of_curve([](v1::MeshSpec* s) { s->mutable_limits()->set_max_rounds(11); }),
+            "max-rounds=10 of mesh");
+  EXPECT_EQ(limit_of_curve([](v1::MeshSpec* s) { s->mutable_limits()->set_answer_seconds(101); }),
+            "max-wait=100 of mesh");
+}
+
+// Not a mesh that ends at once as JOURNAL_FULL.
+TEST_F(LiveRequestsTest, WithoutRoomInTheRecordThereIsNoNewMesh) {
+  const ScratchDirectory directory;
+  Config config;
+  config.data_dir = directory / "data";
+  config.max_journal_bytes = 500'000;
+  config.max_meshes = 1000;
+  Start(config);
+  v1::MeshSpec spec = SpecOfSphere();
+  const std::vector<double> seeds(3 * 3000, 1.0);
+  ToProto(seeds.data(), {3000, 3}, spec.mutable_seeds());
+  std::vector<std::string> names;
+  grpc::Status status;
+  while (status.ok()) {
+    v1::Mesh mesh;
+    status = Create(spec, &mesh);
+    if (status.ok()) names.push_back(mesh.name());
+  }
+  EXPECT_EQ(status.error_code(), StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(ReasonIn(status), "LIMIT_EXCEEDED");
+  EXPECT_EQ(LimitIn(status), "max-journal-bytes=500000 of server");
+  EXPECT_NE(status.error_message().find("delete meshes"), std::string::npos);
+  for (const std::string& name : names) {
+    grpc::ClientContext context;
+    v1::DeleteMeshRequest request;
+    request.set_name(name);
+    google::protobuf::Empty empty;
+    EXPECT_TRUE(stub_->DeleteMesh(&context, request, &empty).ok());
+  }
+  v1::Mesh mesh;
+  while (!Create(spec, &mesh).ok()) std::this_thread::yield();  // the removal is another thread's
+  server_.reset();                                              // before its directory goes
+}
+
+TEST_F(LiveRequestsTest, WithoutMemoryLeftThereIsNoNewMesh) {
+  Config config;
+  config.max_memory_bytes = 1000;
+  Start(config);
+  v1::Mesh mesh;
+  const grpc::Status status = Create(SpecOfSphere(), &mesh);
+  EXPECT_EQ(status.error_code(), StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(LimitIn(status), "max-memory-bytes=1000 of server");
+}
+
+TEST_F(LiveRequestsTest, AMeshThatOutgrowsTheMemoryFailsAlone) {
+  Config config;
+  config.max_memory_bytes = 1'200'000;
+  Start(config);
+  const std::string large = CreateSphere(0.02);
+  {
+    RawWorker worker(stub_.get(), large);
+    const v1::Mesh mesh = WatchToEnd(large);
+    EXPECT_EQ(mesh.state(), v1::MESH_STATE_FAILED);
+    EXPECT_EQ(mesh.report().failure().reason(), "LIMIT_EXCEEDED");
+    EXPECT_NE(mesh.report().failure().message().find("--max-memory-bytes"), std::string::npos);
+    EXPECT_TRUE(worker.Wait().ok());
+  }
+  grpc::ClientContext context;
+  v1::DeleteMeshRequest request;
+  request.set_name(large);
+  google::protobuf::Empty empty;
+  ASSERT_TRUE(stub_->DeleteMesh(&context, request, &empty).ok());
+  // Soon: what the large one held counts until it has been taken apart.
+  for (v1::Mesh mesh; mesh.state() != v1::MESH_STATE_SUCCEEDED;) {
+    const grpc::Status status = Create(SpecOfSphere(), &mesh);
+    if (!status.ok()) {
+      ASSERT_EQ(LimitIn(status), "max-memory-bytes=1200000 of server");
+      continue;
+    }
+    RawWorker worker(stub_.get(), mesh.name());
+    mesh = WatchToEnd(mesh.name());
+    if (mesh.state() == v1::MESH_STATE_FAILED) {
+      ASSERT_EQ(mesh.report().failure().reason(), "LIMIT_EXCEEDED");
+    }
+  }
+}
+
+TEST_F(LiveRequestsTest, AMessageOverTheLimitIsRefusedAndTheServerGoesOn) {
+  Start();
+  v1::MeshSpec spec = SpecOfSphere();
+  spec.mutable_seeds()->mutable_data()->assign(std::size_t{5} << 20, '\0');
+  v1::Mesh mesh;
+  EXPECT_EQ(Create(spec, &mesh).error_code(), StatusCode::RESOURCE_EXHAUSTED);
+  const std::string name = CreateSphere();
+  RawWorker huge(stub_.get(), name, [](const v1::QueryChunk& queries) {
+    v1::ServeOracleRequest request;
+    request.mutable_answers()->set_lease(queries.lease());
+    request.mutable_answers()->set_found(std::string(std::size_t{5} << 20, '\1'));
+    return std::optional(request);
+  });
+  EXPECT_FALSE(huge.Wait().ok());
+  RawWorker worker(stub_.get(), name);
+  EXPECT_EQ(WatchToEnd(name).state(), v1::MESH_STATE_SUCCEEDED);
+}
+
+TEST_F(LiveRequestsTest, ServerInfoStatesTheLimits) {
+  Config config;
+  config.max_meshes = 3;
+  config.max_ambient_dimension = 17;
+  Start(config);
+  grpc::ClientContext context;
+  v1::ServerInfo info;
+  ASSERT_TRUE(stub_->GetServerInfo(&context, {}, &info).ok());
+  EXPECT_EQ(info.version(), Version());
+  ASSERT_EQ(info.protocols_size(), 1);
+  EXPECT_EQ(info.protocols(0), "stellate.v1");
+  EXPECT_EQ(info.max_meshes(), 3u);
+  EXPECT_EQ(info.max_ambient_dimension(), 17u);
+  EXPECT_EQ(info.max_dimension(), static_cast<unsigned>(core::kMaxDimension));
+  EXPECT_EQ(info.max_message_bytes(), config.max_message_bytes);
+  EXPECT_EQ(info.owner_meshes(), config.owner_meshes);
+  EXPECT_EQ(info.max_workers(), config.max_workers);
+  EXPECT_EQ(info.max_watchers(), config.max_watchers);
+  EXPECT_EQ(info.check_share(), config.check_share);
+  EXPECT_GT(info.max_memory_bytes(), 0u) << "a part of the machine's";
+  EXPECT_EQ(info.owner_memory_bytes(), info.max_memory_bytes() / 2);
+}
+
+}  // namespace
+}  // namespace stellate::server::testing
