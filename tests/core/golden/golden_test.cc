@@ -1,0 +1,257 @@
+// Runs held against their records, a file each in this directory: a change of behaviour is a diff
+// of these, which somebody has to read and to explain. `golden_test --rewrite` records anew.
+
+#include <gtest/gtest.h>
+
+#include <cinttypes>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tests/core/golden/golden_cases.h"
+
+namespace stellate::core {
+namespace {
+
+using testing::Answerer;
+using testing::AnswererFor;
+using testing::GoldenCase;
+
+bool rewrite = false;
+
+// FNV-1a over the bytes of what is added.
+class Digest {
+ public:
+  Digest& Add(const void* bytes, std::size_t size) {
+    const auto* at = static_cast<const unsigned char*>(bytes);
+    for (std::size_t i = 0; i < size; ++i) hash_ = (hash_ ^ at[i]) * 0x100000001b3ull;
+    return *this;
+  }
+  template <typename T>
+  Digest& Add(const T& value) {
+    static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T>);
+    return Add(&value, sizeof(value));
+  }
+  template <typename T>
+  Digest& Add(const std::vector<T>& values) {
+    return Add(values.size()).Add(values.data(), values.size() * sizeof(T));
+  }
+  template <int R, int C>
+  Digest& Add(const Eigen::Matrix<double, R, C>& m) {
+    return Add(m.rows()).Add(m.cols()).Add(m.data(),
+                                           static_cast<std::size_t>(m.size()) * sizeof(double));
+  }
+  std::string Hex() const {
+    char text[20];
+    std::snprintf(text, sizeof(text), "%016" PRIx64, hash_);
+    return text;
+  }
+
+ private:
+  std::uint64_t hash_ = 0xcbf29ce484222325ull;
+};
+
+Digest DigestOf(const QueryBatch& batch) {
+  Digest digest;
+  for (const QueryBlock& block : batch.blocks)
+    digest.Add(block.kind)
+        .Add(block.points)
+        .Add(block.bases)
+        .Add(block.radii)
+        .Add(block.want_tangents)
+        .Add(block.want_sizes);
+  return digest;
+}
+
+Digest DigestOf(const Progress& p) {
+  return Digest()
+      .Add(p.phase)
+      .Add(p.round)
+      .Add(p.queries)
+      .Add(p.vertices)
+      .Add(p.simplices)
+      .Add(p.unbounded_stars)
+      .Add(p.bad_size)
+      .Add(p.bad_radius_edge)
+      .Add(p.bad_sliver)
+      .Add(p.bad_inconsistent)
+      .Add(p.fraction);
+}
+
+std::string Number(double value) {
+  char text[40];
+  std::snprintf(text, sizeof(text), "%.17g", value);
+  return text;
+}
+
+void WriteEnd(const Report& report, std::ostream& out) {
+  const Counts& n = report.counts;
+  const Certificate& c = report.certificate;
+  out << "ended " << TerminationName(report.termination) << ' '
+      << StatusCodeName(report.failure.code) << ' ' << CertificateLevelName(c.level) << '\n'
+      << "failure " << report.failure.message << '\n'
+      << "counts " << n.vertices << ' ' << n.simplices << ' ' << n.rounds << ' ' << n.queries << ' '
+      << n.tangent_queries << ' ' << n.inserted_size << ' ' << n.inserted_radius_edge << ' '
+      << n.inserted_sliver << ' ' << n.inserted_inconsistent << ' ' << n.duplicates << '\n'
+      << "mesh " << c.components << ' ' << c.euler_characteristic << ' ' << c.inconsistent_simplices
+      << ' ' << Number(c.max_circumradius) << ' ' << Number(c.estimated_reach) << ' '
+      << Number(c.epsilon_over_reach) << '\n'
+      << "verdict " << c.verdict << '\n';
+  for (const std::string& warning : c.warnings) out << "warning " << warning << '\n';
+}
+
+// What a run does, a line a round, and how it ends.
+std::string Record(const GoldenCase& c, int threads) {
+  const auto manifold = testing::Make(c.manifold);
+  Specification spec = testing::SpecificationFor(*manifold, c.epsilon);
+  c.change(spec);
+  spec.threads = threads;
+  const auto mesher = testing::NewMesher(spec);
+  const Answerer answer = AnswererFor(*manifold);
+  std::ostringstream out;
+  out << "# " << c.what << "\n# round queries vertices simplices; digests of queries, new points,"
+      << " their tangents, delta, progress\n";
+  while (const QueryBatch* batch = mesher->NextBatch()) {
+    const std::uint64_t round = batch->round;
+    if (round == c.cancel_before) {
+      mesher->Cancel();
+      continue;
+    }
+    if (round == c.fail_before) {
+      mesher->Fail({StatusCode::kOracleFailed, "the oracle has gone"});
+      continue;
+    }
+    if (round == c.interrupt_before) mesher->Interrupt();
+    const Eigen::Index queries = batch->size();
+    const Digest asked = DigestOf(*batch);
+    const Answers good = answer(*batch);
+    Answers given = good;
+    if (c.spoil) c.spoil(spec, *batch, given);
+    auto delta = mesher->Absorb(given);
+    if (!delta) {
+      out << "refused " << StatusCodeName(delta.error().code) << ' ' << delta.error().message
+          << '\n';
+      if (delta.error().code == StatusCode::kCancelled) {
+        mesher->Cancel();
+        continue;
+      }
+      EXPECT_EQ(DigestOf(*mesher->NextBatch()).Hex(), asked.Hex());
+      delta = mesher->Absorb(good);
+      if (!delta) return out.str() + "refused again " + delta.error().message + '\n';
+    }
+    const Eigen::MatrixXd tangents = mesher->Tangents().rightCols(delta->points.cols());
+    const Progress& progress = mesher->progress();
+    out << round << ' ' << queries << ' ' << progress.vertices << ' ' << progress.simplices << ' '
+        << asked.Hex() << ' ' << Digest().Add(delta->points).Hex() << ' '
+        << Digest().Add(tangents).Hex() << ' '
+        << Digest()
+               .Add(delta->revision)
+               .Add(delta->first_vertex)
+               .Add(delta->added)
+               .Add(delta->removed)
+               .Hex()
+        << ' ' << DigestOf(progress).Hex() << '\n';
+  }
+  out << "whole mesh " << Digest().Add(mesher->Points()).Hex() << ' '
+      << Digest().Add(mesher->Tangents()).Hex() << ' ' << Digest().Add(mesher->Simplices()).Hex()
+      << ' ' << DigestOf(mesher->progress()).Hex() << '\n';
+  WriteEnd(mesher->report(), out);
+  return out.str();
+}
+
+// What this machine computes where IEEE 754 leaves it a choice: the C library's functions, and
+// whether products and sums are fused. Records can be held to the last bit only where that is as
+// it was on the machine that recorded them.
+std::string Arithmetic() {
+  Digest digest;
+  volatile double x = 0.1;
+  for (int i = 0; i < 2000; ++i) {
+    const double y = std::pow(x * i, 1.5) * std::sin(x * i) + std::cos(x * i);
+    digest.Add(y).Add(std::exp(-x * i) + std::log(1 + x * i)).Add(x * i * y + x);
+  }
+  return digest.Hex() + '\n';
+}
+
+std::string Path(std::string_view name) {
+  return std::string(STELLATE_GOLDEN_DIR) + '/' + std::string(name) + ".txt";
+}
+
+std::string ReadFile(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+void WriteFile(const std::string& path, const std::string& text) {
+  std::ofstream out(path, std::ios::binary);
+  out << text;
+  ASSERT_TRUE(out.flush()) << "cannot write " << path;
+}
+
+bool ComputesAsRecorded() { return ReadFile(Path("arithmetic")) == Arithmetic(); }
+
+std::vector<std::string> Lines(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  return lines;
+}
+
+// On a machine that rounds otherwise no more than how the run ended is compared.
+std::vector<std::string> HowItEnded(const std::string& record) {
+  std::vector<std::string> ending;
+  for (const std::string& line : Lines(record))
+    if (line.starts_with("ended ")) ending.push_back(line);
+  return ending;
+}
+
+void ExpectRecorded(const std::string& path, const std::string& now) {
+  const std::string then = ReadFile(path);
+  ASSERT_FALSE(then.empty()) << "no record " << path << "; golden_test --rewrite writes it";
+  const bool exact = ComputesAsRecorded();
+  const auto was = exact ? Lines(then) : HowItEnded(then);
+  const auto is = exact ? Lines(now) : HowItEnded(now);
+  for (std::size_t i = 0; i < std::max(was.size(), is.size()); ++i) {
+    const std::string a = i < was.size() ? was[i] : "(no such line)";
+    const std::string b = i < is.size() ? is[i] : "(no such line)";
+    ASSERT_EQ(a, b) << "line " << i + 1 << " of " << path
+                    << " is the first that differs. If that is meant, record anew with "
+                       "golden_test --rewrite and say why in the commit.";
+  }
+}
+
+class GoldenFiles : public ::testing::TestWithParam<GoldenCase> {};
+
+TEST_P(GoldenFiles, TellWhatTheMesherDoes) {
+  const GoldenCase& c = GetParam();
+  const std::string one = Record(c, 1);
+  if (rewrite) WriteFile(Path(c.name), one);
+  ExpectRecorded(Path(c.name), one);
+  EXPECT_EQ(Record(c, 4), one) << "4 threads";
+}
+
+INSTANTIATE_TEST_SUITE_P(Recorded, GoldenFiles, ::testing::ValuesIn(testing::golden::Cases()),
+                         [](const auto& tested) { return tested.param.name; });
+
+}  // namespace
+}  // namespace stellate::core
+
+int main(int argc, char** argv) {
+  using namespace stellate::core;
+  ::testing::InitGoogleTest(&argc, argv);
+  for (int i = 1; i < argc; ++i) rewrite = rewrite || std::string_view(argv[i]) == "--rewrite";
+  if (rewrite) {
+    WriteFile(Path("arithmetic"), Arithmetic());
+  } else if (!ComputesAsRecorded()) {
+    std::puts(
+        "This machine's floating-point functions round otherwise than the recording one's: "
+        "only how each run ends is compared.");
+  }
+  return RUN_ALL_TESTS();
+}
