@@ -1,0 +1,133 @@
+// The client's copy of a mesh that grows by deltas.
+import type { DeltaChunk__Output } from "./generated/stellate/v1/DeltaChunk.js";
+import type { MeshDelta__Output } from "./generated/stellate/v1/MeshDelta.js";
+import { protocolError } from "./errors.js";
+import { joined, sameRow, sortedOrder, takeRows } from "./rows.js";
+import { indices, numbers } from "./wire.js";
+
+const UNSETTLED = 300_000; // vertex numbers of removed simplices at least; else half of those there
+
+/**
+ * Vertices and simplices as of the last complete revision. What comes and goes is put aside, and
+ * settled for many revisions at once. Everything throws a StellateError "PROTOCOL" where a delta does
+ * not fit what came before.
+ */
+export class GrowingComplex {
+  revision = 0;
+  private count = 0;
+  private coordinates = new Float64Array(1024);
+  private rows: Uint32Array = new Uint32Array(); // in lexicographic order
+  private added: Uint32Array[] = [];
+  private removed: Uint32Array[] = [];
+  private removedLength = 0;
+  private pending: MeshDelta__Output[] = [];
+
+  constructor(
+    private readonly k: number,
+    private readonly d: number,
+  ) {}
+
+  /** Takes one chunk; true when a revision is complete with it. */
+  absorb(chunk: DeltaChunk__Output): boolean {
+    const delta = chunk.delta;
+    if (!delta) throw protocolError("a chunk without its delta");
+    const begun = this.pending.at(-1)?.revision ?? delta.revision;
+    if (delta.revision <= this.revision || begun !== delta.revision) {
+      throw protocolError(`revision ${delta.revision} is out of order`);
+    }
+    this.pending.push(delta);
+    if (!chunk.complete) return false;
+    const whole = this.pending;
+    this.pending = [];
+    try {
+      for (const part of whole) this.addPoints(part.firstVertex, numbers(part.points, -1, this.d));
+      for (const part of whole) this.change(part);
+    } catch (error) {
+      throw error instanceof RangeError ? protocolError(error.message) : error;
+    }
+    if (this.removedLength > Math.max(UNSETTLED, this.rows.length / 2)) this.settle();
+    this.revision = delta.revision;
+    return true;
+  }
+
+  /** Drops the chunks of a revision that was cut short: it will be sent again. */
+  forgetPending(): void {
+    this.pending = [];
+  }
+
+  /** Back to the empty mesh. What was given out stays what it is. */
+  reset(): void {
+    this.revision = this.count = this.removedLength = 0;
+    this.coordinates = new Float64Array(1024);
+    this.rows = new Uint32Array();
+    this.added = [];
+    this.removed = [];
+    this.pending = [];
+  }
+
+  /** [n, d]; vertices never change, so it stays true while the mesh grows. */
+  points(): Float64Array {
+    return this.coordinates.subarray(0, this.count * this.d);
+  }
+
+  /** [m, k+1], ids ascending in each row, rows in lexicographic order. */
+  simplices(): Uint32Array {
+    this.settle();
+    return this.rows;
+  }
+
+  /** Makes simplices() cheap. */
+  settle(): void {
+    if (!this.added.length && !this.removed.length) return;
+    const width = this.k + 1;
+    const all = joined([this.rows, ...this.added, ...this.removed]);
+    const total = all.length / width;
+    const firstRemoved = total - this.removedLength / width;
+    const order = sortedOrder(all, width);
+    const left: number[] = [];
+    for (let i = 0; i < total;) {
+      let there = 0;
+      const row = order[i];
+      for (; i < total && sameRow(all, width, row, order[i]); i++) {
+        there += order[i] < firstRemoved ? 1 : -1;
+      }
+      if (there < 0) throw protocolError("a delta removes simplices that are not there");
+      if (there > 1) throw protocolError("a delta adds simplices that are there already");
+      if (there) left.push(row);
+    }
+    this.rows = takeRows(all, width, left);
+    this.added = [];
+    this.removed = [];
+    this.removedLength = 0;
+  }
+
+  private change(delta: MeshDelta__Output): void {
+    const added = indices(delta.added, -1, this.k + 1);
+    const removed = indices(delta.removed, -1, this.k + 1);
+    for (const id of added) {
+      if (id >= this.count) {
+        throw protocolError(`a simplex has vertex ${id} of ${this.count} vertices`);
+      }
+    }
+    if (added.length) this.added.push(added);
+    if (removed.length) this.removed.push(removed);
+    this.removedLength += removed.length;
+  }
+
+  /** New vertices, the first with that id. */
+  addPoints(first: number, block: Float64Array): void {
+    if (!block.length) return;
+    if (first !== this.count) {
+      throw protocolError(`a delta starts at vertex ${first}, and there are ${this.count}`);
+    }
+    const begin = first * this.d;
+    const end = begin + block.length;
+    if (end > this.coordinates.length) {
+      const larger = new Float64Array(Math.max(end, 2 * this.coordinates.length));
+      larger.set(this.points());
+      this.coordinates = larger;
+    }
+    this.coordinates.set(block, begin);
+    this.count = end / this.d;
+  }
+}

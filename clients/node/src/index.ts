@@ -1,0 +1,13 @@
+// Meshes of smooth manifolds of any dimension, known through oracles alone.
+export { Client, type ClientOptions } from "./client.js";
+export type { Credentials } from "./credentials.js";
+export * from "./errors.js";
+export { ProductOfCircles, Torus } from "./manifolds.js";
+export { checkSave, Mesh } from "./mesh.js";
+export type { Found, Oracle } from "./oracle.js";
+export { progressBar } from "./progress.js";
+export { type MeshInfo, type Progress, type Report, reportText } from "./report.js";
+export { findStellated, Server } from "./server.js";
+export { type Connection, download, mesh, type RunOptions, serve, watch } from "./session.js";
+export type { MeshOptions } from "./spec.js";
+export { Worker, type WorkerOptions } from "./worker.js";

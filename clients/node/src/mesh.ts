@@ -1,0 +1,95 @@
+// A mesh, finished or growing.
+import { rename, writeFile } from "node:fs/promises";
+import { extname } from "node:path";
+import { SaveError } from "./errors.js";
+import { orient } from "./orientation.js";
+import type { Progress, Report } from "./report.js";
+
+/** A simplicial k-complex in R^d. */
+export class Mesh {
+  constructor(
+    /** k */
+    readonly dimension: number,
+    /** d */
+    readonly ambientDimension: number,
+    /** [n, d], one point after the other. */
+    readonly points: Float64Array,
+    /** [m, k+1], zero-based, ids ascending in each row, rows in lexicographic order. */
+    readonly simplices: Uint32Array,
+    /** One for each round that changed the mesh. */
+    readonly revision: number,
+    /** How it stood at this revision. */
+    readonly progress?: Progress,
+    /** How it ended and what is proved; not there while it grows. */
+    readonly report?: Report,
+  ) {}
+
+  get vertexCount(): number {
+    return this.points.length / this.ambientDimension;
+  }
+
+  get simplexCount(): number {
+    return this.simplices.length / (this.dimension + 1);
+  }
+
+  /** Whether the mesh is finished and proved good. */
+  get certified(): boolean {
+    return this.report?.certified ?? false;
+  }
+
+  /** The simplices with vertices exchanged so that neighbours agree; undefined if not orientable. */
+  orientedSimplices(): Uint32Array | undefined {
+    return orient(this.simplices, this.dimension + 1);
+  }
+
+  /**
+   * Writes .txt (any k and d, exact: "k d nv ns", coordinates, ids from zero) or .obj (curves and
+   * surfaces, d <= 3, oriented where that can be). `stellate download` writes the other formats.
+   * Throws SaveError for what the format cannot hold.
+   */
+  async save(path: string): Promise<void> {
+    checkSave(path, this.dimension, this.ambientDimension);
+    const text = extname(path) === ".txt" ? this.toTxt() : this.toObj();
+    const part = `${path}.part`; // the file takes its name when it is whole
+    await writeFile(part, text);
+    await rename(part, path);
+  }
+
+  private toTxt(): string {
+    const [k, d] = [this.dimension, this.ambientDimension];
+    const head = `${k} ${d} ${this.vertexCount} ${this.simplexCount}`;
+    return [head, ...lines(this.points, d), ...lines(this.simplices, k + 1), ""].join("\n");
+  }
+
+  private toObj(): string {
+    const d = this.ambientDimension;
+    const fill = d === 2 ? " 0" : "";
+    const letter = this.dimension === 1 ? "l" : "f";
+    const ids = (this.orientedSimplices() ?? this.simplices).map((id) => id + 1);
+    const vertices = lines(this.points, d).map((line) => `v ${line}${fill}`);
+    const cells = lines(ids, this.dimension + 1).map((line) => `${letter} ${line}`);
+    return [...vertices, ...cells, ""].join("\n");
+  }
+}
+
+/** Throws SaveError if a mesh of that kind cannot be saved under the name. */
+export function checkSave(path: string, k: number, d: number): void {
+  const ending = extname(path);
+  if (ending === ".txt") return;
+  if (ending !== ".obj") {
+    throw new SaveError(
+      `${path} has to end in .txt or .obj; "stellate download" writes the other formats`,
+    );
+  }
+  if (k > 2 || d > 3) {
+    throw new SaveError(`.obj holds curves and surfaces in the plane and in space: take .txt`);
+  }
+}
+
+function lines(values: Float64Array | Uint32Array, width: number): string[] {
+  const rows: string[] = [];
+  for (let i = 0; i < values.length; i += width) {
+    rows.push(values.subarray(i, i + width).join(" "));
+  }
+  return rows;
+}

@@ -1,0 +1,171 @@
+// What a manifold has to answer, and the checks that answers pass before they are sent.
+import { InvalidArgument, OracleError } from "./errors.js";
+
+/** Points, and where they were found: one byte a point, 1 or 0. */
+export interface Found {
+  points: Float64Array;
+  found: Uint8Array;
+}
+
+type Soon<T> = T | Promise<T>;
+
+/**
+ * A compact smooth k-submanifold M of R^d without boundary, 1 <= k < d.
+ *
+ * Every method takes and returns whole batches, one point after the other, and may be async. The
+ * answer to a query must not depend on the rest of its batch.
+ */
+export interface Oracle {
+  /** k */
+  dimension: number;
+  /** d */
+  ambientDimension: number;
+  /** Where to look for M: two corners; or `seeds`. */
+  boundingBox?: [ArrayLike<number>, ArrayLike<number>];
+  /** [m, d], points near M, one at least on each component. */
+  seeds?: Float64Array;
+  /** [n, d] -> [n, d]: a point of M nearest to each; `Found` where some have none. */
+  closestPoint(points: Float64Array, n: number): Soon<Float64Array | Found>;
+  /**
+   * The point of M nearest to each center [n, d] in the flat through it that is orthogonal to the
+   * columns of its basis [n, d, k], within the radius [n].
+   */
+  intersectFlat?(
+    centers: Float64Array,
+    bases: Float64Array,
+    radii: Float64Array,
+    n: number,
+  ): Soon<Found>;
+  /** At points of M: [n, d] -> [n, d, k], orthonormal columns. */
+  tangentBasis?(points: Float64Array, n: number): Soon<Float64Array>;
+  /** At points of M: [n, d] -> [n], the local feature size or any positive lengths of yours. */
+  localSize?(points: Float64Array, n: number): Soon<Float64Array>;
+}
+
+/** Throws InvalidArgument for an oracle that cannot be one. */
+export function checkOracle(oracle: Oracle): void {
+  for (const name of ["dimension", "ambientDimension"] as const) {
+    const value: unknown = oracle[name];
+    if (!Number.isInteger(value)) {
+      throw new InvalidArgument(`the oracle's ${name} has to be a whole number: ${String(value)}`);
+    }
+  }
+  if (typeof oracle.closestPoint !== "function") {
+    throw new InvalidArgument("the oracle has no method closestPoint(points, n)");
+  }
+  const d = oracle.ambientDimension;
+  for (const corner of oracle.boundingBox ?? []) {
+    if (corner.length !== d) {
+      throw new InvalidArgument(`boundingBox has a corner of ${corner.length} numbers, not ${d}`);
+    }
+  }
+  if (oracle.seeds && oracle.seeds.length % d !== 0) {
+    throw new InvalidArgument(`${oracle.seeds.length} numbers are no seeds in R^${d}`);
+  }
+}
+
+/** An oracle as the server sees it: shapes and finiteness are checked, with clear words. */
+export class CheckedOracle {
+  readonly k: number;
+  readonly d: number;
+
+  constructor(private readonly oracle: Oracle) {
+    checkOracle(oracle);
+    this.k = oracle.dimension;
+    this.d = oracle.ambientDimension;
+  }
+
+  get capabilities() {
+    return {
+      intersectFlat: this.oracle.intersectFlat !== undefined,
+      tangentBasis: this.oracle.tangentBasis !== undefined,
+      localSize: this.oracle.localSize !== undefined,
+    };
+  }
+
+  async closestPoints(points: Float64Array, n: number): Promise<Found> {
+    const answer = await this.oracle.closestPoint(points, n);
+    return this.checked("closestPoint", answer, n);
+  }
+
+  async intersections(
+    centers: Float64Array,
+    bases: Float64Array,
+    radii: Float64Array,
+    n: number,
+  ): Promise<Found> {
+    const answer = await this.oracle.intersectFlat?.(centers, bases, radii, n);
+    return this.checked("intersectFlat", answer, n);
+  }
+
+  /** [n, d, k]; rows that were not found hold any basis. */
+  async tangents(answer: Found, n: number): Promise<Float64Array> {
+    const anywhere = new Float64Array(this.d * this.k);
+    for (let a = 0; a < this.k; a++) anywhere[a * this.k + a] = 1;
+    return this.atFound("tangentBasis", answer, n, anywhere);
+  }
+
+  /** [n]; rows that were not found hold any size. */
+  async sizes(answer: Found, n: number): Promise<Float64Array> {
+    return this.atFound("localSize", answer, n, Float64Array.of(1));
+  }
+
+  private async atFound(
+    method: "tangentBasis" | "localSize",
+    { points, found }: Found,
+    n: number,
+    anywhere: Float64Array,
+  ): Promise<Float64Array> {
+    const rows: number[] = [];
+    for (let i = 0; i < n; i++) if (found[i]) rows.push(i);
+    const everywhere = rows.length === n;
+    const d = this.d;
+    let asked = points;
+    if (!everywhere) {
+      asked = new Float64Array(rows.length * d);
+      rows.forEach((row, i) => asked.set(points.subarray(row * d, row * d + d), i * d));
+    }
+    const width = anywhere.length;
+    const answer = rows.length ? await this.oracle[method]?.(asked, rows.length) : asked;
+    const values = numbersOf(method, answer, rows.length, width);
+    values.forEach((value, i) => {
+      if (!Number.isFinite(value)) throw notFinite(method, Math.floor(i / width), value);
+    });
+    if (everywhere) return values;
+    const spread = new Float64Array(n * width);
+    for (let i = 0; i < n; i++) spread.set(anywhere, i * width);
+    rows.forEach((row, i) => spread.set(values.subarray(i * width, (i + 1) * width), row * width));
+    return spread;
+  }
+
+  private checked(method: string, answer: Float64Array | Found | undefined, n: number): Found {
+    const all = answer instanceof Float64Array || answer === undefined;
+    const points = numbersOf(method, all ? answer : answer.points, n, this.d);
+    const found = all ? new Uint8Array(n).fill(1) : answer.found;
+    if (!(found instanceof Uint8Array) || found.length !== n) {
+      throw new OracleError(`${method}: found has to be a Uint8Array of ${n}`, {
+        reason: "ORACLE_SHAPE",
+      });
+    }
+    for (let i = 0; i < points.length; i++) {
+      const row = Math.floor(i / this.d);
+      if (!Number.isFinite(points[i]) && found[row]) throw notFinite(method, row, points[i]);
+    }
+    return { points, found };
+  }
+}
+
+function numbersOf(method: string, value: unknown, n: number, width: number): Float64Array {
+  if (value instanceof Float64Array && value.length === n * width) return value;
+  const got = value instanceof Float64Array ? `${value.length} numbers` : typeof value;
+  throw new OracleError(
+    `${method} returned ${got}; for ${n} points it has to be a Float64Array of ${n * width}`,
+    { reason: "ORACLE_SHAPE" },
+  );
+}
+
+function notFinite(method: string, row: number, value: number): OracleError {
+  return new OracleError(`${method} returned ${value} for point ${row} of its batch`, {
+    reason: "ORACLE_NOT_FINITE",
+  });
+}

@@ -1,0 +1,99 @@
+// How a mesh stands, how it ended, and what was proved of it: the protocol's messages, with
+// enumerators as names without their prefix.
+import type { Certificate__Output } from "./generated/stellate/v1/Certificate.js";
+import type { Counts__Output } from "./generated/stellate/v1/Counts.js";
+import type { Failure__Output } from "./generated/stellate/v1/Failure.js";
+import type { Mesh__Output } from "./generated/stellate/v1/Mesh.js";
+import type { Progress__Output } from "./generated/stellate/v1/Progress.js";
+import type { Report__Output } from "./generated/stellate/v1/Report.js";
+import { enumName } from "./wire.js";
+
+/** A picture of a mesh at work. `phase` is "SEEDING", "REFINING", "CERTIFYING" or "DONE". */
+export type Progress = Omit<Progress__Output, "phase"> & { phase: string };
+/** `level` is "REFUSED", "SAMPLED" or "PROVED". */
+export type Certificate = Omit<Certificate__Output, "level"> & { level: string };
+
+export interface Report {
+  /** "CONVERGED", "VERTEX_BUDGET", "ROUND_BUDGET", "CANCELLED", "ORACLE_FAILED", "NO_PROGRESS" */
+  termination: string;
+  certified: boolean;
+  /** In plain words; the first thing wrong if not certified. */
+  verdict: string;
+  failure?: Failure__Output;
+  counts?: Counts__Output;
+  certificate?: Certificate;
+  elapsedSeconds: number;
+}
+
+/** A mesh on the server, without its geometry. */
+export interface MeshInfo {
+  name: string;
+  /** "WAITING", "RUNNING", "SUCCEEDED", "STOPPED", "CANCELLED" or "FAILED" */
+  state: string;
+  label: string;
+  dimension: number;
+  ambientDimension: number;
+  epsilon: number;
+  over: boolean;
+  revision: number;
+  progress?: Progress;
+  report?: Report;
+  workers: number;
+  watchers: number;
+}
+
+export function progressFrom(message: Progress__Output): Progress {
+  return { ...message, phase: enumName(message.phase, "PHASE_") };
+}
+
+export function reportFrom(message: Report__Output): Report {
+  const proved = message.certificate;
+  return {
+    termination: enumName(message.termination, "TERMINATION_"),
+    certified: proved?.certified ?? false,
+    verdict: proved?.verdict ?? message.failure?.message ?? "",
+    failure: message.failure ?? undefined,
+    counts: message.counts ?? undefined,
+    certificate: proved
+      ? { ...proved, level: enumName(proved.level, "CERTIFICATE_LEVEL_") }
+      : undefined,
+    elapsedSeconds: message.elapsedSeconds,
+  };
+}
+
+export function infoFrom(mesh: Mesh__Output): MeshInfo {
+  return {
+    name: mesh.name,
+    state: enumName(mesh.state, "MESH_STATE_"),
+    label: mesh.spec?.label ?? "",
+    dimension: mesh.spec?.dimension ?? 0,
+    ambientDimension: mesh.spec?.ambientDimension ?? 0,
+    epsilon: mesh.spec?.epsilon ?? 0,
+    over: mesh.endTime != null,
+    revision: mesh.revision,
+    progress: mesh.progress ? progressFrom(mesh.progress) : undefined,
+    report: mesh.report ? reportFrom(mesh.report) : undefined,
+    workers: mesh.workers,
+    watchers: mesh.watchers,
+  };
+}
+
+/** The report in a few lines, for people. */
+export function reportText(report: Report): string {
+  const { counts, certificate: proved } = report;
+  const lines = [
+    `${report.certified ? "CERTIFIED" : "NOT CERTIFIED"} (${report.termination}): ${report.verdict}`,
+    `${counts?.vertices ?? 0} vertices, ${counts?.simplices ?? 0} simplices, ` +
+      `${counts?.rounds ?? 0} rounds, ${counts?.queries ?? 0} queries, ` +
+      `${report.elapsedSeconds.toFixed(2)} s`,
+  ];
+  if (proved) {
+    lines.push(
+      `${proved.components} components, Euler characteristic ${proved.eulerCharacteristic}, ` +
+        `${proved.orientable ? "orientable" : "not orientable"}, ` +
+        `estimated reach ${proved.estimatedReach.toPrecision(3)}`,
+      ...proved.warnings.map((warning) => `warning: ${warning}`),
+    );
+  }
+  return lines.join("\n");
+}

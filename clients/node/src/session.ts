@@ -1,0 +1,263 @@
+// A mesh from its declaration to its end: the server asks, the oracle answers, we watch.
+import { setTimeout as sleep } from "node:timers/promises";
+import { Client, type ClientOptions } from "./client.js";
+import { Cancelled, errorClass, FailedPrecondition, InvalidArgument } from "./errors.js";
+import { NotCertified, protocolError, StellateError } from "./errors.js";
+import { GrowingComplex } from "./growth.js";
+import { checkSave, Mesh } from "./mesh.js";
+import type { Oracle } from "./oracle.js";
+import { infoFrom, type MeshInfo, type Progress, progressFrom } from "./report.js";
+import { joined, sortedOrder, takeRows } from "./rows.js";
+import { Server } from "./server.js";
+import type { MeshOptions } from "./spec.js";
+import type { Worker, WorkerOptions } from "./worker.js";
+import { indices, numbers } from "./wire.js";
+
+const FAREWELL = 2000; // milliseconds that a worker may take to end when nobody waits for it
+
+/** Where the server is; without `server` one is started, and stopped afterwards. */
+export interface Connection extends ClientOptions {
+  server?: string | Server | Client;
+}
+
+export interface RunOptions extends Connection, MeshOptions, Omit<WorkerOptions, "worker"> {
+  /** Streams on which the oracle is asked at once; more than one helps an async oracle. Default 1. */
+  workers?: number;
+  onProgress?: (progress: Progress) => void;
+  /** Aborting it cancels the mesh: Cancelled, with the mesh so far in the error's `mesh`. */
+  signal?: AbortSignal;
+}
+
+/** A client, and what has to be closed after it. */
+async function connect(options: Connection): Promise<[Client, () => Promise<void>]> {
+  const { server, credentials, reconnectSeconds, keepaliveSeconds, onOutage } = options;
+  if (server instanceof Client) {
+    if (credentials) throw new InvalidArgument("a Client has its credentials already");
+    return [server, async () => {}];
+  }
+  if (!server && credentials) throw new InvalidArgument("credentials are for a server: say which");
+  const at = server ?? (await Server.start());
+  const stop = async () => (server ? undefined : (at as Server).close());
+  try {
+    const given = { credentials, reconnectSeconds, keepaliveSeconds, onOutage };
+    const client = new Client(at, given);
+    return [client, () => (client.close(), stop())];
+  } catch (error) {
+    await stop();
+    throw error;
+  }
+}
+
+/**
+ * Meshes the oracle's manifold. `requireCertified`: a mesh that is not proved good is NotCertified.
+ * `save`: files to write, of which a name that cannot work is an error at once.
+ */
+export async function mesh(
+  oracle: Oracle,
+  options: RunOptions & { requireCertified?: boolean; save?: string },
+): Promise<Mesh> {
+  const { requireCertified, save, ...rest } = options;
+  if (save !== undefined) checkSave(save, oracle.dimension, oracle.ambientDimension);
+  let last: Mesh | undefined;
+  for await (const grown of run(oracle, rest, false)) last = grown;
+  if (!last) throw protocolError("it ended the watch too early");
+  if (save !== undefined) await last.save(save);
+  if (requireCertified && !last.certified) {
+    throw new NotCertified(`the mesh is not certified: ${last.report?.verdict}`, { mesh: last });
+  }
+  return last;
+}
+
+/**
+ * The mesh as it grows, the last with its report. With the name of a mesh in place of an oracle, one
+ * that others serve is watched. Leaving the loop cancels the mesh, or leaves that of others alone.
+ */
+export function watch(oracle: Oracle, options: RunOptions): AsyncGenerator<Mesh>;
+export function watch(
+  name: string,
+  options: Connection & { onProgress?: (progress: Progress) => void },
+): AsyncGenerator<Mesh>;
+export async function* watch(
+  what: Oracle | string,
+  options: RunOptions | Connection,
+): AsyncGenerator<Mesh> {
+  if (typeof what !== "string") {
+    yield* run(what, options as RunOptions, true);
+    return;
+  }
+  if (!options.server)
+    throw new InvalidArgument("to watch a mesh by its name, say on which server");
+  const [client, close] = await connect(options);
+  try {
+    const info = await client.get(what);
+    yield* follow(client, info, (options as RunOptions).onProgress, true);
+  } finally {
+    await close();
+  }
+}
+
+/** One more worker for a mesh: see Client.serve. Throws what the oracle throws. */
+export async function serve(
+  oracle: Oracle,
+  name: string,
+  options: Connection & WorkerOptions,
+): Promise<string> {
+  const [client, close] = await connect(options);
+  try {
+    return await client.serve(oracle, name, options);
+  } finally {
+    await close();
+  }
+}
+
+/** Fetches a mesh that is on a server; one that is not over is refused, or its end waited for. */
+export async function download(
+  name: string,
+  options: Connection & { wait?: boolean; revision?: number },
+): Promise<Mesh> {
+  const [client, close] = await connect(options);
+  try {
+    let info = await client.get(name);
+    const asItIs = (options.revision ?? 0) > 0;
+    if (!info.over && !asItIs) {
+      if (!options.wait) throw new FailedPrecondition(`${name} is not over: ${info.state}`);
+      for await (const event of client.watch(name, 0, true)) {
+        if (event.final) info = infoFrom(event.final);
+      }
+    }
+    const fetched = await assemble(client, info, options.revision ?? 0);
+    return asItIs ? fetched : judged(fetched, info);
+  } finally {
+    await close();
+  }
+}
+
+async function assemble(client: Client, info: MeshInfo, wanted: number): Promise<Mesh> {
+  const { dimension: k, ambientDimension: d } = info;
+  const growth = new GrowingComplex(k, d);
+  const cells: Uint32Array[] = [];
+  let revision = 0;
+  for await (const part of client.parts(info.name, wanted)) {
+    revision = part.revision;
+    cells.push(indices(part.cells, -1, k + 1));
+    growth.addPoints(part.firstVertex, numbers(part.points, -1, d));
+  }
+  const rows = joined(cells);
+  const sorted = takeRows(rows, k + 1, sortedOrder(rows, k + 1));
+  const last = info.over && revision === info.revision;
+  return new Mesh(
+    k,
+    d,
+    growth.points(),
+    sorted,
+    revision,
+    last ? info.progress : undefined,
+    last ? info.report : undefined,
+  );
+}
+
+/** A mesh by the events of its watch: at every revision and at its end, or at its end alone. */
+export async function* follow(
+  client: Client,
+  info: MeshInfo,
+  onProgress: ((progress: Progress) => void) | undefined,
+  every: boolean,
+): AsyncGenerator<Mesh> {
+  const { dimension: k, ambientDimension: d } = info;
+  const growth = new GrowingComplex(k, d);
+  const stream = client.watch(info.name);
+  stream.onResume = () => growth.forgetPending();
+  let progress: Progress | undefined;
+  const soFar = (report?: Mesh["report"]) =>
+    new Mesh(k, d, growth.points(), growth.simplices(), growth.revision, progress, report);
+  for await (const event of stream) {
+    if (event.delta) {
+      if (growth.absorb(event.delta) && every) yield soFar();
+    } else if (event.resetMesh) {
+      growth.reset();
+    } else if (event.progress) {
+      progress = progressFrom(event.progress);
+      onProgress?.(progress);
+      if (progress.phase === "CERTIFYING") growth.settle(); // while the server is busy
+    } else if (event.final) {
+      const final = infoFrom(event.final);
+      progress = final.progress;
+      if (progress) onProgress?.(progress);
+      yield judged(soFar(final.report), final);
+    }
+  }
+}
+
+function judged(mesh: Mesh, { state, report }: MeshInfo): Mesh {
+  if (state === "CANCELLED") throw new Cancelled("the mesh was cancelled", { mesh });
+  if (state === "FAILED") {
+    const reason = report?.failure?.reason || "ORACLE_FAILED";
+    const message = report?.failure?.message || "the mesh failed, and the server says not why";
+    throw new (errorClass(reason))(message, { reason, mesh });
+  }
+  return mesh;
+}
+
+async function* run(oracle: Oracle, options: RunOptions, every: boolean): AsyncGenerator<Mesh> {
+  const { workers = 1, onProgress, signal, maxChunk, server, ...rest } = options;
+  const { credentials, reconnectSeconds, keepaliveSeconds, onOutage, ...asked } = rest;
+  if (!Number.isInteger(workers) || workers < 1) {
+    throw new InvalidArgument(`workers has to be a whole number from 1 on, and is ${workers}`);
+  }
+  signal?.throwIfAborted();
+  const connection = { server, credentials, reconnectSeconds, keepaliveSeconds, onOutage };
+  const [client, close] = await connect(connection);
+  try {
+    const info = await client.create(oracle, asked);
+    yield* served(client, oracle, info, { workers, onProgress, signal, maxChunk }, every);
+  } finally {
+    await close();
+  }
+}
+
+async function* served(
+  client: Client,
+  oracle: Oracle,
+  info: MeshInfo,
+  options: Pick<RunOptions, "onProgress" | "signal" | "maxChunk"> & { workers: number },
+  every: boolean,
+): AsyncGenerator<Mesh> {
+  let failure: { error: unknown } | undefined;
+  const onFailure = (error: unknown) => (failure ??= { error });
+  const all: Worker[] = Array.from({ length: options.workers }, (_, i) =>
+    client.worker(oracle, info.name, {
+      worker: `node-${i + 1}`,
+      maxChunk: options.maxChunk,
+      quiet: true,
+      onFailure,
+    }),
+  );
+  // What the server refuses, or its absence, the watch reports.
+  const done = all.map((worker) =>
+    worker.run().catch((error: unknown) => {
+      if (error instanceof InvalidArgument) onFailure(error);
+    }),
+  );
+  const cancel = () => void client.cancel(info.name, { once: true }).catch(() => {});
+  options.signal?.addEventListener("abort", cancel);
+  let ended = false;
+  try {
+    for await (const grown of follow(client, info, options.onProgress, every)) {
+      ended = grown.report !== undefined;
+      if (ended) for (const worker of all) worker.finish();
+      yield grown;
+    }
+  } catch (error) {
+    // Our own exception says more than the server's account of it.
+    if (!failure || error instanceof Cancelled) throw error;
+    const ours = failure.error;
+    if (ours instanceof StellateError && error instanceof StellateError) ours.mesh = error.mesh;
+    throw ours;
+  } finally {
+    options.signal?.removeEventListener("abort", cancel);
+    if (!ended) for (const worker of all) worker.stop();
+    await Promise.race([Promise.all(done), sleep(FAREWELL, undefined, { ref: false })]);
+    for (const worker of all) worker.stop();
+    await client.delete(info.name, { once: true }).catch(() => {}); // it ends with its server
+  }
+}

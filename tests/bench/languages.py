@@ -1,0 +1,107 @@
+"""Clients in other languages beside the Python client: the same torus, meshed in turn.
+
+    tests/bench/run languages [LANGUAGE]... [--epsilon 0.02] [--rounds 9]
+
+Each client is a process that stays, and connects once; all talk to one server. A round has every
+client mesh the torus, Python before each of the others. The first round, with cold libraries and
+compilers, is shown apart. The ratio is the median of those of the pairs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import pathlib
+import statistics
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "clients" / "python"))
+
+import stellate  # noqa: E402
+
+PYTHON = """
+import sys, time, stellate
+from stellate.manifolds import Torus
+with stellate.Client(sys.argv[1]) as client:
+    for line in sys.stdin:
+        begin = time.perf_counter()
+        mesh = stellate.mesh(Torus(), float(line), client)
+        print(time.perf_counter() - begin, len(mesh.points), len(mesh.simplices), flush=True)
+"""
+
+CLIENTS = ROOT / "clients"
+COMMANDS = {
+    "node": ["node", CLIENTS / "node/dist/examples/timing.js"],
+}
+BUILDS = {  # in the client's directory, in a shell
+    "node": "npm ci --ignore-scripts --silent && npm run --silent build",
+}
+
+
+class Timed:
+    """A process that meshes when it is told to."""
+
+    def __init__(self, command: list[object], address: str, epsilon: float) -> None:
+        self._epsilon = epsilon
+        self._process = subprocess.Popen(
+            [*map(str, command), address], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+
+    def mesh(self) -> tuple[float, tuple[int, int]]:
+        """Seconds, and how many vertices and simplices there are."""
+        self._process.stdin.write(f"{self._epsilon}\n")
+        self._process.stdin.flush()
+        words = self._process.stdout.readline().split()
+        return float(words[0]), (int(words[1]), int(words[2]))
+
+    def close(self) -> None:
+        self._process.stdin.close()
+        self._process.wait()
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("languages", nargs="*", metavar="LANGUAGE", help=", ".join(COMMANDS))
+    parser.add_argument("--epsilon", type=float, default=0.02)
+    parser.add_argument("--rounds", type=int, default=9)
+    arguments = parser.parse_args()
+    chosen = arguments.languages or list(COMMANDS)
+    for name in chosen:
+        if name not in COMMANDS:
+            parser.error(f"no client in {name}; there are {', '.join(COMMANDS)}")
+    print(f"{'':8}{'first, s':>10}{'median, s':>11}{'Python, s':>11}{'ratio':>8}   ratios from..to")
+    with stellate.Server() as server:
+        python = Timed([sys.executable, "-B", "-c", PYTHON], server.address, arguments.epsilon)
+        python.mesh()
+        for name in chosen:
+            compare(name, python, server.address, arguments)
+        python.close()
+    return 0
+
+
+def compare(name: str, python: Timed, address: str, arguments: argparse.Namespace) -> None:
+    subprocess.run(BUILDS[name], shell=True, check=True, cwd=CLIENTS / name)
+    other = Timed(COMMANDS[name], address, arguments.epsilon)
+    first = other.mesh()[0]
+    theirs, ours = [], []
+    for _ in range(arguments.rounds):
+        seconds, expected = python.mesh()
+        ours.append(seconds)
+        seconds, counts = other.mesh()
+        theirs.append(seconds)
+        if counts != expected:
+            raise SystemExit(f"{name} has {counts} vertices and simplices, and Python {expected}")
+    other.close()
+    ratios = [a / b for a, b in zip(theirs, ours)]
+    print(
+        f"{name:8}{first:10.2f}{statistics.median(theirs):11.2f}{statistics.median(ours):11.2f}"
+        f"{statistics.median(ratios):8.2f}   {min(ratios):.2f}..{max(ratios):.2f}",
+        flush=True,
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
