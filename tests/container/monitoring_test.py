@@ -1,6 +1,6 @@
 """docker/prometheus and docker/grafana against a live server, scraped by a real Prometheus.
 
-What rules and panels ask for is there; docs/metrics.md lists what the server tells, all of it.
+What rules and panels ask for is there; docs/running/metrics.md lists what the server tells, all of it.
 """
 
 from __future__ import annotations

@@ -177,7 +177,7 @@ def write(directory: Path, rows: list[Row], update_docs: bool) -> None:
         writer.writerows(asdict(row) for row in rows)
     plot(directory / "plot.png", rows)
     if update_docs:
-        docs = Path(__file__).resolve().parents[3] / "docs"
+        docs = Path(__file__).resolve().parents[3] / "docs" / "evidence"
         page = docs / "benchmarks.md"
         text = page.read_text(encoding="utf-8")
         head, rest = text.split(BEGIN, 1)
