@@ -122,7 +122,9 @@ def main() -> int:
     parser.add_argument("--list", action="store_true", help="print the cases and stop")
     parser.add_argument("--repeats", type=int, default=3, help="of short measurements (default 3)")
     parser.add_argument("--timeout", type=float, default=1800, help="seconds for one measurement")
-    parser.add_argument("--update-docs", action="store_true", help="write into docs/evidence/benchmarks.md")
+    parser.add_argument(
+        "--update-docs", action="store_true", help="write into docs/evidence/benchmarks.md"
+    )
     parser.add_argument("--binary", type=Path, required=True, help=argparse.SUPPRESS)
     parser.add_argument("--output", type=Path, required=True, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
