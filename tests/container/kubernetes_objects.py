@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pathlib
-import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -52,11 +51,7 @@ def workloads(objects: Objects) -> dict[str, Object]:
 
 def version() -> str:
     """Of this source tree."""
-    found = re.search(
-        r"^project\(stellate VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text(), re.M
-    )
-    assert found is not None
-    return found[1]
+    return (ROOT / "VERSION").read_text().strip()
 
 
 def find(tree: Any, key: str) -> Iterator[Any]:

@@ -10,4 +10,3 @@
 #include "stellate/monitor.h"
 #include "stellate/oracle.h"
 #include "stellate/pointwise.h"
-#include "stellate/serve.h"
