@@ -33,9 +33,12 @@ with stellate.Client(sys.argv[1]) as client:
 CLIENTS = ROOT / "clients"
 COMMANDS = {
     "node": ["node", CLIENTS / "node/dist/examples/timing.js"],
+    "go": [ROOT / "build/bench/timing-go"],
 }
 BUILDS = {  # in the client's directory, in a shell
     "node": "npm ci --ignore-scripts --silent && npm run --silent build",
+    "go": 'eval "$(../../tests/languages/go_toolchain)" && go generate ./... && '
+    "go build -o ../../build/bench/timing-go ./cmd/timing",
 }
 
 

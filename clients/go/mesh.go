@@ -1,0 +1,142 @@
+package stellate
+
+import (
+	"bufio"
+	"fmt"
+	"io"
+	"os"
+	"path/filepath"
+	"strconv"
+	"strings"
+
+	pb "stellate/proto/v1"
+)
+
+// Mesh is a simplicial k-complex in R^d, finished or growing.
+type Mesh struct {
+	Dimension        int       // k
+	AmbientDimension int       // d
+	Points           []float64 // [n, d]
+	Simplices        []uint32  // [m, k+1], zero-based, ascending in each row, rows in lexicographic order
+	Revision         uint64    // one for each round that changed the mesh
+	Progress         *pb.Progress
+	Report           *pb.Report // how it ended and what is proved; nil while it grows
+}
+
+// VertexCount is n.
+func (m *Mesh) VertexCount() int { return len(m.Points) / m.AmbientDimension }
+
+// SimplexCount is m.
+func (m *Mesh) SimplexCount() int { return len(m.Simplices) / (m.Dimension + 1) }
+
+// Certified says whether the mesh is finished and proved good.
+func (m *Mesh) Certified() bool { return m.Report.GetCertificate().GetCertified() }
+
+// OrientedSimplices are the simplices with vertices exchanged so that neighbours agree; nil if the mesh
+// is not orientable.
+func (m *Mesh) OrientedSimplices() []uint32 { return orient(m.Simplices, m.Dimension+1) }
+
+// CheckSave says why a mesh of that kind cannot be saved under the name, or nil.
+func CheckSave(path string, k, d int) error {
+	switch ending := filepath.Ext(path); {
+	case ending == ".txt":
+		return nil
+	case ending != ".obj":
+		return newError(ErrSave, "FORMAT",
+			"%s has to end in .txt or .obj; \"stellate download\" writes the other formats", path)
+	case k > 2 || d > 3:
+		return newError(ErrSave, "FORMAT", ".obj holds curves and surfaces in the plane and in space: take .txt")
+	}
+	return nil
+}
+
+// Save writes .txt (any k and d, exact: "k d nv ns", coordinates, ids from zero) or .obj (curves and
+// surfaces, d <= 3, oriented where that can be). The file takes its name when it is whole.
+func (m *Mesh) Save(path string) error {
+	if err := CheckSave(path, m.Dimension, m.AmbientDimension); err != nil {
+		return err
+	}
+	file, err := os.CreateTemp(filepath.Dir(path), filepath.Base(path)+".*.part")
+	if err != nil {
+		return err
+	}
+	defer os.Remove(file.Name())
+	out := bufio.NewWriter(file)
+	if filepath.Ext(path) == ".txt" {
+		fmt.Fprintln(out, m.Dimension, m.AmbientDimension, m.VertexCount(), m.SimplexCount())
+		m.writePoints(out, "", "")
+		writeRows(out, "", m.Simplices, m.Dimension+1, 0)
+	} else {
+		m.writeObj(out)
+	}
+	if err = out.Flush(); err == nil {
+		err = file.Chmod(0o644)
+	}
+	if closing := file.Close(); err == nil {
+		err = closing
+	}
+	if err != nil {
+		return err
+	}
+	return os.Rename(file.Name(), path)
+}
+
+func (m *Mesh) writeObj(out io.StringWriter) {
+	filled := strings.Repeat(" 0", 3-m.AmbientDimension)
+	m.writePoints(out, "v ", filled)
+	cells := m.OrientedSimplices()
+	if cells == nil {
+		cells = m.Simplices
+	}
+	letter := "f "
+	if m.Dimension == 1 {
+		letter = "l "
+	}
+	writeRows(out, letter, cells, m.Dimension+1, 1)
+}
+
+// A bufio.Writer keeps its first error, which Flush returns.
+
+func (m *Mesh) writePoints(out io.StringWriter, before, after string) {
+	d := m.AmbientDimension
+	words := make([]string, d)
+	for i := 0; i < len(m.Points); i += d {
+		for j, value := range m.Points[i : i+d] {
+			words[j] = strconv.FormatFloat(value, 'g', -1, 64)
+		}
+		_, _ = out.WriteString(before + strings.Join(words, " ") + after + "\n")
+	}
+}
+
+func writeRows(out io.StringWriter, before string, rows []uint32, width int, first uint64) {
+	words := make([]string, width)
+	for i := 0; i < len(rows); i += width {
+		for j, id := range rows[i : i+width] {
+			words[j] = strconv.FormatUint(uint64(id)+first, 10)
+		}
+		_, _ = out.WriteString(before + strings.Join(words, " ") + "\n")
+	}
+}
+
+// ReportText is a report in a few lines, for people.
+func ReportText(report *pb.Report) string {
+	counts, proved := report.GetCounts(), report.GetCertificate()
+	word, verdict := "NOT CERTIFIED", proved.GetVerdict()
+	if proved.GetCertified() {
+		word = "CERTIFIED"
+	}
+	if verdict == "" {
+		verdict = report.GetFailure().GetMessage()
+	}
+	ended := strings.TrimPrefix(report.GetTermination().String(), "TERMINATION_")
+	var text strings.Builder
+	fmt.Fprintf(&text, "%s (%s): %s\n", word, ended, verdict)
+	fmt.Fprintf(&text, "%d vertices, %d simplices, %d rounds, %d queries, %.2f s\n",
+		counts.GetVertices(), counts.GetSimplices(), counts.GetRounds(), counts.GetQueries(), report.GetElapsedSeconds())
+	fmt.Fprintf(&text, "%d components, Euler characteristic %d, orientable %t, estimated reach %.3g\n",
+		proved.GetComponents(), proved.GetEulerCharacteristic(), proved.GetOrientable(), proved.GetEstimatedReach())
+	for _, warning := range proved.GetWarnings() {
+		fmt.Fprintf(&text, "warning: %s\n", warning)
+	}
+	return text.String()
+}
