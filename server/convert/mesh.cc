@@ -70,6 +70,7 @@ void ToProto(const core::Certificate& c, v1::Certificate* out) {
   out->set_declared_reach(c.declared_reach);
   out->set_reach_refuted(c.reach_refuted);
   out->set_proved_distance(c.proved_distance);
+  out->set_answers_held(c.answers_held);
 }
 
 }  // namespace

@@ -41,6 +41,94 @@ TEST(Arrays, OfTheWrongShapeAreErrors) {
   EXPECT_EQ(empty->cols(), 0);
 }
 
+// Each plain field of a message gets a number of its own.
+void FillWithNumbers(google::protobuf::Message* message) {
+  using Field = google::protobuf::FieldDescriptor;
+  const auto* reflection = message->GetReflection();
+  for (int i = 0; i < message->GetDescriptor()->field_count(); ++i) {
+    const Field* field = message->GetDescriptor()->field(i);
+    if (field->is_repeated()) continue;
+    if (field->cpp_type() == Field::CPPTYPE_UINT32) {
+      reflection->SetUInt32(message, field, static_cast<std::uint32_t>(100 + field->number()));
+    } else if (field->cpp_type() == Field::CPPTYPE_UINT64) {
+      reflection->SetUInt64(message, field, static_cast<std::uint64_t>(100 + field->number()));
+    } else if (field->cpp_type() == Field::CPPTYPE_INT64) {
+      reflection->SetInt64(message, field, 100 + field->number());
+    } else if (field->cpp_type() == Field::CPPTYPE_DOUBLE) {
+      reflection->SetDouble(message, field, 100 + field->number());
+    }
+  }
+}
+
+void ExpectInJson(const google::protobuf::Message& message, const std::string& json) {
+  for (int i = 0; i < message.GetDescriptor()->field_count(); ++i) {
+    const auto* field = message.GetDescriptor()->field(i);
+    std::string wanted = "\"" + field->name() + "\": ";
+    const auto type = field->cpp_type();
+    using Field = google::protobuf::FieldDescriptor;
+    const bool number = type == Field::CPPTYPE_UINT64 || type == Field::CPPTYPE_INT64 ||
+                        type == Field::CPPTYPE_DOUBLE;
+    if (number) wanted += std::to_string(100 + field->number());
+    EXPECT_NE(json.find(wanted), std::string::npos) << wanted << " in\n" << json;
+  }
+}
+
+// A field that is new in the protocol is not forgotten on the way to the user.
+TEST(Reports, HaveEveryFieldOfTheProtocols) {
+  v1::Mesh mesh;
+  FillWithNumbers(mesh.mutable_report()->mutable_certificate());
+  FillWithNumbers(mesh.mutable_report()->mutable_counts());
+  FillWithNumbers(mesh.mutable_report());
+  const std::string json = ToJson(ReportOf(mesh));
+  ExpectInJson(mesh.report().certificate(), json);
+  ExpectInJson(mesh.report().counts(), json);
+  EXPECT_NE(json.find("\"elapsed_seconds\": 105"), std::string::npos);
+}
+
+TEST(ServerInfo, HasEveryFieldOfTheProtocols) {
+  v1::ServerInfo info;
+  FillWithNumbers(&info);
+  info.set_version("1.2.3");
+  info.add_protocols("stellate.v1");
+  const ServerHealth health = HealthOf(info);
+  // As many as ServerHealth has members, or this does not compile.
+  const auto& [serving, version, protocols, max_dimension, max_ambient_dimension, max_meshes,
+               max_vertices, max_rounds, max_message_bytes, owner_meshes, max_memory_bytes,
+               owner_memory_bytes, max_workers, max_watchers, check_share] = health;
+  EXPECT_EQ(v1::ServerInfo::descriptor()->field_count(), 14);
+  EXPECT_FALSE(serving);
+  EXPECT_EQ(version, "1.2.3");
+  EXPECT_EQ(protocols, std::vector<std::string>{"stellate.v1"});
+  EXPECT_EQ(max_dimension, 103u);
+  EXPECT_EQ(max_ambient_dimension, 104u);
+  EXPECT_EQ(max_vertices, 105u);
+  EXPECT_EQ(max_rounds, 106u);
+  EXPECT_EQ(max_meshes, 107u);
+  EXPECT_EQ(max_message_bytes, 108u);
+  EXPECT_EQ(owner_meshes, 109u);
+  EXPECT_EQ(max_memory_bytes, 110u);
+  EXPECT_EQ(owner_memory_bytes, 111u);
+  EXPECT_EQ(max_workers, 112u);
+  EXPECT_EQ(max_watchers, 113u);
+  EXPECT_EQ(check_share, 114);
+}
+
+TEST(Enums, OfANewerServerAreUnknown) {
+  v1::Mesh mesh;
+  mesh.set_state(static_cast<v1::MeshState>(99));
+  mesh.mutable_progress()->set_phase(static_cast<v1::Phase>(99));
+  mesh.mutable_report()->set_termination(static_cast<v1::Termination>(99));
+  mesh.mutable_report()->mutable_certificate()->set_level(static_cast<v1::CertificateLevel>(99));
+  const MeshStatus status = StatusOf(mesh);
+  EXPECT_STREQ(MeshStateName(status.state), "UNKNOWN");
+  EXPECT_TRUE(status.over());
+  EXPECT_STREQ(PhaseName(status.progress.phase), "UNKNOWN");
+  const Report report = ReportOf(mesh);
+  EXPECT_STREQ(TerminationName(report.termination), "UNKNOWN");
+  EXPECT_STREQ(CertificateLevelName(report.certificate.level), "UNKNOWN");
+  EXPECT_FALSE(ToText(report).empty());
+}
+
 TEST(Spec, CarriesWhatIsGivenAndNothingElse) {
   const auto manifold = MakeManifold("torus", nullptr);
   MeshOptions options;

@@ -82,7 +82,7 @@ TEST(ReportJson, IsThatOfAllClients) {
       R"("min_angle_degrees": 0, "max_tangent_angle_degrees": 0, "max_barycentre_distance": 0, )"
       R"("estimated_reach": null, "epsilon_over_reach": 0, "components": 1, )"
       R"("euler_characteristic": -8, "orientable": false, "level": "UNKNOWN", )"
-      R"("declared_reach": 0, "reach_refuted": false, "proved_distance": 0}, )"
+      R"("declared_reach": 0, "reach_refuted": false, "proved_distance": 0, "answers_held": 0}, )"
       R"("elapsed_seconds": 0.5, )"
       R"("version": "0.1.0"})");
   report.epsilon = 0;

@@ -2,6 +2,7 @@
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
 
+#include <algorithm>
 #include <atomic>
 #include <memory>
 #include <optional>
@@ -13,6 +14,7 @@
 #include "convert.h"
 #include "live.h"
 #include "mesh_builder.h"
+#include "stellate/serve.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 #include "support/mesh_judge.h"
 #include "support/spoiled_oracle.h"
@@ -148,6 +150,63 @@ TEST_F(Workers, WhoLeavesMidRoundIsReplaced) {
     EXPECT_TRUE(AreIdentical(*undisturbed, ending.mesh)) << chunks;
     EXPECT_FALSE(steady.error().has_value());
   }
+}
+
+TEST_F(Workers, AProgramJoinsAMeshByItsName) {
+  const auto torus = Make("torus:1:0.4");
+  const Expected<Mesh> undisturbed = MeshManifold(*torus, At(0.1));
+  ASSERT_TRUE(undisturbed.has_value());
+  const std::string name = Create(*torus, At(0.1));
+  ServeOptions options;
+  options.server = Server();
+  options.max_chunk = 100;
+  Eigen::Index most = 0;
+  SpoiledOracle counting(*torus);
+  counting.on_closest = [&most](const Eigen::MatrixXd& x, Answer&) {
+    most = std::max(most, x.cols());
+  };
+  const Expected<MeshState> state = ServeMesh(counting, name, options);
+  ASSERT_TRUE(state.has_value()) << state.error().message;
+  EXPECT_EQ(*state, MeshState::kSucceeded);
+  EXPECT_GT(most, 1);
+  EXPECT_LE(most, 100);
+  const Ending ending = Watch(name, 2, 3);
+  EXPECT_TRUE(AreIdentical(*undisturbed, ending.mesh));
+  // A batch job that comes when all is done is a success.
+  const Expected<MeshState> late = ServeMesh(*torus, name, options);
+  ASSERT_TRUE(late.has_value()) << late.error().message;
+  EXPECT_EQ(*late, MeshState::kSucceeded);
+}
+
+TEST_F(Workers, WhoDoesNotSuitAMeshLeavesItAlone) {
+  const auto torus = Make("torus:1:0.4"), circle = Make("sphere:1"), cube = Make("tanglecube");
+  const std::string name = Create(*torus, At(0.1));
+  ServeOptions options;
+  options.server = Server();
+  const auto refused = [&](Oracle& oracle, const std::string& mesh, const char* words) {
+    const Expected<MeshState> state = ServeMesh(oracle, mesh, options);
+    ASSERT_FALSE(state.has_value());
+    EXPECT_EQ(state.error().code, ErrorCode::kRefused);
+    EXPECT_NE(state.error().message.find(words), std::string::npos) << state.error().message;
+  };
+  refused(*circle, name, "dimension 2 in R^3");
+  refused(*cube, name, "local_size, which this oracle lacks");
+  refused(*torus, "meshes/00000000000000000000000000000000", "meshes/0000");
+  options.max_chunk = 0;
+  refused(*torus, name, "max_chunk");
+  options.max_chunk.reset();
+  // Nor does one that is told to go: the mesh waits for the next.
+  std::stop_source stop;
+  options.stop = stop.get_token();
+  SpoiledOracle leaving(*torus);
+  leaving.on_closest = [&stop](const Eigen::MatrixXd&, Answer&) { stop.request_stop(); };
+  const Expected<MeshState> left = ServeMesh(leaving, name, options);
+  ASSERT_FALSE(left.has_value());
+  EXPECT_EQ(left.error().reason, "CANCELLED");
+  options.stop = {};
+  const Expected<MeshState> state = ServeMesh(*torus, name, options);
+  ASSERT_TRUE(state.has_value()) << state.error().message;
+  EXPECT_EQ(*state, MeshState::kSucceeded);
 }
 
 TEST_F(Workers, WhoNeverAnswersEndsTheMeshByName) {

@@ -81,21 +81,33 @@ Expected<Eigen::Index> CountRows(const v1::IndexArray& array, std::uint32_t widt
   return Rows(array, {width}, sizeof(std::uint32_t));
 }
 
-Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
-  const auto invalid = [](const std::string& why) {
-    return Fail(ErrorCode::kRefused, why, "INVALID_ARGUMENT");
-  };
+namespace {
+
+tl::unexpected<Error> Invalid(const std::string& why) {
+  return Fail(ErrorCode::kRefused, why, "INVALID_ARGUMENT");
+}
+
+}  // namespace
+
+Expected<void> CheckServable(const Oracle& oracle, std::optional<std::uint32_t> max_chunk) {
   if (oracle.dimension() < 1) {
-    return invalid("dimension is " + std::to_string(oracle.dimension()) +
+    return Invalid("dimension is " + std::to_string(oracle.dimension()) +
                    " but must be at least 1");
   }
   if (oracle.ambient_dimension() < 1) {
-    return invalid("ambient_dimension is " + std::to_string(oracle.ambient_dimension()) +
+    return Invalid("ambient_dimension is " + std::to_string(oracle.ambient_dimension()) +
                    " but must be at least 2");
   }
-  if (options.max_chunk == 0u) return invalid("max_chunk is 0 but must be 1 or more");
+  if (max_chunk == 0u) return Invalid("max_chunk is 0 but must be 1 or more");
+  return {};
+}
+
+Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
+  if (const auto ok = CheckServable(oracle, options.max_chunk); !ok) {
+    return tl::unexpected(ok.error());
+  }
   if (options.workers < 1 || options.workers > 1024) {
-    return invalid("workers is " + std::to_string(options.workers) + " but must be 1 to 1024");
+    return Invalid("workers is " + std::to_string(options.workers) + " but must be 1 to 1024");
   }
   const std::uint32_t d = static_cast<std::uint32_t>(oracle.ambient_dimension());
   v1::MeshSpec spec;
@@ -215,7 +227,46 @@ Report ReportOf(const v1::Mesh& mesh) {
   out.declared_reach = c.declared_reach();
   out.reach_refuted = c.reach_refuted();
   out.proved_distance = c.proved_distance();
+  out.answers_held = c.answers_held();
   return r;
+}
+
+MeshState FromProto(v1::MeshState state) {
+  return v1::MeshState_IsValid(state) ? static_cast<MeshState>(state) : MeshState::kUnknown;
+}
+
+MeshStatus StatusOf(const v1::Mesh& m) {
+  MeshStatus mesh;
+  mesh.name = m.name();
+  mesh.label = m.spec().label();
+  mesh.state = FromProto(m.state());
+  mesh.dimension = static_cast<int>(m.spec().dimension());
+  mesh.ambient_dimension = static_cast<int>(m.spec().ambient_dimension());
+  mesh.epsilon = m.spec().epsilon();
+  mesh.progress = FromProto(m.progress());
+  mesh.revision = m.revision();
+  mesh.workers = m.workers();
+  mesh.watchers = m.watchers();
+  return mesh;
+}
+
+ServerHealth HealthOf(const v1::ServerInfo& info) {
+  ServerHealth health;
+  health.version = info.version();
+  health.protocols.assign(info.protocols().begin(), info.protocols().end());
+  health.max_dimension = info.max_dimension();
+  health.max_ambient_dimension = info.max_ambient_dimension();
+  health.max_meshes = info.max_meshes();
+  health.max_vertices = info.max_vertices();
+  health.max_rounds = info.max_rounds();
+  health.max_message_bytes = info.max_message_bytes();
+  health.owner_meshes = info.owner_meshes();
+  health.max_memory_bytes = info.max_memory_bytes();
+  health.owner_memory_bytes = info.owner_memory_bytes();
+  health.max_workers = info.max_workers();
+  health.max_watchers = info.max_watchers();
+  health.check_share = info.check_share();
+  return health;
 }
 
 namespace {

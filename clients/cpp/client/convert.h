@@ -4,11 +4,14 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "stellate/client.h"
+#include "stellate/monitor.h"
 #include "stellate/v1/geometry.pb.h"
 #include "stellate/v1/mesh.pb.h"
+#include "stellate/v1/stellate.pb.h"
 
 // Between the client's types and the wire's. Nothing here trusts the server: what does not fit
 // is an error, never a crash.
@@ -26,11 +29,16 @@ Expected<void> AppendNumbers(const v1::Array& array, const std::vector<std::uint
 // The rows of an [n, width] array, which has what they need.
 Expected<Eigen::Index> CountRows(const v1::IndexArray& array, std::uint32_t width);
 
+// Errors: dimensions or a chunk size with which no worker can be.
+Expected<void> CheckServable(const Oracle& oracle, std::optional<std::uint32_t> max_chunk);
 // Errors: an option that the wire cannot carry (the server checks the rest).
 Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options);
 
 Progress FromProto(const v1::Progress& message);
 Report ReportOf(const v1::Mesh& mesh);
+MeshState FromProto(v1::MeshState state);
+MeshStatus StatusOf(const v1::Mesh& mesh);
+ServerHealth HealthOf(const v1::ServerInfo& info);  // all but whether it serves
 
 // The error that a failed call stands for.
 Error FromStatus(const grpc::Status& status);

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <iterator>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -16,7 +17,6 @@
 namespace stellate {
 namespace {
 
-using client::FromProto;
 using client::FromStatus;
 using Deadline = std::chrono::system_clock::time_point;
 
@@ -26,42 +26,13 @@ Deadline After(double seconds) {
              std::chrono::duration<double>(seconds));
 }
 
-MeshStatus ToStatus(const v1::Mesh& m) {
-  MeshStatus mesh;
-  mesh.name = m.name();
-  mesh.label = m.spec().label();
-  mesh.state =
-      v1::MeshState_IsValid(m.state()) ? static_cast<MeshState>(m.state()) : MeshState::kUnknown;
-  mesh.dimension = static_cast<int>(m.spec().dimension());
-  mesh.ambient_dimension = static_cast<int>(m.spec().ambient_dimension());
-  mesh.epsilon = m.spec().epsilon();
-  mesh.progress = FromProto(m.progress());
-  mesh.revision = m.revision();
-  mesh.workers = m.workers();
-  mesh.watchers = m.watchers();
-  return mesh;
-}
-
 }  // namespace
 
 const char* MeshStateName(MeshState state) {
-  switch (state) {
-    case MeshState::kWaiting:
-      return "WAITING";
-    case MeshState::kRunning:
-      return "RUNNING";
-    case MeshState::kSucceeded:
-      return "SUCCEEDED";
-    case MeshState::kStopped:
-      return "STOPPED";
-    case MeshState::kCancelled:
-      return "CANCELLED";
-    case MeshState::kFailed:
-      return "FAILED";
-    case MeshState::kUnknown:
-      break;
-  }
-  return "UNKNOWN";
+  constexpr const char* kNames[] = {"UNKNOWN", "WAITING",   "RUNNING", "SUCCEEDED",
+                                    "STOPPED", "CANCELLED", "FAILED"};
+  const size_t i = static_cast<size_t>(state);
+  return i < std::size(kNames) ? kNames[i] : kNames[0];
 }
 
 class Monitor::Impl {
@@ -100,16 +71,8 @@ class Monitor::Impl {
     v1::ServerInfo info;
     const grpc::Status status = stub_->GetServerInfo(&context, v1::GetServerInfoRequest(), &info);
     if (!status.ok()) return tl::unexpected(FromStatus(status));
-    ServerHealth health;
+    ServerHealth health = client::HealthOf(info);
     health.serving = *serving;
-    health.version = info.version();
-    health.protocols.assign(info.protocols().begin(), info.protocols().end());
-    health.max_dimension = info.max_dimension();
-    health.max_ambient_dimension = info.max_ambient_dimension();
-    health.max_meshes = info.max_meshes();
-    health.max_vertices = info.max_vertices();
-    health.max_rounds = info.max_rounds();
-    health.max_message_bytes = info.max_message_bytes();
     return health;
   }
 
@@ -122,7 +85,7 @@ class Monitor::Impl {
       v1::ListMeshesResponse page;
       const grpc::Status status = stub_->ListMeshes(&context, request, &page);
       if (!status.ok()) return tl::unexpected(FromStatus(status));
-      for (const v1::Mesh& mesh : page.meshes()) meshes.push_back(ToStatus(mesh));
+      for (const v1::Mesh& mesh : page.meshes()) meshes.push_back(client::StatusOf(mesh));
       request.set_page_token(page.next_page_token());
     } while (!request.page_token().empty());
     return meshes;

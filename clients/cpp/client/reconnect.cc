@@ -72,13 +72,14 @@ bool Reconnector::Again(const grpc::Status& status) {
   if (policy_.on_outage) {
     policy_.on_outage({false, Seconds(now - lost_).count(), attempts_, status.error_message()});
   }
-  const Seconds pause = std::min(backoff_.Next(), left);
-  {
-    std::unique_lock lock(mutex_);
-    if (wake_.wait_for(lock, pause, [this] { return stopped_ || finished_; })) return false;
-  }
+  if (!Pause(std::min(backoff_.Next(), left))) return false;
   Connect();
   return !stopped();
+}
+
+bool Reconnector::Pause(Seconds pause) {
+  std::unique_lock lock(mutex_);
+  return !wake_.wait_for(lock, pause, [this] { return stopped_ || finished_; });
 }
 
 Error Reconnector::Lost(const grpc::Status& status) const {

@@ -57,6 +57,8 @@ class Reconnector {
   void Heard();
   // After an attempt ended with `status`: waits, and says whether to make another.
   bool Again(const grpc::Status& status);
+  // Waits; false when it was stopped.
+  bool Pause(std::chrono::duration<double> pause);
   // Whether the last attempt follows on one that was broken off.
   bool reconnecting() const { return attempts_ > 0; }
 

@@ -177,6 +177,7 @@ std::string CertificateJson(const Certificate& c) {
   json.Add("declared_reach", c.declared_reach);
   json.Add("reach_refuted", c.reach_refuted);
   json.Add("proved_distance", c.proved_distance);
+  json.Add("answers_held", c.answers_held);
   return json.Take();
 }
 

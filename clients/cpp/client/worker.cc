@@ -17,7 +17,9 @@
 namespace stellate::client {
 namespace {
 
-constexpr size_t kChunkBytes = 3 << 20;    // of numbers, under the 4 MB of a message
+constexpr size_t kChunkBytes = 3 << 20;  // of numbers, under the 4 MB of a message
+constexpr auto kCallTime = std::chrono::seconds(30);
+constexpr auto kLookAgain = std::chrono::milliseconds(100);
 constexpr double kBusyShare = 0.25;        // of the time that the server bears silence
 constexpr size_t kMaxFailureBytes = 4000;  // OracleFailure.message takes 4096
 
@@ -43,6 +45,14 @@ std::vector<Eigen::Index> FoundOf(const Answer& answer) {
     if (answer.IsFound(j)) found.push_back(j);
   }
   return found;
+}
+
+void NoteEnd(const v1::ServeOracleResponse& response, std::optional<MeshState>* state) {
+  if (!response.has_over()) return;
+  v1::MeshState parsed =
+      v1::MESH_STATE_UNSPECIFIED;  // also of a state that this client is too old for
+  v1::MeshState_Parse(response.over().state(), &parsed);
+  *state = FromProto(parsed);
 }
 
 using Seconds = std::chrono::duration<double>;
@@ -244,7 +254,11 @@ grpc::Status Worker::Serve() {
     v1::ServeOracleResponse response;
     while (open && !exception_ && inbox.Next(&response)) {
       attempts_.Heard();
-      over_ = over_ || response.has_over();
+      NoteEnd(response, &state_);
+      if (response.has_welcome() && !Suits(response.welcome())) {
+        attempts_.Stop();
+        break;
+      }
       if (response.welcome().answer_seconds() > 0) {
         outbox.SayBusyEvery(Seconds(kBusyShare * response.welcome().answer_seconds()));
       }
@@ -258,18 +272,67 @@ grpc::Status Worker::Serve() {
     }
     outbox.End();
     // What is left unread would keep Finish from returning.
-    while (inbox.Next(&response)) over_ = over_ || response.has_over();
+    while (inbox.Next(&response)) NoteEnd(response, &state_);
   }
   return stream->Finish();
+}
+
+// False, with error_ set, when this oracle is not of the mesh's kind: others may be.
+bool Worker::Suits(const v1::Welcome& welcome) {
+  const auto k = static_cast<std::uint32_t>(oracle_.dimension());
+  const auto d = static_cast<std::uint32_t>(oracle_.ambient_dimension());
+  std::string problem;
+  if (welcome.dimension() != k || welcome.ambient_dimension() != d) {
+    const auto space = [](std::uint32_t its_k, std::uint32_t its_d) {
+      return "dimension " + std::to_string(its_k) + " in R^" + std::to_string(its_d);
+    };
+    problem = "the mesh has " + space(welcome.dimension(), welcome.ambient_dimension()) +
+              ", and this oracle's manifold has " + space(k, d);
+  } else {
+    const struct {
+      const char* name;
+      bool asked, able;
+    } abilities[] = {
+        {"intersect_flat", welcome.oracle().intersect_flat(), oracle_.has_intersect_flat()},
+        {"tangent_basis", welcome.oracle().tangent_basis(), oracle_.has_tangent_basis()},
+        {"local_size", welcome.oracle().local_size(), oracle_.has_local_size()}};
+    std::string missing;
+    for (const auto& [name, asked, able] : abilities) {
+      if (asked && !able) missing += (missing.empty() ? "" : " and ") + std::string(name);
+    }
+    if (!missing.empty()) {
+      problem = "the mesh was declared with " + missing + ", which this oracle lacks";
+    }
+  }
+  if (problem.empty()) return true;
+  error_ = Error{ErrorCode::kRefused, "INVALID_ARGUMENT",
+                 problem + ": all workers of a mesh have to serve one manifold"};
+  return false;
+}
+
+// Of a mesh that takes no more workers; nothing if that cannot be found out.
+std::optional<MeshState> Worker::HowItEnded() {
+  v1::GetMeshRequest request;
+  request.set_name(mesh_);
+  const auto give_up = std::chrono::steady_clock::now() + kCallTime;
+  do {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kCallTime);
+    v1::Mesh mesh;
+    if (!stub_.GetMesh(&context, request, &mesh).ok()) break;
+    if (mesh.has_end_time()) return FromProto(mesh.state());
+    // It is just about to end.
+  } while (std::chrono::steady_clock::now() < give_up && attempts_.Pause(kLookAgain));
+  return std::nullopt;
 }
 
 void Worker::Run() {
   while (true) {
     const grpc::Status status = Serve();
-    if (exception_ || error_ || over_ || status.ok()) return;
-    // It ended while this worker was away.
-    if (attempts_.reconnecting() && status.error_code() == grpc::StatusCode::FAILED_PRECONDITION) {
-      return;
+    if (exception_ || error_ || state_ || status.ok()) return;
+    if (status.error_code() == grpc::StatusCode::FAILED_PRECONDITION) {
+      state_ = HowItEnded();  // before this worker came, or while it was away
+      if (state_) return;
     }
     if (attempts_.Again(status)) continue;
     error_ = Explain(status, attempts_.reconnecting());

@@ -6,6 +6,7 @@
 
 #include "reconnect.h"
 #include "stellate/client.h"
+#include "stellate/monitor.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 
 namespace stellate::client {
@@ -23,12 +24,16 @@ class Worker {
   // The mesh is over: a lost stream is not opened again.
   void Finish() { attempts_.Finish(); }
 
-  // After Run. What the oracle threw; else how the last stream broke off, unless it ended in order.
+  // After Run: the state that the mesh ended in, unless this worker left before.
+  std::optional<MeshState> state() const { return state_; }
+  // Else what the oracle threw; else how the last stream broke off, unless it ended in order.
   std::exception_ptr exception() const { return exception_; }
   const std::optional<Error>& error() const { return error_; }
 
  private:
   grpc::Status Serve();
+  bool Suits(const v1::Welcome& welcome);
+  std::optional<MeshState> HowItEnded();
   bool Answer(const v1::QueryChunk& chunk, v1::AnswerChunk* answers);
   bool AnswerOrFail(const v1::QueryChunk& chunk, v1::ServeOracleRequest* request);
   void AddTangents(stellate::Answer* answer);
@@ -39,7 +44,7 @@ class Worker {
   const std::string mesh_, name_;
   const std::uint32_t max_chunk_;
   Reconnector attempts_;
-  bool over_ = false;
+  std::optional<MeshState> state_;
   std::exception_ptr exception_;
   std::optional<Error> error_;
 };

@@ -10,7 +10,6 @@ import os
 import shutil
 import time
 import zipfile
-from types import TracebackType
 from typing import IO, Any, Callable
 
 import numpy as np
@@ -68,12 +67,7 @@ class Checkpoint:
             raise
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         assert self._lock is not None
         self._lock.close()
 

@@ -51,8 +51,6 @@ _LABEL_BYTES = 128
 # stellate.mesh; their types.
 _RUN: list[tuple[str, str, type, str]] = [
     ("--seed", "random_seed", int, "seed of everything random"),
-    ("--max-chunk", "max_chunk", int, "most points that the oracle is asked at once"),
-    ("--workers", "workers", int, "threads that call the oracle, if it has thread_safe = True"),
     ("--max-vertices", "max_vertices", int, "stop there"),
     ("--max-rounds", "max_rounds", int, "stop after so many round trips"),
     ("--max-batch-queries", "max_batch_queries", int, "ask larger rounds in several batches"),
@@ -60,6 +58,10 @@ _RUN: list[tuple[str, str, type, str]] = [
     ("--worker-wait", "worker_wait_seconds", float, "seconds that the mesh waits for a worker"),
     ("--answer", "answer_seconds", float, "seconds that a worker may be silent over a chunk"),
     ("--busy", "busy_seconds", float, "seconds that it may take for one in all"),
+]
+_SERVING: list[tuple[str, str, type, str]] = [
+    ("--max-chunk", "max_chunk", int, "most points that the oracle is asked at once"),
+    ("--workers", "workers", int, "threads that call the oracle, if it has thread_safe = True"),
 ]
 _CRITERIA: list[tuple[str, str, type, str]] = [
     ("--radius-edge", "radius_edge_bound", float, "rho0 of rule R2"),
@@ -74,6 +76,7 @@ _CRITERIA: list[tuple[str, str, type, str]] = [
     ("--max-deviation", "max_deviation", float, "circumcentres so far off at most, a length"),
     ("--common-centre", "common_centre", bool, "judge a simplex at one centre"),
 ]
+_ALL = (*_RUN, *_SERVING, *_CRITERIA)
 
 
 class Refused(Exception):
@@ -135,7 +138,7 @@ def credentials_of(options: argparse.Namespace) -> Credentials | None:
 
 
 def _settings(options: argparse.Namespace) -> dict[str, Any]:
-    given = {name: getattr(options, name) for _, name, _, _ in (*_RUN, *_CRITERIA)}
+    given = {name: getattr(options, name) for _, name, _, _ in _ALL if hasattr(options, name)}
     return {name: value for name, value in given.items() if value is not None}
 
 
@@ -244,14 +247,15 @@ def _epsilon(text: str) -> float | str:
         raise argparse.ArgumentTypeError(f"has to be a length or auto, and is '{text}'") from None
 
 
-def _add_settings(command: argparse.ArgumentParser) -> None:
+def _add_settings(command: argparse.ArgumentParser, serves: bool) -> None:
     command.add_argument(
         "-e", "--epsilon", type=_epsilon, required=True,
         help="largest circumradius of a simplex, a length; or auto: a quarter of the reach that "
         "the doctor finds",
     )  # fmt: skip
     criteria = command.add_argument_group("criteria", "absent: the server's defaults")
-    for to, settings in ((command, _RUN), (criteria, _CRITERIA)):
+    run = [*_RUN, *_SERVING] if serves else _RUN
+    for to, settings in ((command, run), (criteria, _CRITERIA)):
         for flag, name, kind, words in settings:
             if kind is bool:
                 both = argparse.BooleanOptionalAction
@@ -297,7 +301,7 @@ def _parser() -> argparse.ArgumentParser:
 
     one = add("mesh", _mesh, "mesh the manifold of an oracle")
     add_oracle(one)
-    _add_settings(one)
+    _add_settings(one, serves=True)
     one.add_argument(
         "--checkpoint", metavar="FOLDER",
         help="in which the mesh outlives this program: the same command goes on with it",
@@ -307,7 +311,7 @@ def _parser() -> argparse.ArgumentParser:
 
     one = add("declare", _declare, "declare a mesh, for others to serve, and print its name")
     add_oracle(one)
-    _add_settings(one)
+    _add_settings(one, serves=False)
     one.add_argument("--label", help="that lists show; default: MODULE:OBJECT")
     _add_connection(one, "127.0.0.1:7717")
 

@@ -8,17 +8,15 @@ import dataclasses
 import logging
 import pickle
 import threading
-import time
 import traceback
 import uuid
-from types import TracebackType
 from typing import Any, Callable
 
 from ._credentials import Credentials
 from ._generated import oracle_pb2 as pb
 from ._interrupt import told
 from ._server import Server
-from ._worker import answer
+from ._worker import answer, join_all
 from .client import Client
 from .errors import ExecutorError, InvalidArgument, OracleError
 from .oracle import CheckedOracle
@@ -169,15 +167,13 @@ class ExecutorWorkers:
         Raises: what the oracle raised; where no slot saw the end, why the first of them left, such
           as ExecutorError; TimeoutError after so many seconds, and the workers go on.
         """
-        deadline = None if timeout is None else time.monotonic() + timeout
         try:
             with told("the workers left; the mesh waits for others"):
-                for thread in self._threads:
-                    thread.join(None if deadline is None else max(0.0, deadline - time.monotonic()))
+                ended = join_all(self._threads, timeout)
         except BaseException:
             self.stop()
             raise
-        if any(thread.is_alive() for thread in self._threads):
+        if not ended:
             raise TimeoutError(f"the mesh was not over after {timeout} s")
         if self._failure is not None:
             raise self._failure
@@ -199,12 +195,7 @@ class ExecutorWorkers:
     def __enter__(self) -> ExecutorWorkers:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self.stop()
         for thread in self._threads:
             thread.join()

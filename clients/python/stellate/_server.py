@@ -11,7 +11,6 @@ import subprocess
 import tempfile
 import threading
 import time
-from types import TracebackType
 
 from .errors import ServerNotFound, Unavailable
 
@@ -204,10 +203,5 @@ class Server:
     def __enter__(self) -> Server:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self.close()

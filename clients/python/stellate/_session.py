@@ -6,7 +6,6 @@ import dataclasses
 import logging
 import numbers
 import threading
-import time
 from collections.abc import Iterator
 from types import TracebackType
 from typing import Any, Callable
@@ -17,7 +16,7 @@ from ._follow import Following, OnProgress
 from ._mesh import Mesh
 from ._server import Server
 from ._spec import mesh_spec
-from ._worker import check_max_chunk
+from ._worker import check_max_chunk, join_all
 from .client import Client, MeshInfo
 from .errors import Interrupted, InvalidArgument, StellateError
 from .oracle import CheckedOracle
@@ -77,10 +76,8 @@ class _Workers:
         for worker in self._workers:
             worker.finish()
 
-    def join(self, seconds: float | None) -> None:
-        deadline = None if seconds is None else time.monotonic() + seconds
-        for thread in self._threads:
-            thread.join(None if deadline is None else max(0.0, deadline - time.monotonic()))
+    def join(self, seconds: float) -> None:
+        join_all(self._threads, seconds)
 
 
 class Session:

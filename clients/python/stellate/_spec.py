@@ -29,6 +29,7 @@ _SPEC = {
     "reach": "declared_reach",
     "cover_box": "cover_box",
 }
+_SERVING = {"workers", "max_chunk"}  # keywords of stellate.mesh alone
 _AUDITS = {"standard": pb.AUDIT_STANDARD, "thorough": pb.AUDIT_THOROUGH}
 _LIMITS = {field.name for field in pb.MeshLimits.DESCRIPTOR.fields}
 
@@ -64,6 +65,8 @@ def mesh_spec(oracle: CheckedOracle, epsilon: float, criteria: dict[str, Any]) -
             _set(spec, name, _audit(value))
         elif name == "seeds":
             spec.seeds.CopyFrom(to_wire(_points(value)))
+        elif name in _SERVING:
+            raise TypeError(f"{name!r} is for who serves the mesh, not for declaring it")
         else:
             raise TypeError(_unknown(name))
     return spec
@@ -100,7 +103,7 @@ def _points(seeds: Any) -> np.ndarray:
 
 
 def _unknown(name: str) -> str:
-    known = sorted(_CRITERIA | _LIMITS | set(_SPEC) | {"audit", "seeds", "workers"})
+    known = sorted(_CRITERIA | _LIMITS | set(_SPEC) | _SERVING | {"audit", "seeds"})
     near = difflib.get_close_matches(name, known, 1)
     hint = f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(known)}"
     return f"unknown keyword {name!r}{hint}"

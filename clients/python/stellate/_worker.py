@@ -7,15 +7,15 @@ import queue
 import threading
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, Callable
 
 import grpc
 
+from . import _enums
 from ._arrays import fill, from_wire
 from ._generated import oracle_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
-from ._generated.mesh_pb2 import MeshState
 from ._generated.stellate_pb2 import GetMeshRequest
 from ._retry import Outage, Patience
 from .errors import ExecutorError, FailedPrecondition, InvalidArgument, StellateError, from_rpc
@@ -25,6 +25,7 @@ _ANSWER_BYTES = 3_000_000  # an answer has to stay below the server's 4 MB
 _MESSAGE_BYTES = 4000
 _CALL_SECONDS = 30.0
 _LOOK_AGAIN_SECONDS = 0.1
+_KINDS = (pb.QUERY_KIND_CLOSEST_POINT, pb.QUERY_KIND_INTERSECT_FLAT)
 _BUSY_SHARE = 0.25  # of the time that the server bears silence
 
 
@@ -36,10 +37,8 @@ def answer(oracle: CheckedOracle, chunk: pb.QueryChunk) -> pb.ServeOracleRequest
         bases = from_wire(chunk.bases, len(points), d, k)
         radii = from_wire(chunk.radii, len(points))
         answers, found = oracle.intersections(points, bases, radii)
-    elif chunk.kind == pb.QUERY_KIND_CLOSEST_POINT:
-        answers, found = oracle.closest_points(points)
     else:
-        raise ValueError(f"the server asks a question of kind {chunk.kind}, unknown to this client")
+        answers, found = oracle.closest_points(points)
     request = pb.ServeOracleRequest()
     reply = request.answers
     reply.lease = chunk.lease
@@ -63,6 +62,16 @@ def check_max_chunk(max_chunk: int | None) -> int | None:
     if not isinstance(max_chunk, numbers.Integral) or max_chunk < 1:
         raise InvalidArgument(f"max_chunk has to be a whole number from 1 on, and is {max_chunk!r}")
     return int(max_chunk)
+
+
+def join_all(threads: Iterable[threading.Thread], seconds: float | None) -> bool:
+    """Waits so long at most for the end of all; None: for ever. Whether it has come."""
+    deadline = None if seconds is None else time.monotonic() + seconds
+    ended = True
+    for thread in threads:
+        thread.join(None if deadline is None else max(0.0, deadline - time.monotonic()))
+        ended = ended and not thread.is_alive()
+    return ended
 
 
 class _Broken(Exception):
@@ -233,6 +242,14 @@ class Worker:
             self._outage.heard()
             kind = response.WhichOneof("message")
             if kind == "queries":
+                if response.queries.kind not in _KINDS:  # another worker may be newer
+                    unknown = StellateError(
+                        f"the server asks a question of kind {response.queries.kind}, which this "
+                        "version does not know",
+                        "PROTOCOL",
+                    )
+                    self._on_failure(unknown)
+                    raise unknown
                 outbox.begin(response.queries.lease)
                 try:
                     reply = self._ask(self._oracle, response.queries)
@@ -248,7 +265,7 @@ class Worker:
                 if response.welcome.answer_seconds > 0:
                     outbox.say_busy_every(_BUSY_SHARE * response.welcome.answer_seconds)
             elif kind == "over":
-                state = response.over.state.removeprefix("MESH_STATE_")
+                state = _enums.state_of(response.over.state)
                 outbox.end()
         return state
 
@@ -262,7 +279,7 @@ class Worker:
             except grpc.RpcError:
                 return ""
             if mesh.HasField("end_time"):
-                return MeshState.Name(mesh.state).removeprefix("MESH_STATE_")
+                return _enums.state(mesh.state)
             # It is just about to end.
             if time.monotonic() > give_up or self._stopped.wait(_LOOK_AGAIN_SECONDS):
                 return ""

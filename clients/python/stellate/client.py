@@ -6,11 +6,11 @@ import dataclasses
 import datetime
 import re
 from collections.abc import Iterator
-from types import TracebackType
 from typing import Any, Callable, TypeVar
 
 import grpc
 
+from . import _enums
 from ._credentials import Credentials, stays_on_this_machine
 from ._download import Parts
 from ._epsilon import choose
@@ -38,7 +38,8 @@ class MeshInfo:
     """A mesh on the server, without its geometry."""
 
     name: str  # "meshes/<unguessable>"
-    state: str  # "WAITING", "RUNNING", "SUCCEEDED", "STOPPED", "CANCELLED" or "FAILED"
+    # "WAITING", "RUNNING", "SUCCEEDED", "STOPPED", "CANCELLED", "FAILED"; "UNKNOWN": a newer one
+    state: str
     label: str
     dimension: int
     ambient_dimension: int
@@ -68,7 +69,7 @@ class MeshInfo:
             report = Report.from_wire(mesh.report, mesh.spec.epsilon or None)
         return cls(
             name=mesh.name,
-            state=mesh_pb2.MeshState.Name(mesh.state).removeprefix("MESH_STATE_"),
+            state=_enums.state(mesh.state),
             label=mesh.spec.label,
             dimension=mesh.spec.dimension,
             ambient_dimension=mesh.spec.ambient_dimension,
@@ -95,6 +96,12 @@ class ServerInfo:
     max_rounds: int
     max_meshes: int
     max_message_bytes: int
+    owner_meshes: int  # of one owner at once, where the server tells owners apart
+    max_memory_bytes: int  # of all meshes, as the server estimates it
+    owner_memory_bytes: int  # of one owner's meshes
+    max_workers: int  # of one mesh
+    max_watchers: int  # of one mesh, downloads included
+    check_share: float  # of the queries, asked of two workers to compare the answers
 
 
 class Client:
@@ -297,12 +304,7 @@ class Client:
     def __enter__(self) -> Client:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self.close()
 
 

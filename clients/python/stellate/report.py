@@ -9,6 +9,7 @@ import re
 import textwrap
 from typing import Any
 
+from . import _enums
 from ._generated import mesh_pb2 as pb
 from ._version import __version__
 
@@ -22,15 +23,11 @@ def _copy_fields(cls: type, message: Any) -> Any:
     return cls(**values)
 
 
-def _enum_name(enum: Any, value: int, prefix: str) -> str:
-    return enum.Name(value).removeprefix(prefix)
-
-
 @dataclasses.dataclass(frozen=True)
 class Progress:
     """A picture of a mesh at work."""
 
-    phase: str  # "SEEDING", "REFINING", "CERTIFYING" or "DONE"
+    phase: str  # "SEEDING", "REFINING", "CERTIFYING" or "DONE"; "UNKNOWN": of a newer server
     round: int  # batches of queries answered
     queries: int  # queries answered
     vertices: int
@@ -47,8 +44,8 @@ class Progress:
     @classmethod
     def from_wire(cls, message: pb.Progress) -> Progress:
         plain = [f.name for f in dataclasses.fields(cls) if f.name != "phase"]
-        phase = _enum_name(pb.Phase, message.phase, "PHASE_")
-        return cls(phase=phase, **{name: getattr(message, name) for name in plain})
+        values = {name: getattr(message, name) for name in plain}
+        return cls(phase=_enums.phase(message.phase), **values)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,6 +95,7 @@ class Certificate:
     declared_reach: float  # 0: none
     reach_refuted: bool  # points of the manifold contradict it; the verdict names them
     proved_distance: float  # PROVED: bounds the Hausdorff distance to the components it meets
+    answers_held: int = 0  # answers of the whole run, beside vertices, held against the mesh
 
 
 @dataclasses.dataclass(frozen=True)
@@ -186,7 +184,7 @@ class Report:
         if message.HasField("failure"):
             failure = Failure(message.failure.reason, message.failure.message)
         return cls(
-            termination=_enum_name(pb.Termination, message.termination, "TERMINATION_"),
+            termination=_enums.termination(message.termination),
             failure=failure,
             counts=_copy_fields(Counts, message.counts),
             certificate=_certificate(message.certificate),
@@ -225,9 +223,8 @@ class Report:
 
 
 def _certificate(message: pb.Certificate) -> Certificate:
-    level = _enum_name(pb.CertificateLevel, message.level, "CERTIFICATE_LEVEL_")
     plain = _copy_fields(Certificate, message)
-    return dataclasses.replace(plain, level="UNKNOWN" if level == "UNSPECIFIED" else level)
+    return dataclasses.replace(plain, level=_enums.level(message.level))
 
 
 def _plain_verdict(c: Certificate) -> str:

@@ -8,6 +8,7 @@ import pytest
 
 _ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(_ROOT / "clients" / "python"))
+sys.path.insert(0, str(_ROOT / "tests" / "clients" / "python"))  # shapes, topology, fake_server
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
 import stellate  # noqa: E402

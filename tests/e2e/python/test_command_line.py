@@ -145,3 +145,12 @@ def test_help(shell):
     assert "MODULE:OBJECT" in shell("--help").stdout
     for command in ("mesh", "declare", "serve", "download", "doctor"):
         assert shell(command, "--help").returncode == 0
+
+
+def test_declaring_takes_nothing_that_only_serving_needs(shell):
+    for flag in ("--workers", "--max-chunk"):
+        refused = shell("declare", "shapes:circle", "-e", "0.5", flag, "2")
+        assert refused.returncode == 2 and f"unrecognized arguments: {flag}" in refused.stderr
+    with pytest.raises(TypeError, match="'workers' is for who serves the mesh"):
+        with stellate.Client() as client:
+            client.create(stellate.manifolds.Sphere(1), 0.5, workers=2)

@@ -111,6 +111,12 @@ struct ServerHealth {
   std::vector<std::string> protocols;
   std::uint32_t max_dimension = 0, max_ambient_dimension = 0, max_meshes = 0;
   std::uint64_t max_vertices = 0, max_rounds = 0, max_message_bytes = 0;
+  std::uint32_t owner_meshes = 0;      // of one owner at once, where the server tells owners apart
+  std::uint64_t max_memory_bytes = 0;  // of all meshes, as the server estimates it
+  std::uint64_t owner_memory_bytes = 0;  // of one owner's meshes
+  std::uint32_t max_workers = 0;         // of one mesh
+  std::uint32_t max_watchers = 0;        // of one mesh, downloads included
+  double check_share = 0;  // of the queries, asked of two workers to compare the answers
 };
 
 // Asks a server how it is. kServerFailed when none answers within `timeout_seconds`.

@@ -92,6 +92,9 @@ struct Certificate {
   double declared_reach = 0;   // MeshOptions::reach; 0: none
   bool reach_refuted = false;  // points of the manifold contradict it; the verdict names them
   double proved_distance = 0;  // kProved: a bound of the Hausdorff distance to these components
+
+  std::uint64_t answers_held =
+      0;  // answers of the whole run, beside vertices, held against the mesh
 };
 
 struct Report {

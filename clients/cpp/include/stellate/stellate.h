@@ -10,3 +10,4 @@
 #include "stellate/monitor.h"
 #include "stellate/oracle.h"
 #include "stellate/pointwise.h"
+#include "stellate/serve.h"

@@ -82,14 +82,6 @@ def test_a_mesh_of_another_kind_is_not_served():
             stellate.serve(CIRCLE, "meshes/x", server=address)
 
 
-def test_an_unknown_question_is_not_answered_with_nonsense():
-    fake = FakeServer(chunks=[oracle_pb2.QueryChunk(lease=1, kind=9, points=to_wire(TRIANGLE))])
-    with serving(fake) as address, pytest.raises(ValueError, match="kind 9"):
-        stellate.serve(CIRCLE, "meshes/x", server=address)
-    assert fake.answers[0].WhichOneof("message") == "failure"
-    assert "kind 9" in fake.answers[0].failure.message
-
-
 def test_nobody_listens():
     with pytest.raises(stellate.Unavailable):
         stellate.mesh(CIRCLE, 0.1, server="127.0.0.1:1")

@@ -128,7 +128,7 @@ AS_JSON = (
     '"min_angle_degrees": 0, "max_tangent_angle_degrees": 0, "max_barycentre_distance": 0, '
     '"estimated_reach": null, "epsilon_over_reach": 0, "components": 1, '
     '"euler_characteristic": -8, "orientable": false, "level": "UNKNOWN", '
-    '"declared_reach": 0, "reach_refuted": false, "proved_distance": 0}, "elapsed_seconds": 0.5, '
+    '"declared_reach": 0, "reach_refuted": false, "proved_distance": 0, "answers_held": 0}, "elapsed_seconds": 0.5, '
     f'"version": "{stellate.__version__}"}}'
 )
 
