@@ -12,9 +12,9 @@
 
 namespace stellate::server {
 
-// What the server counts, in Prometheus's text format; docs/running/metrics.md lists it. Counters are kept
-// as things happen and cost an atomic addition; gauges are counted when somebody asks. No metric
-// names an owner or a mesh.
+// What the server counts, in Prometheus's text format; docs/running/metrics.md lists it. Counters
+// are kept as things happen and cost an atomic addition; gauges are counted when somebody asks. No
+// metric names an owner or a mesh.
 class Metrics {
  public:
   Metrics();

@@ -46,9 +46,10 @@ def broken(page: pathlib.Path, text: str) -> list[str]:
         target = (page.parent / path).resolve() if path else page
         if not target.exists():
             found.append(f"{page.relative_to(ROOT)}: {link} leads nowhere")
-        elif anchor and target.suffix == ".md":
-            if anchor not in anchors(text if target == page else target.read_text()):
-                found.append(f"{page.relative_to(ROOT)}: {link} names no heading there")
+            continue
+        there = text if target == page else target.read_text() if target.suffix == ".md" else None
+        if anchor and there is not None and anchor not in anchors(there):
+            found.append(f"{page.relative_to(ROOT)}: {link} names no heading there")
     return found
 
 

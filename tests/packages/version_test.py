@@ -43,7 +43,9 @@ class Version(unittest.TestCase):
             stated = re.findall(pattern, (ROOT / path).read_text())
             self.assertTrue(stated, path)
             for version in stated:  # all of it, or the part that has to be the same
-                self.assertTrue(f"{VERSION.strip()}.".startswith(f"{version}."), f"{path}: {version}")
+                self.assertTrue(
+                    f"{VERSION.strip()}.".startswith(f"{version}."), f"{path}: {version}"
+                )
 
 
 if __name__ == "__main__":
