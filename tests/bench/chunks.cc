@@ -26,7 +26,7 @@ using namespace stellate::server;
 constexpr double kBegin = 1;  // seconds: time zero is no time
 using Rounds = std::vector<std::vector<Dispatch::Block>>;
 
-// Seconds, but for the count.
+// Seconds, except the count.
 struct Crew {
   int workers = 1;
   double per_query = 0;

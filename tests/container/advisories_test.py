@@ -57,7 +57,7 @@ def changelog(package: str) -> str:
 
 class Advisories(unittest.TestCase):
     def test_the_versions_are_those_that_were_looked_at(self) -> None:
-        """But for Debian's own updates of them, whose changelogs the next test but one reads."""
+        """Except Debian's own updates of them, whose changelogs the next test but one reads."""
         there = installed()
         for entry in packages():
             for package, version in there.get(entry["source"], []):

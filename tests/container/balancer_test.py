@@ -117,7 +117,7 @@ class Balancer(unittest.TestCase):
             self.addCleanup(self.replicas[-1].kill)
         self.port = free_port()
         self.front = f"localhost:{self.port}"
-        # The configuration as it ships, but for where it listens and finds its certificates. Where
+        # The configuration as it ships, except where it listens and finds its certificates. Where
         # the machine has no name server, the names of servers are not asked for again.
         text = (ROOT / "docker/kubernetes/haproxy.cfg").read_text()
         text, fronts = re.subn(r"bind :7717 ", f"bind 127.0.0.1:{self.port} ", text)

@@ -149,7 +149,7 @@ class Kubernetes(unittest.TestCase):
 
 
 class ServerOfTheManifest(unittest.TestCase):
-    """The real program with the manifest's arguments, but for its ports and its directories."""
+    """The real program with the manifest's arguments, except its ports and its directories."""
 
     def setUp(self) -> None:
         scratch = tempfile.TemporaryDirectory()

@@ -143,7 +143,7 @@ class Live(unittest.TestCase):
 
     @classmethod
     def _metrics_address(cls, pid: int) -> str:
-        """Where the process listens: its socket is a unix one but for that."""
+        """Where the process listens: its other socket is a unix one."""
         inodes = {os.readlink(fd) for fd in _links(f"/proc/{pid}/fd")}
         for line in pathlib.Path("/proc/net/tcp").read_text().splitlines()[1:]:
             fields = line.split()
@@ -153,7 +153,7 @@ class Live(unittest.TestCase):
 
     @classmethod
     def _start_prometheus(cls, folder: pathlib.Path) -> str:
-        """As it ships, but for where the server is and how often it is asked."""
+        """As it ships, except where the server is and how often it is asked."""
         text = (PROMETHEUS / "prometheus.yml").read_text()
         for old, new in (("stellated:9717", cls.metrics), ("interval: 5s", "interval: 200ms")):
             assert old in text, old

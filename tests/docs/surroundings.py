@@ -83,7 +83,7 @@ class Surroundings:
 
     def _grow_tree(self, fresh: bool) -> None:
         # Scripts find the tree by their own place: what they lie in has to be a copy.
-        # Stubs are made first, lest somebody else's import makes them while they are copied.
+        # Stubs are made first, or somebody else's import may make them while they are copied.
         runpy.run_path(str(ROOT / "clients/python/stellate/_stubs.py"))["ensure"]()
         passing = shutil.ignore_patterns("__pycache__", ".generated-*")
         for item in ROOT.iterdir():

@@ -17,7 +17,7 @@ std::string GeometryOf(const server::Session& session);
 
 // Runs a session with workers that a script directs, chunk by chunk: they answer truly, wrongly,
 // twice, late, never, with others' leases, come, go, and cancel. Everything happens on the calling
-// thread, but for limits of a few milliseconds that end what is never answered. A script that is
+// thread, except limits of a few milliseconds that end what is never answered. A script that is
 // used up answers truly. Requires what holds whatever the script.
 struct Played {
   bool truthful = true;    // nothing was said that is not so, and nobody ended it

@@ -26,7 +26,7 @@ inline double ProcessorSeconds() {
   return static_cast<double>(std::clock()) / static_cast<double>(CLOCKS_PER_SEC);
 }
 
-// What a client would declare of `oracle`, but for its sizes.
+// What a client would declare of `oracle`, except its sizes.
 inline core::Specification SpecificationFor(const Oracle& oracle, double epsilon) {
   core::Specification spec;
   spec.dimension = oracle.dimension();

@@ -11,7 +11,7 @@ namespace stellate::truth {
 enum class Outcome {
   kRight,       // certified, and it is so
   kFalse,       // certified, and it is not so
-  kUnseen,      // the same, but for components that no answer fell on
+  kUnseen,      // the same, except components that no answer fell on
   kRefused,     // converged, not certified
   kUnfinished,  // ended before
 };

@@ -13,7 +13,7 @@ constexpr double kTurn = 2 * std::numbers::pi;
 constexpr int kSamplesATerm = 160;
 constexpr int kReachSamples = 500;
 
-// min |q - p|^2 / (2 dist(q, T_p)) over points of the curves: their reach, but for the sampling.
+// min |q - p|^2 / (2 dist(q, T_p)) over points of the curves: their reach, up to the sampling.
 double ReachOf(const std::vector<Curve>& curves) {
   std::vector<VectorXd> points, tangents;
   for (const Curve& curve : curves) {

@@ -56,7 +56,7 @@ class Runner:
         return result
 
     def fit_count(self, mesher: Mesher, count: int) -> dict[str, Any]:
-        """A run with about so many vertices."""
+        """A run with about that many vertices."""
         start = mesher.start_size or float(count)
         return self.fit(mesher, start, ("vertices", count, mesher.exponent), COUNT_TOLERANCE)
 

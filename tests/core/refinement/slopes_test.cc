@@ -57,7 +57,7 @@ INSTANTIATE_TEST_SUITE_P(Manifolds, Slopes,
                                            Range{"clifford-torus", {0.2, 0.1, 0.05}},
                                            Range{"so3", {0.45, 0.34, 0.25}}));
 
-// Every round is a round trip to the oracle, which may be far away; every query may be dear.
+// Every round is a round trip to the oracle, which may be far away; every query may be expensive.
 TEST(Cost, OfTenThousandVerticesIsFewRoundTripsAndAboutOneQueryEach) {
   const FinishedRun run = RunMesher("torus:1:0.4", 0.025);
   const core::Counts& counts = run.report.counts;

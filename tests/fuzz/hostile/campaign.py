@@ -5,7 +5,7 @@
 Starts $STELLATED. A round is every attack once, in random order, from two threads at once. All the
 while honest meshes are made by the command line ($STELLATE); each has to be the same, byte for byte,
 as the one made before the first attack. The server has to live, to answer, to stop when it is told,
-to hold no more memory in the end than early on, but for --slack-mb, nor ever more than --peak-mb
+to hold no more memory in the end than early on, within --slack-mb, and never more than --peak-mb
 above what it held before the first attack, and to keep its log in order: every line an object, of
 which a flood makes few.
 """

@@ -154,7 +154,7 @@ class _Holder:
 
 
 def _hold(path: str, calls: int, seconds: float) -> Stranger:
-    """Holds so many calls of an rpc for so many seconds, hangs up and comes again."""
+    """Holds that many calls of an rpc for that long, hangs up and comes again."""
 
     def stranger(host: str, port: int, end: float, _: float) -> None:
         while time.time() < end:

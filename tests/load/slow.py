@@ -1,7 +1,7 @@
 """Oracles that take their time: what sharing out their queries costs.
 
-    dear.py                    a fixed cost for each chunk, and dear queries, of a torus
-    dear.py --quick            a fifth of it
+    slow.py                    a fixed cost for each chunk, and slow queries, of a torus
+    slow.py --quick            a fifth of it
 
 Oracles sleep, so that any number of them fits on one core. Efficiency is queries times the time of
 one, over workers times the time of the whole mesh, the mesher's own included. Each mesh is compared
@@ -11,11 +11,8 @@ with that of an oracle that does not sleep.
 from __future__ import annotations
 
 import argparse
-import os
 import pathlib
-import subprocess
 import sys
-import tempfile
 import threading
 import time
 from typing import Any
@@ -90,7 +87,7 @@ def fixed_costs(address: str, quick: bool) -> bool:
     return good
 
 
-def dear_queries(address: str, quick: bool) -> bool:
+def slow_queries(address: str, quick: bool) -> bool:
     """Some workers, a cost for each query."""
     cases = [(1, 0.001), (4, 0.02), (8, 0.02), (8, 0.1), (32, 0.02), (32, 0.1), (60, 0.1), (60, 1)]
     good = True
@@ -116,22 +113,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true")
     arguments = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        ready = pathlib.Path(folder) / "ready"
-        server = subprocess.Popen(
-            [os.environ["STELLATED"], "--listen", "127.0.0.1:0", "--ready-file", str(ready)]
-            + ["--log-level", "warning"],
-            stdout=subprocess.DEVNULL,
-        )
-        while not ready.exists():
-            time.sleep(0.01)
-        try:
-            address = ready.read_text().strip()
-            good = fixed_costs(address, arguments.quick)
-            good = dear_queries(address, arguments.quick) and good
-        finally:
-            server.terminate()
-            server.wait()
+    with stellate.Server(listen="127.0.0.1:0") as server:
+        good = fixed_costs(server.address, arguments.quick)
+        good = slow_queries(server.address, arguments.quick) and good
     print("all meshes as without a sleep" if good else "NOT all meshes as without a sleep")
     return 0 if good else 1
 
