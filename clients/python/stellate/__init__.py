@@ -20,6 +20,7 @@ from ._face import download, mesh, serve, watch  # noqa: E402
 from ._findings import CheckReport, Finding  # noqa: E402
 from ._formats import check_save  # noqa: E402
 from ._mesh import Mesh, load_txt  # noqa: E402
+from ._pull import Chunk, Puller, pull  # noqa: E402
 from ._server import Server, find_stellated  # noqa: E402
 from ._version import __version__ as __version__  # noqa: E402
 from .client import Client, MeshInfo, ServerInfo  # noqa: E402
@@ -50,6 +51,7 @@ __all__ = [
     "Cancelled",
     "Certificate",
     "CheckReport",
+    "Chunk",
     "Client",
     "Counts",
     "Credentials",
@@ -71,6 +73,7 @@ __all__ = [
     "OracleError",
     "Progress",
     "ProgressBar",
+    "Puller",
     "Report",
     "SaveError",
     "Server",
@@ -88,6 +91,7 @@ __all__ = [
     "manifolds",
     "mesh",
     "progress_bar",
+    "pull",
     "serve",
     "watch",
     "workers_on",

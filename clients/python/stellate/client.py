@@ -6,7 +6,7 @@ import dataclasses
 import datetime
 import re
 from collections.abc import Iterator
-from typing import Any, Callable, TypeVar
+from typing import TYPE_CHECKING, Any, Callable, TypeVar
 
 import grpc
 
@@ -24,6 +24,9 @@ from ._worker import Ask, Worker, answer
 from .errors import InvalidArgument, MeshNotFound, StellateError, from_rpc
 from .oracle import CheckedOracle
 from .report import Progress, Report
+
+if TYPE_CHECKING:
+    from ._pull import Puller
 
 _CALL_SECONDS = 30.0
 _CONNECT_SECONDS = 1.0
@@ -244,6 +247,15 @@ class Client:
         return Worker(
             self._stub, checked, name, worker, on_failure, self._patience, quiet, ask, max_chunk
         )
+
+    def pull(self, name: str, *, worker: str = "", max_chunk: int | None = None) -> Puller:
+        """Serves a mesh from a loop of the caller's, on the caller's own thread: see stellate.pull.
+
+        What the mesh was declared with, answers have to have.
+        """
+        from ._pull import pull_by_name
+
+        return pull_by_name(self, name, worker, max_chunk)
 
     def watch(self, name: str, from_revision: int = 0, progress_only: bool = False) -> Watch:
         """The mesh's events as they come, in the protocol's own messages."""
