@@ -34,8 +34,10 @@ CLIENTS = ROOT / "clients"
 COMMANDS = {
     "node": ["node", CLIENTS / "node/dist/examples/timing.js"],
     "go": [ROOT / "build/bench/timing-go"],
+    "rust": [CLIENTS / "rust/target/release/examples/timing"],
 }
 BUILDS = {  # in the client's directory, in a shell
+    "rust": "cargo build --quiet --locked --release --examples",
     "node": "npm ci --ignore-scripts --silent && npm run --silent build",
     "go": 'eval "$(../../tests/languages/go_toolchain)" && go generate ./... && '
     "go build -o ../../build/bench/timing-go ./cmd/timing",

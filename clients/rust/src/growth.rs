@@ -1,0 +1,151 @@
+//! The client's copy of a mesh that grows by deltas.
+
+use crate::error::Error;
+use crate::proto::{DeltaChunk, MeshDelta};
+use crate::rows::{row_at, sorted_order};
+use crate::wire::{indices, numbers};
+use crate::Mesh;
+
+const UNSETTLED: usize = 300_000; // vertex numbers of removed simplices at least; else half of those there
+
+/// Vertices and simplices as of the last complete revision. What comes and goes is put aside, and
+/// settled for many revisions at once. An error is a delta that does not fit what came before.
+#[derive(Debug)]
+pub struct GrowingComplex {
+    k: usize,
+    d: usize,
+    revision: u64,
+    coordinates: Vec<f64>,
+    rows: Vec<u32>, // in lexicographic order
+    added: Vec<u32>,
+    removed: Vec<u32>,
+    pending: Vec<MeshDelta>,
+}
+
+impl GrowingComplex {
+    /// The empty k-complex in R^d.
+    pub fn new(k: usize, d: usize) -> Self {
+        let empty = Vec::new;
+        GrowingComplex {
+            k,
+            d,
+            revision: 0,
+            coordinates: Vec::new(),
+            rows: empty(),
+            added: empty(),
+            removed: empty(),
+            pending: Vec::new(),
+        }
+    }
+
+    /// Takes one chunk; true when a revision is complete with it.
+    pub fn absorb(&mut self, chunk: DeltaChunk) -> Result<bool, Error> {
+        let delta = chunk.delta.unwrap_or_default();
+        let revision = delta.revision;
+        let begun = self.pending.first().map_or(revision, |first| first.revision);
+        if revision <= self.revision || begun != revision {
+            return Err(Error::protocol(format!("revision {revision} is out of order")));
+        }
+        self.pending.push(delta);
+        if !chunk.complete {
+            return Ok(false);
+        }
+        let whole = std::mem::take(&mut self.pending);
+        for part in &whole {
+            let points = numbers(part.points.as_ref(), &[-1, self.d as i64]).map_err(Error::protocol)?;
+            self.add_points(part.first_vertex, &points)?;
+        }
+        for part in &whole {
+            self.change(part)?;
+        }
+        self.revision = revision;
+        if self.removed.len() > UNSETTLED.max(self.rows.len() / 2) {
+            self.settle()?;
+        }
+        Ok(true)
+    }
+
+    /// Drops the chunks of a revision that was cut short: it will be sent again.
+    pub fn forget_pending(&mut self) {
+        self.pending.clear();
+    }
+
+    /// Back to the empty mesh.
+    pub fn reset(&mut self) {
+        *self = GrowingComplex::new(self.k, self.d);
+    }
+
+    pub(crate) fn add_points(&mut self, first: u64, block: &[f64]) -> Result<(), Error> {
+        let count = (self.coordinates.len() / self.d) as u64;
+        if !block.is_empty() && first != count {
+            let what = format!("a delta starts at vertex {first}, and there are {count}");
+            return Err(Error::protocol(what));
+        }
+        self.coordinates.extend_from_slice(block);
+        Ok(())
+    }
+
+    pub(crate) fn change(&mut self, delta: &MeshDelta) -> Result<(), Error> {
+        let shape = [-1, self.k as i64 + 1];
+        let added = indices(delta.added.as_ref(), &shape).map_err(Error::protocol)?;
+        let removed = indices(delta.removed.as_ref(), &shape).map_err(Error::protocol)?;
+        let count = self.coordinates.len() / self.d;
+        if let Some(id) = added.iter().find(|&&id| id as usize >= count) {
+            return Err(Error::protocol(format!("a simplex has vertex {id} of {count} vertices")));
+        }
+        self.added.extend(added);
+        self.removed.extend(removed);
+        Ok(())
+    }
+
+    /// Makes `mesh` cheap.
+    pub fn settle(&mut self) -> Result<(), Error> {
+        if self.added.is_empty() && self.removed.is_empty() {
+            return Ok(());
+        }
+        let width = self.k + 1;
+        let first_removed = ((self.rows.len() + self.added.len()) / width) as u32;
+        let all = [&self.rows[..], &self.added, &self.removed].concat();
+        let order = sorted_order(&all, width);
+        let mut left = Vec::with_capacity(self.rows.len() + self.added.len());
+        let same = |a: &u32, b: &u32| row_at(&all, width, *a) == row_at(&all, width, *b);
+        for equal in order.chunk_by(same) {
+            let gone = equal.iter().filter(|&&row| row >= first_removed).count();
+            match (equal.len() - gone, gone) {
+                (there, gone) if there == gone => {}
+                (there, gone) if there == gone + 1 => left.extend(row_at(&all, width, equal[0])),
+                (there, gone) if there < gone => {
+                    return Err(Error::protocol("a delta removes simplices that are not there"))
+                }
+                _ => return Err(Error::protocol("a delta adds simplices that are there already")),
+            }
+        }
+        self.rows = left;
+        self.added.clear();
+        self.removed.clear();
+        Ok(())
+    }
+
+    /// The mesh as of the last complete revision.
+    pub fn mesh(&mut self) -> Result<Mesh, Error> {
+        self.settle()?;
+        Ok(Mesh {
+            dimension: self.k,
+            ambient_dimension: self.d,
+            points: self.coordinates.clone(),
+            simplices: self.rows.clone(),
+            revision: self.revision,
+            progress: None,
+            report: None,
+        })
+    }
+
+    /// The last complete one.
+    pub fn revision(&self) -> u64 {
+        self.revision
+    }
+
+    pub(crate) fn set_revision(&mut self, revision: u64) {
+        self.revision = revision;
+    }
+}

@@ -1,0 +1,43 @@
+//! Meshes compact smooth manifolds of any dimension, without boundary, that are known through oracles
+//! alone.
+//!
+//! Arrays are flat, in C order: point i of a batch in R^d is `x[i * d..(i + 1) * d]`, and entry (row,
+//! column) of its basis `[d, k]` is `bases[(i * d + row) * k + column]`.
+
+#![warn(missing_docs)]
+
+mod client;
+mod credentials;
+mod error;
+mod growth;
+pub mod manifolds;
+mod mesh;
+mod oracle;
+mod orientation;
+mod progress;
+mod retry;
+mod rows;
+mod server;
+mod session;
+mod spec;
+mod wire;
+mod worker;
+
+/// The protocol's own messages.
+#[allow(missing_docs, clippy::doc_lazy_continuation, clippy::doc_overindented_list_items)]
+pub mod proto {
+    tonic::include_proto!("stellate.v1");
+}
+
+pub use client::{Client, ClientOptions};
+pub use credentials::Credentials;
+pub use error::{Error, Kind};
+pub use growth::GrowingComplex;
+pub use mesh::{check_save, report_text, Mesh};
+pub use oracle::{BoxError, Capabilities, Oracle};
+pub use progress::progress_bar;
+pub use server::{find_stellated, Server, ServerOptions};
+pub use session::{download, mesh, serve, watch, watch_by_name};
+pub use session::{Cancel, Connection, Growth, OnProgress, RunOptions};
+pub use spec::MeshOptions;
+pub use worker::WorkerOptions;

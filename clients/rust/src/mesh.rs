@@ -1,0 +1,147 @@
+//! A mesh, finished or growing.
+
+use std::fmt::{Display, Write as _};
+use std::fs;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use crate::error::{Error, Kind};
+use crate::orientation::orient;
+use crate::proto::{Progress, Report};
+
+/// A simplicial k-complex in R^d.
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    /// k
+    pub dimension: usize,
+    /// d
+    pub ambient_dimension: usize,
+    /// `[n, d]`, one point after the other.
+    pub points: Vec<f64>,
+    /// `[m, k+1]`, zero-based, ascending in each row, rows in lexicographic order.
+    pub simplices: Vec<u32>,
+    /// One for each round that changed the mesh.
+    pub revision: u64,
+    /// How it stood at this revision.
+    pub progress: Option<Progress>,
+    /// How it ended and what is proved; None while it grows.
+    pub report: Option<Report>,
+}
+
+impl Mesh {
+    /// n
+    pub fn vertex_count(&self) -> usize {
+        self.points.len() / self.ambient_dimension
+    }
+
+    /// m
+    pub fn simplex_count(&self) -> usize {
+        self.simplices.len() / (self.dimension + 1)
+    }
+
+    /// Whether the mesh is finished and proved good.
+    pub fn certified(&self) -> bool {
+        let proved = self.report.as_ref().and_then(|report| report.certificate.as_ref());
+        proved.is_some_and(|certificate| certificate.certified)
+    }
+
+    /// The simplices with vertices exchanged so that neighbours agree; None if not orientable.
+    pub fn oriented_simplices(&self) -> Option<Vec<u32>> {
+        orient(&self.simplices, self.dimension + 1)
+    }
+
+    /// Writes .txt (any k and d, exact: "k d nv ns", coordinates, ids from zero) or .obj (curves and
+    /// surfaces, d <= 3, oriented where that can be). `stellate download` writes the other formats.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
+        let path = path.as_ref();
+        check_save(path, self.dimension, self.ambient_dimension)?;
+        let part = path.with_extension("part"); // the file takes its name when it is whole
+        let written = fs::File::create(&part).and_then(|file| {
+            let mut out = BufWriter::new(file);
+            if path.extension().is_some_and(|ending| ending == "txt") {
+                self.write_txt(&mut out)?;
+            } else {
+                self.write_obj(&mut out)?;
+            }
+            out.flush()?;
+            fs::rename(&part, path)
+        });
+        written.map_err(|error| Error::new(Kind::Save, "FORMAT", format!("{}: {error}", path.display())))
+    }
+
+    fn write_txt(&self, out: &mut impl Write) -> io::Result<()> {
+        let (k, d) = (self.dimension, self.ambient_dimension);
+        writeln!(out, "{k} {d} {} {}", self.vertex_count(), self.simplex_count())?;
+        write_rows(out, "", self.points.iter(), d, "")?;
+        write_rows(out, "", self.simplices.iter(), k + 1, "")
+    }
+
+    fn write_obj(&self, out: &mut impl Write) -> io::Result<()> {
+        let filled = if self.ambient_dimension == 2 { " 0" } else { "" };
+        write_rows(out, "v ", self.points.iter(), self.ambient_dimension, filled)?;
+        let cells = self.oriented_simplices().unwrap_or_else(|| self.simplices.clone());
+        let letter = if self.dimension == 1 { "l " } else { "f " };
+        write_rows(out, letter, cells.iter().map(|id| id + 1), self.dimension + 1, "")
+    }
+}
+
+fn write_rows<T: Display>(
+    out: &mut impl Write,
+    before: &str,
+    values: impl Iterator<Item = T>,
+    width: usize,
+    after: &str,
+) -> io::Result<()> {
+    let mut line = String::new();
+    for (i, value) in values.enumerate() {
+        let space = if i % width == 0 { before } else { " " };
+        let _ = write!(line, "{space}{value}"); // into a string, which takes it
+        if (i + 1) % width == 0 {
+            writeln!(out, "{line}{after}")?;
+            line.clear();
+        }
+    }
+    Ok(())
+}
+
+/// Why a mesh of that kind cannot be saved under the name.
+pub fn check_save(path: impl AsRef<Path>, k: usize, d: usize) -> Result<(), Error> {
+    let path = path.as_ref();
+    let message = match path.extension().and_then(|ending| ending.to_str()) {
+        Some("txt") => return Ok(()),
+        Some("obj") if k <= 2 && d <= 3 => return Ok(()),
+        Some("obj") => ".obj holds curves and surfaces in the plane and in space: take .txt".to_string(),
+        _ => format!(
+            "{} has to end in .txt or .obj; \"stellate download\" writes the other formats",
+            path.display()
+        ),
+    };
+    Err(Error::new(Kind::Save, "FORMAT", message))
+}
+
+/// A report in a few lines, for people.
+pub fn report_text(report: &Report) -> String {
+    let counts = report.counts.unwrap_or_default();
+    let proved = report.certificate.clone().unwrap_or_default();
+    let failure = report.failure.clone().unwrap_or_default();
+    let word = if proved.certified { "CERTIFIED" } else { "NOT CERTIFIED" };
+    let ended = report.termination().as_str_name().trim_start_matches("TERMINATION_");
+    let verdict = if proved.verdict.is_empty() { &failure.message } else { &proved.verdict };
+    let mut text = format!(
+        "{word} ({ended}): {verdict}\n{} vertices, {} simplices, {} rounds, {} queries, {:.2} s\n\
+         {} components, Euler characteristic {}, orientable {}, estimated reach {:.3}\n",
+        counts.vertices,
+        counts.simplices,
+        counts.rounds,
+        counts.queries,
+        report.elapsed_seconds,
+        proved.components,
+        proved.euler_characteristic,
+        proved.orientable,
+        proved.estimated_reach,
+    );
+    for warning in &proved.warnings {
+        text += &format!("warning: {warning}\n");
+    }
+    text
+}

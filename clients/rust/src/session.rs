@@ -1,0 +1,348 @@
+//! A mesh from its declaration to its end: the server asks, the oracle answers, we watch.
+
+use std::sync::{Mutex, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use crate::client::{Client, ClientOptions};
+use crate::error::{Error, Kind};
+use crate::growth::GrowingComplex;
+use crate::mesh::Mesh;
+use crate::oracle::{Checked, Oracle};
+use crate::proto::watch_mesh_response::Event;
+use crate::proto::{
+    DownloadMeshRequest, Mesh as MeshInfo, MeshDelta, MeshState, Progress, WatchMeshRequest,
+};
+use crate::retry::Flag;
+use crate::server::{Server, ServerOptions};
+use crate::spec::MeshOptions;
+use crate::worker::{Worker, WorkerOptions};
+
+const FAREWELL: Duration = Duration::from_secs(2); // that a worker may take to end by itself
+
+/// Where the server is.
+pub enum Connection<'a> {
+    /// One is started, and stopped afterwards.
+    Own,
+    /// A connection that there is.
+    Client(&'a Client),
+    /// "host:port" or "unix:/path", and how to reach it.
+    Server(&'a str, ClientOptions),
+}
+
+/// Told how a mesh stands.
+pub type OnProgress<'a> = Box<dyn FnMut(&Progress) + 'a>;
+
+/// Cancels meshes, from any thread: `RunOptions::cancel`.
+#[derive(Clone, Debug, Default)]
+pub struct Cancel(Flag);
+
+impl Cancel {
+    /// The mesh ends with an error of kind `Cancelled`, which has the mesh so far.
+    pub fn cancel(&self) {
+        self.0.set();
+    }
+}
+
+/// How a mesh is made.
+pub struct RunOptions<'a> {
+    /// Where.
+    pub connection: Connection<'a>,
+    /// What is asked of it.
+    pub mesh: MeshOptions,
+    /// Streams on which the oracle is asked at once, each on a thread of its own.
+    pub workers: usize,
+    /// Most points that the oracle is asked at once; by default the server decides.
+    pub max_chunk: Option<usize>,
+    /// A mesh that is not proved good is an error of kind `NotCertified`.
+    pub require_certified: bool,
+    /// Called on this thread.
+    pub on_progress: Option<OnProgress<'a>>,
+    /// From elsewhere, the end.
+    pub cancel: Cancel,
+}
+
+impl Default for RunOptions<'_> {
+    /// One worker on a server of one's own.
+    fn default() -> Self {
+        RunOptions {
+            connection: Connection::Own,
+            mesh: MeshOptions::default(),
+            workers: 1,
+            max_chunk: None,
+            require_certified: false,
+            on_progress: None,
+            cancel: Cancel::default(),
+        }
+    }
+}
+
+/// Whether more of a growing mesh is wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Growth {
+    /// Yes.
+    GoOn,
+    /// No: the mesh is cancelled, or that of others left alone.
+    Leave,
+}
+
+fn with_client<T>(
+    connection: Connection,
+    use_it: impl FnOnce(&Client) -> Result<T, Error>,
+) -> Result<T, Error> {
+    match connection {
+        Connection::Client(client) => use_it(client),
+        Connection::Server(address, options) => use_it(&Client::new(address, options)?),
+        Connection::Own => {
+            let server = Server::start(&ServerOptions::default())?;
+            let client = Client::of(&server, ClientOptions::default())?;
+            use_it(&client)
+        }
+    }
+}
+
+/// Meshes the oracle's manifold. `epsilon` is the largest circumradius of a simplex, a length.
+pub fn mesh(oracle: &dyn Oracle, epsilon: f64, options: RunOptions) -> Result<Mesh, Error> {
+    let certified = options.require_certified;
+    let mut last = None;
+    run(oracle, epsilon, options, false, &mut |mesh| {
+        last = Some(mesh);
+        Growth::GoOn
+    })?;
+    let finished = last.ok_or_else(|| Error::protocol("it ended the watch too early"))?;
+    if !certified || finished.certified() {
+        return Ok(finished);
+    }
+    let verdict = finished.report.as_ref().and_then(|report| report.certificate.as_ref());
+    let verdict = verdict.map_or(String::new(), |certificate| certificate.verdict.clone());
+    let message = format!("the mesh is not certified: {verdict}");
+    let mut error = Error::new(Kind::NotCertified, "NOT_CERTIFIED", message);
+    error.mesh = Some(Box::new(finished));
+    Err(error)
+}
+
+/// The mesh as it grows, at every revision; the last one has its report.
+pub fn watch(
+    oracle: &dyn Oracle,
+    epsilon: f64,
+    options: RunOptions,
+    mut each: impl FnMut(Mesh) -> Growth,
+) -> Result<(), Error> {
+    run(oracle, epsilon, options, true, &mut each)
+}
+
+/// A mesh that others serve, as it grows.
+pub fn watch_by_name(
+    name: &str,
+    connection: Connection,
+    mut each: impl FnMut(Mesh) -> Growth,
+) -> Result<(), Error> {
+    with_client(connection, |client| {
+        let info = client.get(name)?;
+        let nobody = Flag::default();
+        client.runtime.block_on(follow(client, &info, nobody, None, true, &mut each))
+    })
+}
+
+/// One more worker for a mesh: see `Client::serve`.
+pub fn serve(
+    oracle: &dyn Oracle,
+    name: &str,
+    connection: Connection,
+    options: &WorkerOptions,
+) -> Result<String, Error> {
+    with_client(connection, |client| client.serve(oracle, name, options))
+}
+
+/// Fetches a mesh that is on a server: one that is over, or, with a revision, as it was then.
+pub fn download(name: &str, revision: u64, connection: Connection) -> Result<Mesh, Error> {
+    with_client(connection, |client| {
+        let info = client.get(name)?;
+        if info.end_time.is_none() && revision == 0 {
+            let message = format!("{name} is not over: {}", info.state().as_str_name());
+            return Err(Error::new(Kind::FailedPrecondition, "FAILED_PRECONDITION", message));
+        }
+        let mesh = client.runtime.block_on(assemble(client, &info, revision))?;
+        if revision > 0 {
+            return Ok(mesh);
+        }
+        judge(Mesh { progress: info.progress, report: info.report.clone(), ..mesh }, &info)
+    })
+}
+
+fn empty(info: &MeshInfo) -> GrowingComplex {
+    let (k, d) = info.spec.as_ref().map_or((1, 2), |spec| (spec.dimension, spec.ambient_dimension));
+    GrowingComplex::new(k as usize, d as usize)
+}
+
+async fn assemble(client: &Client, info: &MeshInfo, revision: u64) -> Result<Mesh, Error> {
+    let mut growth = empty(info);
+    let d = info.spec.as_ref().map_or(0, |spec| i64::from(spec.ambient_dimension));
+    let request = Mutex::new(DownloadMeshRequest { name: info.name.clone(), revision, position: 0 });
+    let lock = || request.lock().unwrap_or_else(PoisonError::into_inner);
+    let open = |mut stub: crate::client::Stub| {
+        let request = lock().clone();
+        async move { stub.download_mesh(request).await }
+    };
+    client
+        .follow_stream(Flag::default(), open, |part| {
+            let Some(part) = part else { return Ok(false) };
+            let mut next = lock();
+            (next.revision, next.position) = (part.revision, part.next_position);
+            growth.set_revision(part.revision);
+            let points = crate::wire::numbers(part.points.as_ref(), &[-1, d]);
+            growth.add_points(part.first_vertex, &points.map_err(Error::protocol)?)?;
+            growth.change(&MeshDelta { added: part.cells, ..Default::default() })?;
+            Ok(part.complete)
+        })
+        .await?;
+    growth.mesh()
+}
+
+/// Hands on a mesh at every revision and at its end. An error is how it failed.
+async fn follow(
+    client: &Client,
+    info: &MeshInfo,
+    stopped: Flag,
+    mut on_progress: Option<OnProgress<'_>>,
+    every: bool,
+    each: &mut dyn FnMut(Mesh) -> Growth,
+) -> Result<(), Error> {
+    let mut growth = empty(info);
+    let mut progress = None;
+    let request = WatchMeshRequest { name: info.name.clone(), ..Default::default() };
+    let request = Mutex::new(request);
+    let lock = || request.lock().unwrap_or_else(PoisonError::into_inner);
+    let open = |mut stub: crate::client::Stub| {
+        let request = lock().clone();
+        async move { stub.watch_mesh(request).await }
+    };
+    let mut note = |now: Progress| {
+        if let Some(tell) = on_progress.as_mut() {
+            tell(&now);
+        }
+        Some(now)
+    };
+    let events = client.follow_stream(stopped.clone(), open, |message| {
+        let Some(message) = message else {
+            growth.forget_pending();
+            return Ok(false);
+        };
+        match message.event {
+            Some(Event::Delta(chunk)) => {
+                let complete = growth.absorb(chunk)?;
+                lock().from_revision = growth.revision();
+                if complete && every {
+                    return Ok(each(Mesh { progress, ..growth.mesh()? }) == Growth::Leave);
+                }
+            }
+            Some(Event::ResetMesh(_)) => {
+                growth.reset();
+                lock().from_revision = 0;
+            }
+            Some(Event::Progress(now)) => progress = note(now),
+            Some(Event::Final(last)) => {
+                progress = last.progress.and_then(&mut note);
+                let mesh = Mesh { progress, report: last.report.clone(), ..growth.mesh()? };
+                each(judge(mesh, &last)?);
+                return Ok(true);
+            }
+            None => {} // of a newer server
+        }
+        Ok(false)
+    });
+    let failed = tokio::select! {
+        failed = events => failed,
+        () = stopped.wait() => Err(Error::new(Kind::Cancelled, "CANCELLED", "left")),
+    };
+    failed.map_err(|mut error| {
+        error.mesh = error.mesh.take().or_else(|| growth.mesh().ok().map(Box::new));
+        error
+    })
+}
+
+fn judge(mesh: Mesh, info: &MeshInfo) -> Result<Mesh, Error> {
+    let mut error = match info.state() {
+        MeshState::Cancelled => Error::new(Kind::Cancelled, "CANCELLED", "the mesh was cancelled"),
+        MeshState::Failed => {
+            let failure = info.report.clone().and_then(|report| report.failure).unwrap_or_default();
+            Error::new(Kind::of_reason(&failure.reason), &failure.reason, failure.message)
+        }
+        _ => return Ok(mesh),
+    };
+    error.mesh = Some(Box::new(mesh));
+    Err(error)
+}
+
+fn run(
+    oracle: &dyn Oracle,
+    epsilon: f64,
+    options: RunOptions,
+    every: bool,
+    each: &mut dyn FnMut(Mesh) -> Growth,
+) -> Result<(), Error> {
+    let checked = Checked::new(oracle)?;
+    let RunOptions { connection, mesh, workers, max_chunk, on_progress, cancel, .. } = options;
+    with_client(connection, |client| {
+        let info = client.create(oracle, epsilon, &mesh)?;
+        let failure = Mutex::new(None);
+        let stopped = Flag::default();
+        let (left, ended) = (Flag::default(), Flag::default());
+        let outcome = thread::scope(|scope| {
+            for i in 0..workers.max(1) {
+                let options = WorkerOptions { worker: format!("rust-{}", i + 1), max_chunk };
+                let worker = Worker::new(client, &checked, &info.name, &options, true, stopped.clone());
+                let failure = &failure;
+                scope.spawn(move || {
+                    // What the server refuses, or its absence, the watch reports.
+                    if let Err(error) = client.runtime.block_on(worker.run()) {
+                        let ours = error.kind == Kind::Raised || &*error.reason == "ORACLE_NOT_FINITE";
+                        let mut first = failure.lock().unwrap_or_else(PoisonError::into_inner);
+                        if ours && first.is_none() {
+                            *first = Some(error);
+                        }
+                    }
+                });
+            }
+            let outcome = client.runtime.block_on(async {
+                let watching = follow(client, &info, left.clone(), on_progress, every, each);
+                let cancelling = async {
+                    tokio::select! {
+                        () = cancel.0.wait() => {}
+                        () = ended.wait() => return,
+                    }
+                    if client.cancel_async(&info.name, true).await.is_err() {
+                        left.set(); // a server that is away cannot say how the mesh ends
+                    }
+                };
+                let watching = async {
+                    let outcome = watching.await;
+                    ended.set();
+                    outcome
+                };
+                tokio::join!(watching, cancelling).0
+            });
+            if outcome.is_ok() {
+                // They hear that the mesh is over; one that does not is not waited for.
+                let stopped = stopped.clone();
+                client.runtime.spawn(async move {
+                    tokio::time::sleep(FAREWELL).await;
+                    stopped.set();
+                });
+            } else {
+                left.set();
+                stopped.set();
+            }
+            outcome
+        });
+        let _ = client.runtime.block_on(client.delete_async(&info.name, true)); // it ends with its server
+        let ours = failure.into_inner().unwrap_or_else(PoisonError::into_inner);
+        match (outcome, ours) {
+            (Err(theirs), Some(mut ours)) if theirs.kind != Kind::Cancelled => {
+                ours.mesh = theirs.mesh; // our own says more than the server's account of it
+                Err(ours)
+            }
+            (outcome, _) => outcome,
+        }
+    })
+}
