@@ -52,8 +52,7 @@ void Tell(const Outage& outage, double patience) {
 int Complain(const Error& error) {
   std::cerr << "stellate: " << (error.reason.empty() ? "" : error.reason + ": ") << error.message
             << "\n";
-  const bool ours = error.code == ErrorCode::kRefused || error.code == ErrorCode::kFileFailed;
-  return ours ? kExitRefused : kExitFailed;
+  return ExitStatusOf(error);
 }
 
 }  // namespace stellate::cli

@@ -3,15 +3,10 @@
 #include <CLI/App.hpp>
 #include <string>
 
+#include "exit_status.h"
 #include "stellate/client.h"
 
 namespace stellate::cli {
-
-// Exit statuses of every command.
-inline constexpr int kExitCertified = 0;  // or simply: done
-inline constexpr int kExitNotCertified = 1;
-inline constexpr int kExitRefused = 2;  // usage, a refused request, a file that cannot be written
-inline constexpr int kExitFailed = 3;   // the server or the oracle
 
 // The options that say how to reach a server.
 class ServerOptions {

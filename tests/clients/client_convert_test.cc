@@ -5,6 +5,7 @@
 
 #include "channel.h"
 #include "convert.h"
+#include "status.h"
 #include "mesh_builder.h"
 #include "stellate/catalogue.h"
 #include "stellate/rpc/status_details.pb.h"
@@ -111,6 +112,24 @@ TEST(ServerInfo, HasEveryFieldOfTheProtocols) {
   EXPECT_EQ(max_workers, 112u);
   EXPECT_EQ(max_watchers, 113u);
   EXPECT_EQ(check_share, 114);
+}
+
+TEST(MeshBuilder, FindsASimplexThatCameTwice) {
+  auto builder = MeshBuilder::Create(1, 1);
+  for (const std::uint64_t revision : {1, 2}) {
+    v1::DeltaChunk chunk;
+    chunk.set_complete(true);
+    v1::MeshDelta& delta = *chunk.mutable_delta();
+    delta.set_revision(revision);
+    if (revision == 1) ToArray(Eigen::MatrixXd::Zero(1, 2), {1}, delta.mutable_points());
+    delta.mutable_added()->add_shape(1);
+    delta.mutable_added()->add_shape(2);
+    const std::uint32_t edge[] = {0, 1};
+    delta.mutable_added()->set_data(edge, sizeof edge);
+    ASSERT_TRUE(builder->Absorb(std::move(chunk)).has_value());
+    EXPECT_EQ(builder->Take().has_value(), revision == 1);
+  }
+  EXPECT_EQ(builder->Take().error().reason, "PROTOCOL");
 }
 
 TEST(Enums, OfANewerServerAreUnknown) {
@@ -233,7 +252,7 @@ TEST(MeshBuilder, EndsWithWhatWasAddedAndNotRemoved) {
   ASSERT_TRUE(builder->Absorb(Delta(1, 0, points.leftCols(3), {0, 1, 1, 2, 0, 2}, {})));
   ASSERT_TRUE(builder->Absorb(Delta(2, 3, points.rightCols(1), {2, 3, 0, 3}, {0, 2, 0, 1})));
   ASSERT_TRUE(builder->Absorb(Delta(5, 4, Eigen::MatrixXd(2, 0), {0, 1}, {})));  // it comes back
-  const Mesh mesh = builder->Take();
+  const Mesh mesh = *builder->Take();
   EXPECT_EQ(mesh.points, points);
   SimplexMatrix expected(2, 4);
   expected << 0, 0, 1, 2, 1, 3, 2, 3;
@@ -253,7 +272,7 @@ TEST(MeshBuilder, StaysRightThroughALongHistory) {
     }
     ASSERT_TRUE(builder->Absorb(Delta(2 + step, 200, Eigen::MatrixXd(2, 0), added, removed)));
   }
-  const Mesh mesh = builder->Take();
+  const Mesh mesh = *builder->Take();
   ASSERT_EQ(mesh.simplices.cols(), 1);
   EXPECT_EQ(mesh.simplices(1, 0), 1u);
 }
@@ -266,11 +285,11 @@ TEST(MeshBuilder, TakesARevisionOnceAndWhole) {
   // Cut short in the middle of revision 5, and sent again as 6.
   ASSERT_TRUE(builder->Absorb(Delta(5, 2, points.rightCols(1), {}, {0, 1}, false)));
   EXPECT_EQ(builder->revision(), 3u);
-  EXPECT_EQ(builder->Take().points.cols(), 2);
+  EXPECT_EQ(builder->Take()->points.cols(), 2);
   builder->ForgetPending();
   ASSERT_TRUE(builder->Absorb(Delta(6, 2, points.rightCols(1), {0, 2}, {0, 1})));
   EXPECT_EQ(builder->revision(), 6u);
-  const Mesh mesh = builder->Take();
+  const Mesh mesh = *builder->Take();
   EXPECT_EQ(mesh.points, points);
   ASSERT_EQ(mesh.simplices.cols(), 1);
   EXPECT_EQ(mesh.simplices(1, 0), 2u);
@@ -289,7 +308,7 @@ TEST(MeshBuilder, BeginsAnewWhenTheServerDoes) {
   builder->Reset();
   EXPECT_EQ(builder->revision(), 0u);
   ASSERT_TRUE(builder->Absorb(Delta(2, 0, points.leftCols(2), {0, 1}, {})));
-  const Mesh mesh = builder->Take();
+  const Mesh mesh = *builder->Take();
   EXPECT_EQ(mesh.points, points.leftCols(2));
   EXPECT_EQ(mesh.simplices.cols(), 1);
 }

@@ -62,7 +62,7 @@ class Workers : public Live {
       if (response.has_final()) ending.final = response.final();
     }
     EXPECT_TRUE(stream->Finish().ok());
-    ending.mesh = builder->Take();
+    ending.mesh = *builder->Take();
     return ending;
   }
 

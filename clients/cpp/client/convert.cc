@@ -4,16 +4,12 @@
 #include <cstring>
 #include <string>
 
-#include "stellate/rpc/status_details.pb.h"
+#include "status.h"
 
 namespace stellate::client {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "arrays are copied as they are");
-
-Error Malformed(const std::string& what) {
-  return {ErrorCode::kServerFailed, "", "the server sent " + what};
-}
 
 // The first extent, provided that the others and the data's size agree.
 template <typename Message>
@@ -27,23 +23,9 @@ Expected<Eigen::Index> Rows(const Message& array, const std::vector<std::uint32_
     row *= shape[i];
   }
   if (!fits || array.data().size() != row * array.shape(0)) {
-    return tl::unexpected(Malformed("an array of the wrong shape"));
+    return tl::unexpected(BrokenProtocol("an array of the wrong shape"));
   }
   return static_cast<Eigen::Index>(array.shape(0));
-}
-
-// The name of a status's ErrorInfo, if it carries one.
-std::string ReasonOf(const grpc::Status& status) {
-  rpc::Status details;
-  if (!details.ParseFromString(status.error_details())) return "";
-  for (const google::protobuf::Any& any : details.details()) {
-    rpc::ErrorInfo info;
-    if (any.type_url() == "type.googleapis.com/google.rpc.ErrorInfo" &&
-        info.ParseFromString(any.value()) && info.domain() == "stellate.v1") {
-      return info.reason();
-    }
-  }
-  return "";
 }
 
 }  // namespace
@@ -267,60 +249,6 @@ ServerHealth HealthOf(const v1::ServerInfo& info) {
   health.max_watchers = info.max_watchers();
   health.check_share = info.check_share();
   return health;
-}
-
-namespace {
-
-// What is likely to help where the two sides do not agree how to connect; gRPC's own words and
-// those of its TLS library are all there is to go by.
-std::string_view Advice(const grpc::Status& status) {
-  const auto says = [&status](std::string_view words) {
-    return status.error_message().find(words) != std::string::npos;
-  };
-  if (status.error_code() == grpc::StatusCode::UNAUTHENTICATED) {
-    return "give a token with --token-file FILE or $STELLATE_TOKEN (in C++ Credentials::token)";
-  }
-  if (status.error_code() != grpc::StatusCode::UNAVAILABLE) return "";
-  if (says("wrong version number")) {
-    return "the server speaks plain text: leave --tls, --tls-ca and --tls-cert away (in C++ "
-           "Credentials::tls, tls_ca, tls_certificate)";
-  }
-  if (says("certificate verify failed")) {
-    return "the server's certificate is of no authority that is trusted here: --tls-ca FILE names "
-           "one (in C++ Credentials::tls_ca)";
-  }
-  if (says("failed to connect") && (says("Socket closed") || says("Connection reset"))) {
-    return "does the server want TLS? --tls or --tls-ca FILE. Or a client certificate? --tls-cert "
-           "and --tls-key (in C++ Credentials)";
-  }
-  return "";
-}
-
-}  // namespace
-
-Error FromStatus(const grpc::Status& status) {
-  const std::string reason = ReasonOf(status);
-  ErrorCode code = ErrorCode::kServerFailed;
-  switch (status.error_code()) {
-    case grpc::StatusCode::INVALID_ARGUMENT:
-    case grpc::StatusCode::RESOURCE_EXHAUSTED:
-    case grpc::StatusCode::NOT_FOUND:
-    case grpc::StatusCode::FAILED_PRECONDITION:
-    case grpc::StatusCode::OUT_OF_RANGE:
-    case grpc::StatusCode::UNAUTHENTICATED:
-    case grpc::StatusCode::PERMISSION_DENIED:
-      code = ErrorCode::kRefused;
-      break;
-    default:
-      break;
-  }
-  if (reason.rfind("ORACLE_", 0) == 0) code = ErrorCode::kOracleFailed;
-  std::string message = status.error_message();
-  if (const std::string_view advice = Advice(status); !advice.empty()) {
-    message += "; ";
-    message += advice;
-  }
-  return {code, reason, std::move(message)};
 }
 
 }  // namespace stellate::client

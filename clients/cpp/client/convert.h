@@ -1,7 +1,5 @@
 #pragma once
 
-#include <grpcpp/support/status.h>
-
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
@@ -39,8 +37,5 @@ Report ReportOf(const v1::Mesh& mesh);
 MeshState FromProto(v1::MeshState state);
 MeshStatus StatusOf(const v1::Mesh& mesh);
 ServerHealth HealthOf(const v1::ServerInfo& info);  // all but whether it serves
-
-// The error that a failed call stands for.
-Error FromStatus(const grpc::Status& status);
 
 }  // namespace stellate::client

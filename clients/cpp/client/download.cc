@@ -10,6 +10,7 @@
 #include "mesh_builder.h"
 #include "reconnect.h"
 #include "run.h"
+#include "status.h"
 #include "stellate/monitor.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 
@@ -151,22 +152,23 @@ class Download {
     if (options_.stop.stop_requested()) {
       return {ErrorCode::kServerFailed, "CANCELLED", "the download was cancelled"};
     }
-    if (status.ok()) return {ErrorCode::kServerFailed, "", "the server ended its stream too early"};
+    if (status.ok()) return BrokenProtocol("the end of its stream too early");
     return attempts_.Lost(status);
   }
 
   Expected<Mesh> Conclude() {
-    Mesh mesh = builder_->Take();
-    const auto vertices = static_cast<std::uint64_t>(mesh.points.cols());
-    const auto simplices = static_cast<std::uint64_t>(mesh.simplices.cols());
+    Expected<Mesh> mesh = builder_->Take();
+    if (!mesh) return mesh;
+    const auto vertices = static_cast<std::uint64_t>(mesh->points.cols());
+    const auto simplices = static_cast<std::uint64_t>(mesh->simplices.cols());
     if (vertices != vertices_ || simplices != simplices_) {
-      return Fail(ErrorCode::kServerFailed, "the server announced " + std::to_string(vertices_) +
-                                                " vertices and " + std::to_string(simplices_) +
-                                                " simplices but sent " + std::to_string(vertices) +
-                                                " and " + std::to_string(simplices));
+      return tl::unexpected(
+          BrokenProtocol(std::to_string(vertices) + " vertices and " + std::to_string(simplices) +
+                         " simplices, after it had announced " + std::to_string(vertices_) +
+                         " and " + std::to_string(simplices_)));
     }
     if (HasEnded(status_) && revision_ == status_.revision()) {
-      mesh.report = ReportOf(status_);
+      mesh->report = ReportOf(status_);
     }
     return mesh;
   }

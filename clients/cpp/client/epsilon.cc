@@ -3,13 +3,12 @@
 #include <cstdlib>
 #include <string>
 
+#include "shared/doctor.h"
 #include "stellate/client.h"
 #include "stellate/doctor.h"
 
 namespace stellate {
 namespace {
-
-constexpr double kShareOfReach = 4;  // half the coarseness that is safe: the reach is from above
 
 std::string Show(const char* format, double value) {
   char text[64];
@@ -34,7 +33,8 @@ Expected<ChosenEpsilon> ChooseEpsilon(Oracle& oracle) {
                 "epsilon shall be",
                 "ORACLE_NO_REACH");
   }
-  const double chosen = std::strtod(Show("%.2g", *report.reach / kShareOfReach).c_str(), nullptr);
+  const double chosen =
+      std::strtod(Show("%.2g", *report.reach / doctor::kAutoEpsilon).c_str(), nullptr);
   return ChosenEpsilon{chosen, "a quarter of the reach, about " + Show("%.3g", *report.reach) +
                                    " by " + std::to_string(report.queries) + " queries"};
 }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "convert.h"
+#include "status.h"
 
 namespace stellate::client {
 namespace {
@@ -51,7 +52,7 @@ class FixedSet final : public SimplexSet {
     return true;
   }
 
-  SimplexMatrix Sorted() const override {
+  std::optional<SimplexMatrix> Sorted() const override {
     SimplexMatrix simplices(N, static_cast<Eigen::Index>(size_));
     Eigen::Index column = 0;
     std::vector<Simplex> star;
@@ -61,6 +62,7 @@ class FixedSet final : public SimplexSet {
         star.push_back(nodes_[s].simplex);
       }
       std::sort(star.begin(), star.end());
+      if (std::adjacent_find(star.begin(), star.end()) != star.end()) return std::nullopt;
       for (const Simplex& simplex : star) {
         std::copy(simplex.begin(), simplex.end(), simplices.col(column++).begin());
       }
@@ -94,10 +96,6 @@ class FixedSet final : public SimplexSet {
   std::uint32_t free_ = kNone;  // a list of its own
   size_t size_ = 0;
 };
-
-Error Inconsistent(const std::string& what) {
-  return {ErrorCode::kServerFailed, "", "the server sent " + what};
-}
 
 }  // namespace
 
@@ -143,7 +141,7 @@ void MeshBuilder::Reset() {
 Expected<void> MeshBuilder::Absorb(v1::DeltaChunk&& chunk) {
   const std::uint64_t revision = chunk.delta().revision();
   if (revision <= revision_ || (!pending_.empty() && pending_.back().revision() != revision)) {
-    return tl::unexpected(Inconsistent("revision " + std::to_string(revision) + " out of order"));
+    return tl::unexpected(BrokenProtocol("revision " + std::to_string(revision) + " out of order"));
   }
   pending_.push_back(std::move(*chunk.mutable_delta()));
   if (!chunk.complete()) return {};
@@ -173,8 +171,8 @@ Expected<void> MeshBuilder::Apply(const v1::MeshDelta& delta) {
   }
   if (coordinates_.size() > known &&
       delta.first_vertex() * static_cast<std::uint64_t>(d_) != known) {
-    return tl::unexpected(Inconsistent("vertices from " + std::to_string(delta.first_vertex()) +
-                                       " on, out of order"));
+    return tl::unexpected(BrokenProtocol("vertices from " + std::to_string(delta.first_vertex()) +
+                                         " on, out of order"));
   }
   const std::uint32_t width = static_cast<std::uint32_t>(k_) + 1;
   const Expected<Eigen::Index> removed = CountRows(delta.removed(), width);
@@ -182,19 +180,21 @@ Expected<void> MeshBuilder::Apply(const v1::MeshDelta& delta) {
   const Expected<Eigen::Index> added = CountRows(delta.added(), width);
   if (!added) return tl::unexpected(added.error());
   if (!simplex_set_->Remove(delta.removed().data().data(), *removed)) {
-    return tl::unexpected(Inconsistent("word that a simplex goes which is not there"));
+    return tl::unexpected(BrokenProtocol("word that a simplex goes which is not there"));
   }
   if (!simplex_set_->Add(delta.added().data().data(), *added, vertices())) {
-    return tl::unexpected(Inconsistent("a simplex with a vertex that it never sent"));
+    return tl::unexpected(BrokenProtocol("a simplex with a vertex that it never sent"));
   }
   return {};
 }
 
-Mesh MeshBuilder::Take() const {
+Expected<Mesh> MeshBuilder::Take() const {
+  std::optional<SimplexMatrix> simplices = simplex_set_->Sorted();
+  if (!simplices) return tl::unexpected(BrokenProtocol("a simplex that was there already"));
   Mesh mesh;
   mesh.points = Eigen::Map<const Eigen::MatrixXd>(
       coordinates_.data(), d_, static_cast<Eigen::Index>(coordinates_.size()) / d_);
-  mesh.simplices = simplex_set_->Sorted();
+  mesh.simplices = std::move(*simplices);
   return mesh;
 }
 

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "stellate/error.h"
@@ -15,13 +16,13 @@ namespace stellate::client {
 class SimplexSet {
  public:
   virtual ~SimplexSet() = default;
-  // `count` simplices of k+1 uint32 each; `ids` need not be aligned. False, and the set is of no
-  // use any more, where a vertex is not below `vertices`.
+  // `count` simplices of k+1 uint32 each; `ids` need not be aligned. False, and the set is spoilt,
+  // where a vertex is not below `vertices`.
   virtual bool Add(const char* ids, Eigen::Index count, std::uint64_t vertices) = 0;
-  // False, and the set is of no use any more, where one is not there.
+  // False, and the set is spoilt, where one is not there.
   virtual bool Remove(const char* ids, Eigen::Index count) = 0;
-  // (k+1) x m, columns in ascending order.
-  virtual SimplexMatrix Sorted() const = 0;
+  // (k+1) x m, columns in ascending order; nothing where one is there twice.
+  virtual std::optional<SimplexMatrix> Sorted() const = 0;
 };
 
 // Null unless 1 <= k <= kMaxSimplexDimension.
@@ -50,8 +51,8 @@ class MeshBuilder {
   // Drops the chunks of a revision that was cut short.
   void ForgetPending() { pending_.clear(); }
 
-  // The mesh as of revision().
-  Mesh Take() const;
+  // The mesh as of revision(). Errors: a simplex that was added twice.
+  Expected<Mesh> Take() const;
 
  private:
   MeshBuilder(int k, int d, std::unique_ptr<SimplexSet> set)

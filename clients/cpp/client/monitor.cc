@@ -12,6 +12,7 @@
 
 #include "channel.h"
 #include "convert.h"
+#include "status.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 
 namespace stellate {

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "convert.h"
+#include "status.h"
 
 namespace stellate::client {
 namespace {

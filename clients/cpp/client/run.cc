@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "convert.h"
+#include "status.h"
 
 namespace stellate::client {
 namespace {
@@ -180,7 +181,7 @@ Expected<Mesh> Run::Watch() {
     if (ended_) return Conclude(final);
   } while (watch_->Again(status));
   if (status.ok()) {
-    return Fail(ErrorCode::kServerFailed, "the server ended the watch too early");
+    return tl::unexpected(BrokenProtocol("the end of the watch too early"));
   }
   return tl::unexpected(LostFor(status));
 }
@@ -194,26 +195,18 @@ Error Run::LostFor(const grpc::Status& status) const {
   return error;
 }
 
-Error WhyFailed(const v1::Mesh& mesh) {
-  const v1::Failure& failure = mesh.report().failure();
-  const bool oracle = failure.reason().rfind("ORACLE_", 0) == 0 ||
-                      failure.reason() == "ANSWER_TIMEOUT" || failure.reason() == "NO_SEEDS";
-  return {oracle ? ErrorCode::kOracleFailed : ErrorCode::kServerFailed, failure.reason(),
-          failure.message()};
-}
-
 Expected<Mesh> Run::Conclude(const v1::Mesh& final) {
   if (final.state() == v1::MESH_STATE_FAILED) return tl::unexpected(WhyFailed(final));
-  Mesh mesh = builder_->Take();
-  mesh.report = ReportOf(final);
-  const Counts& counts = mesh.report.counts;
-  if (counts.vertices != static_cast<std::uint64_t>(mesh.points.cols()) ||
-      counts.simplices != static_cast<std::uint64_t>(mesh.simplices.cols())) {
-    return Fail(ErrorCode::kServerFailed, "the server reports " + std::to_string(counts.vertices) +
-                                              " vertices and " + std::to_string(counts.simplices) +
-                                              " simplices but sent " +
-                                              std::to_string(mesh.points.cols()) + " and " +
-                                              std::to_string(mesh.simplices.cols()));
+  Expected<Mesh> mesh = builder_->Take();
+  if (!mesh) return mesh;
+  mesh->report = ReportOf(final);
+  const Counts& counts = mesh->report.counts;
+  if (counts.vertices != static_cast<std::uint64_t>(mesh->points.cols()) ||
+      counts.simplices != static_cast<std::uint64_t>(mesh->simplices.cols())) {
+    return tl::unexpected(BrokenProtocol(
+        "a report of " + std::to_string(counts.vertices) + " vertices and " +
+        std::to_string(counts.simplices) + " simplices, and a mesh of " +
+        std::to_string(mesh->points.cols()) + " and " + std::to_string(mesh->simplices.cols())));
   }
   return mesh;
 }

@@ -17,9 +17,6 @@
 
 namespace stellate::client {
 
-// Of a mesh that failed.
-Error WhyFailed(const v1::Mesh& mesh);
-
 // One mesh on one server, from its creation to its end. Lost streams are opened again and carried
 // on: the watch from the last revision that it has, the workers with whatever is asked next.
 class Run {

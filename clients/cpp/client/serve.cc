@@ -4,6 +4,7 @@
 
 #include "channel.h"
 #include "convert.h"
+#include "status.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 #include "worker.h"
 
@@ -35,7 +36,7 @@ Expected<MeshState> ServeMesh(Oracle& oracle, const std::string& mesh_name,
     return Fail(ErrorCode::kServerFailed, "this worker left; others have its work", "CANCELLED");
   }
   if (worker.error()) return tl::unexpected(*worker.error());
-  return Fail(ErrorCode::kServerFailed, "the server ended the worker's stream too early");
+  return tl::unexpected(client::BrokenProtocol("the end of the worker's stream too early"));
 }
 
 }  // namespace stellate

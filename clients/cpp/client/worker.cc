@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "convert.h"
+#include "status.h"
 
 namespace stellate::client {
 namespace {
@@ -193,7 +194,7 @@ bool Worker::Answer(const v1::QueryChunk& chunk, v1::AnswerChunk* answers) {
   if (!points || !bases || !radii ||
       (flats && (bases->cols() != points->cols() || radii->cols() != points->cols())) ||
       (!flats && chunk.kind() != v1::QUERY_KIND_CLOSEST_POINT)) {
-    error_ = Error{ErrorCode::kServerFailed, "", "the server sent queries that make no sense"};
+    error_ = BrokenProtocol("queries that make no sense");
     return false;
   }
   stellate::Answer answer = flats

@@ -5,18 +5,18 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <map>
+#include <sstream>
+#include <string>
 
 #include "examination.h"
+#include "shared/doctor.h"
 
 namespace stellate {
 namespace doctor {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-constexpr int kBatches[] = {1, 10, 100, 1000, 10'000};
-constexpr double kSpeedSeconds = 0.03;  // for each batch size
-constexpr double kSlowRate = 2000;
 
 // The least time that one call took, of as many as fit.
 template <typename Call>
@@ -57,29 +57,37 @@ CheckReport Examination::Run() {
 }
 
 void Examination::ObeyLaws() {
+  using Law = void (Examination::*)();
+  static const std::map<std::string, Law> by_name = {
+      {"answers_repeat", &Examination::AnswersRepeat},
+      {"answers_stay", &Examination::AnswersStay},
+      {"answers_are_closest", &Examination::AnswersAreClosest},
+      {"dimension_is_right", &Examination::DimensionIsRight},
+      {"tangents_are_right", &Examination::TangentsAreRight},
+      {"sizes_are_lengths", &Examination::SizesAreLengths},
+      {"reach_is_estimated", &Examination::EstimateReach},
+      {"near_points_come_back", &Examination::NearPointsComeBack},
+      {"surface_is_smooth", &Examination::IsSmooth},
+      {"flats_are_met", &Examination::FlatsAreMet},
+      {"few_ranks_are_wrong", &Examination::FewRanksAreWrong},
+      {"pieces_are_counted", &Examination::CountPieces},
+      {"speed_is_measured", &Examination::MeasureSpeed},
+  };
   probe_.FindPoints([this](Finding finding) { Add(std::move(finding)); });
-  AnswersRepeat();
-  AnswersStay();
-  // Far from M a nearer answer is a warning only: solvers find local minima there.
-  NoneSeenIsNearer(probe_.starts, probe_.points, "NOT_CLOSEST_FAR");
-  if (Has("NOT_DETERMINISTIC") || Has("NOT_IDEMPOTENT")) {
-    return MeasureSpeed();  // the rest needs points of M
+  for (const char* const line : kLaws) {
+    std::istringstream words(line);
+    std::string name, code;
+    words >> name >> code;  // and "unless"
+    bool obey = true;
+    while (words >> code) obey = obey && !Has(code);
+    if (obey) (this->*by_name.at(name))();
   }
-  probe_.FindTangents();
-  DimensionIsRight(0.5);
-  TangentsAreRight();
-  SizesAreLengths();
-  if (!Has("WRONG_DIMENSION")) {
-    EstimateReach();
-    NearPointsComeBack();
-    IsSmooth();
-    FlatsAreMet();
-  }
-  if (!Has("ROUGH")) DimensionIsRight(0.05);
+}
+
+void Examination::CountPieces() {
   report_.pieces = probe_.Pieces();
   Add("PIECES",
       {{"n", static_cast<std::int64_t>(probe_.points.cols())}, {"pieces", *report_.pieces}});
-  MeasureSpeed();
 }
 
 void Examination::MeasureSpeed() {
@@ -96,14 +104,15 @@ void Examination::MeasureSpeed() {
   probe_.queries = asked;  // that was no examination
   for (const auto& [batch, rate] : report_.rates) {
     report_.best_batch = batch;
-    if (rate >= 0.9 * best) break;
+    if (rate >= kGoodRate * best) break;
   }
   Add("SPEED", {{"rate", Rounded(best)},
                 {"batch", report_.best_batch},
                 {"single", Rounded(report_.rates.front().second)}});
   if (best < kSlowRate) {
-    Add("SLOW",
-        {{"rate", Rounded(best)}, {"batch", report_.best_batch}, {"minutes", 1e5 / best / 60}});
+    Add("SLOW", {{"rate", Rounded(best)},
+                 {"batch", report_.best_batch},
+                 {"minutes", kMeshQueries / best / 60}});
   }
 }
 

@@ -6,6 +6,7 @@
 
 #include "findings.h"
 #include "probe.h"
+#include "shared/doctor.h"
 #include "stellate/doctor.h"
 
 namespace stellate::doctor {
@@ -30,10 +31,13 @@ class Examination {
   // Of closest points.
   void AnswersRepeat();
   void AnswersStay();
+  void AnswersAreClosest();
   void NoneSeenIsNearer(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, const char* code);
   void NearPointsComeBack();
   // Of dimension, tangents and smoothness.
-  void DimensionIsRight(double share);
+  void DimensionIsRight();
+  void FewRanksAreWrong() { JudgeRanks(kFewWrongRanks); }
+  void JudgeRanks(double share);
   void TangentsAreRight();
   void SizesAreLengths();
   void EstimateReach();
@@ -43,12 +47,13 @@ class Examination {
   void Meet(const Eigen::MatrixXd& centers, const std::vector<Basis>& bases);
   void RadiiAreKept(const Eigen::MatrixXd& centers, const std::vector<Basis>& bases,
                     const Eigen::VectorXd& distances);
+  void CountPieces();
   void MeasureSpeed();
 
   // A length within which M should look like its tangent spaces.
   double Near() const;
   // Where two points count as the same.
-  double Slack() const { return 1e-6 * probe_.size; }
+  double Slack() const { return kSlack * probe_.size; }
 
   const CheckOptions options_;
   Probe probe_;

@@ -9,10 +9,6 @@
 namespace stellate::doctor {
 namespace {
 
-constexpr double kSafeRatio = 0.4;      // of epsilon and the reach
-constexpr double kTolerated = 3;        // degrees
-constexpr double kCorner = 10;          // degrees
-constexpr double kLeastLength = 1e-45;  // that servers take
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double Degrees(double radians) { return radians * 180 / std::numbers::pi; }
@@ -27,7 +23,8 @@ using Vector = Eigen::VectorXd;
 }  // namespace
 
 double Examination::Near() const {
-  return options_.epsilon ? std::min(*report_.reach, 4 * *options_.epsilon) : *report_.reach;
+  return options_.epsilon ? std::min(*report_.reach, kNearEpsilons * *options_.epsilon)
+                          : *report_.reach;
 }
 
 void Examination::AnswersRepeat() {
@@ -36,13 +33,13 @@ void Examination::AnswersRepeat() {
   // The other way round and in pieces, some of them single.
   Eigen::MatrixXd apart(x.rows(), x.cols());
   for (Eigen::Index at = 0, width = 1; at < x.cols(); at += width) {
-    width = at < 8 ? 1 : std::min<Eigen::Index>(x.cols() - at, 150);
+    width = at < kSingleQuestions ? 1 : std::min<Eigen::Index>(x.cols() - at, 150);
     const Eigen::MatrixXd part = x.middleCols(at, width).rowwise().reverse();
     apart.middleCols(at, width) = probe_.Closest(part).points.rowwise().reverse();
   }
   for (Eigen::Index j = 0; j < x.cols(); ++j) {
     const bool repeats = first.col(j) == second.col(j);
-    if (repeats && (first.col(j) - apart.col(j)).norm() <= 1e-9 * probe_.size) continue;
+    if (repeats && (first.col(j) - apart.col(j)).norm() <= kBatchSlack * probe_.size) continue;
     const Vector other = (repeats ? apart : second).col(j);
     return Add(repeats ? "BATCH_DEPENDENT" : "NOT_DETERMINISTIC",
                {{"query", Vector(x.col(j))}, {"answer", Vector(first.col(j))}, {"other", other}});
@@ -61,9 +58,14 @@ void Examination::AnswersStay() {
   if (most > Slack()) {
     Add("NOT_IDEMPOTENT",
         {{"query", query}, {"answer", Vector(again.points.col(worst))}, {"moved", most}});
-  } else if (most > 1e-9 * probe_.size) {
+  } else if (most > kNoise * probe_.size) {
     Add("NOISY", {{"query", query}, {"moved", most}});
   }
+}
+
+// Far from M a nearer answer is a warning only: solvers find local minima there.
+void Examination::AnswersAreClosest() {
+  NoneSeenIsNearer(probe_.starts, probe_.points, "NOT_CLOSEST_FAR");
 }
 
 void Examination::NoneSeenIsNearer(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y,
@@ -84,13 +86,13 @@ void Examination::NoneSeenIsNearer(const Eigen::MatrixXd& x, const Eigen::Matrix
 
 // Off M along a normal by a part of the reach, and back: closest, and at right angles.
 void Examination::NearPointsComeBack() {
-  for (const double share : {0.05, 0.25}) {
+  for (const double share : kOffsets) {
     const double away = share * Near();
     const Eigen::MatrixXd all = probe_.some + away * probe_.Normals(probe_.moved_tangents);
     const Answered back = probe_.Closest(all);
     Indices kept;
     for (Eigen::Index j = 0; j < all.cols(); ++j) {
-      if (back.found[j] && (all.col(j) - back.points.col(j)).norm() > 1e-3 * away) {
+      if (back.found[j] && (all.col(j) - back.points.col(j)).norm() > kLeastOffset * away) {
         kept.push_back(j);
       }
     }
@@ -102,7 +104,7 @@ void Examination::NearPointsComeBack() {
       const Vector v = (x.col(j) - y.col(j)).normalized();
       const double sine = (tangents[static_cast<size_t>(j)].transpose() * v).norm();
       const double degrees = Degrees(std::asin(std::min(1.0, sine)));
-      if (degrees <= kTolerated) continue;
+      if (degrees <= kToleratedDegrees) continue;
       return Add("NOT_NORMAL",
                  {{"query", Vector(x.col(j))}, {"answer", Vector(y.col(j))}, {"degrees", degrees}});
     }
@@ -110,7 +112,12 @@ void Examination::NearPointsComeBack() {
 }
 
 // Samples on an edge are odd ones out, which the smoothness test names better.
-void Examination::DimensionIsRight(double share) {
+void Examination::DimensionIsRight() {
+  probe_.FindTangents();
+  JudgeRanks(kWrongRanks);
+}
+
+void Examination::JudgeRanks(double share) {
   std::vector<size_t> wrong;
   for (size_t j = 0; j < probe_.ranks.size(); ++j) {
     if (probe_.ranks[j] != probe_.k()) wrong.push_back(j);
@@ -130,13 +137,13 @@ void Examination::TangentsAreRight() {
   for (size_t j = 0; j < given.size(); ++j) {
     const Vector query = probe_.some.col(static_cast<Eigen::Index>(j));
     const double off = (given[j].transpose() * given[j] - identity).cwiseAbs().maxCoeff();
-    if (off > 1e-8) {
+    if (off > kOrthonormalSlack) {
       Add("TANGENT_NOT_ORTHONORMAL", {{"query", query}, {"off", off}});
       probe_.trusts_given = false;
     }
-    if (off > 0.5 || probe_.ranks[j] != probe_.k() || Has("WRONG_DIMENSION")) continue;
+    if (off > kUsableTangents || probe_.ranks[j] != probe_.k() || Has("WRONG_DIMENSION")) continue;
     const double degrees = Degrees(Turn(Orthonormal(given[j]), probe_.moved_tangents[j]));
-    if (degrees > kTolerated) {
+    if (degrees > kToleratedDegrees) {
       Add("TANGENT_WRONG", {{"query", query}, {"degrees", degrees}});
       probe_.trusts_given = false;
     }
@@ -147,13 +154,13 @@ void Examination::SizesAreLengths() {
   if (!probe_.gives_sizes()) return;
   const Vector sizes = probe_.GivenSizes(probe_.some);
   for (Eigen::Index j = 0; j < sizes.size(); ++j) {
-    if (sizes[j] >= kLeastLength && sizes[j] <= 1 / kLeastLength) continue;
+    if (sizes[j] >= kLeastSize && sizes[j] <= 1 / kLeastSize) continue;
     return Add("SIZE_WRONG", {{"query", Vector(probe_.some.col(j))}, {"size", sizes[j]}});
   }
   for (Eigen::Index j = 0; j < sizes.size(); ++j) {
     const Vector query = probe_.some.col(j);
     const double alone = probe_.GivenSizes(query)[0];
-    if (!(std::abs(alone - sizes[j]) <= 1e-9 * sizes[j])) {
+    if (!(std::abs(alone - sizes[j]) <= kSizeSlack * sizes[j])) {
       return Add("SIZE_CHANGES", {{"query", query}, {"size", sizes[j]}, {"other", alone}});
     }
   }
@@ -161,7 +168,7 @@ void Examination::SizesAreLengths() {
 
 void Examination::EstimateReach() {
   double reach = kInfinity;
-  const double shortest = 1e-4 * probe_.size;
+  const double shortest = kShortestWay * probe_.size;
   const std::vector<Basis>& tangents = probe_.moved_tangents;
   for (Eigen::Index j = 0; j < probe_.some.cols(); ++j) {
     for (const auto& q : probe_.points.colwise()) {
@@ -169,7 +176,7 @@ void Examination::EstimateReach() {
       reach = std::min(reach, ReachFrom(v, tangents[static_cast<size_t>(j)], shortest));
     }
   }
-  const double step = 0.1 * std::min(reach, probe_.size);
+  const double step = kReachStep * std::min(reach, probe_.size);
   for (int a = 0; a < probe_.k(); ++a) {
     Eigen::MatrixXd x = probe_.some;
     for (Eigen::Index j = 0; j < x.cols(); ++j) {
@@ -206,7 +213,6 @@ void Examination::IsSmooth() {
     a = Take(probe_.points, from);
     b = Take(probe_.points, to);
   }
-  constexpr int kHalvings = 14;
   std::vector<double> turned;
   for (int halving = 0; halving < kHalvings; ++halving) {
     const Answered middle = probe_.Closest((a + b) / 2);
@@ -232,7 +238,7 @@ void Examination::IsSmooth() {
   }
   for (Eigen::Index j = 0; j < a.cols(); ++j) {
     const double degrees = turned[static_cast<size_t>(j)], length = (a.col(j) - b.col(j)).norm();
-    if (degrees <= kCorner || length >= 0.02 * probe_.size) continue;
+    if (degrees <= kCornerDegrees || length >= kCornerLength * probe_.size) continue;
     return Add("ROUGH", {{"query", Vector(a.col(j))}, {"degrees", degrees}, {"length", length}});
   }
 }
@@ -240,18 +246,18 @@ void Examination::IsSmooth() {
 // Each flat goes through a sample, which it meets M in, and perhaps nearer to its centre.
 void Examination::FlatsAreMet() {
   if (!probe_.intersects_flats()) return;
-  for (const double tilt : {0.0, 0.3}) {
+  for (const double tilt : kTilts) {
     std::vector<Basis> bases;
     for (const Basis& tangent : probe_.moved_tangents) {
       const Basis lean = probe_.RandomMatrix(tilt / std::sqrt(static_cast<double>(probe_.d())));
       bases.push_back(Orthonormal(tangent + lean));
     }
-    Meet(probe_.some + 0.1 * Near() * probe_.Normals(bases), bases);
+    Meet(probe_.some + kFlatOffset * Near() * probe_.Normals(bases), bases);
   }
 }
 
 void Examination::Meet(const Eigen::MatrixXd& centers, const std::vector<Basis>& bases) {
-  const Vector radii = Vector::Constant(centers.cols(), 0.5 * Near());
+  const Vector radii = Vector::Constant(centers.cols(), kFlatRadius * Near());
   const Answered met = probe_.Intersect(centers, bases, radii);
   const Answered again = probe_.Closest(met.points);
   Vector distances(centers.cols());
@@ -281,7 +287,7 @@ void Examination::Meet(const Eigen::MatrixXd& centers, const std::vector<Basis>&
 
 void Examination::RadiiAreKept(const Eigen::MatrixXd& centers, const std::vector<Basis>& bases,
                                const Eigen::VectorXd& distances) {
-  const Vector radii = distances / 2;
+  const Vector radii = kShortRadius * distances;
   const Answered met = probe_.Intersect(centers, bases, radii);
   for (Eigen::Index j = 0; j < centers.cols(); ++j) {
     const double own = (met.points.col(j) - centers.col(j)).norm();

@@ -8,17 +8,13 @@
 #include <numeric>
 
 #include "findings.h"
+#include "shared/doctor.h"
 
 namespace stellate::doctor {
 namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Pairs = std::vector<std::pair<Eigen::Index, Eigen::Index>>;
-
-constexpr Eigen::Index kStarts = 400;  // points of the box that closest points are looked for from
-constexpr Eigen::Index kSome = 48;     // samples that dear laws are tried at
-constexpr int kMaxDirections = 24;     // that the closest point map is differentiated in
-constexpr int kSteps = 8;              // of a way between two samples
 
 // What an oracle throws becomes a finding.
 template <typename Ask>
@@ -156,12 +152,13 @@ Eigen::MatrixXd Probe::StartingPoints() {
   const std::optional<BoundingBox> box = oracle_.bounding_box();
   const Eigen::MatrixXd seeds = oracle_.seeds();
   if (seeds.cols() > 0 && seeds.rows() == d_ && seeds.allFinite()) {
-    append(seeds.leftCols(std::min(seeds.cols(), kStarts)));
+    append(seeds.leftCols(std::min<Eigen::Index>(seeds.cols(), kStarts)));
     if (!box) {
       // About them, so that there is more than one point to look at.
       double spread = (seeds.rowwise().maxCoeff() - seeds.rowwise().minCoeff()).norm();
-      if (spread == 0) spread = std::max(seeds.col(0).norm(), 1e-3);
-      Eigen::MatrixXd near = 0.3 * spread * RandomUnits(kStarts);
+      if (spread == 0) spread = seeds.col(0).norm();
+      if (spread == 0) spread = 1;
+      Eigen::MatrixXd near = kSeedSpread * spread * RandomUnits(kStarts);
       for (Eigen::Index j = 0; j < kStarts; ++j) near.col(j) += seeds.col(j % seeds.cols());
       append(near);
     }
@@ -199,7 +196,7 @@ void Probe::FindPoints(const std::function<void(Finding)>& add) {
   size = (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).norm();
   const std::optional<BoundingBox> box = oracle_.bounding_box();
   if (!box) return;
-  const double slack = 1e-9 * (box->upper - box->lower).norm();
+  const double slack = kBoxSlack * (box->upper - box->lower).norm();
   for (const auto& p : points.colwise()) {
     if ((p.array() < box->lower.array() - slack).any() ||
         (p.array() > box->upper.array() + slack).any()) {
@@ -224,7 +221,7 @@ std::vector<Basis> Probe::Differential(const Eigen::MatrixXd& at, std::vector<in
   const int count = std::min(d_, std::max(kMaxDirections, 2 * k_ + 6));
   Eigen::MatrixXd directions = Eigen::MatrixXd::Identity(d_, d_);
   if (count < d_) directions = Orthonormal(RandomUnits(count));
-  const double h = 1e-5 * size;
+  const double h = kDifferentialStep * size;
   Eigen::MatrixXd ends(d_, 2 * count * at.cols());
   for (Eigen::Index j = 0; j < at.cols(); ++j) {
     ends.middleCols(2 * count * j, count) = (h * directions).colwise() + at.col(j);
@@ -240,7 +237,8 @@ std::vector<Basis> Probe::Differential(const Eigen::MatrixXd& at, std::vector<in
     const Eigen::VectorXd& s = svd.singularValues();
     bases.emplace_back(svd.matrixU().leftCols(k_));
     if (its_ranks == nullptr) continue;
-    its_ranks->push_back(s[0] > 0.01 ? static_cast<int>((s.array() > 0.3 * s[0]).count()) : 0);
+    its_ranks->push_back(
+        s[0] > kLeastSingular ? static_cast<int>((s.array() > kRankShare * s[0]).count()) : 0);
   }
   return bases;
 }
@@ -283,7 +281,7 @@ Pairs Probe::Neighbours(int count) const {
 }
 
 Pairs Probe::MostTurnedNeighbours() {
-  Pairs pairs = Neighbours(4);
+  Pairs pairs = Neighbours(kNeighbours);
   const std::vector<Basis> tangents = TangentsAt(points);
   std::vector<std::pair<double, size_t>> turned;
   for (size_t i = 0; i < pairs.size(); ++i) {
@@ -300,12 +298,12 @@ Pairs Probe::MostTurnedNeighbours() {
 }
 
 int Probe::Pieces() {
-  const Pairs pairs = Neighbours(12);
-  Eigen::MatrixXd ways(d_, std::ssize(pairs) * (kSteps - 1));
+  const Pairs pairs = Neighbours(kPieceNeighbours);
+  Eigen::MatrixXd ways(d_, std::ssize(pairs) * (kPieceSteps - 1));
   Eigen::Index at = 0;
   for (const auto& [a, b] : pairs) {
-    for (int i = 1; i < kSteps; ++i) {
-      ways.col(at++) = points.col(a) + (points.col(b) - points.col(a)) * i / kSteps;
+    for (int i = 1; i < kPieceSteps; ++i) {
+      ways.col(at++) = points.col(a) + (points.col(b) - points.col(a)) * i / kPieceSteps;
     }
   }
   const Answered way = Closest(ways);
@@ -317,10 +315,10 @@ int Probe::Pieces() {
   };
   at = 0;
   for (const auto& [a, b] : pairs) {
-    const double leap = 0.4 * (points.col(a) - points.col(b)).norm();
+    const double leap = kLeap * (points.col(a) - points.col(b)).norm();
     Eigen::VectorXd last = points.col(a);
     bool walked = true;
-    for (int i = 1; i < kSteps; ++i, ++at) {
+    for (int i = 1; i < kPieceSteps; ++i, ++at) {
       walked = walked && way.found[at] && (way.points.col(at) - last).norm() <= leap;
       last = way.points.col(at);
     }
@@ -340,7 +338,7 @@ double Turn(const Basis& a, const Basis& b) {
 double ReachFrom(const Eigen::VectorXd& v, const Basis& tangent, double shortest) {
   if (v.norm() <= shortest) return std::numeric_limits<double>::infinity();
   const double off = (v - tangent * (tangent.transpose() * v)).norm();
-  return v.squaredNorm() / (2 * std::max(off, 1e-8 * shortest));
+  return v.squaredNorm() / (2 * std::max(off, kLeastHeight * shortest));
 }
 
 }  // namespace stellate::doctor

@@ -21,6 +21,7 @@ import traceback
 from collections.abc import Sequence
 from typing import Any
 
+from . import _shared
 from ._credentials import Credentials
 from ._doctor import check
 from ._executors import workers_on
@@ -29,22 +30,12 @@ from ._formats import check_save
 from ._mesh import Mesh
 from ._version import __version__
 from .client import Client
-from .errors import (
-    FailedPrecondition,
-    Interrupted,
-    InvalidArgument,
-    LimitExceeded,
-    MeshNotFound,
-    SaveError,
-    StellateError,
-    Unauthenticated,
-)
+from .errors import Interrupted, StellateError, exit_status
 from .progress import progress_bar
 
-_WELL, _NOT_CERTIFIED, _REFUSED, _FAILED = range(4)
-_OURS_TO_MEND = (
-    InvalidArgument, LimitExceeded, MeshNotFound, FailedPrecondition, Unauthenticated, SaveError,
-)  # fmt: skip
+_STATUS = _shared.table("errors.toml")
+_WELL, _NOT_CERTIFIED = _STATUS["exit_well"], _STATUS["exit_not_certified"]
+_REFUSED, _FAILED = _STATUS["exit_refused"], _STATUS["exit_failed"]
 _LABEL_BYTES = 128
 
 # The flags of the program `stellate`, and those that only one's own oracle needs; the keywords of
@@ -352,7 +343,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _REFUSED
     except StellateError as error:
         print(f"stellate: {error.reason}: {error}", file=sys.stderr)
-        return _REFUSED if isinstance(error, _OURS_TO_MEND) else _FAILED
+        return exit_status(error)
     except OSError as error:
         print(f"stellate: {error}", file=sys.stderr)
         return _REFUSED

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import numbers
 import time
+from collections.abc import Mapping
 from typing import Any, Callable
 
 import numpy as np
 
 from ._findings import CheckReport, Finding
 from ._probe import Probe, Stop, norms
+from ._shared import table
 from .errors import InvalidArgument, OracleError
 
-_BATCHES = (1, 10, 100, 1000, 10_000)
-_SPEED_SECONDS = 0.03  # for each batch size
-_SLOW_RATE = 2_000.0
-_SAFE_RATIO = 0.4  # of epsilon and the reach
+_K: Mapping[str, Any] = table("doctor.toml")
 _ORDER = ("error", "warning", "note")
 
 
@@ -64,22 +63,10 @@ class _Examination:
         except (InvalidArgument, OracleError) as error:
             raise Stop(Finding.of("WRONG_SHAPE", what=str(error))) from None
         probe.find_points(self.add)
-        for law in (self._answers_repeat, self._answers_stay, self._own_answers_are_closest):
-            law(probe)
-        if "NOT_DETERMINISTIC" in self._findings or "NOT_IDEMPOTENT" in self._findings:
-            return self._measure_speed(probe)  # the rest needs points of M
-        probe.find_tangents(self.add)
-        self._sizes_are_lengths(probe)
-        for law in (self._dimension_is_right, self._tangents_are_right):
-            law(probe)
-        if "WRONG_DIMENSION" not in self._findings:
-            self._estimate_reach(probe)
-            for law in (self._near_points_come_back, self._surface_is_smooth, self._flats_are_met):
-                law(probe)
-        if "ROUGH" not in self._findings:
-            self._dimension_is_right(probe, share=0.05)
-        self._count_pieces(probe)
-        self._measure_speed(probe)
+        for line in _K["laws"]:
+            name, *passed_over = line.split()  # "unless" and codes
+            if not any(code in self._findings for code in passed_over):
+                getattr(self, f"_{name}")(probe)
 
     def report(self) -> CheckReport:
         ordered = sorted(self._findings.values(), key=lambda f: _ORDER.index(f.severity))
@@ -106,9 +93,9 @@ class _Examination:
             )
             return
         halves = np.concatenate([probe.closest(part)[0] for part in np.array_split(x[::-1], 3)])
-        alone = np.concatenate([probe.closest(row[None])[0] for row in x[:8]])
+        alone = np.concatenate([probe.closest(row[None])[0] for row in x[: _K["single_questions"]]])
         for rows, other in ((np.arange(len(x)), halves[::-1]), (np.arange(len(alone)), alone)):
-            row = _first(norms(first[rows] - other) > 1e-9 * probe.size)
+            row = _first(norms(first[rows] - other) > _K["batch_slack"] * probe.size)
             if row is not None:
                 self.add(
                     Finding.of("BATCH_DEPENDENT", query=x[row], answer=first[row], other=other[row])
@@ -119,16 +106,16 @@ class _Examination:
         again, found = probe.closest(p)
         moved = np.where(found, norms(again - p), np.inf)
         worst = int(moved.argmax())
-        if moved[worst] > 1e-6 * probe.size:
+        if moved[worst] > _K["slack"] * probe.size:
             self.add(
                 Finding.of(
                     "NOT_IDEMPOTENT", query=p[worst], answer=again[worst], moved=moved[worst]
                 )
             )
-        elif moved[worst] > 1e-9 * probe.size:
+        elif moved[worst] > _K["noise"] * probe.size:
             self.add(Finding.of("NOISY", query=p[worst], moved=moved[worst]))
 
-    def _own_answers_are_closest(self, probe: Probe) -> None:
+    def _answers_are_closest(self, probe: Probe) -> None:
         """Far from M a nearer answer is a warning only: solvers find local minima there."""
         self._compare(probe, probe.starts, probe.points, "NOT_CLOSEST_FAR")
 
@@ -138,7 +125,7 @@ class _Examination:
         for row in range(len(x)):
             others = norms(probe.points - x[row])
             nearest = int(others.argmin())
-            if own[row] > others[nearest] + 1e-6 * probe.size:
+            if own[row] > others[nearest] + _K["slack"] * probe.size:
                 other = probe.points[nearest]
                 self.add(
                     Finding.of(
@@ -155,7 +142,7 @@ class _Examination:
     def _near_points_come_back(self, probe: Probe) -> None:
         """Off M along a normal by a part of the reach, and back: closest, and at right angles."""
         p, t = probe.some, probe.moved_tangents
-        for share in (0.05, 0.25):
+        for share in _K["offsets"]:
             x = p + share * self._near * probe.normals(t)
             y, found = probe.closest(x)
             keep = np.flatnonzero(found)
@@ -164,11 +151,11 @@ class _Examination:
             self._compare(probe, x[keep], y[keep], "NOT_CLOSEST")
             away = x[keep] - y[keep]
             lengths = norms(away)
-            keep = keep[lengths > 1e-3 * share * self._near]
+            keep = keep[lengths > _K["least_offset"] * share * self._near]
             away = x[keep] - y[keep]
             sine = norms(probe.along(probe.tangents_at(y[keep]), away)) / norms(away)
             leaning = np.degrees(np.arcsin(np.minimum(1.0, sine)))
-            row = _first(leaning > 3)
+            row = _first(leaning > _K["tolerated_degrees"])
             if row is not None:
                 self.add(
                     Finding.of(
@@ -178,7 +165,14 @@ class _Examination:
 
     # Dimension, tangents, smoothness.
 
-    def _dimension_is_right(self, probe: Probe, share: float = 0.5) -> None:
+    def _dimension_is_right(self, probe: Probe) -> None:
+        probe.find_tangents()
+        self._judge_ranks(probe, _K["wrong_ranks"])
+
+    def _few_ranks_are_wrong(self, probe: Probe) -> None:
+        self._judge_ranks(probe, _K["few_wrong_ranks"])
+
+    def _judge_ranks(self, probe: Probe, share: float) -> None:
         """Samples on an edge are odd ones out, which the smoothness test names better."""
         wrong = probe.ranks != probe.dimension
         if np.count_nonzero(wrong) > share * len(wrong):
@@ -197,12 +191,12 @@ class _Examination:
             return
         p = probe.some
         sizes = probe.sizes(p)
-        row = _first(~((sizes >= 1e-45) & (sizes <= 1e45)))
+        row = _first(~((sizes >= _K["least_size"]) & (sizes <= 1 / _K["least_size"])))
         if row is not None:
             self.add(Finding.of("SIZE_WRONG", query=p[row], size=sizes[row]))
             return
         alone = np.concatenate([probe.sizes(one[None]) for one in p])
-        row = _first(np.abs(sizes - alone) > 1e-9 * sizes)
+        row = _first(np.abs(sizes - alone) > _K["size_slack"] * sizes)
         if row is not None:
             self.add(Finding.of("SIZE_CHANGES", query=p[row], size=sizes[row], other=alone[row]))
 
@@ -212,28 +206,28 @@ class _Examination:
             return
         bases, k = probe.given_tangents, probe.dimension
         off = np.abs(bases.transpose(0, 2, 1) @ bases - np.eye(k)).max(axis=(1, 2))
-        row = _first(off > 1e-8)
+        row = _first(off > _K["orthonormal_slack"])
         if row is not None:
             self.add(Finding.of("TANGENT_NOT_ORTHONORMAL", query=probe.some[row], off=off[row]))
         if "WRONG_DIMENSION" in self._findings:
             return
-        usable = (probe.ranks == k) & (off < 0.5)
+        usable = (probe.ranks == k) & (off <= _K["usable_tangents"])
         turned = np.degrees(probe.turn(np.linalg.qr(bases)[0], probe.moved_tangents))
-        row = _first(usable & (turned > 3))
+        row = _first(usable & (turned > _K["tolerated_degrees"]))
         if row is not None:
             self.add(Finding.of("TANGENT_WRONG", query=probe.some[row], degrees=turned[row]))
         probe.trusts_given = row is None and "TANGENT_NOT_ORTHONORMAL" not in self._findings
 
-    def _estimate_reach(self, probe: Probe) -> None:
+    def _reach_is_estimated(self, probe: Probe) -> None:
         p, t = probe.some, probe.moved_tangents
         difference = probe.points[None] - p[:, None]
         self._reach = probe.reach_from(difference, t)
-        step = 0.1 * min(self._reach, probe.size)
+        step = _K["reach_step"] * min(self._reach, probe.size)
         for a in range(probe.dimension):
             q, found = probe.closest(p + step * t[:, :, a])
             if found.any():
                 self._reach = min(self._reach, probe.reach_from((q - p)[found][:, None], t[found]))
-        advised = _SAFE_RATIO * self._reach
+        advised = _K["safe_ratio"] * self._reach
         self.add(Finding.of("REACH", reach=self._reach, advised=advised))
         if self._epsilon is not None and self._epsilon > advised:
             ratio = self._epsilon / self._reach
@@ -251,7 +245,11 @@ class _Examination:
     def _near(self) -> float:
         """A length within which M should look like its tangent spaces."""
         assert self._reach is not None
-        return self._reach if self._epsilon is None else min(self._reach, 4 * self._epsilon)
+        return (
+            self._reach
+            if self._epsilon is None
+            else min(self._reach, _K["near_epsilons"] * self._epsilon)
+        )
 
     def _surface_is_smooth(self, probe: Probe) -> None:
         """Where tangents turn between two points, halving the way halves the turn: not at corners.
@@ -260,7 +258,7 @@ class _Examination:
         is kept.
         """
         a, b = probe.most_turned_neighbours()
-        for _ in range(14):
+        for _ in range(_K["halvings"]):
             middle, found = probe.closest((a + b) / 2)
             a, b, middle = a[found], b[found], middle[found]
             if not len(a):
@@ -270,7 +268,7 @@ class _Examination:
             a, b = np.where(first, a, middle), np.where(first, middle, b)
         turned = np.degrees(probe.turn(probe.tangents_at(a), probe.tangents_at(b)))
         lengths = norms(a - b)
-        row = _first((turned > 10) & (lengths < 0.02 * probe.size))
+        row = _first((turned > _K["corner_degrees"]) & (lengths < _K["corner_length"] * probe.size))
         if row is not None:
             self.add(
                 Finding.of("ROUGH", query=a[row], degrees=turned[row], length=float(lengths[row]))
@@ -282,15 +280,15 @@ class _Examination:
         if not probe.has_intersect_flat:
             return
         p, d, k = probe.some, probe.ambient_dimension, probe.dimension
-        for tilt in (0.0, 0.2):
-            lean = tilt * probe.random.standard_normal((len(p), d, k)) / np.sqrt(d)
+        for tilt in _K["tilts"]:
+            lean = tilt * probe.random.uniform(-1, 1, (len(p), d, k)) / np.sqrt(d)
             bases = np.linalg.qr(probe.moved_tangents + lean)[0]
-            centers = p + 0.1 * self._near * probe.normals(bases)
+            centers = p + _K["flat_offset"] * self._near * probe.normals(bases)
             self._meet(probe, centers, bases, p)
 
     def _meet(self, probe: Probe, c: np.ndarray, t: np.ndarray, p: np.ndarray) -> None:
         """Each flat through a row of c meets M in the row of p, and perhaps nearer."""
-        radii = np.full(len(c), 0.5 * self._near)
+        radii = np.full(len(c), _K["flat_radius"] * self._near)
         m, found = probe.intersect(c, t, radii)
         seen = norms(p - c)
         row = _first(~found)
@@ -302,7 +300,7 @@ class _Examination:
         own, off = norms(m - c), norms(probe.along(t, m - c))
         again, there = probe.closest(m)
         moved = np.where(there, norms(again - m), np.inf)
-        slack = 1e-6 * probe.size
+        slack = _K["slack"] * probe.size
         for code, wrong, more in (
             ("FLAT_OFF", off > slack, {"off": off}),
             ("FLAT_OFF_MANIFOLD", moved > slack, {"moved": moved}),
@@ -312,9 +310,9 @@ class _Examination:
             if row is not None:
                 values = {name: value[row] for name, value in more.items()}
                 self.add(Finding.of(code, query=c[row], answer=m[row], **values))
-        short = own / 2
+        short = _K["short_radius"] * own
         m, found = probe.intersect(c, t, short)
-        row = _first(found & (norms(m - c) > short * (1 + 1e-6) + slack))
+        row = _first(found & (norms(m - c) > short + slack))
         if row is not None:
             self.add(
                 Finding.of(
@@ -326,25 +324,25 @@ class _Examination:
                 )
             )
 
-    def _count_pieces(self, probe: Probe) -> None:
+    def _pieces_are_counted(self, probe: Probe) -> None:
         self._pieces = probe.pieces()
         self.add(Finding.of("PIECES", n=len(probe.points), pieces=self._pieces))
 
-    def _measure_speed(self, probe: Probe) -> None:
+    def _speed_is_measured(self, probe: Probe) -> None:
         asked = probe.queries
-        for batch in _BATCHES:
+        for batch in _K["batches"]:
             x = probe.starts[np.arange(batch) % len(probe.starts)]
             seconds = _seconds(lambda x=x: probe.closest(x))
             self._rates[batch] = batch / seconds
-            if seconds > 10 * _SPEED_SECONDS:
+            if seconds > 10 * _K["speed_seconds"]:
                 break
         probe.queries = asked  # that was no examination
         best = max(self._rates.values())
-        self._best = next(n for n, rate in self._rates.items() if rate >= 0.9 * best)
+        self._best = next(n for n, rate in self._rates.items() if rate >= _K["good_rate"] * best)
         rates = {"rate": _rounded(best), "batch": self._best}
         self.add(Finding.of("SPEED", **rates, single=_rounded(self._rates[1])))
-        if best < _SLOW_RATE:
-            self.add(Finding.of("SLOW", **rates, minutes=1e5 / best / 60))
+        if best < _K["slow_rate"]:
+            self.add(Finding.of("SLOW", **rates, minutes=_K["mesh_queries"] / best / 60))
 
 
 def _rounded(rate: float) -> int:
@@ -359,7 +357,7 @@ def _first(where: np.ndarray) -> int | None:
 
 def _seconds(call: Callable[[], object]) -> float:
     """The least time that one call took, of as many as fit."""
-    best, deadline = np.inf, time.perf_counter() + _SPEED_SECONDS
+    best, deadline = np.inf, time.perf_counter() + _K["speed_seconds"]
     while True:
         begin = time.perf_counter()
         call()

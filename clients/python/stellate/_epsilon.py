@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ._doctor import check
+from ._shared import table
 from .errors import InvalidArgument, OracleError
 
 AUTO = "auto"
-_SHARE_OF_REACH = 4  # half the coarseness that is safe, as the reach is estimated from above
 
 
 def choose(oracle: Any, epsilon: float | str) -> tuple[float, str]:
@@ -41,7 +41,7 @@ def choose(oracle: Any, epsilon: float | str) -> tuple[float, str]:
             "large epsilon shall be",
             "ORACLE_NO_REACH",
         )
-    chosen = float(f"{report.reach / _SHARE_OF_REACH:.2g}")
+    chosen = float(f"{report.reach / table('doctor.toml')['auto_epsilon']:.2g}")
     return chosen, (
         f"a quarter of the reach, about {report.reach:.3g} by {report.queries:,} queries"
     )

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import importlib.resources
 import textwrap
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+
+from . import _shared
 
 _WIDTH = 100
 _SHOWN_ENTRIES = 6
@@ -41,9 +42,8 @@ class Words:
 @functools.cache
 def all_words() -> Mapping[str, Words]:
     """The findings that there are, by code."""
-    text = importlib.resources.files(__package__).joinpath("findings.txt").read_text("utf-8")
     words = {}
-    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    lines = [line for line in _shared.text("findings.txt").splitlines() if not line.startswith("#")]
     for block in "\n".join(lines).split("\n\n"):
         if not block.strip():
             continue

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def orient(simplices: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """The same simplices, some with their first two vertices exchanged, so that all agree.
+    """The same simplices, some with their last two vertices exchanged, so that all agree.
 
     Simplices agree when they induce opposite orientations on the facet they share; in each
     component the first one stays as it is. Rows have to be ascending. Cost O(m log m).
@@ -31,7 +31,7 @@ def orient(simplices: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         return None
     oriented = simplices.copy()
     rows = np.flatnonzero(stays > turned)  # joined with their component's first one turned
-    oriented[rows, :2] = simplices[rows][:, [1, 0]]
+    oriented[rows, -2:] = simplices[rows][:, [-1, -2]]
     return oriented, stays // 2
 
 
@@ -87,4 +87,4 @@ def turn_outwards(points: np.ndarray, oriented: np.ndarray, component: np.ndarra
     """
     volumes = np.linalg.det(points[oriented])  # (k+1)! times those of the cones from the origin
     inwards = np.bincount(component, weights=volumes)[component] < 0
-    oriented[inwards, :2] = oriented[inwards][:, [1, 0]]
+    oriented[inwards, -2:] = oriented[inwards][:, [-1, -2]]

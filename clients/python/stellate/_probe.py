@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Callable
 
 import numpy as np
 
 from ._findings import Finding
+from ._shared import table
 from .errors import OracleError
 from .oracle import CheckedOracle
 
-_STARTS = 400  # points of the box that closest points are looked for from
-_SOME = 48  # samples that dear laws are tried at
-_MAX_DIRECTIONS = 24  # that the closest point map is differentiated in
+_K: Mapping[str, Any] = table("doctor.toml")
 
 
 class Stop(Exception):
@@ -97,7 +97,7 @@ class Probe:
         self.size = float(norms(np.ptp(self.points, axis=0)))
         box = self._oracle.bounding_box
         if box is not None:
-            slack = 1e-9 * norms(box[1] - box[0])
+            slack = _K["box_slack"] * norms(box[1] - box[0])
             outside = ((self.points < box[0] - slack) | (self.points > box[1] + slack)).any(axis=1)
             if outside.any():
                 add(Finding.of("OUTSIDE_BOX", answer=self.points[outside][0]))
@@ -107,17 +107,17 @@ class Probe:
         parts = []
         usable = seeds is not None and seeds.ndim == 2 and seeds.shape[1] == d
         if usable and np.isfinite(seeds).all():
-            parts.append(seeds[:_STARTS])
+            parts.append(seeds[: _K["starts"]])
             if len(seeds) and box is None:
                 # About them, so that there is more than one point to look at.
                 spread = float(norms(np.ptp(seeds, axis=0))) or float(norms(seeds[0])) or 1.0
-                near = seeds[np.arange(_STARTS) % len(seeds)]
-                parts.append(near + 0.3 * spread * self._random_units(len(near)))
+                near = seeds[np.arange(_K["starts"]) % len(seeds)]
+                parts.append(near + _K["seed_spread"] * spread * self._random_units(len(near)))
         if box is not None:
             lower, upper = box
             ordered = lower.shape == upper.shape == (d,) and (lower < upper).all()
             if ordered and np.isfinite(upper - lower).all():
-                parts.append(lower + (upper - lower) * self.random.random((_STARTS, d)))
+                parts.append(lower + (upper - lower) * self.random.random((_K["starts"], d)))
         if not sum(map(len, parts)):
             raise Stop(Finding.of("NO_WHEREABOUTS", d=d))
         return np.concatenate(parts)
@@ -126,8 +126,8 @@ class Probe:
         v = self.random.standard_normal((count, self.ambient_dimension))
         return v / norms(v)[:, None]
 
-    def find_tangents(self, add: Callable[[Finding], None]) -> None:
-        self.some = self.points[:: max(1, len(self.points) // _SOME)][:_SOME]
+    def find_tangents(self) -> None:
+        self.some = self.points[:: max(1, len(self.points) // _K["some"])][: _K["some"]]
         self.moved_tangents, self.ranks = self._differential(self.some)
         if self.has_tangent_basis:
             self.given_tangents = self._given_at(self.some)
@@ -138,18 +138,18 @@ class Probe:
         That derivative is the projection on the tangent space; its rank comes second.
         """
         k, d = self.dimension, self.ambient_dimension
-        count = min(d, max(_MAX_DIRECTIONS, 2 * k + 6))
+        count = min(d, max(_K["max_directions"], 2 * k + 6))
         directions = np.eye(d)
         if count < d:
             directions = np.linalg.qr(self.random.standard_normal((d, count)))[0]
-        h = 1e-5 * self.size
+        h = _K["differential_step"] * self.size
         steps = h * directions.T[:count]
         ahead = self.closest((p[:, None] + steps).reshape(-1, d))[0]
         behind = self.closest((p[:, None] - steps).reshape(-1, d))[0]
         columns = ((ahead - behind) / (2 * h)).reshape(len(p), count, d).transpose(0, 2, 1)
         u, s, _ = np.linalg.svd(columns, full_matrices=False)
-        ranks = np.count_nonzero(s > 0.3 * np.maximum(s[:, :1], 1e-300), axis=1)
-        return u[:, :, :k], np.where(s[:, 0] > 0.01, ranks, 0)
+        ranks = np.count_nonzero(s > _K["rank_share"] * np.maximum(s[:, :1], 1e-300), axis=1)
+        return u[:, :, :k], np.where(s[:, 0] > _K["least_singular"], ranks, 0)
 
     def tangents_at(self, p: np.ndarray) -> np.ndarray:
         """The oracle's own bases where they have proved right, else from closest points."""
@@ -178,17 +178,20 @@ class Probe:
         along = difference @ t
         squares = (difference * difference).sum(axis=-1)
         off = np.sqrt(np.maximum(squares - (along * along).sum(axis=-1), 0.0))
-        usable = squares > (1e-4 * self.size) ** 2
+        shortest = _K["shortest_way"] * self.size
+        usable = squares > shortest**2
         with np.errstate(divide="ignore", invalid="ignore"):
-            reach = np.where(usable, squares / (2 * np.maximum(off, 1e-12 * self.size)), np.inf)
+            reach = np.where(
+                usable, squares / (2 * np.maximum(off, _K["least_height"] * shortest)), np.inf
+            )
         return float(reach.min(initial=np.inf))
 
     def most_turned_neighbours(self) -> tuple[np.ndarray, np.ndarray]:
         """Of all samples beside their nearest others, those whose tangent spaces differ most."""
-        a, b = self._neighbours(4)
+        a, b = self._neighbours(_K["neighbours"])
         tangents = self.tangents_at(self.points)
         turned = self.turn(tangents[a], tangents[b])
-        most = np.argsort(-turned, kind="stable")[:_SOME]
+        most = np.argsort(-turned, kind="stable")[: _K["some"]]
         return self.points[a[most]], self.points[b[most]]
 
     def _neighbours(self, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -205,8 +208,8 @@ class Probe:
 
         A way leads along M where the closest points of a segment's points advance without a leap.
         """
-        a, b = self._neighbours(12)
-        steps = 8
+        a, b = self._neighbours(_K["piece_neighbours"])
+        steps = _K["piece_steps"]
         share = np.arange(1, steps)[None, :, None] / steps
         ways = (1 - share) * self.points[a][:, None] + share * self.points[b][:, None]
         inner, found = self.closest(ways.reshape(-1, self.ambient_dimension))
@@ -214,7 +217,7 @@ class Probe:
         path = np.concatenate([self.points[a][:, None], inner, self.points[b][:, None]], axis=1)
         leaps = norms(np.diff(path, axis=1)).max(axis=1, initial=0.0)
         length = norms(self.points[a] - self.points[b])
-        walked = found.reshape(ways.shape[:2]).all(axis=1) & (leaps <= 0.4 * length)
+        walked = found.reshape(ways.shape[:2]).all(axis=1) & (leaps <= _K["leap"] * length)
         label = np.arange(len(self.points))
         for i, j in zip(a[walked], b[walked]):
             label[label == label[j]] = label[i]

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import grpc
 import numpy as np
+from google.protobuf.message import DecodeError
 
+from . import _shared
 from ._generated import status_details_pb2 as details_pb
 
 if TYPE_CHECKING:
@@ -158,39 +160,26 @@ class NotConverged(StellateError, ArithmeticError):
         self.converged = converged
 
 
-_BY_REASON: dict[str, type[StellateError]] = {
-    "INVALID_ARGUMENT": InvalidArgument,
-    "OUT_OF_ORDER": FailedPrecondition,
-    "LIMIT_EXCEEDED": LimitExceeded,
-    "MESH_NOT_FOUND": MeshNotFound,
-    "FAILED_PRECONDITION": FailedPrecondition,
-    "SHUTTING_DOWN": Unavailable,
-    "UNAUTHENTICATED": Unauthenticated,
-    "REVISION_TOO_NEW": InvalidArgument,
-    "NO_SEEDS": OracleError,
-    "NO_WORKER": OracleError,
-    "ANSWER_TIMEOUT": OracleError,
-}
-
-_BY_CODE: dict[grpc.StatusCode, type[StellateError]] = {
-    grpc.StatusCode.INVALID_ARGUMENT: InvalidArgument,
-    grpc.StatusCode.OUT_OF_RANGE: InvalidArgument,
-    grpc.StatusCode.RESOURCE_EXHAUSTED: LimitExceeded,
-    grpc.StatusCode.NOT_FOUND: MeshNotFound,
-    grpc.StatusCode.FAILED_PRECONDITION: FailedPrecondition,
-    grpc.StatusCode.UNAUTHENTICATED: Unauthenticated,
-    grpc.StatusCode.ABORTED: OracleError,
-    grpc.StatusCode.CANCELLED: Cancelled,
-    grpc.StatusCode.UNAVAILABLE: Unavailable,
-    grpc.StatusCode.DEADLINE_EXCEEDED: Unavailable,
-}
+_DOMAIN = "stellate.v1"
+_TABLE = _shared.table("errors.toml")
 
 
-def error_class(reason: str) -> type[StellateError]:
-    """The exception for one of the protocol's reasons."""
-    if reason.startswith("ORACLE_"):
+def error_class(reason: str, code: str = "") -> type[StellateError]:
+    """The exception for one of the protocol's reasons, in a status of the gRPC code."""
+    name = _TABLE["reasons"].get(reason)
+    if name is None and reason.startswith("ORACLE_"):
         return OracleError
-    return _BY_REASON.get(reason, StellateError)
+    kind = globals()[name or _TABLE["codes"].get(code, "StellateError")]
+    assert issubclass(kind, StellateError)
+    return kind
+
+
+def exit_status(error: StellateError) -> int:
+    """That a command line ends with."""
+    faults = _TABLE["classes"]
+    fault = next(faults[kind.__name__] for kind in type(error).__mro__ if kind.__name__ in faults)
+    refused = fault in ("request", "file")
+    return int(_TABLE["exit_refused" if refused else "exit_failed"])
 
 
 def from_rpc(error: grpc.RpcError) -> StellateError:
@@ -198,23 +187,32 @@ def from_rpc(error: grpc.RpcError) -> StellateError:
     code, message = error.code(), error.details() or ""
     reason, details = "", {"grpc_code": code.name}
     for key, value in error.trailing_metadata() or ():
-        if key != "grpc-status-details-bin":
-            continue
-        for part in details_pb.Status.FromString(value).details:
-            kind = part.type_url.rpartition("/")[2]
-            if kind == "google.rpc.ErrorInfo":
-                info = details_pb.ErrorInfo.FromString(part.value)
-                reason = info.reason
-                details.update(info.metadata)
-            elif kind == "google.rpc.BadRequest":
-                violations = details_pb.BadRequest.FromString(part.value).field_violations
-                details["fields"] = {v.field: v.description for v in violations}
-    kind_of_error = error_class(reason) if reason else _BY_CODE.get(code, StellateError)
-    if kind_of_error is StellateError:
-        kind_of_error = _BY_CODE.get(code, StellateError)
+        if key == "grpc-status-details-bin":
+            try:
+                reason, more = _named_in(details_pb.Status.FromString(value))
+            except DecodeError:  # of whatever stands between us and the server
+                continue
+            details.update(more)
+    kind_of_error = error_class(reason, code.name)
     advice = _advice(code, message)
     words = f"{message or code.name}; {advice}" if advice else message or code.name
     return kind_of_error(words, reason or None, details)
+
+
+def _named_in(status: details_pb.Status) -> tuple[str, dict[str, Any]]:
+    """The reason, and what else the server says."""
+    reason, details = "", dict[str, Any]()
+    for part in status.details:
+        kind = part.type_url.rpartition("/")[2]
+        if kind == "google.rpc.ErrorInfo":
+            info = details_pb.ErrorInfo.FromString(part.value)
+            if info.domain == _DOMAIN:
+                reason = info.reason
+                details.update(info.metadata)
+        elif kind == "google.rpc.BadRequest":
+            violations = details_pb.BadRequest.FromString(part.value).field_violations
+            details["fields"] = {v.field: v.description for v in violations}
+    return reason, details
 
 
 def _advice(code: grpc.StatusCode, message: str) -> str:

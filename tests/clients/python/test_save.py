@@ -325,7 +325,7 @@ def oriented_one_by_one(simplices):
                         front.append(other)
     turned = simplices.copy()
     for row in (row for row, kept in side.items() if kept < 0):
-        turned[row, :2] = simplices[row, [1, 0]]
+        turned[row, -2:] = simplices[row, [-1, -2]]
     return turned
 
 
