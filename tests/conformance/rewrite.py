@@ -19,10 +19,10 @@ import shapes  # noqa: E402
 import stellate  # noqa: E402
 from fake_server import indices  # noqa: E402
 from stellate import manifolds  # noqa: E402
-from stellate._arrays import to_wire  # noqa: E402
 from stellate._generated import errors_pb2, mesh_pb2, stellate_pb2  # noqa: E402
 from stellate._generated import status_details_pb2 as details_pb  # noqa: E402
 from stellate._shared import table  # noqa: E402
+from stellate._wire.arrays import to_wire  # noqa: E402
 from stellate.errors import error_class, exit_status  # noqa: E402
 
 Event = stellate_pb2.WatchMeshResponse

@@ -13,14 +13,15 @@ from . import _stubs
 _stubs.ensure()  # before anything imports them
 
 from . import manifolds  # noqa: E402
+from ._api import download, mesh, serve, watch  # noqa: E402
+from ._chunks import Chunk, Puller  # noqa: E402
 from ._credentials import Credentials  # noqa: E402
-from ._doctor import check  # noqa: E402
+from ._doctor.check import check  # noqa: E402
+from ._doctor.findings import CheckReport, Finding  # noqa: E402
 from ._executors import ExecutorWorkers, workers_on  # noqa: E402
-from ._face import download, mesh, serve, watch  # noqa: E402
-from ._findings import CheckReport, Finding  # noqa: E402
-from ._formats import check_save  # noqa: E402
+from ._files.formats import check_save  # noqa: E402
 from ._mesh import Mesh, load_txt  # noqa: E402
-from ._pull import Chunk, Puller, pull  # noqa: E402
+from ._pull import pull  # noqa: E402
 from ._server import Server, find_stellated  # noqa: E402
 from ._version import __version__ as __version__  # noqa: E402
 from .client import Client, MeshInfo, ServerInfo  # noqa: E402

@@ -22,12 +22,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from . import _shared
+from ._api import download, mesh
+from ._complex import Complex
 from ._credentials import Credentials
-from ._doctor import check
+from ._doctor.check import check
 from ._executors import workers_on
-from ._face import download, mesh
-from ._formats import check_save
-from ._mesh import Mesh
+from ._files.formats import check_save
 from ._version import __version__
 from .client import Client
 from .errors import Interrupted, StellateError, exit_status
@@ -141,7 +141,7 @@ def _bar(options: argparse.Namespace) -> Any:
     return None if options.quiet else progress_bar()
 
 
-def _deliver(finished: Mesh, options: argparse.Namespace) -> int:
+def _deliver(finished: Complex, options: argparse.Namespace) -> int:
     """What a mesh is told by; the exit status that stands for it."""
     report = finished.report
     if options.report is not None and report is not None:
@@ -154,6 +154,7 @@ def _deliver(finished: Mesh, options: argparse.Namespace) -> int:
 
 
 def _mesh(options: argparse.Namespace) -> int:
+    finished: Complex
     oracle, settings = load(options.oracle), _settings(options)
     label = f"stellate {options.oracle}".encode()[:_LABEL_BYTES].decode(errors="ignore")
     try:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ._doctor import check
+from ._doctor.check import check
 from ._shared import table
 from .errors import InvalidArgument, OracleError
 

@@ -86,8 +86,12 @@ class _Pool:
 
     def __init__(self, executor: futures.Executor | MakeExecutor) -> None:
         self._lock = threading.Lock()
-        self._make = None if isinstance(executor, futures.Executor) else executor
-        self._executor = executor if self._make is None else self._make()
+        self._make: MakeExecutor | None = None
+        if isinstance(executor, futures.Executor):
+            self._executor = executor
+        else:
+            self._make = executor
+            self._executor = executor()
 
     def get(self) -> futures.Executor:
         with self._lock:
@@ -137,11 +141,12 @@ class ExecutorWorkers:
         self._lock = threading.Lock()
         if isinstance(server, Client) and credentials is not None:
             raise InvalidArgument("a Client has its credentials already: give it them")
-        self._own_client = None if isinstance(server, Client) else Client(server, credentials)
-        client = server if isinstance(server, Client) else self._own_client
+        self._own_client: Client | None = None
+        if not isinstance(server, Client):
+            server = self._own_client = Client(server, credentials)
         self._pool = _Pool(executor)
         self._workers = [
-            client.worker(
+            server.worker(
                 self._checked,
                 mesh_name,
                 f"{worker}-{i}",
@@ -239,7 +244,8 @@ class ExecutorWorkers:
 
     def _result_of(self, executor: futures.Executor, question: bytes) -> bytes | _Raised:
         future = executor.submit(_answer_here, self._key, self._oracle, question)
-        futures.wait([future, self._stopped], return_when=futures.FIRST_COMPLETED)
+        either: list[futures.Future[Any]] = [future, self._stopped]
+        futures.wait(either, return_when=futures.FIRST_COMPLETED)
         if self._stopped.done():
             future.cancel()
             raise _Left("the workers were stopped")

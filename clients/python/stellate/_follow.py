@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Callable, TypeVar
 
-from ._growth import GrowingComplex
+from ._info import MeshInfo, unless_failed
 from ._mesh import Mesh
-from .client import Client, MeshInfo
-from .errors import Cancelled, StellateError, error_class
-from .report import Progress, Report
+from ._wire.delta_mesh import DeltaMesh
+from .client import Client
+from .errors import protocol_error
+from .report import Progress
 
 T = TypeVar("T")
 
@@ -26,7 +27,7 @@ class Following:
         self, client: Client, info: MeshInfo, on_progress: OnProgress | None, every: bool = True
     ) -> None:
         self._on_progress, self._every = on_progress, every
-        self._growth = GrowingComplex(info.dimension, info.ambient_dimension)
+        self._growth = DeltaMesh(info.dimension, info.ambient_dimension)
         self._watch = client.watch(info.name)
         self._watch.on_resume = self._growth.forget_pending
         self._progress: Progress | None = None
@@ -42,8 +43,9 @@ class Following:
                 elif kind == "reset_mesh":
                     growth.reset()
                 elif kind == "progress":
-                    self._note(Progress.from_wire(event.progress))
-                    if self._progress.phase == "CERTIFYING":
+                    progress = Progress.from_wire(event.progress)
+                    self._note(progress)
+                    if progress.phase == "CERTIFYING":
                         _sound(growth.settle)  # while the server is busy
                 elif kind == "final":
                     final = MeshInfo.from_wire(event.final)
@@ -69,21 +71,14 @@ class Following:
 
 
 def _sound(step: Callable[..., T], *arguments: Any) -> T:
-    """A step of a GrowingComplex, whose complaints are about the server."""
+    """A step of a DeltaMesh, whose complaints are about the server."""
     try:
         return step(*arguments)
     except ValueError as error:
-        raise StellateError(f"the server broke the protocol: {error}", "PROTOCOL") from error
+        raise protocol_error(str(error)) from error
 
 
-def _finished(growth: GrowingComplex, final: MeshInfo) -> Mesh:
+def _finished(growth: DeltaMesh, final: MeshInfo) -> Mesh:
     simplices = _sound(growth.simplices)
     mesh = Mesh(growth.points(), simplices, final.report, final.progress, growth.revision)
-    if final.state == "CANCELLED":
-        raise Cancelled("the mesh was cancelled", mesh=mesh)
-    if final.state == "FAILED":
-        failure = final.report.failure if isinstance(final.report, Report) else None
-        reason = failure.reason if failure else "ORACLE_FAILED"
-        message = failure.message if failure else "the mesh failed, and the server does not say why"
-        raise error_class(reason)(message, reason, mesh=mesh)
-    return mesh
+    return unless_failed(mesh, final)

@@ -8,8 +8,8 @@ import warnings
 
 import numpy as np
 
-from . import _formats
-from ._orientation import orient, turn_outwards
+from ._files import formats
+from ._files.orientation import orient, turn_outwards
 from .errors import UncertifiedWarning
 from .report import Progress, Report
 
@@ -88,7 +88,7 @@ class Mesh:
                 UncertifiedWarning,
                 stacklevel=2,
             )
-        _formats.save(self, os.fspath(path))
+        formats.save(self, os.fspath(path))
 
     def __repr__(self) -> str:
         if self.report is None:

@@ -12,13 +12,20 @@ from typing import Any, Callable
 
 import grpc
 
-from . import _enums
-from ._arrays import fill, from_wire
 from ._generated import oracle_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
 from ._generated.stellate_pb2 import GetMeshRequest
-from ._retry import Outage, Patience
-from .errors import ExecutorError, FailedPrecondition, InvalidArgument, StellateError, from_rpc
+from ._reconnect import Reconnector, ReconnectPolicy
+from ._wire import enums
+from ._wire.arrays import fill, from_wire
+from .errors import (
+    ExecutorError,
+    FailedPrecondition,
+    InvalidArgument,
+    StellateError,
+    from_rpc,
+    protocol_error,
+)
 from .oracle import CheckedOracle
 
 _ANSWER_BYTES = 3_000_000  # an answer has to stay below the server's 4 MB
@@ -167,7 +174,7 @@ class Worker:
         mesh: str,
         name: str,
         on_failure: Callable[[BaseException], None],
-        patience: Patience,
+        policy: ReconnectPolicy,
         quiet: bool = False,
         ask: Ask = answer,
         max_chunk: int | None = None,
@@ -187,7 +194,7 @@ class Worker:
             max_chunk_queries=min(most, check_max_chunk(max_chunk) or most),
         )
         self._call: Any = None
-        self._outage = Outage(patience, quiet)
+        self._attempts = Reconnector(policy, quiet)
         self._stopped = threading.Event()
 
     def run(self) -> str:
@@ -207,7 +214,7 @@ class Worker:
                     if state:
                         return state
                 try:
-                    self._outage.wait_or_raise(broken.error, ours)
+                    self._attempts.wait_or_raise(broken.error, ours)
                 except StellateError:
                     if self._stopped.is_set():
                         return ""
@@ -216,13 +223,13 @@ class Worker:
     def stop(self) -> None:
         """Ends the stream from another thread: what is unanswered goes to another worker."""
         self._stopped.set()
-        self._outage.stop()
+        self._attempts.stop()
         if self._call is not None:
             self._call.cancel()
 
     def finish(self) -> None:
         """The mesh is over: a lost stream is not opened again."""
-        self._outage.stop()
+        self._attempts.stop()
 
     def _serve(self) -> str:
         outbox = _Outbox()
@@ -239,14 +246,13 @@ class Worker:
     def _answer_all(self, outbox: _Outbox, inbox: _Inbox) -> str:
         state = ""
         for response in inbox:
-            self._outage.heard()
+            self._attempts.heard()
             kind = response.WhichOneof("message")
             if kind == "queries":
                 if response.queries.kind not in _KINDS:  # another worker may be newer
-                    unknown = StellateError(
-                        f"the server asks a question of kind {response.queries.kind}, which this "
-                        "version does not know",
-                        "PROTOCOL",
+                    unknown = protocol_error(
+                        f"it asks a question of kind {response.queries.kind}, which this version "
+                        "does not know"
                     )
                     self._on_failure(unknown)
                     raise unknown
@@ -265,7 +271,7 @@ class Worker:
                 if response.welcome.answer_seconds > 0:
                     outbox.say_busy_every(_BUSY_SHARE * response.welcome.answer_seconds)
             elif kind == "over":
-                state = _enums.state_of(response.over.state)
+                state = enums.state_of(response.over.state)
                 outbox.end()
         return state
 
@@ -279,7 +285,7 @@ class Worker:
             except grpc.RpcError:
                 return ""
             if mesh.HasField("end_time"):
-                return _enums.state(mesh.state)
+                return enums.state(mesh.state)
             # It is just about to end.
             if time.monotonic() > give_up or self._stopped.wait(_LOOK_AGAIN_SECONDS):
                 return ""

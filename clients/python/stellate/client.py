@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-import dataclasses
-import datetime
 import re
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Callable, TypeVar
+from typing import Any, Callable, TypeVar
 
 import grpc
 
-from . import _enums
+from ._chunks import Declared, Puller
 from ._credentials import Credentials, stays_on_this_machine
-from ._download import Parts
 from ._epsilon import choose
 from ._generated import mesh_pb2
 from ._generated import stellate_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
-from ._retry import Outage, Patience
+from ._info import MeshInfo, ServerInfo
+from ._reconnect import Reconnector, ReconnectPolicy
 from ._server import Server
-from ._spec import mesh_spec
+from ._streams import Parts, Watch
+from ._wire.spec import mesh_spec
 from ._worker import Ask, Worker, answer
 from .errors import InvalidArgument, MeshNotFound, StellateError, from_rpc
 from .oracle import CheckedOracle
-from .report import Progress, Report
 
-if TYPE_CHECKING:
-    from ._pull import Puller
+__all__ = ["Client", "MeshInfo", "ServerInfo", "Watch", "Parts"]
 
 _CALL_SECONDS = 30.0
 _CONNECT_SECONDS = 1.0
@@ -34,77 +31,6 @@ _NO_PINGS = 1_000_000.0
 _LARGEST_MESSAGE = 64 << 20
 
 T = TypeVar("T")
-
-
-@dataclasses.dataclass(frozen=True)
-class MeshInfo:
-    """A mesh on the server, without its geometry."""
-
-    name: str  # "meshes/<unguessable>"
-    # "WAITING", "RUNNING", "SUCCEEDED", "STOPPED", "CANCELLED", "FAILED"; "UNKNOWN": a newer one
-    state: str
-    label: str
-    dimension: int
-    ambient_dimension: int
-    epsilon: float
-    create_time: datetime.datetime | None
-    end_time: datetime.datetime | None
-    revision: int
-    progress: Progress
-    report: Report | None  # once it is over
-    workers: int
-    watchers: int
-
-    @property
-    def over(self) -> bool:
-        """Whether nothing will change any more."""
-        return self.state not in ("WAITING", "RUNNING")
-
-    @classmethod
-    def from_wire(cls, mesh: mesh_pb2.Mesh) -> MeshInfo:
-        def at(field: str) -> datetime.datetime | None:
-            if not mesh.HasField(field):
-                return None
-            return getattr(mesh, field).ToDatetime(tzinfo=datetime.timezone.utc)
-
-        report = None
-        if mesh.HasField("report"):
-            report = Report.from_wire(mesh.report, mesh.spec.epsilon or None)
-        return cls(
-            name=mesh.name,
-            state=_enums.state(mesh.state),
-            label=mesh.spec.label,
-            dimension=mesh.spec.dimension,
-            ambient_dimension=mesh.spec.ambient_dimension,
-            epsilon=mesh.spec.epsilon,
-            create_time=at("create_time"),
-            end_time=at("end_time"),
-            revision=mesh.revision,
-            progress=Progress.from_wire(mesh.progress),
-            report=report,
-            workers=mesh.workers,
-            watchers=mesh.watchers,
-        )
-
-
-@dataclasses.dataclass(frozen=True)
-class ServerInfo:
-    """What a server is and allows."""
-
-    version: str
-    protocols: tuple[str, ...]
-    max_dimension: int
-    max_ambient_dimension: int
-    max_vertices: int
-    max_rounds: int
-    max_meshes: int
-    max_message_bytes: int
-    owner_meshes: int  # of one owner at once, where the server tells owners apart
-    max_memory_bytes: int  # of all meshes, as the server estimates it
-    owner_memory_bytes: int  # of one owner's meshes
-    max_workers: int  # of one mesh
-    max_watchers: int  # of one mesh, downloads included
-    check_share: float  # of the queries, asked of two workers to compare the answers
 
 
 class Client:
@@ -160,7 +86,7 @@ class Client:
             options.append(("grpc.enable_http_proxy", 0))  # proxies are for the outside
         self._channel = (credentials or Credentials()).channel(address, options)
         self._stub = rpc.StellateStub(self._channel)
-        self._patience = Patience(reconnect_seconds, self._connect, self._why_hopeless)
+        self._policy = ReconnectPolicy(reconnect_seconds, self._connect, self._why_hopeless)
 
     def create(self, oracle: Any, epsilon: float | str, **criteria: Any) -> MeshInfo:
         """Declares a mesh, which waits to be served. epsilon and keywords: see stellate.mesh.
@@ -198,22 +124,17 @@ class Client:
 
     def delete(self, name: str, *, wait: bool = True) -> None:
         """Cancels a mesh if it runs, and forgets it. Without `wait` a lost server is an error."""
-        outage = Outage(self._patience)
+        attempts = Reconnector(self._policy)
         request = pb.DeleteMeshRequest(name=name)
         try:
-            self._call(self._stub.DeleteMesh, request, outage, once=not wait)
+            self._call(self._stub.DeleteMesh, request, attempts, once=not wait)
         except MeshNotFound:
-            if not outage.lasts:  # else an attempt whose answer was lost has done it
+            if not attempts.lasts:  # else an attempt whose answer was lost has done it
                 raise
 
     def info(self) -> ServerInfo:
         """What the server is and allows."""
-        answer = self._call(self._stub.GetServerInfo, pb.GetServerInfoRequest())
-        plain = (
-            field.name for field in dataclasses.fields(ServerInfo) if field.name != "protocols"
-        )
-        values: dict[str, Any] = {name: getattr(answer, name) for name in plain}
-        return ServerInfo(protocols=tuple(answer.protocols), **values)
+        return ServerInfo.from_wire(self._call(self._stub.GetServerInfo, pb.GetServerInfoRequest()))
 
     def serve(
         self, oracle: Any, name: str, *, worker: str = "", max_chunk: int | None = None
@@ -245,7 +166,7 @@ class Client:
         """
         checked = oracle if isinstance(oracle, CheckedOracle) else CheckedOracle(oracle)
         return Worker(
-            self._stub, checked, name, worker, on_failure, self._patience, quiet, ask, max_chunk
+            self._stub, checked, name, worker, on_failure, self._policy, quiet, ask, max_chunk
         )
 
     def pull(self, name: str, *, worker: str = "", max_chunk: int | None = None) -> Puller:
@@ -253,21 +174,22 @@ class Client:
 
         What the mesh was declared with, answers have to have.
         """
-        from ._pull import pull_by_name
-
-        return pull_by_name(self, name, worker, max_chunk)
+        puller, declared = Puller(), Declared.of(self.get_spec(name))
+        return puller.serve(
+            self.worker(declared, name, worker, ask=puller.ask, max_chunk=max_chunk)
+        )
 
     def watch(self, name: str, from_revision: int = 0, progress_only: bool = False) -> Watch:
         """The mesh's events as they come, in the protocol's own messages."""
-        outage = Outage(self._patience)
-        return Watch(self._stub, outage, name, from_revision, progress_only)
+        attempts = Reconnector(self._policy)
+        return Watch(self._stub, attempts, name, from_revision, progress_only)
 
     def parts(self, name: str, revision: int = 0) -> Parts:
         """A mesh as it was at one revision, 0 being the newest, in the protocol's own messages.
 
         See stellate.download for the mesh itself.
         """
-        return Parts(self._stub, Outage(self._patience), name, revision)
+        return Parts(self._stub, Reconnector(self._policy), name, revision)
 
     def get_spec(self, name: str) -> mesh_pb2.MeshSpec:
         """The specification in the protocol's own message."""
@@ -297,20 +219,20 @@ class Client:
         self,
         method: Callable[..., T],
         request: Any,
-        outage: Outage | None = None,
+        attempts: Reconnector | None = None,
         *,
         once: bool = False,
     ) -> T:
-        outage = outage or Outage(self._patience)
+        attempts = attempts or Reconnector(self._policy)
         while True:
             try:
                 answer = method(request, timeout=_CALL_SECONDS)
             except grpc.RpcError as error:
                 if once:
-                    outage.stop()
-                outage.wait_or_raise(error, from_rpc(error))
+                    attempts.stop()
+                attempts.wait_or_raise(error, from_rpc(error))
             else:
-                outage.heard()
+                attempts.heard()
                 return answer
 
     def __enter__(self) -> Client:
@@ -318,60 +240,3 @@ class Client:
 
     def __exit__(self, *raised: object) -> None:
         self.close()
-
-
-class Watch:
-    """An iterator over WatchMeshResponse messages that survives a lost connection.
-
-    After a break it goes on from the last complete revision; chunks of an incomplete one are sent
-    again, which `on_resume` announces.
-    """
-
-    def __init__(
-        self,
-        stub: rpc.StellateStub,
-        outage: Outage,
-        name: str,
-        from_revision: int,
-        progress_only: bool,
-    ) -> None:
-        self._stub, self._outage = stub, outage
-        self._request = pb.WatchMeshRequest(
-            name=name, from_revision=from_revision, progress_only=progress_only
-        )
-        self._stream: Any = None
-        self._over = False
-        self.on_resume: Callable[[], None] = lambda: None
-
-    def __iter__(self) -> Watch:
-        return self
-
-    def __next__(self) -> pb.WatchMeshResponse:
-        while not self._over:
-            try:
-                if self._stream is None:
-                    self._stream = self._stub.WatchMesh(self._request)
-                    if self._outage.stopped:  # by another thread, which saw no stream
-                        self._stream.cancel()
-                event = next(self._stream)
-            except grpc.RpcError as error:
-                self._stream = None
-                self._outage.wait_or_raise(error, self._outage.explain(from_rpc(error)))
-                self.on_resume()
-                continue
-            self._outage.heard()
-            kind = event.WhichOneof("event")
-            if kind == "delta" and event.delta.complete:
-                self._request.from_revision = event.delta.delta.revision
-            elif kind == "reset_mesh":
-                self._request.from_revision = 0
-            self._over = self._over or kind == "final"
-            return event
-        raise StopIteration
-
-    def close(self) -> None:
-        """Stops watching; the mesh goes on."""
-        self._over = True
-        self._outage.stop()
-        if self._stream is not None:
-            self._stream.cancel()

@@ -8,17 +8,15 @@ them: it reaches the caller as itself.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import grpc
 import numpy as np
 from google.protobuf.message import DecodeError
 
 from . import _shared
+from ._complex import Complex
 from ._generated import status_details_pb2 as details_pb
-
-if TYPE_CHECKING:
-    from ._mesh import Mesh
 
 
 class StellateError(Exception):
@@ -37,7 +35,7 @@ class StellateError(Exception):
         message: str,
         reason: str | None = None,
         details: Mapping[str, Any] | None = None,
-        mesh: Mesh | None = None,
+        mesh: Complex | None = None,
     ) -> None:
         super().__init__(message)
         self.reason = reason or self.default_reason
@@ -83,7 +81,7 @@ class Interrupted(KeyboardInterrupt):
         everything at once.
     """
 
-    def __init__(self, message: str, mesh: Mesh | None = None) -> None:
+    def __init__(self, message: str, mesh: Complex | None = None) -> None:
         super().__init__(message)
         self.mesh = mesh
 
@@ -197,6 +195,11 @@ def from_rpc(error: grpc.RpcError) -> StellateError:
     advice = _advice(code, message)
     words = f"{message or code.name}; {advice}" if advice else message or code.name
     return kind_of_error(words, reason or None, details)
+
+
+def protocol_error(what: str) -> StellateError:
+    """What a server sent that makes no sense."""
+    return StellateError(f"the server broke the protocol: {what}", "PROTOCOL")
 
 
 def _named_in(status: details_pb.Status) -> tuple[str, dict[str, Any]]:

@@ -9,9 +9,9 @@ import re
 import textwrap
 from typing import Any
 
-from . import _enums
 from ._generated import mesh_pb2 as pb
 from ._version import __version__
+from ._wire import enums
 
 
 def _copy_fields(cls: type, message: Any) -> Any:
@@ -19,7 +19,7 @@ def _copy_fields(cls: type, message: Any) -> Any:
     values = {}
     for field in dataclasses.fields(cls):
         value = getattr(message, field.name)
-        values[field.name] = tuple(value) if field.type == "tuple[str, ...]" else value
+        values[field.name] = tuple(value) if str(field.type) == "tuple[str, ...]" else value
     return cls(**values)
 
 
@@ -45,7 +45,7 @@ class Progress:
     def from_wire(cls, message: pb.Progress) -> Progress:
         plain = [f.name for f in dataclasses.fields(cls) if f.name != "phase"]
         values = {name: getattr(message, name) for name in plain}
-        return cls(phase=_enums.phase(message.phase), **values)
+        return cls(phase=enums.phase(message.phase), **values)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -184,7 +184,7 @@ class Report:
         if message.HasField("failure"):
             failure = Failure(message.failure.reason, message.failure.message)
         return cls(
-            termination=_enums.termination(message.termination),
+            termination=enums.termination(message.termination),
             failure=failure,
             counts=_copy_fields(Counts, message.counts),
             certificate=_certificate(message.certificate),
@@ -224,7 +224,7 @@ class Report:
 
 def _certificate(message: pb.Certificate) -> Certificate:
     plain = _copy_fields(Certificate, message)
-    return dataclasses.replace(plain, level=_enums.level(message.level))
+    return dataclasses.replace(plain, level=enums.level(message.level))
 
 
 def _plain_verdict(c: Certificate) -> str:

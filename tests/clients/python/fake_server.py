@@ -7,9 +7,9 @@ from concurrent import futures
 
 import grpc
 import numpy as np
-from stellate._arrays import to_wire
 from stellate._generated import geometry_pb2, mesh_pb2, oracle_pb2, stellate_pb2
 from stellate._generated import stellate_pb2_grpc as rpc
+from stellate._wire.arrays import to_wire
 
 
 def indices(rows) -> geometry_pb2.IndexArray:

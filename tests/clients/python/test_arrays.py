@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import shapes
 import stellate
-from stellate._arrays import from_wire, indices_from_wire, to_wire
 from stellate._generated import geometry_pb2, mesh_pb2, stellate_pb2
-from stellate._growth import GrowingComplex, in_order
+from stellate._wire.arrays import from_wire, indices_from_wire, to_wire
+from stellate._wire.delta_mesh import DeltaMesh, in_order
 
 
 def test_round_trip_keeps_every_bit(rng):
@@ -61,7 +61,7 @@ def delta(revision, first, points, added, removed, complete=True):
 @pytest.mark.parametrize("step", [1, 4, 100])
 def test_deltas_add_up(rng, step):
     """Random additions and removals, in chunks, against a set kept by hand."""
-    growth, expected, points = GrowingComplex(2, 3), set(), np.empty((0, 3))
+    growth, expected, points = DeltaMesh(2, 3), set(), np.empty((0, 3))
     for revision in range(1, 20):
         block = rng.normal(size=(rng.integers(3, 300), 3))
         first, points = len(points), np.vstack([points, block])
@@ -82,7 +82,7 @@ def test_deltas_add_up(rng, step):
 
 
 def test_earlier_snapshots_stay_true():
-    growth = GrowingComplex(2, 3)
+    growth = DeltaMesh(2, 3)
     growth.absorb(delta(1, 0, np.zeros((3, 3)), [[0, 1, 2]], []))
     early = growth.points()
     growth.absorb(delta(2, 3, np.ones((5000, 3)), [], [[0, 1, 2]]))
@@ -92,7 +92,7 @@ def test_earlier_snapshots_stay_true():
 
 
 def test_a_revision_cut_short_is_forgotten():
-    growth = GrowingComplex(2, 3)
+    growth = DeltaMesh(2, 3)
     growth.absorb(delta(1, 0, np.zeros((2, 3)), [], [], False))
     growth.forget_pending()
     assert growth.absorb(delta(1, 0, np.eye(3), [[0, 1, 2]], []))
@@ -107,7 +107,7 @@ def test_rows_of_any_size_are_put_in_order(rng):
 
 
 def test_a_simplex_that_comes_twice_is_refused():
-    growth = GrowingComplex(2, 3)
+    growth = DeltaMesh(2, 3)
     growth.absorb(delta(1, 0, np.eye(3), [[0, 1, 2]], []))
     growth.absorb(delta(2, 3, np.empty((0, 3)), [[0, 1, 2]], []))
     with pytest.raises(ValueError, match="already"):
@@ -124,7 +124,7 @@ def test_a_simplex_that_comes_twice_is_refused():
 )
 def test_deltas_that_do_not_fit_are_refused(chunk, words):
     with pytest.raises(ValueError, match=words):
-        growth = GrowingComplex(2, 3)
+        growth = DeltaMesh(2, 3)
         growth.absorb(chunk)
         growth.simplices()
 

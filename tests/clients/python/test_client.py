@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import stellate
 from fake_server import FakeServer, delta, final, serving
-from stellate._arrays import to_wire
 from stellate._generated import mesh_pb2, oracle_pb2
+from stellate._wire.arrays import to_wire
 from stellate.manifolds import Sphere
 
 CIRCLE = Sphere(1)

@@ -9,7 +9,7 @@ import pytest
 import stellate
 from stellate import manifolds
 from stellate._command_line import main
-from stellate._findings import all_words
+from stellate._doctor.findings import all_words
 
 PACKAGE = str(pathlib.Path(stellate.__file__).parents[1])
 

@@ -5,9 +5,9 @@ import threading
 import numpy as np
 import pytest
 import stellate
-from stellate._arrays import from_wire, to_wire
 from stellate._generated import oracle_pb2
-from stellate._spec import mesh_spec
+from stellate._wire.arrays import from_wire, to_wire
+from stellate._wire.spec import mesh_spec
 from stellate._worker import answer
 from stellate.manifolds import Sphere, Torus
 from stellate.oracle import CheckedOracle

@@ -12,7 +12,7 @@ import pytest
 import shapes
 import stellate
 import topology
-from stellate import _formats
+from stellate._files import formats
 from stellate._generated import mesh_pb2
 
 
@@ -189,10 +189,10 @@ SOLIDS = stellate.Mesh(SOLID.points[:, :3].copy(), SOLID.simplices[:1])
 
 
 @pytest.mark.parametrize("mesh", [shapes.polygon(7), shapes.torus(), SOLIDS])
-@pytest.mark.parametrize("ending", sorted(_formats._FORMATS))
+@pytest.mark.parametrize("ending", sorted(formats._FORMATS))
 def test_what_is_written_is_read_back(ending, mesh, tmp_path):
     path = tmp_path / f"mesh{ending}"
-    if not _formats._FORMATS[ending].takes(mesh.dimension, mesh.ambient_dimension):
+    if not formats._FORMATS[ending].takes(mesh.dimension, mesh.ambient_dimension):
         with pytest.raises(stellate.SaveError):
             mesh.save(path)
         return

@@ -10,8 +10,8 @@ import pytest
 import stellate
 from fake_server import FakeServer, indices, serving
 from stellate import manifolds
-from stellate._arrays import to_wire
 from stellate._generated import mesh_pb2, stellate_pb2
+from stellate._wire.arrays import to_wire
 
 UNKNOWN = "meshes/" + 32 * "0"
 

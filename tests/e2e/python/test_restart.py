@@ -9,7 +9,7 @@ import time
 
 import pytest
 import stellate
-from stellate import _retry, manifolds
+from stellate import _reconnect, manifolds
 
 
 class MortalServer:
@@ -106,13 +106,13 @@ def test_a_worker_by_itself_comes_back(mortal):
 
 def test_a_frozen_server_is_found_by_pings(mortal, monkeypatch):
     oracle = Disaster(lambda: mortal.send(signal.SIGSTOP), 3)
-    wait = _retry.Outage.wait_or_raise
+    wait = _reconnect.Reconnector.wait_or_raise
 
     def thaw_and_wait(outage, error, ours):
         mortal.send(signal.SIGCONT)
         wait(outage, error, ours)
 
-    monkeypatch.setattr(_retry.Outage, "wait_or_raise", thaw_and_wait)
+    monkeypatch.setattr(_reconnect.Reconnector, "wait_or_raise", thaw_and_wait)
     with stellate.Client(mortal.address, keepalive_seconds=0.5) as client:
         mesh = stellate.mesh(oracle, 0.15, server=client)
     assert not oracle.left

@@ -20,7 +20,7 @@ import numpy as np
 import raw_http2 as raw
 import stellate
 from stellate._generated import mesh_pb2, oracle_pb2, stellate_pb2
-from stellate._spec import mesh_spec
+from stellate._wire.spec import mesh_spec
 from stellate.oracle import CheckedOracle
 from strangers import ENDLESS, HALF, STRANGERS
 

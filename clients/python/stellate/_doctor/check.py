@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import numbers
 import time
 from collections.abc import Mapping
@@ -9,10 +10,10 @@ from typing import Any, Callable
 
 import numpy as np
 
-from ._findings import CheckReport, Finding
-from ._probe import Probe, Stop, norms
-from ._shared import table
-from .errors import InvalidArgument, OracleError
+from .._shared import table
+from ..errors import InvalidArgument, OracleError
+from .findings import CheckReport, Finding
+from .probe import Probe, Stop, norms
 
 _K: Mapping[str, Any] = table("doctor.toml")
 _ORDER = ("error", "warning", "note")
@@ -332,7 +333,7 @@ class _Examination:
         asked = probe.queries
         for batch in _K["batches"]:
             x = probe.starts[np.arange(batch) % len(probe.starts)]
-            seconds = _seconds(lambda x=x: probe.closest(x))
+            seconds = _seconds(functools.partial(probe.closest, x))
             self._rates[batch] = batch / seconds
             if seconds > 10 * _K["speed_seconds"]:
                 break

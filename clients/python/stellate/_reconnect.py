@@ -7,6 +7,7 @@ import logging
 import random
 import threading
 import time
+from collections.abc import Iterator
 from typing import Callable
 
 import grpc
@@ -31,7 +32,7 @@ def is_transient(error: grpc.RpcError) -> bool:
     return code in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.CANCELLED)
 
 
-def pauses(rng: random.Random | None = None):
+def pauses(rng: random.Random | None = None) -> Iterator[float]:
     """0.1 s, doubled each time up to 5 s, each shortened at random by up to half.
 
     So the clients of a server that comes back do not all come at once.
@@ -44,7 +45,7 @@ def pauses(rng: random.Random | None = None):
 
 
 @dataclasses.dataclass
-class Patience:
+class ReconnectPolicy:
     """What the calls and streams of one client share."""
 
     give_up_seconds: float
@@ -53,15 +54,15 @@ class Patience:
     reached: bool = False  # something was heard of the server: it was there
 
 
-class Outage:
+class Reconnector:
     """The attempts at one call or stream. One thread makes them; any other may call stop().
 
     A server is lost with a warning in the log and back with another; `quiet` streams, of which there
     are several beside one that is not, leave that to it.
     """
 
-    def __init__(self, patience: Patience, quiet: bool = False) -> None:
-        self._patience, self._quiet = patience, quiet
+    def __init__(self, policy: ReconnectPolicy, quiet: bool = False) -> None:
+        self._policy, self._quiet = policy, quiet
         self._stopped = threading.Event()
         self._attempts = 0
         self._lost_at = 0.0
@@ -82,7 +83,7 @@ class Outage:
 
     def heard(self) -> None:
         """The attempt brought something: the server is there."""
-        self._patience.reached = True
+        self._policy.reached = True
         if not self._attempts:
             return
         if not self._quiet:
@@ -108,21 +109,21 @@ class Outage:
         """
         if not is_transient(error):
             raise as_ours from None
-        hopeless = self._patience.hopeless()
+        hopeless = self._policy.hopeless()
         if hopeless is not None:
             raise hopeless from None
-        if self.stopped or not self._patience.reached:
+        if self.stopped or not self._policy.reached:
             raise as_ours from None
         now = time.monotonic()
         if not self._attempts:
             self._lost_at = now
-            if not self._quiet and self._patience.give_up_seconds > 0:
+            if not self._quiet and self._policy.give_up_seconds > 0:
                 _log.warning(
                     "lost the server (%s): trying again for up to %.0f s",
                     as_ours,
-                    self._patience.give_up_seconds,
+                    self._policy.give_up_seconds,
                 )
-        left = self._lost_at + self._patience.give_up_seconds - now
+        left = self._lost_at + self._policy.give_up_seconds - now
         if left <= 0:
             waited = f"; waited {now - self._lost_at:.1f} s for it" if self._attempts else ""
             raise Unavailable(f"{as_ours}{waited}", as_ours.reason, as_ours.details) from None
@@ -131,4 +132,4 @@ class Outage:
             raise as_ours from None
         # Connections come about only while somebody waits for them, and a stream that finds none
         # fails at once.
-        self._patience.connect()
+        self._policy.connect()

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from google.protobuf.descriptor import FieldDescriptor
 
-from ._arrays import to_wire
-from ._generated import mesh_pb2 as pb
-from .errors import InvalidArgument
-from .oracle import CheckedOracle
+from .._generated import mesh_pb2 as pb
+from ..errors import InvalidArgument
+from ..oracle import CheckedOracle
+from .arrays import to_wire
 
 _WHOLE = {
     FieldDescriptor.CPPTYPE_INT32,

@@ -9,15 +9,13 @@ import os
 import secrets
 import stat
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Callable
+from typing import Callable
 
 import numpy as np
 
-from . import _meshio, _vtu
-from .errors import SaveError
-
-if TYPE_CHECKING:
-    from ._mesh import Mesh
+from .._complex import Complex
+from ..errors import SaveError
+from . import meshio_formats, vtu
 
 _ANY = 1 << 30
 _DEBIAN = {"meshio": "python3-meshio", "h5py": "python3-h5py", "netCDF4": "python3-netcdf4"}
@@ -40,12 +38,12 @@ def check_save(path: str | os.PathLike[str], dimension: int, ambient_dimension: 
         raise PermissionError(f"cannot write {path}: {place} cannot be written to")
 
 
-def save(mesh: Mesh, path: str) -> None:
+def save(mesh: Complex, path: str) -> None:
     """Mesh.save."""
     form = _choose(path, mesh.dimension, mesh.ambient_dimension)
     if form.meshio is not None:
         with _replaced(path) as draft:
-            _meshio.write(form.meshio, mesh, _cells(mesh), draft)
+            meshio_formats.write(form.meshio, mesh, _cells(mesh), draft)
         return
     contents = form.contents(mesh)  # in full before any file is touched
     with _replaced(path) as draft, open(draft, "wb") as file:
@@ -60,8 +58,8 @@ class _Format:
     largest_dimension: int
     largest_ambient_dimension: int
     holds: str
-    contents: Callable[[Mesh], bytes] = lambda mesh: b""
-    meshio: _meshio.MeshioFormat | None = None
+    contents: Callable[[Complex], bytes] = lambda mesh: b""
+    meshio: meshio_formats.MeshioFormat | None = None
 
     def takes(self, k: int, d: int) -> bool:
         return (
@@ -127,24 +125,24 @@ def _lines(rows: np.ndarray, number: str, prefix: str = "") -> Iterator[str]:
     return (line % tuple(row) for row in rows.tolist())
 
 
-def _cells(mesh: Mesh) -> np.ndarray:
+def _cells(mesh: Complex) -> np.ndarray:
     oriented = mesh.oriented_simplices()
     return mesh.simplices if oriented is None else oriented
 
 
-def _in_space(mesh: Mesh) -> np.ndarray:
+def _in_space(mesh: Complex) -> np.ndarray:
     """The points with three coordinates, zeros added."""
     n, d = mesh.points.shape
     return np.hstack([mesh.points, np.zeros((n, 3 - d))])
 
 
-def _txt(mesh: Mesh) -> Iterator[str]:
+def _txt(mesh: Complex) -> Iterator[str]:
     yield f"{mesh.dimension} {mesh.ambient_dimension} {len(mesh.points)} {len(mesh.simplices)}"
     yield from _lines(mesh.points, "%.17g")
     yield from _lines(mesh.simplices, "%d")
 
 
-def _off(mesh: Mesh) -> Iterator[str]:
+def _off(mesh: Complex) -> Iterator[str]:
     if mesh.ambient_dimension == 3:
         yield "OFF"
     else:
@@ -155,13 +153,13 @@ def _off(mesh: Mesh) -> Iterator[str]:
     yield from _lines(_cells(mesh), "%d", f"{mesh.dimension + 1} ")
 
 
-def _obj(mesh: Mesh) -> Iterator[str]:
+def _obj(mesh: Complex) -> Iterator[str]:
     points = _in_space(mesh)
     yield from _lines(points, "%.17g", "v ")
     yield from _lines(_cells(mesh) + 1, "%d", "l " if mesh.dimension == 1 else "f ")
 
 
-def _ply(mesh: Mesh) -> Iterator[str]:
+def _ply(mesh: Complex) -> Iterator[str]:
     points = _in_space(mesh)
     yield "ply"
     yield "format ascii 1.0"
@@ -178,7 +176,7 @@ def _ply(mesh: Mesh) -> Iterator[str]:
     yield from _lines(_cells(mesh), "%d", "" if mesh.dimension == 1 else "3 ")
 
 
-def _msh(mesh: Mesh) -> Iterator[str]:
+def _msh(mesh: Complex) -> Iterator[str]:
     """Gmsh's format 2.2, which every version of it reads, and most others who read .msh."""
     element_type = {1: 1, 2: 2, 3: 4}[mesh.dimension]  # line, triangle, tetrahedron
     yield "$MeshFormat\n2.2 0 8\n$EndMeshFormat"
@@ -194,7 +192,7 @@ def _msh(mesh: Mesh) -> Iterator[str]:
 _STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
 
 
-def _stl(mesh: Mesh) -> bytes:
+def _stl(mesh: Complex) -> bytes:
     """Binary: a header that says nothing, and never "solid", and a record a triangle."""
     corners = mesh.points[_cells(mesh)]
     facets = np.zeros(len(corners), _STL_FACET)
@@ -212,11 +210,11 @@ def _stl(mesh: Mesh) -> bytes:
     return b" " * 80 + np.uint32(len(facets)).astype("<u4").tobytes() + facets.tobytes()
 
 
-def _vtu_lines(mesh: Mesh) -> Iterator[str]:
-    return _vtu.lines(mesh, _cells(mesh))
+def _vtu_lines(mesh: Complex) -> Iterator[str]:
+    return vtu.lines(mesh, _cells(mesh))
 
 
-def _text(lines: Callable[[Mesh], Iterator[str]]) -> Callable[[Mesh], bytes]:
+def _text(lines: Callable[[Complex], Iterator[str]]) -> Callable[[Complex], bytes]:
     return lambda mesh: ("\n".join(lines(mesh)) + "\n").encode()
 
 
@@ -239,6 +237,6 @@ _FORMATS = {
             {1: _CELLULAR, 2: "surfaces and solids", 3: "solids"}[form.least_dimension],
             meshio=form,
         )
-        for ending, form in _meshio.FORMATS.items()
+        for ending, form in meshio_formats.FORMATS.items()
     },
 }

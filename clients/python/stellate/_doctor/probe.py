@@ -7,10 +7,10 @@ from typing import Any, Callable
 
 import numpy as np
 
-from ._findings import Finding
-from ._shared import table
-from .errors import OracleError
-from .oracle import CheckedOracle
+from .._shared import table
+from ..errors import OracleError
+from ..oracle import CheckedOracle
+from .findings import Finding
 
 _K: Mapping[str, Any] = table("doctor.toml")
 
@@ -105,8 +105,8 @@ class Probe:
     def _starting_points(self) -> np.ndarray:
         d, box, seeds = self.ambient_dimension, self._oracle.bounding_box, self._oracle.seeds
         parts = []
-        usable = seeds is not None and seeds.ndim == 2 and seeds.shape[1] == d
-        if usable and np.isfinite(seeds).all():
+        points = seeds is not None and seeds.ndim == 2 and seeds.shape[1] == d
+        if seeds is not None and points and np.isfinite(seeds).all():
             parts.append(seeds[: _K["starts"]])
             if len(seeds) and box is None:
                 # About them, so that there is more than one point to look at.

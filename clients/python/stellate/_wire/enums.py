@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ._generated import mesh_pb2 as pb
+from .._generated import mesh_pb2 as pb
 
 UNKNOWN = "UNKNOWN"  # a value that the server left out, or that is newer than this client
 

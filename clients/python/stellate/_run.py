@@ -15,7 +15,7 @@ from ._epsilon import choose
 from ._follow import Following, OnProgress
 from ._mesh import Mesh
 from ._server import Server
-from ._spec import mesh_spec
+from ._wire.spec import mesh_spec
 from ._worker import check_max_chunk, join_all
 from .client import Client, MeshInfo
 from .errors import Interrupted, InvalidArgument, StellateError
@@ -80,7 +80,17 @@ class _Workers:
         join_all(self._threads, seconds)
 
 
-class Session:
+@dataclasses.dataclass
+class _Live:
+    """A mesh at work, and what works at it."""
+
+    client: Client
+    info: MeshInfo
+    following: Following
+    workers: _Workers | None = None
+
+
+class Run:
     """A mesh that is created, served and watched, as a context manager.
 
     Leaving it early cancels the mesh; leaving it at all deletes the mesh from the server. With a
@@ -102,7 +112,8 @@ class Session:
         workers = criteria.pop("workers", 1)
         if not isinstance(workers, numbers.Integral) or workers < 1:
             raise InvalidArgument(f"workers has to be a whole number from 1 on, and is {workers!r}")
-        if on_progress is progress_bar or not (on_progress is None or callable(on_progress)):
+        given: Any = on_progress
+        if given is progress_bar or not (given is None or callable(given)):
             raise InvalidArgument(
                 "on_progress has to be a function of a Progress, such as stellate.progress_bar(), "
                 f"and is {on_progress!r}"
@@ -117,41 +128,55 @@ class Session:
         self._on_progress, self._checkpoint = on_progress, checkpoint
         self._interrupted = self._ended = False
         self._server: Server | None = None
-        self._client: Client | None = None
-        self._workers: _Workers | None = None
-        self._kept = None
+        self._own_client: Client | None = None
+        self._live: _Live | None = None
+        self._kept: Mesh | None = None
         if checkpoint is not None:
             checkpoint.require(mesh_spec(checked, epsilon, criteria))
             self._kept = checkpoint.finished()
             if self._kept is not None:
                 return
-        self._owns_client = not isinstance(server, Client)
         try:
             if server is None:
                 server = self._server = Server(*(checkpoint.server_flags() if checkpoint else ()))
-            self._client = server if isinstance(server, Client) else Client(server)
-            self._info = self._declare(checked, epsilon, criteria)
+            if not isinstance(server, Client):
+                server = self._own_client = Client(server)
+            info = self._declare(server, checked, epsilon, criteria)
         except BaseException:
             self._close_connection()
             raise
-        self._following = Following(self._client, self._info, on_progress, every)
-        self._workers = _Workers(
-            self._client, checked, self._info.name, int(workers), max_chunk, self._on_failure
+        self._live = _Live(server, info, Following(server, info, on_progress, every))
+        self._live.workers = _Workers(
+            server, checked, info.name, int(workers), max_chunk, self._on_failure
         )
 
-    def _declare(self, oracle: CheckedOracle, epsilon: float, criteria: dict[str, Any]) -> MeshInfo:
+    @property
+    def _at_work(self) -> _Live:
+        """Where the mesh was not finished before."""
+        assert self._live is not None
+        return self._live
+
+    @property
+    def _failure(self) -> BaseException | None:
+        """What our own oracle raised."""
+        workers = self._at_work.workers
+        return None if workers is None else workers.failure
+
+    def _declare(
+        self, client: Client, oracle: CheckedOracle, epsilon: float, criteria: dict[str, Any]
+    ) -> MeshInfo:
         """A new mesh, or the one that the checkpoint has."""
         if self._checkpoint is None:
-            return self._client.create(oracle, epsilon, **criteria)
+            return client.create(oracle, epsilon, **criteria)
         kept = None
-        for info in self._client.list():
+        for info in client.list():
             if info.name == self._checkpoint.name:
                 kept = info
             else:  # was forgotten, or never put down
-                self._client.delete(info.name)
+                client.delete(info.name)
         if kept is not None:
             return kept
-        info = self._client.create(oracle, epsilon, **criteria)
+        info = client.create(oracle, epsilon, **criteria)
         spec = mesh_spec(oracle, epsilon, criteria)
         self._checkpoint.note(spec, info.name, self._epsilon_reason)
         return info
@@ -159,7 +184,7 @@ class Session:
     def _on_failure(self, error: BaseException) -> None:
         """Without a checkpoint it fails the mesh; with one the mesh waits for a better oracle."""
         if self._checkpoint is not None:
-            self._following.stop()
+            self._at_work.following.stop()
             raise error
 
     def __iter__(self) -> Iterator[Mesh]:
@@ -169,13 +194,13 @@ class Session:
             return
         mesh = None
         try:
-            for mesh in self._following:
+            for mesh in self._at_work.following:
                 mesh = self._told(mesh)
                 if mesh.report is not None:
                     self._finish(mesh)
                 yield mesh
         except StellateError as error:
-            if error.mesh is not None:  # the server says that it is over
+            if isinstance(error.mesh, Mesh):  # the server says that it is over
                 error.mesh = mesh = self._told(error.mesh)
                 full = error.reason.startswith("JOURNAL_")  # with more room it goes on
                 if self._checkpoint is not None and not full:
@@ -184,8 +209,8 @@ class Session:
                 raise self._best_reason(error) from None
         if self._interrupted:
             raise self._interruption(mesh)
-        if self._workers.failure is not None and not self._ended:
-            raise self._workers.failure from None
+        if self._failure is not None and not self._ended:
+            raise self._failure from None
 
     def _finish(self, mesh: Mesh) -> None:
         self._ended = True
@@ -194,7 +219,7 @@ class Session:
 
     def _best_reason(self, error: StellateError) -> BaseException:
         """Our own exception says more than the server's account of it."""
-        ours = self._workers.failure
+        ours = self._failure
         if ours is None:
             return error
         if isinstance(ours, StellateError):
@@ -205,16 +230,17 @@ class Session:
         """From another thread: iterating ends as soon as it can, with Interrupted."""
         self._interrupted = True
         if self._checkpoint is not None:
-            self._following.stop()
-            self._workers.stop()
+            self._at_work.following.stop()
+            if self._at_work.workers is not None:
+                self._at_work.workers.stop()
             return
         try:
-            self._client.cancel(self._info.name, wait=False)
+            self._at_work.client.cancel(self._at_work.info.name, wait=False)
         except StellateError:
-            self._following.stop()  # a server that is away cannot say how the mesh ends
+            self._at_work.following.stop()  # a server that is away cannot say how the mesh ends
 
     def _interruption(self, mesh: Mesh | None) -> Interrupted:
-        mesh = mesh or self._following.so_far()
+        mesh = mesh or self._at_work.following.so_far()
         size = f"{len(mesh.points):,} vertices"
         if self._ended:
             return Interrupted(f"the mesh was finished: {size}, the exception's mesh", mesh)
@@ -237,7 +263,7 @@ class Session:
         report = dataclasses.replace(mesh.report, epsilon_reason=self._epsilon_reason)
         return dataclasses.replace(mesh, report=report)
 
-    def __enter__(self) -> Session:
+    def __enter__(self) -> Run:
         return self
 
     def __exit__(
@@ -249,8 +275,8 @@ class Session:
         second = self._interrupted and isinstance(error, KeyboardInterrupt)
         at_once = second and not isinstance(error, Interrupted)
         try:
-            if self._workers is not None and not at_once:
-                self._leave()
+            if self._live is not None and not at_once:
+                self._leave(self._live)
         finally:
             self._close_connection(at_once)
             if self._checkpoint is not None and (self._ended or self._kept is not None):
@@ -259,21 +285,22 @@ class Session:
             if callable(close):
                 close()
 
-    def _leave(self) -> None:
-        if self._ended:
-            self._workers.finish()
-        else:
-            self._workers.stop()
-        self._workers.join(_FAREWELL_SECONDS)
+    def _leave(self, live: _Live) -> None:
+        if live.workers is not None:
+            if self._ended:
+                live.workers.finish()
+            else:
+                live.workers.stop()
+            live.workers.join(_FAREWELL_SECONDS)
         if self._checkpoint is None:
             try:
-                self._client.delete(self._info.name, wait=False)
+                live.client.delete(live.info.name, wait=False)
             except StellateError:
                 pass  # it ends with its server, or somebody else was first
 
     def _close_connection(self, at_once: bool = False) -> None:
-        if self._client is not None and self._owns_client:
-            self._client.close()
+        if self._own_client is not None:
+            self._own_client.close()
         if self._server is not None:
             self._server.close(at_once=at_once)
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
-from ._generated import geometry_pb2 as pb
+from .._generated import geometry_pb2 as pb
 
 
 def to_wire(array: np.ndarray) -> pb.Array:
@@ -34,7 +36,7 @@ def indices_from_wire(array: pb.IndexArray, *shape: int) -> np.ndarray:
     return _view(array.shape, array.data, "<u4", shape)
 
 
-def _view(found, data: bytes, dtype: str, expected: tuple[int, ...]) -> np.ndarray:
+def _view(found: Iterable[int], data: bytes, dtype: str, expected: tuple[int, ...]) -> np.ndarray:
     extents = tuple(found)
     if not extents and not data:
         extents = tuple(0 if extent < 0 else extent for extent in expected)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._arrays import from_wire, indices_from_wire
-from ._generated import mesh_pb2
-from ._generated import stellate_pb2 as pb
+from .._generated import mesh_pb2
+from .._generated import stellate_pb2 as pb
+from .arrays import from_wire, indices_from_wire
 
 
 def _keys(rows: np.ndarray) -> np.ndarray:
@@ -50,7 +50,7 @@ def _net(rows: np.ndarray, removed: int) -> np.ndarray:
 _UNSETTLED = 100_000  # removed simplices at least; else half of those that are there
 
 
-class GrowingComplex:
+class DeltaMesh:
     """Vertices and simplices as of the last complete revision.
 
     What comes and goes is put aside, and settled for many revisions at once.
@@ -58,10 +58,13 @@ class GrowingComplex:
 
     def __init__(self, dimension: int, ambient_dimension: int) -> None:
         self._k, self._d = dimension, ambient_dimension
+        self._begin()
+
+    def _begin(self) -> None:
         self.revision = 0
         self._vertex_count = 0
-        self._points = np.empty((1024, ambient_dimension))
-        self._rows = np.empty((0, dimension + 1), dtype=np.uint32)  # in lexicographic order
+        self._points = np.empty((1024, self._d))
+        self._rows = np.empty((0, self._k + 1), dtype=np.uint32)  # in lexicographic order
         self._added: list[np.ndarray] = []
         self._removed: list[np.ndarray] = []
         self._removed_count = 0
@@ -104,7 +107,7 @@ class GrowingComplex:
 
     def reset(self) -> None:
         """Back to the empty mesh. What points() and simplices() gave stays what it is."""
-        self.__init__(self._k, self._d)
+        self._begin()
 
     def points(self) -> np.ndarray:
         """(n, d), read-only; vertices never change, so it stays true while the mesh grows."""

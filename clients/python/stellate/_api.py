@@ -10,12 +10,12 @@ from typing import Any, Union
 from ._checkpoint import Checkpoint
 from ._credentials import Credentials
 from ._download import OnPart, fetch
+from ._files.formats import check_save
 from ._follow import Following, OnProgress
-from ._formats import check_save
 from ._interrupt import Interrupts, told
 from ._mesh import Mesh
+from ._run import Run
 from ._server import Server
-from ._session import Session
 from .client import Client
 from .errors import InvalidArgument, NotCertified, SaveError
 from .oracle import CheckedOracle
@@ -97,7 +97,7 @@ def mesh(
         if credentials is not None:
             server = stack.enter_context(_connect(server, credentials))
         session = stack.enter_context(
-            Session(oracle, epsilon, server, on_progress, criteria, every=False, checkpoint=kept)
+            Run(oracle, epsilon, server, on_progress, criteria, every=False, checkpoint=kept)
         )
         interrupts.on_first = session.interrupt
         (finished,) = session  # or an exception
@@ -107,8 +107,9 @@ def mesh(
         except (OSError, SaveError) as error:
             raise SaveError(f"{error}; the mesh is the exception's", mesh=finished) from error
     if require_certified and not finished.certified:
+        what_failed = finished.report.what_failed if finished.report is not None else "no report"
         raise NotCertified(
-            f"the mesh is not certified: {finished.report.what_failed}; it is the exception's mesh",
+            f"the mesh is not certified: {what_failed}; it is the exception's mesh",
             mesh=finished,
         )
     return finished
@@ -140,7 +141,7 @@ def watch(
     if epsilon is None:
         raise TypeError("watch() needs epsilon, a length or 'auto', to mesh an oracle's manifold")
     interrupts = Interrupts()
-    with Session(oracle, epsilon, server, on_progress, criteria) as session:
+    with Run(oracle, epsilon, server, on_progress, criteria) as session:
         interrupts.on_first = session.interrupt
         meshes = iter(session)
         while True:

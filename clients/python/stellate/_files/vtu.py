@@ -5,14 +5,11 @@ from __future__ import annotations
 import base64
 import zlib
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ._version import __version__
-
-if TYPE_CHECKING:
-    from ._mesh import Mesh
+from .._complex import Complex
+from .._version import __version__
 
 _TYPES = {"<f8": "Float64", "<i8": "Int64", "|u1": "UInt8"}
 _CELL_TYPES = {1: 3, 2: 5, 3: 10}  # line, triangle, tetrahedron
@@ -21,7 +18,7 @@ _BLOCK_BYTES = 1 << 20
 DIMENSIONS = tuple(_CELL_TYPES)
 
 
-def lines(mesh: Mesh, cells: np.ndarray) -> Iterator[str]:
+def lines(mesh: Complex, cells: np.ndarray) -> Iterator[str]:
     """The file of a mesh with these oriented cells, k in DIMENSIONS."""
     n, d = mesh.points.shape
     m, width = cells.shape
@@ -55,7 +52,7 @@ def lines(mesh: Mesh, cells: np.ndarray) -> Iterator[str]:
     yield "</VTKFile>"
 
 
-def field_data(mesh: Mesh) -> dict[str, np.ndarray]:
+def field_data(mesh: Complex) -> dict[str, np.ndarray]:
     """What a file says of the whole mesh. Text is UTF-8: bytes are what every reader takes."""
     report = mesh.report
     data = {"version": _text(f"stellate {__version__}")}

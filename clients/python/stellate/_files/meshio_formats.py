@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from .errors import SaveError
-
-if TYPE_CHECKING:
-    from ._mesh import Mesh
+from .._complex import Complex
+from ..errors import SaveError
 
 _CELLS = {1: "line", 2: "triangle", 3: "tetra"}
 
@@ -64,7 +62,7 @@ FORMATS = {
 }
 
 
-def write(form: MeshioFormat, mesh: Mesh, cells: np.ndarray, path: str) -> None:
+def write(form: MeshioFormat, mesh: Complex, cells: np.ndarray, path: str) -> None:
     """Writes a mesh with these oriented cells, that the format can hold, to a file."""
     import meshio
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _shared
+from .. import _shared
 
 _WIDTH = 100
 _SHOWN_ENTRIES = 6

@@ -1,0 +1,36 @@
+"""What the writers of files and the errors need to know of a mesh."""
+
+from __future__ import annotations
+
+import os
+from typing import Protocol
+
+import numpy as np
+
+from .report import Report
+
+
+class Complex(Protocol):
+    """A stellate.Mesh, which says more of each."""
+
+    @property
+    def points(self) -> np.ndarray: ...
+
+    @property
+    def simplices(self) -> np.ndarray: ...
+
+    @property
+    def report(self) -> Report | None: ...
+
+    @property
+    def dimension(self) -> int: ...
+
+    @property
+    def ambient_dimension(self) -> int: ...
+
+    @property
+    def certified(self) -> bool: ...
+
+    def oriented_simplices(self) -> np.ndarray | None: ...
+
+    def save(self, path: str | os.PathLike[str]) -> None: ...

@@ -1,0 +1,1 @@
+"""Is an oracle what it should be?"""

@@ -1,0 +1,1 @@
+"""The formats that meshes are written in."""
