@@ -13,7 +13,7 @@ constexpr MeshSetting kRun[] = {
     {"--answer", &O::answer_seconds, "that a worker may be silent over a chunk of queries"},
     {"--busy", &O::busy_seconds, "that a worker may take for one in all"},
     {"--max-vertices", &O::max_vertices, "stop there"},
-    {"--max-rounds", &O::max_rounds, "stop after so many round trips"},
+    {"--max-rounds", &O::max_rounds, "stop after this many round trips"},
     {"--max-batch-queries", &O::max_batch_queries, "ask larger rounds in several batches"},
     {"--box-seeds", &O::box_seeds, "points of the box tried as seeds"},
     {"--components", &O::components, "that the manifold has at least: fewer are not certified"},

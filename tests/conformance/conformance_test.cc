@@ -6,9 +6,11 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <ostream>
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "convert.h"
@@ -24,11 +26,29 @@
 namespace stellate::testing {
 namespace {
 
-std::string NameOf(const ::testing::TestParamInfo<Entry>& info) {
-  std::string name = TextAt(info.param, "name");
+// An entry that a failing test is named by.
+struct Case {
+  Entry entry;
+};
+void PrintTo(const Case& c, std::ostream* out) { *out << TextAt(c.entry, "name"); }
+
+std::vector<Case> Cases(const std::string& file) {
+  std::vector<Case> cases;
+  for (Entry& entry : ListOf(file)) cases.push_back({std::move(entry)});
+  return cases;
+}
+
+std::string NameOf(const ::testing::TestParamInfo<Case>& info) {
+  std::string name = TextAt(info.param.entry, "name");
   std::replace_if(
       name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
   return name;
+}
+
+std::string Scratch(const std::string& name, const std::string& ending) {
+  std::string path = ::testing::TempDir();
+  path.append(name).append(1, '.').append(ending);
+  return path;
 }
 
 // Of a manifold that nobody asks about.
@@ -46,10 +66,10 @@ class Silent final : public Oracle {
   const int k_, d_;
 };
 
-class Stream : public ::testing::TestWithParam<Entry> {};
+class Stream : public ::testing::TestWithParam<Case> {};
 
 TEST_P(Stream, MakesThisMesh) {
-  const Entry& entry = GetParam();
+  const Entry& entry = GetParam().entry;
   Replay replay(entry);
   Silent oracle(static_cast<int>(NumberAt(entry, "dimension")),
                 static_cast<int>(NumberAt(entry, "ambient_dimension")));
@@ -68,7 +88,7 @@ TEST_P(Stream, MakesThisMesh) {
     from_revisions.push_back(NumberAt(attempt, "from_revision"));
   }
   EXPECT_EQ(replay.from_revisions(), from_revisions);
-  const std::string path = ::testing::TempDir() + TextAt(entry, "name") + ".txt";
+  const std::string path = Scratch(TextAt(entry, "name"), "txt");
   ASSERT_TRUE(mesh->Save(path).has_value());
   EXPECT_EQ(ReadBytes(path), ReadBytes(FolderOfFiles() / TextAt(entry, "mesh")));
   EXPECT_EQ(TerminationName(mesh->report.termination), TextAt(entry, "termination"));
@@ -77,28 +97,28 @@ TEST_P(Stream, MakesThisMesh) {
   EXPECT_EQ(MeshStateName(client::StatusOf(last.final()).state), TextAt(entry, "state"));
 }
 
-INSTANTIATE_TEST_SUITE_P(Each, Stream, ::testing::ValuesIn(ListOf("streams.json")), NameOf);
+INSTANTIATE_TEST_SUITE_P(Each, Stream, ::testing::ValuesIn(Cases("streams.json")), NameOf);
 
-class File : public ::testing::TestWithParam<Entry> {};
+class File : public ::testing::TestWithParam<Case> {};
 
 TEST_P(File, HasTheseBytes) {
-  const Mesh mesh = ReadTxt(TextAt(GetParam(), "mesh"));
+  const Mesh mesh = ReadTxt(TextAt(GetParam().entry, "mesh"));
   const auto expect = [&](const std::string& ending, const std::string& file) {
-    const std::string path = ::testing::TempDir() + TextAt(GetParam(), "name") + "." + ending;
+    const std::string path = Scratch(TextAt(GetParam().entry, "name"), ending);
     const Expected<void> saved = mesh.Save(path);
     ASSERT_TRUE(saved.has_value()) << saved.error().message;
     EXPECT_EQ(ReadBytes(path), ReadBytes(FolderOfFiles() / file)) << ending;
   };
-  expect("txt", TextAt(GetParam(), "mesh"));
-  for (const auto& [ending, file] : At(GetParam(), "files").struct_value().fields()) {
+  expect("txt", TextAt(GetParam().entry, "mesh"));
+  for (const auto& [ending, file] : At(GetParam().entry, "files").struct_value().fields()) {
     expect(ending, file.string_value());
   }
-  for (const Entry& ending : ListAt(GetParam(), "refused")) {
-    EXPECT_FALSE(mesh.Save(::testing::TempDir() + "refused." + ending.string_value()).has_value());
+  for (const Entry& ending : ListAt(GetParam().entry, "refused")) {
+    EXPECT_FALSE(mesh.Save(Scratch("refused", ending.string_value())).has_value());
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Each, File, ::testing::ValuesIn(ListOf("meshes.json")), NameOf);
+INSTANTIATE_TEST_SUITE_P(Each, File, ::testing::ValuesIn(Cases("meshes.json")), NameOf);
 
 std::string FromHex(const std::string& hex) {
   std::string bytes;
@@ -216,11 +236,11 @@ void SpoilFlats(const std::string& defect, Oracle& good, const Matrix& centers, 
   }
 }
 
-class Doctor : public ::testing::TestWithParam<Entry> {};
+class Doctor : public ::testing::TestWithParam<Case> {};
 
 TEST_P(Doctor, FindsThis) {
-  const std::string defect = TextAt(GetParam(), "defect");
-  const bool torus = TextAt(GetParam(), "manifold") == "torus";
+  const std::string defect = TextAt(GetParam().entry, "defect");
+  const bool torus = TextAt(GetParam().entry, "manifold") == "torus";
   const auto good = MakeManifold(torus ? "torus:1:0.4" : "sphere:2", nullptr);
   SpoiledOracle oracle(*good);
   int calls = 0;
@@ -242,18 +262,18 @@ TEST_P(Doctor, FindsThis) {
   if (defect == "no_box") oracle.box.reset();
 
   CheckOptions options;
-  if (At(GetParam(), "epsilon").has_number_value()) {
-    options.epsilon = At(GetParam(), "epsilon").number_value();
+  if (At(GetParam().entry, "epsilon").has_number_value()) {
+    options.epsilon = At(GetParam().entry, "epsilon").number_value();
   }
   const CheckReport report = Check(oracle, options);
   std::set<std::string> found, expected;
   for (const Finding& finding : report.findings) found.insert(finding.code);
   for (const char* const code : {"PIECES", "SPEED", "SLOW"}) found.erase(code);
-  for (const Entry& code : ListAt(GetParam(), "finds")) expected.insert(code.string_value());
+  for (const Entry& code : ListAt(GetParam().entry, "finds")) expected.insert(code.string_value());
   EXPECT_EQ(found, expected) << ToText(report);
 }
 
-INSTANTIATE_TEST_SUITE_P(Each, Doctor, ::testing::ValuesIn(ListOf("oracles.json")), NameOf);
+INSTANTIATE_TEST_SUITE_P(Each, Doctor, ::testing::ValuesIn(Cases("oracles.json")), NameOf);
 
 }  // namespace
 }  // namespace stellate::testing

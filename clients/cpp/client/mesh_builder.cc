@@ -180,7 +180,7 @@ Expected<void> MeshBuilder::Apply(const v1::MeshDelta& delta) {
   const Expected<Eigen::Index> added = CountRows(delta.added(), width);
   if (!added) return tl::unexpected(added.error());
   if (!simplex_set_->Remove(delta.removed().data().data(), *removed)) {
-    return tl::unexpected(BrokenProtocol("word that a simplex goes which is not there"));
+    return tl::unexpected(BrokenProtocol("the removal of a simplex that is not there"));
   }
   if (!simplex_set_->Add(delta.added().data().data(), *added, vertices())) {
     return tl::unexpected(BrokenProtocol("a simplex with a vertex that it never sent"));

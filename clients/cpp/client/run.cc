@@ -116,7 +116,7 @@ void Run::StartWorkers() {
   }
 }
 
-// When the last worker is gone without the mesh being over nobody is left to answer.
+// When the last worker is gone before the mesh is over, nobody is left to answer.
 void Run::WorkerEnded(const Worker& worker) {
   const std::lock_guard lock(mutex_);
   ++ended_workers_;

@@ -60,7 +60,7 @@ using Seconds = std::chrono::duration<double>;
 using Stream = grpc::ClientReaderWriterInterface<v1::ServeOracleRequest, v1::ServeOracleResponse>;
 
 // What is sent to the server. While the oracle is at a chunk another thread says so now and then,
-// lest the server take a slow worker for a dead one.
+// so that the server does not take a slow worker for a dead one.
 class Outbox {
  public:
   explicit Outbox(Stream& stream) : stream_(stream) {}

@@ -48,7 +48,7 @@ class Probe {
   void FindTangents();
 
   Eigen::MatrixXd starts, points;     // questions, and the points of M that answer them
-  Eigen::MatrixXd some;               // a part of the points, for the dear laws
+  Eigen::MatrixXd some;               // a part of the points, for the costly laws
   std::vector<Basis> moved_tangents;  // at these: how closest points move
   std::vector<int> ranks;             // in how many dimensions
   double size = 0;                    // the diagonal of the points' box

@@ -239,7 +239,7 @@ def serve(
     once, as in stellate.mesh.
 
     Returns: the state that the mesh ended in, e.g. "SUCCEEDED".
-    Raises: MeshNotFound, also for a mesh that was over and is not kept any more; what the oracle
+    Raises: MeshNotFound, also for a mesh that was over and is no longer kept; what the oracle
         raises, after the server was told, or a StellateError.
     """
     with _client(server, credentials) as client, told("this worker left; others have its work"):

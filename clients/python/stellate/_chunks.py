@@ -185,7 +185,7 @@ class Puller:
         chunk = Chunk(oracle, wire)
         self._chunks.put(chunk)
         if self._left:
-            chunk.fail("nobody asks any more")
+            chunk.fail("the loop that answers was left")
         return chunk.wait()
 
     def __iter__(self) -> Iterator[Chunk]:
@@ -212,7 +212,7 @@ class Puller:
         self.stop()
         while self._thread.is_alive():
             if self._open is not None and not self._open.answered:
-                self._open.fail("nobody asks any more")
+                self._open.fail("the loop that answers was left")
             try:
                 self._open = self._chunks.get(timeout=0.05)
             except queue.Empty:

@@ -43,7 +43,7 @@ _LABEL_BYTES = 128
 _RUN: list[tuple[str, str, type, str]] = [
     ("--seed", "random_seed", int, "seed of everything random"),
     ("--max-vertices", "max_vertices", int, "stop there"),
-    ("--max-rounds", "max_rounds", int, "stop after so many round trips"),
+    ("--max-rounds", "max_rounds", int, "stop after this many round trips"),
     ("--max-batch-queries", "max_batch_queries", int, "ask larger rounds in several batches"),
     ("--box-seeds", "box_seeds", int, "points of the box tried as seeds"),
     ("--worker-wait", "worker_wait_seconds", float, "seconds that the mesh waits for a worker"),
@@ -307,7 +307,9 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--label", help="that lists show; default: MODULE:OBJECT")
     _add_connection(one, "127.0.0.1:7717")
 
-    one = add("serve", _serve, "answer a mesh's questions until it is over, beside other workers")
+    one = add(
+        "serve", _serve, "answer a mesh's questions until it is over, together with other workers"
+    )
     add_oracle(one)
     one.add_argument("mesh", help="its whole name: meshes/ and 32 digits")
     one.add_argument("--processes", type=int, metavar="N", help="of this machine, that answer")

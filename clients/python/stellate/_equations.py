@@ -34,7 +34,7 @@ class Equations:
 
     Args:
       f: (n, d) -> (n, m).
-      jacobian: (n, d) -> (n, m, d), or None for differences of f. Differences are dear, so that
+      jacobian: (n, d) -> (n, m, d), or None for differences of f. Differences are expensive, so that
         steps share them: each corrects the Jacobian by what it has seen (Broyden).
       scale: a length, of the solvers' steps and differences.
     """
@@ -265,7 +265,7 @@ def _as_numbers(answer: object, name: str, shape: tuple[int, ...]) -> np.ndarray
 
 
 def _blocks(count: int, numbers: int) -> Iterator[slice]:
-    """Slices of rows that take so many numbers each."""
+    """Slices of rows, by how many numbers each row takes."""
     size = max(1, _MAX_VALUES // numbers)
     for first in range(0, count, size):
         yield slice(first, first + size)

@@ -47,7 +47,7 @@ _oracles_lock = threading.Lock()
 def _checked(key: str, oracle: Any) -> CheckedOracle:
     """The same object for a key as last time, as far as this process remembers.
 
-    So an oracle may keep what was dear to make: a licence, a solver, a connection.
+    So an oracle may keep what was expensive to make: a licence, a solver, a connection.
     """
     with _oracles_lock:
         if key not in _oracles:
@@ -170,7 +170,7 @@ class ExecutorWorkers:
 
         Returns: for each slot the state that the mesh ended in, "" for one that left before.
         Raises: what the oracle raised; where no slot saw the end, why the first of them left, such
-          as ExecutorError; TimeoutError after so many seconds, and the workers go on.
+          as ExecutorError; TimeoutError after `timeout` seconds, and the workers go on.
         """
         try:
             with told("the workers left; the mesh waits for others"):

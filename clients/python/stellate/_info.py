@@ -35,7 +35,7 @@ class MeshInfo:
 
     @property
     def over(self) -> bool:
-        """Whether nothing will change any more."""
+        """Whether it has come to its end: nothing changes from here on."""
         return self.state not in ("WAITING", "RUNNING")
 
     @classmethod

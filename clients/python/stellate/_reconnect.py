@@ -58,7 +58,7 @@ class Reconnector:
     """The attempts at one call or stream. One thread makes them; any other may call stop().
 
     A server is lost with a warning in the log and back with another; `quiet` streams, of which there
-    are several beside one that is not, leave that to it.
+    are several next to one that is not, leave that to it.
     """
 
     def __init__(self, policy: ReconnectPolicy, quiet: bool = False) -> None:

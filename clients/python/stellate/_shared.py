@@ -1,4 +1,4 @@
-"""What all clients share: clients/shared of the source tree, carried beside the stubs."""
+"""What all clients share: clients/shared of the source tree, carried with the stubs."""
 
 from __future__ import annotations
 

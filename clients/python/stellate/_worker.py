@@ -120,8 +120,8 @@ class _Inbox:
 class _Outbox:
     """What is sent to the server, until end().
 
-    While the oracle is at a chunk another thread says so now and then, lest the server take a slow
-    worker for a dead one.
+    While the oracle is at a chunk another thread says so now and then, so that the server does
+    not take a slow worker for a dead one.
     """
 
     def __init__(self) -> None:

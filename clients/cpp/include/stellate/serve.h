@@ -31,7 +31,7 @@ struct ServeOptions {
 //
 // Returns the state that the mesh ended in; at once for a mesh that was over before this worker
 // came, so a late batch job is a success. kRefused for an oracle of another kind than the mesh was
-// declared with, and for a mesh that is not there, or was over and is not kept any more. Reason
+// declared with, and for a mesh that is not there, or was over and is no longer kept. Reason
 // "CANCELLED" where `stop` was requested. An exception out of the oracle reaches the caller as it
 // is, and the server as a failed oracle.
 Expected<MeshState> ServeMesh(Oracle& oracle, const std::string& mesh_name,

@@ -187,7 +187,7 @@ class Probe:
         return float(reach.min(initial=np.inf))
 
     def most_turned_neighbours(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of all samples beside their nearest others, those whose tangent spaces differ most."""
+        """Of all pairs of a sample and one of its nearest, those whose tangent spaces differ most."""
         a, b = self._neighbours(_K["neighbours"])
         tangents = self.tangents_at(self.points)
         turned = self.turn(tangents[a], tangents[b])

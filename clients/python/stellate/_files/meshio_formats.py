@@ -20,7 +20,7 @@ class MeshioFormat:
 
     Attributes:
       least_dimension: of the simplices that it holds; the largest is 3.
-      point_data: whether it holds numbers beside the points.
+      point_data: whether it holds more numbers for each point than its coordinates.
       package: that meshio needs for it.
     """
 
