@@ -20,6 +20,7 @@ const (
 	connectTime    = time.Second
 	pingTime       = 10 * time.Second // the least that grpc-go allows
 	largestMessage = 64 << 20
+	streamWindow   = 4 << 20
 )
 
 var addressPattern = regexp.MustCompile(`^unix:|^[^/]*:[0-9]+$`)
@@ -47,6 +48,8 @@ func NewClient(to Connection) (*Client, error) {
 	}
 	pauses := backoff.Config{BaseDelay: 100 * time.Millisecond, Multiplier: 2, Jitter: 0.2, MaxDelay: time.Second}
 	options = append(options,
+		// So that the next chunk comes while one is answered.
+		grpc.WithInitialWindowSize(streamWindow), grpc.WithInitialConnWindowSize(2*streamWindow),
 		grpc.WithDefaultCallOptions(grpc.MaxCallRecvMsgSize(largestMessage), grpc.MaxCallSendMsgSize(largestMessage)),
 		grpc.WithConnectParams(grpc.ConnectParams{Backoff: pauses, MinConnectTimeout: 5 * time.Second}))
 	if !private { // whose end shows at once

@@ -127,6 +127,11 @@ func (c *Client) follow(ctx context.Context, info *pb.Mesh, onProgress func(*pb.
 			growth.reset()
 		case *pb.WatchMeshResponse_Progress:
 			note(message.Progress)
+			if message.Progress.GetPhase() == pb.Phase_PHASE_CERTIFYING { // while the server is busy
+				if err := growth.settle(); err != nil {
+					return protocolError(err)
+				}
+			}
 		case *pb.WatchMeshResponse_Final:
 			note(message.Final.GetProgress())
 			return hand(message.Final)

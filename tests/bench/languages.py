@@ -34,9 +34,16 @@ CLIENTS = ROOT / "clients"
 COMMANDS = {
     "node": ["node", CLIENTS / "node/dist/examples/timing.js"],
     "go": [ROOT / "build/bench/timing-go"],
+    "java": [
+        "java",
+        "-cp",
+        f"{CLIENTS}/java/target/stellate-0.1.0.jar:{CLIENTS}/java/target/lib/*",
+        "stellate.examples.Timing",
+    ],
     "rust": [CLIENTS / "rust/target/release/examples/timing"],
 }
 BUILDS = {  # in the client's directory, in a shell
+    "java": "mvn --quiet --batch-mode package -DskipTests",
     "rust": "cargo build --quiet --locked --release --examples",
     "node": "npm ci --ignore-scripts --silent && npm run --silent build",
     "go": 'eval "$(../../tests/languages/go_toolchain)" && go generate ./... && '

@@ -11,7 +11,7 @@ use crate::mesh::Mesh;
 use crate::oracle::{Checked, Oracle};
 use crate::proto::watch_mesh_response::Event;
 use crate::proto::{
-    DownloadMeshRequest, Mesh as MeshInfo, MeshDelta, MeshState, Progress, WatchMeshRequest,
+    DownloadMeshRequest, Mesh as MeshInfo, MeshDelta, MeshState, Phase, Progress, WatchMeshRequest,
 };
 use crate::retry::Flag;
 use crate::server::{Server, ServerOptions};
@@ -240,7 +240,12 @@ async fn follow(
                 growth.reset();
                 lock().from_revision = 0;
             }
-            Some(Event::Progress(now)) => progress = note(now),
+            Some(Event::Progress(now)) => {
+                progress = note(now);
+                if now.phase() == Phase::Certifying {
+                    growth.settle()?; // while the server is busy
+                }
+            }
             Some(Event::Final(last)) => {
                 progress = last.progress.and_then(&mut note);
                 let mesh = Mesh { progress, report: last.report.clone(), ..growth.mesh()? };

@@ -1,0 +1,163 @@
+package stellate;
+
+import java.util.ArrayList;
+import java.util.Arrays;
+import java.util.List;
+import stellate.v1.DeltaChunk;
+import stellate.v1.MeshDelta;
+
+/**
+ * The client's copy of a mesh that grows by deltas: vertices and simplices as of the last complete
+ * revision. What comes and goes is put aside, and settled for many revisions at once. A delta that
+ * does not fit what came before is a StellateException with the reason PROTOCOL.
+ */
+public final class Growth {
+  private static final int UNSETTLED = 300_000; // vertex numbers of removed simplices at least
+
+  private final int k;
+  private final int d;
+  private long revision;
+  private int count;
+  private double[] coordinates = new double[1024];
+  private int[] rows = {}; // in lexicographic order
+  private final List<int[]> added = new ArrayList<>();
+  private final List<int[]> removed = new ArrayList<>();
+  private int removedLength;
+  private final List<MeshDelta> pending = new ArrayList<>();
+
+  /** The empty k-complex in R^d. */
+  public Growth(int k, int d) {
+    this.k = k;
+    this.d = d;
+  }
+
+  /** Takes one chunk; true when a revision is complete with it. */
+  public boolean absorb(DeltaChunk chunk) {
+    long next = chunk.getDelta().getRevision();
+    if (next <= revision || (!pending.isEmpty() && pending.get(0).getRevision() != next)) {
+      throw StellateException.protocol("revision " + next + " is out of order");
+    }
+    pending.add(chunk.getDelta());
+    if (!chunk.getComplete()) {
+      return false;
+    }
+    List<MeshDelta> whole = List.copyOf(pending);
+    pending.clear();
+    for (MeshDelta part : whole) {
+      addPoints(part.getFirstVertex(), Wire.numbers(part.getPoints(), -1, d));
+    }
+    whole.forEach(this::change);
+    revision = next;
+    if (removedLength > Math.max(UNSETTLED, rows.length / 2)) {
+      settle();
+    }
+    return true;
+  }
+
+  /** Drops the chunks of a revision that was cut short: it will be sent again. */
+  public void forgetPending() {
+    pending.clear();
+  }
+
+  /** Back to the empty mesh. */
+  public void reset() {
+    revision = 0;
+    count = 0;
+    removedLength = 0;
+    coordinates = new double[1024];
+    rows = new int[0];
+    added.clear();
+    removed.clear();
+    pending.clear();
+  }
+
+  void addPoints(long first, double[] block) {
+    if (block.length > 0 && first != count) {
+      throw StellateException.protocol(
+          "a delta starts at vertex " + first + ", and there are " + count);
+    }
+    int end = count * d + block.length;
+    if (end > coordinates.length) {
+      coordinates = Arrays.copyOf(coordinates, Math.max(end, 2 * coordinates.length));
+    }
+    System.arraycopy(block, 0, coordinates, count * d, block.length);
+    count = end / d;
+  }
+
+  void change(MeshDelta delta) {
+    int[] comes = Wire.indices(delta.getAdded(), -1, k + 1);
+    int[] goes = Wire.indices(delta.getRemoved(), -1, k + 1);
+    for (int id : comes) {
+      if (Integer.compareUnsigned(id, count) >= 0) {
+        throw StellateException.protocol(
+            "a simplex has vertex %s of %d vertices"
+                .formatted(Integer.toUnsignedString(id), count));
+      }
+    }
+    for (int id : goes) {
+      if (Integer.compareUnsigned(id, count) >= 0) {
+        throw StellateException.protocol("a delta removes simplices that are not there");
+      }
+    }
+    added.add(comes);
+    removed.add(goes);
+    removedLength += goes.length;
+  }
+
+  /** Makes mesh() cheap. */
+  public void settle() {
+    if (added.isEmpty() && removed.isEmpty()) {
+      return;
+    }
+    int width = k + 1;
+    int length = rows.length + added.stream().mapToInt(block -> block.length).sum();
+    int firstRemoved = length / width;
+    int[] all = Arrays.copyOf(rows, length + removedLength);
+    int at = rows.length;
+    for (List<int[]> blocks : List.of(added, removed)) {
+      for (int[] block : blocks) {
+        System.arraycopy(block, 0, all, at, block.length);
+        at += block.length;
+      }
+    }
+    int[] order = Rows.sortedOrder(all, width);
+    int[] left = new int[length];
+    int kept = 0;
+    for (int i = 0; i < order.length; ) {
+      int row = order[i];
+      int there = 0;
+      for (; i < order.length && Rows.same(all, width, row, order[i]); i++) {
+        there += order[i] < firstRemoved ? 1 : -1;
+      }
+      if (there < 0) {
+        throw StellateException.protocol("a delta removes simplices that are not there");
+      }
+      if (there > 1) {
+        throw StellateException.protocol("a delta adds simplices that are there already");
+      }
+      if (there == 1) {
+        System.arraycopy(all, row * width, left, kept, width);
+        kept += width;
+      }
+    }
+    rows = Arrays.copyOf(left, kept);
+    added.clear();
+    removed.clear();
+    removedLength = 0;
+  }
+
+  /** The last complete one. */
+  public long revision() {
+    return revision;
+  }
+
+  void revision(long now) {
+    revision = now;
+  }
+
+  /** The mesh as of the last complete revision. */
+  public Mesh mesh() {
+    settle();
+    return new Mesh(k, d, Arrays.copyOf(coordinates, count * d), rows, revision, null, null);
+  }
+}

@@ -1,0 +1,162 @@
+package stellate;
+
+import java.io.IOException;
+import java.io.PrintWriter;
+import java.nio.file.Files;
+import java.nio.file.Path;
+import java.nio.file.StandardCopyOption;
+import java.util.Optional;
+import stellate.v1.Certificate;
+import stellate.v1.Counts;
+import stellate.v1.Progress;
+import stellate.v1.Report;
+
+/** A simplicial k-complex in R^d, finished or growing. */
+public final class Mesh {
+  /** k */
+  public final int dimension;
+
+  /** d */
+  public final int ambientDimension;
+
+  /** [n, d], one point after the other. */
+  public final double[] points;
+
+  /** [m, k+1], zero-based, ascending in each row, rows in lexicographic order. */
+  public final int[] simplices;
+
+  /** One for each round that changed the mesh. */
+  public final long revision;
+
+  private final Progress progress;
+  private final Report report;
+
+  Mesh(int k, int d, double[] points, int[] simplices, long revision, Progress now, Report end) {
+    this.dimension = k;
+    this.ambientDimension = d;
+    this.points = points;
+    this.simplices = simplices;
+    this.revision = revision;
+    this.progress = now;
+    this.report = end;
+  }
+
+  Mesh with(Progress now, Report end) {
+    return new Mesh(dimension, ambientDimension, points, simplices, revision, now, end);
+  }
+
+  /** n */
+  public int vertexCount() {
+    return points.length / ambientDimension;
+  }
+
+  /** m */
+  public int simplexCount() {
+    return simplices.length / (dimension + 1);
+  }
+
+  /** How it stood at this revision. */
+  public Optional<Progress> progress() {
+    return Optional.ofNullable(progress);
+  }
+
+  /** How it ended and what is proved; empty while it grows. */
+  public Optional<Report> report() {
+    return Optional.ofNullable(report);
+  }
+
+  /** Whether the mesh is finished and proved good. */
+  public boolean certified() {
+    return report != null && report.getCertificate().getCertified();
+  }
+
+  /** The simplices with vertices exchanged so that neighbours agree; empty if not orientable. */
+  public Optional<int[]> orientedSimplices() {
+    return Orientation.orient(simplices, dimension + 1);
+  }
+
+  /** Throws a StellateException of kind SAVE if a mesh of that kind cannot have the name. */
+  public static void checkSave(Path path, int k, int d) {
+    String name = path.toString();
+    if (name.endsWith(".txt") || (name.endsWith(".obj") && k <= 2 && d <= 3)) {
+      return;
+    }
+    throw new StellateException(
+        StellateException.Kind.SAVE,
+        "FORMAT",
+        name.endsWith(".obj")
+            ? ".obj holds curves and surfaces in the plane and in space: take .txt"
+            : name + " has to end in .txt or .obj; stellate download writes the other formats");
+  }
+
+  /**
+   * Writes .txt (any k and d, exact: "k d nv ns", coordinates, ids from zero) or .obj (curves and
+   * surfaces, d at most 3, oriented where that can be). The file takes its name when it is whole.
+   */
+  public void save(Path path) throws IOException {
+    checkSave(path, dimension, ambientDimension);
+    Path part = path.resolveSibling(path.getFileName() + ".part");
+    try (PrintWriter out = new PrintWriter(Files.newBufferedWriter(part))) {
+      if (path.toString().endsWith(".txt")) {
+        out.printf("%d %d %d %d%n", dimension, ambientDimension, vertexCount(), simplexCount());
+        writePoints(out, "", "");
+        writeRows(out, "", simplices, 0);
+      } else {
+        writePoints(out, "v ", " 0".repeat(3 - ambientDimension));
+        writeRows(out, dimension == 1 ? "l " : "f ", orientedSimplices().orElse(simplices), 1);
+      }
+      if (out.checkError()) {
+        throw new IOException(part + " cannot be written to its end");
+      }
+    }
+    Files.move(part, path, StandardCopyOption.REPLACE_EXISTING);
+  }
+
+  private void writePoints(PrintWriter out, String before, String after) {
+    for (int i = 0; i < points.length; i++) {
+      out.print(i % ambientDimension == 0 ? before : " ");
+      out.print(points[i]);
+      if ((i + 1) % ambientDimension == 0) {
+        out.print(after + "\n");
+      }
+    }
+  }
+
+  private void writeRows(PrintWriter out, String before, int[] rows, int first) {
+    for (int i = 0; i < rows.length; i++) {
+      out.print(i % (dimension + 1) == 0 ? before : " ");
+      out.print(rows[i] + first);
+      if ((i + 1) % (dimension + 1) == 0) {
+        out.print("\n");
+      }
+    }
+  }
+
+  /** A report in a few lines, for people. */
+  public static String reportText(Report report) {
+    Counts counts = report.getCounts();
+    Certificate proved = report.getCertificate();
+    StringBuilder text = new StringBuilder();
+    text.append(proved.getCertified() ? "CERTIFIED" : "NOT CERTIFIED");
+    text.append(" (%s): ".formatted(report.getTermination().name().replace("TERMINATION_", "")));
+    text.append(
+        proved.getVerdict().isEmpty() ? report.getFailure().getMessage() : proved.getVerdict());
+    text.append(
+        "%n%d vertices, %d simplices, %d rounds, %d queries, %.2f s%n"
+            .formatted(
+                counts.getVertices(),
+                counts.getSimplices(),
+                counts.getRounds(),
+                counts.getQueries(),
+                report.getElapsedSeconds()));
+    text.append(
+        "%d components, Euler characteristic %d, orientable %b, estimated reach %.3g%n"
+            .formatted(
+                proved.getComponents(),
+                proved.getEulerCharacteristic(),
+                proved.getOrientable(),
+                proved.getEstimatedReach()));
+    proved.getWarningsList().forEach(warning -> text.append("warning: " + warning + "\n"));
+    return text.toString();
+  }
+}

@@ -1,0 +1,60 @@
+package stellate;
+
+/**
+ * A compact smooth k-submanifold M of R^d without boundary, at least 1 = k and k less than d.
+ *
+ * <p>Methods take and fill whole batches, of found.length points, one after the other. The answer
+ * to a query must not depend on the rest of its batch. Calls come one at a time unless the oracle
+ * is concurrent(). What else an oracle can answer are the interfaces below.
+ */
+public interface Oracle {
+  /** k */
+  int dimension();
+
+  /** d */
+  int ambientDimension();
+
+  /** Where to look for M: {lower, upper}; null if there are seeds(). */
+  default double[][] boundingBox() {
+    return null;
+  }
+
+  /** [m, d], points near M, one at least on each component; null if there is a boundingBox(). */
+  default double[] seeds() {
+    return null;
+  }
+
+  /** Whether several workers may call it at once. */
+  default boolean concurrent() {
+    return false;
+  }
+
+  /**
+   * Writes a point of M nearest to each x [n, d] to points, and false to found, which comes as true
+   * everywhere, where it has none.
+   */
+  void closestPoint(double[] x, double[] points, boolean[] found) throws Exception;
+
+  /** An oracle that knows where M meets flats. */
+  interface WithFlats extends Oracle {
+    /**
+     * The point of M nearest to each center [n, d] in the flat through it that is orthogonal to the
+     * columns of its basis [n, d, k], within the radius [n].
+     */
+    void intersectFlat(
+        double[] centers, double[] bases, double[] radii, double[] points, boolean[] found)
+        throws Exception;
+  }
+
+  /** An oracle that knows tangent spaces. */
+  interface WithTangents extends Oracle {
+    /** At points [n, d] of M orthonormal columns: entry (row, column) is (i d + row) k + column. */
+    void tangentBasis(double[] points, double[] bases) throws Exception;
+  }
+
+  /** An oracle that knows how large things are. */
+  interface WithSizes extends Oracle {
+    /** At points [n, d] of M the local feature size, or any positive lengths. */
+    void localSize(double[] points, double[] sizes) throws Exception;
+  }
+}

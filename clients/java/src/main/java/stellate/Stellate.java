@@ -1,0 +1,269 @@
+package stellate;
+
+import io.grpc.Context;
+import java.util.ArrayList;
+import java.util.List;
+import java.util.concurrent.TimeUnit;
+import java.util.concurrent.atomic.AtomicReference;
+import java.util.function.Consumer;
+import java.util.function.Predicate;
+import stellate.v1.DownloadMeshRequest;
+import stellate.v1.Failure;
+import stellate.v1.MeshDelta;
+import stellate.v1.MeshState;
+import stellate.v1.Phase;
+import stellate.v1.Progress;
+import stellate.v1.WatchMeshRequest;
+import stellate.v1.WatchMeshResponse;
+
+/** Meshes: from an oracle, as they grow, or as they are on a server. */
+public final class Stellate {
+  private static final long FAREWELL = 2000; // milliseconds that a worker may take to end
+
+  private Stellate() {}
+
+  /** Meshes the oracle's manifold. epsilon is the largest circumradius of a simplex, a length. */
+  public static Mesh mesh(Oracle oracle, double epsilon, Options options) {
+    AtomicReference<Mesh> last = new AtomicReference<>();
+    run(
+        oracle,
+        epsilon,
+        options,
+        false,
+        mesh -> {
+          last.set(mesh);
+          return true;
+        });
+    Mesh finished = last.get();
+    if (options.requireCertified && !finished.certified()) {
+      String verdict = finished.report().map(end -> end.getCertificate().getVerdict()).orElse("");
+      throw new StellateException(
+              StellateException.Kind.NOT_CERTIFIED,
+              "NOT_CERTIFIED",
+              "the mesh is not certified: " + verdict)
+          .with(finished);
+    }
+    return finished;
+  }
+
+  /**
+   * The mesh as it grows, at every revision; the last one has its report. Where each returns false
+   * the mesh is cancelled.
+   */
+  public static void watch(Oracle oracle, double epsilon, Options options, Predicate<Mesh> each) {
+    run(oracle, epsilon, options, true, each);
+  }
+
+  /** A mesh that others serve, as it grows. */
+  public static void watch(Client client, String name, Predicate<Mesh> each) {
+    try (var within = Context.current().withCancellation()) {
+      follow(client, client.get(name), within, progress -> {}, true, each);
+    }
+  }
+
+  /** Fetches a mesh that is on a server: one that is over, or, revision > 0, as it was then. */
+  public static Mesh download(Client client, String name, long revision) {
+    stellate.v1.Mesh info = client.get(name);
+    if (!info.hasEndTime() && revision == 0) {
+      throw new StellateException(
+          StellateException.Kind.FAILED_PRECONDITION,
+          "FAILED_PRECONDITION",
+          name + " is not over: " + info.getState());
+    }
+    Growth growth = empty(info);
+    DownloadMeshRequest.Builder request =
+        DownloadMeshRequest.newBuilder().setName(name).setRevision(revision);
+    int d = info.getSpec().getAmbientDimension();
+    try (var within = Context.current().withCancellation()) {
+      client.follow(
+          within,
+          stub -> stub.downloadMesh(request.build()),
+          () -> {},
+          part -> {
+            request.setRevision(part.getRevision()).setPosition(part.getNextPosition());
+            growth.revision(part.getRevision());
+            growth.addPoints(part.getFirstVertex(), Wire.numbers(part.getPoints(), -1, d));
+            growth.change(MeshDelta.newBuilder().setAdded(part.getCells()).build());
+            return part.getComplete();
+          });
+    }
+    Mesh mesh = growth.mesh();
+    return revision > 0 ? mesh : judged(mesh.with(info.getProgress(), info.getReport()), info);
+  }
+
+  private static Growth empty(stellate.v1.Mesh info) {
+    return new Growth(info.getSpec().getDimension(), info.getSpec().getAmbientDimension());
+  }
+
+  private static void follow(
+      Client client,
+      stellate.v1.Mesh info,
+      Context.CancellableContext within,
+      Consumer<Progress> onProgress,
+      boolean every,
+      Predicate<Mesh> each) {
+    Growth growth = empty(info);
+    AtomicReference<Progress> progress = new AtomicReference<>();
+    WatchMeshRequest.Builder request = WatchMeshRequest.newBuilder().setName(info.getName());
+    Predicate<WatchMeshResponse> last =
+        event -> {
+          switch (event.getEventCase()) {
+            case DELTA -> {
+              boolean complete = growth.absorb(event.getDelta());
+              request.setFromRevision(growth.revision());
+              return complete && every && !each.test(growth.mesh().with(progress.get(), null));
+            }
+            case RESET_MESH -> {
+              growth.reset();
+              request.setFromRevision(0);
+            }
+            case PROGRESS -> {
+              progress.set(event.getProgress());
+              onProgress.accept(event.getProgress());
+              if (event.getProgress().getPhase() == Phase.PHASE_CERTIFYING) {
+                growth.settle(); // while the server is busy
+              }
+            }
+            case FINAL -> {
+              stellate.v1.Mesh end = event.getFinal();
+              onProgress.accept(end.getProgress());
+              each.test(judged(growth.mesh().with(end.getProgress(), end.getReport()), end));
+              return true;
+            }
+            default -> {} // of a newer server
+          }
+          return false;
+        };
+    try {
+      client.follow(within, stub -> stub.watchMesh(request.build()), growth::forgetPending, last);
+    } catch (StellateException error) {
+      throw error.with(growth.mesh());
+    }
+  }
+
+  private static Mesh judged(Mesh mesh, stellate.v1.Mesh end) {
+    if (end.getState() == MeshState.MESH_STATE_CANCELLED) {
+      throw cancelled().with(mesh);
+    }
+    if (end.getState() == MeshState.MESH_STATE_FAILED) {
+      Failure failure = end.getReport().getFailure();
+      var kind = StellateException.Kind.ofReason(failure.getReason());
+      throw new StellateException(kind, failure.getReason(), failure.getMessage()).with(mesh);
+    }
+    return mesh;
+  }
+
+  private static StellateException cancelled() {
+    return new StellateException(
+        StellateException.Kind.CANCELLED, "CANCELLED", "the mesh was cancelled");
+  }
+
+  private static void run(
+      Oracle oracle, double epsilon, Options options, boolean every, Predicate<Mesh> each) {
+    if (options.client != null) {
+      session(options.client, oracle, epsilon, options, every, each);
+      return;
+    }
+    try (Server server = Server.start();
+        Client client = new Client(server)) {
+      session(client, oracle, epsilon, options, every, each);
+    }
+  }
+
+  private static void session(
+      Client client,
+      Oracle oracle,
+      double epsilon,
+      Options options,
+      boolean every,
+      Predicate<Mesh> each) {
+    CheckedOracle checked = new CheckedOracle(oracle);
+    stellate.v1.Mesh info = client.create(oracle, epsilon, options);
+    AtomicReference<Throwable> failure = new AtomicReference<>();
+    List<Worker> workers = new ArrayList<>();
+    List<Thread> threads = new ArrayList<>();
+    for (int i = 1; i <= Math.max(1, options.workers); i++) {
+      Outage quiet = new Outage(client.patience, true);
+      Worker worker =
+          new Worker(client, checked, info.getName(), "java-" + i, options.maxChunk, quiet);
+      worker.onFailure = error -> failure.compareAndSet(null, error);
+      Thread thread = new Thread(() -> serve(worker), "oracle-" + i);
+      thread.setDaemon(true);
+      workers.add(worker);
+      threads.add(thread);
+      thread.start();
+    }
+    boolean over = false;
+    try (var within = Context.current().withCancellation()) {
+      options.cancel.whenComplete((value, error) -> cancel(client, info.getName(), within));
+      follow(client, info, within, options.onProgress, every, each);
+      over = true;
+    } catch (StellateException error) {
+      throw better(error, failure.get());
+    } finally {
+      leave(workers, threads, over);
+      try {
+        client.deleteOnce(info.getName());
+      } catch (StellateException error) {
+        over = false; // it ends with its server, or somebody else was first
+      }
+    }
+  }
+
+  private static void serve(Worker worker) {
+    try {
+      worker.run();
+    } catch (RuntimeException error) {
+      return; // noted; what the server refuses, or its absence, the watch reports
+    }
+  }
+
+  private static void cancel(Client client, String name, Context.CancellableContext within) {
+    Thread thread =
+        new Thread(
+            () -> {
+              try {
+                client.cancelOnce(name);
+              } catch (StellateException error) {
+                within.cancel(error); // a server that is away cannot say how the mesh ends
+              }
+            },
+            "stellate cancel");
+    thread.setDaemon(true);
+    thread.start();
+  }
+
+  /** Our own says more than the server's account of it. */
+  private static RuntimeException better(StellateException theirs, Throwable ours) {
+    if (theirs.kind() == StellateException.Kind.CANCELLED) {
+      return theirs;
+    }
+    if (ours instanceof StellateException said) {
+      return said.with(theirs.mesh().orElse(null));
+    }
+    if (ours instanceof Error worse) {
+      throw worse;
+    }
+    if (ours instanceof RuntimeException itself) {
+      return itself;
+    }
+    return ours == null
+        ? theirs
+        : new StellateException(
+                StellateException.Kind.RAISED, "ORACLE_FAILED", ours.toString(), ours)
+            .with(theirs.mesh().orElse(null));
+  }
+
+  private static void leave(List<Worker> workers, List<Thread> threads, boolean over) {
+    try {
+      long until = System.nanoTime() + TimeUnit.MILLISECONDS.toNanos(FAREWELL);
+      for (Thread thread : over ? threads : List.<Thread>of()) {
+        thread.join(Math.max(1, TimeUnit.NANOSECONDS.toMillis(until - System.nanoTime())));
+      }
+    } catch (InterruptedException error) {
+      Thread.currentThread().interrupt();
+    } finally {
+      workers.forEach(Worker::stop);
+    }
+  }
+}
