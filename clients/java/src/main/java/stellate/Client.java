@@ -35,8 +35,7 @@ public final class Client implements AutoCloseable {
   private static final int LARGEST_MESSAGE = 64 << 20;
 
   // grpc-java sets an option that unix sockets do not have, and Netty warns of it.
-  private static final Logger NETTY =
-      Logger.getLogger("io.grpc.netty.shaded.io.netty.bootstrap");
+  private static final Logger NETTY = Logger.getLogger("io.grpc.netty.shaded.io.netty.bootstrap");
 
   private static final int WINDOW = 4 << 20; // so that the next chunk comes while one is answered
 
