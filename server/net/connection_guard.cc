@@ -117,10 +117,12 @@ void ConnectionGuard::Run(const std::stop_token& stop) {
       Look();
     }
     CountLeftBehind();
+    if (Clock::now() - said_ >= kLogPause) SayWhatWasClosed();
     if (untidy_ && Clock::now() > quiet_at_) GiveBack();
     pollfd wake{wake_, POLLIN, 0};
     poll(&wake, 1, hurried_ ? kHurryMilliseconds : kPauseMilliseconds);
   }
+  SayWhatWasClosed();
 }
 
 void ConnectionGuard::Look() {
@@ -257,10 +259,15 @@ void ConnectionGuard::Close(Connection* connection, const char* setting,
   untidy_ = true;
   quiet_at_ = now + kQuiet;
   ++unsaid_;
-  if (now - said_ < kLogPause) return;
-  Log(LogLevel::kWarning, {},
-      Message("closed ", unsaid_, " connections; the last, of ", connection->peer, ", ", reason));
-  said_ = now;
+  last_ = Message("the last, of ", connection->peer, ", ", reason);
+  if (now - said_ >= kLogPause) SayWhatWasClosed();
+}
+
+// At most once a second; of what comes faster, the last is said when that is over.
+void ConnectionGuard::SayWhatWasClosed() {
+  if (unsaid_ == 0) return;
+  Log(LogLevel::kWarning, {}, Message("closed ", unsaid_, " connections; ", last_));
+  said_ = Clock::now();
   unsaid_ = 0;
 }
 

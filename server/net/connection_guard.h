@@ -71,6 +71,7 @@ class ConnectionGuard {
   void BoundUnread();
   void GiveBack();
   void Close(Connection* connection, const char* setting, const std::string& reason);
+  void SayWhatWasClosed();
 
   const int port_;
   const Limits limits_;
@@ -91,6 +92,7 @@ class ConnectionGuard {
   Clock::time_point awake_until_;   // gRPC may not have read yet what came
   std::size_t swept_ = 0;           // how many were left when all were last looked at
   std::size_t unsaid_ = 0;          // were closed since the log last said so
+  std::string last_;                // of those: which, and why
   Clock::time_point said_;
   bool untidy_ = false;  // memory is to be given back once it is quiet
   Clock::time_point quiet_at_;

@@ -21,7 +21,10 @@ class ConnectionGuardTest : public LiveServer {
     Config config;
     config.metrics_listen = "127.0.0.1:0";
     config.max_connection_streams = kStreams;
-    config.hello_seconds = 3600;  // nothing else ends what a stranger holds
+    // Nothing else ends what a stranger holds, who answers no pings, and whose calls are some 50 MB
+    // of unread requests, too.
+    config.hello_seconds = config.keepalive_seconds = 3600;
+    config.max_unread_bytes = std::uint64_t{1} << 30;
     StartTcp(config);
   }
 
@@ -51,11 +54,31 @@ TEST_F(ConnectionGuardTest, CallsThatAreHeldOpenBeyondTheBoundCloseTheirConnecti
     stranger.Call(rpc, kTooMany, /*reset=*/false);
     stranger.AwaitEnd();
   }
-  // Each has ended; another bound may have been the first that one of them met.
-  EXPECT_NE(Closed(), "none");
+  EXPECT_EQ(Closed(), "3");
   EXPECT_TRUE(MeshesWell()) << "on the connection that was there before";
   stub_ = NewStub();
   EXPECT_TRUE(MeshesWell()) << "on a new one";
+}
+
+// However fast one comes after the other.
+TEST_F(ConnectionGuardTest, EveryConnectionThatIsClosedIsLogged) {
+  constexpr int kStrangers = 3;
+  ::testing::internal::CaptureStderr();
+  StartGuarded();
+  for (int i = 0; i < kStrangers; ++i) {
+    RawHttp2 stranger(port());
+    stranger.Call("GetServerInfo", kTooMany, /*reset=*/false);
+    stranger.AwaitEnd();
+  }
+  server_.reset();
+  const std::string log = ::testing::internal::GetCapturedStderr();
+  const std::string closed = "] closed ";
+  int logged = 0;
+  for (std::size_t at = 0; (at = log.find(closed, at)) != std::string::npos;) {
+    at += closed.size();
+    logged += std::stoi(log.substr(at));
+  }
+  EXPECT_EQ(logged, kStrangers) << log;
 }
 
 TEST_F(ConnectionGuardTest, CallsThatAreResetFewAtATimeAreLeftAlone) {
