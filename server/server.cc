@@ -14,7 +14,6 @@
 #include <condition_variable>
 #include <cstring>
 #include <mutex>
-#include <new>
 #include <thread>
 
 #include "core/message.h"
@@ -23,6 +22,7 @@
 #include "server/net/connection_guard.h"
 #include "server/net/listener.h"
 #include "server/net/tls.h"
+#include "server/rpc/rpcs.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 
 namespace stellate::server {
@@ -46,71 +46,6 @@ constexpr int kMaxSyncThreads = 64;  // reflection alone uses them
 // Beside the calls that a connection may have open: those that its client has reset, and that gRPC
 // is not done with. 5 MB; a client that waits for anything has a few.
 constexpr std::size_t kResetCalls = 256;
-
-// Unary rpcs: run the function, answer at once. No exception leaves a handler.
-template <typename Request, typename Response>
-grpc::ServerUnaryReactor* Reply(grpc::CallbackServerContext* context, ServerState& service,
-                                grpc::Status (*handler)(const Call&, const Request&, Response*),
-                                const Request& request, Response* response) {
-  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
-  try {
-    auto caller = Identify(service, *context);
-    reactor->Finish(caller ? handler({service, std::move(*caller)}, request, response)
-                           : caller.error());
-  } catch (const std::bad_alloc&) {
-    reactor->Finish(Refusal(v1::ERROR_REASON_LIMIT_EXCEEDED, "the server is out of memory"));
-  } catch (const std::exception& error) {
-    Log(LogLevel::kError, {}, Message("a handler failed: ", error.what()));
-    reactor->Finish(Refusal(v1::ERROR_REASON_INTERNAL, "a fault of the server: see its log"));
-  }
-  return reactor;
-}
-
-class Rpcs final : public v1::Stellate::CallbackService {
- public:
-  explicit Rpcs(ServerState* service) : service_(*service) {}
-
-  using Context = grpc::CallbackServerContext;
-  grpc::ServerUnaryReactor* CreateMesh(Context* context, const v1::CreateMeshRequest* request,
-                                       v1::Mesh* mesh) override {
-    return Reply(context, service_, server::CreateMesh, *request, mesh);
-  }
-  grpc::ServerUnaryReactor* GetMesh(Context* context, const v1::GetMeshRequest* request,
-                                    v1::Mesh* mesh) override {
-    return Reply(context, service_, server::GetMesh, *request, mesh);
-  }
-  grpc::ServerUnaryReactor* ListMeshes(Context* context, const v1::ListMeshesRequest* request,
-                                       v1::ListMeshesResponse* response) override {
-    return Reply(context, service_, server::ListMeshes, *request, response);
-  }
-  grpc::ServerUnaryReactor* CancelMesh(Context* context, const v1::CancelMeshRequest* request,
-                                       v1::Mesh* mesh) override {
-    return Reply(context, service_, server::CancelMesh, *request, mesh);
-  }
-  grpc::ServerUnaryReactor* DeleteMesh(Context* context, const v1::DeleteMeshRequest* request,
-                                       google::protobuf::Empty* empty) override {
-    return Reply(context, service_, server::DeleteMesh, *request, empty);
-  }
-  grpc::ServerUnaryReactor* GetServerInfo(Context* context, const v1::GetServerInfoRequest* request,
-                                          v1::ServerInfo* info) override {
-    return Reply(context, service_, server::GetServerInfo, *request, info);
-  }
-  grpc::ServerBidiReactor<v1::ServeOracleRequest, v1::ServeOracleResponse>* ServeOracle(
-      Context* context) override {
-    return server::ServeOracle(service_, context);
-  }
-  grpc::ServerWriteReactor<v1::WatchMeshResponse>* WatchMesh(
-      Context* context, const v1::WatchMeshRequest* request) override {
-    return server::WatchMesh(service_, context, *request);
-  }
-  grpc::ServerWriteReactor<v1::DownloadMeshResponse>* DownloadMesh(
-      Context* context, const v1::DownloadMeshRequest* request) override {
-    return server::DownloadMesh(service_, context, *request);
-  }
-
- private:
-  ServerState& service_;
-};
 
 // gRPC would take over any socket file, a living server's too.
 Status ClearUnixPath(const std::string& path) {
@@ -228,6 +163,7 @@ class Server::Impl {
           std::move(credentials));
     }
     builder->RegisterService(&rpcs);
+    builder->RegisterCallbackGenericService(&unknown_rpcs);
     const mode_t mask = umask(0177);  // a unix socket is its owner's alone, from its first moment
     server = builder->BuildAndStart();
     umask(mask);
@@ -284,6 +220,7 @@ class Server::Impl {
 
   ServerState service;
   Rpcs rpcs;
+  UnknownRpcs unknown_rpcs;
   std::unique_ptr<TlsFiles> tls;
   std::unique_ptr<grpc::Server> server;
   std::unique_ptr<ConnectionGuard> guard;  // TCP alone, as the next

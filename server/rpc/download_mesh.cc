@@ -13,18 +13,26 @@ constexpr auto kPatience = std::chrono::seconds(30);
 
 // One reader's stream: a cursor in the mesh's history, and one message on its way. Counts as a
 // watcher of the mesh.
-class DownloadStream final : public grpc::ServerWriteReactor<v1::DownloadMeshResponse>,
-                             public SessionWatcher,
-                             public Stream,
-                             public std::enable_shared_from_this<DownloadStream> {
+class DownloadStream final
+    : public grpc::ServerBidiReactor<v1::DownloadMeshRequest, v1::DownloadMeshResponse>,
+      public SessionWatcher,
+      public Stream,
+      public std::enable_shared_from_this<DownloadStream> {
  public:
   DownloadStream(ServerState& service, grpc::CallbackServerContext* context)
       : service_(service), context_(context), caller_(Identify(service, *context)) {}
 
-  void Start(const v1::DownloadMeshRequest& request) {
+  void Start() {
     self_ = shared_from_this();
     service_.streams.Add(self_);
-    grpc::Status status = Attach(request);
+    if (caller_) return StartRead(&request_);
+    const std::lock_guard lock(mutex_);
+    end_ = caller_.error();
+    Pump();
+  }
+
+  void OnReadDone(bool ok) override {
+    grpc::Status status = ok ? Attach(request_) : NoRequest();
     const std::lock_guard lock(mutex_);
     if (!status.ok() && !end_) end_ = std::move(status);
     Pump();
@@ -73,7 +81,6 @@ class DownloadStream final : public grpc::ServerWriteReactor<v1::DownloadMeshRes
 
  private:
   grpc::Status Attach(const v1::DownloadMeshRequest& request) {
-    if (!caller_) return caller_.error();
     auto session = FindMesh(service_, *caller_, request.name());
     if (!session) return session.error();
     const std::uint64_t newest = (*session)->PublishedRevision();
@@ -92,6 +99,7 @@ class DownloadStream final : public grpc::ServerWriteReactor<v1::DownloadMeshRes
       memory_ = std::move(*memory);
       revision_ = request.revision() > 0 ? request.revision() : newest;
       position_ = request.position();
+      attached_ = last_write_ = Clock::now();
       session_ = *session;
     }
     if ((*session)->AddWatcher(weak_from_this())) return grpc::Status::OK;
@@ -181,18 +189,17 @@ class DownloadStream final : public grpc::ServerWriteReactor<v1::DownloadMeshRes
   bool finished_ = false;
   bool done_ = false;
   std::optional<grpc::Status> end_;
-  const TimePoint attached_ = Clock::now();
-  TimePoint last_write_ = attached_;
+  TimePoint attached_, last_write_;
+  v1::DownloadMeshRequest request_;
   v1::DownloadMeshResponse response_;
 };
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::DownloadMeshResponse>* DownloadMesh(
-    ServerState& service, grpc::CallbackServerContext* context,
-    const v1::DownloadMeshRequest& request) {
+grpc::ServerBidiReactor<v1::DownloadMeshRequest, v1::DownloadMeshResponse>* DownloadMesh(
+    ServerState& service, grpc::CallbackServerContext* context) {
   const auto stream = std::make_shared<DownloadStream>(service, context);
-  stream->Start(request);
+  stream->Start();
   return stream.get();
 }
 

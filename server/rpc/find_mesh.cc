@@ -72,6 +72,12 @@ std::optional<grpc::Status> NoHistory(ServerState& service, const Session& sessi
                  "ask again when other meshes have ended, or raise --max-memory-bytes"});
 }
 
+grpc::Status NoRequest() {
+  return Refusal(v1::ERROR_REASON_INVALID_ARGUMENT,
+                 "no request came that this rpc understands: send one message, as "
+                 "stellate/v1/stellate.proto defines it");
+}
+
 grpc::Status ShuttingDown() {
   return Refusal(v1::ERROR_REASON_SHUTTING_DOWN, "the server is stopping: connect again later");
 }

@@ -71,12 +71,10 @@ grpc::Status GetServerInfo(const Call& call, const v1::GetServerInfoRequest& req
                            v1::ServerInfo* info);
 grpc::ServerBidiReactor<v1::ServeOracleRequest, v1::ServeOracleResponse>* ServeOracle(
     ServerState& service, grpc::CallbackServerContext* context);
-grpc::ServerWriteReactor<v1::WatchMeshResponse>* WatchMesh(ServerState& service,
-                                                           grpc::CallbackServerContext* context,
-                                                           const v1::WatchMeshRequest& request);
-grpc::ServerWriteReactor<v1::DownloadMeshResponse>* DownloadMesh(
-    ServerState& service, grpc::CallbackServerContext* context,
-    const v1::DownloadMeshRequest& request);
+grpc::ServerBidiReactor<v1::WatchMeshRequest, v1::WatchMeshResponse>* WatchMesh(
+    ServerState& service, grpc::CallbackServerContext* context);
+grpc::ServerBidiReactor<v1::DownloadMeshRequest, v1::DownloadMeshResponse>* DownloadMesh(
+    ServerState& service, grpc::CallbackServerContext* context);
 
 // The caller's mesh of that name, or INVALID_ARGUMENT or NOT_FOUND. Another owner's mesh is not
 // told from one that does not exist. `field`: where the name stands.
@@ -97,6 +95,9 @@ grpc::Status TooManyWatchers(ServerState& service, const Session& session);
 // server has no memory for it; INTERNAL: it cannot be read back; nothing: wait on.
 std::optional<grpc::Status> NoHistory(ServerState& service, const Session& session,
                                       Clock::duration waited);
+
+// INVALID_ARGUMENT: the call has ended without a request, or with bytes that are none.
+grpc::Status NoRequest();
 
 // UNAVAILABLE: the server stops.
 grpc::Status ShuttingDown();

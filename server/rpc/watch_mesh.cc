@@ -13,18 +13,26 @@ constexpr auto kPatience = std::chrono::seconds(30);
 
 // One watcher's stream: a cursor in the mesh's history, and at most one message on its way. What
 // it does not read waits in the history, not here.
-class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>,
-                          public SessionWatcher,
-                          public Stream,
-                          public std::enable_shared_from_this<WatchStream> {
+class WatchStream final
+    : public grpc::ServerBidiReactor<v1::WatchMeshRequest, v1::WatchMeshResponse>,
+      public SessionWatcher,
+      public Stream,
+      public std::enable_shared_from_this<WatchStream> {
  public:
   WatchStream(ServerState& service, grpc::CallbackServerContext* context)
       : service_(service), context_(context), caller_(Identify(service, *context)) {}
 
-  void Start(const v1::WatchMeshRequest& request) {
+  void Start() {
     self_ = shared_from_this();
     service_.streams.Add(self_);
-    grpc::Status status = Attach(request);
+    if (caller_) return StartRead(&request_);
+    const std::lock_guard lock(mutex_);
+    end_ = caller_.error();
+    Pump();
+  }
+
+  void OnReadDone(bool ok) override {
+    grpc::Status status = ok ? Attach(request_) : NoRequest();
     const std::lock_guard lock(mutex_);
     if (!status.ok() && !end_) End(std::move(status));
     Pump();
@@ -77,7 +85,6 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
 
  private:
   grpc::Status Attach(const v1::WatchMeshRequest& request) {
-    if (!caller_) return caller_.error();
     auto session = FindMesh(service_, *caller_, request.name());
     if (!session) return session.error();
     const std::uint64_t newest = (*session)->PublishedRevision();
@@ -96,6 +103,7 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
       memory_ = std::move(*memory);
       at_ = request.from_revision();
       geometry_ = !request.progress_only();
+      last_write_ = Clock::now();
       session_ = *session;
     }
     if ((*session)->AddWatcher(weak_from_this())) return grpc::Status::OK;
@@ -190,16 +198,16 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchMeshResponse>
   bool done_ = false;
   std::optional<grpc::Status> end_;
   TimePoint last_write_ = Clock::now();
+  v1::WatchMeshRequest request_;
   v1::WatchMeshResponse response_;
 };
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::WatchMeshResponse>* WatchMesh(ServerState& service,
-                                                           grpc::CallbackServerContext* context,
-                                                           const v1::WatchMeshRequest& request) {
+grpc::ServerBidiReactor<v1::WatchMeshRequest, v1::WatchMeshResponse>* WatchMesh(
+    ServerState& service, grpc::CallbackServerContext* context) {
   const auto stream = std::make_shared<WatchStream>(service, context);
-  stream->Start(request);
+  stream->Start();
   return stream.get();
 }
 

@@ -9,6 +9,7 @@
 #include "tests/server/support/certificates.h"
 #include "tests/server/support/live_server.h"
 #include "tests/server/support/loopback.h"
+#include "tests/server/support/raw_http2.h"
 
 namespace stellate::server::testing {
 namespace {
@@ -85,6 +86,59 @@ TEST_F(LiveStrangersTest, ConnectionsThatSayNothingAreClosed) {
   while (recv(silent, bytes, sizeof(bytes), 0) > 0) continue;
   close(silent);
   EXPECT_TRUE(IsServed());
+}
+
+// Of which it has sent next to nothing.
+TEST_F(LiveStrangersTest, CallersAreRefusedBeforeTheirRequestIsRead) {
+  const ScratchDirectory directory;
+  WriteFile(directory / "tokens", std::string("alice ") + kToken + "\n");
+  Config config;
+  config.token_file = directory / "tokens";
+  config.request_seconds = 5;  // else it would wait for the request
+  StartTcp(config);
+  for (const char* rpc : {"CreateMesh", "GetMesh", "ListMeshes", "CancelMesh", "DeleteMesh",
+                          "GetServerInfo", "ServeOracle", "WatchMesh", "DownloadMesh"}) {
+    RawHttp2 stranger(port());
+    stranger.Request(rpc, 4 << 20, 1);
+    EXPECT_NE(stranger.AwaitAnswer().find("no token came"), std::string::npos) << rpc;
+    EXPECT_TRUE(stranger.IsAlive());
+  }
+  RawHttp2 stranger(port());
+  stranger.Request("Nothing", 4 << 20, 1);
+  EXPECT_NE(stranger.AwaitAnswer().find("no such method"), std::string::npos);
+}
+
+TEST_F(LiveStrangersTest, CallsWithoutARequestAreToldSo) {
+  Start();
+  grpc::GenericStub stub(
+      grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials()));
+  for (const char* rpc : {"GetMesh", "WatchMesh", "DownloadMesh"}) {
+    for (const char* request : {"", "\xff\xff"}) {
+      grpc::ClientContext context;
+      grpc::CompletionQueue queue;
+      const auto call =
+          stub.PrepareCall(&context, std::string("/stellate.v1.Stellate/") + rpc, &queue);
+      const auto await = [&queue] {
+        void* tag = nullptr;
+        bool ok = false;
+        EXPECT_TRUE(queue.Next(&tag, &ok));
+      };
+      call->StartCall(nullptr);
+      await();
+      const grpc::Slice slice(request);
+      if (slice.size() > 0) {
+        call->Write(grpc::ByteBuffer(&slice, 1), nullptr);
+        await();
+      }
+      call->WritesDone(nullptr);
+      await();
+      grpc::Status status;
+      call->Finish(&status, nullptr);
+      await();
+      EXPECT_EQ(status.error_code(), StatusCode::INVALID_ARGUMENT) << rpc << status.error_message();
+      EXPECT_NE(status.error_message().find("no request came"), std::string::npos);
+    }
+  }
 }
 
 // Reflection runs on threads, of which there are few.

@@ -81,6 +81,25 @@ class RawHttp2 {
     return Send(frames);
   }
 
+  // The headers of the first call to end, as they came; gRPC leaves text as it is. "": the
+  // connection was closed before.
+  std::string AwaitAnswer() {
+    std::string read;
+    char bytes[4096];
+    for (ssize_t n = 0; (n = recv(fd_, bytes, sizeof(bytes), 0)) > 0;) {
+      read.append(bytes, static_cast<std::size_t>(n));
+      while (read.size() >= kFrameHeader) {
+        const std::size_t size = Byte(read, 0) << 16 | Byte(read, 1) << 8 | Byte(read, 2);
+        if (read.size() < kFrameHeader + size) break;
+        if (read[3] == kHeaders && (read[4] & kEndStream) != 0) {
+          return read.substr(kFrameHeader, size);
+        }
+        read.erase(0, kFrameHeader + size);
+      }
+    }
+    return "";
+  }
+
   // Waits until the server has closed the connection, whatever it says before.
   void AwaitEnd() {
     char bytes[4096];
@@ -105,7 +124,12 @@ class RawHttp2 {
   static constexpr std::size_t kFrameBytes = 16 << 10;
   static constexpr char kData = 0, kHeaders = 1, kReset = 3, kSettings = 4, kPing = 6,
                         kContinuation = 9;
-  static constexpr char kAck = 1, kEndHeaders = 4;
+  static constexpr char kAck = 1, kEndStream = 1, kEndHeaders = 4;
+  static constexpr std::size_t kFrameHeader = 9;
+
+  static std::size_t Byte(const std::string& bytes, std::size_t i) {
+    return static_cast<unsigned char>(bytes[i]);
+  }
 
   static std::string Frame(char kind, char flags, std::uint32_t stream,
                            const std::string& payload) {

@@ -1,0 +1,112 @@
+#include "server/rpc/rpcs.h"
+
+#include <exception>
+#include <new>
+#include <optional>
+#include <utility>
+
+#include "core/message.h"
+#include "server/convert/error_map.h"
+#include "server/base/log.h"
+#include "stellate/v1/stellate.grpc.pb.h"
+
+namespace stellate::server {
+namespace {
+
+// One request, one response.
+template <typename Request, typename Response>
+class UnaryCall final : public grpc::ServerBidiReactor<Request, Response> {
+ public:
+  using Handler = grpc::Status (*)(const Call&, const Request&, Response*);
+
+  UnaryCall(ServerState& service, const grpc::CallbackServerContext& context, Handler handler)
+      : handler_(handler) {
+    auto caller = Identify(service, context);
+    if (!caller) {
+      this->Finish(caller.error());
+      return;
+    }
+    call_.emplace(Call{service, std::move(*caller)});
+    this->StartRead(&request_);
+  }
+
+  void OnReadDone(bool ok) override {
+    if (!ok) return this->Finish(NoRequest());
+    grpc::Status status = Answer();
+    if (!status.ok()) return this->Finish(std::move(status));
+    this->StartWriteAndFinish(&response_, grpc::WriteOptions(), std::move(status));
+  }
+
+  void OnDone() override { delete this; }
+
+ private:
+  // No exception leaves a handler.
+  grpc::Status Answer() {
+    try {
+      return handler_(*call_, request_, &response_);
+    } catch (const std::bad_alloc&) {
+      return Refusal(v1::ERROR_REASON_LIMIT_EXCEEDED, "the server is out of memory");
+    } catch (const std::exception& error) {
+      Log(LogLevel::kError, {}, core::Message("a handler failed: ", error.what()));
+      return Refusal(v1::ERROR_REASON_INTERNAL, "a fault of the server: see its log");
+    }
+  }
+
+  const Handler handler_;
+  std::optional<Call> call_;
+  Request request_;
+  Response response_;
+};
+
+}  // namespace
+
+template <typename Request, typename Response>
+void Rpcs::Add(const char* path, Begin<Request, Response> begin) {
+  using grpc::internal::RpcServiceMethod;
+  AddMethod(new RpcServiceMethod(path, RpcServiceMethod::BIDI_STREAMING, nullptr));
+  MarkMethodCallback(count_++,
+                     new grpc::internal::CallbackBidiHandler<Request, Response>(std::move(begin)));
+}
+
+template <typename Request, typename Response>
+void Rpcs::AddUnary(const char* path,
+                    grpc::Status (*handler)(const Call&, const Request&, Response*)) {
+  Add<Request, Response>(path, [this, handler](grpc::CallbackServerContext* context) {
+    return new UnaryCall<Request, Response>(service_, *context, handler);
+  });
+}
+
+template <typename Request, typename Response>
+void Rpcs::AddStream(const char* path, grpc::ServerBidiReactor<Request, Response>* (*handler)(
+                                           ServerState&, grpc::CallbackServerContext*)) {
+  Add<Request, Response>(path, [this, handler](grpc::CallbackServerContext* context) {
+    return handler(service_, context);
+  });
+}
+
+Rpcs::Rpcs(ServerState* service) : service_(*service) {
+  AddUnary("/stellate.v1.Stellate/CreateMesh", CreateMesh);
+  AddUnary("/stellate.v1.Stellate/GetMesh", GetMesh);
+  AddUnary("/stellate.v1.Stellate/ListMeshes", ListMeshes);
+  AddUnary("/stellate.v1.Stellate/CancelMesh", CancelMesh);
+  AddUnary("/stellate.v1.Stellate/DeleteMesh", DeleteMesh);
+  AddUnary("/stellate.v1.Stellate/GetServerInfo", GetServerInfo);
+  AddStream("/stellate.v1.Stellate/ServeOracle", ServeOracle);
+  AddStream("/stellate.v1.Stellate/WatchMesh", WatchMesh);
+  AddStream("/stellate.v1.Stellate/DownloadMesh", DownloadMesh);
+}
+
+grpc::ServerGenericBidiReactor* UnknownRpcs::CreateReactor(
+    grpc::GenericCallbackServerContext* /*context*/) {
+  class Unknown final : public grpc::ServerGenericBidiReactor {
+   public:
+    Unknown() {
+      Finish({grpc::StatusCode::UNIMPLEMENTED,
+              "this server has no such method: it speaks stellate.v1"});
+    }
+    void OnDone() override { delete this; }
+  };
+  return new Unknown;
+}
+
+}  // namespace stellate::server
