@@ -1,23 +1,24 @@
 #pragma once
 
 #include <CLI/App.hpp>
-#include <string>
+#include <stop_token>
 
+#include "oracle_source.h"
 #include "stellate/doctor.h"
 
 namespace stellate::cli {
 
-// `stellate doctor`: the catalogue's oracles under examination.
+// `stellate doctor`: the catalogue's oracles, and commands, under examination.
 class DoctorCommand {
  public:
   explicit DoctorCommand(CLI::App& parent);
   bool chosen() const { return command_->parsed(); }
-  int Run() const;
+  int Run(std::stop_token stop);
 
  private:
   CLI::App* command_;
+  OracleSource source_;
   CheckOptions options_;
-  std::string manifold_;
 };
 
 }  // namespace stellate::cli

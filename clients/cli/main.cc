@@ -1,4 +1,4 @@
-// stellate: meshes the catalogue's manifolds from the command line.
+// stellate: meshes the catalogue's manifolds, and those of commands, from the command line.
 #include <signal.h>
 
 #include <CLI/CLI.hpp>
@@ -94,7 +94,7 @@ int Main(int argc, char** argv) {
   app.require_subcommand(1);
   stellate::cli::MeshCommand mesh(app);
   const CLI::App* list = app.add_subcommand("list", "Show the catalogue of manifolds");
-  const stellate::cli::DoctorCommand doctor(app);
+  stellate::cli::DoctorCommand doctor(app);
   stellate::cli::DownloadCommand download(app);
   const stellate::cli::TopCommand top(app);
   CLI::App* const health = app.add_subcommand("health", "Ask a server how it is");
@@ -106,9 +106,9 @@ int Main(int argc, char** argv) {
     return app.exit(error) == 0 ? stellate::cli::kExitCertified : stellate::cli::kExitRefused;
   }
   if (list->parsed()) return List();
-  if (doctor.chosen()) return doctor.Run();
   if (health->parsed()) return Health(health_server);
   const StopOnSignal signals;
+  if (doctor.chosen()) return doctor.Run(signals.token());
   if (download.chosen()) return download.Run(signals.token());
   return top.chosen() ? top.Run(signals.token()) : mesh.Run(signals.token());
 }

@@ -1,7 +1,9 @@
 #include "mesh_command.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
+#include <exception>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -10,7 +12,6 @@
 
 #include "mesh_settings.h"
 #include "progress_bar.h"
-#include "stellate/catalogue.h"
 
 namespace stellate::cli {
 namespace {
@@ -48,9 +49,9 @@ void Add(CLI::App* to, const MeshSetting& setting, MeshOptions* options) {
 }  // namespace
 
 MeshCommand::MeshCommand(CLI::App& parent)
-    : command_(parent.add_subcommand("mesh", "Mesh a manifold of the catalogue")),
+    : command_(parent.add_subcommand("mesh", "Mesh a manifold of the catalogue, or of a command")),
+      source_(command_),
       server_(command_, "") {
-  command_->add_option("manifold", manifold_, "e.g. torus:1:0.4; see 'stellate list'")->required();
   command_
       ->add_option_function<std::string>(
           "-e,--epsilon", [this](const std::string& text) { SetEpsilon(text); },
@@ -91,12 +92,10 @@ void MeshCommand::SetEpsilon(const std::string& text) {
 }
 
 int MeshCommand::Run(std::stop_token stop) {
-  std::string why;
-  const std::unique_ptr<Manifold> manifold = MakeManifold(manifold_, &why);
-  if (manifold == nullptr) {
-    return Complain({ErrorCode::kRefused, "", why + "; 'stellate list' shows what there is"});
-  }
-  if (const auto ok = outputs_.Check(manifold->dimension(), manifold->ambient_dimension()); !ok) {
+  const Expected<std::unique_ptr<Oracle>> made = source_.Make(stop);
+  if (!made) return Complain(made.error());
+  Oracle& oracle = **made;
+  if (const auto ok = outputs_.Check(oracle.dimension(), oracle.ambient_dimension()); !ok) {
     return Complain(ok.error());
   }
   options_.server = server_.address();
@@ -105,11 +104,16 @@ int MeshCommand::Run(std::stop_token stop) {
     if (!credentials) return Complain(credentials.error());
     options_.credentials = std::move(*credentials);
   }
-  ClosestPointOnly poor(*manifold);
-  Oracle& oracle = closest_point_only_ ? static_cast<Oracle&>(poor) : *manifold;
-  ProgressBar bar(quiet_);
-  options_.label = ("stellate mesh " + manifold_).substr(0, kMaxLabel);
+  options_.label = ("stellate mesh " + source_.name()).substr(0, kMaxLabel);
+  options_.workers = std::max(options_.workers, source_.processes());
   options_.stop = std::move(stop);
+  ClosestPointOnly poor(oracle);
+  const Expected<Mesh> mesh = MeshIt(closest_point_only_ ? static_cast<Oracle&>(poor) : oracle);
+  return mesh ? Deliver(*mesh) : Complain(mesh.error());
+}
+
+Expected<Mesh> MeshCommand::MeshIt(Oracle& oracle) {
+  ProgressBar bar(quiet_);
   options_.on_epsilon = [this](double epsilon, const std::string& reason) {
     if (!quiet_) std::fprintf(stderr, "epsilon %g, %s\n", epsilon, reason.c_str());
   };
@@ -118,9 +122,14 @@ int MeshCommand::Run(std::stop_token stop) {
     bar.Clear();
     Tell(outage, options_.reconnect_seconds);
   };
-  const Expected<Mesh> mesh = MeshManifold(oracle, options_);
-  bar.Clear();
-  return mesh ? Deliver(*mesh) : Complain(mesh.error());
+  try {
+    Expected<Mesh> mesh = MeshManifold(oracle, options_);
+    bar.Clear();
+    return mesh;
+  } catch (const std::exception& e) {
+    bar.Clear();
+    return Fail(ErrorCode::kOracleFailed, e.what());
+  }
 }
 
 int MeshCommand::Deliver(const Mesh& mesh) const {

@@ -4,6 +4,7 @@
 #include <stop_token>
 #include <string>
 
+#include "oracle_source.h"
 #include "outputs.h"
 #include "server_options.h"
 #include "stellate/client.h"
@@ -19,12 +20,13 @@ class MeshCommand {
 
  private:
   void SetEpsilon(const std::string& text);
+  Expected<Mesh> MeshIt(Oracle& oracle);
   int Deliver(const Mesh& mesh) const;
 
   CLI::App* command_;
+  OracleSource source_;
   ServerOptions server_;
   MeshOptions options_;
-  std::string manifold_;
   Outputs outputs_;
   std::string report_;
   bool json_ = false, quiet_ = false, closest_point_only_ = false;

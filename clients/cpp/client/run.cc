@@ -71,8 +71,10 @@ Expected<Mesh> Run::Go() {
     }
   }
   JoinWorkers();
+  // An oracle that fails while it is being stopped does not take the mesh so far away.
+  const bool delivered = mesh.has_value() && options_.stop.stop_requested();
   for (const auto& worker : workers_) {
-    if (worker->exception()) std::rethrow_exception(worker->exception());
+    if (worker->exception() && !delivered) std::rethrow_exception(worker->exception());
   }
   // The mesh's own failure says most; a stream that the server refused says why it has none.
   if (broken) {

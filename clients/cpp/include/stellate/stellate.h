@@ -3,6 +3,7 @@
 // The whole C++ client: write an Oracle, call MeshManifold, read Mesh::report, Mesh::Save.
 #include "stellate/catalogue.h"
 #include "stellate/client.h"
+#include "stellate/command_oracle.h"
 #include "stellate/doctor.h"
 #include "stellate/download.h"
 #include "stellate/implicit.h"

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <CLI/App.hpp>
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "stellate/command_oracle.h"
+#include "stellate/error.h"
+#include "stellate/oracle.h"
+
+namespace stellate::cli {
+
+// Whose manifold it is: one of the catalogue's, or that of a command (see docs/pipe.md).
+class OracleSource {
+ public:
+  explicit OracleSource(CLI::App* command);
+
+  // The oracle, its processes started. A stop ends them.
+  Expected<std::unique_ptr<Oracle>> Make(std::stop_token stop);
+
+  // For labels and messages.
+  const std::string& name() const {
+    return command_.command.empty() ? manifold_ : command_.command;
+  }
+  // How many of them answer at the same time; 1 for the catalogue's.
+  int processes() const { return command_.processes; }
+
+ private:
+  Expected<void> ReadWhereabouts();
+
+  std::string manifold_, box_;
+  std::vector<std::string> seeds_;
+  CommandOptions command_;
+};
+
+}  // namespace stellate::cli

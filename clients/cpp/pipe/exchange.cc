@@ -1,0 +1,166 @@
+#include "exchange.h"
+
+#include <poll.h>
+#include <signal.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <system_error>
+
+#include "numbers.h"
+
+namespace stellate::pipe {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kStopGrace = std::chrono::seconds(1);
+constexpr size_t kReadBytes = 1 << 16;
+
+// While it lives, writing to a pipe that nobody reads is an error of this thread and no signal.
+class WithoutSigpipe {
+ public:
+  WithoutSigpipe() {
+    sigset_t pending;
+    sigpending(&pending);
+    was_pending_ = sigismember(&pending, SIGPIPE) == 1;
+    sigemptyset(&sigpipe_);
+    sigaddset(&sigpipe_, SIGPIPE);
+    pthread_sigmask(SIG_BLOCK, &sigpipe_, &before_);
+  }
+  ~WithoutSigpipe() {
+    const timespec now{};
+    if (!was_pending_) sigtimedwait(&sigpipe_, nullptr, &now);
+    pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+  }
+  WithoutSigpipe(const WithoutSigpipe&) = delete;
+  WithoutSigpipe& operator=(const WithoutSigpipe&) = delete;
+
+ private:
+  sigset_t sigpipe_, before_;
+  bool was_pending_ = false;
+};
+
+class Conversation {
+ public:
+  Conversation(Process& process, std::string_view question,
+               const std::function<bool(std::string*)>& take, const StopSignal& stop)
+      : process_(process),
+        unwritten_(question),
+        asked_(question.size()),
+        take_(take),
+        stop_(stop) {}
+
+  void Run(std::chrono::duration<double> silence) {
+    const auto patience = std::chrono::duration_cast<Clock::duration>(silence);
+    if (!process_.unread.empty()) TooMuch();
+    Clock::time_point deadline = Clock::now() + patience;
+    while (!done_) {
+      Wait(std::min(deadline, stop_.deadline()));
+      if (Move()) deadline = Clock::now() + patience;
+      const Clock::time_point now = Clock::now();
+      if (done_ || now < std::min(deadline, stop_.deadline())) continue;
+      if (now >= stop_.deadline()) throw std::runtime_error("it was told to stop");
+      char seconds[32];
+      std::snprintf(seconds, sizeof seconds, "%g", silence.count());
+      throw std::runtime_error("it has neither read nor written for " + std::string(seconds) +
+                               " seconds" + Standing());
+    }
+    if (!unwritten_.empty() || !process_.unread.empty()) TooMuch();
+  }
+
+ private:
+  void Wait(Clock::time_point until) {
+    const bool stopping = stop_.deadline() != Clock::time_point::max();
+    fds_ = {pollfd{unwritten_.empty() ? -1 : process_.input.get(), POLLOUT, 0},
+            pollfd{process_.output.get(), POLLIN, 0},
+            pollfd{errors_open_ ? process_.errors.get() : -1, POLLIN, 0},
+            pollfd{stopping ? -1 : stop_.descriptor(), POLLIN, 0}};
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()).count();
+    constexpr std::int64_t kLongest = 1 << 30;  // milliseconds; it is looked at again then
+    const int timeout = static_cast<int>(std::clamp<std::int64_t>(left, 0, kLongest));
+    if (poll(fds_.data(), fds_.size(), timeout) < 0 && errno != EINTR) {
+      throw std::system_error(errno, std::generic_category(), "poll");
+    }
+  }
+
+  // Whether any byte went through.
+  bool Move() {
+    if (fds_[2].revents != 0) errors_open_ = process_.ReadErrors();
+    // Read first: who closes its input may have answered all the same.
+    const bool read = fds_[1].revents != 0 && Read();
+    const bool written = !done_ && fds_[0].revents != 0 && Write();
+    return read || written;
+  }
+
+  bool Read() {
+    std::string& unread = process_.unread;
+    const size_t before = unread.size();
+    unread.resize(before + kReadBytes);
+    const ssize_t count = read(process_.output.get(), unread.data() + before, kReadBytes);
+    const int error = errno;
+    unread.resize(before + static_cast<size_t>(std::max<ssize_t>(count, 0)));
+    if (count == 0) throw Ended("it closed its standard output" + Standing());
+    if (count > 0) done_ = take_(&unread);
+    if (count < 0 && error != EAGAIN && error != EINTR) {
+      throw std::system_error(error, std::generic_category(), "reading from it");
+    }
+    return count > 0;
+  }
+
+  bool Write() {
+    const ssize_t count = write(process_.input.get(), unwritten_.data(), unwritten_.size());
+    if (count > 0) unwritten_.remove_prefix(static_cast<size_t>(count));
+    if (count < 0 && errno == EPIPE) throw Ended("it closed its standard input" + Standing());
+    if (count < 0 && errno != EAGAIN && errno != EINTR) {
+      throw std::system_error(errno, std::generic_category(), "writing to it");
+    }
+    return count > 0;
+  }
+
+  std::string Standing() const {
+    if (asked_ == 0) return ", and its first line never came: is it written, and flushed?";
+    return ", after it took " + std::to_string(asked_ - unwritten_.size()) + " of " +
+           std::to_string(asked_) + " bytes";
+  }
+
+  [[noreturn]] void TooMuch() const {
+    if (!unwritten_.empty())
+      throw std::runtime_error("it answered before it was asked" + Standing());
+    throw std::runtime_error("it wrote more than it was asked for: " + Quoted(process_.unread));
+  }
+
+  Process& process_;
+  std::string_view unwritten_;
+  const size_t asked_;  // bytes
+  const std::function<bool(std::string*)>& take_;
+  const StopSignal& stop_;
+  std::array<pollfd, 4> fds_{};
+  bool errors_open_ = true, done_ = false;
+};
+
+}  // namespace
+
+StopSignal::StopSignal(std::stop_token stop)
+    : event_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+      deadline_(Clock::time_point::max()),
+      callback_(std::move(stop), [this] { Raise(); }) {}
+
+void StopSignal::Raise() {
+  deadline_ = Clock::now() + kStopGrace;
+  const std::uint64_t one = 1;
+  if (write(event_.get(), &one, sizeof one) < 0) return;  // its next look at the deadline will do
+}
+
+void Exchange(Process& process, std::string_view question,
+              const std::function<bool(std::string*)>& take, std::chrono::duration<double> silence,
+              const StopSignal& stop) {
+  const WithoutSigpipe quiet;
+  Conversation(process, question, take, stop).Run(silence);
+}
+
+}  // namespace stellate::pipe

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "stellate/oracle.h"
+
+// What goes through the pipe, as bytes; docs/pipe.md is its specification.
+namespace stellate::pipe {
+
+// What came is not what the specification wants; what() says where and what.
+struct Garbled : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+constexpr size_t kMaxGreetingBytes = 1 << 20;
+constexpr size_t kMaxErrorBytes = 1 << 16;
+
+// A command's first line.
+struct Greeting {
+  bool text = false;
+  std::optional<int> dimension, ambient_dimension;
+  bool tangents = false, flats = false, sizes = false;
+  std::optional<BoundingBox> box;
+  Eigen::MatrixXd seeds;  // d x m
+};
+
+// `line` without its end. Throws Garbled.
+Greeting ParseGreeting(std::string_view line);
+
+// A batch. The referenced outlive it.
+struct Question {
+  int dimension;                           // k
+  const Eigen::MatrixXd& points;           // d x n; a flat's are its centers
+  const Eigen::MatrixXd* bases = nullptr;  // (d k) x n: flats are asked for, else closest points
+  const Eigen::VectorXd* radii = nullptr;  // n, with bases
+  bool tangents = false, sizes = false;    // wanted beside the points
+};
+
+std::string ToBytes(const Question& question, bool text);
+
+// Reads the answer to one question, in whatever pieces it comes. Memory stays within a small
+// multiple of a right answer's size.
+class AnswerReader {
+ public:
+  static std::unique_ptr<AnswerReader> Make(const Question& question, bool text);
+  virtual ~AnswerReader() = default;
+
+  // Takes from the front of `bytes`. True once the answer is whole; what is left then came after
+  // it. Throws Garbled; an error that the command reports is thrown as a CommandError.
+  virtual bool Take(std::string* bytes) = 0;
+
+  // After Take said true. Only what the question wanted, and finite wherever found.
+  Answer Finish();
+
+ protected:
+  explicit AnswerReader(const Question& question) : question_(question) {}
+  Eigen::Index n() const { return question_.points.cols(); }
+  Eigen::Index d() const { return question_.points.rows(); }
+  Eigen::Index dk() const { return d() * question_.dimension; }
+
+  const Question question_;
+  Answer answer_;
+};
+
+// In the command's own words.
+struct CommandError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace stellate::pipe
