@@ -35,7 +35,7 @@ install(DIRECTORY ${PROJECT_BINARY_DIR}/include/stellate DESTINATION ${CMAKE_INS
 if(NOT STELLATE_CORE_ONLY)
   stellate_export(client
     stellate_client=client stellate_mesh=mesh stellate_catalogue=catalogue stellate_doctor=doctor
-    stellate_proto=proto)
+    stellate_pipe=pipe stellate_proto=proto)
   install(DIRECTORY clients/cpp/include/stellate DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
     COMPONENT development)
 endif()

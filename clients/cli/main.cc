@@ -12,6 +12,7 @@
 #include "doctor_command.h"
 #include "download_command.h"
 #include "mesh_command.h"
+#include "serve_command.h"
 #include "server_options.h"
 #include "stellate/catalogue.h"
 #include "stellate/client.h"
@@ -96,6 +97,7 @@ int Main(int argc, char** argv) {
   const CLI::App* list = app.add_subcommand("list", "Show the catalogue of manifolds");
   stellate::cli::DoctorCommand doctor(app);
   stellate::cli::DownloadCommand download(app);
+  stellate::cli::ServeCommand serve(app);
   const stellate::cli::TopCommand top(app);
   CLI::App* const health = app.add_subcommand("health", "Ask a server how it is");
   const stellate::cli::ServerOptions health_server(health, "127.0.0.1:7717");
@@ -109,6 +111,7 @@ int Main(int argc, char** argv) {
   if (health->parsed()) return Health(health_server);
   const StopOnSignal signals;
   if (doctor.chosen()) return doctor.Run(signals.token());
+  if (serve.chosen()) return serve.Run(signals.token());
   if (download.chosen()) return download.Run(signals.token());
   return top.chosen() ? top.Run(signals.token()) : mesh.Run(signals.token());
 }
