@@ -13,9 +13,9 @@ namespace stellate::cli {
 ServeCommand::ServeCommand(CLI::App& parent)
     : command_(parent.add_subcommand(
           "serve", "Answer for a mesh that somebody else declared, until it is over")),
+      name_(command_->add_option("mesh", mesh_, "its name, meshes/...")->required()),
       source_(command_),
       server_(command_, "127.0.0.1:7717") {
-  command_->add_option("mesh", mesh_, "its name, meshes/...")->required();
   command_->add_option("--worker", options_.worker, "this worker's name, for logs");
   command_->add_option("--max-chunk", options_.max_chunk,
                        "most points that the oracle is asked at once");

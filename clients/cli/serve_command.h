@@ -21,8 +21,9 @@ class ServeCommand {
   Expected<MeshState> Serve(Oracle& oracle);
 
   CLI::App* command_;
-  OracleSource source_;
   std::string mesh_;
+  CLI::Option* name_;  // the first of the arguments
+  OracleSource source_;
   ServerOptions server_;
   ServeOptions options_;
 };

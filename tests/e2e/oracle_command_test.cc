@@ -95,11 +95,14 @@ struct Language {
 };
 void PrintTo(const Language& language, std::ostream* out) { *out << language.name; }
 
-std::string FilledIn(std::string command, const std::string& what, const std::string& with) {
-  for (size_t at = 0; (at = command.find(what, at)) != std::string::npos; at += with.size()) {
-    command.replace(at, what.size(), with);
+std::string FilledIn(const std::string& text, const std::string& what, const std::string& with) {
+  std::ostringstream filled;
+  size_t from = 0;
+  for (size_t at = 0; (at = text.find(what, from)) != std::string::npos; from = at + what.size()) {
+    filled << text.substr(from, at - from) << with;
   }
-  return command;
+  filled << text.substr(from);
+  return filled.str();
 }
 
 class InLanguages : public OracleCommand, public ::testing::WithParamInterface<Language> {};
@@ -180,17 +183,37 @@ TEST_F(OracleCommand, UsageIsChecked) {
   }
 }
 
+// A sphere whose program ends as `when` says, with words.
+std::string Dying(const std::string& when) {
+  return R"(BEGIN { print "stellate-oracle 1 text k=2 d=3 seeds=1,0,0"; fflush() }
+/^closest/ {
+  ++batch
+  if ()" +
+         when + R"() { print "the solver diverged" > "/dev/stderr"; exit 5 }
+  left = $2
+  next
+}
+{
+  r = sqrt($1 ^ 2 + $2 ^ 2 + $3 ^ 2)
+  print $1 / r, $2 / r, $3 / r
+  if (--left == 0) fflush()
+})";
+}
+
+TEST_F(OracleCommand, DeathNowAndThenIsSurvived) {
+  const Result result = OnServer("mesh --oracle-command 'mawk -W interactive -f " +
+                                 Script("dying", Dying("batch == 4")) + "' -e 0.3");
+  EXPECT_EQ(result.status, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("the solver diverged\nstellate: it is started again"));
+}
+
 TEST_F(OracleCommand, FailureInMidMeshIsToldInTheCommandsWords) {
-  const std::string dying = Script("dying", R"(BEGIN {
-  print "stellate-oracle 1 text k=2 d=3 seeds=1,0,0"; fflush() }
-/^closest/ { if (++batch == 4) { print "the solver diverged" > "/dev/stderr"; exit 5 } left = $2; next }
-{ r = sqrt($1 ^ 2 + $2 ^ 2 + $3 ^ 2); print $1 / r, $2 / r, $3 / r; if (--left == 0) fflush() })");
-  const Result result = OnServer("mesh --oracle-command 'mawk -W interactive -f " + dying +
-                                 "; echo gone >&2; kill -9 $$' -e 0.3");
+  const Result result = OnServer("mesh --oracle-command 'mawk -W interactive -f " +
+                                 Script("dying", Dying("$2 > 20")) + "' -e 0.3");
   EXPECT_EQ(result.status, 3) << result.output;
-  // Four batches are answered by no process: a new one got to its fourth, too.
-  EXPECT_THAT(result.output, HasSubstr("it is started again"));
-  EXPECT_THAT(result.output, HasSubstr("the solver diverged\ngone"));
+  EXPECT_THAT(result.output, HasSubstr("it closed its standard output"));
+  EXPECT_THAT(result.output, HasSubstr("it ended with status 5\n"));
+  EXPECT_THAT(result.output, HasSubstr("the solver diverged\n"));
 }
 
 // The command interrupts stellate, as a user would, in a batch that it never answers.
@@ -199,7 +222,7 @@ TEST_F(OracleCommand, InterruptDeliversTheMeshSoFar) {
 print "stellate-oracle 1 text k=1 d=2 box=-2,-2:2,2\n";
 while (my $line = <STDIN>) {
   my (undef, $n) = split " ", $line;
-  if (++$batch > 3) { kill "INT", getppid; sleep 1000 }
+  if (++$batch > 8) { kill "INT", getppid; sleep 1000 }
   for (1 .. $n) {
     my ($x, $y) = split " ", <STDIN>;
     my $r = sqrt($x * $x + $y * $y);
@@ -238,8 +261,8 @@ TEST_F(OracleCommand, ServesAMeshThatAnotherProgramDeclared) {
   ASSERT_TRUE(made->Save(Path("served.txt")));
   ExpectSameMesh(Path("served.txt"), Reference(shape));
   // The catalogue's serve, too; and a name that is not there is refused.
-  EXPECT_EQ(OnServer("serve torus " + mesh.name()).status, 0);
-  EXPECT_EQ(OnServer("serve torus meshes/00000000000000000000000000000000").status, 2);
+  EXPECT_EQ(OnServer("serve " + mesh.name() + " torus").status, 0);
+  EXPECT_EQ(OnServer("serve meshes/00000000000000000000000000000000 torus").status, 2);
 }
 
 }  // namespace

@@ -24,7 +24,8 @@ class CommandLine : public Live {
   }
   static Result Run(const std::string& arguments) {
     Result result;
-    std::FILE* pipe = popen(("'" + Program() + "' " + arguments + " 2>&1").c_str(), "r");
+    const std::string command = std::string("'").append(Program()) + "' " + arguments + " 2>&1";
+    std::FILE* pipe = popen(command.c_str(), "r");
     if (pipe == nullptr) return result;
     std::array<char, 4096> buffer;
     while (const size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe)) {
