@@ -34,6 +34,7 @@ CLIENTS = ROOT / "clients"
 COMMANDS = {
     "node": ["node", CLIENTS / "node/dist/examples/timing.js"],
     "go": [ROOT / "build/bench/timing-go"],
+    "ruby": ["ruby", CLIENTS / "ruby/timing.rb"],
     "java": [
         "java",
         "-cp",
@@ -43,6 +44,7 @@ COMMANDS = {
     "rust": [CLIENTS / "rust/target/release/examples/timing"],
 }
 BUILDS = {  # in the client's directory, in a shell
+    "ruby": "./generate",
     "java": "mvn --quiet --batch-mode package -DskipTests",
     "rust": "cargo build --quiet --locked --release --examples",
     "node": "npm ci --ignore-scripts --silent && npm run --silent build",

@@ -1,0 +1,136 @@
+# frozen_string_literal: true
+
+module Stellate
+  # A simplicial k-complex in R^d. `points` and `simplices` are arrays of rows; ids count from zero,
+  # ascend in each row, and rows are in lexicographic order.
+  class Mesh
+    attr_reader :dimension, :ambient_dimension, :points, :simplices, :revision, :progress, :report
+
+    def initialize(k, d, points, simplices, revision, progress: nil, report: nil)
+      @dimension, @ambient_dimension, @points, @simplices = k, d, points, simplices
+      @revision, @progress, @report = revision, progress, report
+    end
+
+    # Whether the mesh is finished and proved good.
+    def certified?
+      report&.certificate&.certified || false
+    end
+
+    # Raises SaveError if a mesh of that kind cannot have the name.
+    def self.check_save(path, k, d)
+      return if path.end_with?('.txt') || (path.end_with?('.obj') && k <= 2 && d <= 3)
+
+      raise SaveError.new('.obj holds curves and surfaces of the plane and of space', reason: 'FORMAT') if
+        path.end_with?('.obj')
+
+      raise SaveError.new("#{path} has to end in .txt or .obj; stellate download writes others", reason: 'FORMAT')
+    end
+
+    # Writes .txt (any k and d, exact: "k d nv ns", coordinates, ids from zero) or .obj (oriented where
+    # that can be). The file takes its name when it is whole.
+    def save(path)
+      Mesh.check_save(path, dimension, ambient_dimension)
+      text = path.end_with?('.txt') ? to_txt : to_obj
+      File.write("#{path}.part", text)
+      File.rename("#{path}.part", path)
+    end
+
+    # The simplices with their last two vertices exchanged where it takes that for neighbours to agree;
+    # nil if the mesh is not orientable. A hypersurface has its normals outwards.
+    def oriented_simplices
+      facets = facet_owners
+      return if facets.each_value.any? { |owners| owners.size > 2 }
+
+      turned = Array.new(simplices.size)
+      oriented = simplices.map(&:dup)
+      simplices.each_index do |start|
+        next if turned[start]
+
+        component = flood(start, turned, facets)
+        return nil if component.nil?
+
+        component.each { |s| oriented[s].push(oriented[s].pop, oriented[s].pop) if turned[s].negative? }
+        turn_outwards(oriented, component) if dimension == ambient_dimension - 1
+      end
+      oriented
+    end
+
+    # A report in a few lines, for people.
+    def self.report_text(report)
+      counts, proved = report.counts || V1::Counts.new, report.certificate || V1::Certificate.new
+      verdict = proved.verdict.empty? ? report.failure&.message : proved.verdict
+      ["#{'NOT ' unless proved.certified}CERTIFIED (#{Wire.name(report.termination, 'TERMINATION_')}): #{verdict}",
+       "#{counts.vertices} vertices, #{counts.simplices} simplices, #{counts.rounds} rounds, " \
+       "#{counts.queries} queries, #{report.elapsed_seconds.round(2)} s",
+       "#{proved.components} components, Euler characteristic #{proved.euler_characteristic}, " \
+       "orientable #{proved.orientable}, estimated reach #{proved.estimated_reach.round(3)}",
+       *proved.warnings.map { |warning| "warning: #{warning}" }].join("\n")
+    end
+
+    private
+
+    def facet_owners
+      owners = Hash.new { |hash, facet| hash[facet] = [] }
+      simplices.each_with_index do |row, s|
+        row.each_index { |i| owners[row[0, i] + row[(i + 1)..]] << [s, i] }
+      end
+      owners
+    end
+
+    # The component of a simplex, its signs set in `turned`; nil if they contradict each other.
+    def flood(start, turned, facets)
+      turned[start] = 1
+      component = [start]
+      component.each do |s|
+        row = simplices[s]
+        row.each_index do |i|
+          facets[row[0, i] + row[(i + 1)..]].each do |other, j|
+            next if other == s
+
+            wanted = (i - j).even? ? -turned[s] : turned[s]
+            return nil if turned[other] == -wanted
+            next if turned[other]
+
+            turned[other] = wanted
+            component << other
+          end
+        end
+      end
+      component
+    end
+
+    def turn_outwards(oriented, component)
+      volume = component.sum { |s| determinant(oriented[s].map { |id| points[id] }) }
+      component.each { |s| oriented[s].push(oriented[s].pop, oriented[s].pop) } if volume.negative?
+    end
+
+    def determinant(rows)
+      return rows[0][0] if rows.size == 1
+
+      rows.each_index.sum do |i|
+        minor = (rows[0, i] + rows[(i + 1)..]).map { |row| row[1..] }
+        (i.even? ? 1 : -1) * rows[i][0] * determinant(minor)
+      end
+    end
+
+    def lines(rows, format)
+      rows.map { |row| format(format, *row) }
+    end
+
+    def coordinates
+      lines(points, (['%.17g'] * ambient_dimension).join(' '))
+    end
+
+    def to_txt
+      head = [dimension, ambient_dimension, points.size, simplices.size].join(' ')
+      [head, *coordinates, *simplices.map { |row| row.join(' ') }, ''].join("\n")
+    end
+
+    def to_obj
+      filled = ' 0' * (3 - ambient_dimension)
+      letter = dimension == 1 ? 'l' : 'f'
+      cells = (oriented_simplices || simplices).map { |row| "#{letter} #{row.map(&:succ).join(' ')}" }
+      [*coordinates.map { |line| "v #{line}#{filled}" }, *cells, ''].join("\n")
+    end
+  end
+end

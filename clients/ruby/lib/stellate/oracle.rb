@@ -1,0 +1,109 @@
+# frozen_string_literal: true
+
+module Stellate
+  # An oracle as the server sees it: answers are checked, with clear words.
+  #
+  # An oracle is any object with `dimension`, `ambient_dimension`, `bounding_box` ([lower, upper]) or
+  # `seeds` (points near M), and these methods on whole batches, arrays of points, of which the last
+  # three are optional:
+  #   closest_point(points): a point of M nearest to each; nil where there is none
+  #   intersect_flat(centers, bases, radii): the point of M nearest to each center in the flat through it
+  #     that is orthogonal to the columns of its basis (d rows of k), within the radius; else nil
+  #   tangent_basis(points): at points of M d rows of k numbers, orthonormal columns
+  #   local_size(points): at points of M the local feature size, or any positive lengths
+  # The answer to a query must not depend on the rest of its batch. Calls come one at a time.
+  class CheckedOracle
+    attr_reader :k, :d
+
+    def initialize(oracle)
+      @oracle = oracle
+      @k, @d = oracle.dimension, oracle.ambient_dimension
+      @turn = Mutex.new
+      unless oracle.respond_to?(:closest_point)
+        raise InvalidArgument.new("#{oracle.class} has no method closest_point", reason: 'INVALID_ARGUMENT')
+      end
+    rescue NoMethodError => e
+      raise InvalidArgument.new("an oracle needs #{e.name}", reason: 'INVALID_ARGUMENT')
+    end
+
+    def capabilities
+      V1::OracleCapabilities.new(
+        **%i[intersect_flat tangent_basis local_size].to_h { |name| [name, @oracle.respond_to?(name)] }
+      )
+    end
+
+    def whereabouts
+      { bounding_box: @oracle.respond_to?(:bounding_box) ? @oracle.bounding_box : nil,
+        seeds: @oracle.respond_to?(:seeds) ? @oracle.seeds : nil }
+    end
+
+    # The answers to one chunk. Raises whatever the oracle does.
+    def answer(chunk)
+      @turn.synchronize { asked(chunk) }
+    end
+
+    private
+
+    def asked(chunk)
+      x = Wire.numbers(chunk.points, nil, d).each_slice(d).to_a
+      n = x.size
+      points = checked(method_of(chunk), ask(chunk, x), n, d)
+      reply = V1::AnswerChunk.new(lease: chunk.lease)
+      found = points.map { |point| point ? 1 : 0 }
+      reply.found = found.pack('C*') if points.include?(nil)
+      nowhere = [0.0] * d
+      reply.points = Wire.to_wire(points.flat_map { |point| point || nowhere }, n, d)
+      if chunk.want_tangents
+        anywhere = Array.new(d) { |row| Array.new(k) { |column| row == column ? 1.0 : 0.0 } }.flatten
+        reply.tangents = Wire.to_wire(at_found(:tangent_basis, points, anywhere), n, d, k)
+      end
+      reply.sizes = Wire.to_wire(at_found(:local_size, points, [1.0]), n) if chunk.want_sizes
+      reply
+    end
+
+    def method_of(chunk)
+      case chunk.kind
+      when :QUERY_KIND_CLOSEST_POINT then :closest_point
+      when :QUERY_KIND_INTERSECT_FLAT then :intersect_flat
+      else raise "the server asks a question of kind #{chunk.kind}, unknown to this client"
+      end
+    end
+
+    def ask(chunk, x)
+      return @oracle.closest_point(x) if chunk.kind == :QUERY_KIND_CLOSEST_POINT
+
+      bases = Wire.numbers(chunk.bases, x.size, d, k).each_slice(k).each_slice(d).to_a
+      @oracle.intersect_flat(x, bases, Wire.numbers(chunk.radii, x.size))
+    end
+
+    # What the method says of the points that were found, and `anywhere` for the others, flat.
+    def at_found(method, points, anywhere)
+      on = points.compact
+      values = on.empty? ? [] : checked(method, @oracle.public_send(method, on), on.size, anywhere.size)
+      return values.flatten if on.size == points.size
+
+      points.flat_map { |point| point ? values.shift : anywhere }
+    end
+
+    # As n rows of so many finite numbers, or nil.
+    def checked(method, answer, n, width)
+      raise wrong(method, "an answer that is no array of #{n}", 'SHAPE') unless
+        answer.is_a?(Array) && answer.size == n
+
+      answer.map do |row|
+        next if row.nil? && %i[closest_point intersect_flat].include?(method)
+
+        numbers = [row].flatten
+        raise wrong(method, "#{row.inspect}, not #{width} numbers", 'SHAPE') unless
+          numbers.size == width && numbers.all?(Numeric)
+        raise wrong(method, row.inspect, 'NOT_FINITE') unless numbers.all?(&:finite?)
+
+        numbers
+      end
+    end
+
+    def wrong(method, what, reason)
+      OracleError.new("#{method} returned #{what}", reason: "ORACLE_#{reason}")
+    end
+  end
+end

@@ -1,0 +1,14 @@
+# frozen_string_literal: true
+
+Gem::Specification.new do |gem|
+  gem.name = 'stellate'
+  gem.version = '0.1.0'
+  gem.summary = 'Meshes of smooth manifolds of any dimension, known through oracles alone'
+  gem.authors = ['Stellate authors']
+  gem.license = 'Apache-2.0'
+  gem.required_ruby_version = '>= 3.1'
+  gem.files = Dir['lib/**/*.rb', 'README.md']
+  gem.add_dependency 'google-protobuf', '>= 3.21'
+  gem.add_dependency 'grpc', '>= 1.51'
+  gem.metadata['rubygems_mfa_required'] = 'true'
+end
