@@ -5,14 +5,15 @@
     mesh.save("manifold.vtu")
 
 `stellate.Oracle` says what an oracle is, and `stellate.check` whether yours is one.
-`stellate.ImplicitManifold` makes one from equations, and `stellate.manifolds` has a few ready.
+`stellate.ImplicitManifold` makes one from equations, `stellate.oracles` makes
+them of charts, distances, points and triangles, and `stellate.manifolds` has a few ready.
 """
 
 from . import _stubs
 
 _stubs.ensure()  # before anything imports them
 
-from . import manifolds  # noqa: E402
+from . import manifolds, oracles  # noqa: E402
 from ._api import download, mesh, serve, watch  # noqa: E402
 from ._chunks import Chunk, Puller  # noqa: E402
 from ._credentials import Credentials  # noqa: E402
@@ -90,6 +91,7 @@ __all__ = [
     "find_stellated",
     "load_txt",
     "manifolds",
+    "oracles",
     "mesh",
     "progress_bar",
     "pull",

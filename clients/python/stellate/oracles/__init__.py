@@ -1,0 +1,24 @@
+"""Oracles for manifolds that are given in other ways than by equations.
+
+Each is an object that `stellate.mesh` takes; `stellate.check` examines them like any other. Equations
+themselves are stellate.ImplicitManifold.
+"""
+
+from ._cloud import PointCloud
+from ._combined import LevelSet, Product, Transformed
+from ._distance import SignedDistance
+from ._linkage import Linkage
+from ._parametrized import Chart, Parametrized
+from ._triangles import TriangleMesh
+
+__all__ = [
+    "Chart",
+    "LevelSet",
+    "Linkage",
+    "Parametrized",
+    "PointCloud",
+    "Product",
+    "SignedDistance",
+    "Transformed",
+    "TriangleMesh",
+]

@@ -1,0 +1,74 @@
+"""What the ready oracles share: arrays, trees, and sums whose order no batch changes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InvalidArgument, NotConverged
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+
+def norms(rows: Array) -> Array:
+    """Lengths of the vectors along the last axis."""
+    return np.asarray(np.sqrt((rows * rows).sum(axis=-1)))
+
+
+def all_or_raise(points: Array, found: Flags) -> Array:
+    """Raises: NotConverged, with what was found."""
+    if not found.all():
+        raise NotConverged(points, found)
+    return points
+
+
+def transposed(matrices: Array) -> Array:
+    """(n, a, b) -> (n, b, a)."""
+    return matrices.transpose(0, 2, 1)
+
+
+def apply(matrices: Array, vectors: Array) -> Array:
+    """(n, a, b), (n, b) -> (n, a), each row on its own."""
+    return np.asarray((matrices @ vectors[..., None])[..., 0])
+
+
+def tree_of(points: Array) -> Any:
+    """A tree of points; needs scipy.
+
+    Raises: InvalidArgument, saying how to get it.
+    """
+    try:
+        from scipy.spatial import cKDTree
+    except ImportError:
+        raise InvalidArgument(
+            "this oracle searches with scipy's tree, and there is no scipy: "
+            "apt-get install python3-scipy, or pip install scipy"
+        ) from None
+    return cKDTree(points)
+
+
+def as_points(points: Any, what: str) -> Array:
+    """(n, d), finite, of at least one row.
+
+    Raises: InvalidArgument.
+    """
+    try:
+        array = np.array(points, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.ndim != 2 or not array.size:
+        raise InvalidArgument(f"{what} have to be an array (n, d), and are {np.shape(points)}")
+    bad = ~np.isfinite(array).all(axis=1)
+    if bad.any():
+        raise InvalidArgument(f"{what}: row {int(np.argmax(bad))} is not finite")
+    return array
+
+
+def box_around(points: Array, share: float) -> tuple[Array, Array]:
+    """The points' box, wider by a share of its diagonal at each side."""
+    lower, upper = points.min(axis=0), points.max(axis=0)
+    margin = share * float(norms(upper - lower))
+    return lower - margin, upper + margin

@@ -1,0 +1,386 @@
+"""Manifolds given by charts: M is the union of the images of maps X: U in R^k -> R^d."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, Callable
+
+import numpy as np
+
+from ..errors import InvalidArgument, OracleError
+from ._common import (
+    Array,
+    Flags,
+    all_or_raise,
+    apply,
+    as_points,
+    box_around,
+    norms,
+    transposed,
+    tree_of,
+)
+
+_SAMPLES = 20_000  # of all charts together, to begin from
+_NEAREST = 8  # of them looked at for each query
+_BASINS = 3  # at most so many of these begin a search
+_STEP = 1e-4  # of second differences, in shares of a chart's box: about the fourth root of rounding
+_FIRST_STEP = 6e-6  # of first differences: about its cube root
+_ITERATIONS = 100
+
+Map = Callable[[Array], Any]
+
+
+@dataclasses.dataclass
+class Chart:
+    """A smooth map of a box of R^k into R^d, an immersion on all of it.
+
+    Args:
+      x: (n, k) -> (n, d). Row i of its value depends on row i of the parameters alone.
+      derivative: (n, k) -> (n, d, k), or None: differences of x, some 2 k values a point.
+      lower, upper: (k,), the box.
+      periodic: whether a parameter comes back to where it was at the end of its interval, for all
+        parameters or for each.
+    """
+
+    x: Map
+    derivative: Map | None
+    lower: Any
+    upper: Any
+    periodic: bool | Sequence[bool] = False
+
+    def __post_init__(self) -> None:
+        self.lower = np.array(self.lower, dtype=np.float64).reshape(-1)
+        self.upper = np.array(self.upper, dtype=np.float64).reshape(-1)
+        if self.lower.shape != self.upper.shape or not (self.lower < self.upper).all():
+            raise InvalidArgument(
+                f"a chart needs corners lower < upper, and has {self.lower} and {self.upper}"
+            )
+        if not np.isfinite(self.upper - self.lower).all():
+            raise InvalidArgument(f"a chart's box has to be finite: {self.lower}, {self.upper}")
+        self.wraps = np.broadcast_to(np.array(self.periodic, dtype=bool), self.lower.shape)
+
+    @property
+    def extent(self) -> Array:
+        """The box's sides, (k,)."""
+        return np.asarray(self.upper - self.lower)
+
+    def points(self, u: Array) -> Array:
+        """X at the rows of u, checked."""
+        return _checked(self.x(u), "x", len(u), None)
+
+    def inside(self, u: Array) -> Array:
+        """The parameters, periodic ones wrapped, others held in the box."""
+        wrapped = self.lower + np.mod(u - self.lower, self.extent)
+        return np.where(self.wraps, wrapped, np.clip(u, self.lower, self.upper))
+
+    def jacobian(self, u: Array) -> Array:
+        """(n, d, k), as given or by central differences within the box."""
+        if self.derivative is not None:
+            return _checked(self.derivative(u), "derivative", len(u), len(self.lower))
+        columns = []
+        for a, side in enumerate(self.extent):
+            h = np.zeros_like(self.lower)
+            h[a] = _FIRST_STEP * side
+            ahead, behind = self._beside(u, h)
+            columns.append(
+                (self.points(ahead) - self.points(behind)) / (ahead - behind)[:, a : a + 1]
+            )
+        return np.stack(columns, axis=2)
+
+    def bend(self, u: Array, r: Array) -> Array:
+        """The second derivative of r . X at the rows of u, (n, k, k)."""
+        k = len(self.lower)
+        bend = np.empty((len(u), k, k))
+        steps = _STEP * np.diag(self.extent)
+        # About a place from which all differences stay in the box: no second difference is one-sided.
+        reach = np.where(self.wraps, 0.0, steps.sum(axis=0))
+        u = np.clip(u, self.lower + reach, self.upper - reach) if not self.wraps.all() else u
+        here = self.points(u)
+
+        def second(v: Array) -> Array:
+            across = self.points(u + v) - 2 * here + self.points(u - v)
+            return np.asarray((across * r).sum(axis=1))
+
+        for a in range(k):
+            bend[:, a, a] = second(steps[a]) / steps[a, a] ** 2
+        for a in range(k):
+            for b in range(a):
+                plus, minus = second(steps[a] + steps[b]), second(steps[a] - steps[b])
+                bend[:, a, b] = bend[:, b, a] = (plus - minus) / (4 * steps[a, a] * steps[b, b])
+        return bend
+
+    def _beside(self, u: Array, h: Array) -> tuple[Array, Array]:
+        ahead, behind = u + h, u - h
+        held = ~self.wraps
+        ahead = np.where(held, np.minimum(ahead, self.upper), ahead)
+        return ahead, np.where(held, np.maximum(behind, self.lower), behind)
+
+
+class Parametrized:
+    """An oracle for a closed manifold that is covered by charts.
+
+    Where a parameter is not periodic, the images of other charts have to go on beyond the end of
+    its interval, by some margin: a nearest point at the end of an interval is none. A sphere in
+    angles has no derivative of full rank at its poles and takes two charts.
+
+    Args:
+      x, derivative, lower, upper, periodic: of one chart, as in Chart; or
+      charts: of several.
+      thread_safe: the maps may be called by several threads at once.
+
+    A closest point is sought by Newton's method from the nearest of some 20,000 points of the
+    charts, which is the right one where M does not fold more finely than they lie; needs scipy.
+    """
+
+    def __init__(
+        self,
+        x: Map | None = None,
+        derivative: Map | None = None,
+        lower: Any = None,
+        upper: Any = None,
+        periodic: bool | Sequence[bool] = False,
+        *,
+        charts: Sequence[Chart] | None = None,
+        thread_safe: bool = False,
+    ) -> None:
+        if (x is None) == (charts is None):
+            raise InvalidArgument("Parametrized takes either a map with its box, or charts=[...]")
+        if charts is None:
+            assert x is not None
+            charts = [Chart(x, derivative, lower, upper, periodic)]
+        if not charts:
+            raise InvalidArgument("Parametrized needs one chart at least")
+        self._charts = list(charts)
+        self.dimension = len(self._charts[0].lower)
+        self.thread_safe = thread_safe
+        self._sample()
+        self.ambient_dimension = self._points.shape[1]
+        if not 1 <= self.dimension < self.ambient_dimension:
+            raise InvalidArgument(
+                f"charts of R^{self.dimension} into R^{self.ambient_dimension}: the first has to "
+                "be the smaller"
+            )
+        self._scale = float(norms(np.ptp(self._points, axis=0)))
+        self.bounding_box = box_around(self._points, 0.05)
+
+    def closest_point(self, points: Array) -> Array:
+        """(n, d) -> (n, d): the nearest points of M. Raises: NotConverged, with what was found."""
+        y, _, found = self._closest(np.asarray(points, dtype=np.float64))
+        return all_or_raise(y, found)
+
+    def tangent_basis(self, points: Array) -> Array:
+        """(n, d) -> (n, d, k), at points of M."""
+        _, bases, found = self._closest(np.asarray(points, dtype=np.float64))
+        bases[~found] = np.eye(self.ambient_dimension, self.dimension)
+        return bases
+
+    def intersect_flat(self, centers: Array, bases: Array, radii: Array) -> tuple[Array, Flags]:
+        """Where M meets the flats {c + v : basis^T v = 0}: (points (n, d), found (n,))."""
+        centers, bases = np.asarray(centers, dtype=float), np.asarray(bases, dtype=float)
+        y, found = centers.copy(), np.zeros(len(centers), dtype=bool)
+        for rows, chart, u in self._beginnings(centers):
+            there, met = _meet(chart, u, centers[rows], bases[rows], self._scale)
+            away = norms(there - centers[rows])
+            met &= away <= radii[rows]
+            better = met & (~found[rows] | (away < norms(y[rows] - centers[rows])))
+            y[rows[better]], found[rows[better]] = there[better], True
+        return y, found
+
+    def _sample(self) -> None:
+        """A grid of parameters on each chart, and where it lies in R^d."""
+        grids, points, owners = [], [], []
+        per_side = max(4, int((_SAMPLES / len(self._charts)) ** (1 / self.dimension)))
+        for number, chart in enumerate(self._charts):
+            if len(chart.lower) != self.dimension:
+                raise InvalidArgument(
+                    f"chart {number} has {len(chart.lower)} parameters, chart 0 {self.dimension}"
+                )
+            sides = [
+                np.linspace(low, high, per_side, endpoint=not wraps)
+                for low, high, wraps in zip(chart.lower, chart.upper, chart.wraps)
+            ]
+            u = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, self.dimension)
+            grids.append(u)
+            points.append(as_points(chart.points(u), f"the points of chart {number}"))
+            owners.append(np.full(len(u), number))
+        if len({p.shape[1] for p in points}) > 1:
+            raise InvalidArgument(f"charts lead to R^d of d = {[p.shape[1] for p in points]}")
+        self._grid, self._points = np.concatenate(grids), np.concatenate(points)
+        self._owner, self._cells = np.concatenate(owners), per_side
+        self._tree = tree_of(self._points)
+
+    def _beginnings(self, x: Array) -> list[tuple[Any, Chart, Array]]:
+        """(rows of x, their chart, parameters) to begin from: the nearest sample, and others near
+        that belong to another chart or lie more than three cells of the grid away."""
+        if not len(x):
+            return []
+        _, near = self._tree.query(x, k=min(_NEAREST, len(self._points)))
+        near = np.asarray(near).reshape(len(x), -1)
+        taken = [near[:, 0]]
+        for column in near.T[1:]:
+            new = np.ones(len(x), dtype=bool)
+            for earlier in taken:
+                new &= (earlier < 0) | self._apart(column, np.maximum(earlier, 0))
+            taken.append(np.where(new, column, -1))
+        order = np.stack(taken, axis=1)
+        rank = np.cumsum(order >= 0, axis=1)
+        begins = (order >= 0) & (rank <= _BASINS)
+        found = []
+        for number, chart in enumerate(self._charts):
+            rows, column = np.nonzero(begins & (self._owner[np.maximum(order, 0)] == number))
+            for turn in range(_BASINS):  # one row at a time in each, so that a row is there once
+                mine = rank[rows, column] == turn + 1
+                if mine.any():
+                    here = rows[mine]
+                    found.append((here, chart, self._grid[order[here, column[mine]]]))
+        return found
+
+    def _apart(self, a: Any, b: Any) -> Flags:
+        same = self._owner[a] == self._owner[b]
+        far = np.zeros(len(a), dtype=bool)
+        for number, chart in enumerate(self._charts):
+            mine = same & (self._owner[a] == number)
+            gap = np.abs(self._grid[a[mine]] - self._grid[b[mine]]) / chart.extent
+            gap = np.where(chart.wraps, np.minimum(gap, 1 - gap), gap)
+            far[mine] = gap.max(axis=1) > 3.5 / self._cells
+        return np.asarray(~same | far)
+
+    def _closest(self, x: Array) -> tuple[Array, Array, Flags]:
+        """The nearest points, tangent bases there, and where both were found."""
+        y, found = x.copy(), np.zeros(len(x), dtype=bool)
+        bases = np.zeros((len(x), self.ambient_dimension, self.dimension))
+        for rows, chart, u in self._beginnings(x):
+            there, basis, met = _descend(chart, u, x[rows], self._scale)
+            better = met & (~found[rows] | (norms(there - x[rows]) < norms(y[rows] - x[rows])))
+            y[rows[better]], bases[rows[better]] = there[better], basis[better]
+            found[rows[better]] = True
+        return y, bases, found
+
+
+def _descend(chart: Chart, u: Array, x: Array, scale: float) -> tuple[Array, Array, Flags]:
+    """Newton's method on the distance to x as a function on M, from parameters u.
+
+    In an orthonormal frame of the tangent space, so that it does not matter how fast a parameter
+    goes; steps are halved until they lead nearer. Where the distance bends the wrong way the step
+    goes downhill all the same.
+    """
+    u = chart.inside(u)
+    y, k = chart.points(u), u.shape[1]
+    bases = np.zeros((len(u), x.shape[1], k))
+    found = np.zeros(len(u), dtype=bool)
+    alive = np.ones(len(u), dtype=bool)
+    for _ in range(_ITERATIONS):
+        rows = np.flatnonzero(alive & ~found)
+        if not rows.size:
+            break
+        r = y[rows] - x[rows]
+        q, triangle = np.linalg.qr(chart.jacobian(u[rows]))
+        pivots = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
+        regular = pivots.min(axis=1) > 1e-9 * np.maximum(pivots.max(axis=1), 1e-300)
+        alive[rows[~regular]] = False
+        rows, r, q, triangle = rows[regular], r[regular], q[regular], triangle[regular]
+        bases[rows] = q
+        gradient = apply(transposed(q), r)
+        inverse = _inverse(triangle)
+        hessian = np.eye(k) + transposed(inverse) @ chart.bend(u[rows], r) @ inverse
+        bends, vectors = np.linalg.eigh((hessian + transposed(hessian)) / 2)
+        bends = np.maximum(np.abs(bends), 0.05)
+        v = -apply(vectors, apply(transposed(vectors), gradient) / bends)
+        length = norms(v)
+        v *= np.minimum(1.0, 0.1 * scale / np.maximum(length, 1e-300))[:, None]
+        step = apply(inverse, v)
+        done = length <= 1e-11 * scale
+        found[rows[done]] = True
+        moved = _halve_until_nearer(chart, u, y, x, rows[~done], step[~done], length[~done], scale)
+        alive[rows[~done][~moved]] = False
+    return y, bases, found
+
+
+def _inverse(triangles: Array) -> Array:
+    """Of upper triangular matrices (n, k, k), by substitution: one k x k system after the other in
+    LAPACK takes longer than all of them at once here."""
+    inverse = np.zeros_like(triangles)
+    for row in reversed(range(triangles.shape[1])):
+        inverse[:, row, row] = 1.0
+        for later in range(row + 1, triangles.shape[1]):
+            inverse[:, row] -= triangles[:, row, later, None] * inverse[:, later]
+        inverse[:, row] /= triangles[:, row, row, None]
+    return inverse
+
+
+def _halve_until_nearer(
+    chart: Chart, u: Array, y: Array, x: Array, rows: Any, step: Array, length: Array, scale: float
+) -> Flags:
+    """Moves u and y, in place, by the longest of step, step/2, ... that leads nearer; where."""
+    moved = np.zeros(len(rows), dtype=bool)
+    left = np.arange(len(rows))
+    fraction = 1.0
+    for _ in range(30):
+        if not left.size:
+            break
+        mine = rows[left]
+        there = chart.inside(u[mine] + fraction * step[left])
+        points = chart.points(there)
+        before, after = norms(y[mine] - x[mine]), norms(points - x[mine])
+        # So near the minimum distances cannot tell better from worse.
+        slack = np.where(length[left] <= 1e-5 * scale, 1e-12 * scale, 0.0)
+        better = (after < before) | ((slack > 0) & (after <= before + slack))
+        better &= (there != u[mine]).any(axis=1)
+        u[mine[better]], y[mine[better]] = there[better], points[better]
+        moved[left[better]] = True
+        left = left[~better]
+        fraction /= 2
+    return moved
+
+
+def _meet(chart: Chart, u: Array, c: Array, bases: Array, scale: float) -> tuple[Array, Flags]:
+    """Newton's method for basis^T (X(u) - c) = 0, with steps halved until that falls."""
+    u = chart.inside(u)
+    y = chart.points(u)
+    found, alive = np.zeros(len(u), dtype=bool), np.ones(len(u), dtype=bool)
+    for _ in range(_ITERATIONS):
+        rows = np.flatnonzero(alive & ~found)
+        if not rows.size:
+            break
+        across = transposed(bases[rows])
+        off = apply(across, y[rows] - c[rows])
+        found[rows[norms(off) <= 1e-13 * scale]] = True
+        system = across @ chart.jacobian(u[rows])
+        regular = np.abs(np.linalg.det(system)) > 0
+        alive[rows[~regular]] = False
+        rows, off, system = rows[regular], off[regular], system[regular]
+        if not rows.size:
+            break
+        step = -np.linalg.solve(system, off[..., None])[..., 0]
+        left, fraction = np.arange(len(rows)), 1.0
+        for _ in range(20):
+            mine = rows[left]
+            there = chart.inside(u[mine] + fraction * step[left])
+            points = chart.points(there)
+            size = norms(apply(transposed(bases[mine]), points - c[mine]))
+            better = size < norms(off[left])
+            u[mine[better]], y[mine[better]] = there[better], points[better]
+            left = left[~better]
+            fraction /= 2
+            if not left.size:
+                break
+        # What no step lowers is where rounding has the last word, or a local minimum.
+        stopped = rows[left]
+        found[stopped] = norms(off[left]) <= 1e-11 * scale
+        alive[stopped] = False
+    return y, found
+
+
+def _checked(values: Any, name: str, count: int, k: int | None) -> Array:
+    array = np.asarray(values)
+    ranks = 2 if k is None else 3
+    right = array.ndim == ranks and len(array) == count and array.dtype.kind in "fiu"
+    if not right or (k is not None and array.shape[2] != k):
+        wanted = f"({count}, d)" if k is None else f"({count}, d, {k})"
+        raise OracleError(
+            f"a chart's {name} returned an array of shape {array.shape} and type {array.dtype}; it "
+            f"has to be {wanted} real numbers, a row for each of the parameters",
+            "ORACLE_SHAPE",
+        )
+    return np.asarray(array, dtype=np.float64)

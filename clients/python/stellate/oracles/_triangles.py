@@ -1,0 +1,117 @@
+"""Surfaces given as meshes of triangles, to be meshed anew."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+
+from ..errors import InvalidArgument
+from ._cloud import PointCloud
+from ._common import Array, as_points, norms
+
+_MOST_POINTS = 5_000_000
+
+
+class TriangleMesh(PointCloud):
+    """An oracle for the smooth surface in R^3 near a closed mesh of triangles.
+
+    Args:
+      source: a file that meshio reads (.obj, .stl, .ply, .off, .vtu, ...), or the points (n, 3); or
+        anything with `points` and `simplices`, such as a stellate.Mesh.
+      triangles: (m, 3) numbers of points, where points are given.
+      spacing: triangles with longer edges are filled with points of this spacing; by default the
+        median of the edges' lengths.
+      bandwidth: how far creases are rounded; by default 3 spacings.
+
+    It is a PointCloud through the vertices, and through the middle of triangles that are large: nearer
+    to the surface that was triangulated than the triangles are, where it is smooth. `residual` tells
+    how far the points lie from it. Edges and corners that are meant are rounded. Needs scipy.
+    """
+
+    def __init__(
+        self,
+        source: Any,
+        triangles: Any = None,
+        *,
+        spacing: float | None = None,
+        bandwidth: float | None = None,
+    ) -> None:
+        points, triangles = _read(source, triangles)
+        points, triangles = _merged(as_points(points, "points"), np.asarray(triangles))
+        if points.shape[1] != 3:
+            raise InvalidArgument(f"triangles have to be in R^3, and are in R^{points.shape[1]}")
+        _insist_on_closed(triangles)
+        corners = points[triangles]
+        edges = norms(corners - np.roll(corners, 1, axis=1))
+        if spacing is None:
+            spacing = float(np.median(edges))
+        if not (np.isfinite(spacing) and spacing > 0):
+            raise InvalidArgument(f"spacing has to be positive, and is {spacing!r}")
+        samples = [points[np.unique(triangles)], *_filling(corners, edges.max(axis=1), spacing)]
+        # An edge's points are those of both of its triangles, up to rounding.
+        rounded = np.round(np.concatenate(samples) / (1e-6 * spacing))
+        _, first = np.unique(rounded, axis=0, return_index=True)
+        super().__init__(
+            np.concatenate(samples)[np.sort(first)],
+            2,
+            bandwidth=3 * spacing if bandwidth is None else bandwidth,
+        )
+
+
+def _filling(corners: Array, longest: Array, spacing: float) -> list[Array]:
+    """Points in triangles whose edges are longer, on a grid of about the spacing."""
+    pieces = np.ceil(longest / (1.5 * spacing)).astype(int)
+    if (0.5 * pieces.astype(float) ** 2).sum() > _MOST_POINTS:
+        raise InvalidArgument(
+            f"a spacing of {spacing:g} makes more than {_MOST_POINTS:,} points: a larger one?"
+        )
+    found = []
+    for count in np.unique(pieces[pieces > 1]):
+        i, j = np.meshgrid(np.arange(count + 1), np.arange(count + 1), indexing="ij")
+        shares = np.stack([count - i - j, i, j], axis=-1)[(i + j <= count)] / count
+        mine = corners[pieces == count]
+        found.append((shares[None, :, :, None] * mine[:, None, :, :]).sum(axis=2).reshape(-1, 3))
+    return found
+
+
+def _read(source: Any, triangles: Any) -> tuple[Any, Any]:
+    if triangles is not None:
+        return source, triangles
+    if hasattr(source, "points") and hasattr(source, "simplices"):
+        return source.points, source.simplices
+    if not isinstance(source, (str, os.PathLike)):
+        raise InvalidArgument("TriangleMesh takes a file, points with triangles, or a mesh")
+    import meshio
+
+    try:
+        mesh = meshio.read(source)
+    except (OSError, meshio.ReadError, SystemExit) as error:
+        raise InvalidArgument(f"{os.fspath(source)!r} cannot be read as a mesh: {error}") from None
+    if "triangle" not in mesh.cells_dict:
+        raise InvalidArgument(
+            f"{os.fspath(source)!r} has no triangles, but {sorted(mesh.cells_dict) or 'nothing'}"
+        )
+    return mesh.points, mesh.cells_dict["triangle"]
+
+
+def _merged(points: Array, triangles: Any) -> tuple[Array, Any]:
+    """Equal points made one, as .stl files have a point for each corner of each triangle."""
+    if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
+        raise InvalidArgument(f"triangles have to be whole numbers (m, 3): {triangles.shape}")
+    if not triangles.size or triangles.min() < 0 or triangles.max() >= len(points):
+        raise InvalidArgument(f"triangles have to name points from 0 to {len(points) - 1}")
+    unique, names = np.unique(points, axis=0, return_inverse=True)
+    return unique, names.reshape(-1)[triangles]
+
+
+def _insist_on_closed(triangles: Any) -> None:
+    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, counts = np.unique(edges, axis=0, return_counts=True)
+    if (counts == 2).all():
+        return
+    raise InvalidArgument(
+        f"the surface is not closed: {np.count_nonzero(counts == 1)} edges have one triangle, "
+        f"{np.count_nonzero(counts > 2)} more than two"
+    )

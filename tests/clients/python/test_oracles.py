@@ -1,0 +1,292 @@
+"""The ready oracles, held to what the catalogue's closed forms say, and to the contract of all."""
+
+import meshio
+import numpy as np
+import pytest
+import stellate
+from stellate import oracles
+
+TORUS = stellate.manifolds.Torus(1.0, 0.4)
+TURN = 2 * np.pi
+
+
+def torus_map(u):
+    ring = 1 + 0.4 * np.cos(u[:, 1])
+    return np.stack([ring * np.cos(u[:, 0]), ring * np.sin(u[:, 0]), 0.4 * np.sin(u[:, 1])], axis=1)
+
+
+def torus_derivative(u):
+    (a, b), zero = u.T, np.zeros(len(u))
+    ring = 1 + 0.4 * np.cos(b)
+    along = np.stack([-ring * np.sin(a), ring * np.cos(a), zero], axis=1)
+    round_ = 0.4 * np.stack([-np.sin(b) * np.cos(a), -np.sin(b) * np.sin(a), np.cos(b)], axis=1)
+    return np.stack([along, round_], axis=2)
+
+
+def half_sphere(sign):
+    """The inverse of a stereographic projection."""
+
+    def chart(u):
+        s = (u * u).sum(axis=1)
+        return np.concatenate([2 * u, (sign * (1 - s))[:, None]], axis=1) / (1 + s)[:, None]
+
+    return oracles.Chart(chart, None, [-1.3, -1.3], [1.3, 1.3])
+
+
+def torus_grid(count=40):
+    grid = np.stack(np.meshgrid(*[np.linspace(-1.5, 1.5, count)] * 3, indexing="ij"), axis=-1)
+    return np.hypot(np.hypot(grid[..., 0], grid[..., 1]) - 1, grid[..., 2]) - 0.4
+
+
+def torus_triangles(n=120, m=60):
+    a, b = np.meshgrid(np.arange(n), np.arange(m), indexing="ij")
+    u = np.stack([TURN * a / n, TURN * b / m], axis=-1).reshape(-1, 2)
+
+    def number(i, j):
+        return (i % n) * m + j % m
+
+    first = np.stack([number(a, b), number(a + 1, b), number(a + 1, b + 1)], axis=-1)
+    second = np.stack([number(a, b), number(a + 1, b + 1), number(a, b + 1)], axis=-1)
+    return torus_map(u), np.concatenate([first.reshape(-1, 3), second.reshape(-1, 3)])
+
+
+def torus_cloud(noise=0.0):
+    a, b = np.meshgrid(np.arange(100) / 100, np.arange(40) / 40, indexing="ij")
+    u = TURN * np.stack([a + 0.37 * b, b], axis=-1).reshape(-1, 2)  # no rows along the axes
+    points = torus_map(u)
+    return points + noise * np.random.default_rng(3).normal(size=points.shape)
+
+
+def turned_torus():
+    turn, _ = np.linalg.qr(np.random.default_rng(2).normal(size=(5, 3)))
+    return oracles.Transformed(TORUS, rotation=turn, scale=2, translation=np.arange(5.0))
+
+
+FOUR_BARS = [("a", "p", 1.0), ("p", "q", 1.3), ("q", "b", 1.1), ("q", "r", 0.5)]
+GROUND = {"a": (0, 0), "b": (1.5, 0)}
+
+# By name: how to make it, how far queries are from M, how exactly closest points are normal to it.
+ALL = {
+    "parametrized": (
+        lambda: oracles.Parametrized(torus_map, torus_derivative, [0, 0], [TURN] * 2, True),
+        0.2,
+        1e-9,
+    ),
+    "parametrized_differences": (
+        lambda: oracles.Parametrized(torus_map, None, [0, 0], [TURN, TURN], True),
+        0.2,
+        1e-8,
+    ),
+    "charts": (lambda: oracles.Parametrized(charts=[half_sphere(1), half_sphere(-1)]), 0.5, 1e-8),
+    "product": (lambda: oracles.Product(TORUS, stellate.manifolds.Sphere(1)), 0.2, 1e-12),
+    "transformed": (turned_torus, 0.4, 1e-12),
+    "level_set": (
+        lambda: oracles.LevelSet(TORUS, lambda x: x[:, 0] - 0.3 * x[:, 2] - 0.1),
+        0.1,
+        1e-8,
+    ),
+    "signed_distance": (
+        lambda: oracles.SignedDistance.of_grid(torus_grid(), ([-1.5] * 3, [1.5] * 3)),
+        0.2,
+        1e-7,
+    ),
+    "linkage": (lambda: oracles.Linkage(FOUR_BARS, GROUND), 0.05, 1e-8),
+    "point_cloud": (lambda: oracles.PointCloud(torus_cloud(), 2), 0.1, 1e-9),
+    "triangles": (lambda: oracles.TriangleMesh(*torus_triangles()), 0.1, 1e-9),
+}
+
+
+@pytest.fixture(scope="module", params=ALL)
+def case(request):
+    make, away, slack = ALL[request.param]
+    oracle = make()
+    return oracle, near(oracle, away), slack
+
+
+def closest(oracle, x):
+    try:
+        return oracle.closest_point(x), np.ones(len(x), dtype=bool)
+    except stellate.NotConverged as error:
+        return error.points, error.converged
+
+
+def near(oracle, away, count=60):
+    """Points about so far from M."""
+    rng = np.random.default_rng(1)
+    box = getattr(oracle, "bounding_box", None)
+    x = rng.uniform(*box, size=(4 * count, oracle.ambient_dimension))
+    y, found = closest(oracle, x)
+    y = y[found][:count]
+    assert len(y) == count
+    offset = rng.normal(size=y.shape)
+    return y + away * offset / np.linalg.norm(offset, axis=1)[:, None]
+
+
+def test_the_way_to_the_closest_point_is_normal(case):
+    oracle, x, slack = case
+    y, found = closest(oracle, x)
+    assert found.mean() > 0.95
+    bases = oracle.tangent_basis(y[found])
+    k = oracle.dimension
+    assert np.abs(bases.transpose(0, 2, 1) @ bases - np.eye(k)).max() < 1e-9
+    along = (bases * (x - y)[found][:, :, None]).sum(axis=1)
+    assert np.abs(along).max() <= slack * np.linalg.norm(x - y, axis=1).max()
+
+
+def test_points_of_the_manifold_stay(case):
+    oracle, x, _ = case
+    y, found = closest(oracle, x)
+    again, still = closest(oracle, y[found])
+    assert still.all()
+    assert np.abs(again - y[found]).max() < 1e-8
+
+
+def test_answers_do_not_depend_on_the_batch(case):
+    oracle, x, _ = case
+    together, found = closest(oracle, x)
+    bases = oracle.tangent_basis(together[found])
+    for rows in [[0], [1], *np.array_split(np.arange(len(x)), 7)]:
+        apart, here = closest(oracle, x[rows])
+        assert (here == found[rows]).all()
+        assert apart[here].tobytes() == together[rows][here].tobytes()
+    parts = np.array_split(together[found], 7)
+    assert np.concatenate([oracle.tangent_basis(p) for p in parts]).tobytes() == bases.tobytes()
+
+
+@pytest.mark.parametrize(
+    "name, error",
+    [
+        ("parametrized", 1e-12),
+        ("parametrized_differences", 1e-12),
+        ("signed_distance", 0.004),
+        ("point_cloud", 0.002),
+        ("triangles", 0.0015),
+    ],
+)
+def test_a_torus_is_the_torus(name, error):
+    oracle = ALL[name][0]()
+    x = near(TORUS, 0.1)
+    y, found = closest(oracle, x)
+    assert found.all()
+    assert np.linalg.norm(y - TORUS.closest_point(y), axis=1).max() < error
+    assert np.linalg.norm(y - TORUS.closest_point(x), axis=1).max() < 6 * error + 1e-7
+
+
+def test_flats_meet_a_parametrized_torus():
+    oracle = ALL["parametrized"][0]()
+    x = near(TORUS, 0.05)
+    bases = TORUS.tangent_basis(TORUS.closest_point(x))
+    y, found = oracle.intersect_flat(x, bases, np.full(len(x), 0.2))
+    assert found.all()
+    assert np.abs((bases * (y - x)[:, :, None]).sum(axis=1)).max() < 1e-11
+    assert np.abs(TORUS.closest_point(y) - y).max() < 1e-12
+    away = np.linalg.norm(y - x, axis=1)
+    _, found = oracle.intersect_flat(x, bases, np.full(len(x), 0.02))
+    assert (found == (away <= 0.02)).all()
+    assert 0 < found.mean() < 1
+
+
+def test_a_turned_torus_meets_turned_flats():
+    turn, _ = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))
+    circles = stellate.manifolds.SpecialOrthogonal3()
+    assert hasattr(oracles.Transformed(circles, scale=3), "intersect_flat") == hasattr(
+        circles, "intersect_flat"
+    )
+    base = ALL["parametrized"][0]()
+    oracle = oracles.Transformed(base, rotation=turn, scale=2, translation=[1, 2, 3])
+    x = near(oracle, 0.1)
+    bases = oracle.tangent_basis(oracle.closest_point(x))
+    y, found = oracle.intersect_flat(x, bases, np.full(len(x), 0.4))
+    assert found.all()
+    assert np.abs((bases * (y - x)[:, :, None]).sum(axis=1)).max() < 1e-10
+
+
+def test_noise_is_smoothed_and_told():
+    cloud = oracles.PointCloud(torus_cloud(noise=0.01), 2, bandwidth=0.3)
+    assert 0.008 < cloud.residual < 0.03
+    y = cloud.closest_point(near(TORUS, 0.05))
+    off = np.linalg.norm(y - TORUS.closest_point(y), axis=1)
+    assert np.median(off) < 0.005 and off.max() < 0.02
+
+
+def test_a_linkage_knows_its_joints():
+    linkage = oracles.Linkage(FOUR_BARS, GROUND)
+    assert linkage.moving == ["p", "q", "r"]
+    assert (linkage.dimension, linkage.ambient_dimension) == (2, 6)
+    at = linkage.joints(linkage.closest_point(near(linkage, 0.05)))
+    for a, b, length in FOUR_BARS:
+        assert np.abs(np.linalg.norm(at[a] - at[b], axis=1) - length).max() < 1e-10
+
+
+@pytest.mark.parametrize("suffix", ["stl", "obj", "ply"])
+def test_triangles_are_read_from_files(tmp_path, suffix):
+    points, triangles = torus_triangles(40, 20)
+    meshio.write_points_cells(tmp_path / f"a.{suffix}", points, [("triangle", triangles)])
+    oracle = oracles.TriangleMesh(tmp_path / f"a.{suffix}")
+    y = oracle.closest_point(near(TORUS, 0.05))
+    assert np.linalg.norm(y - TORUS.closest_point(y), axis=1).max() < 0.02
+
+
+def test_large_triangles_are_filled():
+    corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])
+    faces = np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]])
+    tetrahedron = oracles.TriangleMesh(corners, faces, spacing=0.1)
+    middle = corners[[0, 1, 2]].mean(axis=0)
+    assert np.abs(tetrahedron.closest_point(1.1 * middle[None, :]) - middle).max() < 1e-9
+    with pytest.raises(stellate.InvalidArgument, match="a larger one"):
+        oracles.TriangleMesh(corners, faces, spacing=1e-4)
+
+
+POINTS, TRIANGLES = torus_triangles(12, 8)
+WRONG = {
+    "closed": lambda: oracles.TriangleMesh(POINTS, TRIANGLES[1:]),
+    "triangles have to name points": lambda: oracles.TriangleMesh(POINTS, TRIANGLES + 1),
+    "cannot be read": lambda: oracles.TriangleMesh("no such file.obj"),
+    "takes a file": lambda: oracles.TriangleMesh(7),
+    "not finite": lambda: oracles.PointCloud([[0.0, np.nan]] * 30, 1),
+    "too few": lambda: oracles.PointCloud(np.eye(3), 1),
+    "whole number from 1 to 2": lambda: oracles.PointCloud(torus_cloud(), 3),
+    "has to be positive": lambda: oracles.PointCloud(torus_cloud(), 2, bandwidth=-1),
+    "larger bandwidth": lambda: oracles.PointCloud(torus_cloud(), 2, bandwidth=1e-6),
+    "either a map": lambda: oracles.Parametrized(),
+    "lower < upper": lambda: oracles.Chart(torus_map, None, [1, 1], [0, 2]),
+    "the first has to": lambda: oracles.Parametrized(lambda u: u, None, [0, 0], [1, 1]),
+    "two factors": lambda: oracles.Product(TORUS),
+    "orthonormal": lambda: oracles.Transformed(TORUS, rotation=2 * np.eye(3)),
+    "shape": lambda: oracles.Transformed(TORUS, rotation=np.eye(2)),
+    "scale": lambda: oracles.Transformed(TORUS, scale=0),
+    "needs its tangent_basis": lambda: oracles.LevelSet(_Bare(), lambda x: x[:, 0]),
+    "leave none": lambda: oracles.LevelSet(TORUS, lambda x: x[:, :2]),
+    "no set of level": lambda: oracles.SignedDistance.of_grid(
+        torus_grid(8) + 9, ([-1.5] * 3, [1.5] * 3)
+    ),
+    "4 values an axis": lambda: oracles.SignedDistance.of_grid(
+        np.zeros((3, 9)), ([0] * 2, [1] * 2)
+    ),
+    "a box of R": lambda: oracles.SignedDistance.of_grid(torus_grid(8), ([0] * 2, [1] * 2)),
+    "pair of corners": lambda: oracles.SignedDistance(lambda x: x[:, 0], bounding_box=3),
+    "leave nothing to move": lambda: oracles.Linkage([("a", "p", 1), ("p", "b", 1)], GROUND),
+    "no chain": lambda: oracles.Linkage([("p", "q", 1)], GROUND),
+    "two joints that are fixed": lambda: oracles.Linkage([("a", "b", 1)], GROUND),
+    "too short": lambda: oracles.Linkage(
+        [("a", "p", 0.1), ("p", "b", 0.1), ("p", "q", 1), ("q", "s", 1)], GROUND
+    ),
+    "length > 0": lambda: oracles.Linkage([("a", "p", 0)], GROUND),
+}
+
+
+class _Bare:
+    dimension, ambient_dimension = 2, 3
+    bounding_box = TORUS.bounding_box
+    closest_point = staticmethod(TORUS.closest_point)
+
+
+@pytest.mark.parametrize("words", WRONG)
+def test_what_is_wrong_is_said(words):
+    with pytest.raises(stellate.InvalidArgument, match=words):
+        WRONG[words]()
+
+
+def test_a_chart_of_the_wrong_shape_is_an_oracle_error():
+    with pytest.raises(stellate.OracleError, match="a chart's x returned"):
+        oracles.Parametrized(lambda u: torus_map(u)[:-1], None, [0, 0], [TURN, TURN], True)
