@@ -18,7 +18,8 @@ Expected<std::unique_ptr<Mesher>> Mesher::Create(Specification spec) {
     case 5:
       return std::make_unique<Refinement<5>>(std::move(spec));
   }
-  return Refuse(StatusCode::kLimitExceeded, "this build has no template for this dimension");
+  return Refuse(StatusCode::kLimitExceeded, "this build has no template for this dimension",
+                "dimension");
 }
 
 }  // namespace stellate::core

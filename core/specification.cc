@@ -6,14 +6,18 @@
 #include <numbers>
 #include <string>
 
-#include "core/message.h"
+#include "core/base/message.h"
 
 namespace stellate::core {
 namespace {
 
-Status Invalid(std::string message) { return {StatusCode::kInvalidArgument, std::move(message)}; }
+Status Invalid(std::string field, std::string message) {
+  return {StatusCode::kInvalidArgument, std::move(message), std::move(field)};
+}
 
-Status TooLarge(std::string message) { return {StatusCode::kLimitExceeded, std::move(message)}; }
+Status TooLarge(std::string field, std::string message) {
+  return {StatusCode::kLimitExceeded, std::move(message), std::move(field)};
+}
 
 // False for NaN too.
 bool IsLength(double value) { return value >= kMinLength && value <= kMaxLength; }
@@ -25,21 +29,24 @@ Status CheckDimensions(const Specification& spec) {
   const int k = spec.dimension;
   const int d = spec.ambient_dimension;
   if (k < 1) {
-    return Invalid(Message("dimension (k) is ", k,
+    return Invalid("dimension",
+                   Message("dimension (k) is ", k,
                            " but must be at least 1: set it to the dimension of the manifold"));
   }
   if (k > kMaxDimension) {
-    return TooLarge(Message("dimension (k) is ", k, " but this build meshes manifolds of ",
-                            "dimension up to ", kMaxDimension,
-                            ": mesh a manifold of lower dimension"));
+    return TooLarge("dimension", Message("dimension (k) is ", k,
+                                         " but this build meshes manifolds of ", "dimension up to ",
+                                         kMaxDimension, ": mesh a manifold of lower dimension"));
   }
   if (d > kMaxAmbientDimension) {
-    return TooLarge(Message("ambient_dimension (d) is ", d, " but may be at most ",
-                            kMaxAmbientDimension,
-                            ": map the manifold into a space of lower dimension first"));
+    return TooLarge(
+        "ambient_dimension",
+        Message("ambient_dimension (d) is ", d, " but may be at most ", kMaxAmbientDimension,
+                ": map the manifold into a space of lower dimension first"));
   }
   if (k >= d) {
-    return Invalid(Message("dimension (k) is ", k, " and ambient_dimension (d) is ", d,
+    return Invalid("dimension",
+                   Message("dimension (k) is ", k, " and ambient_dimension (d) is ", d,
                            " but k must be less than d: a closed manifold of dimension k needs "
                            "at least k + 1 coordinates"));
   }
@@ -48,7 +55,8 @@ Status CheckDimensions(const Specification& spec) {
 
 Status CheckEpsilon(double epsilon) {
   if (IsLength(epsilon)) return Status::Ok();
-  return Invalid(Message("epsilon is ", epsilon, " but must be ", LengthRule(),
+  return Invalid("epsilon",
+                 Message("epsilon is ", epsilon, " but must be ", LengthRule(),
                          ": give the largest circumradius that a simplex may have, in the unit of "
                          "the coordinates"));
 }
@@ -57,20 +65,22 @@ Status CheckBox(const BoundingBox& box, int d) {
   for (const auto* side : {&box.lower, &box.upper}) {
     const char* name = side == &box.lower ? "bounding_box.lower" : "bounding_box.upper";
     if (side->size() != d) {
-      return Invalid(Message(name, " has ", side->size(), " coordinates but ambient_dimension is ",
-                             d, ": give one coordinate for each ambient axis"));
+      return Invalid(
+          name, Message(name, " has ", side->size(), " coordinates but ambient_dimension is ", d,
+                        ": give one coordinate for each ambient axis"));
     }
     for (int i = 0; i < d; ++i) {
       if (!IsCoordinate((*side)[i])) {
-        return Invalid(Message(name, " is ", (*side)[i], " in coordinate ", i,
-                               " but must be finite and at most ", kMaxLength,
-                               " in size: give a box that encloses the manifold"));
+        return Invalid(name, Message(name, " is ", (*side)[i], " in coordinate ", i,
+                                     " but must be finite and at most ", kMaxLength,
+                                     " in size: give a box that encloses the manifold"));
       }
     }
   }
   for (int i = 0; i < d; ++i) {
     if (!(box.lower[i] < box.upper[i])) {
-      return Invalid(Message("bounding_box is empty in coordinate ", i, ": lower is ", box.lower[i],
+      return Invalid("bounding_box",
+                     Message("bounding_box is empty in coordinate ", i, ": lower is ", box.lower[i],
                              " and upper is ", box.upper[i],
                              " but lower must be less than upper; swap or widen them"));
     }
@@ -82,36 +92,40 @@ Status CheckSeeds(const Specification& spec) {
   const Eigen::MatrixXd& seeds = spec.seeds;
   if (seeds.cols() == 0 && !spec.bounding_box) {
     return Invalid(
+        "bounding_box",
         "neither seeds nor bounding_box is given: give points near the manifold, or a box that "
         "encloses it");
   }
   if (seeds.cols() > 0 && seeds.rows() != spec.ambient_dimension) {
-    return Invalid(Message("seeds have ", seeds.rows(), " coordinates each but ambient_dimension ",
+    return Invalid("seeds",
+                   Message("seeds have ", seeds.rows(), " coordinates each but ambient_dimension ",
                            "is ", spec.ambient_dimension, ": give points of the ambient space"));
   }
   for (Eigen::Index j = 0; j < seeds.cols(); ++j) {
     for (Eigen::Index i = 0; i < seeds.rows(); ++i) {
       if (!IsCoordinate(seeds(i, j))) {
-        return Invalid(Message("seeds is ", seeds(i, j), " in coordinate ", i, " of seed ", j,
-                               " but must be finite and at most ", kMaxLength,
-                               " in size: remove or correct that seed"));
+        return Invalid("seeds", Message("seeds is ", seeds(i, j), " in coordinate ", i, " of seed ",
+                                        j, " but must be finite and at most ", kMaxLength,
+                                        " in size: remove or correct that seed"));
       }
     }
   }
   if (spec.components < 0 || spec.components > kMaxComponents) {
-    return Invalid(Message("components is ", spec.components, " but must be between 0 and ",
-                           kMaxComponents,
-                           ": say how many the manifold has at least, or 0 if that is not known"));
+    return Invalid(
+        "components",
+        Message("components is ", spec.components, " but must be between 0 and ", kMaxComponents,
+                ": say how many the manifold has at least, or 0 if that is not known"));
   }
   if (spec.box_seeds < 0 || spec.box_seeds > kMaxBoxSeeds) {
-    return Invalid(Message("box_seeds is ", spec.box_seeds, " but must be between 0 and ",
+    return Invalid("box_seeds",
+                   Message("box_seeds is ", spec.box_seeds, " but must be between 0 and ",
                            kMaxBoxSeeds, "; 0 asks for the default"));
   }
   if (std::int64_t{spec.box_seeds} * spec.ambient_dimension > kMaxBoxSeedCoordinates) {
-    return {StatusCode::kLimitExceeded,
-            Message("box_seeds is ", spec.box_seeds, " but in R^", spec.ambient_dimension,
-                    " may be at most ", kMaxBoxSeedCoordinates / spec.ambient_dimension,
-                    ": a few hundred find all but the smallest components")};
+    return TooLarge("box_seeds",
+                    Message("box_seeds is ", spec.box_seeds, " but in R^", spec.ambient_dimension,
+                            " may be at most ", kMaxBoxSeedCoordinates / spec.ambient_dimension,
+                            ": a few hundred find all but the smallest components"));
   }
   return Status::Ok();
 }
@@ -133,12 +147,14 @@ Eigen::VectorXd CoverCounts(const Specification& spec) {
 
 Status CheckReach(const Specification& spec) {
   if (spec.declared_reach && !IsLength(*spec.declared_reach)) {
-    return Invalid(Message("declared_reach is ", *spec.declared_reach, " but must be ",
+    return Invalid("declared_reach",
+                   Message("declared_reach is ", *spec.declared_reach, " but must be ",
                            LengthRule(), ": a lower bound of the manifold's reach"));
   }
   if (!spec.cover_box) return Status::Ok();
   if (!spec.declared_reach || !spec.bounding_box || spec.seeds.cols() > 0) {
     return Invalid(
+        "cover_box",
         "cover_box is set: give declared_reach and bounding_box, by which the seeds are laid, and "
         "no seeds");
   }
@@ -146,7 +162,8 @@ Status CheckReach(const Specification& spec) {
   const double most = std::min<double>(
       kMaxBoxSeeds, static_cast<double>(kMaxBoxSeedCoordinates / spec.ambient_dimension));
   if (!(count <= most)) {
-    return TooLarge(Message("cover_box has to lay ", Brief(count), " seeds into this box for ",
+    return TooLarge("cover_box",
+                    Message("cover_box has to lay ", Brief(count), " seeds into this box for ",
                             "declared_reach = ", *spec.declared_reach, ", but at most ", most,
                             " may be: give a smaller box, or seeds on each component instead"));
   }
@@ -155,42 +172,49 @@ Status CheckReach(const Specification& spec) {
 
 Status CheckCriteria(const Criteria& c) {
   if (!(c.radius_edge_bound > 1 && c.radius_edge_bound <= kMaxLength)) {
-    return Invalid(Message("criteria.radius_edge_bound (rho0) is ", c.radius_edge_bound,
+    return Invalid("criteria.radius_edge_bound",
+                   Message("criteria.radius_edge_bound (rho0) is ", c.radius_edge_bound,
                            " but must be finite and greater than 1: 2 is the default"));
   }
   if (c.sliver_bound && !(*c.sliver_bound >= 0 && *c.sliver_bound <= kMaxSliverBound)) {
-    return Invalid(Message("criteria.sliver_bound (Theta0) is ", *c.sliver_bound,
+    return Invalid("criteria.sliver_bound",
+                   Message("criteria.sliver_bound (Theta0) is ", *c.sliver_bound,
                            " but must be between 0 and ", kMaxSliverBound,
                            ": refinement never ends above; 0 turns the rule off"));
   }
   if (!(c.picking_radius > 0 && c.picking_radius < 1)) {
-    return Invalid(Message("criteria.picking_radius (delta) is ", c.picking_radius,
+    return Invalid("criteria.picking_radius",
+                   Message("criteria.picking_radius (delta) is ", c.picking_radius,
                            " but must lie strictly between 0 and 1: 0.4 is the default"));
   }
   if (!(c.small_sliver_radius >= 1 && c.small_sliver_radius <= kMaxLength)) {
-    return Invalid(Message("criteria.small_sliver_radius (beta) is ", c.small_sliver_radius,
+    return Invalid("criteria.small_sliver_radius",
+                   Message("criteria.small_sliver_radius (beta) is ", c.small_sliver_radius,
                            " but must be finite and at least 1: 2 is the default"));
   }
   if (c.candidates && (*c.candidates < 1 || *c.candidates > kMaxCandidates)) {
-    return Invalid(Message("criteria.candidates is ", *c.candidates, " but must be between 1 and ",
+    return Invalid("criteria.candidates",
+                   Message("criteria.candidates is ", *c.candidates, " but must be between 1 and ",
                            kMaxCandidates, ": leave it unset for the default of this dimension"));
   }
   if (c.advance_step && !IsLength(*c.advance_step)) {
-    return Invalid(Message("criteria.advance_step (h) is ", *c.advance_step, " but must be ",
+    return Invalid("criteria.advance_step",
+                   Message("criteria.advance_step (h) is ", *c.advance_step, " but must be ",
                            LengthRule(), ": leave it unset for the default"));
   }
   if (c.size_rate && !(*c.size_rate > 0 && *c.size_rate <= 1)) {
-    return Invalid(Message("criteria.size_rate is ", *c.size_rate,
-                           " but must be in (0, 1]: 0.3 is a good mesh"));
+    return Invalid("criteria.size_rate", Message("criteria.size_rate is ", *c.size_rate,
+                                                 " but must be in (0, 1]: 0.3 is a good mesh"));
   }
   if (c.max_deviation && !(*c.max_deviation >= kMinLength && *c.max_deviation <= kMaxLength)) {
-    return Invalid(
-        Message("criteria.max_deviation is ", *c.max_deviation, " but must be a positive length"));
+    return Invalid("criteria.max_deviation", Message("criteria.max_deviation is ", *c.max_deviation,
+                                                     " but must be a positive length"));
   }
   if (c.flat_alternations < 1 || c.flat_alternations > kMaxFlatAlternations) {
-    return Invalid(Message("criteria.flat_alternations is ", c.flat_alternations,
-                           " but must be between 1 and ", kMaxFlatAlternations,
-                           ": 1 is the default"));
+    return Invalid(
+        "criteria.flat_alternations",
+        Message("criteria.flat_alternations is ", c.flat_alternations,
+                " but must be between 1 and ", kMaxFlatAlternations, ": 1 is the default"));
   }
   return Status::Ok();
 }
@@ -199,20 +223,23 @@ Status CheckLimits(const Specification& spec) {
   const Limits& limits = spec.limits;
   if (limits.max_vertices < 1) {
     return Invalid(
+        "limits.max_vertices",
         "limits.max_vertices is 0 but must be at least 1: give the largest mesh that you want");
   }
   if (limits.max_vertices > std::numeric_limits<std::uint32_t>::max()) {
-    return TooLarge(Message("limits.max_vertices is ", limits.max_vertices, " but may be at most ",
-                            std::numeric_limits<std::uint32_t>::max(),
-                            ": vertex ids have 32 bits"));
+    return TooLarge(
+        "limits.max_vertices",
+        Message("limits.max_vertices is ", limits.max_vertices, " but may be at most ",
+                std::numeric_limits<std::uint32_t>::max(), ": vertex ids have 32 bits"));
   }
   if (limits.max_rounds < 1) {
     return Invalid(
+        "limits.max_rounds",
         "limits.max_rounds is 0 but must be at least 1: a round is one batch of queries");
   }
   if (spec.threads < 0) {
-    return Invalid(
-        Message("threads is ", spec.threads, " but must not be negative: 0 takes all cores"));
+    return Invalid("threads", Message("threads is ", spec.threads,
+                                      " but must not be negative: 0 takes all cores"));
   }
   return Status::Ok();
 }

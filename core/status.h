@@ -29,6 +29,7 @@ enum class StatusCode {
 struct Status {
   StatusCode code = StatusCode::kOk;
   std::string message;
+  std::string field{};  // of a Specification, "criteria.candidates": the one at fault, or empty
 
   bool ok() const { return code == StatusCode::kOk; }
   static Status Ok() { return {}; }
@@ -40,8 +41,8 @@ const char* StatusCodeName(StatusCode code);
 template <typename T>
 using Expected = tl::expected<T, Status>;
 
-inline tl::unexpected<Status> Refuse(StatusCode code, std::string message) {
-  return tl::unexpected<Status>(Status{code, std::move(message)});
+inline tl::unexpected<Status> Refuse(StatusCode code, std::string message, std::string field = "") {
+  return tl::unexpected<Status>(Status{code, std::move(message), std::move(field)});
 }
 
 }  // namespace stellate::core

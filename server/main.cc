@@ -11,7 +11,7 @@
 #include <system_error>
 #include <utility>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/base/library_log.h"
 #include "server/base/log.h"
 #include "server/base/threads.h"

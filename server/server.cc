@@ -16,7 +16,7 @@
 #include <mutex>
 #include <thread>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/convert/error_map.h"
 #include "server/grpc_parts/header_bound.h"
 #include "server/net/connection_guard.h"

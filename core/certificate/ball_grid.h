@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/sample/vector_ops.h"
+#include "core/base/vector_ops.h"
 
 namespace stellate::core {
 

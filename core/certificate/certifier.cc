@@ -10,6 +10,9 @@
 #include <string>
 #include <utility>
 
+#include "core/base/message.h"
+#include "core/base/parallel.h"
+#include "core/base/random.h"
 #include "core/certificate/declared_reach.h"
 #include "core/certificate/evidence.h"
 #include "core/certificate/fibres.h"
@@ -22,9 +25,6 @@
 #include "core/certificate/tangent_check.h"
 #include "core/certificate/topology.h"
 #include "core/geometry/simplex.h"
-#include "core/message.h"
-#include "core/parallel.h"
-#include "core/sample/random.h"
 
 namespace stellate::core {
 namespace {

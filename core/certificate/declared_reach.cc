@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/message.h"
+#include "core/base/message.h"
 
 namespace stellate::core {
 namespace {

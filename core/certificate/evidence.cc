@@ -4,9 +4,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/base/parallel.h"
+#include "core/base/vector_ops.h"
 #include "core/certificate/vertex_grid.h"
-#include "core/parallel.h"
-#include "core/sample/vector_ops.h"
 
 namespace stellate::core {
 namespace {

@@ -6,12 +6,12 @@
 #include <limits>
 #include <numeric>
 
+#include "core/base/parallel.h"
+#include "core/base/random.h"
+#include "core/base/vector_ops.h"
 #include "core/certificate/ball_grid.h"
 #include "core/certificate/small_index.h"
 #include "core/certificate/small_solve.h"
-#include "core/parallel.h"
-#include "core/sample/random.h"
-#include "core/sample/vector_ops.h"
 
 namespace stellate::core {
 namespace {

@@ -5,10 +5,10 @@
 #include <span>
 #include <vector>
 
+#include "core/base/message.h"
+#include "core/base/parallel.h"
 #include "core/certificate/fundamental_group.h"
 #include "core/certificate/small_index.h"
-#include "core/message.h"
-#include "core/parallel.h"
 #include "core/specification.h"
 
 namespace stellate::core {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "core/parallel.h"
-#include "core/sample/random.h"
+#include "core/base/parallel.h"
+#include "core/base/random.h"
 
 namespace stellate::core {
 namespace {

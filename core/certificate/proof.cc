@@ -8,12 +8,12 @@
 #include <numbers>
 #include <vector>
 
+#include "core/base/message.h"
+#include "core/base/parallel.h"
+#include "core/base/vector_ops.h"
 #include "core/certificate/ball_grid.h"
 #include "core/geometry/reach.h"
 #include "core/geometry/simplex.h"
-#include "core/message.h"
-#include "core/parallel.h"
-#include "core/sample/vector_ops.h"
 
 namespace stellate::core {
 namespace {

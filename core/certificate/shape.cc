@@ -6,8 +6,8 @@
 #include <limits>
 #include <numbers>
 
+#include "core/base/parallel.h"
 #include "core/geometry/simplex_frame.h"
-#include "core/parallel.h"
 #include "core/specification.h"
 
 namespace stellate::core {

@@ -5,8 +5,8 @@
 #include <limits>
 #include <vector>
 
+#include "core/base/random.h"
 #include "core/certificate/certifier.h"
-#include "core/sample/random.h"
 
 namespace stellate::core {
 

@@ -8,12 +8,12 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/message.h"
+#include "core/base/parallel.h"
+#include "core/base/random.h"
+#include "core/base/vector_ops.h"
 #include "core/certificate/small_index.h"
 #include "core/certificate/small_solve.h"
-#include "core/message.h"
-#include "core/parallel.h"
-#include "core/sample/random.h"
-#include "core/sample/vector_ops.h"
 
 namespace stellate::core {
 namespace {

@@ -1,7 +1,7 @@
 #include "core/certificate/tangent_check.h"
 
-#include "core/message.h"
-#include "core/sample/random.h"
+#include "core/base/message.h"
+#include "core/base/random.h"
 
 namespace stellate::core {
 namespace {

@@ -4,8 +4,8 @@
 #include <array>
 #include <numeric>
 
-#include "core/message.h"
-#include "core/parallel.h"
+#include "core/base/message.h"
+#include "core/base/parallel.h"
 #include "core/specification.h"
 
 namespace stellate::core {

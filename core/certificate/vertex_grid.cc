@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/base/parallel.h"
 #include "core/certificate/probes.h"
-#include "core/parallel.h"
 
 namespace stellate::core {
 namespace {

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/vector_ops.h"
 #include "core/certificate/certifier.h"
-#include "core/sample/vector_ops.h"
 
 namespace stellate::core {
 

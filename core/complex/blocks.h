@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/parallel.h"
+#include "core/base/interruption.h"
 
 namespace stellate::core {
 

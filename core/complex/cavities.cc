@@ -8,9 +8,9 @@
 #include <map>
 #include <numeric>
 
+#include "core/base/parallel.h"
 #include "core/complex/consistency.h"
 #include "core/geometry/simplex.h"
-#include "core/parallel.h"
 
 namespace stellate::core {
 namespace {

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 
+#include "core/base/basis_layout.h"
+#include "core/base/parallel.h"
 #include "core/geometry/common_centre.h"
-#include "core/parallel.h"
 
 namespace stellate::core {
 
@@ -237,8 +238,7 @@ template <int K>
 Eigen::MatrixXd StarComplex<K>::TangentMatrix() const {
   Eigen::MatrixXd matrix(d_ * K, size());
   for (std::uint32_t p = 0; p < size(); ++p)
-    for (int a = 0; a < K; ++a)
-      for (int i = 0; i < d_; ++i) matrix(i * K + a, p) = Tangent(p)[a * d_ + i];
+    ToByCoordinate(Tangent(p), d_, K, matrix.col(p).data());
   return matrix;
 }
 

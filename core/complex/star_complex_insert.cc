@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <functional>
 
+#include "core/base/parallel.h"
 #include "core/complex/star_complex.h"
-#include "core/parallel.h"
 
 namespace stellate::core {
 

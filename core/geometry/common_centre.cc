@@ -5,8 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "core/base/vector_ops.h"
 #include "core/geometry/half_spaces.h"
-#include "core/sample/vector_ops.h"
 
 namespace stellate::core {
 namespace {

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/sample/random.h"
-#include "core/sample/vector_ops.h"
+#include "core/base/random.h"
+#include "core/base/vector_ops.h"
 
 namespace stellate::core {
 

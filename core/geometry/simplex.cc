@@ -8,8 +8,8 @@
 #include <numbers>
 #include <vector>
 
+#include "core/base/vector_ops.h"
 #include "core/geometry/simplex_frame.h"
-#include "core/sample/vector_ops.h"
 
 namespace stellate::core {
 namespace {

@@ -5,8 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "core/base/vector_ops.h"
 #include "core/geometry/simplex.h"
-#include "core/sample/vector_ops.h"
 
 namespace stellate::core {
 

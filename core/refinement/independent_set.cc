@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "core/parallel.h"
+#include "core/base/parallel.h"
 #include "core/sample/ball_tree.h"
 
 namespace stellate::core {

@@ -6,10 +6,12 @@
 #include <numeric>
 #include <utility>
 
+#include "core/base/arenas.h"
+#include "core/base/basis_layout.h"
+#include "core/base/message.h"
+#include "core/base/parallel.h"
 #include "core/certificate/findings.h"
 #include "core/geometry/reach.h"
-#include "core/message.h"
-#include "core/parallel.h"
 
 namespace stellate::core {
 namespace {
@@ -245,8 +247,7 @@ void Refinement<K>::TakePoints(const Answers& answers) {
     points_.col(c) = block.points.col(column);
     if (criteria_.sizes_given && block.sizes.size() > 0) sizes_[c] = block.sizes[column];
     if (block.tangents.size() == 0) return;
-    for (int i = 0; i < d; ++i)
-      for (int a = 0; a < K; ++a) tangents_(a * d + i, c) = block.tangents(i * K + a, column);
+    ToByVector(block.tangents.col(column).data(), d, K, tangents_.col(c).data());
   };
   const bool sorted = stage_ == Stage::kPoints && purpose_ == Purpose::kTargets;
   const Eigen::Index count =

@@ -5,11 +5,11 @@
 #include <optional>
 #include <vector>
 
+#include "core/base/interruption.h"
 #include "core/certificate/certifier.h"
 #include "core/complex/cavities.h"
 #include "core/complex/star_complex.h"
 #include "core/mesher.h"
-#include "core/parallel.h"
 #include "core/refinement/batch_parts.h"
 #include "core/refinement/independent_set.h"
 #include "core/refinement/rules.h"

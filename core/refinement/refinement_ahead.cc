@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/parallel.h"
+#include "core/base/parallel.h"
 #include "core/refinement/refinement.h"
 #include "core/refinement/surrogate.h"
 

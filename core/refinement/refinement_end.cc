@@ -6,11 +6,11 @@
 #include <iterator>
 #include <limits>
 
+#include "core/base/message.h"
+#include "core/base/parallel.h"
 #include "core/certificate/evidence.h"
 #include "core/certificate/findings.h"
 #include "core/complex/consistency.h"
-#include "core/message.h"
-#include "core/parallel.h"
 #include "core/refinement/refinement.h"
 
 namespace stellate::core {

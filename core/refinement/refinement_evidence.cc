@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/parallel.h"
 #include "core/certificate/evidence.h"
-#include "core/parallel.h"
 #include "core/refinement/refinement.h"
 
 namespace stellate::core {

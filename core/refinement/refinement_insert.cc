@@ -4,7 +4,7 @@
 #include <limits>
 #include <sstream>
 
-#include "core/parallel.h"
+#include "core/base/parallel.h"
 #include "core/refinement/refinement.h"
 
 namespace stellate::core {

@@ -5,10 +5,11 @@
 #include <functional>
 #include <numeric>
 
+#include "core/base/basis_layout.h"
+#include "core/base/parallel.h"
+#include "core/base/random.h"
 #include "core/complex/consistency.h"
-#include "core/parallel.h"
 #include "core/refinement/refinement.h"
-#include "core/sample/random.h"
 
 namespace stellate::core {
 namespace {
@@ -314,9 +315,7 @@ void Refinement<K>::AskForTargets() {
         continue;
       }
       flats.points.col(column) = candidates_.col(c);
-      const double* tangent = complex_.Tangent(t.star);
-      for (int j = 0; j < d; ++j)
-        for (int a = 0; a < K; ++a) flats.bases(j * K + a, column) = tangent[a * d + j];
+      ToByCoordinate(complex_.Tangent(t.star), d, K, flats.bases.col(column).data());
       flats.radii[column] = t.radius;
     }
   });

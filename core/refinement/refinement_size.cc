@@ -5,6 +5,7 @@
 #include <functional>
 #include <utility>
 
+#include "core/base/parallel.h"
 #include "core/refinement/refinement.h"
 
 namespace stellate::core {

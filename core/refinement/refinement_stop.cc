@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "core/refinement/refinement.h"
 
 namespace stellate::core {

@@ -5,7 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "core/parallel.h"
+#include "core/base/basis_layout.h"
+#include "core/base/parallel.h"
 
 namespace stellate::core {
 namespace {
@@ -317,9 +318,7 @@ AnswerBlock Surrogate<K>::Answer(const QueryBlock& block) {
     const bool ok = Predict(near[c], block.points.col(i).data(), flat, spacing,
                             answer.points.col(i).data(), tangent.data(), &sizes[i]);
     answer.found[c] = ok;
-    for (int j = 0; ok && j < d; ++j)
-      for (int a = 0; a < K; ++a)
-        answer.tangents(j * K + a, i) = tangent[static_cast<std::size_t>(a * d + j)];
+    if (ok) ToByCoordinate(tangent.data(), d, K, answer.tangents.col(i).data());
   });
   if (block.want_sizes) answer.sizes = std::move(sizes);
   return answer;

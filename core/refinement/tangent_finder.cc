@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/parallel.h"
-#include "core/sample/random.h"
+#include "core/base/parallel.h"
+#include "core/base/random.h"
 
 namespace stellate::core {
 namespace {

@@ -4,7 +4,7 @@
 #include <functional>
 #include <numeric>
 
-#include "core/parallel.h"
+#include "core/base/parallel.h"
 
 namespace stellate::core {
 

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/sample/vector_ops.h"
+#include "core/base/vector_ops.h"
 
 namespace stellate::core {
 

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/base/file_stamp.h"
 #include "server/base/log.h"
 

@@ -2,7 +2,7 @@
 
 #include <sys/stat.h>
 
-#include "core/message.h"
+#include "core/base/message.h"
 
 namespace stellate::server {
 

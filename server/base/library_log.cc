@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/base/log.h"
 
 namespace stellate::server {

@@ -8,7 +8,7 @@
 #include <memory>
 #include <string_view>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/base/line_ration.h"
 #include "text/printable.h"
 

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <type_traits>
 
-#include "core/message.h"
+#include "core/base/message.h"
 
 namespace stellate::server {
 

@@ -6,7 +6,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/message.h"
+#include "core/base/message.h"
 
 namespace stellate::server {
 

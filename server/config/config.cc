@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <charconv>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/config/settings.h"
 #include "server/session/memory_budget.h"
 

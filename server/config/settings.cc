@@ -4,7 +4,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "core/message.h"
+#include "core/base/message.h"
 
 namespace stellate::server {
 namespace {

@@ -4,7 +4,7 @@
 #include <bit>
 #include <cstring>
 
-#include "core/message.h"
+#include "core/base/message.h"
 
 namespace stellate::server {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/convert/arrays.h"
 
 namespace stellate::server {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "core/message.h"
+#include "core/base/message.h"
 
 namespace stellate::server {
 namespace {

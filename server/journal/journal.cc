@@ -5,7 +5,7 @@
 #include <system_error>
 #include <utility>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/journal/recorded_mesh.h"
 #include "server/records/journal_format.h"
 

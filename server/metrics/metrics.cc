@@ -10,7 +10,7 @@
 #include <map>
 #include <utility>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/metrics/process_metrics.h"
 
 namespace stellate::server {

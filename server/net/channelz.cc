@@ -10,7 +10,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/message.h"
+#include "core/base/message.h"
 
 namespace stellate::server {
 namespace {

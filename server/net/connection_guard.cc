@@ -17,7 +17,7 @@
 #include <string_view>
 #include <utility>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/base/log.h"
 
 namespace stellate::server {

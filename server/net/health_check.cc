@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/message.h"
+#include "core/base/message.h"
 
 namespace stellate::server {
 namespace {

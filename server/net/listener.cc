@@ -14,7 +14,7 @@
 #include <cerrno>
 #include <cstdint>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/base/log.h"
 
 namespace stellate::server {

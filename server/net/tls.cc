@@ -15,7 +15,7 @@
 #include <iterator>
 #include <utility>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/base/file_stamp.h"
 #include "server/base/log.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/message.h"
+#include "core/base/message.h"
 
 namespace stellate::server {
 namespace {

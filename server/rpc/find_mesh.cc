@@ -1,4 +1,4 @@
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/convert/error_map.h"
 #include "server/rpc/handlers.h"
 

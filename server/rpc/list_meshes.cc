@@ -1,6 +1,6 @@
 #include <charconv>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/convert/error_map.h"
 #include "server/convert/mesh.h"
 #include "server/rpc/handlers.h"

@@ -5,9 +5,9 @@
 #include <optional>
 #include <utility>
 
-#include "core/message.h"
-#include "server/convert/error_map.h"
+#include "core/base/message.h"
 #include "server/base/log.h"
+#include "server/convert/error_map.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 
 namespace stellate::server {

@@ -2,7 +2,7 @@
 #include <optional>
 #include <unordered_map>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/convert/error_map.h"
 #include "server/convert/mesh.h"
 #include "server/convert/oracle.h"

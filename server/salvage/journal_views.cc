@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/message.h"
+#include "core/base/message.h"
 
 namespace stellate::server {
 namespace {

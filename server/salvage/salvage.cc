@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/salvage/journal_views.h"
 #include "server/storage/data_directory.h"
 

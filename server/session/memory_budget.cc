@@ -6,7 +6,7 @@
 #include <fstream>
 #include <utility>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/base/cgroup.h"
 
 namespace stellate::server {

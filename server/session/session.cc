@@ -7,7 +7,7 @@
 #include <new>
 #include <utility>
 
-#include "core/message.h"
+#include "core/base/message.h"
 
 namespace stellate::server {
 namespace {

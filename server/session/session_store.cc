@@ -10,7 +10,7 @@
 #include <system_error>
 #include <utility>
 
-#include "core/message.h"
+#include "core/base/message.h"
 
 namespace stellate::server {
 namespace {

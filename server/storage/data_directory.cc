@@ -11,7 +11,7 @@
 #include <fstream>
 #include <system_error>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/base/log.h"
 #include "server/storage/earlier_journal.h"
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "core/status.h"
 #include "server/storage/journal_file.h"
 

@@ -3,7 +3,7 @@
 #include <optional>
 #include <utility>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/records/journal_format.h"
 #include "server/records/record_bytes.h"
 

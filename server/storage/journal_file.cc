@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "core/message.h"
+#include "core/base/message.h"
 
 namespace stellate::server {
 namespace {

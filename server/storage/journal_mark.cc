@@ -7,7 +7,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/records/journal_format.h"
 #include "server/records/record_bytes.h"
 

@@ -2,7 +2,7 @@
 
 #include <random>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/storage/journal_file.h"
 
 namespace stellate::server {

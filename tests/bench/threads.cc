@@ -17,7 +17,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/sample/random.h"
+#include "core/base/random.h"
 #include "tests/support/run_mesher.h"
 
 namespace {

@@ -122,6 +122,10 @@ TEST(Validate, NamesTheFieldAndTheValueOfWhatItRefuses) {
     EXPECT_EQ(status.code, bad.code) << bad.words;
     EXPECT_NE(status.message.find(bad.words), std::string::npos)
         << "\"" << bad.words << "\" is not in \"" << status.message << "\"";
+    EXPECT_NE(status.field, "");
+    EXPECT_TRUE(status.message.starts_with(status.field) ||
+                status.message.starts_with("neither seeds nor " + status.field))
+        << status.field << ": " << status.message;
   }
 }
 

@@ -3,9 +3,9 @@
 #include <array>
 #include <vector>
 
+#include "core/base/random.h"
 #include "core/geometry/common_centre.h"
 #include "core/geometry/simplex.h"
-#include "core/sample/random.h"
 #include "tests/bench/micro/samples.h"
 
 // What is measured of single simplices: size and shape, angle to a tangent space, common centre.

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "core/sample/random.h"
+#include "core/base/random.h"
 
 namespace stellate::core::bench {
 

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <vector>
 
+#include "core/base/random.h"
 #include "core/complex/star_complex.h"
 #include "core/geometry/restricted_voronoi_cell.h"
-#include "core/sample/random.h"
 #include "tests/bench/micro/samples.h"
 
 // Restricted Voronoi cells: built from neighbours, asked whether a point would cut them, and whole

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "core/sample/random.h"
+#include "core/base/random.h"
 #include "tests/core/certificate/handmade_meshes.h"
 
 namespace stellate::core {

@@ -4,8 +4,8 @@
 
 #include <limits>
 
+#include "core/base/random.h"
 #include "core/certificate/ball_grid.h"
-#include "core/sample/random.h"
 #include "tests/core/certificate/handmade_meshes.h"
 
 namespace stellate::core {

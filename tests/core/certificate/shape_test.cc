@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/random.h"
 #include "core/geometry/simplex.h"
-#include "core/sample/random.h"
 #include "tests/core/certificate/handmade_meshes.h"
 
 namespace stellate::core {

@@ -4,7 +4,7 @@
 
 #include <map>
 
-#include "core/sample/random.h"
+#include "core/base/random.h"
 
 namespace stellate::core {
 namespace {

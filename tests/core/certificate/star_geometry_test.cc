@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/sample/random.h"
+#include "core/base/random.h"
 #include "tests/core/certificate/handmade_meshes.h"
 
 namespace stellate::core {

@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "core/sample/random.h"
+#include "core/base/random.h"
 #include "tests/core/support/cells.h"
 
 namespace stellate::core {

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <vector>
 
+#include "core/base/random.h"
 #include "core/geometry/simplex_frame.h"
-#include "core/sample/random.h"
 
 namespace stellate::core {
 namespace {

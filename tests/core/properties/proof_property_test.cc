@@ -7,7 +7,7 @@
 #include <iostream>
 #include <string>
 
-#include "core/sample/random.h"
+#include "core/base/random.h"
 #include "tests/core/support/in_process_run.h"
 #include "tests/core/support/trials.h"
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "core/base/random.h"
 #include "core/refinement/surrogate.h"
-#include "core/sample/random.h"
 #include "tests/core/support/in_process_run.h"
 
 namespace stellate::core {

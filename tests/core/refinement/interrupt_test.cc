@@ -7,7 +7,7 @@
 #include <string>
 #include <thread>
 
-#include "core/parallel.h"
+#include "core/base/interruption.h"
 #include "tests/core/support/in_process_run.h"
 
 namespace stellate::core {

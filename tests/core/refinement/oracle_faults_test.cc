@@ -10,7 +10,7 @@
 #include <optional>
 #include <string>
 
-#include "core/sample/random.h"
+#include "core/base/random.h"
 #include "tests/core/support/in_process_run.h"
 
 namespace stellate::core {

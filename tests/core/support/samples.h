@@ -9,8 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "core/base/basis_layout.h"
+#include "core/base/random.h"
 #include "core/complex/star_complex.h"
-#include "core/sample/random.h"
 #include "stellate/catalogue.h"
 
 namespace stellate::core::testing {
@@ -33,8 +34,8 @@ struct Sample {
   void Append(const Eigen::MatrixXd& new_points, const Eigen::MatrixXd& bases) {
     for (Eigen::Index c = 0; c < new_points.cols(); ++c) {
       points.insert(points.end(), new_points.col(c).begin(), new_points.col(c).end());
-      for (int a = 0; a < k; ++a)
-        for (int i = 0; i < d; ++i) tangents.push_back(bases(i * k + a, c));
+      tangents.resize(tangents.size() + static_cast<std::size_t>(d * k));
+      ToByVector(bases.col(c).data(), d, k, tangents.data() + tangents.size() - d * k);
     }
   }
 };

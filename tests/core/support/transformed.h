@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/sample/random.h"
+#include "core/base/random.h"
 #include "stellate/oracle.h"
 
 namespace stellate::core::testing {

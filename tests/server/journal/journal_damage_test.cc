@@ -1,6 +1,6 @@
 // Journals that are not what they were, and those of an earlier version.
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/records/record_bytes.h"
 #include "tests/server/support/blank_journal.h"
 #include "tests/server/support/journal_fixture.h"

@@ -1,6 +1,6 @@
 #include "server/journal/journal.h"
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "server/storage/journal_file.h"
 #include "tests/server/support/journal_fixture.h"
 

@@ -5,7 +5,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/message.h"
+#include "core/base/message.h"
 #include "tests/server/support/sphere.h"
 
 namespace stellate::server {

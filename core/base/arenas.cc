@@ -1,4 +1,4 @@
-#include "core/parallel.h"
+#include "core/base/arenas.h"
 
 #if !defined(__SANITIZE_THREAD__)
 #include <algorithm>

@@ -1,10 +1,10 @@
-#include "core/sample/vector_ops.h"
+#include "core/base/vector_ops.h"
 
 #include <gtest/gtest.h>
 
 #include <vector>
 
-#include "core/sample/random.h"
+#include "core/base/random.h"
 
 namespace stellate::core {
 namespace {

@@ -1,4 +1,4 @@
-#include "core/parallel.h"
+#include "core/base/parallel.h"
 
 #include <gtest/gtest.h>
 
@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <thread>
 #include <vector>
+
+#include "core/base/arenas.h"
 
 namespace stellate::core {
 namespace {
