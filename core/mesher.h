@@ -22,9 +22,8 @@ namespace stellate::core {
 //   const Report& report = (*mesher)->report();
 //
 // Deterministic: the specification and the answers determine the mesh bit for bit, whatever
-// Specification::threads. But for Interrupt, one thread at a time may use a
-// Mesher; nothing here blocks, logs or
-// reads a clock.
+// Specification::threads. One thread at a time may use a Mesher, except that any may call
+// Interrupt; nothing here blocks, logs or reads a clock.
 class Mesher {
  public:
   // Errors: those of Validate(spec).
@@ -40,8 +39,8 @@ class Mesher {
   // answered again, or Fail called.
   virtual Expected<MeshDelta> Absorb(const Answers& answers) = 0;
 
-  // Makes an Absorb under way, and every later one, return soon: refused with kCancelled, and with
-  // the mesh of no use any more but to be cancelled. The one call that any thread may make at any
+  // Makes an Absorb under way, and every later one, return soon, refused with kCancelled. All that
+  // can be done with the mesh then is to cancel it. The one call that any thread may make at any
   // time.
   virtual void Interrupt() = 0;
 

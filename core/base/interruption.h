@@ -10,8 +10,9 @@
 namespace stellate::core {
 
 // Work can be interrupted. It checks for that in all that it does: before each body of a
-// ParallelFor, at the end of each parallel stretch, and with LookUp in each loop on one thread that
-// is as long as the mesh is large. What interrupted work leaves behind must not be used.
+// ParallelFor, at the end of each parallel stretch, and with CheckInterruption in each loop on one
+// thread that is as long as the mesh is large. What interrupted work leaves behind must not be
+// used.
 
 // Thrown out of work that was interrupted.
 struct Interrupted {};
@@ -46,10 +47,10 @@ class Interruption {
 };
 
 // For tests: called at each check, by the thread that checks.
-inline std::atomic<void (*)()> on_look_up = nullptr;
+inline std::atomic<void (*)()> on_interruption_check = nullptr;
 
 inline bool IsInterrupted() {
-  if (void (*const told)() = on_look_up.load(std::memory_order_relaxed)) told();
+  if (void (*const told)() = on_interruption_check.load(std::memory_order_relaxed)) told();
   return tbb::is_current_task_group_canceling();
 }
 
@@ -60,7 +61,7 @@ inline void ThrowIfInterrupted() {
 #endif
 
 // In a loop on one thread: checks at every 4096th step.
-inline void LookUp(std::size_t step) {
+inline void CheckInterruption(std::size_t step) {
   if (step % 4096 == 0) ThrowIfInterrupted();
 }
 

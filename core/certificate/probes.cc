@@ -72,7 +72,7 @@ MeshBox BoxOf(const MeshView& mesh) {
   double* const lower = box.lower.data();
   double* const upper = box.upper.data();
   for (std::uint32_t v = 1; v < mesh.vertices; ++v) {
-    LookUp(v);
+    CheckInterruption(v);
     const double* x = mesh.Point(v);
     for (int i = 0; i < mesh.d; ++i) {
       lower[i] = std::min(lower[i], x[i]);

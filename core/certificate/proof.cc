@@ -186,7 +186,7 @@ Chosen ChooseVertices(const Adjacency& adjacency) {
         const std::uint32_t u = open.back();
         open.pop_back();
         for (const std::uint32_t s : adjacency.Star(u)) {
-          LookUp(step++);
+          CheckInterruption(step++);
           for (int i = 0; i <= list.k; ++i) {
             const std::uint32_t w = list[s][i];
             if (component[w] != Adjacency::kNone) continue;

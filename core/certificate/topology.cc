@@ -65,7 +65,7 @@ std::uint64_t CountComponents(const Adjacency& adjacency) {
   std::vector<std::uint32_t> parent(list.vertices);
   std::iota(parent.begin(), parent.end(), 0u);
   for (std::uint32_t s = 0; s < list.size(); ++s) {
-    LookUp(s);
+    CheckInterruption(s);
     for (int i = 1; i <= list.k; ++i) {
       const std::uint32_t a = Root(parent, list[s][0]);
       const std::uint32_t b = Root(parent, list[s][i]);
@@ -74,7 +74,7 @@ std::uint64_t CountComponents(const Adjacency& adjacency) {
   }
   std::uint64_t components = 0;
   for (std::uint32_t v = 0; v < list.vertices; ++v) {
-    LookUp(v);
+    CheckInterruption(v);
     if (!adjacency.Star(v).empty() && Root(parent, v) == v) ++components;
   }
   return components;
@@ -97,7 +97,7 @@ std::size_t Orient(const Adjacency& adjacency, Connectivity& result) {
     sign[start] = 1;
     stack.push_back(start);
     while (!stack.empty()) {
-      LookUp(steps++);
+      CheckInterruption(steps++);
       const std::uint32_t s = stack.back();
       stack.pop_back();
       for (int i = 0; i <= k; ++i) {
@@ -136,7 +136,7 @@ std::string CheckSimplexList(const SimplexList& list) {
     return Message("the mesh has ", list.ids->size() / width, " simplices, too many to check");
   }
   for (std::uint32_t s = 0; s < list.size(); ++s) {
-    LookUp(s);
+    CheckInterruption(s);
     const std::uint32_t* ids = list[s];
     for (std::size_t i = 0; i < width; ++i) {
       if (ids[i] >= list.vertices || (i > 0 && ids[i] <= ids[i - 1])) {
@@ -151,14 +151,14 @@ std::string CheckSimplexList(const SimplexList& list) {
 Adjacency::Adjacency(const SimplexList& list) : list_(list) {
   begin_.assign(static_cast<std::size_t>(list_.vertices) + 1, 0);
   for (std::size_t i = 0; i < list_.ids->size(); ++i) {
-    LookUp(i);
+    CheckInterruption(i);
     ++begin_[(*list_.ids)[i] + 1];
   }
   std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
   incident_.resize(list_.ids->size());
   std::vector<std::uint64_t> next(begin_.begin(), begin_.end() - 1);
   for (std::uint32_t s = 0; s < list_.size(); ++s) {
-    LookUp(s);
+    CheckInterruption(s);
     for (int i = 0; i <= list_.k; ++i) incident_[next[list_[s][i]]++] = s;
   }
   MatchFacets();
@@ -228,7 +228,7 @@ Connectivity ComputeConnectivity(const Adjacency& adjacency) {
   Connectivity result;
   const std::size_t parts = Orient(adjacency, result);
   for (std::uint32_t v = 0; v < list.vertices; ++v) {
-    LookUp(v);
+    CheckInterruption(v);
     if (!adjacency.Star(v).empty()) continue;
     if (result.isolated_vertices++ == 0) result.first_isolated = v;
   }

@@ -8,8 +8,8 @@
 
 namespace stellate::core {
 
-// A vector that grows without moving what it holds: there is never an old copy beside the new one,
-// and no room for as many items again.
+// A vector that grows without moving what it holds: there is never an old copy as well as the new
+// one, and no room for as many items again.
 template <typename T>
 class Blocks {
  public:
@@ -17,7 +17,7 @@ class Blocks {
   Blocks(const Blocks& other) {
     resize(other.size_);
     for (std::size_t i = 0; i < size_; ++i) {
-      LookUp(i);
+      CheckInterruption(i);
       (*this)[i] = other[i];
     }
   }

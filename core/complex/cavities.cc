@@ -166,7 +166,7 @@ class Cavity {
     return facet;
   }
 
-  // How each vertex's tangent basis is oriented beside that of the vertex nearest to all.
+  // How each vertex's tangent basis is oriented relative to that of the vertex nearest to all.
   bool Orient() {
     const int d = complex_.d();
     std::uint32_t middle = vertices_.front();
@@ -401,7 +401,7 @@ std::vector<std::vector<typename StarComplex<K>::Simplex>> PartDoubtful(const Ce
     return s;
   };
   for (std::size_t i = 0; i + 1 < facets.size(); ++i) {
-    LookUp(i);
+    CheckInterruption(i);
     if (facets[i].first != facets[i + 1].first) continue;
     const std::size_t a = root(facets[i].second), b = root(facets[i + 1].second);
     if (a == b) continue;
@@ -444,7 +444,6 @@ FilledCavities FillCavities(const StarComplex<K>& complex, const FillingRules& r
     }
     const auto& at = cavity.vertices();
     result.unfilled.insert(result.unfilled.end(), at.begin(), at.end());
-    if (at.size() > result.largest_unfilled.size()) result.largest_unfilled = at;
   }
   std::sort(result.unfilled.begin(), result.unfilled.end());
   result.unfilled.erase(std::unique(result.unfilled.begin(), result.unfilled.end()),

@@ -7,7 +7,7 @@
 
 namespace stellate::core {
 
-// Where the stars disagree about few simplices, the consistent ones are a mesh but for cavities:
+// Where the stars disagree about few simplices, the consistent ones are a mesh except for cavities:
 // each facet is in at most two of them, and those in one bound the cavities. A cavity can be filled
 // without a new point.
 //
@@ -34,7 +34,6 @@ struct FilledCavities {
   std::uint64_t filling = 0;             // simplices of all fillings
   std::vector<std::uint32_t> simplices;  // consistent and filling ones, K+1 ids each, sorted
   std::vector<std::uint32_t> unfilled;   // vertices of the cavities that are not filled, ascending
-  std::vector<std::uint32_t> largest_unfilled;  // vertices of the largest of them
 };
 
 // A simplex is consistent here when all its vertices' stars hold it and it is folded over a

@@ -225,7 +225,7 @@ std::vector<std::uint32_t> StarComplex<K>::Simplices() const {
   all.reserve(simplex_count_ * (K + 1));
   std::vector<Simplex> owned;
   for (std::uint32_t p = 0; p < cells_.size(); ++p) {
-    LookUp(p);
+    CheckInterruption(p);
     owned.clear();
     ForEachOwned(p, [&](std::size_t, const Simplex& s) { owned.push_back(s); });
     std::sort(owned.begin(), owned.end());

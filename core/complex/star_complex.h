@@ -74,7 +74,7 @@ class StarComplex {
   }
   // The half-space of a facet of p's cell: writes the normal, T_p^t (q - p), returns the offset.
   double HalfSpace(std::uint32_t p, std::size_t facet, double* normal) const;
-  // |q - p|^2 for the sample point q of a facet of p's cell, but for the weights' share.
+  // |q - p|^2 for the sample point q of a facet of p's cell, without the weights' share.
   double EdgeLength2(std::uint32_t p, std::size_t facet) const;
 
   // Whether some sample point lies within `radius` of q.

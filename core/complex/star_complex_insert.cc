@@ -151,7 +151,7 @@ void StarComplex<K>::CutStars(const std::vector<Turn>& turns, const std::vector<
       influence[i] = Influence(cell);
     }
   });
-  // A new point has the largest id of its simplices but for those among new points alone.
+  // A new point has the largest id of its simplices, except of those among new points alone.
   ParallelChunks(count, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t p = first + static_cast<std::uint32_t>(i);
@@ -161,7 +161,7 @@ void StarComplex<K>::CutStars(const std::vector<Turn>& turns, const std::vector<
     }
   });
   for (std::size_t i = 0; i < influence.size(); ++i) {
-    LookUp(i);
+    CheckInterruption(i);
     const bool is_new = i >= turns.size();
     tree_.SetInfluence(
         is_new ? first + static_cast<std::uint32_t>(i - turns.size()) : turns[i].star,

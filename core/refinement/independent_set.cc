@@ -37,7 +37,7 @@ class Conflicts {
     std::vector<double> reaches;
     reaches.reserve(targets.size());
     for (std::size_t i = 0; i < targets.size(); ++i) {
-      LookUp(i);
+      CheckInterruption(i);
       reaches.push_back(Reach(targets[i]));
     }
     balls_.Assign(std::move(reaches));
@@ -106,7 +106,7 @@ std::vector<Target<K>> SelectIndependent(const StarComplex<K>& complex,
   });
   std::vector<std::uint32_t> rank(targets.size());
   for (std::uint32_t r = 0; r < order.size(); ++r) {
-    LookUp(r);
+    CheckInterruption(r);
     rank[order[r]] = r;
   }
   const Conflicts<K> conflicts(complex, targets, rank);
@@ -114,7 +114,7 @@ std::vector<Target<K>> SelectIndependent(const StarComplex<K>& complex,
   std::vector<std::uint8_t> is_chosen(targets.size(), 0);
   std::vector<std::uint32_t> chosen;
   for (std::size_t r = 0; r < order.size() && chosen.size() < most; ++r) {
-    LookUp(r);
+    CheckInterruption(r);
     if (conflicts.AnyChosen(order[r], is_chosen)) continue;
     is_chosen[order[r]] = 1;
     chosen.push_back(order[r]);
@@ -126,7 +126,7 @@ std::vector<Target<K>> SelectIndependent(const StarComplex<K>& complex,
   std::vector<Target<K>> ordered;
   ordered.reserve(chosen.size());
   for (std::size_t i = 0; i < chosen.size(); ++i) {
-    LookUp(i);
+    CheckInterruption(i);
     ordered.push_back(targets[chosen[i]]);
   }
   return ordered;

@@ -84,9 +84,9 @@ std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std:
 }
 
 template <int K>
-bool ContainsSliver(const StarComplex<K>& complex, const double* p,
-                    const RestrictedVoronoiCell<K>& cell, std::size_t v, double sliver_bound,
-                    const double* unborn) {
+bool HasThinFaceAt(const StarComplex<K>& complex, const double* p,
+                   const RestrictedVoronoiCell<K>& cell, std::size_t v, double sliver_bound,
+                   const double* unborn) {
   if (K < 2 || sliver_bound <= 0) return false;
   const int d = complex.d();
   const double* q[K];
@@ -181,7 +181,7 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& comp
   if (bounds.sliver_bound > 0) {
     for (std::size_t v = 0; v < cell.vertex_count(); ++v)
       if (is_worse(v) && held(v) &&
-          ContainsSliver<K>(complex, complex.Point(p), cell, v, bounds.sliver_bound, nullptr))
+          HasThinFaceAt<K>(complex, complex.Point(p), cell, v, bounds.sliver_bound, nullptr))
         worst = v;
     if (worst) return AtVertex<K>(Rule::kSliver, cell, *worst, false);
   }
@@ -226,7 +226,7 @@ int CountBad(const StarComplex<K>& complex, const double* point,
       }
       const bool fresh = simplex.back() == id;  // an old simplex was judged before
       if (fresh && cell.norm2(v) <= small_radius * small_radius &&
-          (ContainsSliver<K>(complex, at, cell, v, bounds.sliver_bound, point) ||
+          (HasThinFaceAt<K>(complex, at, cell, v, bounds.sliver_bound, point) ||
            LeansTooFar<K>(complex, p, at, cell, v, bounds.reach, point))) {
         ++bad;
         continue;
@@ -269,9 +269,9 @@ int CountBad(const StarComplex<K>& complex, const double* point,
                                                         double, double);                          \
   template std::optional<Violation<K>> WorstSliverOrInconsistent(                                 \
       const StarComplex<K>&, std::uint32_t, const ShapeBounds&);                                  \
-  template bool ContainsSliver(const StarComplex<K>&, const double*,                              \
-                               const RestrictedVoronoiCell<K>&, std::size_t, double,              \
-                               const double*);                                                    \
+  template bool HasThinFaceAt(const StarComplex<K>&, const double*,                               \
+                              const RestrictedVoronoiCell<K>&, std::size_t, double,               \
+                              const double*);                                                     \
   template bool LeansTooFar(const StarComplex<K>&, std::uint32_t, const double*,                  \
                             const RestrictedVoronoiCell<K>&, std::size_t, double, const double*); \
   template int CountBad(const StarComplex<K>&, const double*, const StarComplex<K>::Tentative&,   \

@@ -12,7 +12,6 @@ namespace stellate::core {
 // The refinement rules of Sec. 5.3.5, in their order.
 enum class Rule : std::uint8_t { kSize = 0, kRadiusEdge, kSliver, kInconsistent };
 
-// A simplex of star(p) that breaks a rule, given by its dual vertex in p's cell.
 // What R3 asks of a simplex's shape.
 struct ShapeBounds {
   double sliver_bound = 0;  // Theta0; 0: none
@@ -21,6 +20,7 @@ struct ShapeBounds {
   double reach = INFINITY;
 };
 
+// A simplex of star(p) that breaks a rule, given by its dual vertex in p's cell.
 template <int K>
 struct Violation {
   Rule rule = Rule::kSize;
@@ -50,9 +50,9 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& comp
 // Whether the simplex on p and the facets of v is or contains a Theta0-sliver (Sec. 2.3): that is,
 // whether some face at p, of dimension 2 or more, has fatness below Theta0^j.
 template <int K>
-bool ContainsSliver(const StarComplex<K>& complex, const double* p,
-                    const RestrictedVoronoiCell<K>& cell, std::size_t v, double sliver_bound,
-                    const double* unborn);
+bool HasThinFaceAt(const StarComplex<K>& complex, const double* p,
+                   const RestrictedVoronoiCell<K>& cell, std::size_t v, double sliver_bound,
+                   const double* unborn);
 
 // Whether the simplex on p and the facets of v leans too far from the tangent space of one of its
 // vertices for a proof from this reach, or is so large that M itself may turn too far under it.

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "core/base/basis_layout.h"
 #include "core/base/parallel.h"
 
 namespace stellate::core {
@@ -175,7 +174,7 @@ template <int K>
 void Surrogate<K>::Prepare(const std::vector<Near>& near) {
   std::vector<std::uint32_t> unknown;
   for (std::size_t at = 0; at < near.size(); ++at) {
-    LookUp(at);
+    CheckInterruption(at);
     const Near& n = near[at];
     for (int i = 0; i < n.count; ++i) {
       const std::uint32_t p = n.points[static_cast<std::size_t>(i)].second;
@@ -283,8 +282,9 @@ bool Surrogate<K>::Predict(const Near& near, const double* x, const double* flat
   std::copy_n(point, d, from.data());
   for (int a = 0; flat && a < K; ++a) {  // back to the flat
     double along = 0;
-    for (int j = 0; j < d; ++j) along += flat[j * K + a] * (point[j] - x[j]);
-    for (int j = 0; j < d; ++j) from[j] -= along * flat[j * K + a];
+    const double* t = flat + a * d;
+    for (int j = 0; j < d; ++j) along += t[j] * (point[j] - x[j]);
+    for (int j = 0; j < d; ++j) from[j] -= along * t[j];
   }
   if (!Blend(near, from.data(), point, tangent, &guess)) return false;
   *size = guess.size;
@@ -295,39 +295,31 @@ bool Surrogate<K>::Predict(const Near& near, const double* x, const double* flat
 }
 
 template <int K>
-AnswerBlock Surrogate<K>::Answer(const QueryBlock& block) {
-  const int d = complex_.d();
-  const auto count = static_cast<std::size_t>(block.size());
+AnsweredPoints Surrogate<K>::Answer(const Eigen::MatrixXd& points,
+                                    const std::vector<const double*>& flats,
+                                    const Eigen::VectorXd& spacing) {
+  const auto count = static_cast<std::size_t>(points.cols());
   std::vector<Near> near(count);
   ParallelFor(count, [&](std::size_t i) {
-    near[i] = FindNear(block.points.col(static_cast<Eigen::Index>(i)).data());
+    near[i] = FindNear(points.col(static_cast<Eigen::Index>(i)).data());
   });
   Prepare(near);
-  AnswerBlock answer;
-  answer.points.setZero(d, block.size());
-  answer.tangents.setZero(d * K, block.size());
+  AnsweredPoints answer;
+  answer.points.setZero(complex_.d(), points.cols());
+  answer.tangents.setZero(complex_.d() * K, points.cols());
   answer.found.assign(count, 0);
-  Eigen::VectorXd sizes = Eigen::VectorXd::Zero(block.size());
+  Eigen::VectorXd sizes = Eigen::VectorXd::Zero(points.cols());
   ParallelFor(count, [&](std::size_t c) {
     const auto i = static_cast<Eigen::Index>(c);
-    thread_local std::vector<double> tangent;
-    tangent.resize(static_cast<std::size_t>(K * d));
-    const double spacing = block.radii.size() > 0 ? block.radii[i] : 0;
-    const double* flat =
-        block.kind == QueryKind::kIntersectFlat ? block.bases.col(i).data() : nullptr;
-    const bool ok = Predict(near[c], block.points.col(i).data(), flat, spacing,
-                            answer.points.col(i).data(), tangent.data(), &sizes[i]);
-    answer.found[c] = ok;
-    if (ok) ToByCoordinate(tangent.data(), d, K, answer.tangents.col(i).data());
+    answer.found[c] =
+        Predict(near[c], points.col(i).data(), flats[c], spacing[i], answer.points.col(i).data(),
+                answer.tangents.col(i).data(), &sizes[i]);
   });
-  if (block.want_sizes) answer.sizes = std::move(sizes);
+  answer.answered = answer.found;
+  if (sizes_) answer.sizes = std::move(sizes);
   return answer;
 }
 
-template class Surrogate<1>;
-template class Surrogate<2>;
-template class Surrogate<3>;
-template class Surrogate<4>;
-template class Surrogate<5>;
+STELLATE_INSTANTIATE_CLASS(Surrogate)
 
 }  // namespace stellate::core

@@ -1,12 +1,14 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <utility>
 #include <vector>
 
-#include "core/batch.h"
+#include "core/base/instantiate.h"
 #include "core/complex/star_complex.h"
+#include "core/refinement/candidate_set.h"
 
 namespace stellate::core {
 
@@ -30,10 +32,12 @@ class Surrogate {
   Surrogate(const StarComplex<K>& complex, double step, double epsilon,
             const double* sizes = nullptr);
 
-  // Answers queries of both kinds, with tangents and what sizes there are. `block.radii`, for
-  // closest points too, holds the spacing that each point is for: not found where M is not known
-  // well enough for that. In parallel; the same whatever was asked before.
-  AnswerBlock Answer(const QueryBlock& block);
+  // What is guessed of M near each of `points`, d x n: its closest point, or, where `flats` has a
+  // tangent basis T (K rows of d) instead of nullptr, its intersection with x + T^perp. Found, with
+  // tangents and what sizes there are, unless M is not known well enough for `spacing`, a length
+  // for each. In parallel; the same whatever was asked before.
+  AnsweredPoints Answer(const Eigen::MatrixXd& points, const std::vector<const double*>& flats,
+                        const Eigen::VectorXd& spacing);
 
  private:
   static constexpr int kQuadratic = K * (K + 1) / 2;
@@ -76,10 +80,6 @@ class Surrogate {
   std::vector<double> forms_;        // by slot: kTerms coefficients, d each
 };
 
-extern template class Surrogate<1>;
-extern template class Surrogate<2>;
-extern template class Surrogate<3>;
-extern template class Surrogate<4>;
-extern template class Surrogate<5>;
+STELLATE_DECLARE_CLASS(Surrogate)
 
 }  // namespace stellate::core

@@ -41,7 +41,7 @@ void BallTree::MakeLeaf(std::uint32_t node, std::uint32_t first_slot, const std:
   for (const std::uint32_t* i = begin; i != end; ++i) leaf_of_[*i] = node;
 }
 
-// How many leaves a balanced tree of so many points has.
+// How many leaves a balanced tree of that many points has.
 std::uint32_t BallTree::LeafCount(std::size_t points) {
   if (points <= kBuiltLeaf) return 1;
   if (points % 2 == 0) return 2 * LeafCount(points / 2);
@@ -199,7 +199,7 @@ void BallTree::Refit() {
   stale_.erase(std::unique(stale_.begin(), stale_.end()), stale_.end());
   std::size_t steps = 0;
   for (const std::uint32_t leaf : stale_) {
-    LookUp(steps++);
+    CheckInterruption(steps++);
     if (nodes_[leaf].children != kNone) continue;  // split since: measured then
     double outreach = 0;
     for (std::uint32_t i = 0; i < nodes_[leaf].count; ++i) {

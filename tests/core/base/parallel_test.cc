@@ -62,7 +62,7 @@ TEST(Parallel, ALongLoopLooksUpNowAndThen) {
   std::size_t step = 0;
   EXPECT_FALSE(WithThreads(1, interruption, [&] {
     for (;; ++step) {
-      LookUp(step);
+      CheckInterruption(step);
       if (step == 5000) interruption.Raise();
     }
   }));

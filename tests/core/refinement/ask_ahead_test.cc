@@ -173,16 +173,17 @@ TEST(Surrogate, ConvergesToFourthOrder) {
     }
     complex.Commit();
     Surrogate<2> surrogate(complex, h, h);
-    QueryBlock block;
-    block.points = 0.5 * (points.leftCols(points.cols() - 1) + points.rightCols(points.cols() - 1));
-    const Eigen::MatrixXd near = torus->ClosestPoint(block.points).points;
+    const Eigen::MatrixXd middles =
+        0.5 * (points.leftCols(points.cols() - 1) + points.rightCols(points.cols() - 1));
+    const Eigen::MatrixXd near = torus->ClosestPoint(middles).points;
     // Only midpoints of neighbours are near the torus.
     std::vector<Eigen::Index> local;
     for (Eigen::Index i = 0; i < near.cols(); ++i)
       if ((points.col(i) - points.col(i + 1)).norm() < 2.5 * h) local.push_back(i);
     ASSERT_GT(local.size(), 5u);
-    block.points = near(Eigen::all, local);
-    const AnswerBlock answer = surrogate.Answer(block);
+    const AnsweredPoints answer =
+        surrogate.Answer(near(Eigen::all, local), std::vector<const double*>(local.size()),
+                         Eigen::VectorXd::Zero(static_cast<Eigen::Index>(local.size())));
     errors[level] = 0;
     std::size_t answered = 0;
     for (Eigen::Index i = 0; i < answer.points.cols(); ++i) {

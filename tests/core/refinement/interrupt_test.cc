@@ -86,7 +86,7 @@ void CountLookUp() {
 
 class AtALookUp : public ::testing::Test {
  protected:
-  ~AtALookUp() override { on_look_up = nullptr; }
+  ~AtALookUp() override { on_interruption_check = nullptr; }
 
   struct Ended {
     std::unique_ptr<Mesher> mesher;
@@ -104,7 +104,7 @@ class AtALookUp : public ::testing::Test {
     looking_up = run.mesher.get();
     look_ups = 0;
     interrupt_at = at;
-    on_look_up = &CountLookUp;
+    on_interruption_check = &CountLookUp;
     while (const QueryBatch* batch = run.mesher->NextBatch()) {
       const auto delta = run.mesher->Absorb(answer(*batch));
       if (!delta) {
@@ -117,7 +117,7 @@ class AtALookUp : public ::testing::Test {
       run.progress = run.mesher->progress();
       run.counts = run.mesher->report().counts;
     }
-    on_look_up = nullptr;
+    on_interruption_check = nullptr;
     return run;
   }
 

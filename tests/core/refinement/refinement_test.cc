@@ -1,4 +1,4 @@
-#include "core/refinement/refinement.h"
+#include "core/refinement/criteria.h"
 
 #include <gtest/gtest.h>
 

@@ -118,11 +118,10 @@ void ExpectSliversAsMeasured(const Sample& sample) {
         Simplex<K> s;
         if (!complex->SimplexOf(p, complex->cell(p), v, &s)) continue;
         const bool expected = HasThinFaceAt(sample, {s.begin(), s.end()}, p, theta0);
-        EXPECT_EQ(
-            ContainsSliver<K>(*complex, sample.Point(p), complex->cell(p), v, theta0, nullptr),
-            expected);
+        EXPECT_EQ(HasThinFaceAt<K>(*complex, sample.Point(p), complex->cell(p), v, theta0, nullptr),
+                  expected);
         ++(expected ? thin : fat);
-        EXPECT_FALSE(ContainsSliver<K>(*complex, sample.Point(p), complex->cell(p), v, 0, nullptr));
+        EXPECT_FALSE(HasThinFaceAt<K>(*complex, sample.Point(p), complex->cell(p), v, 0, nullptr));
       }
     }
   }
@@ -150,8 +149,8 @@ TEST(Slivers, AreSeenFromSomeVertexOfTheSimplex) {
       for (const std::uint32_t q : s) {
         const auto v = FindSimplex<3>(complex->cell(q), q, s, key);
         ASSERT_TRUE(v.has_value());
-        seen = seen ||
-               ContainsSliver<3>(*complex, sample.Point(q), complex->cell(q), *v, 0.2, nullptr);
+        seen =
+            seen || HasThinFaceAt<3>(*complex, sample.Point(q), complex->cell(q), *v, 0.2, nullptr);
       }
       const std::vector<std::uint32_t> ids(s.begin(), s.end());
       EXPECT_EQ(seen, ContainsSliver(Vertices(sample, ids), sample.d, 0.2));
@@ -201,7 +200,7 @@ void ExpectConsistencyByDefinition(const Sample& sample, double sliver_bound) {
       const bool real = complex->SimplexOf(p, complex->cell(p), v, &s);
       // Slivers are judged in the star of their lowest vertex.
       if (real && s[0] == p &&
-          ContainsSliver<K>(*complex, sample.Point(p), complex->cell(p), v, sliver_bound, nullptr))
+          HasThinFaceAt<K>(*complex, sample.Point(p), complex->cell(p), v, sliver_bound, nullptr))
         worst_sliver = std::max(worst_sliver, radius);
       if (!real || !IsInStars(*complex, s)) {
         ++expected;

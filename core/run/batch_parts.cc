@@ -1,4 +1,4 @@
-#include "core/refinement/batch_parts.h"
+#include "core/run/batch_parts.h"
 
 #include <algorithm>
 #include <utility>

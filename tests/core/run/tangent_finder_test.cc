@@ -1,4 +1,4 @@
-#include "core/refinement/tangent_finder.h"
+#include "core/run/tangent_finder.h"
 
 #include <gtest/gtest.h>
 

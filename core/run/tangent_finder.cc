@@ -1,4 +1,4 @@
-#include "core/refinement/tangent_finder.h"
+#include "core/run/tangent_finder.h"
 
 #include <Eigen/SVD>
 #include <algorithm>
@@ -49,7 +49,7 @@ void TangentFinder::Ask() {
   block_.kind = QueryKind::kClosestPoint;
   block_.points.resize(d_, count * m * 2);
   for (Eigen::Index i = 0; i < count; ++i) {
-    LookUp(static_cast<std::size_t>(i));
+    CheckInterruption(static_cast<std::size_t>(i));
     const Eigen::Index point = open_[static_cast<std::size_t>(i)];
     Random random(seed_, static_cast<std::uint64_t>(point));
     for (int j = 0; j < m; ++j) {

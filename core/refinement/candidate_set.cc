@@ -1,0 +1,67 @@
+#include "core/refinement/candidate_set.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/instantiate.h"
+#include "core/base/parallel.h"
+#include "core/base/random.h"
+
+namespace stellate::core {
+namespace {
+
+// A point of the unit ball of R^K, uniform.
+template <int K>
+void UniformInBall(Random& random, double* x) {
+  double norm2 = 0;
+  for (int a = 0; a < K; ++a) {
+    x[a] = random.Normal();
+    norm2 += x[a] * x[a];
+  }
+  const double scale = std::pow(random.Uniform(), 1.0 / K) / std::sqrt(norm2);
+  for (int a = 0; a < K; ++a) x[a] *= scale;
+}
+
+}  // namespace
+
+template <int K>
+CandidateSet<K> DrawCandidates(const StarComplex<K>& complex, const ViolationBook<K>& book,
+                               const ResolvedCriteria& criteria, const Drawing& drawing,
+                               std::vector<Target<K>> targets) {
+  CandidateSet<K> set;
+  set.targets = std::move(targets);
+  set.first.reserve(set.targets.size() + 1);
+  set.in_flats.reserve(set.targets.size());
+  for (const Target<K>& t : set.targets) {
+    CheckInterruption(set.in_flats.size());
+    const bool one = t.violation.rule < Rule::kSliver;
+    set.first.push_back(set.drawn() + (one ? 1 : criteria.candidates));
+    set.in_flats.push_back(drawing.from_flats && !t.violation.fake && !book.has_no_flat(t.star));
+  }
+  set.points.resize(complex.d(), set.drawn());
+  ParallelFor(set.targets.size(), [&](std::size_t i) {
+    const Target<K>& t = set.targets[i];
+    Random random(drawing.seed ^ Mix64(t.star), drawing.round);
+    const bool has_failed = book.failed_attempts(t.star) > 0 && !t.is_coarse();
+    for (Eigen::Index c = set.first[i]; c < set.first[i + 1]; ++c) {
+      double x[K];
+      std::copy(t.x, t.x + K, x);
+      if (c > set.first[i] || has_failed) {
+        double step[K];
+        UniformInBall<K>(random, step);
+        for (int a = 0; a < K; ++a) x[a] += criteria.picking_radius * t.radius * step[a];
+      }
+      complex.Lift(t.star, x, set.points.col(c).data());
+    }
+  });
+  return set;
+}
+
+#define STELLATE_EACH(K)                                                                     \
+  template CandidateSet<K> DrawCandidates<K>(const StarComplex<K>&, const ViolationBook<K>&, \
+                                             const ResolvedCriteria&, const Drawing&,        \
+                                             std::vector<Target<K>>);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core

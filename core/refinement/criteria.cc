@@ -1,0 +1,57 @@
+#include "core/refinement/criteria.h"
+
+#include <algorithm>
+
+#include "core/geometry/reach.h"
+
+namespace stellate::core {
+namespace {
+
+// Cells begin as fake simplices a little larger than the step of the front.
+constexpr double kInradius = 1.2;
+// Theta0 by k: for k = 3 larger bounds do not terminate, for k <= 2 none is needed. A regular
+// simplex's fatness falls quickly with k, so the bound falls with it.
+constexpr double kDefaultSliverBound[kMaxDimension + 1] = {0, 0, 0, 0.2, 0.15, 0.1};
+
+// With a declared reach: M turns by no more under a simplex of the size asked for, radians. The
+// rest of the right angle is for the simplex itself.
+constexpr double kProofTurn = 0.7;
+
+constexpr double kDefaultAdvanceEpsilons = 3;
+constexpr double kDefaultAdvanceShare = 0.1;  // of the bounding box's diagonal
+
+}  // namespace
+
+ResolvedCriteria Resolve(const Specification& spec) {
+  const Criteria& c = spec.criteria;
+  ResolvedCriteria r;
+  r.epsilon = spec.epsilon;
+  if (spec.declared_reach) {
+    r.shape.reach = *spec.declared_reach;
+    r.epsilon = std::min(r.epsilon, RadiusThatTurns(kProofTurn, r.shape.reach));
+  }
+  r.radius_edge_bound = c.radius_edge_bound;
+  r.shape.sliver_bound = c.sliver_bound.value_or(kDefaultSliverBound[spec.dimension]);
+  r.picking_radius = c.picking_radius;
+  r.small_sliver_radius = c.small_sliver_radius;
+  r.candidates = c.candidates.value_or(spec.dimension <= 2 ? 1 : 10);
+  r.flat_alternations = c.flat_alternations;
+  r.ask_ahead = c.ask_ahead;
+  r.size_rate = c.size_rate.value_or(INFINITY);
+  r.max_deviation = c.max_deviation.value_or(INFINITY);
+  // Common centres mean something well below the local feature size; they are looked for up to
+  // epsilon, which is far above it where the size is graded.
+  const bool flats = spec.dimension <= 2 || r.graded();
+  r.judging = c.judging.value_or(flats ? Judging::kFlats : Judging::kCommonCentre);
+  r.sizes_given = r.graded() && spec.oracle.local_size;
+  double step = kDefaultAdvanceEpsilons * r.epsilon;
+  if (spec.bounding_box) {
+    const double diagonal = (spec.bounding_box->upper - spec.bounding_box->lower).norm();
+    step = std::max(step, kDefaultAdvanceShare * diagonal);
+  }
+  r.advance_step = c.advance_step.value_or(step);
+  r.inradius = kInradius * std::max(r.advance_step, r.epsilon);
+  return r;
+}
+
+}  // namespace stellate::core

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cmath>
+
+#include "core/refinement/rules.h"
+#include "core/specification.h"
+
+namespace stellate::core {
+
+// The constants of a run, defaults filled in for this k.
+struct ResolvedCriteria {
+  double epsilon, radius_edge_bound, picking_radius, small_sliver_radius, advance_step;
+  double inradius;  // of the fake simplex that a cell begins as, length
+  ShapeBounds shape;
+  int candidates, flat_alternations;
+  bool ask_ahead;
+  Judging judging;
+  double size_rate, max_deviation;  // infinity: no such criterion
+  bool sizes_given;                 // graded by what the client says
+  bool graded() const { return std::isfinite(size_rate) || std::isfinite(max_deviation); }
+};
+
+ResolvedCriteria Resolve(const Specification& spec);
+
+}  // namespace stellate::core

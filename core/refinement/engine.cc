@@ -1,0 +1,255 @@
+#include "core/refinement/engine.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
+
+#include "core/base/parallel.h"
+#include "core/refinement/independent_set.h"
+
+namespace stellate::core {
+namespace {
+
+// Good points that no longer help: this many times the vertices that R1 and R2 needed.
+constexpr double kMostGrowth = 4;
+constexpr std::uint64_t kLeastGrowth = 2000;
+
+// The order in which to go through `ids` so that neighbours follow each other: what one star's
+// judge has read of theirs is in the cache for the next.
+template <int K>
+std::vector<std::uint32_t> InOrderOfPlace(const StarComplex<K>& complex,
+                                          const std::vector<std::uint32_t>& ids) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> places(ids.size());
+  ParallelFor(ids.size(), [&](std::size_t i) {
+    places[i] = {complex.PlaceOf(ids[i]), static_cast<std::uint32_t>(i)};
+  });
+  ParallelSort(places, std::less<>());
+  std::vector<std::uint32_t> order;
+  order.reserve(places.size());
+  for (const auto& [place, i] : places) {
+    CheckInterruption(order.size());
+    order.push_back(i);
+  }
+  return order;
+}
+
+}  // namespace
+
+template <int K>
+Engine<K>::Engine(const Specification& spec, const ResolvedCriteria& criteria)
+    : criteria_(criteria),
+      asks_flats_(spec.oracle.intersect_flat),
+      random_seed_(spec.random_seed),
+      max_vertices_(spec.limits.max_vertices),
+      complex_(spec.ambient_dimension, criteria.epsilon, criteria.inradius, criteria.judging),
+      sizes_(criteria) {}
+
+template <int K>
+Engine<K> Engine<K>::ForRehearsal() const {
+  Engine rehearsal(*this);
+  rehearsal.caution_ = kRehearsalCaution;
+  rehearsal.asks_flats_ = true;
+  rehearsal.book_.ForgetFlats();
+  rehearsal.filled_ = {};
+  return rehearsal;
+}
+
+template <int K>
+Target<K> Engine<K>::Aim(std::uint32_t star, const Violation<K>& violation) const {
+  return TargetFor<K>(star, violation, sizes_.BoundAt(complex_, star), criteria_.advance_step,
+                      book_.failed_attempts(star));
+}
+
+// A simplex is mostly the worst one of several of its vertices' stars: the lowest of them has the
+// target, unless an attempt from there has failed.
+template <int K>
+std::vector<Target<K>> Engine<K>::SizeAndShapeTargets() const {
+  using Entry = typename ViolationBook<K>::Entry;
+  const std::vector<Entry>& entries = book_.size_and_shape();
+  constexpr std::uint16_t kNone = 0xffff;
+  std::vector<std::uint16_t> worst(complex_.size(), kNone);
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    CheckInterruption(i);
+    worst[entries[i].star] = static_cast<std::uint16_t>(entries[i].violation.vertex);
+  }
+  const auto is_seen_from_lower = [&](const Entry& entry) {
+    typename StarComplex<K>::Simplex simplex, other;
+    if (!complex_.SimplexOf(entry.star, complex_.cell(entry.star), entry.violation.vertex,
+                            &simplex))
+      return false;
+    for (const std::uint32_t q : simplex) {
+      if (q == entry.star) return false;
+      if (worst[q] != kNone && book_.failed_attempts(q) == 0 &&
+          complex_.SimplexOf(q, complex_.cell(q), worst[q], &other) && other == simplex)
+        return true;
+    }
+    return false;
+  };
+  std::vector<std::uint8_t> is_target(entries.size());
+  ParallelFor(entries.size(), [&](std::size_t i) {
+    is_target[i] = !book_.is_given_up(entries[i].star) && !is_seen_from_lower(entries[i]);
+  });
+  std::vector<Target<K>> targets;
+  targets.reserve(static_cast<std::size_t>(std::count(is_target.begin(), is_target.end(), 1)));
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    CheckInterruption(i);
+    if (is_target[i]) targets.push_back(Aim(entries[i].star, entries[i].violation));
+  }
+  return targets;
+}
+
+// A star's bound also follows its neighbours, whose sizes may have changed after it was judged.
+template <int K>
+void Engine<K>::RejudgeSizes() {
+  sizes_.Spread(complex_);
+  std::vector<std::optional<Violation<K>>> violations(complex_.size());
+  ParallelFor(complex_.size(), [&](std::uint32_t p) {
+    violations[p] =
+        WorstSizeOrShape<K>(complex_, p, sizes_.BoundAt(complex_, p), criteria_.radius_edge_bound);
+  });
+  book_.Replace(violations);
+}
+
+template <int K>
+std::vector<Target<K>> Engine<K>::RejudgeSuspects() {
+  if (book_.are_all_suspect()) before_good_points_ = complex_.size();
+  const std::vector<std::uint32_t> suspects = book_.TakeSuspects(filled_.mended());
+  std::vector<std::optional<Violation<K>>> found(suspects.size());
+  const std::vector<std::uint32_t> near = InOrderOfPlace<K>(complex_, suspects);
+  ParallelFor(suspects.size(), [&](std::size_t i) {
+    found[near[i]] = WorstSliverOrInconsistent<K>(complex_, suspects[near[i]], criteria_.shape);
+  });
+  filled_.ForgetMended();
+  if (std::any_of(found.begin(), found.end(), [](const auto& v) { return v.has_value(); }))
+    filled_.Fill(complex_, criteria_);
+  else
+    filled_.Clear();
+  std::vector<Target<K>> targets;
+  for (std::size_t i = 0; i < suspects.size(); ++i) {
+    CheckInterruption(i);
+    const std::uint32_t p = suspects[i];
+    const bool is_mended = found[i] && filled_.Mends(complex_, p, *found[i]);
+    if (is_mended) filled_.NoteMended(p);
+    // A simplex that leans will not always yield: the certificate says so.
+    if (!found[i] || is_mended || (found[i]->lean && book_.is_given_up(p))) {
+      book_.NoteJudged(p, std::nullopt);
+      continue;
+    }
+    book_.NoteJudged(p, found[i]->rule);
+    if (!book_.is_given_up(p)) targets.push_back(Aim(p, *found[i]));
+  }
+  return targets;
+}
+
+template <int K>
+bool Engine<K>::HasGrownTooMuch() const {
+  if (book_.are_all_suspect()) return false;
+  const double most = std::max(kMostGrowth * static_cast<double>(before_good_points_),
+                               static_cast<double>(before_good_points_ + kLeastGrowth));
+  return static_cast<double>(complex_.size()) > most;
+}
+
+template <int K>
+std::optional<std::vector<Target<K>>> Engine<K>::Plan() {
+  if (HasGrownTooMuch()) {
+    if (!std::isfinite(criteria_.shape.reach)) return std::nullopt;
+    criteria_.shape.reach = INFINITY;  // unproved, but a mesh
+  }
+  std::vector<Target<K>> targets = SizeAndShapeTargets();
+  if (sizes_.NeedsSpreading(complex_, targets.empty())) {
+    RejudgeSizes();
+    targets = SizeAndShapeTargets();
+  }
+  if (targets.empty()) targets = RejudgeSuspects();
+  return targets;
+}
+
+template <int K>
+bool Engine<K>::AllRulesHold() const {
+  const auto& entries = book_.size_and_shape();
+  return book_.blemished() == 0 &&
+         std::all_of(entries.begin(), entries.end(), [&](const auto& entry) {
+           return filled_.Mends(complex_, entry.star, entry.violation);
+         });
+}
+
+template <int K>
+std::vector<Target<K>> Engine<K>::Select(std::vector<Target<K>> targets) const {
+  return SelectIndependent<K>(complex_, std::move(targets), max_vertices_ - complex_.size());
+}
+
+template <int K>
+CandidateSet<K> Engine<K>::Draw(std::vector<Target<K>> targets, std::uint64_t round) const {
+  return DrawCandidates<K>(complex_, book_, criteria_, {asks_flats_, random_seed_, round},
+                           std::move(targets));
+}
+
+template <int K>
+Inserted Engine<K>::Insert(const CandidateSet<K>& candidates, const AnsweredPoints& answers) {
+  return Inserter<K>({complex_, sizes_, book_, criteria_}, candidates, answers, caution_,
+                     max_vertices_)
+      .Run();
+}
+
+template <int K>
+void Engine<K>::Append(const AnsweredPoints& answers, Eigen::Index c) {
+  complex_.Append(answers.points.col(c).data(), answers.tangents.col(c).data());
+  if (answers.sizes.size() > 0) sizes_.AppendGiven(answers.sizes[c]);
+}
+
+template <int K>
+typename Engine<K>::Change Engine<K>::Commit() {
+  const std::uint32_t first = book_.star_count();
+  const bool judged = !book_.are_all_suspect();
+  std::vector<std::uint32_t> around;
+  Change change = complex_.Commit(judged ? &around : nullptr);
+  std::vector<std::uint32_t>& touched = change.stars;
+  touched.resize(touched.size() + complex_.size() - first);
+  std::iota(touched.end() - (complex_.size() - first), touched.end(), first);
+  if (sizes_.is_estimated()) sizes_.Look(complex_, touched);
+  std::vector<std::optional<Violation<K>>> violations(touched.size());
+  ParallelFor(touched.size(), [&](std::size_t i) {
+    violations[i] = WorstSizeOrShape<K>(complex_, touched[i], sizes_.BoundAt(complex_, touched[i]),
+                                        criteria_.radius_edge_bound);
+  });
+  book_.Update(complex_.size(), touched, violations);
+  if (judged) {
+    book_.Suspect(around);
+    book_.Suspect(touched);
+  }
+  return change;
+}
+
+template <int K>
+void Engine<K>::JudgeAllAnew() {
+  book_.JudgeAllAnew();
+  filled_.ForgetMended();
+}
+
+template <int K>
+double Engine<K>::CountMissing(double share) const {
+  double missing = 0;
+  std::size_t step = 0;
+  for (const auto& entry : book_.size_and_shape()) {
+    CheckInterruption(step++);
+    const double ratio = entry.violation.radius / sizes_.BoundAt(complex_, entry.star);
+    missing += share * std::pow(std::max(ratio, 1.0), K);
+  }
+  return missing;
+}
+
+template <int K>
+std::vector<std::uint32_t> Engine<K>::Simplices() const {
+  return filled_.is_handed_out() ? filled_.cavities().simplices : complex_.Simplices();
+}
+
+template <int K>
+std::uint64_t Engine<K>::simplex_count() const {
+  return filled_.is_handed_out() ? filled_.cavities().simplices.size() / (K + 1)
+                                 : complex_.simplex_count();
+}
+
+STELLATE_INSTANTIATE_CLASS(Engine)
+
+}  // namespace stellate::core

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/base/instantiate.h"
+#include "core/complex/star_complex.h"
+#include "core/refinement/candidate_set.h"
+#include "core/refinement/criteria.h"
+#include "core/refinement/filled_mesh.h"
+#include "core/refinement/inserter.h"
+#include "core/refinement/size_field.h"
+#include "core/refinement/violation_book.h"
+
+namespace stellate::core {
+
+// The algorithm of Sec. 5.3.5 between rounds: the sample, its stars, and all that is known of them.
+// A round of whoever drives it is
+//
+//   targets = Plan()                        which simplices break a rule
+//   targets = Select(targets)               which of them can be mended together
+//   candidates = Draw(targets, round)       what to ask for
+//   Insert(candidates, answers); Commit()   what the answers change
+//
+// A value: a copy goes on from the same state by itself. It asks nobody, and knows nothing of
+// batches.
+template <int K>
+class Engine {
+ public:
+  using Change = typename StarComplex<K>::Change;
+
+  Engine(const Specification& spec, const ResolvedCriteria& criteria);
+
+  // A copy to be driven by guesses instead of M's points.
+  Engine ForRehearsal() const;
+
+  bool is_full() const { return complex_.size() >= max_vertices_; }
+
+  // The violations to mend next, by the first rules that any star breaks. Empty: no more can be
+  // done, see AllRulesHold. Nothing: points are inserted without end.
+  std::optional<std::vector<Target<K>>> Plan();
+  // After a Plan that found no targets.
+  bool AllRulesHold() const;
+  std::vector<Target<K>> Select(std::vector<Target<K>> targets) const;
+  CandidateSet<K> Draw(std::vector<Target<K>> targets, std::uint64_t round) const;
+
+  Inserted Insert(const CandidateSet<K>& candidates, const AnsweredPoints& answers);
+  // Appends a candidate whatever the rules say. REQUIRES: !is_full() and that it was found.
+  void Append(const AnsweredPoints& answers, Eigen::Index candidate);
+  // Brings the stars and all that is known of them up to date with what was inserted.
+  Change Commit();
+  // What grows from the points appended last is judged by all rules once it is whole.
+  void JudgeAllAnew();
+
+  // How much is left to do: the vertices still to come, as far as circumradii tell. A cell of
+  // circumradius R will have to hold `share` (R / bound)^K more.
+  double CountMissing(double share) const;
+
+  const StarComplex<K>& complex() const { return complex_; }
+  const ResolvedCriteria& criteria() const { return criteria_; }
+  SizeField<K>& sizes() { return sizes_; }
+  const SizeField<K>& sizes() const { return sizes_; }
+  const ViolationBook<K>& book() const { return book_; }
+  FilledMesh<K>& filled() { return filled_; }
+  const FilledMesh<K>& filled() const { return filled_; }
+
+  // The mesh: K+1 ascending ids each.
+  std::vector<std::uint32_t> Simplices() const;
+  std::uint64_t simplex_count() const;
+
+ private:
+  std::vector<Target<K>> SizeAndShapeTargets() const;
+  std::vector<Target<K>> RejudgeSuspects();
+  void RejudgeSizes();
+  bool HasGrownTooMuch() const;
+  Target<K> Aim(std::uint32_t star, const Violation<K>& violation) const;
+
+  ResolvedCriteria criteria_;
+  Caution caution_;
+  bool asks_flats_;
+  std::uint64_t random_seed_, max_vertices_;
+  StarComplex<K> complex_;
+  SizeField<K> sizes_;
+  ViolationBook<K> book_;
+  FilledMesh<K> filled_;
+  std::uint64_t before_good_points_ = 0;  // vertices when R1 and R2 first held
+};
+
+STELLATE_DECLARE_CLASS(Engine)
+
+}  // namespace stellate::core

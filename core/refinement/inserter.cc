@@ -1,0 +1,185 @@
+#include "core/refinement/inserter.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "core/base/parallel.h"
+#include "core/base/vector_ops.h"
+
+namespace stellate::core {
+namespace {
+
+// Targets of a round lie R apart: images no farther than this share of R from their targets lie at
+// least R / 2 apart, as far as the empty ball asks.
+constexpr double kNearAim = 0.25;
+// Good points are chosen off the centre.
+constexpr double kGoodPointSpacing = 0.25;
+// True points fall elsewhere than predicted: one that comes nearer to another than this share of
+// the spacing that was planned for it would cost quality.
+constexpr double kKeptSpacing = 0.95;
+
+}  // namespace
+
+template <int K>
+Inserter<K>::Inserter(const Parts& to, const CandidateSet<K>& candidates,
+                      const AnsweredPoints& answers, const Caution& caution,
+                      std::uint64_t max_vertices)
+    : to_(to),
+      candidates_(candidates),
+      answers_(answers),
+      caution_(caution),
+      max_vertices_(max_vertices) {
+  done_.used.assign(static_cast<std::size_t>(candidates.size()), 0);
+}
+
+template <int K>
+Inserted Inserter<K>::Run() {
+  InsertTargets();
+  InsertPlanned();
+  return std::move(done_);
+}
+
+template <int K>
+void Inserter<K>::InsertTargets() {
+  const std::vector<Target<K>>& targets = candidates_.targets;
+  std::vector<int> best(targets.size(), 0);
+  std::vector<RefinedPoint> refined(targets.size());
+  ParallelFor(targets.size(), [&](std::size_t i) {
+    if (targets[i].violation.rule >= Rule::kSliver)
+      best[i] = BestCandidate(i);
+    else
+      refined[i] = JudgeRefined(i);
+  });
+  bool all_near_aim = true;
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    CheckInterruption(i);
+    if (targets[i].violation.rule >= Rule::kSliver)
+      InsertGoodPoint(i, best[i]);
+    else
+      InsertRefined(i, refined[i], &all_near_aim);
+  }
+}
+
+template <int K>
+double Inserter<K>::Clearance(const Target<K>& t) const {
+  return t.is_coarse() ? caution_.coarse_spacing * std::min(t.size_bound, t.radius)
+                       : caution_.empty_ball * t.radius;
+}
+
+template <int K>
+typename Inserter<K>::RefinedPoint Inserter<K>::JudgeRefined(std::size_t i) const {
+  const Target<K>& t = candidates_.targets[i];
+  const Eigen::Index c = candidates_.first[i];
+  RefinedPoint judged;
+  judged.found = answers_.found[static_cast<std::size_t>(c)];
+  if (!judged.found) return judged;
+  const double* y = answers_.points.col(c).data();
+  const StarComplex<K>& complex = to_.complex;
+  judged.duplicate = complex.AnyWithin(y, Clearance(t));
+  judged.cuts_violation = !judged.duplicate && complex.CutsVertex(t.star, t.violation.vertex, y);
+  judged.near_aim = !caution_.is_rehearsal && Distance(y, candidates_.points.col(c).data(),
+                                                       complex.d()) <= kNearAim * t.radius;
+  return judged;
+}
+
+template <int K>
+void Inserter<K>::InsertRefined(std::size_t i, RefinedPoint judged, bool* all_near_aim) {
+  const Target<K>& t = candidates_.targets[i];
+  const Eigen::Index c = candidates_.first[i];
+  if (!judged.found) {
+    if (candidates_.in_flats[i] && !caution_.is_rehearsal)
+      to_.book.NoteNoFlat(t.star);
+    else
+      NoteFailedAttempt(t.star);
+    return;
+  }
+  const double* y = answers_.points.col(c).data();
+  // Another of this round may have come near, unless all have stayed near where they were aimed.
+  *all_near_aim = *all_near_aim && judged.near_aim;
+  if (judged.cuts_violation && !*all_near_aim)
+    judged.duplicate = to_.complex.AnyWithin(y, Clearance(t));
+  if (judged.duplicate || !judged.cuts_violation) {
+    done_.duplicates += judged.duplicate;
+    return NoteFailedAttempt(t.star);
+  }
+  done_.front_moved = done_.front_moved || t.violation.fake;
+  Insert(c, t.violation.rule, t.star);
+}
+
+template <int K>
+int Inserter<K>::BestCandidate(std::size_t i) const {
+  const Target<K>& t = candidates_.targets[i];
+  const StarComplex<K>& complex = to_.complex;
+  thread_local typename StarComplex<K>::Cell::Scratch scratch;
+  thread_local typename StarComplex<K>::Tentative tentative;
+  int best = -1, fewest = std::numeric_limits<int>::max();
+  const Eigen::Index first = candidates_.first[i];
+  for (Eigen::Index c = first; c < candidates_.first[i + 1] && fewest > 0; ++c) {
+    if (!answers_.found[static_cast<std::size_t>(c)]) continue;
+    const double* y = answers_.points.col(c).data();
+    if (!complex.CutsVertex(t.star, t.violation.vertex, y) ||
+        complex.AnyWithin(y, kGoodPointSpacing * t.radius))
+      continue;
+    const int index = static_cast<int>(c - first);
+    if (to_.criteria.candidates == 1) return index;
+    complex.TryPoint(y, answers_.tangents.col(c).data(), t.star, scratch, &tentative);
+    const int bad = CountBad<K>(complex, y, tentative, to_.criteria.shape,
+                                to_.criteria.small_sliver_radius * t.radius, fewest);
+    if (bad < fewest) {
+      fewest = bad;
+      best = index;
+    }
+  }
+  return best;
+}
+
+template <int K>
+void Inserter<K>::InsertGoodPoint(std::size_t i, int best) {
+  const Target<K>& t = candidates_.targets[i];
+  if (best < 0) {
+    to_.book.NoteNoFlat(t.star);  // if that was why
+    return NoteFailedAttempt(t.star);
+  }
+  const Eigen::Index c = candidates_.first[i] + best;
+  if (to_.complex.AnyWithin(answers_.points.col(c).data(), kGoodPointSpacing * t.radius))
+    return;  // another of this round came near
+  Insert(c, t.violation.rule, t.star);
+}
+
+template <int K>
+void Inserter<K>::InsertPlanned() {
+  const PlannedPoints& planned = candidates_.planned;
+  for (Eigen::Index i = 0; i < planned.size(); ++i) {
+    CheckInterruption(static_cast<std::size_t>(i));
+    if (to_.complex.size() >= max_vertices_) break;
+    const Eigen::Index c = candidates_.drawn() + i;
+    if (!answers_.found[static_cast<std::size_t>(c)]) continue;
+    if (to_.complex.AnyWithin(answers_.points.col(c).data(), kKeptSpacing * planned.spacing[i])) {
+      ++done_.duplicates;
+      continue;
+    }
+    Insert(c, planned.rules[static_cast<std::size_t>(i)], StarComplex<K>::kNone);
+  }
+}
+
+template <int K>
+void Inserter<K>::Insert(Eigen::Index c, Rule rule, std::uint32_t near) {
+  to_.complex.Append(answers_.points.col(c).data(), answers_.tangents.col(c).data(), near);
+  if (answers_.sizes.size() > 0) to_.sizes.AppendGiven(answers_.sizes[c]);
+  done_.used[static_cast<std::size_t>(c)] = 1;
+  done_.rules.push_back(rule);
+}
+
+// In a rehearsal at once: what the surrogate refuses is left for true points, since shorter steps
+// would only crowd the border of what it knows.
+template <int K>
+void Inserter<K>::NoteFailedAttempt(std::uint32_t star) {
+  if (caution_.is_rehearsal)
+    to_.book.GiveUp(star);
+  else
+    to_.book.NoteFailedAttempt(star);
+}
+
+STELLATE_INSTANTIATE_CLASS(Inserter)
+
+}  // namespace stellate::core

@@ -1,0 +1,102 @@
+#include "core/refinement/rehearsal.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/parallel.h"
+#include "core/refinement/surrogate.h"
+
+namespace stellate::core {
+namespace {
+
+// R3 and R4 are rehearsed for this many rounds: what is inconsistent on the surrogate is mostly
+// inconsistent on M, but not to the last simplex.
+constexpr int kGoodPointRounds = 12;
+// A target is left to the rehearsal when that has a point within this share of its circumradius.
+constexpr double kMended = 0.9;
+// A rehearsal that wants this many times what seems to be missing is on the wrong track.
+constexpr double kMostWanted = 4;
+
+template <int K>
+AnsweredPoints AnswersOf(Surrogate<K>& surrogate, const StarComplex<K>& complex,
+                         const CandidateSet<K>& candidates) {
+  std::vector<const double*> flats(static_cast<std::size_t>(candidates.size()), nullptr);
+  Eigen::VectorXd spacing(candidates.size());
+  for (std::size_t i = 0; i < candidates.targets.size(); ++i) {
+    CheckInterruption(i);
+    const Target<K>& t = candidates.targets[i];
+    for (Eigen::Index c = candidates.first[i]; c < candidates.first[i + 1]; ++c) {
+      spacing[c] = t.radius;
+      if (candidates.in_flats[i]) flats[static_cast<std::size_t>(c)] = complex.Tangent(t.star);
+    }
+  }
+  return surrogate.Answer(candidates.points, flats, spacing);
+}
+
+// Returns what the inserted points are for.
+template <int K>
+std::vector<Rule> Drive(Engine<K>* rehearsal, const Engine<K>& original, std::uint64_t round) {
+  const double count = original.complex().size();
+  const double most = count + kMostWanted * (original.CountMissing(1) + count);
+  const ResolvedCriteria& criteria = original.criteria();
+  Surrogate<K> surrogate(original.complex(), criteria.advance_step, criteria.epsilon,
+                         original.sizes().given());
+  std::vector<Rule> rules;
+  for (int good_rounds = 0; good_rounds < kGoodPointRounds; ++round) {
+    if (rehearsal->is_full() || rehearsal->complex().size() > most) break;
+    auto targets = rehearsal->Plan();
+    if (!targets || targets->empty()) break;
+    const CandidateSet<K> candidates = rehearsal->Draw(rehearsal->Select(*targets), round);
+    good_rounds += candidates.targets.front().violation.rule >= Rule::kSliver;
+    const Inserted inserted =
+        rehearsal->Insert(candidates, AnswersOf(surrogate, rehearsal->complex(), candidates));
+    rules.insert(rules.end(), inserted.rules.begin(), inserted.rules.end());
+    rehearsal->Commit();
+  }
+  return rules;
+}
+
+}  // namespace
+
+template <int K>
+PlannedPoints Rehearse(const Engine<K>& engine, std::uint64_t round,
+                       std::vector<Target<K>>* targets) {
+  Engine<K> rehearsal = engine.ForRehearsal();
+  PlannedPoints planned;
+  planned.rules = Drive(&rehearsal, engine, round);
+  const StarComplex<K>& rehearsed = rehearsal.complex();
+  const std::uint32_t count = engine.complex().size();
+  const auto wanted = static_cast<Eigen::Index>(rehearsed.size() - count);
+  const int d = rehearsed.d();
+  planned.points.resize(d, wanted);
+  planned.tangents.resize(d * K, wanted);
+  planned.spacing.resize(wanted);
+  for (Eigen::Index i = 0; i < wanted; ++i) {
+    CheckInterruption(static_cast<std::size_t>(i));
+    const std::uint32_t p = count + static_cast<std::uint32_t>(i);
+    std::copy_n(rehearsed.Point(p), d, planned.points.col(i).data());
+    std::copy_n(rehearsed.Tangent(p), d * K, planned.tangents.col(i).data());
+    double nearest2 = INFINITY;
+    const auto& cell = rehearsed.cell(p);
+    for (std::size_t f = 0; f < cell.facet_count(); ++f)
+      if (!IsFake(cell.id(f))) nearest2 = std::min(nearest2, rehearsed.EdgeLength2(p, f));
+    planned.spacing[i] = std::isinf(nearest2) ? engine.criteria().epsilon : std::sqrt(nearest2);
+  }
+  std::vector<double> centre(static_cast<std::size_t>(d));
+  std::erase_if(*targets, [&, step = std::size_t{0}](const Target<K>& t) mutable {
+    CheckInterruption(step++);
+    engine.complex().Lift(t.star, t.x, centre.data());
+    bool mended = false;
+    rehearsed.ForEachWithin(centre.data(), kMended * t.radius,
+                            [&](std::uint32_t p) { mended = mended || p >= count; });
+    return mended;
+  });
+  return planned;
+}
+
+#define STELLATE_EACH(K) \
+  template PlannedPoints Rehearse<K>(const Engine<K>&, std::uint64_t, std::vector<Target<K>>*);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core

@@ -1,0 +1,161 @@
+#include "core/refinement/size_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
+#include <utility>
+
+#include "core/base/parallel.h"
+
+namespace stellate::core {
+namespace {
+
+// Shorter edges than this share of a star's longest say little of curvature and much of noise.
+constexpr double kTellingEdge = 0.5;
+// The finest graded sizes, in epsilon: an estimate may come of noise; what is given is meant, but
+// below it the weights of StarComplex would no longer be small against circumradii.
+constexpr double kFinestEstimated = 1.0 / 64;
+constexpr double kFinestGiven = 1.0 / 1024;
+// Estimates are spread anew whenever the sample has grown by this factor.
+constexpr double kSpreadingGrowth = 1.25;
+
+}  // namespace
+
+template <int K>
+SizeField<K>::SizeField(const ResolvedCriteria& criteria)
+    : epsilon_(criteria.epsilon),
+      size_rate_(criteria.size_rate),
+      max_deviation_(criteria.max_deviation),
+      is_graded_(criteria.graded()),
+      is_given_(criteria.sizes_given) {}
+
+// |q - p|^2 / (2 dist(q, T_pM)) bounds the reach from above for any q of M (Federer); over the
+// edges of a star, short ones left out, it is the radius of curvature there.
+template <int K>
+double SizeField<K>::SeenFrom(const StarComplex<K>& complex, std::uint32_t p) const {
+  const auto& cell = complex.cell(p);
+  double longest2 = 0;
+  for (std::size_t f = 0; f < cell.facet_count(); ++f)
+    if (!IsFake(cell.id(f))) longest2 = std::max(longest2, complex.EdgeLength2(p, f));
+  double size = INFINITY;
+  for (std::size_t f = 0; f < cell.facet_count(); ++f) {
+    if (IsFake(cell.id(f))) continue;
+    double along[K];
+    const double distance2 = 2 * complex.HalfSpace(p, f, along);
+    if (distance2 < kTellingEdge * kTellingEdge * longest2) continue;
+    double along2 = 0;
+    for (const double a : along) along2 += a * a;
+    const double away = std::sqrt(std::max(distance2 - along2, 0.0));
+    if (away > 0) size = std::min(size, distance2 / (2 * away));
+  }
+  return size;
+}
+
+template <int K>
+void SizeField<K>::Look(const StarComplex<K>& complex, const std::vector<std::uint32_t>& stars) {
+  seen_.resize(complex.size(), INFINITY);
+  ParallelFor(stars.size(), [&](std::size_t i) { seen_[stars[i]] = SeenFrom(complex, stars[i]); });
+  is_spread_ = false;
+}
+
+// What is seen from there, from the neighbours, and from all when that was last spread.
+template <int K>
+double SizeField<K>::Estimate(const StarComplex<K>& complex, std::uint32_t p) const {
+  double size = seen_[p];
+  const auto& cell = complex.cell(p);
+  for (std::size_t f = 0; f < cell.facet_count(); ++f) {
+    const std::uint32_t q = cell.id(f);
+    if (IsFake(q)) continue;
+    const double there = q < spread_.size() ? std::min(spread_[q], seen_[q]) : seen_[q];
+    size = std::min(size, there + std::sqrt(complex.EdgeLength2(p, f)));
+  }
+  return size;
+}
+
+// The largest 1-Lipschitz function over the edges of the stars that is nowhere above what is seen.
+template <int K>
+void SizeField<K>::Spread(const StarComplex<K>& complex) {
+  using Entry = std::pair<double, std::uint32_t>;
+  std::vector<Entry> queue;
+  for (std::uint32_t p = 0; p < complex.size(); ++p)
+    if (seen_[p] < INFINITY) queue.emplace_back(seen_[p], p);
+  std::make_heap(queue.begin(), queue.end(), std::greater<>());
+  spread_ = seen_;
+  for (std::size_t step = 0; !queue.empty(); ++step) {
+    CheckInterruption(step);
+    std::pop_heap(queue.begin(), queue.end(), std::greater<>());
+    const auto [size, p] = queue.back();
+    queue.pop_back();
+    if (size > spread_[p]) continue;
+    const auto& cell = complex.cell(p);
+    for (std::size_t f = 0; f < cell.facet_count(); ++f) {
+      const std::uint32_t q = cell.id(f);
+      if (IsFake(q)) continue;
+      const double there = size + std::sqrt(complex.EdgeLength2(p, f));
+      if (!(there < spread_[q])) continue;
+      spread_[q] = there;
+      queue.emplace_back(there, q);
+      std::push_heap(queue.begin(), queue.end(), std::greater<>());
+    }
+  }
+  is_spread_ = true;
+  spread_over_ = complex.size();
+}
+
+template <int K>
+bool SizeField<K>::NeedsSpreading(const StarComplex<K>& complex, bool nothing_else_to_do) const {
+  return is_estimated() &&
+         ((nothing_else_to_do && !is_spread_) || complex.size() > kSpreadingGrowth * spread_over_);
+}
+
+template <int K>
+double SizeField<K>::WantedFor(double size) const {
+  const double by_deviation = std::sqrt(2 * max_deviation_ * size);
+  return std::min(size_rate_ * size, by_deviation);
+}
+
+template <int K>
+double SizeField<K>::FinestBound() const {
+  return (is_given_ ? kFinestGiven : kFinestEstimated) * epsilon_;
+}
+
+template <int K>
+double SizeField<K>::BoundFor(double size) const {
+  return std::clamp(WantedFor(size), FinestBound(), epsilon_);
+}
+
+// Of given sizes the star's own alone: where they differ within a simplex, the star of the vertex
+// that has the smallest sees to it.
+template <int K>
+double SizeField<K>::BoundAt(const StarComplex<K>& complex, std::uint32_t p) const {
+  if (!is_graded_) return epsilon_;
+  return BoundFor(is_given_ ? given_[p] : Estimate(complex, p));
+}
+
+template <int K>
+double SizeField<K>::MaxRadiusOverSize(const StarComplex<K>& complex) {
+  if (is_given_) {
+    std::vector<std::uint32_t> all(complex.size());
+    std::iota(all.begin(), all.end(), 0u);
+    Look(complex, all);
+    Spread(complex);
+  }
+  double most = 0;
+  for (std::uint32_t p = 0; p < complex.size(); ++p) {
+    CheckInterruption(p);
+    most = std::max(most, std::sqrt(complex.cell(p).max_norm2()) / Estimate(complex, p));
+  }
+  return most;
+}
+
+template <int K>
+std::uint64_t SizeField<K>::CountTooFine() const {
+  std::uint64_t count = 0;
+  for (const double size : given_) count += WantedFor(size) < FinestBound();
+  return count;
+}
+
+STELLATE_INSTANTIATE_CLASS(SizeField)
+
+}  // namespace stellate::core

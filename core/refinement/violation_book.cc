@@ -1,0 +1,90 @@
+#include "core/refinement/violation_book.h"
+
+#include <algorithm>
+#include <functional>
+#include <numeric>
+
+#include "core/base/parallel.h"
+
+namespace stellate::core {
+
+template <int K>
+void ViolationBook<K>::Update(std::uint32_t count, const std::vector<std::uint32_t>& judged,
+                              const std::vector<std::optional<Violation<K>>>& violations) {
+  is_entered_.resize(count, 0);
+  failed_attempts_.resize(count, 0);
+  no_flat_.resize(count, 0);
+  for (std::size_t i = 0; i < judged.size(); ++i) {
+    CheckInterruption(i);
+    const std::uint32_t p = judged[i];
+    failed_attempts_[p] = no_flat_[p] = is_entered_[p] = 0;
+  }
+  std::erase_if(size_and_shape_, [&, step = std::size_t{0}](const Entry& entry) mutable {
+    CheckInterruption(step++);
+    return !is_entered_[entry.star];
+  });
+  for (std::size_t i = 0; i < judged.size(); ++i) {
+    CheckInterruption(i);
+    if (!violations[i]) continue;
+    is_entered_[judged[i]] = 1;
+    size_and_shape_.push_back({judged[i], *violations[i]});
+  }
+}
+
+template <int K>
+void ViolationBook<K>::Replace(const std::vector<std::optional<Violation<K>>>& violations) {
+  size_and_shape_.clear();
+  for (std::uint32_t p = 0; p < violations.size(); ++p) {
+    CheckInterruption(p);
+    is_entered_[p] = violations[p].has_value();
+    if (violations[p]) size_and_shape_.push_back({p, *violations[p]});
+  }
+}
+
+template <int K>
+void ViolationBook<K>::JudgeAllAnew() {
+  all_suspect_ = true;
+  blemished_.clear();
+}
+
+template <int K>
+void ViolationBook<K>::Suspect(const std::vector<std::uint32_t>& stars) {
+  suspects_.insert(suspects_.end(), stars.begin(), stars.end());
+}
+
+template <int K>
+std::vector<std::uint32_t> ViolationBook<K>::TakeSuspects(
+    const std::vector<std::uint32_t>& besides) {
+  if (all_suspect_) {
+    suspects_.resize(star_count());
+    std::iota(suspects_.begin(), suspects_.end(), 0u);
+    all_suspect_ = false;
+  }
+  Suspect(blemished_);
+  Suspect(besides);
+  blemished_.clear();
+  slivers_ = inconsistent_ = 0;
+  std::vector<std::uint32_t> taken;
+  taken.swap(suspects_);
+  ParallelSort(taken, std::less<>());
+  taken.erase(std::unique(taken.begin(), taken.end()), taken.end());
+  return taken;
+}
+
+// A star that was given up for R1 or R2 is not entered any more once it was judged by the others.
+template <int K>
+void ViolationBook<K>::NoteJudged(std::uint32_t star, std::optional<Rule> blemish) {
+  is_entered_[star] = 0;
+  if (!blemish) return;
+  blemished_.push_back(star);
+  ++(*blemish == Rule::kSliver ? slivers_ : inconsistent_);
+}
+
+template <int K>
+void ViolationBook<K>::NoteFailedAttempt(std::uint32_t star) {
+  if (!is_given_up(star)) ++failed_attempts_[star];
+}
+
+STELLATE_INSTANTIATE_CLASS(ViolationBook)
+
+}  // namespace stellate::core

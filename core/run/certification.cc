@@ -1,0 +1,61 @@
+#include "core/run/certification.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/base/instantiate.h"
+#include "core/base/interruption.h"
+#include "core/complex/consistency.h"
+
+namespace stellate::core {
+namespace {
+
+// max R_p over the simplices that all stars agree on, squared: the others are not in the mesh.
+template <int K>
+double MaxAgreedNorm2(const StarComplex<K>& complex, std::uint32_t p) {
+  const auto& cell = complex.cell(p);
+  double most = 0;
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+    if (cell.norm2(v) > most && IsConsistent<K>(complex, p, v)) most = cell.norm2(v);
+  return most;
+}
+
+MeshView WithSimplices(MeshView mesh, const std::vector<std::uint32_t>& simplices) {
+  mesh.simplices = &simplices;
+  return mesh;
+}
+
+}  // namespace
+
+template <int K>
+StarFacts FactsOf(Engine<K>& engine) {
+  const StarComplex<K>& complex = engine.complex();
+  StarFacts facts;
+  facts.converged = true;
+  for (std::uint32_t p = 0; p < complex.size(); ++p) {
+    CheckInterruption(p);
+    const double norm2 = engine.filled().is_handed_out() ? MaxAgreedNorm2<K>(complex, p)
+                                                         : complex.cell(p).max_norm2();
+    facts.max_circumradius = std::max(facts.max_circumradius, std::sqrt(norm2));
+  }
+  if (engine.criteria().graded()) facts.max_size_ratio = engine.sizes().MaxRadiusOverSize(complex);
+  return facts;
+}
+
+Certification::Certification(const Specification& spec, MeshView mesh,
+                             std::vector<std::uint32_t> simplices, const StarFacts& facts,
+                             std::vector<double> known)
+    : simplices_(std::move(simplices)),
+      certifier_(spec, WithSimplices(mesh, simplices_), facts, std::move(known)) {}
+
+std::vector<QueryBlock> Certification::Questions() {
+  const std::vector<QueryBlock>* blocks = certifier_.NextBlocks();
+  return blocks ? *blocks : std::vector<QueryBlock>();
+}
+
+#define STELLATE_EACH(K) template StarFacts FactsOf<K>(Engine<K>&);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core

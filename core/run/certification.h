@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/certificate/certifier.h"
+#include "core/refinement/engine.h"
+#include "core/run/asker.h"
+
+namespace stellate::core {
+
+// What the stars of a mesh that every rule holds for say of it. `engine` learns what the sample
+// shows of its sizes.
+template <int K>
+StarFacts FactsOf(Engine<K>& engine);
+
+// Asks for what a certificate wants to know, and holds it.
+class Certification final : public Asker {
+ public:
+  // spec      borrowed
+  // mesh      its points and tangents are borrowed and must not change; its simplices are set here
+  // known     points of M, d each, that are no vertices
+  Certification(const Specification& spec, MeshView mesh, std::vector<std::uint32_t> simplices,
+                const StarFacts& facts, std::vector<double> known);
+
+  std::vector<QueryBlock> Questions() override;
+  void Absorb(const std::vector<AnswerBlock>& answers) override { certifier_.Absorb(answers); }
+
+  // Once there are no more questions; see Certifier.
+  const Certificate& certificate() const { return certifier_.certificate(); }
+  const std::vector<double>& Uncovered() const { return certifier_.Uncovered(); }
+  std::vector<double> TakeSeen() { return certifier_.TakeSeen(); }
+
+ private:
+  std::vector<std::uint32_t> simplices_;
+  Certifier certifier_;
+};
+
+}  // namespace stellate::core

@@ -1,0 +1,101 @@
+#include "core/run/ending.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/base/instantiate.h"
+#include "core/base/interruption.h"
+#include "core/base/message.h"
+#include "core/certificate/evidence.h"
+#include "core/certificate/findings.h"
+#include "core/complex/consistency.h"
+
+namespace stellate::core {
+namespace {
+
+// Of epsilon: answers wrong by more do not go unnoticed (RepeatCheck), and points of a run that
+// does not end may lie so near to each other that this tells what they seem to bend by.
+constexpr double kLikelyError = 1e-3;
+
+}  // namespace
+
+// The reach comes from neighbours alone: |q - p|^2 / (2 dist(q, T_pM)).
+template <int K>
+void DescribeUnfinished(const Engine<K>& engine, double epsilon, Certificate* certificate) {
+  const StarComplex<K>& complex = engine.complex();
+  const std::uint32_t count = std::min(complex.size(), engine.book().star_count());
+  double reach = std::numeric_limits<double>::infinity();
+  for (std::uint32_t p = 0; p < count; ++p) {
+    CheckInterruption(p);
+    const auto& cell = complex.cell(p);
+    if (!cell.bounded()) continue;
+    certificate->inconsistent_simplices += CountInconsistent<K>(complex, p);
+    certificate->max_circumradius =
+        std::max(certificate->max_circumradius, std::sqrt(cell.max_norm2()));
+    for (std::size_t f = 0; f < cell.facet_count(); ++f) {
+      double along[K];
+      const double distance2 = 2 * complex.HalfSpace(p, f, along);
+      double along2 = 0;
+      for (const double a : along) along2 += a * a;
+      const double away = std::sqrt(std::max(distance2 - along2, 0.0));
+      if (IsTelling(std::sqrt(distance2), away, epsilon, kLikelyError * epsilon))
+        reach = std::min(reach, distance2 / (2 * away));
+    }
+  }
+  if (std::isinf(reach)) {
+    certificate->warnings.push_back(
+        Message("no star could be closed: epsilon ", Brief(epsilon),
+                " may be far too coarse for the manifold, or the manifold not closed or not ", K,
+                "-dimensional."));
+    return;
+  }
+  certificate->estimated_reach = reach;
+  certificate->epsilon_over_reach = epsilon / reach;
+  if (epsilon > kCoarse * reach)
+    certificate->warnings.push_back(TooCoarse(epsilon / reach, reach, "") + ".");
+}
+
+template <int K>
+std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent) {
+  const StarComplex<K>& complex = engine.complex();
+  const auto& entries = engine.book().size_and_shape();
+  std::string left;
+  if (!entries.empty())
+    left = Message(entries.size(), " stars break rule R1 or R2, one of them that of vertex ",
+                   entries.front().star, "; ");
+  left += Message(inconsistent, " simplices are inconsistent");
+  for (std::uint32_t p = 0; p < complex.size(); ++p) {
+    CheckInterruption(p);
+    const auto found = FindInconsistentConfiguration<K>(complex, p);
+    if (!found) continue;
+    left += Message(", the first in the star of vertex ", found->holder, " but not in that of ",
+                    found->refuser);
+    if (found->nearer) left += Message(", where vertex ", *found->nearer, " is nearer");
+    break;
+  }
+  return left + "; try a smaller epsilon";
+}
+
+template <int K>
+void WarnOfCompromises(const Engine<K>& engine, double epsilon, Certificate* certificate) {
+  if (const std::uint64_t too_fine = engine.sizes().CountTooFine(); too_fine > 0)
+    certificate->warnings.push_back(Message("the sizes given ask for circumradii below ",
+                                            Brief(engine.sizes().FinestBound()), " at ", too_fine,
+                                            " vertices, finer than is meshed at epsilon ",
+                                            Brief(epsilon), ": take epsilon smaller."));
+  const FilledCavities& filled = engine.filled().cavities();
+  if (engine.filled().is_handed_out())
+    certificate->warnings.push_back(Message(
+        "Stars disagreed about ", filled.inconsistent, " simplices in ", filled.cavities,
+        " places; ", filled.filling, " simplices fill these instead, not all of them Delaunay."));
+}
+
+#define STELLATE_EACH(K)                                                       \
+  template void DescribeUnfinished<K>(const Engine<K>&, double, Certificate*); \
+  template std::string WhatIsLeft<K>(const Engine<K>&, std::uint64_t);         \
+  template void WarnOfCompromises<K>(const Engine<K>&, double, Certificate*);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core

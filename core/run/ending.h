@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+
+#include "core/refinement/engine.h"
+#include "core/report.h"
+
+namespace stellate::core {
+
+// What can be said without further questions of a mesh that did not converge: inconsistent
+// simplices, circumradii, the reach that neighbours show, and a warning where epsilon is too coarse
+// for that. epsilon: as the client asked for it, length.
+template <int K>
+void DescribeUnfinished(const Engine<K>& engine, double epsilon, Certificate* certificate);
+
+// What still breaks a rule, for people. inconsistent: simplices that DescribeUnfinished counted.
+template <int K>
+std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent);
+
+// Warns where a converged mesh is not what was asked for to the last star: sizes finer than are
+// meshed, cavities that were filled.
+template <int K>
+void WarnOfCompromises(const Engine<K>& engine, double epsilon, Certificate* certificate);
+
+}  // namespace stellate::core

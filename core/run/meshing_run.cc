@@ -1,0 +1,377 @@
+#include "core/run/meshing_run.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "core/base/arenas.h"
+#include "core/base/message.h"
+#include "core/certificate/findings.h"
+#include "core/refinement/rehearsal.h"
+#include "core/run/ending.h"
+#include "core/run/progress_meter.h"
+#include "core/run/seeding.h"
+
+namespace stellate::core {
+namespace {
+
+// Differences of closest points are taken over this share of epsilon: the error is its square over
+// the reach's, far below what directions may be wrong by (0.03).
+constexpr double kTangentStep = 0.01;
+
+// With a declared reach: what tangents found by differences may be wrong by, radians.
+constexpr double kTangentError = 0.03;
+
+}  // namespace
+
+template <int K>
+MeshingRun<K>::MeshingRun(Specification spec)
+    : spec_(std::move(spec)),
+      engine_(spec_, Resolve(spec_)),
+      tangent_finder_(K, spec_.ambient_dimension, kTangentStep * engine_.criteria().epsilon,
+                      spec_.random_seed, kTangentError * spec_.declared_reach.value_or(INFINITY)),
+      repeat_check_(spec_.epsilon),
+      spare_points_(spec_.ambient_dimension),
+      box_watch_(spec_.bounding_box, engine_.criteria().epsilon),
+      stall_watch_(K) {
+  AskFor(SeedsOf(spec_), &MeshingRun::InsertSeeds);
+  NextQuestions();
+}
+
+// What the client has in hand: the round's batch or a part of it.
+template <int K>
+QueryBatch& MeshingRun<K>::OpenBatch() {
+  const std::uint64_t most = spec_.limits.max_batch_queries;
+  if (most == 0 || static_cast<std::uint64_t>(batch_->size()) <= most) return *batch_;
+  if (!parts_) parts_.emplace(*batch_, most);
+  return parts_->part();
+}
+
+template <int K>
+const QueryBatch* MeshingRun<K>::NextBatch() {
+  if (over_ || !batch_) return nullptr;
+  QueryBatch& batch = OpenBatch();
+  batch.round = progress_.round + 1;
+  return &batch;
+}
+
+template <int K>
+Status MeshingRun<K>::Check(const QueryBatch& asked, const Answers& answers) const {
+  if (answers.blocks.size() != asked.blocks.size())
+    return {StatusCode::kOracleShape,
+            Message("got ", answers.blocks.size(), " answer blocks for ", asked.blocks.size(),
+                    " query blocks; send one for each")};
+  for (std::size_t b = 0; b < answers.blocks.size(); ++b) {
+    const QueryBlock& block = asked.blocks[b];
+    if (answers.blocks[b].points.cols() != block.size())
+      return {StatusCode::kOracleShape,
+              Message("block ", b, " has ", answers.blocks[b].points.cols(), " answers for ",
+                      block.size(), " queries; send one for each")};
+    if (Status s = CheckAnswers(spec_, block, 0, answers.blocks[b]); !s.ok()) return s;
+  }
+  return Status::Ok();
+}
+
+template <int K>
+void MeshingRun<K>::Count(const QueryBatch& asked) {
+  const auto size = static_cast<std::uint64_t>(asked.size());
+  ++progress_.round;
+  progress_.queries += size;
+  ++report_.counts.rounds;
+  const bool for_tangents = trip_ && trip_->asks_for_tangents();
+  (for_tangents ? report_.counts.tangent_queries : report_.counts.queries) += size;
+}
+
+template <int K>
+Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
+  if (over_ || !batch_)
+    return Refuse(StatusCode::kFailedPrecondition, "Absorb without a batch: the run is over");
+  const QueryBatch& asked = OpenBatch();
+  if (Status s = Check(asked, answers); !s.ok()) return tl::unexpected<Status>(s);
+  const bool complete = !parts_ || parts_->is_last();
+  const std::optional<Answers> joined =
+      complete && parts_ ? std::optional(parts_->With(answers)) : std::nullopt;
+  const Answers& all = joined ? *joined : answers;
+  if (complete) {
+    if (Status s = repeat_check_.Judge(all); !s.ok()) return tl::unexpected<Status>(s);
+    repeat_check_.Forget();
+  }
+
+  const Progress progress_before = progress_;
+  const Report report_before = report_;
+  Count(asked);
+  delta_ = {};
+  delta_.revision = progress_.round;
+  delta_.first_vertex = engine_.complex().size();
+  if (complete) {
+    parts_.reset();
+    batch_.reset();
+    ++whole_rounds_;
+  }
+  const auto advance = [&] {
+    if (complete)
+      Advance(all);
+    else
+      parts_->Take(answers);
+    if (!over_ && batch_ && progress_.round >= spec_.limits.max_rounds)
+      Finish(Termination::kRoundBudget);
+    Measure();
+  };
+  if (!WithThreads(spec_.threads, interruption_, advance)) {
+    // It may have ended in the very moment, but nobody has seen that.
+    over_ = false;
+    progress_ = progress_before;
+    report_ = report_before;
+    return Refuse(StatusCode::kCancelled, "the computation was interrupted");
+  }
+  const StarComplex<K>& complex = engine_.complex();
+  delta_.points =
+      Eigen::Map<const Eigen::MatrixXd>(complex.points().data(), complex.d(), complex.size())
+          .rightCols(complex.size() - static_cast<Eigen::Index>(delta_.first_vertex));
+  return std::move(delta_);
+}
+
+// From the answers to the next batch, or to the end.
+template <int K>
+void MeshingRun<K>::Advance(const Answers& answers) {
+  Asker& asker = trip_ ? static_cast<Asker&>(*trip_) : *certification_;
+  asker.Absorb(answers.blocks);
+  NextQuestions();
+  if (batch_ && repeat_check_.has_questions()) batch_->blocks.push_back(repeat_check_.Questions());
+}
+
+// Asks on until some asker has questions, or the run is over.
+template <int K>
+void MeshingRun<K>::NextQuestions() {
+  while (!over_) {
+    Asker& asker = trip_ ? static_cast<Asker&>(*trip_) : *certification_;
+    if (std::vector<QueryBlock> blocks = asker.Questions(); !blocks.empty()) {
+      batch_ = QueryBatch{0, std::move(blocks)};
+      return;
+    }
+    if (trip_)
+      AfterTrip();
+    else
+      AfterCertificate();
+  }
+}
+
+template <int K>
+void MeshingRun<K>::Ask(CandidateSet<K> candidates, Insertion then) {
+  certification_.reset();
+  trip_ =
+      std::make_unique<RoundTrip<K>>(engine_, spec_.oracle, tangent_finder_, std::move(candidates));
+  insertion_ = then;
+}
+
+template <int K>
+void MeshingRun<K>::AskFor(Eigen::MatrixXd points, Insertion then) {
+  CandidateSet<K> candidates;
+  candidates.planned.points = std::move(points);
+  Ask(std::move(candidates), then);
+}
+
+template <int K>
+void MeshingRun<K>::AfterTrip() {
+  (this->*insertion_)();
+  if (over_) return;
+  typename Engine<K>::Change change = engine_.Commit();
+  delta_.added = std::move(change.added);
+  delta_.removed = std::move(change.removed);
+  Plan();
+}
+
+template <int K>
+void MeshingRun<K>::InsertSeeds() {
+  const AnsweredPoints& answers = trip_->answers();
+  const Eigen::Index count = answers.points.cols();
+  const auto found = std::count(answers.found.begin(), answers.found.end(), 1);
+  covers_box_ = spec_.cover_box && found == count;
+  if (found == 0) {
+    const char* const tried =
+        spec_.seeds.cols() > 0 ? " seeds were" : " points of the bounding box were";
+    std::string message = Message("no seed has a closest point on the manifold: ", count, tried,
+                                  " tried; give seeds near the manifold, or a box that holds it");
+    if (!spec_.oracle.tangent_basis)
+      message += Message("; seeds where the manifold does not look ", K,
+                         "-dimensional count as not found");
+    return Fail({StatusCode::kNoSeeds, std::move(message)});
+  }
+  repeat_check_.Sample(answers);
+  std::vector<std::uint8_t> used(static_cast<std::size_t>(count), 0);
+  for (Eigen::Index c = 0; c < count; ++c) {
+    const auto i = static_cast<std::size_t>(c);
+    CheckInterruption(i);
+    if (!answers.found[i]) continue;
+    used[i] = !engine_.is_full() && !engine_.complex().AnyWithin(answers.points.col(c).data(),
+                                                                 engine_.criteria().epsilon);
+    if (used[i])
+      engine_.Append(answers, c);
+    else
+      ++report_.counts.duplicates;
+  }
+  spare_points_.Keep(answers, used);
+}
+
+template <int K>
+void MeshingRun<K>::InsertCandidates() {
+  const Inserted inserted = engine_.Insert(trip_->candidates(), trip_->answers());
+  Counts& counts = report_.counts;
+  const auto count = [&](Rule rule) {
+    return static_cast<std::uint64_t>(
+        std::count(inserted.rules.begin(), inserted.rules.end(), rule));
+  };
+  counts.inserted_size += count(Rule::kSize);
+  counts.inserted_radius_edge += count(Rule::kRadiusEdge);
+  counts.inserted_sliver += count(Rule::kSliver);
+  counts.inserted_inconsistent += count(Rule::kInconsistent);
+  counts.duplicates += inserted.duplicates;
+  if (inserted.front_moved) stall_watch_.NoteFrontMoved();
+  rehearsal_failed_ = inserted.rules.empty();
+  spare_points_.Keep(trip_->answers(), inserted.used);
+}
+
+template <int K>
+void MeshingRun<K>::InsertSpares() {
+  const AnsweredPoints& answers = trip_->answers();
+  std::vector<std::uint8_t> used(answers.found.size(), 0);
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    if (!answers.found[i]) continue;
+    if (engine_.is_full()) break;
+    engine_.Append(answers, static_cast<Eigen::Index>(i));
+    used[i] = 1;
+  }
+  engine_.JudgeAllAnew();
+  spare_points_.Keep(answers, used);
+}
+
+// Finds what to do next and asks for it, or ends the refinement.
+template <int K>
+void MeshingRun<K>::Plan() {
+  box_watch_.Look(engine_.complex().points().data(), engine_.complex().size());
+  if (engine_.is_full()) return Finish(Termination::kVertexBudget);
+  if (box_watch_.has_left()) return Finish(Termination::kNoProgress);
+  auto targets = engine_.Plan();
+  if (!targets) return Finish(Termination::kNoProgress);
+  if (targets->empty())
+    return engine_.AllRulesHold() ? Certify() : Finish(Termination::kNoProgress);
+  const ViolationBook<K>& book = engine_.book();
+  if (stall_watch_.HasStalled(book.size_and_shape().size() + book.blemished(),
+                              !book.are_all_suspect()))
+    return Finish(Termination::kNoProgress);
+  *targets = engine_.Select(std::move(*targets));
+  PlannedPoints planned;
+  if (engine_.criteria().ask_ahead && !rehearsal_failed_)
+    planned = Rehearse<K>(engine_, whole_rounds_, &*targets);
+  CandidateSet<K> candidates = engine_.Draw(std::move(*targets), whole_rounds_);
+  candidates.planned = std::move(planned);
+  Ask(std::move(candidates), &MeshingRun::InsertCandidates);
+}
+
+template <int K>
+void MeshingRun<K>::Certify() {
+  if (AskForSpares(spare_points_.Uncovered(engine_.complex()))) return;
+  const StarComplex<K>& complex = engine_.complex();
+  if (!engine_.filled().mended().empty())
+    engine_.filled().HandOut(complex, &delta_.added, &delta_.removed);
+  StarFacts facts = FactsOf<K>(engine_);
+  facts.covers_box = covers_box_;
+  if (!spec_.oracle.tangent_basis) facts.tangent_error_length = tangent_finder_.error_length();
+  MeshView mesh;
+  mesh.k = K;
+  mesh.d = complex.d();
+  mesh.vertices = complex.size();
+  mesh.points = complex.points().data();
+  mesh.tangents = complex.Tangent(0);
+  trip_.reset();
+  certification_ = std::make_unique<Certification>(spec_, mesh, engine_.Simplices(), facts,
+                                                   spare_points_.Take());
+}
+
+template <int K>
+void MeshingRun<K>::AfterCertificate() {
+  if (engine_.filled().is_handed_out() ||
+      certification_->certificate().epsilon_over_reach > kCoarse ||
+      !AskForSpares(certification_->Uncovered()))
+    Finish(Termination::kConverged);
+}
+
+// False if there are none, or if it did not help before.
+template <int K>
+bool MeshingRun<K>::AskForSpares(const std::vector<double>& points) {
+  Eigen::MatrixXd chosen =
+      spare_points_.Choose(points, engine_.complex(), engine_.criteria().epsilon);
+  if (chosen.cols() == 0) return false;
+  if (certification_) spare_points_.GiveBack(certification_->TakeSeen());
+  AskFor(std::move(chosen), &MeshingRun::InsertSpares);
+  return true;
+}
+
+template <int K>
+void MeshingRun<K>::Fail(Status reason) {
+  if (!over_) report_.failure = std::move(reason);
+  Finish(Termination::kOracleFailed);
+}
+
+template <int K>
+void MeshingRun<K>::Finish(Termination termination) {
+  if (over_) return;
+  over_ = true;
+  batch_.reset();
+  parts_.reset();
+  report_.termination = termination;
+  // What a round that was interrupted has left behind was never handed out.
+  const bool is_whole = !interruption_.raised();
+  report_.counts.vertices = is_whole ? engine_.complex().size() : progress_.vertices;
+  report_.counts.simplices = is_whole ? engine_.simplex_count() : progress_.simplices;
+  DescribeEnding(is_whole);
+  certification_.reset();
+  if (is_whole)
+    Measure();
+  else
+    progress_.phase = Phase::kDone;
+}
+
+template <int K>
+void MeshingRun<K>::DescribeEnding(bool is_whole) {
+  const Termination termination = report_.termination;
+  Certificate& certificate = report_.certificate;
+  if (termination == Termination::kConverged) {
+    certificate = certification_->certificate();
+    WarnOfCompromises<K>(engine_, spec_.epsilon, &certificate);
+  } else {
+    certificate.verdict = std::string("not certified: the run ended as ") +
+                          TerminationName(termination) + " before every rule held";
+    if (!report_.failure.message.empty()) certificate.verdict += ": " + report_.failure.message;
+    // Whoever cancels a large mesh does not want to wait for it to be described.
+    if (termination != Termination::kCancelled && termination != Termination::kOracleFailed)
+      DescribeUnfinished<K>(engine_, spec_.epsilon, &certificate);
+    if (termination == Termination::kNoProgress)
+      certificate.verdict +=
+          "; " + (box_watch_.has_left()
+                      ? box_watch_.WhyStopped()
+                      : WhatIsLeft<K>(engine_, certificate.inconsistent_simplices));
+  }
+  if (is_whole) box_watch_.Warn(&certificate);
+}
+
+template <int K>
+void MeshingRun<K>::Measure() {
+  if (!over_) return core::Measure<K>(engine_, certification_ != nullptr, &progress_);
+  progress_.phase = Phase::kDone;
+  progress_.vertices = engine_.complex().size();
+  progress_.simplices = engine_.simplex_count();
+  progress_.bad_sliver = engine_.book().slivers();
+  progress_.bad_inconsistent = engine_.book().inconsistent();
+  if (report_.termination == Termination::kConverged) progress_.fraction = 1;
+}
+
+template <int K>
+Eigen::MatrixXd MeshingRun<K>::Points() const {
+  const StarComplex<K>& complex = engine_.complex();
+  return Eigen::Map<const Eigen::MatrixXd>(complex.points().data(), complex.d(), complex.size());
+}
+
+STELLATE_INSTANTIATE_CLASS(MeshingRun)
+
+}  // namespace stellate::core

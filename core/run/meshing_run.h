@@ -1,0 +1,97 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "core/base/instantiate.h"
+#include "core/base/interruption.h"
+#include "core/mesher.h"
+#include "core/refinement/engine.h"
+#include "core/run/asker.h"
+#include "core/run/batch_parts.h"
+#include "core/run/certification.h"
+#include "core/run/repeat_check.h"
+#include "core/run/round_trip.h"
+#include "core/run/spare_points.h"
+#include "core/run/tangent_finder.h"
+#include "core/run/watches.h"
+
+namespace stellate::core {
+
+// A run of the engine as the state machine of mesher.h, for one k: hands the word from one asker to
+// the next. First the seeds ask, then each round's candidates; when no rule applies any more the
+// certificate does, and points of M that the mesh misses, if it comes upon any.
+template <int K>
+class MeshingRun final : public Mesher {
+ public:
+  explicit MeshingRun(Specification spec);
+
+  const QueryBatch* NextBatch() override;
+  Expected<MeshDelta> Absorb(const Answers& answers) override;
+  void Interrupt() override { interruption_.Raise(); }
+  void Cancel() override { Finish(Termination::kCancelled); }
+  void Fail(Status reason) override;
+
+  const Specification& specification() const override { return spec_; }
+  const Progress& progress() const override { return progress_; }
+  const Report& report() const override { return report_; }
+  Eigen::MatrixXd Points() const override;
+  Eigen::MatrixXd Tangents() const override { return engine_.complex().TangentMatrix(); }
+  std::vector<std::uint32_t> Simplices() const override { return engine_.Simplices(); }
+
+ private:
+  // What is done with a round trip's answers.
+  using Insertion = void (MeshingRun::*)();
+
+  QueryBatch& OpenBatch();
+  Status Check(const QueryBatch& asked, const Answers& answers) const;
+  void Count(const QueryBatch& asked);
+  void Advance(const Answers& answers);
+  void Ask(CandidateSet<K> candidates, Insertion then);
+  void AskFor(Eigen::MatrixXd points, Insertion then);
+  void NextQuestions();
+
+  // What follows when an asker is done.
+  void AfterTrip();
+  void InsertSeeds();
+  void InsertCandidates();
+  void InsertSpares();
+  void Plan();
+  void Certify();
+  void AfterCertificate();
+  bool AskForSpares(const std::vector<double>& points);
+
+  void Finish(Termination termination);
+  void DescribeEnding(bool is_whole);
+  void Measure();
+
+  const Specification spec_;
+  Engine<K> engine_;
+  TangentFinder tangent_finder_;
+  Interruption interruption_;
+  Progress progress_;
+  Report report_;
+  MeshDelta delta_;  // of the round being absorbed
+  bool over_ = false;
+
+  std::optional<QueryBatch> batch_;  // of the open round
+  std::optional<BatchParts> parts_;  // of batch_, if that is too large to ask at once
+  std::uint64_t whole_rounds_ = 0;   // rounds in which parts count once
+
+  // One of these asks.
+  std::unique_ptr<RoundTrip<K>> trip_;
+  std::unique_ptr<Certification> certification_;
+  Insertion insertion_ = nullptr;  // of the trip's answers
+
+  RepeatCheck repeat_check_;
+  SparePoints spare_points_;
+  BoxWatch box_watch_;
+  StallWatch stall_watch_;
+  bool rehearsal_failed_ = false;  // the last round of candidates inserted nothing
+  bool covers_box_ = false;        // each seed of a covered box has its closest point
+};
+
+STELLATE_DECLARE_CLASS(MeshingRun)
+
+}  // namespace stellate::core

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/base/instantiate.h"
+#include "core/refinement/engine.h"
+#include "core/run/asker.h"
+#include "core/run/tangent_finder.h"
+
+namespace stellate::core {
+
+// Asks for a set of candidates, with all that inserting them needs. Where the client has no flats
+// it goes to and fro between a candidate's flat and M instead (Criteria::flat_alternations); where
+// it gives no tangents they are found by a TangentFinder.
+template <int K>
+class RoundTrip final : public Asker {
+ public:
+  // The engine and the finder are borrowed; the engine does not change meanwhile.
+  RoundTrip(const Engine<K>& engine, const OracleCapabilities& oracle, TangentFinder& finder,
+            CandidateSet<K> candidates);
+
+  std::vector<QueryBlock> Questions() override;
+  void Absorb(const std::vector<AnswerBlock>& answers) override;
+  bool asks_for_tangents() const override { return finds_tangents_; }
+
+  const CandidateSet<K>& candidates() const { return candidates_; }
+  // Complete once there are no more questions.
+  const AnsweredPoints& answers() const { return answers_; }
+
+ private:
+  QueryBlock NewBlock(QueryKind kind) const;
+  void AskForAll();
+  void AskForDrawn();
+  void Sort(const std::vector<AnswerBlock>& answers);
+  void AskAgain();
+  void AskForTangents();
+  void TakeTangents();
+
+  const Engine<K>& engine_;
+  const OracleCapabilities oracle_;
+  TangentFinder& finder_;
+  CandidateSet<K> candidates_;
+  std::vector<QueryBlock> open_;
+  std::vector<std::pair<int, Eigen::Index>> places_;  // by candidate: block and column of open_
+  int alternations_left_ = 0;
+  bool finds_tangents_ = false;
+  AnsweredPoints answers_;
+};
+
+STELLATE_DECLARE_CLASS(RoundTrip)
+
+}  // namespace stellate::core

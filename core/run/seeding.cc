@@ -1,0 +1,43 @@
+#include "core/run/seeding.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/random.h"
+
+namespace stellate::core {
+namespace {
+
+// A rehearsal that begins from many seeds needs no front: this share of the vertices to come, as
+// far as the box tells, within limits by k.
+constexpr double kSeedShare = 0.05;
+constexpr double kLeastAheadSeeds[kMaxDimension + 1] = {0, 100, 300, 300, 1000, 1000};
+constexpr double kMostAheadSeeds[kMaxDimension + 1] = {0, 100, 1000, 1000, 3000, 3000};
+
+int SeedsToAskAheadFrom(const Specification& spec) {
+  const double width = (spec.bounding_box->upper - spec.bounding_box->lower).norm();
+  const double vertices = std::pow(width / spec.epsilon, spec.dimension);
+  return static_cast<int>(std::clamp(kSeedShare * vertices, kLeastAheadSeeds[spec.dimension],
+                                     kMostAheadSeeds[spec.dimension]));
+}
+
+int SeedsToDraw(const Specification& spec) {
+  if (spec.box_seeds > 0) return spec.box_seeds;
+  return spec.criteria.ask_ahead ? SeedsToAskAheadFrom(spec) : kDefaultBoxSeeds;
+}
+
+}  // namespace
+
+Eigen::MatrixXd SeedsOf(const Specification& spec) {
+  if (spec.seeds.cols() > 0) return spec.seeds;
+  if (spec.cover_box) return CoverOfBox(spec);
+  const BoundingBox& box = *spec.bounding_box;
+  Eigen::MatrixXd seeds(spec.ambient_dimension, SeedsToDraw(spec));
+  Random random(spec.random_seed);
+  for (Eigen::Index i = 0; i < seeds.cols(); ++i)
+    for (Eigen::Index j = 0; j < seeds.rows(); ++j)
+      seeds(j, i) = box.lower[j] + random.Uniform() * (box.upper[j] - box.lower[j]);
+  return seeds;
+}
+
+}  // namespace stellate::core

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/specification.h"
+
+namespace stellate::core {
+
+// The points whose closest points a run begins with, d x n: the client's seeds, or those that cover
+// the box, or others drawn from it.
+Eigen::MatrixXd SeedsOf(const Specification& spec);
+
+}  // namespace stellate::core

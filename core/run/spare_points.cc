@@ -1,0 +1,74 @@
+#include "core/run/spare_points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/base/instantiate.h"
+#include "core/base/parallel.h"
+#include "core/base/vector_ops.h"
+#include "core/certificate/evidence.h"
+
+namespace stellate::core {
+namespace {
+
+// Each finds a part of M that was missed, and most manifolds have one part.
+constexpr int kMostChosen = 16;
+
+// How far y is from the sample, in circumradii of the star there.
+template <int K>
+double ClearanceOf(const double* y, const StarComplex<K>& complex) {
+  std::pair<double, std::uint32_t> nearest;
+  if (complex.Nearest(y, 1, &nearest) == 0) return INFINITY;
+  return std::sqrt(nearest.first / complex.cell(nearest.second).max_norm2());
+}
+
+}  // namespace
+
+void SparePoints::Keep(const AnsweredPoints& answers, const std::vector<std::uint8_t>& used) {
+  for (Eigen::Index c = 0; c < answers.points.cols(); ++c) {
+    CheckInterruption(static_cast<std::size_t>(c));
+    const auto i = static_cast<std::size_t>(c);
+    if (!answers.answered[i] || used[i]) continue;
+    points_.insert(points_.end(), answers.points.col(c).begin(), answers.points.col(c).end());
+  }
+}
+
+template <int K>
+std::vector<double> SparePoints::Uncovered(const StarComplex<K>& complex) const {
+  return ParallelGather<double>(points_.size() / d_, [&](std::size_t i, auto* uncovered) {
+    const double* y = points_.data() + i * d_;
+    if (ClearanceOf(y, complex) > kCoverageShare) uncovered->insert(uncovered->end(), y, y + d_);
+  });
+}
+
+template <int K>
+Eigen::MatrixXd SparePoints::Choose(const std::vector<double>& points,
+                                    const StarComplex<K>& complex, double epsilon) {
+  if (points.empty() || chosen_ == kMostChosen) return {};
+  ++chosen_;
+  std::vector<const double*> chosen;
+  for (std::size_t at = 0; at < points.size(); at += d_) {
+    CheckInterruption(at);
+    const double* y = points.data() + at;
+    std::pair<double, std::uint32_t> nearest;
+    complex.Nearest(y, 1, &nearest);
+    const double apart = std::min(epsilon, std::sqrt(nearest.first) / 2);
+    if (std::none_of(chosen.begin(), chosen.end(),
+                     [&](const double* other) { return Distance(y, other, complex.d()) < apart; }))
+      chosen.push_back(y);
+  }
+  Eigen::MatrixXd all(complex.d(), static_cast<Eigen::Index>(chosen.size()));
+  for (std::size_t i = 0; i < chosen.size(); ++i)
+    std::copy_n(chosen[i], d_, all.col(static_cast<Eigen::Index>(i)).data());
+  return all;
+}
+
+#define STELLATE_EACH(K)                                                               \
+  template std::vector<double> SparePoints::Uncovered<K>(const StarComplex<K>&) const; \
+  template Eigen::MatrixXd SparePoints::Choose<K>(const std::vector<double>&,          \
+                                                  const StarComplex<K>&, double);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core

@@ -1,0 +1,73 @@
+#include "core/run/watches.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/interruption.h"
+#include "core/base/message.h"
+
+namespace stellate::core {
+namespace {
+
+// A box that is merely too small is left by a part of its size; what goes on for as much as its
+// diagonal on the outside has most likely no end.
+constexpr double kBoxDiagonals = 1;
+// This many rounds, times k, without a step of the front into unknown ground must leave no more
+// than this share of the violations that there were. Runs that converge need a few dozen in all.
+constexpr std::uint64_t kPatience = 100;
+constexpr double kShareLeft = 0.75;
+
+}  // namespace
+
+void BoxWatch::Look(const double* points, std::uint32_t count) {
+  if (!box_) return;
+  const auto d = static_cast<std::size_t>(box_->lower.size());
+  for (; looked_at_ < count; ++looked_at_) {
+    CheckInterruption(looked_at_);
+    const double* p = points + looked_at_ * d;
+    double outside2 = 0;
+    for (std::size_t i = 0; i < d; ++i) {
+      const auto axis = static_cast<Eigen::Index>(i);
+      const double beyond = std::max({box_->lower[axis] - p[i], p[i] - box_->upper[axis], 0.0});
+      outside2 += beyond * beyond;
+    }
+    outside_ += outside2 > epsilon_ * epsilon_;
+    farthest_outside_ = std::max(farthest_outside_, std::sqrt(outside2));
+  }
+}
+
+bool BoxWatch::has_left() const {
+  return box_ && farthest_outside_ > kBoxDiagonals * (box_->upper - box_->lower).norm();
+}
+
+std::string BoxWatch::WhyStopped() const {
+  return Message("the manifold leaves the bounding box and goes on for ", Brief(farthest_outside_),
+                 " beyond it, with ", outside_, " of ", looked_at_,
+                 " vertices outside. Is it open or unbounded? Only closed manifolds are meshed: "
+                 "bound it, or, if it is closed, give a box that holds all of it");
+}
+
+void BoxWatch::Warn(Certificate* certificate) const {
+  if (outside_ == 0) return;
+  certificate->warnings.push_back(
+      Message("The manifold leaves the bounding box: ", outside_, " of ", looked_at_,
+              " vertices lie outside, by up to ", Brief(farthest_outside_),
+              ". Components outside of the box may have been missed; is the manifold open or "
+              "unbounded?"));
+}
+
+bool StallWatch::HasStalled(std::uint64_t left, bool judges_all) {
+  const bool progress =
+      front_moved_ || static_cast<double>(left) <= kShareLeft * static_cast<double>(left_then_);
+  // Slivers and inconsistencies are counted from when sizes and shapes first hold.
+  const bool begins = judges_all && !judged_all_;
+  judged_all_ = judges_all;
+  front_moved_ = false;
+  if (progress || begins) {
+    left_then_ = left;
+    rounds_since_ = 0;
+  }
+  return rounds_since_++ > kPatience * static_cast<std::uint64_t>(k_);
+}
+
+}  // namespace stellate::core

@@ -1,0 +1,108 @@
+#include "core/refinement/size_field.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "tests/core/support/samples.h"
+
+namespace stellate::core {
+namespace {
+
+using testing::AppendTo;
+using testing::Make;
+using testing::RandomSample;
+
+Specification Spec(double epsilon) {
+  Specification spec;
+  spec.dimension = 2;
+  spec.ambient_dimension = 3;
+  spec.epsilon = epsilon;
+  return spec;
+}
+
+StarComplex<2> ComplexOn(const std::string& manifold, int count) {
+  StarComplex<2> complex(3, 0.3, 3, Judging::kFlats);
+  AppendTo(&complex, RandomSample(*Make(manifold), count, 1));
+  complex.Commit();
+  return complex;
+}
+
+std::vector<std::uint32_t> All(const StarComplex<2>& complex) {
+  std::vector<std::uint32_t> all(complex.size());
+  std::iota(all.begin(), all.end(), 0u);
+  return all;
+}
+
+TEST(SizeField, IsEpsilonWhereNothingIsGraded) {
+  const SizeField<2> sizes(Resolve(Spec(0.3)));
+  EXPECT_FALSE(sizes.is_estimated());
+  EXPECT_EQ(sizes.given(), nullptr);
+  EXPECT_EQ(sizes.BoundAt(ComplexOn("sphere", 20), 7), 0.3);
+}
+
+TEST(SizeField, FollowsWhatIsGivenUpToEpsilonAndDownToTheFinest) {
+  Specification spec = Spec(0.3);
+  spec.oracle.local_size = true;
+  spec.criteria.size_rate = 0.5;
+  SizeField<2> sizes(Resolve(spec));
+  for (const double size : {0.2, 100.0, 1e-9}) sizes.AppendGiven(size);
+  const StarComplex<2> complex = ComplexOn("sphere", 20);
+  EXPECT_FALSE(sizes.is_estimated());
+  EXPECT_EQ(sizes.given()[1], 100);
+  EXPECT_DOUBLE_EQ(sizes.BoundAt(complex, 0), 0.1);
+  EXPECT_EQ(sizes.BoundAt(complex, 1), 0.3);
+  EXPECT_EQ(sizes.BoundAt(complex, 2), sizes.FinestBound());
+  EXPECT_LT(sizes.FinestBound(), 0.3 / 1000);
+  EXPECT_EQ(sizes.CountTooFine(), 1u);
+}
+
+TEST(SizeField, BoundsTheDeviation) {
+  Specification spec = Spec(0.3);
+  spec.oracle.local_size = true;
+  spec.criteria.max_deviation = 0.01;
+  const SizeField<2> sizes(Resolve(spec));
+  const double bound = sizes.BoundFor(1);
+  EXPECT_DOUBLE_EQ(bound * bound / (2 * 1), 0.01);
+}
+
+// |q - p|^2 / (2 dist(q, T_p)) is 1 for any two points of the unit sphere.
+TEST(SizeField, SeesTheRadiusOfASphere) {
+  Specification spec = Spec(0.6);
+  spec.criteria.size_rate = 0.4;
+  SizeField<2> sizes(Resolve(spec));
+  EXPECT_TRUE(sizes.is_estimated());
+  const StarComplex<2> complex = ComplexOn("sphere", 200);
+  sizes.Look(complex, All(complex));
+  double most = 0;
+  for (std::uint32_t p = 0; p < complex.size(); ++p) {
+    EXPECT_NEAR(sizes.BoundAt(complex, p), 0.4, 1e-6);
+    most = std::max(most, std::sqrt(complex.cell(p).max_norm2()));
+  }
+  EXPECT_NEAR(sizes.MaxRadiusOverSize(complex), most, 1e-6 * most);
+}
+
+TEST(SizeField, IsLipschitzOnceSpread) {
+  Specification spec = Spec(10);
+  spec.criteria.size_rate = 1;
+  SizeField<2> sizes(Resolve(spec));
+  const StarComplex<2> complex = ComplexOn("ellipsoid:1:0.6:0.3", 400);
+  sizes.Look(complex, All(complex));
+  EXPECT_TRUE(sizes.NeedsSpreading(complex, true));
+  sizes.Spread(complex);
+  EXPECT_FALSE(sizes.NeedsSpreading(complex, true));
+  for (std::uint32_t p = 0; p < complex.size(); ++p) {
+    const auto& cell = complex.cell(p);
+    for (std::size_t f = 0; f < cell.facet_count(); ++f) {
+      const double apart = std::sqrt(complex.EdgeLength2(p, f));
+      EXPECT_LE(sizes.BoundAt(complex, p), sizes.BoundAt(complex, cell.id(f)) + apart * (1 + 1e-6));
+    }
+  }
+  sizes.Look(complex, {0});
+  EXPECT_TRUE(sizes.NeedsSpreading(complex, true));
+  EXPECT_FALSE(sizes.NeedsSpreading(complex, false));
+}
+
+}  // namespace
+}  // namespace stellate::core

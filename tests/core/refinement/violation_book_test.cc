@@ -1,0 +1,92 @@
+#include "core/refinement/violation_book.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace stellate::core {
+namespace {
+
+using Book = ViolationBook<2>;
+using Stars = std::vector<std::uint32_t>;
+using Violations = std::vector<std::optional<Violation<2>>>;
+
+Stars Entered(const Book& book) {
+  Stars stars;
+  for (const auto& entry : book.size_and_shape()) stars.push_back(entry.star);
+  return stars;
+}
+
+// Five stars, of which 1, 3 and 4 break R1.
+Book FiveStars() {
+  Book book;
+  const Violation<2> bad;
+  book.Update(5, {0, 1, 2, 3, 4}, {std::nullopt, bad, std::nullopt, bad, bad});
+  return book;
+}
+
+TEST(ViolationBook, HoldsOneEntryForEachStarThatBreaksR1OrR2) {
+  Book book = FiveStars();
+  EXPECT_EQ(Entered(book), (Stars{1, 3, 4}));
+  // 3 was mended, 0 and a new star were broken.
+  book.Update(6, {0, 3, 5}, {Violation<2>(), std::nullopt, Violation<2>()});
+  EXPECT_EQ(Entered(book), (Stars{1, 4, 0, 5}));
+  book.Replace(
+      {std::nullopt, std::nullopt, Violation<2>(), std::nullopt, std::nullopt, std::nullopt});
+  EXPECT_EQ(Entered(book), Stars{2});
+}
+
+TEST(ViolationBook, ForgetsFailuresOfAStarThatChanges) {
+  Book book = FiveStars();
+  book.NoteFailedAttempt(1);
+  book.NoteNoFlat(1);
+  book.NoteFailedAttempt(3);
+  book.Update(5, {1}, {Violation<2>()});
+  EXPECT_EQ(book.failed_attempts(1), 0);
+  EXPECT_FALSE(book.has_no_flat(1));
+  EXPECT_EQ(book.failed_attempts(3), 1);
+}
+
+TEST(ViolationBook, GivesUpAfterManyAttemptsOrAtOnce) {
+  Book book = FiveStars();
+  int attempts = 0;
+  for (; !book.is_given_up(1); ++attempts) book.NoteFailedAttempt(1);
+  EXPECT_EQ(attempts, 9);
+  for (int i = 0; i < 1000; ++i) book.NoteFailedAttempt(1);
+  EXPECT_TRUE(book.is_given_up(1));
+  book.GiveUp(3);
+  EXPECT_TRUE(book.is_given_up(3));
+  book.NoteNoFlat(4);
+  book.ForgetFlats();
+  EXPECT_FALSE(book.has_no_flat(4));
+}
+
+TEST(ViolationBook, SuspectsAllUntilTheyWereTakenOnce) {
+  Book book = FiveStars();
+  EXPECT_TRUE(book.are_all_suspect());
+  EXPECT_EQ(book.TakeSuspects({}), (Stars{0, 1, 2, 3, 4}));
+  EXPECT_FALSE(book.are_all_suspect());
+  EXPECT_EQ(book.TakeSuspects({}), Stars{});
+  book.Suspect({3, 2});
+  book.Suspect({2});
+  EXPECT_EQ(book.TakeSuspects({4}), (Stars{2, 3, 4}));
+}
+
+TEST(ViolationBook, JudgesBlemishedStarsAgain) {
+  Book book = FiveStars();
+  book.TakeSuspects({});
+  book.NoteJudged(0, Rule::kSliver);
+  book.NoteJudged(2, Rule::kInconsistent);
+  book.NoteJudged(3, std::nullopt);
+  EXPECT_EQ(book.blemished(), 2u);
+  EXPECT_EQ(book.slivers(), 1u);
+  EXPECT_EQ(book.inconsistent(), 1u);
+  book.Suspect({1});
+  EXPECT_EQ(book.TakeSuspects({}), (Stars{0, 1, 2}));
+  EXPECT_EQ(book.blemished(), 0u);
+  book.JudgeAllAnew();
+  EXPECT_EQ(book.TakeSuspects({}).size(), 5u);
+}
+
+}  // namespace
+}  // namespace stellate::core
