@@ -1,9 +1,8 @@
 # What `cmake --install` puts where, by component:
 #
 #   development  libraries, headers, the package for find_package, pkg-config's files
-#   server       stellated, its systemd unit and configuration
+#   server       stellated
 #   tools        stellate, the command line
-#   python       the Python package, where it is asked for by name
 include(CMakePackageConfigHelpers)
 include(GNUInstallDirs)
 

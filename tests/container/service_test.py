@@ -33,7 +33,7 @@ class Service(unittest.TestCase):
         (tree / "build" / "release").mkdir(parents=True)
         (tree / "build/release/bin").symlink_to(pathlib.Path(os.environ["STELLATED"]).parent)
         (tree / "packaging").mkdir()
-        for file in PACKAGING.iterdir():
+        for file in filter(pathlib.Path.is_file, PACKAGING.iterdir()):
             (tree / "packaging" / file.name).write_bytes(file.read_bytes())
         (tree / "packaging/install").chmod(0o755)
         self.install = tree / "packaging/install"

@@ -17,6 +17,7 @@ from .errors import ServerNotFound, Unavailable
 _READY_SECONDS = 30.0
 _STOP_SECONDS = 10.0
 _LONGEST_SOCKET_PATH = 100  # the kernel takes 107 bytes
+_BUNDLED = pathlib.Path(__file__).resolve().parent / "_bundled" / "stellated"  # packaging/wheel's
 # When its client goes there is nobody left to finish a mesh for.
 _OWN_FLAGS = ("--drain-seconds", "0")
 # Over a unix socket the end of a client shows at once. One that answers no pings is merely busy in
@@ -25,7 +26,7 @@ _PRIVATE_FLAGS = ("--keepalive", "600", "--keepalive-timeout", "600")
 
 
 def find_stellated() -> str:
-    """The server binary: $STELLATED, else build/*/bin of the source tree, else PATH.
+    """The server binary: $STELLATED, else the wheel's, else the source tree's build/*/bin, else PATH.
 
     Raises: ServerNotFound with where it was looked for.
     """
@@ -35,6 +36,8 @@ def find_stellated() -> str:
         if path is None:
             raise ServerNotFound(f"$STELLATED is {named!r}, which is not a program that can be run")
         return path
+    if os.access(_BUNDLED, os.X_OK):
+        return str(_BUNDLED)
     source_tree = pathlib.Path(__file__).resolve().parents[3]
     built = []
     if (source_tree / "proto" / "stellate").is_dir():  # not an installed package
@@ -47,7 +50,8 @@ def find_stellated() -> str:
     if path is None:
         raise ServerNotFound(
             "no server was given and no stellated found to start: pass server='host:port', or set "
-            "$STELLATED to the binary, or put it on PATH, or build it (clients/quickstart does)"
+            "$STELLATED to the binary, or put it on PATH, or build it (clients/quickstart does), or "
+            "install the wheel that carries one (packaging/wheel makes it)"
         )
     return path
 

@@ -1,0 +1,99 @@
+"""The wheel: by pip into an environment of its own, with nothing of ours within reach."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+import zipfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+VERSION = (ROOT / "VERSION").read_text().strip()
+MESH = """
+import os, pathlib, subprocess, sys
+import google.protobuf, grpc, stellate
+assert stellate.__version__ == sys.argv[1], stellate.__version__
+inside = pathlib.Path(stellate.__file__).parent
+assert pathlib.Path(stellate.find_stellated()).is_relative_to(inside), stellate.find_stellated()
+mesh = stellate.mesh(stellate.manifolds.Torus(), epsilon=0.2)
+assert mesh.certified and len(mesh.simplices) == 2 * len(mesh.points), mesh
+mesh.save("torus.vtu")
+print(grpc.__file__, google.protobuf.__version__, grpc.__version__)
+"""
+
+
+def run(*command: str | pathlib.Path, **options: str | pathlib.Path) -> str:
+    """What a command prints, in an environment that knows of nothing."""
+    kept = re.compile(r"HOME|PIP_.*|https?_proxy|SSL_CERT_FILE", re.I)  # the way to PyPI
+    environment = {name: value for name, value in os.environ.items() if kept.fullmatch(name)}
+    environment["PATH"] = "/usr/bin:/bin"
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, **options)
+    assert done.returncode == 0, f"{command}\n{done.stdout[-3000:]}{done.stderr[-3000:]}"
+    return done.stdout
+
+
+class Wheel(unittest.TestCase):
+    wheel: pathlib.Path
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        folder = tempfile.TemporaryDirectory(prefix="stellate-wheel-test-")
+        cls.addClassCleanup(folder.cleanup)
+        made = subprocess.run(
+            [ROOT / "packaging" / "wheel", folder.name],
+            stdout=subprocess.PIPE,
+            text=True,
+            check=True,
+        )
+        cls.wheel = pathlib.Path(made.stdout.strip())
+        cls.folder = pathlib.Path(folder.name)
+
+    def environment(self, name: str, *options: str) -> pathlib.Path:
+        """Its Python."""
+        folder = self.folder / name
+        run("/usr/bin/python3", "-m", "venv", *options, folder)
+        return folder / "bin" / "python"
+
+    def mesh(self, python: pathlib.Path) -> str:
+        with tempfile.TemporaryDirectory() as nowhere:
+            said = run(python, "-I", "-c", MESH, VERSION, cwd=nowhere)
+            self.assertEqual(os.listdir(nowhere), ["torus.vtu"])
+        return said
+
+    def test_with_what_pypi_has(self) -> None:
+        python = self.environment("pypi")
+        run(python, "-m", "pip", "install", "--quiet", self.wheel)
+        said = self.mesh(python)
+        self.assertTrue(said.startswith(str(self.folder)), said)
+
+    def test_with_what_debian_has(self) -> None:
+        python = self.environment("debian", "--system-site-packages")
+        run(python, "-m", "pip", "install", "--quiet", "--no-index", self.wheel)
+        said = self.mesh(python)
+        self.assertTrue(said.startswith("/usr/lib/python3/"), said)
+
+    def test_its_server_finds_its_libraries_in_the_wheel(self) -> None:
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            zipfile.ZipFile(self.wheel).extractall(folder)
+            bundled = folder / "stellate" / "_bundled"
+            for file in [bundled / "stellated", *(bundled / "lib").iterdir()]:
+                for library, path in re.findall(r"(\S+) => (\S+)", run("ldd", file)):
+                    of_the_machine = re.match(r"lib(c|m|stdc\+\+|gcc_s)\.so", library)
+                    if not of_the_machine:
+                        self.assertEqual(path, str(bundled / "lib" / library))
+            licences = {file.name for file in (bundled / "licences").iterdir()}
+            self.assertLessEqual({"stellate", "libgrpc29", "libssl3", "libtbb12"}, licences)
+
+    def test_it_names_its_platform(self) -> None:
+        self.assertRegex(
+            self.wheel.name, rf"^stellate-{re.escape(VERSION)}-py3-none-manylinux_2_\d+_\w+\.whl$"
+        )
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv)
