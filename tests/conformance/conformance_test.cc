@@ -13,15 +13,15 @@
 #include <utility>
 #include <vector>
 
-#include "convert.h"
 #include "exit_status.h"
 #include "files.h"
 #include "replay.h"
-#include "status.h"
 #include "stellate/catalogue.h"
 #include "stellate/client.h"
 #include "stellate/doctor.h"
 #include "support/spoiled_oracle.h"
+#include "wire/convert.h"
+#include "wire/status.h"
 
 namespace stellate::testing {
 namespace {

@@ -20,11 +20,11 @@
 #include <utility>
 #include <vector>
 
-#include "convert.h"
 #include "live.h"
+#include "run/worker.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 #include "support/spoiled_oracle.h"
-#include "worker.h"
+#include "wire/convert.h"
 
 namespace stellate::testing {
 namespace {

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "embedded_server.h"
+#include "net/embedded_server.h"
 #include "stellate/catalogue.h"
 #include "stellate/client.h"
 

@@ -11,11 +11,11 @@
 #include <sstream>
 #include <string>
 
-#include "convert.h"
 #include "program.h"
 #include "stellate/command_oracle.h"
 #include "stellate/download.h"
 #include "stellate/v1/stellate.grpc.pb.h"
+#include "wire/convert.h"
 
 namespace stellate::testing {
 namespace {

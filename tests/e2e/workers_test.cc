@@ -11,14 +11,14 @@
 #include <thread>
 #include <vector>
 
-#include "convert.h"
 #include "live.h"
-#include "mesh_builder.h"
+#include "run/delta_mesh.h"
+#include "run/worker.h"
 #include "stellate/serve.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 #include "support/mesh_judge.h"
 #include "support/spoiled_oracle.h"
-#include "worker.h"
+#include "wire/convert.h"
 
 namespace stellate::testing {
 namespace {
@@ -49,7 +49,7 @@ class Workers : public Live {
   };
   Ending Watch(const std::string& name, int k, int d) {
     Ending ending;
-    auto builder = client::MeshBuilder::Create(k, d);
+    auto builder = client::DeltaMesh::Create(k, d);
     grpc::ClientContext context;
     v1::WatchMeshRequest request;
     request.set_name(name);

@@ -13,11 +13,11 @@
 #include <thread>
 #include <vector>
 
-#include "convert.h"
+#include "run/worker.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 #include "tests/load/load.h"
 #include "tests/load/server_process.h"
-#include "worker.h"
+#include "wire/convert.h"
 
 namespace stellate::load {
 namespace {

@@ -9,7 +9,7 @@
 #include <sstream>
 #include <string>
 
-#include "examination.h"
+#include "doctor/examination.h"
 #include "shared/doctor.h"
 
 namespace stellate {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "findings.h"
-#include "probe.h"
+#include "doctor/findings.h"
+#include "doctor/probe.h"
 #include "shared/doctor.h"
 #include "stellate/doctor.h"
 

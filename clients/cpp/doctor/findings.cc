@@ -1,4 +1,4 @@
-#include "findings.h"
+#include "doctor/findings.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -119,12 +119,6 @@ Finding MakeFinding(const std::string& code, std::initializer_list<Value> values
   if (found == AllWords().end()) throw std::logic_error("findings.txt has no " + code);
   const Words& words = found->second;
   return {words.severity, code, Fill(words.message, values), Fill(words.advice, values)};
-}
-
-std::vector<std::string> FindingCodes() {
-  std::vector<std::string> codes;
-  for (const auto& [code, words] : AllWords()) codes.push_back(code);
-  return codes;
 }
 
 }  // namespace doctor

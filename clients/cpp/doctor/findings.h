@@ -26,9 +26,6 @@ struct Value {
 // The finding of that code, its sentences completed. Throws std::logic_error for an unknown code.
 Finding MakeFinding(const std::string& code, std::initializer_list<Value> values);
 
-// All codes there are.
-std::vector<std::string> FindingCodes();
-
 // Generated from findings.txt.
 extern const char* const kFindingsText;
 

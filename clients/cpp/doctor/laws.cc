@@ -4,7 +4,7 @@
 #include <limits>
 #include <numbers>
 
-#include "examination.h"
+#include "doctor/examination.h"
 
 namespace stellate::doctor {
 namespace {

@@ -1,4 +1,4 @@
-#include "probe.h"
+#include "doctor/probe.h"
 
 #include <Eigen/QR>
 #include <Eigen/SVD>
@@ -7,7 +7,7 @@
 #include <limits>
 #include <numeric>
 
-#include "findings.h"
+#include "doctor/findings.h"
 #include "shared/doctor.h"
 
 namespace stellate::doctor {

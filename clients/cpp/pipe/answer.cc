@@ -1,8 +1,8 @@
 #include <cstring>
 #include <optional>
 
-#include "framing.h"
-#include "numbers.h"
+#include "pipe/framing.h"
+#include "pipe/numbers.h"
 
 namespace stellate::pipe {
 namespace {

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "exchange.h"
-#include "framing.h"
-#include "numbers.h"
+#include "pipe/exchange.h"
+#include "pipe/framing.h"
+#include "pipe/numbers.h"
 
 namespace stellate {
 namespace pipe {

@@ -1,4 +1,4 @@
-#include "exchange.h"
+#include "pipe/exchange.h"
 
 #include <poll.h>
 #include <signal.h>
@@ -11,7 +11,7 @@
 #include <cstdio>
 #include <system_error>
 
-#include "numbers.h"
+#include "pipe/numbers.h"
 
 namespace stellate::pipe {
 namespace {

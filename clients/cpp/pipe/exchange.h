@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "process.h"
+#include "pipe/process.h"
 
 namespace stellate::pipe {
 

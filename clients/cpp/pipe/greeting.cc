@@ -1,7 +1,7 @@
 #include <charconv>
 
-#include "framing.h"
-#include "numbers.h"
+#include "pipe/framing.h"
+#include "pipe/numbers.h"
 #include "stellate/command_oracle.h"
 
 namespace stellate {

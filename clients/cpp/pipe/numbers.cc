@@ -1,4 +1,4 @@
-#include "numbers.h"
+#include "pipe/numbers.h"
 
 #include <charconv>
 #include <cstdio>

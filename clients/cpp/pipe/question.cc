@@ -1,5 +1,5 @@
-#include "framing.h"
-#include "numbers.h"
+#include "pipe/framing.h"
+#include "pipe/numbers.h"
 
 namespace stellate::pipe {
 namespace {

@@ -2,11 +2,11 @@
 
 #include <exception>
 
-#include "channel.h"
-#include "convert.h"
-#include "status.h"
+#include "net/channel.h"
+#include "run/worker.h"
 #include "stellate/v1/stellate.grpc.pb.h"
-#include "worker.h"
+#include "wire/convert.h"
+#include "wire/status.h"
 
 namespace stellate {
 

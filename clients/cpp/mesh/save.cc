@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <string>
 
-#include "formats.h"
+#include "mesh/formats.h"
+#include "mesh/write_file.h"
 #include "stellate/mesh.h"
-#include "write_file.h"
 
 namespace stellate {
 namespace {

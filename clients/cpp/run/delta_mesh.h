@@ -31,10 +31,10 @@ std::unique_ptr<SimplexSet> MakeSimplexSet(int k);
 
 // Puts a mesh together from WatchMesh streams. Chunks are kept until their revision is complete,
 // so that what a broken stream leaves undone can be sent again from revision() on.
-class MeshBuilder {
+class DeltaMesh {
  public:
   // Errors: a k that this client cannot hold.
-  static Expected<MeshBuilder> Create(int k, int d);
+  static Expected<DeltaMesh> Create(int k, int d);
 
   // Takes the chunk's arrays. Errors: what does not follow on revision() and what came before.
   Expected<void> Absorb(v1::DeltaChunk&& chunk);
@@ -55,7 +55,7 @@ class MeshBuilder {
   Expected<Mesh> Take() const;
 
  private:
-  MeshBuilder(int k, int d, std::unique_ptr<SimplexSet> set)
+  DeltaMesh(int k, int d, std::unique_ptr<SimplexSet> set)
       : k_(k), d_(d), simplex_set_(std::move(set)) {}
 
   Expected<void> Apply(const v1::MeshDelta& delta);

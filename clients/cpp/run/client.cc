@@ -4,9 +4,9 @@
 #include <string>
 #include <utility>
 
-#include "channel.h"
-#include "embedded_server.h"
-#include "run.h"
+#include "net/channel.h"
+#include "net/embedded_server.h"
+#include "run/run.h"
 #include "stellate/monitor.h"
 
 namespace stellate {

@@ -1,4 +1,4 @@
-#include "formats.h"
+#include "mesh/formats.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

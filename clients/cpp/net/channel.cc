@@ -1,4 +1,4 @@
-#include "channel.h"
+#include "net/channel.h"
 
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>

@@ -1,4 +1,4 @@
-#include "write_file.h"
+#include "mesh/write_file.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>

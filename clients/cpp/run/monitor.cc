@@ -10,10 +10,10 @@
 #include <optional>
 #include <utility>
 
-#include "channel.h"
-#include "convert.h"
-#include "status.h"
+#include "net/channel.h"
 #include "stellate/v1/stellate.grpc.pb.h"
+#include "wire/convert.h"
+#include "wire/status.h"
 
 namespace stellate {
 namespace {

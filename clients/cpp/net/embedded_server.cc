@@ -1,4 +1,4 @@
-#include "embedded_server.h"
+#include "net/embedded_server.h"
 
 #include <fcntl.h>
 #include <poll.h>

@@ -1,4 +1,4 @@
-#include "worker.h"
+#include "run/worker.h"
 
 #include <algorithm>
 #include <chrono>
@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "convert.h"
-#include "status.h"
+#include "wire/convert.h"
+#include "wire/status.h"
 
 namespace stellate::client {
 namespace {

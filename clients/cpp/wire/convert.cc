@@ -1,10 +1,10 @@
-#include "convert.h"
+#include "wire/convert.h"
 
 #include <bit>
 #include <cstring>
 #include <string>
 
-#include "status.h"
+#include "wire/status.h"
 
 namespace stellate::client {
 namespace {

@@ -1,4 +1,4 @@
-#include "run.h"
+#include "run/run.h"
 
 #include <google/protobuf/empty.pb.h>
 
@@ -6,8 +6,8 @@
 #include <stop_token>
 #include <utility>
 
-#include "convert.h"
-#include "status.h"
+#include "wire/convert.h"
+#include "wire/status.h"
 
 namespace stellate::client {
 namespace {
@@ -91,9 +91,9 @@ Expected<Mesh> Run::Go() {
 Expected<void> Run::Create() {
   const Expected<v1::MeshSpec> spec = ToSpec(oracle_, options_);
   if (!spec) return tl::unexpected(spec.error());
-  auto builder = MeshBuilder::Create(oracle_.dimension(), oracle_.ambient_dimension());
+  auto builder = DeltaMesh::Create(oracle_.dimension(), oracle_.ambient_dimension());
   if (!builder) return tl::unexpected(builder.error());
-  builder_ = std::make_unique<MeshBuilder>(std::move(*builder));
+  builder_ = std::make_unique<DeltaMesh>(std::move(*builder));
   grpc::ClientContext context;
   SetDeadline(context, kCallTime);
   v1::CreateMeshRequest request;

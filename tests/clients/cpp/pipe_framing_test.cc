@@ -7,8 +7,8 @@
 #include <cstring>
 #include <limits>
 
-#include "framing.h"
-#include "numbers.h"
+#include "pipe/framing.h"
+#include "pipe/numbers.h"
 #include "stellate/command_oracle.h"
 
 namespace stellate::pipe {

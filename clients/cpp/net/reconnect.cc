@@ -1,10 +1,10 @@
-#include "reconnect.h"
+#include "net/reconnect.h"
 
 #include <algorithm>
 #include <cstdio>
 #include <utility>
 
-#include "status.h"
+#include "wire/status.h"
 
 namespace stellate::client {
 namespace {

@@ -5,14 +5,14 @@
 #include <optional>
 #include <utility>
 
-#include "channel.h"
-#include "convert.h"
-#include "mesh_builder.h"
-#include "reconnect.h"
-#include "run.h"
-#include "status.h"
+#include "net/channel.h"
+#include "net/reconnect.h"
+#include "run/delta_mesh.h"
+#include "run/run.h"
 #include "stellate/monitor.h"
 #include "stellate/v1/stellate.grpc.pb.h"
+#include "wire/convert.h"
+#include "wire/status.h"
 
 namespace stellate {
 namespace client {
@@ -48,9 +48,9 @@ class Download {
     if (options_.revision == 0) {
       if (const auto ok = Settle(); !ok) return tl::unexpected(ok.error());
     }
-    auto builder = MeshBuilder::Create(k, d);
+    auto builder = DeltaMesh::Create(k, d);
     if (!builder) return tl::unexpected(builder.error());
-    builder_ = std::make_unique<MeshBuilder>(std::move(*builder));
+    builder_ = std::make_unique<DeltaMesh>(std::move(*builder));
     if (const auto ok = Fetch(); !ok) return tl::unexpected(ok.error());
     return Conclude();
   }
@@ -178,7 +178,7 @@ class Download {
   const DownloadOptions& options_;
   Reconnector attempts_;
   v1::Mesh status_;  // without geometry
-  std::unique_ptr<MeshBuilder> builder_;
+  std::unique_ptr<DeltaMesh> builder_;
   std::uint64_t revision_ = 0, vertices_ = 0, simplices_ = 0;  // of what was fetched
 };
 

@@ -1,4 +1,4 @@
-#include "mesh_builder.h"
+#include "run/delta_mesh.h"
 
 #include <algorithm>
 #include <array>
@@ -7,8 +7,8 @@
 #include <string>
 #include <utility>
 
-#include "convert.h"
-#include "status.h"
+#include "wire/convert.h"
+#include "wire/status.h"
 
 namespace stellate::client {
 namespace {
@@ -120,7 +120,7 @@ std::unique_ptr<SimplexSet> MakeSimplexSet(int k) {
   }
 }
 
-Expected<MeshBuilder> MeshBuilder::Create(int k, int d) {
+Expected<DeltaMesh> DeltaMesh::Create(int k, int d) {
   std::unique_ptr<SimplexSet> set = MakeSimplexSet(k);
   if (set == nullptr) {
     return Fail(ErrorCode::kRefused,
@@ -128,17 +128,17 @@ Expected<MeshBuilder> MeshBuilder::Create(int k, int d) {
                     std::to_string(kMaxSimplexDimension),
                 "LIMIT_EXCEEDED");
   }
-  return MeshBuilder(k, d, std::move(set));
+  return DeltaMesh(k, d, std::move(set));
 }
 
-void MeshBuilder::Reset() {
+void DeltaMesh::Reset() {
   revision_ = 0;
   pending_.clear();
   coordinates_.clear();
   simplex_set_ = MakeSimplexSet(k_);
 }
 
-Expected<void> MeshBuilder::Absorb(v1::DeltaChunk&& chunk) {
+Expected<void> DeltaMesh::Absorb(v1::DeltaChunk&& chunk) {
   const std::uint64_t revision = chunk.delta().revision();
   if (revision <= revision_ || (!pending_.empty() && pending_.back().revision() != revision)) {
     return tl::unexpected(BrokenProtocol("revision " + std::to_string(revision) + " out of order"));
@@ -152,7 +152,7 @@ Expected<void> MeshBuilder::Absorb(v1::DeltaChunk&& chunk) {
   return {};
 }
 
-Expected<void> MeshBuilder::Add(v1::DownloadMeshResponse&& part) {
+Expected<void> DeltaMesh::Add(v1::DownloadMeshResponse&& part) {
   v1::MeshDelta delta;
   delta.set_first_vertex(part.first_vertex());
   delta.mutable_points()->Swap(part.mutable_points());
@@ -162,7 +162,7 @@ Expected<void> MeshBuilder::Add(v1::DownloadMeshResponse&& part) {
 }
 
 // Removes first: a simplex that goes and comes back stands in both.
-Expected<void> MeshBuilder::Apply(const v1::MeshDelta& delta) {
+Expected<void> DeltaMesh::Apply(const v1::MeshDelta& delta) {
   const size_t known = coordinates_.size();
   if (const Expected<void> ok =
           AppendNumbers(delta.points(), {static_cast<std::uint32_t>(d_)}, &coordinates_);
@@ -188,7 +188,7 @@ Expected<void> MeshBuilder::Apply(const v1::MeshDelta& delta) {
   return {};
 }
 
-Expected<Mesh> MeshBuilder::Take() const {
+Expected<Mesh> DeltaMesh::Take() const {
   std::optional<SimplexMatrix> simplices = simplex_set_->Sorted();
   if (!simplices) return tl::unexpected(BrokenProtocol("a simplex that was there already"));
   Mesh mesh;

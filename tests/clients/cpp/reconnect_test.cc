@@ -1,5 +1,5 @@
 // When a lost server is waited for, for how long, and who may end the wait.
-#include "reconnect.h"
+#include "net/reconnect.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "reconnect.h"
+#include "net/reconnect.h"
 #include "stellate/client.h"
 #include "stellate/monitor.h"
 #include "stellate/v1/stellate.grpc.pb.h"

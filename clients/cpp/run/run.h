@@ -9,11 +9,11 @@
 #include <thread>
 #include <vector>
 
-#include "mesh_builder.h"
-#include "reconnect.h"
+#include "net/reconnect.h"
+#include "run/delta_mesh.h"
+#include "run/worker.h"
 #include "stellate/client.h"
 #include "stellate/v1/stellate.grpc.pb.h"
-#include "worker.h"
 
 namespace stellate::client {
 
@@ -47,7 +47,7 @@ class Run {
   const MeshOptions& options_;
   const std::function<bool()> hopeless_;
   std::string name_;
-  std::unique_ptr<MeshBuilder> builder_;
+  std::unique_ptr<DeltaMesh> builder_;
   std::unique_ptr<Reconnector> watch_;
   bool ended_ = false;  // the server said how
   std::vector<std::unique_ptr<Worker>> workers_;

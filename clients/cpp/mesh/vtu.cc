@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "formats.h"
+#include "mesh/formats.h"
 
 namespace stellate::client {
 namespace {

@@ -3,12 +3,12 @@
 #include <limits>
 #include <string>
 
-#include "channel.h"
-#include "convert.h"
-#include "status.h"
-#include "mesh_builder.h"
+#include "net/channel.h"
+#include "run/delta_mesh.h"
 #include "stellate/catalogue.h"
 #include "stellate/rpc/status_details.pb.h"
+#include "wire/convert.h"
+#include "wire/status.h"
 
 namespace stellate::client {
 namespace {
@@ -114,8 +114,8 @@ TEST(ServerInfo, HasEveryFieldOfTheProtocols) {
   EXPECT_EQ(check_share, 114);
 }
 
-TEST(MeshBuilder, FindsASimplexThatCameTwice) {
-  auto builder = MeshBuilder::Create(1, 1);
+TEST(DeltaMesh, FindsASimplexThatCameTwice) {
+  auto builder = DeltaMesh::Create(1, 1);
   for (const std::uint64_t revision : {1, 2}) {
     v1::DeltaChunk chunk;
     chunk.set_complete(true);
@@ -245,8 +245,8 @@ v1::DeltaChunk Delta(std::uint64_t revision, std::uint64_t first, const Eigen::M
   return chunk;
 }
 
-TEST(MeshBuilder, EndsWithWhatWasAddedAndNotRemoved) {
-  auto builder = MeshBuilder::Create(1, 2);
+TEST(DeltaMesh, EndsWithWhatWasAddedAndNotRemoved) {
+  auto builder = DeltaMesh::Create(1, 2);
   ASSERT_TRUE(builder.has_value());
   const Eigen::MatrixXd points = Eigen::MatrixXd::Random(2, 4);
   ASSERT_TRUE(builder->Absorb(Delta(1, 0, points.leftCols(3), {0, 1, 1, 2, 0, 2}, {})));
@@ -259,9 +259,9 @@ TEST(MeshBuilder, EndsWithWhatWasAddedAndNotRemoved) {
   EXPECT_EQ(mesh.simplices, expected);
 }
 
-TEST(MeshBuilder, StaysRightThroughALongHistory) {
+TEST(DeltaMesh, StaysRightThroughALongHistory) {
   // A hundred edges come and go five hundred times.
-  auto builder = MeshBuilder::Create(1, 2);
+  auto builder = DeltaMesh::Create(1, 2);
   ASSERT_TRUE(builder.has_value());
   ASSERT_TRUE(builder->Absorb(Delta(1, 0, Eigen::MatrixXd::Zero(2, 200), {0, 1}, {})));
   for (std::uint32_t step = 0; step < 1000; ++step) {
@@ -277,8 +277,8 @@ TEST(MeshBuilder, StaysRightThroughALongHistory) {
   EXPECT_EQ(mesh.simplices(1, 0), 1u);
 }
 
-TEST(MeshBuilder, TakesARevisionOnceAndWhole) {
-  auto builder = MeshBuilder::Create(1, 2);
+TEST(DeltaMesh, TakesARevisionOnceAndWhole) {
+  auto builder = DeltaMesh::Create(1, 2);
   ASSERT_TRUE(builder.has_value());
   const Eigen::MatrixXd points = Eigen::MatrixXd::Random(2, 3);
   ASSERT_TRUE(builder->Absorb(Delta(3, 0, points.leftCols(2), {0, 1}, {})));
@@ -299,8 +299,8 @@ TEST(MeshBuilder, TakesARevisionOnceAndWhole) {
   EXPECT_FALSE(builder->Absorb(Delta(8, 3, Eigen::MatrixXd(2, 0), {}, {})));
 }
 
-TEST(MeshBuilder, BeginsAnewWhenTheServerDoes) {
-  auto builder = MeshBuilder::Create(1, 2);
+TEST(DeltaMesh, BeginsAnewWhenTheServerDoes) {
+  auto builder = DeltaMesh::Create(1, 2);
   ASSERT_TRUE(builder.has_value());
   const Eigen::MatrixXd points = Eigen::MatrixXd::Random(2, 3);
   ASSERT_TRUE(builder->Absorb(Delta(7, 0, points, {0, 1}, {})));
@@ -321,8 +321,8 @@ TEST(Addresses, TellThisMachineFromOthers) {
     EXPECT_FALSE(StaysOnThisMachine(away)) << away;
 }
 
-TEST(MeshBuilder, RefusesWhatMakesNoSense) {
-  auto builder = MeshBuilder::Create(1, 2);
+TEST(DeltaMesh, RefusesWhatMakesNoSense) {
+  auto builder = DeltaMesh::Create(1, 2);
   ASSERT_TRUE(builder.has_value());
   EXPECT_FALSE(builder->Absorb(Delta(1, 5, Eigen::MatrixXd::Zero(2, 1), {}, {})));  // a gap
   v1::DeltaChunk wide = Delta(1, 0, Eigen::MatrixXd(2, 0), {0, 1}, {});
@@ -332,12 +332,12 @@ TEST(MeshBuilder, RefusesWhatMakesNoSense) {
   EXPECT_FALSE(builder->Absorb(Delta(1, 0, Eigen::MatrixXd::Zero(2, 1), {0, 1}, {})));
   for (const std::vector<std::uint32_t>& absent :
        {std::vector{1u, 2u}, {0u, 2u}, {4000000000u, 1u}}) {
-    auto other = MeshBuilder::Create(1, 2);
+    auto other = DeltaMesh::Create(1, 2);
     ASSERT_TRUE(other->Absorb(Delta(1, 0, Eigen::MatrixXd::Zero(2, 3), {0, 1}, {})));
     EXPECT_FALSE(other->Absorb(Delta(2, 3, Eigen::MatrixXd(2, 0), {}, absent)));
   }
-  EXPECT_FALSE(MeshBuilder::Create(0, 2).has_value());
-  EXPECT_FALSE(MeshBuilder::Create(kMaxSimplexDimension + 1, 20).has_value());
+  EXPECT_FALSE(DeltaMesh::Create(0, 2).has_value());
+  EXPECT_FALSE(DeltaMesh::Create(kMaxSimplexDimension + 1, 20).has_value());
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "write_file.h"
+#include "mesh/write_file.h"
 
 namespace stellate {
 namespace {
