@@ -4,6 +4,9 @@ module Stellate
   # The client's copy of a mesh that grows by deltas: vertices and simplices as of the last complete
   # revision. A delta that does not fit what came before is a StellateError with the reason PROTOCOL.
   class Growth
+    UNSETTLED = 64 << 20 # bytes
+    private_constant :UNSETTLED
+
     attr_reader :revision
 
     def initialize(k, d)
@@ -13,7 +16,7 @@ module Stellate
 
     # Back to the empty mesh.
     def reset
-      @revision, @points, @rows, @pending = 0, [], {}, []
+      @revision, @points, @rows, @pending, @unsettled, @size = 0, [], {}, [], [], 0
     end
 
     # Takes one chunk; true when a revision is complete with it.
@@ -26,11 +29,21 @@ module Stellate
       @pending << chunk.delta
       return false unless chunk.complete
 
-      whole, @pending = @pending, []
-      whole.each { |delta| add_points(delta.first_vertex, delta.points) }
-      whole.each { |delta| change(delta.added, delta.removed) }
+      @unsettled << @pending
+      @size += @pending.sum { |delta| [delta.points, delta.added, delta.removed].sum { |a| a ? a.data.size : 0 } }
+      @pending = []
       @revision = revision
+      settle if @size > UNSETTLED
       true
+    end
+
+    # Looks into what has come: many revisions at once, when nobody waits for this thread.
+    def settle
+      whole, @unsettled, @size = @unsettled, [], 0
+      whole.each do |deltas|
+        deltas.each { |delta| add_points(delta.first_vertex, delta.points) }
+        deltas.each { |delta| change(delta.added, delta.removed) }
+      end
     end
 
     # Drops the chunks of a revision that was cut short: it will be sent again.
@@ -55,21 +68,19 @@ module Stellate
       rows = Wire.rows(added, @k + 1)
       before = @rows.size
       rows.each { |row| @rows[row] = true }
-      return if @rows.size == before + rows.size && known?(rows)
+      most = added ? added.data.unpack('V*').max : nil
+      return if @rows.size == before + rows.size && (most || -1) < @points.size / @d
 
       raise Stellate.protocol_error('a delta adds simplices that are there, or vertices that are not')
     end
 
     # The mesh as of the last complete revision: its points and simplices are arrays of rows.
     def mesh(revision = @revision, **more)
-      simplices = @rows.keys.sort.join.unpack('N*').each_slice(@k + 1).to_a
+      settle
+      # Big-endian bytes sort as the numbers do.
+      sorted = Wire.split(@rows.keys.join.unpack('V*').pack('N*'), @k + 1).sort!
+      simplices = sorted.join.unpack('N*').each_slice(@k + 1).to_a
       Mesh.new(@k, @d, @points.each_slice(@d).to_a, simplices, revision, **more)
-    end
-
-    private
-
-    def known?(rows)
-      (rows.join.unpack('N*').max || -1) < @points.size / @d
     end
   end
 end

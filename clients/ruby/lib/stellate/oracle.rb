@@ -49,10 +49,13 @@ module Stellate
       n = x.size
       points = checked(method_of(chunk), ask(chunk, x), n, d)
       reply = V1::AnswerChunk.new(lease: chunk.lease)
-      found = points.map { |point| point ? 1 : 0 }
-      reply.found = found.pack('C*') if points.include?(nil)
-      nowhere = [0.0] * d
-      reply.points = Wire.to_wire(points.flat_map { |point| point || nowhere }, n, d)
+      if points.include?(nil)
+        reply.found = points.map { |point| point ? 1 : 0 }.pack('C*')
+        nowhere = [0.0] * d
+        reply.points = Wire.to_wire(points.flat_map { |point| point || nowhere }, n, d)
+      else
+        reply.points = Wire.to_wire(points.flatten, n, d)
+      end
       if chunk.want_tangents
         anywhere = Array.new(d) { |row| Array.new(k) { |column| row == column ? 1.0 : 0.0 } }.flatten
         reply.tangents = Wire.to_wire(at_found(:tangent_basis, points, anywhere), n, d, k)
@@ -90,6 +93,8 @@ module Stellate
       raise wrong(method, "an answer that is no array of #{n}", 'SHAPE') unless
         answer.is_a?(Array) && answer.size == n
 
+      return answer if sound?(answer, n, width) # looked at as a whole, which is quicker
+
       answer.map do |row|
         next if row.nil? && %i[closest_point intersect_flat].include?(method)
 
@@ -100,6 +105,13 @@ module Stellate
 
         numbers
       end
+    end
+
+    def sound?(answer, n, width)
+      each = answer.first.is_a?(Array) ? answer.first.size : 1
+      flat = answer.flatten
+      flat.size == n * width && flat.all?(Float) && flat.sum.finite? &&
+        answer.all? { |row| row.is_a?(Array) ? row.size == each : each == 1 }
     end
 
     def wrong(method, what, reason)

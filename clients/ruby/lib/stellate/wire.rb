@@ -20,9 +20,12 @@ module Stellate
       bytes(array, 8, *shape).unpack('E*')
     end
 
-    # Rows as strings of big-endian bytes, which sort as the rows do.
+    # Rows of vertex numbers as strings of their bytes.
     def rows(array, width)
-      data = bytes(array, 4, nil, width).unpack('V*').pack('N*')
+      split(bytes(array, 4, nil, width), width)
+    end
+
+    def split(data, width)
       data.unpack("a#{4 * width}" * (data.bytesize / (4 * width)))
     end
 
