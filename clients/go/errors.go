@@ -73,6 +73,8 @@ func protocolError(err error) *Error {
 	return newError(ErrOther, "PROTOCOL", "the server broke the protocol: %v", err)
 }
 
+const domain = "stellate.v1" // others stand between us and the server
+
 var kindOfReason = map[string]error{
 	"INVALID_ARGUMENT":    ErrInvalidArgument,
 	"OUT_OF_ORDER":        ErrFailedPrecondition,
@@ -85,6 +87,11 @@ var kindOfReason = map[string]error{
 	"NO_SEEDS":            ErrOracle,
 	"NO_WORKER":           ErrOracle,
 	"ANSWER_TIMEOUT":      ErrOracle,
+	"WORKERS_DISAGREE":    ErrOracle,
+	"INTERNAL":            ErrOther,
+	"JOURNAL_FULL":        ErrOther,
+	"JOURNAL_FAILED":      ErrOther,
+	"REPLAY_MISMATCH":     ErrOther,
 }
 
 var kindOfCode = map[codes.Code]error{
@@ -92,6 +99,7 @@ var kindOfCode = map[codes.Code]error{
 	codes.OutOfRange:         ErrInvalidArgument,
 	codes.ResourceExhausted:  ErrLimitExceeded,
 	codes.NotFound:           ErrMeshNotFound,
+	codes.PermissionDenied:   ErrUnauthenticated,
 	codes.FailedPrecondition: ErrFailedPrecondition,
 	codes.Unauthenticated:    ErrUnauthenticated,
 	codes.Aborted:            ErrOracle,
@@ -119,7 +127,7 @@ func fromRPC(err error) *Error {
 		switch _, kind, _ := strings.Cut(part.GetTypeUrl(), "/"); kind {
 		case "google.rpc.ErrorInfo":
 			var info rpc.ErrorInfo
-			if proto.Unmarshal(part.GetValue(), &info) == nil {
+			if proto.Unmarshal(part.GetValue(), &info) == nil && info.GetDomain() == domain {
 				ours.Reason, ours.Details = info.GetReason(), info.GetMetadata()
 				ours.Kind = KindOf(ours.Reason)
 			}
@@ -133,8 +141,10 @@ func fromRPC(err error) *Error {
 			}
 		}
 	}
-	if kind, known := kindOfCode[said.Code()]; known && ours.Kind == ErrOther {
-		ours.Kind = kind
+	if _, known := kindOfReason[ours.Reason]; !known && ours.Kind == ErrOther { // of a newer server
+		if kind, known := kindOfCode[said.Code()]; known {
+			ours.Kind = kind
+		}
 	}
 	if ours.Reason == "" {
 		ours.Reason = strings.ToUpper(strings.ReplaceAll(ours.Kind.Error(), " ", "_"))

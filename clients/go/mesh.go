@@ -102,7 +102,7 @@ func (m *Mesh) writePoints(out io.StringWriter, before, after string) {
 	words := make([]string, d)
 	for i := 0; i < len(m.Points); i += d {
 		for j, value := range m.Points[i : i+d] {
-			words[j] = strconv.FormatFloat(value, 'g', -1, 64)
+			words[j] = strconv.FormatFloat(value, 'g', 17, 64)
 		}
 		_, _ = out.WriteString(before + strings.Join(words, " ") + after + "\n")
 	}

@@ -59,6 +59,8 @@ export class SaveError extends kind("FORMAT") {}
 /** The mesh is finished and not proved good, which `requireCertified` insists on. */
 export class NotCertified extends kind("NOT_CERTIFIED") {}
 
+const DOMAIN = "stellate.v1";
+
 type Kind = new (message: string, options?: ErrorOptions) => StellateError;
 
 const BY_REASON: Record<string, Kind | undefined> = {
@@ -73,11 +75,17 @@ const BY_REASON: Record<string, Kind | undefined> = {
   NO_SEEDS: OracleError,
   NO_WORKER: OracleError,
   ANSWER_TIMEOUT: OracleError,
+  WORKERS_DISAGREE: OracleError,
+  INTERNAL: StellateError,
+  JOURNAL_FULL: StellateError,
+  JOURNAL_FAILED: StellateError,
+  REPLAY_MISMATCH: StellateError,
 };
 
 const BY_CODE: { [code: number]: Kind | undefined } = {
   [grpc.status.INVALID_ARGUMENT]: InvalidArgument,
   [grpc.status.OUT_OF_RANGE]: InvalidArgument,
+  [grpc.status.PERMISSION_DENIED]: Unauthenticated,
   [grpc.status.RESOURCE_EXHAUSTED]: LimitExceeded,
   [grpc.status.NOT_FOUND]: MeshNotFound,
   [grpc.status.FAILED_PRECONDITION]: FailedPrecondition,
@@ -88,15 +96,36 @@ const BY_CODE: { [code: number]: Kind | undefined } = {
   [grpc.status.DEADLINE_EXCEEDED]: Unavailable,
 };
 
-/** The class for one of the protocol's reasons. */
-export function errorClass(reason: string): Kind {
-  return reason.startsWith("ORACLE_") ? OracleError : (BY_REASON[reason] ?? StellateError);
+/** The class for one of the protocol's reasons; of a newer server's, for the code beside it. */
+export function errorClass(reason: string, code: grpc.status = grpc.status.UNKNOWN): Kind {
+  if (reason.startsWith("ORACLE_")) return OracleError;
+  return BY_REASON[reason] ?? BY_CODE[code] ?? StellateError;
 }
 
 interface AnyMessage {
-  type_url: string;
-  typeUrl?: string;
+  type_url: string; // as protobufjs has it
   value: Uint8Array;
+}
+
+/** The reason, and what else the server says; nothing of what stands between us and it. */
+function namedIn(bytes: Uint8Array): [string, Record<string, unknown>] {
+  let reason = "";
+  const details: Record<string, unknown> = {};
+  const status = decodeDetail("Status", bytes) as unknown as { details: AnyMessage[] };
+  for (const part of status.details) {
+    const type = part.type_url.split("/").pop();
+    if (type === "google.rpc.ErrorInfo") {
+      const info = decodeDetail("ErrorInfo", part.value);
+      if (info.domain !== DOMAIN) continue;
+      reason = info.reason as string;
+      Object.assign(details, info.metadata);
+    } else if (type === "google.rpc.BadRequest") {
+      const { fieldViolations } = decodeDetail("BadRequest", part.value);
+      const violations = fieldViolations as { field: string; description: string }[];
+      details.fields = Object.fromEntries(violations.map((v) => [v.field, v.description]));
+    }
+  }
+  return [reason, details];
 }
 
 /** Our error for a failed rpc, with the reason and the fields that the server named. */
@@ -104,27 +133,16 @@ export function fromRpc(error: grpc.ServiceError): StellateError {
   let reason = "";
   const details: Record<string, unknown> = { grpcCode: grpc.status[error.code] };
   for (const value of error.metadata?.get("grpc-status-details-bin") ?? []) {
-    const status = decodeDetail("Status", value as Buffer) as unknown as { details: AnyMessage[] };
-    for (const part of status.details) {
-      const type = (part.type_url ?? part.typeUrl).split("/").pop();
-      if (type === "google.rpc.ErrorInfo") {
-        const info = decodeDetail("ErrorInfo", part.value);
-        reason = info.reason as string;
-        Object.assign(details, info.metadata);
-      } else if (type === "google.rpc.BadRequest") {
-        const { fieldViolations } = decodeDetail("BadRequest", part.value);
-        const violations = fieldViolations as { field: string; description: string }[];
-        details.fields = Object.fromEntries(violations.map((v) => [v.field, v.description]));
-      }
+    try {
+      const [named, more] = namedIn(value as Buffer);
+      reason = named;
+      Object.assign(details, more);
+    } catch {
+      continue; // of whatever stands between us and the server
     }
   }
-  const byCode = BY_CODE[error.code] ?? StellateError;
-  const byReason = reason ? errorClass(reason) : byCode;
   const message = error.details || grpc.status[error.code];
-  return new (byReason === StellateError ? byCode : byReason)(message, {
-    reason: reason || undefined,
-    details,
-  });
+  return new (errorClass(reason, error.code))(message, { reason: reason || undefined, details });
 }
 
 /** For what a server sent that it must not send. */

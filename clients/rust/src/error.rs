@@ -14,6 +14,10 @@ mod rpc {
     tonic::include_proto!("stellate.rpc");
 }
 
+const DOMAIN: &str = "stellate.v1"; // others stand between us and the server
+/// Reasons whose kind is none in particular; that of others which are unknown goes by their code.
+const OURS: [&str; 4] = ["INTERNAL", "JOURNAL_FULL", "JOURNAL_FAILED", "REPLAY_MISMATCH"];
+
 /// What kind of thing went wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -112,6 +116,9 @@ impl Error {
             match part.type_url.rsplit('/').next() {
                 Some("google.rpc.ErrorInfo") => {
                     let info = rpc::ErrorInfo::decode(&part.value[..]).unwrap_or_default();
+                    if info.domain != DOMAIN {
+                        continue;
+                    }
                     error.kind = Kind::of_reason(&info.reason);
                     error.reason = info.reason.into();
                     error.details = info.metadata.into_iter().collect();
@@ -124,7 +131,7 @@ impl Error {
                 _ => {}
             }
         }
-        if error.kind == Kind::Other {
+        if error.kind == Kind::Other && !OURS.contains(&&*error.reason) {
             error.kind = Kind::of_code(status.code());
         }
         if error.reason.is_empty() {
@@ -156,7 +163,7 @@ impl Kind {
             "MESH_NOT_FOUND" => Kind::MeshNotFound,
             "SHUTTING_DOWN" => Kind::Unavailable,
             "UNAUTHENTICATED" => Kind::Unauthenticated,
-            "NO_SEEDS" | "NO_WORKER" | "ANSWER_TIMEOUT" => Kind::Oracle,
+            "NO_SEEDS" | "NO_WORKER" | "ANSWER_TIMEOUT" | "WORKERS_DISAGREE" => Kind::Oracle,
             _ if reason.starts_with("ORACLE_") => Kind::Oracle,
             _ => Kind::Other,
         }
@@ -168,7 +175,7 @@ impl Kind {
             Code::ResourceExhausted => Kind::LimitExceeded,
             Code::NotFound => Kind::MeshNotFound,
             Code::FailedPrecondition => Kind::FailedPrecondition,
-            Code::Unauthenticated => Kind::Unauthenticated,
+            Code::Unauthenticated | Code::PermissionDenied => Kind::Unauthenticated,
             Code::Aborted => Kind::Oracle,
             Code::Cancelled => Kind::Cancelled,
             Code::Unavailable | Code::DeadlineExceeded => Kind::Unavailable,

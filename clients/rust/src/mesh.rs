@@ -72,17 +72,33 @@ impl Mesh {
     fn write_txt(&self, out: &mut impl Write) -> io::Result<()> {
         let (k, d) = (self.dimension, self.ambient_dimension);
         writeln!(out, "{k} {d} {} {}", self.vertex_count(), self.simplex_count())?;
-        write_rows(out, "", self.points.iter(), d, "")?;
+        write_rows(out, "", self.points.iter().copied().map(exact), d, "")?;
         write_rows(out, "", self.simplices.iter(), k + 1, "")
     }
 
     fn write_obj(&self, out: &mut impl Write) -> io::Result<()> {
         let filled = if self.ambient_dimension == 2 { " 0" } else { "" };
-        write_rows(out, "v ", self.points.iter(), self.ambient_dimension, filled)?;
+        write_rows(out, "v ", self.points.iter().copied().map(exact), self.ambient_dimension, filled)?;
         let cells = self.oriented_simplices().unwrap_or_else(|| self.simplices.clone());
         let letter = if self.dimension == 1 { "l " } else { "f " };
         write_rows(out, letter, cells.iter().map(|id| id + 1), self.dimension + 1, "")
     }
+}
+
+/// C's %.17g: the same text from all clients, which comes back to the same double.
+fn exact(value: f64) -> String {
+    let scientific = format!("{value:.16e}");
+    let (digits, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    let trimmed = |text: &str| match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_string(),
+        false => text.to_string(),
+    };
+    if (-4..17).contains(&exponent) {
+        return trimmed(&format!("{value:.*}", (16 - exponent) as usize));
+    }
+    let sign = if exponent < 0 { '-' } else { '+' };
+    format!("{}e{sign}{:02}", trimmed(digits), exponent.abs())
 }
 
 fn write_rows<T: Display>(

@@ -105,7 +105,7 @@ impl<'a> Outage<'a> {
         if let Some(hopeless) = (self.patience.hopeless)() {
             return Err(hopeless);
         }
-        if ours.kind == Kind::Other || ours.kind == Kind::Cancelled {
+        if ours.kind == Kind::Other {
             ours.kind = Kind::Unavailable;
         }
         if self.stopped.is_set() || !self.patience.reached.load(Ordering::Relaxed) {

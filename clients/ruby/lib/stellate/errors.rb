@@ -45,13 +45,17 @@ module Stellate
     'LIMIT_EXCEEDED' => LimitExceeded, 'MESH_NOT_FOUND' => MeshNotFound,
     'FAILED_PRECONDITION' => FailedPrecondition, 'SHUTTING_DOWN' => Unavailable,
     'UNAUTHENTICATED' => Unauthenticated, 'REVISION_TOO_NEW' => InvalidArgument,
-    'NO_SEEDS' => OracleError, 'NO_WORKER' => OracleError, 'ANSWER_TIMEOUT' => OracleError
+    'NO_SEEDS' => OracleError, 'NO_WORKER' => OracleError, 'ANSWER_TIMEOUT' => OracleError,
+    'WORKERS_DISAGREE' => OracleError,
+    'INTERNAL' => StellateError, 'JOURNAL_FULL' => StellateError,
+    'JOURNAL_FAILED' => StellateError, 'REPLAY_MISMATCH' => StellateError
   }.freeze
   BY_CODE = {
     GRPC::Core::StatusCodes::INVALID_ARGUMENT => InvalidArgument,
     GRPC::Core::StatusCodes::OUT_OF_RANGE => InvalidArgument,
     GRPC::Core::StatusCodes::RESOURCE_EXHAUSTED => LimitExceeded,
     GRPC::Core::StatusCodes::NOT_FOUND => MeshNotFound,
+    GRPC::Core::StatusCodes::PERMISSION_DENIED => Unauthenticated,
     GRPC::Core::StatusCodes::FAILED_PRECONDITION => FailedPrecondition,
     GRPC::Core::StatusCodes::UNAUTHENTICATED => Unauthenticated,
     GRPC::Core::StatusCodes::ABORTED => OracleError,
@@ -61,31 +65,41 @@ module Stellate
   }.freeze
   private_constant :BY_REASON, :BY_CODE
 
-  # The class for one of the protocol's reasons.
-  def self.error_class(reason)
-    reason.start_with?('ORACLE_') ? OracleError : BY_REASON.fetch(reason, StellateError)
+  DOMAIN = 'stellate.v1' # others stand between us and the server
+  private_constant :DOMAIN
+
+  # The class for one of the protocol's reasons; of a newer server's, for the code beside it.
+  def self.error_class(reason, code = nil)
+    return OracleError if reason.start_with?('ORACLE_')
+
+    BY_REASON[reason] || BY_CODE.fetch(code, StellateError)
   end
 
   # Our error for a failed call, with the reason and the fields that the server named.
   def self.from_rpc(error)
+    reason, fields, details = named_in(error.metadata['grpc-status-details-bin'])
+    kind = error_class(reason, error.code)
+    reason = kind.name.split('::').last if reason.empty?
+    kind.new(error.details.to_s.empty? ? reason : error.details, reason:, fields:, details:)
+  end
+
+  def self.named_in(bytes)
     reason, fields, details = '', {}, {}
-    bytes = error.metadata['grpc-status-details-bin']
     (bytes ? Rpc::Status.decode(bytes).details : []).each do |part|
       case part.type_url.split('/').last
       when 'google.rpc.ErrorInfo'
         info = Rpc::ErrorInfo.decode(part.value)
-        reason, details = info.reason, info.metadata.to_h
+        reason, details = info.reason, info.metadata.to_h if info.domain == DOMAIN
       when 'google.rpc.BadRequest'
         violations = Rpc::BadRequest.decode(part.value).field_violations
         fields = violations.to_h { |one| [one.field, one.description] }
       end
     end
-    by_code = BY_CODE.fetch(error.code, StellateError)
-    kind = reason.empty? ? by_code : error_class(reason)
-    kind = by_code if kind == StellateError
-    reason = kind.name.split('::').last if reason.empty?
-    kind.new(error.details.to_s.empty? ? reason : error.details, reason:, fields:, details:)
+    [reason, fields, details]
+  rescue Google::Protobuf::ParseError
+    ['', {}, {}] # of whatever stands between us and the server
   end
+  private_class_method :named_in
 
   # For what a server sent that it must not send.
   def self.protocol_error(what)

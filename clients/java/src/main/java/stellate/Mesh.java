@@ -2,6 +2,9 @@ package stellate;
 
 import java.io.IOException;
 import java.io.PrintWriter;
+import java.math.BigDecimal;
+import java.math.MathContext;
+import java.math.RoundingMode;
 import java.nio.file.Files;
 import java.nio.file.Path;
 import java.nio.file.StandardCopyOption;
@@ -115,11 +118,26 @@ public final class Mesh {
   private void writePoints(PrintWriter out, String before, String after) {
     for (int i = 0; i < points.length; i++) {
       out.print(i % ambientDimension == 0 ? before : " ");
-      out.print(points[i]);
+      out.print(exact(points[i]));
       if ((i + 1) % ambientDimension == 0) {
         out.print(after + "\n");
       }
     }
+  }
+
+  /** C's %.17g: the same text from all clients, which comes back to the same double. */
+  private static String exact(double value) {
+    if (value == 0) {
+      return 1 / value < 0 ? "-0" : "0";
+    }
+    BigDecimal rounded = new BigDecimal(value).round(new MathContext(17, RoundingMode.HALF_EVEN));
+    rounded = rounded.stripTrailingZeros();
+    int exponent = rounded.precision() - rounded.scale() - 1;
+    if (exponent >= -4 && exponent < 17) {
+      return rounded.toPlainString();
+    }
+    String digits = rounded.movePointLeft(exponent).toPlainString();
+    return digits + (exponent < 0 ? "e-" : "e+") + "%02d".formatted(Math.abs(exponent));
   }
 
   private void writeRows(PrintWriter out, String before, int[] rows, int first) {

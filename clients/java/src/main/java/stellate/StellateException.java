@@ -8,6 +8,7 @@ import io.grpc.StatusRuntimeException;
 import java.util.HashMap;
 import java.util.Map;
 import java.util.Optional;
+import java.util.Set;
 import stellate.rpc.BadRequest;
 import stellate.rpc.ErrorInfo;
 
@@ -54,7 +55,7 @@ public final class StellateException extends RuntimeException {
         case "MESH_NOT_FOUND" -> MESH_NOT_FOUND;
         case "SHUTTING_DOWN" -> UNAVAILABLE;
         case "UNAUTHENTICATED" -> UNAUTHENTICATED;
-        case "NO_SEEDS", "NO_WORKER", "ANSWER_TIMEOUT" -> ORACLE;
+        case "NO_SEEDS", "NO_WORKER", "ANSWER_TIMEOUT", "WORKERS_DISAGREE" -> ORACLE;
         default -> reason.startsWith("ORACLE_") ? ORACLE : OTHER;
       };
     }
@@ -65,7 +66,7 @@ public final class StellateException extends RuntimeException {
         case RESOURCE_EXHAUSTED -> LIMIT_EXCEEDED;
         case NOT_FOUND -> MESH_NOT_FOUND;
         case FAILED_PRECONDITION -> FAILED_PRECONDITION;
-        case UNAUTHENTICATED -> UNAUTHENTICATED;
+        case UNAUTHENTICATED, PERMISSION_DENIED -> UNAUTHENTICATED;
         case ABORTED -> ORACLE;
         case CANCELLED -> CANCELLED;
         case UNAVAILABLE, DEADLINE_EXCEEDED -> UNAVAILABLE;
@@ -76,6 +77,12 @@ public final class StellateException extends RuntimeException {
 
   private static final Metadata.Key<byte[]> DETAILS =
       Metadata.Key.of("grpc-status-details-bin", Metadata.BINARY_BYTE_MARSHALLER);
+
+  private static final String DOMAIN = "stellate.v1"; // others stand between us and the server
+
+  /** Reasons whose kind is none in particular. */
+  private static final Set<String> OURS =
+      Set.of("INTERNAL", "JOURNAL_FULL", "JOURNAL_FAILED", "REPLAY_MISMATCH");
 
   private final Kind kind;
   private final String reason;
@@ -144,7 +151,10 @@ public final class StellateException extends RuntimeException {
       if (bytes != null) {
         for (Any part : stellate.rpc.Status.parseFrom(bytes).getDetailsList()) {
           switch (part.getTypeUrl().substring(part.getTypeUrl().lastIndexOf('/') + 1)) {
-            case "google.rpc.ErrorInfo" -> info = ErrorInfo.parseFrom(part.getValue());
+            case "google.rpc.ErrorInfo" -> {
+              ErrorInfo said = ErrorInfo.parseFrom(part.getValue());
+              info = said.getDomain().equals(DOMAIN) ? said : info;
+            }
             case "google.rpc.BadRequest" -> request = BadRequest.parseFrom(part.getValue());
             default -> {} // of a newer server
           }
@@ -154,7 +164,9 @@ public final class StellateException extends RuntimeException {
       error.addSuppressed(broken);
     }
     Kind kind = Kind.ofReason(info.getReason());
-    kind = kind == Kind.OTHER ? Kind.ofCode(status.getCode()) : kind;
+    if (kind == Kind.OTHER && !OURS.contains(info.getReason())) {
+      kind = Kind.ofCode(status.getCode()); // a reason of a newer server
+    }
     String reason = info.getReason().isEmpty() ? status.getCode().name() : info.getReason();
     String said = status.getDescription() == null ? reason : status.getDescription();
     Throwable cause = status.getCause();
