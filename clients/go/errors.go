@@ -33,7 +33,7 @@ var (
 	// ErrServerNotFound: no server was given, and there is no stellated on this machine to start.
 	ErrServerNotFound = errors.New("no stellated found")
 	// ErrSave: a mesh that the chosen file format cannot hold.
-	ErrSave = errors.New("cannot save")
+	ErrSave = errors.New("save error")
 	// ErrNotCertified: the mesh is finished and not proved good, which Options.RequireCertified is about.
 	ErrNotCertified = errors.New("not certified")
 	// ErrOther is every other error of the server, its own faults among them.

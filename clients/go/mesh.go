@@ -2,6 +2,7 @@ package stellate
 
 import (
 	"bufio"
+	"errors"
 	"fmt"
 	"io"
 	"os"
@@ -34,7 +35,38 @@ func (m *Mesh) Certified() bool { return m.Report.GetCertificate().GetCertified(
 
 // OrientedSimplices are the simplices with vertices exchanged so that neighbours agree; nil if the mesh
 // is not orientable.
-func (m *Mesh) OrientedSimplices() []uint32 { return orient(m.Simplices, m.Dimension+1) }
+func (m *Mesh) OrientedSimplices() []uint32 {
+	return orient(m.Simplices, m.Dimension+1, m.Points, m.AmbientDimension)
+}
+
+// LoadTxt reads the .txt format back, to the last bit.
+func LoadTxt(path string) (*Mesh, error) {
+	text, err := os.ReadFile(path)
+	if err != nil {
+		return nil, err
+	}
+	var head [4]int
+	words := strings.Fields(string(text))
+	for i := range head {
+		if len(words) > i && err == nil {
+			head[i], err = strconv.Atoi(words[i])
+		}
+	}
+	m := &Mesh{Dimension: head[0], AmbientDimension: head[1]}
+	end := 4 + head[1]*head[2]
+	if err != nil || len(words) != end+(head[0]+1)*head[3] {
+		return nil, newError(ErrSave, "FORMAT", "%s does not have the numbers that its first line speaks of", path)
+	}
+	for _, word := range words[4:end] {
+		value, wrong := strconv.ParseFloat(word, 64)
+		m.Points, err = append(m.Points, value), errors.Join(err, wrong)
+	}
+	for _, word := range words[end:] {
+		id, wrong := strconv.ParseUint(word, 10, 32)
+		m.Simplices, err = append(m.Simplices, uint32(id)), errors.Join(err, wrong)
+	}
+	return m, err
+}
 
 // CheckSave says why a mesh of that kind cannot be saved under the name, or nil.
 func CheckSave(path string, k, d int) error {

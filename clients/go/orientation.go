@@ -2,10 +2,11 @@ package stellate
 
 import "slices"
 
-// orient gives the same simplices, some with their first two vertices exchanged, so that neighbours
-// induce opposite orientations on the facet they share; nil if that cannot be: the complex is not
-// orientable, or a facet is in more than two simplices. Rows have to be ascending.
-func orient(simplices []uint32, width int) []uint32 {
+// orient gives the same simplices, some with their last two vertices exchanged, so that neighbours
+// induce opposite orientations on the facet they share; the first of each component stays, but that
+// those of a hypersurface are turned as a whole where their normals point inwards. nil if that cannot
+// be: the complex is not orientable, or a facet is in more than two simplices. Rows have to be ascending.
+func orient(simplices []uint32, width int, points []float64, d int) []uint32 {
 	count := len(simplices) / width
 	// Facet f is that of simplex f / width without its vertex f % width.
 	facets := make([]uint32, 0, count*width*(width-1))
@@ -34,9 +35,9 @@ func orient(simplices []uint32, width int) []uint32 {
 			continue
 		}
 		turned[start] = 1
-		for front := []int{start}; len(front) > 0; {
-			s := front[len(front)-1]
-			front = front[:len(front)-1]
+		component := []int{start}
+		for at := 0; at < len(component); at++ {
+			s := component[at]
 			for i := range width {
 				facet := int(other[s*width+i])
 				if facet < 0 {
@@ -51,15 +52,52 @@ func orient(simplices []uint32, width int) []uint32 {
 				}
 				if turned[neighbour] == 0 {
 					turned[neighbour] = wanted
-					front = append(front, neighbour)
+					component = append(component, neighbour)
 				}
 			}
 		}
-	}
-	for s := range count {
-		if turned[s] < 0 {
-			oriented[s*width], oriented[s*width+1] = oriented[s*width+1], oriented[s*width]
+		volume := 0.0 // (k+1)! times those of the cones from the origin
+		for _, s := range component {
+			row := oriented[s*width : (s+1)*width]
+			if turned[s] < 0 {
+				exchange(row)
+			}
+			if width == d {
+				var corners [][]float64
+				for _, id := range row {
+					corners = append(corners, points[int(id)*d:(int(id)+1)*d])
+				}
+				volume += determinant(corners)
+			}
+		}
+		if volume < 0 {
+			for _, s := range component {
+				exchange(oriented[s*width : (s+1)*width])
+			}
 		}
 	}
 	return oriented
+}
+
+func exchange(row []uint32) {
+	last := len(row) - 1
+	row[last-1], row[last] = row[last], row[last-1]
+}
+
+func determinant(rows [][]float64) float64 {
+	if len(rows) == 1 {
+		return rows[0][0]
+	}
+	sum, sign := 0.0, 1.0
+	for i, row := range rows {
+		var minor [][]float64
+		for j, other := range rows {
+			if j != i {
+				minor = append(minor, other[1:])
+			}
+		}
+		sum += sign * row[0] * determinant(minor)
+		sign = -sign
+	}
+	return sum
 }

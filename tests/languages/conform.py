@@ -7,6 +7,7 @@ the lines of its standard input, each with one line of answer:
 
     watch NAME PATH   watches the mesh, saves it to PATH: "mesh REVISION TERMINATION LEVEL", also if the
                       mesh was cancelled, or "error CLASS REASON"
+    save MESH PATH    reads the .txt file MESH and saves it to PATH: "saved", or "error CLASS REASON"
     create LABEL      declares any mesh with the label: "error CLASS REASON"
 
 Classes may be written as a language likes to, without spaces: case and underscores do not count.
@@ -25,13 +26,13 @@ _ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(_ROOT / "clients" / "python"))
 sys.path.insert(0, str(_ROOT / "tests" / "clients" / "python"))
 
-import stellate  # noqa: E402, F401  (makes the stubs)
 import grpc  # noqa: E402
+import stellate  # noqa: E402, F401  (makes the stubs)
 from fake_server import FakeServer, serving  # noqa: E402
 from stellate._generated import mesh_pb2, stellate_pb2  # noqa: E402
 
 _KIT = _ROOT / "tests" / "conformance"
-_SHORT = {"oracle": "oracleerror", "other": "stellateerror"}
+_SHORT = {"oracle": "oracleerror", "other": "stellateerror", "save": "saveerror"}
 
 
 def recorded(path: str):
@@ -94,6 +95,10 @@ def canonical(line: str) -> str:
     return " ".join(words)
 
 
+def same(path: pathlib.Path, file: str) -> bool:
+    return path.exists() and path.read_bytes() == (_KIT / file).read_bytes()
+
+
 def wanted(entry) -> str:
     if "error" in entry:
         return f"error stellateerror {entry['error']}"
@@ -103,6 +108,7 @@ def wanted(entry) -> str:
 def main() -> int:
     streams = json.loads((_KIT / "streams.json").read_text())
     errors = json.loads((_KIT / "errors.json").read_text())
+    meshes = json.loads((_KIT / "meshes.json").read_text())
     wrong = []
     with tempfile.TemporaryDirectory() as folder, serving(Replay(streams, errors)) as address:
         client = subprocess.Popen(
@@ -112,7 +118,7 @@ def main() -> int:
         def ask(line: str, answer: str, *, any_reason: bool = False) -> None:
             print(line, file=client.stdin, flush=True)
             said = canonical(client.stdout.readline())
-            if any_reason:
+            if any_reason or answer == "error saveerror":
                 said = said.rpartition(" ")[0]
             if said != answer:
                 wrong.append(f"{line}: {said!r}, not {answer!r}")
@@ -120,9 +126,15 @@ def main() -> int:
         for entry in streams:
             path = pathlib.Path(folder) / f"{entry['name']}.txt"
             ask(f"watch meshes/{entry['name']} {path}", wanted(entry))
-            if "mesh" in entry and path.exists():
-                if path.read_bytes() != (_KIT / entry["mesh"]).read_bytes():
-                    wrong.append(f"{entry['name']}: the mesh differs from {entry['mesh']}")
+            if "mesh" in entry and not same(path, entry["mesh"]):
+                wrong.append(f"{entry['name']}: the mesh differs from {entry['mesh']}")
+        for entry in meshes:
+            for ending in ("txt", "obj"):
+                path = pathlib.Path(folder) / f"{entry['name']}-saved.{ending}"
+                file = {"txt": entry["mesh"], **entry["files"]}.get(ending)
+                ask(f"save {_KIT / entry['mesh']} {path}", "saved" if file else "error saveerror")
+                if file and not same(path, file):
+                    wrong.append(f"{entry['name']}: the file differs from {file}")
         for i, entry in enumerate(errors["failures"]):
             kind = entry["class"].lower()
             ask(f"watch meshes/failure-{i} {folder}/failed.txt", f"error {kind} {entry['reason']}")
@@ -131,7 +143,7 @@ def main() -> int:
             ask(f"create {i}", answer, any_reason=not entry["reason"])
         client.stdin.close()
         client.wait()
-    total = len(streams) + len(errors["failures"]) + len(errors["statuses"])
+    total = 2 * len(meshes) + len(streams) + len(errors["failures"]) + len(errors["statuses"])
     print("\n".join([*wrong, f"conformance: {total - len(wrong)} of {total}"]))
     return 1 if wrong else 0
 

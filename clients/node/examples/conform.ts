@@ -1,12 +1,16 @@
 // Obeys tests/languages/conform.py: see there.
 import { createInterface } from "node:readline";
-import { Client, type Mesh, StellateError, Torus, watch } from "../src/index.js";
+import { Client, loadTxt, type Mesh, StellateError, Torus, watch } from "../src/index.js";
 
 const client = new Client(process.argv[2], { onOutage: () => {} });
 
 async function obey(command: string, name: string, path: string): Promise<string> {
   let last: Mesh | undefined;
   try {
+    if (command === "save") {
+      await (await loadTxt(name)).save(path);
+      return "saved";
+    }
     if (command === "create") await client.create(new Torus(), { epsilon: 1, label: name });
     for await (const grown of watch(name, { server: client })) last = grown;
   } catch (error) {

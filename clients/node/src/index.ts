@@ -3,7 +3,7 @@ export { Client, type ClientOptions } from "./client.js";
 export type { Credentials } from "./credentials.js";
 export * from "./errors.js";
 export { ProductOfCircles, Torus } from "./manifolds.js";
-export { checkSave, Mesh } from "./mesh.js";
+export { checkSave, loadTxt, Mesh } from "./mesh.js";
 export type { Found, Oracle } from "./oracle.js";
 export { progressBar } from "./progress.js";
 export { type MeshInfo, type Progress, type Report, reportText } from "./report.js";

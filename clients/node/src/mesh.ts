@@ -1,5 +1,5 @@
 // A mesh, finished or growing.
-import { rename, writeFile } from "node:fs/promises";
+import { readFile, rename, writeFile } from "node:fs/promises";
 import { extname } from "node:path";
 import { SaveError } from "./errors.js";
 import { orient } from "./orientation.js";
@@ -39,7 +39,7 @@ export class Mesh {
 
   /** The simplices with vertices exchanged so that neighbours agree; undefined if not orientable. */
   orientedSimplices(): Uint32Array | undefined {
-    return orient(this.simplices, this.dimension + 1);
+    return orient(this.simplices, this.dimension + 1, this.points, this.ambientDimension);
   }
 
   /**
@@ -70,6 +70,18 @@ export class Mesh {
     const cells = lines(ids, this.dimension + 1).map((line) => `${letter} ${line}`);
     return [...vertices, ...cells, ""].join("\n");
   }
+}
+
+/** Reads the .txt format back, to the last bit. */
+export async function loadTxt(path: string): Promise<Mesh> {
+  const words = (await readFile(path, "utf8")).trim().split(/\s+/).map(Number);
+  const [k, d, vertices, simplices] = words;
+  const end = 4 + d * vertices;
+  if (words.length !== end + (k + 1) * simplices || words.some(Number.isNaN)) {
+    throw new SaveError(`${path} does not have the numbers that its first line speaks of`);
+  }
+  const points = Float64Array.from(words.slice(4, end));
+  return new Mesh(k, d, points, Uint32Array.from(words.slice(end)), 0);
 }
 
 /** Throws SaveError if a mesh of that kind cannot be saved under the name. */

@@ -10,6 +10,11 @@ $stdin.each_line do |line|
   command, name, path = line.split
   mesh = nil
   begin
+    if command == 'save'
+      Stellate::Mesh.load_txt(name).save(path)
+      puts 'saved'
+      next
+    end
     client.create(Stellate::Torus.new, epsilon: 1, label: name) if command == 'create'
     Stellate.watch(name, server: client) { |grown| mesh = grown }
   rescue Stellate::StellateError => e

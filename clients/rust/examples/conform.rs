@@ -12,6 +12,10 @@ fn obey(client: &Client, words: &[&str]) -> Result<Option<Mesh>, Error> {
         client.create(&Torus::default(), 1.0, &options)?;
         return Ok(None);
     }
+    if words[0] == "save" {
+        Mesh::load_txt(words[1])?.save(words[2])?;
+        return Ok(None);
+    }
     let mut last = None;
     stellate::watch_by_name(words[1], Connection::Client(client), |mesh| {
         last = Some(mesh);
@@ -33,7 +37,11 @@ fn main() -> Result<(), BoxError> {
         let line = line?;
         let words: Vec<&str> = line.split(' ').collect();
         let mesh = match obey(&client, &words) {
-            Ok(mesh) => mesh.ok_or("no mesh came")?,
+            Ok(Some(mesh)) => mesh,
+            Ok(None) => {
+                println!("saved");
+                continue;
+            }
             Err(Error { kind: Kind::Cancelled, mesh: Some(mesh), .. }) => *mesh,
             Err(error) => {
                 println!("error {:?} {}", error.kind, error.reason);

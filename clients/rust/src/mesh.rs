@@ -29,6 +29,33 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// Reads the .txt format back, to the last bit.
+    pub fn load_txt(path: impl AsRef<Path>) -> Result<Self, Error> {
+        let path = path.as_ref();
+        let wrong = |what: String| Error::new(Kind::Save, "FORMAT", format!("{}: {what}", path.display()));
+        let text = fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+        let mut words = text.split_whitespace();
+        let mut whole = || words.next().and_then(|word| word.parse::<usize>().ok());
+        let head = [whole(), whole(), whole(), whole()];
+        let [Some(k), Some(d), Some(vertices), Some(simplices)] = head else {
+            return Err(wrong("the first line has to be \"k d nv ns\"".to_string()));
+        };
+        let points: Vec<f64> = words.by_ref().take(d * vertices).flat_map(str::parse).collect();
+        let rows: Vec<u32> = words.flat_map(str::parse).collect();
+        if points.len() != d * vertices || rows.len() != (k + 1) * simplices {
+            return Err(wrong("it does not have the numbers that its first line speaks of".to_string()));
+        }
+        Ok(Mesh {
+            dimension: k,
+            ambient_dimension: d,
+            points,
+            simplices: rows,
+            revision: 0,
+            progress: None,
+            report: None,
+        })
+    }
+
     /// n
     pub fn vertex_count(&self) -> usize {
         self.points.len() / self.ambient_dimension
@@ -47,7 +74,7 @@ impl Mesh {
 
     /// The simplices with vertices exchanged so that neighbours agree; None if not orientable.
     pub fn oriented_simplices(&self) -> Option<Vec<u32>> {
-        orient(&self.simplices, self.dimension + 1)
+        orient(&self.simplices, self.dimension + 1, &self.points, self.ambient_dimension)
     }
 
     /// Writes .txt (any k and d, exact: "k d nv ns", coordinates, ids from zero) or .obj (curves and

@@ -25,7 +25,14 @@ func obey(client *stellate.Client, command, what, path string) string {
 	ctx := context.Background()
 	var last *stellate.Mesh
 	var err error
-	if command == "create" {
+	if command == "save" {
+		if last, err = stellate.LoadTxt(what); err == nil {
+			err = last.Save(path)
+		}
+		if err == nil {
+			return "saved"
+		}
+	} else if command == "create" {
 		_, err = client.Create(ctx, stellate.Torus{Major: 1, Minor: 0.4}, 1, &stellate.Options{Label: what})
 	} else {
 		for mesh, failed := range client.Watch(ctx, what, nil) {

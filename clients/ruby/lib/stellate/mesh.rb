@@ -11,6 +11,15 @@ module Stellate
       @revision, @progress, @report = revision, progress, report
     end
 
+    # Reads the .txt format back, to the last bit.
+    def self.load_txt(path)
+      words = File.read(path).split
+      k, d, vertices, simplices = words.shift(4).map { |word| Integer(word) }
+      points = words.shift(d * vertices).map { |word| Float(word) }
+      ids = words.shift((k + 1) * simplices).map { |word| Integer(word) }
+      new(k, d, points.each_slice(d).to_a, ids.each_slice(k + 1).to_a, 0)
+    end
+
     # Whether the mesh is finished and proved good.
     def certified?
       report&.certificate&.certified || false

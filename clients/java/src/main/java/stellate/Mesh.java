@@ -8,6 +8,7 @@ import java.math.RoundingMode;
 import java.nio.file.Files;
 import java.nio.file.Path;
 import java.nio.file.StandardCopyOption;
+import java.util.Arrays;
 import java.util.Optional;
 import stellate.v1.Certificate;
 import stellate.v1.Counts;
@@ -75,7 +76,23 @@ public final class Mesh {
 
   /** The simplices with vertices exchanged so that neighbours agree; empty if not orientable. */
   public Optional<int[]> orientedSimplices() {
-    return Orientation.orient(simplices, dimension + 1);
+    return Orientation.orient(simplices, dimension + 1, points, ambientDimension);
+  }
+
+  /** Reads the .txt format back, to the last bit. */
+  public static Mesh loadTxt(Path path) throws IOException {
+    String[] words = Files.readString(path).strip().split("\\s+");
+    int[] head = new int[4];
+    for (int i = 0; i < 4 && i < words.length; i++) {
+      head[i] = Integer.parseInt(words[i]);
+    }
+    int end = 4 + head[1] * head[2];
+    if (words.length != end + (head[0] + 1) * head[3]) {
+      throw new IOException(path + " does not have the numbers that its first line speaks of");
+    }
+    double[] points = Arrays.stream(words, 4, end).mapToDouble(Double::parseDouble).toArray();
+    int[] rows = Arrays.stream(words, end, words.length).mapToInt(Integer::parseInt).toArray();
+    return new Mesh(head[0], head[1], points, rows, 0, null, null);
   }
 
   /** Throws a StellateException of kind SAVE if a mesh of that kind cannot have the name. */

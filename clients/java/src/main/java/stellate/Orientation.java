@@ -1,8 +1,8 @@
 package stellate;
 
-import java.util.ArrayDeque;
+import java.util.ArrayList;
 import java.util.Arrays;
-import java.util.Deque;
+import java.util.List;
 import java.util.Optional;
 
 /** Turning the simplices of a complex to agree with their neighbours. */
@@ -10,25 +10,29 @@ final class Orientation {
   private Orientation() {}
 
   /**
-   * The same simplices, some with their first two vertices exchanged, so that neighbours induce
-   * opposite orientations on the facet they share. Empty if that cannot be: the complex is not
-   * orientable, or a facet is in more than two simplices. Rows have to be ascending.
+   * The same simplices, some with their last two vertices exchanged, so that neighbours induce
+   * opposite orientations on the facet they share; the first of each component stays, but that
+   * those of a hypersurface are turned as a whole where their normals point inwards. Empty if that
+   * cannot be: the complex is not orientable, or a facet is in more than two simplices. Rows have
+   * to be ascending.
    */
-  static Optional<int[]> orient(int[] simplices, int width) {
+  static Optional<int[]> orient(int[] simplices, int width, double[] points, int d) {
     int[] other = facing(simplices, width);
     if (other == null) {
       return Optional.empty();
     }
     int[] turned = new int[simplices.length / width]; // 0: not seen, 1: as it is, -1: turned
-    Deque<Integer> front = new ArrayDeque<>();
+    int[] oriented = simplices.clone();
+    List<Integer> component = new ArrayList<>();
     for (int start = 0; start < turned.length; start++) {
       if (turned[start] != 0) {
         continue;
       }
       turned[start] = 1;
-      front.push(start);
-      while (!front.isEmpty()) {
-        int s = front.pop();
+      component.clear();
+      component.add(start);
+      for (int at = 0; at < component.size(); at++) {
+        int s = component.get(at);
         for (int i = 0; i < width; i++) {
           int facet = other[s * width + i];
           if (facet < 0) {
@@ -42,19 +46,51 @@ final class Orientation {
           }
           if (turned[neighbour] == 0) {
             turned[neighbour] = wanted;
-            front.push(neighbour);
+            component.add(neighbour);
           }
         }
       }
-    }
-    int[] oriented = simplices.clone();
-    for (int s = 0; s < turned.length; s++) {
-      if (turned[s] < 0) {
-        oriented[s * width] = simplices[s * width + 1];
-        oriented[s * width + 1] = simplices[s * width];
+      double volume = 0; // (k+1)! times those of the cones from the origin
+      for (int s : component) {
+        if (turned[s] < 0) {
+          exchange(oriented, (s + 1) * width);
+        }
+        if (width == d) {
+          double[][] corners = new double[d][];
+          for (int i = 0; i < d; i++) {
+            int at = oriented[s * width + i] * d;
+            corners[i] = Arrays.copyOfRange(points, at, at + d);
+          }
+          volume += determinant(corners);
+        }
+      }
+      if (volume < 0) {
+        component.forEach(s -> exchange(oriented, (s + 1) * width));
       }
     }
     return Optional.of(oriented);
+  }
+
+  private static void exchange(int[] rows, int end) {
+    int last = rows[end - 1];
+    rows[end - 1] = rows[end - 2];
+    rows[end - 2] = last;
+  }
+
+  private static double determinant(double[][] rows) {
+    if (rows.length == 1) {
+      return rows[0][0];
+    }
+    double sum = 0;
+    for (int i = 0; i < rows.length; i++) {
+      double[][] minor = new double[rows.length - 1][];
+      for (int j = 0; j < minor.length; j++) {
+        double[] other = rows[j < i ? j : j + 1];
+        minor[j] = Arrays.copyOfRange(other, 1, other.length);
+      }
+      sum += (i % 2 == 0 ? 1 : -1) * rows[i][0] * determinant(minor);
+    }
+    return sum;
   }
 
   /**

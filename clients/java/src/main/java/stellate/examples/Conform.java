@@ -31,6 +31,10 @@ public final class Conform {
   private static String obey(Client client, String[] words) throws Exception {
     List<Mesh> all = new ArrayList<>();
     try {
+      if (words[0].equals("save")) {
+        Mesh.loadTxt(Path.of(words[1])).save(Path.of(words[2]));
+        return "saved";
+      }
       if (words[0].equals("create")) {
         Options options = new Options();
         options.spec.setLabel(words[1]);
