@@ -1,0 +1,131 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <iterator>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "core/base/parallel.h"
+#include "core/complex/consistency.h"
+
+namespace stellate::core {
+
+// The stars' simplices, parted into those that all agree on and the doubtful ones.
+template <int K>
+struct Census {
+  using Simplex = typename StarComplex<K>::Simplex;
+  using Facet = std::array<std::uint32_t, K>;
+
+  explicit Census(const StarComplex<K>& whole) : complex(whole) {
+    const std::uint32_t n = complex.size();
+    const std::size_t chunks = ChunkCount(n);
+    std::vector<std::vector<Simplex>> owned(chunks), doubts(chunks);
+    ParallelChunks(n, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i)
+        Survey(static_cast<std::uint32_t>(i), owned[chunk], doubts[chunk]);
+    });
+    for (std::size_t c = 0; c < chunks; ++c) {
+      agreed.insert(agreed.end(), owned[c].begin(), owned[c].end());
+      all_doubts.insert(all_doubts.end(), doubts[c].begin(), doubts[c].end());
+    }
+    ParallelSort(all_doubts, std::less<>());
+    doubtful = all_doubts;
+    doubtful.erase(std::unique(doubtful.begin(), doubtful.end()), doubtful.end());
+    ParallelSort(agreed, std::less<>());
+    std::vector<Simplex> rest;
+    std::set_difference(agreed.begin(), agreed.end(), doubtful.begin(), doubtful.end(),
+                        std::back_inserter(rest));
+    agreed = std::move(rest);
+  }
+
+  // In how many stars a doubtful simplex was found.
+  int Holders(const Simplex& s) const {
+    const auto range = std::equal_range(all_doubts.begin(), all_doubts.end(), s);
+    return static_cast<int>(range.second - range.first);
+  }
+  bool IsDoubtful(const Simplex& s) const {
+    return std::binary_search(doubtful.begin(), doubtful.end(), s);
+  }
+
+  // The agreed simplices that have a facet: two at most, as the facet is an edge of a cell.
+  int AgreedOn(const Facet& facet, Simplex (&found)[2]) const {
+    const std::uint32_t p = facet[0];
+    const auto& cell = complex.cell(p);
+    int count = 0;
+    Simplex s;
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      int has = 0;
+      for (int i = 0; i < K; ++i)
+        has += std::binary_search(facet.begin() + 1, facet.end(), cell.id(cell.facet(v, i)));
+      if (has < K - 1 || !complex.SimplexOf(p, cell, v, &s) || IsDoubtful(s)) continue;
+      if (count < 2) found[count] = s;
+      ++count;
+    }
+    return std::min(count, 2);
+  }
+
+  const StarComplex<K>& complex;
+  std::vector<Simplex> agreed, doubtful, all_doubts;
+
+ private:
+  void Survey(std::uint32_t p, std::vector<Simplex>& owned, std::vector<Simplex>& doubts) const {
+    const auto& cell = complex.cell(p);
+    Simplex s;
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      if (!complex.SimplexOf(p, cell, v, &s)) continue;
+      if (!IsConsistent<K>(complex, p, v) || IsFolded<K>(complex, p, v))
+        doubts.push_back(s);
+      else if (s[0] == p)
+        owned.push_back(s);
+    }
+  }
+};
+
+// Doubtful simplices that share a facet lie in one cavity, unless agreed ones are on both its
+// sides.
+template <int K>
+std::vector<std::vector<typename StarComplex<K>::Simplex>> PartDoubtful(const Census<K>& census) {
+  using Facet = typename Census<K>::Facet;
+  const auto& doubtful = census.doubtful;
+  std::vector<std::pair<Facet, std::uint32_t>> facets;
+  facets.reserve(doubtful.size() * (K + 1));
+  for (std::size_t s = 0; s < doubtful.size(); ++s)
+    for (int i = 0; i <= K; ++i) {
+      Facet facet;
+      std::copy(doubtful[s].begin(), doubtful[s].begin() + i, facet.begin());
+      std::copy(doubtful[s].begin() + i + 1, doubtful[s].end(), facet.begin() + i);
+      facets.emplace_back(facet, static_cast<std::uint32_t>(s));
+    }
+  ParallelSort(facets, std::less<>());
+  std::vector<std::size_t> parent(doubtful.size());
+  std::iota(parent.begin(), parent.end(), std::size_t{0});
+  const auto root = [&](std::size_t s) {
+    while (parent[s] != s) s = parent[s] = parent[parent[s]];
+    return s;
+  };
+  for (std::size_t i = 0; i + 1 < facets.size(); ++i) {
+    CheckInterruption(i);
+    if (facets[i].first != facets[i + 1].first) continue;
+    const std::size_t a = root(facets[i].second), b = root(facets[i + 1].second);
+    if (a == b) continue;
+    typename StarComplex<K>::Simplex agreed[2];
+    if (census.AgreedOn(facets[i].first, agreed) < 2) parent[std::max(a, b)] = std::min(a, b);
+  }
+  std::vector<std::size_t> number(doubtful.size());
+  std::vector<std::vector<typename StarComplex<K>::Simplex>> parts;
+  for (std::size_t s = 0; s < doubtful.size(); ++s) {
+    const std::size_t r = root(s);
+    if (r == s) {
+      number[s] = parts.size();
+      parts.emplace_back();
+    }
+    parts[number[r]].push_back(doubtful[s]);
+  }
+  return parts;
+}
+
+}  // namespace stellate::core
