@@ -17,6 +17,7 @@ module Stellate
     # Back to the empty mesh.
     def reset
       @revision, @points, @rows, @pending, @unsettled, @size = 0, [], {}, [], [], 0
+      @arrays = @arrays_of = nil
     end
 
     # Takes one chunk; true when a revision is complete with it.
@@ -43,6 +44,7 @@ module Stellate
       whole.each do |deltas|
         deltas.each { |delta| add_points(delta.first_vertex, delta.points) }
         deltas.each { |delta| change(delta.added, delta.removed) }
+        Thread.pass # to workers that have been asked something
       end
     end
 
@@ -74,13 +76,25 @@ module Stellate
       raise Stellate.protocol_error('a delta adds simplices that are there, or vertices that are not')
     end
 
-    # The mesh as of the last complete revision: its points and simplices are arrays of rows.
-    def mesh(revision = @revision, **more)
+    # The points and simplices of mesh(), as arrays of rows, for when nobody waits for this thread.
+    def arrays
       settle
+      @arrays = nil if @arrays_of != @revision
+      @arrays_of = @revision
+      @arrays ||= [@points.each_slice(@d).to_a, sorted_rows]
+    end
+
+    # The mesh as of the last complete revision, or, of a download, of another.
+    def mesh(revision = @revision, **more)
+      Mesh.new(@k, @d, *arrays, revision, **more)
+    end
+
+    private
+
+    def sorted_rows
       # Big-endian bytes sort as the numbers do.
       sorted = Wire.split(@rows.keys.join.unpack('V*').pack('N*'), @k + 1).sort!
-      simplices = sorted.join.unpack('N*').each_slice(@k + 1).to_a
-      Mesh.new(@k, @d, @points.each_slice(@d).to_a, simplices, revision, **more)
+      sorted.join.unpack('N*').each_slice(@k + 1).to_a
     end
   end
 end

@@ -95,7 +95,7 @@ module Stellate
         when :progress
           progress = event.progress
           on_progress&.call(progress)
-          growth.settle if progress.phase == :PHASE_CERTIFYING # while the server is busy
+          growth.arrays if progress.phase == :PHASE_CERTIFYING # while the server is busy
         when :final
           final = event.final
           on_progress&.call(final.progress) if final.progress
