@@ -52,7 +52,7 @@ def record(oracle: object, epsilon: float, **criteria: object) -> tuple[list[Eve
         events = [event for event in events if event.WhichOneof("event") != "progress"]
         last = events[-1].final  # without what differs from run to run
         last.name = "meshes/recorded"
-        for field in ("create_time", "end_time"):
+        for field in ("create_time", "end_time", "workers", "watchers"):
             last.ClearField(field)
         for message in (last.progress, last.report):
             message.elapsed_seconds = 0
@@ -366,61 +366,11 @@ def write_errors() -> None:
     write_json("errors.json", {"statuses": statuses, "failures": failures})
 
 
-# Oracles ------------------------------------------------------------------------------------------
-
-# Manifold, defect, epsilon, and the codes that a doctor finds beside PIECES, SPEED and SLOW.
-ORACLES = [
-    ("torus", "none", None, "REACH"),
-    ("sphere", "none", 0.3, "REACH"),
-    ("torus", "none", 0.3, "COARSE_EPSILON REACH"),
-    ("torus", "dimension_3", None, "BAD_DIMENSIONS"),
-    ("torus", "no_box", None, "NO_WHEREABOUTS"),
-    ("torus", "raises", None, "RAISED"),
-    ("torus", "one_row_short", None, "WRONG_SHAPE"),
-    ("torus", "not_a_number", None, "NOT_FINITE"),
-    ("torus", "nothing_found", None, "NOTHING_FOUND"),
-    ("torus", "found_nearby", None, "MOSTLY_NOT_FOUND REACH"),
-    ("torus", "small_box", None, "OUTSIDE_BOX REACH"),
-    ("torus", "counts_calls", None, "NOT_DETERMINISTIC NOT_IDEMPOTENT"),
-    ("torus", "alone_elsewhere", None, "BATCH_DEPENDENT REACH"),
-    ("torus", "half_way", None, "NOT_CLOSEST_FAR NOT_IDEMPOTENT"),
-    ("torus", "trembles", None, "NOISY REACH"),
-    ("torus", "far_side", None, "NOT_CLOSEST NOT_CLOSEST_FAR REACH"),
-    ("torus", "leans", None, "NOT_CLOSEST NOT_CLOSEST_FAR NOT_NORMAL REACH"),
-    ("torus", "dimension_1", None, "WRONG_DIMENSION NO_TANGENTS"),
-    ("torus", "no_tangents", None, "NO_TANGENTS REACH"),
-    ("torus", "long_tangents", None, "TANGENT_NOT_ORTHONORMAL REACH"),
-    ("torus", "other_tangents", None, "TANGENT_WRONG REACH"),
-    ("torus", "negative_sizes", None, "SIZE_WRONG REACH"),
-    ("torus", "sizes_of_batches", None, "SIZE_CHANGES REACH"),
-    ("torus", "cube", None, "ROUGH NO_TANGENTS REACH"),
-    ("sphere", "no_flat_met", None, "FLAT_MISSED REACH"),
-    ("sphere", "off_flat", None, "FLAT_OFF FLAT_OFF_MANIFOLD FLAT_NOT_NEAREST REACH"),
-    ("sphere", "at_centre", None, "FLAT_OFF_MANIFOLD REACH"),
-    ("sphere", "any_radius", None, "FLAT_OUTSIDE_RADIUS REACH"),
-]
-
-
-def write_oracles() -> None:
-    entries = [
-        {
-            "name": "-".join([manifold, defect, *([] if epsilon is None else [str(epsilon)])]),
-            "manifold": manifold,
-            "defect": defect,
-            "epsilon": epsilon,
-            "finds": sorted(codes.split()),
-        }
-        for manifold, defect, epsilon, codes in ORACLES
-    ]
-    write_json("oracles.json", entries)
-
-
 def main() -> None:
     for folder in ("streams", "meshes"):
         (_HERE / folder).mkdir(exist_ok=True)
         for old in (_HERE / folder).iterdir():
             old.unlink()
-    write_oracles()
     write_errors()
     write_meshes()
     write_streams()
