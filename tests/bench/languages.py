@@ -38,7 +38,7 @@ COMMANDS = {
     "java": [
         "java",
         "-cp",
-        f"{CLIENTS}/java/target/stellate-0.1.0.jar:{CLIENTS}/java/target/lib/*",
+        f"{CLIENTS}/java/target/stellate.jar:{CLIENTS}/java/target/lib/*",
         "stellate.examples.Timing",
     ],
     "rust": [CLIENTS / "rust/target/release/examples/timing"],

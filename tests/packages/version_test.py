@@ -15,6 +15,12 @@ VERSION = (ROOT / "VERSION").read_text()
 STATED = {
     "docker/Dockerfile": r"\bstellate:(\d\S*)",
     "clients/node/package.json": r'"version": "(\S+)"',
+    "clients/java/pom.xml": r"<artifactId>stellate</artifactId>\s*<version>(\S+)</version>",
+    "clients/java/README.md": r"`stellate:stellate:(\S+)`",
+    "clients/r/DESCRIPTION": r"\nVersion: (\S+)",
+    "clients/ruby/stellate.gemspec": r"gem\.version = '(\S+)'",
+    "clients/rust/Cargo.toml": r'\nversion = "(\S+)"',
+    "clients/rust/Cargo.lock": r'name = "stellate"\nversion = "(\S+)"',
     "examples/CMakeLists.txt": r"find_package\(stellate (\S+)",
     "docs/using/building.md": r"find_package\(stellate (\S+)",
 }
