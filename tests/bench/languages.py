@@ -10,6 +10,7 @@ compilers, is shown apart. The ratio is the median of those of the pairs.
 from __future__ import annotations
 
 import argparse
+import os
 import pathlib
 import statistics
 import subprocess
@@ -59,7 +60,11 @@ class Timed:
     def __init__(self, command: list[object], address: str, epsilon: float) -> None:
         self._epsilon = epsilon
         self._process = subprocess.Popen(
-            [*map(str, command), address], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+            [*map(str, command), address],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONPATH": str(ROOT / "clients" / "python")},
         )
 
     def mesh(self) -> tuple[float, tuple[int, int]]:
@@ -86,22 +91,27 @@ def main() -> int:
     for name in chosen:
         if name not in COMMANDS:
             parser.error(f"no client in {name}; there are {', '.join(COMMANDS)}")
-    print(f"{'':8}{'first, s':>10}{'median, s':>11}{'Python, s':>11}{'ratio':>8}   ratios from..to")
+    print_header()
     with stellate.Server() as server:
         python = Timed([sys.executable, "-B", "-c", PYTHON], server.address, arguments.epsilon)
         python.mesh()
         for name in chosen:
-            compare(name, python, server.address, arguments)
+            subprocess.run(BUILDS[name], shell=True, check=True, cwd=CLIENTS / name)
+            other = Timed(COMMANDS[name], server.address, arguments.epsilon)
+            compare(name, python, other, arguments.rounds)
         python.close()
     return 0
 
 
-def compare(name: str, python: Timed, address: str, arguments: argparse.Namespace) -> None:
-    subprocess.run(BUILDS[name], shell=True, check=True, cwd=CLIENTS / name)
-    other = Timed(COMMANDS[name], address, arguments.epsilon)
+def print_header() -> None:
+    print(f"{'':8}{'first, s':>10}{'median, s':>11}{'Python, s':>11}{'ratio':>8}   ratios from..to")
+
+
+def compare(name: str, python: Timed, other: Timed, rounds: int) -> None:
+    """Prints a line, and ends the other."""
     first = other.mesh()[0]
     theirs, ours = [], []
-    for _ in range(arguments.rounds):
+    for _ in range(rounds):
         seconds, expected = python.mesh()
         ours.append(seconds)
         seconds, counts = other.mesh()

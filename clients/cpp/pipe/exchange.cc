@@ -98,16 +98,13 @@ class Conversation {
   }
 
   bool Read() {
-    std::string& unread = process_.unread;
-    const size_t before = unread.size();
-    unread.resize(before + kReadBytes);
-    const ssize_t count = read(process_.output.get(), unread.data() + before, kReadBytes);
-    const int error = errno;
-    unread.resize(before + static_cast<size_t>(std::max<ssize_t>(count, 0)));
+    const ssize_t count = read(process_.output.get(), buffer_.data(), buffer_.size());
     if (count == 0) throw Ended("it closed its standard output" + Standing());
-    if (count > 0) done_ = take_(&unread);
-    if (count < 0 && error != EAGAIN && error != EINTR) {
-      throw std::system_error(error, std::generic_category(), "reading from it");
+    if (count > 0) {
+      process_.unread.append(buffer_.data(), static_cast<size_t>(count));
+      done_ = take_(&process_.unread);
+    } else if (errno != EAGAIN && errno != EINTR) {
+      throw std::system_error(errno, std::generic_category(), "reading from it");
     }
     return count > 0;
   }
@@ -140,6 +137,7 @@ class Conversation {
   const std::function<bool(std::string*)>& take_;
   const StopSignal& stop_;
   std::array<pollfd, 4> fds_{};
+  std::array<char, kReadBytes> buffer_;
   bool errors_open_ = true, done_ = false;
 };
 
