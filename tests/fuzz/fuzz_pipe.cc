@@ -4,7 +4,7 @@
 // An input is four bytes that choose the question and the pieces, and what the command says: a
 // first line, or an answer.
 
-#include "framing.h"
+#include "pipe/framing.h"
 #include "tests/fuzz/target.h"
 
 namespace stellate::fuzz {
