@@ -24,7 +24,7 @@ DoctorCommand::DoctorCommand(CLI::App& parent)
 
 int DoctorCommand::Run(std::stop_token stop) {
   const Expected<std::unique_ptr<Oracle>> oracle = source_.Make(stop);
-  if (!oracle) return Complain(oracle.error());
+  if (!oracle) return PrintError(oracle.error());
   const CheckReport report = Check(**oracle, options_);
   if (stop.stop_requested()) {
     std::cerr << "stellate: stopped before the end of the examination\n";

@@ -34,7 +34,7 @@ DownloadCommand::DownloadCommand(CLI::App& parent)
 
 int DownloadCommand::Run(std::stop_token stop) {
   Expected<Credentials> credentials = server_.ReadCredentials();
-  if (!credentials) return Complain(credentials.error());
+  if (!credentials) return PrintError(credentials.error());
   options_.server = server_.address();
   options_.credentials = std::move(*credentials);
   if (wait_) options_.unfinished = Unfinished::kWait;
@@ -46,18 +46,18 @@ int DownloadCommand::Run(std::stop_token stop) {
   options_.on_part = [&bar](auto received, auto all) { bar.ShowPart(received, all); };
   options_.on_outage = [this, &bar](const Outage& outage) {
     bar.Clear();
-    Tell(outage, options_.reconnect_seconds);
+    PrintOutage(outage, options_.reconnect_seconds);
   };
   const Expected<Mesh> mesh = DownloadMesh(mesh_, options_);
   bar.Clear();
-  return mesh ? Deliver(*mesh) : Complain(mesh.error());
+  return mesh ? Deliver(*mesh) : PrintError(mesh.error());
 }
 
 int DownloadCommand::Deliver(const Mesh& mesh) const {
   int status = outputs_.Write(mesh, mesh.report.certified() ? kExitCertified : kExitNotCertified);
   if (!report_.empty()) {
     const Expected<void> saved = SaveJson(mesh.report, report_);
-    if (!saved) status = Complain(saved.error());
+    if (!saved) status = PrintError(saved.error());
   }
   const bool has_report = mesh.report.termination != Termination::kUnknown;
   if (json_) {

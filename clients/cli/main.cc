@@ -20,7 +20,7 @@
 
 namespace {
 
-using stellate::cli::Complain;
+using stellate::cli::PrintError;
 
 // SIGINT and SIGTERM become a request to stop. Made before any other thread, so that all of them
 // leave the signals to this one's. A second signal ends the program at once.
@@ -75,9 +75,9 @@ int List() {
 
 int Health(const stellate::cli::ServerOptions& server) {
   const auto credentials = server.ReadCredentials();
-  if (!credentials) return Complain(credentials.error());
+  if (!credentials) return PrintError(credentials.error());
   const auto health = stellate::CheckHealth(server.address(), 5, *credentials);
-  if (!health) return Complain(health.error());
+  if (!health) return PrintError(health.error());
   std::cout << server.address() << ": " << (health->serving ? "serving" : "not serving")
             << ", stellated " << health->version << "\n"
             << "limits: dimension " << health->max_dimension << " in R^"

@@ -93,15 +93,15 @@ void MeshCommand::SetEpsilon(const std::string& text) {
 
 int MeshCommand::Run(std::stop_token stop) {
   const Expected<std::unique_ptr<Oracle>> made = source_.Make(stop);
-  if (!made) return Complain(made.error());
+  if (!made) return PrintError(made.error());
   Oracle& oracle = **made;
   if (const auto ok = outputs_.Check(oracle.dimension(), oracle.ambient_dimension()); !ok) {
-    return Complain(ok.error());
+    return PrintError(ok.error());
   }
   options_.server = server_.address();
   if (!options_.server.empty()) {
     Expected<Credentials> credentials = server_.ReadCredentials();
-    if (!credentials) return Complain(credentials.error());
+    if (!credentials) return PrintError(credentials.error());
     options_.credentials = std::move(*credentials);
   }
   options_.label = ("stellate mesh " + source_.name()).substr(0, kMaxLabel);
@@ -109,7 +109,7 @@ int MeshCommand::Run(std::stop_token stop) {
   options_.stop = std::move(stop);
   ClosestPointOnly poor(oracle);
   const Expected<Mesh> mesh = MeshIt(closest_point_only_ ? static_cast<Oracle&>(poor) : oracle);
-  return mesh ? Deliver(*mesh) : Complain(mesh.error());
+  return mesh ? Deliver(*mesh) : PrintError(mesh.error());
 }
 
 Expected<Mesh> MeshCommand::MeshIt(Oracle& oracle) {
@@ -120,7 +120,7 @@ Expected<Mesh> MeshCommand::MeshIt(Oracle& oracle) {
   options_.on_progress = [&bar](const Progress& progress) { bar.Show(progress); };
   options_.on_outage = [this, &bar](const Outage& outage) {
     bar.Clear();
-    Tell(outage, options_.reconnect_seconds);
+    PrintOutage(outage, options_.reconnect_seconds);
   };
   try {
     Expected<Mesh> mesh = MeshManifold(oracle, options_);
@@ -136,7 +136,7 @@ int MeshCommand::Deliver(const Mesh& mesh) const {
   int status = outputs_.Write(mesh, mesh.report.certified() ? kExitCertified : kExitNotCertified);
   if (!report_.empty()) {
     const Expected<void> saved = SaveJson(mesh.report, report_);
-    if (!saved) status = Complain(saved.error());
+    if (!saved) status = PrintError(saved.error());
   }
   if (json_) {
     std::cout << ToJson(mesh.report) << "\n";

@@ -21,7 +21,7 @@ Expected<void> Outputs::Check(int dimension, int ambient_dimension) const {
 
 int Outputs::Write(const Mesh& mesh, int status) const {
   for (const std::string& path : paths_) {
-    if (const Expected<void> saved = mesh.Save(path); !saved) status = Complain(saved.error());
+    if (const Expected<void> saved = mesh.Save(path); !saved) status = PrintError(saved.error());
   }
   return status;
 }

@@ -31,19 +31,21 @@ ServeCommand::ServeCommand(CLI::App& parent)
 
 int ServeCommand::Run(std::stop_token stop) {
   const Expected<std::unique_ptr<Oracle>> oracle = source_.Make(stop);
-  if (!oracle) return Complain(oracle.error());
+  if (!oracle) return PrintError(oracle.error());
   const Expected<Credentials> credentials = server_.ReadCredentials();
-  if (!credentials) return Complain(credentials.error());
+  if (!credentials) return PrintError(credentials.error());
   options_.server = server_.address();
   options_.credentials = *credentials;
-  options_.on_outage = [this](const Outage& outage) { Tell(outage, options_.reconnect_seconds); };
+  options_.on_outage = [this](const Outage& outage) {
+    PrintOutage(outage, options_.reconnect_seconds);
+  };
   options_.stop = std::move(stop);
   const Expected<MeshState> state = Serve(**oracle);
   if (options_.stop.stop_requested()) {
     std::cerr << "stellate: this worker left; others have its work\n";
     return kExitNotCertified;
   }
-  if (!state) return Complain(state.error());
+  if (!state) return PrintError(state.error());
   std::cout << mesh_ << " " << MeshStateName(*state) << "\n";
   return *state == MeshState::kSucceeded ? kExitCertified : kExitNotCertified;
 }

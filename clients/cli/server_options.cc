@@ -40,7 +40,7 @@ Expected<Credentials> ServerOptions::ReadCredentials() const {
   return credentials;
 }
 
-void Tell(const Outage& outage, double patience) {
+void PrintOutage(const Outage& outage, double patience) {
   if (outage.over) {
     std::fprintf(stderr, "stellate: the server is back after %.1f s\n", outage.seconds);
   } else if (outage.attempts == 1) {
@@ -49,7 +49,7 @@ void Tell(const Outage& outage, double patience) {
   }
 }
 
-int Complain(const Error& error) {
+int PrintError(const Error& error) {
   std::cerr << "stellate: " << (error.reason.empty() ? "" : error.reason + ": ") << error.message
             << "\n";
   return ExitStatusOf(error);

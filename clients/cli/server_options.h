@@ -25,9 +25,9 @@ class ServerOptions {
 
 // Says on standard error that the server was lost, or is back. `patience`: how long it is waited
 // for.
-void Tell(const Outage& outage, double patience);
+void PrintOutage(const Outage& outage, double patience);
 
 // Prints the error on standard error and gives the exit status that stands for it.
-int Complain(const Error& error);
+int PrintError(const Error& error);
 
 }  // namespace stellate::cli

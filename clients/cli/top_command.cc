@@ -93,11 +93,11 @@ TopCommand::TopCommand(CLI::App& parent)
 
 int TopCommand::Run(std::stop_token stop) const {
   const Expected<Credentials> credentials = server_.ReadCredentials();
-  if (!credentials) return Complain(credentials.error());
+  if (!credentials) return PrintError(credentials.error());
   Expected<Monitor> monitor = Monitor::Connect(server_.address(), *credentials);
-  if (!monitor) return Complain(monitor.error());
+  if (!monitor) return PrintError(monitor.error());
   Expected<ServerHealth> health = monitor->Health();
-  if (!health) return Complain(health.error());
+  if (!health) return PrintError(health.error());
 
   Screen screen(!once_ && isatty(STDOUT_FILENO) == 1);
   TopTable table(order_);
@@ -106,7 +106,7 @@ int TopCommand::Run(std::stop_token stop) const {
     std::vector<std::string> lines = {"stellated " + health->version + " at " + server_.address()};
     Expected<std::vector<MeshStatus>> meshes = monitor->Meshes();
     if (!meshes) {
-      if (once_ || meshes.error().code == ErrorCode::kRefused) return Complain(meshes.error());
+      if (once_ || meshes.error().code == ErrorCode::kRefused) return PrintError(meshes.error());
       lines[0] += " does not answer: " + meshes.error().message;
     } else {
       table.Update(std::move(*meshes), Seconds());
