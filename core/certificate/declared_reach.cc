@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/message.h"
+#include "core/geometry/reach_bound.h"
 
 namespace stellate::core {
 namespace {
@@ -25,7 +26,7 @@ void DeclaredReach::HoldAgainstPoint(std::uint32_t p, const Eigen::VectorXd& y) 
   const double length = offset.norm();
   const double away = (offset - tangent * (tangent.transpose() * offset)).norm();
   if (!(away > 0)) return;
-  Keep({length * length / (2 * away), length, away,
+  Keep({ReachBound(length * length, away), length, away,
         Message("its points ", NamePoint(PointOf(mesh_, p)), ", vertex ", p, ", and ",
                 NamePoint(y))});
 }
@@ -48,8 +49,8 @@ void DeclaredReach::HoldAgainstDistance(const std::uint32_t* ids, double circumr
   // distance above the circumradius says more than that one.
   const double away = std::min(distance, circumradius);
   const double length2 = circumradius * circumradius + away * away;
-  Keep({length2 / (2 * away), std::sqrt(length2), away,
-        Message("the middle of simplex ", NameSimplex(ids, mesh_.k + 1), ", which is ",
+  Keep({ReachBound(length2, away), std::sqrt(length2), away,
+        Message("a point of simplex ", NameSimplex(ids, mesh_.k + 1), ", which is ",
                 Brief(distance), " away from it")});
 }
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "core/certificate/certifier.h"
 #include "core/certificate/findings.h"
+#include "core/certificate/mesh_view.h"
 #include "core/certificate/proof.h"
 
 namespace stellate::core {

@@ -7,6 +7,7 @@
 #include "core/base/parallel.h"
 #include "core/base/vector_ops.h"
 #include "core/certificate/vertex_grid.h"
+#include "core/geometry/reach_bound.h"
 
 namespace stellate::core {
 namespace {
@@ -56,7 +57,7 @@ class Holder {
       if (!(away2 * bound * bound > squared * squared)) return;
       const double away = std::sqrt(away2), distance = std::sqrt(squared);
       if (!IsTelling(distance, away, longest_edge_[v], position_error_)) return;
-      const double reach = squared / (2 * away);
+      const double reach = ReachBound(squared, away);
       evidence->coarseness = std::max(evidence->coarseness, size / reach);
       if (reach >= evidence->reach) return;
       evidence->reach = reach;

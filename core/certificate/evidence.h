@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "core/certificate/certifier.h"
+#include "core/certificate/mesh_view.h"
 
 namespace stellate::core {
 
@@ -17,16 +17,6 @@ namespace stellate::core {
 // How near, in mesh sizes, a point of M has a vertex of a mesh that is M: its simplex' circumradius
 // and height, and as much again.
 inline constexpr double kCoverageShare = 2;
-
-// Whether y, `distance` from p and `away` from T_pM, tells of the reach at p, where the mesh has
-// edges up to `longest_edge`. Far ones do. Near ones do where they lie so steeply above T_pM that
-// no error of the tangent space that lets a mesh be made explains it, and farther than the oracle's
-// own error may have moved them.
-inline bool IsTelling(double distance, double away, double longest_edge, double position_error) {
-  constexpr double kFar = 0.5, kSteep = 0.25, kErrors = 10;
-  if (!(distance > kErrors * position_error)) return false;
-  return distance >= kFar * longest_edge || away >= kSteep * distance;
-}
 
 struct Evidence {
   static constexpr std::uint64_t kNone = std::numeric_limits<std::uint64_t>::max();

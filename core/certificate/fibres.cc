@@ -18,7 +18,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kBoundary = 1e-9;  // barycentric coordinates this small are left to rounding
-constexpr double kSideStep = 0.02;  // of reach_out
 constexpr int kSideSteps = 6;
 
 // The mesh's vertices are gone through in parts of so many.
@@ -63,11 +62,11 @@ class FibreCounter {
     }
   }
 
-  int Count() const {
+  FibreHits Count() const {
     Flat shift{};
-    int hits = CountBeside(shift);
+    FibreHits hits = CountBeside(shift);
     Random random(fibre_.random_key, 0x66696272);
-    for (int step = 0; hits < 0 && step < kSideSteps; ++step) {
+    for (int step = 0; hits.count < 0 && step < kSideSteps; ++step) {
       const double most = kSideStep * fibre_.reach_out / std::sqrt(static_cast<double>(mesh_.k));
       for (int a = 0; a < mesh_.k; ++a) shift[a] = most * (2 * random.Uniform() - 1);
       hits = CountBeside(shift);
@@ -97,9 +96,9 @@ class FibreCounter {
 
   // Where the flat meets a simplex's hull, in barycentric coordinates: projected on the tangent
   // space the flat is the point `shift`.
-  int CountBeside(const Flat& shift) const {
+  FibreHits CountBeside(const Flat& shift) const {
     const int k = mesh_.k;
-    int hits = 0;
+    FibreHits hits;
     std::array<const double*, kMaxDimension + 1> flat{};
     for (const Candidate& candidate : candidates_) {
       const std::uint32_t* ids = adjacency_.list()[candidate.simplex];
@@ -129,15 +128,22 @@ class FibreCounter {
         lowest = std::min(lowest, system.b[c]);
       }
       lowest = std::min(lowest, first);
-      if (lowest < -kBoundary || !IsWithinReach(ids, first, system.b)) continue;
-      if (lowest <= kBoundary) return -1;
-      ++hits;
+      if (lowest < -kBoundary) continue;
+      const double squared = SquaredDistance(ids, first, system.b);
+      if (squared > fibre_.reach_out * fibre_.reach_out) continue;
+      if (lowest <= kBoundary) return {-1, 0, 0};
+      ++hits.count;
+      if (hits.count == 1 || squared > hits.distance) {
+        hits.distance = squared;
+        hits.simplex = candidate.simplex;
+      }
     }
+    hits.distance = std::sqrt(hits.distance);
     return hits;
   }
 
-  // Is the simplex's point with these barycentric coordinates within reach_out of x?
-  bool IsWithinReach(const std::uint32_t* ids, double first, const Flat& others) const {
+  // From x to the simplex's point with these barycentric coordinates.
+  double SquaredDistance(const std::uint32_t* ids, double first, const Flat& others) const {
     const std::size_t d = static_cast<std::size_t>(mesh_.d);
     double squared = 0;
     for (std::size_t c = 0; c < d; ++c) {
@@ -145,7 +151,7 @@ class FibreCounter {
       for (int i = 1; i <= mesh_.k; ++i) y += others[i - 1] * mesh_.points[ids[i] * d + c];
       squared += (y - fibre_.x[c]) * (y - fibre_.x[c]);
     }
-    return squared <= fibre_.reach_out * fibre_.reach_out;
+    return squared;
   }
 
   const MeshView& mesh_;
@@ -199,8 +205,8 @@ std::vector<NearestVertex> FindNearestVertices(const MeshView& mesh,
   return nearest;
 }
 
-std::vector<int> CountHits(const MeshView& mesh, const Adjacency& adjacency, double max_diameter,
-                           const std::vector<Fibre>& fibres) {
+std::vector<FibreHits> CountHits(const MeshView& mesh, const Adjacency& adjacency,
+                                 double max_diameter, const std::vector<Fibre>& fibres) {
   // Each point of a simplex has a vertex within this share of its diameter (Jung).
   const double jung = std::sqrt(mesh.k / (2.0 * (mesh.k + 1)));
   std::vector<double> points, radii, beside;
@@ -228,7 +234,7 @@ std::vector<int> CountHits(const MeshView& mesh, const Adjacency& adjacency, dou
   std::vector<std::vector<std::uint32_t>> near(fibres.size());
   for (const auto& part : parts)
     for (const Pair& pair : part) near[pair.fibre].push_back(pair.vertex);
-  std::vector<int> hits(fibres.size());
+  std::vector<FibreHits> hits(fibres.size());
   ParallelFor(fibres.size(), [&](std::size_t i) {
     hits[i] = FibreCounter(mesh, adjacency, fibres[i], near[i], beside[i]).Count();
   });

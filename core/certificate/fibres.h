@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/certificate/certifier.h"
+#include "core/certificate/mesh_view.h"
 #include "core/certificate/topology.h"
 #include "core/specification.h"
 
@@ -33,11 +33,17 @@ struct Fibre {
   std::uint64_t random_key;
 };
 
-// The number of points within reach_out of x where each fibre meets the mesh. When a flat passes so
-// close to the boundary of a simplex that rounding would decide, parallel ones, at most 0.02
-// reach_out to the side, are tried; -1 if all of them do so too. `max_diameter`: of the mesh's
-// simplices.
-std::vector<int> CountHits(const MeshView& mesh, const Adjacency& adjacency, double max_diameter,
-                           const std::vector<Fibre>& fibres);
+// Where a fibre meets the mesh within reach_out of x.
+struct FibreHits {
+  int count = 0;              // of points; -1: rounding would decide
+  double distance = 0;        // of the farthest from x
+  std::uint32_t simplex = 0;  // that it is in
+};
+// For each fibre. When a flat passes so close to the boundary of a simplex that rounding would
+// decide, parallel ones, at most kSideStep reach_out to the side, are tried. `max_diameter`: of the
+// mesh's simplices.
+inline constexpr double kSideStep = 0.02;
+std::vector<FibreHits> CountHits(const MeshView& mesh, const Adjacency& adjacency,
+                                 double max_diameter, const std::vector<Fibre>& fibres);
 
 }  // namespace stellate::core

@@ -115,13 +115,20 @@ std::vector<std::uint32_t> ChooseVertices(std::uint32_t vertices, std::uint64_t 
   return chosen;
 }
 
-Eigen::MatrixXd Barycentres(const MeshView& mesh, const SimplexList& list,
-                            const std::vector<std::uint32_t>& chosen) {
-  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(mesh.d, static_cast<Eigen::Index>(chosen.size()));
+Eigen::MatrixXd PointsInside(const MeshView& mesh, const SimplexList& list,
+                             const std::vector<std::uint32_t>& chosen, int each) {
+  Eigen::MatrixXd result =
+      Eigen::MatrixXd::Zero(mesh.d, each * static_cast<Eigen::Index>(chosen.size()));
   for (std::size_t n = 0; n < chosen.size(); ++n) {
-    for (int i = 0; i <= mesh.k; ++i) result.col(n) += PointOf(mesh, list[chosen[n]][i]);
+    const std::uint32_t* ids = list[chosen[n]];
+    auto barycentre = result.col(each * static_cast<Eigen::Index>(n));
+    for (int i = 0; i <= mesh.k; ++i) barycentre += PointOf(mesh, ids[i]);
+    barycentre /= mesh.k + 1;
+    for (int i = 1; i < each; ++i)
+      result.col(each * static_cast<Eigen::Index>(n) + i) =
+          (barycentre + PointOf(mesh, ids[i - 1])) / 2;
   }
-  return result / (mesh.k + 1);
+  return result;
 }
 
 Eigen::MatrixXd CoverageProbes(const Specification& spec, const MeshView& mesh,

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/certificate/certifier.h"
+#include "core/certificate/mesh_view.h"
 #include "core/certificate/shape.h"
 #include "core/certificate/topology.h"
 #include "core/specification.h"
@@ -40,8 +40,9 @@ std::vector<std::uint32_t> ChooseSimplices(const SimplexList& list, const MeshSh
 // Vertices that must be their own closest points, ascending.
 std::vector<std::uint32_t> ChooseVertices(std::uint32_t vertices, std::uint64_t random_seed);
 
-Eigen::MatrixXd Barycentres(const MeshView& mesh, const SimplexList& list,
-                            const std::vector<std::uint32_t>& chosen);
+// Of each, `each` points: its barycentre and, if k + 2 are wanted, those halfway to its corners.
+Eigen::MatrixXd PointsInside(const MeshView& mesh, const SimplexList& list,
+                             const std::vector<std::uint32_t>& chosen, int each);
 
 // Points whose closest points on M the mesh must cover: points of simplices pushed up to `push` in
 // random ambient directions, random points of the mesh's own box and of the client's, and seeds.

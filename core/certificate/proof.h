@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "core/certificate/certifier.h"
+#include "core/certificate/mesh_view.h"
 #include "core/certificate/shape.h"
 #include "core/certificate/topology.h"
 

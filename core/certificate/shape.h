@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/certificate/certifier.h"
+#include "core/certificate/mesh_view.h"
 #include "core/certificate/topology.h"
 
 namespace stellate::core {

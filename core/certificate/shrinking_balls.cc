@@ -6,6 +6,7 @@
 
 #include "core/certificate/evidence.h"
 #include "core/certificate/probes.h"
+#include "core/geometry/reach_bound.h"
 
 namespace stellate::core {
 namespace {
@@ -15,7 +16,7 @@ namespace {
 constexpr double kInside = 0.98;
 constexpr int kLadder = 6;
 constexpr double kMet = 1e-3;  // of the longest edge
-// Sine of the angle by which the tangent space at a point that is no vertex may be wrong.
+// Sine of the angle by which the tangent space at a point that is no vertex may be wrong at least.
 constexpr double kTilt = 0.25;
 
 }  // namespace
@@ -54,17 +55,34 @@ void ShrinkingBalls::AddLadders(std::uint64_t random_seed, int count) {
 }
 
 void ShrinkingBalls::AddPair(std::uint32_t v, double radius, std::uint64_t random_seed) {
-  AddPair(v, {}, TangentsOf(v), radius, Mix64(random_seed) + v);
-}
-
-void ShrinkingBalls::AddPair(std::uint32_t v, const Eigen::VectorXd& point,
-                             const Eigen::MatrixXd& tangents, double radius,
-                             std::uint64_t random_key) {
-  Random random(random_key, 0x70616972);
   Ball ball;
   ball.vertex = v;
   ball.radius = radius;
+  AddBothSides(std::move(ball), TangentsOf(v), Mix64(random_seed) + v);
+}
+
+void ShrinkingBalls::AddPair(const std::uint32_t* simplex, const Eigen::VectorXd& point,
+                             const Eigen::MatrixXd& tangents, double radius,
+                             std::uint64_t random_key) {
+  Ball ball;
+  ball.vertex = simplex[0];
+  ball.radius = radius;
   ball.point = point;
+  ball.tilt = kTilt;
+  const std::size_t first = active_.size();
+  AddBothSides(std::move(ball), tangents, random_key);
+  for (std::size_t b = first; b < active_.size(); ++b)
+    for (int i = 0; i <= mesh_.k; ++i)
+      active_[b].tilt = std::max(active_[b].tilt, TiltAt(simplex[i], active_[b].normal));
+}
+
+double ShrinkingBalls::TiltAt(std::uint32_t v, const Eigen::VectorXd& normal) const {
+  return (TangentsOf(v).transpose() * normal).norm();
+}
+
+void ShrinkingBalls::AddBothSides(Ball ball, const Eigen::MatrixXd& tangents,
+                                  std::uint64_t random_key) {
+  Random random(random_key, 0x70616972);
   if (!AimAcross(tangents, random, &ball)) return;
   active_.push_back(ball);
   ball.normal = -ball.normal;
@@ -97,10 +115,10 @@ void ShrinkingBalls::Absorb(const Eigen::MatrixXd& nearest, const std::vector<st
       if (distance > kMet * edge)
         met_.insert(met_.end(), nearest.col(n).begin(), nearest.col(n).end());
       const bool exact = ball.point.size() == 0;
-      const double along = ball.normal.dot(offset) - (exact ? 0 : kTilt * distance);
+      const double along = ball.normal.dot(offset) - ball.tilt * distance;
       const double far = exact ? edge : std::numeric_limits<double>::infinity();
       if (along <= 0 || !IsTelling(distance, along, far, position_error)) continue;
-      const double radius = distance * distance / (2 * along);
+      const double radius = ReachBound(distance * distance, along);
       if (radius >= std::ldexp(ball.radius, -rung) || radius >= narrowest) continue;
       narrowest = radius;
       across = distance;

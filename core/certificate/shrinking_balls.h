@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/base/random.h"
-#include "core/certificate/certifier.h"
+#include "core/certificate/mesh_view.h"
 
 namespace stellate::core {
 
@@ -29,12 +29,12 @@ class ShrinkingBalls {
   void AddLadders(std::uint64_t random_seed, int count);
   // Two balls of one radius on either side of vertex v.
   void AddPair(std::uint32_t v, double radius, std::uint64_t random_seed);
-  // The same at a point of M near v where `tangents` (d x k) nearly span the tangent space: only
-  // what lies steeply above them counts, and for no more than they allow.
-  void AddPair(std::uint32_t v, const Eigen::VectorXd& point, const Eigen::MatrixXd& tangents,
-               double radius, std::uint64_t random_key);
+  // The same at a point of M under a simplex, near its first vertex, where `tangents` (d x k)
+  // nearly span the tangent space: only what lies steeper above them than the tangent spaces of the
+  // simplex's vertices differ from them counts, and for no more than that allows.
+  void AddPair(const std::uint32_t* simplex, const Eigen::VectorXd& point,
+               const Eigen::MatrixXd& tangents, double radius, std::uint64_t random_key);
 
-  bool settled() const { return active_.empty(); }
   // Centres of the balls that may still shrink, d x n, and the answers to them.
   Eigen::MatrixXd Centres() const;
   void Absorb(const Eigen::MatrixXd& nearest, const std::vector<std::uint8_t>& found,
@@ -55,7 +55,11 @@ class ShrinkingBalls {
     double radius = 0;       // its first
     Eigen::VectorXd point;   // that it touches; empty: the vertex
     Eigen::VectorXd normal;  // unit
+    double tilt = 0;         // sine of the angle that the normal may be wrong by
   };
+  void AddBothSides(Ball ball, const Eigen::MatrixXd& tangents, std::uint64_t random_key);
+  // How far a direction is from being normal at a vertex: the sine of the angle.
+  double TiltAt(std::uint32_t v, const Eigen::VectorXd& normal) const;
   Eigen::VectorXd PointOf(const Ball& ball) const;
   bool AimAcross(const Eigen::MatrixXd& tangents, Random& random, Ball* ball) const;
   Eigen::MatrixXd TangentsOf(std::uint32_t v) const;

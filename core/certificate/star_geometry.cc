@@ -14,6 +14,7 @@
 #include "core/base/vector_ops.h"
 #include "core/certificate/small_index.h"
 #include "core/certificate/small_solve.h"
+#include "core/geometry/reach_bound.h"
 
 namespace stellate::core {
 namespace {
@@ -154,7 +155,7 @@ class StarMeasurer {
     longest_edge_[p] = std::sqrt(longest2);
     for (const Neighbour& n : neighbours) {
       if (n.squared_distance < kTellingEdge * kTellingEdge * longest2) continue;
-      const double reach = n.squared_distance / (2 * std::sqrt(n.off_tangent2));
+      const double reach = ReachBound(n.squared_distance, std::sqrt(n.off_tangent2));
       if (reach < result_.reach) {
         result_.reach = reach;
         result_.narrowest_p = p;

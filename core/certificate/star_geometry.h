@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/certificate/certifier.h"
+#include "core/certificate/mesh_view.h"
 #include "core/certificate/topology.h"
 
 namespace stellate::core {

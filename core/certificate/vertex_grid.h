@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/base/vector_ops.h"
-#include "core/certificate/certifier.h"
+#include "core/certificate/mesh_view.h"
 
 namespace stellate::core {
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/parallel.h"
+#include "core/geometry/reach_bound.h"
 
 namespace stellate::core {
 namespace {
@@ -47,7 +48,7 @@ double SizeField<K>::SeenFrom(const StarComplex<K>& complex, std::uint32_t p) co
     double along2 = 0;
     for (const double a : along) along2 += a * a;
     const double away = std::sqrt(std::max(distance2 - along2, 0.0));
-    if (away > 0) size = std::min(size, distance2 / (2 * away));
+    if (away > 0) size = std::min(size, ReachBound(distance2, away));
   }
   return size;
 }

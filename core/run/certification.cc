@@ -45,7 +45,7 @@ StarFacts FactsOf(Engine<K>& engine) {
 
 Certification::Certification(const Specification& spec, MeshView mesh,
                              std::vector<std::uint32_t> simplices, const StarFacts& facts,
-                             std::vector<double> known)
+                             KnownOfManifold known)
     : simplices_(std::move(simplices)),
       certifier_(spec, WithSimplices(mesh, simplices_), facts, std::move(known)) {}
 

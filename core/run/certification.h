@@ -19,9 +19,9 @@ class Certification final : public Asker {
  public:
   // spec      borrowed
   // mesh      its points and tangents are borrowed and must not change; its simplices are set here
-  // known     points of M, d each, that are no vertices
+  // known     what was learned of M before
   Certification(const Specification& spec, MeshView mesh, std::vector<std::uint32_t> simplices,
-                const StarFacts& facts, std::vector<double> known);
+                const StarFacts& facts, KnownOfManifold known);
 
   std::vector<QueryBlock> Questions() override;
   void Absorb(const std::vector<AnswerBlock>& answers) override { certifier_.Absorb(answers); }

@@ -10,6 +10,7 @@
 #include "core/certificate/evidence.h"
 #include "core/certificate/findings.h"
 #include "core/complex/consistency.h"
+#include "core/geometry/reach_bound.h"
 
 namespace stellate::core {
 namespace {
@@ -40,7 +41,7 @@ void DescribeUnfinished(const Engine<K>& engine, double epsilon, Certificate* ce
       for (const double a : along) along2 += a * a;
       const double away = std::sqrt(std::max(distance2 - along2, 0.0));
       if (IsTelling(std::sqrt(distance2), away, epsilon, kLikelyError * epsilon))
-        reach = std::min(reach, distance2 / (2 * away));
+        reach = std::min(reach, ReachBound(distance2, away));
     }
   }
   if (std::isinf(reach)) {

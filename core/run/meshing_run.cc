@@ -227,6 +227,8 @@ void MeshingRun<K>::InsertCandidates() {
   counts.inserted_inconsistent += count(Rule::kInconsistent);
   counts.duplicates += inserted.duplicates;
   if (inserted.front_moved) stall_watch_.NoteFrontMoved();
+  if (engine_.criteria().flat_alternations == 1)
+    rim_watch_.Look(trip_->candidates(), trip_->answers());
   rehearsal_failed_ = inserted.rules.empty();
   spare_points_.Keep(trip_->answers(), inserted.used);
 }
@@ -256,7 +258,8 @@ void MeshingRun<K>::Plan() {
   if (targets->empty())
     return engine_.AllRulesHold() ? Certify() : Finish(Termination::kNoProgress);
   const ViolationBook<K>& book = engine_.book();
-  if (stall_watch_.HasStalled(book.size_and_shape().size() + book.blemished(),
+  if (stall_watch_.IsHopeless(book.size_and_shape().size(), engine_.complex().size()) ||
+      stall_watch_.HasStalled(book.size_and_shape().size() + book.blemished(),
                               !book.are_all_suspect()))
     return Finish(Termination::kNoProgress);
   *targets = engine_.Select(std::move(*targets));
@@ -284,8 +287,9 @@ void MeshingRun<K>::Certify() {
   mesh.points = complex.points().data();
   mesh.tangents = complex.Tangent(0);
   trip_.reset();
-  certification_ = std::make_unique<Certification>(spec_, mesh, engine_.Simplices(), facts,
-                                                   spare_points_.Take());
+  certification_ =
+      std::make_unique<Certification>(spec_, mesh, engine_.Simplices(), facts,
+                                      KnownOfManifold{spare_points_.Take(), rim_watch_.leans()});
 }
 
 template <int K>
@@ -350,7 +354,8 @@ void MeshingRun<K>::DescribeEnding(bool is_whole) {
       certificate.verdict +=
           "; " + (box_watch_.has_left()
                       ? box_watch_.WhyStopped()
-                      : WhatIsLeft<K>(engine_, certificate.inconsistent_simplices));
+                      : WhatIsLeft<K>(engine_, certificate.inconsistent_simplices) +
+                            rim_watch_.Describe(engine_.complex().d()));
   }
   if (is_whole) box_watch_.Warn(&certificate);
 }

@@ -12,6 +12,7 @@
 #include "core/run/batch_parts.h"
 #include "core/run/certification.h"
 #include "core/run/repeat_check.h"
+#include "core/run/rim_watch.h"
 #include "core/run/round_trip.h"
 #include "core/run/spare_points.h"
 #include "core/run/tangent_finder.h"
@@ -88,6 +89,7 @@ class MeshingRun final : public Mesher {
   SparePoints spare_points_;
   BoxWatch box_watch_;
   StallWatch stall_watch_;
+  RimWatch rim_watch_;
   bool rehearsal_failed_ = false;  // the last round of candidates inserted nothing
   bool covers_box_ = false;        // each seed of a covered box has its closest point
 };

@@ -16,6 +16,9 @@ constexpr double kBoxDiagonals = 1;
 // than this share of the violations that there were. Runs that converge need a few dozen in all.
 constexpr std::uint64_t kPatience = 100;
 constexpr double kShareLeft = 0.75;
+// After as many rounds of any kind, a manifold of which this share of the stars does not close
+// bends too much for epsilon.
+constexpr double kHopelessShare = 0.5;
 
 }  // namespace
 
@@ -68,6 +71,11 @@ bool StallWatch::HasStalled(std::uint64_t left, bool judges_all) {
     rounds_since_ = 0;
   }
   return rounds_since_++ > kPatience * static_cast<std::uint64_t>(k_);
+}
+
+bool StallWatch::IsHopeless(std::uint64_t bad, std::uint64_t stars) {
+  return ++rounds_ > kPatience * static_cast<std::uint64_t>(k_) &&
+         static_cast<double>(bad) > kHopelessShare * static_cast<double>(stars);
 }
 
 }  // namespace stellate::core

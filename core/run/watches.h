@@ -42,6 +42,9 @@ class StallWatch {
   // Whether the last rounds have mended little that their own points did not break again. Called
   // once a round: `left` violations are known, and of R3 and R4 only if `judges_all`.
   bool HasStalled(std::uint64_t left, bool judges_all);
+  // Whether after many rounds most of the `stars` still break R1 or R2, `bad` of them: a front
+  // would be a small part of the mesh by then. Called once a round.
+  bool IsHopeless(std::uint64_t bad, std::uint64_t stars);
 
  private:
   int k_;
@@ -49,6 +52,7 @@ class StallWatch {
   bool judged_all_ = false;                      // in the round before
   std::uint64_t left_then_ = ~std::uint64_t{0};  // violations, at the last progress
   std::uint64_t rounds_since_ = 0;
+  std::uint64_t rounds_ = 0;
 };
 
 }  // namespace stellate::core

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/certificate/certifier.h"
+#include "core/geometry/reach_bound.h"
 #include "tests/core/certificate/handmade_meshes.h"
 
 namespace stellate::core {
@@ -73,6 +74,10 @@ TEST(Evidence, RefusesASheetThatTheMeshStandsForToo) {
     EXPECT_FALSE(c.certified) << radius;
     EXPECT_TRUE(Says(c.verdict, "too coarse to trust")) << c.verdict;
     EXPECT_NEAR(c.estimated_reach, std::abs(1 - radius) / 2, 1e-6);
+    // Fibres of the other sheet meet the mesh once, but too far away.
+    if (radius == 0.9) {
+      EXPECT_GT(c.fibre_failures, 0u);
+    }
   }
 }
 
@@ -109,13 +114,19 @@ TEST(Evidence, RefusesTangentsThatAreNotThoseOfTheClosestPoints) {
 
 TEST(Evidence, RefusesAMeshOverARim) {
   const HandmadeMesh mesh = Icosphere(4);
-  const auto capless = [](const Eigen::VectorXd& x) -> Eigen::VectorXd {
-    Eigen::VectorXd y = x.normalized();
-    if (y[2] > 0.995) y << 0.0998749217771909 * y.head(2).normalized(), 0.995;
-    return y;
+  // Inside a triangle, off its middle.
+  const std::uint32_t* ids = mesh.simplices.data();
+  const Eigen::Vector3d middle =
+      (1.1 * mesh.Point(ids[0]) + mesh.Point(ids[1]) + mesh.Point(ids[2])).normalized();
+  const auto punctured = [middle](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+    const Eigen::Vector3d y = x.normalized();
+    const double radius = 0.02, height = std::sqrt(1 - radius * radius);
+    if (y.dot(middle) <= height) return y;
+    return height * middle + radius * (y - y.dot(middle) * middle).normalized();
   };
-  const Certificate c = Certify(SpecificationFor(mesh, 0.1), mesh, capless).certificate;
+  const Certificate c = Certify(SpecificationFor(mesh, 0.1), mesh, punctured).certificate;
   EXPECT_FALSE(c.certified);
+  EXPECT_TRUE(Says(c.verdict, "the manifold ends")) << c.verdict;
   Certificate whole = Certify(SpecificationFor(mesh, 0.1), mesh, ClosestOnSphere).certificate;
   EXPECT_TRUE(Says(whole.verdict, "Assumed: that the manifold has no boundary")) << whole.verdict;
 }

@@ -81,7 +81,7 @@ TEST(FindNearestVertices, FindsTheLowestOfTheNearestHoweverFar) {
 }
 
 // Hits of the flats through points of M with the tangent spaces there.
-std::vector<int> Hits(const HandmadeMesh& mesh, const HandmadeMesh& at, double reach_out) {
+std::vector<FibreHits> Hits(const HandmadeMesh& mesh, const HandmadeMesh& at, double reach_out) {
   double diameter = 0;
   for (std::size_t s = 0; s < mesh.size(); ++s) {
     const std::uint32_t* ids = &mesh.simplices[s * (mesh.k + 1)];
@@ -111,31 +111,49 @@ TEST(CountHits, ANormalLineMeetsASphereOnceNearbyAndTwiceInAll) {
   for (const HandmadeMesh& mesh :
        {CrossPolytope(1), Icosphere(1), Icosphere(3), CrossPolytope(3), SimplexBoundary(4)}) {
     const HandmadeMesh points = RandomSpherePoints(mesh.k, 60);
-    for (const int hits : Hits(mesh, points, 0.9)) EXPECT_EQ(hits, 1) << mesh.k;
-    for (const int hits : Hits(mesh, points, 2.5)) EXPECT_EQ(hits, 2) << mesh.k;
+    for (const FibreHits& hits : Hits(mesh, points, 0.9)) {
+      EXPECT_EQ(hits.count, 1) << mesh.k;
+      EXPECT_LT(hits.distance, 0.9);
+    }
+    for (const FibreHits& hits : Hits(mesh, points, 2.5)) EXPECT_EQ(hits.count, 2) << mesh.k;
   }
 }
 
 TEST(CountHits, CountsEachSimplexOnce) {
   // Across a vertex of many simplices, where a flat to the side must decide.
   const HandmadeMesh mesh = TorusGrid(2, 9, CliffordPoint);
-  for (const int hits : Hits(mesh, mesh, 0.5)) EXPECT_EQ(hits, 1);
+  for (const FibreHits& hits : Hits(mesh, mesh, 0.5)) EXPECT_EQ(hits.count, 1);
   HandmadeMesh twice = mesh;
   twice.Append(mesh);
-  for (const int hits : Hits(twice, mesh, 0.5)) EXPECT_EQ(hits, 2);
+  for (const FibreHits& hits : Hits(twice, mesh, 0.5)) EXPECT_EQ(hits.count, 2);
   const HandmadeMesh solid = TorusGrid(3, 7, CliffordPoint);
-  for (const int hits : Hits(solid, solid, 0.8)) EXPECT_EQ(hits, 1);
+  for (const FibreHits& hits : Hits(solid, solid, 0.8)) EXPECT_EQ(hits.count, 1);
 }
 
 TEST(CountHits, MissesAHole) {
   HandmadeMesh mesh = Icosphere(2);
   const HandmadeMesh points = RandomSpherePoints(2, 200);
   mesh.simplices.resize(mesh.simplices.size() / 2);
-  const std::vector<int> hits = Hits(mesh, points, 0.5);
-  const auto missed = std::count(hits.begin(), hits.end(), 0);
-  EXPECT_GT(missed, 60);
-  EXPECT_LT(missed, 140);
-  EXPECT_EQ(std::count(hits.begin(), hits.end(), 1), 200 - missed);
+  const std::vector<FibreHits> hits = Hits(mesh, points, 0.5);
+  const auto met = [&](int count) {
+    return std::count_if(hits.begin(), hits.end(),
+                         [count](const FibreHits& h) { return h.count == count; });
+  };
+  EXPECT_GT(met(0), 60);
+  EXPECT_LT(met(0), 140);
+  EXPECT_EQ(met(1), 200 - met(0));
+}
+
+TEST(CountHits, TellsHowFarAwayTheMeshIs) {
+  const HandmadeMesh mesh = Icosphere(4);
+  HandmadeMesh inner = RandomSpherePoints(2, 60);
+  for (double& x : inner.points) x *= 0.8;
+  for (const FibreHits& hits : Hits(mesh, inner, 0.5)) {
+    EXPECT_EQ(hits.count, 1);
+    EXPECT_NEAR(hits.distance, 0.2, 0.005);
+    EXPECT_LT(hits.simplex, mesh.size());
+  }
+  for (const FibreHits& hits : Hits(mesh, inner, 0.15)) EXPECT_EQ(hits.count, 0);
 }
 
 }  // namespace

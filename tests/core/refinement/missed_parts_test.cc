@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/SVD>
+#include <cmath>
 #include <set>
 #include <string>
 #include <vector>
@@ -109,6 +110,49 @@ TEST(MissedParts, ABoxThatIsALittleTooSmallIsWarnedOf) {
   ASSERT_EQ(run.report().certificate.warnings.size(), 1u);
   EXPECT_TRUE(Says(run.report().certificate.warnings[0], "leaves the bounding box"));
   EXPECT_TRUE(Drive(SurfaceIn(1.2, 0.2), AnswererOf(Sphere)).report().certificate.warnings.empty());
+}
+
+// The unit sphere without a cap of radius 0.14, less than epsilon.
+Eigen::VectorXd Capless(const Eigen::VectorXd& x) {
+  Eigen::VectorXd y = x.normalized();
+  if (y[2] > 0.99) y << std::sqrt(1 - 0.99 * 0.99) * y.head(2).normalized(), 0.99;
+  return y;
+}
+
+TEST(MissedParts, AHoleThatAnAnswerCameUponIsRefusedByName) {
+  Specification spec = SurfaceIn(1.2, 0.2);
+  for (const bool declared : {false, true}) {
+    if (declared) spec.declared_reach = 0.14;
+    const DrivenRun run = Drive(spec, AnswererOf(Capless));
+    const Certificate& c = run.report().certificate;
+    EXPECT_FALSE(c.certified);
+    EXPECT_TRUE(Says(c.verdict, "the manifold ends")) << c.verdict;
+  }
+}
+
+// A circle of radius 1 in the plane of |u| and z, u in R^3, that thin spheres are turned along.
+Eigen::VectorXd ThinRing(const Eigen::VectorXd& x) {
+  const Eigen::Vector3d out = x.head(3).normalized();
+  Eigen::Vector2d section(x.head(3).norm() - 1, x[3]);
+  section *= 0.007 / section.norm();
+  Eigen::VectorXd y(4);
+  y << (1 + section[0]) * out, section[1];
+  return y;
+}
+
+// Epsilon is 25 times the reach: hardly a star closes, however far the front goes.
+TEST(MissedParts, AManifoldFarThinnerThanEpsilonIsGivenUpSoon) {
+  Specification spec;
+  spec.dimension = 3;
+  spec.ambient_dimension = 4;
+  spec.epsilon = 0.17;
+  spec.bounding_box =
+      BoundingBox{Eigen::VectorXd::Constant(4, -1.1), Eigen::VectorXd::Constant(4, 1.1)};
+  spec.limits.max_vertices = 8'000;
+  const DrivenRun run = Drive(spec, AnswererOf(ThinRing));
+  EXPECT_NE(run.report().termination, Termination::kConverged);
+  EXPECT_LT(run.report().counts.rounds, 1000u);
+  EXPECT_LT(run.report().counts.vertices, 4000u);
 }
 
 // Pairs of orthonormal vectors of R^4: V(2, 4), of dimension 5, in R^8.

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/batch.h"
+#include "core/certificate/examination.h"
+#include "core/certificate/reach_claims.h"
+#include "core/certificate/rim_check.h"
+#include "core/certificate/tangent_check.h"
+
+namespace stellate::core {
+
+// That the mesh lies on M: its vertices and, nearly, points inside its simplices; that the tangent
+// spaces that the oracle gave are M's; that M does not end there. What the closest points say of
+// the reach goes to `reach`, where they lean to `rims`.
+class ClosenessClaims {
+ public:
+  ClosenessClaims(Examination& examination, ReachClaims& reach, RimCheck& rims);
+
+  Eigen::MatrixXd InsideQuestions() const;
+  Eigen::MatrixXd VertexQuestions() const;
+  Eigen::MatrixXd TangentQuestions();  // none where the oracle gives no tangents
+  Eigen::MatrixXd RimQuestions() { return rims_.Questions(x_.position_error); }
+
+  // Sets the examination's position_error, which all other judgements need.
+  void JudgeVertices(const AnswerBlock& answer);
+  void JudgeInside(const Eigen::MatrixXd& asked, const AnswerBlock& answer);
+  void JudgeTangents(const AnswerBlock& answer);
+  void JudgeRims(const AnswerBlock& answer);
+  void JudgeDeviation();
+  std::uint64_t points_held() const { return points_inside_ * simplices_.size(); }
+
+ private:
+  Eigen::VectorXd AlongSimplex(const std::uint32_t* ids, const Eigen::VectorXd& step) const;
+
+  Examination& x_;
+  ReachClaims& reach_;
+  RimCheck& rims_;
+  std::vector<std::uint32_t> simplices_, vertices_;  // that are asked about
+  std::uint32_t points_inside_ = 1;                  // of each simplex
+  std::optional<TangentCheck> tangents_;
+  std::vector<double> deviating_;  // closest to barycentres farther away than max_deviation, d each
+};
+
+}  // namespace stellate::core

@@ -1,0 +1,148 @@
+#include "core/certificate/complex_claims.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "core/base/message.h"
+#include "core/base/parallel.h"
+#include "core/certificate/links.h"
+
+namespace stellate::core {
+namespace {
+
+// R1 is decided on circumradii in tangent spaces; rounding may differ.
+constexpr double kSizeTolerance = 1e-6;
+
+// False if it is none.
+bool IsComplex(Examination& x) {
+  if (x.mesh.vertices >= std::numeric_limits<std::uint32_t>::max()) {
+    x.findings.Refuse(Findings::kComplex, "the mesh has too many vertices to check");
+    return false;
+  }
+  const SimplexList list{x.mesh.k, static_cast<std::uint32_t>(x.mesh.vertices), x.mesh.simplices};
+  const std::string malformed = CheckSimplexList(list);
+  if (!malformed.empty() || list.size() == 0) {
+    x.findings.Refuse(Findings::kComplex,
+                      malformed.empty() ? "the mesh has no simplices" : malformed);
+    return false;
+  }
+  x.adjacency.emplace(list);
+  return true;
+}
+
+void RefuseWhatIsNoManifold(Examination& x, const Connectivity& connectivity,
+                            const LinkReport& links) {
+  const Certificate& c = x.certificate;
+  if (c.components < static_cast<std::uint64_t>(x.spec.components)) {
+    x.findings.Refuse(
+        Findings::kComponents,
+        Message(
+            "the mesh has ", c.components, c.components == 1 ? " component" : " components",
+            " where ", x.spec.components,
+            " were declared: give a seed on each, or a smaller epsilon if two came out as one"));
+  }
+  if (!c.closed) {
+    x.findings.Refuse(Findings::kComplex,
+                      Message("the mesh is not closed: ", x.adjacency->first_bad_facet(),
+                              ", where each must be in two; faces like it: ", c.bad_faces));
+  }
+  if (connectivity.isolated_vertices > 0) {
+    x.findings.Refuse(Findings::kLinks, Message("vertex ", connectivity.first_isolated,
+                                                " is in no simplex; vertices like it: ",
+                                                connectivity.isolated_vertices));
+  }
+  if (links.bad_links > 0) {
+    x.findings.Refuse(Findings::kLinks,
+                      Message(links.first_bad_link, "; vertices like it: ", links.bad_links));
+  }
+}
+
+void RefuseWhatIsUnfinished(Examination& x) {
+  if (x.facts.inconsistent_simplices > 0) {
+    x.findings.Refuse(
+        Findings::kConsistency,
+        Message(x.facts.inconsistent_simplices,
+                " simplices are in the star of one of their vertices but not of all"));
+  }
+  if (!x.facts.converged) {
+    x.findings.Refuse(Findings::kConvergence,
+                      "refinement ended while one of its rules still applied");
+  }
+}
+
+// The orientation of the mesh, if it has one.
+std::vector<std::int8_t> JudgeTopology(Examination& x) {
+  ThrowIfInterrupted();
+  Connectivity connectivity;
+  LinkReport links;
+  ParallelFor(2, [&](int part) {
+    if (part == 0)
+      connectivity = ComputeConnectivity(*x.adjacency);
+    else
+      links = CheckLinks(*x.adjacency);
+  });
+  Certificate& c = x.certificate;
+  c.bad_faces = x.adjacency->bad_facets();
+  c.closed = c.bad_faces == 0;
+  c.components = connectivity.components;
+  c.orientable = c.closed && connectivity.orientable;
+  c.bad_links = links.bad_links + connectivity.isolated_vertices;
+  c.links_are_spheres = c.bad_links == 0;
+  c.links_decided_exactly = links.decided_exactly;
+  c.euler_characteristic = links.euler_characteristic;
+  RefuseWhatIsNoManifold(x, connectivity, links);
+  RefuseWhatIsUnfinished(x);
+  return std::move(connectivity.orientation);
+}
+
+void JudgeStars(Examination& x, const StarGeometry& stars) {
+  Certificate& c = x.certificate;
+  c.unembedded_stars = stars.unembedded_stars;
+  // The link of a star that embeds is the sphere of directions of its tangent space
+  // (docs/proof.md, (a)).
+  if (c.closed && stars.unembedded_stars == 0) c.links_decided_exactly = true;
+  if (c.links_are_spheres && !c.links_decided_exactly) {
+    x.findings.Warn(
+        "Some vertex links have the homology of a sphere, but were not shown to be spheres.");
+  }
+  if (stars.unembedded_stars > 0) {
+    x.findings.Refuse(Findings::kStars,
+                      Message(stars.first_unembedded, "; stars like it: ", stars.unembedded_stars));
+  }
+}
+
+void JudgeSize(Examination& x) {
+  x.shape = MeasureShape(x.mesh, x.list());
+  Certificate& c = x.certificate;
+  c.max_circumradius = std::max(c.max_circumradius, x.shape.max_circumradius);
+  c.max_radius_edge = x.shape.max_radius_edge;
+  c.min_fatness = x.shape.min_fatness;
+  c.min_angle_degrees = x.shape.min_angle_degrees;
+  c.max_tangent_angle_degrees = x.shape.max_tangent_angle_degrees;
+  if (!(c.max_circumradius <= x.spec.epsilon * (1 + kSizeTolerance))) {
+    x.findings.Refuse(Findings::kSize,
+                      Message("simplex ", NameSimplex(x.list()[x.shape.largest], x.mesh.k + 1),
+                              " has the circumradius ", Brief(x.shape.max_circumradius),
+                              " (in a tangent space up to ", Brief(c.max_circumradius),
+                              "), more than epsilon = ", Brief(x.spec.epsilon)));
+  }
+  x.size = std::min(x.shape.max_circumradius, x.spec.epsilon);
+}
+
+}  // namespace
+
+std::optional<StarGeometry> JudgeComplex(Examination& x) {
+  x.certificate.inconsistent_simplices = x.facts.inconsistent_simplices;
+  x.certificate.max_circumradius = x.facts.max_circumradius;
+  if (!IsComplex(x)) return std::nullopt;
+  StarGeometry stars = MeasureStars(x.mesh, *x.adjacency, JudgeTopology(x));
+  JudgeStars(x, stars);
+  JudgeSize(x);
+  x.longest_edge = std::move(stars.longest_edge);
+  return stars;
+}
+
+}  // namespace stellate::core

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace stellate::core {
+
+// A finished mesh as the certifier sees it: the complex and the sample, nothing of how they came
+// about. Borrowed; must outlive the Certifier.
+struct MeshView {
+  int k = 0, d = 0;
+  std::uint64_t vertices = 0;
+  const double* points = nullptr;    // vertices x d, C order
+  const double* tangents = nullptr;  // vertices x k x d, C order, orthonormal rows
+  const std::vector<std::uint32_t>* simplices = nullptr;  // k+1 ascending vertex ids each
+
+  const double* Point(std::uint32_t v) const { return points + std::size_t{v} * d; }
+  const double* Tangent(std::uint32_t v) const { return tangents + std::size_t{v} * d * k; }
+};
+
+// What only the stars know.
+struct StarFacts {
+  std::uint64_t inconsistent_simplices = 0;
+  double max_circumradius = 0;  // max R_p(sigma)
+  bool converged = false;       // no rule applies any more
+  double max_size_ratio = 0;    // max R_p / size(p) where the size is graded, else 0
+  bool covers_box = false;      // every component of M in the bounding box is met, if the declared
+                                // reach is true
+  double tangent_error_length = 0;  // sin(tangent_error) times the reach (TangentFinder), length
+};
+
+// What was learned of M before, while the mesh was made.
+struct KnownOfManifold {
+  std::vector<double> points;  // of M, d each, that are no vertices
+  std::vector<double> leans;   // where M may end: points y of M and the parts of q - y along
+                               // it (RimCheck), 2 d each
+};
+
+}  // namespace stellate::core

@@ -1,0 +1,131 @@
+#include "core/certificate/reach_claims.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "core/base/message.h"
+#include "core/base/random.h"
+#include "core/certificate/probes.h"
+#include "core/geometry/reach_bound.h"
+
+namespace stellate::core {
+namespace {
+
+// Two points of M so much nearer to each other than the mesh size are on two sides of something.
+constexpr double kThin = 0.25;
+
+}  // namespace
+
+ReachClaims::ReachClaims(Examination& examination, const StarGeometry& stars)
+    : x_(examination), balls_(x_.mesh, x_.longest_edge), reach_(stars.reach) {
+  narrowest_ = {stars.narrowest_p,
+                (x_.Vertex(stars.narrowest_p) - x_.Vertex(stars.narrowest_q)).norm()};
+  if (x_.spec.declared_reach) HoldDeclared(stars);
+  if (x_.thorough()) feet_.emplace(x_.mesh, x_.longest_edge);
+  balls_.AddLadders(x_.spec.random_seed, kBallCount);
+  const std::uint64_t step =
+      x_.thorough() ? 1 : std::max<std::uint64_t>(kBallStride, x_.mesh.vertices / kMaxBallPairs);
+  for (std::uint64_t v = 0; v < x_.mesh.vertices; v += step) {
+    const auto id = static_cast<std::uint32_t>(v);
+    balls_.AddPair(id, kPairRadius * x_.LocalSize(id), x_.spec.random_seed);
+  }
+}
+
+void ReachClaims::HoldDeclared(const StarGeometry& stars) {
+  const double reach = *x_.spec.declared_reach;
+  declared_.emplace(
+      x_.mesh, ReachClaim{reach, std::asin(std::min(1.0, x_.facts.tangent_error_length / reach))});
+  if (std::isfinite(stars.reach)) declared_->HoldAgainstEdge(stars.narrowest_p, stars.narrowest_q);
+  if (x_.certificate.closed && stars.unembedded_stars == 0)
+    declared_->Prove(*x_.adjacency, x_.shape);
+}
+
+Eigen::MatrixXd ReachClaims::FootQuestions() const {
+  return feet_ ? feet_->Centres() : Eigen::MatrixXd();
+}
+
+void ReachClaims::TakeBalls(const AnswerBlock& answer) {
+  balls_.Absorb(answer.points, answer.found, x_.position_error);
+}
+
+void ReachClaims::TakeFeet(const AnswerBlock& answer) {
+  feet_->Absorb(answer.points, answer.found, x_.position_error);
+}
+
+// An orthonormal basis, nearly of the tangent space of M under a simplex.
+Eigen::MatrixXd ReachClaims::TangentsUnder(const std::uint32_t* ids) const {
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(x_.mesh.d, x_.mesh.k);
+  const auto first = x_.Tangents(ids[0]);
+  for (int i = 0; i <= x_.mesh.k; ++i) {
+    const auto tangent = x_.Tangents(ids[i]);
+    sum += tangent * (tangent.transpose() * first);
+  }
+  return Eigen::HouseholderQR<Eigen::MatrixXd>(sum).householderQ() *
+         Eigen::MatrixXd::Identity(x_.mesh.d, x_.mesh.k);
+}
+
+void ReachClaims::HoldFoot(const std::uint32_t* ids, double circumradius, double distance,
+                           const Eigen::VectorXd& y, std::optional<std::uint64_t> number) {
+  if (declared_) declared_->HoldAgainstDistance(ids, circumradius, distance);
+  if (feet_ && number)
+    feet_->AddPair(ids, y, TangentsUnder(ids), kPairRadius * x_.LocalSize(ids[0]),
+                   ~(Mix64(x_.spec.random_seed) + *number));
+  for (int i = 0; i <= x_.mesh.k; ++i) {
+    const auto tangent = x_.Tangents(ids[i]);
+    const Eigen::VectorXd step = y - x_.Vertex(ids[i]);
+    const double length = step.norm();
+    const double away = (step - tangent * (tangent.transpose() * step)).norm();
+    if (IsTelling(length, away, x_.longest_edge[ids[i]], x_.position_error))
+      Take(ReachBound(length * length, away), {ids[i], length});
+  }
+}
+
+void ReachClaims::TellWhatBallsMet() {
+  x_.seen.insert(x_.seen.end(), balls_.met().begin(), balls_.met().end());
+  if (feet_) x_.seen.insert(x_.seen.end(), feet_->met().begin(), feet_->met().end());
+}
+
+void ReachClaims::Hold(const Evidence& evidence) {
+  coarseness_ = evidence.coarseness;
+  Take(evidence.reach, {evidence.vertex, evidence.distance});
+}
+
+void ReachClaims::Take(double reach, Narrow where) {
+  if (reach >= reach_) return;
+  reach_ = reach;
+  narrowest_ = where;
+}
+
+void ReachClaims::Judge() {
+  for (const ShrinkingBalls* balls : {&balls_, feet_ ? &*feet_ : nullptr}) {
+    if (!balls) continue;
+    coarseness_ = std::max(coarseness_, balls->coarseness());
+    Take(balls->reach(), {balls->narrowest(), balls->distance()});
+  }
+  x_.certificate.estimated_reach = reach_;
+  const double ratio =
+      x_.graded() ? std::max(x_.facts.max_size_ratio, coarseness_) : x_.size / reach_;
+  x_.certificate.epsilon_over_reach = x_.graded() ? ratio : x_.spec.epsilon / reach_;
+  if (ratio <= kCoarse) return;
+  x_.findings.Refuse(
+      Findings::kReach,
+      Message("too coarse to trust: ",
+              TooCoarse(ratio, reach_,
+                        Message("near vertex ", narrowest_.vertex, " at ",
+                                NamePoint(x_.Vertex(narrowest_.vertex)))),
+              narrowest_.across < kThin * x_.size
+                  ? Message(". Two points of it there are only ", Brief(narrowest_.across),
+                            " apart: if nothing so thin should be there, check the dimension (a "
+                            "wall is no surface, a wire no curve)")
+                  : std::string()));
+}
+
+void ReachClaims::JudgeDeclared() {
+  if (!declared_) return;
+  declared_->HoldAgainstBall(balls_.narrowest(), balls_.reach(), balls_.distance());
+  declared_->Conclude(x_.position_error, x_.facts.covers_box, x_.findings, x_.certificate);
+}
+
+}  // namespace stellate::core

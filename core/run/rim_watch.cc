@@ -1,0 +1,59 @@
+#include "core/run/rim_watch.h"
+
+#include <cmath>
+
+#include "core/base/instantiate.h"
+#include "core/base/interruption.h"
+#include "core/base/message.h"
+#include "core/base/vector_ops.h"
+#include "core/certificate/findings.h"
+#include "core/certificate/rim_check.h"
+
+namespace stellate::core {
+namespace {
+
+constexpr std::size_t kMostLeans = 256;  // more tell no more
+
+}  // namespace
+
+template <int K>
+void RimWatch::Look(const CandidateSet<K>& candidates, const AnsweredPoints& answers) {
+  const Eigen::Index d = answers.points.rows();
+  Eigen::VectorXd step(d);
+  for (std::size_t i = 0; i < candidates.targets.size(); ++i) {
+    CheckInterruption(i);
+    if (candidates.in_flats[i]) continue;
+    for (Eigen::Index c = candidates.first[i]; c < candidates.first[i + 1]; ++c) {
+      if (leans_.size() >= 2 * static_cast<std::size_t>(d) * kMostLeans) return;
+      if (!answers.found[static_cast<std::size_t>(c)]) continue;
+      step = candidates.points.col(c) - answers.points.col(c);
+      const double* tangent = answers.tangents.col(c).data();
+      double along2 = 0;
+      for (int a = 0; a < K; ++a) {
+        const double along = Dot(tangent + a * d, step.data(), static_cast<int>(d));
+        along2 += along * along;
+      }
+      if (!IsLean(std::sqrt(along2), step.norm())) continue;
+      const Eigen::Map<const Eigen::MatrixXd> basis(tangent, d, K);
+      step = basis * (basis.transpose() * step).eval();
+      leans_.insert(leans_.end(), answers.points.col(c).begin(), answers.points.col(c).end());
+      leans_.insert(leans_.end(), step.begin(), step.end());
+    }
+  }
+}
+
+std::string RimWatch::Describe(int d) const {
+  if (leans_.empty()) return {};
+  return Message(". Of the answers ", leans_.size() / (2 * static_cast<std::size_t>(d)),
+                 " did not lie straight below what was asked, the first ",
+                 NamePoint(Eigen::Map<const Eigen::VectorXd>(leans_.data(), d)),
+                 ": the manifold ends there (holes and boundaries are not meshed), or the tangent "
+                 "spaces are wrong");
+}
+
+#define STELLATE_EACH(K) \
+  template void RimWatch::Look<K>(const CandidateSet<K>&, const AnsweredPoints&);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core
