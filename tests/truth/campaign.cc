@@ -2,12 +2,18 @@
 // with 1 when a certificate was false, or when an honest question was not answered.
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
+#include <istream>
+#include <limits>
 #include <map>
+#include <ostream>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "tests/truth/judge.h"
@@ -19,29 +25,70 @@ using namespace stellate::truth;
 struct Settings {
   std::uint64_t cases = 300, seed = 1, only = 0;
   bool single = false, thorough = false, verbose = false;
-  std::string family;
+  std::string family, log;
 };
 
+// What is kept of a run: a line of the log.
+struct Record {
+  std::string family;
+  std::uint64_t number = 0;
+  Outcome outcome = Outcome::kUnfinished;
+  double fineness = 0;  // epsilon over the reach; infinity where there is none
+  double told = 0;      // the reach that was told, over the true one; 0 where none was
+  std::uint64_t rounds = 0, queries = 0;
+  double seconds = 0;
+
+  bool honest() const { return fineness <= 0.4; }
+  bool certified() const { return outcome == Outcome::kRight || outcome == Outcome::kUnseen; }
+  bool wrong() const { return outcome == Outcome::kFalse && !IsBeyondSeeing(family); }
+};
+
+Record RecordOf(const Case& c, std::uint64_t number, const Run& run) {
+  const double reach = c.shape->Reach();
+  return {c.family,
+          number,
+          run.outcome,
+          reach > 0 ? c.epsilon / reach : std::numeric_limits<double>::infinity(),
+          reach > 0 ? run.estimated_reach / reach : 0,
+          run.counts.rounds,
+          run.counts.queries,
+          run.seconds};
+}
+
+std::ostream& operator<<(std::ostream& out, const Record& r) {
+  return out << r.family << ' ' << r.number << ' ' << static_cast<int>(r.outcome) << ' '
+             << (std::isinf(r.fineness) ? -1 : r.fineness) << ' ' << r.told << ' ' << r.rounds
+             << ' ' << r.queries << ' ' << r.seconds << '\n';
+}
+
+std::istream& operator>>(std::istream& in, Record& r) {
+  int outcome = 0;
+  in >> r.family >> r.number >> outcome >> r.fineness >> r.told >> r.rounds >> r.queries >>
+      r.seconds;
+  r.outcome = static_cast<Outcome>(outcome);
+  if (r.fineness < 0) r.fineness = std::numeric_limits<double>::infinity();
+  return in;
+}
+
 struct Tally {
-  std::uint64_t runs = 0, outcomes[5] = {}, honest = 0, honest_certified = 0;
-  std::uint64_t reach_told = 0, reach_near = 0;
+  std::uint64_t runs = 0, outcomes[5] = {}, honest = 0, honest_certified = 0, wrong = 0;
+  std::uint64_t reach_told = 0, reach_near = 0;  // of runs that converged
   std::vector<std::uint64_t> rounds_unfinished, queries_certified;
   double seconds = 0;
 
-  void Add(const Case& c, const Run& run) {
+  void Add(const Record& r) {
     ++runs;
-    ++outcomes[static_cast<int>(run.outcome)];
-    seconds += run.seconds;
-    const double reach = c.shape->Reach();
-    if (c.epsilon <= 0.4 * reach) {
-      ++honest;
-      honest_certified += run.outcome == Outcome::kRight || run.outcome == Outcome::kUnseen;
-    }
-    if (run.outcome == Outcome::kUnfinished) rounds_unfinished.push_back(run.counts.rounds);
-    if (run.outcome == Outcome::kRight) queries_certified.push_back(run.counts.queries);
-    if (reach > 0 && run.estimated_reach > 0) {
+    ++outcomes[static_cast<int>(r.outcome)];
+    wrong += r.wrong();
+    seconds += r.seconds;
+    honest += r.honest();
+    honest_certified += r.honest() && r.certified();
+    if (r.outcome == Outcome::kRight) queries_certified.push_back(r.queries);
+    if (r.outcome == Outcome::kUnfinished) {
+      rounds_unfinished.push_back(r.rounds);
+    } else if (r.told > 0) {
       ++reach_told;
-      reach_near += run.estimated_reach >= 0.95 * reach && run.estimated_reach <= 2 * reach;
+      reach_near += r.told >= 0.95 && r.told <= 2;
     }
   }
 };
@@ -73,6 +120,8 @@ Settings Parse(int argc, char** argv) {
     } else if (flag == "--case") {
       s.only = std::strtoull(value(), nullptr, 10);
       s.single = true;
+    } else if (flag == "--log") {
+      s.log = value();
     } else if (flag == "--thorough") {
       s.thorough = true;
     } else if (flag == "--verbose") {
@@ -80,7 +129,9 @@ Settings Parse(int argc, char** argv) {
     } else {
       std::fprintf(stderr,
                    "truth_campaign [--cases N] [--seed N] [--family NAME [--case N]] [--thorough] "
-                   "[--verbose]\n  families:");
+                   "[--log FILE] [--verbose]\n"
+                   "  --log: results are added to FILE, and those that it has are not run again\n"
+                   "  families:");
       for (const std::string& f : Families()) std::fprintf(stderr, " %s", f.c_str());
       std::fprintf(stderr, "\n");
       std::exit(flag == "--help" ? 0 : 2);
@@ -108,40 +159,59 @@ void Print(const std::string& name, const Tally& t) {
       Wide(Median(t.queries_certified)), t.seconds);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  const Settings s = Parse(argc, argv);
-  std::map<std::string, Tally> tallies;
-  Tally all;
-  std::uint64_t wrong = 0;
-  const std::vector<std::string> families =
-      s.family.empty() ? Families() : std::vector<std::string>{s.family};
-  const std::uint64_t each = (s.cases + families.size() - 1) / families.size();
-  for (std::uint64_t n = s.single ? s.only : 0; n < (s.single ? s.only + 1 : each); ++n) {
-    for (const std::string& family : families) {
-      const Case c = MakeCase(family, s.seed, n);
-      const Run run = Judge(c, s.thorough);
-      tallies[family].Add(c, run);
-      all.Add(c, run);
-      wrong += run.outcome == Outcome::kFalse && !IsBeyondSeeing(family);
-      const bool lost = c.epsilon <= 0.4 * c.shape->Reach() && run.outcome > Outcome::kUnseen;
-      if (!s.verbose && run.outcome != Outcome::kFalse && !lost) continue;
-      std::printf(
-          "%s --family %s --case %llu --seed %llu: k %d, d %d, epsilon %.4g, reach %.4g "
-          "(told %.4g), %llu vertices, %llu rounds: %s\n",
-          NameOf(run.outcome), family.c_str(), Wide(n), Wide(s.seed), c.shape->k(), c.shape->d(),
-          c.epsilon, c.shape->Reach(), run.estimated_reach, Wide(run.counts.vertices),
-          Wide(run.counts.rounds), run.told.c_str());
-      std::fflush(stdout);
-    }
-  }
+void Print(const std::map<std::string, Tally>& tallies, const Tally& all) {
   std::printf("%-20s %5s %6s %6s %6s %7s %6s  %9s %9s %6s %7s %7s\n", "family", "runs", "right",
               "false", "unseen", "refused", "unfin.", "eps<=.4", "reach", "rounds", "queries",
               "seconds");
   for (const auto& [name, tally] : tallies) Print(name, tally);
   Print("all", all);
+}
+
+void Tell(const Settings& s, const Case& c, std::uint64_t n, const Run& run) {
+  std::printf(
+      "%s --family %s --case %llu --seed %llu: k %d, d %d, epsilon %.4g, reach %.4g "
+      "(told %.4g), %llu vertices, %llu rounds: %s\n",
+      NameOf(run.outcome), c.family.c_str(), Wide(n), Wide(s.seed), c.shape->k(), c.shape->d(),
+      c.epsilon, c.hole > 0 ? c.hole : c.shape->Reach(), run.estimated_reach,
+      Wide(run.counts.vertices), Wide(run.counts.rounds), run.told.c_str());
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const Settings s = Parse(argc, argv);
+  std::map<std::pair<std::string, std::uint64_t>, Record> known;
+  std::ofstream log;
+  if (!s.log.empty()) {
+    std::ifstream before(s.log);
+    for (Record r; before >> r;) known[{r.family, r.number}] = r;
+    log.open(s.log, std::ios::app);
+  }
+  std::map<std::string, Tally> tallies;
+  Tally all;
+  const std::vector<std::string> families =
+      s.family.empty() ? Families() : std::vector<std::string>{s.family};
+  const std::uint64_t each = (s.cases + families.size() - 1) / families.size();
+  for (std::uint64_t n = s.single ? s.only : 0; n < (s.single ? s.only + 1 : each); ++n) {
+    for (const std::string& family : families) {
+      Record record;
+      if (const auto found = known.find({family, n}); found != known.end()) {
+        record = found->second;
+      } else {
+        const Case c = MakeCase(family, s.seed, n);
+        const Run run = Judge(c, s.thorough);
+        record = RecordOf(c, n, run);
+        if (log.is_open()) log << record << std::flush;
+        const bool lost = record.honest() && !record.certified();
+        if (s.verbose || lost || run.outcome == Outcome::kFalse) Tell(s, c, n, run);
+      }
+      tallies[family].Add(record);
+      all.Add(record);
+    }
+  }
+  Print(tallies, all);
   const bool answers =
       static_cast<double>(all.honest_certified) >= 0.99 * static_cast<double>(all.honest);
-  return wrong == 0 && answers ? 0 : 1;
+  return all.wrong == 0 && answers ? 0 : 1;
 }

@@ -178,7 +178,8 @@ void Shells(Case& c, Dice& dice) {
 
 void Holes(Case& c, Dice& dice) {
   c.epsilon = dice.Uniform(0.15, 0.4);
-  c.shape = SphereWithoutCap(std::min(0.7, c.epsilon * dice.LogUniform(0.1, 3)));
+  c.hole = std::min(0.7, c.epsilon * dice.LogUniform(0.1, 3));
+  c.shape = SphereWithoutCap(c.hole);
 }
 
 // Anything, at 0.05 to 1.5 of its reach.

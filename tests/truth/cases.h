@@ -13,6 +13,7 @@ struct Case {
   std::string family;
   ShapePtr shape;
   double epsilon = 0;
+  double hole = 0;        // its radius, where there is one: a boundary, and the reach with it
   bool tangents = false;  // the oracle gives them
   bool seeds = false;     // one on each component; else the box alone
   double box = 1.2;       // half its side, in radii of the shape

@@ -13,24 +13,60 @@ constexpr double kTurn = 2 * std::numbers::pi;
 constexpr int kSamplesATerm = 160;
 constexpr int kReachSamples = 500;
 
-// min |q - p|^2 / (2 dist(q, T_p)) over points of the curves: their reach, up to the sampling.
+// |q - p|^2 / (2 dist(q, T_p)).
+double Quotient(const VectorXd& p, const VectorXd& tangent, const VectorXd& q) {
+  const VectorXd step = q - p;
+  const double away = (step - tangent * tangent.dot(step)).norm();
+  return away > 1e-9 ? step.squaredNorm() / (2 * away) : kInfinity;
+}
+
+// The least of these over all points of the curves is their reach. Found on samples first, then by
+// ever smaller steps from where each sample sees the least.
 double ReachOf(const std::vector<Curve>& curves) {
+  constexpr double kSpacing = kTurn / kReachSamples;
+  const auto count = curves.size() * kReachSamples;
   std::vector<VectorXd> points, tangents;
   for (const Curve& curve : curves) {
     for (int i = 0; i < kReachSamples; ++i) {
-      points.push_back(curve.At(kTurn * i / kReachSamples));
-      tangents.push_back(curve.Tangent(kTurn * i / kReachSamples));
+      points.push_back(curve.At(kSpacing * i));
+      tangents.push_back(curve.Tangent(kSpacing * i));
     }
   }
-  double reach = kInfinity;
-  for (std::size_t p = 0; p < points.size(); ++p) {
-    for (std::size_t q = 0; q < points.size(); ++q) {
-      const VectorXd step = points[q] - points[p];
-      const double away = (step - tangents[p] * tangents[p].dot(step)).norm();
-      if (away > 1e-9) reach = std::min(reach, step.squaredNorm() / (2 * away));
+  struct Pair {
+    double reach = kInfinity;
+    std::size_t p = 0, q = 0;
+  };
+  std::vector<Pair> pairs(count);
+  for (std::size_t p = 0; p < count; ++p) {
+    for (std::size_t q = 0; q < count; ++q) {
+      const double reach = Quotient(points[p], tangents[p], points[q]);
+      if (reach < pairs[p].reach) pairs[p] = {reach, p, q};
     }
   }
-  return reach;
+  std::sort(pairs.begin(), pairs.end(),
+            [](const Pair& a, const Pair& b) { return a.reach < b.reach; });
+  pairs.resize(std::min<std::size_t>(pairs.size(), 20));
+  double least = kInfinity;
+  for (Pair& pair : pairs) {
+    const Curve& p = curves[pair.p / kReachSamples];
+    const Curve& q = curves[pair.q / kReachSamples];
+    double s = kSpacing * static_cast<double>(pair.p % kReachSamples);
+    double t = kSpacing * static_cast<double>(pair.q % kReachSamples);
+    for (double step = kSpacing; step > 1e-4 * kSpacing;) {
+      const double before = pair.reach;
+      for (const auto& [ds, dt] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {-1, -1}}) {
+        const double reach =
+            Quotient(p.At(s + ds * step), p.Tangent(s + ds * step), q.At(t + dt * step));
+        if (reach >= pair.reach) continue;
+        pair.reach = reach;
+        s += ds * step;
+        t += dt * step;
+      }
+      if (pair.reach == before) step /= 2;
+    }
+    least = std::min(least, pair.reach);
+  }
+  return least;
 }
 
 double RadiusOf(const std::vector<Curve>& curves) {
