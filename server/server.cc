@@ -114,8 +114,6 @@ StoreLimits ToStoreLimits(const Config& config) {
 
 }  // namespace
 
-const char* Version() { return STELLATE_VERSION; }
-
 // Members are destroyed from the last to the first: the server before what its calls use.
 class Server::Impl {
  public:

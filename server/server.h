@@ -12,8 +12,6 @@
 
 namespace stellate::server {
 
-const char* Version();
-
 // A running server. Several may live in one process, each with its own address.
 class Server {
  public:

@@ -6,8 +6,8 @@
 #include <charconv>
 
 #include "core/base/message.h"
+#include "server/base/machine_memory.h"
 #include "server/config/settings.h"
-#include "server/session/memory_budget.h"
 
 namespace stellate::server {
 namespace {

@@ -6,8 +6,8 @@
 #include <string>
 #include <type_traits>
 
+#include "server/base/version.h"
 #include "server/config/settings.h"
-#include "server/server.h"
 
 namespace stellate::server {
 namespace {

@@ -152,8 +152,4 @@ grpc::Status ToGrpc(const Refused& status, const std::string& prefix) {
                  status.limit);
 }
 
-MeshFailure ToMeshFailure(const core::Status& status) {
-  return {core::StatusCodeName(status.code), status.message};
-}
-
 }  // namespace stellate::server

@@ -6,8 +6,7 @@
 #include <string>
 
 #include "core/status.h"
-#include "server/base/limits.h"
-#include "server/oracles/oracle_pool.h"
+#include "server/base/refusal.h"
 #include "stellate/v1/errors.pb.h"
 
 namespace stellate::server {
@@ -28,8 +27,6 @@ v1::ErrorReason ReasonOf(core::StatusCode code);  // UNSPECIFIED for kOk alone
 // OK for Ok. `prefix` goes before the field that the message starts with, if it names one.
 grpc::Status ToGrpc(const core::Status& status, const std::string& prefix = "");
 grpc::Status ToGrpc(const Refused& refused, const std::string& prefix = "");
-
-MeshFailure ToMeshFailure(const core::Status& status);
 
 // "epsilon" of "epsilon is -1 but ..."; empty when the message does not start with a field.
 std::string FieldOf(const std::string& message);

@@ -172,7 +172,7 @@ void ToProto(const Session& session, v1::Mesh* out) {
     report->set_elapsed_seconds(view.elapsed_seconds);
     if (view.state == SessionState::kFailed) {
       report->set_termination(v1::TERMINATION_ORACLE_FAILED);
-      report->mutable_failure()->set_reason(view.failure.reason);
+      report->mutable_failure()->set_reason(FailureReasonName(view.failure.reason));
       report->mutable_failure()->set_message(Cut(view.failure.message, kMaxFailureBytes));
     }
   }

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "core/specification.h"
-#include "server/base/limits.h"
+#include "server/base/refusal.h"
 #include "server/config/config.h"
 #include "stellate/v1/mesh.pb.h"
 

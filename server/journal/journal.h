@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/status.h"
-#include "server/base/limits.h"
+#include "server/base/refusal.h"
 #include "server/journal/shared_journal.h"
 #include "server/session/session.h"
 #include "server/session/session_journal.h"

@@ -22,7 +22,7 @@ std::vector<Index> SizesOf(const core::QueryBatch& batch) {
 }
 
 MeshFailure Unreadable(const std::string& what) {
-  return {"JOURNAL_FAILED", Message("the record of ", what, " cannot be read back")};
+  return {FailureReason::kJournalFailed, Message("the record of ", what, " cannot be read back")};
 }
 
 }  // namespace
@@ -66,7 +66,7 @@ std::optional<MeshFailure> RecordedMesh::RefuseShare(std::uint64_t bytes) const 
   if (owner_limit_ == 0 || owner_.empty() || bytes == 0) return std::nullopt;
   const std::uint64_t owned = journal_->OwnerBytes(owner_);
   if (owned + bytes <= owner_limit_) return std::nullopt;
-  return MeshFailure{"JOURNAL_FULL",
+  return MeshFailure{FailureReason::kJournalFull,
                      Message("the records of your meshes have ", owned, " bytes, and ", bytes,
                              " more are beyond the ", owner_limit_,
                              " that the server allows each owner: delete meshes that are no longer "
@@ -146,7 +146,7 @@ SessionJournal::Known RecordedMesh::ReadRound(const core::QueryBatch& batch) {
     const auto round = DecodeRound(record);
     if (!round) return true;
     if (round->questions != questions_) {
-      known.failure = MeshFailure{"REPLAY_MISMATCH",
+      known.failure = MeshFailure{FailureReason::kReplayMismatch,
                                   Message("in round ", batch.round,
                                           " this server asks other questions than the server that "
                                           "recorded the answers: mesh anew")};

@@ -38,7 +38,7 @@ std::optional<MeshFailure> SharedJournal::Do(const char* what, Turns::Place plac
 MeshFailure SharedJournal::WhyNot(const char* what) {
   Sqlite& database = file_->database();
   const bool full = database.IsFull();
-  MeshFailure failure{full ? "JOURNAL_FULL" : "JOURNAL_FAILED",
+  MeshFailure failure{full ? FailureReason::kJournalFull : FailureReason::kJournalFailed,
                       Message("the server cannot record ", what, ": ", database.error(),
                               full ? "; free space by deleting meshes, then mesh anew" : "")};
   file_->Abandon();

@@ -13,8 +13,8 @@
 #include <string>
 #include <utility>
 
-#include "server/server.h"
-#include "server/session/memory_budget.h"
+#include "server/base/machine_memory.h"
+#include "server/base/version.h"
 
 namespace stellate::server {
 namespace {

@@ -9,12 +9,11 @@
 #include <utility>
 #include <vector>
 
+#include "server/base/clock.h"
 #include "server/oracles/pace.h"
 
 namespace stellate::server {
 
-using Clock = std::chrono::steady_clock;
-using TimePoint = Clock::time_point;
 using WorkerId = std::uint64_t;
 using LeaseId = std::uint64_t;
 

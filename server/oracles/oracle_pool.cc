@@ -218,7 +218,7 @@ void OraclePool::Compare(const SecondAnswer& second, Index first, Index count) {
       own.worker = TitleLocked(chunk.worker);
     }
     if (observer_ != nullptr) observer_->OnDisagreement();
-    Fail({"WORKERS_DISAGREE",
+    Fail({FailureReason::kWorkersDisagree,
           core::Message("round ", chunk.round->batch.round, ", block ", chunk.block_index, ", ",
                         FindDisagreement(spec_, chunk.block(), q, counted, own))});
     break;
@@ -370,12 +370,12 @@ std::vector<Dispatch::Block> OraclePool::Measure(const core::QueryBatch& batch,
 
 MeshFailure OraclePool::Describe(Dispatch::Failure failure) const {
   if (failure == Dispatch::Failure::kNoWorker) {
-    return {"NO_WORKER",
+    return {FailureReason::kNoWorker,
             core::Message("no worker served the mesh for ", Seconds(options_.worker_wait),
                           " seconds (limits.worker_wait_seconds): open ServeOracle for it, or "
                           "allow a longer wait")};
   }
-  return {"ANSWER_TIMEOUT",
+  return {FailureReason::kAnswerTimeout,
           core::Message("an oracle left a query that it was asked alone unanswered for ",
                         Seconds(options_.answer_limit), " seconds (limits.answer_seconds), or ",
                         Seconds(options_.busy_limit),

@@ -13,17 +13,12 @@
 
 #include "core/batch.h"
 #include "core/specification.h"
-#include "server/base/limits.h"
+#include "server/base/failure.h"
+#include "server/base/refusal.h"
 #include "server/oracles/cross_check.h"
 #include "server/oracles/dispatch.h"
 
 namespace stellate::server {
-
-// Why a mesh failed: a stable name, as in errors.proto without its prefix, and words for people.
-struct MeshFailure {
-  std::string reason;
-  std::string message;
-};
 
 // One round on its way: the questions, and the answers as they come in. Chunks write to disjoint
 // columns, so no lock is needed; it lives until the last chunk lets go of it.

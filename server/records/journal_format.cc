@@ -323,7 +323,7 @@ std::string EncodeEnd(const SessionEnd& end) {
   writer.Number(static_cast<int>(end.state));
   writer.Number(ToNumber(end.time));
   writer.Number(end.elapsed_seconds);
-  writer.Bytes(end.failure.reason);
+  writer.Bytes(std::string(FailureReasonName(end.failure.reason)));
   writer.Bytes(end.failure.message);
   writer.Number(end.rounds);
   return writer.Take();
@@ -337,13 +337,16 @@ std::optional<SessionEnd> DecodeEnd(std::string_view record) {
   reader.Number(state);
   reader.Number(time);
   reader.Number(end.elapsed_seconds);
-  reader.Bytes(end.failure.reason);
+  std::string reason;
+  reader.Bytes(reason);
   reader.Bytes(end.failure.message);
   reader.Number(end.rounds);
   end.state = static_cast<SessionState>(state);
   end.time = ToTime(time);
   const bool ended = end.state >= SessionState::kSucceeded && end.state <= SessionState::kFailed;
-  if (!reader.Complete() || !ended) return std::nullopt;
+  const auto known = FailureReasonOf(reason);
+  if (!reader.Complete() || !ended || !known) return std::nullopt;
+  end.failure.reason = *known;
   return end;
 }
 

@@ -1,5 +1,5 @@
+#include "server/base/version.h"
 #include "server/rpc/handlers.h"
-#include "server/server.h"
 
 namespace stellate::server {
 

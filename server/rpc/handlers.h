@@ -9,7 +9,7 @@
 #include <tl/expected.hpp>
 
 #include "server/auth/auth.h"
-#include "server/base/limits.h"
+#include "server/base/refusal.h"
 #include "server/config/config.h"
 #include "server/journal/journal.h"
 #include "server/metrics/metrics.h"

@@ -206,7 +206,7 @@ class OracleStream final
     const std::string words = failure.message().empty() ? "the oracle failed and did not say why"
                                                         : Cut(failure.message(), kMaxFailureBytes);
     EndWith(Refusal(v1::ERROR_REASON_ORACLE_FAILED, words));
-    session_->pool().Fail({"ORACLE_FAILED", words});
+    session_->pool().Fail({FailureReason::kOracleFailed, words});
     Leave();
   }
 

@@ -4,7 +4,7 @@
 #include <mutex>
 #include <vector>
 
-#include "server/oracles/dispatch.h"
+#include "server/base/clock.h"
 
 namespace stellate::server {
 

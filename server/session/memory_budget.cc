@@ -1,13 +1,9 @@
 #include "server/session/memory_budget.h"
 
-#include <unistd.h>
-
 #include <algorithm>
-#include <fstream>
 #include <utility>
 
 #include "core/base/message.h"
-#include "server/base/cgroup.h"
 
 namespace stellate::server {
 namespace {
@@ -25,8 +21,6 @@ constexpr std::uint64_t kLeastOfStreams = std::uint64_t{4} << 20;
 std::uint64_t SeedBytes(const core::Specification& spec) {
   return static_cast<std::uint64_t>(spec.seeds.size()) * sizeof(double);
 }
-
-std::uint64_t PageBytes() { return static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)); }
 
 }  // namespace
 
@@ -48,17 +42,6 @@ std::uint64_t EstimateFinishedBytes(const core::Specification& spec) {
 
 std::uint64_t EstimateStreamBytes(const core::Specification& spec, std::uint64_t part) {
   return kCallBytes + 2 * std::max(part, SeedBytes(spec));
-}
-
-std::uint64_t MachineBytes() {
-  const auto machine = static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * PageBytes();
-  return std::min(machine, CgroupMemoryLimit().value_or(machine));
-}
-
-std::uint64_t ResidentBytes() {
-  std::uint64_t size = 0, resident = 0;
-  std::ifstream("/proc/self/statm") >> size >> resident;
-  return resident * PageBytes();
 }
 
 std::unique_ptr<MemoryBudget::Account> MemoryBudget::Open(std::shared_ptr<MemoryBudget> budget,

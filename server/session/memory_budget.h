@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "core/specification.h"
-#include "server/base/limits.h"
+#include "server/base/refusal.h"
 
 namespace stellate::server {
 
@@ -26,12 +26,6 @@ std::uint64_t EstimateFinishedBytes(const core::Specification& spec);
 // What an open call on a mesh holds while its client reads nothing: itself, and a message of `part`
 // bytes, or one that repeats the specification, as it is and as it is sent.
 std::uint64_t EstimateStreamBytes(const core::Specification& spec, std::uint64_t part);
-
-// Bytes of memory that this process may have: the machine's, or what a control group allows if
-// that is less.
-std::uint64_t MachineBytes();
-// Bytes of memory that this process has now; 0 where the system does not say.
-std::uint64_t ResidentBytes();
 
 // Keeps the estimates of all meshes below a budget, and those of each owner's. Any thread.
 class MemoryBudget {

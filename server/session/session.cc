@@ -14,10 +14,6 @@ namespace {
 
 using core::StatusCode;
 
-MeshFailure ToFailure(const core::Status& status) {
-  return {core::StatusCodeName(status.code), status.message};
-}
-
 // When it was created, on the clock that measures how long it takes. The clock on the wall may have
 // been set back since.
 TimePoint CreatedAt(std::chrono::system_clock::time_point create_time) {
@@ -39,7 +35,7 @@ LogFields EndFields(const SessionOptions& options, const SessionEnd& end, bool s
       .Add("simplices", progress.simplices)
       .Add("queries", progress.queries);
   if (end.state == SessionState::kFailed) {
-    fields.Add("reason", end.failure.reason).Add("failure", end.failure.message);
+    fields.Add("reason", FailureReasonName(end.failure.reason)).Add("failure", end.failure.message);
   } else if (!suspended) {
     fields.Add("verdict", report.certificate.verdict);
   }
@@ -117,16 +113,17 @@ void Session::Run() {
       RunRounds(mesher.get());
       report = mesher->report();
     } else {
-      Fail(nullptr, ToFailure(made.error()), made.error());
+      Fail(nullptr, ToMeshFailure(made.error()), made.error());
     }
   } catch (const std::bad_alloc&) {
     Fail(nullptr,
-         {"LIMIT_EXCEEDED",
+         {FailureReason::kLimitExceeded,
           "the server ran out of memory for this mesh: ask for a larger epsilon "
           "or fewer vertices"},
          core::Status::Ok());
   } catch (const std::exception& error) {
-    Fail(nullptr, {"INTERNAL", core::Message("a fault of the server: ", error.what())},
+    Fail(nullptr,
+         {FailureReason::kInternal, core::Message("a fault of the server: ", error.what())},
          core::Status::Ok());
   }
   Expose(nullptr);
@@ -184,7 +181,7 @@ bool Session::FitsMemory(core::Mesher* mesher, std::uint64_t queries) {
     return true;
   }
   auto refused = options_.memory->Set(bytes);
-  if (refused) FailBlameless(mesher, ToFailure(*refused));
+  if (refused) FailBlameless(mesher, ToMeshFailure(*refused));
   return !refused;
 }
 
@@ -219,7 +216,7 @@ void Session::RepeatEnd(core::Mesher* mesher) {
     cancelled_ = true;
     return mesher->Cancel();
   }
-  FailBlameless(mesher, {"REPLAY_MISMATCH",
+  FailBlameless(mesher, {FailureReason::kReplayMismatch,
                          "the recorded answers made a whole mesh once, and now do not: this "
                          "server meshes differently from the one that recorded them; mesh anew"});
 }
@@ -266,7 +263,7 @@ bool Session::Absorb(core::Mesher* mesher, const core::Answers& answers) {
     if (delta.error().code == StatusCode::kCancelled)
       mesher->Cancel();
     else
-      Fail(mesher, ToFailure(delta.error()), delta.error());
+      Fail(mesher, ToMeshFailure(delta.error()), delta.error());
     return false;
   }
   unseen_ = std::move(*delta);
@@ -279,7 +276,8 @@ std::optional<MeshFailure> Session::Show(core::Mesher* mesher) {
     const core::Status logged = history_->Append(*unseen_);  // it is there until the end
     unseen_.reset();
     if (!logged.ok()) {
-      return MeshFailure{"INTERNAL", core::Message("a fault of the server: ", logged.message)};
+      return MeshFailure{FailureReason::kInternal,
+                         core::Message("a fault of the server: ", logged.message)};
     }
   }
   {
@@ -307,7 +305,7 @@ void Session::Fail(core::Mesher* mesher, MeshFailure failure, core::Status statu
 }
 
 SessionState Session::FinalState(const core::Report* report) const {
-  if (!failure_.reason.empty()) return SessionState::kFailed;
+  if (failure_.reason != FailureReason::kNone) return SessionState::kFailed;
   if (cancelled_ || report == nullptr) return SessionState::kCancelled;
   switch (report->termination) {
     case core::Termination::kConverged:
@@ -327,8 +325,8 @@ void Session::Finish(const core::Report* report) {
   {
     const std::lock_guard lock(mutex_);
     if (report != nullptr && report->termination == core::Termination::kOracleFailed &&
-        failure_.reason.empty()) {
-      failure_ = ToFailure(report->failure);
+        failure_.reason == FailureReason::kNone) {
+      failure_ = ToMeshFailure(report->failure);
     }
     end = {FinalState(report), std::max(std::chrono::system_clock::now(), create_time_),
            std::chrono::duration<double>(Clock::now() - created_).count(), failure_,

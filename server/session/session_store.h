@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/status.h"
-#include "server/base/limits.h"
+#include "server/base/refusal.h"
 #include "server/session/history_shelf.h"
 #include "server/session/session.h"
 

@@ -13,9 +13,6 @@ namespace {
 using core::Message;
 using core::Status;
 
-// What it says of a mesh that was being removed.
-constexpr char kRemovedReason[] = "REMOVED";
-
 // A record carries its seal behind it.
 std::optional<std::string> Unseal(std::string_view sealed, const std::string& place) {
   if (sealed.size() < kWord) return std::nullopt;
@@ -83,7 +80,7 @@ Status EarlierJournal::CopyTo(JournalFile* file) {
       end = Unseal(meshes.Bytes(2), Message("end/", id));
       const auto decoded = end ? DecodeEnd(*end) : std::nullopt;
       if (!decoded) return DamagedJournal(path_, Message("the end of mesh ", id));
-      if (decoded->failure.reason == kRemovedReason) {
+      if (decoded->failure.reason == FailureReason::kRemoved) {
         Statement lost(*database_, "SELECT count(DISTINCT round) FROM rounds WHERE mesh = ?");
         if (lost.Bind(0, id).Next()) rounds += static_cast<std::uint64_t>(lost.Number(0));
         continue;

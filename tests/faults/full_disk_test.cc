@@ -146,7 +146,7 @@ TEST_F(FailingDisk, ADeletionMakesRoomOnAFullDisk) {
       mesh->BeginRound(batch);
       failure = mesh->WriteRound(batch, answers, 0);
     }
-    EXPECT_EQ(failure->reason, "JOURNAL_FULL");
+    EXPECT_EQ(failure->reason, FailureReason::kJournalFull);
     EXPECT_GT(batch.round, 10u) << "12 MB, of which 8 are removed at once";
     Drop(data_ + "/ballast");
     mesh->Forget();

@@ -185,8 +185,8 @@ class SystemCalls : public testing::JournalTest {
         for (SessionOptions& options : (*journal)->TakeMeshes()) {
           const Outcome outcome = RunMesh(std::move(options));
           const bool failed = outcome.view.state == SessionState::kFailed &&
-                              (outcome.view.failure.reason == "JOURNAL_FULL" ||
-                               outcome.view.failure.reason == "JOURNAL_FAILED");
+                              (outcome.view.failure.reason == FailureReason::kJournalFull ||
+                               outcome.view.failure.reason == FailureReason::kJournalFailed);
           if (!failed && DigestOfMesh(outcome) != undisturbed) {
             std::cout << SessionStateName(outcome.view.state) << " " << outcome.view.failure.message
                       << std::endl;

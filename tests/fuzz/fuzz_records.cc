@@ -66,7 +66,7 @@ std::vector<std::string> Seeds() {
   for (const std::string& record : Encoded(answers, 7)) seeds.push_back('\1' + record);
   server::SessionEnd end;
   end.state = server::SessionState::kFailed;
-  end.failure = {"NO_WORKER", "nobody came"};
+  end.failure = {server::FailureReason::kNoWorker, "nobody came"};
   seeds.push_back('\2' + server::EncodeEnd(end));
   seeds.push_back('\3' + server::EncodeRound({1, 2, 3, 4}));
   return seeds;

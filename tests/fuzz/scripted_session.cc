@@ -136,7 +136,7 @@ class Theatre {
     const core::Status status = session_->pool().Deliver(**claimed, answer);
     if (!status.ok()) {
       Require(!played.truthful, "the truth is not refused");
-      session_->pool().Fail({core::StatusCodeName(status.code), status.message});
+      session_->pool().Fail(server::ToMeshFailure(status));
       Leave(asked.actor);
     }
     return true;
@@ -330,7 +330,8 @@ Played Play(Session* session, Script* script) {
   Require(view.workers == 0, "nobody serves a mesh that is over");
   const auto late = session->pool().Join(std::make_shared<Actor>(nullptr), 0);
   Require(!late, "a mesh that is over takes no workers");
-  Require((view.state == server::SessionState::kFailed) == !view.failure.reason.empty(),
+  Require((view.state == server::SessionState::kFailed) ==
+              (view.failure.reason != server::FailureReason::kNone),
           "a failure has a reason, and nothing else has");
   Require(view.state != server::SessionState::kCancelled || play.played.cancelled,
           "nothing is cancelled by itself");

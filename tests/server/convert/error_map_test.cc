@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/base/failure.h"
 #include "tests/server/support/status_matchers.h"
 
 namespace stellate::server {
@@ -75,6 +76,17 @@ TEST(ErrorMap, CutKeepsCharactersWhole) {
   EXPECT_EQ(Cut("abc", 2), "ab");
   EXPECT_EQ(Cut("aé", 2), "a");
   EXPECT_EQ(Cut("é", 1), "");
+}
+
+// What ends a mesh is told by the names that errors.proto promises.
+TEST(ErrorMap, KnowsEachReasonThatAMeshFailsFor) {
+  for (int value = 1; value < static_cast<int>(FailureReason::kRemoved); ++value) {
+    const auto reason = static_cast<FailureReason>(value);
+    if (reason == FailureReason::kCancelled) continue;  // ends a mesh without a failure
+    v1::ErrorReason known{};
+    const std::string name = std::string("ERROR_REASON_") + FailureReasonName(reason);
+    EXPECT_TRUE(v1::ErrorReason_Parse(name, &known)) << name;
+  }
 }
 
 }  // namespace

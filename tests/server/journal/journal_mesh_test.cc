@@ -173,11 +173,11 @@ struct FailingJournal : testing::BlankJournal {
   std::optional<MeshFailure> WriteRound(const core::QueryBatch& batch, const core::Answers&,
                                         std::uint64_t) override {
     if (batch.round < 3) return std::nullopt;
-    return MeshFailure{"JOURNAL_FULL", "no room"};
+    return MeshFailure{FailureReason::kJournalFull, "no room"};
   }
   std::optional<MeshFailure> WriteEnd(const SessionEnd& end) override {
     state = end.state;
-    return MeshFailure{"JOURNAL_FULL", "no room"};
+    return MeshFailure{FailureReason::kJournalFull, "no room"};
   }
   std::optional<MeshFailure> WriteResult(const SessionResult&, const WatchLog&) override {
     ADD_FAILURE() << "its end is not recorded";
@@ -190,7 +190,7 @@ TEST(SessionJournal, ARoundThatCannotBeRecordedIsNotPublished) {
   const auto journal = std::make_shared<FailingJournal>();
   const Outcome outcome = RunMesh(RecordedSphere(journal));
   EXPECT_EQ(outcome.view.state, SessionState::kFailed);
-  EXPECT_EQ(outcome.view.failure.reason, "JOURNAL_FULL");
+  EXPECT_EQ(outcome.view.failure.reason, FailureReason::kJournalFull);
   EXPECT_EQ(outcome.view.revision, 2u);
   EXPECT_EQ(journal->state, SessionState::kFailed);
 }

@@ -20,7 +20,7 @@ TEST_F(JournalTest, GivesBackWhatWasWritten) {
       std::chrono::time_point_cast<std::chrono::microseconds>(std::chrono::system_clock::now());
   const core::QueryBatch batch = BatchOf(1);
   const core::Answers answers = AnswersTo(batch);
-  const SessionEnd end{SessionState::kFailed, now, 1.5, {"NO_WORKER", "none came"}, 1};
+  const SessionEnd end{SessionState::kFailed, now, 1.5, {FailureReason::kNoWorker, "none came"}, 1};
   {
     const auto journal = Open();
     const auto mesh = journal->NewMesh();
@@ -48,7 +48,7 @@ TEST_F(JournalTest, GivesBackWhatWasWritten) {
   EXPECT_FALSE(beyond.answers || beyond.failure);
   const auto other = back.journal->BeginRound(BatchOf(1, 4, 2.0));
   ASSERT_TRUE(other.failure);
-  EXPECT_EQ(other.failure->reason, "REPLAY_MISMATCH");
+  EXPECT_EQ(other.failure->reason, FailureReason::kReplayMismatch);
   EXPECT_GT(journal->OwnerBytes("somebody"), 400u);
   EXPECT_EQ(journal->OwnerBytes("somebody else"), 0u);
 }
@@ -129,7 +129,7 @@ TEST_F(JournalTest, AnOwnerHasHisShareAndDeletionGivesItBack) {
   std::uint64_t round = 1;
   std::optional<MeshFailure> failure;
   while (!failure) failure = WriteOneRound(mesh.get(), round++, 100);
-  EXPECT_EQ(failure->reason, "JOURNAL_FULL");
+  EXPECT_EQ(failure->reason, FailureReason::kJournalFull);
   EXPECT_GT(round, 10u);
   constexpr std::uint64_t kMesh = 50'000;
   const auto refused = (*opened)->RefuseNewMesh("somebody", kMesh);
@@ -163,7 +163,7 @@ TEST_F(JournalTest, AFullFileFailsTheRoundAloneAndDeletionMakesRoom) {
   EXPECT_FALSE(journal->RefuseNewMesh("", 1000));
   const auto failure = WriteOneRound(large.get(), 2, 8000);
   ASSERT_TRUE(failure);
-  EXPECT_EQ(failure->reason, "JOURNAL_FULL");
+  EXPECT_EQ(failure->reason, FailureReason::kJournalFull);
   const auto refused = journal->RefuseNewMesh("", 1 << 20);
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->limit->setting, "max-journal-bytes");

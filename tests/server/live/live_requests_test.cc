@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "server/base/version.h"
 #include "tests/server/support/certificates.h"
 #include "tests/server/support/live_server.h"
 

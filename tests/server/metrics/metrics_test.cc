@@ -9,6 +9,7 @@
 #include <regex>
 #include <sstream>
 
+#include "server/base/version.h"
 #include "tests/server/support/certificates.h"
 #include "tests/server/support/live_server.h"
 #include "tests/server/support/loopback.h"

@@ -244,7 +244,7 @@ TEST_F(OraclePoolTest, WorkersThatServeDifferentManifoldsFailTheRound) {
         &pool, liar_first ? FakeWorker::Answer(FakeWorker::AnswerTruly) : AnswerForALargerSphere);
     const auto outcome = Ask(&pool).get();
     ASSERT_TRUE(outcome.failure);
-    EXPECT_EQ(outcome.failure->reason, "WORKERS_DISAGREE");
+    EXPECT_EQ(outcome.failure->reason, FailureReason::kWorkersDisagree);
     for (const char* part : {"round 1", "block ", "closest_point query ", "worker number 1",
                              "worker number 2", "the distances differ by "}) {
       EXPECT_NE(outcome.failure->message.find(part), std::string::npos)
@@ -286,7 +286,7 @@ TEST_F(OraclePoolTest, AStragglersOwnAnswerIsComparedWithTheOneThatCounts) {
   EXPECT_EQ(counts->compared, static_cast<std::size_t>(late.count));
   const auto result = outcome.get();
   ASSERT_TRUE(result.failure);
-  EXPECT_EQ(result.failure->reason, "WORKERS_DISAGREE");
+  EXPECT_EQ(result.failure->reason, FailureReason::kWorkersDisagree);
   EXPECT_NE(result.failure->message.find("worker number 1 (slow)"), std::string::npos)
       << result.failure->message;
   EXPECT_NE(result.failure->message.find("worker number 2 (quick)"), std::string::npos);
@@ -299,7 +299,7 @@ TEST_F(OraclePoolTest, AnOracleThatNeverAnswersEndsTheRound) {
       FakeWorker::Join(&pool, [](const Chunk&, core::AnswerBlock*) { return false; });
   const auto outcome = Ask(&pool).get();
   ASSERT_TRUE(outcome.failure);
-  EXPECT_EQ(outcome.failure->reason, "ANSWER_TIMEOUT");
+  EXPECT_EQ(outcome.failure->reason, FailureReason::kAnswerTimeout);
 }
 
 TEST_F(OraclePoolTest, NoWorkerEndsTheRound) {
@@ -307,7 +307,7 @@ TEST_F(OraclePoolTest, NoWorkerEndsTheRound) {
   OraclePool pool(spec_, options_, 8);
   const auto outcome = Ask(&pool).get();
   ASSERT_TRUE(outcome.failure);
-  EXPECT_EQ(outcome.failure->reason, "NO_WORKER");
+  EXPECT_EQ(outcome.failure->reason, FailureReason::kNoWorker);
 }
 
 TEST_F(OraclePoolTest, ABadAnswerEndsTheRoundWithItsOwnReason) {
@@ -319,7 +319,7 @@ TEST_F(OraclePoolTest, ABadAnswerEndsTheRoundWithItsOwnReason) {
   });
   const auto outcome = Ask(&pool).get();
   ASSERT_TRUE(outcome.failure);
-  EXPECT_EQ(outcome.failure->reason, "ORACLE_NOT_FINITE");
+  EXPECT_EQ(outcome.failure->reason, FailureReason::kOracleNotFinite);
 }
 
 TEST_F(OraclePoolTest, AnInterruptEndsTheWait) {

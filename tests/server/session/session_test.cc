@@ -114,7 +114,7 @@ TEST(Session, WaitsWithoutAWorkerAndThenGivesUp) {
   EXPECT_FALSE(running.session->View().report.has_value());
   const SessionView view = running.Finish();
   EXPECT_EQ(view.state, SessionState::kFailed);
-  EXPECT_EQ(view.failure.reason, "NO_WORKER");
+  EXPECT_EQ(view.failure.reason, FailureReason::kNoWorker);
 }
 
 TEST(Session, CancelEndsAWaitAtOnce) {
@@ -146,7 +146,7 @@ TEST(Session, AnswersThatTheMesherRefusesFailTheMeshAndBlameItsWorkers) {
   const auto worker = FakeWorker::Join(&running.session->pool());
   const SessionView view = running.Finish();
   EXPECT_EQ(view.state, SessionState::kFailed);
-  EXPECT_EQ(view.failure.reason, "ORACLE_NOT_IDEMPOTENT");
+  EXPECT_EQ(view.failure.reason, FailureReason::kOracleNotIdempotent);
   EXPECT_EQ(view.failure.message, "query 5 moves its own answer");
   worker->WaitForEnd();
   EXPECT_EQ(worker->end().blame.code, core::StatusCode::kOracleNotIdempotent);
@@ -162,7 +162,7 @@ TEST(Session, AFaultOfTheMesherFailsOnlyItsMesh) {
     const auto worker = FakeWorker::Join(&running.session->pool());
     const SessionView view = running.Finish();
     EXPECT_EQ(view.state, SessionState::kFailed);
-    EXPECT_EQ(view.failure.reason, "INTERNAL");
+    EXPECT_EQ(view.failure.reason, FailureReason::kInternal);
     worker->WaitForEnd();
     EXPECT_TRUE(worker->end().blame.ok()) << "it is not the oracle's fault";
   }
@@ -182,7 +182,7 @@ TEST(Session, AMeshThatOutgrowsTheMemoryFailsAndGivesItBack) {
   thread.join();
   const SessionView view = session.View();
   EXPECT_EQ(view.state, SessionState::kFailed);
-  EXPECT_EQ(view.failure.reason, "LIMIT_EXCEEDED");
+  EXPECT_EQ(view.failure.reason, FailureReason::kLimitExceeded);
   EXPECT_NE(view.failure.message.find("--max-memory-bytes"), std::string::npos);
   EXPECT_EQ(view.revision, 2u);
   EXPECT_EQ(view.bytes,
@@ -199,7 +199,7 @@ TEST(Session, ARefusedSpecificationFailsTheMesh) {
   });
   const SessionView view = running.Finish();
   EXPECT_EQ(view.state, SessionState::kFailed);
-  EXPECT_EQ(view.failure.reason, "INVALID_ARGUMENT");
+  EXPECT_EQ(view.failure.reason, FailureReason::kInvalidArgument);
 }
 
 struct CountingWatcher : SessionWatcher {

@@ -106,7 +106,7 @@ class FakeWorker : public OracleWorker {
         if (claimed && *claimed) {
           const core::Status status = pool_->Deliver(**claimed, answer);
           if (!status.ok()) {
-            pool_->Fail({core::StatusCodeName(status.code), status.message});
+            pool_->Fail(ToMeshFailure(status));
           }
           delivered = status.ok();
         }

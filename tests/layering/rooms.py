@@ -1,0 +1,198 @@
+"""The rooms of the house, and who may take from whom.
+
+Each line is a room, a folder or one file, and the rooms of which its files may include headers or
+import modules; from itself it always may. The longest name counts: `core/mesher.cc` is not of
+`core`. A room may only take from rooms that do not take from it, over whatever way: the table must
+not go in a circle. `core` alone, without a folder, is the face of the core, the headers that
+the server may take, beside `core/base`.
+
+Who adds a folder, or needs a header of a room that is not listed, adds it here, and asks first
+whether the wall stands where it should.
+"""
+
+from __future__ import annotations
+
+from checker import Table
+
+CORE = {
+    "core/base": (),
+    "core": ("core/base",),
+    "core/sample": ("core", "core/base"),
+    "core/geometry": ("core", "core/base", "core/sample"),
+    "core/complex": ("core", "core/base", "core/sample", "core/geometry"),
+    "core/certificate": ("core", "core/base", "core/sample", "core/geometry"),
+    "core/refinement": (
+        "core",
+        "core/base",
+        "core/sample",
+        "core/geometry",
+        "core/complex",
+        "core/certificate",
+    ),
+    "core/run": (
+        "core",
+        "core/base",
+        "core/geometry",
+        "core/complex",
+        "core/certificate",
+        "core/refinement",
+    ),
+    "core/mesher.cc": ("core", "core/base", "core/run"),  # the one door from the face
+}
+
+# What the server may take of the core.
+FACE = ("core", "core/base")
+
+SERVER = {
+    "server/base": (*FACE, "text"),
+    "server/history": (*FACE, "server/base"),
+    "server/oracles": (*FACE, "server/base"),
+    "server/session": (*FACE, "server/base", "server/history", "server/oracles"),
+    # What a mesh's record looks like; the files it is in; who writes and reads them; salvage.
+    "server/records": (*FACE, "server/base", "server/history", "server/oracles", "server/session"),
+    "server/storage": (*FACE, "server/base", "server/records"),
+    "server/journal": (
+        *FACE,
+        "server/base",
+        "server/history",
+        "server/oracles",
+        "server/session",
+        "server/records",
+        "server/storage",
+    ),
+    "server/salvage": (*FACE, "server/base", "server/records", "server/storage"),
+    "server/config": (*FACE, "server/base"),
+    "server/grpc_parts": ("server/base",),
+    "server/net": (*FACE, "server/base", "server/config", "server/grpc_parts"),
+    "server/metrics": (*FACE, "server/base", "server/history", "server/oracles", "server/session"),
+    "server/convert": (
+        *FACE,
+        "proto",
+        "server/base",
+        "server/config",
+        "server/history",
+        "server/oracles",
+        "server/session",
+    ),
+    "server/auth": (*FACE, "server/base", "server/config", "server/convert"),
+    "server/rpc": (
+        *FACE,
+        "proto",
+        "server/base",
+        "server/config",
+        "server/history",
+        "server/oracles",
+        "server/session",
+        "server/journal",
+        "server/metrics",
+        "server/convert",
+        "server/auth",
+    ),
+    "server": (
+        *FACE,
+        "proto",
+        "server/base",
+        "server/config",
+        "server/oracles",
+        "server/session",
+        "server/journal",
+        "server/salvage",
+        "server/grpc_parts",
+        "server/net",
+        "server/metrics",
+        "server/convert",
+        "server/auth",
+        "server/rpc",
+    ),
+}
+
+# The Python package: its rooms, and the modules at its top that these may take.
+PYTHON = {
+    "_shared.py": (),
+    "_version.py": (),
+    "_wire/enums.py": ("proto",),
+    "report.py": ("_version.py", "_wire/enums.py", "proto"),
+    "_complex.py": ("report.py",),
+    "errors.py": ("_complex.py", "_shared.py", "proto"),
+    "oracle.py": ("errors.py",),
+    "_wire": ("errors.py", "oracle.py", "_wire/enums.py", "proto"),
+    "_files": ("_complex.py", "_version.py", "errors.py"),
+    "_doctor": ("_shared.py", "errors.py", "oracle.py"),
+}
+
+
+def in_package(name: str) -> str:
+    return name if name == "proto" else f"clients/python/stellate/{name}"
+
+
+CLIENTS = {
+    "clients/cpp/include": (),
+    "clients/cpp/oracles": ("clients/cpp/include",),
+    "clients/cpp/doctor": ("clients/cpp/include",),
+    "clients/cpp/pipe": ("clients/cpp/include",),
+    "clients/cpp/mesh": ("clients/cpp/include",),
+    "clients/cpp/wire": ("clients/cpp/include", "proto"),
+    "clients/cpp/net": ("clients/cpp/include", "clients/cpp/wire", "proto"),
+    "clients/cpp/run": ("clients/cpp/include", "clients/cpp/net", "clients/cpp/wire", "proto"),
+    "clients/cli": ("clients/cpp/include", "text"),
+    **{
+        in_package(room): tuple(in_package(taken) for taken in takes)
+        for room, takes in PYTHON.items()
+    },
+    "clients/python/stellate": ("proto", *(in_package(room) for room in PYTHON)),
+    "clients/python/examples": ("clients/python/stellate",),
+}
+
+# Tests may take what they test, and not more of the house than that.
+EVERY_CORE = tuple(CORE)
+EVERY_CPP = tuple(room for room in CLIENTS if room.startswith("clients/cpp/"))
+EVERY_PYTHON = tuple(room for room in CLIENTS if room.startswith("clients/python/"))
+EVERY_SERVER = tuple(SERVER)
+TESTS = {
+    "tests/support": (*FACE, "clients/cpp/include"),
+    "tests/core": (*EVERY_CORE, "tests/support", "clients/cpp/include"),
+    "tests/server": (*FACE, "proto", *EVERY_SERVER, "tests/support"),
+    "tests/clients": ("proto", *EVERY_CPP, *EVERY_PYTHON, "clients/cli", "tests/support"),
+    "tests/e2e": ("proto", *EVERY_CPP, *EVERY_PYTHON, "tests/support"),
+}
+
+TABLE = Table(
+    rooms={"text": (), "proto": (), **CORE, **SERVER, **CLIENTS, **TESTS},
+    foreign={
+        # The core is geometry: no clock, no file, no socket, no thread but oneTBB's, no wire.
+        "Eigen/": ("core", "server", "clients/cpp", "tests"),
+        "tbb/": ("core", "tests/core"),
+        "tl/": ("core", "server", "clients/cpp", "tests"),
+        "chrono": ("server", "clients", "tests"),
+        "filesystem": ("server", "clients", "tests"),
+        "fstream": ("server", "clients", "tests"),
+        "iostream": ("server", "clients", "tests"),
+        "sys/": ("server", "clients", "tests"),
+        "unistd.h": ("server", "clients", "tests"),
+        # The wire: not where meshes are run, so that this builds and tests without gRPC.
+        "google/": (
+            "server/convert",
+            "server/rpc",
+            "server/net",
+            "server/base",
+            "clients/cpp/run",
+            "clients/python/stellate",
+            "tests",
+        ),
+        "sqlite3.h": ("server/storage", "tests/server"),
+    },
+    generated={"stellate/v1/": "proto", "stellate/rpc/": "proto"},
+    packages={"stellate": "clients/python/stellate"},
+    watched=("core", "text", "server", "clients/cpp", "clients/cli", "clients/python/stellate"),
+    acyclic=(
+        "core/sample",
+        "core/complex",
+        "core/certificate",
+        "core/refinement",
+        "text",
+        "server",
+        "clients/cpp",
+        "clients/cli",
+        "clients/python/stellate",
+    ),
+)
