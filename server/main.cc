@@ -15,6 +15,7 @@
 #include "server/base/library_log.h"
 #include "server/base/log.h"
 #include "server/base/threads.h"
+#include "server/base/version.h"
 #include "server/config/flags.h"
 #include "server/net/health_check.h"
 #include "server/net/tls.h"
@@ -73,7 +74,7 @@ int RunOnDataDir(const Flags& flags) {
   return 0;
 }
 
-// Written beside and then renamed, so that whoever sees the file sees all of it.
+// Written under another name and then renamed, so that whoever sees the file sees all of it.
 bool WriteReadyFile(const std::string& path, const std::string& address) {
   const std::string draft = path + ".new";
   std::ofstream file(draft);

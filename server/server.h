@@ -1,14 +1,13 @@
 #pragma once
 
-#include <grpcpp/server.h>
-
 #include <functional>
 #include <memory>
 #include <string>
 
 #include "core/status.h"
+#include "server/base/clock.h"
 #include "server/config/config.h"
-#include "server/rpc/handlers.h"
+#include "server/session/session.h"
 
 namespace stellate::server {
 

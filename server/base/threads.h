@@ -10,7 +10,7 @@ namespace stellate::server {
 // machine with many processors.
 std::size_t LeastThreads();
 
-// Ok if this process may have so many threads more; else kFailedPrecondition, and what to do. They
+// Ok if this process may have `count` more threads; else kFailedPrecondition, and what to do. They
 // are made, and gone again when this returns. To be asked before any library makes its own, since
 // those would abort, or go on without.
 core::Status CheckThreads(std::size_t count);

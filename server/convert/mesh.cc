@@ -151,16 +151,16 @@ void ToProto(const core::Report& report, v1::Report* out) {
 }
 
 void ToProto(const Session& session, v1::Mesh* out) {
-  const SessionOptions& options = session.options();
+  const MeshRequest& request = session.request();
   const SessionView view = session.View();
-  out->set_name(options.name);
-  ToProto(options.spec, out->mutable_spec());
-  out->mutable_spec()->set_label(options.label);
+  out->set_name(request.name);
+  ToProto(request.spec, out->mutable_spec());
+  out->mutable_spec()->set_label(request.label);
   v1::MeshLimits* const limits = out->mutable_spec()->mutable_limits();
   limits->set_worker_wait_seconds(
-      std::chrono::duration<double>(options.dispatch.worker_wait).count());
-  limits->set_answer_seconds(std::chrono::duration<double>(options.dispatch.answer_limit).count());
-  limits->set_busy_seconds(std::chrono::duration<double>(options.dispatch.busy_limit).count());
+      std::chrono::duration<double>(request.timeouts.worker_wait).count());
+  limits->set_answer_seconds(std::chrono::duration<double>(request.timeouts.answer_limit).count());
+  limits->set_busy_seconds(std::chrono::duration<double>(request.timeouts.busy_limit).count());
   out->set_state(ToProto(view.state));
   SetTime(view.create_time, out->mutable_create_time());
   if (view.end_time) SetTime(*view.end_time, out->mutable_end_time());

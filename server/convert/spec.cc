@@ -139,12 +139,12 @@ Refused ReadSeconds(double value, double standard, double most, const char* fiel
   return Status::Ok();
 }
 
-Refused ReadLimits(const v1::MeshSpec& spec, const Config& config, MeshRequest* request) {
+Refused ReadLimits(const v1::MeshSpec& spec, const Config& config, core::Specification* out) {
   const v1::MeshLimits& limits = spec.limits();
-  const auto d = std::max<std::uint64_t>(request->spec.ambient_dimension, 1);
+  const auto d = std::max<std::uint64_t>(out->ambient_dimension, 1);
   const std::uint64_t room = std::max<std::uint64_t>(config.max_coordinates / d, 1);
   const std::uint64_t most_vertices = std::min(config.max_vertices, room);
-  core::Limits& to = request->spec.limits;
+  core::Limits& to = out->limits;
   to.max_vertices = limits.max_vertices() == 0 ? most_vertices : limits.max_vertices();
   if (to.max_vertices > most_vertices) {
     const bool room_binds = room < config.max_vertices;
@@ -162,23 +162,32 @@ Refused ReadLimits(const v1::MeshSpec& spec, const Config& config, MeshRequest* 
                     Message("limits.max_rounds is ", to.max_rounds, " but this server allows ",
                             config.max_rounds, ": ask for fewer, or raise --max-rounds"));
   }
+  return Status::Ok();
+}
+
+Clock::duration ToDuration(double seconds) {
+  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+}
+
+Refused ReadTimeouts(const v1::MeshLimits& limits, const Config& config, OracleTimeouts* to) {
   const double most = MaxWaitSeconds(config);
+  double worker_wait = 0, answer = 0, busy = 0;
   Refused refused = ReadSeconds(limits.worker_wait_seconds(), config.worker_wait_seconds, most,
-                                "limits.worker_wait_seconds", &request->worker_wait_seconds);
+                                "limits.worker_wait_seconds", &worker_wait);
   if (!refused.ok()) return refused;
   refused = ReadSeconds(limits.answer_seconds(), config.answer_seconds, most,
-                        "limits.answer_seconds", &request->answer_seconds);
+                        "limits.answer_seconds", &answer);
   if (!refused.ok()) return refused;
-  refused = ReadSeconds(limits.busy_seconds(), config.busy_seconds, most, "limits.busy_seconds",
-                        &request->busy_seconds);
+  refused =
+      ReadSeconds(limits.busy_seconds(), config.busy_seconds, most, "limits.busy_seconds", &busy);
   if (!refused.ok()) return refused;
-  if (limits.busy_seconds() == 0) {
-    request->busy_seconds = std::max(request->busy_seconds, request->answer_seconds);
+  if (limits.busy_seconds() == 0) busy = std::max(busy, answer);
+  if (busy < answer) {
+    return Invalid(Message("limits.busy_seconds is ", busy, " but must be limits.answer_seconds (",
+                           answer, ") or more: a worker may take that long without a word"));
   }
-  if (request->busy_seconds >= request->answer_seconds) return Status::Ok();
-  return Invalid(Message("limits.busy_seconds is ", request->busy_seconds,
-                         " but must be limits.answer_seconds (", request->answer_seconds,
-                         ") or more: a worker may take that long without a word"));
+  *to = {ToDuration(answer), ToDuration(busy), ToDuration(worker_wait)};
+  return Status::Ok();
 }
 
 }  // namespace
@@ -195,7 +204,8 @@ Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config) {
   if (status.ok()) status = ReadPlace(spec, &request.spec);
   if (status.ok()) status = ReadAudit(spec, &request.spec);
   if (status.ok()) status = ReadCriteria(spec, &request.spec);
-  if (status.ok()) status = ReadLimits(spec, config, &request);
+  if (status.ok()) status = ReadLimits(spec, config, &request.spec);
+  if (status.ok()) status = ReadTimeouts(spec.limits(), config, &request.timeouts);
   if (status.ok() && request.label.size() > kMaxLabelBytes) {
     status = Invalid(Message("label has ", request.label.size(), " bytes but may have ",
                              kMaxLabelBytes, ": shorten it"));

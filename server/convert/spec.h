@@ -1,25 +1,16 @@
 #pragma once
 
-#include <string>
-
 #include "core/specification.h"
 #include "server/base/refusal.h"
 #include "server/config/config.h"
+#include "server/session/mesh_request.h"
 #include "stellate/v1/mesh.pb.h"
 
 namespace stellate::server {
 
-// A MeshSpec with every default filled in and every limit of the server checked.
-struct MeshRequest {
-  core::Specification spec;
-  std::string label;
-  double worker_wait_seconds = 0;
-  double answer_seconds = 0;
-  double busy_seconds = 0;
-};
-
-// Errors: kInvalidArgument or kLimitExceeded, the message starting with the field's path in
-// MeshSpec. What it lets through core::Validate accepts too.
+// A MeshSpec with every default filled in and every limit of the server checked; without a name and
+// an owner. Errors: kInvalidArgument or kLimitExceeded, the message starting with the field's path
+// in MeshSpec. What it lets through core::Validate accepts too.
 Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config);
 
 // Seeds are left out: there may be many, and whoever needs them sent them.

@@ -87,17 +87,17 @@ std::optional<Refused> Journal::RefuseNewMesh(const std::string& owner, std::uin
   const std::filesystem::space_info disk = std::filesystem::space(options_.directory, error);
   if (error || disk.available >= bytes) return std::nullopt;
   return Refused({core::StatusCode::kLimitExceeded,
-                  Message("the disk of the server's record is full but for ", disk.available,
-                          " bytes: delete meshes that are no longer needed")});
+                  Message("the disk of the server's record has room for only ", disk.available,
+                          " more bytes: delete meshes that are no longer needed")});
 }
 
 // False: its records contradict each other.
 bool Journal::Take(std::int64_t id, const JournalFile::StoredMesh& stored, std::uint64_t bytes) {
   SessionOptions options;
   SessionRecord record;
-  const bool whole = DecodeStart(stored.start, &options, &record.create_time);
-  const auto place =
-      std::make_shared<RecordedMesh>(file_, options_.owner_bytes, id, stored, options, bytes);
+  const bool whole = DecodeStart(stored.start, &options.request, &record.create_time);
+  const auto place = std::make_shared<RecordedMesh>(file_, options_.owner_bytes, id, stored,
+                                                    options.request, bytes);
   if (stored.removed) {
     place->Forget();
     return true;
@@ -114,7 +114,7 @@ bool Journal::Take(std::int64_t id, const JournalFile::StoredMesh& stored, std::
   if (record.result && (stored.rounds > 0 || stored.has_answers)) place->RemoveRounds();
   if (record.end) record.rounds = std::min(record.rounds, record.end->rounds);
   options.record = std::move(record);
-  options.journal = place;
+  options.ports.journal = place;
   meshes_.push_back(std::move(options));
   return true;
 }

@@ -38,8 +38,8 @@ class Journal {
   // Meshes still running keep their part of it open.
   ~Journal();
 
-  // The meshes that were there when it was opened, oldest first: all of SessionOptions that is
-  // recorded, journal and record included.
+  // The meshes that were there when it was opened, oldest first: what is recorded of
+  // SessionOptions, the journal among its ports.
   std::vector<SessionOptions> TakeMeshes() { return std::move(meshes_); }
 
   // For a new mesh.

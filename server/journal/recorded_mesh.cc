@@ -29,7 +29,7 @@ MeshFailure Unreadable(const std::string& what) {
 
 RecordedMesh::RecordedMesh(std::shared_ptr<SharedJournal> journal, std::uint64_t owner_limit,
                            std::int64_t id, const JournalFile::StoredMesh& stored,
-                           const SessionOptions& options, std::uint64_t bytes)
+                           const MeshRequest& request, std::uint64_t bytes)
     : journal_(std::move(journal)),
       owner_limit_(owner_limit),
       id_(id),
@@ -37,18 +37,18 @@ RecordedMesh::RecordedMesh(std::shared_ptr<SharedJournal> journal, std::uint64_t
       has_history_(stored.has_history),
       rounds_(stored.rounds),
       has_answers_(stored.has_answers) {
-  SetShape(options);
+  SetShape(request);
   journal_->CountFor(owner_, static_cast<std::int64_t>(bytes));
 }
 
-void RecordedMesh::SetShape(const SessionOptions& options) {
-  owner_ = options.owner;
-  dimension_ = options.spec.dimension;
-  ambient_dimension_ = options.spec.ambient_dimension;
+void RecordedMesh::SetShape(const MeshRequest& request) {
+  owner_ = request.owner;
+  dimension_ = request.spec.dimension;
+  ambient_dimension_ = request.spec.ambient_dimension;
 }
 
 // Writes of about `bytes`, unless the mesh is not wanted any more.
-std::optional<MeshFailure> RecordedMesh::Do(const char* what, Turns::Place place,
+std::optional<MeshFailure> RecordedMesh::Do(const char* what, FairMutex::Place place,
                                             std::uint64_t bytes,
                                             const std::function<bool(JournalFile*)>& action) {
   if (forgotten_) return std::nullopt;
@@ -80,10 +80,10 @@ void RecordedMesh::Recount(const JournalFile& file) {
 }
 
 std::optional<MeshFailure> RecordedMesh::WriteStart(
-    const SessionOptions& options, std::chrono::system_clock::time_point create_time) {
-  SetShape(options);
-  const std::string record = EncodeStart(options, create_time);
-  return Do("the mesh", Turns::Place::kLast, record.size(), [&](JournalFile* file) {
+    const MeshRequest& request, std::chrono::system_clock::time_point create_time) {
+  SetShape(request);
+  const std::string record = EncodeStart(request, create_time);
+  return Do("the mesh", FairMutex::Place::kLast, record.size(), [&](JournalFile* file) {
     std::int64_t id = 0;
     const bool written = file->Transact([&] {
       id = file->NewMesh();
@@ -140,7 +140,7 @@ bool RecordedMesh::Fits(const PartOfRound& part) const {
 SessionJournal::Known RecordedMesh::ReadRound(const core::QueryBatch& batch) {
   const auto number = static_cast<std::int64_t>(batch.round);
   Known known{{}, {}, Unreadable(Message("round ", batch.round))};
-  journal_->Do("nothing", Turns::Place::kLast, [&](JournalFile* file) {
+  journal_->Do("nothing", FairMutex::Place::kLast, [&](JournalFile* file) {
     std::string record;
     if (file->Read({id_, RecordKind::kRound, number}, &record) != Found::kYes) return true;
     const auto round = DecodeRound(record);
@@ -172,7 +172,7 @@ SessionJournal::Known RecordedMesh::ReadPartOfRound(const core::QueryBatch& batc
   Known known;
   bool others = false;  // another version of the mesher asked them
   auto failure =
-      journal_->Do("the answers of a round", Turns::Place::kLast, [&](JournalFile* file) {
+      journal_->Do("the answers of a round", FairMutex::Place::kLast, [&](JournalFile* file) {
         Found found = Found::kYes;
         for (std::int64_t part = 0; found == Found::kYes; ++part) {
           RecordedAnswers some;
@@ -259,7 +259,7 @@ std::optional<MeshFailure> RecordedMesh::WriteRound(const core::QueryBatch& batc
     answers_.reset();
   }
   RecordedRound round{questions_, DigestOf(answers), 0, vertices};
-  auto failure = Do("the answers of a round", Turns::Place::kLast, 1, [&](JournalFile* file) {
+  auto failure = Do("the answers of a round", FairMutex::Place::kLast, 1, [&](JournalFile* file) {
     return file->Transact([&] {
       std::int64_t parts = next_part_;
       if (!PutAnswers(file, answers, Missing(Merged(written_), sizes_), &parts)) return false;
@@ -273,7 +273,7 @@ std::optional<MeshFailure> RecordedMesh::WriteRound(const core::QueryBatch& batc
 
 // It is short, and others wait for it.
 std::optional<MeshFailure> RecordedMesh::WriteEnd(const SessionEnd& end) {
-  return Do("the end of the mesh", Turns::Place::kFirst, 0, [&](JournalFile* file) {
+  return Do("the end of the mesh", FairMutex::Place::kFirst, 0, [&](JournalFile* file) {
     return id_ == 0 || file->Transact([&] {
       return file->Put({id_, RecordKind::kEnd}, EncodeEnd(end));
     });
@@ -286,7 +286,7 @@ std::optional<MeshFailure> RecordedMesh::WriteResult(const SessionResult& result
   std::optional<MeshFailure> failure;
   // Of a server that was killed as it wrote.
   for (bool done = !has_history_; !done && !failure;) {
-    failure = Do("the finished mesh", Turns::Place::kLast, 0, [&](JournalFile* file) {
+    failure = Do("the finished mesh", FairMutex::Place::kLast, 0, [&](JournalFile* file) {
       return file->RemoveSome(id_, JournalFile::Kinds::kHistory, &done);
     });
     done = done || forgotten_;
@@ -295,11 +295,12 @@ std::optional<MeshFailure> RecordedMesh::WriteResult(const SessionResult& result
   std::string record;
   std::int64_t parts = 0;
   const auto put = [&] {
-    failure = Do("the finished mesh", Turns::Place::kLast, record.size(), [&](JournalFile* file) {
-      return file->Transact([&] {
-        return file->Put({id_, RecordKind::kHistoryPart, 0, parts}, record);
-      });
-    });
+    failure =
+        Do("the finished mesh", FairMutex::Place::kLast, record.size(), [&](JournalFile* file) {
+          return file->Transact([&] {
+            return file->Put({id_, RecordKind::kHistoryPart, 0, parts}, record);
+          });
+        });
     ++parts;
     record.clear();
     return !failure;
@@ -315,7 +316,7 @@ std::optional<MeshFailure> RecordedMesh::WriteResult(const SessionResult& result
     return true;
   };
   if (!failure && history.Write(add) && (record.empty() || put())) {
-    failure = Do("the finished mesh", Turns::Place::kFirst, 0, [&](JournalFile* file) {
+    failure = Do("the finished mesh", FairMutex::Place::kFirst, 0, [&](JournalFile* file) {
       return file->Transact([&] {
         return file->Put({id_, RecordKind::kResult},
                          EncodeResult(result, static_cast<std::uint64_t>(parts)));
@@ -334,7 +335,7 @@ core::Expected<std::unique_ptr<WatchLog>> RecordedMesh::ReadHistory() {
     for (char* at = static_cast<char*>(data); bytes > 0;) {
       if (used == record.size()) {
         Found found = Found::kNo;
-        journal_->Do("nothing", Turns::Place::kLast, [&](JournalFile* file) {
+        journal_->Do("nothing", FairMutex::Place::kLast, [&](JournalFile* file) {
           found = file->Read({id_, RecordKind::kHistoryPart, 0, part++}, &record);
           return true;
         });

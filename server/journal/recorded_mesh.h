@@ -25,10 +25,10 @@ class RecordedMesh final : public SessionJournal,
       : journal_(std::move(journal)), owner_limit_(owner_limit) {}
   // One that is there: `options` as they were recorded.
   RecordedMesh(std::shared_ptr<SharedJournal> journal, std::uint64_t owner_limit, std::int64_t id,
-               const JournalFile::StoredMesh& stored, const SessionOptions& options,
+               const JournalFile::StoredMesh& stored, const MeshRequest& request,
                std::uint64_t bytes);
 
-  std::optional<MeshFailure> WriteStart(const SessionOptions& options,
+  std::optional<MeshFailure> WriteStart(const MeshRequest& request,
                                         std::chrono::system_clock::time_point create_time) override;
   Known BeginRound(const core::QueryBatch& batch) override;
   void TakeAnswers(const std::shared_ptr<const Round>& round, std::size_t block, Eigen::Index first,
@@ -49,8 +49,8 @@ class RecordedMesh final : public SessionJournal,
   void RemoveRounds();
 
  private:
-  void SetShape(const SessionOptions& options);
-  std::optional<MeshFailure> Do(const char* what, Turns::Place place, std::uint64_t bytes,
+  void SetShape(const MeshRequest& request);
+  std::optional<MeshFailure> Do(const char* what, FairMutex::Place place, std::uint64_t bytes,
                                 const std::function<bool(JournalFile*)>& action);
   std::optional<MeshFailure> RefuseShare(std::uint64_t bytes) const;
   void Recount(const JournalFile& file);

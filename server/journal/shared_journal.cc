@@ -13,21 +13,21 @@ using core::Message;
 
 constexpr auto kRetry = std::chrono::seconds(1);  // of a removal that failed
 constexpr auto kSync = std::chrono::seconds(1);   // of the mark
-// Answers are gathered for so long, and so many times as long as it took to write the last ones, so
-// that the disk is theirs for a tenth of the time or so. A round that is over sooner is written at
-// once and whole.
+// Answers are gathered for at least kGather, and for a multiple of the time that writing the last
+// ones took, so that they keep the disk busy for about a tenth of the time. A round that is over
+// sooner is written at once and whole.
 constexpr Clock::duration kGather = std::chrono::milliseconds(50);
 constexpr Clock::duration kLongestGather = std::chrono::milliseconds(250);
 constexpr int kGatherShare = 10;
 
 }  // namespace
 
-std::optional<MeshFailure> SharedJournal::Do(const char* what, Turns::Place place,
+std::optional<MeshFailure> SharedJournal::Do(const char* what, FairMutex::Place place,
                                              const std::function<bool(JournalFile*)>& action) {
   std::optional<MeshFailure> failure;
   bool is_long = false;
   {
-    const Turn turn(turns_, place);
+    const FairLock turn(mutex_, place);
     if (!action(file_.get())) failure = WhyNot(what);
     is_long = file_->IsLogLong();
   }
@@ -97,7 +97,7 @@ void SharedJournal::Write(std::stop_token stop) {
     lock.unlock();
     const TimePoint begin = Clock::now();
     // If this fails the end of the round, which writes what is missing, says why.
-    Do("answers", Turns::Place::kLast, [&meshes](JournalFile* file) {
+    Do("answers", FairMutex::Place::kLast, [&meshes](JournalFile* file) {
       std::vector<Mesh*> ready;
       for (const auto& mesh : meshes) {
         if (mesh->HasAnswers()) ready.push_back(mesh.get());
@@ -121,7 +121,7 @@ void SharedJournal::Keep(std::stop_token stop) {
     if (!work_due_.wait_for(lock, stop, kSync, is_due)) {  // told to stop, until nothing is due
       if (stop.stop_requested()) return;
       lock.unlock();
-      Do("the mark", Turns::Place::kFirst,
+      Do("the mark", FairMutex::Place::kFirst,
          [](JournalFile* file) { return file->SyncMark(), true; });
       lock.lock();
       continue;
@@ -150,20 +150,20 @@ void SharedJournal::Keep(std::stop_token stop) {
 }
 
 void SharedJournal::Checkpoint() {
-  const Turn turn(turns_, Turns::Place::kFirst);
+  const FairLock turn(mutex_, FairMutex::Place::kFirst);
   // If this fails the log grows on, until a write fails and says why.
   if (!file_->Checkpoint()) file_->Abandon();
 }
 
 bool SharedJournal::RemoveSome(Mesh* mesh, bool* done) {
-  const auto failure = Do("the removal of a mesh", Turns::Place::kLast,
+  const auto failure = Do("the removal of a mesh", FairMutex::Place::kLast,
                           [&](JournalFile* file) { return mesh->RemoveSome(file, done); });
   if (failure) Log(LogLevel::kWarning, {}, failure->message);
   return !failure;
 }
 
 bool SharedJournal::GiveBackSome(bool* done) {
-  const auto failure = Do("what was removed", Turns::Place::kLast,
+  const auto failure = Do("what was removed", FairMutex::Place::kLast,
                           [&](JournalFile* file) { return file->GiveBackSome(done); });
   if (failure) Log(LogLevel::kWarning, {}, failure->message);
   return !failure;

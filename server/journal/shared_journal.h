@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "server/journal/turns.h"
+#include "server/journal/fair_mutex.h"
 #include "server/oracles/oracle_pool.h"
 #include "server/storage/data_directory.h"
 #include "server/storage/journal_file.h"
@@ -44,7 +44,7 @@ class SharedJournal {
 
   // Runs `action` on the file, alone. What went wrong, if it returned false: the server cannot
   // record `what`.
-  std::optional<MeshFailure> Do(const char* what, Turns::Place place,
+  std::optional<MeshFailure> Do(const char* what, FairMutex::Place place,
                                 const std::function<bool(JournalFile*)>& action);
 
   void StartThreads();
@@ -68,7 +68,7 @@ class SharedJournal {
   bool GiveBackSome(bool* done);
 
   const std::unique_ptr<DataDirectory> directory_;  // not another's before the file is closed
-  Turns turns_;
+  FairMutex mutex_;
   const std::unique_ptr<JournalFile> file_;
 
   mutable std::mutex due_mutex_;  // of all that follows; never held while the disk is waited for

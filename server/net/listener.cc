@@ -26,7 +26,7 @@ constexpr std::size_t kOtherFiles = 256;  // the journal, metrics, certificates,
 constexpr int kPauseMilliseconds = 100;   // while there is no file left to accept with
 constexpr int kLaterMilliseconds = 20;    // while connections are to wait
 
-// How many connections there can be, when so many are wanted.
+// How many connections there can be, when `wanted` are asked for.
 std::size_t Allowed(std::size_t wanted) {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return wanted;

@@ -14,7 +14,7 @@
 
 namespace stellate::server {
 
-// Accepts TCP connections for gRPC, and no more than so many at once. gRPC's own listener (1.51)
+// Accepts TCP connections for gRPC, up to a number at once. gRPC's own listener (1.51)
 // stops for good when the process has once run out of files, which any stranger can bring about by
 // opening connections; this one closes what is too much, and goes on.
 class Listener {

@@ -137,7 +137,7 @@ void Dispatch::Cut(const Worker& worker, Piece* piece, Lease* lease) const {
 }
 
 // Besides those that it has: so that it need not wait between two. Towards a round's end that would
-// keep dear queries from others who are idle sooner.
+// keep slow queries from others who are idle sooner.
 bool Dispatch::MayHaveAnother(const Worker& worker) const {
   const int in_flight = worker.InFlight();
   if (in_flight == 0) return true;

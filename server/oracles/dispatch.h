@@ -17,10 +17,15 @@ namespace stellate::server {
 using WorkerId = std::uint64_t;
 using LeaseId = std::uint64_t;
 
-struct DispatchOptions {
+// How long a mesh waits for its oracles, before it fails.
+struct OracleTimeouts {
   Clock::duration answer_limit = std::chrono::seconds(60);  // for one chunk, without a word
   Clock::duration busy_limit = std::chrono::hours(1);       // for one chunk, with words
   Clock::duration worker_wait = std::chrono::seconds(60);   // with queries and no worker
+};
+
+// How a round is shared among the workers.
+struct DispatchPolicy {
   // What a chunk should take, unless its worker's fixed cost (a start, a licence, a schedule) would
   // be more than a quarter of it.
   Clock::duration chunk_target = std::chrono::milliseconds(250);
@@ -30,7 +35,7 @@ struct DispatchOptions {
   int max_leases = 3;     // of one query alone, all timed out, before the round fails
   int max_in_flight = 2;  // chunks that one worker holds, so that it need not wait between two
 
-  // A chunk is a straggler once it has taken so many times what its worker's pace promises, and
+  // A chunk is a straggler once it has taken this many times what its worker's pace promises, and
   // no less than the floor: an idle worker gets it as well. Without a pace to go by: so long.
   double straggler_factor = 3;
   Clock::duration straggler_floor = std::chrono::milliseconds(200);
@@ -41,6 +46,8 @@ struct DispatchOptions {
   double check_share = 0.01;
 };
 
+struct DispatchOptions : OracleTimeouts, DispatchPolicy {};
+
 // A piece of a round given to one worker for a while.
 struct Lease {
   LeaseId id = 0;  // 1, 2, ...; never used twice
@@ -50,7 +57,7 @@ struct Lease {
   Eigen::Index count = 0;
   int timeouts = 0;       // earlier leases of this query alone that ran out
   TimePoint started;      // when the worker could start on it: chunks of one worker queue up
-  TimePoint heard;        // when its worker last said that it is at it
+  TimePoint heard;        // when its worker last said that it is working on it
   bool cut = false;       // smaller than its worker might have had: the round ended, or is shared
   bool queued = false;    // given while its worker had others
   bool check = false;     // another has these queries: the answers are for comparing
@@ -95,13 +102,13 @@ class Dispatch {
   enum class ClaimResult {
     kClaimed,
     kSecond,   // for comparing: another worker's answer counts
-    kLate,     // the lease ended before; the answer is of no use and no harm
+    kLate,     // the lease ended before; the answer is ignored, and no fault
     kUnknown,  // never given to this worker, or answered more often than asked
   };
   // An answer came. The lease ends; the piece counts as answered once Settle is called.
   ClaimResult Claim(WorkerId worker, LeaseId id, TimePoint now, Lease* lease);
   void Settle(const Lease& lease);  // kClaimed only
-  // The worker is still at it. A lease that it does not have is none of its business.
+  // The worker is still computing. A lease that it does not have is ignored.
   void Busy(WorkerId worker, LeaseId id, TimePoint now);
 
   // Takes back the chunks of workers that are too slow.

@@ -20,7 +20,7 @@ constexpr double kFastGrowth = 8;     // of chunks whose queries take less than 
 constexpr double kFast = 0.1;
 constexpr double kTellingSize =
     4;                           // a chunk that was cut so much smaller tells little of the pace,
-constexpr double kSurprise = 2;  // unless it took so many times what it should have
+constexpr double kSurprise = 2;  // unless it took this many times what it should have
 
 }  // namespace
 

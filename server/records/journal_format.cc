@@ -202,41 +202,41 @@ std::optional<JournalState> DecodeState(std::string_view record) {
                                [](auto& archive, auto& value) { LayOutState(archive, value); });
 }
 
-std::string EncodeStart(const SessionOptions& options, SystemTime create_time) {
+std::string EncodeStart(const MeshRequest& request, SystemTime create_time) {
   RecordWriter writer;
-  writer.Bytes(options.name);
-  writer.Bytes(options.owner);
-  writer.Bytes(options.label);
+  writer.Bytes(request.name);
+  writer.Bytes(request.owner);
+  writer.Bytes(request.label);
   writer.Number(ToNumber(create_time));
-  writer.Number(options.dispatch.answer_limit.count());
-  writer.Number(options.dispatch.worker_wait.count());
-  LayOutSpecification(writer, options.spec);
-  writer.Number(options.dispatch.busy_limit.count());
+  writer.Number(request.timeouts.answer_limit.count());
+  writer.Number(request.timeouts.worker_wait.count());
+  LayOutSpecification(writer, request.spec);
+  writer.Number(request.timeouts.busy_limit.count());
   return writer.Take();
 }
 
-bool DecodeStart(std::string_view record, SessionOptions* options, SystemTime* create_time) {
-  return DecodeEarlierStart(record, kJournalVersion, options, create_time);
+bool DecodeStart(std::string_view record, MeshRequest* request, SystemTime* create_time) {
+  return DecodeEarlierStart(record, kJournalVersion, request, create_time);
 }
 
-bool DecodeEarlierStart(std::string_view record, std::uint32_t version, SessionOptions* options,
+bool DecodeEarlierStart(std::string_view record, std::uint32_t version, MeshRequest* request,
                         SystemTime* create_time) {
   RecordReader reader(record);
   std::int64_t time = 0;
   Clock::rep answer_limit = 0, worker_wait = 0;
-  Clock::rep busy_limit = options->dispatch.busy_limit.count();
-  reader.Bytes(options->name);
-  reader.Bytes(options->owner);
-  reader.Bytes(options->label);
+  Clock::rep busy_limit = request->timeouts.busy_limit.count();
+  reader.Bytes(request->name);
+  reader.Bytes(request->owner);
+  reader.Bytes(request->label);
   reader.Number(time);
   reader.Number(answer_limit);
   reader.Number(worker_wait);
-  LayOutSpecification(reader, options->spec, version);
+  LayOutSpecification(reader, request->spec, version);
   if (!reader.Complete()) reader.Number(busy_limit);  // earlier records end before it
   *create_time = ToTime(time);
-  options->dispatch.answer_limit = Clock::duration(answer_limit);
-  options->dispatch.worker_wait = Clock::duration(worker_wait);
-  options->dispatch.busy_limit = Clock::duration(busy_limit);
+  request->timeouts.answer_limit = Clock::duration(answer_limit);
+  request->timeouts.worker_wait = Clock::duration(worker_wait);
+  request->timeouts.busy_limit = Clock::duration(busy_limit);
   return reader.Complete();
 }
 

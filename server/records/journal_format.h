@@ -56,14 +56,14 @@ std::optional<JournalState> DecodeState(std::string_view record);
 
 // Name, owner, label, specification, and the two times that a client may ask for. What the server
 // decides (chunk sizes, numbers of workers) is not recorded: the next server may decide otherwise.
-std::string EncodeStart(const SessionOptions& options,
+std::string EncodeStart(const MeshRequest& request,
                         std::chrono::system_clock::time_point create_time);
 // False: no such record.
-bool DecodeStart(std::string_view record, SessionOptions* options,
+bool DecodeStart(std::string_view record, MeshRequest* request,
                  std::chrono::system_clock::time_point* create_time);
 
 // The same of a record of version 4 or 5; its bytes are not those of EncodeStart.
-bool DecodeEarlierStart(std::string_view record, std::uint32_t version, SessionOptions* options,
+bool DecodeEarlierStart(std::string_view record, std::uint32_t version, MeshRequest* request,
                         std::chrono::system_clock::time_point* create_time);
 
 // Queries [first, end) of a block.

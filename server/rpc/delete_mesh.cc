@@ -1,12 +1,12 @@
-#include "server/rpc/handlers.h"
+#include "server/rpc/rpcs.h"
 
 namespace stellate::server {
 
 grpc::Status DeleteMesh(const Call& call, const v1::DeleteMeshRequest& request,
                         google::protobuf::Empty*) {
-  const auto session = FindMesh(call.service, call.caller, request.name());
+  const auto session = FindMesh(call.state, call.caller, request.name());
   if (!session) return session.error();
-  call.service.store.Delete(request.name());  // gone already: someone else was quicker
+  call.state.store.Delete(request.name());  // gone already: someone else was quicker
   return grpc::Status::OK;
 }
 

@@ -1,11 +1,11 @@
 #include "server/base/version.h"
-#include "server/rpc/handlers.h"
+#include "server/rpc/rpcs.h"
 
 namespace stellate::server {
 
 grpc::Status GetServerInfo(const Call& call, const v1::GetServerInfoRequest&,
                            v1::ServerInfo* info) {
-  const Config& config = call.service.config;
+  const Config& config = call.state.config;
   info->set_version(Version());
   info->add_protocols("stellate.v1");
   info->set_max_dimension(static_cast<std::uint32_t>(config.max_dimension));

@@ -3,7 +3,7 @@
 #include "core/base/message.h"
 #include "server/convert/error_map.h"
 #include "server/convert/mesh.h"
-#include "server/rpc/handlers.h"
+#include "server/rpc/rpcs.h"
 
 namespace stellate::server {
 namespace {
@@ -29,13 +29,13 @@ grpc::Status ListMeshes(const Call& call, const v1::ListMeshesRequest& request,
   }
   const std::uint32_t size = request.page_size() == 0 ? kDefaultPage : request.page_size();
   const SessionStore::Page page =
-      call.service.store.List(after, std::min(size, kLargestPage), call.caller.owner);
+      call.state.store.List(after, std::min(size, kLargestPage), call.caller.owner);
   std::size_t bytes = 0;
   for (std::size_t i = 0; i < page.sessions.size(); ++i) {
     v1::Mesh* const mesh = response->add_meshes();
     ToProto(*page.sessions[i], mesh);
     bytes += mesh->ByteSizeLong();
-    const bool full = bytes >= ChunkBytes(call.service.config) / 2;
+    const bool full = bytes >= ChunkBytes(call.state.config) / 2;
     const bool last = i + 1 == page.sessions.size();
     if ((last && page.more) || (!last && full)) {
       response->set_next_page_token(std::to_string(page.numbers[i]));

@@ -1,45 +1,27 @@
 #pragma once
 
-#include <grpcpp/generic/async_generic_service.h>
-#include <grpcpp/impl/service_type.h>
+#include <grpcpp/support/server_callback.h>
 
-#include <functional>
-
-#include "server/rpc/handlers.h"
+#include "server/rpc/call.h"
+#include "stellate/v1/stellate.pb.h"
 
 namespace stellate::server {
 
-// The rpcs of stellate.v1. gRPC tells of a unary call, or of one that is answered by a stream, once
-// its request is whole: until then anybody could have it kept, with no token asked for. So each is
-// taken as a stream in both directions, which looks the same to its client; of those gRPC tells
-// when the headers have come. A caller who is not known is refused then, and his request not read.
-class Rpcs final : public grpc::Service {
- public:
-  explicit Rpcs(ServerState* service);
-
- private:
-  template <typename Request, typename Response>
-  using Begin = std::function<grpc::ServerBidiReactor<Request, Response>*(
-      grpc::CallbackServerContext* context)>;
-
-  // `path`: as it is on the wire; stays alive.
-  template <typename Request, typename Response>
-  void Add(const char* path, Begin<Request, Response> begin);
-  template <typename Request, typename Response>
-  void AddUnary(const char* path, grpc::Status (*handler)(const Call&, const Request&, Response*));
-  template <typename Request, typename Response>
-  void AddStream(const char* path, grpc::ServerBidiReactor<Request, Response>* (*handler)(
-                                       ServerState&, grpc::CallbackServerContext*));
-
-  ServerState& service_;
-  int count_ = 0;
-};
-
-// What nobody serves: UNIMPLEMENTED, at the headers as well.
-class UnknownRpcs final : public grpc::CallbackGenericService {
- public:
-  grpc::ServerGenericBidiReactor* CreateReactor(
-      grpc::GenericCallbackServerContext* context) override;
-};
+// One function for each rpc, each in its own file. None of them waits for anything.
+grpc::Status CreateMesh(const Call& call, const v1::CreateMeshRequest& request, v1::Mesh* mesh);
+grpc::Status GetMesh(const Call& call, const v1::GetMeshRequest& request, v1::Mesh* mesh);
+grpc::Status ListMeshes(const Call& call, const v1::ListMeshesRequest& request,
+                        v1::ListMeshesResponse* response);
+grpc::Status CancelMesh(const Call& call, const v1::CancelMeshRequest& request, v1::Mesh* mesh);
+grpc::Status DeleteMesh(const Call& call, const v1::DeleteMeshRequest& request,
+                        google::protobuf::Empty* empty);
+grpc::Status GetServerInfo(const Call& call, const v1::GetServerInfoRequest& request,
+                           v1::ServerInfo* info);
+grpc::ServerBidiReactor<v1::ServeOracleRequest, v1::ServeOracleResponse>* ServeOracle(
+    ServerState& state, grpc::CallbackServerContext* context);
+grpc::ServerBidiReactor<v1::WatchMeshRequest, v1::WatchMeshResponse>* WatchMesh(
+    ServerState& state, grpc::CallbackServerContext* context);
+grpc::ServerBidiReactor<v1::DownloadMeshRequest, v1::DownloadMeshResponse>* DownloadMesh(
+    ServerState& state, grpc::CallbackServerContext* context);
 
 }  // namespace stellate::server

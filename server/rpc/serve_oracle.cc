@@ -6,7 +6,7 @@
 #include "server/convert/error_map.h"
 #include "server/convert/mesh.h"
 #include "server/convert/oracle.h"
-#include "server/rpc/handlers.h"
+#include "server/rpc/rpcs.h"
 
 namespace stellate::server {
 namespace {
@@ -23,15 +23,15 @@ class OracleStream final
       public Stream,
       public std::enable_shared_from_this<OracleStream> {
  public:
-  OracleStream(ServerState& service, grpc::CallbackServerContext* context)
-      : service_(service),
+  OracleStream(ServerState& state, grpc::CallbackServerContext* context)
+      : state_(state),
         context_(context),
-        caller_(Identify(service, *context)),
+        caller_(Identify(state, *context)),
         opened_(Clock::now()) {}
 
   void Start() {
     self_ = shared_from_this();
-    service_.streams.Add(self_);
+    state_.streams.Add(self_);
     if (!caller_) return EndWith(caller_.error());
     ReadNext();
   }
@@ -42,7 +42,7 @@ class OracleStream final
       EndWith(grpc::Status::OK);
       return;
     }
-    service_.metrics.Received(request_.ByteSizeLong());
+    state_.metrics.Received(request_.ByteSizeLong());
     Handle(request_);
     ReadNext();
   }
@@ -90,8 +90,8 @@ class OracleStream final
   }
 
   void Tick(TimePoint now) override {
-    const auto patience = std::chrono::duration<double>(service_.config.hello_seconds);
-    if (caller_ && !service_.authenticator->StillHolds(*caller_)) {
+    const auto patience = std::chrono::duration<double>(state_.config.hello_seconds);
+    if (caller_ && !state_.authenticator->StillHolds(*caller_)) {
       EndWith(TokenWithdrawn());
       Leave();
     }
@@ -144,7 +144,7 @@ class OracleStream final
   }
 
   void Greet(const v1::Hello& hello) {
-    auto session = FindMesh(service_, *caller_, hello.mesh(), "hello.mesh");
+    auto session = FindMesh(state_, *caller_, hello.mesh(), "hello.mesh");
     if (!session) return EndWith(session.error());
     if (hello.worker().size() > kMaxWorkerNameBytes) {
       return EndWith(Refusal(v1::ERROR_REASON_INVALID_ARGUMENT,
@@ -152,7 +152,7 @@ class OracleStream final
                                            " bytes but may have ", kMaxWorkerNameBytes),
                              "hello.worker"));
     }
-    auto memory = CountStream(service_, **session, 0);  // questions are part of the mesh's round
+    auto memory = CountStream(state_, **session, 0);  // questions are part of the mesh's round
     if (!memory) return EndWith(memory.error());
     worker_name_ = hello.worker();
     {
@@ -166,7 +166,7 @@ class OracleStream final
     if (!id) {
       const std::lock_guard lock(mutex_);
       welcome_ = false;
-      EndLocked(Refuse(service_, id.error()), false);
+      EndLocked(Refuse(state_, id.error()), false);
       return;
     }
     Log(LogLevel::kInfo, session_->log_context(), "worker joined",
@@ -186,7 +186,7 @@ class OracleStream final
     auto chunk = session_->pool().Claim(worker_, answers.lease());
     if (!chunk) return OutOfOrder(chunk.error().message);
     if (!*chunk) return;  // late: another has the work, or it is done
-    const auto block = FromProto(answers, **chunk, session_->options().spec);
+    const auto block = FromProto(answers, **chunk, session_->request().spec);
     const core::Status status = block ? session_->pool().Deliver(**chunk, *block) : block.error();
     if (status.ok()) return;
     EndWith(ToGrpc(status));
@@ -198,7 +198,7 @@ class OracleStream final
     const std::lock_guard lock(mutex_);
     const auto asked = asked_.find(lease);
     if (asked == asked_.end()) return;
-    service_.metrics.Answered(std::chrono::duration<double>(Clock::now() - asked->second).count());
+    state_.metrics.Answered(std::chrono::duration<double>(Clock::now() - asked->second).count());
     asked_.erase(asked);
   }
 
@@ -245,30 +245,30 @@ class OracleStream final
     if (welcome_ && (!end_ || over_)) {
       welcome_ = false;
       response_.Clear();
-      ToProto(session_->options().spec, response_.mutable_welcome());
+      ToProto(session_->request().spec, response_.mutable_welcome());
       response_.mutable_welcome()->set_answer_seconds(
-          std::chrono::duration<double>(session_->options().dispatch.answer_limit).count());
+          std::chrono::duration<double>(session_->request().timeouts.answer_limit).count());
     } else if (end_) {
       finished_ = true;
       if (!over_) return Finish(*end_);
       response_.Clear();
       response_.mutable_over()->set_state(v1::MeshState_Name(ToProto(session_->View().state)));
-      service_.metrics.Sent(response_.ByteSizeLong());
+      state_.metrics.Sent(response_.ByteSizeLong());
       return StartWriteAndFinish(&response_, grpc::WriteOptions(), *end_);
     } else if (!queue_.empty()) {
       response_.Clear();
-      ToProto(queue_.front(), session_->options().spec, response_.mutable_queries());
+      ToProto(queue_.front(), session_->request().spec, response_.mutable_queries());
       asked_[queue_.front().lease] = Clock::now();
       queue_.pop_front();
     } else {
       return;
     }
     writing_ = true;
-    service_.metrics.Sent(response_.ByteSizeLong());
+    state_.metrics.Sent(response_.ByteSizeLong());
     StartWrite(&response_);
   }
 
-  ServerState& service_;
+  ServerState& state_;
   grpc::CallbackServerContext* const context_;
   const tl::expected<Identity, grpc::Status> caller_;
   const TimePoint opened_;
@@ -296,8 +296,8 @@ class OracleStream final
 }  // namespace
 
 grpc::ServerBidiReactor<v1::ServeOracleRequest, v1::ServeOracleResponse>* ServeOracle(
-    ServerState& service, grpc::CallbackServerContext* context) {
-  const auto stream = std::make_shared<OracleStream>(service, context);
+    ServerState& state, grpc::CallbackServerContext* context) {
+  const auto stream = std::make_shared<OracleStream>(state, context);
   stream->Start();
   return stream.get();
 }

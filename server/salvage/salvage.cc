@@ -44,7 +44,7 @@ class Salvage {
   // All that a view holds, and none had before.
   Status Read(const std::string& view);
   bool HasNothing() const { return taken_.empty(); }
-  // Takes out again what is of no use without what is lost.
+  // Removes again what is useless without what is lost.
   Status Sort();
   std::string Findings() const { return findings_; }
 
@@ -161,10 +161,10 @@ std::int64_t Salvage::WholeRounds(const Shelf& shelf) const {
 
 Status Salvage::SortMesh(std::int64_t mesh, const Shelf& shelf) {
   std::string start, end;
-  SessionOptions options;
+  MeshRequest request;
   std::chrono::system_clock::time_point created;
   file_->Read({mesh, RecordKind::kStart}, &start);
-  if (shelf.removed || !shelf.start || !DecodeStart(start, &options, &created)) {
+  if (shelf.removed || !shelf.start || !DecodeStart(start, &request, &created)) {
     if (!shelf.removed) {
       findings_ += Message("lost: mesh number ", mesh, ", what it was asked to be\n");
     }
@@ -173,7 +173,7 @@ Status Salvage::SortMesh(std::int64_t mesh, const Shelf& shelf) {
   std::uint64_t parts = 0;
   const bool result = !shelf.result.empty() && DecodeResult(shelf.result, &parts).has_value();
   if (result && shelf.end && shelf.history.size() >= parts) {
-    findings_ += Message("kept: ", options.name, ", finished\n");
+    findings_ += Message("kept: ", request.name, ", finished\n");
     return Status::Ok();
   }
   Status status = Remove(mesh, JournalFile::Kinds::kHistory);
@@ -182,7 +182,7 @@ Status Salvage::SortMesh(std::int64_t mesh, const Shelf& shelf) {
   file_->Read({mesh, RecordKind::kEnd}, &end);
   const auto ended = shelf.end ? DecodeEnd(end) : std::nullopt;
   if (status.ok() && ended && static_cast<std::int64_t>(ended->rounds) <= whole) {
-    findings_ += Message("kept: ", options.name, ", finished; it will be replayed\n");
+    findings_ += Message("kept: ", request.name, ", finished; it will be replayed\n");
     return status;
   }
   if (status.ok() && shelf.end) status = RemoveOne({mesh, RecordKind::kEnd});
@@ -200,7 +200,7 @@ Status Salvage::SortMesh(std::int64_t mesh, const Shelf& shelf) {
   // Any of what a mesh leaves once it is over tells that it was.
   const bool had_finished = shelf.end || !shelf.result.empty() || !shelf.history.empty();
   const bool had_more = !shelf.rounds.empty() && shelf.rounds.rbegin()->first > whole;
-  findings_ += Message("kept: ", options.name, ", to go on from round ", whole,
+  findings_ += Message("kept: ", request.name, ", to go on from round ", whole,
                        had_finished ? "; lost: that it had finished" : "",
                        had_more ? "; lost: some rounds" : "", "\n");
   return status;

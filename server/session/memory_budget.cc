@@ -14,7 +14,7 @@ using core::Message;
 constexpr std::uint64_t kStarBytes[] = {0, 700, 1500, 5500, 25'000, 150'000};
 static_assert(std::size(kStarBytes) == core::kMaxDimension + 1);
 constexpr std::uint64_t kEmptyMeshBytes = std::uint64_t{1} << 16;  // one with nothing in it
-constexpr std::uint64_t kFinishedBytes = std::uint64_t{1} << 14;   // beside history and seeds
+constexpr std::uint64_t kFinishedBytes = std::uint64_t{1} << 14;   // without history and seeds
 constexpr std::uint64_t kCallBytes = std::uint64_t{1} << 15;       // that sends nothing
 constexpr std::uint64_t kLeastOfStreams = std::uint64_t{4} << 20;
 
@@ -54,7 +54,7 @@ std::uint64_t MemoryBudget::Share(std::uint64_t limit) const {
   return what_ == Of::kMeshes ? limit : std::max(limit / 8, kLeastOfStreams);
 }
 
-// Whether sums of so many bytes are within the limits, `bytes` of them this account's.
+// Whether the sums `total` and `owned` are within the limits, `bytes` of them this account's.
 std::optional<Refused> MemoryBudget::Check(const std::string& owner, std::uint64_t bytes,
                                            std::uint64_t total, std::uint64_t owned) const {
   const bool meshes = what_ == Of::kMeshes;
@@ -80,13 +80,13 @@ std::optional<Refused> MemoryBudget::Check(const std::string& owner, std::uint64
   return std::nullopt;
 }
 
-std::optional<Refused> MemoryBudget::Set(Account* account, std::uint64_t bytes, bool insist) {
+std::optional<Refused> MemoryBudget::Set(Account* account, std::uint64_t bytes, bool unchecked) {
   const std::lock_guard lock(mutex_);
   const std::uint64_t old = account->bytes_;
   std::uint64_t& owners = by_owner_[account->owner_];
   const std::uint64_t total = total_ - old + bytes;
   const std::uint64_t owned = owners - old + bytes;
-  if (bytes > old && !insist) {
+  if (bytes > old && !unchecked) {
     if (auto refused = Check(account->owner_, bytes, total, owned)) return refused;
   }
   total_ = total;

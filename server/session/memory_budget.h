@@ -14,13 +14,13 @@
 
 namespace stellate::server {
 
-// What a running mesh of this specification holds with so many vertices, in bytes, its history
-// included, while a round of so many queries is under way. An estimate, fitted to measured
+// What a running mesh of this specification holds with `vertices` vertices, in bytes, its
+// history included, while a round of `queries` is under way. An estimate, fitted to measured
 // processes: within a factor of two for k <= 4.
 std::uint64_t EstimateMeshBytes(const core::Specification& spec, std::uint64_t vertices,
                                 std::uint64_t queries);
 
-// What one of no more rounds holds beside its history: itself, and its seeds.
+// What a mesh that has ended holds apart from its history: itself, and its seeds.
 std::uint64_t EstimateFinishedBytes(const core::Specification& spec);
 
 // What an open call on a mesh holds while its client reads nothing: itself, and a message of `part`
@@ -58,7 +58,7 @@ class MemoryBudget {
     // The same, of what there is.
     std::optional<Refused> TrySet(std::uint64_t bytes) { return budget_->Set(this, bytes, false); }
     // For a mesh that is there already, from an earlier server.
-    void Insist(std::uint64_t bytes) { budget_->Set(this, bytes, true); }
+    void SetUnchecked(std::uint64_t bytes) { budget_->Set(this, bytes, true); }
     std::uint64_t bytes() const { return budget_->BytesOf(this); }
 
    private:
@@ -80,7 +80,7 @@ class MemoryBudget {
   std::uint64_t total() const;
 
  private:
-  std::optional<Refused> Set(Account* account, std::uint64_t bytes, bool insist);
+  std::optional<Refused> Set(Account* account, std::uint64_t bytes, bool unchecked);
   std::optional<Refused> Check(const std::string& owner, std::uint64_t bytes, std::uint64_t total,
                                std::uint64_t owned) const;
   std::uint64_t Share(std::uint64_t limit) const;

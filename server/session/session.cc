@@ -21,13 +21,13 @@ TimePoint CreatedAt(std::chrono::system_clock::time_point create_time) {
 }
 
 // Fields that tell a mesh from others, where its name says nothing.
-LogFields WhatItIs(const SessionOptions& options) {
-  return LogFields().Add("owner", options.owner).Add("label", options.label);
+LogFields WhatItIs(const MeshRequest& request) {
+  return LogFields().Add("owner", request.owner).Add("label", request.label);
 }
 
-LogFields EndFields(const SessionOptions& options, const SessionEnd& end, bool suspended,
+LogFields EndFields(const MeshRequest& request, const SessionEnd& end, bool suspended,
                     const core::Report& report, const core::Progress& progress) {
-  LogFields fields = WhatItIs(options);
+  LogFields fields = WhatItIs(request);
   fields.Add("state", suspended ? "SUSPENDED" : SessionStateName(end.state))
       .Add("certified", report.certificate.certified)
       .Add("seconds", end.elapsed_seconds)
@@ -70,19 +70,21 @@ const char* SessionStateName(SessionState state) {
 Session::Session(SessionOptions options, MesherFactory factory)
     : options_(std::move(options)),
       factory_(std::move(factory)),
-      pool_(options_.spec, options_.dispatch, options_.max_workers, options_.observer),
+      pool_(request().spec, DispatchOptions{request().timeouts, policy().dispatch},
+            policy().max_workers, ports().observer),
       create_time_(options_.record ? options_.record->create_time
                                    : std::chrono::system_clock::now()),
       created_(CreatedAt(create_time_)),
       replaying_(options_.record.has_value()) {
-  if (options_.journal != nullptr) {
-    pool_.TellOfAnswers([journal = options_.journal.get()](const auto& round, std::size_t block,
-                                                           auto first, auto count) {
+  if (ports().journal != nullptr) {
+    pool_.TellOfAnswers([journal = ports().journal.get()](const auto& round, std::size_t block,
+                                                          auto first, auto count) {
       journal->TakeAnswers(round, block, first, count);
     });
   }
   if (!options_.record || !options_.record->result) {
-    history_ = std::make_shared<WatchLog>(options_.spec.dimension, options_.spec.ambient_dimension);
+    history_ =
+        std::make_shared<WatchLog>(request().spec.dimension, request().spec.ambient_dimension);
     return;
   }
   const SessionEnd& end = *options_.record->end;
@@ -106,10 +108,10 @@ void Session::Run() {
   std::unique_ptr<core::Mesher> mesher;
   std::optional<core::Report> report;
   try {
-    auto made = factory_(options_.spec);
+    auto made = factory_(request().spec);
     if (made) {
       mesher = std::move(*made);
-      Expose(mesher.get());
+      SetInterruptible(mesher.get());
       RunRounds(mesher.get());
       report = mesher->report();
     } else {
@@ -126,7 +128,7 @@ void Session::Run() {
          {FailureReason::kInternal, core::Message("a fault of the server: ", error.what())},
          core::Status::Ok());
   }
-  Expose(nullptr);
+  SetInterruptible(nullptr);
   Finish(report ? &*report : nullptr);
   mesher.reset();  // it is large, and watchers, who have heard the end, do not need it
   // The allocator would keep the memory of each mesh's own thread. A server that stops has it back
@@ -139,19 +141,19 @@ void Session::Run() {
 }
 
 // What Cancel may interrupt in the middle of a round.
-void Session::Expose(core::Mesher* mesher) {
+void Session::SetInterruptible(core::Mesher* mesher) {
   const std::lock_guard lock(mutex_);
   computing_ = mesher;
 }
 
 void Session::RunRounds(core::Mesher* mesher) {
   Log(LogLevel::kInfo, log_context(), replaying_ ? "replaying" : "meshing",
-      WhatItIs(options_)
-          .Add("dimension", options_.spec.dimension)
-          .Add("ambient_dimension", options_.spec.ambient_dimension)
-          .Add("epsilon", options_.spec.epsilon));
-  if (options_.journal != nullptr && !options_.record) {
-    if (auto failure = options_.journal->WriteStart(options_, create_time_)) {
+      WhatItIs(request())
+          .Add("dimension", request().spec.dimension)
+          .Add("ambient_dimension", request().spec.ambient_dimension)
+          .Add("epsilon", request().spec.epsilon));
+  if (ports().journal != nullptr && !options_.record) {
+    if (auto failure = ports().journal->WriteStart(request(), create_time_)) {
       FailBlameless(mesher, std::move(*failure));
     }
   }
@@ -159,7 +161,7 @@ void Session::RunRounds(core::Mesher* mesher) {
     if (abandoned_ || (cancelled_ && !replaying_)) mesher->Cancel();
     const core::QueryBatch* const batch = mesher->NextBatch();
     if (batch == nullptr) {
-      if (auto failure = Show(mesher)) FailBlameless(mesher, std::move(*failure));
+      if (auto failure = PublishRound(mesher)) FailBlameless(mesher, std::move(*failure));
       return;
     }
     if (!FitsMemory(mesher, static_cast<std::uint64_t>(batch->size()))) continue;
@@ -168,19 +170,19 @@ void Session::RunRounds(core::Mesher* mesher) {
 }
 
 std::uint64_t Session::ReplayBytes() const {
-  return EstimateMeshBytes(options_.spec, options_.record ? options_.record->vertices : 0, 0);
+  return EstimateMeshBytes(request().spec, options_.record ? options_.record->vertices : 0, 0);
 }
 
 // False, and the mesh has failed, if it has grown beyond what the server can hold.
 bool Session::FitsMemory(core::Mesher* mesher, std::uint64_t queries) {
-  if (options_.memory == nullptr) return true;
+  if (ports().memory == nullptr) return true;
   const std::uint64_t bytes =
-      EstimateMeshBytes(options_.spec, mesher->progress().vertices, queries);
+      EstimateMeshBytes(request().spec, mesher->progress().vertices, queries);
   if (replaying_) {
-    options_.memory->Insist(std::max(bytes, ReplayBytes()));  // its own, all the while
+    ports().memory->SetUnchecked(std::max(bytes, ReplayBytes()));  // its own, all the while
     return true;
   }
-  auto refused = options_.memory->Set(bytes);
+  auto refused = ports().memory->Set(bytes);
   if (refused) FailBlameless(mesher, ToMeshFailure(*refused));
   return !refused;
 }
@@ -191,12 +193,12 @@ void Session::ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch) {
   if (batch.round > options_.record->rounds) {
     EndReplay();
     if (options_.record->end) return RepeatEnd(mesher);
-    Log(LogLevel::kInfo, {options_.name, batch.round, options_.owner},
+    Log(LogLevel::kInfo, {request().name, batch.round, request().owner},
         "replayed; going on with new answers");
     return;
   }
-  SessionJournal::Known known = options_.journal->BeginRound(batch);
-  if (!known.failure) known.failure = Show(mesher);
+  SessionJournal::Known known = ports().journal->BeginRound(batch);
+  if (!known.failure) known.failure = PublishRound(mesher);
   if (known.failure) {
     FailBlameless(mesher, std::move(*known.failure));
   } else {
@@ -205,7 +207,7 @@ void Session::ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch) {
 }
 
 void Session::EndReplay() {
-  if (replaying_.exchange(false) && options_.on_replayed) options_.on_replayed();
+  if (replaying_.exchange(false) && ports().on_replayed) ports().on_replayed();
 }
 
 // The recorded answers are used up, and the mesh ended here.
@@ -224,12 +226,12 @@ void Session::RepeatEnd(core::Mesher* mesher) {
 // While the workers are at this round's queries, watchers are shown what the last one led to.
 void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
   SessionJournal::Known known;
-  if (options_.journal != nullptr) known = options_.journal->BeginRound(batch);
+  if (ports().journal != nullptr) known = ports().journal->BeginRound(batch);
   if (known.failure) return FailBlameless(mesher, std::move(*known.failure));
   OraclePool::Outcome outcome = pool_.Ask(
       batch,
       [&] {
-        if (auto failure = Show(mesher)) pool_.Fail(std::move(*failure));
+        if (auto failure = PublishRound(mesher)) pool_.Fail(std::move(*failure));
       },
       known.parts);
   if (outcome.failure) {
@@ -239,9 +241,9 @@ void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
   }
   if (!outcome.round) return;  // interrupted: the caller cancels
   const core::Answers& answers = outcome.round->answers;
-  if (options_.journal != nullptr) {
+  if (ports().journal != nullptr) {
     const std::uint64_t vertices = mesher->progress().vertices;
-    if (auto failure = options_.journal->WriteRound(batch, answers, vertices)) {
+    if (auto failure = ports().journal->WriteRound(batch, answers, vertices)) {
       FailBlameless(mesher, std::move(*failure));
       return;
     }
@@ -249,9 +251,9 @@ void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
   const std::uint64_t round = batch.round;  // the batch is gone once it is absorbed
   const auto queries = static_cast<std::size_t>(batch.size());
   if (!Absorb(mesher, answers)) return;
-  if (options_.observer != nullptr) options_.observer->OnRound(queries);
+  if (ports().observer != nullptr) ports().observer->OnRound(queries);
   if (LogEnabled(LogLevel::kDebug)) {
-    Log(LogLevel::kDebug, {options_.name, round, options_.owner}, "round answered",
+    Log(LogLevel::kDebug, {request().name, round, request().owner}, "round answered",
         LogFields().Add("queries", queries).Add("vertices", mesher->progress().vertices));
   }
 }
@@ -271,7 +273,7 @@ bool Session::Absorb(core::Mesher* mesher, const core::Answers& answers) {
 }
 
 // How the mesh stands, and what has changed since it was last shown.
-std::optional<MeshFailure> Session::Show(core::Mesher* mesher) {
+std::optional<MeshFailure> Session::PublishRound(core::Mesher* mesher) {
   if (unseen_) {
     const core::Status logged = history_->Append(*unseen_);  // it is there until the end
     unseen_.reset();
@@ -337,8 +339,8 @@ void Session::Finish(const core::Report* report) {
   const bool ended_before = options_.record && options_.record->end.has_value();
   if (ended_before && end.state == options_.record->end->state) end = *options_.record->end;
   // Before anyone hears of it, so that nobody finds it running later.
-  if (options_.journal != nullptr && !suspended && !ended_before) {
-    const auto failure = options_.journal->WriteEnd(end);
+  if (ports().journal != nullptr && !suspended && !ended_before) {
+    const auto failure = ports().journal->WriteEnd(end);
     end_is_recorded_ = !failure;
     if (failure) {
       Log(LogLevel::kWarning, log_context(),
@@ -348,8 +350,8 @@ void Session::Finish(const core::Report* report) {
   // A replay that got there, and not one that failed on its way.
   if (ended_before) end_is_recorded_ = !abandoned_ && progress_.round == end.rounds;
   // Counted before it can be seen, as whoever sees the end may look at the metrics next.
-  if (options_.observer != nullptr && !suspended && !ended_before) {
-    options_.observer->OnEnd(end.state, report != nullptr ? *report : core::Report{});
+  if (ports().observer != nullptr && !suspended && !ended_before) {
+    ports().observer->OnEnd(end.state, report != nullptr ? *report : core::Report{});
   }
   // Whoever has seen the end finds the door shut.
   pool_.Shut();
@@ -360,7 +362,7 @@ void Session::Finish(const core::Report* report) {
     report_ = report != nullptr ? *report : core::Report{};
     end_time_ = end.time;
     final_seconds_ = end.elapsed_seconds;
-    fields = EndFields(options_, end, suspended, *report_, progress_);
+    fields = EndFields(request(), end, suspended, *report_, progress_);
   }
   Log(end.state == SessionState::kFailed ? LogLevel::kWarning : LogLevel::kInfo, log_context(),
       suspended ? "mesh suspended until the server is back" : "mesh ended", fields);
@@ -373,7 +375,7 @@ void Session::Finish(const core::Report* report) {
 void Session::RecordResult() {
   if (!end_is_recorded_) return;
   const SessionResult result{progress_, *report_, history_->revision(), history_->MemoryBytes()};
-  if (const auto failure = options_.journal->WriteResult(result, *history_)) {
+  if (const auto failure = ports().journal->WriteResult(result, *history_)) {
     Log(LogLevel::kWarning, log_context(),
         core::Message("the next server will have to replay the mesh: ", failure->message));
     return;

@@ -27,20 +27,27 @@ class SessionObserver : public PoolObserver {
   virtual void OnEnd(SessionState state, const core::Report& report) = 0;
 };
 
-// What a session is made of, fixed for its life.
-struct SessionOptions {
-  std::string name;   // "meshes/<id>"
-  std::string owner;  // whose it is; empty where the server tells nobody apart
-  std::string label;  // the client's
-  core::Specification spec;
-  DispatchOptions dispatch;
+// What the server decides about a mesh, whoever asked for it.
+struct MeshPolicy {
+  DispatchPolicy dispatch;
   std::size_t max_workers = 64;
   std::size_t max_watchers = 64;
+};
+
+// What a session works with.
+struct SessionPorts {
   std::shared_ptr<SessionObserver> observer;      // may be null
   std::shared_ptr<SessionJournal> journal;        // may be null: the mesh lives in memory alone
   std::shared_ptr<MemoryBudget::Account> memory;  // may be null: nobody counts
-  std::optional<SessionRecord> record;            // set: the journal has it from an earlier server
-  std::function<void()> on_replayed;              // after it, or when Run is over; may be empty
+  std::function<void()> on_replayed;  // after the replay, or when Run is over; may be empty
+};
+
+// What a session is made of, fixed for its life.
+struct SessionOptions {
+  MeshRequest request;
+  MeshPolicy policy;
+  SessionPorts ports;
+  std::optional<SessionRecord> record;  // set: the journal has it from an earlier server
 };
 
 // A session at one moment.
@@ -79,7 +86,7 @@ class Session {
   // finished mesh that its journal has whole.
   void Run();
   // Run has nothing left to do but return, and the memory of the mesher is given back. It follows
-  // HasEnded at once, but for a tenth of a second or so after millions of vertices.
+  // HasEnded at once, or a tenth of a second later after millions of vertices.
   bool Over() const { return over_; }
 
   // Ends the mesh; any thread, at once where Run waits, else after the round being computed, or
@@ -109,7 +116,9 @@ class Session {
   bool HasVertices() const;
   bool HasEnded() const;           // state, report and history are final
   LogContext log_context() const;  // in the round that was last shown
-  const SessionOptions& options() const { return options_; }
+  const MeshRequest& request() const { return options_.request; }
+  const MeshPolicy& policy() const { return options_.policy; }
+  const SessionPorts& ports() const { return options_.ports; }
   OraclePool& pool() { return pool_; }
 
   // Null: the journal has it, and it is not in memory. Whoever holds it keeps it there.
@@ -119,18 +128,18 @@ class Session {
   Loading LoadHistory();
   // kFailed came of it.
   bool HistoryIsLost() const;
-  // Takes it from memory, if the journal has it and nobody has held it for so long.
+  // Takes it from memory, if the journal has it and nobody has held it for `unused`.
   bool PutAwayHistory(Clock::duration unused);
 
  private:
-  void Expose(core::Mesher* mesher);
+  void SetInterruptible(core::Mesher* mesher);
   void RunRounds(core::Mesher* mesher);
   void ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch);
   void EndReplay();
   void RepeatEnd(core::Mesher* mesher);
   void RunRound(core::Mesher* mesher, const core::QueryBatch& batch);
   bool Absorb(core::Mesher* mesher, const core::Answers& answers);
-  std::optional<MeshFailure> Show(core::Mesher* mesher);
+  std::optional<MeshFailure> PublishRound(core::Mesher* mesher);
   bool FitsMemory(core::Mesher* mesher, std::uint64_t queries);
   void FailBlameless(core::Mesher* mesher, MeshFailure failure);
   void Fail(core::Mesher* mesher, MeshFailure failure, core::Status status);

@@ -10,11 +10,11 @@
 #include "core/report.h"
 #include "server/history/watch_log.h"
 #include "server/oracles/oracle_pool.h"
+#include "server/session/mesh_request.h"
 
 namespace stellate::server {
 
 enum class SessionState;
-struct SessionOptions;
 
 // How a mesh ended.
 struct SessionEnd {
@@ -55,7 +55,7 @@ class SessionJournal {
 
   // Once, before anything is asked.
   virtual std::optional<MeshFailure> WriteStart(
-      const SessionOptions& options, std::chrono::system_clock::time_point create_time) = 0;
+      const MeshRequest& request, std::chrono::system_clock::time_point create_time) = 0;
 
   struct Known {
     std::optional<core::Answers> answers;  // to the whole batch

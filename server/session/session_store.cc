@@ -69,7 +69,7 @@ Allowed<std::shared_ptr<Session>> SessionStore::Create(SessionOptions options) {
       return;
     }
     ++running;
-    if (entry.session->options().owner == options.owner) ++owned;
+    if (entry.session->request().owner == options.request.owner) ++owned;
   };
   for (const auto& [number, entry] : entries_) count(entry);
   for (const Entry& entry : dying_) count(entry);
@@ -85,7 +85,7 @@ Allowed<std::shared_ptr<Session>> SessionStore::Create(SessionOptions options) {
                                   core::Message("the server is still taking apart ", ending,
                                                 " meshes that ended: ask again in a moment")));
   }
-  if (!options.owner.empty() && owned >= limits_.max_running_of_owner) {
+  if (!options.request.owner.empty() && owned >= limits_.max_running_of_owner) {
     return tl::unexpected(
         Refused({"owner-meshes", core::Message(limits_.max_running_of_owner), "owner"},
                 core::Message("you run ", owned,
@@ -96,13 +96,13 @@ Allowed<std::shared_ptr<Session>> SessionStore::Create(SessionOptions options) {
     return tl::unexpected(
         Refused({core::StatusCode::kFailedPrecondition, "the server is stopping"}));
   }
-  options.name = NewMeshName();
-  if (new_journal_) options.journal = new_journal_();
+  options.request.name = NewMeshName();
+  if (new_journal_) options.ports.journal = new_journal_();
   Entry& entry = AddLocked(std::move(options), TimePoint::max());
   try {
     StartLocked(&entry);
   } catch (const std::system_error&) {
-    numbers_.erase(entry.session->options().name);
+    numbers_.erase(entry.session->request().name);
     entries_.erase(entry.number);
     return tl::unexpected(Refused(
         {core::StatusCode::kLimitExceeded,
@@ -117,14 +117,14 @@ void SessionStore::Restore(SessionOptions options) {
   if (options.record->end) {
     SessionEnd& end = *options.record->end;
     const Clock::duration age = AgeOf(end.time);
-    if (age >= limits_.keep_for) return options.journal->Forget();
+    if (age >= limits_.keep_for) return options.ports.journal->Forget();
     over_since = Clock::now() - age;
     // As a server recorded it that did not look whether its clock had been set back.
     end.time = std::max(end.time, options.record->create_time);
     end.elapsed_seconds = std::max(end.elapsed_seconds, 0.0);
   }
   const std::lock_guard lock(mutex_);
-  options.on_replayed = [this] { Advance(); };
+  options.ports.on_replayed = [this] { Advance(); };
   const Entry& entry = AddLocked(std::move(options), over_since);
   if (entry.session->Over()) return;
   unreplayed_.push_back(entry.number);
@@ -134,7 +134,7 @@ void SessionStore::Restore(SessionOptions options) {
 SessionStore::Entry& SessionStore::AddLocked(SessionOptions options, TimePoint over_since) {
   auto session = std::make_shared<Session>(std::move(options), factory_);
   const std::uint64_t number = next_number_++;
-  numbers_.emplace(session->options().name, number);
+  numbers_.emplace(session->request().name, number);
   return entries_.emplace(number, Entry{number, std::move(session), {}, over_since}).first->second;
 }
 
@@ -155,7 +155,7 @@ void SessionStore::AdvanceLocked() {
   });
   std::erase_if(unreplayed_, [&](std::uint64_t number) {
     Entry& entry = entries_.at(number);
-    const auto& memory = entry.session->options().memory;
+    const auto& memory = entry.session->ports().memory;
     if (replays >= kReplays) return false;
     if (memory != nullptr && memory->TrySet(entry.session->ReplayBytes())) return false;
     try {
@@ -191,7 +191,7 @@ bool SessionStore::Delete(const std::string& name) {
     auto node = entries_.extract(it->second);
     numbers_.erase(it);
     session = node.mapped().session;
-    if (session->options().journal != nullptr) session->options().journal->Forget();
+    if (session->ports().journal != nullptr) session->ports().journal->Forget();
     was_run = std::erase(unreplayed_, node.key()) == 0;
     dying_.push_back(std::move(node.mapped()));
   }
@@ -204,7 +204,7 @@ SessionStore::Page SessionStore::List(std::uint64_t after, std::size_t count,
   const std::lock_guard lock(mutex_);
   Page page;
   for (auto it = entries_.upper_bound(after); it != entries_.end(); ++it) {
-    if (it->second.session->options().owner != owner) continue;
+    if (it->second.session->request().owner != owner) continue;
     if (page.sessions.size() == count) {
       page.more = true;
       break;
@@ -266,7 +266,7 @@ std::vector<std::uint64_t> SessionStore::OutlivedLocked(TimePoint now) {
     if (now - entry.over_since >= limits_.keep_for) {
       outlived.push_back(number);
     } else {
-      by_owner[entry.session->options().owner].push_back(
+      by_owner[entry.session->request().owner].push_back(
           {entry.session->HasVertices(), entry.over_since, number});
     }
   }
@@ -290,9 +290,9 @@ void SessionStore::Sweep(TimePoint now) {
   const std::lock_guard lock(mutex_);
   for (const std::uint64_t number : OutlivedLocked(now)) {
     auto node = entries_.extract(number);
-    const SessionOptions& options = node.mapped().session->options();
-    if (options.journal != nullptr) options.journal->Forget();
-    numbers_.erase(options.name);
+    const Session& session = *node.mapped().session;
+    if (session.ports().journal != nullptr) session.ports().journal->Forget();
+    numbers_.erase(session.request().name);
     dying_.push_back(std::move(node.mapped()));
   }
   dead = TakeDeadLocked();

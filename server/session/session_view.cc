@@ -49,7 +49,7 @@ void Session::Suspend() {
   stopping_ = true;
   {
     const std::lock_guard lock(mutex_);
-    suspended_ = options_.journal != nullptr && !cancelled_;
+    suspended_ = ports().journal != nullptr && !cancelled_;
   }
   Abandon();
 }
@@ -80,9 +80,9 @@ Session::Loading Session::LoadHistory() {
     WakeWatchers();
     return Loading::kDone;
   }
-  const std::uint64_t bytes = EstimateFinishedBytes(options_.spec) + history_bytes_;
-  if (options_.memory != nullptr && options_.memory->Set(bytes)) return Loading::kNoMemory;
-  auto read = options_.journal->ReadHistory();
+  const std::uint64_t bytes = EstimateFinishedBytes(request().spec) + history_bytes_;
+  if (ports().memory != nullptr && ports().memory->Set(bytes)) return Loading::kNoMemory;
+  auto read = ports().journal->ReadHistory();
   {
     const std::lock_guard lock(mutex_);
     history_is_lost_ = !read || (*read)->revision() != revision_;
@@ -111,16 +111,16 @@ bool Session::PutAwayHistory(Clock::duration unused) {
 }
 
 void Session::CountHistory() {
-  if (options_.memory == nullptr) return;
+  if (ports().memory == nullptr) return;
   const auto held = history();
   const std::uint64_t bytes = held != nullptr ? held->MemoryBytes() : 0;
-  options_.memory->Insist(EstimateFinishedBytes(options_.spec) + bytes);
+  ports().memory->SetUnchecked(EstimateFinishedBytes(request().spec) + bytes);
 }
 
 bool Session::AddWatcher(std::weak_ptr<SessionWatcher> watcher) {
   const std::lock_guard lock(mutex_);
   std::erase_if(watchers_, [](const auto& w) { return w.expired(); });
-  if (watchers_.size() >= options_.max_watchers) return false;
+  if (watchers_.size() >= policy().max_watchers) return false;
   watchers_.push_back(std::move(watcher));
   return true;
 }
@@ -140,7 +140,7 @@ SessionView Session::View() const {
   SessionView view;
   view.workers = pool_.workers();
   view.waiting_queries = pool_.waiting();
-  if (options_.memory != nullptr) view.bytes = options_.memory->bytes();
+  if (ports().memory != nullptr) view.bytes = ports().memory->bytes();
   const std::lock_guard lock(mutex_);
   view.revision = history_ != nullptr ? history_->revision() : revision_;
   view.create_time = create_time_;
@@ -180,7 +180,7 @@ bool Session::HasEnded() const {
 
 LogContext Session::log_context() const {
   const std::lock_guard lock(mutex_);
-  return {options_.name, progress_.round, options_.owner};
+  return {request().name, progress_.round, request().owner};
 }
 
 }  // namespace stellate::server

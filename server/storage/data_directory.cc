@@ -149,7 +149,8 @@ core::Expected<std::unique_ptr<JournalFile>> DataDirectory::TakeJournal() const 
   auto file = OpenJournal();
   if (!file) return file;
   // A copy of the file alone has no mark, and that of a server that was killed may lag.
-  // Made beside its place too: a server that fails here, or is killed, leaves the one that was.
+  // Written under another name too: a server that fails here, or is killed, leaves the one that
+  // was.
   const std::string draft = Message(path_, "/mark.new");
   status = JournalMark::Make(draft, (*file)->mark_state());
   if (status.ok() && std::rename(draft.c_str(), mark().c_str()) != 0) {
@@ -163,7 +164,7 @@ core::Expected<std::unique_ptr<JournalFile>> DataDirectory::TakeJournal() const 
   return file;
 }
 
-// Made beside its place and moved there whole.
+// Written under another name and then moved to its place whole.
 Status DataDirectory::Install(const std::function<Status(JournalFile*)>& fill) const {
   const std::string draft = Message(path_, "/journal.new"),
                     draft_mark = Message(path_, "/mark.new");
@@ -195,7 +196,7 @@ Status DataDirectory::Install(const std::function<Status(JournalFile*)>& fill) c
   return Status::Ok();
 }
 
-// The earlier one stays beside it, for whoever wants to go back.
+// The earlier one stays next to it, for whoever wants to go back.
 Status DataDirectory::TakeOver(std::uint32_t version) const {
   const std::string kept = Message(path_, "/journal-version-", std::to_string(version), ".sqlite");
   Log(LogLevel::kInfo, {}, Message("taking over an earlier journal; it is kept as ", kept));

@@ -70,9 +70,9 @@ Status EarlierJournal::CopyTo(JournalFile* file) {
   while (meshes.Next()) {
     const std::int64_t id = meshes.Number(0);
     const auto start = Unseal(meshes.Bytes(1), Message("start/", id));
-    SessionOptions options;
+    MeshRequest request;
     std::chrono::system_clock::time_point created;
-    if (!start || !DecodeEarlierStart(*start, version_, &options, &created)) {
+    if (!start || !DecodeEarlierStart(*start, version_, &request, &created)) {
       return DamagedJournal(path_, Message("the specification of mesh ", id));
     }
     std::optional<std::string> end;
@@ -89,7 +89,7 @@ Status EarlierJournal::CopyTo(JournalFile* file) {
     std::int64_t to = 0;
     const bool put = file->Transact([&] {
       to = file->NewMesh();
-      return file->Put({to, RecordKind::kStart}, EncodeStart(options, created)) &&
+      return file->Put({to, RecordKind::kStart}, EncodeStart(request, created)) &&
              (!end || file->Put({to, RecordKind::kEnd}, *end));
     });
     if (!put) return CannotWrite(file);

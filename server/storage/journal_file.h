@@ -23,7 +23,7 @@ class JournalFile {
  public:
   // A new one with nothing in it, at a path where there is none.
   static core::Expected<std::unique_ptr<JournalFile>> Make(const std::string& path);
-  // One that is there, with `mark` beside it (null: there was none). Refuses what is damaged,
+  // One that is there, with `mark` next to it (null: there was none). Refuses what is damaged,
   // naming it, without changing a byte: every record is read.
   static core::Expected<std::unique_ptr<JournalFile>> Open(const std::string& path,
                                                            std::unique_ptr<JournalMark> mark);
@@ -69,7 +69,7 @@ class JournalFile {
   // Bytes of all records of a mesh.
   std::uint64_t BytesOf(std::int64_t mesh) const;
   JournalMark::State mark_state() const { return {state_.identity, state_.commits}; }
-  // Grows to so many bytes at most; 0: what the disk holds.
+  // Grows to `max_bytes` at most; 0: what the disk holds.
   void Limit(std::uint64_t max_bytes);
   // A file of this path is kept, whose space removals may use on a full disk.
   void Reserve(const std::string& path);

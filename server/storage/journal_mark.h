@@ -9,7 +9,7 @@
 
 namespace stellate::server {
 
-// How far a journal got: a small file beside it, written after each transaction and before anyone
+// How far a journal got: a small file next to it, written after each transaction and before anyone
 // hears of that. SQLite takes a damaged end of its log for one that was never written; a journal
 // that is behind its mark gives that away. The mark itself may lag: its writes are not waited for
 // until Sync, so that it outlives the server at once, and the machine a moment later.

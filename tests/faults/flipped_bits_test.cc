@@ -30,7 +30,7 @@ class FlippedBits : public testing::JournalTest {
  protected:
   SessionOptions Named(Journal* journal, int number) {
     SessionOptions options = RecordedSphere(journal->NewMesh());
-    options.name = core::Message("meshes/", std::string(31, '0'), number);
+    options.request.name = core::Message("meshes/", std::string(31, '0'), number);
     return options;
   }
 

@@ -121,9 +121,9 @@ TEST_F(FailingDisk, AFullDiskHarmsNothingElse) {
 std::shared_ptr<SessionJournal> Begin(Journal* journal) {
   const auto mesh = journal->NewMesh();
   SessionOptions options;
-  options.name = "meshes/0123456789abcdef0123456789abcdef";
-  options.spec = testing::SphereSpec(0.1);
-  EXPECT_FALSE(mesh->WriteStart(options, {}));
+  options.request.name = "meshes/0123456789abcdef0123456789abcdef";
+  options.request.spec = testing::SphereSpec(0.1);
+  EXPECT_FALSE(mesh->WriteStart(options.request, {}));
   return mesh;
 }
 

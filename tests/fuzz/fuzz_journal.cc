@@ -71,7 +71,7 @@ const Recorded& TheRecord() {
     auto journal = server::Journal::Open({TheFolder().path()});
     Require(journal.has_value(), "a journal can be begun");
     server::SessionOptions options = SmallSphere();
-    options.journal = (*journal)->NewMesh();
+    options.ports.journal = (*journal)->NewMesh();
     {
       server::Session session(options);
       Script truth(nullptr, 0);
@@ -79,15 +79,15 @@ const Recorded& TheRecord() {
       Require(session.View().state == server::SessionState::kSucceeded, "truth is enough");
       made.geometry = GeometryOf(session);
     }
-    options.name = "meshes/11111111111111111111111111111111";
-    options.journal = (*journal)->NewMesh();
+    options.request.name = "meshes/11111111111111111111111111111111";
+    options.ports.journal = (*journal)->NewMesh();
     {
       server::Session session(options);
       const std::string suspend = std::string(12, '\0') + SuspendAct();
       Script script(reinterpret_cast<const std::uint8_t*>(suspend.data()), suspend.size());
       Play(&session, &script);
     }
-    options.journal.reset();
+    options.ports.journal.reset();
     made.open = TheFolder().Read();
     journal->reset();
     made.closed = TheFolder().Read();
@@ -125,8 +125,9 @@ void Damage(Script* script, Files* files) {
 // Every mesh that is read back goes on to the mesh that it was to become.
 void GoOn(server::Journal* journal, const std::string& geometry) {
   for (server::SessionOptions& options : journal->TakeMeshes()) {
-    options.spec.threads = 1;
-    options.dispatch = SmallSphere().dispatch;
+    options.request.spec.threads = 1;
+    options.request.timeouts = SmallSphere().request.timeouts;
+    options.policy = SmallSphere().policy;
     server::Session session(options);
     if (!session.Over()) {  // else its result was recorded, and is read
       Script truth(nullptr, 0);

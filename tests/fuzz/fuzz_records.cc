@@ -47,18 +47,18 @@ void CheckAnswers(const server::RecordedAnswers& recorded) {
 }  // namespace
 
 std::vector<std::string> Seeds() {
-  server::SessionOptions options;
-  options.name = "meshes/00000000000000000000000000000000";
-  options.owner = "someone";
-  options.label = "something";
-  options.spec = server::testing::SphereSpec(0.3);
+  server::MeshRequest request;
+  request.name = "meshes/00000000000000000000000000000000";
+  request.owner = "someone";
+  request.label = "something";
+  request.spec = server::testing::SphereSpec(0.3);
   std::vector<std::string> seeds;
-  seeds.push_back('\0' + server::EncodeStart(options, {}));
-  options.spec.bounding_box.reset();
-  options.spec.seeds = Eigen::MatrixXd::Ones(3, 2);
-  options.spec.criteria.judging = core::Judging::kFlats;
-  options.spec.criteria.sliver_bound = 0.1;
-  seeds.push_back('\0' + server::EncodeStart(options, {}));
+  seeds.push_back('\0' + server::EncodeStart(request, {}));
+  request.spec.bounding_box.reset();
+  request.spec.seeds = Eigen::MatrixXd::Ones(3, 2);
+  request.spec.criteria.judging = core::Judging::kFlats;
+  request.spec.criteria.sliver_bound = 0.1;
+  seeds.push_back('\0' + server::EncodeStart(request, {}));
   core::Answers answers;
   answers.blocks.push_back(
       {Eigen::MatrixXd::Ones(3, 4), {1, 0, 1, 1}, Eigen::MatrixXd::Ones(6, 4), {}});
@@ -81,11 +81,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const int kind = script.Byte() % 4;
   const std::string record = script.Rest();
   if (kind == 0) {
-    server::SessionOptions options;
+    server::MeshRequest request;
     std::chrono::system_clock::time_point create_time;
-    if (server::DecodeStart(record, &options, &create_time)) {
-      const std::string once = server::EncodeStart(options, create_time);
-      server::SessionOptions again;
+    if (server::DecodeStart(record, &request, &create_time)) {
+      const std::string once = server::EncodeStart(request, create_time);
+      server::MeshRequest again;
       std::chrono::system_clock::time_point same;
       Require(server::DecodeStart(once, &again, &same), "a written start can be read");
       Require(server::EncodeStart(again, same) == once, "and is the same");

@@ -21,18 +21,18 @@ using server::ToProto;
 constexpr std::uint64_t kMostSeedCoordinates = 1 << 16;
 
 std::string RecordOf(const core::Specification& spec) {
-  server::SessionOptions options;
-  options.name = "meshes/fuzz";
-  options.spec = spec;
-  return server::EncodeStart(options, {});
+  server::MeshRequest request;
+  request.name = "meshes/fuzz";
+  request.spec = spec;
+  return server::EncodeStart(request, {});
 }
 
 void CheckRecord(const core::Specification& spec) {
   const std::string record = RecordOf(spec);
-  server::SessionOptions options;
+  server::MeshRequest request;
   std::chrono::system_clock::time_point create_time;
-  Require(server::DecodeStart(record, &options, &create_time), "a record can be read back");
-  Require(RecordOf(options.spec) == record, "the journal gives the specification back");
+  Require(server::DecodeStart(record, &request, &create_time), "a record can be read back");
+  Require(RecordOf(request.spec) == record, "the journal gives the specification back");
 }
 
 void CheckWire(const core::Specification& spec, const Config& config) {
@@ -111,7 +111,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   Require(core::Validate(request->spec).ok(), "the core takes what the server let through");
-  Require(request->worker_wait_seconds > 0 && request->answer_seconds > 0, "waits are above zero");
+  Require(request->timeouts.worker_wait.count() > 0 && request->timeouts.answer_limit.count() > 0,
+          "waits are above zero");
   fuzz::CheckRecord(request->spec);
   fuzz::CheckWire(request->spec, config);
   fuzz::CheckFirstQuestions(request->spec);

@@ -205,7 +205,7 @@ class Theatre {
         return;
       case Act::kFail:
         played.truthful = false;
-        return pool.Fail({"ORACLE_FAILED", "the script says so"});
+        return pool.Fail({server::FailureReason::kOracleFailed, "the script says so"});
       case Act::kCancel:
         played.truthful = false;
         played.cancelled = true;
@@ -270,15 +270,15 @@ void Actor::Ask(Chunk chunk) {
 
 server::SessionOptions SmallSphere() {
   server::SessionOptions options;
-  options.name = "meshes/00000000000000000000000000000000";
-  options.spec = server::testing::SphereSpec(0.8);
-  options.spec.box_seeds = 8;
-  options.spec.threads = 1;
-  options.spec.limits.max_vertices = 400;
-  options.spec.limits.max_rounds = 60;
-  options.dispatch.answer_limit = 2ms;
-  options.dispatch.worker_wait = 2ms;
-  options.dispatch.chunk_bytes = 1 << 10;
+  options.request.name = "meshes/00000000000000000000000000000000";
+  options.request.spec = server::testing::SphereSpec(0.8);
+  options.request.spec.box_seeds = 8;
+  options.request.spec.threads = 1;
+  options.request.spec.limits.max_vertices = 400;
+  options.request.spec.limits.max_rounds = 60;
+  options.request.timeouts.answer_limit = 2ms;
+  options.request.timeouts.worker_wait = 2ms;
+  options.policy.dispatch.chunk_bytes = 1 << 10;
   return options;
 }
 

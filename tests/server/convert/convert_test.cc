@@ -70,8 +70,9 @@ TEST(ConvertSpec, RoundTrip) {
   const auto request = FromProto(spec, Config{});
   ASSERT_TRUE(request) << request.error().message;
   EXPECT_EQ(request->label, "a sphere");
-  EXPECT_EQ(request->answer_seconds, 3);
-  EXPECT_EQ(request->worker_wait_seconds, Config{}.worker_wait_seconds);
+  EXPECT_EQ(request->timeouts.answer_limit, std::chrono::seconds(3));
+  EXPECT_EQ(std::chrono::duration<double>(request->timeouts.worker_wait).count(),
+            Config{}.worker_wait_seconds);
   EXPECT_EQ(request->spec.limits.max_rounds, Config{}.max_rounds);
   v1::MeshSpec back;
   ToProto(request->spec, &back);

@@ -137,9 +137,9 @@ class Version4 {
   }
   ~Version4() { sqlite3_close(database_); }
 
-  void Mesh(int id, const SessionOptions& options) {
+  void Mesh(int id, const MeshRequest& request) {
     Run("INSERT INTO meshes (id, start) VALUES (" + std::to_string(id) + ", " +
-        Sealed(StartOf(options), core::Message("start/", id)) + ")");
+        Sealed(StartOf(request), core::Message("start/", id)) + ")");
   }
   void End(int id, const SessionEnd& end) {
     Run("UPDATE meshes SET finish = " + Sealed(EncodeEnd(end), core::Message("end/", id)) +
@@ -169,11 +169,11 @@ class Version4 {
 
  private:
   // Without what was added since: two numbers, a number that is not there, and another.
-  static std::string StartOf(SessionOptions options) {
+  static std::string StartOf(MeshRequest request) {
     const auto now = std::chrono::system_clock::now();
-    const std::string start = EncodeStart(options, now);
-    options.spec.components = 1;
-    const std::string other = EncodeStart(options, now);
+    const std::string start = EncodeStart(request, now);
+    request.spec.components = 1;
+    const std::string other = EncodeStart(request, now);
     const auto added = std::mismatch(start.begin(), start.end(), other.begin()).first;
     return std::string(start.begin(), added) + std::string(added + 4 * kWord, start.end());
   }
@@ -201,9 +201,9 @@ class Version4 {
 // Takes down what a mesh asks and is answered.
 struct Recorder : testing::BlankJournal {
   explicit Recorder(Version4* version4) : old(version4) {}
-  std::optional<MeshFailure> WriteStart(const SessionOptions& options,
+  std::optional<MeshFailure> WriteStart(const MeshRequest& request,
                                         std::chrono::system_clock::time_point) override {
-    old->Mesh(1, options);
+    old->Mesh(1, request);
     return std::nullopt;
   }
   std::optional<MeshFailure> WriteRound(const core::QueryBatch& batch, const core::Answers& answers,
@@ -225,13 +225,13 @@ TEST_F(JournalTest, TakesOverAJournalOfVersion4) {
   {
     Version4 old(file());
     whole = RunMesh(RecordedSphere(std::make_shared<Recorder>(&old)));
-    SessionOptions options = RecordedSphere(nullptr);
-    options.name = "meshes/00000000000000000000000000000002";
-    old.Mesh(2, options);
+    MeshRequest request = RecordedSphere(nullptr).request;
+    request.name = "meshes/00000000000000000000000000000002";
+    old.Mesh(2, request);
     const core::QueryBatch batch = BatchOf(1);
     old.Round(2, batch, AnswersTo(batch));
-    old.Mesh(3, options);
-    old.End(3, {SessionState::kCancelled, {}, 0, {"REMOVED", ""}, 0});
+    old.Mesh(3, request);
+    old.End(3, {SessionState::kCancelled, {}, 0, {FailureReason::kRemoved, ""}, 0});
     old.Round(3, batch, AnswersTo(batch));
   }
   const std::string before = ContentOf(file());
@@ -241,9 +241,9 @@ TEST_F(JournalTest, TakesOverAJournalOfVersion4) {
     ASSERT_EQ(meshes.size(), 2u) << "the third was being removed";
     EXPECT_FALSE(meshes[0].record->result);
     ASSERT_TRUE(meshes[0].record->end);
-    EXPECT_EQ(meshes[1].name, "meshes/00000000000000000000000000000002");
+    EXPECT_EQ(meshes[1].request.name, "meshes/00000000000000000000000000000002");
     EXPECT_EQ(meshes[1].record->rounds, 1u);
-    EXPECT_TRUE(meshes[1].journal->BeginRound(BatchOf(1)).answers);
+    EXPECT_TRUE(meshes[1].ports.journal->BeginRound(BatchOf(1)).answers);
     ExpectSame(RunMesh(std::move(meshes[0]), 0, false), whole);
   }
   EXPECT_TRUE(ContentOf(directory_ + "/journal-version-4.sqlite") == before) << "to go back to";
@@ -257,7 +257,7 @@ TEST_F(JournalTest, ADamagedJournalOfVersion4IsNotTakenOver) {
   fs::create_directories(directory_);
   {
     Version4 old(file());
-    old.Mesh(1, RecordedSphere(nullptr));
+    old.Mesh(1, RecordedSphere(nullptr).request);
     const core::QueryBatch first = BatchOf(1), third = BatchOf(3);
     old.Round(1, first, AnswersTo(first));
     old.Round(1, third, AnswersTo(third));

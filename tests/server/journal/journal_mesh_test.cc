@@ -79,7 +79,8 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
   const auto journal = Open();
   auto meshes = journal->TakeMeshes();
   const auto budget = std::make_shared<MemoryBudget>(MemoryBudget::Limits{bytes / 2, 0});
-  meshes.at(0).memory = MemoryBudget::Open(budget, "");
+  SessionOptions reopened = meshes.at(0);
+  meshes[0].ports.memory = MemoryBudget::Open(budget, "");
   Session session(std::move(meshes[0]), [](core::Specification) {
     ADD_FAILURE() << "nobody needs a mesher";
     return core::Refuse(core::StatusCode::kInvalidArgument, "none");
@@ -89,7 +90,7 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
   EXPECT_EQ(session.View().revision, before.revision);
   EXPECT_EQ(session.PublishedRevision(), before.revision);
   EXPECT_EQ(session.View().report->certificate.euler_characteristic, 2);
-  EXPECT_EQ(budget->total(), EstimateFinishedBytes(session.options().spec));
+  EXPECT_EQ(budget->total(), EstimateFinishedBytes(session.request().spec));
   EXPECT_EQ(session.LoadHistory(), Session::Loading::kNoMemory);
   EXPECT_EQ(session.history(), nullptr);
 
@@ -97,12 +98,8 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
   const auto larger = std::make_shared<MemoryBudget>(MemoryBudget::Limits{2 * bytes, 0});
   auto again = journal->TakeMeshes();
   EXPECT_TRUE(again.empty());
-  const auto reopened = [&] {
-    SessionOptions options = session.options();
-    options.memory = MemoryBudget::Open(larger, "");
-    return options;
-  };
-  Session readable(reopened());
+  reopened.ports.memory = MemoryBudget::Open(larger, "");
+  Session readable(std::move(reopened));
   ASSERT_EQ(readable.LoadHistory(), Session::Loading::kDone);
   EXPECT_GE(larger->total(), readable.history()->MemoryBytes());
   EXPECT_TRUE(all_of(*readable.history()) == wholes);
@@ -113,7 +110,7 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
   EXPECT_FALSE(readable.PutAwayHistory(std::chrono::hours(1))) << "somebody has just read it";
   EXPECT_TRUE(readable.PutAwayHistory(Clock::duration::zero()));
   EXPECT_EQ(readable.history(), nullptr);
-  EXPECT_EQ(larger->total(), EstimateFinishedBytes(session.options().spec));
+  EXPECT_EQ(larger->total(), EstimateFinishedBytes(session.request().spec));
   EXPECT_EQ(readable.LoadHistory(), Session::Loading::kDone) << "and back again";
 }
 
@@ -128,7 +125,7 @@ TEST_F(JournalTest, AnEndWithoutItsResultIsReplayedAndThenRecorded) {
     const auto journal = Open();
     auto meshes = journal->TakeMeshes();
     const std::uint64_t rounds = meshes.at(0).record->rounds;
-    ASSERT_FALSE(meshes[0].journal->WriteEnd(
+    ASSERT_FALSE(meshes[0].ports.journal->WriteEnd(
         {SessionState::kCancelled, std::chrono::system_clock::now(), 1, {}, rounds}));
   }
   for (int server = 0; server < 2; ++server) {

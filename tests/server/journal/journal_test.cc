@@ -24,7 +24,7 @@ TEST_F(JournalTest, GivesBackWhatWasWritten) {
   {
     const auto journal = Open();
     const auto mesh = journal->NewMesh();
-    ASSERT_FALSE(mesh->WriteStart(RecordedSphere(mesh), now));
+    ASSERT_FALSE(mesh->WriteStart(RecordedSphere(mesh).request, now));
     mesh->BeginRound(batch);
     ASSERT_FALSE(mesh->WriteRound(batch, answers, 17));
     ASSERT_FALSE(WriteOneRound(mesh.get(), 2));  // led to nothing: cancelled, say
@@ -35,18 +35,19 @@ TEST_F(JournalTest, GivesBackWhatWasWritten) {
   const auto meshes = journal->TakeMeshes();
   ASSERT_EQ(meshes.size(), 1u);
   const SessionOptions& back = meshes[0];
-  EXPECT_EQ(EncodeStart(back, back.record->create_time), EncodeStart(RecordedSphere(nullptr), now));
-  EXPECT_EQ(back.spec.seeds, RecordedSphere(nullptr).spec.seeds);
+  EXPECT_EQ(EncodeStart(back.request, back.record->create_time),
+            EncodeStart(RecordedSphere(nullptr).request, now));
+  EXPECT_EQ(back.request.spec.seeds, RecordedSphere(nullptr).request.spec.seeds);
   EXPECT_EQ(back.record->rounds, 1u);
   ASSERT_TRUE(back.record->end);
   EXPECT_EQ(EncodeEnd(*back.record->end), EncodeEnd(end));
   EXPECT_FALSE(back.record->result);
-  const auto replay = back.journal->BeginRound(batch);
+  const auto replay = back.ports.journal->BeginRound(batch);
   ASSERT_TRUE(replay.answers);
   EXPECT_EQ(DigestOf(*replay.answers), DigestOf(answers));
-  const auto beyond = back.journal->BeginRound(BatchOf(3));
+  const auto beyond = back.ports.journal->BeginRound(BatchOf(3));
   EXPECT_FALSE(beyond.answers || beyond.failure);
-  const auto other = back.journal->BeginRound(BatchOf(1, 4, 2.0));
+  const auto other = back.ports.journal->BeginRound(BatchOf(1, 4, 2.0));
   ASSERT_TRUE(other.failure);
   EXPECT_EQ(other.failure->reason, FailureReason::kReplayMismatch);
   EXPECT_GT(journal->OwnerBytes("somebody"), 400u);
@@ -59,11 +60,11 @@ TEST_F(JournalTest, LargeRoundsAreKeptInParts) {
   {
     const auto journal = Open();
     const auto mesh = journal->NewMesh();
-    ASSERT_FALSE(mesh->WriteStart(RecordedSphere(mesh), {}));
+    ASSERT_FALSE(mesh->WriteStart(RecordedSphere(mesh).request, {}));
     mesh->BeginRound(batch);
     ASSERT_FALSE(mesh->WriteRound(batch, answers, 1));
   }
-  const auto replay = Open()->TakeMeshes().at(0).journal->BeginRound(batch);
+  const auto replay = Open()->TakeMeshes().at(0).ports.journal->BeginRound(batch);
   ASSERT_TRUE(replay.answers);
   EXPECT_EQ(DigestOf(*replay.answers), DigestOf(answers));
 }
@@ -90,7 +91,7 @@ TEST_F(JournalTest, AnswersOfARoundThatIsNotWholeAreKept) {
     const auto next = Open();
     auto meshes = next->TakeMeshes();
     EXPECT_EQ(meshes.at(0).record->rounds, 1u);
-    const auto known = meshes[0].journal->BeginRound(batch);
+    const auto known = meshes[0].ports.journal->BeginRound(batch);
     EXPECT_FALSE(known.answers || known.failure);
     parts = known.parts;
     if (parts.empty()) continue;
@@ -103,8 +104,8 @@ TEST_F(JournalTest, AnswersOfARoundThatIsNotWholeAreKept) {
     EXPECT_EQ(parts[0].answers.points.cols(), 100);
     EXPECT_EQ(parts[1].first, 900);
     // The rest of it, and the whole is what it would have been.
-    ASSERT_FALSE(meshes[0].journal->WriteRound(batch, answers, 1));
-    const auto whole = meshes[0].journal->BeginRound(batch);
+    ASSERT_FALSE(meshes[0].ports.journal->WriteRound(batch, answers, 1));
+    const auto whole = meshes[0].ports.journal->BeginRound(batch);
     ASSERT_TRUE(whole.answers);
     EXPECT_EQ(DigestOf(*whole.answers), DigestOf(answers));
   }
@@ -114,9 +115,9 @@ TEST_F(JournalTest, AnswersOfARoundThatIsNotWholeAreKept) {
   const auto other = Open();
   const auto meshes = other->TakeMeshes();
   core::QueryBatch others = BatchOf(2, 1000, 3.0);
-  const auto known = meshes.at(0).journal->BeginRound(others);
+  const auto known = meshes.at(0).ports.journal->BeginRound(others);
   EXPECT_TRUE(known.parts.empty() && !known.failure && !known.answers);
-  EXPECT_FALSE(meshes[0].journal->WriteRound(others, answers, 1));
+  EXPECT_FALSE(meshes[0].ports.journal->WriteRound(others, answers, 1));
   ASSERT_FALSE(mesh->WriteRound(batch, answers, 1));
   EXPECT_GT(journal->OwnerBytes("somebody"), before);
 }
@@ -125,7 +126,7 @@ TEST_F(JournalTest, AnOwnerHasHisShareAndDeletionGivesItBack) {
   auto opened = Journal::Open({directory_, 0, 100'000});
   ASSERT_TRUE(opened);
   const auto mesh = (*opened)->NewMesh(), others = (*opened)->NewMesh();
-  ASSERT_FALSE(mesh->WriteStart(RecordedSphere(mesh), {}));
+  ASSERT_FALSE(mesh->WriteStart(RecordedSphere(mesh).request, {}));
   std::uint64_t round = 1;
   std::optional<MeshFailure> failure;
   while (!failure) failure = WriteOneRound(mesh.get(), round++, 100);
@@ -140,8 +141,8 @@ TEST_F(JournalTest, AnOwnerHasHisShareAndDeletionGivesItBack) {
   EXPECT_FALSE((*opened)->RefuseNewMesh("somebody else", kMesh));
   EXPECT_FALSE(mesh->WriteEnd({SessionState::kFailed, {}, 0, *failure, round}));
   SessionOptions options = RecordedSphere(others);
-  options.owner = "somebody else";
-  EXPECT_FALSE(others->WriteStart(options, {}));
+  options.request.owner = "somebody else";
+  EXPECT_FALSE(others->WriteStart(options.request, {}));
   EXPECT_FALSE(WriteOneRound(others.get(), 1, 100));
   mesh->Forget();
   while ((*opened)->OwnerBytes("somebody") > 0) std::this_thread::yield();
@@ -157,8 +158,8 @@ TEST_F(JournalTest, RefusesADirectoryInUse) {
 TEST_F(JournalTest, AFullFileFailsTheRoundAloneAndDeletionMakesRoom) {
   const auto journal = Open(1 << 20);
   const auto small = journal->NewMesh(), large = journal->NewMesh();
-  ASSERT_FALSE(small->WriteStart(RecordedSphere(small), {}));
-  ASSERT_FALSE(large->WriteStart(RecordedSphere(large), {}));
+  ASSERT_FALSE(small->WriteStart(RecordedSphere(small).request, {}));
+  ASSERT_FALSE(large->WriteStart(RecordedSphere(large).request, {}));
   ASSERT_FALSE(WriteOneRound(large.get(), 1, 8000));
   EXPECT_FALSE(journal->RefuseNewMesh("", 1000));
   const auto failure = WriteOneRound(large.get(), 2, 8000);
@@ -183,7 +184,7 @@ TEST_F(JournalTest, DeletionGivesSpaceBackAndIsNotUndoneByALateWrite) {
     mesh->Forget();
     EXPECT_FALSE(mesh->WriteEnd({SessionState::kCancelled, {}, 0, {}}));
     early->Forget();
-    EXPECT_FALSE(early->WriteStart(RecordedSphere(early), {}));
+    EXPECT_FALSE(early->WriteStart(RecordedSphere(early).request, {}));
   }
   EXPECT_LT(fs::file_size(file()), 100'000u);
   EXPECT_TRUE(Open()->TakeMeshes().empty());
@@ -228,7 +229,7 @@ TEST_F(JournalTest, ARemovalCutOffAnywhereLeavesAllOfAMeshOrNone) {
         rounds.push_back(mesh.record->rounds);
         for (std::uint64_t round = 1; round <= mesh.record->rounds; ++round) {
           const Eigen::Index queries = mesh.record->rounds == kRounds ? 60'000 : small;
-          EXPECT_TRUE(mesh.journal->BeginRound(BatchOf(round, queries)).answers);
+          EXPECT_TRUE(mesh.ports.journal->BeginRound(BatchOf(round, queries)).answers);
         }
         small = 2000;
       }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/message.h"
+#include "server/base/machine_memory.h"
 #include "tests/server/support/sphere.h"
 
 namespace stellate::server {
@@ -57,7 +58,7 @@ TEST(MemoryBudget, HoldsEachNamedOwnerToItsShare) {
 TEST(MemoryBudget, WhatIsThereAlreadyIsCountedAllTheSame) {
   const auto budget = Budget(100, 0);
   const auto account = MemoryBudget::Open(budget, "");
-  account->Insist(150);
+  account->SetUnchecked(150);
   EXPECT_EQ(budget->total(), 150u);
   EXPECT_TRUE(account->Set(151));
   EXPECT_FALSE(account->Set(140)) << "it shrinks";

@@ -18,16 +18,16 @@ class ReplayQueue : public JournalTest {
     const auto journal = Open();
     for (int number = 0; number < unfinished; ++number) {
       SessionOptions options = Named(number);
-      options.journal = journal->NewMesh();
+      options.ports.journal = journal->NewMesh();
       testing::RunMesh(std::move(options), 4);
     }
     SessionOptions options = Named(unfinished);
-    options.journal = journal->NewMesh();
+    options.ports.journal = journal->NewMesh();
     testing::RunMesh(std::move(options));
   }
   static SessionOptions Named(int number) {
     SessionOptions options = RecordedSphere(nullptr);
-    options.name = core::Message("meshes/", std::string(31, '0'), number);
+    options.request.name = core::Message("meshes/", std::string(31, '0'), number);
     return options;
   }
 
@@ -64,25 +64,25 @@ TEST_F(ReplayQueue, AFewAtATimeAndFinishedOnesAtOnce) {
   const auto journal = Open();
   SessionStore store({}, Counting());
   for (SessionOptions& options : journal->TakeMeshes()) store.Restore(std::move(options));
-  const auto finished = store.Find(Named(5).name);
+  const auto finished = store.Find(Named(5).request.name);
   ASSERT_NE(finished, nullptr);
   EXPECT_TRUE(finished->Over());
   EXPECT_EQ(finished->View().state, SessionState::kSucceeded);
   WaitForMeshers(2);
   EXPECT_EQ(store.Running(), 5u);
-  EXPECT_EQ(store.Find(Named(4).name)->View().state, SessionState::kWaiting);
-  const std::uint64_t revision = store.Find(Named(4).name)->PublishedRevision();
+  EXPECT_EQ(store.Find(Named(4).request.name)->View().state, SessionState::kWaiting);
+  const std::uint64_t revision = store.Find(Named(4).request.name)->PublishedRevision();
   EXPECT_GE(revision, 4u) << "as a watcher may have it";
   // One in the queue can be deleted; what is cancelled there is replayed first.
-  EXPECT_TRUE(store.Delete(Named(3).name));
-  store.Find(Named(4).name)->Cancel();
-  EXPECT_EQ(store.Find(Named(4).name)->View().state, SessionState::kCancelled);
+  EXPECT_TRUE(store.Delete(Named(3).request.name));
+  store.Find(Named(4).request.name)->Cancel();
+  EXPECT_EQ(store.Find(Named(4).request.name)->View().state, SessionState::kCancelled);
   {
     const std::lock_guard lock(mutex_);
     EXPECT_EQ(most_, 2) << "and no more";
   }
   Go();
-  const auto cancelled = store.Find(Named(4).name);
+  const auto cancelled = store.Find(Named(4).request.name);
   while (!cancelled->Over()) std::this_thread::yield();
   EXPECT_EQ(cancelled->View().state, SessionState::kCancelled);
   EXPECT_EQ(cancelled->View().revision, revision);
@@ -98,10 +98,10 @@ TEST_F(ReplayQueue, AsTheMemoryBudgetAllows) {
   for (SessionOptions& options : journal->TakeMeshes()) {
     options.record->vertices = 1000;
     if (budget == nullptr) {
-      const std::uint64_t one = EstimateMeshBytes(options.spec, 1000, 0);
+      const std::uint64_t one = EstimateMeshBytes(options.request.spec, 1000, 0);
       budget = std::make_shared<MemoryBudget>(MemoryBudget::Limits{one * 3 / 2, 0});
     }
-    options.memory = MemoryBudget::Open(budget, options.owner);
+    options.ports.memory = MemoryBudget::Open(budget, options.request.owner);
     store.Restore(std::move(options));
   }
   WaitForMeshers(1);
@@ -110,7 +110,7 @@ TEST_F(ReplayQueue, AsTheMemoryBudgetAllows) {
     const std::lock_guard lock(mutex_);
     EXPECT_EQ(meshing_, 1) << "there is no room for two";
   }
-  EXPECT_TRUE(store.Find(Named(1).name)->IsReplaying());
+  EXPECT_TRUE(store.Find(Named(1).request.name)->IsReplaying());
   Go();
   const auto all_replayed = [&] {
     const auto meshes = store.All();
@@ -128,7 +128,7 @@ TEST_F(ReplayQueue, AHistoryIsReadBackForWhoeverAsks) {
   const auto journal = Open();
   SessionStore store({});
   for (SessionOptions& options : journal->TakeMeshes()) store.Restore(std::move(options));
-  const auto session = store.Find(Named(0).name);
+  const auto session = store.Find(Named(0).request.name);
   ASSERT_NE(session, nullptr);
   struct Watcher : SessionWatcher {
     void Wake() override { woken = true; }

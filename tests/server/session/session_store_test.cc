@@ -18,8 +18,8 @@ using namespace std::chrono_literals;
 
 SessionOptions Options(Clock::duration worker_wait = 60s) {
   SessionOptions options;
-  options.spec = testing::SphereSpec(0.3);
-  options.dispatch.worker_wait = worker_wait;
+  options.request.spec = testing::SphereSpec(0.3);
+  options.request.timeouts.worker_wait = worker_wait;
   return options;
 }
 
@@ -50,7 +50,7 @@ TEST(SessionStore, FindsListsAndDeletes) {
   SessionStore store({});
   const auto a = *store.Create(Options());
   const auto b = *store.Create(Options());
-  EXPECT_EQ(store.Find(a->options().name), a);
+  EXPECT_EQ(store.Find(a->request().name), a);
   const auto page = store.List(0, 1);
   ASSERT_EQ(page.sessions.size(), 1u);
   EXPECT_EQ(page.sessions[0], a) << "oldest first";
@@ -59,9 +59,9 @@ TEST(SessionStore, FindsListsAndDeletes) {
   ASSERT_EQ(rest.sessions.size(), 1u);
   EXPECT_EQ(rest.sessions[0], b);
   EXPECT_FALSE(rest.more);
-  EXPECT_TRUE(store.Delete(a->options().name));
-  EXPECT_FALSE(store.Delete(a->options().name));
-  EXPECT_EQ(store.Find(a->options().name), nullptr);
+  EXPECT_TRUE(store.Delete(a->request().name));
+  EXPECT_FALSE(store.Delete(a->request().name));
+  EXPECT_EQ(store.Find(a->request().name), nullptr);
   EXPECT_EQ(a->View().state, SessionState::kCancelled);
   WaitUntilOver(*a);
   EXPECT_EQ(store.Running(), 1u);
@@ -107,7 +107,7 @@ TEST(SessionStore, MeshesBeingTakenApartTakeNoPlaceButAreBounded) {
   std::vector<std::shared_ptr<Session>> ended;
   for (std::size_t i = 0; i < kMostEnding; ++i) {
     SessionOptions options = Options();
-    options.memory = MemoryBudget::Open(budget, "");
+    options.ports.memory = MemoryBudget::Open(budget, "");
     auto created = store.Create(std::move(options));
     ASSERT_TRUE(created) << i << " are being taken apart";
     ended.push_back(std::move(*created));
@@ -142,7 +142,7 @@ TEST(SessionStore, HoldsEachNamedOwnerToItsShare) {
   SessionStore store({4, 10, 1h, 1});
   const auto create = [&store](const std::string& owner) {
     SessionOptions options = Options();
-    options.owner = owner;
+    options.request.owner = owner;
     return store.Create(std::move(options));
   };
   const auto first = create("alice");
@@ -182,13 +182,13 @@ class SweepTest : public ::testing::Test {
   // Of a mesh that has been cancelled.
   std::string Finished(const std::string& owner, bool with_vertices = true) {
     SessionOptions options = Options();
-    options.owner = owner;
-    options.spec.epsilon = with_vertices ? 0.3 : kBarren;
+    options.request.owner = owner;
+    options.request.spec.epsilon = with_vertices ? 0.3 : kBarren;
     const auto session = *store_.Create(std::move(options));
     while (with_vertices && !session->HasVertices()) std::this_thread::sleep_for(1ms);
     session->Cancel();
     WaitUntilOver(*session);
-    return session->options().name;
+    return session->request().name;
   }
   std::vector<std::string> Several(std::size_t count, const std::string& owner,
                                    bool with_vertices = true) {
@@ -248,7 +248,7 @@ TEST_F(SweepTest, WhatHasNoVertexGoesFirstAndAtOnce) {
 TEST_F(SweepTest, ARunningMeshStays) {
   const auto running = *store_.Create(Options());
   store_.Sweep(now_ + 2h);
-  EXPECT_NE(store_.Find(running->options().name), nullptr);
+  EXPECT_NE(store_.Find(running->request().name), nullptr);
 }
 
 // Remembers how the mesh ended.
@@ -267,10 +267,10 @@ class ClockSetBackTest : public ::testing::Test {
   // A mesh that an earlier server recorded when its clock was two hours fast.
   std::shared_ptr<Session> Restore(std::optional<SessionEnd> end) {
     SessionOptions options = Options();
-    options.name = NewMeshName();
-    options.journal = journal_;
+    options.request.name = NewMeshName();
+    options.ports.journal = journal_;
     options.record = SessionRecord{created_, 0, 0, std::move(end), {}};
-    const std::string name = options.name;
+    const std::string name = options.request.name;
     store_.Restore(std::move(options));
     return store_.Find(name);
   }
@@ -303,9 +303,9 @@ TEST_F(ClockSetBackTest, ARecordWithNegativeTimesIsReadWithoutThem) {
   EXPECT_EQ(view.elapsed_seconds, 0);
   EXPECT_GE(*view.end_time, view.create_time);
   store_.Sweep(Clock::now() + 59min);
-  EXPECT_NE(store_.Find(session->options().name), nullptr) << "kept from now on";
+  EXPECT_NE(store_.Find(session->request().name), nullptr) << "kept from now on";
   store_.Sweep(Clock::now() + 61min);
-  EXPECT_EQ(store_.Find(session->options().name), nullptr);
+  EXPECT_EQ(store_.Find(session->request().name), nullptr);
 }
 
 TEST(SessionStore, StopCancelsWhatRuns) {

@@ -75,10 +75,10 @@ struct Running {
   explicit Running(Session::MesherFactory factory = core::Mesher::Create, double epsilon = 0.3,
                    Clock::duration worker_wait = 60s) {
     SessionOptions options;
-    options.name = "meshes/00000000000000000000000000000000";
-    options.spec = SphereSpec(epsilon);
-    options.dispatch.worker_wait = worker_wait;
-    options.max_watchers = 2;
+    options.request.name = "meshes/00000000000000000000000000000000";
+    options.request.spec = SphereSpec(epsilon);
+    options.request.timeouts.worker_wait = worker_wait;
+    options.policy.max_watchers = 2;
     session = std::make_shared<Session>(options, std::move(factory));
     thread = std::thread([s = session] { s->Run(); });
   }
@@ -170,12 +170,12 @@ TEST(Session, AFaultOfTheMesherFailsOnlyItsMesh) {
 
 TEST(Session, AMeshThatOutgrowsTheMemoryFailsAndGivesItBack) {
   SessionOptions options;
-  options.name = "meshes/00000000000000000000000000000000";
-  options.spec = SphereSpec(0.3);
+  options.request.name = "meshes/00000000000000000000000000000000";
+  options.request.spec = SphereSpec(0.3);
   // The first two rounds end with one vertex and two; a third would be too much.
   const auto budget = std::make_shared<MemoryBudget>(
-      MemoryBudget::Limits{EstimateMeshBytes(options.spec, 1, 1), 0});
-  options.memory = MemoryBudget::Open(budget, "");
+      MemoryBudget::Limits{EstimateMeshBytes(options.request.spec, 1, 1), 0});
+  options.ports.memory = MemoryBudget::Open(budget, "");
   Session session(options, Faking({}));
   std::thread thread([&session] { session.Run(); });
   const auto worker = FakeWorker::Join(&session.pool());
@@ -186,7 +186,7 @@ TEST(Session, AMeshThatOutgrowsTheMemoryFailsAndGivesItBack) {
   EXPECT_NE(view.failure.message.find("--max-memory-bytes"), std::string::npos);
   EXPECT_EQ(view.revision, 2u);
   EXPECT_EQ(view.bytes,
-            EstimateFinishedBytes(session.options().spec) + session.history()->MemoryBytes())
+            EstimateFinishedBytes(session.request().spec) + session.history()->MemoryBytes())
       << "the mesher is gone";
   EXPECT_EQ(budget->total(), view.bytes);
   worker->WaitForEnd();

@@ -7,7 +7,7 @@ namespace stellate::server::testing {
 // Takes everything and knows nothing.
 class BlankJournal : public SessionJournal {
  public:
-  std::optional<MeshFailure> WriteStart(const SessionOptions&,
+  std::optional<MeshFailure> WriteStart(const MeshRequest&,
                                         std::chrono::system_clock::time_point) override {
     return std::nullopt;
   }

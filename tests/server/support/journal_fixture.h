@@ -88,19 +88,19 @@ class JournalTest : public ::testing::Test {
 inline SessionOptions RecordedSphere(std::shared_ptr<SessionJournal> journal,
                                      double epsilon = 0.3) {
   SessionOptions options;
-  options.name = "meshes/0123456789abcdef0123456789abcdef";
-  options.owner = "somebody";
-  options.label = "a sphere";
-  options.spec = SphereSpec(epsilon);
-  options.spec.threads = 1;  // oneTBB itself is not built for ThreadSanitizer
-  options.spec.seeds = Eigen::Vector3d::UnitX();
-  options.spec.criteria.advance_step = 0.9;
-  options.spec.criteria.judging = core::Judging::kCommonCentre;
-  options.spec.criteria.size_rate = 0.4;
-  options.spec.oracle.local_size = true;
-  options.spec.limits.max_batch_queries = 5000;
-  options.dispatch.worker_wait = std::chrono::seconds(77);
-  options.journal = std::move(journal);
+  options.request.name = "meshes/0123456789abcdef0123456789abcdef";
+  options.request.owner = "somebody";
+  options.request.label = "a sphere";
+  options.request.spec = SphereSpec(epsilon);
+  options.request.spec.threads = 1;  // oneTBB itself is not built for ThreadSanitizer
+  options.request.spec.seeds = Eigen::Vector3d::UnitX();
+  options.request.spec.criteria.advance_step = 0.9;
+  options.request.spec.criteria.judging = core::Judging::kCommonCentre;
+  options.request.spec.criteria.size_rate = 0.4;
+  options.request.spec.oracle.local_size = true;
+  options.request.spec.limits.max_batch_queries = 5000;
+  options.request.timeouts.worker_wait = std::chrono::seconds(77);
+  options.ports.journal = std::move(journal);
   return options;
 }
 
@@ -134,7 +134,7 @@ inline std::optional<MeshFailure> WriteOneRound(SessionJournal* mesh, std::uint6
 inline std::shared_ptr<SessionJournal> WriteRounds(Journal* journal, std::uint64_t rounds,
                                                    Eigen::Index queries = 4) {
   const auto mesh = journal->NewMesh();
-  EXPECT_FALSE(mesh->WriteStart(RecordedSphere(mesh), std::chrono::system_clock::now()));
+  EXPECT_FALSE(mesh->WriteStart(RecordedSphere(mesh).request, std::chrono::system_clock::now()));
   for (std::uint64_t round = 1; round <= rounds; ++round) {
     EXPECT_FALSE(WriteOneRound(mesh.get(), round, queries));
   }

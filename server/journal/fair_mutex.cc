@@ -1,8 +1,8 @@
-#include "server/journal/turns.h"
+#include "server/journal/fair_mutex.h"
 
 namespace stellate::server {
 
-void Turns::Take(Place place) {
+void FairMutex::Lock(Place place) {
   std::unique_lock lock(mutex_);
   if (!taken_) {
     taken_ = true;
@@ -13,7 +13,7 @@ void Turns::Take(Place place) {
   self.called.wait(lock, [&self] { return self.turn; });
 }
 
-void Turns::Give() {
+void FairMutex::Unlock() {
   const std::lock_guard lock(mutex_);
   std::deque<Waiter*>& queue = hurried_.empty() ? others_ : hurried_;
   if (queue.empty()) {
@@ -26,7 +26,7 @@ void Turns::Give() {
   next->called.notify_one();  // under the lock: once it has its turn it may be gone
 }
 
-std::size_t Turns::waiting() const {
+std::size_t FairMutex::waiting() const {
   const std::lock_guard lock(mutex_);
   return hurried_.size() + others_.size();
 }

@@ -9,12 +9,12 @@ namespace stellate::server {
 
 // A lock that each gets in its turn: handed over in the order in which it was asked for, but first
 // to those in a hurry. Whoever gives it up and asks again, over and over, holds up nobody.
-class Turns {
+class FairMutex {
  public:
   enum class Place { kLast, kFirst };  // in the queue; kFirst: behind others in a hurry
 
-  void Take(Place place);
-  void Give();
+  void Lock(Place place);
+  void Unlock();
   std::size_t waiting() const;
 
  private:
@@ -29,15 +29,15 @@ class Turns {
 };
 
 // Holds it while it lives.
-class Turn {
+class FairLock {
  public:
-  Turn(Turns& turns, Turns::Place place) : turns_(turns) { turns_.Take(place); }
-  ~Turn() { turns_.Give(); }
-  Turn(const Turn&) = delete;
-  Turn& operator=(const Turn&) = delete;
+  FairLock(FairMutex& mutex, FairMutex::Place place) : mutex_(mutex) { mutex_.Lock(place); }
+  ~FairLock() { mutex_.Unlock(); }
+  FairLock(const FairLock&) = delete;
+  FairLock& operator=(const FairLock&) = delete;
 
  private:
-  Turns& turns_;
+  FairMutex& mutex_;
 };
 
 }  // namespace stellate::server

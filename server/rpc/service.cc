@@ -1,4 +1,4 @@
-#include "server/rpc/rpcs.h"
+#include "server/rpc/service.h"
 
 #include <exception>
 #include <new>
@@ -8,6 +8,7 @@
 #include "core/base/message.h"
 #include "server/base/log.h"
 #include "server/convert/error_map.h"
+#include "server/rpc/rpcs.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 
 namespace stellate::server {
@@ -19,14 +20,14 @@ class UnaryCall final : public grpc::ServerBidiReactor<Request, Response> {
  public:
   using Handler = grpc::Status (*)(const Call&, const Request&, Response*);
 
-  UnaryCall(ServerState& service, const grpc::CallbackServerContext& context, Handler handler)
+  UnaryCall(ServerState& state, const grpc::CallbackServerContext& context, Handler handler)
       : handler_(handler) {
-    auto caller = Identify(service, context);
+    auto caller = Identify(state, context);
     if (!caller) {
       this->Finish(caller.error());
       return;
     }
-    call_.emplace(Call{service, std::move(*caller)});
+    call_.emplace(Call{state, std::move(*caller)});
     this->StartRead(&request_);
   }
 
@@ -72,7 +73,7 @@ template <typename Request, typename Response>
 void Rpcs::AddUnary(const char* path,
                     grpc::Status (*handler)(const Call&, const Request&, Response*)) {
   Add<Request, Response>(path, [this, handler](grpc::CallbackServerContext* context) {
-    return new UnaryCall<Request, Response>(service_, *context, handler);
+    return new UnaryCall<Request, Response>(state_, *context, handler);
   });
 }
 
@@ -80,11 +81,11 @@ template <typename Request, typename Response>
 void Rpcs::AddStream(const char* path, grpc::ServerBidiReactor<Request, Response>* (*handler)(
                                            ServerState&, grpc::CallbackServerContext*)) {
   Add<Request, Response>(path, [this, handler](grpc::CallbackServerContext* context) {
-    return handler(service_, context);
+    return handler(state_, context);
   });
 }
 
-Rpcs::Rpcs(ServerState* service) : service_(*service) {
+Rpcs::Rpcs(ServerState* state) : state_(*state) {
   AddUnary("/stellate.v1.Stellate/CreateMesh", CreateMesh);
   AddUnary("/stellate.v1.Stellate/GetMesh", GetMesh);
   AddUnary("/stellate.v1.Stellate/ListMeshes", ListMeshes);

@@ -1,0 +1,59 @@
+#include "server/rpc/call.h"
+
+#include "core/base/message.h"
+#include "server/convert/error_map.h"
+
+namespace stellate::server {
+tl::expected<std::shared_ptr<Session>, grpc::Status> FindMesh(const ServerState& state,
+                                                              const Identity& caller,
+                                                              const std::string& name,
+                                                              const std::string& field) {
+  if (!IsMeshName(name)) {
+    return tl::unexpected(
+        Refusal(v1::ERROR_REASON_INVALID_ARGUMENT,
+                core::Message(field, " is \"", Cut(name, 100),
+                              "\" but must be \"meshes/\" and 32 hexadecimal digits: use the name "
+                              "that CreateMesh returned"),
+                field));
+  }
+  auto session = state.store.Find(name);
+  if (session == nullptr || session->request().owner != caller.owner) {
+    return tl::unexpected(Refusal(v1::ERROR_REASON_MESH_NOT_FOUND,
+                                  core::Message("there is no mesh ", name,
+                                                ": the name is wrong, or it was deleted, or it "
+                                                "ended too long ago to be kept")));
+  }
+  return session;
+}
+
+tl::expected<Identity, grpc::Status> Identify(ServerState& state,
+                                              const grpc::ServerContextBase& context) {
+  auto identity = state.authenticator->Identify(context);
+  if (!identity) state.metrics.Refused();
+  return identity;
+}
+
+grpc::Status Refuse(ServerState& state, const Refused& refused, const std::string& prefix) {
+  if (refused.limit) state.metrics.LimitReached(refused.limit->setting);
+  return ToGrpc(refused, prefix);
+}
+
+tl::expected<std::unique_ptr<MemoryBudget::Account>, grpc::Status> CountStream(
+    ServerState& state, const Session& session, std::uint64_t part) {
+  auto memory = MemoryBudget::Open(state.stream_memory, session.request().owner);
+  const auto full = memory->Set(EstimateStreamBytes(session.request().spec, part));
+  if (full) return tl::unexpected(Refuse(state, *full));
+  return memory;
+}
+
+grpc::Status NoRequest() {
+  return Refusal(v1::ERROR_REASON_INVALID_ARGUMENT,
+                 "no request came that this rpc understands: send one message, as "
+                 "stellate/v1/stellate.proto defines it");
+}
+
+grpc::Status ShuttingDown() {
+  return Refusal(v1::ERROR_REASON_SHUTTING_DOWN, "the server is stopping: connect again later");
+}
+
+}  // namespace stellate::server
