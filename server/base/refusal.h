@@ -19,8 +19,9 @@ struct LimitHit {
 struct Refused : core::Status {
   Refused(core::Status status)  // NOLINT: every status is one
       : core::Status(std::move(status)) {}
-  Refused(LimitHit hit, std::string words)
-      : core::Status{core::StatusCode::kLimitExceeded, std::move(words)}, limit(std::move(hit)) {}
+  Refused(LimitHit hit, std::string words, std::string of_field = "")
+      : core::Status{core::StatusCode::kLimitExceeded, std::move(words), std::move(of_field)},
+        limit(std::move(hit)) {}
 
   std::optional<LimitHit> limit;
 };

@@ -27,15 +27,19 @@ core::Status CheckArray(const v1::Array& array, std::initializer_list<std::uint6
   const bool same =
       std::equal(array.shape().begin(), array.shape().end(), wanted.begin(), wanted.end());
   if (!same) {
-    return {code, core::Message(name, " has the shape ", ShapeText(array.shape()), " but needs ",
-                                ShapeText(wanted), ": send an array of float64 of that shape")};
+    return {code,
+            core::Message(name, " has the shape ", ShapeText(array.shape()), " but needs ",
+                          ShapeText(wanted), ": send an array of float64 of that shape"),
+            name};
   }
   std::uint64_t bytes = sizeof(double);
   for (const std::uint64_t extent : shape) bytes *= extent;
   if (array.data().size() != bytes) {
-    return {code, core::Message(name, " has ", array.data().size(), " bytes but its shape ",
-                                ShapeText(wanted), " needs ", bytes,
-                                ": send little-endian float64 in C order")};
+    return {code,
+            core::Message(name, " has ", array.data().size(), " bytes but its shape ",
+                          ShapeText(wanted), " needs ", bytes,
+                          ": send little-endian float64 in C order"),
+            name};
   }
   return core::Status::Ok();
 }

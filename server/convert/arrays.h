@@ -18,7 +18,8 @@ namespace stellate::server {
 std::string ShapeText(const google::protobuf::RepeatedField<std::uint32_t>& shape);
 
 // Ok if `array` has just this shape and the bytes that it needs; else `code`, with what came and
-// what was expected. `name` starts the message.
+// what was expected. `name` starts the message, and is
+// the field.
 core::Status CheckArray(const v1::Array& array, std::initializer_list<std::uint64_t> shape,
                         const std::string& name, core::StatusCode code);
 

@@ -1,7 +1,5 @@
 #include "server/convert/error_map.h"
 
-#include <algorithm>
-#include <cctype>
 #include <string_view>
 
 #include "stellate/rpc/status_details.pb.h"
@@ -125,20 +123,6 @@ grpc::Status Refusal(v1::ErrorReason reason, const std::string& message, const s
   return {code, details.message(), details.SerializeAsString()};
 }
 
-std::string FieldOf(const std::string& message) {
-  if (message.starts_with("neither ")) return "bounding_box";
-  const auto end = std::find_if(message.begin(), message.end(), [](unsigned char c) {
-    return !(std::islower(c) || std::isdigit(c) || c == '_' || c == '.');
-  });
-  const std::string word(message.begin(), end);
-  // A field is followed by a space and its symbol or a verb; anything else is a sentence.
-  const std::string_view rest(message.data() + word.size(), message.size() - word.size());
-  for (const std::string_view after : {" (", " is ", " has ", " have ", " starts ", " names "}) {
-    if (!word.empty() && rest.starts_with(after)) return word;
-  }
-  return "";
-}
-
 grpc::Status ToGrpc(const core::Status& status, const std::string& prefix) {
   return ToGrpc(Refused(status), prefix);
 }
@@ -147,7 +131,7 @@ grpc::Status ToGrpc(const Refused& status, const std::string& prefix) {
   if (status.ok()) return grpc::Status::OK;
   const bool of_request = status.code == core::StatusCode::kInvalidArgument ||
                           status.code == core::StatusCode::kLimitExceeded;
-  const std::string field = of_request ? FieldOf(status.message) : "";
+  const std::string field = of_request ? status.field : "";
   return Refusal(ReasonOf(status.code), status.message, field.empty() ? "" : prefix + field,
                  status.limit);
 }

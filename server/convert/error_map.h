@@ -24,12 +24,9 @@ grpc::StatusCode CodeOf(v1::ErrorReason reason);
 
 v1::ErrorReason ReasonOf(core::StatusCode code);  // UNSPECIFIED for kOk alone
 
-// OK for Ok. `prefix` goes before the field that the message starts with, if it names one.
+// OK for Ok. `prefix` goes before the field of the request that is to blame, if one is.
 grpc::Status ToGrpc(const core::Status& status, const std::string& prefix = "");
 grpc::Status ToGrpc(const Refused& refused, const std::string& prefix = "");
-
-// "epsilon" of "epsilon is -1 but ..."; empty when the message does not start with a field.
-std::string FieldOf(const std::string& message);
 
 // At most `limit` bytes of `text`, never cutting a UTF-8 character.
 std::string Cut(const std::string& text, std::size_t limit);

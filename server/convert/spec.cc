@@ -16,15 +16,18 @@ using Eigen::Index;
 
 constexpr std::size_t kMaxLabelBytes = 128;
 
-Status Invalid(std::string message) { return {StatusCode::kInvalidArgument, std::move(message)}; }
-Refused TooLarge(const char* setting, std::uint64_t value, std::string message) {
-  return {{setting, Message(value), "mesh"}, std::move(message)};
+Status Invalid(const char* field, std::string message) {
+  return {StatusCode::kInvalidArgument, std::move(message), field};
+}
+Refused TooLarge(const char* field, const char* setting, std::uint64_t value, std::string message) {
+  return {{setting, Message(value), "mesh"}, std::move(message), field};
 }
 
 // Protobuf counts from 0 to 2^32 - 1; what an int cannot hold no rule would accept.
 Status ToInt(std::uint32_t value, const char* field, int* out) {
   if (value > static_cast<std::uint32_t>(std::numeric_limits<int>::max())) {
-    return {StatusCode::kLimitExceeded, Message(field, " is ", value, " but must be far smaller")};
+    return {StatusCode::kLimitExceeded, Message(field, " is ", value, " but must be far smaller"),
+            field};
   }
   *out = static_cast<int>(value);
   return Status::Ok();
@@ -35,12 +38,12 @@ Refused ReadDimensions(const v1::MeshSpec& spec, const Config& config, core::Spe
   if (!status.ok()) return status;
   // What no server of this build can do, core::Validate says.
   if (out->dimension > config.max_dimension && out->dimension <= core::kMaxDimension) {
-    return TooLarge("max-dimension", config.max_dimension,
+    return TooLarge("dimension", "max-dimension", config.max_dimension,
                     Message("dimension (k) is ", out->dimension, " but this server allows ",
                             config.max_dimension, ": raise --max-dimension"));
   }
   if (spec.ambient_dimension() > static_cast<std::uint32_t>(config.max_ambient_dimension)) {
-    return TooLarge("max-ambient-dimension", config.max_ambient_dimension,
+    return TooLarge("ambient_dimension", "max-ambient-dimension", config.max_ambient_dimension,
                     Message("ambient_dimension (d) is ", spec.ambient_dimension(),
                             " but this server allows ", config.max_ambient_dimension,
                             ": map the manifold into a space of lower dimension, or raise "
@@ -88,7 +91,8 @@ Status ReadAudit(const v1::MeshSpec& spec, core::Specification* out) {
       out->audit = core::Audit::kThorough;
       return Status::Ok();
     default:
-      return Invalid(Message("audit is ", static_cast<int>(spec.audit()),
+      return Invalid("audit",
+                     Message("audit is ", static_cast<int>(spec.audit()),
                              " but this server knows AUDIT_STANDARD and AUDIT_THOROUGH alone"));
   }
 }
@@ -102,9 +106,10 @@ Status ReadCriteria(const v1::MeshSpec& spec, core::Specification* out) {
   if (c.has_small_sliver_radius()) to.small_sliver_radius = c.small_sliver_radius();
   if (c.has_advance_step()) {
     if (c.advance_step() < spec.epsilon()) {
-      return Invalid(Message("criteria.advance_step is ", c.advance_step(),
-                             " but must be at least epsilon, ", spec.epsilon(),
-                             ": leave it unset for 3 epsilon"));
+      return Invalid(
+          "criteria.advance_step",
+          Message("criteria.advance_step is ", c.advance_step(), " but must be at least epsilon, ",
+                  spec.epsilon(), ": leave it unset for 3 epsilon"));
     }
     to.advance_step = c.advance_step();
   }
@@ -127,14 +132,15 @@ Status ReadCriteria(const v1::MeshSpec& spec, core::Specification* out) {
 Refused ReadSeconds(double value, double standard, double most, const char* field, double* out) {
   *out = value == 0 ? std::min(standard, most) : value;
   if (!(*out > 0)) {
-    return Invalid(Message(field, " is ", value,
-                           " but must be a number of seconds above 0: leave it 0 for the "
-                           "server's default"));
+    return Invalid(field, Message(field, " is ", value,
+                                  " but must be a number of seconds above 0: leave it 0 for the "
+                                  "server's default"));
   }
   if (*out > most) {
     return {{"max-wait", Message(most), "mesh"},
             Message(field, " is ", value, " but this server allows ", most,
-                    ": ask for less, or raise --max-wait")};
+                    ": ask for less, or raise --max-wait"),
+            field};
   }
   return Status::Ok();
 }
@@ -148,7 +154,7 @@ Refused ReadLimits(const v1::MeshSpec& spec, const Config& config, core::Specifi
   to.max_vertices = limits.max_vertices() == 0 ? most_vertices : limits.max_vertices();
   if (to.max_vertices > most_vertices) {
     const bool room_binds = room < config.max_vertices;
-    return TooLarge(room_binds ? "max-coordinates" : "max-vertices",
+    return TooLarge("limits.max_vertices", room_binds ? "max-coordinates" : "max-vertices",
                     room_binds ? config.max_coordinates : config.max_vertices,
                     Message("limits.max_vertices is ", to.max_vertices, " but this server allows ",
                             most_vertices, " in ", d,
@@ -158,7 +164,7 @@ Refused ReadLimits(const v1::MeshSpec& spec, const Config& config, core::Specifi
   to.max_batch_queries = limits.max_batch_queries();
   to.max_rounds = limits.max_rounds() == 0 ? config.max_rounds : limits.max_rounds();
   if (to.max_rounds > config.max_rounds) {
-    return TooLarge("max-rounds", config.max_rounds,
+    return TooLarge("limits.max_rounds", "max-rounds", config.max_rounds,
                     Message("limits.max_rounds is ", to.max_rounds, " but this server allows ",
                             config.max_rounds, ": ask for fewer, or raise --max-rounds"));
   }
@@ -183,7 +189,8 @@ Refused ReadTimeouts(const v1::MeshLimits& limits, const Config& config, OracleT
   if (!refused.ok()) return refused;
   if (limits.busy_seconds() == 0) busy = std::max(busy, answer);
   if (busy < answer) {
-    return Invalid(Message("limits.busy_seconds is ", busy, " but must be limits.answer_seconds (",
+    return Invalid("limits.busy_seconds",
+                   Message("limits.busy_seconds is ", busy, " but must be limits.answer_seconds (",
                            answer, ") or more: a worker may take that long without a word"));
   }
   *to = {ToDuration(answer), ToDuration(busy), ToDuration(worker_wait)};
@@ -207,8 +214,8 @@ Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config) {
   if (status.ok()) status = ReadLimits(spec, config, &request.spec);
   if (status.ok()) status = ReadTimeouts(spec.limits(), config, &request.timeouts);
   if (status.ok() && request.label.size() > kMaxLabelBytes) {
-    status = Invalid(Message("label has ", request.label.size(), " bytes but may have ",
-                             kMaxLabelBytes, ": shorten it"));
+    status = Invalid("label", Message("label has ", request.label.size(), " bytes but may have ",
+                                      kMaxLabelBytes, ": shorten it"));
   }
   if (status.ok()) status = core::Validate(request.spec);
   if (!status.ok()) return tl::unexpected(std::move(status));

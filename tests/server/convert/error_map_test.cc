@@ -51,16 +51,14 @@ TEST(ErrorMap, EachReasonOfAReplyHasACode) {
   }
 }
 
-TEST(ErrorMap, TheFieldAtFaultIsFoundInTheMessage) {
-  EXPECT_EQ(FieldOf("epsilon is -1 but must be more"), "epsilon");
-  EXPECT_EQ(FieldOf("dimension (k) is 0"), "dimension");
-  EXPECT_EQ(FieldOf("bounding_box.lower has 2 coordinates"), "bounding_box.lower");
-  EXPECT_EQ(FieldOf("neither seeds nor bounding_box is given"), "bounding_box");
-  EXPECT_EQ(FieldOf("the server runs 3 meshes"), "");
-  EXPECT_EQ(FieldOf(""), "");
-  EXPECT_EQ(FieldIn(ToGrpc({StatusCode::kInvalidArgument, "epsilon is -1"}, "spec.")),
-            "spec.epsilon");
-  EXPECT_EQ(FieldIn(ToGrpc({StatusCode::kInvalidArgument, "no field"}, "spec.")), "");
+TEST(ErrorMap, NamesTheFieldThatTheStatusNames) {
+  const core::Status status{StatusCode::kInvalidArgument, "it is -1", "epsilon"};
+  EXPECT_EQ(FieldIn(ToGrpc(status)), "epsilon");
+  EXPECT_EQ(FieldIn(ToGrpc(status, "spec.")), "spec.epsilon");
+  EXPECT_EQ(FieldIn(ToGrpc(Refused({"max-vertices", "7", "mesh"}, "too many", "limits"), "spec.")),
+            "spec.limits");
+  EXPECT_EQ(FieldIn(ToGrpc(core::Status{StatusCode::kInvalidArgument, "epsilon is -1"}, "spec.")),
+            "");
 }
 
 TEST(ErrorMap, LongMessagesFitIntoTrailers) {
