@@ -33,6 +33,11 @@ class Mesher {
   // The queries of the next round, or nullptr when the run is over. The batch stays the same, and
   // the pointer valid, until Absorb, Cancel or Fail.
   virtual const QueryBatch* NextBatch() = 0;
+  // The same, for whoever may still need it after Absorb: it lives as long as anyone holds it.
+  virtual std::shared_ptr<const QueryBatch> ShareBatch() {
+    const QueryBatch* const batch = NextBatch();
+    return batch == nullptr ? nullptr : std::make_shared<const QueryBatch>(*batch);
+  }
 
   // Takes the answers to the current batch and refines. On error (CheckAnswers, idempotence,
   // kFailedPrecondition without a current batch) nothing has changed: the same batch may be

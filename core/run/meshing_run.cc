@@ -56,6 +56,14 @@ const QueryBatch* MeshingRun<K>::NextBatch() {
 }
 
 template <int K>
+std::shared_ptr<const QueryBatch> MeshingRun<K>::ShareBatch() {
+  const QueryBatch* const batch = NextBatch();
+  if (batch == nullptr) return nullptr;
+  if (batch == batch_.get()) return batch_;
+  return std::make_shared<const QueryBatch>(*batch);  // a part: its place is used again
+}
+
+template <int K>
 Status MeshingRun<K>::Check(const QueryBatch& asked, const Answers& answers) const {
   if (answers.blocks.size() != asked.blocks.size())
     return {StatusCode::kOracleShape,
@@ -146,7 +154,7 @@ void MeshingRun<K>::NextQuestions() {
   while (!over_) {
     Asker& asker = trip_ ? static_cast<Asker&>(*trip_) : *certification_;
     if (std::vector<QueryBlock> blocks = asker.Questions(); !blocks.empty()) {
-      batch_ = QueryBatch{0, std::move(blocks)};
+      batch_ = std::make_shared<QueryBatch>(QueryBatch{0, std::move(blocks)});
       return;
     }
     if (trip_)

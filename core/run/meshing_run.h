@@ -29,6 +29,7 @@ class MeshingRun final : public Mesher {
   explicit MeshingRun(Specification spec);
 
   const QueryBatch* NextBatch() override;
+  std::shared_ptr<const QueryBatch> ShareBatch() override;
   Expected<MeshDelta> Absorb(const Answers& answers) override;
   void Interrupt() override { interruption_.Raise(); }
   void Cancel() override { Finish(Termination::kCancelled); }
@@ -76,7 +77,7 @@ class MeshingRun final : public Mesher {
   MeshDelta delta_;  // of the round being absorbed
   bool over_ = false;
 
-  std::optional<QueryBatch> batch_;  // of the open round
+  std::shared_ptr<QueryBatch> batch_;  // of the open round; null: there is none
   std::optional<BatchParts> parts_;  // of batch_, if that is too large to ask at once
   std::uint64_t whole_rounds_ = 0;   // rounds in which parts count once
 

@@ -209,7 +209,7 @@ void RecordedMesh::TakeAnswers(const std::shared_ptr<const Round>& round, std::s
                                Index first, Index count) {
   {
     const std::lock_guard lock(mutex_);
-    if (round_ == 0 || round->batch.round != static_cast<std::uint64_t>(round_)) return;
+    if (round_ == 0 || round->batch->round != static_cast<std::uint64_t>(round_)) return;
     answers_ = round;
     pending_.push_back({block, first, first + count});
   }

@@ -219,7 +219,7 @@ void OraclePool::Compare(const SecondAnswer& second, Index first, Index count) {
     }
     if (observer_ != nullptr) observer_->OnDisagreement();
     Fail({FailureReason::kWorkersDisagree,
-          core::Message("round ", chunk.round->batch.round, ", block ", chunk.block_index, ", ",
+          core::Message("round ", chunk.round->batch->round, ", block ", chunk.block_index, ", ",
                         FindDisagreement(spec_, chunk.block(), q, counted, own))});
     break;
   }
@@ -246,16 +246,16 @@ void OraclePool::Fail(MeshFailure failure) {
   changed_.notify_one();
 }
 
-OraclePool::Outcome OraclePool::Ask(const core::QueryBatch& batch,
+OraclePool::Outcome OraclePool::Ask(std::shared_ptr<const core::QueryBatch> batch,
                                     const std::function<void()>& meanwhile,
                                     const std::vector<PartOfRound>& known) {
-  std::shared_ptr<Round> round = MakeRound(batch);
+  std::shared_ptr<Round> round = MakeRound(std::move(batch));
   for (const PartOfRound& part : known) PutAnswers(part, &round->answers);
   std::unique_lock lock(mutex_);
   round_ = round;
   std::erase_if(titles_, [this](const auto& entry) { return !members_.contains(entry.first); });
   TimePoint now = Clock::now();
-  dispatch_.Begin(Measure(batch, known), now);
+  dispatch_.Begin(Measure(*round->batch, known), now);
   auto first_deliveries = AssignLocked(now);
   lock.unlock();
   Send(std::move(first_deliveries));
@@ -339,13 +339,13 @@ std::vector<OraclePool::Delivery> OraclePool::AssignLocked(TimePoint now) {
   return deliveries;
 }
 
-std::shared_ptr<Round> OraclePool::MakeRound(const core::QueryBatch& batch) const {
+std::shared_ptr<Round> OraclePool::MakeRound(std::shared_ptr<const core::QueryBatch> batch) const {
   auto round = std::make_shared<Round>();
-  round->batch = batch;
-  round->answers = EmptyAnswers(spec_.dimension, spec_.ambient_dimension, batch);
-  for (const core::QueryBlock& block : batch.blocks) {
+  round->answers = EmptyAnswers(spec_.dimension, spec_.ambient_dimension, *batch);
+  for (const core::QueryBlock& block : batch->blocks) {
     round->answered_by.emplace_back(static_cast<std::size_t>(block.size()), WorkerId{0});
   }
+  round->batch = std::move(batch);
   return round;
 }
 

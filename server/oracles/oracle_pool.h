@@ -23,7 +23,7 @@ namespace stellate::server {
 // One round on its way: the questions, and the answers as they come in. Chunks write to disjoint
 // columns, so no lock is needed; it lives until the last chunk lets go of it.
 struct Round {
-  core::QueryBatch batch;
+  std::shared_ptr<const core::QueryBatch> batch;
   core::Answers answers;  // of full size from the start
   // Of each query of each block, whose answer it has; 0: nobody's yet. The pool's lock guards it.
   std::vector<std::vector<WorkerId>> answered_by;
@@ -51,7 +51,7 @@ struct Chunk {
   WorkerId worker = 0;  // of a claimed chunk: who answers
   bool second = false;  // of a claimed chunk: another's answer counts, this one is compared with it
 
-  const core::QueryBlock& block() const { return round->batch.blocks[block_index]; }
+  const core::QueryBlock& block() const { return round->batch->blocks[block_index]; }
 };
 
 // What becomes of a worker's stream when its mesh is over.
@@ -111,7 +111,7 @@ class OraclePool {
   // Every wait in it ends: with answers, or by a limit of the options. What is `known` is asked of
   // nobody: answers to this very batch, ascending by block and query, no query twice.
   Outcome Ask(
-      const core::QueryBatch& batch, const std::function<void()>& meanwhile = [] {},
+      std::shared_ptr<const core::QueryBatch> batch, const std::function<void()>& meanwhile = [] {},
       const std::vector<PartOfRound>& known = {});
   // Told of queries [first, first + count) of a block as their answers are taken over: they change
   // no more while the round lives. From any thread; must not block.
@@ -143,7 +143,7 @@ class OraclePool {
   };
 
   std::vector<Delivery> AssignLocked(TimePoint now);
-  std::shared_ptr<Round> MakeRound(const core::QueryBatch& batch) const;
+  std::shared_ptr<Round> MakeRound(std::shared_ptr<const core::QueryBatch> batch) const;
   std::vector<Dispatch::Block> Measure(const core::QueryBatch& batch,
                                        const std::vector<PartOfRound>& known) const;
   MeshFailure Describe(Dispatch::Failure failure) const;

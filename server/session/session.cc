@@ -165,7 +165,7 @@ void Session::RunRounds(core::Mesher* mesher) {
       return;
     }
     if (!FitsMemory(mesher, static_cast<std::uint64_t>(batch->size()))) continue;
-    replaying_ ? ReplayRound(mesher, *batch) : RunRound(mesher, *batch);
+    replaying_ ? ReplayRound(mesher, *batch) : RunRound(mesher, mesher->ShareBatch());
   }
 }
 
@@ -224,9 +224,9 @@ void Session::RepeatEnd(core::Mesher* mesher) {
 }
 
 // While the workers are at this round's queries, watchers are shown what the last one led to.
-void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
+void Session::RunRound(core::Mesher* mesher, const std::shared_ptr<const core::QueryBatch>& batch) {
   SessionJournal::Known known;
-  if (ports().journal != nullptr) known = ports().journal->BeginRound(batch);
+  if (ports().journal != nullptr) known = ports().journal->BeginRound(*batch);
   if (known.failure) return FailBlameless(mesher, std::move(*known.failure));
   OraclePool::Outcome outcome = pool_.Ask(
       batch,
@@ -243,17 +243,16 @@ void Session::RunRound(core::Mesher* mesher, const core::QueryBatch& batch) {
   const core::Answers& answers = outcome.round->answers;
   if (ports().journal != nullptr) {
     const std::uint64_t vertices = mesher->progress().vertices;
-    if (auto failure = ports().journal->WriteRound(batch, answers, vertices)) {
+    if (auto failure = ports().journal->WriteRound(*batch, answers, vertices)) {
       FailBlameless(mesher, std::move(*failure));
       return;
     }
   }
-  const std::uint64_t round = batch.round;  // the batch is gone once it is absorbed
-  const auto queries = static_cast<std::size_t>(batch.size());
+  const auto queries = static_cast<std::size_t>(batch->size());
   if (!Absorb(mesher, answers)) return;
   if (ports().observer != nullptr) ports().observer->OnRound(queries);
   if (LogEnabled(LogLevel::kDebug)) {
-    Log(LogLevel::kDebug, {request().name, round, request().owner}, "round answered",
+    Log(LogLevel::kDebug, {request().name, batch->round, request().owner}, "round answered",
         LogFields().Add("queries", queries).Add("vertices", mesher->progress().vertices));
   }
 }

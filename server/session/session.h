@@ -137,7 +137,7 @@ class Session {
   void ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch);
   void EndReplay();
   void RepeatEnd(core::Mesher* mesher);
-  void RunRound(core::Mesher* mesher, const core::QueryBatch& batch);
+  void RunRound(core::Mesher* mesher, const std::shared_ptr<const core::QueryBatch>& batch);
   bool Absorb(core::Mesher* mesher, const core::Answers& answers);
   std::optional<MeshFailure> PublishRound(core::Mesher* mesher);
   bool FitsMemory(core::Mesher* mesher, std::uint64_t queries);

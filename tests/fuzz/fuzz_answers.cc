@@ -43,7 +43,7 @@ Asked MakeChunk(Script* script) {
     block.radii = Eigen::VectorXd::Constant(first + count, 2.0);
   }
   auto round = std::make_shared<server::Round>();
-  round->batch.blocks.push_back(std::move(block));
+  round->batch = std::make_shared<core::QueryBatch>(core::QueryBatch{0, {std::move(block)}});
   asked.chunk = {1, std::move(round), 0, first, count};
   return asked;
 }

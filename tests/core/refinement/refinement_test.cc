@@ -240,5 +240,27 @@ TEST(Refinement, NeverCertifiesTheWrongTopologyQuietly) {
   }
 }
 
+// Whoever is late with its answer still has what it was asked.
+TEST(Refinement, LeavesSharedQuestionsAsTheyWere) {
+  const auto manifold = Make("sphere");
+  for (const int most : {0, 50}) {
+    Specification spec = SpecificationFor(*manifold, 0.4);
+    spec.limits.max_batch_queries = most;
+    const auto mesher = testing::NewMesher(spec);
+    std::shared_ptr<const QueryBatch> before;
+    Eigen::MatrixXd asked;
+    while (const auto batch = mesher->ShareBatch()) {
+      if (most == 0) EXPECT_EQ(batch.get(), mesher->NextBatch()) << "not a copy";
+      if (before != nullptr) EXPECT_EQ(before->blocks.front().points, asked) << before->round;
+      before = batch;
+      asked = batch->blocks.front().points;
+      testing::Step(*mesher, testing::AnswererFor(*manifold));
+    }
+    ASSERT_NE(before, nullptr);
+    EXPECT_EQ(before->blocks.front().points, asked) << "when the run is over";
+    EXPECT_EQ(mesher->ShareBatch(), nullptr);
+  }
+}
+
 }  // namespace
 }  // namespace stellate::core

@@ -164,7 +164,8 @@ class ConvertOracleTest : public ::testing::Test {
     block.radii = Eigen::VectorXd::Random(5);
     block.want_tangents = block.want_sizes = true;
     chunk_.round = std::make_shared<Round>();
-    chunk_.round->batch.blocks = {block};
+    batch_->blocks = {block};
+    chunk_.round->batch = batch_;
     chunk_.lease = 9;
     chunk_.first = 1;
     chunk_.count = 2;
@@ -176,6 +177,7 @@ class ConvertOracleTest : public ::testing::Test {
   }
 
   const core::Specification spec_ = testing::SphereSpec(0.1);
+  const std::shared_ptr<core::QueryBatch> batch_ = std::make_shared<core::QueryBatch>();
   Chunk chunk_;
   v1::AnswerChunk good_;
 };
@@ -192,7 +194,7 @@ TEST_F(ConvertOracleTest, AChunkCarriesItsColumns) {
   EXPECT_EQ(MatrixFromProto(out.points(), 3, 2), block.points.middleCols(1, 2));
   EXPECT_EQ(MatrixFromProto(out.bases(), 6, 2), block.bases.middleCols(1, 2));
   EXPECT_EQ(MatrixFromProto(out.radii(), 1, 2), block.radii.segment(1, 2).transpose());
-  chunk_.round->batch.blocks[0].kind = core::QueryKind::kClosestPoint;
+  batch_->blocks[0].kind = core::QueryKind::kClosestPoint;
   v1::QueryChunk closest;
   ToProto(chunk_, spec_, &closest);
   EXPECT_FALSE(closest.has_bases());
@@ -209,7 +211,7 @@ TEST_F(ConvertOracleTest, AnswersAreReadColumnByColumn) {
 }
 
 TEST_F(ConvertOracleTest, SizesThatWereNotAskedForAreIgnored) {
-  chunk_.round->batch.blocks[0].want_sizes = false;
+  batch_->blocks[0].want_sizes = false;
   good_.mutable_sizes()->add_shape(9);
   const auto answer = FromProto(good_, chunk_, spec_);
   ASSERT_TRUE(answer);
@@ -217,7 +219,7 @@ TEST_F(ConvertOracleTest, SizesThatWereNotAskedForAreIgnored) {
 }
 
 TEST_F(ConvertOracleTest, TangentsThatWereNotAskedForAreIgnored) {
-  chunk_.round->batch.blocks[0].want_tangents = false;
+  batch_->blocks[0].want_tangents = false;
   const auto answer = FromProto(good_, chunk_, spec_);
   ASSERT_TRUE(answer);
   EXPECT_EQ(answer->tangents.size(), 0);

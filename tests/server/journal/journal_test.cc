@@ -74,7 +74,7 @@ TEST_F(JournalTest, AnswersOfARoundThatIsNotWholeAreKept) {
   const core::QueryBatch batch = BatchOf(2, 1000);
   const core::Answers answers = AnswersTo(batch);
   const auto round = std::make_shared<Round>();
-  round->batch = batch;
+  round->batch = std::make_shared<core::QueryBatch>(batch);
   round->answers = answers;
   const auto journal = Open();
   const auto mesh = WriteRounds(journal.get(), 1);

@@ -95,11 +95,12 @@ class OraclePoolTest : public ::testing::Test {
 
   // Asks on a thread of its own, as a session does.
   std::future<OraclePool::Outcome> Ask(OraclePool* pool) {
-    return std::async(std::launch::async, [this, pool] { return pool->Ask(batch_); });
+    return std::async(std::launch::async, [this, pool] { return pool->Ask(shared_); });
   }
 
   void ExpectAllAnswered(const OraclePool::Outcome& outcome) {
     ASSERT_TRUE(outcome.round);
+    EXPECT_EQ(outcome.round->batch, shared_) << "questions are shared, not copied";
     for (std::size_t b = 0; b < batch_.blocks.size(); ++b) {
       const auto whole = AnswerSphere(batch_.blocks[b], 0, batch_.blocks[b].size());
       EXPECT_EQ(outcome.round->answers.blocks[b].points, whole.points);
@@ -109,7 +110,9 @@ class OraclePoolTest : public ::testing::Test {
   }
 
   const core::Specification spec_ = testing::SphereSpec(0.1);
-  const core::QueryBatch batch_ = SomeQueries(700);
+  const std::shared_ptr<const core::QueryBatch> shared_ =
+      std::make_shared<core::QueryBatch>(SomeQueries(700));
+  const core::QueryBatch& batch_ = *shared_;
   DispatchOptions options_;
 };
 
@@ -147,14 +150,14 @@ TEST_F(OraclePoolTest, WhatIsKnownIsAskedOfNobody) {
   const std::vector<PartOfRound> known = {part(0, 0, 10), part(0, 300, 1), part(0, 301, 99),
                                           part(1, 699, 1)};
   ExpectAllAnswered(pool.Ask(
-      batch_, [] {}, known));
+      shared_, [] {}, known));
   for (std::size_t q = 0; q < asked.size(); ++q) {
     const bool was_known = q < 10 || (q >= 300 && q < 400) || q == 1399;
     EXPECT_EQ(asked[q], was_known ? 0 : 1) << q;
     EXPECT_EQ(told[q], asked[q]) << q;
   }
   worker->Leave();
-  ExpectAllAnswered(pool.Ask(batch_, [] {}, {part(0, 0, 700), part(1, 0, 700)}));
+  ExpectAllAnswered(pool.Ask(shared_, [] {}, {part(0, 0, 700), part(1, 0, 700)}));
 }
 
 TEST_F(OraclePoolTest, TheTimeThatWorkersTakeIsUsedOnce) {
@@ -162,7 +165,7 @@ TEST_F(OraclePoolTest, TheTimeThatWorkersTakeIsUsedOnce) {
   int times = 0;
   const auto worker = std::make_shared<HandWorker>("");
   const WorkerId id = *pool.Join(worker, 0);
-  const auto answered = pool.Ask(batch_, [&] {
+  const auto answered = pool.Ask(shared_, [&] {
     ++times;
     EXPECT_GT(worker->Held(), 0u) << "the questions are out";
     while (worker->Held() > 0) TakeAnswer(&pool, id, worker->Take());
@@ -171,14 +174,14 @@ TEST_F(OraclePoolTest, TheTimeThatWorkersTakeIsUsedOnce) {
   ExpectAllAnswered(answered);
 
   pool.Leave(id);
-  const auto interrupted = pool.Ask(batch_, [&] {
+  const auto interrupted = pool.Ask(shared_, [&] {
     ++times;
     pool.Interrupt();
   });
   EXPECT_EQ(times, 2) << "without a worker, too";
   EXPECT_FALSE(interrupted.round);
   EXPECT_FALSE(interrupted.failure);
-  EXPECT_FALSE(pool.Ask(batch_, [&] { ++times; }).round);
+  EXPECT_FALSE(pool.Ask(shared_, [&] { ++times; }).round);
   EXPECT_EQ(times, 3) << "and where no question goes out any more";
 }
 
@@ -266,7 +269,8 @@ TEST_F(OraclePoolTest, AStragglersOwnAnswerIsComparedWithTheOneThatCounts) {
   batch.round = 1;
   batch.blocks.resize(1);
   batch.blocks[0].points = Eigen::MatrixXd::Random(3, 48);
-  auto outcome = std::async(std::launch::async, [&] { return pool.Ask(batch); });
+  auto outcome = std::async(std::launch::async,
+                            [&] { return pool.Ask(std::make_shared<core::QueryBatch>(batch)); });
   const char* const names[] = {"slow", "quick", "holder"};
   std::vector<std::shared_ptr<HandWorker>> workers;
   std::vector<WorkerId> ids;

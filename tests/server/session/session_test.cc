@@ -227,7 +227,7 @@ TEST(Session, WhatARoundLedToIsShownBeforeTheNextIsAnswered) {
   const auto worker = FakeWorker::Join(
       &running.session->pool(), [&](const Chunk& chunk, core::AnswerBlock* answer) {
         const TimePoint patience = Clock::now() + 60s;
-        while (running.session->history()->revision() + 1 < chunk.round->batch.round) {
+        while (running.session->history()->revision() + 1 < chunk.round->batch->round) {
           if (Clock::now() > patience) return false;
           std::this_thread::sleep_for(1ms);
         }
