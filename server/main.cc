@@ -17,6 +17,7 @@
 #include "server/base/threads.h"
 #include "server/base/version.h"
 #include "server/config/flags.h"
+#include "server/config/listen_address.h"
 #include "server/net/health_check.h"
 #include "server/net/tls.h"
 #include "server/salvage/salvage.h"

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "core/base/message.h"
+#include "server/config/listen_address.h"
 #include "server/drain.h"
 #include "server/grpc_parts/header_bound.h"
 #include "server/net/channel_arguments.h"

@@ -78,8 +78,8 @@ class MeshingRun final : public Mesher {
   bool over_ = false;
 
   std::shared_ptr<QueryBatch> batch_;  // of the open round; null: there is none
-  std::optional<BatchParts> parts_;  // of batch_, if that is too large to ask at once
-  std::uint64_t whole_rounds_ = 0;   // rounds in which parts count once
+  std::optional<BatchParts> parts_;    // of batch_, if that is too large to ask at once
+  std::uint64_t whole_rounds_ = 0;     // rounds in which parts count once
 
   // One of these asks.
   std::unique_ptr<RoundTrip<K>> trip_;

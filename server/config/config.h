@@ -11,21 +11,6 @@
 
 namespace stellate::server {
 
-// Where to listen: a TCP host and port, or a unix socket.
-struct ListenAddress {
-  std::string unix_path;  // set: a unix socket
-  std::string host;       // brackets taken off
-  int port = 0;           // 0: any free one
-
-  bool IsUnix() const { return !unix_path.empty(); }
-  bool IsLoopback() const;     // reachable from this machine alone
-  std::string Target() const;  // as gRPC writes it
-};
-
-// "host:port", "[v6]:port", "unix:/path". `flag` is what a refusal names.
-core::Expected<ListenAddress> ParseListenAddress(const std::string& text,
-                                                 const std::string& flag = "--listen");
-
 // Everything that can be set, with its default; settings.h says what each is for. Times in seconds.
 struct Config {
   std::string listen = "127.0.0.1:7717";

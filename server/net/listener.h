@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/status.h"
-#include "server/config/config.h"
+#include "server/config/listen_address.h"
 
 namespace stellate::server {
 

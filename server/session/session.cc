@@ -49,24 +49,6 @@ Clock::duration AgeOf(std::chrono::system_clock::time_point time) {
   return std::max(std::chrono::duration_cast<Clock::duration>(age), Clock::duration::zero());
 }
 
-const char* SessionStateName(SessionState state) {
-  switch (state) {
-    case SessionState::kWaiting:
-      return "WAITING";
-    case SessionState::kRunning:
-      return "RUNNING";
-    case SessionState::kSucceeded:
-      return "SUCCEEDED";
-    case SessionState::kStopped:
-      return "STOPPED";
-    case SessionState::kCancelled:
-      return "CANCELLED";
-    case SessionState::kFailed:
-      return "FAILED";
-  }
-  return "UNKNOWN";
-}
-
 Session::Session(SessionOptions options, MesherFactory factory)
     : options_(std::move(options)),
       factory_(std::move(factory)),

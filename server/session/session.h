@@ -18,8 +18,6 @@
 
 namespace stellate::server {
 
-enum class SessionState { kWaiting, kRunning, kSucceeded, kStopped, kCancelled, kFailed };
-
 // Told what becomes of a session, for the metrics. From the session's thread; must not block.
 class SessionObserver : public PoolObserver {
  public:
@@ -182,7 +180,5 @@ class Session {
   MeshFailure failure_;
   std::vector<std::weak_ptr<SessionWatcher>> watchers_;
 };
-
-const char* SessionStateName(SessionState state);  // "SUCCEEDED", ...
 
 }  // namespace stellate::server

@@ -11,10 +11,9 @@
 #include "server/history/watch_log.h"
 #include "server/oracles/oracle_pool.h"
 #include "server/session/mesh_request.h"
+#include "server/session/session_state.h"
 
 namespace stellate::server {
-
-enum class SessionState;
 
 // How a mesh ended.
 struct SessionEnd {

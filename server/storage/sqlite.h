@@ -34,7 +34,6 @@ class Sqlite {
   std::string error() const { return sqlite3_errmsg(database_); }
   // The last error: the disk, its quota, or the limit on the file is used up.
   bool IsFull() const;
-  std::int64_t last_id() const { return sqlite3_last_insert_rowid(database_); }
 
  private:
   friend class Statement;

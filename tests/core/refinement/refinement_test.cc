@@ -1,9 +1,8 @@
-#include "core/refinement/criteria.h"
-
 #include <gtest/gtest.h>
 
 #include <string>
 
+#include "core/refinement/criteria.h"
 #include "tests/core/support/in_process_run.h"
 
 namespace stellate::core {

@@ -4,6 +4,8 @@
 
 #include <limits>
 
+#include "server/config/listen_address.h"
+
 namespace stellate::server {
 namespace {
 
