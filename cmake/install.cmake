@@ -9,10 +9,15 @@ include(GNUInstallDirs)
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/stellate)
 function(stellate_export part)  # PART TARGET=NAME...: NAME as in stellate::NAME
   set(targets)
+  set(libraries)  # for pkg-config
   foreach(pair ${ARGN})
     string(REGEX MATCH "^([^=]+)=(.*)$" matched ${pair})
     set_target_properties(${CMAKE_MATCH_1} PROPERTIES EXPORT_NAME ${CMAKE_MATCH_2})
     list(APPEND targets ${CMAKE_MATCH_1})
+    get_target_property(type ${CMAKE_MATCH_1} TYPE)
+    if(type STREQUAL STATIC_LIBRARY)
+      string(APPEND libraries " -l${CMAKE_MATCH_1}")
+    endif()
   endforeach()
   install(TARGETS ${targets} EXPORT stellate-${part}
     ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development
