@@ -50,7 +50,7 @@ class Tree:
             path.relative_to(root).as_posix()
             for top in tops
             for path in sorted((root / top).rglob("*"))
-            if path.suffix in SOURCES and path.is_file()
+            if path.suffix in SOURCES and path.is_file() and "_generated" not in path.parts
         ]
         self.by_name: dict[str, list[str]] = {}
         for file in self.files:

@@ -249,8 +249,12 @@ TEST(Refinement, LeavesSharedQuestionsAsTheyWere) {
     std::shared_ptr<const QueryBatch> before;
     Eigen::MatrixXd asked;
     while (const auto batch = mesher->ShareBatch()) {
-      if (most == 0) EXPECT_EQ(batch.get(), mesher->NextBatch()) << "not a copy";
-      if (before != nullptr) EXPECT_EQ(before->blocks.front().points, asked) << before->round;
+      if (most == 0) {
+        EXPECT_EQ(batch.get(), mesher->NextBatch()) << "not a copy";
+      }
+      if (before != nullptr) {
+        EXPECT_EQ(before->blocks.front().points, asked) << before->round;
+      }
       before = batch;
       asked = batch->blocks.front().points;
       testing::Step(*mesher, testing::AnswererFor(*manifold));
