@@ -8,6 +8,7 @@
 
 #include <condition_variable>
 #include <mutex>
+#include <string_view>
 #include <thread>
 
 #include "core/base/message.h"
@@ -39,6 +40,16 @@ constexpr char kAlive[] = "alive";
 // Beside the calls that a connection may have open: those that its client has reset, and that gRPC
 // is not done with. 5 MB; a client that waits for anything has a few.
 constexpr std::size_t kResetCalls = 256;
+
+CallKind KindOf(const Authenticator& authenticator, std::string_view path,
+                std::string_view authorization) {
+  for (const std::string_view open : {"/grpc.health.", "/grpc.reflection."}) {
+    if (path.substr(0, open.size()) == open) return CallKind::kSmall;
+  }
+  if (!Rpcs::Serves(path)) return CallKind::kRefused;
+  if (!authenticator.AsksForTokens()) return CallKind::kAnybodys;
+  return authenticator.Knows(authorization) ? CallKind::kOwners : CallKind::kRefused;
+}
 
 StoreLimits ToStoreLimits(const Config& config) {
   return {config.max_meshes, config.keep_finished_meshes,
@@ -110,6 +121,10 @@ class Server::Impl {
                                 static_cast<std::int64_t>(state.config.max_unread_bytes),
                                 static_cast<std::int64_t>(state.config.max_message_bytes),
                                 std::chrono::duration<double>(state.config.request_seconds)},
+        [authenticator = state.authenticator](std::string_view path,
+                                              std::string_view authorization) {
+          return KindOf(*authenticator, path, authorization);
+        },
         [this](const char* setting) { state.metrics.LimitReached(setting); });
     listener->Start(
         [this, acceptor = std::shared_ptr(std::move(acceptor))](int listener_fd, int fd) {

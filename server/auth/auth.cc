@@ -32,6 +32,11 @@ std::string OwnerIn(const grpc::AuthContext& context) {
   return name.empty() ? "" : "SAN=" + name;
 }
 
+bool IsBearer(std::string_view value) {
+  return value.size() > kScheme.size() &&
+         strncasecmp(value.data(), kScheme.data(), kScheme.size()) == 0;
+}
+
 tl::expected<TokenDigest, grpc::Status> TokenIn(const grpc::ServerContextBase& context) {
   const auto [first, last] = context.client_metadata().equal_range(kHeader);
   if (first == last) {
@@ -39,8 +44,7 @@ tl::expected<TokenDigest, grpc::Status> TokenIn(const grpc::ServerContextBase& c
         "no token came: send the metadata \"authorization\" with \"Bearer TOKEN\"");
   }
   const std::string_view value(first->second.data(), first->second.size());
-  if (std::next(first) != last || value.size() <= kScheme.size() ||
-      strncasecmp(value.data(), kScheme.data(), kScheme.size()) != 0) {
+  if (std::next(first) != last || !IsBearer(value)) {
     return Unauthenticated("the metadata \"authorization\" must be one value, \"Bearer TOKEN\"");
   }
   return Digest(value.substr(kScheme.size()));
@@ -71,6 +75,11 @@ tl::expected<Identity, grpc::Status> Authenticator::Identify(
   std::string owner = OwnerIn(*context.auth_context());
   if (owner.empty()) return Unauthenticated("the client certificate names nobody");
   return Identity{std::move(owner), std::nullopt};
+}
+
+bool Authenticator::Knows(std::string_view authorization) const {
+  return tokens_ != nullptr && IsBearer(authorization) &&
+         tokens_->OwnerOf(Digest(authorization.substr(kScheme.size())));
 }
 
 bool Authenticator::StillHolds(const Identity& identity) const {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <tl/expected.hpp>
 
 #include "core/status.h"
@@ -29,6 +30,10 @@ class Authenticator {
   tl::expected<Identity, grpc::Status> Identify(const grpc::ServerContextBase& context) const;
   // False once the token was taken out of the file: for streams, which may outlive it.
   bool StillHolds(const Identity& identity) const;
+
+  bool AsksForTokens() const { return tokens_ != nullptr; }
+  // Whether it is of a token that is known; its value is the header's.
+  bool Knows(std::string_view authorization) const;
 
   // Reads the token file again, if it changed or if `force`.
   void Reload(bool force = false);

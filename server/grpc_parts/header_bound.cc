@@ -42,9 +42,11 @@ bool stellate::server::HeaderBlocksEnd() { return !LacksHeaderBound(grpc::Versio
 
 #include <algorithm>
 #include <mutex>
+#include <optional>
 #include <unordered_map>
 
 #include "server/grpc_parts/replaced.h"
+#include "server/grpc_parts/unread.h"
 
 struct grpc_metadata_batch;
 
@@ -86,27 +88,36 @@ constexpr char kParse[] = "_ZN9grpc_core11HPackParser5ParseERK10grpc_sliceb";
 struct Block {
   std::size_t bytes = 0;
   std::uint32_t frames = 0;
-  bool ends = false;  // with the frame that is being read
+  bool ends = false;           // with the frame that is being read
+  const void* call = nullptr;  // that it begins
+  grpc_metadata_batch* metadata = nullptr;
 };
 
 class Blocks {
  public:
-  void Begin(const HPackParser* parser, bool ends) {
+  void Begin(const HPackParser* parser, bool ends, grpc_metadata_batch* metadata) {
+    const void* const call = stellate::server::TakeCallBegun();
     const std::lock_guard lock(mutex_);
     Block& block = blocks_[parser];
     ++block.frames;
     block.ends = ends;
+    if (call == nullptr) return;
+    block.call = call;
+    block.metadata = metadata;
   }
 
-  // False: it is too long.
-  bool Add(const HPackParser* parser, std::size_t bytes, bool frame_ends) {
+  // False: it is too long. `whole`: the block, if this ends it.
+  bool Add(const HPackParser* parser, std::size_t bytes, bool frame_ends,
+           std::optional<Block>* whole) {
     const std::lock_guard lock(mutex_);
     const auto found = blocks_.find(parser);
     if (found == blocks_.end()) return true;  // of a client of this process
     Block& block = found->second;
     block.bytes += bytes;
     if (block.bytes > kMostHeaderBytes || block.frames > kMostHeaderFrames) return false;
-    if (frame_ends && block.ends) blocks_.erase(found);
+    if (!frame_ends || !block.ends) return true;
+    *whole = block;
+    blocks_.erase(found);
     return true;
   }
 
@@ -139,7 +150,7 @@ void HPackParser::BeginFrame(grpc_metadata_batch* metadata, std::uint32_t metada
   static auto* const begin = Original<void(HPackParser*, grpc_metadata_batch*, std::uint32_t,
                                            Boundary, Priority, LogInfo)>(kBeginFrame);
   if (!log_info.is_client) {
-    OpenBlocks().Begin(this, boundary != Boundary::None);
+    OpenBlocks().Begin(this, boundary != Boundary::None, metadata);
     metadata_size_limit = std::min(metadata_size_limit, kMostMetadataBytes);
   }
   begin(this, metadata, metadata_size_limit, boundary, priority, log_info);
@@ -147,11 +158,20 @@ void HPackParser::BeginFrame(grpc_metadata_batch* metadata, std::uint32_t metada
 
 absl::Status HPackParser::Parse(const grpc_slice& slice, bool is_last) {
   static auto* const parse = Original<absl::Status(HPackParser*, const grpc_slice&, bool)>(kParse);
-  if (!OpenBlocks().Add(this, GRPC_SLICE_LENGTH(slice), is_last)) {
+  std::optional<Block> whole;
+  if (!OpenBlocks().Add(this, GRPC_SLICE_LENGTH(slice), is_last, &whole)) {
     ++stellate::server::endless;
     return absl::ResourceExhaustedError("a header block is too long");
   }
-  return parse(this, slice, is_last);
+  // Headers are kept as long as their call, each as a part of the slice that it came in: with all
+  // that was read from the connection at the time, unless they are copied.
+  const grpc_slice copy = grpc_slice_copy(slice);
+  auto status = parse(this, copy, is_last);
+  grpc_slice_unref(copy);
+  if (status.ok() && whole && whole->call != nullptr) {
+    stellate::server::HeadersHaveCome(whole->call, whole->metadata);
+  }
+  return status;
 }
 
 }  // namespace grpc_core

@@ -2,7 +2,10 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <string_view>
+#include <utility>
 
 namespace stellate::server {
 
@@ -19,20 +22,56 @@ struct UnreadOfAll {
   const std::int64_t most_of_one = 0;
   std::atomic<std::int64_t> bytes{0};
 };
+
+// What a call's headers say of the request that follows.
+enum class CallKind {
+  kAnybodys,  // to be read, as no tokens are asked for
+  kOwners,    // to be read, with a token that is known
+  kSmall,     // of a service that is open to everybody: beyond kSmallBytes, closes the connection
+  // The call is refused whatever it says: what is beyond kSparedBytes is let go of as it comes. It
+  // closes the connection beyond kLetGoBytes, or when strangers have a quarter of what they may
+  // hold: gRPC reads ever larger pieces, up to 4 MB, from a connection that it can read fast.
+  kRefused,
+};
+// Any thread, also a moment after the server has gone; takes the call's path and authorization.
+using CallJudge = std::function<CallKind(std::string_view path, std::string_view authorization)>;
+
+// Of a server. Owners have an account of their own, so that strangers take none of it.
+struct UnreadRules {
+  UnreadRules(CallJudge judge_in, std::int64_t most, std::int64_t most_of_one)
+      : judge(std::move(judge_in)), strangers{most, most_of_one}, owners{most, most_of_one} {}
+  const CallJudge judge;
+  UnreadOfAll strangers, owners;
+};
 struct Unread {
-  const std::shared_ptr<UnreadOfAll> all;
+  UnreadOfAll& all;
   // Of the connection's calls that wait for their first message, kCallBytes each, and of messages
   // that are not whole or that nobody has asked for.
   std::atomic<std::int64_t> bytes{0};
   std::atomic<std::uint64_t> whole{0};  // messages that were taken, ever
 };
+struct ConnectionUnread {
+  explicit ConnectionUnread(std::shared_ptr<UnreadRules> rules_in)
+      : rules(std::move(rules_in)), strangers{rules->strangers}, owners{rules->owners} {}
+  const std::shared_ptr<UnreadRules> rules;
+  Unread strangers, owners;  // a call whose headers have not come is a stranger's
+  std::atomic<std::int64_t> let_go{0};
+};
 
 inline constexpr std::int64_t kCallBytes = 16 << 10;  // as measured, 10 to 20 kB
+inline constexpr std::int64_t kSmallBytes = 16 << 10;
+inline constexpr std::int64_t kSparedBytes = 4 << 10;
+inline constexpr std::int64_t kLetGoBytes = 64 << 10;  // of a connection, ever
 
 // Counts for the connection, from before gRPC gets it.
-std::shared_ptr<Unread> CountUnread(int fd, std::shared_ptr<UnreadOfAll> all);
+std::shared_ptr<ConnectionUnread> CountUnread(int fd, std::shared_ptr<UnreadRules> rules);
 
 // False: it cannot be counted with this gRPC and the way the program was built.
 bool CountsUnread();
+
+// For header_bound.cc: the call that this thread has begun since it last asked, or null; and that
+// its headers have come, as a grpc_metadata_batch.
+const void* TakeCallBegun();
+void HeadersHaveCome(const void* call, void* metadata);
 
 }  // namespace stellate::server

@@ -34,7 +34,8 @@ constexpr std::int64_t kLittle = 256 << 10;       // unread: a request or two, a
 constexpr double kMoment = 0.01;                  // seconds that anybody may hold anything for
 constexpr auto kAwake = std::chrono::seconds(1);  // after something came
 constexpr auto kLogPause = std::chrono::seconds(1);
-constexpr auto kQuiet = std::chrono::seconds(5);  // after a storm
+constexpr auto kQuiet = std::chrono::seconds(5);        // after a storm
+constexpr auto kTidy = std::chrono::milliseconds(250);  // in one
 
 // Zero: it is no socket any more.
 ino_t NumberOf(int fd) {
@@ -56,11 +57,11 @@ std::uint64_t BytesWaiting(int fd) {
 
 }  // namespace
 
-ConnectionGuard::ConnectionGuard(int port, const Limits& limits,
+ConnectionGuard::ConnectionGuard(int port, const Limits& limits, CallJudge judge,
                                  std::function<void(const char* setting)> closed)
     : port_(port),
       limits_(limits),
-      unread_(std::make_shared<UnreadOfAll>(limits.unread_bytes * 2 / 3,
+      unread_(std::make_shared<UnreadRules>(std::move(judge), limits.unread_bytes * 2 / 3,
                                             limits.request_bytes + kLittle)),
       closed_(std::move(closed)),
       epoll_(epoll_create1(EPOLL_CLOEXEC)),
@@ -86,7 +87,8 @@ void ConnectionGuard::Watch(int fd) {
   connection.number = NumberOf(fd);
   connection.peer = PeerOf(fd);
   connection.unread = CountUnread(fd, unread_);
-  connection.moved = connection.light = Clock::now();
+  NothingIsUnread(&connection.of_strangers);
+  NothingIsUnread(&connection.of_owners);
   const std::lock_guard lock(mutex_);
   connections_.emplace(++last_key_, std::move(connection));
   // Once for all that came meanwhile. It ends when gRPC closes the descriptor.
@@ -99,7 +101,8 @@ void ConnectionGuard::Watch(int fd) {
 void ConnectionGuard::Run(const std::stop_token& stop) {
   std::vector<epoll_event> events(kMostEvents);
   while (!stop.stop_requested()) {
-    const bool idle = busy_.empty() && gone_.empty() && !untidy_ && unread_->bytes == 0 &&
+    const bool idle = busy_.empty() && gone_.empty() && !untidy_ &&
+                      unread_->strangers.bytes + unread_->owners.bytes == 0 &&
                       Clock::now() > awake_until_;
     const int count = epoll_wait(epoll_, events.data(), kMostEvents, idle ? -1 : 0);
     if (count > 0) awake_until_ = Clock::now() + kAwake;
@@ -113,12 +116,16 @@ void ConnectionGuard::Run(const std::stop_token& stop) {
         busy_.insert(found->first);
         if ((event.events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0) found->second.ending = true;
       }
-      BoundUnread();  // first, as the other takes longer
+      hurried_ = false;  // first, as the other takes longer
+      BoundUnread(&ConnectionUnread::strangers, &Connection::of_strangers);
+      BoundUnread(&ConnectionUnread::owners, &Connection::of_owners);
       Look();
     }
     CountLeftBehind();
     if (Clock::now() - said_ >= kLogPause) SayWhatWasClosed();
-    if (untidy_ && Clock::now() > quiet_at_) GiveBack();
+    if (untidy_ && (Clock::now() > quiet_at_ || (hurried_ && Clock::now() > given_back_ + kTidy))) {
+      GiveBack();
+    }
     pollfd wake{wake_, POLLIN, 0};
     poll(&wake, 1, hurried_ ? kHurryMilliseconds : kPauseMilliseconds);
   }
@@ -193,22 +200,29 @@ void ConnectionGuard::CountLeftBehind() {
 
 // Until now, while nobody looked.
 void ConnectionGuard::NothingWasUnread() {
-  const auto now = Clock::now();
-  for (auto& [key, connection] : connections_) connection.moved = connection.light = now;
+  for (auto& [key, connection] : connections_) {
+    NothingIsUnread(&connection.of_strangers);
+    NothingIsUnread(&connection.of_owners);
+  }
 }
 
-void ConnectionGuard::BoundUnread() {
+void ConnectionGuard::NothingIsUnread(Holding* holding) {
+  holding->moved = holding->light = Clock::now();
+}
+
+void ConnectionGuard::BoundUnread(Unread ConnectionUnread::*account, Holding Connection::*holding) {
   const auto now = Clock::now();
   std::int64_t total = 0;
   std::vector<std::pair<double, Connection*>> holders;
   for (auto& [key, connection] : connections_) {
-    const std::int64_t bytes = connection.unread->bytes;
-    const std::uint64_t whole = connection.unread->whole;
-    if (bytes == 0 || whole != connection.whole) connection.moved = now;
-    if (bytes < kLittle) connection.light = now;
-    connection.whole = whole;
+    Holding& held = connection.*holding;
+    const std::int64_t bytes = ((*connection.unread).*account).bytes;
+    const std::uint64_t whole = ((*connection.unread).*account).whole;
+    if (bytes == 0 || whole != held.whole) held.moved = now;
+    if (bytes < kLittle) held.light = now;
+    held.whole = whole;
     if (bytes == 0 || connection.closed) continue;
-    if (now - connection.moved > limits_.request_time) {
+    if (now - held.moved > limits_.request_time) {
       Close(&connection, "request-seconds",
             Message("had sent a part of a request, and no whole one for ",
                     limits_.request_time.count(), " seconds"));
@@ -216,12 +230,12 @@ void ConnectionGuard::BoundUnread() {
     }
     total += bytes;
     // Of a connection that many share, messages become whole all the time.
-    const std::chrono::duration<double> held = now - std::min(connection.moved, connection.light);
-    holders.emplace_back(static_cast<double>(bytes) * std::max(held.count(), kMoment), &connection);
+    const std::chrono::duration<double> time = now - std::min(held.moved, held.light);
+    holders.emplace_back(static_cast<double>(bytes) * std::max(time.count(), kMoment), &connection);
   }
   const std::int64_t most = limits_.unread_bytes / 2;  // more comes before the next look
-  hurried_ = total > most / 2;
-  if (hurried_) {
+  if (total > most / 2) {
+    hurried_ = true;
     untidy_ = true;
     quiet_at_ = now + kQuiet;
   }
@@ -229,7 +243,7 @@ void ConnectionGuard::BoundUnread() {
   std::sort(holders.begin(), holders.end(), std::greater<>());
   for (const auto& [weight, connection] : holders) {
     if (total <= most) return;
-    const std::int64_t bytes = connection->unread->bytes;
+    const std::int64_t bytes = ((*connection->unread).*account).bytes;
     total -= bytes;
     Close(connection, "max-unread-bytes",
           Message("held ", bytes, " bytes of unfinished requests; --max-unread-bytes allows all ",
@@ -239,8 +253,9 @@ void ConnectionGuard::BoundUnread() {
 
 // What the calls had; without this the allocator keeps it.
 void ConnectionGuard::GiveBack() {
-  untidy_ = false;
+  untidy_ = hurried_;
   malloc_trim(0);
+  given_back_ = Clock::now();
 }
 
 void ConnectionGuard::Close(Connection* connection, const char* setting,

@@ -28,15 +28,17 @@ class ConnectionGuard {
  public:
   struct Limits {
     std::size_t calls = 0;  // of a connection, that gRPC has not let go of
-    // Of all connections; those are closed that hold most for longest.
+    // Of all connections, owners' requests and others apart; those are closed that hold most for
+    // longest.
     std::int64_t unread_bytes = 0;
     std::int64_t request_bytes = 0;                // the largest request
     std::chrono::duration<double> request_time{};  // for a connection's next request to be whole
   };
 
-  // `port`: where the server listens. `closed` is told, on another thread, of each connection that
-  // is closed, and by which setting.
-  ConnectionGuard(int port, const Limits& limits, std::function<void(const char* setting)> closed);
+  // `port`: where the server listens. `judge`: unread.h. `closed` is told, on another thread, of
+  // each connection that is closed, and by which setting.
+  ConnectionGuard(int port, const Limits& limits, CallJudge judge,
+                  std::function<void(const char* setting)> closed);
   ~ConnectionGuard();
 
   // Has to be told of every connection, before gRPC has it. One thread at a time.
@@ -47,6 +49,11 @@ class ConnectionGuard {
 
  private:
   using Clock = std::chrono::steady_clock;
+  struct Holding {                 // what a connection has unread
+    std::uint64_t whole = 0;       // messages, when they last were counted
+    Clock::time_point moved = {};  // when one became whole, or nothing was unread
+    Clock::time_point light = {};  // when it held little
+  };
   struct Connection {
     int fd = -1;
     ino_t number = 0;         // by which it is told from another that got the same descriptor
@@ -56,10 +63,8 @@ class ConnectionGuard {
     std::size_t calls = 0;    // held, when it was last asked about
     bool ending = false;      // either side has hung up
     bool closed = false;      // by this guard
-    std::shared_ptr<Unread> unread;
-    std::uint64_t whole = 0;       // messages, when they last were counted
-    Clock::time_point moved = {};  // when one became whole, or nothing was unread
-    Clock::time_point light = {};  // when it held little
+    std::shared_ptr<ConnectionUnread> unread;
+    Holding of_strangers, of_owners;
   };
 
   void Run(const std::stop_token& stop);
@@ -68,14 +73,15 @@ class ConnectionGuard {
   void FindIds();
   void CountLeftBehind();
   void NothingWasUnread();
-  void BoundUnread();
+  static void NothingIsUnread(Holding* holding);
+  void BoundUnread(Unread ConnectionUnread::*account, Holding Connection::*holding);
   void GiveBack();
   void Close(Connection* connection, const char* setting, const std::string& reason);
   void SayWhatWasClosed();
 
   const int port_;
   const Limits limits_;
-  const std::shared_ptr<UnreadOfAll> unread_;
+  const std::shared_ptr<UnreadRules> unread_;
   const std::function<void(const char* setting)> closed_;
   const int epoll_;
   const int wake_;  // readable once it is to stop
@@ -96,6 +102,7 @@ class ConnectionGuard {
   Clock::time_point said_;
   bool untidy_ = false;  // memory is to be given back once it is quiet
   Clock::time_point quiet_at_;
+  Clock::time_point given_back_;
 
   std::atomic<bool> behind_{false};
   std::jthread thread_;

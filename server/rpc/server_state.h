@@ -31,7 +31,7 @@ struct ServerState {
   StreamRegistry streams;
   std::unique_ptr<Journal> journal;  // null: meshes live in memory alone
   SessionStore store;
-  std::unique_ptr<Authenticator> authenticator;  // set before the first call
+  std::shared_ptr<Authenticator> authenticator;  // set before the first call
   Metrics metrics;
   std::atomic<bool> draining{false};  // no new meshes
 };

@@ -1,5 +1,7 @@
 #include "server/rpc/service.h"
 
+#include <google/protobuf/descriptor.h>
+
 #include <exception>
 #include <new>
 #include <optional>
@@ -95,6 +97,15 @@ Rpcs::Rpcs(ServerState* state) : state_(*state) {
   AddStream("/stellate.v1.Stellate/ServeOracle", ServeOracle);
   AddStream("/stellate.v1.Stellate/WatchMesh", WatchMesh);
   AddStream("/stellate.v1.Stellate/DownloadMesh", DownloadMesh);
+}
+
+bool Rpcs::Serves(std::string_view path) {
+  static const auto* const service =
+      google::protobuf::DescriptorPool::generated_pool()->FindServiceByName(
+          v1::Stellate::service_full_name());
+  static const std::string prefix = core::Message("/", v1::Stellate::service_full_name(), "/");
+  return path.substr(0, prefix.size()) == prefix &&
+         service->FindMethodByName(std::string(path.substr(prefix.size()))) != nullptr;
 }
 
 grpc::ServerGenericBidiReactor* UnknownRpcs::CreateReactor(

@@ -4,6 +4,7 @@
 #include <grpcpp/impl/service_type.h>
 
 #include <functional>
+#include <string_view>
 
 #include "server/rpc/call.h"
 
@@ -15,6 +16,9 @@ namespace stellate::server {
 // when the headers have come. A caller who is not known is refused then, and his request not read.
 class Rpcs final : public grpc::Service {
  public:
+  // By its path on the wire.
+  static bool Serves(std::string_view path);
+
   explicit Rpcs(ServerState* state);
 
  private:

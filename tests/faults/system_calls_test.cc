@@ -3,7 +3,8 @@
 // process never aborts, and the next one finds a journal that is sound, with the mesh finished as
 // it would have been, or failed with a reason of the journal's, or going on to the same mesh.
 //
-// $STELLATE_CALL_STEP: every how manieth call (23); 1: all of them.
+// $STELLATE_CALL_STEP: every how manieth call (23); 1: all of them. $STELLATE_CALL_KILLS: how many
+// kills before each of these, and after it (1).
 
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -201,6 +202,7 @@ class SystemCalls : public testing::JournalTest {
 
 TEST_F(SystemCalls, EachFailsOnce) {
   const int step = testing::FromEnvironment("STELLATE_CALL_STEP", 23);
+  const int kills = testing::FromEnvironment("STELLATE_CALL_KILLS", 1);
   ASSERT_EQ(Mesh({}), kFine);
   int count = 0;
   std::ifstream(directory_ + "/calls") >> count;
@@ -218,22 +220,25 @@ TEST_F(SystemCalls, EachFailsOnce) {
                                                {Fault::kKillBefore, "a kill before"},
                                                {Fault::kKillAfter, "a kill after"}};
   for (const auto& [fault, name] : faults) {
+    const bool kill = fault == Fault::kKillBefore || fault == Fault::kKillAfter;
     int tried = 0, refused = 0;
     // The order of threads moves the calls about; a few more than there were are tried.
     for (int at = 1 + static_cast<int>(fault) % step; at <= count + 3; at += step) {
-      std::filesystem::remove_all(directory_);
-      const int status = Mesh({fault, at, {}});
-      const bool killed = WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL;
-      const bool exited =
-          WIFEXITED(status) && (WEXITSTATUS(status) == kFine || WEXITSTATUS(status) == kRefused);
-      EXPECT_TRUE(exited || killed) << name << " at call " << at << ": status " << status;
-      refused += WIFEXITED(status) && WEXITSTATUS(status) == kRefused ? 1 : 0;
-      EXPECT_EQ(Resume(undisturbed), kFine) << name << " at call " << at;
+      for (int again = 0; again < (kill ? kills : 1); ++again) {
+        std::filesystem::remove_all(directory_);
+        const int status = Mesh({fault, at, {}});
+        const bool killed = WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL;
+        const bool exited =
+            WIFEXITED(status) && (WEXITSTATUS(status) == kFine || WEXITSTATUS(status) == kRefused);
+        EXPECT_TRUE(exited || killed) << name << " at call " << at << ": status " << status;
+        refused += WIFEXITED(status) && WEXITSTATUS(status) == kRefused ? 1 : 0;
+        EXPECT_EQ(Resume(undisturbed), kFine) << name << " at call " << at;
+        if (HasFailure()) return;
+      }
       ++tried;
-      if (HasFailure()) return;
     }
-    std::cout << name << ": at " << tried << " of " << count << " calls; " << refused
-              << " servers refused to start\n";
+    std::cout << name << ": at " << tried << " of " << count << " calls, " << (kill ? kills : 1)
+              << " times each; " << refused << " servers refused to start" << std::endl;
   }
 }
 

@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <chrono>
 #include <memory>
+#include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
+#include "tests/server/support/certificates.h"
 #include "tests/server/support/live_server.h"
 #include "tests/server/support/loopback.h"
 #include "tests/server/support/raw_http2.h"
@@ -19,10 +22,13 @@ constexpr std::uint32_t kDeclared = 4 << 20;  // bytes of a message
 constexpr std::size_t kPart = 60'000;         // of which so many come
 constexpr std::uint64_t kMost = 16 << 20;     // that all may hold
 
+using Headers = std::vector<std::pair<std::string, std::string>>;
+
 class UnreadTest : public LiveServer {
  protected:
-  void StartBounded(double request_seconds) {
+  void StartBounded(double request_seconds, const std::string& token_file = "") {
     Config config;
+    config.token_file = token_file;
     config.metrics_listen = "127.0.0.1:0";
     config.max_unread_bytes = kMost;
     config.request_seconds = request_seconds;
@@ -76,6 +82,46 @@ TEST_F(UnreadTest, ConnectionsThatHoldTooMuchTogetherAreClosed) {
     };
     SCOPED_TRACE(rpc);
     while (held() > kMost) std::this_thread::yield();
+  }
+  EXPECT_EQ(Closed("request-seconds"), 0);
+}
+
+// What strangers hold is not taken from those who have a token.
+TEST_F(UnreadTest, OwnersHaveAnAccountOfTheirOwn) {
+  const ScratchDirectory directory;
+  const std::string token = "alice-0123456789abcdef";
+  WriteFile(directory / "tokens", "alice " + token + "\n");
+  const Headers headers = {{"authorization", "Bearer " + token}};
+  constexpr int kCalls = static_cast<int>(kMost / 2 / kCallBytes);  // both together are too many
+  StartBounded(3600, directory / "tokens");
+  RawHttp2 stranger(port()), owner(port());
+  stranger.Call("/grpc.health.v1.Health/Check", kCalls - 20, /*reset=*/false);
+  owner.Call("GetMesh", kCalls - 20, /*reset=*/false, headers);
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_TRUE(stranger.IsAlive());
+    ASSERT_TRUE(owner.IsAlive());
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_EQ(Closed("max-unread-bytes"), 0);
+  stranger.Call("/grpc.health.v1.Health/Check", kCalls, /*reset=*/false);
+  stranger.AwaitEnd();
+  EXPECT_EQ(Closed("max-unread-bytes"), 1);
+  EXPECT_TRUE(owner.IsAlive());
+  owner.Call("GetMesh", kCalls, /*reset=*/false, headers);
+  owner.AwaitEnd();
+  EXPECT_EQ(Closed("max-unread-bytes"), 2);
+}
+
+// Nobody has a large question for a service that is open to everybody.
+TEST_F(UnreadTest, LargeRequestsToOpenServicesCloseTheirConnection) {
+  StartBounded(3600);
+  for (const char* path : {"/grpc.health.v1.Health/Check",
+                           "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"}) {
+    RawHttp2 curious(port()), greedy(port());
+    curious.Request(path, kSmallBytes, kSmallBytes / 2);
+    EXPECT_TRUE(curious.IsAlive());
+    greedy.Request(path, kDeclared, kPart);
+    greedy.AwaitEnd();
   }
   EXPECT_EQ(Closed("request-seconds"), 0);
 }

@@ -22,8 +22,9 @@ class RawHttp2 {
   ~RawHttp2() { close(fd_); }
 
   // Begins `count` calls of an rpc; `reset`: and gives each up at once.
-  void Call(const std::string& rpc, int count, bool reset) {
-    const std::string header = HeadersOf(rpc);
+  void Call(const std::string& rpc, int count, bool reset,
+            const std::vector<std::pair<std::string, std::string>>& more = {}) {
+    const std::string header = HeadersOf(rpc, more);
     for (int i = 0; i < count; ++i, stream_ += 2) {
       std::string frames = Frame(kHeaders, kEndHeaders, stream_, header);
       if (reset) frames += Frame(kReset, 0, stream_, std::string("\0\0\0\x08", 4));
@@ -31,7 +32,8 @@ class RawHttp2 {
     }
   }
 
-  // What HPACK makes of a call's headers, and of some of the caller's own.
+  // What HPACK makes of a call's headers, of a path or an rpc of ours, and of some of the caller's
+  // own.
   static std::string HeadersOf(const std::string& rpc,
                                const std::vector<std::pair<std::string, std::string>>& more = {}) {
     std::string block;
@@ -40,7 +42,7 @@ class RawHttp2 {
     };
     add(":method", "POST");
     add(":scheme", "http");
-    add(":path", "/stellate.v1.Stellate/" + rpc);
+    add(":path", rpc.front() == '/' ? rpc : "/stellate.v1.Stellate/" + rpc);
     add(":authority", "localhost");
     add("content-type", "application/grpc");
     add("te", "trailers");
