@@ -92,7 +92,7 @@ class Advisories(unittest.TestCase):
                     )
 
     def test_users_are_told(self) -> None:
-        page = (ROOT / "docs" / "safety.md").read_text()
+        page = (ROOT / "docs" / "running" / "safety.md").read_text()
         for entry in packages():
             for advisory in entry["advisory"]:
                 self.assertIn(advisory["id"], page)

@@ -211,7 +211,7 @@ class Live(unittest.TestCase):
     def test_docs_list_what_the_server_tells(self) -> None:
         with urllib.request.urlopen(f"http://{self.metrics}/metrics", timeout=PATIENCE) as reply:
             told = set(re.findall(r"^# TYPE (\w+) ", reply.read().decode(), re.M))
-        page = (ROOT / "docs" / "metrics.md").read_text()
+        page = (ROOT / "docs" / "running" / "metrics.md").read_text()
         rows = re.findall(r"^\| (`.*?) \|", page, re.M)
         listed = {
             re.sub(r"\{.*", "", name) for row in rows for name in re.findall(r"`([^`]+)`", row)
