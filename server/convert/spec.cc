@@ -193,7 +193,9 @@ Refused ReadTimeouts(const v1::MeshLimits& limits, const Config& config, OracleT
                    Message("limits.busy_seconds is ", busy, " but must be limits.answer_seconds (",
                            answer, ") or more: a worker may take that long without a word"));
   }
-  *to = {ToDuration(answer), ToDuration(busy), ToDuration(worker_wait)};
+  // A wait shorter than the clock tells is not none.
+  const auto wait = [](double seconds) { return std::max(ToDuration(seconds), Clock::duration(1)); };
+  *to = {wait(answer), wait(busy), wait(worker_wait)};
   return Status::Ok();
 }
 
