@@ -194,7 +194,9 @@ Refused ReadTimeouts(const v1::MeshLimits& limits, const Config& config, OracleT
                            answer, ") or more: a worker may take that long without a word"));
   }
   // A wait shorter than the clock tells is not none.
-  const auto wait = [](double seconds) { return std::max(ToDuration(seconds), Clock::duration(1)); };
+  const auto wait = [](double seconds) {
+    return std::max(ToDuration(seconds), Clock::duration(1));
+  };
   *to = {wait(answer), wait(busy), wait(worker_wait)};
   return Status::Ok();
 }
