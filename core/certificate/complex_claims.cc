@@ -102,7 +102,7 @@ void JudgeStars(Examination& x, const StarGeometry& stars) {
   Certificate& c = x.certificate;
   c.unembedded_stars = stars.unembedded_stars;
   // The link of a star that embeds is the sphere of directions of its tangent space
-  // (docs/proof.md, (a)).
+  // (docs/using/proof.md, (a)).
   if (c.closed && stars.unembedded_stars == 0) c.links_decided_exactly = true;
   if (c.links_are_spheres && !c.links_decided_exactly) {
     x.findings.Warn(

@@ -10,8 +10,8 @@
 namespace stellate::core {
 
 // What a finished mesh proves about a manifold M of which one number is known: a lower bound r of
-// its reach. All that is needed is measured on the mesh; docs/proof.md has the theorem and its
-// proof. With, for a k-simplex s of the mesh,
+// its reach. All that is needed is measured on the mesh; docs/using/proof.md has the theorem and
+// its proof. With, for a k-simplex s of the mesh,
 //
 //   rho(s)    a bound of the radius of its smallest enclosing ball, length
 //   h(s)      = r - sqrt(r^2 - rho^2): no point of s is farther from M (Attali, Lieutier, Salinas)

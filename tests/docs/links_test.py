@@ -1,4 +1,5 @@
-"""Every relative link of every page leads to a file, and to a heading of it."""
+"""Every relative link of every page leads to a file and to a heading of it; every path in `code`, to a
+file or a unit of the tree."""
 
 from __future__ import annotations
 
@@ -11,6 +12,8 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+_FOLDERS = "core|server|clients|tests|proto|docker|packaging|tools|examples|cmake"
+_MADE = {"docker/.env"}  # by users
 
 
 def pages() -> list[pathlib.Path]:
@@ -39,8 +42,16 @@ def anchors(text: str) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", heading).replace(" ", "-") for heading in bare}
 
 
+def paths(text: str) -> list[str]:
+    return [path for path in re.findall(rf"`((?:{_FOLDERS})/[\w./-]+)`", text) if path not in _MADE]
+
+
 def broken(page: pathlib.Path, text: str) -> list[str]:
-    found = []
+    found = [
+        f"{page.relative_to(ROOT)}: there is no {path}"
+        for path in paths(text)
+        if not any((ROOT / f"{path}{end}").exists() for end in ("", ".h", ".cc", ".py"))
+    ]
     for link in links(text):
         path, _, anchor = link.partition("#")
         target = (page.parent / path).resolve() if path else page
@@ -56,7 +67,8 @@ def broken(page: pathlib.Path, text: str) -> list[str]:
 def main() -> int:
     # That it can fail at all.
     made_up = "# A heading\n\n[a](#a-heading) [b](#no) [c](nowhere.md) [d](https://example.org)\n"
-    assert len(broken(ROOT / "README.md", made_up)) == 2
+    made_up += "`core/mesher.h` `core/batch` `core/nothing.h`\n"
+    assert len(broken(ROOT / "README.md", made_up)) == 3
     found = [line for page in pages() for line in broken(page, page.read_text())]
     print("\n".join(found) or f"{len(pages())} pages, no broken link")
     return 1 if found else 0

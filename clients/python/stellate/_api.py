@@ -61,7 +61,7 @@ def mesh(
         is. audit: "standard", or "thorough", which asks about every vertex and every simplex
         before it certifies. components: a mesh with fewer is not certified.
         reach: a lower bound of the manifold's reach, from which the mesh is proved; cover_box: miss
-        no component in the box, which needs `reach` (docs/proof.md). size_rate
+        no component in the box, which needs `reach` (docs/using/proof.md). size_rate
         and max_deviation go by the oracle's local_size where it has one. ask_ahead is on unless the
         server is on this machine. workers: how many threads call the oracle, which takes effect
         when the oracle says `thread_safe = True`; the mesh is the same for any number. max_chunk:

@@ -65,7 +65,7 @@ struct MeshOptions {
   std::optional<std::uint32_t> components;  // that M has at least; with fewer it is not certified
   bool thorough_audit = false;  // ask about every vertex and every simplex before certifying
   // A promise: the manifold's reach is at least this length. The mesh is refined until the promise
-  // proves its topology, or is refuted; see docs/proof.md.
+  // proves its topology, or is refuted; see docs/using/proof.md.
   std::optional<double> reach;
   // Look for every component in the bounding box, which `reach` makes finite.
   std::optional<bool> cover_box;
