@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,9 @@ struct GoldenCase {
   std::function<void(const Specification&, const QueryBatch&, Answers&)> spoil = {};
   std::uint64_t cancel_before = 0, fail_before = 0, interrupt_before = 0;  // rounds; 0: never
 };
+
+// In place of its bytes, in the tests' names.
+inline void PrintTo(const GoldenCase& c, std::ostream* out) { *out << c.name; }
 
 namespace golden {
 
