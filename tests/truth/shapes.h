@@ -8,30 +8,9 @@
 #include <vector>
 
 #include "stellate/oracle.h"
+#include "tests/truth/curves.h"
 
 namespace stellate::truth {
-
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
-// A closed curve x(t) = sum_j a_j cos(j t) + b_j sin(j t), its derivatives exact.
-class Curve {
- public:
-  // cosines, sines: d x m, the terms of j = 0, 1, ..., m - 1.
-  Curve(MatrixXd cosines, MatrixXd sines);
-
-  int d() const { return static_cast<int>(cosines_.rows()); }
-  const MatrixXd& samples() const { return samples_; }  // d x n, in order, evenly in t
-  VectorXd At(double t) const { return Derivative(t, 0); }
-  VectorXd Tangent(double t) const { return Derivative(t, 1).normalized(); }
-  // The parameter of a nearest point, and the squared distance to it.
-  double Nearest(const VectorXd& x, double* squared) const;
-
- private:
-  VectorXd Derivative(double t, int order) const;
-
-  MatrixXd cosines_, sines_, samples_;
-};
 
 // A manifold that is known: its closest points exactly, its Betti numbers, its reach.
 class Shape {
@@ -66,12 +45,6 @@ ShapePtr Placed(ShapePtr shape, int d, std::mt19937_64& random);
 ShapePtr WireAsCurve(double radius);     // a thin torus, told with one tangent
 ShapePtr ShellAsSurface(double thick);   // what lies between two spheres, told with two tangents
 ShapePtr SphereWithoutCap(double hole);  // a boundary: outside what is promised
-
-Curve Circle(double x, double y, double radius);
-// r(t) = sum_j radial[j] cos(j t), about (x, y).
-Curve StarShaped(double x, double y, const std::vector<double>& radial);
-// (p, q) torus knot, or a component of a torus link, `turn` being where it begins.
-Curve TorusCurve(int p, int q, double tube, double turn = 0);
 
 // The oracle of a shape: closest points, with tangents or without.
 class ShapeOracle : public Oracle {
