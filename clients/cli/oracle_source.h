@@ -12,7 +12,7 @@
 
 namespace stellate::cli {
 
-// Whose manifold it is: one of the catalogue's, or that of a command (see docs/pipe.md).
+// Whose manifold it is: one of the catalogue's, or that of a command (see docs/using/pipe.md).
 class OracleSource {
  public:
   explicit OracleSource(CLI::App* command);

@@ -1,5 +1,5 @@
 """Every relative link of every page leads to a file and to a heading of it; every path in `code`, to a
-file or a unit of the tree."""
+file or a unit of the tree; every page that a source names is there."""
 
 from __future__ import annotations
 
@@ -16,11 +16,22 @@ _FOLDERS = "core|server|clients|tests|proto|docker|packaging|tools|examples|cmak
 _MADE = {"docker/.env"}  # by users
 
 
-def pages() -> list[pathlib.Path]:
-    """What the repository has in Markdown, without what builds leave there."""
-    skipped = {"build", "node_modules", "target", ".git"}
-    found = sorted(ROOT.rglob("*.md"))
-    return [page for page in found if not skipped & set(page.relative_to(ROOT).parts)]
+_SKIPPED = {"build", "node_modules", "target", ".git"}  # what builds leave
+_SOURCES = {".cc", ".h", ".proto", ".py", ".go", ".rs", ".rb", ".java", ".js", ".ts", ".R", ".sh"}
+
+
+def _files() -> list[pathlib.Path]:
+    return sorted(p for p in ROOT.rglob("*") if not _SKIPPED & set(p.relative_to(ROOT).parts))
+
+
+def pages(files: list[pathlib.Path]) -> list[pathlib.Path]:
+    return [path for path in files if path.suffix == ".md"]
+
+
+def pages_not_there(source: str) -> list[str]:
+    """The pages of docs/ that a source names, in a comment or a message."""
+    named = set(re.findall(r"\bdocs/[\w/-]+\.md\b", source))
+    return sorted(page for page in named if not (ROOT / page).exists())
 
 
 def _tokens(text: str) -> Iterator[Token]:
@@ -69,8 +80,15 @@ def main() -> int:
     made_up = "# A heading\n\n[a](#a-heading) [b](#no) [c](nowhere.md) [d](https://example.org)\n"
     made_up += "`core/mesher.h` `core/batch` `core/nothing.h`\n"
     assert len(broken(ROOT / "README.md", made_up)) == 3
-    found = [line for page in pages() for line in broken(page, page.read_text())]
-    print("\n".join(found) or f"{len(pages())} pages, no broken link")
+    assert pages_not_there("// see docs/no.md and docs/index.md") == ["docs/no.md"]
+    files = _files()
+    found = [line for page in pages(files) for line in broken(page, page.read_text())]
+    for source in (
+        path for path in files if path.suffix in _SOURCES and path.name != "links_test.py"
+    ):
+        absent = pages_not_there(source.read_text(errors="replace"))
+        found += [f"{source.relative_to(ROOT)}: there is no {page}" for page in absent]
+    print("\n".join(found) or f"{len(pages(files))} pages, no broken link")
     return 1 if found else 0
 
 

@@ -2,7 +2,9 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -13,6 +15,8 @@ constexpr int kMaxIterations = 100;
 constexpr double kSmallestStep = 1e-6;
 // Relative to the box: where Newton stops since rounding takes over, and what is still accepted.
 constexpr double kTarget = 1e-15, kAccepted = 1e-9;
+// What the rounding of a point's coordinates makes of a step, in their last bits: F sums a few.
+constexpr double kRoundings = 16;
 constexpr double kJacobianStep = 6e-6;  // cube root of rounding: best for central differences
 constexpr double kHessianStep = 1e-5;
 
@@ -36,6 +40,9 @@ ImplicitOracle::ImplicitOracle(int dimension, int ambient_dimension, Function f,
     throw std::invalid_argument("ImplicitOracle needs a bounding box of the ambient dimension");
   }
   length_ = (box_.upper - box_.lower).norm();
+  const double largest =
+      std::max(box_.lower.lpNorm<Eigen::Infinity>(), box_.upper.lpNorm<Eigen::Infinity>());
+  rounding_ = kRoundings * std::numeric_limits<double>::epsilon() * largest;
 }
 
 Eigen::MatrixXd ImplicitOracle::J(const Eigen::VectorXd& x) const {
@@ -74,7 +81,7 @@ bool ImplicitOracle::Correct(Eigen::VectorXd& y) const {
     }
     if (fraction < kSmallestStep) break;
   }
-  return last_step <= kAccepted * length_;
+  return last_step <= std::max(kAccepted * length_, rounding_);
 }
 
 void ImplicitOracle::Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const {

@@ -10,7 +10,7 @@
 
 #include "stellate/oracle.h"
 
-// What goes through the pipe, as bytes; docs/pipe.md is its specification.
+// What goes through the pipe, as bytes; docs/using/pipe.md is its specification.
 namespace stellate::pipe {
 
 // What came is not what the specification wants; what() says where and what.

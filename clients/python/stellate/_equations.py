@@ -37,6 +37,7 @@ class Equations:
       jacobian: (n, d) -> (n, m, d), or None for differences of f. Differences are expensive, so that
         steps share them: each corrects the Jacobian by what it has seen (Broyden).
       scale: a length, of the solvers' steps and differences.
+      largest: the largest coordinate; far from the origin its rounding is what a step can reach.
     """
 
     def __init__(
@@ -45,12 +46,15 @@ class Equations:
         jacobian: Batched | None,
         shape: tuple[int, int],
         scale: float,
+        largest: float,
         max_iterations: int,
     ) -> None:
         """`shape`: (m, d)."""
         self._f, self._given, self.shape = f, jacobian, shape
         self._scale, self._max_iterations = scale, max_iterations
-        self.tolerance = 1e-12 * scale  # of a Newton step, a length
+        # Of a Newton step, a length: a step moves a point by no less than its coordinates round to,
+        # and what F makes of that is a small multiple.
+        self.tolerance = max(1e-12 * scale, 16 * np.finfo(float).eps * largest)
 
     def values(self, x: np.ndarray) -> np.ndarray:
         """F at the rows of x."""
@@ -151,7 +155,7 @@ class Equations:
             jacobians.renew_or_kill(rows[~usable], alive)
             rows, step = rows[usable], step[usable]
             length = norms(step)
-            step *= np.minimum(1.0, 0.25 * self._scale / np.maximum(length, 1e-300))[:, None]
+            step *= (np.minimum(length, 0.25 * self._scale) / np.maximum(length, 1e-300))[:, None]
             # A step this short lands on M to rounding; halving could only see noise.
             short = length <= self.tolerance * 1e4
             y[rows[short]] += step[short]

@@ -75,7 +75,8 @@ class ImplicitManifold:
         if isinstance(jacobian, str):
             f, jacobian = with_derivatives(f, jacobian)
         shape = ambient_dimension - dimension, ambient_dimension
-        self._equations = Equations(f, jacobian, shape, self._scale, max_iterations)
+        largest = float(max(np.abs(lower).max(), np.abs(upper).max()))
+        self._equations = Equations(f, jacobian, shape, self._scale, largest, max_iterations)
 
     # The oracle.
 
@@ -201,7 +202,7 @@ class ImplicitManifold:
         along = (vectors.transpose(0, 2, 1) @ gradient[..., None])[..., 0] / bends
         step = -(tangents @ (vectors @ along[..., None]))[..., 0]
         length = norms(step)
-        step *= np.minimum(1.0, 0.1 * self._scale / np.maximum(length, 1e-300))[:, None]
+        step *= (np.minimum(length, 0.1 * self._scale) / np.maximum(length, 1e-300))[:, None]
         return step, length, jacobian
 
     def _search_along_step(

@@ -49,6 +49,27 @@ TEST(ImplicitOracle, AgreesWithTheClosedForm) {
   }
 }
 
+// Coordinates of surveyors: a sphere of unit size a hundred million units from the origin.
+TEST(ImplicitOracle, FarOriginsDoNotMatter) {
+  const Eigen::VectorXd center = Eigen::VectorXd::Constant(3, 1e8);
+  const auto value = [&](const Eigen::VectorXd& x) {
+    return Eigen::VectorXd::Constant(1, (x - center).squaredNorm() - 1);
+  };
+  const auto jacobian = [&](const Eigen::VectorXd& x) -> Eigen::MatrixXd {
+    return 2 * (x - center).transpose();
+  };
+  BoundingBox box = Cube(3, 2);
+  box.lower += center, box.upper += center;
+  ImplicitOracle sphere(2, 3, value, jacobian, box);
+  Eigen::MatrixXd away = Eigen::MatrixXd::Random(3, 300);
+  away.colwise().normalize();
+  const Answer got = sphere.ClosestPoint((1.3 * away).colwise() + center);
+  for (Eigen::Index j = 0; j < away.cols(); ++j) {
+    ASSERT_TRUE(got.IsFound(j));
+    EXPECT_LT((got.points.col(j) - center - away.col(j)).norm(), 1e-6);
+  }
+}
+
 // Only where the closest point is unique do local minimisers have to find it.
 class SeededImplicit : public ::testing::Test {
  protected:

@@ -164,6 +164,28 @@ def test_values_that_are_not_numbers_spoil_their_own_points_alone(rng):
     assert caught.value.converged.tolist() == [True, False]
 
 
+@pytest.mark.parametrize("offset", [0.0, 1e6, -1e7])
+@pytest.mark.parametrize("radius", [1.0, 1e-8, 1e8])
+@pytest.mark.filterwarnings("error")
+def test_units_and_far_origins_do_not_matter(offset, radius, rng):
+    """Coordinates of surveyors: a sphere of unit size a million units away, and in other units."""
+    center = offset * radius
+
+    def f(x):
+        return (((x - center) / radius) ** 2).sum(axis=1)[:, None] - 1
+
+    box = np.full(3, center - 2 * radius), np.full(3, center + 2 * radius)
+    m = stellate.ImplicitManifold(f, ambient_dimension=3, dimension=2, bounding_box=box)
+    away = rng.normal(size=(200, 3))
+    x = center + radius * away / np.linalg.norm(away, axis=1)[:, None] * rng.uniform(
+        0.5, 1.5, (200, 1)
+    )
+    y = m.closest_point(x)
+    expected = center + radius * (x - center) / np.linalg.norm(x - center, axis=1)[:, None]
+    # A closest point found by differences, as far as its coordinates can say.
+    assert np.abs(y - expected).max() <= radius * (1e-8 + 1e-15 * abs(offset) * 100)
+
+
 def test_the_nearest_of_two_sheets_is_found():
     m = manifolds.ellipsoid((2.0, 1.0))
     p = m.closest_point(np.array([[1.2, 0.1], [1.2, -0.1], [0.0, 3.0]]))

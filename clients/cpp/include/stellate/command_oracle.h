@@ -34,7 +34,7 @@ struct CommandOptions {
 };
 
 // An oracle that is a program in any language: it reads batches of queries from its standard input
-// and writes the answers to its standard output. docs/pipe.md says how.
+// and writes the answers to its standard output. docs/using/pipe.md says how.
 //
 // A process that ends after it has answered a batch is started again and asked the same; once for
 // a batch. Whatever else goes wrong is thrown by the oracle's methods as a std::runtime_error that

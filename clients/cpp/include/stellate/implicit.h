@@ -36,7 +36,8 @@ class ImplicitOracle final : public PointwiseOracle {
   Function f_;
   Jacobian jacobian_;
   BoundingBox box_;
-  double length_;  // of the box's diagonal: the unit of every tolerance
+  double length_;    // of the box's diagonal: the unit of every tolerance
+  double rounding_;  // of points in the box, a length: no step can be asked to be shorter
 };
 
 }  // namespace stellate
