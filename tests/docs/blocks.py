@@ -77,7 +77,7 @@ class Page:
 
 def pages() -> list[str]:
     """All that users read, from the root of the repository."""
-    found = [ROOT / "README.md", ROOT / "clients" / "python" / "README.md"]
+    found = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "clients/python/README.md")]
     found += sorted((ROOT / "docs").rglob("*.md"))
     return [str(page.relative_to(ROOT)) for page in found]
 

@@ -12,7 +12,7 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-_FOLDERS = "core|server|clients|tests|proto|docker|packaging|tools|examples|cmake"
+_FOLDERS = "core|server|clients|tests|proto|docker|docs|packaging|tools|examples|cmake"
 _MADE = {"docker/.env"}  # by users
 
 
