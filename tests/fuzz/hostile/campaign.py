@@ -30,7 +30,8 @@ sys.path.insert(0, str(ROOT / "clients" / "python"))
 
 import grpc  # noqa: E402
 import stellate  # noqa: E402
-from attacks import ATTACKS, Target  # noqa: E402
+from attacks import ATTACKS  # noqa: E402
+from target import Target  # noqa: E402
 
 _PATIENCE = 120.0  # seconds for anything that has to come to an end
 _LOG_LINES_A_SECOND = 12  # ten, and how many there were besides
