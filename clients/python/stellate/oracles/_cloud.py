@@ -11,7 +11,7 @@ from ..errors import InvalidArgument
 from ._common import (
     Array,
     Flags,
-    all_or_raise,
+    Projection,
     apply,
     as_points,
     box_around,
@@ -24,7 +24,7 @@ _ITERATIONS = 100
 _BLOCK = 2048  # queries at a time, which bounds what their neighbours take
 
 
-class PointCloud:
+class PointCloud(Projection):
     """An oracle for a smooth k-manifold near given points of R^d, which may be noisy.
 
     Args:
@@ -74,19 +74,7 @@ class PointCloud:
             )
         self.residual = float(np.quantile(norms(nearest - some)[found], 0.95))
 
-    def closest_point(self, points: Array) -> Array:
-        """(n, d) -> (n, d). Raises: NotConverged, with what was found."""
-        nearest, _, found = self._project(np.asarray(points, dtype=np.float64))
-        return all_or_raise(nearest, found)
-
-    def tangent_basis(self, points: Array) -> Array:
-        """(n, d) -> (n, d, k), at points of the manifold."""
-        _, bases, found = self._project(np.asarray(points, dtype=np.float64))
-        bases[~found] = np.eye(self.ambient_dimension, self.dimension)
-        return bases
-
     def _project(self, x: Array) -> tuple[Array, Array, Flags]:
-        """The projections, tangent bases there, and where there are any."""
         parts = [self._project_block(x[i : i + _BLOCK]) for i in range(0, len(x), _BLOCK)]
         if not parts:
             parts = [self._project_block(x)]

@@ -35,6 +35,28 @@ def apply(matrices: Array, vectors: Array) -> Array:
     return np.asarray((matrices @ vectors[..., None])[..., 0])
 
 
+class Projection:
+    """An oracle by `_project` alone."""
+
+    dimension: int
+    ambient_dimension: int
+
+    def _project(self, x: Array) -> tuple[Array, Array, Flags]:
+        """The projections of (n, d) points, tangent bases there, and where there are any."""
+        raise NotImplementedError
+
+    def closest_point(self, points: Array) -> Array:
+        """(n, d) -> (n, d): the nearest points of M. Raises: NotConverged, with what was found."""
+        nearest, _, found = self._project(np.asarray(points, dtype=np.float64))
+        return all_or_raise(nearest, found)
+
+    def tangent_basis(self, points: Array) -> Array:
+        """(n, d) -> (n, d, k), at points of M."""
+        _, bases, found = self._project(np.asarray(points, dtype=np.float64))
+        bases[~found] = np.eye(self.ambient_dimension, self.dimension)
+        return bases
+
+
 def tree_of(points: Array) -> Any:
     """A tree of points; needs scipy.
 

@@ -12,7 +12,7 @@ from ..errors import InvalidArgument, OracleError
 from ._common import (
     Array,
     Flags,
-    all_or_raise,
+    Projection,
     apply,
     as_points,
     box_around,
@@ -117,7 +117,7 @@ class Chart:
         return ahead, np.where(held, np.maximum(behind, self.lower), behind)
 
 
-class Parametrized:
+class Parametrized(Projection):
     """An oracle for a closed manifold that is covered by charts.
 
     Where a parameter is not periodic, the images of other charts have to go on beyond the end of
@@ -163,17 +163,6 @@ class Parametrized:
             )
         self._scale = float(norms(np.ptp(self._points, axis=0)))
         self.bounding_box = box_around(self._points, 0.05)
-
-    def closest_point(self, points: Array) -> Array:
-        """(n, d) -> (n, d): the nearest points of M. Raises: NotConverged, with what was found."""
-        y, _, found = self._closest(np.asarray(points, dtype=np.float64))
-        return all_or_raise(y, found)
-
-    def tangent_basis(self, points: Array) -> Array:
-        """(n, d) -> (n, d, k), at points of M."""
-        _, bases, found = self._closest(np.asarray(points, dtype=np.float64))
-        bases[~found] = np.eye(self.ambient_dimension, self.dimension)
-        return bases
 
     def intersect_flat(self, centers: Array, bases: Array, radii: Array) -> tuple[Array, Flags]:
         """Where M meets the flats {c + v : basis^T v = 0}: (points (n, d), found (n,))."""
@@ -246,7 +235,7 @@ class Parametrized:
             far[mine] = gap.max(axis=1) > 3.5 / self._cells
         return np.asarray(~same | far)
 
-    def _closest(self, x: Array) -> tuple[Array, Array, Flags]:
+    def _project(self, x: Array) -> tuple[Array, Array, Flags]:
         """The nearest points, tangent bases there, and where both were found."""
         y, found = x.copy(), np.zeros(len(x), dtype=bool)
         bases = np.zeros((len(x), self.ambient_dimension, self.dimension))
