@@ -24,6 +24,17 @@ install(FILES packaging/debian/server/README.Debian DESTINATION share/doc/stella
 configure_file(cmake/install_python.cmake.in install_python.cmake @ONLY)
 install(SCRIPT ${PROJECT_BINARY_DIR}/install_python.cmake COMPONENT python EXCLUDE_FROM_ALL)
 
+# Manual pages, of what the programs say with --help.
+foreach(part server tools)
+  install(CODE "
+    execute_process(COMMAND ${PROJECT_SOURCE_DIR}/packaging/manual
+      ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${part} ${PROJECT_BINARY_DIR}/man/${part}
+      COMMAND_ERROR_IS_FATAL ANY)" COMPONENT ${part} EXCLUDE_FROM_ALL)
+endforeach()
+install(DIRECTORY ${PROJECT_BINARY_DIR}/man/server/ DESTINATION share/man/man8 ${of_server})
+install(DIRECTORY ${PROJECT_BINARY_DIR}/man/tools/ DESTINATION share/man/man1
+  COMPONENT tools EXCLUDE_FROM_ALL)
+
 foreach(component server tools development python)
   set(name ${names_${component}})
   install(FILES LICENSE DESTINATION share/doc/${name} RENAME copyright
@@ -72,7 +83,8 @@ set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS python3-matplotlib)
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME stellate)
 set(CPACK_PACKAGE_VENDOR Stellate)
-set(CPACK_PACKAGE_CONTACT "The authors of Stellate <stellate@localhost>")
+# packaging/deb puts who made the packages here.
+set(CPACK_PACKAGE_CONTACT "Made from source <root@localhost>")
 set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
 set(CPACK_RESOURCE_FILE_LICENSE ${PROJECT_SOURCE_DIR}/LICENSE)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
