@@ -103,6 +103,8 @@ def match(path: str, text: str, table: dict[str, Any], where: str) -> Page:
     for token in MarkdownIt("commonmark").parse(text):
         if token.type not in ("fence", "code_block"):
             continue
+        if token.info.startswith("{literalinclude}"):
+            continue  # a file, which has its own test
         line = token.map[0] + (2 if token.type == "fence" else 1)
         first = token.content.lstrip("\n").split("\n")[0].strip()
         entry = next((e for e in entries if first.startswith(e.get("starts", "\0"))), None)

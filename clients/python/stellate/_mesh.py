@@ -5,9 +5,12 @@ from __future__ import annotations
 import dataclasses
 import os
 import warnings
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
+from . import _plot, _slice
 from ._files import formats
 from ._files.orientation import orient, turn_outwards
 from .errors import UncertifiedWarning
@@ -89,6 +92,47 @@ class Mesh:
                 stacklevel=2,
             )
         formats.save(self, os.fspath(path))
+
+    def slice(self, normal: Any, level: float = 0.0) -> Mesh:
+        """Where the mesh meets the hyperplane {x : normal . x = level}: a (k-1)-complex in R^d.
+
+        `normal` is a vector (d,) or the number of an axis, from 0 on. The slice of a closed mesh is
+        closed. Vertices in the hyperplane itself count as above it; its simplices there are flat.
+        """
+        heights = self.points @ _slice.as_normal(normal, self.ambient_dimension) - level
+        return Mesh(*_slice.cut(self.points, self.simplices, heights))
+
+    def plot(
+        self,
+        *,
+        coordinates: Any = None,
+        slices: Sequence[tuple[Any, float]] | None = None,
+        color: Any = None,
+        ax: Any = None,
+        view: tuple[float, float] = (25.0, -60.0),
+        edges: bool | None = None,
+        frame: bool = True,
+        colormap: str = "viridis",
+        alpha: float = 1.0,
+    ) -> Any:
+        """A picture by matplotlib: mesh.plot().figure.savefig("mesh.png").
+
+        Args:
+          coordinates: what is shown: the numbers of two or three axes, from 0 on, or a matrix
+            (2 or 3, d). By default the first three that are not sliced away.
+          slices: (normal, level) pairs as slice() takes them, until a surface is left. By default a
+            mesh of k > 2 is sliced by its last k - 2 coordinates, at their medians.
+          color: a colour's name, the number of a coordinate, or a number for each point. By default
+            a coordinate that is not shown, where there is one.
+          ax: matplotlib's axes to draw into, 3-d if three coordinates are shown; new ones if None.
+          view: elevation and azimuth in degrees.
+          edges: whether triangles have dark edges; by default while they are few.
+          frame: whether to show the axes and what the colours mean.
+
+        Returns: the axes.
+        Raises: ImportError without matplotlib, InvalidArgument.
+        """
+        return _plot.plot(self, coordinates, slices, color, ax, view, edges, frame, colormap, alpha)
 
     def __repr__(self) -> str:
         if self.report is None:

@@ -1,0 +1,99 @@
+"""The gallery's programs do what they claim: each runs coarsely, and its mesh is what topology says."""
+
+import ast
+import json
+import pathlib
+import runpy
+import sys
+
+import numpy as np
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+GALLERY, PAGES = ROOT / "gallery", ROOT / "docs" / "gallery"
+sys.path.insert(0, str(ROOT / "clients" / "python"))
+sys.path.insert(0, str(ROOT / "tests" / "clients" / "python"))  # topology
+sys.path.insert(0, str(GALLERY))
+
+import page  # noqa: E402
+import stellate  # noqa: E402
+import topology  # noqa: E402
+
+# How much coarser here than in the gallery; components, orientable, Betti numbers modulo 2.
+KNOWN = {
+    "cloud": (1.4, 1, True, [1, 2, 1]),
+    "cycloheptane": (2.0, 2, True, [2, 2]),
+    "genus_two": (1.0, 1, True, [1, 4, 1]),
+    "grassmannian": (1.0, 1, True, [1, 1, 2, 1, 1]),
+    "gyroid": (1.4, 1, True, [1, 10, 1]),
+    "invariant_torus": (1.4, 1, True, [1, 2, 1]),
+    "klein_bottle": (1.0, 1, False, [1, 2, 1]),
+    "knot": (1.1, 1, True, [1, 2, 1]),
+    "level_set": (1.6, 1, True, [1, 2, 1]),
+    "linkage": (1.0, 1, True, [1, 8, 1]),
+    "neural": (1.0, 2, True, [2, 4, 2]),
+    "orthogonal": (1.5, 2, True, [2, 2, 2, 2]),
+    "product": (1.2, 1, True, [1, 1, 1, 1]),
+    "projective_plane": (1.5, 1, False, [1, 1, 1]),
+    "remeshed": (1.2, 1, True, [1, 2, 1]),
+    "rotations": (1.8, 1, True, [1, 1, 1, 1]),
+    "shapes": (2.0, 1, True, [1, 0, 1]),
+    "three_torus": (1.3, 1, True, [1, 3, 3, 1]),
+}
+
+
+def euler(betti):
+    return sum((-1) ** i * b for i, b in enumerate(betti))
+
+
+def test_all_programs_are_known_and_short():
+    assert page.programs() == sorted(KNOWN)
+    for name in KNOWN:
+        source = (GALLERY / f"{name}.py").read_text()
+        docstring = ast.get_docstring(ast.parse(source))
+        code = [line for line in source.splitlines() if line.strip() and line[0] != "#"]
+        assert len(code) - len([line for line in docstring.splitlines() if line]) <= 30, name
+        title, words = docstring.split("\n\n")
+        assert "\n" not in title and words
+
+
+@pytest.mark.parametrize("name", sorted(KNOWN))
+def test_a_program_meshes_what_it_claims(name, tmp_path, monkeypatch):
+    coarser, components, orientable, betti = KNOWN[name]
+    mesh_as_ever = stellate.mesh
+    monkeypatch.setattr(
+        stellate, "mesh", lambda oracle, epsilon, **more: mesh_as_ever(oracle, coarser * epsilon, **more)
+    )  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    mesh = runpy.run_path(str(GALLERY / f"{name}.py"))["mesh"]
+    assert mesh.certified, mesh.report
+    assert topology.is_closed(mesh.simplices)
+    assert topology.component_count(mesh.simplices) == components
+    assert topology.euler_characteristic(mesh.simplices) == euler(betti)
+    assert (mesh.oriented_simplices() is not None) == orientable
+    if mesh.dimension <= 3:  # of the fourth dimension that would take a minute
+        assert topology.betti_numbers(mesh.simplices) == betti
+    if mesh.dimension <= 2:
+        assert topology.is_manifold(mesh.simplices)
+    assert share_drawn(tmp_path / f"{name}.png") > 0.01
+
+
+def share_drawn(file):
+    """Of a picture's pixels, those that are not white."""
+    from matplotlib import image
+
+    return float((np.asarray(image.imread(file))[..., :3] < 0.99).any(axis=2).mean())
+
+
+def test_the_page_is_what_its_programs_and_facts_say():
+    facts = json.loads((PAGES / "facts.json").read_text())
+    assert sorted(facts) == sorted(KNOWN)
+    assert (PAGES / "index.md").read_text() == page.text(facts), "gallery/build --page"
+    for name, fact in facts.items():
+        _, components, orientable, betti = KNOWN[name]
+        assert fact["certified"]
+        assert (fact["components"], fact["orientable"]) == (components, orientable)
+        assert fact["euler_characteristic"] == euler(betti)
+        picture = PAGES / f"{name}.png"
+        assert picture.stat().st_size < 60_000
+        assert share_drawn(picture) > 0.01
