@@ -3,7 +3,8 @@
 // process never aborts, and the next one finds a journal that is sound, with the mesh finished as
 // it would have been, or failed with a reason of the journal's, or going on to the same mesh.
 //
-// $STELLATE_CALL_STEP: every how manieth call (23); 1: all of them. $STELLATE_CALL_KILLS: how many
+// $STELLATE_CALL_STEP: every how manieth call (23); 1: all of them. $STELLATE_CALL_FIRST: the first,
+// so that several processes share them out; else another for each fault. $STELLATE_CALL_KILLS: how many
 // kills before each of these, and after it (1).
 
 #include <dlfcn.h>
@@ -203,6 +204,7 @@ class SystemCalls : public testing::JournalTest {
 TEST_F(SystemCalls, EachFailsOnce) {
   const int step = testing::FromEnvironment("STELLATE_CALL_STEP", 23);
   const int kills = testing::FromEnvironment("STELLATE_CALL_KILLS", 1);
+  const int given_first = testing::FromEnvironment("STELLATE_CALL_FIRST", 0);
   ASSERT_EQ(Mesh({}), kFine);
   int count = 0;
   std::ifstream(directory_ + "/calls") >> count;
@@ -223,7 +225,8 @@ TEST_F(SystemCalls, EachFailsOnce) {
     const bool kill = fault == Fault::kKillBefore || fault == Fault::kKillAfter;
     int tried = 0, refused = 0;
     // The order of threads moves the calls about; a few more than there were are tried.
-    for (int at = 1 + static_cast<int>(fault) % step; at <= count + 3; at += step) {
+    const int first = given_first > 0 ? given_first : 1 + static_cast<int>(fault) % step;
+    for (int at = first; at <= count + 3; at += step) {
       for (int again = 0; again < (kill ? kills : 1); ++again) {
         std::filesystem::remove_all(directory_);
         const int status = Mesh({fault, at, {}});

@@ -56,10 +56,26 @@ def find_stellated() -> str:
     return path
 
 
+def _machines_name() -> str:
+    """This machine's name, or, where that is known to nobody, its address on the way out."""
+    name = socket.gethostname()
+    try:
+        socket.getaddrinfo(name, None)
+        return name
+    except OSError:
+        pass
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(("192.0.2.1", 9))  # for documentation alone: nothing is sent
+        except OSError:
+            return "127.0.0.1"
+        return str(probe.getsockname()[0])
+
+
 def _from_elsewhere(address: str) -> str:
     """The address that another machine uses for one that is listened on."""
     host, _, port = address.rpartition(":")
-    return f"{socket.gethostname()}:{port}" if host in ("0.0.0.0", "[::]") else address
+    return f"{_machines_name()}:{port}" if host in ("0.0.0.0", "[::]") else address
 
 
 class Server:

@@ -22,10 +22,14 @@ def test_plain_text_beyond_the_loopback_has_to_be_asked_for():
         stellate.Server(listen="0.0.0.0:0")
 
 
-def test_it_is_reached_by_this_machines_name(repository):
+@pytest.mark.parametrize("known", [True, False])
+def test_it_is_reached_by_this_machines_name(repository, monkeypatch, known):
+    """Or by its address, where its name is known to nobody."""
+    name = "localhost" if known else "nobody.invalid"
+    monkeypatch.setattr(socket, "gethostname", lambda: name)
     with stellate.Server(listen="0.0.0.0:0", insecure_listen=True) as server:
         host, _, port = server.address.rpartition(":")
-        assert host == socket.gethostname() and int(port) > 0
+        assert (host == name) == known and int(port) > 0
         with stellate.Client(server) as client:
             name = client.create(manifolds.Torus(), 0.3).name
             command = [sys.executable, "-c", WORKER, repository / "clients" / "python"]

@@ -161,7 +161,12 @@ inline Outcome RunMesh(SessionOptions options, std::uint64_t stop_at = 0, bool w
   Session session(std::move(options));
   if (!session.Over()) {
     std::thread thread([&] { session.Run(); });
-    const auto worker = with_worker ? FakeWorker::Join(&session.pool()) : nullptr;
+    // Silent from then on, so that it does not end before it is stopped.
+    const auto answer = [stop_at](const Chunk& chunk, core::AnswerBlock* answers) {
+      const bool wanted = stop_at == 0 || chunk.round->batch->round <= stop_at;
+      return wanted && FakeWorker::AnswerTruly(chunk, answers);
+    };
+    const auto worker = with_worker ? FakeWorker::Join(&session.pool(), answer) : nullptr;
     while (stop_at > 0 && session.View().revision < stop_at) std::this_thread::yield();
     if (stop_at > 0) session.Suspend();
     thread.join();
