@@ -22,7 +22,8 @@ from typing import Any, Callable
 
 import stellate
 from stellate import manifolds
-from stellate._command_line import Refused, add_server, credentials_of, load
+from stellate._command_line import add_server, credentials_of
+from stellate._oracle_source import Refused, load
 
 MANIFOLDS: dict[str, Callable[[], Any]] = {
     "torus": manifolds.Torus,

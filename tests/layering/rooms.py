@@ -118,6 +118,7 @@ PYTHON = {
     "_wire": ("errors.py", "oracle.py", "_wire/enums.py", "proto"),
     "_files": ("_complex.py", "_version.py", "errors.py"),
     "_doctor": ("_shared.py", "errors.py", "oracle.py"),
+    "_pipe": ("errors.py",),
 }
 
 
@@ -180,6 +181,8 @@ TABLE = Table(
             "tests",
         ),
         "sqlite3.h": ("server/storage", "tests/server"),
+        "nanoflann.hpp": ("clients/cpp/oracles",),
+        "CGAL/": ("clients/cpp/oracles",),
     },
     generated={"stellate/v1/": "proto", "stellate/rpc/": "proto"},
     packages={"stellate": "clients/python/stellate"},

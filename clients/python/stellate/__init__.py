@@ -6,7 +6,8 @@
 
 `stellate.Oracle` says what an oracle is, and `stellate.check` whether yours is one.
 `stellate.ImplicitManifold` makes one from equations, `stellate.oracles` makes
-them of charts, distances, points and triangles, and `stellate.manifolds` has a few ready.
+them of charts, distances, points and triangles, `stellate.CommandOracle` of a program, and
+`stellate.manifolds` has a few ready.
 """
 
 from . import _stubs
@@ -16,6 +17,7 @@ _stubs.ensure()  # before anything imports them
 from . import manifolds, oracles  # noqa: E402
 from ._api import download, mesh, serve, watch  # noqa: E402
 from ._chunks import Chunk, Puller  # noqa: E402
+from ._command_oracle import CommandOracle  # noqa: E402
 from ._credentials import Credentials  # noqa: E402
 from ._doctor.check import check  # noqa: E402
 from ._doctor.findings import CheckReport, Finding  # noqa: E402
@@ -55,6 +57,7 @@ __all__ = [
     "CheckReport",
     "Chunk",
     "Client",
+    "CommandOracle",
     "Counts",
     "Credentials",
     "ExecutorError",

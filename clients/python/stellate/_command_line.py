@@ -1,7 +1,8 @@
 """python -m stellate: meshes the manifold of an oracle of yours, from the shell.
 
 An oracle is named MODULE:OBJECT, such as shapes:torus for the object, the class or the function
-`torus` of ./shapes.py; a class or a function is called for the oracle.
+`torus` of ./shapes.py; a class or a function is called for the oracle. Or it is a program in any
+language: --oracle-command.
 
 Exit status: 0 certified, or all is well; 1 not certified, or the doctor found errors; 2 usage or
 refused; 3 the server or the oracle failed.
@@ -12,7 +13,6 @@ from __future__ import annotations
 import argparse
 import concurrent.futures as futures
 import contextlib
-import importlib
 import multiprocessing
 import os
 import pathlib
@@ -23,11 +23,13 @@ from typing import Any
 
 from . import _shared
 from ._api import download, mesh
+from ._command_oracle import CommandOracle
 from ._complex import Complex
 from ._credentials import Credentials
 from ._doctor.check import check
 from ._executors import workers_on
 from ._files.formats import check_save
+from ._oracle_source import Refused, add_oracle, name_of, oracle_of
 from ._version import __version__
 from .client import Client
 from .errors import Interrupted, StellateError, exit_status
@@ -68,31 +70,6 @@ _CRITERIA: list[tuple[str, str, type, str]] = [
     ("--common-centre", "common_centre", bool, "judge a simplex at one centre"),
 ]
 _ALL = (*_RUN, *_SERVING, *_CRITERIA)
-
-
-class Refused(Exception):
-    """Something on the command line makes no sense."""
-
-
-def load(name: str) -> Any:
-    """The oracle that "module:attribute.path" names, the current folder's modules included.
-
-    A class or a function is called for it. Raises: Refused.
-    """
-    module_name, colon, path = name.partition(":")
-    if not colon or not path:
-        raise Refused(f"'{name}' has to be MODULE:OBJECT, such as shapes:torus")
-    if os.getcwd() not in sys.path:
-        sys.path.insert(0, os.getcwd())
-    try:
-        found: Any = importlib.import_module(module_name)
-        for attribute in path.split("."):
-            found = getattr(found, attribute)
-        if not hasattr(found, "closest_point") or isinstance(found, type):
-            found = found()
-    except (ImportError, AttributeError, ValueError, TypeError, StellateError) as error:
-        raise Refused(f"{name}: {error}") from error
-    return found
 
 
 def add_server(to: argparse.ArgumentParser, default: str | None) -> None:
@@ -155,8 +132,10 @@ def _deliver(finished: Complex, options: argparse.Namespace) -> int:
 
 def _mesh(options: argparse.Namespace) -> int:
     finished: Complex
-    oracle, settings = load(options.oracle), _settings(options)
-    label = f"stellate {options.oracle}".encode()[:_LABEL_BYTES].decode(errors="ignore")
+    oracle, settings = oracle_of(options), _settings(options)
+    if isinstance(oracle, CommandOracle):
+        settings["workers"] = max(settings.get("workers", 1), oracle.processes)
+    label = _short(f"stellate {name_of(options)}")
     try:
         with contextlib.ExitStack() as stack:
             finished = mesh(
@@ -175,35 +154,38 @@ def _mesh(options: argparse.Namespace) -> int:
     return _deliver(finished, options)
 
 
+def _short(label: str) -> str:
+    return label.encode()[:_LABEL_BYTES].decode(errors="ignore")
+
+
 def _declare(options: argparse.Namespace) -> int:
-    oracle, settings = load(options.oracle), _settings(options)
-    label = options.label or options.oracle
+    oracle, settings = oracle_of(options), _settings(options)
+    label = options.label or _short(name_of(options))
     with _connected(options) as client:
         print(client.create(oracle, options.epsilon, label=label, **settings).name)
     return _WELL
 
 
 def _serve(options: argparse.Namespace) -> int:
-    oracle = load(options.oracle)
+    oracle = oracle_of(options)
+    more = {"worker": options.worker, "max_chunk": options.max_chunk}
     with _connected(options) as client:
-        if options.processes is None:
-            state = client.serve(
-                oracle, options.mesh, worker=options.worker, max_chunk=options.max_chunk
-            )
+        if isinstance(oracle, CommandOracle):
+            # As many workers as there are processes to ask, each over a stream of its own.
+            count = oracle.processes
+            with futures.ThreadPoolExecutor(count) as threads:
+                ends = [
+                    threads.submit(client.serve, oracle, options.mesh, **more) for _ in range(count)
+                ]
+            state = max(end.result() for end in ends)
+        elif options.processes is None:
+            state = client.serve(oracle, options.mesh, **more)
         else:
             count = options.processes
             spawn = multiprocessing.get_context("spawn")  # gRPC's threads do not outlive a fork
             with (
                 futures.ProcessPoolExecutor(count, spawn) as pool,
-                workers_on(
-                    pool,
-                    oracle,
-                    options.mesh,
-                    count,
-                    server=client,
-                    worker=options.worker,
-                    max_chunk=options.max_chunk,
-                ) as crew,
+                workers_on(pool, oracle, options.mesh, count, server=client, **more) as crew,
             ):
                 state = max(crew.wait())
     print(state)
@@ -227,7 +209,7 @@ def _download(options: argparse.Namespace) -> int:
 
 
 def _doctor(options: argparse.Namespace) -> int:
-    report = check(load(options.oracle), options.epsilon, seed=options.seed)
+    report = check(oracle_of(options), options.epsilon, seed=options.seed)
     print(report)
     return _WELL if report.ok else _NOT_CERTIFIED
 
@@ -274,7 +256,7 @@ def _add_connection(command: argparse.ArgumentParser, default: str | None) -> No
     )  # fmt: skip
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(by_command: bool) -> argparse.ArgumentParser:
     about, *more = __doc__.split("\n\n", 1)
     parser = argparse.ArgumentParser(
         "python -m stellate", description=about, epilog="\n".join(more),
@@ -287,9 +269,6 @@ def _parser() -> argparse.ArgumentParser:
         command = commands.add_parser(name, help=words, description=words)
         command.set_defaults(run=run)
         return command
-
-    def add_oracle(to: argparse.ArgumentParser) -> None:
-        to.add_argument("oracle", metavar="MODULE:OBJECT", help="an oracle, or what makes one")
 
     one = add("mesh", _mesh, "mesh the manifold of an oracle")
     add_oracle(one)
@@ -310,7 +289,7 @@ def _parser() -> argparse.ArgumentParser:
     one = add(
         "serve", _serve, "answer a mesh's questions until it is over, together with other workers"
     )
-    add_oracle(one)
+    add_oracle(one, named=not by_command)
     one.add_argument("mesh", help="its whole name: meshes/ and 32 digits")
     one.add_argument("--processes", type=int, metavar="N", help="of this machine, that answer")
     one.add_argument("--worker", default="", help="what the server's log calls this one")
@@ -335,7 +314,9 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; its exit status."""
-    options = _parser().parse_args(arguments)
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    by_command = any(word.partition("=")[0] == "--oracle-command" for word in words)
+    options = _parser(by_command).parse_args(words)
     try:
         return options.run(options)
     except KeyboardInterrupt as stopped:

@@ -62,6 +62,23 @@ def turned_torus():
     return oracles.Transformed(TORUS, rotation=turn, scale=2, translation=np.arange(5.0))
 
 
+def clifford():
+    """A torus in R^4 by two constraints, one with its gradient."""
+
+    def slope(x):
+        return 2 * x * [1, 1, 0, 0]
+
+    return oracles.ConstraintSet(
+        [(lambda x: norm2(x[:, :2]) - 1, slope), lambda x: norm2(x[:, 2:]) - 1],
+        ambient_dimension=4,
+        bounding_box=([-1.5] * 4, [1.5] * 4),
+    )
+
+
+def norm2(x):
+    return (x * x).sum(axis=1)
+
+
 FOUR_BARS = [("a", "p", 1.0), ("p", "q", 1.3), ("q", "b", 1.1), ("q", "r", 0.5)]
 GROUND = {"a": (0, 0), "b": (1.5, 0)}
 
@@ -90,6 +107,7 @@ ALL = {
         0.2,
         1e-7,
     ),
+    "constraint_set": (lambda: clifford(), 0.2, 1e-8),
     "linkage": (lambda: oracles.Linkage(FOUR_BARS, GROUND), 0.05, 1e-8),
     "point_cloud": (lambda: oracles.PointCloud(torus_cloud(), 2), 0.1, 1e-9),
     "triangles": (lambda: oracles.TriangleMesh(*torus_triangles()), 0.1, 1e-9),
@@ -238,6 +256,17 @@ def test_large_triangles_are_filled():
 
 
 POINTS, TRIANGLES = torus_triangles(12, 8)
+
+
+def sphere(x):
+    return norm2(x) - 1
+
+
+def constraints(*functions, d=3):
+    box = [-2] * 3, [2] * 3
+    return oracles.ConstraintSet(functions, ambient_dimension=d, bounding_box=box)
+
+
 WRONG = {
     "closed": lambda: oracles.TriangleMesh(POINTS, TRIANGLES[1:]),
     "triangles have to name points": lambda: oracles.TriangleMesh(POINTS, TRIANGLES + 1),
@@ -265,6 +294,13 @@ WRONG = {
     ),
     "a box of R": lambda: oracles.SignedDistance.of_grid(torus_grid(8), ([0] * 2, [1] * 2)),
     "pair of corners": lambda: oracles.SignedDistance(lambda x: x[:, 0], bounding_box=3),
+    "one constraint at least": lambda: constraints(),
+    "constraint 0 has to be": lambda: constraints(3),
+    "box of R.4": lambda: constraints(sphere, d=4),
+    "leave no manifold": lambda: constraints(lambda x: x),
+    "constraint 1 follows": lambda: constraints(sphere, lambda x: 2 * sphere(x)),
+    "no point was found": lambda: constraints(lambda x: sphere(x) + 2),
+    "no gradient of its own": lambda: constraints(lambda x: sphere(x) ** 2),
     "leave nothing to move": lambda: oracles.Linkage([("a", "p", 1), ("p", "b", 1)], GROUND),
     "no chain": lambda: oracles.Linkage([("p", "q", 1)], GROUND),
     "two joints that are fixed": lambda: oracles.Linkage([("a", "b", 1)], GROUND),

@@ -97,9 +97,44 @@ def test_declare_serve_and_download(shell, server, tmp_path):
     assert (tmp_path / "a.txt").exists() and (tmp_path / "a.msh").exists()
 
 
+def perl(repository):
+    return f"perl {repository / 'clients' / 'pipe' / 'torus.pl'}"
+
+
+def test_a_program_s_manifold_is_meshed(shell, repository, tmp_path):
+    command, torus = ["--oracle-command", perl(repository)], manifolds.Torus(1.0, 0.4)
+    box = ":".join(",".join(map(repr, corner.tolist())) for corner in torus.bounding_box)
+    done = shell("mesh", *command, f"--box={box}", "-e", "0.2", "-o", "a.txt",
+                 "--oracle-processes", "2", "-q")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    same = stellate.mesh(torus, 0.2)
+    mesh = stellate.load_txt(tmp_path / "a.txt")
+    assert (len(mesh.points), len(mesh.simplices)) == (len(same.points), len(same.simplices))
+    doctor = shell("doctor", *command)
+    assert doctor.returncode == 0, doctor.stdout
+    wrong = shell("mesh", *command, "-k", "1", "-e", "0.3")
+    assert wrong.returncode == 2 and "the options 1" in wrong.stderr
+    broken = shell("mesh", "--oracle-command", "echo hello", "-e", "0.3")
+    assert broken.returncode == 3 and "is 'hello'; if that is a banner" in broken.stderr
+
+
+def test_programs_serve_what_was_declared(shell, server, repository):
+    at = ("--server", server.address)
+    command = ("--oracle-command", perl(repository))
+    name = shell("declare", *command, "-e", "0.3", *at).stdout.strip()
+    with stellate.Client(server) as client:
+        assert client.get(name).label == perl(repository)[:128]
+    served = shell("serve", name, *command, "--oracle-processes", "2", *at)
+    assert (served.returncode, served.stdout) == (0, "SUCCEEDED\n"), served.stderr
+
+
 @pytest.mark.parametrize(
     "arguments, words",
     [
+        (["mesh", "shapes:torus", "--oracle-command", "x", "-e", "0.3"], "either shapes:torus or"),
+        (["mesh", "-e", "0.3"], "or give --oracle-command"),
+        (["mesh", "shapes:torus", "-k", "2", "-e", "0.3"], "--dimension goes with"),
+        (["mesh", "--oracle-command", "x", "--box", "1:0", "-e", "1"], "is not a box"),
         (["mesh", "shapes:absent", "-e", "0.3"], "has no attribute 'absent'"),
         (["mesh", "shapes", "-e", "0.3"], "MODULE:OBJECT"),
         (["mesh", "absent:torus", "-e", "0.3"], "No module named 'absent'"),

@@ -6,6 +6,7 @@ themselves are stellate.ImplicitManifold.
 
 from ._cloud import PointCloud
 from ._combined import LevelSet, Product, Transformed
+from ._constraints import ConstraintSet
 from ._distance import SignedDistance
 from ._linkage import Linkage
 from ._parametrized import Chart, Parametrized
@@ -13,6 +14,7 @@ from ._triangles import TriangleMesh
 
 __all__ = [
     "Chart",
+    "ConstraintSet",
     "LevelSet",
     "Linkage",
     "Parametrized",

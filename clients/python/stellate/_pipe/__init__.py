@@ -1,0 +1,1 @@
+"""Oracles that are programs: their processes, and what goes through the pipe."""
