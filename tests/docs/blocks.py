@@ -6,7 +6,8 @@ their order:
 
     [[block]]
     starts = "stellate download"      # how the block's first line begins
-    run = "bash"                      # or python, config, promql, cpp: it is run as it stands
+    run = "bash"                      # or python, config, promql, cpp: it is run as it stands; or
+                                      # output: what the block before it printed
 
     servers = ["plain", "tls"]        # who listens meanwhile: surroundings.py says where
     certificates = true               # the files of "tls", but no server
@@ -26,7 +27,8 @@ or, for a block that cannot run here,
 
 At the top of a table, `paths = { "/etc/stellate" = "etc" }` has the page's blocks write into their
 scratch folder what would go there, and `fresh = true` gives them a source tree in which nothing is
-built. With `service = true` systemctl starts and stops what packaging/install installs, in `root`.
+built. With `session = true` all Python blocks run in one interpreter, one after the other, and a block of
+kind `output` may follow each (session.py says what has to agree). With `service = true` systemctl starts and stops what packaging/install installs, in `root`.
 """
 
 from __future__ import annotations
@@ -40,7 +42,7 @@ from markdown_it import MarkdownIt
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 TABLES = pathlib.Path(__file__).resolve().parent / "pages"
-RUNS = ("bash", "python", "config", "promql", "cpp")
+RUNS = ("bash", "python", "output", "config", "promql", "cpp")
 CHECKS = ("bash", "python", "toml", "yaml", "text")
 _KEYS = {
     "starts", "run", "check", "reason", "servers", "before", "files", "replace", "background",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import pathlib
 import tempfile
 import unittest
@@ -9,6 +10,7 @@ import unittest
 import blocks
 import shell
 from blocks import Wrong
+from session import Session, difference
 from surroundings import Surroundings
 
 PAGE = """# A page
@@ -67,6 +69,28 @@ class Matching(unittest.TestCase):
     def test_every_table_is_a_page_s(self) -> None:
         known = {blocks.table_of(page) for page in blocks.pages()}
         self.assertEqual(set(blocks.TABLES.glob("*.toml")) - known, set())
+
+
+class OneInterpreter(unittest.TestCase):
+    def setUp(self) -> None:
+        self.session = Session("/", dict(os.environ), 60.0)
+        self.addCleanup(self.session.close)
+
+    def test_blocks_go_on_where_others_ended(self) -> None:
+        self.session.run("def f(x):\n    return 2 * x\n")
+        self.session.run("print(f(21))")
+        self.assertEqual(self.session.printed, "42\n")
+        with self.assertRaisesRegex(RuntimeError, "ZeroDivisionError"):
+            self.session.run("1 / 0")
+
+    def test_what_a_page_shows_is_held_to_what_was_printed(self) -> None:
+        printed = "mesh  1,200 vertices, Euler characteristic -2\ntook 0.3 s\nnear 0.31\n"
+        fine = "mesh 1,100 vertices, Euler characteristic -2\n...\nnear 0.3"
+        self.assertIsNone(difference(fine, printed))
+        for wrong in ("-2", "vertices", "0.3"):
+            with self.subTest(wrong):
+                self.assertTrue(difference(fine.replace(wrong, "1"), printed))
+        self.assertTrue(difference("mesh 1,200 vertices", printed))
 
 
 class Running(unittest.TestCase):

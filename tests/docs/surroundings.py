@@ -26,6 +26,7 @@ import time
 from typing import Any
 
 from blocks import ROOT, Page, Wrong
+from session import Session
 
 BUILD = pathlib.Path(os.environ.get("STELLATE_BUILD", ROOT / "build" / "release"))
 PATIENCE = 100.0  # seconds: for a hang, not for a measurement
@@ -68,6 +69,8 @@ class Surroundings:
         self.here = folder
         self._servers: list[subprocess.Popen] = []
         self._mesh: str | None = None
+        self.in_session = page.table.get("session", False)
+        self._session: Session | None = None
         self.paths = {}
         for path, name in page.table.get("paths", {}).items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -169,8 +172,16 @@ class Surroundings:
             server.wait()
         self._servers.clear()
 
+    def session(self) -> Session:
+        """The page's interpreter, for pages of one."""
+        if self._session is None:
+            self._session = Session(str(self.here), self.environment(), PATIENCE)
+        return self._session
+
     def close(self) -> None:
-        """Ends what a page started as a service."""
+        """Ends what a page started as a service, and its interpreter."""
+        if self._session is not None:
+            self._session.close()
         try:
             os.kill(int((self.here / ".pid").read_text()), signal.SIGKILL)
         except (OSError, ValueError):
