@@ -111,13 +111,13 @@ PYTHON = {
     "_shared.py": (),
     "_version.py": (),
     "_wire/enums.py": ("proto",),
-    "report.py": ("_version.py", "_wire/enums.py", "proto"),
+    "report.py": ("_html.py", "_version.py", "_wire/enums.py", "proto"),
     "_complex.py": ("report.py",),
     "errors.py": ("_complex.py", "_shared.py", "proto"),
     "oracle.py": ("errors.py",),
     "_wire": ("errors.py", "oracle.py", "_wire/enums.py", "proto"),
     "_files": ("_complex.py", "_version.py", "errors.py"),
-    "_doctor": ("_shared.py", "errors.py", "oracle.py"),
+    "_doctor": ("_html.py", "_shared.py", "errors.py", "oracle.py"),
     "_pipe": ("errors.py",),
 }
 

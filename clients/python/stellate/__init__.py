@@ -25,6 +25,7 @@ from ._executors import ExecutorWorkers, workers_on  # noqa: E402
 from ._files.formats import check_save  # noqa: E402
 from ._mesh import Mesh, load_txt  # noqa: E402
 from ._pull import pull  # noqa: E402
+from ._series import save_series  # noqa: E402
 from ._server import Server, find_stellated  # noqa: E402
 from ._version import __version__ as __version__  # noqa: E402
 from .client import Client, MeshInfo, ServerInfo  # noqa: E402
@@ -98,6 +99,7 @@ __all__ = [
     "mesh",
     "progress_bar",
     "pull",
+    "save_series",
     "serve",
     "watch",
     "workers_on",

@@ -34,3 +34,11 @@ class Complex(Protocol):
     def oriented_simplices(self) -> np.ndarray | None: ...
 
     def save(self, path: str | os.PathLike[str]) -> None: ...
+
+
+def in_space(points: np.ndarray) -> np.ndarray:
+    """(n, d) -> (n, 3): the first three coordinates, zeros added where there are fewer."""
+    n, d = points.shape
+    space = np.zeros((n, 3))
+    space[:, : min(d, 3)] = points[:, :3]
+    return space

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _plot, _slice
+from . import _convert, _html, _plot, _slice
 from ._files import formats
 from ._files.orientation import orient, turn_outwards
 from .errors import UncertifiedWarning
@@ -133,6 +133,41 @@ class Mesh:
         Raises: ImportError without matplotlib, InvalidArgument.
         """
         return _plot.plot(self, coordinates, slices, color, ax, view, edges, frame, colormap, alpha)
+
+    def to_meshio(self) -> Any:
+        """A meshio.Mesh, k from 1 to 3.
+
+        As in .vtu files, points are the first three coordinates; when d > 3 all of them are the
+        point data "coordinates". This and its likes raise ImportError where the library is not
+        installed, InvalidArgument for meshes that it cannot hold.
+        """
+        return _convert.to_meshio(self, formats.cells(self))
+
+    def to_pyvista(self) -> Any:
+        """A pyvista.UnstructuredGrid, k from 1 to 3; coordinates as in to_meshio()."""
+        return _convert.to_pyvista(self, formats.cells(self))
+
+    def to_trimesh(self) -> Any:
+        """A trimesh.Trimesh of a surface in R^3, its normals outwards where it is closed."""
+        return _convert.to_trimesh(self, formats.cells(self))
+
+    def to_open3d(self) -> Any:
+        """An open3d.geometry.TriangleMesh of a surface, a LineSet of a curve; d <= 3."""
+        return _convert.to_open3d(self, formats.cells(self))
+
+    def _repr_html_(self) -> str:
+        rows = [
+            ("dimension", f"{self.dimension} in R^{self.ambient_dimension}", ""),
+            ("size", f"{len(self.points):,} points, {len(self.simplices):,} simplices", ""),
+        ]
+        if self.report is None:
+            rows.append(
+                ("certificate", "none: the mesh grows still, or its report is not here", "")
+            )
+        else:
+            verdict = self.report.certificate.verdict or self.report.termination
+            rows.append(("certificate", verdict, "good" if self.certified else "bad"))
+        return _html.table("Stellate: mesh", rows)
 
     def __repr__(self) -> str:
         if self.report is None:

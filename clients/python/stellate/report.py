@@ -9,6 +9,7 @@ import re
 import textwrap
 from typing import Any
 
+from . import _html
 from ._generated import mesh_pb2 as pb
 from ._version import __version__
 from ._wire import enums
@@ -193,6 +194,16 @@ class Report:
         )
 
     def __str__(self) -> str:
+        return "\n".join(_entry(title, text) for title, text in self.lines())
+
+    def _repr_html_(self) -> str:
+        marks = {"failure": "bad", "warning": "mind"}
+        marks["certificate"] = "good" if self.certified else "bad"
+        rows = [(title, text, marks.get(title, "")) for title, text in self.lines()]
+        return _html.table("Stellate: report", rows)
+
+    def lines(self) -> list[tuple[str, str]]:
+        """What there is to say, as (title, text)."""
         n, c = self.counts, self.certificate
         inserted = (
             f"size {n.inserted_size:,}, radius-edge {n.inserted_radius_edge:,}, "
@@ -218,8 +229,7 @@ class Report:
         lines.append(("certificate", f"{mark}: {verdict}" if verdict else mark))
         if c.components:
             lines += _certificate_lines(c)
-        lines += [("warning", text) for text in c.warnings]
-        return "\n".join(_entry(title, text) for title, text in lines)
+        return lines + [("warning", text) for text in c.warnings]
 
 
 def _certificate(message: pb.Certificate) -> Certificate:

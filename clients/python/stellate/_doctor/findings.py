@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import _shared
+from .. import _html, _shared
 
 _WIDTH = 100
 _SHOWN_ENTRIES = 6
@@ -101,11 +101,29 @@ class CheckReport:
         return tuple(finding.code for finding in self.findings)
 
     def __str__(self) -> str:
+        return "\n".join([*map(str, self.findings), self.summary])
+
+    def _repr_html_(self) -> str:
+        marks = {"error": "bad", "warning": "mind"}
+        rows = [
+            (
+                f"{f.severity} {f.code}",
+                f"{f.message}\n{f.advice}".rstrip(),
+                marks.get(f.severity, ""),
+            )
+            for f in self.findings
+        ]
+        rows.append(("verdict", self.summary, "good" if self.ok else "bad"))
+        return _html.table("Stellate: check of an oracle", rows)
+
+    @property
+    def summary(self) -> str:
+        """All of it in a sentence."""
+
         def count(severity: str) -> str:
             n = sum(finding.severity == severity for finding in self.findings)
             return f"{n} {severity}" if n == 1 else f"{n} {severity}s"
 
         verdict = "keeps" if self.ok else "breaks"
         summary = f"The oracle {verdict} its contract: {count('error')}, {count('warning')}"
-        summary += f", from {self.queries:,} queries about {self.samples:,} points of M."
-        return "\n".join([*map(str, self.findings), summary])
+        return summary + f", from {self.queries:,} queries about {self.samples:,} points of M."

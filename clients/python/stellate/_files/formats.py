@@ -13,7 +13,7 @@ from typing import Callable
 
 import numpy as np
 
-from .._complex import Complex
+from .._complex import Complex, in_space
 from ..errors import SaveError
 from . import meshio_formats, vtu
 
@@ -43,9 +43,18 @@ def save(mesh: Complex, path: str) -> None:
     form = _choose(path, mesh.dimension, mesh.ambient_dimension)
     if form.meshio is not None:
         with _replaced(path) as draft:
-            meshio_formats.write(form.meshio, mesh, _cells(mesh), draft)
+            meshio_formats.write(form.meshio, mesh, cells(mesh), draft)
         return
-    contents = form.contents(mesh)  # in full before any file is touched
+    _write(form.contents(mesh), path)
+
+
+def save_txt(mesh: Complex, path: str) -> None:
+    """The .txt format, whatever the path ends in."""
+    _write(_FORMATS[".txt"].contents(mesh), path)
+
+
+def _write(contents: bytes, path: str) -> None:
+    """Takes contents that are whole before any file is touched."""
     with _replaced(path) as draft, open(draft, "wb") as file:
         file.write(contents)
 
@@ -125,15 +134,10 @@ def _lines(rows: np.ndarray, number: str, prefix: str = "") -> Iterator[str]:
     return (line % tuple(row) for row in rows.tolist())
 
 
-def _cells(mesh: Complex) -> np.ndarray:
+def cells(mesh: Complex) -> np.ndarray:
+    """The simplices, turned to agree where that can be."""
     oriented = mesh.oriented_simplices()
     return mesh.simplices if oriented is None else oriented
-
-
-def _in_space(mesh: Complex) -> np.ndarray:
-    """The points with three coordinates, zeros added."""
-    n, d = mesh.points.shape
-    return np.hstack([mesh.points, np.zeros((n, 3 - d))])
 
 
 def _txt(mesh: Complex) -> Iterator[str]:
@@ -150,17 +154,17 @@ def _off(mesh: Complex) -> Iterator[str]:
         yield str(mesh.ambient_dimension)
     yield f"{len(mesh.points)} {len(mesh.simplices)} 0"
     yield from _lines(mesh.points, "%.17g")
-    yield from _lines(_cells(mesh), "%d", f"{mesh.dimension + 1} ")
+    yield from _lines(cells(mesh), "%d", f"{mesh.dimension + 1} ")
 
 
 def _obj(mesh: Complex) -> Iterator[str]:
-    points = _in_space(mesh)
+    points = in_space(mesh.points)
     yield from _lines(points, "%.17g", "v ")
-    yield from _lines(_cells(mesh) + 1, "%d", "l " if mesh.dimension == 1 else "f ")
+    yield from _lines(cells(mesh) + 1, "%d", "l " if mesh.dimension == 1 else "f ")
 
 
 def _ply(mesh: Complex) -> Iterator[str]:
-    points = _in_space(mesh)
+    points = in_space(mesh.points)
     yield "ply"
     yield "format ascii 1.0"
     yield f"element vertex {len(points)}"
@@ -173,7 +177,7 @@ def _ply(mesh: Complex) -> Iterator[str]:
         yield "property list uchar int vertex_indices"
     yield "end_header"
     yield from _lines(points, "%.17g")
-    yield from _lines(_cells(mesh), "%d", "" if mesh.dimension == 1 else "3 ")
+    yield from _lines(cells(mesh), "%d", "" if mesh.dimension == 1 else "3 ")
 
 
 def _msh(mesh: Complex) -> Iterator[str]:
@@ -181,10 +185,10 @@ def _msh(mesh: Complex) -> Iterator[str]:
     element_type = {1: 1, 2: 2, 3: 4}[mesh.dimension]  # line, triangle, tetrahedron
     yield "$MeshFormat\n2.2 0 8\n$EndMeshFormat"
     yield f"$Nodes\n{len(mesh.points)}"
-    yield from (f"{i} {line}" for i, line in enumerate(_lines(_in_space(mesh), "%.17g"), 1))
+    yield from (f"{i} {line}" for i, line in enumerate(_lines(in_space(mesh.points), "%.17g"), 1))
     yield f"$EndNodes\n$Elements\n{len(mesh.simplices)}"
     # Two tags for each element: it is of physical group 1 and of geometrical entity 1.
-    rows = _lines(_cells(mesh) + 1, "%d", f"{element_type} 2 1 1 ")
+    rows = _lines(cells(mesh) + 1, "%d", f"{element_type} 2 1 1 ")
     yield from (f"{i} {line}" for i, line in enumerate(rows, 1))
     yield "$EndElements"
 
@@ -194,7 +198,7 @@ _STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attri
 
 def _stl(mesh: Complex) -> bytes:
     """Binary: a header that says nothing, and never "solid", and a record a triangle."""
-    corners = mesh.points[_cells(mesh)]
+    corners = mesh.points[cells(mesh)]
     facets = np.zeros(len(corners), _STL_FACET)
     facets["corners"] = corners
     ends = facets["corners"]
@@ -211,7 +215,7 @@ def _stl(mesh: Complex) -> bytes:
 
 
 def _vtu_lines(mesh: Complex) -> Iterator[str]:
-    return vtu.lines(mesh, _cells(mesh))
+    return vtu.lines(mesh, cells(mesh))
 
 
 def _text(lines: Callable[[Complex], Iterator[str]]) -> Callable[[Complex], bytes]:

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from .._complex import Complex
+from .._complex import Complex, in_space
 from ..errors import SaveError
 
-_CELLS = {1: "line", 2: "triangle", 3: "tetra"}
+CELLS = {1: "line", 2: "triangle", 3: "tetra"}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,17 +62,21 @@ FORMATS = {
 }
 
 
+def as_meshio(mesh: Complex, cells: np.ndarray) -> Any:
+    """A meshio.Mesh with these oriented cells, 1 <= k <= 3."""
+    import meshio
+
+    every = np.ascontiguousarray(mesh.points)
+    point_data = {"coordinates": every} if mesh.ambient_dimension > 3 else {}
+    return meshio.Mesh(in_space(every), [(CELLS[mesh.dimension], cells)], point_data=point_data)
+
+
 def write(form: MeshioFormat, mesh: Complex, cells: np.ndarray, path: str) -> None:
     """Writes a mesh with these oriented cells, that the format can hold, to a file."""
     import meshio
 
-    n, d = mesh.points.shape
-    space = np.zeros((n, 3))
-    space[:, : min(d, 3)] = mesh.points[:, :3]
-    point_data = {"coordinates": np.ascontiguousarray(mesh.points)} if d > 3 else {}
-    one = meshio.Mesh(space, [(_CELLS[mesh.dimension], cells)], point_data=point_data)
     try:
-        meshio.write(path, one, form.name, **form.options)
+        meshio.write(path, as_meshio(mesh, cells), form.name, **form.options)
     except Exception as error:  # meshio has no base class for what its writers raise
         if isinstance(error, OSError):
             raise

@@ -8,22 +8,20 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .._complex import Complex
+from .._complex import Complex, in_space
 from .._version import __version__
 
 _TYPES = {"<f8": "Float64", "<i8": "Int64", "|u1": "UInt8"}
-_CELL_TYPES = {1: 3, 2: 5, 3: 10}  # line, triangle, tetrahedron
+CELL_TYPES = {1: 3, 2: 5, 3: 10}  # line, triangle, tetrahedron
 _BLOCK_BYTES = 1 << 20
 
-DIMENSIONS = tuple(_CELL_TYPES)
+DIMENSIONS = tuple(CELL_TYPES)
 
 
 def lines(mesh: Complex, cells: np.ndarray) -> Iterator[str]:
     """The file of a mesh with these oriented cells, k in DIMENSIONS."""
     n, d = mesh.points.shape
     m, width = cells.shape
-    space = np.zeros((n, 3))
-    space[:, : min(d, 3)] = mesh.points[:, :3]
     yield '<?xml version="1.0"?>'
     yield (
         '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
@@ -36,12 +34,12 @@ def lines(mesh: Complex, cells: np.ndarray) -> Iterator[str]:
     yield "</FieldData>"
     yield f'<Piece NumberOfPoints="{n}" NumberOfCells="{m}">'
     yield "<Points>"
-    yield _array("Points", space)
+    yield _array("Points", in_space(mesh.points))
     yield "</Points>"
     yield "<Cells>"
     yield _array("connectivity", cells.ravel())
     yield _array("offsets", width * np.arange(1, m + 1))
-    yield _array("types", np.full(m, _CELL_TYPES[mesh.dimension], dtype=np.uint8))
+    yield _array("types", np.full(m, CELL_TYPES[mesh.dimension], dtype=np.uint8))
     yield "</Cells>"
     if d > 3:
         yield "<PointData>"

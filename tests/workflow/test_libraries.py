@@ -1,0 +1,69 @@
+"""Meshes in PyVista, trimesh and Open3D: these see the surface that we see."""
+
+import numpy as np
+import pytest
+import shapes
+import stellate
+
+
+def area(mesh):
+    a, b, c = (mesh.points[mesh.simplices[:, i]] for i in range(3))
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+
+
+def test_pyvista_has_the_surface():
+    torus = shapes.torus()
+    grid = torus.to_pyvista()
+    assert (grid.n_points, grid.n_cells) == (len(torus.points), len(torus.simplices))
+    assert np.isclose(grid.area, area(torus), rtol=1e-9, atol=0)
+    surface = grid.extract_surface()
+    assert surface.is_manifold and surface.n_open_edges == 0
+    assert surface.volume > 0
+
+
+def test_pyvista_has_solids_with_all_their_coordinates():
+    sphere = shapes.simplex_boundary(3)
+    grid = sphere.to_pyvista()
+    assert set(grid.celltypes) == {10}  # VTK_TETRA
+    assert np.array_equal(grid.point_data["coordinates"], sphere.points)
+    cells = np.sort(grid.cells.reshape(-1, 5)[:, 1:], axis=1)
+    assert {tuple(row) for row in cells} == {tuple(row) for row in sphere.simplices}
+
+
+def test_pyvista_has_curves():
+    polygon = shapes.polygon(9, 5)
+    assert polygon.to_pyvista().n_cells == len(polygon.simplices)
+
+
+def test_trimesh_finds_the_torus_closed_and_turned_outwards():
+    torus = shapes.torus()
+    converted = torus.to_trimesh()
+    assert converted.is_watertight and converted.is_winding_consistent
+    assert converted.euler_number == 0
+    assert converted.volume > 0
+    assert np.isclose(converted.area, area(torus), rtol=1e-9, atol=0)
+
+
+def test_open3d_finds_the_torus_closed():
+    torus = shapes.torus()
+    converted = torus.to_open3d()
+    assert converted.is_watertight() and converted.is_orientable()
+    assert converted.euler_poincare_characteristic() == 0
+    assert converted.get_volume() > 0
+    assert np.isclose(converted.get_surface_area(), area(torus), rtol=1e-9, atol=0)
+    lines = shapes.polygon(9, 3).to_open3d()
+    assert len(lines.lines) == 9 and len(lines.points) == 9
+
+
+@pytest.mark.parametrize(
+    "convert, mesh",
+    [
+        ("to_pyvista", shapes.simplex_boundary(4)),
+        ("to_trimesh", shapes.projective_plane()),
+        ("to_trimesh", shapes.polygon(9, 3)),
+        ("to_open3d", shapes.simplex_boundary(3)),
+    ],
+)
+def test_what_a_library_cannot_hold_is_refused(convert, mesh):
+    with pytest.raises(stellate.InvalidArgument, match="takes meshes with k in"):
+        getattr(mesh, convert)()
