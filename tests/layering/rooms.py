@@ -108,6 +108,7 @@ SERVER = {
 
 # The Python package: its rooms, and the modules at its top that these may take.
 PYTHON = {
+    "_html.py": (),
     "_shared.py": (),
     "_version.py": (),
     "_wire/enums.py": ("proto",),
