@@ -41,7 +41,9 @@ if(NOT STELLATE_CORE_ONLY)
     stellate_client=client stellate_mesh=mesh stellate_catalogue=catalogue stellate_doctor=doctor
     stellate_pipe=pipe stellate_proto=proto)
   install(DIRECTORY clients/cpp/include/stellate DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-    COMPONENT development)
+    COMPONENT development PATTERN error.h EXCLUDE PATTERN oracle.h EXCLUDE)
+  install(DIRECTORY ${PROJECT_BINARY_DIR}/installed/stellate
+    DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development)
 endif()
 configure_package_config_file(cmake/stellateConfig.cmake.in stellateConfig.cmake
   INSTALL_DESTINATION ${package_folder})
