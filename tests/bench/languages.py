@@ -15,6 +15,7 @@ import pathlib
 import statistics
 import subprocess
 import sys
+from collections.abc import Collection
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "clients" / "python"))
@@ -79,23 +80,29 @@ class Timed:
         self._process.wait()
 
 
-def main() -> int:
+def parse(description: str | None, known: Collection[str]) -> argparse.Namespace:
+    """The command line; without a language on it all that are known."""
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("languages", nargs="*", metavar="LANGUAGE", help=", ".join(COMMANDS))
+    parser.add_argument("languages", nargs="*", metavar="LANGUAGE", help=", ".join(known))
     parser.add_argument("--epsilon", type=float, default=0.02)
     parser.add_argument("--rounds", type=int, default=9)
     arguments = parser.parse_args()
-    chosen = arguments.languages or list(COMMANDS)
-    for name in chosen:
-        if name not in COMMANDS:
-            parser.error(f"no client in {name}; there are {', '.join(COMMANDS)}")
+    arguments.languages = arguments.languages or list(known)
+    for name in arguments.languages:
+        if name not in known:
+            parser.error(f"no {name} here; there are {', '.join(known)}")
+    return arguments
+
+
+def main() -> int:
+    arguments = parse(__doc__, COMMANDS)
     print_header()
     with stellate.Server() as server:
         python = Timed([sys.executable, "-B", "-c", PYTHON], server.address, arguments.epsilon)
         python.mesh()
-        for name in chosen:
+        for name in arguments.languages:
             subprocess.run(BUILDS[name], shell=True, check=True, cwd=CLIENTS / name)
             other = Timed(COMMANDS[name], server.address, arguments.epsilon)
             compare(name, python, other, arguments.rounds)

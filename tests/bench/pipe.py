@@ -9,7 +9,6 @@ Both oracles give closest points and tangents and intersect no flats.
 
 from __future__ import annotations
 
-import argparse
 import pathlib
 import subprocess
 import sys
@@ -52,13 +51,7 @@ BUILDS = {
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("languages", nargs="*", metavar="LANGUAGE", help=", ".join(COMMANDS))
-    parser.add_argument("--epsilon", type=float, default=0.02)
-    parser.add_argument("--rounds", type=int, default=9)
-    arguments = parser.parse_args()
+    arguments = languages.parse(__doc__, COMMANDS)
     BUILT.mkdir(parents=True, exist_ok=True)
     languages.print_header()
     with stellate.Server() as server:
@@ -66,9 +59,7 @@ def main() -> int:
             [sys.executable, "-B", "-c", PYTHON], server.address, arguments.epsilon
         )
         python.mesh()
-        for name in arguments.languages or list(COMMANDS):
-            if name not in COMMANDS:
-                parser.error(f"no oracle in {name}; there are {', '.join(COMMANDS)}")
+        for name in arguments.languages:
             subprocess.run(BUILDS.get(name, "true"), shell=True, check=True)
             other = languages.Timed([TIMING, COMMANDS[name]], server.address, arguments.epsilon)
             languages.compare(name, python, other, arguments.rounds)

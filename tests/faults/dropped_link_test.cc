@@ -9,22 +9,20 @@
 #include "tests/faults/persistent_worker.h"
 #include "tests/faults/relay.h"
 
-namespace stellate::server {
+namespace stellate::server::testing {
 namespace {
 
 using namespace std::chrono_literals;
-using testing::Bytes;
-using testing::PersistentWorker;
 
-class DroppedLink : public testing::FaultTest {};
+class DroppedLink : public FaultTest {};
 
 TEST_F(DroppedLink, TheMeshGoesOnAndIsTheUndisturbedOne) {
-  const int wanted = testing::FromEnvironment("STELLATE_DROPS", 6);
+  const int wanted = FromEnvironment("STELLATE_DROPS", 6);
   auto server = Next();
   const std::optional<Bytes> undisturbed = Undisturbed(server->stub());
   ASSERT_TRUE(undisturbed);
   const std::string bad_link = directory_ + "/relay";
-  testing::Relay relay(bad_link, server->address().substr(std::string("unix:").size()));
+  Relay relay(bad_link, server->address().substr(std::string("unix:").size()));
   int cuts = 0, silences = 0, meshes = 0;
   while (cuts + silences < wanted) {
     const std::string name = Create(server->stub(), 3000);
@@ -48,15 +46,15 @@ TEST_F(DroppedLink, TheMeshGoesOnAndIsTheUndisturbedOne) {
         ++cuts;
       }
     });
-    const std::optional<Bytes> mesh = testing::Watch(server->stub(), name);
+    const std::optional<Bytes> mesh = Watch(server->stub(), name);
     saboteur.request_stop();
     saboteur.join();
     ASSERT_TRUE(mesh);
-    testing::ExpectSame(*mesh, *undisturbed);
+    ExpectSame(*mesh, *undisturbed);
     if (HasFailure()) break;
   }
   std::cout << cuts << " broken links, " << silences << " silent ones, " << meshes << " meshes\n";
 }
 
 }  // namespace
-}  // namespace stellate::server
+}  // namespace stellate::server::testing

@@ -9,18 +9,16 @@
 
 #include "tests/faults/fault_test.h"
 
-namespace stellate::server {
+namespace stellate::server::testing {
 namespace {
 
 using namespace std::chrono_literals;
-using testing::Bytes;
-using testing::Process;
 
-class FrozenWorker : public testing::FaultTest {};
+class FrozenWorker : public FaultTest {};
 
 TEST_F(FrozenWorker, TheMeshGoesOnAndIsTheUndisturbedOne) {
-  const int wanted = testing::FromEnvironment("STELLATE_FREEZES", 2);
-  const double longest_nap = testing::FromEnvironment("STELLATE_NAP_SECONDS", 1);
+  const int wanted = FromEnvironment("STELLATE_FREEZES", 2);
+  const double longest_nap = FromEnvironment("STELLATE_NAP_SECONDS", 1);
   auto server = Next();
   const std::optional<Bytes> undisturbed = Undisturbed(server->stub());
   ASSERT_TRUE(undisturbed);
@@ -47,16 +45,16 @@ TEST_F(FrozenWorker, TheMeshGoesOnAndIsTheUndisturbedOne) {
       }
       workers[victim]->Thaw();
     });
-    const std::optional<Bytes> mesh = testing::Watch(server->stub(), name);
+    const std::optional<Bytes> mesh = Watch(server->stub(), name);
     freezer.request_stop();
     freezer.join();
     ++freezes;
     ASSERT_TRUE(mesh);
-    testing::ExpectSame(*mesh, *undisturbed);
+    ExpectSame(*mesh, *undisturbed);
     if (HasFailure()) break;
   }
   std::cout << freezes << " freezes, " << meshes << " meshes\n";
 }
 
 }  // namespace
-}  // namespace stellate::server
+}  // namespace stellate::server::testing

@@ -8,18 +8,12 @@
 
 #include "tests/faults/fault_test.h"
 
-namespace stellate::server {
+namespace stellate::server::testing {
 namespace {
 
 using namespace std::chrono_literals;
-using testing::Bytes;
-using testing::ExpectSame;
-using testing::FromEnvironment;
-using testing::RawWorker;
-using testing::Watch;
-using testing::WatchFrom;
 
-class KillServer : public testing::FaultTest {};
+class KillServer : public FaultTest {};
 
 TEST_F(KillServer, EveryMeshResumesAndIsTheUndisturbedOne) {
   const int kills_wanted = FromEnvironment("STELLATE_KILLS", 5);
@@ -152,4 +146,4 @@ TEST_F(KillServer, DearAnswersAreAskedForOnce) {
 }
 
 }  // namespace
-}  // namespace stellate::server
+}  // namespace stellate::server::testing

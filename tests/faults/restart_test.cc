@@ -10,17 +10,12 @@
 
 #include "tests/faults/fault_test.h"
 
-namespace stellate::server {
+namespace stellate::server::testing {
 namespace {
 
 using namespace std::chrono_literals;
-using testing::Bytes;
-using testing::ExpectSame;
-using testing::FromEnvironment;
-using testing::RawWorker;
-using testing::Watch;
 
-class Restart : public testing::FaultTest {
+class Restart : public FaultTest {
  protected:
   // Of a process, the most that it had at once, in kB.
   static long PeakOf(pid_t process) {
@@ -146,4 +141,4 @@ TEST_F(Restart, TakesNoMoreMemoryThanBefore) {
 }
 
 }  // namespace
-}  // namespace stellate::server
+}  // namespace stellate::server::testing
