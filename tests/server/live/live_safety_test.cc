@@ -6,6 +6,7 @@
 #include "server/net/tls.h"
 #include "tests/server/support/certificates.h"
 #include "tests/server/support/live_server.h"
+#include "tests/server/support/token_client.h"
 
 namespace stellate::server::testing {
 namespace {
@@ -16,99 +17,6 @@ using grpc::StatusCode;
 constexpr char kAlice[] = "alice-0123456789abcdef";
 constexpr char kBob[] = "bob-0123456789abcdef";
 constexpr char kUnknownMesh[] = "meshes/00000000000000000000000000000000";
-
-// One client: a connection, and a token to send along with every call; empty: none.
-class Client {
- public:
-  Client(const std::string& address, std::shared_ptr<grpc::ChannelCredentials> credentials,
-         std::string token)
-      : token_(std::move(token)) {
-    grpc::ChannelArguments arguments;
-    arguments.SetInt("grpc.use_local_subchannel_pool", 1);
-    stub_ = v1::Stellate::NewStub(grpc::CreateCustomChannel(address, credentials, arguments));
-  }
-
-  grpc::Status Create(v1::Mesh* mesh, const v1::MeshSpec& spec) {
-    v1::CreateMeshRequest request;
-    *request.mutable_spec() = spec;
-    return stub_->CreateMesh(Context().get(), request, mesh);
-  }
-  grpc::Status Get(const std::string& name, v1::Mesh* mesh) {
-    return Named<v1::GetMeshRequest>(name, &v1::Stellate::Stub::GetMesh, mesh);
-  }
-  grpc::Status List(v1::ListMeshesResponse* response, const std::string& page_token = "") {
-    v1::ListMeshesRequest request;
-    request.set_page_size(1);
-    request.set_page_token(page_token);
-    return stub_->ListMeshes(Context().get(), request, response);
-  }
-  grpc::Status Info() {
-    v1::ServerInfo info;
-    return stub_->GetServerInfo(Context().get(), {}, &info);
-  }
-  grpc::Status Cancel(const std::string& name) {
-    v1::Mesh mesh;
-    return Named<v1::CancelMeshRequest>(name, &v1::Stellate::Stub::CancelMesh, &mesh);
-  }
-  grpc::Status Delete(const std::string& name) {
-    google::protobuf::Empty empty;
-    return Named<v1::DeleteMeshRequest>(name, &v1::Stellate::Stub::DeleteMesh, &empty);
-  }
-  grpc::Status Watch(const std::string& name, v1::Mesh* final = nullptr) {
-    const auto context = Context();
-    v1::WatchMeshRequest request;
-    request.set_name(name);
-    const auto reader = stub_->WatchMesh(context.get(), request);
-    v1::WatchMeshResponse event;
-    while (reader->Read(&event)) {
-      if (final != nullptr && event.has_final()) *final = event.final();
-    }
-    return reader->Finish();
-  }
-  grpc::Status Serve(const std::string& name) {
-    const auto context = Context();
-    const auto stream = stub_->ServeOracle(context.get());
-    v1::ServeOracleRequest request;
-    request.mutable_hello()->set_mesh(name);
-    stream->Write(request);
-    v1::ServeOracleResponse response;
-    while (stream->Read(&response)) {
-      if (!response.has_queries()) continue;
-      *request.mutable_answers() = TrueAnswer(response.queries());
-      stream->Write(request);
-    }
-    return stream->Finish();
-  }
-
-  // What there is to ask of a mesh that exists.
-  std::vector<std::pair<const char*, grpc::Status>> AskAllOf(const std::string& name) {
-    v1::Mesh mesh;
-    return {{"GetMesh", Get(name, &mesh)},
-            {"WatchMesh", Watch(name)},
-            {"ServeOracle", Serve(name)},
-            {"CancelMesh", Cancel(name)},
-            {"DeleteMesh", Delete(name)}};
-  }
-
- private:
-  std::unique_ptr<grpc::ClientContext> Context() const {
-    auto context = std::make_unique<grpc::ClientContext>();
-    if (!token_.empty()) context->AddMetadata("authorization", "Bearer " + token_);
-    return context;
-  }
-  template <typename Request, typename Response>
-  grpc::Status Named(const std::string& name,
-                     grpc::Status (v1::Stellate::Stub::*call)(grpc::ClientContext*, const Request&,
-                                                              Response*),
-                     Response* response) {
-    Request request;
-    request.set_name(name);
-    return (stub_.get()->*call)(Context().get(), request, response);
-  }
-
-  const std::string token_;
-  std::unique_ptr<v1::Stellate::Stub> stub_;
-};
 
 std::string Replaced(std::string text, const std::string& what, const std::string& by) {
   for (auto at = text.find(what); at != std::string::npos; at = text.find(what)) {
@@ -147,15 +55,15 @@ class LiveSafetyTest : public LiveServer {
     return grpc::SslCredentials(options);
   }
 
-  Client Plain(const std::string& token) {
+  TokenClient Plain(const std::string& token) {
     return {server_->address(), grpc::InsecureChannelCredentials(), token};
   }
-  Client Secure(std::shared_ptr<grpc::ChannelCredentials> credentials,
-                const std::string& token = "") {
+  TokenClient Secure(std::shared_ptr<grpc::ChannelCredentials> credentials,
+                     const std::string& token = "") {
     return {server_->address(), std::move(credentials), token};
   }
 
-  static std::string CreateBy(Client* client) {
+  static std::string CreateBy(TokenClient* client) {
     v1::Mesh mesh;
     const grpc::Status status = client->Create(&mesh, SpecOfSphere());
     EXPECT_TRUE(status.ok()) << status.error_message();
@@ -163,7 +71,7 @@ class LiveSafetyTest : public LiveServer {
   }
 
   // `stranger` learns nothing of `owner`'s mesh, and does it no harm.
-  static void ExpectHidden(Client* owner, Client* stranger) {
+  static void ExpectHidden(TokenClient* owner, TokenClient* stranger) {
     const std::string name = CreateBy(owner);
     const auto foreign = stranger->AskAllOf(name);
     const auto unknown = stranger->AskAllOf(kUnknownMesh);
@@ -196,11 +104,11 @@ class LiveSafetyTest : public LiveServer {
 
 TEST_F(LiveSafetyTest, EveryCallNeedsAKnownToken) {
   StartWithTokens();
-  Client alice = Plain(kAlice);
+  TokenClient alice = Plain(kAlice);
   const std::string name = CreateBy(&alice);
   for (const std::string& token :
        {std::string(), std::string("alice"), std::string(kAlice) + "0", std::string(4000, 'x')}) {
-    Client stranger = Plain(token);
+    TokenClient stranger = Plain(token);
     v1::Mesh mesh;
     v1::ListMeshesResponse list;
     auto statuses = stranger.AskAllOf(name);
@@ -224,13 +132,13 @@ TEST_F(LiveSafetyTest, EveryCallNeedsAKnownToken) {
 
 TEST_F(LiveSafetyTest, OwnersCannotTellEachOthersMeshesFromNone) {
   StartWithTokens();
-  Client alice = Plain(kAlice), bob = Plain(kBob);
+  TokenClient alice = Plain(kAlice), bob = Plain(kBob);
   ExpectHidden(&alice, &bob);
 }
 
 TEST_F(LiveSafetyTest, PagesHoldTheOwnersMeshesAlone) {
   StartWithTokens();
-  Client alice = Plain(kAlice), bob = Plain(kBob);
+  TokenClient alice = Plain(kAlice), bob = Plain(kBob);
   const std::string first = CreateBy(&alice);
   CreateBy(&bob);
   const std::string second = CreateBy(&alice);
@@ -249,7 +157,7 @@ TEST_F(LiveSafetyTest, PagesHoldTheOwnersMeshesAlone) {
 
 TEST_F(LiveSafetyTest, TokensComeAndGoWithoutARestart) {
   StartWithTokens();
-  Client alice = Plain(kAlice), bob = Plain(kBob), carol = Plain("carol-0123456789abcdef");
+  TokenClient alice = Plain(kAlice), bob = Plain(kBob), carol = Plain("carol-0123456789abcdef");
   const std::string name = CreateBy(&alice);
   EXPECT_EQ(carol.Info().error_code(), StatusCode::UNAUTHENTICATED);
   grpc::Status watched;
@@ -274,7 +182,7 @@ TEST_F(LiveSafetyTest, TokensAreNeverLogged) {
   ::testing::internal::CaptureStderr();
   StartLogging(LogLevel::kTrace, LogFormat::kText);
   StartWithTokens();
-  Client alice = Plain(kAlice), stranger = Plain("stranger-0123456789abcdef");
+  TokenClient alice = Plain(kAlice), stranger = Plain("stranger-0123456789abcdef");
   const std::string name = CreateBy(&alice);
   stranger.AskAllOf(name);
   std::thread serving([&] { alice.Serve(name); });
@@ -307,8 +215,8 @@ TEST_F(LiveSafetyTest, MutualTlsAsksForACertificateAndNamesTheOwnerByIt) {
   EXPECT_EQ(Secure(Tls(authority_)).Info().error_code(), StatusCode::UNAVAILABLE);
   EXPECT_EQ(Secure(Tls(authority_, other.Issue("alice"))).Info().error_code(),
             StatusCode::UNAVAILABLE);
-  Client alice = Secure(Tls(authority_, authority_.Issue("alice")));
-  Client bob = Secure(Tls(authority_, authority_.Issue("bob")));
+  TokenClient alice = Secure(Tls(authority_, authority_.Issue("alice")));
+  TokenClient bob = Secure(Tls(authority_, authority_.Issue("bob")));
   ExpectHidden(&alice, &bob);
 }
 
@@ -319,7 +227,7 @@ TEST_F(LiveSafetyTest, AMeshIsMadeOverMutualTlsWithATokenWhichNamesTheOwner) {
   config.tls_client_ca = authority_.certificate();
   StartWithTls(config);
   const auto credentials = Tls(authority_, authority_.Issue("somebody"));
-  Client alice = Secure(credentials, kAlice), bob = Secure(credentials, kBob);
+  TokenClient alice = Secure(credentials, kAlice), bob = Secure(credentials, kBob);
   EXPECT_EQ(Secure(credentials).Info().error_code(), StatusCode::UNAUTHENTICATED);
   ExpectHidden(&alice, &bob);
   const std::string name = CreateBy(&alice);
