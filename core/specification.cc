@@ -159,8 +159,8 @@ Status CheckReach(const Specification& spec) {
         "no seeds");
   }
   const double count = CoverCounts(spec).prod();
-  const double most = std::min<double>(
-      kMaxBoxSeeds, static_cast<double>(kMaxBoxSeedCoordinates / spec.ambient_dimension));
+  const auto fit = kMaxBoxSeedCoordinates / spec.ambient_dimension;
+  const double most = std::min<double>(kMaxBoxSeeds, static_cast<double>(fit));
   if (!(count <= most)) {
     return TooLarge("cover_box",
                     Message("cover_box has to lay ", Brief(count), " seeds into this box for ",

@@ -7,8 +7,7 @@ namespace stellate::server {
 namespace {
 
 constexpr auto kPoll = std::chrono::milliseconds(20);
-constexpr auto kReturn = std::chrono::seconds(1);     // for a worker that lost its stream
-constexpr auto kLastWords = std::chrono::seconds(2);  // for streams to send what they have
+constexpr auto kReturn = std::chrono::seconds(1);  // for a worker that lost its stream
 
 }  // namespace
 

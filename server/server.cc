@@ -31,7 +31,6 @@ using core::Status;
 using core::StatusCode;
 
 constexpr auto kTick = std::chrono::seconds(1);
-constexpr auto kLastWords = std::chrono::seconds(2);       // for streams to send what they have
 constexpr auto kLook = std::chrono::milliseconds(2);       // whether they have
 constexpr auto kFarewell = std::chrono::milliseconds(20);  // for clients to take leave
 constexpr auto kLastRound = std::chrono::seconds(5);       // for meshers to notice a cancel

@@ -22,7 +22,7 @@ DoctorCommand::DoctorCommand(CLI::App& parent)
       "does not run.");
 }
 
-int DoctorCommand::Run(std::stop_token stop) {
+int DoctorCommand::Run(const std::stop_token& stop) {
   const Expected<std::unique_ptr<Oracle>> oracle = source_.Make(stop);
   if (!oracle) return PrintError(oracle.error());
   const CheckReport report = Check(**oracle, options_);

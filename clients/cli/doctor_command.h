@@ -13,7 +13,7 @@ class DoctorCommand {
  public:
   explicit DoctorCommand(CLI::App& parent);
   bool chosen() const { return command_->parsed(); }
-  int Run(std::stop_token stop);
+  int Run(const std::stop_token& stop);
 
  private:
   CLI::App* command_;

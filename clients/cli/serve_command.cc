@@ -56,6 +56,7 @@ Expected<MeshState> ServeCommand::Serve(Oracle& oracle) {
   const auto count = static_cast<size_t>(source_.processes());
   std::vector<Expected<MeshState>> ends(count, MeshState::kUnknown);
   std::vector<std::thread> threads;
+  threads.reserve(count);
   for (Expected<MeshState>& end : ends) {
     threads.emplace_back([&end, &oracle, this] {
       try {

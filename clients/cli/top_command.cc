@@ -91,7 +91,7 @@ TopCommand::TopCommand(CLI::App& parent)
   command_->footer("Ctrl-C ends it. Exit status: 0 done, 2 usage or refused, 3 no server.");
 }
 
-int TopCommand::Run(std::stop_token stop) const {
+int TopCommand::Run(const std::stop_token& stop) const {
   const Expected<Credentials> credentials = server_.ReadCredentials();
   if (!credentials) return PrintError(credentials.error());
   Expected<Monitor> monitor = Monitor::Connect(server_.address(), *credentials);

@@ -14,7 +14,7 @@ class TopCommand {
  public:
   explicit TopCommand(CLI::App& parent);
   bool chosen() const { return command_->parsed(); }
-  int Run(std::stop_token stop) const;
+  int Run(const std::stop_token& stop) const;
 
  private:
   CLI::App* command_;

@@ -5,16 +5,11 @@
 #include <utility>
 
 #include "core/base/message.h"
+#include "core/certificate/point_of.h"
 #include "core/geometry/reach_bound.h"
 
 namespace stellate::core {
-namespace {
-
-using ConstPoint = Eigen::Map<const Eigen::VectorXd>;
-
-ConstPoint PointOf(const MeshView& mesh, std::uint32_t v) { return {mesh.Point(v), mesh.d}; }
-
-}  // namespace
+namespace {}  // namespace
 
 void DeclaredReach::Prove(const Adjacency& adjacency, const MeshShape& shape) {
   proof_ = ProveFromReach(mesh_, adjacency, shape, claim_);

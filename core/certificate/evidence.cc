@@ -14,7 +14,7 @@ namespace {
 
 // Two sheets so many sizes apart are no more than the reach that a mesh of this size must have.
 constexpr double kLook = 2.5;
-constexpr std::uint64_t kPart = 1 << 8;
+constexpr std::uint64_t kPointsInPart = 1 << 8;
 
 class Holder {
  public:
@@ -90,10 +90,11 @@ Evidence HoldAgainst(const MeshView& mesh, const std::vector<double>& points,
   const std::uint64_t given = points.size() / static_cast<std::size_t>(mesh.d);
   const std::uint64_t stride = std::max<std::uint64_t>(1, mesh.vertices / vertices);
   const std::uint64_t all = given + (mesh.vertices + stride - 1) / stride;
-  std::vector<Evidence> parts((all + kPart - 1) / kPart);
+  std::vector<Evidence> parts((all + kPointsInPart - 1) / kPointsInPart);
   ParallelFor(parts.size(), [&](std::uint64_t part) {
     std::vector<double> step;
-    for (std::uint64_t i = part * kPart; i < std::min(all, (part + 1) * kPart); ++i) {
+    for (std::uint64_t i = part * kPointsInPart; i < std::min(all, (part + 1) * kPointsInPart);
+         ++i) {
       if (i < given) {
         holder.Hold(points.data() + i * static_cast<std::size_t>(mesh.d), i, Holder::kNobody, step,
                     &parts[part]);

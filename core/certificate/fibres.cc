@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
+#include "core/base/infinity.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/base/vector_ops.h"
@@ -16,24 +16,22 @@
 namespace stellate::core {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kBoundary = 1e-9;  // barycentric coordinates this small are left to rounding
 constexpr int kSideSteps = 6;
 
-// The mesh's vertices are gone through in parts of so many.
-constexpr std::uint32_t kPart = 1 << 15;
+constexpr std::uint32_t kVerticesInPart = 1 << 15;
 
 // body(part, begin, end) for each part of the vertices, in parallel.
 template <typename Body>
 void ForEachPart(const MeshView& mesh, const Body& body) {
-  ParallelFor((mesh.vertices + kPart - 1) / kPart, [&](std::uint64_t part) {
-    const std::uint64_t end = std::min<std::uint64_t>(mesh.vertices, (part + 1) * kPart);
-    body(part, static_cast<std::uint32_t>(part * kPart), static_cast<std::uint32_t>(end));
+  ParallelFor((mesh.vertices + kVerticesInPart - 1) / kVerticesInPart, [&](std::uint64_t part) {
+    const std::uint64_t end = std::min<std::uint64_t>(mesh.vertices, (part + 1) * kVerticesInPart);
+    body(part, static_cast<std::uint32_t>(part * kVerticesInPart), static_cast<std::uint32_t>(end));
   });
 }
 
 std::size_t PartCount(const MeshView& mesh) {
-  return static_cast<std::size_t>((mesh.vertices + kPart - 1) / kPart);
+  return static_cast<std::size_t>((mesh.vertices + kVerticesInPart - 1) / kVerticesInPart);
 }
 
 // One fibre and the simplices that may meet it: those with a vertex in `near`, ascending, that is

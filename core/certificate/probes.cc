@@ -7,6 +7,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/random.h"
+#include "core/certificate/point_of.h"
 
 namespace stellate::core {
 namespace {
@@ -15,12 +16,6 @@ namespace {
 enum Stream : std::uint64_t { kSimplexStream = 0x6365727430, kVertexStream, kProbeStream };
 
 constexpr double kBoxMargin = 0.1;  // of the diagonal, around the mesh's own box
-
-using ConstPoint = Eigen::Map<const Eigen::VectorXd>;
-
-ConstPoint PointOf(const MeshView& mesh, std::uint32_t v) {
-  return ConstPoint(mesh.points + std::size_t{v} * mesh.d, mesh.d);
-}
 
 void SortUnique(std::vector<std::uint32_t>& ids) {
   std::sort(ids.begin(), ids.end());

@@ -4,21 +4,21 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <vector>
 
+#include "core/base/infinity.h"
 #include "core/base/message.h"
 #include "core/base/parallel.h"
 #include "core/base/vector_ops.h"
 #include "core/certificate/ball_grid.h"
+#include "core/certificate/corners.h"
 #include "core/geometry/reach.h"
 #include "core/geometry/simplex.h"
 
 namespace stellate::core {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kRight = std::numbers::pi / 2;
 constexpr double kDegrees = 180 / std::numbers::pi;
 // An angle is told from its squared sine, which is right to some 1e-15: near the right angle, where
@@ -29,19 +29,6 @@ constexpr double kLengthMargin = 1e-9;
 constexpr double kFloatMargin = 1e-6;  // MeshShape keeps floats
 // Vertices of a component that (B) is tried at.
 constexpr int kTriedVertices = 4;
-
-struct Corners {
-  std::array<const double*, kMaxDimension + 1> at{};
-  std::size_t count = 0;
-  SimplexVertices vertices() const { return {at.data(), count}; }
-};
-
-Corners CornersOf(const MeshView& mesh, const std::uint32_t* ids) {
-  Corners corners;
-  corners.count = static_cast<std::size_t>(mesh.k) + 1;
-  for (int i = 0; i <= mesh.k; ++i) corners.at[i] = mesh.Point(ids[i]);
-  return corners;
-}
 
 // A simplex that (A) fails for, and by how much.
 struct Leaning {
@@ -92,9 +79,10 @@ class AngleCondition {
     const bool easy =
         tilt < 1 && Holds(std::asin(std::sqrt(tilt)), LargestTurn(jung, claim_.reach));
     if (easy && jung <= part->rho) return;
-    const Corners corners = CornersOf(mesh_, list_[s]);
-    const SimplexFrame frame = FrameSimplex(corners.vertices(), mesh_.d);
-    const double circumradius = MeasureSimplex(corners.vertices(), mesh_.d, frame).circumradius;
+    Corners corners;
+    const SimplexVertices vertices = corners.Of(mesh_, list_[s], mesh_.k);
+    const SimplexFrame frame = FrameSimplex(vertices, mesh_.d);
+    const double circumradius = MeasureSimplex(vertices, mesh_.d, frame).circumradius;
     const double rho = std::min(jung, circumradius * (1 + kLengthMargin));
     part->rho = std::max(part->rho, rho);
     if (easy) return;
@@ -122,12 +110,13 @@ class AngleCondition {
 // A number that the distance of the simplex from p is not below. The point of an affine hull of
 // some vertices that is nearest to p gives a direction, in which no vertex is nearer than that; the
 // best of all faces is the distance itself.
-double DistanceAtLeast(const double* p, const Corners& corners, int d) {
-  const int n = static_cast<int>(corners.count);
-  std::vector<double> offsets(static_cast<std::size_t>(n * d));
-  for (int i = 0; i < n; ++i)
-    for (int c = 0; c < d; ++c)
-      offsets[static_cast<std::size_t>(i * d + c)] = corners.at[i][c] - p[c];
+double DistanceAtLeast(const double* p, SimplexVertices corners, int d) {
+  const int n = static_cast<int>(corners.size());
+  std::vector<double> offsets(corners.size() * static_cast<std::size_t>(d));
+  for (int i = 0; i < n; ++i) {
+    double* const offset = offsets.data() + i * d;
+    for (int c = 0; c < d; ++c) offset[c] = corners[i][c] - p[c];
+  }
   Eigen::Matrix<double, kMaxDimension + 1, kMaxDimension + 1> gram;
   double longest2 = 0;
   for (int i = 0; i < n; ++i) {
@@ -226,7 +215,8 @@ std::string FindOtherSheet(const MeshView& mesh, const Adjacency& adjacency, con
             // All vertices of a simplex so near are in the ball: the lowest has it.
             if (ids[0] != v || std::find(ids, ids + mesh.k + 1, p) != ids + mesh.k + 1) continue;
             const double rho = jung * shape.diameters[s] * (1 + kFloatMargin);
-            if (!(DistanceAtLeast(mesh.Point(p), CornersOf(mesh, ids), mesh.d) >
+            Corners corners;
+            if (!(DistanceAtLeast(mesh.Point(p), corners.Of(mesh, ids, mesh.k), mesh.d) >
                   std::min(LargestDistance(rho, reach), LargestDistance(most_rho, reach))))
               found->push_back({static_cast<std::uint32_t>(i), s});
           }

@@ -14,8 +14,8 @@ constexpr double kLongestStep = 0.05;  // of the mesh size
 // Within M both steps go as far; at a rim the one back into M does, if it is along M at all.
 constexpr double kComesBack = 0.5;  // of the step back
 constexpr double kAlong = 0.25;     // of its length
-// Steps so many position errors long tell what became of them.
-constexpr double kErrors = 10;
+// Steps of at least so many position errors tell what became of them.
+constexpr double kErrorsInStep = 10;
 
 }  // namespace
 
@@ -30,7 +30,8 @@ void RimCheck::SuspectIfLeans(const Eigen::VectorXd& y, const Eigen::VectorXd& a
 Eigen::MatrixXd RimCheck::Questions(double position_error) {
   asked_ = std::move(suspects_);
   suspects_.clear();
-  std::erase_if(asked_, [&](const Lean& l) { return !(l.length > kErrors * position_error); });
+  std::erase_if(asked_,
+                [&](const Lean& l) { return !(l.length > kErrorsInStep * position_error); });
   std::stable_sort(asked_.begin(), asked_.end(),
                    [](const Lean& a, const Lean& b) { return a.share > b.share; });
   if (asked_.size() > kMostSuspects) asked_.resize(kMostSuspects);

@@ -1,12 +1,12 @@
 #include "core/certificate/shape.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
 #include "core/base/parallel.h"
+#include "core/certificate/corners.h"
 #include "core/geometry/simplex_frame.h"
 #include "core/specification.h"
 
@@ -14,23 +14,6 @@ namespace stellate::core {
 namespace {
 
 constexpr double kNegligible = 1e-14;  // difference of squared sines
-
-// A simplex as simplex.h wants it.
-class Corners {
- public:
-  Corners(const MeshView& mesh, const SimplexList& list) : mesh_(mesh), list_(list) {}
-
-  [[gnu::always_inline]] SimplexVertices Of(std::uint32_t s, int k) {
-    const std::uint32_t* ids = list_[s];
-    for (int i = 0; i <= k; ++i) at_[i] = mesh_.Point(ids[i]);
-    return {at_.data(), static_cast<std::size_t>(k) + 1};
-  }
-
- private:
-  const MeshView& mesh_;
-  const SimplexList& list_;
-  std::array<const double*, kMaxDimension + 1> at_{};
-};
 
 // Of some of the simplices.
 struct Extremes {
@@ -62,11 +45,11 @@ struct Extremes {
                                                    std::uint32_t begin, std::uint32_t end, int k,
                                                    int d, MeshShape& shape) {
   Extremes part;
-  Corners corners(mesh, list);
+  Corners corners;
   SimplexFrame frame;
   frame.directions.resize(static_cast<std::size_t>(k) * static_cast<std::size_t>(d));
   for (std::uint32_t s = begin; s < end; ++s) {
-    const SimplexVertices vertices = corners.Of(s, k);
+    const SimplexVertices vertices = corners.Of(mesh, list[s], k);
     TakeFrame(vertices, k, d, frame);
     const SimplexMeasures m =
         k > 1 ? MeasureFramed(vertices, k, d, frame) : MeasureSimplex(vertices, d, frame);
@@ -111,7 +94,7 @@ bool TiltsLess(const TiltMatrix& tilt, int k, double bound) {
 double LargerSine2(const MeshView& mesh, const SimplexList& list, Corners& corners, std::uint32_t s,
                    double sine2) {
   const int k = mesh.k;
-  const SimplexFrame frame = FrameSimplex(corners.Of(s, k), mesh.d);
+  const SimplexFrame frame = FrameSimplex(corners.Of(mesh, list[s], k), mesh.d);
   if (frame.rank < k) return 1;
   for (int i = 0; i <= k; ++i) {
     const double* tangent = mesh.Tangent(list[s][i]);
@@ -129,11 +112,11 @@ double LargerSine2(const MeshView& mesh, const SimplexList& list, Corners& corne
 // a second look.
 double MaxSine2(const MeshView& mesh, const SimplexList& list, const MeshShape& shape,
                 std::uint32_t most_tilted) {
-  Corners corners(mesh, list);
+  Corners corners;
   const double start = LargerSine2(mesh, list, corners, most_tilted, 0);
   std::vector<double> parts(ChunkCount(list.size()), start);
   ParallelChunks(list.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
-    Corners own(mesh, list);
+    Corners own;
     double& sine2 = parts[chunk];
     for (std::size_t s = begin; s < end; ++s) {
       // Rounding keeps the order.
@@ -169,9 +152,9 @@ MeshShape MeasureShape(const MeshView& mesh, const SimplexList& list) {
   if (mesh.k == 2) {
     // An angle's sine is half the opposite edge over the circumradius: the smallest angle is where
     // the radius-edge ratio is largest.
-    Corners corners(mesh, list);
+    Corners corners;
     shape.min_angle_degrees =
-        SmallestTriangleAngle(corners.Of(all.longest, mesh.k), mesh.d) * kDegrees;
+        SmallestTriangleAngle(corners.Of(mesh, list[all.longest], mesh.k), mesh.d) * kDegrees;
   }
   const double sine2 = MaxSine2(mesh, list, shape, all.most_tilted);
   shape.max_tangent_angle_degrees = std::asin(std::min(1.0, std::sqrt(sine2))) * kDegrees;

@@ -2,6 +2,7 @@
 
 #include "core/base/message.h"
 #include "core/base/random.h"
+#include "core/certificate/point_of.h"
 
 namespace stellate::core {
 namespace {
@@ -12,7 +13,7 @@ constexpr double kStep = 0.05;  // of the mesh size
 // tangent space at all is wrong by about 1.
 constexpr double kTolerance = 0.15;
 // Position errors of both ends, with a margin.
-constexpr double kErrors = 4;
+constexpr double kErrorsOfStep = 4;
 
 }  // namespace
 
@@ -34,8 +35,7 @@ TangentCheck::TangentCheck(const MeshView& mesh, double size, std::uint64_t rand
 Eigen::MatrixXd TangentCheck::Questions() const {
   Eigen::MatrixXd points(mesh_.d, static_cast<Eigen::Index>(steps_.size()));
   for (std::size_t i = 0; i < steps_.size(); ++i) {
-    points.col(static_cast<Eigen::Index>(i)) =
-        Eigen::Map<const Eigen::VectorXd>(mesh_.Point(steps_[i].vertex), mesh_.d) + steps_[i].to;
+    points.col(static_cast<Eigen::Index>(i)) = PointOf(mesh_, steps_[i].vertex) + steps_[i].to;
   }
   return points;
 }
@@ -45,10 +45,9 @@ std::string TangentCheck::Judge(const AnswerBlock& answer, double position_error
     const auto j = static_cast<Eigen::Index>(i);
     if (!answer.found.empty() && !answer.found[i]) continue;
     const Step& step = steps_[i];
-    const Eigen::VectorXd moved =
-        answer.points.col(j) - Eigen::Map<const Eigen::VectorXd>(mesh_.Point(step.vertex), mesh_.d);
+    const Eigen::VectorXd moved = answer.points.col(j) - PointOf(mesh_, step.vertex);
     const double off = step.across ? moved.norm() : (moved - step.to).norm();
-    if (off <= kTolerance * length_ + kErrors * position_error) continue;
+    if (off <= kTolerance * length_ + kErrorsOfStep * position_error) continue;
     return Message(
         "at vertex ", step.vertex, " the tangent space that the oracle gave is not that ",
         "of its closest points: a step of ", Brief(length_),

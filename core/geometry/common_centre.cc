@@ -56,7 +56,7 @@ class Vectors {
 template <int count>
 class Vectors<0, count> {
  public:
-  explicit Vectors(int d) : d_(d) { Memory().resize(static_cast<std::size_t>(d * count)); }
+  explicit Vectors(int d) : d_(d) { Memory().resize(static_cast<std::size_t>(d) * count); }
   double* operator[](int i) { return Memory().data() + i * d_; }
 
  private:

@@ -1,12 +1,12 @@
 #include "core/geometry/reach.h"
 
 #include <cmath>
-#include <limits>
+
+#include "core/base/infinity.h"
 
 namespace stellate::core {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kBisections = 60;  // beyond the digits of a double
 
 }  // namespace

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <vector>
 
+#include "core/base/infinity.h"
 #include "core/base/vector_ops.h"
 #include "core/geometry/simplex_frame.h"
 
@@ -15,7 +15,6 @@ namespace stellate::core {
 namespace {
 
 constexpr int kMaxVertices = kMaxSimplexDimension + 1;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Calls visit(face) for each face of dimension `lowest` or more but the simplex itself, until one
 // returns true; returns whether one did.
 template <typename Visit>

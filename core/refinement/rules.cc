@@ -152,7 +152,7 @@ bool LeansTooFar(const StarComplex<K>& complex, std::uint32_t p, const double* a
   const double most = std::numbers::pi / 2 - kLeanMargin - turn;
   if (most <= 0) return true;
   thread_local SimplexFrame frame;
-  frame.directions.resize(static_cast<std::size_t>(K * d));
+  frame.directions.resize(static_cast<std::size_t>(d) * K);
   TakeFrame({corners.data(), corners.size()}, K, d, frame);
   if (frame.rank < K) return true;
   const double sine = std::sin(most);

@@ -195,7 +195,7 @@ bool Surrogate<K>::Blend(const Near& near, const double* x, double* point, doubl
                          Guess* guess) const {
   const int d = complex_.d();
   thread_local std::vector<double> guesses;
-  guesses.resize(static_cast<std::size_t>(kBlended * d));
+  guesses.resize(static_cast<std::size_t>(d) * kBlended);
   double weights[kBlended];
   double total = 0, doubt = 0, spacing = 0, size = 0;
   std::fill(point, point + d, 0.0);

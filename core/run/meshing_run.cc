@@ -173,7 +173,7 @@ void MeshingRun<K>::Ask(CandidateSet<K> candidates, Insertion then) {
 }
 
 template <int K>
-void MeshingRun<K>::AskFor(Eigen::MatrixXd points, Insertion then) {
+void MeshingRun<K>::AskFor(Eigen::MatrixXd&& points, Insertion then) {
   CandidateSet<K> candidates;
   candidates.planned.points = std::move(points);
   Ask(std::move(candidates), then);

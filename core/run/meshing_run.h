@@ -51,7 +51,7 @@ class MeshingRun final : public Mesher {
   void Count(const QueryBatch& asked);
   void Advance(const Answers& answers);
   void Ask(CandidateSet<K> candidates, Insertion then);
-  void AskFor(Eigen::MatrixXd points, Insertion then);
+  void AskFor(Eigen::MatrixXd&& points, Insertion then);
   void NextQuestions();
 
   // What follows when an asker is done.

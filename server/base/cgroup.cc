@@ -87,7 +87,8 @@ std::optional<std::uint64_t> CgroupMemoryLimit(const std::string& root) {
     const char* const name = mount.version_1 ? "/memory.limit_in_bytes" : "/memory.max";
     while (true) {
       while (group.ends_with('/')) group.pop_back();
-      const std::string folder = root + mount.point + group;
+      std::string folder = root + mount.point;
+      folder += group;
       std::ifstream file(folder + name);
       TakeLess(file, &least);
       if (mount.version_1) TakeLessOfAncestors(folder + "/memory.stat", &least);

@@ -50,7 +50,7 @@ Status ValidateSafety(const Config& config, const ListenAddress& address) {
 Status Validate(const Config& config) {
   const auto address = ParseListenAddress(config.listen);
   if (!address) return address.error();
-  const Status safety = ValidateSafety(config, *address);
+  Status safety = ValidateSafety(config, *address);
   if (!safety.ok()) return safety;
   return CheckRanges(config);
 }

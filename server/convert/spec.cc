@@ -58,9 +58,8 @@ Status ReadPlace(const v1::MeshSpec& spec, core::Specification* out) {
     core::BoundingBox box;
     for (const bool lower : {true, false}) {
       const v1::Array& array = lower ? spec.bounding_box().lower() : spec.bounding_box().upper();
-      const Status status =
-          CheckArray(array, {d}, lower ? "bounding_box.lower" : "bounding_box.upper",
-                     StatusCode::kInvalidArgument);
+      Status status = CheckArray(array, {d}, lower ? "bounding_box.lower" : "bounding_box.upper",
+                                 StatusCode::kInvalidArgument);
       if (!status.ok()) return status;
       (lower ? box.lower : box.upper) = MatrixFromProto(array, static_cast<Index>(d), 1);
     }
@@ -70,13 +69,13 @@ Status ReadPlace(const v1::MeshSpec& spec, core::Specification* out) {
     const v1::Array& seeds = spec.seeds();
     // The number of seeds is the client's choice; a declared one that is not there fails here.
     const std::uint64_t m = seeds.shape_size() > 0 ? seeds.shape(0) : 0;
-    const Status status = CheckArray(seeds, {m, d}, "seeds", StatusCode::kInvalidArgument);
+    Status status = CheckArray(seeds, {m, d}, "seeds", StatusCode::kInvalidArgument);
     if (!status.ok()) return status;
     out->seeds = MatrixFromProto(seeds, static_cast<Index>(d), static_cast<Index>(m));
   }
   if (spec.has_declared_reach()) out->declared_reach = spec.declared_reach();
   out->cover_box = spec.cover_box();
-  const Status status = ToInt(spec.box_seeds(), "box_seeds", &out->box_seeds);
+  Status status = ToInt(spec.box_seeds(), "box_seeds", &out->box_seeds);
   if (!status.ok()) return status;
   return ToInt(spec.components(), "components", &out->components);
 }
@@ -115,7 +114,7 @@ Status ReadCriteria(const v1::MeshSpec& spec, core::Specification* out) {
   }
   if (c.has_candidates()) {
     int candidates = 0;
-    const Status status = ToInt(c.candidates(), "criteria.candidates", &candidates);
+    Status status = ToInt(c.candidates(), "criteria.candidates", &candidates);
     if (!status.ok()) return status;
     to.candidates = candidates;
   }

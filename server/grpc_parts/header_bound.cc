@@ -55,8 +55,10 @@ namespace grpc_core {
 // As gRPC 1.51 declares it, where it is replaced. Its members are gRPC's.
 class __attribute__((visibility("default"))) HPackParser {
  public:
+  // NOLINTBEGIN(readability-identifier-naming)
   enum class Boundary : std::uint8_t { None, EndOfHeaders, EndOfStream };
   enum class Priority : std::uint8_t { None, Included };
+  // NOLINTEND(readability-identifier-naming)
   struct LogInfo {
     std::uint32_t stream_id;
     enum Type : std::uint8_t { kHeaders, kTrailers, kDontKnow } type;

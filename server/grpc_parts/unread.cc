@@ -94,7 +94,9 @@ class EvaluateArgs {
 };
 }  // namespace grpc_core
 
-// As gRPC 1.51 declares it, where it is replaced: a call, as its connection sees it.
+// As gRPC 1.51 declares it, where it is replaced: a call, as its connection sees it. The name is
+// gRPC's.
+// NOLINTNEXTLINE(readability-identifier-naming)
 struct __attribute__((visibility("default"))) grpc_chttp2_stream {
   // `server_data`: set on the server's side.
   grpc_chttp2_stream(grpc_chttp2_transport* transport, grpc_stream_refcount* refcount,

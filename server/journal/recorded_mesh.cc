@@ -1,7 +1,6 @@
 #include "server/journal/recorded_mesh.h"
 
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
 #include "core/base/message.h"
@@ -342,8 +341,7 @@ core::Expected<std::unique_ptr<WatchLog>> RecordedMesh::ReadHistory() {
         used = 0;
         if (found != Found::kYes) return false;
       }
-      const std::size_t take = std::min(bytes, record.size() - used);
-      std::memcpy(at, record.data() + used, take);
+      const std::size_t take = record.copy(at, bytes, used);
       at += take;
       used += take;
       bytes -= take;

@@ -47,8 +47,8 @@ MeshFailure SharedJournal::WhyNot(const char* what) {
 
 void SharedJournal::StartThreads() {
   space_is_due_ = file_->HasSpaceToGiveBack();  // that an earlier server did not come to
-  writer_ = std::jthread([this](std::stop_token stop) { Write(stop); });
-  keeper_ = std::jthread([this](std::stop_token stop) { Keep(stop); });
+  writer_ = std::jthread([this](const std::stop_token& stop) { Write(stop); });
+  keeper_ = std::jthread([this](const std::stop_token& stop) { Keep(stop); });
 }
 
 void SharedJournal::StopThreads() {
@@ -88,7 +88,7 @@ void SharedJournal::NoteLongLog() {
 }
 
 // All meshes' answers in one transaction.
-void SharedJournal::Write(std::stop_token stop) {
+void SharedJournal::Write(const std::stop_token& stop) {
   std::unique_lock lock(due_mutex_);
   Clock::duration gather = kGather;
   while (answers_due_.wait(lock, stop, [this] { return !writing_.empty(); })) {
@@ -114,7 +114,7 @@ void SharedJournal::Write(std::stop_token stop) {
   }
 }
 
-void SharedJournal::Keep(std::stop_token stop) {
+void SharedJournal::Keep(const std::stop_token& stop) {
   std::unique_lock lock(due_mutex_);
   const auto is_due = [this] { return log_is_long_ || space_is_due_ || !removing_.empty(); };
   while (true) {

@@ -61,8 +61,8 @@ class SharedJournal {
  private:
   MeshFailure WhyNot(const char* what);
   void NoteLongLog();
-  void Write(std::stop_token stop);
-  void Keep(std::stop_token stop);
+  void Write(const std::stop_token& stop);
+  void Keep(const std::stop_token& stop);
   void Checkpoint();
   bool RemoveSome(Mesh* mesh, bool* done);
   bool GiveBackSome(bool* done);

@@ -9,7 +9,6 @@
 #include <sys/eventfd.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -19,6 +18,7 @@
 
 #include "core/base/message.h"
 #include "server/base/log.h"
+#include "server/net/socket_number.h"
 
 namespace stellate::server {
 namespace {
@@ -26,7 +26,7 @@ namespace {
 using core::Message;
 
 constexpr int kMostEvents = 1024;
-constexpr int kPauseMilliseconds = 20;     // between two looks: some hundred calls may come
+constexpr int kLookMilliseconds = 20;      // between two looks: some hundred calls may come
 constexpr int kHurryMilliseconds = 2;      // while much is unread: some megabytes may come
 constexpr std::uint64_t kFewBytes = 4096;  // too little for many calls, 16 bytes each at least
 constexpr std::size_t kFewCalls = 64;
@@ -36,12 +36,6 @@ constexpr auto kAwake = std::chrono::seconds(1);  // after something came
 constexpr auto kLogPause = std::chrono::seconds(1);
 constexpr auto kQuiet = std::chrono::seconds(5);        // after a storm
 constexpr auto kTidy = std::chrono::milliseconds(250);  // in one
-
-// Zero: it is no socket any more.
-ino_t NumberOf(int fd) {
-  struct stat info {};
-  return fstat(fd, &info) == 0 && S_ISSOCK(info.st_mode) ? info.st_ino : 0;
-}
 
 std::uint64_t BytesReceived(int fd) {
   tcp_info info{};
@@ -127,7 +121,7 @@ void ConnectionGuard::Run(const std::stop_token& stop) {
       GiveBack();
     }
     pollfd wake{wake_, POLLIN, 0};
-    poll(&wake, 1, hurried_ ? kHurryMilliseconds : kPauseMilliseconds);
+    poll(&wake, 1, hurried_ ? kHurryMilliseconds : kLookMilliseconds);
   }
   SayWhatWasClosed();
 }
@@ -267,7 +261,7 @@ void ConnectionGuard::Close(Connection* connection, const char* setting,
     // Not shutdown(2): it would leave gRPC what has come already, megabytes of it.
     sockaddr nowhere{};
     nowhere.sa_family = AF_UNSPEC;
-    connect(fd, &nowhere, sizeof(nowhere));
+    (void)connect(fd, &nowhere, sizeof(nowhere));  // whatever it says, the file is closed
   }
   close(fd);
   const auto now = Clock::now();

@@ -23,9 +23,9 @@ constexpr std::string_view kServing("\x08\x01", 2);  // HealthCheckResponse{stat
 }  // namespace
 
 std::string CheckHealth(const std::string& target, std::chrono::milliseconds limit,
-                        std::shared_ptr<grpc::ChannelCredentials> credentials,
+                        const std::shared_ptr<grpc::ChannelCredentials>& credentials,
                         const std::string& service) {
-  const auto channel = grpc::CreateChannel(target, std::move(credentials));
+  const auto channel = grpc::CreateChannel(target, credentials);
   grpc::GenericStub stub(channel);
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + limit);

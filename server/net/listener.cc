@@ -1,13 +1,12 @@
 #include "server/net/listener.h"
 
+#include <linux/tcp.h>
 #include <netdb.h>
 #include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -16,6 +15,7 @@
 
 #include "core/base/message.h"
 #include "server/base/log.h"
+#include "server/net/socket_number.h"
 
 namespace stellate::server {
 namespace {
@@ -62,12 +62,6 @@ int PortOf(int fd) {
   return ntohs(address.ss_family == AF_INET6
                    ? reinterpret_cast<const sockaddr_in6*>(&address)->sin6_port
                    : reinterpret_cast<const sockaddr_in*>(&address)->sin_port);
-}
-
-// Zero: it is no socket any more.
-ino_t NumberOf(int fd) {
-  struct stat info {};
-  return fstat(fd, &info) == 0 && S_ISSOCK(info.st_mode) ? info.st_ino : 0;
 }
 
 // The client has gone before it was accepted.

@@ -4,6 +4,8 @@
 #include <limits>
 #include <utility>
 
+#include "server/oracles/seconds.h"
+
 namespace stellate::server {
 namespace {
 
@@ -13,8 +15,6 @@ constexpr double kSoon =
     0.01;  // seconds: of work that lasts no longer there is always more to give
 constexpr double kWorthWhile = 0.1;  // share of a worker's time that asking ahead should save it
 constexpr double kMostChecked = 16;  // queries at a time
-
-double Seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
 // Multiplicative hashing: a different place in each chunk, the same in each run.
 Index Scatter(LeaseId id, Index range) {

@@ -4,14 +4,13 @@
 #include <utility>
 
 #include "core/base/message.h"
+#include "server/oracles/seconds.h"
 
 namespace stellate::server {
 namespace {
 
 using core::StatusCode;
 using Eigen::Index;
-
-double Seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
 void CopyInto(const core::AnswerBlock& answer, Index first, core::AnswerBlock* whole) {
   const Index count = answer.points.cols();
@@ -148,7 +147,7 @@ core::Status OraclePool::Deliver(const Chunk& chunk, const core::AnswerBlock& an
                           " points but the chunk has ", chunk.count,
                           " queries: send one point for each query")};
   }
-  const core::Status status = core::CheckAnswers(spec_, chunk.block(), chunk.first, answer);
+  core::Status status = core::CheckAnswers(spec_, chunk.block(), chunk.first, answer);
   if (!status.ok()) return status;
   if (chunk.second) {
     const auto second = std::make_shared<const SecondAnswer>(SecondAnswer{chunk, answer});

@@ -141,7 +141,7 @@ Status Salvage::Sort() {
   });
   if (!numbered) return CannotWrite();
   for (const auto& [mesh, shelf] : meshes_) {
-    const Status status = SortMesh(mesh, shelf);
+    Status status = SortMesh(mesh, shelf);
     if (!status.ok()) return status;
   }
   return Status::Ok();
@@ -277,7 +277,7 @@ core::Expected<std::string> VerifyDataDir(const std::string& path) {
 }
 
 core::Expected<std::string> SalvageDataDir(const std::string& path) {
-  const auto sound = VerifyDataDir(path);
+  auto sound = VerifyDataDir(path);
   if (sound) return *sound + "nothing was changed\n";
   auto opened = DataDirectory::Open(path);
   if (!opened) return tl::unexpected(std::move(opened.error()));
@@ -292,7 +292,7 @@ core::Expected<std::string> SalvageDataDir(const std::string& path) {
   std::string findings;
   const Status status = directory.Install([&](JournalFile* file) {
     Salvage salvage(file);
-    const Status read = ReadViews(directory, work, &salvage);
+    Status read = ReadViews(directory, work, &salvage);
     findings = salvage.Findings();
     return read;
   });

@@ -19,7 +19,8 @@ std::shared_ptr<const WatchLog> HistoryShelf::Open(const std::shared_ptr<Session
       return nullptr;
     }
     wanted_.push_back(session);
-    if (!thread_.joinable()) thread_ = std::jthread([this](std::stop_token stop) { Load(stop); });
+    if (!thread_.joinable())
+      thread_ = std::jthread([this](const std::stop_token& stop) { Load(stop); });
   }
   wanted_changed_.notify_one();
   return nullptr;
@@ -36,7 +37,7 @@ void HistoryShelf::Stop() {
   thread_.join();
 }
 
-void HistoryShelf::Load(std::stop_token stop) {
+void HistoryShelf::Load(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (wanted_changed_.wait(lock, stop, [this] { return !wanted_.empty(); })) {
     const std::shared_ptr<Session> session = std::move(wanted_.front());

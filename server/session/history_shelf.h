@@ -23,7 +23,7 @@ class HistoryShelf {
   void Stop();
 
  private:
-  void Load(std::stop_token stop);
+  void Load(const std::stop_token& stop);
 
   std::mutex mutex_;
   std::condition_variable_any wanted_changed_;

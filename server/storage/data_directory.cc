@@ -21,11 +21,10 @@ namespace {
 using core::Message;
 using core::Status;
 
-constexpr std::string_view kMagic("SQLite format 3\0", 16);
+constexpr std::string_view kDatabaseMagic("SQLite format 3\0", 16);
 constexpr std::size_t kHeaderBytes = 100;
 constexpr std::size_t kVersionAt = 60, kApplicationAt = 68;  // in the header, high byte first
 constexpr std::size_t kFormatAt = 18;                        // two bytes; 2: with a log
-constexpr std::uint32_t kApplication = 0x53744c74;
 constexpr std::uint32_t kEarliestVersion = 4;
 
 bool IsEarlier(std::uint32_t version) {
@@ -97,7 +96,7 @@ core::Expected<std::uint32_t> DataDirectory::VersionOfJournal() const {
   };
   const std::uint32_t version = number_at(kVersionAt);
   const bool whole = file.gcount() == kHeaderBytes;
-  const bool is_database = std::string_view(header, kMagic.size()) == kMagic;
+  const bool is_database = std::string_view(header, kDatabaseMagic.size()) == kDatabaseMagic;
   const bool is_ours = number_at(kApplicationAt) == kApplication;
   // The mark says that there was a journal.
   const bool was_ours = std::filesystem::exists(mark());
@@ -204,9 +203,9 @@ Status DataDirectory::TakeOver(std::uint32_t version) const {
   Status status = earlier.Open();
   if (!status.ok()) return status;
   status = Install([&](JournalFile* file) {
-    const Status copied = earlier.CopyTo(file);
+    Status copied = earlier.CopyTo(file);
     if (!copied.ok()) return copied;
-    const Status closed = earlier.Close();  // its log goes into it
+    Status closed = earlier.Close();  // its log goes into it
     if (!closed.ok()) return closed;
     unlink(kept.c_str());
     if (link(journal().c_str(), kept.c_str()) == 0) return Status::Ok();

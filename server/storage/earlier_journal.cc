@@ -93,7 +93,7 @@ Status EarlierJournal::CopyTo(JournalFile* file) {
              (!end || file->Put({to, RecordKind::kEnd}, *end));
     });
     if (!put) return CannotWrite(file);
-    const Status status = CopyMesh(id, to, &rounds, file);
+    Status status = CopyMesh(id, to, &rounds, file);
     if (!status.ok()) return status;
   }
   if (meshes.failed()) return DamagedJournal(path_, database_->error());
@@ -108,7 +108,7 @@ Status EarlierJournal::CopyMesh(std::int64_t from, std::int64_t to, std::uint64_
                                 JournalFile* file) {
   for (std::int64_t round = 1;; ++round, ++*rounds) {
     bool found = false;
-    const Status status = CopyRound(from, round, to, &found, file);
+    Status status = CopyRound(from, round, to, &found, file);
     if (!status.ok() || !found) return status;
   }
 }
@@ -119,7 +119,7 @@ Status EarlierJournal::CopyRound(std::int64_t mesh, std::int64_t round, std::int
                  "SELECT part, parts, questions, answers FROM rounds WHERE mesh = ? AND round = ? "
                  "ORDER BY part");
   rows.Bind(0, mesh).Bind(1, round);
-  const Status damaged = DamagedJournal(path_, Message("round ", round, " of mesh ", mesh));
+  Status damaged = DamagedJournal(path_, Message("round ", round, " of mesh ", mesh));
   std::string whole;
   std::int64_t due = 0, parts = 0;
   RecordedRound recorded;

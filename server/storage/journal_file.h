@@ -16,6 +16,8 @@
 
 namespace stellate::server {
 
+inline constexpr std::uint32_t kApplication = 0x53744c74;  // SQLite's application_id of a journal
+
 // A journal's file: sealed records, each in its place, whatever they mean. One thread at a time.
 // After a call that returned false, error() and IsFull() of database() say why, and Abandon() must
 // be called before the next.

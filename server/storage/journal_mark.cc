@@ -21,12 +21,12 @@ using core::StatusCode;
 // before it.
 constexpr int kSlots = 2;
 constexpr std::size_t kSlotBytes = 512;
-constexpr std::uint64_t kMagic = 0x6b72614d6c740000 + kJournalVersion;
+constexpr std::uint64_t kMarkMagic = 0x6b72614d6c740000 + kJournalVersion;
 
 using Words = std::array<std::uint64_t, 4>;
 
 Words ToWords(const JournalMark::State& state) {
-  Words words{kMagic, state.identity, state.commits, 0};
+  Words words{kMarkMagic, state.identity, state.commits, 0};
   RecordDigest digest;
   digest.Add(words.data(), 3 * kWord);
   words[3] = digest.value();
@@ -65,7 +65,7 @@ core::Status JournalMark::Make(const std::string& path, const State& state) {
   if (file < 0) return CannotWrite(path);
   bool made = true;
   for (int slot = 0; slot < kSlots; ++slot) made = made && WriteSlot(file, slot, state);
-  const core::Status status = made && fsync(file) == 0 ? core::Status::Ok() : CannotWrite(path);
+  core::Status status = made && fsync(file) == 0 ? core::Status::Ok() : CannotWrite(path);
   close(file);
   return status;
 }

@@ -11,8 +11,6 @@ namespace {
 using core::Message;
 using core::Status;
 
-constexpr std::uint32_t kApplication = 0x53744c74;
-
 constexpr char kRecords[] =
     "CREATE TABLE records (id INTEGER PRIMARY KEY, mesh INTEGER NOT NULL, kind INTEGER NOT NULL, "
     "number INTEGER NOT NULL, part INTEGER NOT NULL, seal INTEGER NOT NULL, bytes BLOB NOT NULL, "
@@ -114,7 +112,7 @@ Status JournalFile::Verify(const std::string& path) {
   }
   JournalState found = state_;
   found.records = found.sum = 0;
-  const Status status = VerifyRecords(path, &found);
+  Status status = VerifyRecords(path, &found);
   if (!status.ok()) return status;
   if (!(found == state_)) {
     return DamagedJournal(

@@ -13,11 +13,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double Degrees(double radians) { return radians * 180 / std::numbers::pi; }
 
-Basis Orthonormal(const Basis& columns) {
-  return Eigen::HouseholderQR<Basis>(columns).householderQ() *
-         Basis::Identity(columns.rows(), columns.cols());
-}
-
 using Vector = Eigen::VectorXd;
 
 }  // namespace

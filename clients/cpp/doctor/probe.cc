@@ -39,12 +39,12 @@ std::string Extent(Eigen::Index rows, Eigen::Index columns) {
   return std::to_string(rows) + " x " + std::to_string(columns);
 }
 
+}  // namespace
+
 Eigen::MatrixXd Orthonormal(const Eigen::MatrixXd& columns) {
   return Eigen::HouseholderQR<Eigen::MatrixXd>(columns).householderQ() *
          Eigen::MatrixXd::Identity(columns.rows(), columns.cols());
 }
-
-}  // namespace
 
 Probe::Probe(Oracle& oracle, std::uint64_t random_seed)
     : oracle_(oracle),

@@ -19,6 +19,8 @@ using Found = Eigen::Array<bool, Eigen::Dynamic, 1>;
 using Basis = Eigen::MatrixXd;  // d x k
 using Indices = std::vector<Eigen::Index>;
 
+Eigen::MatrixXd Orthonormal(const Eigen::MatrixXd& columns);  // a basis of what they span
+
 struct Answered {
   Eigen::MatrixXd points;  // a column for each question
   Found found;

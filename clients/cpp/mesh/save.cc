@@ -14,7 +14,7 @@ using client::Msh, client::Obj, client::Off, client::Ply, client::Stl, client::T
 
 using Writer = Expected<std::string> (*)(const Mesh&);
 
-struct Format {
+struct FileFormat {
   const char* ending;
   int least_dimension, largest_dimension;  // of what it can hold
   int largest_ambient_dimension;
@@ -28,7 +28,7 @@ Expected<std::string> As(const Mesh& mesh) {
 }
 
 constexpr int kAny = 1 << 30;
-constexpr Format kFormats[] = {
+constexpr FileFormat kFormats[] = {
     {".txt", 0, kAny, kAny, "anything", As<Txt>},
     {".off", 1, 2, kAny, "curves and surfaces", As<Off>},
     {".obj", 1, 2, 3, "curves and surfaces", As<Obj>},
@@ -38,7 +38,7 @@ constexpr Format kFormats[] = {
     {".vtu", 1, 3, kAny, "simplices of dimension 3 at most", As<Vtu>},
 };
 
-bool Holds(const Format& format, int k, int d) {
+bool Holds(const FileFormat& format, int k, int d) {
   return format.least_dimension <= k && k <= format.largest_dimension &&
          d <= format.largest_ambient_dimension;
 }
@@ -50,14 +50,14 @@ std::string EndingOf(const std::string& path) {
   return ending;
 }
 
-Expected<const Format*> Choose(const std::string& path, int k, int d) {
+Expected<const FileFormat*> Choose(const std::string& path, int k, int d) {
   std::string able;
-  for (const Format& format : kFormats) {
+  for (const FileFormat& format : kFormats) {
     if (Holds(format, k, d)) able += std::string(" ") + format.ending;
   }
   const std::string ending = EndingOf(path);
   const auto* const format = std::find_if(std::begin(kFormats), std::end(kFormats),
-                                          [&](const Format& f) { return ending == f.ending; });
+                                          [&](const FileFormat& f) { return ending == f.ending; });
   if (format == std::end(kFormats)) {
     return Fail(ErrorCode::kFileFailed, "no format is known by the ending '" + ending + "' of " +
                                             path + "; known for this mesh:" + able);

@@ -2,6 +2,7 @@
 
 #include <grpcpp/channel.h>
 
+#include <chrono>
 #include <memory>
 #include <string>
 
@@ -17,6 +18,8 @@ inline constexpr double kUsualKeepalive = 4, kNoPings = 1e6;
 Expected<std::shared_ptr<grpc::Channel>> Connect(const std::string& server,
                                                  const Credentials& credentials,
                                                  double keepalive_seconds = kUsualKeepalive);
+
+inline constexpr std::chrono::seconds kCallTime{30};  // for a unary call, connecting included
 
 // Whether a server's address is a unix socket or the loopback.
 bool StaysOnThisMachine(const std::string& server);

@@ -105,7 +105,7 @@ struct Built {
 
 Built Same(std::unique_ptr<PointwiseOracle> shape, std::string description, std::vector<int> betti,
            std::optional<double> reach) {
-  return {std::move(shape), std::move(description), betti, betti, reach};
+  return {std::move(shape), std::move(description), betti, std::move(betti), reach};
 }
 
 Built BuildSphere(int k, int d) {

@@ -76,7 +76,7 @@ Eigen::VectorXd Manifold::LocalSize(const Eigen::MatrixXd& points) {
 }
 
 std::optional<BoundingBox> Manifold::bounding_box() const {
-  const std::optional<BoundingBox> box = shape_->bounding_box();
+  std::optional<BoundingBox> box = shape_->bounding_box();
   if (!box || frame_.size() == 0) return box;
   // The smallest axis-aligned box about the turned one, with room where the frame is thin.
   const Eigen::VectorXd center = frame_ * (box->upper + box->lower) / 2;

@@ -8,9 +8,9 @@ namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-constexpr int kMaxIterations = 60;
-constexpr double kSmallestStep = 1e-4;  // of a full Newton step, before giving up on it
-constexpr double kRounding = 4e-16;     // relative; no residual is worth improving below it
+constexpr int kMaxFlatIterations = 60;
+constexpr double kSmallestFlatStep = 1e-4;  // of a full Newton step, before giving up on it
+constexpr double kRounding = 4e-16;         // relative; no residual is worth improving below it
 
 }  // namespace
 
@@ -78,7 +78,7 @@ bool PointwiseOracle::Meet(const Eigen::VectorXd& start, const Eigen::MatrixXd& 
   const double scale = 1 + level.norm() + m.norm();
   Eigen::MatrixXd tangent(ambient_dimension_, dimension_);
   Eigen::VectorXd next(ambient_dimension_), next_residual;
-  for (int i = 0; i < kMaxIterations && residual.norm() > kRounding * scale; ++i) {
+  for (int i = 0; i < kMaxFlatIterations && residual.norm() > kRounding * scale; ++i) {
     Tangent(m, tangent);
     const Eigen::MatrixXd slope = basis.transpose() * tangent;
     Eigen::VectorXd step = slope.partialPivLu().solve(-residual);
@@ -87,12 +87,12 @@ bool PointwiseOracle::Meet(const Eigen::VectorXd& start, const Eigen::MatrixXd& 
     if (!step.allFinite()) return false;
     if (step.norm() > longest) step *= longest / step.norm();
     double fraction = 1;
-    for (; fraction >= kSmallestStep; fraction /= 2) {
+    for (; fraction >= kSmallestFlatStep; fraction /= 2) {
       if (!Project(m + fraction * (tangent * step), next)) continue;
       next_residual = basis.transpose() * next - level;
       if (next_residual.norm() < residual.norm()) break;
     }
-    if (fraction < kSmallestStep) break;  // no better point: rounding, or no intersection
+    if (fraction < kSmallestFlatStep) break;  // no better point: rounding, or no intersection
     m = next;
     residual = next_residual;
   }

@@ -146,7 +146,7 @@ Expected<void> DeltaMesh::Absorb(v1::DeltaChunk&& chunk) {
   pending_.push_back(std::move(*chunk.mutable_delta()));
   if (!chunk.complete()) return {};
   for (const v1::MeshDelta& delta : std::exchange(pending_, {})) {
-    if (const Expected<void> ok = Apply(delta); !ok) return ok;
+    if (Expected<void> ok = Apply(delta); !ok) return ok;
   }
   revision_ = revision;
   return {};
@@ -164,7 +164,7 @@ Expected<void> DeltaMesh::Add(v1::DownloadMeshResponse&& part) {
 // Removes first: a simplex that goes and comes back stands in both.
 Expected<void> DeltaMesh::Apply(const v1::MeshDelta& delta) {
   const size_t known = coordinates_.size();
-  if (const Expected<void> ok =
+  if (Expected<void> ok =
           AppendNumbers(delta.points(), {static_cast<std::uint32_t>(d_)}, &coordinates_);
       !ok) {
     return ok;

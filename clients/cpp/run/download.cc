@@ -18,8 +18,6 @@ namespace stellate {
 namespace client {
 namespace {
 
-constexpr auto kCallTime = std::chrono::seconds(30);  // connecting included
-
 // A mesh that was just cancelled is over, but its last round may be being computed still.
 bool IsOver(const v1::Mesh& mesh) {
   return mesh.state() != v1::MESH_STATE_WAITING && mesh.state() != v1::MESH_STATE_RUNNING;
@@ -39,19 +37,19 @@ class Download {
 
   Expected<Mesh> Go() {
     const std::stop_callback cancel(options_.stop, [this] { attempts_.Stop(); });
-    if (const auto ok = Look(); !ok) return tl::unexpected(ok.error());
+    if (auto ok = Look(); !ok) return tl::unexpected(ok.error());
     const auto k = static_cast<int>(status_.spec().dimension());
     const auto d = static_cast<int>(status_.spec().ambient_dimension());
     if (options_.on_found) {
-      if (const auto ok = options_.on_found(k, d); !ok) return tl::unexpected(ok.error());
+      if (auto ok = options_.on_found(k, d); !ok) return tl::unexpected(ok.error());
     }
     if (options_.revision == 0) {
-      if (const auto ok = Settle(); !ok) return tl::unexpected(ok.error());
+      if (auto ok = Settle(); !ok) return tl::unexpected(ok.error());
     }
     auto builder = DeltaMesh::Create(k, d);
     if (!builder) return tl::unexpected(builder.error());
     builder_ = std::make_unique<DeltaMesh>(std::move(*builder));
-    if (const auto ok = Fetch(); !ok) return tl::unexpected(ok.error());
+    if (auto ok = Fetch(); !ok) return tl::unexpected(ok.error());
     return Conclude();
   }
 
@@ -74,7 +72,7 @@ class Download {
       return tl::unexpected(NotOver());
     }
     if (!HasEnded(status_)) {
-      if (const auto ok = AwaitEnd(); !ok) return ok;
+      if (auto ok = AwaitEnd(); !ok) return ok;
     }
     if (status_.state() == v1::MESH_STATE_FAILED) return tl::unexpected(WhyFailed(status_));
     return {};
@@ -131,7 +129,7 @@ class Download {
         request.set_position(part.next_position());
         vertices_ = part.vertices();
         simplices_ = part.simplices();
-        if (const auto ok = builder_->Add(std::move(part)); !ok) {
+        if (auto ok = builder_->Add(std::move(part)); !ok) {
           context.TryCancel();
           return ok;
         }

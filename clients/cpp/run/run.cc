@@ -6,13 +6,13 @@
 #include <stop_token>
 #include <utility>
 
+#include "net/channel.h"
 #include "wire/convert.h"
 #include "wire/status.h"
 
 namespace stellate::client {
 namespace {
 
-constexpr auto kCallTime = std::chrono::seconds(30);     // for a unary call, connecting included
 constexpr auto kHousekeeping = std::chrono::seconds(5);  // for calls that clean up
 
 void SetDeadline(grpc::ClientContext& context, std::chrono::seconds time) {
@@ -156,7 +156,7 @@ Expected<void> Run::WatchOnce(v1::Mesh* final, grpc::Status* status) {
   while (stream->Read(&response)) {
     watch_->Heard();
     if (response.has_delta()) {
-      if (const auto ok = builder_->Absorb(std::move(*response.mutable_delta())); !ok) {
+      if (auto ok = builder_->Absorb(std::move(*response.mutable_delta())); !ok) {
         context.TryCancel();
         return ok;
       }
@@ -179,7 +179,7 @@ Expected<Mesh> Run::Watch() {
   v1::Mesh final;
   grpc::Status status;
   do {
-    if (const auto ok = WatchOnce(&final, &status); !ok) return tl::unexpected(ok.error());
+    if (auto ok = WatchOnce(&final, &status); !ok) return tl::unexpected(ok.error());
     if (ended_) return Conclude(final);
   } while (watch_->Again(status));
   if (status.ok()) {

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "net/channel.h"
 #include "wire/convert.h"
 #include "wire/status.h"
 
@@ -19,7 +20,6 @@ namespace stellate::client {
 namespace {
 
 constexpr size_t kChunkBytes = 3 << 20;  // of numbers, under the 4 MB of a message
-constexpr auto kCallTime = std::chrono::seconds(30);
 constexpr auto kLookAgain = std::chrono::milliseconds(100);
 constexpr double kBusyShare = 0.25;        // of the time that the server bears silence
 constexpr size_t kMaxFailureBytes = 4000;  // OracleFailure.message takes 4096

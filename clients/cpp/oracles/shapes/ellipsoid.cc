@@ -8,8 +8,6 @@
 namespace stellate::shapes {
 namespace {
 
-constexpr int kMaxIterations = 100;
-
 // The closest point to x is y_i = a_i^2 x_i / (a_i^2 + t), with t the largest root of
 // g(t) = sum (a_i x_i / (a_i^2 + t))^2 - 1. Right of the pole at -min a_i^2, g is convex and falls,
 // so Newton's method from a point with g >= 0 climbs to the root without overshooting.
@@ -97,7 +95,7 @@ class EllipsoidShape final : public PointwiseOracle {
 
 }  // namespace
 
-std::unique_ptr<PointwiseOracle> Ellipsoid(std::vector<double> axes) {
+std::unique_ptr<PointwiseOracle> Ellipsoid(const std::vector<double>& axes) {
   return std::make_unique<EllipsoidShape>(axes);
 }
 

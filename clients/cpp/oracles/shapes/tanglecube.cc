@@ -9,7 +9,7 @@
 namespace stellate::shapes {
 namespace {
 
-constexpr int kMaxIterations = 60;
+constexpr int kMaxSteps = 60;
 constexpr int kGrid = 24;  // starting points are cut from rays over a kGrid x kGrid grid of angles
 constexpr double kSlopeTarget = 1e-15, kSlopeAccepted = 1e-7;
 
@@ -26,7 +26,7 @@ Eigen::Vector3d HessianDiagonal(const Eigen::Vector3d& y) {
 
 // Newton onto the surface along the gradient.
 bool Correct(Eigen::Vector3d& y) {
-  for (int i = 0; i < kMaxIterations; ++i) {
+  for (int i = 0; i < kMaxSteps; ++i) {
     const Eigen::Vector3d g = Gradient(y);
     const Eigen::Vector3d step = -Value(y) / g.squaredNorm() * g;
     const double length = step.norm();
@@ -51,7 +51,7 @@ Eigen::Matrix<double, 3, 2> TangentAt(const Eigen::Vector3d& y) {
 // the surface with backtracking.
 bool Descend(const Eigen::Vector3d& x, Eigen::Vector3d& y) {
   double slope = 1;
-  for (int i = 0; i < kMaxIterations; ++i) {
+  for (int i = 0; i < kMaxSteps; ++i) {
     const Eigen::Matrix<double, 3, 2> tangent = TangentAt(y);
     const Eigen::Vector2d towards = tangent.transpose() * (x - y);
     slope = towards.norm();

@@ -8,7 +8,6 @@ namespace stellate::shapes {
 namespace {
 
 constexpr int kSamplesPerTurn = 200;
-constexpr int kMaxIterations = 100;
 
 // Closest points by a table of the whole curve: every dip of the sampled distance that can hold the
 // minimum, given that the distance changes by no more than the arc between samples, is refined.
