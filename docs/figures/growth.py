@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import drawing
+import _drawing as drawing
 import matplotlib.pyplot as plt
 import numpy as np
 import stellate

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import drawing
+import _drawing as drawing
 import matplotlib.pyplot as plt
 
 SHOWN = ("S² in R³", "torus in R³", "T² in R⁴", "S³ in R⁴", "SO(3) in R⁹", "S² in R⁸")

@@ -27,7 +27,7 @@ plt.rcParams.update({"font.size": 9, "axes.titlesize": 9, "savefig.facecolor": "
 
 
 def save(figure: Figure, name: str, dpi: int = 90) -> None:
-    """As NAME.png, of 64 colours: a figure is read, and a repository keeps it for ever."""
+    """As NAME.png, of 160 colours: a figure is read, and a repository keeps it for ever."""
     from PIL import Image
 
     folder = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else HERE
@@ -36,7 +36,7 @@ def save(figure: Figure, name: str, dpi: int = 90) -> None:
     figure.savefig(path, dpi=dpi, metadata={"Software": None})
     plt.close(figure)
     picture = Image.open(path).convert("RGB")
-    picture.quantize(64, dither=Image.Dither.NONE).save(path, optimize=True)
+    picture.quantize(160, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
 def shaded(
