@@ -188,7 +188,7 @@ def _dress(
         if names is not None:
             getattr(ax, f"set_{axis}label")(names[i])
     if points.shape[1] == 3:
-        ax.set_box_aspect(extent, zoom=0.9 if frame else 1.25)
+        ax.set_box_aspect(extent, zoom=0.9 if frame else 1.1)
         ax.view_init(*view)
     else:
         ax.set_aspect("equal")
