@@ -255,7 +255,7 @@ void ConnectionGuard::GiveBack() {
 void ConnectionGuard::Close(Connection* connection, const char* setting,
                             const std::string& reason) {
   connection->closed = connection->ending = true;
-  closed_(setting);  // first, lest the client know of it before
+  closed_(setting);  // first: the client is not to know of it before
   const int fd = fcntl(connection->fd, F_DUPFD_CLOEXEC, 0);  // stays the same from here on
   if (NumberOf(fd) == connection->number) {
     // Not shutdown(2): it would leave gRPC what has come already, megabytes of it.
