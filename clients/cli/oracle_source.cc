@@ -12,7 +12,8 @@ OracleSource::OracleSource(CLI::App* command) {
   CLI::Option* const manifold = command->add_option(
       "manifold", manifold_, "e.g. torus:1:0.4; see 'stellate list'. Or, instead of it, a command");
   CLI::App* const group = command->add_option_group(
-      "Oracle command", "a program in any language that answers batches of queries: docs/using/pipe.md");
+      "Oracle command",
+      "a program in any language that answers batches of queries: docs/using/pipe.md");
   CLI::Option* const oracle = group->add_option("--oracle-command", command_.command,
                                                 "for the shell, e.g. \"octave-cli -q torus.m\"");
   oracle->excludes(manifold);

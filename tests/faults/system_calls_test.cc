@@ -3,9 +3,9 @@
 // process never aborts, and the next one finds a journal that is sound, with the mesh finished as
 // it would have been, or failed with a reason of the journal's, or going on to the same mesh.
 //
-// $STELLATE_CALL_STEP: every how manieth call (23); 1: all of them. $STELLATE_CALL_FIRST: the first,
-// so that several processes share them out; else another for each fault. $STELLATE_CALL_KILLS: how many
-// kills before each of these, and after it (1).
+// $STELLATE_CALL_STEP: every how manieth call (23); 1: all of them. $STELLATE_CALL_FIRST: the
+// first, so that several processes share them out; else another for each fault.
+// $STELLATE_CALL_KILLS: how many kills before each of these, and after it (1).
 
 #include <dlfcn.h>
 #include <fcntl.h>
