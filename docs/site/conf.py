@@ -26,7 +26,6 @@ exclude_patterns = [
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "breathe"]
 myst_heading_anchors = 4
-myst_enable_extensions = ["dollarmath"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 
 breathe_projects = {"stellate": ""}  # docs/build says where
@@ -40,6 +39,7 @@ autodoc_typehints = "signature"
 autodoc_default_options = {"members": True, "undoc-members": True}
 nitpicky = False
 
+smartquotes = False  # they take -- of --flags for a dash
 html_theme = "furo"
 html_title = f"Stellate {release}"
 html_copy_source = False
@@ -83,12 +83,15 @@ def _lists_are_contents(app, page, source):
     if not page.endswith("/index") or page.startswith("reference"):
         return
     here = pathlib.PurePosixPath(page).parent
-    seen = {page}
+    seen = (
+        {page}
+        if page == root_doc
+        else {page, *_linked("docs", (ROOT / "docs/index.md").read_text())}
+    )
     contents = []
     for part in re.split(r"(?m)^## ", source[0]):
         found = []
-        for _, target in _LINK.findall(part):
-            linked = os.path.normpath(here / target.partition("#")[0].removesuffix(".md"))
+        for linked in _linked(here, part):
             inside = page == root_doc or linked.startswith(f"{here}/")
             if inside and linked in app.env.found_docs and linked not in seen:
                 seen.add(linked)
@@ -100,6 +103,12 @@ def _lists_are_contents(app, page, source):
             caption = heading if page == root_doc and not heading.startswith("#") else ""
             contents.append(_toctree(caption, found))
     source[0] += "\n\n" + "\n".join(contents)
+
+
+def _linked(here, text):
+    """The names of the pages that the text of a page in the folder `here` links to."""
+    targets = [target.partition("#")[0] for _, target in _LINK.findall(text)]
+    return [os.path.normpath(f"{here}/{target.removesuffix('.md')}") for target in targets]
 
 
 def _toctree(caption, pages):

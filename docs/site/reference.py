@@ -19,7 +19,6 @@ import headers
 import protocol
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PYTHON_COMMANDS = ("mesh", "declare", "serve", "download", "doctor")
 
 
 def said(*command: str) -> str:
@@ -46,7 +45,7 @@ def command_lines(programs: pathlib.Path) -> str:
         page += [f"### stellate {command}\n", block(said(stellate, command))]
     python = ["/usr/bin/python3", "-m", "stellate"]
     page += ["## python3 -m stellate\n", block(said(*python))]
-    for command in PYTHON_COMMANDS:
+    for command in re.findall(r"(?m)^    (\w+)  ", said(*python)):
         page += [f"### python3 -m stellate {command}\n", block(said(*python, command))]
     page += ["## stellated\n", block(said(str(programs / "stellated")))]
     return "\n".join(page)
