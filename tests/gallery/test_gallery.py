@@ -4,6 +4,7 @@ import ast
 import json
 import pathlib
 import runpy
+import subprocess
 import sys
 
 import numpy as np
@@ -97,3 +98,23 @@ def test_the_page_is_what_its_programs_and_facts_say():
         picture = PAGES / f"{name}.png"
         assert picture.stat().st_size < 60_000
         assert share_drawn(picture) > 0.01
+
+
+def test_the_build_makes_one_picture_and_the_page_when_all_facts_are_there(tmp_path):
+    def build(*more):
+        command = [sys.executable, "-B", GALLERY / "build", "--output", tmp_path, *more]
+        return subprocess.run(command, capture_output=True, text=True)
+
+    alone = build("--only", "shapes")
+    assert alone.returncode == 1 and "for want of cloud" in alone.stderr
+    assert "shapes: 842 vertices, certified" in alone.stdout
+    assert 0.1 < share_drawn(tmp_path / "shapes.png") < 0.9
+    made = json.loads((tmp_path / "facts.json").read_text())
+    kept = json.loads((PAGES / "facts.json").read_text())
+    assert made == {"shapes": kept["shapes"]}
+
+    (tmp_path / "facts.json").write_text(json.dumps(kept))
+    assert build("--page").returncode == 0
+    assert (tmp_path / "index.md").read_text() == (PAGES / "index.md").read_text()
+    assert build("--only", "nonsense").returncode == 2
+    assert build("--jobs", "0").returncode == 2

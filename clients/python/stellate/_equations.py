@@ -54,7 +54,7 @@ class Equations:
         self._scale, self._max_iterations = scale, max_iterations
         # Of a Newton step, a length: a step moves a point by no less than its coordinates round to,
         # and what F makes of that is a small multiple.
-        self.tolerance = max(1e-12 * scale, 16 * np.finfo(float).eps * largest)
+        self.tolerance = max(1e-12 * scale, 16 * float(np.finfo(float).eps) * largest)
 
     def values(self, x: np.ndarray) -> np.ndarray:
         """F at the rows of x."""
