@@ -39,6 +39,9 @@ ImplicitOracle::ImplicitOracle(int dimension, int ambient_dimension, Function f,
   if (box_.lower.size() != ambient_dimension || box_.upper.size() != ambient_dimension) {
     throw std::invalid_argument("ImplicitOracle needs a bounding box of the ambient dimension");
   }
+  if (!(box_.lower.array() < box_.upper.array()).all()) {
+    throw std::invalid_argument("ImplicitOracle needs a bounding box with lower < upper");
+  }
   length_ = (box_.upper - box_.lower).norm();
   const double largest =
       std::max(box_.lower.lpNorm<Eigen::Infinity>(), box_.upper.lpNorm<Eigen::Infinity>());

@@ -12,14 +12,14 @@ namespace stellate {
 // Closest points by Newton's method on the Lagrange conditions, started where steepest descent of
 // |F| from x first meets M: the nearest point when x is nearer to M than its reach, a critical
 // point of the distance otherwise. Points that do not converge are reported as not found.
-class ImplicitOracle final : public PointwiseOracle {
+class ImplicitOracle : public PointwiseOracle {
  public:
   using Function = std::function<Eigen::VectorXd(const Eigen::VectorXd& x)>;  // d -> d-k
   using Jacobian = std::function<Eigen::MatrixXd(const Eigen::VectorXd& x)>;  // d -> (d-k) x d
 
   // An empty `jacobian` is replaced by central differences of f, which cost 2d calls and about half
   // of the digits of the tangents; the points stay accurate. Throws std::invalid_argument unless
-  // 1 <= k < d and the box is one of R^d.
+  // 1 <= k < d and the box is one of R^d, lower < upper.
   ImplicitOracle(int dimension, int ambient_dimension, Function f, Jacobian jacobian,
                  BoundingBox box);
 

@@ -10,5 +10,6 @@
 #include "stellate/mesh.h"
 #include "stellate/monitor.h"
 #include "stellate/oracle.h"
+#include "stellate/oracles.h"
 #include "stellate/pointwise.h"
 #include "stellate/serve.h"

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "stellate/implicit.h"
+
+// Manifolds given by equations of particular kinds; stellate/implicit.h has equations in general.
+// Constructors throw std::invalid_argument.
+namespace stellate::oracles {
+
+// The zero set of a signed distance, or of any smooth function with a gradient that is not zero
+// there: a network that was trained to be one, for example.
+//
+// A distance has kinks on the medial axis, which the solvers survive.
+class SignedDistance final : public ImplicitOracle {
+ public:
+  using Function = std::function<double(const Eigen::VectorXd& x)>;           // d -> 1
+  using Gradient = std::function<Eigen::VectorXd(const Eigen::VectorXd& x)>;  // d -> d
+
+  // The set of f = level in the box. An empty gradient: differences of f.
+  SignedDistance(Function f, Gradient gradient, BoundingBox box, double level = 0);
+
+  // The set of the cubic spline through values on a grid: `shape` values along each axis at even
+  // distances, the first and the last on the box, the last axis' next to each other in `values`.
+  //
+  // The spline is smooth (C^2) and reproduces the values. What the grid does not resolve it cannot
+  // know: thin parts and gaps of fewer than some three spacings come out otherwise or not at all,
+  // and the set is within about spacing^2 times the curvature of the one that was sampled. An
+  // epsilon below the resolution meshes the spline ever better, and not what was sampled.
+  static SignedDistance OfGrid(const Eigen::VectorXd& values, const std::vector<int>& shape,
+                               const BoundingBox& box, double level = 0);
+
+  // The largest spacing of the grid; 0 where there is none.
+  double resolution() const { return resolution_; }
+
+ private:
+  double resolution_ = 0;
+};
+
+// One or several equations f = 0 out of many.
+struct Constraint {
+  ImplicitOracle::Function f;         // d -> m
+  ImplicitOracle::Jacobian jacobian;  // d -> m x d; empty: differences of f
+};
+
+// Where all constraints hold, a manifold of d minus as many dimensions as there are equations.
+//
+// Refused where one of them follows from the others: as a function, or at points of the set.
+class ConstraintSet final : public ImplicitOracle {
+ public:
+  ConstraintSet(int ambient_dimension, std::vector<Constraint> constraints, BoundingBox box);
+};
+
+struct Bar {
+  std::string a, b;  // joints
+  double length;
+};
+
+// All ways in which joints can lie, some fixed, pairs of them held at given distances.
+//
+// The points of M are the positions of the joints that move, one after the other, in the order in
+// which the bars name them. M has dimension (joints that move) * (2 or 3) - bars and is a manifold
+// for almost all lengths: not where all bars of a loop can lie on one line.
+class Linkage final : public ImplicitOracle {
+ public:
+  using Places = std::map<std::string, Eigen::VectorXd>;  // in the plane, or in space
+
+  Linkage(const std::vector<Bar>& bars, const Places& fixed);
+
+  const std::vector<std::string>& moving() const { return moving_; }
+  // Where each joint is at points of M (d x n): 2 x n or 3 x n, by name; the fixed ones too.
+  std::map<std::string, Eigen::MatrixXd> Joints(const Eigen::MatrixXd& points) const;
+
+ private:
+  struct Plan;
+  explicit Linkage(const Plan& plan);
+
+  std::vector<std::string> moving_;
+  Places fixed_;
+};
+
+}  // namespace stellate::oracles

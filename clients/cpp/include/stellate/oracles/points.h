@@ -1,0 +1,79 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "stellate/pointwise.h"
+
+// Manifolds through points and triangles. Constructors throw std::invalid_argument.
+namespace stellate::oracles {
+
+// A smooth k-manifold near given points of R^d, which may be noisy, by moving least squares.
+//
+// It is where the least-squares quadric through a place's neighbours, weighted by how near they
+// are, goes through the place itself. Where the points' noise is s, it lies within about s of the
+// manifold that they were taken from, plus bandwidth^3 times the change of its curvature; an
+// epsilon below the bandwidth meshes the smoothing.
+class PointCloud : public PointwiseOracle {
+ public:
+  // The points (d x n) have to lie on all of the manifold, at distances well below its reach.
+  // `bandwidth` is how far the neighbours of a place reach; by default twice the distance within
+  // which nearly all points have 2 k + 3 others. Smoother when larger; sheets have to be farther
+  // apart.
+  PointCloud(Eigen::MatrixXd points, int dimension, std::optional<double> bandwidth = {});
+  ~PointCloud() override;
+
+  double bandwidth() const;
+  // How far the points are from the manifold, 95 in 100 of them: the noise, and what the quadric
+  // does not follow.
+  double residual() const { return residual_; }
+
+  // Servers find intersections from closest points.
+  bool has_intersect_flat() const override { return false; }
+  std::optional<BoundingBox> bounding_box() const override;
+
+  bool Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const override;
+  void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const override;
+
+ private:
+  class Neighbourhoods;
+
+  std::unique_ptr<const Neighbourhoods> around_;
+  double residual_ = 0;
+};
+
+// Triangles in R^3 that share their corners.
+struct Triangles {
+  Eigen::MatrixXd points;   // 3 x n
+  Eigen::MatrixXi corners;  // 3 x m, numbers of points
+};
+
+// Reads .off, .obj, .stl or .ply; other polygons than triangles are split. Throws
+// std::invalid_argument, saying which file.
+Triangles ReadTriangles(const std::string& path);
+
+struct TriangleMeshOptions {
+  // Triangles with longer edges are filled with points of this spacing; by default the median of
+  // the edges' lengths.
+  std::optional<double> spacing;
+  std::optional<double> bandwidth;  // how far creases are rounded; by default 3 spacings
+};
+
+// The smooth surface in R^3 near a closed mesh of triangles, to be meshed anew.
+//
+// It is a PointCloud through the vertices, and through the middle of triangles that are large:
+// nearer to the surface that was triangulated than the triangles are, where it is smooth. Edges and
+// corners that are meant are rounded.
+class TriangleMesh final : public PointCloud {
+ public:
+  explicit TriangleMesh(const Triangles& triangles, const TriangleMeshOptions& options = {});
+  explicit TriangleMesh(const std::string& path, const TriangleMeshOptions& options = {});
+
+ private:
+  struct Samples;
+  explicit TriangleMesh(Samples samples);
+};
+
+}  // namespace stellate::oracles

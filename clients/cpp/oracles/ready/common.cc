@@ -1,0 +1,48 @@
+#include "oracles/ready/common.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace stellate::oracles {
+
+std::string Short(double number) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", number);
+  return text;
+}
+
+void CheckPoints(const Eigen::MatrixXd& points, const std::string& what) {
+  if (points.size() == 0) Refuse(what + " have to be a matrix, one a column, and there are none");
+  for (Eigen::Index j = 0; j < points.cols(); ++j) {
+    if (!points.col(j).allFinite())
+      Refuse(what + ": column " + std::to_string(j) + " is not finite");
+  }
+}
+
+BoundingBox BoxAround(const Eigen::MatrixXd& points, double share) {
+  const Eigen::VectorXd lower = points.rowwise().minCoeff(), upper = points.rowwise().maxCoeff();
+  const double margin = share * (upper - lower).norm();
+  return {lower.array() - margin, upper.array() + margin};
+}
+
+double Quantile(std::vector<double> values, double share) {
+  std::sort(values.begin(), values.end());
+  const double at = share * static_cast<double>(values.size() - 1);
+  const auto below = static_cast<size_t>(at);
+  const size_t above = std::min(below + 1, values.size() - 1);
+  return values[below] + (at - std::floor(at)) * (values[above] - values[below]);
+}
+
+Eigen::MatrixXd EachTimes(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& columns) {
+  Eigen::MatrixXd product(matrix.rows(), columns.cols());
+  Eigen::VectorXd column, result(matrix.rows());
+  for (Eigen::Index j = 0; j < columns.cols(); ++j) {
+    column = columns.col(j);
+    result.noalias() = matrix * column;
+    product.col(j) = result;
+  }
+  return product;
+}
+
+}  // namespace stellate::oracles

@@ -1,0 +1,44 @@
+#include <memory>
+
+#include "oracles/ready/common.h"
+#include "oracles/ready/grid_spline.h"
+#include "stellate/oracles/equations.h"
+
+namespace stellate::oracles {
+namespace {
+
+ImplicitOracle::Function Shifted(SignedDistance::Function f, double level) {
+  if (!f) Refuse("a signed distance has to be a function");
+  return [f = std::move(f), level](const Eigen::VectorXd& x) {
+    return Eigen::VectorXd::Constant(1, f(x) - level);
+  };
+}
+
+ImplicitOracle::Jacobian AsRow(SignedDistance::Gradient gradient) {
+  if (!gradient) return {};
+  return [gradient = std::move(gradient)](const Eigen::VectorXd& x) -> Eigen::MatrixXd {
+    return gradient(x).transpose();
+  };
+}
+
+}  // namespace
+
+SignedDistance::SignedDistance(Function f, Gradient gradient, BoundingBox box, double level)
+    : ImplicitOracle(static_cast<int>(box.lower.size()) - 1, static_cast<int>(box.lower.size()),
+                     Shifted(std::move(f), level), AsRow(std::move(gradient)), box) {}
+
+SignedDistance SignedDistance::OfGrid(const Eigen::VectorXd& values, const std::vector<int>& shape,
+                                      const BoundingBox& box, double level) {
+  const auto spline = std::make_shared<const GridSpline>(values, shape, box);
+  if (!(values.minCoeff() < level && level < values.maxCoeff())) {
+    Refuse("no set of level " + Short(level) + ": the values lie between " +
+           Short(values.minCoeff()) + " and " + Short(values.maxCoeff()));
+  }
+  SignedDistance oracle([spline](const Eigen::VectorXd& x) { return spline->Value(x); },
+                        [spline](const Eigen::VectorXd& x) { return spline->Gradient(x); }, box,
+                        level);
+  oracle.resolution_ = spline->spacing();
+  return oracle;
+}
+
+}  // namespace stellate::oracles
