@@ -8,7 +8,7 @@
 
 namespace stellate::testing {
 
-// A ready oracle of each kind, the same as tests/e2e/python/test_languages_agree.py makes by that name.
+// A ready oracle of each kind: those that tests/e2e/python/test_languages_agree.py makes, too.
 // Throws std::invalid_argument for a name that is none.
 std::unique_ptr<Oracle> MakeReadyOracle(const std::string& name);
 std::vector<std::string> ReadyOracles();

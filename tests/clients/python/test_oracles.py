@@ -4,114 +4,24 @@ import meshio
 import numpy as np
 import pytest
 import stellate
+from ready_shapes import (
+    ALL,
+    FOUR_BARS,
+    GROUND,
+    NETWORKS,
+    TORUS,
+    TURN,
+    closest,
+    near,
+    network_torus,
+    norm2,
+    torus_cloud,
+    torus_grid,
+    torus_map,
+    torus_triangles,
+    veronese,
+)
 from stellate import oracles
-
-TORUS = stellate.manifolds.Torus(1.0, 0.4)
-TURN = 2 * np.pi
-
-
-def torus_map(u):
-    ring = 1 + 0.4 * np.cos(u[:, 1])
-    return np.stack([ring * np.cos(u[:, 0]), ring * np.sin(u[:, 0]), 0.4 * np.sin(u[:, 1])], axis=1)
-
-
-def torus_derivative(u):
-    (a, b), zero = u.T, np.zeros(len(u))
-    ring = 1 + 0.4 * np.cos(b)
-    along = np.stack([-ring * np.sin(a), ring * np.cos(a), zero], axis=1)
-    round_ = 0.4 * np.stack([-np.sin(b) * np.cos(a), -np.sin(b) * np.sin(a), np.cos(b)], axis=1)
-    return np.stack([along, round_], axis=2)
-
-
-def half_sphere(sign):
-    """The inverse of a stereographic projection."""
-
-    def chart(u):
-        s = (u * u).sum(axis=1)
-        return np.concatenate([2 * u, (sign * (1 - s))[:, None]], axis=1) / (1 + s)[:, None]
-
-    return oracles.Chart(chart, None, [-1.3, -1.3], [1.3, 1.3])
-
-
-def torus_grid(count=40):
-    grid = np.stack(np.meshgrid(*[np.linspace(-1.5, 1.5, count)] * 3, indexing="ij"), axis=-1)
-    return np.hypot(np.hypot(grid[..., 0], grid[..., 1]) - 1, grid[..., 2]) - 0.4
-
-
-def torus_triangles(n=120, m=60):
-    a, b = np.meshgrid(np.arange(n), np.arange(m), indexing="ij")
-    u = np.stack([TURN * a / n, TURN * b / m], axis=-1).reshape(-1, 2)
-
-    def number(i, j):
-        return (i % n) * m + j % m
-
-    first = np.stack([number(a, b), number(a + 1, b), number(a + 1, b + 1)], axis=-1)
-    second = np.stack([number(a, b), number(a + 1, b + 1), number(a, b + 1)], axis=-1)
-    return torus_map(u), np.concatenate([first.reshape(-1, 3), second.reshape(-1, 3)])
-
-
-def torus_cloud(noise=0.0):
-    a, b = np.meshgrid(np.arange(100) / 100, np.arange(40) / 40, indexing="ij")
-    u = TURN * np.stack([a + 0.37 * b, b], axis=-1).reshape(-1, 2)  # no rows along the axes
-    points = torus_map(u)
-    return points + noise * np.random.default_rng(3).normal(size=points.shape)
-
-
-def turned_torus():
-    turn, _ = np.linalg.qr(np.random.default_rng(2).normal(size=(5, 3)))
-    return oracles.Transformed(TORUS, rotation=turn, scale=2, translation=np.arange(5.0))
-
-
-def clifford():
-    """A torus in R^4 by two constraints, one with its gradient."""
-
-    def slope(x):
-        return 2 * x * [1, 1, 0, 0]
-
-    return oracles.ConstraintSet(
-        [(lambda x: norm2(x[:, :2]) - 1, slope), lambda x: norm2(x[:, 2:]) - 1],
-        ambient_dimension=4,
-        bounding_box=([-1.5] * 4, [1.5] * 4),
-    )
-
-
-def norm2(x):
-    return (x * x).sum(axis=1)
-
-
-FOUR_BARS = [("a", "p", 1.0), ("p", "q", 1.3), ("q", "b", 1.1), ("q", "r", 0.5)]
-GROUND = {"a": (0, 0), "b": (1.5, 0)}
-
-# By name: how to make it, how far queries are from M, how exactly closest points are normal to it.
-ALL = {
-    "parametrized": (
-        lambda: oracles.Parametrized(torus_map, torus_derivative, [0, 0], [TURN] * 2, True),
-        0.2,
-        1e-9,
-    ),
-    "parametrized_differences": (
-        lambda: oracles.Parametrized(torus_map, None, [0, 0], [TURN, TURN], True),
-        0.2,
-        1e-8,
-    ),
-    "charts": (lambda: oracles.Parametrized(charts=[half_sphere(1), half_sphere(-1)]), 0.5, 1e-8),
-    "product": (lambda: oracles.Product(TORUS, stellate.manifolds.Sphere(1)), 0.2, 1e-12),
-    "transformed": (turned_torus, 0.4, 1e-12),
-    "level_set": (
-        lambda: oracles.LevelSet(TORUS, lambda x: x[:, 0] - 0.3 * x[:, 2] - 0.1),
-        0.1,
-        1e-8,
-    ),
-    "signed_distance": (
-        lambda: oracles.SignedDistance.of_grid(torus_grid(), ([-1.5] * 3, [1.5] * 3)),
-        0.2,
-        1e-7,
-    ),
-    "constraint_set": (lambda: clifford(), 0.2, 1e-8),
-    "linkage": (lambda: oracles.Linkage(FOUR_BARS, GROUND), 0.05, 1e-8),
-    "point_cloud": (lambda: oracles.PointCloud(torus_cloud(), 2), 0.1, 1e-9),
-    "triangles": (lambda: oracles.TriangleMesh(*torus_triangles()), 0.1, 1e-9),
-}
 
 
 @pytest.fixture(scope="module", params=ALL)
@@ -119,25 +29,6 @@ def case(request):
     make, away, slack = ALL[request.param]
     oracle = make()
     return oracle, near(oracle, away), slack
-
-
-def closest(oracle, x):
-    try:
-        return oracle.closest_point(x), np.ones(len(x), dtype=bool)
-    except stellate.NotConverged as error:
-        return error.points, error.converged
-
-
-def near(oracle, away, count=60):
-    """Points about so far from M."""
-    rng = np.random.default_rng(1)
-    box = getattr(oracle, "bounding_box", None)
-    x = rng.uniform(*box, size=(4 * count, oracle.ambient_dimension))
-    y, found = closest(oracle, x)
-    y = y[found][:count]
-    assert len(y) == count
-    offset = rng.normal(size=y.shape)
-    return y + away * offset / np.linalg.norm(offset, axis=1)[:, None]
 
 
 def test_the_way_to_the_closest_point_is_normal(case):
@@ -284,7 +175,7 @@ WRONG = {
     "orthonormal": lambda: oracles.Transformed(TORUS, rotation=2 * np.eye(3)),
     "shape": lambda: oracles.Transformed(TORUS, rotation=np.eye(2)),
     "scale": lambda: oracles.Transformed(TORUS, scale=0),
-    "needs its tangent_basis": lambda: oracles.LevelSet(_Bare(), lambda x: x[:, 0]),
+    "a level set on _Bare needs": lambda: oracles.LevelSet(_Bare(), lambda x: x[:, 0]),
     "leave none": lambda: oracles.LevelSet(TORUS, lambda x: x[:, :2]),
     "no set of level": lambda: oracles.SignedDistance.of_grid(
         torus_grid(8) + 9, ([-1.5] * 3, [1.5] * 3)
@@ -301,6 +192,14 @@ WRONG = {
     "constraint 1 follows": lambda: constraints(sphere, lambda x: 2 * sphere(x)),
     "no point was found": lambda: constraints(lambda x: sphere(x) + 2),
     "no gradient of its own": lambda: constraints(lambda x: sphere(x) ** 2),
+    "has to be callable": lambda: oracles.NeuralImplicit(3, bounding_box=([-1], [1])),
+    "corners, and is 3": lambda: oracles.NeuralImplicit(network_torus(), bounding_box=3),
+    "has 1 values, and level": lambda: oracles.NeuralImplicit(
+        network_torus(), bounding_box=([-1.5] * 3, [1.5] * 3), level=[0, 0]
+    ),
+    "a quotient of _Bare needs": lambda: oracles.Quotient(_Bare(), veronese),
+    "no immersion": lambda: oracles.Quotient(TORUS, lambda x: x[:, [0, 0, 0]]),
+    "does not embed in": lambda: oracles.Quotient(TORUS, lambda x: x[:, :2]),
     "leave nothing to move": lambda: oracles.Linkage([("a", "p", 1), ("p", "b", 1)], GROUND),
     "no chain": lambda: oracles.Linkage([("p", "q", 1)], GROUND),
     "two joints that are fixed": lambda: oracles.Linkage([("a", "b", 1)], GROUND),
@@ -326,3 +225,43 @@ def test_what_is_wrong_is_said(words):
 def test_a_chart_of_the_wrong_shape_is_an_oracle_error():
     with pytest.raises(stellate.OracleError, match="a chart's x returned"):
         oracles.Parametrized(lambda u: torus_map(u)[:-1], None, [0, 0], [TURN, TURN], True)
+
+
+@pytest.mark.parametrize(
+    "network, words",
+    [
+        (network_torus(np.float32), "answered in float32"),
+        (lambda x: x[:, 0], "returned a ndarray"),
+        (lambda x: (x[:, 0], x[:, 0]), "gradients"),
+    ],
+)
+def test_networks_answer_with_gradients_in_double_precision(network, words):
+    with pytest.raises(stellate.OracleError, match=words):
+        oracles.NeuralImplicit(network, bounding_box=([-1.5] * 3, [1.5] * 3))
+
+
+@pytest.mark.parametrize("library", NETWORKS)
+def test_a_network_is_the_torus_that_it_learnt(library):
+    network = NETWORKS[library]()
+    oracle = oracles.NeuralImplicit(network, bounding_box=([-1.5] * 3, [1.5] * 3))
+    x = near(TORUS, 0.05)
+    y = oracle.closest_point(x)
+    assert np.linalg.norm(y - TORUS.closest_point(y), axis=1).max() < 0.01
+    assert np.abs(y - ALL["network"][0]().closest_point(x)).max() < 1e-3
+    parts = np.concatenate([oracle.closest_point(part) for part in np.array_split(x, 7)])
+    assert parts.tobytes() == y.tobytes()
+    assert not hasattr(network, "parameters") or all(
+        p.requires_grad and str(p.dtype) == "torch.float32" for p in network.parameters()
+    )
+
+
+def test_a_projective_plane_is_the_matrices_of_rank_one():
+    """The nearest of them is made of the eigenvector to the largest eigenvalue."""
+    oracle = ALL["projective_plane"][0]()
+    x = near(oracle, 0.3)
+    y = oracle.closest_point(x)
+    first, second = np.triu_indices(3)
+    matrices = np.empty((len(x), 3, 3))
+    matrices[:, first, second] = x / np.where(first == second, 1.0, np.sqrt(2))
+    matrices[:, second, first] = matrices[:, first, second]
+    assert np.abs(y - veronese(np.linalg.eigh(matrices)[1][:, :, 2])).max() < 1e-8

@@ -7,8 +7,7 @@ import pathlib
 import numpy as np
 import pytest
 import stellate
-from stellate import oracles
-from test_oracles import (
+from ready_shapes import (
     ALL,
     TORUS,
     clifford,
@@ -16,6 +15,7 @@ from test_oracles import (
     near,
     torus_triangles,
 )
+from stellate import oracles
 
 
 def turned_torus():

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 import stellate
+from ready_shapes import ALL
 from stellate import oracles
-from test_oracles import ALL
 
 # name: epsilon, Euler characteristic
 MESHED = {

@@ -9,7 +9,9 @@ from ._combined import LevelSet, Product, Transformed
 from ._constraints import ConstraintSet
 from ._distance import SignedDistance
 from ._linkage import Linkage
+from ._network import NeuralImplicit
 from ._parametrized import Chart, Parametrized
+from ._quotient import Quotient
 from ._triangles import TriangleMesh
 
 __all__ = [
@@ -17,9 +19,11 @@ __all__ = [
     "ConstraintSet",
     "LevelSet",
     "Linkage",
+    "NeuralImplicit",
     "Parametrized",
     "PointCloud",
     "Product",
+    "Quotient",
     "SignedDistance",
     "Transformed",
     "TriangleMesh",
