@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "core/base/local_maxima.h"
 #include "core/base/parallel.h"
 #include "core/sample/ball_tree.h"
 
@@ -54,16 +55,18 @@ class Conflicts {
     });
   }
 
-  // Whether a stronger conflict of target i is among the chosen.
-  bool AnyChosen(std::size_t i, const std::vector<std::uint8_t>& chosen) const {
+  // visit(j) for the stronger conflicts of target i, until it returns false.
+  template <typename Visit>
+  void VisitStronger(std::size_t i, const Visit& visit) const {
     const Span& span = spans_[i];
-    bool any = false;
     if (span.count > kMostListed) {
-      ForEachStronger(i, [&](std::uint32_t j) { any = any || chosen[j]; });
-      return any;
+      bool more = true;
+      ForEachStronger(i, [&](std::uint32_t j) { more = more && visit(j); });
+      return;
     }
     const std::uint32_t* const list = lists_[i / chunk_size_].data() + span.begin;
-    return std::any_of(list, list + span.count, [&](std::uint32_t j) { return chosen[j] != 0; });
+    for (std::uint32_t n = 0; n < span.count; ++n)
+      if (!visit(list[n])) return;
   }
 
   // Near targets have near places.
@@ -111,14 +114,13 @@ std::vector<Target<K>> SelectIndependent(const StarComplex<K>& complex,
   }
   const Conflicts<K> conflicts(complex, targets, rank);
 
-  std::vector<std::uint8_t> is_chosen(targets.size(), 0);
-  std::vector<std::uint32_t> chosen;
-  for (std::size_t r = 0; r < order.size() && chosen.size() < most; ++r) {
-    CheckInterruption(r);
-    if (conflicts.AnyChosen(order[r], is_chosen)) continue;
-    is_chosen[order[r]] = 1;
-    chosen.push_back(order[r]);
-  }
+  const std::vector<std::uint8_t> is_chosen = ChooseLocalMaxima(
+      targets.size(), [&](std::size_t i, const auto& visit) { conflicts.VisitStronger(i, visit); });
+  std::vector<std::uint32_t> chosen = ParallelGather<std::uint32_t>(
+      order.size(), [&](std::size_t r, std::vector<std::uint32_t>* found) {
+        if (is_chosen[order[r]]) found->push_back(order[r]);
+      });
+  chosen.resize(std::min(chosen.size(), most));  // the strongest
   ParallelSort(chosen, [&](std::uint32_t i, std::uint32_t j) {
     const std::uint32_t a = conflicts.PlaceOf(i), b = conflicts.PlaceOf(j);
     return a != b ? a < b : targets[i].star < targets[j].star;

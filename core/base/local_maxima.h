@@ -1,0 +1,95 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/base/parallel.h"
+
+namespace stellate::core {
+
+// The greedy choice among things in conflict: each is taken unless a stronger one that it conflicts
+// with was. Found in passes, in each of which all are decided that no open stronger conflict holds
+// up: it needs no order to walk along, and is the same for any number of threads.
+//
+// visit_stronger(i, visit) calls visit(j) for each stronger conflict j of i, until that returns
+// false; "stronger" is a strict order.
+template <typename VisitStronger>
+class LocalMaxima {
+ public:
+  LocalMaxima(std::size_t count, const VisitStronger& visit_stronger)
+      : count_(count),
+        visit_stronger_(visit_stronger),
+        state_(std::make_unique<std::atomic<State>[]>(count)) {
+    for (std::size_t i = 0; i < count; ++i) Set(i, kOpen);
+    std::vector<std::size_t> open = LeftOpen(count, [](std::size_t i) { return i; });
+    for (int pass = 1; pass < kMostPasses && !open.empty(); ++pass)
+      open = LeftOpen(open.size(), [&](std::size_t at) { return open[at]; });
+    for (std::size_t at = 0; at < open.size(); ++at) {
+      CheckInterruption(at);
+      Follow(open[at]);
+    }
+  }
+
+  std::vector<std::uint8_t> Chosen() const {
+    std::vector<std::uint8_t> chosen(count_);
+    for (std::size_t i = 0; i < count_; ++i) chosen[i] = Get(i) == kChosen;
+    return chosen;
+  }
+
+ private:
+  enum State : std::uint8_t { kRefused, kChosen, kOpen };
+  // Passes are few where strengths are as good as random; long chains are followed one by one.
+  static constexpr int kMostPasses = 32;
+
+  // What others decide meanwhile may be seen or not: the choice is the same.
+  State Get(std::size_t i) const { return state_[i].load(std::memory_order_relaxed); }
+  void Set(std::size_t i, State state) { state_[i].store(state, std::memory_order_relaxed); }
+
+  // Decides i, or leaves it open and says what holds it up.
+  bool Decide(std::size_t i, std::size_t* held_up_by) {
+    State now = kChosen;
+    visit_stronger_(i, [&](std::size_t j) {
+      const State other = Get(j);
+      if (other == kRefused) return true;
+      now = other == kChosen ? kRefused : kOpen;
+      *held_up_by = j;
+      return now == kOpen;
+    });
+    if (now != kOpen) Set(i, now);
+    return now != kOpen;
+  }
+
+  template <typename At>
+  std::vector<std::size_t> LeftOpen(std::size_t count, const At& at) {
+    return ParallelGather<std::size_t>(count, [&](std::size_t i, std::vector<std::size_t>* left) {
+      std::size_t held_up_by = 0;
+      if (!Decide(at(i), &held_up_by)) left->push_back(at(i));
+    });
+  }
+
+  void Follow(std::size_t i) {
+    std::vector<std::size_t> waiting = {i};
+    while (!waiting.empty()) {
+      std::size_t held_up_by = 0;
+      if (Get(waiting.back()) != kOpen || Decide(waiting.back(), &held_up_by))
+        waiting.pop_back();
+      else
+        waiting.push_back(held_up_by);
+    }
+  }
+
+  std::size_t count_;
+  const VisitStronger& visit_stronger_;
+  std::unique_ptr<std::atomic<State>[]> state_;
+};
+
+// By thing: 1 if it is chosen.
+template <typename VisitStronger>
+std::vector<std::uint8_t> ChooseLocalMaxima(std::size_t count,
+                                            const VisitStronger& visit_stronger) {
+  return LocalMaxima<VisitStronger>(count, visit_stronger).Chosen();
+}
+
+}  // namespace stellate::core
