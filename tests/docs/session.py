@@ -17,7 +17,9 @@ import threading
 import traceback
 
 NUMBER = r"-?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?"
-NEAR = 0.2  # by how much of itself a number may differ: meshes change with versions, 9 is never 10
+# By how much of itself a number may differ: meshes change with versions, and counts of theirs most. A
+# count below a hundred is of something else, and exact.
+NEAR, NEAR_COUNT = 0.2, 0.4
 
 
 class Session:
@@ -80,7 +82,9 @@ def difference(shown: str, printed: str) -> str | None:
         return f"the page shows\n{shown}\nand what was printed is\n{printed}"
     for mine, its in zip(wanted, match.groups()):
         a, b = (float(text.replace(",", "")) for text in (mine, its))
-        if abs(a - b) > NEAR * abs(a):
+        count = "." not in mine and "e" not in mine
+        near = NEAR if not count else NEAR_COUNT if abs(a) >= 100 else 0.0
+        if abs(a - b) > near * abs(a):
             return f"the page shows {mine} where {its} was printed:\n{printed}"
     return None
 
