@@ -70,7 +70,7 @@ def missing(html: pathlib.Path, programs: pathlib.Path) -> list[str]:
         lost = sorted(name for name in names if name not in words)
         found.extend(f"the reference of {page} has no {name} ({source})" for name in lost)
 
-    headers = [*(ROOT / "clients/cpp/include/stellate").glob("*.h"), ROOT / "core/mesher.h"]
+    headers = [*(ROOT / "clients/cpp/include/stellate").rglob("*.h"), ROOT / "core/mesher.h"]
     types = {
         t for h in headers for t in re.findall(r"(?m)^(?:class|struct) (\w+)[^;]*{", h.read_text())
     }
