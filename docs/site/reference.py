@@ -6,6 +6,7 @@ Usage: reference.py FOLDER BIN XML    BIN: where stellated and stellate are; XML
 
 from __future__ import annotations
 
+import os
 import pathlib
 import re
 import socket
@@ -23,10 +24,10 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 def said(*command: str) -> str:
     """What a program says of itself, and names itself as users call it."""
-    environment = {"PYTHONPATH": str(ROOT / "clients" / "python"), "PATH": "/usr/bin:/bin"}
+    package = {"PYTHONPATH": str(ROOT / "clients" / "python"), "COLUMNS": "96"}
     done = subprocess.run(
         [*command, "--help"], capture_output=True, text=True, check=True,
-        env=environment | {"COLUMNS": "96"},
+        env={**os.environ, **package},
     )  # fmt: skip
     return re.sub(r"\S*/bin/(?=stellated?\b)", "", done.stdout).rstrip()
 
