@@ -18,7 +18,7 @@ def f(p):
 surface = stellate.oracles.SignedDistance(
     f, bounding_box=([-1.7, -1.3, -0.4], [1.7, 1.3, 0.4]), thread_safe=True
 )
-mesh = stellate.mesh(surface, epsilon=0.2, size_rate=0.4)
+mesh = stellate.mesh(surface, epsilon=0.2, size_rate=0.3)
 
 sizes = np.linalg.norm(np.ptp(mesh.points[mesh.simplices], axis=1), axis=1)
 print(f"triangles from {sizes.min():.3f} to {sizes.max():.3f}")
