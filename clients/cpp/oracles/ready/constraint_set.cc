@@ -97,8 +97,10 @@ Eigen::VectorXd UsualLengths(const std::vector<Eigen::MatrixXd>& slopes) {
 
 }  // namespace
 
+// The base class keeps what these become, and the box.
+// NOLINTNEXTLINE(performance-unnecessary-value-param)
 ConstraintSet::ConstraintSet(int ambient_dimension, std::vector<Constraint> constraints,
-                             BoundingBox box)
+                             BoundingBox box)  // NOLINT(performance-unnecessary-value-param)
     : ImplicitOracle(DimensionOf(ambient_dimension, constraints, box), ambient_dimension,
                      AllOf(constraints), SlopesOf(constraints, (box.upper - box.lower).norm()),
                      box) {

@@ -9,9 +9,9 @@
 namespace stellate::oracles {
 namespace {
 
-constexpr int kStarts = 64, kMaxIterations = 200;
-constexpr double kArrived = 1e-10;       // a step, in shares of where M is
-constexpr double kLongest = 0.1;         // of one step, likewise
+constexpr int kStarts = 64, kMaxSteps = 200;
+constexpr double kShortestStep = 1e-10;  // a step, in shares of where M is
+constexpr double kLongestStep = 0.1;     // of one step, likewise
 constexpr double kLeastDamping = 1e-3;   // before giving up
 constexpr double kStillShrinking = 0.9;  // what a step may be of the last
 
@@ -89,7 +89,7 @@ Eigen::MatrixXd LevelSet::BaseTangent(const Eigen::VectorXd& y) const {
 bool LevelSet::Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const {
   if (!OntoBase(x, y)) return false;
   double damping = 1, last = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < kMaxIterations; ++i) {
+  for (int i = 0; i < kMaxSteps; ++i) {
     const Eigen::MatrixXd basis = BaseTangent(y);
     const Eigen::MatrixXd slopes = J(y) * basis;  // m x k
     const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(slopes);
@@ -104,9 +104,9 @@ bool LevelSet::Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const {
     last = length;
     if (!std::isfinite(length) || damping <= kLeastDamping) return false;
     Eigen::VectorXd step = down + damping * along;
-    step *= std::min(1.0, kLongest * scale_ / std::max(step.norm(), 1e-300));
+    step *= std::min(1.0, kLongestStep * scale_ / std::max(step.norm(), 1e-300));
     if (!OntoBase(y + basis * step, y)) return false;
-    if (length <= kArrived * scale_) return true;
+    if (length <= kShortestStep * scale_) return true;
   }
   return false;
 }

@@ -10,10 +10,10 @@
 namespace stellate::oracles {
 namespace {
 
-constexpr int kMaxIterations = 100;
-constexpr double kArrived = 1e-11;  // a step, in bandwidths
-constexpr double kLongest = 0.5;    // of one step, likewise
-constexpr double kLeastBend = 0.2;  // of the distance, whose own is 1 where M is flat
+constexpr int kMaxMoves = 100;
+constexpr double kShortestMove = 1e-11;  // a step, in bandwidths
+constexpr double kLongestMove = 0.5;     // of one step, likewise
+constexpr double kLeastCurving = 0.2;    // of the distance, whose own is 1 where M is flat
 // Neighbours that all but determine no quadric: a flat one is preferred, by a share of the weights
 // that is far below what noise does.
 constexpr double kFlat = 1e-10;
@@ -48,12 +48,12 @@ class PointCloud::Neighbourhoods {
   bool Project(const Eigen::VectorXd& x, Eigen::VectorXd& y, Eigen::MatrixXd& tangents) const {
     y = points().col(tree_.Nearest(x, 1).front());
     Quadric quadric;
-    for (int i = 0; i < kMaxIterations; ++i) {
+    for (int i = 0; i < kMaxMoves; ++i) {
       if (!Fit(y, &quadric)) return false;
       Eigen::VectorXd step = Towards(quadric, x);
-      step *= std::min(1.0, kLongest * bandwidth_ / std::max(step.norm(), 1e-300));
+      step *= std::min(1.0, kLongestMove * bandwidth_ / std::max(step.norm(), 1e-300));
       const Eigen::VectorXd there = quadric.place + step;
-      const bool arrived = (there - y).norm() <= kArrived * bandwidth_;
+      const bool arrived = (there - y).norm() <= kShortestMove * bandwidth_;
       y = there;
       tangents = quadric.tangents;
       if (arrived) return true;
@@ -159,7 +159,7 @@ class PointCloud::Neighbourhoods {
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(hessian);
     const Eigen::VectorXd shares = (axes.eigenvectors().transpose() * wish).array() /
-                                   axes.eigenvalues().array().abs().max(kLeastBend);
+                                   axes.eigenvalues().array().abs().max(kLeastCurving);
     return quadric.tangents * (turn.transpose() * (axes.eigenvectors() * shares));
   }
 

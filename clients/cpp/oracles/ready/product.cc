@@ -8,7 +8,7 @@ namespace {
 
 // Of one factor, for the seeds of the product: where it has only a box, a point of that.
 Eigen::MatrixXd SeedsOf(const Oracle& factor) {
-  const Eigen::MatrixXd seeds = factor.seeds();
+  Eigen::MatrixXd seeds = factor.seeds();
   const std::optional<BoundingBox> box = factor.bounding_box();
   if (seeds.size() > 0 || !box) return seeds;
   Eigen::VectorXd seed = (box->lower + box->upper) / 2;

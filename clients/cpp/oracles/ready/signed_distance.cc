@@ -23,6 +23,8 @@ ImplicitOracle::Jacobian AsRow(SignedDistance::Gradient gradient) {
 
 }  // namespace
 
+// The base class keeps the box.
+// NOLINTNEXTLINE(performance-unnecessary-value-param)
 SignedDistance::SignedDistance(Function f, Gradient gradient, BoundingBox box, double level)
     : ImplicitOracle(static_cast<int>(box.lower.size()) - 1, static_cast<int>(box.lower.size()),
                      Shifted(std::move(f), level), AsRow(std::move(gradient)), box) {}

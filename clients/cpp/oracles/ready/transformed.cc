@@ -81,7 +81,7 @@ Eigen::VectorXd Transformed::LocalSize(const Eigen::MatrixXd& points) {
 
 // The box about the turned box, with room across the space that M lies in.
 std::optional<BoundingBox> Transformed::bounding_box() const {
-  const std::optional<BoundingBox> box = inner_->bounding_box();
+  std::optional<BoundingBox> box = inner_->bounding_box();
   if (!box) return box;
   const Eigen::VectorXd middle = Forth((box->lower + box->upper) / 2);
   Eigen::VectorXd half = map_.scale * (map_.rotation.cwiseAbs() * ((box->upper - box->lower) / 2));
