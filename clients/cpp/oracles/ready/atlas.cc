@@ -89,6 +89,7 @@ std::vector<Parametrized::Atlas::Beginning> Parametrized::Atlas::Beginnings(
   }
   if (taken.size() > kBasins) taken.resize(kBasins);
   std::vector<Beginning> beginnings;
+  beginnings.reserve(taken.size());
   for (const Eigen::Index sample : taken) {
     beginnings.push_back({&charts_[owner_[static_cast<size_t>(sample)]], grid_.col(sample)});
   }

@@ -89,6 +89,7 @@ Eigen::VectorXd UsualLengths(const std::vector<Eigen::MatrixXd>& slopes) {
   Eigen::VectorXd usual(slopes.front().rows());
   for (Eigen::Index i = 0; i < usual.size(); ++i) {
     std::vector<double> lengths;
+    lengths.reserve(slopes.size());
     for (const Eigen::MatrixXd& one : slopes) lengths.push_back(one.row(i).norm());
     usual[i] = Quantile(std::move(lengths), 0.5);
   }

@@ -122,6 +122,7 @@ void Fill(const Triangles& triangles, const Eigen::VectorXd& longest, double spa
 // An edge's points are those of both of its triangles, up to rounding: the first of each is kept.
 Eigen::MatrixXd WithoutRepeats(const std::vector<Eigen::VectorXd>& points, double spacing) {
   std::vector<Eigen::VectorXd> rounded;
+  rounded.reserve(points.size());
   for (const Eigen::VectorXd& point : points) {
     rounded.push_back((point / (kSamePoint * spacing)).array().rint());
   }
