@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
@@ -15,7 +16,14 @@ struct LimitHit {
   std::string scope;
 };
 
-// A status, and the limit where one was reached. Ok converts as core::Status does.
+// An answer that broke a rule: its chunk's lease, and the row, from 0, if one alone is at fault.
+struct AnswerPlace {
+  std::uint64_t lease = 0;
+  std::optional<std::int64_t> row;
+};
+
+// A status, the limit where one was reached, the answer where one is to blame. Ok converts as
+// core::Status does.
 struct Refused : core::Status {
   Refused(core::Status status)  // NOLINT: every status is one
       : core::Status(std::move(status)) {}
@@ -23,7 +31,10 @@ struct Refused : core::Status {
       : core::Status{core::StatusCode::kLimitExceeded, std::move(words), std::move(of_field)},
         limit(std::move(hit)) {}
 
+  Refused(AnswerPlace at, core::Status status) : core::Status(std::move(status)), answer(at) {}
+
   std::optional<LimitHit> limit;
+  std::optional<AnswerPlace> answer;
 };
 
 template <typename T>

@@ -69,6 +69,14 @@ void Pack(const google::protobuf::Message& message, const char* type, rpc::Statu
   any->set_value(message.SerializeAsString());
 }
 
+// What the worker knows the answer by: the query's index, which the message has, is the round's.
+std::string PlaceText(const std::optional<AnswerPlace>& answer) {
+  if (!answer) return "";
+  std::string text = " (lease " + std::to_string(answer->lease);
+  if (answer->row) text += ", row " + std::to_string(*answer->row);
+  return text + ")";
+}
+
 }  // namespace
 
 std::string Cut(const std::string& text, std::size_t limit) {
@@ -92,7 +100,8 @@ v1::ErrorReason ReasonOf(core::StatusCode code) {
 }
 
 grpc::Status Refusal(v1::ErrorReason reason, const std::string& message, const std::string& field,
-                     const std::optional<LimitHit>& limit) {
+                     const std::optional<LimitHit>& limit,
+                     const std::optional<AnswerPlace>& answer) {
   const grpc::StatusCode code = CodeOf(reason);
   rpc::Status details;
   details.set_code(code);
@@ -104,6 +113,10 @@ grpc::Status Refusal(v1::ErrorReason reason, const std::string& message, const s
     (*info.mutable_metadata())["limit"] = limit->setting;
     (*info.mutable_metadata())["value"] = limit->value;
     (*info.mutable_metadata())["scope"] = limit->scope;
+  }
+  if (answer) {
+    (*info.mutable_metadata())["lease"] = std::to_string(answer->lease);
+    if (answer->row) (*info.mutable_metadata())["row"] = std::to_string(*answer->row);
   }
   Pack(info, "ErrorInfo", &details);
   if (!field.empty()) {
@@ -131,9 +144,9 @@ grpc::Status ToGrpc(const Refused& status, const std::string& prefix) {
   if (status.ok()) return grpc::Status::OK;
   const bool of_request = status.code == core::StatusCode::kInvalidArgument ||
                           status.code == core::StatusCode::kLimitExceeded;
-  const std::string field = of_request ? status.field : "";
-  return Refusal(ReasonOf(status.code), status.message, field.empty() ? "" : prefix + field,
-                 status.limit);
+  const std::string field = of_request || status.answer ? status.field : "";
+  return Refusal(ReasonOf(status.code), status.message + PlaceText(status.answer),
+                 field.empty() ? "" : prefix + field, status.limit, status.answer);
 }
 
 }  // namespace stellate::server

@@ -39,43 +39,50 @@ void ToProto(const Chunk& chunk, const core::Specification& spec, v1::QueryChunk
   ToProto(block.radii.data() + chunk.first, {n}, out->mutable_radii());
 }
 
-core::Expected<core::AnswerBlock> FromProto(const v1::AnswerChunk& answers, const Chunk& chunk,
-                                            const core::Specification& spec) {
+Allowed<core::AnswerBlock> FromProto(const v1::AnswerChunk& answers, const Chunk& chunk,
+                                     const core::Specification& spec) {
   const auto n = static_cast<std::uint64_t>(chunk.count);
   const auto d = static_cast<std::uint64_t>(spec.ambient_dimension);
   const auto k = static_cast<std::uint64_t>(spec.dimension);
+  const auto refuse = [&](core::Status why, std::optional<std::int64_t> row = std::nullopt) {
+    return tl::unexpected(Refused(AnswerPlace{chunk.lease, row}, std::move(why)));
+  };
   core::AnswerBlock block;
   core::Status status =
       CheckArray(answers.points(), {n, d}, "answers.points", StatusCode::kOracleShape);
-  if (!status.ok()) return tl::unexpected(std::move(status));
+  if (!status.ok()) return refuse(std::move(status));
   block.points = MatrixFromProto(answers.points(), static_cast<Index>(d), chunk.count);
 
   const std::string& found = answers.found();
   if (!found.empty()) {
     if (found.size() != n) {
-      return core::Refuse(StatusCode::kOracleShape,
-                          core::Message("answers.found has ", found.size(), " bytes but ", n,
-                                        " queries were asked: send one byte each, or none"));
+      return refuse({StatusCode::kOracleShape,
+                     core::Message("answers.found has ", found.size(), " bytes but ", n,
+                                   " queries were asked: send one byte each, or none"),
+                     "answers.found"});
     }
     const auto bad =
         std::find_if(found.begin(), found.end(), [](char c) { return c != 0 && c != 1; });
     if (bad != found.end()) {
-      return core::Refuse(
-          StatusCode::kOracleShape,
-          core::Message("answers.found is ", static_cast<unsigned char>(*bad), " for query ",
-                        chunk.first + (bad - found.begin()), " but must be 0 or 1"));
+      const auto row = bad - found.begin();
+      return refuse(
+          {StatusCode::kOracleShape,
+           core::Message("answers.found is ", static_cast<unsigned char>(*bad), " for query ",
+                         chunk.first + row, " but must be 0 or 1"),
+           "answers.found"},
+          row);
     }
     block.found.assign(found.begin(), found.end());
   }
   if (chunk.block().want_tangents && answers.has_tangents()) {
     status =
         CheckArray(answers.tangents(), {n, d, k}, "answers.tangents", StatusCode::kOracleShape);
-    if (!status.ok()) return tl::unexpected(std::move(status));
+    if (!status.ok()) return refuse(std::move(status));
     block.tangents = MatrixFromProto(answers.tangents(), static_cast<Index>(d * k), chunk.count);
   }
   if (chunk.block().want_sizes && answers.has_sizes()) {
     status = CheckArray(answers.sizes(), {n}, "answers.sizes", StatusCode::kOracleShape);
-    if (!status.ok()) return tl::unexpected(std::move(status));
+    if (!status.ok()) return refuse(std::move(status));
     block.sizes = MatrixFromProto(answers.sizes(), chunk.count, 1);
   }
   return block;

@@ -11,7 +11,8 @@ void ToProto(const Chunk& chunk, const core::Specification& spec, v1::QueryChunk
 
 // kOracleShape if an array is not of the shape that `chunk` asks for; nothing is allocated on the
 // word of a declared shape. Tangents that were not asked for are ignored. Values are not looked at.
-core::Expected<core::AnswerBlock> FromProto(const v1::AnswerChunk& answers, const Chunk& chunk,
-                                            const core::Specification& spec);
+// The refusal names the lease, and the row at fault where there is one.
+Allowed<core::AnswerBlock> FromProto(const v1::AnswerChunk& answers, const Chunk& chunk,
+                                     const core::Specification& spec);
 
 }  // namespace stellate::server

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/base/message.h"
+#include "server/oracles/answer_check.h"
 #include "server/oracles/seconds.h"
 
 namespace stellate::server {
@@ -140,15 +141,9 @@ void OraclePool::Busy(WorkerId worker, LeaseId lease) {
   dispatch_.Busy(worker, lease, Clock::now());  // puts off deadlines: nobody need wake up
 }
 
-core::Status OraclePool::Deliver(const Chunk& chunk, const core::AnswerBlock& answer) {
-  if (answer.points.cols() != chunk.count) {
-    return {StatusCode::kOracleShape,
-            core::Message("answers to lease ", chunk.lease, " hold ", answer.points.cols(),
-                          " points but the chunk has ", chunk.count,
-                          " queries: send one point for each query")};
-  }
-  core::Status status = core::CheckAnswers(spec_, chunk.block(), chunk.first, answer);
-  if (!status.ok()) return status;
+Refused OraclePool::Deliver(const Chunk& chunk, const core::AnswerBlock& answer) {
+  Refused checked = CheckAnswer(spec_, chunk, answer);
+  if (!checked.ok()) return checked;
   if (chunk.second) {
     const auto second = std::make_shared<const SecondAnswer>(SecondAnswer{chunk, answer});
     {

@@ -99,7 +99,7 @@ class OraclePool {
   // Checks the answers to a claimed chunk and takes them over, or compares them with another
   // worker's, who may come later. On error nothing is taken, and the caller should call Fail. Two
   // workers that disagree fail the mesh, which is no error of this one.
-  core::Status Deliver(const Chunk& chunk, const core::AnswerBlock& answer);
+  Refused Deliver(const Chunk& chunk, const core::AnswerBlock& answer);
   // Ends the round, and with it the mesh. The first failure counts.
   void Fail(MeshFailure failure);
 

@@ -187,7 +187,7 @@ class OracleStream final
     if (!chunk) return OutOfOrder(chunk.error().message);
     if (!*chunk) return;  // late: another has the work, or it is done
     const auto block = FromProto(answers, **chunk, session_->request().spec);
-    const core::Status status = block ? session_->pool().Deliver(**chunk, *block) : block.error();
+    const Refused status = block ? session_->pool().Deliver(**chunk, *block) : block.error();
     if (status.ok()) return;
     EndWith(ToGrpc(status));
     session_->pool().Fail(ToMeshFailure(status));

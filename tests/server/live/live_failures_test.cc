@@ -105,7 +105,9 @@ TEST_P(LyingOracleTest, FailsItsMeshAndNoOther) {
   const v1::Mesh final = WatchToEnd(name);
   EXPECT_EQ(final.state(), v1::MESH_STATE_FAILED);
   EXPECT_EQ(final.report().failure().reason(), GetParam().reason);
-  EXPECT_EQ(final.report().failure().message(), status.error_message());
+  // The worker is told the lease and the row besides, which are nothing to the mesh's owner.
+  EXPECT_TRUE(status.error_message().starts_with(final.report().failure().message() + " (lease "))
+      << status.error_message();
   EXPECT_FALSE(final.report().certificate().certified());
 
   RawWorker honest(stub_.get(), other);
@@ -116,6 +118,45 @@ INSTANTIATE_TEST_SUITE_P(Lies, LyingOracleTest, ::testing::ValuesIn(kLies),
                          [](const auto& lie) { return lie.param.name; });
 
 class LiveFailuresTest : public LiveServer {};
+
+TEST_F(LiveFailuresTest, ABadAnswerIsNamedByItsLeaseAndRow) {
+  Start();
+  std::string lease;
+  std::string row;
+  RawWorker liar(stub_.get(), CreateSphere(), [&](const v1::QueryChunk& queries) {
+    auto request = RawWorker::Truly(queries);
+    v1::AnswerChunk* const answer = request->mutable_answers();
+    // Not the first chunk, so that the round's index of the query is not its row.
+    const auto last = queries.points().shape(0) - 1;
+    const bool lies = row.empty() && queries.lease() > 2 && last > 1;
+    if (!lies || answer->found()[last] == '\0') return request;
+    Poke(answer->mutable_points(), 3 * last + 1, std::numeric_limits<double>::quiet_NaN());
+    lease = std::to_string(queries.lease());
+    row = std::to_string(last);
+    return request;
+  });
+  const grpc::Status status = liar.Wait();
+  ASSERT_EQ(ReasonIn(status), "ORACLE_NOT_FINITE") << status.error_message();
+  ASSERT_FALSE(row.empty());
+  EXPECT_EQ(MetadataIn(status, "lease"), lease);
+  EXPECT_EQ(MetadataIn(status, "row"), row);
+  EXPECT_TRUE(status.error_message().ends_with(" (lease " + lease + ", row " + row + ")"))
+      << status.error_message();
+}
+
+TEST_F(LiveFailuresTest, AnAnswerOfTheWrongShapeIsNamedByItsLeaseAndField) {
+  Start();
+  RawWorker liar(stub_.get(), CreateSphere(), [&](const v1::QueryChunk& queries) {
+    auto request = RawWorker::Truly(queries);
+    if (queries.lease() > 1) request->mutable_answers()->mutable_found()->push_back('\1');
+    return request;
+  });
+  const grpc::Status status = liar.Wait();
+  ASSERT_EQ(ReasonIn(status), "ORACLE_SHAPE") << status.error_message();
+  EXPECT_EQ(MetadataIn(status, "lease"), "2");
+  EXPECT_EQ(MetadataIn(status, "row"), "");
+  EXPECT_EQ(FieldIn(status), "answers.found");
+}
 
 TEST_F(LiveFailuresTest, AnOracleThatRaisesFailsItsMeshInItsOwnWords) {
   Start();

@@ -27,6 +27,19 @@ inline std::string ReasonIn(const grpc::Status& status) {
   return "";
 }
 
+// A value of the ErrorInfo's metadata, "" if there is none.
+inline std::string MetadataIn(const grpc::Status& status, const std::string& key) {
+  const rpc::Status details = DetailsOf(status);
+  for (const auto& any : details.details()) {
+    rpc::ErrorInfo info;
+    if (any.type_url() == "type.googleapis.com/google.rpc.ErrorInfo" &&
+        info.ParseFromString(any.value()) && info.metadata().contains(key)) {
+      return info.metadata().at(key);
+    }
+  }
+  return "";
+}
+
 // "max-meshes=3 of server": the limit that a status's details name, "" if there is none. The
 // QuotaFailure must say the same.
 inline std::string LimitIn(const grpc::Status& status) {

@@ -1,0 +1,51 @@
+#include "server/oracles/answer_check.h"
+
+#include <utility>
+
+#include "core/base/message.h"
+
+namespace stellate::server {
+namespace {
+
+using core::StatusCode;
+using Eigen::Index;
+
+core::AnswerBlock RowOf(const core::AnswerBlock& answer, Index row) {
+  core::AnswerBlock one;
+  one.points = answer.points.col(row);
+  if (!answer.found.empty()) one.found = {answer.found[static_cast<std::size_t>(row)]};
+  if (answer.tangents.size() > 0) one.tangents = answer.tangents.col(row);
+  if (answer.sizes.size() > 0) one.sizes = answer.sizes.segment(row, 1);
+  return one;
+}
+
+// The first row that breaks a rule by itself; none where the answer as a whole has the wrong shape.
+std::optional<std::int64_t> RowAtFault(const core::Specification& spec, const Chunk& chunk,
+                                       const core::AnswerBlock& answer) {
+  for (Index row = 0; row < answer.points.cols(); ++row) {
+    const auto alone =
+        core::CheckAnswers(spec, chunk.block(), chunk.first + row, RowOf(answer, row));
+    if (!alone.ok()) return row;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+Refused CheckAnswer(const core::Specification& spec, const Chunk& chunk,
+                    const core::AnswerBlock& answer) {
+  if (answer.points.cols() != chunk.count) {
+    return {AnswerPlace{chunk.lease, std::nullopt},
+            {StatusCode::kOracleShape,
+             core::Message("answers to lease ", chunk.lease, " hold ", answer.points.cols(),
+                           " points but the chunk has ", chunk.count,
+                           " queries: send one point for each query")}};
+  }
+  core::Status status = core::CheckAnswers(spec, chunk.block(), chunk.first, answer);
+  if (status.ok()) return status;
+  AnswerPlace place{chunk.lease, std::nullopt};
+  if (status.code != StatusCode::kOracleShape) place.row = RowAtFault(spec, chunk, answer);
+  return {place, std::move(status)};
+}
+
+}  // namespace stellate::server
