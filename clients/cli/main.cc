@@ -9,6 +9,7 @@
 #include <string>
 #include <thread>
 
+#include "conform_command.h"
 #include "doctor_command.h"
 #include "download_command.h"
 #include "mesh_command.h"
@@ -95,6 +96,7 @@ int Main(int argc, char** argv) {
   app.require_subcommand(1);
   stellate::cli::MeshCommand mesh(app);
   const CLI::App* list = app.add_subcommand("list", "Show the catalogue of manifolds");
+  stellate::cli::ConformCommand conform(app);
   stellate::cli::DoctorCommand doctor(app);
   stellate::cli::DownloadCommand download(app);
   stellate::cli::ServeCommand serve(app);
@@ -108,6 +110,7 @@ int Main(int argc, char** argv) {
     return app.exit(error) == 0 ? stellate::cli::kExitCertified : stellate::cli::kExitRefused;
   }
   if (list->parsed()) return List();
+  if (conform.chosen()) return conform.Run();
   if (health->parsed()) return Health(health_server);
   const StopOnSignal signals;
   if (doctor.chosen()) return doctor.Run(signals.token());

@@ -256,6 +256,7 @@ grpc::Status Worker::Serve() {
     while (open && !exception_ && inbox.Next(&response)) {
       attempts_.Heard();
       NoteEnd(response, &state_);
+      if (response.has_over()) break;  // our half ends first
       if (response.has_welcome() && !Suits(response.welcome())) {
         attempts_.Stop();
         break;

@@ -77,6 +77,7 @@ class Client:
             ("grpc.max_send_message_length", _LARGEST_MESSAGE),
             ("grpc.keepalive_time_ms", ping),
             ("grpc.keepalive_timeout_ms", 2 * ping),
+            ("grpc.http2.ping_timeout_ms", 2 * ping),  # the same to newer libraries: else a minute
             ("grpc.http2.max_pings_without_data", 0),  # as many as it takes
             # The pauses between attempts are ours; gRPC's own would be up to two minutes.
             ("grpc.initial_reconnect_backoff_ms", 100),

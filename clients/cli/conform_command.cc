@@ -1,0 +1,58 @@
+#include "conform_command.h"
+
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdlib>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "exit_status.h"
+
+namespace stellate::cli {
+namespace {
+
+// Whether `python -c "import stellate"` works.
+bool HasStellate(const char* python) {
+  std::array<char*, 4> arguments = {const_cast<char*>(python), const_cast<char*>("-c"),
+                                    const_cast<char*>("import stellate"), nullptr};
+  posix_spawn_file_actions_t quiet;
+  posix_spawn_file_actions_init(&quiet);
+  posix_spawn_file_actions_addopen(&quiet, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+  pid_t child = 0;
+  const int failed = posix_spawnp(&child, python, &quiet, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&quiet);
+  if (failed != 0) return false;
+  int status = 0;
+  return waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+}  // namespace
+
+ConformCommand::ConformCommand(CLI::App& parent)
+    : command_(parent.add_subcommand(
+          "conform", "Hold a client in any language to the rules of the protocol")) {
+  command_->prefix_command();
+  command_->set_help_flag();
+}
+
+int ConformCommand::Run() {
+  for (const char* const python : {"python3", "/usr/bin/python3"}) {
+    if (!HasStellate(python)) continue;
+    std::vector<std::string> words = {python, "-m", "stellate", "conform"};
+    for (const std::string& word : command_->remaining()) words.push_back(word);
+    std::vector<char*> arguments;
+    for (std::string& word : words) arguments.push_back(word.data());
+    arguments.push_back(nullptr);
+    execvp(python, arguments.data());
+  }
+  std::cerr << "stellate: conform is a part of the Python client, and no python3 here can import "
+               "stellate: install that (docs/running/installing.md)\n";
+  return kExitFailed;
+}
+
+}  // namespace stellate::cli
