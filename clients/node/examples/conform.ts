@@ -1,21 +1,141 @@
-// Obeys tests/languages/conform.py: see there.
+// Obeys `stellate conform`, whose help says what each line wants.
 import { createInterface } from "node:readline";
-import { Client, loadTxt, type Mesh, StellateError, Torus, watch } from "../src/index.js";
+import { setTimeout } from "node:timers/promises";
+import {
+  Client,
+  type Found,
+  loadTxt,
+  type Mesh,
+  type Oracle,
+  ProductOfCircles,
+  StellateError,
+  Torus,
+  watch,
+} from "../src/index.js";
 
-const client = new Client(process.argv[2], { onOutage: () => {} });
+const server = process.argv[2];
+const client = new Client(server, { onOutage: () => {} });
 
-async function obey(command: string, name: string, path: string): Promise<string> {
+/** The unit circle of the first two coordinates of R^d. */
+function circle(d: number): Oracle {
+  return {
+    dimension: 1,
+    ambientDimension: d,
+    closestPoint(x, n) {
+      const points = new Float64Array(x.length);
+      for (let i = 0; i < n * d; i += d) {
+        const length = Math.hypot(x[i], x[i + 1]);
+        points.set([x[i] / length, x[i + 1] / length], i);
+      }
+      return points;
+    },
+    tangentBasis(p, n) {
+      const bases = new Float64Array(p.length);
+      for (let i = 0; i < n * d; i += d) bases.set([-p[i + 1], p[i]], i);
+      return bases;
+    },
+  };
+}
+
+/** The unit sphere, which meets lines; its sizes are 1 + z / 2. */
+const sphere: Oracle = {
+  dimension: 2,
+  ambientDimension: 3,
+  closestPoint(x, n) {
+    const points = new Float64Array(3 * n);
+    for (let i = 0; i < 3 * n; i += 3) {
+      const length = Math.hypot(x[i], x[i + 1], x[i + 2]);
+      for (let a = i; a < i + 3; a++) points[a] = x[a] / length;
+    }
+    return points;
+  },
+  tangentBasis(p, n) {
+    const bases = new Float64Array(6 * n);
+    for (let i = 0; i < n; i++) {
+      const [x, y, z] = p.subarray(3 * i, 3 * i + 3);
+      const s = z < 0 ? -1 : 1;
+      const [a, b] = [-1 / (s + z), (-x * y) / (s + z)];
+      bases.set([1 + s * x * x * a, b, s * b, s + y * y * a, -s * x, -y], 6 * i);
+    }
+    return bases;
+  },
+  localSize: (p, n) => Float64Array.from({ length: n }, (_, i) => 1 + p[3 * i + 2] / 2),
+  intersectFlat(c, bases, radii, n) {
+    const [points, found] = [new Float64Array(3 * n), new Uint8Array(n)];
+    for (let i = 0; i < n; i++) {
+      const [a, p, b, q, e, r] = bases.subarray(6 * i, 6 * i + 6);
+      const along = [b * r - e * q, e * p - a * r, a * q - b * p];
+      const at = c.subarray(3 * i, 3 * i + 3);
+      const middle = along.reduce((sum, u, j) => sum + u * at[j], 0);
+      const root = middle * middle - at.reduce((sum, u) => sum + u * u, 0) + 1;
+      const half = Math.sqrt(Math.max(root, 0));
+      const step = middle > 0 ? half - middle : -half - middle;
+      found[i] = root >= 0 && Math.abs(step) <= radii[i] ? 1 : 0;
+      points.set(
+        along.map((u, j) => at[j] + step * u),
+        3 * i,
+      );
+    }
+    return { points, found };
+  },
+};
+
+class Half extends Torus {
+  override closestPoint(x: Float64Array, n: number): Found {
+    const answer = super.closestPoint(x, n);
+    for (let i = 0; i < n; i++) answer.found[i] &= x[3 * i] < 0 ? 0 : 1;
+    return answer;
+  }
+}
+
+class Raises extends Torus {
+  override closestPoint(): Found {
+    throw new Error("on purpose");
+  }
+}
+
+const slow: Oracle = {
+  dimension: 2,
+  ambientDimension: 3,
+  closestPoint: async (x, n) => {
+    await setTimeout(2000);
+    return new Torus().closestPoint(x, n);
+  },
+  tangentBasis: (p, n) => new Torus().tangentBasis(p, n),
+};
+
+function manifold(name: string): Oracle | undefined {
+  if (name.startsWith("circle:")) return circle(Number(name.slice(7)));
+  const clifford = new ProductOfCircles();
+  const all: Record<string, Oracle> = {
+    torus: new Torus(),
+    half: new Half(),
+    raises: new Raises(),
+  };
+  return { ...all, clifford, sphere, slow }[name];
+}
+
+async function create(label: string, how = ""): Promise<string> {
+  const torus: Oracle = new Torus();
+  if (how === "seeds") {
+    torus.boundingBox = undefined;
+    torus.seeds = Float64Array.of(1.4, 0, 0);
+  }
+  const token = how.startsWith("token=") ? how.slice(6) : undefined;
+  const known = new Client(server, { credentials: { token } });
+  try {
+    return `created ${(await known.create(torus, { epsilon: 0.5, label })).name}`;
+  } finally {
+    known.close();
+  }
+}
+
+async function follow(name: string, path: string): Promise<string> {
   let last: Mesh | undefined;
   try {
-    if (command === "save") {
-      await (await loadTxt(name)).save(path);
-      return "saved";
-    }
-    if (command === "create") await client.create(new Torus(), { epsilon: 1, label: name });
     for await (const grown of watch(name, { server: client })) last = grown;
   } catch (error) {
-    if (!(error instanceof StellateError)) throw error;
-    if (error.name !== "Cancelled" || !error.mesh) return `error ${error.name} ${error.reason}`;
+    if (!(error instanceof StellateError && error.name === "Cancelled" && error.mesh)) throw error;
     last = error.mesh;
   }
   await last?.save(path);
@@ -23,8 +143,24 @@ async function obey(command: string, name: string, path: string): Promise<string
   return `mesh ${last?.revision} ${report?.termination} ${report?.certificate?.level}`;
 }
 
+async function obey(command: string, what: string, more: string): Promise<string> {
+  try {
+    if (command === "create") return await create(what, more);
+    if (command === "watch") return await follow(what, more);
+    if (command === "save") {
+      await (await loadTxt(what)).save(more);
+      return "saved";
+    }
+    const oracle = command === "serve" ? manifold(more) : undefined;
+    return oracle ? `over ${await client.serve(oracle, what)}` : "unsupported";
+  } catch (error) {
+    if (!(error instanceof StellateError)) return `error oracle RAISED ${String(error)}`;
+    return `error ${error.name} ${error.reason} ${error.message.replaceAll("\n", " ")}`;
+  }
+}
+
 for await (const line of createInterface(process.stdin)) {
-  const [command, name, path] = line.split(" ");
-  console.log(await obey(command, name, path));
+  const [command, what, more] = line.split(" ");
+  console.log(await obey(command, what, more));
 }
 client.close();

@@ -1,31 +1,142 @@
 # frozen_string_literal: true
 
-# Obeys tests/languages/conform.py: see there.
+# Obeys `stellate conform`, whose help says what each line wants.
 require_relative '../lib/stellate'
 
 $stdout.sync = true
-client = Stellate::Client.new(ARGV.shift, on_outage: ->(_said) {})
+SERVER = ARGV.shift
+CLIENT = Stellate::Client.new(SERVER, on_outage: ->(_said) {})
 
-$stdin.each_line do |line|
-  command, name, path = line.split
+# The unit circle of the first two coordinates of R^d.
+Circle = Struct.new(:ambient_dimension) do
+  def dimension
+    1
+  end
+
+  def closest_point(points)
+    points.map do |x, y|
+      length = Math.hypot(x, y)
+      [x / length, y / length] + ([0.0] * (ambient_dimension - 2))
+    end
+  end
+
+  def tangent_basis(points)
+    points.map { |x, y| [[-y], [x]] + Array.new(ambient_dimension - 2) { [0.0] } }
+  end
+end
+
+# The unit sphere, which meets lines; its sizes are 1 + z / 2.
+class Sphere
+  def dimension
+    2
+  end
+
+  def ambient_dimension
+    3
+  end
+
+  def closest_point(points)
+    points.map { |point| point.map { |x| x / Math.sqrt(dot(point, point)) } }
+  end
+
+  def tangent_basis(points)
+    points.map do |x, y, z|
+      s = z.negative? ? -1.0 : 1.0
+      a = -1 / (s + z)
+      b = x * y * a
+      [[1 + (s * x * x * a), b], [s * b, s + (y * y * a)], [-s * x, -y]]
+    end
+  end
+
+  def local_size(points)
+    points.map { |point| 1 + (point[2] / 2) }
+  end
+
+  def intersect_flat(centers, bases, radii)
+    centers.zip(bases, radii).map do |center, ((a, p), (b, q), (e, r)), radius|
+      along = [(b * r) - (e * q), (e * p) - (a * r), (a * q) - (b * p)]
+      middle = dot(along, center)
+      root = (middle * middle) - dot(center, center) + 1
+      next if root.negative?
+
+      step = (middle.positive? ? Math.sqrt(root) : -Math.sqrt(root)) - middle
+      center.zip(along).map { |x, u| x + (step * u) } if step.abs <= radius
+    end
+  end
+
+  private
+
+  def dot(one, other)
+    one.zip(other).sum { |x, y| x * y }
+  end
+end
+
+# A torus whose closest point the block may refuse.
+class Spoiled < Stellate::Torus
+  def initialize(&spoil)
+    super()
+    @spoil = spoil
+  end
+
+  def closest_point(points)
+    @spoil.call(points, super)
+  end
+end
+
+def manifold(name)
+  return Circle.new(Integer(name.split(':').last)) if name.start_with?('circle:')
+
+  case name
+  when 'torus' then Stellate::Torus.new
+  when 'clifford' then Stellate::ProductOfCircles.new
+  when 'sphere' then Sphere.new
+  when 'half' then Spoiled.new { |x, found| x.zip(found).map { |from, point| point if from[0] >= 0 } }
+  when 'raises' then Spoiled.new { |_x, _found| raise 'on purpose' }
+  when 'slow' then Spoiled.new { |_x, found| sleep(2) && found }
+  end
+end
+
+def create(label, how = '')
+  torus = Stellate::Torus.new
+  torus.define_singleton_method(:bounding_box) { nil } if how == 'seeds'
+  seeds = how == 'seeds' ? [[1.4, 0.0, 0.0]] : nil
+  token = how.delete_prefix('token=') if how.start_with?('token=')
+  known = Stellate::Client.new(SERVER, credentials: Stellate::Credentials.new(token:))
+  "created #{known.create(torus, epsilon: 0.5, label:, seeds:).name}"
+end
+
+def watch(name, path, *_dimensions)
   mesh = nil
   begin
-    if command == 'save'
-      Stellate::Mesh.load_txt(name).save(path)
-      puts 'saved'
-      next
-    end
-    client.create(Stellate::Torus.new, epsilon: 1, label: name) if command == 'create'
-    Stellate.watch(name, server: client) { |grown| mesh = grown }
-  rescue Stellate::StellateError => e
-    unless e.is_a?(Stellate::Cancelled) && e.mesh
-      puts "error #{e.class.name.split('::').last} #{e.reason}"
-      next
-    end
-    mesh = e.mesh
+    Stellate.watch(name, server: CLIENT) { |grown| mesh = grown }
+  rescue Stellate::Cancelled => e
+    raise unless (mesh = e.mesh)
   end
   mesh.save(path)
   ended = Stellate::Wire.name(mesh.report.termination, 'TERMINATION_')
   level = Stellate::Wire.name(mesh.report.certificate&.level || 0, 'CERTIFICATE_LEVEL_')
-  puts "mesh #{mesh.revision} #{ended} #{level}"
+  "mesh #{mesh.revision} #{ended} #{level}"
+end
+
+def save(mesh, path)
+  Stellate::Mesh.load_txt(mesh).save(path)
+  'saved'
+end
+
+def serve(mesh, name)
+  oracle = manifold(name)
+  oracle ? "over #{CLIENT.serve(oracle, mesh)}" : 'unsupported'
+rescue RuntimeError => e
+  raise if e.is_a?(Stellate::StellateError)
+
+  "error oracle RAISED #{e.message}"
+end
+
+$stdin.each_line do |line|
+  command, *words = line.split
+  begin
+    puts %w[serve watch create save].include?(command) ? send(command, *words) : 'unsupported'
+  rescue Stellate::StellateError => e
+    puts "error #{e.class.name.split('::').last} #{e.reason} #{e.message.tr("\n", ' ')}"
+  end
 end

@@ -1,27 +1,22 @@
-//! Obeys tests/languages/conform.py: see there.
+//! Obeys `stellate conform`, whose help says what each line wants.
 
 use std::io::BufRead;
 
 use stellate::manifolds::Torus;
 use stellate::proto::{CertificateLevel, Termination};
-use stellate::{BoxError, Client, ClientOptions, Connection, Error, Growth, Kind, Mesh, MeshOptions};
+use stellate::{
+    BoxError, Capabilities, Client, ClientOptions, Connection, Credentials, Error, Growth, Kind, Mesh,
+    MeshOptions, Oracle,
+};
 
-fn obey(client: &Client, words: &[&str]) -> Result<Option<Mesh>, Error> {
-    if words[0] == "create" {
-        let options = MeshOptions { label: words[1].to_string(), ..Default::default() };
-        client.create(&Torus::default(), 1.0, &options)?;
-        return Ok(None);
-    }
-    if words[0] == "save" {
-        Mesh::load_txt(words[1])?.save(words[2])?;
-        return Ok(None);
-    }
-    let mut last = None;
-    stellate::watch_by_name(words[1], Connection::Client(client), |mesh| {
-        last = Some(mesh);
-        Growth::GoOn
-    })?;
-    Ok(last)
+use manifolds::manifold;
+
+#[path = "conform/manifolds.rs"]
+mod manifolds;
+
+fn connect(server: &str, token: Option<&str>) -> Result<Client, Error> {
+    let credentials = Credentials { token: token.map(String::from), ..Default::default() };
+    Client::new(server, ClientOptions { credentials, on_outage: Box::new(|_| {}), ..Default::default() })
 }
 
 /// An enumerator without its prefix, or UNKNOWN, which a newer server's is.
@@ -29,31 +24,83 @@ fn name<E: TryFrom<i32>>(value: i32, words: impl Fn(&E) -> &'static str, prefix:
     E::try_from(value).map_or("UNKNOWN", |known| words(&known)).trim_start_matches(prefix).to_string()
 }
 
+fn watch(client: &Client, mesh: &str, path: &str) -> Result<String, Error> {
+    let mut last = None;
+    let ended = stellate::watch_by_name(mesh, Connection::Client(client), |mesh| {
+        last = Some(mesh);
+        Growth::GoOn
+    });
+    let mesh = match ended {
+        Err(Error { kind: Kind::Cancelled, mesh: Some(mesh), .. }) => *mesh,
+        other => other.map(|()| last.expect("a mesh"))?,
+    };
+    mesh.save(path)?;
+    let report = mesh.report.unwrap_or_default();
+    let level = report.certificate.as_ref().map_or(0, |proved| proved.level);
+    let ended = name(report.termination, Termination::as_str_name, "TERMINATION_");
+    let level = name(level, CertificateLevel::as_str_name, "CERTIFICATE_LEVEL_");
+    Ok(format!("mesh {} {ended} {level}", mesh.revision))
+}
+
+/// The torus, with a seed in place of its box.
+struct Seeded(Torus);
+
+impl Oracle for Seeded {
+    fn dimension(&self) -> usize {
+        self.0.dimension()
+    }
+    fn ambient_dimension(&self) -> usize {
+        self.0.ambient_dimension()
+    }
+    fn capabilities(&self) -> Capabilities {
+        self.0.capabilities()
+    }
+    fn seeds(&self) -> Option<Vec<f64>> {
+        Some(vec![1.4, 0.0, 0.0])
+    }
+    fn closest_point(&self, x: &[f64], points: &mut [f64], found: &mut [bool]) -> Result<(), BoxError> {
+        self.0.closest_point(x, points, found)
+    }
+}
+
+fn create(server: &str, label: &str, how: &str) -> Result<String, Error> {
+    let client = connect(server, how.strip_prefix("token="))?;
+    let torus = Torus::default();
+    let seeded = Seeded(torus);
+    let oracle: &dyn Oracle = if how == "seeds" { &seeded } else { &torus };
+    let options = MeshOptions { label: label.to_string(), ..Default::default() };
+    Ok(format!("created {}", client.create(oracle, 0.5, &options)?.name))
+}
+
+fn obey(server: &str, client: &Client, words: &[&str]) -> Result<String, Error> {
+    let (what, more) = (words.get(1).unwrap_or(&""), words.get(2).unwrap_or(&""));
+    match words[0] {
+        "create" => create(server, what, more),
+        "watch" => watch(client, what, more),
+        "save" => Mesh::load_txt(what)?.save(more).map(|()| "saved".to_string()),
+        "serve" => match manifold(more) {
+            Some(oracle) => {
+                Ok(format!("over {}", client.serve(oracle.as_ref(), what, &Default::default())?))
+            }
+            None => Ok("unsupported".to_string()),
+        },
+        _ => Ok("unsupported".to_string()),
+    }
+}
+
 fn main() -> Result<(), BoxError> {
     let server = std::env::args().nth(1).ok_or("name the server")?;
-    let options = ClientOptions { on_outage: Box::new(|_| {}), ..Default::default() };
-    let client = Client::new(&server, options)?;
+    let client = connect(&server, None)?;
     for line in std::io::stdin().lock().lines() {
         let line = line?;
         let words: Vec<&str> = line.split(' ').collect();
-        let mesh = match obey(&client, &words) {
-            Ok(Some(mesh)) => mesh,
-            Ok(None) => {
-                println!("saved");
-                continue;
-            }
-            Err(Error { kind: Kind::Cancelled, mesh: Some(mesh), .. }) => *mesh,
-            Err(error) => {
-                println!("error {:?} {}", error.kind, error.reason);
-                continue;
-            }
-        };
-        mesh.save(words[2])?;
-        let report = mesh.report.unwrap_or_default();
-        let level = report.certificate.as_ref().map_or(0, |proved| proved.level);
-        let ended = name(report.termination, Termination::as_str_name, "TERMINATION_");
-        let level = name(level, CertificateLevel::as_str_name, "CERTIFICATE_LEVEL_");
-        println!("mesh {} {ended} {level}", mesh.revision);
+        println!(
+            "{}",
+            obey(&server, &client, &words).unwrap_or_else(|error| {
+                let words = error.message.replace('\n', " ");
+                format!("error {:?} {} {words}", error.kind, error.reason)
+            })
+        );
     }
     Ok(())
 }

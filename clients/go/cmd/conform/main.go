@@ -1,7 +1,8 @@
-// Conform obeys tests/languages/conform.py: see there.
+// Conform obeys `stellate conform`, whose help says what each line wants.
 package main
 
 import (
+	"bufio"
 	"context"
 	"errors"
 	"fmt"
@@ -21,53 +22,96 @@ func name[Enum ~int32](value Enum, known map[int32]string, prefix string) string
 	return "UNKNOWN"
 }
 
-func obey(client *stellate.Client, command, what, path string) string {
-	ctx := context.Background()
+func connect(token string) (*stellate.Client, error) {
+	quiet := func(string) {}
+	credentials := stellate.Credentials{Token: token}
+	return stellate.NewClient(stellate.Connection{Server: os.Args[1], OnOutage: quiet, Credentials: credentials})
+}
+
+func serve(ctx context.Context, client *stellate.Client, mesh, what string) (string, error) {
+	oracle := manifold(what)
+	if oracle == nil {
+		return "unsupported", nil
+	}
+	state, err := client.Serve(ctx, oracle, mesh, stellate.WorkerOptions{})
+	return "over " + state, err
+}
+
+func watch(ctx context.Context, client *stellate.Client, mesh, path string) (string, error) {
 	var last *stellate.Mesh
 	var err error
-	if command == "save" {
-		if last, err = stellate.LoadTxt(what); err == nil {
-			err = last.Save(path)
-		}
-		if err == nil {
-			return "saved"
-		}
-	} else if command == "create" {
-		_, err = client.Create(ctx, stellate.Torus{Major: 1, Minor: 0.4}, 1, &stellate.Options{Label: what})
-	} else {
-		for mesh, failed := range client.Watch(ctx, what, nil) {
-			last, err = mesh, failed
-		}
+	for grown, failed := range client.Watch(ctx, mesh, nil) {
+		last, err = grown, failed
 	}
 	var ours *stellate.Error
-	if errors.As(err, &ours) {
-		if ours.Kind != stellate.ErrCancelled || ours.Mesh == nil {
-			return fmt.Sprint("error ", strings.ReplaceAll(ours.Kind.Error(), " ", ""), " ", ours.Reason)
-		}
-		last = ours.Mesh
-	} else if err != nil {
-		log.Fatal(err)
+	if errors.As(err, &ours) && ours.Kind == stellate.ErrCancelled && ours.Mesh != nil {
+		last, err = ours.Mesh, nil
 	}
-	if err := last.Save(path); err != nil {
-		log.Fatal(err)
+	if err == nil {
+		err = last.Save(path)
+	}
+	if err != nil {
+		return "", err
 	}
 	return fmt.Sprint("mesh ", last.Revision,
 		" ", name(last.Report.GetTermination(), pb.Termination_name, "TERMINATION_"),
-		" ", name(last.Report.GetCertificate().GetLevel(), pb.CertificateLevel_name, "CERTIFICATE_LEVEL_"))
+		" ", name(last.Report.GetCertificate().GetLevel(), pb.CertificateLevel_name, "CERTIFICATE_LEVEL_")), nil
+}
+
+func create(ctx context.Context, label, how string) (string, error) {
+	token, hasToken := strings.CutPrefix(how, "token=")
+	if !hasToken {
+		token = ""
+	}
+	client, err := connect(token)
+	if err != nil {
+		return "", err
+	}
+	defer client.Close()
+	options := stellate.Options{Label: label}
+	var oracle stellate.Oracle = torus
+	if how == "seeds" {
+		oracle = seeded{torus, torus}
+	}
+	mesh, err := client.Create(ctx, oracle, 0.5, &options)
+	return "created " + mesh.GetName(), err
+}
+
+func obey(client *stellate.Client, words []string) (string, error) {
+	ctx := context.Background()
+	words = append(words, "", "")
+	switch words[0] {
+	case "serve":
+		return serve(ctx, client, words[1], words[2])
+	case "watch":
+		return watch(ctx, client, words[1], words[2])
+	case "create":
+		return create(ctx, words[1], words[2])
+	case "save":
+		mesh, err := stellate.LoadTxt(words[1])
+		if err == nil {
+			err = mesh.Save(words[2])
+		}
+		return "saved", err
+	}
+	return "unsupported", nil
 }
 
 func main() {
-	quiet := func(string) {}
-	client, err := stellate.NewClient(stellate.Connection{Server: os.Args[1], OnOutage: quiet})
+	client, err := connect("")
 	if err != nil {
 		log.Fatal(err)
 	}
 	defer client.Close()
-	for {
-		var command, what, path string
-		if n, _ := fmt.Scanln(&command, &what, &path); n < 2 {
-			return
+	for in := bufio.NewScanner(os.Stdin); in.Scan(); {
+		answer, err := obey(client, strings.Fields(in.Text()))
+		var ours *stellate.Error
+		if errors.As(err, &ours) {
+			kind := strings.ReplaceAll(ours.Kind.Error(), " ", "")
+			answer = fmt.Sprint("error ", kind, " ", ours.Reason, " ", strings.ReplaceAll(ours.Error(), "\n", " "))
+		} else if err != nil {
+			answer = "error oracle RAISED " + err.Error()
 		}
-		fmt.Println(obey(client, command, what, path))
+		fmt.Println(answer)
 	}
 }

@@ -47,15 +47,14 @@ module Stellate
     def asked(chunk)
       x = Wire.numbers(chunk.points, nil, d).each_slice(d).to_a
       n = x.size
-      points = checked(method_of(chunk), ask(chunk, x), n, d)
+      points, flat = checked(method_of(chunk), ask(chunk, x), n, d)
       reply = V1::AnswerChunk.new(lease: chunk.lease)
-      if points.include?(nil)
+      unless flat
         reply.found = points.map { |point| point ? 1 : 0 }.pack('C*')
         nowhere = [0.0] * d
-        reply.points = Wire.to_wire(points.flat_map { |point| point || nowhere }, n, d)
-      else
-        reply.points = Wire.to_wire(points.flatten, n, d)
+        flat = points.flat_map { |point| point || nowhere }
       end
+      reply.points = Wire.to_wire(flat, n, d)
       if chunk.want_tangents
         anywhere = Array.new(d) { |row| Array.new(k) { |column| row == column ? 1.0 : 0.0 } }.flatten
         reply.tangents = Wire.to_wire(at_found(:tangent_basis, points, anywhere), n, d, k)
@@ -82,20 +81,21 @@ module Stellate
     # What the method says of the points that were found, and `anywhere` for the others, flat.
     def at_found(method, points, anywhere)
       on = points.compact
-      values = on.empty? ? [] : checked(method, @oracle.public_send(method, on), on.size, anywhere.size)
-      return values.flatten if on.size == points.size
+      values, flat = on.empty? ? [] : checked(method, @oracle.public_send(method, on), on.size, anywhere.size)
+      return flat || values.flatten if on.size == points.size
 
-      points.flat_map { |point| point ? values.shift : anywhere }
+      points.flat_map { |point| point ? [values.shift].flatten : anywhere }
     end
 
-    # As n rows of so many finite numbers, or nil.
+    # As n rows of so many finite numbers, or nil; and all of these in one array, where that is known.
     def checked(method, answer, n, width)
       raise wrong(method, "an answer that is no array of #{n}", 'SHAPE') unless
         answer.is_a?(Array) && answer.size == n
 
-      return answer if sound?(answer, n, width) # looked at as a whole, which is quicker
+      flat = sound(answer, n, width) # looked at as a whole, which is quicker
+      return [answer, flat] if flat
 
-      answer.map do |row|
+      rows = answer.map do |row|
         next if row.nil? && %i[closest_point intersect_flat].include?(method)
 
         numbers = [row].flatten
@@ -105,13 +105,16 @@ module Stellate
 
         numbers
       end
+      [rows, rows.include?(nil) ? nil : rows.flatten]
     end
 
-    def sound?(answer, n, width)
+    # All numbers, where they are what they should be; else nil.
+    def sound(answer, n, width)
       each = answer.first.is_a?(Array) ? answer.first.size : 1
       flat = answer.flatten
-      flat.size == n * width && flat.all?(Float) && flat.sum.finite? &&
-        answer.all? { |row| row.is_a?(Array) ? row.size == each : each == 1 }
+      good = flat.size == n * width && flat.all?(Float) && flat.sum.finite? &&
+             answer.all? { |row| row.is_a?(Array) ? row.size == each : each == 1 }
+      flat if good
     end
 
     def wrong(method, what, reason)

@@ -10,49 +10,85 @@ import stellate.Client;
 import stellate.Credentials;
 import stellate.Mesh;
 import stellate.Options;
+import stellate.Oracle;
 import stellate.Stellate;
 import stellate.StellateException;
-import stellate.Torus;
 import stellate.v1.Report;
 
-/** Obeys tests/languages/conform.py: see there. */
+/** Obeys `stellate conform`, whose help says what each line wants. */
 public final class Conform {
-  private Conform() {}
+  private final String server;
+  private final Client client;
+
+  private Conform(String server, Client client) {
+    this.server = server;
+    this.client = client;
+  }
 
   public static void main(String[] arguments) throws Exception {
     var in = new BufferedReader(new InputStreamReader(System.in, StandardCharsets.UTF_8));
-    try (Client client = new Client(arguments[0], Credentials.NONE).onOutage(said -> {})) {
+    try (Client client = connect(arguments[0], Credentials.NONE)) {
+      Conform conform = new Conform(arguments[0], client);
       for (String line = in.readLine(); line != null; line = in.readLine()) {
-        System.out.println(obey(client, line.split(" ")));
+        System.out.println(conform.obey((line + "  ").split(" ", -1)));
       }
     }
   }
 
-  private static String obey(Client client, String[] words) throws Exception {
+  private static Client connect(String server, Credentials credentials) {
+    return new Client(server, credentials).onOutage(said -> {});
+  }
+
+  private String obey(String[] words) throws Exception {
+    try {
+      return switch (words[0]) {
+        case "serve" -> serve(words[1], words[2]);
+        case "watch" -> watch(words[1], Path.of(words[2]));
+        case "create" -> create(words[1], words[2]);
+        case "save" -> {
+          Mesh.loadTxt(Path.of(words[1])).save(Path.of(words[2]));
+          yield "saved";
+        }
+        default -> "unsupported";
+      };
+    } catch (StellateException error) {
+      String said = error.getMessage().replace('\n', ' ');
+      boolean raised = error.kind() == StellateException.Kind.RAISED;
+      return "error " + (raised ? "oracle" : error.kind()) + " " + error.reason() + " " + said;
+    }
+  }
+
+  private String serve(String mesh, String name) throws Exception {
+    Oracle oracle = KitManifolds.named(name);
+    return oracle == null ? "unsupported" : "over " + client.serve(oracle, mesh, "", 0);
+  }
+
+  private String watch(String name, Path path) throws Exception {
     List<Mesh> all = new ArrayList<>();
     try {
-      if (words[0].equals("save")) {
-        Mesh.loadTxt(Path.of(words[1])).save(Path.of(words[2]));
-        return "saved";
-      }
-      if (words[0].equals("create")) {
-        Options options = new Options();
-        options.spec.setLabel(words[1]);
-        client.create(new Torus(1, 0.4), 1, options);
-      }
-      Stellate.watch(client, words[1], all::add);
+      Stellate.watch(client, name, all::add);
     } catch (StellateException error) {
       if (error.kind() != StellateException.Kind.CANCELLED || error.mesh().isEmpty()) {
-        return "error " + error.kind() + " " + error.reason();
+        throw error;
       }
       all.add(error.mesh().get());
     }
     Mesh last = all.get(all.size() - 1);
-    last.save(Path.of(words[2]));
+    last.save(path);
     Report report = last.report().orElseThrow();
     String ended = name(report.getTermination(), "TERMINATION_");
     String level = name(report.getCertificate().getLevel(), "CERTIFICATE_LEVEL_");
     return "mesh " + last.revision + " " + ended + " " + level;
+  }
+
+  private String create(String label, String how) {
+    Options options = new Options();
+    options.spec.setLabel(label);
+    Oracle torus = how.equals("seeds") ? new KitManifolds.Seeded() : KitManifolds.TORUS;
+    String token = how.startsWith("token=") ? how.substring(6) : null;
+    try (Client known = connect(server, Credentials.token(token))) {
+      return "created " + known.create(torus, 0.5, options).getName();
+    }
   }
 
   /** Without its prefix, or UNKNOWN, which a newer server's is. */

@@ -1,0 +1,186 @@
+package stellate.examples;
+
+import stellate.Oracle;
+import stellate.ProductOfCircles;
+import stellate.Torus;
+
+/** The manifolds that `stellate conform` asks about. */
+final class KitManifolds {
+  static final Torus TORUS = new Torus(1, 0.4);
+
+  private KitManifolds() {}
+
+  /** What the kit calls name; null where it is not here. */
+  static Oracle named(String name) {
+    if (name.startsWith("circle:")) {
+      return new Circle(Integer.parseInt(name.substring(7)));
+    }
+    return switch (name) {
+      case "torus" -> TORUS;
+      case "clifford" -> new ProductOfCircles(2);
+      case "sphere" -> new Sphere();
+      case "half" -> new Changed(KitManifolds::refuseLeft);
+      case "raises" ->
+          new Changed(
+              (x, found) -> {
+                throw new IllegalStateException("on purpose");
+              });
+      case "slow" -> new Changed((x, found) -> Thread.sleep(2000));
+      default -> null;
+    };
+  }
+
+  private static void refuseLeft(double[] x, boolean[] found) {
+    for (int i = 0; i < found.length; i++) {
+      found[i] &= x[3 * i] >= 0;
+    }
+  }
+
+  /** What is done to the answers of the torus. */
+  interface Change {
+    void to(double[] x, boolean[] found) throws Exception;
+  }
+
+  /** The torus, after something was done to its answers. */
+  private record Changed(Change change) implements Oracle.WithTangents {
+    @Override
+    public int dimension() {
+      return 2;
+    }
+
+    @Override
+    public int ambientDimension() {
+      return 3;
+    }
+
+    @Override
+    public void closestPoint(double[] x, double[] points, boolean[] found) throws Exception {
+      TORUS.closestPoint(x, points, found);
+      change.to(x, found);
+    }
+
+    @Override
+    public void tangentBasis(double[] points, double[] bases) {
+      TORUS.tangentBasis(points, bases);
+    }
+  }
+
+  /** The torus, with a seed in place of its box. */
+  record Seeded() implements Oracle.WithTangents {
+    @Override
+    public int dimension() {
+      return 2;
+    }
+
+    @Override
+    public int ambientDimension() {
+      return 3;
+    }
+
+    @Override
+    public double[] seeds() {
+      return new double[] {1.4, 0, 0};
+    }
+
+    @Override
+    public void closestPoint(double[] x, double[] points, boolean[] found) {
+      TORUS.closestPoint(x, points, found);
+    }
+
+    @Override
+    public void tangentBasis(double[] points, double[] bases) {
+      TORUS.tangentBasis(points, bases);
+    }
+  }
+
+  /** The unit circle of the first two coordinates of R^d. */
+  private record Circle(int ambientDimension) implements Oracle.WithTangents {
+    @Override
+    public int dimension() {
+      return 1;
+    }
+
+    @Override
+    public void closestPoint(double[] x, double[] points, boolean[] found) {
+      for (int i = 0; i < x.length; i += ambientDimension) {
+        double length = Math.hypot(x[i], x[i + 1]);
+        points[i] = x[i] / length;
+        points[i + 1] = x[i + 1] / length;
+      }
+    }
+
+    @Override
+    public void tangentBasis(double[] points, double[] bases) {
+      for (int i = 0; i < points.length; i += ambientDimension) {
+        bases[i] = -points[i + 1];
+        bases[i + 1] = points[i];
+      }
+    }
+  }
+
+  /** The unit sphere, which meets lines; its sizes are 1 + z / 2. */
+  private record Sphere() implements Oracle.WithFlats, Oracle.WithTangents, Oracle.WithSizes {
+    @Override
+    public int dimension() {
+      return 2;
+    }
+
+    @Override
+    public int ambientDimension() {
+      return 3;
+    }
+
+    @Override
+    public void closestPoint(double[] x, double[] points, boolean[] found) {
+      for (int i = 0; i < x.length; i++) {
+        int row = i - i % 3;
+        points[i] = x[i] / Math.sqrt(dot(x, row, x, row));
+      }
+    }
+
+    @Override
+    public void tangentBasis(double[] points, double[] bases) {
+      for (int i = 0; i < points.length; i += 3) {
+        double x = points[i];
+        double y = points[i + 1];
+        double s = Math.copySign(1, points[i + 2]);
+        double a = -1 / (s + points[i + 2]);
+        double b = x * y * a;
+        double[] basis = {1 + s * x * x * a, b, s * b, s + y * y * a, -s * x, -y};
+        System.arraycopy(basis, 0, bases, 2 * i, 6);
+      }
+    }
+
+    @Override
+    public void localSize(double[] points, double[] sizes) {
+      for (int i = 0; i < sizes.length; i++) {
+        sizes[i] = 1 + points[3 * i + 2] / 2;
+      }
+    }
+
+    @Override
+    public void intersectFlat(
+        double[] centers, double[] bases, double[] radii, double[] points, boolean[] found) {
+      for (int i = 0; i < found.length; i++) {
+        int c = 3 * i;
+        int b = 6 * i;
+        double[] along = {
+          bases[b + 2] * bases[b + 5] - bases[b + 4] * bases[b + 3],
+          bases[b + 4] * bases[b + 1] - bases[b] * bases[b + 5],
+          bases[b] * bases[b + 3] - bases[b + 2] * bases[b + 1]
+        };
+        double middle = dot(along, 0, centers, c);
+        double root = middle * middle - dot(centers, c, centers, c) + 1;
+        double step = Math.copySign(Math.sqrt(Math.max(root, 0)), middle) - middle;
+        found[i] = root >= 0 && Math.abs(step) <= radii[i];
+        for (int j = 0; j < 3; j++) {
+          points[c + j] = centers[c + j] + step * along[j];
+        }
+      }
+    }
+
+    private static double dot(double[] a, int i, double[] b, int j) {
+      return a[i] * b[j] + a[i + 1] * b[j + 1] + a[i + 2] * b[j + 2];
+    }
+  }
+}
