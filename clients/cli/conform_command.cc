@@ -33,22 +33,19 @@ bool HasStellate(const char* python) {
 
 }  // namespace
 
-ConformCommand::ConformCommand(CLI::App& parent)
-    : command_(parent.add_subcommand(
-          "conform", "Hold a client in any language to the rules of the protocol")) {
-  command_->prefix_command();
-  command_->set_help_flag();
+ConformCommand::ConformCommand(CLI::App& parent) {
+  parent.add_subcommand("conform", "Hold a client in any language to the rules of the protocol");
 }
 
-int ConformCommand::Run() {
+int ConformCommand::Run(int count, char** arguments) {
   for (const char* const python : {"python3", "/usr/bin/python3"}) {
     if (!HasStellate(python)) continue;
     std::vector<std::string> words = {python, "-m", "stellate", "conform"};
-    for (const std::string& word : command_->remaining()) words.push_back(word);
-    std::vector<char*> arguments;
-    for (std::string& word : words) arguments.push_back(word.data());
-    arguments.push_back(nullptr);
-    execvp(python, arguments.data());
+    words.insert(words.end(), arguments, arguments + count);
+    std::vector<char*> line;
+    for (std::string& word : words) line.push_back(word.data());
+    line.push_back(nullptr);
+    execvp(python, line.data());
   }
   std::cerr << "stellate: conform is a part of the Python client, and no python3 here can import "
                "stellate: install that (docs/running/installing.md)\n";

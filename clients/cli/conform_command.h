@@ -8,13 +8,10 @@ namespace stellate::cli {
 // no library of a server would: that is little work where messages are made up as a program runs.
 class ConformCommand {
  public:
-  explicit ConformCommand(CLI::App& parent);
-  bool chosen() const { return command_->parsed(); }
-  // Becomes `python -m stellate conform`; comes back only where there is none.
-  int Run();
-
- private:
-  CLI::App* const command_;
+  explicit ConformCommand(CLI::App& parent);  // for the list of commands
+  // Becomes `python -m stellate conform` with these arguments, as they are: "--" means something
+  // there. Comes back only where there is no such Python.
+  static int Run(int count, char** arguments);
 };
 
 }  // namespace stellate::cli

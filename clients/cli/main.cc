@@ -7,6 +7,7 @@
 #include <iostream>
 #include <stop_token>
 #include <string>
+#include <string_view>
 #include <thread>
 
 #include "conform_command.h"
@@ -96,13 +97,16 @@ int Main(int argc, char** argv) {
   app.require_subcommand(1);
   stellate::cli::MeshCommand mesh(app);
   const CLI::App* list = app.add_subcommand("list", "Show the catalogue of manifolds");
-  stellate::cli::ConformCommand conform(app);
+  const stellate::cli::ConformCommand conform(app);
   stellate::cli::DoctorCommand doctor(app);
   stellate::cli::DownloadCommand download(app);
   stellate::cli::ServeCommand serve(app);
   const stellate::cli::TopCommand top(app);
   CLI::App* const health = app.add_subcommand("health", "Ask a server how it is");
   const stellate::cli::ServerOptions health_server(health, "127.0.0.1:7717");
+  if (argc > 1 && std::string_view(argv[1]) == "conform") {
+    return stellate::cli::ConformCommand::Run(argc - 2, argv + 2);
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -110,7 +114,6 @@ int Main(int argc, char** argv) {
     return app.exit(error) == 0 ? stellate::cli::kExitCertified : stellate::cli::kExitRefused;
   }
   if (list->parsed()) return List();
-  if (conform.chosen()) return conform.Run();
   if (health->parsed()) return Health(health_server);
   const StopOnSignal signals;
   if (doctor.chosen()) return doctor.Run(signals.token());

@@ -43,7 +43,7 @@ def runs(tmp_path_factory):
     cpp = os.environ["STELLATE_CPP_CLIENT"]
     return {
         "python": start("--record", str(record), "--", *PYTHON_CLIENT),
-        "cpp": start("--", cpp, kit=(os.environ["STELLATE"],)),
+        "cpp": start("--", cpp, kit=(os.environ["STELLATE"],)),  # handed over by the command line
         "faultless": start("worker", "--", *FAULTY_CLIENT, "none"),
         "record": record,
     }
