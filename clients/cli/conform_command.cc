@@ -43,6 +43,7 @@ int ConformCommand::Run(int count, char** arguments) {
     std::vector<std::string> words = {python, "-m", "stellate", "conform"};
     words.insert(words.end(), arguments, arguments + count);
     std::vector<char*> line;
+    line.reserve(words.size() + 1);
     for (std::string& word : words) line.push_back(word.data());
     line.push_back(nullptr);
     execvp(python, line.data());

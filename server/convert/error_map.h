@@ -14,7 +14,8 @@ namespace stellate::server {
 // The one place where refusals become gRPC statuses. Each carries google.rpc.ErrorInfo (domain
 // "stellate.v1", the reason's name without prefix), where a field of the request is to blame
 // google.rpc.BadRequest, and where a limit was reached google.rpc.QuotaFailure, the limit standing
-// in ErrorInfo.metadata too, as do the lease and the row of an answer that broke a rule. Messages are cut so that they fit into a reply's trailers.
+// in ErrorInfo.metadata too, as do the lease and the row of an answer that broke a rule. Messages
+// are cut so that they fit into a reply's trailers.
 grpc::Status Refusal(v1::ErrorReason reason, const std::string& message,
                      const std::string& field = "",
                      const std::optional<LimitHit>& limit = std::nullopt,

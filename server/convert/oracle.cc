@@ -65,12 +65,11 @@ Allowed<core::AnswerBlock> FromProto(const v1::AnswerChunk& answers, const Chunk
         std::find_if(found.begin(), found.end(), [](char c) { return c != 0 && c != 1; });
     if (bad != found.end()) {
       const auto row = bad - found.begin();
-      return refuse(
-          {StatusCode::kOracleShape,
-           core::Message("answers.found is ", static_cast<unsigned char>(*bad), " for query ",
-                         chunk.first + row, " but must be 0 or 1"),
-           "answers.found"},
-          row);
+      return refuse({StatusCode::kOracleShape,
+                     core::Message("answers.found is ", static_cast<unsigned char>(*bad),
+                                   " for query ", chunk.first + row, " but must be 0 or 1"),
+                     "answers.found"},
+                    row);
     }
     block.found.assign(found.begin(), found.end());
   }
