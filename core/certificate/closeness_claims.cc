@@ -1,12 +1,14 @@
 #include "core/certificate/closeness_claims.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 #include <string>
 #include <utility>
 
 #include "core/base/message.h"
+#include "core/certificate/along.h"
 #include "core/certificate/probes.h"
 
 namespace stellate::core {
@@ -26,6 +28,16 @@ constexpr double kRounding = 16 * std::numeric_limits<double>::epsilon();
 double LargestCoordinate(const MeshView& mesh) {
   const MeshBox box = BoxOf(mesh);
   return std::max(box.lower.cwiseAbs().maxCoeff(), box.upper.cwiseAbs().maxCoeff());
+}
+
+// Whether the part of `step` along M at a simplex may be long enough to tell: it is no longer than
+// the mean of those along its vertices' tangent spaces. Rounding is far below the margin.
+bool MayLean(const MeshView& mesh, const std::uint32_t* ids, const Eigen::VectorXd& step,
+             double distance) {
+  constexpr double kMargin = 1 + 1e-9;
+  double sum = 0;
+  for (int i = 0; i <= mesh.k; ++i) sum += std::sqrt(SquaredAlong(mesh, ids[i], step.data()));
+  return IsLean(kMargin * sum / (mesh.k + 1), distance);
 }
 
 }  // namespace
@@ -118,7 +130,8 @@ void ClosenessClaims::JudgeInside(const Eigen::MatrixXd& asked, const AnswerBloc
     const double circumradius = x_.Circumradius(ids);
     reach_.HoldFoot(ids, circumradius, distance, y,
                     is_barycentre ? std::optional(number) : std::nullopt);
-    rims_.SuspectIfLeans(y, AlongSimplex(ids, step), distance);
+    if (MayLean(x_.mesh, ids, step, distance))
+      rims_.SuspectIfLeans(y, AlongSimplex(ids, step), distance);
     if (is_barycentre) {
       x_.certificate.max_barycentre_distance =
           std::max(x_.certificate.max_barycentre_distance, distance);

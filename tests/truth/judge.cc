@@ -28,6 +28,9 @@ bool IsRight(const Case& c, const testing::FinishedRun& run) {
   return KnotTypeOf(Polygons(run.points, run.simplices)) == KnotTypeOf(truth);
 }
 
+// The reach of a shape with a hole is the hole's radius at most.
+double ReachOf(const Case& c) { return c.hole > 0 ? c.hole : c.shape->Reach(); }
+
 bool SawAll(const Case& c, bool thorough) {
   ShapeOracle oracle(c.shape, c.tangents, c.box, c.seeds);
   oracle.NoteComponents();
@@ -46,17 +49,19 @@ core::Specification SpecificationOf(const Case& c, const ShapeOracle& oracle) {
   return spec;
 }
 
-Run Judge(const Case& c, bool thorough) {
+Run Judge(const Case& c, bool thorough, double declared) {
   Run result;
   ShapeOracle oracle(c.shape, c.tangents, c.box, c.seeds);
   core::Specification spec = SpecificationOf(c, oracle);
   spec.audit = thorough ? core::Audit::kThorough : core::Audit::kStandard;
+  if (declared > 0 && ReachOf(c) > 0) spec.declared_reach = declared * ReachOf(c);
   try {
     const testing::FinishedRun run = testing::RunMesher(oracle, spec);
     const core::Certificate& certificate = run.report.certificate;
     result.told = certificate.verdict;
     result.counts = run.report.counts;
     result.estimated_reach = certificate.estimated_reach;
+    result.proved = certificate.level == core::CertificateLevel::kProved;
     result.seconds = run.mesher_seconds;
     if (run.report.termination == core::Termination::kConverged) {
       result.outcome = Outcome::kRefused;

@@ -21,11 +21,13 @@ struct Run {
   std::string told;  // the verdict, or the error
   core::Counts counts;
   double estimated_reach = 0;
-  double seconds = 0;  // of this process, the mesher's share
+  bool proved = false;  // what is certified, from the declared reach
+  double seconds = 0;   // of this process, the mesher's share
 };
 
 core::Specification SpecificationOf(const Case& c, const ShapeOracle& oracle);
-// `thorough`: with every question that a certificate may ask.
-Run Judge(const Case& c, bool thorough);
+// `thorough`: with every question that a certificate may ask. `declared`: so many true reaches are
+// declared, or 0.
+Run Judge(const Case& c, bool thorough, double declared = 0);
 
 }  // namespace stellate::truth

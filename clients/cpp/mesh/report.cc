@@ -81,8 +81,9 @@ void AddCertificate(const Certificate& c, Lines& lines) {
                              " of the manifold, simplices within " +
                              Format("%.1f", c.max_tangent_angle_degrees) +
                              " degrees of its tangent spaces");
-  lines.Add("reach", "about " + Format("%.4g", c.estimated_reach) + ", epsilon is " +
-                         Format("%.3g", c.epsilon_over_reach) + " of it");
+  lines.Add("reach", (c.certified ? "about " : "at most ") + Format("%.4g", c.estimated_reach) +
+                         ", epsilon is " + Format("%.3g", c.epsilon_over_reach) + " of it" +
+                         (c.certified ? "" : " or more"));
   if (c.declared_reach > 0) {
     lines.Add("declared", "a reach of " + Format("%.4g", c.declared_reach) +
                               (c.reach_refuted ? ", refuted"

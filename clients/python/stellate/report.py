@@ -87,7 +87,7 @@ class Certificate:
     min_angle_degrees: float  # k = 2 only
     max_tangent_angle_degrees: float
     max_barycentre_distance: float  # of a simplex to the manifold
-    estimated_reach: float  # an estimate from above
+    estimated_reach: float  # an estimate from above; unless `certified`, no more than a bound
     epsilon_over_reach: float
     components: int
     euler_characteristic: int
@@ -273,6 +273,9 @@ def _certificate_lines(c: Certificate) -> list[tuple[str, str]]:
     shape += f"; smallest fatness {c.min_fatness:.3g}"
     if c.min_angle_degrees > 0:
         shape += f", angle {c.min_angle_degrees:.1f} degrees"
+    # What was refused may be far too coarse to tell the reach.
+    about, more = ("about", "") if c.certified else ("at most", " or more")
+    reach = f"{about} {c.estimated_reach:.4g}, epsilon is {c.epsilon_over_reach:.3g} of it{more}"
     lines = [
         ("topology", f"{components}, Euler characteristic {c.euler_characteristic}, {orientable}"),
         ("manifold", f"{closed}; {links}"),
@@ -288,7 +291,7 @@ def _certificate_lines(c: Certificate) -> list[tuple[str, str]]:
             f"barycentres within {c.max_barycentre_distance:.3g} of the manifold, simplices within "
             f"{c.max_tangent_angle_degrees:.1f} degrees of its tangent spaces",
         ),
-        ("reach", f"about {c.estimated_reach:.4g}, epsilon is {c.epsilon_over_reach:.3g} of it"),
+        ("reach", reach),
     ]
     if c.declared_reach > 0:
         what = ": nothing proved from it"

@@ -35,6 +35,20 @@ bool Says(const std::string& text, const std::string& words) {
   return text.find(words) != std::string::npos;
 }
 
+template <typename Closest>
+DrivenRun DriveClosest(const Specification& spec, const Closest& closest) {
+  return Drive(spec, [&](const QueryBatch& batch) {
+    Answers answers;
+    for (const QueryBlock& block : batch.blocks) {
+      AnswerBlock& answer = answers.blocks.emplace_back();
+      answer.points.resize(spec.ambient_dimension, block.size());
+      for (Eigen::Index i = 0; i < block.size(); ++i)
+        answer.points.col(i) = closest(Eigen::VectorXd(block.points.col(i)));
+    }
+    return answers;
+  });
+}
+
 class TrueReach : public ::testing::TestWithParam<Case> {};
 
 TEST_P(TrueReach, ProvesTheMesh) {
@@ -112,6 +126,50 @@ TEST(DeclaredReach, CoversTheBox) {
   EXPECT_FALSE(Says(c.verdict, "cannot be excluded")) << c.verdict;
 }
 
+// A unit sphere without the cap around its last axis, whose rim has radius `hole`: an arc with a
+// gap where x has two coordinates. Its reach is `hole` at most.
+Eigen::VectorXd ClosestOutsideCap(const Eigen::VectorXd& x, double hole) {
+  const Eigen::Index last = x.size() - 1;
+  Eigen::VectorXd y = x.normalized();
+  if (y[last] <= 0 || y.head(last).norm() >= hole) return y;
+  Eigen::VectorXd rim = Eigen::VectorXd::Unit(x.size(), 0);
+  if (y.head(last).norm() > 0) rim.head(last) = y.head(last).normalized();
+  rim *= hole;
+  rim[last] = std::sqrt(1 - hole * hole);
+  return rim;
+}
+
+// With the true reach of what ends declared, the mesh gets too fine to close over the end.
+TEST(DeclaredReach, ProvesNothingWhereTheManifoldEnds) {
+  for (const int k : {1, 2})
+    for (const double hole : {0.1, 0.3})
+      for (const double epsilon : {0.5, 2.0}) {
+        Specification spec;
+        spec.dimension = k;
+        spec.ambient_dimension = k + 1;
+        spec.epsilon = epsilon * hole;
+        spec.declared_reach = hole;
+        spec.seeds = -Eigen::VectorXd::Unit(k + 1, k);
+        spec.limits.max_vertices = 3000;
+        const DrivenRun run = DriveClosest(
+            spec, [hole](const Eigen::VectorXd& x) { return ClosestOutsideCap(x, hole); });
+        EXPECT_EQ(run.report().certificate.level, CertificateLevel::kRefused)
+            << "k " << k << ", hole " << hole << ", epsilon " << spec.epsilon << ": "
+            << run.report().certificate.verdict;
+      }
+}
+
+TEST(DeclaredReach, ProvesGradedMeshes) {
+  const auto manifold = Make("ellipsoid:1:0.8:0.6");
+  const double reach = *manifold->facts().reach;
+  Specification spec = Declared(*manifold, 0.5 * reach, reach);
+  spec.criteria.size_rate = 0.4;
+  const DrivenRun run = Drive(spec, *manifold);
+  const Certificate& c = run.report().certificate;
+  EXPECT_EQ(c.level, CertificateLevel::kProved)
+      << c.verdict << (c.warnings.empty() ? "" : "; " + c.warnings.front());
+}
+
 // Eight spheres of radius 0.1 in the corners of a box: each is found.
 TEST(DeclaredReach, CoversABoxOfSmallComponents) {
   Specification spec;
@@ -121,20 +179,10 @@ TEST(DeclaredReach, CoversABoxOfSmallComponents) {
   spec.declared_reach = 0.1;
   spec.cover_box = true;
   spec.bounding_box = BoundingBox{Eigen::Vector3d::Constant(-1), Eigen::Vector3d::Constant(1)};
-  const auto closest = [](const Eigen::Vector3d& x) -> Eigen::Vector3d {
+  const DrivenRun run = DriveClosest(spec, [](const Eigen::VectorXd& x) -> Eigen::VectorXd {
     Eigen::Vector3d centre;
     for (int i = 0; i < 3; ++i) centre[i] = x[i] < 0 ? -0.85 : 0.85;
     return centre + 0.1 * (x - centre).normalized();
-  };
-  const DrivenRun run = Drive(spec, [&](const QueryBatch& batch) {
-    Answers answers;
-    for (const QueryBlock& block : batch.blocks) {
-      AnswerBlock& answer = answers.blocks.emplace_back();
-      answer.points.resize(3, block.size());
-      for (Eigen::Index i = 0; i < block.size(); ++i)
-        answer.points.col(i) = closest(block.points.col(i));
-    }
-    return answers;
   });
   const Certificate& c = run.report().certificate;
   EXPECT_EQ(c.components, 8u) << c.verdict;
