@@ -80,7 +80,7 @@ std::istream& operator>>(std::istream& in, Record& r) {
 
 struct Tally {
   std::uint64_t runs = 0, outcomes[5] = {}, proved = 0, honest = 0, honest_certified = 0, wrong = 0;
-  // Of runs that converged: a certified one must tell the reach, another no less than it is.
+  // Of those that were certified, rightly: others only bound it.
   std::uint64_t reach_told = 0, reach_right = 0;
   std::vector<std::uint64_t> rounds_unfinished, queries_certified;
   double seconds = 0;
@@ -96,9 +96,9 @@ struct Tally {
     if (r.outcome == Outcome::kRight) queries_certified.push_back(r.queries);
     if (r.outcome == Outcome::kUnfinished) {
       rounds_unfinished.push_back(r.rounds);
-    } else if (r.told > 0) {
+    } else if (r.outcome == Outcome::kRight && r.told > 0) {
       ++reach_told;
-      reach_right += r.told >= kLeastTold && (!r.certified() || r.told <= kMostTold);
+      reach_right += r.told >= kLeastTold && r.told <= kMostTold;
     }
   }
 };
