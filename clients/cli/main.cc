@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "conform_command.h"
+#include "declare_command.h"
 #include "doctor_command.h"
 #include "download_command.h"
 #include "mesh_command.h"
@@ -100,6 +101,7 @@ int Main(int argc, char** argv) {
   const stellate::cli::ConformCommand conform(app);
   stellate::cli::DoctorCommand doctor(app);
   stellate::cli::DownloadCommand download(app);
+  stellate::cli::DeclareCommand declare(app);
   stellate::cli::ServeCommand serve(app);
   const stellate::cli::TopCommand top(app);
   CLI::App* const health = app.add_subcommand("health", "Ask a server how it is");
@@ -117,6 +119,7 @@ int Main(int argc, char** argv) {
   if (health->parsed()) return Health(health_server);
   const StopOnSignal signals;
   if (doctor.chosen()) return doctor.Run(signals.token());
+  if (declare.chosen()) return declare.Run(signals.token());
   if (serve.chosen()) return serve.Run(signals.token());
   if (download.chosen()) return download.Run(signals.token());
   return top.chosen() ? top.Run(signals.token()) : mesh.Run(signals.token());

@@ -6,17 +6,12 @@
 #include <exception>
 #include <iostream>
 #include <memory>
-#include <string>
-#include <type_traits>
 #include <utility>
 
-#include "mesh_settings.h"
 #include "progress_bar.h"
 
 namespace stellate::cli {
 namespace {
-
-constexpr size_t kMaxLabel = 128;  // bytes that a server takes
 
 // Hides all but closest_point, to see what a mesh costs a client that has nothing else.
 class ClosestPointOnly final : public Oracle {
@@ -31,64 +26,21 @@ class ClosestPointOnly final : public Oracle {
   Oracle& oracle_;
 };
 
-void Add(CLI::App* to, const MeshSetting& setting, MeshOptions* options) {
-  std::visit(
-      [&](auto field) {
-        auto& value = options->*field;
-        using T = std::decay_t<decltype(value)>;
-        if constexpr (std::is_same_v<T, std::optional<bool>>) {
-          to->add_flag(setting.flag, value, setting.help);
-        } else {
-          CLI::Option* const option = to->add_option(setting.flag, value, setting.help);
-          if constexpr (std::is_arithmetic_v<T>) option->capture_default_str();
-        }
-      },
-      setting.field);
-}
-
 }  // namespace
 
 MeshCommand::MeshCommand(CLI::App& parent)
     : command_(parent.add_subcommand("mesh", "Mesh a manifold of the catalogue, or of a command")),
       source_(command_),
-      server_(command_, "") {
-  command_
-      ->add_option_function<std::string>(
-          "-e,--epsilon", [this](const std::string& text) { SetEpsilon(text); },
-          "largest circumradius of a simplex, a length; or auto: a quarter of the reach that "
-          "'stellate doctor' finds")
-      ->type_name("FLOAT|auto")
-      ->required();
+      server_(command_, ""),
+      spec_(command_, /*serves=*/true) {
   outputs_.AddTo(command_);
-  for (const MeshSetting& setting : RunSettings()) Add(command_, setting, &options_);
-  CLI::App* const criteria =
-      command_->add_option_group("Criteria", "absent: the server's defaults");
-  for (const MeshSetting& setting : CriteriaSettings()) Add(criteria, setting, &options_);
   command_->add_flag("--closest-point-only", closest_point_only_,
                      "offer neither flat intersections nor tangent bases");
-  command_
-      ->add_option(
-          "--audit",
-          [this](const CLI::results_t& given) {
-            options_.thorough_audit = given.back() == "thorough";
-            return true;
-          },
-          "how much is asked before certifying: standard, or thorough, which is about "
-          "every vertex and every simplex")
-      ->check(CLI::IsMember({"standard", "thorough"}))
-      ->type_name("LEVEL")
-      ->default_str("standard");
   command_->add_option("--report", report_, "file for the report as JSON");
   command_->add_flag("--json", json_, "print the report as JSON");
   command_->add_flag("-q,--quiet", quiet_, "no progress and no report");
   command_->footer(
       "Exit status: 0 certified, 1 not certified, 2 usage or refused, 3 server or oracle failed.");
-}
-
-void MeshCommand::SetEpsilon(const std::string& text) {
-  options_.auto_epsilon = text == "auto";
-  if (options_.auto_epsilon || CLI::detail::lexical_cast(text, options_.epsilon)) return;
-  throw CLI::ValidationError("--epsilon", "has to be a length or auto, and is '" + text + "'");
 }
 
 int MeshCommand::Run(std::stop_token stop) {
@@ -104,7 +56,7 @@ int MeshCommand::Run(std::stop_token stop) {
     if (!credentials) return PrintError(credentials.error());
     options_.credentials = std::move(*credentials);
   }
-  options_.label = ("stellate mesh " + source_.name()).substr(0, kMaxLabel);
+  spec_.SetLabel("stellate mesh " + source_.name());
   options_.workers = std::max(options_.workers, source_.processes());
   options_.stop = std::move(stop);
   ClosestPointOnly poor(oracle);

@@ -7,6 +7,7 @@
 #include "oracle_source.h"
 #include "outputs.h"
 #include "server_options.h"
+#include "spec_options.h"
 #include "stellate/client.h"
 
 namespace stellate::cli {
@@ -19,14 +20,14 @@ class MeshCommand {
   int Run(std::stop_token stop);
 
  private:
-  void SetEpsilon(const std::string& text);
   Expected<Mesh> MeshIt(Oracle& oracle);
   int Deliver(const Mesh& mesh) const;
 
   CLI::App* command_;
   OracleSource source_;
   ServerOptions server_;
-  MeshOptions options_;
+  SpecOptions spec_;
+  MeshOptions& options_ = spec_.options;
   Outputs outputs_;
   std::string report_;
   bool json_ = false, quiet_ = false, closest_point_only_ = false;

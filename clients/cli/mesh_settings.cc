@@ -7,8 +7,6 @@ using O = MeshOptions;
 
 constexpr MeshSetting kRun[] = {
     {"--seed", &O::random_seed, "seed of everything random"},
-    {"--workers", &O::workers, "threads that answer the server"},
-    {"--max-chunk", &O::max_chunk, "most points that the oracle is asked at once"},
     {"--worker-wait", &O::worker_wait_seconds, "seconds that the mesh waits for a worker"},
     {"--answer", &O::answer_seconds, "that a worker may be silent over a chunk of queries"},
     {"--busy", &O::busy_seconds, "that a worker may take for one in all"},
@@ -19,6 +17,11 @@ constexpr MeshSetting kRun[] = {
     {"--components", &O::components, "that the manifold has at least: fewer are not certified"},
     {"--reach", &O::reach, "declare a lower bound of the reach, to have the mesh proved"},
     {"--cover-box", &O::cover_box, "miss no component in the bounding box; needs --reach"},
+};
+
+constexpr MeshSetting kServing[] = {
+    {"--workers", &O::workers, "threads that answer the server"},
+    {"--max-chunk", &O::max_chunk, "most points that the oracle is asked at once"},
     {"--reconnect", &O::reconnect_seconds, "seconds to wait for a server that went away"},
 };
 
@@ -46,6 +49,7 @@ constexpr MeshSetting kCriteria[] = {
 }  // namespace
 
 std::span<const MeshSetting> RunSettings() { return kRun; }
+std::span<const MeshSetting> ServingSettings() { return kServing; }
 std::span<const MeshSetting> CriteriaSettings() { return kCriteria; }
 
 }  // namespace stellate::cli

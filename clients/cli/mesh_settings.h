@@ -21,8 +21,9 @@ struct MeshSetting {
   const char* help;
 };
 
-// What `stellate mesh --help` lists, in this order.
+// What `stellate mesh --help` lists, in this order; the second are for who answers the questions.
 std::span<const MeshSetting> RunSettings();
+std::span<const MeshSetting> ServingSettings();
 std::span<const MeshSetting> CriteriaSettings();
 
 }  // namespace stellate::cli

@@ -1,8 +1,5 @@
 // `stellate` with oracles that are programs in other languages.
 #include <gmock/gmock.h>
-#include <google/protobuf/empty.pb.h>
-#include <grpcpp/create_channel.h>
-#include <grpcpp/security/credentials.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -14,8 +11,6 @@
 #include "program.h"
 #include "stellate/command_oracle.h"
 #include "stellate/download.h"
-#include "stellate/v1/stellate.grpc.pb.h"
-#include "wire/convert.h"
 
 namespace stellate::testing {
 namespace {
@@ -176,6 +171,9 @@ TEST_F(OracleCommand, UsageIsChecked) {
            {"mesh -e 0.2 TORUS --oracle-silence 0", "must be positive"},
            {"mesh -e 0.2 TORUS -o a.wkt", "wkt"},
            {"serve TORUS", "mesh is required"},
+           {"declare torus", "--epsilon is required"},
+           {"declare torus -e 0.3 --workers 2", "--workers"},
+           {"declare torus -e 0.3 --label x --epsilon -1", "epsilon"},
        }) {
     const Result result = Run(FilledIn(arguments, "TORUS", torus));
     EXPECT_EQ(result.status, 2) << arguments << ": " << result.output;
@@ -241,27 +239,23 @@ while (my $line = <STDIN>) {
 
 TEST_F(OracleCommand, ServesAMeshThatAnotherProgramDeclared) {
   const Shape& shape = kShapes[0];
-  const auto torus = Make(shape.manifold);
-  AsThroughAPipe oracle(*torus, *ParseBox(shape.box));
-  const auto stub =
-      v1::Stellate::NewStub(grpc::CreateChannel(Server(), grpc::InsecureChannelCredentials()));
-  grpc::ClientContext context;
-  v1::CreateMeshRequest request;
-  *request.mutable_spec() = *client::ToSpec(oracle, At(shape.epsilon));
-  v1::Mesh mesh;
-  ASSERT_TRUE(stub->CreateMesh(&context, request, &mesh).ok());
-  const Result result = OnServer("serve --oracle-command 'perl " + Shipped("torus.pl") +
-                                 "' --oracle-processes 2 " + mesh.name());
+  const std::string perl = "--oracle-command 'perl " + Shipped("torus.pl") + "'";
+  const Result declared =
+      OnServer("declare " + perl + " -e " + std::to_string(shape.epsilon) + " --label ours");
+  ASSERT_EQ(declared.status, 0) << declared.output;
+  const std::string name = declared.output.substr(0, declared.output.find('\n'));
+  EXPECT_EQ(declared.output, name + "\n");
+  const Result result = OnServer("serve " + perl + " --oracle-processes 2 " + name);
   EXPECT_EQ(result.status, 0) << result.output;
-  EXPECT_EQ(result.output, mesh.name() + " SUCCEEDED\n");
+  EXPECT_EQ(result.output, name + " SUCCEEDED\n");
   DownloadOptions options;
   options.server = Server();
-  const Expected<Mesh> made = DownloadMesh(mesh.name(), options);
+  const Expected<Mesh> made = DownloadMesh(name, options);
   ASSERT_TRUE(made) << made.error().message;
   ASSERT_TRUE(made->Save(Path("served.txt")));
   ExpectSameMesh(Path("served.txt"), Reference(shape));
   // The catalogue's serve, too; and a name that is not there is refused.
-  EXPECT_EQ(OnServer("serve " + mesh.name() + " torus").status, 0);
+  EXPECT_EQ(OnServer("serve " + name + " torus").status, 0);
   EXPECT_EQ(OnServer("serve meshes/00000000000000000000000000000000 torus").status, 2);
 }
 

@@ -6,7 +6,7 @@
 #include <stop_token>
 #include <utility>
 
-#include "net/channel.h"
+#include "run/declare.h"
 #include "wire/convert.h"
 #include "wire/status.h"
 
@@ -15,8 +15,8 @@ namespace {
 
 constexpr auto kHousekeeping = std::chrono::seconds(5);  // for calls that clean up
 
-void SetDeadline(grpc::ClientContext& context, std::chrono::seconds time) {
-  context.set_deadline(std::chrono::system_clock::now() + time);
+void SetDeadline(grpc::ClientContext& context) {
+  context.set_deadline(std::chrono::system_clock::now() + kHousekeeping);
 }
 
 }  // namespace
@@ -36,7 +36,7 @@ Run::Run(const std::shared_ptr<grpc::Channel>& channel, Oracle& oracle, const Me
 Run::~Run() {
   if (!name_.empty()) {
     grpc::ClientContext context;
-    SetDeadline(context, kHousekeeping);
+    SetDeadline(context);
     context.set_wait_for_ready(ended_);  // unless the server is lost, it may be just coming back
     v1::DeleteMeshRequest request;
     request.set_name(name_);
@@ -87,21 +87,13 @@ Expected<Mesh> Run::Go() {
   return mesh;
 }
 
-// Not tried again when it fails: whether the server made the mesh would not be known.
 Expected<void> Run::Create() {
-  const Expected<v1::MeshSpec> spec = ToSpec(oracle_, options_);
-  if (!spec) return tl::unexpected(spec.error());
   auto builder = DeltaMesh::Create(oracle_.dimension(), oracle_.ambient_dimension());
   if (!builder) return tl::unexpected(builder.error());
   builder_ = std::make_unique<DeltaMesh>(std::move(*builder));
-  grpc::ClientContext context;
-  SetDeadline(context, kCallTime);
-  v1::CreateMeshRequest request;
-  *request.mutable_spec() = *spec;
-  v1::Mesh mesh;
-  const grpc::Status status = stub_->CreateMesh(&context, request, &mesh);
-  if (!status.ok()) return tl::unexpected(FromStatus(status));
-  name_ = mesh.name();
+  Expected<std::string> name = CreateMesh(*stub_, oracle_, options_);
+  if (!name) return tl::unexpected(name.error());
+  name_ = std::move(*name);
   return {};
 }
 
@@ -136,7 +128,7 @@ void Run::JoinWorkers() {
 
 void Run::Cancel() {
   grpc::ClientContext context;
-  SetDeadline(context, kHousekeeping);
+  SetDeadline(context);
   v1::CancelMeshRequest request;
   request.set_name(name_);
   v1::Mesh ignored;

@@ -13,6 +13,11 @@
 
 namespace stellate {
 
+// Declares a mesh of the oracle's manifold on options.server, which must be given, for ServeMesh to
+// answer for, here or elsewhere. Gives its name. Nobody serves it yet; a server forgets a mesh that
+// nobody serves, in its own time. Errors as of MeshManifold.
+Expected<std::string> DeclareMesh(Oracle& oracle, const MeshOptions& options);
+
 struct ServeOptions {
   std::string server;  // "host:port" or "unix:/path"; must be given
   Credentials credentials;

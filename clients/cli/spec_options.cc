@@ -1,0 +1,66 @@
+#include "spec_options.h"
+
+#include <CLI/CLI.hpp>
+#include <type_traits>
+
+#include "mesh_settings.h"
+
+namespace stellate::cli {
+namespace {
+
+constexpr size_t kMaxLabel = 128;  // bytes that a server takes
+
+void Add(CLI::App* to, const MeshSetting& setting, MeshOptions* options) {
+  std::visit(
+      [&](auto field) {
+        auto& value = options->*field;
+        using T = std::decay_t<decltype(value)>;
+        if constexpr (std::is_same_v<T, std::optional<bool>>) {
+          to->add_flag(setting.flag, value, setting.help);
+        } else {
+          CLI::Option* const option = to->add_option(setting.flag, value, setting.help);
+          if constexpr (std::is_arithmetic_v<T>) option->capture_default_str();
+        }
+      },
+      setting.field);
+}
+
+}  // namespace
+
+SpecOptions::SpecOptions(CLI::App* command, bool serves) {
+  command
+      ->add_option_function<std::string>(
+          "-e,--epsilon", [this](const std::string& text) { SetEpsilon(text); },
+          "largest circumradius of a simplex, a length; or auto: a quarter of the reach that "
+          "'stellate doctor' finds")
+      ->type_name("FLOAT|auto")
+      ->required();
+  for (const MeshSetting& setting : RunSettings()) Add(command, setting, &options);
+  if (serves) {
+    for (const MeshSetting& setting : ServingSettings()) Add(command, setting, &options);
+  }
+  CLI::App* const criteria = command->add_option_group("Criteria", "absent: the server's defaults");
+  for (const MeshSetting& setting : CriteriaSettings()) Add(criteria, setting, &options);
+  command
+      ->add_option(
+          "--audit",
+          [this](const CLI::results_t& given) {
+            options.thorough_audit = given.back() == "thorough";
+            return true;
+          },
+          "how much is asked before certifying: standard, or thorough, which is about "
+          "every vertex and every simplex")
+      ->check(CLI::IsMember({"standard", "thorough"}))
+      ->type_name("LEVEL")
+      ->default_str("standard");
+}
+
+void SpecOptions::SetEpsilon(const std::string& text) {
+  options.auto_epsilon = text == "auto";
+  if (options.auto_epsilon || CLI::detail::lexical_cast(text, options.epsilon)) return;
+  throw CLI::ValidationError("--epsilon", "has to be a length or auto, and is '" + text + "'");
+}
+
+void SpecOptions::SetLabel(const std::string& text) { options.label = text.substr(0, kMaxLabel); }
+
+}  // namespace stellate::cli

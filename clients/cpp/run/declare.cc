@@ -1,0 +1,60 @@
+#include "run/declare.h"
+
+#include <chrono>
+#include <utility>
+
+#include "net/channel.h"
+#include "stellate/serve.h"
+#include "wire/convert.h"
+#include "wire/status.h"
+
+namespace stellate {
+namespace client {
+
+Expected<Request> Settle(Oracle& oracle, const MeshOptions& options) {
+  Request request{options, ""};
+  if (options.auto_epsilon) {
+    if (options.epsilon != 0) {
+      return Fail(ErrorCode::kRefused, "epsilon is given and auto_epsilon set: choose one");
+    }
+    Expected<ChosenEpsilon> chosen = ChooseEpsilon(oracle);
+    if (!chosen) return tl::unexpected(chosen.error());
+    request.options.epsilon = chosen->epsilon;
+    request.epsilon_reason = std::move(chosen->reason);
+    if (options.on_epsilon) options.on_epsilon(chosen->epsilon, request.epsilon_reason);
+  }
+  // Round trips are what a far server costs.
+  const bool far = !options.server.empty() && !StaysOnThisMachine(options.server);
+  if (!options.ask_ahead && far) request.options.ask_ahead = true;
+  return request;
+}
+
+Expected<std::string> CreateMesh(v1::Stellate::Stub& stub, Oracle& oracle,
+                                 const MeshOptions& options) {
+  const Expected<v1::MeshSpec> spec = ToSpec(oracle, options);
+  if (!spec) return tl::unexpected(spec.error());
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kCallTime);
+  v1::CreateMeshRequest request;
+  *request.mutable_spec() = *spec;
+  v1::Mesh mesh;
+  const grpc::Status status = stub.CreateMesh(&context, request, &mesh);
+  if (!status.ok()) return tl::unexpected(FromStatus(status));
+  return mesh.name();
+}
+
+}  // namespace client
+
+Expected<std::string> DeclareMesh(Oracle& oracle, const MeshOptions& options) {
+  if (options.server.empty()) {
+    return Fail(ErrorCode::kRefused, "no server is given: say where the mesh is to be");
+  }
+  const auto channel =
+      client::Connect(options.server, options.credentials, options.keepalive_seconds);
+  if (!channel) return tl::unexpected(channel.error());
+  const Expected<client::Request> request = client::Settle(oracle, options);
+  if (!request) return tl::unexpected(request.error());
+  return client::CreateMesh(*v1::Stellate::NewStub(*channel), oracle, request->options);
+}
+
+}  // namespace stellate

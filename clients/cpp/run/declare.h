@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+
+#include "stellate/client.h"
+#include "stellate/error.h"
+#include "stellate/v1/stellate.grpc.pb.h"
+
+namespace stellate::client {
+
+// What a server is asked for: options of which nothing is left to be chosen.
+struct Request {
+  MeshOptions options;
+  std::string epsilon_reason;  // empty where epsilon was given
+};
+
+// Chooses epsilon where it is automatic, and what suits where the server is: on this machine, if
+// none is named.
+Expected<Request> Settle(Oracle& oracle, const MeshOptions& options);
+
+// The name of a new mesh. Not tried again when it fails: whether the server made the mesh would not
+// be known.
+Expected<std::string> CreateMesh(v1::Stellate::Stub& stub, Oracle& oracle,
+                                 const MeshOptions& options);
+
+}  // namespace stellate::client
