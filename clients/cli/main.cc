@@ -20,6 +20,7 @@
 #include "stellate/catalogue.h"
 #include "stellate/client.h"
 #include "top_command.h"
+#include "view_command.h"
 
 namespace {
 
@@ -104,6 +105,7 @@ int Main(int argc, char** argv) {
   stellate::cli::DeclareCommand declare(app);
   stellate::cli::ServeCommand serve(app);
   const stellate::cli::TopCommand top(app);
+  const stellate::cli::ViewCommand view(app);
   CLI::App* const health = app.add_subcommand("health", "Ask a server how it is");
   const stellate::cli::ServerOptions health_server(health, "127.0.0.1:7717");
   if (argc > 1 && std::string_view(argv[1]) == "conform") {
@@ -121,6 +123,7 @@ int Main(int argc, char** argv) {
   if (doctor.chosen()) return doctor.Run(signals.token());
   if (declare.chosen()) return declare.Run(signals.token());
   if (serve.chosen()) return serve.Run(signals.token());
+  if (view.chosen()) return view.Run(signals.token());
   if (download.chosen()) return download.Run(signals.token());
   return top.chosen() ? top.Run(signals.token()) : mesh.Run(signals.token());
 }

@@ -136,7 +136,14 @@ CLIENTS = {
     "clients/cpp/wire": ("clients/cpp/include", "proto"),
     "clients/cpp/net": ("clients/cpp/include", "clients/cpp/wire", "proto"),
     "clients/cpp/run": ("clients/cpp/include", "clients/cpp/net", "clients/cpp/wire", "proto"),
-    "clients/cli": ("clients/cpp/include", "text"),
+    "clients/view/gateway": (
+        "clients/cpp/include",
+        "clients/cpp/mesh",
+        "clients/cpp/net",
+        "clients/cpp/wire",
+        "proto",
+    ),
+    "clients/cli": ("clients/cpp/include", "clients/view/gateway", "text"),
     **{
         in_package(room): tuple(in_package(taken) for taken in takes)
         for room, takes in PYTHON.items()
@@ -179,15 +186,25 @@ TABLE = Table(
             "server/base",
             "clients/cpp/run",
             "clients/python/stellate",
+            "clients/view/gateway",
             "tests",
         ),
         "sqlite3.h": ("server/storage", "tests/server"),
         "nanoflann.hpp": ("clients/cpp/oracles",),
         "CGAL/": ("clients/cpp/oracles",),
+        "boost/": ("clients/view/gateway",),  # the viewer's sockets, and nothing else
     },
     generated={"stellate/v1/": "proto", "stellate/rpc/": "proto"},
     packages={"stellate": "clients/python/stellate"},
-    watched=("core", "text", "server", "clients/cpp", "clients/cli", "clients/python/stellate"),
+    watched=(
+        "core",
+        "text",
+        "server",
+        "clients/cpp",
+        "clients/view",
+        "clients/cli",
+        "clients/python/stellate",
+    ),
     acyclic=(
         "core/sample",
         "core/complex",
@@ -196,6 +213,7 @@ TABLE = Table(
         "text",
         "server",
         "clients/cpp",
+        "clients/view",
         "clients/cli",
         "clients/python/stellate",
     ),

@@ -113,7 +113,13 @@ def main() -> int:
         mesh.save(output / name)
         written.append(name)
     draw(torus, output / "torus.png")
-    print(f"Written to {output}: {', '.join(written)}, torus.png")
+    written.append("torus.png")
+    try:
+        torus.show(output / "torus.html", label="torus")
+        written.append("torus.html")
+    except stellate.ViewerNotFound as error:
+        print(f"No torus.html: {error}", file=sys.stderr)
+    print(f"Written to {output}: {', '.join(written)}")
     return 0 if torus.certified and so3.certified else 1
 
 

@@ -28,6 +28,7 @@ from ._pull import pull  # noqa: E402
 from ._series import save_series  # noqa: E402
 from ._server import Server, find_stellated  # noqa: E402
 from ._version import __version__ as __version__  # noqa: E402
+from ._view import LiveView  # noqa: E402
 from .client import Client, MeshInfo, ServerInfo  # noqa: E402
 from .errors import (  # noqa: E402
     Cancelled,
@@ -46,6 +47,7 @@ from .errors import (  # noqa: E402
     Unauthenticated,
     Unavailable,
     UncertifiedWarning,
+    ViewerNotFound,
 )
 from .implicit import ImplicitManifold  # noqa: E402
 from .oracle import Oracle  # noqa: E402
@@ -70,6 +72,7 @@ __all__ = [
     "Interrupted",
     "InvalidArgument",
     "LimitExceeded",
+    "LiveView",
     "Mesh",
     "MeshInfo",
     "MeshNotFound",
@@ -89,6 +92,7 @@ __all__ = [
     "Unauthenticated",
     "Unavailable",
     "UncertifiedWarning",
+    "ViewerNotFound",
     "check",
     "check_save",
     "download",

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _convert, _html, _plot, _slice
+from . import _convert, _html, _plot, _slice, _view
 from ._files import formats
 from ._files.orientation import orient, turn_outwards
 from .errors import UncertifiedWarning
@@ -133,6 +133,25 @@ class Mesh:
         Raises: ImportError without matplotlib, InvalidArgument.
         """
         return _plot.plot(self, coordinates, slices, color, ax, view, edges, frame, colormap, alpha)
+
+    def show(
+        self,
+        path: str | os.PathLike[str] | None = None,
+        *,
+        label: str = "",
+        height: int = 640,
+    ) -> Any:
+        """The mesh in a browser, to be turned, sliced and measured; stellate.LiveView shows one grow.
+
+        Args:
+          path: a file to write, which needs no network; by default a temporary one is opened in the
+            browser, and in a notebook the mesh is shown there.
+          label: its title.
+          height: of a notebook's frame, in pixels.
+
+        Raises: ViewerNotFound, OSError.
+        """
+        return _view.show(self, path, label, height)
 
     def to_meshio(self) -> Any:
         """A meshio.Mesh, k from 1 to 3.

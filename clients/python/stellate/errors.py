@@ -116,6 +116,12 @@ class ServerNotFound(StellateError, FileNotFoundError):
     default_reason = "SERVER_NOT_FOUND"
 
 
+class ViewerNotFound(StellateError, FileNotFoundError):
+    """No command line was found to show meshes with, or it was built without its page."""
+
+    default_reason = "VIEWER_NOT_FOUND"
+
+
 class SaveError(StellateError, ValueError):
     """A mesh that the chosen file format cannot hold."""
 

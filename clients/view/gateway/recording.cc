@@ -1,0 +1,168 @@
+#include "recording.h"
+
+#include <grpcpp/client_context.h>
+#include <openssl/evp.h>
+
+#include <cstdint>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "mesh/write_file.h"
+#include "net/channel.h"
+#include "page.h"
+#include "stellate/v1/stellate.grpc.pb.h"
+#include "wire/convert.h"
+#include "wire/status.h"
+
+namespace stellate::view {
+namespace {
+
+constexpr double kMostBytes = 16e6;  // of earlier revisions
+
+std::string Base64(const std::string& bytes) {
+  std::string text(4 * ((bytes.size() + 2) / 3) + 1, '\0');  // and a zero
+  const int size = EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
+                                   reinterpret_cast<const unsigned char*>(bytes.data()),
+                                   static_cast<int>(bytes.size()));
+  text.resize(static_cast<size_t>(size));
+  return text;
+}
+
+class Recorder {
+ public:
+  Recorder(const std::shared_ptr<grpc::Channel>& channel, std::string mesh,
+           const RecordOptions& options)
+      : stub_(v1::Stellate::NewStub(channel)), mesh_(std::move(mesh)), options_(options) {}
+
+  Expected<std::string> Go() {
+    if (const auto ok = Watch(); !ok) return tl::unexpected(ok.error());
+    if (const auto ok = Look(); !ok) return tl::unexpected(ok.error());
+    for (const std::uint64_t revision : Revisions()) {
+      if (const auto ok = Download(revision); !ok) return tl::unexpected(ok.error());
+    }
+    // No names of servers or paths in a file that goes around.
+    return "{\"replies\":[" + replies_ + "]}";
+  }
+
+ private:
+  void Begin(const std::string& method, std::uint64_t revision = 0) {
+    if (!replies_.empty()) replies_ += ",";
+    replies_ += "{\"method\":\"" + method + "\",";
+    if (revision > 0) replies_ += "\"revision\":" + std::to_string(revision) + ",";
+    replies_ += "\"frames\":[";
+    first_ = true;
+  }
+  template <typename Message>
+  void Add(const Message& message) {
+    replies_ += first_ ? "\"" : ",\"";
+    replies_ += Base64(message.SerializeAsString());
+    replies_ += "\"";
+    first_ = false;
+  }
+  void End() { replies_ += "]}"; }
+
+  // The name opens the mesh on its server, which a file that goes around should not.
+  static void Anonymize(v1::Mesh* mesh) { mesh->set_name("meshes/recorded"); }
+
+  template <typename Request, typename Response, typename Call, typename Take>
+  Expected<void> Read(const Request& request, const Call& call, const Take& take) {
+    grpc::ClientContext context;
+    const std::stop_callback cancel(options_.stop, [&context] { context.TryCancel(); });
+    const auto stream = call(&context, request);
+    Response response;
+    while (stream->Read(&response)) take(&response);
+    const grpc::Status status = stream->Finish();
+    if (options_.stop.stop_requested())
+      return Fail(ErrorCode::kServerFailed, "nothing was written", "CANCELLED");
+    if (!status.ok()) return tl::unexpected(client::FromStatus(status));
+    return {};
+  }
+
+  // Waits for the end; what has been until now comes merged.
+  Expected<void> Watch() {
+    v1::WatchMeshRequest request;
+    request.set_name(mesh_);
+    request.set_progress_only(true);
+    const auto watch = [this](auto* context, const auto& r) {
+      return stub_->WatchMesh(context, r);
+    };
+    const auto ok = Read<v1::WatchMeshRequest, v1::WatchMeshResponse>(
+        request, watch, [this](v1::WatchMeshResponse* response) {
+          if (response->has_progress() && options_.on_progress)
+            options_.on_progress(client::FromProto(response->progress()));
+        });
+    if (!ok) return ok;
+    request.set_progress_only(false);
+    Begin("WatchMesh");
+    const auto whole = Read<v1::WatchMeshRequest, v1::WatchMeshResponse>(
+        request, watch, [this](v1::WatchMeshResponse* response) {
+          if (response->has_final()) Anonymize(response->mutable_final());
+          if (response->has_delta() || response->has_final()) Add(*response);
+        });
+    End();
+    return whole;
+  }
+
+  Expected<void> Look() {
+    grpc::ClientContext context;
+    const std::stop_callback cancel(options_.stop, [&context] { context.TryCancel(); });
+    v1::GetMeshRequest request;
+    request.set_name(mesh_);
+    const grpc::Status status = stub_->GetMesh(&context, request, &status_);
+    if (!status.ok()) return tl::unexpected(client::FromStatus(status));
+    Anonymize(&status_);
+    Begin("GetMesh");
+    Add(status_);
+    End();
+    return {};
+  }
+
+  Expected<void> Download(std::uint64_t revision) {
+    v1::DownloadMeshRequest request;
+    request.set_name(mesh_);
+    request.set_revision(revision);
+    Begin("DownloadMesh", revision);
+    const auto ok = Read<v1::DownloadMeshRequest, v1::DownloadMeshResponse>(
+        request, [this](auto* context, const auto& r) { return stub_->DownloadMesh(context, r); },
+        [this](v1::DownloadMeshResponse* part) { Add(*part); });
+    End();
+    return ok;
+  }
+
+  // As many as fit, each held to be as large as the last.
+  std::vector<std::uint64_t> Revisions() const {
+    const double point = 8.0 * status_.spec().ambient_dimension();
+    const double simplex = 4.0 * (status_.spec().dimension() + 1);
+    const double bytes = 4.0 / 3 * static_cast<double>(status_.revision()) *
+                         (point * static_cast<double>(status_.progress().vertices()) +
+                          simplex * static_cast<double>(status_.progress().simplices()));
+    const auto step = static_cast<std::uint64_t>(1 + bytes / kMostBytes);
+    std::vector<std::uint64_t> revisions;
+    for (std::uint64_t r = 1; r < status_.revision(); r += step) revisions.push_back(r);
+    return revisions;
+  }
+
+  const std::unique_ptr<v1::Stellate::Stub> stub_;
+  const std::string mesh_;
+  const RecordOptions& options_;
+  v1::Mesh status_;
+  std::string replies_;
+  bool first_ = true;
+};
+
+}  // namespace
+
+Expected<void> WriteRecording(const std::string& mesh, const std::string& path,
+                              const RecordOptions& options) {
+  if (auto ok = client::CheckWrite(path); !ok) return ok;
+  const auto channel = client::Connect(options.server, options.credentials);
+  if (!channel) return tl::unexpected(channel.error());
+  const Expected<std::string> recording = Recorder(*channel, mesh, options).Go();
+  if (!recording) return tl::unexpected(recording.error());
+  const Expected<std::string> page = PageWith(*recording);
+  if (!page) return tl::unexpected(page.error());
+  return client::WriteFile(path, *page);
+}
+
+}  // namespace stellate::view

@@ -1,0 +1,131 @@
+// Curves and histograms.
+import uPlot from "uplot";
+import "uplot/dist/uPlot.min.css";
+import type { Histogram } from "./measure";
+import type { PastRow } from "./messages";
+
+const kRules = [
+  { key: "size", name: "R1 size", colour: "#2563eb" },
+  { key: "radiusEdge", name: "R2 radius / edge", colour: "#0d9488" },
+  { key: "sliver", name: "R3 slivers", colour: "#d97706" },
+  { key: "inconsistent", name: "R4 inconsistent", colour: "#dc2626" },
+] as const;
+
+const css = (name: string) => getComputedStyle(document.documentElement).getPropertyValue(name);
+const short = (n: number) =>
+  Math.abs(n) >= 1e6 ? `${n / 1e6}M` : Math.abs(n) >= 1e4 ? `${n / 1e3}k` : `${n}`;
+
+function axis(options: Partial<uPlot.Axis>): uPlot.Axis {
+  return {
+    stroke: css("--dim"),
+    grid: { stroke: css("--line"), width: 1 },
+    ticks: { stroke: css("--line"), width: 1, size: 4 },
+    font: "11px system-ui, sans-serif",
+    gap: 3,
+    ...options,
+  };
+}
+
+// Stars that break each rule, one upon the other, over the revisions.
+export class Curves {
+  private plot: uPlot | null = null;
+  private rows: PastRow[] = [];
+
+  constructor(
+    private readonly host: HTMLElement,
+    legend: HTMLElement,
+    private readonly onPick: (revision: number) => void,
+  ) {
+    for (const rule of kRules) {
+      const item = document.createElement("span");
+      item.style.setProperty("--swatch", rule.colour);
+      item.textContent = rule.name;
+      legend.append(item);
+    }
+    new ResizeObserver(() => {
+      if (host.clientWidth !== this.plot?.width) this.draw();
+    }).observe(host);
+  }
+
+  show(rows: PastRow[]) {
+    this.rows = rows;
+    this.draw();
+  }
+
+  private draw() {
+    this.plot?.destroy();
+    this.plot = null;
+    this.host.parentElement!.hidden = this.rows.length === 0;
+    const width = this.host.clientWidth;
+    if (width === 0 || this.rows.length === 0) return;
+    const data: number[][] = [this.rows.map((row) => row.revision)];
+    let sum = this.rows.map(() => 0);
+    for (const rule of kRules) {
+      sum = this.rows.map((row, i) => sum[i] + row[rule.key]);
+      data.push(sum);
+    }
+    const options: uPlot.Options = {
+      width,
+      height: 150,
+      legend: { show: false },
+      cursor: { y: false, drag: { x: false, y: false } },
+      scales: { x: { time: false }, y: { range: (_, __, high) => [0, Math.max(high, 1)] } },
+      axes: [
+        axis({ size: 26, values: (_, ticks) => ticks.map((t) => `${t}`) }),
+        axis({ size: 40, values: (_, ticks) => ticks.map(short) }),
+      ],
+      series: [
+        {},
+        ...kRules.map((rule) => ({
+          stroke: rule.colour,
+          width: 1.5,
+          points: { show: this.rows.length < 3 },
+        })),
+      ],
+      bands: kRules
+        .map((rule, i) => ({
+          series: (i === 0 ? [1, -1] : [i + 1, i]) as [number, number],
+          fill: `${rule.colour}40`,
+        }))
+        .filter((band) => band.series[1] > 0),
+    };
+    (options.series[1] as uPlot.Series).fill = `${kRules[0].colour}40`;
+    this.plot = new uPlot(options, data as uPlot.AlignedData, this.host);
+    this.plot.over.addEventListener("click", () => {
+      const at = this.plot?.cursor.idx;
+      if (at !== null && at !== undefined) this.onPick(this.rows[at].revision);
+    });
+  }
+}
+
+export function drawHistograms(host: HTMLElement, histograms: Histogram[]) {
+  host.replaceChildren();
+  for (const { name, unit, low, high, bins } of histograms) {
+    const figure = document.createElement("figure");
+    const caption = document.createElement("figcaption");
+    caption.textContent = name;
+    const place = document.createElement("div");
+    figure.append(caption, place);
+    host.append(figure);
+    const width = place.clientWidth;
+    if (width === 0) continue;
+    const step = (high - low) / bins.length;
+    const bars = uPlot.paths.bars!({ size: [1, Infinity], align: 1, gap: 1 });
+    new uPlot(
+      {
+        width,
+        height: 92,
+        legend: { show: false },
+        cursor: { show: false },
+        scales: { x: { time: false, range: [low, high] }, y: { range: (_, __, top) => [0, top] } },
+        axes: [
+          axis({ size: 22, values: (_, ticks) => ticks.map((t) => `${t}${unit}`) }),
+          axis({ size: 40, values: (_, ticks) => ticks.map(short) }),
+        ],
+        series: [{}, { paths: bars, fill: css("--accent"), width: 0, points: { show: false } }],
+      },
+      [bins.map((_, i) => low + i * step), bins] as uPlot.AlignedData,
+      place,
+    );
+  }
+}

@@ -1,0 +1,72 @@
+// What is to be seen of a mesh: by which axes, which part, coloured by what.
+
+export type Part = "whole" | "slice" | "below";
+export type Colour = "plain" | "order" | "coordinate" | "size" | "shape";
+
+export interface Look {
+  frame: number[]; // 3 x d, orthonormal rows: what is right, up and near
+  part: Part;
+  axis: number; // of the slice: a coordinate
+  level: number; // 0..1 between the mesh's ends along it
+  colour: Colour;
+  colourAxis: number;
+}
+
+export interface Shape {
+  kind: "triangles" | "segments";
+  positions: Float32Array; // 3 a vertex
+  values: Float32Array; // of each vertex, 0..1; NaN: plain
+  index: Uint32Array | null;
+}
+
+// The coordinates' own axes, chosen by hand.
+export function axesFrame(d: number, axes: number[]): number[] {
+  const frame = new Array<number>(3 * d).fill(0);
+  axes.forEach((axis, row) => {
+    if (axis >= 0 && axis < d) frame[row * d + axis] = 1;
+  });
+  return frame;
+}
+
+function random(seed: number): () => number {
+  let s = seed >>> 0;
+  return () => {
+    s = (s + 0x6d2b79f5) >>> 0;
+    let t = Math.imul(s ^ (s >>> 15), 1 | s);
+    t = (t + Math.imul(t ^ (t >>> 7), 61 | t)) ^ t;
+    return ((t ^ (t >>> 14)) >>> 0) / 4294967296;
+  };
+}
+
+// A grand tour: all coordinates turn, in pairs, at speeds that never come round together, so that
+// every direction is seen from every side. It begins at the given frame.
+export class Tour {
+  private readonly turns: { a: number; b: number; speed: number }[] = [];
+
+  constructor(
+    private readonly d: number,
+    private readonly start: number[],
+  ) {
+    const next = random(1);
+    for (let a = 0; a < d; a++) {
+      for (let b = a + 1; b < d; b++) {
+        if (d <= 6 || next() < 6 / d) this.turns.push({ a, b, speed: 0.1 + 0.2 * next() });
+      }
+    }
+  }
+
+  at(seconds: number): number[] {
+    const frame = this.start.slice();
+    for (const { a, b, speed } of this.turns) {
+      const c = Math.cos(speed * seconds);
+      const s = Math.sin(speed * seconds);
+      for (let row = 0; row < 3; row++) {
+        const x = frame[row * this.d + a];
+        const y = frame[row * this.d + b];
+        frame[row * this.d + a] = c * x - s * y;
+        frame[row * this.d + b] = s * x + c * y;
+      }
+    }
+    return frame;
+  }
+}

@@ -1,0 +1,376 @@
+// The page: what is chosen, and what of it is shown where.
+import "./style.css";
+import { Curves, drawHistograms } from "./charts";
+import { axesFrame, Tour, type Colour, type Look, type Part } from "./look";
+import type { FaultKind, FromWorker, MeshRow, PastRow, ToWorker } from "./messages";
+import {
+  badgeOf,
+  drawCrew,
+  drawList,
+  drawVerdict,
+  element,
+  grouped,
+  seconds,
+  shortName,
+  superscript,
+} from "./panels";
+import { View } from "./scene";
+import type { Recording } from "./source";
+import MeshWorker from "./worker?worker&inline";
+
+const kTourSeconds = 0.05;
+const kReplaySeconds = 0.35;
+const kObliqueSeconds = 4; // into a tour
+
+const at = <T extends HTMLElement>(id: string) => document.getElementById(id) as T;
+const css = (name: string) =>
+  getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+const worker = new MeshWorker();
+const ask = (message: ToWorker) => worker.postMessage(message);
+
+const view = new View(at<HTMLCanvasElement>("canvas"));
+let chosen = "";
+let recorded = false;
+let list: MeshRow[] = [];
+let mesh: MeshRow | null = null;
+let past: PastRow[] = [];
+let shownRevision = 0;
+let following = true; // the newest revision
+let fault: { kind: FaultKind; next: number; count: number } | null = null;
+let look: Look = {
+  frame: axesFrame(3, [0, 1, 2]),
+  part: "whole",
+  axis: 0,
+  level: 0.5,
+  colour: "plain",
+  colourAxis: 0,
+};
+let tour: { tour: Tour; start: number } | null = null;
+let measured = { revision: -1, name: "" };
+
+const curves = new Curves(at("curves"), at("legend"), (revision) => show(revision));
+
+function choose(name: string) {
+  if (name === chosen) return;
+  chosen = name;
+  mesh = null;
+  past = [];
+  fault = null;
+  following = true;
+  shownRevision = 0;
+  measured = { revision: -1, name: "" };
+  at("histograms").replaceChildren();
+  at("note").hidden = false;
+  at("note").textContent = "Waiting for the first vertices";
+  view.refit();
+  drawList(at("list"), list, chosen, choose);
+  ask({ type: "watch", name });
+}
+
+// --- what is looked at, and how
+
+function fill(id: string, options: [value: string, text: string][], value: string) {
+  const select = at<HTMLSelectElement>(id);
+  select.replaceChildren(...options.map(([v, text]) => new Option(text, v, false, v === value)));
+  select.value = value;
+}
+
+const coordinates = (d: number): [string, string][] =>
+  Array.from({ length: d }, (_, i) => [`${i}`, `x${subscript(i + 1)}`]);
+const subscript = (n: number) => `${n}`.replace(/\d/g, (digit) => "₀₁₂₃₄₅₆₇₈₉"[Number(digit)]);
+
+// How a mesh of this kind is best seen at first.
+function meet({ k, d }: MeshRow) {
+  const parts: [Part, string][] =
+    k === 1
+      ? [["whole", "all of it"]]
+      : k === 2
+        ? [
+            ["whole", "all of it"],
+            ["below", "a part"],
+            ["slice", "a slice"],
+          ]
+        : k === 3
+          ? [
+              ["slice", "a slice"],
+              ["below", "a shell"],
+              ["whole", "all edges"],
+            ]
+          : [
+              ["slice", "a slice"],
+              ["whole", "all edges"],
+            ];
+  const axes = d >= 3 ? [0, 1, 2] : [0, 1, -1];
+  // A surface lies over itself when coordinates are left out, but less so from an oblique side.
+  const oblique = k <= 2 && d > 3;
+  look = {
+    frame: oblique ? new Tour(d, axesFrame(d, axes)).at(kObliqueSeconds) : axesFrame(d, axes),
+    part: parts[0][0],
+    axis: Math.min(3, d - 1), // along an axis of the picture a slice would be seen edge on
+    level: 0.5,
+    // Not by the coordinate that is the same all over a slice.
+    colour: (k === 3 ? d > 4 : d > 3) ? "coordinate" : "plain",
+    colourAxis: Math.min(k === 3 ? 4 : 3, d - 1),
+  };
+  tour = null;
+  at<HTMLInputElement>("tour").checked = false;
+  at<HTMLInputElement>("level").value = "0.5";
+  fill("part", parts, look.part);
+  fill("axis", coordinates(d), `${look.axis}`);
+  const colours: [string, string][] = [
+    ["plain", "plain"],
+    ["order", "order of coming"],
+    ["size", "circumradius"],
+    ["shape", "thinness"],
+    ...coordinates(d),
+  ];
+  fill("colour", colours, look.colour === "coordinate" ? `${look.colourAxis}` : look.colour);
+  axes.forEach((axis, i) =>
+    fill(`axis-${i}`, [["", "oblique"], ...coordinates(d)], oblique ? "" : `${axis}`),
+  );
+  at("axes-box").hidden = d <= 3;
+  setParts();
+  ask({ type: "look", look });
+}
+
+function setParts() {
+  const whole = look.part === "whole";
+  at("axis-box").hidden = at("level-box").hidden = whole;
+}
+
+function changeLook(change: Partial<Look>) {
+  look = { ...look, ...change };
+  setParts();
+  ask({ type: "look", look });
+}
+
+at<HTMLSelectElement>("part").onchange = (e) =>
+  changeLook({ part: (e.target as HTMLSelectElement).value as Part });
+at<HTMLSelectElement>("axis").onchange = (e) =>
+  changeLook({ axis: Number((e.target as HTMLSelectElement).value) });
+at<HTMLInputElement>("level").oninput = (e) =>
+  changeLook({ level: Number((e.target as HTMLInputElement).value) });
+at<HTMLSelectElement>("colour").onchange = (e) => {
+  const { value } = e.target as HTMLSelectElement;
+  const axis = Number(value);
+  changeLook(
+    Number.isNaN(axis) ? { colour: value as Colour } : { colour: "coordinate", colourAxis: axis },
+  );
+};
+for (const id of ["axis-0", "axis-1", "axis-2"]) {
+  at<HTMLSelectElement>(id).onchange = () => {
+    const selects = [0, 1, 2].map((i) => at<HTMLSelectElement>(`axis-${i}`));
+    if (selects.some((select) => select.value === "")) {
+      selects.forEach((select, i) => (select.value = `${i}`)); // one by hand, all by hand
+    }
+    const axes = selects.map((select) => Number(select.value));
+    tour = null;
+    at<HTMLInputElement>("tour").checked = false;
+    changeLook({ frame: axesFrame(mesh?.d ?? 3, axes) });
+    view.refit();
+  };
+}
+at<HTMLInputElement>("tour").onchange = (e) => {
+  const on = (e.target as HTMLInputElement).checked;
+  tour = on && mesh ? { tour: new Tour(mesh.d, look.frame), start: performance.now() } : null;
+  if (!on) return;
+  for (const id of ["axis-0", "axis-1", "axis-2"]) at<HTMLSelectElement>(id).value = "";
+};
+at<HTMLInputElement>("wires").onchange = (e) =>
+  view.setWires((e.target as HTMLInputElement).checked);
+at("fit").onclick = () => view.refit();
+setInterval(() => {
+  if (tour && !document.hidden) {
+    changeLook({ frame: tour.tour.at((performance.now() - tour.start) / 1000) });
+  }
+}, 1000 * kTourSeconds);
+
+// --- time
+
+function show(revision: number | null) {
+  following = revision === null;
+  ask({ type: "revision", revision });
+  drawTime();
+}
+
+function newest(): number {
+  return Math.max(mesh?.revision ?? 0, past.at(-1)?.revision ?? 0, 1);
+}
+
+function drawTime() {
+  const slider = at<HTMLInputElement>("revision");
+  slider.max = `${newest()}`;
+  if (following) slider.value = slider.max;
+  at<HTMLButtonElement>("live").disabled = following;
+  at("live").textContent = mesh?.over ? "newest" : "live";
+}
+
+at<HTMLInputElement>("revision").oninput = (e) => {
+  const value = Number((e.target as HTMLInputElement).value);
+  stopReplay();
+  show(value >= newest() ? null : value);
+};
+at("live").onclick = () => {
+  stopReplay();
+  show(null);
+};
+
+let replay: ReturnType<typeof setInterval> | undefined;
+function stopReplay() {
+  clearInterval(replay);
+  replay = undefined;
+  at("play").textContent = "replay";
+}
+at("play").onclick = () => {
+  if (replay !== undefined) return stopReplay();
+  at("play").textContent = "pause";
+  let next = following || shownRevision >= newest() ? 1 : shownRevision;
+  const step = Math.max(1, Math.round(newest() / 60));
+  replay = setInterval(() => {
+    if (next >= newest()) {
+      stopReplay();
+      return show(null);
+    }
+    at<HTMLInputElement>("revision").value = `${next}`;
+    show(next);
+    next += step;
+  }, 1000 * kReplaySeconds);
+};
+
+// --- faults
+
+function fly(kind: FaultKind, count: number) {
+  const next = fault?.kind === kind ? (fault.next + 1) % count : 0;
+  fault = { kind, next, count };
+  show(null);
+  ask({ type: "faults", kind, chosen: next });
+}
+
+// --- what the worker says
+
+function drawFacts() {
+  if (!mesh) return at("facts").replaceChildren();
+  const facts = at("facts");
+  const fact = (name: string, value: string) => {
+    const item = element("span", "", `${name} `);
+    item.append(element("b", "", value));
+    return item;
+  };
+  const items: HTMLElement[] = [
+    element("b", "", mesh.label || shortName(mesh.name)),
+    badgeOf(mesh),
+    fact("dimension", `${mesh.k} in R${superscript(mesh.d)}`),
+    fact("epsilon", `${Number(mesh.epsilon.toPrecision(4))}`),
+    fact("vertices", grouped(mesh.vertices)),
+    fact("simplices", grouped(mesh.simplices)),
+    fact("queries", grouped(mesh.queries)),
+    fact("round", grouped(mesh.round)),
+  ];
+  if (mesh.elapsed > 0) items.push(fact("time", seconds(mesh.elapsed)));
+  if (!mesh.over && mesh.remaining > 0) items.push(fact("left, about", seconds(mesh.remaining)));
+  if (!mesh.over) items.push(fact("phase", mesh.phase));
+  facts.replaceChildren(...items);
+  document.title = `${mesh.label || shortName(mesh.name)} – Stellate`;
+}
+
+// Histograms take a while: of what stands still, and of what grows now and then.
+setInterval(() => {
+  const due = measured.revision !== shownRevision || measured.name !== chosen;
+  if (!due || shownRevision === 0 || document.hidden) return;
+  measured = { revision: shownRevision, name: chosen };
+  ask({ type: "measure" });
+}, 1000);
+
+const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) => void } = {
+  greeting: ({ server, mesh: name, secret: kept }) => {
+    at("server").textContent = server;
+    // So that the page can be loaded again.
+    if (kept) history.replaceState(null, "", `#${[kept, mode].filter(Boolean).join("&")}`);
+    if (name) choose(name);
+  },
+  connection: ({ ok, message }) => {
+    at("connection").className = ok ? "" : "lost";
+    at("connection").textContent = ok ? "" : `Not connected: ${message}. Trying again.`;
+  },
+  list: ({ meshes }) => {
+    list = meshes;
+    drawList(at("list"), list, chosen, choose);
+    const newestMesh = meshes.at(-1);
+    if (!chosen && newestMesh) choose(newestMesh.name);
+    if (!chosen) {
+      at("note").hidden = false;
+      at("note").textContent = "No mesh yet";
+    }
+    // A demonstration goes from mesh to mesh.
+    if (demo && newestMesh && mesh?.over && newestMesh.name !== chosen) choose(newestMesh.name);
+  },
+  mesh: (message) => {
+    const first = mesh === null;
+    mesh = message.mesh;
+    if (first) meet(mesh);
+    drawFacts();
+    drawTime();
+  },
+  past: ({ rows }) => {
+    past = rows;
+    curves.show(rows);
+    drawTime();
+  },
+  crew: ({ rows }) => drawCrew(at("crew"), rows),
+  verdict: ({ verdict }) => drawVerdict(at("verdict"), verdict, fly),
+  histograms: ({ histograms }) => drawHistograms(at("histograms"), histograms),
+  fly: ({ centre, radius, level }) => {
+    if (look.part !== "whole") {
+      at<HTMLInputElement>("level").value = `${level}`;
+      changeLook({ level });
+    }
+    view.flyTo(centre, radius);
+  },
+  loading: ({ text }) => {
+    at("revision-text").textContent = text;
+  },
+  scene: (scene) => {
+    if (!recorded && scene.name !== chosen) return ask({ type: "drawn" });
+    shownRevision = scene.revision;
+    at("note").hidden = scene.vertices > 0;
+    at("revision-text").textContent =
+      `revision ${scene.revision} of ${newest()} · ${grouped(scene.vertices)} vertices`;
+    at("stage").dataset.revision = `${scene.revision}`;
+    at("stage").dataset.vertices = `${scene.vertices}`;
+    at("stage").dataset.simplices = `${scene.simplices}`;
+    view.show(scene, css("--mesh"));
+  },
+};
+view.onDrawn = () => ask({ type: "drawn" });
+worker.onmessage = ({ data }: MessageEvent<FromWorker>) => {
+  (hear[data.type] as (message: FromWorker) => void)(data);
+};
+worker.onerror = (event) => {
+  at("connection").className = "lost";
+  at("connection").textContent = `The page has failed: ${event.message}`;
+};
+
+// --- the beginning
+
+const setColours = () => view.setBackground(css("--stage"));
+setColours();
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", setColours);
+
+const [secret, mode] = location.hash.slice(1).split("&");
+const demo = mode === "demo";
+const recording = at("recording").textContent?.trim();
+if (recording) {
+  recorded = true;
+  document.body.classList.add("recorded");
+  ask({ type: "replay", recording: JSON.parse(recording) as Recording });
+} else if (!secret) {
+  at("note").hidden = false;
+  at("note").textContent =
+    "Open the address that `stellate view` printed, with all that follows #.";
+} else if (!globalThis.crypto?.subtle) {
+  at("note").hidden = false;
+  at("note").textContent = "Open this page as http://127.0.0.1 or http://localhost.";
+} else {
+  ask({ type: "open", host: location.host, secret });
+}

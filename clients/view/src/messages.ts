@@ -1,0 +1,104 @@
+// What the page and its worker say to each other.
+import type { Look, Shape } from "./look";
+import type { Histogram } from "./measure";
+import type { Recording } from "./source";
+
+export interface MeshRow {
+  name: string;
+  label: string;
+  state: string;
+  over: boolean;
+  k: number;
+  d: number;
+  epsilon: number;
+  vertices: number;
+  simplices: number;
+  fraction: number;
+  elapsed: number;
+  remaining: number;
+  phase: string;
+  round: number;
+  queries: number;
+  revision: number;
+  certified: boolean | null; // null: not over
+}
+
+export interface PastRow {
+  revision: number;
+  vertices: number;
+  simplices: number;
+  size: number;
+  radiusEdge: number;
+  sliver: number;
+  inconsistent: number;
+  front: number;
+}
+
+export interface CrewRow {
+  number: number;
+  title: string;
+  queries: number;
+  chunks: number;
+  perSecond: number; // 0: unknown
+  fixedSeconds: number;
+  newestChunk: number;
+  holds: number;
+  lagging: boolean;
+}
+
+export type FaultKind = "faces" | "links" | "stars" | "inconsistent" | "fibres";
+
+// A line of the certificate; with faults, it leads to them.
+export interface Claim {
+  title: string;
+  text: string;
+  holds: boolean | null; // null: a number, not a verdict
+  faults?: FaultKind;
+  count?: number; // of the ids that came
+}
+
+export interface Verdict {
+  level: "refused" | "sampled" | "proved" | "failed" | "unfinished";
+  headline: string;
+  text: string;
+  claims: Claim[];
+  warnings: string[];
+}
+
+export type ToWorker =
+  | { type: "open"; host: string; secret: string }
+  | { type: "replay"; recording: Recording }
+  | { type: "watch"; name: string }
+  | { type: "revision"; revision: number | null } // null: the newest, as it comes
+  | { type: "look"; look: Look }
+  | { type: "faults"; kind: FaultKind | null; chosen: number }
+  | { type: "measure" }
+  | { type: "drawn" };
+
+export interface Scene {
+  type: "scene";
+  name: string;
+  revision: number;
+  vertices: number;
+  simplices: number;
+  shape: Shape;
+  faults: Float32Array; // positions of vertices at fault
+  faultEdges: Float32Array; // pairs of positions
+  chosen: Float32Array; // of the fault that was chosen
+  // The smallest ball about the middle that holds the mesh, from whatever side it is seen.
+  centre: [number, number, number];
+  radius: number;
+}
+
+export type FromWorker =
+  | { type: "greeting"; server: string; mesh: string; secret: string }
+  | { type: "connection"; ok: boolean; message: string }
+  | { type: "list"; meshes: MeshRow[] }
+  | { type: "mesh"; mesh: MeshRow }
+  | { type: "past"; rows: PastRow[] }
+  | { type: "crew"; rows: CrewRow[] }
+  | { type: "verdict"; verdict: Verdict | null }
+  | { type: "histograms"; histograms: Histogram[]; revision: number }
+  | { type: "fly"; centre: [number, number, number]; radius: number; level: number; text: string }
+  | { type: "loading"; text: string }
+  | Scene;

@@ -1,0 +1,107 @@
+// A mesh as it grows: vertices that only come, simplices that come and go.
+
+function grown<T extends Float64Array | Uint32Array | Int32Array>(array: T, size: number): T {
+  if (array.length >= size) return array;
+  const Type = array.constructor as new (size: number) => T;
+  const larger = new Type(Math.max(size, 2 * array.length, 1024));
+  larger.set(array);
+  return larger;
+}
+
+export class MeshStore {
+  points = new Float64Array();
+  vertices = 0;
+  cells = new Uint32Array();
+  simplices = 0;
+  revision = 0;
+
+  // Open addressing: which simplex is where in `cells`. -1: free.
+  private table = new Int32Array(1024).fill(-1);
+
+  constructor(
+    readonly k: number,
+    readonly d: number,
+  ) {}
+
+  clear() {
+    this.vertices = this.simplices = this.revision = 0;
+    this.table = new Int32Array(1024).fill(-1);
+  }
+
+  addPoints(first: number, points: Float64Array) {
+    const end = first + points.length / this.d;
+    this.points = grown(this.points, end * this.d);
+    this.points.set(points, first * this.d);
+    this.vertices = Math.max(this.vertices, end);
+  }
+
+  addCells(cells: Uint32Array) {
+    const width = this.k + 1;
+    const count = cells.length / width;
+    this.cells = grown(this.cells, (this.simplices + count) * width);
+    this.reserve(this.simplices + count);
+    for (let i = 0; i < count; i++) {
+      const slot = this.find(cells, i * width);
+      if (this.table[slot] >= 0) continue;
+      this.cells.set(cells.subarray(i * width, (i + 1) * width), this.simplices * width);
+      this.table[slot] = this.simplices++;
+    }
+  }
+
+  removeCells(cells: Uint32Array) {
+    const width = this.k + 1;
+    for (let i = 0; i < cells.length; i += width) {
+      const slot = this.find(cells, i);
+      const hole = this.table[slot];
+      if (hole < 0) continue;
+      this.free(slot);
+      const last = --this.simplices;
+      if (hole === last) continue;
+      this.table[this.find(this.cells, last * width)] = hole;
+      this.cells.copyWithin(hole * width, last * width, (last + 1) * width);
+    }
+  }
+
+  private hash(cells: Uint32Array, at: number): number {
+    let h = 0x811c9dc5;
+    for (let i = 0; i <= this.k; i++) h = Math.imul(h ^ cells[at + i], 0x9e3779b1) ^ (h >>> 15);
+    return (h ^ (h >>> 13)) >>> 0;
+  }
+
+  // Where the simplex is, or where it would be.
+  private find(cells: Uint32Array, at: number): number {
+    const mask = this.table.length - 1;
+    const width = this.k + 1;
+    for (let slot = this.hash(cells, at) & mask; ; slot = (slot + 1) & mask) {
+      const cell = this.table[slot];
+      if (cell < 0) return slot;
+      let i = 0;
+      while (i < width && this.cells[cell * width + i] === cells[at + i]) i++;
+      if (i === width) return slot;
+    }
+  }
+
+  // Closes the gap, so that whoever was pushed on by the one that goes is still found.
+  private free(gap: number) {
+    const mask = this.table.length - 1;
+    const width = this.k + 1;
+    for (let slot = (gap + 1) & mask; this.table[slot] >= 0; slot = (slot + 1) & mask) {
+      const home = this.hash(this.cells, this.table[slot] * width) & mask;
+      if (((slot - home) & mask) < ((slot - gap) & mask)) continue;
+      this.table[gap] = this.table[slot];
+      gap = slot;
+    }
+    this.table[gap] = -1;
+  }
+
+  private reserve(cells: number) {
+    if (2 * cells < this.table.length) return;
+    let size = this.table.length;
+    while (size <= 2 * cells) size *= 2;
+    this.table = new Int32Array(size).fill(-1);
+    const width = this.k + 1;
+    for (let cell = 0; cell < this.simplices; cell++) {
+      this.table[this.find(this.cells, cell * width)] = cell;
+    }
+  }
+}

@@ -1,0 +1,172 @@
+// A mesh's status and certificate, as people read them.
+import {
+  CertificateLevel,
+  MeshState,
+  Phase,
+  type Certificate,
+  type Mesh,
+} from "./generated/stellate/v1/mesh_pb";
+import type { Claim, FaultKind, MeshRow, Verdict } from "./messages";
+
+const kOver = new Set([
+  MeshState.SUCCEEDED,
+  MeshState.STOPPED,
+  MeshState.CANCELLED,
+  MeshState.FAILED,
+]);
+
+export function isOver(mesh: Mesh): boolean {
+  return kOver.has(mesh.state);
+}
+
+export function rowOf(mesh: Mesh): MeshRow {
+  const progress = mesh.progress;
+  return {
+    name: mesh.name,
+    label: mesh.spec?.label ?? "",
+    state: MeshState[mesh.state].toLowerCase(),
+    over: isOver(mesh),
+    k: mesh.spec?.dimension ?? 0,
+    d: mesh.spec?.ambientDimension ?? 0,
+    epsilon: mesh.spec?.epsilon ?? 0,
+    vertices: Number(progress?.vertices ?? 0),
+    simplices: Number(progress?.simplices ?? 0),
+    fraction: progress?.fraction ?? 0,
+    elapsed: progress?.elapsedSeconds ?? 0,
+    remaining: progress?.remainingSeconds ?? 0,
+    phase: Phase[progress?.phase ?? 0].toLowerCase(),
+    round: Number(progress?.round ?? 0),
+    queries: Number(progress?.queries ?? 0),
+    revision: Number(mesh.revision),
+    certified: isOver(mesh) ? (mesh.report?.certificate?.certified ?? false) : null,
+  };
+}
+
+// The ids at fault, by kind, and how many make one fault.
+export function faultsOf(_mesh: Mesh): Map<FaultKind, { ids: Uint32Array; width: number }> {
+  return new Map();
+}
+
+const grouped = (n: bigint | number) => n.toLocaleString("en");
+const brief = (x: number) => (x === 0 ? "0" : Number(x.toPrecision(4)).toString());
+
+function claimsOf(mesh: Mesh, c: Certificate): Claim[] {
+  const faults = faultsOf(mesh);
+  const count = (kind: FaultKind) => {
+    const found = faults.get(kind);
+    return found ? found.ids.length / found.width : 0;
+  };
+  const claims: Claim[] = [];
+  const check = (title: string, holds: boolean, well: string, ill: string, kind?: FaultKind) => {
+    const found = kind ? count(kind) : 0;
+    claims.push({
+      title,
+      text: holds ? well : ill,
+      holds,
+      ...(found > 0 ? { faults: kind, count: found } : {}),
+    });
+  };
+  const number = (title: string, text: string) => claims.push({ title, text, holds: null });
+  const k = mesh.spec?.dimension ?? 0;
+  const face = ["", "vertex", "edge", "triangle"][k] ?? `${k - 1}-face`;
+  check(
+    "Closed",
+    c.closed,
+    `every ${face} is in exactly two simplices`,
+    `${grouped(c.badFaces)} faces are not in exactly two simplices`,
+    "faces",
+  );
+  check(
+    "Links",
+    c.linksAreSpheres,
+    `all are spheres, decided ${c.linksDecidedExactly ? "exactly" : "by homology"}`,
+    `${grouped(c.badLinks)} vertices have a link that is no sphere`,
+    "links",
+  );
+  check(
+    "Consistent",
+    c.inconsistentSimplices === 0n,
+    "every simplex is in the stars of all its vertices",
+    `${grouped(c.inconsistentSimplices)} simplices are in some of their stars only`,
+    "inconsistent",
+  );
+  check(
+    "Embedded",
+    c.unembeddedStars === 0n,
+    "each star embeds in the tangent space of its centre",
+    `${grouped(c.unembeddedStars)} stars overlap themselves`,
+    "stars",
+  );
+  check(
+    "Normal flats",
+    c.fibreFailures === 0n && c.fibreSamples > 0n,
+    `${grouped(c.fibreSamples)} sampled, each meets the mesh once`,
+    c.fibreSamples === 0n
+      ? "not asked"
+      : `${grouped(c.fibreFailures)} of ${grouped(c.fibreSamples)} do not meet the mesh once`,
+    "fibres",
+  );
+  number("Euler char.", grouped(c.eulerCharacteristic));
+  number("Components", grouped(c.components));
+  number("Orientable", c.orientable ? "yes" : "no");
+  number(
+    "Circumradius",
+    `at most ${brief(c.maxCircumradius)}, epsilon is ${brief(mesh.spec?.epsilon ?? 0)}`,
+  );
+  number("Radius / edge", `at most ${brief(c.maxRadiusEdge)}`);
+  number("Fatness", `at least ${brief(c.minFatness)}`);
+  if (k === 2) number("Angles", `at least ${brief(c.minAngleDegrees)}°`);
+  number(
+    "Reach",
+    `about ${brief(c.estimatedReach)}, epsilon is ${brief(c.epsilonOverReach)} of it`,
+  );
+  if (c.declaredReach > 0) number("Reach declared", brief(c.declaredReach));
+  if (c.provedDistance > 0) number("Distance", `at most ${brief(c.provedDistance)}`);
+  return claims;
+}
+
+export function verdictOf(mesh: Mesh): Verdict | null {
+  const report = mesh.report;
+  if (!isOver(mesh) || !report) return null;
+  const state = MeshState[mesh.state].toLowerCase();
+  const certificate = report.certificate;
+  if (report.failure || !certificate) {
+    const { reason, message } = report.failure ?? { reason: "", message: `the mesh ${state}` };
+    return {
+      level: "failed",
+      headline: reason ? `Failed: ${reason}` : `Ended: ${state}`,
+      text: message,
+      claims: [],
+      warnings: [],
+    };
+  }
+  const { level, verdict } = certificate;
+  const unfinished = mesh.state !== MeshState.SUCCEEDED;
+  const headline = {
+    [CertificateLevel.PROVED]: "Proved",
+    [CertificateLevel.SAMPLED]: "Certified",
+    [CertificateLevel.REFUSED]: unfinished ? `Not certified: ${state}` : "Not certified",
+    [CertificateLevel.UNSPECIFIED]: certificate.certified ? "Certified" : "Not certified",
+  }[level];
+  return {
+    level:
+      level === CertificateLevel.PROVED
+        ? "proved"
+        : certificate.certified
+          ? "sampled"
+          : unfinished
+            ? "unfinished"
+            : "refused",
+    headline,
+    text: verdict,
+    // Of a run that did not converge, only what is at fault was looked at.
+    claims: unfinished ? unfinishedClaims(mesh, certificate) : claimsOf(mesh, certificate),
+    warnings: certificate.warnings,
+  };
+}
+
+function unfinishedClaims(mesh: Mesh, c: Certificate): Claim[] {
+  return claimsOf(mesh, c).filter(
+    (claim) => claim.title === "Consistent" || claim.title === "Reach",
+  );
+}

@@ -1,0 +1,361 @@
+// A mesh on its way from the server to the screen.
+import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
+import { doubles, indices } from "./arrays";
+import { MeshSchema, type Mesh } from "./generated/stellate/v1/mesh_pb";
+import {
+  DownloadMeshRequestSchema,
+  DownloadMeshResponseSchema,
+  GetMeshRequestSchema,
+  WatchMeshRequestSchema,
+  WatchMeshResponseSchema,
+} from "./generated/stellate/v1/stellate_pb";
+import type { Look } from "./look";
+import { histograms } from "./measure";
+import type { FaultKind, Scene } from "./messages";
+import { report, send, sleep } from "./say";
+import { extent, project, shapeOf } from "./shape";
+import type { Source } from "./source";
+import { MeshStore } from "./store";
+import { faultsOf, isOver, rowOf, verdictOf } from "./verdict";
+
+const kLookSeconds = 1;
+const kDrawSeconds = 0.1; // ten frames a second while it grows
+const kFirstPause = 0.25;
+const kLongestPause = 5;
+const kRemembered = 6; // revisions that the slider came by
+
+// A mesh that is looked at, until another is.
+export class Viewing {
+  private readonly stop = new AbortController();
+  private store: MeshStore | null = null; // the newest
+  private shown: MeshStore | null = null; // an earlier revision; null: the newest
+  private readonly earlier = new Map<number, MeshStore>();
+  private wanted: number | null = null;
+  private fetching = false;
+  private mesh: Mesh | null = null;
+  private over = false;
+  private faults: { kind: FaultKind | null; chosen: number } = { kind: null, chosen: -1 };
+  private due = false;
+  private waiting = false; // the page has not drawn the last scene yet
+  private drawnAt = 0;
+  private timer: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(
+    private readonly source: Source,
+    private look: Look | null,
+    readonly name: string,
+  ) {
+    void this.inquire();
+    void this.watch();
+  }
+
+  leave() {
+    this.stop.abort();
+    clearTimeout(this.timer);
+  }
+
+  private get epsilon(): number {
+    return this.mesh?.spec?.epsilon ?? 1;
+  }
+  private get visible(): MeshStore | null {
+    return this.shown ?? this.store;
+  }
+
+  // State, crew and history, again and again until it is over.
+  private async inquire() {
+    let wasOver = false;
+    while (!this.stop.signal.aborted) {
+      const request = create(GetMeshRequestSchema, {
+        name: this.name,
+      });
+      const end = await this.source.call(
+        "GetMesh",
+        toBinary(GetMeshRequestSchema, request),
+        (frame) => this.hear(fromBinary(MeshSchema, frame)),
+        { stop: this.stop.signal },
+      );
+      // Once more after the end, for what came between.
+      if (end.code === 0 && wasOver) return;
+      wasOver = end.code === 0 && this.mesh !== null && isOver(this.mesh) && this.over;
+      if (!this.source.live) return;
+      await sleep(kLookSeconds);
+    }
+  }
+
+  private hear(mesh: Mesh) {
+    if (this.stop.signal.aborted) return;
+    if (this.store === null) {
+      this.store = new MeshStore(mesh.spec!.dimension, mesh.spec!.ambientDimension);
+    }
+    const ended = mesh.endTime !== undefined;
+    this.mesh = mesh;
+    send({ type: "mesh", mesh: rowOf(mesh) });
+    send({ type: "verdict", verdict: ended ? verdictOf(mesh) : null });
+  }
+
+  // The newest, as it comes; a connection that breaks off is opened again, from where it was.
+  private async watch() {
+    let pause = kFirstPause;
+    let parts: { first: number; points: Float64Array; added: Uint32Array; removed: Uint32Array }[] =
+      [];
+    const take = (frame: Uint8Array) => {
+      const { event } = fromBinary(WatchMeshResponseSchema, frame);
+      pause = kFirstPause;
+      if (event.case === "delta" && event.value.delta) {
+        const { delta, complete } = event.value;
+        parts.push({
+          first: Number(delta.firstVertex),
+          points: doubles(delta.points),
+          added: indices(delta.added),
+          removed: indices(delta.removed),
+        });
+        if (!complete || this.store === null) return;
+        for (const part of parts) {
+          this.store.removeCells(part.removed);
+          this.store.addPoints(part.first, part.points);
+          this.store.addCells(part.added);
+        }
+        parts = [];
+        this.store.revision = Number(delta.revision);
+        if (this.shown === null) this.draw();
+      } else if (event.case === "resetMesh") {
+        this.store?.clear();
+        this.draw();
+      } else if (event.case === "final") {
+        this.over = true;
+        this.hear(event.value);
+        this.draw();
+      }
+    };
+    while (!this.stop.signal.aborted) {
+      parts = [];
+      if (this.store === null) {
+        await sleep(0.01); // how many dimensions it has is not known yet
+        continue;
+      }
+      const request = create(WatchMeshRequestSchema, {
+        name: this.name,
+        fromRevision: BigInt(this.store.revision),
+      });
+      const end = await this.source.call(
+        "WatchMesh",
+        toBinary(WatchMeshRequestSchema, request),
+        take,
+        {
+          stop: this.stop.signal,
+        },
+      );
+      if (this.over || this.stop.signal.aborted) return;
+      report(end);
+      await sleep(pause);
+      pause = Math.min(2 * pause, kLongestPause);
+    }
+  }
+
+  show(revision: number | null) {
+    this.wanted = revision;
+    if (revision === null || revision === this.store?.revision) {
+      this.shown = null;
+      this.draw();
+    } else {
+      void this.fetch();
+    }
+  }
+
+  // The last revision that was asked for; those that were passed on the way are left out.
+  private async fetch() {
+    if (this.fetching) return;
+    this.fetching = true;
+    let revision = -1;
+    while (this.wanted !== null && this.wanted !== revision && this.store) {
+      revision = this.wanted;
+      const store = this.earlier.get(revision) ?? (await this.download(revision));
+      if (store === null) break;
+      this.earlier.delete(revision);
+      this.earlier.set(revision, store);
+      if (this.earlier.size > kRemembered) this.earlier.delete(this.earlier.keys().next().value!);
+      if (this.wanted === null) break;
+      this.shown = store;
+      this.draw();
+    }
+    this.fetching = false;
+  }
+
+  private async download(revision: number): Promise<MeshStore | null> {
+    const store = new MeshStore(this.store!.k, this.store!.d);
+    const request = create(DownloadMeshRequestSchema, {
+      name: this.name,
+      revision: BigInt(revision),
+    });
+    const end = await this.source.call(
+      "DownloadMesh",
+      toBinary(DownloadMeshRequestSchema, request),
+      (frame) => {
+        const part = fromBinary(DownloadMeshResponseSchema, frame);
+        store.revision = Number(part.revision);
+        store.addPoints(Number(part.firstVertex), doubles(part.points));
+        store.addCells(indices(part.cells));
+      },
+      { stop: this.stop.signal, revision },
+    );
+    if (end.code !== 0) send({ type: "loading", text: end.message });
+    return end.code === 0 ? store : null;
+  }
+
+  lookAt(look: Look) {
+    this.look = look;
+    this.draw();
+  }
+
+  choose(kind: FaultKind | null, chosen: number) {
+    this.faults = { kind, chosen };
+    this.draw();
+    const ids = this.chosenIds();
+    const store = this.visible;
+    if (ids.length === 0 || store === null || this.look === null) return;
+    const projected = project(store, this.look.frame);
+    const centre = mean(projected, ids);
+    send({
+      type: "fly",
+      centre,
+      radius: this.neighbourhood(store, projected, ids, centre),
+      level: this.levelOf(store, ids),
+      text: `${ids.length === 1 ? "vertex" : "vertices"} ${ids.join(" ")}`,
+    });
+  }
+
+  private chosenIds(): number[] {
+    const { kind, chosen } = this.faults;
+    const found = kind && this.mesh ? faultsOf(this.mesh).get(kind) : undefined;
+    if (!found || chosen < 0) return [];
+    const ids = [...found.ids.subarray(chosen * found.width, (chosen + 1) * found.width)];
+    return ids.filter((id) => id < (this.visible?.vertices ?? 0));
+  }
+
+  // Where the slice has to be to show them.
+  private levelOf(store: MeshStore, ids: number[]): number {
+    const [low, high] = extent(store, this.look!.axis);
+    const sum = ids.reduce((all, id) => all + store.points[id * store.d + this.look!.axis], 0);
+    return (sum / ids.length - low) / (high - low || 1);
+  }
+
+  // Far enough to see all simplices about them.
+  private neighbourhood(
+    store: MeshStore,
+    projected: Float32Array,
+    ids: number[],
+    centre: [number, number, number],
+  ): number {
+    const wanted = new Set(ids);
+    const width = store.k + 1;
+    let farthest = 0;
+    for (let cell = 0; cell < store.simplices; cell++) {
+      const row = store.cells.subarray(cell * width, (cell + 1) * width);
+      if (!row.some((id) => wanted.has(id))) continue;
+      for (const id of row) {
+        const away = Math.hypot(...centre.map((c, i) => projected[3 * id + i] - c));
+        if (away > farthest) farthest = away;
+      }
+    }
+    return farthest || this.epsilon;
+  }
+
+  drawn() {
+    this.waiting = false;
+    if (this.due) this.draw();
+  }
+
+  // Soon: not before the page has drawn what it has, and not too often.
+  private draw() {
+    this.due = true;
+    if (this.waiting || this.timer !== undefined) return;
+    const growing = !this.over && this.shown === null;
+    const rest = growing ? kDrawSeconds - (performance.now() - this.drawnAt) / 1000 : 0;
+    this.timer = setTimeout(
+      () => {
+        this.timer = undefined;
+        this.render();
+      },
+      1000 * Math.max(rest, 0),
+    );
+  }
+
+  private render() {
+    const store = this.visible;
+    if (store === null || this.look === null || this.stop.signal.aborted) return;
+    this.due = false;
+    this.waiting = true;
+    this.drawnAt = performance.now();
+    const shape = shapeOf(store, this.look, this.epsilon);
+    const scene: Scene = {
+      type: "scene",
+      name: this.name,
+      revision: store.revision,
+      vertices: store.vertices,
+      simplices: store.simplices,
+      shape,
+      ...this.faultPositions(store, this.look),
+      ...ballOf(store, this.look),
+    };
+    const buffers: Transferable[] = [shape.positions.buffer, shape.values.buffer];
+    if (shape.index) buffers.push(shape.index.buffer);
+    send(scene, buffers);
+  }
+
+  private faultPositions(store: MeshStore, { frame }: Look) {
+    const found = this.faults.kind && this.mesh && faultsOf(this.mesh).get(this.faults.kind);
+    const none = new Float32Array();
+    if (!found) return { faults: none, faultEdges: none, chosen: none };
+    const projected = project(store, frame);
+    const at = (id: number) => [...projected.subarray(3 * id, 3 * id + 3)];
+    const there = [...found.ids].filter((id) => id < store.vertices);
+    const ends: number[] = [];
+    for (let i = 0; i + found.width <= found.ids.length; i += found.width) {
+      for (let a = i; a < i + found.width; a++) {
+        for (let b = a + 1; b < i + found.width; b++) {
+          if (Math.max(found.ids[a], found.ids[b]) >= store.vertices) continue;
+          ends.push(...at(found.ids[a]), ...at(found.ids[b]));
+        }
+      }
+    }
+    return {
+      faults: Float32Array.from(there.flatMap(at)),
+      faultEdges: Float32Array.from(ends),
+      chosen: Float32Array.from(this.chosenIds().flatMap(at)),
+    };
+  }
+
+  measure() {
+    const store = this.visible;
+    if (store === null) return;
+    send({
+      type: "histograms",
+      histograms: histograms(store, this.epsilon),
+      revision: store.revision,
+    });
+  }
+}
+
+function mean(projected: Float32Array, ids: number[]): [number, number, number] {
+  const sum = [0, 1, 2].map((i) => ids.reduce((all, id) => all + projected[3 * id + i], 0));
+  return sum.map((s) => s / ids.length) as [number, number, number];
+}
+
+// The same size from all sides, so that a tour does not breathe.
+function ballOf(store: MeshStore, { frame }: Look): Pick<Scene, "centre" | "radius"> {
+  const { d, vertices, points } = store;
+  const middle = Array.from({ length: d }, (_, axis) => {
+    const [low, high] = extent(store, axis);
+    return (low + high) / 2;
+  });
+  let radius = 0;
+  for (let v = 0; v < vertices; v++) {
+    let squared = 0;
+    for (let i = 0; i < d; i++) squared += (points[v * d + i] - middle[i]) ** 2;
+    if (squared > radius) radius = squared;
+  }
+  const centre = [0, 1, 2].map((row) =>
+    middle.reduce((all, x, i) => all + frame[row * d + i] * x, 0),
+  );
+  return { centre: centre as [number, number, number], radius: Math.sqrt(radius) || 1 };
+}

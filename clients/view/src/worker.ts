@@ -1,0 +1,78 @@
+// Everything but the drawing: the connection, the messages, the mesh, its measures. The page gets
+// what it can draw at once, and no more than it asks for.
+import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
+import type { Mesh } from "./generated/stellate/v1/mesh_pb";
+import {
+  ListMeshesRequestSchema,
+  ListMeshesResponseSchema,
+} from "./generated/stellate/v1/stellate_pb";
+import type { Look } from "./look";
+import type { ToWorker } from "./messages";
+import { report, send, sleep } from "./say";
+import { GatewaySource, RecordedSource, type CallEnd, type Source } from "./source";
+import { rowOf } from "./verdict";
+import { Viewing } from "./viewing";
+
+const kListSeconds = 2;
+
+let source: Source;
+let look: Look | null = null;
+
+async function list() {
+  const encode = (request: object) =>
+    toBinary(ListMeshesRequestSchema, create(ListMeshesRequestSchema, request));
+  for (;;) {
+    const meshes: Mesh[] = [];
+    let pageToken = "";
+    let end: CallEnd;
+    do {
+      end = await source.call("ListMeshes", encode({ pageSize: 1000, pageToken }), (frame) => {
+        const page = fromBinary(ListMeshesResponseSchema, frame);
+        meshes.push(...page.meshes);
+        pageToken = page.nextPageToken;
+      });
+    } while (end.code === 0 && pageToken !== "");
+    report(end);
+    if (end.code === 0) send({ type: "list", meshes: meshes.map(rowOf) });
+    await sleep(kListSeconds);
+  }
+}
+
+let viewing: Viewing | null = null;
+
+function view(name: string) {
+  viewing?.leave();
+  send({ type: "crew", rows: [] });
+  send({ type: "past", rows: [] });
+  send({ type: "verdict", verdict: null });
+  viewing = new Viewing(source, look, name);
+}
+
+const answers: { [T in ToWorker["type"]]: (m: Extract<ToWorker, { type: T }>) => unknown } = {
+  open: async ({ host, secret }) => {
+    const gateway = await GatewaySource.open(host, secret);
+    gateway.onGreeting = ({ server, mesh, secret: kept }) => {
+      gateway.onGreeting = () => {};
+      send({ type: "greeting", server, mesh, secret: kept });
+    };
+    source = gateway;
+    void list();
+  },
+  replay: ({ recording }) => {
+    source = new RecordedSource(recording);
+    send({ type: "greeting", server: "", mesh: "recorded", secret: "" });
+  },
+  watch: ({ name }) => view(name),
+  revision: ({ revision }) => viewing?.show(revision),
+  look: (message) => {
+    look = message.look;
+    viewing?.lookAt(message.look);
+  },
+  faults: ({ kind, chosen }) => viewing?.choose(kind, chosen),
+  measure: () => viewing?.measure(),
+  drawn: () => viewing?.drawn(),
+};
+
+self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
+  void (answers[data.type] as (message: ToWorker) => unknown)(data);
+};

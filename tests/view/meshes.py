@@ -1,0 +1,72 @@
+"""Meshes on a server, for the viewer to look at.
+
+    tests/view/meshes.py ADDRESS
+
+Reads a line of JSON for each mesh wanted, {"shape": NAME, "epsilon": E, ...}; writes its name once
+it is declared, and "over" when it is done. "seconds": that each call of the oracle takes at least.
+"""
+
+from __future__ import annotations
+
+import json
+import pathlib
+import sys
+import time
+
+import numpy as np
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "clients" / "python"))
+
+import stellate  # noqa: E402
+from stellate import manifolds  # noqa: E402
+
+
+class TwoSpheres:
+    """Unit spheres about (-1.5, 0, 0) and (1.5, 0, 0)."""
+
+    dimension, ambient_dimension = 2, 3
+    bounding_box = [-2.6, -1.1, -1.1], [2.6, 1.1, 1.1]
+
+    def closest_point(self, x: np.ndarray) -> np.ndarray:
+        centre = np.where(x[:, :1] < 0, -1.5, 1.5) * [1.0, 0.0, 0.0]
+        away = x - centre
+        return centre + away / np.linalg.norm(away, axis=1, keepdims=True)
+
+
+class Slow:
+    """The same, but each call takes a while."""
+
+    def __init__(self, oracle: object, seconds: float) -> None:
+        self._oracle, self._seconds = oracle, seconds
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._oracle, name)
+
+    def closest_point(self, x: np.ndarray) -> np.ndarray:
+        time.sleep(self._seconds)
+        return self._oracle.closest_point(x)
+
+
+SHAPES = {
+    "torus": lambda: manifolds.Torus(1.0, 0.4),
+    "two spheres": TwoSpheres,
+    "flat torus": lambda: manifolds.ProductOfCircles([1.0, 1.0, 1.0]),
+}
+
+
+def main() -> None:
+    client = stellate.Client(sys.argv[1])
+    for line in sys.stdin:
+        wish = json.loads(line)
+        oracle = SHAPES[wish.pop("shape")]()
+        seconds = wish.pop("seconds", 0.0)
+        if seconds:
+            oracle = Slow(oracle, seconds)
+        name = client.create(oracle, **wish).name
+        print(name, flush=True)
+        client.serve(oracle, name, worker="a worker")
+        print("over", flush=True)
+
+
+if __name__ == "__main__":
+    main()
