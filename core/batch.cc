@@ -1,5 +1,6 @@
 #include "core/batch.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -18,6 +19,28 @@ const char* KindName(QueryKind kind) {
 // "closest_point query 17", the start of each message.
 std::string Where(const QueryBlock& block, Index query) {
   return Message(KindName(block.kind), " query ", query);
+}
+
+// What answers of a manifold with boundary carry besides.
+Status CheckFaceShape(const Specification& spec, const QueryBlock& block, const AnswerBlock& answer,
+                      bool any_found) {
+  if (!block.want_clearances || !any_found) return Status::Ok();
+  const Index n = answer.points.cols();
+  if (answer.clearances.rows() != spec.walls || answer.clearances.cols() != n) {
+    return {StatusCode::kOracleShape,
+            Message(KindName(block.kind), " answers: clearances hold ", answer.clearances.size(),
+                    " numbers but ", n, " points and ", spec.walls, " walls need ", n * spec.walls,
+                    ": send one for each wall at each point")};
+  }
+  const Index rows = CountWalls(block.face) * spec.ambient_dimension;
+  if (rows > 0 && (answer.conormals.rows() != rows || answer.conormals.cols() != n)) {
+    return {StatusCode::kOracleShape,
+            Message(KindName(block.kind), " answers: conormals hold ", answer.conormals.size(),
+                    " numbers but ", n, " points on ", CountWalls(block.face), " walls in R^",
+                    spec.ambient_dimension, " need ", n * rows,
+                    ": send a vector for each wall of the face at each point")};
+  }
+  return Status::Ok();
 }
 
 Status CheckShape(const Specification& spec, const QueryBlock& block, Index first,
@@ -51,6 +74,7 @@ Status CheckShape(const Specification& spec, const QueryBlock& block, Index firs
     return refuse("sizes hold ", answer.sizes.size(), " numbers for ", n,
                   " points: send one length for each");
   }
+  if (Status s = CheckFaceShape(spec, block, answer, any_found); !s.ok()) return s;
   const Index basis_size = d * spec.dimension;
   if (answer.tangents.size() == 0) {
     if (block.want_tangents && any_found) {
@@ -144,6 +168,46 @@ Status CheckTangent(const Specification& spec, const QueryBlock& block, Index qu
   return Status::Ok();
 }
 
+// Unit, tangent, and independent of each other: by the tangent basis that came with them.
+Status CheckConormals(const Specification& spec, const QueryBlock& block, Index query,
+                      const double* basis, const double* conormals) {
+  const Index k = spec.dimension, d = spec.ambient_dimension;
+  const int count = CountWalls(block.face);
+  const auto refuse = [&](const auto&... parts) {
+    return Status{StatusCode::kOracleBadConormal, Message(Where(block, query), ": ", parts...)};
+  };
+  Eigen::MatrixXd along(k, count);
+  int n = 0;
+  Status status = Status::Ok();
+  ForEachWall(block.face, [&](int wall) {
+    const Eigen::Map<const Eigen::VectorXd> conormal(conormals + n * d, d);
+    for (Index a = 0; a < k; ++a) {
+      along(a, n) = 0;
+      for (Index i = 0; i < d; ++i) along(a, n) += basis[i * k + a] * conormal[i];
+    }
+    const double length = conormal.norm(), tangent = along.col(n).norm();
+    if (status.ok() && !(std::abs(length - 1) <= kConormalTolerance))
+      status = refuse("the conormal of wall ", wall, " has the length ", length,
+                      " but must be a unit vector");
+    if (status.ok() && !(tangent >= 1 - kConormalTolerance))
+      status = refuse("the conormal of wall ", wall,
+                      " is not tangent to the manifold: of its "
+                      "length ",
+                      tangent,
+                      " lies in the tangent space; take the wall's outward "
+                      "normal and project it onto that, or is the wall tangential here?");
+    ++n;
+  });
+  if (!status.ok() || count < 2) return status;
+  const Eigen::MatrixXd gram = along.transpose() * along;
+  const double independent = gram.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff();
+  if (independent >= kLeastTransversality) return Status::Ok();
+  return refuse(
+      "the walls meet nearly tangentially there: the smallest eigenvalue of their "
+      "conormals' Gram matrix is ",
+      independent, ", less than ", kLeastTransversality, "; walls must cross at an angle");
+}
+
 Status CheckSize(const QueryBlock& block, Index query, double size) {
   const auto refuse = [&](StatusCode code) -> Status {
     return {code, Message(Where(block, query), ": the size at the answer is ", size,
@@ -171,6 +235,14 @@ Status CheckAnswers(const Specification& spec, const QueryBlock& block, Eigen::I
       const double* basis = answer.tangents.col(j).data();
       status = CheckFinite(block, query, "tangent basis", basis, answer.tangents.rows());
       if (status.ok()) status = CheckTangent(spec, block, query, basis);
+    }
+    if (status.ok() && block.want_clearances)
+      status = CheckFinite(block, query, "clearance", answer.clearances.col(j).data(), spec.walls);
+    if (status.ok() && block.want_clearances && block.face != 0) {
+      const double* conormals = answer.conormals.col(j).data();
+      status = CheckFinite(block, query, "conormal", conormals, answer.conormals.rows());
+      if (status.ok())
+        status = CheckConormals(spec, block, query, answer.tangents.col(j).data(), conormals);
     }
     if (status.ok() && answer.sizes.size() > 0) status = CheckSize(block, query, answer.sizes[j]);
     if (!status.ok()) return status;

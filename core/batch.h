@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/specification.h"
+#include "core/walls.h"
 
 namespace stellate::core {
 
@@ -25,6 +26,10 @@ struct QueryBlock {
   Eigen::VectorXd radii;       // n, kIntersectFlat only: look no farther than this from c
   bool want_tangents = false;  // the answers must carry tangent bases
   bool want_sizes = false;     // ... and local sizes
+  // Of manifolds with boundary: the face whose points are asked for, those of M^ where g_i = 0 for
+  // its walls, whatever the other walls say. M^ itself for none.
+  WallSet face = 0;
+  bool want_clearances = false;  // the answers must carry clearances, and conormals on a face
 
   Eigen::Index size() const { return points.cols(); }
 };
@@ -46,6 +51,10 @@ struct AnswerBlock {
   std::vector<std::uint8_t> found;  // n, 1 or 0; empty: all found
   Eigen::MatrixXd tangents;         // (d k) x n laid out as QueryBlock::bases, or empty
   Eigen::VectorXd sizes;            // n lengths, of the points; ignored where not found; or empty
+  Eigen::MatrixXd clearances;  // walls x n: g_i at the points; what counts is the sign; or empty
+  // (|face| d) x n: for each wall of the face, ascending, its outward unit normal within the
+  // tangent space of M^; or empty
+  Eigen::MatrixXd conormals;
 };
 
 struct Answers {
@@ -64,6 +73,11 @@ inline constexpr double kRadiusTolerance = 1e-6;
 // Largest |T^t T - I| entry. Admits bases computed in single precision. The mesher itself
 // tolerates directions wrong by 0.03, so this asks for orthonormality, not for accuracy.
 inline constexpr double kOrthonormalTolerance = 1e-6;
+// How far a conormal may be from a unit tangent vector: directions wrong by 0.2 do no harm.
+inline constexpr double kConormalTolerance = 1e-3;
+// Least eigenvalue of the Gram matrix of the conormals that meet in a point: walls that cross at
+// less than some 14 degrees.
+inline constexpr double kLeastTransversality = 0.03;
 // How much larger a point's size may be when it is told again, as a share of the larger: sizes
 // guide the mesh and need not be exact, but must be a function of the point.
 inline constexpr double kSameSizeTolerance = 0.1;

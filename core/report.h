@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/status.h"
+#include "core/walls.h"
 
 namespace stellate::core {
 
@@ -48,6 +49,7 @@ struct MeshDelta {
   std::uint64_t first_vertex = 0;             // id of the first new vertex
   Eigen::MatrixXd points;                     // d x (new vertices)
   std::vector<std::uint32_t> added, removed;  // simplices, k+1 ascending vertex ids each
+  std::vector<WallSet> walls;                 // of each new vertex; empty where none is on a wall
 };
 
 struct Counts {
@@ -60,6 +62,23 @@ struct Counts {
   std::uint64_t inserted_sliver = 0;        // R3
   std::uint64_t inserted_inconsistent = 0;  // R4
   std::uint64_t duplicates = 0;             // answers that fell on an existing sample point
+};
+
+// The mesh of a face: its simplices, whose vertices are all on its walls, dimension + 1 ascending
+// vertex ids each, sorted. The boundary is made of the faces of one wall.
+struct FaceMesh {
+  WallSet walls = 0;
+  int dimension = 0;
+  std::vector<std::uint32_t> simplices;
+};
+
+// What a certificate says of a face.
+struct FaceReport {
+  WallSet walls = 0;
+  int dimension = 0;
+  std::uint64_t simplices = 0;
+  std::uint64_t components = 0;
+  std::int64_t euler_characteristic = 0;
 };
 
 // How far a certificate goes.
@@ -110,6 +129,13 @@ struct Certificate {
   std::uint64_t components = 0;
   std::int64_t euler_characteristic = 0;
   bool orientable = false;
+
+  // Of manifolds with boundary: `closed` says then that each (k-1)-face is in two simplices, or in
+  // one and in the boundary; links are spheres inside and balls at the boundary.
+  std::uint64_t boundary_simplices = 0;  // of dimension k - 1
+  std::uint64_t boundary_components = 0;
+  std::int64_t boundary_euler_characteristic = 0;
+  std::vector<FaceReport> faces;  // those that there are, by dimension, the lowest first
 };
 
 struct Report {

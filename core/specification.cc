@@ -44,11 +44,31 @@ Status CheckDimensions(const Specification& spec) {
         Message("ambient_dimension (d) is ", d, " but may be at most ", kMaxAmbientDimension,
                 ": map the manifold into a space of lower dimension first"));
   }
+  if (spec.walls > 0 && k == d) return Status::Ok();  // a domain of R^d
   if (k >= d) {
     return Invalid("dimension",
                    Message("dimension (k) is ", k, " and ambient_dimension (d) is ", d,
                            " but k must be less than d: a closed manifold of dimension k needs "
                            "at least k + 1 coordinates"));
+  }
+  return Status::Ok();
+}
+
+Status CheckWalls(const Specification& spec) {
+  if (spec.walls == 0) return Status::Ok();
+  if (spec.walls < 0 || spec.walls > kMaxWalls) {
+    return Invalid("walls", Message("walls is ", spec.walls, " but must be between 0 and ",
+                                    kMaxWalls, ": unite walls that do not meet into one"));
+  }
+  if (!spec.oracle.conormals || !spec.oracle.tangent_basis) {
+    return Invalid("walls",
+                   "walls is set: the oracle must give conormals with points of faces, and tangent "
+                   "bases, by which these are read");
+  }
+  if (spec.declared_reach || spec.cover_box) {
+    return Invalid("declared_reach",
+                   "declared_reach is set beside walls, but proofs are of manifolds without "
+                   "boundary: leave one of them out");
   }
   return Status::Ok();
 }
@@ -248,6 +268,7 @@ Status CheckLimits(const Specification& spec) {
 
 Status Validate(const Specification& spec) {
   Status status = CheckDimensions(spec);
+  if (status.ok()) status = CheckWalls(spec);
   if (status.ok()) status = CheckEpsilon(spec.epsilon);
   if (status.ok() && spec.bounding_box) {
     status = CheckBox(*spec.bounding_box, spec.ambient_dimension);

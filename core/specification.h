@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "core/status.h"
+#include "core/walls.h"
 
 namespace stellate::core {
 
@@ -29,6 +30,7 @@ struct OracleCapabilities {
   bool intersect_flat = false;  // answers "the point of M nearest c in c + T^perp"
   bool tangent_basis = false;   // sends an orthonormal tangent basis with every point of M
   bool local_size = false;      // says how large things are at every point of M: see size_rate
+  bool conormals = false;       // sends the walls' conormals with points of faces
 };
 
 // Axis-aligned box, ambient coordinates, lower < upper in each.
@@ -97,6 +99,7 @@ struct Limits {
 struct Specification {
   int dimension = 0;          // k
   int ambient_dimension = 0;  // d, k < d
+  int walls = 0;              // of a manifold with boundary: see core/walls.h; k <= d then
   double epsilon = 0;         // rule R1: every R_p(sigma) <= epsilon; a length, > 0
   OracleCapabilities oracle;
   std::optional<BoundingBox> bounding_box;  // seeds are drawn from it when none are given

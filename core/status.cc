@@ -22,6 +22,8 @@ const char* StatusCodeName(StatusCode code) {
       return "ORACLE_OUTSIDE_RADIUS";
     case StatusCode::kOracleBadTangent:
       return "ORACLE_BAD_TANGENT";
+    case StatusCode::kOracleBadConormal:
+      return "ORACLE_BAD_CONORMAL";
     case StatusCode::kOracleBadSize:
       return "ORACLE_BAD_SIZE";
     case StatusCode::kOracleNotIdempotent:

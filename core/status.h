@@ -17,6 +17,7 @@ enum class StatusCode {
   kOracleOffFlat,        // an intersection that is not in the flat asked for
   kOracleOutsideRadius,  // an intersection farther than the radius asked for
   kOracleBadTangent,     // a tangent basis that is not orthonormal
+  kOracleBadConormal,    // a conormal that is no unit tangent vector, or walls that are tangential
   kOracleBadSize,        // a local size that is not positive, or another for the same point
   kOracleNotIdempotent,  // closest_point moves a point that it returned itself
   kOracleFailed,         // the oracle reported a failure of its own, or vanished

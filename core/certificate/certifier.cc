@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/certificate/boundary_claims.h"
 #include "core/certificate/closeness_claims.h"
 #include "core/certificate/complex_claims.h"
 #include "core/certificate/coverage_claims.h"
@@ -28,6 +29,7 @@ class Certifier::Impl {
        KnownOfManifold known)
       : x_(spec, mesh, facts) {
     x_.seen = std::move(known.points);
+    if (mesh.faces) boundary_.emplace(x_);
     if (const std::optional<StarGeometry> stars = JudgeComplex(x_)) {
       claims_.emplace(x_, *stars, known.leans);
       AskFirst();
@@ -44,6 +46,9 @@ class Certifier::Impl {
     if (ball_steps_ == 0) claims_->closeness.JudgeVertices(answers[vertices_]);
     for (std::size_t b = 0; b < blocks_.size(); ++b)
       if (judges_[b]) judges_[b](blocks_[b].points, answers[b]);
+    if (boundary_ && ball_steps_ == 0)
+      for (std::size_t b = faces_; b < blocks_.size(); ++b)
+        boundary_->JudgeFace(blocks_[b], answers[b]);
     AskMore();
   }
 
@@ -76,18 +81,35 @@ class Certifier::Impl {
     block.kind = QueryKind::kClosestPoint;
     block.points = std::move(points);
     block.want_tangents = want_tangents;
+    block.want_clearances = boundary_.has_value();
     blocks_.push_back(std::move(block));
     judges_.push_back(std::move(judge));
+  }
+  // As Ask, of M alone: what M^ has beyond a wall counts as not found.
+  void AskWithin(Eigen::MatrixXd points, const Judge& judge, bool want_tangents = false) {
+    if (!boundary_) return Ask(std::move(points), judge, want_tangents);
+    const auto within = [judge](const Eigen::MatrixXd& asked, const AnswerBlock& answer) {
+      AnswerBlock inside = answer;
+      const Eigen::Index count = answer.points.cols();
+      inside.found.resize(static_cast<std::size_t>(count), 1);
+      for (Eigen::Index j = 0; j < count; ++j)
+        if (answer.clearances.cols() == count && answer.clearances.col(j).minCoeff() < 0)
+          inside.found[static_cast<std::size_t>(j)] = 0;
+      judge(asked, inside);
+    };
+    Ask(std::move(points), within, want_tangents);
   }
 
   void AskFirst() {
     Claims& c = *claims_;
-    Ask(c.closeness.InsideQuestions(), [&c](const Eigen::MatrixXd& asked, const AnswerBlock& a) {
-      c.closeness.JudgeInside(asked, a);
+    Ask(c.closeness.InsideQuestions(), [this](const Eigen::MatrixXd& asked, const AnswerBlock& a) {
+      const ClosenessClaims& closeness = claims_->closeness;
+      if (boundary_) boundary_->JudgeInside(closeness.simplices(), closeness.points_inside(), a);
+      claims_->closeness.JudgeInside(asked, a);
     });
     vertices_ = blocks_.size();
     Ask(c.closeness.VertexQuestions(), nullptr);
-    Ask(
+    AskWithin(
         c.coverage.ProbeQuestions(),
         [&c](const Eigen::MatrixXd& asked, const AnswerBlock& a) {
           c.coverage.JudgeProbes(asked, a);
@@ -96,6 +118,12 @@ class Certifier::Impl {
     Ask(c.closeness.TangentQuestions(),
         [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.closeness.JudgeTangents(a); });
     AskBalls();
+    faces_ = blocks_.size();
+    if (!boundary_) return;
+    for (QueryBlock& block : boundary_->FaceQuestions()) {
+      blocks_.push_back(std::move(block));
+      judges_.push_back(nullptr);
+    }
   }
 
   void AskMore() {
@@ -108,8 +136,8 @@ class Certifier::Impl {
           [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.coverage.JudgeDifferences(a); });
     if (ball_steps_ < kMaxBallSteps) AskBalls();
     if (ball_steps_ <= kMaxBallSteps)
-      Ask(c.reach.FootQuestions(),
-          [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.reach.TakeFeet(a); });
+      AskWithin(c.reach.FootQuestions(),
+                [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.reach.TakeFeet(a); });
     Ask(c.closeness.RimQuestions(),
         [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.closeness.JudgeRims(a); });
     if (blocks_.empty()) Finish();
@@ -117,8 +145,8 @@ class Certifier::Impl {
 
   void AskBalls() {
     Claims& c = *claims_;
-    Ask(c.reach.BallQuestions(),
-        [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.reach.TakeBalls(a); });
+    AskWithin(c.reach.BallQuestions(),
+              [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.reach.TakeBalls(a); });
   }
 
   void Finish() {
@@ -136,12 +164,14 @@ class Certifier::Impl {
   }
 
   Examination x_;
-  std::optional<Claims> claims_;  // if it is a complex
+  std::optional<Claims> claims_;            // if it is a complex
+  std::optional<BoundaryClaims> boundary_;  // of a manifold with boundary
   int ball_steps_ = 0;
   bool finished_ = false;
   std::vector<QueryBlock> blocks_;
   std::vector<Judge> judges_;  // of the blocks; none of the vertices', which come first
   std::size_t vertices_ = 0;   // their block in the first round
+  std::size_t faces_ = 0;      // the first of the faces' blocks there, which come last
 };
 
 Certifier::Certifier(const Specification& spec, const MeshView& mesh, const StarFacts& facts,

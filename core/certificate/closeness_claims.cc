@@ -130,7 +130,7 @@ void ClosenessClaims::JudgeInside(const Eigen::MatrixXd& asked, const AnswerBloc
     const double circumradius = x_.Circumradius(ids);
     reach_.HoldFoot(ids, circumradius, distance, y,
                     is_barycentre ? std::optional(number) : std::nullopt);
-    if (MayLean(x_.mesh, ids, step, distance))
+    if (!x_.AtBoundary(ids) && MayLean(x_.mesh, ids, step, distance))
       rims_.SuspectIfLeans(y, AlongSimplex(ids, step), distance);
     if (is_barycentre) {
       x_.certificate.max_barycentre_distance =

@@ -31,6 +31,8 @@ class ClosenessClaims {
   void JudgeTangents(const AnswerBlock& answer);
   void JudgeRims(const AnswerBlock& answer);
   void JudgeDeviation();
+  const std::vector<std::uint32_t>& simplices() const { return simplices_; }
+  std::uint32_t points_inside() const { return points_inside_; }
   std::uint64_t points_held() const { return points_inside_ * simplices_.size(); }
 
  private:

@@ -8,6 +8,7 @@
 
 #include "core/base/message.h"
 #include "core/base/parallel.h"
+#include "core/certificate/boundary_claims.h"
 #include "core/certificate/links.h"
 
 namespace stellate::core {
@@ -30,6 +31,10 @@ bool IsComplex(Examination& x) {
     return false;
   }
   x.adjacency.emplace(list);
+  if (x.mesh.faces) {
+    x.closed_off = BoundaryClaims::CloseOff(x.mesh);
+    x.closed_adjacency.emplace(SimplexList{list.k, list.vertices + 1, &x.closed_off});
+  }
   return true;
 }
 
@@ -46,8 +51,16 @@ void RefuseWhatIsNoManifold(Examination& x, const Connectivity& connectivity,
   }
   if (!c.closed) {
     x.findings.Refuse(Findings::kComplex,
-                      Message("the mesh is not closed: ", x.adjacency->first_bad_facet(),
-                              ", where each must be in two; faces like it: ", c.bad_faces));
+                      Message(x.mesh.faces ? "the mesh does not end where its faces are: "
+                                           : "the mesh is not closed: ",
+                              x.Closed().first_bad_facet(),
+                              ", where each must be in two; faces like it: ", c.bad_faces,
+                              x.mesh.faces ? Message("; ", x.mesh.vertices,
+                                                     " stands for what is beyond the boundary")
+                                           : std::string(),
+                              x.mesh.faces || x.facts.inconsistent_simplices > 0
+                                  ? ""
+                                  : ". If the manifold has a boundary, declare it by walls"));
   }
   if (connectivity.isolated_vertices > 0) {
     x.findings.Refuse(Findings::kLinks, Message("vertex ", connectivity.first_isolated,
@@ -82,10 +95,11 @@ std::vector<std::int8_t> JudgeTopology(Examination& x) {
     if (part == 0)
       connectivity = ComputeConnectivity(*x.adjacency);
     else
-      links = CheckLinks(*x.adjacency);
+      links = CheckLinks(x.Closed(), x.mesh.faces ? static_cast<std::uint32_t>(x.mesh.vertices)
+                                                  : Adjacency::kNone);
   });
   Certificate& c = x.certificate;
-  c.bad_faces = x.adjacency->bad_facets();
+  c.bad_faces = x.Closed().bad_facets();
   c.closed = c.bad_faces == 0;
   c.components = connectivity.components;
   c.orientable = c.closed && connectivity.orientable;
@@ -93,6 +107,8 @@ std::vector<std::int8_t> JudgeTopology(Examination& x) {
   c.links_are_spheres = c.bad_links == 0;
   c.links_decided_exactly = links.decided_exactly;
   c.euler_characteristic = links.euler_characteristic;
+  if (x.mesh.faces && x.mesh.faces->empty()) --c.euler_characteristic;  // the apex of no cone
+  if (x.mesh.faces) BoundaryClaims(x).JudgeFaces();
   RefuseWhatIsNoManifold(x, connectivity, links);
   RefuseWhatIsUnfinished(x);
   return std::move(connectivity.orientation);
@@ -103,7 +119,7 @@ void JudgeStars(Examination& x, const StarGeometry& stars) {
   c.unembedded_stars = stars.unembedded_stars;
   // The link of a star that embeds is the sphere of directions of its tangent space
   // (docs/using/proof.md, (a)).
-  if (c.closed && stars.unembedded_stars == 0) c.links_decided_exactly = true;
+  if (c.closed && !x.mesh.faces && stars.unembedded_stars == 0) c.links_decided_exactly = true;
   if (c.links_are_spheres && !c.links_decided_exactly) {
     x.findings.Warn(
         "Some vertex links have the homology of a sphere, but were not shown to be spheres.");

@@ -52,6 +52,8 @@ void CoverageClaims::JudgeProbes(const Eigen::MatrixXd& asked, const AnswerBlock
       probe.tangent.assign(t, t + x_.mesh.d * x_.mesh.k);
     }
     const Eigen::Map<const Eigen::MatrixXd> tangent(probe.tangent.data(), x_.mesh.d, x_.mesh.k);
+    // At the boundary the flat may miss the mesh by as much as the boundary bends.
+    if (x_.mesh.WallsOf(probe.nearest.vertex) != 0) continue;
     const Eigen::VectorXd step = asked.col(j) - probe.x;
     // Another vertex's tangent space says little of where M leans.
     if (answer.tangents.size() > 0)

@@ -41,6 +41,16 @@ struct Examination {
   Findings findings;
 
   std::optional<Adjacency> adjacency;
+  // Of manifolds with boundary: the mesh closed off by one vertex more (BoundaryClaims).
+  std::vector<std::uint32_t> closed_off;
+  std::optional<Adjacency> closed_adjacency;
+  const Adjacency& Closed() const { return closed_adjacency ? *closed_adjacency : *adjacency; }
+  // Whether some vertex of a simplex is on the boundary.
+  bool AtBoundary(const std::uint32_t* ids) const {
+    bool any = false;
+    for (int i = 0; i <= mesh.k; ++i) any = any || mesh.WallsOf(ids[i]) != 0;
+    return any;
+  }
   MeshShape shape;
   std::vector<double> longest_edge;  // by vertex
   double size = 0;                   // the mesh's own: its largest circumradius, epsilon at most

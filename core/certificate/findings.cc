@@ -30,6 +30,28 @@ std::string NamePoint(const Eigen::VectorXd& x) {
   return name + (x.size() > 6 ? ", ...)" : ")");
 }
 
+// ", with a boundary of 2 components and Euler characteristic 0 (wall 0: ...)"
+std::string DescribeBoundary(const Certificate& certificate) {
+  if (certificate.boundary_simplices == 0) return ", without boundary: no wall cuts it";
+  const auto count = [](std::uint64_t n, const char* what) {
+    return Message(n, " ", what, n == 1 ? "" : "s");
+  };
+  std::string text =
+      Message(", with a boundary of ", count(certificate.boundary_components, "component"),
+              " and Euler characteristic ", certificate.boundary_euler_characteristic);
+  std::string faces;
+  for (const FaceReport& face : certificate.faces) {
+    std::string walls;
+    ForEachWall(face.walls, [&](int wall) { walls += Message(walls.empty() ? "" : "+", wall); });
+    faces += Message(faces.empty() ? " (" : "; ", CountWalls(face.walls) == 1 ? "wall " : "walls ",
+                     walls, ": ", count(face.components, face.dimension == 0 ? "point" : "piece"),
+                     face.dimension == 0
+                         ? std::string()
+                         : Message(" of Euler characteristic ", face.euler_characteristic));
+  }
+  return text + faces + ")";
+}
+
 void Findings::Conclude(int k, const Specification& spec, Certificate& certificate) const {
   certificate.certified = clean();
   certificate.level = !clean()           ? CertificateLevel::kRefused
@@ -45,11 +67,13 @@ void Findings::Conclude(int k, const Specification& spec, Certificate& certifica
     return;
   }
   const std::uint64_t components = certificate.components;
+  const bool has_walls = spec.walls > 0;
   const std::string what =
-      Message("a closed ", certificate.orientable ? "orientable" : "non-orientable",
-              " manifold of dimension ", k, " with ", components,
-              components == 1 ? " component" : " components", " and Euler characteristic ",
-              certificate.euler_characteristic);
+      Message(has_walls ? "a compact " : "a closed ",
+              certificate.orientable ? "orientable" : "non-orientable", " manifold of dimension ",
+              k, " with ", components, components == 1 ? " component" : " components",
+              " and Euler characteristic ", certificate.euler_characteristic,
+              has_walls ? DescribeBoundary(certificate) : "");
   const char* const unseen =
       "Components of the manifold that no seed or sampled point fell on cannot be excluded";
   const char* const declared = components == static_cast<std::uint64_t>(spec.components)
@@ -65,17 +89,19 @@ void Findings::Conclude(int k, const Specification& spec, Certificate& certifica
   }
   certificate.verdict = Message(
       "Certified: ", what,
-      ". Decided on the whole mesh: it is closed, and each star embeds in the tangent space of its "
-      "centre. Sampled: ",
+      has_walls
+          ? ". Decided on the whole mesh: it ends at its faces and nowhere else, and each star "
+            "embeds in the tangent cone of its centre. Sampled: "
+          : ". Decided on the whole mesh: it is closed, and each star embeds in the tangent "
+            "space of its centre. Sampled: ",
       certificate.fibre_samples, " normal flats meet the mesh once, ",
       spec.audit == Audit::kThorough ? "balls at every vertex and simplex"
                                      : "balls at some vertices",
       " show no reach below ", Brief(certificate.estimated_reach), ", and all of ",
       certificate.answers_held,
-      " answers that are no vertices lie on the mesh. Assumed: that the manifold has no boundary, "
-      "and "
-      "no part narrower than epsilon that no question came near. ",
-      unseen, declared);
+      " answers that are no vertices lie on the mesh. Assumed: that the manifold has no ",
+      has_walls ? "boundary but its walls, " : "boundary, ",
+      "and no part narrower than epsilon that no question came near. ", unseen, declared);
 }
 
 }  // namespace stellate::core

@@ -45,8 +45,8 @@ struct LinksOfPart {
 
 class LinkChecker {
  public:
-  explicit LinkChecker(const Adjacency& adjacency)
-      : adjacency_(adjacency), list_(adjacency.list()), k_(list_.k) {}
+  LinkChecker(const Adjacency& adjacency, std::uint32_t ignored)
+      : adjacency_(adjacency), list_(adjacency.list()), k_(list_.k), ignored_(ignored) {}
 
   LinksOfPart Run(std::uint32_t begin, std::uint32_t end) {
     for (std::uint32_t v = begin; v < end; ++v) {
@@ -54,6 +54,7 @@ class LinkChecker {
       if (star.empty()) continue;
       ++part_.used_vertices;
       blamed_here_ = false;
+      is_ignored_ = v == ignored_;
       if (k_ == 2)
         CheckCircle(v, star);
       else if (k_ == 3)
@@ -281,6 +282,7 @@ class LinkChecker {
   }
 
   void Blame(const Face& face, const char* why) {
+    if (is_ignored_) return;
     part_.blamed.insert(part_.blamed.end(), face.ids.begin(), face.ids.begin() + face.size);
     blamed_here_ = true;
     if (!part_.report.first_bad_link.empty()) return;
@@ -293,6 +295,8 @@ class LinkChecker {
   const Adjacency& adjacency_;
   const SimplexList& list_;
   const int k_;
+  const std::uint32_t ignored_;
+  bool is_ignored_ = false;  // the vertex at hand
   LinksOfPart part_;
   bool blamed_here_ = false;           // the vertex at hand
   std::vector<std::uint8_t> flooded_;  // by simplex of the link at hand
@@ -317,12 +321,12 @@ std::int64_t EulerCharacteristic(const Adjacency& adjacency, const LinksOfPart& 
 
 }  // namespace
 
-LinkReport CheckLinks(const Adjacency& adjacency) {
+LinkReport CheckLinks(const Adjacency& adjacency, std::uint32_t ignored) {
   const std::uint32_t vertices = adjacency.list().vertices;
   std::vector<LinksOfPart> parts(ChunkCount(vertices));
   ParallelChunks(vertices, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
-    parts[chunk] = LinkChecker(adjacency).Run(static_cast<std::uint32_t>(begin),
-                                              static_cast<std::uint32_t>(end));
+    parts[chunk] = LinkChecker(adjacency, ignored)
+                       .Run(static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end));
   });
   LinksOfPart all;
   for (LinksOfPart& part : parts) {
@@ -338,6 +342,7 @@ LinkReport CheckLinks(const Adjacency& adjacency) {
   }
   std::sort(all.blamed.begin(), all.blamed.end());
   all.blamed.erase(std::unique(all.blamed.begin(), all.blamed.end()), all.blamed.end());
+  std::erase(all.blamed, ignored);
   all.report.bad_links = all.blamed.size();
   all.report.euler_characteristic = EulerCharacteristic(adjacency, all);
   return std::move(all.report);

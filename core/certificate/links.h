@@ -21,7 +21,7 @@ struct LinkReport {
   std::int64_t euler_characteristic = 0;  // of the whole complex
 };
 
-// Time linear in the mesh for bounded stars.
-LinkReport CheckLinks(const Adjacency& adjacency);
+// Time linear in the mesh for bounded stars. `ignored`: a vertex whose link may be anything.
+LinkReport CheckLinks(const Adjacency& adjacency, std::uint32_t ignored = Adjacency::kNone);
 
 }  // namespace stellate::core

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/report.h"
+
 namespace stellate::core {
 
 // A finished mesh as the certifier sees it: the complex and the sample, nothing of how they came
@@ -15,6 +17,14 @@ struct MeshView {
   const double* tangents = nullptr;  // vertices x k x d, C order, orthonormal rows
   const std::vector<std::uint32_t>* simplices = nullptr;  // k+1 ascending vertex ids each
 
+  // Of manifolds with boundary, else null: by vertex, its walls, and the sum of their conormals (k
+  // tangent coordinates each); and the faces.
+  const WallSet* walls = nullptr;
+  const double* outward = nullptr;
+  const std::vector<FaceMesh>* faces = nullptr;
+
+  WallSet WallsOf(std::uint32_t v) const { return walls ? walls[v] : 0; }
+  const double* Outward(std::uint32_t v) const { return outward + std::size_t{v} * k; }
   const double* Point(std::uint32_t v) const { return points + std::size_t{v} * d; }
   const double* Tangent(std::uint32_t v) const { return tangents + std::size_t{v} * d * k; }
 };

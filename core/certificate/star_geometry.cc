@@ -155,13 +155,22 @@ class StarMeasurer {
     longest_edge_[p] = std::sqrt(longest2);
     for (const Neighbour& n : neighbours) {
       if (n.squared_distance < kTellingEdge * kTellingEdge * longest2) continue;
-      const double reach = ReachBound(n.squared_distance, std::sqrt(n.off_tangent2));
+      const double reach =
+          ReachBound(n.squared_distance, std::sqrt(n.off_tangent2 + Beyond2(p, n)));
       if (reach < result_.reach) {
         result_.reach = reach;
         result_.narrowest_p = p;
         result_.narrowest_q = n.id;
       }
     }
+  }
+
+  // Of a vertex of the boundary: how far a neighbour is beyond the tangent cone, squared, at least:
+  // the manifold bends back over its own boundary there.
+  double Beyond2(std::uint32_t p, const Neighbour& n) const {
+    if (CountWalls(mesh_.WallsOf(p)) != 1) return 0;
+    const double beyond = Dot(mesh_.Outward(p), n.u, K);
+    return beyond > 0 ? beyond * beyond : 0;
   }
 
   // The tangent coordinates of the other vertices of the star's m-th simplex, in the order of their
@@ -200,7 +209,22 @@ class StarMeasurer {
     } else if (!IsOriented(p)) {
       return kFolded;
     }
-    return hits == 1 ? nullptr : "covers some directions of its tangent space more than once";
+    if (hits != 1) return "covers some directions of its tangent space more than once";
+    return mesh_.WallsOf(p) != 0 && HasSimplexOutward(p)
+               ? "covers directions that lie beyond the boundary"
+               : nullptr;
+  }
+
+  // Of a vertex of the boundary: whether a simplex of its star meets the ray outward.
+  bool HasSimplexOutward(std::uint32_t p) const {
+    std::array<double, K> ray;
+    std::copy_n(mesh_.Outward(p), K, ray.begin());
+    for (std::size_t m = 0; m < adjacency_.Star(p).size(); ++m) {
+      std::array<double, K> b;
+      if (Solve<K>(ColumnsOf(m), ray, b) == 0) return true;
+      if (*std::min_element(b.begin(), b.end()) > 0) return true;
+    }
+    return false;
   }
 
   // Projected, all simplices of the star must be oriented alike, or all against the orientation of
@@ -229,7 +253,10 @@ class StarMeasurer {
         if (ids[i] == p) continue;
         ++column;
         const std::uint32_t t = adjacency_.Across(s, i);
-        if (t == Adjacency::kNone) return "has a boundary";
+        if (t == Adjacency::kNone) {
+          if (mesh_.WallsOf(p) != 0) continue;
+          return "has a boundary";
+        }
         if (t < s) continue;
         // With the apex moved behind the facet, the two determinants must differ in sign.
         const int apex = adjacency_.Apex(s, t);

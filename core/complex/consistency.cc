@@ -74,8 +74,27 @@ std::optional<std::size_t> FindSimplex(const RestrictedVoronoiCell<K>& cell, std
   return std::nullopt;
 }
 
+namespace {
+
+// Of a star at the boundary, where the simplex may be one of a face.
+template <int K>
+bool IsConsistentOnFaces(const StarComplex<K>& complex, std::uint32_t p, std::size_t v) {
+  const auto simplex = complex.FaceSimplexOf(p, complex.cell(p), v);
+  if (simplex.fake || simplex.foreign) return false;
+  const std::uint64_t key = SimplexKey<K>(complex.cell(p), v, p);
+  for (int i = 0; i < simplex.count; ++i) {
+    const std::uint32_t q = simplex.ids[static_cast<std::size_t>(i)];
+    if (q != p && complex.cell(q).Find(key - Mix64(q)) == complex.cell(q).vertex_count())
+      return false;
+  }
+  return true;
+}
+
+}  // namespace
+
 template <int K>
 bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p, std::size_t v) {
+  if (complex.walls(p) != 0) return IsConsistentOnFaces<K>(complex, p, v);
   typename StarComplex<K>::Simplex simplex;
   if (!complex.SimplexOf(p, complex.cell(p), v, &simplex)) return false;
   const std::uint64_t key = SimplexKey<K>(complex.cell(p), v, p);
@@ -97,6 +116,7 @@ bool IsFolded(const StarComplex<K>& complex, std::uint32_t p, std::size_t v) {
     std::copy(here, here + K, there);
     for (int r = 0; r < K; ++r)
       if (std::find(here, here + K, cell.facet(w, r)) == here + K) there[s] = cell.facet(w, r);
+    if (IsWall(cell.id(there[s]))) continue;  // the mesh ends there
     if (Orientation<K>(complex, p, there) * side >= 0) return true;
   }
   return false;

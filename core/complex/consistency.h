@@ -23,7 +23,8 @@ std::optional<std::size_t> FindSimplex(const RestrictedVoronoiCell<K>& cell, std
                                        const typename StarComplex<K>::Simplex& simplex,
                                        std::uint64_t key);
 
-// Whether the simplex dual to vertex v of p's cell is in the stars of all its vertices.
+// Whether the simplex dual to vertex v of p's cell is in the stars of all its vertices; one of a
+// face, that it is not foreign either.
 template <int K>
 bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p, std::size_t v);
 

@@ -1,6 +1,8 @@
 #include "core/complex/star_complex.h"
 
 #include <algorithm>
+#include <type_traits>
+#include <utility>
 
 #include "core/base/basis_layout.h"
 #include "core/base/parallel.h"
@@ -13,6 +15,11 @@ namespace {
 // Simplices of a larger circumradius, in epsilon, are judged in the flats: far out the common
 // centre is no better, and they will be refined anyway.
 constexpr double kJudgedRadius = 1.3;
+
+// How far outwards walls are moved, as a share of the fake simplex' inradius: corners of that may
+// lie in the planes of walls along the axes, and rounding would decide which side of it they are
+// on.
+constexpr double kWallOffset = 1e-12;
 
 // Room for q - p, on the stack where d is small.
 class Step {
@@ -48,6 +55,9 @@ StarComplex<K>::StarComplex(const StarComplex& other)
       weight_scale_(other.weight_scale_),
       points_(other.points_),
       tangents_(other.tangents_),
+      walls_(other.walls_),
+      conormals_at_(other.conormals_at_),
+      conormals_(other.conormals_),
       cells_(other.cells_),
       tree_(other.tree_, &points_),
       simplex_count_(other.simplex_count_) {}
@@ -63,6 +73,10 @@ class StarComplex<K>::Around final : public Surroundings<K> {
   double HalfSpace(std::uint32_t id, double* normal) const override {
     if (IsFake(id))
       return FakeHalfSpace<K>(static_cast<int>(id - kFirstFakeId), complex_.inradius_, normal);
+    if (IsWall(id)) {
+      std::copy_n(ConormalOf(p_, WallOf(id)), K, normal);
+      return kWallOffset * complex_.inradius_;
+    }
     Step step(complex_.d_);
     return complex_.HalfSpace(p_, Find(id), step.data(), normal);
   }
@@ -104,11 +118,17 @@ class StarComplex<K>::Around final : public Surroundings<K> {
   bool Common(const std::uint32_t* others, double* centre) const {
     std::uint32_t ids[K + 1];
     ids[0] = p_.id;
+    int count = 1;
+    WallSet walls = 0;
     for (int s = 0; s < K; ++s) {
       if (IsFake(others[s])) return false;
-      ids[s + 1] = others[s];
+      if (IsWall(others[s]))
+        walls |= SetOfWall(WallOf(others[s]));
+      else
+        ids[count++] = others[s];
     }
-    std::sort(ids, ids + K + 1);
+    std::sort(ids, ids + count);
+    if (walls != 0) return CommonOnFace(ids, count, walls, centre);
     const double* points[K + 1];
     const double* tangents[K + 1];
     double weights[K + 1];
@@ -122,6 +142,86 @@ class StarComplex<K>::Around final : public Surroundings<K> {
       return false;
     for (int i = 0; i < complex_.d_; ++i) centre[i] += points[0][i] - p_.point[i];
     return true;
+  }
+
+  // The same for a simplex of a face, by the face's own tangent spaces. Foreign ones are left where
+  // they are: no other star agrees about them.
+  bool CommonOnFace(const std::uint32_t* ids, int count, WallSet walls, double* centre) const {
+    if (count < 2) return false;
+    const int n = complex_.d_;
+    const double* points[K + 1];
+    const double* tangents[K + 1];
+    double weights[K + 1];
+    thread_local std::vector<double> bases;
+    const auto stride = static_cast<std::size_t>(count - 1) * static_cast<std::size_t>(n);
+    bases.resize(stride * (K + 1));
+    for (int i = 0; i < count; ++i) {
+      const Site site = Find(ids[i]);
+      if (!IsSubset(walls, site.walls)) return false;
+      FaceTangents(site, walls, n, bases.data() + static_cast<std::size_t>(i) * stride);
+      points[i] = site.point;
+      tangents[i] = bases.data() + static_cast<std::size_t>(i) * stride;
+      weights[i] = complex_.Weight(site.id);
+    }
+    const auto common = [&](auto dimension) {
+      return CommonCentre<decltype(dimension)::value>(n, points, tangents, weights,
+                                                      complex_.judged_radius2_, centre);
+    };
+    bool found = false;
+    [&]<int... J>(std::integer_sequence<int, J...>) {
+      ((count == J + 2 && (found = common(std::integral_constant<int, J + 1>()))), ...);
+    }
+    (std::make_integer_sequence<int, K - 1>());
+    if (!found) return false;
+    for (int i = 0; i < n; ++i) centre[i] += points[0][i] - p_.point[i];
+    return true;
+  }
+
+  static const double* ConormalOf(const Site& site, int wall) {
+    return site.conormals + K * CountWalls(site.walls & (SetOfWall(wall) - 1));
+  }
+
+  // An orthonormal basis of the tangent space of a face at a point of it: what is left of T_pM off
+  // the conormals, by rows of d.
+  static void FaceTangents(const Site& site, WallSet walls, int n, double* rows) {
+    double taken[K][K] = {};  // orthonormal, conormals first
+    int count = 0;
+    const auto orthogonalise = [&](double* v) {
+      for (int pass = 0; pass < 2; ++pass)  // the second for what rounding left
+        for (int i = 0; i < count; ++i) {
+          const double along = Dot(taken[i], v, K);
+          for (int a = 0; a < K; ++a) v[a] -= along * taken[i][a];
+        }
+      return Dot(v, v, K);
+    };
+    const auto take = [&](const double* v, double norm2) {
+      for (int a = 0; a < K; ++a) taken[count][a] = v[a] / std::sqrt(norm2);
+      ++count;
+    };
+    ForEachWall(walls, [&](int wall) {
+      double v[K];
+      std::copy_n(ConormalOf(site, wall), K, v);
+      take(v, orthogonalise(v));
+    });
+    const int conormals = count;
+    for (int left = K - conormals; left > 0; --left) {
+      double best[K], most = -1;
+      for (int a = 0; a < K; ++a) {
+        double v[K] = {};
+        v[a] = 1;
+        if (const double norm2 = orthogonalise(v); norm2 > most) {
+          most = norm2;
+          std::copy_n(v, K, best);
+        }
+      }
+      take(best, most);
+    }
+    for (int j = conormals; j < K; ++j)
+      for (int i = 0; i < n; ++i) {
+        double s = 0;
+        for (int a = 0; a < K; ++a) s += taken[j][a] * site.tangent[a * n + i];
+        rows[(j - conormals) * n + i] = s;
+      }
   }
 
   const StarComplex& complex_;
@@ -173,7 +273,8 @@ bool StarComplex<K>::ClipBy(Cell& cell, const Site& p, const Site& q, const Site
   Step step(d_);
   double normal[K];
   const double offset = HalfSpace(p, q, step.data(), normal);
-  return cell.Clip(q.id, normal, offset, scratch, Around(*this, p, guest, &q, born), step.data());
+  const Around around(*this, p, guest, &q, born);
+  return cell.Clip(q.id, normal, offset, scratch, around, step.data());
 }
 
 template <int K>
@@ -210,8 +311,18 @@ bool StarComplex<K>::CutsVertex(std::uint32_t p, std::size_t vertex, const doubl
 }
 
 template <int K>
-void StarComplex<K>::ResetCell(Cell& cell, const Site& p, const Site* guest) const {
-  cell.Reset(inradius_, Around(*this, p, guest));
+void StarComplex<K>::ResetCell(Cell& cell, const Site& p, const Site* guest,
+                               typename Cell::Scratch& scratch) const {
+  const Around around(*this, p, guest);
+  cell.Reset(inradius_, around);
+  if (p.walls == 0) return;
+  Step step(d_);
+  const double* conormal = p.conormals;
+  ForEachWall(p.walls, [&](int wall) {
+    around.Lift(conormal, step.data());
+    cell.Clip(IdOfWall(wall), conormal, kWallOffset * inradius_, scratch, around, step.data());
+    conormal += K;
+  });
 }
 
 template <int K>

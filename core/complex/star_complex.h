@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/complex/blocks.h"
@@ -45,7 +46,10 @@ class StarComplex {
   // a sample point whose star it will change: its cell is found sooner. The cell is the same where
   // stars are judged in flats; at common centres the order of the cuts may tell in a cell that is
   // far from convex.
-  std::uint32_t Append(const double* point, const double* tangent, std::uint32_t near = kNone);
+  // A point of the boundary comes with the walls that it is on and their conormals, K tangent
+  // coordinates each by ascending wall: the outward unit normals of the walls in T_pM.
+  std::uint32_t Append(const double* point, const double* tangent, std::uint32_t near = kNone,
+                       WallSet walls = 0, const double* conormals = nullptr);
   // Builds the stars of the appended points and clips all others by them, in parallel; the result
   // does not depend on the number of threads. `around`, if given, gets the neighbours that changed
   // stars have or had (with repetitions): their simplices may have become inconsistent.
@@ -59,19 +63,50 @@ class StarComplex {
   // K rows of d: row a is tangent vector a.
   const double* Tangent(std::uint32_t id) const { return tangents_.data() + id * stride() * K; }
   const Cell& cell(std::uint32_t id) const { return cells_[id]; }
+  // The walls that a point is on.
+  WallSet walls(std::uint32_t id) const { return id < walls_.size() ? walls_[id] : 0; }
+  // K for each of its walls, ascending.
+  const double* Conormals(std::uint32_t id) const {
+    return id < walls_.size() ? conormals_.data() + conormals_at_[id] : nullptr;
+  }
 
-  // The simplex dual to vertex v of p's cell, or false if a facet of it is fake.
+  // The k-simplex dual to vertex v of p's cell, or false if a facet of it is fake or a wall.
   bool SimplexOf(std::uint32_t p, const Cell& cell, std::size_t v, Simplex* simplex) const {
     (*simplex)[0] = p;
     for (int s = 0; s < K; ++s) {
       const std::uint32_t id = cell.id(cell.facet(v, s));
-      if (IsFake(id)) return false;
+      if (!IsSample(id)) return false;
       std::size_t at = static_cast<std::size_t>(s) + 1;
       for (; at > 0 && (*simplex)[at - 1] > id; --at) (*simplex)[at] = (*simplex)[at - 1];
       (*simplex)[at] = id;
     }
     return true;
   }
+  // What vertex v of p's cell is dual to: a simplex of the face of its walls.
+  struct FaceSimplex {
+    Simplex ids;        // the first `count`, ascending
+    int count = 0;      // its dimension, and one
+    WallSet walls = 0;  // of the vertex
+    bool fake = false;  // a facet is: it is no simplex yet
+    // A vertex of it is not on the face: a point off the face is nearer to the vertex than the
+    // face's own.
+    bool foreign = false;
+    int dimension() const { return K - CountWalls(walls); }
+  };
+  // `guest_walls`: of the point with the id size(), if a facet is its.
+  FaceSimplex FaceSimplexOf(std::uint32_t p, const Cell& cell, std::size_t v,
+                            WallSet guest_walls = 0) const;
+
+  // A vertex of a star's cell.
+  struct CellVertex {
+    std::uint32_t star;
+    std::size_t vertex;
+  };
+  // The vertex dual to a simplex of a face of lower dimension that a point on the face of `walls`
+  // would cut off, off that face: of the lowest dimension, and there the farthest out. Nothing: it
+  // encroaches on no face.
+  std::optional<CellVertex> EncroachedBy(const double* point, WallSet walls) const;
+
   // The half-space of a facet of p's cell: writes the normal, T_p^t (q - p), returns the offset.
   double HalfSpace(std::uint32_t p, std::size_t facet, double* normal) const;
   // |q - p|^2 for the sample point q of a facet of p's cell, without the weights' share.
@@ -109,7 +144,8 @@ class StarComplex {
     std::vector<std::pair<std::uint32_t, Cell>> cut;
   };
   void TryPoint(const double* point, const double* tangent, std::uint32_t near,
-                typename Cell::Scratch& scratch, Tentative* result) const;
+                typename Cell::Scratch& scratch, Tentative* result, WallSet walls = 0,
+                const double* conormals = nullptr) const;
 
   // Simplices held by the star of their lowest vertex.
   std::vector<std::uint32_t> Simplices() const;
@@ -131,9 +167,11 @@ class StarComplex {
     std::uint32_t id;
     const double* point;
     const double* tangent;
+    WallSet walls = 0;
+    const double* conormals = nullptr;  // K for each of the walls
   };
   class Around;
-  Site At(std::uint32_t id) const { return {id, Point(id), Tangent(id)}; }
+  Site At(std::uint32_t id) const { return {id, Point(id), Tangent(id), walls(id), Conormals(id)}; }
   // Clips the cell of p by q, or only says whether it would. `guest` is a site that may be named by
   // the cell's facets without being in the sample. `born`: the star of q, if it is there already,
   // where centres may be looked up.
@@ -149,7 +187,8 @@ class StarComplex {
     return 0.5 * (Project(p, q.point, step, normal) + Weight(p.id) - Weight(q.id));
   }
   // The cell of p before any other point is known.
-  void ResetCell(Cell& cell, const Site& p, const Site* guest) const;
+  void ResetCell(Cell& cell, const Site& p, const Site* guest,
+                 typename Cell::Scratch& scratch) const;
   // Builds p's cell, and calls influencing(q) for each sample point whose cell p may cut.
   template <typename Influencing>
   void BuildStar(const Site& p, const Site* guest, std::uint32_t near, Cell& cell,
@@ -200,6 +239,10 @@ class StarComplex {
   double judged_radius2_;
   double weight_scale_;
   std::vector<double> points_, tangents_;
+  // Of manifolds with boundary, up to the last point of it; else empty.
+  std::vector<WallSet> walls_;
+  std::vector<std::uint32_t> conormals_at_;
+  std::vector<double> conormals_;
   Blocks<Cell> cells_;
   std::vector<std::uint32_t> near_;  // of the appended points
   BallTree tree_;

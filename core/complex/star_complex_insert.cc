@@ -46,9 +46,9 @@ void StarComplex<K>::Neighbourhood(const double* q, std::uint32_t near,
   };
   offer(near);
   for (std::size_t f = 0; f < cells_[near].facet_count(); ++f)
-    if (!IsFake(cells_[near].id(f))) offer(cells_[near].id(f));
+    if (IsSample(cells_[near].id(f))) offer(cells_[near].id(f));
   const auto add = [&](std::uint32_t id) {
-    if (!IsFake(id) && std::find(ids->begin(), ids->end(), id) == ids->end()) ids->push_back(id);
+    if (IsSample(id) && std::find(ids->begin(), ids->end(), id) == ids->end()) ids->push_back(id);
   };
   for (int i = 0; i < count; ++i) ids->push_back(nearest[i].second);
   for (int i = 0; i < count; ++i) {
@@ -62,7 +62,7 @@ template <typename Influencing>
 void StarComplex<K>::BuildStar(const Site& p, const Site* guest, std::uint32_t near, Cell& cell,
                                typename Cell::Scratch& scratch,
                                const Influencing& influencing) const {
-  ResetCell(cell, p, guest);
+  ResetCell(cell, p, guest, scratch);
   // What closes the cell, or nearly so, comes first: without it a search that happens to begin on
   // one side of p would visit all of that side while the cell is open towards the other.
   thread_local std::vector<std::uint32_t> first;
@@ -81,9 +81,16 @@ void StarComplex<K>::BuildStar(const Site& p, const Site* guest, std::uint32_t n
 }
 
 template <int K>
-std::uint32_t StarComplex<K>::Append(const double* point, const double* tangent,
-                                     std::uint32_t near) {
+std::uint32_t StarComplex<K>::Append(const double* point, const double* tangent, std::uint32_t near,
+                                     WallSet walls, const double* conormals) {
   const std::uint32_t id = size();
+  if (walls != 0) {
+    walls_.resize(id, 0);
+    walls_.push_back(walls);
+    conormals_at_.resize(id, 0);
+    conormals_at_.push_back(static_cast<std::uint32_t>(conormals_.size()));
+    conormals_.insert(conormals_.end(), conormals, conormals + K * CountWalls(walls));
+  }
   near_.push_back(near);
   points_.insert(points_.end(), point, point + d_);
   tangents_.insert(tangents_.end(), tangent, tangent + d_ * K);
@@ -189,7 +196,7 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
         ParallelGather<std::uint32_t>(count, [&](std::size_t i, std::vector<std::uint32_t>* ids) {
           const Cell& cell = cells_[star(i)];
           for (std::size_t f = 0; f < cell.facet_count(); ++f)
-            if (!IsFake(cell.id(f))) ids->push_back(cell.id(f));
+            if (IsSample(cell.id(f))) ids->push_back(cell.id(f));
         });
     around->insert(around->end(), found.begin(), found.end());
   };
@@ -206,8 +213,9 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
 
 template <int K>
 void StarComplex<K>::TryPoint(const double* point, const double* tangent, std::uint32_t near,
-                              typename Cell::Scratch& scratch, Tentative* result) const {
-  const Site guest{size(), point, tangent};
+                              typename Cell::Scratch& scratch, Tentative* result, WallSet walls,
+                              const double* conormals) const {
+  const Site guest{size(), point, tangent, walls, conormals};
   result->cut.clear();
   BuildStar(guest, &guest, near, result->own, scratch, [&](std::uint32_t p) {
     if (Cuts(cells_[p], At(p), guest)) result->cut.emplace_back(p, cells_[p]);
@@ -220,14 +228,16 @@ void StarComplex<K>::TryPoint(const double* point, const double* tangent, std::u
 #define STELLATE_INSTANTIATE(K)                                                                \
   template void StarComplex<K>::Neighbourhood(const double*, std::uint32_t,                    \
                                               std::vector<std::uint32_t>*) const;              \
-  template std::uint32_t StarComplex<K>::Append(const double*, const double*, std::uint32_t);  \
+  template std::uint32_t StarComplex<K>::Append(const double*, const double*, std::uint32_t,   \
+                                                WallSet, const double*);                       \
   template std::vector<StarComplex<K>::Cut> StarComplex<K>::BuildNewStars(std::uint32_t);      \
   template std::vector<StarComplex<K>::Turn> StarComplex<K>::InTurns(const std::vector<Cut>&); \
   template void StarComplex<K>::CutStars(const std::vector<Turn>&, const std::vector<Cut>&,    \
                                          std::uint32_t, Change*);                              \
   template StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t>*);         \
   template void StarComplex<K>::TryPoint(const double*, const double*, std::uint32_t,          \
-                                         typename Cell::Scratch&, Tentative*) const;
+                                         typename Cell::Scratch&, Tentative*, WallSet,         \
+                                         const double*) const;
 STELLATE_INSTANTIATE(1)
 STELLATE_INSTANTIATE(2)
 STELLATE_INSTANTIATE(3)

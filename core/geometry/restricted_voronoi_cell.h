@@ -8,6 +8,7 @@
 
 #include "core/base/random.h"
 #include "core/base/vector_ops.h"
+#include "core/walls.h"
 
 namespace stellate::core {
 
@@ -50,8 +51,10 @@ double FakeHalfSpace(int i, double inradius, double* normal);
 //
 // A simple polytope: each vertex lies on exactly K facets and has K neighbours; it is dual to the
 // k-simplex of star(p) on p and the K facets' points, and is that simplex's circumcentre c_p in
-// T_pM. Kept by clipping, one half-space at a time; what is cut off is found by walking, and a cut
-// that rounding makes impossible is refused, so that the combinatorics stay those of a polytope.
+// T_pM. At a point of the boundary the cell is cut by its walls' conormal half-spaces, too: facets
+// with offset 0, whose vertices are dual to simplices of the faces. Kept by clipping, one
+// half-space at a time; what is cut off is found by walking, and a cut that rounding makes
+// impossible is refused, so that the combinatorics stay those of a polytope.
 //
 // Vertices and facets go by their place, from 0; a cut may give them other places. For K = 2 the
 // same cell is kept in less memory: restricted_voronoi_polygon.h.
@@ -98,7 +101,9 @@ class RestrictedVoronoiCell {
   }
 
   std::size_t facet_count() const { return facets_.size(); }
-  std::uint32_t id(std::size_t facet) const { return facets_[facet].id; }  // sample point, or fake
+  std::uint32_t id(std::size_t facet) const {
+    return facets_[facet].id;
+  }  // IsSample, IsWall, IsFake
   const double* normal(std::size_t facet) const { return facets_[facet].normal; }  // length
   double offset(std::size_t facet) const { return facets_[facet].offset; }         // length squared
 
@@ -182,3 +187,17 @@ extern template class RestrictedVoronoiCell<5>;
 }  // namespace stellate::core
 
 #include "core/geometry/restricted_voronoi_polygon.h"
+
+namespace stellate::core {
+
+// The walls that vertex v of a cell is on.
+template <int K>
+WallSet WallsAt(const RestrictedVoronoiCell<K>& cell, std::size_t v) {
+  WallSet walls = 0;
+  for (int s = 0; s < K; ++s)
+    if (const std::uint32_t id = cell.id(cell.facet(v, s)); IsWall(id))
+      walls |= SetOfWall(WallOf(id));
+  return walls;
+}
+
+}  // namespace stellate::core

@@ -36,7 +36,8 @@ CandidateSet<K> DrawCandidates(const StarComplex<K>& complex, const ViolationBoo
     CheckInterruption(set.in_flats.size());
     const bool one = t.violation.rule < Rule::kSliver;
     set.first.push_back(set.drawn() + (one ? 1 : criteria.candidates));
-    set.in_flats.push_back(drawing.from_flats && !t.violation.fake && !book.has_no_flat(t.star));
+    set.in_flats.push_back(drawing.from_flats && !t.violation.fake && t.violation.walls == 0 &&
+                           !book.has_no_flat(t.star));
   }
   set.points.resize(complex.d(), set.drawn());
   ParallelFor(set.targets.size(), [&](std::size_t i) {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/refinement/criteria.h"
@@ -13,10 +14,11 @@ namespace stellate::core {
 // Points that shall be inserted if M has a point near each: not for a target, but because a
 // rehearsal inserted them, or because they are seeds.
 struct PlannedPoints {
-  Eigen::MatrixXd points;    // d x n
-  Eigen::MatrixXd tangents;  // (K rows of d) x n, predicted; or empty
-  Eigen::VectorXd spacing;   // n, predicted distance to the nearest; or empty
-  std::vector<Rule> rules;   // n, what they are for; or empty
+  Eigen::MatrixXd points;      // d x n
+  Eigen::MatrixXd tangents;    // (K rows of d) x n, predicted; or empty
+  Eigen::VectorXd spacing;     // n, predicted distance to the nearest; or empty
+  std::vector<Rule> rules;     // n, what they are for; or empty
+  std::vector<WallSet> walls;  // n, the face that each shall be on; or empty: all are on M
 
   Eigen::Index size() const { return points.cols(); }
 };
@@ -42,6 +44,22 @@ struct AnsweredPoints {
   std::vector<std::uint8_t> found;     // ... and its tangents
   Eigen::MatrixXd tangents;            // (K rows of d) x n
   Eigen::VectorXd sizes;               // n, where the client gives them; or empty
+  // Of manifolds with boundary, else empty:
+  std::vector<WallSet> walls;  // n, the face that was asked for
+  Eigen::MatrixXd clearances;  // walls x n
+  Eigen::MatrixXd conormals;   // (K numbers for each wall of the face, ascending) x n, in the
+                               // points' own tangent coordinates
+
+  // The wall that a point lies beyond, of those that it is not on: by the most. None: it is in M.
+  std::optional<int> Beyond(Eigen::Index c) const {
+    std::optional<int> wall;
+    for (Eigen::Index i = 0; i < clearances.rows(); ++i)
+      if (clearances(i, c) < 0 &&
+          !IsSubset(SetOfWall(static_cast<int>(i)), walls[static_cast<std::size_t>(c)]) &&
+          !(wall && clearances(*wall, c) <= clearances(i, c)))
+        wall = static_cast<int>(i);
+    return wall;
+  }
 };
 
 // How candidates are drawn.

@@ -43,7 +43,8 @@ Engine<K>::Engine(const Specification& spec, const ResolvedCriteria& criteria)
       random_seed_(spec.random_seed),
       max_vertices_(spec.limits.max_vertices),
       complex_(spec.ambient_dimension, criteria.epsilon, criteria.inradius, criteria.judging),
-      sizes_(criteria) {}
+      sizes_(criteria),
+      faces_(spec.walls) {}
 
 template <int K>
 Engine<K> Engine<K>::ForRehearsal() const {
@@ -103,10 +104,15 @@ std::vector<Target<K>> Engine<K>::SizeAndShapeTargets() const {
 template <int K>
 void Engine<K>::RejudgeSizes() {
   sizes_.Spread(complex_);
+  RejudgeAll();
+}
+
+template <int K>
+void Engine<K>::RejudgeAll() {
   std::vector<std::optional<Violation<K>>> violations(complex_.size());
   ParallelFor(complex_.size(), [&](std::uint32_t p) {
-    violations[p] =
-        WorstSizeOrShape<K>(complex_, p, sizes_.BoundAt(complex_, p), criteria_.radius_edge_bound);
+    violations[p] = WorstSizeOrShape<K>(complex_, p, sizes_.BoundAt(complex_, p),
+                                        criteria_.radius_edge_bound, faces_.stage());
   });
   book_.Replace(violations);
 }
@@ -118,7 +124,8 @@ std::vector<Target<K>> Engine<K>::RejudgeSuspects() {
   std::vector<std::optional<Violation<K>>> found(suspects.size());
   const std::vector<std::uint32_t> near = InOrderOfPlace<K>(complex_, suspects);
   ParallelFor(suspects.size(), [&](std::size_t i) {
-    found[near[i]] = WorstSliverOrInconsistent<K>(complex_, suspects[near[i]], criteria_.shape);
+    found[near[i]] =
+        WorstSliverOrInconsistent<K>(complex_, suspects[near[i]], criteria_.shape, faces_.stage());
   });
   filled_.ForgetMended();
   if (std::any_of(found.begin(), found.end(), [](const auto& v) { return v.has_value(); }))
@@ -162,6 +169,10 @@ std::optional<std::vector<Target<K>>> Engine<K>::Plan() {
     targets = SizeAndShapeTargets();
   }
   if (targets.empty()) targets = RejudgeSuspects();
+  if (!faces_.has_walls()) return targets;
+  const bool any = !targets.empty();
+  YieldToFaces(&targets);
+  if (any && targets.empty()) return Plan();  // all were refused, which is not done forever
   return targets;
 }
 
@@ -187,14 +198,18 @@ CandidateSet<K> Engine<K>::Draw(std::vector<Target<K>> targets, std::uint64_t ro
 
 template <int K>
 Inserted Engine<K>::Insert(const CandidateSet<K>& candidates, const AnsweredPoints& answers) {
-  return Inserter<K>({complex_, sizes_, book_, criteria_}, candidates, answers, caution_,
+  return Inserter<K>({complex_, sizes_, book_, criteria_, faces_}, candidates, answers, caution_,
                      max_vertices_)
       .Run();
 }
 
 template <int K>
 void Engine<K>::Append(const AnsweredPoints& answers, Eigen::Index c) {
-  complex_.Append(answers.points.col(c).data(), answers.tangents.col(c).data());
+  const bool on_faces = !answers.walls.empty();
+  complex_.Append(answers.points.col(c).data(), answers.tangents.col(c).data(),
+                  StarComplex<K>::kNone,
+                  on_faces ? answers.walls[static_cast<std::size_t>(c)] : WallSet{0},
+                  on_faces ? answers.conormals.col(c).data() : nullptr);
   if (answers.sizes.size() > 0) sizes_.AppendGiven(answers.sizes[c]);
 }
 
@@ -211,7 +226,7 @@ typename Engine<K>::Change Engine<K>::Commit() {
   std::vector<std::optional<Violation<K>>> violations(touched.size());
   ParallelFor(touched.size(), [&](std::size_t i) {
     violations[i] = WorstSizeOrShape<K>(complex_, touched[i], sizes_.BoundAt(complex_, touched[i]),
-                                        criteria_.radius_edge_bound);
+                                        criteria_.radius_edge_bound, faces_.stage());
   });
   book_.Update(complex_.size(), touched, violations);
   if (judged) {

@@ -9,10 +9,12 @@
 #include "core/complex/star_complex.h"
 #include "core/refinement/candidate_set.h"
 #include "core/refinement/criteria.h"
+#include "core/refinement/face_book.h"
 #include "core/refinement/filled_mesh.h"
 #include "core/refinement/inserter.h"
 #include "core/refinement/size_field.h"
 #include "core/refinement/violation_book.h"
+#include "core/report.h"
 
 namespace stellate::core {
 
@@ -51,6 +53,14 @@ class Engine {
   void Append(const AnsweredPoints& answers, Eigen::Index candidate);
   // Brings the stars and all that is known of them up to date with what was inserted.
   Change Commit();
+  // Of a manifold with boundary, when no targets are left: points of the faces of this stage that
+  // the sample has nothing near, if any, to be asked for and appended.
+  PlannedPoints ChooseSeeds();
+  // On to faces of the next dimension. False after the last.
+  bool AdvanceStage();
+  // Where faces were discovered since; to be asked for beside the targets.
+  PlannedPoints TakeDiscoveries();
+
   // What grows from the points appended last is judged by all rules once it is whole.
   void JudgeAllAnew();
 
@@ -63,8 +73,12 @@ class Engine {
   SizeField<K>& sizes() { return sizes_; }
   const SizeField<K>& sizes() const { return sizes_; }
   const ViolationBook<K>& book() const { return book_; }
+  FaceBook<K>& faces() { return faces_; }
   FilledMesh<K>& filled() { return filled_; }
   const FilledMesh<K>& filled() const { return filled_; }
+
+  // Of a manifold with boundary: the faces that there are, by dimension, the lowest first.
+  std::vector<FaceMesh> Faces() const;
 
   // The mesh: K+1 ascending ids each.
   std::vector<std::uint32_t> Simplices() const;
@@ -75,6 +89,11 @@ class Engine {
   std::vector<Target<K>> RejudgeSuspects();
   void RejudgeSizes();
   bool HasGrownTooMuch() const;
+  void RejudgeAll();
+  void YieldToFaces(std::vector<Target<K>>* targets);
+  PlannedPoints SetCollars();
+  bool IsCollar(const typename StarComplex<K>::FaceSimplex& simplex) const;
+  std::optional<Target<K>> SplitOf(const typename StarComplex<K>::CellVertex& at, Rule by) const;
   Target<K> Aim(std::uint32_t star, const Violation<K>& violation) const;
 
   ResolvedCriteria criteria_;
@@ -84,6 +103,7 @@ class Engine {
   StarComplex<K> complex_;
   SizeField<K> sizes_;
   ViolationBook<K> book_;
+  FaceBook<K> faces_;
   FilledMesh<K> filled_;
   std::uint64_t before_good_points_ = 0;  // vertices when R1 and R2 first held
 };

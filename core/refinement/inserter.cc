@@ -14,6 +14,8 @@ namespace {
 constexpr double kNearAim = 0.25;
 // Good points are chosen off the centre.
 constexpr double kGoodPointSpacing = 0.25;
+// A split falls near the middle of what it splits.
+constexpr double kSplitSpacing = 0.3;
 // True points fall elsewhere than predicted: one that comes nearer to another than this share of
 // the spacing that was planned for it would cost quality.
 constexpr double kKeptSpacing = 0.95;
@@ -62,6 +64,7 @@ void Inserter<K>::InsertTargets() {
 
 template <int K>
 double Inserter<K>::Clearance(const Target<K>& t) const {
+  if (t.violation.split) return kSplitSpacing * t.radius;
   return t.is_coarse() ? caution_.coarse_spacing * std::min(t.size_bound, t.radius)
                        : caution_.empty_ball * t.radius;
 }
@@ -77,6 +80,10 @@ typename Inserter<K>::RefinedPoint Inserter<K>::JudgeRefined(std::size_t i) cons
   const StarComplex<K>& complex = to_.complex;
   judged.duplicate = complex.AnyWithin(y, Clearance(t));
   judged.cuts_violation = !judged.duplicate && complex.CutsVertex(t.star, t.violation.vertex, y);
+  if (to_.faces.has_walls()) {
+    judged.encroached = complex.EncroachedBy(y, t.violation.walls);
+    judged.beyond = answers_.Beyond(c);
+  }
   judged.near_aim = !caution_.is_rehearsal && Distance(y, candidates_.points.col(c).data(),
                                                        complex.d()) <= kNearAim * t.radius;
   return judged;
@@ -93,6 +100,7 @@ void Inserter<K>::InsertRefined(std::size_t i, RefinedPoint judged, bool* all_ne
       NoteFailedAttempt(t.star);
     return;
   }
+  if (YieldsToFaces(judged, t, c)) return NoteFailedAttempt(t.star);
   const double* y = answers_.points.col(c).data();
   // Another of this round may have come near, unless all have stayed near where they were aimed.
   *all_near_aim = *all_near_aim && judged.near_aim;
@@ -104,6 +112,28 @@ void Inserter<K>::InsertRefined(std::size_t i, RefinedPoint judged, bool* all_ne
   }
   done_.front_moved = done_.front_moved || t.violation.fake;
   Insert(c, t.violation.rule, t.star);
+}
+
+// What spoils a face of lower dimension, or lies beyond a wall, is not inserted: that face is
+// refined instead, or found.
+template <int K>
+bool Inserter<K>::YieldsToFaces(const RefinedPoint& judged, const Target<K>& t, Eigen::Index c) {
+  if (judged.encroached) {
+    const auto& [star, vertex] = *judged.encroached;
+    to_.faces.NoteEncroached({star, to_.complex.cell(star).key(vertex), t.violation.rule});
+    return true;
+  }
+  if (!judged.beyond) return false;
+  to_.faces.Discover(answers_.points.col(c), t.violation.walls, *judged.beyond);
+  return true;
+}
+
+// Whether a point is in M and spoils no face.
+template <int K>
+bool Inserter<K>::FitsFaces(Eigen::Index c) const {
+  return !to_.faces.has_walls() ||
+         (!answers_.Beyond(c) &&
+          !to_.complex.EncroachedBy(answers_.points.col(c).data(), WallsOf(c)));
 }
 
 template <int K>
@@ -118,13 +148,14 @@ int Inserter<K>::BestCandidate(std::size_t i) const {
     if (!answers_.found[static_cast<std::size_t>(c)]) continue;
     const double* y = answers_.points.col(c).data();
     if (!complex.CutsVertex(t.star, t.violation.vertex, y) ||
-        complex.AnyWithin(y, kGoodPointSpacing * t.radius))
+        complex.AnyWithin(y, kGoodPointSpacing * t.radius) || !FitsFaces(c))
       continue;
     const int index = static_cast<int>(c - first);
     if (to_.criteria.candidates == 1) return index;
-    complex.TryPoint(y, answers_.tangents.col(c).data(), t.star, scratch, &tentative);
+    complex.TryPoint(y, answers_.tangents.col(c).data(), t.star, scratch, &tentative, WallsOf(c),
+                     ConormalsOf(c));
     const int bad = CountBad<K>(complex, y, tentative, to_.criteria.shape,
-                                to_.criteria.small_sliver_radius * t.radius, fewest);
+                                to_.criteria.small_sliver_radius * t.radius, fewest, WallsOf(c));
     if (bad < fewest) {
       fewest = bad;
       best = index;
@@ -137,6 +168,15 @@ template <int K>
 void Inserter<K>::InsertGoodPoint(std::size_t i, int best) {
   const Target<K>& t = candidates_.targets[i];
   if (best < 0) {
+    // The first that is in the way of a face has that refined.
+    for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c) {
+      if (!to_.faces.has_walls() || !answers_.found[static_cast<std::size_t>(c)]) continue;
+      RefinedPoint judged;
+      judged.encroached =
+          to_.complex.EncroachedBy(answers_.points.col(c).data(), t.violation.walls);
+      judged.beyond = answers_.Beyond(c);
+      if (YieldsToFaces(judged, t, c)) break;
+    }
     to_.book.NoteNoFlat(t.star);  // if that was why
     return NoteFailedAttempt(t.star);
   }
@@ -154,6 +194,15 @@ void Inserter<K>::InsertPlanned() {
     if (to_.complex.size() >= max_vertices_) break;
     const Eigen::Index c = candidates_.drawn() + i;
     if (!answers_.found[static_cast<std::size_t>(c)]) continue;
+    if (!FitsFaces(c)) {
+      if (const auto beyond = answers_.Beyond(c))
+        to_.faces.Discover(answers_.points.col(c), WallsOf(c), *beyond);
+      continue;
+    }
+    if (K - CountWalls(WallsOf(c)) > to_.faces.stage()) {  // corners and their collars come first
+      to_.faces.KeepSeed(answers_.points.col(c), WallsOf(c));
+      continue;
+    }
     if (to_.complex.AnyWithin(answers_.points.col(c).data(), kKeptSpacing * planned.spacing[i])) {
       ++done_.duplicates;
       continue;
@@ -164,7 +213,8 @@ void Inserter<K>::InsertPlanned() {
 
 template <int K>
 void Inserter<K>::Insert(Eigen::Index c, Rule rule, std::uint32_t near) {
-  to_.complex.Append(answers_.points.col(c).data(), answers_.tangents.col(c).data(), near);
+  to_.complex.Append(answers_.points.col(c).data(), answers_.tangents.col(c).data(), near,
+                     WallsOf(c), ConormalsOf(c));
   if (answers_.sizes.size() > 0) to_.sizes.AppendGiven(answers_.sizes[c]);
   done_.used[static_cast<std::size_t>(c)] = 1;
   done_.rules.push_back(rule);

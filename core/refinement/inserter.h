@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/base/instantiate.h"
 #include "core/refinement/candidate_set.h"
+#include "core/refinement/face_book.h"
 #include "core/refinement/size_field.h"
 #include "core/refinement/violation_book.h"
 
@@ -48,6 +50,7 @@ class Inserter {
     SizeField<K>& sizes;
     ViolationBook<K>& book;
     const ResolvedCriteria& criteria;
+    FaceBook<K>& faces;
   };
   // max_vertices: the planned points go no further.
   Inserter(const Parts& to, const CandidateSet<K>& candidates, const AnsweredPoints& answers,
@@ -62,6 +65,9 @@ class Inserter {
     bool duplicate = false;       // too near another point
     bool cuts_violation = false;  // takes the violating simplex out of its star
     bool near_aim = false;        // lies near where it was aimed
+    // Of manifolds with boundary: it would spoil that face simplex; it lies beyond that wall.
+    std::optional<typename StarComplex<K>::CellVertex> encroached;
+    std::optional<int> beyond;
   };
   double Clearance(const Target<K>& target) const;
   RefinedPoint JudgeRefined(std::size_t target) const;
@@ -70,6 +76,14 @@ class Inserter {
   void InsertGoodPoint(std::size_t target, int best);
   void InsertTargets();
   void InsertPlanned();
+  bool YieldsToFaces(const RefinedPoint& judged, const Target<K>& target, Eigen::Index candidate);
+  bool FitsFaces(Eigen::Index candidate) const;
+  WallSet WallsOf(Eigen::Index candidate) const {
+    return answers_.walls.empty() ? 0 : answers_.walls[static_cast<std::size_t>(candidate)];
+  }
+  const double* ConormalsOf(Eigen::Index candidate) const {
+    return answers_.walls.empty() ? nullptr : answers_.conormals.col(candidate).data();
+  }
   void Insert(Eigen::Index candidate, Rule rule, std::uint32_t near);
   void NoteFailedAttempt(std::uint32_t star);
 

@@ -79,7 +79,7 @@ PlannedPoints Rehearse(const Engine<K>& engine, std::uint64_t round,
     double nearest2 = INFINITY;
     const auto& cell = rehearsed.cell(p);
     for (std::size_t f = 0; f < cell.facet_count(); ++f)
-      if (!IsFake(cell.id(f))) nearest2 = std::min(nearest2, rehearsed.EdgeLength2(p, f));
+      if (IsSample(cell.id(f))) nearest2 = std::min(nearest2, rehearsed.EdgeLength2(p, f));
     planned.spacing[i] = std::isinf(nearest2) ? engine.criteria().epsilon : std::sqrt(nearest2);
   }
   std::vector<double> centre(static_cast<std::size_t>(d));

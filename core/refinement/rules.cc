@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 #include <vector>
 
 #include "core/geometry/reach.h"
@@ -43,11 +44,45 @@ double GramDeterminant(double (&g)[K][K], int j) {
   return det;
 }
 
+// Of a star at the boundary, whose vertices are dual to simplices of several faces.
+template <int K>
+std::optional<Violation<K>> WorstSizeOrShapeOnFaces(const StarComplex<K>& complex, std::uint32_t p,
+                                                    double epsilon, double radius_edge_bound,
+                                                    int stage) {
+  const auto& cell = complex.cell(p);
+  std::optional<Violation<K>> worst;
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+    const auto simplex = complex.FaceSimplexOf(p, cell, v);
+    const int dimension = simplex.dimension();
+    if (dimension == 0 || dimension > stage) continue;
+    const double norm2 = cell.norm2(v);
+    double edge2 = INFINITY;
+    for (int i = 0; i < simplex.count; ++i) {
+      const std::uint32_t q = simplex.ids[static_cast<std::size_t>(i)];
+      if (q != p)
+        edge2 = std::min(edge2, SquaredDistance(complex.Point(p), complex.Point(q), complex.d()));
+    }
+    const bool large = simplex.fake || norm2 > epsilon * epsilon;
+    if (!large && !simplex.foreign && norm2 <= radius_edge_bound * radius_edge_bound * edge2)
+      continue;
+    const Rule rule = large ? Rule::kSize : Rule::kRadiusEdge;
+    if (worst && std::tuple(worst->dimension(), worst->rule, -worst->radius) <=
+                     std::tuple(dimension, rule, -std::sqrt(norm2)))
+      continue;
+    worst = AtVertex<K>(rule, cell, v, simplex.fake);
+    worst->walls = simplex.walls;
+  }
+  return worst;
+}
+
 }  // namespace
 
 template <int K>
 std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std::uint32_t p,
-                                             double epsilon, double radius_edge_bound) {
+                                             double epsilon, double radius_edge_bound, int stage) {
+  if (complex.walls(p) != 0)
+    return WorstSizeOrShapeOnFaces<K>(complex, p, epsilon, radius_edge_bound, stage);
+  if (stage < K) return std::nullopt;
   const auto& cell = complex.cell(p);
   std::optional<std::size_t> worst;
   double worst_norm2 = 0;
@@ -165,9 +200,44 @@ bool LeansTooFar(const StarComplex<K>& complex, std::uint32_t p, const double* a
   return false;
 }
 
+namespace {
+
+template <int K>
+std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const StarComplex<K>& complex,
+                                                             std::uint32_t p,
+                                                             const ShapeBounds& bounds, int stage) {
+  const auto& cell = complex.cell(p);
+  std::optional<Violation<K>> worst;
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+    const auto simplex = complex.FaceSimplexOf(p, cell, v);
+    const int dimension = simplex.dimension();
+    if (dimension == 0 || dimension > stage) continue;
+    if (simplex.fake) return std::nullopt;  // R1 gave up there: nothing to judge yet
+    const bool whole = dimension == K, held = simplex.ids[0] == p;
+    const bool thin =
+        whole && held && bounds.sliver_bound > 0 &&
+        HasThinFaceAt<K>(complex, complex.Point(p), cell, v, bounds.sliver_bound, nullptr);
+    if (!thin && IsConsistent<K>(complex, p, v) &&
+        !(whole && complex.judging() == Judging::kCommonCentre && IsFolded<K>(complex, p, v)))
+      continue;
+    const Rule rule = thin ? Rule::kSliver : Rule::kInconsistent;
+    if (worst && std::tuple(worst->dimension(), worst->rule, -worst->radius) <=
+                     std::tuple(dimension, rule, -std::sqrt(cell.norm2(v))))
+      continue;
+    worst = AtVertex<K>(rule, cell, v, false);
+    worst->walls = simplex.walls;
+  }
+  return worst;
+}
+
+}  // namespace
+
 template <int K>
 std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& complex,
-                                                      std::uint32_t p, const ShapeBounds& bounds) {
+                                                      std::uint32_t p, const ShapeBounds& bounds,
+                                                      int stage) {
+  if (complex.walls(p) != 0) return WorstSliverOrInconsistentOnFaces<K>(complex, p, bounds, stage);
+  if (stage < K) return std::nullopt;
   const auto& cell = complex.cell(p);
   if (!cell.bounded()) return std::nullopt;  // R1 gave up there: nothing to judge yet
   std::optional<std::size_t> worst;
@@ -205,7 +275,7 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& comp
 template <int K>
 int CountBad(const StarComplex<K>& complex, const double* point,
              const typename StarComplex<K>::Tentative& tentative, const ShapeBounds& bounds,
-             double small_radius, int enough) {
+             double small_radius, int enough, WallSet walls) {
   using Cell = RestrictedVoronoiCell<K>;
   using Simplex = typename StarComplex<K>::Simplex;
   const std::uint32_t id = complex.size();
@@ -216,12 +286,31 @@ int CountBad(const StarComplex<K>& complex, const double* point,
     return at != tentative.cut.end() && at->first == q ? &at->second : nullptr;
   };
   int bad = 0;
+  const auto has = [](const Cell& cell, std::uint32_t q, std::uint64_t key) {
+    return cell.Find(key - Mix64(q)) < cell.vertex_count();
+  };
+  // Of a simplex of a face: is it none, foreign, or one that stars disagree about?
+  const auto is_bad_face = [&](std::uint32_t p, const Cell& cell, std::size_t v) {
+    const auto face = complex.FaceSimplexOf(p, cell, v, walls);
+    if (face.fake || face.foreign) return true;
+    const bool fresh = face.ids[static_cast<std::size_t>(face.count - 1)] == id;
+    const std::uint64_t key = SimplexKey<K>(cell, v, p);
+    for (int i = 0; i < face.count; ++i) {
+      const std::uint32_t q = face.ids[static_cast<std::size_t>(i)];
+      if (q == p) continue;
+      const Cell* other = changed(q);
+      if (!other && !fresh) continue;
+      if (!other || !has(*other, q, key)) return true;
+    }
+    return false;
+  };
   const auto survey = [&](std::uint32_t p, const double* at, const Cell& cell) {
     Simplex simplex;
+    const bool on_boundary = (p == id ? walls : complex.walls(p)) != 0;
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
       if (bad >= enough) return;
       if (!complex.SimplexOf(p, cell, v, &simplex)) {
-        ++bad;
+        bad += !on_boundary || is_bad_face(p, cell, v);
         continue;
       }
       const bool fresh = simplex.back() == id;  // an old simplex was judged before
@@ -266,16 +355,16 @@ int CountBad(const StarComplex<K>& complex, const double* point,
 
 #define STELLATE_INSTANTIATE(K)                                                                   \
   template std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>&, std::uint32_t,     \
-                                                        double, double);                          \
+                                                        double, double, int);                     \
   template std::optional<Violation<K>> WorstSliverOrInconsistent(                                 \
-      const StarComplex<K>&, std::uint32_t, const ShapeBounds&);                                  \
+      const StarComplex<K>&, std::uint32_t, const ShapeBounds&, int);                             \
   template bool HasThinFaceAt(const StarComplex<K>&, const double*,                               \
                               const RestrictedVoronoiCell<K>&, std::size_t, double,               \
                               const double*);                                                     \
   template bool LeansTooFar(const StarComplex<K>&, std::uint32_t, const double*,                  \
                             const RestrictedVoronoiCell<K>&, std::size_t, double, const double*); \
   template int CountBad(const StarComplex<K>&, const double*, const StarComplex<K>::Tentative&,   \
-                        const ShapeBounds&, double, int);
+                        const ShapeBounds&, double, int, WallSet);
 STELLATE_INSTANTIATE(1)
 STELLATE_INSTANTIATE(2)
 STELLATE_INSTANTIATE(3)

@@ -29,23 +29,33 @@ struct Violation {
   std::size_t vertex = 0;  // of p's cell, as long as that does not change
   bool fake = false;       // not a simplex yet: the cell is unbounded there
   bool lean = false;       // of R3: it is no sliver, but leans too far for a proof
+  WallSet walls = 0;       // of the dual vertex: the simplex is one of their face
+  bool split = false;      // it breaks no rule, but a point off its face would come too near
+
+  int dimension() const { return K - CountWalls(walls); }
 };
 
 // R1 and R2, which need star(p) alone: the worst simplex of the first rule that one breaks, by R_p
 // for R1 and by rho for R2. Of rho, star(p) looks at the edges at p: the others are at some other
 // vertex of the simplex, whose star looks at them.
+//
+// Faces of dimension at most `stage` are looked at, those of the lowest dimension first; to R2
+// there belongs that no simplex is foreign.
 template <int K>
 std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std::uint32_t p,
-                                             double epsilon, double radius_edge_bound);
+                                             double epsilon, double radius_edge_bound,
+                                             int stage = K);
 
 // R3 and R4, which need the neighbours' stars, and star(p) closed: first the worst simplex, by R_p,
 // that is or contains a sliver and whose lowest vertex p is, then the worst one that is
 // inconsistent, or, where stars are judged at common centres, that lies on the same side as a
 // neighbour of the facet they share in T_pM: such a star is no embedded disk although all its
-// vertices agree on it; last the worst one whose lowest vertex p is and that leans too far.
+// vertices agree on it; last the worst one whose lowest vertex p is and that leans too far. Of
+// faces up to `stage`, those of the lowest dimension first.
 template <int K>
 std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& complex,
-                                                      std::uint32_t p, const ShapeBounds& bounds);
+                                                      std::uint32_t p, const ShapeBounds& bounds,
+                                                      int stage = K);
 
 // Whether the simplex on p and the facets of v is or contains a Theta0-sliver (Sec. 2.3): that is,
 // whether some face at p, of dimension 2 or more, has fatness below Theta0^j.
@@ -63,11 +73,11 @@ bool LeansTooFar(const StarComplex<K>& complex, std::uint32_t p, const double* a
                  const double* unborn);
 
 // How bad a tentative insertion would leave its surroundings: the new slivers of circumradius at
-// most `small_radius`, and the simplices that stars would disagree about. Counts no further than
-// `enough`.
+// most `small_radius`, the simplices that stars would disagree about, and foreign ones. Counts no
+// further than `enough`. `walls`: that the point is on.
 template <int K>
 int CountBad(const StarComplex<K>& complex, const double* point,
              const typename StarComplex<K>::Tentative& tentative, const ShapeBounds& bounds,
-             double small_radius, int enough);
+             double small_radius, int enough, WallSet walls = 0);
 
 }  // namespace stellate::core

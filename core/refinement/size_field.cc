@@ -38,10 +38,10 @@ double SizeField<K>::SeenFrom(const StarComplex<K>& complex, std::uint32_t p) co
   const auto& cell = complex.cell(p);
   double longest2 = 0;
   for (std::size_t f = 0; f < cell.facet_count(); ++f)
-    if (!IsFake(cell.id(f))) longest2 = std::max(longest2, complex.EdgeLength2(p, f));
+    if (IsSample(cell.id(f))) longest2 = std::max(longest2, complex.EdgeLength2(p, f));
   double size = INFINITY;
   for (std::size_t f = 0; f < cell.facet_count(); ++f) {
-    if (IsFake(cell.id(f))) continue;
+    if (!IsSample(cell.id(f))) continue;
     double along[K];
     const double distance2 = 2 * complex.HalfSpace(p, f, along);
     if (distance2 < kTellingEdge * kTellingEdge * longest2) continue;
@@ -67,7 +67,7 @@ double SizeField<K>::Estimate(const StarComplex<K>& complex, std::uint32_t p) co
   const auto& cell = complex.cell(p);
   for (std::size_t f = 0; f < cell.facet_count(); ++f) {
     const std::uint32_t q = cell.id(f);
-    if (IsFake(q)) continue;
+    if (!IsSample(q)) continue;
     const double there = q < spread_.size() ? std::min(spread_[q], seen_[q]) : seen_[q];
     size = std::min(size, there + std::sqrt(complex.EdgeLength2(p, f)));
   }
@@ -92,7 +92,7 @@ void SizeField<K>::Spread(const StarComplex<K>& complex) {
     const auto& cell = complex.cell(p);
     for (std::size_t f = 0; f < cell.facet_count(); ++f) {
       const std::uint32_t q = cell.id(f);
-      if (IsFake(q)) continue;
+      if (!IsSample(q)) continue;
       const double there = size + std::sqrt(complex.EdgeLength2(p, f));
       if (!(there < spread_[q])) continue;
       spread_[q] = there;

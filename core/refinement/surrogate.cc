@@ -87,7 +87,7 @@ void Surrogate<K>::Fit(std::uint32_t p, std::uint32_t slot) {
   double total = 0;
   for (std::size_t f = 0; f < cell.facet_count(); ++f) {
     const std::uint32_t neighbour = cell.id(f);
-    if (IsFake(neighbour)) continue;
+    if (!IsSample(neighbour)) continue;
     const Frame other(complex_.Tangent(neighbour), d, K);
     const Eigen::Matrix<double, K, K> turn = tangent.transpose() * other;
     if (turn.squaredNorm() < K - 1 + kLeastCosine * kLeastCosine) continue;

@@ -50,6 +50,8 @@ class ViolationBook {
   int failed_attempts(std::uint32_t star) const { return failed_attempts_[star]; }
   bool is_given_up(std::uint32_t star) const { return failed_attempts_[star] > kMostAttempts; }
   void NoteFailedAttempt(std::uint32_t star);
+  // What failed may succeed by other rules.
+  void ForgetAttempts() { failed_attempts_.assign(failed_attempts_.size(), 0); }
   void GiveUp(std::uint32_t star) { failed_attempts_[star] = kMostAttempts + 1; }
 
   // Stars for which an intersection with a flat was not found: closest points are asked for

@@ -42,6 +42,8 @@ void BatchParts::Cut() {
     piece.kind = block.kind;
     piece.want_tangents = block.want_tangents;
     piece.want_sizes = block.want_sizes;
+    piece.face = block.face;
+    piece.want_clearances = block.want_clearances;
     piece.points = block.points.middleCols(from, count);
     if (block.bases.size() > 0) piece.bases = block.bases.middleCols(from, count);
     if (block.radii.size() > 0) piece.radii = block.radii.segment(from, count);
@@ -67,6 +69,15 @@ Answers BatchParts::With(const Answers& answers) const {
     if (asked.want_sizes && piece.sizes.size() > 0) {
       if (block.sizes.size() == 0) block.sizes.setZero(asked.size());
       block.sizes.segment(from, count) = piece.sizes;
+    }
+    const auto join = [&](Eigen::MatrixXd& joined, const Eigen::MatrixXd& more) {
+      if (more.size() == 0) return;
+      if (joined.size() == 0) joined.setZero(more.rows(), asked.size());
+      joined.middleCols(from, count) = more;
+    };
+    if (asked.want_clearances) {
+      join(block.clearances, piece.clearances);
+      join(block.conormals, piece.conormals);
     }
   });
   return all;

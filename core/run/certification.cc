@@ -21,8 +21,13 @@ double MaxAgreedNorm2(const StarComplex<K>& complex, std::uint32_t p) {
   return most;
 }
 
-MeshView WithSimplices(MeshView mesh, const std::vector<std::uint32_t>& simplices) {
+MeshView WithSimplices(MeshView mesh, const std::vector<std::uint32_t>& simplices,
+                       const std::optional<BoundaryOfMesh>& boundary) {
   mesh.simplices = &simplices;
+  if (!boundary) return mesh;
+  mesh.walls = boundary->walls.data();
+  mesh.outward = boundary->outward.data();
+  mesh.faces = &boundary->faces;
   return mesh;
 }
 
@@ -45,16 +50,37 @@ StarFacts FactsOf(Engine<K>& engine) {
 
 Certification::Certification(const Specification& spec, MeshView mesh,
                              std::vector<std::uint32_t> simplices, const StarFacts& facts,
-                             KnownOfManifold known)
+                             KnownOfManifold known, std::optional<BoundaryOfMesh> boundary)
     : simplices_(std::move(simplices)),
-      certifier_(spec, WithSimplices(mesh, simplices_), facts, std::move(known)) {}
+      boundary_(std::move(boundary)),
+      certifier_(spec, WithSimplices(mesh, simplices_, boundary_), facts, std::move(known)) {}
 
 std::vector<QueryBlock> Certification::Questions() {
   const std::vector<QueryBlock>* blocks = certifier_.NextBlocks();
   return blocks ? *blocks : std::vector<QueryBlock>();
 }
 
-#define STELLATE_EACH(K) template StarFacts FactsOf<K>(Engine<K>&);
+template <int K>
+BoundaryOfMesh BoundaryOf(const Engine<K>& engine) {
+  const StarComplex<K>& complex = engine.complex();
+  BoundaryOfMesh boundary;
+  boundary.walls.resize(complex.size());
+  boundary.outward.assign(std::size_t{complex.size()} * K, 0);
+  for (std::uint32_t p = 0; p < complex.size(); ++p) {
+    CheckInterruption(p);
+    boundary.walls[p] = complex.walls(p);
+    for (int w = 0; w < CountWalls(complex.walls(p)); ++w)
+      for (int a = 0; a < K; ++a)
+        boundary.outward[std::size_t{p} * K + static_cast<std::size_t>(a)] +=
+            complex.Conormals(p)[w * K + a];
+  }
+  boundary.faces = engine.Faces();
+  return boundary;
+}
+
+#define STELLATE_EACH(K)                     \
+  template StarFacts FactsOf<K>(Engine<K>&); \
+  template BoundaryOfMesh BoundaryOf<K>(const Engine<K>&);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/certificate/certifier.h"
@@ -14,14 +15,25 @@ namespace stellate::core {
 template <int K>
 StarFacts FactsOf(Engine<K>& engine);
 
+// What MeshView has of a manifold with boundary.
+struct BoundaryOfMesh {
+  std::vector<WallSet> walls;   // by vertex
+  std::vector<double> outward;  // k tangent coordinates by vertex
+  std::vector<FaceMesh> faces;
+};
+template <int K>
+BoundaryOfMesh BoundaryOf(const Engine<K>& engine);
+
 // Asks for what a certificate wants to know, and holds it.
 class Certification final : public Asker {
  public:
   // spec      borrowed
   // mesh      its points and tangents are borrowed and must not change; its simplices are set here
   // known     what was learned of M before
+  // boundary  of a manifold with boundary
   Certification(const Specification& spec, MeshView mesh, std::vector<std::uint32_t> simplices,
-                const StarFacts& facts, KnownOfManifold known);
+                const StarFacts& facts, KnownOfManifold known,
+                std::optional<BoundaryOfMesh> boundary = std::nullopt);
 
   std::vector<QueryBlock> Questions() override;
   void Absorb(const std::vector<AnswerBlock>& answers) override { certifier_.Absorb(answers); }
@@ -33,6 +45,7 @@ class Certification final : public Asker {
 
  private:
   std::vector<std::uint32_t> simplices_;
+  std::optional<BoundaryOfMesh> boundary_;
   Certifier certifier_;
 };
 

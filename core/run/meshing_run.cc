@@ -34,7 +34,10 @@ MeshingRun<K>::MeshingRun(Specification spec)
       spare_points_(spec_.ambient_dimension),
       box_watch_(spec_.bounding_box, engine_.criteria().epsilon),
       stall_watch_(K) {
-  AskFor(SeedsOf(spec_), &MeshingRun::InsertSeeds);
+  if (spec_.walls > 0)
+    AskForFaces(SeedsOf(spec_));
+  else
+    AskFor(SeedsOf(spec_), &MeshingRun::InsertSeeds);
   NextQuestions();
 }
 
@@ -136,6 +139,9 @@ Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
   delta_.points =
       Eigen::Map<const Eigen::MatrixXd>(complex.points().data(), complex.d(), complex.size())
           .rightCols(complex.size() - static_cast<Eigen::Index>(delta_.first_vertex));
+  if (spec_.walls > 0)
+    for (auto v = static_cast<std::uint32_t>(delta_.first_vertex); v < complex.size(); ++v)
+      delta_.walls.push_back(complex.walls(v));
   return std::move(delta_);
 }
 
@@ -167,8 +173,8 @@ void MeshingRun<K>::NextQuestions() {
 template <int K>
 void MeshingRun<K>::Ask(CandidateSet<K> candidates, Insertion then) {
   certification_.reset();
-  trip_ =
-      std::make_unique<RoundTrip<K>>(engine_, spec_.oracle, tangent_finder_, std::move(candidates));
+  trip_ = std::make_unique<RoundTrip<K>>(engine_, spec_.oracle, tangent_finder_,
+                                         std::move(candidates), spec_.walls);
   insertion_ = then;
 }
 
@@ -235,7 +241,7 @@ void MeshingRun<K>::InsertCandidates() {
   counts.inserted_inconsistent += count(Rule::kInconsistent);
   counts.duplicates += inserted.duplicates;
   if (inserted.front_moved) stall_watch_.NoteFrontMoved();
-  if (engine_.criteria().flat_alternations == 1)
+  if (engine_.criteria().flat_alternations == 1 && spec_.walls == 0)
     rim_watch_.Look(trip_->candidates(), trip_->answers());
   rehearsal_failed_ = inserted.rules.empty();
   spare_points_.Keep(trip_->answers(), inserted.used);
@@ -248,6 +254,7 @@ void MeshingRun<K>::InsertSpares() {
   for (std::size_t i = 0; i < used.size(); ++i) {
     if (!answers.found[i]) continue;
     if (engine_.is_full()) break;
+    if (answers.Beyond(static_cast<Eigen::Index>(i))) continue;
     engine_.Append(answers, static_cast<Eigen::Index>(i));
     used[i] = 1;
   }
@@ -263,7 +270,9 @@ void MeshingRun<K>::Plan() {
   if (box_watch_.has_left()) return Finish(Termination::kNoProgress);
   auto targets = engine_.Plan();
   if (!targets) return Finish(Termination::kNoProgress);
-  if (targets->empty())
+  if (spec_.walls > 0 && !PlanFaces(&targets)) return;
+  FaceBook<K>& faces = engine_.faces();
+  if (targets->empty() && !faces.has_discoveries())
     return engine_.AllRulesHold() ? Certify() : Finish(Termination::kNoProgress);
   const ViolationBook<K>& book = engine_.book();
   if (stall_watch_.IsHopeless(book.size_and_shape().size(), engine_.complex().size()) ||
@@ -275,7 +284,7 @@ void MeshingRun<K>::Plan() {
   if (engine_.criteria().ask_ahead && !rehearsal_failed_)
     planned = Rehearse<K>(engine_, whole_rounds_, &*targets);
   CandidateSet<K> candidates = engine_.Draw(std::move(*targets), whole_rounds_);
-  candidates.planned = std::move(planned);
+  candidates.planned = faces.has_walls() ? engine_.TakeDiscoveries() : std::move(planned);
   Ask(std::move(candidates), &MeshingRun::InsertCandidates);
 }
 
@@ -295,9 +304,10 @@ void MeshingRun<K>::Certify() {
   mesh.points = complex.points().data();
   mesh.tangents = complex.Tangent(0);
   trip_.reset();
-  certification_ =
-      std::make_unique<Certification>(spec_, mesh, engine_.Simplices(), facts,
-                                      KnownOfManifold{spare_points_.Take(), rim_watch_.leans()});
+  certification_ = std::make_unique<Certification>(
+      spec_, mesh, engine_.Simplices(), facts,
+      KnownOfManifold{spare_points_.Take(), rim_watch_.leans()},
+      spec_.walls > 0 ? std::optional(BoundaryOf<K>(engine_)) : std::nullopt);
 }
 
 template <int K>

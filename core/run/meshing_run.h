@@ -57,6 +57,9 @@ class MeshingRun final : public Mesher {
   // What follows when an asker is done.
   void AfterTrip();
   void InsertSeeds();
+  void AskForFaces(const Eigen::MatrixXd& seeds);
+  void KeepFaceSeeds();
+  bool PlanFaces(std::optional<std::vector<Target<K>>>* targets);
   void InsertCandidates();
   void InsertSpares();
   void Plan();

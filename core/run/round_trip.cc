@@ -1,38 +1,73 @@
 #include "core/run/round_trip.h"
 
+#include <cmath>
+
 #include "core/base/basis_layout.h"
 #include "core/base/parallel.h"
+#include "core/base/vector_ops.h"
 
 namespace stellate::core {
 
 template <int K>
 RoundTrip<K>::RoundTrip(const Engine<K>& engine, const OracleCapabilities& oracle,
-                        TangentFinder& finder, CandidateSet<K> candidates)
-    : engine_(engine), oracle_(oracle), finder_(finder), candidates_(std::move(candidates)) {
-  const bool alternates = !oracle_.intersect_flat && candidates_.planned.size() == 0;
+                        TangentFinder& finder, CandidateSet<K> candidates, int walls)
+    : engine_(engine),
+      oracle_(oracle),
+      walls_(walls),
+      finder_(finder),
+      candidates_(std::move(candidates)) {
+  const bool alternates = !oracle_.intersect_flat && candidates_.planned.size() == 0 && walls_ == 0;
   if (alternates) alternations_left_ = engine_.criteria().flat_alternations - 1;
   AskForAll();
 }
 
 template <int K>
-QueryBlock RoundTrip<K>::NewBlock(QueryKind kind) const {
+QueryBlock RoundTrip<K>::NewBlock(QueryKind kind, WallSet face) const {
   QueryBlock block;
   block.kind = kind;
+  block.face = face;
+  block.want_clearances = walls_ > 0;
   block.want_tangents = oracle_.tangent_basis;
   block.want_sizes = engine_.criteria().sizes_given;
   return block;
 }
 
-// A block of flats, one of closest points, and one of the planned points, as far as there are any.
+// A block of flats, one of closest points for each face, and one of the planned points for each of
+// theirs, as far as there are any.
 template <int K>
 void RoundTrip<K>::AskForAll() {
   places_.reserve(static_cast<std::size_t>(candidates_.size()));
   if (candidates_.drawn() > 0) AskForDrawn();
-  if (candidates_.planned.size() == 0) return;
-  const int block = static_cast<int>(open_.size());
-  open_.push_back(NewBlock(QueryKind::kClosestPoint));
-  open_.back().points = candidates_.planned.points;
-  for (Eigen::Index i = 0; i < candidates_.planned.size(); ++i) places_.emplace_back(block, i);
+  const PlannedPoints& planned = candidates_.planned;
+  if (planned.size() == 0) return;
+  std::vector<WallSet> faces = planned.walls;
+  faces.resize(static_cast<std::size_t>(planned.size()), 0);
+  const std::map<WallSet, int> block_of = OpenBlocks(faces);
+  std::vector<Eigen::Index> next(open_.size(), 0);
+  for (Eigen::Index i = 0; i < planned.size(); ++i) {
+    const int block = block_of.at(faces[static_cast<std::size_t>(i)]);
+    const Eigen::Index column = next[static_cast<std::size_t>(block)]++;
+    open_[static_cast<std::size_t>(block)].points.col(column) = planned.points.col(i);
+    places_.emplace_back(block, column);
+  }
+}
+
+// Opens a block of closest points for each of the faces that occur, ascending, with room for as
+// many as do. Returns the faces' blocks.
+template <int K>
+std::map<WallSet, int> RoundTrip<K>::OpenBlocks(const std::vector<WallSet>& faces) {
+  std::map<WallSet, Eigen::Index> counts;
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    CheckInterruption(i);
+    ++counts[faces[i]];
+  }
+  std::map<WallSet, int> block_of;
+  for (const auto& [face, count] : counts) {
+    block_of[face] = static_cast<int>(open_.size());
+    open_.push_back(NewBlock(QueryKind::kClosestPoint, face));
+    open_.back().points.resize(engine_.complex().d(), count);
+  }
+  return block_of;
 }
 
 template <int K>
@@ -40,46 +75,49 @@ void RoundTrip<K>::AskForDrawn() {
   const StarComplex<K>& complex = engine_.complex();
   const std::vector<Target<K>>& targets = candidates_.targets;
   Eigen::Index flat_count = 0;
+  std::vector<WallSet> faces;  // of the others, by candidate
   for (std::size_t i = 0; i < targets.size(); ++i) {
     CheckInterruption(i);
-    if (candidates_.in_flats[i]) flat_count += candidates_.first[i + 1] - candidates_.first[i];
+    const Eigen::Index count = candidates_.first[i + 1] - candidates_.first[i];
+    if (candidates_.in_flats[i])
+      flat_count += count;
+    else
+      faces.insert(faces.end(), static_cast<std::size_t>(count), targets[i].violation.walls);
   }
-  const Eigen::Index closest_count = candidates_.drawn() - flat_count;
-  const int closest_block = flat_count > 0;
-  Eigen::Index next_flat = 0, next_closest = 0;
+  if (flat_count > 0) {
+    QueryBlock flats = NewBlock(QueryKind::kIntersectFlat, 0);
+    flats.points.resize(complex.d(), flat_count);
+    flats.bases.resize(complex.d() * K, flat_count);
+    flats.radii.resize(flat_count);
+    open_.push_back(std::move(flats));
+  }
+  const std::map<WallSet, int> block_of = OpenBlocks(faces);
+  std::vector<Eigen::Index> next(open_.size(), 0);
   for (std::size_t i = 0; i < targets.size(); ++i) {
     CheckInterruption(i);
+    const int block = candidates_.in_flats[i] ? 0 : block_of.at(targets[i].violation.walls);
     for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c)
-      places_.push_back(candidates_.in_flats[i] ? std::pair{0, next_flat++}
-                                                : std::pair{closest_block, next_closest++});
+      places_.emplace_back(block, next[static_cast<std::size_t>(block)]++);
   }
-  QueryBlock flats = NewBlock(QueryKind::kIntersectFlat);
-  QueryBlock closest = NewBlock(QueryKind::kClosestPoint);
-  flats.points.resize(complex.d(), flat_count);
-  flats.bases.resize(complex.d() * K, flat_count);
-  flats.radii.resize(flat_count);
-  closest.points.resize(complex.d(), closest_count);
   ParallelFor(targets.size(), [&](std::size_t i) {
     for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c) {
-      const Eigen::Index column = places_[static_cast<std::size_t>(c)].second;
-      if (!candidates_.in_flats[i]) {
-        closest.points.col(column) = candidates_.points.col(c);
-        continue;
-      }
-      flats.points.col(column) = candidates_.points.col(c);
+      const auto [b, column] = places_[static_cast<std::size_t>(c)];
+      QueryBlock& block = open_[static_cast<std::size_t>(b)];
+      block.points.col(column) = candidates_.points.col(c);
+      if (!candidates_.in_flats[i]) continue;
       ToByCoordinate(complex.Tangent(targets[i].star), complex.d(), K,
-                     flats.bases.col(column).data());
-      flats.radii[column] = targets[i].radius;
+                     block.bases.col(column).data());
+      block.radii[column] = targets[i].radius;
     }
   });
-  if (flat_count > 0) open_.push_back(std::move(flats));
-  if (closest_count > 0) open_.push_back(std::move(closest));
 }
 
 template <int K>
 std::vector<QueryBlock> RoundTrip<K>::Questions() {
   std::vector<QueryBlock> asked;
   asked.swap(open_);
+  asked_faces_.clear();
+  for (const QueryBlock& block : asked) asked_faces_.push_back(block.face);
   return asked;
 }
 
@@ -121,6 +159,37 @@ void RoundTrip<K>::Sort(const std::vector<AnswerBlock>& answers) {
     if (block.tangents.size() > 0)
       ToByVector(block.tangents.col(column).data(), d, K, answers_.tangents.col(c).data());
   }
+  if (walls_ > 0) SortFaces(answers);
+}
+
+// What answers say of the walls.
+template <int K>
+void RoundTrip<K>::SortFaces(const std::vector<AnswerBlock>& answers) {
+  const int d = engine_.complex().d();
+  const Eigen::Index count = candidates_.size();
+  answers_.walls.assign(static_cast<std::size_t>(count), 0);
+  answers_.clearances.resize(walls_, count);
+  answers_.conormals.resize(K * K, count);
+  for (Eigen::Index c = 0; c < count; ++c) {
+    const auto i = static_cast<std::size_t>(c);
+    CheckInterruption(i);
+    const auto [b, column] = places_[i];
+    const WallSet face = asked_faces_[static_cast<std::size_t>(b)];
+    const AnswerBlock& block = answers[static_cast<std::size_t>(b)];
+    answers_.walls[i] = face;
+    if (!answers_.found[i]) continue;
+    answers_.clearances.col(c) = block.clearances.col(column);
+    for (int w = 0; w < CountWalls(face); ++w) {
+      const double* conormal = block.conormals.col(column).data() + w * d;
+      double* const own = answers_.conormals.col(c).data() + w * K;
+      double norm2 = 0;
+      for (int a = 0; a < K; ++a) {
+        own[a] = Dot(answers_.tangents.col(c).data() + a * d, conormal, d);
+        norm2 += own[a] * own[a];
+      }
+      for (int a = 0; a < K; ++a) own[a] /= std::sqrt(norm2);
+    }
+  }
 }
 
 // Back to the flat of each candidate, and to M from there.
@@ -128,7 +197,7 @@ template <int K>
 void RoundTrip<K>::AskAgain() {
   --alternations_left_;
   const int d = engine_.complex().d();
-  QueryBlock block = NewBlock(QueryKind::kClosestPoint);
+  QueryBlock block = NewBlock(QueryKind::kClosestPoint, 0);
   block.points = answers_.points;
   for (std::size_t i = 0; i < candidates_.targets.size(); ++i) {
     CheckInterruption(i);

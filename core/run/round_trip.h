@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -19,7 +20,7 @@ class RoundTrip final : public Asker {
  public:
   // The engine and the finder are borrowed; the engine does not change meanwhile.
   RoundTrip(const Engine<K>& engine, const OracleCapabilities& oracle, TangentFinder& finder,
-            CandidateSet<K> candidates);
+            CandidateSet<K> candidates, int walls = 0);
 
   std::vector<QueryBlock> Questions() override;
   void Absorb(const std::vector<AnswerBlock>& answers) override;
@@ -30,19 +31,23 @@ class RoundTrip final : public Asker {
   const AnsweredPoints& answers() const { return answers_; }
 
  private:
-  QueryBlock NewBlock(QueryKind kind) const;
+  QueryBlock NewBlock(QueryKind kind, WallSet face) const;
+  std::map<WallSet, int> OpenBlocks(const std::vector<WallSet>& faces);
   void AskForAll();
   void AskForDrawn();
   void Sort(const std::vector<AnswerBlock>& answers);
+  void SortFaces(const std::vector<AnswerBlock>& answers);
   void AskAgain();
   void AskForTangents();
   void TakeTangents();
 
   const Engine<K>& engine_;
   const OracleCapabilities oracle_;
+  const int walls_;
   TangentFinder& finder_;
   CandidateSet<K> candidates_;
   std::vector<QueryBlock> open_;
+  std::vector<WallSet> asked_faces_;                  // by block, of the open questions
   std::vector<std::pair<int, Eigen::Index>> places_;  // by candidate: block and column of open_
   int alternations_left_ = 0;
   bool finds_tangents_ = false;

@@ -29,7 +29,7 @@ void SparePoints::Keep(const AnsweredPoints& answers, const std::vector<std::uin
   for (Eigen::Index c = 0; c < answers.points.cols(); ++c) {
     CheckInterruption(static_cast<std::size_t>(c));
     const auto i = static_cast<std::size_t>(c);
-    if (!answers.answered[i] || used[i]) continue;
+    if (!answers.answered[i] || used[i] || answers.Beyond(c)) continue;
     points_.insert(points_.end(), answers.points.col(c).begin(), answers.points.col(c).end());
   }
 }

@@ -23,6 +23,7 @@ constexpr Row kRows[] = {
      StatusCode::kOracleOutsideRadius},
     {FailureReason::kOracleBadTangent, "ORACLE_BAD_TANGENT", StatusCode::kOracleBadTangent},
     {FailureReason::kOracleBadSize, "ORACLE_BAD_SIZE", StatusCode::kOracleBadSize},
+    {FailureReason::kOracleBadConormal, "ORACLE_BAD_CONORMAL", StatusCode::kOracleBadConormal},
     {FailureReason::kOracleNotIdempotent, "ORACLE_NOT_IDEMPOTENT",
      StatusCode::kOracleNotIdempotent},
     {FailureReason::kOracleFailed, "ORACLE_FAILED", StatusCode::kOracleFailed},

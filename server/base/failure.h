@@ -22,6 +22,7 @@ enum class FailureReason {
   kOracleOutsideRadius,
   kOracleBadTangent,
   kOracleBadSize,
+  kOracleBadConormal,
   kOracleNotIdempotent,
   kOracleFailed,
   kFailedPrecondition,

@@ -32,6 +32,7 @@ constexpr ReasonRow kCodes[] = {
     {v1::ERROR_REASON_ORACLE_OUTSIDE_RADIUS, grpc::StatusCode::INVALID_ARGUMENT},
     {v1::ERROR_REASON_ORACLE_BAD_TANGENT, grpc::StatusCode::INVALID_ARGUMENT},
     {v1::ERROR_REASON_ORACLE_BAD_SIZE, grpc::StatusCode::INVALID_ARGUMENT},
+    {v1::ERROR_REASON_ORACLE_BAD_CONORMAL, grpc::StatusCode::INVALID_ARGUMENT},
     {v1::ERROR_REASON_ORACLE_NOT_IDEMPOTENT, grpc::StatusCode::INVALID_ARGUMENT},
     {v1::ERROR_REASON_ORACLE_FAILED, grpc::StatusCode::ABORTED},
 };
@@ -52,6 +53,7 @@ constexpr CoreRow kReasons[] = {
     {core::StatusCode::kOracleOutsideRadius, v1::ERROR_REASON_ORACLE_OUTSIDE_RADIUS},
     {core::StatusCode::kOracleBadTangent, v1::ERROR_REASON_ORACLE_BAD_TANGENT},
     {core::StatusCode::kOracleBadSize, v1::ERROR_REASON_ORACLE_BAD_SIZE},
+    {core::StatusCode::kOracleBadConormal, v1::ERROR_REASON_ORACLE_BAD_CONORMAL},
     {core::StatusCode::kOracleNotIdempotent, v1::ERROR_REASON_ORACLE_NOT_IDEMPOTENT},
     {core::StatusCode::kOracleFailed, v1::ERROR_REASON_ORACLE_FAILED},
     {core::StatusCode::kFailedPrecondition, v1::ERROR_REASON_FAILED_PRECONDITION},

@@ -189,6 +189,8 @@ void ToProto(const DeltaPart& part, int k, int d, v1::DeltaChunk* out) {
   ToProto(part.points.data(), {part.points.size() / dimension, dimension}, delta->mutable_points());
   ToProto(part.added, row_size, delta->mutable_added());
   ToProto(part.removed, row_size, delta->mutable_removed());
+  delta->mutable_boundary_vertices()->Add(part.boundary.begin(), part.boundary.end());
+  delta->mutable_boundary_walls()->Add(part.walls.begin(), part.walls.end());
   out->set_complete(part.complete);
 }
 
@@ -198,6 +200,8 @@ void ToProto(const DeltaPart& part, int k, int d, v1::DownloadMeshResponse* out)
   out->set_first_vertex(part.first_vertex);
   ToProto(part.points.data(), {part.points.size() / dimension, dimension}, out->mutable_points());
   ToProto(part.added, static_cast<std::size_t>(k) + 1, out->mutable_cells());
+  out->mutable_boundary_vertices()->Add(part.boundary.begin(), part.boundary.end());
+  out->mutable_boundary_walls()->Add(part.walls.begin(), part.walls.end());
   out->set_complete(part.complete);
 }
 

@@ -11,6 +11,30 @@ namespace {
 using core::StatusCode;
 using Eigen::Index;
 
+// What answers of a manifold with boundary say of its walls.
+core::Status WallsFromProto(const v1::AnswerChunk& answers, const Chunk& chunk,
+                            const core::Specification& spec, core::AnswerBlock* block) {
+  const auto n = static_cast<std::uint64_t>(chunk.count);
+  const auto d = static_cast<std::uint64_t>(spec.ambient_dimension);
+  const auto walls = static_cast<std::uint64_t>(spec.walls);
+  const auto on = static_cast<std::uint64_t>(core::CountWalls(chunk.block().face));
+  core::Status status = core::Status::Ok();
+  if (answers.has_clearances()) {
+    status = CheckArray(answers.clearances(), {n, walls}, "answers.clearances",
+                        StatusCode::kOracleShape);
+    if (!status.ok()) return status;
+    block->clearances =
+        MatrixFromProto(answers.clearances(), static_cast<Index>(walls), chunk.count);
+  }
+  if (on == 0 || !answers.has_conormals()) return status;
+  status =
+      CheckArray(answers.conormals(), {n, on, d}, "answers.conormals", StatusCode::kOracleShape);
+  if (status.ok())
+    block->conormals =
+        MatrixFromProto(answers.conormals(), static_cast<Index>(on * d), chunk.count);
+  return status;
+}
+
 }  // namespace
 
 void ToProto(const core::Specification& spec, v1::Welcome* welcome) {
@@ -19,6 +43,8 @@ void ToProto(const core::Specification& spec, v1::Welcome* welcome) {
   welcome->mutable_oracle()->set_intersect_flat(spec.oracle.intersect_flat);
   welcome->mutable_oracle()->set_tangent_basis(spec.oracle.tangent_basis);
   welcome->mutable_oracle()->set_local_size(spec.oracle.local_size);
+  welcome->mutable_oracle()->set_conormals(spec.oracle.conormals);
+  welcome->set_walls(static_cast<std::uint32_t>(spec.walls));
 }
 
 void ToProto(const Chunk& chunk, const core::Specification& spec, v1::QueryChunk* out) {
@@ -29,6 +55,8 @@ void ToProto(const Chunk& chunk, const core::Specification& spec, v1::QueryChunk
   out->set_lease(chunk.lease);
   out->set_want_tangents(block.want_tangents);
   out->set_want_sizes(block.want_sizes);
+  out->set_want_clearances(block.want_clearances);
+  core::ForEachWall(block.face, [&](int wall) { out->add_face(static_cast<std::uint32_t>(wall)); });
   ToProto(block.points.col(chunk.first).data(), {n, d}, out->mutable_points());
   if (block.kind == core::QueryKind::kClosestPoint) {
     out->set_kind(v1::QUERY_KIND_CLOSEST_POINT);
@@ -83,6 +111,10 @@ Allowed<core::AnswerBlock> FromProto(const v1::AnswerChunk& answers, const Chunk
     status = CheckArray(answers.sizes(), {n}, "answers.sizes", StatusCode::kOracleShape);
     if (!status.ok()) return refuse(std::move(status));
     block.sizes = MatrixFromProto(answers.sizes(), chunk.count, 1);
+  }
+  if (chunk.block().want_clearances) {
+    status = WallsFromProto(answers, chunk, spec, &block);
+    if (!status.ok()) return tl::unexpected(std::move(status));
   }
   return block;
 }

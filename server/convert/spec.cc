@@ -208,6 +208,9 @@ Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config) {
   request.spec.oracle.intersect_flat = spec.oracle().intersect_flat();
   request.spec.oracle.tangent_basis = spec.oracle().tangent_basis();
   request.spec.oracle.local_size = spec.oracle().local_size();
+  request.spec.oracle.conormals = spec.oracle().conormals();
+  // Any larger number is refused as one too many.
+  request.spec.walls = static_cast<int>(std::min<std::uint32_t>(spec.walls(), core::kMaxWalls + 1));
   request.spec.random_seed = spec.random_seed() == 0 ? 1 : spec.random_seed();
   request.label = spec.label();
   Refused status = ReadDimensions(spec, config, &request.spec);
@@ -233,6 +236,8 @@ void ToProto(const core::Specification& spec, v1::MeshSpec* out) {
   out->mutable_oracle()->set_intersect_flat(spec.oracle.intersect_flat);
   out->mutable_oracle()->set_tangent_basis(spec.oracle.tangent_basis);
   out->mutable_oracle()->set_local_size(spec.oracle.local_size);
+  out->mutable_oracle()->set_conormals(spec.oracle.conormals);
+  out->set_walls(static_cast<std::uint32_t>(spec.walls));
   if (spec.bounding_box) {
     const auto d = static_cast<std::size_t>(spec.bounding_box->lower.size());
     v1::BoundingBox* const box = out->mutable_bounding_box();

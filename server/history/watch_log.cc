@@ -114,6 +114,8 @@ Status WatchLog::Append(const core::MeshDelta& delta) {
     for (const std::uint32_t simplex : dying) lives_[simplex]->died = revision;
     deaths_.Append(dying.data(), dying.size());
     points_.Append(delta.points.data(), new_vertices);
+    for (std::size_t v = 0; v < delta.walls.size(); ++v)
+      if (delta.walls[v] != 0) boundary_.push_back({last.vertices + v, delta.walls[v]});
     rows_.Append(delta.added.data(), new_simplices);
     lives_.Append(births.data(), new_simplices);
     marks_.push_back({last.vertices + new_vertices, first_simplex + new_simplices, deaths_.size()});
@@ -131,7 +133,28 @@ bool WatchLog::Write(const Sink& write) const {
   const std::uint64_t revisions = marks_.size() - 1;
   return write(&revisions, sizeof(revisions)) &&
          write(marks_.data() + 1, revisions * sizeof(Mark)) && WriteRows(points_, d_, write) &&
-         WriteRows(rows_, row_size_, write) && WriteRows(deaths_, 1, write);
+         WriteRows(rows_, row_size_, write) && WriteRows(deaths_, 1, write) && WriteWalls(write);
+}
+
+// Nothing where there is no boundary: so it was before there were any.
+bool WatchLog::WriteWalls(const Sink& write) const {
+  const std::uint64_t count = boundary_.size();
+  return count == 0 || (write(&count, sizeof(count)) &&
+                        write(boundary_.data(), boundary_.size() * sizeof(OnWalls)));
+}
+
+bool WatchLog::ReadWalls(const Source& read) {
+  std::uint64_t count = 0;
+  if (!read(&count, sizeof(count))) return true;
+  const std::uint64_t vertices = marks_.back().vertices;
+  if (count == 0 || count > vertices) return false;
+  for (std::uint64_t i = 0, next = 0; i < count; ++i) {
+    OnWalls one;
+    if (!read(&one, sizeof(one)) || one.vertex < next || one.vertex >= vertices) return false;
+    next = one.vertex + 1;
+    boundary_.push_back(one);
+  }
+  return true;
 }
 
 core::Expected<std::unique_ptr<WatchLog>> WatchLog::Read(int dimension, int ambient_dimension,
@@ -160,7 +183,7 @@ bool WatchLog::ReadRows(const Source& read) {
   return end.vertices <= kNone && end.simplices < kNone &&
          ReadInto(&points_, d_, end.vertices, read) &&
          ReadInto(&rows_, row_size_, end.simplices, read) &&
-         ReadInto(&deaths_, 1, end.deaths, read);
+         ReadInto(&deaths_, 1, end.deaths, read) && ReadWalls(read);
 }
 
 // From the order of births and deaths.
@@ -195,8 +218,8 @@ WatchLog::Cursor WatchLog::Begin(std::uint64_t from) const {
 
 std::uint64_t WatchLog::MemoryBytes() const {
   const std::lock_guard lock(mutex_);
-  return points_.bytes() + rows_.bytes() + lives_.bytes() + deaths_.bytes() +
-         marks_.capacity() * sizeof(Mark) + appenders_bytes_;
+  return points_.bytes() + boundary_.capacity() * sizeof(OnWalls) + rows_.bytes() + lives_.bytes() +
+         deaths_.bytes() + marks_.capacity() * sizeof(Mark) + appenders_bytes_;
 }
 
 WatchLog::Snapshot WatchLog::At(std::uint64_t revision) const {
@@ -255,6 +278,13 @@ DeltaPart WatchLog::Next(Cursor* cursor, std::size_t max_bytes) const {
     part.points.insert(part.points.end(), first, first + run * d_);
     cursor->vertex += run;
     points -= run;
+  }
+  const auto first_on = std::lower_bound(
+      boundary_.begin(), boundary_.end(), part.first_vertex,
+      [](const OnWalls& one, std::uint64_t vertex) { return one.vertex < vertex; });
+  for (auto one = first_on; one != boundary_.end() && one->vertex < cursor->vertex; ++one) {
+    part.boundary.push_back(static_cast<std::uint32_t>(one->vertex));
+    part.walls.push_back(one->walls);
   }
   if (cursor->vertex < end.vertices) return part;  // a position is among vertices or simplices
   AppendAdded(cursor, end.simplices,

@@ -67,7 +67,10 @@ struct DeltaPart {
   std::uint64_t first_vertex = 0;
   std::vector<double> points;                 // d each
   std::vector<std::uint32_t> added, removed;  // k+1 each; none is in both
-  bool complete = false;                      // the last part
+  // Those of its vertices that are on walls, and these.
+  std::vector<std::uint32_t> boundary;
+  std::vector<core::WallSet> walls;
+  bool complete = false;  // the last part
 };
 
 // The history of a mesh, from which the change from any revision to any later one is read in
@@ -128,6 +131,8 @@ class WatchLog {
     std::uint64_t died = 0;  // 0: alive
   };
   bool ReadRows(const Source& read);
+  bool WriteWalls(const Sink& write) const;
+  bool ReadWalls(const Source& read);
   bool ReckonLives();
   std::uint32_t Unlink(const std::uint32_t* row);
   void Link(std::uint32_t simplex);
@@ -138,6 +143,11 @@ class WatchLog {
 
   mutable std::mutex mutex_;
   GrowingRows<double> points_;
+  struct OnWalls {
+    std::uint64_t vertex = 0;
+    core::WallSet walls = 0;
+  };
+  std::vector<OnWalls> boundary_;      // of the vertices, ascending
   GrowingRows<std::uint32_t> rows_;    // ids of each simplex that ever was
   GrowingRows<Life> lives_;            // by simplex
   GrowingRows<std::uint32_t> deaths_;  // simplices in the order in which they went

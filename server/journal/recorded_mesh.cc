@@ -44,6 +44,7 @@ void RecordedMesh::SetShape(const MeshRequest& request) {
   owner_ = request.owner;
   dimension_ = request.spec.dimension;
   ambient_dimension_ = request.spec.ambient_dimension;
+  walls_ = request.spec.walls;
 }
 
 // Writes of about `bytes`, unless the mesh is not wanted any more.
@@ -151,7 +152,7 @@ SessionJournal::Known RecordedMesh::ReadRound(const core::QueryBatch& batch) {
                                           "recorded the answers: mesh anew")};
       return true;
     }
-    core::Answers answers = EmptyAnswers(dimension_, ambient_dimension_, batch);
+    core::Answers answers = EmptyAnswers(dimension_, ambient_dimension_, batch, walls_);
     for (std::uint64_t part = 0; part < round->parts; ++part) {
       RecordedAnswers some;
       Found found;

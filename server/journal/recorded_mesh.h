@@ -65,7 +65,7 @@ class RecordedMesh final : public SessionJournal,
   const std::shared_ptr<SharedJournal> journal_;
   const std::uint64_t owner_limit_;
   std::string owner_;
-  int dimension_ = 0, ambient_dimension_ = 0;
+  int dimension_ = 0, ambient_dimension_ = 0, walls_ = 0;
   std::atomic<bool> forgotten_{false};
 
   // Whoever has the file to himself.

@@ -25,11 +25,18 @@ void CopyInto(const core::AnswerBlock& answer, Index first, core::AnswerBlock* w
   if (whole->sizes.size() > 0 && answer.sizes.size() == count) {
     whole->sizes.segment(first, count) = answer.sizes;
   }
+  const auto copy = [&](const Eigen::MatrixXd& some, Eigen::MatrixXd* all) {
+    const bool fits = all->cols() > 0 && some.cols() == count && some.rows() == all->rows();
+    if (fits) all->middleCols(first, count) = some;
+  };
+  copy(answer.clearances, &whole->clearances);
+  copy(answer.conormals, &whole->conormals);
 }
 
 }  // namespace
 
-core::Answers EmptyAnswers(int dimension, int ambient_dimension, const core::QueryBatch& batch) {
+core::Answers EmptyAnswers(int dimension, int ambient_dimension, const core::QueryBatch& batch,
+                           int walls) {
   core::Answers answers;
   for (const core::QueryBlock& block : batch.blocks) {
     const Index n = block.size();
@@ -40,6 +47,11 @@ core::Answers EmptyAnswers(int dimension, int ambient_dimension, const core::Que
       empty.tangents = Eigen::MatrixXd::Zero(Index{ambient_dimension} * dimension, n);
     }
     if (block.want_sizes) empty.sizes = Eigen::VectorXd::Zero(n);
+    if (block.want_clearances) {
+      empty.clearances = Eigen::MatrixXd::Zero(walls, n);
+      const Index on = core::CountWalls(block.face);
+      if (on > 0) empty.conormals = Eigen::MatrixXd::Zero(on * ambient_dimension, n);
+    }
   }
   return answers;
 }
@@ -335,7 +347,7 @@ std::vector<OraclePool::Delivery> OraclePool::AssignLocked(TimePoint now) {
 
 std::shared_ptr<Round> OraclePool::MakeRound(std::shared_ptr<const core::QueryBatch> batch) const {
   auto round = std::make_shared<Round>();
-  round->answers = EmptyAnswers(spec_.dimension, spec_.ambient_dimension, *batch);
+  round->answers = EmptyAnswers(spec_.dimension, spec_.ambient_dimension, *batch, spec_.walls);
   for (const core::QueryBlock& block : batch->blocks) {
     round->answered_by.emplace_back(static_cast<std::size_t>(block.size()), WorkerId{0});
   }
@@ -352,7 +364,10 @@ std::vector<Dispatch::Block> OraclePool::Measure(const core::QueryBatch& batch,
     const bool flat = block.kind == core::QueryKind::kIntersectFlat;
     const std::size_t question = point + (flat ? basis + sizeof(double) : 0);
     const std::size_t answer =
-        point + 1 + (block.want_tangents ? basis : 0) + (block.want_sizes ? sizeof(double) : 0);
+        point + 1 + (block.want_tangents ? basis : 0) + (block.want_sizes ? sizeof(double) : 0) +
+        (block.want_clearances ? sizeof(double) * static_cast<std::size_t>(spec_.walls) +
+                                     point * static_cast<std::size_t>(core::CountWalls(block.face))
+                               : 0);
     blocks.push_back({block.size(), std::max(question, answer)});
   }
   for (const PartOfRound& part : known) {

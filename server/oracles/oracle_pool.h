@@ -37,7 +37,8 @@ struct PartOfRound {
 };
 
 // Of the shape that a batch asks for, with nothing in it: what is put into it are its answers.
-core::Answers EmptyAnswers(int dimension, int ambient_dimension, const core::QueryBatch& batch);
+core::Answers EmptyAnswers(int dimension, int ambient_dimension, const core::QueryBatch& batch,
+                           int walls = 0);
 // `first` and those after it must be there; what is more than was asked for is left out.
 void PutAnswers(const PartOfRound& part, core::Answers* answers);
 

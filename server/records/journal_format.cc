@@ -67,68 +67,6 @@ SystemTime ToTime(std::int64_t number) {
   return SystemTime(Microseconds(std::clamp(number, -kFarthest, kFarthest)));
 }
 
-template <typename Archive, typename Value>
-void LayOutProgress(Archive& archive, Value& progress) {
-  archive.Number(progress.phase);
-  archive.Number(progress.round);
-  archive.Number(progress.queries);
-  archive.Number(progress.vertices);
-  archive.Number(progress.simplices);
-  archive.Number(progress.unbounded_stars);
-  archive.Number(progress.bad_size);
-  archive.Number(progress.bad_radius_edge);
-  archive.Number(progress.bad_sliver);
-  archive.Number(progress.bad_inconsistent);
-  archive.Number(progress.fraction);
-}
-
-template <typename Archive, typename Value>
-void LayOutReport(Archive& archive, Value& report) {
-  archive.Number(report.termination);
-  archive.Number(report.failure.code);
-  archive.Bytes(report.failure.message);
-  auto& counts = report.counts;
-  archive.Number(counts.vertices);
-  archive.Number(counts.simplices);
-  archive.Number(counts.rounds);
-  archive.Number(counts.queries);
-  archive.Number(counts.tangent_queries);
-  archive.Number(counts.inserted_size);
-  archive.Number(counts.inserted_radius_edge);
-  archive.Number(counts.inserted_sliver);
-  archive.Number(counts.inserted_inconsistent);
-  archive.Number(counts.duplicates);
-  auto& certificate = report.certificate;
-  archive.Number(certificate.certified);
-  archive.Bytes(certificate.verdict);
-  archive.Strings(certificate.warnings);
-  archive.Number(certificate.closed);
-  archive.Number(certificate.bad_faces);
-  archive.Number(certificate.links_are_spheres);
-  archive.Number(certificate.links_decided_exactly);
-  archive.Number(certificate.bad_links);
-  archive.Number(certificate.inconsistent_simplices);
-  archive.Number(certificate.unembedded_stars);
-  archive.Number(certificate.fibre_failures);
-  archive.Number(certificate.fibre_samples);
-  archive.Number(certificate.answers_held);
-  archive.Number(certificate.max_circumradius);
-  archive.Number(certificate.max_radius_edge);
-  archive.Number(certificate.min_fatness);
-  archive.Number(certificate.min_angle_degrees);
-  archive.Number(certificate.max_tangent_angle_degrees);
-  archive.Number(certificate.max_barycentre_distance);
-  archive.Number(certificate.estimated_reach);
-  archive.Number(certificate.epsilon_over_reach);
-  archive.Number(certificate.components);
-  archive.Number(certificate.euler_characteristic);
-  archive.Number(certificate.orientable);
-  archive.Number(certificate.level);
-  archive.Number(certificate.declared_reach);
-  archive.Number(certificate.reach_refuted);
-  archive.Number(certificate.proved_distance);
-}
-
 core::AnswerBlock Columns(const core::AnswerBlock& block, Index first, Index count) {
   core::AnswerBlock some;
   some.points = block.points.middleCols(first, count);
@@ -137,6 +75,8 @@ core::AnswerBlock Columns(const core::AnswerBlock& block, Index first, Index cou
   }
   if (block.tangents.cols() > 0) some.tangents = block.tangents.middleCols(first, count);
   if (block.sizes.size() > 0) some.sizes = block.sizes.segment(first, count);
+  if (block.clearances.cols() > 0) some.clearances = block.clearances.middleCols(first, count);
+  if (block.conormals.cols() > 0) some.conormals = block.conormals.middleCols(first, count);
   return some;
 }
 
@@ -146,6 +86,15 @@ void LayOutAnswers(Archive& archive, Value& answers) {
   archive.Bytes(answers.found);
   archive.Numbers(answers.tangents);
   archive.Numbers(answers.sizes);
+}
+
+// Marks, in the number of a block, that clearances and conormals follow its answers.
+constexpr std::size_t kWithWalls = std::size_t{1} << 62;
+
+template <typename Archive, typename Value>
+void LayOutWalls(Archive& archive, Value& answers) {
+  archive.Numbers(answers.clearances);
+  archive.Numbers(answers.conormals);
 }
 
 template <typename Archive, typename Value>
@@ -212,6 +161,10 @@ std::string EncodeStart(const MeshRequest& request, SystemTime create_time) {
   writer.Number(request.timeouts.worker_wait.count());
   LayOutSpecification(writer, request.spec);
   writer.Number(request.timeouts.busy_limit.count());
+  if (request.spec.walls > 0) {
+    writer.Number(request.spec.walls);
+    writer.Number(request.spec.oracle.conormals);
+  }
   return writer.Take();
 }
 
@@ -233,6 +186,10 @@ bool DecodeEarlierStart(std::string_view record, std::uint32_t version, MeshRequ
   reader.Number(worker_wait);
   LayOutSpecification(reader, request->spec, version);
   if (!reader.Complete()) reader.Number(busy_limit);  // earlier records end before it
+  if (!reader.Complete()) {
+    reader.Number(request->spec.walls);
+    reader.Number(request->spec.oracle.conormals);
+  }
   *create_time = ToTime(time);
   request->timeouts.answer_limit = Clock::duration(answer_limit);
   request->timeouts.worker_wait = Clock::duration(worker_wait);
@@ -279,13 +236,17 @@ bool EncodeAnswers(const core::Answers& answers, const std::vector<AnswerRange>&
   bool empty = true;
   for (const AnswerRange& range : ranges) {
     const core::AnswerBlock& block = answers.blocks[range.block];
-    const auto column = static_cast<std::size_t>(block.points.rows() + block.tangents.rows() + 2);
+    const auto column =
+        static_cast<std::size_t>(block.points.rows() + block.tangents.rows() +
+                                 block.clearances.rows() + block.conormals.rows() + 2);
     const auto most = std::max<Index>(static_cast<Index>(kPartBytes / (column * kWord)), 1);
     for (Index first = range.first; first < range.end; first += most) {
-      writer.Number(range.block);
+      const bool with_walls = block.clearances.cols() > 0;
+      writer.Number(range.block | (with_walls ? kWithWalls : 0));
       writer.Number(first);
       const core::AnswerBlock some = Columns(block, first, std::min(most, range.end - first));
       LayOutAnswers(writer, some);
+      if (with_walls) LayOutWalls(writer, some);
       empty = writer.size() >= kPartBytes;
       if (!empty) continue;
       if (!take(writer.Take())) return false;
@@ -304,6 +265,8 @@ std::optional<RecordedAnswers> DecodeAnswers(std::string_view record) {
     reader.Number(part.block_index);
     reader.Number(part.first);
     LayOutAnswers(reader, part.answers);
+    if (part.block_index & kWithWalls) LayOutWalls(reader, part.answers);
+    part.block_index &= ~kWithWalls;
   }
   if (!reader.Complete()) return std::nullopt;
   return recorded;
@@ -350,28 +313,6 @@ std::optional<SessionEnd> DecodeEnd(std::string_view record) {
   return end;
 }
 
-std::string EncodeResult(const SessionResult& result, std::uint64_t parts) {
-  RecordWriter writer;
-  LayOutProgress(writer, result.progress);
-  LayOutReport(writer, result.report);
-  writer.Number(result.revision);
-  writer.Number(result.history_bytes);
-  writer.Number(parts);
-  return writer.Take();
-}
-
-std::optional<SessionResult> DecodeResult(std::string_view record, std::uint64_t* parts) {
-  RecordReader reader(record);
-  SessionResult result;
-  LayOutProgress(reader, result.progress);
-  LayOutReport(reader, result.report);
-  reader.Number(result.revision);
-  reader.Number(result.history_bytes);
-  reader.Number(*parts);
-  if (!reader.Complete()) return std::nullopt;
-  return result;
-}
-
 std::uint64_t DigestOf(const core::QueryBatch& batch) {
   RecordDigest digest;
   digest.Add(batch.round);
@@ -382,6 +323,7 @@ std::uint64_t DigestOf(const core::QueryBatch& batch) {
     digest.Add(block.points);
     digest.Add(block.bases);
     digest.Add(block.radii);
+    if (block.want_clearances) digest.Add(block.face);
   }
   return digest.value();
 }
@@ -393,6 +335,9 @@ std::uint64_t DigestOf(const core::Answers& answers) {
     digest.Add(block.found.data(), block.found.size());
     digest.Add(block.tangents);
     digest.Add(block.sizes);
+    if (block.clearances.cols() == 0) continue;
+    digest.Add(block.clearances);
+    digest.Add(block.conormals);
   }
   return digest.value();
 }

@@ -61,8 +61,8 @@ std::vector<std::string> Seeds() {
   seeds.push_back('\0' + server::EncodeStart(request, {}));
   core::Answers answers;
   answers.blocks.push_back(
-      {Eigen::MatrixXd::Ones(3, 4), {1, 0, 1, 1}, Eigen::MatrixXd::Ones(6, 4), {}});
-  answers.blocks.push_back({Eigen::MatrixXd::Ones(3, 1), {}, {}, Eigen::VectorXd::Ones(1)});
+      {Eigen::MatrixXd::Ones(3, 4), {1, 0, 1, 1}, Eigen::MatrixXd::Ones(6, 4), {}, {}, {}});
+  answers.blocks.push_back({Eigen::MatrixXd::Ones(3, 1), {}, {}, Eigen::VectorXd::Ones(1), {}, {}});
   for (const std::string& record : Encoded(answers, 7)) seeds.push_back('\1' + record);
   server::SessionEnd end;
   end.state = server::SessionState::kFailed;

@@ -53,8 +53,12 @@ inline core::Answers AnswersOf(Oracle& oracle, const core::QueryBatch& batch) {
     if (block.want_sizes && answer.sizes.size() == 0) {
       answer.sizes = oracle.LocalSize(answer.points);
     }
-    answers.blocks.push_back({std::move(answer.points), std::move(answer.found),
-                              std::move(answer.tangents), std::move(answer.sizes)});
+    answers.blocks.push_back({std::move(answer.points),
+                              std::move(answer.found),
+                              std::move(answer.tangents),
+                              std::move(answer.sizes),
+                              {},
+                              {}});
   }
   return answers;
 }

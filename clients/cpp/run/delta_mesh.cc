@@ -126,7 +126,7 @@ Expected<DeltaMesh> DeltaMesh::Create(int k, int d) {
     return Fail(ErrorCode::kRefused,
                 "dimension is " + std::to_string(k) + " but this client holds meshes of 1 to " +
                     std::to_string(kMaxSimplexDimension),
-                "LIMIT_EXCEEDED");
+                k < 1 ? "INVALID_ARGUMENT" : "LIMIT_EXCEEDED");
   }
   return DeltaMesh(k, d, std::move(set));
 }

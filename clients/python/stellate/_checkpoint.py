@@ -133,10 +133,11 @@ class Checkpoint:
         try:
             with np.load(self._mesh_path, allow_pickle=False) as kept:
                 points, simplices = kept["points"], kept["simplices"]
+                walls = kept["walls"] if "walls" in kept else None
                 about = json.loads(str(kept["about"]))
             progress = about["progress"] and Progress(**about["progress"])
             report = Report.from_fields(about["report"])
-            return Mesh(points, simplices, report, progress, about["revision"])
+            return Mesh(points, simplices, report, progress, about["revision"], walls)
         except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
             raise InvalidArgument(
                 f"{self._mesh_path} is no mesh that was kept ({error}): remove {self.directory}"
@@ -149,14 +150,12 @@ class Checkpoint:
             "progress": mesh.progress and dataclasses.asdict(mesh.progress),
             "revision": mesh.revision,
         }
+        arrays = {"points": mesh.points, "simplices": mesh.simplices}
+        if mesh.walls is not None:
+            arrays["walls"] = mesh.walls
         self._replace(
             self._mesh_path,
-            lambda file: np.savez(
-                file,
-                points=mesh.points,
-                simplices=mesh.simplices,
-                about=np.array(json.dumps(about)),
-            ),
+            lambda file: np.savez(file, about=np.array(json.dumps(about)), **arrays),
         )
 
     def forget_server(self) -> None:

@@ -11,7 +11,7 @@ from ._files.formats import check_save
 from ._info import MeshInfo, unless_failed
 from ._mesh import Mesh
 from ._wire.arrays import from_wire, indices_from_wire
-from ._wire.delta_mesh import in_order
+from ._wire.delta_mesh import in_order, spread_walls, walls_from_wire
 from .client import Client
 from .errors import FailedPrecondition, protocol_error
 from .report import Progress
@@ -67,6 +67,7 @@ def _await_end(client: Client, name: str, on_progress: OnProgress | None) -> Mes
 def _assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | None) -> Mesh:
     d, width = info.ambient_dimension, info.dimension + 1
     points, rows = [np.empty((0, d))], [np.empty((0, width), dtype=np.uint32)]
+    boundary: list[tuple[np.ndarray, np.ndarray]] = []
     vertices = simplices = 0
     parts = client.parts(info.name, revision)
     try:
@@ -75,6 +76,7 @@ def _assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | N
             try:
                 block = from_wire(part.points, -1, d)
                 cells = indices_from_wire(part.cells, -1, width)
+                boundary += walls_from_wire(part, vertices + len(block))
             except ValueError as error:
                 raise protocol_error(str(error)) from error
             if len(block) and part.first_vertex != vertices:
@@ -104,4 +106,5 @@ def _assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | N
         info.report if last else None,
         info.progress if last else None,
         revision,
+        spread_walls(boundary, vertices),
     )

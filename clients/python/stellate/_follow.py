@@ -58,7 +58,10 @@ class Following:
     def so_far(self) -> Mesh:
         """The mesh at its last complete revision."""
         simplices = _sound(self._growth.simplices)
-        return Mesh(self._growth.points(), simplices, None, self._progress, self._growth.revision)
+        growth = self._growth
+        return Mesh(
+            growth.points(), simplices, None, self._progress, growth.revision, growth.walls()
+        )
 
     def stop(self) -> None:
         """From another thread: the iterator ends soon, with or without an exception."""
@@ -80,5 +83,7 @@ def _sound(step: Callable[..., T], *arguments: Any) -> T:
 
 def _finished(growth: DeltaMesh, final: MeshInfo) -> Mesh:
     simplices = _sound(growth.simplices)
-    mesh = Mesh(growth.points(), simplices, final.report, final.progress, growth.revision)
+    mesh = Mesh(
+        growth.points(), simplices, final.report, final.progress, growth.revision, growth.walls()
+    )
     return unless_failed(mesh, final)

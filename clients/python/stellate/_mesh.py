@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from . import _convert, _html, _plot, _slice, _view
+from . import _convert, _faces, _html, _plot, _slice, _view
+from ._faces import Face
 from ._files import formats
 from ._files.orientation import orient, turn_outwards
 from .errors import UncertifiedWarning
@@ -28,6 +29,8 @@ class Mesh:
       report: how it ended and what is proved; None while the mesh grows, or if that is not known.
       progress: how it stood at this revision; None if that is not known.
       revision: one for each round that changed the mesh.
+      walls: of a manifold with boundary, (n,) uint64: the walls that each point lies on, wall i as
+        bit i; else None.
     """
 
     points: np.ndarray
@@ -35,6 +38,26 @@ class Mesh:
     report: Report | None = None
     progress: Progress | None = None
     revision: int = 0
+    walls: np.ndarray | None = None
+
+    @property
+    def boundary(self) -> tuple[Face, ...]:
+        """The boundary's parts, one for each wall: simplices of dimension k - 1."""
+        return self.faces(self.dimension - 1)
+
+    @property
+    def edges(self) -> tuple[Face, ...]:
+        """Where two walls meet or more, the curves of them."""
+        return tuple(face for face in self.faces(1) if len(face.walls) > 1)
+
+    @property
+    def corners(self) -> tuple[Face, ...]:
+        """Where as many walls meet as the mesh has dimensions: points."""
+        return tuple(face for face in self.faces(0) if len(face.walls) == self.dimension)
+
+    def faces(self, dimension: int) -> tuple[Face, ...]:
+        """The faces of a dimension below k, of a manifold with boundary, by ascending walls."""
+        return _faces.faces(self.simplices, self.walls, dimension)
 
     @property
     def dimension(self) -> int:

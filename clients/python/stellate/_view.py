@@ -14,6 +14,7 @@ import subprocess
 import tempfile
 import webbrowser
 from types import TracebackType
+from typing import Any
 
 import numpy as np
 
@@ -67,10 +68,8 @@ def _indices(array: np.ndarray) -> geometry.IndexArray:
 
 
 def _report(report: Report) -> pb.Report:
-    message = pb.Report(
-        termination=pb.Termination.Value(f"TERMINATION_{report.termination}"),
-        elapsed_seconds=report.elapsed_seconds,
-    )
+    message = pb.Report(elapsed_seconds=report.elapsed_seconds)
+    message.termination = pb.Termination.Value(f"TERMINATION_{report.termination}")  # type: ignore[assignment]
     if report.failure is not None:
         message.failure.reason = report.failure.reason
         message.failure.message = report.failure.message
@@ -116,7 +115,7 @@ def page_of(mesh: Complex, label: str = "") -> str:
         added=_indices(np.sort(mesh.simplices, axis=1)),
     )
     grown = calls.WatchMeshResponse(delta=calls.DeltaChunk(delta=delta, complete=True))
-    replies = {
+    replies: dict[str, list[Any]] = {
         "WatchMesh": [grown, calls.WatchMeshResponse(final=status)],
         "GetMesh": [status],
     }

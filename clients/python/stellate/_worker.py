@@ -44,6 +44,8 @@ def answer(oracle: CheckedOracle, chunk: pb.QueryChunk) -> pb.ServeOracleRequest
         bases = from_wire(chunk.bases, len(points), d, k)
         radii = from_wire(chunk.radii, len(points))
         answers, found = oracle.intersections(points, bases, radii)
+    elif chunk.face:
+        answers, found = oracle.face_points(points, tuple(chunk.face))
     else:
         answers, found = oracle.closest_points(points)
     request = pb.ServeOracleRequest()
@@ -56,6 +58,10 @@ def answer(oracle: CheckedOracle, chunk: pb.QueryChunk) -> pb.ServeOracleRequest
         fill(reply.tangents, oracle.tangents(answers, found))
     if chunk.want_sizes:
         fill(reply.sizes, oracle.sizes(answers, found))
+    if chunk.want_clearances:
+        fill(reply.clearances, oracle.clearances(answers, found))
+        if chunk.face:
+            fill(reply.conormals, oracle.conormals(answers, found, tuple(chunk.face)))
     return request
 
 
@@ -186,7 +192,8 @@ class Worker:
         """
         self._ask = ask
         self._stub, self._oracle, self._on_failure = stub, oracle, on_failure
-        per_query = 8 * oracle.ambient_dimension * (oracle.dimension + 1) + 9
+        d, k, walls = oracle.ambient_dimension, oracle.dimension, oracle.walls
+        per_query = 8 * (d * (k + 1 + min(k, walls)) + walls) + 9
         most = max(1, _ANSWER_BYTES // per_query)
         self._hello = pb.Hello(
             mesh=mesh,
@@ -301,6 +308,7 @@ class Worker:
                 ("intersect_flat", welcome.oracle.intersect_flat, mine.has_intersect_flat),
                 ("tangent_basis", welcome.oracle.tangent_basis, mine.has_tangent_basis),
                 ("local_size", welcome.oracle.local_size, mine.has_local_size),
+                (f"{welcome.walls} walls", welcome.walls != mine.walls, False),
             )
             if asked and not able
         ]

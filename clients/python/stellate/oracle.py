@@ -28,6 +28,14 @@ class Oracle(Protocol):
       local_size(points (n, d)) -> (n,): how large things are at points of M: the local feature size
         there, or any positive lengths of yours. With size_rate or max_deviation the mesh goes by
         it; without it the server estimates. A point's size must depend on the point alone.
+      walls: how many walls bound M, which has a boundary then: M = {x in M^ : g_i(x) >= 0} for the
+        walls g_i, i < walls, and the methods above are those of M^, whose dimension may be d. It takes
+        tangent_basis, and
+      face_point(points (n, d), face) -> (n, d): nearest points of M^ where the walls of `face`, a
+        tuple of their numbers, ascending, are zero. May raise NotConverged.
+      clearances(points (n, d)) -> (n, walls): the g_i, of which the sign counts.
+      conormals(points (n, d), face) -> (n, len(face), d): at points of a face, the outward unit normal
+        of each of its walls within the tangent space. stellate.oracles.Clipped has all of these.
       bounding_box: (lower (d,), upper (d,)), where to look for M, or
       seeds: (m, d), points near M, one at least on each component. One of the two is needed.
       thread_safe: True lets several workers call it at once.
@@ -56,6 +64,7 @@ class CheckedOracle:
         self.has_intersect_flat = callable(getattr(oracle, "intersect_flat", None))
         self.has_tangent_basis = callable(getattr(oracle, "tangent_basis", None))
         self.has_local_size = callable(getattr(oracle, "local_size", None))
+        self.walls = self._count_walls(oracle)
         self.bounding_box = _box(getattr(oracle, "bounding_box", None))
         self.seeds = _seeds(getattr(oracle, "seeds", None))
         shared = bool(getattr(oracle, "thread_safe", False))
@@ -74,6 +83,43 @@ class CheckedOracle:
                 answer, found = error.points, error.converged
         found = _flags("closest_point", found, len(points))
         return _numbers("closest_point", answer, points.shape, found), found
+
+    def _count_walls(self, oracle: Any) -> int:
+        if getattr(oracle, "walls", None) is None:
+            return 0
+        walls = _whole_number(oracle, "walls")
+        lacking = [
+            name
+            for name in ("tangent_basis", "face_point", "clearances", "conormals")
+            if walls and not callable(getattr(oracle, name, None))
+        ]
+        if lacking:
+            raise InvalidArgument(
+                f"{type(oracle).__name__} has walls, and lacks {' and '.join(lacking)}"
+            )
+        return walls
+
+    def face_points(
+        self, points: np.ndarray, face: tuple[int, ...]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """As closest_points, of a face of a manifold with boundary."""
+        with self._one_at_a_time:
+            try:
+                answer = self._oracle.face_point(points, face)
+                found = np.ones(len(points), dtype=bool)
+            except NotConverged as error:
+                answer, found = error.points, error.converged
+        found = _flags("face_point", found, len(points))
+        return _numbers("face_point", answer, points.shape, found), found
+
+    def clearances(self, points: np.ndarray, found: np.ndarray) -> np.ndarray:
+        """(n, d) -> (n, walls); the rows that were not found hold any."""
+        return self._at_found("clearances", points, found, np.zeros(self.walls))
+
+    def conormals(self, points: np.ndarray, found: np.ndarray, face: tuple[int, ...]) -> np.ndarray:
+        """(n, d) -> (n, len(face), d); the rows that were not found hold any."""
+        anywhere = np.zeros((len(face), self.ambient_dimension))
+        return self._at_found("conormals", points, found, anywhere, face)
 
     def intersections(
         self, centers: np.ndarray, bases: np.ndarray, radii: np.ndarray
@@ -103,7 +149,7 @@ class CheckedOracle:
         return self._at_found("local_size", points, found, np.ones(()))
 
     def _at_found(
-        self, method: str, points: np.ndarray, found: np.ndarray, anywhere: np.ndarray
+        self, method: str, points: np.ndarray, found: np.ndarray, anywhere: np.ndarray, *more: Any
     ) -> np.ndarray:
         """What the method says of the points that were found, and `anywhere` for the others."""
         everywhere = bool(found.all())
@@ -113,7 +159,7 @@ class CheckedOracle:
         values = np.empty((0, *anywhere.shape))
         if count:
             with self._one_at_a_time:
-                answer = getattr(self._oracle, method)(on_manifold)
+                answer = getattr(self._oracle, method)(on_manifold, *more)
             all_rows = np.ones(count, dtype=bool)
             values = _numbers(method, answer, (count, *anywhere.shape), all_rows)
         if everywhere:

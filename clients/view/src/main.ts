@@ -1,5 +1,6 @@
 // The page: what is chosen, and what of it is shown where.
 import "./style.css";
+import "./stage.css";
 import { Curves, drawHistograms } from "./charts";
 import { axesFrame, Tour, type Colour, type Look, type Part } from "./look";
 import type { FaultKind, FromWorker, MeshRow, PastRow, ToWorker } from "./messages";

@@ -38,7 +38,7 @@ class InserterTest : public ::testing::Test {
   }
 
   Inserted Run(const Caution& caution = {}, std::uint64_t max_vertices = 100) {
-    return Inserter<2>({complex_, sizes_, book_, criteria_}, candidates_, answers_, caution,
+    return Inserter<2>({complex_, sizes_, book_, criteria_, faces_}, candidates_, answers_, caution,
                        max_vertices)
         .Run();
   }
@@ -49,6 +49,7 @@ class InserterTest : public ::testing::Test {
   StarComplex<2> complex_;
   SizeField<2> sizes_;
   ViolationBook<2> book_;
+  FaceBook<2> faces_{0};
   CandidateSet<2> candidates_;
   AnsweredPoints answers_;
 };

@@ -186,7 +186,7 @@ TEST(TangentFinder, RefusesTheWrongDimension) {
     const Eigen::MatrixXd points = RandomPointsOn(*manifold, kPoints, 3);
     finder.Start(points, std::vector<const double*>(kPoints, nullptr));
     while (const QueryBlock* block = finder.Next())
-      finder.Absorb({manifold->ClosestPoint(block->points).points, {}, {}, {}});
+      finder.Absorb({manifold->ClosestPoint(block->points).points, {}, {}, {}, {}, {}});
     int refused = 0;
     for (const std::uint8_t ok : finder.ok()) refused += !ok;
     EXPECT_GE(refused, kPoints * 3 / 4) << manifold->facts().spec;

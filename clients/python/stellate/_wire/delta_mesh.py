@@ -50,6 +50,32 @@ def _net(rows: np.ndarray, removed: int) -> np.ndarray:
 _UNSETTLED = 100_000  # removed simplices at least; else half of those that are there
 
 
+def walls_from_wire(
+    message: mesh_pb2.MeshDelta | pb.DownloadMeshResponse, vertices: int
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """What a message says of vertices on walls: none or one pair of arrays.
+
+    Raises: ValueError if there are not that many vertices.
+    """
+    if not message.boundary_vertices:
+        return []
+    on = np.array(message.boundary_vertices, dtype=np.int64)
+    walls = np.array(message.boundary_walls, dtype=np.uint64)
+    if len(on) != len(walls) or int(on.max()) >= vertices:
+        raise ValueError(f"walls of {len(on)} vertices do not fit the {vertices} that there are")
+    return [(on, walls)]
+
+
+def spread_walls(boundary: list[tuple[np.ndarray, np.ndarray]], vertices: int) -> np.ndarray | None:
+    """(vertices,) uint64 from what walls_from_wire found; None where there was nothing."""
+    if not boundary:
+        return None
+    walls = np.zeros(vertices, dtype=np.uint64)
+    for on, of in boundary:
+        walls[on] = of
+    return walls
+
+
 class DeltaMesh:
     """Vertices and simplices as of the last complete revision.
 
@@ -63,6 +89,7 @@ class DeltaMesh:
     def _begin(self) -> None:
         self.revision = 0
         self._vertex_count = 0
+        self._boundary: list[tuple[np.ndarray, np.ndarray]] = []  # vertices and their walls
         self._points = np.empty((1024, self._d))
         self._rows = np.empty((0, self._k + 1), dtype=np.uint32)  # in lexicographic order
         self._added: list[np.ndarray] = []
@@ -88,6 +115,8 @@ class DeltaMesh:
         removed = [indices_from_wire(delta.removed, -1, self._k + 1) for delta in pending]
         for first, block in points:
             self._append_points(first, block)
+        for delta in pending:
+            self._boundary += walls_from_wire(delta, self._vertex_count)
         for rows in added:
             if rows.size and int(rows.max()) >= self._vertex_count:
                 raise ValueError(
@@ -114,6 +143,10 @@ class DeltaMesh:
         view = self._points[: self._vertex_count]
         view.flags.writeable = False
         return view
+
+    def walls(self) -> np.ndarray | None:
+        """(n,) uint64, the walls of each vertex as bits; None where there are none."""
+        return spread_walls(self._boundary, self._vertex_count)
 
     def simplices(self) -> np.ndarray:
         """(m, k+1) int64, ids ascending in each row, rows in lexicographic order."""

@@ -46,6 +46,8 @@ def mesh_spec(oracle: CheckedOracle, epsilon: float, criteria: dict[str, Any]) -
     spec.oracle.intersect_flat = oracle.has_intersect_flat
     spec.oracle.tangent_basis = oracle.has_tangent_basis
     spec.oracle.local_size = oracle.has_local_size
+    spec.oracle.conormals = oracle.walls > 0
+    _set(spec, "walls", oracle.walls)
     if oracle.bounding_box is not None:
         lower, upper = oracle.bounding_box
         spec.bounding_box.lower.CopyFrom(to_wire(lower))

@@ -13,9 +13,11 @@ from ._network import NeuralImplicit
 from ._parametrized import Chart, Parametrized
 from ._quotient import Quotient
 from ._triangles import TriangleMesh
+from ._walls import Clipped, Solid
 
 __all__ = [
     "Chart",
+    "Clipped",
     "ConstraintSet",
     "LevelSet",
     "Linkage",
@@ -25,6 +27,7 @@ __all__ = [
     "Product",
     "Quotient",
     "SignedDistance",
+    "Solid",
     "Transformed",
     "TriangleMesh",
 ]

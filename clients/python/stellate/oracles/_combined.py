@@ -185,6 +185,8 @@ class LevelSet:
       seeds: (s, d) points near the set, where M's box or seeds are not to be gone by.
     """
 
+    _least_dimension = 1
+
     def __init__(
         self,
         oracle: Any,
@@ -211,7 +213,7 @@ class LevelSet:
             raise InvalidArgument("no point of M was found, to look for the level set from")
         self._count = self._values(near[found][:1]).shape[1]
         self.dimension = self._base.dimension - self._count
-        if self.dimension < 1:
+        if self.dimension < self._least_dimension:
             raise InvalidArgument(
                 f"{self._count} equations on a manifold of dimension {self._base.dimension} leave none"
             )
@@ -249,6 +251,8 @@ class LevelSet:
             found[rows[length <= 1e-10 * self._scale]] = True
             usable = np.isfinite(length) & (damping[rows] > 1e-3)
             alive[rows[~usable]] = False
+            if not usable.any():
+                continue
             rows, v = rows[usable], (down + damping[rows][:, None] * along)[usable]
             v *= np.minimum(1.0, 0.1 * self._scale / np.maximum(norms(v), 1e-300))[:, None]
             there = y[rows] + apply(bases[usable], v)

@@ -108,7 +108,7 @@ def _checked(answer: Any) -> tuple[Array, Array]:
 
 
 def _is_module(network: Any) -> bool:
-    torch = sys.modules.get("torch")  # whoever made a module has imported it
+    torch: Any = sys.modules.get("torch")  # whoever made a module has imported it
     return hasattr(torch, "nn") and isinstance(network, torch.nn.Module)
 
 

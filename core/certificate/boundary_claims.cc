@@ -1,0 +1,171 @@
+#include "core/certificate/boundary_claims.h"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+#include <set>
+#include <string>
+
+#include "core/base/message.h"
+#include "core/base/random.h"
+#include "core/certificate/links.h"
+
+namespace stellate::core {
+namespace {
+
+constexpr std::size_t kMaxFaceBarycentres = 500;  // of each face
+
+std::string NameWalls(WallSet walls) {
+  std::string name = Message(CountWalls(walls) == 1 ? "wall" : "walls");
+  ForEachWall(walls, [&](int wall) { name = Message(name, " ", wall); });
+  return name;
+}
+
+// Components and Euler characteristic of a list of simplices of one dimension.
+void Count(const FaceMesh& face, FaceReport* report) {
+  const auto width = static_cast<std::size_t>(face.dimension) + 1;
+  std::map<std::uint32_t, std::uint32_t> parent;
+  const auto root = [&](std::uint32_t v) {
+    while (parent[v] != v) v = parent[v] = parent[parent[v]];
+    return v;
+  };
+  std::set<std::vector<std::uint32_t>> all;
+  for (std::size_t s = 0; s < face.simplices.size(); s += width) {
+    const std::uint32_t* ids = face.simplices.data() + s;
+    for (std::size_t i = 0; i < width; ++i) parent.emplace(ids[i], ids[i]);
+    for (std::size_t i = 1; i < width; ++i) parent[root(ids[i])] = root(ids[0]);
+    for (unsigned mask = 1; mask < 1u << width; ++mask) {
+      std::vector<std::uint32_t> part;
+      for (std::size_t i = 0; i < width; ++i)
+        if (mask >> i & 1u) part.push_back(ids[i]);
+      all.insert(std::move(part));
+    }
+  }
+  for (const auto& part : all) report->euler_characteristic += part.size() % 2 == 1 ? 1 : -1;
+  for (const auto& [v, up] : parent) report->components += v == up;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> BoundaryClaims::CloseOff(const MeshView& mesh) {
+  std::vector<std::uint32_t> all = *mesh.simplices;
+  const auto apex = static_cast<std::uint32_t>(mesh.vertices);
+  for (const FaceMesh& face : *mesh.faces) {
+    if (face.dimension != mesh.k - 1) continue;
+    for (std::size_t s = 0; s < face.simplices.size(); s += static_cast<std::size_t>(mesh.k)) {
+      all.insert(all.end(), face.simplices.begin() + static_cast<std::ptrdiff_t>(s),
+                 face.simplices.begin() + static_cast<std::ptrdiff_t>(s) + mesh.k);
+      all.push_back(apex);
+    }
+  }
+  return all;
+}
+
+void BoundaryClaims::JudgeFaces() {
+  Certificate& c = x_.certificate;
+  FaceMesh boundary{0, x_.mesh.k - 1, {}};
+  for (const FaceMesh& face : *x_.mesh.faces) {
+    FaceReport report;
+    report.walls = face.walls;
+    report.dimension = face.dimension;
+    report.simplices = face.simplices.size() / (static_cast<std::size_t>(face.dimension) + 1);
+    Count(face, &report);
+    c.faces.push_back(report);
+    if (face.dimension == boundary.dimension)
+      boundary.simplices.insert(boundary.simplices.end(), face.simplices.begin(),
+                                face.simplices.end());
+  }
+  c.boundary_simplices = boundary.simplices.size() / static_cast<std::size_t>(x_.mesh.k);
+  FaceReport whole;
+  Count(boundary, &whole);
+  c.boundary_components = whole.components;
+  c.boundary_euler_characteristic = whole.euler_characteristic;
+  // Without its cones the complex has as many faces fewer as the cone over the boundary has
+  // beyond it.
+  c.euler_characteristic += whole.euler_characteristic - 1;
+  if (x_.mesh.k < 3 || boundary.simplices.empty()) return;  // circles and points have no links
+  const SimplexList list{x_.mesh.k - 1, static_cast<std::uint32_t>(x_.mesh.vertices),
+                         &boundary.simplices};
+  const Adjacency adjacency(list);
+  const LinkReport links = CheckLinks(adjacency);
+  if (adjacency.bad_facets() > 0)
+    x_.findings.Refuse(Findings::kComplex,
+                       Message("the boundary is not closed: ", adjacency.first_bad_facet(),
+                               " of it; faces like it: ", adjacency.bad_facets()));
+  if (links.bad_links > 0)
+    x_.findings.Refuse(Findings::kLinks, Message("in the boundary ", links.first_bad_link,
+                                                 "; vertices like it: ", links.bad_links));
+}
+
+std::vector<QueryBlock> BoundaryClaims::FaceQuestions() {
+  std::vector<QueryBlock> blocks;
+  for (const FaceMesh& face : *x_.mesh.faces) {
+    if (CountWalls(face.walls) != 1 || face.dimension == 0) continue;
+    const auto width = static_cast<std::size_t>(face.dimension) + 1;
+    const std::size_t count = face.simplices.size() / width;
+    const std::size_t step = std::max<std::size_t>(1, count / kMaxFaceBarycentres);
+    std::vector<std::uint32_t> chosen;
+    for (std::size_t s = Mix64(x_.spec.random_seed) % step; s < count; s += step)
+      chosen.push_back(static_cast<std::uint32_t>(s));
+    QueryBlock block;
+    block.face = face.walls;
+    block.want_clearances = block.want_tangents = true;
+    block.points.setZero(x_.mesh.d, static_cast<Eigen::Index>(chosen.size()));
+    for (std::size_t n = 0; n < chosen.size(); ++n)
+      for (std::size_t i = 0; i < width; ++i)
+        block.points.col(static_cast<Eigen::Index>(n)) +=
+            x_.Vertex(face.simplices[chosen[n] * width + i]) / static_cast<double>(width);
+    blocks.push_back(std::move(block));
+    chosen_.push_back(std::move(chosen));
+    faces_.push_back(&face);
+  }
+  return blocks;
+}
+
+void BoundaryClaims::JudgeFace(const QueryBlock& asked, const AnswerBlock& answer) {
+  const auto at = std::find_if(faces_.begin(), faces_.end(),
+                               [&](const FaceMesh* f) { return f->walls == asked.face; });
+  const FaceMesh& face = **at;
+  const std::vector<std::uint32_t>& chosen = chosen_[static_cast<std::size_t>(at - faces_.begin())];
+  const auto width = static_cast<std::size_t>(face.dimension) + 1;
+  for (std::size_t n = 0; n < chosen.size(); ++n) {
+    const auto j = static_cast<Eigen::Index>(n);
+    const std::uint32_t* ids = face.simplices.data() + chosen[n] * width;
+    double diameter = 0;
+    for (std::size_t i = 1; i < width; ++i)
+      diameter = std::max(diameter, (x_.Vertex(ids[i]) - x_.Vertex(ids[0])).norm());
+    const double bound = x_.DistanceAllowed(diameter);
+    const double distance =
+        Found(answer, j) ? (answer.points.col(j) - asked.points.col(j)).norm() : INFINITY;
+    if (distance <= bound) continue;
+    x_.findings.Refuse(
+        Findings::kBarycentres,
+        Message("the barycentre of simplex ", NameSimplex(ids, static_cast<int>(width)), " of ",
+                NameWalls(face.walls), " is ", Brief(distance),
+                " away from that, where its size "
+                "allows ",
+                Brief(bound)));
+  }
+}
+
+void BoundaryClaims::JudgeInside(const std::vector<std::uint32_t>& chosen, std::uint32_t each,
+                                 const AnswerBlock& answer) {
+  if (answer.clearances.size() == 0) return;
+  for (std::size_t n = 0; n < chosen.size(); ++n) {
+    const std::uint32_t* ids = x_.list()[chosen[n]];
+    const bool inner = std::all_of(ids, ids + x_.mesh.k + 1,
+                                   [&](std::uint32_t v) { return x_.mesh.WallsOf(v) == 0; });
+    const auto j = static_cast<Eigen::Index>(n * each);
+    if (!inner || !Found(answer, j)) continue;
+    Eigen::Index wall = 0;
+    if (answer.clearances.col(j).minCoeff(&wall) >= 0) continue;
+    x_.findings.Refuse(
+        Findings::kCoverage,
+        Message("the mesh lies beyond wall ", wall, " at ", NamePoint(answer.points.col(j)),
+                ", inside of simplex ", NameSimplex(ids, x_.mesh.k + 1),
+                ": the manifold has a hole there that is smaller than epsilon; take epsilon "
+                "smaller, or give seeds on that wall"));
+  }
+}
+
+}  // namespace stellate::core

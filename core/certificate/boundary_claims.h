@@ -1,0 +1,39 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "core/batch.h"
+#include "core/certificate/examination.h"
+
+namespace stellate::core {
+
+// Of manifolds with boundary: that the mesh ends where its faces are, and only there. The boundary
+// is closed off by cones to one vertex more; the mesh is a manifold with boundary when what then
+// comes out is closed and its links, but that vertex', are spheres: the link of a vertex of the
+// boundary is a ball exactly when, with its rim coned off, it is a sphere.
+class BoundaryClaims {
+ public:
+  explicit BoundaryClaims(Examination& examination) : x_(examination) {}
+
+  // The simplices and the cones over the boundary's, K+1 ascending ids each. The vertex that closes
+  // it off is the last, examination.mesh.vertices.
+  static std::vector<std::uint32_t> CloseOff(const MeshView& mesh);
+  // What is told of each face; and that the boundary itself is a closed manifold.
+  void JudgeFaces();
+
+  // Barycentres of some simplices of the boundary, a block for each wall.
+  std::vector<QueryBlock> FaceQuestions();
+  void JudgeFace(const QueryBlock& asked, const AnswerBlock& answer);
+  // That simplices off the boundary have M under them. `chosen`, `each`: see PointsInside.
+  void JudgeInside(const std::vector<std::uint32_t>& chosen, std::uint32_t each,
+                   const AnswerBlock& answer);
+
+ private:
+  Examination& x_;
+  std::vector<std::vector<std::uint32_t>> chosen_;  // by block: places in its face
+  std::vector<const FaceMesh*> faces_;              // by block
+};
+
+}  // namespace stellate::core

@@ -1,0 +1,70 @@
+// What the stars of a manifold with boundary say of its faces.
+
+#include <algorithm>
+
+#include "core/base/instantiate.h"
+#include "core/complex/star_complex.h"
+
+namespace stellate::core {
+
+template <int K>
+typename StarComplex<K>::FaceSimplex StarComplex<K>::FaceSimplexOf(std::uint32_t p,
+                                                                   const Cell& cell, std::size_t v,
+                                                                   WallSet guest_walls) const {
+  FaceSimplex simplex;
+  simplex.ids[0] = p;
+  simplex.count = 1;
+  for (int s = 0; s < K; ++s) {
+    const std::uint32_t id = cell.id(cell.facet(v, s));
+    if (IsFake(id))
+      simplex.fake = true;
+    else if (IsWall(id))
+      simplex.walls |= SetOfWall(WallOf(id));
+    else
+      simplex.ids[static_cast<std::size_t>(simplex.count++)] = id;
+  }
+  const auto end = simplex.ids.begin() + simplex.count;
+  std::sort(simplex.ids.begin(), end);
+  simplex.foreign = std::any_of(simplex.ids.begin(), end, [&](std::uint32_t id) {
+    return !IsSubset(simplex.walls, id == size() ? guest_walls : walls(id));
+  });
+  return simplex;
+}
+
+template <int K>
+std::optional<typename StarComplex<K>::CellVertex> StarComplex<K>::EncroachedBy(
+    const double* point, WallSet walls) const {
+  if (walls_.empty()) return std::nullopt;
+  std::optional<CellVertex> worst;
+  int lowest = K - CountWalls(walls);
+  double farthest2 = 0;
+  tree_.ForEachInfluencing(point, [&](std::uint32_t p) {
+    if (IsSubset(this->walls(p), walls)) return;
+    const Cell& cell = cells_[p];
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      const WallSet at = WallsAt<K>(cell, v);
+      const int dimension = K - CountWalls(at);
+      if (IsSubset(at, walls) || dimension == 0 || dimension > lowest || cell.HasFakeFacet(v))
+        continue;
+      const double norm2 = cell.norm2(v);
+      const bool is_first = !worst && dimension < K - CountWalls(walls);
+      const bool is_worse = worst && (dimension < lowest || norm2 > farthest2 ||
+                                      (norm2 == farthest2 && p < worst->star));
+      if (!(is_first || is_worse) || !CutsVertex(p, v, point)) continue;
+      worst = CellVertex{p, v};
+      lowest = dimension;
+      farthest2 = norm2;
+    }
+  });
+  return worst;
+}
+
+#define STELLATE_EACH(K)                                                                          \
+  template StarComplex<K>::FaceSimplex StarComplex<K>::FaceSimplexOf(std::uint32_t, const Cell&,  \
+                                                                     std::size_t, WallSet) const; \
+  template std::optional<StarComplex<K>::CellVertex> StarComplex<K>::EncroachedBy(const double*,  \
+                                                                                  WallSet) const;
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core

@@ -1,0 +1,217 @@
+// What the engine does for manifolds with boundary alone: faces are meshed by dimension, the lowest
+// first, and each insertion yields to faces of lower dimension, as in Ruppert's refinement.
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "core/refinement/engine.h"
+
+namespace stellate::core {
+namespace {
+
+// Shape never grinds the boundary down: a face's simplex of less than this share of the size asked
+// for is split for the sake of sizes alone.
+constexpr double kLeastSplit = 0.25;
+// A point of a face is news this far from the sample, in sizes asked for; a corner, which nothing
+// else can be instead of, anywhere but at itself.
+constexpr double kNewsAway = 0.5;
+constexpr double kSameCorner = 1e-6;
+// How far a corner's collar is: this share of epsilon, and of the distance to the nearest other
+// corner, so that two collars leave room between them. On a curved edge it may be a little longer.
+constexpr double kCollar = 0.5;
+constexpr double kCollarShare = 0.4;
+constexpr double kCollarLength = 1.1;
+
+}  // namespace
+
+// Around each corner, before anything else, a point on each of its edges: these are equally far
+// then, and no two edges that leave a corner at a sharp angle split each other without end.
+template <int K>
+PlannedPoints Engine<K>::SetCollars() {
+  std::vector<std::uint32_t> corners;
+  for (std::uint32_t p = 0; p < complex_.size(); ++p)
+    if (CountWalls(complex_.walls(p)) == K) corners.push_back(p);
+  PlannedPoints planned;
+  planned.points.resize(complex_.d(), static_cast<Eigen::Index>(corners.size() * K));
+  Eigen::Index column = 0;
+  for (const std::uint32_t p : corners) {
+    CheckInterruption(static_cast<std::size_t>(column));
+    double radius = kCollar * criteria_.epsilon;
+    for (const std::uint32_t q : corners)
+      if (q != p)
+        radius = std::min(
+            radius, kCollarShare * Distance(complex_.Point(p), complex_.Point(q), complex_.d()));
+    faces_.SetCollar(p, radius);
+    // Along the edge on all walls but one: what leaves that one alone inwards.
+    const Eigen::Map<const Eigen::Matrix<double, K, K, Eigen::RowMajor>> conormals(
+        complex_.Conormals(p));
+    const Eigen::Matrix<double, K, K> edges = -conormals.inverse();
+    int number = 0;
+    ForEachWall(complex_.walls(p), [&](int wall) {
+      const Eigen::Matrix<double, K, 1> x = radius * edges.col(number++).normalized();
+      complex_.Lift(p, x.data(), planned.points.col(column++).data());
+      planned.walls.push_back(complex_.walls(p) & ~SetOfWall(wall));
+    });
+  }
+  return planned;
+}
+
+template <int K>
+bool Engine<K>::IsCollar(const typename StarComplex<K>::FaceSimplex& simplex) const {
+  if (simplex.count != 2) return false;
+  const double length =
+      Distance(complex_.Point(simplex.ids[0]), complex_.Point(simplex.ids[1]), complex_.d());
+  return length <=
+         kCollarLength * std::max(faces_.CollarOf(simplex.ids[0]), faces_.CollarOf(simplex.ids[1]));
+}
+
+// The simplex dual to a vertex of a star's cell, to be split although it breaks no rule. Nothing
+// where that would go too far.
+template <int K>
+std::optional<Target<K>> Engine<K>::SplitOf(const typename StarComplex<K>::CellVertex& at,
+                                            Rule by) const {
+  const auto& cell = complex_.cell(at.star);
+  Violation<K> violation;
+  violation.rule = std::min(by, Rule::kRadiusEdge);
+  violation.radius = std::sqrt(cell.norm2(at.vertex));
+  std::copy_n(cell.x(at.vertex), K, violation.x);
+  violation.vertex = at.vertex;
+  violation.walls = WallsAt<K>(cell, at.vertex);
+  violation.split = true;
+  if (IsCollar(complex_.FaceSimplexOf(at.star, cell, at.vertex))) return std::nullopt;
+  if (by > Rule::kSize && violation.radius < kLeastSplit * sizes_.BoundAt(complex_, at.star))
+    return std::nullopt;
+  return Aim(at.star, violation);
+}
+
+// Leaves the targets on faces of the lowest dimension, and has those that would spoil a face of
+// lower dimension yet split that. What answers have encroached on comes besides.
+template <int K>
+void Engine<K>::YieldToFaces(std::vector<Target<K>>* targets) {
+  int lowest = K;
+  for (const Target<K>& t : *targets) lowest = std::min(lowest, t.violation.dimension());
+  std::vector<Target<K>> kept;
+  for (const auto& [star, key, by] : faces_.TakeSplits()) {
+    const std::size_t v = complex_.cell(star).Find(key);
+    if (v == complex_.cell(star).vertex_count()) continue;
+    if (auto split = SplitOf({star, v}, by)) kept.push_back(*split);
+  }
+  std::vector<double> aim(static_cast<std::size_t>(complex_.d()));
+  for (Target<K>& t : *targets) {
+    CheckInterruption(kept.size());
+    if (t.violation.dimension() > lowest) continue;
+    std::optional<Target<K>> target = t;
+    // The image of a far aim may fall anywhere; good points have several candidates, and after a
+    // failed attempt the point is another.
+    const bool is_one = t.violation.rule < Rule::kSliver && book_.failed_attempts(t.star) == 0;
+    for (int step = 0;
+         target && is_one && !target->violation.fake && !target->is_coarse() && step < K; ++step) {
+      complex_.Lift(target->star, target->x, aim.data());
+      const auto at = complex_.EncroachedBy(aim.data(), target->violation.walls);
+      if (!at) break;
+      target = SplitOf(*at, target->violation.rule);
+    }
+    if (target)
+      kept.push_back(*target);
+    else
+      book_.NoteFailedAttempt(t.star);
+  }
+  *targets = std::move(kept);
+}
+
+template <int K>
+PlannedPoints Engine<K>::ChooseSeeds() {
+  std::vector<typename FaceBook<K>::Seed> chosen, left;
+  for (auto& seed : faces_.seeds()) {
+    CheckInterruption(chosen.size() + left.size());
+    const int dimension = K - CountWalls(seed.walls);
+    const double apart = dimension == 0 ? kSameCorner * criteria_.epsilon : criteria_.epsilon;
+    const bool covered =
+        complex_.AnyWithin(seed.point.data(), apart) ||
+        std::any_of(chosen.begin(), chosen.end(), [&](const auto& other) {
+          return Distance(other.point.data(), seed.point.data(), complex_.d()) <= apart;
+        });
+    const bool ripe = dimension == faces_.stage() && !covered && !is_full() &&
+                      !complex_.EncroachedBy(seed.point.data(), seed.walls);
+    (ripe ? chosen : left).push_back(std::move(seed));
+  }
+  faces_.seeds() = std::move(left);
+  if (chosen.empty() && faces_.stage() == 0 && K > 1 && !faces_.has_collars()) return SetCollars();
+  PlannedPoints points;
+  points.points.resize(complex_.d(), static_cast<Eigen::Index>(chosen.size()));
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    points.points.col(static_cast<Eigen::Index>(i)) = chosen[i].point;
+    points.walls.push_back(chosen[i].walls);
+  }
+  return points;
+}
+
+template <int K>
+bool Engine<K>::AdvanceStage() {
+  if (!faces_.Advance()) return false;
+  RejudgeAll();
+  JudgeAllAnew();
+  book_.ForgetAttempts();
+  return true;
+}
+
+template <int K>
+PlannedPoints Engine<K>::TakeDiscoveries() {
+  const auto found = faces_.TakeDiscoveries();
+  PlannedPoints planned;
+  const auto count = static_cast<Eigen::Index>(found.size());
+  planned.points.resize(complex_.d(), count);
+  planned.spacing.resize(count);
+  planned.rules.assign(found.size(), Rule::kSize);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const auto column = static_cast<Eigen::Index>(i);
+    planned.points.col(column) = found[i].point;
+    planned.walls.push_back(found[i].walls);
+    planned.spacing[column] =
+        criteria_.epsilon * (CountWalls(found[i].walls) == K ? kSameCorner : kNewsAway);
+  }
+  return planned;
+}
+
+template <int K>
+std::vector<FaceMesh> Engine<K>::Faces() const {
+  using Simplex = std::vector<std::uint32_t>;
+  std::map<std::pair<int, WallSet>, std::set<Simplex>> faces;
+  for (std::uint32_t p = 0; p < complex_.size(); ++p) {
+    CheckInterruption(p);
+    if (complex_.walls(p) == 0) continue;
+    const auto& cell = complex_.cell(p);
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      const auto simplex = complex_.FaceSimplexOf(p, cell, v);
+      if (simplex.walls == 0 || simplex.fake || simplex.ids[0] != p) continue;
+      faces[{simplex.dimension(), simplex.walls}].emplace(simplex.ids.begin(),
+                                                          simplex.ids.begin() + simplex.count);
+    }
+  }
+  std::vector<FaceMesh> all;
+  for (const auto& [key, simplices] : faces) {
+    FaceMesh face{key.second, key.first, {}};
+    for (const Simplex& s : simplices)
+      face.simplices.insert(face.simplices.end(), s.begin(), s.end());
+    all.push_back(std::move(face));
+  }
+  return all;
+}
+
+#define STELLATE_EACH(K)                                                                        \
+  template std::optional<Target<K>> Engine<K>::SplitOf(const StarComplex<K>::CellVertex&, Rule) \
+      const;                                                                                    \
+  template void Engine<K>::YieldToFaces(std::vector<Target<K>>*);                               \
+  template PlannedPoints Engine<K>::ChooseSeeds();                                              \
+  template PlannedPoints Engine<K>::SetCollars();                                               \
+  template bool Engine<K>::IsCollar(const StarComplex<K>::FaceSimplex&) const;                  \
+  template bool Engine<K>::AdvanceStage();                                                      \
+  template std::vector<FaceMesh> Engine<K>::Faces() const;                                      \
+  template PlannedPoints Engine<K>::TakeDiscoveries();
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core

@@ -1,0 +1,81 @@
+// What a run of a manifold with boundary asks for besides: seeds of its faces.
+
+#include <string>
+#include <utility>
+
+#include "core/base/message.h"
+#include "core/base/parallel.h"
+#include "core/run/meshing_run.h"
+
+namespace stellate::core {
+
+// The seeds' closest points on M, and on each wall of it.
+template <int K>
+void MeshingRun<K>::AskForFaces(const Eigen::MatrixXd& seeds) {
+  CandidateSet<K> candidates;
+  PlannedPoints& planned = candidates.planned;
+  planned.points = seeds.replicate(1, spec_.walls + 1);
+  planned.walls.assign(static_cast<std::size_t>(seeds.cols()), 0);
+  for (int wall = 0; wall < spec_.walls; ++wall)
+    planned.walls.insert(planned.walls.end(), static_cast<std::size_t>(seeds.cols()),
+                         SetOfWall(wall));
+  Ask(std::move(candidates), &MeshingRun::KeepFaceSeeds);
+}
+
+template <int K>
+void MeshingRun<K>::KeepFaceSeeds() {
+  const AnsweredPoints& answers = trip_->answers();
+  std::uint64_t found = 0, inside = 0;
+  for (Eigen::Index c = 0; c < answers.points.cols(); ++c) {
+    const auto i = static_cast<std::size_t>(c);
+    CheckInterruption(i);
+    if (!answers.found[i]) continue;
+    found += answers.walls[i] == 0;
+    if (const std::optional<int> beyond = answers.Beyond(c)) {
+      if (answers.walls[i] != 0)
+        engine_.faces().Discover(answers.points.col(c), answers.walls[i], *beyond);
+      continue;
+    }
+    ++inside;
+    engine_.faces().KeepSeed(answers.points.col(c), answers.walls[i]);
+  }
+  if (inside > 0 || engine_.faces().has_discoveries()) return;
+  Fail({StatusCode::kNoSeeds,
+        found == 0 ? "no seed has a closest point on the manifold; give seeds near it, or a box "
+                     "that holds it"
+                   : Message("the walls leave nothing of the manifold: all ", found,
+                             " closest points of the seeds lie beyond a wall. Is a wall's sign "
+                             "inverted? What is inside has clearances >= 0")});
+}
+
+// Where nothing is left to do on faces up to the stage: on to seeds of that stage, or to the next.
+// False where these are asked for, or the run is over.
+template <int K>
+bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
+  const FaceBook<K>& faces = engine_.faces();
+  while ((*targets)->empty() && !faces.has_discoveries()) {
+    if (PlannedPoints seeds = engine_.ChooseSeeds(); seeds.size() > 0) {
+      CandidateSet<K> candidates;
+      candidates.planned = std::move(seeds);
+      Ask(std::move(candidates), &MeshingRun::InsertSpares);
+      return false;
+    }
+    if (!engine_.AdvanceStage()) break;
+    stall_watch_.NoteFrontMoved();
+    *targets = engine_.Plan();
+    if (!*targets) {
+      Finish(Termination::kNoProgress);
+      return false;
+    }
+  }
+  return true;
+}
+
+#define STELLATE_EACH(K)                                            \
+  template void MeshingRun<K>::AskForFaces(const Eigen::MatrixXd&); \
+  template void MeshingRun<K>::KeepFaceSeeds();                     \
+  template bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>*);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core

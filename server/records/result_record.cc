@@ -1,0 +1,118 @@
+// The record of what a mesh came to.
+
+#include "server/records/journal_format.h"
+#include "server/records/record_bytes.h"
+
+namespace stellate::server {
+namespace {
+
+template <typename Archive, typename Value>
+void LayOutProgress(Archive& archive, Value& progress) {
+  archive.Number(progress.phase);
+  archive.Number(progress.round);
+  archive.Number(progress.queries);
+  archive.Number(progress.vertices);
+  archive.Number(progress.simplices);
+  archive.Number(progress.unbounded_stars);
+  archive.Number(progress.bad_size);
+  archive.Number(progress.bad_radius_edge);
+  archive.Number(progress.bad_sliver);
+  archive.Number(progress.bad_inconsistent);
+  archive.Number(progress.fraction);
+}
+
+template <typename Archive, typename Value>
+void LayOutReport(Archive& archive, Value& report) {
+  archive.Number(report.termination);
+  archive.Number(report.failure.code);
+  archive.Bytes(report.failure.message);
+  auto& counts = report.counts;
+  archive.Number(counts.vertices);
+  archive.Number(counts.simplices);
+  archive.Number(counts.rounds);
+  archive.Number(counts.queries);
+  archive.Number(counts.tangent_queries);
+  archive.Number(counts.inserted_size);
+  archive.Number(counts.inserted_radius_edge);
+  archive.Number(counts.inserted_sliver);
+  archive.Number(counts.inserted_inconsistent);
+  archive.Number(counts.duplicates);
+  auto& certificate = report.certificate;
+  archive.Number(certificate.certified);
+  archive.Bytes(certificate.verdict);
+  archive.Strings(certificate.warnings);
+  archive.Number(certificate.closed);
+  archive.Number(certificate.bad_faces);
+  archive.Number(certificate.links_are_spheres);
+  archive.Number(certificate.links_decided_exactly);
+  archive.Number(certificate.bad_links);
+  archive.Number(certificate.inconsistent_simplices);
+  archive.Number(certificate.unembedded_stars);
+  archive.Number(certificate.fibre_failures);
+  archive.Number(certificate.fibre_samples);
+  archive.Number(certificate.answers_held);
+  archive.Number(certificate.max_circumradius);
+  archive.Number(certificate.max_radius_edge);
+  archive.Number(certificate.min_fatness);
+  archive.Number(certificate.min_angle_degrees);
+  archive.Number(certificate.max_tangent_angle_degrees);
+  archive.Number(certificate.max_barycentre_distance);
+  archive.Number(certificate.estimated_reach);
+  archive.Number(certificate.epsilon_over_reach);
+  archive.Number(certificate.components);
+  archive.Number(certificate.euler_characteristic);
+  archive.Number(certificate.orientable);
+  archive.Number(certificate.level);
+  archive.Number(certificate.declared_reach);
+  archive.Number(certificate.reach_refuted);
+  archive.Number(certificate.proved_distance);
+}
+
+// Follows what other meshes have: records without walls are as they were.
+template <typename Archive, typename Value>
+void LayOutBoundary(Archive& archive, Value& certificate) {
+  archive.Number(certificate.boundary_simplices);
+  archive.Number(certificate.boundary_components);
+  archive.Number(certificate.boundary_euler_characteristic);
+  std::size_t count = certificate.faces.size();
+  archive.Number(count);
+  if constexpr (!std::is_const_v<Value>) {
+    // A forged number of them ends with the record.
+    for (std::size_t i = 0; i < count && archive.good(); ++i) certificate.faces.emplace_back();
+  }
+  for (auto& face : certificate.faces) {
+    archive.Number(face.walls);
+    archive.Number(face.dimension);
+    archive.Number(face.simplices);
+    archive.Number(face.components);
+    archive.Number(face.euler_characteristic);
+  }
+}
+
+}  // namespace
+
+std::string EncodeResult(const SessionResult& result, std::uint64_t parts) {
+  RecordWriter writer;
+  LayOutProgress(writer, result.progress);
+  LayOutReport(writer, result.report);
+  writer.Number(result.revision);
+  writer.Number(result.history_bytes);
+  writer.Number(parts);
+  if (!result.report.certificate.faces.empty()) LayOutBoundary(writer, result.report.certificate);
+  return writer.Take();
+}
+
+std::optional<SessionResult> DecodeResult(std::string_view record, std::uint64_t* parts) {
+  RecordReader reader(record);
+  SessionResult result;
+  LayOutProgress(reader, result.progress);
+  LayOutReport(reader, result.report);
+  reader.Number(result.revision);
+  reader.Number(result.history_bytes);
+  reader.Number(*parts);
+  if (!reader.Complete()) LayOutBoundary(reader, result.report.certificate);
+  if (!reader.Complete()) return std::nullopt;
+  return result;
+}
+
+}  // namespace stellate::server
