@@ -26,6 +26,7 @@ class OracleStream final
   OracleStream(ServerState& state, grpc::CallbackServerContext* context)
       : state_(state),
         context_(context),
+        peer_(context->peer()),
         caller_(Identify(state, *context)),
         opened_(Clock::now()) {}
 
@@ -86,7 +87,7 @@ class OracleStream final
   }
 
   std::string Title() const override {
-    return core::Message(worker_name_, worker_name_.empty() ? "at " : " at ", context_->peer());
+    return core::Message(worker_name_, worker_name_.empty() ? "at " : " at ", peer_);
   }
 
   void Tick(TimePoint now) override {
@@ -170,7 +171,7 @@ class OracleStream final
       return;
     }
     Log(LogLevel::kInfo, session_->log_context(), "worker joined",
-        LogFields().Add("worker", worker_name_).Add("address", context_->peer()));
+        LogFields().Add("worker", worker_name_).Add("address", peer_));
     bool ended = false;
     {
       const std::lock_guard lock(mutex_);
@@ -221,7 +222,7 @@ class OracleStream final
     }
     session_->pool().Leave(worker);
     Log(LogLevel::kInfo, session_->log_context(), "worker left",
-        LogFields().Add("worker", worker_name_).Add("address", context_->peer()));
+        LogFields().Add("worker", worker_name_).Add("address", peer_));
   }
 
   void EndWith(grpc::Status status, bool mesh_over = false) {
@@ -270,6 +271,7 @@ class OracleStream final
 
   ServerState& state_;
   grpc::CallbackServerContext* const context_;
+  const std::string peer_;  // asked of the context while there surely is a call
   const tl::expected<Identity, grpc::Status> caller_;
   const TimePoint opened_;
   v1::ServeOracleRequest request_;  // the reading side's alone, as are the next
