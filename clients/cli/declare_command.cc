@@ -23,7 +23,7 @@ DeclareCommand::DeclareCommand(CLI::App& parent)
 }
 
 int DeclareCommand::Run(std::stop_token stop) {
-  const Expected<std::unique_ptr<Oracle>> oracle = source_.Make(stop);
+  const Expected<std::unique_ptr<Oracle>> oracle = source_.Make(std::move(stop));
   if (!oracle) return PrintError(oracle.error());
   Expected<Credentials> credentials = server_.ReadCredentials();
   if (!credentials) return PrintError(credentials.error());

@@ -81,7 +81,7 @@ int ViewCommand::Run(std::stop_token stop) const {
     return std::cout ? kExitCertified : kExitRefused;
   }
   if (demo_) return ShowDemo(stop);
-  return html_.empty() ? ShowLive(std::move(stop)) : WriteHtml(std::move(stop));
+  return html_.empty() ? ShowLive(stop) : WriteHtml(std::move(stop));
 }
 
 int ViewCommand::WriteHtml(std::stop_token stop) const {
@@ -115,7 +115,7 @@ Expected<void> ViewCommand::Serve(const std::string& server, const Credentials& 
   return {};
 }
 
-int ViewCommand::ShowLive(std::stop_token stop) const {
+int ViewCommand::ShowLive(const std::stop_token& stop) const {
   const Expected<Credentials> credentials = server_.ReadCredentials();
   if (!credentials) return PrintError(credentials.error());
   // Whoever mistypes hears of it here, not in the browser.

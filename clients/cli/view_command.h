@@ -18,7 +18,7 @@ class ViewCommand {
 
  private:
   int WriteHtml(std::stop_token stop) const;
-  int ShowLive(std::stop_token stop) const;
+  int ShowLive(const std::stop_token& stop) const;
   int ShowDemo(const std::stop_token& stop) const;
   Expected<void> Serve(const std::string& server, const Credentials& credentials,
                        const std::stop_token& stop) const;

@@ -108,7 +108,7 @@ Expected<void> Demo::Run(const std::stop_token& stop,
   for (const Exhibit& exhibit : kExhibits) {
     if (stop.stop_requested()) break;
     on_mesh(exhibit.manifold);
-    if (const auto ok = impl_->Show(exhibit, stop); !ok) return ok;
+    if (auto ok = impl_->Show(exhibit, stop); !ok) return ok;
     std::unique_lock lock(mutex);
     wake.wait_for(lock, stop, kPause, [] { return false; });
   }

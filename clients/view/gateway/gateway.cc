@@ -201,6 +201,6 @@ Expected<std::unique_ptr<Gateway>> Gateway::Listen(GatewayOptions options) {
 
 std::string Gateway::Address() const { return impl_->AddressWith(impl_->keys().secret()); }
 std::string Gateway::AddressForOnce() { return impl_->AddressWith(impl_->keys().NewForOnce()); }
-void Gateway::Run(std::stop_token stop) { impl_->Run(stop); }
+void Gateway::Run(const std::stop_token& stop) { impl_->Run(stop); }
 
 }  // namespace stellate::view

@@ -35,7 +35,7 @@ class Gateway {
   std::string AddressForOnce();
 
   // Until stop is requested.
-  void Run(std::stop_token stop);
+  void Run(const std::stop_token& stop);
 
  private:
   class Impl;

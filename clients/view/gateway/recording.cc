@@ -87,7 +87,7 @@ class Recorder {
     const auto watch = [this](auto* context, const auto& r) {
       return stub_->WatchMesh(context, r);
     };
-    const auto ok = Read<v1::WatchMeshRequest, v1::WatchMeshResponse>(
+    auto ok = Read<v1::WatchMeshRequest, v1::WatchMeshResponse>(
         request, watch, [this](v1::WatchMeshResponse* response) {
           if (response->has_progress() && options_.on_progress)
             options_.on_progress(client::FromProto(response->progress()));
@@ -95,7 +95,7 @@ class Recorder {
     if (!ok) return ok;
     request.set_progress_only(false);
     Begin("WatchMesh");
-    const auto whole = Read<v1::WatchMeshRequest, v1::WatchMeshResponse>(
+    auto whole = Read<v1::WatchMeshRequest, v1::WatchMeshResponse>(
         request, watch, [this](v1::WatchMeshResponse* response) {
           if (response->has_final()) Anonymize(response->mutable_final());
           if (response->has_delta() || response->has_final()) Add(*response);
@@ -123,7 +123,7 @@ class Recorder {
     request.set_name(mesh_);
     request.set_revision(revision);
     Begin("DownloadMesh", revision);
-    const auto ok = Read<v1::DownloadMeshRequest, v1::DownloadMeshResponse>(
+    auto ok = Read<v1::DownloadMeshRequest, v1::DownloadMeshResponse>(
         request, [this](auto* context, const auto& r) { return stub_->DownloadMesh(context, r); },
         [this](v1::DownloadMeshResponse* part) { Add(*part); });
     End();
