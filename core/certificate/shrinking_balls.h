@@ -24,7 +24,7 @@ class ShrinkingBalls {
       : mesh_(mesh), longest_edge_(longest_edge) {}
 
   // At random vertices, on random normals. The first step asks for a ladder of radii, each half of
-  // the one before, from half the mesh's width on: round trips are dearer than questions, and one
+  // the one before, from half the mesh's width on: round trips cost more than questions, and one
   // more step then suffices.
   void AddLadders(std::uint64_t random_seed, int count);
   // Two balls of one radius on either side of vertex v.

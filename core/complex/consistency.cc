@@ -3,6 +3,8 @@
 #include <Eigen/LU>
 #include <algorithm>
 
+#include "core/base/instantiate.h"
+
 namespace stellate::core {
 namespace {
 
@@ -167,7 +169,7 @@ std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(
   return std::nullopt;
 }
 
-#define STELLATE_INSTANTIATE(K)                                                       \
+#define STELLATE_EACH(K)                                                              \
   template std::optional<std::size_t> FindSimplex<K>(                                 \
       const RestrictedVoronoiCell<K>&, std::uint32_t, const StarComplex<K>::Simplex&, \
       std::uint64_t);                                                                 \
@@ -176,11 +178,7 @@ std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(
   template std::uint64_t CountInconsistent(const StarComplex<K>&, std::uint32_t);     \
   template std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration( \
       const StarComplex<K>&, std::uint32_t);
-STELLATE_INSTANTIATE(1)
-STELLATE_INSTANTIATE(2)
-STELLATE_INSTANTIATE(3)
-STELLATE_INSTANTIATE(4)
-STELLATE_INSTANTIATE(5)
-#undef STELLATE_INSTANTIATE
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
 
 }  // namespace stellate::core

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 
+#include "core/base/instantiate.h"
 #include "core/base/parallel.h"
 #include "core/complex/star_complex.h"
 
@@ -225,7 +226,7 @@ void StarComplex<K>::TryPoint(const double* point, const double* tangent, std::u
             [](const auto& a, const auto& b) { return a.first < b.first; });
 }
 
-#define STELLATE_INSTANTIATE(K)                                                                \
+#define STELLATE_EACH(K)                                                                       \
   template void StarComplex<K>::Neighbourhood(const double*, std::uint32_t,                    \
                                               std::vector<std::uint32_t>*) const;              \
   template std::uint32_t StarComplex<K>::Append(const double*, const double*, std::uint32_t,   \
@@ -238,11 +239,7 @@ void StarComplex<K>::TryPoint(const double* point, const double* tangent, std::u
   template void StarComplex<K>::TryPoint(const double*, const double*, std::uint32_t,          \
                                          typename Cell::Scratch&, Tentative*, WallSet,         \
                                          const double*) const;
-STELLATE_INSTANTIATE(1)
-STELLATE_INSTANTIATE(2)
-STELLATE_INSTANTIATE(3)
-STELLATE_INSTANTIATE(4)
-STELLATE_INSTANTIATE(5)
-#undef STELLATE_INSTANTIATE
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
 
 }  // namespace stellate::core

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/base/instantiate.h"
 #include "core/base/vector_ops.h"
 #include "core/geometry/half_spaces.h"
 
@@ -265,14 +266,10 @@ bool CommonCentre(int d, const double* const* points, const double* const* tange
   });
 }
 
-#define STELLATE_INSTANTIATE(K)                                                                 \
+#define STELLATE_EACH(K)                                                                        \
   template bool CommonCentre<K>(int, const double* const*, const double* const*, const double*, \
                                 double, double*);
-STELLATE_INSTANTIATE(1)
-STELLATE_INSTANTIATE(2)
-STELLATE_INSTANTIATE(3)
-STELLATE_INSTANTIATE(4)
-STELLATE_INSTANTIATE(5)
-#undef STELLATE_INSTANTIATE
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
 
 }  // namespace stellate::core

@@ -6,9 +6,14 @@
 #include <memory>
 #include <vector>
 
-#include "core/geometry/restricted_voronoi_cell.h"
+#include "core/base/random.h"
+#include "core/base/vector_ops.h"
+#include "core/geometry/surroundings.h"
 
 namespace stellate::core {
+
+template <int K>
+class RestrictedVoronoiCell;  // for any other K: restricted_voronoi_cell.h
 
 // The cell for K = 2, a polygon: vertex v lies on the facets v and v + 1, cyclically. Of a facet
 // only the id is kept, and its half-space asked for when a cut needs it, so that millions of cells

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "core/base/instantiate.h"
 #include "core/base/local_maxima.h"
 #include "core/base/parallel.h"
 #include "core/sample/ball_tree.h"
@@ -134,14 +135,10 @@ std::vector<Target<K>> SelectIndependent(const StarComplex<K>& complex,
   return ordered;
 }
 
-#define STELLATE_INSTANTIATE(K)                                                                    \
+#define STELLATE_EACH(K)                                                                           \
   template std::vector<Target<K>> SelectIndependent(const StarComplex<K>&, std::vector<Target<K>>, \
                                                     std::size_t);
-STELLATE_INSTANTIATE(1)
-STELLATE_INSTANTIATE(2)
-STELLATE_INSTANTIATE(3)
-STELLATE_INSTANTIATE(4)
-STELLATE_INSTANTIATE(5)
-#undef STELLATE_INSTANTIATE
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
 
 }  // namespace stellate::core

@@ -8,6 +8,7 @@
 #include <tuple>
 #include <vector>
 
+#include "core/base/instantiate.h"
 #include "core/geometry/reach.h"
 #include "core/geometry/simplex_frame.h"
 
@@ -353,7 +354,7 @@ int CountBad(const StarComplex<K>& complex, const double* point,
   return bad;
 }
 
-#define STELLATE_INSTANTIATE(K)                                                                   \
+#define STELLATE_EACH(K)                                                                          \
   template std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>&, std::uint32_t,     \
                                                         double, double, int);                     \
   template std::optional<Violation<K>> WorstSliverOrInconsistent(                                 \
@@ -365,11 +366,7 @@ int CountBad(const StarComplex<K>& complex, const double* point,
                             const RestrictedVoronoiCell<K>&, std::size_t, double, const double*); \
   template int CountBad(const StarComplex<K>&, const double*, const StarComplex<K>::Tentative&,   \
                         const ShapeBounds&, double, int, WallSet);
-STELLATE_INSTANTIATE(1)
-STELLATE_INSTANTIATE(2)
-STELLATE_INSTANTIATE(3)
-STELLATE_INSTANTIATE(4)
-STELLATE_INSTANTIATE(5)
-#undef STELLATE_INSTANTIATE
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
 
 }  // namespace stellate::core

@@ -23,7 +23,8 @@ class StopSignal {
   explicit StopSignal(std::stop_token stop);
 
   int descriptor() const { return event_.get(); }  // readable once a stop was requested
-  // Of what is going on: a second after the request, lest a batch that is nearly done be lost.
+  // Of what is going on: a second after the request, so that a batch that is nearly done is not
+  // lost.
   std::chrono::steady_clock::time_point deadline() const { return deadline_.load(); }
 
  private:

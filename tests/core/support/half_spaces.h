@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/random.h"
-#include "core/geometry/restricted_voronoi_cell.h"
+#include "core/geometry/surroundings.h"
 
 // Half-spaces for cells to be cut by, and the vertices of what they leave, without a cell.
 namespace stellate::core::testing {

@@ -1,6 +1,6 @@
-#include <cmath>
+#include "core/geometry/surroundings.h"
 
-#include "core/geometry/restricted_voronoi_cell.h"
+#include <cmath>
 
 namespace stellate::core {
 
