@@ -16,6 +16,7 @@
 #include "exit_status.h"
 #include "files.h"
 #include "replay.h"
+#include "silent_oracle.h"
 #include "stellate/catalogue.h"
 #include "stellate/client.h"
 #include "stellate/doctor.h"
@@ -50,21 +51,6 @@ std::string Scratch(const std::string& name, const std::string& ending) {
   path.append(name).append(1, '.').append(ending);
   return path;
 }
-
-// Of a manifold that nobody asks about.
-class Silent final : public Oracle {
- public:
-  Silent(int k, int d) : k_(k), d_(d) {}
-  int dimension() const override { return k_; }
-  int ambient_dimension() const override { return d_; }
-  Answer ClosestPoint(const Eigen::MatrixXd&) override { throw std::logic_error("was asked"); }
-  std::optional<BoundingBox> bounding_box() const override {
-    return BoundingBox{-Eigen::VectorXd::Ones(d_), Eigen::VectorXd::Ones(d_)};
-  }
-
- private:
-  const int k_, d_;
-};
 
 class Stream : public ::testing::TestWithParam<Case> {};
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "files.h"
+#include "silent_oracle.h"
 #include "stellate/catalogue.h"
 #include "stellate/client.h"
 #include "stellate/monitor.h"
@@ -18,21 +19,6 @@
 
 namespace stellate::testing {
 namespace {
-
-// Of a manifold that nobody asks about.
-class Silent final : public Oracle {
- public:
-  Silent(int k, int d) : k_(k), d_(d) {}
-  int dimension() const override { return k_; }
-  int ambient_dimension() const override { return d_; }
-  Answer ClosestPoint(const Eigen::MatrixXd&) override { throw std::logic_error("was asked"); }
-  std::optional<BoundingBox> bounding_box() const override {
-    return BoundingBox{-Eigen::VectorXd::Ones(d_), Eigen::VectorXd::Ones(d_)};
-  }
-
- private:
-  const int k_, d_;
-};
 
 // The unit circle of the first two coordinates of R^d; the catalogue's is turned.
 class Circle final : public Oracle {
