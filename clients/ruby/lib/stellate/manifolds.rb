@@ -27,7 +27,7 @@ module Stellate
       points.map do |x, y, z|
         ring = Math.sqrt((x * x) + (y * y))
         c, s, out, up = x / ring, y / ring, (ring - @major) / @minor, z / @minor
-        [[-s, -c * up], [c, -s * up], [0.0, out]]
+        [-s, -c * up, c, -s * up, 0.0, out]
       end
     end
   end
@@ -52,10 +52,10 @@ module Stellate
 
     def tangent_basis(points)
       points.map do |point|
-        basis = Array.new(ambient_dimension) { [0.0] * dimension }
+        basis = [0.0] * (ambient_dimension * dimension)
         dimension.times do |a|
-          basis[2 * a][a] = -point[(2 * a) + 1]
-          basis[(2 * a) + 1][a] = point[2 * a]
+          row = (2 * a * dimension) + a
+          basis[row], basis[row + dimension] = -point[(2 * a) + 1], point[2 * a]
         end
         basis
       end

@@ -9,7 +9,8 @@ module Stellate
   #   closest_point(points): a point of M nearest to each; nil where there is none
   #   intersect_flat(centers, bases, radii): the point of M nearest to each center in the flat through it
   #     that is orthogonal to the columns of its basis (d rows of k), within the radius; else nil
-  #   tangent_basis(points): at points of M d rows of k numbers, orthonormal columns
+  #   tangent_basis(points): at points of M d rows of k numbers, orthonormal columns; or these d k numbers
+  #     in one array, which is quicker
   #   local_size(points): at points of M the local feature size, or any positive lengths
   # The answer to a query must not depend on the rest of its batch. Calls come one at a time.
   class CheckedOracle
@@ -47,19 +48,19 @@ module Stellate
     def asked(chunk)
       x = Wire.numbers(chunk.points, nil, d).each_slice(d).to_a
       n = x.size
-      points, flat = checked(method_of(chunk), ask(chunk, x), n, d)
+      points, data = checked(method_of(chunk), ask(chunk, x), n, d)
       reply = V1::AnswerChunk.new(lease: chunk.lease)
-      unless flat
+      unless data
         reply.found = points.map { |point| point ? 1 : 0 }.pack('C*')
         nowhere = [0.0] * d
-        flat = points.flat_map { |point| point || nowhere }
+        data = points.flat_map { |point| point || nowhere }.pack('E*')
       end
-      reply.points = Wire.to_wire(flat, n, d)
+      reply.points = Wire.packed(data, n, d)
       if chunk.want_tangents
         anywhere = Array.new(d) { |row| Array.new(k) { |column| row == column ? 1.0 : 0.0 } }.flatten
-        reply.tangents = Wire.to_wire(at_found(:tangent_basis, points, anywhere), n, d, k)
+        reply.tangents = Wire.packed(at_found(:tangent_basis, points, anywhere), n, d, k)
       end
-      reply.sizes = Wire.to_wire(at_found(:local_size, points, [1.0]), n) if chunk.want_sizes
+      reply.sizes = Wire.packed(at_found(:local_size, points, [1.0]), n) if chunk.want_sizes
       reply
     end
 
@@ -78,22 +79,22 @@ module Stellate
       @oracle.intersect_flat(x, bases, Wire.numbers(chunk.radii, x.size))
     end
 
-    # What the method says of the points that were found, and `anywhere` for the others, flat.
+    # What the method says of the points that were found, and `anywhere` for the others, as bytes.
     def at_found(method, points, anywhere)
-      on = points.compact
-      values, flat = on.empty? ? [] : checked(method, @oracle.public_send(method, on), on.size, anywhere.size)
-      return flat || values.flatten if on.size == points.size
+      on = points.include?(nil) ? points.compact : points
+      values, data = on.empty? ? [] : checked(method, @oracle.public_send(method, on), on.size, anywhere.size)
+      return data || values.flatten.pack('E*') if on.size == points.size
 
-      points.flat_map { |point| point ? [values.shift].flatten : anywhere }
+      points.flat_map { |point| point ? [values.shift].flatten : anywhere }.pack('E*')
     end
 
-    # As n rows of so many finite numbers, or nil; and all of these in one array, where that is known.
+    # The answer with n rows of `width` finite numbers, or nil; and all of these as bytes, where none is nil.
     def checked(method, answer, n, width)
       raise wrong(method, "an answer that is no array of #{n}", 'SHAPE') unless
         answer.is_a?(Array) && answer.size == n
 
-      flat = sound(answer, n, width) # looked at as a whole, which is quicker
-      return [answer, flat] if flat
+      data = sound(answer, n, width) # looked at as a whole, which is quicker
+      return [answer, data] if data
 
       rows = answer.map do |row|
         next if row.nil? && %i[closest_point intersect_flat].include?(method)
@@ -105,16 +106,20 @@ module Stellate
 
         numbers
       end
-      [rows, rows.include?(nil) ? nil : rows.flatten]
+      [rows, rows.include?(nil) ? nil : rows.flatten.pack('E*')]
     end
 
-    # All numbers, where they are what they should be; else nil.
+    # The bytes of all numbers, where they are what they should be; else nil. Rows of numbers are laid out
+    # much faster than rows of rows.
     def sound(answer, n, width)
-      each = answer.first.is_a?(Array) ? answer.first.size : 1
-      flat = answer.flatten
-      good = flat.size == n * width && flat.all?(Float) && flat.sum.finite? &&
-             answer.all? { |row| row.is_a?(Array) ? row.size == each : each == 1 }
-      flat if good
+      first = answer.first
+      each = first.is_a?(Array) ? first.size : 1
+      return unless answer.all? { |row| row.is_a?(Array) ? row.size == each : each == 1 }
+
+      flat = first.is_a?(Array) && first.first.is_a?(Array) ? answer.flatten : answer.flatten(1)
+      flat.pack('E*') if flat.size == n * width && flat.sum.finite?
+    rescue TypeError, RangeError, NoMethodError # something is no number
+      nil
     end
 
     def wrong(method, what, reason)

@@ -20,17 +20,12 @@ module Stellate
       bytes(array, 8, *shape).unpack('E*')
     end
 
-    # Rows of vertex numbers as strings of their bytes.
-    def rows(array, width)
-      split(bytes(array, 4, nil, width), width)
-    end
-
-    def split(data, width)
-      data.unpack("a#{4 * width}" * (data.bytesize / (4 * width)))
-    end
-
     def to_wire(values, *shape)
-      V1::Array.new(shape:, data: values.pack('E*'))
+      packed(values.pack('E*'), *shape)
+    end
+
+    def packed(data, *shape)
+      V1::Array.new(shape:, data:)
     end
 
     # An enumerator without its prefix; "UNKNOWN" for one of a newer server.
