@@ -5,9 +5,9 @@
     mesh.save("manifold.vtu")
 
 `stellate.Oracle` says what an oracle is, and `stellate.check` whether yours is one.
-`stellate.ImplicitManifold` makes one from equations, `stellate.oracles` makes
-them of charts, distances, points and triangles, `stellate.CommandOracle` of a program, and
-`stellate.manifolds` has a few ready.
+`stellate.ImplicitManifold` makes one from equations, `stellate.ImplicitSolid` a solid,
+`stellate.oracles` makes them of charts, distances, points and triangles, and cuts them by walls,
+`stellate.CommandOracle` of a program, and `stellate.manifolds` has a few ready.
 """
 
 from . import _stubs
@@ -51,6 +51,7 @@ from .errors import (  # noqa: E402
 )
 from .implicit import ImplicitManifold  # noqa: E402
 from .oracle import Oracle  # noqa: E402
+from .oracles import ImplicitSolid  # noqa: E402
 from .progress import ProgressBar, progress_bar  # noqa: E402
 from .report import Certificate, Counts, Failure, Progress, Report  # noqa: E402
 
@@ -69,6 +70,7 @@ __all__ = [
     "Failure",
     "Finding",
     "ImplicitManifold",
+    "ImplicitSolid",
     "Interrupted",
     "InvalidArgument",
     "LimitExceeded",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Any, Callable
 
@@ -25,6 +26,8 @@ class ImplicitManifold:
       bounding_box: (lower (d,), upper (d,)) around M. Its size is the length scale of the solvers.
       seeds: (m, d) points near M, instead of random points of the box.
       local_size: (n, d) -> (n,), at points of M; see stellate.Oracle.
+      inequalities: functions g, (n, d) -> (n,), of which M = {F = 0, all g >= 0} has its boundary:
+        the walls of oracles.Clipped. They take `jacobian`, where that names a library, as f does.
       max_iterations: of each solver.
       thread_safe: f and jacobian may be called by several threads at once.
     """
@@ -39,6 +42,7 @@ class ImplicitManifold:
         bounding_box: Sequence[Any],
         seeds: np.ndarray | None = None,
         local_size: Callable[[np.ndarray], np.ndarray] | None = None,
+        inequalities: Sequence[Callable[[Any], Any]] = (),
         max_iterations: int = 100,
         thread_safe: bool = False,
     ) -> None:
@@ -72,11 +76,24 @@ class ImplicitManifold:
         self.thread_safe = thread_safe
         self._max_iterations = max_iterations
         self._scale = float(np.linalg.norm(upper - lower))
+        library = jacobian if isinstance(jacobian, str) else None
         if isinstance(jacobian, str):
             f, jacobian = with_derivatives(f, jacobian)
         shape = ambient_dimension - dimension, ambient_dimension
         largest = float(max(np.abs(lower).max(), np.abs(upper).max()))
         self._equations = Equations(f, jacobian, shape, self._scale, largest, max_iterations)
+        if len(inequalities) > 0:
+            self._bound(inequalities, library)
+
+    def _bound(self, inequalities: Sequence[Callable[[Any], Any]], library: str | None) -> None:
+        """Becomes the manifold with boundary that the inequalities leave."""
+        from .oracles import Clipped  # which has ready oracles that are made of this one
+
+        clipped = Clipped(copy.copy(self), inequalities, gradients=library)
+        self.walls: int = clipped.walls
+        self.face_point = clipped.face_point
+        self.clearances = clipped.clearances
+        self.conormals = clipped.conormals
 
     # The oracle.
 

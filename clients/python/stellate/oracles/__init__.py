@@ -4,6 +4,7 @@ Each is an object that `stellate.mesh` takes; `stellate.check` examines them lik
 themselves are stellate.ImplicitManifold.
 """
 
+from ._bounded import ManifoldWithBoundary
 from ._cloud import PointCloud
 from ._combined import LevelSet, Product, Transformed
 from ._constraints import ConstraintSet
@@ -13,14 +14,17 @@ from ._network import NeuralImplicit
 from ._parametrized import Chart, Parametrized
 from ._quotient import Quotient
 from ._triangles import TriangleMesh
-from ._walls import Clipped, Solid
+from ._walls import Clipped, HalfSpace, ImplicitSolid, Solid
 
 __all__ = [
     "Chart",
     "Clipped",
     "ConstraintSet",
+    "HalfSpace",
+    "ImplicitSolid",
     "LevelSet",
     "Linkage",
+    "ManifoldWithBoundary",
     "NeuralImplicit",
     "Parametrized",
     "PointCloud",

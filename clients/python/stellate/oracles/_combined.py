@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InvalidArgument
 from ..oracle import CheckedOracle
-from ._common import Array, Flags, all_or_raise, apply, norms, transposed
+from ._common import Array, Flags, all_or_raise, apply, norms, refuse_walls, transposed
 
 
 class Product:
@@ -22,6 +22,8 @@ class Product:
         if len(factors) < 2:
             raise InvalidArgument(f"a product needs two factors at least, and has {len(factors)}")
         self._factors = [CheckedOracle(factor) for factor in factors]
+        for factor in self._factors:
+            refuse_walls(factor, "a product")
         ends = np.cumsum([factor.ambient_dimension for factor in self._factors])
         self._parts = [slice(b - f.ambient_dimension, b) for b, f in zip(ends, self._factors)]
         self.dimension = sum(factor.dimension for factor in self._factors)
@@ -100,6 +102,7 @@ class Transformed:
         translation: Any = None,
     ) -> None:
         self._inner = CheckedOracle(oracle)
+        refuse_walls(self._inner, "Transformed")
         d = self._inner.ambient_dimension
         turn = np.eye(d) if rotation is None else np.array(rotation, dtype=np.float64)
         if turn.ndim != 2 or turn.shape[1] != d or turn.shape[0] < d:
@@ -197,6 +200,7 @@ class LevelSet:
         max_iterations: int = 200,
     ) -> None:
         self._base = CheckedOracle(oracle)
+        refuse_walls(self._base, "a level set")
         if not self._base.has_tangent_basis:
             raise InvalidArgument(f"a level set on {type(oracle).__name__} needs its tangent_basis")
         if not callable(f) or not (gradient is None or callable(gradient)):

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InvalidArgument, NotConverged
+from ..oracle import CheckedOracle
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -33,6 +34,14 @@ def transposed(matrices: Array) -> Array:
 def apply(matrices: Array, vectors: Array) -> Array:
     """(n, a, b), (n, b) -> (n, a), each row on its own."""
     return np.asarray((matrices @ vectors[..., None])[..., 0])
+
+
+def refuse_walls(oracle: CheckedOracle, made: str) -> None:
+    """What is made of a manifold with boundary would have none. Raises: InvalidArgument."""
+    if oracle.walls:
+        raise InvalidArgument(
+            f"{made} is made of manifolds without boundary: clip it instead, by oracles.Clipped"
+        )
 
 
 class Projection:

@@ -9,7 +9,17 @@ import numpy as np
 
 from ..errors import InvalidArgument, OracleError
 from ..oracle import CheckedOracle
-from ._common import Array, Flags, all_or_raise, apply, box_around, norms, transposed, tree_of
+from ._common import (
+    Array,
+    Flags,
+    all_or_raise,
+    apply,
+    box_around,
+    norms,
+    refuse_walls,
+    transposed,
+    tree_of,
+)
 
 _SAMPLES = 20_000  # of the manifold, to begin from
 _NEAREST = 8  # of them looked at for each query
@@ -37,6 +47,7 @@ class Quotient:
 
     def __init__(self, oracle: Any, f: Map, derivative: Map | None = None) -> None:
         self._base = CheckedOracle(oracle)
+        refuse_walls(self._base, "a quotient")
         if not self._base.has_tangent_basis:
             raise InvalidArgument(f"a quotient of {type(oracle).__name__} needs its tangent_basis")
         if self._base.bounding_box is None:

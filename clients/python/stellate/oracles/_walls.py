@@ -7,10 +7,11 @@ from typing import Any, Callable
 
 import numpy as np
 
+from .._derivatives import with_derivatives
 from ..errors import InvalidArgument
 from ..oracle import CheckedOracle
 from ._combined import LevelSet
-from ._common import Array, apply, norms, transposed
+from ._common import Array, apply, norms, refuse_walls, transposed
 
 Wall = Callable[[Array], Any]
 
@@ -47,9 +48,11 @@ class Clipped:
 
     Args:
       oracle: of M, with tangent bases.
+        If it is Clipped itself, its walls come first.
       walls: functions (n, d) -> (n,), smooth near where they are zero; what counts elsewhere is their
         sign. Wall i of mesh.boundary is the i-th of them; those of box and ball come after these.
-      gradients: of the walls, (n, d) -> (n, d) each; None: differences.
+      gradients: of the walls, (n, d) -> (n, d) each, or "autograd", "jax" or "torch" as in
+        ImplicitManifold; None: differences.
       box: (lower (d,), upper (d,)): M within a box, whose sides are walls, lower ones first. An
         infinite side is none.
       ball: (centre (d,), radius): M within a ball.
@@ -61,21 +64,26 @@ class Clipped:
         oracle: Any,
         walls: Sequence[Wall] = (),
         *,
-        gradients: Sequence[Wall | None] | None = None,
+        gradients: Sequence[Wall | str | None] | str | None = None,
         box: Sequence[Any] | None = None,
         ball: Sequence[Any] | None = None,
         seeds: Any = None,
     ) -> None:
+        self._walls: list[Wall] = []
+        self._gradients: list[Wall | None] = []
+        if isinstance(oracle, Clipped):
+            self._walls += oracle._walls
+            self._gradients += oracle._gradients
+            seeds = getattr(oracle, "seeds", None) if seeds is None else seeds
+            oracle = oracle._oracle
         self._base = CheckedOracle(oracle)
+        refuse_walls(self._base, "Clipped")
         if not self._base.has_tangent_basis:
             raise InvalidArgument(f"to clip {type(oracle).__name__} takes its tangent_basis")
-        self._oracle = oracle
+        self._oracle: Any = oracle
         self.dimension = self._base.dimension
         self.ambient_dimension = d = self._base.ambient_dimension
-        self._walls = list(walls)
-        self._gradients = list(gradients) if gradients is not None else [None] * len(self._walls)
-        if len(self._gradients) != len(self._walls) or not all(map(callable, self._walls)):
-            raise InvalidArgument("walls have to be functions, and gradients one for each, or None")
+        self._add(list(walls), gradients)
         if box is not None:
             self._add_box(*(np.asarray(corner, dtype=np.float64) for corner in box))
         if ball is not None:
@@ -150,30 +158,61 @@ class Clipped:
         seeds = self._base.seeds
         return float(norms(np.ptp(seeds, axis=0))) if seeds is not None and len(seeds) > 1 else 1.0
 
+    def _add(self, walls: list[Wall], gradients: Sequence[Wall | str | None] | str | None) -> None:
+        if gradients is None or isinstance(gradients, str):
+            gradients = [gradients] * len(walls)
+        if len(gradients) != len(walls) or not all(map(callable, walls)):
+            raise InvalidArgument("walls have to be functions, and gradients one for each, or None")
+        for wall, gradient in zip(walls, gradients):
+            if isinstance(gradient, str):
+                wall, gradient = _derived(wall, gradient)
+            self._walls.append(wall)
+            self._gradients.append(
+                getattr(wall, "gradient", None) if gradient is None else gradient
+            )
+
     def _add_box(self, lower: Array, upper: Array) -> None:
         d = self.ambient_dimension
         if lower.shape != (d,) or upper.shape != (d,) or not (lower < upper).all():
             raise InvalidArgument(f"box has to be two corners of R^{d}, the lower one first")
         for corner, sign in ((lower, 1.0), (upper, -1.0)):
             for i in np.flatnonzero(np.isfinite(corner)):
-                self._walls.append(_side(int(i), float(corner[i]), sign))
-                self._gradients.append(_constant(sign * np.eye(d)[i]))
+                self._add([HalfSpace(sign * np.eye(d)[i], sign * corner[i])], None)
 
     def _add_ball(self, centre: Array, radius: float) -> None:
         if centre.shape != (self.ambient_dimension,) or not radius > 0:
             raise InvalidArgument(
                 f"ball has to be a point of R^{self.ambient_dimension} and a radius"
             )
-        self._walls.append(lambda x: radius**2 - ((x - centre) ** 2).sum(axis=1))
-        self._gradients.append(lambda x: -2 * (x - centre))
+        self._add(
+            [lambda x: radius**2 - ((x - centre) ** 2).sum(axis=1)], [lambda x: -2 * (x - centre)]
+        )
 
 
-def _side(axis: int, at: float, sign: float) -> Wall:
-    return lambda x: sign * (x[:, axis] - at)
+class HalfSpace:
+    """The wall {x : normal . x >= offset}, a function that knows its gradient.
+
+    Args:
+      normal: (d,), inwards, of any length.
+    """
+
+    def __init__(self, normal: Any, offset: float = 0.0) -> None:
+        self._normal, self._offset = np.array(normal, dtype=np.float64), float(offset)
+        if self._normal.ndim != 1 or not norms(self._normal) > 0:
+            raise InvalidArgument(f"a half-space needs a normal (d,), and has {normal!r}")
+
+    def __call__(self, points: Array) -> Array:
+        return np.asarray((points * self._normal).sum(axis=1) - self._offset)
+
+    def gradient(self, points: Array) -> Array:
+        """(n, d) -> (n, d)"""
+        return np.broadcast_to(self._normal, points.shape)
 
 
-def _constant(slope: Array) -> Wall:
-    return lambda x: np.broadcast_to(slope, x.shape)
+def _derived(wall: Wall, library: str) -> tuple[Wall, Wall]:
+    """A wall written for a library, and its gradient, on numpy's arrays."""
+    values, jacobian = with_derivatives(lambda x: wall(x)[:, None], library)
+    return lambda x: values(x)[:, 0], lambda x: jacobian(x)[:, 0]
 
 
 class Solid(Clipped):
@@ -181,15 +220,63 @@ class Solid(Clipped):
 
     Args:
       walls: a function (n, d) -> (n,), or several.
-      bounding_box: (lower (d,), upper (d,)) around it.
+      bounding_box: (lower (d,), upper (d,)) around it; by default that of a finite box or a ball.
       gradients, box, ball, seeds: as in Clipped.
     """
 
     def __init__(
-        self, walls: Wall | Sequence[Wall], bounding_box: Sequence[Any], **options: Any
+        self,
+        walls: Wall | Sequence[Wall] = (),
+        bounding_box: Sequence[Any] | None = None,
+        **options: Any,
     ) -> None:
         one = callable(walls)
-        if one and "gradients" in options:
+        if one and callable(options.get("gradients")):
             options["gradients"] = [options["gradients"]]
+        if bounding_box is None:
+            bounding_box = _around(options.get("box"), options.get("ball"))
         super().__init__(Space(bounding_box), [walls] if one else walls, **options)  # type: ignore[list-item, arg-type]
         self.thread_safe = False
+
+
+class ImplicitSolid(Solid):
+    """{x in R^d : g(x) >= 0}, bounded by a smooth surface or by several.
+
+    Args:
+      g: (n, d) -> (n,), positive inside; its gradient is not zero where it is. Of a signed
+        distance that is negative inside take the negative.
+      jacobian: (n, d) -> (n, d); or "autograd", "jax" or "torch", if g is written for one of these;
+        or None: differences of g.
+      bounding_box: (lower (d,), upper (d,)) around the solid.
+      inequalities: more such functions, which all have to be positive. They take `jacobian`, where
+        that names a library, as g does.
+      seeds, thread_safe: as in ImplicitManifold.
+    """
+
+    def __init__(
+        self,
+        g: Wall,
+        jacobian: Wall | str | None = None,
+        *,
+        bounding_box: Sequence[Any],
+        inequalities: Sequence[Wall] = (),
+        seeds: Any = None,
+        thread_safe: bool = False,
+    ) -> None:
+        library = jacobian if isinstance(jacobian, str) else None
+        gradients = [jacobian, *[library] * len(inequalities)]
+        super().__init__([g, *inequalities], bounding_box, gradients=gradients, seeds=seeds)
+        self.thread_safe = thread_safe
+
+
+def _around(box: Sequence[Any] | None, ball: Sequence[Any] | None) -> tuple[Array, Array]:
+    """A box with room for either. Raises: InvalidArgument where there is none."""
+    if box is None and ball is not None:
+        centre, radius = np.asarray(ball[0], dtype=np.float64), float(ball[1])
+        box = centre - radius, centre + radius
+    corners = box if box is not None else (np.inf, np.inf)
+    lower, upper = (np.asarray(corner, dtype=np.float64) for corner in corners)
+    if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
+        raise InvalidArgument("a solid needs a bounding_box, or a finite box or ball")
+    margin = 0.15 * (upper - lower)
+    return lower - margin, upper + margin
