@@ -14,7 +14,7 @@ constexpr double kLongestStep = 0.05;  // of the mesh size
 // Within M both steps go as far; at a rim the one back into M does, if it is along M at all.
 constexpr double kComesBack = 0.5;  // of the step back
 constexpr double kAlong = 0.25;     // of its length
-// Steps of at least so many position errors tell what became of them.
+// Steps of at least this number of position errors tell what became of them.
 constexpr double kErrorsInStep = 10;
 
 }  // namespace

@@ -13,7 +13,7 @@ class SmallIndex {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
-  // Forgets all ids. So many will do without growing.
+  // Forgets all ids. It has room for this many without growing.
   void Clear(std::size_t expected) {
     slots_.assign(std::bit_ceil(2 * expected + 2), {});
     shift_ = 32 - std::countr_zero(slots_.size());

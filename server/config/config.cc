@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/base/message.h"
-#include "server/base/machine_memory.h"
+#include "server/memory/machine_memory.h"
 #include "server/config/listen_address.h"
 #include "server/config/settings.h"
 

@@ -7,7 +7,7 @@
 namespace stellate::server {
 namespace {
 
-// Whose connection has a descriptor. The last to have it stays: there are only so many.
+// Whose connection has a descriptor. The last to have it stays: descriptors are few.
 class Connections {
  public:
   std::shared_ptr<ConnectionUnread> Add(int fd, std::shared_ptr<UnreadRules> rules) {

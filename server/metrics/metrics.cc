@@ -135,7 +135,7 @@ class Metrics::Impl final : public SessionObserver {
   Counter& received = Count("stellate_received_bytes_total", "Bytes of stream messages received");
   Counter& sent = Count("stellate_sent_bytes_total", "Bytes of stream messages sent");
   Counter& refused =
-      Count("stellate_unauthenticated_total", "Calls refused for want of a good token");
+      Count("stellate_unauthenticated_total", "Calls refused because they had no valid token");
   prometheus::Family<Counter>& certificates =
       prometheus::BuildCounter()
           .Name("stellate_certificates_total")

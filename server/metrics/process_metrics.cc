@@ -13,7 +13,7 @@
 #include <string>
 #include <utility>
 
-#include "server/base/machine_memory.h"
+#include "server/memory/machine_memory.h"
 #include "server/base/version.h"
 
 namespace stellate::server {

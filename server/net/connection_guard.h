@@ -44,7 +44,7 @@ class ConnectionGuard {
   // Has to be told of every connection, before gRPC has it. One thread at a time.
   void Watch(int fd);
 
-  // Connections that were closed have left so many calls behind that others should wait.
+  // Connections that were closed have left enough calls behind that others should wait.
   bool IsBehind() const { return behind_; }
 
  private:

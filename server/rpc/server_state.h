@@ -8,7 +8,7 @@
 #include "server/journal/journal.h"
 #include "server/metrics/metrics.h"
 #include "server/rpc/streams.h"
-#include "server/session/memory_budget.h"
+#include "server/memory/memory_budget.h"
 #include "server/session/session_store.h"
 
 namespace stellate::server {

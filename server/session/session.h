@@ -13,7 +13,7 @@
 #include "server/base/log.h"
 #include "server/history/watch_log.h"
 #include "server/oracles/oracle_pool.h"
-#include "server/session/memory_budget.h"
+#include "server/memory/memory_budget.h"
 #include "server/session/session_journal.h"
 
 namespace stellate::server {

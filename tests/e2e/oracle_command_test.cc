@@ -65,7 +65,7 @@ class OracleCommand : public CommandLine {
     EXPECT_TRUE(mesh->report.certified());
     return mesh ? *mesh : Mesh();
   }
-  // Formulas agree but for the last digits.
+  // Formulas agree except in the last digits.
   static void ExpectSameMesh(const std::string& path, const Mesh& reference) {
     std::ifstream file(path);
     Eigen::Index k = 0, d = 0, vertices = 0, simplices = 0;

@@ -45,9 +45,16 @@ FACE = ("core", "core/base")
 
 SERVER = {
     "server/base": (*FACE, "text"),
+    "server/memory": (*FACE, "server/base"),
     "server/history": (*FACE, "server/base"),
     "server/oracles": (*FACE, "server/base"),
-    "server/session": (*FACE, "server/base", "server/history", "server/oracles"),
+    "server/session": (
+        *FACE,
+        "server/base",
+        "server/memory",
+        "server/history",
+        "server/oracles",
+    ),
     # What a mesh's record looks like; the files it is in; who writes and reads them; salvage.
     "server/records": (*FACE, "server/base", "server/history", "server/oracles", "server/session"),
     "server/storage": (*FACE, "server/base", "server/records"),
@@ -61,10 +68,17 @@ SERVER = {
         "server/storage",
     ),
     "server/salvage": (*FACE, "server/base", "server/records", "server/storage"),
-    "server/config": (*FACE, "server/base"),
+    "server/config": (*FACE, "server/base", "server/memory"),
     "server/grpc_parts": ("server/base",),
     "server/net": (*FACE, "server/base", "server/config", "server/grpc_parts"),
-    "server/metrics": (*FACE, "server/base", "server/history", "server/oracles", "server/session"),
+    "server/metrics": (
+        *FACE,
+        "server/base",
+        "server/memory",
+        "server/history",
+        "server/oracles",
+        "server/session",
+    ),
     "server/convert": (
         *FACE,
         "proto",
@@ -79,6 +93,7 @@ SERVER = {
         *FACE,
         "proto",
         "server/base",
+        "server/memory",
         "server/config",
         "server/history",
         "server/oracles",

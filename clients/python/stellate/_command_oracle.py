@@ -37,7 +37,7 @@ class CommandOracle:
 
     Args:
       command: for /bin/sh -c.
-      processes: of it, each with a batch of its own; so many threads may ask at once.
+      processes: of it, each with a batch of its own; as many threads may ask at once.
       dimension, ambient_dimension: k and d; where the command says them too, they have to be the
         same.
       bounding_box, seeds: (lower (d,), upper (d,)); (m, d). Instead of the command's own.

@@ -24,7 +24,7 @@ def save_series(meshes: Iterable[Mesh], path: str | os.PathLike[str], every: int
       meshes: what stellate.watch gives; or any others, which are numbered where they have no
         revision. k from 1 to 3. Revisions without simplices are passed over.
       path: ends in .pvd.
-      every: writes one revision of so many, and the last.
+      every: writes every n-th revision, and the last.
 
     Returns: the last mesh.
     Raises: SaveError, before anything is taken, where the ending is another; InvalidArgument where

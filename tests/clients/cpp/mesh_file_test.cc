@@ -291,7 +291,7 @@ TEST_F(MeshFile, AFileIsReplacedWholeOrNotAtAll) {
   EXPECT_EQ(std::filesystem::status(Path("real.txt")).permissions(),
             std::filesystem::perms::owner_all);
   EXPECT_GT(std::filesystem::file_size(Path("real.txt")), 3u);
-  // A file may grow to so many bytes here: what does not fit leaves the old one.
+  // A file may grow to this number of bytes: what does not fit leaves the old one.
   rlimit limit{}, before{};
   getrlimit(RLIMIT_FSIZE, &before);
   limit = before;

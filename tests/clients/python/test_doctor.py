@@ -190,7 +190,7 @@ def test_a_good_oracle_passes(oracle):
 
 
 def test_a_corner_does_not_hide_behind_tangents_of_its_own():
-    """A can: smooth but for two rims, and with tangent bases that are right everywhere else."""
+    """A can: smooth except at two rims, and with tangent bases that are right everywhere else."""
 
     def can(x):
         r = np.hypot(x[:, 0], x[:, 1])[:, None]

@@ -1,5 +1,5 @@
 // Meshes whose cavities were filled: k >= 4. STELLATE_FILLED_SEEDS asks for T^4 in R^8 besides,
-// with so many seeds; each takes minutes.
+// with that number of seeds; each takes minutes.
 
 #include <gtest/gtest.h>
 

@@ -19,7 +19,7 @@ namespace stellate::server::testing {
 namespace {
 
 constexpr std::uint32_t kDeclared = 4 << 20;  // bytes of a message
-constexpr std::size_t kPart = 60'000;         // of which so many come
+constexpr std::size_t kPart = 60'000;         // of which this part comes
 constexpr std::uint64_t kMost = 16 << 20;     // that all may hold
 
 using Headers = std::vector<std::pair<std::string, std::string>>;

@@ -123,7 +123,7 @@ inline core::Answers AnswersTo(const core::QueryBatch& batch) {
   return answers;
 }
 
-// Of a round of so many queries; `what` the journal said.
+// Of a round of that number of queries; `what` the journal said.
 inline std::optional<MeshFailure> WriteOneRound(SessionJournal* mesh, std::uint64_t round,
                                                 Eigen::Index queries = 4) {
   const core::QueryBatch batch = BatchOf(round, queries);

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kSamples = 20'000;    // of all charts together, to begin from
 constexpr int kNearest = 8;         // of them looked at for each query
-constexpr size_t kBasins = 3;       // at most so many of these begin a search
+constexpr size_t kBasins = 3;       // the most of these that begin a search
 constexpr double kSameBasin = 3.5;  // cells of the grid
 constexpr int kMaxIterations = 100, kMaxHalvings = 30, kMaxFlatHalvings = 20;
 

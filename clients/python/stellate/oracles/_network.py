@@ -15,7 +15,7 @@ from ..errors import InvalidArgument, OracleError
 from ..implicit import ImplicitManifold
 from ._common import Array
 
-_ROWS = 256  # asked at a time: always so many, whatever the batch
+_ROWS = 256  # asked at a time: always this number, whatever the batch
 
 
 class NeuralImplicit(ImplicitManifold):

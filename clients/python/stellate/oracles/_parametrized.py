@@ -23,7 +23,7 @@ from ._common import (
 
 _SAMPLES = 20_000  # of all charts together, to begin from
 _NEAREST = 8  # of them looked at for each query
-_BASINS = 3  # at most so many of these begin a search
+_BASINS = 3  # the most of these that begin a search
 _STEP = 1e-4  # of second differences, in shares of a chart's box: about the fourth root of rounding
 _FIRST_STEP = 6e-6  # of first differences: about its cube root
 _ITERATIONS = 100

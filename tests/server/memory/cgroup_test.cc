@@ -1,4 +1,4 @@
-#include "server/base/cgroup.h"
+#include "server/memory/cgroup.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -1,4 +1,4 @@
-#include "server/session/memory_budget.h"
+#include "server/memory/memory_budget.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/base/message.h"
-#include "server/base/machine_memory.h"
+#include "server/memory/machine_memory.h"
 #include "tests/server/support/sphere.h"
 
 namespace stellate::server {

@@ -1,4 +1,4 @@
-#include "server/session/memory_budget.h"
+#include "server/memory/memory_budget.h"
 
 #include <algorithm>
 #include <utility>

@@ -1,11 +1,11 @@
-#include "server/base/machine_memory.h"
+#include "server/memory/machine_memory.h"
 
 #include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
 
-#include "server/base/cgroup.h"
+#include "server/memory/cgroup.h"
 
 namespace stellate::server {
 namespace {
