@@ -12,7 +12,8 @@
 namespace stellate::core {
 namespace {
 
-// Two sheets this number of sizes apart are no more than the reach that a mesh of this size must have.
+// Two sheets this number of sizes apart are no more than the reach that a mesh of this size must
+// have.
 constexpr double kLook = 2.5;
 constexpr std::uint64_t kPointsInPart = 1 << 8;
 

@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "core/base/message.h"
-#include "server/memory/machine_memory.h"
 #include "server/config/listen_address.h"
 #include "server/config/settings.h"
+#include "server/memory/machine_memory.h"
 
 namespace stellate::server {
 namespace {

@@ -13,8 +13,8 @@
 #include <string>
 #include <utility>
 
-#include "server/memory/machine_memory.h"
 #include "server/base/version.h"
+#include "server/memory/machine_memory.h"
 
 namespace stellate::server {
 namespace {

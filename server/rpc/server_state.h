@@ -6,9 +6,9 @@
 #include "server/auth/auth.h"
 #include "server/config/config.h"
 #include "server/journal/journal.h"
+#include "server/memory/memory_budget.h"
 #include "server/metrics/metrics.h"
 #include "server/rpc/streams.h"
-#include "server/memory/memory_budget.h"
 #include "server/session/session_store.h"
 
 namespace stellate::server {

@@ -12,8 +12,8 @@
 #include "core/mesher.h"
 #include "server/base/log.h"
 #include "server/history/watch_log.h"
-#include "server/oracles/oracle_pool.h"
 #include "server/memory/memory_budget.h"
+#include "server/oracles/oracle_pool.h"
 #include "server/session/session_journal.h"
 
 namespace stellate::server {

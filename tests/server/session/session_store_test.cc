@@ -162,7 +162,8 @@ TEST(SessionStore, HoldsEachNamedOwnerToItsShare) {
   EXPECT_TRUE(create("alice"));
 }
 
-// A mesher that has a given number of vertices at once, and then asks for more until it is cancelled.
+// A mesher that has a given number of vertices at once, and then asks for more until it is
+// cancelled.
 class Founded : public stellate::testing::StubMesher {
  public:
   Founded(core::Specification spec, std::uint64_t vertices) : StubMesher(std::move(spec)) {

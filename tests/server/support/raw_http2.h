@@ -50,7 +50,8 @@ class RawHttp2 {
     return block;
   }
 
-  // A new call's headers, in frames of at most this number of bytes. False: the connection is closed.
+  // A new call's headers, in frames of at most this number of bytes. False: the connection is
+  // closed.
   bool Headers(const std::string& block, std::size_t frame_bytes, bool end) {
     for (std::size_t at = 0; at < block.size() || at == 0; at += frame_bytes) {
       const bool last = end && at + frame_bytes >= block.size();
