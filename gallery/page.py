@@ -62,5 +62,15 @@ def _sentence(fact: dict) -> str:
     verdict = "**Certified**" if fact["certified"] else "**Not certified**"
     return (
         f"Dimension {k} in R^{d}; epsilon {fact['epsilon']:g}: {counts}. {verdict}: {pieces}, "
-        f"Euler characteristic {fact['euler_characteristic']}, {turn}."
+        f"Euler characteristic {fact['euler_characteristic']}, {turn}{_boundary(fact)}."
+    )
+
+
+def _boundary(fact: dict) -> str:
+    words = ("wall", "edge", "corner")
+    counts = [(n, word) for n, word in zip(fact.get("faces", []), words) if n]
+    if not counts:
+        return ""
+    return ", with a boundary of " + ", ".join(
+        f"{n} {word}{'s' if n > 1 else ''}" for n, word in counts
     )

@@ -20,5 +20,8 @@ facts = {
     "orientable": certificate.orientable,
     "epsilon": mesh.report.epsilon,
 }
+if mesh.walls is not None:
+    corners = sum(len(face.simplices) for face in mesh.corners)
+    facts["faces"] = [len(mesh.boundary), len(mesh.edges), corners]
 told = {"facts": facts, "seconds": mesh.report.elapsed_seconds}
 pathlib.Path("facts.json").write_text(json.dumps(told))

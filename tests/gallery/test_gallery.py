@@ -21,17 +21,33 @@ import stellate  # noqa: E402
 import topology  # noqa: E402
 
 # How much coarser here than in the gallery; components, orientable, Betti numbers modulo 2.
+# For those with boundary, what it is made of: walls, edges, corners; and its Betti numbers.
+BOUNDARY = {
+    "drilled_block": ([7, 14, 8], [1, 2, 1]),
+    "gyroid_box": ([6, 0, 21], [2, 2]),
+    "hemisphere": ([1, 0, 0], [1, 1]),
+    "joint_limits": ([1, 0, 0], [1, 2, 1]),
+    "linkage_limits": ([2, 0, 6], [1, 1]),
+    "moebius_strip": ([1, 0, 0], [1, 1]),
+    "solid_torus": ([1, 0, 0], [1, 2, 1]),
+}
 KNOWN = {
     "cloud": (1.4, 1, True, [1, 2, 1]),
     "cycloheptane": (2.0, 2, True, [2, 2]),
+    "drilled_block": (1.8, 1, True, [1, 1, 0, 0]),
     "genus_two": (1.0, 1, True, [1, 4, 1]),
     "grassmannian": (1.0, 1, True, [1, 1, 2, 1, 1]),
     "gyroid": (1.4, 1, True, [1, 10, 1]),
+    "gyroid_box": (1.2, 1, True, [1, 3, 0]),
+    "hemisphere": (2.0, 1, True, [1, 0, 0]),
     "invariant_torus": (1.4, 1, True, [1, 2, 1]),
+    "joint_limits": (1.3, 1, True, [1, 1, 0, 0]),
     "klein_bottle": (1.0, 1, False, [1, 2, 1]),
     "knot": (1.0, 1, True, [1, 2, 1]),
     "level_set": (1.6, 1, True, [1, 2, 1]),
     "linkage": (1.0, 1, True, [1, 8, 1]),
+    "linkage_limits": (1.0, 1, True, [1, 2, 0]),
+    "moebius_strip": (1.3, 1, False, [1, 1, 0]),
     "neural": (1.0, 2, True, [2, 4, 2]),
     "orthogonal": (1.5, 2, True, [2, 2, 2, 2]),
     "product": (1.2, 1, True, [1, 1, 1, 1]),
@@ -39,6 +55,7 @@ KNOWN = {
     "remeshed": (1.2, 1, True, [1, 2, 1]),
     "rotations": (1.8, 1, True, [1, 1, 1, 1]),
     "shapes": (2.0, 1, True, [1, 0, 1]),
+    "solid_torus": (1.3, 1, True, [1, 1, 0, 0]),
     "three_torus": (1.3, 1, True, [1, 3, 3, 1]),
 }
 
@@ -68,15 +85,35 @@ def test_a_program_meshes_what_it_claims(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     mesh = runpy.run_path(str(GALLERY / f"{name}.py"))["mesh"]
     assert mesh.certified, mesh.report
-    assert topology.is_closed(mesh.simplices)
+    assert topology.is_closed(mesh.simplices) == (name not in BOUNDARY)
+    if name in BOUNDARY:
+        ends_at_its_walls(mesh, *BOUNDARY[name])
     assert topology.component_count(mesh.simplices) == components
     assert topology.euler_characteristic(mesh.simplices) == euler(betti)
     assert (mesh.oriented_simplices() is not None) == orientable
     if mesh.dimension <= 3:  # of the fourth dimension that would take a minute
         assert topology.betti_numbers(mesh.simplices) == betti
-    if mesh.dimension <= 2:
+    if mesh.dimension <= 2 and name not in BOUNDARY:
         assert topology.is_manifold(mesh.simplices)
     assert share_drawn(tmp_path / f"{name}.png") > 0.01
+
+
+def ends_at_its_walls(mesh, counts, betti):
+    assert faces_of(mesh) == counts
+    rim = np.concatenate([face.simplices for face in mesh.boundary])
+    facets = np.concatenate(
+        [np.delete(mesh.simplices, i, axis=1) for i in range(mesh.dimension + 1)]
+    )
+    facets, times = np.unique(facets, axis=0, return_counts=True)
+    assert times.max() == 2
+    assert set(map(tuple, rim)) == set(map(tuple, facets[times == 1]))
+    assert topology.is_closed(rim) and topology.is_manifold(rim)
+    assert topology.betti_numbers(rim) == betti
+
+
+def faces_of(mesh):
+    corners = sum(len(face.simplices) for face in mesh.corners)
+    return [len(mesh.boundary), len(mesh.edges), corners]
 
 
 def share_drawn(file):
@@ -95,6 +132,7 @@ def test_the_page_is_what_its_programs_and_facts_say():
         assert fact["certified"]
         assert (fact["components"], fact["orientable"]) == (components, orientable)
         assert fact["euler_characteristic"] == euler(betti)
+        assert fact.get("faces") == (BOUNDARY[name][0] if name in BOUNDARY else None)
         picture = PAGES / f"{name}.png"
         assert picture.stat().st_size < 60_000
         assert share_drawn(picture) > 0.01
