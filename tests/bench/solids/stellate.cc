@@ -1,0 +1,81 @@
+#include <map>
+#include <stdexcept>
+
+#include "core/mesher.h"
+#include "tests/bench/peers/meter.h"
+#include "tests/bench/solids/solid.h"
+
+namespace stellate::bench {
+namespace {
+
+using Eigen::Vector3d;
+
+// The boundary's edges where walls meet, as curves from corner to corner, or around.
+std::vector<Curve> CurvesOf(const SolidMesh& mesh, const std::vector<core::WallSet>& walls) {
+  std::map<Id, std::vector<Id>> next;
+  std::map<std::pair<Id, Id>, bool> taken;
+  const auto on_edge = [&](Id v) { return core::CountWalls(walls[v]) >= 2; };
+  for (const auto& cell : mesh.cells)
+    for (std::size_t i = 0; i < 4; ++i)
+      for (std::size_t j = 0; j < i; ++j) {
+        const auto [a, b] = std::minmax(cell[i], cell[j]);
+        if (!on_edge(a) || !on_edge(b) || core::CountWalls(walls[a] & walls[b]) < 2) continue;
+        if (!taken.emplace(std::pair(a, b), false).second) continue;
+        next[a].push_back(b);
+        next[b].push_back(a);
+      }
+  std::vector<Curve> curves;
+  const auto walk = [&](Id from, Id to) {
+    Curve curve{mesh.points[from]};
+    for (Id last = from, v = to;;) {
+      taken[std::minmax(last, v)] = true;
+      curve.push_back(mesh.points[v]);
+      if (v == from || next[v].size() != 2) break;
+      const Id onward = next[v][0] == last ? next[v][1] : next[v][0];
+      last = v, v = onward;
+    }
+    curves.push_back(curve);
+  };
+  for (const bool closed : {false, true})
+    for (const auto& [v, others] : next)
+      if (closed || others.size() != 2)
+        for (const Id other : others)
+          if (!taken[std::minmax(v, other)]) walk(v, other);
+  return curves;
+}
+
+}  // namespace
+
+SolidMesh MeshWithStellate(const Solid& solid, double epsilon, std::vector<Curve>* edges) {
+  testing::Domain domain = solid.domain;
+  core::Specification spec = domain.SpecificationFor(epsilon);
+  spec.threads = 1;
+  SolidMesh mesh;
+  std::vector<core::WallSet> walls;
+  const double began = ProcessorSeconds();
+  auto mesher = core::Mesher::Create(std::move(spec));
+  if (!mesher) throw std::runtime_error(mesher.error().message);
+  while (const core::QueryBatch* batch = (*mesher)->NextBatch()) {
+    const double asked = ProcessorSeconds();
+    const core::Answers answers = domain.AnswersOf(*batch);
+    mesh.oracle_seconds += ProcessorSeconds() - asked;
+    const auto delta = (*mesher)->Absorb(answers);
+    if (!delta) throw std::runtime_error(delta.error().message);
+    walls.resize(walls.size() + static_cast<std::size_t>(delta->points.cols()) -
+                 delta->walls.size());
+    walls.insert(walls.end(), delta->walls.begin(), delta->walls.end());
+  }
+  const std::vector<Id> simplices = (*mesher)->Simplices();
+  mesh.seconds = ProcessorSeconds() - began;
+
+  const Eigen::MatrixXd points = (*mesher)->Points();
+  for (Eigen::Index j = 0; j < points.cols(); ++j) mesh.points.emplace_back(points.col(j));
+  for (std::size_t s = 0; s < simplices.size(); s += 4)
+    mesh.cells.push_back({simplices[s], simplices[s + 1], simplices[s + 2], simplices[s + 3]});
+  const core::Certificate& certificate = (*mesher)->report().certificate;
+  mesh.note = certificate.certified ? "certified" : certificate.verdict;
+  if (edges) *edges = CurvesOf(mesh, walls);
+  return mesh;
+}
+
+}  // namespace stellate::bench
