@@ -2,13 +2,15 @@
 
 #include <CLI/App.hpp>
 #include <stop_token>
+#include <string>
 
 #include "oracle_source.h"
 #include "stellate/doctor.h"
 
 namespace stellate::cli {
 
-// `stellate doctor`: the catalogue's oracles, and commands, under examination.
+// `stellate doctor`: oracles under examination, the catalogue's, commands, and those of workers in
+// any language, which come as to a server.
 class DoctorCommand {
  public:
   explicit DoctorCommand(CLI::App& parent);
@@ -16,9 +18,14 @@ class DoctorCommand {
   int Run(const std::stop_token& stop);
 
  private:
+  int Listen(const std::stop_token& stop);
+  void Print(const CheckReport& report) const;
+
   CLI::App* command_;
   OracleSource source_;
   CheckOptions options_;
+  std::string listen_;
+  bool exit_with_parent_ = false, json_ = false;
 };
 
 }  // namespace stellate::cli

@@ -1,11 +1,11 @@
+#include "run/epsilon.h"
+
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
 
 #include "shared/doctor.h"
-#include "stellate/client.h"
-#include "stellate/doctor.h"
 
 namespace stellate {
 namespace {
@@ -19,7 +19,10 @@ std::string Show(const char* format, double value) {
 }  // namespace
 
 Expected<ChosenEpsilon> ChooseEpsilon(Oracle& oracle) {
-  CheckReport report = Check(oracle);
+  return client::ChooseEpsilon(Check(oracle));
+}
+
+Expected<ChosenEpsilon> client::ChooseEpsilon(CheckReport report) {
   if (!report.ok()) {
     std::erase_if(report.findings, [](const Finding& f) { return f.severity != Severity::kError; });
     return Fail(ErrorCode::kOracleFailed,
