@@ -122,7 +122,10 @@ func (c *Client) Create(ctx context.Context, oracle Oracle, epsilon float64, opt
 	if err != nil {
 		return nil, err
 	}
-	spec := meshSpec(checked, epsilon, options, !staysOnThisMachine(c.Address))
+	return c.create(ctx, meshSpec(checked, epsilon, options, !staysOnThisMachine(c.Address)))
+}
+
+func (c *Client) create(ctx context.Context, spec *pb.MeshSpec) (*pb.Mesh, error) {
 	return call(ctx, c.outage(), true, &pb.CreateMeshRequest{Spec: spec}, c.stub.CreateMesh)
 }
 

@@ -16,6 +16,7 @@ type growingComplex struct {
 	k, d           int
 	revision       uint64
 	coordinates    []float64
+	walls          []uint64 // bits, of the vertices up to the last on a wall
 	rows           []uint32 // in lexicographic order
 	added, removed []uint32
 	pending        []*pb.MeshDelta
@@ -73,6 +74,9 @@ func (g *growingComplex) change(delta *pb.MeshDelta) error {
 	if err != nil {
 		return err
 	}
+	if err := g.addWalls(delta.GetBoundaryVertices(), delta.GetBoundaryWalls()); err != nil {
+		return err
+	}
 	count := len(g.coordinates) / g.d
 	for _, id := range added {
 		if int(id) >= count {
@@ -80,6 +84,21 @@ func (g *growingComplex) change(delta *pb.MeshDelta) error {
 		}
 	}
 	g.added, g.removed = append(g.added, added...), append(g.removed, removed...)
+	return nil
+}
+
+// addWalls notes which vertices lie on which walls.
+func (g *growingComplex) addWalls(vertices []uint32, walls []uint64) error {
+	count := len(g.coordinates) / g.d
+	if len(vertices) != len(walls) || (len(vertices) > 0 && int(vertices[len(vertices)-1]) >= count) {
+		return fmt.Errorf("walls of %d vertices do not fit the %d that there are", len(vertices), count)
+	}
+	for i, vertex := range vertices {
+		if missing := int(vertex) + 1 - len(g.walls); missing > 0 {
+			g.walls = append(g.walls, make([]uint64, missing)...)
+		}
+		g.walls[vertex] = walls[i]
+	}
 	return nil
 }
 
@@ -123,7 +142,12 @@ func (g *growingComplex) mesh() (*Mesh, error) {
 		return nil, protocolError(err)
 	}
 	points := g.coordinates[:len(g.coordinates):len(g.coordinates)]
-	return &Mesh{Dimension: g.k, AmbientDimension: g.d, Points: points, Simplices: g.rows, Revision: g.revision}, nil
+	var walls []uint64
+	if len(g.walls) > 0 {
+		walls = append(slices.Clone(g.walls), make([]uint64, len(points)/g.d-len(g.walls))...)
+	}
+	return &Mesh{Dimension: g.k, AmbientDimension: g.d, Points: points, Simplices: g.rows, Walls: walls,
+		Revision: g.revision}, nil
 }
 
 // reset goes back to the empty mesh.

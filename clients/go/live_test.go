@@ -35,6 +35,16 @@ func expected(t *testing.T) (torus, clifford [2]int) {
 	return torus, clifford
 }
 
+// hemisphereCounts are those of a half sphere of epsilon 0.2.
+func hemisphereCounts(t *testing.T) (counts [2]int) {
+	t.Helper()
+	_, err := fmt.Sscan(fromEnvironment(t, "STELLATE_TEST_HEMISPHERE"), &counts[0], &counts[1])
+	if err != nil {
+		t.Fatal(err)
+	}
+	return counts
+}
+
 // server is a stellated for one test.
 func server(t *testing.T) stellate.Connection {
 	t.Helper()

@@ -7,6 +7,7 @@ import (
 	"io"
 	"os"
 	"path/filepath"
+	"slices"
 	"strconv"
 	"strings"
 
@@ -19,6 +20,7 @@ type Mesh struct {
 	AmbientDimension int       // d
 	Points           []float64 // [n, d]
 	Simplices        []uint32  // [m, k+1], zero-based, ascending in each row, rows in lexicographic order
+	Walls            []uint64  // [n], as bits the walls that each vertex lies on; nil without a boundary
 	Revision         uint64    // one for each round that changed the mesh
 	Progress         *pb.Progress
 	Report           *pb.Report // how it ended and what is proved; nil while it grows
@@ -37,6 +39,33 @@ func (m *Mesh) Certified() bool { return m.Report.GetCertificate().GetCertified(
 // is not orientable.
 func (m *Mesh) OrientedSimplices() []uint32 {
 	return orient(m.Simplices, m.Dimension+1, m.Points, m.AmbientDimension)
+}
+
+// Boundary are the (k-1)-faces that are in one simplex alone, [m, k], in lexicographic order; each lies on
+// the walls that all its vertices have in common.
+func (m *Mesh) Boundary() []uint32 {
+	k := m.Dimension
+	var faces []uint32
+	for i := 0; i < len(m.Simplices); i += k + 1 {
+		for left := range k + 1 {
+			for j, id := range m.Simplices[i : i+k+1] {
+				if j != left {
+					faces = append(faces, id)
+				}
+			}
+		}
+	}
+	var once []int32
+	order := sortedOrder(faces, k)
+	for i := 0; i < len(order); {
+		first := i
+		for ; i < len(order) && slices.Equal(rowAt(faces, k, order[i]), rowAt(faces, k, order[first])); i++ {
+		}
+		if i == first+1 {
+			once = append(once, order[first])
+		}
+	}
+	return takeRows(faces, k, once)
 }
 
 // LoadTxt reads the .txt format back, to the last bit.

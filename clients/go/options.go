@@ -38,7 +38,11 @@ type Options struct {
 	Workers          int // streams on which the oracle is asked at once; default 1
 	MaxChunk         int // most points that the oracle is asked at once; default: the server decides
 	RequireCertified bool
-	OnProgress       func(*pb.Progress)
+	// Checkpoint is a directory, made if it is not there, in which the mesh outlives this program: the same
+	// call goes on from where the last one was interrupted or killed, or its oracle failed, and gives a mesh
+	// that is finished at once. For private servers; one that is named keeps its meshes with --data-dir.
+	Checkpoint string
+	OnProgress func(*pb.Progress)
 }
 
 func positive[Number float64 | uint32 | uint64](value Number) *Number {
@@ -55,6 +59,7 @@ func meshSpec(c *checkedOracle, epsilon float64, o *Options, far bool) *pb.MeshS
 		Criteria:   &pb.Criteria{SizeRate: positive(o.SizeRate), MaxDeviation: positive(o.MaxDeviation)},
 		Limits:     &pb.MeshLimits{MaxVertices: o.MaxVertices, MaxRounds: o.MaxRounds},
 		RandomSeed: o.RandomSeed, Label: o.Label, Components: o.Components, CoverBox: o.CoverBox,
+		Walls:         uint32(c.walls),
 		DeclaredReach: positive(o.Reach),
 	}
 	if far { // round trips are what a far server costs

@@ -8,7 +8,7 @@ import (
 	pb "stellate/proto/v1"
 )
 
-// Oracle is a compact smooth k-submanifold M of R^d without boundary, 1 <= k < d.
+// Oracle is a compact smooth k-submanifold M of R^d without boundary, 1 <= k < d, unless it is Walled.
 //
 // Methods take and fill whole batches, of len(found) points. The answer to a query must not depend on
 // the rest of its batch. Calls come one at a time, unless the oracle is ConcurrencySafe. An oracle may
@@ -39,6 +39,20 @@ type LocalSizer interface {
 	LocalSize(points, sizes []float64) error
 }
 
+// Walled manifolds have a boundary: M is where all walls are at least 0 on M^, a manifold without one,
+// of which the other methods tell; it may be R^d itself. It takes a TangentBaser, too. The walls of a
+// face ascend.
+type Walled interface {
+	Walls() int
+	// FacePoint finds a nearest point of M^ where the walls of the face are 0, whatever the others are.
+	FacePoint(x []float64, face []uint32, points []float64, found []bool) error
+	// Clearances writes the walls' values at points [n, d], of which the sign counts, [n, Walls()].
+	Clearances(points, values []float64) error
+	// Conormals writes, at points of a face, of each of its walls the unit normal within the tangent space
+	// along which the wall's value falls: [n, len(face), d].
+	Conormals(points []float64, face []uint32, normals []float64) error
+}
+
 // Bounded says where to look for M.
 type Bounded interface {
 	BoundingBox() (lower, upper []float64)
@@ -57,7 +71,7 @@ type ConcurrencySafe interface {
 // checkedOracle is an oracle as the server sees it.
 type checkedOracle struct {
 	oracle       Oracle
-	k, d         int
+	k, d, walls  int
 	capabilities *pb.OracleCapabilities
 	mutex        sync.Locker
 }
@@ -72,13 +86,21 @@ func check(oracle Oracle) (*checkedOracle, error) {
 		return nil, invalid("there is no oracle")
 	}
 	c := &checkedOracle{oracle: oracle, k: oracle.Dimension(), d: oracle.AmbientDimension(), mutex: &sync.Mutex{}}
-	if c.k < 1 || c.d <= c.k {
-		return nil, invalid("dimension %d in R^%d: 1 <= k < d is needed", c.k, c.d)
+	walled, hasWalls := oracle.(Walled)
+	if hasWalls {
+		c.walls = walled.Walls()
+	}
+	if c.k < 1 || c.d < c.k || (c.d == c.k && c.walls == 0) {
+		return nil, invalid("dimension %d in R^%d: 1 <= k < d is needed, or k = d with walls", c.k, c.d)
 	}
 	_, flats := oracle.(FlatIntersector)
 	_, tangents := oracle.(TangentBaser)
 	_, sizes := oracle.(LocalSizer)
-	c.capabilities = &pb.OracleCapabilities{IntersectFlat: flats, TangentBasis: tangents, LocalSize: sizes}
+	c.capabilities = &pb.OracleCapabilities{IntersectFlat: flats, TangentBasis: tangents, LocalSize: sizes,
+		Conormals: c.walls > 0}
+	if c.walls > 0 && !tangents {
+		return nil, invalid("an oracle with walls needs a method TangentBasis")
+	}
 	if safe, says := oracle.(ConcurrencySafe); says && safe.ConcurrencySafe() {
 		c.mutex = free{}
 	}
@@ -135,12 +157,39 @@ func (c *checkedOracle) answer(chunk *pb.QueryChunk) (*pb.AnswerChunk, error) {
 		}
 		reply.Sizes = toWire(sizes, n)
 	}
+	if chunk.GetWantClearances() {
+		if err := c.addWalls(reply, chunk.GetFace(), points, rows); err != nil {
+			return nil, err
+		}
+	}
 	return reply, nil
+}
+
+// addWalls adds what the walls are at the points, and, on a face, its conormals.
+func (c *checkedOracle) addWalls(reply *pb.AnswerChunk, face []uint32, points []float64, rows []int) error {
+	walled, n := c.oracle.(Walled), len(points)/c.d
+	values, err := c.atFound("Clearances", walled.Clearances, points, rows, make([]float64, c.walls))
+	if err != nil {
+		return err
+	}
+	reply.Clearances = toWire(values, n, c.walls)
+	if len(face) == 0 {
+		return nil
+	}
+	conormals := func(points, normals []float64) error { return walled.Conormals(points, face, normals) }
+	normals, err := c.atFound("Conormals", conormals, points, rows, make([]float64, len(face)*c.d))
+	if err == nil {
+		reply.Conormals = toWire(normals, n, len(face), c.d)
+	}
+	return err
 }
 
 func (c *checkedOracle) ask(chunk *pb.QueryChunk, x, points []float64, found []bool) error {
 	switch chunk.GetKind() {
 	case pb.QueryKind_QUERY_KIND_CLOSEST_POINT:
+		if face := chunk.GetFace(); len(face) > 0 {
+			return c.oracle.(Walled).FacePoint(x, face, points, found)
+		}
 		return c.oracle.ClosestPoint(x, points, found)
 	case pb.QueryKind_QUERY_KIND_INTERSECT_FLAT:
 		bases, err := numbers(chunk.GetBases(), len(found), c.d, c.k)

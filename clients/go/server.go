@@ -57,6 +57,21 @@ func FindStellated() (string, error) {
 			"binary, or put it on PATH, or build it (clients/quickstart does)")
 }
 
+// FindStellate gives the command-line program: beside the server binary, else on PATH.
+func FindStellate() (string, error) {
+	if server, err := FindStellated(); err == nil {
+		if path, err := exec.LookPath(filepath.Join(filepath.Dir(server), "stellate")); err == nil {
+			return path, nil
+		}
+	}
+	if path, err := exec.LookPath("stellate"); err == nil {
+		return path, nil
+	}
+	return "", newError(ErrServerNotFound, "SERVER_NOT_FOUND",
+		"the program stellate, which examines oracles, is neither beside stellated nor on PATH: install it, or "+
+			"build it (clients/quickstart does)")
+}
+
 // StartServer starts a server, and returns when it listens.
 func StartServer(options ServerOptions) (*Server, error) {
 	binary := options.Binary
@@ -67,19 +82,35 @@ func StartServer(options ServerOptions) (*Server, error) {
 		}
 		binary = found
 	}
+	flags := []string{"--drain-seconds", "0"}
+	if options.Listen == "" {
+		// One that answers no pings is merely busy in an oracle.
+		flags = append(flags, "--keepalive", "600", "--keepalive-timeout", "600")
+	}
+	return launch(binary, nil, append(flags, options.Flags...), options.Listen)
+}
+
+// startDoctor starts the doctor, to which an oracle is served as to a server: see Check.
+func startDoctor() (*Server, error) {
+	binary, err := FindStellate()
+	if err != nil {
+		return nil, err
+	}
+	return launch(binary, []string{"doctor"}, nil, "")
+}
+
+func launch(binary string, words, flags []string, listen string) (*Server, error) {
 	folder, err := os.MkdirTemp("", "stellate-")
 	if err != nil {
 		return nil, err
 	}
-	address, flags := options.Listen, []string{"--exit-with-parent", "--drain-seconds", "0"}
+	address := listen
 	if address == "" {
 		address = "unix:" + filepath.Join(folder, "socket")
-		// One that answers no pings is merely busy in an oracle.
-		flags = append(flags, "--keepalive", "600", "--keepalive-timeout", "600")
 	}
-	flags = append(append(flags, "--listen", address), options.Flags...)
-	s := &Server{private: options.Listen == "", folder: folder, ended: make(chan struct{})}
-	s.command = exec.Command(binary, flags...)
+	words = append(append(words, "--exit-with-parent", "--listen", address), flags...)
+	s := &Server{private: listen == "", folder: folder, ended: make(chan struct{})}
+	s.command = exec.Command(binary, words...)
 	s.command.Stderr = &s.words
 	// A session of its own: Ctrl-C is for the client, which cancels its meshes first.
 	s.command.SysProcAttr = &syscall.SysProcAttr{Setsid: true}
@@ -92,7 +123,7 @@ func StartServer(options ServerOptions) (*Server, error) {
 		return nil, newError(ErrServerNotFound, "SERVER_NOT_FOUND", "cannot start %s: %v", binary, err)
 	}
 	for lines := bufio.NewScanner(out); s.Address == "" && lines.Scan(); {
-		s.Address = strings.TrimPrefix(lines.Text(), "stellated listening on ")
+		_, s.Address, _ = strings.Cut(lines.Text(), " listening on ")
 	}
 	go func() {
 		_ = s.command.Wait()

@@ -76,7 +76,7 @@ func (c *Client) Watch(ctx context.Context, name string, onProgress func(*pb.Pro
 	return func(yield func(*Mesh, error) bool) {
 		info, err := c.Get(ctx, name)
 		if err == nil {
-			err = c.follow(ctx, info, onProgress, func(mesh *Mesh) bool { return yield(mesh, nil) })
+			err = c.follow(ctx, info, onProgress, true, func(mesh *Mesh) bool { return yield(mesh, nil) })
 		}
 		if err != nil && !errors.Is(err, errLeft) {
 			yield(nil, err)
@@ -87,8 +87,10 @@ func (c *Client) Watch(ctx context.Context, name string, onProgress func(*pb.Pro
 // errLeft: nobody wants more of a mesh.
 var errLeft = errors.New("left")
 
-// follow hands on a mesh at every revision and at its end. It returns how the mesh failed.
-func (c *Client) follow(ctx context.Context, info *pb.Mesh, onProgress func(*pb.Progress), every func(*Mesh) bool) error {
+// follow hands on a mesh at its end, and at every revision where they are wanted. It returns how the
+// mesh failed.
+func (c *Client) follow(ctx context.Context, info *pb.Mesh, onProgress func(*pb.Progress), every bool,
+	each func(*Mesh) bool) error {
 	spec := info.GetSpec()
 	growth := &growingComplex{k: int(spec.GetDimension()), d: int(spec.GetAmbientDimension())}
 	var progress *pb.Progress
@@ -106,7 +108,7 @@ func (c *Client) follow(ctx context.Context, info *pb.Mesh, onProgress func(*pb.
 		if err := judge(mesh, final); err != nil {
 			return err
 		}
-		if !every(mesh) {
+		if !each(mesh) {
 			return errLeft
 		}
 		return nil
@@ -120,7 +122,7 @@ func (c *Client) follow(ctx context.Context, info *pb.Mesh, onProgress func(*pb.
 			if err != nil {
 				return protocolError(err)
 			}
-			if complete {
+			if complete && every {
 				return hand(nil)
 			}
 		case *pb.WatchMeshResponse_ResetMesh:
@@ -166,29 +168,53 @@ func run(ctx context.Context, oracle Oracle, epsilon float64, options *Options, 
 		if err != nil {
 			return err
 		}
-		client, closeAll, err := options.open()
+		kept := checkpoint{options.Checkpoint}
+		to := options.Connection
+		if kept.folder != "" {
+			if to.Server != "" || to.Own != nil || to.Client != nil || to.Credentials != (Credentials{}) {
+				return invalid("a checkpoint is for a private server: one that is named keeps meshes itself")
+			}
+			if to.Own, err = kept.server(); err != nil {
+				return err
+			}
+			defer to.Own.Close()
+		}
+		client, closeAll, err := to.open()
 		if err != nil {
 			return err
 		}
 		defer closeAll()
-		info, err := client.Create(ctx, oracle, epsilon, options)
+		spec := meshSpec(checked, epsilon, options, !staysOnThisMachine(client.Address))
+		var info *pb.Mesh
+		if kept.folder != "" {
+			info, err = kept.declare(ctx, client, spec)
+		} else {
+			info, err = client.create(ctx, spec)
+		}
 		if err != nil {
 			return err
 		}
-		return client.session(ctx, checked, info, options, every, func(mesh *Mesh) bool { return yield(mesh, nil) })
+		err = client.session(ctx, checked, info, options, every, func(mesh *Mesh) bool { return yield(mesh, nil) })
+		kept.forgetAfter(err)
+		return err
 	}()
 	if err != nil && !errors.Is(err, errLeft) {
 		yield(nil, err)
 	}
 }
 
-// session serves and watches a mesh side by side, and deletes it in the end.
+// session serves and watches a mesh side by side, and deletes it in the end, or leaves it to a checkpoint.
 func (c *Client) session(ctx context.Context, oracle *checkedOracle, info *pb.Mesh, options *Options,
 	every bool, hand func(*Mesh) bool) error {
 	// What is left when the context ends: the mesh is cancelled, and the watch tells how it ended.
 	alive, leave := context.WithCancel(context.WithoutCancel(ctx))
 	defer leave()
+	kept := options.Checkpoint != ""
 	stop := context.AfterFunc(ctx, func() {
+		if kept {
+			leave()
+			return
+		}
 		limited, cancel := context.WithTimeout(alive, callTime)
 		defer cancel()
 		request := &pb.CancelMeshRequest{Name: info.GetName()}
@@ -206,16 +232,20 @@ func (c *Client) session(ctx context.Context, oracle *checkedOracle, info *pb.Me
 	for i := range max(1, options.Workers) {
 		w := c.newWorker(oracle, info.GetName(), WorkerOptions{Worker: fmt.Sprintf("go-%d", i+1), MaxChunk: options.MaxChunk})
 		w.outage.quiet = true
-		w.onFailure = func(err error) { once.Do(func() { failure = err }) }
+		w.onFailure = func(err error) bool {
+			once.Do(func() { failure = err })
+			if kept {
+				leave() // the mesh waits for a better oracle
+			}
+			return !kept
+		}
 		workers.Add(1)
 		go func() {
 			defer workers.Done()
 			_, _ = w.run(serving) // what the server refuses, or its absence, the watch reports
 		}()
 	}
-	err := c.follow(alive, info, options.OnProgress, func(mesh *Mesh) bool {
-		return (!every && mesh.Report == nil) || hand(mesh)
-	})
+	err := c.follow(alive, info, options.OnProgress, every, hand)
 	if err != nil {
 		dismiss()
 	}
@@ -229,13 +259,18 @@ func (c *Client) session(ctx context.Context, oracle *checkedOracle, info *pb.Me
 	case <-time.After(farewell):
 	}
 	dismiss()
-	limited, cancel := context.WithTimeout(context.WithoutCancel(ctx), callTime)
-	defer cancel()
-	// Once: it ends with its server, or somebody else was first.
-	_, _ = call(limited, c.outage(), true, &pb.DeleteMeshRequest{Name: info.GetName()}, c.stub.DeleteMesh)
+	if !kept {
+		limited, cancel := context.WithTimeout(context.WithoutCancel(ctx), callTime)
+		defer cancel()
+		// Once: it ends with its server, or somebody else was first.
+		_, _ = call(limited, c.outage(), true, &pb.DeleteMeshRequest{Name: info.GetName()}, c.stub.DeleteMesh)
+	}
 	var ours *Error
 	if ctx.Err() != nil && errors.As(err, &ours) {
 		ours.Kind, ours.Reason, ours.Cause = ErrCancelled, "CANCELLED", ctx.Err()
+		if kept {
+			ours.Message = "the mesh is kept in " + options.Checkpoint + ": the same call goes on from there"
+		}
 	}
 	return err
 }
@@ -266,7 +301,8 @@ func (c *Client) Download(ctx context.Context, name string, revision uint64) (*M
 			err = growth.addPoints(part.GetFirstVertex(), points)
 		}
 		if err == nil {
-			err = growth.change(&pb.MeshDelta{Added: part.GetCells()})
+			err = growth.change(&pb.MeshDelta{Added: part.GetCells(),
+				BoundaryVertices: part.GetBoundaryVertices(), BoundaryWalls: part.GetBoundaryWalls()})
 		}
 		if err != nil {
 			return protocolError(err)

@@ -43,16 +43,16 @@ type worker struct {
 	oracle    *checkedOracle
 	hello     *pb.Hello
 	outage    *outage
-	onFailure func(error) // told of what the oracle returned, before the server is
+	onFailure func(error) bool // told of what the oracle returned; whether the server is to be
 }
 
 func (c *Client) newWorker(oracle *checkedOracle, name string, options WorkerOptions) *worker {
-	most := max(1, answerBytes/(8*oracle.d*(oracle.k+1)+9))
+	most := max(1, answerBytes/(8*(oracle.d*(oracle.k+1+min(oracle.k, oracle.walls))+oracle.walls)+9))
 	if options.MaxChunk > 0 {
 		most = min(most, options.MaxChunk)
 	}
 	hello := &pb.Hello{Mesh: name, Worker: options.Worker, MaxChunkQueries: uint32(most)}
-	return &worker{client: c, oracle: oracle, hello: hello, outage: c.outage(), onFailure: func(error) {}}
+	return &worker{client: c, oracle: oracle, hello: hello, outage: c.outage(), onFailure: func(error) bool { return true }}
 }
 
 func (w *worker) run(ctx context.Context) (string, error) {
@@ -93,8 +93,8 @@ func (w *worker) howItEnded(ctx context.Context) string {
 	return ""
 }
 
-// outbox sends from several goroutines, and says now and then that the oracle is at a chunk, lest the
-// server take a slow worker for a dead one. What cannot be sent shows when the stream is read.
+// outbox sends from several goroutines, and says now and then that the oracle is at a chunk, so that the
+// server does not take a slow worker for a dead one. What cannot be sent shows when the stream is read.
 type outbox struct {
 	mutex  sync.Mutex
 	stream grpc.BidiStreamingClient[pb.ServeOracleRequest, pb.ServeOracleResponse]
@@ -183,7 +183,10 @@ func (w *worker) reply(out *outbox, chunk *pb.QueryChunk) error {
 		out.put(&pb.ServeOracleRequest{Message: &pb.ServeOracleRequest_Answers{Answers: answers}}, 0)
 		return nil
 	}
-	w.onFailure(err)
+	if !w.onFailure(err) {
+		out.end() // as a worker that has to go
+		return err
+	}
 	said := err.Error()
 	if len(said) > messageBytes {
 		said = said[:messageBytes]
@@ -213,6 +216,8 @@ func (w *worker) compare(welcome *pb.Welcome) error {
 	case k != w.oracle.k || d != w.oracle.d:
 		problem = fmt.Sprintf("the mesh has dimension %d in R^%d, and this oracle's manifold has dimension %d in R^%d",
 			k, d, w.oracle.k, w.oracle.d)
+	case int(welcome.GetWalls()) != w.oracle.walls:
+		problem = fmt.Sprintf("the mesh has %d walls, and this oracle's manifold has %d", welcome.GetWalls(), w.oracle.walls)
 	case len(missing) > 0:
 		problem = "the mesh was declared with methods that this oracle lacks: " + strings.Join(missing, ", ")
 	default:

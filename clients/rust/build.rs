@@ -2,9 +2,8 @@
 
 fn main() -> std::io::Result<()> {
     let protos = "../../proto";
-    let files =
-        ["stellate/v1/stellate.proto", "stellate/v1/errors.proto", "stellate/rpc/status_details.proto"]
-            .map(|file| format!("{protos}/{file}"));
+    let files = ["v1/stellate", "v1/doctor", "v1/errors", "rpc/status_details"]
+        .map(|file| format!("{protos}/stellate/{file}.proto"));
     println!("cargo:rerun-if-changed={protos}");
     tonic_prost_build::configure()
         .build_server(false)

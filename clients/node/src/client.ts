@@ -3,6 +3,7 @@ import { channelCredentials, type Credentials, staysOnThisMachine } from "./cred
 import { tokenInterceptor } from "./credentials.js";
 import { fromRpc, InvalidArgument, MeshNotFound, StellateError } from "./errors.js";
 import type { DownloadMeshResponse__Output } from "./generated/stellate/v1/DownloadMeshResponse.js";
+import type { MeshSpec } from "./generated/stellate/v1/MeshSpec.js";
 import type { Mesh__Output } from "./generated/stellate/v1/Mesh.js";
 import type { ServerInfo__Output } from "./generated/stellate/v1/ServerInfo.js";
 import type { WatchMeshResponse__Output } from "./generated/stellate/v1/WatchMeshResponse.js";
@@ -80,9 +81,18 @@ export class Client {
    * the mesh would not be known.
    */
   async create(oracle: Oracle, options: MeshOptions): Promise<MeshInfo> {
+    return this.createFrom(this.specOf(oracle, options));
+  }
+
+  /** What create() asks for. */
+  specOf(oracle: Oracle, options: MeshOptions): MeshSpec {
     // Round trips are what a far server costs.
     const far = staysOnThisMachine(this.address) ? {} : { askAhead: true };
-    const spec = meshSpec(new CheckedOracle(oracle), oracle, { ...far, ...options });
+    return meshSpec(new CheckedOracle(oracle), oracle, { ...far, ...options });
+  }
+
+  /** As create(), in the protocol's own message. */
+  async createFrom(spec: MeshSpec): Promise<MeshInfo> {
     const call: Unary<object, Mesh__Output> = this.stub.CreateMesh.bind(this.stub);
     return infoFrom(await this.unary(call, { spec }, { once: true }));
   }
@@ -137,7 +147,7 @@ export class Client {
   worker(
     oracle: Oracle,
     name: string,
-    options: WorkerOptions & { quiet?: boolean; onFailure?: (error: unknown) => void } = {},
+    options: WorkerOptions & { quiet?: boolean; onFailure?: (error: unknown) => boolean } = {},
   ): Worker {
     const outage = new Outage(this.patience, options.quiet);
     return new Worker(

@@ -21,6 +21,7 @@ export class GrowingComplex {
   private removed: Uint32Array[] = [];
   private removedLength = 0;
   private pending: MeshDelta__Output[] = [];
+  private boundary: [number, number][] = []; // vertices and their walls, as bits
 
   constructor(
     private readonly k: number,
@@ -63,6 +64,24 @@ export class GrowingComplex {
     this.added = [];
     this.removed = [];
     this.pending = [];
+    this.boundary = [];
+  }
+
+  /** [n], as bits the walls that each vertex lies on; undefined without a boundary. */
+  walls(): BigUint64Array | undefined {
+    if (!this.boundary.length) return undefined;
+    const walls = new BigUint64Array(this.count);
+    for (const [vertex, bits] of this.boundary) walls[vertex] = BigInt(bits);
+    return walls;
+  }
+
+  /** Which of the vertices lie on walls. */
+  addWalls(vertices: number[], walls: number[]): void {
+    if (vertices.length !== walls.length || (vertices.at(-1) ?? -1) >= this.count) {
+      const there = `the ${this.count} that there are`;
+      throw protocolError(`walls of ${vertices.length} vertices do not fit ${there}`);
+    }
+    vertices.forEach((vertex, i) => this.boundary.push([vertex, walls[i]]));
   }
 
   /** [n, d]; vertices never change, so it stays true while the mesh grows. */
@@ -102,6 +121,7 @@ export class GrowingComplex {
   }
 
   private change(delta: MeshDelta__Output): void {
+    this.addWalls(delta.boundaryVertices, delta.boundaryWalls);
     const added = indices(delta.added, -1, this.k + 1);
     const removed = indices(delta.removed, -1, this.k + 1);
     for (const id of added) {

@@ -1,4 +1,5 @@
 // Meshes of smooth manifolds of any dimension, known through oracles alone.
+export { check, type CheckReport, chooseEpsilon, type Finding } from "./check.js";
 export { Client, type ClientOptions } from "./client.js";
 export type { Credentials } from "./credentials.js";
 export * from "./errors.js";

@@ -4,6 +4,7 @@ import { extname } from "node:path";
 import { SaveError } from "./errors.js";
 import { orient } from "./orientation.js";
 import type { Progress, Report } from "./report.js";
+import { sameRow, sortedOrder, takeRows } from "./rows.js";
 
 /** A simplicial k-complex in R^d. */
 export class Mesh {
@@ -22,6 +23,8 @@ export class Mesh {
     readonly progress?: Progress,
     /** How it ended and what is proved; not there while it grows. */
     readonly report?: Report,
+    /** [n], as bits the walls that each vertex lies on; not there without a boundary. */
+    readonly walls?: BigUint64Array,
   ) {}
 
   get vertexCount(): number {
@@ -35,6 +38,26 @@ export class Mesh {
   /** Whether the mesh is finished and proved good. */
   get certified(): boolean {
     return this.report?.certified ?? false;
+  }
+
+  /**
+   * The (k-1)-faces that are in one simplex alone, [m, k], in lexicographic order; each lies on the
+   * walls that all its vertices have in common.
+   */
+  boundary(): Uint32Array {
+    const k = this.dimension;
+    const faces = new Uint32Array(this.simplices.length * k);
+    let at = 0;
+    for (let row = 0; row < this.simplices.length; row += k + 1) {
+      for (let left = row; left <= row + k; left++) {
+        for (let i = row; i <= row + k; i++) if (i !== left) faces[at++] = this.simplices[i];
+      }
+    }
+    const order = sortedOrder(faces, k);
+    const same = (i: number, j: number) =>
+      i >= 0 && j < order.length && sameRow(faces, k, order[i], order[j]);
+    const once = [...order].filter((_, i) => !same(i - 1, i) && !same(i, i + 1));
+    return takeRows(faces, k, once);
   }
 
   /** The simplices with vertices exchanged so that neighbours agree; undefined if not orientable. */

@@ -10,7 +10,7 @@ export interface Found {
 type Soon<T> = T | Promise<T>;
 
 /**
- * A compact smooth k-submanifold M of R^d without boundary, 1 <= k < d.
+ * A compact smooth k-submanifold M of R^d without boundary, 1 <= k < d, unless it has `walls`.
  *
  * Every method takes and returns whole batches, one point after the other, and may be async. The
  * answer to a query must not depend on the rest of its batch.
@@ -40,6 +40,21 @@ export interface Oracle {
   tangentBasis?(points: Float64Array, n: number): Soon<Float64Array>;
   /** At points of M: [n, d] -> [n], the local feature size or any positive lengths of yours. */
   localSize?(points: Float64Array, n: number): Soon<Float64Array>;
+  /**
+   * How many walls bound M, at most 53, which has a boundary then: it is where all walls are at least 0
+   * on M^, a manifold without one, of which the methods above tell; it may be R^d itself. Walls take
+   * tangentBasis and the three methods below. The walls of a face ascend.
+   */
+  walls?: number;
+  /** As closestPoint, of points of M^ where the walls of the face are 0, whatever the others are. */
+  facePoint?(points: Float64Array, n: number, face: number[]): Soon<Float64Array | Found>;
+  /** The walls' values at points, of which the sign counts: [n, d] -> [n, walls]. */
+  clearances?(points: Float64Array, n: number): Soon<Float64Array>;
+  /**
+   * At points of a face, of each of its walls the unit normal within the tangent space along which the
+   * wall's value falls: [n, d] -> [n, face.length, d].
+   */
+  conormals?(points: Float64Array, n: number, face: number[]): Soon<Float64Array>;
 }
 
 /** Throws InvalidArgument for an oracle that cannot be one. */
@@ -53,6 +68,7 @@ export function checkOracle(oracle: Oracle): void {
   if (typeof oracle.closestPoint !== "function") {
     throw new InvalidArgument("the oracle has no method closestPoint(points, n)");
   }
+  if (oracle.walls !== undefined) checkWalls(oracle, oracle.walls);
   const d = oracle.ambientDimension;
   for (const corner of oracle.boundingBox ?? []) {
     if (corner.length !== d) {
@@ -64,15 +80,28 @@ export function checkOracle(oracle: Oracle): void {
   }
 }
 
+function checkWalls(oracle: Oracle, walls: number): void {
+  if (!Number.isInteger(walls) || walls < 0 || walls > 53) {
+    throw new InvalidArgument(`walls has to be a whole number up to 53, and is ${walls}`);
+  }
+  const wanted = ["tangentBasis", "facePoint", "clearances", "conormals"] as const;
+  const lacking = walls ? wanted.filter((name) => oracle[name] === undefined) : [];
+  if (lacking.length) {
+    throw new InvalidArgument(`the oracle has walls, and lacks ${lacking.join(" and ")}`);
+  }
+}
+
 /** An oracle as the server sees it: shapes and finiteness are checked, with clear words. */
 export class CheckedOracle {
   readonly k: number;
   readonly d: number;
+  readonly walls: number;
 
   constructor(private readonly oracle: Oracle) {
     checkOracle(oracle);
     this.k = oracle.dimension;
     this.d = oracle.ambientDimension;
+    this.walls = oracle.walls ?? 0;
   }
 
   get capabilities() {
@@ -80,10 +109,15 @@ export class CheckedOracle {
       intersectFlat: this.oracle.intersectFlat !== undefined,
       tangentBasis: this.oracle.tangentBasis !== undefined,
       localSize: this.oracle.localSize !== undefined,
+      conormals: this.walls > 0,
     };
   }
 
-  async closestPoints(points: Float64Array, n: number): Promise<Found> {
+  /** Of a face, if there is one. */
+  async closestPoints(points: Float64Array, n: number, face: number[] = []): Promise<Found> {
+    if (face.length) {
+      return this.checked("facePoint", await this.oracle.facePoint?.(points, n, face), n);
+    }
     const answer = await this.oracle.closestPoint(points, n);
     return this.checked("closestPoint", answer, n);
   }
@@ -110,11 +144,22 @@ export class CheckedOracle {
     return this.atFound("localSize", answer, n, Float64Array.of(1));
   }
 
+  /** [n, walls]; rows that were not found hold any. */
+  async clearances(answer: Found, n: number): Promise<Float64Array> {
+    return this.atFound("clearances", answer, n, new Float64Array(this.walls));
+  }
+
+  /** [n, face.length, d]; rows that were not found hold any. */
+  async conormals(answer: Found, n: number, face: number[]): Promise<Float64Array> {
+    return this.atFound("conormals", answer, n, new Float64Array(face.length * this.d), face);
+  }
+
   private async atFound(
-    method: "tangentBasis" | "localSize",
+    method: "tangentBasis" | "localSize" | "clearances" | "conormals",
     { points, found }: Found,
     n: number,
     anywhere: Float64Array,
+    face: number[] = [],
   ): Promise<Float64Array> {
     const rows: number[] = [];
     for (let i = 0; i < n; i++) if (found[i]) rows.push(i);
@@ -126,7 +171,7 @@ export class CheckedOracle {
       rows.forEach((row, i) => asked.set(points.subarray(row * d, row * d + d), i * d));
     }
     const width = anywhere.length;
-    const answer = rows.length ? await this.oracle[method]?.(asked, rows.length) : asked;
+    const answer = rows.length ? await this.oracle[method]?.(asked, rows.length, face) : asked;
     const values = numbersOf(method, answer, rows.length, width);
     values.forEach((value, i) => {
       if (!Number.isFinite(value)) throw notFinite(method, Math.floor(i / width), value);

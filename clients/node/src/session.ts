@@ -1,5 +1,7 @@
 // A mesh from its declaration to its end: the server asks, the oracle answers, we watch.
 import { setTimeout as sleep } from "node:timers/promises";
+import { chooseEpsilon } from "./check.js";
+import { Checkpoint } from "./checkpoint.js";
 import { Client, type ClientOptions } from "./client.js";
 import { Cancelled, errorClass, FailedPrecondition, InvalidArgument } from "./errors.js";
 import { NotCertified, protocolError, StellateError } from "./errors.js";
@@ -20,10 +22,19 @@ export interface Connection extends ClientOptions {
   server?: string | Server | Client;
 }
 
-export interface RunOptions extends Connection, MeshOptions, Omit<WorkerOptions, "worker"> {
+export interface RunOptions
+  extends Connection, Omit<MeshOptions, "epsilon">, Omit<WorkerOptions, "worker"> {
+  /** Largest circumradius of a simplex, a length; "auto": what chooseEpsilon() says. */
+  epsilon: number | "auto";
   /** Streams on which the oracle is asked at once; more than one helps an async oracle. Default 1. */
   workers?: number;
   onProgress?: (progress: Progress) => void;
+  /**
+   * A directory, made if it is not there, in which the mesh outlives this program: the same call goes
+   * on from where the last one was aborted or killed, or its oracle threw, and gives a mesh that is
+   * finished at once. For private servers; one that is named keeps its meshes with --data-dir.
+   */
+  checkpoint?: string;
   /** Aborting it cancels the mesh: Cancelled, with the mesh so far in the error's `mesh`. */
   signal?: AbortSignal;
 }
@@ -141,6 +152,7 @@ async function assemble(client: Client, info: MeshInfo, wanted: number): Promise
     revision = part.revision;
     cells.push(indices(part.cells, -1, k + 1));
     growth.addPoints(part.firstVertex, numbers(part.points, -1, d));
+    growth.addWalls(part.boundaryVertices, part.boundaryWalls);
   }
   const rows = joined(cells);
   const sorted = takeRows(rows, k + 1, sortedOrder(rows, k + 1));
@@ -153,23 +165,38 @@ async function assemble(client: Client, info: MeshInfo, wanted: number): Promise
     revision,
     last ? info.progress : undefined,
     last ? info.report : undefined,
+    growth.walls(),
   );
 }
 
-/** A mesh by the events of its watch: at every revision and at its end, or at its end alone. */
+/**
+ * A mesh by the events of its watch: at every revision and at its end, or at its end alone. Throws
+ * Cancelled, with the mesh so far, once `leaving` is aborted.
+ */
 export async function* follow(
   client: Client,
   info: MeshInfo,
   onProgress: ((progress: Progress) => void) | undefined,
   every: boolean,
+  leaving?: AbortSignal,
 ): AsyncGenerator<Mesh> {
   const { dimension: k, ambientDimension: d } = info;
   const growth = new GrowingComplex(k, d);
   const stream = client.watch(info.name);
+  leaving?.addEventListener("abort", () => stream.close());
   stream.onResume = () => growth.forgetPending();
   let progress: Progress | undefined;
   const soFar = (report?: Mesh["report"]) =>
-    new Mesh(k, d, growth.points(), growth.simplices(), growth.revision, progress, report);
+    new Mesh(
+      k,
+      d,
+      growth.points(),
+      growth.simplices(),
+      growth.revision,
+      progress,
+      report,
+      growth.walls(),
+    );
   for await (const event of stream) {
     if (event.delta) {
       if (growth.absorb(event.delta) && every) yield soFar();
@@ -186,6 +213,7 @@ export async function* follow(
       yield judged(soFar(final.report), final);
     }
   }
+  if (leaving?.aborted) throw new Cancelled("the mesh is left as it is", { mesh: soFar() });
 }
 
 function judged(mesh: Mesh, { state, report }: MeshInfo): Mesh {
@@ -199,19 +227,39 @@ function judged(mesh: Mesh, { state, report }: MeshInfo): Mesh {
 }
 
 async function* run(oracle: Oracle, options: RunOptions, every: boolean): AsyncGenerator<Mesh> {
-  const { workers = 1, onProgress, signal, maxChunk, server, ...rest } = options;
-  const { credentials, reconnectSeconds, keepaliveSeconds, onOutage, ...asked } = rest;
+  const { workers = 1, onProgress, signal, maxChunk, server, epsilon: wanted, ...more } = options;
+  const { checkpoint, ...rest } = more;
+  const { credentials, reconnectSeconds, keepaliveSeconds, onOutage, ...others } = rest;
   if (!Number.isInteger(workers) || workers < 1) {
     throw new InvalidArgument(`workers has to be a whole number from 1 on, and is ${workers}`);
   }
   signal?.throwIfAborted();
-  const connection = { server, credentials, reconnectSeconds, keepaliveSeconds, onOutage };
-  const [client, close] = await connect(connection);
+  const kept = checkpoint === undefined ? undefined : new Checkpoint(checkpoint);
+  if (kept && (server || credentials)) {
+    throw new InvalidArgument(
+      "a checkpoint is for a private server: one that is named keeps meshes itself",
+    );
+  }
+  const own = await kept?.server();
+  const link = { credentials, reconnectSeconds, keepaliveSeconds, onOutage };
+  const [client, close] = await connect({ server: own ?? server, ...link });
   try {
-    const info = await client.create(oracle, asked);
-    yield* served(client, oracle, info, { workers, onProgress, signal, maxChunk }, every);
+    const epsilon = wanted === "auto" ? (await chooseEpsilon(oracle)).epsilon : wanted;
+    const spec = client.specOf(oracle, { ...others, epsilon });
+    const info = await (kept?.declare(client, spec) ?? client.createFrom(spec));
+    yield* served(
+      client,
+      oracle,
+      info,
+      { workers, onProgress, signal, maxChunk, checkpoint },
+      every,
+    );
+  } catch (error) {
+    kept?.forgetAfter(error);
+    throw error;
   } finally {
     await close();
+    await own?.close();
   }
 }
 
@@ -219,11 +267,19 @@ async function* served(
   client: Client,
   oracle: Oracle,
   info: MeshInfo,
-  options: Pick<RunOptions, "onProgress" | "signal" | "maxChunk"> & { workers: number },
+  options: Pick<RunOptions, "onProgress" | "signal" | "maxChunk" | "checkpoint"> & {
+    workers: number;
+  },
   every: boolean,
 ): AsyncGenerator<Mesh> {
   let failure: { error: unknown } | undefined;
-  const onFailure = (error: unknown) => (failure ??= { error });
+  const kept = options.checkpoint !== undefined;
+  const leaving = new AbortController(); // a mesh that is kept waits for a better oracle
+  const onFailure = (error: unknown) => {
+    failure ??= { error };
+    if (kept) leaving.abort();
+    return !kept;
+  };
   const all: Worker[] = Array.from({ length: options.workers }, (_, i) =>
     client.worker(oracle, info.name, {
       worker: `node-${i + 1}`,
@@ -238,18 +294,24 @@ async function* served(
       if (error instanceof InvalidArgument) onFailure(error);
     }),
   );
-  const cancel = () => void client.cancel(info.name, { once: true }).catch(() => {});
+  const cancel = () =>
+    kept ? leaving.abort() : void client.cancel(info.name, { once: true }).catch(() => {});
   options.signal?.addEventListener("abort", cancel);
   let ended = false;
   try {
-    for await (const grown of follow(client, info, options.onProgress, every)) {
+    for await (const grown of follow(client, info, options.onProgress, every, leaving.signal)) {
       ended = grown.report !== undefined;
       if (ended) for (const worker of all) worker.finish();
       yield grown;
     }
   } catch (error) {
     // Our own exception says more than the server's account of it.
-    if (!failure || error instanceof Cancelled) throw error;
+    if (!failure && kept && leaving.signal.aborted) {
+      const { mesh } = error as Cancelled;
+      const words = `the mesh is kept in ${options.checkpoint}: the same call goes on from there`;
+      throw new Cancelled(words, { mesh });
+    }
+    if (!failure || (error instanceof Cancelled && !kept)) throw error;
     const ours = failure.error;
     if (ours instanceof StellateError && error instanceof StellateError) ours.mesh = error.mesh;
     throw ours;
@@ -258,6 +320,7 @@ async function* served(
     if (!ended) for (const worker of all) worker.stop();
     await Promise.race([Promise.all(done), sleep(FAREWELL, undefined, { ref: false })]);
     for (const worker of all) worker.stop();
-    await client.delete(info.name, { once: true }).catch(() => {}); // it ends with its server
+    // It ends with its server, or is kept.
+    if (!kept) await client.delete(info.name, { once: true }).catch(() => {});
   }
 }

@@ -84,6 +84,7 @@ export function meshSpec(checked: CheckedOracle, oracle: Oracle, options: MeshOp
     ambientDimension: d,
     epsilon: options.epsilon,
     oracle: checked.capabilities,
+    walls: checked.walls,
     boundingBox: oracle.boundingBox && {
       lower: toWire(Float64Array.from(oracle.boundingBox[0]), d),
       upper: toWire(Float64Array.from(oracle.boundingBox[1]), d),

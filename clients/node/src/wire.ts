@@ -6,6 +6,7 @@ import { fileURLToPath } from "node:url";
 import * as grpc from "@grpc/grpc-js";
 import { loadSync } from "@grpc/proto-loader";
 import protobuf from "protobufjs";
+import type { ProtoGrpcType as DoctorProto } from "./generated/doctor.js";
 import type { ProtoGrpcType } from "./generated/stellate.js";
 import type { Array as WireArray } from "./generated/stellate/v1/Array.js";
 import type { StellateClient } from "./generated/stellate/v1/Stellate.js";
@@ -13,7 +14,7 @@ import type { StellateClient } from "./generated/stellate/v1/Stellate.js";
 if (endianness() !== "LE") throw new Error("stellate needs a little-endian machine");
 
 const folder = join(dirname(fileURLToPath(import.meta.url)), "..", "proto");
-const proto = loadSync("stellate/v1/stellate.proto", {
+const proto = loadSync(["stellate/v1/stellate.proto", "stellate/v1/doctor.proto"], {
   includeDirs: [folder],
   longs: Number,
   enums: String,
@@ -22,10 +23,12 @@ const proto = loadSync("stellate/v1/stellate.proto", {
   oneofs: true,
 });
 
+const services: unknown = grpc.loadPackageDefinition(proto);
+
 /** The service's stub. Enumerators that this version does not know are numbers, not errors. */
-export const Stub = (grpc.loadPackageDefinition(proto) as unknown as ProtoGrpcType).stellate.v1
-  .Stellate;
+export const Stub = (services as ProtoGrpcType).stellate.v1.Stellate;
 export type Stub = StellateClient;
+export const DoctorStub = (services as DoctorProto).stellate.v1.Doctor;
 
 const details = protobuf.parse(
   readFileSync(join(folder, "stellate/rpc/status_details.proto"), "utf8"),

@@ -5,7 +5,7 @@ import type { QueryChunk__Output } from "./generated/stellate/v1/QueryChunk.js";
 import type { ServeOracleRequest } from "./generated/stellate/v1/ServeOracleRequest.js";
 import type { ServeOracleResponse__Output } from "./generated/stellate/v1/ServeOracleResponse.js";
 import type { Welcome__Output } from "./generated/stellate/v1/Welcome.js";
-import type { CheckedOracle } from "./oracle.js";
+import type { CheckedOracle, Found } from "./oracle.js";
 import type { Outage } from "./retry.js";
 import { enumName, grpc, numbers, type Stub, toWire } from "./wire.js";
 
@@ -36,7 +36,7 @@ export async function answer(
     const bases = numbers(chunk.bases, n, d, k);
     reply = await oracle.intersections(points, bases, numbers(chunk.radii, n), n);
   } else if (chunk.kind === "QUERY_KIND_CLOSEST_POINT") {
-    reply = await oracle.closestPoints(points, n);
+    reply = await oracle.closestPoints(points, n, chunk.face);
   } else {
     throw new Error(`the server asks a question of kind ${chunk.kind}, unknown to this client`);
   }
@@ -48,8 +48,17 @@ export async function answer(
       found: all ? undefined : Buffer.from(reply.found.map((one) => (one ? 1 : 0))),
       tangents: chunk.wantTangents ? toWire(await oracle.tangents(reply, n), n, d, k) : undefined,
       sizes: chunk.wantSizes ? toWire(await oracle.sizes(reply, n), n) : undefined,
+      ...(chunk.wantClearances ? await wallsAt(oracle, reply, n, chunk.face) : {}),
     },
   };
+}
+
+/** What the walls are at the points, and, on a face, its conormals. */
+async function wallsAt(oracle: CheckedOracle, reply: Found, n: number, face: number[]) {
+  const clearances = toWire(await oracle.clearances(reply, n), n, oracle.walls);
+  if (!face.length) return { clearances };
+  const conormals = await oracle.conormals(reply, n, face);
+  return { clearances, conormals: toWire(conormals, n, face.length, oracle.d) };
 }
 
 export interface WorkerOptions {
@@ -71,13 +80,15 @@ export class Worker {
     mesh: string,
     { worker, maxChunk }: WorkerOptions,
     private readonly outage: Outage,
-    /** Told what the oracle threw, before the server is. */
-    private readonly onFailure: (error: unknown) => void = () => {},
+    /** Told what the oracle threw; whether the server is to be told as well. */
+    private readonly onFailure: (error: unknown) => boolean = () => true,
   ) {
     if (maxChunk !== undefined && !(Number.isInteger(maxChunk) && maxChunk >= 1)) {
       throw new InvalidArgument(`maxChunk has to be a whole number from 1 on, and is ${maxChunk}`);
     }
-    const most = Math.max(1, Math.floor(ANSWER_BYTES / (8 * oracle.d * (oracle.k + 1) + 9)));
+    const { d, k, walls } = oracle;
+    const numbers = d * (k + 1 + Math.min(k, walls)) + walls;
+    const most = Math.max(1, Math.floor(ANSWER_BYTES / (8 * numbers + 9)));
     const maxChunkQueries = Math.min(most, maxChunk ?? most);
     this.hello = { mesh, worker: worker ?? "", maxChunkQueries };
   }
@@ -135,9 +146,8 @@ export class Worker {
             call.write(await answer(this.oracle, response.queries));
           } catch (error) {
             failure = { error };
-            this.onFailure(error);
-            call.write({ failure: { lease, message: words(error) } });
-            call.end();
+            if (this.onFailure(error)) call.write({ failure: { lease, message: words(error) } });
+            call.end(); // without a word as a worker that has to go
           }
           lease = undefined;
         } else if (response.welcome) {
@@ -188,6 +198,8 @@ export class Worker {
       problem =
         `the mesh has dimension ${welcome.dimension} in R^${welcome.ambientDimension}, ` +
         `and this oracle's manifold has dimension ${k} in R^${d}`;
+    } else if (welcome.walls !== this.oracle.walls) {
+      problem = `the mesh has ${welcome.walls} walls, and this manifold ${this.oracle.walls}`;
     } else if (missing.length) {
       problem = `the mesh was declared with ${missing.join(" and ")}, which this oracle lacks`;
     }

@@ -23,6 +23,7 @@ execFileSync(
     `--includeDirs=${protos}`,
     `--outDir=${at("../src/generated")}`,
     "stellate/v1/stellate.proto",
+    "stellate/v1/doctor.proto",
     "stellate/v1/errors.proto",
     "stellate/rpc/status_details.proto",
   ],

@@ -2,6 +2,7 @@
 
 $LOAD_PATH.unshift(File.join(__dir__, 'stellate', 'proto'))
 require 'stellate/v1/stellate_services_pb'
+require 'stellate/v1/doctor_services_pb'
 require 'stellate/rpc/status_details_pb'
 $LOAD_PATH.shift
 
@@ -14,6 +15,8 @@ require_relative 'stellate/outage'
 require_relative 'stellate/server'
 require_relative 'stellate/client'
 require_relative 'stellate/worker'
+require_relative 'stellate/checkpoint'
 require_relative 'stellate/session'
+require_relative 'stellate/check'
 require_relative 'stellate/manifolds'
 require_relative 'stellate/progress_bar'

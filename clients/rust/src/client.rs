@@ -16,7 +16,7 @@ use crate::oracle::{Checked, Oracle};
 use crate::proto::stellate_client::StellateClient;
 use crate::proto::{
     CancelMeshRequest, CreateMeshRequest, DeleteMeshRequest, GetMeshRequest, GetServerInfoRequest,
-    ListMeshesRequest, Mesh as MeshInfo, ServerInfo,
+    ListMeshesRequest, Mesh as MeshInfo, MeshSpec, ServerInfo,
 };
 use crate::retry::{Flag, Outage, Patience};
 use crate::server::Server;
@@ -56,6 +56,7 @@ impl Default for ClientOptions {
 /// A connection to a server; any thread may use it, but not from within an async runtime.
 pub struct Client {
     address: String,
+    pub(crate) channel: Channel,
     pub(crate) stub: Stub,
     pub(crate) runtime: Arc<Runtime>,
     pub(crate) patience: Patience,
@@ -108,7 +109,7 @@ impl Client {
             endpoint.connect_lazy()
         };
         let token = Token::new(options.credentials.token.as_deref())?;
-        let stub = StellateClient::with_interceptor(channel, token)
+        let stub = StellateClient::with_interceptor(channel.clone(), token)
             .max_decoding_message_size(LARGEST_MESSAGE)
             .max_encoding_message_size(LARGEST_MESSAGE);
         let process = own.map(Server::process);
@@ -118,7 +119,7 @@ impl Client {
             on_outage: options.on_outage,
             reached: AtomicBool::new(false),
         };
-        Ok(Client { address: address.to_string(), stub, runtime: Arc::new(runtime), patience })
+        Ok(Client { address: address.to_string(), channel, stub, runtime: Arc::new(runtime), patience })
     }
 
     pub(crate) fn outage(&self) -> Outage<'_> {
@@ -160,8 +161,14 @@ impl Client {
         epsilon: f64,
         options: &MeshOptions,
     ) -> Result<MeshInfo, Error> {
-        let far = !stays_on_this_machine(&self.address);
-        let spec = options.spec(&Checked::new(oracle)?, epsilon, far);
+        self.create_from(self.spec(&Checked::new(oracle)?, epsilon, options))
+    }
+
+    pub(crate) fn spec(&self, oracle: &Checked, epsilon: f64, options: &MeshOptions) -> MeshSpec {
+        options.spec(oracle, epsilon, !stays_on_this_machine(&self.address))
+    }
+
+    pub(crate) fn create_from(&self, spec: MeshSpec) -> Result<MeshInfo, Error> {
         let request = CreateMeshRequest { spec: Some(spec) };
         self.runtime.block_on(self.call(&mut self.outage(), true, |mut stub| {
             let request = request.clone();

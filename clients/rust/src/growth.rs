@@ -16,7 +16,8 @@ pub struct GrowingComplex {
     d: usize,
     revision: u64,
     coordinates: Vec<f64>,
-    rows: Vec<u32>, // in lexicographic order
+    walls: Vec<u64>, // bits, of the vertices up to the last on a wall
+    rows: Vec<u32>,  // in lexicographic order
     added: Vec<u32>,
     removed: Vec<u32>,
     pending: Vec<MeshDelta>,
@@ -31,6 +32,7 @@ impl GrowingComplex {
             d,
             revision: 0,
             coordinates: Vec::new(),
+            walls: Vec::new(),
             rows: empty(),
             added: empty(),
             removed: empty(),
@@ -90,6 +92,15 @@ impl GrowingComplex {
         let added = indices(delta.added.as_ref(), &shape).map_err(Error::protocol)?;
         let removed = indices(delta.removed.as_ref(), &shape).map_err(Error::protocol)?;
         let count = self.coordinates.len() / self.d;
+        let (on, walls) = (&delta.boundary_vertices, &delta.boundary_walls);
+        if on.len() != walls.len() || on.last().is_some_and(|&last| last as usize >= count) {
+            let what = format!("walls of {} vertices do not fit the {count} that there are", on.len());
+            return Err(Error::protocol(what));
+        }
+        for (&vertex, &walls) in on.iter().zip(walls) {
+            self.walls.resize(self.walls.len().max(vertex as usize + 1), 0);
+            self.walls[vertex as usize] = walls;
+        }
         if let Some(id) = added.iter().find(|&&id| id as usize >= count) {
             return Err(Error::protocol(format!("a simplex has vertex {id} of {count} vertices")));
         }
@@ -129,11 +140,16 @@ impl GrowingComplex {
     /// The mesh as of the last complete revision.
     pub fn mesh(&mut self) -> Result<Mesh, Error> {
         self.settle()?;
+        let mut walls = self.walls.clone();
+        if !walls.is_empty() {
+            walls.resize(self.coordinates.len() / self.d, 0);
+        }
         Ok(Mesh {
             dimension: self.k,
             ambient_dimension: self.d,
             points: self.coordinates.clone(),
             simplices: self.rows.clone(),
+            walls,
             revision: self.revision,
             progress: None,
             report: None,

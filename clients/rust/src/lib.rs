@@ -1,4 +1,4 @@
-//! Meshes compact smooth manifolds of any dimension, without boundary, that are known through oracles
+//! Meshes compact smooth manifolds of any dimension, with or without boundary, known through oracles
 //! alone.
 //!
 //! Arrays are flat, in C order: point i of a batch in R^d is `x[i * d..(i + 1) * d]`, and entry (row,
@@ -6,6 +6,8 @@
 
 #![warn(missing_docs)]
 
+mod check;
+mod checkpoint;
 mod client;
 mod credentials;
 mod error;
@@ -29,6 +31,7 @@ pub mod proto {
     tonic::include_proto!("stellate.v1");
 }
 
+pub use check::{check, choose_epsilon};
 pub use client::{Client, ClientOptions};
 pub use credentials::Credentials;
 pub use error::{Error, Kind};
@@ -36,7 +39,7 @@ pub use growth::GrowingComplex;
 pub use mesh::{check_save, report_text, Mesh};
 pub use oracle::{BoxError, Capabilities, Oracle};
 pub use progress::progress_bar;
-pub use server::{find_stellated, Server, ServerOptions};
+pub use server::{find_stellate, find_stellated, Server, ServerOptions};
 pub use session::{download, mesh, serve, watch, watch_by_name};
 pub use session::{Cancel, Connection, Growth, OnProgress, RunOptions};
 pub use spec::MeshOptions;

@@ -8,6 +8,7 @@ use std::path::Path;
 use crate::error::{Error, Kind};
 use crate::orientation::orient;
 use crate::proto::{Progress, Report};
+use crate::rows::{row_at, sorted_order};
 
 /// A simplicial k-complex in R^d.
 #[derive(Clone, Debug)]
@@ -20,6 +21,8 @@ pub struct Mesh {
     pub points: Vec<f64>,
     /// `[m, k+1]`, zero-based, ascending in each row, rows in lexicographic order.
     pub simplices: Vec<u32>,
+    /// `[n]`, as bits the walls that each vertex lies on; empty without a boundary.
+    pub walls: Vec<u64>,
     /// One for each round that changed the mesh.
     pub revision: u64,
     /// How it stood at this revision.
@@ -50,6 +53,7 @@ impl Mesh {
             ambient_dimension: d,
             points,
             simplices: rows,
+            walls: Vec::new(),
             revision: 0,
             progress: None,
             report: None,
@@ -70,6 +74,23 @@ impl Mesh {
     pub fn certified(&self) -> bool {
         let proved = self.report.as_ref().and_then(|report| report.certificate.as_ref());
         proved.is_some_and(|certificate| certificate.certified)
+    }
+
+    /// The (k-1)-faces that are in one simplex alone, `[m, k]`, in lexicographic order; each lies on the
+    /// walls that all its vertices have in common.
+    pub fn boundary(&self) -> Vec<u32> {
+        let k = self.dimension;
+        let mut faces = Vec::with_capacity(self.simplices.len() * k);
+        for row in self.simplices.chunks_exact(k + 1) {
+            for left in 0..=k {
+                faces.extend_from_slice(&row[..left]);
+                faces.extend_from_slice(&row[left + 1..]);
+            }
+        }
+        let order = sorted_order(&faces, k);
+        let same = |a: &u32, b: &u32| row_at(&faces, k, *a) == row_at(&faces, k, *b);
+        let once = order.chunk_by(same).filter(|equal| equal.len() == 1);
+        once.flat_map(|face| row_at(&faces, k, face[0])).copied().collect()
     }
 
     /// The simplices with vertices exchanged so that neighbours agree; None if not orientable.

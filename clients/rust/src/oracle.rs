@@ -18,7 +18,7 @@ pub struct Capabilities {
     pub local_size: bool,
 }
 
-/// A compact smooth k-submanifold M of R^d without boundary, 1 <= k < d.
+/// A compact smooth k-submanifold M of R^d without boundary, 1 <= k < d, unless it has `walls`.
 ///
 /// Methods take and fill whole batches, of `found.len()` points. The answer to a query must not depend
 /// on the rest of its batch. Calls come one at a time unless the oracle is `concurrent`.
@@ -74,6 +74,36 @@ pub trait Oracle: Sync {
     fn local_size(&self, _points: &[f64], _sizes: &mut [f64]) -> Result<(), BoxError> {
         Err("local_size is among the capabilities and not overridden".into())
     }
+
+    /// How many walls bound M, which has a boundary then: it is where all walls are at least 0 on M^, a
+    /// manifold without one, of which the methods above tell; it may be R^d itself. Walls take
+    /// `tangent_basis` and the three methods below.
+    fn walls(&self) -> usize {
+        0
+    }
+
+    /// As `closest_point`, of points of M^ where the walls of a face, ascending, are 0, whatever the
+    /// others are.
+    fn face_point(
+        &self,
+        _x: &[f64],
+        _face: &[u32],
+        _points: &mut [f64],
+        _found: &mut [bool],
+    ) -> Result<(), BoxError> {
+        Err("face_point is not overridden, and there are walls".into())
+    }
+
+    /// The walls' values at points `[n, d]`, of which the sign counts: `[n, walls]`.
+    fn clearances(&self, _points: &[f64], _values: &mut [f64]) -> Result<(), BoxError> {
+        Err("clearances is not overridden, and there are walls".into())
+    }
+
+    /// At points of a face, of each of its walls the unit normal within the tangent space along which the
+    /// wall's value falls: `[n, face.len(), d]`.
+    fn conormals(&self, _points: &[f64], _face: &[u32], _normals: &mut [f64]) -> Result<(), BoxError> {
+        Err("conormals is not overridden, and there are walls".into())
+    }
 }
 
 /// An oracle as the server sees it.
@@ -81,22 +111,28 @@ pub struct Checked<'a> {
     pub oracle: &'a dyn Oracle,
     pub k: usize,
     pub d: usize,
+    pub walls: usize,
     turn: Option<Mutex<()>>,
 }
 
 impl<'a> Checked<'a> {
     pub fn new(oracle: &'a dyn Oracle) -> Result<Self, Error> {
         let (k, d) = (oracle.dimension(), oracle.ambient_dimension());
-        if k < 1 || d <= k {
-            return Err(Error::invalid(format!("dimension {k} in R^{d}: 1 <= k < d is needed")));
+        let walls = oracle.walls();
+        if k < 1 || d < k || (d == k && walls == 0) {
+            let needed = "1 <= k < d is needed, or k = d with walls";
+            return Err(Error::invalid(format!("dimension {k} in R^{d}: {needed}")));
+        }
+        if walls > 0 && !oracle.capabilities().tangent_basis {
+            return Err(Error::invalid("an oracle with walls needs tangent_basis"));
         }
         let turn = (!oracle.concurrent()).then(Mutex::default);
-        Ok(Checked { oracle, k, d, turn })
+        Ok(Checked { oracle, k, d, walls, turn })
     }
 
     pub fn capabilities(&self) -> OracleCapabilities {
         let Capabilities { intersect_flat, tangent_basis, local_size } = self.oracle.capabilities();
-        OracleCapabilities { intersect_flat, tangent_basis, local_size }
+        OracleCapabilities { intersect_flat, tangent_basis, local_size, conormals: self.walls > 0 }
     }
 
     /// The oracle's answers to one chunk. Errors are the oracle's, or say what is wrong with them.
@@ -108,6 +144,10 @@ impl<'a> Checked<'a> {
         let mut points = vec![0.0; x.len()];
         let mut found = vec![true; n];
         match chunk.kind() {
+            QueryKind::ClosestPoint if !chunk.face.is_empty() => {
+                let asked = self.oracle.face_point(&x, &chunk.face, &mut points, &mut found);
+                asked.map_err(Error::raised)?
+            }
             QueryKind::ClosestPoint => {
                 self.oracle.closest_point(&x, &mut points, &mut found).map_err(Error::raised)?
             }
@@ -143,6 +183,17 @@ impl<'a> Checked<'a> {
             let ask = |on: &[f64], values: &mut [f64]| self.oracle.local_size(on, values);
             let sizes = self.at_found("local_size", &points, &rows, &[1.0], &ask)?;
             reply.sizes = Some(to_wire(&sizes, &[n]));
+        }
+        if chunk.want_clearances {
+            let ask = |on: &[f64], values: &mut [f64]| self.oracle.clearances(on, values);
+            let values = self.at_found("clearances", &points, &rows, &vec![0.0; self.walls], &ask)?;
+            reply.clearances = Some(to_wire(&values, &[n, self.walls]));
+        }
+        if chunk.want_clearances && !chunk.face.is_empty() {
+            let ask = |on: &[f64], normals: &mut [f64]| self.oracle.conormals(on, &chunk.face, normals);
+            let count = chunk.face.len();
+            let normals = self.at_found("conormals", &points, &rows, &vec![0.0; count * d], &ask)?;
+            reply.conormals = Some(to_wire(&normals, &[n, count, d]));
         }
         Ok(reply)
     }

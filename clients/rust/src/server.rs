@@ -73,25 +73,52 @@ pub fn find_stellated() -> Result<PathBuf, Error> {
     })
 }
 
+/// The command-line program: beside the server binary, else on PATH.
+pub fn find_stellate() -> Result<PathBuf, Error> {
+    let beside = find_stellated().ok().map(|server| server.with_file_name("stellate"));
+    let path = beside.filter(|path| runs(path)).or_else(|| on_path(Path::new("stellate")));
+    path.ok_or_else(|| {
+        let message = "the program stellate, which examines oracles, is neither beside stellated nor on \
+                       PATH: install it, or build it (clients/quickstart does)";
+        Error::new(Kind::ServerNotFound, "SERVER_NOT_FOUND", message)
+    })
+}
+
 impl Server {
     /// Starts it, and returns when it listens.
     pub fn start(options: &ServerOptions) -> Result<Self, Error> {
         let binary = options.binary.clone().map_or_else(find_stellated, Ok)?;
+        let mut flags = vec!["--drain-seconds".to_string(), "0".to_string()];
+        if options.listen.is_none() {
+            // One that answers no pings is merely busy in an oracle.
+            flags.extend(["--keepalive", "600", "--keepalive-timeout", "600"].map(String::from));
+        }
+        flags.extend(options.flags.iter().cloned());
+        Server::launch(&binary, &[], &flags, options.listen.clone())
+    }
+
+    /// The doctor, to which an oracle is served as to a server: see `check`.
+    pub(crate) fn start_doctor() -> Result<Self, Error> {
+        Server::launch(&find_stellate()?, &["doctor"], &[], None)
+    }
+
+    fn launch(
+        binary: &Path,
+        words: &[&str],
+        flags: &[String],
+        listen: Option<String>,
+    ) -> Result<Self, Error> {
         let cannot = |error: std::io::Error| {
             let message = format!("cannot start {}: {error}", binary.display());
             Error::new(Kind::ServerNotFound, "SERVER_NOT_FOUND", message)
         };
         let folder = private_folder().map_err(cannot)?;
-        let private = options.listen.is_none();
+        let private = listen.is_none();
         let socket = || format!("unix:{}", folder.join("socket").display());
-        let mut command = Command::new(&binary);
-        command.args(["--exit-with-parent", "--drain-seconds", "0", "--listen"]);
-        command.arg(options.listen.clone().unwrap_or_else(socket));
-        if private {
-            // One that answers no pings is merely busy in an oracle.
-            command.args(["--keepalive", "600", "--keepalive-timeout", "600"]);
-        }
-        command.args(&options.flags).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut command = Command::new(binary);
+        command.args(words).args(["--exit-with-parent", "--listen"]);
+        command.arg(listen.unwrap_or_else(socket));
+        command.args(flags).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         command.process_group(0); // Ctrl-C is for the client
         let mut child = command.spawn().map_err(|error| {
             let _ = fs::remove_dir_all(&folder); // which is empty
@@ -113,8 +140,8 @@ impl Server {
         let process = Arc::new(Process { child: Mutex::new(child), words, folder });
         let mut line = String::new();
         let said = out.map(|out| BufReader::new(out).read_line(&mut line));
-        match line.trim_end().strip_prefix("stellated listening on ") {
-            Some(address) if said.is_some() => {
+        match line.trim_end().split_once(" listening on ") {
+            Some((_, address)) if said.is_some() => {
                 Ok(Server { address: address.to_string(), private, process })
             }
             _ => {

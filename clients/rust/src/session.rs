@@ -1,9 +1,11 @@
 //! A mesh from its declaration to its end: the server asks, the oracle answers, we watch.
 
+use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
+use crate::checkpoint::Checkpoint;
 use crate::client::{Client, ClientOptions};
 use crate::error::{Error, Kind};
 use crate::growth::GrowingComplex;
@@ -56,6 +58,10 @@ pub struct RunOptions<'a> {
     pub max_chunk: Option<usize>,
     /// A mesh that is not proved good is an error of kind `NotCertified`.
     pub require_certified: bool,
+    /// A directory, made if it is not there, in which the mesh outlives this program: the same call goes
+    /// on from where the last one was cancelled or killed, or its oracle failed, and gives a mesh that is
+    /// finished at once. For `Connection::Own`; other servers keep their meshes with --data-dir.
+    pub checkpoint: Option<PathBuf>,
     /// Called on this thread.
     pub on_progress: Option<OnProgress<'a>>,
     /// From elsewhere, the end.
@@ -71,6 +77,7 @@ impl Default for RunOptions<'_> {
             workers: 1,
             max_chunk: None,
             require_certified: false,
+            checkpoint: None,
             on_progress: None,
             cancel: Cancel::default(),
         }
@@ -192,7 +199,12 @@ async fn assemble(client: &Client, info: &MeshInfo, revision: u64) -> Result<Mes
             growth.set_revision(part.revision);
             let points = crate::wire::numbers(part.points.as_ref(), &[-1, d]);
             growth.add_points(part.first_vertex, &points.map_err(Error::protocol)?)?;
-            growth.change(&MeshDelta { added: part.cells, ..Default::default() })?;
+            growth.change(&MeshDelta {
+                added: part.cells,
+                boundary_vertices: part.boundary_vertices,
+                boundary_walls: part.boundary_walls,
+                ..Default::default()
+            })?;
             Ok(part.complete)
         })
         .await?;
@@ -287,67 +299,106 @@ fn run(
     each: &mut dyn FnMut(Mesh) -> Growth,
 ) -> Result<(), Error> {
     let checked = Checked::new(oracle)?;
-    let RunOptions { connection, mesh, workers, max_chunk, on_progress, cancel, .. } = options;
-    with_client(connection, |client| {
-        let info = client.create(oracle, epsilon, &mesh)?;
-        let failure = Mutex::new(None);
-        let stopped = Flag::default();
-        let (left, ended) = (Flag::default(), Flag::default());
-        let outcome = thread::scope(|scope| {
-            for i in 0..workers.max(1) {
-                let options = WorkerOptions { worker: format!("rust-{}", i + 1), max_chunk };
-                let worker = Worker::new(client, &checked, &info.name, &options, true, stopped.clone());
-                let failure = &failure;
-                scope.spawn(move || {
-                    // What the server refuses, or its absence, the watch reports.
-                    if let Err(error) = client.runtime.block_on(worker.run()) {
-                        let ours = error.kind == Kind::Raised || &*error.reason == "ORACLE_NOT_FINITE";
-                        let mut first = failure.lock().unwrap_or_else(PoisonError::into_inner);
-                        if ours && first.is_none() {
-                            *first = Some(error);
-                        }
-                    }
-                });
-            }
-            let outcome = client.runtime.block_on(async {
-                let watching = follow(client, &info, left.clone(), on_progress, every, each);
-                let cancelling = async {
-                    tokio::select! {
-                        () = cancel.0.wait() => {}
-                        () = ended.wait() => return,
-                    }
-                    if client.cancel_async(&info.name, true).await.is_err() {
-                        left.set(); // a server that is away cannot say how the mesh ends
-                    }
-                };
-                let watching = async {
-                    let outcome = watching.await;
-                    ended.set();
-                    outcome
-                };
-                tokio::join!(watching, cancelling).0
-            });
-            if outcome.is_ok() {
-                // They hear that the mesh is over; one that does not is not waited for.
-                let stopped = stopped.clone();
-                client.runtime.spawn(async move {
-                    tokio::time::sleep(FAREWELL).await;
-                    stopped.set();
-                });
-            } else {
-                left.set();
-                stopped.set();
-            }
-            outcome
+    let Some(folder) = options.checkpoint.clone() else {
+        let (mut options, connection) = (options, Connection::Own);
+        let connection = std::mem::replace(&mut options.connection, connection);
+        return with_client(connection, |client| {
+            let info = client.create_from(client.spec(&checked, epsilon, &options.mesh))?;
+            session(client, &checked, &info, options, every, each)
         });
-        let _ = client.runtime.block_on(client.delete_async(&info.name, true)); // it ends with its server
-        let ours = failure.into_inner().unwrap_or_else(PoisonError::into_inner);
-        match (outcome, ours) {
-            (Err(theirs), Some(mut ours)) if theirs.kind != Kind::Cancelled => {
-                ours.mesh = theirs.mesh; // our own says more than the server's account of it
-                Err(ours)
-            }
-            (outcome, _) => outcome,
+    };
+    if !matches!(options.connection, Connection::Own) {
+        let what = "a checkpoint is for a private server: one that is named keeps meshes itself";
+        return Err(Error::invalid(what));
+    }
+    let kept = Checkpoint(&folder);
+    let server = kept.server()?;
+    let client = Client::of(&server, ClientOptions::default())?;
+    let info = kept.declare(&client, client.spec(&checked, epsilon, &options.mesh))?;
+    let outcome = session(&client, &checked, &info, options, every, each);
+    outcome.inspect_err(|error| kept.forget_after(error))
+}
+
+/// Serves and watches a mesh side by side, and deletes it in the end, or leaves it to its checkpoint.
+fn session(
+    client: &Client,
+    checked: &Checked,
+    info: &MeshInfo,
+    options: RunOptions,
+    every: bool,
+    each: &mut dyn FnMut(Mesh) -> Growth,
+) -> Result<(), Error> {
+    let RunOptions { checkpoint, workers, max_chunk, on_progress, cancel, .. } = options;
+    let failure = Mutex::new(None);
+    let stopped = Flag::default();
+    let (left, ended) = (Flag::default(), Flag::default());
+    let outcome = thread::scope(|scope| {
+        for i in 0..workers.max(1) {
+            let options = WorkerOptions { worker: format!("rust-{}", i + 1), max_chunk };
+            let mut worker = Worker::new(client, checked, &info.name, &options, true, stopped.clone());
+            worker.tells = checkpoint.is_none();
+            let (failure, left, kept) = (&failure, &left, checkpoint.is_some());
+            scope.spawn(move || {
+                // What the server refuses, or its absence, the watch reports.
+                if let Err(error) = client.runtime.block_on(worker.run()) {
+                    let ours = error.kind == Kind::Raised || &*error.reason == "ORACLE_NOT_FINITE";
+                    let mut first = failure.lock().unwrap_or_else(PoisonError::into_inner);
+                    if ours && first.is_none() {
+                        *first = Some(error);
+                    }
+                    if ours && kept {
+                        left.set(); // the mesh waits for a better oracle
+                    }
+                }
+            });
         }
-    })
+        let outcome = client.runtime.block_on(async {
+            let watching = follow(client, info, left.clone(), on_progress, every, each);
+            let cancelling = async {
+                tokio::select! {
+                    () = cancel.0.wait() => {}
+                    () = ended.wait() => return,
+                }
+                // A server that is away cannot say how the mesh ends; one that is kept does not.
+                if checkpoint.is_some() || client.cancel_async(&info.name, true).await.is_err() {
+                    left.set();
+                }
+            };
+            let watching = async {
+                let outcome = watching.await;
+                ended.set();
+                outcome
+            };
+            tokio::join!(watching, cancelling).0
+        });
+        if outcome.is_ok() {
+            // They hear that the mesh is over; one that does not is not waited for.
+            let stopped = stopped.clone();
+            client.runtime.spawn(async move {
+                tokio::time::sleep(FAREWELL).await;
+                stopped.set();
+            });
+        } else {
+            left.set();
+            stopped.set();
+        }
+        outcome
+    });
+    if checkpoint.is_none() {
+        let _ = client.runtime.block_on(client.delete_async(&info.name, true)); // it ends with its server
+    }
+    let ours = failure.into_inner().unwrap_or_else(PoisonError::into_inner);
+    match (outcome, ours) {
+        (Err(theirs), Some(mut ours)) if theirs.kind != Kind::Cancelled || checkpoint.is_some() => {
+            ours.mesh = theirs.mesh; // our own says more than the server's account of it
+            Err(ours)
+        }
+        (Err(mut theirs), None) if theirs.kind == Kind::Cancelled && checkpoint.is_some() => {
+            let folder = checkpoint.unwrap_or_default();
+            theirs.message =
+                format!("the mesh is kept in {}: the same call goes on from there", folder.display());
+            Err(theirs)
+        }
+        (outcome, _) => outcome,
+    }
 }

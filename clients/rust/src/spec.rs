@@ -52,6 +52,7 @@ impl MeshOptions {
             declared_reach: self.reach,
             cover_box: self.cover_box,
             components: self.components,
+            walls: checked.walls as u32,
             audit: if self.thorough_audit { Audit::Thorough } else { Audit::Unspecified }.into(),
         }
     }

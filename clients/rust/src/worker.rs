@@ -42,6 +42,8 @@ pub struct Worker<'a> {
     oracle: &'a Checked<'a>,
     hello: Hello,
     outage: Outage<'a>,
+    /// Whether the server hears of a failure of the oracle's, which ends the mesh.
+    pub tells: bool,
 }
 
 impl<'a> Worker<'a> {
@@ -53,13 +55,15 @@ impl<'a> Worker<'a> {
         quiet: bool,
         stopped: Flag,
     ) -> Self {
-        let most = (ANSWER_BYTES / (8 * oracle.d * (oracle.k + 1) + 9)).max(1);
+        let numbers = oracle.d * (oracle.k + 1 + oracle.k.min(oracle.walls)) + oracle.walls;
+        let most = (ANSWER_BYTES / (8 * numbers + 9)).max(1);
         let hello = Hello {
             mesh: mesh.to_string(),
             worker: options.worker.clone(),
             max_chunk_queries: options.max_chunk.map_or(most, |limit| limit.clamp(1, most)) as u32,
         };
-        Worker { client, oracle, hello, outage: Outage::new(&client.patience, quiet, stopped) }
+        let outage = Outage::new(&client.patience, quiet, stopped);
+        Worker { client, oracle, hello, outage, tells: true }
     }
 
     /// Serves until the mesh is over; a lost stream is opened again. The oracle is called on this thread.
@@ -158,8 +162,10 @@ impl<'a> Worker<'a> {
         let mut message = error.to_string();
         let cut = (0..=MESSAGE_BYTES.min(message.len())).rev().find(|&at| message.is_char_boundary(at));
         message.truncate(cut.unwrap_or(0));
-        say(outbox.as_ref(), Say::Failure(OracleFailure { lease: chunk.lease, message }));
-        *outbox = None;
+        if self.tells {
+            say(outbox.as_ref(), Say::Failure(OracleFailure { lease: chunk.lease, message }));
+        }
+        *outbox = None; // without a word as a worker that has to go
         Err(error)
     }
 
@@ -178,6 +184,8 @@ impl<'a> Worker<'a> {
                 "the mesh has dimension {k} in R^{d}, and this oracle's manifold has dimension {} in R^{}",
                 self.oracle.k, self.oracle.d
             )
+        } else if welcome.walls as usize != self.oracle.walls {
+            format!("the mesh has {} walls, and this manifold {}", welcome.walls, self.oracle.walls)
         } else if missing.is_empty() {
             return Ok(());
         } else {
@@ -198,7 +206,8 @@ fn say(outbox: Option<&Outbox>, message: Say) {
     }
 }
 
-/// Says now and then that the oracle is at a chunk, lest the server take a slow worker for a dead one.
+/// Says now and then that the oracle is at a chunk, so that the server does not take a slow worker for a
+/// dead one.
 async fn tell_busy(
     outbox: Option<mpsc::WeakUnboundedSender<ServeOracleRequest>>,
     busy: Arc<AtomicU64>,

@@ -5,52 +5,10 @@ mod live;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use live::{counts, expected, meshed, RestartingServer};
+use live::{counts, expected, meshed, RestartingServer, Spoilt};
 use stellate::manifolds::{ProductOfCircles, Torus};
-use stellate::{BoxError, Capabilities, Client, ClientOptions, Connection, Credentials, Kind};
+use stellate::{Client, ClientOptions, Connection, Credentials, Kind};
 use stellate::{MeshOptions, Oracle, RunOptions, Server, ServerOptions, WorkerOptions};
-
-/// A torus whose answers are spoilt after a while.
-struct Spoilt<F> {
-    asked: AtomicUsize,
-    spoil: F,
-}
-
-impl<F: Fn(&mut [f64]) -> Result<(), BoxError> + Sync> Spoilt<F> {
-    fn new(spoil: F) -> Self {
-        Spoilt { asked: AtomicUsize::new(0), spoil }
-    }
-}
-
-impl<F: Fn(&mut [f64]) -> Result<(), BoxError> + Sync> Oracle for Spoilt<F> {
-    fn dimension(&self) -> usize {
-        2
-    }
-
-    fn ambient_dimension(&self) -> usize {
-        3
-    }
-
-    fn bounding_box(&self) -> Option<(Vec<f64>, Vec<f64>)> {
-        Torus::default().bounding_box()
-    }
-
-    fn capabilities(&self) -> Capabilities {
-        Torus::default().capabilities()
-    }
-
-    fn closest_point(&self, x: &[f64], points: &mut [f64], found: &mut [bool]) -> Result<(), BoxError> {
-        Torus::default().closest_point(x, points, found)?;
-        if self.asked.fetch_add(found.len(), Ordering::Relaxed) > 300 {
-            return (self.spoil)(points);
-        }
-        Ok(())
-    }
-
-    fn tangent_basis(&self, points: &[f64], bases: &mut [f64]) -> Result<(), BoxError> {
-        Torus::default().tangent_basis(points, bases)
-    }
-}
 
 #[test]
 fn refusals() {

@@ -63,8 +63,17 @@ module Stellate
     # Declares a mesh, which waits to be served; options as for Stellate.mesh. Not repeated when the server
     # is lost: whether it made the mesh would not be known.
     def create(oracle, epsilon:, **options)
+      create_from(spec(oracle, epsilon, options))
+    end
+
+    # What `create` asks for: a V1::MeshSpec.
+    def spec(oracle, epsilon, options)
       options[:ask_ahead] = true unless options.key?(:ask_ahead) || Credentials.stays_on_this_machine?(address)
-      spec = Spec.from(CheckedOracle.new(oracle), epsilon, options)
+      Spec.from(CheckedOracle.new(oracle), epsilon, options)
+    end
+
+    # As `create`, in the protocol's own message.
+    def create_from(spec)
       call(:create_mesh, V1::CreateMeshRequest.new(spec:), once: true)
     end
 
@@ -104,6 +113,14 @@ module Stellate
     # What the server is and allows.
     def info
       call(:get_server_info, V1::GetServerInfoRequest.new)
+    end
+
+    # What the doctor found, if this is a connection to it.
+    def check_report(name)
+      doctor = V1::Doctor::Stub.new(@address, :this_channel_is_insecure)
+      doctor.get_check_report(V1::GetCheckReportRequest.new(name:), deadline: Time.now + CALL_SECONDS)
+    rescue GRPC::BadStatus => e
+      raise Stellate.from_rpc(e)
     end
 
     # Serves a mesh with this oracle until it is over; the state that it ended in, e.g. "SUCCEEDED".
@@ -173,7 +190,8 @@ module Stellate
     def from(checked, epsilon, options)
       d = checked.d
       spec = V1::MeshSpec.new(dimension: checked.k, ambient_dimension: d, epsilon: epsilon.to_f,
-                              oracle: checked.capabilities, criteria: V1::Criteria.new, limits: V1::MeshLimits.new)
+                              oracle: checked.capabilities, walls: checked.walls,
+                              criteria: V1::Criteria.new, limits: V1::MeshLimits.new)
       box, seeds = checked.whereabouts.values_at(:bounding_box, :seeds)
       if box
         lower, upper = box.map { |corner| Wire.to_wire(corner, corner.size) }

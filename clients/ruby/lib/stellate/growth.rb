@@ -23,6 +23,7 @@ module Stellate
       @revision, @points, @pending, @simplices, @gone = 0, [], [], [], []
       @bits = WORD_BITS / (@k + 1)
       @arrays = @arrays_of = nil
+      @walls = {}
     end
 
     # Takes one chunk; true when a revision is complete with it.
@@ -36,7 +37,10 @@ module Stellate
       return false unless chunk.complete
 
       whole, @pending = @pending, []
-      whole.each { |delta| add_points(delta.first_vertex, delta.points) }
+      whole.each do |delta|
+        add_points(delta.first_vertex, delta.points)
+        add_walls(delta.boundary_vertices, delta.boundary_walls)
+      end
       whole.each do |delta|
         change(delta.added, delta.removed)
         Thread.pass # to workers that have been asked something
@@ -62,6 +66,16 @@ module Stellate
       widen while @points.size / @d > (1 << @bits)
     end
 
+    # Which of the vertices lie on which walls.
+    def add_walls(vertices, walls)
+      count = @points.size / @d
+      unless vertices.size == walls.size && (vertices.max || -1) < count
+        raise Stellate.protocol_error("walls of #{vertices.size} vertices do not fit the #{count} that there are")
+      end
+
+      @walls.update(vertices.zip(walls.to_a).to_h)
+    end
+
     # What goes is put aside, and taken out for many revisions at once.
     def change(added, removed)
       @gone.concat(numbered(removed))
@@ -77,7 +91,8 @@ module Stellate
 
     # The mesh as of the last complete revision, or, of a download, of another.
     def mesh(revision = @revision, **more)
-      Mesh.new(@k, @d, *arrays, revision, **more)
+      walls = Array.new(@points.size / @d) { |vertex| @walls.fetch(vertex, 0) } unless @walls.empty?
+      Mesh.new(@k, @d, *arrays, revision, walls:, **more)
     end
 
     private

@@ -2,13 +2,14 @@
 
 module Stellate
   # A simplicial k-complex in R^d. `points` and `simplices` are arrays of rows; ids count from zero,
-  # ascend in each row, and rows are in lexicographic order.
+  # ascend in each row, and rows are in lexicographic order. `walls` are, as bits, those that each vertex lies
+  # on; nil without a boundary.
   class Mesh
-    attr_reader :dimension, :ambient_dimension, :points, :simplices, :revision, :progress, :report
+    attr_reader :dimension, :ambient_dimension, :points, :simplices, :revision, :progress, :report, :walls
 
-    def initialize(k, d, points, simplices, revision, progress: nil, report: nil)
+    def initialize(k, d, points, simplices, revision, progress: nil, report: nil, walls: nil)
       @dimension, @ambient_dimension, @points, @simplices = k, d, points, simplices
-      @revision, @progress, @report = revision, progress, report
+      @revision, @progress, @report, @walls = revision, progress, report, walls
     end
 
     # Reads the .txt format back, to the last bit.
@@ -23,6 +24,12 @@ module Stellate
     # Whether the mesh is finished and proved good.
     def certified?
       report&.certificate&.certified || false
+    end
+
+    # The (k-1)-faces that are in one simplex alone; each lies on the walls that all its vertices have in common.
+    def boundary
+      faces = simplices.flat_map { |row| row.each_index.map { |i| row[0, i] + row[(i + 1)..] } }
+      faces.tally.filter_map { |face, count| face if count == 1 }.sort!
     end
 
     # Raises SaveError if a mesh of that kind cannot have the name.

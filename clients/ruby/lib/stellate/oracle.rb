@@ -13,13 +13,25 @@ module Stellate
   #     in one array, which is quicker
   #   local_size(points): at points of M the local feature size, or any positive lengths
   # The answer to a query must not depend on the rest of its batch. Calls come one at a time.
+  #
+  # A manifold with boundary has `walls`, their number: it is where all walls are at least 0 on M^, a manifold
+  # without boundary, of which the methods above tell; it may be R^d itself. It needs tangent_basis, and:
+  #   face_point(points, face): as closest_point, of points of M^ where the walls of the face, their numbers
+  #     ascending, are 0, whatever the others are
+  #   clearances(points): at each point the walls' values, of which the sign counts
+  #   conormals(points, face): at points of a face, of each of its walls the unit normal within the tangent
+  #     space along which the wall's value falls, one after the other in one array
   class CheckedOracle
-    attr_reader :k, :d
+    attr_reader :k, :d, :walls
 
     def initialize(oracle)
       @oracle = oracle
       @k, @d = oracle.dimension, oracle.ambient_dimension
+      @walls = oracle.respond_to?(:walls) ? oracle.walls : 0
       @turn = Mutex.new
+      lacking = %i[tangent_basis face_point clearances conormals].reject { |name| oracle.respond_to?(name) }
+      raise Stellate.invalid("an oracle with walls needs #{lacking.join(' and ')}") if walls != 0 && lacking.any?
+
       unless oracle.respond_to?(:closest_point)
         raise InvalidArgument.new("#{oracle.class} has no method closest_point", reason: 'INVALID_ARGUMENT')
       end
@@ -29,7 +41,8 @@ module Stellate
 
     def capabilities
       V1::OracleCapabilities.new(
-        **%i[intersect_flat tangent_basis local_size].to_h { |name| [name, @oracle.respond_to?(name)] }
+        **%i[intersect_flat tangent_basis local_size].to_h { |name| [name, @oracle.respond_to?(name)] },
+        conormals: walls.positive?
       )
     end
 
@@ -61,18 +74,30 @@ module Stellate
         reply.tangents = Wire.packed(at_found(:tangent_basis, points, anywhere), n, d, k)
       end
       reply.sizes = Wire.packed(at_found(:local_size, points, [1.0]), n) if chunk.want_sizes
+      add_walls(reply, chunk.face.to_a, points) if chunk.want_clearances
       reply
+    end
+
+    # What the walls are at the points, and, on a face, its conormals.
+    def add_walls(reply, face, points)
+      n = points.size
+      reply.clearances = Wire.packed(at_found(:clearances, points, [0.0] * walls), n, walls)
+      return if face.empty?
+
+      normals = at_found(:conormals, points, [0.0] * (face.size * d), face)
+      reply.conormals = Wire.packed(normals, n, face.size, d)
     end
 
     def method_of(chunk)
       case chunk.kind
-      when :QUERY_KIND_CLOSEST_POINT then :closest_point
+      when :QUERY_KIND_CLOSEST_POINT then chunk.face.empty? ? :closest_point : :face_point
       when :QUERY_KIND_INTERSECT_FLAT then :intersect_flat
       else raise "the server asks a question of kind #{chunk.kind}, unknown to this client"
       end
     end
 
     def ask(chunk, x)
+      return @oracle.face_point(x, chunk.face.to_a) unless chunk.face.empty?
       return @oracle.closest_point(x) if chunk.kind == :QUERY_KIND_CLOSEST_POINT
 
       bases = Wire.numbers(chunk.bases, x.size, d, k).each_slice(k).each_slice(d).to_a
@@ -80,9 +105,14 @@ module Stellate
     end
 
     # What the method says of the points that were found, and `anywhere` for the others, as bytes.
-    def at_found(method, points, anywhere)
+    def at_found(method, points, anywhere, *more)
       on = points.include?(nil) ? points.compact : points
-      values, data = on.empty? ? [] : checked(method, @oracle.public_send(method, on), on.size, anywhere.size)
+      values, data = if on.empty?
+                       []
+                     else
+                       checked(method, @oracle.public_send(method, on, *more), on.size,
+                               anywhere.size)
+                     end
       return data || values.flatten.pack('E*') if on.size == points.size
 
       points.flat_map { |point| point ? [values.shift].flatten : anywhere }.pack('E*')
@@ -97,7 +127,7 @@ module Stellate
       return [answer, data] if data
 
       rows = answer.map do |row|
-        next if row.nil? && %i[closest_point intersect_flat].include?(method)
+        next if row.nil? && %i[closest_point intersect_flat face_point].include?(method)
 
         numbers = [row].flatten
         raise wrong(method, "#{row.inspect}, not #{width} numbers", 'SHAPE') unless

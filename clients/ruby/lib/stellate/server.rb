@@ -18,13 +18,29 @@ module Stellate
       )
   end
 
+  # The command-line program: beside the server binary, else on PATH.
+  def self.find_stellate
+    beside = begin
+      [File.dirname(find_stellated)]
+    rescue ServerNotFound
+      [] # one that is on PATH without its server will do
+    end
+    folders = beside + ENV.fetch('PATH', '').split(':')
+    folders.map { |folder| File.join(folder, 'stellate') }
+           .find { |path| File.file?(path) && File.executable?(path) } or
+      raise ServerNotFound.new(
+        "the program 'stellate', which examines oracles, is neither beside stellated nor on PATH: install it, " \
+        'or build it (clients/quickstart does)', reason: 'SERVER_NOT_FOUND'
+      )
+  end
+
   # A stellated of this process's own, which ends with it whatever happens.
   class Server
-    SAID = 'stellated listening on '
+    SAID = /\Astellated? (doctor )?listening on /
     STOP_SECONDS = 10
     # When its client goes there is nobody left to finish a mesh for. One that answers no pings is merely
     # busy in an oracle.
-    OWN_FLAGS = %w[--exit-with-parent --drain-seconds 0].freeze
+    OWN_FLAGS = %w[--drain-seconds 0].freeze
     PRIVATE_FLAGS = %w[--keepalive 600 --keepalive-timeout 600].freeze
 
     # Where clients reach it, "unix:/path" or "host:port".
@@ -32,8 +48,18 @@ module Stellate
 
     # Starts it, and returns when it listens: on a unix socket that only this user may enter, or at
     # `listen`. `flags` are more of stellated's. With a block it is closed afterwards.
-    def self.start(*flags, listen: nil, binary: Stellate.find_stellated)
-      server = new(binary, listen, flags)
+    def self.start(*flags, listen: nil, binary: Stellate.find_stellated, &)
+      own = OWN_FLAGS + (listen ? [] : PRIVATE_FLAGS)
+      closing(new([binary], listen, own + flags), &)
+    end
+
+    # The doctor, to which an oracle is served as to a server: see Stellate.check.
+    def self.start_doctor(&)
+      closing(new([Stellate.find_stellate, 'doctor'], nil, []), &)
+    end
+
+    # The server, or, with a block, what that makes of it before it is closed.
+    def self.closing(server)
       return server unless block_given?
 
       begin
@@ -43,18 +69,18 @@ module Stellate
       end
     end
 
-    def initialize(binary, listen, flags)
+    def initialize(program, listen, flags)
       @folder = Dir.mktmpdir('stellate-')
       @log = File.join(@folder, 'log')
       @private = listen.nil?
       address = listen || "unix:#{File.join(@folder, 'socket')}"
-      command = [binary, '--listen', address, *OWN_FLAGS, *(@private ? PRIVATE_FLAGS : []), *flags]
+      command = [*program, '--exit-with-parent', '--listen', address, *flags]
       # A group of its own: Ctrl-C is for the client, which cancels its meshes first.
       said, write = IO.pipe
       @pid = Process.spawn(*command, in: :close, out: write, err: @log, pgroup: true)
       write.close
       line = said.gets.to_s
-      return @address = line.delete_prefix(SAID).strip if line.start_with?(SAID)
+      return @address = line.sub(SAID, '').strip if line.match?(SAID)
 
       sleep 0.01 while alive?
       gone = why_gone

@@ -5,13 +5,17 @@ module Stellate
   FAREWELL_SECONDS = 2 # that a worker may take to end when nobody waits for it
 
   class << self
-    # Meshes the oracle's manifold. `epsilon` is the largest circumradius of a simplex, a length.
+    # Meshes the oracle's manifold. `epsilon` is the largest circumradius of a simplex, a length, or 'auto':
+    # what `choose_epsilon` says.
     #   server: "host:port", a Server or Client; without it one is started, and stopped afterwards
     #   credentials: for a server that wants them; on_progress: a proc that is called in this thread
     #   workers: streams on which the oracle is asked at once; max_chunk: most points at once
+    #   checkpoint: a directory, made if it is not there, in which the mesh outlives this program: the same
+    #     call goes on from where the last one was interrupted or killed, or its oracle raised, and gives a
+    #     mesh that is finished at once. For a private server; one that is named keeps meshes itself
     #   require_certified: a mesh that is not proved good is NotCertified; save: a file to write
     #   and size_rate, max_deviation, max_vertices, random_seed, label, reach...: see mesh.proto
-    # Ctrl-C cancels the mesh, and is Cancelled with the mesh so far.
+    # Ctrl-C cancels the mesh, or leaves it to the checkpoint, and is Cancelled with the mesh so far.
     def mesh(oracle, epsilon:, require_certified: false, save: nil, **options)
       Mesh.check_save(save, oracle.dimension, oracle.ambient_dimension) if save
       finished = nil
@@ -71,6 +75,7 @@ module Stellate
       client.stream(:download_mesh, request) do |part|
         request.revision, request.position = part.revision, part.next_position
         growth.add_points(part.first_vertex, part.points)
+        growth.add_walls(part.boundary_vertices, part.boundary_walls)
         growth.change(part.cells, nil)
         :last if part.complete
       end
@@ -120,25 +125,42 @@ module Stellate
     end
 
     def run(oracle, epsilon, every, options, &each)
-      mine = %i[server credentials on_progress workers max_chunk].to_h { |name| [name, options.delete(name)] }
-      connect(mine[:server], mine[:credentials]) do |client|
-        info = client.create(oracle, epsilon:, **options)
+      mine = %i[server credentials on_progress workers max_chunk checkpoint].to_h do |name|
+        [name, options.delete(name)]
+      end
+      kept = mine[:checkpoint] && Checkpoint.new(mine[:checkpoint])
+      epsilon, = choose_epsilon(oracle) if epsilon == 'auto'
+      reached(kept, mine) do |client|
+        spec = client.spec(oracle, epsilon, options)
+        info = kept ? kept.declare(client, spec) : client.create_from(spec)
         Session.new(client, CheckedOracle.new(oracle), info, mine).run do |stream|
           follow(client, info, mine[:on_progress], every, **stream, &each)
         end
       end
+    rescue StellateError => e
+      kept&.forget_after(e)
+      raise
+    end
+
+    def reached(kept, mine, &)
+      return connect(mine[:server], mine[:credentials], &) unless kept
+      raise invalid('a checkpoint is for a private server: one that is named keeps meshes itself') if
+        mine[:server] || mine[:credentials]
+
+      kept.server { |own| connect(Client.new(own), nil, &) }
     end
   end
 
-  # A mesh that is served and watched side by side, and deleted in the end.
+  # A mesh that is served and watched side by side, and deleted in the end, or left to its checkpoint.
   class Session
     def initialize(client, oracle, info, options)
-      @client, @info, @failure = client, info, nil
+      @client, @info, @failure, @checkpoint = client, info, nil, options[:checkpoint]
+      @watching = Outage.new(client.patience)
       @workers = Array.new(options[:workers] || 1) do |i|
         outage = Outage.new(client.patience, quiet: true)
         max_chunk = options[:max_chunk]
         worker = Worker.new(client, oracle, info.name, outage, worker: "ruby-#{i + 1}", max_chunk:)
-        worker.on_failure = ->(error) { @failure ||= error }
+        worker.on_failure = ->(error) { note(error) }
         worker
       end
     end
@@ -146,13 +168,13 @@ module Stellate
     def run
       threads = @workers.map { |worker| Thread.new { serve(worker) } }
       over = false
-      result = yield({})
+      result = yield({ outage: @watching, running: method(:watch) })
       over = true
       result
     rescue Interrupt
       raise interrupted
     rescue StellateError => e
-      raise e if @failure.nil? || e.is_a?(Cancelled)
+      raise e if @failure.nil? || (e.is_a?(Cancelled) && @checkpoint.nil?)
 
       @failure.mesh = e.mesh if @failure.is_a?(StellateError)
       raise @failure # our own says more than the server's account of it
@@ -162,25 +184,41 @@ module Stellate
 
     private
 
+    # Whether the server is to hear of it; a mesh with a checkpoint waits for a better oracle.
+    def note(error)
+      @failure ||= error
+      return true unless @checkpoint
+
+      @watching.stop
+      @watch&.cancel
+      false
+    end
+
+    def watch(call)
+      @watch = call
+      call.cancel if @watching.stopped?
+    end
+
     def serve(worker)
       worker.run
     rescue Exception # rubocop:disable Lint/RescueException
       nil # noted; what the server refuses, or its absence, the watch reports
     end
 
-    # Ctrl-C: the mesh is cancelled, and fetched as far as it came.
+    # Ctrl-C: the mesh is cancelled, unless it is kept, and fetched as far as it came.
     def interrupted
-      @client.cancel(@info.name, once: true)
+      @client.cancel(@info.name, once: true) unless @checkpoint
       revision = @client.get(@info.name).revision
       mesh = revision.positive? ? Stellate.download(@info.name, server: @client, revision:) : nil
-      Cancelled.new('the mesh is cancelled; what there was of it is the mesh of this error', reason: 'CANCELLED',
-                                                                                             mesh:)
+      what = @checkpoint ? "kept in #{@checkpoint}: the same call goes on from there" : 'cancelled'
+      Cancelled.new("the mesh is #{what}; what there was of it is the mesh of this error", reason: 'CANCELLED',
+                                                                                           mesh:)
     end
 
     def leave(threads, over)
       threads&.each { |thread| thread.join(FAREWELL_SECONDS) } if over
       @workers.each(&:stop)
-      @client.delete(@info.name, once: true)
+      @client.delete(@info.name, once: true) unless @checkpoint
     rescue StellateError
       nil # it ends with its server, or somebody else was first
     end

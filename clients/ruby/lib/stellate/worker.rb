@@ -9,18 +9,19 @@ module Stellate
     MESSAGE_BYTES = 4000
     BUSY_SHARE = 0.25 # of the time that the server bears silence
 
-    # Told what the oracle raised, before the server is.
+    # Told what the oracle raised; whether the server is to be told as well.
     attr_writer :on_failure
 
     def initialize(client, oracle, mesh, outage, worker: '', max_chunk: nil)
-      most = [ANSWER_BYTES / ((8 * oracle.d * (oracle.k + 1)) + 9), 1].max
+      numbers = (oracle.d * (oracle.k + 1 + [oracle.k, oracle.walls].min)) + oracle.walls
+      most = [ANSWER_BYTES / ((8 * numbers) + 9), 1].max
       unless max_chunk.nil? || (max_chunk.is_a?(Integer) && max_chunk.positive?)
         raise Stellate.invalid("max_chunk has to be a whole number from 1 on, and is #{max_chunk.inspect}")
       end
 
       @client, @oracle, @outage, @stopped = client, oracle, outage, false
       @hello = V1::Hello.new(mesh:, worker:, max_chunk_queries: [most, max_chunk || most].min)
-      @on_failure = ->(_error) {}
+      @on_failure = ->(_error) { true }
     end
 
     # The state that the mesh ended in, "" when stopped before. Raises what the oracle raises.
@@ -119,12 +120,15 @@ module Stellate
       @lease = nil
       raise if e.is_a?(Interrupt) # no failure of the oracle: another worker may go on
 
-      @on_failure.call(e)
-      said = "#{e.class}: #{e.message}".encode('UTF-8', invalid: :replace, undef: :replace)
-      say(failure: V1::OracleFailure.new(lease: chunk.lease, message: said.byteslice(0, MESSAGE_BYTES).scrub('')))
-      @outbox.close
+      say_failure(chunk.lease, e) if @on_failure.call(e)
+      @outbox.close # without a word as a worker that has to go
       nil while inbox.pop.is_a?(V1::ServeOracleResponse) # until the server has taken note
       raise
+    end
+
+    def say_failure(lease, error)
+      said = "#{error.class}: #{error.message}".encode('UTF-8', invalid: :replace, undef: :replace)
+      say(failure: V1::OracleFailure.new(lease:, message: said.byteslice(0, MESSAGE_BYTES).scrub('')))
     end
 
     def welcome(said)
@@ -151,6 +155,8 @@ module Stellate
         if wanted != have
           format("the mesh has dimension %d in R^%d, and this oracle's manifold has dimension %d in R^%d",
                  *wanted, *have)
+        elsif said.walls != @oracle.walls
+          "the mesh has #{said.walls} walls, and this oracle's manifold has #{@oracle.walls}"
         elsif missing.any?
           "the mesh was declared with #{missing.join(' and ')}, which this oracle lacks"
         end

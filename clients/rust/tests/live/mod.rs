@@ -4,8 +4,10 @@
 use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use stellate::{Connection, Error, Mesh, Oracle, RunOptions};
+use stellate::manifolds::Torus;
+use stellate::{BoxError, Capabilities, Connection, Error, Mesh, Oracle, RunOptions};
 
 /// What tests/languages/run sets.
 pub fn from_environment(name: &str) -> String {
@@ -59,5 +61,47 @@ impl Drop for RestartingServer {
     fn drop(&mut self) {
         drop(self.child.stdin.take());
         let _ = self.child.wait();
+    }
+}
+
+/// A torus whose answers are spoilt after a while.
+pub struct Spoilt<F> {
+    asked: AtomicUsize,
+    spoil: F,
+}
+
+impl<F: Fn(&mut [f64]) -> Result<(), BoxError> + Sync> Spoilt<F> {
+    pub fn new(spoil: F) -> Self {
+        Spoilt { asked: AtomicUsize::new(0), spoil }
+    }
+}
+
+impl<F: Fn(&mut [f64]) -> Result<(), BoxError> + Sync> Oracle for Spoilt<F> {
+    fn dimension(&self) -> usize {
+        2
+    }
+
+    fn ambient_dimension(&self) -> usize {
+        3
+    }
+
+    fn bounding_box(&self) -> Option<(Vec<f64>, Vec<f64>)> {
+        Torus::default().bounding_box()
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        Torus::default().capabilities()
+    }
+
+    fn closest_point(&self, x: &[f64], points: &mut [f64], found: &mut [bool]) -> Result<(), BoxError> {
+        Torus::default().closest_point(x, points, found)?;
+        if self.asked.fetch_add(found.len(), Ordering::Relaxed) > 300 {
+            return (self.spoil)(points);
+        }
+        Ok(())
+    }
+
+    fn tangent_basis(&self, points: &[f64], bases: &mut [f64]) -> Result<(), BoxError> {
+        Torus::default().tangent_basis(points, bases)
     }
 }

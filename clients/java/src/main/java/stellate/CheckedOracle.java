@@ -12,14 +12,17 @@ final class CheckedOracle {
   final Oracle oracle;
   final int k;
   final int d;
+  final int walls;
   private final ReentrantLock turn = new ReentrantLock();
 
   CheckedOracle(Oracle oracle) {
     this.oracle = oracle;
     k = oracle.dimension();
     d = oracle.ambientDimension();
-    if (k < 1 || d <= k) {
-      throw StellateException.invalid("dimension " + k + " in R^" + d + ": 1 <= k < d is needed");
+    walls = oracle instanceof Oracle.WithWalls walled ? walled.walls() : 0;
+    if (k < 1 || d < k || (d == k && walls == 0)) {
+      throw StellateException.invalid(
+          "dimension " + k + " in R^" + d + ": 1 <= k < d is needed, or k = d with walls");
     }
   }
 
@@ -28,6 +31,7 @@ final class CheckedOracle {
         .setIntersectFlat(oracle instanceof Oracle.WithFlats)
         .setTangentBasis(oracle instanceof Oracle.WithTangents)
         .setLocalSize(oracle instanceof Oracle.WithSizes)
+        .setConormals(walls > 0)
         .build();
   }
 
@@ -51,7 +55,13 @@ final class CheckedOracle {
     boolean[] found = new boolean[n];
     Arrays.fill(found, true);
     switch (chunk.getKind()) {
-      case QUERY_KIND_CLOSEST_POINT -> oracle.closestPoint(x, points, found);
+      case QUERY_KIND_CLOSEST_POINT -> {
+        if (chunk.getFaceCount() > 0) {
+          ((Oracle.WithWalls) oracle).facePoint(x, face(chunk), points, found);
+        } else {
+          oracle.closestPoint(x, points, found);
+        }
+      }
       case QUERY_KIND_INTERSECT_FLAT -> {
         double[] bases = Wire.numbers(chunk.getBases(), n, d, k);
         double[] radii = Wire.numbers(chunk.getRadii(), n);
@@ -87,7 +97,29 @@ final class CheckedOracle {
       double[] anywhere = {1};
       reply.setSizes(Wire.toWire(atFound("localSize", ask, points, rows, anywhere), n));
     }
+    if (chunk.getWantClearances()) {
+      addWalls(reply, face(chunk), points, rows);
+    }
     return reply.build();
+  }
+
+  private static int[] face(QueryChunk chunk) {
+    return chunk.getFaceList().stream().mapToInt(Integer::intValue).toArray();
+  }
+
+  /** What the walls are at the points, and, on a face, its conormals. */
+  private void addWalls(AnswerChunk.Builder reply, int[] face, double[] points, int[] rows)
+      throws Exception {
+    Oracle.WithWalls walled = (Oracle.WithWalls) oracle;
+    int n = points.length / d;
+    double[] values = atFound("clearances", walled::clearances, points, rows, new double[walls]);
+    reply.setClearances(Wire.toWire(values, n, walls));
+    if (face.length > 0) {
+      Method ask = (on, normals) -> walled.conormals(on, face, normals);
+      double[] anywhere = new double[face.length * d];
+      double[] normals = atFound("conormals", ask, points, rows, anywhere);
+      reply.setConormals(Wire.toWire(normals, n, face.length, d));
+    }
   }
 
   @FunctionalInterface

@@ -20,12 +20,16 @@ import java.util.function.Supplier;
 import java.util.logging.Level;
 import java.util.logging.Logger;
 import stellate.v1.CancelMeshRequest;
+import stellate.v1.CheckReport;
 import stellate.v1.CreateMeshRequest;
 import stellate.v1.DeleteMeshRequest;
+import stellate.v1.DoctorGrpc;
+import stellate.v1.GetCheckReportRequest;
 import stellate.v1.GetMeshRequest;
 import stellate.v1.GetServerInfoRequest;
 import stellate.v1.ListMeshesRequest;
 import stellate.v1.ListMeshesResponse;
+import stellate.v1.MeshSpec;
 import stellate.v1.ServerInfo;
 import stellate.v1.StellateGrpc;
 
@@ -149,11 +153,15 @@ public final class Client implements AutoCloseable {
    * made the mesh would not be known.
    */
   public stellate.v1.Mesh create(Oracle oracle, double epsilon, Options options) {
-    boolean far = !Credentials.staysOnThisMachine(address);
-    CreateMeshRequest request =
-        CreateMeshRequest.newBuilder()
-            .setSpec(options.specOf(new CheckedOracle(oracle), epsilon, far))
-            .build();
+    return create(spec(new CheckedOracle(oracle), epsilon, options));
+  }
+
+  MeshSpec spec(CheckedOracle oracle, double epsilon, Options options) {
+    return options.specOf(oracle, epsilon, !Credentials.staysOnThisMachine(address));
+  }
+
+  stellate.v1.Mesh create(MeshSpec spec) {
+    CreateMeshRequest request = CreateMeshRequest.newBuilder().setSpec(spec).build();
     return call(once(), now -> now.createMesh(request));
   }
 
@@ -211,6 +219,17 @@ public final class Client implements AutoCloseable {
   /** What the server is and allows. */
   public ServerInfo info() {
     return call(outage(), now -> now.getServerInfo(GetServerInfoRequest.getDefaultInstance()));
+  }
+
+  /** What the doctor found, if this is a connection to it. */
+  CheckReport checkReport(String name) {
+    GetCheckReportRequest request = GetCheckReportRequest.newBuilder().setName(name).build();
+    return call(
+        once(),
+        now ->
+            DoctorGrpc.newBlockingStub(now.getChannel())
+                .withDeadlineAfter(CALL_SECONDS, TimeUnit.SECONDS)
+                .getCheckReport(request));
   }
 
   /**

@@ -19,6 +19,7 @@ public final class Growth {
   private long revision;
   private int count;
   private double[] coordinates = new double[1024];
+  private long[] walls; // bits, of the vertices up to the last on a wall; null: there is none
   private int[] rows = {}; // in lexicographic order
   private final List<int[]> added = new ArrayList<>();
   private final List<int[]> removed = new ArrayList<>();
@@ -65,6 +66,7 @@ public final class Growth {
     count = 0;
     removedLength = 0;
     coordinates = new double[1024];
+    walls = null;
     rows = new int[0];
     added.clear();
     removed.clear();
@@ -85,6 +87,7 @@ public final class Growth {
   }
 
   void change(MeshDelta delta) {
+    addWalls(delta.getBoundaryVerticesList(), delta.getBoundaryWallsList());
     int[] comes = Wire.indices(delta.getAdded(), -1, k + 1);
     int[] goes = Wire.indices(delta.getRemoved(), -1, k + 1);
     for (int id : comes) {
@@ -102,6 +105,21 @@ public final class Growth {
     added.add(comes);
     removed.add(goes);
     removedLength += goes.length;
+  }
+
+  /** Which of the vertices lie on which walls. */
+  private void addWalls(List<Integer> vertices, List<Long> of) {
+    int on = vertices.size();
+    if (on != of.size() || (on > 0 && Integer.compareUnsigned(vertices.get(on - 1), count) >= 0)) {
+      throw StellateException.protocol(
+          "walls of %d vertices do not fit the %d that there are".formatted(on, count));
+    }
+    if (on > 0) {
+      walls = walls == null ? new long[count] : Arrays.copyOf(walls, count);
+    }
+    for (int i = 0; i < on; i++) {
+      walls[vertices.get(i)] = of.get(i);
+    }
   }
 
   /** Makes mesh() cheap. */
@@ -158,6 +176,8 @@ public final class Growth {
   /** The mesh as of the last complete revision. */
   public Mesh mesh() {
     settle();
-    return new Mesh(k, d, Arrays.copyOf(coordinates, count * d), rows, revision, null, null);
+    long[] bits = walls == null ? null : Arrays.copyOf(walls, count);
+    double[] points = Arrays.copyOf(coordinates, count * d);
+    return new Mesh(k, d, points, rows, bits, revision, null, null);
   }
 }

@@ -29,24 +29,36 @@ public final class Mesh {
   /** [m, k+1], zero-based, ascending in each row, rows in lexicographic order. */
   public final int[] simplices;
 
+  /** [n], as bits the walls that each vertex lies on; null without a boundary. */
+  public final long[] walls;
+
   /** One for each round that changed the mesh. */
   public final long revision;
 
   private final Progress progress;
   private final Report report;
 
-  Mesh(int k, int d, double[] points, int[] simplices, long revision, Progress now, Report end) {
+  Mesh(
+      int k,
+      int d,
+      double[] points,
+      int[] simplices,
+      long[] walls,
+      long revision,
+      Progress now,
+      Report end) {
     this.dimension = k;
     this.ambientDimension = d;
     this.points = points;
     this.simplices = simplices;
+    this.walls = walls;
     this.revision = revision;
     this.progress = now;
     this.report = end;
   }
 
   Mesh with(Progress now, Report end) {
-    return new Mesh(dimension, ambientDimension, points, simplices, revision, now, end);
+    return new Mesh(dimension, ambientDimension, points, simplices, walls, revision, now, end);
   }
 
   /** n */
@@ -57,6 +69,39 @@ public final class Mesh {
   /** m */
   public int simplexCount() {
     return simplices.length / (dimension + 1);
+  }
+
+  /**
+   * The (k-1)-faces that are in one simplex alone, [m, k], in lexicographic order; each lies on the
+   * walls that all its vertices have in common.
+   */
+  public int[] boundary() {
+    int k = dimension;
+    int[] faces = new int[simplices.length * k];
+    int at = 0;
+    for (int row = 0; row < simplices.length; row += k + 1) {
+      for (int left = row; left <= row + k; left++) {
+        for (int i = row; i <= row + k; i++) {
+          if (i != left) {
+            faces[at++] = simplices[i];
+          }
+        }
+      }
+    }
+    int[] order = Rows.sortedOrder(faces, k);
+    int[] once = new int[faces.length];
+    int kept = 0;
+    for (int i = 0; i < order.length; ) {
+      int first = i;
+      while (i < order.length && Rows.same(faces, k, order[first], order[i])) {
+        i++;
+      }
+      if (i == first + 1) {
+        System.arraycopy(faces, order[first] * k, once, kept, k);
+        kept += k;
+      }
+    }
+    return Arrays.copyOf(once, kept);
   }
 
   /** How it stood at this revision. */
@@ -92,7 +137,7 @@ public final class Mesh {
     }
     double[] points = Arrays.stream(words, 4, end).mapToDouble(Double::parseDouble).toArray();
     int[] rows = Arrays.stream(words, end, words.length).mapToInt(Integer::parseInt).toArray();
-    return new Mesh(head[0], head[1], points, rows, 0, null, null);
+    return new Mesh(head[0], head[1], points, rows, null, 0, null, null);
   }
 
   /** Throws a StellateException of kind SAVE if a mesh of that kind cannot have the name. */

@@ -1,5 +1,6 @@
 package stellate;
 
+import java.nio.file.Path;
 import java.util.concurrent.CompletableFuture;
 import java.util.function.Consumer;
 import stellate.v1.BoundingBox;
@@ -31,6 +32,13 @@ public final class Options {
   /** A mesh that is not proved good is an exception of kind NOT_CERTIFIED. */
   public boolean requireCertified;
 
+  /**
+   * A directory, made if it is not there, in which the mesh outlives this program: the same call
+   * goes on from where the last one was cancelled or killed, or its oracle threw, and gives a mesh
+   * that is finished at once. For servers that are started; others keep meshes with --data-dir.
+   */
+  public Path checkpoint;
+
   /** Called on the thread that meshes. */
   public Consumer<Progress> onProgress = progress -> {};
 
@@ -50,7 +58,8 @@ public final class Options {
             .setDimension(checked.k)
             .setAmbientDimension(checked.d)
             .setEpsilon(epsilon)
-            .setOracle(checked.capabilities());
+            .setOracle(checked.capabilities())
+            .setWalls(checked.walls);
     Criteria.Builder rules = criteria.clone();
     if (far && !rules.hasAskAhead()) {
       rules.setAskAhead(true); // round trips are what a far server costs

@@ -1,7 +1,7 @@
 package stellate;
 
 /**
- * A compact smooth k-submanifold M of R^d without boundary, at least 1 = k and k less than d.
+ * A compact smooth k-submanifold M of R^d without boundary, 1 &lt;= k &lt; d, unless it is WithWalls.
  *
  * <p>Methods take and fill whole batches, of found.length points, one after the other. The answer
  * to a query must not depend on the rest of its batch. Calls come one at a time unless the oracle
@@ -56,5 +56,26 @@ public interface Oracle {
   interface WithSizes extends Oracle {
     /** At points [n, d] of M the local feature size, or any positive lengths. */
     void localSize(double[] points, double[] sizes) throws Exception;
+  }
+
+  /**
+   * An oracle of a manifold with boundary: it is where all walls are at least 0 on M^, a manifold
+   * without one, of which the other methods tell; it may be R^d itself. The walls of a face ascend.
+   */
+  interface WithWalls extends WithTangents {
+    /** How many there are. */
+    int walls();
+
+    /** As closestPoint, of points of M^ where the walls of the face are 0, whatever others are. */
+    void facePoint(double[] x, int[] face, double[] points, boolean[] found) throws Exception;
+
+    /** The walls' values at points [n, d], of which the sign counts: [n, walls]. */
+    void clearances(double[] points, double[] values) throws Exception;
+
+    /**
+     * At points of a face, of each of its walls the unit normal within the tangent space along
+     * which the wall's value falls: [n, face.length, d].
+     */
+    void conormals(double[] points, int[] face, double[] normals) throws Exception;
   }
 }

@@ -14,7 +14,7 @@ import java.util.stream.Stream;
 /** A stellated of this process's own, which ends with it whatever happens. */
 public final class Server implements AutoCloseable {
   private static final int STOP_SECONDS = 10;
-  private static final String SAID = "stellated listening on ";
+  private static final String SAID = " listening on ";
 
   private final Process process;
   private final Path folder;
@@ -54,6 +54,27 @@ public final class Server implements AutoCloseable {
                         + " (clients/quickstart does)"));
   }
 
+  /** The command-line program: beside the server binary, else on PATH. */
+  public static Path findStellate() {
+    List<Path> candidates = new ArrayList<>();
+    try {
+      candidates.add(findStellated().resolveSibling("stellate"));
+    } catch (StellateException none) {
+      candidates.clear(); // one that is on PATH without its server will do
+    }
+    onPath("stellate").forEach(candidates::add);
+    return candidates.stream()
+        .filter(path -> Files.isRegularFile(path) && Files.isExecutable(path))
+        .findFirst()
+        .orElseThrow(
+            () ->
+                new StellateException(
+                    StellateException.Kind.SERVER_NOT_FOUND,
+                    "SERVER_NOT_FOUND",
+                    "the program stellate, which examines oracles, is neither beside stellated nor"
+                        + " on PATH: install it, or build it (clients/quickstart does)"));
+  }
+
   private static Stream<Path> onPath(String name) {
     String path = System.getenv("PATH");
     return Stream.of((path == null ? "" : path).split(":")).map(part -> Path.of(part, name));
@@ -66,23 +87,34 @@ public final class Server implements AutoCloseable {
 
   /** At listen, "host:port"; it returns when it listens. */
   public static Server start(String listen, String[] flags) {
-    Path binary = findStellated();
+    List<String> all = new ArrayList<>(List.of("--drain-seconds", "0"));
+    if (listen == null) { // one that answers no pings is merely busy in an oracle
+      all.addAll(List.of("--keepalive", "600", "--keepalive-timeout", "600"));
+    }
+    all.addAll(List.of(flags));
+    return launch(List.of(findStellated().toString()), listen, all);
+  }
+
+  /** The doctor, to which an oracle is served as to a server: see Doctor. */
+  static Server startDoctor() {
+    return launch(List.of(findStellate().toString(), "doctor"), null, List.of());
+  }
+
+  private static Server launch(List<String> program, String listen, List<String> flags) {
     try {
       Path folder = Files.createTempDirectory("stellate-");
-      List<String> command = new ArrayList<>(List.of("setsid", binary.toString()));
       // A session of its own: Ctrl-C is for the client, which cancels its meshes first.
-      command.addAll(List.of("--exit-with-parent", "--drain-seconds", "0", "--listen"));
+      List<String> command = new ArrayList<>(List.of("setsid"));
+      command.addAll(program);
+      command.addAll(List.of("--exit-with-parent", "--listen"));
       command.add(listen == null ? "unix:" + folder.resolve("socket") : listen);
-      if (listen == null) { // one that answers no pings is merely busy in an oracle
-        command.addAll(List.of("--keepalive", "600", "--keepalive-timeout", "600"));
-      }
-      command.addAll(List.of(flags));
+      command.addAll(flags);
       ProcessBuilder builder = new ProcessBuilder(command);
       Process process = builder.redirectError(folder.resolve("log").toFile()).start();
       BufferedReader out = process.inputReader(StandardCharsets.UTF_8);
       String line = out.readLine();
-      boolean listens = line != null && line.startsWith(SAID);
-      String address = listens ? line.substring(SAID.length()) : "";
+      boolean listens = line != null && line.contains(SAID);
+      String address = listens ? line.substring(line.indexOf(SAID) + SAID.length()) : "";
       Server server = new Server(process, folder, address);
       if (!listens) {
         process.onExit().join();
@@ -95,7 +127,7 @@ public final class Server implements AutoCloseable {
       throw new StellateException(
           StellateException.Kind.SERVER_NOT_FOUND,
           "SERVER_NOT_FOUND",
-          "cannot start " + binary + ": " + error.getMessage(),
+          "cannot start " + program.get(0) + ": " + error.getMessage(),
           error);
     }
   }

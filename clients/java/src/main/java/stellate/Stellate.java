@@ -1,6 +1,7 @@
 package stellate;
 
 import io.grpc.Context;
+import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.concurrent.TimeUnit;
@@ -83,7 +84,12 @@ public final class Stellate {
             request.setRevision(part.getRevision()).setPosition(part.getNextPosition());
             growth.revision(part.getRevision());
             growth.addPoints(part.getFirstVertex(), Wire.numbers(part.getPoints(), -1, d));
-            growth.change(MeshDelta.newBuilder().setAdded(part.getCells()).build());
+            growth.change(
+                MeshDelta.newBuilder()
+                    .setAdded(part.getCells())
+                    .addAllBoundaryVertices(part.getBoundaryVerticesList())
+                    .addAllBoundaryWalls(part.getBoundaryWallsList())
+                    .build());
             return part.getComplete();
           });
     }
@@ -143,7 +149,7 @@ public final class Stellate {
 
   private static Mesh judged(Mesh mesh, stellate.v1.Mesh end) {
     if (end.getState() == MeshState.MESH_STATE_CANCELLED) {
-      throw cancelled().with(mesh);
+      throw cancelled("was cancelled").with(mesh);
     }
     if (end.getState() == MeshState.MESH_STATE_FAILED) {
       Failure failure = end.getReport().getFailure();
@@ -153,57 +159,99 @@ public final class Stellate {
     return mesh;
   }
 
-  private static StellateException cancelled() {
-    return new StellateException(
-        StellateException.Kind.CANCELLED, "CANCELLED", "the mesh was cancelled");
+  private static StellateException cancelled(String what) {
+    return new StellateException(StellateException.Kind.CANCELLED, "CANCELLED", "the mesh " + what);
   }
 
   private static void run(
       Oracle oracle, double epsilon, Options options, boolean every, Predicate<Mesh> each) {
+    CheckedOracle checked = new CheckedOracle(oracle);
+    if (options.checkpoint != null) {
+      keep(new Checkpoint(options.checkpoint), checked, epsilon, options, every, each);
+      return;
+    }
     if (options.client != null) {
-      session(options.client, oracle, epsilon, options, every, each);
+      stellate.v1.Mesh info = options.client.create(options.client.spec(checked, epsilon, options));
+      session(options.client, checked, info, options, every, each);
       return;
     }
     try (Server server = Server.start();
         Client client = new Client(server)) {
-      session(client, oracle, epsilon, options, every, each);
+      stellate.v1.Mesh info = client.create(client.spec(checked, epsilon, options));
+      session(client, checked, info, options, every, each);
+    }
+  }
+
+  private static void keep(
+      Checkpoint checkpoint,
+      CheckedOracle checked,
+      double epsilon,
+      Options options,
+      boolean every,
+      Predicate<Mesh> each) {
+    if (options.client != null) {
+      throw StellateException.invalid(
+          "a checkpoint is for a private server: one that is named keeps meshes itself");
+    }
+    try (Server server = checkpoint.server();
+        Client client = new Client(server)) {
+      stellate.v1.Mesh info = checkpoint.declare(client, client.spec(checked, epsilon, options));
+      session(client, checked, info, options, every, each);
+    } catch (StellateException error) {
+      checkpoint.forgetAfter(error);
+      throw error;
     }
   }
 
   private static void session(
       Client client,
-      Oracle oracle,
-      double epsilon,
+      CheckedOracle checked,
+      stellate.v1.Mesh info,
       Options options,
       boolean every,
       Predicate<Mesh> each) {
-    CheckedOracle checked = new CheckedOracle(oracle);
-    stellate.v1.Mesh info = client.create(oracle, epsilon, options);
+    boolean kept = options.checkpoint != null;
     AtomicReference<Throwable> failure = new AtomicReference<>();
     List<Worker> workers = new ArrayList<>();
     List<Thread> threads = new ArrayList<>();
-    for (int i = 1; i <= Math.max(1, options.workers); i++) {
-      Outage quiet = new Outage(client.patience, true);
-      Worker worker =
-          new Worker(client, checked, info.getName(), "java-" + i, options.maxChunk, quiet);
-      worker.onFailure = error -> failure.compareAndSet(null, error);
-      Thread thread = new Thread(() -> serve(worker), "oracle-" + i);
-      thread.setDaemon(true);
-      workers.add(worker);
-      threads.add(thread);
-      thread.start();
-    }
     boolean over = false;
     try (var within = Context.current().withCancellation()) {
-      options.cancel.whenComplete((value, error) -> cancel(client, info.getName(), within));
+      for (int i = 1; i <= Math.max(1, options.workers); i++) {
+        Outage quiet = new Outage(client.patience, true);
+        Worker worker =
+            new Worker(client, checked, info.getName(), "java-" + i, options.maxChunk, quiet);
+        worker.tells = !kept;
+        worker.onFailure =
+            error -> {
+              failure.compareAndSet(null, error);
+              if (kept) {
+                within.cancel(error); // the mesh waits for a better oracle
+              }
+            };
+        Thread thread = new Thread(() -> serve(worker), "oracle-" + i);
+        thread.setDaemon(true);
+        workers.add(worker);
+        threads.add(thread);
+        thread.start();
+      }
+      options.cancel.whenComplete(
+          (value, error) -> {
+            if (kept) {
+              within.cancel(error);
+            } else {
+              cancel(client, info.getName(), within);
+            }
+          });
       follow(client, info, within, options.onProgress, every, each);
       over = true;
     } catch (StellateException error) {
-      throw better(error, failure.get());
+      throw better(error, failure.get(), options.checkpoint);
     } finally {
       leave(workers, threads, over);
       try {
-        client.deleteOnce(info.getName());
+        if (!kept) {
+          client.deleteOnce(info.getName());
+        }
       } catch (StellateException error) {
         over = false; // it ends with its server, or somebody else was first
       }
@@ -234,9 +282,15 @@ public final class Stellate {
   }
 
   /** Our own says more than the server's account of it. */
-  private static RuntimeException better(StellateException theirs, Throwable ours) {
+  private static RuntimeException better(
+      StellateException theirs, Throwable ours, Path checkpoint) {
     if (theirs.kind() == StellateException.Kind.CANCELLED) {
-      return theirs;
+      if (checkpoint == null) {
+        return theirs;
+      } else if (ours == null) {
+        return cancelled("is kept in " + checkpoint + ": the same call goes on from there")
+            .with(theirs.mesh().orElse(null));
+      }
     }
     if (ours instanceof StellateException said) {
       return said.with(theirs.mesh().orElse(null));

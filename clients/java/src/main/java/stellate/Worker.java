@@ -36,13 +36,15 @@ final class Worker {
   private volatile boolean stopped;
 
   Consumer<Throwable> onFailure = error -> {}; // told what the oracle threw, before the server is
+  boolean tells = true; // whether the server is
 
   Worker(
       Client client, CheckedOracle oracle, String mesh, String name, int maxChunk, Outage outage) {
     this.client = client;
     this.oracle = oracle;
     this.outage = outage;
-    int most = Math.max(1, ANSWER_BYTES / (8 * oracle.d * (oracle.k + 1) + 9));
+    int numbers = oracle.d * (oracle.k + 1 + Math.min(oracle.k, oracle.walls)) + oracle.walls;
+    int most = Math.max(1, ANSWER_BYTES / (8 * numbers + 9));
     int chunk = maxChunk > 0 ? Math.min(most, maxChunk) : most;
     hello = Hello.newBuilder().setMesh(mesh).setWorker(name).setMaxChunkQueries(chunk).build();
   }
@@ -219,6 +221,10 @@ final class Worker {
       open.put(ServeOracleRequest.newBuilder().setAnswers(oracle.answer(chunk)));
     } catch (Throwable error) {
       onFailure.accept(error);
+      if (!tells) {
+        open.end(); // as a worker that has to go
+        throw thrown(error);
+      }
       String said = String.valueOf(error);
       said = said.substring(0, Math.min(said.length(), MESSAGE_CHARACTERS));
       byte[] sound = said.getBytes(StandardCharsets.UTF_8); // half a surrogate becomes "?"
@@ -268,6 +274,10 @@ final class Worker {
       problem =
           "the mesh has dimension %d in R^%d, and this oracle's manifold has dimension %d in R^%d"
               .formatted(welcome.getDimension(), welcome.getAmbientDimension(), oracle.k, oracle.d);
+    } else if (welcome.getWalls() != oracle.walls) {
+      problem =
+          "the mesh has %d walls, and this oracle's manifold has %d"
+              .formatted(welcome.getWalls(), oracle.walls);
     } else if (missing.isEmpty()) {
       return;
     } else {

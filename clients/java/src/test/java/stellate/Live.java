@@ -11,6 +11,7 @@ import java.util.ArrayList;
 import java.util.List;
 import java.util.function.UnaryOperator;
 import java.util.stream.Stream;
+import stellate.examples.Surface;
 
 /** What the tests share: servers, and how large the meshes have to be. */
 final class Live {
@@ -43,18 +44,8 @@ final class Live {
 
   /** The torus, its answers spoilt after a while. */
   static Oracle spoilt(UnaryOperator<double[]> spoil) {
-    return new Oracle.WithTangents() {
+    return new Surface.OfTorus() {
       private int asked;
-
-      @Override
-      public int dimension() {
-        return 2;
-      }
-
-      @Override
-      public int ambientDimension() {
-        return 3;
-      }
 
       @Override
       public double[][] boundingBox() {
@@ -62,18 +53,13 @@ final class Live {
       }
 
       @Override
-      public void closestPoint(double[] x, double[] points, boolean[] found) {
-        TORUS.closestPoint(x, points, found);
+      public void closestPoint(double[] x, double[] points, boolean[] found) throws Exception {
+        super.closestPoint(x, points, found);
         asked += found.length;
         if (asked > 300) {
           double[] spoilt = spoil.apply(points.clone());
           System.arraycopy(spoilt, 0, points, 0, points.length);
         }
-      }
-
-      @Override
-      public void tangentBasis(double[] points, double[] bases) {
-        TORUS.tangentBasis(points, bases);
       }
     };
   }

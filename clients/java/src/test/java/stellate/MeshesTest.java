@@ -19,6 +19,7 @@ import org.junit.jupiter.api.AfterAll;
 import org.junit.jupiter.api.BeforeAll;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
+import stellate.examples.Surface;
 import stellate.v1.Certificate;
 import stellate.v1.Phase;
 
@@ -52,19 +53,9 @@ final class MeshesTest {
   }
 
   /** Answers everything but tangents, and has seeds instead of a box. */
-  private static final class Sphere implements Oracle.WithFlats, Oracle.WithSizes {
+  private static final class Sphere extends Surface.Sphere {
     private final AtomicInteger intersections = new AtomicInteger();
     private final AtomicInteger most = new AtomicInteger();
-
-    @Override
-    public int dimension() {
-      return 2;
-    }
-
-    @Override
-    public int ambientDimension() {
-      return 3;
-    }
 
     @Override
     public double[] seeds() {
@@ -72,39 +63,11 @@ final class MeshesTest {
     }
 
     @Override
-    public void closestPoint(double[] x, double[] points, boolean[] found) {
-      for (int i = 0; i < x.length; i += 3) {
-        double length = Math.sqrt(x[i] * x[i] + x[i + 1] * x[i + 1] + x[i + 2] * x[i + 2]);
-        found[i / 3] = length > 1e-9;
-        for (int j = i; j < i + 3; j++) {
-          points[j] = x[j] / length;
-        }
-      }
-    }
-
-    @Override
     public void intersectFlat(
-        double[] c, double[] b, double[] radii, double[] points, boolean[] found) {
+        double[] centers, double[] bases, double[] radii, double[] points, boolean[] found) {
       intersections.addAndGet(found.length);
       most.accumulateAndGet(found.length, Math::max);
-      for (int i = 0; i < found.length; i++) {
-        // The flat is the line along u = t0 x t1 through c: |c + s u| = 1.
-        int at = 3 * i;
-        int t = 6 * i;
-        double[] u = {
-          b[t + 2] * b[t + 5] - b[t + 4] * b[t + 3],
-          b[t + 4] * b[t + 1] - b[t] * b[t + 5],
-          b[t] * b[t + 3] - b[t + 2] * b[t + 1]
-        };
-        double cu = c[at] * u[0] + c[at + 1] * u[1] + c[at + 2] * u[2];
-        double square = c[at] * c[at] + c[at + 1] * c[at + 1] + c[at + 2] * c[at + 2];
-        double root = cu * cu - square + 1;
-        double along = Math.copySign(Math.sqrt(Math.max(root, 0)), cu) - cu;
-        found[i] = root >= 0 && Math.abs(along) <= radii[i];
-        for (int j = 0; j < 3; j++) {
-          points[at + j] = c[at + j] + along * u[j];
-        }
-      }
+      super.intersectFlat(centers, bases, radii, points, found);
     }
 
     @Override

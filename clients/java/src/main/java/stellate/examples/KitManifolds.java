@@ -42,54 +42,25 @@ final class KitManifolds {
   }
 
   /** The torus, after something was done to its answers. */
-  private record Changed(Change change) implements Oracle.WithTangents {
-    @Override
-    public int dimension() {
-      return 2;
-    }
+  private static final class Changed extends Surface.OfTorus {
+    private final Change change;
 
-    @Override
-    public int ambientDimension() {
-      return 3;
+    Changed(Change change) {
+      this.change = change;
     }
 
     @Override
     public void closestPoint(double[] x, double[] points, boolean[] found) throws Exception {
-      TORUS.closestPoint(x, points, found);
+      super.closestPoint(x, points, found);
       change.to(x, found);
-    }
-
-    @Override
-    public void tangentBasis(double[] points, double[] bases) {
-      TORUS.tangentBasis(points, bases);
     }
   }
 
   /** The torus, with a seed in place of its box. */
-  record Seeded() implements Oracle.WithTangents {
-    @Override
-    public int dimension() {
-      return 2;
-    }
-
-    @Override
-    public int ambientDimension() {
-      return 3;
-    }
-
+  static final class Seeded extends Surface.OfTorus {
     @Override
     public double[] seeds() {
       return new double[] {1.4, 0, 0};
-    }
-
-    @Override
-    public void closestPoint(double[] x, double[] points, boolean[] found) {
-      TORUS.closestPoint(x, points, found);
-    }
-
-    @Override
-    public void tangentBasis(double[] points, double[] bases) {
-      TORUS.tangentBasis(points, bases);
     }
   }
 
@@ -118,26 +89,8 @@ final class KitManifolds {
     }
   }
 
-  /** The unit sphere, which meets lines; its sizes are 1 + z / 2. */
-  private record Sphere() implements Oracle.WithFlats, Oracle.WithTangents, Oracle.WithSizes {
-    @Override
-    public int dimension() {
-      return 2;
-    }
-
-    @Override
-    public int ambientDimension() {
-      return 3;
-    }
-
-    @Override
-    public void closestPoint(double[] x, double[] points, boolean[] found) {
-      for (int i = 0; i < x.length; i++) {
-        int row = i - i % 3;
-        points[i] = x[i] / Math.sqrt(dot(x, row, x, row));
-      }
-    }
-
+  /** The unit sphere with tangents; its sizes are 1 + z / 2. */
+  private static final class Sphere extends Surface.Sphere implements Oracle.WithTangents {
     @Override
     public void tangentBasis(double[] points, double[] bases) {
       for (int i = 0; i < points.length; i += 3) {
@@ -156,31 +109,6 @@ final class KitManifolds {
       for (int i = 0; i < sizes.length; i++) {
         sizes[i] = 1 + points[3 * i + 2] / 2;
       }
-    }
-
-    @Override
-    public void intersectFlat(
-        double[] centers, double[] bases, double[] radii, double[] points, boolean[] found) {
-      for (int i = 0; i < found.length; i++) {
-        int c = 3 * i;
-        int b = 6 * i;
-        double[] along = {
-          bases[b + 2] * bases[b + 5] - bases[b + 4] * bases[b + 3],
-          bases[b + 4] * bases[b + 1] - bases[b] * bases[b + 5],
-          bases[b] * bases[b + 3] - bases[b + 2] * bases[b + 1]
-        };
-        double middle = dot(along, 0, centers, c);
-        double root = middle * middle - dot(centers, c, centers, c) + 1;
-        double step = Math.copySign(Math.sqrt(Math.max(root, 0)), middle) - middle;
-        found[i] = root >= 0 && Math.abs(step) <= radii[i];
-        for (int j = 0; j < 3; j++) {
-          points[c + j] = centers[c + j] + step * along[j];
-        }
-      }
-    }
-
-    private static double dot(double[] a, int i, double[] b, int j) {
-      return a[i] * b[j] + a[i + 1] * b[j + 1] + a[i + 2] * b[j + 2];
     }
   }
 }

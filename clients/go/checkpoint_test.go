@@ -1,0 +1,87 @@
+package stellate_test
+
+import (
+	"context"
+	"errors"
+	"path/filepath"
+	"slices"
+	"testing"
+
+	"stellate"
+	pb "stellate/proto/v1"
+)
+
+// counting is the torus, and how often it was asked.
+type counting struct {
+	stellate.Torus
+	asked *int
+}
+
+func (c counting) ClosestPoint(x, points []float64, found []bool) error {
+	*c.asked += len(found)
+	return c.Torus.ClosestPoint(x, points, found)
+}
+
+func (counting) ConcurrencySafe() bool { return false }
+
+func TestCheckpointGoesOn(t *testing.T) {
+	folder := filepath.Join(t.TempDir(), "torus")
+	ctx, cancel := context.WithCancel(context.Background())
+	defer cancel()
+	options := stellate.Options{Checkpoint: folder, OnProgress: func(progress *pb.Progress) {
+		if progress.GetVertices() > 500 {
+			cancel()
+		}
+	}}
+	first, second := 0, 0
+	_, err := stellate.NewMesh(ctx, counting{torus, &first}, 0.05, &options)
+	var ours *stellate.Error
+	if !errors.Is(err, stellate.ErrCancelled) || !errors.As(err, &ours) || ours.Mesh.VertexCount() == 0 {
+		t.Fatal(err)
+	}
+	options.OnProgress, options.Label = nil, "another label is no other mesh"
+	mesh, err := stellate.NewMesh(context.Background(), counting{torus, &second}, 0.05, &options)
+	if err != nil || !mesh.Certified() {
+		t.Fatal(mesh, err)
+	}
+	straight, err := stellate.NewMesh(context.Background(), torus, 0.05, nil)
+	if err != nil {
+		t.Fatal(err)
+	}
+	if !slices.Equal(mesh.Points, straight.Points) || !slices.Equal(mesh.Simplices, straight.Simplices) {
+		t.Error("the mesh that went on is another")
+	}
+	if total := int(straight.Report.GetCounts().GetQueries()); first == 0 || second >= total {
+		t.Error("asked", first, "and", second, "of", total)
+	}
+	third := 0
+	again, err := stellate.NewMesh(context.Background(), counting{torus, &third}, 0.05, &options)
+	if err != nil || third != 0 || counts(again) != counts(mesh) || !again.Certified() {
+		t.Error("a finished mesh is there at once", third, err)
+	}
+	if _, err := stellate.NewMesh(context.Background(), torus, 0.06, &options); !errors.Is(err, stellate.ErrInvalidArgument) {
+		t.Error(err)
+	}
+}
+
+func TestCheckpointWaitsForABetterOracle(t *testing.T) {
+	mine := errors.New("no such surface")
+	options := stellate.Options{Checkpoint: t.TempDir()}
+	failing := spoilt{torus, new(int), func([]float64) error { return mine }}
+	if _, err := stellate.NewMesh(context.Background(), failing, 0.1, &options); !errors.Is(err, mine) {
+		t.Fatal(err)
+	}
+	mesh, err := stellate.NewMesh(context.Background(), torus, 0.1, &options)
+	if want, _ := expected(t); err != nil || counts(mesh) != want {
+		t.Error(mesh, err)
+	}
+	// What the server refuses of an oracle is final, and the next call begins anew.
+	options.Checkpoint = t.TempDir()
+	moving := spoilt{torus, new(int), func(points []float64) error { points[0] *= 1.1; return nil }}
+	if _, err := stellate.NewMesh(context.Background(), moving, 0.1, &options); !errors.Is(err, stellate.ErrOracle) {
+		t.Fatal(err)
+	}
+	if _, err = stellate.NewMesh(context.Background(), torus, 0.1, &options); err != nil {
+		t.Error(err)
+	}
+}

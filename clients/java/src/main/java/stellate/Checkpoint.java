@@ -1,0 +1,135 @@
+package stellate;
+
+import java.io.IOException;
+import java.nio.charset.StandardCharsets;
+import java.nio.file.Files;
+import java.nio.file.Path;
+import java.nio.file.StandardCopyOption;
+import java.util.Arrays;
+import stellate.v1.MeshSpec;
+
+/**
+ * A directory in which one mesh outlives the processes that make it.
+ *
+ * <p>"mesh" has the mesh's name on the private server, and, on the next line, what is meshed;
+ * "server" is that server's --data-dir.
+ */
+final class Checkpoint {
+  private static final long LAST_SERVER = 20_000; // milliseconds that a killed process' may take
+
+  private final Path folder;
+  private final Path record;
+
+  Checkpoint(Path folder) {
+    this.folder = folder;
+    record = folder.resolve("mesh");
+  }
+
+  private StellateException wrong(String what) {
+    return StellateException.invalid("the checkpoint " + folder + " " + what);
+  }
+
+  private StellateException unusable(IOException error) {
+    return wrong("cannot be used: " + error);
+  }
+
+  /** Starts the private server, once that of a killed process has come to its end. */
+  Server server() {
+    if (Files.exists(folder.resolve("mesh.json"))) {
+      throw wrong("is of the Python client: take another directory");
+    }
+    try {
+      Files.createDirectories(folder);
+    } catch (IOException error) {
+      throw unusable(error);
+    }
+    String data = folder.resolve("server").toString();
+    long deadline = System.currentTimeMillis() + LAST_SERVER;
+    while (true) {
+      try {
+        return Server.start("--data-dir", data, "--keep-finished-seconds", "31536000");
+      } catch (StellateException error) {
+        if (!error.getMessage().contains("another server uses")) {
+          throw error;
+        }
+        pauseUntil(deadline);
+      }
+    }
+  }
+
+  private void pauseUntil(long deadline) {
+    try {
+      if (System.currentTimeMillis() < deadline) {
+        Thread.sleep(100);
+        return;
+      }
+    } catch (InterruptedException error) {
+      Thread.currentThread().interrupt();
+    }
+    throw new StellateException(
+        StellateException.Kind.FAILED_PRECONDITION,
+        "FAILED_PRECONDITION",
+        "another process is meshing in the checkpoint "
+            + folder
+            + ": wait for its end, or take another directory");
+  }
+
+  /** The mesh that is there, or a new one. */
+  stellate.v1.Mesh declare(Client client, MeshSpec spec) {
+    byte[] wanted = spec.toBuilder().clearLabel().build().toByteArray();
+    String name = "";
+    try {
+      if (Files.exists(record)) {
+        byte[] kept = Files.readAllBytes(record);
+        int end = 0;
+        while (end < kept.length && kept[end] != '\n') {
+          end++;
+        }
+        name = new String(kept, 0, end, StandardCharsets.UTF_8);
+        if (!Arrays.equals(
+            wanted, Arrays.copyOfRange(kept, Math.min(end + 1, kept.length), kept.length))) {
+          throw wrong(
+              "is of a mesh of another specification: take another directory, or remove it");
+        }
+      }
+      stellate.v1.Mesh found = null;
+      for (stellate.v1.Mesh info : client.list()) {
+        if (info.getName().equals(name)) {
+          found = info;
+        } else {
+          client.delete(info.getName()); // was forgotten, or never put down
+        }
+      }
+      if (found == null) {
+        found = client.create(spec);
+        note(found.getName(), wanted);
+      }
+      return found;
+    } catch (IOException error) {
+      throw unusable(error);
+    }
+  }
+
+  /** All of it or nothing. */
+  private void note(String name, byte[] wanted) throws IOException {
+    byte[] head = (name + "\n").getBytes(StandardCharsets.UTF_8);
+    byte[] all = Arrays.copyOf(head, head.length + wanted.length);
+    System.arraycopy(wanted, 0, all, head.length, wanted.length);
+    Path draft = folder.resolve("mesh.new");
+    Files.write(draft, all);
+    Files.move(draft, record, StandardCopyOption.ATOMIC_MOVE, StandardCopyOption.REPLACE_EXISTING);
+  }
+
+  /** Has the next call begin anew where this mesh has failed for good. */
+  void forgetAfter(StellateException error) {
+    boolean over = error.mesh().flatMap(Mesh::report).isPresent();
+    if (!over || error.reason().startsWith("JOURNAL_")) {
+      return; // with more room for its journal it goes on
+    }
+    try {
+      Files.deleteIfExists(record);
+    } catch (IOException kept) {
+      error.addSuppressed(kept);
+    }
+  }
+}

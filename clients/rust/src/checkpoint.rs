@@ -1,0 +1,102 @@
+//! A directory in which one mesh outlives the processes that make it:
+//!
+//! - `mesh`: the mesh's name on the private server, and, on the next line, what is meshed
+//! - `server/`: that server's --data-dir
+
+use std::fs;
+use std::io;
+use std::os::unix::fs::DirBuilderExt;
+use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use prost::Message;
+
+use crate::client::Client;
+use crate::error::{Error, Kind};
+use crate::proto::{Mesh as MeshInfo, MeshSpec};
+use crate::server::{Server, ServerOptions};
+
+const LAST_SERVER: Duration = Duration::from_secs(20); // that of a killed process may take to end
+
+pub struct Checkpoint<'a>(pub &'a Path);
+
+impl Checkpoint<'_> {
+    fn record(&self) -> PathBuf {
+        self.0.join("mesh")
+    }
+
+    fn wrong(&self, what: &str) -> Error {
+        Error::invalid(format!("the checkpoint {} {what}", self.0.display()))
+    }
+
+    /// Starts the private server, once that of a killed process has come to its end.
+    pub fn server(&self) -> Result<Server, Error> {
+        if self.0.join("mesh.json").exists() {
+            return Err(self.wrong("is of the Python client: take another directory"));
+        }
+        let made = fs::DirBuilder::new().recursive(true).mode(0o700).create(self.0);
+        made.map_err(|error| self.wrong(&format!("cannot be made: {error}")))?;
+        let data = self.0.join("server").display().to_string();
+        let flags = ["--data-dir", &data, "--keep-finished-seconds", "31536000"].map(String::from);
+        let options = ServerOptions { flags: flags.to_vec(), ..Default::default() };
+        let begin = Instant::now();
+        loop {
+            match Server::start(&options) {
+                Err(error) if error.message.contains("another server uses") => {
+                    if begin.elapsed() > LAST_SERVER {
+                        let message = format!(
+                            "another process is meshing in the checkpoint {}: wait for its end, or take \
+                             another directory",
+                            self.0.display()
+                        );
+                        return Err(Error::new(Kind::FailedPrecondition, "FAILED_PRECONDITION", message));
+                    }
+                    thread::sleep(Duration::from_millis(100));
+                }
+                started => return started,
+            }
+        }
+    }
+
+    /// The mesh that is there, or a new one.
+    pub fn declare(&self, client: &Client, spec: MeshSpec) -> Result<MeshInfo, Error> {
+        let wanted = MeshSpec { label: String::new(), ..spec.clone() }.encode_to_vec();
+        let unreadable = |error: io::Error| self.wrong(&format!("cannot be used: {error}"));
+        let kept = match fs::read(self.record()) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
+            read => read.map_err(unreadable)?,
+        };
+        let mut parts = kept.splitn(2, |&byte| byte == b'\n');
+        let name = parts.next().unwrap_or_default();
+        if !name.is_empty() && parts.next() != Some(&wanted[..]) {
+            return Err(
+                self.wrong("is of a mesh of another specification: take another directory, or remove it")
+            );
+        }
+        let mut found = None;
+        for info in client.list()? {
+            if info.name.as_bytes() == name {
+                found = Some(info);
+            } else {
+                client.delete(&info.name)?; // was forgotten, or never put down
+            }
+        }
+        if let Some(info) = found {
+            return Ok(info);
+        }
+        let info = client.create_from(spec)?;
+        let draft = self.record().with_extension("new"); // all of it or nothing
+        let record = [info.name.as_bytes(), b"\n", &wanted].concat();
+        fs::write(&draft, record).and_then(|()| fs::rename(&draft, self.record())).map_err(unreadable)?;
+        Ok(info)
+    }
+
+    /// Has the next call begin anew where this mesh has failed for good.
+    pub fn forget_after(&self, error: &Error) {
+        let over = error.mesh.as_ref().is_some_and(|mesh| mesh.report.is_some());
+        if over && !error.reason.starts_with("JOURNAL_") {
+            let _ = fs::remove_file(self.record()); // with more room for its journal it would go on
+        }
+    }
+}
