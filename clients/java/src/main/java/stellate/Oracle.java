@@ -1,7 +1,8 @@
 package stellate;
 
 /**
- * A compact smooth k-submanifold M of R^d without boundary, 1 &lt;= k &lt; d, unless it is WithWalls.
+ * A compact smooth k-submanifold M of R^d without boundary, 1 &lt;= k &lt; d, unless it is
+ * WithWalls.
  *
  * <p>Methods take and fill whole batches, of found.length points, one after the other. The answer
  * to a query must not depend on the rest of its batch. Calls come one at a time unless the oracle

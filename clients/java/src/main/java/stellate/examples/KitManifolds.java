@@ -23,7 +23,7 @@ final class KitManifolds {
       case "raises" ->
           new Changed(
               (x, found) -> {
-                throw new IllegalStateException("on purpose");
+                throw new java.io.IOException("on purpose"); // of kind RAISED
               });
       case "slow" -> new Changed((x, found) -> Thread.sleep(2000));
       default -> null;
