@@ -89,6 +89,19 @@ enum class CertificateLevel {
 };
 const char* CertificateLevelName(CertificateLevel level);  // "SAMPLED", ...
 
+// Where a mesh is at fault: the first of each kind that the certificate counts, in ascending order.
+struct Violations {
+  static constexpr std::size_t kMost = 100;  // of each kind
+
+  // k vertex ids each, of faces that are not in exactly two simplices; with a boundary the number
+  // of vertices stands for what is beyond it.
+  std::vector<std::uint32_t> faces;
+  std::vector<std::uint32_t> links;         // vertices whose link is no sphere, or that have none
+  std::vector<std::uint32_t> stars;         // vertices whose star overlaps itself, projected
+  std::vector<std::uint32_t> inconsistent;  // vertices whose star holds a simplex that others lack
+  std::vector<std::uint32_t> fibres;        // vertices near which a normal flat fails; ascending
+};
+
 // The certificate: computed from the finished complex and never assumed.
 struct Certificate {
   bool certified = false;             // every claim below holds, and the run converged
@@ -136,6 +149,8 @@ struct Certificate {
   std::uint64_t boundary_components = 0;
   std::int64_t boundary_euler_characteristic = 0;
   std::vector<FaceReport> faces;  // those that there are, by dimension, the lowest first
+
+  Violations violations;
 };
 
 struct Report {

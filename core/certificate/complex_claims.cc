@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <utility>
@@ -63,7 +64,7 @@ void RefuseWhatIsNoManifold(Examination& x, const Connectivity& connectivity,
                                   : ". If the manifold has a boundary, declare it by walls"));
   }
   if (connectivity.isolated_vertices > 0) {
-    x.findings.Refuse(Findings::kLinks, Message("vertex ", connectivity.first_isolated,
+    x.findings.Refuse(Findings::kLinks, Message("vertex ", connectivity.some_isolated.front(),
                                                 " is in no simplex; vertices like it: ",
                                                 connectivity.isolated_vertices));
   }
@@ -106,6 +107,10 @@ std::vector<std::int8_t> JudgeTopology(Examination& x) {
   c.bad_links = links.bad_links + connectivity.isolated_vertices;
   c.links_are_spheres = c.bad_links == 0;
   c.links_decided_exactly = links.decided_exactly;
+  c.violations.faces = x.Closed().some_bad_facets();
+  std::merge(links.some_bad.begin(), links.some_bad.end(), connectivity.some_isolated.begin(),
+             connectivity.some_isolated.end(), std::back_inserter(c.violations.links));
+  c.violations.links.resize(std::min(c.violations.links.size(), Violations::kMost));
   c.euler_characteristic = links.euler_characteristic;
   if (x.mesh.faces && x.mesh.faces->empty()) --c.euler_characteristic;  // the apex of no cone
   if (x.mesh.faces) BoundaryClaims(x).JudgeFaces();
@@ -116,6 +121,7 @@ std::vector<std::int8_t> JudgeTopology(Examination& x) {
 
 void JudgeStars(Examination& x, const StarGeometry& stars) {
   Certificate& c = x.certificate;
+  c.violations.stars = stars.some_unembedded;
   c.unembedded_stars = stars.unembedded_stars;
   // The link of a star that embeds is the sphere of directions of its tangent space
   // (docs/using/proof.md, (a)).

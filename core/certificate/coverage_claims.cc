@@ -1,6 +1,7 @@
 #include "core/certificate/coverage_claims.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cstdint>
 #include <utility>
 
@@ -35,7 +36,7 @@ void CoverageClaims::JudgeProbes(const Eigen::MatrixXd& asked, const AnswerBlock
     Probe probe{answer.points.col(j), nearest[n], {}};
     if (probe.nearest.distance > kCoverageShare * x_.size) {
       ++x_.certificate.fibre_samples;
-      ++x_.certificate.fibre_failures;
+      Fail(probe);
       x_.findings.Refuse(
           Findings::kCoverage,
           Message("the mesh misses a part of the manifold: its point ", NamePoint(probe.x), " is ",
@@ -113,12 +114,21 @@ void CoverageClaims::JudgeFibres() {
   probes_.clear();
 }
 
+void CoverageClaims::Fail(const Probe& probe) {
+  ++x_.certificate.fibre_failures;
+  std::vector<std::uint32_t>& near = x_.certificate.violations.fibres;
+  const auto place = std::lower_bound(near.begin(), near.end(), probe.nearest.vertex);
+  if (place != near.end() && *place == probe.nearest.vertex) return;
+  near.insert(place, probe.nearest.vertex);
+  if (near.size() > Violations::kMost) near.pop_back();
+}
+
 void CoverageClaims::JudgeHits(const Probe& probe, const FibreHits& hits) {
   if (hits.count < 0) return;  // undecided by rounding
   ++x_.certificate.fibre_samples;
   const double size = x_.LocalSize(probe.nearest.vertex);
   if (hits.count != 1) {
-    ++x_.certificate.fibre_failures;
+    Fail(probe);
     x_.findings.Refuse(Findings::kFibres,
                        Message("the normal flat of the manifold at its point ", NamePoint(probe.x),
                                ", near vertex ", probe.nearest.vertex, ", meets the mesh ",
@@ -128,7 +138,7 @@ void CoverageClaims::JudgeHits(const Probe& probe, const FibreHits& hits) {
   const double bound =
       x_.DistanceAllowed(x_.Circumradius(x_.list()[hits.simplex])) + kSideStep * size;
   if (hits.distance <= bound) return;
-  ++x_.certificate.fibre_failures;
+  Fail(probe);
   x_.findings.Refuse(
       Findings::kFibres,
       Message("the mesh lies ", Brief(hits.distance), " above the manifold at its point ",

@@ -35,6 +35,7 @@ class CoverageClaims {
   };
   void JudgeFibres();
   void JudgeHits(const Probe& probe, const FibreHits& hits);
+  void Fail(const Probe& probe);
 
   Examination& x_;
   RimCheck& rims_;

@@ -7,8 +7,10 @@
 
 #include "core/base/message.h"
 #include "core/base/parallel.h"
+#include "core/certificate/first_ids.h"
 #include "core/certificate/fundamental_group.h"
 #include "core/certificate/small_index.h"
+#include "core/report.h"
 #include "core/specification.h"
 
 namespace stellate::core {
@@ -344,6 +346,7 @@ LinkReport CheckLinks(const Adjacency& adjacency, std::uint32_t ignored) {
   all.blamed.erase(std::unique(all.blamed.begin(), all.blamed.end()), all.blamed.end());
   std::erase(all.blamed, ignored);
   all.report.bad_links = all.blamed.size();
+  AppendFirst(all.blamed, Violations::kMost, &all.report.some_bad);
   all.report.euler_characteristic = EulerCharacteristic(adjacency, all);
   return std::move(all.report);
 }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "core/certificate/topology.h"
 
@@ -11,7 +12,8 @@ namespace stellate::core {
 // closed k-manifold.
 struct LinkReport {
   std::uint64_t bad_links = 0;
-  std::string first_bad_link;  // plain words; empty if none
+  std::vector<std::uint32_t> some_bad;  // the first Violations::kMost of these vertices
+  std::string first_bad_link;           // plain words; empty if none
   // Every link called a sphere is one. For k <= 3 always: closed, connected, and of Euler
   // characteristic 2 when it is a surface. For k = 4 and 5 a link is decided when, its own vertex
   // links being spheres, it is seen to be simply connected (a sphere then, by Perelman and, up to

@@ -12,9 +12,11 @@
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/base/vector_ops.h"
+#include "core/certificate/first_ids.h"
 #include "core/certificate/small_index.h"
 #include "core/certificate/small_solve.h"
 #include "core/geometry/reach_bound.h"
+#include "core/report.h"
 
 namespace stellate::core {
 namespace {
@@ -94,9 +96,9 @@ class StarMeasurer {
         Project(p, d);
         MeasureReach(p);
         if (const char* why = WhyNotEmbedded(p)) {
-          if (result_.unembedded_stars++ == 0) {
+          if (result_.unembedded_stars++ == 0)
             result_.first_unembedded = Message("the star of vertex ", p, " ", why);
-          }
+          if (result_.unembedded_stars <= Violations::kMost) result_.some_unembedded.push_back(p);
         }
       }
     });
@@ -303,6 +305,7 @@ StarGeometry Measure(const MeshView& mesh, const Adjacency& adjacency,
     }
     if (whole.unembedded_stars == 0) whole.first_unembedded = std::move(part.first_unembedded);
     whole.unembedded_stars += part.unembedded_stars;
+    AppendFirst(part.some_unembedded, Violations::kMost, &whole.some_unembedded);
   }
   return whole;
 }

@@ -15,7 +15,8 @@ struct StarGeometry {
   // Stars whose projection on the tangent space of their centre is not an embedding. Consistency
   // alone does not exclude them when simplices are judged at common centres.
   std::uint64_t unembedded_stars = 0;
-  std::string first_unembedded;  // plain words; empty if none
+  std::string first_unembedded;                // plain words; empty if none
+  std::vector<std::uint32_t> some_unembedded;  // the first Violations::kMost of their centres
 
   // The smallest |q - p|^2 / (2 dist(q, T_pM)) over mesh edges: an upper bound of the reach
   // (Federer). Infinity for a flat mesh.

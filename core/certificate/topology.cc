@@ -6,6 +6,8 @@
 
 #include "core/base/message.h"
 #include "core/base/parallel.h"
+#include "core/certificate/first_ids.h"
+#include "core/report.h"
 #include "core/specification.h"
 
 namespace stellate::core {
@@ -179,6 +181,8 @@ void Adjacency::MatchFacets() {
     facets_.all += part.all;
     if (facets_.bad == 0) facets_.first_bad = std::move(part.first_bad);
     facets_.bad += part.bad;
+    AppendFirst(part.some_bad, Violations::kMost * static_cast<std::size_t>(list_.k),
+                &facets_.some_bad);
   }
 }
 
@@ -209,13 +213,15 @@ Adjacency::FacetCount Adjacency::MatchFacetsOf(std::uint32_t begin, std::uint32_
       if (good) {
         across_[static_cast<std::size_t>(a.simplex()) * (K + 1) + a.omitted()] = b.simplex();
         across_[static_cast<std::size_t>(b.simplex()) * (K + 1) + b.omitted()] = a.simplex();
-      } else if (count.bad++ == 0) {
+      } else if (count.bad++ < Violations::kMost) {
         std::array<std::uint32_t, K> ids{};
         std::remove_copy(list_[a.simplex()], list_[a.simplex()] + K + 1, ids.begin(),
                          list_[a.simplex()][a.omitted()]);
-        count.first_bad = Message("face ", NameSimplex(ids.data(), K), " is in ", next - i,
-                                  next - i == 1 ? " simplex" : " simplices",
-                                  next - i == 2 ? " that are the same" : "");
+        count.some_bad.insert(count.some_bad.end(), ids.begin(), ids.end());
+        if (count.bad == 1)
+          count.first_bad = Message("face ", NameSimplex(ids.data(), K), " is in ", next - i,
+                                    next - i == 1 ? " simplex" : " simplices",
+                                    next - i == 2 ? " that are the same" : "");
       }
       i = next;
     }
@@ -230,7 +236,7 @@ Connectivity ComputeConnectivity(const Adjacency& adjacency) {
   for (std::uint32_t v = 0; v < list.vertices; ++v) {
     CheckInterruption(v);
     if (!adjacency.Star(v).empty()) continue;
-    if (result.isolated_vertices++ == 0) result.first_isolated = v;
+    if (result.isolated_vertices++ < Violations::kMost) result.some_isolated.push_back(v);
   }
   // Parts that no facet joins may still meet in smaller faces.
   result.components = parts > 1 ? CountComponents(adjacency) : parts;

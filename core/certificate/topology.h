@@ -79,11 +79,14 @@ class Adjacency {
   std::uint64_t bad_facets() const { return facets_.bad; }  // not in exactly two simplices
   // The first bad facet in id order, with the number of simplices it is in; empty if none.
   const std::string& first_bad_facet() const { return facets_.first_bad; }
+  // The first Violations::kMost bad facets, k ids each.
+  const std::vector<std::uint32_t>& some_bad_facets() const { return facets_.some_bad; }
 
  private:
   struct FacetCount {
     std::uint64_t all = 0, bad = 0;
     std::string first_bad;
+    std::vector<std::uint32_t> some_bad;
   };
   void MatchFacets();
   template <int K>
@@ -99,7 +102,7 @@ class Adjacency {
 struct Connectivity {
   std::uint64_t components = 0;         // of the complex; vertices without a simplex not counted
   std::uint64_t isolated_vertices = 0;  // in no simplex
-  std::uint32_t first_isolated = 0;     // meaningful if there is one
+  std::vector<std::uint32_t> some_isolated;  // the first Violations::kMost of them
   bool orientable = false;  // neighbours across facets can be oriented alike, facets being good
   // By simplex, 1 or -1: of the order of its ids. Neighbours across facets are oriented alike.
   // Empty unless orientable.

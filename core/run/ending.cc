@@ -9,6 +9,7 @@
 #include "core/base/message.h"
 #include "core/certificate/evidence.h"
 #include "core/certificate/findings.h"
+#include "core/certificate/first_ids.h"
 #include "core/complex/consistency.h"
 #include "core/geometry/reach_bound.h"
 
@@ -31,7 +32,10 @@ void DescribeUnfinished(const Engine<K>& engine, double epsilon, Certificate* ce
     CheckInterruption(p);
     const auto& cell = complex.cell(p);
     if (!cell.bounded()) continue;
-    certificate->inconsistent_simplices += CountInconsistent<K>(complex, p);
+    const std::uint64_t inconsistent = CountInconsistent<K>(complex, p);
+    certificate->inconsistent_simplices += inconsistent;
+    if (inconsistent > 0)
+      AppendFirst({p}, Violations::kMost, &certificate->violations.inconsistent);
     certificate->max_circumradius =
         std::max(certificate->max_circumradius, std::sqrt(cell.max_norm2()));
     for (std::size_t f = 0; f < cell.facet_count(); ++f) {

@@ -42,7 +42,24 @@ v1::CertificateLevel ToProto(core::CertificateLevel level) {
   return v1::CERTIFICATE_LEVEL_UNSPECIFIED;
 }
 
-void ToProto(const core::Certificate& c, v1::Certificate* out) {
+// Kinds without a fault are not set, nor is a whole without one.
+void ToProto(const core::Violations& violations, int k, v1::Certificate* out) {
+  if (!violations.faces.empty())
+    server::ToProto(violations.faces, static_cast<std::size_t>(k),
+                    out->mutable_violations()->mutable_faces());
+  const auto vertices = [out](const std::vector<std::uint32_t>& ids, auto field) {
+    if (ids.empty()) return;
+    v1::IndexArray* const array = (out->mutable_violations()->*field)();
+    array->add_shape(static_cast<std::uint32_t>(ids.size()));
+    array->set_data(ids.data(), ids.size() * sizeof(ids[0]));
+  };
+  vertices(violations.links, &v1::Violations::mutable_links);
+  vertices(violations.stars, &v1::Violations::mutable_stars);
+  vertices(violations.inconsistent, &v1::Violations::mutable_inconsistent);
+  vertices(violations.fibres, &v1::Violations::mutable_fibres);
+}
+
+void ToProto(const core::Certificate& c, int k, v1::Certificate* out) {
   out->set_certified(c.certified);
   out->set_verdict(c.verdict);
   for (const std::string& warning : c.warnings) out->add_warnings(warning);
@@ -71,6 +88,7 @@ void ToProto(const core::Certificate& c, v1::Certificate* out) {
   out->set_reach_refuted(c.reach_refuted);
   out->set_proved_distance(c.proved_distance);
   out->set_answers_held(c.answers_held);
+  ToProto(c.violations, k, out);
 }
 
 }  // namespace
@@ -127,9 +145,10 @@ v1::Termination ToProto(core::Termination termination) {
   return v1::TERMINATION_UNSPECIFIED;
 }
 
-void ToProto(const SessionView& view, v1::Progress* out) {
-  const core::Progress& p = view.progress;
-  out->set_phase(ToProto(p.phase));
+namespace {
+
+void ToProto(const core::Progress& p, v1::Progress* out) {
+  out->set_phase(server::ToProto(p.phase));
   out->set_round(p.round);
   out->set_queries(p.queries);
   out->set_vertices(p.vertices);
@@ -140,14 +159,44 @@ void ToProto(const SessionView& view, v1::Progress* out) {
   out->set_bad_sliver(p.bad_sliver);
   out->set_bad_inconsistent(p.bad_inconsistent);
   out->set_fraction(p.fraction);
+}
+
+}  // namespace
+
+void ToProto(const SessionView& view, v1::Progress* out) {
+  ToProto(view.progress, out);
   out->set_elapsed_seconds(view.elapsed_seconds);
   out->set_remaining_seconds(view.remaining_seconds);
 }
 
-void ToProto(const core::Report& report, v1::Report* out) {
+void ToProto(const core::Report& report, int k, v1::Report* out) {
   out->set_termination(ToProto(report.termination));
   ToProto(report.counts, out->mutable_counts());
-  ToProto(report.certificate, out->mutable_certificate());
+  ToProto(report.certificate, k, out->mutable_certificate());
+}
+
+void ToProto(const std::vector<CrewMember>& crew, v1::Mesh* out) {
+  for (const CrewMember& member : crew) {
+    v1::WorkerStatus* const worker = out->add_crew();
+    worker->set_number(member.id);
+    worker->set_title(member.title);
+    worker->set_queries(member.queries);
+    worker->set_chunks(member.chunks);
+    worker->set_fixed_seconds(member.fixed_seconds);
+    worker->set_each_seconds(member.each_seconds);
+    worker->set_newest_chunk(member.newest);
+    worker->set_holds(member.holds);
+    worker->set_lagging(member.lagging);
+  }
+}
+
+void ToProto(const std::vector<PastProgress>& past, v1::Mesh* out) {
+  for (const PastProgress& then : past) {
+    v1::PastProgress* const row = out->add_past_progress();
+    row->set_revision(then.revision);
+    ToProto(then.progress, row->mutable_progress());
+    row->mutable_progress()->set_elapsed_seconds(then.elapsed_seconds);
+  }
 }
 
 void ToProto(const Session& session, v1::Mesh* out) {
@@ -168,7 +217,7 @@ void ToProto(const Session& session, v1::Mesh* out) {
   ToProto(view, out->mutable_progress());
   if (view.report) {
     v1::Report* const report = out->mutable_report();
-    ToProto(*view.report, report);
+    ToProto(*view.report, request.spec.dimension, report);
     report->set_elapsed_seconds(view.elapsed_seconds);
     if (view.state == SessionState::kFailed) {
       report->set_termination(v1::TERMINATION_ORACLE_FAILED);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "core/report.h"
 #include "server/history/watch_log.h"
 #include "server/session/session.h"
@@ -13,7 +15,10 @@ v1::Phase ToProto(core::Phase phase);
 v1::Termination ToProto(core::Termination termination);
 
 void ToProto(const SessionView& view, v1::Progress* out);
-void ToProto(const core::Report& report, v1::Report* out);
+void ToProto(const core::Report& report, int k, v1::Report* out);
+// Add to what a mesh says of itself.
+void ToProto(const std::vector<CrewMember>& crew, v1::Mesh* out);
+void ToProto(const std::vector<PastProgress>& past, v1::Mesh* out);
 // State, progress and report; no geometry, neither the mesh's nor the seeds'.
 void ToProto(const Session& session, v1::Mesh* out);
 // `d`: ambient dimension; `k`: dimension.

@@ -188,6 +188,7 @@ Lease Dispatch::Give(WorkerId id, Lease lease, TimePoint now) {
   lease.queued = !worker.leases.empty();
   worker.leases.push_back(lease);
   ++worker.unanswered;
+  if (!lease.check) worker.newest_chunk = static_cast<std::uint64_t>(lease.count);
   return lease;
 }
 
@@ -296,6 +297,8 @@ Dispatch::ClaimResult Dispatch::Claim(WorkerId worker_id, LeaseId id, TimePoint 
                                [id](const Lease& l) { return l.id == id; });
   if (it == worker.leases.end()) return ClaimResult::kLate;
   *lease = *it;
+  worker.answered_queries += static_cast<std::uint64_t>(lease->count);
+  ++worker.answered_chunks;
   const bool oldest = it == worker.leases.begin();
   worker.leases.erase(it);
   // A handful of queries to check says nothing.

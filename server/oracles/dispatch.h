@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "server/base/clock.h"
+#include "server/oracles/crew.h"
 #include "server/oracles/pace.h"
 
 namespace stellate::server {
@@ -95,6 +96,8 @@ class Dispatch {
   void Join(WorkerId worker, std::uint32_t max_chunk);
   void Leave(WorkerId worker, TimePoint now);
   std::size_t workers() const { return workers_.size(); }
+  // All workers, without their titles; the earliest first.
+  std::vector<CrewMember> Crew() const;
 
   // Hands out what the workers can take now.
   std::vector<Lease> Assign(TimePoint now);
@@ -130,7 +133,8 @@ class Dispatch {
     double check_credit = 1;       // queries that it may be asked on top
     bool stalled = false;          // let a lease run out and has not answered since
     std::uint64_t unanswered = 0;  // chunks sent less answers come, late ones too
-    std::deque<Lease> leases;      // oldest first; only the first one's time runs
+    std::uint64_t answered_queries = 0, answered_chunks = 0, newest_chunk = 0;  // for Crew
+    std::deque<Lease> leases;  // oldest first; only the first one's time runs
 
     // Is still at something that nobody waits for any more, or has stopped answering.
     bool Lagging() const { return stalled || unanswered > leases.size(); }

@@ -129,6 +129,8 @@ class OraclePool {
   void Close(const WorkerEnd& end);
 
   std::size_t workers() const { return worker_count_; }
+  // Who they are, the earliest first.
+  std::vector<CrewMember> Crew() const;
   // Queries of the round that have no answer yet.
   std::size_t waiting() const;
 
@@ -167,7 +169,7 @@ class OraclePool {
   WorkerId next_worker_ = 1;
   std::shared_ptr<Round> round_;
   std::vector<std::shared_ptr<const SecondAnswer>> seconds_;  // of the round
-  std::unordered_map<WorkerId, std::string> titles_;          // of those who answered in the round
+  std::unordered_map<WorkerId, std::string> titles_;  // of those here or who answered in the round
   std::optional<MeshFailure> failure_;
   bool interrupted_ = false;
   bool closed_ = false;

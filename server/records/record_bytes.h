@@ -62,6 +62,9 @@ class RecordWriter {
   }
   void Bytes(const std::string& bytes) { Array(bytes.data(), bytes.size()); }
   void Bytes(const std::vector<std::uint8_t>& bytes) { Array(bytes.data(), bytes.size()); }
+  void Ids(const std::vector<std::uint32_t>& ids) {
+    Array(ids.data(), ids.size() * sizeof(ids[0]));
+  }
   void Strings(const std::vector<std::string>& strings) {
     Number(strings.size());
     for (const std::string& string : strings) Bytes(string);
@@ -110,6 +113,12 @@ class RecordReader {
   void Bytes(Container& bytes) {
     const std::string_view data = Array();
     bytes.assign(data.begin(), data.end());
+  }
+  void Ids(std::vector<std::uint32_t>& ids) {
+    const std::string_view data = Array();
+    good_ = good_ && data.size() % sizeof(ids[0]) == 0;
+    ids.resize(good_ ? data.size() / sizeof(ids[0]) : 0);
+    if (!ids.empty()) std::memcpy(ids.data(), data.data(), data.size());
   }
   void Strings(std::vector<std::string>& strings) {
     std::uint64_t count = 0;

@@ -68,7 +68,6 @@ void LayOutReport(Archive& archive, Value& report) {
   archive.Number(certificate.proved_distance);
 }
 
-// Follows what other meshes have: records without walls are as they were.
 template <typename Archive, typename Value>
 void LayOutBoundary(Archive& archive, Value& certificate) {
   archive.Number(certificate.boundary_simplices);
@@ -89,6 +88,35 @@ void LayOutBoundary(Archive& archive, Value& certificate) {
   }
 }
 
+template <typename Archive, typename Value>
+void LayOutViolations(Archive& archive, Value& violations) {
+  for (auto* ids : {&violations.faces, &violations.links, &violations.stars,
+                    &violations.inconsistent, &violations.fibres}) {
+    archive.Ids(*ids);
+  }
+}
+
+void LayOutPast(RecordWriter& archive, const ProgressHistory& past) {
+  archive.Number(past.all().size());
+  for (const PastProgress& p : past.all()) {
+    archive.Number(p.revision);
+    LayOutProgress(archive, p.progress);
+    archive.Number(p.elapsed_seconds);
+  }
+}
+
+void LayOutPast(RecordReader& archive, ProgressHistory& past) {
+  std::uint64_t count = 0;
+  archive.Number(count);
+  for (std::uint64_t i = 0; i < count && archive.good(); ++i) {
+    PastProgress p;
+    archive.Number(p.revision);
+    LayOutProgress(archive, p.progress);
+    archive.Number(p.elapsed_seconds);
+    past.Add(std::move(p));
+  }
+}
+
 }  // namespace
 
 std::string EncodeResult(const SessionResult& result, std::uint64_t parts) {
@@ -98,7 +126,9 @@ std::string EncodeResult(const SessionResult& result, std::uint64_t parts) {
   writer.Number(result.revision);
   writer.Number(result.history_bytes);
   writer.Number(parts);
-  if (!result.report.certificate.faces.empty()) LayOutBoundary(writer, result.report.certificate);
+  LayOutBoundary(writer, result.report.certificate);
+  LayOutViolations(writer, result.report.certificate.violations);
+  LayOutPast(writer, result.past);
   return writer.Take();
 }
 
@@ -110,7 +140,12 @@ std::optional<SessionResult> DecodeResult(std::string_view record, std::uint64_t
   reader.Number(result.revision);
   reader.Number(result.history_bytes);
   reader.Number(*parts);
+  // Records of earlier servers end before the boundary, or after it.
   if (!reader.Complete()) LayOutBoundary(reader, result.report.certificate);
+  if (!reader.Complete()) {
+    LayOutViolations(reader, result.report.certificate.violations);
+    LayOutPast(reader, result.past);
+  }
   if (!reader.Complete()) return std::nullopt;
   return result;
 }

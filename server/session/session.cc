@@ -20,6 +20,8 @@ TimePoint CreatedAt(std::chrono::system_clock::time_point create_time) {
   return Clock::now() - AgeOf(create_time);
 }
 
+double Seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
+
 // Fields that tell a mesh from others, where its name says nothing.
 LogFields WhatItIs(const MeshRequest& request) {
   return LogFields().Add("owner", request.owner).Add("label", request.label);
@@ -77,6 +79,7 @@ Session::Session(SessionOptions options, MesherFactory factory)
   final_seconds_ = end.elapsed_seconds;
   failure_ = end.failure;
   progress_ = result.progress;
+  past_ = result.past;
   report_ = result.report;
   revision_ = result.revision;
   history_bytes_ = result.history_bytes;
@@ -256,12 +259,15 @@ bool Session::Absorb(core::Mesher* mesher, const core::Answers& answers) {
 // How the mesh stands, and what has changed since it was last shown.
 std::optional<MeshFailure> Session::PublishRound(core::Mesher* mesher) {
   if (unseen_) {
+    const std::uint64_t revision = unseen_->revision;
     const core::Status logged = history_->Append(*unseen_);  // it is there until the end
     unseen_.reset();
     if (!logged.ok()) {
       return MeshFailure{FailureReason::kInternal,
                          core::Message("a fault of the server: ", logged.message)};
     }
+    const std::lock_guard lock(mutex_);
+    past_.Add({revision, mesher->progress(), replaying_ ? 0 : Seconds(Clock::now() - created_)});
   }
   {
     const std::lock_guard lock(mutex_);
@@ -312,8 +318,7 @@ void Session::Finish(const core::Report* report) {
       failure_ = ToMeshFailure(report->failure);
     }
     end = {FinalState(report), std::max(std::chrono::system_clock::now(), create_time_),
-           std::chrono::duration<double>(Clock::now() - created_).count(), failure_,
-           progress_.round};
+           Seconds(Clock::now() - created_), failure_, progress_.round};
     suspended = suspended_ && end.state == SessionState::kCancelled;
     ending_ = true;
   }
@@ -355,7 +360,8 @@ void Session::Finish(const core::Report* report) {
 // room for it, the next server replays these once more.
 void Session::RecordResult() {
   if (!end_is_recorded_) return;
-  const SessionResult result{progress_, *report_, history_->revision(), history_->MemoryBytes()};
+  const SessionResult result{progress_, *report_, history_->revision(), history_->MemoryBytes(),
+                             past_};
   if (const auto failure = ports().journal->WriteResult(result, *history_)) {
     Log(LogLevel::kWarning, log_context(),
         core::Message("the next server will have to replay the mesh: ", failure->message));

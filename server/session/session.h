@@ -111,6 +111,8 @@ class Session {
   // The newest revision that anyone may have seen: while a recorded mesh is replayed, the one at
   // which the replay will end.
   std::uint64_t PublishedRevision() const;
+  // How it stood at revisions after this one.
+  std::vector<PastProgress> PastAfter(std::uint64_t revision) const;
   bool HasVertices() const;
   bool HasEnded() const;           // state, report and history are final
   LogContext log_context() const;  // in the round that was last shown
@@ -176,6 +178,7 @@ class Session {
   std::optional<std::chrono::system_clock::time_point> end_time_;
   double final_seconds_ = 0;
   core::Progress progress_;
+  ProgressHistory past_;
   std::optional<core::Report> report_;
   MeshFailure failure_;
   std::vector<std::weak_ptr<SessionWatcher>> watchers_;

@@ -11,6 +11,7 @@
 #include "server/history/watch_log.h"
 #include "server/oracles/oracle_pool.h"
 #include "server/session/mesh_request.h"
+#include "server/session/progress_history.h"
 #include "server/session/session_state.h"
 
 namespace stellate::server {
@@ -33,6 +34,7 @@ struct SessionResult {
   core::Report report;
   std::uint64_t revision = 0;
   std::uint64_t history_bytes = 0;  // in memory, about
+  ProgressHistory past;             // empty in records of earlier servers
 };
 
 // What a journal knows of a mesh that an earlier server left.

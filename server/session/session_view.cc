@@ -168,6 +168,11 @@ SessionView Session::View() const {
   return view;
 }
 
+std::vector<PastProgress> Session::PastAfter(std::uint64_t revision) const {
+  const std::lock_guard lock(mutex_);
+  return past_.After(revision);
+}
+
 bool Session::HasVertices() const {
   const std::lock_guard lock(mutex_);
   return progress_.vertices > 0;

@@ -145,6 +145,24 @@ std::string CountsJson(const Counts& n) {
   return json.Take();
 }
 
+std::string IdsJson(const std::vector<std::uint32_t>& ids) {
+  std::string text;
+  for (const std::uint32_t id : ids) text += (text.empty() ? "" : ", ") + std::to_string(id);
+  return "[" + text + "]";
+}
+
+std::string ViolationsJson(const Violations& v) {
+  JsonObject json;
+  std::string faces;
+  for (const auto& ids : v.faces) faces += (faces.empty() ? "" : ", ") + IdsJson(ids);
+  json.Raw("faces", "[" + faces + "]");
+  json.Raw("links", IdsJson(v.links));
+  json.Raw("stars", IdsJson(v.stars));
+  json.Raw("inconsistent", IdsJson(v.inconsistent));
+  json.Raw("fibres", IdsJson(v.fibres));
+  return json.Take();
+}
+
 std::string CertificateJson(const Certificate& c) {
   JsonObject json;
   json.Add("certified", c.certified);
@@ -179,6 +197,7 @@ std::string CertificateJson(const Certificate& c) {
   json.Add("reach_refuted", c.reach_refuted);
   json.Add("proved_distance", c.proved_distance);
   json.Add("answers_held", c.answers_held);
+  json.Raw("violations", ViolationsJson(c.violations));
   return json.Take();
 }
 

@@ -158,6 +158,29 @@ Progress FromProto(const v1::Progress& m) {
   return p;
 }
 
+namespace {
+
+std::vector<std::uint32_t> Ids(const v1::IndexArray& array) {
+  std::vector<std::uint32_t> ids(array.data().size() / sizeof(std::uint32_t));
+  if (!ids.empty()) std::memcpy(ids.data(), array.data().data(), ids.size() * sizeof(ids[0]));
+  return ids;
+}
+
+Violations FromProto(const v1::Violations& m) {
+  Violations v{{}, Ids(m.links()), Ids(m.stars()), Ids(m.inconsistent()), Ids(m.fibres())};
+  const std::vector<std::uint32_t> ids = Ids(m.faces());
+  const std::size_t width = m.faces().shape_size() == 2 ? m.faces().shape(1) : 0;
+  if (width == 0) return v;
+  for (auto at = ids.begin(); ids.end() - at >= static_cast<std::ptrdiff_t>(width);) {
+    const auto next = at + static_cast<std::ptrdiff_t>(width);
+    v.faces.emplace_back(at, next);
+    at = next;
+  }
+  return v;
+}
+
+}  // namespace
+
 Report ReportOf(const v1::Mesh& mesh) {
   const v1::Report& m = mesh.report();
   Report r;
@@ -210,6 +233,7 @@ Report ReportOf(const v1::Mesh& mesh) {
   out.reach_refuted = c.reach_refuted();
   out.proved_distance = c.proved_distance();
   out.answers_held = c.answers_held();
+  out.violations = FromProto(c.violations());
   return r;
 }
 

@@ -53,7 +53,7 @@ from .implicit import ImplicitManifold  # noqa: E402
 from .oracle import Oracle  # noqa: E402
 from .oracles import ImplicitSolid  # noqa: E402
 from .progress import ProgressBar, progress_bar  # noqa: E402
-from .report import Certificate, Counts, Failure, Progress, Report  # noqa: E402
+from .report import Certificate, Counts, Failure, Progress, Report, Violations  # noqa: E402
 
 __all__ = [
     "Cancelled",
@@ -95,6 +95,7 @@ __all__ = [
     "Unavailable",
     "UncertifiedWarning",
     "ViewerNotFound",
+    "Violations",
     "check",
     "check_save",
     "download",

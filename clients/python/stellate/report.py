@@ -9,6 +9,8 @@ import re
 import textwrap
 from typing import Any
 
+import numpy as np
+
 from . import _html
 from ._generated import mesh_pb2 as pb
 from ._version import __version__
@@ -65,6 +67,40 @@ class Counts:
     duplicates: int  # answers that fell on an existing sample point
 
 
+def _ids(array: Any) -> list[Any]:
+    """Of an IndexArray, nested as its shape is."""
+    ids: list[Any] = np.frombuffer(array.data, "<u4").reshape(tuple(array.shape) or 0).tolist()
+    return ids
+
+
+@dataclasses.dataclass(frozen=True)
+class Violations:
+    """Where a mesh is at fault: of each kind the first 100 that the certificate counts, ascending.
+
+    All but `faces` are vertex ids.
+    """
+
+    # (k-1)-faces that are not in exactly two simplices, k ids each; with a boundary, the number of
+    # vertices stands for what is beyond it
+    faces: tuple[tuple[int, ...], ...] = ()
+    links: tuple[int, ...] = ()  # whose link is no sphere
+    stars: tuple[int, ...] = ()  # whose star overlaps itself
+    inconsistent: tuple[int, ...] = ()  # whose star has a simplex that is not in all stars
+    fibres: tuple[int, ...] = ()  # near which a normal flat fails
+
+    @classmethod
+    def from_wire(cls, message: pb.Violations) -> Violations:
+        kinds = [field.name for field in dataclasses.fields(cls)]
+        return cls.from_fields({kind: _ids(getattr(message, kind)) for kind in kinds})
+
+    @classmethod
+    def from_fields(cls, fields: dict[str, Any]) -> Violations:
+        """Back from dataclasses.asdict(violations), or from JSON of it."""
+        plain: dict[str, Any] = {kind: tuple(ids) for kind, ids in fields.items()}
+        plain["faces"] = tuple(map(tuple, plain["faces"]))
+        return cls(**plain)
+
+
 @dataclasses.dataclass(frozen=True)
 class Certificate:
     """What was computed from the finished complex. Lengths are in the units of the coordinates."""
@@ -97,6 +133,7 @@ class Certificate:
     reach_refuted: bool  # points of the manifold contradict it; the verdict names them
     proved_distance: float  # PROVED: bounds the Hausdorff distance to the components it meets
     answers_held: int = 0  # answers of the whole run, beside vertices, held against the mesh
+    violations: Violations = Violations()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -172,6 +209,8 @@ class Report:
         """Back from dataclasses.asdict(report)."""
         failure, certificate = fields["failure"], dict(fields["certificate"])
         certificate["warnings"] = tuple(certificate["warnings"])
+        if "violations" in certificate:  # checkpoints of earlier versions lack it
+            certificate["violations"] = Violations.from_fields(certificate["violations"])
         more = {
             "failure": failure and Failure(**failure),
             "counts": Counts(**fields["counts"]),
@@ -234,7 +273,8 @@ class Report:
 
 def _certificate(message: pb.Certificate) -> Certificate:
     plain = _copy_fields(Certificate, message)
-    return dataclasses.replace(plain, level=enums.level(message.level))
+    violations = Violations.from_wire(message.violations)
+    return dataclasses.replace(plain, level=enums.level(message.level), violations=violations)
 
 
 def _plain_verdict(c: Certificate) -> str:
@@ -246,7 +286,7 @@ def _for_json(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _for_json(entry) for key, entry in value.items()}
     if isinstance(value, tuple):
-        return list(value)
+        return [_for_json(entry) for entry in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

@@ -64,6 +64,9 @@ TEST(ReportJson, IsThatOfAllClients) {
   report.certificate.verdict = "3 links";
   report.certificate.warnings = {"coarse", "dear"};
   report.certificate.bad_links = 3;
+  report.certificate.violations.faces = {{1, 2}, {1, 5}};
+  report.certificate.violations.stars = {7};
+  report.certificate.violations.fibres = {0, 3};
   report.certificate.max_circumradius = 0.25;
   report.certificate.estimated_reach = std::numeric_limits<double>::infinity();
   report.certificate.components = 1;
@@ -82,7 +85,9 @@ TEST(ReportJson, IsThatOfAllClients) {
       R"("min_angle_degrees": 0, "max_tangent_angle_degrees": 0, "max_barycentre_distance": 0, )"
       R"("estimated_reach": null, "epsilon_over_reach": 0, "components": 1, )"
       R"("euler_characteristic": -8, "orientable": false, "level": "UNKNOWN", )"
-      R"("declared_reach": 0, "reach_refuted": false, "proved_distance": 0, "answers_held": 0}, )"
+      R"("declared_reach": 0, "reach_refuted": false, "proved_distance": 0, "answers_held": 0, )"
+      R"("violations": {"faces": [[1, 2], [1, 5]], "links": [], "stars": [7], )"
+      R"("inconsistent": [], "fibres": [0, 3]}}, )"
       R"("elapsed_seconds": 0.5, )"
       R"("version": "0.1.0"})");
   report.epsilon = 0;

@@ -128,7 +128,9 @@ AS_JSON = (
     '"min_angle_degrees": 0, "max_tangent_angle_degrees": 0, "max_barycentre_distance": 0, '
     '"estimated_reach": null, "epsilon_over_reach": 0, "components": 1, '
     '"euler_characteristic": -8, "orientable": false, "level": "UNKNOWN", '
-    '"declared_reach": 0, "reach_refuted": false, "proved_distance": 0, "answers_held": 0}, "elapsed_seconds": 0.5, '
+    '"declared_reach": 0, "reach_refuted": false, "proved_distance": 0, "answers_held": 0, '
+    '"violations": {"faces": [[1, 2], [1, 5]], "links": [], "stars": [7], "inconsistent": [], '
+    '"fibres": [0, 3]}}, "elapsed_seconds": 0.5, '
     f'"version": "{stellate.__version__}"}}'
 )
 
@@ -142,7 +144,14 @@ def test_a_report_is_the_json_of_all_clients():
     certificate.warnings.extend(["coarse", "dear"])
     certificate.max_circumradius, certificate.estimated_reach = 0.25, float("inf")
     certificate.components, certificate.euler_characteristic = 1, -8
+    for kind, ids in {"faces": [[1, 2], [1, 5]], "stars": [7], "fibres": [0, 3]}.items():
+        array = np.array(ids, dtype="<u4")
+        wire = getattr(certificate.violations, kind)
+        wire.shape.extend(array.shape)
+        wire.data = array.tobytes()
     ours = stellate.Report.from_wire(message, 0.1)
+    assert stellate.Report.from_fields(dataclasses.asdict(ours)) == ours
+    assert stellate.Report.from_fields(json.loads(json.dumps(dataclasses.asdict(ours)))) == ours
     assert list(json.loads(AS_JSON)) == list(ours.to_dict())  # in this order
     assert json.loads(ours.to_json()) == json.loads(AS_JSON) == ours.to_dict()
     assert len(ours.to_json(indent=2).splitlines()) > 40

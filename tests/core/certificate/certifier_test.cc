@@ -133,6 +133,7 @@ TEST(Certifier, ForgivesASmallErrorAndMentionsIt) {
 
 TEST(Certifier, RefusesAMissingTriangle) {
   HandmadeMesh mesh = Icosphere(3);
+  const std::vector<std::uint32_t> hole(&mesh.simplices[17 * 3], &mesh.simplices[18 * 3]);
   mesh.RemoveSimplex(17);
   const Certificate c = Certify(SpecificationFor(mesh, 0.2), mesh, ClosestOnSphere).certificate;
   EXPECT_FALSE(c.certified);
@@ -140,6 +141,10 @@ TEST(Certifier, RefusesAMissingTriangle) {
   EXPECT_EQ(c.bad_faces, 3u);
   EXPECT_EQ(c.bad_links, 3u);
   EXPECT_EQ(c.unembedded_stars, 3u);
+  EXPECT_EQ(c.violations.faces,
+            (std::vector{hole[0], hole[1], hole[0], hole[2], hole[1], hole[2]}));
+  EXPECT_EQ(c.violations.links, hole);
+  EXPECT_EQ(c.violations.stars, hole);
   EXPECT_TRUE(Says(c.verdict, "not closed")) << c.verdict;
   EXPECT_TRUE(Says(c.verdict, "is in 1 simplex")) << c.verdict;
 }
@@ -151,6 +156,7 @@ TEST(Certifier, RefusesAVertexWithoutSimplices) {
   const Certificate c = Certify(SpecificationFor(mesh, 0.2), mesh, ClosestOnSphere).certificate;
   EXPECT_FALSE(c.certified);
   EXPECT_TRUE(Says(c.verdict, "is in no simplex")) << c.verdict;
+  EXPECT_EQ(c.violations.links, std::vector{mesh.vertices() - 1});
 }
 
 TEST(Certifier, RefusesADoubledSheet) {
@@ -161,6 +167,8 @@ TEST(Certifier, RefusesADoubledSheet) {
   EXPECT_EQ(c.components, 2u);
   EXPECT_FALSE(c.certified);
   EXPECT_EQ(c.fibre_failures, c.fibre_samples);
+  EXPECT_EQ(c.violations.fibres.size(), Violations::kMost);
+  EXPECT_TRUE(std::is_sorted(c.violations.fibres.begin(), c.violations.fibres.end()));
   EXPECT_TRUE(Says(c.verdict, "meets the mesh 2 times")) << c.verdict;
 }
 

@@ -245,6 +245,12 @@ def test_a_budget_that_is_spent_leaves_an_uncertified_mesh(limit, end, server):
     assert mesh.report.termination == end
     assert not mesh.certified
     assert limit in str(mesh.report)
+    certificate = mesh.report.certificate
+    at_fault = certificate.violations.inconsistent
+    assert len(at_fault) <= certificate.inconsistent_simplices
+    assert bool(at_fault) == (certificate.inconsistent_simplices > 0) == (limit == "max_rounds")
+    assert list(at_fault) == sorted(set(at_fault))
+    assert all(vertex < mesh.report.counts.vertices for vertex in at_fault)
 
 
 def test_a_mesh_that_has_to_be_certified(server):

@@ -66,6 +66,7 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
     return revisions;
   };
   std::uint64_t bytes = 0;
+  std::vector<PastProgress> past;
   {
     const auto journal = Open();
     Session session(RecordedSphere(journal->NewMesh(), 0.1));
@@ -73,6 +74,7 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
     const auto worker = FakeWorker::Join(&session.pool());
     thread.join();
     before = session.View();
+    past = session.PastAfter(0);
     wholes = all_of(*session.history());
     bytes = session.history()->MemoryBytes();
   }
@@ -90,6 +92,16 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
   EXPECT_EQ(session.View().revision, before.revision);
   EXPECT_EQ(session.PublishedRevision(), before.revision);
   EXPECT_EQ(session.View().report->certificate.euler_characteristic, 2);
+  ASSERT_EQ(past.size(), before.revision);
+  ASSERT_EQ(session.PastAfter(0).size(), past.size());
+  for (std::size_t i = 0; i < past.size(); ++i) {
+    const PastProgress then = session.PastAfter(0)[i];
+    EXPECT_EQ(then.revision, i + 1);
+    EXPECT_EQ(then.progress.vertices, past[i].progress.vertices);
+    EXPECT_EQ(then.progress.bad_size, past[i].progress.bad_size);
+    EXPECT_EQ(then.elapsed_seconds, past[i].elapsed_seconds);
+  }
+  EXPECT_EQ(past.back().progress.vertices, before.progress.vertices);
   EXPECT_EQ(budget->total(), EstimateFinishedBytes(session.request().spec));
   EXPECT_EQ(session.LoadHistory(), Session::Loading::kNoMemory);
   EXPECT_EQ(session.history(), nullptr);

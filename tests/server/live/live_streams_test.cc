@@ -85,6 +85,43 @@ TEST_F(LiveStreamsTest, TheMeshGrowsBeforeItsWatcherAndIsCertified) {
   EXPECT_EQ(worker.over(), "MESH_STATE_SUCCEEDED");
 }
 
+TEST_F(LiveStreamsTest, AMeshTellsOfItsPastAndItsCrewWhenAsked) {
+  Start();
+  const std::string name = CreateSphere(0.1);
+  const auto look = [&](bool crew, std::optional<std::uint64_t> after) {
+    v1::GetMeshRequest request;
+    request.set_name(name);
+    request.set_crew(crew);
+    if (after) request.set_past_progress_after(*after);
+    grpc::ClientContext context;
+    v1::Mesh mesh;
+    EXPECT_TRUE(stub_->GetMesh(&context, request, &mesh).ok());
+    return mesh;
+  };
+  {
+    RawWorker silent(stub_.get(), name, [](const auto&) { return std::nullopt; });
+    v1::Mesh mesh;
+    while ((mesh = look(true, {})).crew_size() == 0) std::this_thread::yield();
+    EXPECT_EQ(mesh.crew(0).title().substr(0, 8), "test at ");
+    EXPECT_EQ(mesh.crew(0).queries(), 0u);
+  }
+  Copy copy;
+  RawWorker worker(stub_.get(), name);
+  const v1::Mesh final = Follow(name, &copy);
+  EXPECT_EQ(look(false, {}).past_progress_size(), 0);
+  EXPECT_EQ(look(true, {}).crew_size(), 0) << "nobody serves it any more";
+  const v1::Mesh whole = look(false, 0);
+  ASSERT_EQ(static_cast<std::uint64_t>(whole.past_progress_size()), final.revision());
+  std::uint64_t broken = 0;
+  for (int i = 0; i < whole.past_progress_size(); ++i) {
+    EXPECT_EQ(whole.past_progress(i).revision(), i + 1u);
+    broken += whole.past_progress(i).progress().bad_size();
+  }
+  EXPECT_GT(broken, 0u) << "rule R1 made the mesh";
+  EXPECT_EQ(whole.past_progress().rbegin()->progress().vertices(), copy.vertices);
+  EXPECT_EQ(look(false, final.revision() - 2).past_progress_size(), 2);
+}
+
 TEST_F(LiveStreamsTest, AWatcherResumesFromARevision) {
   Start();
   const std::string name = CreateSphere(0.1);

@@ -236,6 +236,34 @@ TEST_F(OraclePoolTest, WorkersThatAgreeAreComparedAndLeftInPeace) {
   EXPECT_EQ(counts->disagreements, 0u);
 }
 
+TEST_F(OraclePoolTest, TellsWhatEachWorkerDid) {
+  options_.straggler_unknown = options_.straggler_floor = 1h;
+  options_.check_share = 0;
+  OraclePool pool(spec_, options_, 8);
+  const auto idle = std::make_shared<HandWorker>("left out");
+  const auto busy = std::make_shared<HandWorker>("from the far side");
+  const WorkerId first = *pool.Join(busy, 0);
+  auto asking = Ask(&pool);
+  const Chunk chunk = busy->Take();
+  EXPECT_EQ(pool.Crew().at(0).holds, static_cast<std::uint64_t>(chunk.count));
+  TakeAnswer(&pool, first, chunk);
+  const Chunk next = busy->Take();
+  pool.Join(idle, 0);
+  const std::vector<CrewMember> crew = pool.Crew();
+  ASSERT_EQ(crew.size(), 2u);
+  EXPECT_EQ(crew[0].id, first);
+  EXPECT_EQ(crew[0].title, "from the far side");
+  EXPECT_EQ(crew[0].queries, static_cast<std::uint64_t>(chunk.count));
+  EXPECT_EQ(crew[0].chunks, 1u);
+  EXPECT_EQ(crew[0].newest, static_cast<std::uint64_t>(next.count));
+  EXPECT_GT(crew[0].each_seconds + crew[0].fixed_seconds, 0);
+  EXPECT_EQ(crew[1].title, "left out");
+  EXPECT_EQ(crew[1].queries, 0u);
+  EXPECT_EQ(crew[1].each_seconds, 0);
+  pool.Interrupt();
+  asking.get();
+}
+
 TEST_F(OraclePoolTest, WorkersThatServeDifferentManifoldsFailTheRound) {
   options_.straggler_unknown = options_.straggler_floor = 1h;
   for (const bool liar_first : {true, false}) {

@@ -58,6 +58,18 @@ enum class CertificateLevel {
 };
 const char* CertificateLevelName(CertificateLevel level);  // "PROVED", ...
 
+// Where a mesh is at fault: vertex ids, ascending, of the first 100 of each kind that the
+// certificate counts.
+struct Violations {
+  // (k-1)-faces that are not in exactly two simplices, k ids each. With a boundary, the number of
+  // vertices stands for what is beyond it.
+  std::vector<std::vector<std::uint32_t>> faces;
+  std::vector<std::uint32_t> links;         // whose link is no sphere
+  std::vector<std::uint32_t> stars;         // whose star overlaps itself
+  std::vector<std::uint32_t> inconsistent;  // whose star has a simplex that is not in all stars
+  std::vector<std::uint32_t> fibres;        // near which a normal flat fails
+};
+
 // What the server computed from the finished complex. Lengths are in the coordinates' unit.
 struct Certificate {
   bool certified = false;  // every claim holds and the run converged
@@ -95,6 +107,7 @@ struct Certificate {
 
   std::uint64_t answers_held =
       0;  // answers of the whole run, beside vertices, held against the mesh
+  Violations violations;
 };
 
 struct Report {

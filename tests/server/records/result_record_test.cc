@@ -1,0 +1,64 @@
+// What a mesh came to, on the disk.
+
+#include <gtest/gtest.h>
+
+#include <string_view>
+#include <vector>
+
+#include "server/records/journal_format.h"
+
+namespace stellate::server {
+namespace {
+
+SessionResult Refused() {
+  SessionResult result;
+  result.revision = 9;
+  result.report.certificate.verdict = "Not certified";
+  result.report.certificate.violations.faces = {1, 2, 1, 5};
+  result.report.certificate.violations.stars = {3, 8};
+  for (const std::uint64_t revision : {4, 9}) {
+    PastProgress past;
+    past.revision = revision;
+    past.progress.bad_size = 10 * revision;
+    past.elapsed_seconds = 0.5;
+    result.past.Add(past);
+  }
+  return result;
+}
+
+TEST(ResultRecord, HoldsWhereAMeshIsAtFaultAndHowItStood) {
+  std::uint64_t parts = 0;
+  const auto read = DecodeResult(EncodeResult(Refused(), 2), &parts);
+  ASSERT_TRUE(read);
+  EXPECT_EQ(parts, 2u);
+  const core::Violations& violations = read->report.certificate.violations;
+  EXPECT_EQ(violations.faces, (std::vector<std::uint32_t>{1, 2, 1, 5}));
+  EXPECT_TRUE(violations.links.empty());
+  EXPECT_EQ(violations.stars, (std::vector<std::uint32_t>{3, 8}));
+  ASSERT_EQ(read->past.all().size(), 2u);
+  EXPECT_EQ(read->past.all()[0].revision, 4u);
+  EXPECT_EQ(read->past.all()[1].progress.bad_size, 90u);
+  EXPECT_EQ(read->past.all()[1].elapsed_seconds, 0.5);
+}
+
+// Those of earlier servers end before the boundary, or behind it; what ends elsewhere is damaged.
+TEST(ResultRecord, EarlierOnesAreRead) {
+  const std::string record = EncodeResult(Refused(), 2);
+  std::vector<std::size_t> whole;
+  for (std::size_t bytes = 0; bytes <= record.size(); ++bytes) {
+    std::uint64_t parts = 0;
+    const auto read = DecodeResult(std::string_view(record).substr(0, bytes), &parts);
+    if (!read) continue;
+    whole.push_back(bytes);
+    EXPECT_EQ(parts, 2u);
+    EXPECT_EQ(read->revision, 9u);
+    EXPECT_EQ(read->report.certificate.verdict, "Not certified");
+    EXPECT_EQ(read->past.all().empty(), bytes < record.size());
+    EXPECT_EQ(read->report.certificate.violations.stars.empty(), bytes < record.size());
+  }
+  ASSERT_EQ(whole.size(), 3u);
+  EXPECT_EQ(whole.back(), record.size());
+}
+
+}  // namespace
+}  // namespace stellate::server
