@@ -18,7 +18,7 @@ import numpy as np
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "clients" / "python"))
 
 import stellate  # noqa: E402
-from stellate import manifolds  # noqa: E402
+from stellate import manifolds, oracles  # noqa: E402
 
 
 class TwoSpheres:
@@ -51,6 +51,10 @@ SHAPES = {
     "torus": lambda: manifolds.Torus(1.0, 0.4),
     "two spheres": TwoSpheres,
     "flat torus": lambda: manifolds.ProductOfCircles([1.0, 1.0, 1.0]),
+    "octant": lambda: oracles.Clipped(
+        manifolds.Sphere(2), box=([0.0, 0.0, 0.0], [np.inf, np.inf, np.inf])
+    ),
+    "cube": lambda: oracles.Solid([], ([-1.3] * 3, [1.3] * 3), box=([-1.0] * 3, [1.0] * 3)),
 }
 
 

@@ -1,10 +1,7 @@
-// `stellate view` in a real browser: what it shows, and whom it lets see it.
+// `stellate view` in a real browser: what it shows.
 import assert from "node:assert/strict";
-import { createHash } from "node:crypto";
 import { readFileSync } from "node:fs";
 import http from "node:http";
-import { createConnection } from "node:net";
-import { networkInterfaces } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { pathToFileURL } from "node:url";
@@ -34,6 +31,7 @@ test("a finished mesh, its numbers and its certificate", async () => {
   assert.match(await text(page, "#verdict"), /Euler char\.\s+0/);
   assert.equal(await page.locator("#verdict li.holds").count(), 5);
   assert.equal(await page.locator("#verdict li.fails").count(), 0);
+  assert.equal(await page.locator("#curves canvas").count(), 1);
 
   // The name of a mesh opens it, and the secret the page: neither goes into an address.
   const key = name.replace("meshes/", "");
@@ -78,6 +76,7 @@ test("a mesh grows before one's eyes, and goes on with the gateway's successor",
   const first = await stage.gateway(name, "--port", `${port}`);
   const page = await stage.page(first.url);
   await until(page, () => Number(document.getElementById("stage").dataset.vertices) > 20);
+  assert.match(await text(page, "#crew"), /a worker at .*\d/);
   const early = { ...(await shown(page)), ...(await picture(page)) };
   first.process.kill("SIGKILL");
   await first.ended;
@@ -97,6 +96,87 @@ test("a mesh grows before one's eyes, and goes on with the gateway's successor",
   assert.match(await text(page, "#verdict"), /Components\s+2/);
   assert.equal(late.simplices, 2 * late.vertices - 8, "no simplex came twice or was lost");
   assert.equal(await text(page, "#connection"), "");
+  assert.deepEqual(page.faults, []);
+  await page.close();
+});
+
+test("meshes with boundary show where they end, by wall", async () => {
+  await stage.mesh({ shape: "octant", epsilon: 0.2, label: "an octant" });
+  const cube = await stage.mesh({ shape: "cube", epsilon: 0.7, label: "a cube" });
+  const gateway = await stage.gateway(cube);
+  const page = await stage.page(gateway.url);
+  await until(page, certified);
+  await until(page, () => document.getElementById("facts").textContent.includes("corners"));
+  assert.match(await text(page, "#facts"), /boundary\s+\d+ triangles in 1 part, 8 corners/);
+  assert.match(await text(page, "#verdict"), /or in one and in the boundary/);
+  assert.equal(await page.locator("#walls span").count(), 6);
+  assert.equal(await page.locator("#part").inputValue(), "boundary");
+  // Three walls are seen at once, each in its colour.
+  const coloured = await picture(page);
+  await page.locator("#colour").selectOption("plain");
+  await until(page, () => document.getElementById("colour").value === "plain");
+  await page.waitForTimeout(300);
+  assert.ok((await picture(page)).colours < coloured.colours, "walls are told apart");
+  await page.locator("#part").selectOption("slice");
+  await page.waitForTimeout(300);
+  const slice = await picture(page);
+  assert.ok(slice.share > 0.01 && slice.share < coloured.share, "a slice is less than the solid");
+
+  await page.locator("#list button", { hasText: "an octant" }).click();
+  await until(page, () => document.getElementById("facts").textContent.includes("an octant"));
+  await until(page, () => document.getElementById("facts").textContent.includes("corners"));
+  assert.match(await text(page, "#facts"), /boundary\s+\d+ edges in 1 part, 3 corners/);
+  assert.equal(await page.locator("#walls span").count(), 3);
+  assert.deepEqual(page.faults, []);
+  await page.close();
+});
+
+test("a page that falls behind goes on with the newest revision", async () => {
+  const name = await stage.mesh({ shape: "torus", epsilon: 0.07, seconds: 0.1, label: "fast" });
+  const gateway = await stage.gateway(name);
+  const page = await stage.page(gateway.url);
+  await until(page, () => Number(document.getElementById("stage").dataset.vertices) > 10);
+  // Nothing is drawn or heard for a while; the mesh goes on.
+  const drawn = await page.evaluate(async () => {
+    const stage = document.getElementById("stage");
+    const seen = [Number(stage.dataset.revision)];
+    new MutationObserver(() => seen.push(Number(stage.dataset.revision))).observe(stage, {
+      attributeFilter: ["data-revision"],
+    });
+    const end = performance.now() + 2000;
+    while (performance.now() < end);
+    const over = () =>
+      document.querySelector("#verdict .headline") !== null &&
+      stage.dataset.revision === document.getElementById("revision").max;
+    while (seen.length < 4 && !over()) await new Promise((resolve) => setTimeout(resolve, 20));
+    return seen;
+  });
+  const steps = drawn.slice(1).map((revision, i) => revision - drawn[i]);
+  assert.ok(Math.max(...steps) > 3, `revisions are left out: ${drawn}`);
+  await stage.over();
+  await until(page, certified);
+  assert.deepEqual(page.faults, []);
+  await page.close();
+});
+
+test("a mesh at fault leads to where it is", async () => {
+  const name = await stage.mesh({ shape: "torus", epsilon: 0.1, max_rounds: 6, label: "stopped" });
+  const gateway = await stage.gateway(name);
+  const page = await stage.page(gateway.url);
+  await until(page, () => document.querySelector("#verdict .fault") !== null);
+  const before = await picture(page);
+  await page.locator("#verdict .fault").first().click();
+  await page.waitForTimeout(900); // a flight
+  const there = await picture(page);
+  assert.notEqual(there.digest, before.digest, "the camera flew");
+  assert.match(await text(page, "#fault"), /^1 of \d+: the star of vertex \d+/);
+  await page.locator("#verdict .fault").first().click();
+  await page.waitForTimeout(900);
+  assert.notEqual((await picture(page)).digest, there.digest, "and on to the next");
+  assert.match(await text(page, "#fault"), /^2 of \d+: /);
+  await page.locator("#fault-leave").click();
+  assert.ok(await page.locator("#fault").isHidden());
+  assert.match(await text(page, "#verdict"), /Not certified/);
   assert.deepEqual(page.faults, []);
   await page.close();
 });
@@ -163,149 +243,35 @@ test("a 3-manifold of R^6 by slices, shells and turns; the same in a file of its
   await alone.close();
 });
 
-// --- whom it lets see it
-
-function get(port, options) {
-  return new Promise((resolve, reject) => {
-    const request = http.request({ host: "127.0.0.1", port, ...options });
-    const done = (response) => {
-      response.resume?.();
-      resolve({ status: response.statusCode, headers: response.headers });
-    };
-    request.on("response", done);
-    request.on("upgrade", (response, socket) => {
-      socket.destroy();
-      done(response);
+test("a notebook's frame shows it, live; a page from elsewhere has no frame of it", async () => {
+  const name = await stage.mesh({ shape: "torus", epsilon: 0.2, label: "in a frame" });
+  const gateway = await stage.gateway(name);
+  const framed = async (host) => {
+    const server = http.createServer((_, response) => {
+      response.setHeader("Content-Type", "text/html");
+      response.end(`<iframe src="${gateway.url}" width="900" height="600"></iframe>`);
     });
-    request.on("error", reject);
-    request.end();
-  });
-}
-
-const upgrade = (port, path, origin) => ({
-  path,
-  headers: {
-    Connection: "Upgrade",
-    Upgrade: "websocket",
-    "Sec-WebSocket-Version": "13",
-    "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
-    Host: `127.0.0.1:${port}`,
-    ...(origin ? { Origin: origin } : {}),
-  },
-});
-
-test("others are turned away", async () => {
-  const { port } = await stage.gateway();
-  const ours = `http://127.0.0.1:${port}`;
-  const page = await get(port, { path: "/" });
-  assert.equal(page.status, 200);
-  assert.match(page.headers["content-security-policy"], /default-src 'none'/);
-  assert.equal((await get(port, { path: "/../etc/passwd" })).status, 404);
-  assert.equal((await get(port, { path: "/", method: "POST" })).status, 405);
-  assert.equal(
-    (await get(port, { path: "/", headers: { Host: `localhost:${port}` } })).status,
-    200,
-  );
-  for (const host of ["evil.example", `evil.example:${port}`, "127.0.0.1", "127.0.0.1:1"]) {
-    assert.equal((await get(port, { path: "/", headers: { Host: host } })).status, 421, host);
-  }
-  assert.equal((await get(port, upgrade(port, "/call/GetMesh", ours))).status, 101);
-  for (const origin of [
-    undefined,
-    "null",
-    "http://evil.example",
-    `https://127.0.0.1:${port}`,
-    "http://127.0.0.1:1",
-    `http://localhost:${port}`,
-  ]) {
-    assert.equal(
-      (await get(port, upgrade(port, "/call/GetMesh", origin))).status,
-      403,
-      `${origin}`,
-    );
-  }
-  for (const call of ["/call/CreateMesh", "/call/DeleteMesh", "/call/", "/call/../GetMesh", "/"]) {
-    assert.equal((await get(port, upgrade(port, call, ours))).status, 404, call);
-  }
-  const huge = get(port, {
-    path: "/",
-    headers: { "X-Long": "x".repeat(15_000), "X-Longer": "y".repeat(15_000) },
-  });
-  await assert.rejects(huge, "headers without end are not waited for");
-
-  // Nobody from another machine: this one's other addresses do not listen.
-  const elsewhere = Object.values(networkInterfaces())
-    .flat()
-    .find((a) => a.family === "IPv4" && !a.internal);
-  if (elsewhere) {
-    await assert.rejects(
-      new Promise((resolve, reject) => {
-        const socket = createConnection({ host: elsewhere.address, port: Number(port) });
-        socket.on("connect", resolve).on("error", reject);
-      }),
-      { code: "ECONNREFUSED" },
-    );
-  }
-});
-
-test("whoever does not know the secret sees nothing", async () => {
-  const { port } = await stage.gateway();
-  const page = await stage.page(`http://127.0.0.1:${port}/#${"0".repeat(32)}`);
-  await until(
-    page,
-    () =>
-      document.getElementById("connection").textContent.includes("not good here") ||
-      document.getElementById("connection").textContent.includes("no longer"),
-  );
-  assert.equal(await page.locator("#list button").count(), 0);
-  await page.close();
-
-  // And an impostor is told nothing: no name of a mesh, no request.
-  const impostor = await Impostor.open(port);
-  const deceived = await stage.page(`http://127.0.0.1:${impostor.port}/#${"0".repeat(32)}`);
-  await until(deceived, () =>
-    document.getElementById("connection").textContent.includes("another program"),
-  );
-  assert.ok(impostor.heard.length > 0);
-  for (const frame of impostor.heard) assert.match(frame, /^[0-9a-f]{64} [0-9a-f]{32}$/);
-  await deceived.close();
-  impostor.server.closeAllConnections();
-  impostor.server.close();
-});
-
-// Serves the same page, and answers its calls without knowing the secret.
-class Impostor {
-  heard = [];
-
-  static async open(port) {
-    const impostor = new Impostor();
-    impostor.server = http.createServer((_, response) => {
-      http.get({ host: "127.0.0.1", port }, (page) => page.pipe(response));
+    await new Promise((resolve) => server.listen(0, host, resolve));
+    const page = await stage.browser.newPage();
+    page.refused = page.waitForEvent("console", {
+      predicate: (said) => said.text().includes("frame-ancestors"),
+      timeout: kPatience,
     });
-    impostor.server.on("upgrade", (request, socket) => impostor.meet(request, socket));
-    await new Promise((resolve) => impostor.server.listen(0, "127.0.0.1", resolve));
-    impostor.port = impostor.server.address().port;
-    return impostor;
-  }
+    page.refused.catch(() => {}); // where it is not
+    await page.goto(`http://${host}:${server.address().port}/`);
+    server.close();
+    return page;
+  };
+  const notebook = await framed("127.0.0.1");
+  const frame = notebook.frames()[1];
+  await frame.waitForFunction(certified, undefined, { timeout: kPatience });
+  await frame.waitForFunction(
+    () => Number(document.getElementById("stage").dataset.vertices) > 100,
+  );
+  await notebook.close();
 
-  meet(request, socket) {
-    const key = request.headers["sec-websocket-key"] + "258EAFA5-E914-47DA-95CA-C5AB0DC85B11";
-    const accept = createHash("sha1").update(key).digest("base64");
-    socket.on("error", () => {});
-    socket.write(
-      "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n" +
-        `Sec-WebSocket-Accept: ${accept}\r\n\r\n`,
-    );
-    const say = (text) =>
-      socket.write(Buffer.concat([Buffer.from([0x81, text.length]), Buffer.from(text)]));
-    say(JSON.stringify({ nonce: "1".repeat(32) }));
-    socket.on("data", (frame) => {
-      if ((frame[0] & 15) !== 1) return;
-      // A short text, masked: its length, four bytes of mask, the text.
-      const mask = frame.subarray(2, 6);
-      const body = frame.subarray(6, 6 + (frame[1] & 127)).map((byte, i) => byte ^ mask[i % 4]);
-      this.heard.push(Buffer.from(body).toString());
-      say(JSON.stringify({ proof: "2".repeat(64) }));
-    });
-  }
-}
+  const elsewhere = await framed("127.0.0.2");
+  await elsewhere.refused;
+  assert.equal(await elsewhere.frames()[1].locator("#canvas").count(), 0);
+  await elsewhere.close();
+});

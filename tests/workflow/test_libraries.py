@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import pyvista
 import shapes
 import stellate
 
@@ -33,6 +34,24 @@ def test_pyvista_has_solids_with_all_their_coordinates():
 def test_pyvista_has_curves():
     polygon = shapes.polygon(9, 5)
     assert polygon.to_pyvista().n_cells == len(polygon.simplices)
+
+
+def test_pyvista_follows_a_series_while_it_grows(tmp_path):
+    torus = shapes.torus()
+    wanted = [len(torus.simplices) // share for share in (3, 2, 1)]
+    read = []
+
+    def growing():
+        for revision, count in enumerate(wanted, 1):
+            yield stellate.Mesh(torus.points, torus.simplices[:count], revision=revision)
+            reader = pyvista.get_reader(tmp_path / "torus.pvd")
+            reader.set_active_time_value(reader.time_values[-1])
+            read.append((reader.time_values, reader.read()[0]))
+
+    stellate.save_series(growing(), tmp_path / "torus.pvd")
+    assert [times for times, _ in read] == [[1.0], [1.0, 2.0], [1.0, 2.0, 3.0]]
+    assert [grid.n_cells for _, grid in read] == wanted
+    assert np.isclose(read[-1][1].area, area(torus), rtol=1e-9, atol=0)
 
 
 def test_trimesh_finds_the_torus_closed_and_turned_outwards():

@@ -20,6 +20,9 @@ class Complex(Protocol):
     def simplices(self) -> np.ndarray: ...
 
     @property
+    def walls(self) -> np.ndarray | None: ...
+
+    @property
     def report(self) -> Report | None: ...
 
     @property

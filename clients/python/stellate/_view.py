@@ -80,10 +80,14 @@ def _report(report: Report) -> pb.Report:
     certificate = dict(vars(report.certificate))
     level = f"CERTIFICATE_LEVEL_{certificate.pop('level')}"
     certificate["level"] = dict(pb.CertificateLevel.items()).get(level, 0)
+    violations = certificate.pop("violations")
     fields = {f.name for f in pb.Certificate.DESCRIPTOR.fields}
     message.certificate.MergeFrom(
         pb.Certificate(**{k: v for k, v in certificate.items() if k in fields})
     )
+    for kind, ids in vars(violations).items():
+        if ids:
+            getattr(message.certificate.violations, kind).CopyFrom(_indices(np.array(ids)))
     return message
 
 
@@ -114,6 +118,11 @@ def page_of(mesh: Complex, label: str = "") -> str:
         points=arrays.to_wire(np.asarray(mesh.points, dtype=float)),
         added=_indices(np.sort(mesh.simplices, axis=1)),
     )
+    if mesh.walls is not None:
+        status.spec.walls = int(np.bitwise_or.reduce(mesh.walls)).bit_length()
+        (ends,) = np.nonzero(mesh.walls)
+        delta.boundary_vertices.extend(ends.tolist())
+        delta.boundary_walls.extend(mesh.walls[ends].tolist())
     grown = calls.WatchMeshResponse(delta=calls.DeltaChunk(delta=delta, complete=True))
     replies: dict[str, list[Any]] = {
         "WatchMesh": [grown, calls.WatchMeshResponse(final=status)],

@@ -3,6 +3,7 @@
 #include <grpcpp/client_context.h>
 #include <openssl/evp.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <utility>
@@ -109,6 +110,7 @@ class Recorder {
     const std::stop_callback cancel(options_.stop, [&context] { context.TryCancel(); });
     v1::GetMeshRequest request;
     request.set_name(mesh_);
+    request.set_past_progress_after(0);
     const grpc::Status status = stub_->GetMesh(&context, request, &status_);
     if (!status.ok()) return tl::unexpected(client::FromStatus(status));
     Anonymize(&status_);
@@ -130,17 +132,27 @@ class Recorder {
     return ok;
   }
 
-  // As many as fit, each held to be as large as the last.
+  // Those at which something came, as many as fit.
   std::vector<std::uint64_t> Revisions() const {
     const double point = 8.0 * status_.spec().ambient_dimension();
     const double simplex = 4.0 * (status_.spec().dimension() + 1);
-    const double bytes = 4.0 / 3 * static_cast<double>(status_.revision()) *
-                         (point * static_cast<double>(status_.progress().vertices()) +
-                          simplex * static_cast<double>(status_.progress().simplices()));
-    const auto step = static_cast<std::uint64_t>(1 + bytes / kMostBytes);
     std::vector<std::uint64_t> revisions;
-    for (std::uint64_t r = 1; r < status_.revision(); r += step) revisions.push_back(r);
-    return revisions;
+    double bytes = 0;
+    std::uint64_t vertices = status_.progress().vertices();
+    for (int i = status_.past_progress_size() - 1; i >= 0; --i) {
+      const v1::PastProgress& past = status_.past_progress(i);
+      if (past.progress().vertices() == vertices) continue;  // the same mesh as the next
+      vertices = past.progress().vertices();
+      bytes += 4.0 / 3 *
+               (point * static_cast<double>(vertices) +
+                simplex * static_cast<double>(past.progress().simplices()));
+      revisions.push_back(past.revision());
+    }
+    std::reverse(revisions.begin(), revisions.end());
+    const auto step = static_cast<size_t>(1 + bytes / kMostBytes);
+    std::vector<std::uint64_t> some;
+    for (size_t i = 0; i < revisions.size(); i += step) some.push_back(revisions[i]);
+    return some;
   }
 
   const std::unique_ptr<v1::Stellate::Stub> stub_;

@@ -58,12 +58,11 @@ export class Curves {
     this.host.parentElement!.hidden = this.rows.length === 0;
     const width = this.host.clientWidth;
     if (width === 0 || this.rows.length === 0) return;
-    const data: number[][] = [this.rows.map((row) => row.revision)];
     let sum = this.rows.map(() => 0);
-    for (const rule of kRules) {
-      sum = this.rows.map((row, i) => sum[i] + row[rule.key]);
-      data.push(sum);
-    }
+    const sums = kRules.map((rule) => (sum = this.rows.map((row, i) => sum[i] + row[rule.key])));
+    // The whole first, so that of lines that coincide the one is seen that has something.
+    const data = [this.rows.map((row) => row.revision), ...sums.reverse()];
+    const rules = [...kRules].reverse();
     const options: uPlot.Options = {
       width,
       height: 150,
@@ -76,20 +75,18 @@ export class Curves {
       ],
       series: [
         {},
-        ...kRules.map((rule) => ({
+        ...rules.map((rule, i) => ({
           stroke: rule.colour,
           width: 1.5,
           points: { show: this.rows.length < 3 },
+          ...(i === rules.length - 1 ? { fill: `${rule.colour}40` } : {}),
         })),
       ],
-      bands: kRules
-        .map((rule, i) => ({
-          series: (i === 0 ? [1, -1] : [i + 1, i]) as [number, number],
-          fill: `${rule.colour}40`,
-        }))
-        .filter((band) => band.series[1] > 0),
+      bands: rules.slice(1).map((_, i) => ({
+        series: [i + 1, i + 2] as [number, number],
+        fill: `${rules[i].colour}40`,
+      })),
     };
-    (options.series[1] as uPlot.Series).fill = `${kRules[0].colour}40`;
     this.plot = new uPlot(options, data as uPlot.AlignedData, this.host);
     this.plot.over.addEventListener("click", () => {
       const at = this.plot?.cursor.idx;

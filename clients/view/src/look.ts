@@ -1,7 +1,7 @@
 // What is to be seen of a mesh: by which axes, which part, coloured by what.
 
-export type Part = "whole" | "slice" | "below";
-export type Colour = "plain" | "order" | "coordinate" | "size" | "shape";
+export type Part = "whole" | "slice" | "below" | "boundary";
+export type Colour = "plain" | "order" | "coordinate" | "size" | "shape" | "wall";
 
 export interface Look {
   frame: number[]; // 3 x d, orthonormal rows: what is right, up and near
@@ -15,9 +15,29 @@ export interface Look {
 export interface Shape {
   kind: "triangles" | "segments";
   positions: Float32Array; // 3 a vertex
-  values: Float32Array; // of each vertex, 0..1; NaN: plain
+  values: Float32Array; // of each vertex, 0..1, or its wall's number; NaN: plain
+  byWall: boolean;
   index: Uint32Array | null;
 }
+
+// Where a mesh with boundary ends: curves by wall, and corners.
+export interface Rim {
+  segments: Float32Array; // pairs of positions
+  walls: Uint8Array; // of each segment, as of boundary.ts
+  points: Float32Array;
+}
+
+const kWalls = [
+  "#d97706",
+  "#7c3aed",
+  "#059669",
+  "#db2777",
+  "#0891b2",
+  "#65a30d",
+  "#92400e",
+  "#4f46e5",
+];
+export const wallColour = (wall: number) => kWalls[wall % kWalls.length];
 
 // The coordinates' own axes, chosen by hand.
 export function axesFrame(d: number, axes: number[]): number[] {

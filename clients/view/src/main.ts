@@ -2,6 +2,7 @@
 import "./style.css";
 import "./stage.css";
 import { Curves, drawHistograms } from "./charts";
+import { choicesOf, coordinates } from "./choices";
 import { axesFrame, Tour, type Colour, type Look, type Part } from "./look";
 import type { FaultKind, FromWorker, MeshRow, PastRow, ToWorker } from "./messages";
 import {
@@ -9,6 +10,7 @@ import {
   drawCrew,
   drawList,
   drawVerdict,
+  drawWalls,
   element,
   grouped,
   seconds,
@@ -21,7 +23,14 @@ import MeshWorker from "./worker?worker&inline";
 
 const kTourSeconds = 0.05;
 const kReplaySeconds = 0.35;
-const kObliqueSeconds = 4; // into a tour
+
+const kFaults: { [K in FaultKind]: string } = {
+  faces: "the face of",
+  links: "the link of",
+  stars: "the star of",
+  inconsistent: "the star of",
+  fibres: "a normal flat near",
+};
 
 const at = <T extends HTMLElement>(id: string) => document.getElementById(id) as T;
 const css = (name: string) =>
@@ -37,6 +46,7 @@ let list: MeshRow[] = [];
 let mesh: MeshRow | null = null;
 let past: PastRow[] = [];
 let shownRevision = 0;
+let boundary = ""; // of what is shown, in words
 let following = true; // the newest revision
 let fault: { kind: FaultKind; next: number; count: number } | null = null;
 let look: Look = {
@@ -57,9 +67,10 @@ function choose(name: string) {
   chosen = name;
   mesh = null;
   past = [];
-  fault = null;
+  leaveFault();
   following = true;
   shownRevision = 0;
+  boundary = "";
   measured = { revision: -1, name: "" };
   at("histograms").replaceChildren();
   at("note").hidden = false;
@@ -77,66 +88,31 @@ function fill(id: string, options: [value: string, text: string][], value: strin
   select.value = value;
 }
 
-const coordinates = (d: number): [string, string][] =>
-  Array.from({ length: d }, (_, i) => [`${i}`, `x${subscript(i + 1)}`]);
-const subscript = (n: number) => `${n}`.replace(/\d/g, (digit) => "₀₁₂₃₄₅₆₇₈₉"[Number(digit)]);
-
 // How a mesh of this kind is best seen at first.
-function meet({ k, d }: MeshRow) {
-  const parts: [Part, string][] =
-    k === 1
-      ? [["whole", "all of it"]]
-      : k === 2
-        ? [
-            ["whole", "all of it"],
-            ["below", "a part"],
-            ["slice", "a slice"],
-          ]
-        : k === 3
-          ? [
-              ["slice", "a slice"],
-              ["below", "a shell"],
-              ["whole", "all edges"],
-            ]
-          : [
-              ["slice", "a slice"],
-              ["whole", "all edges"],
-            ];
-  const axes = d >= 3 ? [0, 1, 2] : [0, 1, -1];
-  // A surface lies over itself when coordinates are left out, but less so from an oblique side.
-  const oblique = k <= 2 && d > 3;
-  look = {
-    frame: oblique ? new Tour(d, axesFrame(d, axes)).at(kObliqueSeconds) : axesFrame(d, axes),
-    part: parts[0][0],
-    axis: Math.min(3, d - 1), // along an axis of the picture a slice would be seen edge on
-    level: 0.5,
-    // Not by the coordinate that is the same all over a slice.
-    colour: (k === 3 ? d > 4 : d > 3) ? "coordinate" : "plain",
-    colourAxis: Math.min(k === 3 ? 4 : 3, d - 1),
-  };
+function meet(row: MeshRow) {
+  const { parts, colours, first, oblique } = choicesOf(row);
+  look = first;
   tour = null;
   at<HTMLInputElement>("tour").checked = false;
   at<HTMLInputElement>("level").value = "0.5";
   fill("part", parts, look.part);
-  fill("axis", coordinates(d), `${look.axis}`);
-  const colours: [string, string][] = [
-    ["plain", "plain"],
-    ["order", "order of coming"],
-    ["size", "circumradius"],
-    ["shape", "thinness"],
-    ...coordinates(d),
-  ];
+  fill("axis", coordinates(row.d), `${look.axis}`);
   fill("colour", colours, look.colour === "coordinate" ? `${look.colourAxis}` : look.colour);
-  axes.forEach((axis, i) =>
-    fill(`axis-${i}`, [["", "oblique"], ...coordinates(d)], oblique ? "" : `${axis}`),
+  [0, 1, 2].forEach((axis) =>
+    fill(
+      `axis-${axis}`,
+      [["", "oblique"], ...coordinates(row.d)],
+      oblique || axis >= row.d ? "" : `${axis}`,
+    ),
   );
-  at("axes-box").hidden = d <= 3;
+  at("axes-box").hidden = row.d <= 3;
+  drawWalls(at("walls"), row.k <= 3 ? row.walls : 0);
   setParts();
   ask({ type: "look", look });
 }
 
 function setParts() {
-  const whole = look.part === "whole";
+  const whole = look.part === "whole" || look.part === "boundary";
   at("axis-box").hidden = at("level-box").hidden = whole;
 }
 
@@ -196,11 +172,12 @@ function show(revision: number | null) {
 }
 
 function newest(): number {
-  return Math.max(mesh?.revision ?? 0, past.at(-1)?.revision ?? 0, 1);
+  return Math.max(mesh?.revision ?? 0, past.at(-1)?.revision ?? 0, shownRevision, 1);
 }
 
 function drawTime() {
   const slider = at<HTMLInputElement>("revision");
+  at("time").hidden = recorded && newest() === 1;
   slider.max = `${newest()}`;
   if (following) slider.value = slider.max;
   at<HTMLButtonElement>("live").disabled = following;
@@ -248,6 +225,14 @@ function fly(kind: FaultKind, count: number) {
   ask({ type: "faults", kind, chosen: next });
 }
 
+function leaveFault() {
+  if (fault) ask({ type: "faults", kind: null, chosen: -1 });
+  fault = null;
+  at("fault").hidden = true;
+}
+at("fault-next").onclick = () => fault && fly(fault.kind, fault.count);
+at("fault-leave").onclick = leaveFault;
+
 // --- what the worker says
 
 function drawFacts() {
@@ -268,6 +253,7 @@ function drawFacts() {
     fact("queries", grouped(mesh.queries)),
     fact("round", grouped(mesh.round)),
   ];
+  if (boundary) items.push(fact("boundary", boundary));
   if (mesh.elapsed > 0) items.push(fact("time", seconds(mesh.elapsed)));
   if (!mesh.over && mesh.remaining > 0) items.push(fact("left, about", seconds(mesh.remaining)));
   if (!mesh.over) items.push(fact("phase", mesh.phase));
@@ -321,12 +307,17 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
   crew: ({ rows }) => drawCrew(at("crew"), rows),
   verdict: ({ verdict }) => drawVerdict(at("verdict"), verdict, fly),
   histograms: ({ histograms }) => drawHistograms(at("histograms"), histograms),
-  fly: ({ centre, radius, level }) => {
-    if (look.part !== "whole") {
+  fly: ({ centre, radius, normal, level, text }) => {
+    if (!fault) return;
+    at("fault").hidden = false;
+    at("fault").querySelector("span")!.textContent =
+      `${fault.next + 1} of ${fault.count}: ${kFaults[fault.kind]} ${text}`;
+    at("fault-next").hidden = fault.count < 2;
+    if (!at("level-box").hidden) {
       at<HTMLInputElement>("level").value = `${level}`;
       changeLook({ level });
     }
-    view.flyTo(centre, radius);
+    view.flyTo(centre, radius, normal);
   },
   loading: ({ text }) => {
     at("revision-text").textContent = text;
@@ -340,7 +331,11 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
     at("stage").dataset.revision = `${scene.revision}`;
     at("stage").dataset.vertices = `${scene.vertices}`;
     at("stage").dataset.simplices = `${scene.simplices}`;
-    view.show(scene, css("--mesh"));
+    if (boundary !== scene.boundary) {
+      boundary = scene.boundary;
+      drawFacts();
+    }
+    view.show(scene, css("--mesh"), css("--text"));
   },
 };
 view.onDrawn = () => ask({ type: "drawn" });

@@ -1,5 +1,5 @@
 // What the page and its worker say to each other.
-import type { Look, Shape } from "./look";
+import type { Look, Rim, Shape } from "./look";
 import type { Histogram } from "./measure";
 import type { Recording } from "./source";
 
@@ -20,6 +20,7 @@ export interface MeshRow {
   round: number;
   queries: number;
   revision: number;
+  walls: number;
   certified: boolean | null; // null: not over
 }
 
@@ -40,7 +41,6 @@ export interface CrewRow {
   queries: number;
   chunks: number;
   perSecond: number; // 0: unknown
-  fixedSeconds: number;
   newestChunk: number;
   holds: number;
   lagging: boolean;
@@ -82,9 +82,12 @@ export interface Scene {
   vertices: number;
   simplices: number;
   shape: Shape;
+  rim: Rim;
+  boundary: string; // in words; empty: none
   faults: Float32Array; // positions of vertices at fault
   faultEdges: Float32Array; // pairs of positions
   chosen: Float32Array; // of the fault that was chosen
+  chosenEdges: Float32Array; // pairs of positions, of the simplices about it
   // The smallest ball about the middle that holds the mesh, from whatever side it is seen.
   centre: [number, number, number];
   radius: number;
@@ -99,6 +102,13 @@ export type FromWorker =
   | { type: "crew"; rows: CrewRow[] }
   | { type: "verdict"; verdict: Verdict | null }
   | { type: "histograms"; histograms: Histogram[]; revision: number }
-  | { type: "fly"; centre: [number, number, number]; radius: number; level: number; text: string }
+  | {
+      type: "fly";
+      centre: [number, number, number];
+      radius: number;
+      normal: [number, number, number]; // zero: none
+      level: number;
+      text: string;
+    }
   | { type: "loading"; text: string }
   | Scene;

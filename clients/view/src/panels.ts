@@ -1,4 +1,5 @@
 // The lists beside the mesh. All text goes in as text: labels and titles are strangers'.
+import { wallColour } from "./look";
 import type { Claim, CrewRow, FaultKind, MeshRow, Verdict } from "./messages";
 
 export function element<T extends keyof HTMLElementTagNameMap>(
@@ -120,6 +121,17 @@ export function drawCrew(host: HTMLElement, rows: CrewRow[]) {
     }
   }
   host.replaceChildren(rows.length > 0 ? table : element("p", "empty", "No worker serves it."));
+}
+
+export function drawWalls(host: HTMLElement, walls: number) {
+  host.hidden = walls === 0;
+  host.replaceChildren(
+    ...Array.from({ length: walls }, (_, wall) => {
+      const item = element("span", "", `wall ${wall}`);
+      item.style.setProperty("--swatch", wallColour(wall));
+      return item;
+    }),
+  );
 }
 
 function drawClaim(claim: Claim, onFault: (kind: FaultKind, count: number) => void): HTMLElement {

@@ -11,19 +11,23 @@ import {
   Mesh,
   MeshStandardMaterial,
   PerspectiveCamera,
-  Points,
-  PointsMaterial,
+  Raycaster,
   Scene as ThreeScene,
   Vector3,
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { kSeveral } from "./boundary";
+import { Dots, ThickLines } from "./marks";
+import { wallColour, type Shape } from "./look";
 import type { Scene } from "./messages";
+import { roughIndex } from "./rough";
 
 // Viridis at a few places; between them straight.
 const kMap = ["#440154", "#414487", "#2a788e", "#22a884", "#7ad151", "#fde725"].map(
   (c) => new Color(c),
 );
+const kWhite = new Color("#ffffff");
 const kSlowFrame = 0.08; // seconds: from here on, moving is drawn coarser
 const kFlight = 0.6; // seconds
 
@@ -51,6 +55,7 @@ export class View {
       polygonOffsetUnits: 1,
     }),
   );
+  private readonly rough = new Mesh(new BufferGeometry(), this.surface.material);
   private readonly wires = new Mesh(
     this.surface.geometry,
     new LineWires() as unknown as MeshStandardMaterial,
@@ -59,21 +64,15 @@ export class View {
     new BufferGeometry(),
     new LineBasicMaterial({ vertexColors: true, transparent: true, opacity: 0.85 }),
   );
-  private readonly faults = new Points(
-    new BufferGeometry(),
-    new PointsMaterial({ color: "#d92d20", size: 9, sizeAttenuation: false, depthTest: false }),
-  );
-  private readonly faultEdges = new LineSegments(
-    new BufferGeometry(),
-    new LineBasicMaterial({ color: "#d92d20", depthTest: false }),
-  );
-  private readonly chosen = new Points(
-    new BufferGeometry(),
-    new PointsMaterial({ color: "#ffb020", size: 14, sizeAttenuation: false, depthTest: false }),
-  );
+  private readonly rim = new ThickLines({ width: 3 });
+  private readonly corners = new Dots({ size: 9 });
+  private readonly faultEdges = new ThickLines({ width: 2.5, colour: "#d92d20", through: true });
+  private readonly chosenEdges = new ThickLines({ width: 2.5, colour: "#ffb020", through: true });
+  private readonly faults = new Dots({ size: 9, colour: "#d92d20", through: true });
+  private readonly chosen = new Dots({ size: 15, colour: "#ffb020", through: true });
   private dirty = true;
   private moving = false;
-  private slow = 0; // seconds that a frame takes, lately
+  private slow = 0; // seconds that all of the mesh takes to be drawn, lately
   private fitted = false;
   private ball = { centre: new Vector3(), radius: 1 };
   private flight: { from: [Vector3, Vector3]; to: [Vector3, Vector3]; start: number } | null = null;
@@ -100,11 +99,17 @@ export class View {
     sun.position.set(-0.6, 1, 1.2);
     this.camera.add(sun);
     const sky = new HemisphereLight("#ffffff", "#8b93a5", 1.25);
-    this.scene.add(this.camera, sky, this.surface, this.wires, this.segments);
-    this.scene.add(this.faultEdges, this.faults, this.chosen);
-    this.faultEdges.renderOrder = 1;
-    this.faults.renderOrder = 2;
-    this.chosen.renderOrder = 3;
+    this.scene.add(this.camera, sky, this.surface, this.rough, this.wires, this.segments);
+    const marks = [
+      this.rim,
+      this.corners,
+      this.chosenEdges,
+      this.faultEdges,
+      this.chosen,
+      this.faults,
+    ];
+    marks.forEach((mark, i) => (mark.object.renderOrder = i + 1));
+    this.scene.add(...marks.map((mark) => mark.object));
     new ResizeObserver(() => (this.dirty = true)).observe(canvas);
     this.setWires(true);
     requestAnimationFrame((now) => this.tick(now));
@@ -120,8 +125,9 @@ export class View {
     this.dirty = true;
   }
 
-  show(scene: Scene, plain: string) {
-    const { shape } = scene;
+  // `plain`: of what has no colour of its own. `several`: of where walls meet.
+  show(scene: Scene, plain: string, several: string) {
+    const { shape, rim } = scene;
     const solid = shape.kind === "triangles";
     const target = solid ? this.surface : this.segments;
     const other = solid ? this.segments : this.surface;
@@ -129,20 +135,20 @@ export class View {
     target.geometry = geometryOf(shape.positions, shape.index);
     target.geometry.setAttribute(
       "color",
-      new BufferAttribute(coloursOf(shape.values, new Color(plain)), 3, true),
+      new BufferAttribute(coloursOf(shape, new Color(plain)), 3, true),
     );
     other.geometry.dispose();
     other.geometry = new BufferGeometry();
     this.wires.geometry = this.surface.geometry;
-    for (const [object, positions] of [
-      [this.faults, scene.faults],
-      [this.faultEdges, scene.faultEdges],
-      [this.chosen, scene.chosen],
-    ] as const) {
-      object.geometry.dispose();
-      object.geometry = geometryOf(positions, null);
-      object.visible = positions.length > 0;
-    }
+    this.rough.geometry.dispose();
+    this.rough.geometry = new BufferGeometry(); // until it is needed
+    const colourOf = (wall: number) => (wall === kSeveral ? several : wallColour(wall));
+    this.rim.show(rim.segments, Array.from(rim.walls, colourOf));
+    this.corners.show(rim.points, several);
+    this.chosenEdges.show(scene.chosenEdges);
+    this.faultEdges.show(scene.faultEdges);
+    this.faults.show(scene.faults);
+    this.chosen.show(scene.chosen);
     this.ball = { centre: new Vector3(...scene.centre), radius: scene.radius };
     if (!this.fitted) this.fit();
     this.dirty = true;
@@ -167,20 +173,33 @@ export class View {
     this.fit();
   }
 
-  flyTo(centre: [number, number, number], radius: number) {
+  flyTo(centre: [number, number, number], radius: number, normal: [number, number, number]) {
     const target = new Vector3(...centre);
-    // From outside, so that the mesh does not stand before it.
-    const out = target.clone().sub(this.ball.centre);
-    if (out.length() < 0.05 * this.ball.radius) out.copy(this.camera.position).sub(target);
-    const sight = this.camera.position.clone().sub(this.controls.target).normalize();
-    out.normalize().addScaledVector(sight, 0.6).normalize();
-    const distance = (5 * radius) / Math.tan((this.camera.fov * Math.PI) / 360);
+    const distance = (2.5 * radius) / Math.tan((this.camera.fov * Math.PI) / 360);
+    const sight = this.camera.position.clone().sub(target).normalize();
+    // From outside, if nothing better is found.
+    const outside = target.clone().sub(this.ball.centre).normalize().addScaledVector(sight, 0.6);
+    const ways = [outside.lengthSq() > 0.01 ? outside.normalize() : sight];
+    const face = new Vector3(...normal).normalize();
+    if (face.lengthSq() > 0) {
+      if (face.dot(sight) < 0) face.negate();
+      face.addScaledVector(sight, 0.3).normalize();
+      ways.unshift(face, face.clone().negate());
+    }
+    const out = ways.find((way) => this.isFree(target, way, radius, distance)) ?? ways[0];
     this.flight = {
       from: [this.camera.position.clone(), this.controls.target.clone()],
       to: [target.clone().addScaledVector(out, distance), target],
       start: performance.now(),
     };
     this.fitted = true;
+  }
+
+  // Whether nothing of the mesh stands between.
+  private isFree(target: Vector3, way: Vector3, near: number, far: number): boolean {
+    const from = target.clone().addScaledVector(way, 0.25 * near);
+    const ray = new Raycaster(from, way, 0, far);
+    return ray.intersectObject(this.surface, false).length === 0;
   }
 
   private tick(now: number) {
@@ -208,6 +227,9 @@ export class View {
     const coarse = (this.moving || this.flight !== null) && this.slow > kSlowFrame;
     const wires = this.wires.visible;
     this.wires.visible = wires && !coarse;
+    if (coarse) this.roughen();
+    this.rough.visible = coarse;
+    this.surface.visible = !coarse;
     const ratio = coarse ? 0.5 : Math.min(window.devicePixelRatio, 2);
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (width === 0 || height === 0) return;
@@ -219,9 +241,27 @@ export class View {
     this.camera.far = distance + 20 * this.ball.radius;
     this.camera.updateProjectionMatrix();
     this.renderer.render(this.scene, this.camera);
-    this.renderer.getContext().finish();
+    this.await();
     this.wires.visible = wires;
-    this.slow = 0.5 * this.slow + (0.5 * (performance.now() - began)) / 1000;
+    if (!coarse) this.slow = 0.5 * this.slow + (0.5 * (performance.now() - began)) / 1000;
+  }
+
+  // Until all is drawn: browsers take finish() for flush(), and frames would queue up.
+  private await() {
+    const gl = this.renderer.getContext();
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+  }
+
+  // Shares its vertices with the surface.
+  private roughen() {
+    const { attributes, index } = this.surface.geometry;
+    const rough = this.rough.geometry;
+    if (rough.index !== null || attributes.position === undefined) return;
+    rough.setAttribute("position", attributes.position);
+    rough.setAttribute("color", attributes.color);
+    rough.setIndex(
+      new BufferAttribute(roughIndex(attributes.position.array, index?.array ?? null), 1),
+    );
   }
 }
 
@@ -239,11 +279,13 @@ function geometryOf(positions: Float32Array, index: Uint32Array | null): BufferG
   return geometry;
 }
 
-function coloursOf(values: Float32Array, plain: Color): Uint8Array {
+function coloursOf({ values, byWall }: Shape, plain: Color): Uint8Array {
   const colours = new Uint8Array(3 * values.length);
   const colour = new Color();
+  const of = (value: number) =>
+    byWall ? colour.set(wallColour(value)).lerp(kWhite, 0.3) : colourAt(value, colour);
   values.forEach((value, i) => {
-    const { r, g, b } = Number.isNaN(value) ? plain : colourAt(value, colour);
+    const { r, g, b } = Number.isNaN(value) ? plain : of(value);
     colours[3 * i] = 255 * r;
     colours[3 * i + 1] = 255 * g;
     colours[3 * i + 2] = 255 * b;

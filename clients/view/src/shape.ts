@@ -1,4 +1,5 @@
 // From a mesh and a look at it to what can be drawn: triangles or segments in space.
+import { boundaryOf, wallOf } from "./boundary";
 import type { Look, Shape } from "./look";
 import { fattest, Simplices } from "./measure";
 import type { MeshStore } from "./store";
@@ -33,6 +34,7 @@ class Mix {
       kind,
       positions: this.positions.slice(0, 3 * this.count),
       values: this.values.slice(0, this.count),
+      byWall: false,
       index: null,
     };
   }
@@ -66,7 +68,7 @@ export function extent(store: MeshStore, axis: number): [low: number, high: numb
 function valuesOf(store: MeshStore, look: Look, epsilon: number): Float32Array {
   const { vertices, k, d } = store;
   const values = new Float32Array(vertices);
-  if (look.colour === "plain") return values.fill(NaN);
+  if (look.colour === "plain" || look.colour === "wall") return values.fill(NaN);
   if (look.colour === "order") {
     for (let v = 0; v < vertices; v++) values[v] = v / vertices;
   } else if (look.colour === "coordinate") {
@@ -116,7 +118,13 @@ function faces(store: MeshStore, size: number, take: (ids: number[]) => boolean)
 function edges(store: MeshStore, projected: Float32Array, values: Float32Array): Shape {
   const index: number[] = [];
   faces(store, 2, ([p, q]) => index.push(p, q) < 2 * kMostSegments);
-  return { kind: "segments", positions: projected, values, index: Uint32Array.from(index) };
+  return {
+    kind: "segments",
+    positions: projected,
+    values,
+    byWall: false,
+    index: Uint32Array.from(index),
+  };
 }
 
 // Where a hyperplane cuts each simplex: a tetrahedron in a triangle or a quadrangle, a triangle in a
@@ -181,7 +189,7 @@ function below(
     for (let i = 0; i < width && all; i++) all = height(cells[cell * width + i]) < 0;
     if (all) chosen.push(cell);
   }
-  const part = { positions: projected, values };
+  const part = { positions: projected, values, byWall: false };
   if (k === 2) {
     const index = new Uint32Array(3 * chosen.length);
     chosen.forEach((cell, i) => index.set(cells.subarray(3 * cell, 3 * cell + 3), 3 * i));
@@ -198,19 +206,51 @@ function below(
   return { kind: "triangles", ...part, index: Uint32Array.from([...once.values()].flat()) };
 }
 
-export function shapeOf(store: MeshStore, look: Look, epsilon: number): Shape {
-  const projected = project(store, look.frame);
+// The triangles that bound a 3-manifold; by wall, each has its own vertices.
+function surface(
+  store: MeshStore,
+  projected: Float32Array,
+  values: Float32Array,
+  look: Look,
+): Shape {
+  const { triangles } = boundaryOf(store);
+  if (look.colour !== "wall") {
+    const index = Uint32Array.from(triangles);
+    return { kind: "triangles", positions: projected, values, byWall: false, index };
+  }
+  const positions = new Float32Array(3 * triangles.length);
+  triangles.forEach((id, i) => positions.set(projected.subarray(3 * id, 3 * id + 3), 3 * i));
+  const walls = new Float32Array(triangles.length);
+  for (let i = 0; i < triangles.length; i += 3) {
+    walls.fill(wallOf(store, triangles.slice(i, i + 3)), i, i + 3);
+  }
+  return { kind: "triangles", positions, values: walls, byWall: true, index: null };
+}
+
+// Of vertices, above the slice. One on the very level counts as above: no segment of length zero over
+// nothing.
+export function heightOf(store: MeshStore, look: Look): (v: number) => number {
+  const [low, high] = extent(store, look.axis);
+  const level = low + look.level * (high - low);
+  const { points, d } = store;
+  return (v) => points[v * d + look.axis] - level;
+}
+
+export function shapeOf(
+  store: MeshStore,
+  look: Look,
+  projected: Float32Array,
+  epsilon: number,
+): Shape {
   const values = valuesOf(store, look, epsilon);
-  const { k, d, cells, simplices, points } = store;
+  const { k, cells, simplices } = store;
+  if (look.part === "boundary" && k === 3) return surface(store, projected, values, look);
   if (look.part === "whole" || k === 1) {
     if (k !== 2) return edges(store, projected, values);
     const index = cells.slice(0, 3 * simplices);
-    return { kind: "triangles", positions: projected, values, index };
+    return { kind: "triangles", positions: projected, values, byWall: false, index };
   }
-  const [low, high] = extent(store, look.axis);
-  const level = low + look.level * (high - low);
-  // A vertex on the very level counts as above it: no segment of length zero over nothing.
-  const height = (v: number) => points[v * d + look.axis] - level;
+  const height = heightOf(store, look);
   if (look.part === "slice" || k > 3) return slice(store, projected, values, height);
   return below(store, projected, values, height);
 }

@@ -14,6 +14,7 @@ export class MeshStore {
   cells = new Uint32Array();
   simplices = 0;
   revision = 0;
+  walls = new Map<number, bigint>(); // of vertices at the boundary, those they lie on, as bits
 
   // Open addressing: which simplex is where in `cells`. -1: free.
   private table = new Int32Array(1024).fill(-1);
@@ -25,6 +26,7 @@ export class MeshStore {
 
   clear() {
     this.vertices = this.simplices = this.revision = 0;
+    this.walls.clear();
     this.table = new Int32Array(1024).fill(-1);
   }
 
@@ -33,6 +35,10 @@ export class MeshStore {
     this.points = grown(this.points, end * this.d);
     this.points.set(points, first * this.d);
     this.vertices = Math.max(this.vertices, end);
+  }
+
+  addWalls(vertices: number[], walls: bigint[]) {
+    vertices.forEach((vertex, i) => this.walls.set(vertex, walls[i]));
   }
 
   addCells(cells: Uint32Array) {

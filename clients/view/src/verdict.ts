@@ -1,12 +1,14 @@
 // A mesh's status and certificate, as people read them.
+import { indices } from "./arrays";
 import {
   CertificateLevel,
   MeshState,
   Phase,
   type Certificate,
   type Mesh,
+  type WorkerStatus,
 } from "./generated/stellate/v1/mesh_pb";
-import type { Claim, FaultKind, MeshRow, Verdict } from "./messages";
+import type { Claim, CrewRow, FaultKind, MeshRow, PastRow, Verdict } from "./messages";
 
 const kOver = new Set([
   MeshState.SUCCEEDED,
@@ -38,13 +40,55 @@ export function rowOf(mesh: Mesh): MeshRow {
     round: Number(progress?.round ?? 0),
     queries: Number(progress?.queries ?? 0),
     revision: Number(mesh.revision),
+    walls: mesh.spec?.walls ?? 0,
     certified: isOver(mesh) ? (mesh.report?.certificate?.certified ?? false) : null,
   };
 }
 
+export function pastOf(mesh: Mesh): PastRow[] {
+  return mesh.pastProgress.map(({ revision, progress }) => ({
+    revision: Number(revision),
+    vertices: Number(progress?.vertices ?? 0),
+    simplices: Number(progress?.simplices ?? 0),
+    size: Number(progress?.badSize ?? 0),
+    radiusEdge: Number(progress?.badRadiusEdge ?? 0),
+    sliver: Number(progress?.badSliver ?? 0),
+    inconsistent: Number(progress?.badInconsistent ?? 0),
+    front: Number(progress?.unboundedStars ?? 0),
+  }));
+}
+
+// At chunks like its newest; 0: not known.
+function speedOf({ fixedSeconds, eachSeconds, newestChunk }: WorkerStatus): number {
+  const n = Number(newestChunk);
+  const seconds = fixedSeconds + n * eachSeconds;
+  return seconds > 0 ? n / seconds : 0;
+}
+
+export function crewOf(mesh: Mesh): CrewRow[] {
+  return mesh.crew.map((worker) => ({
+    number: Number(worker.number),
+    title: worker.title,
+    queries: Number(worker.queries),
+    chunks: Number(worker.chunks),
+    perSecond: speedOf(worker),
+    newestChunk: Number(worker.newestChunk),
+    holds: Number(worker.holds),
+    lagging: worker.lagging,
+  }));
+}
+
 // The ids at fault, by kind, and how many make one fault.
-export function faultsOf(_mesh: Mesh): Map<FaultKind, { ids: Uint32Array; width: number }> {
-  return new Map();
+export function faultsOf(mesh: Mesh): Map<FaultKind, { ids: Uint32Array; width: number }> {
+  const violations = mesh.report?.certificate?.violations;
+  const k = mesh.spec?.dimension ?? 1;
+  return new Map([
+    ["faces", { ids: indices(violations?.faces), width: k }],
+    ["links", { ids: indices(violations?.links), width: 1 }],
+    ["stars", { ids: indices(violations?.stars), width: 1 }],
+    ["inconsistent", { ids: indices(violations?.inconsistent), width: 1 }],
+    ["fibres", { ids: indices(violations?.fibres), width: 1 }],
+  ]);
 }
 
 const grouped = (n: bigint | number) => n.toLocaleString("en");
@@ -68,19 +112,20 @@ function claimsOf(mesh: Mesh, c: Certificate): Claim[] {
   };
   const number = (title: string, text: string) => claims.push({ title, text, holds: null });
   const k = mesh.spec?.dimension ?? 0;
+  const ends = (mesh.spec?.walls ?? 0) > 0;
   const face = ["", "vertex", "edge", "triangle"][k] ?? `${k - 1}-face`;
   check(
     "Closed",
     c.closed,
-    `every ${face} is in exactly two simplices`,
-    `${grouped(c.badFaces)} faces are not in exactly two simplices`,
+    `every ${face} is in two simplices${ends ? ", or in one and in the boundary" : ""}`,
+    `${grouped(c.badFaces)} faces are not${ends ? ", nor where the mesh should end" : " in two simplices"}`,
     "faces",
   );
   check(
     "Links",
     c.linksAreSpheres,
-    `all are spheres, decided ${c.linksDecidedExactly ? "exactly" : "by homology"}`,
-    `${grouped(c.badLinks)} vertices have a link that is no sphere`,
+    `all are spheres${ends ? ", balls at the boundary" : ""}, decided ${c.linksDecidedExactly ? "exactly" : "by homology"}`,
+    `${grouped(c.badLinks)} vertices have a link that is no sphere${ends ? " or ball" : ""}`,
     "links",
   );
   check(
@@ -118,7 +163,9 @@ function claimsOf(mesh: Mesh, c: Certificate): Claim[] {
   if (k === 2) number("Angles", `at least ${brief(c.minAngleDegrees)}°`);
   number(
     "Reach",
-    `about ${brief(c.estimatedReach)}, epsilon is ${brief(c.epsilonOverReach)} of it`,
+    Number.isFinite(c.estimatedReach)
+      ? `${c.certified ? "about" : "at most"} ${brief(c.estimatedReach)}, epsilon is ${brief(c.epsilonOverReach)} of it`
+      : "nothing limits it: all is flat",
   );
   if (c.declaredReach > 0) number("Reach declared", brief(c.declaredReach));
   if (c.provedDistance > 0) number("Distance", `at most ${brief(c.provedDistance)}`);
@@ -158,7 +205,10 @@ export function verdictOf(mesh: Mesh): Verdict | null {
             ? "unfinished"
             : "refused",
     headline,
-    text: verdict,
+    // The headline says whether it is certified.
+    text: verdict
+      .replace(/^((not )?certified|proved)\W+/i, "")
+      .replace(/^./, (first) => first.toUpperCase()),
     // Of a run that did not converge, only what is at fault was looked at.
     claims: unfinished ? unfinishedClaims(mesh, certificate) : claimsOf(mesh, certificate),
     warnings: certificate.warnings,

@@ -1,7 +1,9 @@
 // A mesh on its way from the server to the screen.
 import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
 import { doubles, indices } from "./arrays";
-import { MeshSchema, type Mesh } from "./generated/stellate/v1/mesh_pb";
+import { describe } from "./boundary";
+import { faultsIn, flightTo, marksOf, type Faults } from "./faults";
+import { MeshSchema, type Mesh, type MeshDelta } from "./generated/stellate/v1/mesh_pb";
 import {
   DownloadMeshRequestSchema,
   DownloadMeshResponseSchema,
@@ -11,12 +13,13 @@ import {
 } from "./generated/stellate/v1/stellate_pb";
 import type { Look } from "./look";
 import { histograms } from "./measure";
-import type { FaultKind, Scene } from "./messages";
+import type { FaultKind, PastRow, Scene } from "./messages";
+import { rimOf } from "./rim";
 import { report, send, sleep } from "./say";
 import { extent, project, shapeOf } from "./shape";
 import type { Source } from "./source";
 import { MeshStore } from "./store";
-import { faultsOf, isOver, rowOf, verdictOf } from "./verdict";
+import { crewOf, faultsOf, isOver, pastOf, rowOf, verdictOf } from "./verdict";
 
 const kLookSeconds = 1;
 const kDrawSeconds = 0.1; // ten frames a second while it grows
@@ -33,8 +36,9 @@ export class Viewing {
   private wanted: number | null = null;
   private fetching = false;
   private mesh: Mesh | null = null;
+  private past: PastRow[] = [];
   private over = false;
-  private faults: { kind: FaultKind | null; chosen: number } = { kind: null, chosen: -1 };
+  private fault: { kind: FaultKind | null; chosen: number } = { kind: null, chosen: -1 };
   private due = false;
   private waiting = false; // the page has not drawn the last scene yet
   private drawnAt = 0;
@@ -67,6 +71,8 @@ export class Viewing {
     while (!this.stop.signal.aborted) {
       const request = create(GetMeshRequestSchema, {
         name: this.name,
+        crew: true,
+        pastProgressAfter: BigInt(this.past.at(-1)?.revision ?? 0),
       });
       const end = await this.source.call(
         "GetMesh",
@@ -91,29 +97,29 @@ export class Viewing {
     this.mesh = mesh;
     send({ type: "mesh", mesh: rowOf(mesh) });
     send({ type: "verdict", verdict: ended ? verdictOf(mesh) : null });
+    if (mesh.pastProgress.length > 0) {
+      this.past.push(...pastOf(mesh));
+      send({ type: "past", rows: this.past });
+    }
+    send({ type: "crew", rows: crewOf(mesh) });
   }
 
   // The newest, as it comes; a connection that breaks off is opened again, from where it was.
   private async watch() {
     let pause = kFirstPause;
-    let parts: { first: number; points: Float64Array; added: Uint32Array; removed: Uint32Array }[] =
-      [];
+    let parts: MeshDelta[] = [];
     const take = (frame: Uint8Array) => {
       const { event } = fromBinary(WatchMeshResponseSchema, frame);
       pause = kFirstPause;
       if (event.case === "delta" && event.value.delta) {
         const { delta, complete } = event.value;
-        parts.push({
-          first: Number(delta.firstVertex),
-          points: doubles(delta.points),
-          added: indices(delta.added),
-          removed: indices(delta.removed),
-        });
+        parts.push(delta);
         if (!complete || this.store === null) return;
         for (const part of parts) {
-          this.store.removeCells(part.removed);
-          this.store.addPoints(part.first, part.points);
-          this.store.addCells(part.added);
+          this.store.removeCells(indices(part.removed));
+          this.store.addPoints(Number(part.firstVertex), doubles(part.points));
+          this.store.addWalls(part.boundaryVertices, part.boundaryWalls);
+          this.store.addCells(indices(part.added));
         }
         parts = [];
         this.store.revision = Number(delta.revision);
@@ -194,6 +200,7 @@ export class Viewing {
         const part = fromBinary(DownloadMeshResponseSchema, frame);
         store.revision = Number(part.revision);
         store.addPoints(Number(part.firstVertex), doubles(part.points));
+        store.addWalls(part.boundaryVertices, part.boundaryWalls);
         store.addCells(indices(part.cells));
       },
       { stop: this.stop.signal, revision },
@@ -208,56 +215,18 @@ export class Viewing {
   }
 
   choose(kind: FaultKind | null, chosen: number) {
-    this.faults = { kind, chosen };
+    this.fault = { kind, chosen };
     this.draw();
-    const ids = this.chosenIds();
     const store = this.visible;
-    if (ids.length === 0 || store === null || this.look === null) return;
+    if (store === null || this.look === null) return;
     const projected = project(store, this.look.frame);
-    const centre = mean(projected, ids);
-    send({
-      type: "fly",
-      centre,
-      radius: this.neighbourhood(store, projected, ids, centre),
-      level: this.levelOf(store, ids),
-      text: `${ids.length === 1 ? "vertex" : "vertices"} ${ids.join(" ")}`,
-    });
+    const flight = flightTo(store, this.look, projected, this.epsilon, this.faults(store));
+    if (flight) send(flight);
   }
 
-  private chosenIds(): number[] {
-    const { kind, chosen } = this.faults;
-    const found = kind && this.mesh ? faultsOf(this.mesh).get(kind) : undefined;
-    if (!found || chosen < 0) return [];
-    const ids = [...found.ids.subarray(chosen * found.width, (chosen + 1) * found.width)];
-    return ids.filter((id) => id < (this.visible?.vertices ?? 0));
-  }
-
-  // Where the slice has to be to show them.
-  private levelOf(store: MeshStore, ids: number[]): number {
-    const [low, high] = extent(store, this.look!.axis);
-    const sum = ids.reduce((all, id) => all + store.points[id * store.d + this.look!.axis], 0);
-    return (sum / ids.length - low) / (high - low || 1);
-  }
-
-  // Far enough to see all simplices about them.
-  private neighbourhood(
-    store: MeshStore,
-    projected: Float32Array,
-    ids: number[],
-    centre: [number, number, number],
-  ): number {
-    const wanted = new Set(ids);
-    const width = store.k + 1;
-    let farthest = 0;
-    for (let cell = 0; cell < store.simplices; cell++) {
-      const row = store.cells.subarray(cell * width, (cell + 1) * width);
-      if (!row.some((id) => wanted.has(id))) continue;
-      for (const id of row) {
-        const away = Math.hypot(...centre.map((c, i) => projected[3 * id + i] - c));
-        if (away > farthest) farthest = away;
-      }
-    }
-    return farthest || this.epsilon;
+  private faults(store: MeshStore): Faults {
+    const { kind, chosen } = this.fault;
+    return faultsIn(store, kind && this.mesh ? faultsOf(this.mesh).get(kind) : undefined, chosen);
   }
 
   drawn() {
@@ -286,7 +255,9 @@ export class Viewing {
     this.due = false;
     this.waiting = true;
     this.drawnAt = performance.now();
-    const shape = shapeOf(store, this.look, this.epsilon);
+    const projected = project(store, this.look.frame);
+    const shape = shapeOf(store, this.look, projected, this.epsilon);
+    const rim = rimOf(store, this.look, projected);
     const scene: Scene = {
       type: "scene",
       name: this.name,
@@ -294,35 +265,14 @@ export class Viewing {
       vertices: store.vertices,
       simplices: store.simplices,
       shape,
-      ...this.faultPositions(store, this.look),
+      rim,
+      boundary: describe(store),
+      ...marksOf(store, projected, this.faults(store)),
       ...ballOf(store, this.look),
     };
     const buffers: Transferable[] = [shape.positions.buffer, shape.values.buffer];
     if (shape.index) buffers.push(shape.index.buffer);
     send(scene, buffers);
-  }
-
-  private faultPositions(store: MeshStore, { frame }: Look) {
-    const found = this.faults.kind && this.mesh && faultsOf(this.mesh).get(this.faults.kind);
-    const none = new Float32Array();
-    if (!found) return { faults: none, faultEdges: none, chosen: none };
-    const projected = project(store, frame);
-    const at = (id: number) => [...projected.subarray(3 * id, 3 * id + 3)];
-    const there = [...found.ids].filter((id) => id < store.vertices);
-    const ends: number[] = [];
-    for (let i = 0; i + found.width <= found.ids.length; i += found.width) {
-      for (let a = i; a < i + found.width; a++) {
-        for (let b = a + 1; b < i + found.width; b++) {
-          if (Math.max(found.ids[a], found.ids[b]) >= store.vertices) continue;
-          ends.push(...at(found.ids[a]), ...at(found.ids[b]));
-        }
-      }
-    }
-    return {
-      faults: Float32Array.from(there.flatMap(at)),
-      faultEdges: Float32Array.from(ends),
-      chosen: Float32Array.from(this.chosenIds().flatMap(at)),
-    };
   }
 
   measure() {
@@ -334,11 +284,6 @@ export class Viewing {
       revision: store.revision,
     });
   }
-}
-
-function mean(projected: Float32Array, ids: number[]): [number, number, number] {
-  const sum = [0, 1, 2].map((i) => ids.reduce((all, id) => all + projected[3 * id + i], 0));
-  return sum.map((s) => s / ids.length) as [number, number, number];
 }
 
 // The same size from all sides, so that a tour does not breathe.

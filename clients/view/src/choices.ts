@@ -1,0 +1,69 @@
+// What can be looked at of a mesh of some kind, and what is best seen of it at first.
+import { axesFrame, Tour, type Look, type Part } from "./look";
+import type { MeshRow } from "./messages";
+
+const kObliqueSeconds = 4; // into a tour
+
+export type Option = [value: string, text: string];
+
+const subscript = (n: number) => `${n}`.replace(/\d/g, (digit) => "₀₁₂₃₄₅₆₇₈₉"[Number(digit)]);
+
+export const coordinates = (d: number): Option[] =>
+  Array.from({ length: d }, (_, i) => [`${i}`, `x${subscript(i + 1)}`]);
+
+export interface Choices {
+  parts: Option[];
+  colours: Option[];
+  first: Look;
+  oblique: boolean; // the first look is along no axes of the coordinates
+}
+
+function partsOf(k: number, solid: boolean): Option[] {
+  if (k === 1) return [["whole", "all of it"]];
+  if (k === 2) {
+    return [
+      ["whole", "all of it"],
+      ["below", "a part"],
+      ["slice", "a slice"],
+    ];
+  }
+  if (k > 3) {
+    return [
+      ["slice", "a slice"],
+      ["whole", "all edges"],
+    ];
+  }
+  return [
+    ...(solid ? [["boundary", "the boundary"] as Option] : []),
+    ["slice", "a slice"],
+    ["below", solid ? "a part" : "a shell"],
+    ["whole", "all edges"],
+  ];
+}
+
+export function choicesOf({ k, d, walls }: MeshRow): Choices {
+  const solid = k === 3 && walls > 0;
+  const parts = partsOf(k, solid);
+  const colours: Option[] = [
+    ["plain", "plain"],
+    ...(solid ? [["wall", "wall"] as Option] : []),
+    ["order", "order of coming"],
+    ["size", "circumradius"],
+    ["shape", "thinness"],
+    ...coordinates(d),
+  ];
+  // A surface lies over itself when coordinates are left out, but less so from an oblique side.
+  const oblique = (k <= 2 || solid) && d > 3;
+  const axes = axesFrame(d, [0, 1, 2]);
+  // Not by the coordinate that is the same all over a slice.
+  const byCoordinate = k === 3 ? d > 4 : d > 3;
+  const first: Look = {
+    frame: oblique ? new Tour(d, axes).at(kObliqueSeconds) : axes,
+    part: parts[0][0] as Part,
+    axis: Math.min(3, d - 1), // along an axis of the picture a slice would be seen edge on
+    level: 0.5,
+    colour: solid ? "wall" : byCoordinate ? "coordinate" : "plain",
+    colourAxis: Math.min(k === 3 ? 4 : 3, d - 1),
+  };
+  return { parts, colours, first, oblique };
+}

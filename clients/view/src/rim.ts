@@ -1,0 +1,50 @@
+// Where a mesh with boundary ends, as far as it is to be seen.
+import { boundaryOf, wallOf } from "./boundary";
+import type { Look, Rim } from "./look";
+import { heightOf } from "./shape";
+import type { MeshStore } from "./store";
+
+const rows = (ids: number[], size: number): number[][] =>
+  Array.from({ length: ids.length / size }, (_, i) => ids.slice(i * size, (i + 1) * size));
+
+// Where the slice of a 3-manifold ends.
+function cut(store: MeshStore, look: Look, projected: Float32Array): Rim {
+  const height = heightOf(store, look);
+  const segments: number[] = [];
+  const walls: number[] = [];
+  for (const ids of rows(boundaryOf(store).triangles, 3)) {
+    const above = ids.filter((v) => height(v) >= 0);
+    const below = ids.filter((v) => height(v) < 0);
+    if (above.length === 0 || below.length === 0) continue;
+    const [alone, others] = above.length === 1 ? [above[0], below] : [below[0], above];
+    for (const other of others) {
+      const t = height(alone) / (height(alone) - height(other));
+      for (let i = 0; i < 3; i++)
+        segments.push((1 - t) * projected[3 * alone + i] + t * projected[3 * other + i]);
+    }
+    walls.push(wallOf(store, ids));
+  }
+  return {
+    segments: Float32Array.from(segments),
+    walls: Uint8Array.from(walls),
+    points: new Float32Array(),
+  };
+}
+
+export function rimOf(store: MeshStore, look: Look, projected: Float32Array): Rim {
+  if (look.part === "slice" && store.k === 3) return cut(store, look, projected);
+  const height = heightOf(store, look);
+  const seen = (ids: number[]) =>
+    look.part === "whole" ||
+    look.part === "boundary" ||
+    (look.part === "below" && ids.every((v) => height(v) < 0));
+  const at = (id: number) => [...projected.subarray(3 * id, 3 * id + 3)];
+  const boundary = boundaryOf(store);
+  const segments = rows(boundary.segments, 2).filter(seen);
+  const points = rows(boundary.points, 1).filter(seen);
+  return {
+    segments: Float32Array.from(segments.flat().flatMap(at)),
+    walls: Uint8Array.from(segments.map((ids) => wallOf(store, ids))),
+    points: Float32Array.from(points.flat().flatMap(at)),
+  };
+}
