@@ -37,7 +37,7 @@ class CommandOracle:
 
     Args:
       command: for /bin/sh -c.
-      processes: of it, each with a batch of its own; as many threads may ask at once.
+      processes: of it, each with a batch of its own; so many threads may ask at once.
       dimension, ambient_dimension: k and d; where the command says them too, they have to be the
         same.
       bounding_box, seeds: (lower (d,), upper (d,)); (m, d). Instead of the command's own.
@@ -145,6 +145,19 @@ class CommandOracle:
         self._wants_sizes = True
         return self._beside("sizes", points)
 
+    def _face_point(self, points: np.ndarray, face: tuple[int, ...]) -> np.ndarray:
+        question = Question(self.dimension, np.asarray(points, dtype=np.float64), face=face)
+        answer = self._ask(question)
+        if not answer.found.all():
+            raise NotConverged(answer.points, answer.found)
+        return answer.points
+
+    def _clearances(self, points: np.ndarray) -> np.ndarray:
+        return self._beside("clearances", points)
+
+    def _conormals(self, points: np.ndarray, face: tuple[int, ...]) -> np.ndarray:
+        return self._beside("conormals", points, face)
+
     # Pieces.
 
     def _start(self) -> None:
@@ -167,9 +180,13 @@ class CommandOracle:
         greeting = self._greeting
         self.dimension = k = _agreed("k", greeting.dimension, k)
         self.ambient_dimension = d = _agreed("d", greeting.ambient_dimension, d)
-        if not 1 <= k < d:
+        if not (1 <= k < d or (k == d and greeting.walls)):
             raise InvalidArgument(
                 f"the dimension k = {k} has to be at least 1 and less than d = {d}"
+            )
+        if greeting.walls and not greeting.tangents:
+            raise InvalidArgument(
+                "an oracle with walls takes tangents: walls= goes with tangents=1"
             )
         if bounding_box is None and seeds is None:
             bounding_box, seeds = greeting.box, greeting.seeds
@@ -192,19 +209,26 @@ class CommandOracle:
             self.tangent_basis = self._tangent_basis
         if greeting.sizes:
             self.local_size = self._local_size
+        if greeting.walls:
+            self.walls = greeting.walls
+            self.face_point, self.clearances = self._face_point, self._clearances
+            self.conormals = self._conormals
 
-    def _beside(self, what: str, points: np.ndarray) -> np.ndarray:
-        """Tangents or sizes at points that were answered before. What has been asked for once beside
+    def _beside(self, what: str, points: np.ndarray, face: tuple[int, ...] = ()) -> np.ndarray:
+        """Tangents, sizes or walls at points that were answered before. What has been asked for once beside
         the points is asked for along with them from then on: one batch instead of two."""
         last: Answer | None = getattr(self._last, "answer", None)
         known = None if last is None else getattr(last, what)
         if (
             last is not None
             and known is not None
+            and (not face or self._last.face == face)
             and np.array_equal(last.points[last.found], points)
         ):
             return np.asarray(known[last.found])
-        answer = self._ask(Question(self.dimension, np.asarray(points, dtype=np.float64)))
+        answer = self._ask(
+            Question(self.dimension, np.asarray(points, dtype=np.float64), face=face)
+        )
         if not answer.found.all():
             row = int(np.argmin(answer.found))
             raise OracleError(
@@ -218,13 +242,19 @@ class CommandOracle:
         n, d = question.points.shape
         question.tangents = self._greeting.tangents and self._wants_tangents
         question.sizes = self._greeting.sizes and self._wants_sizes
+        question.walls = self._greeting.walls
         if not n:
             return Answer(
-                np.empty((0, d)), np.empty(0, bool), np.empty((0, d, self.dimension)), np.empty(0)
+                np.empty((0, d)),
+                np.empty(0, bool),
+                np.empty((0, d, self.dimension)),
+                np.empty(0),
+                np.empty((0, question.walls)),
+                np.empty((0, len(question.face), d)),
             )
         with self._speaker() as speaker:
             answer = self._ask_or_restart(question, speaker)
-        self._last.answer = answer
+        self._last.answer, self._last.face = answer, question.face
         return answer
 
     def _ask_or_restart(self, question: Question, speaker: list[_Speaker]) -> Answer:

@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from ._faces import Face
 from .report import Report
 
 
@@ -33,6 +34,8 @@ class Complex(Protocol):
 
     @property
     def certified(self) -> bool: ...
+
+    def faces(self, dimension: int) -> tuple[Face, ...]: ...
 
     def oriented_simplices(self) -> np.ndarray | None: ...
 

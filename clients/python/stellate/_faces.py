@@ -34,7 +34,7 @@ def faces(simplices: np.ndarray, walls: np.ndarray | None, dimension: int) -> tu
     k = simplices.shape[1] - 1
     if walls is None or not 0 <= dimension < k or not len(simplices):
         return ()
-    rows = _facets_in_one(simplices)
+    rows = facets_in_one(simplices)
     bits = np.bitwise_and.reduce(walls[rows], axis=1)
     while rows.shape[1] - 1 > dimension and len(rows):
         rows, bits = _ridges(rows, walls)
@@ -53,7 +53,8 @@ def _subsets(rows: np.ndarray) -> np.ndarray:
     return np.concatenate([np.delete(rows, i, axis=1) for i in range(width)])
 
 
-def _facets_in_one(simplices: np.ndarray) -> np.ndarray:
+def facets_in_one(simplices: np.ndarray) -> np.ndarray:
+    """The facets in one simplex alone, in lexicographic order."""
     facets, counts = np.unique(_subsets(simplices), axis=0, return_counts=True)
     return facets[counts == 1]
 

@@ -13,7 +13,7 @@ import numpy as np
 from . import _convert, _faces, _html, _plot, _slice, _view
 from ._faces import Face
 from ._files import formats
-from ._files.orientation import orient, turn_outwards
+from ._files.orientation import orient, turn_outwards, turn_positive
 from .errors import UncertifiedWarning
 from .report import Progress, Report
 
@@ -77,7 +77,8 @@ class Mesh:
     def oriented_simplices(self) -> np.ndarray | None:
         """The simplices with vertices exchanged so that neighbours agree; None if not orientable.
 
-        A hypersurface (k = d - 1) gets its normals outwards, component by component.
+        A hypersurface (k = d - 1) gets its normals outwards, component by component; simplices that
+        fill space (k = d) positive volumes.
         """
         turned = orient(self.simplices)
         if turned is None:
@@ -85,6 +86,8 @@ class Mesh:
         oriented, component = turned
         if self.dimension == self.ambient_dimension - 1:
             turn_outwards(self.points, oriented, component)
+        elif self.dimension == self.ambient_dimension:
+            turn_positive(self.points, oriented)
         return oriented
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -92,7 +95,8 @@ class Mesh:
 
         .txt  any k and d, exact: "k d nv ns", then nv lines of coordinates, then ns lines of ids.
         .off  any d (nOFF when d is not 3), k <= 2.
-        .obj  .ply  curves and surfaces, d <= 3.
+        .obj  curves and surfaces, d <= 3, and the boundary of a solid.
+        .ply  curves and surfaces, d <= 3.
         .stl  surfaces of space, binary, in single precision as the format has it.
         .msh  k <= 3, d <= 3: Gmsh's, version 2.2.
         .vtu  k <= 3. When d > 3 the points are the first three coordinates, and all of them are the
@@ -100,6 +104,11 @@ class Mesh:
               "verdict" and "version" (UTF-8 bytes).
         .vtk, as .vtu, and .avs .bdf .cgns .dat .dato .e .exo .f3grid .fem .h5m .hmf .inp .mdpa .med
         .mesh .meshb .nas .post .su2 .tec .vol .xdmf .xmf .xml, d <= 3, by meshio.
+
+        Of a mesh with boundary .msh, .vtu, .vtk and .obj have its faces too, of all dimensions, after
+        its simplices: in .msh as physical groups, "inside", "wall_0", ..., "walls_0_1", ...; in .obj
+        as groups of the same names; in .vtu and .vtk with the cell data "walls", the walls as bits
+        (0 inside), and .vtu's "group", .msh's number of it. Points have "walls" too.
 
         Surfaces are written with their triangles turned to agree where they are orientable. A file
         that was there is replaced when the new one is whole.

@@ -39,7 +39,7 @@ def write(path: Any, mesh: Any) -> None:
     """
     import meshio
 
-    names = {name: k for k, name in meshio_formats.CELLS.items()}
+    names = {name: k for k, name in meshio_formats.CELLS.items() if k > 0}
     kinds = sorted({block.type for block in mesh.cells} - {"vertex"})
     foreign = [kind for kind in kinds if kind not in names]
     if foreign or not kinds:

@@ -187,4 +187,3 @@ def test_clipping_twice_is_clipping_by_all(server):
     quarter = oracles.Clipped(half, [oracles.HalfSpace([0, 1, 0])], ball=([0, 0, 0], 5))
     assert quarter.walls == 3
     hold(stellate.mesh(quarter, 0.2, server=server), 0, {(0,), (1,)})
-

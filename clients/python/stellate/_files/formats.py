@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import importlib.util
+import itertools
 import os
 import secrets
 import stat
@@ -16,6 +17,7 @@ import numpy as np
 from .._complex import Complex, in_space
 from ..errors import SaveError
 from . import meshio_formats, vtu
+from .groups import groups, outside
 
 _ANY = 1 << 30
 _DEBIAN = {"meshio": "python3-meshio", "h5py": "python3-h5py", "netCDF4": "python3-netcdf4"}
@@ -160,7 +162,14 @@ def _off(mesh: Complex) -> Iterator[str]:
 def _obj(mesh: Complex) -> Iterator[str]:
     points = in_space(mesh.points)
     yield from _lines(points, "%.17g", "v ")
-    yield from _lines(cells(mesh) + 1, "%d", "l " if mesh.dimension == 1 else "f ")
+    every = groups(mesh, cells(mesh))
+    named = len(every) > 1
+    if mesh.dimension == 3:  # a solid is its boundary here
+        every = every[1:] or [outside(every[0].simplices)]
+    for group in every:
+        if named:
+            yield f"g {group.name}"
+        yield from _lines(group.simplices + 1, "%d", ("p ", "l ", "f ")[group.dimension])
 
 
 def _ply(mesh: Complex) -> Iterator[str]:
@@ -182,13 +191,25 @@ def _ply(mesh: Complex) -> Iterator[str]:
 
 def _msh(mesh: Complex) -> Iterator[str]:
     """Gmsh's format 2.2, which every version of it reads, and most others who read .msh."""
-    element_type = {1: 1, 2: 2, 3: 4}[mesh.dimension]  # line, triangle, tetrahedron
+    element_types = (15, 1, 2, 4)  # point, line, triangle, tetrahedron
+    every = groups(mesh, cells(mesh))
     yield "$MeshFormat\n2.2 0 8\n$EndMeshFormat"
+    if len(every) > 1:
+        yield f"$PhysicalNames\n{len(every)}"
+        yield from (f'{group.dimension} {group.tag} "{group.name}"' for group in every)
+        yield "$EndPhysicalNames"
     yield f"$Nodes\n{len(mesh.points)}"
     yield from (f"{i} {line}" for i, line in enumerate(_lines(in_space(mesh.points), "%.17g"), 1))
-    yield f"$EndNodes\n$Elements\n{len(mesh.simplices)}"
-    # Two tags for each element: it is of physical group 1 and of geometrical entity 1.
-    rows = _lines(cells(mesh) + 1, "%d", f"{element_type} 2 1 1 ")
+    yield f"$EndNodes\n$Elements\n{sum(len(group.simplices) for group in every)}"
+    # Two tags for each element: its physical group and its geometrical entity, by the same number.
+    rows = itertools.chain.from_iterable(
+        _lines(
+            group.simplices + 1,
+            "%d",
+            f"{element_types[group.dimension]} 2 {group.tag} {group.tag} ",
+        )
+        for group in every
+    )
     yield from (f"{i} {line}" for i, line in enumerate(rows, 1))
     yield "$EndElements"
 
@@ -198,7 +219,7 @@ _STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attri
 
 def _stl(mesh: Complex) -> bytes:
     """Binary: a header that says nothing, and never "solid", and a record a triangle."""
-    corners = mesh.points[cells(mesh)]
+    corners = in_space(mesh.points)[cells(mesh)]
     facets = np.zeros(len(corners), _STL_FACET)
     facets["corners"] = corners
     ends = facets["corners"]
@@ -228,7 +249,7 @@ _CELLULAR = "simplices of dimension 3 at most"
 _FORMATS = {
     ".txt": _Format(0, _ANY, _ANY, "anything", _text(_txt)),
     ".off": _Format(1, 2, _ANY, _LOW, _text(_off)),
-    ".obj": _Format(1, 2, 3, _LOW, _text(_obj)),
+    ".obj": _Format(1, 3, 3, f"{_LOW}, and the boundaries of solids", _text(_obj)),
     ".ply": _Format(1, 2, 3, _LOW, _text(_ply)),
     ".stl": _Format(2, 2, 3, "surfaces", _stl),
     ".msh": _Format(1, 3, 3, _CELLULAR, _text(_msh)),

@@ -10,8 +10,9 @@ import numpy as np
 
 from .._complex import Complex, in_space
 from ..errors import SaveError
+from .groups import Group, groups
 
-CELLS = {1: "line", 2: "triangle", 3: "tetra"}
+CELLS = {0: "vertex", 1: "line", 2: "triangle", 3: "tetra"}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,7 +21,8 @@ class MeshioFormat:
 
     Attributes:
       least_dimension: of the simplices that it holds; the largest is 3.
-      point_data: whether it holds more numbers for each point than its coordinates.
+      point_data: whether it holds more numbers for each point than its coordinates, and, of a mesh
+        with boundary, its faces beside its simplices with numbers for each.
       package: that meshio needs for it.
     """
 
@@ -62,13 +64,31 @@ FORMATS = {
 }
 
 
-def as_meshio(mesh: Complex, cells: np.ndarray) -> Any:
-    """A meshio.Mesh with these oriented cells, 1 <= k <= 3."""
+def as_meshio(mesh: Complex, cells: np.ndarray, faces: bool = True) -> Any:
+    """A meshio.Mesh with these oriented cells, 1 <= k <= 3, and `faces` of its boundary too."""
     import meshio
 
-    every = np.ascontiguousarray(mesh.points)
-    point_data = {"coordinates": every} if mesh.ambient_dimension > 3 else {}
-    return meshio.Mesh(in_space(every), [(CELLS[mesh.dimension], cells)], point_data=point_data)
+    every = groups(mesh, cells) if faces else [Group(1, "inside", (), cells)]
+    points = np.ascontiguousarray(mesh.points)
+    point_data = {"coordinates": points} if mesh.ambient_dimension > 3 else {}
+    cell_data: dict[str, list[np.ndarray]] = {}
+    names: dict[str, np.ndarray] = {}
+    if len(every) > 1 and mesh.walls is not None:
+        point_data["walls"] = mesh.walls
+        tags = [np.full(len(group.simplices), group.tag, dtype=np.int32) for group in every]
+        cell_data = {
+            "gmsh:physical": tags,
+            "gmsh:geometrical": tags,
+            "walls": [np.full(len(g.simplices), g.bits, dtype=np.uint64) for g in every],
+        }
+        names = {group.name: np.array([group.tag, group.dimension]) for group in every}
+    return meshio.Mesh(
+        in_space(points),
+        [(CELLS[group.dimension], group.simplices) for group in every],
+        point_data=point_data,
+        cell_data=cell_data,
+        field_data=names,
+    )
 
 
 def write(form: MeshioFormat, mesh: Complex, cells: np.ndarray, path: str) -> None:
@@ -76,7 +96,8 @@ def write(form: MeshioFormat, mesh: Complex, cells: np.ndarray, path: str) -> No
     import meshio
 
     try:
-        meshio.write(path, as_meshio(mesh, cells), form.name, **form.options)
+        whole = as_meshio(mesh, cells, form.point_data)
+        meshio.write(path, whole, form.name, **form.options)
     except Exception as error:  # meshio has no base class for what its writers raise
         if isinstance(error, OSError):
             raise

@@ -88,3 +88,10 @@ def turn_outwards(points: np.ndarray, oriented: np.ndarray, component: np.ndarra
     volumes = np.linalg.det(points[oriented])  # (k+1)! times those of the cones from the origin
     inwards = np.bincount(component, weights=volumes)[component] < 0
     oriented[inwards, -2:] = oriented[inwards][:, [-1, -2]]
+
+
+def turn_positive(points: np.ndarray, oriented: np.ndarray) -> None:
+    """Turns, in place, the simplices that fill space (k = d) with a negative volume."""
+    corners = points[oriented]
+    negative = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0
+    oriented[negative, -2:] = oriented[negative][:, [-1, -2]]

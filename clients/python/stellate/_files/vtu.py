@@ -10,18 +10,22 @@ import numpy as np
 
 from .._complex import Complex, in_space
 from .._version import __version__
+from .groups import groups
 
-_TYPES = {"<f8": "Float64", "<i8": "Int64", "|u1": "UInt8"}
-CELL_TYPES = {1: 3, 2: 5, 3: 10}  # line, triangle, tetrahedron
+_TYPES = {"<f8": "Float64", "<i8": "Int64", "<i4": "Int32", "<u8": "UInt64", "|u1": "UInt8"}
+CELL_TYPES = {0: 1, 1: 3, 2: 5, 3: 10}  # vertex, line, triangle, tetrahedron
 _BLOCK_BYTES = 1 << 20
 
-DIMENSIONS = tuple(CELL_TYPES)
+DIMENSIONS = (1, 2, 3)
 
 
 def lines(mesh: Complex, cells: np.ndarray) -> Iterator[str]:
     """The file of a mesh with these oriented cells, k in DIMENSIONS."""
     n, d = mesh.points.shape
-    m, width = cells.shape
+    every = groups(mesh, cells)
+    counts = [len(group.simplices) for group in every]
+    widths = np.repeat([group.dimension + 1 for group in every], counts)
+    kinds = [CELL_TYPES[group.dimension] for group in every]
     yield '<?xml version="1.0"?>'
     yield (
         '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
@@ -32,19 +36,29 @@ def lines(mesh: Complex, cells: np.ndarray) -> Iterator[str]:
     for name, values in field_data(mesh).items():
         yield _array(name, values, f'NumberOfTuples="{len(values)}"')
     yield "</FieldData>"
-    yield f'<Piece NumberOfPoints="{n}" NumberOfCells="{m}">'
+    yield f'<Piece NumberOfPoints="{n}" NumberOfCells="{sum(counts)}">'
     yield "<Points>"
     yield _array("Points", in_space(mesh.points))
     yield "</Points>"
     yield "<Cells>"
-    yield _array("connectivity", cells.ravel())
-    yield _array("offsets", width * np.arange(1, m + 1))
-    yield _array("types", np.full(m, CELL_TYPES[mesh.dimension], dtype=np.uint8))
+    yield _array("connectivity", np.concatenate([group.simplices.ravel() for group in every]))
+    yield _array("offsets", np.cumsum(widths))
+    yield _array("types", np.repeat(np.array(kinds, dtype=np.uint8), counts))
     yield "</Cells>"
-    if d > 3:
+    if d > 3 or mesh.walls is not None:
         yield "<PointData>"
-        yield _array("coordinates", mesh.points)
+        if d > 3:
+            yield _array("coordinates", mesh.points)
+        if mesh.walls is not None:
+            yield _array("walls", mesh.walls)
         yield "</PointData>"
+    if len(every) > 1:
+        bits = np.array([group.bits for group in every], dtype=np.uint64)
+        tags = np.array([group.tag for group in every], dtype=np.int32)
+        yield "<CellData>"
+        yield _array("group", np.repeat(tags, counts))
+        yield _array("walls", np.repeat(bits, counts))
+        yield "</CellData>"
     yield "</Piece>"
     yield "</UnstructuredGrid>"
     yield "</VTKFile>"

@@ -13,7 +13,8 @@ from ..errors import InvalidArgument
 
 MOST_GREETING_BYTES = 1 << 20
 MOST_ERROR_BYTES = 1 << 16
-_TANGENTS, _SIZES, _FOUND, _ERROR = 1, 2, 4, 8
+_TANGENTS, _SIZES, _FOUND, _ERROR, _WALLS = 1, 2, 4, 8, 16
+_MOST_WALLS = 64
 _MOST_DIMENSIONS = 1 << 20  # servers allow far less
 
 
@@ -74,6 +75,7 @@ class Greeting:
     tangents: bool = False
     flats: bool = False
     sizes: bool = False
+    walls: int = 0
     box: tuple[np.ndarray, np.ndarray] | None = None
     seeds: np.ndarray | None = None
 
@@ -81,7 +83,15 @@ class Greeting:
         """Whether both are about the same oracle."""
         return all(
             getattr(self, name) == getattr(other, name)
-            for name in ("text", "dimension", "ambient_dimension", "tangents", "flats", "sizes")
+            for name in (
+                "text",
+                "dimension",
+                "ambient_dimension",
+                "tangents",
+                "flats",
+                "sizes",
+                "walls",
+            )  # fmt: skip
         )
 
 
@@ -116,14 +126,16 @@ def _understand(word: str, greeting: Greeting) -> None:
             setattr(greeting, _NUMBERS[key], _number(word, value, _MOST_DIMENSIONS))
         elif key in ("tangents", "flats", "sizes"):
             setattr(greeting, key, _number(word, value, 1) != 0)
+        elif key == "walls":
+            greeting.walls = _number(word, value, _MOST_WALLS)
         elif key == "box":
             greeting.box = parse_box(value)
         elif key == "seeds":
             greeting.seeds = parse_points(value)
         else:
             raise Garbled(
-                f"its first line: {quoted(word)} is none of k= d= tangents= flats= sizes= box= "
-                "seeds="
+                f"its first line: {quoted(word)} is none of k= d= tangents= flats= sizes= walls= "
+                "box= seeds="
             )
     except InvalidArgument as error:
         raise Garbled(f"its first line: {error}") from None
@@ -137,7 +149,7 @@ def _number(word: str, value: str, most: int) -> int:
 
 @dataclasses.dataclass
 class Question:
-    """A batch: flats where bases are given, else closest points."""
+    """A batch: flats where bases are given, points of a face where that is, else closest points."""
 
     dimension: int  # k
     points: np.ndarray  # (n, d); of flats, their centers
@@ -145,6 +157,13 @@ class Question:
     radii: np.ndarray | None = None  # (n,)
     tangents: bool = False  # wanted beside the points
     sizes: bool = False
+    walls: int = 0  # of the oracle, whose clearances are wanted too
+    face: tuple[int, ...] = ()
+
+    @property
+    def wall_numbers(self) -> int:
+        """That an answer has for each point, of walls."""
+        return self.walls + len(self.face) * self.points.shape[1]
 
     def to_bytes(self, text: bool) -> bytes:
         """As the command reads it."""
@@ -153,10 +172,13 @@ class Question:
             parts += [self.bases.reshape(len(self.points), -1), self.radii[:, None]]
         if not text:
             wanted = self.tangents * _TANGENTS + self.sizes * _SIZES
-            head = struct.pack("=4I", 1 if self.bases is None else 2, len(self.points), wanted, 0)
+            kind = 3 if self.face else 1 if self.bases is None else 2
+            head = struct.pack("=4I", kind, len(self.points), wanted, len(self.face))
+            head += struct.pack(f"={len(self.face)}I", *self.face)
             return head + b"".join(np.ascontiguousarray(part).tobytes() for part in parts)
-        kind = "closest" if self.bases is None else "flat"
-        head = f"{kind} {len(self.points)} {self.tangents:d} {self.sizes:d}\n".encode()
+        name = "face" if self.face else "closest" if self.bases is None else "flat"
+        words = [name, len(self.points), int(self.tangents), int(self.sizes), *self.face]
+        head = (" ".join(map(str, words)) + "\n").encode()
         rows = np.concatenate(parts, axis=1).tolist()
         return head + "".join(" ".join(map(_decimal, row)) + "\n" for row in rows).encode()
 
@@ -173,6 +195,8 @@ class Answer:
     found: np.ndarray  # (n,) bool
     tangents: np.ndarray | None = None  # (n, d, k)
     sizes: np.ndarray | None = None  # (n,)
+    clearances: np.ndarray | None = None  # (n, walls)
+    conormals: np.ndarray | None = None  # (n, len(face), d)
 
 
 class AnswerReader:
@@ -204,12 +228,19 @@ class AnswerReader:
             if answer.found.any():
                 raise _promised("sizes")
             answer.sizes = np.ones(n)
+        if self._question.walls and answer.clearances is None:
+            if answer.found.any():
+                raise _promised("walls")
+            answer.clearances = np.zeros((n, self._question.walls))
+            answer.conormals = np.zeros((n, len(self._question.face), d))
         for what, values in (
             ("a point", answer.points),
             ("tangents", answer.tangents),
             ("a size", answer.sizes),
+            ("a clearance", answer.clearances),
+            ("a conormal", answer.conormals),
         ):
-            if values is not None:
+            if values is not None and values.size:
                 self._insist_on_finite(what, values.reshape(n, -1), answer)
         return answer
 
@@ -264,7 +295,7 @@ class BinaryReader(AnswerReader):
         count, flags = struct.unpack_from("=2I", came)
         if flags == _ERROR and count <= MOST_ERROR_BYTES:
             self._size = count
-        elif flags >= _ERROR:
+        elif flags & _ERROR or flags > _WALLS + _FOUND + _SIZES + _TANGENTS:
             raise Garbled(
                 "an answer begins with its number of rows and its flags, 8 bytes; these are "
                 f"{quoted(came)}; does something else write to its standard output?"
@@ -273,6 +304,7 @@ class BinaryReader(AnswerReader):
             raise Garbled(f"it answers {count} rows and was asked {self._n}")
         else:
             numbers = self._d + (self._dk if flags & _TANGENTS else 0) + bool(flags & _SIZES)
+            numbers += self._question.wall_numbers if flags & _WALLS else 0
             self._size = self._n * (8 * numbers + bool(flags & _FOUND))
         self._flags = flags
 
@@ -291,6 +323,10 @@ class BinaryReader(AnswerReader):
             answer.tangents = numbers(n, d, self._question.dimension)
         if flags & _SIZES:
             answer.sizes = numbers(n)
+        if flags & _WALLS and self._question.walls:
+            face = len(self._question.face)
+            answer.clearances = numbers(n, self._question.walls)
+            answer.conormals = numbers(n, face, d)
         if flags & _FOUND:
             found = np.frombuffer(self._body, np.uint8, n, at)
             if (found > 1).any():
@@ -305,7 +341,8 @@ class TextReader(AnswerReader):
         super().__init__(question)
         self._lines: list[bytes] = []
         # Numbers of a row have some 25 bytes each, and never more than 400.
-        self._longest = max(MOST_ERROR_BYTES, 400 * (self._d + self._dk + 1))
+        numbers = self._d + self._dk + 1 + question.wall_numbers
+        self._longest = max(MOST_ERROR_BYTES, 400 * numbers)
 
     def take(self, came: bytearray) -> bool:
         end = came.rfind(b"\n") + 1
@@ -330,23 +367,30 @@ class TextReader(AnswerReader):
         rows = [line.split() for line in self._lines]
         found = np.array([row != [b"-"] for row in rows], dtype=bool)
         counts = np.array([len(row) for row in rows])
-        columns = int(counts[found][0]) if found.any() else d
-        self._check(counts, found, columns)
-        values = np.zeros((n, columns))
-        values[found] = self._numbers(rows, found).reshape(-1, columns)
+        of_walls = self._question.wall_numbers
+        width = int(counts[found][0]) if found.any() else d + of_walls
+        self._check(counts, found, width)
+        values = np.zeros((n, width))
+        values[found] = self._numbers(rows, found).reshape(-1, width)
+        columns = width - of_walls
         answer = Answer(values[:, :d], found)
+        if self._question.walls:
+            after = values[:, columns:]
+            answer.clearances = after[:, : self._question.walls]
+            answer.conormals = after[:, self._question.walls :].reshape(n, -1, d)
         if columns >= d + dk:
             answer.tangents = values[:, d : d + dk].reshape(n, d, -1)
         if columns in (d + 1, d + dk + 1):
-            answer.sizes = np.where(found, values[:, -1], 1.0)
+            answer.sizes = np.where(found, values[:, columns - 1], 1.0)
         return answer
 
     def _check(self, counts: np.ndarray, found: np.ndarray, columns: int) -> None:
-        d, dk = self._d, self._dk
+        d, dk, of_walls = self._d, self._dk, self._question.wall_numbers
         wrong = found & (counts != columns)
-        if columns not in (d, d + 1, d + dk, d + dk + 1):
+        if columns - of_walls not in (d, d + 1, d + dk, d + dk + 1):
             row = int(np.argmax(found))
             why = f", not {d} of a point, {dk} more of tangents or 1 more of a size"
+            why += f", and {of_walls} of walls after these" if of_walls else ""
         elif wrong.any():
             row = int(np.argmax(wrong))
             why = f", and those before {columns}"

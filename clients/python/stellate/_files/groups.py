@@ -1,0 +1,75 @@
+"""A mesh with boundary as files hold it: groups of simplices, by the walls that they lie on."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from .._complex import Complex
+from .._faces import facets_in_one
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Group:
+    """Simplices of one dimension that lie on the same walls; on none: the mesh's own.
+
+    Attributes:
+      tag: its number, from 1 on: the mesh's own first, then the boundary's, edges', corners'.
+      name: "inside", "wall_0", "walls_0_1", ...
+      walls: their numbers, ascending.
+      simplices: (m, j+1). The boundary's are turned as the mesh's own induce it: outwards, if
+        the mesh fills space.
+    """
+
+    tag: int
+    name: str
+    walls: tuple[int, ...]
+    simplices: np.ndarray
+
+    @property
+    def dimension(self) -> int:
+        """j"""
+        return self.simplices.shape[1] - 1
+
+    @property
+    def bits(self) -> int:
+        """The walls, wall i as bit i."""
+        return sum(1 << wall for wall in self.walls)
+
+
+def groups(mesh: Complex, cells: np.ndarray) -> list[Group]:
+    """All of a mesh with these cells, oriented or not: one group, where it has no boundary."""
+    found = [Group(1, "inside", (), cells)]
+    for dimension in reversed(range(mesh.dimension)):
+        for face in mesh.faces(dimension):
+            rows = face.simplices
+            if dimension == mesh.dimension - 1 >= 1:
+                rows = _turned(rows, cells)
+            plural = "s" if len(face.walls) > 1 else ""
+            name = f"wall{plural}_" + "_".join(map(str, face.walls))
+            found.append(Group(len(found) + 1, name, face.walls, rows))
+    return found
+
+
+def outside(cells: np.ndarray) -> Group:
+    """The boundary of oriented cells of which it is not known what walls they are on."""
+    return Group(2, "boundary", (), _turned(facets_in_one(np.sort(cells, axis=1)), cells))
+
+
+def _turned(rows: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """The facets, ascending in each row, as the cells that have them induce their orientation."""
+    wanted = {tuple(row): i for i, row in enumerate(rows.tolist())}
+    on = np.zeros(int(cells.max()) + 1, dtype=bool)
+    on[rows] = True
+    turned = rows.copy()
+    for out in range(cells.shape[1]):
+        facets = np.delete(cells, out, axis=1)
+        facets = facets[on[facets].all(axis=1)]
+        if out % 2:
+            facets[:, -2:] = facets[:, [-1, -2]]
+        for ascending, facet in zip(np.sort(facets, axis=1).tolist(), facets.tolist()):
+            place = wanted.get(tuple(ascending))
+            if place is not None:
+                turned[place] = facet
+    return turned
