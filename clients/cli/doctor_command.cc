@@ -1,28 +1,18 @@
 #include "doctor_command.h"
 
-#include <google/protobuf/util/json_util.h>
-#include <grpc/grpc.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <atomic>
-#include <chrono>
 #include <csignal>
 #include <iostream>
 #include <memory>
-#include <thread>
 #include <utility>
 
-#include "doctor_service.h"
 #include "server_options.h"
+#include "stellate/doctor_server.h"
 
 namespace stellate::cli {
-namespace {
-
-constexpr auto kLook = std::chrono::milliseconds(100);
-constexpr int kLargestMessage = 64 << 20;
-
-}  // namespace
 
 DoctorCommand::DoctorCommand(CLI::App& parent)
     : command_(parent.add_subcommand(
@@ -59,46 +49,27 @@ int DoctorCommand::Run(const std::stop_token& stop) {
 // Until it is stopped. The exit status is that of the worst oracle.
 int DoctorCommand::Listen(const std::stop_token& stop) {
   const pid_t parent = getppid();
-  grpc_init();                    // for good: its shutdown now and then waits for ten seconds
   std::signal(SIGPIPE, SIG_IGN);  // whoever started it need not read the reports
   std::atomic<bool> all_well = true;
-  DoctorService service(options_.random_seed, [&](const CheckReport& report) {
+  DoctorOptions options;
+  options.listen = listen_;
+  options.random_seed = options_.random_seed;
+  options.on_listening = [](const std::string& address) {
+    std::cout << "stellate doctor listening on " << address << std::endl;
+  };
+  options.on_report = [&](const CheckReport& report) {
     if (!report.ok()) all_well = false;
     Print(report);
-  });
-  int port = 0;
-  grpc::ServerBuilder builder;
-  builder.AddListeningPort(listen_, grpc::InsecureServerCredentials(), &port);
-  builder.SetMaxReceiveMessageSize(kLargestMessage);
-  builder.RegisterService(static_cast<v1::Stellate::Service*>(&service));
-  builder.RegisterService(static_cast<v1::Doctor::Service*>(&service));
-  const std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
-  if (server == nullptr) {
-    return PrintError({ErrorCode::kRefused, "cannot listen on " + listen_, "INVALID_ARGUMENT"});
-  }
-  std::string address = listen_;
-  if (address.rfind("unix:", 0) != 0) {
-    address = address.substr(0, address.rfind(':') + 1) + std::to_string(port);
-  }
-  std::cout << "stellate doctor listening on " << address << std::endl;
-  while (!stop.stop_requested() && !(exit_with_parent_ && getppid() != parent)) {
-    std::this_thread::sleep_for(kLook);
-  }
-  server->Shutdown(std::chrono::system_clock::now());
+  };
+  options.goes_on = [&] {
+    return !stop.stop_requested() && !(exit_with_parent_ && getppid() != parent);
+  };
+  if (const auto done = RunDoctor(options); !done) return PrintError(done.error());
   return all_well ? kExitCertified : kExitNotCertified;
 }
 
 void DoctorCommand::Print(const CheckReport& report) const {
-  std::string text = ToText(report);
-  if (json_) {
-    text.clear();
-    google::protobuf::util::JsonPrintOptions options;
-    options.add_whitespace = true;
-    options.always_print_primitive_fields = true;
-    options.preserve_proto_field_names = true;
-    (void)google::protobuf::util::MessageToJsonString(ToProto(report), &text, options);
-  }
-  std::cout << text << std::flush;
+  std::cout << (json_ ? ToJson(report) : ToText(report)) << std::flush;
 }
 
 }  // namespace stellate::cli

@@ -8,7 +8,7 @@
 #include "stellate/oracle.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 
-namespace stellate::cli {
+namespace stellate::client {
 
 // The oracle behind a worker's stream: the server's side of ServeOracle, a chunk at a time. Methods
 // throw std::runtime_error with what the worker said of its failure, or that it went away.
@@ -52,4 +52,4 @@ class AskedOracle final : public Oracle {
   bool lost_ = false;
 };
 
-}  // namespace stellate::cli
+}  // namespace stellate::client

@@ -1,13 +1,13 @@
-#include "doctor_service.h"
+#include "run/doctor_service.h"
 
 #include <algorithm>
 #include <chrono>
 #include <utility>
 
-#include "asked_oracle.h"
+#include "run/asked_oracle.h"
 #include "run/epsilon.h"
 
-namespace stellate::cli {
+namespace stellate::client {
 namespace {
 
 constexpr size_t kMostPatients = 64;
@@ -52,7 +52,7 @@ v1::CheckReport ToProto(const CheckReport& report) {
     measured.set_queries_per_second(rate);
   }
   message.set_best_batch(static_cast<std::uint32_t>(report.best_batch));
-  if (const Expected<ChosenEpsilon> chosen = client::ChooseEpsilon(report)) {
+  if (const Expected<ChosenEpsilon> chosen = ChooseEpsilon(report)) {
     message.set_epsilon(chosen->epsilon);
     message.set_epsilon_reason(chosen->reason);
   } else {
@@ -162,7 +162,7 @@ grpc::Status DoctorService::DeleteMesh(grpc::ServerContext*, const v1::DeleteMes
 
 grpc::Status DoctorService::GetServerInfo(grpc::ServerContext*, const v1::GetServerInfoRequest*,
                                           v1::ServerInfo* info) {
-  info->set_version("doctor " STELLATE_VERSION);
+  info->set_version("doctor");
   info->add_protocols("stellate.v1");
   return grpc::Status::OK;
 }
@@ -181,4 +181,4 @@ grpc::Status DoctorService::GetCheckReport(grpc::ServerContext*,
   return grpc::Status::OK;
 }
 
-}  // namespace stellate::cli
+}  // namespace stellate::client

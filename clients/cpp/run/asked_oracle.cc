@@ -1,4 +1,4 @@
-#include "asked_oracle.h"
+#include "run/asked_oracle.h"
 
 #include <algorithm>
 #include <stdexcept>
@@ -7,11 +7,8 @@
 
 #include "wire/convert.h"
 
-namespace stellate::cli {
+namespace stellate::client {
 namespace {
-
-using client::FromArray;
-using client::ToArray;
 
 constexpr Eigen::Index kChunkBytes = 1 << 20;  // of a chunk's arrays, as oracle.proto says
 
@@ -152,4 +149,4 @@ Answer AskedOracle::Read(const v1::QueryChunk& chunk, const v1::AnswerChunk& ans
   return answer;
 }
 
-}  // namespace stellate::cli
+}  // namespace stellate::client

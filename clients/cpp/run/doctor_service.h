@@ -12,7 +12,7 @@
 #include "stellate/v1/doctor.grpc.pb.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 
-namespace stellate::cli {
+namespace stellate::client {
 
 v1::CheckReport ToProto(const CheckReport& report);
 
@@ -55,4 +55,4 @@ class DoctorService final : public v1::Stellate::Service, public v1::Doctor::Ser
   std::uint64_t count_ = 0;
 };
 
-}  // namespace stellate::cli
+}  // namespace stellate::client
