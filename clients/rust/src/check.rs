@@ -18,7 +18,9 @@ pub fn check(oracle: &dyn Oracle, epsilon: Option<f64>) -> Result<CheckReport, E
     let name = client.create(oracle, epsilon.unwrap_or(0.0), &MeshOptions::default())?.name;
     let served = client.serve(oracle, &name, &WorkerOptions::default());
     let mut stub = DoctorClient::new(client.channel.clone());
-    let report = client.runtime.block_on(stub.get_check_report(GetCheckReportRequest { name }));
+    let report = client
+        .runtime
+        .block_on(stub.get_check_report(GetCheckReportRequest { name, ..Default::default() }));
     match (report, served) {
         (Ok(report), _) => Ok(report.into_inner()),
         (Err(_), Err(failure)) => Err(failure), // there was no examination

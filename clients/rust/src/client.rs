@@ -169,7 +169,7 @@ impl Client {
     }
 
     pub(crate) fn create_from(&self, spec: MeshSpec) -> Result<MeshInfo, Error> {
-        let request = CreateMeshRequest { spec: Some(spec) };
+        let request = CreateMeshRequest { spec: Some(spec), ..Default::default() };
         self.runtime.block_on(self.call(&mut self.outage(), true, |mut stub| {
             let request = request.clone();
             async move { stub.create_mesh(request).await }
@@ -184,7 +184,7 @@ impl Client {
     pub(crate) async fn get_async(&self, name: &str) -> Result<MeshInfo, Error> {
         let name = name.to_string();
         self.call(&mut self.outage(), false, |mut stub| {
-            let request = GetMeshRequest { name: name.clone() };
+            let request = GetMeshRequest { name: name.clone(), ..Default::default() };
             async move { stub.get_mesh(request).await }
         })
         .await
@@ -195,7 +195,7 @@ impl Client {
         let mut all = Vec::new();
         let mut page_token = String::new();
         loop {
-            let request = ListMeshesRequest { page_size: 0, page_token };
+            let request = ListMeshesRequest { page_token, ..Default::default() };
             let page = self.runtime.block_on(self.call(&mut self.outage(), false, |mut stub| {
                 let request = request.clone();
                 async move { stub.list_meshes(request).await }
@@ -216,7 +216,7 @@ impl Client {
     pub(crate) async fn cancel_async(&self, name: &str, once: bool) -> Result<MeshInfo, Error> {
         let name = name.to_string();
         self.call(&mut self.outage(), once, |mut stub| {
-            let request = CancelMeshRequest { name: name.clone() };
+            let request = CancelMeshRequest { name: name.clone(), ..Default::default() };
             async move { stub.cancel_mesh(request).await }
         })
         .await
@@ -231,7 +231,7 @@ impl Client {
         let name = name.to_string();
         let mut outage = self.outage();
         let call = self.call(&mut outage, once, |mut stub| {
-            let request = DeleteMeshRequest { name: name.clone() };
+            let request = DeleteMeshRequest { name: name.clone(), ..Default::default() };
             async move { stub.delete_mesh(request).await }
         });
         match call.await {
@@ -244,7 +244,7 @@ impl Client {
     /// What the server is and allows.
     pub fn info(&self) -> Result<ServerInfo, Error> {
         self.runtime.block_on(self.call(&mut self.outage(), false, |mut stub| async move {
-            stub.get_server_info(GetServerInfoRequest {}).await
+            stub.get_server_info(GetServerInfoRequest::default()).await
         }))
     }
 

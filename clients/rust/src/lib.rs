@@ -5,6 +5,8 @@
 //! column) of its basis `[d, k]` is `bases[(i * d + row) * k + column]`.
 
 #![warn(missing_docs)]
+// The protocol's messages may get more fields.
+#![allow(clippy::needless_update)]
 
 mod check;
 mod checkpoint;

@@ -132,7 +132,8 @@ impl<'a> Checked<'a> {
 
     pub fn capabilities(&self) -> OracleCapabilities {
         let Capabilities { intersect_flat, tangent_basis, local_size } = self.oracle.capabilities();
-        OracleCapabilities { intersect_flat, tangent_basis, local_size, conormals: self.walls > 0 }
+        let conormals = self.walls > 0;
+        OracleCapabilities { intersect_flat, tangent_basis, local_size, conormals, ..Default::default() }
     }
 
     /// The oracle's answers to one chunk. Errors are the oracle's, or say what is wrong with them.

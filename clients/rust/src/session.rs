@@ -185,7 +185,8 @@ fn empty(info: &MeshInfo) -> GrowingComplex {
 async fn assemble(client: &Client, info: &MeshInfo, revision: u64) -> Result<Mesh, Error> {
     let mut growth = empty(info);
     let d = info.spec.as_ref().map_or(0, |spec| i64::from(spec.ambient_dimension));
-    let request = Mutex::new(DownloadMeshRequest { name: info.name.clone(), revision, position: 0 });
+    let request =
+        Mutex::new(DownloadMeshRequest { name: info.name.clone(), revision, ..Default::default() });
     let lock = || request.lock().unwrap_or_else(PoisonError::into_inner);
     let open = |mut stub: crate::client::Stub| {
         let request = lock().clone();

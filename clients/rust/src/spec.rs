@@ -54,6 +54,7 @@ impl MeshOptions {
             components: self.components,
             walls: checked.walls as u32,
             audit: if self.thorough_audit { Audit::Thorough } else { Audit::Unspecified }.into(),
+            ..Default::default()
         }
     }
 }

@@ -61,6 +61,7 @@ impl<'a> Worker<'a> {
             mesh: mesh.to_string(),
             worker: options.worker.clone(),
             max_chunk_queries: options.max_chunk.map_or(most, |limit| limit.clamp(1, most)) as u32,
+            ..Default::default()
         };
         let outage = Outage::new(&client.patience, quiet, stopped);
         Worker { client, oracle, hello, outage, tells: true }
@@ -163,7 +164,10 @@ impl<'a> Worker<'a> {
         let cut = (0..=MESSAGE_BYTES.min(message.len())).rev().find(|&at| message.is_char_boundary(at));
         message.truncate(cut.unwrap_or(0));
         if self.tells {
-            say(outbox.as_ref(), Say::Failure(OracleFailure { lease: chunk.lease, message }));
+            say(
+                outbox.as_ref(),
+                Say::Failure(OracleFailure { lease: chunk.lease, message, ..Default::default() }),
+            );
         }
         *outbox = None; // without a word as a worker that has to go
         Err(error)
@@ -218,7 +222,7 @@ async fn tell_busy(
         let lease = busy.load(Ordering::Relaxed);
         let Some(outbox) = outbox.as_ref().and_then(|weak| weak.upgrade()) else { return };
         if lease != 0 {
-            say(Some(&outbox), Say::Busy(Busy { lease }));
+            say(Some(&outbox), Say::Busy(Busy { lease, ..Default::default() }));
         }
     }
 }
