@@ -4,6 +4,7 @@
 
 Reads a line of JSON for each mesh wanted, {"shape": NAME, "epsilon": E, ...}; writes its name once
 it is declared, and "over" when it is done. "seconds": that each call of the oracle takes at least.
+"wait": for one more line before it is begun.
 """
 
 from __future__ import annotations
@@ -49,6 +50,7 @@ class Slow:
 
 SHAPES = {
     "torus": lambda: manifolds.Torus(1.0, 0.4),
+    "thin torus": lambda: manifolds.Torus(1.0, 0.12),
     "two spheres": TwoSpheres,
     "flat torus": lambda: manifolds.ProductOfCircles([1.0, 1.0, 1.0]),
     "octant": lambda: oracles.Clipped(
@@ -64,10 +66,13 @@ def main() -> None:
         wish = json.loads(line)
         oracle = SHAPES[wish.pop("shape")]()
         seconds = wish.pop("seconds", 0.0)
+        wait = wish.pop("wait", False)
         if seconds:
             oracle = Slow(oracle, seconds)
         name = client.create(oracle, **wish).name
         print(name, flush=True)
+        if wait:
+            sys.stdin.readline()
         client.serve(oracle, name, worker="a worker")
         print("over", flush=True)
 

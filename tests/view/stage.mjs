@@ -57,12 +57,15 @@ export class Stage {
     return child;
   }
 
-  // Declares a mesh and, unless it is slow, waits for its end. Its name.
+  // Declares a mesh and, unless it is slow or is to wait for begin(), waits for its end. Its name.
   async mesh(wish) {
     this.meshes.stdin.write(JSON.stringify(wish) + "\n");
     const { value: name } = await this.said.next();
-    if (!wish.seconds) await this.over();
+    if (!wish.seconds && !wish.wait) await this.over();
     return name;
+  }
+  begin() {
+    this.meshes.stdin.write("\n");
   }
   async over() {
     const { value } = await this.said.next();
@@ -70,14 +73,11 @@ export class Stage {
   }
 
   // `stellate view ...`, and the address that it prints.
-  async gateway(...args) {
-    const process_ = this.spawn(process.env.STELLATE, [
-      "view",
-      "--server",
-      this.address,
-      "--no-browser",
-      ...args,
-    ]);
+  gateway(...args) {
+    return this.viewer("--server", this.address, ...args);
+  }
+  async viewer(...args) {
+    const process_ = this.spawn(process.env.STELLATE, ["view", "--no-browser", ...args]);
     const said = [];
     process_.stderr.on("data", (text) => said.push(text));
     const ended = once(process_, "exit");
@@ -88,8 +88,9 @@ export class Stage {
     return { process: process_, url: url.href, port: url.port, secret: url.hash.slice(1), ended };
   }
 
-  async page(url) {
+  async page(url, script = () => {}) {
     const page = await this.browser.newPage({ viewport: { width: 1200, height: 760 } });
+    await page.addInitScript(script);
     page.requested = [];
     page.faults = [];
     page.on("request", (request) => page.requested.push(request.url()));

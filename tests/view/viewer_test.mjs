@@ -131,32 +131,56 @@ test("meshes with boundary show where they end, by wall", async () => {
   await page.close();
 });
 
+// Frames are drawn no more, once it is told so, until they are let go.
+function holdFrames() {
+  const draw = window.requestAnimationFrame.bind(window);
+  const held = [];
+  window.hold = false;
+  window.requestAnimationFrame = (frame) => (window.hold ? held.push(frame) : draw(frame));
+  window.release = () => {
+    window.hold = false;
+    held.splice(0).forEach(draw);
+  };
+}
+
 test("a page that falls behind goes on with the newest revision", async () => {
-  const name = await stage.mesh({ shape: "torus", epsilon: 0.07, seconds: 0.1, label: "fast" });
+  const name = await stage.mesh({ shape: "torus", epsilon: 0.1, wait: true, label: "unseen" });
   const gateway = await stage.gateway(name);
-  const page = await stage.page(gateway.url);
-  await until(page, () => Number(document.getElementById("stage").dataset.vertices) > 10);
-  // Nothing is drawn or heard for a while; the mesh goes on.
-  const drawn = await page.evaluate(async () => {
+  const page = await stage.page(gateway.url, holdFrames);
+  await until(page, () => document.getElementById("note").textContent.includes("first vertices"));
+  await page.evaluate(() => {
+    window.hold = true;
     const stage = document.getElementById("stage");
-    const seen = [Number(stage.dataset.revision)];
-    new MutationObserver(() => seen.push(Number(stage.dataset.revision))).observe(stage, {
+    window.seen = [];
+    new MutationObserver(() => window.seen.push(Number(stage.dataset.revision))).observe(stage, {
       attributeFilter: ["data-revision"],
     });
-    const end = performance.now() + 2000;
-    while (performance.now() < end);
-    const over = () =>
-      document.querySelector("#verdict .headline") !== null &&
-      stage.dataset.revision === document.getElementById("revision").max;
-    while (seen.length < 4 && !over()) await new Promise((resolve) => setTimeout(resolve, 20));
-    return seen;
   });
-  const steps = drawn.slice(1).map((revision, i) => revision - drawn[i]);
-  assert.ok(Math.max(...steps) > 3, `revisions are left out: ${drawn}`);
+  stage.begin();
   await stage.over();
   await until(page, certified);
+  await page.evaluate(() => window.release());
+  await until(page, () => {
+    const newest = document.getElementById("revision").max;
+    return document.getElementById("stage").dataset.revision === newest;
+  });
+  const seen = await page.evaluate(() => window.seen);
+  assert.ok(seen.at(-1) > 5 && seen.length <= 3, `revisions are left out: ${seen}`);
   assert.deepEqual(page.faults, []);
   await page.close();
+});
+
+test("a demonstration goes through the catalogue by itself", async () => {
+  const demo = await stage.viewer("--demo");
+  const page = await stage.page(demo.url);
+  await until(page, () => document.getElementById("facts").textContent.includes("torus:1:0.4"));
+  await until(page, () => document.getElementById("facts").textContent.includes("tanglecube"));
+  await until(page, () => Number(document.getElementById("stage").dataset.vertices) > 50);
+  assert.match(await text(page, "#list"), /tanglecube.*torus:1:0\.4\s+certified/s);
+  assert.deepEqual(page.faults, []);
+  await page.close();
+  demo.process.kill("SIGINT");
+  assert.deepEqual(await demo.ended, [0, null], "Ctrl-C ends it well");
 });
 
 test("a mesh at fault leads to where it is", async () => {
@@ -177,6 +201,23 @@ test("a mesh at fault leads to where it is", async () => {
   await page.locator("#fault-leave").click();
   assert.ok(await page.locator("#fault").isHidden());
   assert.match(await text(page, "#verdict"), /Not certified/);
+  assert.deepEqual(page.faults, []);
+  await page.close();
+});
+
+test("what the certificate's words name leads there, too", async () => {
+  const name = await stage.mesh({ shape: "thin torus", epsilon: 0.25, label: "too coarse" });
+  const gateway = await stage.gateway(name);
+  const page = await stage.page(gateway.url);
+  await until(page, () => document.querySelector("#verdict .place") !== null);
+  assert.match(await text(page, "#verdict"), /^Not certified/);
+  const before = await picture(page);
+  const place = await page.locator("#verdict .place").first().innerText();
+  await page.locator("#verdict .place").first().click();
+  await until(page, () => !document.getElementById("fault").hidden);
+  assert.equal((await text(page, "#fault")).split("\n")[0].replace(/ ?(next|leave).*/, ""), place);
+  await page.waitForTimeout(900); // a flight
+  assert.notEqual((await picture(page)).digest, before.digest);
   assert.deepEqual(page.faults, []);
   await page.close();
 });

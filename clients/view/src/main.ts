@@ -48,7 +48,7 @@ let past: PastRow[] = [];
 let shownRevision = 0;
 let boundary = ""; // of what is shown, in words
 let following = true; // the newest revision
-let fault: { kind: FaultKind; next: number; count: number } | null = null;
+let fault: { kind: FaultKind; next: number; count: number } | { place: string } | null = null;
 let look: Look = {
   frame: axesFrame(3, [0, 1, 2]),
   part: "whole",
@@ -219,18 +219,25 @@ at("play").onclick = () => {
 // --- faults
 
 function fly(kind: FaultKind, count: number) {
-  const next = fault?.kind === kind ? (fault.next + 1) % count : 0;
+  const next = fault && "kind" in fault && fault.kind === kind ? (fault.next + 1) % count : 0;
   fault = { kind, next, count };
   show(null);
-  ask({ type: "faults", kind, chosen: next });
+  ask({ type: "faults", fault: { kind, chosen: next } });
+}
+
+// To what the certificate's words name.
+function flyTo(place: string, ids: number[]) {
+  fault = { place };
+  show(null);
+  ask({ type: "faults", fault: { ids } });
 }
 
 function leaveFault() {
-  if (fault) ask({ type: "faults", kind: null, chosen: -1 });
+  if (fault) ask({ type: "faults", fault: null });
   fault = null;
   at("fault").hidden = true;
 }
-at("fault-next").onclick = () => fault && fly(fault.kind, fault.count);
+at("fault-next").onclick = () => fault && "kind" in fault && fly(fault.kind, fault.count);
 at("fault-leave").onclick = leaveFault;
 
 // --- what the worker says
@@ -305,14 +312,16 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
     drawTime();
   },
   crew: ({ rows }) => drawCrew(at("crew"), rows),
-  verdict: ({ verdict }) => drawVerdict(at("verdict"), verdict, fly),
+  verdict: ({ verdict }) => drawVerdict(at("verdict"), verdict, fly, flyTo),
   histograms: ({ histograms }) => drawHistograms(at("histograms"), histograms),
   fly: ({ centre, radius, normal, level, text }) => {
     if (!fault) return;
     at("fault").hidden = false;
     at("fault").querySelector("span")!.textContent =
-      `${fault.next + 1} of ${fault.count}: ${kFaults[fault.kind]} ${text}`;
-    at("fault-next").hidden = fault.count < 2;
+      "kind" in fault
+        ? `${fault.next + 1} of ${fault.count}: ${kFaults[fault.kind]} ${text}`
+        : fault.place;
+    at("fault-next").hidden = !("kind" in fault) || fault.count < 2;
     if (!at("level-box").hidden) {
       at<HTMLInputElement>("level").value = `${level}`;
       changeLook({ level });

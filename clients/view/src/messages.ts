@@ -48,6 +48,9 @@ export interface CrewRow {
 
 export type FaultKind = "faces" | "links" | "stars" | "inconsistent" | "fibres";
 
+// What is looked at: one of those that the certificate names, or what its words name.
+export type Fault = { kind: FaultKind; chosen: number } | { ids: number[] };
+
 // A line of the certificate; with faults, it leads to them.
 export interface Claim {
   title: string;
@@ -71,7 +74,7 @@ export type ToWorker =
   | { type: "watch"; name: string }
   | { type: "revision"; revision: number | null } // null: the newest, as it comes
   | { type: "look"; look: Look }
-  | { type: "faults"; kind: FaultKind | null; chosen: number }
+  | { type: "faults"; fault: Fault | null }
   | { type: "measure" }
   | { type: "drawn" };
 

@@ -151,10 +151,24 @@ function drawClaim(claim: Claim, onFault: (kind: FaultKind, count: number) => vo
   return item;
 }
 
+type OnPlace = (place: string, ids: number[]) => void;
+
+// Words in which simplices and vertices that are named lead there.
+function withPlaces(text: string, onPlace: OnPlace): (string | HTMLElement)[] {
+  return text.split(/((?:simplex|face) \(\d+(?: \d+)*\)|vertex \d+)/i).map((part, i) => {
+    if (i % 2 === 0) return part;
+    const link = element("button", "place", part);
+    link.type = "button";
+    link.onclick = () => onPlace(part, part.match(/\d+/g)!.map(Number));
+    return link;
+  });
+}
+
 export function drawVerdict(
   host: HTMLElement,
   verdict: Verdict | null,
   onFault: (kind: FaultKind, count: number) => void,
+  onPlace: OnPlace,
 ) {
   if (!isNews(host, verdict)) return;
   if (verdict === null) {
@@ -162,11 +176,16 @@ export function drawVerdict(
     return;
   }
   const headline = element("p", `headline ${verdict.level}`, verdict.headline);
-  const text = element("p", "verdict", verdict.text);
+  const text = element("p", "verdict");
+  text.append(...withPlaces(verdict.text, onPlace));
   text.title = "Read all of it";
   text.onclick = () => text.classList.add("open");
   const claims = element("ul", "claims");
   claims.append(...verdict.claims.map((claim) => drawClaim(claim, onFault)));
   host.replaceChildren(headline, text, claims);
-  for (const warning of verdict.warnings) host.append(element("p", "warning", warning));
+  for (const warning of verdict.warnings) {
+    const line = element("p", "warning");
+    line.append(...withPlaces(warning, onPlace));
+    host.append(line);
+  }
 }

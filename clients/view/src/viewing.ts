@@ -13,7 +13,7 @@ import {
 } from "./generated/stellate/v1/stellate_pb";
 import type { Look } from "./look";
 import { histograms } from "./measure";
-import type { FaultKind, PastRow, Scene } from "./messages";
+import type { Fault, PastRow, Scene } from "./messages";
 import { rimOf } from "./rim";
 import { report, send, sleep } from "./say";
 import { extent, project, shapeOf } from "./shape";
@@ -38,7 +38,8 @@ export class Viewing {
   private mesh: Mesh | null = null;
   private past: PastRow[] = [];
   private over = false;
-  private fault: { kind: FaultKind | null; chosen: number } = { kind: null, chosen: -1 };
+  private fault: Fault | null = null;
+  private flightDue = false; // to it, once it is there
   private due = false;
   private waiting = false; // the page has not drawn the last scene yet
   private drawnAt = 0;
@@ -214,19 +215,19 @@ export class Viewing {
     this.draw();
   }
 
-  choose(kind: FaultKind | null, chosen: number) {
-    this.fault = { kind, chosen };
+  choose(fault: Fault | null) {
+    this.fault = fault;
+    this.flightDue = fault !== null;
     this.draw();
-    const store = this.visible;
-    if (store === null || this.look === null) return;
-    const projected = project(store, this.look.frame);
-    const flight = flightTo(store, this.look, projected, this.epsilon, this.faults(store));
-    if (flight) send(flight);
   }
 
   private faults(store: MeshStore): Faults {
-    const { kind, chosen } = this.fault;
-    return faultsIn(store, kind && this.mesh ? faultsOf(this.mesh).get(kind) : undefined, chosen);
+    if (this.fault === null || this.mesh === null) return { all: [], chosen: [] };
+    if ("kind" in this.fault) {
+      return faultsIn(store, faultsOf(this.mesh).get(this.fault.kind), this.fault.chosen);
+    }
+    const { ids } = this.fault;
+    return faultsIn(store, { ids: Uint32Array.from(ids), width: ids.length }, 0);
   }
 
   drawn() {
@@ -258,6 +259,12 @@ export class Viewing {
     const projected = project(store, this.look.frame);
     const shape = shapeOf(store, this.look, projected, this.epsilon);
     const rim = rimOf(store, this.look, projected);
+    const faults = this.faults(store);
+    const flight = flightTo(store, this.look, projected, this.epsilon, faults);
+    if (this.flightDue && flight !== null) {
+      this.flightDue = false;
+      send(flight);
+    }
     const scene: Scene = {
       type: "scene",
       name: this.name,
@@ -267,7 +274,7 @@ export class Viewing {
       shape,
       rim,
       boundary: describe(store),
-      ...marksOf(store, projected, this.faults(store)),
+      ...marksOf(store, projected, faults),
       ...ballOf(store, this.look),
     };
     const buffers: Transferable[] = [shape.positions.buffer, shape.values.buffer];

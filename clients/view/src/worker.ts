@@ -68,7 +68,7 @@ const answers: { [T in ToWorker["type"]]: (m: Extract<ToWorker, { type: T }>) =>
     look = message.look;
     viewing?.lookAt(message.look);
   },
-  faults: ({ kind, chosen }) => viewing?.choose(kind, chosen),
+  faults: ({ fault }) => viewing?.choose(fault),
   measure: () => viewing?.measure(),
   drawn: () => viewing?.drawn(),
 };
