@@ -17,7 +17,7 @@ import numpy as np
 from .._complex import Complex, in_space
 from ..errors import SaveError
 from . import meshio_formats, vtu
-from .groups import groups, outside
+from .groups import groups
 
 _ANY = 1 << 30
 _DEBIAN = {"meshio": "python3-meshio", "h5py": "python3-h5py", "netCDF4": "python3-netcdf4"}
@@ -165,7 +165,12 @@ def _obj(mesh: Complex) -> Iterator[str]:
     every = groups(mesh, cells(mesh))
     named = len(every) > 1
     if mesh.dimension == 3:  # a solid is its boundary here
-        every = every[1:] or [outside(every[0].simplices)]
+        every = every[1:]
+        if not every:
+            raise SaveError(
+                ".obj holds curves, surfaces and the boundaries of solids, and it is not known on what "
+                "walls this solid's boundary lies"
+            )
     for group in every:
         if named:
             yield f"g {group.name}"

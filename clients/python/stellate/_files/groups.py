@@ -7,7 +7,6 @@ import dataclasses
 import numpy as np
 
 from .._complex import Complex
-from .._faces import facets_in_one
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -50,11 +49,6 @@ def groups(mesh: Complex, cells: np.ndarray) -> list[Group]:
             name = f"wall{plural}_" + "_".join(map(str, face.walls))
             found.append(Group(len(found) + 1, name, face.walls, rows))
     return found
-
-
-def outside(cells: np.ndarray) -> Group:
-    """The boundary of oriented cells of which it is not known what walls they are on."""
-    return Group(2, "boundary", (), _turned(facets_in_one(np.sort(cells, axis=1)), cells))
 
 
 def _turned(rows: np.ndarray, cells: np.ndarray) -> np.ndarray:
