@@ -187,3 +187,21 @@ def test_clipping_twice_is_clipping_by_all(server):
     quarter = oracles.Clipped(half, [oracles.HalfSpace([0, 1, 0])], ball=([0, 0, 0], 5))
     assert quarter.walls == 3
     hold(stellate.mesh(quarter, 0.2, server=server), 0, {(0,), (1,)})
+
+
+@pytest.mark.parametrize(
+    ("wall", "gradient", "said"),
+    [
+        (lambda x: x, None, r"wall 0 returned shape \(1, 3\)"),
+        (lambda x: 1 - (x**2).sum(), None, r"wall 0 returned shape \(\)"),
+        (
+            lambda x: 1 - (x**2).sum(axis=1),
+            lambda x: -2 * x.T,  # as many numbers, in the wrong order
+            r"the gradient of wall 0 returned shape \(3, \d+\)",
+        ),
+    ],
+)
+def test_walls_of_the_wrong_shape_are_named(server, wall, gradient, said):
+    with pytest.raises(stellate.OracleError, match=said):
+        solid = oracles.Solid(wall, ROOM, gradients=[gradient])
+        stellate.mesh(solid, 0.4, server=server)

@@ -8,7 +8,7 @@ from typing import Any, Callable
 import numpy as np
 
 from .._derivatives import with_derivatives
-from ..errors import InvalidArgument
+from ..errors import InvalidArgument, OracleError
 from ..oracle import CheckedOracle
 from ._combined import LevelSet
 from ._common import Array, apply, norms, refuse_walls, transposed
@@ -138,12 +138,24 @@ class Clipped:
 
     def _value(self, wall: int, points: Array) -> Array:
         values = np.asarray(self._walls[wall](points), dtype=np.float64)
-        return values.reshape(len(points))
+        n = len(points)
+        if values.shape not in ((n,), (n, 1)):
+            raise OracleError(
+                f"wall {wall} returned shape {values.shape}; it has to be ({n},) for a batch of {n} "
+                "points, a number each"
+            )
+        return values.reshape(n)
 
     def _slope(self, wall: int, points: Array) -> Array:
         gradient = self._gradients[wall]
         if gradient is not None:
-            return np.asarray(gradient(points), dtype=np.float64).reshape(points.shape)
+            slopes = np.asarray(gradient(points), dtype=np.float64)
+            if slopes.shape != points.shape:
+                raise OracleError(
+                    f"the gradient of wall {wall} returned shape {slopes.shape}; it has to be "
+                    f"{points.shape} for a batch of {len(points)} points, a row each"
+                )
+            return slopes
         h = 6e-6 * self._scale() * np.eye(self.ambient_dimension)
         columns = [
             (self._value(wall, points + v) - self._value(wall, points - v)) / (2 * v.sum())
