@@ -12,17 +12,8 @@ from typing import Any, Callable, TypeVar
 
 import numpy as np
 
-from ._pipe.framing import (
-    MOST_GREETING_BYTES,
-    Answer,
-    CommandError,
-    Garbled,
-    Greeting,
-    Question,
-    parse_greeting,
-    quoted,
-    reader,
-)
+from ._pipe.framing import Answer, CommandError, Question, reader
+from ._pipe.greeting import MOST_GREETING_BYTES, Garbled, Greeting, parse_greeting, quoted
 from ._pipe.process import Ended, Process
 from .errors import InvalidArgument, NotConverged, OracleError
 

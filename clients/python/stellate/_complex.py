@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from ._faces import Face
 from .report import Report
 
 
@@ -35,7 +34,7 @@ class Complex(Protocol):
     @property
     def certified(self) -> bool: ...
 
-    def faces(self, dimension: int) -> tuple[Face, ...]: ...
+    def faces(self, dimension: int) -> tuple[Any, ...]: ...
 
     def oriented_simplices(self) -> np.ndarray | None: ...
 

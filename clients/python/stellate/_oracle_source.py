@@ -9,7 +9,7 @@ import sys
 from typing import Any
 
 from ._command_oracle import CommandOracle
-from ._pipe.framing import parse_box, parse_points
+from ._pipe.greeting import parse_box, parse_points
 from .errors import StellateError
 
 _OF_COMMANDS = ("oracle_processes", "dimension", "ambient_dimension", "box", "seeds",

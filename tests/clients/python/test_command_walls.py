@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import stellate
 from stellate import manifolds, oracles
-from stellate._pipe.framing import Garbled, Question, parse_greeting, reader
+from stellate._pipe.framing import Question, reader
+from stellate._pipe.greeting import Garbled, parse_greeting
 
 PIPE = pathlib.Path(__file__).resolve().parents[3] / "clients" / "pipe"
 COMMANDS = {

@@ -10,7 +10,7 @@ import subprocess
 import time
 from collections.abc import Callable
 
-from .framing import quoted
+from .greeting import quoted
 
 _GRACE = 2.0  # seconds between an end of input, SIGTERM and SIGKILL
 _LAST_WORDS = 1.0  # seconds from closed pipes to the end
