@@ -3,9 +3,11 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 
 #include "core/base/message.h"
+#include "core/certificate/findings.h"
 
 namespace stellate::core {
 namespace {
@@ -168,9 +170,32 @@ Status CheckTangent(const Specification& spec, const QueryBlock& block, Index qu
   return Status::Ok();
 }
 
+// Of walls that meet nearly tangentially: the two that do most, and at which angle inside of M.
+// `along`: conormals in tangent coordinates, by ascending wall.
+std::string NameTangential(WallSet walls, const Eigen::MatrixXd& along) {
+  double most = 0;
+  int pair[2] = {0, 0};
+  int a = 0;
+  ForEachWall(walls, [&](int first) {
+    int b = 0;
+    ForEachWall(walls, [&](int second) {
+      const double cosine = -along.col(a).dot(along.col(b));
+      if (b > a && std::abs(cosine) > std::abs(most)) {
+        most = cosine;
+        pair[0] = first;
+        pair[1] = second;
+      }
+      ++b;
+    });
+    ++a;
+  });
+  const double degrees = std::acos(std::clamp(most, -1.0, 1.0)) * 180 / std::numbers::pi;
+  return Message("walls ", pair[0], " and ", pair[1], " at ", Brief(degrees), " degrees");
+}
+
 // Unit, tangent, and independent of each other: by the tangent basis that came with them.
 Status CheckConormals(const Specification& spec, const QueryBlock& block, Index query,
-                      const double* basis, const double* conormals) {
+                      const Eigen::VectorXd& point, const double* basis, const double* conormals) {
   const Index k = spec.dimension, d = spec.ambient_dimension;
   const int count = CountWalls(block.face);
   const auto refuse = [&](const auto&... parts) {
@@ -202,10 +227,10 @@ Status CheckConormals(const Specification& spec, const QueryBlock& block, Index 
   const Eigen::MatrixXd gram = along.transpose() * along;
   const double independent = gram.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff();
   if (independent >= kLeastTransversality) return Status::Ok();
-  return refuse(
-      "the walls meet nearly tangentially there: the smallest eigenvalue of their "
-      "conormals' Gram matrix is ",
-      independent, ", less than ", kLeastTransversality, "; walls must cross at an angle");
+  return refuse("the walls meet nearly tangentially: ", NameTangential(block.face, along), ", at ",
+                NamePoint(point), "; the smallest eigenvalue of their conormals' Gram matrix is ",
+                independent, ", less than ", kLeastTransversality,
+                "; walls must cross at an angle");
 }
 
 Status CheckSize(const QueryBlock& block, Index query, double size) {
@@ -242,7 +267,8 @@ Status CheckAnswers(const Specification& spec, const QueryBlock& block, Eigen::I
       const double* conormals = answer.conormals.col(j).data();
       status = CheckFinite(block, query, "conormal", conormals, answer.conormals.rows());
       if (status.ok())
-        status = CheckConormals(spec, block, query, answer.tangents.col(j).data(), conormals);
+        status = CheckConormals(spec, block, query, answer.points.col(j),
+                                answer.tangents.col(j).data(), conormals);
     }
     if (status.ok() && answer.sizes.size() > 0) status = CheckSize(block, query, answer.sizes[j]);
     if (!status.ok()) return status;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -81,6 +82,13 @@ struct FaceReport {
   std::int64_t euler_characteristic = 0;
 };
 
+// Where two walls meet: a point of M, and the angle between them there inside of M.
+struct WallAngle {
+  WallSet walls = 0;  // the two
+  double degrees = 0;
+  Eigen::VectorXd point;
+};
+
 // How far a certificate goes.
 enum class CertificateLevel {
   kRefused = 0,  // a check failed, or the run did not converge
@@ -149,6 +157,9 @@ struct Certificate {
   std::uint64_t boundary_components = 0;
   std::int64_t boundary_euler_characteristic = 0;
   std::vector<FaceReport> faces;  // those that there are, by dimension, the lowest first
+  // Of all vertices on several walls, the smallest angle; none: no walls meet. Told however the run
+  // ends.
+  std::optional<WallAngle> sharpest;
 
   Violations violations;
 };

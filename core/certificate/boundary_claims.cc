@@ -1,6 +1,7 @@
 #include "core/certificate/boundary_claims.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <numeric>
 #include <set>
@@ -9,6 +10,7 @@
 #include "core/base/message.h"
 #include "core/base/random.h"
 #include "core/certificate/links.h"
+#include "core/geometry/reach_bound.h"
 
 namespace stellate::core {
 namespace {
@@ -137,6 +139,13 @@ void BoundaryClaims::JudgeFace(const QueryBlock& asked, const AnswerBlock& answe
     const double bound = x_.DistanceAllowed(diameter);
     const double distance =
         Found(answer, j) ? (answer.points.col(j) - asked.points.col(j)).norm() : INFINITY;
+    if (x_.spec.criteria.max_deviation && distance > *x_.spec.criteria.max_deviation)
+      x_.findings.Refuse(
+          Findings::kDeviation,
+          Message("a barycentre of ", NameWalls(face.walls), " lies ", Brief(distance),
+                  " from it, more than max_deviation = ", Brief(*x_.spec.criteria.max_deviation),
+                  ": the wall bends more there than the vertices show; take epsilon smaller, or "
+                  "max_deviation"));
     if (distance <= bound) continue;
     x_.findings.Refuse(
         Findings::kBarycentres,
@@ -166,6 +175,53 @@ void BoundaryClaims::JudgeInside(const std::vector<std::uint32_t>& chosen, std::
                 ": the manifold has a hole there that is smaller than epsilon; take epsilon "
                 "smaller, or give seeds on that wall"));
   }
+}
+
+// What q, on the same wall as p, shows at p: p's distance from it over that from the wall's tangent
+// space, which leaves the conormal out. Infinity where p is on other walls too.
+double BoundaryClaims::ReachAt(const FaceMesh& face, std::uint32_t p, std::uint32_t q) const {
+  if (x_.mesh.WallsOf(p) != face.walls) return INFINITY;
+  const Eigen::VectorXd step = x_.Vertex(q) - x_.Vertex(p);
+  const Eigen::VectorXd along = x_.Tangents(p).transpose() * step;
+  const double out = Eigen::Map<const Eigen::VectorXd>(x_.mesh.Outward(p), x_.mesh.k).dot(along);
+  const double away2 = step.squaredNorm() - along.squaredNorm() + out * out;
+  const double away = std::sqrt(std::max(away2, 0.0)), length = step.norm();
+  return IsTelling(length, away, x_.longest_edge[p], x_.position_error)
+             ? ReachBound(length * length, away)
+             : INFINITY;
+}
+
+void BoundaryClaims::JudgeReach() {
+  double reach = INFINITY, ratio = 0;
+  std::uint32_t narrowest = 0;
+  WallSet walls = 0;
+  for (const FaceMesh& face : *x_.mesh.faces) {
+    if (CountWalls(face.walls) != 1) continue;
+    const auto width = static_cast<std::size_t>(face.dimension) + 1;
+    for (std::size_t s = 0; s < face.simplices.size(); s += width)
+      for (std::size_t i = 0; i < width; ++i)
+        for (std::size_t j = 0; j < width; ++j) {
+          if (i == j) continue;
+          const std::uint32_t p = face.simplices[s + i];
+          const double here = ReachAt(face, p, face.simplices[s + j]);
+          ratio = std::max(ratio, x_.size / here);
+          if (here >= reach) continue;
+          reach = here;
+          narrowest = p;
+          walls = face.walls;
+        }
+  }
+  Certificate& c = x_.certificate;
+  c.estimated_reach = std::min(c.estimated_reach, reach);
+  if (x_.graded()) return;  // what is seen there counts in the sizes
+  c.epsilon_over_reach = std::max(c.epsilon_over_reach, x_.spec.epsilon / reach);
+  if (ratio > kCoarse)
+    x_.findings.Refuse(
+        Findings::kReach,
+        Message("too coarse to trust: ",
+                TooCoarse(ratio, reach,
+                          Message("along ", NameWalls(walls), " near vertex ", narrowest, " at ",
+                                  NamePoint(x_.Vertex(narrowest))))));
 }
 
 }  // namespace stellate::core

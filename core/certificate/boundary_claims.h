@@ -29,8 +29,13 @@ class BoundaryClaims {
   // That simplices off the boundary have M under them. `chosen`, `each`: see PointsInside.
   void JudgeInside(const std::vector<std::uint32_t>& chosen, std::uint32_t each,
                    const AnswerBlock& answer);
+  // That the boundary's own reach within M, as its edges show it, is not too small for the mesh.
+  // After what M's is was told.
+  void JudgeReach();
 
  private:
+  double ReachAt(const FaceMesh& face, std::uint32_t p, std::uint32_t q) const;
+
   Examination& x_;
   std::vector<std::vector<std::uint32_t>> chosen_;  // by block: places in its face
   std::vector<const FaceMesh*> faces_;              // by block

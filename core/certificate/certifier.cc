@@ -157,6 +157,7 @@ class Certifier::Impl {
       x_.certificate.answers_held =
           x_.seen.size() / static_cast<std::size_t>(x_.mesh.d) + claims_->closeness.points_held();
       claims_->reach.Judge();
+      if (boundary_) boundary_->JudgeReach();
       claims_->closeness.JudgeDeviation();
       claims_->reach.JudgeDeclared();
     }

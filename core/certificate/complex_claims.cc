@@ -58,10 +58,7 @@ void RefuseWhatIsNoManifold(Examination& x, const Connectivity& connectivity,
                               ", where each must be in two; faces like it: ", c.bad_faces,
                               x.mesh.faces ? Message("; ", x.mesh.vertices,
                                                      " stands for what is beyond the boundary")
-                                           : std::string(),
-                              x.mesh.faces || x.facts.inconsistent_simplices > 0
-                                  ? ""
-                                  : ". If the manifold has a boundary, declare it by walls"));
+                                           : std::string()));
   }
   if (connectivity.isolated_vertices > 0) {
     x.findings.Refuse(Findings::kLinks, Message("vertex ", connectivity.some_isolated.front(),

@@ -22,6 +22,32 @@ void Findings::Refuse(Subject subject, std::string problem) {
   problems_.insert(place, {subject, std::move(problem)});
 }
 
+bool Findings::MayBeBoundary() const {
+  return std::any_of(problems_.begin(), problems_.end(), [](const Problem& p) {
+    switch (p.subject) {
+      case kComplex:
+      case kLinks:
+      case kConsistency:
+      case kStars:
+      case kRim:
+      case kBarycentres:
+      case kCoverage:
+      case kFibres:
+        return true;
+      case kSize:
+      case kVertices:
+      case kTangents:
+      case kReach:
+      case kComponents:
+      case kDeviation:
+      case kDeclaredReach:
+      case kConvergence:
+        return false;
+    }
+    return false;
+  });
+}
+
 std::string NamePoint(const Eigen::VectorXd& x) {
   std::string name = "(";
   for (Eigen::Index i = 0; i < std::min<Eigen::Index>(x.size(), 6); ++i) {
@@ -64,6 +90,7 @@ void Findings::Conclude(int k, const Specification& spec, Certificate& certifica
       certificate.verdict += Message(" Other checks failed too (", problems_.size() - 1,
                                      "), next: ", problems_[1].text, ".");
     }
+    if (spec.walls == 0 && MayBeBoundary()) certificate.verdict += Message(" ", kDeclareWalls, ".");
     return;
   }
   const std::uint64_t components = certificate.components;

@@ -22,8 +22,10 @@ struct MeshView {
   const WallSet* walls = nullptr;
   const double* outward = nullptr;
   const std::vector<FaceMesh>* faces = nullptr;
+  const double* guards = nullptr;  // by vertex, squared radii (StarComplex::Guard); null: none
 
   WallSet WallsOf(std::uint32_t v) const { return walls ? walls[v] : 0; }
+  double GuardOf(std::uint32_t v) const { return guards ? guards[v] : 0; }
   const double* Outward(std::uint32_t v) const { return outward + std::size_t{v} * k; }
   const double* Point(std::uint32_t v) const { return points + std::size_t{v} * d; }
   const double* Tangent(std::uint32_t v) const { return tangents + std::size_t{v} * d * k; }

@@ -56,9 +56,7 @@ std::string RimCheck::Judge(const AnswerBlock& answer, double position_error) co
     if (over >= kComesBack * back || back < kAlong * lean.length) continue;
     return Message("the manifold ends, or has a sharp edge, at its point ", NamePoint(lean.y),
                    ": what was asked there does not lie straight above it, and a step of ",
-                   Brief(lean.length),
-                   " along it comes back, unlike the step the other way; holes "
-                   "and boundaries are not meshed");
+                   Brief(lean.length), " along it comes back, unlike the step the other way");
   }
   return {};
 }

@@ -1,5 +1,6 @@
 #include "core/certificate/shape.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -40,6 +41,29 @@ struct Extremes {
   }
 };
 
+// What R1 bounds where a vertex is guarded: the largest distance of a vertex from the orthocentre,
+// from which all have the same power.
+double RadiusAmongGuards(const MeshView& mesh, const std::uint32_t* ids) {
+  const Eigen::Map<const Eigen::VectorXd> first(mesh.Point(ids[0]), mesh.d);
+  Eigen::MatrixXd edges(mesh.d, mesh.k);
+  Eigen::VectorXd powers(mesh.k);
+  for (int i = 0; i < mesh.k; ++i) {
+    const Eigen::Map<const Eigen::VectorXd> other(mesh.Point(ids[i + 1]), mesh.d);
+    edges.col(i) = other - first;
+    powers[i] =
+        0.5 * (edges.col(i).squaredNorm() + mesh.GuardOf(ids[0]) - mesh.GuardOf(ids[i + 1]));
+  }
+  const Eigen::VectorXd centre = edges * (edges.transpose() * edges).ldlt().solve(powers).eval();
+  double radius = centre.norm();
+  for (int i = 0; i < mesh.k; ++i) radius = std::max(radius, (centre - edges.col(i)).norm());
+  return radius;
+}
+
+bool IsAmongGuards(const MeshView& mesh, const std::uint32_t* ids) {
+  return mesh.guards &&
+         std::any_of(ids, ids + mesh.k + 1, [&](std::uint32_t v) { return mesh.GuardOf(v) > 0; });
+}
+
 // k and d are constants where they are usual.
 [[gnu::always_inline]] inline Extremes MeasurePart(const MeshView& mesh, const SimplexList& list,
                                                    std::uint32_t begin, std::uint32_t end, int k,
@@ -53,7 +77,9 @@ struct Extremes {
     TakeFrame(vertices, k, d, frame);
     const SimplexMeasures m =
         k > 1 ? MeasureFramed(vertices, k, d, frame) : MeasureSimplex(vertices, d, frame);
-    Extremes one{m.circumradius, m.diameter, m.RadiusEdgeRatio(), m.Fatness(), 0, s, s, s};
+    const double radius =
+        IsAmongGuards(mesh, list[s]) ? RadiusAmongGuards(mesh, list[s]) : m.circumradius;
+    Extremes one{radius, m.diameter, m.RadiusEdgeRatio(), m.Fatness(), 0, s, s, s};
     for (int i = 0; i <= k; ++i) {
       const double tilt =
           frame.rank < k ? k : SumOfSquaredSines(frame, k, d, mesh.Tangent(list[s][i]), k);

@@ -58,6 +58,8 @@ StarComplex<K>::StarComplex(const StarComplex& other)
       walls_(other.walls_),
       conormals_at_(other.conormals_at_),
       conormals_(other.conormals_),
+      guards_(other.guards_),
+      largest_guard_(other.largest_guard_),
       cells_(other.cells_),
       tree_(other.tree_, &points_),
       simplex_count_(other.simplex_count_) {}
@@ -264,7 +266,7 @@ double StarComplex<K>::EdgeLength2(std::uint32_t p, std::size_t facet) const {
   if constexpr (K == 2)
     return SquaredDistance(Point(p), Point(cells_[p].id(facet)), d_);
   else
-    return 2 * cells_[p].offset(facet);
+    return 2 * cells_[p].offset(facet) - GuardOf(p) + GuardOf(cells_[p].id(facet));
 }
 
 template <int K>
@@ -306,7 +308,7 @@ bool StarComplex<K>::CutsVertex(std::uint32_t p, std::size_t vertex, const doubl
   Step step(d_);
   double normal[K];
   const Site site = At(p);
-  const double offset = 0.5 * Project(site, point, step.data(), normal);
+  const double offset = 0.5 * (Project(site, point, step.data(), normal) + GuardOf(p));
   return cells_[p].WouldCutVertex(vertex, normal, offset, step.data());
 }
 

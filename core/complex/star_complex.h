@@ -70,6 +70,26 @@ class StarComplex {
     return id < walls_.size() ? conormals_.data() + conormals_at_[id] : nullptr;
   }
 
+  // Guards: balls around points of sharp edges, whose squared radii are the points' weights. What
+  // lies outside of them comes nowhere nearer to an edge than its own points do, however sharp it
+  // is. `radii2` by point, 0: none; later points have none. All stars are built anew.
+  // REQUIRES: nothing waits for a Commit.
+  void Guard(std::vector<double> radii2);
+  bool has_guards() const { return largest_guard_ > 0; }
+  // Squared radius; 0: the point has none.
+  double GuardOf(std::uint32_t id) const { return id < guards_.size() ? guards_[id] : 0; }
+  bool InGuard(const double* point) const;
+  // Whether p or a sample point of a facet at vertex v of its cell is guarded.
+  bool TouchesGuard(std::uint32_t p, const Cell& cell, std::size_t v) const {
+    if (!has_guards()) return false;
+    bool touches = GuardOf(p) > 0;
+    for (int s = 0; s < K; ++s) {
+      const std::uint32_t id = cell.id(cell.facet(v, s));
+      touches = touches || (IsSample(id) && GuardOf(id) > 0);
+    }
+    return touches;
+  }
+
   // The k-simplex dual to vertex v of p's cell, or false if a facet of it is fake or a wall.
   bool SimplexOf(std::uint32_t p, const Cell& cell, std::size_t v, Simplex* simplex) const {
     (*simplex)[0] = p;
@@ -160,7 +180,7 @@ class StarComplex {
   // Cospherical points would have every star decide alone how to split them; weights this much
   // larger than rounding, and this much smaller than anything geometric, make all decide alike.
   double Weight(std::uint32_t id) const {
-    return weight_scale_ * (static_cast<double>(Mix64(id) >> 11) * 0x1p-53);
+    return weight_scale_ * (static_cast<double>(Mix64(id) >> 11) * 0x1p-53) + GuardOf(id);
   }
   // A point with its tangent basis, in the sample or not yet.
   struct Site {
@@ -231,7 +251,13 @@ class StarComplex {
   static std::vector<Turn> InTurns(const std::vector<Cut>& cuts);
   void CutStars(const std::vector<Turn>& turns, const std::vector<Cut>& cuts, std::uint32_t first,
                 Change* change);
-  double Influence(const Cell& cell) const { return 2 * std::sqrt(cell.max_norm2()) * (1 + 1e-9); }
+  // How far from p a point may be whose bisector cuts its cell.
+  double Influence(std::uint32_t p, const Cell& cell) const {
+    const double most2 = cell.max_norm2();
+    if (!has_guards()) return 2 * std::sqrt(most2) * (1 + 1e-9);
+    const double power2 = std::max(most2 - GuardOf(p) + largest_guard_, 0.0);
+    return (std::sqrt(most2) + std::sqrt(power2)) * (1 + 1e-9);
+  }
 
   int d_;
   double inradius_;
@@ -243,6 +269,8 @@ class StarComplex {
   std::vector<WallSet> walls_;
   std::vector<std::uint32_t> conormals_at_;
   std::vector<double> conormals_;
+  std::vector<double> guards_;  // squared radii, by point, up to the last; or empty
+  double largest_guard_ = 0;
   Blocks<Cell> cells_;
   std::vector<std::uint32_t> near_;  // of the appended points
   BallTree tree_;

@@ -1,6 +1,7 @@
 // What the stars of a manifold with boundary say of its faces.
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/base/instantiate.h"
 #include "core/complex/star_complex.h"
@@ -59,9 +60,20 @@ std::optional<typename StarComplex<K>::CellVertex> StarComplex<K>::EncroachedBy(
   return worst;
 }
 
+template <int K>
+bool StarComplex<K>::InGuard(const double* point) const {
+  if (!has_guards()) return false;
+  bool in = false;
+  tree_.VisitNear(
+      point, [&] { return std::sqrt(largest_guard_); },
+      [&](std::uint32_t id, double distance2) { in = in || distance2 < GuardOf(id); });
+  return in;
+}
+
 #define STELLATE_EACH(K)                                                                          \
   template StarComplex<K>::FaceSimplex StarComplex<K>::FaceSimplexOf(std::uint32_t, const Cell&,  \
                                                                      std::size_t, WallSet) const; \
+  template bool StarComplex<K>::InGuard(const double*) const;                                     \
   template std::optional<StarComplex<K>::CellVertex> StarComplex<K>::EncroachedBy(const double*,  \
                                                                                   WallSet) const;
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <utility>
 
 #include "core/base/instantiate.h"
 #include "core/base/parallel.h"
@@ -70,13 +71,13 @@ void StarComplex<K>::BuildStar(const Site& p, const Site* guest, std::uint32_t n
   Neighbourhood(p.point, near, &first);
   for (const std::uint32_t q : first)
     if (q != p.id) ClipBy(cell, p, At(q), guest, nullptr, scratch);
-  double reach = Influence(cell);
+  double reach = Influence(p.id, cell);
   tree_.VisitAround(
       p.point, [&] { return reach; },
       [&](std::uint32_t q, double) {
         // Once by each point: a second cut by the same plane would be decided by rounding.
         if (q == p.id || std::find(first.begin(), first.end(), q) != first.end()) return;
-        if (ClipBy(cell, p, At(q), guest, nullptr, scratch)) reach = Influence(cell);
+        if (ClipBy(cell, p, At(q), guest, nullptr, scratch)) reach = Influence(p.id, cell);
       },
       influencing);
 }
@@ -156,7 +157,7 @@ void StarComplex<K>::CutStars(const std::vector<Turn>& turns, const std::vector<
       ForEachOwned(p, [&](std::size_t, const Simplex& s) {
         if (s.back() >= first) append(s, &added[chunk]);
       });
-      influence[i] = Influence(cell);
+      influence[i] = Influence(p, cell);
     }
   });
   // A new point has the largest id of its simplices, except of those among new points alone.
@@ -165,7 +166,7 @@ void StarComplex<K>::CutStars(const std::vector<Turn>& turns, const std::vector<
       const std::uint32_t p = first + static_cast<std::uint32_t>(i);
       ForEachOwned(
           p, [&](std::size_t, const Simplex& s) { append(s, &added[removed.size() + chunk]); });
-      influence[turns.size() + i] = Influence(cells_[p]);
+      influence[turns.size() + i] = Influence(p, cells_[p]);
     }
   });
   for (std::size_t i = 0; i < influence.size(); ++i) {
@@ -213,6 +214,18 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
 }
 
 template <int K>
+void StarComplex<K>::Guard(std::vector<double> radii2) {
+  guards_ = std::move(radii2);
+  largest_guard_ = guards_.empty() ? 0 : *std::max_element(guards_.begin(), guards_.end());
+  tree_.Assign(std::vector<double>(size(), 0.0));
+  near_.assign(size(), kNone);
+  simplex_count_ = 0;
+  Change change;
+  BuildNewStars(0);
+  CutStars({}, {}, 0, &change);
+}
+
+template <int K>
 void StarComplex<K>::TryPoint(const double* point, const double* tangent, std::uint32_t near,
                               typename Cell::Scratch& scratch, Tentative* result, WallSet walls,
                               const double* conormals) const {
@@ -236,6 +249,7 @@ void StarComplex<K>::TryPoint(const double* point, const double* tangent, std::u
   template void StarComplex<K>::CutStars(const std::vector<Turn>&, const std::vector<Cut>&,    \
                                          std::uint32_t, Change*);                              \
   template StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t>*);         \
+  template void StarComplex<K>::Guard(std::vector<double>);                                    \
   template void StarComplex<K>::TryPoint(const double*, const double*, std::uint32_t,          \
                                          typename Cell::Scratch&, Tentative*, WallSet,         \
                                          const double*) const;

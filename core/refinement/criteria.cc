@@ -36,7 +36,7 @@ ResolvedCriteria Resolve(const Specification& spec) {
   r.small_sliver_radius = c.small_sliver_radius;
   r.candidates = c.candidates.value_or(spec.dimension <= 2 ? 1 : 10);
   r.flat_alternations = c.flat_alternations;
-  r.ask_ahead = c.ask_ahead && spec.walls == 0;  // the guess knows no walls
+  r.ask_ahead = c.ask_ahead;
   r.size_rate = c.size_rate.value_or(INFINITY);
   r.max_deviation = c.max_deviation.value_or(INFINITY);
   // Common centres mean something well below the local feature size; they are looked for up to

@@ -58,6 +58,13 @@ class Engine {
   PlannedPoints ChooseSeeds();
   // On to faces of the next dimension. False after the last.
   bool AdvanceStage();
+  // Whether edges and corners are at rest, and some sharp one is not guarded (core/refinement/
+  // guards.h).
+  bool WantsGuards(const std::vector<Target<K>>& targets) const;
+  // Guards them, or finds what is to be split first, and plans anew. `added`, `removed`: as of
+  // Commit, of the round.
+  std::optional<std::vector<Target<K>>> GuardSharpEdges(std::vector<std::uint32_t>* added,
+                                                        std::vector<std::uint32_t>* removed);
   // Where faces were discovered since; to be asked for beside the targets.
   PlannedPoints TakeDiscoveries();
 

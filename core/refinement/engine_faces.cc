@@ -8,6 +8,8 @@
 #include <set>
 
 #include "core/refinement/engine.h"
+#include "core/refinement/exchange.h"
+#include "core/refinement/guards.h"
 
 namespace stellate::core {
 namespace {
@@ -15,6 +17,8 @@ namespace {
 // Shape never grinds the boundary down: a face's simplex of less than this share of the size asked
 // for is split for the sake of sizes alone.
 constexpr double kLeastSplit = 0.25;
+// Beside guarded edges the walls are that near to each other, and no shape without it.
+constexpr double kLeastSplitAtGuards = 0.02;
 // A point of a face is news this far from the sample, in sizes asked for; a corner, which nothing
 // else can be instead of, anywhere but at itself.
 constexpr double kNewsAway = 0.5;
@@ -81,8 +85,14 @@ std::optional<Target<K>> Engine<K>::SplitOf(const typename StarComplex<K>::CellV
   violation.vertex = at.vertex;
   violation.walls = WallsAt<K>(cell, at.vertex);
   violation.split = true;
-  if (IsCollar(complex_.FaceSimplexOf(at.star, cell, at.vertex))) return std::nullopt;
-  if (by > Rule::kSize && violation.radius < kLeastSplit * sizes_.BoundAt(complex_, at.star))
+  const auto simplex = complex_.FaceSimplexOf(at.star, cell, at.vertex);
+  if (IsCollar(simplex)) return std::nullopt;
+  // The middle of an edge between guards is in both.
+  if (simplex.count == 2 && complex_.GuardOf(simplex.ids[0]) > 0 &&
+      complex_.GuardOf(simplex.ids[1]) > 0)
+    return std::nullopt;
+  const double least = complex_.has_guards() ? kLeastSplitAtGuards : kLeastSplit;
+  if (by > Rule::kSize && violation.radius < least * sizes_.BoundAt(complex_, at.star))
     return std::nullopt;
   return Aim(at.star, violation);
 }
@@ -159,6 +169,36 @@ bool Engine<K>::AdvanceStage() {
 }
 
 template <int K>
+bool Engine<K>::WantsGuards(const std::vector<Target<K>>& targets) const {
+  return K == 3 && faces_.stage() >= 1 && !faces_.has_discoveries() &&
+         std::all_of(targets.begin(), targets.end(),
+                     [](const Target<K>& t) { return t.violation.dimension() >= 2; }) &&
+         LacksGuards<K>(complex_);
+}
+
+template <int K>
+std::optional<std::vector<Target<K>>> Engine<K>::GuardSharpEdges(
+    std::vector<std::uint32_t>* added, std::vector<std::uint32_t>* removed) {
+  Guards<K> guards = PlanGuards<K>(complex_, sizes_);
+  if (!complex_.has_guards()) {
+    std::vector<Target<K>> splits;
+    for (const auto& gap : guards.gaps)
+      if (!book_.is_given_up(gap.star))
+        if (const auto split = SplitOf(gap, Rule::kSize)) splits.push_back(*split);
+    if (!splits.empty()) return splits;
+  } else if (!guards.gaps.empty()) {
+    guards.radii2.clear();  // what is to be split must not be hidden in balls
+  }
+  const std::vector<std::uint32_t> before = complex_.Simplices();
+  complex_.Guard(std::move(guards.radii2));
+  ExchangeSimplices<K>(before, complex_.Simplices(), added, removed);
+  RejudgeAll();
+  JudgeAllAnew();
+  book_.ForgetAttempts();
+  return Plan();
+}
+
+template <int K>
 PlannedPoints Engine<K>::TakeDiscoveries() {
   const auto found = faces_.TakeDiscoveries();
   PlannedPoints planned;
@@ -209,6 +249,9 @@ std::vector<FaceMesh> Engine<K>::Faces() const {
   template PlannedPoints Engine<K>::SetCollars();                                               \
   template bool Engine<K>::IsCollar(const StarComplex<K>::FaceSimplex&) const;                  \
   template bool Engine<K>::AdvanceStage();                                                      \
+  template bool Engine<K>::WantsGuards(const std::vector<Target<K>>&) const;                    \
+  template std::optional<std::vector<Target<K>>> Engine<K>::GuardSharpEdges(                    \
+      std::vector<std::uint32_t>*, std::vector<std::uint32_t>*);                                \
   template std::vector<FaceMesh> Engine<K>::Faces() const;                                      \
   template PlannedPoints Engine<K>::TakeDiscoveries();
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)

@@ -1,6 +1,7 @@
 #include "core/refinement/inserter.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "core/base/parallel.h"
@@ -62,11 +63,20 @@ void Inserter<K>::InsertTargets() {
   }
 }
 
+// Of the ball around the insertion point: from a guarded point it reaches to its ball's border,
+// orthogonally.
+template <int K>
+double Inserter<K>::EmptyRadius(const Target<K>& t) const {
+  const double guard2 = to_.complex.GuardOf(t.star);
+  return guard2 == 0 ? t.radius : std::sqrt(std::max(t.radius * t.radius - guard2, 0.0));
+}
+
 template <int K>
 double Inserter<K>::Clearance(const Target<K>& t) const {
-  if (t.violation.split) return kSplitSpacing * t.radius;
-  return t.is_coarse() ? caution_.coarse_spacing * std::min(t.size_bound, t.radius)
-                       : caution_.empty_ball * t.radius;
+  const double radius = EmptyRadius(t);
+  if (t.violation.split) return kSplitSpacing * radius;
+  return t.is_coarse() ? caution_.coarse_spacing * std::min(t.size_bound, radius)
+                       : caution_.empty_ball * radius;
 }
 
 template <int K>
@@ -78,7 +88,7 @@ typename Inserter<K>::RefinedPoint Inserter<K>::JudgeRefined(std::size_t i) cons
   if (!judged.found) return judged;
   const double* y = answers_.points.col(c).data();
   const StarComplex<K>& complex = to_.complex;
-  judged.duplicate = complex.AnyWithin(y, Clearance(t));
+  judged.duplicate = complex.AnyWithin(y, Clearance(t)) || complex.InGuard(y);
   judged.cuts_violation = !judged.duplicate && complex.CutsVertex(t.star, t.violation.vertex, y);
   if (to_.faces.has_walls()) {
     judged.encroached = complex.EncroachedBy(y, t.violation.walls);
@@ -132,7 +142,7 @@ bool Inserter<K>::YieldsToFaces(const RefinedPoint& judged, const Target<K>& t, 
 template <int K>
 bool Inserter<K>::FitsFaces(Eigen::Index c) const {
   return !to_.faces.has_walls() ||
-         (!answers_.Beyond(c) &&
+         (!answers_.Beyond(c) && !to_.complex.InGuard(answers_.points.col(c).data()) &&
           !to_.complex.EncroachedBy(answers_.points.col(c).data(), WallsOf(c)));
 }
 
@@ -148,7 +158,7 @@ int Inserter<K>::BestCandidate(std::size_t i) const {
     if (!answers_.found[static_cast<std::size_t>(c)]) continue;
     const double* y = answers_.points.col(c).data();
     if (!complex.CutsVertex(t.star, t.violation.vertex, y) ||
-        complex.AnyWithin(y, kGoodPointSpacing * t.radius) || !FitsFaces(c))
+        complex.AnyWithin(y, kGoodPointSpacing * EmptyRadius(t)) || !FitsFaces(c))
       continue;
     const int index = static_cast<int>(c - first);
     if (to_.criteria.candidates == 1) return index;
@@ -181,7 +191,7 @@ void Inserter<K>::InsertGoodPoint(std::size_t i, int best) {
     return NoteFailedAttempt(t.star);
   }
   const Eigen::Index c = candidates_.first[i] + best;
-  if (to_.complex.AnyWithin(answers_.points.col(c).data(), kGoodPointSpacing * t.radius))
+  if (to_.complex.AnyWithin(answers_.points.col(c).data(), kGoodPointSpacing * EmptyRadius(t)))
     return;  // another of this round came near
   Insert(c, t.violation.rule, t.star);
 }

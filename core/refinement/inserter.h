@@ -69,6 +69,7 @@ class Inserter {
     std::optional<typename StarComplex<K>::CellVertex> encroached;
     std::optional<int> beyond;
   };
+  double EmptyRadius(const Target<K>& target) const;
   double Clearance(const Target<K>& target) const;
   RefinedPoint JudgeRefined(std::size_t target) const;
   void InsertRefined(std::size_t target, RefinedPoint judged, bool* all_near_aim);

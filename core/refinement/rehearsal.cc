@@ -33,6 +33,22 @@ AnsweredPoints AnswersOf(Surrogate<K>& surrogate, const StarComplex<K>& complex,
   return surrogate.Answer(candidates.points, flats, spacing);
 }
 
+// The guess knows no walls: what would come near one is left to true points.
+template <int K>
+void LeaveWallsAlone(const StarComplex<K>& complex, double epsilon,
+                     std::vector<Target<K>>* targets) {
+  std::vector<double> aim(static_cast<std::size_t>(complex.d()));
+  std::erase_if(*targets, [&, step = std::size_t{0}](const Target<K>& t) mutable {
+    CheckInterruption(step++);
+    if (t.violation.walls != 0) return true;
+    complex.Lift(t.star, t.x, aim.data());
+    bool near = false;
+    complex.ForEachWithin(aim.data(), t.radius + epsilon,
+                          [&](std::uint32_t p) { near = near || complex.walls(p) != 0; });
+    return near;
+  });
+}
+
 // Returns what the inserted points are for.
 template <int K>
 std::vector<Rule> Drive(Engine<K>* rehearsal, const Engine<K>& original, std::uint64_t round) {
@@ -45,6 +61,8 @@ std::vector<Rule> Drive(Engine<K>* rehearsal, const Engine<K>& original, std::ui
   for (int good_rounds = 0; good_rounds < kGoodPointRounds; ++round) {
     if (rehearsal->is_full() || rehearsal->complex().size() > most) break;
     auto targets = rehearsal->Plan();
+    if (targets && rehearsal->faces().has_walls())
+      LeaveWallsAlone<K>(rehearsal->complex(), criteria.epsilon, &*targets);
     if (!targets || targets->empty()) break;
     const CandidateSet<K> candidates = rehearsal->Draw(rehearsal->Select(*targets), round);
     good_rounds += candidates.targets.front().violation.rule >= Rule::kSliver;

@@ -64,8 +64,9 @@ std::optional<Violation<K>> WorstSizeOrShapeOnFaces(const StarComplex<K>& comple
         edge2 = std::min(edge2, SquaredDistance(complex.Point(p), complex.Point(q), complex.d()));
     }
     const bool large = simplex.fake || norm2 > epsilon * epsilon;
-    if (!large && !simplex.foreign && norm2 <= radius_edge_bound * radius_edge_bound * edge2)
-      continue;
+    const bool long_enough =
+        norm2 <= radius_edge_bound * radius_edge_bound * edge2 || complex.TouchesGuard(p, cell, v);
+    if (!large && !simplex.foreign && long_enough) continue;
     const Rule rule = large ? Rule::kSize : Rule::kRadiusEdge;
     if (worst && std::tuple(worst->dimension(), worst->rule, -worst->radius) <=
                      std::tuple(dimension, rule, -std::sqrt(norm2)))
@@ -110,7 +111,7 @@ std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std:
     double edge2 = INFINITY;
     for (int s = 0; s < K; ++s) edge2 = std::min(edge2, edges2[cell.facet(v, s)]);
     const double norm2 = cell.norm2(v);
-    if (norm2 > worst_rho2 * edge2) {
+    if (norm2 > worst_rho2 * edge2 && !complex.TouchesGuard(p, cell, v)) {
       worst_rho2 = norm2 / edge2;
       worst = v;
     }
@@ -216,7 +217,7 @@ std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const StarComplex<K
     if (simplex.fake) return std::nullopt;  // R1 gave up there: nothing to judge yet
     const bool whole = dimension == K, held = simplex.ids[0] == p;
     const bool thin =
-        whole && held && bounds.sliver_bound > 0 &&
+        whole && held && bounds.sliver_bound > 0 && !complex.TouchesGuard(p, cell, v) &&
         HasThinFaceAt<K>(complex, complex.Point(p), cell, v, bounds.sliver_bound, nullptr);
     if (!thin && IsConsistent<K>(complex, p, v) &&
         !(whole && complex.judging() == Judging::kCommonCentre && IsFolded<K>(complex, p, v)))
@@ -251,7 +252,7 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& comp
   };
   if (bounds.sliver_bound > 0) {
     for (std::size_t v = 0; v < cell.vertex_count(); ++v)
-      if (is_worse(v) && held(v) &&
+      if (is_worse(v) && held(v) && !complex.TouchesGuard(p, cell, v) &&
           HasThinFaceAt<K>(complex, complex.Point(p), cell, v, bounds.sliver_bound, nullptr))
         worst = v;
     if (worst) return AtVertex<K>(Rule::kSliver, cell, *worst, false);
@@ -316,6 +317,7 @@ int CountBad(const StarComplex<K>& complex, const double* point,
       }
       const bool fresh = simplex.back() == id;  // an old simplex was judged before
       if (fresh && cell.norm2(v) <= small_radius * small_radius &&
+          !complex.TouchesGuard(p, cell, v) &&
           (HasThinFaceAt<K>(complex, at, cell, v, bounds.sliver_bound, point) ||
            LeansTooFar<K>(complex, p, at, cell, v, bounds.reach, point))) {
         ++bad;

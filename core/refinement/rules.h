@@ -40,7 +40,7 @@ struct Violation {
 // vertex of the simplex, whose star looks at them.
 //
 // Faces of dimension at most `stage` are looked at, those of the lowest dimension first; to R2
-// there belongs that no simplex is foreign.
+// there belongs that no simplex is foreign. R2 and R3 leave simplices at guarded points alone.
 template <int K>
 std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std::uint32_t p,
                                              double epsilon, double radius_edge_bound,

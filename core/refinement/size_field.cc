@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/parallel.h"
+#include "core/base/vector_ops.h"
 #include "core/geometry/reach_bound.h"
 
 namespace stellate::core {
@@ -20,6 +21,21 @@ constexpr double kFinestEstimated = 1.0 / 64;
 constexpr double kFinestGiven = 1.0 / 1024;
 // Estimates are spread anew whenever the sample has grown by this factor.
 constexpr double kSpreadingGrowth = 1.25;
+
+// How far q is, along M, from the tangent space of the walls that it shares with p: the most of
+// them, squared. `along`: q - p in p's tangent coordinates.
+template <int K>
+double OffWalls2(const StarComplex<K>& complex, std::uint32_t p, std::uint32_t q,
+                 const double* along) {
+  double most2 = 0;
+  const double* conormal = complex.Conormals(p);
+  ForEachWall(complex.walls(p), [&](int wall) {
+    const double out = Dot(conormal, along, K);
+    if (IsSubset(SetOfWall(wall), complex.walls(q))) most2 = std::max(most2, out * out);
+    conormal += K;
+  });
+  return most2;
+}
 
 }  // namespace
 
@@ -43,11 +59,14 @@ double SizeField<K>::SeenFrom(const StarComplex<K>& complex, std::uint32_t p) co
   for (std::size_t f = 0; f < cell.facet_count(); ++f) {
     if (!IsSample(cell.id(f))) continue;
     double along[K];
-    const double distance2 = 2 * complex.HalfSpace(p, f, along);
+    const double distance2 =
+        2 * complex.HalfSpace(p, f, along) - complex.GuardOf(p) + complex.GuardOf(cell.id(f));
     if (distance2 < kTellingEdge * kTellingEdge * longest2) continue;
     double along2 = 0;
     for (const double a : along) along2 += a * a;
-    const double away = std::sqrt(std::max(distance2 - along2, 0.0));
+    double away2 = std::max(distance2 - along2, 0.0);
+    if (complex.walls(p) != 0) away2 += OffWalls2(complex, p, cell.id(f), along);
+    const double away = std::sqrt(away2);
     if (away > 0) size = std::min(size, ReachBound(distance2, away));
   }
   return size;

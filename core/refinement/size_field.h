@@ -13,7 +13,8 @@ namespace stellate::core {
 // (Criteria::size_rate, max_deviation). Then the bound follows a local size of each vertex: what
 // the client gives, or the local feature size that the sample shows.
 //
-// Sizes are by star; all lengths.
+// Sizes are by star; all lengths. At the boundary of M that counts too: its curvature within M is
+// seen as M's is.
 template <int K>
 class SizeField {
  public:

@@ -28,6 +28,7 @@ MeshView WithSimplices(MeshView mesh, const std::vector<std::uint32_t>& simplice
   mesh.walls = boundary->walls.data();
   mesh.outward = boundary->outward.data();
   mesh.faces = &boundary->faces;
+  if (!boundary->guards.empty()) mesh.guards = boundary->guards.data();
   return mesh;
 }
 
@@ -75,6 +76,8 @@ BoundaryOfMesh BoundaryOf(const Engine<K>& engine) {
             complex.Conormals(p)[w * K + a];
   }
   boundary.faces = engine.Faces();
+  for (std::uint32_t p = 0; complex.has_guards() && p < complex.size(); ++p)
+    boundary.guards.push_back(complex.GuardOf(p));
   return boundary;
 }
 

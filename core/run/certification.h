@@ -20,6 +20,7 @@ struct BoundaryOfMesh {
   std::vector<WallSet> walls;   // by vertex
   std::vector<double> outward;  // k tangent coordinates by vertex
   std::vector<FaceMesh> faces;
+  std::vector<double> guards;  // by vertex; empty: none
 };
 template <int K>
 BoundaryOfMesh BoundaryOf(const Engine<K>& engine);

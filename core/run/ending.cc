@@ -1,6 +1,7 @@
 #include "core/run/ending.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -12,6 +13,7 @@
 #include "core/certificate/first_ids.h"
 #include "core/complex/consistency.h"
 #include "core/geometry/reach_bound.h"
+#include "core/refinement/sharp_edges.h"
 
 namespace stellate::core {
 namespace {
@@ -40,7 +42,8 @@ void DescribeUnfinished(const Engine<K>& engine, double epsilon, Certificate* ce
         std::max(certificate->max_circumradius, std::sqrt(cell.max_norm2()));
     for (std::size_t f = 0; f < cell.facet_count(); ++f) {
       double along[K];
-      const double distance2 = 2 * complex.HalfSpace(p, f, along);
+      const double distance2 =
+          2 * complex.HalfSpace(p, f, along) - complex.GuardOf(p) + complex.GuardOf(cell.id(f));
       double along2 = 0;
       for (const double a : along) along2 += a * a;
       const double away = std::sqrt(std::max(distance2 - along2, 0.0));
@@ -59,6 +62,26 @@ void DescribeUnfinished(const Engine<K>& engine, double epsilon, Certificate* ce
   certificate->epsilon_over_reach = epsilon / reach;
   if (epsilon > kCoarse * reach)
     certificate->warnings.push_back(TooCoarse(epsilon / reach, reach, "") + ".");
+}
+
+template <int K>
+void TellSharpest(const Engine<K>& engine, Certificate* certificate) {
+  certificate->sharpest = Sharpest<K>(engine.complex());
+  if (!certificate->sharpest || certificate->sharpest->degrees >= SafeAngle(K)) return;
+  const WallAngle& sharpest = *certificate->sharpest;
+  const int first = std::countr_zero(sharpest.walls);
+  const int second = std::countr_zero(sharpest.walls & (sharpest.walls - 1));
+  const std::string where =
+      Message("alls ", first, " and ", second, " meet at ", Brief(sharpest.degrees), " degrees at ",
+              NamePoint(sharpest.point));
+  if (certificate->certified) {
+    certificate->warnings.push_back("W" + where + ": simplices there are as thin.");
+    return;
+  }
+  if (certificate->verdict.ends_with('.')) certificate->verdict.pop_back();
+  certificate->verdict +=
+      Message("; w", where, ", and in dimension ", K, " the refinement may not end below ",
+              SafeAngle(K), ": cut that edge off by one wall more, or take a smaller epsilon.");
 }
 
 template <int K>
@@ -99,6 +122,7 @@ void WarnOfCompromises(const Engine<K>& engine, double epsilon, Certificate* cer
 #define STELLATE_EACH(K)                                                       \
   template void DescribeUnfinished<K>(const Engine<K>&, double, Certificate*); \
   template std::string WhatIsLeft<K>(const Engine<K>&, std::uint64_t);         \
+  template void TellSharpest<K>(const Engine<K>&, Certificate*);               \
   template void WarnOfCompromises<K>(const Engine<K>&, double, Certificate*);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

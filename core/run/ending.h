@@ -13,6 +13,11 @@ namespace stellate::core {
 template <int K>
 void DescribeUnfinished(const Engine<K>& engine, double epsilon, Certificate* certificate);
 
+// Where walls meet at the smallest angle; below what the refinement is sure to cope with, also in
+// words: a warning of a certified mesh, else at the verdict's end.
+template <int K>
+void TellSharpest(const Engine<K>& engine, Certificate* certificate);
+
 // What still breaks a rule, for people. inconsistent: simplices that DescribeUnfinished counted.
 template <int K>
 std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent);

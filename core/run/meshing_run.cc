@@ -31,6 +31,7 @@ MeshingRun<K>::MeshingRun(Specification spec)
       tangent_finder_(K, spec_.ambient_dimension, kTangentStep * engine_.criteria().epsilon,
                       spec_.random_seed, kTangentError * spec_.declared_reach.value_or(INFINITY)),
       repeat_check_(spec_.epsilon),
+      wall_check_(K, spec_.ambient_dimension, spec_.epsilon),
       spare_points_(spec_.ambient_dimension),
       box_watch_(spec_.bounding_box, engine_.criteria().epsilon),
       stall_watch_(K) {
@@ -187,8 +188,9 @@ void MeshingRun<K>::AskFor(Eigen::MatrixXd&& points, Insertion then) {
 
 template <int K>
 void MeshingRun<K>::AfterTrip() {
+  const auto* const answered = trip_.get();
   (this->*insertion_)();
-  if (over_) return;
+  if (over_ || trip_.get() != answered) return;  // it asks on
   typename Engine<K>::Change change = engine_.Commit();
   delta_.added = std::move(change.added);
   delta_.removed = std::move(change.removed);
@@ -281,10 +283,12 @@ void MeshingRun<K>::Plan() {
     return Finish(Termination::kNoProgress);
   *targets = engine_.Select(std::move(*targets));
   PlannedPoints planned;
-  if (engine_.criteria().ask_ahead && !rehearsal_failed_)
+  if (faces.has_discoveries())
+    planned = engine_.TakeDiscoveries();
+  else if (engine_.criteria().ask_ahead && !rehearsal_failed_ && faces.stage() == K)
     planned = Rehearse<K>(engine_, whole_rounds_, &*targets);
   CandidateSet<K> candidates = engine_.Draw(std::move(*targets), whole_rounds_);
-  candidates.planned = faces.has_walls() ? engine_.TakeDiscoveries() : std::move(planned);
+  candidates.planned = std::move(planned);
   Ask(std::move(candidates), &MeshingRun::InsertCandidates);
 }
 
@@ -352,30 +356,6 @@ void MeshingRun<K>::Finish(Termination termination) {
     Measure();
   else
     progress_.phase = Phase::kDone;
-}
-
-template <int K>
-void MeshingRun<K>::DescribeEnding(bool is_whole) {
-  const Termination termination = report_.termination;
-  Certificate& certificate = report_.certificate;
-  if (termination == Termination::kConverged) {
-    certificate = certification_->certificate();
-    WarnOfCompromises<K>(engine_, spec_.epsilon, &certificate);
-  } else {
-    certificate.verdict = std::string("not certified: the run ended as ") +
-                          TerminationName(termination) + " before every rule held";
-    if (!report_.failure.message.empty()) certificate.verdict += ": " + report_.failure.message;
-    // Whoever cancels a large mesh does not want to wait for it to be described.
-    if (termination != Termination::kCancelled && termination != Termination::kOracleFailed)
-      DescribeUnfinished<K>(engine_, spec_.epsilon, &certificate);
-    if (termination == Termination::kNoProgress)
-      certificate.verdict +=
-          "; " + (box_watch_.has_left()
-                      ? box_watch_.WhyStopped()
-                      : WhatIsLeft<K>(engine_, certificate.inconsistent_simplices) +
-                            rim_watch_.Describe(engine_.complex().d()));
-  }
-  if (is_whole) box_watch_.Warn(&certificate);
 }
 
 template <int K>

@@ -16,6 +16,7 @@
 #include "core/run/round_trip.h"
 #include "core/run/spare_points.h"
 #include "core/run/tangent_finder.h"
+#include "core/run/wall_check.h"
 #include "core/run/watches.h"
 
 namespace stellate::core {
@@ -59,6 +60,7 @@ class MeshingRun final : public Mesher {
   void InsertSeeds();
   void AskForFaces(const Eigen::MatrixXd& seeds);
   void KeepFaceSeeds();
+  void JudgeWalls();
   bool PlanFaces(std::optional<std::vector<Target<K>>>* targets);
   void InsertCandidates();
   void InsertSpares();
@@ -90,6 +92,7 @@ class MeshingRun final : public Mesher {
   Insertion insertion_ = nullptr;  // of the trip's answers
 
   RepeatCheck repeat_check_;
+  WallCheck wall_check_;
   SparePoints spare_points_;
   BoxWatch box_watch_;
   StallWatch stall_watch_;

@@ -39,7 +39,11 @@ void MeshingRun<K>::KeepFaceSeeds() {
     ++inside;
     engine_.faces().KeepSeed(answers.points.col(c), answers.walls[i]);
   }
-  if (inside > 0 || engine_.faces().has_discoveries()) return;
+  if (inside > 0 || engine_.faces().has_discoveries()) {
+    Eigen::MatrixXd steps = wall_check_.Questions(answers);
+    if (steps.cols() > 0) AskFor(std::move(steps), &MeshingRun::JudgeWalls);
+    return;
+  }
   Fail({StatusCode::kNoSeeds,
         found == 0 ? "no seed has a closest point on the manifold; give seeds near it, or a box "
                      "that holds it"
@@ -48,21 +52,31 @@ void MeshingRun<K>::KeepFaceSeeds() {
                              "inverted? What is inside has clearances >= 0")});
 }
 
+template <int K>
+void MeshingRun<K>::JudgeWalls() {
+  if (Status status = wall_check_.Judge(trip_->answers()); !status.ok()) Fail(std::move(status));
+}
+
 // Where nothing is left to do on faces up to the stage: on to seeds of that stage, or to the next.
 // False where these are asked for, or the run is over.
 template <int K>
 bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
   const FaceBook<K>& faces = engine_.faces();
-  while ((*targets)->empty() && !faces.has_discoveries()) {
-    if (PlannedPoints seeds = engine_.ChooseSeeds(); seeds.size() > 0) {
+  while (true) {
+    const bool idle = (*targets)->empty() && !faces.has_discoveries();
+    if (PlannedPoints seeds = idle ? engine_.ChooseSeeds() : PlannedPoints(); seeds.size() > 0) {
       CandidateSet<K> candidates;
       candidates.planned = std::move(seeds);
       Ask(std::move(candidates), &MeshingRun::InsertSpares);
       return false;
     }
-    if (!engine_.AdvanceStage()) break;
+    if (engine_.WantsGuards(**targets)) {
+      *targets = engine_.GuardSharpEdges(&delta_.added, &delta_.removed);
+    } else {
+      if (!idle || !engine_.AdvanceStage()) break;
+      *targets = engine_.Plan();
+    }
     stall_watch_.NoteFrontMoved();
-    *targets = engine_.Plan();
     if (!*targets) {
       Finish(Termination::kNoProgress);
       return false;
@@ -74,6 +88,7 @@ bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
 #define STELLATE_EACH(K)                                            \
   template void MeshingRun<K>::AskForFaces(const Eigen::MatrixXd&); \
   template void MeshingRun<K>::KeepFaceSeeds();                     \
+  template void MeshingRun<K>::JudgeWalls();                        \
   template bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>*);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

@@ -47,8 +47,7 @@ std::string RimWatch::Describe(int d) const {
   return Message(". Of the answers ", leans_.size() / (2 * static_cast<std::size_t>(d)),
                  " did not lie straight below what was asked, the first ",
                  NamePoint(Eigen::Map<const Eigen::VectorXd>(leans_.data(), d)),
-                 ": the manifold ends there (holes and boundaries are not meshed), or the tangent "
-                 "spaces are wrong");
+                 ": the manifold ends there, or the tangent spaces are wrong");
 }
 
 #define STELLATE_EACH(K) \

@@ -1,5 +1,6 @@
 #include "core/run/round_trip.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/base/basis_layout.h"
@@ -18,7 +19,34 @@ RoundTrip<K>::RoundTrip(const Engine<K>& engine, const OracleCapabilities& oracl
       candidates_(std::move(candidates)) {
   const bool alternates = !oracle_.intersect_flat && candidates_.planned.size() == 0 && walls_ == 0;
   if (alternates) alternations_left_ = engine_.criteria().flat_alternations - 1;
+  FindKnown();
   AskForAll();
+}
+
+// Between a vertex of M and a point beyond a wall lies a point of that, and the sample covers
+// walls. So a point is inside that lies farther from any vertex of the boundary than its star's and
+// as far again as that covering asks. One is asked if all are: a round is a batch.
+template <int K>
+void RoundTrip<K>::FindKnown() {
+  constexpr double kCovering = 1.25;  // of epsilon: R1 bounds it in tangent spaces, walls bend
+  const StarComplex<K>& complex = engine_.complex();
+  const std::vector<Target<K>>& targets = candidates_.targets;
+  if (walls_ == 0 || complex.d() != K || engine_.criteria().sizes_given) return;
+  known_.resize(static_cast<std::size_t>(candidates_.drawn()));
+  ParallelFor(targets.size(), [&](std::size_t i) {
+    if (targets[i].violation.walls != 0) return;
+    for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c) {
+      const double* point = candidates_.points.col(c).data();
+      const double far = Distance(point, complex.Point(targets[i].star), K) +
+                         kCovering * engine_.criteria().epsilon;
+      bool deep = true;
+      complex.ForEachWithin(point, far, [&](std::uint32_t p) { deep &= complex.walls(p) == 0; });
+      known_[static_cast<std::size_t>(c)] = deep;
+    }
+  });
+  if (candidates_.planned.size() == 0 && !known_.empty() &&
+      std::all_of(known_.begin(), known_.end(), [](std::uint8_t k) { return k != 0; }))
+    known_[0] = 0;
 }
 
 template <int K>
@@ -78,11 +106,13 @@ void RoundTrip<K>::AskForDrawn() {
   std::vector<WallSet> faces;  // of the others, by candidate
   for (std::size_t i = 0; i < targets.size(); ++i) {
     CheckInterruption(i);
-    const Eigen::Index count = candidates_.first[i + 1] - candidates_.first[i];
-    if (candidates_.in_flats[i])
-      flat_count += count;
-    else
-      faces.insert(faces.end(), static_cast<std::size_t>(count), targets[i].violation.walls);
+    for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c) {
+      if (IsKnown(c)) continue;
+      if (candidates_.in_flats[i])
+        ++flat_count;
+      else
+        faces.push_back(targets[i].violation.walls);
+    }
   }
   if (flat_count > 0) {
     QueryBlock flats = NewBlock(QueryKind::kIntersectFlat, 0);
@@ -95,12 +125,18 @@ void RoundTrip<K>::AskForDrawn() {
   std::vector<Eigen::Index> next(open_.size(), 0);
   for (std::size_t i = 0; i < targets.size(); ++i) {
     CheckInterruption(i);
-    const int block = candidates_.in_flats[i] ? 0 : block_of.at(targets[i].violation.walls);
-    for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c)
+    for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c) {
+      if (IsKnown(c)) {
+        places_.emplace_back(0, 0);
+        continue;
+      }
+      const int block = candidates_.in_flats[i] ? 0 : block_of.at(targets[i].violation.walls);
       places_.emplace_back(block, next[static_cast<std::size_t>(block)]++);
+    }
   }
   ParallelFor(targets.size(), [&](std::size_t i) {
     for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c) {
+      if (IsKnown(c)) continue;
       const auto [b, column] = places_[static_cast<std::size_t>(c)];
       QueryBlock& block = open_[static_cast<std::size_t>(b)];
       block.points.col(column) = candidates_.points.col(c);
@@ -150,6 +186,10 @@ void RoundTrip<K>::Sort(const std::vector<AnswerBlock>& answers) {
   for (Eigen::Index c = 0; c < count; ++c) {
     const auto i = static_cast<std::size_t>(c);
     CheckInterruption(i);
+    if (c < candidates_.drawn() && IsKnown(c)) {
+      TakeKnown(c);
+      continue;
+    }
     const auto [b, column] = places_[i];
     const AnswerBlock& block = answers[static_cast<std::size_t>(b)];
     answers_.found[i] =
@@ -160,6 +200,13 @@ void RoundTrip<K>::Sort(const std::vector<AnswerBlock>& answers) {
       ToByVector(block.tangents.col(column).data(), d, K, answers_.tangents.col(c).data());
   }
   if (walls_ > 0) SortFaces(answers);
+}
+
+template <int K>
+void RoundTrip<K>::TakeKnown(Eigen::Index c) {
+  answers_.found[static_cast<std::size_t>(c)] = 1;
+  answers_.points.col(c) = candidates_.points.col(c);
+  Eigen::Map<Eigen::Matrix<double, K, K>>(answers_.tangents.col(c).data()).setIdentity();
 }
 
 // What answers say of the walls.
@@ -173,6 +220,10 @@ void RoundTrip<K>::SortFaces(const std::vector<AnswerBlock>& answers) {
   for (Eigen::Index c = 0; c < count; ++c) {
     const auto i = static_cast<std::size_t>(c);
     CheckInterruption(i);
+    if (c < candidates_.drawn() && IsKnown(c)) {
+      answers_.clearances.col(c).setOnes();  // what counts is the sign
+      continue;
+    }
     const auto [b, column] = places_[i];
     const WallSet face = asked_faces_[static_cast<std::size_t>(b)];
     const AnswerBlock& block = answers[static_cast<std::size_t>(b)];

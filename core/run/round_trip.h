@@ -33,6 +33,11 @@ class RoundTrip final : public Asker {
  private:
   QueryBlock NewBlock(QueryKind kind, WallSet face) const;
   std::map<WallSet, int> OpenBlocks(const std::vector<WallSet>& faces);
+  void FindKnown();
+  bool IsKnown(Eigen::Index candidate) const {
+    return !known_.empty() && known_[static_cast<std::size_t>(candidate)];
+  }
+  void TakeKnown(Eigen::Index candidate);
   void AskForAll();
   void AskForDrawn();
   void Sort(const std::vector<AnswerBlock>& answers);
@@ -49,6 +54,9 @@ class RoundTrip final : public Asker {
   std::vector<QueryBlock> open_;
   std::vector<WallSet> asked_faces_;                  // by block, of the open questions
   std::vector<std::pair<int, Eigen::Index>> places_;  // by candidate: block and column of open_
+  // By drawn candidate: it is not asked for, since it lies deep inside of a domain of R^k, where
+  // each point is its own closest point. Empty: none is.
+  std::vector<std::uint8_t> known_;
   int alternations_left_ = 0;
   bool finds_tangents_ = false;
   AnsweredPoints answers_;

@@ -46,8 +46,8 @@ bool BoxWatch::has_left() const {
 std::string BoxWatch::WhyStopped() const {
   return Message("the manifold leaves the bounding box and goes on for ", Brief(farthest_outside_),
                  " beyond it, with ", outside_, " of ", looked_at_,
-                 " vertices outside. Is it open or unbounded? Only closed manifolds are meshed: "
-                 "bound it, or, if it is closed, give a box that holds all of it");
+                 " vertices outside. Is it open or unbounded? Cut it by walls, a box for instance, "
+                 "or, if it is closed, give a box that holds all of it");
 }
 
 void BoxWatch::Warn(Certificate* certificate) const {

@@ -59,6 +59,28 @@ void ToProto(const core::Violations& violations, int k, v1::Certificate* out) {
   vertices(violations.fibres, &v1::Violations::mutable_fibres);
 }
 
+void BoundaryToProto(const core::Certificate& c, v1::Certificate* out) {
+  const auto add_walls = [](core::WallSet walls, auto* message) {
+    core::ForEachWall(walls,
+                      [&](int wall) { message->add_walls(static_cast<std::uint32_t>(wall)); });
+  };
+  out->set_boundary_simplices(c.boundary_simplices);
+  out->set_boundary_components(c.boundary_components);
+  out->set_boundary_euler_characteristic(c.boundary_euler_characteristic);
+  for (const core::FaceReport& face : c.faces) {
+    v1::FaceCertificate* const one = out->add_faces();
+    add_walls(face.walls, one);
+    one->set_dimension(static_cast<std::uint32_t>(face.dimension));
+    one->set_simplices(face.simplices);
+    one->set_components(face.components);
+    one->set_euler_characteristic(face.euler_characteristic);
+  }
+  if (!c.sharpest) return;
+  add_walls(c.sharpest->walls, out->mutable_sharpest());
+  out->mutable_sharpest()->set_degrees(c.sharpest->degrees);
+  out->mutable_sharpest()->mutable_point()->Add(c.sharpest->point.begin(), c.sharpest->point.end());
+}
+
 void ToProto(const core::Certificate& c, int k, v1::Certificate* out) {
   out->set_certified(c.certified);
   out->set_verdict(c.verdict);
@@ -89,6 +111,7 @@ void ToProto(const core::Certificate& c, int k, v1::Certificate* out) {
   out->set_proved_distance(c.proved_distance);
   out->set_answers_held(c.answers_held);
   ToProto(c.violations, k, out);
+  BoundaryToProto(c, out);
 }
 
 }  // namespace

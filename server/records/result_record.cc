@@ -117,6 +117,14 @@ void LayOutPast(RecordReader& archive, ProgressHistory& past) {
   }
 }
 
+// Where walls meet.
+template <typename Archive, typename Value>
+void LayOutSharpest(Archive& archive, Value& sharpest) {
+  archive.Number(sharpest.walls);
+  archive.Number(sharpest.degrees);
+  archive.Numbers(sharpest.point);
+}
+
 }  // namespace
 
 std::string EncodeResult(const SessionResult& result, std::uint64_t parts) {
@@ -129,6 +137,8 @@ std::string EncodeResult(const SessionResult& result, std::uint64_t parts) {
   LayOutBoundary(writer, result.report.certificate);
   LayOutViolations(writer, result.report.certificate.violations);
   LayOutPast(writer, result.past);
+  if (result.report.certificate.sharpest)
+    LayOutSharpest(writer, *result.report.certificate.sharpest);
   return writer.Take();
 }
 
@@ -140,12 +150,13 @@ std::optional<SessionResult> DecodeResult(std::string_view record, std::uint64_t
   reader.Number(result.revision);
   reader.Number(result.history_bytes);
   reader.Number(*parts);
-  // Records of earlier servers end before the boundary, or after it.
+  // Records of earlier servers end before the boundary, or after it or what is past.
   if (!reader.Complete()) LayOutBoundary(reader, result.report.certificate);
   if (!reader.Complete()) {
     LayOutViolations(reader, result.report.certificate.violations);
     LayOutPast(reader, result.past);
   }
+  if (!reader.Complete()) LayOutSharpest(reader, result.report.certificate.sharpest.emplace());
   if (!reader.Complete()) return std::nullopt;
   return result;
 }

@@ -102,13 +102,14 @@ class JsonObject {
   }
   void Add(const char* key, std::uint64_t value) { Raw(key, std::to_string(value)); }
   void Add(const char* key, bool value) { Raw(key, value ? "true" : "false"); }
-  void Add(const char* key, double value) {
-    // JSON knows no infinity and no NaN.
-    Raw(key, std::isfinite(value) ? Format("%.17g", value) : "null");
-  }
+  void Add(const char* key, double value) { Raw(key, Number(value)); }
   void Add(const char* key, const std::string& value) { Raw(key, Quoted(value)); }
   std::string Take() { return text_.empty() ? "{}" : text_ + "}"; }
 
+  // JSON knows no infinity and no NaN.
+  static std::string Number(double value) {
+    return std::isfinite(value) ? Format("%.17g", value) : "null";
+  }
   static std::string Quoted(const std::string& value) {
     std::string text = "\"";
     for (const char c : value) {
@@ -163,6 +164,32 @@ std::string ViolationsJson(const Violations& v) {
   return json.Take();
 }
 
+std::string FacesJson(const std::vector<FaceCertificate>& faces) {
+  std::string text;
+  for (const FaceCertificate& face : faces) {
+    JsonObject json;
+    json.Raw("walls", IdsJson(face.walls));
+    json.Raw("dimension", std::to_string(face.dimension));
+    json.Add("simplices", face.simplices);
+    json.Add("components", face.components);
+    json.Raw("euler_characteristic", std::to_string(face.euler_characteristic));
+    text += (text.empty() ? "" : ", ") + json.Take();
+  }
+  return "[" + text + "]";
+}
+
+std::string SharpestJson(const std::optional<WallAngle>& sharpest) {
+  if (!sharpest) return "null";
+  JsonObject json;
+  json.Raw("walls", IdsJson(sharpest->walls));
+  json.Add("degrees", sharpest->degrees);
+  std::string point;
+  for (const double x : sharpest->point)
+    point += (point.empty() ? "" : ", ") + JsonObject::Number(x);
+  json.Raw("point", "[" + point + "]");
+  return json.Take();
+}
+
 std::string CertificateJson(const Certificate& c) {
   JsonObject json;
   json.Add("certified", c.certified);
@@ -198,6 +225,11 @@ std::string CertificateJson(const Certificate& c) {
   json.Add("proved_distance", c.proved_distance);
   json.Add("answers_held", c.answers_held);
   json.Raw("violations", ViolationsJson(c.violations));
+  json.Add("boundary_simplices", c.boundary_simplices);
+  json.Add("boundary_components", c.boundary_components);
+  json.Raw("boundary_euler_characteristic", std::to_string(c.boundary_euler_characteristic));
+  json.Raw("faces", FacesJson(c.faces));
+  json.Raw("sharpest", SharpestJson(c.sharpest));
   return json.Take();
 }
 

@@ -234,6 +234,20 @@ Report ReportOf(const v1::Mesh& mesh) {
   out.proved_distance = c.proved_distance();
   out.answers_held = c.answers_held();
   out.violations = FromProto(c.violations());
+  out.boundary_simplices = c.boundary_simplices();
+  out.boundary_components = c.boundary_components();
+  out.boundary_euler_characteristic = c.boundary_euler_characteristic();
+  for (const v1::FaceCertificate& face : c.faces())
+    out.faces.push_back({{face.walls().begin(), face.walls().end()},
+                         face.dimension(),
+                         face.simplices(),
+                         face.components(),
+                         face.euler_characteristic()});
+  if (c.has_sharpest()) {
+    const v1::WallAngle& s = c.sharpest();
+    out.sharpest = WallAngle{
+        {s.walls().begin(), s.walls().end()}, s.degrees(), {s.point().begin(), s.point().end()}};
+  }
   return r;
 }
 

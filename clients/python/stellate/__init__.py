@@ -53,7 +53,16 @@ from .implicit import ImplicitManifold  # noqa: E402
 from .oracle import Oracle  # noqa: E402
 from .oracles import ImplicitSolid  # noqa: E402
 from .progress import ProgressBar, progress_bar  # noqa: E402
-from .report import Certificate, Counts, Failure, Progress, Report, Violations  # noqa: E402
+from .report import (  # noqa: E402
+    Certificate,
+    Counts,
+    FaceCertificate,
+    Failure,
+    Progress,
+    Report,
+    Violations,
+    WallAngle,
+)
 
 __all__ = [
     "Cancelled",
@@ -66,6 +75,7 @@ __all__ = [
     "Credentials",
     "ExecutorError",
     "ExecutorWorkers",
+    "FaceCertificate",
     "FailedPrecondition",
     "Failure",
     "Finding",
@@ -96,6 +106,7 @@ __all__ = [
     "UncertifiedWarning",
     "ViewerNotFound",
     "Violations",
+    "WallAngle",
     "check",
     "check_save",
     "download",

@@ -102,6 +102,36 @@ class Violations:
 
 
 @dataclasses.dataclass(frozen=True)
+class FaceCertificate:
+    """A face of a manifold with boundary: where some of its walls are 0."""
+
+    walls: tuple[int, ...]
+    dimension: int  # k - 1 of the boundary, less of edges, 0 of corners
+    simplices: int
+    components: int
+    euler_characteristic: int
+
+    @classmethod
+    def from_fields(cls, fields: dict[str, Any]) -> FaceCertificate:
+        """Back from dataclasses.asdict(face), or from JSON of it."""
+        return cls(**{**fields, "walls": tuple(fields["walls"])})
+
+
+@dataclasses.dataclass(frozen=True)
+class WallAngle:
+    """Two walls that meet, at a vertex."""
+
+    walls: tuple[int, ...]
+    degrees: float  # between them, inside of the manifold
+    point: tuple[float, ...]
+
+    @classmethod
+    def from_fields(cls, fields: dict[str, Any]) -> WallAngle:
+        """Back from dataclasses.asdict(angle), or from JSON of it."""
+        return cls(tuple(fields["walls"]), fields["degrees"], tuple(fields["point"]))
+
+
+@dataclasses.dataclass(frozen=True)
 class Certificate:
     """What was computed from the finished complex. Lengths are in the units of the coordinates."""
 
@@ -134,6 +164,12 @@ class Certificate:
     proved_distance: float  # PROVED: bounds the Hausdorff distance to the components it meets
     answers_held: int = 0  # answers of the whole run, beside vertices, held against the mesh
     violations: Violations = Violations()
+    # Of manifolds with boundary:
+    boundary_simplices: int = 0  # of dimension k - 1
+    boundary_components: int = 0
+    boundary_euler_characteristic: int = 0
+    faces: tuple[FaceCertificate, ...] = ()  # by dimension, the lowest first
+    sharpest: WallAngle | None = None  # where walls meet at the smallest angle, if any meet
 
 
 @dataclasses.dataclass(frozen=True)
@@ -211,6 +247,11 @@ class Report:
         certificate["warnings"] = tuple(certificate["warnings"])
         if "violations" in certificate:  # checkpoints of earlier versions lack it
             certificate["violations"] = Violations.from_fields(certificate["violations"])
+        if "faces" in certificate:
+            faces = map(FaceCertificate.from_fields, certificate["faces"])
+            certificate["faces"] = tuple(faces)
+        if certificate.get("sharpest"):
+            certificate["sharpest"] = WallAngle.from_fields(certificate["sharpest"])
         more = {
             "failure": failure and Failure(**failure),
             "counts": Counts(**fields["counts"]),
@@ -274,7 +315,20 @@ class Report:
 def _certificate(message: pb.Certificate) -> Certificate:
     plain = _copy_fields(Certificate, message)
     violations = Violations.from_wire(message.violations)
-    return dataclasses.replace(plain, level=enums.level(message.level), violations=violations)
+    faces = tuple(
+        FaceCertificate(
+            tuple(f.walls), f.dimension, f.simplices, f.components, f.euler_characteristic
+        )
+        for f in message.faces
+    )
+    s = message.sharpest
+    sharpest = None
+    if message.HasField("sharpest"):
+        sharpest = WallAngle(tuple(s.walls), s.degrees, tuple(s.point))
+    level = enums.level(message.level)
+    return dataclasses.replace(
+        plain, level=level, violations=violations, faces=faces, sharpest=sharpest
+    )
 
 
 def _plain_verdict(c: Certificate) -> str:

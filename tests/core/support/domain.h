@@ -27,8 +27,8 @@ class Domain {
   std::vector<Function> equations;  // d - k
   std::vector<Function> walls;
   BoundingBox box;
-  int euler = 0;
-  std::size_t boundary_components = 0;
+  std::vector<int> homology;  // ranks over Z/2, by dimension
+  std::vector<int> boundary_homology;
 
   // The same, turned and moved a little at random; 0: as it is.
   Domain Turned(unsigned seed) const {

@@ -296,5 +296,32 @@ TEST(ConvertMesh, DeltasKeepTheirRows) {
   EXPECT_EQ(last, 7u);
 }
 
+TEST(ConvertReport, TellsOfFacesAndWhereWallsMeetMostSharply) {
+  core::Report report;
+  report.certificate.boundary_simplices = 12;
+  report.certificate.boundary_components = 2;
+  report.certificate.boundary_euler_characteristic = -4;
+  report.certificate.faces = {{core::WallSet{5}, 1, 7, 2, -3}};
+  v1::Report sent;
+  ToProto(report, 3, &sent);
+  EXPECT_FALSE(sent.certificate().has_sharpest());
+  report.certificate.sharpest = core::WallAngle{core::WallSet{3}, 27.5, Eigen::Vector2d(0.5, -0.5)};
+  ToProto(report, 3, &sent);
+  const v1::Certificate& certificate = sent.certificate();
+  EXPECT_EQ(certificate.boundary_simplices(), 12u);
+  EXPECT_EQ(certificate.boundary_components(), 2u);
+  EXPECT_EQ(certificate.boundary_euler_characteristic(), -4);
+  const v1::FaceCertificate& face = certificate.faces(0);
+  EXPECT_EQ(std::vector<std::uint32_t>(face.walls().begin(), face.walls().end()),
+            (std::vector<std::uint32_t>{0, 2}));
+  EXPECT_EQ(face.dimension(), 1u);
+  EXPECT_EQ(face.simplices(), 7u);
+  EXPECT_EQ(face.components(), 2u);
+  EXPECT_EQ(face.euler_characteristic(), -3);
+  EXPECT_EQ(certificate.sharpest().walls_size(), 2);
+  EXPECT_EQ(certificate.sharpest().degrees(), 27.5);
+  EXPECT_EQ(certificate.sharpest().point(1), -0.5);
+}
+
 }  // namespace
 }  // namespace stellate::server

@@ -41,6 +41,22 @@ TEST(ResultRecord, HoldsWhereAMeshIsAtFaultAndHowItStood) {
   EXPECT_EQ(read->past.all()[1].elapsed_seconds, 0.5);
 }
 
+TEST(ResultRecord, HoldsFacesAndWhereWallsMeetMostSharply) {
+  SessionResult result = Refused();
+  core::Certificate& certificate = result.report.certificate;
+  certificate.faces = {{core::WallSet{5}, 1, 7, 2, -3}};
+  certificate.sharpest = core::WallAngle{core::WallSet{5}, 27.5, Eigen::Vector3d(1, 2, 3)};
+  std::uint64_t parts = 0;
+  const auto read = DecodeResult(EncodeResult(result, 2), &parts);
+  ASSERT_TRUE(read);
+  ASSERT_EQ(read->report.certificate.faces.size(), 1u);
+  EXPECT_EQ(read->report.certificate.faces[0].euler_characteristic, -3);
+  ASSERT_TRUE(read->report.certificate.sharpest);
+  EXPECT_EQ(read->report.certificate.sharpest->walls, core::WallSet{5});
+  EXPECT_EQ(read->report.certificate.sharpest->degrees, 27.5);
+  EXPECT_EQ(read->report.certificate.sharpest->point, Eigen::Vector3d(1, 2, 3));
+}
+
 // Those of earlier servers end before the boundary, or behind it; what ends elsewhere is damaged.
 TEST(ResultRecord, EarlierOnesAreRead) {
   const std::string record = EncodeResult(Refused(), 2);

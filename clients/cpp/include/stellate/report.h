@@ -70,6 +70,22 @@ struct Violations {
   std::vector<std::uint32_t> fibres;        // near which a normal flat fails
 };
 
+// A face of a manifold with boundary: where some of its walls are 0.
+struct FaceCertificate {
+  std::vector<std::uint32_t> walls;  // ascending
+  std::uint32_t dimension = 0;       // k - 1 of the boundary, less of edges, 0 of corners
+  std::uint64_t simplices = 0;
+  std::uint64_t components = 0;
+  std::int64_t euler_characteristic = 0;
+};
+
+// Two walls that meet.
+struct WallAngle {
+  std::vector<std::uint32_t> walls;  // ascending
+  double degrees = 0;                // between them, inside of the manifold
+  std::vector<double> point;         // a vertex
+};
+
 // What the server computed from the finished complex. Lengths are in the coordinates' unit.
 struct Certificate {
   bool certified = false;  // every claim holds and the run converged
@@ -108,6 +124,13 @@ struct Certificate {
   std::uint64_t answers_held =
       0;  // answers of the whole run, beside vertices, held against the mesh
   Violations violations;
+
+  // Of manifolds with boundary:
+  std::uint64_t boundary_simplices = 0;  // of dimension k - 1
+  std::uint64_t boundary_components = 0;
+  std::int64_t boundary_euler_characteristic = 0;
+  std::vector<FaceCertificate> faces;  // by dimension, the lowest first
+  std::optional<WallAngle> sharpest;   // where walls meet at the smallest angle, if any meet
 };
 
 struct Report {

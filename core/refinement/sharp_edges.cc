@@ -1,0 +1,54 @@
+#include "core/refinement/sharp_edges.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/base/instantiate.h"
+#include "core/base/interruption.h"
+#include "core/base/vector_ops.h"
+
+namespace stellate::core {
+
+template <int K>
+std::optional<WallAngle> SharpestAt(const StarComplex<K>& complex, std::uint32_t p) {
+  const WallSet walls = complex.walls(p);
+  if (CountWalls(walls) < 2) return std::nullopt;
+  std::optional<WallAngle> sharpest;
+  const double* const conormals = complex.Conormals(p);
+  int a = 0;
+  ForEachWall(walls, [&](int first) {
+    int b = a + 1;
+    ForEachWall(walls & ~((SetOfWall(first) << 1) - 1), [&](int second) {
+      // Between the half-spaces that the walls leave: 0 where their conormals are opposite.
+      const double cosine = -Dot(conormals + K * a, conormals + K * b, K);
+      const double degrees = std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / std::numbers::pi;
+      if (!sharpest || degrees < sharpest->degrees)
+        sharpest = WallAngle{SetOfWall(first) | SetOfWall(second), degrees, {}};
+      ++b;
+    });
+    ++a;
+  });
+  return sharpest;
+}
+
+template <int K>
+std::optional<WallAngle> Sharpest(const StarComplex<K>& complex) {
+  std::optional<WallAngle> sharpest;
+  for (std::uint32_t p = 0; p < complex.size(); ++p) {
+    CheckInterruption(p);
+    std::optional<WallAngle> here = SharpestAt<K>(complex, p);
+    if (!here || (sharpest && sharpest->degrees <= here->degrees)) continue;
+    sharpest = std::move(here);
+    sharpest->point = Eigen::Map<const Eigen::VectorXd>(complex.Point(p), complex.d());
+  }
+  return sharpest;
+}
+
+#define STELLATE_EACH(K)                                                                 \
+  template std::optional<WallAngle> SharpestAt<K>(const StarComplex<K>&, std::uint32_t); \
+  template std::optional<WallAngle> Sharpest<K>(const StarComplex<K>&);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core

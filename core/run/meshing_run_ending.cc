@@ -1,0 +1,48 @@
+// What a run says of how it ended.
+
+#include <string>
+
+#include "core/base/message.h"
+#include "core/certificate/findings.h"
+#include "core/run/ending.h"
+#include "core/run/meshing_run.h"
+
+namespace stellate::core {
+
+template <int K>
+void MeshingRun<K>::DescribeEnding(bool is_whole) {
+  const Termination termination = report_.termination;
+  Certificate& certificate = report_.certificate;
+  if (termination == Termination::kConverged) {
+    certificate = certification_->certificate();
+    WarnOfCompromises<K>(engine_, spec_.epsilon, &certificate);
+  } else {
+    certificate.verdict = std::string("not certified: the run ended as ") +
+                          TerminationName(termination) + " before every rule held";
+    if (!report_.failure.message.empty()) certificate.verdict += ": " + report_.failure.message;
+    // Whoever cancels a large mesh does not want to wait for it to be described.
+    if (termination != Termination::kCancelled && termination != Termination::kOracleFailed)
+      DescribeUnfinished<K>(engine_, spec_.epsilon, &certificate);
+    if (termination == Termination::kNoProgress)
+      certificate.verdict +=
+          "; " + (box_watch_.has_left()
+                      ? box_watch_.WhyStopped()
+                      : WhatIsLeft<K>(engine_, certificate.inconsistent_simplices) +
+                            rim_watch_.Describe(engine_.complex().d()));
+    // A front that never closes may be where the manifold ends.
+    const bool spent =
+        termination == Termination::kVertexBudget || termination == Termination::kRoundBudget;
+    if (spec_.walls == 0 && !box_watch_.has_left() &&
+        (termination == Termination::kNoProgress || (spent && !rim_watch_.leans().empty())))
+      certificate.verdict += Message(". ", kDeclareWalls);
+  }
+  if (!is_whole) return;
+  box_watch_.Warn(&certificate);
+  if (spec_.walls > 0) TellSharpest<K>(engine_, &certificate);
+}
+
+#define STELLATE_EACH(K) template void MeshingRun<K>::DescribeEnding(bool);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core
