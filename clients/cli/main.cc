@@ -19,6 +19,7 @@
 #include "server_options.h"
 #include "stellate/catalogue.h"
 #include "stellate/client.h"
+#include "stellate/oracles/walls.h"
 #include "top_command.h"
 #include "view_command.h"
 
@@ -73,6 +74,10 @@ int List() {
                 facts.euler_characteristic, betti.c_str());
     if (facts.reach) std::printf(", reach %.4g", *facts.reach);
     std::printf("\n");
+  }
+  std::printf("\nWith boundary, or cut any of the others with --clip:\n");
+  for (const stellate::CatalogueEntry& entry : stellate::oracles::ListDomains()) {
+    std::printf("%-22s %s\n", entry.syntax.c_str(), entry.description.c_str());
   }
   return stellate::cli::kExitCertified;
 }

@@ -47,6 +47,10 @@ int MeshCommand::Run(std::stop_token stop) {
   const Expected<std::unique_ptr<Oracle>> made = source_.Make(stop);
   if (!made) return PrintError(made.error());
   Oracle& oracle = **made;
+  if (closest_point_only_ && oracle.walls() > 0) {
+    return PrintError({ErrorCode::kRefused, "",
+                       "--closest-point-only: a manifold with boundary takes tangent bases"});
+  }
   if (const auto ok = outputs_.Check(oracle.dimension(), oracle.ambient_dimension()); !ok) {
     return PrintError(ok.error());
   }

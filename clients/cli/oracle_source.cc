@@ -2,15 +2,83 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "stellate/catalogue.h"
+#include "stellate/oracles/walls.h"
 
 namespace stellate::cli {
+
+namespace {
+
+constexpr const char* kClips =
+    "box:LOWER:UPPER, ball:CENTRE:RADIUS or half-space:NORMAL:OFFSET, where points are numbers "
+    "between commas";
+
+Expected<Eigen::MatrixXd> OnePoint(std::string_view text) {
+  Expected<Eigen::MatrixXd> points = ParsePoints(text);
+  if (points && points->cols() != 1) return Fail(ErrorCode::kRefused, "more than one point");
+  return points;
+}
+
+// The walls of one --clip, of a manifold in R^d.
+Expected<std::vector<oracles::Wall>> ParseClip(const std::string& text, int d) {
+  const auto refuse = [&](const std::string& why) {
+    return Fail(ErrorCode::kRefused, "--clip " + text + ": " + why);
+  };
+  const size_t first = text.find(':'), last = text.rfind(':');
+  if (first == last) return refuse(std::string("has to be ") + kClips);
+  const std::string kind = text.substr(0, first);
+  const auto left = OnePoint(std::string_view(text).substr(first + 1, last - first - 1));
+  const auto right = OnePoint(std::string_view(text).substr(last + 1));
+  for (const auto* const end : {&left, &right}) {
+    if (!*end) return refuse(end->error().message);
+  }
+  const bool box = kind == "box";
+  if (left->rows() != d || right->rows() != (box ? d : 1)) {
+    return refuse("the manifold lies in R^" + std::to_string(d));
+  }
+  try {
+    if (box) return oracles::Box(left->col(0), right->col(0));
+    if (kind == "ball") return std::vector{oracles::Ball(left->col(0), (*right)(0, 0))};
+    if (kind == "half-space") {
+      return std::vector{oracles::HalfSpace(left->col(0), (*right)(0, 0))};
+    }
+  } catch (const std::invalid_argument& failure) {
+    return refuse(failure.what());
+  }
+  return refuse(std::string("has to be ") + kClips);
+}
+
+Expected<std::unique_ptr<Oracle>> Clip(std::unique_ptr<Oracle> oracle,
+                                       const std::vector<std::string>& clips) {
+  if (clips.empty()) return oracle;
+  std::vector<oracles::Wall> walls;
+  for (const std::string& clip : clips) {
+    const auto more = ParseClip(clip, oracle->ambient_dimension());
+    if (!more) return tl::unexpected(more.error());
+    walls.insert(walls.end(), more->begin(), more->end());
+  }
+  try {
+    return std::make_unique<oracles::Clipped>(std::move(oracle), std::move(walls));
+  } catch (const std::invalid_argument& failure) {
+    return Fail(ErrorCode::kRefused, std::string("--clip: ") + failure.what());
+  }
+}
+
+}  // namespace
 
 OracleSource::OracleSource(CLI::App* command) {
   CLI::Option* const manifold = command->add_option(
       "manifold", manifold_, "e.g. torus:1:0.4; see 'stellate list'. Or, instead of it, a command");
+  command
+      ->add_option("--clip", clips_,
+                   "what is left of it inside a wall, with a boundary there; may be given again. " +
+                       std::string(kClips) + ", as --clip=half-space:0,0,1:0.2")
+      ->type_name("WALL")
+      ->allow_extra_args(false);
   CLI::App* const group = command->add_option_group(
       "Oracle command",
       "a program in any language that answers batches of queries: docs/using/pipe.md");
@@ -52,10 +120,18 @@ Expected<void> OracleSource::ReadWhereabouts() {
 }
 
 Expected<std::unique_ptr<Oracle>> OracleSource::Make(std::stop_token stop) {
+  auto made = MakeUnclipped(std::move(stop));
+  if (!made) return made;
+  return Clip(std::move(*made), clips_);
+}
+
+Expected<std::unique_ptr<Oracle>> OracleSource::MakeUnclipped(std::stop_token stop) {
   if (command_.command.empty()) {
     std::string why = "name a manifold, or give --oracle-command";
     std::unique_ptr<Oracle> known;
-    if (!manifold_.empty()) known = MakeManifold(manifold_, &why);
+    if (!manifold_.empty()) known = oracles::MakeDomain(manifold_, &why);
+    if (!manifold_.empty() && known == nullptr && why.empty())
+      known = MakeManifold(manifold_, &why);
     if (known != nullptr) return known;
     return Fail(ErrorCode::kRefused, why + "; 'stellate list' shows what there is");
   }

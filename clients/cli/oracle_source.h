@@ -12,7 +12,8 @@
 
 namespace stellate::cli {
 
-// Whose manifold it is: one of the catalogue's, or that of a command (see docs/using/pipe.md).
+// Whose manifold it is: one of the catalogue's, or that of a command (see docs/using/pipe.md), and
+// what walls leave of it.
 class OracleSource {
  public:
   explicit OracleSource(CLI::App* command);
@@ -29,9 +30,10 @@ class OracleSource {
 
  private:
   Expected<void> ReadWhereabouts();
+  Expected<std::unique_ptr<Oracle>> MakeUnclipped(std::stop_token stop);
 
   std::string manifold_, box_;
-  std::vector<std::string> seeds_;
+  std::vector<std::string> seeds_, clips_;
   CommandOptions command_;
 };
 

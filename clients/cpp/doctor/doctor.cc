@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <sstream>
@@ -65,6 +66,7 @@ void Examination::ObeyLaws() {
       {"dimension_is_right", &Examination::DimensionIsRight},
       {"tangents_are_right", &Examination::TangentsAreRight},
       {"sizes_are_lengths", &Examination::SizesAreLengths},
+      {"walls_are_right", &Examination::WallsAreRight},
       {"reach_is_estimated", &Examination::EstimateReach},
       {"near_points_come_back", &Examination::NearPointsComeBack},
       {"surface_is_smooth", &Examination::IsSmooth},
@@ -78,7 +80,9 @@ void Examination::ObeyLaws() {
     std::istringstream words(line);
     std::string name, code;
     words >> name >> code;  // and "unless"
-    bool obey = true;
+    const bool of_normals =
+        std::find(std::begin(kOfNormals), std::end(kOfNormals), name) != std::end(kOfNormals);
+    bool obey = !(of_normals && probe_.fills_space());
     while (words >> code) obey = obey && !Has(code);
     if (obey) (this->*by_name.at(name))();
   }

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <initializer_list>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "doctor/findings.h"
 #include "doctor/probe.h"
+#include "doctor/walls.h"
 #include "shared/doctor.h"
 #include "stellate/doctor.h"
 
@@ -40,6 +42,7 @@ class Examination {
   void JudgeRanks(double share);
   void TangentsAreRight();
   void SizesAreLengths();
+  void WallsAreRight();
   void EstimateReach();
   void IsSmooth();
   // Of flats.
@@ -57,6 +60,7 @@ class Examination {
 
   const CheckOptions options_;
   Probe probe_;
+  std::optional<WallProbe> walls_;
   CheckReport report_;
 };
 

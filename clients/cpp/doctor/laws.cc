@@ -161,6 +161,12 @@ void Examination::SizesAreLengths() {
   }
 }
 
+void Examination::WallsAreRight() {
+  if (probe_.walls() == 0) return;
+  walls_.emplace(probe_, [this](Finding finding) { Add(std::move(finding)); });
+  walls_->Examine();
+}
+
 void Examination::EstimateReach() {
   double reach = kInfinity;
   const double shortest = kShortestWay * probe_.size;
@@ -184,6 +190,7 @@ void Examination::EstimateReach() {
       reach = std::min(reach, ReachFrom(v, tangents[static_cast<size_t>(j)], shortest));
     }
   }
+  if (walls_) reach = std::min({reach, walls_->Reach(), kFlatReach * probe_.size});
   report_.reach = reach;
   const double advised = kSafeRatio * reach;
   Add("REACH", {{"reach", reach}, {"advised", advised}});

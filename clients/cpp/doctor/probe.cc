@@ -50,6 +50,7 @@ Probe::Probe(Oracle& oracle, std::uint64_t random_seed)
     : oracle_(oracle),
       k_(oracle.dimension()),
       d_(oracle.ambient_dimension()),
+      walls_(oracle.walls()),
       gives_tangents_(oracle.has_tangent_basis()),
       random_(random_seed) {}
 
@@ -125,6 +126,37 @@ Eigen::VectorXd Probe::GivenSizes(const Eigen::MatrixXd& at) {
   return sizes;
 }
 
+Answered Probe::FacePoints(const Eigen::MatrixXd& x, const Walls& face) {
+  queries += static_cast<std::uint64_t>(x.cols());
+  const Answer answer = Guarded("FacePoint", x.cols(), [&] { return oracle_.FacePoint(x, face); });
+  return Checked("FacePoint", answer, x.cols());
+}
+
+// Finite numbers, `rows` for each point.
+Eigen::MatrixXd Probe::Numbers(const char* method, const Eigen::MatrixXd& at, Eigen::Index rows,
+                               const std::function<Eigen::MatrixXd()>& ask) {
+  queries += static_cast<std::uint64_t>(at.cols());
+  Eigen::MatrixXd numbers = Guarded(method, at.cols(), ask);
+  if (numbers.rows() != rows || numbers.cols() != at.cols()) {
+    WrongShape(std::string(method) + " returned " + Extent(numbers.rows(), numbers.cols()) +
+               " numbers; wanted are " + Extent(rows, at.cols()));
+  }
+  if (!numbers.allFinite()) {
+    throw Stop{MakeFinding(
+        "NOT_FINITE", {{"what", std::string(method) + " returned numbers that are not finite"}})};
+  }
+  return numbers;
+}
+
+Eigen::MatrixXd Probe::Clearances(const Eigen::MatrixXd& at) {
+  return Numbers("Clearances", at, walls_, [&] { return oracle_.Clearances(at); });
+}
+
+Eigen::MatrixXd Probe::Conormals(const Eigen::MatrixXd& at, const Walls& face) {
+  const Eigen::Index rows = d_ * std::ssize(face);
+  return Numbers("Conormals", at, rows, [&] { return oracle_.Conormals(at, face); });
+}
+
 double Probe::Uniform(double low, double high) {
   // The engine's output is fixed by the standard, the distributions' is not.
   return low + (high - low) * std::ldexp(static_cast<double>(random_() >> 11), -53);
@@ -176,7 +208,8 @@ Eigen::MatrixXd Probe::StartingPoints() {
 }
 
 void Probe::FindPoints(const std::function<void(Finding)>& add) {
-  if (k_ < 1 || k_ >= d_) throw Stop{MakeFinding("BAD_DIMENSIONS", {{"k", k_}, {"d", d_}})};
+  const bool possible = 1 <= k_ && (k_ < d_ || (k_ == d_ && walls_ > 0));
+  if (!possible) throw Stop{MakeFinding("BAD_DIMENSIONS", {{"k", k_}, {"d", d_}})};
   const Eigen::MatrixXd all = StartingPoints();
   const Answered answered = Closest(all);
   Indices kept, lost;
@@ -195,7 +228,7 @@ void Probe::FindPoints(const std::function<void(Finding)>& add) {
   points = Take(answered.points, kept);
   size = (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).norm();
   const std::optional<BoundingBox> box = oracle_.bounding_box();
-  if (!box) return;
+  if (!box || walls_ > 0) return;
   const double slack = kBoxSlack * (box->upper - box->lower).norm();
   for (const auto& p : points.colwise()) {
     if ((p.array() < box->lower.array() - slack).any() ||

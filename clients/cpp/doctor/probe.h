@@ -37,12 +37,18 @@ class Probe {
   bool gives_tangents() const { return gives_tangents_; }
   bool intersects_flats() const { return oracle_.has_intersect_flat(); }
   bool gives_sizes() const { return oracle_.has_local_size(); }
+  int walls() const { return walls_; }
+  bool fills_space() const { return k_ == d_; }
 
   Answered Closest(const Eigen::MatrixXd& x);
   Answered Intersect(const Eigen::MatrixXd& centers, const std::vector<Basis>& bases,
                      const Eigen::VectorXd& radii);
   std::vector<Basis> GivenTangents(const Eigen::MatrixXd& points);
   Eigen::VectorXd GivenSizes(const Eigen::MatrixXd& points);
+  // Of walls, as the oracle's own.
+  Answered FacePoints(const Eigen::MatrixXd& x, const Walls& face);
+  Eigen::MatrixXd Clearances(const Eigen::MatrixXd& points);
+  Eigen::MatrixXd Conormals(const Eigen::MatrixXd& points, const Walls& face);
 
   // Fills starts and points; `add` takes what is wrong with them.
   void FindPoints(const std::function<void(Finding)>& add);
@@ -68,17 +74,19 @@ class Probe {
   int Pieces();
   // A d x k matrix of random entries of about the given size.
   Eigen::MatrixXd RandomMatrix(double size);
+  Eigen::MatrixXd RandomUnits(Eigen::Index count);  // d x count
 
  private:
   Eigen::MatrixXd StartingPoints();
   double Uniform(double low, double high);
-  Eigen::MatrixXd RandomUnits(Eigen::Index count);
+  Eigen::MatrixXd Numbers(const char* method, const Eigen::MatrixXd& points, Eigen::Index rows,
+                          const std::function<Eigen::MatrixXd()>& ask);
   std::vector<Basis> Differential(const Eigen::MatrixXd& points, std::vector<int>* ranks);
   std::vector<std::pair<Eigen::Index, Eigen::Index>> Neighbours(int count) const;
   Answered Checked(const char* method, const Answer& answer, Eigen::Index count) const;
 
   Oracle& oracle_;
-  const int k_, d_;
+  const int k_, d_, walls_;
   bool gives_tangents_;
   std::mt19937_64 random_;
 };

@@ -7,6 +7,9 @@
 #include <cstring>
 #include <string_view>
 #include <type_traits>
+#include <vector>
+
+#include "mesh/groups.h"
 
 namespace stellate::client {
 namespace {
@@ -76,11 +79,21 @@ std::string Off(const Mesh& mesh) {
   return text.str();
 }
 
-std::string Obj(const Mesh& mesh) {
+Expected<std::string> Obj(const Mesh& mesh) {
+  constexpr const char* kPrefixes[] = {"p ", "l ", "f "};
   Text text;
   text.AddLines("v ", InSpace(mesh));
-  const SimplexMatrix from_one = OrientedSimplices(mesh).array() + 1;
-  text.AddLines(mesh.dimension() == 1 ? "l " : "f ", from_one);
+  const std::vector<Group> groups = GroupsOf(mesh);
+  if (mesh.dimension() == 3 && groups.size() == 1) {
+    return Fail(ErrorCode::kFileFailed,
+                ".obj holds curves, surfaces and the boundaries of solids, and it is not known on "
+                "what walls this solid's boundary lies");
+  }
+  for (const Group& group : groups) {
+    if (group.dimension() == 3) continue;  // a solid is its boundary here
+    if (groups.size() > 1) text.Add("g " + group.name + "\n");
+    text.AddLines(kPrefixes[group.dimension()], SimplexMatrix(group.simplices.array() + 1));
+  }
   return text.str();
 }
 
@@ -101,20 +114,33 @@ std::string Ply(const Mesh& mesh) {
 std::string Msh(const Mesh& mesh) {
   constexpr int kElementTypes[] = {15, 1, 2, 4};  // point, line, triangle, tetrahedron
   const Eigen::MatrixXd points = InSpace(mesh);
-  const SimplexMatrix simplices = OrientedSimplices(mesh).array() + 1;
+  const std::vector<Group> groups = GroupsOf(mesh);
   Text text;
-  text.Add("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n" + std::to_string(points.cols()) + "\n");
+  text.Add("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n");
+  if (groups.size() > 1) {
+    text.Add("$PhysicalNames\n" + std::to_string(groups.size()) + "\n");
+    for (const Group& group : groups) {
+      text.Add(std::to_string(group.dimension()) + " " + std::to_string(group.tag) + " \"" +
+               group.name + "\"\n");
+    }
+    text.Add("$EndPhysicalNames\n");
+  }
+  text.Add("$Nodes\n" + std::to_string(points.cols()) + "\n");
   for (Eigen::Index j = 0; j < points.cols(); ++j) {
     text.Add(std::to_string(j + 1) + " ");
     text.AddLines("", points.col(j));
   }
-  // Two tags for each element: it is of physical group 1 and of geometrical entity 1.
-  std::string type(1, ' ');
-  type += std::to_string(kElementTypes[mesh.dimension()]);
-  type += " 2 1 1 ";
-  text.Add("$EndNodes\n$Elements\n" + std::to_string(simplices.cols()) + "\n");
-  for (Eigen::Index j = 0; j < simplices.cols(); ++j) {
-    text.AddLines(std::to_string(j + 1) + type, simplices.col(j));
+  text.Add("$EndNodes\n$Elements\n" + std::to_string(CountSimplices(groups)) + "\n");
+  Eigen::Index number = 0;
+  for (const Group& group : groups) {
+    // Two tags for each element: its physical group and its geometrical entity, by the same number.
+    char type[64];
+    std::snprintf(type, sizeof type, " %d 2 %d %d ", kElementTypes[group.dimension()], group.tag,
+                  group.tag);
+    const SimplexMatrix simplices = group.simplices.array() + 1;
+    for (Eigen::Index j = 0; j < simplices.cols(); ++j) {
+      text.AddLines(std::to_string(++number) + type, simplices.col(j));
+    }
   }
   text.Add("$EndElements\n");
   return text.str();
@@ -122,6 +148,7 @@ std::string Msh(const Mesh& mesh) {
 
 Expected<std::string> Stl(const Mesh& mesh) {
   const SimplexMatrix triangles = OrientedSimplices(mesh);
+  const Eigen::MatrixXd points = InSpace(mesh);
   std::string bytes(80, ' ');  // a header that says nothing, and never "solid"
   const auto add = [&bytes](const auto& value) {
     bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
@@ -129,7 +156,7 @@ Expected<std::string> Stl(const Mesh& mesh) {
   add(static_cast<std::uint32_t>(triangles.cols()));
   for (Eigen::Index j = 0; j < triangles.cols(); ++j) {
     Eigen::Matrix3d corners;
-    for (Eigen::Index i = 0; i < 3; ++i) corners.col(i) = mesh.points.col(triangles(i, j));
+    for (Eigen::Index i = 0; i < 3; ++i) corners.col(i) = points.col(triangles(i, j));
     const Eigen::Matrix3f single = corners.cast<float>();
     if (single.col(0) == single.col(1) || single.col(1) == single.col(2) ||
         single.col(2) == single.col(0)) {

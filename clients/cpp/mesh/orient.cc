@@ -108,6 +108,18 @@ SimplexMatrix Orient(const SimplexMatrix& simplices, std::vector<Eigen::Index>* 
   return oriented;
 }
 
+// Simplices that fill space, to positive volumes.
+void TurnPositive(const Eigen::MatrixXd& points, SimplexMatrix* simplices) {
+  const Eigen::Index d = points.rows();
+  Eigen::MatrixXd sides(d, d);
+  for (Eigen::Index j = 0; j < simplices->cols(); ++j) {
+    for (Eigen::Index i = 0; i < d; ++i) {
+      sides.col(i) = points.col((*simplices)(i + 1, j)) - points.col((*simplices)(0, j));
+    }
+    if (sides.determinant() < 0) Turn(simplices->col(j));
+  }
+}
+
 }  // namespace
 
 SimplexMatrix OrientedSimplices(const SimplexMatrix& simplices) {
@@ -119,6 +131,7 @@ SimplexMatrix OrientedSimplices(const Mesh& mesh) {
   std::vector<Eigen::Index> component;
   SimplexMatrix oriented = Orient(mesh.simplices, &component);
   const int d = mesh.ambient_dimension();
+  if (mesh.dimension() == d) TurnPositive(mesh.points, &oriented);
   if (component.empty() || mesh.dimension() != d - 1) return oriented;
   // d! times what each component encloses, as cones from the origin; below zero with normals
   // inwards.

@@ -31,7 +31,7 @@ constexpr int kAny = 1 << 30;
 constexpr FileFormat kFormats[] = {
     {".txt", 0, kAny, kAny, "anything", As<Txt>},
     {".off", 1, 2, kAny, "curves and surfaces", As<Off>},
-    {".obj", 1, 2, 3, "curves and surfaces", As<Obj>},
+    {".obj", 1, 3, 3, "curves and surfaces, and the boundaries of solids", As<Obj>},
     {".ply", 1, 2, 3, "curves and surfaces", As<Ply>},
     {".stl", 2, 2, 3, "surfaces", As<Stl>},
     {".msh", 1, 3, 3, "simplices of dimension 3 at most", As<Msh>},

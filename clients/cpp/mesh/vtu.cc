@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mesh/formats.h"
+#include "mesh/groups.h"
 
 namespace stellate::client {
 namespace {
@@ -64,37 +65,64 @@ std::string FieldData(const Report& report) {
   return xml + "</FieldData>\n";
 }
 
+std::string Cells(const std::vector<Group>& groups) {
+  // vertex, line, triangle, tetrahedron
+  constexpr std::array<std::uint8_t, 4> kCellTypes = {1, 3, 5, 10};
+  std::vector<std::int64_t> connectivity, offsets;
+  std::vector<std::uint8_t> types;
+  for (const Group& group : groups) {
+    const auto width = static_cast<size_t>(group.simplices.rows());
+    for (const std::uint32_t id : group.simplices.reshaped()) connectivity.push_back(id);
+    for (Eigen::Index j = 0; j < group.simplices.cols(); ++j) {
+      const std::int64_t last = offsets.empty() ? 0 : offsets.back();
+      offsets.push_back(last + static_cast<std::int64_t>(width));
+      types.push_back(kCellTypes[width - 1]);
+    }
+  }
+  const auto array = [](const char* type, const char* name, const auto& values) {
+    return DataArray(type, name, 1, values.data(), std::ssize(values));
+  };
+  return "<Cells>\n" + array("Int64", "connectivity", connectivity) +
+         array("Int64", "offsets", offsets) + array("UInt8", "types", types) + "</Cells>\n";
+}
+
+std::string PointData(const Mesh& mesh) {
+  std::string xml;
+  if (mesh.ambient_dimension() > 3) {
+    xml += DataArray("Float64", "coordinates", mesh.ambient_dimension(), mesh.points.data(),
+                     mesh.points.size());
+  }
+  if (!mesh.walls.empty()) {
+    xml += DataArray("UInt64", "walls", 1, mesh.walls.data(), std::ssize(mesh.walls));
+  }
+  return xml.empty() ? xml : "<PointData>\n" + xml + "</PointData>\n";
+}
+
+// The groups of the cells, which are not all of one.
+std::string CellData(const std::vector<Group>& groups) {
+  std::vector<std::int32_t> tags;
+  std::vector<std::uint64_t> walls;
+  for (const Group& group : groups) {
+    tags.insert(tags.end(), static_cast<size_t>(group.simplices.cols()), group.tag);
+    walls.insert(walls.end(), static_cast<size_t>(group.simplices.cols()), group.walls);
+  }
+  return "<CellData>\n" + DataArray("Int32", "group", 1, tags.data(), std::ssize(tags)) +
+         DataArray("UInt64", "walls", 1, walls.data(), std::ssize(walls)) + "</CellData>\n";
+}
+
 }  // namespace
 
 std::string Vtu(const Mesh& mesh) {
-  // vertex, line, triangle, tetrahedron
-  constexpr std::array<std::uint8_t, 4> kCellTypes = {1, 3, 5, 10};
-  const Eigen::Index n = mesh.points.cols(), m = mesh.simplices.cols(),
-                     width = mesh.simplices.rows();
+  const std::vector<Group> groups = GroupsOf(mesh);
   const Eigen::MatrixXd points = InSpace(mesh);
-  const Eigen::Matrix<std::int64_t, Eigen::Dynamic, Eigen::Dynamic> connectivity =
-      OrientedSimplices(mesh).cast<std::int64_t>();
-  std::vector<std::int64_t> offsets(static_cast<size_t>(m));
-  for (size_t i = 0; i < offsets.size(); ++i) {
-    offsets[i] = static_cast<std::int64_t>(i + 1) * static_cast<std::int64_t>(width);
-  }
-  const std::vector<std::uint8_t> types(static_cast<size_t>(m),
-                                        kCellTypes[static_cast<size_t>(mesh.dimension())]);
   std::string xml =
       "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" "
       "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<UnstructuredGrid>\n" +
-      FieldData(mesh.report) + "<Piece NumberOfPoints=\"" + std::to_string(n) +
-      "\" NumberOfCells=\"" + std::to_string(m) + "\">\n<Points>\n" +
-      DataArray("Float64", "Points", 3, points.data(), points.size()) + "</Points>\n<Cells>\n" +
-      DataArray("Int64", "connectivity", 1, connectivity.data(), connectivity.size()) +
-      DataArray("Int64", "offsets", 1, offsets.data(), m) +
-      DataArray("UInt8", "types", 1, types.data(), m) + "</Cells>\n";
-  if (mesh.ambient_dimension() > 3) {
-    xml += "<PointData>\n" +
-           DataArray("Float64", "coordinates", mesh.ambient_dimension(), mesh.points.data(),
-                     mesh.points.size()) +
-           "</PointData>\n";
-  }
+      FieldData(mesh.report) + "<Piece NumberOfPoints=\"" + std::to_string(points.cols()) +
+      "\" NumberOfCells=\"" + std::to_string(CountSimplices(groups)) + "\">\n<Points>\n" +
+      DataArray("Float64", "Points", 3, points.data(), points.size()) + "</Points>\n" +
+      Cells(groups) + PointData(mesh);
+  if (groups.size() > 1) xml += CellData(groups);
   return xml + "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
 }
 

@@ -7,7 +7,8 @@
 namespace stellate::pipe {
 namespace {
 
-constexpr std::uint32_t kTangents = 1, kSizes = 2, kFound = 4, kError = 8;
+constexpr std::uint32_t kTangents = 1, kSizes = 2, kFound = 4, kError = 8, kWalls = 16;
+constexpr std::uint32_t kMostFlags = kTangents | kSizes | kFound | kWalls;
 
 std::string Show(const Eigen::Ref<const Eigen::VectorXd>& numbers) {
   constexpr Eigen::Index kShown = 10;
@@ -48,15 +49,16 @@ class BinaryReader final : public AnswerReader {
     const auto [count, flags] = head;
     if (flags == kError && count <= kMaxErrorBytes) {
       body_ = count;
-    } else if (flags >= kError) {
+    } else if ((flags & ~kMostFlags) != 0) {
       throw Garbled("an answer begins with its number of rows and its flags, 8 bytes; these are " +
                     Quoted(bytes) + "; does something else write to its standard output?");
     } else if (count != static_cast<std::uint64_t>(n())) {
       throw Garbled("it answers " + std::to_string(count) + " rows and was asked " +
                     std::to_string(n()));
     } else {
-      const Eigen::Index numbers =
-          d() + ((flags & kTangents) != 0 ? dk() : 0) + ((flags & kSizes) != 0 ? 1 : 0);
+      const Eigen::Index numbers = d() + ((flags & kTangents) != 0 ? dk() : 0) +
+                                   ((flags & kSizes) != 0 ? 1 : 0) +
+                                   ((flags & kWalls) != 0 ? question_.wall_numbers() : 0);
       body_ = static_cast<size_t>(n()) *
               (sizeof(double) * static_cast<size_t>(numbers) + ((flags & kFound) != 0 ? 1 : 0));
     }
@@ -78,6 +80,11 @@ class BinaryReader final : public AnswerReader {
     if ((*flags_ & kSizes) != 0) {
       answer_.sizes.resize(n());
       take(answer_.sizes.data(), n());
+    }
+    if ((*flags_ & kWalls) != 0 && question_.walls > 0) {
+      MakeWalls();
+      take(answer_.clearances.data(), answer_.clearances.size());
+      take(answer_.conormals.data(), answer_.conormals.size());
     }
     if ((*flags_ & kFound) == 0) return;
     answer_.found.resize(static_cast<size_t>(n()));
@@ -114,7 +121,8 @@ class TextReader final : public AnswerReader {
     bytes->erase(0, taken);
     searched_ = bytes->size();
     // Numbers of a row have some 25 bytes each, and never more than 400.
-    const size_t longest = std::max(kMaxErrorBytes, 400 * static_cast<size_t>(d() + dk() + 1));
+    const size_t longest = std::max(
+        kMaxErrorBytes, 400 * static_cast<size_t>(d() + dk() + 1 + question_.wall_numbers()));
     if (row_ < n() && bytes->size() > longest) {
       throw Garbled(RowOf(row_, n()) + " does not end: " + Quoted(*bytes));
     }
@@ -144,24 +152,34 @@ class TextReader final : public AnswerReader {
     take(answer_.points.col(row_));
     if (answer_.tangents.size() > 0) take(answer_.tangents.col(row_));
     if (answer_.sizes.size() > 0) take(answer_.sizes.segment(row_, 1));
+    if (question_.walls == 0) return;
+    take(answer_.clearances.col(row_));
+    if (!question_.face.empty()) take(answer_.conormals.col(row_));
   }
 
   // The first row that was found says what all have.
   void Settle(Eigen::Index count, std::string_view line) {
     if (!settled_) {
-      const bool sizes = count == d() + 1 || count == d() + dk() + 1;
-      const bool tangents = count == d() + dk() || count == d() + dk() + 1;
+      const Eigen::Index own = count - question_.wall_numbers();
+      const bool sizes = own == d() + 1 || own == d() + dk() + 1;
+      const bool tangents = own == d() + dk() || own == d() + dk() + 1;
+      if (question_.walls > 0) MakeWalls();
       if (tangents) answer_.tangents.setZero(dk(), n());
       if (sizes) answer_.sizes.setOnes(n());
-      settled_ = tangents || sizes || count == d() ? count : 0;
+      settled_ = tangents || sizes || own == d() ? count : 0;
     }
     if (count == *settled_ && count > 0) return;
     const bool first = *settled_ == 0;
     throw Garbled(RowOf(row_, n()) + " has " + std::to_string(count) + " numbers" +
                   (first ? ", not " + std::to_string(d()) + " of a point, " + std::to_string(dk()) +
-                               " more of tangents or 1 more of a size"
+                               " more of tangents or 1 more of a size" + OfWalls()
                          : ", and those before " + std::to_string(*settled_)) +
                   ": " + Quoted(line));
+  }
+
+  std::string OfWalls() const {
+    if (question_.walls == 0) return "";
+    return ", and " + std::to_string(question_.wall_numbers()) + " of walls after these";
   }
 
   Eigen::Index row_ = 0;
@@ -176,6 +194,11 @@ std::unique_ptr<AnswerReader> AnswerReader::Make(const Question& question, bool 
   return std::make_unique<BinaryReader>(question);
 }
 
+void AnswerReader::MakeWalls() {
+  answer_.clearances.setZero(question_.walls, n());
+  answer_.conormals.setZero(std::ssize(question_.face) * d(), n());
+}
+
 Answer AnswerReader::Finish() {
   const bool any = std::find(answer_.found.begin(), answer_.found.end(), 1) != answer_.found.end();
   const bool nothing = !answer_.found.empty() && !any;
@@ -186,6 +209,10 @@ Answer AnswerReader::Finish() {
   if (question_.tangents && answer_.tangents.size() == 0) {
     throw Garbled("it has no tangents in an answer that has to have them: its first line promised");
   }
+  if (nothing && question_.walls > 0 && answer_.clearances.size() == 0) MakeWalls();
+  if (question_.walls > 0 && answer_.clearances.size() == 0) {
+    throw Garbled("it has no walls in an answer that has to have them: its first line promised");
+  }
   if (question_.sizes && answer_.sizes.size() == 0) {
     throw Garbled("it has no sizes in an answer that has to have them: its first line promised");
   }
@@ -195,6 +222,8 @@ Answer AnswerReader::Finish() {
     if (!answer_.points.col(j).allFinite()) what = "a point";
     if (question_.tangents && !answer_.tangents.col(j).allFinite()) what = "tangents";
     if (question_.sizes && !std::isfinite(answer_.sizes[j])) what = "a size";
+    if (question_.walls > 0 && !answer_.clearances.col(j).allFinite()) what = "a clearance";
+    if (!question_.face.empty() && !answer_.conormals.col(j).allFinite()) what = "a conormal";
     if (what == nullptr) continue;
     throw Garbled(RowOf(j, n()) + " has " + what +
                   " that is not finite, and does not say that none was found: " +

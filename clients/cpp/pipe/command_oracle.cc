@@ -93,7 +93,7 @@ class Speaker {
 bool Same(const Greeting& a, const Greeting& b) {
   return a.text == b.text && a.dimension == b.dimension &&
          a.ambient_dimension == b.ambient_dimension && a.tangents == b.tangents &&
-         a.flats == b.flats && a.sizes == b.sizes;
+         a.flats == b.flats && a.sizes == b.sizes && a.walls == b.walls;
 }
 
 class CommandOracle final : public Oracle {
@@ -135,19 +135,38 @@ class CommandOracle final : public Oracle {
     return Ask({dimension(), centers, &bases, &radii});
   }
 
+  int walls() const override { return greeting_.walls; }
+
+  Answer FacePoint(const Eigen::MatrixXd& x, const Walls& face) override {
+    Question question{dimension(), x};
+    question.face = face;
+    return Ask(std::move(question));
+  }
+
+  Eigen::MatrixXd Clearances(const Eigen::MatrixXd& points) override {
+    return AskAllFound({dimension(), points}, "clearances").clearances;
+  }
+
+  Eigen::MatrixXd Conormals(const Eigen::MatrixXd& points, const Walls& face) override {
+    Question question{dimension(), points};
+    question.face = face;
+    return AskAllFound(std::move(question), "conormals").conormals;
+  }
+
   Eigen::MatrixXd TangentBasis(const Eigen::MatrixXd& points) override {
     wants_tangents_ = true;
-    return AskAllFound(points, "tangents").tangents;
+    return AskAllFound({dimension(), points}, "tangents").tangents;
   }
 
   Eigen::VectorXd LocalSize(const Eigen::MatrixXd& points) override {
     wants_sizes_ = true;
-    return AskAllFound(points, "sizes").sizes;
+    return AskAllFound({dimension(), points}, "sizes").sizes;
   }
 
  private:
-  Answer AskAllFound(const Eigen::MatrixXd& points, const char* what) {
-    Answer answer = Ask({dimension(), points});
+  Answer AskAllFound(Question question, const char* what) {
+    const Eigen::MatrixXd& points = question.points;
+    Answer answer = Ask(std::move(question));
     for (Eigen::Index j = 0; j < points.cols(); ++j) {
       if (answer.IsFound(j)) continue;
       throw std::runtime_error(
@@ -158,12 +177,19 @@ class CommandOracle final : public Oracle {
     return answer;
   }
 
+  Answer Nothing(const Question& question) const {
+    const Eigen::Index conormals = std::ssize(question.face) * question.points.rows();
+    return {
+        question.points, {}, {}, {}, Eigen::MatrixXd(walls(), 0), Eigen::MatrixXd(conormals, 0)};
+  }
+
   // What has been asked for once beside the points is asked for along with them from then on: one
   // batch instead of two.
   Answer Ask(Question question) {
-    if (question.points.cols() == 0) return {question.points, {}, {}, {}};
+    if (question.points.cols() == 0) return Nothing(question);
     question.tangents = greeting_.tangents && wants_tangents_;
     question.sizes = greeting_.sizes && wants_sizes_;
+    question.walls = greeting_.walls;
     std::unique_ptr<Speaker> speaker = Take();
     try {
       Answer answer = AskOrRestart(question, &speaker);
@@ -221,10 +247,14 @@ class CommandOracle final : public Oracle {
       return ok;
     }
     const int k = dimension(), d = ambient_dimension();
-    if (k < 1 || k >= d) {
+    if (k < 1 || k > d || (k == d && walls() == 0)) {
       return Fail(ErrorCode::kRefused,
                   "the dimension k = " + std::to_string(k) +
                       " has to be at least 1 and less than d = " + std::to_string(d));
+    }
+    if (walls() > 0 && !has_tangent_basis()) {
+      return Fail(ErrorCode::kRefused,
+                  "an oracle with walls takes tangents: walls= goes with tangents=1");
     }
     if (!options_.box && options_.seeds.size() == 0) {
       options_.box = greeting_.box;

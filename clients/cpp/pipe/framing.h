@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -26,6 +27,7 @@ struct Greeting {
   bool text = false;
   std::optional<int> dimension, ambient_dimension;
   bool tangents = false, flats = false, sizes = false;
+  int walls = 0;
   std::optional<BoundingBox> box;
   Eigen::MatrixXd seeds;  // d x m
 };
@@ -40,6 +42,11 @@ struct Question {
   const Eigen::MatrixXd* bases = nullptr;  // (d k) x n: flats are asked for, else closest points
   const Eigen::VectorXd* radii = nullptr;  // n, with bases
   bool tangents = false, sizes = false;    // wanted beside the points
+  int walls = 0;                           // of the oracle, whose clearances are wanted too
+  Walls face = {};                         // points of a face are asked for, and conormals
+
+  // Numbers that an answer has for each point, of walls.
+  Eigen::Index wall_numbers() const { return walls + std::ssize(face) * points.rows(); }
 };
 
 std::string ToBytes(const Question& question, bool text);
@@ -63,6 +70,7 @@ class AnswerReader {
   Eigen::Index n() const { return question_.points.cols(); }
   Eigen::Index d() const { return question_.points.rows(); }
   Eigen::Index dk() const { return d() * question_.dimension; }
+  void MakeWalls();  // in the answer, of the question's sizes
 
   const Question question_;
   Answer answer_;

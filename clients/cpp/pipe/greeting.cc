@@ -75,6 +75,7 @@ int Number(std::string_view word, std::string_view value, int most) {
 
 void Understand(std::string_view word, Greeting* greeting) {
   constexpr int kMostDimensions = 1 << 20;  // servers allow far less
+  constexpr int kMostWalls = 64;
   const size_t equals = word.find('=');
   const std::string_view key = word.substr(0, equals);
   const std::string_view value = equals < word.size() ? word.substr(equals + 1) : "";
@@ -88,13 +89,15 @@ void Understand(std::string_view word, Greeting* greeting) {
     greeting->flats = Number(word, value, 1) != 0;
   } else if (key == "sizes") {
     greeting->sizes = Number(word, value, 1) != 0;
+  } else if (key == "walls") {
+    greeting->walls = Number(word, value, kMostWalls);
   } else if (key == "box") {
     greeting->box = Value(ParseBox(value));
   } else if (key == "seeds") {
     greeting->seeds = Value(ParsePoints(value));
   } else {
     throw Garbled("its first line: " + Quoted(word) +
-                  " is none of k= d= tangents= flats= sizes= box= seeds=");
+                  " is none of k= d= tangents= flats= sizes= walls= box= seeds=");
   }
 }
 

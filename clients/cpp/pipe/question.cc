@@ -1,3 +1,5 @@
+#include <vector>
+
 #include "pipe/framing.h"
 #include "pipe/numbers.h"
 
@@ -14,15 +16,18 @@ void AppendNumbers(const Eigen::Ref<const Eigen::MatrixXd>& numbers, std::string
 }
 
 std::string Binary(const Question& question) {
-  const std::uint32_t head[] = {question.bases != nullptr ? 2u : 1u,
-                                static_cast<std::uint32_t>(question.points.cols()),
-                                (question.tangents ? 1u : 0u) | (question.sizes ? 2u : 0u), 0};
+  std::vector<std::uint32_t> head = {question.bases != nullptr ? 2u : 1u,
+                                     static_cast<std::uint32_t>(question.points.cols()),
+                                     (question.tangents ? 1u : 0u) | (question.sizes ? 2u : 0u),
+                                     static_cast<std::uint32_t>(question.face.size())};
+  if (!question.face.empty()) head[0] = 3;
+  head.insert(head.end(), question.face.begin(), question.face.end());
+  const size_t head_bytes = sizeof(std::uint32_t) * head.size();
   std::string bytes;
   const Eigen::Index flat = question.bases != nullptr ? question.bases->rows() + 1 : 0;
-  bytes.reserve(sizeof head +
-                sizeof(double) *
-                    static_cast<size_t>(question.points.cols() * (question.points.rows() + flat)));
-  AppendRaw(head, sizeof head, &bytes);
+  bytes.reserve(head_bytes + sizeof(double) * static_cast<size_t>(question.points.cols() *
+                                                                  (question.points.rows() + flat)));
+  AppendRaw(head.data(), head_bytes, &bytes);
   AppendNumbers(question.points, &bytes);
   if (question.bases != nullptr) {
     AppendNumbers(*question.bases, &bytes);
@@ -40,10 +45,17 @@ void AppendWords(const Numbers& numbers, std::string* to) {
 }
 
 std::string Text(const Question& question) {
-  std::string bytes = question.bases != nullptr ? "flat " : "closest ";
+  std::string bytes = !question.face.empty()      ? "face "
+                      : question.bases != nullptr ? "flat "
+                                                  : "closest ";
   bytes += std::to_string(question.points.cols());
   bytes += question.tangents ? " 1" : " 0";
-  bytes += question.sizes ? " 1\n" : " 0\n";
+  bytes += question.sizes ? " 1" : " 0";
+  for (const int wall : question.face) {
+    bytes += ' ';
+    bytes += std::to_string(wall);
+  }
+  bytes += '\n';
   for (Eigen::Index j = 0; j < question.points.cols(); ++j) {
     AppendWords(question.points.col(j), &bytes);
     if (question.bases != nullptr) {

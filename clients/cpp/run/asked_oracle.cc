@@ -31,6 +31,8 @@ void Append(const Answer& part, Answer* all) {
   }
   join(part.points, &all->points);
   if (part.tangents.size() > 0) join(part.tangents, &all->tangents);
+  if (part.clearances.size() > 0) join(part.clearances, &all->clearances);
+  if (part.conormals.size() > 0) join(part.conormals, &all->conormals);
   const Eigen::Index sizes = all->sizes.size();
   all->sizes.conservativeResize(sizes + part.sizes.size());
   all->sizes.tail(part.sizes.size()) = part.sizes;
@@ -94,6 +96,23 @@ Eigen::VectorXd AskedOracle::LocalSize(const Eigen::MatrixXd& points) {
       .sizes;
 }
 
+Answer AskedOracle::FacePoint(const Eigen::MatrixXd& x, const Walls& face) {
+  return AskAll(x.cols(), [&](Eigen::Index first, Eigen::Index count, v1::QueryChunk* chunk) {
+    ToArray(x.middleCols(first, count), {spec_.ambient_dimension()}, chunk->mutable_points());
+    chunk->mutable_face()->Assign(face.begin(), face.end());
+    chunk->set_want_tangents(true);
+    chunk->set_want_clearances(true);
+  });
+}
+
+Eigen::MatrixXd AskedOracle::Clearances(const Eigen::MatrixXd& points) {
+  return FacePoint(points, {}).clearances;
+}
+
+Eigen::MatrixXd AskedOracle::Conormals(const Eigen::MatrixXd& points, const Walls& face) {
+  return FacePoint(points, face).conormals;
+}
+
 Answer AskedOracle::AskAll(
     Eigen::Index n, const std::function<void(Eigen::Index, Eigen::Index, v1::QueryChunk*)>& fill) {
   Answer all;
@@ -139,11 +158,21 @@ Answer AskedOracle::Read(const v1::QueryChunk& chunk, const v1::AnswerChunk& ans
   }
   if (chunk.want_sizes())
     answer.sizes = ArrayOr(answers.sizes(), {}, "the sizes").row(0).transpose();
+  if (chunk.want_clearances()) {
+    answer.clearances =
+        ArrayOr(answers.clearances(), {static_cast<std::uint32_t>(walls())}, "the clearances");
+  }
+  if (chunk.face_size() > 0) {
+    const auto on = static_cast<std::uint32_t>(chunk.face_size());
+    answer.conormals = ArrayOr(answers.conormals(), {on, d}, "the conormals");
+  }
   const auto right = [count](Eigen::Index columns) { return columns == count; };
   if (!right(answer.points.cols()) ||
       !(answer.found.empty() || right(static_cast<Eigen::Index>(answer.found.size()))) ||
       (chunk.want_tangents() && !right(answer.tangents.cols())) ||
-      (chunk.want_sizes() && !right(answer.sizes.size()))) {
+      (chunk.want_sizes() && !right(answer.sizes.size())) ||
+      (chunk.want_clearances() && !right(answer.clearances.cols())) ||
+      (chunk.face_size() > 0 && !right(answer.conormals.cols()))) {
     throw std::runtime_error("it does not answer " + std::to_string(count) + " queries");
   }
   return answer;

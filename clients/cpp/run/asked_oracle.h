@@ -2,6 +2,7 @@
 
 #include <grpcpp/support/sync_stream.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 
@@ -33,6 +34,11 @@ class AskedOracle final : public Oracle {
   // Closest points of points of M, asked for with their tangents or sizes.
   Eigen::MatrixXd TangentBasis(const Eigen::MatrixXd& points) override;
   Eigen::VectorXd LocalSize(const Eigen::MatrixXd& points) override;
+  // Servers take no more walls than these.
+  int walls() const override { return static_cast<int>(std::min(64u, spec_.walls())); }
+  Answer FacePoint(const Eigen::MatrixXd& x, const Walls& face) override;
+  Eigen::MatrixXd Clearances(const Eigen::MatrixXd& points) override;
+  Eigen::MatrixXd Conormals(const Eigen::MatrixXd& points, const Walls& face) override;
 
   // The worker failed, or is gone: there is nobody to ask.
   bool lost() const { return lost_; }

@@ -135,6 +135,7 @@ void DeltaMesh::Reset() {
   revision_ = 0;
   pending_.clear();
   coordinates_.clear();
+  boundary_.clear();
   simplex_set_ = MakeSimplexSet(k_);
 }
 
@@ -157,6 +158,8 @@ Expected<void> DeltaMesh::Add(v1::DownloadMeshResponse&& part) {
   delta.set_first_vertex(part.first_vertex());
   delta.mutable_points()->Swap(part.mutable_points());
   delta.mutable_added()->Swap(part.mutable_cells());
+  delta.mutable_boundary_vertices()->Swap(part.mutable_boundary_vertices());
+  delta.mutable_boundary_walls()->Swap(part.mutable_boundary_walls());
   if (delta.added().shape_size() > 0) parts_simplices_ += delta.added().shape(0);
   return Apply(delta);
 }
@@ -174,6 +177,7 @@ Expected<void> DeltaMesh::Apply(const v1::MeshDelta& delta) {
     return tl::unexpected(BrokenProtocol("vertices from " + std::to_string(delta.first_vertex()) +
                                          " on, out of order"));
   }
+  if (Expected<void> ok = NoteWalls(delta); !ok) return ok;
   const std::uint32_t width = static_cast<std::uint32_t>(k_) + 1;
   const Expected<Eigen::Index> removed = CountRows(delta.removed(), width);
   if (!removed) return tl::unexpected(removed.error());
@@ -188,6 +192,16 @@ Expected<void> DeltaMesh::Apply(const v1::MeshDelta& delta) {
   return {};
 }
 
+Expected<void> DeltaMesh::NoteWalls(const v1::MeshDelta& delta) {
+  bool fits = delta.boundary_vertices_size() == delta.boundary_walls_size();
+  for (int i = 0; fits && i < delta.boundary_vertices_size(); ++i) {
+    fits = delta.boundary_vertices(i) < vertices();
+    boundary_.emplace_back(delta.boundary_vertices(i), delta.boundary_walls(i));
+  }
+  if (!fits) return tl::unexpected(BrokenProtocol("walls of vertices that it never sent"));
+  return {};
+}
+
 Expected<Mesh> DeltaMesh::Take() const {
   std::optional<SimplexMatrix> simplices = simplex_set_->Sorted();
   if (!simplices) return tl::unexpected(BrokenProtocol("a simplex that was there already"));
@@ -195,6 +209,8 @@ Expected<Mesh> DeltaMesh::Take() const {
   mesh.points = Eigen::Map<const Eigen::MatrixXd>(
       coordinates_.data(), d_, static_cast<Eigen::Index>(coordinates_.size()) / d_);
   mesh.simplices = std::move(*simplices);
+  if (!boundary_.empty()) mesh.walls.assign(vertices(), 0);
+  for (const auto& [vertex, walls] : boundary_) mesh.walls[vertex] = walls;
   return mesh;
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "stellate/error.h"
@@ -59,11 +60,13 @@ class DeltaMesh {
       : k_(k), d_(d), simplex_set_(std::move(set)) {}
 
   Expected<void> Apply(const v1::MeshDelta& delta);
+  Expected<void> NoteWalls(const v1::MeshDelta& delta);
 
   int k_, d_;
   std::uint64_t revision_ = 0;
   std::vector<v1::MeshDelta> pending_;
   std::vector<double> coordinates_;  // of the vertices so far, one after another
+  std::vector<std::pair<std::uint32_t, std::uint64_t>> boundary_;  // vertices, walls as bits
   std::unique_ptr<SimplexSet> simplex_set_;
   std::uint64_t parts_simplices_ = 0;
 };

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "net/channel.h"
+#include "run/answer_chunk.h"
 #include "wire/convert.h"
 #include "wire/status.h"
 
@@ -27,7 +28,9 @@ constexpr size_t kMaxFailureBytes = 4000;  // OracleFailure.message takes 4096
 std::uint32_t MaxChunkQueries(const Oracle& oracle) {
   const size_t d = static_cast<size_t>(oracle.ambient_dimension());
   const size_t k = static_cast<size_t>(oracle.dimension());
-  return static_cast<std::uint32_t>(std::max<size_t>(1, kChunkBytes / (8 * (d + d * k + 2))));
+  const size_t walls = static_cast<size_t>(oracle.walls());
+  const size_t numbers = d + d * (k + std::min(k, walls)) + walls + 2;
+  return static_cast<std::uint32_t>(std::max<size_t>(1, kChunkBytes / (8 * numbers)));
 }
 
 std::string DescriptionOf(const std::exception_ptr& exception) {
@@ -38,14 +41,6 @@ std::string DescriptionOf(const std::exception_ptr& exception) {
   } catch (...) {
     return "an exception that is no std::exception";
   }
-}
-
-std::vector<Eigen::Index> FoundOf(const Answer& answer) {
-  std::vector<Eigen::Index> found;
-  for (Eigen::Index j = 0; j < answer.points.cols(); ++j) {
-    if (answer.IsFound(j)) found.push_back(j);
-  }
-  return found;
 }
 
 void NoteEnd(const v1::ServeOracleResponse& response, std::optional<MeshState>* state) {
@@ -152,87 +147,14 @@ Worker::Worker(v1::Stellate::StubInterface& stub, Oracle& oracle, std::string me
       max_chunk_(std::min(MaxChunkQueries(oracle), max_chunk.value_or(MaxChunkQueries(oracle)))),
       attempts_(std::move(policy)) {}
 
-// Only where there is a point to ask about; the server skips the other columns.
-void Worker::AddTangents(stellate::Answer* answer) {
-  const std::vector<Eigen::Index> found = FoundOf(*answer);
-  if (static_cast<Eigen::Index>(found.size()) == answer->points.cols()) {
-    answer->tangents = oracle_.TangentBasis(answer->points);
-    return;
-  }
-  Eigen::MatrixXd tangents = oracle_.TangentBasis(answer->points(Eigen::all, found));
-  if (tangents.cols() == static_cast<Eigen::Index>(found.size())) {
-    answer->tangents.setZero(tangents.rows(), answer->points.cols());
-    answer->tangents(Eigen::all, found) = tangents;
-  } else {
-    answer->tangents = std::move(tangents);  // of the wrong size: the server says so
-  }
-}
-
-void Worker::AddSizes(stellate::Answer* answer) {
-  const std::vector<Eigen::Index> found = FoundOf(*answer);
-  if (static_cast<Eigen::Index>(found.size()) == answer->points.cols()) {
-    answer->sizes = oracle_.LocalSize(answer->points);
-    return;
-  }
-  Eigen::VectorXd sizes = oracle_.LocalSize(answer->points(Eigen::all, found));
-  if (sizes.size() == static_cast<Eigen::Index>(found.size())) {
-    answer->sizes.setZero(answer->points.cols());
-    answer->sizes(found) = sizes;
-  } else {
-    answer->sizes = std::move(sizes);
-  }
-}
-
-// False, with error_ set, when the chunk makes no sense. Lets the oracle's exceptions through.
-bool Worker::Answer(const v1::QueryChunk& chunk, v1::AnswerChunk* answers) {
-  const std::uint32_t d = static_cast<std::uint32_t>(oracle_.ambient_dimension());
-  const std::uint32_t k = static_cast<std::uint32_t>(oracle_.dimension());
-  const auto points = FromArray(chunk.points(), {d});
-  const auto bases = FromArray(chunk.bases(), {d, k});
-  const auto radii = FromArray(chunk.radii(), {});
-  const bool flats = chunk.kind() == v1::QUERY_KIND_INTERSECT_FLAT;
-  if (!points || !bases || !radii ||
-      (flats && (bases->cols() != points->cols() || radii->cols() != points->cols())) ||
-      (!flats && chunk.kind() != v1::QUERY_KIND_CLOSEST_POINT)) {
-    error_ = BrokenProtocol("queries that make no sense");
-    return false;
-  }
-  stellate::Answer answer = flats
-                                ? oracle_.IntersectFlat(*points, *bases, radii->row(0).transpose())
-                                : oracle_.ClosestPoint(*points);
-  // Points of a wrong shape are the server's to refuse; the oracle is not asked about them.
-  const bool in_shape = answer.points.rows() == static_cast<Eigen::Index>(d) &&
-                        (answer.found.empty() ||
-                         answer.found.size() >= static_cast<std::size_t>(answer.points.cols()));
-  if (chunk.want_tangents() && in_shape && answer.tangents.size() == 0 &&
-      oracle_.has_tangent_basis()) {
-    AddTangents(&answer);
-  }
-  if (chunk.want_sizes() && in_shape && answer.sizes.size() == 0 && oracle_.has_local_size()) {
-    AddSizes(&answer);
-  }
-  answers->set_lease(chunk.lease());
-  // As the oracle has them: the server checks the shapes and names what is wrong with them.
-  ToArray(answer.points, {static_cast<std::uint32_t>(answer.points.rows())},
-          answers->mutable_points());
-  answers->set_found(answer.found.data(), answer.found.size());
-  if (answer.tangents.size() > 0) {
-    const std::uint32_t rows = static_cast<std::uint32_t>(answer.tangents.rows());
-    const std::vector<std::uint32_t> shape =
-        rows == d * k ? std::vector<std::uint32_t>{d, k} : std::vector<std::uint32_t>{rows};
-    ToArray(answer.tangents, shape, answers->mutable_tangents());
-  }
-  if (chunk.want_sizes() && answer.sizes.size() > 0) {
-    ToArray(answer.sizes.transpose(), {}, answers->mutable_sizes());
-  }
-  return true;
-}
-
-// Sets exception_, and makes the request say so, when the oracle throws. False: nothing to send.
+// Sets exception_, and makes the request say so, when the oracle throws. False, with error_ set:
+// nothing to send.
 bool Worker::AnswerOrFail(const v1::QueryChunk& chunk, v1::ServeOracleRequest* request) {
   request->Clear();
   try {
-    return Answer(chunk, request->mutable_answers());
+    if (AnswerChunk(oracle_, chunk, request->mutable_answers())) return true;
+    error_ = BrokenProtocol("queries that make no sense");
+    return false;
   } catch (...) {
     exception_ = std::current_exception();
     request->Clear();
@@ -292,15 +214,17 @@ bool Worker::Suits(const v1::Welcome& welcome) {
               ", and this oracle's manifold has " + space(k, d);
   } else {
     const struct {
-      const char* name;
+      std::string name;
       bool asked, able;
     } abilities[] = {
         {"intersect_flat", welcome.oracle().intersect_flat(), oracle_.has_intersect_flat()},
         {"tangent_basis", welcome.oracle().tangent_basis(), oracle_.has_tangent_basis()},
-        {"local_size", welcome.oracle().local_size(), oracle_.has_local_size()}};
+        {"local_size", welcome.oracle().local_size(), oracle_.has_local_size()},
+        {std::to_string(welcome.walls()) + " walls",
+         welcome.walls() != static_cast<std::uint32_t>(oracle_.walls()), false}};
     std::string missing;
     for (const auto& [name, asked, able] : abilities) {
-      if (asked && !able) missing += (missing.empty() ? "" : " and ") + std::string(name);
+      if (asked && !able) missing += (missing.empty() ? "" : " and ") + name;
     }
     if (!missing.empty()) {
       problem = "the mesh was declared with " + missing + ", which this oracle lacks";

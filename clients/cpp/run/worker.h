@@ -34,10 +34,7 @@ class Worker {
   grpc::Status Serve();
   bool Suits(const v1::Welcome& welcome);
   std::optional<MeshState> HowItEnded();
-  bool Answer(const v1::QueryChunk& chunk, v1::AnswerChunk* answers);
   bool AnswerOrFail(const v1::QueryChunk& chunk, v1::ServeOracleRequest* request);
-  void AddTangents(stellate::Answer* answer);
-  void AddSizes(stellate::Answer* answer);
 
   v1::Stellate::StubInterface& stub_;
   Oracle& oracle_;

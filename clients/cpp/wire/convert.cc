@@ -80,6 +80,12 @@ Expected<void> CheckServable(const Oracle& oracle, std::optional<std::uint32_t> 
     return Invalid("ambient_dimension is " + std::to_string(oracle.ambient_dimension()) +
                    " but must be at least 2");
   }
+  if (oracle.walls() < 0) {
+    return Invalid("walls is " + std::to_string(oracle.walls()) + " but must be 0 or more");
+  }
+  if (oracle.walls() > 0 && !oracle.has_tangent_basis()) {
+    return Invalid("the oracle has walls, and lacks tangent bases");
+  }
   if (max_chunk == 0u) return Invalid("max_chunk is 0 but must be 1 or more");
   return {};
 }
@@ -99,6 +105,8 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   spec.mutable_oracle()->set_intersect_flat(oracle.has_intersect_flat());
   spec.mutable_oracle()->set_tangent_basis(oracle.has_tangent_basis());
   spec.mutable_oracle()->set_local_size(oracle.has_local_size());
+  spec.mutable_oracle()->set_conormals(oracle.walls() > 0);
+  spec.set_walls(static_cast<std::uint32_t>(oracle.walls()));
   if (const auto box = oracle.bounding_box()) {
     // Shape [d]: a corner is one point, not a list of them.
     for (const auto& [corner, array] :

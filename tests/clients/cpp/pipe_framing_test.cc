@@ -244,5 +244,37 @@ TEST(FramingGreeting, WrongOnesAreNamed) {
   }
 }
 
+// A face of the second of two walls, in the plane.
+TEST(Walls, OfABatchAndItsAnswer) {
+  const Eigen::MatrixXd point = Eigen::Vector2d(0.5, 2);
+  Question question{1, point};
+  question.walls = 2;
+  question.face = {1};
+  EXPECT_EQ(ToBytes(question, true), "face 1 0 0 1\n0.5 2\n");
+  EXPECT_EQ(ToBytes(question, false), Raw(std::uint32_t{3}, std::uint32_t{1}, std::uint32_t{0},
+                                          std::uint32_t{1}, std::uint32_t{1}) +
+                                          Raw(point));
+  const Eigen::MatrixXd clearances = Eigen::Vector2d(3, 4), conormal = Eigen::Vector2d(0, -1);
+  const std::string head = Raw(std::uint32_t{1}, std::uint32_t{16});
+  for (const bool text : {false, true}) {
+    const Answer answer =
+        Read(question, text,
+             text ? "0.5 2 3 4 0 -1\n" : head + Raw(point) + Raw(clearances) + Raw(conormal));
+    EXPECT_EQ(answer.points, point);
+    EXPECT_EQ(answer.clearances, clearances);
+    EXPECT_EQ(answer.conormals, conormal);
+  }
+  EXPECT_THAT(ErrorOf([&] { Read(question, true, "0.5 2\n"); }), HasSubstr("4 of walls"));
+  EXPECT_THAT(ErrorOf([&] { Read(question, true, "0.5 2 3 4 0 nan\n"); }),
+              HasSubstr("a conormal that is not finite"));
+  EXPECT_THAT(
+      ErrorOf([&] { Read(question, false, Raw(std::uint32_t{1}, std::uint32_t{0}) + Raw(point)); }),
+      HasSubstr("has no walls"));
+  EXPECT_EQ(Read(question, true, "-\n").clearances, Eigen::MatrixXd::Zero(2, 1));
+  EXPECT_EQ(ParseGreeting("stellate-oracle 1 text k=2 d=2 walls=64").walls, 64);
+  EXPECT_THAT(ErrorOf([] { ParseGreeting("stellate-oracle 1 text walls=65"); }),
+              HasSubstr("up to 64"));
+}
+
 }  // namespace
 }  // namespace stellate::pipe

@@ -1,4 +1,10 @@
-"""Files of meshes with boundary: what finite elements read. Groups are read back by meshio."""
+"""Files of meshes with boundary: what finite elements read, from both languages, and that both agree
+on the mesh. Groups are read back by meshio."""
+
+import json
+import os
+import pathlib
+import subprocess
 
 import meshio
 import numpy as np
@@ -6,14 +12,93 @@ import pytest
 import stellate
 from stellate import manifolds, oracles
 
+PIPE = pathlib.Path(__file__).resolve().parents[3] / "clients" / "pipe"
+ROOM = ([-1.3] * 3, [1.3] * 3)
+
+
+def cylinder():
+    return oracles.Solid(
+        [
+            oracles.HalfSpace([0, 0, 1], -1),
+            oracles.HalfSpace([0, 0, -1], -1),
+            lambda x: 1 - x[:, 0] ** 2 - x[:, 1] ** 2,
+        ],
+        ROOM,
+    )
+
+
+# As clients/cpp/oracles/ready/domains.cc makes them, with what they come to.
+DOMAINS = {
+    "hemisphere": (
+        lambda: oracles.Clipped(manifolds.Sphere(2), [oracles.HalfSpace([0, 0, 1])]),
+        0.3,
+    ),
+    "half-torus": (
+        lambda: oracles.Clipped(manifolds.Torus(), [oracles.HalfSpace([1, 0, 0])]),
+        0.16,
+    ),
+    "cube": (lambda: oracles.Solid([], ROOM, box=([-1] * 3, [1] * 3)), 0.5),
+    "ball": (lambda: oracles.Solid([], ROOM, ball=([0] * 3, 1)), 0.35),
+    "cylinder": (cylinder, 0.3),
+}
+
+
+def by_command_line(server, what, epsilon, *outputs):
+    """The report of the C++ command line."""
+    program = pathlib.Path(os.environ["STELLATED"]).parent / "stellate"
+    files = [argument for path in outputs for argument in ("-o", str(path))]
+    command = [program, "mesh", *what, "-e", str(epsilon), "--json", "--server", server.address]
+    done = subprocess.run([*command, *files], check=True, capture_output=True, text=True)
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("name", DOMAINS)
+def test_both_languages_know_the_same_domains(name, server, tmp_path):
+    make, epsilon = DOMAINS[name]
+    ours = stellate.mesh(make(), epsilon, server=server)
+    theirs = by_command_line(server, [name], epsilon, tmp_path / "a.msh")
+    assert theirs["certificate"]["certified"] and ours.certified
+    for key in ("euler_characteristic", "components", "orientable"):
+        assert theirs["certificate"][key] == getattr(ours.report.certificate, key)
+    ours.save(tmp_path / "b.msh")
+    a, b = (meshio.read(tmp_path / file, "gmsh") for file in ("a.msh", "b.msh"))
+    assert {k: v.tolist() for k, v in a.field_data.items()} == {
+        k: v.tolist() for k, v in b.field_data.items()
+    }
+    if name == "cube":  # where no rounding decides
+        assert np.allclose(a.points, b.points, rtol=0, atol=1e-12)
+        for kind, rows in a.cells_dict.items():
+            assert np.array_equal(np.sort(rows, axis=1), np.sort(b.cells_dict[kind], axis=1))
+
+
+@pytest.mark.parametrize(
+    "command",
+    [f"perl {PIPE}/half_torus.pl", f"mawk -W interactive -f {PIPE}/half_torus.awk"],
+)
+def test_both_languages_make_the_same_mesh_of_the_same_answers(command, server, tmp_path):
+    with stellate.CommandOracle(command) as oracle:
+        ours = stellate.mesh(oracle, 0.16, server=server)
+    by_command_line(server, ["--oracle-command", command], 0.16, tmp_path / "a.vtu")
+    ours.save(tmp_path / "b.vtu")
+    a, b = (meshio.read(tmp_path / file) for file in ("a.vtu", "b.vtu"))
+    assert np.array_equal(a.points, b.points)
+    assert [block.type for block in a.cells] == [block.type for block in b.cells]
+    for mine, other in zip(a.cells, b.cells):
+        assert np.array_equal(mine.data, other.data)
+    for key in ("walls", "group"):
+        assert all(np.array_equal(x, y) for x, y in zip(a.cell_data[key], b.cell_data[key]))
+    assert np.array_equal(a.point_data["walls"], b.point_data["walls"])
+    assert [face.walls for face in ours.boundary] == [(0,)] and ours.certified
+
 
 @pytest.fixture(scope="module")
 def cubes(server, tmp_path_factory):
-    """A cube in files, and the mesh."""
+    """The same cube in files of both languages, and the mesh."""
     folder = tmp_path_factory.mktemp("cubes")
-    mesh = stellate.mesh(oracles.Solid(box=([-1] * 3, [1] * 3)), 0.5, server=server)
+    mesh = stellate.mesh(DOMAINS["cube"][0](), 0.5, server=server)
     for ending in ("msh", "vtu", "obj", "vtk"):
         mesh.save(folder / f"python.{ending}")
+    by_command_line(server, ["cube"], 0.5, *(folder / f"cpp.{e}" for e in ("msh", "vtu", "obj")))
     return mesh, folder
 
 
@@ -25,7 +110,7 @@ def group(file, name):
     return file.cells_dict[kind][tags == tag]
 
 
-@pytest.mark.parametrize("language", ["python"])
+@pytest.mark.parametrize("language", ["python", "cpp"])
 def test_msh_has_a_physical_group_for_each_face(cubes, language):
     mesh, folder = cubes
     file = meshio.read(folder / f"{language}.msh", "gmsh")
@@ -51,7 +136,7 @@ def test_msh_has_a_physical_group_for_each_face(cubes, language):
         assert abs(np.linalg.norm(b - a, axis=1).sum() - 2) < 1e-9
 
 
-@pytest.mark.parametrize("file", ["python.vtu", "python.vtk"])
+@pytest.mark.parametrize("file", ["python.vtu", "cpp.vtu", "python.vtk"])
 def test_vtu_says_of_each_cell_on_which_walls_it_is(cubes, file):
     mesh, folder = cubes
     again = meshio.read(folder / file)
@@ -68,7 +153,7 @@ def test_vtu_says_of_each_cell_on_which_walls_it_is(cubes, file):
     assert counts["vertex"] == 8
 
 
-@pytest.mark.parametrize("language", ["python"])
+@pytest.mark.parametrize("language", ["python", "cpp"])
 def test_obj_is_the_boundary_of_a_solid_in_groups(cubes, language):
     mesh, folder = cubes
     groups, name = {}, ""
@@ -100,3 +185,5 @@ def test_surfaces_of_the_plane_are_saved_as_any(server, tmp_path):
     a, b, c = np.moveaxis(np.asarray(again.points, float)[again.cells_dict["triangle"]], 1, 0)
     areas = np.cross(b - a, c - a)[:, 2] / 2
     assert areas.min() > 0 and abs(areas.sum() - 1) < 1e-6
+    by_command_line(server, ["cube:2"], 0.3, tmp_path / "b.stl")
+    assert meshio.read(tmp_path / "b.stl").cells_dict["triangle"].size > 0

@@ -3,19 +3,37 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "stellate/error.h"
+#include "stellate/oracle.h"
 #include "stellate/report.h"
 
 namespace stellate {
 
 using SimplexMatrix = Eigen::Matrix<std::uint32_t, Eigen::Dynamic, Eigen::Dynamic>;
 
+// The part of a mesh that lies on some walls.
+struct Face {
+  Walls walls;
+  SimplexMatrix simplices;  // (j+1) x m for a face of dimension j, in order as a mesh's
+};
+
 // A simplicial k-complex in R^d.
 struct Mesh {
   Eigen::MatrixXd points;   // d x n, a vertex a column
   SimplexMatrix simplices;  // (k+1) x m; ascending ids in each column, columns in ascending order
   Report report;
+  // Of a manifold with boundary, n: the walls that each point lies on, wall i as bit i; else empty.
+  std::vector<std::uint64_t> walls = {};
+
+  // The faces of a manifold with boundary, by ascending walls: the boundary's parts, one for each
+  // wall, of dimension k - 1; curves where two walls meet or more; points where k walls meet; and
+  // those of any dimension below k.
+  std::vector<Face> boundary() const { return faces(dimension() - 1); }
+  std::vector<Face> edges() const;
+  std::vector<Face> corners() const;
+  std::vector<Face> faces(int dimension) const;
 
   int dimension() const { return static_cast<int>(simplices.rows()) - 1; }
   int ambient_dimension() const { return static_cast<int>(points.rows()); }
@@ -24,11 +42,16 @@ struct Mesh {
   //   .txt  any k and d: "k d nv ns", then nv lines of d coordinates (%.17g), then ns lines of k+1
   //         ids from zero, in the order of `simplices`
   //   .off  curves and surfaces; nOFF with all coordinates unless d = 3
-  //   .obj  .ply  curves and surfaces, d <= 3, text
+  //   .obj  curves and surfaces, d <= 3, and the boundary of a solid, text
+  //   .ply  curves and surfaces, d <= 3, text
   //   .stl  surfaces of space, binary, in single precision as the format has it
   //   .msh  k <= 3, d <= 3: Gmsh's, version 2.2, text
   //   .vtu  k <= 3; beyond d = 3 the first three coordinates, and all as point data "coordinates";
   //         field data "epsilon", "certified" (0 or 1), "verdict" and "version" (UTF-8 bytes)
+  // Of a mesh with boundary .msh, .vtu and .obj have its faces too, of all dimensions, after its
+  // simplices: in .msh as physical groups "inside", "wall_0", ..., "walls_0_1", ...; in .obj as
+  // groups of the same names; in .vtu with cell data "walls", the walls as bits (0 inside), and
+  // "group", .msh's number of it, and point data "walls".
   // All but .txt are oriented as by OrientedSimplices(mesh). The file is replaced when the new one
   // is whole. kFileFailed when the format cannot hold the mesh or the file cannot be written.
   Expected<void> Save(const std::string& path) const;
@@ -41,7 +64,8 @@ Expected<void> CheckSave(const std::string& path, int dimension, int ambient_dim
 // The simplices with the ids in each reordered so that neighbours agree on their orientation; as
 // they are when the complex is not an orientable pseudomanifold.
 SimplexMatrix OrientedSimplices(const SimplexMatrix& simplices);
-// The same, and the normals of a hypersurface (k = d - 1) outwards, component by component.
+// The same, and the normals of a hypersurface (k = d - 1) outwards, component by component;
+// simplices that fill space (k = d) with positive volumes.
 SimplexMatrix OrientedSimplices(const Mesh& mesh);
 
 }  // namespace stellate

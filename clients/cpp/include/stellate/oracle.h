@@ -8,6 +8,9 @@
 
 namespace stellate {
 
+// Numbers of walls, ascending. A face of a manifold with boundary is known by those it lies on.
+using Walls = std::vector<int>;
+
 // Axis-aligned box of R^d, lower < upper in each coordinate.
 struct BoundingBox {
   Eigen::VectorXd lower, upper;  // d each
@@ -19,11 +22,13 @@ struct Answer {
   std::vector<std::uint8_t> found;  // n, 1 or 0; empty: all found
   Eigen::MatrixXd tangents;         // (d k) x n laid out as a basis (see Oracle), or empty
   Eigen::VectorXd sizes;            // n, of the points, or empty
+  // Of walls, as Oracle::Clearances and Conormals have them, or empty.
+  Eigen::MatrixXd clearances = {}, conormals = {};
 
   bool IsFound(Eigen::Index j) const { return found.empty() || found[static_cast<size_t>(j)] != 0; }
 };
 
-// A compact smooth k-submanifold M of R^d without boundary, known by what it answers. Derive from
+// A compact smooth k-submanifold M of R^d, known by what it answers. Derive from
 // this to mesh a manifold of your own: dimension, ambient_dimension, ClosestPoint, and one of
 // bounding_box and seeds are all it takes. PointwiseOracle and ImplicitOracle do more of the work.
 //
@@ -37,7 +42,7 @@ class Oracle {
   virtual ~Oracle() = default;
 
   virtual int dimension() const = 0;          // k
-  virtual int ambient_dimension() const = 0;  // d > k
+  virtual int ambient_dimension() const = 0;  // d > k, or d = k with walls
 
   // A point of M nearest to each column of x (d x n).
   virtual Answer ClosestPoint(const Eigen::MatrixXd& x) = 0;
@@ -65,6 +70,25 @@ class Oracle {
   virtual bool has_local_size() const { return false; }
   virtual Eigen::VectorXd LocalSize(const Eigen::MatrixXd& /*points*/) {
     throw std::logic_error("this oracle has no local sizes");
+  }
+
+  // How many walls bound M. It has a boundary then: M = { x in M^ : g_i(x) >= 0, i < walls() }, and
+  // the methods above are those of M^, whose dimension may be d. It takes tangent bases, and the
+  // three below, which oracles::Clipped has.
+  virtual int walls() const { return 0; }
+  // A point nearest to each column of x (d x n) of those of M^ where the walls of the face are
+  // zero.
+  virtual Answer FacePoint(const Eigen::MatrixXd& /*x*/, const Walls& /*face*/) {
+    throw std::logic_error("this oracle has no walls");
+  }
+  // The walls' values g_i at points (d x n), walls() x n, of which the sign counts.
+  virtual Eigen::MatrixXd Clearances(const Eigen::MatrixXd& /*points*/) {
+    throw std::logic_error("this oracle has no walls");
+  }
+  // At points of a face (d x n), for each of its walls the outward unit normal within the tangent
+  // space, which g_i falls along: (f d) x n for f walls, entry i*d + j is coordinate j of wall i's.
+  virtual Eigen::MatrixXd Conormals(const Eigen::MatrixXd& /*points*/, const Walls& /*face*/) {
+    throw std::logic_error("this oracle has no walls");
   }
 
   // Where to look for M: a box, or points near M, one at least on each component.

@@ -5,3 +5,4 @@
 #include "stellate/oracles/equations.h"
 #include "stellate/oracles/parametrized.h"
 #include "stellate/oracles/points.h"
+#include "stellate/oracles/walls.h"

@@ -14,6 +14,11 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 
 [[noreturn]] inline void Refuse(const std::string& why) { throw std::invalid_argument(why); }
 
+// What is made of a manifold with boundary would have none.
+inline void RefuseWalls(const Oracle& oracle, const std::string& made) {
+  if (oracle.walls() > 0) Refuse(made + " is made of manifolds without boundary: clip it instead");
+}
+
 // To six digits.
 std::string Short(double number);
 

@@ -1,19 +1,14 @@
-#include <Eigen/Cholesky>
 #include <Eigen/QR>
-#include <limits>
 #include <random>
 
 #include "oracles/ready/common.h"
+#include "oracles/ready/level_solver.h"
 #include "stellate/oracles/combined.h"
 
 namespace stellate::oracles {
 namespace {
 
-constexpr int kStarts = 64, kMaxSteps = 200;
-constexpr double kShortestStep = 1e-10;  // a step, in shares of where M is
-constexpr double kLongestStep = 0.1;     // of one step, likewise
-constexpr double kLeastDamping = 1e-3;   // before giving up
-constexpr double kStillShrinking = 0.9;  // what a step may be of the last
+constexpr int kStarts = 64;
 
 // Points to look for M from.
 Eigen::MatrixXd Starts(const Oracle& oracle) {
@@ -36,6 +31,7 @@ Eigen::MatrixXd Starts(const Oracle& oracle) {
 int DimensionOf(Oracle* oracle, const LevelSet::Function& f) {
   if (oracle == nullptr) Refuse("a level set needs an oracle");
   if (!oracle->has_tangent_basis()) Refuse("a level set on a manifold needs its tangent bases");
+  RefuseWalls(*oracle, "a level set");
   if (!f) Refuse("a level set needs a function f");
   const Answer near = oracle->ClosestPoint(Starts(*oracle));
   for (Eigen::Index j = 0; j < near.points.cols(); ++j) {
@@ -75,40 +71,16 @@ Eigen::MatrixXd LevelSet::J(const Eigen::VectorXd& x) const {
   return jacobian_ ? jacobian_(x) : Differences(f_, x, scale_);
 }
 
-bool LevelSet::OntoBase(const Eigen::VectorXd& x, Eigen::VectorXd& y) const {
-  const Answer answer = base_->ClosestPoint(x);
-  y = answer.points.col(0);
-  return answer.IsFound(0);
-}
-
 Eigen::MatrixXd LevelSet::BaseTangent(const Eigen::VectorXd& y) const {
   const Eigen::MatrixXd basis = base_->TangentBasis(y);
   return Eigen::Map<const RowMajor>(basis.data(), ambient_dimension(), base_->dimension());
 }
 
 bool LevelSet::Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const {
-  if (!OntoBase(x, y)) return false;
-  double damping = 1, last = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < kMaxSteps; ++i) {
-    const Eigen::MatrixXd basis = BaseTangent(y);
-    const Eigen::MatrixXd slopes = J(y) * basis;  // m x k
-    const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(slopes);
-    if (solver.rank() < slopes.rows()) return false;
-    // In M's tangent space: the shortest way to f = 0, and what of the wish does not change f.
-    const Eigen::VectorXd wish = basis.transpose() * (x - y);
-    const Eigen::VectorXd down = -solver.solve(f_(y));
-    const Eigen::VectorXd along = wish - solver.solve(slopes * wish);
-    const double length = down.norm() + along.norm();
-    // Longer than the last: the set bends so that the step went too far.
-    if (length > kStillShrinking * last) damping *= 0.5;
-    last = length;
-    if (!std::isfinite(length) || damping <= kLeastDamping) return false;
-    Eigen::VectorXd step = down + damping * along;
-    step *= std::min(1.0, kLongestStep * scale_ / std::max(step.norm(), 1e-300));
-    if (!OntoBase(y + basis * step, y)) return false;
-    if (length <= kShortestStep * scale_) return true;
-  }
-  return false;
+  const Level level{f_, [this](const Eigen::VectorXd& at) { return J(at); }, scale_};
+  const Answer answer = OntoLevel(*base_, level, x);
+  y = answer.points.col(0);
+  return answer.IsFound(0);
 }
 
 // The directions of M along which f does not change.

@@ -24,6 +24,7 @@ Product::Product(std::vector<std::shared_ptr<Oracle>> factors) : factors_(std::m
   }
   for (const auto& factor : factors_) {
     if (factor == nullptr) Refuse("a factor of a product is null");
+    RefuseWalls(*factor, "a product");
     dimension_ += factor->dimension();
     ambient_dimension_ += factor->ambient_dimension();
   }

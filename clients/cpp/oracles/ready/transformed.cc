@@ -6,6 +6,7 @@ namespace stellate::oracles {
 Transformed::Transformed(std::shared_ptr<Oracle> oracle, Similarity similarity)
     : inner_(std::move(oracle)), map_(std::move(similarity)) {
   if (inner_ == nullptr) Refuse("Transformed needs an oracle");
+  RefuseWalls(*inner_, "Transformed");
   const Eigen::Index d = inner_->ambient_dimension();
   Eigen::MatrixXd& turn = map_.rotation;
   if (turn.size() == 0) turn.setIdentity(d, d);

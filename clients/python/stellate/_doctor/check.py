@@ -14,6 +14,7 @@ from .._shared import table
 from ..errors import InvalidArgument, OracleError
 from .findings import CheckReport, Finding
 from .probe import Probe, Stop, norms
+from .walls import WallProbe
 
 _K: Mapping[str, Any] = table("doctor.toml")
 _ORDER = ("error", "warning", "note")
@@ -23,7 +24,7 @@ def check(oracle: Any, epsilon: float | None = None, *, seed: int = 1) -> CheckR
     """Probes an oracle: is it what stellate.Oracle says an oracle is?
 
     Shapes, finiteness and determinism; closest points that are closest, on M and met at right
-    angles; the dimension; tangent bases; intersections with flats; smoothness; the reach and
+    angles; the dimension; tangent bases; walls, where there are any; intersections with flats; smoothness; the reach and
     whether `epsilon` suits it; the components seen; speed.
 
     Args:
@@ -49,6 +50,7 @@ class _Examination:
         self._epsilon, self._seed = epsilon, seed
         self._findings: dict[str, Finding] = {}
         self._probe: Probe | None = None
+        self._walls: WallProbe | None = None
         self._reach: float | None = None
         self._pieces: int | None = None
         self._rates: dict[int, float] = {}
@@ -66,6 +68,8 @@ class _Examination:
         probe.find_points(self.add)
         for line in _K["laws"]:
             name, *passed_over = line.split()  # "unless" and codes
+            if probe.fills_space and name in _K["of_normals"]:
+                continue
             if not any(code in self._findings for code in passed_over):
                 getattr(self, f"_{name}")(probe)
 
@@ -219,25 +223,33 @@ class _Examination:
             self.add(Finding.of("TANGENT_WRONG", query=probe.some[row], degrees=turned[row]))
         probe.trusts_given = row is None and "TANGENT_NOT_ORTHONORMAL" not in self._findings
 
+    def _walls_are_right(self, probe: Probe) -> None:
+        if probe.walls:
+            self._walls = WallProbe(probe, self.add)
+            self._walls.examine()
+
     def _reach_is_estimated(self, probe: Probe) -> None:
         p, t = probe.some, probe.moved_tangents
         difference = probe.points[None] - p[:, None]
-        self._reach = probe.reach_from(difference, t)
-        step = _K["reach_step"] * min(self._reach, probe.size)
+        reach = probe.reach_from(difference, t)
+        step = _K["reach_step"] * min(reach, probe.size)
         for a in range(probe.dimension):
             q, found = probe.closest(p + step * t[:, :, a])
             if found.any():
-                self._reach = min(self._reach, probe.reach_from((q - p)[found][:, None], t[found]))
-        advised = _K["safe_ratio"] * self._reach
-        self.add(Finding.of("REACH", reach=self._reach, advised=advised))
+                reach = min(reach, probe.reach_from((q - p)[found][:, None], t[found]))
+        if self._walls is not None:
+            reach = min(reach, self._walls.reach(), _K["flat_reach"] * probe.size)
+        self._reach = reach
+        advised = _K["safe_ratio"] * reach
+        self.add(Finding.of("REACH", reach=reach, advised=advised))
         if self._epsilon is not None and self._epsilon > advised:
-            ratio = self._epsilon / self._reach
+            ratio = self._epsilon / reach
             self.add(
                 Finding.of(
                     "COARSE_EPSILON",
                     epsilon=self._epsilon,
                     ratio=ratio,
-                    reach=self._reach,
+                    reach=reach,
                     advised=advised,
                 )
             )

@@ -44,6 +44,8 @@ class Probe:
         self.has_tangent_basis = checked.has_tangent_basis
         self.has_intersect_flat = checked.has_intersect_flat
         self.has_local_size = checked.has_local_size
+        self.walls = checked.walls
+        self.fills_space = self.dimension == self.ambient_dimension
         self.random = np.random.default_rng(seed)
         self.queries = 0
         self.starts = self.points = self.some = np.empty((0, self.ambient_dimension))
@@ -66,6 +68,19 @@ class Probe:
         everywhere = np.ones(len(p), dtype=bool)
         return self._ask("local_size", self._oracle.sizes, p, everywhere)
 
+    def face(self, x: np.ndarray, face: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+        return self._ask("face_point", lambda at: self._oracle.face_points(at, face), x)
+
+    def clearances(self, p: np.ndarray) -> np.ndarray:
+        everywhere = np.ones(len(p), dtype=bool)
+        return self._ask("clearances", self._oracle.clearances, p, everywhere)
+
+    def conormals(self, p: np.ndarray, face: tuple[int, ...]) -> np.ndarray:
+        everywhere = np.ones(len(p), dtype=bool)
+        return self._ask(
+            "conormals", lambda a, f: self._oracle.conormals(a, f, face), p, everywhere
+        )
+
     def _ask(self, method: str, ask: Callable[..., Any], *arrays: np.ndarray) -> Any:
         self.queries += len(arrays[0])
         arguments = [np.array(array) for array in arrays]  # whatever is done to them
@@ -82,7 +97,7 @@ class Probe:
 
     def find_points(self, add: Callable[[Finding], None]) -> None:
         k, d = self.dimension, self.ambient_dimension
-        if not 1 <= k < d:
+        if not (1 <= k < d or (k == d and self.walls)):
             raise Stop(Finding.of("BAD_DIMENSIONS", k=k, d=d))
         starts = self._starting_points()
         answers, found = self.closest(starts)
@@ -96,7 +111,7 @@ class Probe:
         self.starts, self.points = starts[found], answers[found]
         self.size = float(norms(np.ptp(self.points, axis=0)))
         box = self._oracle.bounding_box
-        if box is not None:
+        if box is not None and not self.walls:
             slack = _K["box_slack"] * norms(box[1] - box[0])
             outside = ((self.points < box[0] - slack) | (self.points > box[1] + slack)).any(axis=1)
             if outside.any():
@@ -125,6 +140,10 @@ class Probe:
     def _random_units(self, count: int) -> np.ndarray:
         v = self.random.standard_normal((count, self.ambient_dimension))
         return v / norms(v)[:, None]
+
+    def bases(self, p: np.ndarray) -> np.ndarray:
+        """The oracle's own bases, which one with walls has."""
+        return self._given_at(p)
 
     def find_tangents(self) -> None:
         self.some = self.points[:: max(1, len(self.points) // _K["some"])][: _K["some"]]

@@ -91,7 +91,6 @@ class LevelSet final : public PointwiseOracle {
 
  private:
   Eigen::MatrixXd J(const Eigen::VectorXd& x) const;
-  bool OntoBase(const Eigen::VectorXd& x, Eigen::VectorXd& y) const;
   Eigen::MatrixXd BaseTangent(const Eigen::VectorXd& y) const;
 
   std::shared_ptr<Oracle> base_;

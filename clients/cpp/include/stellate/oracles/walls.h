@@ -1,0 +1,84 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stellate/catalogue.h"
+#include "stellate/oracle.h"
+
+// Manifolds with boundary: what walls leave of another manifold, and domains of space. All are as
+// safe to call from several threads as what they are made of. Constructors throw
+// std::invalid_argument.
+namespace stellate::oracles {
+
+// {g >= 0}, g smooth near where it is zero; what counts elsewhere is its sign.
+struct Wall {
+  std::function<double(const Eigen::VectorXd& x)> g;                  // d -> 1
+  std::function<Eigen::VectorXd(const Eigen::VectorXd& x)> gradient;  // d -> d; empty: differences
+};
+
+// {x : normal . x >= offset}.
+Wall HalfSpace(Eigen::VectorXd normal, double offset = 0);
+// The sides of a box, lower ones first; an infinite side is none.
+std::vector<Wall> Box(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper);
+// The inside of a ball.
+Wall Ball(Eigen::VectorXd centre, double radius);
+
+// {x in M : g(x) >= 0 for all walls g}: a manifold with boundary, edges and corners.
+//
+// Where several walls meet on M they have to cross at an angle: tangential walls are refused.
+class Clipped : public Oracle {
+ public:
+  // Of M, with tangent bases; 1 to 64 walls. Those of an oracle that is Clipped itself come first.
+  // `seeds` (d x s) are points near what is left, where M's box or seeds are not to be gone by.
+  Clipped(std::shared_ptr<Oracle> oracle, std::vector<Wall> walls, Eigen::MatrixXd seeds = {});
+
+  int dimension() const override { return base_->dimension(); }
+  int ambient_dimension() const override { return base_->ambient_dimension(); }
+  int walls() const override { return static_cast<int>(walls_.size()); }
+  // Of M, whatever the walls say.
+  Answer ClosestPoint(const Eigen::MatrixXd& x) override { return base_->ClosestPoint(x); }
+  bool has_intersect_flat() const override;
+  Answer IntersectFlat(const Eigen::MatrixXd& centers, const Eigen::MatrixXd& bases,
+                       const Eigen::VectorXd& radii) override {
+    return base_->IntersectFlat(centers, bases, radii);
+  }
+  bool has_tangent_basis() const override { return true; }
+  Eigen::MatrixXd TangentBasis(const Eigen::MatrixXd& points) override {
+    return base_->TangentBasis(points);
+  }
+  bool has_local_size() const override { return base_->has_local_size(); }
+  Eigen::VectorXd LocalSize(const Eigen::MatrixXd& points) override {
+    return base_->LocalSize(points);
+  }
+  Answer FacePoint(const Eigen::MatrixXd& x, const Walls& face) override;
+  Eigen::MatrixXd Clearances(const Eigen::MatrixXd& points) override;
+  Eigen::MatrixXd Conormals(const Eigen::MatrixXd& points, const Walls& face) override;
+  std::optional<BoundingBox> bounding_box() const override { return base_->bounding_box(); }
+  Eigen::MatrixXd seeds() const override { return seeds_; }
+
+ private:
+  Eigen::VectorXd Slope(int wall, const Eigen::VectorXd& x) const;
+
+  std::shared_ptr<Oracle> base_;
+  std::vector<Wall> walls_;
+  Eigen::MatrixXd seeds_;
+  double scale_ = 1;  // of where M is: the unit of lengths
+};
+
+// {x in R^d : g(x) >= 0 for all walls g}, as a manifold of dimension d with boundary.
+class Solid final : public Clipped {
+ public:
+  Solid(std::vector<Wall> walls, BoundingBox around, Eigen::MatrixXd seeds = {});
+};
+
+// Makes "name:parameter:...", a manifold with boundary that ListDomains names. On failure returns
+// null and says why in `error`, which is empty if there is none of that name.
+std::unique_ptr<Oracle> MakeDomain(const std::string& spec, std::string* error);
+const std::vector<CatalogueEntry>& ListDomains();
+
+}  // namespace stellate::oracles

@@ -1,0 +1,120 @@
+// The faces of a mesh with boundary: of its boundary, edges, corners.
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <map>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "stellate/mesh.h"
+
+namespace stellate {
+namespace {
+
+using Eigen::Index;
+using WallBits = std::uint64_t;
+
+// All columns with one entry left out.
+SimplexMatrix Subsets(const SimplexMatrix& simplices) {
+  const Index width = simplices.rows(), count = simplices.cols();
+  SimplexMatrix subsets(width - 1, width * count);
+  for (Index out = 0; out < width; ++out) {
+    subsets.middleCols(out * count, count).topRows(out) = simplices.topRows(out);
+    subsets.middleCols(out * count, count).bottomRows(width - 1 - out) =
+        simplices.bottomRows(width - 1 - out);
+  }
+  return subsets;
+}
+
+bool AreEqual(const SimplexMatrix& simplices, Index a, Index b) {
+  return (simplices.col(a).array() == simplices.col(b).array()).all();
+}
+
+// The numbers of the columns in lexicographic order.
+std::vector<Index> Sorted(const SimplexMatrix& simplices, std::vector<Index> columns) {
+  std::sort(columns.begin(), columns.end(), [&](Index a, Index b) {
+    const auto x = simplices.col(a), y = simplices.col(b);
+    return std::lexicographical_compare(x.begin(), x.end(), y.begin(), y.end());
+  });
+  return columns;
+}
+
+std::vector<Index> AllOf(const SimplexMatrix& simplices) {
+  std::vector<Index> all(static_cast<size_t>(simplices.cols()));
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
+// The columns that are there once, in lexicographic order.
+SimplexMatrix ThoseOnce(const SimplexMatrix& simplices) {
+  const std::vector<Index> order = Sorted(simplices, AllOf(simplices));
+  std::vector<Index> once;
+  for (size_t i = 0; i < order.size();) {
+    size_t end = i + 1;
+    while (end < order.size() && AreEqual(simplices, order[i], order[end])) ++end;
+    if (end == i + 1) once.push_back(order[i]);
+    i = end;
+  }
+  return simplices(Eigen::all, once);
+}
+
+WallBits InCommon(const std::vector<WallBits>& walls, const SimplexMatrix& simplices, Index j) {
+  WallBits bits = ~WallBits{0};
+  for (const std::uint32_t vertex : simplices.col(j)) bits &= walls[vertex];
+  return bits;
+}
+
+// Of these faces' own faces those that lie on more walls than a face that has them, each once.
+SimplexMatrix Ridges(const SimplexMatrix& rows, const std::vector<WallBits>& walls) {
+  const SimplexMatrix subsets = Subsets(rows);
+  std::vector<Index> inner;
+  for (Index j = 0; j < subsets.cols(); ++j) {
+    if (InCommon(walls, subsets, j) != InCommon(walls, rows, j % rows.cols())) inner.push_back(j);
+  }
+  inner = Sorted(subsets, std::move(inner));
+  const auto same = [&](Index a, Index b) { return AreEqual(subsets, a, b); };
+  inner.erase(std::unique(inner.begin(), inner.end(), same), inner.end());
+  return subsets(Eigen::all, inner);
+}
+
+Walls ListOf(WallBits bits) {
+  Walls walls;
+  for (; bits != 0; bits &= bits - 1) walls.push_back(std::countr_zero(bits));
+  return walls;
+}
+
+}  // namespace
+
+std::vector<Face> Mesh::faces(int dimension) const {
+  if (walls.empty() || dimension < 0 || dimension >= this->dimension() || simplices.cols() == 0) {
+    return {};
+  }
+  SimplexMatrix rows = ThoseOnce(Subsets(simplices));
+  while (rows.rows() - 1 > dimension && rows.cols() > 0) rows = Ridges(rows, walls);
+  std::map<Walls, std::vector<Index>> of_walls;
+  for (Index j = 0; j < rows.cols(); ++j) {
+    if (const WallBits bits = InCommon(walls, rows, j); bits != 0) {
+      of_walls[ListOf(bits)].push_back(j);
+    }
+  }
+  std::vector<Face> faces;
+  for (const auto& [on, columns] : of_walls) faces.push_back({on, rows(Eigen::all, columns)});
+  return faces;
+}
+
+std::vector<Face> Mesh::edges() const {
+  std::vector<Face> edges = faces(1);
+  std::erase_if(edges, [](const Face& face) { return face.walls.size() < 2; });
+  return edges;
+}
+
+std::vector<Face> Mesh::corners() const {
+  std::vector<Face> corners = faces(0);
+  std::erase_if(corners, [this](const Face& face) {
+    return face.walls.size() != static_cast<size_t>(dimension());
+  });
+  return corners;
+}
+
+}  // namespace stellate

@@ -1,0 +1,179 @@
+#include <cmath>
+#include <utility>
+
+#include "oracles/ready/common.h"
+#include "oracles/ready/level_solver.h"
+#include "stellate/oracles/walls.h"
+
+namespace stellate::oracles {
+namespace {
+
+using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
+
+constexpr size_t kMaxWalls = 64;
+
+// All of R^d, as a manifold that is to be cut by walls.
+class Space final : public Oracle {
+ public:
+  explicit Space(BoundingBox around) : around_(std::move(around)) {
+    const Index d = around_.lower.size();
+    if (d < 1 || around_.upper.size() != d ||
+        !(around_.lower.array() < around_.upper.array()).all()) {
+      Refuse("a solid needs a box around it, two corners of one space, the lower one first");
+    }
+  }
+
+  int dimension() const override { return static_cast<int>(around_.lower.size()); }
+  int ambient_dimension() const override { return dimension(); }
+  Answer ClosestPoint(const MatrixXd& x) override { return {x, {}, {}, {}}; }
+  bool has_tangent_basis() const override { return true; }
+  MatrixXd TangentBasis(const MatrixXd& points) override {
+    const MatrixXd identity = MatrixXd::Identity(dimension(), dimension());
+    return identity.reshaped().replicate(1, points.cols());
+  }
+  std::optional<BoundingBox> bounding_box() const override { return around_; }
+
+ private:
+  BoundingBox around_;
+};
+
+double ScaleOf(const Oracle& oracle) {
+  if (const auto box = oracle.bounding_box()) return (box->upper - box->lower).norm();
+  const MatrixXd seeds = oracle.seeds();
+  if (seeds.cols() < 2) return 1;
+  return (seeds.rowwise().maxCoeff() - seeds.rowwise().minCoeff()).norm();
+}
+
+void CheckFace(const Walls& face, int walls) {
+  int last = -1;
+  for (const int wall : face) {
+    if (wall <= last || wall >= walls) {
+      Refuse("a face has ascending numbers of walls, below " + std::to_string(walls));
+    }
+    last = wall;
+  }
+}
+
+}  // namespace
+
+Wall HalfSpace(VectorXd normal, double offset) {
+  if (!normal.allFinite() || !(normal.norm() > 0)) Refuse("a half-space needs a normal");
+  return {[normal, offset](const VectorXd& x) { return normal.dot(x) - offset; },
+          [normal](const VectorXd& /*x*/) { return normal; }};
+}
+
+std::vector<Wall> Box(const VectorXd& lower, const VectorXd& upper) {
+  const Index d = lower.size();
+  if (d < 1 || upper.size() != d || !(lower.array() < upper.array()).all()) {
+    Refuse("a box is two corners of one space, the lower one first");
+  }
+  std::vector<Wall> walls;
+  for (const auto& [corner, sign] : {std::pair(&lower, 1.0), std::pair(&upper, -1.0)}) {
+    for (Index i = 0; i < d; ++i) {
+      if (std::isinf((*corner)[i])) continue;
+      walls.push_back(HalfSpace(sign * VectorXd::Unit(d, i), sign * (*corner)[i]));
+    }
+  }
+  return walls;
+}
+
+Wall Ball(VectorXd centre, double radius) {
+  if (!centre.allFinite() || centre.size() < 1 || !(radius > 0)) {
+    Refuse("a ball needs a centre and a positive radius");
+  }
+  return {
+      [centre, radius](const VectorXd& x) { return radius * radius - (x - centre).squaredNorm(); },
+      [centre](const VectorXd& x) -> VectorXd { return -2 * (x - centre); }};
+}
+
+Clipped::Clipped(std::shared_ptr<Oracle> oracle, std::vector<Wall> walls, MatrixXd seeds)
+    : base_(std::move(oracle)), walls_(std::move(walls)), seeds_(std::move(seeds)) {
+  if (base_ == nullptr) Refuse("there is no oracle to clip");
+  if (const auto* const clipped = dynamic_cast<const Clipped*>(base_.get())) {
+    walls_.insert(walls_.begin(), clipped->walls_.begin(), clipped->walls_.end());
+    if (seeds_.size() == 0) seeds_ = clipped->seeds_;
+    base_ = std::shared_ptr<Oracle>(clipped->base_);
+  }
+  RefuseWalls(*base_, "Clipped");
+  if (!base_->has_tangent_basis()) Refuse("to clip a manifold takes its tangent bases");
+  if (walls_.empty() || walls_.size() > kMaxWalls) {
+    Refuse("there are " + std::to_string(walls_.size()) + " walls; there have to be 1 to 64");
+  }
+  for (const Wall& wall : walls_) {
+    if (!wall.g) Refuse("walls have to be functions");
+  }
+  if (seeds_.size() == 0) seeds_ = base_->seeds();
+  if (seeds_.size() > 0 && seeds_.rows() != ambient_dimension()) {
+    Refuse("seeds have to be points of R^" + std::to_string(ambient_dimension()));
+  }
+  scale_ = ScaleOf(*base_);
+}
+
+bool Clipped::has_intersect_flat() const {
+  return base_->has_intersect_flat() && dimension() < ambient_dimension();
+}
+
+VectorXd Clipped::Slope(int wall, const VectorXd& x) const {
+  const Wall& it = walls_[static_cast<size_t>(wall)];
+  if (it.gradient) return it.gradient(x);
+  const auto f = [&it](const VectorXd& at) { return VectorXd::Constant(1, it.g(at)); };
+  return Differences(f, x, scale_).row(0).transpose();
+}
+
+Answer Clipped::FacePoint(const MatrixXd& x, const Walls& face) {
+  CheckFace(face, walls());
+  const auto count = static_cast<Index>(face.size());
+  const Level level{[&](const VectorXd& y) {
+                      VectorXd values(count);
+                      for (Index i = 0; i < count; ++i) {
+                        const int wall = face[static_cast<size_t>(i)];
+                        values[i] = walls_[static_cast<size_t>(wall)].g(y);
+                      }
+                      return values;
+                    },
+                    [&](const VectorXd& y) {
+                      MatrixXd slopes(count, y.size());
+                      for (Index i = 0; i < count; ++i) {
+                        slopes.row(i) = Slope(face[static_cast<size_t>(i)], y).transpose();
+                      }
+                      return slopes;
+                    },
+                    scale_};
+  return OntoLevel(*base_, level, x);
+}
+
+MatrixXd Clipped::Clearances(const MatrixXd& points) {
+  MatrixXd clearances(walls(), points.cols());
+  VectorXd x;
+  for (Index j = 0; j < points.cols(); ++j) {
+    x = points.col(j);
+    for (Index i = 0; i < clearances.rows(); ++i) {
+      clearances(i, j) = walls_[static_cast<size_t>(i)].g(x);
+    }
+  }
+  return clearances;
+}
+
+MatrixXd Clipped::Conormals(const MatrixXd& points, const Walls& face) {
+  CheckFace(face, walls());
+  const Index d = points.rows();
+  const MatrixXd bases = base_->TangentBasis(points);
+  MatrixXd outward(d * static_cast<Index>(face.size()), points.cols());
+  VectorXd x;
+  for (Index j = 0; j < points.cols(); ++j) {
+    x = points.col(j);
+    const Eigen::Map<const RowMajor> basis(bases.col(j).data(), d, dimension());
+    for (size_t i = 0; i < face.size(); ++i) {
+      const VectorXd along = basis.transpose() * Slope(face[i], x);
+      const double steep = along.norm();
+      outward.col(j).segment(static_cast<Index>(i) * d, d) =
+          basis * (-along / (steep > 0 ? steep : 1.0));
+    }
+  }
+  return outward;
+}
+
+Solid::Solid(std::vector<Wall> walls, BoundingBox around, MatrixXd seeds)
+    : Clipped(std::make_shared<Space>(std::move(around)), std::move(walls), std::move(seeds)) {}
+
+}  // namespace stellate::oracles
