@@ -62,6 +62,8 @@ def test_two_oracles_of_nearest_points_will_do(server, inner, rim, epsilon, chi)
     on = mesh.points[mesh.walls > 0]
     assert np.abs(on - rim.closest_point(on)).max() < 1e-9
     assert np.abs(mesh.points - inner.closest_point(mesh.points)).max() < 1e-9
+    report = stellate.check(oracle)
+    assert report.ok, report
 
 
 def test_the_same_from_a_larger_manifold_and_where_it_ends(server):
@@ -69,6 +71,7 @@ def test_the_same_from_a_larger_manifold_and_where_it_ends(server):
         manifolds.Sphere(2), RIM, clearance=lambda x: x[:, 2] - TALL
     )
     hold(stellate.mesh(oracle, 0.25, server=server), 1, {(0,)})
+    assert stellate.check(oracle).ok
 
 
 def test_normals_of_the_boundary_are_found():
@@ -129,6 +132,7 @@ def test_inequalities_bound_an_implicit_manifold(server, jacobian):
     mesh = stellate.mesh(quarter, 0.3, server=server)
     hold(mesh, 1, {(0,), (1,)})
     assert sum(len(face.simplices) for face in mesh.corners) == 2
+    assert stellate.check(quarter).ok
 
 
 def test_inequalities_may_be_written_for_a_library(server, fake_autograd):
@@ -205,3 +209,8 @@ def test_walls_of_the_wrong_shape_are_named(server, wall, gradient, said):
     with pytest.raises(stellate.OracleError, match=said):
         solid = oracles.Solid(wall, ROOM, gradients=[gradient])
         stellate.mesh(solid, 0.4, server=server)
+
+
+def test_epsilon_may_be_left_to_the_reach_of_the_boundary(server):
+    mesh = stellate.mesh(oracles.Solid(ball=([0, 0, 0], 1)), "auto", server=server)
+    assert mesh.certified and mesh.report.epsilon == pytest.approx(0.25)
