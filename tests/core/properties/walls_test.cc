@@ -30,7 +30,9 @@ unsigned Setting(const char* name, unsigned otherwise) {
   return value ? static_cast<unsigned>(std::atoi(value)) : otherwise;
 }
 unsigned FirstTrial() { return Setting("STELLATE_WALL_SEED", 0); }
-unsigned EndOfTrials() { return FirstTrial() + Setting("STELLATE_WALL_TRIALS", 1); }
+unsigned EndOfTrials(unsigned each = 1) {
+  return FirstTrial() + each * Setting("STELLATE_WALL_TRIALS", 1);
+}
 
 struct Case {
   std::string name;
@@ -138,7 +140,7 @@ INSTANTIATE_TEST_SUITE_P(Slow, Walls, ::testing::ValuesIn(SlowCases()));
 class CoarseWalls : public ::testing::TestWithParam<Case> {};
 
 TEST_P(CoarseWalls, AreNeverCertifiedAsSomethingElse) {
-  for (unsigned trial = FirstTrial(); trial < 4 * EndOfTrials(); ++trial) {
+  for (unsigned trial = FirstTrial(); trial < EndOfTrials(4); ++trial) {
     SCOPED_TRACE("trial " + std::to_string(trial));
     Specification spec;
     const Domain m = Trial(GetParam(), trial, &spec);
