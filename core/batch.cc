@@ -7,7 +7,6 @@
 #include <string>
 
 #include "core/base/message.h"
-#include "core/certificate/findings.h"
 
 namespace stellate::core {
 namespace {

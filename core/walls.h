@@ -33,4 +33,9 @@ inline constexpr bool IsWall(std::uint32_t id) { return id - kFirstWallId < kMax
 inline constexpr bool IsSample(std::uint32_t id) { return id < kFirstWallId; }
 inline constexpr int WallOf(std::uint32_t id) { return static_cast<int>(id - kFirstWallId); }
 
+// What to do where a manifold that is meshed without walls turns out to end, or may: one sentence.
+inline constexpr const char* kDeclareWalls =
+    "If the manifold has a boundary, it has to be declared by walls: see \"Boundaries and "
+    "domains\" in the documentation";
+
 }  // namespace stellate::core

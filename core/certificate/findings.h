@@ -16,11 +16,6 @@ inline constexpr double kCoarse = 0.8;
 // That a mesh is `ratio` times as coarse as a reach, and what to do; `where` it was seen, or empty.
 std::string TooCoarse(double ratio, double reach, const std::string& where);
 
-// What to do where a manifold that is meshed without walls turns out to end, or may: one sentence.
-inline constexpr const char* kDeclareWalls =
-    "If the manifold has a boundary, it has to be declared by walls: see \"Boundaries and "
-    "domains\" in the documentation";
-
 // What speaks against a mesh, in plain words: problems refuse it, warnings do not.
 class Findings {
  public:
