@@ -35,7 +35,9 @@ TEST(WallsCriteriaTest, MaxDeviationHoldsOnTheWallsOfASolid) {
       barycentre += mesh.points[v] / 3;
       walls &= mesh.walls[v];
     }
-    if (walls == SetOfWall(0)) EXPECT_LE(1 - barycentre.head(2).norm(), kDeviation);
+    if (walls == SetOfWall(0)) {
+      EXPECT_LE(1 - barycentre.head(2).norm(), kDeviation);
+    }
   }
   EXPECT_GT(mesh.points.size(), coarse);
 }
