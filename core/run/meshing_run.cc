@@ -190,43 +190,11 @@ template <int K>
 void MeshingRun<K>::AfterTrip() {
   const auto* const answered = trip_.get();
   (this->*insertion_)();
-  if (over_ || trip_.get() != answered) return;  // it asks on
+  if (over_ || trip_.get() != answered || AskToLay()) return;  // it asks on
   typename Engine<K>::Change change = engine_.Commit();
   delta_.added = std::move(change.added);
   delta_.removed = std::move(change.removed);
   Plan();
-}
-
-template <int K>
-void MeshingRun<K>::InsertSeeds() {
-  const AnsweredPoints& answers = trip_->answers();
-  const Eigen::Index count = answers.points.cols();
-  const auto found = std::count(answers.found.begin(), answers.found.end(), 1);
-  covers_box_ = spec_.cover_box && found == count;
-  if (found == 0) {
-    const char* const tried =
-        spec_.seeds.cols() > 0 ? " seeds were" : " points of the bounding box were";
-    std::string message = Message("no seed has a closest point on the manifold: ", count, tried,
-                                  " tried; give seeds near the manifold, or a box that holds it");
-    if (!spec_.oracle.tangent_basis)
-      message += Message("; seeds where the manifold does not look ", K,
-                         "-dimensional count as not found");
-    return Fail({StatusCode::kNoSeeds, std::move(message)});
-  }
-  repeat_check_.Sample(answers);
-  std::vector<std::uint8_t> used(static_cast<std::size_t>(count), 0);
-  for (Eigen::Index c = 0; c < count; ++c) {
-    const auto i = static_cast<std::size_t>(c);
-    CheckInterruption(i);
-    if (!answers.found[i]) continue;
-    used[i] = !engine_.is_full() && !engine_.complex().AnyWithin(answers.points.col(c).data(),
-                                                                 engine_.criteria().epsilon);
-    if (used[i])
-      engine_.Append(answers, c);
-    else
-      ++report_.counts.duplicates;
-  }
-  spare_points_.Keep(answers, used);
 }
 
 template <int K>
@@ -343,6 +311,9 @@ template <int K>
 void MeshingRun<K>::Finish(Termination termination) {
   if (over_) return;
   over_ = true;
+  // What is laid has no stars yet.
+  if (laying_ && termination == Termination::kRoundBudget) delta_.added = engine_.Commit().added;
+  laying_.reset();
   batch_.reset();
   parts_.reset();
   report_.termination = termination;
@@ -360,7 +331,9 @@ void MeshingRun<K>::Finish(Termination termination) {
 
 template <int K>
 void MeshingRun<K>::Measure() {
-  if (!over_) return core::Measure<K>(engine_, certification_ != nullptr, &progress_);
+  if (!over_)
+    return core::Measure<K>(engine_, certification_ != nullptr,
+                            laying_ ? laying_->CountMissing() : 0, &progress_);
   progress_.phase = Phase::kDone;
   progress_.vertices = engine_.complex().size();
   progress_.simplices = engine_.simplex_count();

@@ -11,6 +11,7 @@
 #include "core/run/asker.h"
 #include "core/run/batch_parts.h"
 #include "core/run/certification.h"
+#include "core/run/laying.h"
 #include "core/run/repeat_check.h"
 #include "core/run/rim_watch.h"
 #include "core/run/round_trip.h"
@@ -62,6 +63,8 @@ class MeshingRun final : public Mesher {
   void KeepFaceSeeds();
   void JudgeWalls();
   bool PlanFaces(std::optional<std::vector<Target<K>>>* targets);
+  void LayRing();
+  bool AskToLay();
   void InsertCandidates();
   void InsertSpares();
   void Plan();
@@ -88,6 +91,7 @@ class MeshingRun final : public Mesher {
 
   // One of these asks.
   std::unique_ptr<RoundTrip<K>> trip_;
+  std::unique_ptr<Laying<K>> laying_;  // while the sample is laid
   std::unique_ptr<Certification> certification_;
   Insertion insertion_ = nullptr;  // of the trip's answers
 

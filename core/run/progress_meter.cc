@@ -8,7 +8,7 @@
 namespace stellate::core {
 
 template <int K>
-void Measure(const Engine<K>& engine, bool is_certifying, Progress* progress) {
+void Measure(const Engine<K>& engine, bool is_certifying, double to_lay, Progress* progress) {
   const StarComplex<K>& complex = engine.complex();
   const ViolationBook<K>& book = engine.book();
   progress->vertices = complex.size();
@@ -26,13 +26,13 @@ void Measure(const Engine<K>& engine, bool is_certifying, Progress* progress) {
   progress->bad_sliver = book.slivers();
   progress->bad_inconsistent = book.inconsistent();
   // Half as many as would fill the flat cells: their points serve several.
-  const double missing = engine.CountMissing(0.5) + static_cast<double>(book.blemished());
+  const double missing = to_lay + engine.CountMissing(0.5) + static_cast<double>(book.blemished());
   const double have = static_cast<double>(complex.size());
   const double share = is_certifying ? 0.99 : 0.98 * have / (have + missing + 1);
   progress->fraction = std::max(progress->fraction, share);
 }
 
-#define STELLATE_EACH(K) template void Measure<K>(const Engine<K>&, bool, Progress*);
+#define STELLATE_EACH(K) template void Measure<K>(const Engine<K>&, bool, double, Progress*);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/message.h"
 #include "core/base/random.h"
 
 namespace stellate::core {
@@ -38,6 +39,17 @@ Eigen::MatrixXd SeedsOf(const Specification& spec) {
     for (Eigen::Index j = 0; j < seeds.rows(); ++j)
       seeds(j, i) = box.lower[j] + random.Uniform() * (box.upper[j] - box.lower[j]);
   return seeds;
+}
+
+std::string WhyNoSeeds(const Specification& spec, Eigen::Index count) {
+  const char* const tried =
+      spec.seeds.cols() > 0 ? " seeds were" : " points of the bounding box were";
+  std::string message = Message("no seed has a closest point on the manifold: ", count, tried,
+                                " tried; give seeds near the manifold, or a box that holds it");
+  if (!spec.oracle.tangent_basis)
+    message += Message("; seeds where the manifold does not look ", spec.dimension,
+                       "-dimensional count as not found");
+  return message;
 }
 
 }  // namespace stellate::core

@@ -347,9 +347,9 @@ TEST_F(Workers, ProgressOnlyGrows) {
 
 TEST_F(Workers, TenThousandVerticesInAtMostFortyFiveRoundTrips) {
   const auto torus = Make("torus:1:0.4");
-  const Expected<Mesh> mesh = MeshManifold(*torus, At(0.0325));
+  const Expected<Mesh> mesh = MeshManifold(*torus, At(0.027));
   ASSERT_TRUE(mesh.has_value());
-  EXPECT_TRUE(IsFaithful(*mesh, *torus, 0.0325));
+  EXPECT_TRUE(IsFaithful(*mesh, *torus, 0.027));
   EXPECT_GE(mesh->report.counts.vertices, 9'000u);
   EXPECT_LE(mesh->report.counts.rounds, 45u) << ToText(mesh->report);
   EXPECT_LE(mesh->report.counts.queries, 2 * mesh->report.counts.vertices) << ToText(mesh->report);

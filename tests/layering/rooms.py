@@ -29,13 +29,16 @@ CORE = {
         "core/complex",
         "core/certificate",
     ),
+    "core/growth": ("core", "core/base", "core/sample"),
     "core/run": (
         "core",
         "core/base",
         "core/geometry",
         "core/complex",
         "core/certificate",
+        "core/growth",
         "core/refinement",
+        "core/sample",
     ),
     "core/mesher.cc": ("core", "core/base", "core/run"),  # the one door from the face
 }

@@ -21,6 +21,8 @@ struct Range {
 // How test names and failures show a range.
 void PrintTo(const Range& range, std::ostream* out) { *out << range.manifold; }
 
+// All so fine that the sample is laid by growth: coarse meshes have more vertices for their
+// epsilon.
 class Slopes : public ::testing::TestWithParam<Range> {};
 
 TEST_P(Slopes, FollowTheTheory) {
@@ -51,15 +53,15 @@ TEST_P(Slopes, FollowTheTheory) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Manifolds, Slopes,
-                         ::testing::Values(Range{"torus-knot:2:3", {0.08, 0.04, 0.02, 0.01}},
-                                           Range{"torus:1:0.4", {0.16, 0.08, 0.04}},
-                                           Range{"ellipsoid:1:0.8:0.6", {0.1, 0.05, 0.025}},
-                                           Range{"clifford-torus", {0.2, 0.1, 0.05}},
+                         ::testing::Values(Range{"torus-knot:2:3", {0.02, 0.01, 0.005}},
+                                           Range{"torus:1:0.4", {0.06, 0.03, 0.015}},
+                                           Range{"ellipsoid:1:0.8:0.6", {0.04, 0.02, 0.01}},
+                                           Range{"clifford-torus", {0.064, 0.032, 0.016}},
                                            Range{"so3", {0.45, 0.34, 0.25}}));
 
 // Every round is a round trip to the oracle, which may be far away; every query may be expensive.
 TEST(Cost, OfTenThousandVerticesIsFewRoundTripsAndAboutOneQueryEach) {
-  const FinishedRun run = RunMesher("torus:1:0.4", 0.025);
+  const FinishedRun run = RunMesher("torus:1:0.4", 0.019);
   const core::Counts& counts = run.report.counts;
   ASSERT_TRUE(run.report.certificate.certified) << run.report.certificate.verdict;
   EXPECT_GE(counts.vertices, 10'000u);

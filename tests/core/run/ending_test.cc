@@ -73,19 +73,19 @@ TEST(ProgressMeter, FollowsTheMesh) {
   const Specification spec = SphereSpec(0.2);
   Engine<2> empty(spec, Resolve(spec));
   Progress progress;
-  Measure<2>(empty, false, &progress);
+  Measure<2>(empty, false, 0, &progress);
   EXPECT_EQ(progress.phase, Phase::kSeeding);
   EXPECT_EQ(progress.fraction, 0);
 
   Engine<2> engine = EngineOnSphere(spec, Octahedron());
-  Measure<2>(engine, false, &progress);
+  Measure<2>(engine, false, 0, &progress);
   EXPECT_EQ(progress.phase, Phase::kRefining);
   EXPECT_EQ(progress.vertices, 6u);
   EXPECT_EQ(progress.bad_size, 6u);
   EXPECT_EQ(progress.unbounded_stars, 6u);  // too far from each other to see each other yet
   double before = progress.fraction;
   for (std::uint64_t round = 1; StepOnSphere(&engine, round); ++round) {
-    Measure<2>(engine, false, &progress);
+    Measure<2>(engine, false, 0, &progress);
     EXPECT_GE(progress.fraction, before);
     before = progress.fraction;
   }
@@ -93,7 +93,7 @@ TEST(ProgressMeter, FollowsTheMesh) {
   EXPECT_EQ(progress.unbounded_stars, 0u);
   EXPECT_EQ(progress.bad_size + progress.bad_radius_edge, 0u);
   EXPECT_EQ(progress.bad_sliver + progress.bad_inconsistent, 0u);
-  Measure<2>(engine, true, &progress);
+  Measure<2>(engine, true, 0, &progress);
   EXPECT_EQ(progress.phase, Phase::kCertifying);
   EXPECT_GE(progress.fraction, before);
   EXPECT_LT(progress.fraction, 1);

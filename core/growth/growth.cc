@@ -1,0 +1,369 @@
+#include "core/growth/growth.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/base/local_maxima.h"
+#include "core/base/parallel.h"
+#include "core/growth/lattice.h"
+#include "core/sample/near_lists.h"
+
+namespace stellate::core {
+namespace {
+
+// Proposals nearer to each other than this many spacings are one.
+constexpr double kMerged = 0.5;
+// An answer farther than this many spacings from what was asked is no neighbour: M bends away.
+constexpr double kFarthest = 1;
+// Tangent spaces that keep less of a frame's volume than this have turned too far to carry it on.
+constexpr double kLeastVolume = 0.1;
+// Points of a block lie within this many spacings of its first.
+constexpr double kBlockReach = 3;
+constexpr std::size_t kBlockSize = 32;
+// Few points are laid into the newest layer, until it is as large as this share of the one before.
+constexpr std::size_t kLayerGrowth = 2;
+
+// Makes of `frame` (K rows of d, roughly orthonormal) the orthonormal frame of the span of
+// `tangent` (K orthonormal rows of d) that is nearest to it, the polar factor of its projection, by
+// Newton's iteration (Higham, Functions of Matrices, Ch. 8). False where it was turned too far.
+template <int K>
+bool Align(const double* tangent, int d, double* frame) {
+  using Rows = Eigen::Matrix<double, K, Eigen::Dynamic, Eigen::RowMajor>;
+  const Eigen::Map<const Rows> t(tangent, K, d);
+  Eigen::Map<Rows> f(frame, K, d);
+  Eigen::Matrix<double, K, K> a = f * t.transpose();
+  if (!(std::abs(a.determinant()) > kLeastVolume)) return false;
+  for (int step = 0; step < 5; ++step) a = 0.5 * (a + a.inverse().transpose().eval()).eval();
+  f = a * t;
+  return true;
+}
+
+}  // namespace
+
+template <int K>
+void Growth<K>::Sites::Append(const Sites& others) {
+  points.insert(points.end(), others.points.begin(), others.points.end());
+  frames.insert(frames.end(), others.frames.begin(), others.frames.end());
+  patch.insert(patch.end(), others.patch.begin(), others.patch.end());
+}
+
+template <int K>
+Growth<K>::Layer::Layer(int d, std::vector<double> laid)
+    : points(std::move(laid)), tree(d, &points) {
+  tree.Assign(std::vector<double>(points.size() / static_cast<std::size_t>(d), 0.0));
+}
+
+template <int K>
+Growth<K>::Growth(int d, double spacing)
+    : d_(d),
+      spacing_(spacing),
+      vectors_(LatticeVectors(K)),
+      longest_(spacing * LongestLatticeVector(K)) {
+  for (double& x : vectors_) x *= spacing;
+}
+
+template <int K>
+std::vector<typename Growth<K>::Block> Growth<K>::BlocksOf(
+    const std::vector<double>& points) const {
+  std::vector<Block> blocks;
+  const std::size_t count = points.size() / stride();
+  const auto at = [&](std::size_t i) { return points.data() + i * stride(); };
+  for (std::size_t begin = 0, end; begin < count; begin = end) {
+    CheckInterruption(blocks.size());
+    for (end = begin + 1; end < count && end < begin + kBlockSize; ++end)
+      if (!(Distance(at(begin), at(end), d_) <= kBlockReach * spacing_)) break;
+    Block block{begin, end, std::vector<double>(stride(), 0.0), 0};
+    for (std::size_t i = begin; i < end; ++i)
+      for (std::size_t j = 0; j < stride(); ++j) block.centre[j] += at(i)[j];
+    for (double& c : block.centre) c /= static_cast<double>(end - begin);
+    for (std::size_t i = begin; i < end; ++i)
+      block.radius = std::max(block.radius, Distance(at(i), block.centre.data(), d_));
+    blocks.push_back(std::move(block));
+  }
+  return blocks;
+}
+
+// What is laid within `radius` of some point of the block, and more; d each.
+template <int K>
+void Growth<K>::GatherLaid(const Block& block, double radius, std::vector<double>* near) const {
+  near->clear();
+  for (const auto& layer : layers_)
+    layer->tree.VisitNear(
+        block.centre.data(), [&] { return block.radius + radius; },
+        [&](std::uint32_t id, double) {
+          const double* const q = layer->points.data() + id * stride();
+          near->insert(near->end(), q, q + d_);
+        });
+}
+
+template <int K>
+std::vector<std::uint8_t> Growth<K>::AreFarFromLaid(const std::vector<double>& points,
+                                                    double distance) const {
+  std::vector<std::uint8_t> far(points.size() / stride(), 1);
+  const std::vector<Block> blocks = BlocksOf(points);
+  ParallelFor(blocks.size(), [&](std::size_t b) {
+    thread_local std::vector<double> near;
+    GatherLaid(blocks[b], distance, &near);
+    for (std::size_t i = blocks[b].begin; i < blocks[b].end; ++i)
+      for (std::size_t q = 0; q < near.size() && far[i]; q += stride())
+        far[i] = SquaredDistance(points.data() + i * stride(), near.data() + q, d_) >=
+                 distance * distance;
+  });
+  return far;
+}
+
+// Where a proposal lies: its parent's neighbour in the lattice, in the parent's tangent space.
+template <int K>
+void Growth<K>::Land(const Proposal& proposal, double* point) const {
+  const double* const vector = vectors_.data() + std::size_t{proposal.direction} * K;
+  const double* const frame = border_.frames.data() + proposal.parent * stride() * K;
+  const double* const from = border_.points.data() + proposal.parent * stride();
+  for (int j = 0; j < d_; ++j) {
+    double x = from[j];
+    for (int a = 0; a < K; ++a) x += vector[a] * frame[a * d_ + j];
+    point[j] = x;
+  }
+}
+
+// Compares in the parent's own coordinates: along its frame, and the square of what is across.
+template <int K>
+void Growth<K>::ProposeFrom(std::uint32_t p, const std::vector<double>& near,
+                            std::vector<Proposal>* free) const {
+  const double* const from = border_.points.data() + p * stride();
+  const double* const frame = border_.frames.data() + p * stride() * K;
+  const double keep = kKeep * spacing_;
+  const double far = longest_ + keep;
+  thread_local std::vector<double> coordinates, step;
+  coordinates.clear();
+  step.resize(stride());
+  for (std::size_t at = 0; at < near.size(); at += stride()) {
+    for (std::size_t j = 0; j < stride(); ++j) step[j] = near[at + j] - from[j];
+    const double distance2 = Dot(step.data(), step.data(), d_);
+    if (distance2 > far * far || distance2 == 0) continue;
+    double across2 = distance2;
+    for (int a = 0; a < K; ++a) {
+      const double along = Dot(frame + a * d_, step.data(), d_);
+      coordinates.push_back(along);
+      across2 -= along * along;
+    }
+    coordinates.push_back(across2);
+  }
+  const std::size_t directions = vectors_.size() / K;
+  for (std::uint32_t i = 0; i < directions; ++i) {
+    const double* const v = vectors_.data() + std::size_t{i} * K;
+    bool taken = false;
+    for (std::size_t at = 0; at < coordinates.size() && !taken; at += K + 1) {
+      double distance2 = coordinates[at + K];
+      for (int a = 0; a < K; ++a) {
+        const double e = coordinates[at + static_cast<std::size_t>(a)] - v[a];
+        distance2 += e * e;
+      }
+      taken = distance2 < keep * keep;
+    }
+    if (!taken) free->push_back({p, i});
+  }
+}
+
+template <int K>
+std::vector<typename Growth<K>::Proposal> Growth<K>::FreePlaces() const {
+  const std::vector<Block> blocks = BlocksOf(border_.points);
+  return ParallelGather<Proposal>(blocks.size(), [&](std::size_t b, auto* free) {
+    thread_local std::vector<double> near;
+    GatherLaid(blocks[b], longest_ + kKeep * spacing_, &near);
+    for (std::size_t p = blocks[b].begin; p < blocks[b].end; ++p)
+      ProposeFrom(static_cast<std::uint32_t>(p), near, free);
+  });
+}
+
+// Several points mostly propose the same place: their mean is asked for, with the mean of their
+// frames. Of two patches that meet only one proposes.
+template <int K>
+typename Growth<K>::Proposed Growth<K>::Merge(const std::vector<Proposal>& proposals) const {
+  std::vector<double> landed(proposals.size() * stride());
+  ParallelFor(proposals.size(),
+              [&](std::size_t i) { Land(proposals[i], landed.data() + i * stride()); });
+  const NearLists near(landed, d_, kMerged * spacing_);
+  const std::vector<std::uint8_t> leads =
+      ChooseLocalMaxima(proposals.size(), [&](std::size_t i, const auto& visit) {
+        for (const std::uint32_t j : near.Of(i))
+          if (j > i || !visit(j)) return;
+      });
+  const auto patch = [&](std::size_t i) { return border_.patch[proposals[i].parent]; };
+  const auto distance2 = [&](std::size_t i, std::size_t j) {
+    return SquaredDistance(landed.data() + i * stride(), landed.data() + j * stride(), d_);
+  };
+  std::vector<std::uint32_t> leader(proposals.size());
+  ParallelFor(proposals.size(), [&](std::size_t i) {
+    leader[i] = static_cast<std::uint32_t>(i);
+    if (leads[i]) return;
+    double nearest2 = INFINITY;
+    for (const std::uint32_t j : near.Of(i)) {
+      if (!leads[j] || !(distance2(i, j) < nearest2)) continue;
+      nearest2 = distance2(i, j);
+      leader[i] = j;
+    }
+  });
+  std::vector<std::uint32_t> leaders;
+  for (std::uint32_t i = 0; i < proposals.size(); ++i) {
+    CheckInterruption(i);
+    if (leads[i]) leaders.push_back(i);
+  }
+  Proposed merged;
+  merged.sites.points.assign(leaders.size() * stride(), 0.0);
+  merged.sites.frames.assign(leaders.size() * stride() * K, 0.0);
+  merged.sites.patch.resize(leaders.size());
+  merged.parents.assign(leaders.size(), 0);
+  ParallelFor(leaders.size(), [&](std::size_t l) {
+    const std::uint32_t lead = leaders[l];
+    double* const point = merged.sites.points.data() + l * stride();
+    double* const frame = merged.sites.frames.data() + l * stride() * K;
+    const auto add = [&](std::uint32_t i) {
+      if (leader[i] != lead || patch(i) != patch(lead)) return;
+      const double* const other = border_.frames.data() + proposals[i].parent * stride() * K;
+      for (std::size_t j = 0; j < stride(); ++j) point[j] += landed[i * stride() + j];
+      for (std::size_t j = 0; j < stride() * K; ++j) frame[j] += other[j];
+      ++merged.parents[l];
+    };
+    add(lead);
+    for (const std::uint32_t i : near.Of(lead)) add(i);
+    for (std::size_t j = 0; j < stride(); ++j) point[j] /= merged.parents[l];
+    for (std::size_t j = 0; j < stride() * K; ++j) frame[j] /= merged.parents[l];
+    merged.sites.patch[l] = patch(lead);
+  });
+  return merged;
+}
+
+// Of proposals that came out as `candidates`, d each, in the order of `columns`, those that keep
+// their distance from what is laid and from each other. Those of several parents are more likely
+// where they belong.
+template <int K>
+std::vector<std::uint32_t> Growth<K>::Choose(const std::vector<double>& candidates,
+                                             const Proposed& proposed,
+                                             const std::vector<std::uint32_t>& columns) const {
+  const double keep = kKeep * spacing_;
+  const std::vector<std::uint8_t> far = AreFarFromLaid(candidates, keep);
+  const NearLists near(candidates, d_, keep);
+  const auto strength = [&](std::uint32_t i) {
+    const std::uint32_t c = columns[i];
+    return std::pair(proposed.parents[c] > 1 ? 0 : 1, i);
+  };
+  const std::vector<std::uint8_t> chosen =
+      ChooseLocalMaxima(columns.size(), [&](std::size_t i, const auto& visit) {
+        if (!far[i]) return;
+        for (const std::uint32_t j : near.Of(i))
+          if (far[j] && strength(j) < strength(static_cast<std::uint32_t>(i)) && !visit(j)) return;
+      });
+  std::vector<std::uint32_t> taken;
+  for (std::uint32_t i = 0; i < columns.size(); ++i) {
+    CheckInterruption(i);
+    if (chosen[i] && far[i]) taken.push_back(i);
+  }
+  return taken;
+}
+
+template <int K>
+typename Growth<K>::Sites Growth<K>::SitesOf(const Proposed& proposed,
+                                             const std::vector<std::uint32_t>& columns) const {
+  Sites sites;
+  for (const std::uint32_t c : columns) {
+    CheckInterruption(sites.size());
+    const double* const point = proposed.sites.points.data() + c * stride();
+    const double* const frame = proposed.sites.frames.data() + c * stride() * K;
+    sites.points.insert(sites.points.end(), point, point + stride());
+    sites.frames.insert(sites.frames.end(), frame, frame + stride() * K);
+    sites.patch.push_back(proposed.sites.patch[c]);
+  }
+  return sites;
+}
+
+template <int K>
+typename Growth<K>::Ring Growth<K>::Propose() {
+  asked_ = Merge(FreePlaces());
+  border_ = {};
+  const auto count = static_cast<Eigen::Index>(asked_.sites.size());
+  return {Eigen::Map<const Eigen::MatrixXd>(asked_.sites.points.data(), d_, count),
+          Eigen::Map<const Eigen::MatrixXd>(asked_.sites.frames.data(), d_ * K, count)};
+}
+
+// Appends to the sample, which goes on from there.
+template <int K>
+void Growth<K>::Carry(Sites sites) {
+  border_.Append(sites);
+  size_ += static_cast<std::uint32_t>(sites.size());
+  if (sites.size() == 0) return;
+  std::vector<double> points = std::move(sites.points);
+  while (!layers_.empty() && kLayerGrowth * points.size() >= layers_.back()->points.size()) {
+    layers_.back()->points.insert(layers_.back()->points.end(), points.begin(), points.end());
+    points = std::move(layers_.back()->points);
+    layers_.pop_back();
+  }
+  layers_.push_back(std::make_unique<Layer>(d_, std::move(points)));
+}
+
+template <int K>
+std::vector<Eigen::Index> Growth<K>::Begin(const Eigen::MatrixXd& points,
+                                           const Eigen::MatrixXd& tangents,
+                                           const std::vector<std::uint8_t>& found, double apart) {
+  std::vector<Eigen::Index> columns;
+  std::vector<double> candidates;
+  for (Eigen::Index c = 0; c < points.cols(); ++c) {
+    CheckInterruption(static_cast<std::size_t>(c));
+    if (!found[static_cast<std::size_t>(c)]) continue;
+    columns.push_back(c);
+    candidates.insert(candidates.end(), points.col(c).begin(), points.col(c).end());
+  }
+  const std::vector<std::uint8_t> far = AreFarFromLaid(candidates, spacing_);
+  Sites seeds;
+  BallTree tree(d_, &seeds.points);
+  std::vector<Eigen::Index> begun;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    CheckInterruption(i);
+    const double* const y = candidates.data() + i * stride();
+    if (!far[i] || tree.AnyWithin(y, apart)) continue;
+    begun.push_back(columns[i]);
+    seeds.points.insert(seeds.points.end(), y, y + d_);
+    tree.Insert(0);
+    const auto frame = tangents.col(columns[i]);
+    seeds.frames.insert(seeds.frames.end(), frame.begin(), frame.end());
+    seeds.patch.push_back(patches_++);
+  }
+  Carry(std::move(seeds));
+  return begun;
+}
+
+template <int K>
+std::vector<Eigen::Index> Growth<K>::Join(const Eigen::MatrixXd& points,
+                                          const Eigen::MatrixXd& tangents,
+                                          const std::vector<std::uint8_t>& found) {
+  const std::size_t count = asked_.sites.size();
+  double* const frames = asked_.sites.frames.data();
+  std::vector<std::uint8_t> fits(count);
+  ParallelFor(count, [&](std::size_t i) {
+    const auto c = static_cast<Eigen::Index>(i);
+    const double* const proposed = asked_.sites.points.data() + i * stride();
+    fits[i] = found[i] && Distance(points.col(c).data(), proposed, d_) <= kFarthest * spacing_ &&
+              Align<K>(tangents.col(c).data(), d_, frames + i * stride() * K);
+  });
+  std::vector<std::uint32_t> columns;
+  std::vector<double> candidates;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    CheckInterruption(i);
+    if (!fits[i]) continue;
+    columns.push_back(i);
+    candidates.insert(candidates.end(), points.col(i).begin(), points.col(i).end());
+  }
+  std::vector<std::uint32_t> joined = Choose(candidates, asked_, columns);
+  for (std::uint32_t& i : joined) i = columns[i];
+  Sites sites = SitesOf(asked_, joined);
+  for (std::size_t i = 0; i < joined.size(); ++i)
+    std::copy_n(points.col(joined[i]).data(), d_, sites.points.data() + i * stride());
+  asked_ = {};
+  Carry(std::move(sites));
+  return {joined.begin(), joined.end()};
+}
+
+STELLATE_INSTANTIATE_CLASS(Growth)
+
+}  // namespace stellate::core

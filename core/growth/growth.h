@@ -1,0 +1,116 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/base/instantiate.h"
+#include "core/sample/ball_tree.h"
+
+namespace stellate::core {
+
+// Lays a sample of M at its final spacing: from each seed a patch of the lattice A_k^* is carried
+// over M ring by ring, in the tangent spaces of its own points, until it meets the others. Where it
+// cannot be carried (M bends too much, or answers are missing) it leaves a hole.
+//
+//   growth.Begin(points, tangents, found)            seeds
+//   while (growth.Propose().points.cols() > 0)       a ring about all that is new
+//     joined = growth.Join(closest points of that)
+//
+// Deterministic: the same for any number of threads. Pure geometry: it asks nobody.
+template <int K>
+class Growth {
+ public:
+  // d        ambient dimension
+  // spacing  nearest-neighbour distance of the lattice, length
+  Growth(int d, double spacing);
+
+  // Of points of M, d x n with tangent bases (K rows of d) x n, those become seeds that are found,
+  // farther than a lattice spacing from all that is laid, and `apart` from each other. Returns
+  // their columns, ascending.
+  std::vector<Eigen::Index> Begin(const Eigen::MatrixXd& points, const Eigen::MatrixXd& tangents,
+                                  const std::vector<std::uint8_t>& found, double apart);
+
+  // Where the lattice goes on from what joined last: points near M, d x n, with tangent bases
+  // there, (K rows of d) x n, roughly orthonormal.
+  struct Ring {
+    Eigen::MatrixXd points, tangents;
+  };
+  Ring Propose();
+
+  // The closest points of the ring, tangent bases at them, and which were found. Returns the
+  // columns of those that join the sample, ascending: no two points of it are nearer than kKeep
+  // spacings.
+  std::vector<Eigen::Index> Join(const Eigen::MatrixXd& points, const Eigen::MatrixXd& tangents,
+                                 const std::vector<std::uint8_t>& found);
+
+  std::uint32_t size() const { return size_; }
+  // The points that joined last.
+  std::size_t border() const { return border_.size(); }
+  double spacing() const { return spacing_; }
+
+  // Least distance in the sample, in spacings: of a lattice that covers with radius epsilon, 1.4
+  // epsilon for k = 1, 1.2, 1.1, 1.0 and 0.9 for k = 2 to 5.
+  static constexpr double kKeep = 0.72;
+
+ private:
+  // Points that the lattice goes on from, or is proposed at.
+  struct Sites {
+    std::vector<double> points;        // d each
+    std::vector<double> frames;        // K rows of d each: the lattice's directions
+    std::vector<std::uint32_t> patch;  // the seed that it came from
+    std::size_t size() const { return patch.size(); }
+    void Append(const Sites& others);
+  };
+  // Means of what points proposed.
+  struct Proposed {
+    Sites sites;
+    std::vector<std::uint16_t> parents;  // how many proposed it
+  };
+  // A run of points, one after the other, that lie together.
+  struct Block {
+    std::size_t begin, end;
+    std::vector<double> centre;
+    double radius;
+  };
+  // What was laid by rounds; those of about as many are joined into one.
+  struct Layer {
+    Layer(int d, std::vector<double> laid);
+    std::vector<double> points;
+    BallTree tree;
+  };
+  struct Proposal {
+    std::uint32_t parent;     // in border_
+    std::uint32_t direction;  // of the lattice
+  };
+
+  std::size_t stride() const { return static_cast<std::size_t>(d_); }
+  std::vector<Block> BlocksOf(const std::vector<double>& points) const;
+  void GatherLaid(const Block& block, double radius, std::vector<double>* near) const;
+  std::vector<std::uint8_t> AreFarFromLaid(const std::vector<double>& points,
+                                           double distance) const;
+  void Land(const Proposal& proposal, double* point) const;
+  void ProposeFrom(std::uint32_t p, const std::vector<double>& near,
+                   std::vector<Proposal>* free) const;
+  std::vector<Proposal> FreePlaces() const;
+  Proposed Merge(const std::vector<Proposal>& proposals) const;
+  std::vector<std::uint32_t> Choose(const std::vector<double>& candidates, const Proposed& proposed,
+                                    const std::vector<std::uint32_t>& columns) const;
+  Sites SitesOf(const Proposed& proposed, const std::vector<std::uint32_t>& columns) const;
+  void Carry(Sites sites);
+
+  int d_;
+  double spacing_;
+  std::vector<double> vectors_;  // of the lattice, length, K each
+  double longest_;               // of them
+  std::vector<std::unique_ptr<Layer>> layers_;
+  std::uint32_t size_ = 0;
+  std::uint32_t patches_ = 0;
+  Sites border_;
+  Proposed asked_;
+};
+
+STELLATE_DECLARE_CLASS(Growth)
+
+}  // namespace stellate::core

@@ -1,0 +1,70 @@
+// How a run begins: its seeds, and the sample that is laid from them.
+
+#include <algorithm>
+#include <utility>
+
+#include "core/run/meshing_run.h"
+#include "core/run/seeding.h"
+
+namespace stellate::core {
+
+template <int K>
+void MeshingRun<K>::InsertSeeds() {
+  const AnsweredPoints& answers = trip_->answers();
+  const Eigen::Index count = answers.points.cols();
+  const auto found = std::count(answers.found.begin(), answers.found.end(), 1);
+  covers_box_ = spec_.cover_box && found == count;
+  if (found == 0) return Fail({StatusCode::kNoSeeds, WhyNoSeeds(spec_, count)});
+  repeat_check_.Sample(answers);
+  std::vector<std::uint8_t> used(static_cast<std::size_t>(count), 0);
+  if (spec_.walls == 0 && Laying<K>::Suits(engine_.criteria(), answers)) {
+    laying_ = std::make_unique<Laying<K>>(engine_, answers);
+    return spare_points_.Keep(answers, used);
+  }
+  for (Eigen::Index c = 0; c < count; ++c) {
+    const auto i = static_cast<std::size_t>(c);
+    CheckInterruption(i);
+    if (!answers.found[i]) continue;
+    used[i] = !engine_.is_full() && !engine_.complex().AnyWithin(answers.points.col(c).data(),
+                                                                 engine_.criteria().epsilon);
+    if (used[i])
+      engine_.Append(answers, c);
+    else
+      ++report_.counts.duplicates;
+  }
+  spare_points_.Keep(answers, used);
+}
+
+template <int K>
+void MeshingRun<K>::LayRing() {
+  const std::vector<std::uint8_t> used = laying_->Take(trip_->answers());
+  report_.counts.inserted_size +=
+      static_cast<std::uint64_t>(std::count(used.begin(), used.end(), 1));
+  spare_points_.Keep(trip_->answers(), used);
+}
+
+// Whether the sample is not yet laid. What goes on without end is left to Plan.
+template <int K>
+bool MeshingRun<K>::AskToLay() {
+  if (!laying_) return false;
+  box_watch_.Look(engine_.complex().points().data(), engine_.complex().size());
+  PlannedPoints ring;
+  if (!box_watch_.has_left()) ring = laying_->Next();
+  if (ring.size() == 0) {
+    laying_.reset();
+    return false;
+  }
+  CandidateSet<K> candidates;
+  candidates.planned = std::move(ring);
+  Ask(std::move(candidates), &MeshingRun::LayRing);
+  return true;
+}
+
+#define STELLATE_EACH(K)                      \
+  template void MeshingRun<K>::InsertSeeds(); \
+  template void MeshingRun<K>::LayRing();     \
+  template bool MeshingRun<K>::AskToLay();
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core
