@@ -87,7 +87,9 @@ TEST(ReportJson, IsThatOfAllClients) {
       R"("euler_characteristic": -8, "orientable": false, "level": "UNKNOWN", )"
       R"("declared_reach": 0, "reach_refuted": false, "proved_distance": 0, "answers_held": 0, )"
       R"("violations": {"faces": [[1, 2], [1, 5]], "links": [], "stars": [7], )"
-      R"("inconsistent": [], "fibres": [0, 3]}}, )"
+      R"("inconsistent": [], "fibres": [0, 3]}, "boundary_simplices": 0, )"
+      R"("boundary_components": 0, "boundary_euler_characteristic": 0, "faces": [], )"
+      R"("sharpest": null}, )"
       R"("elapsed_seconds": 0.5, )"
       R"("version": "0.1.0"})");
   report.epsilon = 0;
