@@ -65,8 +65,8 @@ double RadiusAt(const StarComplex<K>& complex, std::uint32_t p,
     return Distance(complex.Point(p), complex.Point(q), complex.d());
   };
   for (const HalfEdge<K>& edge : edges)
-    radius =
-        std::min(radius, (IsCorner<K>(complex, p) ? kCornerShare : kNeighbour) * distance(edge.other));
+    radius = std::min(radius,
+                      (IsCorner<K>(complex, p) ? kCornerShare : kNeighbour) * distance(edge.other));
   complex.ForEachWithin(complex.Point(p), radius / kOtherEdge, [&](std::uint32_t q) {
     if (q == p) return;
     const WallSet there = complex.walls(q);

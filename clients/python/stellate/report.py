@@ -114,7 +114,8 @@ class FaceCertificate:
     @classmethod
     def from_fields(cls, fields: dict[str, Any]) -> FaceCertificate:
         """Back from dataclasses.asdict(face), or from JSON of it."""
-        return cls(**{**fields, "walls": tuple(fields["walls"])})
+        plain: dict[str, Any] = {**fields, "walls": tuple(fields["walls"])}
+        return cls(**plain)
 
 
 @dataclasses.dataclass(frozen=True)
