@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/base/message.h"
+#include "core/base/name_point.h"
 
 namespace stellate::core {
 namespace {

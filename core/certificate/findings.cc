@@ -48,14 +48,6 @@ bool Findings::MayBeBoundary() const {
   });
 }
 
-std::string NamePoint(const Eigen::VectorXd& x) {
-  std::string name = "(";
-  for (Eigen::Index i = 0; i < std::min<Eigen::Index>(x.size(), 6); ++i) {
-    name += Message(i > 0 ? ", " : "", Brief(x[i]));
-  }
-  return name + (x.size() > 6 ? ", ...)" : ")");
-}
-
 // ", with a boundary of 2 components and Euler characteristic 0 (wall 0: ...)"
 std::string DescribeBoundary(const Certificate& certificate) {
   if (certificate.boundary_simplices == 0) return ", without boundary: no wall cuts it";

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/name_point.h"
 #include "core/report.h"
 #include "core/specification.h"
 
@@ -66,8 +67,5 @@ class Findings {
   std::string theorem_;
   bool covered_ = false;
 };
-
-// "(0.5, 1, ...)": the first coordinates of a point, as messages name it.
-std::string NamePoint(const Eigen::VectorXd& x);
 
 }  // namespace stellate::core

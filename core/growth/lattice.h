@@ -17,7 +17,8 @@ std::vector<double> LatticeVectors(int k);
 
 // The length of the longest of them.
 inline double LongestLatticeVector(int k) {
-  return std::sqrt(static_cast<double>((k + 1) / 2 * ((k + 2) / 2)) / k);
+  const int half = (k + 1) / 2, other_half = (k + 2) / 2;
+  return std::sqrt(static_cast<double>(half * other_half) / k);
 }
 
 }  // namespace stellate::core

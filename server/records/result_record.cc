@@ -113,7 +113,7 @@ void LayOutPast(RecordReader& archive, ProgressHistory& past) {
     archive.Number(p.revision);
     LayOutProgress(archive, p.progress);
     archive.Number(p.elapsed_seconds);
-    past.Add(std::move(p));
+    past.Add(p);
   }
 }
 

@@ -1,19 +1,18 @@
 #include "server/session/progress_history.h"
 
 #include <algorithm>
-#include <utility>
 
 namespace stellate::server {
 
-void ProgressHistory::Add(PastProgress past) {
+void ProgressHistory::Add(const PastProgress& past) {
   if (!all_.empty() && all_.back().revision % step_ != 0) all_.pop_back();
-  all_.push_back(std::move(past));
+  all_.push_back(past);
   if (all_.size() < kMost) return;
   step_ *= 2;
-  PastProgress newest = std::move(all_.back());
+  const PastProgress newest = all_.back();
   all_.pop_back();
   std::erase_if(all_, [this](const PastProgress& p) { return p.revision % step_ != 0; });
-  all_.push_back(std::move(newest));
+  all_.push_back(newest);
 }
 
 std::vector<PastProgress> ProgressHistory::After(std::uint64_t revision) const {

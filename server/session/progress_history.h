@@ -23,7 +23,7 @@ class ProgressHistory {
   static constexpr std::size_t kMost = 4096;
 
   // Revisions ascend.
-  void Add(PastProgress past);
+  void Add(const PastProgress& past);
   // Of revisions after this one, ascending.
   std::vector<PastProgress> After(std::uint64_t revision) const;
 

@@ -99,7 +99,7 @@ MatrixXd WallProbe::OnManifold(int wall, const MatrixXd& found) {
 }
 
 MatrixXd WallProbe::One(int wall, const MatrixXd& found) {
-  const MatrixXd y = OnManifold(wall, found);
+  MatrixXd y = OnManifold(wall, found);
   if (y.cols() == 0) return y;
   const std::vector<Basis> bases = probe_.GivenTangents(y);
   const MatrixXd normals = probe_.Conormals(y, {wall}), slopes = Slopes(wall, y, bases),

@@ -99,6 +99,7 @@ std::vector<Face> Mesh::faces(int dimension) const {
     }
   }
   std::vector<Face> faces;
+  faces.reserve(of_walls.size());
   for (const auto& [on, columns] : of_walls) faces.push_back({on, rows(Eigen::all, columns)});
   return faces;
 }

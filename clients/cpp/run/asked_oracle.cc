@@ -10,7 +10,7 @@
 namespace stellate::client {
 namespace {
 
-constexpr Eigen::Index kChunkBytes = 1 << 20;  // of a chunk's arrays, as oracle.proto says
+constexpr Eigen::Index kArrayBytes = 1 << 20;  // of a chunk's arrays, as oracle.proto says
 
 Eigen::MatrixXd ArrayOr(const v1::Array& array, const std::vector<std::uint32_t>& shape,
                         const std::string& what) {
@@ -43,7 +43,7 @@ void Append(const Answer& part, Answer* all) {
 AskedOracle::AskedOracle(Stream& stream, const v1::MeshSpec& spec, std::uint32_t max_chunk)
     : stream_(stream), spec_(spec) {
   const Eigen::Index d = std::max(1, ambient_dimension()), k = std::max(1, dimension());
-  max_chunk_ = std::max<Eigen::Index>(1, kChunkBytes / (8 * (d + d * k + 2)));
+  max_chunk_ = std::max<Eigen::Index>(1, kArrayBytes / (8 * (d + d * k + 2)));
   if (max_chunk > 0) max_chunk_ = std::min<Eigen::Index>(max_chunk_, max_chunk);
 }
 

@@ -110,7 +110,7 @@ grpc::Status DoctorService::ServeOracle(
   }
   const std::string name = request.hello().mesh();
   v1::MeshSpec spec;
-  if (const grpc::Status refused = Admit(name, &spec); !refused.ok()) return refused;
+  if (grpc::Status refused = Admit(name, &spec); !refused.ok()) return refused;
   v1::ServeOracleResponse response;
   response.mutable_welcome()->set_dimension(spec.dimension());
   response.mutable_welcome()->set_ambient_dimension(spec.ambient_dimension());

@@ -56,7 +56,7 @@ void CheckFace(const Walls& face, int walls) {
 
 }  // namespace
 
-Wall HalfSpace(VectorXd normal, double offset) {
+Wall HalfSpace(const VectorXd& normal, double offset) {
   if (!normal.allFinite() || !(normal.norm() > 0)) Refuse("a half-space needs a normal");
   return {[normal, offset](const VectorXd& x) { return normal.dot(x) - offset; },
           [normal](const VectorXd& /*x*/) { return normal; }};
@@ -77,7 +77,7 @@ std::vector<Wall> Box(const VectorXd& lower, const VectorXd& upper) {
   return walls;
 }
 
-Wall Ball(VectorXd centre, double radius) {
+Wall Ball(const VectorXd& centre, double radius) {
   if (!centre.allFinite() || centre.size() < 1 || !(radius > 0)) {
     Refuse("a ball needs a centre and a positive radius");
   }

@@ -22,11 +22,11 @@ struct Wall {
 };
 
 // {x : normal . x >= offset}.
-Wall HalfSpace(Eigen::VectorXd normal, double offset = 0);
+Wall HalfSpace(const Eigen::VectorXd& normal, double offset = 0);
 // The sides of a box, lower ones first; an infinite side is none.
 std::vector<Wall> Box(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper);
 // The inside of a ball.
-Wall Ball(Eigen::VectorXd centre, double radius);
+Wall Ball(const Eigen::VectorXd& centre, double radius);
 
 // {x in M : g(x) >= 0 for all walls g}: a manifold with boundary, edges and corners.
 //

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <string>
+
+#include "core/base/message.h"
+
+namespace stellate::core {
+
+// "(0.5, 1, ...)": the first coordinates of a point, as messages name it.
+inline std::string NamePoint(const Eigen::VectorXd& x) {
+  std::string name = "(";
+  for (Eigen::Index i = 0; i < std::min<Eigen::Index>(x.size(), 6); ++i) {
+    name += Message(i > 0 ? ", " : "", Brief(x[i]));
+  }
+  return name + (x.size() > 6 ? ", ...)" : ")");
+}
+
+}  // namespace stellate::core
