@@ -111,6 +111,8 @@ def package() -> str:
     page += ["```\n", "## Ready oracles\n", "```{eval-rst}"]
     page += [".. automodule:: stellate.oracles", "   :no-members:\n"]
     for name in stellate.oracles.__all__:
+        if name in names:  # which has it already
+            continue
         page.append(f".. autoclass:: stellate.oracles.{name}")
     page += ["```\n", "## Manifolds of the catalogue\n", "```{eval-rst}"]
     page += [".. automodule:: stellate.manifolds", "```\n"]
