@@ -135,11 +135,17 @@ def veronese(x):
     return x[:, first] * x[:, second] * np.where(first == second, 1.0, np.sqrt(2))
 
 
+def times(a, b):
+    """Of complex numbers as pairs: numpy's own product rounds by where its arrays happen to lie."""
+    return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
+
+
 def lens(x):
     """S^3 in C^2 under (z, w) -> (e^(2 pi i / 3) z, e^(2 pi i / 3) w): the monomials of degree 3."""
-    z, w = x[:, 0] + 1j * x[:, 1], x[:, 2] + 1j * x[:, 3]
-    terms = [z * z * z, np.sqrt(3) * z * z * w, np.sqrt(3) * z * w * w, w * w * w]
-    return np.stack([part for term in terms for part in (term.real, term.imag)], axis=1)
+    z, w = x.T[:2], x.T[2:]
+    zz, ww, root = times(z, z), times(w, w), (np.sqrt(3), 0.0)
+    terms = [times(zz, z), times(root, times(zz, w)), times(root, times(z, ww)), times(ww, w)]
+    return np.stack([part for term in terms for part in term], axis=1)
 
 
 def klein(x):
