@@ -9,7 +9,7 @@ import tempfile
 
 from google.protobuf import descriptor_pb2
 
-FILES = ("stellate", "mesh", "oracle", "geometry", "errors")
+FILES = ("stellate", "mesh", "oracle", "geometry", "errors", "doctor")
 _TYPES = {
     number: name.removeprefix("TYPE_").lower()
     for name, number in descriptor_pb2.FieldDescriptorProto.Type.items()
