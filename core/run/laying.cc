@@ -62,14 +62,16 @@ bool Laying<K>::Suits(const ResolvedCriteria& criteria, const AnsweredPoints& se
 }
 
 template <int K>
-Laying<K>::Laying(Engine<K>& engine, const AnsweredPoints& seeds)
+Laying<K>::Laying(Engine<K>& engine)
     : engine_(engine),
       growth_(engine.complex().d(), SpacingFor(K, engine.criteria().epsilon)),
-      seeds_(seeds) {
-  scouting_ = std::make_unique<Growth<K>>(engine.complex().d(), kApart * growth_.spacing());
-  Append(seeds_,
-         scouting_->Begin(seeds_.points, seeds_.tangents, seeds_.found, scouting_->spacing()),
-         &scouts_);
+      scouting_(std::make_unique<Growth<K>>(engine.complex().d(), kApart * growth_.spacing())) {}
+
+template <int K>
+std::vector<std::uint8_t> Laying<K>::Begin(const AnsweredPoints& seeds) {
+  seeds_ = seeds;
+  return Scout(seeds, scouting_->Begin(seeds.points, seeds.tangents, seeds.found,
+                                       scouting_->spacing()));
 }
 
 template <int K>
@@ -85,9 +87,12 @@ std::vector<std::uint8_t> Laying<K>::Lay(const AnsweredPoints& answers,
   return used;
 }
 
+// What scouts find is of the sample at once: it is what there is if the run ends here.
 template <int K>
-void Laying<K>::Begin(const AnsweredPoints& seeds, double apart) {
-  Lay(seeds, growth_.Begin(seeds.points, seeds.tangents, seeds.found, apart));
+std::vector<std::uint8_t> Laying<K>::Scout(const AnsweredPoints& answers,
+                                           const std::vector<Eigen::Index>& columns) {
+  Append(answers, columns, &scouts_);
+  return Lay(answers, columns);
 }
 
 template <int K>
@@ -97,13 +102,14 @@ PlannedPoints Laying<K>::Next() {
   if (scouting_ && scouting_->size() > 1) ring = scouting_->Propose();
   if (scouting_ && ring.points.cols() == 0) {
     scouting_.reset();
-    Begin(scouts_, 0);
+    growth_.Begin(scouts_.points, scouts_.tangents, scouts_.found, 0);
   }
   if (!scouting_ && !engine_.is_full()) {
     ring = growth_.Propose();
     if (ring.points.cols() == 0) {
       // What no patch came near has seeds of its own.
-      Begin(seeds_, kApart * growth_.spacing());
+      Lay(seeds_, growth_.Begin(seeds_.points, seeds_.tangents, seeds_.found,
+                                kApart * growth_.spacing()));
       if (!engine_.is_full()) ring = growth_.Propose();
     }
   }
@@ -118,9 +124,7 @@ std::vector<std::uint8_t> Laying<K>::Take(const AnsweredPoints& answers) {
   Growth<K>& growth = scouting_ ? *scouting_ : growth_;
   const std::vector<Eigen::Index> joined =
       growth.Join(answers.points, answers.tangents, answers.found);
-  if (!scouting_) return Lay(answers, joined);
-  Append(answers, joined, &scouts_);
-  return std::vector<std::uint8_t>(answers.found.size(), 0);
+  return scouting_ ? Scout(answers, joined) : Lay(answers, joined);
 }
 
 template <int K>

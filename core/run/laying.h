@@ -22,8 +22,10 @@ class Laying {
   // saved.
   static bool Suits(const ResolvedCriteria& criteria, const AnsweredPoints& seeds);
 
-  // Begins from those of the seeds that were found. The engine is borrowed.
-  Laying(Engine<K>& engine, const AnsweredPoints& seeds);
+  explicit Laying(Engine<K>& engine);  // borrowed
+
+  // Begins from those of the seeds that were found. Returns which of them joined the sample.
+  std::vector<std::uint8_t> Begin(const AnsweredPoints& seeds);
 
   // What to ask next; empty when the sample is laid, as far as it can be.
   PlannedPoints Next();
@@ -36,7 +38,8 @@ class Laying {
  private:
   std::vector<std::uint8_t> Lay(const AnsweredPoints& answers,
                                 const std::vector<Eigen::Index>& columns);
-  void Begin(const AnsweredPoints& seeds, double apart);
+  std::vector<std::uint8_t> Scout(const AnsweredPoints& answers,
+                                  const std::vector<Eigen::Index>& columns);
 
   Engine<K>& engine_;
   Growth<K> growth_;

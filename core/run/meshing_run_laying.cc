@@ -18,8 +18,8 @@ void MeshingRun<K>::InsertSeeds() {
   repeat_check_.Sample(answers);
   std::vector<std::uint8_t> used(static_cast<std::size_t>(count), 0);
   if (spec_.walls == 0 && Laying<K>::Suits(engine_.criteria(), answers)) {
-    laying_ = std::make_unique<Laying<K>>(engine_, answers);
-    return spare_points_.Keep(answers, used);
+    laying_ = std::make_unique<Laying<K>>(engine_);
+    return spare_points_.Keep(answers, laying_->Begin(answers));
   }
   for (Eigen::Index c = 0; c < count; ++c) {
     const auto i = static_cast<std::size_t>(c);
