@@ -70,8 +70,8 @@ Laying<K>::Laying(Engine<K>& engine)
 template <int K>
 std::vector<std::uint8_t> Laying<K>::Begin(const AnsweredPoints& seeds) {
   seeds_ = seeds;
-  return Scout(seeds, scouting_->Begin(seeds.points, seeds.tangents, seeds.found,
-                                       scouting_->spacing()));
+  return Scout(seeds,
+               scouting_->Begin(seeds.points, seeds.tangents, seeds.found, scouting_->spacing()));
 }
 
 template <int K>
@@ -108,8 +108,8 @@ PlannedPoints Laying<K>::Next() {
     ring = growth_.Propose();
     if (ring.points.cols() == 0) {
       // What no patch came near has seeds of its own.
-      Lay(seeds_, growth_.Begin(seeds_.points, seeds_.tangents, seeds_.found,
-                                kApart * growth_.spacing()));
+      Lay(seeds_,
+          growth_.Begin(seeds_.points, seeds_.tangents, seeds_.found, kApart * growth_.spacing()));
       if (!engine_.is_full()) ring = growth_.Propose();
     }
   }
