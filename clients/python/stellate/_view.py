@@ -13,7 +13,6 @@ import signal
 import subprocess
 import tempfile
 import webbrowser
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -256,12 +255,7 @@ class LiveView:
     def __enter__(self) -> LiveView:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self.close()
 
     def __del__(self) -> None:

@@ -41,17 +41,10 @@ public final class Server implements AutoCloseable {
       }
       onPath("stellated").forEach(candidates::add);
     }
-    return candidates.stream()
-        .filter(path -> Files.isRegularFile(path) && Files.isExecutable(path))
-        .findFirst()
-        .orElseThrow(
-            () ->
-                new StellateException(
-                    StellateException.Kind.SERVER_NOT_FOUND,
-                    "SERVER_NOT_FOUND",
-                    "no server was given and no stellated found to start: name a server, or set"
-                        + " $STELLATED to the binary, or put it on PATH, or build it"
-                        + " (clients/quickstart does)"));
+    return firstProgram(
+        candidates,
+        "no server was given and no stellated found to start: name a server, or set $STELLATED to"
+            + " the binary, or put it on PATH, or build it (clients/quickstart does)");
   }
 
   /** The command-line program: beside the server binary, else on PATH. */
@@ -63,16 +56,22 @@ public final class Server implements AutoCloseable {
       candidates.clear(); // one that is on PATH without its server will do
     }
     onPath("stellate").forEach(candidates::add);
+    return firstProgram(
+        candidates,
+        "the program stellate, which examines oracles, is neither beside stellated nor on PATH:"
+            + " install it, or build it (clients/quickstart does)");
+  }
+
+  private static Path firstProgram(List<Path> candidates, String noneIsThere) {
     return candidates.stream()
         .filter(path -> Files.isRegularFile(path) && Files.isExecutable(path))
         .findFirst()
-        .orElseThrow(
-            () ->
-                new StellateException(
-                    StellateException.Kind.SERVER_NOT_FOUND,
-                    "SERVER_NOT_FOUND",
-                    "the program stellate, which examines oracles, is neither beside stellated nor"
-                        + " on PATH: install it, or build it (clients/quickstart does)"));
+        .orElseThrow(() -> notFound(noneIsThere, null));
+  }
+
+  private static StellateException notFound(String words, IOException cause) {
+    var kind = StellateException.Kind.SERVER_NOT_FOUND;
+    return new StellateException(kind, "SERVER_NOT_FOUND", words, cause);
   }
 
   private static Stream<Path> onPath(String name) {
@@ -124,11 +123,7 @@ public final class Server implements AutoCloseable {
       }
       return server;
     } catch (IOException error) {
-      throw new StellateException(
-          StellateException.Kind.SERVER_NOT_FOUND,
-          "SERVER_NOT_FOUND",
-          "cannot start " + program.get(0) + ": " + error.getMessage(),
-          error);
+      throw notFound("cannot start " + program.get(0) + ": " + error.getMessage(), error);
     }
   }
 
