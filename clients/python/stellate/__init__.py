@@ -24,7 +24,7 @@ from ._doctor.findings import CheckReport, Finding  # noqa: E402
 from ._executors import ExecutorWorkers, workers_on  # noqa: E402
 from ._files.formats import check_save  # noqa: E402
 from ._mesh import Mesh, load_txt  # noqa: E402
-from ._pull import pull  # noqa: E402
+from ._pull import pull, pull_check  # noqa: E402
 from ._series import save_series  # noqa: E402
 from ._server import Server, find_stellated  # noqa: E402
 from ._version import __version__ as __version__  # noqa: E402
@@ -117,6 +117,7 @@ __all__ = [
     "mesh",
     "progress_bar",
     "pull",
+    "pull_check",
     "save_series",
     "serve",
     "watch",

@@ -5,31 +5,26 @@ For programs that may be entered on one thread alone, such as R, MATLAB, Julia a
 
 from __future__ import annotations
 
+import contextlib
+import os
 from typing import Any
 
+from ._checkpoint import Checkpoint
 from ._chunks import Declared, Puller
 from ._credentials import Credentials
+from ._doctor.check import check
 from ._run import Run
 from ._server import Server
-from ._worker import Worker
 from .client import Client
 from .errors import InvalidArgument
+from .oracle import CheckedOracle
 from .report import Progress
-
-
-class _PullingClient(Client):
-    """Its workers hand their chunks to a Puller."""
-
-    puller: Puller
-
-    def worker(self, *arguments: Any, **options: Any) -> Worker:
-        return super().worker(*arguments, **options, ask=self.puller.ask)
 
 
 def pull(
     dimension: int,
     ambient_dimension: int,
-    epsilon: float,
+    epsilon: float | str,
     server: str | Server | None = None,
     *,
     bounding_box: Any = None,
@@ -37,6 +32,8 @@ def pull(
     intersect_flat: bool = False,
     tangent_basis: bool = False,
     local_size: bool = False,
+    walls: int = 0,
+    checkpoint: str | os.PathLike[str] | None = None,
     credentials: Credentials | None = None,
     **criteria: Any,
 ) -> Puller:
@@ -49,43 +46,76 @@ def pull(
 
     Args:
       dimension, ambient_dimension: k and d.
-      epsilon: a length; "auto" needs an oracle that can be called.
+      epsilon: a length, or "auto": then the first chunks are the doctor's.
       bounding_box, seeds: where the manifold is: see stellate.Oracle. One of the two is needed.
       intersect_flat, tangent_basis, local_size: what the answers will have when a chunk wants it.
-      server, credentials, criteria: as for stellate.mesh; `workers` is 1.
+      walls: how many walls bound the manifold: then chunks may be about a face, and want clearances
+        and conormals.
+      server, checkpoint, credentials, criteria: as for stellate.mesh; `workers` is 1.
 
     The loop ends when the mesh is finished, and raises how it failed. A loop that takes minutes over a
     chunk has to let Python run meanwhile, or the server takes it for dead: see `answer_seconds`.
     """
-    if isinstance(epsilon, str):
-        raise InvalidArgument("epsilon='auto' needs an oracle that can be called: give a length")
-    declared = Declared(
-        dimension,
-        ambient_dimension,
-        intersect_flat=intersect_flat,
-        tangent_basis=tangent_basis,
-        local_size=local_size,
-    )
-    declared.bounding_box, declared.seeds = bounding_box, seeds
+    if checkpoint is not None and not (server is None and credentials is None):
+        raise InvalidArgument("checkpoint is for a private server: one that is named keeps meshes")
     puller = Puller()
-    client = _PullingClient(server, credentials)
-    client.puller = puller
+    declared = _examined(
+        puller, dimension, ambient_dimension, bounding_box=bounding_box, seeds=seeds, walls=walls,
+        intersect_flat=intersect_flat, tangent_basis=tangent_basis, local_size=local_size,
+    )  # fmt: skip
 
     def note(progress: Progress) -> None:
         puller.progress = progress
 
-    try:
-        session = Run(declared, epsilon, client, note, {**criteria, "workers": 1}, every=False)
-    except BaseException:
-        client.close()
-        raise
+    def work() -> None:
+        with contextlib.ExitStack() as stack:
+            kept = None
+            at: Any = server
+            if checkpoint is not None:
+                kept = stack.enter_context(Checkpoint(checkpoint))
+            if credentials is not None:
+                at = stack.enter_context(Client(server, credentials))
+            session = Run(
+                declared, epsilon, at, note, {**criteria, "workers": 1}, every=False,
+                checkpoint=kept, ask=puller.ask,
+            )  # fmt: skip
+            stack.enter_context(session)
+            puller.stop = session.interrupt
+            if puller.left:
+                session.interrupt()
+            (puller.mesh,) = session
+
+    return puller.start(work).begun()
+
+
+def pull_check(
+    dimension: int, ambient_dimension: int, epsilon: float | None = None, **oracle: Any
+) -> Puller:
+    """As stellate.check, of an oracle whose questions are answered in a loop of yours.
+
+        with stellate.pull_check(2, 3, bounding_box=([-1.5] * 3, [1.5] * 3)) as worker:
+            for chunk in worker:
+                chunk.answer(closest(chunk.points))
+        print(worker.report)
+
+    Args:
+      oracle: bounding_box, seeds, intersect_flat, tangent_basis, local_size and walls, as for
+        stellate.pull.
+
+    An answer that cannot be one, and fail(), are findings, too.
+    """
+    puller = Puller()
+    declared = _examined(puller, dimension, ambient_dimension, **oracle)
 
     def work() -> None:
-        try:
-            with session:
-                (puller.mesh,) = session
-        finally:
-            client.close()
+        puller.report = check(declared, epsilon)
 
-    puller.stop = session.interrupt
-    return puller.start(work)
+    return puller.start(work).begun()
+
+
+def _examined(puller: Puller, *dimensions: Any, **oracle: Any) -> Declared:
+    """An oracle whose methods, which a doctor calls, ask the puller."""
+    declared = Declared(
+        *dimensions, lambda chunk: puller.ask(CheckedOracle(declared), chunk, True), **oracle
+    )
+    return declared

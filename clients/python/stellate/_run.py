@@ -16,7 +16,7 @@ from ._follow import Following, OnProgress
 from ._mesh import Mesh
 from ._server import Server
 from ._wire.spec import mesh_spec
-from ._worker import check_max_chunk, join_all
+from ._worker import Ask, answer, check_max_chunk, join_all
 from .client import Client, MeshInfo
 from .errors import Interrupted, InvalidArgument, StellateError
 from .oracle import CheckedOracle
@@ -38,14 +38,21 @@ class _Workers:
         count: int,
         max_chunk: int | None,
         on_failure: Callable[[BaseException], None],
+        ask: Ask,
     ) -> None:
         """`on_failure` is told of each; what it raises in turn, the server is not told."""
         self.failure: BaseException | None = None
         self._on_failure = on_failure
         self._workers = [
             client.worker(
-                oracle, mesh, f"python-{i + 1}", self._note, quiet=True, max_chunk=max_chunk
-            )
+                oracle,
+                mesh,
+                f"python-{i + 1}",
+                self._note,
+                quiet=True,
+                ask=ask,
+                max_chunk=max_chunk,
+            )  # fmt: skip
             for i in range(count)
         ]
         self._threads = [
@@ -107,8 +114,12 @@ class Run:
         *,
         every: bool = True,
         checkpoint: Checkpoint | None = None,
+        ask: Ask = answer,
     ) -> None:
-        """`every`: iterating gives the mesh at every revision, and not only when it is finished."""
+        """`every`: iterating gives the mesh at every revision, and not only when it is finished.
+
+        `ask`: see Client.worker.
+        """
         workers = criteria.pop("workers", 1)
         if not isinstance(workers, numbers.Integral) or workers < 1:
             raise InvalidArgument(f"workers has to be a whole number from 1 on, and is {workers!r}")
@@ -147,7 +158,7 @@ class Run:
             raise
         self._live = _Live(server, info, Following(server, info, on_progress, every))
         self._live.workers = _Workers(
-            server, checked, info.name, int(workers), max_chunk, self._on_failure
+            server, checked, info.name, int(workers), max_chunk, self._on_failure, ask
         )
 
     @property

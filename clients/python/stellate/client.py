@@ -170,12 +170,15 @@ class Client:
             self._stub, checked, name, worker, on_failure, self._policy, quiet, ask, max_chunk
         )
 
-    def pull(self, name: str, *, worker: str = "", max_chunk: int | None = None) -> Puller:
+    def pull(
+        self, name: str, *, worker: str = "", max_chunk: int | None = None, **can: Any
+    ) -> Puller:
         """Serves a mesh from a loop of the caller's, on the caller's own thread: see stellate.pull.
 
-        What the mesh was declared with, answers have to have.
+        `can`: what answers can have, intersect_flat, tangent_basis, local_size and walls, where that
+        is to be compared with what the mesh was declared with; without any it is all of that.
         """
-        puller, declared = Puller(), Declared.of(self.get_spec(name))
+        puller, declared = Puller(), Declared.of(self.get_spec(name), **can)
         return puller.serve(
             self.worker(declared, name, worker, ask=puller.ask, max_chunk=max_chunk)
         )

@@ -74,8 +74,27 @@ sphere <- list(
   }
 )
 
+# The part of the sphere where z and y are not negative, its two walls.
+axes <- c(3, 2)
+lune <- list(
+  closest_point = sphere$closest_point, tangent_basis = sphere$tangent_basis, walls = 2,
+  face_point = function(x, face) {
+    x[, axes[face]] <- 0
+    points <- sphere$closest_point(x)
+    points[is.nan(points)] <- NA
+    points
+  },
+  clearances = function(p) p[, axes, drop = FALSE],
+  conormals = function(p, face) {
+    normals <- array(0, c(nrow(p), length(face), 3))
+    for (i in seq_along(face)) normals[, i, axes[face[i]]] <- -1
+    normals
+  }
+)
+
 oracles <- list(
   torus = like_torus(torus), clifford = clifford, sphere = sphere,
+  lune = lune,
   half = like_torus(function(x) {
     points <- torus(x)
     points[x[, 1] < 0, ] <- NA

@@ -65,6 +65,87 @@ stopifnot(grepl("epsilon", said), grepl("InvalidArgument", said))
 said <- meshed(function(x) x[, 1:2, drop = FALSE])
 stopifnot(grepl("3 columns", said))
 
+# Manifolds with boundary: the half of the unit sphere above the plane z = 0.
+half <- list(
+  closest_point = function(x) x / norm(x),
+  walls = 1,
+  face_point = function(x, face) {
+    stopifnot(identical(face, 1L))
+    x[, 3] <- 0
+    x / norm(x)
+  },
+  tangent_basis = function(p) {
+    s <- ifelse(p[, 3] < 0, -1, 1)
+    a <- -1 / (s + p[, 3])
+    b <- p[, 1] * p[, 2] * a
+    first <- c(1 + s * p[, 1]^2 * a, s * b, -s * p[, 1])
+    array(c(first, b, s + p[, 2]^2 * a, -p[, 2]), c(nrow(p), 3, 2))
+  },
+  clearances = function(p) p[, 3],
+  conormals = function(p, face) array(rep(c(0, 0, -1), each = nrow(p)), c(nrow(p), 1, 3))
+)
+with_oracle <- function(what, oracle, ...) do.call(what, c(oracle, list(...)))
+unit_box <- box(rep(1.1, 3))
+grown <- with_oracle(mesh, half,
+  dimension = 2, ambient_dimension = 3, epsilon = 0.2, bounding_box = unit_box, server = address
+)
+expected <- as.integer(strsplit(trimws(Sys.getenv("STELLATE_TEST_HEMISPHERE")), " ")[[1]])
+stopifnot(identical(c(nrow(grown$points), nrow(grown$simplices)), expected), grown$certified)
+on <- grown$points[, 3] == 0
+stopifnot(identical(dim(grown$walls), c(expected[1], 1L)), identical(as.vector(grown$walls), on))
+circle <- boundary(grown)
+stopifnot(length(circle) == 1, circle[[1]]$walls == 1, nrow(circle[[1]]$simplices) == sum(on))
+stopifnot(setequal(circle[[1]]$simplices, which(on)))
+said <- failure(mesh(half$closest_point, 2, 3, 0.2, unit_box, walls = 1, server = address))
+stopifnot(grepl("tangent_basis and face_point and clearances and conormals", said))
+
+# The doctor.
+examined <- check(torus$closest_point, 2, 3, box(c(1.54, 1.54, 0.44)),
+  tangent_basis = torus$tangent_basis
+)
+stopifnot(examined$ok, abs(examined$reach - 0.4) < 0.1, !"error" %in% examined$findings$severity)
+stopifnot(any(grepl("keeps its contract", capture.output(print(examined)))))
+examined <- with_oracle(check, half, dimension = 2, ambient_dimension = 3, bounding_box = unit_box)
+stopifnot(examined$ok)
+codes <- function(closest_point, ...) check(closest_point, 2, 3, unit_box, ...)$findings$code
+stopifnot("NOT_IDEMPOTENT" %in% codes(function(x) (x + half$closest_point(x)) / 2))
+stopifnot("RAISED" %in% codes(function(x) stop("no such surface")))
+stopifnot("NOT_FINITE" %in% codes(function(x) x / 0))
+inwards <- half
+inwards$conormals <- function(p, face) -half$conormals(p, face)
+found <- with_oracle(check, inwards, dimension = 2, ambient_dimension = 3, bounding_box = unit_box)
+stopifnot("CONORMAL_INWARD" %in% found$findings$code, !found$ok)
+
+# A quarter of the reach, for those who have no size in mind.
+grown <- mesh(half$closest_point, 2, 3, "auto", unit_box, server = address)
+stopifnot(grown$certified, abs(grown$python$report$epsilon - 0.25) < 0.05)
+stopifnot(grepl("NOT_IDEMPOTENT", failure(
+  mesh(function(x) (x + half$closest_point(x)) / 2, 2, 3, "auto", unit_box, server = address)
+)))
+
+# A checkpoint: an oracle stops in the middle, and the same call goes on from there.
+folder <- tempfile("checkpoint")
+asked <- 0
+stopping <- function(limit) {
+  function(x) {
+    asked <<- asked + nrow(x)
+    if (asked > limit) stop("the power is gone")
+    half$closest_point(x)
+  }
+}
+kept <- function(limit) {
+  asked <<- 0
+  failure(mesh(stopping(limit), 2, 3, 0.15, unit_box, checkpoint = folder))
+}
+stopifnot(identical(kept(1000), "the power is gone"))
+whole <- kept(Inf)
+stopifnot(whole$certified)
+again <- kept(0) # it is finished, and asks nothing
+stopifnot(asked == 0, identical(again$points, whole$points))
+stopifnot(grepl("private server", failure(
+  mesh(half$closest_point, 2, 3, 0.2, unit_box, checkpoint = folder, server = address)
+)))
+
 # A mesh of others.
 client <- python$Client(address)
 declared <- client$create(python$manifolds$Torus(), 0.1) # with tangents and sizes

@@ -5,7 +5,8 @@ import threading
 import numpy as np
 import pytest
 import stellate
-from stellate import manifolds
+from stellate import manifolds, oracles
+from stellate.oracle import CheckedOracle
 
 TORUS = manifolds.Torus()
 WHERE = {"bounding_box": TORUS.bounding_box}
@@ -134,3 +135,111 @@ def test_a_mesh_of_others_is_served_by_name(client):
     assert worker.state == "SUCCEEDED" and worker.mesh is None
     with pytest.raises(stellate.MeshNotFound):
         client.pull("meshes/" + "0" * 32)
+
+
+LUNE = oracles.Clipped(manifolds.Sphere(2), [lambda x: x[:, 2], lambda x: x[:, 1]])
+
+
+def answer_with(oracle, chunk):
+    """All that a chunk may want, at all its points."""
+    checked = CheckedOracle(oracle)
+    if chunk.face:
+        points, found = checked.face_points(chunk.points, chunk.face)
+    else:
+        points, found = checked.closest_points(chunk.points)
+    more = {}
+    if chunk.wants_tangents:
+        more["tangents"] = checked.tangents(points, found)
+    if chunk.wants_clearances:
+        more["clearances"] = checked.clearances(points, found)
+        if chunk.face:
+            more["conormals"] = checked.conormals(points, found, chunk.face)
+    chunk.answer(points, found=found, **more)
+
+
+LUNE_CAN = {"bounding_box": LUNE.bounding_box, "tangent_basis": True, "walls": 2}
+
+
+def test_manifolds_with_boundary(server, client):
+    faces = set()
+    with stellate.pull(2, 3, 0.3, server, **LUNE_CAN) as worker:
+        for chunk in worker:
+            faces.add(chunk.face)
+            answer_with(LUNE, chunk)
+    called = stellate.mesh(LUNE, 0.3, server)
+    assert np.array_equal(worker.mesh.points, called.points)
+    assert np.array_equal(worker.mesh.walls, called.walls) and called.walls.max() == 3
+    assert {(), (0,), (1,), (0, 1)} <= faces
+    info = client.create(LUNE, 0.3)
+    with client.pull(info.name, tangent_basis=True) as other:
+        with pytest.raises(stellate.InvalidArgument, match="2 walls, and this oracle's manifold 0"):
+            next(other)
+    with client.pull(info.name) as other:
+        for chunk in other:
+            answer_with(LUNE, chunk)
+    assert other.state == "SUCCEEDED"
+
+
+@pytest.mark.parametrize("oracle, can", [
+    (TORUS, {"tangent_basis": True, **WHERE}), (LUNE, LUNE_CAN),
+])  # fmt: skip
+def test_a_doctor_says_what_it_says_of_an_oracle_that_is_called(oracle, can):
+    with stellate.pull_check(2, 3, 0.1, **can) as worker:
+        for chunk in worker:
+            answer_with(oracle, chunk)
+    called = stellate.check(oracle, 0.1)
+    passing = {"SPEED", "SLOW"}  # by the clock
+    assert worker.report.ok
+    assert set(worker.report.codes) - passing == set(called.codes) - passing
+    assert worker.report.reach == pytest.approx(called.reach, rel=1e-6)
+
+
+def test_a_doctor_finds_what_is_wrong_with_answers():
+    def codes(do):
+        with stellate.pull_check(2, 3, **WHERE) as worker:
+            for chunk in worker:
+                do(chunk)
+        return worker.report.codes
+
+    assert "WRONG_SHAPE" in codes(lambda chunk: chunk.answer(chunk.points[:, :2]))
+    assert "NOT_FINITE" in codes(lambda chunk: chunk.answer(chunk.points * np.nan))
+    assert "RAISED" in codes(lambda chunk: chunk.fail("no such surface"))
+    assert "NOT_IDEMPOTENT" in codes(lambda chunk: chunk.answer(chunk.points * 0.9))
+    with stellate.pull_check(2, 3, **WHERE) as worker:
+        next(worker)  # and no more
+    with pytest.raises(stellate.InvalidArgument, match="length"):
+        stellate.pull_check(2, 3, "small", **WHERE)
+
+
+def test_automatic_sizes(server):
+    with stellate.pull(2, 3, "auto", server, tangent_basis=True, **WHERE) as worker:
+        for chunk in worker:
+            answer_with(TORUS, chunk)
+    assert worker.mesh.report.epsilon == pytest.approx(0.1, rel=0.2)
+    assert "a quarter of the reach" in worker.mesh.report.epsilon_reason
+    with pytest.raises(stellate.OracleError, match="NOT_IDEMPOTENT"):
+        with stellate.pull(2, 3, "auto", server, **WHERE) as worker:
+            for chunk in worker:
+                chunk.answer(chunk.points * 0.9)
+
+
+def test_a_checkpoint_goes_on_where_the_loop_was_left(tmp_path, server):
+    def grow(limit):
+        asked = 0
+        with stellate.pull(2, 3, 0.15, tangent_basis=True, checkpoint=tmp_path, **WHERE) as worker:
+            for chunk in worker:
+                asked += len(chunk)
+                if asked > limit:
+                    break
+                answer(chunk)
+        return asked, worker.mesh
+
+    first, left = grow(800)
+    assert left is None
+    second, mesh = grow(np.inf)
+    assert mesh.certified
+    assert grow(0)[0] == 0
+    whole = stellate.mesh(TORUS, 0.15, server)
+    assert np.array_equal(mesh.points, whole.points)
+    with pytest.raises(stellate.InvalidArgument, match="private server"):
+        stellate.pull(2, 3, 0.15, server, checkpoint=tmp_path, **WHERE)
