@@ -77,6 +77,10 @@ TEST_P(Stream, MakesThisMesh) {
   const std::string path = Scratch(TextAt(entry, "name"), "txt");
   ASSERT_TRUE(mesh->Save(path).has_value());
   EXPECT_EQ(ReadBytes(path), ReadBytes(FolderOfFiles() / TextAt(entry, "mesh")));
+  std::string walls;
+  for (const std::uint64_t bits : mesh->walls) walls += std::to_string(bits) + "\n";
+  const std::string file = TextAt(entry, "walls");
+  EXPECT_EQ(walls, file.empty() ? "" : ReadBytes(FolderOfFiles() / file));
   EXPECT_EQ(TerminationName(mesh->report.termination), TextAt(entry, "termination"));
   EXPECT_EQ(CertificateLevelName(mesh->report.certificate.level), TextAt(entry, "level"));
   const auto last = ReadStream(TextAt(ListAt(entry, "attempts").back(), "file")).back();

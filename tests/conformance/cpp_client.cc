@@ -1,8 +1,11 @@
 // The C++ client under `stellate conform`, whose help says what each line wants.
 #include <chrono>
+#include <cstdint>
+#include <fstream>
 #include <functional>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -42,6 +45,47 @@ class Circle final : public Oracle {
 
  private:
   const int d_;
+};
+
+// The part of the unit sphere where z >= 0 and y >= 0.
+class Lune final : public Oracle {
+ public:
+  int dimension() const override { return 2; }
+  int ambient_dimension() const override { return 3; }
+  bool has_tangent_basis() const override { return true; }
+  int walls() const override { return 2; }
+  std::optional<BoundingBox> bounding_box() const override { return sphere_->bounding_box(); }
+  Answer ClosestPoint(const Eigen::MatrixXd& x) override { return sphere_->ClosestPoint(x); }
+  Eigen::MatrixXd TangentBasis(const Eigen::MatrixXd& points) override {
+    return sphere_->TangentBasis(points);
+  }
+  Answer FacePoint(const Eigen::MatrixXd& x, const Walls& face) override {
+    Answer answer;
+    answer.points = x;
+    for (const int wall : face) answer.points.row(Axis(wall)).setZero();
+    const Eigen::ArrayXd lengths = answer.points.colwise().norm().transpose();
+    answer.points.colwise().normalize();
+    for (const double length : lengths) answer.found.push_back(length > 0);
+    return answer;
+  }
+  Eigen::MatrixXd Clearances(const Eigen::MatrixXd& points) override {
+    Eigen::MatrixXd values(2, points.cols());
+    for (int wall = 0; wall < 2; ++wall) values.row(wall) = points.row(Axis(wall));
+    return values;
+  }
+  Eigen::MatrixXd Conormals(const Eigen::MatrixXd& points, const Walls& face) override {
+    const auto count = static_cast<Eigen::Index>(face.size());
+    Eigen::MatrixXd normals = Eigen::MatrixXd::Zero(3 * count, points.cols());
+    for (Eigen::Index i = 0; i < count; ++i) {
+      normals.row(3 * i + Axis(face[static_cast<size_t>(i)])).setConstant(-1);
+    }
+    return normals;
+  }
+
+ private:
+  static int Axis(int wall) { return wall == 0 ? 2 : 1; }
+
+  const std::unique_ptr<Manifold> sphere_ = MakeManifold("sphere:2", nullptr);
 };
 
 // A manifold of the catalogue, changed as the kit wants it.
@@ -114,6 +158,10 @@ std::string Watch(int k, int d, const std::string& path, const std::string& serv
   const Expected<Mesh> mesh = MeshManifold(oracle, options);
   if (!mesh) return Words(mesh.error());
   if (const auto saved = mesh->Save(path); !saved) return Words(saved.error());
+  if (!mesh->walls.empty()) {
+    std::ofstream file(path + ".walls");
+    for (const std::uint64_t bits : mesh->walls) file << bits << '\n';
+  }
   return std::string("mesh - ") + TerminationName(mesh->report.termination) + " " +
          CertificateLevelName(mesh->report.certificate.level);
 }
@@ -130,7 +178,9 @@ std::string Create(const std::string& label, const std::string& how, const std::
   } else if (how.rfind("token=", 0) == 0) {
     options.credentials.token = how.substr(6);
   }
-  const Expected<Mesh> mesh = MeshManifold(*torus.oracle, options);
+  Lune lune;
+  Oracle& oracle = how == "walls" ? static_cast<Oracle&>(lune) : *torus.oracle;
+  const Expected<Mesh> mesh = MeshManifold(oracle, options);
   return mesh ? "created -" : Words(mesh.error());
 }
 
@@ -154,6 +204,10 @@ std::string Obey(const std::string& line, const std::string& server) {
   if (second.rfind("circle:", 0) == 0) {
     Circle circle(std::stoi(second.substr(7)));
     return Serve(circle, first, server);
+  }
+  if (second == "lune") {
+    Lune lune;
+    return Serve(lune, first, server);
   }
   const Changed changed = Named(second);
   return Serve(*changed.oracle, first, server);

@@ -20,8 +20,10 @@ FAULT = sys.argv[1]
 
 def answers(oracle, chunk):
     x = from_wire(chunk.points, -1, oracle.ambient_dimension)
+    face = tuple(chunk.face)
     try:
-        points, found = oracle.closest_point(x), np.ones(len(x), bool)
+        points = oracle.face_point(x, face) if face else oracle.closest_point(x)
+        found = np.ones(len(x), bool)
     except stellate.NotConverged as partly:
         points, found = np.where(partly.converged[:, None], partly.points, np.nan), partly.converged
     if FAULT == "finds-all":
@@ -34,6 +36,13 @@ def answers(oracle, chunk):
         if FAULT == "columns-first":
             bases = bases.transpose(0, 2, 1).reshape(bases.shape)
         reply.tangents.CopyFrom(to_wire(bases))
+    if chunk.want_clearances:
+        clearances = oracle.clearances(np.where(found[:, None], points, 0.0))
+        reply.clearances.CopyFrom(to_wire(abs(clearances) if FAULT == "no-sign" else clearances))
+        if face:
+            order = face[::-1] if FAULT == "walls-descend" else face
+            normals = oracle.conormals(points, order)
+            reply.conormals.CopyFrom(to_wire(-normals if FAULT == "inwards" else normals))
     if FAULT == "no-lease":
         reply.lease = 0
     return reply
@@ -73,6 +82,9 @@ class Stream:
         for said in self.call:
             kind = said.WhichOneof("message")
             if kind == "welcome":
+                if said.welcome.walls != getattr(self.oracle, "walls", 0) and FAULT != "any-walls":
+                    self.say()
+                    return "error request INVALID_ARGUMENT other walls"
                 every = said.welcome.answer_seconds / 4
                 if FAULT == "always-busy":
                     every = 0.25

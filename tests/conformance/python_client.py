@@ -45,6 +45,34 @@ class Sphere(manifolds.Sphere):
         return points, (half > 0) & (np.abs(step) <= radii)
 
 
+class Lune(manifolds.Sphere):
+    """The part of the sphere where z >= 0 and y >= 0."""
+
+    walls, local_size = 2, None
+
+    def __init__(self) -> None:
+        super().__init__(2)
+
+    @staticmethod
+    def normals(face):
+        return np.eye(3)[[2 - wall for wall in face]]
+
+    def face_point(self, x, face):
+        flat = x * (1 - self.normals(face).sum(axis=0))
+        found = flat.any(axis=1)
+        flat[~found] = np.nan
+        points = flat / np.sqrt((flat * flat).sum(axis=1))[:, None]
+        if not found.all():
+            raise stellate.NotConverged(points, found)
+        return points
+
+    def clearances(self, p):
+        return p[:, [2, 1]]
+
+    def conormals(self, p, face):
+        return np.broadcast_to(-self.normals(face), (len(p), len(face), 3))
+
+
 class Half(manifolds.Torus):
     def closest_point(self, x):
         found = x[:, 0] >= 0
@@ -71,7 +99,7 @@ def named(name: str) -> Any:
         oracle = manifolds.ProductOfCircles()
     else:
         kinds = {"torus": manifolds.Torus, "so3": manifolds.SpecialOrthogonal3}
-        kinds |= {"sphere": Sphere, "half": Half, "raises": Raises, "slow": Slow}
+        kinds |= {"sphere": Sphere, "lune": Lune, "half": Half, "raises": Raises, "slow": Slow}
         oracle = kinds[name]()
     if not hasattr(oracle, "bounding_box"):
         d = oracle.ambient_dimension
@@ -94,12 +122,14 @@ def watch(client: stellate.Client, mesh: str, path: str, *dimensions: str) -> st
     except stellate.Cancelled as stopped:
         last = stopped.mesh
     last.save(path)
+    if last.walls is not None:
+        pathlib.Path(f"{path}.walls").write_text("".join(f"{bits}\n" for bits in last.walls))
     level = last.report.certificate.level
     return f"mesh {last.revision} {last.report.termination} {level}"
 
 
 def create(client: stellate.Client, label: str, how: str = "") -> str:
-    torus = manifolds.Torus()
+    torus = named("lune") if how == "walls" else manifolds.Torus()
     if how == "seeds":
         torus.seeds, torus.bounding_box = np.array([[1.4, 0.0, 0.0]]), None
     if how.startswith("token="):

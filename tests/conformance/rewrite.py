@@ -18,6 +18,7 @@ import grpc  # noqa: E402
 import shapes  # noqa: E402
 import stellate  # noqa: E402
 from fake_server import indices  # noqa: E402
+from python_client import named  # noqa: E402
 from stellate import manifolds  # noqa: E402
 from stellate._generated import errors_pb2, mesh_pb2, stellate_pb2  # noqa: E402
 from stellate._generated import status_details_pb2 as details_pb  # noqa: E402
@@ -59,7 +60,8 @@ def record(oracle: object, epsilon: float, **criteria: object) -> tuple[list[Eve
         return events, stellate.download(name, server=client)
 
 
-def delta(revision, first=0, points=(), added=(), removed=(), complete=True) -> Event:
+def delta(revision, first=0, points=(), added=(), removed=(), complete=True, walls=()) -> Event:
+    """`walls`: pairs of a vertex and its walls as bits."""
     body = mesh_pb2.MeshDelta(revision=revision, first_vertex=first)
     if len(points):
         body.points.CopyFrom(to_wire(np.asarray(points, dtype=float)))
@@ -67,6 +69,8 @@ def delta(revision, first=0, points=(), added=(), removed=(), complete=True) -> 
         body.added.CopyFrom(indices(added))
     if len(removed):
         body.removed.CopyFrom(indices(removed))
+    body.boundary_vertices.extend(vertex for vertex, _ in walls)
+    body.boundary_walls.extend(bits for _, bits in walls)
     return Event(delta=stellate_pb2.DeltaChunk(delta=body, complete=complete))
 
 
@@ -111,6 +115,10 @@ class Streams:
         else:
             entry["mesh"] = f"streams/{name}.txt"
             mesh.save(_HERE / entry["mesh"])
+            if mesh.walls is not None:
+                entry["walls"] = f"streams/{name}.walls"
+                lines = "".join(f"{bits}\n" for bits in mesh.walls)
+                (_HERE / entry["walls"]).write_text(lines)
             entry["revision"] = revision
             entry["state"], entry["termination"], entry["level"] = ends
         self.entries.append(entry)
@@ -153,6 +161,7 @@ def write_streams() -> None:
     streams.recorded(
         "budget", "stopped: a complex that is not closed", manifolds.Torus(), 0.4, max_vertices=60
     )
+    streams.recorded("lune", "a surface with boundary: two walls that meet", named("lune"), 0.4)
     triangle = stellate.Mesh(np.array(TRIANGLE), np.array(EDGES))
     end = final(3, 3)
 
@@ -183,6 +192,17 @@ def write_streams() -> None:
         "reset", "the server begins anew after the client had more",
         [(0, [delta(1, 0, [[9.0, 9.0]]), delta(5, 1, [[8.0, 8.0]], [[0, 1]]),
               Event(reset_mesh=stellate_pb2.ResetMesh()), whole, end], "OK")],
+    )  # fmt: skip
+    path = stellate.Mesh(np.array(TRIANGLE), np.array(EDGES[:2]), walls=np.array([0, 2, 5], "u8"))
+    ends = [
+        delta(1, 0, TRIANGLE[:2], EDGES[:1], complete=False, walls=[(1, 2)]),
+        delta(1, 2, TRIANGLE[2:], EDGES[1:2], walls=[(2, 5)]),
+    ]
+    made(
+        "walls", "walls of vertices, after chunks that were lost and a mesh that was begun anew",
+        [(0, [delta(1, 0, TRIANGLE[:1], walls=[(0, 1)]), delta(2, 1, TRIANGLE[1:], complete=False,
+              walls=[(2, 7)])], "UNAVAILABLE"),
+         (1, [Event(reset_mesh=stellate_pb2.ResetMesh()), *ends, final(3, 2)], "OK")], path,
     )  # fmt: skip
     newer = [
         UNKNOWN_FIELD,
@@ -218,6 +238,13 @@ def write_streams() -> None:
         "a simplex comes that is there already",
         [delta(1, 0, TRIANGLE, EDGES), delta(2, added=EDGES[:1]), final(3, 4)],
     )
+    refused(
+        "strange-walls", "walls of a vertex that was not sent",
+        [delta(1, 0, TRIANGLE, EDGES, walls=[(0, 1), (3, 1)]), end],
+    )  # fmt: skip
+    fewer = delta(1, 0, TRIANGLE, EDGES, walls=[(0, 1), (2, 1)])
+    del fewer.delta.delta.boundary_walls[1]
+    refused("fewer-walls", "fewer walls than vertices that lie on them", [fewer, end])
     wrong = delta(1, 0, TRIANGLE, EDGES)
     wrong.delta.delta.points.shape[:] = [2, 3]
     refused("shape", "an array of the wrong shape", [wrong, end])

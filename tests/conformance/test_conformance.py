@@ -74,6 +74,10 @@ def test_a_stream_makes_this_mesh(entry, tmp_path):
     assert replay.from_revisions == [attempt["from_revision"] for attempt in entry["attempts"]]
     mesh.save(tmp_path / "mesh.txt")
     assert (tmp_path / "mesh.txt").read_bytes() == (HERE / entry["mesh"]).read_bytes()
+    if "walls" in entry:
+        assert mesh.walls.tolist() == [int(line) for line in (HERE / entry["walls"]).open()]
+    else:
+        assert mesh.walls is None
     assert mesh.revision == entry["revision"]
     assert mesh.report.termination == entry["termination"]
     assert mesh.report.certificate.level == entry["level"]

@@ -212,6 +212,9 @@ bool Worker::Suits(const v1::Welcome& welcome) {
     };
     problem = "the mesh has " + space(welcome.dimension(), welcome.ambient_dimension()) +
               ", and this oracle's manifold has " + space(k, d);
+  } else if (welcome.walls() != static_cast<std::uint32_t>(oracle_.walls())) {
+    problem = "the mesh has " + std::to_string(welcome.walls()) +
+              " walls, and this oracle's manifold " + std::to_string(oracle_.walls());
   } else {
     const struct {
       std::string name;
@@ -219,9 +222,7 @@ bool Worker::Suits(const v1::Welcome& welcome) {
     } abilities[] = {
         {"intersect_flat", welcome.oracle().intersect_flat(), oracle_.has_intersect_flat()},
         {"tangent_basis", welcome.oracle().tangent_basis(), oracle_.has_tangent_basis()},
-        {"local_size", welcome.oracle().local_size(), oracle_.has_local_size()},
-        {std::to_string(welcome.walls()) + " walls",
-         welcome.walls() != static_cast<std::uint32_t>(oracle_.walls()), false}};
+        {"local_size", welcome.oracle().local_size(), oracle_.has_local_size()}};
     std::string missing;
     for (const auto& [name, asked, able] : abilities) {
       if (asked && !able) missing += (missing.empty() ? "" : " and ") + name;

@@ -1,4 +1,5 @@
 // Obeys `stellate conform`, whose help says what each line wants.
+import { writeFile } from "node:fs/promises";
 import { createInterface } from "node:readline";
 import { setTimeout } from "node:timers/promises";
 import {
@@ -80,6 +81,34 @@ const sphere: Oracle = {
   },
 };
 
+/** The part of the sphere where z and y are not negative: the axes of its two walls. */
+const axes = [2, 1];
+const lune: Oracle = {
+  dimension: 2,
+  ambientDimension: 3,
+  walls: 2,
+  boundingBox: [
+    [-1.1, -1.1, -1.1],
+    [1.1, 1.1, 1.1],
+  ],
+  closestPoint: (x, n) => sphere.closestPoint(x, n),
+  tangentBasis: (p, n) => sphere.tangentBasis?.(p, n) ?? new Float64Array(),
+  async facePoint(x, n, face) {
+    const flat = x.slice();
+    for (const wall of face) for (let i = axes[wall]; i < 3 * n; i += 3) flat[i] = 0;
+    const points = (await sphere.closestPoint(flat, n)) as Float64Array;
+    const found = Uint8Array.from({ length: n }, (_, i) => (Number.isNaN(points[3 * i]) ? 0 : 1));
+    return { points, found };
+  },
+  clearances: (p, n) =>
+    Float64Array.from({ length: 2 * n }, (_, i) => p[3 * (i >> 1) + axes[i % 2]]),
+  conormals(_, n, face) {
+    const normals = new Float64Array(3 * n * face.length);
+    for (let i = 0; i < n * face.length; i++) normals[3 * i + axes[face[i % face.length]]] = -1;
+    return normals;
+  },
+};
+
 class Half extends Torus {
   override closestPoint(x: Float64Array, n: number): Found {
     const answer = super.closestPoint(x, n);
@@ -112,11 +141,11 @@ function manifold(name: string): Oracle | undefined {
     half: new Half(),
     raises: new Raises(),
   };
-  return { ...all, clifford, sphere, slow }[name];
+  return { ...all, clifford, sphere, lune, slow }[name];
 }
 
 async function create(label: string, how = ""): Promise<string> {
-  const torus: Oracle = new Torus();
+  const torus: Oracle = how === "walls" ? lune : new Torus();
   if (how === "seeds") {
     torus.boundingBox = undefined;
     torus.seeds = Float64Array.of(1.4, 0, 0);
@@ -139,6 +168,7 @@ async function follow(name: string, path: string): Promise<string> {
     last = error.mesh;
   }
   await last?.save(path);
+  if (last?.walls) await writeFile(`${path}.walls`, last.walls.join("\n") + "\n");
   const report = last?.report;
   return `mesh ${last?.revision} ${report?.termination} ${report?.certificate?.level}`;
 }

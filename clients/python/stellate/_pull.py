@@ -13,6 +13,7 @@ from ._checkpoint import Checkpoint
 from ._chunks import Declared, Puller
 from ._credentials import Credentials
 from ._doctor.check import check
+from ._generated.oracle_pb2 import QueryChunk, ServeOracleRequest
 from ._run import Run
 from ._server import Server
 from .client import Client
@@ -113,9 +114,11 @@ def pull_check(
     return puller.start(work).begun()
 
 
-def _examined(puller: Puller, *dimensions: Any, **oracle: Any) -> Declared:
+def _examined(puller: Puller, dimension: Any, ambient_dimension: Any, **oracle: Any) -> Declared:
     """An oracle whose methods, which a doctor calls, ask the puller."""
-    declared = Declared(
-        *dimensions, lambda chunk: puller.ask(CheckedOracle(declared), chunk, True), **oracle
-    )
+
+    def ask(chunk: QueryChunk) -> ServeOracleRequest:
+        return puller.ask(CheckedOracle(declared), chunk, True)
+
+    declared = Declared(dimension, ambient_dimension, ask, **oracle)
     return declared

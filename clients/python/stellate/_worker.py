@@ -308,7 +308,6 @@ class Worker:
                 ("intersect_flat", welcome.oracle.intersect_flat, mine.has_intersect_flat),
                 ("tangent_basis", welcome.oracle.tangent_basis, mine.has_tangent_basis),
                 ("local_size", welcome.oracle.local_size, mine.has_local_size),
-                (f"{welcome.walls} walls", welcome.walls != mine.walls, False),
             )
             if asked and not able
         ]
@@ -316,6 +315,8 @@ class Worker:
         if wanted != have:
             problem = f"the mesh has dimension {wanted[0]} in R^{wanted[1]}, and this oracle's "
             problem += f"manifold has dimension {have[0]} in R^{have[1]}"
+        elif welcome.walls != mine.walls:
+            problem = f"the mesh has {welcome.walls} walls, and this oracle's manifold {mine.walls}"
         elif missing:
             problem = f"the mesh was declared with {' and '.join(missing)}, which this oracle lacks"
         if problem:

@@ -71,6 +71,28 @@ class Sphere
   end
 end
 
+# The part of the sphere where z and y are not negative, its two walls.
+class Lune < Sphere
+  AXES = [2, 1].freeze
+  undef_method :local_size, :intersect_flat
+
+  def walls = 2
+  def bounding_box = [[-1.1] * 3, [1.1] * 3]
+
+  def face_point(points, face)
+    axes = AXES.values_at(*face)
+    flat = points.map { |point| point.each_with_index.map { |x, axis| axes.include?(axis) ? 0.0 : x } }
+    closest_point(flat).map { |point| point unless point.any?(&:nan?) }
+  end
+
+  def clearances(points) = points.map { |point| point.values_at(*AXES) }
+
+  def conormals(points, face)
+    one_row = AXES.values_at(*face).flat_map { |axis| Array.new(3) { |i| i == axis ? -1.0 : 0.0 } }
+    points.map { one_row }
+  end
+end
+
 # A torus whose closest point the block may refuse.
 class Spoiled < Stellate::Torus
   def initialize(&spoil)
@@ -90,6 +112,7 @@ def manifold(name)
   when 'torus' then Stellate::Torus.new
   when 'clifford' then Stellate::ProductOfCircles.new
   when 'sphere' then Sphere.new
+  when 'lune' then Lune.new
   when 'half' then Spoiled.new { |x, found| x.zip(found).map { |from, point| point if from[0] >= 0 } }
   when 'raises' then Spoiled.new { |_x, _found| raise 'on purpose' }
   when 'slow' then Spoiled.new { |_x, found| sleep(2) && found }
@@ -97,7 +120,7 @@ def manifold(name)
 end
 
 def create(label, how = '')
-  torus = Stellate::Torus.new
+  torus = how == 'walls' ? Lune.new : Stellate::Torus.new
   torus.define_singleton_method(:bounding_box) { nil } if how == 'seeds'
   seeds = how == 'seeds' ? [[1.4, 0.0, 0.0]] : nil
   token = how.delete_prefix('token=') if how.start_with?('token=')
@@ -113,6 +136,7 @@ def watch(name, path, *_dimensions)
     raise unless (mesh = e.mesh)
   end
   mesh.save(path)
+  File.write("#{path}.walls", mesh.walls.map { |bits| "#{bits}\n" }.join) if mesh.walls
   ended = Stellate::Wire.name(mesh.report.termination, 'TERMINATION_')
   level = Stellate::Wire.name(mesh.report.certificate&.level || 0, 'CERTIFICATE_LEVEL_')
   "mesh #{mesh.revision} #{ended} #{level}"

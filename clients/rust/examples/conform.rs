@@ -35,6 +35,10 @@ fn watch(client: &Client, mesh: &str, path: &str) -> Result<String, Error> {
         other => other.map(|()| last.expect("a mesh"))?,
     };
     mesh.save(path)?;
+    if !mesh.walls.is_empty() {
+        let lines: String = mesh.walls.iter().map(|bits| format!("{bits}\n")).collect();
+        std::fs::write(format!("{path}.walls"), lines).expect("a folder of the kit's");
+    }
     let report = mesh.report.unwrap_or_default();
     let level = report.certificate.as_ref().map_or(0, |proved| proved.level);
     let ended = name(report.termination, Termination::as_str_name, "TERMINATION_");
@@ -65,11 +69,13 @@ impl Oracle for Seeded {
 
 fn create(server: &str, label: &str, how: &str) -> Result<String, Error> {
     let client = connect(server, how.strip_prefix("token="))?;
-    let torus = Torus::default();
-    let seeded = Seeded(torus);
-    let oracle: &dyn Oracle = if how == "seeds" { &seeded } else { &torus };
+    let oracle: Box<dyn Oracle> = match how {
+        "seeds" => Box::new(Seeded(Torus::default())),
+        "walls" => manifold("lune").expect("a manifold of the kit's"),
+        _ => Box::new(Torus::default()),
+    };
     let options = MeshOptions { label: label.to_string(), ..Default::default() };
-    Ok(format!("created {}", client.create(oracle, 0.5, &options)?.name))
+    Ok(format!("created {}", client.create(oracle.as_ref(), 0.5, &options)?.name))
 }
 
 fn obey(server: &str, client: &Client, words: &[&str]) -> Result<String, Error> {

@@ -50,6 +50,13 @@ func watch(ctx context.Context, client *stellate.Client, mesh, path string) (str
 	if err == nil {
 		err = last.Save(path)
 	}
+	if err == nil && last.Walls != nil {
+		var lines strings.Builder
+		for _, bits := range last.Walls {
+			fmt.Fprintln(&lines, bits)
+		}
+		err = os.WriteFile(path+".walls", []byte(lines.String()), 0o644)
+	}
 	if err != nil {
 		return "", err
 	}
@@ -70,8 +77,11 @@ func create(ctx context.Context, label, how string) (string, error) {
 	defer client.Close()
 	options := stellate.Options{Label: label}
 	var oracle stellate.Oracle = torus
-	if how == "seeds" {
+	switch how {
+	case "seeds":
 		oracle = seeded{torus, torus}
+	case "walls":
+		oracle = lune{}
 	}
 	mesh, err := client.Create(ctx, oracle, 0.5, &options)
 	return "created " + mesh.GetName(), err

@@ -3,6 +3,7 @@ package main
 import (
 	"errors"
 	"math"
+	"slices"
 	"strconv"
 	"strings"
 	"time"
@@ -102,6 +103,45 @@ func (sphere) IntersectFlat(centers, bases, radii, points []float64, found []boo
 	return nil
 }
 
+// lune is the part of the sphere where z and y are not negative, its two walls.
+type lune struct{ sphere }
+
+func axis(wall int) int { return 2 - wall }
+
+func (lune) Walls() int { return 2 }
+
+func (lune) BoundingBox() (lower, upper []float64) {
+	return []float64{-1.1, -1.1, -1.1}, []float64{1.1, 1.1, 1.1}
+}
+
+func (l lune) FacePoint(x []float64, face []uint32, points []float64, found []bool) error {
+	flat := slices.Clone(x)
+	for _, wall := range face {
+		for i := axis(int(wall)); i < len(flat); i += 3 {
+			flat[i] = 0
+		}
+	}
+	for i := range found {
+		at := flat[3*i : 3*i+3]
+		found[i] = dot(at, at) > 0
+	}
+	return l.ClosestPoint(flat, points, nil)
+}
+
+func (lune) Clearances(points, values []float64) error {
+	for i := range values {
+		values[i] = points[i/2*3+axis(i%2)]
+	}
+	return nil
+}
+
+func (lune) Conormals(_ []float64, face []uint32, normals []float64) error {
+	for i := range len(normals) / 3 {
+		normals[3*i+axis(int(face[i%len(face)]))] = -1
+	}
+	return nil
+}
+
 func manifold(name string) stellate.Oracle {
 	if d, is := strings.CutPrefix(name, "circle:"); is {
 		number, _ := strconv.Atoi(d)
@@ -114,6 +154,8 @@ func manifold(name string) stellate.Oracle {
 		return stellate.ProductOfCircles{K: 2}
 	case "sphere":
 		return sphere{}
+	case "lune":
+		return lune{}
 	case "half":
 		return changed{torus, func(x []float64, found []bool) error {
 			for i := range found {

@@ -30,9 +30,11 @@ standard input, one after the other, each with one line of its standard output:
 
   serve MESH MANIFOLD    serves the mesh until it is over: "over STATE"
   watch MESH PATH K D    watches the mesh, of dimension K in R^D, to its end and saves it to PATH, also if
-                         it was cancelled: "mesh REVISION TERMINATION LEVEL"
+                         it was cancelled: "mesh REVISION TERMINATION LEVEL". Of a manifold with
+                         boundary also PATH.walls: of each vertex a line, its walls as bits
   create LABEL           declares the torus with that label and epsilon 0.5: "created MESH";
   create LABEL seeds     with a seed in place of the box; LABEL token=TOKEN: with that token
+  create LABEL walls     declares the lune
   save MESH PATH         reads the .txt file MESH, and saves it to PATH: "saved"
 
 or with "error CLASS REASON WORDS" where that came of it, or with "unsupported". "-" stands for what the
@@ -46,6 +48,8 @@ MANIFOLD is one of
   circle:D       the unit circle of the first two coordinates of R^D
   so3            rotations, as 3 x 3 matrices, row after row
   sphere         the unit sphere of R^3, with intersections with lines, and sizes 1 + z / 2
+  lune           the quarter of the unit sphere between two walls, z >= 0 and y >= 0, in this order. From
+                 where all the points of a face are equally far, none is found
   half           the torus, whose closest point is not found from where x < 0
   raises         the torus, whose closest point fails with the words "on purpose"
   slow           the torus, which takes two seconds over every batch

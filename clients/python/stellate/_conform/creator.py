@@ -97,6 +97,16 @@ class Seeds(Creating):
             self.judge(rule, False, str(error), wanted)
 
 
+class Walls(Creating):
+    name, what, rules = "creator.walls", "walls", ("their-number", "capabilities", "declared")
+
+    def look(self, spec: mesh_pb2.MeshSpec, metadata: dict[str, str]) -> None:
+        self.judge("their-number", spec.walls == 2, f"walls is {spec.walls}", "2")
+        good = spec.oracle.tangent_basis and spec.oracle.conormals
+        came = str(spec.oracle).replace("\n", " ")
+        self.judge("capabilities", good, came, "tangent bases and conormals, which walls need")
+
+
 class Token(Creating):
     name, rules = "creator", ("token-in-metadata", "declared")
     what = f"token={_TOKEN}"
@@ -150,7 +160,7 @@ class Field(Creating):
 
 
 def creator_scenarios(*arguments: Any) -> Iterator[Scenario]:
-    for kind in (Defaults, Seeds, Field):
+    for kind in (Defaults, Seeds, Walls, Field):
         yield kind(*arguments)
     for entry in entries("errors.json")["statuses"]:
         yield Status(entry, *arguments)

@@ -66,13 +66,34 @@ class Sphere:
         return c + near[:, None] * along, (root >= 0) & (np.abs(near) <= radii)
 
 
+class Lune(Sphere):
+    """The quarter of the unit sphere of R^3 where z and y are not negative: its two walls."""
+
+    walls = 2
+    _AXES = (2, 1)  # a wall's value is this coordinate
+
+    def face_point(self, x: np.ndarray, face: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+        """The points, and where there is a nearest one."""
+        flat = x.copy()
+        flat[:, [self._AXES[wall] for wall in face]] = 0
+        length = np.linalg.norm(flat, axis=1)
+        return flat / np.where(length > 0, length, 1)[:, None], length > 0
+
+    def clearances(self, p: np.ndarray) -> np.ndarray:
+        return p[:, self._AXES]
+
+    def conormals(self, p: np.ndarray, face: tuple[int, ...]) -> np.ndarray:
+        outwards = -np.eye(3)[[self._AXES[wall] for wall in face]]
+        return np.broadcast_to(outwards, (len(p), *outwards.shape))
+
+
 def make(name: str) -> Any:
     """The manifold that a line `serve MESH NAME` is about."""
     if name.startswith("circle:"):
         return Circle(int(name.removeprefix("circle:")))
     if name == "clifford":
         return manifolds.ProductOfCircles()
-    kinds = {"half": Half, "sphere": Sphere, "so3": manifolds.SpecialOrthogonal3}
+    kinds = {"half": Half, "sphere": Sphere, "lune": Lune, "so3": manifolds.SpecialOrthogonal3}
     return kinds.get(name, manifolds.Torus)()
 
 
@@ -105,7 +126,12 @@ def wrong_tangents(right: np.ndarray, found: Found, said: np.ndarray) -> str:
     return ""
 
 
-def wrong_sizes(right: np.ndarray, found: Found, said: np.ndarray) -> str:
+def wrong_values(right: np.ndarray, found: Found, said: np.ndarray) -> str:
+    """The same of sizes, [n], of clearances, [n, walls], and of conormals, [n, walls, d]."""
     ours = np.ones(len(right), bool) if found is None else found
-    bad = np.flatnonzero(ours & ~(np.abs(said - right) <= _TOLERANCE))
-    return f"row {bad[0]} is {said[bad[0]]}, not {right[bad[0]]}" if len(bad) else ""
+    near = (np.abs(said - right) <= _TOLERANCE).reshape(len(right), -1).all(axis=1)
+    bad = np.flatnonzero(ours & ~near)
+    if not len(bad):
+        return ""
+    theirs, wanted = (array[bad[0]].tolist() for array in (said, right))
+    return f"row {bad[0]} is {theirs}, not {wanted}"

@@ -11,7 +11,7 @@ import numpy as np
 from .._generated import mesh_pb2
 from .scenario import Refusal, Scenario, agree
 from .server import Silence, Stream
-from .worker import Answers, Flats, Partly, Serving, manifold
+from .worker import Answers, Flats, OtherWalls, Partly, Serving, Walls, manifold
 
 _COMES_BACK_SECONDS = 6.0
 _FROZEN_SECONDS = 30.0
@@ -212,6 +212,6 @@ class OverTooEarly(Serving):
 
 SCENARIOS: tuple[type[Scenario], ...] = (
     Answers, manifold("clifford"), manifold("so3"), manifold("circle:64"), manifold("circle:4096"),
-    Partly, Flats, Raises, BadAnswer, AlreadyOver, OverTooEarly, Slow, SlowOnOldServer, Stopping,
+    Partly, Flats, Walls, OtherWalls, Raises, BadAnswer, AlreadyOver, OverTooEarly, Slow, SlowOnOldServer, Stopping,
     Gone, Frozen,
 )  # fmt: skip

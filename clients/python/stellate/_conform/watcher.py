@@ -64,7 +64,10 @@ class Recorded(Declared):
         if self.complaint or not agree(answer, wanted):
             self.judge(rule, False, self.complaint or f"`{answer}`", f"`{wanted}`")
         elif "mesh" in entry:
-            self.judge(rule, *same_file(self.path, entry["mesh"]))
+            same = same_file(self.path, entry["mesh"])
+            if same[0] and "walls" in entry:
+                same = same_file(self.path.with_name(self.path.name + ".walls"), entry["walls"])
+            self.judge(rule, *same)
         self.judge(rule, True)
 
 

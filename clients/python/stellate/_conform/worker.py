@@ -11,7 +11,7 @@ import numpy as np
 from .._generated import oracle_pb2 as pb
 from .._wire.arrays import from_wire, to_wire
 from . import manifolds
-from .scenario import Refusal, Scenario
+from .scenario import Refusal, Scenario, agree
 from .server import Silence, Stream
 
 _CHUNK_BYTES = 1_000_000  # of the arrays of a chunk, as of those of its answer
@@ -35,8 +35,10 @@ class Serving(Scenario):
         self.spec.ambient_dimension = self.oracle.ambient_dimension
         able = self.spec.oracle
         able.tangent_basis = True
-        able.intersect_flat = hasattr(self.oracle, "intersect_flat")
+        able.intersect_flat = self.manifold == "sphere"
         able.local_size = self.manifold == "sphere"
+        self.spec.walls = getattr(self.oracle, "walls", 0)
+        able.conormals = self.spec.walls > 0
 
     @property
     def line(self) -> str:
@@ -94,6 +96,7 @@ class Serving(Scenario):
                 ambient_dimension=self.spec.ambient_dimension,
                 oracle=self.spec.oracle,
                 answer_seconds=self.answer_seconds,
+                walls=self.spec.walls,
             )
         )
         return problem
@@ -159,6 +162,8 @@ class Serving(Scenario):
         if chunk.kind == pb.QUERY_KIND_INTERSECT_FLAT:
             bases, radii = from_wire(chunk.bases, n, d, k), from_wire(chunk.radii, n)
             right, found = self.oracle.intersect_flat(x, bases, radii)
+        elif chunk.face:
+            right, found = self.oracle.face_point(x, tuple(chunk.face))
         else:
             right = self.oracle.closest_point(x)
         if answer.found and (len(answer.found) != n or set(answer.found) - {0, 1}):
@@ -176,8 +181,26 @@ class Serving(Scenario):
                 return f"tangents: {problem}"
         if chunk.want_sizes:
             sizes = self.oracle.local_size(right)
-            problem = manifolds.wrong_sizes(sizes, found, from_wire(answer.sizes, n))
-        return problem and f"sizes: {problem}"
+            problem = manifolds.wrong_values(sizes, found, from_wire(answer.sizes, n))
+        problem = problem and f"sizes: {problem}"
+        return problem or self._wrong_walls(chunk, answer, right, found)
+
+    def _wrong_walls(self, chunk: Any, answer: Any, right: np.ndarray, found: np.ndarray) -> str:
+        if not chunk.want_clearances:
+            return ""
+        face = tuple(chunk.face)
+        wanted = {"clearances": self.oracle.clearances(right)}
+        if face:
+            wanted["conormals"] = self.oracle.conormals(right, face)
+        for name, values in wanted.items():
+            try:
+                said = from_wire(getattr(answer, name), *values.shape)
+            except ValueError as error:
+                return f"{name}: {error}"
+            problem = manifolds.wrong_values(values, found, said)
+            if problem:
+                return f"{name}: {problem}"
+        return ""
 
     def ask(self, stream: Stream, rule: str, chunk: Any, wanted: str = "a right answer") -> None:
         problem = self.answered(stream, chunk)
@@ -280,6 +303,67 @@ class Partly(Serving):
             stream, "all-found", self.question(left * [-1, 1, 1], tangents=True),
             "found empty, or 1 for all",
         )  # fmt: skip
+
+
+class Walls(Serving):
+    """A manifold with boundary: clearances, and points of its faces with their conormals."""
+
+    name, manifold = "worker.lune", "lune"
+    rules = (
+        "clearances", "first-wall", "second-wall", "corner", "corner-and-none", "face-alone",
+        "large-chunk", "ends-with-the-mesh",
+    )  # fmt: skip
+
+    def face(self, points: np.ndarray, *face: int, clearances: bool = True) -> Any:
+        chunk = self.question(points, tangents=True)
+        chunk.face.extend(face)
+        chunk.want_clearances = clearances
+        return chunk
+
+    def converse(self, stream: Stream) -> None:
+        self.ask(
+            stream, "clearances", self.face(self.near(30)),
+            "the walls' values z and y, [n, 2], and no conormals",
+        )  # fmt: skip
+        for rule, wall in (("first-wall", 0), ("second-wall", 1)):
+            self.ask(
+                stream, rule, self.face(self.near(30), wall),
+                "points of this wall whatever the other says, and one conormal each, [n, 1, 3]",
+            )  # fmt: skip
+        two = "points of both walls, and two conormals each, [n, 2, 3], those of wall 0 first"
+        self.ask(stream, "corner", self.face(self.near(30), 0, 1), two)
+        x = self.near(20)
+        x[::3, 0] = 0
+        none = "found 0 where x = 0, and arrays of all 20 rows"
+        self.ask(stream, "corner-and-none", self.face(x, 0, 1), none)
+        alone = self.face(self.near(9), 1, clearances=False)
+        self.ask(stream, "face-alone", alone, "points of the wall, and nothing of walls")
+        n = min(_CHUNK_BYTES // (8 * (3 * 5 + 2)), self.max_chunk or _CHUNK_BYTES)
+        self.ask(stream, "large-chunk", self.face(self.near(n), 0, 1), two)
+
+
+class OtherWalls(Serving):
+    """The worker's manifold is not the mesh's: it has no walls."""
+
+    name, rules = "worker", ("other-walls-are-refused",)
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.spec.walls, self.spec.oracle.conormals = 2, True
+
+    def converse(self, stream: Stream) -> None:
+        stream.say(queries=self.question(self.near(3), tangents=True))
+        try:
+            said = self.reply(stream)
+        except Silence:  # it cancelled, as it may
+            return
+        if said is not None:
+            came = f"{said.WhichOneof('message')} came"
+            self.judge(self.rules[0], False, came, "no answer: the mesh is left to others")
+
+    def hear(self, answer: str) -> None:
+        wanted = "error invalidargument"
+        self.judge(self.rules[0], agree(answer, wanted), f"`{answer}`", f"`{wanted}`")
 
 
 class Flats(Serving):

@@ -134,6 +134,72 @@ impl Oracle for Sphere {
     }
 }
 
+/// The part of the sphere where z and y are not negative, its two walls.
+struct Lune;
+
+fn axis(wall: usize) -> usize {
+    2 - wall
+}
+
+impl Oracle for Lune {
+    fn dimension(&self) -> usize {
+        2
+    }
+
+    fn ambient_dimension(&self) -> usize {
+        3
+    }
+
+    fn bounding_box(&self) -> Option<(Vec<f64>, Vec<f64>)> {
+        Some((vec![-1.1; 3], vec![1.1; 3]))
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        Torus::default().capabilities()
+    }
+
+    fn closest_point(&self, x: &[f64], points: &mut [f64], found: &mut [bool]) -> Result<(), BoxError> {
+        Sphere.closest_point(x, points, found)
+    }
+
+    fn tangent_basis(&self, points: &[f64], bases: &mut [f64]) -> Result<(), BoxError> {
+        Sphere.tangent_basis(points, bases)
+    }
+
+    fn walls(&self) -> usize {
+        2
+    }
+
+    fn face_point(
+        &self,
+        x: &[f64],
+        face: &[u32],
+        points: &mut [f64],
+        found: &mut [bool],
+    ) -> Result<(), BoxError> {
+        let mut flat = x.to_vec();
+        for (at, found) in flat.chunks_exact_mut(3).zip(found.iter_mut()) {
+            face.iter().for_each(|&wall| at[axis(wall as usize)] = 0.0);
+            *found = dot(at, at) > 0.0;
+        }
+        Sphere.closest_point(&flat, points, found)
+    }
+
+    fn clearances(&self, points: &[f64], values: &mut [f64]) -> Result<(), BoxError> {
+        for (p, values) in points.chunks_exact(3).zip(values.chunks_exact_mut(2)) {
+            values.copy_from_slice(&[p[axis(0)], p[axis(1)]]);
+        }
+        Ok(())
+    }
+
+    fn conormals(&self, _: &[f64], face: &[u32], normals: &mut [f64]) -> Result<(), BoxError> {
+        for (normal, &wall) in normals.chunks_exact_mut(3).zip(face.iter().cycle()) {
+            normal[axis(wall as usize)] = -1.0;
+        }
+        Ok(())
+    }
+}
+
 /// What the kit calls `name`.
 pub fn manifold(name: &str) -> Option<Box<dyn Oracle>> {
     if let Some(d) = name.strip_prefix("circle:") {
@@ -143,6 +209,7 @@ pub fn manifold(name: &str) -> Option<Box<dyn Oracle>> {
         "torus" => Box::new(Torus::default()),
         "clifford" => Box::new(ProductOfCircles { k: 2 }),
         "sphere" => Box::new(Sphere),
+        "lune" => Box::new(Lune),
         "half" => Box::new(Changed(|x, found| {
             for (x, found) in x.chunks_exact(3).zip(found) {
                 *found &= x[0] >= 0.0;

@@ -3,9 +3,11 @@ package stellate.examples;
 import java.io.BufferedReader;
 import java.io.InputStreamReader;
 import java.nio.charset.StandardCharsets;
+import java.nio.file.Files;
 import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.List;
+import java.util.stream.LongStream;
 import stellate.Client;
 import stellate.Credentials;
 import stellate.Mesh;
@@ -75,6 +77,10 @@ public final class Conform {
     }
     Mesh last = all.get(all.size() - 1);
     last.save(path);
+    if (last.walls != null) {
+      List<String> lines = LongStream.of(last.walls).mapToObj(Long::toUnsignedString).toList();
+      Files.write(Path.of(path + ".walls"), lines);
+    }
     Report report = last.report().orElseThrow();
     String ended = name(report.getTermination(), "TERMINATION_");
     String level = name(report.getCertificate().getLevel(), "CERTIFICATE_LEVEL_");
@@ -84,10 +90,15 @@ public final class Conform {
   private String create(String label, String how) {
     Options options = new Options();
     options.spec.setLabel(label);
-    Oracle torus = how.equals("seeds") ? new KitManifolds.Seeded() : KitManifolds.TORUS;
+    Oracle oracle =
+        switch (how) {
+          case "seeds" -> new KitManifolds.Seeded();
+          case "walls" -> KitManifolds.named("lune");
+          default -> KitManifolds.TORUS;
+        };
     String token = how.startsWith("token=") ? how.substring(6) : null;
     try (Client known = connect(server, Credentials.token(token))) {
-      return "created " + known.create(torus, 0.5, options).getName();
+      return "created " + known.create(oracle, 0.5, options).getName();
     }
   }
 

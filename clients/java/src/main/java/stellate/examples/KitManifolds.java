@@ -19,6 +19,7 @@ final class KitManifolds {
       case "torus" -> TORUS;
       case "clifford" -> new ProductOfCircles(2);
       case "sphere" -> new Sphere();
+      case "lune" -> new Surface.CutSphere(2);
       case "half" -> new Changed(KitManifolds::refuseLeft);
       case "raises" ->
           new Changed(
@@ -93,15 +94,7 @@ final class KitManifolds {
   private static final class Sphere extends Surface.Sphere implements Oracle.WithTangents {
     @Override
     public void tangentBasis(double[] points, double[] bases) {
-      for (int i = 0; i < points.length; i += 3) {
-        double x = points[i];
-        double y = points[i + 1];
-        double s = Math.copySign(1, points[i + 2]);
-        double a = -1 / (s + points[i + 2]);
-        double b = x * y * a;
-        double[] basis = {1 + s * x * x * a, b, s * b, s + y * y * a, -s * x, -y};
-        System.arraycopy(basis, 0, bases, 2 * i, 6);
-      }
+      tangentsOfSphere(points, bases);
     }
 
     @Override

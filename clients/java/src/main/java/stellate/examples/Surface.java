@@ -32,13 +32,7 @@ public abstract class Surface implements Oracle {
       implements Oracle.WithFlats, Oracle.WithSizes {
     @Override
     public void closestPoint(double[] x, double[] points, boolean[] found) {
-      for (int i = 0; i < x.length; i += 3) {
-        double length = Math.sqrt(dot(x, i, x, i));
-        found[i / 3] = length > 1e-9;
-        for (int j = i; j < i + 3; j++) {
-          points[j] = x[j] / length;
-        }
-      }
+      normalise(x, points, found);
     }
 
     @Override
@@ -62,9 +56,90 @@ public abstract class Surface implements Oracle {
         }
       }
     }
+  }
 
-    private static double dot(double[] a, int i, double[] b, int j) {
-      return a[i] * b[j] + a[i + 1] * b[j + 1] + a[i + 2] * b[j + 2];
+  /** The part of the unit sphere above one wall, z = 0, or between two, z = 0 and y = 0. */
+  public static final class CutSphere extends Surface implements Oracle.WithWalls {
+    private final int walls;
+
+    public CutSphere(int walls) {
+      this.walls = walls;
     }
+
+    @Override
+    public int walls() {
+      return walls;
+    }
+
+    @Override
+    public double[][] boundingBox() {
+      return new double[][] {{-1.1, -1.1, -1.1}, {1.1, 1.1, 1.1}};
+    }
+
+    @Override
+    public void closestPoint(double[] x, double[] points, boolean[] found) {
+      normalise(x, points, found);
+    }
+
+    @Override
+    public void tangentBasis(double[] points, double[] bases) {
+      tangentsOfSphere(points, bases);
+    }
+
+    @Override
+    public void facePoint(double[] x, int[] face, double[] points, boolean[] found) {
+      double[] flat = x.clone();
+      for (int wall : face) {
+        for (int i = axis(wall); i < flat.length; i += 3) {
+          flat[i] = 0;
+        }
+      }
+      normalise(flat, points, found);
+    }
+
+    @Override
+    public void clearances(double[] points, double[] values) {
+      for (int i = 0; i < values.length; i++) {
+        values[i] = points[3 * (i / walls) + axis(i % walls)];
+      }
+    }
+
+    @Override
+    public void conormals(double[] points, int[] face, double[] normals) {
+      for (int i = 0; 3 * i < normals.length; i++) {
+        normals[3 * i + axis(face[i % face.length])] = -1;
+      }
+    }
+
+    private static int axis(int wall) {
+      return 2 - wall;
+    }
+  }
+
+  /** Orthonormal bases, [n, 3, 2], at points of the unit sphere. */
+  static void tangentsOfSphere(double[] points, double[] bases) {
+    for (int i = 0; i < points.length; i += 3) {
+      double x = points[i];
+      double y = points[i + 1];
+      double s = Math.copySign(1, points[i + 2]);
+      double a = -1 / (s + points[i + 2]);
+      double b = x * y * a;
+      double[] basis = {1 + s * x * x * a, b, s * b, s + y * y * a, -s * x, -y};
+      System.arraycopy(basis, 0, bases, 2 * i, 6);
+    }
+  }
+
+  private static void normalise(double[] x, double[] points, boolean[] found) {
+    for (int i = 0; i < x.length; i += 3) {
+      double length = Math.sqrt(dot(x, i, x, i));
+      found[i / 3] = length > 1e-9;
+      for (int j = i; j < i + 3; j++) {
+        points[j] = x[j] / length;
+      }
+    }
+  }
+
+  private static double dot(double[] a, int i, double[] b, int j) {
+    return a[i] * b[j] + a[i + 1] * b[j + 1] + a[i + 2] * b[j + 2];
   }
 }
