@@ -12,10 +12,6 @@ namespace stellate::core {
 
 namespace {
 
-// Simplices of a larger circumradius, in epsilon, are judged in the flats: far out the common
-// centre is no better, and they will be refined anyway.
-constexpr double kJudgedRadius = 1.3;
-
 // How far outwards walls are moved, as a share of the fake simplex' inradius: corners of that may
 // lie in the planes of walls along the axes, and rounding would decide which side of it they are
 // on.
@@ -55,6 +51,7 @@ StarComplex<K>::StarComplex(const StarComplex& other)
       weight_scale_(other.weight_scale_),
       points_(other.points_),
       tangents_(other.tangents_),
+      names_(other.names_),
       walls_(other.walls_),
       conormals_at_(other.conormals_at_),
       conormals_(other.conormals_),

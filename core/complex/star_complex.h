@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -50,6 +51,12 @@ class StarComplex {
   // coordinates each by ascending wall: the outward unit normals of the walls in T_pM.
   std::uint32_t Append(const double* point, const double* tangent, std::uint32_t near = kNone,
                        WallSet walls = 0, const double* conormals = nullptr);
+  // A point of a sample that is there before any star: no search finds it before Commit. Its star
+  // then hangs on the points within reach alone: a part of the sample, with all points that far
+  // around it, has the stars of the whole, bit for bit, if its points keep their order and the names
+  // that they have there. REQUIRES: no stars yet, nothing appended, and no walls; names ascend.
+  void Lay(const double* point, const double* tangent) { Lay(point, tangent, size()); }
+  void Lay(const double* point, const double* tangent, std::uint32_t name);
   // Builds the stars of the appended points and clips all others by them, in parallel; the result
   // does not depend on the number of threads. `around`, if given, gets the neighbours that changed
   // stars have or had (with repetitions): their simplices may have become inconsistent.
@@ -176,11 +183,16 @@ class StarComplex {
   Eigen::MatrixXd TangentMatrix() const;
 
  private:
+  // Simplices of a larger circumradius, in epsilon, are judged in the flats: far out the common
+  // centre is no better, and they will be refined anyway.
+  static constexpr double kJudgedRadius = 1.3;
+
   std::size_t stride() const { return static_cast<std::size_t>(d_); }
   // Cospherical points would have every star decide alone how to split them; weights this much
   // larger than rounding, and this much smaller than anything geometric, make all decide alike.
   double Weight(std::uint32_t id) const {
-    return weight_scale_ * (static_cast<double>(Mix64(id) >> 11) * 0x1p-53) + GuardOf(id);
+    const std::uint64_t name = id < names_.size() ? names_[id] : id;
+    return weight_scale_ * (static_cast<double>(Mix64(name) >> 11) * 0x1p-53) + GuardOf(id);
   }
   // A point with its tangent basis, in the sample or not yet.
   struct Site {
@@ -248,9 +260,14 @@ class StarComplex {
     }
   };
   std::vector<Cut> BuildNewStars(std::uint32_t first);
+  // Of a sample laid at once: every star is built once, from what lies around it.
+  Change BuildLaidStars();
+  void BuildLaidStar(std::uint32_t p, const std::vector<std::uint32_t>& around, double gathered,
+                     Cell& cell) const;
   static std::vector<Turn> InTurns(const std::vector<Cut>& cuts);
   void CutStars(const std::vector<Turn>& turns, const std::vector<Cut>& cuts, std::uint32_t first,
                 Change* change);
+  double epsilon() const { return std::sqrt(judged_radius2_) / kJudgedRadius; }
   // How far from p a point may be whose bisector cuts its cell.
   double Influence(std::uint32_t p, const Cell& cell) const {
     const double most2 = cell.max_norm2();
@@ -265,6 +282,7 @@ class StarComplex {
   double judged_radius2_;
   double weight_scale_;
   std::vector<double> points_, tangents_;
+  std::vector<std::uint32_t> names_;  // up to the last that is not its point's id
   // Of manifolds with boundary, up to the last point of it; else empty.
   std::vector<WallSet> walls_;
   std::vector<std::uint32_t> conormals_at_;

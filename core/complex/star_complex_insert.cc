@@ -188,6 +188,7 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
   const auto first = static_cast<std::uint32_t>(cells_.size());
   Change change;
   if (size() == first) return change;
+  if (tree_.size() == 0) return BuildLaidStars();
   const std::vector<Cut> cuts = BuildNewStars(first);
   const std::vector<Turn> turns = InTurns(cuts);
   change.stars = ParallelGather<std::uint32_t>(

@@ -52,7 +52,8 @@ void Growth<K>::Sites::Append(const Sites& others) {
 template <int K>
 Growth<K>::Layer::Layer(int d, std::vector<double> laid)
     : points(std::move(laid)), tree(d, &points) {
-  tree.Assign(std::vector<double>(points.size() / static_cast<std::size_t>(d), 0.0));
+  tree.Assign(std::vector<double>(points.size() / static_cast<std::size_t>(d), 0.0),
+              BallTree::Halving::kExtent);
 }
 
 template <int K>
@@ -89,13 +90,15 @@ std::vector<typename Growth<K>::Block> Growth<K>::BlocksOf(
 template <int K>
 void Growth<K>::GatherLaid(const Block& block, double radius, std::vector<double>* near) const {
   near->clear();
-  for (const auto& layer : layers_)
-    layer->tree.VisitNear(
-        block.centre.data(), [&] { return block.radius + radius; },
-        [&](std::uint32_t id, double) {
-          const double* const q = layer->points.data() + id * stride();
-          near->insert(near->end(), q, q + d_);
-        });
+  thread_local std::vector<std::uint32_t> ids;
+  for (const auto& layer : layers_) {
+    ids.clear();
+    layer->tree.Gather(block.centre.data(), block.radius + radius, &ids);
+    for (const std::uint32_t id : ids) {
+      const double* const q = layer->points.data() + id * stride();
+      near->insert(near->end(), q, q + d_);
+    }
+  }
 }
 
 template <int K>

@@ -214,6 +214,12 @@ void Engine<K>::Append(const AnsweredPoints& answers, Eigen::Index c) {
 }
 
 template <int K>
+void Engine<K>::Lay(const AnsweredPoints& answers, Eigen::Index c) {
+  complex_.Lay(answers.points.col(c).data(), answers.tangents.col(c).data());
+  if (answers.sizes.size() > 0) sizes_.AppendGiven(answers.sizes[c]);
+}
+
+template <int K>
 typename Engine<K>::Change Engine<K>::Commit() {
   const std::uint32_t first = book_.star_count();
   const bool judged = !book_.are_all_suspect();

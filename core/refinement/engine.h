@@ -51,6 +51,9 @@ class Engine {
   Inserted Insert(const CandidateSet<K>& candidates, const AnsweredPoints& answers);
   // Appends a candidate whatever the rules say. REQUIRES: !is_full() and that it was found.
   void Append(const AnsweredPoints& answers, Eigen::Index candidate);
+  // The same for a sample that is laid before there is any star: cheaper, and no search finds the
+  // point before Commit.
+  void Lay(const AnsweredPoints& answers, Eigen::Index candidate);
   // Brings the stars and all that is known of them up to date with what was inserted.
   Change Commit();
   // Of a manifold with boundary, when no targets are left: points of the faces of this stage that

@@ -81,7 +81,7 @@ std::vector<std::uint8_t> Laying<K>::Lay(const AnsweredPoints& answers,
   for (const Eigen::Index c : columns) {
     CheckInterruption(static_cast<std::size_t>(c));
     if (engine_.is_full()) break;
-    engine_.Append(answers, c);
+    engine_.Lay(answers, c);
     used[static_cast<std::size_t>(c)] = 1;
   }
   return used;

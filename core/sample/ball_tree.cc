@@ -1,12 +1,19 @@
 #include "core/sample/ball_tree.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <numeric>
 
 #include "core/base/parallel.h"
 
 namespace stellate::core {
+namespace {
+
+// Parted at the middle of its extent, no half holds less than one in so many of the points.
+constexpr std::size_t kLeastShare = 16;
+
+}  // namespace
 
 std::uint32_t BallTree::NewNodes(int count) {
   const auto first = static_cast<std::uint32_t>(nodes_.size());
@@ -15,13 +22,17 @@ std::uint32_t BallTree::NewNodes(int count) {
   return first;
 }
 
+void BallTree::Mean(const std::uint32_t* begin, const std::uint32_t* end, double* mean) const {
+  std::fill(mean, mean + d_, 0.0);
+  for (const std::uint32_t* i = begin; i != end; ++i)
+    for (int j = 0; j < d_; ++j) mean[j] += Point(*i)[j];
+  for (int j = 0; j < d_; ++j) mean[j] /= static_cast<double>(end - begin);
+}
+
 // Centre, radius and outreach from the points themselves.
 void BallTree::Measure(std::uint32_t node, const std::uint32_t* begin, const std::uint32_t* end) {
   double* c = Centre(node);
-  std::fill(c, c + d_, 0.0);
-  for (const std::uint32_t* i = begin; i != end; ++i)
-    for (int j = 0; j < d_; ++j) c[j] += Point(*i)[j];
-  for (int j = 0; j < d_; ++j) c[j] /= static_cast<double>(end - begin);
+  Mean(begin, end, c);
   double radius = 0, outreach = 0;
   for (const std::uint32_t* i = begin; i != end; ++i) {
     const double distance = Distance(c, Point(*i), d_);
@@ -41,20 +52,10 @@ void BallTree::MakeLeaf(std::uint32_t node, std::uint32_t first_slot, const std:
   for (const std::uint32_t* i = begin; i != end; ++i) leaf_of_[*i] = node;
 }
 
-// How many leaves a balanced tree of that many points has.
-std::uint32_t BallTree::LeafCount(std::size_t points) {
-  if (points <= kBuiltLeaf) return 1;
-  if (points % 2 == 0) return 2 * LeafCount(points / 2);
-  return LeafCount(points / 2) + LeafCount(points - points / 2);
-}
-
-// Halves along the line through two far points. The nodes below take the places from `place.node`
-// on, the leaves the slots from `place.slot` on: where each goes is known before any is there, and
-// large halves are built in parallel.
-void BallTree::Build(std::uint32_t node, Place place, std::uint32_t* begin, std::uint32_t* end) {
-  Measure(node, begin, end);
+// Where to part them, along the line through two far ones: by their number, or at the middle of
+// their extent, unless that would leave hardly any on one side.
+std::uint32_t* BallTree::Middle(std::uint32_t* begin, std::uint32_t* end, Halving halving) const {
   const auto count = static_cast<std::size_t>(end - begin);
-  if (count <= kBuiltLeaf) return MakeLeaf(node, place.slot, begin, end);
   const auto farthest = [&](const double* from) {
     const std::uint32_t* best = begin;
     double most = -1;
@@ -67,29 +68,68 @@ void BallTree::Build(std::uint32_t node, Place place, std::uint32_t* begin, std:
     }
     return Point(*best);
   };
-  const double* a = farthest(Centre(node));
-  const double* b = farthest(a);
   std::vector<double> axis(static_cast<std::size_t>(d_));
+  Mean(begin, end, axis.data());
+  const double* a = farthest(axis.data());
+  const double* b = farthest(a);
   for (int j = 0; j < d_; ++j) axis[static_cast<std::size_t>(j)] = b[j] - a[j];
   std::vector<std::pair<double, std::uint32_t>> along;
   along.reserve(count);
   for (const std::uint32_t* i = begin; i != end; ++i)
     along.emplace_back(Dot(axis.data(), Point(*i), d_), *i);
-  const auto middle = along.begin() + static_cast<std::ptrdiff_t>(count / 2);
-  std::nth_element(along.begin(), middle, along.end());
+  auto middle = along.begin();
+  if (halving == Halving::kExtent) {
+    const auto [least, most] = std::minmax_element(along.begin(), along.end());
+    const double halfway = least->first + (most->first - least->first) / 2;
+    middle = std::partition(along.begin(), along.end(),
+                            [&](const auto& item) { return item.first < halfway; });
+  }
+  const auto below = static_cast<std::size_t>(middle - along.begin());
+  if (kLeastShare * std::min(below, count - below) < count) {
+    middle = along.begin() + static_cast<std::ptrdiff_t>(count / 2);
+    std::nth_element(along.begin(), middle, along.end());
+  }
   for (std::size_t i = 0; i < count; ++i) begin[i] = along[i].second;
-  along = {};
-  std::uint32_t* const half = begin + count / 2;
+  return begin + (middle - along.begin());
+}
+
+std::unique_ptr<BallTree::Halves> BallTree::Halve(std::uint32_t* begin, std::uint32_t* end,
+                                                  Halving halving) const {
+  auto halves = std::make_unique<Halves>();
+  const auto count = static_cast<std::size_t>(end - begin);
+  if (count <= kBuiltLeaf) return halves;
+  halves->middle = Middle(begin, end, halving);
+  const auto halve = [&](int half) {
+    (half == 0 ? halves->first : halves->second) =
+        half == 0 ? Halve(begin, halves->middle, halving) : Halve(halves->middle, end, halving);
+  };
+  if (count < kBuiltAlone) {
+    halve(0);
+    halve(1);
+  } else {
+    ParallelFor(2, halve);
+  }
+  halves->leaves = halves->first->leaves + halves->second->leaves;
+  return halves;
+}
+
+// The nodes below take the places from `place.node` on, the leaves the slots from `place.slot` on:
+// where each goes is known before any is there, and large halves are built in parallel.
+void BallTree::Build(std::uint32_t node, Place place, std::uint32_t* begin, std::uint32_t* end,
+                     const Halves& halves) {
+  Measure(node, begin, end);
+  if (halves.middle == nullptr) return MakeLeaf(node, place.slot, begin, end);
   const std::uint32_t children = place.node;
   nodes_[node].children = children;
   nodes_[children].parent = nodes_[children + 1].parent = node;
-  const std::uint32_t leaves = LeafCount(count / 2);
+  const std::uint32_t leaves = halves.first->leaves;
   const Place left{place.node + 2, place.slot};
   const Place right{left.node + 2 * (leaves - 1), place.slot + leaves * kLeafCapacity};
   const auto build = [&](int child) {
-    child == 0 ? Build(children, left, begin, half) : Build(children + 1, right, half, end);
+    child == 0 ? Build(children, left, begin, halves.middle, *halves.first)
+               : Build(children + 1, right, halves.middle, end, *halves.second);
   };
-  if (count < kBuiltAlone) {
+  if (static_cast<std::size_t>(end - begin) < kBuiltAlone) {
     build(0);
     build(1);
   } else {
@@ -97,16 +137,16 @@ void BallTree::Build(std::uint32_t node, Place place, std::uint32_t* begin, std:
   }
 }
 
-void BallTree::Rebuild() {
+void BallTree::Rebuild(Halving halving) {
   built_ = influence_.size();
   stale_.clear();
-  const std::uint32_t leaves = LeafCount(built_);
-  nodes_.assign(2 * std::size_t{leaves} - 1, {});
-  centres_.assign(nodes_.size() * static_cast<std::size_t>(d_), 0.0);
-  slots_.resize(std::size_t{leaves} * kLeafCapacity);
   std::vector<std::uint32_t> ids(built_);
   std::iota(ids.begin(), ids.end(), 0u);
-  Build(0, {1, 0}, ids.data(), ids.data() + ids.size());
+  const std::unique_ptr<Halves> halves = Halve(ids.data(), ids.data() + ids.size(), halving);
+  nodes_.assign(2 * std::size_t{halves->leaves} - 1, {});
+  centres_.assign(nodes_.size() * static_cast<std::size_t>(d_), 0.0);
+  slots_.resize(std::size_t{halves->leaves} * kLeafCapacity);
+  Build(0, {1, 0}, ids.data(), ids.data() + ids.size(), *halves);
   built_nodes_ = nodes_.size();
 }
 
@@ -144,13 +184,62 @@ void BallTree::Split(std::uint32_t node) {
   MakeLeaf(children + 1, slot, half, ids + kLeafCapacity);
 }
 
-void BallTree::Assign(std::vector<double> influences) {
+void BallTree::Assign(std::vector<double> influences, Halving halving) {
   influence_ = std::move(influences);
   leaf_of_.assign(influence_.size(), 0);
   if (influence_.empty())
     nodes_.clear();
   else
-    Rebuild();
+    Rebuild(halving);
+}
+
+// Children have larger numbers than their parents.
+void BallTree::SetInfluences(std::vector<double> influences) {
+  influence_ = std::move(influences);
+  stale_.clear();
+  for (std::size_t n = nodes_.size(); n-- > 0;) {
+    CheckInterruption(n);
+    Node& node = nodes_[n];
+    const double* const centre = Centre(static_cast<std::uint32_t>(n));
+    node.outreach = 0;
+    if (node.children == kNone) {
+      for (std::uint32_t i = 0; i < node.count; ++i) {
+        const std::uint32_t id = slots_[node.first + i];
+        node.outreach = std::max(node.outreach, Distance(centre, Point(id), d_) + influence_[id]);
+      }
+    } else {
+      for (std::uint32_t c = node.children; c <= node.children + 1; ++c)
+        node.outreach =
+            std::max(node.outreach, Distance(centre, Centre(c), d_) + nodes_[c].outreach);
+    }
+  }
+}
+
+std::vector<BallTree::Bunch> BallTree::Bunches() const {
+  std::vector<Bunch> bunches;
+  for (std::uint32_t n = 0; n < nodes_.size(); ++n) {
+    CheckInterruption(n);
+    const Node& node = nodes_[n];
+    if (node.children == kNone && node.count > 0)
+      bunches.push_back({slots_.data() + node.first, node.count, Centre(n), node.radius});
+  }
+  return bunches;
+}
+
+void BallTree::Gather(std::uint32_t n, const double* q, double radius,
+                      std::vector<std::uint32_t>* ids) const {
+  const Node& node = nodes_[n];
+  const double far = kRounding * (radius + node.radius);
+  if (SquaredDistance(q, Centre(n), d_) > far * far) return;
+  if (node.children != kNone) {
+    Gather(node.children, q, radius, ids);
+    Gather(node.children + 1, q, radius, ids);
+    return;
+  }
+  for (std::uint32_t i = 0; i < node.count; ++i) {
+    const std::uint32_t id = slots_[node.first + i];
+    if (SquaredDistance(q, Point(id), d_) <= radius * radius) ids->push_back(id);
+  }
 }
 
 void BallTree::Insert(double influence) {
@@ -158,7 +247,7 @@ void BallTree::Insert(double influence) {
   influence_.push_back(influence);
   leaf_of_.push_back(0);
   if (nodes_.empty() || influence_.size() > kRebuild * built_ + 32) {
-    Rebuild();
+    Rebuild(Halving::kNumber);
     return;
   }
   const double* p = Point(id);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -32,8 +33,32 @@ class BallTree {
   // Adds the point with the next id, size().
   void Insert(double influence);
 
-  // Makes it the tree of the points 0 to influences.size() - 1, built balanced and in parallel.
-  void Assign(std::vector<double> influences);
+  // Where what is built is parted: by the number of points, so that insertion keeps it flat, or at
+  // the middle of their extent, so that balls shrink as fast as can be.
+  enum class Halving { kNumber, kExtent };
+  // Makes it the tree of the points 0 to influences.size() - 1, built in parallel.
+  void Assign(std::vector<double> influences, Halving halving = Halving::kNumber);
+
+  // All influences anew, by id.
+  void SetInfluences(std::vector<double> influences);
+
+  // Points that lie together: those of a leaf, in the ball around its centre.
+  struct Bunch {
+    const std::uint32_t* ids;
+    std::uint32_t count;
+    const double* centre;
+    double radius;
+  };
+  // Every point is in one, and bunches that follow each other are mostly near each other.
+  std::vector<Bunch> Bunches() const;
+  // Appends the points within `radius` of q, in no meaningful but a fixed order.
+  void Gather(const double* q, double radius, std::vector<std::uint32_t>* ids) const {
+    if (!nodes_.empty()) Gather(0, q, radius, ids);
+  }
+  // Appends at least the points within `radius` of some point of the bunch.
+  void GatherAround(const Bunch& bunch, double radius, std::vector<std::uint32_t>* ids) const {
+    Gather(bunch.centre, kRounding * (bunch.radius + radius), ids);
+  }
 
   // Growth takes effect at once; shrinking makes searches faster after Refit, never different.
   void SetInfluence(std::uint32_t id, double influence);
@@ -121,13 +146,24 @@ class BallTree {
   struct Place {
     std::uint32_t node, slot;
   };
-  static std::uint32_t LeafCount(std::size_t points);
-  void Build(std::uint32_t node, Place place, std::uint32_t* begin, std::uint32_t* end);
+  // How points are halved and halved again.
+  struct Halves {
+    std::uint32_t leaves = 1;
+    std::uint32_t* middle = nullptr;  // of a leaf: null
+    std::unique_ptr<Halves> first, second;
+  };
+  std::unique_ptr<Halves> Halve(std::uint32_t* begin, std::uint32_t* end, Halving halving) const;
+  std::uint32_t* Middle(std::uint32_t* begin, std::uint32_t* end, Halving halving) const;
+  void Build(std::uint32_t node, Place place, std::uint32_t* begin, std::uint32_t* end,
+             const Halves& halves);
+  void Gather(std::uint32_t n, const double* q, double radius,
+              std::vector<std::uint32_t>* ids) const;
   void MakeLeaf(std::uint32_t node, std::uint32_t first_slot, const std::uint32_t* begin,
                 const std::uint32_t* end);
+  void Mean(const std::uint32_t* begin, const std::uint32_t* end, double* mean) const;
   void Measure(std::uint32_t node, const std::uint32_t* begin, const std::uint32_t* end);
   void Split(std::uint32_t node);
-  void Rebuild();
+  void Rebuild(Halving halving);
 
   template <typename Visit>
   void Influencing(std::uint32_t n, double d2, const double* q, Visit& visit) const {

@@ -140,6 +140,35 @@ TYPED_TEST(StarComplexTest, IsTheSameFromOneBatchOrManyOrOneByOne) {
   }
 }
 
+// A sample laid at once has the stars that it has when it is appended, and takes further points.
+TYPED_TEST(StarComplexTest, IsTheSameLaidAtOnceOrAppended) {
+  constexpr int K = TypeParam::kDimension;
+  if (TypeParam::kJudging != Judging::kFlats) return SUCCEED();
+  const Sample sample = SampleOfDimension<K>(K == 4 ? 100 : 300, 5);
+  const std::uint32_t laid = sample.size() - 20;
+  auto complex = NewComplex<K>(sample.d, Judging::kFlats);
+  auto appended = NewComplex<K>(sample.d, Judging::kFlats);
+  for (std::uint32_t i = 0; i < laid; ++i) {
+    complex->Lay(sample.Point(i), sample.Tangent(i));
+    appended->Append(sample.Point(i), sample.Tangent(i));
+  }
+  const auto change = complex->Commit();
+  EXPECT_TRUE(change.stars.empty());
+  EXPECT_TRUE(change.removed.empty());
+  EXPECT_EQ(AsSet<K>(change.added), AsSet<K>(appended->Commit().added));
+  for (int last = 0; last < 2; ++last) {
+    for (std::uint32_t p = 0; p < complex->size(); ++p)
+      EXPECT_EQ(Canonical(complex->cell(p)), Canonical(appended->cell(p))) << "star " << p;
+    EXPECT_EQ(complex->Simplices(), appended->Simplices());
+    EXPECT_EQ(complex->simplex_count(), appended->simplex_count());
+    for (std::uint32_t i = laid; i < sample.size() && last == 0; ++i) {
+      complex->Append(sample.Point(i), sample.Tangent(i));
+      appended->Append(sample.Point(i), sample.Tangent(i));
+    }
+    EXPECT_EQ(complex->Commit().stars, appended->Commit().stars);
+  }
+}
+
 TYPED_TEST(StarComplexTest, DoesNotDependOnTheNumberOfThreads) {
   constexpr int K = TypeParam::kDimension;
   const Sample sample = SampleOfDimension<K>(K == 4 ? 100 : 400, 4);
@@ -160,6 +189,28 @@ TYPED_TEST(StarComplexTest, DoesNotDependOnTheNumberOfThreads) {
   for (const int threads : {2, 4}) {
     const auto [many, many_changes] = build(threads);
     EXPECT_EQ(many_changes, one_changes);
+    for (std::uint32_t p = 0; p < sample.size(); ++p)
+      EXPECT_EQ(Canonical(many->cell(p)), Canonical(one->cell(p))) << "star " << p;
+  }
+}
+
+TYPED_TEST(StarComplexTest, LaidAtOnceDoesNotDependOnTheNumberOfThreads) {
+  constexpr int K = TypeParam::kDimension;
+  const Sample sample = SampleOfDimension<K>(K == 4 ? 100 : 400, 6);
+  const auto build = [&](int threads) {
+    auto complex = NewComplex<K>(sample.d, TypeParam::kJudging);
+    std::vector<std::uint32_t> added;
+    tbb::task_arena(threads).execute([&] {
+      for (std::uint32_t i = 0; i < sample.size(); ++i)
+        complex->Lay(sample.Point(i), sample.Tangent(i));
+      added = complex->Commit().added;
+    });
+    return std::make_pair(std::move(complex), added);
+  };
+  const auto [one, one_added] = build(1);
+  for (const int threads : {2, 4}) {
+    const auto [many, many_added] = build(threads);
+    EXPECT_EQ(many_added, one_added);
     for (std::uint32_t p = 0; p < sample.size(); ++p)
       EXPECT_EQ(Canonical(many->cell(p)), Canonical(one->cell(p))) << "star " << p;
   }

@@ -75,6 +75,12 @@ class BallTreeTest : public ::testing::TestWithParam<int> {
     EXPECT_EQ(got,
               All([&](std::uint32_t id) { return SquaredDistanceTo(id, q) <= radius * radius; }));
 
+    got.clear();
+    tree_.Gather(q.data(), radius, &got);
+    std::sort(got.begin(), got.end());
+    EXPECT_EQ(got,
+              All([&](std::uint32_t id) { return SquaredDistanceTo(id, q) <= radius * radius; }));
+
     double nearest = INFINITY;
     for (std::uint32_t id = 0; id < influence_.size(); ++id)
       nearest = std::min(nearest, SquaredDistanceTo(id, q));
@@ -131,6 +137,44 @@ TEST_P(BallTreeTest, AnswersTheSameWhenGivenAllPointsAtOnce) {
   tree_.Assign({});
   EXPECT_EQ(tree_.size(), 0u);
   EXPECT_EQ(tree_.NearestSquaredDistance(Draw().data()), INFINITY);
+}
+
+TEST_P(BallTreeTest, TakesAllInfluencesAnew) {
+  for (int n = 0; n < 600; ++n) Insert(Draw(), DrawInfluence());
+  for (const double share : {2.0, 0.3}) {
+    for (double& influence : influence_) influence = share * DrawInfluence();
+    tree_.SetInfluences(influence_);
+    CheckQueries(15);
+    SetInfluence(7, 0.9);
+    tree_.Refit();
+    CheckQueries(5);
+  }
+}
+
+TEST_P(BallTreeTest, HasEveryPointInOneBunch) {
+  EXPECT_TRUE(tree_.Bunches().empty());
+  for (int n = 0; n < 700; ++n) Insert(Draw(), 0);
+  std::vector<int> times(700, 0);
+  for (const BallTree::Bunch& bunch : tree_.Bunches())
+    for (std::uint32_t i = 0; i < bunch.count; ++i) {
+      const std::uint32_t id = bunch.ids[i];
+      ++times[id];
+      EXPECT_LE(Distance(bunch.centre, coordinates_.data() + id * static_cast<std::size_t>(d_), d_),
+                bunch.radius * (1 + 1e-12));
+    }
+  EXPECT_EQ(times, std::vector<int>(700, 1));
+}
+
+// Half of the points lie in one place, and each other one twice as far as the one before.
+TEST_P(BallTreeTest, StaysFlatWhateverTheExtents) {
+  for (int i = 0; i < 2000; ++i) {
+    std::vector<double> x(static_cast<std::size_t>(d_), 0.0);
+    if (i % 2 == 1) x[0] = std::ldexp(1.0, -(i / 2) % 900);
+    coordinates_.insert(coordinates_.end(), x.begin(), x.end());
+    influence_.push_back(0);
+  }
+  tree_.Assign(influence_);
+  CheckQueries(5);
 }
 
 // Points of one place are few, and on the whole much nearer to each other than any two.

@@ -1,0 +1,101 @@
+// How a whole sample is laid at once.
+
+#include <algorithm>
+
+#include "core/base/instantiate.h"
+#include "core/base/parallel.h"
+#include "core/complex/star_complex.h"
+
+namespace stellate::core {
+namespace {
+
+// Where no circumradius is above epsilon nothing farther than 2 epsilon cuts a star.
+constexpr double kGathered = 2 * (1 + 1e-6);
+
+}  // namespace
+
+template <int K>
+void StarComplex<K>::Lay(const double* point, const double* tangent, std::uint32_t name) {
+  if (name != size()) {
+    for (auto id = static_cast<std::uint32_t>(names_.size()); id < size(); ++id)
+      names_.push_back(id);
+    names_.push_back(name);
+  }
+  points_.insert(points_.end(), point, point + d_);
+  tangents_.insert(tangents_.end(), tangent, tangent + d_ * K);
+}
+
+// Cuts by what is near, nearest first and ties by id, out to where nothing can cut any more.
+// `around` holds at least what lies within `gathered` of p.
+template <int K>
+void StarComplex<K>::BuildLaidStar(std::uint32_t p, const std::vector<std::uint32_t>& around,
+                                   double gathered, Cell& cell) const {
+  thread_local typename Cell::Scratch scratch;
+  thread_local std::vector<std::pair<double, std::uint32_t>> near;
+  const Site site = At(p);
+  ResetCell(cell, site, nullptr, scratch);
+  near.clear();
+  for (const std::uint32_t q : around) {
+    const double distance2 = SquaredDistance(site.point, Point(q), d_);
+    if (q != p && distance2 <= gathered * gathered) near.emplace_back(distance2, q);
+  }
+  for (double done = gathered;;) {
+    std::sort(near.begin(), near.end());
+    double reach = Influence(p, cell);
+    for (const auto& [distance2, q] : near) {
+      if (distance2 > reach * reach) break;
+      if (ClipBy(cell, site, At(q), nullptr, nullptr, scratch)) reach = Influence(p, cell);
+    }
+    if (reach <= done) return;
+    const double next = std::min(reach, 2 * done);
+    near.clear();
+    tree_.VisitNear(
+        site.point, [&] { return next; },
+        [&](std::uint32_t q, double distance2) {
+          if (distance2 > done * done) near.emplace_back(distance2, q);
+        });
+    done = next;
+  }
+}
+
+template <int K>
+typename StarComplex<K>::Change StarComplex<K>::BuildLaidStars() {
+  cells_.resize(size());
+  near_.clear();
+  tree_.Assign(std::vector<double>(size(), 0.0), BallTree::Halving::kExtent);
+  const std::vector<BallTree::Bunch> bunches = tree_.Bunches();
+  const double gathered = kGathered * epsilon();
+  std::vector<double> influence(size());
+  ParallelFor(bunches.size(), [&](std::size_t b) {
+    thread_local std::vector<std::uint32_t> around;
+    thread_local Cell cell;  // its memory is used again; what is kept is no larger than it must be
+    const BallTree::Bunch& bunch = bunches[b];
+    around.clear();
+    tree_.GatherAround(bunch, gathered, &around);
+    for (std::uint32_t i = 0; i < bunch.count; ++i) {
+      const std::uint32_t p = bunch.ids[i];
+      BuildLaidStar(p, around, gathered, cell);
+      cells_[p] = cell;
+      influence[p] = Influence(p, cell);
+    }
+  });
+  tree_.SetInfluences(std::move(influence));
+  Change change;
+  change.added = ParallelGather<std::uint32_t>(size(), [&](std::size_t p, auto* ids) {
+    ForEachOwned(static_cast<std::uint32_t>(p), [&](std::size_t, const Simplex& s) {
+      ids->insert(ids->end(), s.begin(), s.end());
+    });
+  });
+  simplex_count_ = change.added.size() / (K + 1);
+  return change;
+}
+
+#define STELLATE_EACH(K)                                                                        \
+  template void StarComplex<K>::Lay(const double*, const double*, std::uint32_t);               \
+  template void StarComplex<K>::BuildLaidStar(std::uint32_t, const std::vector<std::uint32_t>&, \
+                                              double, Cell&) const;                             \
+  template StarComplex<K>::Change StarComplex<K>::BuildLaidStars();
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core
