@@ -19,9 +19,8 @@ constexpr double kMerged = 0.5;
 constexpr double kFarthest = 1;
 // Tangent spaces that keep less of a frame's volume than this have turned too far to carry it on.
 constexpr double kLeastVolume = 0.1;
-// Points of a block lie within this many spacings of its first.
-constexpr double kBlockReach = 3;
-constexpr std::size_t kBlockSize = 32;
+// Points of a run lie within this many spacings of its first.
+constexpr double kRunReach = 3;
 // Few points are laid into the newest layer, until it is as large as this share of the one before.
 constexpr std::size_t kLayerGrowth = 2;
 
@@ -50,11 +49,8 @@ void Growth<K>::Sites::Append(const Sites& others) {
 }
 
 template <int K>
-Growth<K>::Layer::Layer(int d, std::vector<double> laid)
-    : points(std::move(laid)), tree(d, &points) {
-  tree.Assign(std::vector<double>(points.size() / static_cast<std::size_t>(d), 0.0),
-              BallTree::Halving::kExtent);
-}
+Growth<K>::Layer::Layer(int d, std::vector<double> laid, double reach)
+    : points(std::move(laid)), tree(points, d, reach) {}
 
 template <int K>
 Growth<K>::Growth(int d, double spacing)
@@ -66,34 +62,19 @@ Growth<K>::Growth(int d, double spacing)
 }
 
 template <int K>
-std::vector<typename Growth<K>::Block> Growth<K>::BlocksOf(
-    const std::vector<double>& points) const {
-  std::vector<Block> blocks;
-  const std::size_t count = points.size() / stride();
-  const auto at = [&](std::size_t i) { return points.data() + i * stride(); };
-  for (std::size_t begin = 0, end; begin < count; begin = end) {
-    CheckInterruption(blocks.size());
-    for (end = begin + 1; end < count && end < begin + kBlockSize; ++end)
-      if (!(Distance(at(begin), at(end), d_) <= kBlockReach * spacing_)) break;
-    Block block{begin, end, std::vector<double>(stride(), 0.0), 0};
-    for (std::size_t i = begin; i < end; ++i)
-      for (std::size_t j = 0; j < stride(); ++j) block.centre[j] += at(i)[j];
-    for (double& c : block.centre) c /= static_cast<double>(end - begin);
-    for (std::size_t i = begin; i < end; ++i)
-      block.radius = std::max(block.radius, Distance(at(i), block.centre.data(), d_));
-    blocks.push_back(std::move(block));
-  }
-  return blocks;
+Runs Growth<K>::RunsOf(const std::vector<double>& points) const {
+  return Runs(points, d_, kRunReach * spacing_);
 }
 
-// What is laid within `radius` of some point of the block, and more; d each.
+// What is laid within `radius` of some point of the run, and more; d each.
 template <int K>
-void Growth<K>::GatherLaid(const Block& block, double radius, std::vector<double>* near) const {
+void Growth<K>::GatherLaid(const Runs& runs, std::size_t run, double radius,
+                           std::vector<double>* near) const {
   near->clear();
   thread_local std::vector<std::uint32_t> ids;
   for (const auto& layer : layers_) {
     ids.clear();
-    layer->tree.Gather(block.centre.data(), block.radius + radius, &ids);
+    layer->tree.Gather(runs.centre(run), runs.radius(run) + radius, &ids);
     for (const std::uint32_t id : ids) {
       const double* const q = layer->points.data() + id * stride();
       near->insert(near->end(), q, q + d_);
@@ -105,11 +86,11 @@ template <int K>
 std::vector<std::uint8_t> Growth<K>::AreFarFromLaid(const std::vector<double>& points,
                                                     double distance) const {
   std::vector<std::uint8_t> far(points.size() / stride(), 1);
-  const std::vector<Block> blocks = BlocksOf(points);
-  ParallelFor(blocks.size(), [&](std::size_t b) {
+  const Runs runs = RunsOf(points);
+  ParallelFor(runs.count(), [&](std::size_t run) {
     thread_local std::vector<double> near;
-    GatherLaid(blocks[b], distance, &near);
-    for (std::size_t i = blocks[b].begin; i < blocks[b].end; ++i)
+    GatherLaid(runs, run, distance, &near);
+    for (std::size_t i = runs.begin(run); i < runs.end(run); ++i)
       for (std::size_t q = 0; q < near.size() && far[i]; q += stride())
         far[i] = SquaredDistance(points.data() + i * stride(), near.data() + q, d_) >=
                  distance * distance;
@@ -171,11 +152,11 @@ void Growth<K>::ProposeFrom(std::uint32_t p, const std::vector<double>& near,
 
 template <int K>
 std::vector<typename Growth<K>::Proposal> Growth<K>::FreePlaces() const {
-  const std::vector<Block> blocks = BlocksOf(border_.points);
-  return ParallelGather<Proposal>(blocks.size(), [&](std::size_t b, auto* free) {
+  const Runs runs = RunsOf(border_.points);
+  return ParallelGather<Proposal>(runs.count(), [&](std::size_t run, auto* free) {
     thread_local std::vector<double> near;
-    GatherLaid(blocks[b], longest_ + kKeep * spacing_, &near);
-    for (std::size_t p = blocks[b].begin; p < blocks[b].end; ++p)
+    GatherLaid(runs, run, longest_ + kKeep * spacing_, &near);
+    for (std::size_t p = runs.begin(run); p < runs.end(run); ++p)
       ProposeFrom(static_cast<std::uint32_t>(p), near, free);
   });
 }
@@ -302,7 +283,7 @@ void Growth<K>::Carry(Sites sites) {
     points = std::move(layers_.back()->points);
     layers_.pop_back();
   }
-  layers_.push_back(std::make_unique<Layer>(d_, std::move(points)));
+  layers_.push_back(std::make_unique<Layer>(d_, std::move(points), kRunReach * spacing_));
 }
 
 template <int K>

@@ -7,6 +7,7 @@
 
 #include "core/base/instantiate.h"
 #include "core/sample/ball_tree.h"
+#include "core/sample/runs.h"
 
 namespace stellate::core {
 
@@ -68,17 +69,11 @@ class Growth {
     Sites sites;
     std::vector<std::uint16_t> parents;  // how many proposed it
   };
-  // A run of points, one after the other, that lie together.
-  struct Block {
-    std::size_t begin, end;
-    std::vector<double> centre;
-    double radius;
-  };
   // What was laid by rounds; those of about as many are joined into one.
   struct Layer {
-    Layer(int d, std::vector<double> laid);
+    Layer(int d, std::vector<double> laid, double reach);
     std::vector<double> points;
-    BallTree tree;
+    RunTree tree;
   };
   struct Proposal {
     std::uint32_t parent;     // in border_
@@ -86,8 +81,9 @@ class Growth {
   };
 
   std::size_t stride() const { return static_cast<std::size_t>(d_); }
-  std::vector<Block> BlocksOf(const std::vector<double>& points) const;
-  void GatherLaid(const Block& block, double radius, std::vector<double>* near) const;
+  Runs RunsOf(const std::vector<double>& points) const;
+  void GatherLaid(const Runs& runs, std::size_t run, double radius,
+                  std::vector<double>* near) const;
   std::vector<std::uint8_t> AreFarFromLaid(const std::vector<double>& points,
                                            double distance) const;
   void Land(const Proposal& proposal, double* point) const;

@@ -1,0 +1,61 @@
+#include "core/sample/runs.h"
+
+#include <algorithm>
+
+#include "core/base/parallel.h"
+#include "core/base/vector_ops.h"
+
+namespace stellate::core {
+namespace {
+
+constexpr std::size_t kMostPoints = 32;
+// More than rounding can take from a distance in R^d, d up to thousands.
+constexpr double kRounding = 1 + 1e-12;
+
+}  // namespace
+
+Runs::Runs(const std::vector<double>& points, int d, double reach)
+    : stride_(static_cast<std::size_t>(d)) {
+  const std::size_t count = points.size() / stride_;
+  const auto at = [&](std::size_t i) { return points.data() + i * stride_; };
+  for (std::size_t begin = 0, end; begin < count; begin = end) {
+    CheckInterruption(begins_.size());
+    begins_.push_back(begin);
+    for (end = begin + 1; end < count && end < begin + kMostPoints; ++end)
+      if (!(SquaredDistance(at(begin), at(end), d) <= reach * reach)) break;
+  }
+  centres_.assign(begins_.size() * stride_, 0.0);
+  radii_.assign(begins_.size(), 0.0);
+  begins_.push_back(count);
+  ParallelFor(radii_.size(), [&](std::size_t run) {
+    double* const centre = centres_.data() + run * stride_;
+    for (std::size_t i = begin(run); i < end(run); ++i)
+      for (std::size_t j = 0; j < stride_; ++j) centre[j] += at(i)[j];
+    for (std::size_t j = 0; j < stride_; ++j)
+      centre[j] /= static_cast<double>(end(run) - begin(run));
+    for (std::size_t i = begin(run); i < end(run); ++i)
+      radii_[run] = std::max(radii_[run], Distance(at(i), centre, d));
+  });
+  for (const double radius : radii_) largest_radius_ = std::max(largest_radius_, radius);
+}
+
+RunTree::RunTree(const std::vector<double>& points, int d, double reach)
+    : d_(d), points_(points), runs_(points, d, reach), tree_(d, &runs_.centres()) {
+  tree_.Assign(std::vector<double>(runs_.count(), 0.0), BallTree::Halving::kExtent);
+}
+
+void RunTree::Gather(const double* q, double radius, std::vector<std::uint32_t>* ids) const {
+  thread_local std::vector<std::uint32_t> near;
+  near.clear();
+  const double far = kRounding * radius;
+  tree_.Gather(q, kRounding * (far + runs_.largest_radius()), &near);
+  for (const std::uint32_t run : near) {
+    const double apart = kRounding * (far + runs_.radius(run));
+    if (SquaredDistance(q, runs_.centre(run), d_) > apart * apart) continue;
+    for (std::size_t i = runs_.begin(run); i < runs_.end(run); ++i)
+      if (SquaredDistance(q, points_.data() + i * static_cast<std::size_t>(d_), d_) <= far * far)
+        ids->push_back(static_cast<std::uint32_t>(i));
+  }
+}
+
+}  // namespace stellate::core

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/sample/ball_tree.h"
+
+namespace stellate::core {
+
+// Points in an order in which neighbours mostly follow each other, cut into runs that lie together:
+// what is near them is searched for once a run, instead of once a point.
+class Runs {
+ public:
+  // `points`: d each. The points of a run lie within `reach` of its first.
+  Runs(const std::vector<double>& points, int d, double reach);
+
+  std::size_t count() const { return radii_.size(); }
+  std::size_t begin(std::size_t run) const { return begins_[run]; }
+  std::size_t end(std::size_t run) const { return begins_[run + 1]; }
+  // The ball around its points.
+  const double* centre(std::size_t run) const { return centres_.data() + run * stride_; }
+  double radius(std::size_t run) const { return radii_[run]; }
+  const std::vector<double>& centres() const { return centres_; }  // d each
+  double largest_radius() const { return largest_radius_; }
+
+ private:
+  std::size_t stride_;
+  std::vector<std::size_t> begins_;
+  std::vector<double> centres_;  // d each
+  std::vector<double> radii_;
+  double largest_radius_ = 0;
+};
+
+// Such points, searched by distance: a tree of the runs alone, much cheaper to build than one of
+// the points.
+class RunTree {
+ public:
+  // `points` as above; borrowed.
+  RunTree(const std::vector<double>& points, int d, double reach);
+  RunTree(const RunTree&) = delete;
+  RunTree& operator=(const RunTree&) = delete;
+
+  const Runs& runs() const { return runs_; }
+  // Appends the points within `radius` of q, in no meaningful but a fixed order, and such as only
+  // rounding keeps out.
+  void Gather(const double* q, double radius, std::vector<std::uint32_t>* ids) const;
+
+ private:
+  int d_;
+  const std::vector<double>& points_;
+  Runs runs_;
+  BallTree tree_;
+};
+
+}  // namespace stellate::core
