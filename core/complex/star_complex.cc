@@ -67,7 +67,14 @@ class StarComplex<K>::Around final : public Surroundings<K> {
  public:
   Around(const StarComplex& complex, const Site& p, const Site* guest,
          const Site* newcomer = nullptr, const Cell* born = nullptr)
-      : complex_(complex), p_(p), guest_(guest), newcomer_(newcomer), born_(born) {}
+      : complex_(complex),
+        p_(p),
+        judging_(complex.judging_),
+        guest_(guest),
+        newcomer_(newcomer),
+        born_(born) {}
+  Around(const StarComplex& complex, const Site& p, Judging judging)
+      : complex_(complex), p_(p), judging_(judging) {}
 
   double HalfSpace(std::uint32_t id, double* normal) const override {
     if (IsFake(id))
@@ -80,7 +87,7 @@ class StarComplex<K>::Around final : public Surroundings<K> {
     return complex_.HalfSpace(p_, Find(id), step.data(), normal);
   }
 
-  int judged_in() const override { return complex_.judging_ == Judging::kFlats ? 0 : complex_.d_; }
+  int judged_in() const override { return judging_ == Judging::kFlats ? 0 : complex_.d_; }
 
   bool Centre(const std::uint32_t* ids, std::uint64_t key, double* x,
               double* centre) const override {
@@ -225,9 +232,10 @@ class StarComplex<K>::Around final : public Surroundings<K> {
 
   const StarComplex& complex_;
   const Site& p_;
-  const Site* guest_;
-  const Site* newcomer_;
-  const Cell* born_;
+  const Judging judging_;
+  const Site* guest_ = nullptr;
+  const Site* newcomer_ = nullptr;
+  const Cell* born_ = nullptr;
 };
 
 template <int K>
@@ -282,6 +290,40 @@ bool StarComplex<K>::Cuts(const Cell& cell, const Site& p, const Site& q) const 
   double normal[K];
   const double offset = HalfSpace(p, q, step.data(), normal);
   return cell.WouldCut(normal, offset, step.data());
+}
+
+template <int K>
+void StarComplex<K>::ResetInFlats(Cell& cell, const Site& p) const {
+  cell.Reset(inradius_, Around(*this, p, Judging::kFlats));
+}
+
+template <int K>
+bool StarComplex<K>::ClipInFlats(Cell& cell, const Site& p, const Site& q,
+                                 typename Cell::Scratch& scratch) const {
+  Step step(d_);
+  double normal[K];
+  const double offset = HalfSpace(p, q, step.data(), normal);
+  return cell.Clip(q.id, normal, offset, scratch, Around(*this, p, Judging::kFlats));
+}
+
+template <int K>
+bool StarComplex<K>::JudgeCell(
+    Cell& cell, const Site& p,
+    const std::vector<std::pair<double, std::uint32_t>>& near) const {
+  if constexpr (K == 2) {
+    return false;
+  } else {
+    cell.Judge(Around(*this, p, judging_));
+    const double reach = Influence(p.id, cell);
+    Step step(d_);
+    double normal[K];
+    for (const auto& [distance2, q] : near) {
+      if (distance2 > reach * reach) break;
+      const double offset = HalfSpace(p, At(q), step.data(), normal);
+      if (cell.WouldCutOthers(q, normal, offset, step.data())) return false;
+    }
+    return true;
+  }
 }
 
 template <int K>

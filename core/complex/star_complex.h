@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/complex/blocks.h"
@@ -210,6 +211,13 @@ class StarComplex {
   bool ClipBy(Cell& cell, const Site& p, const Site& q, const Site* guest, const Cell* born,
               typename Cell::Scratch& scratch) const;
   bool Cuts(const Cell& cell, const Site& p, const Site& q) const;
+  // Of a cell that is judged at common centres only when it is done.
+  void ResetInFlats(Cell& cell, const Site& p) const;
+  bool ClipInFlats(Cell& cell, const Site& p, const Site& q, typename Cell::Scratch& scratch) const;
+  // Judges it. Whether its vertices are those that it has there, too: none of `near`, the points
+  // within reach, is nearer to a common centre than the simplex' own.
+  bool JudgeCell(Cell& cell, const Site& p,
+                 const std::vector<std::pair<double, std::uint32_t>>& near) const;
   double Project(const Site& p, const double* q, double* step, double* normal) const {
     for (int i = 0; i < d_; ++i) step[i] = q[i] - p.point[i];
     for (int a = 0; a < K; ++a) normal[a] = Dot(p.tangent + a * d_, step, d_);
@@ -264,6 +272,8 @@ class StarComplex {
   Change BuildLaidStars();
   void BuildLaidStar(std::uint32_t p, const std::vector<std::uint32_t>& around, double gathered,
                      Cell& cell) const;
+  bool BuildInFlats(const Site& p, const std::vector<std::pair<double, std::uint32_t>>& near,
+                    double gathered, Cell& cell, typename Cell::Scratch& scratch) const;
   static std::vector<Turn> InTurns(const std::vector<Cut>& cuts);
   void CutStars(const std::vector<Turn>& turns, const std::vector<Cut>& cuts, std::uint32_t first,
                 Change* change);

@@ -1,6 +1,7 @@
 // How a whole sample is laid at once.
 
 #include <algorithm>
+#include <utility>
 
 #include "core/base/instantiate.h"
 #include "core/base/parallel.h"
@@ -25,6 +26,22 @@ void StarComplex<K>::Lay(const double* point, const double* tangent, std::uint32
   tangents_.insert(tangents_.end(), tangent, tangent + d_ * K);
 }
 
+// Most stars are the same in the flats, where clips cost a fraction: only those are judged all along
+// of which that is not so. `near`: what lies within `gathered`, nearest first.
+template <int K>
+bool StarComplex<K>::BuildInFlats(const Site& p,
+                                  const std::vector<std::pair<double, std::uint32_t>>& near,
+                                  double gathered, Cell& cell,
+                                  typename Cell::Scratch& scratch) const {
+  ResetInFlats(cell, p);
+  double reach = Influence(p.id, cell);
+  for (const auto& [distance2, q] : near) {
+    if (distance2 > reach * reach) break;
+    if (ClipInFlats(cell, p, At(q), scratch)) reach = Influence(p.id, cell);
+  }
+  return reach <= gathered && JudgeCell(cell, p, near) && Influence(p.id, cell) <= gathered;
+}
+
 // Cuts by what is near, nearest first and ties by id, out to where nothing can cut any more.
 // `around` holds at least what lies within `gathered` of p.
 template <int K>
@@ -33,14 +50,17 @@ void StarComplex<K>::BuildLaidStar(std::uint32_t p, const std::vector<std::uint3
   thread_local typename Cell::Scratch scratch;
   thread_local std::vector<std::pair<double, std::uint32_t>> near;
   const Site site = At(p);
-  ResetCell(cell, site, nullptr, scratch);
   near.clear();
   for (const std::uint32_t q : around) {
     const double distance2 = SquaredDistance(site.point, Point(q), d_);
     if (q != p && distance2 <= gathered * gathered) near.emplace_back(distance2, q);
   }
+  std::sort(near.begin(), near.end());
+  if (K > 2 && judging_ == Judging::kCommonCentre &&
+      BuildInFlats(site, near, gathered, cell, scratch))
+    return;
+  ResetCell(cell, site, nullptr, scratch);
   for (double done = gathered;;) {
-    std::sort(near.begin(), near.end());
     double reach = Influence(p, cell);
     for (const auto& [distance2, q] : near) {
       if (distance2 > reach * reach) break;
@@ -54,6 +74,7 @@ void StarComplex<K>::BuildLaidStar(std::uint32_t p, const std::vector<std::uint3
         [&](std::uint32_t q, double distance2) {
           if (distance2 > done * done) near.emplace_back(distance2, q);
         });
+    std::sort(near.begin(), near.end());
     done = next;
   }
 }
@@ -94,6 +115,9 @@ typename StarComplex<K>::Change StarComplex<K>::BuildLaidStars() {
   template void StarComplex<K>::Lay(const double*, const double*, std::uint32_t);               \
   template void StarComplex<K>::BuildLaidStar(std::uint32_t, const std::vector<std::uint32_t>&, \
                                               double, Cell&) const;                             \
+  template bool StarComplex<K>::BuildInFlats(                                                   \
+      const Site&, const std::vector<std::pair<double, std::uint32_t>>&, double, Cell&,         \
+      Cell::Scratch&) const;                                                                    \
   template StarComplex<K>::Change StarComplex<K>::BuildLaidStars();
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

@@ -49,6 +49,24 @@ void RestrictedVoronoiCell<K>::Reset(double inradius, const Surroundings<K>& aro
 }
 
 template <int K>
+void RestrictedVoronoiCell<K>::Judge(const Surroundings<K>& around) {
+  d_ = static_cast<std::size_t>(around.judged_in());
+  centres_.resize(vertices_.size() * d_);
+  for (std::size_t i = 0; i < vertices_.size(); ++i) {
+    Vertex& v = vertices_[i];
+    double* const centre = centres_.data() + i * d_;
+    std::uint32_t ids[K];
+    for (int s = 0; s < K; ++s) ids[s] = facets_[v.facet[s]].id;
+    v.judged = around.Centre(ids, keys_[i], v.x, centre);
+    if (v.judged)
+      v.norm2 = Dot(centre, centre, static_cast<int>(d_));
+    else
+      around.Lift(v.x, centre);
+  }
+  Measure();
+}
+
+template <int K>
 void RestrictedVoronoiCell<K>::Locate(Vertex& v, const Vertex& kept, const Vertex& removed,
                                       double s, double t, double slack) const {
   HalfSpaceRef<K> planes[K];

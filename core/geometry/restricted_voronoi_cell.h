@@ -58,10 +58,21 @@ class RestrictedVoronoiCell {
   bool Clip(std::uint32_t id, const double* normal, double offset, Scratch& scratch,
             const Surroundings<K>& around, const double* step = nullptr);
 
+  // Of a cell clipped in T_pM: judges its vertices, from now on, where `around` does.
+  void Judge(const Surroundings<K>& around);
+
   // Whether Clip with these arguments would cut: some vertex violates the half-space.
   bool WouldCut(const double* normal, double offset, const double* step = nullptr) const {
     for (std::size_t v = 0; v < vertices_.size(); ++v)
       if (Excess(v, normal, offset, step) > 0) return true;
+    return false;
+  }
+
+  // The same, of vertices that are not on the facet of that id: of what is on it rounding decides.
+  bool WouldCutOthers(std::uint32_t id, const double* normal, double offset,
+                      const double* step = nullptr) const {
+    for (std::size_t v = 0; v < vertices_.size(); ++v)
+      if (Excess(v, normal, offset, step) > 0 && !IsOn(v, id)) return true;
     return false;
   }
 
@@ -125,6 +136,11 @@ class RestrictedVoronoiCell {
   double Excess(std::size_t v, const double* normal, double offset, const double* step) const {
     return (d_ > 0 ? Dot(step, Centre(v), static_cast<int>(d_)) : Dot(normal, vertices_[v].x, K)) -
            offset;
+  }
+  bool IsOn(std::size_t v, std::uint32_t id) const {
+    for (const Index f : vertices_[v].facet)
+      if (facets_[f].id == id) return true;
+    return false;
   }
   // Writes the excess of each vertex, returns the place of the largest.
   std::size_t Excesses(const double* normal, double offset, const double* step,
