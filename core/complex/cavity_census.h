@@ -74,10 +74,11 @@ struct Census {
  private:
   void Survey(std::uint32_t p, std::vector<Simplex>& owned, std::vector<Simplex>& doubts) const {
     const auto& cell = complex.cell(p);
+    const Folds<K> folds(complex, p);
     Simplex s;
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
       if (!complex.SimplexOf(p, cell, v, &s)) continue;
-      if (!IsConsistent<K>(complex, p, v) || IsFolded<K>(complex, p, v))
+      if (!IsConsistent<K>(complex, p, v) || folds.IsFolded(v))
         doubts.push_back(s);
       else if (s[0] == p)
         owned.push_back(s);

@@ -106,20 +106,36 @@ bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p, std::size_t v)
 }
 
 template <int K>
-bool IsFolded(const StarComplex<K>& complex, std::uint32_t p, std::size_t v) {
-  const RestrictedVoronoiCell<K>& cell = complex.cell(p);
-  std::uint16_t here[K];
-  for (int s = 0; s < K; ++s) here[s] = cell.facet(v, s);
-  const double side = Orientation<K>(complex, p, here);
-  if (side == 0) return true;
+Folds<K>::Folds(const StarComplex<K>& complex, std::uint32_t p)
+    : cell_(complex.cell(p)), sides_(cell_.vertex_count()) {
+  for (std::size_t v = 0; v < sides_.size(); ++v) {
+    std::uint16_t facets[K];
+    for (int s = 0; s < K; ++s) facets[s] = cell_.facet(v, s);
+    sides_[v] = Orientation<K>(complex, p, facets);
+  }
+}
+
+// Neighbours lie on different sides of the facet they share if, with the one's vertex off it in the
+// place of the other's, their signs differ.
+template <int K>
+bool Folds<K>::IsFolded(std::size_t v) const {
+  if (sides_[v] == 0) return true;
   for (int s = 0; s < K; ++s) {
-    const std::size_t w = cell.adjacent(v, s);
-    std::uint16_t there[K];
-    std::copy(here, here + K, there);
+    const std::size_t w = cell_.adjacent(v, s);
+    int at[K];  // the place among v's facets of each of w's; the one off v takes that of slot s
+    bool is_wall = false;
+    for (int r = 0; r < K; ++r) {
+      at[r] = s;
+      for (int i = 0; i < K; ++i)
+        if (cell_.facet(v, i) == cell_.facet(w, r)) at[r] = i;
+      is_wall = is_wall || (at[r] == s && IsWall(cell_.id(cell_.facet(w, r))));
+    }
+    if (is_wall) continue;  // the mesh ends there
+    double side = sides_[w];
     for (int r = 0; r < K; ++r)
-      if (std::find(here, here + K, cell.facet(w, r)) == here + K) there[s] = cell.facet(w, r);
-    if (IsWall(cell.id(there[s]))) continue;  // the mesh ends there
-    if (Orientation<K>(complex, p, there) * side >= 0) return true;
+      for (int i = 0; i < r; ++i)
+        if (at[i] > at[r]) side = -side;
+    if (side * sides_[v] >= 0) return true;
   }
   return false;
 }
@@ -174,11 +190,11 @@ std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(
       const RestrictedVoronoiCell<K>&, std::uint32_t, const StarComplex<K>::Simplex&, \
       std::uint64_t);                                                                 \
   template bool IsConsistent(const StarComplex<K>&, std::uint32_t, std::size_t);      \
-  template bool IsFolded(const StarComplex<K>&, std::uint32_t, std::size_t);          \
   template std::uint64_t CountInconsistent(const StarComplex<K>&, std::uint32_t);     \
   template std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration( \
       const StarComplex<K>&, std::uint32_t);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
+STELLATE_INSTANTIATE_CLASS(Folds)
 
 }  // namespace stellate::core

@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
+#include "core/base/instantiate.h"
 #include "core/complex/star_complex.h"
 
 namespace stellate::core {
@@ -28,10 +30,20 @@ std::optional<std::size_t> FindSimplex(const RestrictedVoronoiCell<K>& cell, std
 template <int K>
 bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p, std::size_t v);
 
-// Whether the simplex dual to vertex v of p's cell and a neighbour of it in star(p) overlap near
-// the facet they share, seen in T_pM. Only stars that are judged at common centres can be folded.
+// Which simplices of star(p) overlap a neighbour in it near the facet they share, seen in T_pM.
+// Only stars that are judged at common centres can be folded.
 template <int K>
-bool IsFolded(const StarComplex<K>& complex, std::uint32_t p, std::size_t v);
+class Folds {
+ public:
+  Folds(const StarComplex<K>& complex, std::uint32_t p);
+
+  // Of the simplex dual to vertex v of p's cell.
+  bool IsFolded(std::size_t v) const;
+
+ private:
+  const RestrictedVoronoiCell<K>& cell_;
+  std::vector<double> sides_;  // by vertex: the sign of its simplex, in the order of its facets
+};
 
 // Simplices of star(p) that are missing from the star of one of their vertices.
 template <int K>
@@ -52,5 +64,7 @@ struct InconsistentConfiguration {
 template <int K>
 std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(
     const StarComplex<K>& complex, std::uint32_t p);
+
+STELLATE_DECLARE_CLASS(Folds)
 
 }  // namespace stellate::core

@@ -307,9 +307,8 @@ bool StarComplex<K>::ClipInFlats(Cell& cell, const Site& p, const Site& q,
 }
 
 template <int K>
-bool StarComplex<K>::JudgeCell(
-    Cell& cell, const Site& p,
-    const std::vector<std::pair<double, std::uint32_t>>& near) const {
+bool StarComplex<K>::JudgeCell(Cell& cell, const Site& p,
+                               const std::vector<std::pair<double, std::uint32_t>>& near) const {
   if constexpr (K == 2) {
     return false;
   } else {

@@ -54,8 +54,8 @@ class StarComplex {
                        WallSet walls = 0, const double* conormals = nullptr);
   // A point of a sample that is there before any star: no search finds it before Commit. Its star
   // then hangs on the points within reach alone: a part of the sample, with all points that far
-  // around it, has the stars of the whole, bit for bit, if its points keep their order and the names
-  // that they have there. REQUIRES: no stars yet, nothing appended, and no walls; names ascend.
+  // around it, has the stars of the whole, bit for bit, if its points keep their order and
+  // their names. REQUIRES: no stars yet, nothing appended, and no walls; names ascend.
   void Lay(const double* point, const double* tangent) { Lay(point, tangent, size()); }
   void Lay(const double* point, const double* tangent, std::uint32_t name);
   // Builds the stars of the appended points and clips all others by them, in parallel; the result

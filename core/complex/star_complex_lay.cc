@@ -26,8 +26,8 @@ void StarComplex<K>::Lay(const double* point, const double* tangent, std::uint32
   tangents_.insert(tangents_.end(), tangent, tangent + d_ * K);
 }
 
-// Most stars are the same in the flats, where clips cost a fraction: only those are judged all along
-// of which that is not so. `near`: what lies within `gathered`, nearest first.
+// Most stars are the same in the flats, where clips cost a fraction: only those are judged all
+// along of which that is not so. `near`: what lies within `gathered`, nearest first.
 template <int K>
 bool StarComplex<K>::BuildInFlats(const Site& p,
                                   const std::vector<std::pair<double, std::uint32_t>>& near,
@@ -111,13 +111,13 @@ typename StarComplex<K>::Change StarComplex<K>::BuildLaidStars() {
   return change;
 }
 
-#define STELLATE_EACH(K)                                                                        \
-  template void StarComplex<K>::Lay(const double*, const double*, std::uint32_t);               \
-  template void StarComplex<K>::BuildLaidStar(std::uint32_t, const std::vector<std::uint32_t>&, \
-                                              double, Cell&) const;                             \
-  template bool StarComplex<K>::BuildInFlats(                                                   \
-      const Site&, const std::vector<std::pair<double, std::uint32_t>>&, double, Cell&,         \
-      Cell::Scratch&) const;                                                                    \
+#define STELLATE_EACH(K)                                                                           \
+  template void StarComplex<K>::Lay(const double*, const double*, std::uint32_t);                  \
+  template void StarComplex<K>::BuildLaidStar(std::uint32_t, const std::vector<std::uint32_t>&,    \
+                                              double, Cell&) const;                                \
+  template bool StarComplex<K>::BuildInFlats(const Site&,                                          \
+                                             const std::vector<std::pair<double, std::uint32_t>>&, \
+                                             double, Cell&, Cell::Scratch&) const;                 \
   template StarComplex<K>::Change StarComplex<K>::BuildLaidStars();
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

@@ -209,6 +209,8 @@ std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const StarComplex<K
                                                              std::uint32_t p,
                                                              const ShapeBounds& bounds, int stage) {
   const auto& cell = complex.cell(p);
+  std::optional<Folds<K>> folds;
+  if (complex.judging() == Judging::kCommonCentre) folds.emplace(complex, p);
   std::optional<Violation<K>> worst;
   for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
     const auto simplex = complex.FaceSimplexOf(p, cell, v);
@@ -219,8 +221,7 @@ std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const StarComplex<K
     const bool thin =
         whole && held && bounds.sliver_bound > 0 && !complex.TouchesGuard(p, cell, v) &&
         HasThinFaceAt<K>(complex, complex.Point(p), cell, v, bounds.sliver_bound, nullptr);
-    if (!thin && IsConsistent<K>(complex, p, v) &&
-        !(whole && complex.judging() == Judging::kCommonCentre && IsFolded<K>(complex, p, v)))
+    if (!thin && IsConsistent<K>(complex, p, v) && !(whole && folds && folds->IsFolded(v)))
       continue;
     const Rule rule = thin ? Rule::kSliver : Rule::kInconsistent;
     if (worst && std::tuple(worst->dimension(), worst->rule, -worst->radius) <=
@@ -257,10 +258,10 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& comp
         worst = v;
     if (worst) return AtVertex<K>(Rule::kSliver, cell, *worst, false);
   }
+  std::optional<Folds<K>> folds;
+  if (complex.judging() == Judging::kCommonCentre) folds.emplace(complex, p);
   for (std::size_t v = 0; v < cell.vertex_count(); ++v)
-    if (is_worse(v) &&
-        (!IsConsistent<K>(complex, p, v) ||
-         (complex.judging() == Judging::kCommonCentre && IsFolded<K>(complex, p, v))))
+    if (is_worse(v) && (!IsConsistent<K>(complex, p, v) || (folds && folds->IsFolded(v))))
       worst = v;
   if (worst) return AtVertex<K>(Rule::kInconsistent, cell, *worst, false);
   if (!std::isfinite(bounds.reach)) return std::nullopt;
