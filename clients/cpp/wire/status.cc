@@ -92,6 +92,9 @@ std::string_view Advice(const grpc::Status& status) {
     return "does the server want TLS? --tls or --tls-ca FILE. Or a client certificate? --tls-cert "
            "and --tls-key (in C++ Credentials)";
   }
+  if (says("failed to connect") && says("Connection refused")) {
+    return "nobody listens there: start a server with `stellated`, or name another with --server";
+  }
   return "";
 }
 

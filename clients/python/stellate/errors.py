@@ -250,4 +250,9 @@ def _advice(code: grpc.StatusCode, message: str) -> str:
             "--tls or --tls-ca FILE. Or a client certificate? certificate= and key=, in the shell "
             "--tls-cert and --tls-key"
         )
+    if "failed to connect" in said and "connection refused" in said:
+        return (
+            "nobody listens there: start a server with `stellated`, or name another, in the shell "
+            "with --server"
+        )
     return ""

@@ -83,7 +83,7 @@ def test_a_mesh_of_another_kind_is_not_served():
 
 
 def test_nobody_listens():
-    with pytest.raises(stellate.Unavailable):
+    with pytest.raises(stellate.Unavailable, match="nobody listens there"):
         stellate.mesh(CIRCLE, 0.1, server="127.0.0.1:1")
 
 
