@@ -152,5 +152,8 @@ func fromRPC(err error) *Error {
 	if ours.Message == "" {
 		ours.Message = said.Code().String()
 	}
+	if ours.Kind == ErrUnauthenticated {
+		ours.Message += "; give a token with the Connection's Credentials"
+	}
 	return ours
 }

@@ -152,6 +152,9 @@ func TestTLSAndToken(t *testing.T) {
 		if !errors.Is(err, one.kind) {
 			t.Error(one.kind, err)
 		}
+		if one.kind == stellate.ErrUnauthenticated && !strings.Contains(err.Error(), "give a token") {
+			t.Error(err)
+		}
 	}
 	_, err = stellate.NewClient(stellate.Connection{
 		Server: "mesh.example.org:7717", Credentials: stellate.Credentials{Token: "secret"}})

@@ -141,7 +141,10 @@ export function fromRpc(error: grpc.ServiceError): StellateError {
       continue; // of whatever stands between us and the server
     }
   }
-  const message = error.details || grpc.status[error.code];
+  let message = error.details || grpc.status[error.code];
+  if (error.code === grpc.status.UNAUTHENTICATED) {
+    message += "; give a token with credentials: { token }";
+  }
   return new (errorClass(reason, error.code))(message, { reason: reason || undefined, details });
 }
 

@@ -43,6 +43,9 @@ answer_all <- function(worker, oracle, each = function() NULL, fails = stop) {
     tryCatch(
       {
         answer <- answer_chunk(chunk, oracle)
+        if (identical(fails, stop)) {
+          check_finite(answer)
+        }
         chunk$answer(
           answer$points, answer$tangents, answer$sizes, answer$found, answer$clearances,
           answer$conormals
@@ -107,6 +110,17 @@ check_shape <- function(method, values, shape) {
     stop(
       method, " has to give numbers of the extents ", paste(shape, collapse = " x "),
       ", and gave ", class(values)[1], " of ", paste(has, collapse = " x ")
+    )
+  }
+}
+
+# In R's words; a doctor has its own for it.
+check_finite <- function(answer) {
+  bad <- which(unlist(answer$found) & !is.finite(rowSums(answer$points)))
+  if (length(bad) > 0) {
+    stop(
+      "the answer for point ", bad[1], " of ", nrow(answer$points), " is ",
+      paste(answer$points[bad[1], ], collapse = " "), ": a row of NA says that there is none"
     )
   }
 }

@@ -146,6 +146,9 @@ stopifnot(grepl("private server", failure(
   mesh(half$closest_point, 2, 3, 0.2, unit_box, checkpoint = folder, server = address)
 )))
 
+said <- meshed(function(x) x * NaN)
+stopifnot(grepl("is NaN NaN NaN: a row of NA says that there is none", said, fixed = TRUE))
+
 # A mesh of others.
 client <- python$Client(address)
 declared <- client$create(python$manifolds$Torus(), 0.1) # with tangents and sizes

@@ -65,7 +65,8 @@ class FailuresTest < Minitest::Test
     Live.restarting_server('--tls-cert', pem, '--tls-key', pem, '--token-file', tokens) do |address, _|
       ask = ->(**some) { meshed(Live::TORUS, address, credentials: Stellate::Credentials.new(**some)) }
       assert_predicate ask.call(ca:, token:), :certified?
-      assert_raises(Stellate::Unauthenticated) { ask.call(ca:) }
+      refused = assert_raises(Stellate::Unauthenticated) { ask.call(ca:) }
+      assert_includes refused.message, 'give a token'
       assert_raises(Stellate::Unauthenticated) { ask.call(ca:, token: 'guessed') }
       assert_raises(Stellate::Unavailable) { ask.call(tls: true, token:) }
     end

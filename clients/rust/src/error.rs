@@ -137,6 +137,9 @@ impl Error {
         if error.reason.is_empty() {
             error.reason = format!("{:?}", status.code()).to_uppercase().into();
         }
+        if error.kind == Kind::Unauthenticated {
+            error.message += "; give a token with the Credentials of ClientOptions";
+        }
         if let Some(cause) = root_cause(status).filter(|cause| !error.message.contains(cause.as_str())) {
             error.message = format!("{}: {cause}", error.message);
         }

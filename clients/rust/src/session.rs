@@ -1,5 +1,6 @@
 //! A mesh from its declaration to its end: the server asks, the oracle answers, we watch.
 
+use std::panic::{catch_unwind, resume_unwind, AssertUnwindSafe};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
@@ -259,6 +260,7 @@ fn session(
 ) -> Result<(), Error> {
     let RunOptions { checkpoint, workers, max_chunk, on_progress, cancel, .. } = options;
     let failure = Mutex::new(None);
+    let panicked = Mutex::new(None);
     let stopped = Flag::default();
     let (left, ended) = (Flag::default(), Flag::default());
     let outcome = thread::scope(|scope| {
@@ -266,10 +268,16 @@ fn session(
             let options = WorkerOptions { worker: format!("rust-{}", i + 1), max_chunk };
             let mut worker = Worker::new(client, checked, &info.name, &options, true, stopped.clone());
             worker.tells = checkpoint.is_none();
-            let (failure, left, kept) = (&failure, &left, checkpoint.is_some());
+            let (failure, panicked, left, kept) = (&failure, &panicked, &left, checkpoint.is_some());
             scope.spawn(move || {
+                let serve = AssertUnwindSafe(|| client.runtime.block_on(worker.run()));
+                let outcome = catch_unwind(serve).unwrap_or_else(|payload| {
+                    panicked.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(payload);
+                    left.set(); // nobody else would answer
+                    Ok(String::new())
+                });
                 // What the server refuses, or its absence, the watch reports.
-                if let Err(error) = client.runtime.block_on(worker.run()) {
+                if let Err(error) = outcome {
                     let ours = error.kind == Kind::Raised || &*error.reason == "ORACLE_NOT_FINITE";
                     let mut first = failure.lock().unwrap_or_else(PoisonError::into_inner);
                     if ours && first.is_none() {
@@ -315,6 +323,9 @@ fn session(
     });
     if checkpoint.is_none() {
         let _ = client.runtime.block_on(client.delete_async(&info.name, true)); // it ends with its server
+    }
+    if let Some(payload) = panicked.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        resume_unwind(payload); // the oracle's own, where its owner sees it
     }
     let ours = failure.into_inner().unwrap_or_else(PoisonError::into_inner);
     match (outcome, ours) {

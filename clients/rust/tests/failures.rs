@@ -2,6 +2,7 @@
 
 mod live;
 
+use std::panic::{catch_unwind, AssertUnwindSafe};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -56,6 +57,18 @@ fn oracles_that_fail() {
 }
 
 #[test]
+fn a_panic_of_an_oracle_is_its_callers() {
+    let server = Server::start(&ServerOptions::default()).unwrap();
+    let client = Client::of(&server, ClientOptions::default()).unwrap();
+    let oracle = Spoilt::new(|_| panic!("no such surface"));
+    let meshing = || meshed(&oracle, Connection::Client(&client)).map(|_| ());
+    let payload = catch_unwind(AssertUnwindSafe(meshing)).unwrap_err();
+    assert_eq!(*payload.downcast_ref::<&str>().unwrap(), "no such surface");
+    assert!(client.list().unwrap().is_empty(), "the mesh is gone");
+    meshed(&Torus::default(), Connection::Client(&client)).unwrap(); // all else goes on
+}
+
+#[test]
 fn a_server_that_comes_back_is_waited_for() {
     let server = Mutex::new(RestartingServer::start(&[]));
     let address = server.lock().unwrap().address.clone();
@@ -98,7 +111,9 @@ fn tls_and_a_token() {
     let right = Credentials { ca: ca.clone(), token: Some(token.clone()), ..Default::default() };
     assert!(ask(right).unwrap().certified());
     let none = Credentials { ca: ca.clone(), ..Default::default() };
-    assert_eq!(ask(none).unwrap_err().kind, Kind::Unauthenticated);
+    let refused = ask(none).unwrap_err();
+    assert_eq!(refused.kind, Kind::Unauthenticated);
+    assert!(refused.message.contains("give a token"), "{refused:?}");
     let guessed = Credentials { ca, token: Some("guessed".to_string()), ..Default::default() };
     assert_eq!(ask(guessed).unwrap_err().kind, Kind::Unauthenticated);
     let stranger = Credentials { tls: true, token: Some(token.clone()), ..Default::default() };

@@ -80,7 +80,9 @@ module Stellate
     reason, fields, details = named_in(error.metadata['grpc-status-details-bin'])
     kind = error_class(reason, error.code)
     reason = kind.name.split('::').last if reason.empty?
-    kind.new(error.details.to_s.empty? ? reason : error.details, reason:, fields:, details:)
+    said = error.details.to_s.empty? ? reason : error.details
+    said += '; give a token with credentials: Stellate::Credentials.new(token:)' if kind == Unauthenticated
+    kind.new(said, reason:, fields:, details:)
   end
 
   def self.named_in(bytes)

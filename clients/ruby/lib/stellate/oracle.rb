@@ -120,8 +120,8 @@ module Stellate
 
     # The answer with n rows of `width` finite numbers, or nil; and all of these as bytes, where none is nil.
     def checked(method, answer, n, width)
-      raise wrong(method, "an answer that is no array of #{n}", 'SHAPE') unless
-        answer.is_a?(Array) && answer.size == n
+      raise wrong(method, "#{answer.class}, not an array of #{n} answers", 'SHAPE') unless answer.is_a?(Array)
+      raise wrong(method, "#{answer.size} answers to #{n} questions", 'SHAPE') unless answer.size == n
 
       data = sound(answer, n, width) # looked at as a whole, which is quicker
       return [answer, data] if data

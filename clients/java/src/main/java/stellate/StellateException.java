@@ -171,6 +171,9 @@ public final class StellateException extends RuntimeException {
     String said = status.getDescription() == null ? reason : status.getDescription();
     Throwable cause = status.getCause();
     String words = cause == null ? said : said + ": " + cause.getMessage();
+    if (kind == Kind.UNAUTHENTICATED) {
+      words += "; give a token with Credentials.token(...)";
+    }
     StellateException ours = new StellateException(kind, reason, words, error);
     ours.details.putAll(info.getMetadataMap());
     request

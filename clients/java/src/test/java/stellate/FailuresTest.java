@@ -111,7 +111,9 @@ final class FailuresTest {
       }
       for (String wrong : new String[] {null, "guessed"}) {
         try (Client client = new Client(address, new Credentials(wrong, ca, null, null, false))) {
-          assertEquals(Kind.UNAUTHENTICATED, thrown(client::info).kind());
+          StellateException refused = thrown(client::info);
+          assertEquals(Kind.UNAUTHENTICATED, refused.kind());
+          assertTrue(refused.getMessage().contains("give a token"), refused.getMessage());
         }
       }
       try (Client client = new Client(address, new Credentials(token, null, null, null, true))) {
