@@ -30,6 +30,7 @@ BOUNDARY = {
     "linkage_limits": ([2, 0, 6], [1, 1]),
     "moebius_strip": ([1, 0, 0], [1, 1]),
     "solid_torus": ([1, 0, 0], [1, 2, 1]),
+    "wedge": ([5, 9, 6], [1, 0, 1]),
 }
 KNOWN = {
     "cloud": (1.4, 1, True, [1, 2, 1]),
@@ -57,6 +58,7 @@ KNOWN = {
     "shapes": (2.0, 1, True, [1, 0, 1]),
     "solid_torus": (1.3, 1, True, [1, 1, 0, 0]),
     "three_torus": (1.3, 1, True, [1, 3, 3, 1]),
+    "wedge": (1.5, 1, True, [1, 0, 0, 0]),
 }
 
 

@@ -265,3 +265,18 @@ def test_a_projective_plane_is_the_matrices_of_rank_one():
     matrices[:, first, second] = x / np.where(first == second, 1.0, np.sqrt(2))
     matrices[:, second, first] = matrices[:, first, second]
     assert np.abs(y - veronese(np.linalg.eigh(matrices)[1][:, :, 2])).max() < 1e-8
+
+
+def test_walls_without_a_common_point_have_none():
+    """Three upright walls: rounding alone keeps their slopes from being dependent."""
+    turn = np.radians(30)
+    sides = [oracles.HalfSpace([0, 1, 0]), oracles.HalfSpace([np.sin(turn), -np.cos(turn), 0])]
+    wedge = oracles.Solid(
+        [*sides, lambda x: 1 - x[:, 0] ** 2 - x[:, 1] ** 2], bounding_box=([-1] * 3, [1] * 3)
+    )
+    x = np.random.default_rng(1).uniform(-1, 1, (200, 3))
+    with pytest.raises(stellate.NotConverged) as raised:
+        wedge.face_point(x, (0, 1, 2))
+    assert not raised.value.converged.any()
+    edge = wedge.face_point(x, (0, 1))
+    assert np.abs(edge[:, :2]).max() < 1e-12 and np.abs(edge[:, 2] - x[:, 2]).max() < 1e-12

@@ -8,6 +8,7 @@ import subprocess
 import pytest
 import stellate
 from stellate.manifolds import ProductOfCircles, Sphere, Torus
+from stellate.oracles import Clipped, HalfSpace, Solid
 
 
 @contextlib.contextmanager
@@ -74,6 +75,60 @@ def test_oracles_that_break_their_contract():
     assert process.wait() == 1
     assert "error NOT_IDEMPOTENT: closest_point moves its own answer" in text
     assert "error RAISED: ClosestPoint failed on a batch of 400: ArithmeticError: no such" in text
+
+
+def half_a_sphere():
+    return Clipped(Sphere(), [HalfSpace([0, 0, 1], -0.1)])
+
+
+class Inward(Clipped):
+    def conormals(self, points, face):
+        return -super().conormals(points, face)
+
+
+class Afield(Clipped):
+    def face_point(self, points, face):
+        return super().face_point(points, face) + 0.01
+
+
+WALLED = [
+    half_a_sphere(),
+    Solid(ball=([0, 0, 0], 1)),
+    Inward(Sphere(), [HalfSpace([0, 0, 1], -0.1)]),
+    Afield(Sphere(), [HalfSpace([0, 0, 1], -0.1)]),
+    Clipped(Sphere(), [HalfSpace([0, 0, 1], 5)]),
+    Clipped(half_a_sphere(), [HalfSpace([0, 0.2, 1], -0.1)]),
+    Clipped(half_a_sphere(), [HalfSpace([0, 0, 1], -5)]),
+    Solid([HalfSpace([0, 1, 0]), HalfSpace([0.5, -(0.75**0.5), 0])], ball=([0, 0, 0], 1)),
+]
+OF_WALLS = [
+    set(),
+    set(),
+    {"CONORMAL_INWARD"},
+    {"FACE_OFF_MANIFOLD"},
+    {"NOTHING_LEFT"},
+    {"WALLS_TANGENTIAL"},
+    {"WALL_CUTS_NOTHING"},
+    {"ACUTE_EDGE"},
+]
+
+
+@pytest.mark.parametrize("oracle, expected", zip(WALLED, OF_WALLS, strict=True))
+def test_walls_are_examined_as_beside_the_oracle(oracle, expected):
+    with doctor("--json") as (process, client):
+        assert examine(client, oracle, 0.05) == "SUCCEEDED"
+        process.terminate()
+        report = json.loads(process.stdout.read())
+    codes = {finding["code"] for finding in report["findings"]}
+    assert expected <= codes, report["text"]
+    own = stellate.check(oracle, 0.05)
+    of_walls = ("WALL", "FACE", "CONORMAL", "ACUTE", "NOTHING_LEFT")
+    assert {code for code in codes if code.startswith(of_walls)} == {
+        code for code in own.codes if code.startswith(of_walls)
+    }
+    assert report["ok"] == own.ok
+    if own.reach is not None:
+        assert report["reach"] == pytest.approx(own.reach, rel=0.2)
 
 
 def test_a_worker_that_goes_leaves_a_report():

@@ -274,7 +274,9 @@ class LevelSet:
     def _steps(self, slopes: Array, values: Array, wish: Array) -> tuple[Array, Array]:
         """In M's tangent space: the shortest to f = 0, and what of the wish does not change f."""
         gram = slopes @ transposed(slopes)
-        regular = np.abs(np.linalg.det(gram)) > 0
+        # Rows that rounding alone keeps apart lead nowhere, least of all to f = 0.
+        lengths2 = np.diagonal(gram, axis1=1, axis2=2).prod(axis=1)
+        regular = np.linalg.det(gram) > 1e-12 * lengths2
         gram[~regular] = np.eye(self._count)
         down = -apply(transposed(slopes), np.linalg.solve(gram, values[..., None])[..., 0])
         off = apply(slopes, wish)
