@@ -38,15 +38,22 @@ def rooms(build: pathlib.Path) -> dict[str, tuple[list[str], list[pathlib.Path]]
     """By room: the options, and the sources."""
     found: dict[str, tuple[list[str], list[pathlib.Path]]] = {}
     for entry in json.loads((build / "compile_commands.json").read_text()):
-        source = pathlib.Path(entry["file"])
-        if not source.is_relative_to(ROOT) or source.is_relative_to(build.resolve()):
-            continue
-        relative = source.relative_to(ROOT)
-        if relative.parts[0] in OURS:
-            given, sources = found.setdefault(str(relative.parent), ([], []))
-            sources.append(source)
-            given += [word for word in options(entry["command"]) if word not in given]
+        for source in sources_of(pathlib.Path(entry["file"])):
+            if not source.is_relative_to(ROOT) or source.is_relative_to(build.resolve()):
+                continue
+            relative = source.relative_to(ROOT)
+            if relative.parts[0] in OURS:
+                given, sources = found.setdefault(str(relative.parent), ([], []))
+                sources.append(source)
+                given += [word for word in options(entry["command"]) if word not in given]
     return found
+
+
+def sources_of(compiled: pathlib.Path) -> list[pathlib.Path]:
+    """What it includes, if CMake bunched sources there."""
+    if compiled.parent.name != "Unity":
+        return [compiled]
+    return [pathlib.Path(name) for name in re.findall(r'#include "(.*)"', compiled.read_text())]
 
 
 def judge(room: str, given: list[str], sources: list[pathlib.Path], scratch: pathlib.Path) -> str:

@@ -27,7 +27,7 @@ constexpr int kPauseMilliseconds = 100;   // while there is no file left to acce
 constexpr int kLaterMilliseconds = 20;    // while connections are to wait
 
 // How many connections there can be, when `wanted` are asked for.
-std::size_t Allowed(std::size_t wanted) {
+std::size_t ConnectionsAllowed(std::size_t wanted) {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return wanted;
   const rlim_t needed = wanted + kOtherFiles;
@@ -102,7 +102,7 @@ core::Expected<std::unique_ptr<Listener>> Listener::Open(ListenAddress address,
                                 "another --listen"));
   }
   return std::unique_ptr<Listener>(
-      new Listener(std::move(sockets), address.port, Allowed(max_connections)));
+      new Listener(std::move(sockets), address.port, ConnectionsAllowed(max_connections)));
 }
 
 Listener::Listener(std::vector<int> sockets, int port, std::size_t max_connections)
