@@ -26,7 +26,7 @@ function runs(path: string): boolean {
 
 function inSourceTree(): string[] {
   let folder = dirname(fileURLToPath(import.meta.url));
-  while (!existsSync(join(folder, "proto", "stellate", "v1", "stellate.proto"))) {
+  while (!existsSync(join(folder, "clients", "node", "package.json"))) {
     if (folder === dirname(folder)) return [];
     folder = dirname(folder);
   }
