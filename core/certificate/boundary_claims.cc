@@ -1,6 +1,7 @@
 #include "core/certificate/boundary_claims.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <map>
 #include <numeric>
@@ -9,6 +10,7 @@
 
 #include "core/base/message.h"
 #include "core/base/random.h"
+#include "core/certificate/fibres.h"
 #include "core/certificate/links.h"
 #include "core/geometry/reach_bound.h"
 
@@ -162,18 +164,51 @@ void BoundaryClaims::JudgeInside(const std::vector<std::uint32_t>& chosen, std::
   if (answer.clearances.size() == 0) return;
   for (std::size_t n = 0; n < chosen.size(); ++n) {
     const std::uint32_t* ids = x_.list()[chosen[n]];
-    const bool inner = std::all_of(ids, ids + x_.mesh.k + 1,
-                                   [&](std::uint32_t v) { return x_.mesh.WallsOf(v) == 0; });
-    const auto j = static_cast<Eigen::Index>(n * each);
-    if (!inner || !Found(answer, j)) continue;
-    Eigen::Index wall = 0;
-    if (answer.clearances.col(j).minCoeff(&wall) >= 0) continue;
+    // A simplex at a wall may lie beyond that, by as much as the wall bends.
+    WallSet touched = 0;
+    for (int i = 0; i <= x_.mesh.k; ++i) touched |= x_.mesh.WallsOf(ids[i]);
+    for (std::size_t m = n * each; m < (n + 1) * each; ++m) {
+      const auto j = static_cast<Eigen::Index>(m);
+      if (!Found(answer, j)) continue;
+      int wall = 0;
+      while (wall < x_.spec.walls &&
+             ((touched & SetOfWall(wall)) != 0 || answer.clearances(wall, j) >= 0))
+        ++wall;
+      if (wall == x_.spec.walls) continue;
+      x_.findings.Refuse(
+          Findings::kCoverage,
+          Message("the mesh lies beyond wall ", wall, " at ", NamePoint(answer.points.col(j)),
+                  ", inside of simplex ", NameSimplex(ids, x_.mesh.k + 1),
+                  ": the manifold has a hole there that is smaller than epsilon; take epsilon "
+                  "smaller, or give seeds on that wall"));
+    }
+  }
+}
+
+void BoundaryClaims::JudgeBeyond(const AnswerBlock& answer) {
+  WallSet met = 0;
+  for (const FaceMesh& face : *x_.mesh.faces) met |= face.walls;
+  std::vector<double> points;
+  std::vector<int> walls;
+  for (Eigen::Index j = 0; j < answer.clearances.cols(); ++j) {
+    if (!Found(answer, j)) continue;
+    WallSet beyond = 0;
+    for (int wall = 0; wall < x_.spec.walls; ++wall)
+      if (answer.clearances(wall, j) < 0) beyond |= SetOfWall(wall);
+    if (beyond == 0 || (beyond & met) != 0) continue;
+    walls.push_back(std::countr_zero(beyond));
+    points.insert(points.end(), answer.points.col(j).begin(), answer.points.col(j).end());
+  }
+  const std::vector<NearestVertex> nearest = FindNearestVertices(x_.mesh, points, x_.size);
+  for (std::size_t n = 0; n < walls.size(); ++n) {
+    if (nearest[n].distance > x_.size) continue;
+    const Eigen::Map<const Eigen::VectorXd> at(
+        points.data() + n * static_cast<std::size_t>(x_.mesh.d), x_.mesh.d);
     x_.findings.Refuse(
         Findings::kCoverage,
-        Message("the mesh lies beyond wall ", wall, " at ", NamePoint(answer.points.col(j)),
-                ", inside of simplex ", NameSimplex(ids, x_.mesh.k + 1),
-                ": the manifold has a hole there that is smaller than epsilon; take epsilon "
-                "smaller, or give seeds on that wall"));
+        Message("no vertex is on wall ", walls[n], ", which cuts the manifold: ", NamePoint(at),
+                " is beyond it, ", Brief(nearest[n].distance), " from vertex ", nearest[n].vertex,
+                "; take epsilon smaller, or give seeds on that wall"));
   }
 }
 

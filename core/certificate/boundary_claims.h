@@ -26,9 +26,11 @@ class BoundaryClaims {
   // Barycentres of some simplices of the boundary, a block for each wall.
   std::vector<QueryBlock> FaceQuestions();
   void JudgeFace(const QueryBlock& asked, const AnswerBlock& answer);
-  // That simplices off the boundary have M under them. `chosen`, `each`: see PointsInside.
+  // That no simplex lies beyond a wall that it does not touch. `chosen`, `each`: see PointsInside.
   void JudgeInside(const std::vector<std::uint32_t>& chosen, std::uint32_t each,
                    const AnswerBlock& answer);
+  // Of points of M^: where one near the mesh is beyond a wall that the mesh does not end at.
+  void JudgeBeyond(const AnswerBlock& answer);
   // That the boundary's own reach within M, as its edges show it, is not too small for the mesh.
   // After what M's is was told.
   void JudgeReach();

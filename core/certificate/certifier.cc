@@ -88,7 +88,8 @@ class Certifier::Impl {
   // As Ask, of M alone: what M^ has beyond a wall counts as not found.
   void AskWithin(Eigen::MatrixXd points, const Judge& judge, bool want_tangents = false) {
     if (!boundary_) return Ask(std::move(points), judge, want_tangents);
-    const auto within = [judge](const Eigen::MatrixXd& asked, const AnswerBlock& answer) {
+    const auto within = [this, judge](const Eigen::MatrixXd& asked, const AnswerBlock& answer) {
+      boundary_->JudgeBeyond(answer);
       AnswerBlock inside = answer;
       const Eigen::Index count = answer.points.cols();
       inside.found.resize(static_cast<std::size_t>(count), 1);

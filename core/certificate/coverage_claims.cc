@@ -123,8 +123,37 @@ void CoverageClaims::Fail(const Probe& probe) {
   if (near.size() > Violations::kMost) near.pop_back();
 }
 
+// Whether a point is beyond a facet of the boundary near a vertex, by no more than that may bend.
+bool CoverageClaims::IsBeyondFacet(const Eigen::VectorXd& x, std::uint32_t vertex) const {
+  const auto is_near = [&](const std::uint32_t* ids) {
+    for (int i = 0; i <= x_.mesh.k; ++i) {
+      WallSet common = ~WallSet{0};
+      std::vector<std::uint32_t> corners;
+      for (int j = 0; j <= x_.mesh.k; ++j) {
+        if (j == i) continue;
+        common &= x_.mesh.WallsOf(ids[j]);
+        corners.push_back(ids[j]);
+      }
+      if (common == 0) continue;
+      Eigen::MatrixXd along(x_.mesh.d, x_.mesh.k - 1);
+      for (int j = 1; j < x_.mesh.k; ++j)
+        along.col(j - 1) = x_.Vertex(corners[static_cast<std::size_t>(j)]) - x_.Vertex(corners[0]);
+      const Eigen::VectorXd step = x - x_.Vertex(corners[0]);
+      const double away = (step - along * along.colPivHouseholderQr().solve(step)).norm();
+      if (away <= x_.DistanceAllowed(x_.Circumradius(ids))) return true;
+    }
+    return false;
+  };
+  for (const std::uint32_t s : x_.adjacency->Star(vertex))
+    for (int i = 0; i <= x_.mesh.k; ++i)
+      for (const std::uint32_t t : x_.adjacency->Star(x_.list()[s][i]))
+        if (is_near(x_.list()[t])) return true;
+  return false;
+}
+
 void CoverageClaims::JudgeHits(const Probe& probe, const FibreHits& hits) {
   if (hits.count < 0) return;  // undecided by rounding
+  if (hits.count == 0 && x_.mesh.walls && IsBeyondFacet(probe.x, probe.nearest.vertex)) return;
   ++x_.certificate.fibre_samples;
   const double size = x_.LocalSize(probe.nearest.vertex);
   if (hits.count != 1) {

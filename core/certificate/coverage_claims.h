@@ -34,6 +34,7 @@ class CoverageClaims {
     std::vector<double> tangent;  // k x d, C order
   };
   void JudgeFibres();
+  bool IsBeyondFacet(const Eigen::VectorXd& x, std::uint32_t vertex) const;
   void JudgeHits(const Probe& probe, const FibreHits& hits);
   void Fail(const Probe& probe);
 

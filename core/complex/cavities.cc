@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <optional>
 
 #include "core/base/parallel.h"
 #include "core/complex/cavity_census.h"
@@ -19,6 +20,10 @@ constexpr std::size_t kAllSubsets = 11;
 constexpr std::size_t kMostVertices = 48;
 // Simplices placed, in one cavity, before the search is given up.
 constexpr int kMostSteps = 4000;
+
+// A determinant this small beside the lengths of its rows is one of points that are off a wall by
+// an oracle's error.
+constexpr double kFlat = 1e-8;
 
 template <int N>
 double Determinant(double (&m)[N][N]) {
@@ -118,10 +123,11 @@ class Cavity {
     return true;
   }
 
-  // The sign of a simplex, its vertices ascending, in p's tangent space.
+  // The sign of a simplex, its vertices ascending, in p's tangent space; 0 if it is
+  // degenerate there, as those are whose vertices are all on one flat wall.
   int SignAt(std::uint32_t p, const Simplex& s) const {
     const int d = complex_.d();
-    double m[K][K];
+    double m[K][K], lengths2 = 1;
     for (int i = 0; i < K; ++i) {
       const double* const at = complex_.Point(s[static_cast<std::size_t>(i) + 1]);
       for (int a = 0; a < K; ++a) {
@@ -129,8 +135,11 @@ class Cavity {
         m[i][a] = 0;
         for (int j = 0; j < d; ++j) m[i][a] += t[j] * (at[j] - complex_.Point(s[0])[j]);
       }
+      lengths2 *= Dot(m[i], m[i], K);
     }
-    return Sign(Determinant<K>(m)) * orientation_[Place(p)];
+    const double determinant = Determinant<K>(m);
+    if (determinant * determinant <= kFlat * kFlat * lengths2) return 0;
+    return Sign(determinant) * orientation_[Place(p)];
   }
 
   // The orientation of a simplex seen from some vertices of the cavity, or 0 if they differ.
@@ -142,20 +151,29 @@ class Cavity {
     return first;
   }
 
+  // Of a facet of a doubtful simplex before the cavity is filled; nothing where that cannot be
+  // told.
+  std::optional<State> StateOf(const Facet& facet) const {
+    Simplex agreed[2];
+    const int count = census_.AgreedOn(facet, agreed);
+    const std::optional<int> wall = count < 2 ? census_.WallUnder(facet) : std::nullopt;
+    if (count + wall.has_value() == 2) return kClosed;
+    if (count + wall.has_value() == 0) return kFree;
+    const int taken = wall ? SideBeyond(*wall, facet) : SideOf(agreed[0], facet);
+    if (taken == 0) return std::nullopt;
+    return static_cast<State>(-taken);
+  }
+
   // The facets of doubtful simplices that an agreed one is on, from its other side.
   bool FindBoundary() {
     for (const Simplex& s : doubtful_) {
       for (int i = 0; i <= K; ++i) {
         const Facet facet = Without(s, i);
         if (!facets_.emplace(facet, static_cast<int>(state_.size())).second) continue;
-        Simplex agreed[2];
-        const int count = census_.AgreedOn(facet, agreed);
-        state_.push_back(count == 2 ? kClosed : kFree);
+        const std::optional<State> state = StateOf(facet);
+        if (!state) return false;
+        state_.push_back(*state);
         by_facet_.emplace_back();
-        if (count != 1) continue;
-        const int side = SideOf(agreed[0], facet);
-        if (side == 0) return false;
-        state_.back() = static_cast<State>(-side);
       }
     }
     loose_.assign(vertices_.size(), 1);
@@ -178,6 +196,25 @@ class Cavity {
     while (apex < K && s[apex] == facet[apex]) ++apex;
     const int orientation = OrientationOf(s, facet);
     return apex % 2 == 0 ? orientation : -orientation;
+  }
+
+  // On which side of a facet in a wall there is nothing: where a simplex would lie whose first
+  // vertex is beyond it.
+  int SideBeyond(int wall, const Facet& facet) const {
+    int side = 0;
+    for (const std::uint32_t p : facet) {
+      const double* const outward =
+          complex_.Conormals(p) + K * CountWalls(complex_.walls(p) & (SetOfWall(wall) - 1));
+      double m[K][K];
+      for (int i = 0; i < K; ++i) {
+        complex_.Project(p, complex_.Point(facet[static_cast<std::size_t>(i)]), m[i]);
+        for (int a = 0; a < K; ++a) m[i][a] -= outward[a];
+      }
+      const int here = Sign(Determinant<K>(m)) * orientation_[Place(p)];
+      if (here == 0 || (side != 0 && here != side)) return 0;
+      side = here;
+    }
+    return side;
   }
 
   void ProposeAll(std::size_t next, int chosen, Simplex& s) {

@@ -15,7 +15,8 @@ namespace stellate::core {
 // spaces of all its vertices, whose oriented boundary, with that of the consistent simplices,
 // cancels on each facet. Such a chain covers each point as often as its boundary winds around it,
 // and that is once: it tiles the cavity. The search goes facet by facet, the one with the fewest
-// choices first, and tries simplices that more stars hold, and then fatter ones, first.
+// choices first, and tries simplices that more stars hold, and then fatter ones, first. At a wall
+// the cavity ends: what stars agree on there has one side.
 //
 // The mesh is then no longer the union of the stars, so that it must be judged as it is: by the
 // certificate.

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <functional>
 #include <iterator>
 #include <numeric>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -68,6 +70,27 @@ struct Census {
     return std::min(count, 2);
   }
 
+  // The wall that a facet lies in: nothing is beyond it there. Stars agree that it is of that face.
+  std::optional<int> WallUnder(const Facet& facet) const {
+    const std::uint32_t p = facet[0];
+    if (complex.walls(p) == 0) return std::nullopt;
+    const auto& cell = complex.cell(p);
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      const auto simplex = complex.FaceSimplexOf(p, cell, v);
+      if (simplex.fake || CountWalls(simplex.walls) != 1 || simplex.count != K) continue;
+      if (std::equal(facet.begin(), facet.end(), simplex.ids.begin()) &&
+          IsConsistent<K>(complex, p, v))
+        return std::countr_zero(simplex.walls);
+    }
+    return std::nullopt;
+  }
+  // Whether agreed simplices are wherever a facet has a side.
+  bool IsClosed(const Facet& facet) const {
+    Simplex found[2];
+    const int count = AgreedOn(facet, found);
+    return count == 2 || (count == 1 && WallUnder(facet));
+  }
+
   const StarComplex<K>& complex;
   std::vector<Simplex> agreed, doubtful, all_doubts;
 
@@ -87,7 +110,7 @@ struct Census {
 };
 
 // Doubtful simplices that share a facet lie in one cavity, unless agreed ones are on both its
-// sides.
+// sides, or on the one that it has in a wall.
 template <int K>
 std::vector<std::vector<typename StarComplex<K>::Simplex>> PartDoubtful(const Census<K>& census) {
   using Facet = typename Census<K>::Facet;
@@ -113,8 +136,7 @@ std::vector<std::vector<typename StarComplex<K>::Simplex>> PartDoubtful(const Ce
     if (facets[i].first != facets[i + 1].first) continue;
     const std::size_t a = root(facets[i].second), b = root(facets[i + 1].second);
     if (a == b) continue;
-    typename StarComplex<K>::Simplex agreed[2];
-    if (census.AgreedOn(facets[i].first, agreed) < 2) parent[std::max(a, b)] = std::min(a, b);
+    if (!census.IsClosed(facets[i].first)) parent[std::max(a, b)] = std::min(a, b);
   }
   std::vector<std::size_t> number(doubtful.size());
   std::vector<std::vector<typename StarComplex<K>::Simplex>> parts;

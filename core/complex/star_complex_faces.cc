@@ -37,21 +37,27 @@ std::optional<typename StarComplex<K>::CellVertex> StarComplex<K>::EncroachedBy(
     const double* point, WallSet walls) const {
   if (walls_.empty()) return std::nullopt;
   std::optional<CellVertex> worst;
-  int lowest = K - CountWalls(walls);
+  const int own = K - CountWalls(walls);
+  int lowest = own;
   double farthest2 = 0;
+  std::vector<double> step(stride());
   tree_.ForEachInfluencing(point, [&](std::uint32_t p) {
     if (IsSubset(this->walls(p), walls)) return;
     const Cell& cell = cells_[p];
+    double normal[K];
+    const double offset = 0.5 * (Project(At(p), point, step.data(), normal) + GuardOf(p));
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      // Few vertices are cut: that is asked first.
+      if (!cell.WouldCutVertex(v, normal, offset, step.data())) continue;
       const WallSet at = WallsAt<K>(cell, v);
       const int dimension = K - CountWalls(at);
       if (IsSubset(at, walls) || dimension == 0 || dimension > lowest || cell.HasFakeFacet(v))
         continue;
       const double norm2 = cell.norm2(v);
-      const bool is_first = !worst && dimension < K - CountWalls(walls);
+      const bool is_first = !worst && dimension < own;
       const bool is_worse = worst && (dimension < lowest || norm2 > farthest2 ||
                                       (norm2 == farthest2 && p < worst->star));
-      if (!(is_first || is_worse) || !CutsVertex(p, v, point)) continue;
+      if (!is_first && !is_worse) continue;
       worst = CellVertex{p, v};
       lowest = dimension;
       farthest2 = norm2;

@@ -128,7 +128,8 @@ std::vector<Target<K>> Engine<K>::RejudgeSuspects() {
         WorstSliverOrInconsistent<K>(complex_, suspects[near[i]], criteria_.shape, faces_.stage());
   });
   filled_.ForgetMended();
-  if (std::any_of(found.begin(), found.end(), [](const auto& v) { return v.has_value(); }))
+  if (faces_.stage() == K &&
+      std::any_of(found.begin(), found.end(), [](const auto& v) { return v.has_value(); }))
     filled_.Fill(complex_, criteria_);
   else
     filled_.Clear();
@@ -138,8 +139,10 @@ std::vector<Target<K>> Engine<K>::RejudgeSuspects() {
     const std::uint32_t p = suspects[i];
     const bool is_mended = found[i] && filled_.Mends(complex_, p, *found[i]);
     if (is_mended) filled_.NoteMended(p);
-    // A simplex that leans will not always yield: the certificate says so.
-    if (!found[i] || is_mended || (found[i]->lean && book_.is_given_up(p))) {
+    // A simplex that leans will not always yield, nor a sliver between faces that are nearer to
+    // each other than their sizes: the certificate says so.
+    const bool may_stay = found[i] && (found[i]->lean || IsSliverAtBoundary(p, *found[i]));
+    if (!found[i] || is_mended || (may_stay && book_.is_given_up(p))) {
       book_.NoteJudged(p, std::nullopt);
       continue;
     }

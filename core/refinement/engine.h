@@ -102,6 +102,7 @@ class Engine {
   void RejudgeAll();
   void YieldToFaces(std::vector<Target<K>>* targets);
   PlannedPoints SetCollars();
+  bool IsSliverAtBoundary(std::uint32_t star, const Violation<K>& violation) const;
   bool IsCollar(const typename StarComplex<K>::FaceSimplex& simplex) const;
   std::optional<Target<K>> SplitOf(const typename StarComplex<K>::CellVertex& at, Rule by) const;
   Target<K> Aim(std::uint32_t star, const Violation<K>& violation) const;

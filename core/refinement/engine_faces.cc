@@ -15,10 +15,10 @@ namespace stellate::core {
 namespace {
 
 // Shape never grinds the boundary down: a face's simplex of less than this share of the size asked
-// for is split for the sake of sizes alone.
-constexpr double kLeastSplit = 0.25;
-// Beside guarded edges the walls are that near to each other, and no shape without it.
-constexpr double kLeastSplitAtGuards = 0.02;
+// for is split for the sake of sizes alone. A larger share leaves no shape where faces are near to
+// each other: of 63 gyroid solids that end just beside the corners of their boxes 12 do not close
+// with this, 25 with 0.05, more than half with 0.25.
+constexpr double kLeastSplit = 0.02;
 // A point of a face is news this far from the sample, in sizes asked for; a corner, which nothing
 // else can be instead of, anywhere but at itself.
 constexpr double kNewsAway = 0.5;
@@ -72,6 +72,14 @@ bool Engine<K>::IsCollar(const typename StarComplex<K>::FaceSimplex& simplex) co
          kCollarLength * std::max(faces_.CollarOf(simplex.ids[0]), faces_.CollarOf(simplex.ids[1]));
 }
 
+template <int K>
+bool Engine<K>::IsSliverAtBoundary(std::uint32_t star, const Violation<K>& violation) const {
+  if (violation.rule != Rule::kSliver || !faces_.has_walls()) return false;
+  const auto simplex = complex_.FaceSimplexOf(star, complex_.cell(star), violation.vertex);
+  return std::any_of(simplex.ids.begin(), simplex.ids.begin() + simplex.count,
+                     [&](std::uint32_t id) { return complex_.walls(id) != 0; });
+}
+
 // The simplex dual to a vertex of a star's cell, to be split although it breaks no rule. Nothing
 // where that would go too far.
 template <int K>
@@ -91,8 +99,7 @@ std::optional<Target<K>> Engine<K>::SplitOf(const typename StarComplex<K>::CellV
   if (simplex.count == 2 && complex_.GuardOf(simplex.ids[0]) > 0 &&
       complex_.GuardOf(simplex.ids[1]) > 0)
     return std::nullopt;
-  const double least = complex_.has_guards() ? kLeastSplitAtGuards : kLeastSplit;
-  if (by > Rule::kSize && violation.radius < least * sizes_.BoundAt(complex_, at.star))
+  if (by > Rule::kSize && violation.radius < kLeastSplit * sizes_.BoundAt(complex_, at.star))
     return std::nullopt;
   return Aim(at.star, violation);
 }
@@ -247,6 +254,7 @@ std::vector<FaceMesh> Engine<K>::Faces() const {
   template void Engine<K>::YieldToFaces(std::vector<Target<K>>*);                               \
   template PlannedPoints Engine<K>::ChooseSeeds();                                              \
   template PlannedPoints Engine<K>::SetCollars();                                               \
+  template bool Engine<K>::IsSliverAtBoundary(std::uint32_t, const Violation<K>&) const;        \
   template bool Engine<K>::IsCollar(const StarComplex<K>::FaceSimplex&) const;                  \
   template bool Engine<K>::AdvanceStage();                                                      \
   template bool Engine<K>::WantsGuards(const std::vector<Target<K>>&) const;                    \

@@ -24,7 +24,7 @@ void FilledMesh<K>::Fill(const StarComplex<K>& complex, const ResolvedCriteria& 
 template <int K>
 bool FilledMesh<K>::Mends(const StarComplex<K>& complex, std::uint32_t star,
                           const Violation<K>& violation) const {
-  if (cavities_.cavities == 0 || violation.fake ||
+  if (cavities_.cavities == 0 || violation.fake || violation.walls != 0 ||
       std::binary_search(cavities_.unfilled.begin(), cavities_.unfilled.end(), star))
     return false;
   return violation.rule == Rule::kInconsistent || !IsConsistent<K>(complex, star, violation.vertex);

@@ -14,6 +14,7 @@
 #include "core/complex/consistency.h"
 #include "core/geometry/reach_bound.h"
 #include "core/refinement/sharp_edges.h"
+#include "core/refinement/wall_bends.h"
 
 namespace stellate::core {
 namespace {
@@ -85,6 +86,35 @@ void TellSharpest(const Engine<K>& engine, Certificate* certificate) {
 }
 
 template <int K>
+void TellBend(const Engine<K>& engine, double epsilon, Certificate* certificate) {
+  if (certificate->certified) return;
+  const StarComplex<K>& complex = engine.complex();
+  const std::optional<WallBend> bend = SharpestBend<K>(complex);
+  const bool is_sharp = bend && epsilon > kCoarse * bend->radius();
+  // No edge of a mesh of that size is longer.
+  const std::optional<std::uint32_t> lone =
+      is_sharp ? std::nullopt : LoneVertex<K>(complex, 2 * epsilon);
+  if (!is_sharp && !lone) return;
+  if (certificate->verdict.ends_with('.')) certificate->verdict.pop_back();
+  if (is_sharp) {
+    certificate->verdict += Message(
+        "; wall ", bend->wall, " bends by ", Brief(bend->degrees),
+        " degrees between vertices that are ", Brief(bend->length), " apart, near ",
+        NamePoint(bend->point),
+        ": if it has a crease there, give its sides as walls of their own, which meet in an edge; "
+        "if it is round, take epsilon at most ",
+        Brief(bend->size_to_take()), ".");
+    return;
+  }
+  const Eigen::Map<const Eigen::VectorXd> at(complex.Point(*lone), complex.d());
+  certificate->verdict +=
+      Message("; wall ", std::countr_zero(complex.walls(*lone)), " has a piece at ", NamePoint(at),
+              " that is too small for epsilon ", Brief(epsilon), ": vertex ", *lone,
+              " finds no neighbour on it; take epsilon at most a fifth of the width of that hole "
+              "or piece.");
+}
+
+template <int K>
 std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent) {
   const StarComplex<K>& complex = engine.complex();
   const auto& entries = engine.book().size_and_shape();
@@ -123,6 +153,7 @@ void WarnOfCompromises(const Engine<K>& engine, double epsilon, Certificate* cer
   template void DescribeUnfinished<K>(const Engine<K>&, double, Certificate*); \
   template std::string WhatIsLeft<K>(const Engine<K>&, std::uint64_t);         \
   template void TellSharpest<K>(const Engine<K>&, Certificate*);               \
+  template void TellBend<K>(const Engine<K>&, double, Certificate*);           \
   template void WarnOfCompromises<K>(const Engine<K>&, double, Certificate*);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

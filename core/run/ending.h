@@ -18,6 +18,11 @@ void DescribeUnfinished(const Engine<K>& engine, double epsilon, Certificate* ce
 template <int K>
 void TellSharpest(const Engine<K>& engine, Certificate* certificate);
 
+// Where a wall bends by more than epsilon can follow, or has a piece that is smaller, of a mesh
+// that is not certified although nothing kept it from being finished: at the verdict's end.
+template <int K>
+void TellBend(const Engine<K>& engine, double epsilon, Certificate* certificate);
+
 // What still breaks a rule, for people. inconsistent: simplices that DescribeUnfinished counted.
 template <int K>
 std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent);

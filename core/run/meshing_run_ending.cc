@@ -38,7 +38,10 @@ void MeshingRun<K>::DescribeEnding(bool is_whole) {
   }
   if (!is_whole) return;
   box_watch_.Warn(&certificate);
-  if (spec_.walls > 0) TellSharpest<K>(engine_, &certificate);
+  if (spec_.walls == 0) return;
+  if (termination == Termination::kConverged || termination == Termination::kNoProgress)
+    TellBend<K>(engine_, spec_.epsilon, &certificate);
+  TellSharpest<K>(engine_, &certificate);
 }
 
 #define STELLATE_EACH(K) template void MeshingRun<K>::DescribeEnding(bool);

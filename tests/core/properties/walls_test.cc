@@ -128,9 +128,9 @@ INSTANTIATE_TEST_SUITE_P(
 
 // What takes its time: most with $STELLATE_WALL_ALL alone.
 std::vector<Case> SlowCases() {
-  std::vector<Case> cases = {{"4-ball", stellate::testing::Ball4, 0.6}};
+  std::vector<Case> cases = {{"4-ball", stellate::testing::Ball4, 0.6},
+                             {"half of S^4", stellate::testing::HalfSphere4, 0.6}};
   if (Setting("STELLATE_WALL_ALL", 0) == 0) return cases;
-  cases.push_back({"half of S^4", stellate::testing::HalfSphere4, 0.5});
   cases.push_back({"large gyroid solid", stellate::testing::LargeGyroidSolid, 0.24});
   return cases;
 }

@@ -290,6 +290,25 @@ inline Domain CutTorus4() {
   return m;
 }
 
+// The cube of R^d by a single function: its wall has creases.
+inline Domain CreasedCube(int d) {
+  Domain m = Make(d, d, 1.3, {}, {});
+  m.walls = {[](const VectorXd& x, VectorXd* g) {
+    Eigen::Index i = 0;
+    const double most = x.cwiseAbs().maxCoeff(&i);
+    if (g) *g = (x[i] > 0 ? -1 : 1) * VectorXd::Unit(x.size(), i);
+    return 1 - most;
+  }};
+  return m;
+}
+
+// The unit disc without a smaller one.
+inline Domain PiercedDisc(double radius) {
+  Domain m = Make(2, 2, 1.3, {1, 1, 0}, {2, 2});
+  m.walls = {BallOf(Vector2d::Zero(), 1, -1, 2), BallOf(Vector2d(0.1, 0.05), radius, 1, 2)};
+  return m;
+}
+
 // Two half-spaces through the last axes whose borders meet at an angle.
 inline std::vector<Domain::Function> WedgeOf(double degrees, int d) {
   const double t = degrees * std::numbers::pi / 180;

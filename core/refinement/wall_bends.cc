@@ -1,0 +1,84 @@
+#include "core/refinement/wall_bends.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numbers>
+
+#include "core/base/instantiate.h"
+#include "core/base/interruption.h"
+
+namespace stellate::core {
+namespace {
+
+// Conormals may be wrong by some 11 degrees each (core/run/wall_check.cc).
+constexpr double kTelling = 23;  // degrees
+// A neighbour across a thin part of M is no bend: each is behind the other by most of its distance.
+constexpr double kBehind = 0.8;
+
+template <int K>
+Eigen::Map<const Eigen::VectorXd> PointOf(const StarComplex<K>& complex, std::uint32_t p) {
+  return {complex.Point(p), complex.d()};
+}
+
+template <int K>
+Eigen::VectorXd ConormalOf(const StarComplex<K>& complex, std::uint32_t p) {
+  const Eigen::Map<const Eigen::MatrixXd> tangents(complex.Tangent(p), complex.d(), K);
+  return tangents * Eigen::Map<const Eigen::Matrix<double, K, 1>>(complex.Conormals(p));
+}
+
+}  // namespace
+
+double WallBend::radius() const {
+  return length / (2 * std::sin(degrees * std::numbers::pi / 360));
+}
+
+template <int K>
+std::optional<WallBend> SharpestBend(const StarComplex<K>& complex) {
+  std::optional<WallBend> sharpest;
+  for (std::uint32_t p = 0; p < complex.size(); ++p) {
+    CheckInterruption(p);
+    if (CountWalls(complex.walls(p)) != 1) continue;
+    const auto& cell = complex.cell(p);
+    for (std::size_t f = 0; f < cell.facet_count(); ++f) {
+      const std::uint32_t q = cell.id(f);
+      if (!IsSample(q) || q <= p || complex.walls(q) != complex.walls(p)) continue;
+      const Eigen::VectorXd here = ConormalOf<K>(complex, p), there = ConormalOf<K>(complex, q);
+      const double sine = (here - there).norm() / 2;  // of half the angle
+      const double degrees = 2 * std::asin(std::min(sine, 1.0)) * 180 / std::numbers::pi;
+      const Eigen::VectorXd step = PointOf<K>(complex, q) - PointOf<K>(complex, p);
+      const double length = step.norm();
+      const bool is_behind = std::max(step.dot(here), -step.dot(there)) < -kBehind * length;
+      if (degrees < kTelling || is_behind) continue;
+      WallBend bend{std::countr_zero(complex.walls(p)), degrees, length, {}};
+      if (sharpest && sharpest->radius() <= bend.radius()) continue;
+      bend.point = PointOf<K>(complex, p) + step / 2;
+      sharpest = std::move(bend);
+    }
+  }
+  return sharpest;
+}
+
+template <int K>
+std::optional<std::uint32_t> LoneVertex(const StarComplex<K>& complex, double far) {
+  for (std::uint32_t p = 0; K > 1 && p < complex.size(); ++p) {
+    CheckInterruption(p);
+    if (CountWalls(complex.walls(p)) != 1) continue;
+    bool alone = true;
+    for (std::size_t f = 0; f < complex.cell(p).facet_count() && alone; ++f) {
+      const std::uint32_t q = complex.cell(p).id(f);
+      alone = !IsSample(q) || !IsSubset(complex.walls(p), complex.walls(q)) ||
+              (PointOf<K>(complex, p) - PointOf<K>(complex, q)).norm() > far;
+    }
+    if (alone) return p;
+  }
+  return std::nullopt;
+}
+
+#define STELLATE_EACH(K)                                                   \
+  template std::optional<WallBend> SharpestBend<K>(const StarComplex<K>&); \
+  template std::optional<std::uint32_t> LoneVertex<K>(const StarComplex<K>&, double);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+
+#include "core/complex/star_complex.h"
+
+namespace stellate::core {
+
+// How a wall bends between two neighbouring vertices on it that are on no other wall.
+struct WallBend {
+  int wall = 0;
+  double degrees = 0;     // between the conormals at the two
+  double length = 0;      // from one to the other
+  Eigen::VectorXd point;  // the middle between them
+  double radius() const;  // of a circle that bends so over that length
+  // As of any reach (TooCoarse).
+  double size_to_take() const { return 0.4 * radius(); }
+};
+
+// Of all whose conormals differ by more than errors may explain, the one of the least radius.
+template <int K>
+std::optional<WallBend> SharpestBend(const StarComplex<K>& complex);
+
+// A vertex on one wall alone that has no neighbour on it within `far`: that piece of the wall is so
+// small that all of it is too near to its first vertex.
+template <int K>
+std::optional<std::uint32_t> LoneVertex(const StarComplex<K>& complex, double far);
+
+}  // namespace stellate::core

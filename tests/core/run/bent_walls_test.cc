@@ -1,0 +1,69 @@
+// Walls that bend more than a size can follow: what is refused names the wall, the place and the
+// cure.
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/core/support/domains.h"
+#include "tests/core/support/wall_mesh.h"
+
+namespace stellate::core {
+namespace {
+
+using stellate::testing::CreasedCube;
+using stellate::testing::Domain;
+using stellate::testing::PiercedDisc;
+
+Certificate CertificateOf(const Domain& m, double epsilon, std::uint64_t seed = 1) {
+  Specification spec = m.SpecificationFor(epsilon);
+  spec.random_seed = seed;
+  return stellate::testing::MeshOf(m, spec).report.certificate;
+}
+
+void ExpectWords(const Certificate& c, const std::string& words) {
+  EXPECT_FALSE(c.certified);
+  EXPECT_NE(c.verdict.find(words), std::string::npos) << c.verdict;
+}
+
+TEST(BentWallsTest, ACreaseIsNamedWithItsAngle) {
+  for (const int d : {2, 3})
+    for (const unsigned turn : {0u, 1u, 2u}) {
+      const Certificate c = CertificateOf(CreasedCube(d).Turned(turn), 0.3);
+      ExpectWords(c, "; wall 0 bends by 90 degrees between vertices that are ");
+      ExpectWords(c, "give its sides as walls of their own");
+    }
+}
+
+TEST(BentWallsTest, ASmallHoleIsNamedWithTheSizeToTake) {
+  for (const unsigned turn : {0u, 1u, 2u}) {
+    const Certificate c = CertificateOf(PiercedDisc(0.15).Turned(turn), 0.3);
+    ExpectWords(c, "; wall 1 bends by ");
+    ExpectWords(c, "if it is round, take epsilon at most 0.06.");
+  }
+  EXPECT_TRUE(CertificateOf(PiercedDisc(0.15), 0.06).certified) << "as it says";
+}
+
+TEST(BentWallsTest, AHoleWithRoomForOneVertexIsNamed) {
+  for (const unsigned turn : {0u, 1u, 2u})
+    ExpectWords(CertificateOf(PiercedDisc(0.05).Turned(turn), 0.3), "; wall 1 has a piece at (");
+  EXPECT_TRUE(CertificateOf(PiercedDisc(0.05), 0.02).certified) << "a fifth of its width";
+}
+
+TEST(BentWallsTest, WhatEndsWellSaysNothing) {
+  const Certificate c = CertificateOf(PiercedDisc(0.4), 0.1);
+  EXPECT_TRUE(c.certified) << c.verdict;
+  EXPECT_EQ(c.verdict.find(" bends by "), std::string::npos) << c.verdict;
+}
+
+// Where a round wall is meshed that coarsely, points of the solid between an arc and its chord lie
+// outside of the mesh: they are asked about now and then.
+TEST(BentWallsTest, PointsBetweenAnArcAndItsChordRefuseNothing) {
+  for (const std::uint64_t seed : {66, 82, 90}) {
+    const Certificate c = CertificateOf(stellate::testing::Ball(), 0.5, seed);
+    EXPECT_TRUE(c.certified) << c.verdict;
+  }
+}
+
+}  // namespace
+}  // namespace stellate::core
