@@ -4,7 +4,7 @@
 //
 // $STELLATE_WALL_TRIALS: turns of each (1), at three sizes by turns. $STELLATE_WALL_SEED: the
 // first (0). $STELLATE_WALL_ALL: those that take minutes too. $STELLATE_WALL_FIGURES: a line for
-// each mesh.
+// each mesh. $STELLATE_WALL_FOUR: turns of a cut T^4 (0).
 
 #include <gtest/gtest.h>
 
@@ -135,6 +135,22 @@ std::vector<Case> SlowCases() {
   return cases;
 }
 INSTANTIATE_TEST_SUITE_P(Slow, Walls, ::testing::ValuesIn(SlowCases()));
+
+// T^4 cut by a half-space, in R^8: minutes each.
+class CutFourTorus : public ::testing::TestWithParam<unsigned> {};
+
+TEST_P(CutFourTorus, IsCertified) {
+  const Domain m = stellate::testing::CutTorus4().Turned(GetParam());
+  Specification spec = m.SpecificationFor(0.8);
+  spec.random_seed = GetParam() + 1;
+  const WallMesh mesh = MeshOf(m, spec);
+  EXPECT_TRUE(mesh.report.certificate.certified) << mesh.report.certificate.verdict;
+  EXPECT_TRUE(HasRightHomology(mesh, m));
+}
+
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(CutFourTorus);
+INSTANTIATE_TEST_SUITE_P(Campaign, CutFourTorus,
+                         ::testing::Range(0u, Setting("STELLATE_WALL_FOUR", 0)));
 
 // Far too coarse: what comes out may be anything, but then it is refused.
 class CoarseWalls : public ::testing::TestWithParam<Case> {};
