@@ -13,6 +13,34 @@ namespace {
 // Where no circumradius is above epsilon nothing farther than 2 epsilon cuts a star.
 constexpr double kGathered = 2 * (1 + 1e-6);
 
+using Near = std::vector<std::pair<double, std::uint32_t>>;  // squared distances, and who is there
+
+// Cuts by what is near, nearest first and ties by id, out to where nothing can cut any more. `near`
+// is sorted, and all there is within `known`; search(from, to) appends what lies between. Returns
+// how far it knows all in the end.
+template <typename Reach, typename Clip, typename Search>
+double CutByNear(Near* near, double known, const Reach& reach, const Clip& clip,
+                 const Search& search) {
+  for (std::size_t next = 0;;) {
+    double far = reach();
+    for (; next < near->size() && (*near)[next].first <= far * far; ++next)
+      if (clip((*near)[next].second)) far = reach();
+    if (far <= known) return known;
+    const double farther = std::min(far, 2 * known);
+    search(known, farther);
+    std::sort(near->begin() + static_cast<std::ptrdiff_t>(next), near->end());
+    known = farther;
+  }
+}
+
+void AppendBetween(const BallTree& tree, const double* point, double from, double to, Near* near) {
+  tree.VisitNear(
+      point, [&] { return to; },
+      [&](std::uint32_t q, double distance2) {
+        if (distance2 > from * from) near->emplace_back(distance2, q);
+      });
+}
+
 }  // namespace
 
 template <int K>
@@ -33,22 +61,22 @@ bool StarComplex<K>::BuildInFlats(const Site& p,
                                   const std::vector<std::pair<double, std::uint32_t>>& near,
                                   double gathered, Cell& cell,
                                   typename Cell::Scratch& scratch) const {
+  thread_local Near all;
+  all = near;
   ResetInFlats(cell, p);
-  double reach = Influence(p.id, cell);
-  for (const auto& [distance2, q] : near) {
-    if (distance2 > reach * reach) break;
-    if (ClipInFlats(cell, p, At(q), scratch)) reach = Influence(p.id, cell);
-  }
-  return reach <= gathered && JudgeCell(cell, p, near) && Influence(p.id, cell) <= gathered;
+  const double known = CutByNear(
+      &all, gathered, [&] { return Influence(p.id, cell); },
+      [&](std::uint32_t q) { return ClipInFlats(cell, p, At(q), scratch); },
+      [&](double from, double to) { AppendBetween(tree_, p.point, from, to, &all); });
+  return JudgeCell(cell, p, all) && Influence(p.id, cell) <= known;
 }
 
-// Cuts by what is near, nearest first and ties by id, out to where nothing can cut any more.
 // `around` holds at least what lies within `gathered` of p.
 template <int K>
 void StarComplex<K>::BuildLaidStar(std::uint32_t p, const std::vector<std::uint32_t>& around,
                                    double gathered, Cell& cell) const {
   thread_local typename Cell::Scratch scratch;
-  thread_local std::vector<std::pair<double, std::uint32_t>> near;
+  thread_local Near near;
   const Site site = At(p);
   near.clear();
   for (const std::uint32_t q : around) {
@@ -60,23 +88,10 @@ void StarComplex<K>::BuildLaidStar(std::uint32_t p, const std::vector<std::uint3
       BuildInFlats(site, near, gathered, cell, scratch))
     return;
   ResetCell(cell, site, nullptr, scratch);
-  for (double done = gathered;;) {
-    double reach = Influence(p, cell);
-    for (const auto& [distance2, q] : near) {
-      if (distance2 > reach * reach) break;
-      if (ClipBy(cell, site, At(q), nullptr, nullptr, scratch)) reach = Influence(p, cell);
-    }
-    if (reach <= done) return;
-    const double next = std::min(reach, 2 * done);
-    near.clear();
-    tree_.VisitNear(
-        site.point, [&] { return next; },
-        [&](std::uint32_t q, double distance2) {
-          if (distance2 > done * done) near.emplace_back(distance2, q);
-        });
-    std::sort(near.begin(), near.end());
-    done = next;
-  }
+  CutByNear(
+      &near, gathered, [&] { return Influence(p, cell); },
+      [&](std::uint32_t q) { return ClipBy(cell, site, At(q), nullptr, nullptr, scratch); },
+      [&](double from, double to) { AppendBetween(tree_, site.point, from, to, &near); });
 }
 
 template <int K>
