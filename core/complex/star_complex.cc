@@ -393,10 +393,6 @@ Eigen::MatrixXd StarComplex<K>::TangentMatrix() const {
   return matrix;
 }
 
-template class StarComplex<1>;
-template class StarComplex<2>;
-template class StarComplex<3>;
-template class StarComplex<4>;
-template class StarComplex<5>;
+STELLATE_INSTANTIATE_CLASS(StarComplex)
 
 }  // namespace stellate::core

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/instantiate.h"
 #include "core/complex/blocks.h"
 #include "core/geometry/restricted_voronoi_cell.h"
 #include "core/sample/ball_tree.h"
@@ -305,10 +306,6 @@ class StarComplex {
   std::uint64_t simplex_count_ = 0;
 };
 
-extern template class StarComplex<1>;
-extern template class StarComplex<2>;
-extern template class StarComplex<3>;
-extern template class StarComplex<4>;
-extern template class StarComplex<5>;
+STELLATE_DECLARE_CLASS(StarComplex)
 
 }  // namespace stellate::core

@@ -17,16 +17,13 @@ sys.path.insert(0, str(_ROOT / "tests" / "clients" / "python"))
 import grpc  # noqa: E402
 import shapes  # noqa: E402
 import stellate  # noqa: E402
-from fake_server import indices  # noqa: E402
+from handmade_events import Event, delta, final  # noqa: E402
 from python_client import named  # noqa: E402
 from stellate import manifolds  # noqa: E402
 from stellate._generated import errors_pb2, mesh_pb2, stellate_pb2  # noqa: E402
 from stellate._generated import status_details_pb2 as details_pb  # noqa: E402
 from stellate._shared import table  # noqa: E402
-from stellate._wire.arrays import to_wire  # noqa: E402
 from stellate.errors import error_class, exit_status  # noqa: E402
-
-Event = stellate_pb2.WatchMeshResponse
 
 
 def write_json(name: str, value: object) -> None:
@@ -58,37 +55,6 @@ def record(oracle: object, epsilon: float, **criteria: object) -> tuple[list[Eve
         for message in (last.progress, last.report):
             message.elapsed_seconds = 0
         return events, stellate.download(name, server=client)
-
-
-def delta(revision, first=0, points=(), added=(), removed=(), complete=True, walls=()) -> Event:
-    """`walls`: pairs of a vertex and its walls as bits."""
-    body = mesh_pb2.MeshDelta(revision=revision, first_vertex=first)
-    if len(points):
-        body.points.CopyFrom(to_wire(np.asarray(points, dtype=float)))
-    if len(added):
-        body.added.CopyFrom(indices(added))
-    if len(removed):
-        body.removed.CopyFrom(indices(removed))
-    body.boundary_vertices.extend(vertex for vertex, _ in walls)
-    body.boundary_walls.extend(bits for _, bits in walls)
-    return Event(delta=stellate_pb2.DeltaChunk(delta=body, complete=complete))
-
-
-def final(vertices=0, simplices=0, state="SUCCEEDED", termination="CONVERGED", level="SAMPLED"):
-    """`state` and the others may be numbers."""
-
-    def number(enum, prefix, value):
-        return value if isinstance(value, int) else enum.Value(prefix + value)
-
-    mesh = mesh_pb2.Mesh(
-        name="meshes/recorded", state=number(mesh_pb2.MeshState, "MESH_STATE_", state)
-    )
-    report = mesh.report
-    report.termination = number(mesh_pb2.Termination, "TERMINATION_", termination)
-    report.counts.vertices, report.counts.simplices = vertices, simplices
-    report.certificate.level = number(mesh_pb2.CertificateLevel, "CERTIFICATE_LEVEL_", level)
-    mesh.progress.phase = mesh_pb2.PHASE_DONE
-    return Event(final=mesh)
 
 
 # A field of the number 99 that holds two bytes: what a newer server may send anywhere.
