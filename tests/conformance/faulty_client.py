@@ -125,7 +125,7 @@ def serve(stub, mesh, manifold):
             code = error.code()
             lost = code in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.CANCELLED)
             stubborn = FAULT == "comes-back" and tries < 3
-            if (lost and FAULT != "gives-up" and tries < 50) or stubborn:
+            if (lost and FAULT != "gives-up" and tries < 200) or stubborn:
                 time.sleep(0.1)
                 continue
             details = dict(error.trailing_metadata()).get("grpc-status-details-bin", b"")
@@ -135,7 +135,11 @@ def serve(stub, mesh, manifold):
 
 
 def main():
-    options = [("grpc.keepalive_time_ms", 500), ("grpc.keepalive_timeout_ms", 500)]
+    options = [
+        ("grpc.keepalive_time_ms", 500),
+        ("grpc.keepalive_timeout_ms", 500),
+        ("grpc.max_reconnect_backoff_ms", 200),  # by itself gRPC waits longer than the tries last
+    ]
     with grpc.insecure_channel(sys.argv[2], options) as channel:
         stub = rpc.StellateStub(channel)
         for line in sys.stdin:
