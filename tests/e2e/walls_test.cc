@@ -1,12 +1,12 @@
 // Manifolds with boundary, from C++ through the real server; topology is counted here.
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <memory>
 #include <ostream>
-#include <set>
 #include <string>
 #include <vector>
 
+#include "faces.h"
 #include "live.h"
 #include "stellate/download.h"
 #include "stellate/oracles.h"
@@ -17,61 +17,6 @@ namespace {
 
 using Eigen::MatrixXd, Eigen::VectorXd;
 using oracles::Ball, oracles::Box, oracles::Clipped, oracles::HalfSpace, oracles::Solid;
-using Ids = std::vector<std::uint32_t>;
-
-std::vector<Ids> Columns(const SimplexMatrix& simplices) {
-  std::vector<Ids> columns;
-  for (const auto& simplex : simplices.colwise())
-    columns.emplace_back(simplex.begin(), simplex.end());
-  return columns;
-}
-
-// Of a complex, all its faces counted.
-int Euler(const SimplexMatrix& simplices) {
-  std::set<Ids> faces;
-  for (const Ids& simplex : Columns(simplices)) {
-    for (unsigned pick = 1; pick < 1u << simplex.size(); ++pick) {
-      Ids face;
-      for (size_t i = 0; i < simplex.size(); ++i) {
-        if (pick >> i & 1) face.push_back(simplex[i]);
-      }
-      faces.insert(face);
-    }
-  }
-  int chi = 0;
-  for (const Ids& face : faces) chi += face.size() % 2 == 1 ? 1 : -1;
-  return chi;
-}
-
-// The facets in one simplex alone.
-std::set<Ids> Rim(const SimplexMatrix& simplices) {
-  std::map<Ids, int> counts;
-  for (const Ids& simplex : Columns(simplices)) {
-    for (size_t out = 0; out < simplex.size(); ++out) {
-      Ids facet = simplex;
-      facet.erase(facet.begin() + static_cast<std::ptrdiff_t>(out));
-      ++counts[facet];
-    }
-  }
-  std::set<Ids> rim;
-  for (const auto& [facet, count] : counts) {
-    EXPECT_LE(count, 2);
-    if (count == 1) rim.insert(facet);
-  }
-  return rim;
-}
-
-std::set<Ids> All(const std::vector<Face>& faces) {
-  std::set<Ids> all;
-  for (const Face& face : faces) {
-    for (const Ids& simplex : Columns(face.simplices)) {
-      EXPECT_TRUE(all.insert(simplex).second) << "in two faces";
-    }
-  }
-  return all;
-}
-
-size_t Count(const std::vector<Face>& faces) { return All(faces).size(); }
 
 struct Case {
   std::string spec;

@@ -37,13 +37,6 @@ class Space final : public Oracle {
   BoundingBox around_;
 };
 
-double ScaleOf(const Oracle& oracle) {
-  if (const auto box = oracle.bounding_box()) return (box->upper - box->lower).norm();
-  const MatrixXd seeds = oracle.seeds();
-  if (seeds.cols() < 2) return 1;
-  return (seeds.rowwise().maxCoeff() - seeds.rowwise().minCoeff()).norm();
-}
-
 void CheckFace(const Walls& face, int walls) {
   int last = -1;
   for (const int wall : face) {

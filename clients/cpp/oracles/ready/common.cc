@@ -26,6 +26,13 @@ BoundingBox BoxAround(const Eigen::MatrixXd& points, double share) {
   return {lower.array() - margin, upper.array() + margin};
 }
 
+double ScaleOf(const Oracle& oracle) {
+  if (const auto box = oracle.bounding_box()) return (box->upper - box->lower).norm();
+  const Eigen::MatrixXd seeds = oracle.seeds();
+  if (seeds.cols() < 2) return 1;
+  return (seeds.rowwise().maxCoeff() - seeds.rowwise().minCoeff()).norm();
+}
+
 double Quantile(std::vector<double> values, double share) {
   std::sort(values.begin(), values.end());
   const double at = share * static_cast<double>(values.size() - 1);

@@ -28,6 +28,9 @@ void CheckPoints(const Eigen::MatrixXd& points, const std::string& what);
 // The points' box, wider by a share of its diagonal at each side.
 BoundingBox BoxAround(const Eigen::MatrixXd& points, double share);
 
+// How large a manifold is, by where it says to look for it.
+double ScaleOf(const Oracle& oracle);
+
 // The share of all values that is not above it, between values along a line; values are not empty.
 double Quantile(std::vector<double> values, double share);
 

@@ -124,9 +124,11 @@ class ManifoldWithBoundary:
         side = (across * inwards).sum(axis=1)
         least = _ONE_SIDED * _STEP * self._scale
         if self._clearance is None and not (np.abs(side) > least).all():
+            place = points[int(np.argmin(np.abs(side)))].tolist()
             raise OracleError(
-                "nearest points do not end at the boundary: the oracle of a manifold with boundary "
-                "has to answer with points of M alone, or clearance= has to say where M ends",
+                f"nearest points do not end at the boundary, at {place}: the oracle of a manifold "
+                "with boundary has to answer with points of M alone, or clearance= has to say where "
+                "M ends",
                 "ORACLE_BAD_CONORMAL",
             )
         return apply(bases, np.where(side > 0, -1.0, 1.0)[:, None] * across)

@@ -76,6 +76,53 @@ class Solid final : public Clipped {
   Solid(std::vector<Wall> walls, BoundingBox around, Eigen::MatrixXd seeds = {});
 };
 
+// A manifold with boundary, from nearest points of it and nearest points of its boundary.
+//
+// Nothing else is needed: tangent spaces, where an oracle has none, and the boundary's outward
+// normals come from differences of nearest points. Where the boundary has corners, or where there
+// are equations for it, take Clipped. Oracles that are not of one manifold are told by the points
+// where they differ, in a std::runtime_error.
+class ManifoldWithBoundary final : public Oracle {
+ public:
+  // d -> 1: positive in M, zero on its boundary, negative beyond it.
+  using Clearance = std::function<double(const Eigen::VectorXd& x)>;
+
+  // `oracle`, of dimension k, answers with nearest points of M itself, so on the boundary where it
+  // is asked from beyond that; or, with a clearance, of a manifold that M is a part of. `boundary`
+  // is closed, of dimension k - 1. `tolerance`, of M's size: a nearest point so near the boundary
+  // is on it.
+  ManifoldWithBoundary(std::shared_ptr<Oracle> oracle, std::shared_ptr<Oracle> boundary,
+                       Clearance clearance = {}, double tolerance = 1e-6);
+
+  int dimension() const override { return inner_->dimension(); }
+  int ambient_dimension() const override { return inner_->ambient_dimension(); }
+  int walls() const override { return 1; }
+  // Of M, and straight on beyond its boundary.
+  Answer ClosestPoint(const Eigen::MatrixXd& x) override;
+  bool has_tangent_basis() const override { return true; }
+  Eigen::MatrixXd TangentBasis(const Eigen::MatrixXd& points) override;
+  bool has_local_size() const override { return inner_->has_local_size(); }
+  Eigen::VectorXd LocalSize(const Eigen::MatrixXd& points) override {
+    return inner_->LocalSize(points);
+  }
+  Answer FacePoint(const Eigen::MatrixXd& x, const Walls& face) override;
+  // Distances to the boundary, below zero beyond it; or the clearance.
+  Eigen::MatrixXd Clearances(const Eigen::MatrixXd& points) override;
+  Eigen::MatrixXd Conormals(const Eigen::MatrixXd& points, const Walls& face) override;
+  std::optional<BoundingBox> bounding_box() const override;
+  Eigen::MatrixXd seeds() const override;
+
+ private:
+  Eigen::MatrixXd Outward(const Eigen::MatrixXd& points, const Eigen::MatrixXd& bases);
+  Eigen::VectorXd Climb(const Eigen::VectorXd& x, const Eigen::MatrixXd& basis) const;
+  Eigen::VectorXd ToRim(const Eigen::MatrixXd& points);
+  void CheckOn(const Eigen::MatrixXd& points);
+
+  std::shared_ptr<Oracle> inner_, rim_;
+  Clearance clearance_;
+  double scale_ = 1, tolerance_;  // lengths: of where M is, and what is on its boundary
+};
+
 // Makes "name:parameter:...", a manifold with boundary that ListDomains names. On failure returns
 // null and says why in `error`, which is empty if there is none of that name.
 std::unique_ptr<Oracle> MakeDomain(const std::string& spec, std::string* error);
