@@ -2,8 +2,8 @@
 //
 //   solids [SCALE [REGEX]]     SCALE: of all epsilons (1)
 //
-// CGAL is given the curves where walls meet, at a quarter of epsilon; Stellate finds them. Seconds
-// are of the processor, one thread, oracle and certificate included.
+// CGAL is given the curves where walls meet, at a quarter of the mesh's edges; Stellate finds them.
+// Seconds are of the processor, one thread, oracle and certificate included.
 //   least, most       dihedral angles of the cells, degrees
 //   corners, middles  how far the boundary's vertices and barycentres are from it
 
@@ -135,11 +135,12 @@ int Main(int argc, char** argv) {
     if (!std::regex_search(solid.name, chosen)) continue;
     const double epsilon = scale * solid.epsilon;
     std::vector<Curve> edges;
-    MeshWithStellate(solid, epsilon / 4, &edges);
-    const SolidMesh ours = MeshWithStellate(solid, epsilon, nullptr);
-    Print(solid, "Stellate", epsilon, ours);
-    for (const bool optimized : {false, true})
+    std::fprintf(stderr, "%s, Stellate ...\n", solid.name);
+    Print(solid, "Stellate", epsilon, MeshWithStellate(solid, epsilon, &edges));
+    for (const bool optimized : {false, true}) {
+      std::fprintf(stderr, "%s, CGAL%s ...\n", solid.name, optimized ? " optimized" : "");
       Print(solid, "CGAL", epsilon, MeshWithCgal(solid, epsilon, edges, optimized));
+    }
   }
   return 0;
 }

@@ -28,6 +28,8 @@ struct Solid {
   double epsilon;
 };
 
+// Stellate's core, in this process. `edges`: the curves where walls meet, by four points an edge of
+// the mesh.
 SolidMesh MeshWithStellate(const Solid& solid, double epsilon, std::vector<Curve>* edges);
 
 // CGAL's make_mesh_3 with the same bound on circumradii (cells and surface balls) and on edges

@@ -10,8 +10,28 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr int kBisections = 2;  // of the mesh's edges, for curves
+
+// From a, which the curve has, to b along an edge of the boundary, where walls meet.
+void Follow(testing::Domain& domain, core::WallSet walls, const Vector3d& a, const Vector3d& b,
+            int bisections, Curve* curve) {
+  if (bisections == 0) {
+    curve->push_back(b);
+    return;
+  }
+  core::QueryBlock middle;
+  middle.face = walls;
+  middle.points = (a + b) / 2;
+  const core::AnswerBlock answer = domain.AnswerOf(middle);
+  if (!answer.found[0]) throw std::runtime_error("no point where walls meet");
+  const Vector3d m = answer.points.col(0);
+  Follow(domain, walls, a, m, bisections - 1, curve);
+  Follow(domain, walls, m, b, bisections - 1, curve);
+}
+
 // The boundary's edges where walls meet, as curves from corner to corner, or around.
-std::vector<Curve> CurvesOf(const SolidMesh& mesh, const std::vector<core::WallSet>& walls) {
+std::vector<Curve> CurvesOf(testing::Domain& domain, const SolidMesh& mesh,
+                            const std::vector<core::WallSet>& walls) {
   std::map<Id, std::vector<Id>> next;
   std::map<std::pair<Id, Id>, bool> taken;
   const auto on_edge = [&](Id v) { return core::CountWalls(walls[v]) >= 2; };
@@ -29,7 +49,8 @@ std::vector<Curve> CurvesOf(const SolidMesh& mesh, const std::vector<core::WallS
     Curve curve{mesh.points[from]};
     for (Id last = from, v = to;;) {
       taken[std::minmax(last, v)] = true;
-      curve.push_back(mesh.points[v]);
+      Follow(domain, walls[last] & walls[v], mesh.points[last], mesh.points[v], kBisections,
+             &curve);
       if (v == from || next[v].size() != 2) break;
       const Id onward = next[v][0] == last ? next[v][1] : next[v][0];
       last = v, v = onward;
@@ -74,7 +95,7 @@ SolidMesh MeshWithStellate(const Solid& solid, double epsilon, std::vector<Curve
     mesh.cells.push_back({simplices[s], simplices[s + 1], simplices[s + 2], simplices[s + 3]});
   const core::Certificate& certificate = (*mesher)->report().certificate;
   mesh.note = certificate.certified ? "certified" : certificate.verdict;
-  if (edges) *edges = CurvesOf(mesh, walls);
+  *edges = CurvesOf(domain, mesh, walls);
   return mesh;
 }
 
