@@ -222,6 +222,14 @@ test("what the certificate's words name leads there, too", async () => {
   await page.close();
 });
 
+// In the page, before its own scripts.
+function withoutWebGL() {
+  const { getContext } = HTMLCanvasElement.prototype;
+  HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+    return kind.startsWith("webgl") ? null : getContext.call(this, kind, ...rest);
+  };
+}
+
 test("a 3-manifold of R^6 by slices, shells and turns; the same in a file of its own", async () => {
   const name = await stage.mesh({ shape: "flat torus", epsilon: 0.6, label: "three circles" });
   const gateway = await stage.gateway(name);
@@ -282,6 +290,13 @@ test("a 3-manifold of R^6 by slices, shells and turns; the same in a file of its
   );
   assert.deepEqual(alone.faults, []);
   await alone.close();
+
+  const dull = await stage.page(pathToFileURL(file).href, withoutWebGL);
+  await until(dull, certified);
+  await until(dull, () => document.getElementById("note").textContent.includes("WebGL"));
+  assert.ok(await dull.locator("#note").isVisible(), "it says why nothing is drawn");
+  assert.deepEqual(await shown(dull), live);
+  await dull.close();
 });
 
 test("a notebook's frame shows it, live; a page from elsewhere has no frame of it", async () => {

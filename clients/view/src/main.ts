@@ -32,6 +32,10 @@ const kFaults: { [K in FaultKind]: string } = {
   fibres: "a normal flat near",
 };
 
+const kCannotDraw =
+  "This browser cannot draw the mesh: it has no WebGL, or WebGL is switched off in its settings. " +
+  "Certificate and figures are beside this.";
+
 const at = <T extends HTMLElement>(id: string) => document.getElementById(id) as T;
 const css = (name: string) =>
   getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -62,6 +66,11 @@ let measured = { revision: -1, name: "" };
 
 const curves = new Curves(at("curves"), at("legend"), (revision) => show(revision));
 
+function note(text: string) {
+  at("note").hidden = false;
+  at("note").textContent = text;
+}
+
 function choose(name: string) {
   if (name === chosen) return;
   chosen = name;
@@ -73,8 +82,7 @@ function choose(name: string) {
   boundary = "";
   measured = { revision: -1, name: "" };
   at("histograms").replaceChildren();
-  at("note").hidden = false;
-  at("note").textContent = "Waiting for the first vertices";
+  note("Waiting for the first vertices");
   view.refit();
   drawList(at("list"), list, chosen, choose);
   ask({ type: "watch", name });
@@ -292,10 +300,7 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
     drawList(at("list"), list, chosen, choose);
     const newestMesh = meshes.at(-1);
     if (!chosen && newestMesh) choose(newestMesh.name);
-    if (!chosen) {
-      at("note").hidden = false;
-      at("note").textContent = "No mesh yet";
-    }
+    if (!chosen) note("No mesh yet");
     // A demonstration goes from mesh to mesh.
     if (demo && newestMesh && mesh?.over && newestMesh.name !== chosen) choose(newestMesh.name);
   },
@@ -335,6 +340,7 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
     if (!recorded && scene.name !== chosen) return ask({ type: "drawn" });
     shownRevision = scene.revision;
     at("note").hidden = scene.vertices > 0;
+    if (!view.draws) note(kCannotDraw);
     at("revision-text").textContent =
       `revision ${scene.revision} of ${newest()} · ${grouped(scene.vertices)} vertices`;
     at("stage").dataset.revision = `${scene.revision}`;
@@ -370,12 +376,9 @@ if (recording) {
   document.body.classList.add("recorded");
   ask({ type: "replay", recording: JSON.parse(recording) as Recording });
 } else if (!secret) {
-  at("note").hidden = false;
-  at("note").textContent =
-    "Open the address that `stellate view` printed, with all that follows #.";
+  note("Open the address that `stellate view` printed, with all that follows #.");
 } else if (!globalThis.crypto?.subtle) {
-  at("note").hidden = false;
-  at("note").textContent = "Open this page as http://127.0.0.1 or http://localhost.";
+  note("Open this page as http://127.0.0.1 or http://localhost.");
 } else {
   ask({ type: "open", host: location.host, secret });
 }

@@ -38,7 +38,7 @@ export function colourAt(value: number, out: Color): Color {
 }
 
 export class View {
-  private readonly renderer: WebGLRenderer;
+  private readonly renderer: WebGLRenderer | null; // none where the browser has no WebGL
   private readonly scene = new ThreeScene();
   private readonly camera = new PerspectiveCamera(35, 1, 0.001, 1000);
   private readonly controls: OrbitControls;
@@ -80,7 +80,7 @@ export class View {
   private owed = false;
 
   constructor(private readonly canvas: HTMLCanvasElement) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
+    this.renderer = rendererOf(canvas);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.zoomToCursor = true;
     this.controls.addEventListener("change", () => (this.dirty = true));
@@ -113,6 +113,10 @@ export class View {
     new ResizeObserver(() => (this.dirty = true)).observe(canvas);
     this.setWires(true);
     requestAnimationFrame((now) => this.tick(now));
+  }
+
+  get draws(): boolean {
+    return this.renderer !== null;
   }
 
   setBackground(colour: string) {
@@ -232,24 +236,19 @@ export class View {
     this.surface.visible = !coarse;
     const ratio = coarse ? 0.5 : Math.min(window.devicePixelRatio, 2);
     const { clientWidth: width, clientHeight: height } = this.canvas;
-    if (width === 0 || height === 0) return;
-    this.renderer.setPixelRatio(ratio);
-    this.renderer.setSize(width, height, false);
+    const { renderer } = this;
+    if (renderer === null || width === 0 || height === 0) return;
+    renderer.setPixelRatio(ratio);
+    renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     const distance = this.camera.position.distanceTo(this.controls.target);
     this.camera.near = Math.max(distance - 4 * this.ball.radius, distance / 500);
     this.camera.far = distance + 20 * this.ball.radius;
     this.camera.updateProjectionMatrix();
-    this.renderer.render(this.scene, this.camera);
-    this.await();
+    renderer.render(this.scene, this.camera);
+    awaitDrawn(renderer.getContext());
     this.wires.visible = wires;
     if (!coarse) this.slow = 0.5 * this.slow + (0.5 * (performance.now() - began)) / 1000;
-  }
-
-  // Until all is drawn: browsers take finish() for flush(), and frames would queue up.
-  private await() {
-    const gl = this.renderer.getContext();
-    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
   }
 
   // Shares its vertices with the surface.
@@ -270,6 +269,19 @@ class LineWires extends MeshStandardMaterial {
   constructor() {
     super({ wireframe: true, color: "#0b1220", transparent: true, opacity: 0.22, roughness: 1 });
   }
+}
+
+function rendererOf(canvas: HTMLCanvasElement): WebGLRenderer | null {
+  try {
+    return new WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
+  } catch {
+    return null;
+  }
+}
+
+// Until all is drawn: browsers take finish() for flush(), and frames would queue up.
+function awaitDrawn(gl: WebGLRenderingContext | WebGL2RenderingContext) {
+  gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
 }
 
 function geometryOf(positions: Float32Array, index: Uint32Array | null): BufferGeometry {
