@@ -34,6 +34,8 @@ inline core::Specification SpecificationFor(const Oracle& oracle, double epsilon
   spec.epsilon = epsilon;
   spec.oracle.intersect_flat = oracle.has_intersect_flat();
   spec.oracle.tangent_basis = oracle.has_tangent_basis();
+  spec.walls = oracle.walls();
+  spec.oracle.conormals = oracle.walls() > 0;
   if (const auto box = oracle.bounding_box()) {
     spec.bounding_box = core::BoundingBox{box->lower, box->upper};
   }
@@ -44,21 +46,25 @@ inline core::Specification SpecificationFor(const Oracle& oracle, double epsilon
 inline core::Answers AnswersOf(Oracle& oracle, const core::QueryBatch& batch) {
   core::Answers answers;
   for (const core::QueryBlock& block : batch.blocks) {
-    Answer answer = block.kind == core::QueryKind::kClosestPoint
-                        ? oracle.ClosestPoint(block.points)
-                        : oracle.IntersectFlat(block.points, block.bases, block.radii);
+    Walls face;
+    core::ForEachWall(block.face, [&face](int wall) { face.push_back(wall); });
+    Answer answer = block.kind != core::QueryKind::kClosestPoint
+                        ? oracle.IntersectFlat(block.points, block.bases, block.radii)
+                    : face.empty() ? oracle.ClosestPoint(block.points)
+                                   : oracle.FacePoint(block.points, face);
     if (block.want_tangents && answer.tangents.size() == 0) {
       answer.tangents = oracle.TangentBasis(answer.points);
     }
     if (block.want_sizes && answer.sizes.size() == 0) {
       answer.sizes = oracle.LocalSize(answer.points);
     }
-    answers.blocks.push_back({std::move(answer.points),
-                              std::move(answer.found),
-                              std::move(answer.tangents),
-                              std::move(answer.sizes),
-                              {},
-                              {}});
+    if (block.want_clearances) {
+      answer.clearances = oracle.Clearances(answer.points);
+      if (!face.empty()) answer.conormals = oracle.Conormals(answer.points, face);
+    }
+    answers.blocks.push_back({std::move(answer.points), std::move(answer.found),
+                              std::move(answer.tangents), std::move(answer.sizes),
+                              std::move(answer.clearances), std::move(answer.conormals)});
   }
   return answers;
 }

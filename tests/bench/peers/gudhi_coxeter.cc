@@ -16,6 +16,7 @@
 
 #include "stellate/catalogue.h"
 #include "tests/bench/peers/peer.h"
+#include "tests/bench/peers/quality.h"
 
 namespace stellate::bench {
 namespace {
@@ -59,6 +60,30 @@ class Function {
   std::uint64_t* evaluations_;
 };
 
+// Negative beyond the offset along a unit vector of the first coordinates. A model of GUDHI's
+// FunctionForImplicitManifold.
+class Beyond {
+ public:
+  Beyond(Eigen::VectorXd pole, double offset, int ambient_dimension, std::uint64_t* evaluations)
+      : pole_(std::move(pole)),
+        offset_(offset),
+        ambient_dimension_(ambient_dimension),
+        evaluations_(evaluations) {}
+
+  Eigen::VectorXd operator()(const Eigen::VectorXd& x) const {
+    ++*evaluations_;
+    return Eigen::VectorXd::Constant(1, offset_ - pole_.dot(x.head(pole_.size())));
+  }
+  std::size_t amb_d() const { return static_cast<std::size_t>(ambient_dimension_); }
+  std::size_t cod_d() const { return 1; }
+
+ private:
+  Eigen::VectorXd pole_;
+  double offset_;
+  int ambient_dimension_;
+  std::uint64_t* evaluations_;
+};
+
 // Cuts the convex cells into simplices without new vertices: each cell is coned from its lowest
 // vertex over those of its facets that do not hold it, so that cells agree on what they share.
 class Pulling {
@@ -66,9 +91,13 @@ class Pulling {
   using Simplices = std::vector<std::vector<std::uint32_t>>;
 
   explicit Pulling(const CellComplex& complex) {
-    for (const auto& entry : complex.interior_simplex_cell_map(0)) {
-      ids_.emplace(entry.second, static_cast<std::uint32_t>(ids_.size()));
-    }
+    const auto number = [&](const auto& cells) {
+      for (const auto& entry : cells) {
+        ids_.emplace(entry.second, static_cast<std::uint32_t>(ids_.size()));
+      }
+    };
+    number(complex.interior_simplex_cell_map(0));
+    if (!complex.boundary_simplex_cell_maps().empty()) number(complex.boundary_simplex_cell_map(0));
   }
   std::uint32_t IdOf(Cell* vertex) const { return ids_.at(vertex); }
 
@@ -136,14 +165,23 @@ Outcome MeshWithGudhiCoxeter(const Task& task, Meter& meter) {
     seeds[static_cast<std::size_t>(i)].head(near.rows()) = near.col(i);
   }
 
+  const Eigen::VectorXd pole = PoleOf(*manifold);
+
   meter.Start();
   Triangulation triangulation(static_cast<std::size_t>(d));
   triangulation.change_matrix(task.size * turn * triangulation.matrix());
   triangulation.change_offset(shift);
-  Tracing::Out_simplex_map met;
-  Tracing().manifold_tracing_algorithm(seeds, triangulation, coxeter::make_oracle(function), met);
+  Tracing::Out_simplex_map met, met_by_boundary;
   CellComplex complex(static_cast<std::size_t>(k));
-  complex.construct_complex(met);
+  if (task.clip) {
+    const Beyond domain(pole, *task.clip, d, &outcome.evaluations);
+    Tracing().manifold_tracing_algorithm(
+        seeds, triangulation, coxeter::make_oracle(function, domain), met, met_by_boundary);
+    complex.construct_complex(met, met_by_boundary);
+  } else {
+    Tracing().manifold_tracing_algorithm(seeds, triangulation, coxeter::make_oracle(function), met);
+    complex.construct_complex(met);
+  }
   meter.Stop();
 
   Pulling pulling(complex);

@@ -1,7 +1,7 @@
 // Meshes one manifold with one mesher, once, and prints what it took as one line of JSON:
 //
 //   peers PROGRAM MANIFOLD SIZE [--ambient D] [--time-limit SECONDS] [--radius-edge RHO0]
-//         [--estimate-tangents] [--no-quality]
+//         [--estimate-tangents] [--clip OFFSET] [--no-quality]
 //
 // tests/bench/peers/compare.py starts one such process a measurement, so that none inherits
 // another's memory.
@@ -64,6 +64,8 @@ int Main(int argc, char** argv) {
       task.estimate_tangents = true;
     } else if (option == "--ambient" && i + 1 < argc) {
       task.ambient_dimension = static_cast<int>(Number(argv[++i]));
+    } else if (option == "--clip" && i + 1 < argc) {
+      task.clip = Number(argv[++i]);
     } else if (option == "--time-limit" && i + 1 < argc) {
       task.time_limit = Number(argv[++i]);
     } else if (option == "--radius-edge" && i + 1 < argc) {
@@ -94,7 +96,7 @@ int Main(int argc, char** argv) {
   if (with_quality) {
     std::string error;
     const auto manifold = MakeManifold(task.manifold, &error);
-    const Quality quality = MeasureQuality(*manifold, outcome.points, outcome.simplices);
+    const Quality quality = MeasureQuality(*manifold, outcome.points, outcome.simplices, task.clip);
     std::printf(
         ", \"hausdorff\": %.6g, \"min_angle_degrees\": %.6g, \"min_fatness\": %.6g, "
         "\"euler_characteristic\": %lld, \"closed\": %s",

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@ struct Task {
   double time_limit = 0;           // seconds of the clock, for meshers that may never end; 0: none
   double radius_edge_bound = 0;    // Stellate's rho0; 0: its default
   bool estimate_tangents = false;  // GUDHI's complex: from neighbours, instead of being given them
+  std::optional<double> clip;  // of a sphere what is beyond this along PoleOf it; see each mesher
 };
 
 // What it made of it, in the harness's terms.
@@ -33,7 +35,7 @@ struct Outcome {
 // std::exception when the manifold is none of its, or when it fails.
 using Mesh = Outcome (*)(const Task& task, Meter& meter);
 
-// Stellate's core, in this process. size: epsilon.
+// Stellate's core, in this process. size: epsilon. Clips.
 Outcome MeshWithStellate(const Task& task, Meter& meter);
 // CGAL's make_surface_mesh, facet angles of at least 30 degrees. size: the bound on the radius of
 // the facets' surface Delaunay balls.
@@ -42,7 +44,7 @@ Outcome MeshWithCgalSurface(const Task& task, Meter& meter);
 // sample that it is given, met to some per cent.
 Outcome MeshWithGudhiTangential(const Task& task, Meter& meter);
 // GUDHI's Manifold_tracing through a Coxeter triangulation, and the cells of it. size: the factor
-// of the triangulation.
+// of the triangulation. Clips, by a domain function.
 Outcome MeshWithGudhiCoxeter(const Task& task, Meter& meter);
 
 }  // namespace stellate::bench

@@ -46,6 +46,44 @@ bool AllTwice(const std::vector<Face>& faces) {
   return true;
 }
 
+// Of a sorted list, what stands there once.
+std::vector<Face> Once(const std::vector<Face>& faces) {
+  std::vector<Face> once;
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    const bool before = i > 0 && faces[i] == faces[i - 1];
+    const bool after = i + 1 < faces.size() && faces[i] == faces[i + 1];
+    if (!before && !after) once.push_back(faces[i]);
+  }
+  return once;
+}
+
+// Whether no entry of a sorted list stands there more than twice, and those that stand there once,
+// with `size` corners each, are a closed complex that is not empty.
+bool EndInAClosedOne(const std::vector<Face>& faces, std::size_t size) {
+  for (std::size_t i = 2; i < faces.size(); ++i)
+    if (faces[i] == faces[i - 2]) return false;
+  std::vector<std::uint32_t> rim;
+  for (const Face& face : Once(faces))
+    rim.insert(rim.end(), face.begin(), face.begin() + static_cast<std::ptrdiff_t>(size));
+  return !rim.empty() && AllTwice(Faces(rim, size, static_cast<int>(size) - 1));
+}
+
+// Largest distance of the faces' vertices and barycentres from a half-space's end.
+double FarthestFromEnd(const Eigen::VectorXd& pole, double clip, const Eigen::MatrixXd& points,
+                       const std::vector<Face>& faces, std::size_t size) {
+  double farthest = 0;
+  for (const Face& face : faces) {
+    double middle = 0;
+    for (std::size_t i = 0; i < size; ++i) {
+      const double off = pole.dot(points.col(face[i]).head(pole.size())) - clip;
+      farthest = std::max(farthest, std::abs(off));
+      middle += off / static_cast<double>(size);
+    }
+    farthest = std::max(farthest, std::abs(middle));
+  }
+  return farthest;
+}
+
 // Largest distance of the faces' barycentres from M, in batches.
 double FarthestBarycentre(Manifold& manifold, const Eigen::MatrixXd& points,
                           const std::vector<Face>& faces, int size) {
@@ -100,8 +138,13 @@ double SmallestAngle(const Eigen::MatrixXd& corners) {
 
 }  // namespace
 
+Eigen::VectorXd PoleOf(Manifold& manifold) {
+  const Eigen::MatrixXd ones = Eigen::MatrixXd::Ones(manifold.ambient_dimension(), 1);
+  return manifold.ClosestPoint(ones).points.col(0).normalized();
+}
+
 Quality MeasureQuality(Manifold& manifold, const Eigen::MatrixXd& points,
-                       const std::vector<std::uint32_t>& simplices) {
+                       const std::vector<std::uint32_t>& simplices, std::optional<double> clip) {
   const int k = manifold.dimension();
   const std::size_t corners = static_cast<std::size_t>(k) + 1;
 
@@ -123,7 +166,13 @@ Quality MeasureQuality(Manifold& manifold, const Eigen::MatrixXd& points,
   for (int size = 1; size <= k + 1; ++size) {
     std::vector<Face> faces = Faces(simplices, corners, size);
     const std::size_t entries = faces.size();
-    if (size == k) faces_twice = AllTwice(faces);
+    if (size == k && !clip) faces_twice = AllTwice(faces);
+    if (size == k && clip) {
+      const auto facet = static_cast<std::size_t>(k);
+      faces_twice = EndInAClosedOne(faces, facet);
+      quality.hausdorff = std::max(
+          quality.hausdorff, FarthestFromEnd(PoleOf(manifold), *clip, points, Once(faces), facet));
+    }
     faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
     if (size == 1) vertices_used = static_cast<Eigen::Index>(faces.size()) == points.cols();
     if (size == k + 1) simplices_distinct = faces.size() == entries;
@@ -132,8 +181,9 @@ Quality MeasureQuality(Manifold& manifold, const Eigen::MatrixXd& points,
     quality.hausdorff =
         std::max(quality.hausdorff, FarthestBarycentre(manifold, points, faces, size));
   }
-  quality.closed = faces_twice && simplices_distinct && vertices_used && !simplices.empty() &&
-                   quality.euler_characteristic == manifold.facts().euler_characteristic;
+  quality.closed =
+      faces_twice && simplices_distinct && vertices_used && !simplices.empty() &&
+      quality.euler_characteristic == (clip ? 1 : manifold.facts().euler_characteristic);
   return quality;
 }
 

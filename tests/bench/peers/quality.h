@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "stellate/catalogue.h"
@@ -19,13 +20,19 @@ struct Quality {
   double min_fatness = 0;        // least vol_k / diam^k of the k-simplices
   std::int64_t euler_characteristic = 0;
   // Each (k-1)-face is in exactly two k-simplices, each vertex in some, and the Euler
-  // characteristic is that of M. Necessary for a right mesh, not sufficient.
+  // characteristic is that of M. Necessary for a right mesh, not sufficient. Clipped: the faces in
+  // one simplex alone are a closed complex themselves, and the Euler characteristic is a ball's.
   bool closed = false;
 };
 
 // points: D x n with D at least the dimension of M's space, which is that of the first coordinates;
-// simplices: k+1 vertex numbers each.
+// simplices: k+1 vertex numbers each. `clip`: of a sphere's part beyond it along PoleOf it, whose
+// boundary's vertices and barycentres are measured from where it ends, too.
 Quality MeasureQuality(Manifold& manifold, const Eigen::MatrixXd& points,
-                       const std::vector<std::uint32_t>& simplices);
+                       const std::vector<std::uint32_t>& simplices,
+                       std::optional<double> clip = std::nullopt);
+
+// A point of M, as unit vector.
+Eigen::VectorXd PoleOf(Manifold& manifold);
 
 }  // namespace stellate::bench

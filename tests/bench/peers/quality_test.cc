@@ -53,6 +53,23 @@ TEST(QualityTest, KnowsTheOctahedron) {
   EXPECT_NEAR(quality.hausdorff, 1 - 1 / std::sqrt(3), 1e-12);
 }
 
+TEST(QualityTest, KnowsWhereAClippedOneEnds) {
+  const auto sphere = Make("sphere:2");
+  const Eigen::MatrixXd axes = Eigen::MatrixXd::Identity(3, 3);
+  const double end = 1 / std::sqrt(3);  // of the axes' ends, along the diagonal
+  const Quality cap = MeasureQuality(*sphere, axes, {0, 1, 2}, end);
+  EXPECT_TRUE(cap.closed);
+  EXPECT_EQ(cap.euler_characteristic, 1);
+  EXPECT_NEAR(cap.hausdorff, 1 - end, 1e-12);
+  EXPECT_NEAR(MeasureQuality(*sphere, axes, {0, 1, 2}, -0.3).hausdorff, end + 0.3, 1e-12);
+  EXPECT_FALSE(MeasureQuality(*sphere, axes, {0, 1, 2}).closed);
+  // Two that have a corner in common: four edges meet there.
+  const Quality pinched =
+      MeasureQuality(*sphere, CrossPolytopeVertices(3, 3).leftCols(5), {0, 2, 4, 1, 3, 4}, end);
+  EXPECT_EQ(pinched.euler_characteristic, 1);
+  EXPECT_FALSE(pinched.closed);
+}
+
 TEST(QualityTest, KnowsTheSixteenCell) {
   const auto sphere = Make("sphere:3");
   const Quality quality =

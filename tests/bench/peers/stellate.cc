@@ -1,18 +1,26 @@
 #include <memory>
 #include <stdexcept>
+#include <vector>
 
 #include "core/mesher.h"
 #include "stellate/catalogue.h"
+#include "stellate/oracles/walls.h"
 #include "tests/bench/peers/peer.h"
+#include "tests/bench/peers/quality.h"
 #include "tests/support/run_mesher.h"
 
 namespace stellate::bench {
 
 Outcome MeshWithStellate(const Task& task, Meter& meter) {
   std::string error;
-  const std::unique_ptr<Manifold> manifold = MakeManifold(task.manifold, &error);
+  const std::shared_ptr<Manifold> manifold = MakeManifold(task.manifold, &error);
   if (manifold == nullptr) throw std::runtime_error(error);
-  core::Specification spec = stellate::testing::SpecificationFor(*manifold, task.size);
+  std::shared_ptr<Oracle> oracle = manifold;
+  if (task.clip) {
+    oracle = std::make_shared<oracles::Clipped>(
+        oracle, std::vector{oracles::HalfSpace(PoleOf(*manifold), *task.clip)});
+  }
+  core::Specification spec = stellate::testing::SpecificationFor(*oracle, task.size);
   spec.threads = 1;
   if (task.radius_edge_bound > 0) spec.criteria.radius_edge_bound = task.radius_edge_bound;
 
@@ -23,7 +31,7 @@ Outcome MeshWithStellate(const Task& task, Meter& meter) {
   double refined = ProcessorSeconds();  // when the last round that inserted points was over
   while (const core::QueryBatch* batch = (*mesher)->NextBatch()) {
     const double asked = ProcessorSeconds();
-    const core::Answers answers = stellate::testing::AnswersOf(*manifold, *batch);
+    const core::Answers answers = stellate::testing::AnswersOf(*oracle, *batch);
     outcome.oracle_seconds += ProcessorSeconds() - asked;
     const auto delta = (*mesher)->Absorb(answers);
     if (!delta) throw std::runtime_error(delta.error().message);

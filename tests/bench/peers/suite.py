@@ -75,11 +75,13 @@ def _coxeter(
     options: tuple[str, ...],
     starts: tuple[float, float],
     full: tuple[int, ...],
+    both: tuple[str, ...] = (),
 ) -> Case:
+    options = (*options, *both)
     peer = Mesher(
         "GUDHI Coxeter tracing", "gudhi-coxeter", manifolds[0], starts[0], -dimension, options
     )
-    ours = Mesher("Stellate", "stellate", manifolds[1], starts[1], -dimension)
+    ours = Mesher("Stellate", "stellate", manifolds[1], starts[1], -dimension, both)
     return Case(title, peer, ours, 0.4, (10_000,), full)
 
 
@@ -93,6 +95,15 @@ CASES: tuple[Case, ...] = (
     *_tangential("S³ in R⁴", "sphere:3", 3, 0.3, 0.4, ((5_000,), (30_000,)), ((5_000,), ())),
     *_tangential("SO(3) in R⁹", "so3", 3, 0.5, 0.56, ((8_000,), ()), ((), (8_000,))),
     _coxeter("S² in R⁸", 2, ("sphere:2", "sphere:2:8"), ("--ambient", "8"), (0.5, 0.1), (100_000,)),
+    _coxeter(
+        "S² in R⁸, cut",
+        2,
+        ("sphere:2", "sphere:2:8"),
+        ("--ambient", "8"),
+        (0.4, 0.08),
+        (100_000,),
+        ("--clip", "0.2"),
+    ),
     _coxeter("S³ in R⁴", 3, ("sphere:3", "sphere:3"), (), (0.4, 0.3), (50_000,)),
     _coxeter("T³ in R⁶", 3, ("flat-torus:3", "flat-torus:3"), (), (1.2, 0.4), (50_000,)),
 )

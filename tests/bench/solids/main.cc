@@ -1,6 +1,6 @@
 // Solids, beside CGAL's mesher of volumes with features: prints a table, asserts nothing.
 //
-//   solids [SCALE [REGEX]]     SCALE: of all epsilons (1)
+//   solids [SCALE [REGEX]]     SCALE: of all epsilons (1); REGEX: of lines, as "solid torus, CGAL"
 //
 // CGAL is given the curves where walls meet, at a quarter of the mesh's edges; Stellate finds them.
 // Seconds are of the processor, one thread, oracle and certificate included.
@@ -16,6 +16,7 @@
 #include <map>
 #include <numbers>
 #include <regex>
+#include <string>
 
 #include "tests/bench/solids/solid.h"
 
@@ -132,12 +133,16 @@ int Main(int argc, char** argv) {
               "vertices", "cells", "CPU s", "oracle s", "vert./s", "least", "most", "corners",
               "middles");
   for (const Solid& solid : solids) {
-    if (!std::regex_search(solid.name, chosen)) continue;
+    const auto is_chosen = [&](const char* mesher) {
+      return std::regex_search(std::string(solid.name) + ", " + mesher, chosen);
+    };
+    if (!is_chosen("Stellate") && !is_chosen("CGAL")) continue;
     const double epsilon = scale * solid.epsilon;
     std::vector<Curve> edges;
     std::fprintf(stderr, "%s, Stellate ...\n", solid.name);
     Print(solid, "Stellate", epsilon, MeshWithStellate(solid, epsilon, &edges));
     for (const bool optimized : {false, true}) {
+      if (!is_chosen("CGAL")) break;
       std::fprintf(stderr, "%s, CGAL%s ...\n", solid.name, optimized ? " optimized" : "");
       Print(solid, "CGAL", epsilon, MeshWithCgal(solid, epsilon, edges, optimized));
     }
