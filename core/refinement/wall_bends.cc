@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "core/base/instantiate.h"
 #include "core/base/interruption.h"
@@ -75,8 +76,26 @@ std::optional<std::uint32_t> LoneVertex(const StarComplex<K>& complex, double fa
   return std::nullopt;
 }
 
-#define STELLATE_EACH(K)                                                   \
-  template std::optional<WallBend> SharpestBend<K>(const StarComplex<K>&); \
+template <int K>
+std::optional<NearCorners> NearestCorners(const StarComplex<K>& complex) {
+  std::vector<std::uint32_t> corners;
+  for (std::uint32_t p = 0; K > 1 && p < complex.size(); ++p)
+    if (CountWalls(complex.walls(p)) == K) corners.push_back(p);
+  std::optional<NearCorners> nearest;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    CheckInterruption(i);
+    for (std::size_t j = 0; j < i; ++j) {
+      const double distance =
+          Distance(complex.Point(corners[j]), complex.Point(corners[i]), complex.d());
+      if (!nearest || distance < nearest->distance) nearest = {corners[j], corners[i], distance};
+    }
+  }
+  return nearest;
+}
+
+#define STELLATE_EACH(K)                                                        \
+  template std::optional<NearCorners> NearestCorners<K>(const StarComplex<K>&); \
+  template std::optional<WallBend> SharpestBend<K>(const StarComplex<K>&);      \
   template std::optional<std::uint32_t> LoneVertex<K>(const StarComplex<K>&, double);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

@@ -28,4 +28,14 @@ std::optional<WallBend> SharpestBend(const StarComplex<K>& complex);
 template <int K>
 std::optional<std::uint32_t> LoneVertex(const StarComplex<K>& complex, double far);
 
+// Two corners, vertices on K walls each, and how far from each other they are, length.
+struct NearCorners {
+  std::uint32_t first = 0, second = 0;
+  double distance = 0;
+};
+
+// Of all pairs of corners, the nearest to each other.
+template <int K>
+std::optional<NearCorners> NearestCorners(const StarComplex<K>& complex);
+
 }  // namespace stellate::core

@@ -22,6 +22,9 @@ namespace {
 // Of epsilon: answers wrong by more do not go unnoticed (RepeatCheck), and points of a run that
 // does not end may lie so near to each other that this tells what they seem to bend by.
 constexpr double kLikelyError = 1e-3;
+// Of epsilon: corners of a solid that are so near to each other, or nearer, were seen to keep runs
+// from their end.
+constexpr double kNearlyMeet = 0.25;
 
 }  // namespace
 
@@ -115,6 +118,24 @@ void TellBend(const Engine<K>& engine, double epsilon, Certificate* certificate)
 }
 
 template <int K>
+void TellNearCorners(const Engine<K>& engine, double epsilon, Certificate* certificate) {
+  if (certificate->certified) return;
+  const StarComplex<K>& complex = engine.complex();
+  const std::optional<NearCorners> near = NearestCorners<K>(complex);
+  if (!near || near->distance > kNearlyMeet * epsilon) return;
+  if (certificate->verdict.ends_with('.')) certificate->verdict.pop_back();
+  std::string walls;
+  ForEachWall(complex.walls(near->first) | complex.walls(near->second),
+              [&](int wall) { walls += Message(walls.empty() ? "" : ", ", wall); });
+  certificate->verdict += Message(
+      "; walls ", walls, " all but meet in one point: two corners are ", Brief(near->distance),
+      " apart at ",
+      NamePoint(Eigen::Map<const Eigen::VectorXd>(complex.Point(near->first), complex.d())),
+      ", far less than epsilon ", Brief(epsilon),
+      "; move one of these walls, so that it passes farther away, or take a smaller epsilon.");
+}
+
+template <int K>
 std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent) {
   const StarComplex<K>& complex = engine.complex();
   const auto& entries = engine.book().size_and_shape();
@@ -154,6 +175,7 @@ void WarnOfCompromises(const Engine<K>& engine, double epsilon, Certificate* cer
   template std::string WhatIsLeft<K>(const Engine<K>&, std::uint64_t);         \
   template void TellSharpest<K>(const Engine<K>&, Certificate*);               \
   template void TellBend<K>(const Engine<K>&, double, Certificate*);           \
+  template void TellNearCorners<K>(const Engine<K>&, double, Certificate*);    \
   template void WarnOfCompromises<K>(const Engine<K>&, double, Certificate*);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

@@ -23,6 +23,11 @@ void TellSharpest(const Engine<K>& engine, Certificate* certificate);
 template <int K>
 void TellBend(const Engine<K>& engine, double epsilon, Certificate* certificate);
 
+// Where walls all but meet in one point, so that corners are far nearer to each other than epsilon,
+// of a mesh that is not certified: at the verdict's end.
+template <int K>
+void TellNearCorners(const Engine<K>& engine, double epsilon, Certificate* certificate);
+
 // What still breaks a rule, for people. inconsistent: simplices that DescribeUnfinished counted.
 template <int K>
 std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent);

@@ -84,5 +84,22 @@ TEST(BentWallsTest, SolidsEndBesideTheCornersOfTheirBoxes) {
   }
 }
 
+// Where such a run does not end, that is the likely cause, and told so.
+TEST(BentWallsTest, WallsThatAllButMeetInOnePointAreNamed) {
+  const auto verdict = [](const Domain& m, double epsilon) {
+    Specification spec = m.SpecificationFor(epsilon);
+    spec.limits.max_vertices = 150;
+    return stellate::testing::MeshOf(m, spec).report.certificate.verdict;
+  };
+  const std::string words = " all but meet in one point: two corners are 0.0108 apart at (";
+  const std::string near = verdict(stellate::testing::GyroidSolid(1.56), 0.3);
+  EXPECT_NE(near.find(words), std::string::npos) << near;
+  EXPECT_NE(near.find("move one of these walls"), std::string::npos) << near;
+  for (const Domain& m : {stellate::testing::Cube(), stellate::testing::GyroidSolid(1)}) {
+    const std::string apart = verdict(m, 0.2);
+    EXPECT_EQ(apart.find("all but meet"), std::string::npos) << apart;
+  }
+}
+
 }  // namespace
 }  // namespace stellate::core
