@@ -257,6 +257,9 @@ def test_places_that_cannot_be_written_are_known_before(tmp_path):
     with pytest.raises(IsADirectoryError):
         stellate.check_save(tmp_path / "folder.txt", 2, 3)
     stellate.check_save("mesh.txt", 2, 3)  # here
+    for ending in ("txt", "vtu"):
+        with pytest.raises(FileNotFoundError, match=rf"missing/mesh\.{ending}'"):
+            shapes.torus().save(tmp_path / "missing" / f"mesh.{ending}")
 
 
 def test_a_file_is_replaced_whole_or_not_at_all(tmp_path, monkeypatch):

@@ -125,9 +125,11 @@ def _replaced(path: str) -> Iterator[str]:
         with open(draft, "rb") as written:
             os.fsync(written.fileno())
         os.replace(draft, target)
-    except BaseException:
+    except BaseException as error:
         with contextlib.suppress(FileNotFoundError):
             os.unlink(draft)
+        if isinstance(error, OSError) and error.filename == draft:
+            error.filename = path  # the one that the caller knows
         raise
 
 
