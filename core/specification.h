@@ -62,9 +62,9 @@ struct Criteria {
                                        // bounding box's diagonal if that is more
   std::optional<Judging> judging;      // default kFlats for k <= 2 and for graded sizes, else
                                        // kCommonCentre
-  bool ask_ahead = false;              // rehearse on a guess of M first and ask for all that
-                                       // it wants at once: a handful of round trips for
-                                       // two to three times the processor time
+  bool ask_ahead = false;              // lay or refine the sample on a guess of M first and
+                                       // ask for all that this wants at once: a handful of
+                                       // round trips for up to three times the processor time
   // Adaptive size: where the mesh must be finer than epsilon, which stays the upper bound. Both go
   // by size(p), p a vertex:
   // - what the client says of p, where OracleCapabilities::local_size: its local feature size or

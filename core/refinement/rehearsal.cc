@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/base/parallel.h"
-#include "core/refinement/surrogate.h"
 
 namespace stellate::core {
 namespace {
@@ -51,23 +51,28 @@ void LeaveWallsAlone(const StarComplex<K>& complex, double epsilon,
 
 // Returns what the inserted points are for.
 template <int K>
-std::vector<Rule> Drive(Engine<K>* rehearsal, const Engine<K>& original, std::uint64_t round) {
+std::vector<Rule> Drive(Engine<K>* rehearsal, const Engine<K>& original, std::uint64_t round,
+                        Rehearsed by, Surrogate<K>* known) {
   const double count = original.complex().size();
   const double most = count + kMostWanted * (original.CountMissing(1) + count);
   const ResolvedCriteria& criteria = original.criteria();
-  Surrogate<K> surrogate(original.complex(), criteria.advance_step, criteria.epsilon,
+  std::optional<Surrogate<K>> own;
+  if (!known)
+    known = &own.emplace(original.complex(), criteria.advance_step, criteria.epsilon,
                          original.sizes().given());
   std::vector<Rule> rules;
   for (int good_rounds = 0; good_rounds < kGoodPointRounds; ++round) {
     if (rehearsal->is_full() || rehearsal->complex().size() > most) break;
+    if (by == Rehearsed::kSizes && rehearsal->book().size_and_shape().empty()) break;
     auto targets = rehearsal->Plan();
     if (targets && rehearsal->faces().has_walls())
       LeaveWallsAlone<K>(rehearsal->complex(), criteria.epsilon, &*targets);
     if (!targets || targets->empty()) break;
+    if (by == Rehearsed::kSizes && targets->front().violation.rule >= Rule::kSliver) break;
     const CandidateSet<K> candidates = rehearsal->Draw(rehearsal->Select(*targets), round);
     good_rounds += candidates.targets.front().violation.rule >= Rule::kSliver;
     const Inserted inserted =
-        rehearsal->Insert(candidates, AnswersOf(surrogate, rehearsal->complex(), candidates));
+        rehearsal->Insert(candidates, AnswersOf(*known, rehearsal->complex(), candidates));
     rules.insert(rules.end(), inserted.rules.begin(), inserted.rules.end());
     rehearsal->Commit();
   }
@@ -78,10 +83,10 @@ std::vector<Rule> Drive(Engine<K>* rehearsal, const Engine<K>& original, std::ui
 
 template <int K>
 PlannedPoints Rehearse(const Engine<K>& engine, std::uint64_t round,
-                       std::vector<Target<K>>* targets) {
+                       std::vector<Target<K>>* targets, Rehearsed rules, Surrogate<K>* known) {
   Engine<K> rehearsal = engine.ForRehearsal();
   PlannedPoints planned;
-  planned.rules = Drive(&rehearsal, engine, round);
+  planned.rules = Drive(&rehearsal, engine, round, rules, known);
   const StarComplex<K>& rehearsed = rehearsal.complex();
   const std::uint32_t count = engine.complex().size();
   const auto wanted = static_cast<Eigen::Index>(rehearsed.size() - count);
@@ -112,8 +117,9 @@ PlannedPoints Rehearse(const Engine<K>& engine, std::uint64_t round,
   return planned;
 }
 
-#define STELLATE_EACH(K) \
-  template PlannedPoints Rehearse<K>(const Engine<K>&, std::uint64_t, std::vector<Target<K>>*);
+#define STELLATE_EACH(K)                                                                       \
+  template PlannedPoints Rehearse<K>(const Engine<K>&, std::uint64_t, std::vector<Target<K>>*, \
+                                     Rehearsed, Surrogate<K>*);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 

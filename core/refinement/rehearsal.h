@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/refinement/engine.h"
+#include "core/refinement/surrogate.h"
 
 namespace stellate::core {
 
@@ -13,8 +14,11 @@ namespace stellate::core {
 // when a run is over.
 //
 // round: whatever Draw would be given next.
+// known: what is guessed already, of the manifold's whole; or null: from the engine's own sample.
+enum class Rehearsed { kAllRules, kSizes };  // kSizes: R1 and R2 alone
 template <int K>
 PlannedPoints Rehearse(const Engine<K>& engine, std::uint64_t round,
-                       std::vector<Target<K>>* targets);
+                       std::vector<Target<K>>* targets, Rehearsed rules = Rehearsed::kAllRules,
+                       Surrogate<K>* known = nullptr);
 
 }  // namespace stellate::core

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/base/parallel.h"
+#include "core/base/vector_ops.h"
 
 namespace stellate::core {
 namespace {
@@ -28,6 +29,14 @@ constexpr double kLeastCosine = 0.5;
 // Keep the fit determined where neighbours are few; the terms are of order one after scaling.
 constexpr double kQuadraticRidge = 1e-6;
 constexpr double kCubicRidge = 1e-4;
+// A guess from so near, in shares of the sample's spacing, stays where it is seen from there.
+constexpr double kNearGuess = 0.1;
+// Of points that follow each other at most so many share a search, within this share of how far it
+// goes.
+constexpr std::size_t kRun = 32;
+constexpr double Shared(int k) { return k < 3 ? 1 : 0.5; }
+// More than rounding can take from a distance in R^d, d up to thousands.
+constexpr double kRounding = 1 + 1e-12;
 // What a fit is trusted at best, as a share of the neighbours' distance; and where there are hardly
 // more equations than coefficients.
 constexpr double kLeastDoubt = 0.003;
@@ -77,13 +86,11 @@ void Surrogate<K>::Fit(std::uint32_t p, std::uint32_t slot) {
   const auto& cell = complex_.cell(p);
   const int d = complex_.d();
   const Frame tangent(complex_.Tangent(p), d, K);
-  struct Neighbour {
-    double u[K];
-    double length;
-    Eigen::VectorXd away;                             // q off the tangent plane
-    Eigen::Matrix<double, Eigen::Dynamic, K> slopes;  // d of away / d u
-  };
-  std::vector<Neighbour> neighbours;
+  // Neighbours one after the other: u and length, q off the tangent plane, and the slopes there,
+  // the derivatives of that by u (K rows of d).
+  thread_local std::vector<double> neighbours;
+  neighbours.clear();
+  const auto stride = (K + 1) * (1 + static_cast<std::size_t>(d));
   double total = 0;
   for (std::size_t f = 0; f < cell.facet_count(); ++f) {
     const std::uint32_t neighbour = cell.id(f);
@@ -91,62 +98,86 @@ void Surrogate<K>::Fit(std::uint32_t p, std::uint32_t slot) {
     const Frame other(complex_.Tangent(neighbour), d, K);
     const Eigen::Matrix<double, K, K> turn = tangent.transpose() * other;
     if (turn.squaredNorm() < K - 1 + kLeastCosine * kLeastCosine) continue;
-    Neighbour n;
-    complex_.HalfSpace(p, f, n.u);
-    double length2 = 0;
-    for (const double u : n.u) length2 += u * u;
+    neighbours.resize(neighbours.size() + stride);
+    double* const n = neighbours.data() + neighbours.size() - stride;
+    complex_.HalfSpace(p, f, n);
+    const Eigen::Map<const Eigen::Matrix<double, K, 1>> u(n);
+    Eigen::Map<Eigen::VectorXd> away(n + K + 1, d);
     const double* q = complex_.Point(neighbour);
     const double* at = complex_.Point(p);
-    n.away.resize(d);
-    for (int j = 0; j < d; ++j) n.away[j] = q[j] - at[j];
-    n.away -= tangent * Eigen::Map<const Eigen::Matrix<double, K, 1>>(n.u);
-    if (!(length2 > n.away.squaredNorm())) continue;
-    n.length = std::sqrt(length2);
-    n.slopes = (other - tangent * turn) * turn.inverse();
-    total += n.length;
-    neighbours.push_back(std::move(n));
+    for (int j = 0; j < d; ++j) away[j] = q[j] - at[j];
+    away.noalias() -= tangent * u;
+    const double length2 = u.squaredNorm();
+    if (!(length2 > away.squaredNorm())) {
+      neighbours.resize(neighbours.size() - stride);
+      continue;
+    }
+    n[K] = std::sqrt(length2);
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, K>> slopes(n + K + 1 + d, d, K);
+    const Eigen::Matrix<double, K, K> back = turn.inverse();
+    slopes.noalias() = other * back;
+    slopes -= tangent;
+    total += n[K];
   }
+  const std::size_t count = neighbours.size() / stride;
   Graph& graph = graphs_[slot];
   graph = {};
   double* out = forms_.data() + slot * form_size_;
   std::fill(out, out + form_size_, 0.0);
-  if (neighbours.size() <= K) return;
-  const double scale = total / static_cast<double>(neighbours.size());
+  if (count <= K) return;
+  const double scale = total / static_cast<double>(count);
 
-  // Sizes known at run time only: unrolled for k = 5 this would be a megabyte of code.
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(kTerms, kTerms);
-  Eigen::MatrixXd rhs = Eigen::MatrixXd::Zero(kTerms, d);
-  Eigen::VectorXd terms(kTerms);
-  double slopes[K][kTerms];
-  for (const Neighbour& n : neighbours) {
-    double v[K];
-    for (int a = 0; a < K; ++a) v[a] = n.u[a] / scale;
-    // Divided by |u|^2 places, and by |u| slopes, are all of the curvature's size.
-    const double weight = scale / n.length;
-    Terms(v, terms.data());
-    terms *= weight * weight;
-    normal.selfadjointView<Eigen::Lower>().rankUpdate(terms);
-    rhs.noalias() += terms * ((weight * weight) * n.away.transpose());
-    Slopes(v, slopes);
-    for (int a = 0; a < K; ++a) {
-      terms = Eigen::Map<const Eigen::VectorXd>(slopes[a], kTerms) * weight;
-      normal.selfadjointView<Eigen::Lower>().rankUpdate(terms);
-      rhs.noalias() += terms * ((weight * scale) * n.slopes.col(a).transpose());
+  // Normal equations, the lower half, and their right-hand sides, d for each term.
+  double normal[kTerms][kTerms] = {}, terms[kTerms], slopes[K][kTerms];
+  thread_local std::vector<double> right;
+  right.assign(form_size_, 0.0);
+  const auto add = [&](const double* row, const double* value, double weight, double value_weight) {
+    for (int s = 0; s < kTerms; ++s) {
+      const double w = weight * weight * row[s];
+      for (int t = 0; t <= s; ++t) normal[s][t] += w * row[t];
+      const double v = weight * value_weight * row[s];
+      double* const right_of = right.data() + s * d;
+      for (int j = 0; j < d; ++j) right_of[j] += v * value[j];
     }
-  }
-  for (int t = 0; t < kTerms; ++t) normal(t, t) += t < kQuadratic ? kQuadraticRidge : kCubicRidge;
-  const Eigen::MatrixXd forms = normal.ldlt().solve(rhs);
-  graph.scale = scale;
-  const bool scant = static_cast<double>(neighbours.size() * (K + 1)) < 1.5 * kTerms;
-  graph.error = (scant ? kScantDoubt : kLeastDoubt) * scale;
-  for (const Neighbour& n : neighbours) {
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    const double* const n = neighbours.data() + i * stride;
     double v[K];
-    for (int a = 0; a < K; ++a) v[a] = n.u[a] / scale;
-    Terms(v, terms.data());
-    graph.error = std::max(graph.error, (forms.transpose() * terms - n.away).norm());
+    for (int a = 0; a < K; ++a) v[a] = n[a] / scale;
+    // Divided by |u|^2 places, and by |u| slopes, are all of the curvature's size.
+    const double weight = scale / n[K];
+    Terms(v, terms);
+    add(terms, n + K + 1, weight * weight, weight * weight);
+    Slopes(v, slopes);
+    for (int a = 0; a < K; ++a) add(slopes[a], n + K + 1 + (a + 1) * d, weight, weight * scale);
   }
-  for (int t = 0; t < kTerms; ++t)
-    for (int j = 0; j < d; ++j) out[t * d + j] = forms(t, j);
+  for (int t = 0; t < kTerms; ++t) normal[t][t] += t < kQuadratic ? kQuadraticRidge : kCubicRidge;
+  // Sizes known at run time only: unrolled for k = 5 this would be a megabyte of code.
+  using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kTerms, kTerms>;
+  const Square lower =
+      Eigen::Map<const Eigen::Matrix<double, kTerms, kTerms, Eigen::RowMajor>>(normal[0]);
+  const Eigen::LDLT<Square> solver(lower);
+  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> forms(
+      out, kTerms, d);
+  forms = solver.solve(
+      Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+          right.data(), kTerms, d));
+  graph.scale = scale;
+  const bool scant = static_cast<double>(count * (K + 1)) < 1.5 * kTerms;
+  graph.error = (scant ? kScantDoubt : kLeastDoubt) * scale;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double* const n = neighbours.data() + i * stride;
+    double v[K];
+    for (int a = 0; a < K; ++a) v[a] = n[a] / scale;
+    Terms(v, terms);
+    double missed2 = 0;
+    for (int j = 0; j < d; ++j) {
+      double missed = -n[K + 1 + j];
+      for (int t = 0; t < kTerms; ++t) missed += terms[t] * out[t * d + j];
+      missed2 += missed * missed;
+    }
+    graph.error = std::max(graph.error, std::sqrt(missed2));
+  }
 }
 
 // By how much a graph may be wrong at |u| = length.
@@ -158,15 +189,56 @@ double Surrogate<K>::Doubt(const Graph& graph, double length) const {
 }
 
 template <int K>
-typename Surrogate<K>::Near Surrogate<K>::FindNear(const double* x) const {
-  Near near;
-  near.count = complex_.Nearest(x, kBlended + 1, near.points.data());
-  if (near.count == kBlended + 1) {
-    near.radius2 = near.points[kBlended].first;
-    --near.count;
-  } else if (near.count > 0) {
-    near.radius2 = 2 * near.points[static_cast<std::size_t>(near.count) - 1].first;
+void Surrogate<K>::Near::Add(const std::pair<double, std::uint32_t>& candidate) {
+  const std::size_t most = points.size();
+  std::size_t at = static_cast<std::size_t>(count);
+  if (at == most && !(candidate < points[--at])) return;
+  for (; at > 0 && candidate < points[at - 1]; --at) points[at] = points[at - 1];
+  points[at] = candidate;
+  count = std::min(count + 1, static_cast<int>(most));
+}
+
+template <int K>
+void Surrogate<K>::Near::Close() {
+  if (count == kBlended + 1) {
+    radius2 = points[kBlended].first;
+    --count;
+  } else if (count > 0) {
+    radius2 = 2 * points[static_cast<std::size_t>(count) - 1].first;
   }
+}
+
+// Points that follow each other are mostly near each other: what is near one of them is looked
+// through for others, too. Where one search ends and the next begins changes nothing.
+template <int K>
+std::vector<typename Surrogate<K>::Near> Surrogate<K>::FindNear(
+    const Eigen::MatrixXd& points) const {
+  const int d = complex_.d();
+  const auto count = static_cast<std::size_t>(points.cols());
+  const auto at = [&](std::size_t i) { return points.col(static_cast<Eigen::Index>(i)).data(); };
+  std::vector<Near> near(count);
+  ParallelFor((count + kRun - 1) / kRun, [&](std::size_t run) {
+    thread_local std::vector<std::uint32_t> around;
+    const double* from = nullptr;  // where was searched last
+    double radius = 0;             // ... how far
+    for (std::size_t i = run * kRun; i < std::min(count, (run + 1) * kRun); ++i) {
+      Near& here = near[i];
+      if (from && Distance(at(i), from, d) <= Shared(K) * radius) {
+        if (around.empty())
+          complex_.ForEachWithin(from, kRounding * (1 + 2 * Shared(K)) * radius,
+                                 [&](std::uint32_t p) { around.push_back(p); });
+        for (const std::uint32_t p : around)
+          here.Add({SquaredDistance(at(i), complex_.Point(p), d), p});
+      } else {
+        here.count = complex_.Nearest(at(i), kBlended + 1, here.points.data());
+        if (here.count == 0) return;
+        from = at(i);
+        radius = std::sqrt(here.points[static_cast<std::size_t>(here.count) - 1].first);
+        around.clear();
+      }
+    }
+    for (std::size_t i = run * kRun; i < std::min(count, (run + 1) * kRun); ++i) near[i].Close();
+  });
   return near;
 }
 
@@ -278,7 +350,8 @@ bool Surrogate<K>::Predict(const Near& near, const double* x, const double* flat
   from.resize(static_cast<std::size_t>(d));
   Guess guess;
   // Off the graphs each sees x elsewhere; near them they can be compared.
-  if (!Blend(near, x, point, nullptr, &guess)) return false;
+  if (!Blend(near, x, point, flat ? nullptr : tangent, &guess)) return false;
+  const bool stays = !flat && Distance(x, point, d) <= kNearGuess * guess.spacing;
   std::copy_n(point, d, from.data());
   for (int a = 0; flat && a < K; ++a) {  // back to the flat
     double along = 0;
@@ -286,7 +359,7 @@ bool Surrogate<K>::Predict(const Near& near, const double* x, const double* flat
     for (int j = 0; j < d; ++j) along += t[j] * (point[j] - x[j]);
     for (int j = 0; j < d; ++j) from[j] -= along * t[j];
   }
-  if (!Blend(near, from.data(), point, tangent, &guess)) return false;
+  if (!stays && !Blend(near, from.data(), point, tangent, &guess)) return false;
   *size = guess.size;
   if (spacing < kMargin * epsilon_ && guess.uncertainty > kExact * spacing &&
       guess.spacing > kFine * epsilon_)
@@ -299,10 +372,7 @@ AnsweredPoints Surrogate<K>::Answer(const Eigen::MatrixXd& points,
                                     const std::vector<const double*>& flats,
                                     const Eigen::VectorXd& spacing) {
   const auto count = static_cast<std::size_t>(points.cols());
-  std::vector<Near> near(count);
-  ParallelFor(count, [&](std::size_t i) {
-    near[i] = FindNear(points.col(static_cast<Eigen::Index>(i)).data());
-  });
+  const std::vector<Near> near = FindNear(points);
   Prepare(near);
   AnsweredPoints answer;
   answer.points.setZero(complex_.d(), points.cols());

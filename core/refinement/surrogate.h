@@ -26,7 +26,8 @@ class Surrogate {
  public:
   // complex  borrowed, must not change
   // step     how far from a point without neighbours its tangent plane means something, length
-  // epsilon  the spacing that the points are for in the end, length
+  // epsilon  the spacing that the points are for in the end, length: what asks for that is not
+  //          guessed from a sample too coarse to tell exactly. 0: it is
   // sizes    of the sample points, borrowed, or nullptr; between them they are blended like the
   //          graphs: right to second order, where the least of a few would ask for far too much
   Surrogate(const StarComplex<K>& complex, double step, double epsilon,
@@ -54,6 +55,8 @@ class Surrogate {
     std::array<std::pair<double, std::uint32_t>, kBlended + 1> points;
     int count = 0;
     double radius2 = 0;
+    void Add(const std::pair<double, std::uint32_t>& candidate);
+    void Close();
   };
   struct Guess {
     double uncertainty = 0;  // length
@@ -63,7 +66,7 @@ class Surrogate {
 
   static void Terms(const double* v, double* terms);
   static void Slopes(const double* v, double (*slopes)[kTerms]);
-  Near FindNear(const double* x) const;
+  std::vector<Near> FindNear(const Eigen::MatrixXd& points) const;
   void Prepare(const std::vector<Near>& near);
   void Fit(std::uint32_t p, std::uint32_t slot);
   double Doubt(const Graph& graph, double length) const;

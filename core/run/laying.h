@@ -1,52 +1,61 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "core/base/instantiate.h"
-#include "core/growth/growth.h"
 #include "core/refinement/engine.h"
+#include "core/refinement/surrogate.h"
 
 namespace stellate::core {
 
-// Lays the sample at its final spacing before there is any star: what is asked and what joins, ring
-// by ring (core/growth/growth.h). A lattice ten times as coarse goes before, to have a seed near
-// everything.
+// How a sample is laid at its final spacing before there is any star. Whoever drives it asks what
+// Next says, and hands over the answers, until there is nothing more to ask.
 template <int K>
 class Laying {
  public:
-  // Whether a run begins so: sizes are the same everywhere, what was found of the seeds is not
-  // dense (a sample itself, or all that so coarse a mesh needs), and round trips are not to be
-  // saved.
-  static bool Suits(const ResolvedCriteria& criteria, const AnsweredPoints& seeds);
-
-  explicit Laying(Engine<K>& engine);  // borrowed
+  virtual ~Laying() = default;
+  Laying(const Laying&) = delete;
+  Laying& operator=(const Laying&) = delete;
 
   // Begins from those of the seeds that were found. Returns which of them joined the sample.
-  std::vector<std::uint8_t> Begin(const AnsweredPoints& seeds);
+  virtual std::vector<std::uint8_t> Begin(const AnsweredPoints& seeds) = 0;
 
-  // What to ask next; empty when the sample is laid, as far as it can be.
-  PlannedPoints Next();
+  // What to ask next; empty when the sample is laid, as far as it can be. round: whatever
+  // Engine::Draw would be given.
+  virtual CandidateSet<K> Next(std::uint64_t round) = 0;
   // Takes the answers. Returns which of them joined the sample.
-  std::vector<std::uint8_t> Take(const AnsweredPoints& answers);
+  virtual std::vector<std::uint8_t> Take(const CandidateSet<K>& candidates,
+                                         const AnsweredPoints& answers) = 0;
+  // Whose stars what was asked last is about.
+  virtual const Engine<K>& asking() const = 0;
+
+  // What it went by, for what is left to refine; or null. Lasts as long as this.
+  virtual Surrogate<K>* guess() { return nullptr; }
 
   // About how many points are still to come.
-  double CountMissing() const;
+  virtual double CountMissing() const = 0;
 
- private:
-  std::vector<std::uint8_t> Lay(const AnsweredPoints& answers,
-                                const std::vector<Eigen::Index>& columns);
-  std::vector<std::uint8_t> Scout(const AnsweredPoints& answers,
-                                  const std::vector<Eigen::Index>& columns);
-
-  Engine<K>& engine_;
-  Growth<K> growth_;
-  std::unique_ptr<Growth<K>> scouting_;  // the coarse lattice, until it is laid
-  AnsweredPoints seeds_, scouts_;        // as given; of the coarse lattice
+ protected:
+  Laying() = default;
 };
 
-STELLATE_DECLARE_CLASS(Laying)
+// How a run lays its sample, ring by ring or ahead. Null where it does not: where sizes are graded,
+// where there are walls, and where what was found of the seeds is dense (a sample itself, or all
+// that so coarse a mesh needs). The engine is borrowed; `spec` is its.
+template <int K>
+std::unique_ptr<Laying<K>> LayingFor(Engine<K>& engine, const Specification& spec,
+                                     const AnsweredPoints& seeds);
+
+// The lattice's nearest-neighbour distance for circumradii of epsilon, length.
+double LaidSpacing(int k, double epsilon);
+// Patches of it begin about so many spacings apart: nearer, and seams between them cost more
+// vertices; farther, and the strain within them does.
+inline constexpr double kPatchesApart = 10;
+
+// How many of the first `most` points that were found, in their order, lie `apart` from all that
+// were counted before.
+std::size_t CountApart(const AnsweredPoints& from, Eigen::Index most, double apart);
 
 }  // namespace stellate::core

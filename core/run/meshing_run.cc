@@ -172,9 +172,9 @@ void MeshingRun<K>::NextQuestions() {
 }
 
 template <int K>
-void MeshingRun<K>::Ask(CandidateSet<K> candidates, Insertion then) {
+void MeshingRun<K>::Ask(CandidateSet<K> candidates, Insertion then, const Engine<K>& asking) {
   certification_.reset();
-  trip_ = std::make_unique<RoundTrip<K>>(engine_, spec_.oracle, tangent_finder_,
+  trip_ = std::make_unique<RoundTrip<K>>(asking, spec_.oracle, tangent_finder_,
                                          std::move(candidates), spec_.walls);
   insertion_ = then;
 }
@@ -235,6 +235,7 @@ void MeshingRun<K>::InsertSpares() {
 // Finds what to do next and asks for it, or ends the refinement.
 template <int K>
 void MeshingRun<K>::Plan() {
+  const std::unique_ptr<Laying<K>> laid = std::move(laid_);
   box_watch_.Look(engine_.complex().points().data(), engine_.complex().size());
   if (engine_.is_full()) return Finish(Termination::kVertexBudget);
   if (box_watch_.has_left()) return Finish(Termination::kNoProgress);
@@ -254,7 +255,8 @@ void MeshingRun<K>::Plan() {
   if (faces.has_discoveries())
     planned = engine_.TakeDiscoveries();
   else if (engine_.criteria().ask_ahead && !rehearsal_failed_ && faces.stage() == K)
-    planned = Rehearse<K>(engine_, whole_rounds_, &*targets);
+    planned = Rehearse<K>(engine_, whole_rounds_, &*targets, Rehearsed::kAllRules,
+                          laid ? laid->guess() : nullptr);
   CandidateSet<K> candidates = engine_.Draw(std::move(*targets), whole_rounds_);
   candidates.planned = std::move(planned);
   Ask(std::move(candidates), &MeshingRun::InsertCandidates);
@@ -314,6 +316,7 @@ void MeshingRun<K>::Finish(Termination termination) {
   // What is laid has no stars yet.
   if (laying_ && termination == Termination::kRoundBudget) delta_.added = engine_.Commit().added;
   laying_.reset();
+  laid_.reset();
   batch_.reset();
   parts_.reset();
   report_.termination = termination;

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/base/instantiate.h"
@@ -52,7 +53,10 @@ class MeshingRun final : public Mesher {
   Status Check(const QueryBatch& asked, const Answers& answers) const;
   void Count(const QueryBatch& asked);
   void Advance(const Answers& answers);
-  void Ask(CandidateSet<K> candidates, Insertion then);
+  void Ask(CandidateSet<K> candidates, Insertion then) {
+    Ask(std::move(candidates), then, engine_);
+  }
+  void Ask(CandidateSet<K> candidates, Insertion then, const Engine<K>& asking);
   void AskFor(Eigen::MatrixXd&& points, Insertion then);
   void NextQuestions();
 
@@ -63,7 +67,7 @@ class MeshingRun final : public Mesher {
   void KeepFaceSeeds();
   void JudgeWalls();
   bool PlanFaces(std::optional<std::vector<Target<K>>>* targets);
-  void LayRing();
+  void LayAnswered();
   bool AskToLay();
   void InsertCandidates();
   void InsertSpares();
@@ -92,6 +96,7 @@ class MeshingRun final : public Mesher {
   // One of these asks.
   std::unique_ptr<RoundTrip<K>> trip_;
   std::unique_ptr<Laying<K>> laying_;  // while the sample is laid
+  std::unique_ptr<Laying<K>> laid_;    // until what that left is planned
   std::unique_ptr<Certification> certification_;
   Insertion insertion_ = nullptr;  // of the trip's answers
 

@@ -17,10 +17,8 @@ void MeshingRun<K>::InsertSeeds() {
   if (found == 0) return Fail({StatusCode::kNoSeeds, WhyNoSeeds(spec_, count)});
   repeat_check_.Sample(answers);
   std::vector<std::uint8_t> used(static_cast<std::size_t>(count), 0);
-  if (spec_.walls == 0 && Laying<K>::Suits(engine_.criteria(), answers)) {
-    laying_ = std::make_unique<Laying<K>>(engine_);
-    return spare_points_.Keep(answers, laying_->Begin(answers));
-  }
+  laying_ = LayingFor<K>(engine_, spec_, answers);
+  if (laying_) return spare_points_.Keep(answers, laying_->Begin(answers));
   for (Eigen::Index c = 0; c < count; ++c) {
     const auto i = static_cast<std::size_t>(c);
     CheckInterruption(i);
@@ -36,8 +34,8 @@ void MeshingRun<K>::InsertSeeds() {
 }
 
 template <int K>
-void MeshingRun<K>::LayRing() {
-  const std::vector<std::uint8_t> used = laying_->Take(trip_->answers());
+void MeshingRun<K>::LayAnswered() {
+  const std::vector<std::uint8_t> used = laying_->Take(trip_->candidates(), trip_->answers());
   report_.counts.inserted_size +=
       static_cast<std::uint64_t>(std::count(used.begin(), used.end(), 1));
   spare_points_.Keep(trip_->answers(), used);
@@ -48,21 +46,19 @@ template <int K>
 bool MeshingRun<K>::AskToLay() {
   if (!laying_) return false;
   box_watch_.Look(engine_.complex().points().data(), engine_.complex().size());
-  PlannedPoints ring;
-  if (!box_watch_.has_left()) ring = laying_->Next();
-  if (ring.size() == 0) {
-    laying_.reset();
+  CandidateSet<K> candidates;
+  if (!box_watch_.has_left()) candidates = laying_->Next(whole_rounds_);
+  if (candidates.size() == 0) {
+    laid_ = std::move(laying_);
     return false;
   }
-  CandidateSet<K> candidates;
-  candidates.planned = std::move(ring);
-  Ask(std::move(candidates), &MeshingRun::LayRing);
+  Ask(std::move(candidates), &MeshingRun::LayAnswered, laying_->asking());
   return true;
 }
 
 #define STELLATE_EACH(K)                      \
   template void MeshingRun<K>::InsertSeeds(); \
-  template void MeshingRun<K>::LayRing();     \
+  template void MeshingRun<K>::LayAnswered(); \
   template bool MeshingRun<K>::AskToLay();
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

@@ -181,6 +181,13 @@ TEST_F(AtALookUp, OfARehearsal) {
   InterruptAtMany(spec, *torus);
 }
 
+TEST_F(AtALookUp, OfASampleThatIsAskedForAtOnce) {
+  const auto torus = Make("torus");
+  Specification spec = SpecificationFor(*torus, 0.06);
+  spec.criteria.ask_ahead = true;
+  InterruptAtMany(spec, *torus, 15);
+}
+
 TEST_F(AtALookUp, OfARunInPartsThatIsCutShort) {
   const auto torus = Make("torus");
   Specification spec = SpecificationFor(*torus, 0.1);

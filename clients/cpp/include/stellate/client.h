@@ -77,8 +77,8 @@ struct MeshOptions {
   std::optional<std::uint32_t> candidates;    // tried in a picking region
   std::optional<double> advance_step;         // h, a length
   std::optional<std::uint32_t> flat_alternations;
-  // A handful of round trips for two to three times the processor time; on unless the server is on
-  // this machine.
+  // A handful of round trips for one and a half to three times the processor time; on unless the
+  // server is on this machine.
   std::optional<bool> ask_ahead;
   // R_p at most this share of the local size, (0, 1]: the oracle's if it has one, else estimated.
   std::optional<double> size_rate;

@@ -1,0 +1,222 @@
+#include "core/run/ahead_laying.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/base/interruption.h"
+#include "core/base/local_maxima.h"
+#include "core/growth/growth.h"
+#include "core/refinement/rehearsal.h"
+#include "core/sample/near_lists.h"
+
+namespace stellate::core {
+namespace {
+
+// Epsilon of the coarse mesh, in those of the final one: what can be guessed from it grows less
+// exact with the fourth power. Seeds that lie nearer to each other tell for a finer one.
+constexpr double kLeastCoarse = 2;
+constexpr double kMostCoarse = 15;
+constexpr double kCoarseStep = 0.8;
+constexpr double kShareApart = 0.5;
+// So many points tell enough of M; or all seeds, where they are fewer.
+constexpr double kEnough[kMaxDimension + 1] = {0, 50, 400, 600, 600, 600};
+// Seeds nearer to each other than this share of it tell nothing that one would not.
+constexpr double kSeedSpacing = 0.5;
+// It need not be whole: what it misses is left to the refinement of the final one.
+constexpr int kMostRounds = 4;
+constexpr double kMostBad = 0.15;
+// Answers fall elsewhere than guessed. Nearer to each other than this many spacings they would cost
+// quality.
+constexpr double kKept = 0.6;
+
+// The largest at which enough of the seeds lie that far apart.
+double CoarseEpsilon(int k, const AnsweredPoints& seeds, double epsilon) {
+  const auto found = static_cast<double>(std::count(seeds.found.begin(), seeds.found.end(), 1));
+  const double enough = std::min(kEnough[k], kShareApart * found);
+  double coarse = kMostCoarse * epsilon;
+  while (kCoarseStep * coarse > kLeastCoarse * epsilon &&
+         static_cast<double>(CountApart(seeds, seeds.points.cols(), coarse)) < enough)
+    coarse *= kCoarseStep;
+  return coarse;
+}
+
+// Of a mesh that only has to be guessed from: nothing is asked of its shapes.
+Specification CoarserThan(Specification spec, double epsilon) {
+  spec.epsilon = epsilon;
+  spec.declared_reach.reset();
+  spec.criteria.radius_edge_bound = INFINITY;
+  spec.criteria.judging = Judging::kFlats;
+  if (auto& step = spec.criteria.advance_step) step = std::max(*step, epsilon);
+  return spec;
+}
+
+}  // namespace
+
+template <int K>
+AheadLaying<K>::AheadLaying(Engine<K>& engine, const Specification& spec)
+    : engine_(engine),
+      spec_(spec),
+      spacing_(LaidSpacing(K, engine.criteria().epsilon)),
+      scouts_(engine.complex().d(), &engine.complex().points()) {}
+
+template <int K>
+std::vector<std::uint8_t> AheadLaying<K>::Begin(const AnsweredPoints& seeds) {
+  const double epsilon = CoarseEpsilon(K, seeds, engine_.criteria().epsilon);
+  const Specification coarse = CoarserThan(spec_, epsilon);
+  coarse_ = std::make_unique<Engine<K>>(coarse, Resolve(coarse));
+  std::vector<std::uint8_t> used(seeds.found.size(), 0);
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    CheckInterruption(i);
+    const auto c = static_cast<Eigen::Index>(i);
+    used[i] = seeds.found[i] && !coarse_->is_full() &&
+              !coarse_->complex().AnyWithin(seeds.points.col(c).data(), kSeedSpacing * epsilon);
+    if (used[i]) coarse_->Append(seeds, c);
+  }
+  coarse_->Commit();
+  return Scout(seeds, used);
+}
+
+// Of those found patches begin: they are of the sample at once, and all there is of it if the run
+// ends here.
+template <int K>
+std::vector<std::uint8_t> AheadLaying<K>::Scout(const AnsweredPoints& answers,
+                                                const std::vector<std::uint8_t>& found) {
+  std::vector<std::uint8_t> used(found.size(), 0);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    CheckInterruption(i);
+    const double* const y = answers.points.col(static_cast<Eigen::Index>(i)).data();
+    if (!found[i] || engine_.is_full() || scouts_.AnyWithin(y, kPatchesApart * spacing_)) continue;
+    engine_.Lay(answers, static_cast<Eigen::Index>(i));
+    scouts_.Insert(0);
+    used[i] = 1;
+  }
+  return used;
+}
+
+// Until R1 mostly holds.
+template <int K>
+CandidateSet<K> AheadLaying<K>::RefineCoarse(std::uint64_t round) {
+  CandidateSet<K> candidates;
+  const double bad = static_cast<double>(coarse_->book().size_and_shape().size());
+  if (rounds_++ == kMostRounds || coarse_->is_full() || bad <= kMostBad * coarse_->complex().size())
+    return candidates;
+  auto targets = coarse_->Plan();
+  if (!targets || targets->empty() || targets->front().violation.rule >= Rule::kSliver)
+    return candidates;
+  *targets = coarse_->Select(std::move(*targets));
+  PlannedPoints planned = Rehearse<K>(*coarse_, round, &*targets, Rehearsed::kSizes);
+  candidates = coarse_->Draw(std::move(*targets), round);
+  candidates.planned = std::move(planned);
+  return candidates;
+}
+
+// The lattice on the guess, from the sample's points on, and from others that no patch comes near;
+// those join the sample. No more than a sample may have.
+template <int K>
+PlannedPoints AheadLaying<K>::GrowOnGuesses() {
+  const StarComplex<K>& coarse = coarse_->complex();
+  const auto known = [](const StarComplex<K>& complex) {
+    AnsweredPoints answers;
+    answers.points =
+        Eigen::Map<const Eigen::MatrixXd>(complex.points().data(), complex.d(), complex.size());
+    answers.tangents =
+        Eigen::Map<const Eigen::MatrixXd>(complex.Tangent(0), complex.d() * K, complex.size());
+    answers.found.assign(complex.size(), 1);
+    return answers;
+  };
+  guess_.emplace(coarse, coarse_->criteria().advance_step, 0);
+  Growth<K> growth(coarse.d(), spacing_);
+  std::vector<double> points, tangents;
+  const AnsweredPoints scouts = known(engine_.complex()), all = known(coarse);
+  growth.Begin(scouts.points, scouts.tangents, scouts.found, 0);
+  for (bool goes_on = true; goes_on;) {
+    while (growth.size() < spec_.limits.max_vertices) {
+      const auto ring = growth.Propose();
+      if (ring.points.cols() == 0) break;
+      const auto count = static_cast<std::size_t>(ring.points.cols());
+      const AnsweredPoints guessed =
+          guess_->Answer(ring.points, std::vector<const double*>(count, nullptr),
+                         Eigen::VectorXd::Constant(ring.points.cols(), spacing_));
+      for (const Eigen::Index c : growth.Join(guessed.points, guessed.tangents, guessed.found)) {
+        CheckInterruption(static_cast<std::size_t>(c));
+        const auto point = guessed.points.col(c), tangent = guessed.tangents.col(c);
+        points.insert(points.end(), point.begin(), point.end());
+        tangents.insert(tangents.end(), tangent.begin(), tangent.end());
+      }
+    }
+    goes_on = false;
+    for (const Eigen::Index c :
+         growth.Begin(all.points, all.tangents, all.found, kPatchesApart * spacing_)) {
+      if (engine_.is_full()) break;
+      engine_.Lay(all, c);
+      goes_on = true;
+    }
+  }
+  PlannedPoints planned;
+  const auto count = std::ssize(points) / coarse.d();
+  planned.points = Eigen::Map<const Eigen::MatrixXd>(points.data(), coarse.d(), count);
+  planned.tangents = Eigen::Map<const Eigen::MatrixXd>(tangents.data(), coarse.d() * K, count);
+  return planned;
+}
+
+template <int K>
+CandidateSet<K> AheadLaying<K>::Next(std::uint64_t round) {
+  CandidateSet<K> candidates;
+  if (guess_) return candidates;
+  candidates = RefineCoarse(round);
+  if (candidates.size() > 0) return candidates;
+  candidates.planned = GrowOnGuesses();
+  asked_ = static_cast<std::size_t>(candidates.size());
+  return candidates;
+}
+
+template <int K>
+std::vector<std::uint8_t> AheadLaying<K>::Take(const CandidateSet<K>& candidates,
+                                               const AnsweredPoints& answers) {
+  if (guess_) return LayThoseApart(answers);
+  const Inserted inserted = coarse_->Insert(candidates, answers);
+  coarse_->Commit();
+  return Scout(answers, inserted.used);
+}
+
+// The sample's own come first: they keep their distance already.
+template <int K>
+std::vector<std::uint8_t> AheadLaying<K>::LayThoseApart(const AnsweredPoints& answers) {
+  asked_ = 0;
+  const std::size_t first = engine_.complex().size();
+  std::vector<double> points = engine_.complex().points();
+  std::vector<Eigen::Index> found;
+  for (std::size_t i = 0; i < answers.found.size(); ++i) {
+    CheckInterruption(i);
+    if (!answers.found[i]) continue;
+    const auto point = answers.points.col(static_cast<Eigen::Index>(i));
+    found.push_back(static_cast<Eigen::Index>(i));
+    points.insert(points.end(), point.begin(), point.end());
+  }
+  const NearLists near(points, engine_.complex().d(), kKept * spacing_);
+  const std::vector<std::uint8_t> chosen =
+      ChooseLocalMaxima(near.size(), [&](std::size_t i, const auto& visit) {
+        for (const std::uint32_t j : near.Of(i))
+          if (j > i || !visit(j)) return;
+      });
+  std::vector<std::uint8_t> used(answers.found.size(), 0);
+  for (std::size_t i = 0; i < found.size() && !engine_.is_full(); ++i) {
+    CheckInterruption(i);
+    if (!chosen[first + i]) continue;
+    engine_.Lay(answers, found[i]);
+    used[static_cast<std::size_t>(found[i])] = 1;
+  }
+  return used;
+}
+
+// As many spacings apart as patches begin.
+template <int K>
+double AheadLaying<K>::CountMissing() const {
+  return guess_ ? static_cast<double>(asked_)
+                : std::pow(kPatchesApart, K) * engine_.complex().size();
+}
+
+STELLATE_INSTANTIATE_CLASS(AheadLaying)
+
+}  // namespace stellate::core
