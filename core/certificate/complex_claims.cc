@@ -39,6 +39,21 @@ bool IsComplex(Examination& x) {
   return true;
 }
 
+// What to know of a mesh with walls that does not end where its faces are.
+std::string AboutItsEnd(const Examination& x) {
+  WallSet met = 0;
+  for (std::uint32_t v = 0; v < x.mesh.vertices; ++v) met |= x.mesh.WallsOf(v);
+  std::string said = Message("; ", x.mesh.vertices, " stands for what is beyond the boundary");
+  for (int wall = 0; wall < x.spec.walls; ++wall) {
+    if ((met & SetOfWall(wall)) == 0) {
+      said += Message("; no point of wall ", wall,
+                      " was found: does its function pass through zero with a slope?");
+      break;
+    }
+  }
+  return said;
+}
+
 void RefuseWhatIsNoManifold(Examination& x, const Connectivity& connectivity,
                             const LinkReport& links) {
   const Certificate& c = x.certificate;
@@ -56,9 +71,7 @@ void RefuseWhatIsNoManifold(Examination& x, const Connectivity& connectivity,
                                            : "the mesh is not closed: ",
                               x.Closed().first_bad_facet(),
                               ", where each must be in two; faces like it: ", c.bad_faces,
-                              x.mesh.faces ? Message("; ", x.mesh.vertices,
-                                                     " stands for what is beyond the boundary")
-                                           : std::string()));
+                              x.mesh.faces ? AboutItsEnd(x) : std::string()));
   }
   if (connectivity.isolated_vertices > 0) {
     x.findings.Refuse(Findings::kLinks, Message("vertex ", connectivity.some_isolated.front(),

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <set>
+#include <utility>
 
 #include "shared/doctor.h"
 
@@ -47,12 +49,14 @@ void WallProbe::Examine() {
   for (Index j = 0; j < probe_.points.cols(); j += stride) chosen.push_back(j);
   const MatrixXd questions = Take(probe_.points, chosen);
   bool any = false;
+  std::set<int> unseen;
   for (int wall = 0; wall < probe_.walls(); ++wall) {
     const MatrixXd found = Kept(probe_.FacePoints(questions, {wall}));
     points_.push_back(found.cols() > 0 ? One(wall, found) : found);
     any = any || points_.back().cols() > 0;
+    if (found.cols() == 0 && Crosses(wall)) unseen.insert(wall);
   }
-  if (!any) AnythingLeft();
+  if (!any && unseen.empty()) AnythingLeft();
   int pairs = any && probe_.k() > 1 ? kFacePairs : 0;
   for (int wall = 0; wall < probe_.walls(); ++wall) {
     for (int other = wall + 1; other < probe_.walls() && pairs > 0; ++other, --pairs) {
@@ -60,7 +64,9 @@ void WallProbe::Examine() {
     }
   }
   for (int wall = 0; wall < probe_.walls(); ++wall) {
-    if (points_[static_cast<size_t>(wall)].cols() == 0) Add("WALL_CUTS_NOTHING", {{"wall", wall}});
+    if (points_[static_cast<size_t>(wall)].cols() == 0 && !unseen.contains(wall)) {
+      Add("WALL_CUTS_NOTHING", {{"wall", wall}});
+    }
   }
 }
 
@@ -123,6 +129,32 @@ MatrixXd WallProbe::One(int wall, const MatrixXd& found) {
   }
   Closest(wall, y);
   return Take(y, inside);
+}
+
+bool WallProbe::Crosses(int wall) {
+  const VectorXd value = probe_.Clearances(probe_.points).row(wall);
+  std::pair<VectorXd, VectorXd> ends;  // inside, outside
+  double way = kNowhere;
+  for (Index i = 0; i < value.size(); ++i) {
+    for (Index j = 0; j < value.size(); ++j) {
+      if (!(value[i] > 0 && value[j] < 0)) continue;
+      const double length = (probe_.points.col(i) - probe_.points.col(j)).norm();
+      if (length >= way) continue;
+      way = length;
+      ends = {probe_.points.col(i), probe_.points.col(j)};
+    }
+  }
+  if (way == kNowhere) return false;
+  for (; way > slack_; way = (ends.first - ends.second).norm()) {
+    const Answered middle = probe_.Closest((ends.first + ends.second) / 2);
+    if (!middle.found[0]) return false;
+    const VectorXd at = middle.points.col(0);
+    const double farthest = std::max((at - ends.first).norm(), (at - ends.second).norm());
+    if (farthest > kFarthestMiddle * way) return false;  // they are on two components
+    (probe_.Clearances(at)(wall, 0) > 0 ? ends.first : ends.second) = at;
+  }
+  Add("FACE_NOT_FOUND", {{"wall", wall}, {"query", Vector(ends.first)}});
+  return true;
 }
 
 void WallProbe::Conormal(int wall, const Vector& y, const Basis& basis, const Vector& n,

@@ -142,6 +142,7 @@ OF_WALLS = {
     "FACE_OFF_MANIFOLD": Cut(face_point=lambda x, face: CUT.face_point(x, face) + 0.01),
     "FACE_CLEARANCE": Cut(clearances=lambda p: p[:, 2:] + 0.15),
     "FACE_NOT_CLOSEST": Cut(face_point=across_the_equator),
+    "FACE_NOT_FOUND": Cut(lambda x: (x[:, 2] + 0.1) ** 3),
     "CONORMAL_NOT_UNIT": Cut(conormals=conormals(lambda n, along, p: 2 * n)),
     "CONORMAL_NOT_TANGENT": Cut(conormals=conormals(lambda n, along, p: 0.96 * n + 0.28 * p)),
     "CONORMAL_INWARD": Cut(conormals=conormals(lambda n, along, p: -n)),

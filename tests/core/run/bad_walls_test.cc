@@ -116,6 +116,17 @@ TEST(BadWallsTest, TangentialWallsAreRefused) {
   EXPECT_NE(refused.message.find(" degrees, at ("), std::string::npos) << refused.message;
 }
 
+TEST(BadWallsTest, AWallOfWhichNoPointIsFoundIsNamed) {
+  const Report report = ReportOf(stellate::testing::Hemisphere(), 0.3,
+                                 [](const QueryBlock& asked, AnswerBlock* answer) {
+                                   if (asked.face != 0)
+                                     answer->found.assign(answer->found.size(), 0);
+                                 });
+  EXPECT_FALSE(report.certificate.certified);
+  EXPECT_NE(report.certificate.verdict.find("no point of wall 0 was found"), std::string::npos)
+      << report.certificate.verdict;
+}
+
 TEST(BadWallsTest, AWallThatCutsNothingIsAllowedAndSaid) {
   Domain m = stellate::testing::Hemisphere();
   m.walls = {stellate::testing::HalfSpaceOf(Eigen::Vector3d::UnitZ(), 5)};

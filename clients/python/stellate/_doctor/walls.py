@@ -31,18 +31,21 @@ class WallProbe:
         probe = self._probe
         stride = len(probe.points) // max(_K["some"], _K["starts"] // probe.walls)
         questions = probe.points[:: max(1, stride)]
+        unseen = set()
         for wall in range(probe.walls):
             y, found = probe.face(questions, (wall,))
             self.points.append(self._one(wall, y[found]) if found.any() else y[:0])
-        if not any(map(len, self.points)):
+            if not found.any() and self._crosses(wall):
+                unseen.add(wall)
+        if not unseen and not any(map(len, self.points)):
             self._anything_left()
-        elif probe.dimension > 1:
+        elif any(map(len, self.points)) and probe.dimension > 1:
             pairs = itertools.combinations(range(probe.walls), 2)
             for pair in itertools.islice(pairs, _K["face_pairs"]):
                 y, found = probe.face(probe.some, pair)
                 self._two(pair, y[found])
         for wall, points in enumerate(self.points):
-            if not len(points):
+            if not len(points) and wall not in unseen:
                 self._add(Finding.of("WALL_CUTS_NOTHING", wall=wall))
 
     def reach(self) -> float:
@@ -109,6 +112,24 @@ class WallProbe:
         self._say("CONORMAL_INWARD", inward, wall=wall, query=y)
         wrong = (steep > 0) & ~inward & (turned > _K["tolerated_degrees"])
         self._say("CONORMAL_WRONG", wrong, wall=wall, query=y, degrees=turned)
+
+    def _crosses(self, wall: int) -> bool:
+        """Looks between samples on both sides for where a wall of which no point is found is zero."""
+        probe = self._probe
+        value = probe.clearances(probe.points)[:, wall]
+        inside, outside = probe.points[value > 0], probe.points[value < 0]
+        if not len(inside) or not len(outside):
+            return False
+        ways = norms((inside[:, None] - outside[None]).reshape(-1, probe.points.shape[1]))
+        pair = np.unravel_index(ways.argmin(), (len(inside), len(outside)))
+        ends = np.stack([inside[pair[0]], outside[pair[1]]])
+        while (way := float(norms(ends[:1] - ends[1:])[0])) > self._slack:
+            middle, found = probe.closest(ends.mean(axis=0, keepdims=True))
+            if not found[0] or norms(ends - middle).max() > _K["farthest_middle"] * way:
+                return False  # they are on two components
+            ends[int(probe.clearances(middle)[0, wall] <= 0)] = middle[0]
+        self._add(Finding.of("FACE_NOT_FOUND", wall=wall, query=ends[0]))
+        return True
 
     def _slopes(self, wall: int, y: np.ndarray, bases: np.ndarray) -> np.ndarray:
         """How the wall's value changes along M, (n, k)."""

@@ -17,8 +17,9 @@ namespace stellate::oracles {
 
 // {g >= 0}, g smooth near where it is zero; what counts elsewhere is its sign.
 struct Wall {
-  std::function<double(const Eigen::VectorXd& x)> g;                  // d -> 1
-  std::function<Eigen::VectorXd(const Eigen::VectorXd& x)> gradient;  // d -> d; empty: differences
+  std::function<double(const Eigen::VectorXd& x)> g;  // d -> 1
+  // d -> d; without it, differences.
+  std::function<Eigen::VectorXd(const Eigen::VectorXd& x)> gradient = nullptr;
 };
 
 // {x : normal . x >= offset}.
