@@ -75,9 +75,11 @@ void Growth<K>::GatherLaid(const Runs& runs, std::size_t run, double radius,
   for (const auto& layer : layers_) {
     ids.clear();
     layer->tree.Gather(runs.centre(run), runs.radius(run) + radius, &ids);
+    std::size_t to = near->size();
+    near->resize(to + ids.size() * stride());
     for (const std::uint32_t id : ids) {
-      const double* const q = layer->points.data() + id * stride();
-      near->insert(near->end(), q, q + d_);
+      std::copy_n(layer->points.data() + id * stride(), stride(), near->data() + to);
+      to += stride();
     }
   }
 }
@@ -90,10 +92,16 @@ std::vector<std::uint8_t> Growth<K>::AreFarFromLaid(const std::vector<double>& p
   ParallelFor(runs.count(), [&](std::size_t run) {
     thread_local std::vector<double> near;
     GatherLaid(runs, run, distance, &near);
-    for (std::size_t i = runs.begin(run); i < runs.end(run); ++i)
-      for (std::size_t q = 0; q < near.size() && far[i]; q += stride())
-        far[i] = SquaredDistance(points.data() + i * stride(), near.data() + q, d_) >=
-                 distance * distance;
+    WithDimension(d_, [&](auto known) {
+      const int d = known() > 0 ? known() : d_;
+      const double* const last = near.data() + near.size();
+      for (std::size_t i = runs.begin(run); i < runs.end(run); ++i) {
+        const double* const p = points.data() + i * stride();
+        const double* q = near.data();
+        while (q != last && SquaredDistance(p, q, d) >= distance * distance) q += d;
+        far[i] = q == last;
+      }
+    });
   });
   return far;
 }
@@ -119,31 +127,36 @@ void Growth<K>::ProposeFrom(std::uint32_t p, const std::vector<double>& near,
   const double* const frame = border_.frames.data() + p * stride() * K;
   const double keep = kKeep * spacing_;
   const double far = longest_ + keep;
-  thread_local std::vector<double> coordinates, step;
-  coordinates.clear();
-  step.resize(stride());
-  for (std::size_t at = 0; at < near.size(); at += stride()) {
-    for (std::size_t j = 0; j < stride(); ++j) step[j] = near[at + j] - from[j];
-    const double distance2 = Dot(step.data(), step.data(), d_);
-    if (distance2 > far * far || distance2 == 0) continue;
-    double across2 = distance2;
-    for (int a = 0; a < K; ++a) {
-      const double along = Dot(frame + a * d_, step.data(), d_);
-      coordinates.push_back(along);
-      across2 -= along * along;
+  thread_local std::vector<double> coordinates, steps;
+  coordinates.resize(near.size() / stride() * (K + 1));
+  steps.resize(stride());
+  const double* const begin = coordinates.data();
+  const double* const end = WithDimension(d_, [&](auto known) {
+    const int d = known() > 0 ? known() : d_;
+    double* to = coordinates.data();
+    double* const step = steps.data();
+    const double* const last = near.data() + near.size();
+    for (const double* q = near.data(); q != last; q += d) {
+      for (int j = 0; j < d; ++j) step[j] = q[j] - from[j];
+      const double distance2 = Dot(step, step, d);
+      if (distance2 > far * far || distance2 == 0) continue;
+      double across2 = distance2;
+      for (int a = 0; a < K; ++a) {
+        const double along = Dot(frame + a * d, step, d);
+        *to++ = along;
+        across2 -= along * along;
+      }
+      *to++ = across2;
     }
-    coordinates.push_back(across2);
-  }
+    return to;
+  });
   const std::size_t directions = vectors_.size() / K;
   for (std::uint32_t i = 0; i < directions; ++i) {
     const double* const v = vectors_.data() + std::size_t{i} * K;
     bool taken = false;
-    for (std::size_t at = 0; at < coordinates.size() && !taken; at += K + 1) {
-      double distance2 = coordinates[at + K];
-      for (int a = 0; a < K; ++a) {
-        const double e = coordinates[at + static_cast<std::size_t>(a)] - v[a];
-        distance2 += e * e;
-      }
+    for (const double* at = begin; at != end && !taken; at += K + 1) {
+      double distance2 = at[K];
+      for (int a = 0; a < K; ++a) distance2 += (at[a] - v[a]) * (at[a] - v[a]);
       taken = distance2 < keep * keep;
     }
     if (!taken) free->push_back({p, i});

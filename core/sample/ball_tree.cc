@@ -23,10 +23,15 @@ std::uint32_t BallTree::NewNodes(int count) {
 }
 
 void BallTree::Mean(const std::uint32_t* begin, const std::uint32_t* end, double* mean) const {
-  std::fill(mean, mean + d_, 0.0);
-  for (const std::uint32_t* i = begin; i != end; ++i)
-    for (int j = 0; j < d_; ++j) mean[j] += Point(*i)[j];
-  for (int j = 0; j < d_; ++j) mean[j] /= static_cast<double>(end - begin);
+  WithDimension(d_, [&](auto known) {
+    const int d = known() > 0 ? known() : d_;
+    double few[known() > 0 ? known() : 1];
+    double* const sum = known() > 0 ? few : mean;
+    std::fill(sum, sum + d, 0.0);
+    for (const std::uint32_t* i = begin; i != end; ++i)
+      for (int j = 0; j < d; ++j) sum[j] += Point(*i)[j];
+    for (int j = 0; j < d; ++j) mean[j] = sum[j] / static_cast<double>(end - begin);
+  });
 }
 
 // Centre, radius and outreach from the points themselves.
@@ -68,12 +73,18 @@ std::uint32_t* BallTree::Middle(std::uint32_t* begin, std::uint32_t* end, Halvin
     }
     return Point(*best);
   };
-  std::vector<double> axis(static_cast<std::size_t>(d_));
+  thread_local std::vector<double> axis;
+  axis.resize(static_cast<std::size_t>(d_));
   Mean(begin, end, axis.data());
   const double* a = farthest(axis.data());
   const double* b = farthest(a);
   for (int j = 0; j < d_; ++j) axis[static_cast<std::size_t>(j)] = b[j] - a[j];
-  std::vector<std::pair<double, std::uint32_t>> along;
+  // Memory of the small ones, which are many, is used again.
+  using Along = std::vector<std::pair<double, std::uint32_t>>;
+  thread_local Along kept;
+  Along own;
+  Along& along = count < kBuiltAlone ? kept : own;
+  along.clear();
   along.reserve(count);
   for (const std::uint32_t* i = begin; i != end; ++i)
     along.emplace_back(Dot(axis.data(), Point(*i), d_), *i);
@@ -226,20 +237,33 @@ std::vector<BallTree::Bunch> BallTree::Bunches() const {
   return bunches;
 }
 
+// Along the tree, as recursion would go.
 void BallTree::Gather(std::uint32_t n, const double* q, double radius,
                       std::vector<std::uint32_t>* ids) const {
-  const Node& node = nodes_[n];
-  const double far = kRounding * (radius + node.radius);
-  if (SquaredDistance(q, Centre(n), d_) > far * far) return;
-  if (node.children != kNone) {
-    Gather(node.children, q, radius, ids);
-    Gather(node.children + 1, q, radius, ids);
-    return;
-  }
-  for (std::uint32_t i = 0; i < node.count; ++i) {
-    const std::uint32_t id = slots_[node.first + i];
-    if (SquaredDistance(q, Point(id), d_) <= radius * radius) ids->push_back(id);
-  }
+  constexpr int kMostOpen = 64;
+  WithDimension(d_, [&](auto known) {
+    const int d = known() > 0 ? known() : d_;
+    std::uint32_t open[kMostOpen] = {n};
+    for (int count = 1; count > 0;) {
+      const std::uint32_t at = open[--count];
+      const Node& node = nodes_[at];
+      const double far = kRounding * (radius + node.outreach);
+      if (SquaredDistance(q, Centre(at), d) > far * far) continue;
+      if (node.children != kNone && count + 2 > kMostOpen) {
+        Gather(node.children, q, radius, ids);
+        Gather(node.children + 1, q, radius, ids);
+      } else if (node.children != kNone) {
+        open[count++] = node.children + 1;
+        open[count++] = node.children;
+      } else {
+        for (std::uint32_t i = 0; i < node.count; ++i) {
+          const std::uint32_t id = slots_[node.first + i];
+          const double reach = kRounding * (radius + influence_[id]);
+          if (SquaredDistance(q, Point(id), d) <= reach * reach) ids->push_back(id);
+        }
+      }
+    }
+  });
 }
 
 void BallTree::Insert(double influence) {

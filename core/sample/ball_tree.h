@@ -51,13 +51,14 @@ class BallTree {
   };
   // Every point is in one, and bunches that follow each other are mostly near each other.
   std::vector<Bunch> Bunches() const;
-  // Appends the points within `radius` of q, in no meaningful but a fixed order.
+  // Appends the points whose influence comes within `radius` of q, and such as only rounding keeps
+  // out, in no meaningful but a fixed order. Without influence: the points within `radius`.
   void Gather(const double* q, double radius, std::vector<std::uint32_t>* ids) const {
     if (!nodes_.empty()) Gather(0, q, radius, ids);
   }
   // Appends at least the points within `radius` of some point of the bunch.
   void GatherAround(const Bunch& bunch, double radius, std::vector<std::uint32_t>* ids) const {
-    Gather(bunch.centre, kRounding * (bunch.radius + radius), ids);
+    Gather(bunch.centre, bunch.radius + radius, ids);
   }
 
   // Growth takes effect at once; shrinking makes searches faster after Refit, never different.

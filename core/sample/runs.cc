@@ -36,26 +36,28 @@ Runs::Runs(const std::vector<double>& points, int d, double reach)
     for (std::size_t i = begin(run); i < end(run); ++i)
       radii_[run] = std::max(radii_[run], Distance(at(i), centre, d));
   });
-  for (const double radius : radii_) largest_radius_ = std::max(largest_radius_, radius);
 }
 
 RunTree::RunTree(const std::vector<double>& points, int d, double reach)
     : d_(d), points_(points), runs_(points, d, reach), tree_(d, &runs_.centres()) {
-  tree_.Assign(std::vector<double>(runs_.count(), 0.0), BallTree::Halving::kExtent);
+  tree_.Assign(runs_.radii(), BallTree::Halving::kExtent);
 }
 
 void RunTree::Gather(const double* q, double radius, std::vector<std::uint32_t>* ids) const {
   thread_local std::vector<std::uint32_t> near;
   near.clear();
   const double far = kRounding * radius;
-  tree_.Gather(q, kRounding * (far + runs_.largest_radius()), &near);
-  for (const std::uint32_t run : near) {
-    const double apart = kRounding * (far + runs_.radius(run));
-    if (SquaredDistance(q, runs_.centre(run), d_) > apart * apart) continue;
-    for (std::size_t i = runs_.begin(run); i < runs_.end(run); ++i)
-      if (SquaredDistance(q, points_.data() + i * static_cast<std::size_t>(d_), d_) <= far * far)
-        ids->push_back(static_cast<std::uint32_t>(i));
-  }
+  tree_.Gather(q, far, &near);
+  WithDimension(d_, [&](auto known) {
+    const auto stride = static_cast<std::size_t>(known() > 0 ? known() : d_);
+    for (const std::uint32_t run : near) {
+      const std::size_t end = runs_.end(run);
+      const double* p = points_.data() + runs_.begin(run) * stride;
+      for (std::size_t i = runs_.begin(run); i < end; ++i, p += stride)
+        if (SquaredDistance(q, p, static_cast<int>(stride)) <= far * far)
+          ids->push_back(static_cast<std::uint32_t>(i));
+    }
+  });
 }
 
 }  // namespace stellate::core

@@ -22,14 +22,13 @@ class Runs {
   const double* centre(std::size_t run) const { return centres_.data() + run * stride_; }
   double radius(std::size_t run) const { return radii_[run]; }
   const std::vector<double>& centres() const { return centres_; }  // d each
-  double largest_radius() const { return largest_radius_; }
+  const std::vector<double>& radii() const { return radii_; }
 
  private:
   std::size_t stride_;
   std::vector<std::size_t> begins_;
   std::vector<double> centres_;  // d each
   std::vector<double> radii_;
-  double largest_radius_ = 0;
 };
 
 // Such points, searched by distance: a tree of the runs alone, much cheaper to build than one of

@@ -78,8 +78,9 @@ class BallTreeTest : public ::testing::TestWithParam<int> {
     got.clear();
     tree_.Gather(q.data(), radius, &got);
     std::sort(got.begin(), got.end());
-    EXPECT_EQ(got,
-              All([&](std::uint32_t id) { return SquaredDistanceTo(id, q) <= radius * radius; }));
+    EXPECT_EQ(got, All([&](std::uint32_t id) {
+                return std::sqrt(SquaredDistanceTo(id, q)) <= radius + influence_[id];
+              }));
 
     double nearest = INFINITY;
     for (std::uint32_t id = 0; id < influence_.size(); ++id)
