@@ -11,6 +11,7 @@
 
 #include "core/base/instantiate.h"
 #include "core/complex/blocks.h"
+#include "core/complex/centre_cache.h"
 #include "core/geometry/restricted_voronoi_cell.h"
 #include "core/sample/ball_tree.h"
 #include "core/specification.h"
@@ -215,10 +216,10 @@ class StarComplex {
   // Of a cell that is judged at common centres only when it is done.
   void ResetInFlats(Cell& cell, const Site& p) const;
   bool ClipInFlats(Cell& cell, const Site& p, const Site& q, typename Cell::Scratch& scratch) const;
+  using Near = std::vector<std::pair<double, std::uint32_t>>;  // by squared distance
   // Judges it. Whether its vertices are those that it has there, too: none of `near`, the points
   // within reach, is nearer to a common centre than the simplex' own.
-  bool JudgeCell(Cell& cell, const Site& p,
-                 const std::vector<std::pair<double, std::uint32_t>>& near) const;
+  bool JudgeCell(Cell& cell, const Site& p, const Near& near) const;
   double Project(const Site& p, const double* q, double* step, double* normal) const {
     for (int i = 0; i < d_; ++i) step[i] = q[i] - p.point[i];
     for (int a = 0; a < K; ++a) normal[a] = Dot(p.tangent + a * d_, step, d_);
@@ -271,10 +272,10 @@ class StarComplex {
   std::vector<Cut> BuildNewStars(std::uint32_t first);
   // Of a sample laid at once: every star is built once, from what lies around it.
   Change BuildLaidStars();
-  void BuildLaidStar(std::uint32_t p, const std::vector<std::uint32_t>& around, double gathered,
-                     Cell& cell) const;
-  bool BuildInFlats(const Site& p, const std::vector<std::pair<double, std::uint32_t>>& near,
-                    double gathered, Cell& cell, typename Cell::Scratch& scratch) const;
+  void BuildLaidStar(std::uint32_t p, const std::vector<std::uint32_t>& around, Cell& cell) const;
+  template <typename Search>
+  bool BuildInFlats(const Site& p, const Near& near, double gathered, const Search& search,
+                    Cell& cell, typename Cell::Scratch& scratch) const;
   static std::vector<Turn> InTurns(const std::vector<Cut>& cuts);
   void CutStars(const std::vector<Turn>& turns, const std::vector<Cut>& cuts, std::uint32_t first,
                 Change* change);
@@ -292,6 +293,7 @@ class StarComplex {
   Judging judging_;
   double judged_radius2_;
   double weight_scale_;
+  std::uint64_t centre_owner_ = CentreCache<K>::NewOwner();
   std::vector<double> points_, tangents_;
   std::vector<std::uint32_t> names_;  // up to the last that is not its point's id
   // Of manifolds with boundary, up to the last point of it; else empty.

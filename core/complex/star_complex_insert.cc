@@ -218,6 +218,7 @@ template <int K>
 void StarComplex<K>::Guard(std::vector<double> radii2) {
   guards_ = std::move(radii2);
   largest_guard_ = guards_.empty() ? 0 : *std::max_element(guards_.begin(), guards_.end());
+  centre_owner_ = CentreCache<K>::NewOwner();
   tree_.Assign(std::vector<double>(size(), 0.0));
   near_.assign(size(), kNone);
   simplex_count_ = 0;

@@ -12,6 +12,8 @@ namespace {
 
 // Where no circumradius is above epsilon nothing farther than 2 epsilon cuts a star.
 constexpr double kGathered = 2 * (1 + 1e-6);
+// Before R1 many a star reaches farther, and few beyond this.
+constexpr double kSearched = 3;
 
 using Near = std::vector<std::pair<double, std::uint32_t>>;  // squared distances, and who is there
 
@@ -33,7 +35,14 @@ double CutByNear(Near* near, double known, const Reach& reach, const Clip& clip,
   }
 }
 
-void AppendBetween(const BallTree& tree, const double* point, double from, double to, Near* near) {
+// What lies from `from` to `to` around a point: of all within `searched` of it `beyond` holds what
+// is beyond `from`.
+void AppendBetween(const BallTree& tree, const double* point, const Near& beyond, double searched,
+                   double from, double to, Near* near) {
+  for (const auto& [distance2, q] : beyond)
+    if (distance2 > from * from && distance2 <= to * to) near->emplace_back(distance2, q);
+  if (to <= searched) return;
+  from = std::max(from, searched);
   tree.VisitNear(
       point, [&] { return to; },
       [&](std::uint32_t q, double distance2) {
@@ -55,11 +64,11 @@ void StarComplex<K>::Lay(const double* point, const double* tangent, std::uint32
 }
 
 // Most stars are the same in the flats, where clips cost a fraction: only those are judged all
-// along of which that is not so. `near`: what lies within `gathered`, nearest first.
+// along of which that is not so. `near` is what lies within `gathered`, nearest first.
 template <int K>
-bool StarComplex<K>::BuildInFlats(const Site& p,
-                                  const std::vector<std::pair<double, std::uint32_t>>& near,
-                                  double gathered, Cell& cell,
+template <typename Search>
+bool StarComplex<K>::BuildInFlats(const Site& p, const Near& near, double gathered,
+                                  const Search& search, Cell& cell,
                                   typename Cell::Scratch& scratch) const {
   thread_local Near all;
   all = near;
@@ -67,31 +76,37 @@ bool StarComplex<K>::BuildInFlats(const Site& p,
   const double known = CutByNear(
       &all, gathered, [&] { return Influence(p.id, cell); },
       [&](std::uint32_t q) { return ClipInFlats(cell, p, At(q), scratch); },
-      [&](double from, double to) { AppendBetween(tree_, p.point, from, to, &all); });
+      [&](double from, double to) { search(from, to, &all); });
   return JudgeCell(cell, p, all) && Influence(p.id, cell) <= known;
 }
 
-// `around` holds at least what lies within `gathered` of p.
+// `around` holds at least what lies within kSearched epsilon of p.
 template <int K>
 void StarComplex<K>::BuildLaidStar(std::uint32_t p, const std::vector<std::uint32_t>& around,
-                                   double gathered, Cell& cell) const {
+                                   Cell& cell) const {
   thread_local typename Cell::Scratch scratch;
-  thread_local Near near;
+  thread_local Near near, beyond;
   const Site site = At(p);
+  const double gathered = kGathered * epsilon(), searched = kSearched * epsilon();
   near.clear();
+  beyond.clear();
   for (const std::uint32_t q : around) {
     const double distance2 = SquaredDistance(site.point, Point(q), d_);
-    if (q != p && distance2 <= gathered * gathered) near.emplace_back(distance2, q);
+    if (q == p || distance2 > searched * searched) continue;
+    (distance2 <= gathered * gathered ? near : beyond).emplace_back(distance2, q);
   }
   std::sort(near.begin(), near.end());
+  const auto search = [&](double from, double to, Near* found) {
+    AppendBetween(tree_, site.point, beyond, searched, from, to, found);
+  };
   if (K > 2 && judging_ == Judging::kCommonCentre &&
-      BuildInFlats(site, near, gathered, cell, scratch))
+      BuildInFlats(site, near, gathered, search, cell, scratch))
     return;
   ResetCell(cell, site, nullptr, scratch);
   CutByNear(
       &near, gathered, [&] { return Influence(p, cell); },
       [&](std::uint32_t q) { return ClipBy(cell, site, At(q), nullptr, nullptr, scratch); },
-      [&](double from, double to) { AppendBetween(tree_, site.point, from, to, &near); });
+      [&](double from, double to) { search(from, to, &near); });
 }
 
 template <int K>
@@ -100,17 +115,16 @@ typename StarComplex<K>::Change StarComplex<K>::BuildLaidStars() {
   near_.clear();
   tree_.Assign(std::vector<double>(size(), 0.0), BallTree::Halving::kExtent);
   const std::vector<BallTree::Bunch> bunches = tree_.Bunches();
-  const double gathered = kGathered * epsilon();
   std::vector<double> influence(size());
   ParallelFor(bunches.size(), [&](std::size_t b) {
     thread_local std::vector<std::uint32_t> around;
     thread_local Cell cell;  // its memory is used again; what is kept is no larger than it must be
     const BallTree::Bunch& bunch = bunches[b];
     around.clear();
-    tree_.GatherAround(bunch, gathered, &around);
+    tree_.GatherAround(bunch, kSearched * epsilon(), &around);
     for (std::uint32_t i = 0; i < bunch.count; ++i) {
       const std::uint32_t p = bunch.ids[i];
-      BuildLaidStar(p, around, gathered, cell);
+      BuildLaidStar(p, around, cell);
       cells_[p] = cell;
       influence[p] = Influence(p, cell);
     }
@@ -126,13 +140,10 @@ typename StarComplex<K>::Change StarComplex<K>::BuildLaidStars() {
   return change;
 }
 
-#define STELLATE_EACH(K)                                                                           \
-  template void StarComplex<K>::Lay(const double*, const double*, std::uint32_t);                  \
-  template void StarComplex<K>::BuildLaidStar(std::uint32_t, const std::vector<std::uint32_t>&,    \
-                                              double, Cell&) const;                                \
-  template bool StarComplex<K>::BuildInFlats(const Site&,                                          \
-                                             const std::vector<std::pair<double, std::uint32_t>>&, \
-                                             double, Cell&, Cell::Scratch&) const;                 \
+#define STELLATE_EACH(K)                                                                        \
+  template void StarComplex<K>::Lay(const double*, const double*, std::uint32_t);               \
+  template void StarComplex<K>::BuildLaidStar(std::uint32_t, const std::vector<std::uint32_t>&, \
+                                              Cell&) const;                                     \
   template StarComplex<K>::Change StarComplex<K>::BuildLaidStars();
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

@@ -70,11 +70,7 @@ class RestrictedVoronoiCell {
 
   // The same, of vertices that are not on the facet of that id: of what is on it rounding decides.
   bool WouldCutOthers(std::uint32_t id, const double* normal, double offset,
-                      const double* step = nullptr) const {
-    for (std::size_t v = 0; v < vertices_.size(); ++v)
-      if (Excess(v, normal, offset, step) > 0 && !IsOn(v, id)) return true;
-    return false;
-  }
+                      const double* step = nullptr) const;
 
   // Whether Clip with these arguments would cut vertex v off.
   bool WouldCutVertex(std::size_t v, const double* normal, double offset,

@@ -1,0 +1,227 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "core/complex/centre_cache.h"
+#include "core/complex/star_complex.h"
+#include "core/geometry/common_centre.h"
+
+namespace stellate::core {
+
+// How far outwards walls are moved, as a share of the fake simplex' inradius: corners of that may
+// lie in the planes of walls along the axes, and rounding would decide which side of it they are
+// on.
+inline constexpr double kWallOffset = 1e-12;
+
+// Room for q - p, on the stack where d is small.
+class Step {
+ public:
+  explicit Step(int d) {
+    if (d > kSmall) heap_.resize(static_cast<std::size_t>(d));
+  }
+  double* data() { return heap_.empty() ? stack_ : heap_.data(); }
+
+ private:
+  static constexpr int kSmall = 16;
+  double stack_[kSmall];
+  std::vector<double> heap_;
+};
+
+// What the cell of p may ask.
+template <int K>
+class StarComplex<K>::Around final : public Surroundings<K> {
+ public:
+  Around(const StarComplex& complex, const Site& p, const Site* guest,
+         const Site* newcomer = nullptr, const Cell* born = nullptr)
+      : complex_(complex),
+        p_(p),
+        judging_(complex.judging_),
+        guest_(guest),
+        newcomer_(newcomer),
+        born_(born) {}
+  Around(const StarComplex& complex, const Site& p, Judging judging)
+      : complex_(complex), p_(p), judging_(judging) {}
+
+  double HalfSpace(std::uint32_t id, double* normal) const override {
+    if (IsFake(id))
+      return FakeHalfSpace<K>(static_cast<int>(id - kFirstFakeId), complex_.inradius_, normal);
+    if (IsWall(id)) {
+      std::copy_n(ConormalOf(p_, WallOf(id)), K, normal);
+      return kWallOffset * complex_.inradius_;
+    }
+    Step step(complex_.d_);
+    return complex_.HalfSpace(p_, Find(id), step.data(), normal);
+  }
+
+  int judged_in() const override { return judging_ == Judging::kFlats ? 0 : complex_.d_; }
+
+  bool Centre(const std::uint32_t* ids, std::uint64_t key, double* x,
+              double* centre) const override {
+    if (!(born_ && Known(key, centre)) && !Common(ids, key, centre)) return false;
+    const int n = complex_.d_;
+    for (int a = 0; a < K; ++a) x[a] = Dot(p_.tangent + a * n, centre, n);
+    return true;
+  }
+
+  void Lift(const double* x, double* centre) const override {
+    const int n = complex_.d_;
+    std::fill(centre, centre + n, 0.0);
+    for (int a = 0; a < K; ++a)
+      for (int i = 0; i < n; ++i) centre[i] += x[a] * p_.tangent[a * n + i];
+  }
+
+ private:
+  Site Find(std::uint32_t id) const {
+    return id == p_.id ? p_ : guest_ && id == guest_->id ? *guest_ : complex_.At(id);
+  }
+
+  // The centre from the newcomer's star, which all simplices of the vertices that it creates are in
+  // if they are consistent.
+  bool Known(std::uint64_t key_in_p, double* centre) const {
+    const std::uint64_t key = key_in_p + Mix64(p_.id) - Mix64(newcomer_->id);
+    const std::size_t v = born_->Find(key);
+    if (v == born_->vertex_count() || !born_->judged(v)) return false;
+    const double* const there = born_->Centre(v);
+    for (int j = 0; j < complex_.d_; ++j)
+      centre[j] = there[j] + (newcomer_->point[j] - p_.point[j]);
+    return true;
+  }
+
+  // `key`: the sum of Mix64 over the ids of the others.
+  bool Common(const std::uint32_t* others, std::uint64_t key, double* centre) const {
+    Simplex ids;
+    ids[0] = p_.id;
+    int count = 1;
+    WallSet walls = 0;
+    for (int s = 0; s < K; ++s) {
+      if (IsFake(others[s])) return false;
+      if (IsWall(others[s]))
+        walls |= SetOfWall(WallOf(others[s]));
+      else
+        ids[static_cast<std::size_t>(count++)] = others[s];
+    }
+    std::sort(ids.begin(), ids.begin() + count);
+    if (walls != 0) return CommonOnFace(ids.data(), count, walls, centre);
+    const int n = complex_.d_;
+    // A guest's id may be another's next.
+    const bool lasts = ids[K] < complex_.size();
+    thread_local CentreCache<K> cache;
+    const auto find = [&](double* found) { return FindCommon(ids, found); };
+    if (!(lasts ? cache.Centre(complex_.centre_owner_, ids, key + Mix64(p_.id), n, centre, find)
+                : find(centre)))
+      return false;
+    const double* const first = Find(ids[0]).point;
+    for (int i = 0; i < n; ++i) centre[i] += first[i] - p_.point[i];
+    return true;
+  }
+
+  // Relative to the first point.
+  bool FindCommon(const Simplex& ids, double* centre) const {
+    const double* points[K + 1];
+    const double* tangents[K + 1];
+    double weights[K + 1];
+    for (std::size_t i = 0; i <= K; ++i) {
+      const Site site = Find(ids[i]);
+      points[i] = site.point;
+      tangents[i] = site.tangent;
+      weights[i] = complex_.Weight(site.id);
+    }
+    return CommonCentre<K>(complex_.d_, points, tangents, weights, complex_.judged_radius2_,
+                           centre);
+  }
+
+  // The same for a simplex of a face, by the face's own tangent spaces. Foreign ones are left where
+  // they are: no other star agrees about them.
+  bool CommonOnFace(const std::uint32_t* ids, int count, WallSet walls, double* centre) const {
+    if (count < 2) return false;
+    const int n = complex_.d_;
+    const double* points[K + 1];
+    const double* tangents[K + 1];
+    double weights[K + 1];
+    thread_local std::vector<double> bases;
+    const auto stride = static_cast<std::size_t>(count - 1) * static_cast<std::size_t>(n);
+    bases.resize(stride * (K + 1));
+    for (int i = 0; i < count; ++i) {
+      const Site site = Find(ids[i]);
+      if (!IsSubset(walls, site.walls)) return false;
+      FaceTangents(site, walls, n, bases.data() + static_cast<std::size_t>(i) * stride);
+      points[i] = site.point;
+      tangents[i] = bases.data() + static_cast<std::size_t>(i) * stride;
+      weights[i] = complex_.Weight(site.id);
+    }
+    const auto common = [&](auto dimension) {
+      return CommonCentre<decltype(dimension)::value>(n, points, tangents, weights,
+                                                      complex_.judged_radius2_, centre);
+    };
+    bool found = false;
+    [&]<int... J>(std::integer_sequence<int, J...>) {
+      ((count == J + 2 && (found = common(std::integral_constant<int, J + 1>()))), ...);
+    }
+    (std::make_integer_sequence<int, K - 1>());
+    if (!found) return false;
+    for (int i = 0; i < n; ++i) centre[i] += points[0][i] - p_.point[i];
+    return true;
+  }
+
+  static const double* ConormalOf(const Site& site, int wall) {
+    return site.conormals + K * CountWalls(site.walls & (SetOfWall(wall) - 1));
+  }
+
+  // An orthonormal basis of the tangent space of a face at a point of it: what is left of T_pM off
+  // the conormals, by rows of d.
+  static void FaceTangents(const Site& site, WallSet walls, int n, double* rows) {
+    double taken[K][K] = {};  // orthonormal, conormals first
+    int count = 0;
+    const auto orthogonalise = [&](double* v) {
+      for (int pass = 0; pass < 2; ++pass)  // the second for what rounding left
+        for (int i = 0; i < count; ++i) {
+          const double along = Dot(taken[i], v, K);
+          for (int a = 0; a < K; ++a) v[a] -= along * taken[i][a];
+        }
+      return Dot(v, v, K);
+    };
+    const auto take = [&](const double* v, double norm2) {
+      for (int a = 0; a < K; ++a) taken[count][a] = v[a] / std::sqrt(norm2);
+      ++count;
+    };
+    ForEachWall(walls, [&](int wall) {
+      double v[K];
+      std::copy_n(ConormalOf(site, wall), K, v);
+      take(v, orthogonalise(v));
+    });
+    const int conormals = count;
+    for (int left = K - conormals; left > 0; --left) {
+      double best[K], most = -1;
+      for (int a = 0; a < K; ++a) {
+        double v[K] = {};
+        v[a] = 1;
+        if (const double norm2 = orthogonalise(v); norm2 > most) {
+          most = norm2;
+          std::copy_n(v, K, best);
+        }
+      }
+      take(best, most);
+    }
+    for (int j = conormals; j < K; ++j)
+      for (int i = 0; i < n; ++i) {
+        double s = 0;
+        for (int a = 0; a < K; ++a) s += taken[j][a] * site.tangent[a * n + i];
+        rows[(j - conormals) * n + i] = s;
+      }
+  }
+
+  const StarComplex& complex_;
+  const Site& p_;
+  const Judging judging_;
+  const Site* guest_ = nullptr;
+  const Site* newcomer_ = nullptr;
+  const Cell* born_ = nullptr;
+};
+
+}  // namespace stellate::core
