@@ -20,8 +20,10 @@ class VertexGrid {
   template <typename Visit>
   void ForEachAround(const double* q, const Visit& visit) const {
     std::array<std::int64_t, kMaxAxes> low{}, high{}, at{};
+    std::array<double, kMaxAxes> there{};  // q along the axes; 0 along such as there are not
     for (int a = 0; a < axes_; ++a) {
-      const double place = (q[coordinate_[a]] - lower_[a]) * cells_per_length_;
+      there[a] = q[coordinate_[a]];
+      const double place = (there[a] - lower_[a]) * cells_per_length_;
       if (!(place >= -1 && place < static_cast<double>(cells_[a]) + 1)) return;
       low[a] = at[a] = std::max<std::int64_t>(static_cast<std::int64_t>(place) - 1, 0);
       high[a] = std::min<std::int64_t>(static_cast<std::int64_t>(place) + 1, cells_[a] - 1);
@@ -34,8 +36,8 @@ class VertexGrid {
         cell = cell * static_cast<std::uint64_t>(cells_[a]) + static_cast<std::uint64_t>(at[a]);
       for (std::uint32_t i = begin_[cell]; i < begin_[cell + 1]; ++i) {
         double along2 = 0;
-        for (int a = 0; a < axes_; ++a) {
-          const double step = places_[i][a] - q[coordinate_[a]];
+        for (int a = 0; a < kMaxAxes; ++a) {
+          const double step = places_[i][a] - there[a];
           along2 += step * step;
         }
         if (along2 >= radius2_) continue;
@@ -60,7 +62,7 @@ class VertexGrid {
   std::array<std::int64_t, kMaxAxes> cells_{};
   std::vector<std::uint32_t> begin_;     // by cell: where its vertices begin; one more at the end
   std::vector<std::uint32_t> vertices_;  // by cell, ascending
-  std::vector<std::array<double, kMaxAxes>> places_;  // theirs along the axes
+  std::vector<std::array<double, kMaxAxes>> places_;  // theirs along the axes, as `there`
 };
 
 }  // namespace stellate::core

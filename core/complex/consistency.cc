@@ -97,12 +97,30 @@ bool IsConsistentOnFaces(const StarComplex<K>& complex, std::uint32_t p, std::si
 template <int K>
 bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p, std::size_t v) {
   if (complex.walls(p) != 0) return IsConsistentOnFaces<K>(complex, p, v);
-  typename StarComplex<K>::Simplex simplex;
-  if (!complex.SimplexOf(p, complex.cell(p), v, &simplex)) return false;
-  const std::uint64_t key = SimplexKey<K>(complex.cell(p), v, p);
-  for (const std::uint32_t q : simplex)
-    if (q != p && !FindSimplex<K>(complex.cell(q), q, simplex, key)) return false;
-  return true;
+  const auto& cell = complex.cell(p);
+  std::uint32_t others[K];
+  for (int s = 0; s < K; ++s) {
+    others[s] = cell.id(cell.facet(v, s));
+    if (!IsSample(others[s])) return false;
+  }
+  if constexpr (K == 2) {
+    const auto holds = [&](std::uint32_t q, std::uint32_t other) {
+      const auto& there = complex.cell(q);
+      for (std::size_t w = 0; w < there.vertex_count(); ++w) {
+        const std::uint32_t a = there.id(w), b = there.id(there.Next(w));
+        if ((a == p && b == other) || (a == other && b == p)) return true;
+      }
+      return false;
+    };
+    return holds(others[0], others[1]) && holds(others[1], others[0]);
+  } else {
+    const std::uint64_t key = SimplexKey<K>(cell, v, p);
+    for (const std::uint32_t q : others) {
+      const auto& there = complex.cell(q);
+      if (there.Find(key - Mix64(q)) == there.vertex_count()) return false;
+    }
+    return true;
+  }
 }
 
 template <int K>
