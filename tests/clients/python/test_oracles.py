@@ -280,3 +280,12 @@ def test_walls_without_a_common_point_have_none():
     assert not raised.value.converged.any()
     edge = wedge.face_point(x, (0, 1))
     assert np.abs(edge[:, :2]).max() < 1e-12 and np.abs(edge[:, 2] - x[:, 2]).max() < 1e-12
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+@pytest.mark.filterwarnings("error")
+def test_faces_are_found_in_any_unit(unit, rng):
+    ball = oracles.Solid(ball=([0] * 3, unit))
+    x = unit * rng.normal(size=(100, 3))
+    expected = unit * x / np.linalg.norm(x, axis=1)[:, None]
+    assert np.abs(ball.face_point(x, (0,)) - expected).max() <= 1e-9 * unit

@@ -96,7 +96,8 @@ class PointCloud(Projection):
             alive[rows[~enough]] = False
             rows, quadric = rows[enough], quadric.of(enough)
             step = quadric.towards(x[rows])
-            step *= np.minimum(1.0, 0.5 * self.bandwidth / np.maximum(norms(step), 1e-300))[:, None]
+            longest = 0.5 * self.bandwidth
+            step *= (longest / np.maximum(norms(step), longest))[:, None]
             there = quadric.place + step
             found[rows[norms(there - y[rows]) <= 1e-11 * self.bandwidth]] = True
             y[rows], bases[rows] = there, quadric.tangents

@@ -258,7 +258,8 @@ class LevelSet:
             if not usable.any():
                 continue
             rows, v = rows[usable], (down + damping[rows][:, None] * along)[usable]
-            v *= np.minimum(1.0, 0.1 * self._scale / np.maximum(norms(v), 1e-300))[:, None]
+            longest = 0.1 * self._scale
+            v *= (longest / np.maximum(norms(v), longest))[:, None]
             there = y[rows] + apply(bases[usable], v)
             y[rows], landed = self._base.closest_points(np.ascontiguousarray(there))
             alive[rows[~landed]] = False
