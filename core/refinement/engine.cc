@@ -47,12 +47,17 @@ Engine<K>::Engine(const Specification& spec, const ResolvedCriteria& criteria)
       faces_(spec.walls) {}
 
 template <int K>
-Engine<K> Engine<K>::ForRehearsal() const {
+Engine<K> Engine<K>::ForRehearsal(double share) const {
   Engine rehearsal(*this);
   rehearsal.caution_ = kRehearsalCaution;
   rehearsal.asks_flats_ = true;
   rehearsal.book_.ForgetFlats();
   rehearsal.filled_ = {};
+  if (share < 1) {
+    rehearsal.criteria_.epsilon *= share;
+    rehearsal.sizes_ = SizeField<K>(rehearsal.criteria_);
+    rehearsal.RejudgeAll();
+  }
   return rehearsal;
 }
 

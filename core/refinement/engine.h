@@ -35,8 +35,9 @@ class Engine {
 
   Engine(const Specification& spec, const ResolvedCriteria& criteria);
 
-  // A copy to be driven by guesses instead of M's points.
-  Engine ForRehearsal() const;
+  // A copy to be driven by guesses instead of M's points, to this share of the sizes asked for: 1,
+  // or less where they are the same everywhere.
+  Engine ForRehearsal(double share = 1) const;
 
   bool is_full() const { return complex_.size() >= max_vertices_; }
 

@@ -2,13 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "core/base/interruption.h"
-#include "core/base/local_maxima.h"
+#include "core/base/parallel.h"
+#include "core/base/vector_ops.h"
 #include "core/growth/growth.h"
 #include "core/refinement/rehearsal.h"
-#include "core/sample/near_lists.h"
+#include "core/sample/runs.h"
 
 namespace stellate::core {
 namespace {
@@ -25,10 +27,12 @@ constexpr double kEnough[kMaxDimension + 1] = {0, 50, 400, 600, 600, 600};
 constexpr double kSeedSpacing = 0.5;
 // It need not be whole: what it misses is left to the refinement of the final one.
 constexpr int kMostRounds = 4;
-constexpr double kMostBad = 0.15;
+constexpr double kMostBad = 0.25;
 // Answers fall elsewhere than guessed. Nearer to each other than this many spacings they would cost
 // quality.
 constexpr double kKept = 0.6;
+// Points of a run lie within this many spacings of its first.
+constexpr double kRunReach = 3;
 
 // The largest at which enough of the seeds lie that far apart.
 double CoarseEpsilon(int k, const AnsweredPoints& seeds, double epsilon) {
@@ -167,7 +171,7 @@ CandidateSet<K> AheadLaying<K>::Next(std::uint64_t round) {
   candidates = RefineCoarse(round);
   if (candidates.size() > 0) return candidates;
   candidates.planned = GrowOnGuesses();
-  asked_ = static_cast<std::size_t>(candidates.size());
+  asked_ = candidates.planned.points;
   return candidates;
 }
 
@@ -180,10 +184,42 @@ std::vector<std::uint8_t> AheadLaying<K>::Take(const CandidateSet<K>& candidates
   return Scout(answers, inserted.used);
 }
 
-// The sample's own come first: they keep their distance already.
+// Which of the points, `first` of the sample's own and then those at `columns`, come too near to an
+// earlier one that stays. As guessed they kept their distance: one of two that come near has moved.
+template <int K>
+std::vector<std::uint8_t> AheadLaying<K>::AreTooNear(
+    const std::vector<double>& points, std::size_t first,
+    const std::vector<Eigen::Index>& columns) const {
+  const int d = engine_.complex().d();
+  const auto stride = static_cast<std::size_t>(d);
+  const double apart = kKept * spacing_;
+  const RunTree tree(points, d, kRunReach * spacing_);
+  using Pair = std::pair<std::uint32_t, std::uint32_t>;  // the later one first
+  std::vector<Pair> near = ParallelGather<Pair>(columns.size(), [&](std::size_t at, auto* pairs) {
+    const auto i = static_cast<std::uint32_t>(first + at);
+    const double* const point = points.data() + i * stride;
+    if (Distance(point, asked_.col(columns[at]).data(), d) <=
+        0.5 * (Growth<K>::kKeep * spacing_ - apart))
+      return;
+    thread_local std::vector<std::uint32_t> around;
+    around.clear();
+    tree.Gather(point, apart, &around);
+    for (const std::uint32_t j : around)
+      if (j != i && SquaredDistance(point, points.data() + j * stride, d) < apart * apart)
+        pairs->emplace_back(std::max(i, j), std::min(i, j));
+  });
+  ParallelSort(near, std::less<>());
+  std::vector<std::uint8_t> too_near(points.size() / stride, 0);
+  for (std::size_t at = 0; at < near.size(); ++at) {
+    CheckInterruption(at);
+    const auto [later, earlier] = near[at];
+    too_near[later] = too_near[later] || !too_near[earlier];
+  }
+  return too_near;
+}
+
 template <int K>
 std::vector<std::uint8_t> AheadLaying<K>::LayThoseApart(const AnsweredPoints& answers) {
-  asked_ = 0;
   const std::size_t first = engine_.complex().size();
   std::vector<double> points = engine_.complex().points();
   std::vector<Eigen::Index> found;
@@ -194,16 +230,12 @@ std::vector<std::uint8_t> AheadLaying<K>::LayThoseApart(const AnsweredPoints& an
     found.push_back(static_cast<Eigen::Index>(i));
     points.insert(points.end(), point.begin(), point.end());
   }
-  const NearLists near(points, engine_.complex().d(), kKept * spacing_);
-  const std::vector<std::uint8_t> chosen =
-      ChooseLocalMaxima(near.size(), [&](std::size_t i, const auto& visit) {
-        for (const std::uint32_t j : near.Of(i))
-          if (j > i || !visit(j)) return;
-      });
+  const std::vector<std::uint8_t> too_near = AreTooNear(points, first, found);
+  asked_.resize(0, 0);
   std::vector<std::uint8_t> used(answers.found.size(), 0);
   for (std::size_t i = 0; i < found.size() && !engine_.is_full(); ++i) {
     CheckInterruption(i);
-    if (!chosen[first + i]) continue;
+    if (too_near[first + i]) continue;
     engine_.Lay(answers, found[i]);
     used[static_cast<std::size_t>(found[i])] = 1;
   }
@@ -213,7 +245,7 @@ std::vector<std::uint8_t> AheadLaying<K>::LayThoseApart(const AnsweredPoints& an
 // As many spacings apart as patches begin.
 template <int K>
 double AheadLaying<K>::CountMissing() const {
-  return guess_ ? static_cast<double>(asked_)
+  return guess_ ? static_cast<double>(asked_.cols())
                 : std::pow(kPatchesApart, K) * engine_.complex().size();
 }
 

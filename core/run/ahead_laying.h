@@ -32,6 +32,8 @@ class AheadLaying final : public Laying<K> {
                                   const std::vector<std::uint8_t>& found);
   CandidateSet<K> RefineCoarse(std::uint64_t round);
   PlannedPoints GrowOnGuesses();
+  std::vector<std::uint8_t> AreTooNear(const std::vector<double>& points, std::size_t first,
+                                       const std::vector<Eigen::Index>& columns) const;
   std::vector<std::uint8_t> LayThoseApart(const AnsweredPoints& answers);
 
   Engine<K>& engine_;
@@ -41,7 +43,7 @@ class AheadLaying final : public Laying<K> {
   int rounds_ = 0;                     // of its refinement
   std::optional<Surrogate<K>> guess_;  // of the coarse mesh, from when the sample is asked for
   BallTree scouts_;                    // the sample until then
-  std::size_t asked_ = 0;              // points of the sample that are asked for
+  Eigen::MatrixXd asked_;              // the sample, guessed, while it is asked for
 };
 
 STELLATE_DECLARE_CLASS(AheadLaying)

@@ -254,9 +254,13 @@ void MeshingRun<K>::Plan() {
   PlannedPoints planned;
   if (faces.has_discoveries())
     planned = engine_.TakeDiscoveries();
-  else if (engine_.criteria().ask_ahead && !rehearsal_failed_ && faces.stage() == K)
-    planned = Rehearse<K>(engine_, whole_rounds_, &*targets, Rehearsed::kAllRules,
+  else if (engine_.criteria().ask_ahead && !rehearsal_failed_ && faces.stage() == K) {
+    // What is left then of R1 and R2 is not worth judging all stars for.
+    const bool is_rest = was_laid_ && !laid && book.are_all_suspect();
+    planned = Rehearse<K>(engine_, whole_rounds_, &*targets,
+                          is_rest ? Rehearsed::kSizes : Rehearsed::kAllRules,
                           laid ? laid->guess() : nullptr);
+  }
   CandidateSet<K> candidates = engine_.Draw(std::move(*targets), whole_rounds_);
   candidates.planned = std::move(planned);
   Ask(std::move(candidates), &MeshingRun::InsertCandidates);

@@ -97,6 +97,7 @@ class MeshingRun final : public Mesher {
   std::unique_ptr<RoundTrip<K>> trip_;
   std::unique_ptr<Laying<K>> laying_;  // while the sample is laid
   std::unique_ptr<Laying<K>> laid_;    // until what that left is planned
+  bool was_laid_ = false;              // the sample
   std::unique_ptr<Certification> certification_;
   Insertion insertion_ = nullptr;  // of the trip's answers
 

@@ -50,6 +50,7 @@ bool MeshingRun<K>::AskToLay() {
   if (!box_watch_.has_left()) candidates = laying_->Next(whole_rounds_);
   if (candidates.size() == 0) {
     laid_ = std::move(laying_);
+    was_laid_ = true;
     return false;
   }
   Ask(std::move(candidates), &MeshingRun::LayAnswered, laying_->asking());
