@@ -1,12 +1,13 @@
 #include "core/certificate/boundary_claims.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
-#include <map>
+#include <cstdint>
 #include <numeric>
-#include <set>
 #include <string>
+#include <vector>
 
 #include "core/base/message.h"
 #include "core/base/random.h"
@@ -25,28 +26,42 @@ std::string NameWalls(WallSet walls) {
   return name;
 }
 
+// Of a list of simplices of one dimension, how many faces with `size` corners it has.
+std::int64_t CountFaces(const FaceMesh& face, int size) {
+  const auto width = static_cast<std::size_t>(face.dimension) + 1;
+  std::vector<std::array<std::uint32_t, kMaxDimension>> parts;
+  for (std::size_t s = 0; s < face.simplices.size(); s += width)
+    for (unsigned mask = 1; mask < 1u << width; ++mask) {
+      if (std::popcount(mask) != size) continue;
+      std::size_t corners = 0;
+      auto& part = parts.emplace_back();
+      for (std::size_t i = 0; i < width; ++i)
+        if (mask >> i & 1u) part[corners++] = face.simplices[s + i];
+    }
+  std::sort(parts.begin(), parts.end());
+  return std::unique(parts.begin(), parts.end()) - parts.begin();
+}
+
 // Components and Euler characteristic of a list of simplices of one dimension.
 void Count(const FaceMesh& face, FaceReport* report) {
   const auto width = static_cast<std::size_t>(face.dimension) + 1;
-  std::map<std::uint32_t, std::uint32_t> parent;
-  const auto root = [&](std::uint32_t v) {
+  std::vector<std::uint32_t> vertices = face.simplices;
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  std::vector<std::size_t> parent(vertices.size());
+  std::iota(parent.begin(), parent.end(), std::size_t{0});
+  const auto root = [&](std::uint32_t id) {
+    auto v = static_cast<std::size_t>(std::lower_bound(vertices.begin(), vertices.end(), id) -
+                                      vertices.begin());
     while (parent[v] != v) v = parent[v] = parent[parent[v]];
     return v;
   };
-  std::set<std::vector<std::uint32_t>> all;
-  for (std::size_t s = 0; s < face.simplices.size(); s += width) {
-    const std::uint32_t* ids = face.simplices.data() + s;
-    for (std::size_t i = 0; i < width; ++i) parent.emplace(ids[i], ids[i]);
-    for (std::size_t i = 1; i < width; ++i) parent[root(ids[i])] = root(ids[0]);
-    for (unsigned mask = 1; mask < 1u << width; ++mask) {
-      std::vector<std::uint32_t> part;
-      for (std::size_t i = 0; i < width; ++i)
-        if (mask >> i & 1u) part.push_back(ids[i]);
-      all.insert(std::move(part));
-    }
-  }
-  for (const auto& part : all) report->euler_characteristic += part.size() % 2 == 1 ? 1 : -1;
-  for (const auto& [v, up] : parent) report->components += v == up;
+  for (std::size_t s = 0; s < face.simplices.size(); s += width)
+    for (std::size_t i = 1; i < width; ++i)
+      parent[root(face.simplices[s + i])] = root(face.simplices[s]);
+  for (std::size_t v = 0; v < parent.size(); ++v) report->components += parent[v] == v;
+  for (int size = 1; size <= face.dimension + 1; ++size)
+    report->euler_characteristic += (size % 2 == 1 ? 1 : -1) * CountFaces(face, size);
 }
 
 }  // namespace

@@ -3,10 +3,13 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
-#include <set>
+#include <utility>
+#include <vector>
 
+#include "core/base/parallel.h"
 #include "core/refinement/engine.h"
 #include "core/refinement/exchange.h"
 #include "core/refinement/guards.h"
@@ -116,18 +119,31 @@ void Engine<K>::YieldToFaces(std::vector<Target<K>>* targets) {
     if (v == complex_.cell(star).vertex_count()) continue;
     if (auto split = SplitOf({star, v}, by)) kept.push_back(*split);
   }
-  std::vector<double> aim(static_cast<std::size_t>(complex_.d()));
-  for (Target<K>& t : *targets) {
-    CheckInterruption(kept.size());
+  const auto encroached = [&](const Target<K>& t) {
+    std::vector<double> aim(static_cast<std::size_t>(complex_.d()));
+    complex_.Lift(t.star, t.x, aim.data());
+    return complex_.EncroachedBy(aim.data(), t.violation.walls);
+  };
+  // The image of a far aim may fall anywhere; good points have several candidates, and after a
+  // failed attempt the point is another.
+  const auto may_yield = [&](const Target<K>& t) {
+    return t.violation.dimension() == lowest && t.violation.rule < Rule::kSliver &&
+           book_.failed_attempts(t.star) == 0;
+  };
+  const auto is_near = [](const Target<K>& t) { return !t.violation.fake && !t.is_coarse(); };
+  std::vector<std::optional<typename StarComplex<K>::CellVertex>> first(targets->size());
+  ParallelFor(targets->size(), [&](std::size_t i) {
+    const Target<K>& t = (*targets)[i];
+    if (may_yield(t) && is_near(t)) first[i] = encroached(t);
+  });
+  for (std::size_t i = 0; i < targets->size(); ++i) {
+    CheckInterruption(i);
+    const Target<K>& t = (*targets)[i];
     if (t.violation.dimension() > lowest) continue;
     std::optional<Target<K>> target = t;
-    // The image of a far aim may fall anywhere; good points have several candidates, and after a
-    // failed attempt the point is another.
-    const bool is_one = t.violation.rule < Rule::kSliver && book_.failed_attempts(t.star) == 0;
-    for (int step = 0;
-         target && is_one && !target->violation.fake && !target->is_coarse() && step < K; ++step) {
-      complex_.Lift(target->star, target->x, aim.data());
-      const auto at = complex_.EncroachedBy(aim.data(), target->violation.walls);
+    const bool is_one = may_yield(t);
+    for (int step = 0; target && is_one && is_near(*target) && step < K; ++step) {
+      const auto at = step == 0 ? first[i] : encroached(*target);
       if (!at) break;
       target = SplitOf(*at, target->violation.rule);
     }
@@ -225,8 +241,8 @@ PlannedPoints Engine<K>::TakeDiscoveries() {
 
 template <int K>
 std::vector<FaceMesh> Engine<K>::Faces() const {
-  using Simplex = std::vector<std::uint32_t>;
-  std::map<std::pair<int, WallSet>, std::set<Simplex>> faces;
+  using Simplex = std::array<std::uint32_t, K + 1>;  // as many of them as the face has corners
+  std::map<std::pair<int, WallSet>, std::vector<Simplex>> faces;
   for (std::uint32_t p = 0; p < complex_.size(); ++p) {
     CheckInterruption(p);
     if (complex_.walls(p) == 0) continue;
@@ -234,15 +250,17 @@ std::vector<FaceMesh> Engine<K>::Faces() const {
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
       const auto simplex = complex_.FaceSimplexOf(p, cell, v);
       if (simplex.walls == 0 || simplex.fake || simplex.ids[0] != p) continue;
-      faces[{simplex.dimension(), simplex.walls}].emplace(simplex.ids.begin(),
-                                                          simplex.ids.begin() + simplex.count);
+      Simplex& corners = faces[{simplex.dimension(), simplex.walls}].emplace_back();
+      std::copy_n(simplex.ids.begin(), simplex.count, corners.begin());
     }
   }
   std::vector<FaceMesh> all;
-  for (const auto& [key, simplices] : faces) {
+  for (auto& [key, simplices] : faces) {
+    std::sort(simplices.begin(), simplices.end());
+    simplices.erase(std::unique(simplices.begin(), simplices.end()), simplices.end());
     FaceMesh face{key.second, key.first, {}};
     for (const Simplex& s : simplices)
-      face.simplices.insert(face.simplices.end(), s.begin(), s.end());
+      face.simplices.insert(face.simplices.end(), s.begin(), s.begin() + key.first + 1);
     all.push_back(std::move(face));
   }
   return all;
