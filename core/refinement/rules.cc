@@ -1,5 +1,6 @@
 #include "core/refinement/rules.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -18,6 +19,11 @@ namespace {
 // Simplices lean at least so much less than a proof allows, radians: what tangents found by
 // differences may be wrong by where epsilon is half of the reach, with some to spare.
 constexpr double kLeanMargin = 0.05;
+// A volume this small beside the lengths of the edges that span it is one of points that are off a
+// flat wall by an oracle's error.
+constexpr double kFlat = 1e-8;
+// Below this dimension such simplices were not seen to stay.
+constexpr int kFirstFlat = 4;
 
 template <int K>
 Violation<K> AtVertex(Rule rule, const RestrictedVoronoiCell<K>& cell, std::size_t v, bool fake) {
@@ -204,6 +210,24 @@ bool LeansTooFar(const StarComplex<K>& complex, std::uint32_t p, const double* a
 
 namespace {
 
+// Whether the simplex on p and the facets of v has all its vertices on one wall and no volume as
+// p sees it. Stars may agree on one where the wall's own simplices and those inside are not of one
+// mind about cospherical points of a flat wall.
+template <int K>
+bool IsFlatOnWall(const StarComplex<K>& complex, std::uint32_t p,
+                  const RestrictedVoronoiCell<K>& cell, std::size_t v) {
+  if (K < kFirstFlat) return false;
+  WallSet common = complex.walls(p);
+  Eigen::Matrix<double, K, K> edges;
+  for (int a = 0; a < K; ++a) {
+    const std::uint32_t id = cell.id(cell.facet(v, a));
+    common &= complex.walls(id);
+    if (common == 0) return false;
+    complex.Project(p, complex.Point(id), edges.col(a).data());
+  }
+  return std::abs(edges.determinant()) <= kFlat * edges.colwise().norm().prod();
+}
+
 template <int K>
 std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const StarComplex<K>& complex,
                                                              std::uint32_t p,
@@ -220,7 +244,8 @@ std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const StarComplex<K
     const bool whole = dimension == K, held = simplex.ids[0] == p;
     const bool thin =
         whole && held && bounds.sliver_bound > 0 && !complex.TouchesGuard(p, cell, v) &&
-        HasThinFaceAt<K>(complex, complex.Point(p), cell, v, bounds.sliver_bound, nullptr);
+        (HasThinFaceAt<K>(complex, complex.Point(p), cell, v, bounds.sliver_bound, nullptr) ||
+         IsFlatOnWall<K>(complex, p, cell, v));
     if (!thin && IsConsistent<K>(complex, p, v) && !(whole && folds && folds->IsFolded(v)))
       continue;
     const Rule rule = thin ? Rule::kSliver : Rule::kInconsistent;
