@@ -1,5 +1,6 @@
 #include "server/server.h"
 
+#include <grpc/grpc.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
@@ -199,6 +200,7 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
           Message("gRPC ", grpc::Version(), " takes headers without end (CVE-2023-33953), which ",
                   "stops the server for everybody: let strangers reach it through a proxy alone"));
     }
+    grpc_init();  // for good: its shutdown now and then waits for ten seconds
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   });

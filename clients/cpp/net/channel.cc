@@ -1,5 +1,6 @@
 #include "net/channel.h"
 
+#include <grpc/grpc.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
 #include <grpcpp/support/client_interceptor.h>
@@ -98,6 +99,7 @@ Expected<std::shared_ptr<grpc::Channel>> Connect(const std::string& server,
     }
     interceptors.push_back(std::make_unique<SendTokenFactory>(credentials.token));
   }
+  KeepGrpc();
   grpc::ChannelArguments arguments;
   // Streams are quiet while the other side computes: pings find a peer that froze or vanished.
   const int ping = std::max(1, static_cast<int>(1000 * std::min(keepalive_seconds, 1e6)));
@@ -109,6 +111,11 @@ Expected<std::shared_ptr<grpc::Channel>> Connect(const std::string& server,
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
   return grpc::experimental::CreateCustomChannelWithInterceptors(server, *security, arguments,
                                                                  std::move(interceptors));
+}
+
+void KeepGrpc() {
+  static const bool kept = (grpc_init(), true);
+  static_cast<void>(kept);
 }
 
 }  // namespace stellate::client

@@ -1,13 +1,13 @@
 #include "stellate/doctor_server.h"
 
 #include <google/protobuf/util/json_util.h>
-#include <grpc/grpc.h>
 #include <grpcpp/grpcpp.h>
 
 #include <chrono>
 #include <memory>
 #include <thread>
 
+#include "net/channel.h"
 #include "run/doctor_service.h"
 
 namespace stellate {
@@ -19,7 +19,7 @@ constexpr int kLargestMessage = 64 << 20;
 }  // namespace
 
 Expected<void> RunDoctor(const DoctorOptions& options) {
-  grpc_init();  // for good: its shutdown now and then waits for ten seconds
+  client::KeepGrpc();
   client::DoctorService service(options.random_seed, options.on_report);
   int port = 0;
   grpc::ServerBuilder builder;

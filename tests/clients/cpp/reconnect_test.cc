@@ -1,11 +1,14 @@
 // When a lost server is waited for, for how long, and who may end the wait.
 #include "net/reconnect.h"
 
+#include <grpc/grpc.h>
 #include <gtest/gtest.h>
 
 #include <limits>
 #include <thread>
 #include <vector>
+
+#include "net/channel.h"
 
 namespace stellate::client {
 namespace {
@@ -13,6 +16,11 @@ namespace {
 using Seconds = std::chrono::duration<double>;
 
 const grpc::Status kLost(grpc::StatusCode::UNAVAILABLE, "Socket closed");
+
+TEST(Connect, LeavesGrpcsOwnShutdownToTheEndOfTheProcess) {
+  ASSERT_TRUE(Connect("127.0.0.1:1", {}));
+  EXPECT_NE(grpc_is_initialized(), 0) << "the shutdown now and then waits for ten seconds";
+}
 
 TEST(IsTransient, TellsALostServerFromOneThatRefuses) {
   using enum grpc::StatusCode;

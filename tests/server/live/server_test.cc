@@ -1,5 +1,6 @@
 #include "server/server.h"
 
+#include <grpc/grpc.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 
@@ -31,6 +32,13 @@ TEST_F(ServerTest, TakesAFreePortAndSaysWhich) {
   config.listen = (*a)->address();
   EXPECT_FALSE(Server::Start(config)) << "the port is taken";
   EXPECT_EQ(CheckHealth((*a)->address(), 60s), "");
+}
+
+TEST_F(ServerTest, LeavesGrpcsOwnShutdownToTheEndOfTheProcess) {
+  Config config;
+  config.listen = "127.0.0.1:0";
+  ASSERT_TRUE(Server::Start(config));  // and stops it
+  EXPECT_NE(grpc_is_initialized(), 0) << "the shutdown now and then waits for ten seconds";
 }
 
 TEST_F(ServerTest, AUnixSocketIsItsOwnersAlone) {
