@@ -364,7 +364,8 @@ bool Surrogate<K>::Predict(const Near& near, const double* x, const double* flat
   if (spacing < kMargin * epsilon_ && guess.uncertainty > kExact * spacing &&
       guess.spacing > kFine * epsilon_)
     return false;
-  return guess.uncertainty <= std::max(kSure * guess.spacing, kSureForSpacing * spacing);
+  return guess.uncertainty <=
+         std::max(epsilon_ > 0 ? kSure * guess.spacing : 0, kSureForSpacing * spacing);
 }
 
 template <int K>

@@ -27,7 +27,8 @@ class Surrogate {
   // complex  borrowed, must not change
   // step     how far from a point without neighbours its tangent plane means something, length
   // epsilon  the spacing that the points are for in the end, length: what asks for that is not
-  //          guessed from a sample too coarse to tell exactly. 0: it is
+  //          guessed from a sample too coarse to tell exactly. 0: it is, where that is
+  //          sure for the spacing asked for
   // sizes    of the sample points, borrowed, or nullptr; between them they are blended like the
   //          graphs: right to second order, where the least of a few would ask for far too much
   Surrogate(const StarComplex<K>& complex, double step, double epsilon,
