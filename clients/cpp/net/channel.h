@@ -21,8 +21,8 @@ Expected<std::shared_ptr<grpc::Channel>> Connect(const std::string& server,
 
 inline constexpr std::chrono::seconds kCallTime{30};  // for a unary call, connecting included
 
-// Keeps gRPC's threads until the process ends: its shutdown, which follows the last channel or server,
-// now and then waits for ten seconds.
+// Keeps gRPC's threads until the process ends: its shutdown, which follows the last channel or
+// server, now and then waits for ten seconds.
 void KeepGrpc();
 
 // Whether a server's address is a unix socket or the loopback.
