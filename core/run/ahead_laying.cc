@@ -46,8 +46,11 @@ double CoarseEpsilon(int k, const AnsweredPoints& seeds, double epsilon) {
 }
 
 // Of a mesh that only has to be guessed from: nothing is asked of its shapes.
+template <int K>
 Specification CoarserThan(Specification spec, double epsilon) {
   spec.epsilon = epsilon;
+  spec.limits.max_vertices =
+      std::min(spec.limits.max_vertices, MostAtOnce(K, spec.ambient_dimension));
   spec.declared_reach.reset();
   spec.criteria.radius_edge_bound = INFINITY;
   spec.criteria.judging = Judging::kFlats;
@@ -67,7 +70,7 @@ AheadLaying<K>::AheadLaying(Engine<K>& engine, const Specification& spec)
 template <int K>
 std::vector<std::uint8_t> AheadLaying<K>::Begin(const AnsweredPoints& seeds) {
   const double epsilon = CoarseEpsilon(K, seeds, engine_.criteria().epsilon);
-  const Specification coarse = CoarserThan(spec_, epsilon);
+  const Specification coarse = CoarserThan<K>(spec_, epsilon);
   coarse_ = std::make_unique<Engine<K>>(coarse, Resolve(coarse));
   std::vector<std::uint8_t> used(seeds.found.size(), 0);
   for (std::size_t i = 0; i < used.size(); ++i) {
@@ -116,7 +119,8 @@ CandidateSet<K> AheadLaying<K>::RefineCoarse(std::uint64_t round) {
 }
 
 // The lattice on the guess, from the sample's points on, and from others that no patch comes near;
-// those join the sample. No more than a sample may have.
+// those join the sample. No more than a sample may have; and where guesses go on without end, no
+// more than twice what was expected at most.
 template <int K>
 PlannedPoints AheadLaying<K>::GrowOnGuesses() {
   const StarComplex<K>& coarse = coarse_->complex();
@@ -131,11 +135,12 @@ PlannedPoints AheadLaying<K>::GrowOnGuesses() {
   };
   guess_.emplace(coarse, coarse_->criteria().advance_step, 0);
   Growth<K> growth(coarse.d(), spacing_);
+  const std::uint64_t most = std::min(spec_.limits.max_vertices, 2 * MostAtOnce(K, coarse.d()));
   std::vector<double> points, tangents;
   const AnsweredPoints scouts = known(engine_.complex()), all = known(coarse);
   growth.Begin(scouts.points, scouts.tangents, scouts.found, 0);
   for (bool goes_on = true; goes_on;) {
-    while (growth.size() < spec_.limits.max_vertices) {
+    while (growth.size() < most) {
       const auto ring = growth.Propose();
       if (ring.points.cols() == 0) break;
       const auto count = static_cast<std::size_t>(ring.points.cols());

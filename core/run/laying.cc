@@ -1,5 +1,8 @@
 #include "core/run/laying.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "core/base/interruption.h"
 #include "core/growth/lattice.h"
 #include "core/run/ahead_laying.h"
@@ -20,6 +23,19 @@ constexpr double SparseShare(int k) { return k < 3 ? 0.5 : 0.1; }
 // From 4 on as many seeds as tell enough to guess by are a good part of the sample.
 constexpr int kMostAhead = 3;
 
+// Of points and tangents grown ahead: 134 MB.
+constexpr std::uint64_t kMostNumbers = 1 << 24;
+
+// About how many points the sample will have, from how far apart half of the seeds lie.
+double GuessSize(int k, const AnsweredPoints& seeds, double epsilon) {
+  const auto found = static_cast<std::size_t>(std::ranges::count(seeds.found, 1));
+  double apart = epsilon;
+  std::size_t count = found;
+  for (; 2 * count > found && found > 1; apart *= 2)
+    count = CountApart(seeds, seeds.points.cols(), 2 * apart);
+  return static_cast<double>(count) * std::pow(apart / epsilon, k);
+}
+
 // Of seeds drawn to ask ahead from only as many tell as there would be else.
 template <int K>
 bool AreSparse(const AnsweredPoints& seeds, const Specification& spec, double epsilon) {
@@ -31,6 +47,10 @@ bool AreSparse(const AnsweredPoints& seeds, const Specification& spec, double ep
 }
 
 }  // namespace
+
+std::uint64_t MostAtOnce(int k, int d) {
+  return kMostNumbers / (static_cast<std::uint64_t>(d) * static_cast<std::uint64_t>(k + 1));
+}
 
 double LaidSpacing(int k, double epsilon) { return kSlack * LatticeSpacing(k) * epsilon; }
 
@@ -57,7 +77,9 @@ std::unique_ptr<Laying<K>> LayingFor(Engine<K>& engine, const Specification& spe
   if (criteria.graded() || spec.walls > 0 || (criteria.ask_ahead && K > kMostAhead) ||
       !AreSparse<K>(seeds, spec, criteria.epsilon))
     return nullptr;
-  if (criteria.ask_ahead) return std::make_unique<AheadLaying<K>>(engine, spec);
+  const auto most = static_cast<double>(MostAtOnce(K, engine.complex().d()));
+  if (criteria.ask_ahead && GuessSize(K, seeds, criteria.epsilon) <= most)
+    return std::make_unique<AheadLaying<K>>(engine, spec);
   return std::make_unique<RingLaying<K>>(engine);
 }
 

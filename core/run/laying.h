@@ -41,7 +41,8 @@ class Laying {
   Laying() = default;
 };
 
-// How a run lays its sample, ring by ring or ahead. Null where it does not: where sizes are graded,
+// How a run lays its sample: ahead, if that is asked for and the sample is not too large for it, else
+// ring by ring. Null where it does not: where sizes are graded,
 // where there are walls, and where what was found of the seeds is dense (a sample itself, or all
 // that so coarse a mesh needs). The engine is borrowed; `spec` is its.
 template <int K>
@@ -53,6 +54,9 @@ double LaidSpacing(int k, double epsilon);
 // Patches of it begin about so many spacings apart: nearer, and seams between them cost more
 // vertices; farther, and the strain within them does.
 inline constexpr double kPatchesApart = 10;
+
+// How many points at most are grown before anybody is asked for one, and then asked for at once.
+std::uint64_t MostAtOnce(int k, int d);
 
 // How many of the first `most` points that were found, in their order, lie `apart` from all that
 // were counted before.

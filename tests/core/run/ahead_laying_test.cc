@@ -123,6 +123,21 @@ TEST(AheadLaying, KeepsABudgetOfVertices) {
   }
 }
 
+TEST(AheadLaying, LeavesToRingsWhatIsTooMuchToAskAtOnce) {
+  const auto sphere = Make("sphere:2");
+  for (const double epsilon : {1e-3, 1e-6, 1e-12}) {
+    Specification spec = AheadOn(*sphere, epsilon);
+    spec.limits.max_rounds = 5;
+    std::uint64_t queries = 0;
+    const DrivenRun run = Drive(spec, [&](const QueryBatch& batch) {
+      queries = std::max(queries, static_cast<std::uint64_t>(batch.size()));
+      return testing::AnswersOf(*sphere, batch);
+    });
+    EXPECT_EQ(run.report().counts.rounds, 5u);
+    EXPECT_LT(queries, 100'000u);
+  }
+}
+
 TEST(AheadLaying, HasPointsWhereverItIsCutShort) {
   const auto torus = Make("torus");
   Specification spec = AheadOn(*torus, 0.04);
