@@ -41,10 +41,10 @@ class Laying {
   Laying() = default;
 };
 
-// How a run lays its sample: ahead, if that is asked for and the sample is not too large for it, else
-// ring by ring. Null where it does not: where sizes are graded,
-// where there are walls, and where what was found of the seeds is dense (a sample itself, or all
-// that so coarse a mesh needs). The engine is borrowed; `spec` is its.
+// How a run lays its sample: ahead, if that is asked for and the sample is not too large for it,
+// else ring by ring. Null where it does not: where sizes are graded, where there are walls, and
+// where what was found of the seeds is dense (a sample itself, or all that so coarse a mesh needs).
+// The engine is borrowed; `spec` is its.
 template <int K>
 std::unique_ptr<Laying<K>> LayingFor(Engine<K>& engine, const Specification& spec,
                                      const AnsweredPoints& seeds);
