@@ -14,7 +14,7 @@ rows = [
 ]
 peers, ours, names = [], [], []
 for peer, same in zip(rows, rows[1:]):
-    if peer[0].startswith(SHOWN) and same[1] == "Stellate, same vertices":
+    if peer[0] in SHOWN and same[1] == "Stellate, same vertices":
         name = f"{peer[0]}\n{peer[1].split(',')[0]}"
         if name not in names:  # the first of each: some ten thousand vertices
             names.append(name)

@@ -117,7 +117,9 @@ def compare(runner: Runner, case: Case, count: int, repeats: int) -> list[report
 def main() -> int:
     """Runs the cases that are asked for."""
     parser = argparse.ArgumentParser(prog="tests/bench/run peers", description=__doc__)
-    parser.add_argument("--full", action="store_true", help="the large meshes too: an hour or so")
+    parser.add_argument(
+        "--full", action="store_true", help="the large meshes too: some ten minutes"
+    )
     parser.add_argument("--only", metavar="REGEX", default="", help="cases that it is found in")
     parser.add_argument("--list", action="store_true", help="print the cases and stop")
     parser.add_argument("--repeats", type=int, default=3, help="of short measurements (default 3)")
