@@ -197,7 +197,7 @@ class StarComplex<K>::Around final : public Surroundings<K> {
     });
     const int conormals = count;
     for (int left = K - conormals; left > 0; --left) {
-      double best[K], most = -1;
+      double best[K] = {}, most = -1;
       for (int a = 0; a < K; ++a) {
         double v[K] = {};
         v[a] = 1;
