@@ -3,13 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <bit>
 #include <string>
 #include <vector>
 
-#include "core/base/random.h"
 #include "core/refinement/surrogate.h"
 #include "tests/core/support/in_process_run.h"
+#include "tests/core/support/point_hash.h"
 
 namespace stellate::core {
 namespace {
@@ -87,13 +86,6 @@ Specification AheadOnTorus(Manifold& torus, double epsilon) {
   return spec;
 }
 
-// A number in [0, 1) that depends on a point alone.
-double Hash(const Eigen::VectorXd& x) {
-  std::uint64_t h = 0;
-  for (Eigen::Index i = 0; i < x.size(); ++i) h = Mix64(h ^ std::bit_cast<std::uint64_t>(x[i]));
-  return static_cast<double>(h >> 11) * 0x1p-53;
-}
-
 TEST(AskAheadFaults, AnswersThatAreMissingHereAndThereAreDoneWithout) {
   const auto torus = Make("torus");
   const auto mesher = testing::NewMesher(AheadOnTorus(*torus, 0.1));
@@ -104,7 +96,8 @@ TEST(AskAheadFaults, AnswersThatAreMissingHereAndThereAreDoneWithout) {
       std::vector<std::uint8_t>& found = answers.blocks[b].found;
       found.assign(static_cast<std::size_t>(batch->blocks[b].size()), 1);
       for (Eigen::Index i = 0; i < batch->blocks[b].size(); ++i)
-        found[static_cast<std::size_t>(i)] = Hash(batch->blocks[b].points.col(i)) > 0.2;
+        found[static_cast<std::size_t>(i)] =
+            testing::PointHash(batch->blocks[b].points.col(i)) > 0.2;
     }
     ASSERT_TRUE(mesher->Absorb(answers));
   }
@@ -138,7 +131,7 @@ TEST(AskAheadFaults, NoiseAtItsToleranceIsMeshed) {
       for (Eigen::Index i = 0; i < block.points.cols(); ++i) {
         const Eigen::VectorXd y = block.points.col(i);
         const Eigen::Vector3d normal = Eigen::Vector3d(y).normalized();
-        block.points.col(i) += 3e-4 * epsilon * (Hash(y) - 0.5) * normal;
+        block.points.col(i) += 3e-4 * epsilon * (testing::PointHash(y) - 0.5) * normal;
       }
     return answers;
   });

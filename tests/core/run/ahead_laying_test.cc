@@ -5,11 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <bit>
 #include <string>
 
-#include "core/base/random.h"
 #include "tests/core/support/in_process_run.h"
+#include "tests/core/support/point_hash.h"
 
 namespace stellate::core {
 namespace {
@@ -82,13 +81,6 @@ TEST(AheadLaying, DoesWithClosestPointsAlone) {
   EXPECT_LT(run.report().counts.rounds, 30u);
 }
 
-// A number in [0, 1) that depends on a point alone.
-double HashOf(const Eigen::VectorXd& x) {
-  std::uint64_t h = 0;
-  for (Eigen::Index i = 0; i < x.size(); ++i) h = Mix64(h ^ std::bit_cast<std::uint64_t>(x[i]));
-  return static_cast<double>(h >> 11) * 0x1p-53;
-}
-
 TEST(AheadLaying, LeavesWhatWasNotFoundToTheRefinement) {
   const auto torus = Make("torus");
   Specification spec = AheadOn(*torus, 0.05);
@@ -100,7 +92,7 @@ TEST(AheadLaying, LeavesWhatWasNotFoundToTheRefinement) {
     for (AnswerBlock& block : answers.blocks) {
       block.found.assign(static_cast<std::size_t>(block.points.cols()), 1);
       for (Eigen::Index i = 0; i < block.points.cols(); ++i)
-        block.found[static_cast<std::size_t>(i)] = HashOf(block.points.col(i)) > 0.2;
+        block.found[static_cast<std::size_t>(i)] = testing::PointHash(block.points.col(i)) > 0.2;
     }
     return answers;
   });
