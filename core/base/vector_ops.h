@@ -63,7 +63,8 @@ inline void DotRows(const double* rows, std::size_t count, const double* v, int 
   });
 }
 
-inline double LongSquaredDistance(const double* a, const double* b, int d) {
+[[gnu::always_inline]] inline double UnrolledSquaredDistance(const double* a, const double* b,
+                                                             int d) {
   double s0 = 0, s1 = 0, s2 = 0, s3 = 0;
   int i = 0;
   for (; i + 4 <= d; i += 4) {
@@ -78,6 +79,10 @@ inline double LongSquaredDistance(const double* a, const double* b, int d) {
   return (s0 + s1) + (s2 + s3);
 }
 
+inline double LongSquaredDistance(const double* a, const double* b, int d) {
+  return UnrolledSquaredDistance(a, b, d);
+}
+
 [[gnu::always_inline]] inline double SquaredDistance(const double* a, const double* b, int d) {
   if (d == 3) {
     const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
@@ -87,7 +92,7 @@ inline double LongSquaredDistance(const double* a, const double* b, int d) {
     const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2], w = a[3] - b[3];
     return (x * x + y * y) + (z * z + w * w);
   }
-  return LongSquaredDistance(a, b, d);
+  return __builtin_constant_p(d) ? UnrolledSquaredDistance(a, b, d) : LongSquaredDistance(a, b, d);
 }
 
 inline double Distance(const double* a, const double* b, int d) {

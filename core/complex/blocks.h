@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/base/interruption.h"
+#include "core/base/parallel.h"
 
 namespace stellate::core {
 
@@ -25,12 +25,12 @@ class Blocks {
 
   std::size_t size() const { return size_; }
 
-  // REQUIRES: size >= size().
+  // REQUIRES: size >= size(). In parallel: a thread's first touch of memory is slow.
   void resize(std::size_t size) {
-    while (blocks_.size() * kBlock < size) {
-      ThrowIfInterrupted();  // a thread's first touch of memory is slow
-      blocks_.push_back(std::make_unique<T[]>(kBlock));
-    }
+    const std::size_t begin = Count(size_), end = Count(size);
+    blocks_.resize(end);
+    ParallelFor(end - begin,
+                [&](std::size_t i) { blocks_[begin + i] = std::make_unique<T[]>(kBlock); });
     size_ = size;
   }
 
@@ -39,6 +39,7 @@ class Blocks {
 
  private:
   static constexpr std::size_t kBlock = 1024;
+  static std::size_t Count(std::size_t size) { return (size + kBlock - 1) / kBlock; }
 
   std::vector<std::unique_ptr<T[]>> blocks_;
   std::size_t size_ = 0;

@@ -88,15 +88,16 @@ template <int K>
 std::size_t RestrictedVoronoiCell<K>::Excesses(const double* normal, double offset,
                                                const double* step, double* excess) const {
   const std::size_t count = vertices_.size();
+  std::size_t worst = 0;
+  const auto take = [&](std::size_t v, double along) {
+    excess[v] = along - offset;
+    if (excess[v] > excess[worst]) worst = v;
+  };
   if (d_ > 0) {
     DotRows(centres_.data(), count, step, static_cast<int>(d_), excess);
+    for (std::size_t v = 0; v < count; ++v) take(v, excess[v]);
   } else {
-    for (std::size_t v = 0; v < count; ++v) excess[v] = Dot(normal, vertices_[v].x, K);
-  }
-  std::size_t worst = 0;
-  for (std::size_t v = 0; v < count; ++v) {
-    excess[v] -= offset;
-    if (excess[v] > excess[worst]) worst = v;
+    for (std::size_t v = 0; v < count; ++v) take(v, Dot(normal, vertices_[v].x, K));
   }
   return worst;
 }
@@ -136,24 +137,28 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
   // What a plane cuts off a polytope is connected: take the part around the worst vertex, and
   // leave what only rounding put beyond the plane.
   scratch.cut.assign(old_count, 0);
-  scratch.stack.assign(1, static_cast<Index>(worst));
-  scratch.cut[worst] = 1;
-  while (!scratch.stack.empty()) {
-    const Index v = scratch.stack.back();
-    scratch.stack.pop_back();
-    for (const Index w : vertices_[v].adjacent) {
-      if (scratch.cut[w] || !(excess[w] > 0)) continue;
-      scratch.cut[w] = 1;
-      scratch.stack.push_back(w);
+  std::uint8_t* const cut = scratch.cut.data();
+  cut[worst] = 1;
+  scratch.removed.clear();
+  scratch.removed.push_back(static_cast<Index>(worst));
+  for (std::size_t i = 0; i < scratch.removed.size(); ++i) {
+    for (const Index w : vertices_[scratch.removed[i]].adjacent) {
+      if (cut[w] || !(excess[w] > 0)) continue;
+      cut[w] = 1;
+      scratch.removed.push_back(w);
     }
   }
+  if (scratch.removed.size() == old_count) return false;
+  std::sort(scratch.removed.begin(), scratch.removed.end());
   FindCrossings(scratch);
   const bool is_disc = IsDisc(scratch);
   if (d_ > 0 && !is_disc) {
     if (!Tidy(scratch)) return false;
+    scratch.removed.clear();
+    for (std::size_t v = 0; v < old_count; ++v)
+      if (scratch.cut[v]) scratch.removed.push_back(static_cast<Index>(v));
     FindCrossings(scratch);
   }
-  if (scratch.removed.size() == old_count) return false;
 
   // One new vertex on each edge that crosses the plane. Its slot 0 holds the new facet, so that
   // adjacent[0] is the kept end of the edge; the edge's facets follow.
@@ -161,12 +166,13 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
   Grow(facets_, facets_.size() + 1, kSpareFacets);
   facets_.back() = facet;
   Grow(vertices_, old_count + scratch.crossings.size(), kSpareVertices);
+  Vertex* const vertices = vertices_.data();
   for (std::size_t c = 0; c < scratch.crossings.size(); ++c) {
     auto& crossing = scratch.crossings[c];
     const Index created = static_cast<Index>(old_count + c);
-    Vertex& removed = vertices_[crossing.removed];
-    Vertex& kept = vertices_[crossing.kept];
-    Vertex& v = vertices_[created];
+    Vertex& removed = vertices[crossing.removed];
+    Vertex& kept = vertices[crossing.kept];
+    Vertex& v = vertices[created];
     v.facet[0] = new_facet;
     v.adjacent[0] = crossing.kept;
     if constexpr (K > 1) {
@@ -196,47 +202,50 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
     return false;
   }
   Grow(keys_, vertices_.size(), kSpareVertices);
-  Grow(centres_, vertices_.size() * d_, kSpareVertices * d_);
+  const std::uint64_t cut_key = Mix64(id);
+  if (d_ > 0) Grow(centres_, vertices_.size() * d_, kSpareVertices * d_);
   for (std::size_t c = 0; c < scratch.crossings.size(); ++c) {
     const auto& crossing = scratch.crossings[c];
-    Vertex& v = vertices_[old_count + c];
-    const std::uint64_t key = keys_[old_count + c] = KeyOf(v);
+    Vertex& v = vertices[old_count + c];
+    // The new facet takes the place of the one that the edge's removed end is not on any more.
+    const Vertex& removed = vertices[crossing.removed];
+    const std::uint64_t key = keys_[old_count + c] =
+        keys_[crossing.removed] - Mix64(facets_[removed.facet[crossing.slot]].id) + cut_key;
     double* const centre = centres_.data() + (old_count + c) * d_;
-    std::uint32_t ids[K];
-    for (int i = 0; i < K; ++i) ids[i] = facets_[v.facet[i]].id;
-    v.judged = d_ > 0 && around.Centre(ids, key, v.x, centre);
-    if (v.judged) {
-      v.norm2 = Dot(centre, centre, static_cast<int>(d_));
-      continue;
+    v.judged = false;
+    if (d_ > 0) {
+      std::uint32_t ids[K];
+      for (int i = 0; i < K; ++i) ids[i] = facets_[v.facet[i]].id;
+      v.judged = around.Centre(ids, key, v.x, centre);
+      if (v.judged) {
+        v.norm2 = Dot(centre, centre, static_cast<int>(d_));
+        continue;
+      }
     }
-    Locate(v, vertices_[crossing.kept], vertices_[crossing.removed], excess[crossing.kept],
-           excess[crossing.removed], d_ > 0 ? kJudgedSlack : kSlack);
+    Locate(v, vertices[crossing.kept], removed, excess[crossing.kept], excess[crossing.removed],
+           d_ > 0 ? kJudgedSlack : kSlack);
     if (d_ > 0) around.Lift(v.x, centre);
   }
+  Facet* const facets = facets_.data();
   for (const Index v : scratch.removed)
-    for (const Index f : vertices_[v].facet) --facets_[f].vertices;
+    for (const Index f : vertices[v].facet) --facets[f].vertices;
   for (std::size_t v = old_count; v < vertices_.size(); ++v)
-    for (const Index f : vertices_[v].facet) ++facets_[f].vertices;
+    for (const Index f : vertices[v].facet) ++facets[f].vertices;
   for (auto v = scratch.removed.rbegin(); v != scratch.removed.rend(); ++v) DropVertex(*v);
   DropFacets();
   Measure();
   return true;
 }
 
-// What is cut off, and the edges that the cut crosses.
+// The edges that the cut crosses, from what is removed, ascending.
 template <int K>
 void RestrictedVoronoiCell<K>::FindCrossings(Scratch& scratch) const {
   scratch.crossings.clear();
-  scratch.removed.clear();
-  for (std::size_t v = 0; v < vertices_.size(); ++v) {
-    if (!scratch.cut[v]) continue;
-    scratch.removed.push_back(static_cast<Index>(v));
+  for (const Index v : scratch.removed)
     for (int s = 0; s < K; ++s) {
       const Index w = vertices_[v].adjacent[s];
-      if (!scratch.cut[w])
-        scratch.crossings.push_back({w, 0, static_cast<Index>(v), static_cast<Index>(s)});
+      if (!scratch.cut[w]) scratch.crossings.push_back({w, 0, v, static_cast<Index>(s)});
     }
-  }
 }
 
 // For K = 3, whether the crossed edges, two on each facet that has any, go round in one circle:
@@ -327,16 +336,17 @@ template <int K>
 void RestrictedVoronoiCell<K>::DropVertex(std::size_t v) {
   const std::size_t last = vertices_.size() - 1;
   if (v != last) {
-    for (const Index w : vertices_[last].adjacent)
-      for (Index& back : vertices_[w].adjacent)
+    Vertex* const vertices = vertices_.data();
+    for (const Index w : vertices[last].adjacent)
+      for (Index& back : vertices[w].adjacent)
         if (back == last) back = static_cast<Index>(v);
-    vertices_[v] = vertices_[last];
+    vertices[v] = vertices[last];
     keys_[v] = keys_[last];
-    std::copy_n(centres_.data() + last * d_, d_, centres_.data() + v * d_);
+    if (d_ > 0) std::copy_n(centres_.data() + last * d_, d_, centres_.data() + v * d_);
   }
   vertices_.pop_back();
   keys_.pop_back();
-  centres_.resize(last * d_);
+  if (d_ > 0) centres_.resize(last * d_);
 }
 
 // Drops the facets that no vertex is left on.
@@ -359,8 +369,9 @@ template <int K>
 void RestrictedVoronoiCell<K>::Measure() {
   max_norm2_ = 0;
   for (const Vertex& v : vertices_) max_norm2_ = std::max(max_norm2_, v.norm2);
-  has_fake_ = false;
-  for (const Facet& f : facets_) has_fake_ |= IsFake(f.id);
+  // What is cut away does not come back.
+  has_fake_ = has_fake_ && std::any_of(facets_.begin(), facets_.end(),
+                                       [](const Facet& f) { return IsFake(f.id); });
 }
 
 template class RestrictedVoronoiCell<1>;

@@ -38,7 +38,7 @@ class RestrictedVoronoiCell {
   struct Scratch {
     std::vector<double> excess;
     std::vector<std::uint8_t> cut, seen;
-    std::vector<Index> stack, removed, crossed;
+    std::vector<Index> removed, crossed;
     struct Crossing {
       Index kept, kept_slot, removed, slot;
     };  // an edge and its place at both ends

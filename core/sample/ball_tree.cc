@@ -12,6 +12,8 @@ namespace {
 
 // Parted at the middle of its extent, no half holds less than one in so many of the points.
 constexpr std::size_t kLeastShare = 16;
+// Fewer points are not worth a second thread.
+constexpr std::size_t kBuiltAlone = 512;
 
 }  // namespace
 
@@ -39,11 +41,14 @@ void BallTree::Measure(std::uint32_t node, const std::uint32_t* begin, const std
   double* c = Centre(node);
   Mean(begin, end, c);
   double radius = 0, outreach = 0;
-  for (const std::uint32_t* i = begin; i != end; ++i) {
-    const double distance = Distance(c, Point(*i), d_);
-    radius = std::max(radius, distance);
-    outreach = std::max(outreach, distance + influence_[*i]);
-  }
+  WithDimension(d_, [&](auto known) {
+    const int d = known() > 0 ? known() : d_;
+    for (const std::uint32_t* i = begin; i != end; ++i) {
+      const double distance = Distance(c, Point(*i), d);
+      radius = std::max(radius, distance);
+      outreach = std::max(outreach, distance + influence_[*i]);
+    }
+  });
   nodes_[node].radius = radius;
   nodes_[node].outreach = outreach;
 }
@@ -61,37 +66,48 @@ void BallTree::MakeLeaf(std::uint32_t node, std::uint32_t first_slot, const std:
 // their extent, unless that would leave hardly any on one side.
 std::uint32_t* BallTree::Middle(std::uint32_t* begin, std::uint32_t* end, Halving halving) const {
   const auto count = static_cast<std::size_t>(end - begin);
-  const auto farthest = [&](const double* from) {
-    const std::uint32_t* best = begin;
-    double most = -1;
-    for (const std::uint32_t* i = begin; i != end; ++i) {
-      const double s = SquaredDistance(from, Point(*i), d_);
-      if (s > most) {
-        most = s;
-        best = i;
-      }
-    }
-    return Point(*best);
-  };
   thread_local std::vector<double> axis;
   axis.resize(static_cast<std::size_t>(d_));
   Mean(begin, end, axis.data());
-  const double* a = farthest(axis.data());
-  const double* b = farthest(a);
-  for (int j = 0; j < d_; ++j) axis[static_cast<std::size_t>(j)] = b[j] - a[j];
   // Memory of the small ones, which are many, is used again.
   using Along = std::vector<std::pair<double, std::uint32_t>>;
   thread_local Along kept;
   Along own;
   Along& along = count < kBuiltAlone ? kept : own;
-  along.clear();
-  along.reserve(count);
-  for (const std::uint32_t* i = begin; i != end; ++i)
-    along.emplace_back(Dot(axis.data(), Point(*i), d_), *i);
+  along.resize(count);
+  double least = INFINITY, most = -INFINITY;
+  WithDimension(d_, [&](auto known) {
+    const int d = known() > 0 ? known() : d_;
+    const auto farthest = [&](const double* from) {
+      const std::uint32_t* best = begin;
+      double most2 = -1;
+      for (const std::uint32_t* i = begin; i != end; ++i) {
+        const double s = SquaredDistance(from, Point(*i), d);
+        if (s > most2) {
+          most2 = s;
+          best = i;
+        }
+      }
+      return Point(*best);
+    };
+    const double* a = farthest(axis.data());
+    const double* b = farthest(a);
+    double* const line = axis.data();
+    for (int j = 0; j < d; ++j) line[j] = b[j] - a[j];
+    std::pair<double, std::uint32_t>* const to = along.data();
+    double low = INFINITY, high = -INFINITY;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double at = Dot(line, Point(begin[i]), d);
+      to[i] = {at, begin[i]};
+      low = std::min(low, at);
+      high = std::max(high, at);
+    }
+    least = low;
+    most = high;
+  });
   auto middle = along.begin();
   if (halving == Halving::kExtent) {
-    const auto [least, most] = std::minmax_element(along.begin(), along.end());
-    const double halfway = least->first + (most->first - least->first) / 2;
+    const double halfway = least + (most - least) / 2;
     middle = std::partition(along.begin(), along.end(),
                             [&](const auto& item) { return item.first < halfway; });
   }
@@ -228,11 +244,19 @@ void BallTree::SetInfluences(std::vector<double> influences) {
 
 std::vector<BallTree::Bunch> BallTree::Bunches() const {
   std::vector<Bunch> bunches;
-  for (std::uint32_t n = 0; n < nodes_.size(); ++n) {
-    CheckInterruption(n);
+  std::vector<std::uint32_t> open;
+  if (!nodes_.empty()) open.push_back(0);
+  for (std::size_t step = 0; !open.empty(); ++step) {
+    CheckInterruption(step);
+    const std::uint32_t n = open.back();
     const Node& node = nodes_[n];
-    if (node.children == kNone && node.count > 0)
+    open.pop_back();
+    if (node.children != kNone) {
+      open.push_back(node.children + 1);
+      open.push_back(node.children);
+    } else if (node.count > 0) {
       bunches.push_back({slots_.data() + node.first, node.count, Centre(n), node.radius});
+    }
   }
   return bunches;
 }

@@ -115,8 +115,7 @@ class BallTree {
 
  private:
   static constexpr int kLeafCapacity = 12;
-  static constexpr std::size_t kBuiltLeaf = 8;      // points of a leaf at most, when built
-  static constexpr std::size_t kBuiltAlone = 4096;  // fewer points are not worth a second thread
+  static constexpr std::size_t kBuiltLeaf = 8;  // points of a leaf at most, when built
   static constexpr std::size_t kRebuild = 4;
   static constexpr std::uint32_t kNone = 0xffffffffu;
   // More than rounding can take from a distance in R^d, d up to thousands: no point is overlooked

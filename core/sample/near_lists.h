@@ -10,8 +10,10 @@ namespace stellate::core {
 // of threads.
 class NearLists {
  public:
-  // `points`: d each. Near is what lies nearer than `radius`.
-  NearLists(const std::vector<double>& points, int d, double radius);
+  // `points`: d each. Near is what lies nearer than `radius`, or than that share of it that is the
+  // smaller of the two points': `shares` is by point, or empty.
+  NearLists(const std::vector<double>& points, int d, double radius,
+            const std::vector<double>& shares = {});
 
   std::size_t size() const { return spans_.size(); }
   // Ascending; i is not among them.

@@ -14,15 +14,16 @@ constexpr double kRounding = 1 + 1e-12;
 
 }  // namespace
 
-Runs::Runs(const std::vector<double>& points, int d, double reach)
+Runs::Runs(std::span<const double> points, int d, double reach, std::span<const double> shares)
     : stride_(static_cast<std::size_t>(d)) {
   const std::size_t count = points.size() / stride_;
   const auto at = [&](std::size_t i) { return points.data() + i * stride_; };
   for (std::size_t begin = 0, end; begin < count; begin = end) {
     CheckInterruption(begins_.size());
     begins_.push_back(begin);
+    const double far = shares.empty() ? reach : reach * shares[begin];
     for (end = begin + 1; end < count && end < begin + kMostPoints; ++end)
-      if (!(SquaredDistance(at(begin), at(end), d) <= reach * reach)) break;
+      if (!(SquaredDistance(at(begin), at(end), d) <= far * far)) break;
   }
   centres_.assign(begins_.size() * stride_, 0.0);
   radii_.assign(begins_.size(), 0.0);
@@ -38,8 +39,9 @@ Runs::Runs(const std::vector<double>& points, int d, double reach)
   });
 }
 
-RunTree::RunTree(const std::vector<double>& points, int d, double reach)
-    : d_(d), points_(points), runs_(points, d, reach), tree_(d, &runs_.centres()) {
+RunTree::RunTree(std::span<const double> points, int d, double reach,
+                 std::span<const double> shares)
+    : d_(d), points_(points), runs_(points, d, reach, shares), tree_(d, &runs_.centres()) {
   tree_.Assign(runs_.radii(), BallTree::Halving::kExtent);
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/sample/ball_tree.h"
@@ -12,8 +13,9 @@ namespace stellate::core {
 // what is near them is searched for once a run, instead of once a point.
 class Runs {
  public:
-  // `points`: d each. The points of a run lie within `reach` of its first.
-  Runs(const std::vector<double>& points, int d, double reach);
+  // `points`: d each. The points of a run lie within `reach` of its first, or within that share of
+  // it that is the first's: `shares` is by point, or empty.
+  Runs(std::span<const double> points, int d, double reach, std::span<const double> shares = {});
 
   std::size_t count() const { return radii_.size(); }
   std::size_t begin(std::size_t run) const { return begins_[run]; }
@@ -36,7 +38,7 @@ class Runs {
 class RunTree {
  public:
   // `points` as above; borrowed.
-  RunTree(const std::vector<double>& points, int d, double reach);
+  RunTree(std::span<const double> points, int d, double reach, std::span<const double> shares = {});
   RunTree(const RunTree&) = delete;
   RunTree& operator=(const RunTree&) = delete;
 
@@ -47,7 +49,7 @@ class RunTree {
 
  private:
   int d_;
-  const std::vector<double>& points_;
+  std::span<const double> points_;
   Runs runs_;
   BallTree tree_;
 };

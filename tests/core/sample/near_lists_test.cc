@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "core/base/random.h"
@@ -32,6 +33,28 @@ TEST(NearLists, HoldWhatIsNearerAndNothingElse) {
       }
     }
   }
+}
+
+TEST(NearLists, GoByTheSmallerShareOfTwo) {
+  constexpr int kD = 2;
+  constexpr std::size_t kCount = 500;
+  constexpr double kRadius = 0.3;
+  Random random(7, 0);
+  std::vector<double> x(kCount * kD), shares(kCount);
+  for (double& c : x) c = random.Uniform();
+  for (double& share : shares) share = 0.05 + 0.95 * random.Uniform();
+  const NearLists near(x, kD, kRadius, shares);
+  std::size_t found = 0;
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    std::vector<std::uint32_t> expected;
+    for (std::uint32_t j = 0; j < kCount; ++j)
+      if (i != j && Distance(x.data() + i * kD, x.data() + j * kD, kD) <
+                        kRadius * std::min(shares[i], shares[j]))
+        expected.push_back(j);
+    EXPECT_EQ(std::vector<std::uint32_t>(near.Of(i).begin(), near.Of(i).end()), expected);
+    found += expected.size();
+  }
+  EXPECT_GT(found, kCount);
 }
 
 }  // namespace

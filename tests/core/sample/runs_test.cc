@@ -46,6 +46,18 @@ TEST(Runs, HoldEveryPointOnceInItsBall) {
   }
 }
 
+TEST(Runs, GoByTheShareOfTheirFirst) {
+  constexpr std::size_t kCount = 300;
+  std::vector<double> x(kCount), shares(kCount);
+  for (std::size_t i = 0; i < kCount; ++i) {
+    x[i] = 0.1 * static_cast<double>(i);
+    shares[i] = i < kCount / 2 ? 1 : 0.25;
+  }
+  const Runs runs(x, 1, 1.05, shares);
+  for (std::size_t run = 0; run + 1 < runs.count(); ++run)
+    EXPECT_EQ(runs.end(run) - runs.begin(run), runs.begin(run) < kCount / 2 ? 11u : 3u);
+}
+
 TEST(Runs, OfNothingAreNone) {
   const Runs runs({}, 3, 1);
   EXPECT_EQ(runs.count(), 0u);
