@@ -63,6 +63,8 @@ class StarComplex<K>::Around final : public Surroundings<K> {
 
   bool Centre(const std::uint32_t* ids, std::uint64_t key, double* x,
               double* centre) const override {
+    // Of a k-simplex in R^k, the place where its facets meet is the circumcentre.
+    if (complex_.d_ == K && std::none_of(ids, ids + K, IsWall)) return false;
     if (!(born_ && Known(key, centre)) && !Common(ids, key, centre)) return false;
     const int n = complex_.d_;
     for (int a = 0; a < K; ++a) x[a] = Dot(p_.tangent + a * n, centre, n);
@@ -106,7 +108,9 @@ class StarComplex<K>::Around final : public Surroundings<K> {
       else
         ids[static_cast<std::size_t>(count++)] = others[s];
     }
-    std::sort(ids.begin(), ids.begin() + count);
+    std::uint32_t* const first = ids.data();
+    for (int i = 1; i < count; ++i)  // they are few
+      for (int j = i; j > 0 && first[j] < first[j - 1]; --j) std::swap(first[j], first[j - 1]);
     if (walls != 0) return CommonOnFace(ids.data(), count, walls, centre);
     const int n = complex_.d_;
     // A guest's id may be another's next.
@@ -116,8 +120,8 @@ class StarComplex<K>::Around final : public Surroundings<K> {
     if (!(lasts ? cache.Centre(complex_.centre_owner_, ids, key + Mix64(p_.id), n, centre, find)
                 : find(centre)))
       return false;
-    const double* const first = Find(ids[0]).point;
-    for (int i = 0; i < n; ++i) centre[i] += first[i] - p_.point[i];
+    const double* const origin = Find(ids[0]).point;
+    for (int i = 0; i < n; ++i) centre[i] += origin[i] - p_.point[i];
     return true;
   }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/base/instantiate.h"
+#include "core/base/parallel.h"
 
 namespace stellate::core {
 namespace {
@@ -94,68 +95,112 @@ bool IsConsistentOnFaces(const StarComplex<K>& complex, std::uint32_t p, std::si
 
 }  // namespace
 
+namespace {
+
+// The vertex of the cell of q that is dual to a simplex on q with these other vertices, of that
+// key; vertex_count() if there is none.
 template <int K>
-bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p, std::size_t v) {
-  if (complex.walls(p) != 0) return IsConsistentOnFaces<K>(complex, p, v);
+std::size_t FindIn(const RestrictedVoronoiCell<K>& cell, std::uint32_t q, std::uint64_t key,
+                   const std::uint32_t (&others)[K]) {
+  if constexpr (K == 2) {  // no key is quicker than the ids themselves
+    std::size_t v = 0;
+    for (; v < cell.vertex_count(); ++v) {
+      const std::uint32_t a = cell.id(v), b = cell.id(cell.Next(v));
+      if ((a == others[0] && b == others[1]) || (a == others[1] && b == others[0])) break;
+    }
+    return v;
+  } else {
+    return cell.Find(key - Mix64(q));
+  }
+}
+
+// Looks for the simplex dual to vertex v of p's cell in the stars of its other vertices: where it
+// is, by facet of v. False: not in all of them.
+template <int K>
+bool FindInStars(const StarComplex<K>& complex, std::uint32_t p, std::size_t v,
+                 std::uint32_t (&others)[K], std::size_t (&at)[K]) {
   const auto& cell = complex.cell(p);
-  std::uint32_t others[K];
   for (int s = 0; s < K; ++s) {
     others[s] = cell.id(cell.facet(v, s));
     if (!IsSample(others[s])) return false;
   }
-  if constexpr (K == 2) {
-    const auto holds = [&](std::uint32_t q, std::uint32_t other) {
-      const auto& there = complex.cell(q);
-      for (std::size_t w = 0; w < there.vertex_count(); ++w) {
-        const std::uint32_t a = there.id(w), b = there.id(there.Next(w));
-        if ((a == p && b == other) || (a == other && b == p)) return true;
-      }
-      return false;
-    };
-    return holds(others[0], others[1]) && holds(others[1], others[0]);
-  } else {
-    const std::uint64_t key = SimplexKey<K>(cell, v, p);
-    for (const std::uint32_t q : others) {
-      const auto& there = complex.cell(q);
-      if (there.Find(key - Mix64(q)) == there.vertex_count()) return false;
-    }
-    return true;
+  const std::uint64_t key = K == 2 ? 0 : SimplexKey<K>(cell, v, p);
+  for (int s = 0; s < K; ++s) {
+    std::uint32_t rest[K];
+    std::copy_n(others, K, rest);
+    rest[s] = p;
+    const auto& there = complex.cell(others[s]);
+    at[s] = FindIn<K>(there, others[s], key, rest);
+    if (at[s] == there.vertex_count()) return false;
   }
+  return true;
+}
+
+}  // namespace
+
+template <int K>
+bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p, std::size_t v) {
+  if (complex.walls(p) != 0) return IsConsistentOnFaces<K>(complex, p, v);
+  std::uint32_t others[K];
+  std::size_t at[K];
+  return FindInStars<K>(complex, p, v, others, at);
 }
 
 template <int K>
-Folds<K>::Folds(const StarComplex<K>& complex, std::uint32_t p)
-    : cell_(complex.cell(p)), sides_(cell_.vertex_count()) {
-  for (std::size_t v = 0; v < sides_.size(); ++v) {
-    std::uint16_t facets[K];
-    for (int s = 0; s < K; ++s) facets[s] = cell_.facet(v, s);
-    sides_[v] = Orientation<K>(complex, p, facets);
-  }
+ConsistentSimplices<K>::ConsistentSimplices(const StarComplex<K>& complex)
+    : known_(complex.size()) {
+  ParallelFor(complex.size(), [&](std::uint32_t p) {
+    if (complex.walls(p) != 0) return;
+    const auto& cell = complex.cell(p);
+    std::uint32_t others[K];
+    std::size_t at[K];
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      bool lowest = true;
+      for (int s = 0; s < K; ++s) lowest = lowest && cell.id(cell.facet(v, s)) > p;
+      if (!lowest || !FindInStars<K>(complex, p, v, others, at)) continue;
+      Note(p, v);
+      for (int s = 0; s < K; ++s) Note(others[s], at[s]);
+    }
+  });
 }
 
 // Neighbours lie on different sides of the facet they share if, with the one's vertex off it in the
 // place of the other's, their signs differ.
 template <int K>
-bool Folds<K>::IsFolded(std::size_t v) const {
-  if (sides_[v] == 0) return true;
-  for (int s = 0; s < K; ++s) {
-    const std::size_t w = cell_.adjacent(v, s);
-    int at[K];  // the place among v's facets of each of w's; the one off v takes that of slot s
-    bool is_wall = false;
-    for (int r = 0; r < K; ++r) {
-      at[r] = s;
-      for (int i = 0; i < K; ++i)
-        if (cell_.facet(v, i) == cell_.facet(w, r)) at[r] = i;
-      is_wall = is_wall || (at[r] == s && IsWall(cell_.id(cell_.facet(w, r))));
-    }
-    if (is_wall) continue;  // the mesh ends there
-    double side = sides_[w];
-    for (int r = 0; r < K; ++r)
-      for (int i = 0; i < r; ++i)
-        if (at[i] > at[r]) side = -side;
-    if (side * sides_[v] >= 0) return true;
+Folds<K>::Folds(const StarComplex<K>& complex, std::uint32_t p)
+    : folded_(complex.cell(p).vertex_count()) {
+  const auto& cell = complex.cell(p);
+  thread_local std::vector<double> sides;
+  sides.resize(folded_.size());
+  for (std::size_t v = 0; v < sides.size(); ++v) {
+    std::uint16_t facets[K];
+    for (int s = 0; s < K; ++s) facets[s] = cell.facet(v, s);
+    sides[v] = Orientation<K>(complex, p, facets);
+    folded_[v] = sides[v] == 0;
   }
-  return false;
+  const auto is_wall = [&](std::size_t facet) { return IsWall(cell.id(facet)); };
+  for (std::size_t v = 0; v < sides.size(); ++v) {
+    for (int s = 0; s < K; ++s) {
+      const std::size_t w = cell.adjacent(v, s);
+      if (w < v) continue;
+      int at[K];  // the place among v's facets of each of w's; the one off v takes that of slot s
+      std::size_t off_v = 0;
+      for (int r = 0; r < K; ++r) {
+        at[r] = s;
+        for (int i = 0; i < K; ++i)
+          if (cell.facet(v, i) == cell.facet(w, r)) at[r] = i;
+        if (at[r] == s) off_v = cell.facet(w, r);
+      }
+      double side = sides[w];
+      for (int r = 0; r < K; ++r)
+        for (int i = 0; i < r; ++i)
+          if (at[i] > at[r]) side = -side;
+      if (!(side * sides[v] >= 0)) continue;
+      // Beyond a wall there is nothing to fold over.
+      if (!is_wall(off_v)) folded_[v] = 1;
+      if (!is_wall(cell.facet(v, s))) folded_[w] = 1;
+    }
+  }
 }
 
 template <int K>
@@ -213,6 +258,7 @@ std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(
       const StarComplex<K>&, std::uint32_t);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
+STELLATE_INSTANTIATE_CLASS(ConsistentSimplices)
 STELLATE_INSTANTIATE_CLASS(Folds)
 
 }  // namespace stellate::core

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -30,6 +31,26 @@ std::optional<std::size_t> FindSimplex(const RestrictedVoronoiCell<K>& cell, std
 template <int K>
 bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p, std::size_t v);
 
+// The consistent simplices of all stars, looked for once a simplex and not once for each of its
+// stars. It does not know of all: of the others IsConsistent tells, as of those at the boundary.
+template <int K>
+class ConsistentSimplices {
+ public:
+  // In parallel.
+  explicit ConsistentSimplices(const StarComplex<K>& complex);
+
+  // The vertices of p's cell that are known to be dual to consistent simplices: a bit each, of the
+  // first 64.
+  std::uint64_t Of(std::uint32_t p) const { return known_[p].load(std::memory_order_relaxed); }
+
+ private:
+  void Note(std::uint32_t p, std::size_t v) {
+    if (v < 64) known_[p].fetch_or(std::uint64_t{1} << v, std::memory_order_relaxed);
+  }
+
+  std::vector<std::atomic<std::uint64_t>> known_;
+};
+
 // Which simplices of star(p) overlap a neighbour in it near the facet they share, seen in T_pM.
 // Only stars that are judged at common centres can be folded.
 template <int K>
@@ -38,11 +59,10 @@ class Folds {
   Folds(const StarComplex<K>& complex, std::uint32_t p);
 
   // Of the simplex dual to vertex v of p's cell.
-  bool IsFolded(std::size_t v) const;
+  bool IsFolded(std::size_t v) const { return folded_[v] != 0; }
 
  private:
-  const RestrictedVoronoiCell<K>& cell_;
-  std::vector<double> sides_;  // by vertex: the sign of its simplex, in the order of its facets
+  std::vector<std::uint8_t> folded_;  // by vertex
 };
 
 // Simplices of star(p) that are missing from the star of one of their vertices.
@@ -65,6 +85,7 @@ template <int K>
 std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(
     const StarComplex<K>& complex, std::uint32_t p);
 
+STELLATE_DECLARE_CLASS(ConsistentSimplices)
 STELLATE_DECLARE_CLASS(Folds)
 
 }  // namespace stellate::core

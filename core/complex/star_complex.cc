@@ -16,7 +16,8 @@ StarComplex<K>::StarComplex(int d, double epsilon, double inradius, Judging judg
       judging_(judging),
       judged_radius2_(kJudgedRadius * kJudgedRadius * epsilon * epsilon),
       weight_scale_(1e-10 * epsilon * epsilon),
-      tree_(d, &points_) {}
+      tree_(d, &points_),
+      boundary_tree_(d, &boundary_points_) {}
 
 template <int K>
 StarComplex<K>::StarComplex(const StarComplex& other)
@@ -35,12 +36,25 @@ StarComplex<K>::StarComplex(const StarComplex& other)
       largest_guard_(other.largest_guard_),
       cells_(other.cells_),
       tree_(other.tree_, &points_),
+      boundary_(other.boundary_),
+      boundary_points_(other.boundary_points_),
+      boundary_tree_(other.boundary_tree_, &boundary_points_),
       simplex_count_(other.simplex_count_) {}
 
 template <int K>
 double StarComplex<K>::Project(std::uint32_t p, const double* q, double* normal) const {
   Step step(d_);
   return Project(At(p), q, step.data(), normal);
+}
+
+template <int K>
+double StarComplex<K>::Project(const Site& p, const double* q, double* step, double* normal) const {
+  return WithDimension(d_, [&](auto known) {
+    const int d = known() > 0 ? known() : d_;
+    for (int i = 0; i < d; ++i) step[i] = q[i] - p.point[i];
+    for (int a = 0; a < K; ++a) normal[a] = Dot(p.tangent + a * d, step, d);
+    return Dot(step, step, d);
+  });
 }
 
 template <int K>
@@ -170,17 +184,14 @@ bool StarComplex<K>::AnyWithin(const double* q, double radius) const {
 
 template <int K>
 std::vector<std::uint32_t> StarComplex<K>::Simplices() const {
-  std::vector<std::uint32_t> all;
-  all.reserve(simplex_count_ * (K + 1));
-  std::vector<Simplex> owned;
-  for (std::uint32_t p = 0; p < cells_.size(); ++p) {
-    CheckInterruption(p);
+  return ParallelGather<std::uint32_t>(cells_.size(), [&](std::size_t p, auto* all) {
+    thread_local std::vector<Simplex> owned;
     owned.clear();
-    ForEachOwned(p, [&](std::size_t, const Simplex& s) { owned.push_back(s); });
+    ForEachOwned(static_cast<std::uint32_t>(p),
+                 [&](std::size_t, const Simplex& s) { owned.push_back(s); });
     std::sort(owned.begin(), owned.end());
-    for (const Simplex& s : owned) all.insert(all.end(), s.begin(), s.end());
-  }
-  return all;
+    for (const Simplex& s : owned) all->insert(all->end(), s.begin(), s.end());
+  });
 }
 
 template <int K>

@@ -54,12 +54,16 @@ class StarComplex {
   // coordinates each by ascending wall: the outward unit normals of the walls in T_pM.
   std::uint32_t Append(const double* point, const double* tangent, std::uint32_t near = kNone,
                        WallSet walls = 0, const double* conormals = nullptr);
-  // A point of a sample that is there before any star: no search finds it before Commit. Its star
-  // then hangs on the points within reach alone: a part of the sample, with all points that far
-  // around it, has the stars of the whole, bit for bit, if its points keep their order and
-  // their names. REQUIRES: no stars yet, nothing appended, and no walls; names ascend.
+  // A point of a sample that is there before any star of it: no search finds it before Commit,
+  // which builds all stars, those that there are anew. They then hang on the points within reach
+  // alone: a part of the sample, with all points that far around it, has the stars of the whole,
+  // bit for bit, if its points keep their order and their names. REQUIRES: nothing waits for a
+  // Commit but what was laid, and the point is on no wall; names ascend.
   void Lay(const double* point, const double* tangent) { Lay(point, tangent, size()); }
   void Lay(const double* point, const double* tangent, std::uint32_t name);
+  // The size bound at the point that was laid last, where it is not epsilon for all; said of each
+  // or of none. It is where to look for what cuts its star, never what does.
+  void LaidAt(double bound) { laid_bounds_.push_back(bound); }
   // Builds the stars of the appended points and clips all others by them, in parallel; the result
   // does not depend on the number of threads. `around`, if given, gets the neighbours that changed
   // stars have or had (with repetitions): their simplices may have become inconsistent.
@@ -220,11 +224,7 @@ class StarComplex {
   // Judges it. Whether its vertices are those that it has there, too: none of `near`, the points
   // within reach, is nearer to a common centre than the simplex' own.
   bool JudgeCell(Cell& cell, const Site& p, const Near& near) const;
-  double Project(const Site& p, const double* q, double* step, double* normal) const {
-    for (int i = 0; i < d_; ++i) step[i] = q[i] - p.point[i];
-    for (int a = 0; a < K; ++a) normal[a] = Dot(p.tangent + a * d_, step, d_);
-    return Dot(step, step, d_);
-  }
+  double Project(const Site& p, const double* q, double* step, double* normal) const;
   double HalfSpace(const Site& p, const Site& q, double* step, double* normal) const {
     return 0.5 * (Project(p, q.point, step, normal) + Weight(p.id) - Weight(q.id));
   }
@@ -270,20 +270,33 @@ class StarComplex {
     }
   };
   std::vector<Cut> BuildNewStars(std::uint32_t first);
-  // Of a sample laid at once: every star is built once, from what lies around it.
+  // Where a sample was laid: every star is built once, from what lies around it.
   Change BuildLaidStars();
   void BuildLaidStar(std::uint32_t p, const std::vector<std::uint32_t>& around, Cell& cell) const;
+  double LaidBound(std::uint32_t p) const {
+    return laid_bounds_.empty() ? epsilon() : laid_bounds_[p];
+  }
+  template <typename Search>
+  void BuildLaidPolygon(const Site& p, Near* near, double gathered, const Search& search,
+                        Cell& cell) const;
   template <typename Search>
   bool BuildInFlats(const Site& p, const Near& near, double gathered, const Search& search,
                     Cell& cell, typename Cell::Scratch& scratch) const;
   static std::vector<Turn> InTurns(const std::vector<Cut>& cuts);
   void CutStars(const std::vector<Turn>& turns, const std::vector<Cut>& cuts, std::uint32_t first,
                 Change* change);
+  // What is known of the boundary's stars besides, after some stars changed.
+  void MeasureFaces(const std::vector<Turn>& turns, std::uint32_t first);
   double epsilon() const { return std::sqrt(judged_radius2_) / kJudgedRadius; }
+  // The same for a cell of that max_norm2, where there are no guards.
+  static double InfluenceWithin(double most2) { return 2 * std::sqrt(most2) * (1 + 1e-9); }
   // How far from p a point may be whose bisector cuts its cell.
   double Influence(std::uint32_t p, const Cell& cell) const {
-    const double most2 = cell.max_norm2();
-    if (!has_guards()) return 2 * std::sqrt(most2) * (1 + 1e-9);
+    return Influence(p, cell.max_norm2());
+  }
+  // ... or cuts vertices that are no farther out.
+  double Influence(std::uint32_t p, double most2) const {
+    if (!has_guards()) return InfluenceWithin(most2);
     const double power2 = std::max(most2 - GuardOf(p) + largest_guard_, 0.0);
     return (std::sqrt(most2) + std::sqrt(power2)) * (1 + 1e-9);
   }
@@ -304,7 +317,12 @@ class StarComplex {
   double largest_guard_ = 0;
   Blocks<Cell> cells_;
   std::vector<std::uint32_t> near_;  // of the appended points
+  std::vector<double> laid_bounds_;  // of the laid points, until they have stars; or empty
   BallTree tree_;
+  // The points of the boundary, ascending, with the influence of their stars' simplices of faces.
+  std::vector<std::uint32_t> boundary_;
+  std::vector<double> boundary_points_;
+  BallTree boundary_tree_;
   std::uint64_t simplex_count_ = 0;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/instantiate.h"
+#include "core/base/parallel.h"
 #include "core/complex/star_complex.h"
 
 namespace stellate::core {
@@ -32,16 +33,48 @@ typename StarComplex<K>::FaceSimplex StarComplex<K>::FaceSimplexOf(std::uint32_t
   return simplex;
 }
 
+// Of simplices of faces alone: those inside are larger, and no point yields to them.
+template <int K>
+void StarComplex<K>::MeasureFaces(const std::vector<Turn>& turns, std::uint32_t first) {
+  if (boundary_.empty()) return;
+  std::vector<std::uint32_t> changed;  // by place in boundary_
+  for (const Turn& turn : turns) {
+    CheckInterruption(changed.size());
+    if (walls(turn.star) == 0) continue;
+    const auto at = std::lower_bound(boundary_.begin(), boundary_.end(), turn.star);
+    changed.push_back(static_cast<std::uint32_t>(at - boundary_.begin()));
+  }
+  for (auto at = std::lower_bound(boundary_.begin(), boundary_.end(), first); at != boundary_.end();
+       ++at)
+    changed.push_back(static_cast<std::uint32_t>(at - boundary_.begin()));
+  std::vector<double> influence(changed.size());
+  ParallelFor(changed.size(), [&](std::size_t i) {
+    const std::uint32_t p = boundary_[changed[i]];
+    const Cell& cell = cells_[p];
+    double most2 = 0;
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+      if (cell.norm2(v) > most2 && WallsAt<K>(cell, v) != 0 && !cell.HasFakeFacet(v))
+        most2 = cell.norm2(v);
+    influence[i] = Influence(p, most2);
+  });
+  for (std::size_t i = 0; i < changed.size(); ++i) {
+    CheckInterruption(i);
+    boundary_tree_.SetInfluence(changed[i], influence[i]);
+  }
+  boundary_tree_.Refit();
+}
+
 template <int K>
 std::optional<typename StarComplex<K>::CellVertex> StarComplex<K>::EncroachedBy(
     const double* point, WallSet walls) const {
-  if (walls_.empty()) return std::nullopt;
+  if (boundary_.empty()) return std::nullopt;
   std::optional<CellVertex> worst;
   const int own = K - CountWalls(walls);
   int lowest = own;
   double farthest2 = 0;
   std::vector<double> step(stride());
-  tree_.ForEachInfluencing(point, [&](std::uint32_t p) {
+  boundary_tree_.ForEachInfluencing(point, [&](std::uint32_t i) {
+    const std::uint32_t p = boundary_[i];
     if (IsSubset(this->walls(p), walls)) return;
     const Cell& cell = cells_[p];
     double normal[K];
@@ -79,6 +112,7 @@ bool StarComplex<K>::InGuard(const double* point) const {
 #define STELLATE_EACH(K)                                                                          \
   template StarComplex<K>::FaceSimplex StarComplex<K>::FaceSimplexOf(std::uint32_t, const Cell&,  \
                                                                      std::size_t, WallSet) const; \
+  template void StarComplex<K>::MeasureFaces(const std::vector<Turn>&, std::uint32_t);            \
   template bool StarComplex<K>::InGuard(const double*) const;                                     \
   template std::optional<StarComplex<K>::CellVertex> StarComplex<K>::EncroachedBy(const double*,  \
                                                                                   WallSet) const;

@@ -7,6 +7,7 @@
 #include "core/base/instantiate.h"
 #include "core/base/parallel.h"
 #include "core/complex/star_complex.h"
+#include "core/geometry/laid_polygon.h"
 
 namespace stellate::core {
 
@@ -64,22 +65,39 @@ template <typename Influencing>
 void StarComplex<K>::BuildStar(const Site& p, const Site* guest, std::uint32_t near, Cell& cell,
                                typename Cell::Scratch& scratch,
                                const Influencing& influencing) const {
-  ResetCell(cell, p, guest, scratch);
+  // In the flats, K = 2, a polygon is made apart, where each half-space is found once.
+  thread_local LaidPolygon polygon;
+  const bool apart =
+      K == 2 && judging_ == Judging::kFlats && guest == nullptr && p.walls == 0 && !has_guards();
+  const double weight = Weight(p.id);
+  if (apart)
+    polygon.Reset(inradius_);
+  else
+    ResetCell(cell, p, guest, scratch);
+  const auto clip = [&](std::uint32_t q) {
+    return apart ? polygon.ClipBy(q, d_, p.point, p.tangent, weight, Point(q), Weight(q))
+                 : ClipBy(cell, p, At(q), guest, nullptr, scratch);
+  };
+  const auto reach_now = [&] {
+    return apart ? InfluenceWithin(polygon.max_norm2()) : Influence(p.id, cell);
+  };
   // What closes the cell, or nearly so, comes first: without it a search that happens to begin on
   // one side of p would visit all of that side while the cell is open towards the other.
   thread_local std::vector<std::uint32_t> first;
   Neighbourhood(p.point, near, &first);
   for (const std::uint32_t q : first)
-    if (q != p.id) ClipBy(cell, p, At(q), guest, nullptr, scratch);
-  double reach = Influence(p.id, cell);
+    if (q != p.id) clip(q);
+  double reach = reach_now();
   tree_.VisitAround(
       p.point, [&] { return reach; },
       [&](std::uint32_t q, double) {
         // Once by each point: a second cut by the same plane would be decided by rounding.
         if (q == p.id || std::find(first.begin(), first.end(), q) != first.end()) return;
-        if (ClipBy(cell, p, At(q), guest, nullptr, scratch)) reach = Influence(p.id, cell);
+        if (clip(q)) reach = reach_now();
       },
       influencing);
+  if constexpr (K == 2)
+    if (apart) cell.Take(polygon);
 }
 
 template <int K>
@@ -92,6 +110,9 @@ std::uint32_t StarComplex<K>::Append(const double* point, const double* tangent,
     conormals_at_.resize(id, 0);
     conormals_at_.push_back(static_cast<std::uint32_t>(conormals_.size()));
     conormals_.insert(conormals_.end(), conormals, conormals + K * CountWalls(walls));
+    boundary_.push_back(id);
+    boundary_points_.insert(boundary_points_.end(), point, point + d_);
+    boundary_tree_.Insert(0);
   }
   near_.push_back(near);
   points_.insert(points_.end(), point, point + d_);
@@ -177,6 +198,7 @@ void StarComplex<K>::CutStars(const std::vector<Turn>& turns, const std::vector<
         influence[i]);
   }
   tree_.Refit();
+  MeasureFaces(turns, first);
   change->removed = Concatenate(std::move(removed));
   change->added = Concatenate(std::move(added));
   simplex_count_ += change->added.size() / (K + 1);
@@ -188,7 +210,7 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
   const auto first = static_cast<std::uint32_t>(cells_.size());
   Change change;
   if (size() == first) return change;
-  if (tree_.size() == 0) return BuildLaidStars();
+  if (tree_.size() < size()) return BuildLaidStars();
   const std::vector<Cut> cuts = BuildNewStars(first);
   const std::vector<Turn> turns = InTurns(cuts);
   change.stars = ParallelGather<std::uint32_t>(

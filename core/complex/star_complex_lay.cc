@@ -1,16 +1,18 @@
-// How a whole sample is laid at once.
+// How a sample is laid at once: all of it, or all but the boundary's.
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 
 #include "core/base/instantiate.h"
 #include "core/base/parallel.h"
 #include "core/complex/star_complex.h"
+#include "core/geometry/laid_polygon.h"
 
 namespace stellate::core {
 namespace {
 
-// Where no circumradius is above epsilon nothing farther than 2 epsilon cuts a star.
+// Where no circumradius is above the size bound nothing farther than twice that cuts a star.
 constexpr double kGathered = 2 * (1 + 1e-6);
 // Before R1 many a star reaches farther, and few beyond this.
 constexpr double kSearched = 3;
@@ -33,6 +35,23 @@ double CutByNear(Near* near, double known, const Reach& reach, const Clip& clip,
     std::sort(near->begin() + static_cast<std::ptrdiff_t>(next), near->end());
     known = farther;
   }
+}
+
+// Parts what lies within `searched` of p, without p itself, by whether it is within `gathered`.
+void Part(const std::vector<std::uint32_t>& ids, const std::vector<double>& points, int any_d,
+          std::uint32_t p, double gathered, double searched, Near* near, Near* beyond) {
+  near->clear();
+  beyond->clear();
+  WithDimension(any_d, [&](auto known) {
+    const int d = known() > 0 ? known() : any_d;
+    const auto stride = static_cast<std::size_t>(d);
+    const double* const point = points.data() + p * stride;
+    for (const std::uint32_t q : ids) {
+      const double distance2 = SquaredDistance(point, points.data() + q * stride, d);
+      if (distance2 > searched * searched || q == p) continue;
+      (distance2 <= gathered * gathered ? near : beyond)->emplace_back(distance2, q);
+    }
+  });
 }
 
 // What lies from `from` to `to` around a point: of all within `searched` of it `beyond` holds what
@@ -80,26 +99,43 @@ bool StarComplex<K>::BuildInFlats(const Site& p, const Near& near, double gather
   return JudgeCell(cell, p, all) && Influence(p.id, cell) <= known;
 }
 
-// `around` holds at least what lies within kSearched epsilon of p.
+// In the flats, K = 2: the polygon is made apart, where each half-space is found once.
+template <int K>
+template <typename Search>
+void StarComplex<K>::BuildLaidPolygon(const Site& p, Near* near, double gathered,
+                                      const Search& search, Cell& cell) const {
+  if constexpr (K == 2) {
+    thread_local LaidPolygon polygon;
+    polygon.Reset(inradius_);
+    const double weight = Weight(p.id);
+    CutByNear(
+        near, gathered, [&] { return InfluenceWithin(polygon.max_norm2()); },
+        [&](std::uint32_t q) {
+          return polygon.ClipBy(q, d_, p.point, p.tangent, weight, Point(q), Weight(q));
+        },
+        search);
+    cell.Take(polygon);
+  }
+}
+
+// `around` holds at least what lies within kSearched size bounds of p.
 template <int K>
 void StarComplex<K>::BuildLaidStar(std::uint32_t p, const std::vector<std::uint32_t>& around,
                                    Cell& cell) const {
   thread_local typename Cell::Scratch scratch;
   thread_local Near near, beyond;
   const Site site = At(p);
-  const double gathered = kGathered * epsilon(), searched = kSearched * epsilon();
-  near.clear();
-  beyond.clear();
-  for (const std::uint32_t q : around) {
-    const double distance2 = SquaredDistance(site.point, Point(q), d_);
-    if (q == p || distance2 > searched * searched) continue;
-    (distance2 <= gathered * gathered ? near : beyond).emplace_back(distance2, q);
-  }
+  const double gathered = kGathered * LaidBound(p), searched = kSearched * LaidBound(p);
+  Part(around, points_, d_, p, gathered, searched, &near, &beyond);
   std::sort(near.begin(), near.end());
   const auto search = [&](double from, double to, Near* found) {
     AppendBetween(tree_, site.point, beyond, searched, from, to, found);
   };
-  if (K > 2 && judging_ == Judging::kCommonCentre &&
+  const bool is_inside = site.walls == 0;
+  if (is_inside && K == 2 && judging_ == Judging::kFlats && !has_guards())
+    return BuildLaidPolygon(
+        site, &near, gathered, [&](double from, double to) { search(from, to, &near); }, cell);
+  if (is_inside && K > 2 && judging_ == Judging::kCommonCentre &&
       BuildInFlats(site, near, gathered, search, cell, scratch))
     return;
   ResetCell(cell, site, nullptr, scratch);
@@ -111,8 +147,12 @@ void StarComplex<K>::BuildLaidStar(std::uint32_t p, const std::vector<std::uint3
 
 template <int K>
 typename StarComplex<K>::Change StarComplex<K>::BuildLaidStars() {
+  Change change;
+  change.removed = Simplices();
+  change.stars.resize(cells_.size());
+  std::iota(change.stars.begin(), change.stars.end(), std::uint32_t{0});
+  centre_owner_ = CentreCache<K>::NewOwner();
   cells_.resize(size());
-  near_.clear();
   tree_.Assign(std::vector<double>(size(), 0.0), BallTree::Halving::kExtent);
   const std::vector<BallTree::Bunch> bunches = tree_.Bunches();
   std::vector<double> influence(size());
@@ -121,7 +161,9 @@ typename StarComplex<K>::Change StarComplex<K>::BuildLaidStars() {
     thread_local Cell cell;  // its memory is used again; what is kept is no larger than it must be
     const BallTree::Bunch& bunch = bunches[b];
     around.clear();
-    tree_.GatherAround(bunch, kSearched * epsilon(), &around);
+    double most = 0;
+    for (std::uint32_t i = 0; i < bunch.count; ++i) most = std::max(most, LaidBound(bunch.ids[i]));
+    tree_.GatherAround(bunch, kSearched * most, &around);
     for (std::uint32_t i = 0; i < bunch.count; ++i) {
       const std::uint32_t p = bunch.ids[i];
       BuildLaidStar(p, around, cell);
@@ -130,7 +172,8 @@ typename StarComplex<K>::Change StarComplex<K>::BuildLaidStars() {
     }
   });
   tree_.SetInfluences(std::move(influence));
-  Change change;
+  MeasureFaces({}, 0);
+  laid_bounds_ = {};
   change.added = ParallelGather<std::uint32_t>(size(), [&](std::size_t p, auto* ids) {
     ForEachOwned(static_cast<std::uint32_t>(p), [&](std::size_t, const Simplex& s) {
       ids->insert(ids->end(), s.begin(), s.end());

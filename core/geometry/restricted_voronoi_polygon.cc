@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/geometry/half_spaces.h"
+#include "core/geometry/laid_polygon.h"
 
 namespace stellate::core {
 
@@ -50,6 +51,19 @@ void Polygon::Reset(double inradius, const Surroundings<2>& around) {
   centres_->at.resize(3 * d);
   centres_->judged.assign(3, 0);
   for (std::size_t v = 0; v < 3; ++v) around.Lift(x(v), centres_->at.data() + v * d);
+}
+
+void Polygon::Take(const LaidPolygon& polygon) {
+  centres_.reset();
+  Resize(polygon.corners().size());
+  has_fake_ = false;
+  for (std::size_t v = 0; v < count_; ++v) {
+    const LaidPolygon::Corner& corner = polygon.corners()[v];
+    std::copy_n(corner.x, 2, corners() + 2 * v);
+    ids()[v] = corner.id;
+    has_fake_ = has_fake_ || IsFake(corner.id);
+  }
+  max_norm2_ = polygon.max_norm2();
 }
 
 // What is cut off a polygon is a chain of vertices, from `first` to `last`, and two new ones close

@@ -12,6 +12,8 @@
 
 namespace stellate::core {
 
+class LaidPolygon;
+
 template <int K>
 class RestrictedVoronoiCell;  // for any other K: restricted_voronoi_cell.h
 
@@ -34,6 +36,8 @@ class RestrictedVoronoiCell<2> {
   RestrictedVoronoiCell& operator=(RestrictedVoronoiCell&&) = default;
 
   void Reset(double inradius, const Surroundings<2>& around);
+  // Becomes a polygon that was made apart; nothing is judged.
+  void Take(const LaidPolygon& polygon);
   bool Clip(std::uint32_t id, const double* normal, double offset, Scratch& scratch,
             const Surroundings<2>& around, const double* step = nullptr);
 

@@ -1,6 +1,8 @@
 #include "core/refinement/criteria.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "core/geometry/reach.h"
 
@@ -12,6 +14,14 @@ constexpr double kInradius = 1.2;
 // Theta0 by k: for k = 3 larger bounds do not terminate, for k <= 2 none is needed. A regular
 // simplex's fatness falls quickly with k, so the bound falls with it.
 constexpr double kDefaultSliverBound[kMaxDimension + 1] = {0, 0, 0, 0.2, 0.15, 0.1};
+
+// Dihedral angles of tetrahedra, degrees, of manifolds with walls: of solids, whose inner points
+// cost no answer, and elsewhere. Solids have 5 % more vertices for it than with no such rule, T^3
+// cut by a half-space 1 %. Larger ones were reached, too, with more: 18 degrees of solids at 10 %.
+constexpr double kLeastDihedral = 14;
+constexpr double kLeastDihedralInside = 10;
+// Down to this share of the size asked for, which ends it: near sharp edges faces are as fine.
+constexpr double kSharpRadius = 0.1;
 
 // With a declared reach: M turns by no more under a simplex of the size asked for, radians. The
 // rest of the right angle is for the simplex itself.
@@ -32,6 +42,12 @@ ResolvedCriteria Resolve(const Specification& spec) {
   }
   r.radius_edge_bound = c.radius_edge_bound;
   r.shape.sliver_bound = c.sliver_bound.value_or(kDefaultSliverBound[spec.dimension]);
+  if (spec.dimension == 3 && spec.walls > 0 && r.shape.sliver_bound > 0) {
+    const bool is_solid = spec.ambient_dimension == 3;
+    r.shape.sharpest_cosine =
+        std::cos((is_solid ? kLeastDihedral : kLeastDihedralInside) * std::numbers::pi / 180);
+    r.shape.sharp_radius = kSharpRadius;
+  }
   r.picking_radius = c.picking_radius;
   r.small_sliver_radius = c.small_sliver_radius;
   r.candidates = c.candidates.value_or(spec.dimension <= 2 ? 1 : 10);

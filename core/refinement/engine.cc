@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/base/parallel.h"
+#include "core/complex/consistency.h"
 #include "core/refinement/independent_set.h"
 
 namespace stellate::core {
@@ -14,6 +15,8 @@ namespace {
 // Good points that no longer help: this many times the vertices that R1 and R2 needed.
 constexpr double kMostGrowth = 4;
 constexpr std::uint64_t kLeastGrowth = 2000;
+// Where one star in so many is suspect, simplices are looked for once for all stars.
+constexpr std::size_t kMostlySuspect = 2;
 
 // The order in which to go through `ids` so that neighbours follow each other: what one star's
 // judge has read of theirs is in the cache for the next.
@@ -128,9 +131,13 @@ std::vector<Target<K>> Engine<K>::RejudgeSuspects() {
   const std::vector<std::uint32_t> suspects = book_.TakeSuspects(filled_.mended());
   std::vector<std::optional<Violation<K>>> found(suspects.size());
   const std::vector<std::uint32_t> near = InOrderOfPlace<K>(complex_, suspects);
+  std::optional<ConsistentSimplices<K>> consistent;
+  if (kMostlySuspect * suspects.size() >= complex_.size()) consistent.emplace(complex_);
   ParallelFor(suspects.size(), [&](std::size_t i) {
+    const std::uint32_t p = suspects[near[i]];
     found[near[i]] =
-        WorstSliverOrInconsistent<K>(complex_, suspects[near[i]], criteria_.shape, faces_.stage());
+        WorstSliverOrInconsistent<K>(complex_, p, criteria_.shape, sizes_.BoundAt(complex_, p),
+                                     faces_.stage(), consistent ? consistent->Of(p) : 0);
   });
   filled_.ForgetMended();
   if (faces_.stage() == K &&
@@ -144,15 +151,18 @@ std::vector<Target<K>> Engine<K>::RejudgeSuspects() {
     const std::uint32_t p = suspects[i];
     const bool is_mended = found[i] && filled_.Mends(complex_, p, *found[i]);
     if (is_mended) filled_.NoteMended(p);
-    // A simplex that leans will not always yield, nor a sliver between faces that are nearer to
-    // each other than their sizes: the certificate says so.
-    const bool may_stay = found[i] && (found[i]->lean || IsSliverAtBoundary(p, *found[i]));
+    // A simplex that leans or is sharp will not always yield, nor a sliver between faces that are
+    // nearer to each other than their sizes: the certificate says so.
+    const bool may_stay =
+        found[i] && (found[i]->lean || found[i]->sharp || IsSliverAtBoundary(p, *found[i]));
     if (!found[i] || is_mended || (may_stay && book_.is_given_up(p))) {
       book_.NoteJudged(p, std::nullopt);
       continue;
     }
     book_.NoteJudged(p, found[i]->rule);
-    if (!book_.is_given_up(p)) targets.push_back(Aim(p, *found[i]));
+    if (book_.is_given_up(p)) continue;
+    const auto split = SplitUnderSliver(p, *found[i]);
+    targets.push_back(split ? *split : Aim(p, *found[i]));
   }
   return targets;
 }
@@ -168,8 +178,14 @@ bool Engine<K>::HasGrownTooMuch() const {
 template <int K>
 std::optional<std::vector<Target<K>>> Engine<K>::Plan() {
   if (HasGrownTooMuch()) {
-    if (!std::isfinite(criteria_.shape.reach)) return std::nullopt;
-    criteria_.shape.reach = INFINITY;  // unproved, but a mesh
+    if (criteria_.shape.sharpest_cosine < 1) {  // what it grew for: a mesh is worth more
+      criteria_.shape.sharpest_cosine = 1;
+      before_good_points_ = complex_.size();
+    } else if (std::isfinite(criteria_.shape.reach)) {
+      criteria_.shape.reach = INFINITY;  // unproved, but a mesh
+    } else {
+      return std::nullopt;
+    }
   }
   std::vector<Target<K>> targets = SizeAndShapeTargets();
   if (sizes_.NeedsSpreading(complex_, targets.empty())) {
@@ -224,7 +240,9 @@ void Engine<K>::Append(const AnsweredPoints& answers, Eigen::Index c) {
 template <int K>
 void Engine<K>::Lay(const AnsweredPoints& answers, Eigen::Index c) {
   complex_.Lay(answers.points.col(c).data(), answers.tangents.col(c).data());
-  if (answers.sizes.size() > 0) sizes_.AppendGiven(answers.sizes[c]);
+  if (answers.sizes.size() == 0) return;
+  sizes_.AppendGiven(answers.sizes[c]);
+  complex_.LaidAt(sizes_.BoundFor(answers.sizes[c]));
 }
 
 template <int K>

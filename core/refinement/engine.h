@@ -60,6 +60,8 @@ class Engine {
   // Of a manifold with boundary, when no targets are left: points of the faces of this stage that
   // the sample has nothing near, if any, to be asked for and appended.
   PlannedPoints ChooseSeeds();
+  // The points of no face that wait to be seeds, all that are known with their tangents.
+  AnsweredPoints InteriorSeeds();
   // On to faces of the next dimension. False after the last.
   bool AdvanceStage();
   // Whether edges and corners are at rest, and some sharp one is not guarded (core/refinement/
@@ -104,6 +106,8 @@ class Engine {
   void YieldToFaces(std::vector<Target<K>>* targets);
   PlannedPoints SetCollars();
   bool IsSliverAtBoundary(std::uint32_t star, const Violation<K>& violation) const;
+  std::optional<Target<K>> SplitUnderSliver(std::uint32_t star,
+                                            const Violation<K>& violation) const;
   bool IsCollar(const typename StarComplex<K>::FaceSimplex& simplex) const;
   std::optional<Target<K>> SplitOf(const typename StarComplex<K>::CellVertex& at, Rule by) const;
   Target<K> Aim(std::uint32_t star, const Violation<K>& violation) const;

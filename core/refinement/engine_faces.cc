@@ -107,6 +107,27 @@ std::optional<Target<K>> Engine<K>::SplitOf(const typename StarComplex<K>::CellV
   return Aim(at.star, violation);
 }
 
+// Where no point near a sliver was good and all its corners are on one wall, which may be flat: a
+// simplex of the wall that it lies on, to be split. Its centre may be on the wall itself then, and
+// what lies near it neither cuts the sliver off nor spoils the wall.
+template <int K>
+std::optional<Target<K>> Engine<K>::SplitUnderSliver(std::uint32_t star,
+                                                     const Violation<K>& violation) const {
+  if (violation.rule != Rule::kSliver || !faces_.has_walls() || violation.walls != 0 ||
+      book_.failed_attempts(star) == 0)
+    return std::nullopt;
+  const auto& cell = complex_.cell(star);
+  WallSet common = complex_.walls(star);
+  for (int s = 0; s < K; ++s) common &= complex_.walls(cell.id(cell.facet(violation.vertex, s)));
+  if (common == 0) return std::nullopt;
+  for (int s = 0; s < K; ++s) {
+    const std::size_t below = cell.adjacent(violation.vertex, s);
+    if (CountWalls(WallsAt<K>(cell, below)) == 1 && !cell.HasFakeFacet(below))
+      return SplitOf({star, below}, Rule::kSliver);
+  }
+  return std::nullopt;
+}
+
 // Leaves the targets on faces of the lowest dimension, and has those that would spoil a face of
 // lower dimension yet split that. What answers have encroached on comes besides.
 template <int K>
@@ -180,6 +201,24 @@ PlannedPoints Engine<K>::ChooseSeeds() {
     points.walls.push_back(chosen[i].walls);
   }
   return points;
+}
+
+template <int K>
+AnsweredPoints Engine<K>::InteriorSeeds() {
+  std::vector<const typename FaceBook<K>::Seed*> seeds;
+  for (const auto& seed : faces_.seeds())
+    if (seed.walls == 0 && seed.tangent.size() > 0) seeds.push_back(&seed);
+  AnsweredPoints all;
+  const auto count = static_cast<Eigen::Index>(seeds.size());
+  all.points.resize(complex_.d(), count);
+  all.tangents.resize(complex_.d() * K, count);
+  all.answered.assign(seeds.size(), 1);
+  all.found = all.answered;
+  for (Eigen::Index c = 0; c < count; ++c) {
+    all.points.col(c) = seeds[static_cast<std::size_t>(c)]->point;
+    all.tangents.col(c) = seeds[static_cast<std::size_t>(c)]->tangent;
+  }
+  return all;
 }
 
 template <int K>
@@ -269,8 +308,11 @@ std::vector<FaceMesh> Engine<K>::Faces() const {
 #define STELLATE_EACH(K)                                                                        \
   template std::optional<Target<K>> Engine<K>::SplitOf(const StarComplex<K>::CellVertex&, Rule) \
       const;                                                                                    \
+  template std::optional<Target<K>> Engine<K>::SplitUnderSliver(std::uint32_t,                  \
+                                                                const Violation<K>&) const;     \
   template void Engine<K>::YieldToFaces(std::vector<Target<K>>*);                               \
   template PlannedPoints Engine<K>::ChooseSeeds();                                              \
+  template AnsweredPoints Engine<K>::InteriorSeeds();                                           \
   template PlannedPoints Engine<K>::SetCollars();                                               \
   template bool Engine<K>::IsSliverAtBoundary(std::uint32_t, const Violation<K>&) const;        \
   template bool Engine<K>::IsCollar(const StarComplex<K>::FaceSimplex&) const;                  \

@@ -27,20 +27,22 @@ class FaceBook {
   // On to the next. False after the last.
   bool Advance() { return stage_ < K && ++stage_ <= K; }
 
-  // Points of M, each on the face of `walls`, that wait for the stage of their face.
+  // Points of M, each on the face of `walls`, that wait for the stage of their face. `tangent`:
+  // the basis there, (K rows of d), or empty.
   struct Seed {
     Eigen::VectorXd point;
     WallSet walls;
+    Eigen::VectorXd tangent;
   };
-  void KeepSeed(Eigen::VectorXd point, WallSet walls) {
-    seeds_.push_back({std::move(point), walls});
+  void KeepSeed(Eigen::VectorXd point, WallSet walls, Eigen::VectorXd tangent = {}) {
+    seeds_.push_back({std::move(point), walls, std::move(tangent)});
   }
   std::vector<Seed>& seeds() { return seeds_; }
 
   // A point of the face of `walls` that lies beyond another: near it the face of both passes.
   void Discover(Eigen::VectorXd point, WallSet walls, int beyond) {
     if (CountWalls(walls) < K)
-      discoveries_.push_back({std::move(point), walls | SetOfWall(beyond)});
+      discoveries_.push_back({std::move(point), walls | SetOfWall(beyond), {}});
   }
   bool has_discoveries() const { return !discoveries_.empty(); }
   std::vector<Seed> TakeDiscoveries() { return std::exchange(discoveries_, {}); }

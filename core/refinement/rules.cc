@@ -12,6 +12,7 @@
 #include "core/base/instantiate.h"
 #include "core/geometry/reach.h"
 #include "core/geometry/simplex_frame.h"
+#include "core/refinement/sharp_dihedrals.h"
 
 namespace stellate::core {
 namespace {
@@ -228,10 +229,24 @@ bool IsFlatOnWall(const StarComplex<K>& complex, std::uint32_t p,
   return std::abs(edges.determinant()) <= kFlat * edges.colwise().norm().prod();
 }
 
+// Of a closed star that breaks no rule besides.
+template <int K>
+std::optional<Violation<K>> SharpSimplex(const StarComplex<K>& complex, std::uint32_t p,
+                                         const ShapeBounds& bounds, double size_bound) {
+  if (bounds.sharpest_cosine >= 1) return std::nullopt;
+  const auto worst =
+      WorstSharp<K>(complex, p, bounds.sharpest_cosine, bounds.sharp_radius * size_bound);
+  if (!worst) return std::nullopt;
+  Violation<K> violation = AtVertex<K>(Rule::kSliver, complex.cell(p), *worst, false);
+  violation.sharp = true;
+  return violation;
+}
+
 template <int K>
 std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const StarComplex<K>& complex,
                                                              std::uint32_t p,
-                                                             const ShapeBounds& bounds, int stage) {
+                                                             const ShapeBounds& bounds,
+                                                             double size_bound, int stage) {
   const auto& cell = complex.cell(p);
   std::optional<Folds<K>> folds;
   if (complex.judging() == Judging::kCommonCentre) folds.emplace(complex, p);
@@ -255,7 +270,7 @@ std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const StarComplex<K
     worst = AtVertex<K>(rule, cell, v, false);
     worst->walls = simplex.walls;
   }
-  return worst;
+  return worst || stage < K ? worst : SharpSimplex<K>(complex, p, bounds, size_bound);
 }
 
 }  // namespace
@@ -263,8 +278,10 @@ std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const StarComplex<K
 template <int K>
 std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& complex,
                                                       std::uint32_t p, const ShapeBounds& bounds,
-                                                      int stage) {
-  if (complex.walls(p) != 0) return WorstSliverOrInconsistentOnFaces<K>(complex, p, bounds, stage);
+                                                      double size_bound, int stage,
+                                                      std::uint64_t consistent) {
+  if (complex.walls(p) != 0)
+    return WorstSliverOrInconsistentOnFaces<K>(complex, p, bounds, size_bound, stage);
   if (stage < K) return std::nullopt;
   const auto& cell = complex.cell(p);
   if (!cell.bounded()) return std::nullopt;  // R1 gave up there: nothing to judge yet
@@ -283,117 +300,35 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& comp
         worst = v;
     if (worst) return AtVertex<K>(Rule::kSliver, cell, *worst, false);
   }
+  const auto is_consistent = [&](std::size_t v) {
+    return (v < 64 && (consistent >> v & 1) != 0) || IsConsistent<K>(complex, p, v);
+  };
   std::optional<Folds<K>> folds;
   if (complex.judging() == Judging::kCommonCentre) folds.emplace(complex, p);
   for (std::size_t v = 0; v < cell.vertex_count(); ++v)
-    if (is_worse(v) && (!IsConsistent<K>(complex, p, v) || (folds && folds->IsFolded(v))))
-      worst = v;
+    if (is_worse(v) && (!is_consistent(v) || (folds && folds->IsFolded(v)))) worst = v;
   if (worst) return AtVertex<K>(Rule::kInconsistent, cell, *worst, false);
-  if (!std::isfinite(bounds.reach)) return std::nullopt;
+  if (!std::isfinite(bounds.reach)) return SharpSimplex<K>(complex, p, bounds, size_bound);
   for (std::size_t v = 0; v < cell.vertex_count(); ++v)
     if (is_worse(v) && held(v) &&
         LeansTooFar<K>(complex, p, complex.Point(p), cell, v, bounds.reach, nullptr))
       worst = v;
-  if (!worst) return std::nullopt;
+  if (!worst) return SharpSimplex<K>(complex, p, bounds, size_bound);
   Violation<K> violation = AtVertex<K>(Rule::kSliver, cell, *worst, false);
   violation.lean = true;
   return violation;
 }
 
-template <int K>
-int CountBad(const StarComplex<K>& complex, const double* point,
-             const typename StarComplex<K>::Tentative& tentative, const ShapeBounds& bounds,
-             double small_radius, int enough, WallSet walls) {
-  using Cell = RestrictedVoronoiCell<K>;
-  using Simplex = typename StarComplex<K>::Simplex;
-  const std::uint32_t id = complex.size();
-  const auto changed = [&](std::uint32_t q) -> const Cell* {
-    if (q == id) return &tentative.own;
-    const auto at = std::lower_bound(tentative.cut.begin(), tentative.cut.end(), q,
-                                     [](const auto& c, std::uint32_t x) { return c.first < x; });
-    return at != tentative.cut.end() && at->first == q ? &at->second : nullptr;
-  };
-  int bad = 0;
-  const auto has = [](const Cell& cell, std::uint32_t q, std::uint64_t key) {
-    return cell.Find(key - Mix64(q)) < cell.vertex_count();
-  };
-  // Of a simplex of a face: is it none, foreign, or one that stars disagree about?
-  const auto is_bad_face = [&](std::uint32_t p, const Cell& cell, std::size_t v) {
-    const auto face = complex.FaceSimplexOf(p, cell, v, walls);
-    if (face.fake || face.foreign) return true;
-    const bool fresh = face.ids[static_cast<std::size_t>(face.count - 1)] == id;
-    const std::uint64_t key = SimplexKey<K>(cell, v, p);
-    for (int i = 0; i < face.count; ++i) {
-      const std::uint32_t q = face.ids[static_cast<std::size_t>(i)];
-      if (q == p) continue;
-      const Cell* other = changed(q);
-      if (!other && !fresh) continue;
-      if (!other || !has(*other, q, key)) return true;
-    }
-    return false;
-  };
-  const auto survey = [&](std::uint32_t p, const double* at, const Cell& cell) {
-    Simplex simplex;
-    const bool on_boundary = (p == id ? walls : complex.walls(p)) != 0;
-    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
-      if (bad >= enough) return;
-      if (!complex.SimplexOf(p, cell, v, &simplex)) {
-        bad += !on_boundary || is_bad_face(p, cell, v);
-        continue;
-      }
-      const bool fresh = simplex.back() == id;  // an old simplex was judged before
-      if (fresh && cell.norm2(v) <= small_radius * small_radius &&
-          !complex.TouchesGuard(p, cell, v) &&
-          (HasThinFaceAt<K>(complex, at, cell, v, bounds.sliver_bound, point) ||
-           LeansTooFar<K>(complex, p, at, cell, v, bounds.reach, point))) {
-        ++bad;
-        continue;
-      }
-      const std::uint64_t key = SimplexKey<K>(cell, v, p);
-      for (const std::uint32_t q : simplex) {
-        if (q == p) continue;
-        const Cell* other = changed(q);
-        if (!other && !fresh) continue;
-        if (!other || !FindSimplex<K>(*other, q, simplex, key)) {
-          ++bad;
-          break;
-        }
-      }
-    }
-  };
-  survey(id, point, tentative.own);
-  for (const auto& [p, cell] : tentative.cut) survey(p, complex.Point(p), cell);
-  // Simplices that a cut star loses and an uncut one keeps.
-  for (const auto& [p, cell] : tentative.cut) {
-    Simplex simplex;
-    const Cell& before = complex.cell(p);
-    for (std::size_t v = 0; v < before.vertex_count(); ++v) {
-      if (bad >= enough) return bad;
-      if (!complex.SimplexOf(p, before, v, &simplex)) continue;
-      const std::uint64_t key = SimplexKey<K>(before, v, p);
-      if (FindSimplex<K>(cell, p, simplex, key)) continue;
-      for (const std::uint32_t q : simplex)
-        if (q != p && !changed(q) && FindSimplex<K>(complex.cell(q), q, simplex, key)) {
-          ++bad;
-          break;
-        }
-    }
-  }
-  return bad;
-}
-
-#define STELLATE_EACH(K)                                                                          \
-  template std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>&, std::uint32_t,     \
-                                                        double, double, int);                     \
-  template std::optional<Violation<K>> WorstSliverOrInconsistent(                                 \
-      const StarComplex<K>&, std::uint32_t, const ShapeBounds&, int);                             \
-  template bool HasThinFaceAt(const StarComplex<K>&, const double*,                               \
-                              const RestrictedVoronoiCell<K>&, std::size_t, double,               \
-                              const double*);                                                     \
-  template bool LeansTooFar(const StarComplex<K>&, std::uint32_t, const double*,                  \
-                            const RestrictedVoronoiCell<K>&, std::size_t, double, const double*); \
-  template int CountBad(const StarComplex<K>&, const double*, const StarComplex<K>::Tentative&,   \
-                        const ShapeBounds&, double, int, WallSet);
+#define STELLATE_EACH(K)                                                                      \
+  template std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>&, std::uint32_t, \
+                                                        double, double, int);                 \
+  template std::optional<Violation<K>> WorstSliverOrInconsistent(                             \
+      const StarComplex<K>&, std::uint32_t, const ShapeBounds&, double, int, std::uint64_t);  \
+  template bool HasThinFaceAt(const StarComplex<K>&, const double*,                           \
+                              const RestrictedVoronoiCell<K>&, std::size_t, double,           \
+                              const double*);                                                 \
+  template bool LeansTooFar(const StarComplex<K>&, std::uint32_t, const double*,              \
+                            const RestrictedVoronoiCell<K>&, std::size_t, double, const double*);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 

@@ -18,6 +18,10 @@ struct ShapeBounds {
   // Of the declared reach, length: no simplex may lean so far from a vertex's tangent space that
   // ProveFromReach would fail (core/certificate/proof.h). Infinity: they may.
   double reach = INFINITY;
+  // Of the least dihedral angle that tetrahedra shall have. 1: it may be any.
+  double sharpest_cosine = 1;
+  // It may be any, too, where the circumradius is smaller than this share of the size asked for.
+  double sharp_radius = 0;
 };
 
 // A simplex of star(p) that breaks a rule, given by its dual vertex in p's cell.
@@ -29,6 +33,7 @@ struct Violation {
   std::size_t vertex = 0;  // of p's cell, as long as that does not change
   bool fake = false;       // not a simplex yet: the cell is unbounded there
   bool lean = false;       // of R3: it is no sliver, but leans too far for a proof
+  bool sharp = false;      // of R3: it is no sliver, but has a sharp dihedral angle
   WallSet walls = 0;       // of the dual vertex: the simplex is one of their face
   bool split = false;      // it breaks no rule, but a point off its face would come too near
 
@@ -50,12 +55,15 @@ std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std:
 // that is or contains a sliver and whose lowest vertex p is, then the worst one that is
 // inconsistent, or, where stars are judged at common centres, that lies on the same side as a
 // neighbour of the facet they share in T_pM: such a star is no embedded disk although all its
-// vertices agree on it; last the worst one whose lowest vertex p is and that leans too far. Of
-// faces up to `stage`, those of the lowest dimension first.
+// vertices agree on it; then the worst one whose lowest vertex p is and that leans too far, or else
+// that has a sharp dihedral angle. Of faces up to `stage`, those of the lowest dimension first.
+// `size_bound`: of R1 for p, length. `consistent`: what is known of p already
+// (ConsistentSimplices).
 template <int K>
 std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& complex,
                                                       std::uint32_t p, const ShapeBounds& bounds,
-                                                      int stage = K);
+                                                      double size_bound, int stage = K,
+                                                      std::uint64_t consistent = 0);
 
 // Whether the simplex on p and the facets of v is or contains a Theta0-sliver (Sec. 2.3): that is,
 // whether some face at p, of dimension 2 or more, has fatness below Theta0^j.

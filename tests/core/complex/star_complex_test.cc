@@ -148,14 +148,19 @@ TYPED_TEST(StarComplexTest, IsTheSameLaidAtOnceOrAppended) {
   const std::uint32_t laid = sample.size() - 20;
   auto complex = NewComplex<K>(sample.d, Judging::kFlats);
   auto appended = NewComplex<K>(sample.d, Judging::kFlats);
+  auto graded = NewComplex<K>(sample.d, Judging::kFlats);
+  Random random(5, 0);
   for (std::uint32_t i = 0; i < laid; ++i) {
     complex->Lay(sample.Point(i), sample.Tangent(i));
+    graded->Lay(sample.Point(i), sample.Tangent(i));
+    graded->LaidAt(0.3 * random.Uniform());
     appended->Append(sample.Point(i), sample.Tangent(i));
   }
   const auto change = complex->Commit();
   EXPECT_TRUE(change.stars.empty());
   EXPECT_TRUE(change.removed.empty());
   EXPECT_EQ(AsSet<K>(change.added), AsSet<K>(appended->Commit().added));
+  EXPECT_EQ(change.added, graded->Commit().added);
   for (int last = 0; last < 2; ++last) {
     for (std::uint32_t p = 0; p < complex->size(); ++p)
       EXPECT_EQ(Canonical(complex->cell(p)), Canonical(appended->cell(p))) << "star " << p;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/base/random.h"
+#include "core/geometry/laid_polygon.h"
 #include "tests/core/support/cells.h"
 #include "tests/core/support/half_spaces.h"
 
@@ -347,6 +348,32 @@ TYPED_TEST(RestrictedVoronoiCellTest, CanBeUsedAgainAfterReset) {
   cell.Reset(10, given);
   for (const auto& h : Cube<K>()) given.Clip(cell, h.id, h.normal.data(), h.offset);
   EXPECT_EQ(Canonical(cell), Canonical(Cell<K>(Cube<K>())));
+}
+
+TEST(LaidPolygon, IsTheCellByTheSameCutsBitForBit) {
+  LaidPolygon made;
+  for (std::uint64_t trial = 0; trial < 200; ++trial) {
+    const double inradius = trial % 2 == 0 ? 10 : 3;
+    HalfSpaces<2> half_spaces = RandomHalfSpaces<2>(40, trial);
+    half_spaces.push_back(half_spaces.front());  // a cut by rounding at most
+    made.Reset(inradius);
+    RestrictedVoronoiCell<2> cell, taken;
+    GivenHalfSpaces<2> given(inradius);
+    cell.Reset(inradius, given);
+    for (const auto& h : half_spaces) {
+      EXPECT_EQ(made.Clip(h.id, h.normal.data(), h.offset),
+                given.Clip(cell, h.id, h.normal.data(), h.offset));
+      taken.Take(made);
+      ASSERT_EQ(taken.vertex_count(), cell.vertex_count());
+      EXPECT_EQ(taken.max_norm2(), cell.max_norm2());
+      EXPECT_EQ(taken.bounded(), cell.bounded());
+      for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+        EXPECT_EQ(taken.id(v), cell.id(v));
+        EXPECT_EQ(taken.x(v)[0], cell.x(v)[0]);
+        EXPECT_EQ(taken.x(v)[1], cell.x(v)[1]);
+      }
+    }
+  }
 }
 
 }  // namespace

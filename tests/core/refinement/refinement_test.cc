@@ -86,7 +86,8 @@ void ExpectRulesHold(const DrivenRun& run, const Specification& spec) {
   for (std::uint32_t p = 0; p < complex.size(); ++p) {
     EXPECT_FALSE(
         WorstSizeOrShape<K>(complex, p, spec.epsilon, criteria.radius_edge_bound).has_value());
-    EXPECT_FALSE(WorstSliverOrInconsistent<K>(complex, p, criteria.shape).has_value());
+    EXPECT_FALSE(
+        WorstSliverOrInconsistent<K>(complex, p, criteria.shape, criteria.epsilon).has_value());
     EXPECT_EQ(CountInconsistent<K>(complex, p), 0u);
     all.merge(StarOf(complex, p));
   }

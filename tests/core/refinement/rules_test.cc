@@ -190,6 +190,7 @@ TEST(FindSimplex, FindsWhatTheStarHoldsAndNothingElse) {
 template <int K>
 void ExpectConsistencyByDefinition(const Sample& sample, double sliver_bound) {
   const auto complex = Build<K>(sample);
+  const ConsistentSimplices<K> known(*complex);
   std::uint64_t inconsistent = 0, slivers = 0, fine = 0;
   for (std::uint32_t p = 0; p < complex->size(); ++p) {
     std::uint64_t expected = 0;
@@ -202,13 +203,16 @@ void ExpectConsistencyByDefinition(const Sample& sample, double sliver_bound) {
       if (real && s[0] == p &&
           HasThinFaceAt<K>(*complex, sample.Point(p), complex->cell(p), v, sliver_bound, nullptr))
         worst_sliver = std::max(worst_sliver, radius);
-      if (!real || !IsInStars(*complex, s)) {
+      const bool consistent = real && IsInStars(*complex, s);
+      ASSERT_LT(v, 64u);
+      EXPECT_EQ((known.Of(p) >> v & 1) != 0, consistent) << "star " << p;
+      if (!consistent) {
         ++expected;
         worst_inconsistent = std::max(worst_inconsistent, radius);
       }
     }
     EXPECT_EQ(CountInconsistent<K>(*complex, p), expected) << "star " << p;
-    const auto got = WorstSliverOrInconsistent<K>(*complex, p, {sliver_bound});
+    const auto got = WorstSliverOrInconsistent<K>(*complex, p, {sliver_bound}, 0.3, K, known.Of(p));
     if (!complex->cell(p).bounded()) {  // R1's, not yet to be judged by others
       EXPECT_FALSE(got) << "star " << p;
       inconsistent += expected > 0;

@@ -1,0 +1,103 @@
+#include <algorithm>
+
+#include "core/base/instantiate.h"
+#include "core/refinement/rules.h"
+#include "core/refinement/sharp_dihedrals.h"
+
+namespace stellate::core {
+
+template <int K>
+int CountBad(const StarComplex<K>& complex, const double* point,
+             const typename StarComplex<K>::Tentative& tentative, const ShapeBounds& bounds,
+             double small_radius, int enough, WallSet walls) {
+  using Cell = RestrictedVoronoiCell<K>;
+  using Simplex = typename StarComplex<K>::Simplex;
+  const std::uint32_t id = complex.size();
+  const auto changed = [&](std::uint32_t q) -> const Cell* {
+    if (q == id) return &tentative.own;
+    const auto at = std::lower_bound(tentative.cut.begin(), tentative.cut.end(), q,
+                                     [](const auto& c, std::uint32_t x) { return c.first < x; });
+    return at != tentative.cut.end() && at->first == q ? &at->second : nullptr;
+  };
+  int bad = 0;
+  const auto has = [](const Cell& cell, std::uint32_t q, std::uint64_t key) {
+    return cell.Find(key - Mix64(q)) < cell.vertex_count();
+  };
+  // Of a simplex of a face: is it none, foreign, or one that stars disagree about?
+  const auto is_bad_face = [&](std::uint32_t p, const Cell& cell, std::size_t v) {
+    const auto face = complex.FaceSimplexOf(p, cell, v, walls);
+    if (face.fake || face.foreign) return true;
+    const bool fresh = face.ids[static_cast<std::size_t>(face.count - 1)] == id;
+    const std::uint64_t key = SimplexKey<K>(cell, v, p);
+    for (int i = 0; i < face.count; ++i) {
+      const std::uint32_t q = face.ids[static_cast<std::size_t>(i)];
+      if (q == p) continue;
+      const Cell* other = changed(q);
+      if (!other && !fresh) continue;
+      if (!other || !has(*other, q, key)) return true;
+    }
+    return false;
+  };
+  const auto is_badly_shaped = [&](std::uint32_t p, const double* at, const Cell& cell,
+                                   std::size_t v) {
+    return (bounds.sharpest_cosine < 1 &&
+            HasSharpDihedral<K>(complex, p, at, cell, v, bounds.sharpest_cosine, point)) ||
+           (!complex.TouchesGuard(p, cell, v) &&
+            (HasThinFaceAt<K>(complex, at, cell, v, bounds.sliver_bound, point) ||
+             LeansTooFar<K>(complex, p, at, cell, v, bounds.reach, point)));
+  };
+  const auto survey = [&](std::uint32_t p, const double* at, const Cell& cell) {
+    Simplex simplex;
+    const bool on_boundary = (p == id ? walls : complex.walls(p)) != 0;
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      if (bad >= enough) return;
+      if (!complex.SimplexOf(p, cell, v, &simplex)) {
+        bad += !on_boundary || is_bad_face(p, cell, v);
+        continue;
+      }
+      const bool fresh = simplex.back() == id;  // an old simplex was judged before
+      if (fresh && cell.norm2(v) <= small_radius * small_radius &&
+          is_badly_shaped(p, at, cell, v)) {
+        ++bad;
+        continue;
+      }
+      const std::uint64_t key = SimplexKey<K>(cell, v, p);
+      for (const std::uint32_t q : simplex) {
+        if (q == p) continue;
+        const Cell* other = changed(q);
+        if (!other && !fresh) continue;
+        if (!other || !FindSimplex<K>(*other, q, simplex, key)) {
+          ++bad;
+          break;
+        }
+      }
+    }
+  };
+  survey(id, point, tentative.own);
+  for (const auto& [p, cell] : tentative.cut) survey(p, complex.Point(p), cell);
+  // Simplices that a cut star loses and an uncut one keeps.
+  for (const auto& [p, cell] : tentative.cut) {
+    Simplex simplex;
+    const Cell& before = complex.cell(p);
+    for (std::size_t v = 0; v < before.vertex_count(); ++v) {
+      if (bad >= enough) return bad;
+      if (!complex.SimplexOf(p, before, v, &simplex)) continue;
+      const std::uint64_t key = SimplexKey<K>(before, v, p);
+      if (FindSimplex<K>(cell, p, simplex, key)) continue;
+      for (const std::uint32_t q : simplex)
+        if (q != p && !changed(q) && FindSimplex<K>(complex.cell(q), q, simplex, key)) {
+          ++bad;
+          break;
+        }
+    }
+  }
+  return bad;
+}
+
+#define STELLATE_EACH(K)                                                                        \
+  template int CountBad(const StarComplex<K>&, const double*, const StarComplex<K>::Tentative&, \
+                        const ShapeBounds&, double, int, WallSet);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core

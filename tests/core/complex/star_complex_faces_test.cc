@@ -1,0 +1,84 @@
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "core/complex/star_complex.h"
+
+namespace stellate::core {
+namespace {
+
+constexpr double kFrame[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+constexpr double kOutward[6] = {-1, 0, 0, 0, -1, 0};  // of x >= 0 and of y >= 0
+
+// Points of the quarter of space that two walls leave, some of them on the walls and their edge.
+void AppendQuarter(StarComplex<3>* complex, unsigned seed, int count) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (int i = 0; i < count; ++i) {
+    double point[3] = {uniform(random), uniform(random), uniform(random)};
+    const auto walls = static_cast<WallSet>(i % 8 < 4 ? i % 8 : 0);
+    for (const int wall : {0, 1})
+      if ((walls & SetOfWall(wall)) != 0) point[wall] = 0;
+    complex->Append(point, kFrame, StarComplex<3>::kNone, walls,
+                    kOutward + (walls == SetOfWall(1) ? 3 : 0));
+  }
+  complex->Commit();
+}
+
+// What is encroached on, by looking at every vertex of every cell.
+std::optional<StarComplex<3>::CellVertex> WorstOfAll(const StarComplex<3>& complex,
+                                                     const double* point, WallSet walls) {
+  std::optional<StarComplex<3>::CellVertex> worst;
+  int lowest = 3 - CountWalls(walls);
+  double farthest2 = 0;
+  for (std::uint32_t p = 0; p < complex.size(); ++p) {
+    const auto& cell = complex.cell(p);
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      const WallSet at = WallsAt<3>(cell, v);
+      const int dimension = 3 - CountWalls(at);
+      if (IsSubset(at, walls) || dimension == 0 || cell.HasFakeFacet(v) ||
+          !complex.CutsVertex(p, v, point))
+        continue;
+      if (dimension > lowest || (dimension == lowest && !(cell.norm2(v) > farthest2))) continue;
+      if (!worst && dimension == 3 - CountWalls(walls)) continue;
+      worst = StarComplex<3>::CellVertex{p, v};
+      lowest = dimension;
+      farthest2 = cell.norm2(v);
+    }
+  }
+  return worst;
+}
+
+// As points come, and after the stars were built anew with guards: only the boundary's stars are
+// looked for, by how far their simplices of faces reach.
+TEST(EncroachedBy, FindsTheWorstOfAllFaces) {
+  int encroached = 0, free = 0;
+  StarComplex<3> complex(3, 0.5, 3.0, Judging::kFlats);
+  for (unsigned part = 0; part < 6; ++part) {
+    AppendQuarter(&complex, part, 40 << part);
+    if (part == 4) {
+      std::vector<double> radii2(complex.size(), 0.0);
+      for (std::uint32_t p = 0; p < complex.size(); p += 7) radii2[p] = 1e-4;
+      complex.Guard(std::move(radii2));
+    }
+    std::mt19937 random(100 + part);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    for (int i = 0; i < 300; ++i) {
+      const auto walls = static_cast<WallSet>(i % 3);
+      double point[3] = {0.3 * uniform(random), 0.3 * uniform(random), uniform(random)};
+      if (walls != 0) point[walls - 1] = 0;
+      const auto got = complex.EncroachedBy(point, walls);
+      const auto expected = WorstOfAll(complex, point, walls);
+      ASSERT_EQ(got.has_value(), expected.has_value());
+      ++(got ? encroached : free);
+      if (!got) continue;
+      EXPECT_EQ(got->star, expected->star);
+      EXPECT_EQ(got->vertex, expected->vertex);
+    }
+  }
+  EXPECT_GT(encroached, 100);
+  EXPECT_GT(free, 100);
+}
+
+}  // namespace
+}  // namespace stellate::core
