@@ -21,6 +21,12 @@ constexpr double kFarthest = 1;
 constexpr double kLeastVolume = 0.1;
 // Points of a run lie within this many spacings of its first.
 constexpr double kRunReach = 3;
+// A lattice whose sizes change by more than this from what is expected costs more than it spares.
+constexpr double kUnexpected = 1.25;
+// So many answers tell whether it is worth while: if more than this share is not as expected, sizes
+// change within a spacing.
+constexpr std::uint64_t kTelling = 256;
+constexpr double kMostUnexpected = 0.5;
 // Few points are laid into the newest layer, until it is as large as this share of the one before.
 constexpr std::size_t kLayerGrowth = 2;
 
@@ -45,12 +51,14 @@ template <int K>
 void Growth<K>::Sites::Append(const Sites& others) {
   points.insert(points.end(), others.points.begin(), others.points.end());
   frames.insert(frames.end(), others.frames.begin(), others.frames.end());
+  shares.insert(shares.end(), others.shares.begin(), others.shares.end());
   patch.insert(patch.end(), others.patch.begin(), others.patch.end());
 }
 
 template <int K>
-Growth<K>::Layer::Layer(int d, std::vector<double> laid, double reach)
-    : points(std::move(laid)), tree(points, d, reach) {}
+Growth<K>::Layer::Layer(int d, std::vector<double> laid, std::vector<double> its_shares,
+                        double reach)
+    : points(std::move(laid)), shares(std::move(its_shares)), tree(points, d, reach, shares) {}
 
 template <int K>
 Growth<K>::Growth(int d, double spacing)
@@ -62,23 +70,27 @@ Growth<K>::Growth(int d, double spacing)
 }
 
 template <int K>
-Runs Growth<K>::RunsOf(const std::vector<double>& points) const {
-  return Runs(points, d_, kRunReach * spacing_);
+Runs Growth<K>::RunsOf(const std::vector<double>& points, const std::vector<double>& shares) const {
+  return Runs(points, d_, kRunReach * spacing_, shares);
 }
 
-// What is laid within `radius` of some point of the run, and more; d each.
+// What is laid within its share of `radius` of some point of the run, and more.
 template <int K>
-void Growth<K>::GatherLaid(const Runs& runs, std::size_t run, double radius,
-                           std::vector<double>* near) const {
-  near->clear();
+void Growth<K>::GatherLaid(const Runs& runs, std::size_t run, const std::vector<double>& shares,
+                           double radius, Laid* near) const {
+  near->points.clear();
+  near->shares.clear();
+  const auto at = [&](std::size_t i) { return shares.begin() + static_cast<std::ptrdiff_t>(i); };
+  const double most = *std::max_element(at(runs.begin(run)), at(runs.end(run)));
   thread_local std::vector<std::uint32_t> ids;
   for (const auto& layer : layers_) {
     ids.clear();
-    layer->tree.Gather(runs.centre(run), runs.radius(run) + radius, &ids);
-    std::size_t to = near->size();
-    near->resize(to + ids.size() * stride());
+    layer->tree.Gather(runs.centre(run), runs.radius(run) + most * radius, &ids);
+    std::size_t to = near->points.size();
+    near->points.resize(to + ids.size() * stride());
     for (const std::uint32_t id : ids) {
-      std::copy_n(layer->points.data() + id * stride(), stride(), near->data() + to);
+      std::copy_n(layer->points.data() + id * stride(), stride(), near->points.data() + to);
+      near->shares.push_back(layer->shares[id]);
       to += stride();
     }
   }
@@ -86,19 +98,21 @@ void Growth<K>::GatherLaid(const Runs& runs, std::size_t run, double radius,
 
 template <int K>
 std::vector<std::uint8_t> Growth<K>::AreFarFromLaid(const std::vector<double>& points,
+                                                    const std::vector<double>& shares,
                                                     double distance) const {
   std::vector<std::uint8_t> far(points.size() / stride(), 1);
-  const Runs runs = RunsOf(points);
+  const Runs runs = RunsOf(points, shares);
   ParallelFor(runs.count(), [&](std::size_t run) {
-    thread_local std::vector<double> near;
-    GatherLaid(runs, run, distance, &near);
+    thread_local Laid near;
+    GatherLaid(runs, run, shares, distance, &near);
     WithDimension(d_, [&](auto known) {
       const int d = known() > 0 ? known() : d_;
-      const double* const last = near.data() + near.size();
+      const double* const last = near.points.data() + near.points.size();
       for (std::size_t i = runs.begin(run); i < runs.end(run); ++i) {
         const double* const p = points.data() + i * stride();
-        const double* q = near.data();
-        while (q != last && SquaredDistance(p, q, d) >= distance * distance) q += d;
+        const double apart = distance * shares[i];
+        const double* q = near.points.data();
+        while (q != last && SquaredDistance(p, q, d) >= apart * apart) q += d;
         far[i] = q == last;
       }
     });
@@ -106,82 +120,16 @@ std::vector<std::uint8_t> Growth<K>::AreFarFromLaid(const std::vector<double>& p
   return far;
 }
 
-// Where a proposal lies: its parent's neighbour in the lattice, in the parent's tangent space.
-template <int K>
-void Growth<K>::Land(const Proposal& proposal, double* point) const {
-  const double* const vector = vectors_.data() + std::size_t{proposal.direction} * K;
-  const double* const frame = border_.frames.data() + proposal.parent * stride() * K;
-  const double* const from = border_.points.data() + proposal.parent * stride();
-  for (int j = 0; j < d_; ++j) {
-    double x = from[j];
-    for (int a = 0; a < K; ++a) x += vector[a] * frame[a * d_ + j];
-    point[j] = x;
-  }
-}
-
-// Compares in the parent's own coordinates: along its frame, and the square of what is across.
-template <int K>
-void Growth<K>::ProposeFrom(std::uint32_t p, const std::vector<double>& near,
-                            std::vector<Proposal>* free) const {
-  const double* const from = border_.points.data() + p * stride();
-  const double* const frame = border_.frames.data() + p * stride() * K;
-  const double keep = kKeep * spacing_;
-  const double far = longest_ + keep;
-  thread_local std::vector<double> coordinates, steps;
-  coordinates.resize(near.size() / stride() * (K + 1));
-  steps.resize(stride());
-  const double* const begin = coordinates.data();
-  const double* const end = WithDimension(d_, [&](auto known) {
-    const int d = known() > 0 ? known() : d_;
-    double* to = coordinates.data();
-    double* const step = steps.data();
-    const double* const last = near.data() + near.size();
-    for (const double* q = near.data(); q != last; q += d) {
-      for (int j = 0; j < d; ++j) step[j] = q[j] - from[j];
-      const double distance2 = Dot(step, step, d);
-      if (distance2 > far * far || distance2 == 0) continue;
-      double across2 = distance2;
-      for (int a = 0; a < K; ++a) {
-        const double along = Dot(frame + a * d, step, d);
-        *to++ = along;
-        across2 -= along * along;
-      }
-      *to++ = across2;
-    }
-    return to;
-  });
-  const std::size_t directions = vectors_.size() / K;
-  for (std::uint32_t i = 0; i < directions; ++i) {
-    const double* const v = vectors_.data() + std::size_t{i} * K;
-    bool taken = false;
-    for (const double* at = begin; at != end && !taken; at += K + 1) {
-      double distance2 = at[K];
-      for (int a = 0; a < K; ++a) distance2 += (at[a] - v[a]) * (at[a] - v[a]);
-      taken = distance2 < keep * keep;
-    }
-    if (!taken) free->push_back({p, i});
-  }
-}
-
-template <int K>
-std::vector<typename Growth<K>::Proposal> Growth<K>::FreePlaces() const {
-  const Runs runs = RunsOf(border_.points);
-  return ParallelGather<Proposal>(runs.count(), [&](std::size_t run, auto* free) {
-    thread_local std::vector<double> near;
-    GatherLaid(runs, run, longest_ + kKeep * spacing_, &near);
-    for (std::size_t p = runs.begin(run); p < runs.end(run); ++p)
-      ProposeFrom(static_cast<std::uint32_t>(p), near, free);
-  });
-}
-
 // Several points mostly propose the same place: their mean is asked for, with the mean of their
 // frames. Of two patches that meet only one proposes.
 template <int K>
 typename Growth<K>::Proposed Growth<K>::Merge(const std::vector<Proposal>& proposals) const {
-  std::vector<double> landed(proposals.size() * stride());
-  ParallelFor(proposals.size(),
-              [&](std::size_t i) { Land(proposals[i], landed.data() + i * stride()); });
-  const NearLists near(landed, d_, kMerged * spacing_);
+  std::vector<double> landed(proposals.size() * stride()), shares(proposals.size());
+  ParallelFor(proposals.size(), [&](std::size_t i) {
+    Land(proposals[i], landed.data() + i * stride());
+    shares[i] = proposals[i].share;
+  });
+  const NearLists near(landed, d_, kMerged * spacing_, shares);
   const std::vector<std::uint8_t> leads =
       ChooseLocalMaxima(proposals.size(), [&](std::size_t i, const auto& visit) {
         for (const std::uint32_t j : near.Of(i))
@@ -210,6 +158,7 @@ typename Growth<K>::Proposed Growth<K>::Merge(const std::vector<Proposal>& propo
   Proposed merged;
   merged.sites.points.assign(leaders.size() * stride(), 0.0);
   merged.sites.frames.assign(leaders.size() * stride() * K, 0.0);
+  merged.sites.shares.assign(leaders.size(), 0.0);
   merged.sites.patch.resize(leaders.size());
   merged.parents.assign(leaders.size(), 0);
   ParallelFor(leaders.size(), [&](std::size_t l) {
@@ -221,27 +170,30 @@ typename Growth<K>::Proposed Growth<K>::Merge(const std::vector<Proposal>& propo
       const double* const other = border_.frames.data() + proposals[i].parent * stride() * K;
       for (std::size_t j = 0; j < stride(); ++j) point[j] += landed[i * stride() + j];
       for (std::size_t j = 0; j < stride() * K; ++j) frame[j] += other[j];
+      merged.sites.shares[l] += shares[i];
       ++merged.parents[l];
     };
     add(lead);
     for (const std::uint32_t i : near.Of(lead)) add(i);
     for (std::size_t j = 0; j < stride(); ++j) point[j] /= merged.parents[l];
     for (std::size_t j = 0; j < stride() * K; ++j) frame[j] /= merged.parents[l];
+    merged.sites.shares[l] /= merged.parents[l];
     merged.sites.patch[l] = patch(lead);
   });
   return merged;
 }
 
-// Of proposals that came out as `candidates`, d each, in the order of `columns`, those that keep
-// their distance from what is laid and from each other. Those of several parents are more likely
-// where they belong.
+// Of proposals that came out as `candidates`, d each, with their shares, in the order of `columns`,
+// those that keep their distance from what is laid and from each other. Those of several parents
+// are more likely where they belong.
 template <int K>
 std::vector<std::uint32_t> Growth<K>::Choose(const std::vector<double>& candidates,
+                                             const std::vector<double>& shares,
                                              const Proposed& proposed,
                                              const std::vector<std::uint32_t>& columns) const {
   const double keep = kKeep * spacing_;
-  const std::vector<std::uint8_t> far = AreFarFromLaid(candidates, keep);
-  const NearLists near(candidates, d_, keep);
+  const std::vector<std::uint8_t> far = AreFarFromLaid(candidates, shares, keep);
+  const NearLists near(candidates, d_, keep, shares);
   const auto strength = [&](std::uint32_t i) {
     const std::uint32_t c = columns[i];
     return std::pair(proposed.parents[c] > 1 ? 0 : 1, i);
@@ -270,6 +222,7 @@ typename Growth<K>::Sites Growth<K>::SitesOf(const Proposed& proposed,
     const double* const frame = proposed.sites.frames.data() + c * stride() * K;
     sites.points.insert(sites.points.end(), point, point + stride());
     sites.frames.insert(sites.frames.end(), frame, frame + stride() * K);
+    sites.shares.push_back(proposed.sites.shares[c]);
     sites.patch.push_back(proposed.sites.patch[c]);
   }
   return sites;
@@ -277,11 +230,23 @@ typename Growth<K>::Sites Growth<K>::SitesOf(const Proposed& proposed,
 
 template <int K>
 typename Growth<K>::Ring Growth<K>::Propose() {
-  asked_ = Merge(FreePlaces());
+  const bool is_lost = answered_ > kTelling && static_cast<double>(unexpected_) >
+                                                   kMostUnexpected * static_cast<double>(answered_);
+  asked_ = is_lost ? Proposed() : Merge(FreePlaces());
   border_ = {};
   const auto count = static_cast<Eigen::Index>(asked_.sites.size());
   return {Eigen::Map<const Eigen::MatrixXd>(asked_.sites.points.data(), d_, count),
           Eigen::Map<const Eigen::MatrixXd>(asked_.sites.frames.data(), d_ * K, count)};
+}
+
+// Keeps the share that the answer to the `asked`th question has, if it is about as expected.
+template <int K>
+bool Growth<K>::IsExpected(std::size_t asked, double share) {
+  const double expected = std::exchange(asked_.sites.shares[asked], share);
+  const bool is = share <= kUnexpected * expected && expected <= kUnexpected * share;
+  ++answered_;
+  unexpected_ += !is;
+  return is;
 }
 
 // Appends to the sample, which goes on from there.
@@ -290,40 +255,49 @@ void Growth<K>::Carry(Sites sites) {
   border_.Append(sites);
   size_ += static_cast<std::uint32_t>(sites.size());
   if (sites.size() == 0) return;
-  std::vector<double> points = std::move(sites.points);
+  std::vector<double> points = std::move(sites.points), shares = std::move(sites.shares);
+  const auto append = [](std::vector<double>* to, std::vector<double>* from) {
+    to->insert(to->end(), from->begin(), from->end());
+    *from = std::move(*to);
+  };
   while (!layers_.empty() && kLayerGrowth * points.size() >= layers_.back()->points.size()) {
-    layers_.back()->points.insert(layers_.back()->points.end(), points.begin(), points.end());
-    points = std::move(layers_.back()->points);
+    append(&layers_.back()->points, &points);
+    append(&layers_.back()->shares, &shares);
     layers_.pop_back();
   }
-  layers_.push_back(std::make_unique<Layer>(d_, std::move(points), kRunReach * spacing_));
+  layers_.push_back(
+      std::make_unique<Layer>(d_, std::move(points), std::move(shares), kRunReach * spacing_));
 }
 
 template <int K>
 std::vector<Eigen::Index> Growth<K>::Begin(const Eigen::MatrixXd& points,
                                            const Eigen::MatrixXd& tangents,
-                                           const std::vector<std::uint8_t>& found, double apart) {
+                                           const std::vector<std::uint8_t>& found, double apart,
+                                           const Eigen::VectorXd& shares, double room) {
+  is_graded_ = is_graded_ || shares.size() > 0;
   std::vector<Eigen::Index> columns;
-  std::vector<double> candidates;
+  std::vector<double> candidates, own;
   for (Eigen::Index c = 0; c < points.cols(); ++c) {
     CheckInterruption(static_cast<std::size_t>(c));
     if (!found[static_cast<std::size_t>(c)]) continue;
     columns.push_back(c);
     candidates.insert(candidates.end(), points.col(c).begin(), points.col(c).end());
+    own.push_back(shares.size() > 0 ? shares[c] : 1);
   }
-  const std::vector<std::uint8_t> far = AreFarFromLaid(candidates, spacing_);
+  const std::vector<std::uint8_t> far = AreFarFromLaid(candidates, own, room * spacing_);
   Sites seeds;
   BallTree tree(d_, &seeds.points);
   std::vector<Eigen::Index> begun;
   for (std::size_t i = 0; i < columns.size(); ++i) {
     CheckInterruption(i);
     const double* const y = candidates.data() + i * stride();
-    if (!far[i] || tree.AnyWithin(y, apart)) continue;
+    if (!far[i] || tree.AnyWithin(y, own[i] * apart)) continue;
     begun.push_back(columns[i]);
     seeds.points.insert(seeds.points.end(), y, y + d_);
     tree.Insert(0);
     const auto frame = tangents.col(columns[i]);
     seeds.frames.insert(seeds.frames.end(), frame.begin(), frame.end());
+    seeds.shares.push_back(own[i]);
     seeds.patch.push_back(patches_++);
   }
   Carry(std::move(seeds));
@@ -333,25 +307,28 @@ std::vector<Eigen::Index> Growth<K>::Begin(const Eigen::MatrixXd& points,
 template <int K>
 std::vector<Eigen::Index> Growth<K>::Join(const Eigen::MatrixXd& points,
                                           const Eigen::MatrixXd& tangents,
-                                          const std::vector<std::uint8_t>& found) {
+                                          const std::vector<std::uint8_t>& found,
+                                          const Eigen::VectorXd& shares) {
   const std::size_t count = asked_.sites.size();
   double* const frames = asked_.sites.frames.data();
   std::vector<std::uint8_t> fits(count);
   ParallelFor(count, [&](std::size_t i) {
     const auto c = static_cast<Eigen::Index>(i);
     const double* const proposed = asked_.sites.points.data() + i * stride();
-    fits[i] = found[i] && Distance(points.col(c).data(), proposed, d_) <= kFarthest * spacing_ &&
+    const double farthest = asked_.sites.shares[i] * (kFarthest * spacing_);
+    fits[i] = found[i] && Distance(points.col(c).data(), proposed, d_) <= farthest &&
               Align<K>(tangents.col(c).data(), d_, frames + i * stride() * K);
   });
   std::vector<std::uint32_t> columns;
-  std::vector<double> candidates;
+  std::vector<double> candidates, own;
   for (std::uint32_t i = 0; i < count; ++i) {
     CheckInterruption(i);
-    if (!fits[i]) continue;
+    if (!fits[i] || (shares.size() > 0 && !IsExpected(i, shares[i]))) continue;
     columns.push_back(i);
+    own.push_back(asked_.sites.shares[i]);
     candidates.insert(candidates.end(), points.col(i).begin(), points.col(i).end());
   }
-  std::vector<std::uint32_t> joined = Choose(candidates, asked_, columns);
+  std::vector<std::uint32_t> joined = Choose(candidates, own, asked_, columns);
   for (std::uint32_t& i : joined) i = columns[i];
   Sites sites = SitesOf(asked_, joined);
   for (std::size_t i = 0; i < joined.size(); ++i)

@@ -19,19 +19,25 @@ namespace stellate::core {
 //   while (growth.Propose().points.cols() > 0)       a ring about all that is new
 //     joined = growth.Join(closest points of that)
 //
+// Where the spacing is graded, each point has a share of it of its own, in (0, 1], and lengths
+// below that are said in spacings are in its. Where an answer's is not what was expected of it, it
+// is left out; and where that is so of most, nothing more is proposed.
+//
 // Deterministic: the same for any number of threads. Pure geometry: it asks nobody.
 template <int K>
 class Growth {
  public:
   // d        ambient dimension
-  // spacing  nearest-neighbour distance of the lattice, length
+  // spacing  nearest-neighbour distance of the lattice, length; the largest where it is graded
   Growth(int d, double spacing);
 
   // Of points of M, d x n with tangent bases (K rows of d) x n, those become seeds that are found,
-  // farther than a lattice spacing from all that is laid, and `apart` from each other. Returns
-  // their columns, ascending.
+  // farther than `room` lattice spacings from all that is laid, and `apart`, or its share of it,
+  // from each other. `shares`: of the spacing, n, or empty where it is not graded. Returns their
+  // columns, ascending.
   std::vector<Eigen::Index> Begin(const Eigen::MatrixXd& points, const Eigen::MatrixXd& tangents,
-                                  const std::vector<std::uint8_t>& found, double apart);
+                                  const std::vector<std::uint8_t>& found, double apart,
+                                  const Eigen::VectorXd& shares = {}, double room = 1);
 
   // Where the lattice goes on from what joined last: points near M, d x n, with tangent bases
   // there, (K rows of d) x n, roughly orthonormal.
@@ -40,16 +46,19 @@ class Growth {
   };
   Ring Propose();
 
-  // The closest points of the ring, tangent bases at them, and which were found. Returns the
-  // columns of those that join the sample, ascending: no two points of it are nearer than kKeep
-  // spacings.
+  // The closest points of the ring, tangent bases at them, and which were found; `shares` as
+  // above. Returns the columns of those that join the sample, ascending: no two points of it are
+  // nearer than kKeep spacings.
   std::vector<Eigen::Index> Join(const Eigen::MatrixXd& points, const Eigen::MatrixXd& tangents,
-                                 const std::vector<std::uint8_t>& found);
+                                 const std::vector<std::uint8_t>& found,
+                                 const Eigen::VectorXd& shares = {});
 
   std::uint32_t size() const { return size_; }
   // The points that joined last.
   std::size_t border() const { return border_.size(); }
   double spacing() const { return spacing_; }
+  // How far from what it goes on from a ring reaches, length.
+  double reach() const { return longest_; }
 
   // Least distance in the sample, in spacings: of a lattice that covers with radius epsilon, 1.4
   // epsilon for k = 1, 1.2, 1.1, 1.0 and 0.9 for k = 2 to 5.
@@ -60,6 +69,7 @@ class Growth {
   struct Sites {
     std::vector<double> points;        // d each
     std::vector<double> frames;        // K rows of d each: the lattice's directions
+    std::vector<double> shares;        // of the spacing
     std::vector<std::uint32_t> patch;  // the seed that it came from
     std::size_t size() const { return patch.size(); }
     void Append(const Sites& others);
@@ -71,29 +81,36 @@ class Growth {
   };
   // What was laid by rounds; those of about as many are joined into one.
   struct Layer {
-    Layer(int d, std::vector<double> laid, double reach);
-    std::vector<double> points;
+    Layer(int d, std::vector<double> laid, std::vector<double> its_shares, double reach);
+    std::vector<double> points, shares;
     RunTree tree;
   };
   struct Proposal {
     std::uint32_t parent;     // in border_
     std::uint32_t direction;  // of the lattice
+    double share;             // of the lattice's spacing, that it is proposed at
   };
 
   std::size_t stride() const { return static_cast<std::size_t>(d_); }
-  Runs RunsOf(const std::vector<double>& points) const;
-  void GatherLaid(const Runs& runs, std::size_t run, double radius,
-                  std::vector<double>* near) const;
+  Runs RunsOf(const std::vector<double>& points, const std::vector<double>& shares) const;
+  // What is laid around some points.
+  struct Laid {
+    std::vector<double> points, shares;  // d each; of the spacing
+  };
+  void GatherLaid(const Runs& runs, std::size_t run, const std::vector<double>& shares,
+                  double radius, Laid* near) const;
   std::vector<std::uint8_t> AreFarFromLaid(const std::vector<double>& points,
+                                           const std::vector<double>& shares,
                                            double distance) const;
   void Land(const Proposal& proposal, double* point) const;
-  void ProposeFrom(std::uint32_t p, const std::vector<double>& near,
-                   std::vector<Proposal>* free) const;
+  void ProposeFrom(std::uint32_t p, const Laid& near, std::vector<Proposal>* free) const;
   std::vector<Proposal> FreePlaces() const;
   Proposed Merge(const std::vector<Proposal>& proposals) const;
-  std::vector<std::uint32_t> Choose(const std::vector<double>& candidates, const Proposed& proposed,
+  std::vector<std::uint32_t> Choose(const std::vector<double>& candidates,
+                                    const std::vector<double>& shares, const Proposed& proposed,
                                     const std::vector<std::uint32_t>& columns) const;
   Sites SitesOf(const Proposed& proposed, const std::vector<std::uint32_t>& columns) const;
+  bool IsExpected(std::size_t asked, double share);
   void Carry(Sites sites);
 
   int d_;
@@ -101,6 +118,8 @@ class Growth {
   std::vector<double> vectors_;  // of the lattice, length, K each
   double longest_;               // of them
   std::vector<std::unique_ptr<Layer>> layers_;
+  bool is_graded_ = false;
+  std::uint64_t answered_ = 0, unexpected_ = 0;  // with shares, and of those not as expected
   std::uint32_t size_ = 0;
   std::uint32_t patches_ = 0;
   Sites border_;

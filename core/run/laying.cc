@@ -7,6 +7,7 @@
 #include "core/growth/lattice.h"
 #include "core/run/ahead_laying.h"
 #include "core/run/ring_laying.h"
+#include "core/run/solid_laying.h"
 #include "core/sample/ball_tree.h"
 
 namespace stellate::core {
@@ -22,6 +23,9 @@ constexpr double kSparse = 3;
 constexpr double SparseShare(int k) { return k < 3 ? 0.5 : 0.1; }
 // From 4 on as many seeds as tell enough to guess by are a good part of the sample.
 constexpr int kMostAhead = 3;
+// From 4 on there are no fewer vertices between walls, and a cut T^4 that closes without a lattice
+// does not with one.
+constexpr int kMostBetweenWalls = 3;
 
 // Of points and tangents grown ahead: 134 MB.
 constexpr std::uint64_t kMostNumbers = 1 << 24;
@@ -38,12 +42,22 @@ double GuessSize(int k, const AnsweredPoints& seeds, double epsilon) {
 
 // Of seeds drawn to ask ahead from only as many tell as there would be else.
 template <int K>
-bool AreSparse(const AnsweredPoints& seeds, const Specification& spec, double epsilon) {
+bool AreSparse(const Engine<K>& engine, const AnsweredPoints& seeds, const Specification& spec) {
+  const double epsilon = engine.criteria().epsilon;
+  const Eigen::VectorXd shares = SharesOf(engine.sizes(), seeds);
   const bool many =
       spec.criteria.ask_ahead && spec.seeds.cols() == 0 && spec.box_seeds == 0 && !spec.cover_box;
   const Eigen::Index most = many ? kDefaultBoxSeeds : seeds.points.cols();
-  return static_cast<double>(CountApart(seeds, most, kSparse * LaidSpacing(K, epsilon))) >=
-         SparseShare(K) * static_cast<double>(CountApart(seeds, most, epsilon));
+  return static_cast<double>(CountApart(seeds, most, kSparse * LaidSpacing(K, epsilon), shares)) >=
+         SparseShare(K) * static_cast<double>(CountApart(seeds, most, epsilon, shares));
+}
+
+// Seeds are no vertices yet there, and in nobody's way.
+template <int K>
+std::unique_ptr<Laying<K>> LayingBetweenWalls(Engine<K>& engine, const Specification& spec) {
+  if (K > kMostBetweenWalls || engine.criteria().graded()) return nullptr;
+  if (K == spec.ambient_dimension) return std::make_unique<SolidLaying<K>>(engine);
+  return spec.criteria.ask_ahead ? nullptr : std::make_unique<RingLaying<K>>(engine, true);
 }
 
 }  // namespace
@@ -54,7 +68,17 @@ std::uint64_t MostAtOnce(int k, int d) {
 
 double LaidSpacing(int k, double epsilon) { return kSlack * LatticeSpacing(k) * epsilon; }
 
-std::size_t CountApart(const AnsweredPoints& from, Eigen::Index most, double apart) {
+template <int K>
+Eigen::VectorXd SharesOf(const SizeField<K>& sizes, const AnsweredPoints& answers) {
+  Eigen::VectorXd shares = Eigen::VectorXd::Ones(answers.sizes.size());
+  for (Eigen::Index c = 0; c < shares.size(); ++c)
+    if (answers.found[static_cast<std::size_t>(c)])
+      shares[c] = sizes.BoundFor(answers.sizes[c]) / sizes.BoundFor(INFINITY);
+  return shares;
+}
+
+std::size_t CountApart(const AnsweredPoints& from, Eigen::Index most, double apart,
+                       const Eigen::VectorXd& shares) {
   const auto d = static_cast<int>(from.points.rows());
   std::vector<double> counted;
   BallTree tree(d, &counted);
@@ -63,7 +87,7 @@ std::size_t CountApart(const AnsweredPoints& from, Eigen::Index most, double apa
     if (!from.found[static_cast<std::size_t>(c)]) continue;
     --most;
     const double* const y = from.points.col(c).data();
-    if (tree.AnyWithin(y, apart)) continue;
+    if (tree.AnyWithin(y, shares.size() > 0 ? shares[c] * apart : apart)) continue;
     counted.insert(counted.end(), y, y + d);
     tree.Insert(0);
   }
@@ -71,20 +95,37 @@ std::size_t CountApart(const AnsweredPoints& from, Eigen::Index most, double apa
 }
 
 template <int K>
+std::vector<std::uint8_t> LayColumns(Engine<K>& engine, const AnsweredPoints& answers,
+                                     const std::vector<Eigen::Index>& columns) {
+  std::vector<std::uint8_t> used(static_cast<std::size_t>(answers.points.cols()), 0);
+  for (const Eigen::Index c : columns) {
+    CheckInterruption(static_cast<std::size_t>(c));
+    if (engine.is_full()) break;
+    engine.Lay(answers, c);
+    used[static_cast<std::size_t>(c)] = 1;
+  }
+  return used;
+}
+
+template <int K>
 std::unique_ptr<Laying<K>> LayingFor(Engine<K>& engine, const Specification& spec,
                                      const AnsweredPoints& seeds) {
   const ResolvedCriteria& criteria = engine.criteria();
-  if (criteria.graded() || spec.walls > 0 || (criteria.ask_ahead && K > kMostAhead) ||
-      !AreSparse<K>(seeds, spec, criteria.epsilon))
+  if (spec.walls > 0) return LayingBetweenWalls<K>(engine, spec);
+  if ((criteria.graded() && (!criteria.sizes_given || criteria.ask_ahead)) ||
+      (criteria.ask_ahead && K > kMostAhead) || !AreSparse<K>(engine, seeds, spec))
     return nullptr;
   const auto most = static_cast<double>(MostAtOnce(K, engine.complex().d()));
   if (criteria.ask_ahead && GuessSize(K, seeds, criteria.epsilon) <= most)
     return std::make_unique<AheadLaying<K>>(engine, spec);
-  return std::make_unique<RingLaying<K>>(engine);
+  return std::make_unique<RingLaying<K>>(engine, false);
 }
 
-#define STELLATE_EACH(K)                                                             \
-  template std::unique_ptr<Laying<K>> LayingFor<K>(Engine<K>&, const Specification&, \
+#define STELLATE_EACH(K)                                                              \
+  template Eigen::VectorXd SharesOf<K>(const SizeField<K>&, const AnsweredPoints&);   \
+  template std::vector<std::uint8_t> LayColumns<K>(Engine<K>&, const AnsweredPoints&, \
+                                                   const std::vector<Eigen::Index>&); \
+  template std::unique_ptr<Laying<K>> LayingFor<K>(Engine<K>&, const Specification&,  \
                                                    const AnsweredPoints&);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

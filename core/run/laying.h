@@ -42,12 +42,20 @@ class Laying {
 };
 
 // How a run lays its sample: ahead, if that is asked for and the sample is not too large for it,
-// else ring by ring. Null where it does not: where sizes are graded, where there are walls, and
-// where what was found of the seeds is dense (a sample itself, or all that so coarse a mesh needs).
-// The engine is borrowed; `spec` is its.
+// else ring by ring. With walls, once their faces are meshed: the interior, of a domain of R^k at
+// once. Null where it does not: where sizes are estimated, or given and asked for ahead; between
+// walls where sizes are graded, where it would ask ahead, and from k = 4 on; elsewhere where what
+// was found of the seeds is dense (a sample itself, or all that so coarse a mesh needs). The engine
+// is borrowed; `spec` is its.
 template <int K>
 std::unique_ptr<Laying<K>> LayingFor(Engine<K>& engine, const Specification& spec,
                                      const AnsweredPoints& seeds);
+
+// Adds columns of the answers to the sample, as long as there is room in it. Returns which columns
+// were added.
+template <int K>
+std::vector<std::uint8_t> LayColumns(Engine<K>& engine, const AnsweredPoints& answers,
+                                     const std::vector<Eigen::Index>& columns);
 
 // The lattice's nearest-neighbour distance for circumradii of epsilon, length.
 double LaidSpacing(int k, double epsilon);
@@ -58,8 +66,13 @@ inline constexpr double kPatchesApart = 10;
 // How many points at most are grown before anybody is asked for one, and then asked for at once.
 std::uint64_t MostAtOnce(int k, int d);
 
-// How many of the first `most` points that were found, in their order, lie `apart` from all that
-// were counted before.
-std::size_t CountApart(const AnsweredPoints& from, Eigen::Index most, double apart);
+// The points' sizes in epsilon, where they are graded and given; else empty.
+template <int K>
+Eigen::VectorXd SharesOf(const SizeField<K>& sizes, const AnsweredPoints& answers);
+
+// How many of the first `most` points that were found, in their order, lie `apart`, or their share
+// of it, from all that were counted before.
+std::size_t CountApart(const AnsweredPoints& from, Eigen::Index most, double apart,
+                       const Eigen::VectorXd& shares = {});
 
 }  // namespace stellate::core

@@ -318,7 +318,7 @@ void MeshingRun<K>::Finish(Termination termination) {
   if (over_) return;
   over_ = true;
   // What is laid has no stars yet.
-  if (laying_ && termination == Termination::kRoundBudget) delta_.added = engine_.Commit().added;
+  if (laying_ && termination == Termination::kRoundBudget) CommitLaid();
   laying_.reset();
   laid_.reset();
   batch_.reset();

@@ -67,6 +67,8 @@ class MeshingRun final : public Mesher {
   void KeepFaceSeeds();
   void JudgeWalls();
   bool PlanFaces(std::optional<std::vector<Target<K>>>* targets);
+  bool AskToLayInterior();
+  void CommitLaid();
   void LayAnswered();
   bool AskToLay();
   void InsertCandidates();

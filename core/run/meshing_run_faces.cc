@@ -37,7 +37,7 @@ void MeshingRun<K>::KeepFaceSeeds() {
       continue;
     }
     ++inside;
-    engine_.faces().KeepSeed(answers.points.col(c), answers.walls[i]);
+    engine_.faces().KeepSeed(answers.points.col(c), answers.walls[i], answers.tangents.col(c));
   }
   if (inside > 0 || engine_.faces().has_discoveries()) {
     Eigen::MatrixXd steps = wall_check_.Questions(answers);
@@ -57,6 +57,19 @@ void MeshingRun<K>::JudgeWalls() {
   if (Status status = wall_check_.Judge(trip_->answers()); !status.ok()) Fail(std::move(status));
 }
 
+// Lays the interior, once its faces are meshed, if it has any. Whether it asks for some of it.
+template <int K>
+bool MeshingRun<K>::AskToLayInterior() {
+  if (engine_.complex().size() == 0) return false;
+  AnsweredPoints seeds = engine_.InteriorSeeds();
+  laying_ = LayingFor<K>(engine_, spec_, seeds);
+  if (!laying_) return false;
+  laying_->Begin(seeds);
+  if (AskToLay()) return true;
+  CommitLaid();
+  return false;
+}
+
 // Where nothing is left to do on faces up to the stage: on to seeds of that stage, or to the next.
 // False where these are asked for, or the run is over.
 template <int K>
@@ -74,6 +87,13 @@ bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
       *targets = engine_.GuardSharpEdges(&delta_.added, &delta_.removed);
     } else {
       if (!idle || !engine_.AdvanceStage()) break;
+      if (faces.stage() == K) {
+        if (AskToLayInterior()) return false;
+        if (engine_.is_full()) {
+          Finish(Termination::kVertexBudget);
+          return false;
+        }
+      }
       *targets = engine_.Plan();
     }
     stall_watch_.NoteFrontMoved();
@@ -89,6 +109,7 @@ bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
   template void MeshingRun<K>::AskForFaces(const Eigen::MatrixXd&); \
   template void MeshingRun<K>::KeepFaceSeeds();                     \
   template void MeshingRun<K>::JudgeWalls();                        \
+  template bool MeshingRun<K>::AskToLayInterior();                  \
   template bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>*);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

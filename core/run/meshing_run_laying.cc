@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/refinement/exchange.h"
 #include "core/run/meshing_run.h"
 #include "core/run/seeding.h"
 
@@ -57,7 +58,20 @@ bool MeshingRun<K>::AskToLay() {
   return true;
 }
 
+// Besides what else the round has changed.
+template <int K>
+void MeshingRun<K>::CommitLaid() {
+  const std::vector<std::uint32_t> before = engine_.complex().Simplices();
+  if (before.empty() && delta_.removed.empty()) {
+    delta_.added = engine_.Commit().added;
+    return;
+  }
+  engine_.Commit();
+  ExchangeSimplices<K>(before, engine_.complex().Simplices(), &delta_.added, &delta_.removed);
+}
+
 #define STELLATE_EACH(K)                      \
+  template void MeshingRun<K>::CommitLaid();  \
   template void MeshingRun<K>::InsertSeeds(); \
   template void MeshingRun<K>::LayAnswered(); \
   template bool MeshingRun<K>::AskToLay();

@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
-
-#include "core/base/interruption.h"
 
 namespace stellate::core {
 namespace {
@@ -20,35 +19,30 @@ void Append(const AnsweredPoints& from, const std::vector<Eigen::Index>& columns
   append(from.points, &to->points);
   append(from.tangents, &to->tangents);
   to->found.resize(to->found.size() + columns.size(), 1);
+  if (from.sizes.size() == 0) return;
+  const Eigen::Index before = to->sizes.size();
+  to->sizes.conservativeResize(before + std::ssize(columns));
+  for (std::size_t i = 0; i < columns.size(); ++i)
+    to->sizes[before + static_cast<Eigen::Index>(i)] = from.sizes[columns[i]];
 }
 
 }  // namespace
 
 template <int K>
-RingLaying<K>::RingLaying(Engine<K>& engine)
+RingLaying<K>::RingLaying(Engine<K>& engine, bool has_walls)
     : engine_(engine),
       growth_(engine.complex().d(), LaidSpacing(K, engine.criteria().epsilon)),
       scouting_(
-          std::make_unique<Growth<K>>(engine.complex().d(), kPatchesApart * growth_.spacing())) {}
+          std::make_unique<Growth<K>>(engine.complex().d(), kPatchesApart * growth_.spacing())) {
+  if (has_walls) room_.emplace(engine, growth_.spacing());
+}
 
 template <int K>
 std::vector<std::uint8_t> RingLaying<K>::Begin(const AnsweredPoints& seeds) {
   seeds_ = seeds;
-  return Scout(seeds,
-               scouting_->Begin(seeds.points, seeds.tangents, seeds.found, scouting_->spacing()));
-}
-
-template <int K>
-std::vector<std::uint8_t> RingLaying<K>::Lay(const AnsweredPoints& answers,
-                                             const std::vector<Eigen::Index>& columns) {
-  std::vector<std::uint8_t> used(answers.found.size(), 0);
-  for (const Eigen::Index c : columns) {
-    CheckInterruption(static_cast<std::size_t>(c));
-    if (engine_.is_full()) break;
-    engine_.Lay(answers, c);
-    used[static_cast<std::size_t>(c)] = 1;
-  }
-  return used;
+  if (room_) seeds_.found = room_->HaveRoom(seeds.points, seeds.found);
+  return Scout(seeds, scouting_->Begin(seeds.points, seeds.tangents, seeds_.found,
+                                       scouting_->spacing(), SharesOf(engine_.sizes(), seeds)));
 }
 
 // What scouts find is of the sample at once: it is what there is if the run ends here.
@@ -56,40 +50,98 @@ template <int K>
 std::vector<std::uint8_t> RingLaying<K>::Scout(const AnsweredPoints& answers,
                                                const std::vector<Eigen::Index>& columns) {
   Append(answers, columns, &scouts_);
-  return Lay(answers, columns);
+  return LayColumns<K>(engine_, answers, columns);
 }
 
 template <int K>
-CandidateSet<K> RingLaying<K>::Next(std::uint64_t) {
+typename Growth<K>::Ring RingLaying<K>::NextRing() {
   typename Growth<K>::Ring ring;
   // Where all is within reach of one seed there is nothing to scout.
   if (scouting_ && scouting_->size() > 1) ring = scouting_->Propose();
   if (scouting_ && ring.points.cols() == 0) {
     scouting_.reset();
-    growth_.Begin(scouts_.points, scouts_.tangents, scouts_.found, 0);
+    growth_.Begin(scouts_.points, scouts_.tangents, scouts_.found, 0,
+                  SharesOf(engine_.sizes(), scouts_));
   }
   if (!scouting_ && !engine_.is_full()) {
     ring = growth_.Propose();
     if (ring.points.cols() == 0) {
       // What no patch came near has seeds of its own.
-      Lay(seeds_, growth_.Begin(seeds_.points, seeds_.tangents, seeds_.found,
-                                kPatchesApart * growth_.spacing()));
+      LayColumns<K>(
+          engine_, seeds_,
+          growth_.Begin(seeds_.points, seeds_.tangents, seeds_.found,
+                        kPatchesApart * growth_.spacing(), SharesOf(engine_.sizes(), seeds_)));
       if (!engine_.is_full()) ring = growth_.Propose();
     }
   }
+  return ring;
+}
+
+// What there is room for of a ring; where there is for none of it, of the next.
+template <int K>
+CandidateSet<K> RingLaying<K>::Next(std::uint64_t) {
   CandidateSet<K> candidates;
-  candidates.planned.points = std::move(ring.points);
-  candidates.planned.tangents = std::move(ring.tangents);
-  return candidates;
+  while (true) {
+    typename Growth<K>::Ring ring = NextRing();
+    proposed_ = ring.points.cols();
+    std::vector<std::uint8_t> all(static_cast<std::size_t>(proposed_), 1);
+    const std::vector<std::uint8_t> has_room = room_ ? room_->HaveRoom(ring.points, all) : all;
+    asked_.clear();
+    for (Eigen::Index c = 0; c < proposed_; ++c)
+      if (has_room[static_cast<std::size_t>(c)]) asked_.push_back(c);
+    if (proposed_ > 0 && asked_.empty()) {
+      growing().Join(ring.points, ring.tangents, has_room);
+      continue;
+    }
+    if (std::ssize(asked_) == proposed_) {
+      candidates.planned.points = std::move(ring.points);
+      candidates.planned.tangents = std::move(ring.tangents);
+    } else {
+      candidates.planned.points = ring.points(Eigen::all, asked_);
+      candidates.planned.tangents = ring.tangents(Eigen::all, asked_);
+    }
+    return candidates;
+  }
+}
+
+// The answers as of the whole ring, found where there is room for them. What lies beyond a wall
+// that nobody knows of tells of that.
+template <int K>
+AnsweredPoints RingLaying<K>::InRoom(const AnsweredPoints& answers) {
+  std::vector<std::uint8_t> fits = room_->HaveRoom(answers.points, answers.found);
+  AnsweredPoints ring;
+  ring.points.setZero(answers.points.rows(), proposed_);
+  ring.tangents.setZero(answers.tangents.rows(), proposed_);
+  ring.found.assign(static_cast<std::size_t>(proposed_), 0);
+  for (std::size_t i = 0; i < asked_.size(); ++i) {
+    const auto c = static_cast<Eigen::Index>(i);
+    if (!fits[i]) continue;
+    if (const std::optional<int> beyond = answers.Beyond(c)) {
+      if (!room_->KnowsWallNear(answers.points.col(c).data(), growing().reach()))
+        engine_.faces().Discover(answers.points.col(c), 0, *beyond);
+      continue;
+    }
+    ring.points.col(asked_[i]) = answers.points.col(c);
+    ring.tangents.col(asked_[i]) = answers.tangents.col(c);
+    ring.found[static_cast<std::size_t>(asked_[i])] = 1;
+  }
+  return ring;
 }
 
 template <int K>
 std::vector<std::uint8_t> RingLaying<K>::Take(const CandidateSet<K>&,
                                               const AnsweredPoints& answers) {
-  Growth<K>& growth = scouting_ ? *scouting_ : growth_;
-  const std::vector<Eigen::Index> joined =
-      growth.Join(answers.points, answers.tangents, answers.found);
-  return scouting_ ? Scout(answers, joined) : Lay(answers, joined);
+  std::vector<Eigen::Index> joined;
+  if (room_) {
+    const AnsweredPoints ring = InRoom(answers);
+    joined = growing().Join(ring.points, ring.tangents, ring.found);
+    for (Eigen::Index& c : joined)
+      c = std::lower_bound(asked_.begin(), asked_.end(), c) - asked_.begin();
+  } else {
+    joined = growing().Join(answers.points, answers.tangents, answers.found,
+                            SharesOf(engine_.sizes(), answers));
+  }
+  return scouting_ ? Scout(answers, joined) : LayColumns<K>(engine_, answers, joined);
 }
 
 template <int K>

@@ -1,19 +1,22 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/growth/growth.h"
+#include "core/run/interior_room.h"
 #include "core/run/laying.h"
 
 namespace stellate::core {
 
 // What is asked is what joins, ring by ring (core/growth/growth.h). A lattice ten times as coarse
-// goes before, to have a seed near everything.
+// goes before, to have a seed near everything. Of a manifold with boundary it is the interior that
+// is laid, as far as there is room.
 template <int K>
 class RingLaying final : public Laying<K> {
  public:
-  explicit RingLaying(Engine<K>& engine);  // borrowed
+  RingLaying(Engine<K>& engine, bool has_walls);  // borrowed
 
   std::vector<std::uint8_t> Begin(const AnsweredPoints& seeds) override;
   CandidateSet<K> Next(std::uint64_t round) override;
@@ -23,8 +26,9 @@ class RingLaying final : public Laying<K> {
   double CountMissing() const override;
 
  private:
-  std::vector<std::uint8_t> Lay(const AnsweredPoints& answers,
-                                const std::vector<Eigen::Index>& columns);
+  Growth<K>& growing() { return scouting_ ? *scouting_ : growth_; }
+  typename Growth<K>::Ring NextRing();
+  AnsweredPoints InRoom(const AnsweredPoints& answers);
   std::vector<std::uint8_t> Scout(const AnsweredPoints& answers,
                                   const std::vector<Eigen::Index>& columns);
 
@@ -32,6 +36,9 @@ class RingLaying final : public Laying<K> {
   Growth<K> growth_;
   std::unique_ptr<Growth<K>> scouting_;  // the coarse lattice, until it is laid
   AnsweredPoints seeds_, scouts_;        // as given; of the coarse lattice
+  std::optional<InteriorRoom<K>> room_;  // between walls
+  Eigen::Index proposed_ = 0;            // of the ring that was asked for last
+  std::vector<Eigen::Index> asked_;      // its columns for which there was room
 };
 
 STELLATE_DECLARE_CLASS(RingLaying)

@@ -125,6 +125,69 @@ TEST(Growth, IsTheLatticeWhereNothingBends) {
   }
 }
 
+// Grown with a share of the spacing at each point; also how many points were asked for.
+struct Graded {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<double> shares;
+  Eigen::Index asked = 0;
+};
+
+Graded GrowGraded(double spacing, const std::function<double(const Eigen::Vector3d&)>& share) {
+  const auto sphere = Make("sphere:2");
+  Growth<2> growth(3, spacing);
+  Graded all;
+  const auto shares_of = [&](const Answered& from) {
+    Eigen::VectorXd shares(from.points.cols());
+    for (Eigen::Index c = 0; c < shares.size(); ++c) shares[c] = share(from.points.col(c));
+    return shares;
+  };
+  const auto add = [&](const Answered& from, const std::vector<Eigen::Index>& columns) {
+    for (const Eigen::Index c : columns) {
+      all.points.push_back(from.points.col(c));
+      all.shares.push_back(share(all.points.back()));
+    }
+  };
+  const Answered begun = Closest(*sphere, Eigen::Vector3d(0, 0, 2), {});
+  add(begun, growth.Begin(begun.points, begun.tangents, begun.found, 1, shares_of(begun)));
+  for (int round = 0; round < 500; ++round) {
+    const auto ring = growth.Propose();
+    if (ring.points.cols() == 0) break;
+    const Answered answered = Closest(*sphere, ring.points, {});
+    add(answered,
+        growth.Join(answered.points, answered.tangents, answered.found, shares_of(answered)));
+    all.asked += ring.points.cols();
+  }
+  return all;
+}
+
+// From the one pole to the other spacings grow eightfold.
+TEST(Growth, KeepsItsDistanceAndCoversWhereSizesAreGraded) {
+  const double spacing = 0.16;
+  const auto share = [](const Eigen::Vector3d& y) { return std::exp2(-1.5 * (1 - y[2])); };
+  const Graded grown = GrowGraded(spacing, share);
+  double lattice = 0;
+  for (std::size_t i = 0; i < grown.points.size(); ++i) {
+    const double own = spacing * grown.shares[i];
+    lattice += own * own * std::sqrt(0.75);
+    for (std::size_t j = 0; j < i; ++j)
+      EXPECT_GE((grown.points[i] - grown.points[j]).norm(),
+                Growth<2>::kKeep * spacing * std::min(grown.shares[i], grown.shares[j]));
+  }
+  // Cells of the lattice, each of its own spacing, would tile the sphere. They are laid a little
+  // smaller, and holes are left where patches meet.
+  EXPECT_GT(lattice, 0.9 * 4 * std::numbers::pi);
+  EXPECT_LT(lattice, 1.3 * 4 * std::numbers::pi);
+  EXPECT_LT(static_cast<double>(grown.asked), 1.3 * static_cast<double>(grown.points.size()));
+}
+
+// What changes within a spacing cannot be laid, and little is asked for to see that.
+TEST(Growth, GivesUpWhereSizesChangeWithinASpacing) {
+  const auto share = [](const Eigen::Vector3d& y) {
+    return 0.6 + 0.4 * std::sin(1e4 * y[0] + 7e3 * y[1]);
+  };
+  EXPECT_LT(GrowGraded(0.05, share).asked, 1000);
+}
+
 TEST(Growth, TakesOneOfSeedsThatLieTogetherAndThoseItHasNotReached) {
   Growth<2> growth(3, 1);
   const Eigen::Matrix<double, 6, 1> frame{1, 0, 0, 0, 1, 0};

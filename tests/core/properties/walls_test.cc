@@ -12,6 +12,7 @@
 #include <iostream>
 #include <string>
 
+#include "tests/core/support/dihedrals.h"
 #include "tests/core/support/domains.h"
 #include "tests/core/support/wall_mesh.h"
 
@@ -59,6 +60,25 @@ int Euler(const std::vector<int>& betti) {
   return chi;
 }
 
+// Degrees; of tetrahedra.
+double LeastDihedral(const WallMesh& mesh) {
+  double least = 180;
+  for (const auto& cell : mesh.simplices)
+    least = std::min(
+        least, stellate::testing::DihedralAnglesOf({mesh.points[cell[0]], mesh.points[cell[1]],
+                                                    mesh.points[cell[2]], mesh.points[cell[3]]})
+                   .first);
+  return least;
+}
+
+// What the refinement gives, degrees: more of solids, whose inner points cost no answer. Next to an
+// edge of 20 degrees it is between two cells.
+double PromisedDihedral(const Case& c, const Domain& m) {
+  if (m.k != 3) return 0;
+  if (c.make == stellate::testing::Wedge20) return 6;
+  return m.d == 3 ? 14 : 10;
+}
+
 class Walls : public ::testing::TestWithParam<Case> {};
 
 TEST_P(Walls, AreWhereTheMeshEnds) {
@@ -88,11 +108,14 @@ TEST_P(Walls, AreWhereTheMeshEnds) {
         const bool on = (mesh.walls[v] & SetOfWall(static_cast<int>(w))) != 0;
         EXPECT_TRUE(on ? std::abs(g) < 1e-9 : g > -1e-9) << "vertex " << v << ", wall " << w;
       }
+    const double dihedral = m.k == 3 ? LeastDihedral(mesh) : 180;
+    EXPECT_GE(dihedral, PromisedDihedral(GetParam(), m) - 1e-6);
     if (Setting("STELLATE_WALL_FIGURES", 0) > 0)
       std::cout << GetParam().name << ' ' << trial << " epsilon " << spec.epsilon << " vertices "
                 << mesh.points.size() << " rounds " << mesh.report.counts.rounds << " queries "
-                << mesh.report.counts.queries << " angle " << c.min_angle_degrees << " fatness "
-                << c.min_fatness << " radius/epsilon " << c.max_circumradius / spec.epsilon << '\n';
+                << mesh.report.counts.queries << " angle " << c.min_angle_degrees << " dihedral "
+                << dihedral << " fatness " << c.min_fatness << " radius/epsilon "
+                << c.max_circumradius / spec.epsilon << '\n';
     if (HasFailure()) return;
   }
 }

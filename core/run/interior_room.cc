@@ -1,0 +1,54 @@
+#include "core/run/interior_room.h"
+
+#include <cmath>
+
+#include "core/base/parallel.h"
+
+namespace stellate::core {
+namespace {
+
+// How far any point of a wall is from its nearest vertices, in epsilon: R1 bounds it in tangent
+// spaces, walls bend.
+constexpr double kWallCovering = 1.25;
+// What is laid keeps this many of its spacings from the faces' vertices. Nearer makes more slivers,
+// farther more vertices; little either way from 0.5 to 0.8, since it must not encroach on them.
+constexpr double kFromFaces = 0.66;
+
+}  // namespace
+
+template <int K>
+InteriorRoom<K>::InteriorRoom(const Engine<K>& engine, double spacing)
+    : complex_(engine.complex()),
+      epsilon_(engine.criteria().epsilon),
+      apart_(kFromFaces * spacing) {}
+
+template <int K>
+bool InteriorRoom<K>::HasRoomFor(const double* point) const {
+  return !complex_.AnyWithin(point, apart_) && !complex_.InGuard(point) &&
+         !complex_.EncroachedBy(point, 0);
+}
+
+template <int K>
+std::vector<std::uint8_t> InteriorRoom<K>::HaveRoom(const Eigen::MatrixXd& points,
+                                                    const std::vector<std::uint8_t>& found) const {
+  std::vector<std::uint8_t> have(found.size());
+  ParallelFor(found.size(), [&](std::size_t i) {
+    have[i] = found[i] && HasRoomFor(points.col(static_cast<Eigen::Index>(i)).data());
+  });
+  return have;
+}
+
+// The wall's point is nearest to both ends where it is between them, in the middle.
+template <int K>
+bool InteriorRoom<K>::IsSurelyInside(const double* point, double reach) const {
+  return !complex_.AnyWithin(point, std::hypot(kWallCovering * epsilon_, reach / 2));
+}
+
+template <int K>
+bool InteriorRoom<K>::KnowsWallNear(const double* point, double reach) const {
+  return complex_.AnyWithin(point, kWallCovering * epsilon_ + reach);
+}
+
+STELLATE_INSTANTIATE_CLASS(InteriorRoom)
+
+}  // namespace stellate::core

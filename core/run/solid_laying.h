@@ -1,0 +1,42 @@
+#pragma once
+
+#include <vector>
+
+#include "core/growth/growth.h"
+#include "core/run/interior_room.h"
+#include "core/run/laying.h"
+#include "core/sample/ball_tree.h"
+
+namespace stellate::core {
+
+// The interior of a domain of R^k whose boundary is meshed: one lattice, as far as there is room.
+// Each point is its own closest point there; only where it may lie beyond a wall it is asked for.
+template <int K>
+class SolidLaying final : public Laying<K> {
+ public:
+  explicit SolidLaying(Engine<K>& engine);  // borrowed
+
+  std::vector<std::uint8_t> Begin(const AnsweredPoints& seeds) override;
+  CandidateSet<K> Next(std::uint64_t round) override;
+  std::vector<std::uint8_t> Take(const CandidateSet<K>& candidates,
+                                 const AnsweredPoints& answers) override;
+  const Engine<K>& asking() const override { return engine_; }
+  double CountMissing() const override { return 2.0 * static_cast<double>(growth_.border()); }
+
+ private:
+  void Grow();
+  bool BeginFromNextSeed();
+  void Doubt(const double* point);
+
+  Engine<K>& engine_;
+  Growth<K> growth_;
+  InteriorRoom<K> room_;
+  AnsweredPoints seeds_;
+  std::vector<double> doubted_;  // d each: all that were asked for, or will be next
+  BallTree doubts_;              // of them
+  std::size_t asked_ = 0;        // of them
+};
+
+STELLATE_DECLARE_CLASS(SolidLaying)
+
+}  // namespace stellate::core
