@@ -5,7 +5,8 @@
 // CGAL is given the curves where walls meet, at a quarter of the mesh's edges; Stellate finds them.
 // Seconds are of the processor, one thread, oracle and certificate included.
 //   least, most       dihedral angles of the cells, degrees
-//   corners, middles  how far the boundary's vertices and barycentres are from it
+//   of 1000           cells by their least dihedral angles: below 5 degrees, 10, 15 ... 60, and
+//   above corners, middles  how far the boundary's vertices and barycentres are from it
 
 #include <algorithm>
 #include <cmath>
@@ -14,16 +15,21 @@
 #include <exception>
 #include <limits>
 #include <map>
-#include <numbers>
 #include <regex>
 #include <string>
 
 #include "tests/bench/solids/solid.h"
+#include "tests/core/support/dihedrals.h"
 
 namespace stellate::bench {
 namespace {
 
 using Eigen::Vector3d;
+
+// Of the histogram of least angles, degrees.
+constexpr double kBin = 5;
+constexpr std::size_t kBins = 13;
+
 using testing::BallOf;
 using testing::CubeOf;
 using testing::Domain;
@@ -58,26 +64,13 @@ Domain SolidTorus() {
   return m;
 }
 
-// Degrees; the least and the largest of all cells.
-std::pair<double, double> DihedralAngles(const SolidMesh& mesh) {
-  double least = 180, largest = 0;
-  for (const auto& cell : mesh.cells) {
-    std::array<Vector3d, 4> normals;
-    for (std::size_t i = 0; i < 4; ++i) {
-      const Vector3d &a = mesh.points[cell[(i + 1) % 4]], &b = mesh.points[cell[(i + 2) % 4]],
-                     &c = mesh.points[cell[(i + 3) % 4]], &apex = mesh.points[cell[i]];
-      normals[i] = (b - a).cross(c - a).normalized();
-      if (normals[i].dot(apex - a) > 0) normals[i] = -normals[i];  // outward
-    }
-    for (std::size_t i = 0; i < 4; ++i)
-      for (std::size_t j = 0; j < i; ++j) {
-        const double cosine = std::clamp(-normals[i].dot(normals[j]), -1.0, 1.0);
-        const double angle = std::acos(cosine) * 180 / std::numbers::pi;
-        least = std::min(least, angle);
-        largest = std::max(largest, angle);
-      }
-  }
-  return {least, largest};
+// Degrees: the least and the largest dihedral angle of each cell.
+std::vector<std::pair<double, double>> DihedralAngles(const SolidMesh& mesh) {
+  std::vector<std::pair<double, double>> angles;
+  for (const auto& cell : mesh.cells)
+    angles.push_back(testing::DihedralAnglesOf(
+        {mesh.points[cell[0]], mesh.points[cell[1]], mesh.points[cell[2]], mesh.points[cell[3]]}));
+  return angles;
 }
 
 // The largest distance, by the walls' values over their slopes, of a point of the boundary's
@@ -110,13 +103,23 @@ std::pair<double, double> BoundaryErrors(const SolidMesh& mesh, const Domain& do
 }
 
 void Print(const Solid& solid, const char* mesher, double epsilon, const SolidMesh& mesh) {
-  const auto [least, largest] = DihedralAngles(mesh);
+  double least = 180, largest = 0;
+  std::array<std::size_t, kBins> bins{};
+  for (const auto& [low, high] : DihedralAngles(mesh)) {
+    least = std::min(least, low);
+    largest = std::max(largest, high);
+    ++bins[std::min(static_cast<std::size_t>(low / kBin), kBins - 1)];
+  }
   const auto [corners, middles] = BoundaryErrors(mesh, solid.domain);
   const auto n = static_cast<double>(mesh.points.size());
   std::printf("%-16s %-8s %7.3f %8zu %8zu %8.3f %8.3f %9.0f %6.1f %6.1f %9.1e %9.1e  %s\n",
               solid.name, mesher, epsilon, mesh.points.size(), mesh.cells.size(), mesh.seconds,
               mesh.oracle_seconds, n / mesh.seconds, least, largest, corners, middles,
               mesh.note.c_str());
+  std::printf("%16s %-8s %7s", "", "of 1000", "");
+  for (const std::size_t bin : bins)
+    std::printf(" %5.1f", 1000 * static_cast<double>(bin) / static_cast<double>(mesh.cells.size()));
+  std::printf("\n");
   std::fflush(stdout);
 }
 
