@@ -6,6 +6,7 @@
 
 #include "core/base/instantiate.h"
 #include "core/base/parallel.h"
+#include "core/base/room.h"
 #include "core/complex/star_complex.h"
 #include "core/geometry/laid_polygon.h"
 
@@ -16,6 +17,9 @@ namespace {
 constexpr double kGathered = 2 * (1 + 1e-6);
 // Before R1 many a star reaches farther, and few beyond this.
 constexpr double kSearched = 3;
+
+// The rules mostly insert fewer points into a laid sample than one in so many.
+constexpr std::size_t PartsToCome(int k) { return k <= 2 ? 8 : 4; }
 
 using Near = std::vector<std::pair<double, std::uint32_t>>;  // squared distances, and who is there
 
@@ -152,8 +156,11 @@ typename StarComplex<K>::Change StarComplex<K>::BuildLaidStars() {
   change.stars.resize(cells_.size());
   std::iota(change.stars.begin(), change.stars.end(), std::uint32_t{0});
   centre_owner_ = CentreCache<K>::NewOwner();
+  LeaveRoom(PartsToCome(K), &points_);
+  LeaveRoom(PartsToCome(K), &tangents_);
   cells_.resize(size());
   tree_.Assign(std::vector<double>(size(), 0.0), BallTree::Halving::kExtent);
+  tree_.LeaveRoom(PartsToCome(K));
   const std::vector<BallTree::Bunch> bunches = tree_.Bunches();
   std::vector<double> influence(size());
   ParallelFor(bunches.size(), [&](std::size_t b) {

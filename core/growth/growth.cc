@@ -249,6 +249,13 @@ bool Growth<K>::IsExpected(std::size_t asked, double share) {
   return is;
 }
 
+template <int K>
+void Growth<K>::Forget() {
+  layers_.clear();
+  border_ = {};
+  asked_ = {};
+}
+
 // Appends to the sample, which goes on from there.
 template <int K>
 void Growth<K>::Carry(Sites sites) {

@@ -53,6 +53,9 @@ class Growth {
                                  const std::vector<std::uint8_t>& found,
                                  const Eigen::VectorXd& shares = {});
 
+  // Gives its memory back. Nothing is proposed afterwards.
+  void Forget();
+
   std::uint32_t size() const { return size_; }
   // The points that joined last.
   std::size_t border() const { return border_.size(); }

@@ -117,12 +117,21 @@ void Engine<K>::RejudgeSizes() {
 
 template <int K>
 void Engine<K>::RejudgeAll() {
-  std::vector<std::optional<Violation<K>>> violations(complex_.size());
-  ParallelFor(complex_.size(), [&](std::uint32_t p) {
-    violations[p] = WorstSizeOrShape<K>(complex_, p, sizes_.BoundAt(complex_, p),
-                                        criteria_.radius_edge_bound, faces_.stage());
+  std::vector<std::uint32_t> all(complex_.size());
+  std::iota(all.begin(), all.end(), 0u);
+  book_.Replace(JudgeSizeAndShape(all));
+}
+
+template <int K>
+std::vector<typename ViolationBook<K>::Entry> Engine<K>::JudgeSizeAndShape(
+    const std::vector<std::uint32_t>& stars) const {
+  using Entry = typename ViolationBook<K>::Entry;
+  return ParallelGather<Entry>(stars.size(), [&](std::size_t i, std::vector<Entry>* found) {
+    const std::uint32_t p = stars[i];
+    if (const auto worst = WorstSizeOrShape<K>(complex_, p, sizes_.BoundAt(complex_, p),
+                                               criteria_.radius_edge_bound, faces_.stage()))
+      found->push_back({p, *worst});
   });
-  book_.Replace(violations);
 }
 
 template <int K>
@@ -255,12 +264,7 @@ typename Engine<K>::Change Engine<K>::Commit() {
   touched.resize(touched.size() + complex_.size() - first);
   std::iota(touched.end() - (complex_.size() - first), touched.end(), first);
   if (sizes_.is_estimated()) sizes_.Look(complex_, touched);
-  std::vector<std::optional<Violation<K>>> violations(touched.size());
-  ParallelFor(touched.size(), [&](std::size_t i) {
-    violations[i] = WorstSizeOrShape<K>(complex_, touched[i], sizes_.BoundAt(complex_, touched[i]),
-                                        criteria_.radius_edge_bound, faces_.stage());
-  });
-  book_.Update(complex_.size(), touched, violations);
+  book_.Update(complex_.size(), touched, JudgeSizeAndShape(touched));
   if (judged) {
     book_.Suspect(around);
     book_.Suspect(touched);

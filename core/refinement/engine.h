@@ -103,6 +103,8 @@ class Engine {
   void RejudgeSizes();
   bool HasGrownTooMuch() const;
   void RejudgeAll();
+  std::vector<typename ViolationBook<K>::Entry> JudgeSizeAndShape(
+      const std::vector<std::uint32_t>& stars) const;
   void YieldToFaces(std::vector<Target<K>>* targets);
   PlannedPoints SetCollars();
   bool IsSliverAtBoundary(std::uint32_t star, const Violation<K>& violation) const;

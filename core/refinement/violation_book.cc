@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 #include <numeric>
+#include <utility>
 
 #include "core/base/parallel.h"
 
@@ -10,7 +11,7 @@ namespace stellate::core {
 
 template <int K>
 void ViolationBook<K>::Update(std::uint32_t count, const std::vector<std::uint32_t>& judged,
-                              const std::vector<std::optional<Violation<K>>>& violations) {
+                              std::vector<Entry> entries) {
   is_entered_.resize(count, 0);
   failed_attempts_.resize(count, 0);
   no_flat_.resize(count, 0);
@@ -23,22 +24,20 @@ void ViolationBook<K>::Update(std::uint32_t count, const std::vector<std::uint32
     CheckInterruption(step++);
     return !is_entered_[entry.star];
   });
-  for (std::size_t i = 0; i < judged.size(); ++i) {
-    CheckInterruption(i);
-    if (!violations[i]) continue;
-    is_entered_[judged[i]] = 1;
-    size_and_shape_.push_back({judged[i], *violations[i]});
-  }
+  for (const Entry& entry : entries) is_entered_[entry.star] = 1;
+  if (size_and_shape_.empty())
+    size_and_shape_ = std::move(entries);
+  else
+    size_and_shape_.insert(size_and_shape_.end(), entries.begin(), entries.end());
+  // A sample that was just laid has many.
+  if (size_and_shape_.size() < size_and_shape_.capacity() / 4) size_and_shape_.shrink_to_fit();
 }
 
 template <int K>
-void ViolationBook<K>::Replace(const std::vector<std::optional<Violation<K>>>& violations) {
-  size_and_shape_.clear();
-  for (std::uint32_t p = 0; p < violations.size(); ++p) {
-    CheckInterruption(p);
-    is_entered_[p] = violations[p].has_value();
-    if (violations[p]) size_and_shape_.push_back({p, *violations[p]});
-  }
+void ViolationBook<K>::Replace(std::vector<Entry> entries) {
+  is_entered_.assign(is_entered_.size(), 0);
+  for (const Entry& entry : entries) is_entered_[entry.star] = 1;
+  size_and_shape_ = std::move(entries);
 }
 
 template <int K>

@@ -23,11 +23,11 @@ class ViolationBook {
   std::uint32_t star_count() const { return static_cast<std::uint32_t>(is_entered_.size()); }
 
   // Rules R1 and R2. After an insertion: there are `count` stars now, of which `judged` are new or
-  // changed, and these are their violations; what was known of them before is forgotten.
+  // changed, and these break a rule; what was known of them before is forgotten.
   void Update(std::uint32_t count, const std::vector<std::uint32_t>& judged,
-              const std::vector<std::optional<Violation<K>>>& violations);
+              std::vector<Entry> entries);
   // All stars were judged again, by other bounds.
-  void Replace(const std::vector<std::optional<Violation<K>>>& violations);
+  void Replace(std::vector<Entry> entries);
   // One violation a star.
   const std::vector<Entry>& size_and_shape() const { return size_and_shape_; }
 

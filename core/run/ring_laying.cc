@@ -84,12 +84,17 @@ CandidateSet<K> RingLaying<K>::Next(std::uint64_t) {
   while (true) {
     typename Growth<K>::Ring ring = NextRing();
     proposed_ = ring.points.cols();
+    if (proposed_ == 0) {  // all is laid: what follows needs the room
+      growth_.Forget();
+      seeds_ = scouts_ = {};
+      return candidates;
+    }
     std::vector<std::uint8_t> all(static_cast<std::size_t>(proposed_), 1);
     const std::vector<std::uint8_t> has_room = room_ ? room_->HaveRoom(ring.points, all) : all;
     asked_.clear();
     for (Eigen::Index c = 0; c < proposed_; ++c)
       if (has_room[static_cast<std::size_t>(c)]) asked_.push_back(c);
-    if (proposed_ > 0 && asked_.empty()) {
+    if (asked_.empty()) {
       growing().Join(ring.points, ring.tangents, has_room);
       continue;
     }

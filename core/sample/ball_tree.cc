@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/base/parallel.h"
+#include "core/base/room.h"
 
 namespace stellate::core {
 namespace {
@@ -218,6 +219,14 @@ void BallTree::Assign(std::vector<double> influences, Halving halving) {
     nodes_.clear();
   else
     Rebuild(halving);
+}
+
+void BallTree::LeaveRoom(std::size_t parts) {
+  core::LeaveRoom(parts, &influence_);
+  core::LeaveRoom(parts, &leaf_of_);
+  core::LeaveRoom(parts, &nodes_);
+  core::LeaveRoom(parts, &centres_);
+  core::LeaveRoom(parts, &slots_);
 }
 
 // Children have larger numbers than their parents.

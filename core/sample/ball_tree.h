@@ -94,6 +94,9 @@ class BallTree {
     return !nodes_.empty() && AnyWithin(0, SquaredDistance(q, Centre(0), d_), q, radius);
   }
 
+  // Room for one part in `parts` more points, and little more, after Assign.
+  void LeaveRoom(std::size_t parts);
+
   // Points in the order of their places are mostly near the ones before them: handled so, they find
   // in the cache what those have touched.
   std::uint32_t PlaceOf(std::uint32_t id) const {

@@ -20,7 +20,7 @@ class CandidateSetTest : public ::testing::Test {
     complex_.Commit();
     std::vector<std::uint32_t> all(50);
     for (std::uint32_t p = 0; p < 50; ++p) all[p] = p;
-    book_.Update(50, all, std::vector<std::optional<Violation<2>>>(50));
+    book_.Update(50, all, {});
     Specification spec;
     spec.dimension = 2;
     spec.ambient_dimension = 4;

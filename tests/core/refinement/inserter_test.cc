@@ -24,12 +24,13 @@ class InserterTest : public ::testing::Test {
       complex_.Append(seeds.points.col(c).data(), seeds.tangents.col(c).data());
     complex_.Commit();
     std::vector<std::uint32_t> all;
-    std::vector<std::optional<Violation<2>>> violations;
+    std::vector<ViolationBook<2>::Entry> entries;
     for (std::uint32_t p = 0; p < 6; ++p) {
       all.push_back(p);
-      violations.push_back(WorstSizeOrShape<2>(complex_, p, criteria_.epsilon, 2));
+      if (const auto worst = WorstSizeOrShape<2>(complex_, p, criteria_.epsilon, 2))
+        entries.push_back({p, *worst});
     }
-    book_.Update(6, all, violations);
+    book_.Update(6, all, std::move(entries));
     const auto& entry = book_.size_and_shape().front();
     candidates_ = DrawCandidates<2>(
         complex_, book_, criteria_, {true, 1, 1},

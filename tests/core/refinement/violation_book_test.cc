@@ -9,7 +9,6 @@ namespace {
 
 using Book = ViolationBook<2>;
 using Stars = std::vector<std::uint32_t>;
-using Violations = std::vector<std::optional<Violation<2>>>;
 
 Stars Entered(const Book& book) {
   Stars stars;
@@ -21,7 +20,7 @@ Stars Entered(const Book& book) {
 Book FiveStars() {
   Book book;
   const Violation<2> bad;
-  book.Update(5, {0, 1, 2, 3, 4}, {std::nullopt, bad, std::nullopt, bad, bad});
+  book.Update(5, {0, 1, 2, 3, 4}, {{1, bad}, {3, bad}, {4, bad}});
   return book;
 }
 
@@ -29,10 +28,9 @@ TEST(ViolationBook, HoldsOneEntryForEachStarThatBreaksR1OrR2) {
   Book book = FiveStars();
   EXPECT_EQ(Entered(book), (Stars{1, 3, 4}));
   // 3 was mended, 0 and a new star were broken.
-  book.Update(6, {0, 3, 5}, {Violation<2>(), std::nullopt, Violation<2>()});
+  book.Update(6, {0, 3, 5}, {{0, {}}, {5, {}}});
   EXPECT_EQ(Entered(book), (Stars{1, 4, 0, 5}));
-  book.Replace(
-      {std::nullopt, std::nullopt, Violation<2>(), std::nullopt, std::nullopt, std::nullopt});
+  book.Replace({{2, {}}});
   EXPECT_EQ(Entered(book), Stars{2});
 }
 
@@ -41,7 +39,7 @@ TEST(ViolationBook, ForgetsFailuresOfAStarThatChanges) {
   book.NoteFailedAttempt(1);
   book.NoteNoFlat(1);
   book.NoteFailedAttempt(3);
-  book.Update(5, {1}, {Violation<2>()});
+  book.Update(5, {1}, {{1, {}}});
   EXPECT_EQ(book.failed_attempts(1), 0);
   EXPECT_FALSE(book.has_no_flat(1));
   EXPECT_EQ(book.failed_attempts(3), 1);
