@@ -56,6 +56,7 @@ std::vector<std::uint8_t> RingLaying<K>::Scout(const AnsweredPoints& answers,
 template <int K>
 typename Growth<K>::Ring RingLaying<K>::NextRing() {
   typename Growth<K>::Ring ring;
+  if (engine_.is_full()) return ring;
   // Where all is within reach of one seed there is nothing to scout.
   if (scouting_ && scouting_->size() > 1) ring = scouting_->Propose();
   if (scouting_ && ring.points.cols() == 0) {
@@ -63,7 +64,7 @@ typename Growth<K>::Ring RingLaying<K>::NextRing() {
     growth_.Begin(scouts_.points, scouts_.tangents, scouts_.found, 0,
                   SharesOf(engine_.sizes(), scouts_));
   }
-  if (!scouting_ && !engine_.is_full()) {
+  if (!scouting_) {
     ring = growth_.Propose();
     if (ring.points.cols() == 0) {
       // What no patch came near has seeds of its own.

@@ -57,5 +57,17 @@ TEST(Laying, LeavesASampleThatIsGiven) {
   EXPECT_FALSE(again.deltas[0].added.empty());
 }
 
+// The coarse lattice that goes before counts, too: nobody is asked to find their way around all of M
+// for vertices that there is no room for.
+TEST(Laying, EndsWhereThereIsNoRoomForMoreVertices) {
+  const auto manifold = Make("sphere:2:3");
+  Specification spec = SpecificationFor(*manifold, 0.001);
+  spec.limits.max_vertices = 200;
+  const auto run = Drive(spec, *manifold);
+  EXPECT_EQ(run.report().termination, Termination::kVertexBudget);
+  EXPECT_EQ(run.report().counts.vertices, 200);
+  EXPECT_LT(run.report().counts.queries, 2000);
+}
+
 }  // namespace
 }  // namespace stellate::core
