@@ -39,6 +39,8 @@ StarComplex<K>::StarComplex(const StarComplex& other)
       boundary_(other.boundary_),
       boundary_points_(other.boundary_points_),
       boundary_tree_(other.boundary_tree_, &boundary_points_),
+      faces_alone_(other.faces_alone_),
+      becomes_whole_(other.becomes_whole_),
       simplex_count_(other.simplex_count_) {}
 
 template <int K>

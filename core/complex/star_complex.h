@@ -64,6 +64,11 @@ class StarComplex {
   // The size bound at the point that was laid last, where it is not epsilon for all; said of each
   // or of none. It is where to look for what cuts its star, never what does.
   void LaidAt(double bound) { laid_bounds_.push_back(bound); }
+  // While the faces of a boundary are meshed by themselves: stars are known no farther out than
+  // their simplices of faces are, and have no others. What is inside would reach from one side of M
+  // to the other. From the next Commit after FollowAll on they are whole, all built anew.
+  void FollowFacesAlone() { faces_alone_ = true; }
+  void FollowAll() { becomes_whole_ = faces_alone_; }
   // Builds the stars of the appended points and clips all others by them, in parallel; the result
   // does not depend on the number of threads. `around`, if given, gets the neighbours that changed
   // stars have or had (with repetitions): their simplices may have become inconsistent.
@@ -240,6 +245,7 @@ class StarComplex {
   // each: at common centres a cell that is far from convex may hold one at two vertices.
   template <typename Visit>
   void ForEachOwned(std::uint32_t p, const Visit& visit) const {
+    if (faces_alone_) return;
     const Cell& cell = cells_[p];
     Simplex simplex;
     thread_local std::vector<std::uint64_t> keys;
@@ -270,6 +276,8 @@ class StarComplex {
     }
   };
   std::vector<Cut> BuildNewStars(std::uint32_t first);
+  // From one point to the next, as if all had come at once.
+  Change BuildAllStars();
   // Where a sample was laid: every star is built once, from what lies around it.
   Change BuildLaidStars();
   void BuildLaidStar(std::uint32_t p, const std::vector<std::uint32_t>& around, Cell& cell) const;
@@ -290,10 +298,11 @@ class StarComplex {
   double epsilon() const { return std::sqrt(judged_radius2_) / kJudgedRadius; }
   // The same for a cell of that max_norm2, where there are no guards.
   static double InfluenceWithin(double most2) { return 2 * std::sqrt(most2) * (1 + 1e-9); }
-  // How far from p a point may be whose bisector cuts its cell.
+  // How far from p a point may be whose bisector cuts its cell, as far as that is followed.
   double Influence(std::uint32_t p, const Cell& cell) const {
-    return Influence(p, cell.max_norm2());
+    return Influence(p, faces_alone_ ? MaxNorm2OnFaces(cell) : cell.max_norm2());
   }
+  static double MaxNorm2OnFaces(const Cell& cell);
   // ... or cuts vertices that are no farther out.
   double Influence(std::uint32_t p, double most2) const {
     if (!has_guards()) return InfluenceWithin(most2);
@@ -323,6 +332,7 @@ class StarComplex {
   std::vector<std::uint32_t> boundary_;
   std::vector<double> boundary_points_;
   BallTree boundary_tree_;
+  bool faces_alone_ = false, becomes_whole_ = false;
   std::uint64_t simplex_count_ = 0;
 };
 

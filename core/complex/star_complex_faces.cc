@@ -33,6 +33,14 @@ typename StarComplex<K>::FaceSimplex StarComplex<K>::FaceSimplexOf(std::uint32_t
   return simplex;
 }
 
+template <int K>
+double StarComplex<K>::MaxNorm2OnFaces(const Cell& cell) {
+  double most2 = 0;
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+    if (cell.norm2(v) > most2 && WallsAt<K>(cell, v) != 0) most2 = cell.norm2(v);
+  return most2 > 0 ? most2 : cell.max_norm2();  // of a point inside: all of it
+}
+
 // Of simplices of faces alone: those inside are larger, and no point yields to them.
 template <int K>
 void StarComplex<K>::MeasureFaces(const std::vector<Turn>& turns, std::uint32_t first) {
@@ -112,6 +120,7 @@ bool StarComplex<K>::InGuard(const double* point) const {
 #define STELLATE_EACH(K)                                                                          \
   template StarComplex<K>::FaceSimplex StarComplex<K>::FaceSimplexOf(std::uint32_t, const Cell&,  \
                                                                      std::size_t, WallSet) const; \
+  template double StarComplex<K>::MaxNorm2OnFaces(const Cell&);                                   \
   template void StarComplex<K>::MeasureFaces(const std::vector<Turn>&, std::uint32_t);            \
   template bool StarComplex<K>::InGuard(const double*) const;                                     \
   template std::optional<StarComplex<K>::CellVertex> StarComplex<K>::EncroachedBy(const double*,  \

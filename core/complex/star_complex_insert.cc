@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <numeric>
 #include <utility>
 
 #include "core/base/instantiate.h"
@@ -209,8 +210,9 @@ template <int K>
 typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t>* around) {
   const auto first = static_cast<std::uint32_t>(cells_.size());
   Change change;
-  if (size() == first) return change;
   if (tree_.size() < size()) return BuildLaidStars();
+  if (becomes_whole_) return BuildAllStars();
+  if (size() == first) return change;
   const std::vector<Cut> cuts = BuildNewStars(first);
   const std::vector<Turn> turns = InTurns(cuts);
   change.stars = ParallelGather<std::uint32_t>(
@@ -237,16 +239,26 @@ typename StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t
 }
 
 template <int K>
-void StarComplex<K>::Guard(std::vector<double> radii2) {
-  guards_ = std::move(radii2);
-  largest_guard_ = guards_.empty() ? 0 : *std::max_element(guards_.begin(), guards_.end());
+typename StarComplex<K>::Change StarComplex<K>::BuildAllStars() {
+  faces_alone_ = faces_alone_ && !becomes_whole_;
+  becomes_whole_ = false;
   centre_owner_ = CentreCache<K>::NewOwner();
   tree_.Assign(std::vector<double>(size(), 0.0));
   near_.assign(size(), kNone);
   simplex_count_ = 0;
   Change change;
+  change.stars.resize(cells_.size());
+  std::iota(change.stars.begin(), change.stars.end(), std::uint32_t{0});
   BuildNewStars(0);
   CutStars({}, {}, 0, &change);
+  return change;
+}
+
+template <int K>
+void StarComplex<K>::Guard(std::vector<double> radii2) {
+  guards_ = std::move(radii2);
+  largest_guard_ = guards_.empty() ? 0 : *std::max_element(guards_.begin(), guards_.end());
+  BuildAllStars();
 }
 
 template <int K>
@@ -273,6 +285,7 @@ void StarComplex<K>::TryPoint(const double* point, const double* tangent, std::u
   template void StarComplex<K>::CutStars(const std::vector<Turn>&, const std::vector<Cut>&,    \
                                          std::uint32_t, Change*);                              \
   template StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t>*);         \
+  template StarComplex<K>::Change StarComplex<K>::BuildAllStars();                             \
   template void StarComplex<K>::Guard(std::vector<double>);                                    \
   template void StarComplex<K>::TryPoint(const double*, const double*, std::uint32_t,          \
                                          typename Cell::Scratch&, Tentative*, WallSet,         \

@@ -153,6 +153,7 @@ template <int K>
 typename StarComplex<K>::Change StarComplex<K>::BuildLaidStars() {
   Change change;
   change.removed = Simplices();
+  faces_alone_ = becomes_whole_ = false;
   change.stars.resize(cells_.size());
   std::iota(change.stars.begin(), change.stars.end(), std::uint32_t{0});
   centre_owner_ = CentreCache<K>::NewOwner();

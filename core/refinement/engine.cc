@@ -47,7 +47,10 @@ Engine<K>::Engine(const Specification& spec, const ResolvedCriteria& criteria)
       max_vertices_(spec.limits.max_vertices),
       complex_(spec.ambient_dimension, criteria.epsilon, criteria.inradius, criteria.judging),
       sizes_(criteria),
-      faces_(spec.walls) {}
+      faces_(spec.walls) {
+  // Sizes are estimated from whole stars.
+  if (faces_.has_walls() && !sizes_.is_estimated()) complex_.FollowFacesAlone();
+}
 
 template <int K>
 Engine<K> Engine<K>::ForRehearsal(double share) const {

@@ -224,6 +224,7 @@ AnsweredPoints Engine<K>::InteriorSeeds() {
 template <int K>
 bool Engine<K>::AdvanceStage() {
   if (!faces_.Advance()) return false;
+  if (faces_.stage() == K) complex_.FollowAll();
   RejudgeAll();
   JudgeAllAnew();
   book_.ForgetAttempts();

@@ -57,14 +57,14 @@ void MeshingRun<K>::JudgeWalls() {
   if (Status status = wall_check_.Judge(trip_->answers()); !status.ok()) Fail(std::move(status));
 }
 
-// Lays the interior, once its faces are meshed, if it has any. Whether it asks for some of it.
+// Lays the interior, once its faces are meshed, if it has any. Whether it asks for some of it; else
+// all stars are whole.
 template <int K>
 bool MeshingRun<K>::AskToLayInterior() {
   if (engine_.complex().size() == 0) return false;
   AnsweredPoints seeds = engine_.InteriorSeeds();
   laying_ = LayingFor<K>(engine_, spec_, seeds);
-  if (!laying_) return false;
-  laying_->Begin(seeds);
+  if (laying_) laying_->Begin(seeds);
   if (AskToLay()) return true;
   CommitLaid();
   return false;

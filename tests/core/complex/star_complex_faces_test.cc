@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <set>
+#include <utility>
+#include <vector>
 
 #include "core/complex/star_complex.h"
 
@@ -47,6 +50,42 @@ std::optional<StarComplex<3>::CellVertex> WorstOfAll(const StarComplex<3>& compl
     }
   }
   return worst;
+}
+
+// The simplices of faces that a star holds: their walls and corners.
+std::set<std::pair<WallSet, std::vector<std::uint32_t>>> OnFaces(const StarComplex<3>& complex,
+                                                                 std::uint32_t p) {
+  std::set<std::pair<WallSet, std::vector<std::uint32_t>>> simplices;
+  const auto& cell = complex.cell(p);
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+    const auto simplex = complex.FaceSimplexOf(p, cell, v);
+    if (simplex.walls != 0 && !simplex.fake)
+      simplices.insert({simplex.walls, {simplex.ids.begin(), simplex.ids.begin() + simplex.count}});
+  }
+  return simplices;
+}
+
+TEST(FollowFacesAlone, KnowsTheSameSimplicesOfFacesAndNoOthers) {
+  StarComplex<3> whole(3, 0.5, 3.0, Judging::kFlats), alone(3, 0.5, 3.0, Judging::kFlats);
+  alone.FollowFacesAlone();
+  std::size_t known = 0;
+  for (unsigned part = 0; part < 4; ++part) {
+    AppendQuarter(&whole, part, 40 << part);
+    AppendQuarter(&alone, part, 40 << part);
+    EXPECT_TRUE(alone.Simplices().empty());
+    for (std::uint32_t p = 0; p < whole.size(); ++p) {
+      if (whole.walls(p) == 0) continue;
+      const auto expected = OnFaces(whole, p);
+      EXPECT_EQ(OnFaces(alone, p), expected);
+      known += expected.size();
+    }
+  }
+  EXPECT_GT(known, 1000u);
+  alone.FollowAll();
+  const auto change = alone.Commit();
+  EXPECT_EQ(alone.Simplices(), whole.Simplices());
+  EXPECT_EQ(change.added.size(), whole.Simplices().size());
+  EXPECT_EQ(alone.simplex_count(), whole.simplex_count());
 }
 
 // As points come, and after the stars were built anew with guards: only the boundary's stars are

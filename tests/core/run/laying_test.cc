@@ -57,8 +57,8 @@ TEST(Laying, LeavesASampleThatIsGiven) {
   EXPECT_FALSE(again.deltas[0].added.empty());
 }
 
-// The coarse lattice that goes before counts, too: nobody is asked to find their way around all of M
-// for vertices that there is no room for.
+// The coarse lattice that goes before counts, too: nobody is asked to find their way around all of
+// M for vertices that there is no room for.
 TEST(Laying, EndsWhereThereIsNoRoomForMoreVertices) {
   const auto manifold = Make("sphere:2:3");
   Specification spec = SpecificationFor(*manifold, 0.001);
