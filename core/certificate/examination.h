@@ -45,6 +45,12 @@ struct Examination {
   std::vector<std::uint32_t> closed_off;
   std::optional<Adjacency> closed_adjacency;
   const Adjacency& Closed() const { return closed_adjacency ? *closed_adjacency : *adjacency; }
+  // Who is whose neighbour is a quarter of what the certificate takes up.
+  void ForgetNeighbours() {
+    adjacency.reset();
+    closed_adjacency.reset();
+    closed_off = {};
+  }
   // Whether some vertex of a simplex is on the boundary.
   bool AtBoundary(const std::uint32_t* ids) const {
     bool any = false;

@@ -93,10 +93,6 @@ bool IsConsistentOnFaces(const StarComplex<K>& complex, std::uint32_t p, std::si
   return true;
 }
 
-}  // namespace
-
-namespace {
-
 // The vertex of the cell of q that is dual to a simplex on q with these other vertices, of that
 // key; vertex_count() if there is none.
 template <int K>

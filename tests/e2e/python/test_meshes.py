@@ -281,6 +281,17 @@ def test_what_cannot_be_saved_is_refused_before_meshing(tmp_path):
         stellate.mesh(manifolds.Torus(), 0.3, "unix:/nowhere", save=tmp_path / "no" / "such.txt")
 
 
+def test_a_mesh_of_points_alone_is_saved_or_refused_in_words(tmp_path):
+    points = np.eye(3)
+    bare = stellate.Mesh(points, np.empty((0, 3), dtype=np.uint32))
+    for name in ("bare.txt", "bare.msh", "bare.vtu"):
+        bare.save(tmp_path / name)
+        assert (tmp_path / name).stat().st_size > 0
+    with pytest.raises(stellate.SaveError, match="no simplices.*[.]vtu"):
+        bare.save(tmp_path / "bare.vtk")
+    assert not list(tmp_path.glob("*.vtk"))
+
+
 def test_a_mesh_that_could_not_be_written_is_the_exceptions(server, tmp_path):
     folder = tmp_path / "folder"
     folder.mkdir()

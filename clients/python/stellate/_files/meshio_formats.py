@@ -95,6 +95,11 @@ def write(form: MeshioFormat, mesh: Complex, cells: np.ndarray, path: str) -> No
     """Writes a mesh with these oriented cells, that the format can hold, to a file."""
     import meshio
 
+    if len(cells) == 0:
+        raise SaveError(
+            f"the mesh has no simplices, and meshio writes none such as {form.name}: .txt, .msh "
+            "and .vtu hold points alone"
+        )
     try:
         whole = as_meshio(mesh, cells, form.point_data)
         meshio.write(path, whole, form.name, **form.options)

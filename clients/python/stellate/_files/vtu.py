@@ -12,7 +12,14 @@ from .._complex import Complex, in_space
 from .._version import __version__
 from .groups import groups
 
-_TYPES = {"<f8": "Float64", "<i8": "Int64", "<i4": "Int32", "<u8": "UInt64", "|u1": "UInt8"}
+_TYPES = {
+    "<f8": "Float64",
+    "<i8": "Int64",
+    "<i4": "Int32",
+    "<u8": "UInt64",
+    "<u4": "UInt32",
+    "|u1": "UInt8",
+}
 CELL_TYPES = {0: 1, 1: 3, 2: 5, 3: 10}  # vertex, line, triangle, tetrahedron
 _BLOCK_BYTES = 1 << 20
 
