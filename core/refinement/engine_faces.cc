@@ -165,7 +165,7 @@ void Engine<K>::YieldToFaces(std::vector<Target<K>>* targets) {
     const bool is_one = may_yield(t);
     for (int step = 0; target && is_one && is_near(*target) && step < K; ++step) {
       const auto at = step == 0 ? first[i] : encroached(*target);
-      if (!at) break;
+      if (!at || book_.is_given_up(at->star)) break;
       target = SplitOf(*at, target->violation.rule);
     }
     if (target)
