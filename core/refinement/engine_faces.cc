@@ -128,12 +128,16 @@ std::optional<Target<K>> Engine<K>::SplitUnderSliver(std::uint32_t star,
   return std::nullopt;
 }
 
-// Leaves the targets on faces of the lowest dimension, and has those that would spoil a face of
-// lower dimension yet split that. What answers have encroached on comes besides.
+// Has the targets that would spoil a face of lower dimension split that instead. What answers have
+// encroached on comes besides. Only what is too large is split while faces of lower dimension have
+// targets: beside a face that cannot be mended shapes never would be, however small.
 template <int K>
 void Engine<K>::YieldToFaces(std::vector<Target<K>>* targets) {
   int lowest = K;
   for (const Target<K>& t : *targets) lowest = std::min(lowest, t.violation.dimension());
+  std::erase_if(*targets, [&](const Target<K>& t) {
+    return t.violation.rule > Rule::kSize && t.violation.dimension() > lowest;
+  });
   std::vector<Target<K>> kept;
   for (const auto& [star, key, by] : faces_.TakeSplits()) {
     const std::size_t v = complex_.cell(star).Find(key);
@@ -148,8 +152,7 @@ void Engine<K>::YieldToFaces(std::vector<Target<K>>* targets) {
   // The image of a far aim may fall anywhere; good points have several candidates, and after a
   // failed attempt the point is another.
   const auto may_yield = [&](const Target<K>& t) {
-    return t.violation.dimension() == lowest && t.violation.rule < Rule::kSliver &&
-           book_.failed_attempts(t.star) == 0;
+    return t.violation.rule < Rule::kSliver && book_.failed_attempts(t.star) == 0;
   };
   const auto is_near = [](const Target<K>& t) { return !t.violation.fake && !t.is_coarse(); };
   std::vector<std::optional<typename StarComplex<K>::CellVertex>> first(targets->size());
@@ -160,7 +163,6 @@ void Engine<K>::YieldToFaces(std::vector<Target<K>>* targets) {
   for (std::size_t i = 0; i < targets->size(); ++i) {
     CheckInterruption(i);
     const Target<K>& t = (*targets)[i];
-    if (t.violation.dimension() > lowest) continue;
     std::optional<Target<K>> target = t;
     const bool is_one = may_yield(t);
     for (int step = 0; target && is_one && is_near(*target) && step < K; ++step) {

@@ -159,7 +159,7 @@ std::vector<Case> SlowCases() {
 }
 INSTANTIATE_TEST_SUITE_P(Slow, Walls, ::testing::ValuesIn(SlowCases()));
 
-// T^4 cut by a half-space, in R^8: minutes each.
+// T^4 cut by a half-space, in R^8: half a minute each.
 class CutFourTorus : public ::testing::TestWithParam<unsigned> {};
 
 TEST_P(CutFourTorus, IsCertified) {
@@ -174,6 +174,28 @@ TEST_P(CutFourTorus, IsCertified) {
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(CutFourTorus);
 INSTANTIATE_TEST_SUITE_P(Campaign, CutFourTorus,
                          ::testing::Range(0u, Setting("STELLATE_WALL_FOUR", 0)));
+
+// A simplex of a face that a sliver needs split is tried again, though it has failed often.
+TEST(WallsTest, SliversGoWhereFacesYieldLate) {
+  for (const Case& c : {Case{"gyroid solid", stellate::testing::SmallGyroidSolid, 0.4},
+                        Case{"cylinder", stellate::testing::Cylinder, 0.3}}) {
+    SCOPED_TRACE(c.name);
+    Specification spec;
+    const Domain m = Trial(c, 1009, &spec);
+    const WallMesh mesh = MeshOf(m, spec);
+    EXPECT_TRUE(mesh.report.certificate.certified) << mesh.report.certificate.verdict;
+    EXPECT_GE(LeastDihedral(mesh), PromisedDihedral(c, m) - 1e-6);
+  }
+}
+
+// Nor are simplices beside a face that cannot be mended made ever smaller.
+TEST(WallsTest, AFaceThatStaysBadDoesNotSpoilTheInside) {
+  Specification spec;
+  const Domain m = Trial({"drilled box", stellate::testing::DrilledBox, 1.5}, 1, &spec);
+  const WallMesh mesh = MeshOf(m, spec);
+  EXPECT_FALSE(mesh.report.certificate.certified);
+  EXPECT_LT(mesh.points.size(), 1000u);
+}
 
 // Far too coarse: what comes out may be anything, but then it is refused.
 class CoarseWalls : public ::testing::TestWithParam<Case> {};

@@ -47,7 +47,7 @@ TEST(BentWallsTest, ASmallHoleIsNamedWithTheSizeToTake) {
 
 TEST(BentWallsTest, AHoleWithRoomForOneVertexIsNamed) {
   for (const unsigned turn : {0u, 1u, 2u})
-    ExpectWords(CertificateOf(PiercedDisc(0.05).Turned(turn), 0.3), "; wall 1 has a piece at (");
+    ExpectWords(CertificateOf(PiercedDisc(0.04).Turned(turn), 0.3), "; wall 1 has a piece at (");
   EXPECT_TRUE(CertificateOf(PiercedDisc(0.05), 0.02).certified) << "a fifth of its width";
 }
 
