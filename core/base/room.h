@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
@@ -13,6 +14,15 @@ void LeaveRoom(std::size_t parts, std::vector<T>* vector) {
   fitting.reserve(vector->size() + vector->size() / parts);
   fitting.assign(vector->begin(), vector->end());
   vector->swap(fitting);
+}
+
+// For a vector of all there is that is about to grow by `more`: where it must be moved, it gets a
+// little more room, and not as much again as it has.
+template <typename T>
+void MakeRoom(std::size_t more, std::vector<T>* vector) {
+  constexpr std::size_t kParts = 8;
+  const std::size_t size = vector->size();
+  if (size + more > vector->capacity()) vector->reserve(size + std::max(more, size / kParts));
 }
 
 }  // namespace stellate::core

@@ -7,6 +7,7 @@
 
 #include "core/base/instantiate.h"
 #include "core/base/parallel.h"
+#include "core/base/room.h"
 #include "core/complex/star_complex.h"
 #include "core/geometry/laid_polygon.h"
 
@@ -116,6 +117,8 @@ std::uint32_t StarComplex<K>::Append(const double* point, const double* tangent,
     boundary_tree_.Insert(0);
   }
   near_.push_back(near);
+  MakeRoom(stride(), &points_);
+  MakeRoom(stride() * K, &tangents_);
   points_.insert(points_.end(), point, point + d_);
   tangents_.insert(tangents_.end(), tangent, tangent + d_ * K);
   tree_.Insert(0);  // until Commit it is found by place, but has no influence

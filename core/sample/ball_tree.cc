@@ -20,8 +20,11 @@ constexpr std::size_t kBuiltAlone = 512;
 
 std::uint32_t BallTree::NewNodes(int count) {
   const auto first = static_cast<std::uint32_t>(nodes_.size());
-  nodes_.resize(nodes_.size() + static_cast<std::size_t>(count));
-  centres_.resize(nodes_.size() * static_cast<std::size_t>(d_), 0.0);
+  const auto more = static_cast<std::size_t>(count), d = static_cast<std::size_t>(d_);
+  MakeRoom(more, &nodes_);
+  MakeRoom(more * d, &centres_);
+  nodes_.resize(nodes_.size() + more);
+  centres_.resize(nodes_.size() * d, 0.0);
   return first;
 }
 
@@ -208,6 +211,7 @@ void BallTree::Split(std::uint32_t node) {
   std::copy(ids, half, slots_.begin() + first);
   for (std::uint32_t* i = ids; i != half; ++i) leaf_of_[*i] = children;
   const auto slot = static_cast<std::uint32_t>(slots_.size());
+  MakeRoom(kLeafCapacity, &slots_);
   slots_.resize(slots_.size() + kLeafCapacity);
   MakeLeaf(children + 1, slot, half, ids + kLeafCapacity);
 }
@@ -301,6 +305,8 @@ void BallTree::Gather(std::uint32_t n, const double* q, double radius,
 
 void BallTree::Insert(double influence) {
   const auto id = static_cast<std::uint32_t>(influence_.size());
+  MakeRoom(1, &influence_);
+  MakeRoom(1, &leaf_of_);
   influence_.push_back(influence);
   leaf_of_.push_back(0);
   if (nodes_.empty() || influence_.size() > kRebuild * built_ + 32) {

@@ -18,5 +18,21 @@ TEST(LeaveRoom, KeepsWhatIsThereAndALittleMore) {
   EXPECT_TRUE(none.empty());
 }
 
+TEST(MakeRoom, MovesSeldomAndDoesNotDouble) {
+  std::vector<int> numbers;
+  int moves = 0;
+  for (int i = 0; i < 100000; ++i) {
+    const int* const before = numbers.data();
+    MakeRoom(1, &numbers);
+    numbers.push_back(i);
+    moves += numbers.data() != before;
+  }
+  EXPECT_LT(moves, 150);
+  EXPECT_LE(numbers.capacity(), numbers.size() + numbers.size() / 7);
+  EXPECT_EQ(numbers[99999], 99999);
+  MakeRoom(1000000, &numbers);
+  EXPECT_GE(numbers.capacity(), numbers.size() + 1000000);
+}
+
 }  // namespace
 }  // namespace stellate::core
