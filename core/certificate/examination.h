@@ -45,7 +45,7 @@ struct Examination {
   std::vector<std::uint32_t> closed_off;
   std::optional<Adjacency> closed_adjacency;
   const Adjacency& Closed() const { return closed_adjacency ? *closed_adjacency : *adjacency; }
-  // Who is whose neighbour is a quarter of what the certificate takes up.
+  // Once no claim asks who is whose neighbour: almost half of what the certificate takes up.
   void ForgetNeighbours() {
     adjacency.reset();
     closed_adjacency.reset();
