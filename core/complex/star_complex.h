@@ -240,6 +240,7 @@ class StarComplex {
   template <typename Influencing>
   void BuildStar(const Site& p, const Site* guest, std::uint32_t near, Cell& cell,
                  typename Cell::Scratch& scratch, const Influencing& influencing) const;
+  void CloseInFlats(const Site& p, Cell& cell, typename Cell::Scratch& scratch) const;
   void Neighbourhood(const double* q, std::uint32_t near, std::vector<std::uint32_t>* ids) const;
   // Calls visit(v, simplex) for the simplices of star(p) of which p is the lowest vertex, once for
   // each: at common centres a cell that is far from convex may hold one at two vertices.

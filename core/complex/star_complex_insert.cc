@@ -62,6 +62,25 @@ void StarComplex<K>::Neighbourhood(const double* q, std::uint32_t near,
   }
 }
 
+// At common centres cuts are refused that would leave no polytope, and a cell may stay open in the
+// midst of the sample, to which R1 would add points forever. It is closed in the flats then, and
+// judged: where it is not as it would be there stars disagree, which R4 mends.
+template <int K>
+void StarComplex<K>::CloseInFlats(const Site& p, Cell& cell,
+                                  typename Cell::Scratch& scratch) const {
+  if (K < 3 || judging_ != Judging::kCommonCentre || p.walls != 0 || cell.bounded()) return;
+  thread_local Cell flat;
+  ResetInFlats(flat, p);
+  tree_.VisitNear(
+      p.point, [&] { return Influence(p.id, flat); },
+      [&](std::uint32_t q, double) {
+        if (q != p.id) ClipInFlats(flat, p, At(q), scratch);
+      });
+  if (!flat.bounded()) return;
+  JudgeCell(flat, p, {});
+  cell = flat;
+}
+
 template <int K>
 template <typename Influencing>
 void StarComplex<K>::BuildStar(const Site& p, const Site* guest, std::uint32_t near, Cell& cell,
@@ -100,6 +119,7 @@ void StarComplex<K>::BuildStar(const Site& p, const Site* guest, std::uint32_t n
       influencing);
   if constexpr (K == 2)
     if (apart) cell.Take(polygon);
+  if (guest == nullptr) CloseInFlats(p, cell, scratch);
 }
 
 template <int K>
@@ -278,20 +298,21 @@ void StarComplex<K>::TryPoint(const double* point, const double* tangent, std::u
             [](const auto& a, const auto& b) { return a.first < b.first; });
 }
 
-#define STELLATE_EACH(K)                                                                       \
-  template void StarComplex<K>::Neighbourhood(const double*, std::uint32_t,                    \
-                                              std::vector<std::uint32_t>*) const;              \
-  template std::uint32_t StarComplex<K>::Append(const double*, const double*, std::uint32_t,   \
-                                                WallSet, const double*);                       \
-  template std::vector<StarComplex<K>::Cut> StarComplex<K>::BuildNewStars(std::uint32_t);      \
-  template std::vector<StarComplex<K>::Turn> StarComplex<K>::InTurns(const std::vector<Cut>&); \
-  template void StarComplex<K>::CutStars(const std::vector<Turn>&, const std::vector<Cut>&,    \
-                                         std::uint32_t, Change*);                              \
-  template StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t>*);         \
-  template StarComplex<K>::Change StarComplex<K>::BuildAllStars();                             \
-  template void StarComplex<K>::Guard(std::vector<double>);                                    \
-  template void StarComplex<K>::TryPoint(const double*, const double*, std::uint32_t,          \
-                                         typename Cell::Scratch&, Tentative*, WallSet,         \
+#define STELLATE_EACH(K)                                                                         \
+  template void StarComplex<K>::CloseInFlats(const Site&, Cell&, typename Cell::Scratch&) const; \
+  template void StarComplex<K>::Neighbourhood(const double*, std::uint32_t,                      \
+                                              std::vector<std::uint32_t>*) const;                \
+  template std::uint32_t StarComplex<K>::Append(const double*, const double*, std::uint32_t,     \
+                                                WallSet, const double*);                         \
+  template std::vector<StarComplex<K>::Cut> StarComplex<K>::BuildNewStars(std::uint32_t);        \
+  template std::vector<StarComplex<K>::Turn> StarComplex<K>::InTurns(const std::vector<Cut>&);   \
+  template void StarComplex<K>::CutStars(const std::vector<Turn>&, const std::vector<Cut>&,      \
+                                         std::uint32_t, Change*);                                \
+  template StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t>*);           \
+  template StarComplex<K>::Change StarComplex<K>::BuildAllStars();                               \
+  template void StarComplex<K>::Guard(std::vector<double>);                                      \
+  template void StarComplex<K>::TryPoint(const double*, const double*, std::uint32_t,            \
+                                         typename Cell::Scratch&, Tentative*, WallSet,           \
                                          const double*) const;
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

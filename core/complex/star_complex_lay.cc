@@ -147,6 +147,7 @@ void StarComplex<K>::BuildLaidStar(std::uint32_t p, const std::vector<std::uint3
       &near, gathered, [&] { return Influence(p, cell); },
       [&](std::uint32_t q) { return ClipBy(cell, site, At(q), nullptr, nullptr, scratch); },
       [&](double from, double to) { search(from, to, &near); });
+  CloseInFlats(site, cell, scratch);
 }
 
 template <int K>
