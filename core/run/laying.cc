@@ -21,6 +21,11 @@ constexpr double kSlack = 0.97;
 // 1,500.
 constexpr double kSparse = 3;
 constexpr double SparseShare(int k) { return k < 3 ? 0.5 : 0.1; }
+// From 4 on hardly any lie so far from each other where a lattice begins to need fewer vertices:
+// what counts is how many more than the seeds there will be, by a guess that is low there. A sphere
+// breaks even at some 2,500 vertices, a flat torus below 3,000.
+constexpr int kFirstByGuess = 4;
+constexpr double kTimesSeeds = 5;
 // From 4 on as many seeds as tell enough to guess by are a good part of the sample.
 constexpr int kMostAhead = 3;
 // From 4 on there are no fewer vertices between walls, and a cut T^4 that closes without a lattice
@@ -48,6 +53,11 @@ bool AreSparse(const Engine<K>& engine, const AnsweredPoints& seeds, const Speci
   const bool many =
       spec.criteria.ask_ahead && spec.seeds.cols() == 0 && spec.box_seeds == 0 && !spec.cover_box;
   const Eigen::Index most = many ? kDefaultBoxSeeds : seeds.points.cols();
+  if (K >= kFirstByGuess)
+    return GuessSize(K, seeds, epsilon) >=
+           kTimesSeeds *
+               static_cast<double>(std::max<std::size_t>(
+                   kDefaultBoxSeeds, CountApart(seeds, seeds.points.cols(), epsilon, shares)));
   return static_cast<double>(CountApart(seeds, most, kSparse * LaidSpacing(K, epsilon), shares)) >=
          SparseShare(K) * static_cast<double>(CountApart(seeds, most, epsilon, shares));
 }

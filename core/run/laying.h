@@ -45,8 +45,8 @@ class Laying {
 // else ring by ring. With walls, once their faces are meshed: the interior, of a domain of R^k at
 // once. Null where it does not: where sizes are estimated, or given and asked for ahead; between
 // walls where sizes are graded, where it would ask ahead, and from k = 4 on; elsewhere where what
-// was found of the seeds is dense (a sample itself, or all that so coarse a mesh needs). The engine
-// is borrowed; `spec` is its.
+// was found of the seeds is dense (a sample itself, or much of what so coarse a mesh needs). The
+// engine is borrowed; `spec` is its.
 template <int K>
 std::unique_ptr<Laying<K>> LayingFor(Engine<K>& engine, const Specification& spec,
                                      const AnsweredPoints& seeds);

@@ -45,9 +45,27 @@ INSTANTIATE_TEST_SUITE_P(All, LaidTest,
                          ::testing::Values(Dense{"flat-torus:3", 0.4, 8 * kPi* kPi* kPi, 0.55},
                                            Dense{"sphere:3", 0.18, 2 * kPi* kPi, 0.63}));
 
+// Whether vertices come ring by ring, and simplices later.
+bool IsLaid(const char* name, double epsilon) {
+  const auto manifold = Make(name);
+  Specification spec = SpecificationFor(*manifold, epsilon);
+  spec.limits.max_rounds = 4;
+  const auto run = Drive(spec, *manifold);
+  return run.deltas[3].first_vertex > run.deltas[2].first_vertex && run.deltas[2].added.empty();
+}
+
+// Few of their seeds lie far from each other, even where thousands of vertices will be needed.
+TEST(Laying, BeginsLargeMeshesOfFourDimensions) {
+  EXPECT_TRUE(IsLaid("flat-torus:4", 0.8));  // 3,600 vertices
+  EXPECT_TRUE(IsLaid("sphere:4", 0.3));      // 2,800
+  EXPECT_FALSE(IsLaid("sphere:4", 0.5));     // 360
+}
+
+class Given : public ::testing::TestWithParam<const char*> {};
+
 // The points of a mesh are a sample: they are kept, and nothing is laid between them.
-TEST(Laying, LeavesASampleThatIsGiven) {
-  const auto manifold = Make("flat-torus:3");
+TEST_P(Given, SampleIsLeft) {
+  const auto manifold = Make(GetParam());
   Specification spec = SpecificationFor(*manifold, 0.5);
   const auto first = Drive(spec, *manifold);
   spec.seeds = first.mesher->Points();
@@ -56,6 +74,8 @@ TEST(Laying, LeavesASampleThatIsGiven) {
   EXPECT_LT(static_cast<double>(again.report().counts.vertices), 1.1 * vertices);
   EXPECT_FALSE(again.deltas[0].added.empty());
 }
+
+INSTANTIATE_TEST_SUITE_P(Laying, Given, ::testing::Values("flat-torus:3", "sphere:4"));
 
 // The coarse lattice that goes before counts, too: nobody is asked to find their way around all of
 // M for vertices that there is no room for.
