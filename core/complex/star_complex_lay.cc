@@ -16,7 +16,7 @@ namespace {
 // Where no circumradius is above the size bound nothing farther than twice that cuts a star.
 constexpr double kGathered = 2 * (1 + 1e-6);
 // Before R1 many a star reaches farther, and few beyond this.
-constexpr double kSearched = 3;
+constexpr double kSearched = 2.5;
 
 // The rules mostly insert fewer points into a laid sample than one in so many.
 constexpr std::size_t PartsToCome(int k) { return k <= 2 ? 8 : 4; }

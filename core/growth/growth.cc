@@ -19,8 +19,9 @@ constexpr double kMerged = 0.5;
 constexpr double kFarthest = 1;
 // Tangent spaces that keep less of a frame's volume than this have turned too far to carry it on.
 constexpr double kLeastVolume = 0.1;
-// Points of a run lie within this many spacings of its first.
-constexpr double kRunReach = 3;
+// Points of a run lie within this many spacings of its first: of higher dimension there are more of
+// them around a longer one than a search costs.
+constexpr double RunReach(int k) { return k < 3 ? 3 : 1.5; }
 // A lattice whose sizes change by more than this from what is expected costs more than it spares.
 constexpr double kUnexpected = 1.25;
 // So many answers tell whether it is worth while: if more than this share is not as expected, sizes
@@ -71,7 +72,7 @@ Growth<K>::Growth(int d, double spacing)
 
 template <int K>
 Runs Growth<K>::RunsOf(const std::vector<double>& points, const std::vector<double>& shares) const {
-  return Runs(points, d_, kRunReach * spacing_, shares);
+  return Runs(points, d_, RunReach(K) * spacing_, shares);
 }
 
 // What is laid within its share of `radius` of some point of the run, and more.
@@ -273,7 +274,7 @@ void Growth<K>::Carry(Sites sites) {
     layers_.pop_back();
   }
   layers_.push_back(
-      std::make_unique<Layer>(d_, std::move(points), std::move(shares), kRunReach * spacing_));
+      std::make_unique<Layer>(d_, std::move(points), std::move(shares), RunReach(K) * spacing_));
 }
 
 template <int K>
