@@ -26,7 +26,8 @@ constexpr double SparseShare(int k) { return k < 3 ? 0.5 : 0.1; }
 // breaks even at some 2,500 vertices, a flat torus below 3,000.
 constexpr int kFirstByGuess = 4;
 constexpr double kTimesSeeds = 5;
-// From 4 on as many seeds as tell enough to guess by are a good part of the sample.
+// From 4 on as many seeds as tell enough to guess by are a good part of the sample: it is laid ring
+// by ring, and asked ahead for what the rules add.
 constexpr int kMostAhead = 3;
 // From 4 on there are no fewer vertices between walls, and a cut T^4 that closes without a lattice
 // does not with one.
@@ -55,9 +56,8 @@ bool AreSparse(const Engine<K>& engine, const AnsweredPoints& seeds, const Speci
   const Eigen::Index most = many ? kDefaultBoxSeeds : seeds.points.cols();
   if (K >= kFirstByGuess)
     return GuessSize(K, seeds, epsilon) >=
-           kTimesSeeds *
-               static_cast<double>(std::max<std::size_t>(
-                   kDefaultBoxSeeds, CountApart(seeds, seeds.points.cols(), epsilon, shares)));
+           kTimesSeeds * static_cast<double>(std::max<std::size_t>(
+                             kDefaultBoxSeeds, CountApart(seeds, most, epsilon, shares)));
   return static_cast<double>(CountApart(seeds, most, kSparse * LaidSpacing(K, epsilon), shares)) >=
          SparseShare(K) * static_cast<double>(CountApart(seeds, most, epsilon, shares));
 }
@@ -123,10 +123,10 @@ std::unique_ptr<Laying<K>> LayingFor(Engine<K>& engine, const Specification& spe
   const ResolvedCriteria& criteria = engine.criteria();
   if (spec.walls > 0) return LayingBetweenWalls<K>(engine, spec);
   if ((criteria.graded() && (!criteria.sizes_given || criteria.ask_ahead)) ||
-      (criteria.ask_ahead && K > kMostAhead) || !AreSparse<K>(engine, seeds, spec))
+      !AreSparse<K>(engine, seeds, spec))
     return nullptr;
   const auto most = static_cast<double>(MostAtOnce(K, engine.complex().d()));
-  if (criteria.ask_ahead && GuessSize(K, seeds, criteria.epsilon) <= most)
+  if (criteria.ask_ahead && K <= kMostAhead && GuessSize(K, seeds, criteria.epsilon) <= most)
     return std::make_unique<AheadLaying<K>>(engine, spec);
   return std::make_unique<RingLaying<K>>(engine, false);
 }

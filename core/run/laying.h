@@ -41,9 +41,9 @@ class Laying {
   Laying() = default;
 };
 
-// How a run lays its sample: ahead, if that is asked for and the sample is not too large for it,
-// else ring by ring. With walls, once their faces are meshed: the interior, of a domain of R^k at
-// once. Null where it does not: where sizes are estimated, or given and asked for ahead; between
+// How a run lays its sample: ahead, if that is asked for, k < 4 and the sample is not too large for
+// it, else ring by ring. With walls, once their faces are meshed: the interior, of a domain of R^k
+// at once. Null where it does not: where sizes are estimated, or given and asked for ahead; between
 // walls where sizes are graded, where it would ask ahead, and from k = 4 on; elsewhere where what
 // was found of the seeds is dense (a sample itself, or much of what so coarse a mesh needs). The
 // engine is borrowed; `spec` is its.

@@ -46,9 +46,10 @@ INSTANTIATE_TEST_SUITE_P(All, LaidTest,
                                            Dense{"sphere:3", 0.18, 2 * kPi* kPi, 0.63}));
 
 // Whether vertices come ring by ring, and simplices later.
-bool IsLaid(const char* name, double epsilon) {
+bool IsLaid(const char* name, double epsilon, bool ask_ahead = false) {
   const auto manifold = Make(name);
   Specification spec = SpecificationFor(*manifold, epsilon);
+  spec.criteria.ask_ahead = ask_ahead;
   spec.limits.max_rounds = 4;
   const auto run = Drive(spec, *manifold);
   return run.deltas[3].first_vertex > run.deltas[2].first_vertex && run.deltas[2].added.empty();
@@ -59,6 +60,7 @@ TEST(Laying, BeginsLargeMeshesOfFourDimensions) {
   EXPECT_TRUE(IsLaid("flat-torus:4", 0.8));  // 3,600 vertices
   EXPECT_TRUE(IsLaid("sphere:4", 0.3));      // 2,800
   EXPECT_FALSE(IsLaid("sphere:4", 0.5));     // 360
+  EXPECT_TRUE(IsLaid("flat-torus:4", 0.6, true));
 }
 
 class Given : public ::testing::TestWithParam<const char*> {};
