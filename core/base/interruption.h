@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #if !defined(__SANITIZE_THREAD__)
+#include <tbb/task.h>
 #include <tbb/task_group.h>
 #endif
 
@@ -30,6 +31,10 @@ class Interruption {
 
 inline bool IsInterrupted() { return false; }
 inline void ThrowIfInterrupted() {}
+class InterruptionCheck {
+ public:
+  bool operator()() const { return false; }
+};
 #else
 // Ends the work of another thread, once and for all.
 class Interruption {
@@ -49,10 +54,19 @@ class Interruption {
 // For tests: called at each check, by the thread that checks.
 inline std::atomic<void (*)()> on_interruption_check = nullptr;
 
-inline bool IsInterrupted() {
-  if (void (*const told)() = on_interruption_check.load(std::memory_order_relaxed)) told();
-  return tbb::is_current_task_group_canceling();
-}
+// Made by a task that asks often: whom to ask costs more than the answer, and is found once.
+class InterruptionCheck {
+ public:
+  bool operator()() const {
+    if (void (*const told)() = on_interruption_check.load(std::memory_order_relaxed)) told();
+    return context_ != nullptr && context_->is_group_execution_cancelled();
+  }
+
+ private:
+  tbb::task_group_context* context_ = tbb::task::current_context();
+};
+
+inline bool IsInterrupted() { return InterruptionCheck()(); }
 
 // For long stretches of work on one thread.
 inline void ThrowIfInterrupted() {

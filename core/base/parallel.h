@@ -48,7 +48,8 @@ void ParallelSort(std::vector<Item>& items, const Less& less) {
 template <typename Index, typename Body>
 void ParallelFor(Index count, const Body& body) {
   tbb::parallel_for(tbb::blocked_range<Index>(0, count), [&body](const auto& range) {
-    for (Index i = range.begin(); i < range.end() && !IsInterrupted(); ++i) body(i);
+    const InterruptionCheck is_interrupted;
+    for (Index i = range.begin(); i < range.end() && !is_interrupted(); ++i) body(i);
   });
   ThrowIfInterrupted();
 }
