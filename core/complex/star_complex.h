@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -248,6 +249,9 @@ class StarComplex {
   void ForEachOwned(std::uint32_t p, const Visit& visit) const {
     if (faces_alone_) return;
     const Cell& cell = cells_[p];
+    if constexpr (K == 2) {
+      if (judging_ == Judging::kFlats) return ForEachOwnedTriangle(p, cell, visit);
+    }
     Simplex simplex;
     thread_local std::vector<std::uint64_t> keys;
     keys.clear();
@@ -260,6 +264,15 @@ class StarComplex {
         keys.push_back(cell.key(v));
       }
       visit(v, simplex);
+    }
+  }
+  template <typename Visit>
+  static void ForEachOwnedTriangle(std::uint32_t p, const Cell& cell, const Visit& visit) {
+    const std::size_t count = cell.facet_count();
+    const auto is_above = [p](std::uint32_t q) { return q > p && IsSample(q); };
+    for (std::size_t v = 0; v < count; ++v) {
+      const std::uint32_t a = cell.id(v), b = cell.id(v + 1 < count ? v + 1 : 0);
+      if (is_above(a) && is_above(b)) visit(v, a < b ? Simplex{p, a, b} : Simplex{p, b, a});
     }
   }
   // Commit, step by step.
@@ -281,13 +294,14 @@ class StarComplex {
   Change BuildAllStars();
   // Where a sample was laid: every star is built once, from what lies around it.
   Change BuildLaidStars();
+  void BuildAllLaidStars(double* influence);  // by id
   void BuildLaidStar(std::uint32_t p, const std::vector<std::uint32_t>& around, Cell& cell) const;
   double LaidBound(std::uint32_t p) const {
     return laid_bounds_.empty() ? epsilon() : laid_bounds_[p];
   }
-  template <typename Search>
-  void BuildLaidPolygon(const Site& p, Near* near, double gathered, const Search& search,
-                        Cell& cell) const;
+  // The same for K = 2 in the flats: of all of them, or of bunches that lie together.
+  void BuildAllLaidPolygons(double* influence);
+  void BuildLaidPolygons(std::span<const BallTree::Bunch> bunches, double* influence);
   template <typename Search>
   bool BuildInFlats(const Site& p, const Near& near, double gathered, const Search& search,
                     Cell& cell, typename Cell::Scratch& scratch) const;

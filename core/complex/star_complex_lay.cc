@@ -8,7 +8,6 @@
 #include "core/base/parallel.h"
 #include "core/base/room.h"
 #include "core/complex/star_complex.h"
-#include "core/geometry/laid_polygon.h"
 
 namespace stellate::core {
 namespace {
@@ -103,25 +102,6 @@ bool StarComplex<K>::BuildInFlats(const Site& p, const Near& near, double gather
   return JudgeCell(cell, p, all) && Influence(p.id, cell) <= known;
 }
 
-// In the flats, K = 2: the polygon is made apart, where each half-space is found once.
-template <int K>
-template <typename Search>
-void StarComplex<K>::BuildLaidPolygon(const Site& p, Near* near, double gathered,
-                                      const Search& search, Cell& cell) const {
-  if constexpr (K == 2) {
-    thread_local LaidPolygon polygon;
-    polygon.Reset(inradius_);
-    const double weight = Weight(p.id);
-    CutByNear(
-        near, gathered, [&] { return InfluenceWithin(polygon.max_norm2()); },
-        [&](std::uint32_t q) {
-          return polygon.ClipBy(q, d_, p.point, p.tangent, weight, Point(q), Weight(q));
-        },
-        search);
-    cell.Take(polygon);
-  }
-}
-
 // `around` holds at least what lies within kSearched size bounds of p.
 template <int K>
 void StarComplex<K>::BuildLaidStar(std::uint32_t p, const std::vector<std::uint32_t>& around,
@@ -136,9 +116,6 @@ void StarComplex<K>::BuildLaidStar(std::uint32_t p, const std::vector<std::uint3
     AppendBetween(tree_, site.point, beyond, searched, from, to, found);
   };
   const bool is_inside = site.walls == 0;
-  if (is_inside && K == 2 && judging_ == Judging::kFlats && !has_guards())
-    return BuildLaidPolygon(
-        site, &near, gathered, [&](double from, double to) { search(from, to, &near); }, cell);
   if (is_inside && K > 2 && judging_ == Judging::kCommonCentre &&
       BuildInFlats(site, near, gathered, search, cell, scratch))
     return;
@@ -151,20 +128,10 @@ void StarComplex<K>::BuildLaidStar(std::uint32_t p, const std::vector<std::uint3
 }
 
 template <int K>
-typename StarComplex<K>::Change StarComplex<K>::BuildLaidStars() {
-  Change change;
-  change.removed = Simplices();
-  faces_alone_ = becomes_whole_ = false;
-  change.stars.resize(cells_.size());
-  std::iota(change.stars.begin(), change.stars.end(), std::uint32_t{0});
-  centre_owner_ = CentreCache<K>::NewOwner();
-  LeaveRoom(PartsToCome(K), &points_);
-  LeaveRoom(PartsToCome(K), &tangents_);
-  cells_.resize(size());
-  tree_.Assign(std::vector<double>(size(), 0.0), BallTree::Halving::kExtent);
-  tree_.LeaveRoom(PartsToCome(K));
+void StarComplex<K>::BuildAllLaidStars(double* influence) {
+  if constexpr (K == 2)
+    if (judging_ == Judging::kFlats && !has_guards()) return BuildAllLaidPolygons(influence);
   const std::vector<BallTree::Bunch> bunches = tree_.Bunches();
-  std::vector<double> influence(size());
   ParallelFor(bunches.size(), [&](std::size_t b) {
     thread_local std::vector<std::uint32_t> around;
     thread_local Cell cell;  // its memory is used again; what is kept is no larger than it must be
@@ -180,6 +147,23 @@ typename StarComplex<K>::Change StarComplex<K>::BuildLaidStars() {
       influence[p] = Influence(p, cell);
     }
   });
+}
+
+template <int K>
+typename StarComplex<K>::Change StarComplex<K>::BuildLaidStars() {
+  Change change;
+  change.removed = Simplices();
+  faces_alone_ = becomes_whole_ = false;
+  change.stars.resize(cells_.size());
+  std::iota(change.stars.begin(), change.stars.end(), std::uint32_t{0});
+  centre_owner_ = CentreCache<K>::NewOwner();
+  LeaveRoom(PartsToCome(K), &points_);
+  LeaveRoom(PartsToCome(K), &tangents_);
+  cells_.resize(size());
+  tree_.Assign(std::vector<double>(size(), 0.0), BallTree::Halving::kExtent);
+  tree_.LeaveRoom(PartsToCome(K));
+  std::vector<double> influence(size());
+  BuildAllLaidStars(influence.data());
   tree_.SetInfluences(std::move(influence));
   MeasureFaces({}, 0);
   laid_bounds_ = {};
@@ -196,6 +180,7 @@ typename StarComplex<K>::Change StarComplex<K>::BuildLaidStars() {
   template void StarComplex<K>::Lay(const double*, const double*, std::uint32_t);               \
   template void StarComplex<K>::BuildLaidStar(std::uint32_t, const std::vector<std::uint32_t>&, \
                                               Cell&) const;                                     \
+  template void StarComplex<K>::BuildAllLaidStars(double*);                                     \
   template StarComplex<K>::Change StarComplex<K>::BuildLaidStars();
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

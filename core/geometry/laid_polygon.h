@@ -16,122 +16,153 @@ namespace stellate::core {
 // and vertex by vertex.
 class LaidPolygon {
  public:
-  // A vertex, and the facet that goes on from it: vertex v is on the facets v and v + 1,
-  // cyclically.
-  struct Corner {
-    double x[2];
-    double norm2;
-    double normal[2], offset;
-    std::uint32_t id;
-  };
-
   // A regular triangle of fake facets at distance `inradius` from p.
   void Reset(double inradius) {
     if (inradius != inradius_) Begin(inradius);
-    corners_ = fake_;
+    if (capacity_ == 0) Grow();
+    for (std::size_t v = 0; v < 3; ++v) {
+      sides_[v] = fake_[v].side;
+      Put(v, fake_[v].x, fake_[v].norm2);
+    }
+    count_ = 3;
     max_norm2_ = 4 * inradius * inradius;
   }
 
-  const std::vector<Corner>& corners() const { return corners_; }
+  // Vertex v is on the facets v and v + 1, cyclically.
+  std::size_t count() const { return count_; }
+  double x(std::size_t v) const { return x_[v]; }
+  double y(std::size_t v) const { return y_[v]; }
+  std::uint32_t id(std::size_t facet) const { return sides_[facet].id; }
   double max_norm2() const { return max_norm2_; }
 
   // By the half-space of q in the tangent space at p, where they have these weights.
   bool ClipBy(std::uint32_t id, int any_d, const double* p, const double* tangent, double p_weight,
               const double* q, double q_weight) {
-    thread_local std::vector<double> step;
-    step.resize(static_cast<std::size_t>(any_d));
-    double* const away = step.data();
     return WithDimension(any_d, [&](auto known) {
       const int d = known() > 0 ? known() : any_d;
-      for (int i = 0; i < d; ++i) away[i] = q[i] - p[i];
-      const double normal[2] = {Dot(tangent, away, d), Dot(tangent + d, away, d)};
-      return Clip(id, normal, 0.5 * (Dot(away, away, d) + p_weight - q_weight));
+      double few[known() > 0 ? known() : 1];
+      if (known() == 0) step_.resize(static_cast<std::size_t>(d));
+      double* const step = known() > 0 ? few : step_.data();
+      for (int i = 0; i < d; ++i) step[i] = q[i] - p[i];
+      const double normal[2] = {Dot(tangent, step, d), Dot(tangent + d, step, d)};
+      return Clip(id, normal, 0.5 * (Dot(step, step, d) + p_weight - q_weight));
     });
   }
 
   // As RestrictedVoronoiCell<2>::Clip.
   bool Clip(std::uint32_t id, const double* normal, double offset) {
-    const std::size_t count = corners_.size();
-    if (excess_.size() < count) excess_.resize(2 * count);
-    std::size_t worst = 0;
-    for (std::size_t v = 0; v < count; ++v) {
-      excess_[v] = normal[0] * corners_[v].x[0] + normal[1] * corners_[v].x[1] - offset;
-      if (excess_[v] > excess_[worst]) worst = v;
+    const std::size_t count = count_;
+    const double a = normal[0], b = normal[1];
+    const double *const x = x_.data(), *const y = y_.data();
+    double* const excess = excess_.data();
+    for (std::size_t v = 0; v < count; v += 2) {  // there is room for an even number
+      excess[v] = a * x[v] + b * y[v] - offset;
+      excess[v + 1] = a * x[v + 1] + b * y[v + 1] - offset;
     }
-    if (!(excess_[worst] > 0)) return false;
+    std::size_t worst = 0;
+    while (!(excess[worst] > 0))
+      if (++worst == count) return false;
+    for (std::size_t v = worst + 1; v < count; ++v)
+      if (excess[v] > excess[worst]) worst = v;
     std::size_t first = worst, last = worst, cut = 1;
-    for (; excess_[Previous(first)] > 0; first = Previous(first))
+    for (; excess[Previous(first)] > 0; first = Previous(first))
       if (++cut == count) return false;
-    for (; excess_[Next(last)] > 0; last = Next(last))
+    for (; excess[Next(last)] > 0; last = Next(last))
       if (++cut == count) return false;
-    const std::size_t after = Next(last);
-    Corner before_gap = corners_[first], behind_gap{};
-    Locate(first, Previous(first), first, {id, normal, offset}, &before_gap);
-    Locate(after, after, last, {id, normal, offset}, &behind_gap);
-    behind_gap.normal[0] = normal[0];
-    behind_gap.normal[1] = normal[1];
-    behind_gap.offset = offset;
-    behind_gap.id = id;
-    Close(first, last, cut, before_gap, behind_gap);
+    const std::size_t before = Previous(first), after = Next(last);
+    const Side side = sides_[first], added{{a, b}, offset, id};
+    double created[2][2];
+    const double norm2s[2] = {Locate(side, before, first, added, created[0]),
+                              Locate(sides_[after], after, last, added, created[1])};
+    const std::size_t place = Close(first, last, cut);
+    sides_[place] = side;
+    sides_[place + 1] = added;
+    for (std::size_t e = 0; e < 2; ++e) Put(place + e, created[e], norm2s[e]);
     max_norm2_ = 0;
-    for (const Corner& corner : corners_) max_norm2_ = std::max(max_norm2_, corner.norm2);
+    for (std::size_t v = 0; v < count_; ++v) max_norm2_ = std::max(max_norm2_, norm2_[v]);
     return true;
   }
 
  private:
+  struct Side {
+    double normal[2], offset;
+    std::uint32_t id;
+  };
+  struct FakeCorner {
+    double x[2], norm2;
+    Side side;
+  };
+
   void Begin(double inradius) {
     inradius_ = inradius;
-    fake_.resize(3);
     for (std::size_t i = 0; i < 3; ++i) {
-      Corner& corner = fake_[i];
-      corner.id = kFirstFakeId + static_cast<std::uint32_t>(i);
-      corner.offset = FakeHalfSpace<2>(static_cast<int>(i), inradius, corner.normal);
-      FakeHalfSpace<2>(static_cast<int>((i + 2) % 3), inradius, corner.x);  // of the opposite side
-      corner.x[0] *= -2;
-      corner.x[1] *= -2;
-      corner.norm2 = corner.x[0] * corner.x[0] + corner.x[1] * corner.x[1];
+      auto& [x, norm2, side] = fake_[i];
+      side.id = kFirstFakeId + static_cast<std::uint32_t>(i);
+      side.offset = FakeHalfSpace<2>(static_cast<int>(i), inradius, side.normal);
+      FakeHalfSpace<2>(static_cast<int>((i + 2) % 3), inradius, x);  // of the opposite side
+      x[0] *= -2;
+      x[1] *= -2;
+      norm2 = x[0] * x[0] + x[1] * x[1];
     }
   }
 
-  std::size_t Next(std::size_t v) const { return v + 1 < corners_.size() ? v + 1 : 0; }
-  std::size_t Previous(std::size_t v) const { return v > 0 ? v - 1 : corners_.size() - 1; }
-
-  // Where the facet of a corner meets the cut, between a corner that is kept and one that is not.
-  void Locate(std::size_t facet, std::size_t kept, std::size_t removed, const HalfSpaceRef<2>& cut,
-              Corner* created) const {
-    const Corner& side = corners_[facet];
-    HalfSpaceRef<2> planes[2] = {{side.id, side.normal, side.offset}, cut};
-    created->norm2 = Meet<2>(planes, {corners_[kept].x, corners_[kept].norm2, excess_[kept]},
-                             {corners_[removed].x, corners_[removed].norm2, excess_[removed]},
-                             kSlack, created->x);
+  void Grow() {
+    capacity_ += 16;
+    for (std::vector<double>* const numbers : {&x_, &y_, &norm2_, &excess_})
+      numbers->resize(capacity_);
+    sides_.resize(capacity_);
   }
 
-  // The created take the place of the chain, or, where it goes over the end, come last.
-  void Close(std::size_t first, std::size_t last, std::size_t cut, const Corner& before_gap,
-             const Corner& behind_gap) {
-    const std::size_t count = corners_.size(), size = count - cut + 2;
-    const bool over_end = first > last;
-    const std::size_t place = over_end ? size - 2 : first;
-    if (size > count) corners_.resize(size);
-    const auto at = [&](std::size_t v) {
-      return corners_.begin() + static_cast<std::ptrdiff_t>(v);
-    };
-    if (over_end)
-      std::copy(at(last + 1), at(first), at(0));
-    else if (cut > 2)
-      std::copy(at(last + 1), at(count), at(first + 2));
-    else if (cut < 2)
-      std::copy_backward(at(last + 1), at(count), at(size));
-    corners_.resize(size);
-    corners_[place] = before_gap;
-    corners_[place + 1] = behind_gap;
+  std::size_t Next(std::size_t v) const { return v + 1 < count_ ? v + 1 : 0; }
+  std::size_t Previous(std::size_t v) const { return v > 0 ? v - 1 : count_ - 1; }
+
+  void Put(std::size_t v, const double* x, double norm2) {
+    x_[v] = x[0];
+    y_[v] = x[1];
+    norm2_[v] = norm2;
+  }
+
+  // Where a facet meets the cut, between a vertex that is kept and one that is not.
+  double Locate(const Side& side, std::size_t kept, std::size_t removed, const Side& cut,
+                double* created) const {
+    const double at_kept[2] = {x_[kept], y_[kept]}, at_removed[2] = {x_[removed], y_[removed]};
+    HalfSpaceRef<2> planes[2] = {{side.id, side.normal, side.offset},
+                                 {cut.id, cut.normal, cut.offset}};
+    return Meet<2>(planes, {at_kept, norm2_[kept], excess_[kept]},
+                   {at_removed, norm2_[removed], excess_[removed]}, kSlack, created);
+  }
+
+  void Move(std::size_t from, std::size_t to) {
+    x_[to] = x_[from];
+    y_[to] = y_[from];
+    norm2_[to] = norm2_[from];
+    sides_[to] = sides_[from];
+  }
+
+  // Makes room for the two that are created, and returns where: they take the place of the chain
+  // that is cut off, or, where it goes over the end, come last.
+  std::size_t Close(std::size_t first, std::size_t last, std::size_t cut) {
+    const std::size_t count = count_;
+    count_ = count - cut + 2;
+    if (count_ > capacity_) Grow();
+    if (first > last) {
+      for (std::size_t v = last + 1; v < first; ++v) Move(v, v - last - 1);
+      return count_ - 2;
+    }
+    if (cut < 2)
+      for (std::size_t v = count; v-- > last + 1;) Move(v, v + 1);
+    if (cut > 2)
+      for (std::size_t v = last + 1; v < count; ++v) Move(v, v + 2 - cut);
+    return first;
   }
 
   double inradius_ = 0;
-  std::vector<Corner> fake_;  // what it begins as
-  std::vector<Corner> corners_;
-  std::vector<double> excess_;
+  FakeCorner fake_[3];  // what it begins as
+  std::size_t count_ = 0, capacity_ = 0;
   double max_norm2_ = 0;
+  std::vector<double> x_, y_, norm2_, excess_;  // by vertex
+  std::vector<Side> sides_;                     // by vertex: the facet that goes on from it
+  std::vector<double> step_;
 };
 
 }  // namespace stellate::core

@@ -55,13 +55,15 @@ void Polygon::Reset(double inradius, const Surroundings<2>& around) {
 
 void Polygon::Take(const LaidPolygon& polygon) {
   centres_.reset();
-  Resize(polygon.corners().size());
+  Resize(polygon.count());
+  double* const x = corners();
+  std::uint32_t* const id = ids();
   has_fake_ = false;
   for (std::size_t v = 0; v < count_; ++v) {
-    const LaidPolygon::Corner& corner = polygon.corners()[v];
-    std::copy_n(corner.x, 2, corners() + 2 * v);
-    ids()[v] = corner.id;
-    has_fake_ = has_fake_ || IsFake(corner.id);
+    x[2 * v] = polygon.x(v);
+    x[2 * v + 1] = polygon.y(v);
+    id[v] = polygon.id(v);
+    has_fake_ = has_fake_ || IsFake(id[v]);
   }
   max_norm2_ = polygon.max_norm2();
 }
