@@ -16,6 +16,37 @@ constexpr std::size_t kLeastShare = 16;
 // Fewer points are not worth a second thread.
 constexpr std::size_t kBuiltAlone = 512;
 
+// The coordinate in which points extend farthest, and the middle between its ends.
+struct Extent {
+  std::size_t coordinate;
+  double middle;
+};
+
+Extent WidestExtent(const double* coordinates, int any_d, const std::uint32_t* begin,
+                    const std::uint32_t* end) {
+  return WithDimension(any_d, [&](auto known) {
+    const auto d = static_cast<std::size_t>(known() > 0 ? known() : any_d);
+    thread_local std::vector<double> many;
+    double few[known() > 0 ? 2 * known() : 1];
+    if (known() == 0) many.resize(2 * d);
+    double* const low = known() > 0 ? few : many.data();
+    double* const high = low + d;
+    std::copy_n(coordinates + *begin * d, d, low);
+    std::copy_n(coordinates + *begin * d, d, high);
+    for (const std::uint32_t* i = begin + 1; i != end; ++i) {
+      const double* const x = coordinates + *i * d;
+      for (std::size_t j = 0; j < d; ++j) {
+        low[j] = std::min(low[j], x[j]);
+        high[j] = std::max(high[j], x[j]);
+      }
+    }
+    std::size_t widest = 0;
+    for (std::size_t j = 1; j < d; ++j)
+      if (high[j] - low[j] > high[widest] - low[widest]) widest = j;
+    return Extent{widest, low[widest] + (high[widest] - low[widest]) / 2};
+  });
+}
+
 }  // namespace
 
 std::uint32_t BallTree::NewNodes(int count) {
@@ -66,10 +97,19 @@ void BallTree::MakeLeaf(std::uint32_t node, std::uint32_t first_slot, const std:
   for (const std::uint32_t* i = begin; i != end; ++i) leaf_of_[*i] = node;
 }
 
-// Where to part them, along the line through two far ones: by their number, or at the middle of
-// their extent, unless that would leave hardly any on one side.
+// Where to part them: at the middle of the coordinate in which they extend farthest, unless that
+// would leave hardly any on one side, or by their number, along the line through two far ones.
 std::uint32_t* BallTree::Middle(std::uint32_t* begin, std::uint32_t* end, Halving halving) const {
   const auto count = static_cast<std::size_t>(end - begin);
+  if (halving == Halving::kExtent) {
+    const Extent widest = WidestExtent(coordinates_->data(), d_, begin, end);
+    const double* const along = coordinates_->data() + widest.coordinate;
+    const auto stride = static_cast<std::size_t>(d_);
+    std::uint32_t* const middle = std::partition(
+        begin, end, [&](std::uint32_t i) { return along[i * stride] < widest.middle; });
+    const auto below = static_cast<std::size_t>(middle - begin);
+    if (kLeastShare * std::min(below, count - below) >= count) return middle;
+  }
   thread_local std::vector<double> axis;
   axis.resize(static_cast<std::size_t>(d_));
   Mean(begin, end, axis.data());
@@ -79,7 +119,6 @@ std::uint32_t* BallTree::Middle(std::uint32_t* begin, std::uint32_t* end, Halvin
   Along own;
   Along& along = count < kBuiltAlone ? kept : own;
   along.resize(count);
-  double least = INFINITY, most = -INFINITY;
   WithDimension(d_, [&](auto known) {
     const int d = known() > 0 ? known() : d_;
     const auto farthest = [&](const double* from) {
@@ -98,30 +137,12 @@ std::uint32_t* BallTree::Middle(std::uint32_t* begin, std::uint32_t* end, Halvin
     const double* b = farthest(a);
     double* const line = axis.data();
     for (int j = 0; j < d; ++j) line[j] = b[j] - a[j];
-    std::pair<double, std::uint32_t>* const to = along.data();
-    double low = INFINITY, high = -INFINITY;
-    for (std::size_t i = 0; i < count; ++i) {
-      const double at = Dot(line, Point(begin[i]), d);
-      to[i] = {at, begin[i]};
-      low = std::min(low, at);
-      high = std::max(high, at);
-    }
-    least = low;
-    most = high;
+    for (std::size_t i = 0; i < count; ++i) along[i] = {Dot(line, Point(begin[i]), d), begin[i]};
   });
-  auto middle = along.begin();
-  if (halving == Halving::kExtent) {
-    const double halfway = least + (most - least) / 2;
-    middle = std::partition(along.begin(), along.end(),
-                            [&](const auto& item) { return item.first < halfway; });
-  }
-  const auto below = static_cast<std::size_t>(middle - along.begin());
-  if (kLeastShare * std::min(below, count - below) < count) {
-    middle = along.begin() + static_cast<std::ptrdiff_t>(count / 2);
-    std::nth_element(along.begin(), middle, along.end());
-  }
+  const auto middle = along.begin() + static_cast<std::ptrdiff_t>(count / 2);
+  std::nth_element(along.begin(), middle, along.end());
   for (std::size_t i = 0; i < count; ++i) begin[i] = along[i].second;
-  return begin + (middle - along.begin());
+  return begin + count / 2;
 }
 
 std::unique_ptr<BallTree::Halves> BallTree::Halve(std::uint32_t* begin, std::uint32_t* end,
