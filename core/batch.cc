@@ -99,6 +99,9 @@ bool IsUsable(double value) { return std::abs(value) <= kMaxLength; }
 
 Status CheckFinite(const QueryBlock& block, Index query, const char* what, const double* values,
                    Index count) {
+  bool all = true;
+  for (Index i = 0; i < count; ++i) all = all && IsUsable(values[i]);
+  if (all) return Status::Ok();
   for (Index i = 0; i < count; ++i) {
     if (!IsUsable(values[i])) {
       return {StatusCode::kOracleNotFinite,
@@ -111,11 +114,11 @@ Status CheckFinite(const QueryBlock& block, Index query, const char* what, const
 }
 
 Status CheckIntersection(const Specification& spec, const QueryBlock& block, Index query,
-                         const Eigen::VectorXd& y) {
+                         const Eigen::Ref<const Eigen::VectorXd>& y) {
   const Index k = spec.dimension;
   const Index d = spec.ambient_dimension;
   const auto c = block.points.col(query);
-  const Eigen::VectorXd offset = y - c;
+  const auto offset = y - c;
   const double distance = offset.norm();
   const double rounding =
       kRoundingTolerance * std::max(y.lpNorm<Eigen::Infinity>(), c.lpNorm<Eigen::Infinity>());
@@ -243,35 +246,46 @@ Status CheckSize(const QueryBlock& block, Index query, double size) {
   return size >= kMinLength ? Status::Ok() : refuse(StatusCode::kOracleBadSize);
 }
 
+// Answer j, to the query of that number.
+Status CheckAnswer(const Specification& spec, const QueryBlock& block, Index query,
+                   const AnswerBlock& answer, Index j) {
+  const double* const point = answer.points.col(j).data();
+  if (Status s = CheckFinite(block, query, "point", point, answer.points.rows()); !s.ok()) return s;
+  if (block.kind == QueryKind::kIntersectFlat)
+    if (Status s = CheckIntersection(spec, block, query, answer.points.col(j)); !s.ok()) return s;
+  if (answer.tangents.size() > 0) {
+    const double* const basis = answer.tangents.col(j).data();
+    if (Status s = CheckFinite(block, query, "tangent basis", basis, answer.tangents.rows());
+        !s.ok())
+      return s;
+    if (Status s = CheckTangent(spec, block, query, basis); !s.ok()) return s;
+  }
+  if (block.want_clearances) {
+    const double* const clearances = answer.clearances.col(j).data();
+    if (Status s = CheckFinite(block, query, "clearance", clearances, spec.walls); !s.ok())
+      return s;
+  }
+  if (block.want_clearances && block.face != 0) {
+    const double* const conormals = answer.conormals.col(j).data();
+    if (Status s = CheckFinite(block, query, "conormal", conormals, answer.conormals.rows());
+        !s.ok())
+      return s;
+    if (Status s = CheckConormals(spec, block, query, answer.points.col(j),
+                                  answer.tangents.col(j).data(), conormals);
+        !s.ok())
+      return s;
+  }
+  return answer.sizes.size() > 0 ? CheckSize(block, query, answer.sizes[j]) : Status::Ok();
+}
+
 }  // namespace
 
 Status CheckAnswers(const Specification& spec, const QueryBlock& block, Eigen::Index first,
                     const AnswerBlock& answer) {
-  Status status = CheckShape(spec, block, first, answer);
-  if (!status.ok()) return status;
+  if (Status s = CheckShape(spec, block, first, answer); !s.ok()) return s;
   for (Index j = 0; j < answer.points.cols(); ++j) {
     if (!answer.found.empty() && answer.found[j] == 0) continue;
-    const Index query = first + j;
-    status = CheckFinite(block, query, "point", answer.points.col(j).data(), answer.points.rows());
-    if (status.ok() && block.kind == QueryKind::kIntersectFlat) {
-      status = CheckIntersection(spec, block, query, answer.points.col(j));
-    }
-    if (status.ok() && answer.tangents.size() > 0) {
-      const double* basis = answer.tangents.col(j).data();
-      status = CheckFinite(block, query, "tangent basis", basis, answer.tangents.rows());
-      if (status.ok()) status = CheckTangent(spec, block, query, basis);
-    }
-    if (status.ok() && block.want_clearances)
-      status = CheckFinite(block, query, "clearance", answer.clearances.col(j).data(), spec.walls);
-    if (status.ok() && block.want_clearances && block.face != 0) {
-      const double* conormals = answer.conormals.col(j).data();
-      status = CheckFinite(block, query, "conormal", conormals, answer.conormals.rows());
-      if (status.ok())
-        status = CheckConormals(spec, block, query, answer.points.col(j),
-                                answer.tangents.col(j).data(), conormals);
-    }
-    if (status.ok() && answer.sizes.size() > 0) status = CheckSize(block, query, answer.sizes[j]);
-    if (!status.ok()) return status;
+    if (Status s = CheckAnswer(spec, block, first + j, answer, j); !s.ok()) return s;
   }
   return Status::Ok();
 }
