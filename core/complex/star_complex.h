@@ -290,6 +290,9 @@ class StarComplex {
     }
   };
   std::vector<Cut> BuildNewStars(std::uint32_t first);
+  // Clips the cell of p by new points; for K = 2 in the flats.
+  void CutStar(std::uint32_t p, std::span<const Cut> cuts);
+  void CutPolygon(std::uint32_t p, std::span<const Cut> cuts);
   // From one point to the next, as if all had come at once.
   Change BuildAllStars();
   // Where a sample was laid: every star is built once, from what lies around it.

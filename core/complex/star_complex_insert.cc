@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 #include <numeric>
+#include <span>
 #include <utility>
 
 #include "core/base/instantiate.h"
@@ -24,6 +25,16 @@ template <int K>
 typename RestrictedVoronoiCell<K>::Scratch& ThreadScratch() {
   thread_local typename RestrictedVoronoiCell<K>::Scratch scratch;
   return scratch;
+}
+
+// Whether a polygon has a vertex on both these facets.
+template <typename Polygon>
+bool HoldsTriangle(const Polygon& cell, std::uint32_t a, std::uint32_t b) {
+  const std::size_t count = cell.facet_count();
+  for (std::size_t v = 0; v < count; ++v)
+    if (cell.id(v) == a)
+      return cell.id(v + 1 < count ? v + 1 : 0) == b || cell.id(v > 0 ? v - 1 : count - 1) == b;
+  return false;
 }
 
 }  // namespace
@@ -176,6 +187,14 @@ std::vector<typename StarComplex<K>::Turn> StarComplex<K>::InTurns(const std::ve
   return turns;
 }
 
+template <int K>
+void StarComplex<K>::CutStar(std::uint32_t p, std::span<const Cut> cuts) {
+  if constexpr (K == 2)
+    if (judging_ == Judging::kFlats && walls(p) == 0) return CutPolygon(p, cuts);
+  for (const Cut& cut : cuts)
+    ClipBy(cells_[p], At(p), At(cut.by), nullptr, &cells_[cut.by], ThreadScratch<K>());
+}
+
 // Clips the old stars. A simplex that a cut creates has the new point that cuts, and so an id from
 // `first` on; one without is as old as the star.
 template <int K>
@@ -189,16 +208,25 @@ void StarComplex<K>::CutStars(const std::vector<Turn>& turns, const std::vector<
     ids->insert(ids->end(), s.begin(), s.end());
   };
   ParallelChunks(turns.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    // For K = 2 the ids of the facets tell simplices apart, else keys.
     std::vector<std::pair<std::uint64_t, Simplex>> before;
+    const auto key_of = [](const Cell& cell, std::size_t v) {
+      return K == 2 ? std::uint64_t{0} : cell.key(v);
+    };
+    const auto is_left = [](const Cell& cell, std::uint64_t key, const Simplex& s) {
+      if constexpr (K == 2) return HoldsTriangle(cell, s[1], s[2]);
+      return cell.Find(key) != cell.vertex_count();
+    };
     for (std::size_t i = begin; i < end && !IsInterrupted(); ++i) {
       const std::uint32_t p = turns[i].star;
       Cell& cell = cells_[p];
       before.clear();
-      ForEachOwned(p, [&](std::size_t v, const Simplex& s) { before.push_back({cell.key(v), s}); });
-      for (std::size_t j = turns[i].begin; j < turns[i].end; ++j)
-        ClipBy(cell, At(p), At(cuts[j].by), nullptr, &cells_[cuts[j].by], ThreadScratch<K>());
+      ForEachOwned(p, [&](std::size_t v, const Simplex& s) {
+        before.push_back({key_of(cell, v), s});
+      });
+      CutStar(p, std::span(cuts).subspan(turns[i].begin, turns[i].end - turns[i].begin));
       for (const auto& [key, s] : before)
-        if (cell.Find(key) == cell.vertex_count()) append(s, &removed[chunk]);
+        if (!is_left(cell, key, s)) append(s, &removed[chunk]);
       ForEachOwned(p, [&](std::size_t, const Simplex& s) {
         if (s.back() >= first) append(s, &added[chunk]);
       });
@@ -306,6 +334,7 @@ void StarComplex<K>::TryPoint(const double* point, const double* tangent, std::u
                                                 WallSet, const double*);                         \
   template std::vector<StarComplex<K>::Cut> StarComplex<K>::BuildNewStars(std::uint32_t);        \
   template std::vector<StarComplex<K>::Turn> StarComplex<K>::InTurns(const std::vector<Cut>&);   \
+  template void StarComplex<K>::CutStar(std::uint32_t, std::span<const Cut>);                    \
   template void StarComplex<K>::CutStars(const std::vector<Turn>&, const std::vector<Cut>&,      \
                                          std::uint32_t, Change*);                                \
   template StarComplex<K>::Change StarComplex<K>::Commit(std::vector<std::uint32_t>*);           \

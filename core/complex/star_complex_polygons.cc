@@ -1,10 +1,9 @@
-// How the stars of a laid sample are built for K = 2, where they are polygons in the flats.
+// How stars are built and cut for K = 2 in the flats, where they are polygons that are made apart.
 
 #include <algorithm>
 #include <cmath>
 #include <span>
 
-#include "core/base/instantiate.h"
 #include "core/base/parallel.h"
 #include "core/complex/star_complex.h"
 #include "core/geometry/laid_polygon.h"
@@ -83,6 +82,12 @@ std::span<const Found> NearestFirst(const Gathered& gathered, const double* poin
   return {found, count};
 }
 
+// One a thread, for the life of the thread.
+LaidPolygon& ThreadPolygon() {
+  thread_local LaidPolygon polygon;
+  return polygon;
+}
+
 // Cuts by what lies around a point, nearest first and ties by id, out to where nothing can cut any
 // more: by what was gathered, which is all there is within `known`, and then by what search(reach)
 // gathers. Returns how far that is.
@@ -144,8 +149,8 @@ void StarComplex<K>::BuildLaidPolygons(std::span<const BallTree::Bunch> bunches,
   thread_local std::vector<std::uint32_t> around, farther;
   thread_local Gathered gathered, more;
   thread_local std::vector<double> centre;
-  thread_local LaidPolygon polygon;
   thread_local Cell cell;
+  LaidPolygon& polygon = ThreadPolygon();
   const double radius = BallAround(bunches, d_, &centre);
   double most = 0;
   for (const BallTree::Bunch& bunch : bunches)
@@ -173,10 +178,10 @@ void StarComplex<K>::BuildLaidPolygons(std::span<const BallTree::Bunch> bunches,
       polygon.Reset(inradius_);
       influence[p] = CutNearestFirst(
           site.point, d_, &gathered, kNear * LaidBound(p),
-          [] { return InfluenceWithin(polygon.max_norm2()); },
+          [&] { return InfluenceWithin(polygon.max_norm2()); },
           [&](std::uint32_t q) {
-            return q != p && polygon.ClipBy(q, d_, site.point, site.tangent, weight, Point(q),
-                                            Weight(q));
+            return q != p &&
+                   polygon.ClipBy(q, d_, site.point, site.tangent, weight, Point(q), Weight(q));
           },
           search);
       cells_[p].Take(polygon);
@@ -194,7 +199,25 @@ void StarComplex<K>::BuildAllLaidPolygons(double* influence) {
   });
 }
 
+// The half-spaces of facets beside a cut are found as they are needed, once each.
+template <int K>
+void StarComplex<K>::CutPolygon(std::uint32_t p, std::span<const Cut> cuts) {
+  LaidPolygon& polygon = ThreadPolygon();
+  const Site site = At(p);
+  const double weight = Weight(p);
+  const auto half_space = [&](std::uint32_t q, double* normal) {
+    if (IsFake(q)) return FakeHalfSpace<2>(static_cast<int>(q - kFirstFakeId), inradius_, normal);
+    return polygon.HalfSpace(d_, site.point, site.tangent, weight, Point(q), Weight(q), normal);
+  };
+  polygon.Resume(cells_[p]);
+  for (const Cut& cut : cuts)
+    polygon.ClipBy(cut.by, d_, site.point, site.tangent, weight, Point(cut.by), Weight(cut.by),
+                   half_space);
+  cells_[p].Take(polygon);
+}
+
 template void StarComplex<2>::BuildLaidPolygons(std::span<const BallTree::Bunch>, double*);
 template void StarComplex<2>::BuildAllLaidPolygons(double*);
+template void StarComplex<2>::CutPolygon(std::uint32_t, std::span<const Cut>);
 
 }  // namespace stellate::core

@@ -1,13 +1,16 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <type_traits>
 #include <vector>
 
 #include "core/base/vector_ops.h"
 #include "core/geometry/half_spaces.h"
-#include "core/geometry/surroundings.h"
+#include "core/geometry/restricted_voronoi_polygon.h"
 
 namespace stellate::core {
 
@@ -28,6 +31,20 @@ class LaidPolygon {
     max_norm2_ = 4 * inradius * inradius;
   }
 
+  // As a finished cell that nothing was judged in. That has no half-spaces: Clip finds those it
+  // needs.
+  void Resume(const RestrictedVoronoiCell<2>& cell) {
+    count_ = cell.vertex_count();
+    while (count_ > capacity_) Grow();
+    for (std::size_t v = 0; v < count_; ++v) {
+      const double* const x = cell.x(v);
+      Put(v, x, x[0] * x[0] + x[1] * x[1]);
+      sides_[v].offset = kUnknown;
+      sides_[v].id = cell.id(v);
+    }
+    max_norm2_ = cell.max_norm2();
+  }
+
   // Vertex v is on the facets v and v + 1, cyclically.
   std::size_t count() const { return count_; }
   double x(std::size_t v) const { return x_[v]; }
@@ -35,22 +52,33 @@ class LaidPolygon {
   std::uint32_t id(std::size_t facet) const { return sides_[facet].id; }
   double max_norm2() const { return max_norm2_; }
 
-  // By the half-space of q in the tangent space at p, where they have these weights.
-  bool ClipBy(std::uint32_t id, int any_d, const double* p, const double* tangent, double p_weight,
-              const double* q, double q_weight) {
+  // Of a polygon that was not resumed.
+  struct KnowsAll {};
+
+  // The half-space of q in the tangent space at p, where they have these weights: writes the
+  // normal, returns the offset.
+  double HalfSpace(int any_d, const double* p, const double* tangent, double p_weight,
+                   const double* q, double q_weight, double* normal) {
     return WithDimension(any_d, [&](auto known) {
-      const int d = known() > 0 ? known() : any_d;
-      double few[known() > 0 ? known() : 1];
-      if (known() == 0) step_.resize(static_cast<std::size_t>(d));
-      double* const step = known() > 0 ? few : step_.data();
-      for (int i = 0; i < d; ++i) step[i] = q[i] - p[i];
-      const double normal[2] = {Dot(tangent, step, d), Dot(tangent + d, step, d)};
-      return Clip(id, normal, 0.5 * (Dot(step, step, d) + p_weight - q_weight));
+      return HalfSpaceIn(known, any_d, p, tangent, p_weight, q, q_weight, normal);
     });
   }
 
-  // As RestrictedVoronoiCell<2>::Clip.
-  bool Clip(std::uint32_t id, const double* normal, double offset) {
+  // By that half-space; `find` as below.
+  template <typename Find = KnowsAll>
+  bool ClipBy(std::uint32_t id, int any_d, const double* p, const double* tangent, double p_weight,
+              const double* q, double q_weight, const Find& find = {}) {
+    return WithDimension(any_d, [&](auto known) {
+      double normal[2];
+      const double offset = HalfSpaceIn(known, any_d, p, tangent, p_weight, q, q_weight, normal);
+      return Clip(id, normal, offset, find);
+    });
+  }
+
+  // As RestrictedVoronoiCell<2>::Clip. find(id, normal) is the half-space of a facet that the cell
+  // had before Resume.
+  template <typename Find = KnowsAll>
+  bool Clip(std::uint32_t id, const double* normal, double offset, const Find& find = {}) {
     const std::size_t count = count_;
     const double a = normal[0], b = normal[1];
     const double *const x = x_.data(), *const y = y_.data();
@@ -70,10 +98,10 @@ class LaidPolygon {
     for (; excess[Next(last)] > 0; last = Next(last))
       if (++cut == count) return false;
     const std::size_t before = Previous(first), after = Next(last);
-    const Side side = sides_[first], added{{a, b}, offset, id};
+    const Side side = Known(first, find), added{{a, b}, offset, id};
     double created[2][2];
     const double norm2s[2] = {Locate(side, before, first, added, created[0]),
-                              Locate(sides_[after], after, last, added, created[1])};
+                              Locate(Known(after, find), after, last, added, created[1])};
     const std::size_t place = Close(first, last, cut);
     sides_[place] = side;
     sides_[place + 1] = added;
@@ -84,6 +112,8 @@ class LaidPolygon {
   }
 
  private:
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
   struct Side {
     double normal[2], offset;
     std::uint32_t id;
@@ -115,6 +145,27 @@ class LaidPolygon {
 
   std::size_t Next(std::size_t v) const { return v + 1 < count_ ? v + 1 : 0; }
   std::size_t Previous(std::size_t v) const { return v > 0 ? v - 1 : count_ - 1; }
+
+  template <typename Find>
+  const Side& Known(std::size_t facet, [[maybe_unused]] const Find& find) {
+    Side& side = sides_[facet];
+    if constexpr (!std::is_same_v<Find, KnowsAll>)
+      if (std::isnan(side.offset)) side.offset = find(side.id, side.normal);
+    return side;
+  }
+
+  template <typename Known>
+  double HalfSpaceIn(Known known, int any_d, const double* p, const double* tangent,
+                     double p_weight, const double* q, double q_weight, double* normal) {
+    const int d = known() > 0 ? known() : any_d;
+    double few[known() > 0 ? known() : 1];
+    if (known() == 0) step_.resize(static_cast<std::size_t>(d));
+    double* const step = known() > 0 ? few : step_.data();
+    for (int i = 0; i < d; ++i) step[i] = q[i] - p[i];
+    normal[0] = Dot(tangent, step, d);
+    normal[1] = Dot(tangent + d, step, d);
+    return 0.5 * (Dot(step, step, d) + p_weight - q_weight);
+  }
 
   void Put(std::size_t v, const double* x, double norm2) {
     x_[v] = x[0];

@@ -351,7 +351,7 @@ TYPED_TEST(RestrictedVoronoiCellTest, CanBeUsedAgainAfterReset) {
 }
 
 TEST(LaidPolygon, IsTheCellByTheSameCutsBitForBit) {
-  LaidPolygon made;
+  LaidPolygon made, resumed;
   for (std::uint64_t trial = 0; trial < 200; ++trial) {
     const double inradius = trial % 2 == 0 ? 10 : 3;
     HalfSpaces<2> half_spaces = RandomHalfSpaces<2>(40, trial);
@@ -361,9 +361,18 @@ TEST(LaidPolygon, IsTheCellByTheSameCutsBitForBit) {
     GivenHalfSpaces<2> given(inradius);
     cell.Reset(inradius, given);
     for (const auto& h : half_spaces) {
+      resumed.Resume(cell);
+      resumed.Clip(h.id, h.normal.data(), h.offset,
+                   [&](std::uint32_t id, double* normal) { return given.HalfSpace(id, normal); });
       EXPECT_EQ(made.Clip(h.id, h.normal.data(), h.offset),
                 given.Clip(cell, h.id, h.normal.data(), h.offset));
       taken.Take(made);
+      ASSERT_EQ(resumed.count(), cell.vertex_count());
+      for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+        EXPECT_EQ(resumed.id(v), cell.id(v));
+        EXPECT_EQ(resumed.x(v), cell.x(v)[0]);
+        EXPECT_EQ(resumed.y(v), cell.x(v)[1]);
+      }
       ASSERT_EQ(taken.vertex_count(), cell.vertex_count());
       EXPECT_EQ(taken.max_norm2(), cell.max_norm2());
       EXPECT_EQ(taken.bounded(), cell.bounded());
