@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 
+#include "core/base/vector_ops.h"
 #include "core/geometry/simplex.h"
+#include "core/geometry/simplex_frame.h"
 
 namespace stellate::core {
 namespace {
@@ -26,8 +28,14 @@ double Examination::DistanceAllowed(double circumradius) const {
 double Examination::Circumradius(const std::uint32_t* ids) const {
   std::array<const double*, kMaxDimension + 1> corners{};
   for (int i = 0; i <= mesh.k; ++i) corners[i] = mesh.Point(ids[i]);
-  return MeasureSimplex({corners.data(), static_cast<std::size_t>(mesh.k) + 1}, mesh.d)
-      .circumradius;
+  const SimplexVertices vertices{corners.data(), static_cast<std::size_t>(mesh.k) + 1};
+  if (mesh.k == 1) return MeasureSimplex(vertices, mesh.d).circumradius;
+  SimplexFrame frame;
+  frame.directions.resize(static_cast<std::size_t>(mesh.k) * static_cast<std::size_t>(mesh.d));
+  WithDimension(mesh.d, [&](auto known) {
+    TakeFrame(vertices, mesh.k, known() > 0 ? known() : mesh.d, frame);
+  });
+  return FrameCircumradius(frame, mesh.k);
 }
 
 }  // namespace stellate::core

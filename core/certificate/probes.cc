@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "core/base/parallel.h"
 #include "core/base/random.h"
+#include "core/base/vector_ops.h"
 #include "core/certificate/point_of.h"
 
 namespace stellate::core {
@@ -16,23 +18,36 @@ namespace {
 enum Stream : std::uint64_t { kSimplexStream = 0x6365727430, kVertexStream, kProbeStream };
 
 constexpr double kBoxMargin = 0.1;  // of the diagonal, around the mesh's own box
+constexpr std::uint32_t kKeptFold = 4;  // of how many are sought
+constexpr std::uint64_t kVerticesInPart = 1 << 14;
 
 void SortUnique(std::vector<std::uint32_t>& ids) {
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
 }
 
-// The `count` simplices of largest value.
+// The `count` simplices of largest value. REQUIRES: there are as many.
 void AppendLargest(const std::vector<float>& values, std::uint32_t count,
                    std::vector<std::uint32_t>& chosen) {
-  std::vector<std::uint32_t> order(values.size());
-  std::iota(order.begin(), order.end(), 0u);
-  ThrowIfInterrupted();
-  std::nth_element(order.begin(), order.begin() + count, order.end(),
-                   [&values](std::uint32_t a, std::uint32_t b) {
-                     return values[a] != values[b] ? values[a] > values[b] : a < b;
-                   });
-  chosen.insert(chosen.end(), order.begin(), order.begin() + count);
+  const auto is_larger = [&values](std::uint32_t a, std::uint32_t b) {
+    return values[a] != values[b] ? values[a] > values[b] : a < b;
+  };
+  // Those that may be among them, a bounded number: what comes later has to be larger.
+  std::vector<std::uint32_t> kept;
+  float least = -std::numeric_limits<float>::infinity();
+  const auto keep_largest = [&] {
+    std::nth_element(kept.begin(), kept.begin() + count, kept.end(), is_larger);
+    kept.resize(count);
+    least = values[*std::max_element(kept.begin(), kept.end(), is_larger)];
+  };
+  for (std::uint32_t i = 0; i < values.size(); ++i) {
+    CheckInterruption(i);
+    if (!(values[i] > least)) continue;
+    kept.push_back(i);
+    if (kept.size() == std::size_t{kKeptFold} * count) keep_largest();
+  }
+  keep_largest();
+  chosen.insert(chosen.end(), kept.begin(), kept.end());
 }
 
 Eigen::VectorXd PointInBox(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,
@@ -60,19 +75,37 @@ Eigen::VectorXd PointNearSimplex(const MeshView& mesh, const std::uint32_t* ids,
   return x + push * random.Uniform() * direction.normalized();
 }
 
+MeshBox BoxOfPart(const MeshView& mesh, std::uint32_t begin, std::uint32_t end) {
+  MeshBox box{PointOf(mesh, begin), PointOf(mesh, begin)};
+  WithDimension(mesh.d, [&](auto known) {
+    const int d = known() > 0 ? known() : mesh.d;
+    double* const lower = box.lower.data();
+    double* const upper = box.upper.data();
+    const double* x = mesh.Point(begin);
+    for (std::uint32_t v = begin; v < end; ++v, x += d) {
+      for (int i = 0; i < d; ++i) {
+        lower[i] = std::min(lower[i], x[i]);
+        upper[i] = std::max(upper[i], x[i]);
+      }
+    }
+  });
+  return box;
+}
+
 }  // namespace
 
 MeshBox BoxOf(const MeshView& mesh) {
-  MeshBox box{PointOf(mesh, 0), PointOf(mesh, 0)};
-  double* const lower = box.lower.data();
-  double* const upper = box.upper.data();
-  for (std::uint32_t v = 1; v < mesh.vertices; ++v) {
-    CheckInterruption(v);
-    const double* x = mesh.Point(v);
-    for (int i = 0; i < mesh.d; ++i) {
-      lower[i] = std::min(lower[i], x[i]);
-      upper[i] = std::max(upper[i], x[i]);
-    }
+  std::vector<MeshBox> parts((mesh.vertices + kVerticesInPart - 1) / kVerticesInPart);
+  ParallelFor(parts.size(), [&](std::size_t part) {
+    const auto begin = static_cast<std::uint32_t>(part * kVerticesInPart);
+    parts[part] = BoxOfPart(
+        mesh, begin,
+        static_cast<std::uint32_t>(std::min(mesh.vertices, begin + kVerticesInPart)));
+  });
+  MeshBox box = parts.front();
+  for (const MeshBox& part : parts) {
+    box.lower = box.lower.cwiseMin(part.lower);
+    box.upper = box.upper.cwiseMax(part.upper);
   }
   return box;
 }

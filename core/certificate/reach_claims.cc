@@ -7,6 +7,7 @@
 
 #include "core/base/message.h"
 #include "core/base/random.h"
+#include "core/certificate/along.h"
 #include "core/certificate/probes.h"
 #include "core/geometry/reach_bound.h"
 
@@ -15,6 +16,13 @@ namespace {
 
 // Two points of M so much nearer to each other than the mesh size are on two sides of something.
 constexpr double kThin = 0.25;
+
+// Whether a point at this distance, so far off a tangent space, both squared, may bound the reach
+// by less than `reach`, or rounding hides whether it does.
+bool MayBound(double length2, double away2, double reach) {
+  constexpr double kRounding = 1e-12, kMargin = 1 - 1e-6;
+  return !(4 * reach * reach * (away2 + kRounding * length2) < kMargin * length2 * length2);
+}
 
 }  // namespace
 
@@ -72,9 +80,13 @@ void ReachClaims::HoldFoot(const std::uint32_t* ids, double circumradius, double
   if (feet_ && number)
     feet_->AddPair(ids, y, TangentsUnder(ids), kPairRadius * x_.LocalSize(ids[0]),
                    ~(Mix64(x_.spec.random_seed) + *number));
+  Eigen::VectorXd step(x_.mesh.d);
   for (int i = 0; i <= x_.mesh.k; ++i) {
+    for (int c = 0; c < x_.mesh.d; ++c) step[c] = y[c] - x_.mesh.Point(ids[i])[c];
+    const double length2 = Dot(step.data(), step.data(), x_.mesh.d);
+    const double away2 = length2 - SquaredAlong(x_.mesh, ids[i], step.data());
+    if (!MayBound(length2, away2, reach_)) continue;
     const auto tangent = x_.Tangents(ids[i]);
-    const Eigen::VectorXd step = y - x_.Vertex(ids[i]);
     const double length = step.norm();
     const double away = (step - tangent * (tangent.transpose() * step)).norm();
     if (IsTelling(length, away, x_.longest_edge[ids[i]], x_.position_error))

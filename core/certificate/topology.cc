@@ -137,17 +137,22 @@ std::string CheckSimplexList(const SimplexList& list) {
   if (list.ids->size() / width >= Adjacency::kNone - 1) {
     return Message("the mesh has ", list.ids->size() / width, " simplices, too many to check");
   }
-  for (std::uint32_t s = 0; s < list.size(); ++s) {
-    CheckInterruption(s);
-    const std::uint32_t* ids = list[s];
-    for (std::size_t i = 0; i < width; ++i) {
-      if (ids[i] >= list.vertices || (i > 0 && ids[i] <= ids[i - 1])) {
-        return Message("simplex ", s, " ", NameSimplex(ids, list.k + 1),
-                       " does not name ascending vertices below ", list.vertices);
-      }
+  std::vector<std::uint32_t> first(ChunkCount(list.size()), list.size());  // by chunk
+  ParallelChunks(list.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    for (auto s = static_cast<std::uint32_t>(begin); s < end; ++s) {
+      const std::uint32_t* ids = list[s];
+      bool good = ids[list.k] < list.vertices;
+      for (int i = 1; i <= list.k; ++i) good = good && ids[i - 1] < ids[i];
+      if (good) continue;
+      first[chunk] = s;
+      return;
     }
-  }
-  return "";
+  });
+  const auto bad = std::find_if(first.begin(), first.end(),
+                                [&](std::uint32_t s) { return s < list.size(); });
+  if (bad == first.end()) return "";
+  return Message("simplex ", *bad, " ", NameSimplex(list[*bad], list.k + 1),
+                 " does not name ascending vertices below ", list.vertices);
 }
 
 Adjacency::Adjacency(const SimplexList& list) : list_(list) {

@@ -6,6 +6,7 @@
 
 #include "core/base/instantiate.h"
 #include "core/base/interruption.h"
+#include "core/base/parallel.h"
 #include "core/complex/consistency.h"
 
 namespace stellate::core {
@@ -39,12 +40,17 @@ StarFacts FactsOf(Engine<K>& engine) {
   const StarComplex<K>& complex = engine.complex();
   StarFacts facts;
   facts.converged = true;
-  for (std::uint32_t p = 0; p < complex.size(); ++p) {
-    CheckInterruption(p);
-    const double norm2 = engine.filled().is_handed_out() ? MaxAgreedNorm2<K>(complex, p)
-                                                         : complex.cell(p).max_norm2();
+  const bool agreed = engine.filled().is_handed_out();
+  std::vector<double> parts(ChunkCount(complex.size()), 0);
+  ParallelChunks(complex.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    double most = 0;
+    for (auto p = static_cast<std::uint32_t>(begin); p < end; ++p)
+      most =
+          std::max(most, agreed ? MaxAgreedNorm2<K>(complex, p) : complex.cell(p).max_norm2());
+    parts[chunk] = most;
+  });
+  for (const double norm2 : parts)
     facts.max_circumradius = std::max(facts.max_circumradius, std::sqrt(norm2));
-  }
   if (engine.criteria().graded()) facts.max_size_ratio = engine.sizes().MaxRadiusOverSize(complex);
   return facts;
 }
