@@ -152,7 +152,7 @@ class Certifier::Impl {
 
   void Finish() {
     finished_ = true;
-    x_.ForgetNeighbours();
+    x_.ForgetStars();
     if (claims_) {
       claims_->reach.TellWhatBallsMet();
       claims_->reach.Hold(claims_->coverage.JudgeSeen());

@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/base/message.h"
 #include "core/base/parallel.h"
@@ -31,11 +33,7 @@ bool IsComplex(Examination& x) {
                       malformed.empty() ? "the mesh has no simplices" : malformed);
     return false;
   }
-  x.adjacency.emplace(list);
-  if (x.mesh.faces) {
-    x.closed_off = BoundaryClaims::CloseOff(x.mesh);
-    x.closed_adjacency.emplace(SimplexList{list.k, list.vertices + 1, &x.closed_off});
-  }
+  x.stars.emplace(list);
   return true;
 }
 
@@ -54,8 +52,18 @@ std::string AboutItsEnd(const Examination& x) {
   return said;
 }
 
-void RefuseWhatIsNoManifold(Examination& x, const Connectivity& connectivity,
-                            const LinkReport& links) {
+// What is known of the complex as such. A closed manifold, until something else is found.
+struct Topology {
+  Connectivity connectivity;
+  LinkReport links;
+  std::uint64_t bad_facets = 0;
+  std::string first_bad_facet;
+  std::vector<std::uint32_t> some_bad_facets;
+};
+
+void RefuseWhatIsNoManifold(Examination& x, const Topology& topology) {
+  const Connectivity& connectivity = topology.connectivity;
+  const LinkReport& links = topology.links;
   const Certificate& c = x.certificate;
   if (c.components < static_cast<std::uint64_t>(x.spec.components)) {
     x.findings.Refuse(
@@ -69,7 +77,7 @@ void RefuseWhatIsNoManifold(Examination& x, const Connectivity& connectivity,
     x.findings.Refuse(Findings::kComplex,
                       Message(x.mesh.faces ? "the mesh does not end where its faces are: "
                                            : "the mesh is not closed: ",
-                              x.Closed().first_bad_facet(),
+                              topology.first_bad_facet,
                               ", where each must be in two; faces like it: ", c.bad_faces,
                               x.mesh.faces ? AboutItsEnd(x) : std::string()));
   }
@@ -97,36 +105,63 @@ void RefuseWhatIsUnfinished(Examination& x) {
   }
 }
 
-// The orientation of the mesh, if it has one.
-std::vector<std::int8_t> JudgeTopology(Examination& x) {
+// From who is whose neighbour; of manifolds with boundary in the mesh closed off by one vertex more
+// (BoundaryClaims).
+Topology ExamineTopology(const Examination& x, const Adjacency& adjacency) {
   ThrowIfInterrupted();
-  Connectivity connectivity;
-  LinkReport links;
+  const std::vector<std::uint32_t> closed_off =
+      x.mesh.faces ? BoundaryClaims::CloseOff(x.mesh) : std::vector<std::uint32_t>();
+  const SimplexList& list = adjacency.list();
+  std::optional<Adjacency> closed_adjacency;
+  if (x.mesh.faces) closed_adjacency.emplace(SimplexList{list.k, list.vertices + 1, &closed_off});
+  const Adjacency& closed = closed_adjacency ? *closed_adjacency : adjacency;
+  Topology topology;
   ParallelFor(2, [&](int part) {
     if (part == 0)
-      connectivity = ComputeConnectivity(*x.adjacency);
+      topology.connectivity = ComputeConnectivity(adjacency);
     else
-      links = CheckLinks(x.Closed(), x.mesh.faces ? static_cast<std::uint32_t>(x.mesh.vertices)
-                                                  : Adjacency::kNone);
+      topology.links = CheckLinks(closed, x.mesh.faces ? list.vertices : Stars::kNone);
   });
+  topology.bad_facets = closed.bad_facets();
+  topology.first_bad_facet = closed.first_bad_facet();
+  topology.some_bad_facets = closed.some_bad_facets();
+  return topology;
+}
+
+// What the stars say of themselves; where that is not that all is well, what is wrong.
+StarGeometry MeasureComplex(Examination& x, Topology* topology) {
+  if (std::optional<EmbeddedStars> embedded = MeasureIfEmbedded(x.mesh, *x.stars)) {
+    topology->connectivity = std::move(embedded->connectivity);
+    topology->links.euler_characteristic = embedded->euler_characteristic;
+    return std::move(embedded->geometry);
+  }
+  Adjacency adjacency(std::move(*x.stars));
+  *topology = ExamineTopology(x, adjacency);
+  StarGeometry stars = MeasureStars(x.mesh, adjacency, topology->connectivity.orientation);
+  *x.stars = std::move(adjacency);
+  return stars;
+}
+
+void JudgeTopology(Examination& x, const Topology& topology) {
+  const Connectivity& connectivity = topology.connectivity;
+  const LinkReport& links = topology.links;
   Certificate& c = x.certificate;
-  c.bad_faces = x.Closed().bad_facets();
+  c.bad_faces = topology.bad_facets;
   c.closed = c.bad_faces == 0;
   c.components = connectivity.components;
   c.orientable = c.closed && connectivity.orientable;
   c.bad_links = links.bad_links + connectivity.isolated_vertices;
   c.links_are_spheres = c.bad_links == 0;
   c.links_decided_exactly = links.decided_exactly;
-  c.violations.faces = x.Closed().some_bad_facets();
+  c.violations.faces = topology.some_bad_facets;
   std::merge(links.some_bad.begin(), links.some_bad.end(), connectivity.some_isolated.begin(),
              connectivity.some_isolated.end(), std::back_inserter(c.violations.links));
   c.violations.links.resize(std::min(c.violations.links.size(), Violations::kMost));
   c.euler_characteristic = links.euler_characteristic;
   if (x.mesh.faces && x.mesh.faces->empty()) --c.euler_characteristic;  // the apex of no cone
   if (x.mesh.faces) BoundaryClaims(x).JudgeFaces();
-  RefuseWhatIsNoManifold(x, connectivity, links);
+  RefuseWhatIsNoManifold(x, topology);
   RefuseWhatIsUnfinished(x);
-  return std::move(connectivity.orientation);
 }
 
 void JudgeStars(Examination& x, const StarGeometry& stars) {
@@ -147,7 +182,6 @@ void JudgeStars(Examination& x, const StarGeometry& stars) {
 }
 
 void JudgeSize(Examination& x) {
-  x.shape = MeasureShape(x.mesh, x.list());
   Certificate& c = x.certificate;
   c.max_circumradius = std::max(c.max_circumradius, x.shape.max_circumradius);
   c.max_radius_edge = x.shape.max_radius_edge;
@@ -170,8 +204,11 @@ std::optional<StarGeometry> JudgeComplex(Examination& x) {
   x.certificate.inconsistent_simplices = x.facts.inconsistent_simplices;
   x.certificate.max_circumradius = x.facts.max_circumradius;
   if (!IsComplex(x)) return std::nullopt;
-  StarGeometry stars = MeasureStars(x.mesh, *x.adjacency, JudgeTopology(x));
+  Topology topology;
+  StarGeometry stars = MeasureComplex(x, &topology);
+  JudgeTopology(x, topology);
   JudgeStars(x, stars);
+  x.shape = std::move(stars.shape);
   JudgeSize(x);
   x.longest_edge = std::move(stars.longest_edge);
   return stars;

@@ -108,8 +108,7 @@ void CoverageClaims::JudgeFibres() {
   for (std::size_t n = 0; n < probes_.size(); ++n)
     fibres.push_back({probes_[n].x.data(), probes_[n].tangent.data(),
                       x_.LocalSize(probes_[n].nearest.vertex), Mix64(x_.spec.random_seed) + n});
-  const std::vector<FibreHits> hits =
-      CountHits(x_.mesh, *x_.adjacency, x_.shape.max_diameter, fibres);
+  const std::vector<FibreHits> hits = CountHits(x_.mesh, *x_.stars, x_.shape.max_diameter, fibres);
   for (std::size_t n = 0; n < probes_.size(); ++n) JudgeHits(probes_[n], hits[n]);
   probes_.clear();
 }
@@ -144,9 +143,9 @@ bool CoverageClaims::IsBeyondFacet(const Eigen::VectorXd& x, std::uint32_t verte
     }
     return false;
   };
-  for (const std::uint32_t s : x_.adjacency->Star(vertex))
+  for (const std::uint32_t s : x_.stars->Star(vertex))
     for (int i = 0; i <= x_.mesh.k; ++i)
-      for (const std::uint32_t t : x_.adjacency->Star(x_.list()[s][i]))
+      for (const std::uint32_t t : x_.stars->Star(x_.list()[s][i]))
         if (is_near(x_.list()[t])) return true;
   return false;
 }

@@ -11,8 +11,8 @@
 namespace stellate::core {
 namespace {}  // namespace
 
-void DeclaredReach::Prove(const Adjacency& adjacency, const MeshShape& shape) {
-  proof_ = ProveFromReach(mesh_, adjacency, shape, claim_);
+void DeclaredReach::Prove(const Stars& stars, const MeshShape& shape) {
+  proof_ = ProveFromReach(mesh_, stars, shape, claim_);
 }
 
 void DeclaredReach::HoldAgainstPoint(std::uint32_t p, const Eigen::VectorXd& y) {

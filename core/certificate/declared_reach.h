@@ -19,7 +19,7 @@ class DeclaredReach {
   DeclaredReach(const MeshView& mesh, const ReachClaim& claim) : mesh_(mesh), claim_(claim) {}
 
   // The mesh is closed and its stars embed.
-  void Prove(const Adjacency& adjacency, const MeshShape& shape);
+  void Prove(const Stars& stars, const MeshShape& shape);
 
   // The point y of M, seen from vertex p.
   void HoldAgainstPoint(std::uint32_t p, const Eigen::VectorXd& y);

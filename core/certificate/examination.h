@@ -17,12 +17,12 @@ namespace stellate::core {
 
 // A mesh under examination: what every claim about it looks at, and what was found so far.
 struct Examination {
-  Examination(const Specification& asked, const MeshView& view, const StarFacts& stars)
-      : spec(asked), mesh(view), facts(stars) {}
+  Examination(const Specification& asked, const MeshView& view, const StarFacts& known)
+      : spec(asked), mesh(view), facts(known) {}
 
   bool thorough() const { return spec.audit == Audit::kThorough; }
   bool graded() const { return facts.max_size_ratio > 0; }
-  const SimplexList& list() const { return adjacency->list(); }
+  const SimplexList& list() const { return stars->list(); }
   Eigen::Map<const Eigen::VectorXd> Vertex(std::uint32_t v) const {
     return {mesh.Point(v), mesh.d};
   }
@@ -40,17 +40,9 @@ struct Examination {
   Certificate certificate;
   Findings findings;
 
-  std::optional<Adjacency> adjacency;
-  // Of manifolds with boundary: the mesh closed off by one vertex more (BoundaryClaims).
-  std::vector<std::uint32_t> closed_off;
-  std::optional<Adjacency> closed_adjacency;
-  const Adjacency& Closed() const { return closed_adjacency ? *closed_adjacency : *adjacency; }
-  // Once no claim asks who is whose neighbour: almost half of what the certificate takes up.
-  void ForgetNeighbours() {
-    adjacency.reset();
-    closed_adjacency.reset();
-    closed_off = {};
-  }
+  std::optional<Stars> stars;
+  // Once no claim asks for them: most of what the certificate takes up.
+  void ForgetStars() { stars.reset(); }
   // Whether some vertex of a simplex is on the boundary.
   bool AtBoundary(const std::uint32_t* ids) const {
     bool any = false;

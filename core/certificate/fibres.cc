@@ -38,9 +38,9 @@ std::size_t PartCount(const MeshView& mesh) {
 // no farther than `beside` from it.
 class FibreCounter {
  public:
-  FibreCounter(const MeshView& mesh, const Adjacency& adjacency, const Fibre& fibre,
+  FibreCounter(const MeshView& mesh, const Stars& stars, const Fibre& fibre,
                const std::vector<std::uint32_t>& near, double beside)
-      : mesh_(mesh), adjacency_(adjacency), fibre_(fibre) {
+      : mesh_(mesh), stars_(stars), fibre_(fibre) {
     corner_index_.Clear(near.size());
     std::vector<std::uint32_t> close;
     for (const std::uint32_t v : near) {
@@ -48,8 +48,8 @@ class FibreCounter {
       if (Dot(flat, flat, mesh.k) <= beside * beside) close.push_back(v);
     }
     for (const std::uint32_t v : close) {
-      for (const std::uint32_t s : adjacency.Star(v)) {
-        const std::uint32_t* ids = adjacency.list()[s];
+      for (const std::uint32_t s : stars.Star(v)) {
+        const std::uint32_t* ids = stars.list()[s];
         int i = 0;
         while (!std::binary_search(close.begin(), close.end(), ids[i])) ++i;
         if (ids[i] != v) continue;  // each simplex once
@@ -99,7 +99,7 @@ class FibreCounter {
     FibreHits hits;
     std::array<const double*, kMaxDimension + 1> flat{};
     for (const Candidate& candidate : candidates_) {
-      const std::uint32_t* ids = adjacency_.list()[candidate.simplex];
+      const std::uint32_t* ids = stars_.list()[candidate.simplex];
       for (int i = 0; i <= k; ++i) flat[i] = corners_[candidate.corners[i]].data();
       bool may_hit = true;
       for (int a = 0; a < k && may_hit; ++a) {
@@ -153,7 +153,7 @@ class FibreCounter {
   }
 
   const MeshView& mesh_;
-  const Adjacency& adjacency_;
+  const Stars& stars_;
   const Fibre& fibre_;
   std::vector<Candidate> candidates_;
   SmallIndex corner_index_;
@@ -203,8 +203,8 @@ std::vector<NearestVertex> FindNearestVertices(const MeshView& mesh,
   return nearest;
 }
 
-std::vector<FibreHits> CountHits(const MeshView& mesh, const Adjacency& adjacency,
-                                 double max_diameter, const std::vector<Fibre>& fibres) {
+std::vector<FibreHits> CountHits(const MeshView& mesh, const Stars& stars, double max_diameter,
+                                 const std::vector<Fibre>& fibres) {
   // Each point of a simplex has a vertex within this share of its diameter (Jung).
   const double jung = std::sqrt(mesh.k / (2.0 * (mesh.k + 1)));
   std::vector<double> points, radii, beside;
@@ -234,7 +234,7 @@ std::vector<FibreHits> CountHits(const MeshView& mesh, const Adjacency& adjacenc
     for (const Pair& pair : part) near[pair.fibre].push_back(pair.vertex);
   std::vector<FibreHits> hits(fibres.size());
   ParallelFor(fibres.size(), [&](std::size_t i) {
-    hits[i] = FibreCounter(mesh, adjacency, fibres[i], near[i], beside[i]).Count();
+    hits[i] = FibreCounter(mesh, stars, fibres[i], near[i], beside[i]).Count();
   });
   return hits;
 }

@@ -32,7 +32,7 @@ constexpr int kTriedVertices = 4;
 
 // A simplex that (A) fails for, and by how much.
 struct Leaning {
-  std::uint32_t simplex = Adjacency::kNone;
+  std::uint32_t simplex = Stars::kNone;
   double alpha = 0, rho = 0;
   double sum = 0;  // alpha + theta, radians
 };
@@ -75,7 +75,7 @@ class AngleCondition {
  private:
   void Judge(std::uint32_t s, Extent* part) const {
     const double jung = jung_ * shape_.diameters[s] * (1 + kFloatMargin);
-    const double tilt = shape_.tilts[s] * (1 + kFloatMargin);
+    const double tilt = (shape_.tilts[s] + kTiltError) * (1 + kFloatMargin);
     const bool easy =
         tilt < 1 && Holds(std::asin(std::sqrt(tilt)), LargestTurn(jung, claim_.reach));
     if (easy && jung <= part->rho) return;
@@ -159,26 +159,26 @@ struct Chosen {
   std::uint32_t component_count = 0;
 };
 
-Chosen ChooseVertices(const Adjacency& adjacency) {
-  const SimplexList& list = adjacency.list();
-  std::vector<std::uint32_t> component(list.vertices, Adjacency::kNone);
+Chosen ChooseVertices(const Stars& stars) {
+  const SimplexList& list = stars.list();
+  std::vector<std::uint32_t> component(list.vertices, Stars::kNone);
   std::vector<std::uint32_t> open;
   Chosen chosen;
   std::vector<int> taken;
   std::size_t step = 0;
   for (std::uint32_t v = 0; v < list.vertices; ++v) {
-    if (component[v] == Adjacency::kNone) {
+    if (component[v] == Stars::kNone) {
       component[v] = chosen.component_count++;
       taken.push_back(0);
       open.push_back(v);
       while (!open.empty()) {
         const std::uint32_t u = open.back();
         open.pop_back();
-        for (const std::uint32_t s : adjacency.Star(u)) {
+        for (const std::uint32_t s : stars.Star(u)) {
           CheckInterruption(step++);
           for (int i = 0; i <= list.k; ++i) {
             const std::uint32_t w = list[s][i];
-            if (component[w] != Adjacency::kNone) continue;
+            if (component[w] != Stars::kNone) continue;
             component[w] = component[v];
             open.push_back(w);
           }
@@ -193,9 +193,9 @@ Chosen ChooseVertices(const Adjacency& adjacency) {
 }
 
 // Condition (B): empty, or what is in the way.
-std::string FindOtherSheet(const MeshView& mesh, const Adjacency& adjacency, const MeshShape& shape,
+std::string FindOtherSheet(const MeshView& mesh, const Stars& stars, const MeshShape& shape,
                            double most_rho, double reach) {
-  const Chosen chosen = ChooseVertices(adjacency);
+  const Chosen chosen = ChooseVertices(stars);
   const double near = LargestDistance(most_rho, reach) + shape.max_diameter;
   std::vector<double> centres;
   for (const std::uint32_t v : chosen.vertices)
@@ -210,8 +210,8 @@ std::string FindOtherSheet(const MeshView& mesh, const Adjacency& adjacency, con
       ParallelGather<Sheet>(mesh.vertices, [&](std::size_t v, std::vector<Sheet>* found) {
         grid.ForEachAround(mesh.Point(static_cast<std::uint32_t>(v)), [&](std::size_t i, double) {
           const std::uint32_t p = chosen.vertices[i];
-          for (const std::uint32_t s : adjacency.Star(static_cast<std::uint32_t>(v))) {
-            const std::uint32_t* ids = adjacency.list()[s];
+          for (const std::uint32_t s : stars.Star(static_cast<std::uint32_t>(v))) {
+            const std::uint32_t* ids = stars.list()[s];
             // All vertices of a simplex so near are in the ball: the lowest has it.
             if (ids[0] != v || std::find(ids, ids + mesh.k + 1, p) != ids + mesh.k + 1) continue;
             const double rho = jung * shape.diameters[s] * (1 + kFloatMargin);
@@ -229,7 +229,7 @@ std::string FindOtherSheet(const MeshView& mesh, const Adjacency& adjacency, con
   for (const Sheet& sheet : sheets) {
     if (shown[chosen.components[sheet.chosen]]) continue;
     const std::uint32_t p = chosen.vertices[sheet.chosen];
-    return Message("simplex ", NameSimplex(adjacency.list()[sheet.simplex], mesh.k + 1),
+    return Message("simplex ", NameSimplex(stars.list()[sheet.simplex], mesh.k + 1),
                    " is so near vertex ", p,
                    " that the two may lie over one point of the manifold: take a smaller epsilon");
   }
@@ -266,17 +266,17 @@ bool Contradicts(const ReachClaim& claim, double length, double away, double noi
   return away * (1 - kLengthMargin) > allowed * (1 + kLengthMargin) + blame;
 }
 
-Proof ProveFromReach(const MeshView& mesh, const Adjacency& adjacency, const MeshShape& shape,
+Proof ProveFromReach(const MeshView& mesh, const Stars& stars, const MeshShape& shape,
                      const ReachClaim& claim) {
   Proof proof;
-  const SimplexList& list = adjacency.list();
+  const SimplexList& list = stars.list();
   const Extent extent = AngleCondition(mesh, list, shape, claim).Decide();
   proof.distance = LargestDistance(extent.rho, claim.reach);
   if (extent.failures > 0) {
     proof.obstacle = DescribeLeaning(mesh, list, extent, claim);
     return proof;
   }
-  proof.obstacle = FindOtherSheet(mesh, adjacency, shape, extent.rho, claim.reach);
+  proof.obstacle = FindOtherSheet(mesh, stars, shape, extent.rho, claim.reach);
   proof.holds = proof.obstacle.empty();
   return proof;
 }

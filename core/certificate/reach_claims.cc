@@ -46,8 +46,7 @@ void ReachClaims::HoldDeclared(const StarGeometry& stars) {
   declared_.emplace(
       x_.mesh, ReachClaim{reach, std::asin(std::min(1.0, x_.facts.tangent_error_length / reach))});
   if (std::isfinite(stars.reach)) declared_->HoldAgainstEdge(stars.narrowest_p, stars.narrowest_q);
-  if (x_.certificate.closed && stars.unembedded_stars == 0)
-    declared_->Prove(*x_.adjacency, x_.shape);
+  if (x_.certificate.closed && stars.unembedded_stars == 0) declared_->Prove(*x_.stars, x_.shape);
 }
 
 Eigen::MatrixXd ReachClaims::FootQuestions() const {

@@ -3,8 +3,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
+#include <utility>
 
 #include "core/base/parallel.h"
 #include "core/certificate/corners.h"
@@ -16,30 +16,18 @@ namespace {
 
 constexpr double kNegligible = 1e-14;  // difference of squared sines
 
-// Of some of the simplices.
-struct Extremes {
-  double circumradius = 0, diameter = 0, radius_edge = 0;
-  double fatness = std::numeric_limits<double>::infinity();
-  double tilt = -1;
-  std::uint32_t largest = 0, longest = 0, most_tilted = 0;  // of circumradius, radius-edge, tilt
-
-  void Take(const Extremes& other) {
-    if (other.circumradius > circumradius) {
-      circumradius = other.circumradius;
-      largest = other.largest;
-    }
-    if (other.radius_edge > radius_edge) {
-      radius_edge = other.radius_edge;
-      longest = other.longest;
-    }
-    if (other.tilt > tilt) {
-      tilt = other.tilt;
-      most_tilted = other.most_tilted;
-    }
-    diameter = std::max(diameter, other.diameter);
-    fatness = std::min(fatness, other.fatness);
+// Makes `extreme` no less than `value`.
+void Raise(std::atomic<double>& extreme, double value) {
+  double known = extreme.load(std::memory_order_relaxed);
+  while (known < value && !extreme.compare_exchange_weak(known, value, std::memory_order_relaxed)) {
   }
-};
+}
+
+void Lower(std::atomic<double>& extreme, double value) {
+  double known = extreme.load(std::memory_order_relaxed);
+  while (known > value && !extreme.compare_exchange_weak(known, value, std::memory_order_relaxed)) {
+  }
+}
 
 // What R1 bounds where a vertex is guarded: the largest distance of a vertex from the orthocentre,
 // from which all have the same power.
@@ -64,41 +52,14 @@ bool IsAmongGuards(const MeshView& mesh, const std::uint32_t* ids) {
          std::any_of(ids, ids + mesh.k + 1, [&](std::uint32_t v) { return mesh.GuardOf(v) > 0; });
 }
 
-// k and d are constants where they are usual.
-[[gnu::always_inline]] inline Extremes MeasurePart(const MeshView& mesh, const SimplexList& list,
-                                                   std::uint32_t begin, std::uint32_t end, int k,
-                                                   int d, MeshShape& shape) {
-  Extremes part;
-  Corners corners;
-  SimplexFrame frame;
-  frame.directions.resize(static_cast<std::size_t>(k) * static_cast<std::size_t>(d));
-  for (std::uint32_t s = begin; s < end; ++s) {
-    const SimplexVertices vertices = corners.Of(mesh, list[s], k);
-    TakeFrame(vertices, k, d, frame);
-    const SimplexMeasures m =
-        k > 1 ? MeasureFramed(vertices, k, d, frame) : MeasureSimplex(vertices, d, frame);
-    const double radius =
-        IsAmongGuards(mesh, list[s]) ? RadiusAmongGuards(mesh, list[s]) : m.circumradius;
-    Extremes one{radius, m.diameter, m.RadiusEdgeRatio(), m.Fatness(), 0, s, s, s};
-    for (int i = 0; i <= k; ++i) {
-      const double tilt =
-          frame.rank < k ? k : SumOfSquaredSines(frame, k, d, mesh.Tangent(list[s][i]), k);
-      one.tilt = std::max(one.tilt, tilt);
-    }
-    part.Take(one);
-    shape.diameters[s] = static_cast<float>(m.diameter);
-    shape.tilts[s] = static_cast<float>(one.tilt);
-  }
-  return part;
-}
-
-template <int K>
-Extremes MeasurePart(const MeshView& mesh, const SimplexList& list, std::uint32_t begin,
-                     std::uint32_t end, MeshShape& shape) {
-  return WithDimension(mesh.d, [&](auto known) {
-    const int d = known() > 0 ? known() : mesh.d;
-    return MeasurePart(mesh, list, begin, end, K, d, shape);
+SimplexVertices FrameCorners(const MeshView& mesh, const std::uint32_t* ids, Corners& corners,
+                             SimplexFrame& frame) {
+  const SimplexVertices vertices = corners.Of(mesh, ids, mesh.k);
+  frame.directions.resize(static_cast<std::size_t>(mesh.k) * static_cast<std::size_t>(mesh.d));
+  WithDimension(mesh.d, [&](auto known) {
+    TakeFrame(vertices, mesh.k, known() > 0 ? known() : mesh.d, frame);
   });
+  return vertices;
 }
 
 // Are all eigenvalues of the tilt below `bound`? Cholesky's factorisation of the difference.
@@ -134,57 +95,113 @@ double LargerSine2(const MeshView& mesh, const SimplexList& list, Corners& corne
   return sine2;
 }
 
+}  // namespace
+
+ShapeSearch::ShapeSearch(const MeshView& mesh, const SimplexList& list) : mesh_(mesh), list_(list) {
+  shape_.diameters.resize(list.size());
+  shape_.tilts.resize(list.size());
+}
+
+void ShapeSearch::MeasureByFrame(std::uint32_t s, Part* part) {
+  Corners corners;
+  const SimplexVertices vertices = FrameCorners(mesh_, list_[s], corners, part->frame);
+  const SimplexMeasures m = MeasureSimplex(vertices, mesh_.d, part->frame);
+  const double radius =
+      IsAmongGuards(mesh_, list_[s]) ? RadiusAmongGuards(mesh_, list_[s]) : m.circumradius;
+  const double ratio = m.RadiusEdgeRatio(), fatness = m.Fatness();
+  if (radius > part->circumradius || (radius == part->circumradius && s < part->largest)) {
+    part->circumradius = radius;
+    part->largest = s;
+  }
+  if (ratio > part->radius_edge || (ratio == part->radius_edge && s < part->longest)) {
+    part->radius_edge = ratio;
+    part->longest = s;
+  }
+  part->fatness = std::min(part->fatness, fatness);
+  Raise(radius2_, radius * radius);
+  Raise(radius_edge2_, ratio * ratio);
+  Lower(fatness2_, fatness * fatness);
+}
+
+double ShapeSearch::TiltByFrame(std::uint32_t s, std::uint32_t vertex, Part* part) const {
+  Corners corners;
+  FrameCorners(mesh_, list_[s], corners, part->frame);
+  if (part->frame.rank < mesh_.k) return mesh_.k;
+  return SumOfSquaredSines(part->frame, mesh_.k, mesh_.d, mesh_.Tangent(vertex), mesh_.k);
+}
+
+double ShapeSearch::LargestTilt(std::uint32_t s, Part* part) const {
+  double largest = 0;
+  for (int i = 0; i <= mesh_.k; ++i) largest = std::max(largest, TiltByFrame(s, list_[s][i], part));
+  return largest;
+}
+
 // A simplex' tilt is the sum of the squared sines that the largest is sought of, so that few need
 // a second look.
-double MaxSine2(const MeshView& mesh, const SimplexList& list, const MeshShape& shape,
-                std::uint32_t most_tilted) {
+double ShapeSearch::MaxSine2(float largest_tilt) const {
+  // Rounding keeps the order.
+  const auto may_reach = [&](std::uint32_t s, double sine2) {
+    return shape_.tilts[s] >= static_cast<float>((sine2 - kTiltError) * (1 - kMargin));
+  };
+  const std::vector<std::uint32_t> first =
+      ParallelGather<std::uint32_t>(list_.size(), [&](std::size_t s, auto* found) {
+        const auto id = static_cast<std::uint32_t>(s);
+        if (may_reach(id, largest_tilt)) found->push_back(id);
+      });
+  double most = -1;
+  std::uint32_t most_tilted = 0;
+  Part part;
+  for (const std::uint32_t s : first) {
+    const double tilt = LargestTilt(s, &part);
+    if (!(tilt > most)) continue;
+    most = tilt;
+    most_tilted = s;
+  }
   Corners corners;
-  const double start = LargerSine2(mesh, list, corners, most_tilted, 0);
-  std::vector<double> parts(ChunkCount(list.size()), start);
-  ParallelChunks(list.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+  const double start = LargerSine2(mesh_, list_, corners, most_tilted, 0);
+  std::vector<double> parts(ChunkCount(list_.size()), start);
+  ParallelChunks(list_.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     Corners own;
     double& sine2 = parts[chunk];
-    for (std::size_t s = begin; s < end; ++s) {
-      // Rounding keeps the order.
-      if (shape.tilts[s] < static_cast<float>(sine2 + kNegligible)) continue;
-      sine2 = LargerSine2(mesh, list, own, static_cast<std::uint32_t>(s), sine2);
-    }
+    for (auto s = static_cast<std::uint32_t>(begin); s < end; ++s)
+      if (may_reach(s, sine2 + kNegligible)) sine2 = LargerSine2(mesh_, list_, own, s, sine2);
   });
   return *std::max_element(parts.begin(), parts.end());
 }
 
-}  // namespace
-
-MeshShape MeasureShape(const MeshView& mesh, const SimplexList& list) {
+MeshShape ShapeSearch::Conclude(const std::vector<Part>& parts) {
   constexpr double kDegrees = 180 / std::numbers::pi;
-  MeshShape shape;
-  if (list.size() == 0) return shape;
-  shape.diameters.resize(list.size());
-  shape.tilts.resize(list.size());
-  std::vector<Extremes> parts(ChunkCount(list.size()));
-  ParallelChunks(list.size(), [&](std::size_t chunk, std::size_t from, std::size_t to) {
-    const auto begin = static_cast<std::uint32_t>(from), end = static_cast<std::uint32_t>(to);
-    parts[chunk] = mesh.k == 2   ? MeasurePart<2>(mesh, list, begin, end, shape)
-                   : mesh.k == 3 ? MeasurePart<3>(mesh, list, begin, end, shape)
-                                 : MeasurePart(mesh, list, begin, end, mesh.k, mesh.d, shape);
-  });
-  Extremes all;
-  for (const Extremes& part : parts) all.Take(part);
-  shape.max_circumradius = all.circumradius;
-  shape.largest = all.largest;
-  shape.max_diameter = all.diameter;
-  shape.max_radius_edge = all.radius_edge;
-  shape.min_fatness = std::min(shape.min_fatness, all.fatness);
-  if (mesh.k == 2) {
+  Part all;
+  for (const Part& part : parts) {
+    if (part.circumradius > all.circumradius ||
+        (part.circumradius == all.circumradius && part.largest < all.largest)) {
+      all.circumradius = part.circumradius;
+      all.largest = part.largest;
+    }
+    if (part.radius_edge > all.radius_edge ||
+        (part.radius_edge == all.radius_edge && part.longest < all.longest)) {
+      all.radius_edge = part.radius_edge;
+      all.longest = part.longest;
+    }
+    all.diameter = std::max(all.diameter, part.diameter);
+    all.fatness = std::min(all.fatness, part.fatness);
+    all.tilt = std::max(all.tilt, part.tilt);
+  }
+  shape_.max_circumradius = all.circumradius;
+  shape_.largest = all.largest;
+  shape_.max_diameter = all.diameter;
+  shape_.max_radius_edge = all.radius_edge;
+  shape_.min_fatness = std::min(shape_.min_fatness, all.fatness);
+  if (mesh_.k == 2) {
     // An angle's sine is half the opposite edge over the circumradius: the smallest angle is where
     // the radius-edge ratio is largest.
     Corners corners;
-    shape.min_angle_degrees =
-        SmallestTriangleAngle(corners.Of(mesh, list[all.longest], mesh.k), mesh.d) * kDegrees;
+    shape_.min_angle_degrees =
+        SmallestTriangleAngle(corners.Of(mesh_, list_[all.longest], mesh_.k), mesh_.d) * kDegrees;
   }
-  const double sine2 = MaxSine2(mesh, list, shape, all.most_tilted);
-  shape.max_tangent_angle_degrees = std::asin(std::min(1.0, std::sqrt(sine2))) * kDegrees;
-  return shape;
+  const double sine2 = MaxSine2(all.tilt);
+  shape_.max_tangent_angle_degrees = std::asin(std::min(1.0, std::sqrt(sine2))) * kDegrees;
+  return std::move(shape_);
 }
 
 }  // namespace stellate::core

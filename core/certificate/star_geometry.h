@@ -1,16 +1,19 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "core/certificate/mesh_view.h"
+#include "core/certificate/shape.h"
 #include "core/certificate/topology.h"
 
 namespace stellate::core {
 
-// What the stars look like from the tangent spaces of their centres.
+// What the stars look like from the tangent spaces of their centres, and the shapes of their
+// simplices.
 struct StarGeometry {
   // Stars whose projection on the tangent space of their centre is not an embedding. Consistency
   // alone does not exclude them when simplices are judged at common centres.
@@ -24,6 +27,7 @@ struct StarGeometry {
   std::uint32_t narrowest_p = 0, narrowest_q = 0;  // where it is attained
 
   std::vector<double> longest_edge;  // by vertex, length
+  MeshShape shape;
 };
 
 // A star embeds when simplices that share a facet through its centre p lie on opposite sides of
@@ -33,5 +37,18 @@ struct StarGeometry {
 // there is none. Time linear in the mesh.
 StarGeometry MeasureStars(const MeshView& mesh, const Adjacency& adjacency,
                           std::span<const std::int8_t> orientation = {});
+
+// A closed manifold whose stars embed.
+struct EmbeddedStars {
+  StarGeometry geometry;
+  Connectivity connectivity;  // without its orientation
+  std::int64_t euler_characteristic = 0;
+};
+
+// That the complex is one, without asking who is whose neighbour: each star says so of the facets
+// and the link of its centre. None if it is not one, or if this cannot be told so: for k > 3, of
+// manifolds with boundary, and of very large stars. MeasureStars then says what is wrong. Time
+// linear in the mesh.
+std::optional<EmbeddedStars> MeasureIfEmbedded(const MeshView& mesh, const Stars& stars);
 
 }  // namespace stellate::core

@@ -120,6 +120,55 @@ std::size_t Orient(const Adjacency& adjacency, Connectivity& result) {
   return parts;
 }
 
+// That two vertices are in one simplex, and whether their stars' orientations differ.
+struct Tie {
+  std::uint32_t a, b;
+  bool flips;
+};
+
+constexpr std::uint32_t kVerticesInPart = 1 << 14;
+
+// Vertices joined in trees, each by a tie to its parent.
+class VertexForest {
+ public:
+  explicit VertexForest(std::uint32_t vertices) : parent_(vertices), flips_(vertices, 0) {
+    std::iota(parent_.begin(), parent_.end(), 0u);
+  }
+
+  // Changes nothing but what the trees of a and b have above these two. False if the two were
+  // joined by a tie that says otherwise.
+  bool Join(std::uint32_t a, std::uint32_t b, bool flips) {
+    const std::uint8_t differ = static_cast<std::uint8_t>(Climb(&a) ^ Climb(&b) ^ (flips ? 1 : 0));
+    if (a == b) return differ == 0;
+    parent_[std::max(a, b)] = std::min(a, b);
+    flips_[std::max(a, b)] = differ;
+    return true;
+  }
+
+  std::uint64_t CountTrees() const {
+    std::uint64_t trees = 0;
+    for (std::uint32_t v = 0; v < parent_.size(); ++v) trees += parent_[v] == v;
+    return trees;
+  }
+
+ private:
+  // Goes to the root; returns 1 if the ties on the way flip in all.
+  std::uint8_t Climb(std::uint32_t* v) {
+    std::uint8_t flips = 0;
+    while (parent_[*v] != *v) {
+      const std::uint32_t parent = parent_[*v];
+      flips_[*v] ^= flips_[parent];  // 0 at a root
+      parent_[*v] = parent_[parent];
+      flips ^= flips_[*v];
+      *v = parent_[*v];
+    }
+    return flips;
+  }
+
+  std::vector<std::uint32_t> parent_;
+  std::vector<std::uint8_t> flips_;
+};
+
 }  // namespace
 
 std::string NameSimplex(const std::uint32_t* ids, int count) {
@@ -148,14 +197,14 @@ std::string CheckSimplexList(const SimplexList& list) {
       return;
     }
   });
-  const auto bad = std::find_if(first.begin(), first.end(),
-                                [&](std::uint32_t s) { return s < list.size(); });
+  const auto bad =
+      std::find_if(first.begin(), first.end(), [&](std::uint32_t s) { return s < list.size(); });
   if (bad == first.end()) return "";
   return Message("simplex ", *bad, " ", NameSimplex(list[*bad], list.k + 1),
                  " does not name ascending vertices below ", list.vertices);
 }
 
-Adjacency::Adjacency(const SimplexList& list) : list_(list) {
+Stars::Stars(const SimplexList& list) : list_(list) {
   begin_.assign(static_cast<std::size_t>(list_.vertices) + 1, 0);
   for (std::size_t i = 0; i < list_.ids->size(); ++i) {
     CheckInterruption(i);
@@ -168,16 +217,18 @@ Adjacency::Adjacency(const SimplexList& list) : list_(list) {
     CheckInterruption(s);
     for (int i = 0; i <= list_.k; ++i) incident_[next[list_[s][i]]++] = s;
   }
-  MatchFacets();
 }
+
+Adjacency::Adjacency(Stars stars) : Stars(std::move(stars)) { MatchFacets(); }
 
 // Each facet is matched at its lowest vertex, among the few that share it: parts of the vertices
 // write to different places.
 void Adjacency::MatchFacets() {
-  across_.assign(list_.ids->size(), kNone);
-  std::vector<FacetCount> parts(ChunkCount(list_.vertices));
-  ParallelChunks(list_.vertices, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
-    parts[chunk] = WithMeshDimension(list_.k, [&](auto k) {
+  const SimplexList& list = this->list();
+  across_.assign(list.ids->size(), kNone);
+  std::vector<FacetCount> parts(ChunkCount(list.vertices));
+  ParallelChunks(list.vertices, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    parts[chunk] = WithMeshDimension(list.k, [&](auto k) {
       return MatchFacetsOf<k()>(static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end));
     });
   });
@@ -186,19 +237,20 @@ void Adjacency::MatchFacets() {
     facets_.all += part.all;
     if (facets_.bad == 0) facets_.first_bad = std::move(part.first_bad);
     facets_.bad += part.bad;
-    AppendFirst(part.some_bad, Violations::kMost * static_cast<std::size_t>(list_.k),
+    AppendFirst(part.some_bad, Violations::kMost * static_cast<std::size_t>(list.k),
                 &facets_.some_bad);
   }
 }
 
 template <int K>
 Adjacency::FacetCount Adjacency::MatchFacetsOf(std::uint32_t begin, std::uint32_t end) {
+  const SimplexList& list = this->list();
   FacetCount count;
   std::vector<FacetSide<K>> sides;
   for (std::uint32_t v = begin; v < end; ++v) {
     sides.clear();
     for (const std::uint32_t s : Star(v)) {
-      const std::uint32_t* ids = list_[s];
+      const std::uint32_t* ids = list[s];
       // v is lowest in the simplex, or once the lowest is left out.
       if (ids[0] != v && ids[1] != v) continue;
       const int first = ids[0] == v ? 1 : 0;
@@ -214,14 +266,14 @@ Adjacency::FacetCount Adjacency::MatchFacetsOf(std::uint32_t begin, std::uint32_
       const FacetSide<K>& b = sides[next - 1];
       // Two copies of one simplex share all facets, yet bound nothing.
       const bool good =
-          next - i == 2 && list_[a.simplex()][a.omitted()] != list_[b.simplex()][b.omitted()];
+          next - i == 2 && list[a.simplex()][a.omitted()] != list[b.simplex()][b.omitted()];
       if (good) {
         across_[static_cast<std::size_t>(a.simplex()) * (K + 1) + a.omitted()] = b.simplex();
         across_[static_cast<std::size_t>(b.simplex()) * (K + 1) + b.omitted()] = a.simplex();
       } else if (count.bad++ < Violations::kMost) {
         std::array<std::uint32_t, K> ids{};
-        std::remove_copy(list_[a.simplex()], list_[a.simplex()] + K + 1, ids.begin(),
-                         list_[a.simplex()][a.omitted()]);
+        std::remove_copy(list[a.simplex()], list[a.simplex()] + K + 1, ids.begin(),
+                         list[a.simplex()][a.omitted()]);
         count.some_bad.insert(count.some_bad.end(), ids.begin(), ids.end());
         if (count.bad == 1)
           count.first_bad = Message("face ", NameSimplex(ids.data(), K), " is in ", next - i,
@@ -245,6 +297,40 @@ Connectivity ComputeConnectivity(const Adjacency& adjacency) {
   }
   // Parts that no facet joins may still meet in smaller faces.
   result.components = parts > 1 ? CountComponents(adjacency) : parts;
+  return result;
+}
+
+Connectivity ComputeConnectivity(const Stars& stars, std::span<const std::uint8_t> sides) {
+  const SimplexList& list = stars.list();
+  VertexForest forest(list.vertices);
+  std::vector<std::vector<Tie>> left((list.vertices + kVerticesInPart - 1) / kVerticesInPart);
+  std::vector<std::uint8_t> oriented(left.size(), 1);
+  // Ties within a part first, all parts at once.
+  ParallelFor(left.size(), [&](std::size_t part) {
+    const auto begin = static_cast<std::uint32_t>(part * kVerticesInPart);
+    const std::uint32_t end = begin + std::min(list.vertices - begin, kVerticesInPart);
+    for (std::uint32_t v = begin; v < end; ++v) {
+      for (const std::uint32_t s : stars.Star(v)) {
+        const std::uint32_t* ids = list[s];
+        if (ids[0] != v) continue;
+        for (int i = 1; i <= list.k; ++i) {
+          const bool flips = ((sides[s] ^ sides[s] >> i) & 1) != 0;
+          if (ids[i] >= end)
+            left[part].push_back({v, ids[i], flips});
+          else if (!forest.Join(v, ids[i], flips))
+            oriented[part] = 0;
+        }
+      }
+    }
+  });
+  Connectivity result;
+  result.orientable = std::find(oriented.begin(), oriented.end(), 0) == oriented.end();
+  for (const std::vector<Tie>& ties : left) {
+    ThrowIfInterrupted();
+    for (const Tie& tie : ties)
+      if (!forest.Join(tie.a, tie.b, tie.flips)) result.orientable = false;
+  }
+  result.components = forest.CountTrees();
   return result;
 }
 

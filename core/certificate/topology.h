@@ -44,15 +44,13 @@ auto WithMeshDimension(int k, const Call& call) {
   }
 }
 
-// Which simplices meet at a vertex and which share a facet.
-//
-// Linear in the mesh in time and memory, for bounded stars: 4 (2k + 3) bytes a simplex.
-class Adjacency {
+// Which simplices meet at a vertex. 4 (k + 1) bytes a simplex and 8 a vertex.
+class Stars {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
   // REQUIRES: CheckSimplexList(list) is empty.
-  explicit Adjacency(const SimplexList& list);
+  explicit Stars(const SimplexList& list);
 
   const SimplexList& list() const { return list_; }
 
@@ -61,12 +59,27 @@ class Adjacency {
     return {incident_.data() + begin_[v], incident_.data() + begin_[v + 1]};
   }
 
+ private:
+  SimplexList list_;
+  std::vector<std::uint64_t> begin_;
+  std::vector<std::uint32_t> incident_;
+};
+
+// And which share a facet.
+//
+// Linear in the mesh in time and memory, for bounded stars: 8 (k + 1) bytes a simplex.
+class Adjacency : public Stars {
+ public:
+  // REQUIRES: as for Stars.
+  explicit Adjacency(const SimplexList& list) : Adjacency(Stars(list)) {}
+  explicit Adjacency(Stars stars);
+
   // The simplex across the facet opposite vertex number i of simplex s; kNone unless that facet
   // is in exactly two simplices, on different vertex sets.
   std::uint32_t Across(std::uint32_t s, int i) const { return Across(s)[i]; }
   // All k + 1 of them. No simplex is across two facets: the two would have all vertices in common.
   const std::uint32_t* Across(std::uint32_t s) const {
-    return across_.data() + static_cast<std::size_t>(s) * (list_.k + 1);
+    return across_.data() + static_cast<std::size_t>(s) * (list().k + 1);
   }
   // The number of t's vertex that is not in s. REQUIRES: t is across a facet of s.
   int Apex(std::uint32_t s, std::uint32_t t) const {
@@ -92,9 +105,6 @@ class Adjacency {
   template <int K>
   FacetCount MatchFacetsOf(std::uint32_t begin, std::uint32_t end);
 
-  SimplexList list_;
-  std::vector<std::uint64_t> begin_;
-  std::vector<std::uint32_t> incident_;
   std::vector<std::uint32_t> across_;
   FacetCount facets_;
 };
@@ -110,6 +120,12 @@ struct Connectivity {
 };
 
 Connectivity ComputeConnectivity(const Adjacency& adjacency);
+
+// The same, but without an orientation, of a complex whose vertices' links are spheres, told from
+// how each simplex is oriented at its vertices. `sides`: by simplex, bit i for vertex number i: as
+// the simplices at one vertex are oriented alike, whether the order of the simplex' ids says so or
+// the opposite.
+Connectivity ComputeConnectivity(const Stars& stars, std::span<const std::uint8_t> sides);
 
 // "(3 17 20)": vertex ids as messages name a simplex.
 std::string NameSimplex(const std::uint32_t* ids, int count);

@@ -13,7 +13,8 @@ namespace {
 Proof Prove(const HandmadeMesh& mesh, double reach, double tangent_error = 0) {
   const Adjacency adjacency(mesh.List());
   const MeshView view = mesh.View();
-  return ProveFromReach(view, adjacency, MeasureShape(view, mesh.List()), {reach, tangent_error});
+  const MeshShape shape = MeasureStars(view, adjacency).shape;
+  return ProveFromReach(view, adjacency, shape, {reach, tangent_error});
 }
 
 bool Says(const std::string& text, const std::string& words) {

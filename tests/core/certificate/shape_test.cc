@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "core/certificate/star_geometry.h"
 #include "core/geometry/simplex.h"
 #include "tests/core/certificate/handmade_meshes.h"
 
@@ -31,6 +32,10 @@ HandmadeMesh Lifted(const HandmadeMesh& mesh, int d) {
   return lifted;
 }
 
+MeshShape ShapeOf(const HandmadeMesh& mesh) {
+  return MeasureStars(mesh.View(), Adjacency(mesh.List())).shape;
+}
+
 TEST(MeasureShape, FindsTheExtremesOfAllSimplices) {
   const std::vector<HandmadeMesh> meshes{Shaken(TorusGrid(1, 30, CliffordPoint), 0.05),
                                          Shaken(Icosphere(3), 0.03),
@@ -43,7 +48,7 @@ TEST(MeasureShape, FindsTheExtremesOfAllSimplices) {
                                          Lifted(Shaken(TorusGrid(3, 5, CliffordPoint), 0.1), 14)};
   for (const HandmadeMesh& mesh : meshes) {
     const int k = mesh.k, d = mesh.d;
-    const MeshShape shape = MeasureShape(mesh.View(), mesh.List());
+    const MeshShape shape = ShapeOf(mesh);
     MeshShape direct;
     double angle = k == 2 ? std::numbers::pi : 0, tangent_angle = 0;
     for (std::uint32_t s = 0; s < mesh.size(); ++s) {
@@ -81,7 +86,7 @@ TEST(MeasureShape, ADegenerateSimplexIsAtARightAngle) {
   HandmadeMesh mesh = Icosphere(1);
   std::copy_n(&mesh.points[0], 3, &mesh.points[3 * mesh.simplices[1]]);
   std::copy_n(&mesh.points[0], 3, &mesh.points[3 * mesh.simplices[2]]);
-  const MeshShape shape = MeasureShape(mesh.View(), mesh.List());
+  const MeshShape shape = ShapeOf(mesh);
   EXPECT_EQ(shape.min_fatness, 0);
   EXPECT_EQ(shape.min_angle_degrees, 0);
   EXPECT_TRUE(std::isinf(shape.max_radius_edge));

@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <optional>
+
 #include "core/base/random.h"
+#include "core/certificate/links.h"
 #include "tests/core/certificate/handmade_meshes.h"
 
 namespace stellate::core {
@@ -55,6 +59,67 @@ TEST(MeasureStars, AnOrientationMakesNoDifference) {
       EXPECT_TRUE(by > 0 || most == 0);
     }
     EXPECT_TRUE(most > 0 || mesh.k == 1);
+  }
+}
+
+// What MeasureIfEmbedded says is what is found by neighbours.
+void ExpectTheSame(const HandmadeMesh& mesh) {
+  const Adjacency adjacency(mesh.List());
+  const Connectivity connectivity = ComputeConnectivity(adjacency);
+  const LinkReport links = CheckLinks(adjacency);
+  const StarGeometry stars = MeasureStars(mesh.View(), adjacency, connectivity.orientation);
+  const std::optional<EmbeddedStars> embedded = MeasureIfEmbedded(mesh.View(), Stars(mesh.List()));
+  const bool good = adjacency.bad_facets() == 0 && links.bad_links == 0 &&
+                    connectivity.isolated_vertices == 0 && stars.unembedded_stars == 0;
+  ASSERT_EQ(embedded.has_value(), good);
+  if (!good) return;
+  EXPECT_EQ(embedded->connectivity.components, connectivity.components);
+  EXPECT_EQ(embedded->connectivity.orientable, connectivity.orientable);
+  EXPECT_EQ(embedded->euler_characteristic, links.euler_characteristic);
+  EXPECT_EQ(embedded->geometry.reach, stars.reach);
+  EXPECT_EQ(embedded->geometry.longest_edge, stars.longest_edge);
+  EXPECT_EQ(embedded->geometry.shape.max_circumradius, stars.shape.max_circumradius);
+  EXPECT_EQ(embedded->geometry.shape.largest, stars.shape.largest);
+  EXPECT_EQ(embedded->geometry.shape.min_fatness, stars.shape.min_fatness);
+  EXPECT_EQ(embedded->geometry.shape.max_tangent_angle_degrees,
+            stars.shape.max_tangent_angle_degrees);
+}
+
+// Two meshes side by side, and the second's vertices put in place of some of the first's.
+HandmadeMesh Joined(const HandmadeMesh& a, const HandmadeMesh& b, std::uint32_t shared) {
+  HandmadeMesh both = a;
+  for (std::uint32_t v = shared; v < b.vertices(); ++v)
+    both.AddVertex(b.Point(v), Eigen::Map<const Eigen::MatrixXd>(b.View().Tangent(v), b.d, b.k));
+  for (std::uint32_t id : b.simplices) {
+    id = id < shared ? id : id - shared + a.vertices();
+    both.simplices.push_back(id);
+  }
+  return both;
+}
+
+TEST(MeasureIfEmbedded, SaysWhatNeighboursSay) {
+  for (const HandmadeMesh& mesh :
+       {SimplexBoundary(1), TorusGrid(1, 9, CliffordPoint), SimplexBoundary(2), Icosphere(2),
+        TorusGrid(2, 9, CliffordPoint), SimplexBoundary(3), TorusGrid(3, 8, CliffordPoint)}) {
+    ASSERT_TRUE(MeasureIfEmbedded(mesh.View(), Stars(mesh.List())).has_value()) << mesh.k;
+    ExpectTheSame(mesh);
+    ExpectTheSame(Joined(mesh, mesh, 0));
+    ExpectTheSame(Joined(mesh, mesh, 1));
+    ExpectTheSame(Joined(mesh, mesh, 2));
+    HandmadeMesh shaken = mesh;
+    Random random(3);
+    for (double& x : shaken.points) x += 0.3 * random.Normal();
+    ExpectTheSame(shaken);
+    HandmadeMesh open = mesh, doubled = mesh, crossed = mesh;
+    const auto corners = static_cast<std::ptrdiff_t>(mesh.k) + 1;
+    open.simplices.erase(open.simplices.end() - corners, open.simplices.end());
+    ExpectTheSame(open);
+    doubled.simplices.insert(doubled.simplices.end(), mesh.simplices.begin(),
+                             mesh.simplices.begin() + corners);
+    ExpectTheSame(doubled);
+    std::swap_ranges(&crossed.points[0], &crossed.points[static_cast<std::size_t>(mesh.d)],
+                     &crossed.points[static_cast<std::size_t>(mesh.d)]);
+    ExpectTheSame(crossed);
   }
 }
 
