@@ -138,6 +138,8 @@ class VertexForest {
   // Changes nothing but what the trees of a and b have above these two. False if the two were
   // joined by a tie that says otherwise.
   bool Join(std::uint32_t a, std::uint32_t b, bool flips) {
+    if (parent_[a] == parent_[b])  // as mostly
+      return (flips_[a] ^ flips_[b]) == (flips ? 1 : 0);
     const std::uint8_t differ = static_cast<std::uint8_t>(Climb(&a) ^ Climb(&b) ^ (flips ? 1 : 0));
     if (a == b) return differ == 0;
     parent_[std::max(a, b)] = std::min(a, b);
