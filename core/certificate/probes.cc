@@ -17,9 +17,9 @@ namespace {
 // Streams of random numbers that no other part of the core uses.
 enum Stream : std::uint64_t { kSimplexStream = 0x6365727430, kVertexStream, kProbeStream };
 
-constexpr double kBoxMargin = 0.1;  // of the diagonal, around the mesh's own box
+constexpr double kBoxMargin = 0.1;      // of the diagonal, around the mesh's own box
 constexpr std::uint32_t kKeptFold = 4;  // of how many are sought
-constexpr std::uint64_t kVerticesInPart = 1 << 14;
+constexpr std::uint64_t kBoxedTogether = 1 << 14;
 
 void SortUnique(std::vector<std::uint32_t>& ids) {
   std::sort(ids.begin(), ids.end());
@@ -95,12 +95,11 @@ MeshBox BoxOfPart(const MeshView& mesh, std::uint32_t begin, std::uint32_t end) 
 }  // namespace
 
 MeshBox BoxOf(const MeshView& mesh) {
-  std::vector<MeshBox> parts((mesh.vertices + kVerticesInPart - 1) / kVerticesInPart);
+  std::vector<MeshBox> parts((mesh.vertices + kBoxedTogether - 1) / kBoxedTogether);
   ParallelFor(parts.size(), [&](std::size_t part) {
-    const auto begin = static_cast<std::uint32_t>(part * kVerticesInPart);
+    const auto begin = static_cast<std::uint32_t>(part * kBoxedTogether);
     parts[part] = BoxOfPart(
-        mesh, begin,
-        static_cast<std::uint32_t>(std::min(mesh.vertices, begin + kVerticesInPart)));
+        mesh, begin, static_cast<std::uint32_t>(std::min(mesh.vertices, begin + kBoxedTogether)));
   });
   MeshBox box = parts.front();
   for (const MeshBox& part : parts) {

@@ -20,8 +20,8 @@ constexpr double kThin = 0.25;
 // Whether a point at this distance, so far off a tangent space, both squared, may bound the reach
 // by less than `reach`, or rounding hides whether it does.
 bool MayBound(double length2, double away2, double reach) {
-  constexpr double kRounding = 1e-12, kMargin = 1 - 1e-6;
-  return !(4 * reach * reach * (away2 + kRounding * length2) < kMargin * length2 * length2);
+  constexpr double kLost = 1e-12, kMargin = 1 - 1e-6;
+  return !(4 * reach * reach * (away2 + kLost * length2) < kMargin * length2 * length2);
 }
 
 }  // namespace

@@ -126,7 +126,7 @@ struct Tie {
   bool flips;
 };
 
-constexpr std::uint32_t kVerticesInPart = 1 << 14;
+constexpr std::uint32_t kJoinedTogether = 1 << 14;
 
 // Vertices joined in trees, each by a tie to its parent.
 class VertexForest {
@@ -305,12 +305,12 @@ Connectivity ComputeConnectivity(const Adjacency& adjacency) {
 Connectivity ComputeConnectivity(const Stars& stars, std::span<const std::uint8_t> sides) {
   const SimplexList& list = stars.list();
   VertexForest forest(list.vertices);
-  std::vector<std::vector<Tie>> left((list.vertices + kVerticesInPart - 1) / kVerticesInPart);
+  std::vector<std::vector<Tie>> left((list.vertices + kJoinedTogether - 1) / kJoinedTogether);
   std::vector<std::uint8_t> oriented(left.size(), 1);
   // Ties within a part first, all parts at once.
   ParallelFor(left.size(), [&](std::size_t part) {
-    const auto begin = static_cast<std::uint32_t>(part * kVerticesInPart);
-    const std::uint32_t end = begin + std::min(list.vertices - begin, kVerticesInPart);
+    const auto begin = static_cast<std::uint32_t>(part * kJoinedTogether);
+    const std::uint32_t end = begin + std::min(list.vertices - begin, kJoinedTogether);
     for (std::uint32_t v = begin; v < end; ++v) {
       for (const std::uint32_t s : stars.Star(v)) {
         const std::uint32_t* ids = list[s];
