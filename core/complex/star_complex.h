@@ -306,8 +306,11 @@ class StarComplex {
   void BuildAllLaidPolygons(double* influence);
   void BuildLaidPolygons(std::span<const BallTree::Bunch> bunches, double* influence);
   template <typename Search>
-  bool BuildInFlats(const Site& p, const Near& near, double gathered, const Search& search,
-                    Cell& cell, typename Cell::Scratch& scratch) const;
+  void CutInFlats(const Site& p, Near* near, double* known, const Search& search, Cell& cell,
+                  typename Cell::Scratch& scratch) const;
+  template <typename Search>
+  bool BuildInFlats(const Site& p, Near* near, double* known, const Search& search, Cell& cell,
+                    typename Cell::Scratch& scratch) const;
   static std::vector<Turn> InTurns(const std::vector<Cut>& cuts);
   void CutStars(const std::vector<Turn>& turns, const std::vector<Cut>& cuts, std::uint32_t first,
                 Change* change);

@@ -7,7 +7,9 @@
 #include "core/base/instantiate.h"
 #include "core/base/parallel.h"
 #include "core/base/room.h"
+#include "core/complex/around.h"
 #include "core/complex/star_complex.h"
+#include "core/geometry/laid_polytope.h"
 
 namespace stellate::core {
 namespace {
@@ -85,21 +87,40 @@ void StarComplex<K>::Lay(const double* point, const double* tangent, std::uint32
   tangents_.insert(tangents_.end(), tangent, tangent + d_ * K);
 }
 
-// Most stars are the same in the flats, where clips cost a fraction: only those are judged all
-// along of which that is not so. `near` is what lies within `gathered`, nearest first.
+// The cell in the flats, made apart where K = 3. `near` holds all that lies within `known`, as
+// CutByNear has it.
 template <int K>
 template <typename Search>
-bool StarComplex<K>::BuildInFlats(const Site& p, const Near& near, double gathered,
-                                  const Search& search, Cell& cell,
-                                  typename Cell::Scratch& scratch) const {
-  thread_local Near all;
-  all = near;
+void StarComplex<K>::CutInFlats(const Site& p, Near* near, double* known, const Search& search,
+                                Cell& cell, typename Cell::Scratch& scratch) const {
+  if constexpr (K == 3) {
+    thread_local LaidPolytope polytope;
+    Step step(d_);
+    polytope.Reset(inradius_);
+    *known = CutByNear(
+        near, *known, [&] { return Influence(p.id, polytope.max_norm2()); },
+        [&](std::uint32_t q) {
+          double normal[K];
+          const double offset = HalfSpace(p, At(q), step.data(), normal);
+          return polytope.Clip(q, normal, offset);
+        },
+        search);
+    if (!polytope.gave_up()) return cell.Take(polytope);
+  }
   ResetInFlats(cell, p);
-  const double known = CutByNear(
-      &all, gathered, [&] { return Influence(p.id, cell); },
-      [&](std::uint32_t q) { return ClipInFlats(cell, p, At(q), scratch); },
-      [&](double from, double to) { search(from, to, &all); });
-  return JudgeCell(cell, p, all) && Influence(p.id, cell) <= known;
+  *known = CutByNear(
+      near, *known, [&] { return Influence(p.id, cell); },
+      [&](std::uint32_t q) { return ClipInFlats(cell, p, At(q), scratch); }, search);
+}
+
+// Most stars are the same in the flats, where clips cost a fraction: only those are judged all
+// along of which that is not so. `near` holds all that lies within `known`, as CutByNear has it.
+template <int K>
+template <typename Search>
+bool StarComplex<K>::BuildInFlats(const Site& p, Near* near, double* known, const Search& search,
+                                  Cell& cell, typename Cell::Scratch& scratch) const {
+  CutInFlats(p, near, known, search, cell, scratch);
+  return JudgeCell(cell, p, *near) && Influence(p.id, cell) <= *known;
 }
 
 // `around` holds at least what lies within kSearched size bounds of p.
@@ -112,18 +133,19 @@ void StarComplex<K>::BuildLaidStar(std::uint32_t p, const std::vector<std::uint3
   const double gathered = kGathered * LaidBound(p), searched = kSearched * LaidBound(p);
   Part(around, points_, d_, p, gathered, searched, &near, &beyond);
   std::sort(near.begin(), near.end());
-  const auto search = [&](double from, double to, Near* found) {
-    AppendBetween(tree_, site.point, beyond, searched, from, to, found);
+  double known = gathered;
+  const auto search = [&](double from, double to) {
+    AppendBetween(tree_, site.point, beyond, searched, from, to, &near);
   };
   const bool is_inside = site.walls == 0;
   if (is_inside && K > 2 && judging_ == Judging::kCommonCentre &&
-      BuildInFlats(site, near, gathered, search, cell, scratch))
+      BuildInFlats(site, &near, &known, search, cell, scratch))
     return;
   ResetCell(cell, site, nullptr, scratch);
   CutByNear(
-      &near, gathered, [&] { return Influence(p, cell); },
+      &near, known, [&] { return Influence(p, cell); },
       [&](std::uint32_t q) { return ClipBy(cell, site, At(q), nullptr, nullptr, scratch); },
-      [&](double from, double to) { search(from, to, &near); });
+      search);
   CloseInFlats(site, cell, scratch);
 }
 

@@ -14,6 +14,8 @@
 
 namespace stellate::core {
 
+class LaidPolytope;
+
 // The Voronoi cell of a sample point p restricted to T_pM (Lemma 2.4.2), in tangent coordinates
 // with p at the origin:
 //
@@ -49,6 +51,10 @@ class RestrictedVoronoiCell {
 
   // A regular simplex of K+1 fake facets at distance `inradius` from p.
   void Reset(double inradius, const Surroundings<K>& around);
+
+  // Becomes a polytope that was made apart, in the flats; nothing is judged. REQUIRES: K = 3, and it
+  // did not give up.
+  void Take(const LaidPolytope& polytope);
 
   // Cuts away { x : normal . x > offset }. Returns whether anything was cut. A half-space that
   // would cut everything away (it cannot, for offset > 0, but in rounding) is refused. Where
