@@ -66,8 +66,10 @@ class StarComplex<K>::Around final : public Surroundings<K> {
     // Of a k-simplex in R^k, the place where its facets meet is the circumcentre.
     if (complex_.d_ == K && std::none_of(ids, ids + K, IsWall)) return false;
     if (!(born_ && Known(key, centre)) && !Common(ids, key, centre)) return false;
-    const int n = complex_.d_;
-    for (int a = 0; a < K; ++a) x[a] = Dot(p_.tangent + a * n, centre, n);
+    WithDimension(complex_.d_, [&](auto known) {
+      const int n = known() > 0 ? known() : complex_.d_;
+      for (int a = 0; a < K; ++a) x[a] = Dot(p_.tangent + a * n, centre, n);
+    });
     return true;
   }
 
@@ -80,7 +82,15 @@ class StarComplex<K>::Around final : public Surroundings<K> {
 
  private:
   Site Find(std::uint32_t id) const {
-    return id == p_.id ? p_ : guest_ && id == guest_->id ? *guest_ : complex_.At(id);
+    return id == p_.id ? p_ : IsGuest(id) ? *guest_ : complex_.At(id);
+  }
+
+  bool IsGuest(std::uint32_t id) const { return guest_ && id == guest_->id; }
+  const double* PointOf(std::uint32_t id) const {
+    return id == p_.id ? p_.point : IsGuest(id) ? guest_->point : complex_.Point(id);
+  }
+  const double* TangentOf(std::uint32_t id) const {
+    return id == p_.id ? p_.tangent : IsGuest(id) ? guest_->tangent : complex_.Tangent(id);
   }
 
   // The centre from the newcomer's star, which all simplices of the vertices that it creates are in
@@ -120,7 +130,7 @@ class StarComplex<K>::Around final : public Surroundings<K> {
     if (!(lasts ? cache.Centre(complex_.centre_owner_, ids, key + Mix64(p_.id), n, centre, find)
                 : find(centre)))
       return false;
-    const double* const origin = Find(ids[0]).point;
+    const double* const origin = PointOf(ids[0]);
     for (int i = 0; i < n; ++i) centre[i] += origin[i] - p_.point[i];
     return true;
   }
@@ -131,10 +141,9 @@ class StarComplex<K>::Around final : public Surroundings<K> {
     const double* tangents[K + 1];
     double weights[K + 1];
     for (std::size_t i = 0; i <= K; ++i) {
-      const Site site = Find(ids[i]);
-      points[i] = site.point;
-      tangents[i] = site.tangent;
-      weights[i] = complex_.Weight(site.id);
+      points[i] = PointOf(ids[i]);
+      tangents[i] = TangentOf(ids[i]);
+      weights[i] = complex_.Weight(ids[i]);
     }
     return CommonCentre<K>(complex_.d_, points, tangents, weights, complex_.judged_radius2_,
                            centre);

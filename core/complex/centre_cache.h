@@ -43,8 +43,8 @@ class CentreCache {
   }
 
  private:
-  // Those of some hundred stars for K = 3: they fit in the processor's own memory.
-  static constexpr std::size_t kEntries = 2048;
+  // Those of some thousand stars for K = 3: they fit in the processor's own memory.
+  static constexpr std::size_t kEntries = 8192;
 
   struct Entry {
     std::uint64_t owner = 0;  // nobody

@@ -8,6 +8,55 @@
 #include "core/complex/around.h"
 
 namespace stellate::core {
+namespace {
+
+// Far above what rounding leaves of tangent bases and inner products, far below any distance that
+// matters: the share of a length by which a bound on its part off the tangent space is larger.
+constexpr double kRounding = 1e-10;
+double LengthOff(double whole2, double along2) {
+  return std::sqrt(std::max(whole2 - along2, 0.0) + kRounding * whole2);
+}
+
+// The vertices of a judged cell, by coordinate: their places in T_pM, and how far their centres are
+// off it. A half-space of R^d is held against them all at once in T_pM, where that is enough.
+template <int K>
+class JudgedPlaces {
+ public:
+  void Take(const RestrictedVoronoiCell<K>& cell) {
+    count_ = cell.vertex_count();
+    places_.resize(K * count_);
+    off_.resize(count_);
+    bounds_.resize(count_);
+    for (std::size_t v = 0; v < count_; ++v) {
+      for (std::size_t a = 0; a < K; ++a) places_[a * count_ + v] = cell.x(v)[a];
+      off_[v] = LengthOff(cell.norm2(v), Dot(cell.x(v), cell.x(v), K));
+    }
+  }
+
+  // What step . c can be at most, by vertex: `normal` is the part of `step` along T_pM, `off` the
+  // length of the rest. Returns whether one is above `offset`.
+  bool Bound(const double* normal, double off, double offset) {
+    const double* const places = places_.data();
+    const double* const off_flat = off_.data();
+    double* const bounds = bounds_.data();
+    const std::size_t count = count_;
+    std::size_t above = 0;
+    for (std::size_t v = 0; v < count; ++v) {
+      double bound = off * off_flat[v];
+      for (std::size_t a = 0; a < K; ++a) bound += normal[a] * places[a * count + v];
+      bounds[v] = bound;
+      above += bound > offset;
+    }
+    return above > 0;
+  }
+  double bound(std::size_t v) const { return bounds_[v]; }
+
+ private:
+  std::size_t count_ = 0;
+  std::vector<double> places_, off_, bounds_;
+};
+
+}  // namespace
 
 template <int K>
 StarComplex<K>::StarComplex(int d, double epsilon, double inradius, Judging judging)
@@ -127,13 +176,27 @@ bool StarComplex<K>::JudgeCell(Cell& cell, const Site& p, const Near& near) cons
     return false;
   } else {
     cell.Judge(Around(*this, p, judging_));
-    const double reach = Influence(p.id, cell);
+    if (near.empty()) return true;
+    thread_local JudgedPlaces<K> places;
+    places.Take(cell);
+    const double reach = Influence(p.id, cell), weight = Weight(p.id);
+    // Of what is on q's own facet rounding decides.
+    const auto is_off = [&](std::size_t v, std::uint32_t q) {
+      for (int s = 0; s < K; ++s)
+        if (cell.id(cell.facet(v, s)) == q) return false;
+      return true;
+    };
     Step step(d_);
     double normal[K];
     for (const auto& [distance2, q] : near) {
       if (distance2 > reach * reach) break;
-      const double offset = HalfSpace(p, At(q), step.data(), normal);
-      if (cell.WouldCutOthers(q, normal, offset, step.data())) return false;
+      const double length2 = Project(p, Point(q), step.data(), normal);
+      const double offset = 0.5 * (length2 + weight - Weight(q));
+      if (!places.Bound(normal, LengthOff(length2, Dot(normal, normal, K)), offset)) continue;
+      for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+        if (places.bound(v) > offset && is_off(v, q) &&
+            cell.WouldCutVertex(v, normal, offset, step.data()))
+          return false;
     }
     return true;
   }

@@ -103,23 +103,6 @@ std::size_t RestrictedVoronoiCell<K>::Excesses(const double* normal, double offs
 }
 
 template <int K>
-bool RestrictedVoronoiCell<K>::WouldCutOthers(std::uint32_t id, const double* normal, double offset,
-                                              const double* step) const {
-  if (d_ == 0) {
-    for (std::size_t v = 0; v < vertices_.size(); ++v)
-      if (Excess(v, normal, offset, step) > 0 && !IsOn(v, id)) return true;
-    return false;
-  }
-  return WithDimension(static_cast<int>(d_), [&](auto known) {
-    const int d = known() > 0 ? known() : static_cast<int>(d_);
-    const double* centre = centres_.data();
-    for (std::size_t v = 0; v < vertices_.size(); ++v, centre += d)
-      if (Dot(step, centre, d) > offset && !IsOn(v, id)) return true;
-    return false;
-  });
-}
-
-template <int K>
 bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, double offset,
                                     Scratch& scratch, const Surroundings<K>& around,
                                     const double* step) {

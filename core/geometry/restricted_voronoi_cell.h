@@ -52,8 +52,8 @@ class RestrictedVoronoiCell {
   // A regular simplex of K+1 fake facets at distance `inradius` from p.
   void Reset(double inradius, const Surroundings<K>& around);
 
-  // Becomes a polytope that was made apart, in the flats; nothing is judged. REQUIRES: K = 3, and it
-  // did not give up.
+  // Becomes a polytope that was made apart, in the flats; nothing is judged. REQUIRES: K = 3, and
+  // it did not give up.
   void Take(const LaidPolytope& polytope);
 
   // Cuts away { x : normal . x > offset }. Returns whether anything was cut. A half-space that
@@ -69,14 +69,19 @@ class RestrictedVoronoiCell {
 
   // Whether Clip with these arguments would cut: some vertex violates the half-space.
   bool WouldCut(const double* normal, double offset, const double* step = nullptr) const {
-    for (std::size_t v = 0; v < vertices_.size(); ++v)
-      if (Excess(v, normal, offset, step) > 0) return true;
-    return false;
+    if (d_ == 0) {
+      for (const Vertex& v : vertices_)
+        if (Dot(normal, v.x, K) - offset > 0) return true;
+      return false;
+    }
+    return WithDimension(static_cast<int>(d_), [&](auto known) {
+      const int d = known() > 0 ? known() : static_cast<int>(d_);
+      const double* centre = centres_.data();
+      for (std::size_t v = 0; v < vertices_.size(); ++v, centre += d)
+        if (Dot(step, centre, d) - offset > 0) return true;
+      return false;
+    });
   }
-
-  // The same, of vertices that are not on the facet of that id: of what is on it rounding decides.
-  bool WouldCutOthers(std::uint32_t id, const double* normal, double offset,
-                      const double* step = nullptr) const;
 
   // Whether Clip with these arguments would cut vertex v off.
   bool WouldCutVertex(std::size_t v, const double* normal, double offset,
@@ -138,11 +143,6 @@ class RestrictedVoronoiCell {
   double Excess(std::size_t v, const double* normal, double offset, const double* step) const {
     return (d_ > 0 ? Dot(step, Centre(v), static_cast<int>(d_)) : Dot(normal, vertices_[v].x, K)) -
            offset;
-  }
-  bool IsOn(std::size_t v, std::uint32_t id) const {
-    for (const Index f : vertices_[v].facet)
-      if (facets_[f].id == id) return true;
-    return false;
   }
   // Writes the excess of each vertex, returns the place of the largest.
   std::size_t Excesses(const double* normal, double offset, const double* step,
