@@ -298,7 +298,10 @@ class StarComplex {
   // Where a sample was laid: every star is built once, from what lies around it.
   Change BuildLaidStars();
   void BuildAllLaidStars(double* influence);  // by id
-  void BuildLaidStar(std::uint32_t p, const std::vector<std::uint32_t>& around, Cell& cell) const;
+  // `ids`: at least what lies as far around as a laid star is looked for at once.
+  void BuildLaidStar(std::uint32_t p, const std::vector<std::uint32_t>& ids, Cell& cell) const;
+  template <typename Laid>
+  void BuildLaidStarFrom(std::uint32_t p, Laid& around, Cell& cell) const;
   double LaidBound(std::uint32_t p) const {
     return laid_bounds_.empty() ? epsilon() : laid_bounds_[p];
   }

@@ -42,22 +42,57 @@ double CutByNear(Near* near, double known, const Reach& reach, const Clip& clip,
   }
 }
 
-// Parts what lies within `searched` of p, without p itself, by whether it is within `gathered`.
-void Part(const std::vector<std::uint32_t>& ids, const std::vector<double>& points, int any_d,
-          std::uint32_t p, double gathered, double searched, Near* near, Near* beyond) {
-  near->clear();
-  beyond->clear();
-  WithDimension(any_d, [&](auto known) {
-    const int d = known() > 0 ? known() : any_d;
-    const auto stride = static_cast<std::size_t>(d);
-    const double* const point = points.data() + p * stride;
-    for (const std::uint32_t q : ids) {
-      const double distance2 = SquaredDistance(point, points.data() + q * stride, d);
-      if (distance2 > searched * searched || q == p) continue;
-      (distance2 <= gathered * gathered ? near : beyond)->emplace_back(distance2, q);
+// What lies around a bunch of points, by coordinate: distances to it all are taken side by side.
+class LaidAround {
+ public:
+  void Take(const std::vector<std::uint32_t>& ids, const std::vector<double>& points, int d) {
+    ids_ = &ids;
+    points_ = &points;
+    const std::size_t count = ids.size(), stride = static_cast<std::size_t>(d);
+    coordinates_.resize(stride * count);
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t j = 0; j < stride; ++j)
+        coordinates_[j * count + i] = points[ids[i] * stride + j];
+    distances2_.resize(count);
+  }
+
+  // Parts what lies within `searched` of p, without p itself, by whether it is within `gathered`.
+  void Part(std::uint32_t p, int d, double gathered, double searched, Near* near, Near* beyond) {
+    near->clear();
+    beyond->clear();
+    WithDimension(d, [&](auto known) { MeasureFrom<known()>(p, d); });
+    const std::vector<std::uint32_t>& ids = *ids_;
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      const double distance2 = distances2_[i];
+      if (distance2 > searched * searched || ids[i] == p) continue;
+      (distance2 <= gathered * gathered ? near : beyond)->emplace_back(distance2, ids[i]);
     }
-  });
-}
+  }
+
+ private:
+  template <int D>
+  void MeasureFrom(std::uint32_t p, int any_d) {
+    const std::size_t count = ids_->size(), stride = static_cast<std::size_t>(any_d);
+    const double* const point = points_->data() + p * stride;
+    double* const distances2 = distances2_.data();
+    if constexpr (D > 0) {
+      const double* const coordinates = coordinates_.data();
+      const double origin[D] = {};
+      for (std::size_t i = 0; i < count; ++i) {
+        double away[D];  // its sum of squares is taken in SquaredDistance's order
+        for (std::size_t j = 0; j < D; ++j) away[j] = coordinates[j * count + i] - point[j];
+        distances2[i] = SquaredDistance(away, origin, D);
+      }
+    } else {
+      for (std::size_t i = 0; i < count; ++i)
+        distances2[i] = SquaredDistance(point, points_->data() + (*ids_)[i] * stride, any_d);
+    }
+  }
+
+  const std::vector<std::uint32_t>* ids_ = nullptr;
+  const std::vector<double>* points_ = nullptr;
+  std::vector<double> coordinates_, distances2_;
+};
 
 // What lies from `from` to `to` around a point: of all within `searched` of it `beyond` holds what
 // is beyond `from`.
@@ -125,13 +160,13 @@ bool StarComplex<K>::BuildInFlats(const Site& p, Near* near, double* known, cons
 
 // `around` holds at least what lies within kSearched size bounds of p.
 template <int K>
-void StarComplex<K>::BuildLaidStar(std::uint32_t p, const std::vector<std::uint32_t>& around,
-                                   Cell& cell) const {
+template <typename Laid>
+void StarComplex<K>::BuildLaidStarFrom(std::uint32_t p, Laid& around, Cell& cell) const {
   thread_local typename Cell::Scratch scratch;
   thread_local Near near, beyond;
   const Site site = At(p);
   const double gathered = kGathered * LaidBound(p), searched = kSearched * LaidBound(p);
-  Part(around, points_, d_, p, gathered, searched, &near, &beyond);
+  around.Part(p, d_, gathered, searched, &near, &beyond);
   std::sort(near.begin(), near.end());
   double known = gathered;
   const auto search = [&](double from, double to) {
@@ -150,21 +185,31 @@ void StarComplex<K>::BuildLaidStar(std::uint32_t p, const std::vector<std::uint3
 }
 
 template <int K>
+void StarComplex<K>::BuildLaidStar(std::uint32_t p, const std::vector<std::uint32_t>& ids,
+                                   Cell& cell) const {
+  thread_local LaidAround around;
+  around.Take(ids, points_, d_);
+  BuildLaidStarFrom(p, around, cell);
+}
+
+template <int K>
 void StarComplex<K>::BuildAllLaidStars(double* influence) {
   if constexpr (K == 2)
     if (judging_ == Judging::kFlats && !has_guards()) return BuildAllLaidPolygons(influence);
   const std::vector<BallTree::Bunch> bunches = tree_.Bunches();
   ParallelFor(bunches.size(), [&](std::size_t b) {
-    thread_local std::vector<std::uint32_t> around;
+    thread_local std::vector<std::uint32_t> ids;
+    thread_local LaidAround around;
     thread_local Cell cell;  // its memory is used again; what is kept is no larger than it must be
     const BallTree::Bunch& bunch = bunches[b];
-    around.clear();
+    ids.clear();
     double most = 0;
     for (std::uint32_t i = 0; i < bunch.count; ++i) most = std::max(most, LaidBound(bunch.ids[i]));
-    tree_.GatherAround(bunch, kSearched * most, &around);
+    tree_.GatherAround(bunch, kSearched * most, &ids);
+    around.Take(ids, points_, d_);
     for (std::uint32_t i = 0; i < bunch.count; ++i) {
       const std::uint32_t p = bunch.ids[i];
-      BuildLaidStar(p, around, cell);
+      BuildLaidStarFrom(p, around, cell);
       cells_[p] = cell;
       influence[p] = Influence(p, cell);
     }
