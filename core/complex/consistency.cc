@@ -29,16 +29,20 @@ Eigen::VectorXd CentreIn(const StarComplex<K>& complex, std::uint32_t q,
   return centre;
 }
 
-// The sign of the simplex on p and K facets' points, seen in T_pM.
+// The sign of the simplex on p and the K points of the facets at vertex v of its cell, seen in
+// T_pM.
 template <int K>
-double Orientation(const StarComplex<K>& complex, std::uint32_t p, const std::uint16_t* facets) {
-  double m[K][K];
-  for (int r = 0; r < K; ++r) complex.HalfSpace(p, facets[r], m[r]);
+double Orientation(const StarComplex<K>& complex, std::uint32_t p, std::size_t v) {
+  const auto& cell = complex.cell(p);
   if constexpr (K == 3) {  // by far the most often
-    return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) +
-           m[0][1] * (m[1][2] * m[2][0] - m[1][0] * m[2][2]) +
-           m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+    const double* const a = cell.normal(cell.facet(v, 0));
+    const double* const b = cell.normal(cell.facet(v, 1));
+    const double* const c = cell.normal(cell.facet(v, 2));
+    return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+           a[2] * (b[0] * c[1] - b[1] * c[0]);
   }
+  double m[K][K];
+  for (int r = 0; r < K; ++r) complex.HalfSpace(p, cell.facet(v, r), m[r]);
   double sign = 1;
   for (int c = 0; c < K; ++c) {
     int pivot = c;
@@ -56,6 +60,37 @@ double Orientation(const StarComplex<K>& complex, std::uint32_t p, const std::ui
     }
   }
   return sign;
+}
+
+// How the facets of a vertex w follow each other beside those of its neighbour v, with the one that
+// is off v in the place of v's that is off w.
+struct Turned {
+  std::size_t off_v;  // that facet
+  bool odd;           // an odd permutation
+};
+
+// `s`: the slot of v's facet that is off w.
+template <int K>
+Turned TurnOf(const RestrictedVoronoiCell<K>& cell, std::size_t v, int s, std::size_t w) {
+  if constexpr (K == 3) {
+    const int other = s == 0 ? 1 : 0;
+    const auto first = cell.facet(v, other), second = cell.facet(v, 3 - s - other);
+    int t = 0;
+    while (t < 2 && (cell.facet(w, t) == first || cell.facet(w, t) == second)) ++t;
+    const bool swapped = cell.facet(w, t == 0 ? 1 : 0) != first;
+    return {cell.facet(w, t), ((s + t) % 2 != 0) != swapped};
+  }
+  int at[K];  // the place among v's facets of each of w's
+  Turned turned{0, false};
+  for (int r = 0; r < K; ++r) {
+    at[r] = s;
+    for (int i = 0; i < K; ++i)
+      if (cell.facet(v, i) == cell.facet(w, r)) at[r] = i;
+    if (at[r] == s) turned.off_v = cell.facet(w, r);
+  }
+  for (int r = 0; r < K; ++r)
+    for (int i = 0; i < r; ++i) turned.odd = turned.odd != (at[i] > at[r]);
+  return turned;
 }
 
 }  // namespace
@@ -169,9 +204,7 @@ Folds<K>::Folds(const StarComplex<K>& complex, std::uint32_t p)
   thread_local std::vector<double> sides;
   sides.resize(folded_.size());
   for (std::size_t v = 0; v < sides.size(); ++v) {
-    std::uint16_t facets[K];
-    for (int s = 0; s < K; ++s) facets[s] = cell.facet(v, s);
-    sides[v] = Orientation<K>(complex, p, facets);
+    sides[v] = Orientation<K>(complex, p, v);
     folded_[v] = sides[v] == 0;
   }
   const auto is_wall = [&](std::size_t facet) { return IsWall(cell.id(facet)); };
@@ -179,19 +212,9 @@ Folds<K>::Folds(const StarComplex<K>& complex, std::uint32_t p)
     for (int s = 0; s < K; ++s) {
       const std::size_t w = cell.adjacent(v, s);
       if (w < v) continue;
-      int at[K];  // the place among v's facets of each of w's; the one off v takes that of slot s
-      std::size_t off_v = 0;
-      for (int r = 0; r < K; ++r) {
-        at[r] = s;
-        for (int i = 0; i < K; ++i)
-          if (cell.facet(v, i) == cell.facet(w, r)) at[r] = i;
-        if (at[r] == s) off_v = cell.facet(w, r);
-      }
-      double side = sides[w];
-      for (int r = 0; r < K; ++r)
-        for (int i = 0; i < r; ++i)
-          if (at[i] > at[r]) side = -side;
-      if (!(side * sides[v] >= 0)) continue;
+      const auto [off_v, odd] = TurnOf<K>(cell, v, s, w);
+      const double product = sides[w] * sides[v];
+      if (!(odd ? product <= 0 : product >= 0)) continue;
       // Beyond a wall there is nothing to fold over.
       if (!is_wall(off_v)) folded_[v] = 1;
       if (!is_wall(cell.facet(v, s))) folded_[w] = 1;

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <numbers>
 #include <tuple>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "core/base/instantiate.h"
@@ -37,19 +39,70 @@ Violation<K> AtVertex(Rule rule, const RestrictedVoronoiCell<K>& cell, std::size
   return violation;
 }
 
-// Determinant of the j x j leading part of a symmetric matrix, by elimination.
-template <int K>
-double GramDeterminant(double (&g)[K][K], int j) {
+// Determinant of a symmetric J x J matrix, by elimination.
+template <int J>
+double GramDeterminant(double (&g)[J][J]) {
   double det = 1;
-  for (int c = 0; c < j; ++c) {
+  for (int c = 0; c < J; ++c) {
     det *= g[c][c];
     if (!(g[c][c] > 0)) return 0;
-    for (int r = c + 1; r < j; ++r) {
+    for (int r = c + 1; r < J; ++r) {
       const double factor = g[r][c] / g[c][c];
-      for (int i = c + 1; i < j; ++i) g[r][i] -= factor * g[c][i];
+      for (int i = c + 1; i < J; ++i) g[r][i] -= factor * g[c][i];
     }
   }
   return det;
+}
+
+// The edges of a k-simplex from its vertex p to the others.
+template <int K>
+struct EdgesAt {
+  double length2[K];
+  double between2[K][K];  // below the diagonal, of the edges between their ends
+  double gram[K][K];
+};
+
+// Whether the face on p and the others in `face`, a bit each, two at least, is a sliver.
+template <int K, unsigned face>
+bool IsThin(const EdgesAt<K>& edges, double sliver_bound) {
+  constexpr int j = std::popcount(face);
+  constexpr auto at = [] {
+    std::array<int, j> ends{};
+    for (int a = 0, n = 0; a < K; ++a)
+      if (face >> a & 1u) ends[static_cast<std::size_t>(n++)] = a;
+    return ends;
+  }();
+  double diameter2 = 0;
+  double g[j][j];
+  for (std::size_t r = 0; r < j; ++r) {
+    diameter2 = std::max(diameter2, edges.length2[at[r]]);
+    for (std::size_t c = 0; c < r; ++c)
+      diameter2 = std::max(diameter2, edges.between2[at[r]][at[c]]);
+    for (std::size_t c = 0; c < j; ++c) g[r][c] = edges.gram[at[r]][at[c]];
+  }
+  const double bound = sliver_bound * sliver_bound;
+  double factorial = 1, bound2j = 1, diameter2j = 1;
+  for (int i = 1; i <= j; ++i) {
+    factorial *= i;
+    bound2j *= bound;
+    diameter2j *= diameter2;
+  }
+  // Theta = vol / diameter^j < Theta0^j, squared.
+  return GramDeterminant<j>(g) < bound2j * diameter2j * factorial * factorial;
+}
+
+template <int K>
+bool HasThinFace(const EdgesAt<K>& edges, double sliver_bound) {
+  const auto is_thin = [&](auto face) {
+    if constexpr (std::popcount(face()) < 2)
+      return false;
+    else
+      return IsThin<K, face()>(edges, sliver_bound);
+  };
+  return [&]<unsigned... face>(std::integer_sequence<unsigned, face...>) {
+    return (is_thin(std::integral_constant<unsigned, face>()) || ...);
+  }
+  (std::make_integer_sequence<unsigned, 1u << K>());
 }
 
 // Of a star at the boundary, whose vertices are dual to simplices of several faces.
@@ -138,41 +191,19 @@ bool HasThinFaceAt(const StarComplex<K>& complex, const double* p,
     const std::uint32_t id = cell.id(cell.facet(v, a));
     q[a] = id < complex.size() ? complex.Point(id) : unborn;
   }
-  double length2[K], gram[K][K];
-  for (int a = 0; a < K; ++a) length2[a] = SquaredDistance(p, q[a], d);
-  double between2[K][K];
-  for (int a = 0; a < K; ++a) {
-    gram[a][a] = length2[a];
-    for (int b = 0; b < a; ++b) {
-      between2[a][b] = SquaredDistance(q[a], q[b], d);
-      gram[a][b] = gram[b][a] = 0.5 * (length2[a] + length2[b] - between2[a][b]);
-    }
-  }
-  for (unsigned face = 1; face < (1u << K); ++face) {
-    const int j = std::popcount(face);
-    if (j < 2) continue;
-    int at[K], n = 0;
-    double diameter2 = 0;
+  EdgesAt<K> edges;
+  WithDimension(d, [&](auto known) {
+    const int n = known() > 0 ? known() : d;
     for (int a = 0; a < K; ++a) {
-      if (!(face >> a & 1u)) continue;
-      diameter2 = std::max(diameter2, length2[a]);
-      for (int i = 0; i < n; ++i) diameter2 = std::max(diameter2, between2[a][at[i]]);
-      at[n++] = a;
+      edges.length2[a] = edges.gram[a][a] = SquaredDistance(p, q[a], n);
+      for (int b = 0; b < a; ++b) edges.between2[a][b] = SquaredDistance(q[a], q[b], n);
     }
-    double g[K][K];
-    for (int r = 0; r < j; ++r)
-      for (int c = 0; c < j; ++c) g[r][c] = gram[at[r]][at[c]];
-    double factorial = 1, bound = sliver_bound * sliver_bound, diameter2j = 1;
-    double bound2j = 1;
-    for (int i = 1; i <= j; ++i) {
-      factorial *= i;
-      bound2j *= bound;
-      diameter2j *= diameter2;
-    }
-    // Theta = vol / diameter^j < Theta0^j, squared.
-    if (GramDeterminant<K>(g, j) < bound2j * diameter2j * factorial * factorial) return true;
-  }
-  return false;
+  });
+  for (int a = 0; a < K; ++a)
+    for (int b = 0; b < a; ++b)
+      edges.gram[a][b] = edges.gram[b][a] =
+          0.5 * (edges.length2[a] + edges.length2[b] - edges.between2[a][b]);
+  return HasThinFace<K>(edges, sliver_bound);
 }
 
 template <int K>
