@@ -10,11 +10,15 @@
 namespace stellate::core {
 namespace {
 
+// The point itself, and as many neighbours as close a cell.
+template <int K>
+inline constexpr int kNearestFirst = 2 * K + 3;
+
 // Far above what rounding leaves of tangent bases and inner products, far below any distance that
 // matters: the share of a length by which a bound on its part off the tangent space is larger.
-constexpr double kRounding = 1e-10;
+constexpr double kOffRounding = 1e-10;
 double LengthOff(double whole2, double along2) {
-  return std::sqrt(std::max(whole2 - along2, 0.0) + kRounding * whole2);
+  return std::sqrt(std::max(whole2 - along2, 0.0) + kOffRounding * whole2);
 }
 
 // The vertices of a judged cell, by coordinate: their places in T_pM, and how far their centres are
@@ -216,6 +220,40 @@ int StarComplex<K>::Nearest(const double* q, int count,
         nearest[at] = candidate;
       });
   return found;
+}
+
+// The sample points that most likely close a cell around q, the nearest first: those nearest, or,
+// where a star near q is known, that star and the stars of its points nearest to q.
+template <int K>
+void StarComplex<K>::Neighbourhood(const double* q, std::uint32_t near,
+                                   std::vector<std::uint32_t>* ids) const {
+  ids->clear();
+  constexpr int kCount = kNearestFirst<K>;
+  std::array<std::pair<double, std::uint32_t>, kCount> nearest;
+  if (near == kNone || !cells_[near].bounded()) {
+    const int count = Nearest(q, kCount, nearest.data());
+    for (int i = 0; i < count; ++i) ids->push_back(nearest[static_cast<std::size_t>(i)].second);
+    return;
+  }
+  int count = 0;
+  const auto offer = [&](std::uint32_t id) {
+    const std::pair<double, std::uint32_t> candidate{SquaredDistance(q, Point(id), d_), id};
+    if (count == K + 1 && !(candidate < nearest[K])) return;
+    int at = count < K + 1 ? count++ : K;
+    for (; at > 0 && candidate < nearest[at - 1]; --at) nearest[at] = nearest[at - 1];
+    nearest[at] = candidate;
+  };
+  offer(near);
+  for (std::size_t f = 0; f < cells_[near].facet_count(); ++f)
+    if (IsSample(cells_[near].id(f))) offer(cells_[near].id(f));
+  const auto add = [&](std::uint32_t id) {
+    if (IsSample(id) && std::find(ids->begin(), ids->end(), id) == ids->end()) ids->push_back(id);
+  };
+  for (int i = 0; i < count; ++i) ids->push_back(nearest[i].second);
+  for (int i = 0; i < count; ++i) {
+    const Cell& cell = cells_[nearest[i].second];
+    for (std::size_t f = 0; f < cell.facet_count(); ++f) add(cell.id(f));
+  }
 }
 
 template <int K>

@@ -241,6 +241,9 @@ class StarComplex {
   template <typename Influencing>
   void BuildStar(const Site& p, const Site* guest, std::uint32_t near, Cell& cell,
                  typename Cell::Scratch& scratch, const Influencing& influencing) const;
+  template <typename Influencing>
+  bool BuildAsInFlats(const Site& p, std::uint32_t near, Cell& cell,
+                      const Influencing& influencing) const;
   void CloseInFlats(const Site& p, Cell& cell, typename Cell::Scratch& scratch) const;
   void Neighbourhood(const double* q, std::uint32_t near, std::vector<std::uint32_t>* ids) const;
   // Calls visit(v, simplex) for the simplices of star(p) of which p is the lowest vertex, once for

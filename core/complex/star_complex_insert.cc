@@ -9,16 +9,20 @@
 #include "core/base/instantiate.h"
 #include "core/base/parallel.h"
 #include "core/base/room.h"
+#include "core/complex/around.h"
 #include "core/complex/star_complex.h"
 #include "core/geometry/laid_polygon.h"
+#include "core/geometry/laid_polytope.h"
 
 namespace stellate::core {
 
 namespace {
 
-// The point itself, and as many neighbours as close a cell.
-template <int K>
-inline constexpr int kNearestFirst = 2 * K + 3;
+// How much farther than its star in the flats reaches the neighbours of a new point are gathered:
+// judged stars are mostly that much larger at most.
+constexpr double kJudgedReach = 1.1;
+// ... and how far at most, in epsilon: a star that is open so far would gather half of the sample.
+constexpr double kFarthest = 5;
 
 // One a thread, for the life of the thread.
 template <int K>
@@ -39,40 +43,6 @@ bool HoldsTriangle(const Polygon& cell, std::uint32_t a, std::uint32_t b) {
 
 }  // namespace
 
-// The sample points that most likely close a cell around q, the nearest first: those nearest, or,
-// where a star near q is known, that star and the stars of its points nearest to q.
-template <int K>
-void StarComplex<K>::Neighbourhood(const double* q, std::uint32_t near,
-                                   std::vector<std::uint32_t>* ids) const {
-  ids->clear();
-  constexpr int kCount = kNearestFirst<K>;
-  std::array<std::pair<double, std::uint32_t>, kCount> nearest;
-  if (near == kNone || !cells_[near].bounded()) {
-    const int count = Nearest(q, kCount, nearest.data());
-    for (int i = 0; i < count; ++i) ids->push_back(nearest[static_cast<std::size_t>(i)].second);
-    return;
-  }
-  int count = 0;
-  const auto offer = [&](std::uint32_t id) {
-    const std::pair<double, std::uint32_t> candidate{SquaredDistance(q, Point(id), d_), id};
-    if (count == K + 1 && !(candidate < nearest[K])) return;
-    int at = count < K + 1 ? count++ : K;
-    for (; at > 0 && candidate < nearest[at - 1]; --at) nearest[at] = nearest[at - 1];
-    nearest[at] = candidate;
-  };
-  offer(near);
-  for (std::size_t f = 0; f < cells_[near].facet_count(); ++f)
-    if (IsSample(cells_[near].id(f))) offer(cells_[near].id(f));
-  const auto add = [&](std::uint32_t id) {
-    if (IsSample(id) && std::find(ids->begin(), ids->end(), id) == ids->end()) ids->push_back(id);
-  };
-  for (int i = 0; i < count; ++i) ids->push_back(nearest[i].second);
-  for (int i = 0; i < count; ++i) {
-    const Cell& cell = cells_[nearest[i].second];
-    for (std::size_t f = 0; f < cell.facet_count(); ++f) add(cell.id(f));
-  }
-}
-
 // At common centres cuts are refused that would leave no polytope, and a cell may stay open in the
 // midst of the sample, to which R1 would add points forever. It is closed in the flats then, and
 // judged: where it is not as it would be there stars disagree, which R4 mends.
@@ -92,11 +62,54 @@ void StarComplex<K>::CloseInFlats(const Site& p, Cell& cell,
   cell = flat;
 }
 
+// As most stars that are laid: made in the flats, and judged when it is done. False where that will
+// not do. Asks once about whom p influences, whatever it returns.
+template <int K>
+template <typename Influencing>
+bool StarComplex<K>::BuildAsInFlats(const Site& p, std::uint32_t near, Cell& cell,
+                                    const Influencing& influencing) const {
+  thread_local LaidPolytope polytope;
+  thread_local std::vector<std::uint32_t> first;
+  thread_local Near around;
+  Step step(d_);
+  polytope.Reset(inradius_);
+  const auto clip = [&](std::uint32_t q) {
+    double normal[K];
+    const double offset = HalfSpace(p, At(q), step.data(), normal);
+    polytope.Clip(q, normal, offset);
+  };
+  Neighbourhood(p.point, near, &first);
+  for (const std::uint32_t q : first)
+    if (q != p.id) clip(q);
+  const double reach =
+      std::min(kJudgedReach * Influence(p.id, polytope.max_norm2()), kFarthest * epsilon());
+  around.clear();
+  tree_.VisitAround(
+      p.point, [&] { return reach; },
+      [&](std::uint32_t q, double distance2) {
+        if (q != p.id) around.emplace_back(distance2, q);
+      },
+      influencing);
+  std::sort(around.begin(), around.end());
+  for (const auto& [distance2, q] : around)
+    if (std::find(first.begin(), first.end(), q) == first.end()) clip(q);
+  if (polytope.gave_up() || Influence(p.id, polytope.max_norm2()) > reach) return false;
+  cell.Take(polytope);
+  return JudgeCell(cell, p, around) && Influence(p.id, cell) <= reach;
+}
+
 template <int K>
 template <typename Influencing>
 void StarComplex<K>::BuildStar(const Site& p, const Site* guest, std::uint32_t near, Cell& cell,
                                typename Cell::Scratch& scratch,
                                const Influencing& influencing) const {
+  bool is_asked = false;  // about whom p influences
+  if constexpr (K == 3) {
+    if (judging_ == Judging::kCommonCentre && p.walls == 0 && !faces_alone_) {
+      if (BuildAsInFlats(p, near, cell, influencing)) return;
+      is_asked = true;
+    }
+  }
   // In the flats, K = 2, a polygon is made apart, where each half-space is found once.
   thread_local LaidPolygon polygon;
   const bool apart =
@@ -127,7 +140,9 @@ void StarComplex<K>::BuildStar(const Site& p, const Site* guest, std::uint32_t n
         if (q == p.id || std::find(first.begin(), first.end(), q) != first.end()) return;
         if (clip(q)) reach = reach_now();
       },
-      influencing);
+      [&](std::uint32_t q) {
+        if (!is_asked) influencing(q);
+      });
   if constexpr (K == 2)
     if (apart) cell.Take(polygon);
   if (guest == nullptr) CloseInFlats(p, cell, scratch);
@@ -328,8 +343,6 @@ void StarComplex<K>::TryPoint(const double* point, const double* tangent, std::u
 
 #define STELLATE_EACH(K)                                                                         \
   template void StarComplex<K>::CloseInFlats(const Site&, Cell&, typename Cell::Scratch&) const; \
-  template void StarComplex<K>::Neighbourhood(const double*, std::uint32_t,                      \
-                                              std::vector<std::uint32_t>*) const;                \
   template std::uint32_t StarComplex<K>::Append(const double*, const double*, std::uint32_t,     \
                                                 WallSet, const double*);                         \
   template std::vector<StarComplex<K>::Cut> StarComplex<K>::BuildNewStars(std::uint32_t);        \
