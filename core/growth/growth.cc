@@ -30,6 +30,8 @@ constexpr std::uint64_t kTelling = 256;
 constexpr double kMostUnexpected = 0.5;
 // Few points are laid into the newest layer, until it is as large as this share of the one before.
 constexpr std::size_t kLayerGrowth = 2;
+// What is known to be clear by more than rounding can take is not searched.
+constexpr double kSurely = 1 + 1e-9;
 
 // Makes of `frame` (K rows of d, roughly orthonormal) the orthonormal frame of the span of
 // `tangent` (K orthonormal rows of d) that is nearest to it, the polar factor of its projection, by
@@ -162,6 +164,7 @@ typename Growth<K>::Proposed Growth<K>::Merge(const std::vector<Proposal>& propo
   merged.sites.shares.assign(leaders.size(), 0.0);
   merged.sites.patch.resize(leaders.size());
   merged.parents.assign(leaders.size(), 0);
+  merged.clear.resize(leaders.size());
   ParallelFor(leaders.size(), [&](std::size_t l) {
     const std::uint32_t lead = leaders[l];
     double* const point = merged.sites.points.data() + l * stride();
@@ -180,8 +183,35 @@ typename Growth<K>::Proposed Growth<K>::Merge(const std::vector<Proposal>& propo
     for (std::size_t j = 0; j < stride() * K; ++j) frame[j] /= merged.parents[l];
     merged.sites.shares[l] /= merged.parents[l];
     merged.sites.patch[l] = patch(lead);
+    merged.clear[l] =
+        proposals[lead].clear - Distance(point, landed.data() + lead * stride(), d_);
   });
   return merged;
+}
+
+// Which of those below keep their distance from what is laid: what came out near a place that was
+// clear of all needs no search.
+template <int K>
+std::vector<std::uint8_t> Growth<K>::AreFree(const std::vector<double>& candidates,
+                                             const std::vector<double>& shares,
+                                             const Proposed& proposed,
+                                             const std::vector<std::uint32_t>& columns) const {
+  const double keep = kKeep * spacing_;
+  std::vector<std::uint8_t> free(columns.size(), 1);
+  std::vector<std::uint32_t> open;
+  std::vector<double> points, own;
+  for (std::uint32_t i = 0; i < columns.size(); ++i) {
+    CheckInterruption(i);
+    const double* const y = candidates.data() + i * stride();
+    const double* const asked = proposed.sites.points.data() + columns[i] * stride();
+    if (proposed.clear[columns[i]] - Distance(y, asked, d_) > kSurely * (keep * shares[i])) continue;
+    open.push_back(i);
+    points.insert(points.end(), y, y + d_);
+    own.push_back(shares[i]);
+  }
+  const std::vector<std::uint8_t> far = AreFarFromLaid(points, own, keep);
+  for (std::size_t i = 0; i < open.size(); ++i) free[open[i]] = far[i];
+  return free;
 }
 
 // Of proposals that came out as `candidates`, d each, with their shares, in the order of `columns`,
@@ -193,7 +223,7 @@ std::vector<std::uint32_t> Growth<K>::Choose(const std::vector<double>& candidat
                                              const Proposed& proposed,
                                              const std::vector<std::uint32_t>& columns) const {
   const double keep = kKeep * spacing_;
-  const std::vector<std::uint8_t> far = AreFarFromLaid(candidates, shares, keep);
+  const std::vector<std::uint8_t> far = AreFree(candidates, shares, proposed, columns);
   const NearLists near(candidates, d_, keep, shares);
   const auto strength = [&](std::uint32_t i) {
     const std::uint32_t c = columns[i];

@@ -81,6 +81,7 @@ class Growth {
   struct Proposed {
     Sites sites;
     std::vector<std::uint16_t> parents;  // how many proposed it
+    std::vector<double> clear;           // no less far than this is all that is laid, length
   };
   // What was laid by rounds; those of about as many are joined into one.
   struct Layer {
@@ -92,6 +93,7 @@ class Growth {
     std::uint32_t parent;     // in border_
     std::uint32_t direction;  // of the lattice
     double share;             // of the lattice's spacing, that it is proposed at
+    double clear;             // no less far than this is all that is laid, length
   };
 
   std::size_t stride() const { return static_cast<std::size_t>(d_); }
@@ -109,6 +111,9 @@ class Growth {
   void ProposeFrom(std::uint32_t p, const Laid& near, std::vector<Proposal>* free) const;
   std::vector<Proposal> FreePlaces() const;
   Proposed Merge(const std::vector<Proposal>& proposals) const;
+  std::vector<std::uint8_t> AreFree(const std::vector<double>& candidates,
+                                    const std::vector<double>& shares, const Proposed& proposed,
+                                    const std::vector<std::uint32_t>& columns) const;
   std::vector<std::uint32_t> Choose(const std::vector<double>& candidates,
                                     const std::vector<double>& shares, const Proposed& proposed,
                                     const std::vector<std::uint32_t>& columns) const;

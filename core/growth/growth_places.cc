@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cmath>
 
 #include "core/base/parallel.h"
 #include "core/growth/growth.h"
@@ -16,6 +17,10 @@ constexpr double kLeastMoment = 0.05;
 // by this share of the change in a spacing, at most by half.
 constexpr double kSlopeMargin = 0.3;
 constexpr double kLeastStep = 0.5;
+// Places are looked at so many spacings farther around than what would take them lies: what is
+// asked for there comes out a little beside, and mostly needs no search then. Slopes are told by
+// what is near alone.
+constexpr double Beside(bool is_graded) { return is_graded ? 0 : 0.15; }
 
 // How shares change from that of a point, by its own coordinates, as least squares over what is
 // laid around it tell: coordinates along its frame, the square of that across, and the share, each.
@@ -57,7 +62,7 @@ void Growth<K>::ProposeFrom(std::uint32_t p, const Laid& near, std::vector<Propo
   const double* const frame = border_.frames.data() + p * stride() * K;
   const double share = border_.shares[p];
   const double keep = share * (kKeep * spacing_);
-  const double far = share * longest_ + keep;
+  const double far = share * (longest_ + Beside(is_graded_) * spacing_) + keep;
   thread_local std::vector<double> coordinates, steps;
   coordinates.resize(near.shares.size() * (K + 2));
   steps.resize(stride());
@@ -88,17 +93,21 @@ void Growth<K>::ProposeFrom(std::uint32_t p, const Laid& near, std::vector<Propo
   const std::size_t directions = vectors_.size() / K;
   for (std::uint32_t i = 0; i < directions; ++i) {
     const double* const v = vectors_.data() + std::size_t{i} * K;
-    double change = 0;
-    for (int a = 0; a < K; ++a) change += slope[a] * v[a];
+    double change = 0, length2 = 0;
+    for (int a = 0; a < K; ++a) {
+      change += slope[a] * v[a];
+      length2 += v[a] * v[a];
+    }
     const double step = share * std::clamp(steepest * (1 + change), kLeastStep, 1.0);
     const double apart = step * (kKeep * spacing_);
-    bool taken = false;
-    for (const double* at = begin; at != end && !taken; at += K + 2) {
+    double nearest2 = INFINITY;
+    for (const double* at = begin; at != end && nearest2 >= apart * apart; at += K + 2) {
       double distance2 = at[K];
       for (int a = 0; a < K; ++a) distance2 += (at[a] - step * v[a]) * (at[a] - step * v[a]);
-      taken = distance2 < apart * apart;
+      nearest2 = std::min(nearest2, distance2);
     }
-    if (!taken) free->push_back({p, i, step});
+    if (nearest2 >= apart * apart)
+      free->push_back({p, i, step, std::min(std::sqrt(nearest2), far - step * std::sqrt(length2))});
   }
 }
 
@@ -107,7 +116,7 @@ std::vector<typename Growth<K>::Proposal> Growth<K>::FreePlaces() const {
   const Runs runs = RunsOf(border_.points, border_.shares);
   return ParallelGather<Proposal>(runs.count(), [&](std::size_t run, auto* free) {
     thread_local Laid near;
-    GatherLaid(runs, run, border_.shares, longest_ + kKeep * spacing_, &near);
+    GatherLaid(runs, run, border_.shares, longest_ + (kKeep + Beside(is_graded_)) * spacing_, &near);
     for (std::size_t p = runs.begin(run); p < runs.end(run); ++p)
       ProposeFrom(static_cast<std::uint32_t>(p), near, free);
   });
