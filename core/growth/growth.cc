@@ -13,15 +13,13 @@
 namespace stellate::core {
 namespace {
 
-// Proposals nearer to each other than this many spacings are one.
-constexpr double kMerged = 0.5;
 // An answer farther than this many spacings from what was asked is no neighbour: M bends away.
 constexpr double kFarthest = 1;
 // Tangent spaces that keep less of a frame's volume than this have turned too far to carry it on.
 constexpr double kLeastVolume = 0.1;
 // Points of a run lie within this many spacings of its first: of higher dimension there are more of
 // them around a longer one than a search costs.
-constexpr double RunReach(int k) { return k < 3 ? 3 : 1.5; }
+constexpr double RunReach(int k) { return k < 3 ? 4 : 1.5; }
 // A lattice whose sizes change by more than this from what is expected costs more than it spares.
 constexpr double kUnexpected = 1.25;
 // So many answers tell whether it is worth while: if more than this share is not as expected, sizes
@@ -56,6 +54,17 @@ void Growth<K>::Sites::Append(const Sites& others) {
   frames.insert(frames.end(), others.frames.begin(), others.frames.end());
   shares.insert(shares.end(), others.shares.begin(), others.shares.end());
   patch.insert(patch.end(), others.patch.begin(), others.patch.end());
+  name.insert(name.end(), others.name.begin(), others.name.end());
+}
+
+template <int K>
+Growth<K>::Proposed::Proposed(std::size_t count, std::size_t stride)
+    : parents(count), clear(count) {
+  sites.points.resize(count * stride);
+  sites.frames.resize(count * stride * K);
+  sites.shares.resize(count);
+  sites.patch.resize(count);
+  sites.name.resize(count);
 }
 
 template <int K>
@@ -123,72 +132,6 @@ std::vector<std::uint8_t> Growth<K>::AreFarFromLaid(const std::vector<double>& p
   return far;
 }
 
-// Several points mostly propose the same place: their mean is asked for, with the mean of their
-// frames. Of two patches that meet only one proposes.
-template <int K>
-typename Growth<K>::Proposed Growth<K>::Merge(const std::vector<Proposal>& proposals) const {
-  std::vector<double> landed(proposals.size() * stride()), shares(proposals.size());
-  ParallelFor(proposals.size(), [&](std::size_t i) {
-    Land(proposals[i], landed.data() + i * stride());
-    shares[i] = proposals[i].share;
-  });
-  const NearLists near(landed, d_, kMerged * spacing_, shares);
-  const std::vector<std::uint8_t> leads =
-      ChooseLocalMaxima(proposals.size(), [&](std::size_t i, const auto& visit) {
-        for (const std::uint32_t j : near.Of(i))
-          if (j > i || !visit(j)) return;
-      });
-  const auto patch = [&](std::size_t i) { return border_.patch[proposals[i].parent]; };
-  const auto distance2 = [&](std::size_t i, std::size_t j) {
-    return SquaredDistance(landed.data() + i * stride(), landed.data() + j * stride(), d_);
-  };
-  std::vector<std::uint32_t> leader(proposals.size());
-  ParallelFor(proposals.size(), [&](std::size_t i) {
-    leader[i] = static_cast<std::uint32_t>(i);
-    if (leads[i]) return;
-    double nearest2 = INFINITY;
-    for (const std::uint32_t j : near.Of(i)) {
-      if (!leads[j] || !(distance2(i, j) < nearest2)) continue;
-      nearest2 = distance2(i, j);
-      leader[i] = j;
-    }
-  });
-  std::vector<std::uint32_t> leaders;
-  for (std::uint32_t i = 0; i < proposals.size(); ++i) {
-    CheckInterruption(i);
-    if (leads[i]) leaders.push_back(i);
-  }
-  Proposed merged;
-  merged.sites.points.assign(leaders.size() * stride(), 0.0);
-  merged.sites.frames.assign(leaders.size() * stride() * K, 0.0);
-  merged.sites.shares.assign(leaders.size(), 0.0);
-  merged.sites.patch.resize(leaders.size());
-  merged.parents.assign(leaders.size(), 0);
-  merged.clear.resize(leaders.size());
-  ParallelFor(leaders.size(), [&](std::size_t l) {
-    const std::uint32_t lead = leaders[l];
-    double* const point = merged.sites.points.data() + l * stride();
-    double* const frame = merged.sites.frames.data() + l * stride() * K;
-    const auto add = [&](std::uint32_t i) {
-      if (leader[i] != lead || patch(i) != patch(lead)) return;
-      const double* const other = border_.frames.data() + proposals[i].parent * stride() * K;
-      for (std::size_t j = 0; j < stride(); ++j) point[j] += landed[i * stride() + j];
-      for (std::size_t j = 0; j < stride() * K; ++j) frame[j] += other[j];
-      merged.sites.shares[l] += shares[i];
-      ++merged.parents[l];
-    };
-    add(lead);
-    for (const std::uint32_t i : near.Of(lead)) add(i);
-    for (std::size_t j = 0; j < stride(); ++j) point[j] /= merged.parents[l];
-    for (std::size_t j = 0; j < stride() * K; ++j) frame[j] /= merged.parents[l];
-    merged.sites.shares[l] /= merged.parents[l];
-    merged.sites.patch[l] = patch(lead);
-    merged.clear[l] =
-        proposals[lead].clear - Distance(point, landed.data() + lead * stride(), d_);
-  });
-  return merged;
-}
-
 // Which of those below keep their distance from what is laid: what came out near a place that was
 // clear of all needs no search.
 template <int K>
@@ -204,7 +147,8 @@ std::vector<std::uint8_t> Growth<K>::AreFree(const std::vector<double>& candidat
     CheckInterruption(i);
     const double* const y = candidates.data() + i * stride();
     const double* const asked = proposed.sites.points.data() + columns[i] * stride();
-    if (proposed.clear[columns[i]] - Distance(y, asked, d_) > kSurely * (keep * shares[i])) continue;
+    const double clear = proposed.clear[columns[i]] - Distance(y, asked, d_);
+    if (clear > kSurely * (keep * shares[i])) continue;
     open.push_back(i);
     points.insert(points.end(), y, y + d_);
     own.push_back(shares[i]);
@@ -215,8 +159,8 @@ std::vector<std::uint8_t> Growth<K>::AreFree(const std::vector<double>& candidat
 }
 
 // Of proposals that came out as `candidates`, d each, with their shares, in the order of `columns`,
-// those that keep their distance from what is laid and from each other. Those of several parents
-// are more likely where they belong.
+// those that keep their distance from what is laid and from each other. Those of more parents are
+// more likely where they belong.
 template <int K>
 std::vector<std::uint32_t> Growth<K>::Choose(const std::vector<double>& candidates,
                                              const std::vector<double>& shares,
@@ -227,7 +171,7 @@ std::vector<std::uint32_t> Growth<K>::Choose(const std::vector<double>& candidat
   const NearLists near(candidates, d_, keep, shares);
   const auto strength = [&](std::uint32_t i) {
     const std::uint32_t c = columns[i];
-    return std::pair(proposed.parents[c] > 1 ? 0 : 1, i);
+    return std::pair(-static_cast<int>(proposed.parents[c]), i);
   };
   const std::vector<std::uint8_t> chosen =
       ChooseLocalMaxima(columns.size(), [&](std::size_t i, const auto& visit) {
@@ -255,6 +199,7 @@ typename Growth<K>::Sites Growth<K>::SitesOf(const Proposed& proposed,
     sites.frames.insert(sites.frames.end(), frame, frame + stride() * K);
     sites.shares.push_back(proposed.sites.shares[c]);
     sites.patch.push_back(proposed.sites.patch[c]);
+    sites.name.push_back(proposed.sites.name[c]);
   }
   return sites;
 }
@@ -263,7 +208,7 @@ template <int K>
 typename Growth<K>::Ring Growth<K>::Propose() {
   const bool is_lost = answered_ > kTelling && static_cast<double>(unexpected_) >
                                                    kMostUnexpected * static_cast<double>(answered_);
-  asked_ = is_lost ? Proposed() : Merge(FreePlaces());
+  asked_ = is_lost ? Proposed() : Merge(ByPlace(FreePlaces()));
   border_ = {};
   const auto count = static_cast<Eigen::Index>(asked_.sites.size());
   return {Eigen::Map<const Eigen::MatrixXd>(asked_.sites.points.data(), d_, count),
@@ -284,7 +229,7 @@ template <int K>
 void Growth<K>::Forget() {
   layers_.clear();
   border_ = {};
-  asked_ = {};
+  asked_ = Proposed();
 }
 
 // Appends to the sample, which goes on from there.
@@ -337,6 +282,7 @@ std::vector<Eigen::Index> Growth<K>::Begin(const Eigen::MatrixXd& points,
     seeds.frames.insert(seeds.frames.end(), frame.begin(), frame.end());
     seeds.shares.push_back(own[i]);
     seeds.patch.push_back(patches_++);
+    seeds.name.push_back(names_.origin());
   }
   Carry(std::move(seeds));
   return begun;
@@ -371,7 +317,7 @@ std::vector<Eigen::Index> Growth<K>::Join(const Eigen::MatrixXd& points,
   Sites sites = SitesOf(asked_, joined);
   for (std::size_t i = 0; i < joined.size(); ++i)
     std::copy_n(points.col(joined[i]).data(), d_, sites.points.data() + i * stride());
-  asked_ = {};
+  asked_ = Proposed();
   Carry(std::move(sites));
   return {joined.begin(), joined.end()};
 }

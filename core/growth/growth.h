@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/instantiate.h"
+#include "core/growth/lattice.h"
 #include "core/sample/ball_tree.h"
 #include "core/sample/runs.h"
 
@@ -74,11 +75,13 @@ class Growth {
     std::vector<double> frames;        // K rows of d each: the lattice's directions
     std::vector<double> shares;        // of the spacing
     std::vector<std::uint32_t> patch;  // the seed that it came from
+    std::vector<std::uint64_t> name;   // in the lattice of its patch
     std::size_t size() const { return patch.size(); }
     void Append(const Sites& others);
   };
   // Means of what points proposed.
   struct Proposed {
+    explicit Proposed(std::size_t count = 0, std::size_t stride = 0);
     Sites sites;
     std::vector<std::uint16_t> parents;  // how many proposed it
     std::vector<double> clear;           // no less far than this is all that is laid, length
@@ -90,6 +93,8 @@ class Growth {
     RunTree tree;
   };
   struct Proposal {
+    std::uint64_t name;       // in the lattice of its patch
+    std::uint32_t patch;
     std::uint32_t parent;     // in border_
     std::uint32_t direction;  // of the lattice
     double share;             // of the lattice's spacing, that it is proposed at
@@ -110,7 +115,8 @@ class Growth {
   void Land(const Proposal& proposal, double* point) const;
   void ProposeFrom(std::uint32_t p, const Laid& near, std::vector<Proposal>* free) const;
   std::vector<Proposal> FreePlaces() const;
-  Proposed Merge(const std::vector<Proposal>& proposals) const;
+  Proposed ByPlace(std::vector<Proposal> proposals) const;
+  Proposed Merge(Proposed places) const;
   std::vector<std::uint8_t> AreFree(const std::vector<double>& candidates,
                                     const std::vector<double>& shares, const Proposed& proposed,
                                     const std::vector<std::uint32_t>& columns) const;
@@ -125,6 +131,7 @@ class Growth {
   double spacing_;
   std::vector<double> vectors_;  // of the lattice, length, K each
   double longest_;               // of them
+  LatticeNames names_{K};
   std::vector<std::unique_ptr<Layer>> layers_;
   bool is_graded_ = false;
   std::uint64_t answered_ = 0, unexpected_ = 0;  // with shares, and of those not as expected

@@ -1,6 +1,7 @@
 #include "core/growth/lattice.h"
 
 #include <array>
+#include <bit>
 
 #include "core/specification.h"
 
@@ -29,6 +30,23 @@ std::vector<double> LatticeVectors(int k) {
       vectors.push_back(sum);
     }
   return vectors;
+}
+
+// The vectors to the first k corners of that simplex are a basis, and that to the last is less
+// their sum.
+LatticeNames::LatticeNames(int k) : coordinates_(static_cast<std::size_t>(k)) {
+  for (int bit = 0; bit < 64; ++bit) coordinates_[bit % k] |= std::uint64_t{1} << bit;
+  for (const std::uint64_t bits : coordinates_) origin_ |= std::bit_floor(bits);
+  for (unsigned set = 1; set + 1 < (1u << (k + 1)); ++set) {
+    std::uint64_t step = 0;
+    const bool has_last = set >> k & 1;
+    for (int a = 0; a < k; ++a) {
+      const bool has = set >> a & 1;
+      if (has && !has_last) step |= std::uint64_t{1} << a;
+      if (!has && has_last) step |= coordinates_[a];
+    }
+    steps_.push_back(step);
+  }
 }
 
 }  // namespace stellate::core

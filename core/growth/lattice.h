@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 namespace stellate::core {
@@ -20,5 +21,27 @@ inline double LongestLatticeVector(int k) {
   const int half = (k + 1) / 2, other_half = (k + 2) / 2;
   return std::sqrt(static_cast<double>(half * other_half) / k);
 }
+
+// Names points of the lattice, so that neighbours mostly have names that follow each other: the
+// bits of their k coordinates by k of its basis vectors, in turn. Far away, names recur.
+class LatticeNames {
+ public:
+  explicit LatticeNames(int k);
+
+  // From which steps can be taken the same way in all directions.
+  std::uint64_t origin() const { return origin_; }
+  // The neighbour by the i-th of the vectors above.
+  std::uint64_t Neighbour(std::uint64_t name, std::size_t i) const {
+    std::uint64_t neighbour = 0;
+    for (const std::uint64_t bits : coordinates_)
+      neighbour |= ((name | ~bits) + (steps_[i] & bits)) & bits;
+    return neighbour;
+  }
+
+ private:
+  std::vector<std::uint64_t> coordinates_;  // which bits are whose
+  std::vector<std::uint64_t> steps_;        // by vector
+  std::uint64_t origin_ = 0;
+};
 
 }  // namespace stellate::core
