@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "core/base/random.h"
@@ -36,6 +37,29 @@ TEST_P(Lattice, HasItsVectorsInPairsAndNoneShorterThanOne) {
   }
   EXPECT_NEAR(shortest, 1, 1e-12);
   EXPECT_NEAR(longest, LongestLatticeVector(k), 1e-12);
+}
+
+// Two ways to a point, by vectors that add up to the same, come to one name; and there are no two
+// neighbours of one.
+TEST_P(Lattice, NamesAPointTheSameOnEveryWayThere) {
+  const int k = GetParam();
+  const LatticeNames names(k);
+  const std::vector<double> v = LatticeVectors(k);
+  const std::size_t stride = static_cast<std::size_t>(k), count = v.size() / stride;
+  std::vector<std::uint64_t> neighbours;
+  for (std::size_t i = 0; i < count; ++i) {
+    neighbours.push_back(names.Neighbour(names.origin(), i));
+    for (std::size_t j = 0; j < count; ++j) {
+      const std::uint64_t there = names.Neighbour(neighbours.back(), j);
+      EXPECT_EQ(there, names.Neighbour(names.Neighbour(names.origin(), j), i));
+      double off = 0;
+      for (std::size_t c = 0; c < stride; ++c)
+        off += std::abs(v[i * stride + c] + v[j * stride + c]);
+      EXPECT_EQ(there == names.origin(), off < 1e-12);
+    }
+  }
+  std::sort(neighbours.begin(), neighbours.end());
+  EXPECT_EQ(std::adjacent_find(neighbours.begin(), neighbours.end()), neighbours.end());
 }
 
 // The sums of its vectors lie no farther than the covering radius from any point, and some points
