@@ -93,7 +93,7 @@ class Growth {
     RunTree tree;
   };
   struct Proposal {
-    std::uint64_t name;       // in the lattice of its patch
+    std::uint64_t name;  // in the lattice of its patch
     std::uint32_t patch;
     std::uint32_t parent;     // in border_
     std::uint32_t direction;  // of the lattice

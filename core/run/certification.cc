@@ -45,8 +45,7 @@ StarFacts FactsOf(Engine<K>& engine) {
   ParallelChunks(complex.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     double most = 0;
     for (auto p = static_cast<std::uint32_t>(begin); p < end; ++p)
-      most =
-          std::max(most, agreed ? MaxAgreedNorm2<K>(complex, p) : complex.cell(p).max_norm2());
+      most = std::max(most, agreed ? MaxAgreedNorm2<K>(complex, p) : complex.cell(p).max_norm2());
     parts[chunk] = most;
   });
   for (const double norm2 : parts)
