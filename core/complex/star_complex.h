@@ -205,7 +205,9 @@ class StarComplex {
   // larger than rounding, and this much smaller than anything geometric, make all decide alike.
   double Weight(std::uint32_t id) const {
     const std::uint64_t name = id < names_.size() ? names_[id] : id;
-    return weight_scale_ * (static_cast<double>(Mix64(name) >> 11) * 0x1p-53) + GuardOf(id);
+    // Of a signed number, which takes an instruction where an unsigned one takes a branch.
+    const auto bits = static_cast<std::int64_t>(Mix64(name) >> 11);
+    return weight_scale_ * (static_cast<double>(bits) * 0x1p-53) + GuardOf(id);
   }
   // A point with its tangent basis, in the sample or not yet.
   struct Site {
