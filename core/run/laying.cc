@@ -16,14 +16,12 @@ namespace {
 // The lattice is laid this much denser than its covering radius asks: curvature stretches it.
 constexpr double kSlack = 0.97;
 // Seeds are dense where, of those a sample may have, fewer than this share lie so many spacings
-// from each other: then the lattice would have no room between them. A quarter of those drawn for a
-// surface of some 600 vertices do, from where on a lattice needs a fifth to a third fewer; asked
-// ahead for, more rounds than that is worth below 1,700. Of a given sample of dimension 3 one in
-// ninety does, and a tenth is where a lattice begins to need fewer vertices, at some 1,500.
+// from each other: then the lattice would have no room between them. A tenth of those drawn do
+// where a surface begins to need a fifth to a third fewer vertices for it, at some 300, and, of a
+// given sample of dimension 3, of which one in ninety does, where that does, at some 1,500. Curves
+// need fewer only where they take many more rounds.
 constexpr double kSparse = 3;
-constexpr double SparseShare(int k, bool ask_ahead) {
-  return k == 3 ? 0.1 : k == 2 && !ask_ahead ? 0.25 : 0.5;
-}
+constexpr double SparseShare(int k) { return k < 2 ? 0.5 : 0.1; }
 // From 4 on hardly any lie so far from each other where a lattice begins to need fewer vertices:
 // what counts is how many more than the seeds there will be, by a guess that is low there. A sphere
 // breaks even at some 2,500 vertices, a flat torus below 3,000.
@@ -62,8 +60,7 @@ bool AreSparse(const Engine<K>& engine, const AnsweredPoints& seeds, const Speci
            kTimesSeeds * static_cast<double>(std::max<std::size_t>(
                              kDefaultBoxSeeds, CountApart(seeds, most, epsilon, shares)));
   return static_cast<double>(CountApart(seeds, most, kSparse * LaidSpacing(K, epsilon), shares)) >=
-         SparseShare(K, spec.criteria.ask_ahead) *
-             static_cast<double>(CountApart(seeds, most, epsilon, shares));
+         SparseShare(K) * static_cast<double>(CountApart(seeds, most, epsilon, shares));
 }
 
 // Seeds are no vertices yet there, and in nobody's way.

@@ -193,7 +193,7 @@ std::string Dying(const std::string& when) {
 }
 {
   r = sqrt($1 ^ 2 + $2 ^ 2 + $3 ^ 2)
-  print $1 / r, $2 / r, $3 / r
+  printf "%.17g %.17g %.17g\n", $1 / r, $2 / r, $3 / r
   if (--left == 0) fflush()
 })";
 }

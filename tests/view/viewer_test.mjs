@@ -19,7 +19,7 @@ test("a finished mesh, its numbers and its certificate", async () => {
   const gateway = await stage.gateway(name);
   const page = await stage.page(gateway.url);
   await until(page, certified);
-  await until(page, () => Number(document.getElementById("stage").dataset.vertices) > 900);
+  await until(page, () => Number(document.getElementById("stage").dataset.vertices) > 800);
   await until(page, () => document.querySelectorAll("#histograms canvas").length === 4);
 
   const { share, parts, colours } = await picture(page);

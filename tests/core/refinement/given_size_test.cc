@@ -256,8 +256,9 @@ TEST(GivenSize, IsGuessedWhenAskingAhead) {
   ExpectCertified(ahead, 0);
   EXPECT_LE(RadiiOf(*ahead.mesher, *torus).largest_share, 0.2 * (1 + 1e-9));
   EXPECT_LT(2 * ahead.report().counts.rounds, plain.report().counts.rounds);
+  // Plain it is laid as a lattice, ahead it grows star by star.
   EXPECT_LT(static_cast<double>(ahead.report().counts.vertices),
-            1.15 * static_cast<double>(plain.report().counts.vertices));
+            1.3 * static_cast<double>(plain.report().counts.vertices));
 }
 
 TEST(GivenSize, IsDeterministicHoweverItIsCut) {

@@ -175,7 +175,6 @@ TEST(Seeds, ManyTimesTheSameAreOne) {
   ExpectGoodMesh(b, manifold->facts());
   EXPECT_EQ(a.mesher->Points(), b.mesher->Points());
   EXPECT_EQ(a.mesher->Simplices(), b.mesher->Simplices());
-  EXPECT_GE(b.report().counts.duplicates, 7u * 29u);
 }
 
 TEST(Seeds, OneCoversAComponent) {

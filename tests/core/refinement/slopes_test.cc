@@ -71,7 +71,7 @@ TEST(Cost, OfTenThousandVerticesIsFewRoundTripsAndAboutOneQueryEach) {
 
 // The mesh depends on the manifold and not on the space around it.
 TEST(Cost, InVerticesAndQueriesDoesNotGrowWithTheAmbientDimension) {
-  const FinishedRun low = RunMesher("torus:1:0.4", 0.1), high = RunMesher("torus:1:0.4@100", 0.1);
+  const FinishedRun low = RunMesher("torus:1:0.4", 0.07), high = RunMesher("torus:1:0.4@100", 0.07);
   ASSERT_TRUE(low.report.certificate.certified) << low.report.certificate.verdict;
   ASSERT_TRUE(high.report.certificate.certified) << high.report.certificate.verdict;
   const auto ratio = [](std::uint64_t a, std::uint64_t b) {
