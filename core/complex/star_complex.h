@@ -365,6 +365,13 @@ class StarComplex {
   std::uint64_t simplex_count_ = 0;
 };
 
+template <>
+void StarComplex<2>::CutPolygon(std::uint32_t p, std::span<const Cut> cuts);
+template <>
+void StarComplex<2>::BuildAllLaidPolygons(double* influence);
+template <>
+void StarComplex<2>::BuildLaidPolygons(std::span<const BallTree::Bunch> bunches, double* influence);
+
 STELLATE_DECLARE_CLASS(StarComplex)
 
 }  // namespace stellate::core

@@ -143,8 +143,8 @@ double BallAround(std::span<const BallTree::Bunch> bunches, int d, std::vector<d
 
 // A search for all of them, of which a part is copied for each bunch: most of the time goes into
 // looking which of that are near a point.
-template <int K>
-void StarComplex<K>::BuildLaidPolygons(std::span<const BallTree::Bunch> bunches,
+template <>
+void StarComplex<2>::BuildLaidPolygons(std::span<const BallTree::Bunch> bunches,
                                        double* influence) {
   thread_local std::vector<std::uint32_t> around, farther;
   thread_local Gathered gathered, more;
@@ -189,8 +189,8 @@ void StarComplex<K>::BuildLaidPolygons(std::span<const BallTree::Bunch> bunches,
   }
 }
 
-template <int K>
-void StarComplex<K>::BuildAllLaidPolygons(double* influence) {
+template <>
+void StarComplex<2>::BuildAllLaidPolygons(double* influence) {
   const std::vector<BallTree::Bunch> bunches = tree_.Bunches();
   const std::vector<std::size_t> begins =
       CutIntoStretches(bunches, d_, [this](std::uint32_t p) { return LaidBound(p); });
@@ -200,8 +200,8 @@ void StarComplex<K>::BuildAllLaidPolygons(double* influence) {
 }
 
 // The half-spaces of facets beside a cut are found as they are needed, once each.
-template <int K>
-void StarComplex<K>::CutPolygon(std::uint32_t p, std::span<const Cut> cuts) {
+template <>
+void StarComplex<2>::CutPolygon(std::uint32_t p, std::span<const Cut> cuts) {
   LaidPolygon& polygon = ThreadPolygon();
   const Site site = At(p);
   const double weight = Weight(p);
@@ -215,9 +215,5 @@ void StarComplex<K>::CutPolygon(std::uint32_t p, std::span<const Cut> cuts) {
                    half_space);
   cells_[p].Take(polygon);
 }
-
-template void StarComplex<2>::BuildLaidPolygons(std::span<const BallTree::Bunch>, double*);
-template void StarComplex<2>::BuildAllLaidPolygons(double*);
-template void StarComplex<2>::CutPolygon(std::uint32_t, std::span<const Cut>);
 
 }  // namespace stellate::core

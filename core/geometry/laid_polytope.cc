@@ -179,8 +179,8 @@ bool LaidPolytope::GiveUp() {
 }
 
 // The two ends of an edge, who are on the same two facets, find each other there.
-template <int K>
-void RestrictedVoronoiCell<K>::Take(const LaidPolytope& polytope) {
+template <>
+void RestrictedVoronoiCell<3>::Take(const LaidPolytope& polytope) {
   constexpr std::size_t kMost = LaidPolytope::kMostFacets;
   thread_local std::array<std::array<std::uint16_t, kMost>, kMost> end;  // vertex and slot
   std::uint64_t mixed[kMost];
@@ -221,7 +221,5 @@ void RestrictedVoronoiCell<K>::Take(const LaidPolytope& polytope) {
   has_fake_ =
       std::any_of(facets_.begin(), facets_.end(), [](const Facet& f) { return IsFake(f.id); });
 }
-
-template void RestrictedVoronoiCell<3>::Take(const LaidPolytope&);
 
 }  // namespace stellate::core

@@ -168,6 +168,9 @@ class RestrictedVoronoiCell {
   bool has_fake_ = true;
 };
 
+template <>
+void RestrictedVoronoiCell<3>::Take(const LaidPolytope& polytope);
+
 extern template class RestrictedVoronoiCell<1>;
 extern template class RestrictedVoronoiCell<3>;
 extern template class RestrictedVoronoiCell<4>;

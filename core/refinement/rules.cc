@@ -56,7 +56,7 @@ double GramDeterminant(double (&g)[J][J]) {
 
 // The edges of a k-simplex from its vertex p to the others.
 template <int K>
-struct EdgesAt {
+struct SimplexEdges {
   double length2[K];
   double between2[K][K];  // below the diagonal, of the edges between their ends
   double gram[K][K];
@@ -64,7 +64,7 @@ struct EdgesAt {
 
 // Whether the face on p and the others in `face`, a bit each, two at least, is a sliver.
 template <int K, unsigned face>
-bool IsThin(const EdgesAt<K>& edges, double sliver_bound) {
+bool IsThin(const SimplexEdges<K>& edges, double sliver_bound) {
   constexpr int j = std::popcount(face);
   constexpr auto at = [] {
     std::array<int, j> ends{};
@@ -92,7 +92,7 @@ bool IsThin(const EdgesAt<K>& edges, double sliver_bound) {
 }
 
 template <int K>
-bool HasThinFace(const EdgesAt<K>& edges, double sliver_bound) {
+bool HasThinFace(const SimplexEdges<K>& edges, double sliver_bound) {
   const auto is_thin = [&](auto face) {
     if constexpr (std::popcount(face()) < 2)
       return false;
@@ -191,7 +191,7 @@ bool HasThinFaceAt(const StarComplex<K>& complex, const double* p,
     const std::uint32_t id = cell.id(cell.facet(v, a));
     q[a] = id < complex.size() ? complex.Point(id) : unborn;
   }
-  EdgesAt<K> edges;
+  SimplexEdges<K> edges;
   WithDimension(d, [&](auto known) {
     const int n = known() > 0 ? known() : d;
     for (int a = 0; a < K; ++a) {
