@@ -88,14 +88,17 @@ class Restart : public ::testing::Test {
     };
   }
 
-  // Has `happens` come to pass while the oracle is at the first batch after `rounds` others.
-  void AfterRounds(int rounds, std::function<void()> happens) {
-    oracle_.on_flat = [=, this, calls = 0](const auto&, const auto&, const auto&, Answer&) mutable {
-      if (++calls % (rounds + 1) == 0 && disasters_ > 0) {
+  // Has `happens` come to pass while the oracle is at the first batch after `batches` others, of
+  // closest points or flats; then again after as many, as long as disasters are left.
+  void AfterBatches(int batches, std::function<void()> happens) {
+    const auto count = [=, this] {
+      if (++asked_ % (batches + 1) == 0 && disasters_ > 0) {
         --disasters_;
         happens();
       }
     };
+    oracle_.on_closest = [count](const auto&, Answer&) { count(); };
+    oracle_.on_flat = [count](const auto&, const auto&, const auto&, Answer&) { count(); };
   }
 
   void ExpectTheUndisturbedMesh() {
@@ -115,6 +118,7 @@ class Restart : public ::testing::Test {
   const std::unique_ptr<Manifold> torus_;
   SpoiledOracle oracle_;
   MeshOptions options_;
+  int asked_ = 0;  // batches
   int disasters_ = 1;
   int failures_ = 0, returns_ = 0;
   std::function<void()> on_failure_;
@@ -122,7 +126,7 @@ class Restart : public ::testing::Test {
 
 TEST_F(Restart, KilledTwiceTheServerIsWaitedFor) {
   disasters_ = 2;
-  AfterRounds(3, [this] {
+  AfterBatches(3, [this] {
     server_.End(SIGKILL);
     server_.Start();
   });
@@ -139,7 +143,7 @@ class GradedRestart : public Restart {
 
 TEST_F(GradedRestart, SizesAreReplayed) {
   disasters_ = 2;
-  AfterRounds(6, [this] {
+  AfterBatches(6, [this] {
     server_.End(SIGKILL);
     server_.Start();
   });
@@ -147,7 +151,7 @@ TEST_F(GradedRestart, SizesAreReplayed) {
 }
 
 TEST_F(Restart, AStoppedServerIsWaitedFor) {
-  AfterRounds(4, [this] {
+  AfterBatches(4, [this] {
     server_.End(SIGTERM);
     server_.Start();
   });
@@ -156,21 +160,21 @@ TEST_F(Restart, AStoppedServerIsWaitedFor) {
 
 TEST_F(Restart, AFrozenServerIsFoundByPings) {
   options_.keepalive_seconds = 0.5;
-  AfterRounds(3, [this] { server_.Send(SIGSTOP); });
+  AfterBatches(3, [this] { server_.Send(SIGSTOP); });
   on_failure_ = [this] { server_.Send(SIGCONT); };
   ExpectTheUndisturbedMesh();
 }
 
 TEST_F(Restart, AServerThatStaysAwayIsGivenUp) {
   options_.reconnect_seconds = 0.2;
-  AfterRounds(2, [this] { server_.End(SIGKILL); });
+  AfterBatches(2, [this] { server_.End(SIGKILL); });
   const Expected<Mesh> mesh = MeshManifold(oracle_, options_);
   ASSERT_FALSE(mesh.has_value());
   EXPECT_EQ(mesh.error().code, ErrorCode::kServerFailed);
 }
 
 TEST_F(Restart, AServerThatForgotIsNotWaitedFor) {
-  AfterRounds(2, [this] {
+  AfterBatches(2, [this] {
     server_.End(SIGKILL);
     server_.Start(/*with_memory=*/false);
   });
@@ -183,7 +187,7 @@ TEST_F(Restart, AServerThatForgotIsNotWaitedFor) {
 TEST_F(Restart, TheWaitCanBeCancelled) {
   std::stop_source source;
   options_.stop = source.get_token();
-  AfterRounds(2, [this] { server_.End(SIGKILL); });
+  AfterBatches(2, [this] { server_.End(SIGKILL); });
   on_failure_ = [&source] { source.request_stop(); };
   const Expected<Mesh> mesh = MeshManifold(oracle_, options_);
   ASSERT_FALSE(mesh.has_value());
