@@ -39,6 +39,12 @@ def save(figure: Figure, name: str, dpi: int = 90) -> None:
     picture.quantize(160, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
+def eye_of(axes: Axes3D) -> np.ndarray:
+    """The unit vector towards whoever looks at it."""
+    e, a = np.radians([axes.elev, axes.azim])
+    return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+
+
 def shaded(
     axes: Axes3D,
     points: np.ndarray,
@@ -48,32 +54,32 @@ def shaded(
     colour: str = "#5ca8e5",
     marked: np.ndarray | None = None,
     size: float | None = None,
+    lines: float = 0.3,
 ) -> None:
     """A closed surface, the far side left out; `marked` triangles (bool) in red.
 
-    `size`: the half width of what is shown; the largest coordinate if none is given.
+    `size`: the half width of what is shown; the largest coordinate if none is given. `lines`: the
+    width of the edges.
     """
     corners = points[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    e, a = np.radians([elevation, azimuth])
-    eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    axes.view_init(elevation, azimuth)
     light = np.array([0.35, -0.55, 0.76])
     shade = 0.35 + 0.65 * np.clip(normals @ light, 0, 1)
     base = np.tile(matplotlib.colors.to_rgb(colour), (len(triangles), 1))
     if marked is not None:
         base[marked] = matplotlib.colors.to_rgb(RED)
-    front = normals @ eye > -0.15
+    front = normals @ eye_of(axes) > -0.15
     axes.add_collection3d(
         Poly3DCollection(
             corners[front],
             facecolors=(shade[:, None] * base)[front],
             edgecolors=INK,
-            linewidths=0.3,
+            linewidths=lines,
         )
     )
     size = size or np.abs(points).max()
     axes.set(xlim=(-size, size), ylim=(-size, size), zlim=(-size, size))
     axes.set_box_aspect((1, 1, 1), zoom=1.7)
-    axes.view_init(elevation, azimuth)
     axes.set_axis_off()
