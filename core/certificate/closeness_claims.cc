@@ -10,6 +10,7 @@
 #include "core/base/message.h"
 #include "core/certificate/along.h"
 #include "core/certificate/probes.h"
+#include "core/certificate/rounding.h"
 
 namespace stellate::core {
 namespace {
@@ -92,8 +93,8 @@ void ClosenessClaims::JudgeVertices(const AnswerBlock& answer) {
                                  Brief(error), " away"));
     }
   }
-  x_.position_error =
-      std::max({worst, kLeastError * x_.size, kRounding * LargestCoordinate(x_.mesh)});
+  x_.position_error = std::max({worst, RoundingOf(answer.points), kLeastError * x_.size,
+                                kRounding * LargestCoordinate(x_.mesh)});
   if (worst > kNoticeablePositionError * x_.size && worst <= kPositionTolerance * x_.size) {
     x_.findings.Warn(Message("The oracle moves points that it returned itself by up to ",
                              Brief(worst), ", ", Brief(100 * worst / x_.size),
