@@ -18,6 +18,7 @@
 #include "server/base/version.h"
 #include "server/config/flags.h"
 #include "server/config/listen_address.h"
+#include "server/memory/allocator.h"
 #include "server/net/health_check.h"
 #include "server/net/tls.h"
 #include "server/salvage/salvage.h"
@@ -126,6 +127,7 @@ int main(int argc, char** argv) {
   if (flags.health_check) return RunHealthCheck(flags);
   if (flags.verify_data_dir || flags.salvage) return RunOnDataDir(flags);
 
+  stellate::server::GiveBackLargeBlocks();
   // Before gRPC starts its threads, which inherit the mask: then sigtimedwait alone sees them.
   const sigset_t signals = Signals(config);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);

@@ -67,7 +67,7 @@ std::optional<EmbeddedStars> MeasureIfEmbedded(const MeshView& mesh, const Stars
   std::uint64_t neighbours = 0;
   embedded.geometry = MeasureBy(sweep, &neighbours);
   if (sweep.is_refuted) return std::nullopt;
-  embedded.connectivity = ComputeConnectivity(stars, sweep.sides);
+  embedded.connectivity = ComputeConnectivity(stars.list(), sweep.sides);
   // V - E + F - ..., with k + 1 facets a simplex, each in two: V - E for a curve, V - E + F for
   // both a surface and a manifold of dimension 3.
   embedded.euler_characteristic = static_cast<std::int64_t>(mesh.vertices) -

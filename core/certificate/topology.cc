@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <memory>
 #include <numeric>
+#include <utility>
 
 #include "core/base/message.h"
 #include "core/base/parallel.h"
@@ -120,55 +123,67 @@ std::size_t Orient(const Adjacency& adjacency, Connectivity& result) {
   return parts;
 }
 
-// That two vertices are in one simplex, and whether their stars' orientations differ.
-struct Tie {
-  std::uint32_t a, b;
-  bool flips;
-};
-
-constexpr std::uint32_t kJoinedTogether = 1 << 14;
-
-// Vertices joined in trees, each by a tie to its parent.
+// Vertices joined in trees, by ties that say whether the stars of two are oriented oppositely: by
+// any number of threads at once. Which trees there are in the end, and whether some tie contradicts
+// others, hangs on no order.
 class VertexForest {
  public:
-  explicit VertexForest(std::uint32_t vertices) : parent_(vertices), flips_(vertices, 0) {
-    std::iota(parent_.begin(), parent_.end(), 0u);
+  explicit VertexForest(std::uint32_t vertices)
+      : vertices_(vertices), up_(std::make_unique<std::atomic<Up>[]>(vertices)) {
+    ParallelFor(vertices, [&](std::uint32_t v) { up_[v].store(Pack(v, 0), kRelaxed); });
   }
 
-  // Changes nothing but what the trees of a and b have above these two. False if the two were
-  // joined by a tie that says otherwise.
+  // False if other ties say the opposite of this one.
   bool Join(std::uint32_t a, std::uint32_t b, bool flips) {
-    if (parent_[a] == parent_[b])  // as mostly
-      return (flips_[a] ^ flips_[b]) == (flips ? 1 : 0);
-    const std::uint8_t differ = static_cast<std::uint8_t>(Climb(&a) ^ Climb(&b) ^ (flips ? 1 : 0));
-    if (a == b) return differ == 0;
-    parent_[std::max(a, b)] = std::min(a, b);
-    flips_[std::max(a, b)] = differ;
-    return true;
+    const Up differ = flips ? 1 : 0;
+    const Up up_a = up_[a].load(kRelaxed), up_b = up_[b].load(kRelaxed);
+    if (Parent(up_a) == Parent(up_b)) return (Flips(up_a) ^ Flips(up_b)) == differ;  // as mostly
+    while (true) {
+      const auto [root_a, flips_a] = Climb(a);
+      const auto [root_b, flips_b] = Climb(b);
+      const Up of_roots = flips_a ^ flips_b ^ differ;
+      if (root_a == root_b) return of_roots == 0;
+      const std::uint32_t low = std::min(root_a, root_b), high = std::max(root_a, root_b);
+      Up root = Pack(high, 0);
+      if (up_[high].compare_exchange_strong(root, Pack(low, of_roots), kRelaxed)) return true;
+      // Another thread has tied that root meanwhile.
+    }
   }
 
   std::uint64_t CountTrees() const {
     std::uint64_t trees = 0;
-    for (std::uint32_t v = 0; v < parent_.size(); ++v) trees += parent_[v] == v;
+    for (std::uint32_t v = 0; v < vertices_; ++v) trees += Parent(up_[v].load(kRelaxed)) == v;
     return trees;
   }
 
  private:
-  // Goes to the root; returns 1 if the ties on the way flip in all.
-  std::uint8_t Climb(std::uint32_t* v) {
-    std::uint8_t flips = 0;
-    while (parent_[*v] != *v) {
-      const std::uint32_t parent = parent_[*v];
-      flips_[*v] ^= flips_[parent];  // 0 at a root
-      parent_[*v] = parent_[parent];
-      flips ^= flips_[*v];
-      *v = parent_[*v];
+  // The parent, the vertex itself at a root, and in the lowest bit whether the two are oriented
+  // oppositely: one word, so that nobody sees half of it. Nothing else is handed from thread to
+  // thread.
+  using Up = std::uint64_t;
+  static constexpr auto kRelaxed = std::memory_order_relaxed;
+  static Up Pack(std::uint32_t parent, Up flips) { return Up{parent} << 1 | flips; }
+  static std::uint32_t Parent(Up up) { return static_cast<std::uint32_t>(up >> 1); }
+  static Up Flips(Up up) { return up & 1; }
+
+  // The root, and whether v is oriented oppositely to it. Halves the way there.
+  std::pair<std::uint32_t, Up> Climb(std::uint32_t v) {
+    Up flips = 0;
+    while (true) {
+      Up up = up_[v].load(kRelaxed);
+      const std::uint32_t parent = Parent(up);
+      if (parent == v) return {v, flips};
+      const Up above = up_[parent].load(kRelaxed);
+      const Up both = Flips(up) ^ Flips(above);
+      if (Parent(above) != parent)
+        up_[v].compare_exchange_weak(up, Pack(Parent(above), both), kRelaxed);
+      flips ^= both;
+      v = Parent(above);
     }
-    return flips;
   }
 
-  std::vector<std::uint32_t> parent_;
-  std::vector<std::uint8_t> flips_;
+  std::uint32_t vertices_;
+  std::unique_ptr<std::atomic<Up>[]> up_;
 };
 
 }  // namespace
@@ -302,36 +317,18 @@ Connectivity ComputeConnectivity(const Adjacency& adjacency) {
   return result;
 }
 
-Connectivity ComputeConnectivity(const Stars& stars, std::span<const std::uint8_t> sides) {
-  const SimplexList& list = stars.list();
+Connectivity ComputeConnectivity(const SimplexList& list, std::span<const std::uint8_t> sides) {
   VertexForest forest(list.vertices);
-  std::vector<std::vector<Tie>> left((list.vertices + kJoinedTogether - 1) / kJoinedTogether);
-  std::vector<std::uint8_t> oriented(left.size(), 1);
-  // Ties within a part first, all parts at once.
-  ParallelFor(left.size(), [&](std::size_t part) {
-    const auto begin = static_cast<std::uint32_t>(part * kJoinedTogether);
-    const std::uint32_t end = begin + std::min(list.vertices - begin, kJoinedTogether);
-    for (std::uint32_t v = begin; v < end; ++v) {
-      for (const std::uint32_t s : stars.Star(v)) {
-        const std::uint32_t* ids = list[s];
-        if (ids[0] != v) continue;
-        for (int i = 1; i <= list.k; ++i) {
-          const bool flips = ((sides[s] ^ sides[s] >> i) & 1) != 0;
-          if (ids[i] >= end)
-            left[part].push_back({v, ids[i], flips});
-          else if (!forest.Join(v, ids[i], flips))
-            oriented[part] = 0;
-        }
-      }
+  std::atomic<bool> orientable = true;
+  ParallelFor(list.size(), [&](std::uint32_t s) {
+    const std::uint32_t* ids = list[s];
+    for (int i = 1; i <= list.k; ++i) {
+      const bool flips = ((sides[s] ^ sides[s] >> i) & 1) != 0;
+      if (!forest.Join(ids[0], ids[i], flips)) orientable = false;
     }
   });
   Connectivity result;
-  result.orientable = std::find(oriented.begin(), oriented.end(), 0) == oriented.end();
-  for (const std::vector<Tie>& ties : left) {
-    ThrowIfInterrupted();
-    for (const Tie& tie : ties)
-      if (!forest.Join(tie.a, tie.b, tie.flips)) result.orientable = false;
-  }
+  result.orientable = orientable;
   result.components = forest.CountTrees();
   return result;
 }

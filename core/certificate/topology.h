@@ -125,7 +125,7 @@ Connectivity ComputeConnectivity(const Adjacency& adjacency);
 // how each simplex is oriented at its vertices. `sides`: by simplex, bit i for vertex number i: as
 // the simplices at one vertex are oriented alike, whether the order of the simplex' ids says so or
 // the opposite.
-Connectivity ComputeConnectivity(const Stars& stars, std::span<const std::uint8_t> sides);
+Connectivity ComputeConnectivity(const SimplexList& list, std::span<const std::uint8_t> sides);
 
 // "(3 17 20)": vertex ids as messages name a simplex.
 std::string NameSimplex(const std::uint32_t* ids, int count);
