@@ -258,22 +258,31 @@ void BallTree::LeaveRoom(std::size_t parts) {
 void BallTree::SetInfluences(std::vector<double> influences) {
   influence_ = std::move(influences);
   stale_.clear();
+  ParallelFor(nodes_.size(), [&](std::size_t n) {
+    if (nodes_[n].children == kNone) MeasureOutreach(static_cast<std::uint32_t>(n));
+  });
   for (std::size_t n = nodes_.size(); n-- > 0;) {
     CheckInterruption(n);
     Node& node = nodes_[n];
-    const double* const centre = Centre(static_cast<std::uint32_t>(n));
-    node.outreach = 0;
-    if (node.children == kNone) {
-      for (std::uint32_t i = 0; i < node.count; ++i) {
-        const std::uint32_t id = slots_[node.first + i];
-        node.outreach = std::max(node.outreach, Distance(centre, Point(id), d_) + influence_[id]);
-      }
-    } else {
-      for (std::uint32_t c = node.children; c <= node.children + 1; ++c)
-        node.outreach =
-            std::max(node.outreach, Distance(centre, Centre(c), d_) + nodes_[c].outreach);
-    }
+    if (node.children != kNone) node.outreach = OutreachOfChildren(static_cast<std::uint32_t>(n));
   }
+}
+
+void BallTree::MeasureOutreach(std::uint32_t leaf) {
+  double outreach = 0;
+  for (std::uint32_t i = 0; i < nodes_[leaf].count; ++i) {
+    const std::uint32_t id = slots_[nodes_[leaf].first + i];
+    outreach = std::max(outreach, Distance(Centre(leaf), Point(id), d_) + influence_[id]);
+  }
+  nodes_[leaf].outreach = outreach;
+}
+
+double BallTree::OutreachOfChildren(std::uint32_t n) const {
+  const std::uint32_t a = nodes_[n].children;
+  double outreach = 0;
+  for (std::uint32_t c = a; c <= a + 1; ++c)
+    outreach = std::max(outreach, Distance(Centre(n), Centre(c), d_) + nodes_[c].outreach);
+  return outreach;
 }
 
 std::vector<BallTree::Bunch> BallTree::Bunches() const {
@@ -370,23 +379,18 @@ void BallTree::SetInfluence(std::uint32_t id, double influence) {
 void BallTree::Refit() {
   ParallelSort(stale_, std::less<>());
   stale_.erase(std::unique(stale_.begin(), stale_.end()), stale_.end());
+  ParallelFor(stale_.size(), [&](std::size_t i) {
+    // One that has been split since was measured then.
+    if (nodes_[stale_[i]].children == kNone) MeasureOutreach(stale_[i]);
+  });
   std::size_t steps = 0;
   for (const std::uint32_t leaf : stale_) {
     CheckInterruption(steps++);
-    if (nodes_[leaf].children != kNone) continue;  // split since: measured then
-    double outreach = 0;
-    for (std::uint32_t i = 0; i < nodes_[leaf].count; ++i) {
-      const std::uint32_t id = slots_[nodes_[leaf].first + i];
-      outreach = std::max(outreach, Distance(Centre(leaf), Point(id), d_) + influence_[id]);
-    }
-    nodes_[leaf].outreach = outreach;
+    if (nodes_[leaf].children != kNone) continue;
     for (std::uint32_t n = nodes_[leaf].parent; n != kNone; n = nodes_[n].parent) {
-      const std::uint32_t a = nodes_[n].children;
-      double bound = 0;
-      for (std::uint32_t c = a; c <= a + 1; ++c)
-        bound = std::max(bound, Distance(Centre(n), Centre(c), d_) + nodes_[c].outreach);
-      if (bound >= nodes_[n].outreach) break;  // already as tight as the children allow
-      nodes_[n].outreach = bound;
+      const double outreach = OutreachOfChildren(n);
+      if (outreach >= nodes_[n].outreach) break;  // already as tight as the children allow
+      nodes_[n].outreach = outreach;
     }
   }
   stale_.clear();

@@ -165,6 +165,8 @@ class BallTree {
                 const std::uint32_t* end);
   void Mean(const std::uint32_t* begin, const std::uint32_t* end, double* mean) const;
   void Measure(std::uint32_t node, const std::uint32_t* begin, const std::uint32_t* end);
+  void MeasureOutreach(std::uint32_t leaf);
+  double OutreachOfChildren(std::uint32_t node) const;
   void Split(std::uint32_t node);
   void Rebuild(Halving halving);
 
