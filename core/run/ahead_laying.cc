@@ -18,7 +18,7 @@ namespace {
 // Epsilon of the coarse mesh, in those of the final one: what can be guessed from it grows less
 // exact with the fourth power. Seeds that lie nearer to each other tell for a finer one.
 constexpr double kLeastCoarse = 2;
-constexpr double kMostCoarse = 15;
+constexpr double kMostCoarse = 8;
 constexpr double kCoarseStep = 0.8;
 constexpr double kShareApart = 0.5;
 // So many points tell enough of M; or all seeds, where they are fewer.
@@ -28,6 +28,10 @@ constexpr double kSeedSpacing = 0.5;
 // It need not be whole: what it misses is left to the refinement of the final one.
 constexpr int kMostRounds = 4;
 constexpr double kMostBad = 0.25;
+// Where so many stars are still bad after so many rounds, near the limits of what a reach allows,
+// guesses would be far off.
+constexpr int kTellingRounds = 2;
+constexpr double kHopeless = 0.8;
 // Answers fall elsewhere than guessed. Nearer to each other than this many spacings they would cost
 // quality.
 constexpr double kKept = 0.6;
@@ -56,6 +60,17 @@ Specification CoarserThan(Specification spec, double epsilon) {
   spec.criteria.judging = Judging::kFlats;
   if (auto& step = spec.criteria.advance_step) step = std::max(*step, epsilon);
   return spec;
+}
+
+template <int K>
+AnsweredPoints PointsOf(const StarComplex<K>& complex) {
+  AnsweredPoints answers;
+  answers.points =
+      Eigen::Map<const Eigen::MatrixXd>(complex.points().data(), complex.d(), complex.size());
+  answers.tangents =
+      Eigen::Map<const Eigen::MatrixXd>(complex.Tangent(0), complex.d() * K, complex.size());
+  answers.found.assign(complex.size(), 1);
+  return answers;
 }
 
 }  // namespace
@@ -101,13 +116,16 @@ std::vector<std::uint8_t> AheadLaying<K>::Scout(const AnsweredPoints& answers,
   return used;
 }
 
+template <int K>
+double AheadLaying<K>::BadShare() const {
+  return static_cast<double>(coarse_->book().size_and_shape().size()) / coarse_->complex().size();
+}
+
 // Until R1 mostly holds.
 template <int K>
 CandidateSet<K> AheadLaying<K>::RefineCoarse(std::uint64_t round) {
   CandidateSet<K> candidates;
-  const double bad = static_cast<double>(coarse_->book().size_and_shape().size());
-  if (rounds_++ == kMostRounds || coarse_->is_full() || bad <= kMostBad * coarse_->complex().size())
-    return candidates;
+  if (rounds_++ == kMostRounds || coarse_->is_full() || BadShare() <= kMostBad) return candidates;
   auto targets = coarse_->Plan();
   if (!targets || targets->empty() || targets->front().violation.rule >= Rule::kSliver)
     return candidates;
@@ -124,20 +142,11 @@ CandidateSet<K> AheadLaying<K>::RefineCoarse(std::uint64_t round) {
 template <int K>
 PlannedPoints AheadLaying<K>::GrowOnGuesses() {
   const StarComplex<K>& coarse = coarse_->complex();
-  const auto known = [](const StarComplex<K>& complex) {
-    AnsweredPoints answers;
-    answers.points =
-        Eigen::Map<const Eigen::MatrixXd>(complex.points().data(), complex.d(), complex.size());
-    answers.tangents =
-        Eigen::Map<const Eigen::MatrixXd>(complex.Tangent(0), complex.d() * K, complex.size());
-    answers.found.assign(complex.size(), 1);
-    return answers;
-  };
   guess_.emplace(coarse, coarse_->criteria().advance_step, 0);
   Growth<K> growth(coarse.d(), spacing_);
   const std::uint64_t most = std::min(spec_.limits.max_vertices, 2 * MostAtOnce(K, coarse.d()));
   std::vector<double> points, tangents;
-  const AnsweredPoints scouts = known(engine_.complex()), all = known(coarse);
+  const AnsweredPoints scouts = PointsOf<K>(engine_.complex()), all = PointsOf<K>(coarse);
   growth.Begin(scouts.points, scouts.tangents, scouts.found, 0);
   for (bool goes_on = true; goes_on;) {
     while (growth.size() < most) {
@@ -172,7 +181,13 @@ PlannedPoints AheadLaying<K>::GrowOnGuesses() {
 template <int K>
 CandidateSet<K> AheadLaying<K>::Next(std::uint64_t round) {
   CandidateSet<K> candidates;
+  if (rings_) return rings_->Next(round);
   if (guess_) return candidates;
+  if (rounds_ == kTellingRounds && BadShare() > kHopeless) {
+    rings_.emplace(engine_, false);
+    rings_->GoOn(PointsOf<K>(engine_.complex()), PointsOf<K>(coarse_->complex()));
+    return rings_->Next(round);
+  }
   candidates = RefineCoarse(round);
   if (candidates.size() > 0) return candidates;
   candidates.planned = GrowOnGuesses();
@@ -183,6 +198,7 @@ CandidateSet<K> AheadLaying<K>::Next(std::uint64_t round) {
 template <int K>
 std::vector<std::uint8_t> AheadLaying<K>::Take(const CandidateSet<K>& candidates,
                                                const AnsweredPoints& answers) {
+  if (rings_) return rings_->Take(candidates, answers);
   if (guess_) return LayThoseApart(answers);
   const Inserted inserted = coarse_->Insert(candidates, answers);
   coarse_->Commit();
@@ -250,6 +266,7 @@ std::vector<std::uint8_t> AheadLaying<K>::LayThoseApart(const AnsweredPoints& an
 // As many spacings apart as patches begin.
 template <int K>
 double AheadLaying<K>::CountMissing() const {
+  if (rings_) return rings_->CountMissing();
   return guess_ ? static_cast<double>(asked_.cols())
                 : std::pow(kPatchesApart, K) * engine_.complex().size();
 }

@@ -45,6 +45,13 @@ std::vector<std::uint8_t> RingLaying<K>::Begin(const AnsweredPoints& seeds) {
                                        scouting_->spacing(), SharesOf(engine_.sizes(), seeds)));
 }
 
+template <int K>
+void RingLaying<K>::GoOn(const AnsweredPoints& sample, const AnsweredPoints& seeds) {
+  seeds_ = seeds;
+  scouting_.reset();
+  growth_.Begin(sample.points, sample.tangents, sample.found, 0);
+}
+
 // What scouts find is of the sample at once: it is what there is if the run ends here.
 template <int K>
 std::vector<std::uint8_t> RingLaying<K>::Scout(const AnsweredPoints& answers,

@@ -19,6 +19,8 @@ class RingLaying final : public Laying<K> {
   RingLaying(Engine<K>& engine, bool has_walls);  // borrowed
 
   std::vector<std::uint8_t> Begin(const AnsweredPoints& seeds) override;
+  // In place of Begin: from the sample as it is, and from seeds where no patch comes.
+  void GoOn(const AnsweredPoints& sample, const AnsweredPoints& seeds);
   CandidateSet<K> Next(std::uint64_t round) override;
   std::vector<std::uint8_t> Take(const CandidateSet<K>& candidates,
                                  const AnsweredPoints& answers) override;

@@ -69,7 +69,24 @@ TEST_P(AheadLaid, IsTheSameForAnyNumberOfThreads) {
 INSTANTIATE_TEST_SUITE_P(Catalogue, AheadLaid,
                          ::testing::Values(Case{"torus", 0.04, 8}, Case{"sphere:2", 0.04, 8},
                                            Case{"circle:3", 0.003, 8}, Case{"two-spheres", 0.06, 9},
-                                           Case{"sphere:3", 0.16, 9}, Case{"so3", 0.33, 9}));
+                                           Case{"tanglecube", 0.05, 10}, Case{"sphere:3", 0.16, 9},
+                                           Case{"so3", 0.33, 9}));
+
+// At 0.4 of its reach a mesh of T^3 twice as coarse does not come about.
+TEST(AheadLaying, LeavesToRingsWhatCannotBeGuessed) {
+  const auto torus = Make("flat-torus:3");
+  Specification spec = AheadOn(*torus, 0.4);
+  const DrivenRun ahead = Drive(spec, *torus);
+  ExpectGoodMesh(ahead, torus->facts());
+  spec.threads = 3;
+  EXPECT_TRUE(SameMesh(*ahead.mesher, *Drive(spec, *torus).mesher));
+  spec.criteria.ask_ahead = false;
+  const DrivenRun plain = Drive(spec, *torus);
+  EXPECT_LT(static_cast<double>(ahead.report().counts.vertices),
+            1.05 * static_cast<double>(plain.report().counts.vertices));
+  EXPECT_LT(static_cast<double>(ahead.report().counts.queries),
+            1.3 * static_cast<double>(plain.report().counts.queries));
+}
 
 // A manifold of which an oracle says less still has such a mesh.
 TEST(AheadLaying, DoesWithClosestPointsAlone) {
