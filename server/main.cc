@@ -12,13 +12,13 @@
 #include <utility>
 
 #include "core/base/message.h"
+#include "server/base/allocator.h"
 #include "server/base/library_log.h"
 #include "server/base/log.h"
 #include "server/base/threads.h"
 #include "server/base/version.h"
 #include "server/config/flags.h"
 #include "server/config/listen_address.h"
-#include "server/memory/allocator.h"
 #include "server/net/health_check.h"
 #include "server/net/tls.h"
 #include "server/salvage/salvage.h"

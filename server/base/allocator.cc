@@ -1,4 +1,4 @@
-#include "server/memory/allocator.h"
+#include "server/base/allocator.h"
 
 #include <malloc.h>
 
