@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 """Runs clang-tidy on our sources, a room at a time: what rooms include is then read once, not per file.
 
     tools/tidy.py BUILD [ROOM...]      BUILD has compile_commands.json; ROOM is core/complex, say
