@@ -93,8 +93,10 @@ void ClosenessClaims::JudgeVertices(const AnswerBlock& answer) {
                                  Brief(error), " away"));
     }
   }
-  x_.position_error = std::max({worst, RoundingOf(answer.points), kLeastError * x_.size,
-                                kRounding * LargestCoordinate(x_.mesh)});
+  // More would not have passed for answers that stay where they are (core/run/repeat_check.h).
+  const double rounding = RoundingOf(answer.points, kNoticeablePositionError * x_.size);
+  x_.position_error =
+      std::max({worst, rounding, kLeastError * x_.size, kRounding * LargestCoordinate(x_.mesh)});
   if (worst > kNoticeablePositionError * x_.size && worst <= kPositionTolerance * x_.size) {
     x_.findings.Warn(Message("The oracle moves points that it returned itself by up to ",
                              Brief(worst), ", ", Brief(100 * worst / x_.size),

@@ -13,7 +13,10 @@ constexpr int kMostDigits = 12;
 // Fewer coordinates that are not zero may be short by nature.
 constexpr int kFewestSeen = 32;
 
-bool IsSingle(double x) { return static_cast<double>(static_cast<float>(x)) == x; }
+bool IsSingle(double x) {
+  return std::abs(x) <= std::numeric_limits<float>::max() &&
+         static_cast<double>(static_cast<float>(x)) == x;
+}
 
 // The fewest significant decimals that read back as x.
 int DigitsOf(double x) {
@@ -27,7 +30,7 @@ int DigitsOf(double x) {
 
 }  // namespace
 
-double RoundingOf(const Eigen::MatrixXd& points) {
+double RoundingOf(const Eigen::MatrixXd& points, double most) {
   if (points.size() == 0) return 0;
   const double largest = points.cwiseAbs().maxCoeff();
   if (!(largest > 0)) return 0;
@@ -45,7 +48,8 @@ double RoundingOf(const Eigen::MatrixXd& points) {
   const double decimal = digits <= kMostDigits ? last_place / 2 : largest;
   const double single =
       all_single ? largest * (std::numeric_limits<float>::epsilon() / 2) : largest;
-  return std::min(decimal, single) * std::sqrt(static_cast<double>(points.rows()));
+  const double moved = std::min(decimal, single) * std::sqrt(static_cast<double>(points.rows()));
+  return moved <= most ? moved : 0;
 }
 
 }  // namespace stellate::core

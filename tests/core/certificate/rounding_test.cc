@@ -38,7 +38,7 @@ Eigen::MatrixXd Written(Eigen::MatrixXd points, const char* format) {
   return points.unaryExpr([format](double x) { return AsText(x, format); });
 }
 
-TEST(Rounding, OfDoublesIsNone) { EXPECT_EQ(RoundingOf(Points()), 0); }
+TEST(Rounding, OfDoublesIsNone) { EXPECT_EQ(RoundingOf(Points(), 1), 0); }
 
 TEST(Rounding, BoundsWhatItDid) {
   const Eigen::MatrixXd points = Points();
@@ -46,19 +46,25 @@ TEST(Rounding, BoundsWhatItDid) {
   for (const char* format : {"%.3g", "%.6g", "%.9g", "%.4f", "%.6f", "%.5e"}) {
     const Eigen::MatrixXd rounded = Written(points, format);
     const double moved = (rounded - points).colwise().norm().maxCoeff();
-    EXPECT_GE(RoundingOf(rounded), moved) << format;
-    EXPECT_LE(RoundingOf(rounded), 12 * moved) << format;
+    EXPECT_GE(RoundingOf(rounded, 1), moved) << format;
+    EXPECT_LE(RoundingOf(rounded, 1), 12 * moved) << format;
   }
   const Eigen::MatrixXd single = points.cast<float>().cast<double>();
   const double moved = (single - points).colwise().norm().maxCoeff();
-  EXPECT_GE(RoundingOf(single), moved);
-  EXPECT_LE(RoundingOf(single), 1e-7 * most);
+  EXPECT_GE(RoundingOf(single, 1), moved);
+  EXPECT_LE(RoundingOf(single, 1), 1e-7 * most);
 }
 
 TEST(Rounding, IsNotToldFromAFewShortNumbers) {
-  EXPECT_EQ(RoundingOf(Eigen::MatrixXd::Identity(3, 3)), 0);
-  EXPECT_EQ(RoundingOf(Eigen::MatrixXd::Zero(3, 200)), 0);
-  EXPECT_EQ(RoundingOf(Eigen::MatrixXd(3, 0)), 0);
+  EXPECT_EQ(RoundingOf(Eigen::MatrixXd::Identity(3, 3), 1), 0);
+  EXPECT_EQ(RoundingOf(Eigen::MatrixXd::Zero(3, 200), 1), 0);
+  EXPECT_EQ(RoundingOf(Eigen::MatrixXd(3, 0), 1), 0);
+}
+
+TEST(Rounding, IsNotToldFromAGrid) {
+  const Eigen::MatrixXd grid = Written(Points(), "%.1f");
+  EXPECT_GT(RoundingOf(grid, 1), 0.05);
+  EXPECT_EQ(RoundingOf(grid, 0.05), 0);
 }
 
 DrivenRun MeshedAsText(const std::string& name, double epsilon, std::uint64_t seed,
