@@ -41,15 +41,8 @@ bool IsComplex(Examination& x) {
 std::string AboutItsEnd(const Examination& x) {
   WallSet met = 0;
   for (std::uint32_t v = 0; v < x.mesh.vertices; ++v) met |= x.mesh.WallsOf(v);
-  std::string said = Message("; ", x.mesh.vertices, " stands for what is beyond the boundary");
-  for (int wall = 0; wall < x.spec.walls; ++wall) {
-    if ((met & SetOfWall(wall)) == 0) {
-      said += Message("; no point of wall ", wall,
-                      " was found: does its function pass through zero with a slope?");
-      break;
-    }
-  }
-  return said;
+  return Message("; ", x.mesh.vertices, " stands for what is beyond the boundary") +
+         AboutUnmetWall(x.spec.walls, met);
 }
 
 // What is known of the complex as such. A closed manifold, until something else is found.

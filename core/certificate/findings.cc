@@ -6,6 +6,14 @@
 
 namespace stellate::core {
 
+std::string AboutUnmetWall(int walls, WallSet met) {
+  for (int wall = 0; wall < walls; ++wall)
+    if ((met & SetOfWall(wall)) == 0)
+      return Message("; no point of wall ", wall,
+                     " was found: does its function pass through zero with a slope?");
+  return {};
+}
+
 std::string TooCoarse(double ratio, double reach, const std::string& where) {
   return Message(
       "the mesh size is ", Brief(ratio), " times the estimated reach ", Brief(reach),

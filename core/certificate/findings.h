@@ -8,6 +8,7 @@
 #include "core/base/name_point.h"
 #include "core/report.h"
 #include "core/specification.h"
+#include "core/walls.h"
 
 namespace stellate::core {
 
@@ -16,6 +17,10 @@ inline constexpr double kCoarse = 0.8;
 
 // That a mesh is `ratio` times as coarse as a reach, and what to do; `where` it was seen, or empty.
 std::string TooCoarse(double ratio, double reach, const std::string& where);
+
+// Of a mesh with walls, whose vertices are on the walls `met`: of a wall that none of them is on,
+// what to look for, to go on from what was wrong. Empty: there is none.
+std::string AboutUnmetWall(int walls, WallSet met);
 
 // What speaks against a mesh, in plain words: problems refuse it, warnings do not.
 class Findings {

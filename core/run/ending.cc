@@ -89,6 +89,14 @@ void TellSharpest(const Engine<K>& engine, Certificate* certificate) {
 }
 
 template <int K>
+void TellUnmetWall(const Engine<K>& engine, int walls, Certificate* certificate) {
+  const StarComplex<K>& complex = engine.complex();
+  WallSet met = 0;
+  for (std::uint32_t p = 0; p < complex.size(); ++p) met |= complex.walls(p);
+  certificate->verdict += AboutUnmetWall(walls, met);
+}
+
+template <int K>
 void TellBend(const Engine<K>& engine, double epsilon, Certificate* certificate) {
   if (certificate->certified) return;
   const StarComplex<K>& complex = engine.complex();
@@ -143,9 +151,12 @@ std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent) {
   if (!entries.empty())
     left = Message(entries.size(), " stars break rule R1 or R2, one of them that of vertex ",
                    entries.front().star, "; ");
+  if (!entries.empty() && inconsistent == 0) return left + "try a smaller epsilon";
   left += Message(inconsistent, " simplices are inconsistent");
   for (std::uint32_t p = 0; p < complex.size(); ++p) {
     CheckInterruption(p);
+    // As they are counted: an open star says nothing of its simplices.
+    if (!complex.cell(p).bounded()) continue;
     const auto found = FindInconsistentConfiguration<K>(complex, p);
     if (!found) continue;
     left += Message(", the first in the star of vertex ", found->holder, " but not in that of ",
@@ -174,6 +185,7 @@ void WarnOfCompromises(const Engine<K>& engine, double epsilon, Certificate* cer
   template void DescribeUnfinished<K>(const Engine<K>&, double, Certificate*); \
   template std::string WhatIsLeft<K>(const Engine<K>&, std::uint64_t);         \
   template void TellSharpest<K>(const Engine<K>&, Certificate*);               \
+  template void TellUnmetWall<K>(const Engine<K>&, int, Certificate*);         \
   template void TellBend<K>(const Engine<K>&, double, Certificate*);           \
   template void TellNearCorners<K>(const Engine<K>&, double, Certificate*);    \
   template void WarnOfCompromises<K>(const Engine<K>&, double, Certificate*);

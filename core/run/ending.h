@@ -18,6 +18,11 @@ void DescribeUnfinished(const Engine<K>& engine, double epsilon, Certificate* ce
 template <int K>
 void TellSharpest(const Engine<K>& engine, Certificate* certificate);
 
+// A wall that no vertex is on, if there is one, of a mesh that made no progress: at the verdict's
+// end.
+template <int K>
+void TellUnmetWall(const Engine<K>& engine, int walls, Certificate* certificate);
+
 // Where a wall bends by more than epsilon can follow, or has a piece that is smaller, of a mesh
 // that is not certified although nothing kept it from being finished: at the verdict's end.
 template <int K>

@@ -39,6 +39,7 @@ void MeshingRun<K>::DescribeEnding(bool is_whole) {
   if (!is_whole) return;
   box_watch_.Warn(&certificate);
   if (spec_.walls == 0) return;
+  if (termination == Termination::kNoProgress) TellUnmetWall<K>(engine_, spec_.walls, &certificate);
   TellNearCorners<K>(engine_, spec_.epsilon, &certificate);
   if (termination == Termination::kConverged || termination == Termination::kNoProgress)
     TellBend<K>(engine_, spec_.epsilon, &certificate);
