@@ -58,10 +58,13 @@ class StarComplex {
   // A point of a sample that is there before any star of it: no search finds it before Commit,
   // which builds all stars, those that there are anew. They then hang on the points within reach
   // alone: a part of the sample, with all points that far around it, has the stars of the whole,
-  // bit for bit, if its points keep their order and their names. REQUIRES: nothing waits for a
-  // Commit but what was laid, and the point is on no wall; names ascend.
-  void Lay(const double* point, const double* tangent) { Lay(point, tangent, size()); }
-  void Lay(const double* point, const double* tangent, std::uint32_t name);
+  // bit for bit, if its points keep their order and their names (NameLast). REQUIRES: nothing
+  // waits for a Commit but what was laid, and the point is on no wall.
+  void Lay(const double* point, const double* tangent);
+  // Of a part of a sample: the name of the point that was laid or appended last, which is its id in
+  // the whole. Until then a point's name is its id. REQUIRES: names ascend.
+  void NameLast(std::uint32_t name);
+  std::uint32_t NameOf(std::uint32_t id) const { return id < names_.size() ? names_[id] : id; }
   // The size bound at the point that was laid last, where it is not epsilon for all; said of each
   // or of none. It is where to look for what cuts its star, never what does.
   void LaidAt(double bound) { laid_bounds_.push_back(bound); }
@@ -204,9 +207,8 @@ class StarComplex {
   // Cospherical points would have every star decide alone how to split them; weights this much
   // larger than rounding, and this much smaller than anything geometric, make all decide alike.
   double Weight(std::uint32_t id) const {
-    const std::uint64_t name = id < names_.size() ? names_[id] : id;
     // Of a signed number, which takes an instruction where an unsigned one takes a branch.
-    const auto bits = static_cast<std::int64_t>(Mix64(name) >> 11);
+    const auto bits = static_cast<std::int64_t>(Mix64(NameOf(id)) >> 11);
     return weight_scale_ * (static_cast<double>(bits) * 0x1p-53) + GuardOf(id);
   }
   // A point with its tangent basis, in the sample or not yet.
@@ -246,6 +248,11 @@ class StarComplex {
   template <typename Influencing>
   bool BuildAsInFlats(const Site& p, std::uint32_t near, Cell& cell,
                       const Influencing& influencing) const;
+  template <typename Influencing>
+  bool BuildPolytope(const Site& p, std::uint32_t near, Cell& cell,
+                     const Influencing& influencing) const;
+  void BuildNearestFirst(const Site& p, const Site* guest, Cell& cell,
+                         typename Cell::Scratch& scratch) const;
   void CloseInFlats(const Site& p, Cell& cell, typename Cell::Scratch& scratch) const;
   void Neighbourhood(const double* q, std::uint32_t near, std::vector<std::uint32_t>* ids) const;
   // Calls visit(v, simplex) for the simplices of star(p) of which p is the lowest vertex, once for

@@ -8,6 +8,7 @@
 #include "core/base/parallel.h"
 #include "core/base/room.h"
 #include "core/complex/around.h"
+#include "core/complex/cut_by_near.h"
 #include "core/complex/star_complex.h"
 #include "core/geometry/laid_polytope.h"
 
@@ -23,24 +24,6 @@ constexpr double kSearched = 2.5;
 constexpr std::size_t PartsToCome(int k) { return k <= 2 ? 8 : 4; }
 
 using Near = std::vector<std::pair<double, std::uint32_t>>;  // squared distances, and who is there
-
-// Cuts by what is near, nearest first and ties by id, out to where nothing can cut any more. `near`
-// is sorted, and all there is within `known`; search(from, to) appends what lies between. Returns
-// how far it knows all in the end.
-template <typename Reach, typename Clip, typename Search>
-double CutByNear(Near* near, double known, const Reach& reach, const Clip& clip,
-                 const Search& search) {
-  for (std::size_t next = 0;;) {
-    double far = reach();
-    for (; next < near->size() && (*near)[next].first <= far * far; ++next)
-      if (clip((*near)[next].second)) far = reach();
-    if (far <= known) return known;
-    const double farther = std::min(far, 2 * known);
-    search(known, farther);
-    std::sort(near->begin() + static_cast<std::ptrdiff_t>(next), near->end());
-    known = farther;
-  }
-}
 
 // What lies around a bunch of points, by coordinate: distances to it all are taken side by side.
 class LaidAround {
@@ -112,14 +95,17 @@ void AppendBetween(const BallTree& tree, const double* point, const Near& beyond
 }  // namespace
 
 template <int K>
-void StarComplex<K>::Lay(const double* point, const double* tangent, std::uint32_t name) {
-  if (name != size()) {
-    for (auto id = static_cast<std::uint32_t>(names_.size()); id < size(); ++id)
-      names_.push_back(id);
-    names_.push_back(name);
-  }
+void StarComplex<K>::Lay(const double* point, const double* tangent) {
   points_.insert(points_.end(), point, point + d_);
   tangents_.insert(tangents_.end(), tangent, tangent + d_ * K);
+}
+
+template <int K>
+void StarComplex<K>::NameLast(std::uint32_t name) {
+  const std::uint32_t last = size() - 1;
+  if (name == last) return;
+  for (auto id = static_cast<std::uint32_t>(names_.size()); id < last; ++id) names_.push_back(id);
+  names_.push_back(name);
 }
 
 // The cell in the flats, made apart where K = 3. `near` holds all that lies within `known`, as
@@ -129,7 +115,7 @@ template <typename Search>
 void StarComplex<K>::CutInFlats(const Site& p, Near* near, double* known, const Search& search,
                                 Cell& cell, typename Cell::Scratch& scratch) const {
   if constexpr (K == 3) {
-    thread_local LaidPolytope polytope;
+    LaidPolytope& polytope = ThreadPolytope();
     Step step(d_);
     polytope.Reset(inradius_);
     *known = CutByNear(
@@ -244,7 +230,8 @@ typename StarComplex<K>::Change StarComplex<K>::BuildLaidStars() {
 }
 
 #define STELLATE_EACH(K)                                                                        \
-  template void StarComplex<K>::Lay(const double*, const double*, std::uint32_t);               \
+  template void StarComplex<K>::Lay(const double*, const double*);                              \
+  template void StarComplex<K>::NameLast(std::uint32_t);                                        \
   template void StarComplex<K>::BuildLaidStar(std::uint32_t, const std::vector<std::uint32_t>&, \
                                               Cell&) const;                                     \
   template void StarComplex<K>::BuildAllLaidStars(double*);                                     \

@@ -1,11 +1,17 @@
 #include "core/geometry/laid_polytope.h"
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "core/geometry/restricted_voronoi_cell.h"
 
 namespace stellate::core {
+
+LaidPolytope& ThreadPolytope() {
+  thread_local const auto polytope = std::make_unique<LaidPolytope>();
+  return *polytope;
+}
 
 void LaidPolytope::Reset(double inradius) {
   if (inradius != inradius_) {
@@ -182,7 +188,9 @@ bool LaidPolytope::GiveUp() {
 template <>
 void RestrictedVoronoiCell<3>::Take(const LaidPolytope& polytope) {
   constexpr std::size_t kMost = LaidPolytope::kMostFacets;
-  thread_local std::array<std::array<std::uint16_t, kMost>, kMost> end;  // vertex and slot
+  using Ends = std::array<std::array<std::uint16_t, kMost>, kMost>;
+  thread_local const auto memory = std::make_unique<Ends>();  // see ThreadPolytope
+  Ends& end = *memory;                                        // vertex and slot
   std::uint64_t mixed[kMost];
   std::uint64_t is_known[kMost] = {};  // by facet, the others whose edge's first end is known
   facets_.resize(polytope.facet_count());

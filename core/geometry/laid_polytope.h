@@ -76,4 +76,8 @@ class LaidPolytope {
   Facets across_[kMostFacets];  // by facet, those that it shares a crossed edge with
 };
 
+// One a thread, for whatever that makes next. On the heap: what is static of a thread lies on its
+// stack, and a library's threads may have little of that, though they never come here.
+LaidPolytope& ThreadPolytope();
+
 }  // namespace stellate::core

@@ -42,7 +42,7 @@ CandidateSet<K> DrawCandidates(const StarComplex<K>& complex, const ViolationBoo
   set.points.resize(complex.d(), set.drawn());
   ParallelFor(set.targets.size(), [&](std::size_t i) {
     const Target<K>& t = set.targets[i];
-    Random random(drawing.seed ^ Mix64(t.star), drawing.round);
+    Random random(drawing.seed ^ Mix64(complex.NameOf(t.star)), drawing.round);
     const bool has_failed = book.failed_attempts(t.star) > 0 && !t.is_coarse();
     for (Eigen::Index c = set.first[i]; c < set.first[i + 1]; ++c) {
       double x[K];

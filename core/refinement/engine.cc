@@ -138,7 +138,7 @@ std::vector<typename ViolationBook<K>::Entry> Engine<K>::JudgeSizeAndShape(
 }
 
 template <int K>
-std::vector<Target<K>> Engine<K>::RejudgeSuspects() {
+std::vector<Target<K>> Engine<K>::GoodPointTargets() {
   if (book_.are_all_suspect()) before_good_points_ = complex_.size();
   const std::vector<std::uint32_t> suspects = book_.TakeSuspects(filled_.mended());
   std::vector<std::optional<Violation<K>>> found(suspects.size());
@@ -204,7 +204,7 @@ std::optional<std::vector<Target<K>>> Engine<K>::Plan() {
     RejudgeSizes();
     targets = SizeAndShapeTargets();
   }
-  if (targets.empty()) targets = RejudgeSuspects();
+  if (targets.empty()) targets = GoodPointTargets();
   if (!faces_.has_walls()) return targets;
   const bool any = !targets.empty();
   YieldToFaces(&targets);
@@ -222,8 +222,16 @@ bool Engine<K>::AllRulesHold() const {
 }
 
 template <int K>
-std::vector<Target<K>> Engine<K>::Select(std::vector<Target<K>> targets) const {
-  return SelectIndependent<K>(complex_, std::move(targets), max_vertices_ - complex_.size());
+std::vector<Target<K>> Engine<K>::Select(const std::vector<Target<K>>& targets) const {
+  const std::vector<std::size_t> chosen = SelectIndependent<K>(
+      complex_.d(), CentresOf<K>(complex_, targets), targets, max_vertices_ - complex_.size());
+  std::vector<Target<K>> selected;
+  selected.reserve(chosen.size());
+  for (const std::size_t i : chosen) {
+    CheckInterruption(selected.size());
+    selected.push_back(targets[i]);
+  }
+  return selected;
 }
 
 template <int K>
@@ -233,10 +241,15 @@ CandidateSet<K> Engine<K>::Draw(std::vector<Target<K>> targets, std::uint64_t ro
 }
 
 template <int K>
+Inserter<K> Engine<K>::InserterOf(const CandidateSet<K>& candidates,
+                                  const AnsweredPoints& answers) {
+  return {
+      {complex_, sizes_, book_, criteria_, faces_}, candidates, answers, caution_, max_vertices_};
+}
+
+template <int K>
 Inserted Engine<K>::Insert(const CandidateSet<K>& candidates, const AnsweredPoints& answers) {
-  return Inserter<K>({complex_, sizes_, book_, criteria_, faces_}, candidates, answers, caution_,
-                     max_vertices_)
-      .Run();
+  return InserterOf(candidates, answers).Run();
 }
 
 template <int K>

@@ -44,12 +44,17 @@ class Engine {
   // The violations to mend next, by the first rules that any star breaks. Empty: no more can be
   // done, see AllRulesHold. Nothing: points are inserted without end.
   std::optional<std::vector<Target<K>>> Plan();
+  // Plan's parts: R1 and R2, of all stars that break them; then, if none does, R3 and R4.
+  std::vector<Target<K>> SizeAndShapeTargets() const;
+  std::vector<Target<K>> GoodPointTargets();
   // After a Plan that found no targets.
   bool AllRulesHold() const;
-  std::vector<Target<K>> Select(std::vector<Target<K>> targets) const;
+  std::vector<Target<K>> Select(const std::vector<Target<K>>& targets) const;
   CandidateSet<K> Draw(std::vector<Target<K>> targets, std::uint64_t round) const;
 
   Inserted Insert(const CandidateSet<K>& candidates, const AnsweredPoints& answers);
+  // The same step by step, for who has only a part of the round's targets.
+  Inserter<K> InserterOf(const CandidateSet<K>& candidates, const AnsweredPoints& answers);
   // Appends a candidate whatever the rules say. REQUIRES: !is_full() and that it was found.
   void Append(const AnsweredPoints& answers, Eigen::Index candidate);
   // The same for a sample that is laid before there is any star: cheaper, and no search finds the
@@ -73,6 +78,11 @@ class Engine {
                                                         std::vector<std::uint32_t>* removed);
   // Where faces were discovered since; to be asked for beside the targets.
   PlannedPoints TakeDiscoveries();
+
+  // The point inserted last is known by that name, in place of its id: see StarComplex::NameLast.
+  void NameLast(std::uint32_t name) { complex_.NameLast(name); }
+  // An attempt to mend that star has failed, elsewhere.
+  void NoteFailedAttempt(std::uint32_t star) { book_.NoteFailedAttempt(star); }
 
   // What grows from the points appended last is judged by all rules once it is whole.
   void JudgeAllAnew();
@@ -98,8 +108,6 @@ class Engine {
   std::uint64_t simplex_count() const;
 
  private:
-  std::vector<Target<K>> SizeAndShapeTargets() const;
-  std::vector<Target<K>> RejudgeSuspects();
   void RejudgeSizes();
   bool HasGrownTooMuch() const;
   void RejudgeAll();

@@ -24,18 +24,15 @@ double Reach(const Target<K>& t) {
 template <int K>
 class Conflicts {
  public:
-  Conflicts(const StarComplex<K>& complex, const std::vector<Target<K>>& targets,
+  Conflicts(int d, const std::vector<double>& centres, const std::vector<Target<K>>& targets,
             const std::vector<std::uint32_t>& rank)
       : rank_(rank),
-        d_(static_cast<std::size_t>(complex.d())),
+        d_(static_cast<std::size_t>(d)),
         chunk_size_(ChunkSize(targets.size())),
-        centres_(targets.size() * d_),
-        balls_(complex.d(), &centres_),
+        centres_(centres),
+        balls_(d, &centres_),
         lists_(ChunkCount(targets.size())),
         spans_(targets.size()) {
-    ParallelFor(targets.size(), [&](std::size_t i) {
-      complex.Lift(targets[i].star, targets[i].x, centres_.data() + i * d_);
-    });
     std::vector<double> reaches;
     reaches.reserve(targets.size());
     for (std::size_t i = 0; i < targets.size(); ++i) {
@@ -70,9 +67,6 @@ class Conflicts {
       if (!visit(list[n])) return;
   }
 
-  // Near targets have near places.
-  std::uint32_t PlaceOf(std::uint32_t i) const { return balls_.PlaceOf(i); }
-
  private:
   template <typename Visit>
   void ForEachStronger(std::size_t i, const Visit& visit) const {
@@ -88,7 +82,7 @@ class Conflicts {
   const std::vector<std::uint32_t>& rank_;
   const std::size_t d_;
   const std::size_t chunk_size_;
-  std::vector<double> centres_;                    // by target, d each
+  const std::vector<double>& centres_;             // by target, d each
   BallTree balls_;                                 // the conflict balls around them
   std::vector<std::vector<std::uint32_t>> lists_;  // by chunk of targets
   std::vector<Span> spans_;                        // by target: its part of the chunk's list
@@ -97,8 +91,20 @@ class Conflicts {
 }  // namespace
 
 template <int K>
-std::vector<Target<K>> SelectIndependent(const StarComplex<K>& complex,
-                                         std::vector<Target<K>> targets, std::size_t most) {
+std::vector<double> CentresOf(const StarComplex<K>& complex,
+                              const std::vector<Target<K>>& targets) {
+  const auto d = static_cast<std::size_t>(complex.d());
+  std::vector<double> centres(targets.size() * d);
+  ParallelFor(targets.size(), [&](std::size_t i) {
+    complex.Lift(targets[i].star, targets[i].x, centres.data() + i * d);
+  });
+  return centres;
+}
+
+template <int K>
+std::vector<std::size_t> SelectIndependent(int d, const std::vector<double>& centres,
+                                           const std::vector<Target<K>>& targets,
+                                           std::size_t most) {
   std::vector<std::uint32_t> order(targets.size());
   std::iota(order.begin(), order.end(), 0u);
   ParallelSort(order, [&](std::uint32_t i, std::uint32_t j) {
@@ -113,31 +119,24 @@ std::vector<Target<K>> SelectIndependent(const StarComplex<K>& complex,
     CheckInterruption(r);
     rank[order[r]] = r;
   }
-  const Conflicts<K> conflicts(complex, targets, rank);
+  const Conflicts<K> conflicts(d, centres, targets, rank);
 
   const std::vector<std::uint8_t> is_chosen = ChooseLocalMaxima(
       targets.size(), [&](std::size_t i, const auto& visit) { conflicts.VisitStronger(i, visit); });
-  std::vector<std::uint32_t> chosen = ParallelGather<std::uint32_t>(
-      order.size(), [&](std::size_t r, std::vector<std::uint32_t>* found) {
+  std::vector<std::size_t> chosen = ParallelGather<std::size_t>(
+      order.size(), [&](std::size_t r, std::vector<std::size_t>* found) {
         if (is_chosen[order[r]]) found->push_back(order[r]);
       });
   chosen.resize(std::min(chosen.size(), most));  // the strongest
-  ParallelSort(chosen, [&](std::uint32_t i, std::uint32_t j) {
-    const std::uint32_t a = conflicts.PlaceOf(i), b = conflicts.PlaceOf(j);
-    return a != b ? a < b : targets[i].star < targets[j].star;
-  });
-  std::vector<Target<K>> ordered;
-  ordered.reserve(chosen.size());
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    CheckInterruption(i);
-    ordered.push_back(targets[chosen[i]]);
-  }
-  return ordered;
+  ParallelSort(chosen,
+               [&](std::size_t i, std::size_t j) { return targets[i].star < targets[j].star; });
+  return chosen;
 }
 
-#define STELLATE_EACH(K)                                                                           \
-  template std::vector<Target<K>> SelectIndependent(const StarComplex<K>&, std::vector<Target<K>>, \
-                                                    std::size_t);
+#define STELLATE_EACH(K)                                                                        \
+  template std::vector<double> CentresOf(const StarComplex<K>&, const std::vector<Target<K>>&); \
+  template std::vector<std::size_t> SelectIndependent(int, const std::vector<double>&,          \
+                                                      const std::vector<Target<K>>&, std::size_t);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
 #include <vector>
 
 #include "core/complex/star_complex.h"
@@ -8,12 +8,18 @@
 
 namespace stellate::core {
 
-// The targets of one round: a maximal set in which no insertion point lies in the conflict ball of
-// another (radius |x| for rules R1 and R2, 2|x| for R3 and R4), taken greedily by rule and then by
-// descending |x|; the first `most` of it. Deterministic: ties are broken by star. Returned in an
-// order that keeps near ones together.
+// The insertion points of targets, d each.
 template <int K>
-std::vector<Target<K>> SelectIndependent(const StarComplex<K>& complex,
-                                         std::vector<Target<K>> targets, std::size_t most);
+std::vector<double> CentresOf(const StarComplex<K>& complex, const std::vector<Target<K>>& targets);
+
+// The targets of one round, by their places: a maximal set in which no insertion point (`centres`,
+// d each) lies in the conflict ball of another (radius |x| for rules R1 and R2, 2|x| for R3 and
+// R4), taken greedily by rule and then by descending |x|; the first `most` of it. Ties are broken
+// by star, which is also the order that they are returned in: near ones are mostly together. The
+// targets may come in any order, and from any number of parts of a sample, if their stars are named
+// as in the whole.
+template <int K>
+std::vector<std::size_t> SelectIndependent(int d, const std::vector<double>& centres,
+                                           const std::vector<Target<K>>& targets, std::size_t most);
 
 }  // namespace stellate::core

@@ -37,30 +37,34 @@ Inserter<K>::Inserter(const Parts& to, const CandidateSet<K>& candidates,
 
 template <int K>
 Inserted Inserter<K>::Run() {
-  InsertTargets();
+  TellAllNearAim(Judge());
+  for (std::size_t i = 0; i < candidates_.targets.size(); ++i) {
+    CheckInterruption(i);
+    InsertTarget(i);
+  }
   InsertPlanned();
   return std::move(done_);
 }
 
 template <int K>
-void Inserter<K>::InsertTargets() {
+bool Inserter<K>::Judge() {
   const std::vector<Target<K>>& targets = candidates_.targets;
-  std::vector<int> best(targets.size(), 0);
-  std::vector<RefinedPoint> refined(targets.size());
+  best_.assign(targets.size(), 0);
+  refined_.assign(targets.size(), {});
   ParallelFor(targets.size(), [&](std::size_t i) {
     if (targets[i].violation.rule >= Rule::kSliver)
-      best[i] = BestCandidate(i);
+      best_[i] = BestCandidate(i);
     else
-      refined[i] = JudgeRefined(i);
+      refined_[i] = JudgeRefined(i);
   });
-  bool all_near_aim = true;
-  for (std::size_t i = 0; i < targets.size(); ++i) {
-    CheckInterruption(i);
-    if (targets[i].violation.rule >= Rule::kSliver)
-      InsertGoodPoint(i, best[i]);
-    else
-      InsertRefined(i, refined[i], &all_near_aim);
-  }
+  return std::all_of(refined_.begin(), refined_.end(),
+                     [](const RefinedPoint& judged) { return !judged.found || judged.near_aim; });
+}
+
+template <int K>
+typename Inserter<K>::Outcome Inserter<K>::InsertTarget(std::size_t i) {
+  return candidates_.targets[i].violation.rule >= Rule::kSliver ? InsertGoodPoint(i, best_[i])
+                                                                : InsertRefined(i, refined_[i]);
 }
 
 // Of the ball around the insertion point: from a guarded point it reaches to its ball's border,
@@ -100,28 +104,25 @@ typename Inserter<K>::RefinedPoint Inserter<K>::JudgeRefined(std::size_t i) cons
 }
 
 template <int K>
-void Inserter<K>::InsertRefined(std::size_t i, RefinedPoint judged, bool* all_near_aim) {
+typename Inserter<K>::Outcome Inserter<K>::InsertRefined(std::size_t i, RefinedPoint judged) {
   const Target<K>& t = candidates_.targets[i];
   const Eigen::Index c = candidates_.first[i];
   if (!judged.found) {
-    if (candidates_.in_flats[i] && !caution_.is_rehearsal)
-      to_.book.NoteNoFlat(t.star);
-    else
-      NoteFailedAttempt(t.star);
-    return;
+    if (!candidates_.in_flats[i] || caution_.is_rehearsal) return NoteFailedAttempt(t.star);
+    to_.book.NoteNoFlat(t.star);
+    return Outcome::kPutOff;
   }
   if (YieldsToFaces(judged, t, c)) return NoteFailedAttempt(t.star);
   const double* y = answers_.points.col(c).data();
   // Another of this round may have come near, unless all have stayed near where they were aimed.
-  *all_near_aim = *all_near_aim && judged.near_aim;
-  if (judged.cuts_violation && !*all_near_aim)
+  if (judged.cuts_violation && !all_near_aim_)
     judged.duplicate = to_.complex.AnyWithin(y, Clearance(t));
   if (judged.duplicate || !judged.cuts_violation) {
     done_.duplicates += judged.duplicate;
     return NoteFailedAttempt(t.star);
   }
   done_.front_moved = done_.front_moved || t.violation.fake;
-  Insert(c, t.violation.rule, t.star);
+  return Insert(c, t.violation.rule, t.star);
 }
 
 // What spoils a face of lower dimension, or lies beyond a wall, is not inserted: that face is
@@ -175,7 +176,7 @@ int Inserter<K>::BestCandidate(std::size_t i) const {
 }
 
 template <int K>
-void Inserter<K>::InsertGoodPoint(std::size_t i, int best) {
+typename Inserter<K>::Outcome Inserter<K>::InsertGoodPoint(std::size_t i, int best) {
   const Target<K>& t = candidates_.targets[i];
   if (best < 0) {
     // The first that is in the way of a face has that refined.
@@ -192,8 +193,8 @@ void Inserter<K>::InsertGoodPoint(std::size_t i, int best) {
   }
   const Eigen::Index c = candidates_.first[i] + best;
   if (to_.complex.AnyWithin(answers_.points.col(c).data(), kGoodPointSpacing * EmptyRadius(t)))
-    return;  // another of this round came near
-  Insert(c, t.violation.rule, t.star);
+    return Outcome::kPutOff;  // another of this round came near
+  return Insert(c, t.violation.rule, t.star);
 }
 
 template <int K>
@@ -222,22 +223,24 @@ void Inserter<K>::InsertPlanned() {
 }
 
 template <int K>
-void Inserter<K>::Insert(Eigen::Index c, Rule rule, std::uint32_t near) {
+typename Inserter<K>::Outcome Inserter<K>::Insert(Eigen::Index c, Rule rule, std::uint32_t near) {
   to_.complex.Append(answers_.points.col(c).data(), answers_.tangents.col(c).data(), near,
                      WallsOf(c), ConormalsOf(c));
   if (answers_.sizes.size() > 0) to_.sizes.AppendGiven(answers_.sizes[c]);
   done_.used[static_cast<std::size_t>(c)] = 1;
   done_.rules.push_back(rule);
+  return Outcome::kInserted;
 }
 
 // In a rehearsal at once: what the surrogate refuses is left for true points, since shorter steps
 // would only crowd the border of what it knows.
 template <int K>
-void Inserter<K>::NoteFailedAttempt(std::uint32_t star) {
+typename Inserter<K>::Outcome Inserter<K>::NoteFailedAttempt(std::uint32_t star) {
   if (caution_.is_rehearsal)
     to_.book.GiveUp(star);
   else
     to_.book.NoteFailedAttempt(star);
+  return Outcome::kFailed;
 }
 
 STELLATE_INSTANTIATE_CLASS(Inserter)

@@ -58,6 +58,14 @@ class Inserter {
 
   Inserted Run();
 
+  // The steps of a run. Judge: returns whether all points of R1 and R2 lie near where they were
+  // aimed, and so cannot have come near each other; to be told of all of the round, if others have
+  // some of it. InsertTarget: in the order of the round. Returns what became of it.
+  enum class Outcome : std::uint8_t { kInserted, kFailed, kPutOff };
+  bool Judge();
+  void TellAllNearAim(bool all) { all_near_aim_ = all; }
+  Outcome InsertTarget(std::size_t target);
+
  private:
   // The answer to a target of R1 or R2, seen from the complex before the round.
   struct RefinedPoint {
@@ -72,10 +80,9 @@ class Inserter {
   double EmptyRadius(const Target<K>& target) const;
   double Clearance(const Target<K>& target) const;
   RefinedPoint JudgeRefined(std::size_t target) const;
-  void InsertRefined(std::size_t target, RefinedPoint judged, bool* all_near_aim);
+  Outcome InsertRefined(std::size_t target, RefinedPoint judged);
   int BestCandidate(std::size_t target) const;
-  void InsertGoodPoint(std::size_t target, int best);
-  void InsertTargets();
+  Outcome InsertGoodPoint(std::size_t target, int best);
   void InsertPlanned();
   bool YieldsToFaces(const RefinedPoint& judged, const Target<K>& target, Eigen::Index candidate);
   bool FitsFaces(Eigen::Index candidate) const;
@@ -85,14 +92,17 @@ class Inserter {
   const double* ConormalsOf(Eigen::Index candidate) const {
     return answers_.walls.empty() ? nullptr : answers_.conormals.col(candidate).data();
   }
-  void Insert(Eigen::Index candidate, Rule rule, std::uint32_t near);
-  void NoteFailedAttempt(std::uint32_t star);
+  Outcome Insert(Eigen::Index candidate, Rule rule, std::uint32_t near);
+  Outcome NoteFailedAttempt(std::uint32_t star);
 
   Parts to_;
   const CandidateSet<K>& candidates_;
   const AnsweredPoints& answers_;
   Caution caution_;
   std::uint64_t max_vertices_;
+  std::vector<int> best_;              // by target of R3 and R4: its candidate; -1: none
+  std::vector<RefinedPoint> refined_;  // by target of R1 and R2
+  bool all_near_aim_ = false;
   Inserted done_;
 };
 

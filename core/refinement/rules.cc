@@ -39,6 +39,27 @@ Violation<K> AtVertex(Rule rule, const RestrictedVoronoiCell<K>& cell, std::size
   return violation;
 }
 
+// Of two vertices of p's cell that are equally bad: whose simplex has the lower ids. The order in
+// which a cell keeps them hangs on how it came about.
+template <int K>
+bool Precedes(const RestrictedVoronoiCell<K>& cell, std::size_t v, std::size_t w) {
+  const auto ids_of = [&](std::size_t at) {
+    std::array<std::uint32_t, K> ids;
+    for (int s = 0; s < K; ++s) ids[static_cast<std::size_t>(s)] = cell.id(cell.facet(at, s));
+    std::sort(ids.begin(), ids.end());
+    return ids;
+  };
+  return ids_of(v) < ids_of(w);
+}
+
+// Whether v is worse than what is the worst so far, by what is said of each.
+template <int K>
+bool IsWorse(const RestrictedVoronoiCell<K>& cell, std::size_t v, double badness,
+             const std::optional<std::size_t>& worst, double worst_badness) {
+  if (!worst || badness != worst_badness) return !worst || badness > worst_badness;
+  return Precedes<K>(cell, v, *worst);
+}
+
 // Determinant of a symmetric J x J matrix, by elimination.
 template <int J>
 double GramDeterminant(double (&g)[J][J]) {
@@ -153,7 +174,8 @@ std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std:
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
       const bool fake = !cell.bounded() && cell.HasFakeFacet(v);
       const double norm2 = cell.norm2(v);
-      if (!(fake || norm2 > epsilon * epsilon) || (worst && !(norm2 > worst_norm2))) continue;
+      if (!(fake || norm2 > epsilon * epsilon) || !IsWorse<K>(cell, v, norm2, worst, worst_norm2))
+        continue;
       worst = v;
       worst_norm2 = norm2;
       worst_fake = fake;
@@ -163,18 +185,20 @@ std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std:
   thread_local std::vector<double> edges2;
   edges2.clear();
   for (std::size_t f = 0; f < cell.facet_count(); ++f) edges2.push_back(complex.EdgeLength2(p, f));
-  double worst_rho2 = radius_edge_bound * radius_edge_bound;
+  const double bound2 = radius_edge_bound * radius_edge_bound;
+  double worst_rho2 = 0;
   // Mostly the longest radius is short enough for the shortest edge.
-  if (cell.max_norm2() <= worst_rho2 * *std::min_element(edges2.begin(), edges2.end()))
+  if (cell.max_norm2() <= bound2 * *std::min_element(edges2.begin(), edges2.end()))
     return std::nullopt;
   for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
     double edge2 = INFINITY;
     for (int s = 0; s < K; ++s) edge2 = std::min(edge2, edges2[cell.facet(v, s)]);
     const double norm2 = cell.norm2(v);
-    if (norm2 > worst_rho2 * edge2 && !complex.TouchesGuard(p, cell, v)) {
-      worst_rho2 = norm2 / edge2;
-      worst = v;
-    }
+    const double rho2 = norm2 / edge2;
+    if (!(rho2 > bound2) || !IsWorse<K>(cell, v, rho2, worst, worst_rho2)) continue;
+    if (complex.TouchesGuard(p, cell, v)) continue;
+    worst_rho2 = rho2;
+    worst = v;
   }
   if (worst) return AtVertex<K>(Rule::kRadiusEdge, cell, *worst, false);
   return std::nullopt;
@@ -317,7 +341,9 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& comp
   const auto& cell = complex.cell(p);
   if (!cell.bounded()) return std::nullopt;  // R1 gave up there: nothing to judge yet
   std::optional<std::size_t> worst;
-  const auto is_worse = [&](std::size_t v) { return !worst || cell.norm2(v) > cell.norm2(*worst); };
+  const auto is_worse = [&](std::size_t v) {
+    return IsWorse<K>(cell, v, cell.norm2(v), worst, worst ? cell.norm2(*worst) : 0);
+  };
   // In the star of its lowest vertex: if it is not there, it is inconsistent besides.
   const auto held = [&](std::size_t v) {
     for (int s = 0; s < K; ++s)

@@ -250,7 +250,7 @@ void MeshingRun<K>::Plan() {
       stall_watch_.HasStalled(book.size_and_shape().size() + book.blemished(),
                               !book.are_all_suspect()))
     return Finish(Termination::kNoProgress);
-  *targets = engine_.Select(std::move(*targets));
+  *targets = engine_.Select(*targets);
   PlannedPoints planned;
   if (faces.has_discoveries())
     planned = engine_.TakeDiscoveries();

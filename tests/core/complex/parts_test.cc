@@ -90,7 +90,10 @@ class Builder {
 
   std::unique_ptr<Complex> Lay(const std::vector<std::uint32_t>& names) const {
     auto complex = std::make_unique<Complex>(sample_.d, criteria_.epsilon, 3.0, criteria_.judging);
-    for (const std::uint32_t q : names) complex->Lay(sample_.Point(q), sample_.Tangent(q), q);
+    for (const std::uint32_t q : names) {
+      complex->Lay(sample_.Point(q), sample_.Tangent(q));
+      complex->NameLast(q);
+    }
     complex->Commit();
     return complex;
   }

@@ -42,6 +42,14 @@ class IndependentSetTest : public ::testing::Test {
     return targets;
   }
 
+  Targets Select(const Targets& targets, std::size_t most) const {
+    Targets selected;
+    for (const std::size_t i :
+         SelectIndependent<kDimension>(6, CentresOf<kDimension>(complex_, targets), targets, most))
+      selected.push_back(targets[i]);
+    return selected;
+  }
+
   // Whether a point at b's insertion point would lie in a's conflict ball.
   bool Conflict(const Target<kDimension>& a, const Target<kDimension>& b) const {
     double at[6], bt[6];
@@ -73,7 +81,7 @@ bool Before(const Target<kDimension>& a, const Target<kDimension>& b) {
 TEST_F(IndependentSetTest, IsGreedyIndependentAndMaximal) {
   for (const double largest : {0.05, 0.2, 0.6}) {
     const Targets targets = RandomTargets(7, largest);
-    Targets chosen = SelectIndependent<kDimension>(complex_, targets, kAll);
+    Targets chosen = Select(targets, kAll);
     std::sort(chosen.begin(), chosen.end(), Before);
     ASSERT_FALSE(chosen.empty());
     for (std::size_t i = 0; i < chosen.size(); ++i)
@@ -90,35 +98,32 @@ TEST_F(IndependentSetTest, IsGreedyIndependentAndMaximal) {
 }
 
 TEST_F(IndependentSetTest, TakesAllThatAreFarApart) {
-  EXPECT_EQ(SelectIndependent<kDimension>(complex_, RandomTargets(8, 1e-9), kAll).size(),
-            complex_.size());
+  EXPECT_EQ(Select(RandomTargets(8, 1e-9), kAll).size(), complex_.size());
 }
 
 TEST_F(IndependentSetTest, DoesNotDependOnTheOrderOfTheTargets) {
   Targets targets = RandomTargets(9, 0.3);
-  const auto chosen = Stars(SelectIndependent<kDimension>(complex_, targets, kAll));
+  const auto chosen = Stars(Select(targets, kAll));
   Random random(3);
   for (int shuffle = 0; shuffle < 5; ++shuffle) {
     for (std::size_t i = targets.size(); i > 1; --i)
       std::swap(targets[i - 1], targets[random.Next() % i]);
-    EXPECT_EQ(Stars(SelectIndependent<kDimension>(complex_, targets, kAll)), chosen);
+    EXPECT_EQ(Stars(Select(targets, kAll)), chosen);
   }
 }
 
 TEST_F(IndependentSetTest, TheFirstOfItAreTheWorst) {
   const Targets targets = RandomTargets(10, 0.1);
-  Targets all = SelectIndependent<kDimension>(complex_, targets, kAll);
+  Targets all = Select(targets, kAll);
   ASSERT_GT(all.size(), 20u);
-  Targets some = SelectIndependent<kDimension>(complex_, targets, 20);
+  Targets some = Select(targets, 20);
   std::sort(all.begin(), all.end(), Before);
   std::sort(some.begin(), some.end(), Before);
   all.resize(20);
   EXPECT_EQ(Stars(some), Stars(all));
 }
 
-TEST_F(IndependentSetTest, OfNothingIsNothing) {
-  EXPECT_TRUE(SelectIndependent<kDimension>(complex_, {}, kAll).empty());
-}
+TEST_F(IndependentSetTest, OfNothingIsNothing) { EXPECT_TRUE(Select({}, kAll).empty()); }
 
 }  // namespace
 }  // namespace stellate::core
