@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -176,16 +177,17 @@ class BallTree {
     const double outreach = kRounding * node.outreach;
     if (d2 >= outreach * outreach) return;
     if (node.children == kNone) {
+      double distance2[kLeafCapacity];
+      MeasureLeaf(node, q, distance2);
       for (std::uint32_t i = 0; i < node.count; ++i) {
         const std::uint32_t id = slots_[node.first + i];
-        const double r = influence_[id];
-        if (SquaredDistance(q, Point(id), d_) < r * r) visit(id);
+        if (distance2[i] < influence_[id] * influence_[id]) visit(id);
       }
       return;
     }
-    const std::uint32_t a = node.children;
-    Influencing(a, SquaredDistance(q, Centre(a), d_), q, visit);
-    Influencing(a + 1, SquaredDistance(q, Centre(a + 1), d_), q, visit);
+    const auto [a, b] = Children(node, q);
+    Influencing(a.id, a.d2, q, visit);
+    Influencing(b.id, b.d2, q, visit);
   }
 
   // All distances are compared squared. d2: from q to the node's centre.
@@ -205,9 +207,10 @@ class BallTree {
     const double far = kRounding * (radius + node.radius);
     if (d2 > far * far) return false;
     if (node.children == kNone) {
-      for (std::uint32_t i = 0; i < node.count; ++i)
-        if (SquaredDistance(q, Point(slots_[node.first + i]), d_) <= radius * radius) return true;
-      return false;
+      double distance2[kLeafCapacity];
+      MeasureLeaf(node, q, distance2);
+      return std::any_of(distance2, distance2 + node.count,
+                         [&](double away2) { return away2 <= radius * radius; });
     }
     const auto [first, second] = NearerFirst(node, q);
     return AnyWithin(first.id, first.d2, q, radius) || AnyWithin(second.id, second.d2, q, radius);
@@ -235,11 +238,13 @@ class BallTree {
     std::uint32_t id;
     double d2;  // from q to its centre
   };
+  std::pair<Child, Child> Children(const Node& node, const double* q) const;
   std::pair<Child, Child> NearerFirst(const Node& node, const double* q) const {
-    const Child a{node.children, SquaredDistance(q, Centre(node.children), d_)};
-    const Child b{node.children + 1, SquaredDistance(q, Centre(node.children + 1), d_)};
+    const auto [a, b] = Children(node, q);
     return a.d2 <= b.d2 ? std::pair{a, b} : std::pair{b, a};
   }
+  // The squared distances of a leaf's points.
+  void MeasureLeaf(const Node& leaf, const double* q, double* distance2) const;
 
   // Nearest first: what is visited early may shrink the radius most. `each` sees every point.
   template <typename Radius, typename Visit, typename Each>
@@ -248,9 +253,11 @@ class BallTree {
     std::pair<double, std::uint32_t> near[kLeafCapacity];
     std::uint32_t count = 0;
     const double reach = radius();
+    double distance2[kLeafCapacity];
+    MeasureLeaf(node, q, distance2);
     for (std::uint32_t i = 0; i < node.count; ++i) {
       const std::uint32_t id = slots_[node.first + i];
-      const double d2 = SquaredDistance(q, Point(id), d_);
+      const double d2 = distance2[i];
       each(id, d2);
       if (!(d2 <= reach * reach)) continue;
       std::uint32_t at = count++;
