@@ -18,20 +18,24 @@ namespace {
 // Epsilon of the coarse mesh, in those of the final one: what can be guessed from it grows less
 // exact with the fourth power. Seeds that lie nearer to each other tell for a finer one.
 constexpr double kLeastCoarse = 2;
-constexpr double kMostCoarse = 8;
+constexpr double kMostCoarse = 5;
 constexpr double kCoarseStep = 0.8;
 constexpr double kShareApart = 0.5;
 // So many points tell enough of M; or all seeds, where they are fewer.
 constexpr double kEnough[kMaxDimension + 1] = {0, 50, 400, 600, 600, 600};
 // Seeds nearer to each other than this share of it tell nothing that one would not.
 constexpr double kSeedSpacing = 0.5;
-// It need not be whole: what it misses is left to the refinement of the final one.
+// Of the spacing at which circumradii are mostly below its epsilon: where they all are a round is
+// saved.
+constexpr double kCoarseSpacing = 0.8;
+// It need not be whole: what it misses is left to the refinement of the final one. For k <= 2 a
+// hole in it costs that more rounds than mending it takes.
 constexpr int kMostRounds = 4;
-constexpr double kMostBad = 0.25;
+constexpr double MostBad(int k) { return k <= 2 ? 0.1 : 0.25; }
 // Where so many stars are still bad after so many rounds, near the limits of what a reach allows,
 // guesses would be far off.
 constexpr int kTellingRounds = 2;
-constexpr double kHopeless = 0.8;
+constexpr double kHopeless = 0.5;
 // Answers fall elsewhere than guessed. Nearer to each other than this many spacings they would cost
 // quality.
 constexpr double kKept = 0.6;
@@ -125,37 +129,44 @@ double AheadLaying<K>::BadShare() const {
 template <int K>
 CandidateSet<K> AheadLaying<K>::RefineCoarse(std::uint64_t round) {
   CandidateSet<K> candidates;
-  if (rounds_++ == kMostRounds || coarse_->is_full() || BadShare() <= kMostBad) return candidates;
+  if (rounds_++ == kMostRounds || coarse_->is_full() || BadShare() <= MostBad(K)) return candidates;
   auto targets = coarse_->Plan();
   if (!targets || targets->empty() || targets->front().violation.rule >= Rule::kSliver)
     return candidates;
-  *targets = coarse_->Select(std::move(*targets));
+  *targets = coarse_->Select(*targets);
   PlannedPoints planned = Rehearse<K>(*coarse_, round, &*targets, Rehearsed::kSizes);
   candidates = coarse_->Draw(std::move(*targets), round);
   candidates.planned = std::move(planned);
   return candidates;
 }
 
-// The lattice on the guess, from the sample's points on, and from others that no patch comes near;
-// those join the sample. No more than a sample may have; and where guesses go on without end, no
-// more than twice what was expected at most.
+// A lattice on a guess, from `starts` on, and from those of `others` that no patch comes near. No
+// more points than a sample may have; and where guesses go on without end, no more than twice what
+// was expected at most.
 template <int K>
-PlannedPoints AheadLaying<K>::GrowOnGuesses() {
-  const StarComplex<K>& coarse = coarse_->complex();
-  guess_.emplace(coarse, coarse_->criteria().advance_step, 0);
-  Growth<K> growth(coarse.d(), spacing_);
-  const std::uint64_t most = std::min(spec_.limits.max_vertices, 2 * MostAtOnce(K, coarse.d()));
+struct AheadLaying<K>::Grown {
+  PlannedPoints planned;
+  std::vector<Eigen::Index> begun;  // of the others
+};
+
+template <int K>
+typename AheadLaying<K>::Grown AheadLaying<K>::Grow(Surrogate<K>& guess, double spacing,
+                                                    const AnsweredPoints& starts,
+                                                    const AnsweredPoints& others) const {
+  const int d = engine_.complex().d();
+  const std::uint64_t most = std::min(spec_.limits.max_vertices, 2 * MostAtOnce(K, d));
+  Growth<K> growth(d, spacing);
   std::vector<double> points, tangents;
-  const AnsweredPoints scouts = PointsOf<K>(engine_.complex()), all = PointsOf<K>(coarse);
-  growth.Begin(scouts.points, scouts.tangents, scouts.found, 0);
+  Grown grown;
+  if (!starts.found.empty()) growth.Begin(starts.points, starts.tangents, starts.found, 0);
   for (bool goes_on = true; goes_on;) {
     while (growth.size() < most) {
       const auto ring = growth.Propose();
       if (ring.points.cols() == 0) break;
       const auto count = static_cast<std::size_t>(ring.points.cols());
       const AnsweredPoints guessed =
-          guess_->Answer(ring.points, std::vector<const double*>(count, nullptr),
-                         Eigen::VectorXd::Constant(ring.points.cols(), spacing_));
+          guess.Answer(ring.points, std::vector<const double*>(count, nullptr),
+                       Eigen::VectorXd::Constant(ring.points.cols(), spacing));
       for (const Eigen::Index c : growth.Join(guessed.points, guessed.tangents, guessed.found)) {
         CheckInterruption(static_cast<std::size_t>(c));
         const auto point = guessed.points.col(c), tangent = guessed.tangents.col(c);
@@ -163,19 +174,75 @@ PlannedPoints AheadLaying<K>::GrowOnGuesses() {
         tangents.insert(tangents.end(), tangent.begin(), tangent.end());
       }
     }
-    goes_on = false;
-    for (const Eigen::Index c :
-         growth.Begin(all.points, all.tangents, all.found, kPatchesApart * spacing_)) {
-      if (engine_.is_full()) break;
-      engine_.Lay(all, c);
-      goes_on = true;
-    }
+    const std::vector<Eigen::Index> begun =
+        growth.Begin(others.points, others.tangents, others.found, kPatchesApart * spacing);
+    goes_on = !begun.empty();
+    grown.begun.insert(grown.begun.end(), begun.begin(), begun.end());
   }
-  PlannedPoints planned;
-  const auto count = std::ssize(points) / coarse.d();
-  planned.points = Eigen::Map<const Eigen::MatrixXd>(points.data(), coarse.d(), count);
-  planned.tangents = Eigen::Map<const Eigen::MatrixXd>(tangents.data(), coarse.d() * K, count);
-  return planned;
+  const auto count = std::ssize(points) / d;
+  grown.planned.points = Eigen::Map<const Eigen::MatrixXd>(points.data(), d, count);
+  grown.planned.tangents = Eigen::Map<const Eigen::MatrixXd>(tangents.data(), d * K, count);
+  return grown;
+}
+
+template <int K>
+double AheadLaying<K>::coarse_spacing() const {
+  return kCoarseSpacing * LaidSpacing(K, coarse_->criteria().epsilon);
+}
+
+// In place of the seeds, but for those that patches begin from. Nothing, where that would be fewer
+// points than there are seeds: they tell too little of M then.
+template <int K>
+PlannedPoints AheadLaying<K>::GrowCoarse() {
+  Surrogate<K> guess(coarse_->complex(), coarse_->criteria().advance_step, 0);
+  const AnsweredPoints seeds = PointsOf<K>(coarse_->complex());
+  Grown grown = Grow(guess, coarse_spacing(), {}, seeds);
+  if (grown.planned.size() + std::ssize(grown.begun) < seeds.points.cols()) return {};
+  const Specification coarse = CoarserThan<K>(spec_, coarse_->criteria().epsilon);
+  coarse_ = std::make_unique<Engine<K>>(coarse, Resolve(coarse));
+  for (const Eigen::Index c : grown.begun)
+    if (!coarse_->is_full()) coarse_->Lay(seeds, c);
+  is_coarse_asked_ = true;
+  asked_ = grown.planned.points;
+  return std::move(grown.planned);
+}
+
+// What was grown with what R1 and R2 ask for where M is as it is guessed: else they would after
+// one round more.
+template <int K>
+PlannedPoints AheadLaying<K>::RefineGuessed(const PlannedPoints& grown, std::uint64_t round) {
+  Engine<K> guessed(spec_, engine_.criteria());
+  const auto lay = [&](const AnsweredPoints& points) {
+    for (Eigen::Index c = 0; c < points.points.cols() && !guessed.is_full(); ++c) {
+      CheckInterruption(static_cast<std::size_t>(c));
+      guessed.Lay(points, c);
+    }
+  };
+  AnsweredPoints all = PointsOf<K>(engine_.complex());
+  lay(all);
+  all.points = grown.points;
+  all.tangents = grown.tangents;
+  lay(all);
+  guessed.Commit();
+  std::vector<Target<K>> targets;
+  const PlannedPoints more = Rehearse<K>(guessed, round, &targets, Rehearsed::kSizes, &*guess_);
+  PlannedPoints refined;
+  refined.points.resize(grown.points.rows(), grown.size() + more.size());
+  refined.points << grown.points, more.points;
+  refined.tangents.resize(grown.tangents.rows(), grown.size() + more.size());
+  refined.tangents << grown.tangents, more.tangents;
+  return refined;
+}
+
+template <int K>
+PlannedPoints AheadLaying<K>::GrowOnGuesses(std::uint64_t round) {
+  const StarComplex<K>& coarse = coarse_->complex();
+  guess_.emplace(coarse, coarse_->criteria().advance_step, 0);
+  const AnsweredPoints all = PointsOf<K>(coarse);
+  Grown grown = Grow(*guess_, spacing_, PointsOf<K>(engine_.complex()), all);
+  for (const Eigen::Index c : grown.begun)
+    if (!engine_.is_full()) engine_.Lay(all, c);
+  return RefineGuessed(grown.planned, round);
 }
 
 template <int K>
@@ -188,9 +255,13 @@ CandidateSet<K> AheadLaying<K>::Next(std::uint64_t round) {
     rings_->GoOn(PointsOf<K>(engine_.complex()), PointsOf<K>(coarse_->complex()));
     return rings_->Next(round);
   }
+  if (rounds_ == 0) {
+    candidates.planned = GrowCoarse();
+    if (candidates.size() > 0) return candidates;
+  }
   candidates = RefineCoarse(round);
   if (candidates.size() > 0) return candidates;
-  candidates.planned = GrowOnGuesses();
+  candidates.planned = GrowOnGuesses(round);
   asked_ = candidates.planned.points;
   return candidates;
 }
@@ -199,7 +270,14 @@ template <int K>
 std::vector<std::uint8_t> AheadLaying<K>::Take(const CandidateSet<K>& candidates,
                                                const AnsweredPoints& answers) {
   if (rings_) return rings_->Take(candidates, answers);
-  if (guess_) return LayThoseApart(answers);
+  if (guess_) return LayThoseApart(engine_, spacing_, answers);
+  if (is_coarse_asked_) {
+    is_coarse_asked_ = false;
+    ++rounds_;
+    const std::vector<std::uint8_t> used = LayThoseApart(*coarse_, coarse_spacing(), answers);
+    coarse_->Commit();
+    return Scout(answers, used);
+  }
   const Inserted inserted = coarse_->Insert(candidates, answers);
   coarse_->Commit();
   return Scout(answers, inserted.used);
@@ -208,19 +286,20 @@ std::vector<std::uint8_t> AheadLaying<K>::Take(const CandidateSet<K>& candidates
 // Which of the points, `first` of the sample's own and then those at `columns`, come too near to an
 // earlier one that stays. As guessed they kept their distance: one of two that come near has moved.
 template <int K>
-std::vector<std::uint8_t> AheadLaying<K>::AreTooNear(
-    const std::vector<double>& points, std::size_t first,
-    const std::vector<Eigen::Index>& columns) const {
+std::vector<std::uint8_t> AheadLaying<K>::AreTooNear(const std::vector<double>& points,
+                                                     std::size_t first,
+                                                     const std::vector<Eigen::Index>& columns,
+                                                     double spacing) const {
   const int d = engine_.complex().d();
   const auto stride = static_cast<std::size_t>(d);
-  const double apart = kKept * spacing_;
-  const RunTree tree(points, d, kRunReach * spacing_);
+  const double apart = kKept * spacing;
+  const RunTree tree(points, d, kRunReach * spacing);
   using Pair = std::pair<std::uint32_t, std::uint32_t>;  // the later one first
   std::vector<Pair> near = ParallelGather<Pair>(columns.size(), [&](std::size_t at, auto* pairs) {
     const auto i = static_cast<std::uint32_t>(first + at);
     const double* const point = points.data() + i * stride;
     if (Distance(point, asked_.col(columns[at]).data(), d) <=
-        0.5 * (Growth<K>::kKeep * spacing_ - apart))
+        0.5 * (Growth<K>::kKeep * spacing - apart))
       return;
     thread_local std::vector<std::uint32_t> around;
     around.clear();
@@ -240,9 +319,10 @@ std::vector<std::uint8_t> AheadLaying<K>::AreTooNear(
 }
 
 template <int K>
-std::vector<std::uint8_t> AheadLaying<K>::LayThoseApart(const AnsweredPoints& answers) {
-  const std::size_t first = engine_.complex().size();
-  std::vector<double> points = engine_.complex().points();
+std::vector<std::uint8_t> AheadLaying<K>::LayThoseApart(Engine<K>& engine, double spacing,
+                                                        const AnsweredPoints& answers) {
+  const std::size_t first = engine.complex().size();
+  std::vector<double> points = engine.complex().points();
   std::vector<Eigen::Index> found;
   for (std::size_t i = 0; i < answers.found.size(); ++i) {
     CheckInterruption(i);
@@ -251,13 +331,13 @@ std::vector<std::uint8_t> AheadLaying<K>::LayThoseApart(const AnsweredPoints& an
     found.push_back(static_cast<Eigen::Index>(i));
     points.insert(points.end(), point.begin(), point.end());
   }
-  const std::vector<std::uint8_t> too_near = AreTooNear(points, first, found);
+  const std::vector<std::uint8_t> too_near = AreTooNear(points, first, found, spacing);
   asked_.resize(0, 0);
   std::vector<std::uint8_t> used(answers.found.size(), 0);
-  for (std::size_t i = 0; i < found.size() && !engine_.is_full(); ++i) {
+  for (std::size_t i = 0; i < found.size() && !engine.is_full(); ++i) {
     CheckInterruption(i);
     if (too_near[first + i]) continue;
-    engine_.Lay(answers, found[i]);
+    engine.Lay(answers, found[i]);
     used[static_cast<std::size_t>(found[i])] = 1;
   }
   return used;

@@ -10,11 +10,12 @@
 
 namespace stellate::core {
 
-// Lays the sample in a handful of round trips: a mesh several times as coarse is refined first,
-// asking ahead; on what that guesses of M (core/refinement/surrogate.h) a sample of the final
-// spacing is grown, and asked for at once. Of the coarse mesh's points those that patches begin
-// from are of the sample, from when they are found. Where that mesh does not come about the sample
-// is laid ring by ring after all.
+// Lays the sample in a handful of round trips. On what the stars of the seeds guess of M
+// (core/refinement/surrogate.h) a sample several times as coarse is grown, asked for at once, and
+// refined where it has to be; on what that guesses one of the final spacing, asked for at once as
+// well, with what R1 and R2 will ask for if it is right. Of the coarse points those that patches
+// begin from are of the sample, from when they are found. Where the coarse mesh does not come about
+// the sample is laid ring by ring after all.
 template <int K>
 class AheadLaying final : public Laying<K> {
  public:
@@ -34,20 +35,29 @@ class AheadLaying final : public Laying<K> {
                                   const std::vector<std::uint8_t>& found);
   double BadShare() const;  // of the coarse mesh's stars
   CandidateSet<K> RefineCoarse(std::uint64_t round);
-  PlannedPoints GrowOnGuesses();
+  struct Grown;
+  Grown Grow(Surrogate<K>& guess, double spacing, const AnsweredPoints& starts,
+             const AnsweredPoints& others) const;
+  double coarse_spacing() const;
+  PlannedPoints GrowCoarse();
+  PlannedPoints GrowOnGuesses(std::uint64_t round);
+  PlannedPoints RefineGuessed(const PlannedPoints& grown, std::uint64_t round);
   std::vector<std::uint8_t> AreTooNear(const std::vector<double>& points, std::size_t first,
-                                       const std::vector<Eigen::Index>& columns) const;
-  std::vector<std::uint8_t> LayThoseApart(const AnsweredPoints& answers);
+                                       const std::vector<Eigen::Index>& columns,
+                                       double spacing) const;
+  std::vector<std::uint8_t> LayThoseApart(Engine<K>& engine, double spacing,
+                                          const AnsweredPoints& answers);
 
   Engine<K>& engine_;
   const Specification& spec_;
   double spacing_;
   std::unique_ptr<Engine<K>> coarse_;
-  int rounds_ = 0;                      // of its refinement
+  bool is_coarse_asked_ = false;        // grown points of it are asked for
+  int rounds_ = 0;                      // of the coarse mesh
   std::optional<Surrogate<K>> guess_;   // of the coarse mesh, from when the sample is asked for
   std::optional<RingLaying<K>> rings_;  // where nothing can be guessed
   BallTree scouts_;                     // the sample until then
-  Eigen::MatrixXd asked_;               // the sample, guessed, while it is asked for
+  Eigen::MatrixXd asked_;               // what was grown, while it is asked for
 };
 
 STELLATE_DECLARE_CLASS(AheadLaying)

@@ -70,7 +70,7 @@ INSTANTIATE_TEST_SUITE_P(Catalogue, AheadLaid,
                          ::testing::Values(Case{"torus", 0.04, 8}, Case{"sphere:2", 0.04, 8},
                                            Case{"circle:3", 0.003, 8}, Case{"two-spheres", 0.06, 9},
                                            Case{"tanglecube", 0.05, 10}, Case{"sphere:3", 0.16, 9},
-                                           Case{"so3", 0.33, 9}));
+                                           Case{"so3", 0.33, 9}, Case{"flat-torus:3", 0.3, 10}));
 
 // At 0.4 of its reach a mesh of T^3 twice as coarse does not come about.
 TEST(AheadLaying, LeavesToRingsWhatCannotBeGuessed) {
