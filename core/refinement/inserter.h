@@ -60,7 +60,8 @@ class Inserter {
 
   // The steps of a run. Judge: returns whether all points of R1 and R2 lie near where they were
   // aimed, and so cannot have come near each other; to be told of all of the round, if others have
-  // some of it. InsertTarget: in the order of the round. Returns what became of it.
+  // some of it. InsertTarget: in the order of the round. Returns what became of it; kPutOff: it is
+  // as it was, for its star to be asked about otherwise, or since another point came near.
   enum class Outcome : std::uint8_t { kInserted, kFailed, kPutOff };
   bool Judge();
   void TellAllNearAim(bool all) { all_near_aim_ = all; }

@@ -88,7 +88,10 @@ class Surroundings:
         # Scripts find the tree by their own place: what they lie in has to be a copy.
         # Stubs are made first, or somebody else's import may make them while they are copied.
         runpy.run_path(str(ROOT / "clients/python/stellate/_stubs.py"))["ensure"]()
-        passing = shutil.ignore_patterns("__pycache__", ".generated-*", "node_modules", "target")
+        # Caches of linters that run beside this (.mypy_cache) come and go while they are copied.
+        passing = shutil.ignore_patterns(
+            "__pycache__", ".*_cache", ".generated-*", "node_modules", "target"
+        )
         for item in ROOT.iterdir():
             if item.name in ("clients", "docker", "packaging", "proto"):
                 shutil.copytree(item, self.here / item.name, symlinks=True, ignore=passing)
