@@ -238,6 +238,13 @@ class StarComplex {
   double HalfSpace(const Site& p, const Site& q, double* step, double* normal) const {
     return 0.5 * (Project(p, q.point, step, normal) + Weight(p.id) - Weight(q.id));
   }
+  // Of a cell in the flats that is made apart. Whether q cuts it.
+  template <typename Polytope>
+  bool ClipApart(const Site& p, std::uint32_t q, double* step, Polytope* polytope) const {
+    double normal[K];
+    const double offset = HalfSpace(p, At(q), step, normal);
+    return polytope->Clip(q, normal, offset);
+  }
   // The cell of p before any other point is known.
   void ResetCell(Cell& cell, const Site& p, const Site* guest,
                  typename Cell::Scratch& scratch) const;
@@ -255,6 +262,10 @@ class StarComplex {
                          typename Cell::Scratch& scratch) const;
   void CloseInFlats(const Site& p, Cell& cell, typename Cell::Scratch& scratch) const;
   void Neighbourhood(const double* q, std::uint32_t near, std::vector<std::uint32_t>* ids) const;
+  // Calls clip(q) for each q of p's Neighbourhood, and returns that.
+  template <typename Clip>
+  const std::vector<std::uint32_t>& ClipByNeighbourhood(const Site& p, std::uint32_t near,
+                                                        const Clip& clip) const;
   // Calls visit(v, simplex) for the simplices of star(p) of which p is the lowest vertex, once for
   // each: at common centres a cell that is far from convex may hold one at two vertices.
   template <typename Visit>

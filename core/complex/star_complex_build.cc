@@ -44,6 +44,20 @@ void StarComplex<K>::CloseInFlats(const Site& p, Cell& cell,
   cell = flat;
 }
 
+// What closes the cell, or nearly so, comes first: without it a search that happens to begin on one
+// side of p would visit all of that side while the cell is open towards the other.
+template <int K>
+template <typename Clip>
+const std::vector<std::uint32_t>& StarComplex<K>::ClipByNeighbourhood(const Site& p,
+                                                                      std::uint32_t near,
+                                                                      const Clip& clip) const {
+  thread_local std::vector<std::uint32_t> first;
+  Neighbourhood(p.point, near, &first);
+  for (const std::uint32_t q : first)
+    if (q != p.id) clip(q);
+  return first;
+}
+
 // As most stars that are laid: made in the flats, and judged when it is done. False where that will
 // not do, which hangs on what lies around p alone. Asks once about whom p influences, whatever it
 // returns.
@@ -52,18 +66,11 @@ template <typename Influencing>
 bool StarComplex<K>::BuildAsInFlats(const Site& p, std::uint32_t near, Cell& cell,
                                     const Influencing& influencing) const {
   LaidPolytope& polytope = ThreadPolytope();
-  thread_local std::vector<std::uint32_t> first;
   thread_local Near around;
   Step step(d_);
   polytope.Reset(inradius_);
-  const auto clip = [&](std::uint32_t q) {
-    double normal[K];
-    const double offset = HalfSpace(p, At(q), step.data(), normal);
-    polytope.Clip(q, normal, offset);
-  };
-  Neighbourhood(p.point, near, &first);
-  for (const std::uint32_t q : first)
-    if (q != p.id) clip(q);
+  const auto clip = [&](std::uint32_t q) { ClipApart(p, q, step.data(), &polytope); };
+  const auto& first = ClipByNeighbourhood(p, near, clip);
   const auto judged_reach = [&] { return kJudgedReach * Influence(p.id, polytope.max_norm2()); };
   const double farthest = kFarthest * epsilon(), gathered = std::min(judged_reach(), farthest);
   around.clear();
@@ -89,17 +96,10 @@ template <typename Influencing>
 bool StarComplex<K>::BuildPolytope(const Site& p, std::uint32_t near, Cell& cell,
                                    const Influencing& influencing) const {
   LaidPolytope& polytope = ThreadPolytope();
-  thread_local std::vector<std::uint32_t> first;
   Step step(d_);
   polytope.Reset(inradius_);
-  const auto clip = [&](std::uint32_t q) {
-    double normal[K];
-    const double offset = HalfSpace(p, At(q), step.data(), normal);
-    return polytope.Clip(q, normal, offset);
-  };
-  Neighbourhood(p.point, near, &first);
-  for (const std::uint32_t q : first)
-    if (q != p.id) clip(q);
+  const auto clip = [&](std::uint32_t q) { return ClipApart(p, q, step.data(), &polytope); };
+  const auto& first = ClipByNeighbourhood(p, near, clip);
   double reach = InfluenceWithin(polytope.max_norm2());
   tree_.VisitAround(
       p.point, [&] { return reach; },
@@ -167,12 +167,7 @@ void StarComplex<K>::BuildStar(const Site& p, const Site* guest, std::uint32_t n
   const auto reach_now = [&] {
     return apart ? InfluenceWithin(polygon.max_norm2()) : Influence(p.id, cell);
   };
-  // What closes the cell, or nearly so, comes first: without it a search that happens to begin on
-  // one side of p would visit all of that side while the cell is open towards the other.
-  thread_local std::vector<std::uint32_t> first;
-  Neighbourhood(p.point, near, &first);
-  for (const std::uint32_t q : first)
-    if (q != p.id) clip(q);
+  const auto& first = ClipByNeighbourhood(p, near, clip);
   double reach = reach_now();
   tree_.VisitAround(
       p.point, [&] { return reach; },

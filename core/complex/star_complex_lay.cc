@@ -120,12 +120,7 @@ void StarComplex<K>::CutInFlats(const Site& p, Near* near, double* known, const 
     polytope.Reset(inradius_);
     *known = CutByNear(
         near, *known, [&] { return Influence(p.id, polytope.max_norm2()); },
-        [&](std::uint32_t q) {
-          double normal[K];
-          const double offset = HalfSpace(p, At(q), step.data(), normal);
-          return polytope.Clip(q, normal, offset);
-        },
-        search);
+        [&](std::uint32_t q) { return ClipApart(p, q, step.data(), &polytope); }, search);
     if (!polytope.gave_up()) return cell.Take(polytope);
   }
   ResetInFlats(cell, p);
