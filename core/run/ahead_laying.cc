@@ -2,15 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <utility>
 
 #include "core/base/interruption.h"
-#include "core/base/parallel.h"
-#include "core/base/vector_ops.h"
 #include "core/growth/growth.h"
 #include "core/refinement/rehearsal.h"
-#include "core/sample/runs.h"
 
 namespace stellate::core {
 namespace {
@@ -36,11 +32,11 @@ constexpr double MostBad(int k) { return k <= 2 ? 0.1 : 0.25; }
 // guesses would be far off.
 constexpr int kTellingRounds = 2;
 constexpr double kHopeless = 0.5;
-// Answers fall elsewhere than guessed. Nearer to each other than this many spacings they would cost
-// quality.
-constexpr double kKept = 0.6;
-// Points of a run lie within this many spacings of its first.
-constexpr double kRunReach = 3;
+// Where so many are after what was grown on guesses from too few seeds, these told next to nothing:
+// the coarse sample is laid ring by ring, as fine as it may be, since nobody knows how M bends.
+// Nobody minds its seams: patches begin so few spacings apart.
+constexpr double kNothingTold = 0.85;
+constexpr double kCoarseApart = 3;
 
 // The largest at which enough of the seeds lie that far apart.
 double CoarseEpsilon(int k, const AnsweredPoints& seeds, double epsilon) {
@@ -197,12 +193,12 @@ PlannedPoints AheadLaying<K>::GrowCoarse() {
   Surrogate<K> guess(coarse_->complex(), coarse_->criteria().advance_step, 0);
   const AnsweredPoints seeds = PointsOf<K>(coarse_->complex());
   Grown grown = Grow(guess, coarse_spacing(), {}, seeds);
-  if (grown.planned.size() + std::ssize(grown.begun) < seeds.points.cols()) return {};
+  const Eigen::Index count = grown.planned.size();
+  if (count == 0 || count + std::ssize(grown.begun) < seeds.points.cols()) return {};
   const Specification coarse = CoarserThan<K>(spec_, coarse_->criteria().epsilon);
   coarse_ = std::make_unique<Engine<K>>(coarse, Resolve(coarse));
   for (const Eigen::Index c : grown.begun)
     if (!coarse_->is_full()) coarse_->Lay(seeds, c);
-  is_coarse_asked_ = true;
   asked_ = grown.planned.points;
   return std::move(grown.planned);
 }
@@ -245,22 +241,57 @@ PlannedPoints AheadLaying<K>::GrowOnGuesses(std::uint64_t round) {
   return RefineGuessed(grown.planned, round);
 }
 
+// Ring by ring, from what there is of it on.
+template <int K>
+void AheadLaying<K>::LayCoarse() {
+  const AnsweredPoints seeds = PointsOf<K>(coarse_->complex());
+  const Specification coarse = CoarserThan<K>(spec_, kLeastCoarse * engine_.criteria().epsilon);
+  coarse_ = std::make_unique<Engine<K>>(coarse, Resolve(coarse));
+  rings_.emplace(*coarse_, spec_, kCoarseApart);
+  rings_->Begin(seeds);
+}
+
 template <int K>
 CandidateSet<K> AheadLaying<K>::Next(std::uint64_t round) {
   CandidateSet<K> candidates;
-  if (rings_) return rings_->Next(round);
-  if (guess_) return candidates;
+  switch (stage_) {
+    case Stage::kRings:
+      return rings_->Next(round);
+    case Stage::kGuessed:
+      return candidates;
+    case Stage::kSeeds:
+      candidates.planned = GrowCoarse();
+      if (candidates.size() > 0) {
+        stage_ = Stage::kGrown;
+        return candidates;
+      }
+      [[fallthrough]];
+    case Stage::kGrown:
+      stage_ = Stage::kCoarse;
+      if (coarse_->complex().size() >= kEnough[K] || BadShare() <= kNothingTold) break;
+      LayCoarse();
+      stage_ = Stage::kCoarseRings;
+      [[fallthrough]];
+    case Stage::kCoarseRings:
+      candidates = rings_->Next(round);
+      if (candidates.size() > 0) return candidates;
+      rings_.reset();
+      coarse_->Commit();
+      rounds_ = 1;
+      stage_ = Stage::kCoarse;
+      break;
+    case Stage::kCoarse:
+      break;
+  }
   if (rounds_ == kTellingRounds && BadShare() > kHopeless) {
-    rings_.emplace(engine_, false);
+    stage_ = Stage::kRings;
+    rings_.emplace(engine_, spec_);
     rings_->GoOn(PointsOf<K>(engine_.complex()), PointsOf<K>(coarse_->complex()));
     return rings_->Next(round);
   }
-  if (rounds_ == 0) {
-    candidates.planned = GrowCoarse();
-    if (candidates.size() > 0) return candidates;
-  }
   candidates = RefineCoarse(round);
   if (candidates.size() > 0) return candidates;
+  stage_ = Stage::kGuessed;
   candidates.planned = GrowOnGuesses(round);
   asked_ = candidates.planned.points;
   return candidates;
@@ -269,84 +300,33 @@ CandidateSet<K> AheadLaying<K>::Next(std::uint64_t round) {
 template <int K>
 std::vector<std::uint8_t> AheadLaying<K>::Take(const CandidateSet<K>& candidates,
                                                const AnsweredPoints& answers) {
-  if (rings_) return rings_->Take(candidates, answers);
-  if (guess_) return LayThoseApart(engine_, spacing_, answers);
-  if (is_coarse_asked_) {
-    is_coarse_asked_ = false;
-    ++rounds_;
-    const std::vector<std::uint8_t> used = LayThoseApart(*coarse_, coarse_spacing(), answers);
-    coarse_->Commit();
-    return Scout(answers, used);
+  std::vector<std::uint8_t> used;
+  switch (stage_) {
+    case Stage::kRings:
+      return rings_->Take(candidates, answers);
+    case Stage::kGuessed:
+      return LayThoseApart(engine_, spacing_, answers);
+    case Stage::kCoarseRings:
+      used = rings_->Take(candidates, answers);
+      break;
+    case Stage::kGrown:
+      ++rounds_;
+      used = LayThoseApart(*coarse_, coarse_spacing(), answers);
+      coarse_->Commit();
+      break;
+    case Stage::kSeeds:
+    case Stage::kCoarse:
+      used = coarse_->Insert(candidates, answers).used;
+      coarse_->Commit();
+      break;
   }
-  const Inserted inserted = coarse_->Insert(candidates, answers);
-  coarse_->Commit();
-  return Scout(answers, inserted.used);
-}
-
-// Which of the points, `first` of the sample's own and then those at `columns`, come too near to an
-// earlier one that stays. As guessed they kept their distance: one of two that come near has moved.
-template <int K>
-std::vector<std::uint8_t> AheadLaying<K>::AreTooNear(const std::vector<double>& points,
-                                                     std::size_t first,
-                                                     const std::vector<Eigen::Index>& columns,
-                                                     double spacing) const {
-  const int d = engine_.complex().d();
-  const auto stride = static_cast<std::size_t>(d);
-  const double apart = kKept * spacing;
-  const RunTree tree(points, d, kRunReach * spacing);
-  using Pair = std::pair<std::uint32_t, std::uint32_t>;  // the later one first
-  std::vector<Pair> near = ParallelGather<Pair>(columns.size(), [&](std::size_t at, auto* pairs) {
-    const auto i = static_cast<std::uint32_t>(first + at);
-    const double* const point = points.data() + i * stride;
-    if (Distance(point, asked_.col(columns[at]).data(), d) <=
-        0.5 * (Growth<K>::kKeep * spacing - apart))
-      return;
-    thread_local std::vector<std::uint32_t> around;
-    around.clear();
-    tree.Gather(point, apart, &around);
-    for (const std::uint32_t j : around)
-      if (j != i && SquaredDistance(point, points.data() + j * stride, d) < apart * apart)
-        pairs->emplace_back(std::max(i, j), std::min(i, j));
-  });
-  ParallelSort(near, std::less<>());
-  std::vector<std::uint8_t> too_near(points.size() / stride, 0);
-  for (std::size_t at = 0; at < near.size(); ++at) {
-    CheckInterruption(at);
-    const auto [later, earlier] = near[at];
-    too_near[later] = too_near[later] || !too_near[earlier];
-  }
-  return too_near;
-}
-
-template <int K>
-std::vector<std::uint8_t> AheadLaying<K>::LayThoseApart(Engine<K>& engine, double spacing,
-                                                        const AnsweredPoints& answers) {
-  const std::size_t first = engine.complex().size();
-  std::vector<double> points = engine.complex().points();
-  std::vector<Eigen::Index> found;
-  for (std::size_t i = 0; i < answers.found.size(); ++i) {
-    CheckInterruption(i);
-    if (!answers.found[i]) continue;
-    const auto point = answers.points.col(static_cast<Eigen::Index>(i));
-    found.push_back(static_cast<Eigen::Index>(i));
-    points.insert(points.end(), point.begin(), point.end());
-  }
-  const std::vector<std::uint8_t> too_near = AreTooNear(points, first, found, spacing);
-  asked_.resize(0, 0);
-  std::vector<std::uint8_t> used(answers.found.size(), 0);
-  for (std::size_t i = 0; i < found.size() && !engine.is_full(); ++i) {
-    CheckInterruption(i);
-    if (too_near[first + i]) continue;
-    engine.Lay(answers, found[i]);
-    used[static_cast<std::size_t>(found[i])] = 1;
-  }
-  return used;
+  return Scout(answers, used);
 }
 
 // As many spacings apart as patches begin.
 template <int K>
 double AheadLaying<K>::CountMissing() const {
-  if (rings_) return rings_->CountMissing();
+  if (stage_ == Stage::kRings) return rings_->CountMissing();
   return guess_ ? static_cast<double>(asked_.cols())
                 : std::pow(kPatchesApart, K) * engine_.complex().size();
 }

@@ -14,8 +14,8 @@ namespace stellate::core {
 // (core/refinement/surrogate.h) a sample several times as coarse is grown, asked for at once, and
 // refined where it has to be; on what that guesses one of the final spacing, asked for at once as
 // well, with what R1 and R2 will ask for if it is right. Of the coarse points those that patches
-// begin from are of the sample, from when they are found. Where the coarse mesh does not come about
-// the sample is laid ring by ring after all.
+// begin from are of the sample, from when they are found. Where seeds are too few to guess from the
+// coarse sample is laid ring by ring; where the coarse mesh does not come about the final one is.
 template <int K>
 class AheadLaying final : public Laying<K> {
  public:
@@ -26,7 +26,9 @@ class AheadLaying final : public Laying<K> {
   CandidateSet<K> Next(std::uint64_t round) override;
   std::vector<std::uint8_t> Take(const CandidateSet<K>& candidates,
                                  const AnsweredPoints& answers) override;
-  const Engine<K>& asking() const override { return guess_ || rings_ ? engine_ : *coarse_; }
+  const Engine<K>& asking() const override {
+    return stage_ == Stage::kGuessed || stage_ == Stage::kRings ? engine_ : *coarse_;
+  }
   Surrogate<K>* guess() override { return guess_ ? &*guess_ : nullptr; }
   double CountMissing() const override;
 
@@ -40,22 +42,28 @@ class AheadLaying final : public Laying<K> {
              const AnsweredPoints& others) const;
   double coarse_spacing() const;
   PlannedPoints GrowCoarse();
+  void LayCoarse();
   PlannedPoints GrowOnGuesses(std::uint64_t round);
   PlannedPoints RefineGuessed(const PlannedPoints& grown, std::uint64_t round);
-  std::vector<std::uint8_t> AreTooNear(const std::vector<double>& points, std::size_t first,
-                                       const std::vector<Eigen::Index>& columns,
-                                       double spacing) const;
   std::vector<std::uint8_t> LayThoseApart(Engine<K>& engine, double spacing,
                                           const AnsweredPoints& answers);
 
   Engine<K>& engine_;
   const Specification& spec_;
   double spacing_;
+  enum class Stage {
+    kSeeds,        // they are the coarse sample
+    kGrown,        // that was grown on what they tell
+    kCoarseRings,  // it is laid ring by ring
+    kCoarse,       // the coarse mesh is refined
+    kGuessed,      // the sample was grown on what it tells
+    kRings,        // the sample is laid ring by ring
+  };
+  Stage stage_ = Stage::kSeeds;
   std::unique_ptr<Engine<K>> coarse_;
-  bool is_coarse_asked_ = false;        // grown points of it are asked for
   int rounds_ = 0;                      // of the coarse mesh
-  std::optional<Surrogate<K>> guess_;   // of the coarse mesh, from when the sample is asked for
-  std::optional<RingLaying<K>> rings_;  // where nothing can be guessed
+  std::optional<Surrogate<K>> guess_;   // of the coarse mesh
+  std::optional<RingLaying<K>> rings_;  // of either sample
   BallTree scouts_;                     // the sample until then
   Eigen::MatrixXd asked_;               // what was grown, while it is asked for
 };

@@ -68,7 +68,7 @@ template <int K>
 std::unique_ptr<Laying<K>> LayingBetweenWalls(Engine<K>& engine, const Specification& spec) {
   if (K > kMostBetweenWalls || engine.criteria().graded()) return nullptr;
   if (K == spec.ambient_dimension) return std::make_unique<SolidLaying<K>>(engine);
-  return spec.criteria.ask_ahead ? nullptr : std::make_unique<RingLaying<K>>(engine, true);
+  return spec.criteria.ask_ahead ? nullptr : std::make_unique<RingLaying<K>>(engine, spec);
 }
 
 }  // namespace
@@ -129,7 +129,7 @@ std::unique_ptr<Laying<K>> LayingFor(Engine<K>& engine, const Specification& spe
   const auto most = static_cast<double>(MostAtOnce(K, engine.complex().d()));
   if (criteria.ask_ahead && K <= kMostAhead && GuessSize(K, seeds, criteria.epsilon) <= most)
     return std::make_unique<AheadLaying<K>>(engine, spec);
-  return std::make_unique<RingLaying<K>>(engine, false);
+  return std::make_unique<RingLaying<K>>(engine, spec);
 }
 
 #define STELLATE_EACH(K)                                                              \

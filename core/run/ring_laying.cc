@@ -29,12 +29,13 @@ void Append(const AnsweredPoints& from, const std::vector<Eigen::Index>& columns
 }  // namespace
 
 template <int K>
-RingLaying<K>::RingLaying(Engine<K>& engine, bool has_walls)
+RingLaying<K>::RingLaying(Engine<K>& engine, const Specification& spec, double apart)
     : engine_(engine),
+      are_drawn_(spec.seeds.cols() == 0),
+      apart_(apart),
       growth_(engine.complex().d(), LaidSpacing(K, engine.criteria().epsilon)),
-      scouting_(
-          std::make_unique<Growth<K>>(engine.complex().d(), kPatchesApart * growth_.spacing())) {
-  if (has_walls) room_.emplace(engine, growth_.spacing());
+      scouting_(std::make_unique<Growth<K>>(engine.complex().d(), apart_ * growth_.spacing())) {
+  if (spec.walls > 0) room_.emplace(engine, growth_.spacing());
 }
 
 template <int K>
@@ -64,8 +65,7 @@ template <int K>
 typename Growth<K>::Ring RingLaying<K>::NextRing() {
   typename Growth<K>::Ring ring;
   if (engine_.is_full()) return ring;
-  // Where all is within reach of one seed there is nothing to scout.
-  if (scouting_ && scouting_->size() > 1) ring = scouting_->Propose();
+  if (scouting_ && (scouting_->size() > 1 || !are_drawn_)) ring = scouting_->Propose();
   if (scouting_ && ring.points.cols() == 0) {
     scouting_.reset();
     growth_.Begin(scouts_.points, scouts_.tangents, scouts_.found, 0,
@@ -75,10 +75,9 @@ typename Growth<K>::Ring RingLaying<K>::NextRing() {
     ring = growth_.Propose();
     if (ring.points.cols() == 0) {
       // What no patch came near has seeds of its own.
-      LayColumns<K>(
-          engine_, seeds_,
-          growth_.Begin(seeds_.points, seeds_.tangents, seeds_.found,
-                        kPatchesApart * growth_.spacing(), SharesOf(engine_.sizes(), seeds_)));
+      LayColumns<K>(engine_, seeds_,
+                    growth_.Begin(seeds_.points, seeds_.tangents, seeds_.found,
+                                  apart_ * growth_.spacing(), SharesOf(engine_.sizes(), seeds_)));
       if (!engine_.is_full()) ring = growth_.Propose();
     }
   }
@@ -160,8 +159,7 @@ std::vector<std::uint8_t> RingLaying<K>::Take(const CandidateSet<K>&,
 template <int K>
 double RingLaying<K>::CountMissing() const {
   const double here = 2.0 * static_cast<double>(growth_.border());
-  return scouting_ ? here + std::pow(kPatchesApart, K) * static_cast<double>(scouting_->size())
-                   : here;
+  return scouting_ ? here + std::pow(apart_, K) * static_cast<double>(scouting_->size()) : here;
 }
 
 STELLATE_INSTANTIATE_CLASS(RingLaying)

@@ -10,13 +10,15 @@
 
 namespace stellate::core {
 
-// What is asked is what joins, ring by ring (core/growth/growth.h). A lattice ten times as coarse
-// goes before, to have a seed near everything. Of a manifold with boundary it is the interior that
-// is laid, as far as there is room.
+// What is asked is what joins, ring by ring (core/growth/growth.h). A coarser lattice goes before,
+// to have a seed near everything; but where all that was drawn in a box is within its spacing of
+// one seed. Of a manifold with boundary it is the interior that is laid, as far as there is room.
 template <int K>
 class RingLaying final : public Laying<K> {
  public:
-  RingLaying(Engine<K>& engine, bool has_walls);  // borrowed
+  // The engine is borrowed; of `spec` only its walls and whether it gives seeds are heeded.
+  // apart: of patches, in spacings of the lattice.
+  RingLaying(Engine<K>& engine, const Specification& spec, double apart = kPatchesApart);
 
   std::vector<std::uint8_t> Begin(const AnsweredPoints& seeds) override;
   // In place of Begin: from the sample as it is, and from seeds where no patch comes.
@@ -35,6 +37,8 @@ class RingLaying final : public Laying<K> {
                                   const std::vector<Eigen::Index>& columns);
 
   Engine<K>& engine_;
+  const bool are_drawn_;  // the seeds, from a box
+  const double apart_;    // patches, in spacings
   Growth<K> growth_;
   std::unique_ptr<Growth<K>> scouting_;  // the coarse lattice, until it is laid
   AnsweredPoints seeds_, scouts_;        // as given; of the coarse lattice

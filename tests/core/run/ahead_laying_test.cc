@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
+#include <tuple>
 
 #include "tests/core/support/in_process_run.h"
 #include "tests/core/support/point_hash.h"
@@ -87,6 +89,47 @@ TEST(AheadLaying, LeavesToRingsWhatCannotBeGuessed) {
   EXPECT_LT(static_cast<double>(ahead.report().counts.queries),
             1.3 * static_cast<double>(plain.report().counts.queries));
 }
+
+// M at closest points of what a sequence that fills the box gives, as a user would name them who
+// has no box.
+Specification Seeded(Manifold& manifold, double epsilon, Eigen::Index count) {
+  Specification spec = SpecificationFor(manifold, epsilon);
+  const int d = spec.ambient_dimension;
+  Eigen::MatrixXd drawn(d, count);
+  for (Eigen::Index c = 0; c < count; ++c)
+    for (int r = 0; r < d; ++r) {
+      const double share = std::fmod((c + 1) * std::sqrt(2.0 + 3 * r), 1.0);
+      drawn(r, c) = std::lerp(spec.bounding_box->lower[r], spec.bounding_box->upper[r], share);
+    }
+  spec.seeds = manifold.ClosestPoint(drawn).points;
+  spec.bounding_box.reset();
+  return spec;
+}
+
+class FewSeeds : public ::testing::TestWithParam<std::tuple<Case, int>> {};
+
+TEST_P(FewSeeds, TakeNoMoreRoundsThanRingsAndHardlyMoreVertices) {
+  const auto& [c, count] = GetParam();
+  const auto manifold = Make(c.manifold);
+  Specification spec = Seeded(*manifold, c.epsilon, count);
+  const DrivenRun plain = Drive(spec, *manifold);
+  spec.criteria.ask_ahead = true;
+  const DrivenRun ahead = Drive(spec, *manifold);
+  ExpectGoodMesh(plain, manifold->facts());
+  ExpectGoodMesh(ahead, manifold->facts());
+  const Counts& a = ahead.report().counts;
+  const Counts& p = plain.report().counts;
+  EXPECT_LE(p.rounds, c.most_rounds);
+  EXPECT_LE(a.rounds, p.rounds);
+  EXPECT_LT(static_cast<double>(a.vertices), 1.07 * static_cast<double>(p.vertices));
+}
+
+INSTANTIATE_TEST_SUITE_P(Laying, FewSeeds,
+                         ::testing::Combine(::testing::Values(Case{"sphere:2", 0.03, 26},
+                                                              Case{"torus", 0.04, 26},
+                                                              Case{"tanglecube", 0.05, 36},
+                                                              Case{"flat-torus:3", 0.3, 40}),
+                                            ::testing::Values(1, 4, 16)));
 
 // A manifold of which an oracle says less still has such a mesh.
 TEST(AheadLaying, DoesWithClosestPointsAlone) {
