@@ -1,7 +1,5 @@
 // What a run says of how it ended.
 
-#include <string>
-
 #include "core/base/message.h"
 #include "core/certificate/findings.h"
 #include "core/run/ending.h"
@@ -17,8 +15,9 @@ void MeshingRun<K>::DescribeEnding(bool is_whole) {
     certificate = certification_->certificate();
     WarnOfCompromises<K>(engine_, spec_.epsilon, &certificate);
   } else {
-    certificate.verdict = std::string("not certified: the run ended as ") +
-                          TerminationName(termination) + " before every rule held";
+    certificate.verdict = Message("not certified: the run ended as ", TerminationName(termination),
+                                  certification_ ? " when every rule held, before it was certified"
+                                                 : " before every rule held");
     if (!report_.failure.message.empty()) certificate.verdict += ": " + report_.failure.message;
     // Whoever cancels a large mesh does not want to wait for it to be described.
     if (termination != Termination::kCancelled && termination != Termination::kOracleFailed)

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "core/run/progress_meter.h"
+#include "tests/core/support/in_process_run.h"
 #include "tests/core/support/unit_sphere.h"
 
 namespace stellate::core {
@@ -67,6 +68,22 @@ TEST(Ending, WarnsOfSizesThatAreTooFine) {
     ASSERT_EQ(certificate.warnings.size(), 1u);
     EXPECT_TRUE(Says(certificate.warnings[0], "at 1 vertices")) << certificate.warnings[0];
   }
+}
+
+TEST(Ending, TellsARunThatOnlyHadToBeCertified) {
+  const auto sphere = testing::Make("sphere:2");
+  Specification spec = testing::SpecificationFor(*sphere, 0.2);
+  const std::uint64_t rounds = testing::Drive(spec, *sphere).report().counts.rounds;
+  spec.limits.max_rounds = rounds - 1;
+  const testing::DrivenRun refined = testing::Drive(spec, *sphere);
+  EXPECT_EQ(refined.report().termination, Termination::kRoundBudget);
+  EXPECT_FALSE(refined.report().certificate.certified);
+  EXPECT_EQ(
+      refined.report().certificate.verdict,
+      "not certified: the run ended as ROUND_BUDGET when every rule held, before it was certified");
+  spec.limits.max_rounds = 4;
+  EXPECT_EQ(testing::Drive(spec, *sphere).report().certificate.verdict,
+            "not certified: the run ended as ROUND_BUDGET before every rule held");
 }
 
 TEST(ProgressMeter, FollowsTheMesh) {
