@@ -29,14 +29,15 @@ constexpr double kCoarseSpacing = 0.8;
 constexpr int kMostRounds = 4;
 constexpr double MostBad(int k) { return k <= 2 ? 0.1 : 0.25; }
 // Where so many stars are still bad after so many rounds, near the limits of what a reach allows,
-// guesses would be far off.
+// guesses would be far off; of a lattice of dimension 3 that was laid in rings, where it should be
+// all but whole by then.
 constexpr int kTellingRounds = 2;
-constexpr double kHopeless = 0.5;
-// Where so many are after what was grown on guesses from too few seeds, these told next to nothing:
-// the coarse sample is laid ring by ring, as fine as it may be, since nobody knows how M bends.
-// Nobody minds its seams: patches begin so few spacings apart.
+constexpr double MostHopeful(int k, bool in_rings) { return in_rings && k > 2 ? MostBad(k) : 0.5; }
+// Seeds that are given may tell next to nothing: where so many are after what was grown on their
+// guess the coarse sample is laid in rings, as fine as it may be, since nobody knows how M bends.
+// Patches begin as far from each other as those of the final one.
 constexpr double kNothingTold = 0.85;
-constexpr double kCoarseApart = 3;
+constexpr double kCoarseApart = kPatchesApart / kLeastCoarse;
 
 // The largest at which enough of the seeds lie that far apart.
 double CoarseEpsilon(int k, const AnsweredPoints& seeds, double epsilon) {
@@ -249,45 +250,48 @@ void AheadLaying<K>::LayCoarse() {
   coarse_ = std::make_unique<Engine<K>>(coarse, Resolve(coarse));
   rings_.emplace(*coarse_, spec_, kCoarseApart);
   rings_->Begin(seeds);
+  is_coarse_in_rings_ = true;
+  stage_ = Stage::kCoarseRings;
+}
+
+// All of the sample ring by ring, from what there is of it and of the coarse one.
+template <int K>
+void AheadLaying<K>::GiveUp() {
+  rings_.emplace(engine_, spec_);
+  rings_->GoOn(PointsOf<K>(engine_.complex()), PointsOf<K>(coarse_->complex()));
+  stage_ = Stage::kRings;
+}
+
+// Where the coarse mesh tells too little to guess from.
+template <int K>
+void AheadLaying<K>::JudgeCoarse() {
+  const double most = rounds_ < kTellingRounds ? kNothingTold : MostHopeful(K, is_coarse_in_rings_);
+  if (BadShare() <= most) return;
+  if (spec_.seeds.cols() > 0 && !is_coarse_in_rings_)
+    LayCoarse();
+  else if (rounds_ == kTellingRounds)
+    GiveUp();
 }
 
 template <int K>
 CandidateSet<K> AheadLaying<K>::Next(std::uint64_t round) {
   CandidateSet<K> candidates;
-  switch (stage_) {
-    case Stage::kRings:
-      return rings_->Next(round);
-    case Stage::kGuessed:
-      return candidates;
-    case Stage::kSeeds:
-      candidates.planned = GrowCoarse();
-      if (candidates.size() > 0) {
-        stage_ = Stage::kGrown;
-        return candidates;
-      }
-      [[fallthrough]];
-    case Stage::kGrown:
-      stage_ = Stage::kCoarse;
-      if (coarse_->complex().size() >= kEnough[K] || BadShare() <= kNothingTold) break;
-      LayCoarse();
-      stage_ = Stage::kCoarseRings;
-      [[fallthrough]];
-    case Stage::kCoarseRings:
-      candidates = rings_->Next(round);
-      if (candidates.size() > 0) return candidates;
-      rings_.reset();
-      coarse_->Commit();
-      rounds_ = 1;
-      stage_ = Stage::kCoarse;
-      break;
-    case Stage::kCoarse:
-      break;
+  if (stage_ == Stage::kGuessed) return candidates;
+  if (stage_ == Stage::kSeeds) {
+    candidates.planned = GrowCoarse();
+    stage_ = candidates.size() > 0 ? Stage::kGrown : Stage::kCoarse;
+    if (candidates.size() > 0) return candidates;
   }
-  if (rounds_ == kTellingRounds && BadShare() > kHopeless) {
-    stage_ = Stage::kRings;
-    rings_.emplace(engine_, spec_);
-    rings_->GoOn(PointsOf<K>(engine_.complex()), PointsOf<K>(coarse_->complex()));
-    return rings_->Next(round);
+  if (stage_ == Stage::kGrown) stage_ = Stage::kCoarse;
+  if (stage_ == Stage::kCoarse) JudgeCoarse();
+  if (stage_ == Stage::kRings) return rings_->Next(round);
+  if (stage_ == Stage::kCoarseRings) {
+    candidates = rings_->Next(round);
+    if (candidates.size() > 0) return candidates;
+    rings_.reset();
+    coarse_->Commit();
+    rounds_ = 1;
+    stage_ = Stage::kCoarse;
   }
   candidates = RefineCoarse(round);
   if (candidates.size() > 0) return candidates;

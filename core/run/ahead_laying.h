@@ -14,8 +14,9 @@ namespace stellate::core {
 // (core/refinement/surrogate.h) a sample several times as coarse is grown, asked for at once, and
 // refined where it has to be; on what that guesses one of the final spacing, asked for at once as
 // well, with what R1 and R2 will ask for if it is right. Of the coarse points those that patches
-// begin from are of the sample, from when they are found. Where seeds are too few to guess from the
-// coarse sample is laid ring by ring; where the coarse mesh does not come about the final one is.
+// begin from are of the sample, from when they are found. Where seeds that are given tell too
+// little the coarse sample is laid ring by ring; where the coarse mesh does not come about the
+// final one is.
 template <int K>
 class AheadLaying final : public Laying<K> {
  public:
@@ -43,6 +44,8 @@ class AheadLaying final : public Laying<K> {
   double coarse_spacing() const;
   PlannedPoints GrowCoarse();
   void LayCoarse();
+  void GiveUp();
+  void JudgeCoarse();
   PlannedPoints GrowOnGuesses(std::uint64_t round);
   PlannedPoints RefineGuessed(const PlannedPoints& grown, std::uint64_t round);
   std::vector<std::uint8_t> LayThoseApart(Engine<K>& engine, double spacing,
@@ -61,6 +64,7 @@ class AheadLaying final : public Laying<K> {
   };
   Stage stage_ = Stage::kSeeds;
   std::unique_ptr<Engine<K>> coarse_;
+  bool is_coarse_in_rings_ = false;     // laid so
   int rounds_ = 0;                      // of the coarse mesh
   std::optional<Surrogate<K>> guess_;   // of the coarse mesh
   std::optional<RingLaying<K>> rings_;  // of either sample

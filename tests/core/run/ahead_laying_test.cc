@@ -124,6 +124,17 @@ TEST_P(FewSeeds, TakeNoMoreRoundsThanRingsAndHardlyMoreVertices) {
   EXPECT_LT(static_cast<double>(a.vertices), 1.07 * static_cast<double>(p.vertices));
 }
 
+TEST_P(FewSeeds, GiveTheSameForAnyNumberOfThreads) {
+  const auto& [c, count] = GetParam();
+  const auto manifold = Make(c.manifold);
+  Specification spec = Seeded(*manifold, c.epsilon, count);
+  spec.criteria.ask_ahead = true;
+  spec.threads = 1;
+  const DrivenRun one = Drive(spec, *manifold);
+  spec.threads = 3;
+  EXPECT_TRUE(SameMesh(*one.mesher, *Drive(spec, *manifold).mesher));
+}
+
 INSTANTIATE_TEST_SUITE_P(Laying, FewSeeds,
                          ::testing::Combine(::testing::Values(Case{"sphere:2", 0.03, 26},
                                                               Case{"torus", 0.04, 26},
