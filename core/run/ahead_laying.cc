@@ -38,6 +38,8 @@ constexpr double MostHopeful(int k, bool in_rings) { return in_rings && k > 2 ? 
 // Patches begin as far from each other as those of the final one.
 constexpr double kNothingTold = 0.85;
 constexpr double kCoarseApart = kPatchesApart / kLeastCoarse;
+// Where it takes more than a sample of the most vertices would, it is of no use.
+constexpr double kCoarseSlack = 1.5;
 
 // The largest at which enough of the seeds lie that far apart.
 double CoarseEpsilon(int k, const AnsweredPoints& seeds, double epsilon) {
@@ -246,7 +248,9 @@ PlannedPoints AheadLaying<K>::GrowOnGuesses(std::uint64_t round) {
 template <int K>
 void AheadLaying<K>::LayCoarse() {
   const AnsweredPoints seeds = PointsOf<K>(coarse_->complex());
-  const Specification coarse = CoarserThan<K>(spec_, kLeastCoarse * engine_.criteria().epsilon);
+  Specification coarse = CoarserThan<K>(spec_, kLeastCoarse * engine_.criteria().epsilon);
+  coarse.limits.max_vertices = static_cast<std::uint64_t>(std::ceil(
+      kCoarseSlack * static_cast<double>(coarse.limits.max_vertices) / std::pow(kLeastCoarse, K)));
   coarse_ = std::make_unique<Engine<K>>(coarse, Resolve(coarse));
   rings_.emplace(*coarse_, spec_, kCoarseApart);
   rings_->Begin(seeds);
@@ -288,6 +292,10 @@ CandidateSet<K> AheadLaying<K>::Next(std::uint64_t round) {
   if (stage_ == Stage::kCoarseRings) {
     candidates = rings_->Next(round);
     if (candidates.size() > 0) return candidates;
+    if (coarse_->is_full()) {
+      GiveUp();
+      return rings_->Next(round);
+    }
     rings_.reset();
     coarse_->Commit();
     rounds_ = 1;

@@ -186,6 +186,20 @@ TEST(AheadLaying, KeepsABudgetOfVertices) {
   }
 }
 
+// As much of a coarse sample as would be of use: no more than that is asked for beside the sample.
+TEST(AheadLaying, AsksForLittleMoreThanABudgetOfVerticesFromFewSeeds) {
+  const auto torus = Make("torus");
+  for (const std::uint64_t most : {5u, 200u, 3000u}) {
+    Specification spec = Seeded(*torus, 1e-4, 1);
+    spec.criteria.ask_ahead = true;
+    spec.limits.max_vertices = most;
+    const DrivenRun run = Drive(spec, *torus);
+    EXPECT_EQ(run.report().termination, Termination::kVertexBudget) << most;
+    EXPECT_EQ(run.report().counts.vertices, most);
+    EXPECT_LT(run.report().counts.queries, 5 * most / 2 + 1000);
+  }
+}
+
 TEST(AheadLaying, LeavesToRingsWhatIsTooMuchToAskAtOnce) {
   const auto sphere = Make("sphere:2");
   for (const double epsilon : {1e-3, 1e-6, 1e-12}) {
