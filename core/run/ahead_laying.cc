@@ -34,11 +34,13 @@ constexpr double MostBad(int k) { return k <= 2 ? 0.1 : 0.25; }
 constexpr int kTellingRounds = 2;
 constexpr double MostHopeful(int k, bool in_rings) { return in_rings && k > 2 ? MostBad(k) : 0.5; }
 // Seeds that are given may tell next to nothing: where so many are after what was grown on their
-// guess the coarse sample is laid in rings, as fine as it may be, since nobody knows how M bends.
-// Patches begin as far from each other as those of the final one.
+// guess (with 4 to 32 of them mostly more, with hundreds less; eleven manifolds) the coarse sample
+// is laid in rings, as fine as it may be, since nobody knows how M bends. Patches begin as far from
+// each other as those of the final one.
 constexpr double kNothingTold = 0.85;
 constexpr double kCoarseApart = kPatchesApart / kLeastCoarse;
-// Where it takes more than a sample of the most vertices would, it is of no use.
+// A sample of the most vertices that there may be comes from kLeastCoarse^-k times as many. Of a
+// coarse sample larger by this factor the final one will not fit: curvature accounts for less.
 constexpr double kCoarseSlack = 1.5;
 
 // The largest at which enough of the seeds lie that far apart.
