@@ -161,6 +161,9 @@ struct Certificate {
   // ends.
   std::optional<WallAngle> sharpest;
 
+  bool only_too_coarse = false;  // refused for its size alone: nothing that was seen contradicts
+                                 // the mesh, which is too coarse for the reach to be certified
+
   Violations violations;
 };
 

@@ -110,6 +110,7 @@ void ToProto(const core::Certificate& c, int k, v1::Certificate* out) {
   out->set_reach_refuted(c.reach_refuted);
   out->set_proved_distance(c.proved_distance);
   out->set_answers_held(c.answers_held);
+  out->set_only_too_coarse(c.only_too_coarse);
   ToProto(c.violations, k, out);
   BoundaryToProto(c, out);
 }

@@ -1,5 +1,7 @@
 // The record of what a mesh came to.
 
+#include <utility>
+
 #include "server/records/journal_format.h"
 #include "server/records/record_bytes.h"
 
@@ -117,7 +119,7 @@ void LayOutPast(RecordReader& archive, ProgressHistory& past) {
   }
 }
 
-// Where walls meet.
+// Where walls meet; without walls: they do not.
 template <typename Archive, typename Value>
 void LayOutSharpest(Archive& archive, Value& sharpest) {
   archive.Number(sharpest.walls);
@@ -137,8 +139,9 @@ std::string EncodeResult(const SessionResult& result, std::uint64_t parts) {
   LayOutBoundary(writer, result.report.certificate);
   LayOutViolations(writer, result.report.certificate.violations);
   LayOutPast(writer, result.past);
-  if (result.report.certificate.sharpest)
-    LayOutSharpest(writer, *result.report.certificate.sharpest);
+  const core::WallAngle sharpest = result.report.certificate.sharpest.value_or(core::WallAngle());
+  LayOutSharpest(writer, sharpest);
+  writer.Number(result.report.certificate.only_too_coarse);
   return writer.Take();
 }
 
@@ -150,13 +153,18 @@ std::optional<SessionResult> DecodeResult(std::string_view record, std::uint64_t
   reader.Number(result.revision);
   reader.Number(result.history_bytes);
   reader.Number(*parts);
-  // Records of earlier servers end before the boundary, or after it or what is past.
+  // Records of earlier servers end before the boundary, or after it, what is past or the angle.
   if (!reader.Complete()) LayOutBoundary(reader, result.report.certificate);
   if (!reader.Complete()) {
     LayOutViolations(reader, result.report.certificate.violations);
     LayOutPast(reader, result.past);
   }
-  if (!reader.Complete()) LayOutSharpest(reader, result.report.certificate.sharpest.emplace());
+  if (!reader.Complete()) {
+    core::WallAngle sharpest;
+    LayOutSharpest(reader, sharpest);
+    if (sharpest.walls != 0) result.report.certificate.sharpest = std::move(sharpest);
+  }
+  if (!reader.Complete()) reader.Number(result.report.certificate.only_too_coarse);
   if (!reader.Complete()) return std::nullopt;
   return result;
 }

@@ -230,6 +230,7 @@ std::string CertificateJson(const Certificate& c) {
   json.Raw("boundary_euler_characteristic", std::to_string(c.boundary_euler_characteristic));
   json.Raw("faces", FacesJson(c.faces));
   json.Raw("sharpest", SharpestJson(c.sharpest));
+  json.Add("only_too_coarse", c.only_too_coarse);
   return json.Take();
 }
 

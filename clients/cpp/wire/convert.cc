@@ -256,6 +256,7 @@ Report ReportOf(const v1::Mesh& mesh) {
     out.sharpest = WallAngle{
         {s.walls().begin(), s.walls().end()}, s.degrees(), {s.point().begin(), s.point().end()}};
   }
+  out.only_too_coarse = c.only_too_coarse();
   return r;
 }
 

@@ -131,7 +131,8 @@ AS_JSON = (
     '"declared_reach": 0, "reach_refuted": false, "proved_distance": 0, "answers_held": 0, '
     '"violations": {"faces": [[1, 2], [1, 5]], "links": [], "stars": [7], "inconsistent": [], '
     '"fibres": [0, 3]}, "boundary_simplices": 0, "boundary_components": 0, '
-    '"boundary_euler_characteristic": 0, "faces": [], "sharpest": null}, "elapsed_seconds": 0.5, '
+    '"boundary_euler_characteristic": 0, "faces": [], "sharpest": null, '
+    '"only_too_coarse": false}, "elapsed_seconds": 0.5, '
     f'"version": "{stellate.__version__}"}}'
 )
 

@@ -305,6 +305,8 @@ TEST(ConvertReport, TellsOfFacesAndWhereWallsMeetMostSharply) {
   v1::Report sent;
   ToProto(report, 3, &sent);
   EXPECT_FALSE(sent.certificate().has_sharpest());
+  EXPECT_FALSE(sent.certificate().only_too_coarse());
+  report.certificate.only_too_coarse = true;
   report.certificate.sharpest = core::WallAngle{core::WallSet{3}, 27.5, Eigen::Vector2d(0.5, -0.5)};
   ToProto(report, 3, &sent);
   const v1::Certificate& certificate = sent.certificate();
@@ -321,6 +323,7 @@ TEST(ConvertReport, TellsOfFacesAndWhereWallsMeetMostSharply) {
   EXPECT_EQ(certificate.sharpest().walls_size(), 2);
   EXPECT_EQ(certificate.sharpest().degrees(), 27.5);
   EXPECT_EQ(certificate.sharpest().point(1), -0.5);
+  EXPECT_TRUE(certificate.only_too_coarse());
 }
 
 }  // namespace

@@ -57,9 +57,11 @@ TEST(ResultRecord, HoldsFacesAndWhereWallsMeetMostSharply) {
   EXPECT_EQ(read->report.certificate.sharpest->point, Eigen::Vector3d(1, 2, 3));
 }
 
-// Those of earlier servers end before the boundary, or behind it; what ends elsewhere is damaged.
+// Those of earlier servers end before the boundary, or behind it, the past or the angle; what ends elsewhere is damaged.
 TEST(ResultRecord, EarlierOnesAreRead) {
-  const std::string record = EncodeResult(Refused(), 2);
+  SessionResult result = Refused();
+  result.report.certificate.only_too_coarse = true;
+  const std::string record = EncodeResult(result, 2);
   std::vector<std::size_t> whole;
   for (std::size_t bytes = 0; bytes <= record.size(); ++bytes) {
     std::uint64_t parts = 0;
@@ -69,10 +71,11 @@ TEST(ResultRecord, EarlierOnesAreRead) {
     EXPECT_EQ(parts, 2u);
     EXPECT_EQ(read->revision, 9u);
     EXPECT_EQ(read->report.certificate.verdict, "Not certified");
-    EXPECT_EQ(read->past.all().empty(), bytes < record.size());
-    EXPECT_EQ(read->report.certificate.violations.stars.empty(), bytes < record.size());
+    EXPECT_EQ(read->past.all().empty(), whole.size() <= 2);
+    EXPECT_EQ(read->report.certificate.violations.stars.empty(), whole.size() <= 2);
+    EXPECT_EQ(read->report.certificate.only_too_coarse, bytes == record.size());
   }
-  ASSERT_EQ(whole.size(), 3u);
+  ASSERT_EQ(whole.size(), 5u);
   EXPECT_EQ(whole.back(), record.size());
 }
 

@@ -131,6 +131,10 @@ struct Certificate {
   std::int64_t boundary_euler_characteristic = 0;
   std::vector<FaceCertificate> faces;  // by dimension, the lowest first
   std::optional<WallAngle> sharpest;   // where walls meet at the smallest angle, if any meet
+
+  // Refused for its size alone: nothing that was seen contradicts the mesh, which is too coarse for
+  // the reach to be certified.
+  bool only_too_coarse = false;
 };
 
 struct Report {
