@@ -17,6 +17,14 @@ from .errors import InvalidArgument
 class Credentials:
     """TLS, and a token, for a server that wants them.
 
+        who = stellate.Credentials(token=open("token").read().strip(), ca="ca.pem")
+        mesh = stellate.mesh(oracle, epsilon=0.1, server="mesh.example.org:7717", credentials=who)
+
+    stellate.Client, serve, watch and download take them likewise. Nothing is read or sent before that:
+    files that are missing, a certificate without its key, and a token that would go over the network
+    in plain text are told when the server is called (FileNotFoundError, stellate.InvalidArgument). The
+    token is not shown by repr().
+
     Args:
       token: sent with every call. Over plain text only within this machine.
       ca: PEM file with the authority that signed the server's certificate.

@@ -26,19 +26,36 @@ def with_derivatives(f: Callable[[Any], Any], library: str) -> tuple[Batched, Ba
 
     Raises: InvalidArgument for a library that is not known or not installed.
     """
-    makers = {"autograd": _autograd, "jax": _jax, "torch": _torch}
-    if library not in makers:
+    if library not in _MAKERS:
         raise InvalidArgument(
             f"jacobian has to be a function, None for differences, or one of "
-            f"{', '.join(map(repr, makers))}, and is {library!r}"
+            f"{', '.join(map(repr, _MAKERS))}, and is {library!r}"
         )
     try:
-        return makers[library](f)
+        both = _Derived(f, library)
+        return both.values, both.jacobian
     except ImportError as error:
         raise InvalidArgument(
             f"jacobian={library!r} needs {library}, which cannot be imported ({error}): install "
             "it, or leave jacobian out for differences"
         ) from None
+
+
+class _Derived:
+    """What a library makes of f; another process has it made anew."""
+
+    def __init__(self, f: Callable[[Any], Any], library: str) -> None:
+        self._made_of = f, library
+        self._values, self._jacobian = _MAKERS[library](f)
+
+    def values(self, x: np.ndarray) -> np.ndarray:
+        return self._values(x)
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        return self._jacobian(x)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _Derived, self._made_of
 
 
 def _gradients(differentiate: Differentiate, x: Any, array: Callable[[Any], Any]) -> list[Any]:
@@ -116,3 +133,6 @@ def _jax(f: Callable[[Any], Any]) -> tuple[Batched, Batched]:
         return answer
 
     return in_blocks(jax.jit(f)), in_blocks(jax.jit(all_rows))
+
+
+_MAKERS = {"autograd": _autograd, "jax": _jax, "torch": _torch}

@@ -7,11 +7,12 @@ error.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Callable, NamedTuple
+from typing import Any, Callable, NamedTuple
 
 import numpy as np
 
-from .errors import OracleError
+from ._functions import Exactness, UserFunction
+from ._rows import apply, norms, transposed
 
 _MAX_VALUES = 4_000_000  # numbers in one call for differences
 _FIRST_STEP = 6e-6  # of central differences: about the cube root of the rounding unit
@@ -33,11 +34,13 @@ class Equations:
     """F with its derivatives.
 
     Args:
-      f: (n, d) -> (n, m).
-      jacobian: (n, d) -> (n, m, d), or None for differences of f. Differences are expensive, so that
+      f: (n, d) -> (n, m), or (n,) for m = 1.
+      jacobian: (n, d) -> (n, m, d), or (n, d) for m = 1; None for differences of f. Differences are expensive, so that
         steps share them: each corrects the Jacobian by what it has seen (Broyden).
       scale: a length, of the solvers' steps and differences.
-      largest: the largest coordinate; far from the origin its rounding is what a step can reach.
+      box: (lower (d,), upper (d,)); far from the origin the rounding of its coordinates is what a step
+        can reach.
+      about: (s, d) points near the zeros, where f is looked at first; None: random ones of the box.
     """
 
     def __init__(
@@ -46,11 +49,16 @@ class Equations:
         jacobian: Batched | None,
         shape: tuple[int, int],
         scale: float,
-        largest: float,
+        box: tuple[np.ndarray, np.ndarray],
         max_iterations: int,
+        about: Any = None,
     ) -> None:
         """`shape`: (m, d)."""
-        self._f, self._given, self.shape = f, jacobian, shape
+        self.shape, d = shape, str(shape[1])
+        self._f = UserFunction(f, "f", shape[:1], d)
+        self._given = None if jacobian is None else UserFunction(jacobian, "jacobian", shape, d)
+        self._exactness = Exactness(about, *box)
+        largest = float(max(np.abs(corner).max() for corner in box))
         self._scale, self._max_iterations = scale, max_iterations
         # Of a Newton step, a length: a step moves a point by no less than its coordinates round to,
         # and what F makes of that is a small multiple.
@@ -58,10 +66,9 @@ class Equations:
 
     def values(self, x: np.ndarray) -> np.ndarray:
         """F at the rows of x."""
-        expected = (len(x), self.shape[0])
-        if not len(x):
-            return np.empty(expected)
-        return _as_numbers(self._f(x), "f", expected)
+        if len(x):
+            self._exactness.insist(self._f)
+        return self._f(x)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """(n, m, d), as given or by differences, in one call for as many rows as fit."""
@@ -71,9 +78,7 @@ class Equations:
             for part in _blocks(len(x), 2 * d * d):
                 jacobian[part] = self._differences(x[part])
             return jacobian
-        if not len(x):
-            return np.empty((0, m, d))
-        return _as_numbers(self._given(x), "jacobian", (len(x), m, d))
+        return self._given(x)
 
     def _differences(self, x: np.ndarray) -> np.ndarray:
         (m, d), n = self.shape, len(x)
@@ -109,8 +114,8 @@ class Equations:
         curvature = np.empty((n, k, k))
         for a in range(k):
             change = (jacobian[:, a] - jacobian[:, k + a]) / (2 * h)
-            change = (multipliers[:, None, :] @ change)[:, 0, :]
-            curvature[:, :, a] = (tangents.transpose(0, 2, 1) @ change[..., None])[..., 0]
+            change = apply(transposed(change), multipliers)
+            curvature[:, :, a] = apply(transposed(tangents), change)
         return curvature
 
     def _second_differences(
@@ -221,7 +226,7 @@ class _Shared:
             return
         self._old[rows[slow]] = True
         rows, step, change = rows[~slow], step[~slow], change[~slow]
-        missing = change - (self._now[rows] @ step[..., None])[..., 0]
+        missing = change - apply(self._now[rows], step)
         along = step / (step * step).sum(axis=1)[:, None]
         self._now[rows] += missing[:, :, None] * along[:, None, :]
 
@@ -229,10 +234,6 @@ class _Shared:
         """Where no step helps: with a Jacobian of another point that is no verdict yet."""
         alive[rows[self._exact[rows]]] = False
         self._old[rows] = True
-
-
-def norms(rows: np.ndarray) -> np.ndarray:
-    return np.sqrt((rows * rows).sum(axis=1))
 
 
 def solve(systems: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -247,25 +248,6 @@ def solve(systems: np.ndarray, right: np.ndarray) -> np.ndarray:
             except np.linalg.LinAlgError:
                 continue
         return solution
-
-
-def _as_numbers(answer: object, name: str, shape: tuple[int, ...]) -> np.ndarray:
-    values = np.asarray(answer)
-    if values.shape != shape or values.dtype.kind not in "fiu":
-        got = f"shape {values.shape}" if values.dtype.kind in "fiu" else type(answer).__name__
-        hint = "; [:, None] makes a column" if (*values.shape, 1) == shape else ""
-        raise OracleError(
-            f"{name} returned {got}; it has to be {shape} for a batch of {shape[0]} points, "
-            f"a row each{hint}",
-            "ORACLE_SHAPE",
-        )
-    if values.dtype in (np.float32, np.float16):
-        raise OracleError(
-            f"{name} returned {values.dtype} numbers; points are found to twelve digits, which "
-            "takes float64 throughout (for a function of jax's say jacobian='jax')",
-            "ORACLE_PRECISION",
-        )
-    return values.astype(float, copy=False)
 
 
 def _blocks(count: int, numbers: int) -> Iterator[slice]:

@@ -9,7 +9,8 @@ from typing import Any, Callable
 import numpy as np
 
 from ._derivatives import with_derivatives
-from ._equations import Equations, Solution, norms, solve
+from ._equations import Equations, Solution, solve
+from ._rows import apply, norms, product, transposed
 from .errors import InvalidArgument, NotConverged
 
 
@@ -17,8 +18,9 @@ class ImplicitManifold:
     """An oracle for the zero set of a smooth function whose Jacobian has full rank on it.
 
     Args:
-      f: (n, d) -> (n, d-k), in double precision. Row i of its value depends on row i of x alone.
-      jacobian: (n, d) -> (n, d-k, d); or "autograd", "jax" or "torch", if f is written for one of
+      f: (n, d) -> (n, d-k), or (n,) for one equation, in double precision throughout. Row i of its
+        value depends on row i of x alone.
+      jacobian: (n, d) -> (n, d-k, d), or (n, d) for one equation; or "autograd", "jax" or "torch", if f is written for one of
         these and takes and returns its arrays; or None: differences of f, which cost some 2 d
         values of f a point, and no other answers.
       ambient_dimension: d.
@@ -80,8 +82,8 @@ class ImplicitManifold:
         if isinstance(jacobian, str):
             f, jacobian = with_derivatives(f, jacobian)
         shape = ambient_dimension - dimension, ambient_dimension
-        largest = float(max(np.abs(lower).max(), np.abs(upper).max()))
-        self._equations = Equations(f, jacobian, shape, self._scale, largest, max_iterations)
+        box = lower, upper
+        self._equations = Equations(f, jacobian, shape, self._scale, box, max_iterations, seeds)
         if len(inequalities) > 0:
             self._bound(inequalities, library)
 
@@ -193,7 +195,7 @@ class ImplicitManifold:
         ) -> np.ndarray:
             basis = bases[rows]
             system = np.concatenate([jacobian, basis.transpose(0, 2, 1)], axis=1)
-            back = (basis.transpose(0, 2, 1) @ (x - centers[rows])[..., None])[..., 0]
+            back = apply(transposed(basis), x - centers[rows])
             return -solve(system, np.concatenate([values, back], axis=1)[..., None])[..., 0]
 
         y, _, converged = self._equations.drive(start, step_in_flat)
@@ -205,10 +207,10 @@ class ImplicitManifold:
         """The tangent step at y in M towards the point nearest to x, its length, and J(y)."""
         jacobian = self._equations.jacobian(y)
         tangents = self._null_space(jacobian)
-        gram = jacobian @ jacobian.transpose(0, 2, 1)
+        gram = product(jacobian, transposed(jacobian))
         offset = y - x
-        multipliers = -solve(gram, jacobian @ offset[..., None])[..., 0]
-        gradient = (tangents.transpose(0, 2, 1) @ offset[..., None])[..., 0]
+        multipliers = -solve(gram, apply(jacobian, offset)[..., None])[..., 0]
+        gradient = apply(transposed(tangents), offset)
         hessian = np.eye(self.dimension) + self._equations.curvature(
             y, values, multipliers, tangents
         )
@@ -216,8 +218,8 @@ class ImplicitManifold:
         hessian = np.where(np.isfinite(hessian), hessian, 0.0)
         bends, vectors = np.linalg.eigh(hessian)
         bends = np.maximum(np.abs(bends), 0.1)  # always downhill, also beyond the focal set
-        along = (vectors.transpose(0, 2, 1) @ gradient[..., None])[..., 0] / bends
-        step = -(tangents @ (vectors @ along[..., None]))[..., 0]
+        along = apply(transposed(vectors), gradient) / bends
+        step = -apply(tangents, apply(vectors, along))
         length = norms(step)
         step *= (np.minimum(length, 0.1 * self._scale) / np.maximum(length, 1e-300))[:, None]
         return step, length, jacobian
@@ -247,10 +249,10 @@ class ImplicitManifold:
 def _normal_step(
     jacobian: np.ndarray, values: np.ndarray, x: np.ndarray, rows: np.ndarray
 ) -> np.ndarray:
-    gram = jacobian @ jacobian.transpose(0, 2, 1)
-    return -(jacobian.transpose(0, 2, 1) @ solve(gram, values[..., None]))[..., 0]
+    gram = product(jacobian, transposed(jacobian))
+    return -apply(transposed(jacobian), solve(gram, values[..., None])[..., 0])
 
 
 def _off(bases: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """The vectors without their components along the orthonormal columns of the bases."""
-    return vectors - (bases @ (bases.transpose(0, 2, 1) @ vectors[..., None]))[..., 0]
+    return vectors - apply(bases, apply(transposed(bases), vectors))

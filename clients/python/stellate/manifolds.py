@@ -12,6 +12,20 @@ import numpy as np
 from .errors import InvalidArgument, NotConverged
 from .implicit import ImplicitManifold
 
+__all__ = [
+    "ProductOfCircles",
+    "SpecialOrthogonal3",
+    "Sphere",
+    "Torus",
+    "ellipsoid",
+    "tanglecube",
+]
+
+
+def __dir__() -> list[str]:
+    """What is offered here, without what it is made of."""
+    return __all__
+
 
 def _unit(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Each row over its length, and where that can be done."""
@@ -155,26 +169,26 @@ class SpecialOrthogonal3:
         return np.full(len(points), np.sqrt(2.0))
 
 
-def ellipsoid(axes: Sequence[float] = (1.0, 0.8, 0.6)) -> ImplicitManifold:
-    """The ellipsoid of the given semi-axes in R^d, k = d - 1, by its equation."""
-    squares = np.asarray(axes, dtype=float) ** 2
-    d = len(squares)
+class _Ellipsoid:
+    """Its equation."""
 
-    def f(x: np.ndarray) -> np.ndarray:
-        return (x * x / squares).sum(axis=1, keepdims=True) - 1.0
+    def __init__(self, squares: np.ndarray) -> None:
+        self._squares = squares
+        self._inner = (squares - squares.min()) / np.sqrt(squares)
 
-    def jacobian(x: np.ndarray) -> np.ndarray:
-        return (2.0 * x / squares)[:, None, :]
+    def f(self, x: np.ndarray) -> np.ndarray:
+        return (x * x / self._squares).sum(axis=1, keepdims=True) - 1.0
 
-    inner = (squares - squares.min()) / np.sqrt(squares)
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        return (2.0 * x / self._squares)[:, None, :]
 
-    def local_size(y: np.ndarray) -> np.ndarray:
+    def local_size(self, y: np.ndarray) -> np.ndarray:
         """To the medial axis: the solid ellipsoid of semi-axes `inner`, flat in the shortest axes.
 
         Its nearest point to y outside is inner^2 y / (inner^2 + t), with t by Newton's method,
         which climbs to its root from zero.
         """
-        t = np.zeros((len(y), 1))
+        inner, t = self._inner, np.zeros((len(y), 1))
         for _ in range(60):
             below = np.maximum(inner**2 + t, 1e-300)
             terms = (inner * y / below) ** 2
@@ -184,31 +198,37 @@ def ellipsoid(axes: Sequence[float] = (1.0, 0.8, 0.6)) -> ImplicitManifold:
         off = np.where(inner > 0.0, t / np.maximum(inner**2 + t, 1e-300), 1.0)
         return np.sqrt(((off * y) ** 2).sum(axis=1))
 
+
+def ellipsoid(axes: Sequence[float] = (1.0, 0.8, 0.6)) -> ImplicitManifold:
+    """The ellipsoid of the given semi-axes in R^d, k = d - 1, by its equation."""
+    squares = np.asarray(axes, dtype=float) ** 2
+    d, by = len(squares), _Ellipsoid(squares)
     corner = 1.1 * np.sqrt(squares)
     return ImplicitManifold(
-        f,
-        jacobian,
+        by.f,
+        by.jacobian,
         ambient_dimension=d,
         dimension=d - 1,
         bounding_box=(-corner, corner),
-        local_size=local_size,
+        local_size=by.local_size,
         thread_safe=True,
     )
 
 
+def _tanglecube(x: np.ndarray) -> np.ndarray:
+    return (x**4 - 5.0 * x**2).sum(axis=1, keepdims=True) + 11.8
+
+
+def _tanglecube_slopes(x: np.ndarray) -> np.ndarray:
+    return (4.0 * x**3 - 10.0 * x)[:, None, :]
+
+
 def tanglecube() -> ImplicitManifold:
     """x^4 - 5x^2 + y^4 - 5y^2 + z^4 - 5z^2 + 11.8 = 0, a surface of genus 5."""
-
-    def f(x: np.ndarray) -> np.ndarray:
-        return (x**4 - 5.0 * x**2).sum(axis=1, keepdims=True) + 11.8
-
-    def jacobian(x: np.ndarray) -> np.ndarray:
-        return (4.0 * x**3 - 10.0 * x)[:, None, :]
-
     corner = np.full(3, 2.5)
     return ImplicitManifold(
-        f,
-        jacobian,
+        _tanglecube,
+        _tanglecube_slopes,
         ambient_dimension=3,
         dimension=2,
         bounding_box=(-corner, corner),

@@ -13,7 +13,7 @@ from .errors import InvalidArgument, NotConverged, OracleError
 
 @runtime_checkable
 class Oracle(Protocol):
-    """A compact smooth k-submanifold M of R^d without boundary, 1 <= k < d.
+    """A compact smooth k-submanifold M of R^d, 1 <= k < d; with `walls`, what they leave of one.
 
     Every method takes and returns whole batches as numpy arrays of float64; those it is given are
     read-only. The answer to a query must not depend on the rest of its batch: batches are cut
@@ -68,13 +68,19 @@ class CheckedOracle:
         self.bounding_box = _box(getattr(oracle, "bounding_box", None))
         self.seeds = _seeds(getattr(oracle, "seeds", None))
         shared = bool(getattr(oracle, "thread_safe", False))
-        self._one_at_a_time: contextlib.AbstractContextManager[Any]
-        self._one_at_a_time = threading.Lock()
+        self._one_at_a_time = _Turns()
         if shared:
             self._one_at_a_time = contextlib.nullcontext()
 
+    _one_at_a_time: contextlib.AbstractContextManager[Any]
+
     def closest_points(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(n, d) -> the closest points (n, d), and where they were found (n,)."""
+        """(n, d) -> the closest points (n, d), and where they were found (n,).
+
+        No method of the oracle is asked for no rows, here and below.
+        """
+        if not len(points):
+            return _none(points)
         with self._one_at_a_time:
             try:
                 answer = self._oracle.closest_point(points)
@@ -103,6 +109,8 @@ class CheckedOracle:
         self, points: np.ndarray, face: tuple[int, ...]
     ) -> tuple[np.ndarray, np.ndarray]:
         """As closest_points, of a face of a manifold with boundary."""
+        if not len(points):
+            return _none(points)
         with self._one_at_a_time:
             try:
                 answer = self._oracle.face_point(points, face)
@@ -125,6 +133,8 @@ class CheckedOracle:
         self, centers: np.ndarray, bases: np.ndarray, radii: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """The points (n, d) where M meets the flats, and where it does (n,)."""
+        if not len(centers):
+            return _none(centers)
         with self._one_at_a_time:
             try:
                 answer = self._oracle.intersect_flat(centers, bases, radii)
@@ -169,6 +179,26 @@ class CheckedOracle:
         return spread
 
 
+class _Turns:
+    """A lock, which is a new one where what holds it is copied, as to another process."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> None:
+        self._lock.acquire()
+
+    def __exit__(self, *unused: object) -> None:
+        self._lock.release()
+
+    def __reduce__(self) -> tuple[type[_Turns], tuple[()]]:
+        return _Turns, ()
+
+
+def _none(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return np.empty(points.shape), np.empty(0, dtype=bool)
+
+
 def _describe(value: Any) -> str:
     if isinstance(value, np.ndarray):
         return f"an array of shape {value.shape} and type {value.dtype}"
@@ -196,7 +226,7 @@ def _numbers(method: str, answer: Any, shape: tuple[int, ...], found: np.ndarray
             "ORACLE_SHAPE",
         )
     array = np.ascontiguousarray(array, dtype=np.float64)
-    bad = found & ~np.isfinite(array.reshape(len(array), -1)).all(axis=1)
+    bad = found & ~np.isfinite(array).all(axis=tuple(range(1, array.ndim)))
     if bad.any():
         row = int(np.flatnonzero(bad)[0])
         raise OracleError(

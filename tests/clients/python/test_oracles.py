@@ -198,7 +198,7 @@ WRONG = {
         network_torus(), bounding_box=([-1.5] * 3, [1.5] * 3), level=[0, 0]
     ),
     "a quotient of _Bare needs": lambda: oracles.Quotient(_Bare(), veronese),
-    "no immersion": lambda: oracles.Quotient(TORUS, lambda x: x[:, [0, 0, 0]]),
+    "not an immersion near": lambda: oracles.Quotient(TORUS, lambda x: x[:, [0, 0, 0]]),
     "does not embed in": lambda: oracles.Quotient(TORUS, lambda x: x[:, :2]),
     "leave nothing to move": lambda: oracles.Linkage([("a", "p", 1), ("p", "b", 1)], GROUND),
     "no chain": lambda: oracles.Linkage([("p", "q", 1)], GROUND),

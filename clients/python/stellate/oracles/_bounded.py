@@ -6,9 +6,11 @@ from typing import Any, Callable
 
 import numpy as np
 
+from .._functions import UserFunction
+from .._rows import Array, apply, norms, product, transposed
 from ..errors import InvalidArgument, OracleError
 from ..oracle import CheckedOracle
-from ._common import Array, all_or_raise, apply, norms, refuse_walls, transposed
+from ._common import all_or_raise, refuse_walls
 
 _STEP = 1e-4  # of differences of closest points, in shares of where M is
 _ONE_SIDED = 0.1  # of what a step outwards loses at the boundary, at least
@@ -51,7 +53,9 @@ class ManifoldWithBoundary:
             )
         if not (clearance is None or callable(clearance)):
             raise InvalidArgument("clearance has to be a function or None")
-        self._clearance = clearance
+        self._clearance = None
+        if clearance is not None:
+            self._clearance = UserFunction(clearance, "clearance", (1,), str(d))
         box = self._inner.bounding_box or self._rim.bounding_box
         seeds = self._inner.seeds if self._inner.seeds is not None else self._rim.seeds
         if seeds is not None:
@@ -100,7 +104,7 @@ class ManifoldWithBoundary:
         """(n, d) -> (n, 1): distances to the boundary, below zero beyond it."""
         points = np.ascontiguousarray(points, dtype=np.float64)
         if self._clearance is not None:
-            return np.asarray(self._clearance(points), dtype=np.float64).reshape(len(points), 1)
+            return self._clearance(points)
         back, found = self._inner.closest_points(points)
         beyond, rim = np.where(found, norms(points - back), 0.0), self._to_rim(points)
         return np.where(beyond > rim / 2, -beyond, rim)[:, None]  # beyond it they are the same
@@ -119,7 +123,7 @@ class ManifoldWithBoundary:
         else:
             inwards = apply(transposed(bases), self._steps(self._inner, points).sum(axis=1))
         # Of M's directions, the one across the boundary's: exactly, whatever the differences are.
-        rim = transposed(bases) @ self._tangents(self._rim, points)
+        rim = product(transposed(bases), self._tangents(self._rim, points))
         across = np.linalg.svd(rim, full_matrices=True)[0][:, :, -1]
         side = (across * inwards).sum(axis=1)
         least = _ONE_SIDED * _STEP * self._scale
@@ -155,8 +159,8 @@ class ManifoldWithBoundary:
         columns = []
         for a in range(self.dimension):
             step = h * bases[:, :, a]
-            ahead, behind = (np.asarray(self._clearance(points + s)) for s in (step, -step))
-            columns.append((ahead - behind).reshape(len(points)) / (2 * h))
+            ahead, behind = (self._clearance(points + s)[:, 0] for s in (step, -step))
+            columns.append((ahead - behind) / (2 * h))
         return np.stack(columns, axis=1)
 
     def _tangents(self, of: CheckedOracle, points: Array) -> Array:

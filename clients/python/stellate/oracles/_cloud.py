@@ -7,18 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .._rows import Array, Flags, apply, norms, product, transposed
 from ..errors import InvalidArgument
-from ._common import (
-    Array,
-    Flags,
-    Projection,
-    apply,
-    as_points,
-    box_around,
-    norms,
-    transposed,
-    tree_of,
-)
+from ._common import Projection, as_points, box_around, tree_of
 
 _ITERATIONS = 100
 _BLOCK = 2048  # queries at a time, which bounds what their neighbours take
@@ -140,7 +131,7 @@ class PointCloud(Projection):
         bend = np.empty((count, k, k, across.shape[2]))
         bend[:, first, second] = bend[:, second, first] = solution[:, 1 + k :]
         bend[:, np.arange(k), np.arange(k)] *= 2
-        tangents, _ = np.linalg.qr(along + across @ transposed(solution[:, 1 : 1 + k]))
+        tangents, _ = np.linalg.qr(along + product(across, transposed(solution[:, 1 : 1 + k])))
         place = places + self.bandwidth * apply(across, solution[:, 0])
         return _Quadric(place, tangents, along, across, bend / self.bandwidth), enough
 
@@ -160,7 +151,7 @@ class _Quadric(NamedTuple):
     def towards(self, x: Array) -> Array:
         """The tangent step towards the point nearest to x: Newton's, downhill in any case."""
         gap = x - self.place
-        turn = transposed(self.along) @ self.tangents
+        turn = product(transposed(self.along), self.tangents)
         wish = apply(turn, apply(transposed(self.tangents), gap))
         above = apply(transposed(self.across), gap)
         k = self.along.shape[2]

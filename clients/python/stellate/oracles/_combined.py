@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from .._functions import Exactness, UserFunction
+from .._rows import Array, Flags, apply, norms, product, transposed
 from ..errors import InvalidArgument
 from ..oracle import CheckedOracle
-from ._common import Array, Flags, all_or_raise, apply, norms, refuse_walls, transposed
+from ._common import all_or_raise, refuse_walls
 
 
 class Product:
@@ -207,8 +209,11 @@ class LevelSet:
             raise InvalidArgument(
                 "a level set needs a function f, and a function or None as gradient"
             )
-        self._f, self._gradient, self._max_iterations = f, gradient, max_iterations
-        self.ambient_dimension = self._base.ambient_dimension
+        self.ambient_dimension = d = self._base.ambient_dimension
+        self._values, self._gradient = UserFunction(f, "f", ("m",), str(d)), None
+        if gradient is not None:
+            self._gradient = UserFunction(gradient, "gradient", ("m", d), str(d))
+        self._max_iterations = max_iterations
         box, given = self._base.bounding_box, self._base.seeds
         starts = self._starts(box, given)
         self._scale = float(norms(np.ptp(starts, axis=0)))
@@ -216,6 +221,7 @@ class LevelSet:
         if not found.any():
             raise InvalidArgument("no point of M was found, to look for the level set from")
         self._count = self._values(near[found][:1]).shape[1]
+        Exactness(near[found], starts.min(axis=0), starts.max(axis=0)).insist(self._values)
         self.dimension = self._base.dimension - self._count
         if self.dimension < self._least_dimension:
             raise InvalidArgument(
@@ -244,7 +250,7 @@ class LevelSet:
                 break
             here = np.ascontiguousarray(y[rows])
             bases = self._base.tangents(here, np.ones(len(rows), dtype=bool))
-            slopes = self._slopes(here) @ bases  # (n, m, k)
+            slopes = product(self._slopes(here), bases)  # (n, m, k)
             down, along = self._steps(
                 slopes, self._values(here), apply(transposed(bases), x[rows] - here)
             )
@@ -269,12 +275,12 @@ class LevelSet:
         """(n, d) -> (n, d, k - m): the directions of M along which f does not change."""
         points = np.ascontiguousarray(points, dtype=np.float64)
         bases = self._base.tangents(points, np.ones(len(points), dtype=bool))
-        _, _, directions = np.linalg.svd(self._slopes(points) @ bases, full_matrices=True)
-        return np.asarray(bases @ transposed(directions[:, self._count :]))
+        _, _, directions = np.linalg.svd(product(self._slopes(points), bases), full_matrices=True)
+        return product(bases, transposed(directions[:, self._count :]))
 
     def _steps(self, slopes: Array, values: Array, wish: Array) -> tuple[Array, Array]:
         """In M's tangent space: the shortest to f = 0, and what of the wish does not change f."""
-        gram = slopes @ transposed(slopes)
+        gram = product(slopes, transposed(slopes))
         # Rows that rounding alone keeps apart lead nowhere, least of all to f = 0.
         lengths2 = np.diagonal(gram, axis1=1, axis2=2).prod(axis=1)
         regular = np.linalg.det(gram) > 1e-12 * lengths2
@@ -285,14 +291,9 @@ class LevelSet:
         down[~regular] = np.nan
         return down, along
 
-    def _values(self, points: Array) -> Array:
-        values = np.asarray(self._f(points), dtype=np.float64)
-        return values[:, None] if values.ndim == 1 else values
-
     def _slopes(self, points: Array) -> Array:
         if self._gradient is not None:
-            slopes = np.asarray(self._gradient(points), dtype=np.float64)
-            return slopes[:, None, :] if slopes.ndim == 2 else slopes
+            return self._gradient(points)
         h = 6e-6 * self._scale * np.eye(self.ambient_dimension)
         columns = [(self._values(points + v) - self._values(points - v)) / (2 * v.sum()) for v in h]
         return np.stack(columns, axis=2)

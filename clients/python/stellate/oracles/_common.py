@@ -1,22 +1,14 @@
-"""What the ready oracles share: arrays, trees, and sums whose order no batch changes."""
+"""What the ready oracles share: points, boxes, trees."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from .._rows import Array, Flags, norms
 from ..errors import InvalidArgument, NotConverged
 from ..oracle import CheckedOracle
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
-
-
-def norms(rows: Array) -> Array:
-    """Lengths of the vectors along the last axis."""
-    return np.asarray(np.sqrt((rows * rows).sum(axis=-1)))
 
 
 def all_or_raise(points: Array, found: Flags) -> Array:
@@ -26,22 +18,24 @@ def all_or_raise(points: Array, found: Flags) -> Array:
     return points
 
 
-def transposed(matrices: Array) -> Array:
-    """(n, a, b) -> (n, b, a)."""
-    return matrices.transpose(0, 2, 1)
-
-
-def apply(matrices: Array, vectors: Array) -> Array:
-    """(n, a, b), (n, b) -> (n, a), each row on its own."""
-    return np.asarray((matrices @ vectors[..., None])[..., 0])
-
-
 def refuse_walls(oracle: CheckedOracle, made: str) -> None:
     """What is made of a manifold with boundary would have none. Raises: InvalidArgument."""
     if oracle.walls:
         raise InvalidArgument(
             f"{made} is made of manifolds without boundary: clip it instead, by oracles.Clipped"
         )
+
+
+def where_of(oracle: CheckedOracle) -> tuple[Array, Array]:
+    """The box that an oracle has, or one about its seeds, as large as these lie apart; else 1."""
+    if oracle.bounding_box is not None:
+        return oracle.bounding_box
+    seeds = oracle.seeds
+    if seeds is None or not len(seeds):
+        seeds = np.zeros((1, oracle.ambient_dimension))
+    size = (float(norms(np.ptp(seeds, axis=0))) or 1.0) / np.sqrt(oracle.ambient_dimension)
+    middle = (seeds.min(axis=0) + seeds.max(axis=0)) / 2
+    return middle - size / 2, middle + size / 2
 
 
 class Projection:

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from .._functions import UserFunction
+from .._rows import Array, Flags, norms
 from ..errors import InvalidArgument, NotConverged
 from ..implicit import ImplicitManifold
-from ._common import Array, Flags, norms
 
 _LOOKS = 64  # points of the box that constraints are looked at from
 # What is left of a gradient across those before it, as a share, where it follows from them; and a
@@ -54,9 +55,12 @@ class ConstraintSet(ImplicitManifold):
             lower = upper = np.empty(0)
         if lower.shape != (ambient_dimension,) or upper.shape != lower.shape:
             raise InvalidArgument(f"a constraint set needs a bounding box of R^{ambient_dimension}")
-        self._pairs, self._length = pairs, float(norms(upper - lower))
+        self._pairs = [
+            _named(number, *pair, ambient_dimension) for number, pair in enumerate(pairs)
+        ]
+        self._length = float(norms(upper - lower))
         middle = ((lower + upper) / 2)[None, :]
-        counts = [_values(f, middle).shape[1] for f, _ in pairs]
+        counts = [f(middle).shape[1] for f, _ in self._pairs]
         self._owners = np.repeat(np.arange(len(pairs)), counts)
         if not 1 <= len(self._owners) < ambient_dimension:
             raise InvalidArgument(
@@ -74,17 +78,16 @@ class ConstraintSet(ImplicitManifold):
         self._insist_on_independence(lower + shares * (upper - lower))
 
     def _all_values(self, x: Array) -> Array:
-        return np.concatenate([_values(f, x) for f, _ in self._pairs], axis=1)
+        return np.concatenate([f(x) for f, _ in self._pairs], axis=1)
 
     def _all_gradients(self, x: Array) -> Array:
         return np.concatenate([self._gradient(*pair, x) for pair in self._pairs], axis=1)
 
-    def _gradient(self, f: Function, gradient: Function | None, x: Array) -> Array:
+    def _gradient(self, f: UserFunction, gradient: UserFunction | None, x: Array) -> Array:
         if gradient is not None:
-            given = np.asarray(gradient(x), dtype=np.float64)
-            return given[:, None, :] if given.ndim == 2 else given
+            return gradient(x)
         steps = _STEP * self._length * np.eye(x.shape[1])
-        columns = [(_values(f, x + h) - _values(f, x - h)) / (2 * h.sum()) for h in steps]
+        columns = [(f(x + h) - f(x - h)) / (2 * h.sum()) for h in steps]
         return np.stack(columns, axis=2)
 
     def _insist_on_independence(self, looks: Array) -> None:
@@ -128,6 +131,10 @@ class ConstraintSet(ImplicitManifold):
         return result
 
 
-def _values(f: Function, x: Array) -> Array:
-    values = np.asarray(f(x), dtype=np.float64)
-    return values[:, None] if values.ndim == 1 else values
+def _named(
+    number: int, f: Function, gradient: Function | None, d: int
+) -> tuple[UserFunction, UserFunction | None]:
+    values = UserFunction(f, f"constraint {number}", ("m",), str(d))
+    if gradient is None:
+        return values, None
+    return values, UserFunction(gradient, f"the gradient of constraint {number}", ("m", d), str(d))

@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from .._functions import UserFunction
+from .._rows import Array
 from ..errors import InvalidArgument
 from ..implicit import ImplicitManifold
-from ._common import Array, norms
+from ._grid import Grid, Spline, smoothed
 
 
 class SignedDistance(ImplicitManifold):
@@ -23,7 +25,7 @@ class SignedDistance(ImplicitManifold):
       level: the value whose set is meant.
 
     A distance has kinks on the medial axis: the solvers begin at points of the box and go down the
-    gradient, which they survive. See `of_grid` for sampled distances.
+    gradient, which they survive. See `of_grid` for sampled distances, `of_volume` for voxels.
     """
 
     resolution: float | None = None  # the spacing of the grid, where there is one
@@ -44,125 +46,102 @@ class SignedDistance(ImplicitManifold):
                 f"bounding_box has to be a pair of corners, and is {bounding_box!r}"
             ) from None
 
-        def column(x: Array) -> Array:
-            return np.asarray(f(x), dtype=np.float64).reshape(len(x), 1) - level
-
-        def slopes(x: Array) -> Array:
-            assert gradient is not None
-            return np.asarray(gradient(x), dtype=np.float64).reshape(len(x), 1, d)
-
+        self._level = float(level)
+        self._distance = UserFunction(f, "f", (1,), str(d))
+        self._slope = (
+            None if gradient is None else UserFunction(gradient, "gradient", (1, d), str(d))
+        )
         super().__init__(
-            column,
-            None if gradient is None else slopes,
+            self._above_level,
+            self._slope,
             ambient_dimension=d,
             dimension=d - 1,
             bounding_box=bounding_box,
             thread_safe=thread_safe,
         )
 
+    def _above_level(self, x: Array) -> Array:
+        return self._distance(x) - self._level
+
     @classmethod
-    def of_grid(cls, values: Any, bounding_box: Any, *, level: float = 0.0) -> SignedDistance:
+    def of_grid(
+        cls, values: Any, bounding_box: Any, *, level: float = 0.0, border: str = "closed"
+    ) -> SignedDistance:
         """The zero set of the cubic spline through values on a grid; needs scipy.
 
         Args:
           values: (n_1, ..., n_d), at evenly spaced places; the first and last of each axis lie on
-            the box.
+            the box. Any smooth function's: distances, densities, either sign inside.
           bounding_box: (lower (d,), upper (d,)).
+          border: "closed": the set does not reach the box's sides. "open": it may, and goes on beyond
+            them; to be clipped, by Clipped(oracle, box=bounding_box).
 
         The spline is smooth (C^2) and reproduces the values. What the grid does not resolve it cannot
         know: thin parts and gaps of fewer than some three spacings come out otherwise or not at all,
         and the set is within about spacing^2 times the curvature of the one that was sampled. An
         epsilon below the `resolution` meshes the spline ever better, and not what was sampled.
+
+        Raises: InvalidArgument where there is no such set, where it leaves the grid, and where values
+          are those of labels or a mask: what to do about it is said.
         """
-        spline = _Spline(values, bounding_box)
-        if not np.min(values) < level < np.max(values):
-            raise InvalidArgument(
-                f"no set of level {level:g}: the values lie between {np.min(values):g} and "
-                f"{np.max(values):g}"
-            )
+        if border not in ("closed", "open"):
+            raise InvalidArgument(f"border has to be 'closed' or 'open', and is {border!r}")
+        grid = Grid(values, bounding_box)
+        outside = grid.insist_on_a_surface(level, border == "open")
+        spline = Spline(grid, 0.0 if border == "open" else outside)
         oracle = cls(
-            spline.value, spline.gradient, bounding_box=bounding_box, level=level, thread_safe=True
+            spline.value,
+            spline.gradient,
+            bounding_box=bounding_box,
+            level=level,
+            thread_safe=True,
         )
-        oracle.resolution = float(spline.spacing.max())
+        oracle.resolution = float(grid.spacing.max())
         return oracle
 
+    @classmethod
+    def of_volume(
+        cls,
+        array: Any,
+        *,
+        spacing: Any = 1.0,
+        origin: Any = 0.0,
+        level: float | None = None,
+        smooth: float = 0.0,
+        border: str = "closed",
+    ) -> SignedDistance:
+        """The surface of a level in a volume of voxels, as scanners and simulations write them.
 
-class _Spline:
-    """A tensor product of cubic B-splines through values on a grid, in any dimension."""
-
-    def __init__(self, values: Any, bounding_box: Any) -> None:
+        Args:
+          array: (n_1, ..., n_d). Its axes are the coordinates in their order: of an array of
+            slices, (z, y, x), give array.transpose(2, 1, 0).
+          spacing: between voxels, one length or (d,).
+          origin: where the first voxel's middle is, (d,).
+          level: by default 0; 1/2 of a mask (an array of bool), such as `labels == 3`.
+          smooth: a length: the array is smoothed first, by a Gaussian of this standard deviation. A
+            mask takes some 1.5 spacings; noise takes a spacing or more. A surface moves inwards by
+            smooth^2 over its radius.
+          border: as in `of_grid`.
+        """
+        volume = np.asarray(array)
+        mask = volume.dtype.kind == "b"
+        if level is None:
+            level = 0.5 if mask else 0.0
+        d = volume.ndim
         try:
-            from scipy.ndimage import spline_filter
-        except ImportError:
+            sides = np.broadcast_to(np.asarray(spacing, dtype=np.float64), (d,))
+            lower = np.broadcast_to(np.asarray(origin, dtype=np.float64), (d,))
+        except ValueError:
             raise InvalidArgument(
-                "a sampled distance is interpolated by scipy, and there is no scipy: "
-                "apt-get install python3-scipy, or pip install scipy"
+                f"spacing and origin have to be one number or {d}, and are {spacing!r} and {origin!r}"
             ) from None
-        array = np.asarray(values, dtype=np.float64)
-        lower, upper = (np.asarray(corner, dtype=np.float64) for corner in bounding_box)
-        if lower.shape != (array.ndim,) or upper.shape != lower.shape or not (lower < upper).all():
+        if not (
+            np.isfinite(sides).all() and (sides > 0).all() and np.isfinite(smooth) and smooth >= 0
+        ):
             raise InvalidArgument(
-                f"values on a grid of {array.ndim} axes need a box of R^{array.ndim}, lower < upper"
+                f"spacing has to be positive, and smooth not negative: {spacing!r} and {smooth!r}"
             )
-        if min(array.shape) < 4:
-            raise InvalidArgument(f"a cubic spline needs 4 values an axis, and has {array.shape}")
-        if not np.isfinite(array).all():
-            raise InvalidArgument("values on the grid have to be finite")
-        # Coefficients, with what mirroring says beyond the border.
-        self._coefficients = np.pad(spline_filter(array, order=3, mode="mirror"), 2, mode="reflect")
-        self._lower, self.spacing = lower, (upper - lower) / (np.array(array.shape) - 1)
-        self._cells = np.array(array.shape) - 1
-
-    def value(self, x: Array) -> Array:
-        """(n, d) -> (n,)."""
-        return self._sum(x, None)
-
-    def gradient(self, x: Array) -> Array:
-        """(n, d) -> (n, d)."""
-        return np.stack([self._sum(x, a) / self.spacing[a] for a in range(x.shape[1])], axis=1)
-
-    def _sum(self, x: Array, derived: int | None) -> Array:
-        """The spline, or its derivative along one axis of the grid, with lengths in cells."""
-        places = (x - self._lower) / self.spacing
-        # Beyond the border it goes on as at the border, and grows with the distance.
-        inside = np.clip(places, 0, self._cells)
-        first = np.minimum(inside.astype(np.intp), self._cells - 1)
-        share = inside - first
-        total = np.zeros(len(x))
-        d = x.shape[1]
-        weights = [
-            _slopes(share[:, a]) if a == derived else _weights(share[:, a]) for a in range(d)
-        ]
-        for corner in np.ndindex(*(4,) * d):
-            term = self._coefficients[tuple(first[:, a] + corner[a] + 1 for a in range(d))].copy()
-            for a in range(d):
-                term *= weights[a][corner[a]]
-            total += term
-        beyond = places - inside
-        if derived is None:
-            return np.asarray(total + norms(beyond * self.spacing))
-        length = norms(beyond * self.spacing)
-        out = length > 0
-        outward = np.divide(
-            beyond[:, derived] * self.spacing[derived], length, where=out, out=np.zeros(len(x))
-        )
-        total = np.where(beyond[:, derived] != 0, 0.0, total)
-        return np.asarray(total + outward * self.spacing[derived])
-
-
-# By products: numpy's powers round otherwise for one number than for a column of an array.
-def _weights(t: Array) -> list[Array]:
-    """Of the four splines about a place t of a cell, there."""
-    u, t2 = 1 - t, t * t
-    return [
-        u * u * u / 6,
-        (t2 * (3 * t - 6) + 4) / 6,
-        (((3 - 3 * t) * t + 3) * t + 1) / 6,
-        t2 * t / 6,
-    ]
-
-
-def _slopes(t: Array) -> list[Array]:
-    """Their derivatives."""
-    u = 1 - t
-    return [-u * u / 2, t * (9 * t - 12) / 6, (t * (6 - 9 * t) + 3) / 6, t * t / 2]
+        if smooth > 0:
+            volume = smoothed(volume, smooth / sides)
+        box = lower, lower + sides * (np.array(volume.shape) - 1)
+        return cls.of_grid(volume, box, level=level, border=border)

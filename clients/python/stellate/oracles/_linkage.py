@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from .._rows import Array
 from ..errors import InvalidArgument
 from ..implicit import ImplicitManifold
-from ._common import Array
 
 
 class Linkage(ImplicitManifold):

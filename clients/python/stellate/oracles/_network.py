@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from .._derivatives import with_derivatives
+from .._rows import Array
 from ..errors import InvalidArgument, OracleError
 from ..implicit import ImplicitManifold
-from ._common import Array
 
 _ROWS = 256  # asked at a time: always this number, whatever the batch
 
@@ -53,23 +53,29 @@ class NeuralImplicit(ImplicitManifold):
             ) from None
         both = _of_module(network) if _is_module(network) else network
         self._both, self._level = both, np.asarray(level, dtype=np.float64)
-        self._last = threading.local()
+        self._last = _Last()
         count = self._at(probe / 2)[0].shape[1]
         if self._level.shape not in ((), (count,)):
             raise InvalidArgument(f"the network has {count} values, and level is {level!r}")
         super().__init__(
-            lambda x: self._at(x)[0] - self._level,
-            lambda x: self._at(x)[1],
+            self._values,
+            self._gradients,
             ambient_dimension=d,
             dimension=d - count,
             bounding_box=bounding_box,
             thread_safe=thread_safe,
         )
 
+    def _values(self, x: Array) -> Array:
+        return np.asarray(self._at(x)[0] - self._level)
+
+    def _gradients(self, x: Array) -> Array:
+        return self._at(x)[1]
+
     def _at(self, x: Array) -> tuple[Array, Array]:
         """Values (n, m) and gradients (n, m, d); those of the last batch are kept, since solvers ask
         for one after the other."""
-        last = getattr(self._last, "batch", None)
+        last = self._last.batch
         if last is not None and np.array_equal(last[0], x):
             return last[1], last[2]
         padded = np.concatenate([x, np.repeat(x[-1:], -len(x) % _ROWS, axis=0)])
@@ -79,6 +85,15 @@ class NeuralImplicit(ImplicitManifold):
         values, gradients = (np.concatenate(parts)[: len(x)] for parts in zip(*blocks))
         self._last.batch = x.copy(), values, gradients
         return values, gradients
+
+
+class _Last(threading.local):
+    """The batch that a thread asked about last. Another process has none."""
+
+    batch: tuple[Array, Array, Array] | None = None
+
+    def __reduce__(self) -> tuple[type[_Last], tuple[()]]:
+        return _Last, ()
 
 
 def _checked(answer: Any) -> tuple[Array, Array]:
@@ -102,7 +117,7 @@ def _checked(answer: Any) -> tuple[Array, Array]:
         raise OracleError(
             f"a network has to answer in double precision, and answered in {values.dtype} and "
             f"{gradients.dtype}: closest points have to be found to more digits than single has",
-            "ORACLE_SHAPE",
+            "ORACLE_PRECISION",
         )
     return values, gradients
 
@@ -118,9 +133,24 @@ def _of_module(network: Any) -> Callable[[Array], tuple[Array, Array]]:
     for parameter in double.parameters():
         parameter.requires_grad_(False)
 
-    def column(x: Any) -> Any:
-        values = double(x)
+    values, gradients = with_derivatives(_Columns(double), "torch")
+    return _Both(values, gradients)
+
+
+class _Columns:
+    def __init__(self, network: Any) -> None:
+        self._network = network
+
+    def __call__(self, x: Any) -> Any:
+        values = self._network(x)
         return values[:, None] if values.ndim == 1 else values
 
-    values, gradients = with_derivatives(column, "torch")
-    return lambda x: (values(x), gradients(x))
+
+class _Both:
+    def __init__(
+        self, values: Callable[[Array], Array], gradients: Callable[[Array], Array]
+    ) -> None:
+        self._values, self._gradients = values, gradients
+
+    def __call__(self, x: Array) -> tuple[Array, Array]:
+        return self._values(x), self._gradients(x)

@@ -8,18 +8,10 @@ from typing import Any, Callable
 
 import numpy as np
 
-from ..errors import InvalidArgument, OracleError
-from ._common import (
-    Array,
-    Flags,
-    Projection,
-    apply,
-    as_points,
-    box_around,
-    norms,
-    transposed,
-    tree_of,
-)
+from .._functions import Exactness, UserFunction
+from .._rows import Array, Flags, apply, norms, product, transposed
+from ..errors import InvalidArgument
+from ._common import Projection, as_points, box_around, tree_of
 
 _SAMPLES = 20_000  # of all charts together, to begin from
 _NEAREST = 8  # of them looked at for each query
@@ -59,6 +51,11 @@ class Chart:
         if not np.isfinite(self.upper - self.lower).all():
             raise InvalidArgument(f"a chart's box has to be finite: {self.lower}, {self.upper}")
         self.wraps = np.broadcast_to(np.array(self.periodic, dtype=bool), self.lower.shape)
+        k = len(self.lower)
+        self._values = UserFunction(self.x, "a chart's x", ("d",), str(k))
+        self._exactness = Exactness(None, self.lower, self.upper)
+        if self.derivative is not None:
+            self._slopes = UserFunction(self.derivative, "a chart's derivative", ("d", k), str(k))
 
     @property
     def extent(self) -> Array:
@@ -67,7 +64,11 @@ class Chart:
 
     def points(self, u: Array) -> Array:
         """X at the rows of u, checked."""
-        return _checked(self.x(u), "x", len(u), None)
+        return self._values(u)
+
+    def insist_on_exactness(self) -> None:
+        """Raises: OracleError, of what is as inexact as single precision."""
+        self._exactness.insist(self._values)
 
     def inside(self, u: Array) -> Array:
         """The parameters, periodic ones wrapped, others held in the box."""
@@ -77,7 +78,7 @@ class Chart:
     def jacobian(self, u: Array) -> Array:
         """(n, d, k), as given or by central differences within the box."""
         if self.derivative is not None:
-            return _checked(self.derivative(u), "derivative", len(u), len(self.lower))
+            return self._slopes(u)
         columns = []
         for a, side in enumerate(self.extent):
             h = np.zeros_like(self.lower)
@@ -192,6 +193,7 @@ class Parametrized(Projection):
             u = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, self.dimension)
             grids.append(u)
             points.append(as_points(chart.points(u), f"the points of chart {number}"))
+            chart.insist_on_exactness()
             owners.append(np.full(len(u), number))
         if len({p.shape[1] for p in points}) > 1:
             raise InvalidArgument(f"charts lead to R^d of d = {[p.shape[1] for p in points]}")
@@ -272,7 +274,7 @@ def _descend(chart: Chart, u: Array, x: Array, scale: float) -> tuple[Array, Arr
         bases[rows] = q
         gradient = apply(transposed(q), r)
         inverse = _inverse(triangle)
-        hessian = np.eye(k) + transposed(inverse) @ chart.bend(u[rows], r) @ inverse
+        hessian = np.eye(k) + product(product(transposed(inverse), chart.bend(u[rows], r)), inverse)
         bends, vectors = np.linalg.eigh((hessian + transposed(hessian)) / 2)
         bends = np.maximum(np.abs(bends), 0.05)
         v = -apply(vectors, apply(transposed(vectors), gradient) / bends)
@@ -335,7 +337,7 @@ def _meet(chart: Chart, u: Array, c: Array, bases: Array, scale: float) -> tuple
         across = transposed(bases[rows])
         off = apply(across, y[rows] - c[rows])
         found[rows[norms(off) <= 1e-13 * scale]] = True
-        system = across @ chart.jacobian(u[rows])
+        system = product(across, chart.jacobian(u[rows]))
         regular = np.abs(np.linalg.det(system)) > 0
         alive[rows[~regular]] = False
         rows, off, system = rows[regular], off[regular], system[regular]
@@ -359,17 +361,3 @@ def _meet(chart: Chart, u: Array, c: Array, bases: Array, scale: float) -> tuple
         found[stopped] = norms(off[left]) <= 1e-11 * scale
         alive[stopped] = False
     return y, found
-
-
-def _checked(values: Any, name: str, count: int, k: int | None) -> Array:
-    array = np.asarray(values)
-    ranks = 2 if k is None else 3
-    right = array.ndim == ranks and len(array) == count and array.dtype.kind in "fiu"
-    if not right or (k is not None and array.shape[2] != k):
-        wanted = f"({count}, d)" if k is None else f"({count}, d, {k})"
-        raise OracleError(
-            f"a chart's {name} returned an array of shape {array.shape} and type {array.dtype}; it "
-            f"has to be {wanted} real numbers, a row for each of the parameters",
-            "ORACLE_SHAPE",
-        )
-    return np.asarray(array, dtype=np.float64)

@@ -7,19 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InvalidArgument, OracleError
+from .._functions import Exactness, UserFunction
+from .._lowest import descend
+from .._rows import Array, Flags, apply, norms, product, transposed
+from ..errors import InvalidArgument
 from ..oracle import CheckedOracle
-from ._common import (
-    Array,
-    Flags,
-    all_or_raise,
-    apply,
-    box_around,
-    norms,
-    refuse_walls,
-    transposed,
-    tree_of,
-)
+from ._common import all_or_raise, box_around, refuse_walls, tree_of
 
 _SAMPLES = 20_000  # of the manifold, to begin from
 _NEAREST = 8  # of them looked at for each query
@@ -27,6 +20,8 @@ _BASINS = 3  # the most of these that begin a search
 _FIRST_STEP = 6e-6  # of first differences, in shares of N's size: about the cube root of rounding
 _STEP = 1e-4  # of second differences: about its fourth root
 _ITERATIONS = 100
+_LOOKS, _DESCENTS = 2000, 24  # samples looked at for where f is no immersion, and gone on from
+_FLAT = 1e-4  # of what f stretches by usually, which leaves nothing of it
 
 Map = Callable[[Array], Any]
 
@@ -54,7 +49,8 @@ class Quotient:
             raise InvalidArgument(f"a quotient of {type(oracle).__name__} needs its bounding_box")
         if not callable(f) or not (derivative is None or callable(derivative)):
             raise InvalidArgument("a quotient needs a function f, and one or None as derivative")
-        self._f, self._derivative = f, derivative
+        m = len(self._base.bounding_box[0])
+        self._values = UserFunction(f, "a quotient's f", ("d",), str(m))
         self.dimension = self._base.dimension
         self.thread_safe = False
         lower, upper = self._base.bounding_box
@@ -65,7 +61,11 @@ class Quotient:
             raise InvalidArgument("no point of the manifold was found in its bounding_box")
         self._samples = near[found]
         self._images = self._values(self._samples)
-        self.ambient_dimension = self._images.shape[1]
+        self.ambient_dimension = d = self._images.shape[1]
+        self._derivative = None
+        if derivative is not None:
+            self._derivative = UserFunction(derivative, "a quotient's derivative", (d, m), str(m))
+        Exactness(self._samples, lower, upper).insist(self._values)
         if self.dimension >= self.ambient_dimension:
             raise InvalidArgument(
                 f"a manifold of dimension {self.dimension} does not embed in "
@@ -147,7 +147,7 @@ class Quotient:
             bases[rows] = q
             r = y[rows] - x[rows]
             inverse = np.linalg.inv(triangle)
-            bend = transposed(inverse) @ self._bend(u[rows], frames, r) @ inverse
+            bend = product(product(transposed(inverse), self._bend(u[rows], frames, r)), inverse)
             bends, vectors = np.linalg.eigh(np.eye(k) + (bend + transposed(bend)) / 2)
             wish = apply(transposed(vectors), apply(transposed(q), r))
             v = -apply(vectors, wish / np.maximum(np.abs(bends), 0.05))
@@ -189,14 +189,7 @@ class Quotient:
     def _slopes(self, u: Array, frames: Array) -> Array:
         """f's derivative along the frames, (n, d, k)."""
         if self._derivative is not None:
-            given = np.asarray(self._derivative(u), dtype=np.float64)
-            if given.shape != (len(u), self.ambient_dimension, u.shape[1]):
-                raise OracleError(
-                    f"a quotient's derivative returned an array of shape {given.shape}; it has to "
-                    f"be {(len(u), self.ambient_dimension, u.shape[1])}",
-                    "ORACLE_SHAPE",
-                )
-            return given @ frames
+            return product(self._derivative(u), frames)
         h = _FIRST_STEP * self._length
         columns = [
             (self._values(u + h * frames[:, :, a]) - self._values(u - h * frames[:, :, a]))
@@ -227,21 +220,28 @@ class Quotient:
         return bend
 
     def _insist_on_immersion(self) -> None:
-        some = self._samples[:: max(1, len(self._samples) // 500)]
-        sizes = np.linalg.svd(self._slopes(some, self._frames(some)), compute_uv=False)
-        flat = sizes[:, -1] <= 1e-6 * sizes.max()
-        if flat.any():
+        """Looks for the direction that f changes least, and follows it down. Raises: InvalidArgument."""
+        some = self._samples[:: max(1, len(self._samples) // _LOOKS)]
+        usual = float(np.median(self._stretches(some, 0)))
+        lowest = np.argsort(self._stretches(some, -1), kind="stable")[:_DESCENTS]
+
+        def least(u: Array) -> Array:
+            return self._stretches(u, -1)
+
+        places, sizes = descend(
+            some[lowest], least, self._base.closest_points, self._frames, self._length
+        )
+        worst = int(np.argmin(sizes))
+        if not sizes[worst] > _FLAT * usual:
+            place = places[worst : worst + 1]
             raise InvalidArgument(
-                "f is no immersion: some direction of the manifold does not change it at "
-                f"{some[int(np.argmax(flat))].tolist()}"
+                f"f is not an immersion near {place[0].round(6).tolist()} of the manifold, which it takes "
+                f"to {self._values(place)[0].round(6).tolist()}: it does not change in some direction "
+                "there, so that its image has a fold, a tip or an end. A quotient by a reflection, or by "
+                "anything with fixed points, is no manifold"
             )
 
-    def _values(self, u: Array) -> Array:
-        values = np.asarray(self._f(u))
-        if values.ndim != 2 or len(values) != len(u) or values.dtype.kind not in "fiu":
-            raise OracleError(
-                f"a quotient's f returned an array of shape {values.shape} and type "
-                f"{values.dtype}; it has to be ({len(u)}, d) real numbers",
-                "ORACLE_SHAPE",
-            )
-        return np.asarray(values, dtype=np.float64)
+    def _stretches(self, u: Array, which: int) -> Array:
+        """(n, m) -> (n,): how f stretches N most, by 0, or least, by -1."""
+        slopes = self._slopes(u, self._frames(u))
+        return np.asarray(np.linalg.svd(slopes, compute_uv=False)[:, which])

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from .._rows import Array, norms
 from ..errors import InvalidArgument
 from ._cloud import PointCloud
-from ._common import Array, as_points, norms
+from ._common import as_points
 
 _MOST_POINTS = 5_000_000
 

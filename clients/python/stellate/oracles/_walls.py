@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, Callable
 
 import numpy as np
 
 from .._derivatives import with_derivatives
-from ..errors import InvalidArgument, OracleError
+from .._functions import Exactness, UserFunction
+from .._rows import Array, apply, norms, transposed
+from ..errors import InvalidArgument
 from ..oracle import CheckedOracle
 from ._combined import LevelSet
-from ._common import Array, apply, norms, refuse_walls, transposed
+from ._common import refuse_walls, where_of
 
 Wall = Callable[[Array], Any]
 
@@ -69,8 +72,8 @@ class Clipped:
         ball: Sequence[Any] | None = None,
         seeds: Any = None,
     ) -> None:
-        self._walls: list[Wall] = []
-        self._gradients: list[Wall | None] = []
+        self._walls: list[UserFunction] = []
+        self._gradients: list[UserFunction | None] = []
         if isinstance(oracle, Clipped):
             self._walls += oracle._walls
             self._gradients += oracle._gradients
@@ -103,6 +106,8 @@ class Clipped:
             self.local_size = oracle.local_size
         self.thread_safe = bool(getattr(oracle, "thread_safe", False))
         self._faces: dict[tuple[int, ...], _Face] = {}
+        box = where_of(self._base)
+        self._exactness = [Exactness(self._base.seeds, *box) for _ in self._walls]
 
     def closest_point(self, points: Array) -> Array:
         """Of M, whatever the walls say."""
@@ -115,16 +120,13 @@ class Clipped:
         """(n, d) -> (n, d): nearest points of M where the walls of `face` are zero."""
         solver = self._faces.get(face)
         if solver is None:
-            solver = self._faces[face] = _Face(
-                self._oracle,
-                lambda x: np.stack([self._value(wall, x) for wall in face], axis=1),
-                lambda x: np.stack([self._slope(wall, x) for wall in face], axis=1),
-            )
+            walls, slopes = partial(self._values, face), partial(self._slopes, face)
+            solver = self._faces[face] = _Face(self._oracle, walls, slopes)
         return solver.closest_point(points)
 
     def clearances(self, points: Array) -> Array:
         """(n, d) -> (n, walls): the walls' values."""
-        return np.stack([self._value(wall, points) for wall in range(self.walls)], axis=1)
+        return self._values(tuple(range(self.walls)), points)
 
     def conormals(self, points: Array, face: tuple[int, ...]) -> Array:
         """(n, d) -> (n, len(face), d): outward unit normals of the walls within M."""
@@ -136,51 +138,47 @@ class Clipped:
             outward[:, i] = apply(bases, -along / np.where(steep > 0, steep, 1.0))
         return outward
 
+    def _values(self, face: tuple[int, ...], points: Array) -> Array:
+        """(n, d) -> (n, len(face))"""
+        return np.stack([self._value(wall, points) for wall in face], axis=1)
+
+    def _slopes(self, face: tuple[int, ...], points: Array) -> Array:
+        """(n, d) -> (n, len(face), d)"""
+        return np.stack([self._slope(wall, points) for wall in face], axis=1)
+
     def _value(self, wall: int, points: Array) -> Array:
-        values = np.asarray(self._walls[wall](points), dtype=np.float64)
-        n = len(points)
-        if values.shape not in ((n,), (n, 1)):
-            raise OracleError(
-                f"wall {wall} returned shape {values.shape}; it has to be ({n},) for a batch of {n} "
-                "points, a number each"
-            )
-        return values.reshape(n)
+        if len(points):
+            self._exactness[wall].insist(self._walls[wall])
+        return self._walls[wall](points)[:, 0]
 
     def _slope(self, wall: int, points: Array) -> Array:
         gradient = self._gradients[wall]
         if gradient is not None:
-            slopes = np.asarray(gradient(points), dtype=np.float64)
-            if slopes.shape != points.shape:
-                raise OracleError(
-                    f"the gradient of wall {wall} returned shape {slopes.shape}; it has to be "
-                    f"{points.shape} for a batch of {len(points)} points, a row each"
-                )
-            return slopes
-        h = 6e-6 * self._scale() * np.eye(self.ambient_dimension)
+            return gradient(points)[:, 0]
+        lower, upper = where_of(self._base)
+        h = 6e-6 * float(norms(upper - lower)) * np.eye(self.ambient_dimension)
         columns = [
             (self._value(wall, points + v) - self._value(wall, points - v)) / (2 * v.sum())
             for v in h
         ]
         return np.stack(columns, axis=1)
 
-    def _scale(self) -> float:
-        if self._base.bounding_box is not None:
-            lower, upper = self._base.bounding_box
-            return float(norms(upper - lower))
-        seeds = self._base.seeds
-        return float(norms(np.ptp(seeds, axis=0))) if seeds is not None and len(seeds) > 1 else 1.0
-
     def _add(self, walls: list[Wall], gradients: Sequence[Wall | str | None] | str | None) -> None:
         if gradients is None or isinstance(gradients, str):
             gradients = [gradients] * len(walls)
         if len(gradients) != len(walls) or not all(map(callable, walls)):
             raise InvalidArgument("walls have to be functions, and gradients one for each, or None")
+        d = self.ambient_dimension
         for wall, gradient in zip(walls, gradients):
             if isinstance(gradient, str):
                 wall, gradient = _derived(wall, gradient)
-            self._walls.append(wall)
+            if gradient is None:
+                gradient = getattr(wall, "gradient", None)
+            name = f"wall {len(self._walls)}"
+            self._walls.append(UserFunction(wall, name, (1,), str(d)))
+            slope = f"the gradient of {name}"
             self._gradients.append(
-                getattr(wall, "gradient", None) if gradient is None else gradient
+                None if gradient is None else UserFunction(gradient, slope, (1, d), str(d))
             )
 
     def _add_box(self, lower: Array, upper: Array) -> None:
@@ -196,9 +194,21 @@ class Clipped:
             raise InvalidArgument(
                 f"ball has to be a point of R^{self.ambient_dimension} and a radius"
             )
-        self._add(
-            [lambda x: radius**2 - ((x - centre) ** 2).sum(axis=1)], [lambda x: -2 * (x - centre)]
-        )
+        self._add([_Ball(centre, radius)], None)
+
+
+class _Ball:
+    """The wall {x : |x - centre| <= radius}, a function that knows its gradient."""
+
+    def __init__(self, centre: Array, radius: float) -> None:
+        self._centre, self._radius = centre, radius
+
+    def __call__(self, points: Array) -> Array:
+        return np.asarray(self._radius**2 - ((points - self._centre) ** 2).sum(axis=1))
+
+    def gradient(self, points: Array) -> Array:
+        """(n, d) -> (n, d)"""
+        return np.asarray(-2 * (points - self._centre))
 
 
 class HalfSpace:
@@ -223,8 +233,17 @@ class HalfSpace:
 
 def _derived(wall: Wall, library: str) -> tuple[Wall, Wall]:
     """A wall written for a library, and its gradient, on numpy's arrays."""
-    values, jacobian = with_derivatives(lambda x: wall(x)[:, None], library)
-    return lambda x: values(x)[:, 0], lambda x: jacobian(x)[:, 0]
+    return with_derivatives(_Column(wall), library)
+
+
+class _Column:
+    """A wall's values as a column, in its library's arrays."""
+
+    def __init__(self, wall: Wall) -> None:
+        self._wall = wall
+
+    def __call__(self, x: Any) -> Any:
+        return self._wall(x)[:, None]
 
 
 class Solid(Clipped):

@@ -1,0 +1,188 @@
+"""Functions that users write, for whole batches: how they are called, and what they may return."""
+
+from __future__ import annotations
+
+from typing import Any, Callable
+
+import numpy as np
+
+from .errors import OracleError, StellateError
+
+_LINES = 12  # that the exactness of a function is measured along
+_FEWEST = 3  # of them that have to tell it
+# Of a line's five places, in shares of the box: no smooth function bends in so little. Single
+# precision far from the origin does not tell them apart: then those of the second length.
+_STEPS = (1e-6, 1e-4)
+_FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # their fourth difference, of what is not smooth:
+_FOURTH_SIZE = np.sqrt(70.0)  # so many times the error of a value
+# The most that values may err by, as a length in shares of the box: a hundred times what points are
+# found to. Single precision errs by some 1e-8, double by 1e-16.
+_INEXACT = 1e-10
+_ROUNDINGS = 1600 * float(np.finfo(float).eps)  # likewise, of the largest coordinate
+
+
+class UserFunction:
+    """A function of a user's, which is checked.
+
+    Shapes without the batch are called rows. An answer of another shape, or in single precision, is
+    an OracleError that says what is right. An exception of the function's own goes on as it is; until
+    it has answered once, words on how it is called are added.
+
+    Args:
+      f: (n, *asked) -> (n, *row); of one number a row (n,) and (n, 1) are the same.
+      name: of the function, for messages.
+      asked: letters for what a row of its argument has, such as "d".
+      row: the shape of a row of its values, whose whole numbers are insisted on; a letter stands for
+        any, and is replaced by what the first answer has.
+    """
+
+    def __init__(
+        self, f: Callable[[Any], Any], name: str, row: tuple[int | str, ...], asked: str = "d"
+    ) -> None:
+        self._f, self.name, self._asked, self.row = f, name, asked, row
+        self._worked = False
+
+    @property
+    def width(self) -> int:
+        """How many numbers the first axis of a row has. 1 until it is known."""
+        return self.row[0] if self.row and isinstance(self.row[0], int) else 1
+
+    def __call__(self, x: np.ndarray) -> np.ndarray:
+        """At the rows of x, without asking if there are none. Raises: OracleError."""
+        if not len(x):
+            return np.empty((0, *(1 if isinstance(n, str) else n for n in self.row)))
+        if self._worked:
+            return self._checked(self._f(x), x.shape)
+        try:
+            answer = self._f(x)
+        except StellateError:
+            raise
+        except Exception as error:
+            _add(error, self._called(x.shape))
+            raise
+        values = self._checked(answer, x.shape)
+        self.row, self._worked = values.shape[1:], True
+        return values
+
+    def _called(self, shape: tuple[int, ...]) -> str:
+        one = f" or {_shape('n', *self.row[:-1])}" if self.row[-1:] == (1,) else ""
+        return (
+            f"{self.name} is called with a whole batch at once, an array (n, {self._asked}), here "
+            f"{shape}, and returns {_shape('n', *self.row)}{one}, a row for each of its rows: "
+            "x[:, 0] are all first coordinates, x[0] is the first point"
+        )
+
+    def _checked(self, answer: Any, asked: tuple[int, ...]) -> np.ndarray:
+        values, count = np.asarray(answer), asked[0]
+        real = values.dtype.kind in "fiu"
+        if real and self._lacks_an_axis(values.shape, count):
+            values = values[:, None]
+        fits = len(values.shape) == 1 + len(self.row) and all(
+            isinstance(wanted, str) or wanted == got
+            for wanted, got in zip((count, *self.row), values.shape)
+        )
+        if not fits or not real:
+            got = f"shape {values.shape}" if real else type(answer).__name__
+            raise OracleError(
+                f"{self.name} returned {got}; it has to be {_shape(count, *self.row)} for a batch of "
+                f"{count} points, a row each"
+                + ("" if self._worked else f"; {self._called(asked)}"),
+                "ORACLE_SHAPE",
+            )
+        if values.dtype.kind == "f" and values.dtype.itemsize < 8:
+            raise OracleError(
+                f"{self.name} returned {values.dtype} numbers; points are found to twelve digits, "
+                "which takes float64 throughout (for a function of jax's say jacobian='jax')",
+                "ORACLE_PRECISION",
+            )
+        return values.astype(float, copy=False)
+
+    def _lacks_an_axis(self, shape: tuple[int, ...], count: int) -> bool:
+        """Of one value: (n,) for (n, 1), its gradient (n, d) for (n, 1, d)."""
+        if not self.row or self.row[0] not in (1, "m") or len(shape) != len(self.row):
+            return False
+        wanted = (count, *self.row[1:])
+        return all(isinstance(w, str) or w == got for w, got in zip(wanted, shape))
+
+
+class Exactness:
+    """Insists, once, that a function is as exact as double precision is.
+
+    Args:
+      about: (s, d) places to look from, or None: random ones of the box.
+      lower, upper: (d,), the box.
+    """
+
+    def __init__(self, about: np.ndarray | None, lower: np.ndarray, upper: np.ndarray) -> None:
+        self._about, self._lower, self._upper = _points(about, len(lower)), lower, upper
+        self._known = False
+
+    def insist(self, f: UserFunction) -> None:
+        """Raises: OracleError, where f rounds to single precision and back, or is as noisy."""
+        if self._known:
+            return
+        self._known = True
+        inexact, value = self._share(f)
+        sides = np.maximum(self._upper - self._lower, 1e-300)
+        far = float((np.maximum(np.abs(self._lower), np.abs(self._upper)) / sides).max())
+        if inexact <= max(_INEXACT, _ROUNDINGS * far):
+            return
+        which = f.name if f.width == 1 else f"{f.name}'s value {value}"
+        raise OracleError(
+            f"{which} is exact to {inexact:.1g} of its box only, as neighbouring points show, which is "
+            "what single precision does. Points are found to twelve digits, which takes "
+            "float64 throughout, within the function as well; what is solved or integrated inside it "
+            "takes as many digits",
+            "ORACLE_PRECISION",
+        )
+
+    def _share(self, f: UserFunction) -> tuple[float, int]:
+        """How far the zero set moves by the errors of f, in shares of the box; by which of its values.
+
+        Along short lines a smooth function is a straight one, which its fourth differences show no
+        more than rounding of.
+        """
+        random = np.random.default_rng(1)
+        d, sides = len(self._lower), self._upper - self._lower
+        starts = self._lower + sides * random.random((_LINES, d))
+        if self._about is not None:
+            starts = self._about[np.arange(_LINES) % len(self._about)]
+        ways = random.standard_normal((_LINES, d))
+        ways *= sides / np.sqrt((ways * ways).sum(axis=1))[:, None]
+        for step in _STEPS:
+            along = step * np.arange(-2, 3)[None, :, None] * ways[:, None, :]
+            values = f((starts[:, None, :] + along).reshape(-1, d)).reshape(_LINES, 5, -1)
+            with np.errstate(invalid="ignore", divide="ignore"):
+                error = np.abs((values * _FOURTH[None, :, None]).sum(axis=1)) / _FOURTH_SIZE
+                shares = error * (4 * step) / np.abs(values[:, 4] - values[:, 0])
+            told = np.isfinite(shares)
+            enough = told.sum(axis=0) >= _FEWEST
+            if enough.any():
+                usual = [np.median(c[t]) if e else 0.0 for c, t, e in zip(shares.T, told.T, enough)]
+                return float(max(usual)), int(np.argmax(usual))
+        return 0.0, 0
+
+
+def _points(about: Any, d: int) -> np.ndarray | None:
+    """Seeds, if they are what they have to be, which the server judges."""
+    try:
+        points = np.asarray(about, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+    right = points.ndim == 2 and points.shape[1] == d and len(points) and np.isfinite(points).all()
+    return points if right else None
+
+
+def _shape(*sides: Any) -> str:
+    return f"({', '.join(map(str, sides))}{',' if len(sides) == 1 else ''})"
+
+
+def _add(error: Exception, words: str) -> None:
+    """To the message of somebody else's exception, once; its type stays."""
+    if getattr(error, "_stellate_told", False):
+        return
+    error._stellate_told = True  # type: ignore[attr-defined]
+    if len(error.args) == 1 and isinstance(error.args[0], str) and str(error) == error.args[0]:
+        error.args = (f"{error.args[0]}; {words}",)
+    elif hasattr(error, "add_note"):
+        error.add_note(words)

@@ -1,0 +1,239 @@
+"""Functions that users write: how they are called, what they may return, how exact they have to be."""
+
+import pickle
+
+import numpy as np
+import pytest
+import stellate
+from ready_shapes import ALL, TORUS, TURN, closest, near, norm2, torus_map, veronese
+from stellate import manifolds, oracles
+
+CUBE = [-1.5] * 3, [1.5] * 3
+
+
+def sphere(x):
+    return np.sqrt(norm2(x)) - 1
+
+
+def implicit(f, jacobian=None, **more):
+    return stellate.ImplicitManifold(
+        f, jacobian, ambient_dimension=3, dimension=2, bounding_box=CUBE, **more
+    )
+
+
+def constraints(f):
+    return oracles.ConstraintSet([f], ambient_dimension=3, bounding_box=CUBE)
+
+
+def half_of_a_sphere(clearance):
+    rim = oracles.Transformed(manifolds.Sphere(1), rotation=np.eye(3, 2))
+    return oracles.ManifoldWithBoundary(manifolds.Sphere(2), rim, clearance=clearance)
+
+
+# Each ready oracle that takes a function of points: what makes it, and a function that it takes.
+TAKERS = {
+    "ImplicitManifold": (implicit, sphere),
+    "SignedDistance": (lambda f: oracles.SignedDistance(f, bounding_box=CUBE), sphere),
+    "ConstraintSet": (constraints, sphere),
+    "LevelSet": (lambda f: oracles.LevelSet(TORUS, f), lambda x: x[:, 0] - 0.3),
+    "Clipped": (lambda f: oracles.Clipped(TORUS, [f]), lambda x: x[:, 0] - 0.3),
+    "Solid": (lambda f: oracles.Solid(f, CUBE), lambda x: -sphere(x)),
+    "Quotient": (lambda f: oracles.Quotient(manifolds.Sphere(2), f), veronese),
+    "Parametrized": (
+        lambda f: oracles.Parametrized(f, None, [0, 0], [TURN] * 2, True),
+        torus_map,
+    ),
+}
+SEVERAL = ["Quotient", "Parametrized"]  # values a point
+
+
+def ask(oracle):
+    """About all that its functions are asked for."""
+    x = np.random.default_rng(1).uniform(-1, 1, (20, oracle.ambient_dimension))
+    if hasattr(oracle, "clearances"):
+        oracle.clearances(x)
+    oracle.closest_point(x)
+
+
+@pytest.mark.parametrize("taker", TAKERS)
+@pytest.mark.parametrize(
+    "cast, words",
+    [
+        (lambda f: lambda x: f(x).astype(np.float32), "returned float32 numbers"),
+        (lambda f: lambda x: f(x.astype(np.float32)).astype(float), "is exact to .*e-0[789] of"),
+    ],
+    ids=["single", "single and back"],
+)
+def test_single_precision_is_told_whoever_takes_the_function(taker, cast, words):
+    make, f = TAKERS[taker]
+    ask(make(f))
+    with pytest.raises(stellate.OracleError, match=words) as caught:
+        ask(make(cast(f)))
+    assert caught.value.reason == "ORACLE_PRECISION"
+
+
+def test_single_precision_is_told_of_clearances_too():
+    x = np.random.default_rng(1).uniform(-1, 1, (20, 3))
+    half_of_a_sphere(lambda x: x[:, 2]).clearances(x)
+    with pytest.raises(stellate.OracleError, match="clearance returned float32"):
+        half_of_a_sphere(lambda x: x[:, 2].astype(np.float32)).clearances(x)
+
+
+@pytest.mark.parametrize("center", [0.0, 3e3], ids=["at the origin", "far from it"])
+def test_exactness_is_measured_where_the_box_is(center):
+    low, high = np.full(3, center - 1.5), np.full(3, center + 1.5)
+
+    def made(f):
+        return oracles.SignedDistance(f, bounding_box=(low, high))
+
+    ask_at = np.full((1, 3), center + 0.4)
+    made(lambda x: sphere(x - center)).closest_point(ask_at)
+    with pytest.raises(stellate.OracleError, match="is exact to"):
+        made(lambda x: sphere(x.astype(np.float32).astype(float) - center)).closest_point(ask_at)
+
+
+@pytest.mark.parametrize(
+    "f",
+    [
+        lambda x: np.minimum(sphere(x), np.abs(x).max(axis=1) - 0.9),  # creases
+        lambda x: np.clip(sphere(x), -0.2, 0.2),  # constant in most places
+        lambda x: np.where(x[:, 0] > 0.5, np.nan, sphere(x)),
+        lambda x: 1e-12 * sphere(x),
+        lambda x: np.sin(40 * sphere(x)),
+        lambda x: x[:, 2] - 1e-3,
+    ],
+)
+def test_what_is_exact_is_not_accused(f):
+    f_twice = implicit(f)
+    with np.errstate(invalid="ignore"):
+        try:
+            f_twice.closest_point(np.random.default_rng(1).uniform(-1, 1, (50, 3)))
+        except stellate.NotConverged:
+            pass
+
+
+@pytest.mark.parametrize("taker", [t for t in TAKERS if t not in SEVERAL])
+def test_a_function_of_one_point_is_told_how_it_is_called(taker):
+    make, _ = TAKERS[taker]
+
+    def one_point(x):
+        return float(x[0]) ** 2 + float(x[1]) ** 2 + float(x[2]) ** 2 - 1
+
+    with pytest.raises(TypeError, match=r"called with a whole batch .*\(n, 3\).*returns \(n"):
+        ask(make(one_point))
+    kinds = (stellate.OracleError, IndexError)  # by how many points the first batch has
+    with pytest.raises(kinds, match=r"called with a whole batch .*\(n, 3\)"):
+        ask(make(lambda x: x[0] ** 2 + x[1] ** 2 + x[2] ** 2 - 1))
+
+
+def test_an_exception_of_a_function_that_worked_is_left_alone():
+    calls = []
+
+    def f(x):
+        calls.append(len(x))
+        if len(calls) > 3:
+            raise ValueError("a licence ran out")
+        return sphere(x)
+
+    with pytest.raises(ValueError) as caught:
+        ask(implicit(f))
+    assert caught.value.args == ("a licence ran out",)
+
+
+def test_one_equation_may_return_a_number_a_point():
+    x = np.random.default_rng(1).uniform(-1, 1, (30, 3))
+    flat = implicit(sphere, lambda x: x / np.sqrt(norm2(x))[:, None])
+    column = implicit(
+        lambda x: sphere(x)[:, None], lambda x: (x / np.sqrt(norm2(x))[:, None])[:, None]
+    )
+    assert (flat.closest_point(x) == column.closest_point(x)).all()
+
+
+@pytest.mark.parametrize("name", [*ALL, "clipped", "solid", "bounded"])
+def test_no_rows_are_answered_with_no_rows(name):
+    more = {
+        "clipped": lambda: oracles.Clipped(TORUS, [lambda x: x[:, 0]], ball=([0, 0, 0], 1.2)),
+        "solid": lambda: oracles.Solid(lambda x: 1 - norm2(x), CUBE),
+        "bounded": lambda: half_of_a_sphere(lambda x: x[:, 2]),
+    }
+    oracle = more[name]() if name in more else ALL[name][0]()
+    d, k = oracle.ambient_dimension, oracle.dimension
+    none = np.empty((0, d))
+    for _ in range(2):  # before it was asked anything else, and after
+        assert oracle.closest_point(none).shape == (0, d)
+        assert oracle.tangent_basis(none).shape == (0, d, k)
+        if hasattr(oracle, "intersect_flat"):
+            points, found = oracle.intersect_flat(none, np.empty((0, d, k)), np.empty(0))
+            assert points.shape == (0, d) and found.shape == (0,)
+        if getattr(oracle, "local_size", None) is not None:
+            assert oracle.local_size(none).shape == (0,)
+        if getattr(oracle, "walls", 0):
+            assert oracle.clearances(none).shape == (0, oracle.walls)
+            assert oracle.face_point(none, (0,)).shape == (0, d)
+            assert oracle.conormals(none, (0,)).shape == (0, 1, d)
+        ask(oracle) if name in more else near(oracle, ALL[name][1], 5)
+
+
+@pytest.mark.parametrize(
+    "f, near_to",
+    [
+        (lambda u: np.stack([u[:, 0], u[:, 1], u[:, 2] ** 2], axis=1), lambda u: abs(u[2])),
+        (
+            lambda u: np.stack(
+                [u[:, 0] ** 2 - u[:, 1] ** 2, 2 * u[:, 0] * u[:, 1], u[:, 2]], axis=1
+            ),
+            lambda u: np.hypot(u[0], u[1]),
+        ),
+    ],
+    ids=["a reflection", "a rotation that has fixed points"],
+)
+def test_what_is_no_immersion_is_refused_with_the_place(f, near_to):
+    with pytest.raises(stellate.InvalidArgument, match="not an immersion near") as caught:
+        oracles.Quotient(manifolds.Sphere(2), f)
+    place = str(caught.value).split("near [")[1].split("]")[0]
+    assert near_to([float(number) for number in place.split(",")]) < 1e-3
+
+
+def half_space(x):
+    return x[:, 0] - 0.2
+
+
+PICKLED = {
+    "ellipsoid": lambda: manifolds.ellipsoid(),
+    "tanglecube": lambda: manifolds.tanglecube(),
+    "signed distance": lambda: oracles.SignedDistance(sphere, bounding_box=CUBE),
+    "clipped": lambda: oracles.Clipped(TORUS, [half_space], ball=([0, 0, 0], 1.2)),
+    "solid": lambda: oracles.Solid(half_space, box=CUBE),
+    "level set": lambda: oracles.LevelSet(TORUS, half_space),
+    "parametrized": lambda: oracles.Parametrized(torus_map, None, [0, 0], [TURN] * 2, True),
+    **{
+        name: ALL[name][0]
+        for name in ("product", "transformed", "signed_distance", "projective_plane", "linkage")
+    },
+    "point_cloud": ALL["point_cloud"][0],
+}
+
+
+@pytest.mark.parametrize("name", PICKLED)
+def test_ready_oracles_go_to_other_processes(name):
+    oracle = PICKLED[name]()
+    x = np.random.default_rng(1).uniform(-1, 1, (20, oracle.ambient_dimension))
+    before, found = closest(oracle, x)
+    for copy in (pickle.loads(pickle.dumps(PICKLED[name]())), pickle.loads(pickle.dumps(oracle))):
+        after, again = closest(copy, x)
+        assert (again == found).all() and (after[found] == before[found]).all()
+        if getattr(oracle, "walls", 0):
+            assert (copy.clearances(x) == oracle.clearances(x)).all()
+            assert (copy.face_point(x[:3], (0,)) == oracle.face_point(x[:3], (0,))).all()
+
+
+@pytest.mark.parametrize("module", [manifolds, oracles])
+def test_a_module_offers_what_it_is_for_and_nothing_else(module):
+    assert [name for name in dir(module) if not name.startswith("_")] == sorted(module.__all__)
+
+
+def test_credentials_say_where_they_are_given(capsys):
+    help(stellate.Credentials)
+    shown = capsys.readouterr().out
+    for words in ("stellate.mesh(oracle", "credentials=", "InvalidArgument", "not shown by repr"):
+        assert words in shown

@@ -1,0 +1,149 @@
+"""Surfaces of values on a grid: the spline through them, and what is said of values that hold none."""
+
+import numpy as np
+import pytest
+import stellate
+from ready_shapes import closest
+from scipy import ndimage
+from stellate import oracles
+
+OfGrid = oracles.SignedDistance.of_grid
+OfVolume = oracles.SignedDistance.of_volume
+
+
+def lattice(count=24):
+    side = np.arange(count) - (count - 1) / 2
+    return np.meshgrid(side, side, side, indexing="ij")
+
+
+def ball(count=24, radius=8.0):
+    x, y, z = lattice(count)
+    return np.sqrt(x * x + y * y + z * z) - radius
+
+
+def box_of(values, spacing=1.0):
+    return np.zeros(values.ndim), spacing * (np.array(values.shape) - 1)
+
+
+def radii(oracle, count=24, around=8.0):
+    """Of the points that closest_point finds from about the ball's surface."""
+    way = np.random.default_rng(1).normal(size=(200, 3))
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    middle = np.full(3, (count - 1) / 2)
+    points, found = closest(oracle, middle + around * way)
+    assert found.all()
+    return np.linalg.norm(points - middle, axis=1)
+
+
+@pytest.mark.parametrize("shape", [(9,), (7, 12), (6, 8, 5), (5, 4, 6, 5)])
+def test_the_spline_is_scipys(shape):
+    random = np.random.default_rng(1)
+    values = random.normal(size=shape)
+    values[(0,) * len(shape)] = -50
+    lower, upper = random.uniform(-1, 0, len(shape)), random.uniform(1, 3, len(shape))
+    spline = oracles._grid.Spline(oracles._grid.Grid(values, (lower, upper)), 1.0)
+    x = random.uniform(lower, upper, (300, len(shape)))
+    places = ((x - lower) / spline.spacing).T
+    expected = ndimage.map_coordinates(values, places, order=3, mode="mirror")
+    assert np.abs(spline.value(x) - expected).max() < 1e-12 * 50
+    h = 1e-6
+    for axis in range(len(shape)):
+        step = h * np.eye(len(shape))[axis]
+        slope = (spline.value(x + step) - spline.value(x - step)) / (2 * h)
+        assert np.abs(spline.gradient(x)[:, axis] - slope).max() < 1e-6
+    alone = [spline.gradient(row[None])[0] for row in x]
+    assert np.array_equal(alone, spline.gradient(x))
+    assert np.array_equal(np.concatenate([spline.value(row[None]) for row in x]), spline.value(x))
+
+
+@pytest.mark.parametrize("sign", [1, -1], ids=["negative inside", "positive inside"])
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e4])
+def test_there_is_no_other_surface_beyond_the_border(sign, scale):
+    values = scale * (sign * ball() + 3)
+    oracle = OfGrid(values, box_of(values), level=3 * scale)
+    far = np.random.default_rng(1).uniform(-60, 80, (300, 3))
+    points, found = closest(oracle, far)
+    assert found.mean() > 0.5
+    assert (np.abs(np.linalg.norm(points[found] - 11.5, axis=1) - 8) < 0.05).all()
+
+
+def test_whole_numbers_that_equal_the_level_make_a_surface():
+    x, y, z = lattice()
+    values = np.round(10 - np.sqrt(x**2 + y**2 + 2 * z**2))
+    oracle = OfGrid(values, box_of(values), level=3)
+    points, found = closest(oracle, np.random.default_rng(1).uniform(0, 23, (100, 3)))
+    away = points[found] - 11.5
+    assert found.mean() > 0.5
+    assert np.abs(np.sqrt((away**2 * [1, 1, 2]).sum(axis=1)) - 7).max() < 1
+
+
+def test_a_surface_that_leaves_the_grid_is_told_with_what_to_type():
+    values = ball(radius=12.0)
+    with pytest.raises(
+        stellate.InvalidArgument, match="leaves the grid through its border"
+    ) as told:
+        OfGrid(values, box_of(values))
+    place = [float(n) for n in str(told.value).split("near [")[1].split("]")[0].split(",")]
+    assert any(side in (0.0, 23.0) for side in place)
+    assert 'border="open"' in str(told.value) and "np.pad" in str(told.value)
+
+
+def test_an_open_border_is_clipped():
+    values = ball(radius=12.0)
+    box = box_of(values)
+    oracle = oracles.Clipped(OfGrid(values, box, border="open"), box=box)
+    sides = np.random.default_rng(1).uniform(0, 23, (200, 3))
+    sides[:, 0] = 0.0  # where it is met
+    points, found = closest(oracle, sides)
+    assert found.mean() > 0.9
+    assert np.abs(np.linalg.norm(points[found] - 11.5, axis=1) - 12).max() < 0.03
+    with pytest.raises(stellate.InvalidArgument, match="'closed' or 'open'"):
+        OfGrid(values, box, border="clip")
+
+
+@pytest.mark.parametrize("level", [0.5, 0.3])
+def test_two_valued_data_is_told_and_smoothed(level):
+    mask = ball() < 0
+    for values in (mask, mask.astype(float), mask.astype(np.uint8)):
+        with pytest.raises(stellate.InvalidArgument, match=r"labels and masks.*smooth=1.5"):
+            OfGrid(values, box_of(values), level=level)
+    smooth = radii(OfVolume(mask, smooth=1.5))
+    assert np.abs(smooth - (8 - 1.5**2 / 8)).max() < 0.15
+
+
+def test_labels_are_told():
+    labels = np.where(ball() < 0, 3, np.where(ball(radius=11) < 0, 7, 12))
+    with pytest.raises(stellate.InvalidArgument, match="labels and masks"):
+        OfVolume(labels, level=5)
+    assert np.abs(radii(OfVolume(labels == 3, smooth=1.5)) - 8).max() < 0.4
+
+
+def test_a_volume_lies_where_its_voxels_are():
+    values = ball()
+    oracle = OfVolume(values, spacing=[0.5, 0.25, 2], origin=[-1, 0, 4])
+    assert oracle.resolution == 2
+    lower, upper = oracle.bounding_box
+    assert lower.tolist() == [-1, 0, 4] and upper.tolist() == [10.5, 5.75, 50]
+    middle = (lower + upper) / 2
+    away = (oracle.closest_point(middle + [[3.0, 0, 0], [0, 3.0, 0]]) - middle) / [0.5, 0.25, 2]
+    assert np.abs(np.linalg.norm(away, axis=1) - 8).max() < 0.01
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        ({"spacing": [1, 2]}, "one number or 3"),
+        ({"spacing": 0}, "spacing has to be positive"),
+        ({"smooth": -1}, "smooth not negative"),
+        ({"level": 99}, "no set of level 99"),
+    ],
+)
+def test_a_volume_that_makes_no_sense_is_refused(options, words):
+    with pytest.raises(stellate.InvalidArgument, match=words):
+        OfVolume(ball(), **options)
+
+
+def test_numbers_in_single_precision_are_data_like_others():
+    values = ball()
+    single = OfGrid(values.astype(np.float32), box_of(values))
+    assert np.abs(radii(single) - radii(OfGrid(values, box_of(values)))).max() < 1e-5
