@@ -19,8 +19,9 @@ constexpr double kGrowth = 2;         // of chunks, at most
 constexpr double kFastGrowth = 8;     // of chunks whose queries take less than this share:
 constexpr double kFast = 0.1;
 constexpr double kTellingSize =
-    4;                           // a chunk that was cut so much smaller tells little of the pace,
-constexpr double kSurprise = 2;  // unless it took this many times what it should have
+    4;                             // a chunk that was cut so much smaller tells little of the pace,
+constexpr double kComparable = 2;  // so many times as large a chunk is forgotten for it
+constexpr double kSurprise = 2;    // unless it took this many times what it should have
 
 }  // namespace
 
@@ -55,11 +56,15 @@ double Pace::FullChunk() const {
 }
 
 void Pace::Answered(const Chunk& chunk) {
+  // One that travelled while another was answered seems to have taken nothing for it.
+  const bool overlapped = chunk.queued && kSurprise * chunk.seconds < Seconds(chunk.queries);
+  const bool dearer = chunk.seconds * largest_.queries > largest_.seconds * chunk.queries;
+  if ((!chunk.queued || dearer) && kComparable * chunk.queries >= largest_.queries) {
+    largest_ = chunk;
+  }
   const bool telling = !chunk.cut || !SizesDiffer() || kTellingSize * chunk.queries >= Largest() ||
                        chunk.seconds > kSurprise * Seconds(chunk.queries);
   if (!telling) return;
-  // One that travelled while another was answered seems to have taken nothing for it.
-  const bool overlapped = chunk.queued && kSurprise * chunk.seconds < Seconds(chunk.queries);
   if (!overlapped) {
     newest_.push_back(chunk);
     Fit();
@@ -102,6 +107,12 @@ void Pace::Fit() {
   }
   fixed_ = std::max(line_fixed_ - Doubt(sum_nn, determinant), 0.0);
   each_ = std::max((sum_nt - fixed_ * sum_n) / sum_nn, 0.0);
+  // No query takes more than its share of the largest chunk: what small ones took beyond is theirs,
+  // however it scatters.
+  const double share = std::max(largest_.seconds, kShortest) / largest_.queries;
+  if (each_ <= share) return;
+  each_ = share;
+  fixed_ = std::max(fixed_, (sum_t - each_ * sum_n) / sum);
 }
 
 // The standard error of the line's fixed cost, by how the chunks scatter about it.

@@ -13,6 +13,10 @@ namespace stellate::server {
 // of them looks fixed. Where all chunks are of one size nothing can be seen of it: then it is what
 // it was held to be, at first nothing.
 //
+// A query is held to take no more than its share of the largest chunk, however long ago that was:
+// of small ones, whose times scatter by what is asked, no line tells that a call takes long
+// whatever it holds.
+//
 // A worker begins with one query. While the queries take far less than they may, a chunk may be
 // eight times the largest before, else twice.
 class Pace {
@@ -56,6 +60,7 @@ class Pace {
 
   Aim aim_;
   std::deque<Chunk> newest_;               // the newest last
+  Chunk largest_;                          // of all, or a later one of half its size or more
   double line_fixed_ = 0, line_each_ = 0;  // of the line
   double fixed_ = 0, each_ = 0;            // with what is believed of it
   double reach_ = 1;                       // the most that it has shown itself fit for

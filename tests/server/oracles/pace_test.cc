@@ -63,6 +63,23 @@ TEST(Pace, ChunksCutShortTellLittle) {
   EXPECT_EQ(pace.FullChunk(), full);
 }
 
+// A call takes long whatever it holds, now more, now less; most rounds have two queries to ask.
+TEST(Pace, OneLargeChunkTellsWhatManySmallOnesDoNot) {
+  for (const double spread : {0.5, 1.0, 1.5}) {
+    Pace pace(kAim);
+    std::mt19937 random(3);
+    std::lognormal_distribution<double> factor(0, spread);
+    int small = 0;
+    for (int i = 0; i < 300; ++i) {
+      const double full = std::floor(pace.FullChunk());
+      const double n = std::min(full, i % 40 == 39 ? 2000.0 : 2.0);
+      pace.Answered({n, 0.06 * factor(random) + 1e-4 * n, n < full});
+      if (i > 40 && full < 100) ++small;
+    }
+    EXPECT_LT(small, 150) << spread;
+  }
+}
+
 TEST(Pace, APauseBeforeTheFirstAnswerIsForgotten) {
   Pace pace(kAim);
   pace.Answered({1, 5});  // it was started, or compiled, or licensed
