@@ -34,6 +34,7 @@ REMOTE, ADDRESS = "mesh.example.org", "127.0.0.2"
 TOKEN = "0123456789abcdef" * 4
 MAKE_MESH = str(pathlib.Path(__file__).resolve().parent / "make_mesh.py")
 _ALONE = "STELLATE_DOCS_ALONE"
+_OURS = ("STELLATED", "STELLATE")  # variables that name a program
 
 
 def go_alone() -> None:
@@ -75,8 +76,10 @@ class Surroundings:
         for path, name in page.table.get("paths", {}).items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             self.paths[path] = str(folder / name)
-        self._grow_tree(fresh=page.table.get("fresh", False))
         self._service = page.table.get("service", False)
+        # Of a fresh tree nothing is on PATH but what a page puts into the system.
+        self._on_path = self._service or not page.table.get("fresh", False)
+        self._grow_tree(fresh=page.table.get("fresh", False))
         if self._service:
             stand_in = pathlib.Path(__file__).resolve().parent / "systemctl"
             (folder / ".programs" / "systemctl").symlink_to(stand_in)
@@ -100,8 +103,9 @@ class Surroundings:
         programs = self.here / ".programs"
         programs.mkdir()
         built = self.here / "build" / "release" / "bin"
-        for name in ("stellated", "stellate"):
-            (programs / name).symlink_to(BUILD / "bin" / name)
+        if self._on_path:
+            for name in ("stellated", "stellate"):
+                (programs / name).symlink_to(BUILD / "bin" / name)
         # Debian's python3, which has the packages that we ask for.
         (programs / "python3").symlink_to("/usr/bin/python3")
         if fresh:
@@ -113,15 +117,16 @@ class Surroundings:
 
     def environment(self) -> dict[str, str]:
         """Of the blocks."""
+        inherited = {name: value for name, value in os.environ.items() if name not in _OURS}
         return {
-            **os.environ,
+            **inherited,
             "PATH": f"{self.here}/.programs:{os.environ['PATH']}:/usr/sbin",
             "PYTHONPATH": str(self.here / "clients" / "python"),
             "PYTHONDONTWRITEBYTECODE": "1",
             "HOME": str(self.here),
             "TMPDIR": str(self.here),
             "MPLBACKEND": "Agg",
-            "STELLATED": str(BUILD / "bin" / "stellated"),
+            **({"STELLATED": str(BUILD / "bin" / "stellated")} if self._on_path else {}),
             "STELLATE_BUILD": str(BUILD),
             "token": TOKEN,
             **({"here": str(self.here), "DESTDIR": f"{self.here}/root"} if self._service else {}),

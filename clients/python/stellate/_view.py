@@ -51,7 +51,7 @@ def find_stellate() -> str:
             return path
     raise ViewerNotFound(
         "the viewer is part of the command line `stellate`, which was not found: set $STELLATE to "
-        "it, or put it on PATH; clients/quickstart builds it"
+        "it, or put it on PATH; clients/quickstart --all builds it"
     )
 
 
