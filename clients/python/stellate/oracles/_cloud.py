@@ -9,9 +9,11 @@ import numpy as np
 
 from .._rows import Array, Flags, apply, norms, product, transposed
 from ..errors import InvalidArgument
+from ._bandwidth import Fits, by_density, noise_aware
 from ._common import Projection, as_points, box_around, tree_of
 
 _ITERATIONS = 100
+_LOOKS = 400  # points at which fits are looked at, for how far neighbours should reach
 _BLOCK = 2048  # queries at a time, which bounds what their neighbours take
 
 
@@ -21,12 +23,15 @@ class PointCloud(Projection):
     Args:
       points: (n, d). They have to lie on all of the manifold, at distances well below its reach.
       dimension: k.
-      bandwidth: how far the neighbours of a place reach; by default twice the distance within
-        which nearly all points have 2 k + 3 others. Smoother when larger; sheets have to be farther apart.
+      bandwidth: how far points are neighbours of a place. By default each point has one of its own:
+        twice the distance within which it and those about it have 2 k + 3 others, or what it takes
+        for noise to add no more than a tenth to the curvature. Smoother when larger; sheets have to
+        be farther apart. repr() tells what it is.
 
     The manifold is where the least-squares quadric through a place's neighbours, weighted by how near
     they are, goes through the place itself. `residual` is how far the points are from the manifold, 95 in
-    100 of them: the noise, and what the quadric does not follow. Needs scipy.
+    100 of them: the noise, and what the quadric does not follow. `bandwidths` (n,) are the points' own,
+    `bandwidth` their median. Needs scipy.
 
     The manifold is a smoothed one. Where the points' noise is s, it lies within about s of the one
     that they were taken from, plus bandwidth^3 times the change of its curvature; an epsilon below
@@ -50,12 +55,15 @@ class PointCloud(Projection):
             )
         self._tree = tree_of(self._points)
         if bandwidth is None:
-            some = self._points[:: max(1, n // 2000)]
-            away, _ = self._tree.query(some, k=min(n, 2 * dimension + 4))
-            bandwidth = 2.0 * float(np.quantile(away[:, -1], 0.95))
-        if not (np.isfinite(bandwidth) and bandwidth > 0):
+            some = self._points[:: max(1, n // _LOOKS)]
+            self._reach(by_density(self._tree, self._points, dimension))
+            self._reach(
+                noise_aware(self.bandwidths, dimension, lambda w: self._reach(w)._fits(some))
+            )
+        elif not (np.isfinite(bandwidth) and bandwidth > 0):
             raise InvalidArgument(f"bandwidth has to be positive, and is {bandwidth!r}")
-        self.bandwidth = float(bandwidth)
+        else:
+            self._reach(np.full(n, float(bandwidth)))
         self.bounding_box = box_around(self._points, 0.02)
         some = self._points[:: max(1, n // 500)]
         nearest, _, found = self._project(some)
@@ -64,6 +72,25 @@ class PointCloud(Projection):
                 f"no point has enough neighbours within {self.bandwidth:g}: a larger bandwidth?"
             )
         self.residual = float(np.quantile(norms(nearest - some)[found], 0.95))
+
+    def __repr__(self) -> str:
+        low, high = float(self.bandwidths.min()), float(self.bandwidths.max())
+        local = f" ({low:.3g} to {high:.3g})" if low < high else ""
+        return (
+            f"{type(self).__name__}({len(self._points):,} points of R^{self.ambient_dimension}, dimension "
+            f"{self.dimension}, bandwidth {self.bandwidth:.3g}{local}, residual {self.residual:.2g})"
+        )
+
+    def _reach(self, bandwidths: Array) -> PointCloud:
+        """Gives the points bandwidths, and each octave of these a tree of its own, to search as far."""
+        self.bandwidths, self.bandwidth = bandwidths, float(np.median(bandwidths))
+        octave = np.floor(2 * np.log2(bandwidths / bandwidths.min()))
+        self._octaves = []
+        for one in np.unique(octave):
+            members = np.flatnonzero(octave == one)
+            reach = float(bandwidths[members].max())
+            self._octaves.append((members, tree_of(self._points[members]), reach))
+        return self
 
     def _project(self, x: Array) -> tuple[Array, Array, Flags]:
         parts = [self._project_block(x[i : i + _BLOCK]) for i in range(0, len(x), _BLOCK)]
@@ -74,9 +101,10 @@ class PointCloud(Projection):
 
     def _project_block(self, x: Array) -> tuple[Array, Array, Flags]:
         """To where the quadric about a place goes through it, and the way to x is normal to it."""
-        y = np.empty_like(x)
+        y, reach = np.empty_like(x), np.empty(len(x))
         if len(x):
-            y = self._points[self._tree.query(x)[1]].copy()
+            nearest = self._tree.query(x)[1]
+            y, reach = self._points[nearest].copy(), self.bandwidths[nearest]
         bases = np.zeros((len(x), self.ambient_dimension, self.dimension))
         alive, found = np.ones(len(x), dtype=bool), np.zeros(len(x), dtype=bool)
         for _ in range(_ITERATIONS):
@@ -87,32 +115,64 @@ class PointCloud(Projection):
             alive[rows[~enough]] = False
             rows, quadric = rows[enough], quadric.of(enough)
             step = quadric.towards(x[rows])
-            longest = 0.5 * self.bandwidth
+            longest = 0.5 * reach[rows]
             step *= (longest / np.maximum(norms(step), longest))[:, None]
             there = quadric.place + step
-            found[rows[norms(there - y[rows]) <= 1e-11 * self.bandwidth]] = True
+            found[rows[norms(there - y[rows]) <= 1e-11 * reach[rows]]] = True
             y[rows], bases[rows] = there, quadric.tangents
         return y, bases, found
 
     def _neighbours(self, places: Array) -> tuple[Any, Any, Array]:
         """For all pairs: the place's number, the point's, and the weight; places ascend."""
-        lists = self._tree.query_ball_point(places, self.bandwidth, return_sorted=True)
-        counts = np.fromiter(map(len, lists), dtype=np.intp, count=len(lists))
-        points = np.fromiter(itertools.chain.from_iterable(lists), np.intp, count=counts.sum())
-        owners = np.repeat(np.arange(len(places)), counts)
-        share = norms(self._points[points] - places[owners]) / self.bandwidth
-        return owners, points, (1 - share) ** 4 * (4 * share + 1)  # Wendland's, twice smooth
+        owners, points = [], []
+        for members, tree, reach in self._octaves:
+            lists = tree.query_ball_point(places, reach, return_sorted=True)
+            counts = np.fromiter(map(len, lists), dtype=np.intp, count=len(lists))
+            near = np.fromiter(itertools.chain.from_iterable(lists), np.intp, count=counts.sum())
+            owners.append(np.repeat(np.arange(len(places)), counts))
+            points.append(members[near])
+        owner, point = np.concatenate(owners), np.concatenate(points)
+        share = norms(self._points[point] - places[owner]) / self.bandwidths[point]
+        order = np.lexsort((point, owner))
+        order = order[share[order] < 1]
+        u = 1 - share[order]
+        u2 = u * u
+        return owner[order], point[order], u2 * u2 * (5 - 4 * u)  # Wendland's, twice smooth
 
-    def _quadric(self, places: Array) -> tuple[_Quadric, Flags]:
-        """The least-squares quadric about each place, over the plane through its neighbours, and
-        where there are neighbours enough."""
+    def _fits(self, some: Array) -> Fits:
+        """What the quadrics at some of the points are like."""
+        fit = self._fit(some)
+        k, terms = self.dimension, fit.terms
+        off = fit.heights - apply(transposed(fit.solution)[fit.owners], terms)
+        squares = _sums(fit.weights[:, None] * off * off, fit.owners, len(some)).sum(axis=1)
+        twice = (fit.weights * fit.weights)[:, None, None] * terms[:, :, None] * terms[:, None, :]
+        inverse = np.linalg.inv(fit.system)
+        errors = product(product(inverse, _sums(twice, fit.owners, len(some))), inverse)
+        total = np.maximum(_sums(fit.weights, fit.owners, len(some)), 1e-300)
+        # As many neighbours as the weights are worth, less the quadric's own freedom.
+        worth = total**2 / _sums(fit.weights * fit.weights, fit.owners, len(some))
+        free = np.maximum(1 - terms.shape[1] / np.maximum(worth, 1.0), 0.1)
+        noise = np.sqrt(squares / total / free / (self.ambient_dimension - k))
+        bend = np.sqrt((fit.solution[:, 1 + k :] ** 2).sum(axis=(1, 2)))
+        pure = np.diagonal(errors, axis1=1, axis2=2)[:, 1 + k :].sum(axis=1)
+        pure = pure * (self.ambient_dimension - k)
+        usable = fit.enough & np.isfinite(pure)
+        return Fits(
+            (2 * bend / fit.scale)[usable],
+            (2 * noise * np.sqrt(np.maximum(pure, 0)) / fit.scale)[usable],
+        )
+
+    def _fit(self, places: Array) -> _Fit:
+        """The least-squares quadric about each place, over the plane through its neighbours."""
         owners, points, weights = self._neighbours(places)
         count, k = len(places), self.dimension
         first, second = np.triu_indices(k)
         enough = _sums(np.ones_like(weights), owners, count) >= 1 + k + len(first)
-        away = (self._points[points] - places[owners]) / self.bandwidth
-        weighted = weights[:, None] * away
         total = np.maximum(_sums(weights, owners, count), 1e-300)
+        scale = _sums(weights * self.bandwidths[points], owners, count) / total
+        scale = np.where(scale > 0, scale, self.bandwidth)  # where there are no neighbours
+        away = (self._points[points] - places[owners]) / scale[owners][:, None]
+        weighted = weights[:, None] * away
         middle = _sums(weighted, owners, count) / total[:, None]
         spread = _sums(weighted[:, :, None] * away[:, None, :], owners, count)
         spread -= total[:, None, None] * middle[:, :, None] * middle[:, None, :]
@@ -128,12 +188,35 @@ class PointCloud(Projection):
         # weights that is far below what noise does.
         system += (1e-10 * total[:, None, None] + 1e-300) * np.eye(terms.shape[1])
         solution = np.linalg.solve(system, right)
-        bend = np.empty((count, k, k, across.shape[2]))
-        bend[:, first, second] = bend[:, second, first] = solution[:, 1 + k :]
+        return _Fit(owners, weights, terms, heights, system, solution, along, across, scale, enough)
+
+    def _quadric(self, places: Array) -> tuple[_Quadric, Flags]:
+        """The quadric about each place, and where there are neighbours enough for it."""
+        fit, k = self._fit(places), self.dimension
+        first, second = np.triu_indices(k)
+        bend = np.empty((len(places), k, k, fit.across.shape[2]))
+        bend[:, first, second] = bend[:, second, first] = fit.solution[:, 1 + k :]
         bend[:, np.arange(k), np.arange(k)] *= 2
-        tangents, _ = np.linalg.qr(along + product(across, transposed(solution[:, 1 : 1 + k])))
-        place = places + self.bandwidth * apply(across, solution[:, 0])
-        return _Quadric(place, tangents, along, across, bend / self.bandwidth), enough
+        slopes = transposed(fit.solution[:, 1 : 1 + k])
+        tangents, _ = np.linalg.qr(fit.along + product(fit.across, slopes))
+        place = places + fit.scale[:, None] * apply(fit.across, fit.solution[:, 0])
+        bend /= fit.scale[:, None, None, None]
+        return _Quadric(place, tangents, fit.along, fit.across, bend), fit.enough
+
+
+class _Fit(NamedTuple):
+    """Least squares about places: of pairs with their neighbours (m,), and of the places (n,)."""
+
+    owners: Any  # (m,), the place's number
+    weights: Array  # (m,)
+    terms: Array  # (m, t), of a quadric, in lengths of `scale`
+    heights: Array  # (m, d - k), over the plane
+    system: Array  # (n, t, t)
+    solution: Array  # (n, t, d - k)
+    along: Array  # (n, d, k), the plane
+    across: Array  # (n, d, d - k)
+    scale: Array  # (n,), the length of the neighbours' bandwidths
+    enough: Flags  # (n,), where neighbours determine a quadric
 
 
 class _Quadric(NamedTuple):

@@ -1,0 +1,67 @@
+"""How far the neighbours of each point of a cloud should reach, for quadrics to be fitted to them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .._rows import Array
+
+_ROUNDS = 12  # of bandwidths from noise, and noise from fits of these bandwidths
+_SETTLED = 0.02  # a share: no round that changes them by less is followed by another
+# Of the curvature, what noise may make of it: tangents and reach are as good then as of exact points.
+_NOISE_SHARE = 0.1
+_LEAST = 0.1  # of the curvature that is seen: no less is left of it by the noise
+_GROWTH = 1.5  # of a bandwidth in a round
+_WIDEST = 0.5  # of the smallest radius of curvature: a quadric follows no more of a surface
+
+
+class Fits(NamedTuple):
+    """Of the quadrics at some points of the cloud, all (n,)."""
+
+    bend: Array  # their largest curvature
+    bend_error: Array  # what the noise makes of it, a standard deviation
+
+
+def by_density(tree: Any, points: Array, dimension: int) -> Array:
+    """(n,): twice the distance within which a point, and those about it, have 2 k + 3 others."""
+    count = min(len(points), 2 * dimension + 4)
+    away, near = tree.query(points, k=count)
+    return np.asarray(2.0 * away[:, -1][near].max(axis=1))
+
+
+def noise_aware(widths: Array, dimension: int, fit: Callable[[Array], Fits]) -> Array:
+    """The bandwidths (n,) by density, wider where noise would make the surface bend more than it does.
+
+    The error of a curvature falls with the width w as w^-(2 + k/2), for there are w^k more points.
+
+    Args:
+      fit: what quadrics of given bandwidths are like.
+    """
+    wider = widths
+    fall = 2 + dimension / 2
+    for _ in range(_ROUNDS):
+        seen = fit(wider)
+        # What is left of the curvatures that are seen without what noise adds to them.
+        true = np.sqrt(np.maximum(seen.bend**2 - seen.bend_error**2, 0))
+        bend = max(float(np.median(true)), _LEAST * float(np.median(seen.bend)), 1e-300)
+        # What the error is at each point: as of the usual one, but for how many neighbours it has there.
+        relative = float(np.median(seen.bend_error)) / (_NOISE_SHARE * bend)
+        usual = float(np.median(wider))
+        at = (
+            relative
+            * (usual / wider) ** 2
+            * (usual / wider * widths / np.median(widths)) ** (dimension / 2)
+        )
+        wished = np.maximum(wider * at ** (1 / fall), widths)
+        # What is bent more than the noise can have made it, by two deviations.
+        surely = np.sqrt(np.maximum(seen.bend**2 - 4 * seen.bend_error**2, 0))
+        most = np.minimum(_GROWTH * wider, _WIDEST / max(float(np.quantile(surely, 0.9)), bend))
+        wished = np.maximum(np.minimum(wished, most), widths)
+        change = float(np.abs(wished / wider - 1).max())
+        wider = wished
+        if change < _SETTLED:
+            break
+    return wider

@@ -1,0 +1,68 @@
+"""Clouds of points: how far their neighbours reach, by density and by noise."""
+
+import numpy as np
+import pytest
+import stellate
+from ready_shapes import TORUS, TURN, closest, torus_map
+from stellate import oracles
+
+
+def scan(count, noise, crowding=1):
+    """At random places of a torus, closer together towards one of its meridians."""
+    random = np.random.default_rng(1)
+    u = random.random((count, 2))
+    u[:, 0] **= crowding
+    return torus_map(TURN * u) + random.normal(0, noise, (count, 3))
+
+
+def errors(cloud, count=60):
+    """How far its points are from the torus, and how its tangents turn from the torus', in degrees."""
+    x = TORUS.closest_point(np.random.default_rng(2).uniform(-1.4, 1.4, (count, 3)) * [1, 1, 0.3])
+    y, found = closest(cloud, x)
+    assert found.all()
+    near = TORUS.closest_point(y)
+    ours, theirs = cloud.tangent_basis(y), TORUS.tangent_basis(near)
+    cosines = np.linalg.svd(ours.transpose(0, 2, 1) @ theirs, compute_uv=False)[:, -1]
+    turned = np.degrees(np.arccos(np.clip(cosines, 0, 1)))
+    return np.linalg.norm(y - near, axis=1).max(), turned.max()
+
+
+def test_more_points_of_one_scan_are_no_worse():
+    few, many = (oracles.PointCloud(scan(count, 0.003), 2) for count in (8000, 80000))
+    (off, turned), (many_off, many_turned) = errors(few), errors(many)
+    assert many_off < off and many_off < 0.003
+    assert many_turned < turned and many_turned < 3
+    assert few.bandwidths.min() < 1.1 * few.bandwidth
+    # As far as the noise takes, five times as far as twice the seventh neighbour.
+    spacing = np.sqrt(15.8 / 80000)
+    assert many.bandwidth > 5 * spacing
+
+
+def test_an_uneven_cloud_has_as_many_neighbours_everywhere():
+    points = scan(8000, 0, crowding=3)
+    cloud = oracles.PointCloud(points, 2)
+    low, high = np.quantile(cloud.bandwidths, [0.02, 0.98])
+    assert high > 4 * low
+    owners, _, _ = cloud._neighbours(points[::20])
+    counts = np.bincount(owners, minlength=len(points[::20]))
+    assert counts.min() >= 6
+    assert counts.max() < 300  # of 8,000, which one bandwidth for all would make thousands of
+    off, turned = errors(cloud)
+    assert off < 0.01 and turned < 5
+    x = points[:40] + 0.01
+    together, found = closest(cloud, x)
+    for rows in np.array_split(np.arange(40), 6):
+        apart, here = closest(cloud, x[rows])
+        assert (here == found[rows]).all() and (apart[here] == together[rows][here]).all()
+
+
+def test_a_bandwidth_that_is_given_is_everybodys():
+    cloud = oracles.PointCloud(scan(4000, 0.003), 2, bandwidth=0.25)
+    assert cloud.bandwidth == 0.25 and (cloud.bandwidths == 0.25).all()
+    with pytest.raises(stellate.InvalidArgument, match="bandwidth has to be positive"):
+        oracles.PointCloud(scan(400, 0), 2, bandwidth=0)
+
+
+def test_a_cloud_says_how_far_its_neighbours_reach():
+    said = repr(oracles.PointCloud(scan(4000, 0.003), 2))
+    assert "4,000 points of R^3" in said and "bandwidth 0." in said and "residual 0.00" in said
