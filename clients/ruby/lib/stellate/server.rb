@@ -47,15 +47,16 @@ module Stellate
     attr_reader :address
 
     # Starts it, and returns when it listens: on a unix socket that only this user may enter, or at
-    # `listen`. `flags` are more of stellated's. With a block it is closed afterwards.
-    def self.start(*flags, listen: nil, binary: Stellate.find_stellated, &)
+    # `listen`. `flags` are more of stellated's. With a block it is closed afterwards. (The block has a
+    # name since Ruby 3.1 forwards none without where there are keywords.)
+    def self.start(*flags, listen: nil, binary: Stellate.find_stellated, &block)
       own = OWN_FLAGS + (listen ? [] : PRIVATE_FLAGS)
-      closing(new([binary], listen, own + flags), &)
+      closing(new([binary], listen, own + flags), &block)
     end
 
     # The doctor, to which an oracle is served as to a server: see Stellate.check.
-    def self.start_doctor(&)
-      closing(new([Stellate.find_stellate, 'doctor'], nil, []), &)
+    def self.start_doctor(&block)
+      closing(new([Stellate.find_stellate, 'doctor'], nil, []), &block)
     end
 
     # The server, or, with a block, what that makes of it before it is closed.
