@@ -107,4 +107,4 @@ def made_secrets() -> set[str]:
     """The files that docker/make-secrets makes."""
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([ROOT / "docker" / "make-secrets", folder], check=True, capture_output=True)
-        return {file.name for file in pathlib.Path(folder).iterdir()}
+        return {file.name for file in pathlib.Path(folder).iterdir() if file.is_file()}

@@ -358,15 +358,20 @@ class Pins(unittest.TestCase):
             self.assertFalse((self.folder / ".env").exists(), says)
 
 
+def files_of(folder: pathlib.Path) -> dict[str, bytes]:
+    """What `kubectl create secret generic --from-file` takes of a folder: its files, no folders."""
+    return {file.name: file.read_bytes() for file in folder.iterdir() if file.is_file()}
+
+
 class Secrets(unittest.TestCase):
     def test_what_is_there_is_kept_and_private(self) -> None:
         with tempfile.TemporaryDirectory() as scratch:
             folder = pathlib.Path(scratch) / "secrets"
             command = [ROOT / "docker/make-secrets", folder, "--name", "mesh.example.org", "ada"]
             subprocess.run(command, check=True, capture_output=True)
-            before = {file.name: file.read_bytes() for file in folder.iterdir()}
+            before = files_of(folder)
             subprocess.run([*command, "ben"], check=True, capture_output=True)
-            after = {file.name: file.read_bytes() for file in folder.iterdir()}
+            after = files_of(folder)
             self.assertEqual(after.keys() - before.keys(), {"ben.token"})
             self.assertEqual({n for n in before if before[n] != after[n]}, {"tokens"})
             self.assertEqual(folder.stat().st_mode & 0o077, 0, "nobody else gets into the folder")
@@ -375,6 +380,22 @@ class Secrets(unittest.TestCase):
                 capture_output=True, text=True,
             ).stdout  # fmt: skip
             self.assertIn("DNS:mesh.example.org", names)
+
+    def test_what_goes_to_a_cluster_signs_nothing(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run([ROOT / "docker/make-secrets", folder], check=True, capture_output=True)
+            authority = pathlib.Path(folder, "ca.pem").read_text()
+            self.assertIn("server.key", files_of(pathlib.Path(folder)))
+            for name, content in files_of(pathlib.Path(folder)).items():
+                if b"PRIVATE KEY" in content:
+                    public = subprocess.run(
+                        ["openssl", "pkey", "-pubout"], input=content, capture_output=True, check=True
+                    ).stdout.decode()
+                    signs = subprocess.run(
+                        ["openssl", "x509", "-noout", "-pubkey"],
+                        input=authority, capture_output=True, text=True, check=True,
+                    ).stdout  # fmt: skip
+                    self.assertNotEqual(public, signs, f"{name} is the authority's")
 
 
 if __name__ == "__main__":
