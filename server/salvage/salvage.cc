@@ -222,7 +222,8 @@ std::string Summary(JournalFile* file) {
   for (const auto& [id, mesh] : file->TakeMeshes()) {
     if (!mesh.removed) ++(mesh.end.empty() ? unfinished : finished);
   }
-  return Message(finished, " finished meshes, ", unfinished, " to go on");
+  return Message(finished, finished == 1 ? " finished mesh, " : " finished meshes, ", unfinished,
+                 " to go on");
 }
 
 // In a directory of their own, the first that is not there. As links: a new journal takes their
