@@ -3,14 +3,13 @@
 //   TARGET [--runs N] [--seconds S] [--seed N]    mutations, by number or by time
 //   TARGET FILE...                                these inputs, e.g. one that libFuzzer kept
 
-#include <algorithm>
 #include <chrono>
 #include <cstring>
 #include <fstream>
 #include <iterator>
-#include <random>
 
 #include "tests/fuzz/target.h"
+#include "tests/support/mutator.h"
 
 extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv);
 
@@ -22,55 +21,6 @@ using Clock = std::chrono::steady_clock;
 void Run(const std::string& input) {
   LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(input.data()), input.size());
 }
-
-class Mutator {
- public:
-  Mutator(std::vector<std::string> seeds, unsigned seed)
-      : seeds_(std::move(seeds)), random_(seed) {}
-
-  std::string Next() {
-    std::string input = Pick();
-    for (auto edits = 1 + Below(8); edits > 0; --edits) Edit(&input);
-    return input;
-  }
-
- private:
-  std::size_t Below(std::size_t n) { return n == 0 ? 0 : random_() % n; }
-  const std::string& Pick() { return seeds_[Below(seeds_.size())]; }
-
-  void Edit(std::string* input) {
-    const std::size_t at = Below(input->size() + 1);
-    const std::size_t length = Below(std::min<std::size_t>(input->size() - at, 64) + 1);
-    switch (Below(7)) {
-      case 0:
-        if (at < input->size()) (*input)[at] = static_cast<char>(random_());
-        break;
-      case 1:
-        if (at < input->size()) (*input)[at] ^= static_cast<char>(1 << Below(8));
-        break;
-      case 2:
-        input->insert(at, 1 + Below(8), static_cast<char>(random_()));
-        break;
-      case 3:
-        input->erase(at, length);
-        break;
-      case 4:
-        input->insert(at, input->substr(at, length));
-        break;
-      case 5: {
-        const std::string& other = Pick();
-        input->insert(at, other.substr(Below(other.size()), 64));
-        break;
-      }
-      case 6:  // what lengths and counts go wrong at
-        input->replace(at, length, Below(2) == 0 ? 4 : 8, Below(2) == 0 ? '\xff' : '\x7f');
-        break;
-    }
-  }
-
-  const std::vector<std::string> seeds_;
-  std::mt19937 random_;
-};
 
 int RunFiles(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) {
@@ -99,7 +49,7 @@ int main(int argc, char** argv) {
   }
   const std::vector<std::string> seeds = Seeds();
   for (const std::string& input : seeds) Run(input);
-  Mutator mutator(seeds, seed);
+  stellate::testing::Mutator mutator(seeds, seed);
   const auto begin = Clock::now();
   const auto more = [&](long done) {
     if (seconds > 0) return Clock::now() - begin < std::chrono::duration<double>(seconds);

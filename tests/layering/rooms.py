@@ -148,7 +148,7 @@ def in_package(name: str) -> str:
 
 CLIENTS = {
     "clients/cpp/include": (),
-    "clients/cpp/oracles": ("clients/cpp/include",),
+    "clients/cpp/oracles": ("clients/cpp/include", "clients/cpp/pipe"),
     "clients/cpp/doctor": ("clients/cpp/include",),
     "clients/cpp/pipe": ("clients/cpp/include",),
     "clients/cpp/mesh": ("clients/cpp/include",),
@@ -210,7 +210,6 @@ TABLE = Table(
         ),
         "sqlite3.h": ("server/storage", "tests/server"),
         "nanoflann.hpp": ("clients/cpp/oracles",),
-        "CGAL/": ("clients/cpp/oracles",),
         "boost/": ("clients/view/gateway",),  # the viewer's sockets, and nothing else
     },
     generated={"stellate/v1/": "proto", "stellate/rpc/": "proto"},

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
@@ -13,6 +16,8 @@ from ._cloud import PointCloud
 from ._common import as_points
 
 _MOST_POINTS = 5_000_000
+# For meshio to begin on a busy machine, and to read: ten times what its slowest formats take.
+_SECONDS, _SECONDS_A_MB = 20, 20
 
 
 class TriangleMesh(PointCloud):
@@ -84,17 +89,40 @@ def _read(source: Any, triangles: Any) -> tuple[Any, Any]:
         return source.points, source.simplices
     if not isinstance(source, (str, os.PathLike)):
         raise InvalidArgument("TriangleMesh takes a file, points with triangles, or a mesh")
-    import meshio
+    return _read_file(os.fspath(source))
 
+
+def _read_file(path: str) -> tuple[Any, Any]:
+    begin = f"{path!r} cannot be read as a mesh: "
+    if not os.path.isfile(path):  # a device or a pipe may have no end
+        raise InvalidArgument(begin + "it is not there, or no file")
+    seconds = _SECONDS + _SECONDS_A_MB * os.path.getsize(path) / 1e6
+    reader = os.path.join(os.path.dirname(__file__), "_read_file.py")
     try:
-        mesh = meshio.read(source)
-    except (OSError, meshio.ReadError, SystemExit) as error:
-        raise InvalidArgument(f"{os.fspath(source)!r} cannot be read as a mesh: {error}") from None
-    if "triangle" not in mesh.cells_dict:
-        raise InvalidArgument(
-            f"{os.fspath(source)!r} has no triangles, but {sorted(mesh.cells_dict) or 'nothing'}"
+        run = subprocess.run(
+            [sys.executable, reader, os.path.abspath(path)],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=seconds,
+            env={
+                **os.environ,
+                "PYTHONPATH": os.pathsep.join(sys.path),
+                "OPENBLAS_NUM_THREADS": "1",
+            },
         )
-    return mesh.points, mesh.cells_dict["triangle"]
+    except subprocess.TimeoutExpired:
+        raise InvalidArgument(
+            begin + f"meshio was not done after {seconds:.0f} s: is it damaged?"
+        ) from None
+    if run.returncode != 0:
+        said = run.stderr.decode(errors="replace").split("\n")
+        said = [line for line in said if line.strip()][-3:]
+        raise InvalidArgument(begin + ("; ".join(said) or "meshio broke down") + ": is it damaged?")
+    with np.load(io.BytesIO(run.stdout), allow_pickle=False) as read:
+        if not read["triangles"].size:
+            kinds = ", ".join(read["kinds"]) or "nothing"
+            raise InvalidArgument(f"{path!r} has no triangles, but {kinds}")
+        return read["points"], read["triangles"]
 
 
 def _merged(points: Array, triangles: Any) -> tuple[Array, Any]:

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string_view>
+
+#include "stellate/oracles/points.h"
+
+// Files of polygons, as bytes from anywhere: whatever they say, they are refused with the place and
+// the cause, or make triangles that name points that are there. Memory stays within a multiple of
+// the bytes given: no count is believed beyond what the bytes that follow can hold. All throw
+// std::invalid_argument.
+namespace stellate::oracles::files {
+
+Triangles ParseObj(std::string_view bytes);
+Triangles ParseOff(std::string_view bytes);  // as text
+Triangles ParsePly(std::string_view bytes);  // as text, or binary of either byte order
+Triangles ParseStl(std::string_view bytes);  // as text, or binary; equal corners become one point
+
+}  // namespace stellate::oracles::files

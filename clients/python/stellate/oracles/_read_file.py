@@ -1,0 +1,89 @@
+"""A program: reads a file of polygons by meshio, writes points and triangles to standard output.
+
+It is a process of its own since meshio takes damaged files in every way there is: by exceptions of any
+class, by sys.exit, by asking for all memory, and by reading on for ever where a file ends too soon.
+"""
+
+from __future__ import annotations
+
+import builtins
+import contextlib
+import io
+import os
+import resource
+import sys
+from typing import Any
+
+import numpy as np
+
+_builtin_open = open
+_END_IS_READ = (
+    1000  # times in a row before it is taken for a loop; right readers do it once or twice
+)
+_MEMORY = (
+    1 << 30,
+    200,
+)  # bytes, and bytes for each of the file's: Python, numpy; lists of Python objects
+
+
+def main(path: str) -> None:
+    import meshio
+
+    bytes_each, most = os.path.getsize(path), resource.getrlimit(resource.RLIMIT_AS)[1]
+    wanted = _MEMORY[0] + _MEMORY[1] * bytes_each
+    resource.setrlimit(resource.RLIMIT_AS, (wanted if most < 0 else min(wanted, most), most))
+    builtins.open = _open  # meshio's
+    with contextlib.redirect_stdout(sys.stderr):
+        mesh = meshio.read(path)
+    corners: list[Any] = [np.empty((0, 3), np.int64)]
+    for block in mesh.cells:
+        if block.type in ("triangle", "quad", "polygon"):
+            polygons = np.asarray(block.data)
+            for i in range(2, polygons.shape[1]):
+                corners.append(polygons[:, [0, i - 1, i]])
+    found = io.BytesIO()
+    np.savez(
+        found,
+        points=np.asarray(mesh.points, dtype=float),
+        triangles=np.concatenate(corners).astype(np.int64),
+        kinds=np.array(sorted({block.type for block in mesh.cells}), dtype=str),
+    )
+    sys.stdout.buffer.write(found.getvalue())
+
+
+class _Ending:
+    """A file whose end is not read for ever."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._ends = 0
+
+    def readline(self, *size: Any) -> Any:
+        line = super().readline(*size)  # type: ignore[misc]
+        self._ends = 0 if line else self._ends + 1
+        if self._ends > _END_IS_READ:
+            raise EOFError("the file ends too soon")
+        return line
+
+
+class _Binary(_Ending, io.BufferedReader):
+    pass
+
+
+class _Text(_Ending, io.TextIOWrapper):
+    pass
+
+
+def _open(path: Any, mode: str = "r", *args: Any, **kwargs: Any) -> Any:
+    if mode not in ("r", "rt", "rb"):
+        return _builtin_open(path, mode, *args, **kwargs)
+    raw = _Binary(io.FileIO(path))
+    return raw if "b" in mode else _Text(raw)
+
+
+if __name__ == "__main__":
+    try:
+        main(sys.argv[1])
+    except BaseException as error:
+        print(f"{type(error).__name__}: {error}", file=sys.stderr)
+        sys.exit(1)

@@ -1,0 +1,52 @@
+"""Files of triangles by strangers: read, or refused in one way; none is waited for for ever."""
+
+import os
+
+import meshio
+import numpy as np
+import pytest
+import stellate
+from stellate import oracles
+
+CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])
+FACES = np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]])
+
+
+def written(folder, ending):
+    path = folder / f"a.{ending}"
+    meshio.write_points_cells(path, CORNERS, [("triangle", FACES)])
+    return path
+
+
+# Of these meshio reads on where .off, .ply and .msh end, exits the program over .vtk and .vtu, and
+# raises ValueError, AssertionError, IndexError for the rest.
+@pytest.mark.parametrize("ending", ["off", "ply", "stl", "msh", "vtk", "vtu"])
+@pytest.mark.parametrize("share", [0.03, 0.6])
+def test_a_file_cut_short_is_refused(ending, share, tmp_path):
+    path = written(tmp_path, ending)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(stellate.InvalidArgument, match=rf"a\.{ending}.*(cannot be read|no tri)"):
+        oracles.TriangleMesh(path, spacing=0.1)
+
+
+def test_a_file_that_promises_too_much_fills_no_memory(tmp_path):
+    path = tmp_path / "a.off"
+    path.write_text("OFF\n1000000000 1000000000 0\n0 0 0\n")
+    with pytest.raises(stellate.InvalidArgument, match="cannot be read as a mesh: MemoryError"):
+        oracles.TriangleMesh(path)
+
+
+def test_what_is_no_file_is_refused(tmp_path):
+    os.mkfifo(tmp_path / "pipe.off")  # opened, it would wait for ever
+    for path in (tmp_path / "pipe.off", tmp_path):
+        with pytest.raises(stellate.InvalidArgument, match="no file"):
+            oracles.TriangleMesh(path)
+
+
+def test_polygons_are_split(tmp_path):
+    x = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1.0)])
+    squares = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    meshio.write_points_cells(tmp_path / "cube.obj", x, [("quad", np.array(squares))])
+    cube = oracles.TriangleMesh(tmp_path / "cube.obj", spacing=0.1)
+    assert np.abs(cube.closest_point([[0.5, 0.5, 1.05]]) - [0.5, 0.5, 1]).max() < 1e-6
