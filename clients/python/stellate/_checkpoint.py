@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import errno
 import fcntl
 import hashlib
 import json
 import os
 import shutil
+import stat
 import time
 import zipfile
 from typing import IO, Any, Callable
@@ -31,13 +34,16 @@ class Checkpoint:
     lock        held by that process
     mesh.json   what is meshed, and its name on the private server
     server/     that server's --data-dir, until the mesh is finished
-    mesh.npz    the finished mesh
+    mesh.npz    the finished mesh, and the digest of what was meshed
 
-    Raises, when entered: FailedPrecondition if another process is at work in it, OSError.
+    Only what this user put there is read, and no link is followed.
+
+    Raises, when entered: FailedPrecondition if another process is at work in it, InvalidArgument if
+    others could have written there, OSError.
     """
 
     def __init__(self, directory: str | os.PathLike[str]) -> None:
-        self.directory = os.fspath(directory)
+        self.directory = os.fspath(directory).rstrip("/") or "/"  # "link/" would be followed
         self._server_directory = os.path.join(self.directory, "server")
         self._record_path = os.path.join(self.directory, "mesh.json")
         self._mesh_path = os.path.join(self.directory, "mesh.npz")
@@ -51,7 +57,9 @@ class Checkpoint:
             raise InvalidArgument(
                 f"checkpoint has to be a directory, and {self.directory} is a file"
             ) from None
-        self._lock = open(os.path.join(self.directory, "lock"), "w")
+        _insist_on_own(self.directory)
+        lock = _open_own(os.path.join(self.directory, "lock"), os.O_RDWR | os.O_CREAT)
+        self._lock = os.fdopen(lock, "r+")
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -76,7 +84,7 @@ class Checkpoint:
         deadline = time.monotonic() + _LAST_SERVER_SECONDS
         lock = os.path.join(self._server_directory, "lock")  # as stellated has it
         while os.path.exists(lock):
-            with open(lock) as file:
+            with os.fdopen(_open_own(lock, os.O_RDONLY)) as file:
                 try:
                     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                     break
@@ -126,15 +134,19 @@ class Checkpoint:
         os.remove(self._record_path)
         self._record = {}
 
-    def finished(self) -> Mesh | None:
-        """The mesh, if it is finished."""
-        if not os.path.exists(self._mesh_path):
+    def finished(self, spec: pb.MeshSpec) -> Mesh | None:
+        """The mesh, if it is finished. Raises InvalidArgument if it is of another specification."""
+        try:
+            file = os.fdopen(_open_own(self._mesh_path, os.O_RDONLY), "rb")
+        except FileNotFoundError:
             return None
         try:
-            with np.load(self._mesh_path, allow_pickle=False) as kept:
+            with file, np.load(file, allow_pickle=False) as kept:
                 points, simplices = kept["points"], kept["simplices"]
                 walls = kept["walls"] if "walls" in kept else None
                 about = json.loads(str(kept["about"]))
+            if about["digest"] != _digest(spec):
+                raise ValueError("its digest is of another specification")
             progress = about["progress"] and Progress(**about["progress"])
             report = Report.from_fields(about["report"])
             return Mesh(points, simplices, report, progress, about["revision"], walls)
@@ -149,6 +161,7 @@ class Checkpoint:
             "report": mesh.report and dataclasses.asdict(mesh.report),
             "progress": mesh.progress and dataclasses.asdict(mesh.progress),
             "revision": mesh.revision,
+            "digest": self._record["digest"],
         }
         arrays = {"points": mesh.points, "simplices": mesh.simplices}
         if mesh.walls is not None:
@@ -164,7 +177,7 @@ class Checkpoint:
 
     def _read(self) -> dict[str, Any]:
         try:
-            with open(self._record_path) as file:
+            with os.fdopen(_open_own(self._record_path, os.O_RDONLY)) as file:
                 record = json.load(file)
             if record["layout"] == _LAYOUT and record["name"] and record["digest"]:
                 return record
@@ -180,16 +193,52 @@ class Checkpoint:
 
     def _replace(self, path: str, write: Callable[[IO[bytes]], object]) -> None:
         """The whole file or none of it, also when the machine goes down."""
-        with open(path + ".new", "wb") as file:
+        new = path + ".new"
+        with contextlib.suppress(FileNotFoundError):
+            os.remove(new)  # of a process that was killed; a link itself, not where it leads
+        with os.fdopen(_open_own(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL), "wb") as file:
             write(file)
             file.flush()
             os.fsync(file.fileno())
-        os.replace(path + ".new", path)
+        os.replace(new, path)
         directory = os.open(self.directory, os.O_RDONLY)
         try:
             os.fsync(directory)
         finally:
             os.close(directory)
+
+
+def _insist_on_own(directory: str) -> None:
+    """Raises InvalidArgument where others could have put there what we would believe."""
+    found = os.lstat(directory)
+    if stat.S_ISLNK(found.st_mode):
+        problem = "is a link: name the directory that it leads to"
+    elif found.st_uid != os.geteuid():
+        problem = f"belongs to another user, of number {found.st_uid}: take another directory"
+    elif found.st_mode & 0o022:
+        problem = (
+            f"may be written by others (mode {stat.S_IMODE(found.st_mode):04o}): take another "
+            "directory, or, if all in it is yours, chmod go-w"
+        )
+    else:
+        return
+    raise InvalidArgument(f"the checkpoint {directory} {problem}")
+
+
+def _open_own(path: str, flags: int) -> int:
+    """A file of this user's, no link and no pipe. Raises InvalidArgument, or OSError as os.open."""
+    try:
+        # NONBLOCK: a pipe without another end would wait for it.
+        file = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, mode=0o600)
+    except OSError as error:
+        if error.errno in (errno.ELOOP, errno.EMLINK):
+            raise InvalidArgument(f"{path} is a link, which no checkpoint has: remove it") from None
+        raise
+    found = os.fstat(file)
+    if stat.S_ISREG(found.st_mode) and found.st_uid == os.geteuid():
+        return file
+    os.close(file)
+    raise InvalidArgument(f"{path} is no file of this user's: take another directory")
 
 
 def _essence(spec: pb.MeshSpec) -> pb.MeshSpec:

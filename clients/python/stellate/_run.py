@@ -143,8 +143,9 @@ class Run:
         self._live: _Live | None = None
         self._kept: Mesh | None = None
         if checkpoint is not None:
-            checkpoint.require(mesh_spec(checked, epsilon, criteria))
-            self._kept = checkpoint.finished()
+            spec = mesh_spec(checked, epsilon, criteria)
+            checkpoint.require(spec)
+            self._kept = checkpoint.finished(spec)
             if self._kept is not None:
                 return
         try:
