@@ -5,10 +5,12 @@ import (
 	"context"
 	"errors"
 	"fmt"
+	"io"
 	"io/fs"
 	"os"
 	"path/filepath"
 	"strings"
+	"syscall"
 	"time"
 
 	"google.golang.org/protobuf/proto"
@@ -23,19 +25,24 @@ const lastServer = 20 * time.Second
 //
 //	mesh     the mesh's name on the private server, and, on the next line, what is meshed
 //	server/  that server's --data-dir
+//
+// Only what this user put there is read, and no link is followed.
 type checkpoint struct{ folder string }
 
 func (c checkpoint) record() string { return filepath.Join(c.folder, "mesh") }
 
 // server starts the private server, once that of a killed process has come to its end.
 func (c checkpoint) server() (*Server, error) {
+	if err := os.MkdirAll(c.folder, 0o700); err != nil {
+		return nil, invalid("the checkpoint has to be a directory: %v", err)
+	}
+	if err := c.insistOnOwn(); err != nil {
+		return nil, err
+	}
 	if _, err := os.Stat(filepath.Join(c.folder, "mesh.json")); err == nil {
 		return nil, invalid("%s is a checkpoint of the Python client: take another directory", c.folder)
 	}
 	data := filepath.Join(c.folder, "server")
-	if err := os.MkdirAll(c.folder, 0o700); err != nil {
-		return nil, invalid("the checkpoint has to be a directory: %v", err)
-	}
 	flags := []string{"--data-dir", data, "--keep-finished-seconds", "31536000"}
 	for deadline := time.Now().Add(lastServer); ; time.Sleep(100 * time.Millisecond) {
 		server, err := StartServer(ServerOptions{Flags: flags})
@@ -49,6 +56,51 @@ func (c checkpoint) server() (*Server, error) {
 	}
 }
 
+// insistOnOwn fails where others could have put there what we would believe.
+func (c checkpoint) insistOnOwn() error {
+	found, err := os.Lstat(filepath.Clean(c.folder)) // "link/" would be followed
+	if err != nil {
+		return err
+	}
+	if found.Mode()&fs.ModeSymlink != 0 {
+		return invalid("the checkpoint %s is a link: name the directory that it leads to", c.folder)
+	}
+	if !owned(found) {
+		return invalid("the checkpoint %s belongs to another user: take another directory", c.folder)
+	}
+	if found.Mode().Perm()&0o022 != 0 {
+		return invalid("the checkpoint %s may be written by others (mode %04o): take another directory, or, "+
+			"if all in it is yours, chmod go-w", c.folder, found.Mode().Perm())
+	}
+	return nil
+}
+
+func owned(found fs.FileInfo) bool {
+	stat, ok := found.Sys().(*syscall.Stat_t)
+	return ok && int(stat.Uid) == os.Geteuid()
+}
+
+// readOwn reads a file of this user's, no link and no pipe.
+func readOwn(path string) ([]byte, error) {
+	// NONBLOCK: a pipe without another end would wait for it.
+	file, err := os.OpenFile(path, os.O_RDONLY|syscall.O_NOFOLLOW|syscall.O_NONBLOCK, 0)
+	if errors.Is(err, syscall.ELOOP) {
+		return nil, invalid("%s is a link, which no checkpoint has: remove it", path)
+	}
+	if err != nil {
+		return nil, err
+	}
+	defer file.Close()
+	found, err := file.Stat()
+	if err != nil {
+		return nil, err
+	}
+	if !found.Mode().IsRegular() || !owned(found) {
+		return nil, invalid("%s is no file of this user's: take another directory", path)
+	}
+	return io.ReadAll(file)
+}
+
 // declare gives the mesh that is there, or a new one.
 func (c checkpoint) declare(ctx context.Context, client *Client, spec *pb.MeshSpec) (*pb.Mesh, error) {
 	essence := proto.Clone(spec).(*pb.MeshSpec)
@@ -57,7 +109,7 @@ func (c checkpoint) declare(ctx context.Context, client *Client, spec *pb.MeshSp
 	if err != nil {
 		return nil, err
 	}
-	kept, err := os.ReadFile(c.record())
+	kept, err := readOwn(c.record())
 	if err != nil && !errors.Is(err, fs.ErrNotExist) {
 		return nil, err
 	}
@@ -90,10 +142,20 @@ func (c checkpoint) declare(ctx context.Context, client *Client, spec *pb.MeshSp
 
 // note writes the record, all of it or nothing.
 func (c checkpoint) note(record []byte) error {
-	if err := os.WriteFile(c.record()+".new", record, 0o600); err != nil {
+	draft := c.record() + ".new"
+	// One of a process that was killed; a link itself, not where it leads.
+	if err := os.Remove(draft); err != nil && !errors.Is(err, fs.ErrNotExist) {
 		return err
 	}
-	return os.Rename(c.record()+".new", c.record())
+	file, err := os.OpenFile(draft, os.O_WRONLY|os.O_CREATE|os.O_EXCL, 0o600)
+	if err != nil {
+		return err
+	}
+	_, err = file.Write(record)
+	if err := errors.Join(err, file.Close()); err != nil {
+		return err
+	}
+	return os.Rename(draft, c.record())
 }
 
 // forgetAfter has the next call begin anew where this mesh has failed for good.

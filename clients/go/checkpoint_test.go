@@ -3,8 +3,10 @@ package stellate_test
 import (
 	"context"
 	"errors"
+	"os"
 	"path/filepath"
 	"slices"
+	"strings"
 	"testing"
 
 	"stellate"
@@ -82,6 +84,43 @@ func TestCheckpointWaitsForABetterOracle(t *testing.T) {
 		t.Fatal(err)
 	}
 	if _, err = stellate.NewMesh(context.Background(), torus, 0.1, &options); err != nil {
+		t.Error(err)
+	}
+}
+
+// Somebody else's: what is there is not believed, and no link leads to a file that is overwritten.
+func TestCheckpointOfSomebodyElse(t *testing.T) {
+	mine := t.TempDir()
+	link, open := filepath.Join(mine, "link"), filepath.Join(mine, "open")
+	if err := errors.Join(os.Symlink(t.TempDir(), link), os.Mkdir(open, 0o700), os.Chmod(open, 0o777)); err != nil {
+		t.Fatal(err)
+	}
+	for folder, words := range map[string]string{link: "is a link", link + "/": "is a link", open: "chmod go-w"} {
+		_, err := stellate.NewMesh(context.Background(), torus, 0.3, &stellate.Options{Checkpoint: folder})
+		if !errors.Is(err, stellate.ErrInvalidArgument) || !strings.Contains(err.Error(), words) {
+			t.Errorf("%s: %v", folder, err)
+		}
+	}
+
+	folder, precious := filepath.Join(mine, "planted"), filepath.Join(mine, "precious")
+	err := errors.Join(os.Mkdir(folder, 0o700), os.WriteFile(precious, []byte("mine"), 0o600),
+		os.Symlink(precious, filepath.Join(folder, "mesh.new")))
+	if err != nil {
+		t.Fatal(err)
+	}
+	options := &stellate.Options{Checkpoint: folder}
+	if _, err := stellate.NewMesh(context.Background(), torus, 0.3, options); err != nil {
+		t.Fatal(err)
+	}
+	if kept, err := os.ReadFile(precious); err != nil || string(kept) != "mine" {
+		t.Errorf("a draft overwrote %q, %v", kept, err)
+	}
+	record := filepath.Join(folder, "mesh")
+	if err := errors.Join(os.Rename(record, record+".elsewhere"), os.Symlink(record+".elsewhere", record)); err != nil {
+		t.Fatal(err)
+	}
+	_, err = stellate.NewMesh(context.Background(), torus, 0.3, options)
+	if !errors.Is(err, stellate.ErrInvalidArgument) || !strings.Contains(err.Error(), "mesh is a link") {
 		t.Error(err)
 	}
 }

@@ -1,7 +1,19 @@
 // A directory in which one mesh outlives the processes that make it:
 //   mesh     the mesh's name on the private server, and, on the next line, what is meshed
 //   server/  that server's --data-dir
-import { existsSync, mkdirSync, readFileSync, renameSync, rmSync, writeFileSync } from "node:fs";
+import {
+  closeSync,
+  constants,
+  existsSync,
+  fstatSync,
+  lstatSync,
+  mkdirSync,
+  openSync,
+  readFileSync,
+  renameSync,
+  rmSync,
+  writeFileSync,
+} from "node:fs";
 import { join } from "node:path";
 import { setTimeout as sleep } from "node:timers/promises";
 import type { Client } from "./client.js";
@@ -14,20 +26,23 @@ import { Stub } from "./wire.js";
 const LAST_SERVER = 20_000; // milliseconds that the server of a killed process may take to end
 
 export class Checkpoint {
+  readonly folder: string;
   private readonly record: string;
 
-  constructor(readonly folder: string) {
-    this.record = join(folder, "mesh");
+  constructor(folder: string) {
+    this.folder = folder.replace(/(?<=.)\/+$/, ""); // "link/" would be followed
+    this.record = join(this.folder, "mesh");
   }
 
   /** Starts the private server, once that of a killed process has come to its end. */
   async server(): Promise<Server> {
+    mkdirSync(this.folder, { recursive: true, mode: 0o700 });
+    insistOnOwn(this.folder);
     if (existsSync(join(this.folder, "mesh.json"))) {
       throw new InvalidArgument(
         `${this.folder} is a checkpoint of the Python client: take another directory`,
       );
     }
-    mkdirSync(this.folder, { recursive: true, mode: 0o700 });
     const data = join(this.folder, "server");
     const flags = ["--data-dir", data, "--keep-finished-seconds", "31536000"];
     for (const deadline = Date.now() + LAST_SERVER; ; await sleep(100)) {
@@ -48,7 +63,7 @@ export class Checkpoint {
   async declare(client: Client, spec: MeshSpec): Promise<MeshInfo> {
     const essence = { spec: { ...spec, label: "" } };
     const wanted = Buffer.from(Stub.service.CreateMesh.requestSerialize(essence));
-    const kept = existsSync(this.record) ? readFileSync(this.record) : Buffer.alloc(0);
+    const kept = readOwn(this.record);
     const end = kept.indexOf("\n");
     const name = kept.subarray(0, Math.max(0, end)).toString();
     if (name && !kept.subarray(end + 1).equals(wanted)) {
@@ -64,8 +79,11 @@ export class Checkpoint {
     }
     if (found) return found;
     found = await client.createFrom(spec);
-    writeFileSync(`${this.record}.new`, Buffer.concat([Buffer.from(`${found.name}\n`), wanted]));
-    renameSync(`${this.record}.new`, this.record); // all of it or nothing
+    const draft = `${this.record}.new`;
+    rmSync(draft, { force: true }); // of a process that was killed; a link itself, not where it leads
+    const all = Buffer.concat([Buffer.from(`${found.name}\n`), wanted]);
+    writeFileSync(draft, all, { flag: "wx", mode: 0o600 });
+    renameSync(draft, this.record); // all of it or nothing
     return found;
   }
 
@@ -74,5 +92,46 @@ export class Checkpoint {
     const over = error instanceof StellateError && error.mesh?.report !== undefined;
     // With more room for its journal it would go on.
     if (over && !error.reason.startsWith("JOURNAL_")) rmSync(this.record, { force: true });
+  }
+}
+
+/** Throws InvalidArgument where others could have put there what we would believe. */
+function insistOnOwn(folder: string): void {
+  const found = lstatSync(folder);
+  const wrong = (what: string) => new InvalidArgument(`the checkpoint ${folder} ${what}`);
+  if (found.isSymbolicLink()) throw wrong("is a link: name the directory that it leads to");
+  if (process.geteuid === undefined) return; // a system without owners and modes
+  if (found.uid !== process.geteuid()) {
+    throw wrong(`belongs to another user, of number ${found.uid}: take another directory`);
+  }
+  if ((found.mode & 0o022) !== 0) {
+    throw wrong(
+      `may be written by others (mode ${(found.mode & 0o7777).toString(8)}): ` +
+        "take another directory, or, if all in it is yours, chmod go-w",
+    );
+  }
+}
+
+/** A file of this user's, no link; empty if there is none. */
+function readOwn(path: string): Buffer {
+  const problem = `${path} is a link, or no file of this user's: take another directory`;
+  // NONBLOCK: a pipe without another end would wait for it. Both are missing on Windows.
+  const { O_RDONLY, O_NOFOLLOW = 0, O_NONBLOCK = 0 } = constants;
+  let file: number;
+  try {
+    file = openSync(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK);
+  } catch (error) {
+    const code = (error as NodeJS.ErrnoException).code;
+    if (code === "ENOENT") return Buffer.alloc(0);
+    if (code === "ELOOP") throw new InvalidArgument(problem);
+    throw error;
+  }
+  try {
+    const found = fstatSync(file);
+    const own = process.geteuid === undefined || found.uid === process.geteuid();
+    if (!found.isFile() || !own) throw new InvalidArgument(problem);
+    return readFileSync(file);
+  } finally {
+    closeSync(file);
   }
 }

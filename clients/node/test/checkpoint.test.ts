@@ -1,5 +1,5 @@
 import assert from "node:assert/strict";
-import { mkdtemp, rm } from "node:fs/promises";
+import { chmod, mkdir, mkdtemp, readFile, rename, rm, symlink, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
@@ -73,4 +73,33 @@ test("a mesh whose oracle threw waits for a better one", async () => {
     stellate.mesh(new Counting(), { epsilon: 0.1, checkpoint, server: "localhost:1" }),
     stellate.InvalidArgument,
   );
+});
+
+test("a folder in which others could have put something is refused", async () => {
+  const refused = async (checkpoint: string, words: RegExp) => {
+    await assert.rejects(
+      stellate.mesh(new stellate.Torus(), { epsilon: 0.3, checkpoint }),
+      (error) => {
+        return error instanceof stellate.InvalidArgument && words.test(error.message);
+      },
+    );
+  };
+  const open = join(folder, "open");
+  await mkdir(open);
+  await chmod(open, 0o777);
+  await refused(open, /mode 777.*chmod go-w/);
+  await symlink(folder, join(folder, "link"));
+  await refused(join(folder, "link"), /is a link/);
+  await refused(join(folder, "link/"), /is a link/);
+
+  const precious = join(folder, "precious");
+  const checkpoint = join(folder, "planted");
+  await writeFile(precious, "mine");
+  await mkdir(checkpoint, { mode: 0o700 });
+  await symlink(precious, join(checkpoint, "mesh.new"));
+  await stellate.mesh(new stellate.Torus(), { epsilon: 0.3, checkpoint });
+  assert.equal(await readFile(precious, "utf8"), "mine");
+  await rename(join(checkpoint, "mesh"), precious);
+  await symlink(precious, join(checkpoint, "mesh"));
+  await refused(checkpoint, /mesh is a link/);
 });

@@ -41,6 +41,30 @@ class CheckpointTest < Minitest::Test
     assert_raises(Stellate::InvalidArgument) { Stellate.mesh(third, epsilon: 0.06, checkpoint: @checkpoint) }
   end
 
+  def test_a_folder_in_which_others_write_is_refused
+    Dir.mkdir(@checkpoint)
+    File.chmod(0o777, @checkpoint)
+    assert_includes refused, 'chmod go-w'
+    File.chmod(0o700, @checkpoint)
+    File.rename(@checkpoint, "#{@checkpoint}.elsewhere")
+    File.symlink("#{@checkpoint}.elsewhere", @checkpoint)
+    assert_includes refused, 'is a link'
+    assert_empty Dir.children("#{@checkpoint}.elsewhere")
+  end
+
+  def test_a_planted_link_leads_nowhere
+    precious = File.join(@folder, 'precious')
+    File.write(precious, 'mine')
+    Dir.mkdir(@checkpoint, 0o700)
+    File.symlink(precious, File.join(@checkpoint, 'mesh.new'))
+    kept(Counting.new)
+    assert_equal 'mine', File.read(precious)
+    record = File.join(@checkpoint, 'mesh')
+    File.rename(record, precious)
+    File.symlink(precious, record)
+    assert_includes refused, 'mesh is a link'
+  end
+
   def test_a_better_oracle_goes_on
     raising = Spoilt.new { raise 'no such surface' }
     error = assert_raises(RuntimeError) { Stellate.mesh(raising, epsilon: 0.1, checkpoint: @checkpoint) }
@@ -53,6 +77,10 @@ class CheckpointTest < Minitest::Test
   end
 
   private
+
+  def refused
+    assert_raises(Stellate::InvalidArgument) { kept(Counting.new) }.message
+  end
 
   def kept(oracle, **options)
     Stellate.mesh(oracle, epsilon: 0.05, checkpoint: @checkpoint, **options)

@@ -4,8 +4,8 @@
 //! - `server/`: that server's --data-dir
 
 use std::fs;
-use std::io;
-use std::os::unix::fs::DirBuilderExt;
+use std::io::{self, Read, Write};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -32,11 +32,12 @@ impl Checkpoint<'_> {
 
     /// Starts the private server, once that of a killed process has come to its end.
     pub fn server(&self) -> Result<Server, Error> {
+        let made = fs::DirBuilder::new().recursive(true).mode(0o700).create(self.0);
+        made.map_err(|error| self.wrong(&format!("cannot be made: {error}")))?;
+        self.insist_on_own()?;
         if self.0.join("mesh.json").exists() {
             return Err(self.wrong("is of the Python client: take another directory"));
         }
-        let made = fs::DirBuilder::new().recursive(true).mode(0o700).create(self.0);
-        made.map_err(|error| self.wrong(&format!("cannot be made: {error}")))?;
         let data = self.0.join("server").display().to_string();
         let flags = ["--data-dir", &data, "--keep-finished-seconds", "31536000"].map(String::from);
         let options = ServerOptions { flags: flags.to_vec(), ..Default::default() };
@@ -59,14 +60,55 @@ impl Checkpoint<'_> {
         }
     }
 
+    /// Fails where others could have put there what we would believe.
+    fn insist_on_own(&self) -> Result<(), Error> {
+        // Without a last slash, by which a link would be followed.
+        let path: PathBuf = self.0.components().collect();
+        let found = fs::symlink_metadata(path);
+        let found = found.map_err(|error| self.wrong(&format!("cannot be used: {error}")))?;
+        if found.file_type().is_symlink() {
+            return Err(self.wrong("is a link: name the directory that it leads to"));
+        }
+        if found.uid() != self.own_user()? {
+            return Err(self.wrong("belongs to another user: take another directory"));
+        }
+        if found.mode() & 0o022 != 0 {
+            return Err(self.wrong(&format!(
+                "may be written by others (mode {:04o}): take another directory, or, if all in it is yours, \
+                 chmod go-w",
+                found.mode() & 0o7777
+            )));
+        }
+        Ok(())
+    }
+
+    fn own_user(&self) -> Result<u32, Error> {
+        let process = fs::metadata("/proc/self");
+        Ok(process.map_err(|error| self.wrong(&format!("cannot be used: {error}")))?.uid())
+    }
+
+    /// The record, if it is a file of this user's and no link; empty if there is none.
+    fn read_own(&self) -> Result<Vec<u8>, Error> {
+        let wrong = |error: io::Error| self.wrong(&format!("cannot be used: {error}"));
+        let found = match fs::symlink_metadata(self.record()) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+            found => found.map_err(wrong)?,
+        };
+        if !found.file_type().is_file() || found.uid() != self.own_user()? {
+            return Err(self
+                .wrong("has a record that is a link, or no file of this user's: take another directory"));
+        }
+        let mut kept = Vec::new();
+        let mut file = fs::File::open(self.record()).map_err(wrong)?;
+        file.read_to_end(&mut kept).map_err(wrong)?;
+        Ok(kept)
+    }
+
     /// The mesh that is there, or a new one.
     pub fn declare(&self, client: &Client, spec: MeshSpec) -> Result<MeshInfo, Error> {
         let wanted = MeshSpec { label: String::new(), ..spec.clone() }.encode_to_vec();
         let unreadable = |error: io::Error| self.wrong(&format!("cannot be used: {error}"));
-        let kept = match fs::read(self.record()) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
-            read => read.map_err(unreadable)?,
-        };
+        let kept = self.read_own()?;
         let mut parts = kept.splitn(2, |&byte| byte == b'\n');
         let name = parts.next().unwrap_or_default();
         if !name.is_empty() && parts.next() != Some(&wanted[..]) {
@@ -88,7 +130,16 @@ impl Checkpoint<'_> {
         let info = client.create_from(spec)?;
         let draft = self.record().with_extension("new"); // all of it or nothing
         let record = [info.name.as_bytes(), b"\n", &wanted].concat();
-        fs::write(&draft, record).and_then(|()| fs::rename(&draft, self.record())).map_err(unreadable)?;
+        let write = || {
+            match fs::remove_file(&draft) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+                _ => {} // of a process that was killed; a link itself, not where it leads
+            }
+            let mut file = fs::OpenOptions::new().write(true).create_new(true).mode(0o600).open(&draft)?;
+            file.write_all(&record)?;
+            fs::rename(&draft, self.record())
+        };
+        write().map_err(unreadable)?;
         Ok(info)
     }
 

@@ -2,6 +2,8 @@
 
 mod live;
 
+use std::fs;
+use std::os::unix::fs::{symlink, PermissionsExt};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -95,4 +97,33 @@ fn waits_for_a_better_oracle() {
     let error = stellate::mesh(&Torus::default(), 0.1, elsewhere).unwrap_err();
     assert_eq!(error.kind, Kind::InvalidArgument);
     std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn believes_nobody_else() {
+    let base = std::env::temp_dir().join(format!("stellate-test-{}-planted", std::process::id()));
+    let refused = |folder: &Path, words: &str| {
+        let error = kept(&Torus::default(), 0.3, folder).unwrap_err();
+        assert_eq!(error.kind, Kind::InvalidArgument);
+        assert!(error.message.contains(words), "{error}");
+    };
+    let (open, link, planted) = (base.join("open"), base.join("link"), base.join("planted"));
+    fs::create_dir_all(&open).unwrap();
+    fs::set_permissions(&open, fs::Permissions::from_mode(0o777)).unwrap();
+    refused(&open, "chmod go-w");
+    symlink(&base, &link).unwrap();
+    refused(&link, "is a link");
+    refused(&link.join(""), "is a link");
+
+    let precious = base.join("precious");
+    fs::write(&precious, "mine").unwrap();
+    fs::create_dir(&planted).unwrap();
+    fs::set_permissions(&planted, fs::Permissions::from_mode(0o700)).unwrap();
+    symlink(&precious, planted.join("mesh.new")).unwrap();
+    kept(&Torus::default(), 0.3, &planted).unwrap();
+    assert_eq!(fs::read_to_string(&precious).unwrap(), "mine");
+    fs::rename(planted.join("mesh"), base.join("elsewhere")).unwrap();
+    symlink(base.join("elsewhere"), planted.join("mesh")).unwrap();
+    refused(&planted, "is a link");
+    fs::remove_dir_all(base).unwrap();
 }

@@ -12,17 +12,18 @@ module Stellate
     attr_reader :folder
 
     def initialize(folder)
-      @folder = folder.to_s
+      @folder = folder.to_s.sub(%r{(?<=.)/+\z}, '') # "link/" would be followed
       @record = File.join(@folder, 'mesh')
     end
 
     # Starts the private server, once that of a killed process has come to its end.
     def server(&)
+      FileUtils.mkdir_p(folder, mode: 0o700)
+      insist_on_own
       if File.exist?(File.join(folder, 'mesh.json'))
         raise Stellate.invalid("#{folder} is a checkpoint of the Python client: take another directory")
       end
 
-      FileUtils.mkdir_p(folder, mode: 0o700)
       Server.closing(start, &)
     end
 
@@ -31,7 +32,7 @@ module Stellate
       essence = spec.dup
       essence.label = ''
       wanted = V1::MeshSpec.encode(essence)
-      name, there = File.exist?(@record) ? File.binread(@record).split("\n", 2) : nil
+      name, there = read_own&.split("\n", 2)
       if name && there != wanted
         raise Stellate.invalid("the checkpoint #{folder} is of a mesh of another specification: " \
                                'take another directory, or remove it')
@@ -70,10 +71,37 @@ module Stellate
                              'another directory', reason: 'FAILED_PRECONDITION')
     end
 
+    # Refuses a folder in which others could have put what we would believe.
+    def insist_on_own
+      found = File.lstat(folder)
+      wrong = if found.symlink? then 'is a link: name the directory that it leads to'
+              elsif !found.owned? then 'belongs to another user: take another directory'
+              elsif found.mode.anybits?(0o022)
+                format('may be written by others (mode %04o): take another directory, or, if all in it is yours, ' \
+                       'chmod go-w', found.mode & 0o7777)
+              end
+      raise Stellate.invalid("the checkpoint #{folder} #{wrong}") if wrong
+    end
+
+    # The record, if it is a file of this user's and no link; nil if there is none.
+    def read_own
+      # NONBLOCK: a pipe without another end would wait for it.
+      File.open(@record, File::RDONLY | File::NOFOLLOW | File::NONBLOCK | File::BINARY) do |file|
+        return file.read if file.stat.file? && file.stat.owned?
+      end
+      raise Stellate.invalid("#{@record} is no file of this user's: take another directory")
+    rescue Errno::ENOENT
+      nil
+    rescue Errno::ELOOP
+      raise Stellate.invalid("#{@record} is a link, which no checkpoint has: remove it")
+    end
+
     # All of it or nothing.
     def note(record)
-      File.binwrite("#{@record}.new", record)
-      File.rename("#{@record}.new", @record)
+      draft = "#{@record}.new"
+      FileUtils.rm_f(draft) # of a process that was killed; a link itself, not where it leads
+      File.open(draft, File::WRONLY | File::CREAT | File::EXCL | File::BINARY, 0o600) { |file| file.write(record) }
+      File.rename(draft, @record)
     end
   end
 end

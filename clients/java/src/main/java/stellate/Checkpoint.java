@@ -3,9 +3,14 @@ package stellate;
 import java.io.IOException;
 import java.nio.charset.StandardCharsets;
 import java.nio.file.Files;
+import java.nio.file.LinkOption;
 import java.nio.file.Path;
 import java.nio.file.StandardCopyOption;
+import java.nio.file.StandardOpenOption;
+import java.nio.file.attribute.PosixFilePermission;
+import java.nio.file.attribute.PosixFilePermissions;
 import java.util.Arrays;
+import java.util.Set;
 import stellate.v1.MeshSpec;
 
 /**
@@ -35,13 +40,13 @@ final class Checkpoint {
 
   /** Starts the private server, once that of a killed process has come to its end. */
   Server server() {
-    if (Files.exists(folder.resolve("mesh.json"))) {
-      throw wrong("is of the Python client: take another directory");
-    }
     try {
-      Files.createDirectories(folder);
+      insistOnOwn();
     } catch (IOException error) {
       throw unusable(error);
+    }
+    if (Files.exists(folder.resolve("mesh.json"))) {
+      throw wrong("is of the Python client: take another directory");
     }
     String data = folder.resolve("server").toString();
     long deadline = System.currentTimeMillis() + LAST_SERVER;
@@ -55,6 +60,37 @@ final class Checkpoint {
         pauseUntil(deadline);
       }
     }
+  }
+
+  /** Makes the folder; refuses one in which others could have put what we would believe. */
+  private void insistOnOwn() throws IOException {
+    if (Files.isSymbolicLink(folder)) {
+      throw wrong("is a link: name the directory that it leads to");
+    }
+    if (!Files.exists(folder)) {
+      if (folder.toAbsolutePath().getParent() != null) {
+        Files.createDirectories(folder.toAbsolutePath().getParent());
+      }
+      Files.createDirectory(
+          folder, PosixFilePermissions.asFileAttribute(PosixFilePermissions.fromString("rwx------")));
+    }
+    if (!isOwn(folder)) {
+      throw wrong("belongs to another user: take another directory");
+    }
+    Set<PosixFilePermission> modes =
+        Files.getPosixFilePermissions(folder, LinkOption.NOFOLLOW_LINKS);
+    if (modes.contains(PosixFilePermission.GROUP_WRITE)
+        || modes.contains(PosixFilePermission.OTHERS_WRITE)) {
+      throw wrong(
+          "may be written by others ("
+              + PosixFilePermissions.toString(modes)
+              + "): take another directory, or, if all in it is yours, chmod go-w");
+    }
+  }
+
+  private static boolean isOwn(Path path) throws IOException {
+    Object owner = Files.getAttribute(path, "unix:uid", LinkOption.NOFOLLOW_LINKS);
+    return owner.equals(Files.getAttribute(Path.of("/proc/self"), "unix:uid"));
   }
 
   private void pauseUntil(long deadline) {
@@ -79,7 +115,11 @@ final class Checkpoint {
     byte[] wanted = spec.toBuilder().clearLabel().build().toByteArray();
     String name = "";
     try {
-      if (Files.exists(record)) {
+      if (Files.exists(record, LinkOption.NOFOLLOW_LINKS)) {
+        if (!Files.isRegularFile(record, LinkOption.NOFOLLOW_LINKS) || !isOwn(record)) {
+          throw wrong(
+              "has a record that is a link, or no file of this user's: take another directory");
+        }
         byte[] kept = Files.readAllBytes(record);
         int end = 0;
         while (end < kept.length && kept[end] != '\n') {
@@ -116,7 +156,8 @@ final class Checkpoint {
     byte[] all = Arrays.copyOf(head, head.length + wanted.length);
     System.arraycopy(wanted, 0, all, head.length, wanted.length);
     Path draft = folder.resolve("mesh.new");
-    Files.write(draft, all);
+    Files.deleteIfExists(draft); // of a process that was killed; a link itself, not where it leads
+    Files.write(draft, all, StandardOpenOption.CREATE_NEW, StandardOpenOption.WRITE);
     Files.move(draft, record, StandardCopyOption.ATOMIC_MOVE, StandardCopyOption.REPLACE_EXISTING);
   }
 

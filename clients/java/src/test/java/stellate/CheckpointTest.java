@@ -6,7 +6,9 @@ import static org.junit.jupiter.api.Assertions.assertSame;
 import static org.junit.jupiter.api.Assertions.assertThrows;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
+import java.nio.file.Files;
 import java.nio.file.Path;
+import java.nio.file.attribute.PosixFilePermissions;
 import java.util.concurrent.CompletableFuture;
 import java.util.concurrent.atomic.AtomicLong;
 import org.junit.jupiter.api.Test;
@@ -87,5 +89,33 @@ final class CheckpointTest {
     assertSame(mine, caught);
     // As the failing one, which has tangents and a box: the specification is the same.
     assertEquals(Live.expected(0), Live.counts(Stellate.mesh(Live.TORUS, 0.1, in(folder))));
+  }
+
+  private static void refused(Path checkpoint, String words) {
+    var error =
+        assertThrows(
+            StellateException.class, () -> Stellate.mesh(Live.TORUS, 0.3, in(checkpoint)));
+    assertEquals(StellateException.Kind.INVALID_ARGUMENT, error.kind());
+    assertTrue(error.getMessage().contains(words), error.getMessage());
+  }
+
+  @Test
+  void believesNobodyElse(@TempDir Path folder) throws Exception {
+    Path open = Files.createDirectory(folder.resolve("open"));
+    Files.setPosixFilePermissions(open, PosixFilePermissions.fromString("rwxrwxrwx"));
+    refused(open, "chmod go-w");
+    Path link = Files.createSymbolicLink(folder.resolve("link"), folder);
+    refused(link, "is a link");
+
+    Path precious = Files.writeString(folder.resolve("precious"), "mine");
+    Path checkpoint = Files.createDirectory(folder.resolve("planted"));
+    Files.setPosixFilePermissions(checkpoint, PosixFilePermissions.fromString("rwx------"));
+    Files.createSymbolicLink(checkpoint.resolve("mesh.new"), precious);
+    Stellate.mesh(Live.TORUS, 0.3, in(checkpoint));
+    assertEquals("mine", Files.readString(precious));
+    Path record = checkpoint.resolve("mesh");
+    Files.move(record, folder.resolve("elsewhere"));
+    Files.createSymbolicLink(record, folder.resolve("elsewhere"));
+    refused(checkpoint, "is a link");
   }
 }
