@@ -245,15 +245,11 @@ template <int K>
 std::optional<std::vector<Target<K>>> Engine<K>::GuardSharpEdges(
     std::vector<std::uint32_t>* added, std::vector<std::uint32_t>* removed) {
   Guards<K> guards = PlanGuards<K>(complex_, sizes_);
-  if (!complex_.has_guards()) {
-    std::vector<Target<K>> splits;
-    for (const auto& gap : guards.gaps)
-      if (!book_.is_given_up(gap.star))
-        if (const auto split = SplitOf(gap, Rule::kSize)) splits.push_back(*split);
-    if (!splits.empty()) return splits;
-  } else if (!guards.gaps.empty()) {
-    guards.radii2.clear();  // what is to be split must not be hidden in balls
-  }
+  std::vector<Target<K>> splits;
+  for (const auto& gap : guards.gaps)
+    if (!book_.is_given_up(gap.star))
+      if (const auto split = SplitOf(gap, Rule::kSize)) splits.push_back(*split);
+  if (!splits.empty()) return splits;
   const std::vector<std::uint32_t> before = complex_.Simplices();
   complex_.Guard(std::move(guards.radii2));
   ExchangeSimplices<K>(before, complex_.Simplices(), added, removed);

@@ -20,14 +20,10 @@ constexpr double kGuardedBelow = 70;
 constexpr double kLargest = 0.6;
 constexpr double kOtherEdge = 1.0 / 3;
 constexpr double kOtherPoint = 0.9;  // of the distance to points inside of faces
-// Of the distance to the nearest neighbour along the edge. That of a corner reaches nearly as far
-// as its collar, whatever the balls there are.
-constexpr double kNeighbour = 0.75;
-constexpr double kCornerShare = 0.95;
-// Of an edge's length, the sum of the radii at its ends: with the least there is a neck a third of
-// the edge wide between them. At a corner they only have to meet.
-constexpr double kOverlap = 1.3;
+// Of the length of an edge at a corner, the sum of the radii at its ends: there they only have to
+// meet.
 constexpr double kMeet = 1;
+constexpr double kSplitsPerOctave = 20;
 
 template <int K>
 bool IsSharp(const StarComplex<K>& complex, std::uint32_t p, double degrees) {
@@ -59,25 +55,25 @@ std::vector<HalfEdge<K>> EdgesAt(const StarComplex<K>& complex, std::uint32_t p)
   return edges;
 }
 
+// What a ball around p has room for beside everything that is not along its own edge.
 template <int K>
-double RadiusAt(const StarComplex<K>& complex, std::uint32_t p,
-                const std::vector<HalfEdge<K>>& edges, double bound) {
-  double radius = kLargest * bound;
-  const auto distance = [&](std::uint32_t q) {
-    return Distance(complex.Point(p), complex.Point(q), complex.d());
-  };
-  for (const HalfEdge<K>& edge : edges)
-    radius = std::min(radius,
-                      (IsCorner<K>(complex, p) ? kCornerShare : kNeighbour) * distance(edge.other));
-  complex.ForEachWithin(complex.Point(p), radius / kOtherEdge, [&](std::uint32_t q) {
+double RoomAt(const StarComplex<K>& complex, std::uint32_t p, double bound) {
+  double room = kLargest * bound;
+  complex.ForEachWithin(complex.Point(p), room / kOtherEdge, [&](std::uint32_t q) {
     if (q == p) return;
+    const double distance = Distance(complex.Point(p), complex.Point(q), complex.d());
     const WallSet there = complex.walls(q);
     if (CountWalls(there) < 2)
-      radius = std::min(radius, kOtherPoint * distance(q));
+      room = std::min(room, kOtherPoint * distance);
     else if (CountWalls(there & complex.walls(p)) < 2)  // not along the same edge
-      radius = std::min(radius, kOtherEdge * distance(q));
+      room = std::min(room, kOtherEdge * distance);
   });
-  return radius;
+  return room;
+}
+
+template <int K>
+double LengthOf(const StarComplex<K>& complex, std::uint32_t p, std::uint32_t q) {
+  return Distance(complex.Point(p), complex.Point(q), complex.d());
 }
 
 }  // namespace
@@ -88,26 +84,45 @@ Guards<K> PlanGuards(const StarComplex<K>& complex, const SizeField<K>& sizes) {
   std::vector<std::uint32_t> sharp;
   for (std::uint32_t p = 0; p < complex.size(); ++p) {
     CheckInterruption(p);
-    if (IsSharp<K>(complex, p, kGuardedBelow)) sharp.push_back(p);
+    if (complex.GuardOf(p) > 0 || IsSharp<K>(complex, p, kGuardedBelow)) sharp.push_back(p);
   }
-  std::vector<double> radii(complex.size(), 0);
+  guards.radii2.assign(complex.size(), 0);
+  guards.least_room = INFINITY;
   std::vector<std::vector<HalfEdge<K>>> edges;
   for (const std::uint32_t p : sharp) {
     CheckInterruption(edges.size());
     edges.push_back(EdgesAt<K>(complex, p));
-    radii[p] = RadiusAt<K>(complex, p, edges.back(), sizes.BoundAt(complex, p));
+    guards.radii2[p] = complex.GuardOf(p);
+    if (guards.radii2[p] > 0) continue;
+    double radius = RoomAt<K>(complex, p, sizes.BoundAt(complex, p));
+    guards.least_room = std::min(guards.least_room, radius);
+    for (const HalfEdge<K>& edge : edges.back())
+      radius = std::min(radius, kGuardShare * LengthOf<K>(complex, p, edge.other));
+    guards.radii2[p] = radius * radius;
   }
   for (std::size_t i = 0; i < sharp.size(); ++i)
     for (const HalfEdge<K>& edge : edges[i]) {
       const std::uint32_t p = sharp[i], q = edge.other;
-      if (q < p || radii[q] == 0) continue;
-      const double overlap = IsCorner<K>(complex, p) || IsCorner<K>(complex, q) ? kMeet : kOverlap;
-      const double length = Distance(complex.Point(p), complex.Point(q), complex.d());
-      if (radii[p] + radii[q] < overlap * length) guards.gaps.push_back(edge.at);
+      if (q < p || guards.radii2[q] == 0) continue;
+      const double length = LengthOf<K>(complex, p, q);
+      ++guards.edges;
+      guards.longest = std::max(guards.longest, length);
+      guards.least_room = std::min(guards.least_room, length);
+      if (complex.GuardOf(p) > 0 && complex.GuardOf(q) > 0) continue;
+      const double overlap =
+          IsCorner<K>(complex, p) || IsCorner<K>(complex, q) ? kMeet : kGuardOverlap;
+      if (std::sqrt(guards.radii2[p]) + std::sqrt(guards.radii2[q]) < overlap * length)
+        guards.gaps.push_back(edge.at);
     }
-  for (double& radius : radii) radius *= radius;
-  guards.radii2 = std::move(radii);
   return guards;
+}
+
+template <int K>
+std::size_t MostSplits(const Guards<K>& guards) {
+  if (guards.edges == 0) return 0;
+  int octaves = 1;
+  for (double length = guards.least_room; length < guards.longest; length *= 2) ++octaves;
+  return static_cast<std::size_t>(kSplitsPerOctave * octaves) * guards.edges;
 }
 
 template <int K>
@@ -119,6 +134,7 @@ bool LacksGuards(const StarComplex<K>& complex) {
 
 #define STELLATE_EACH(K)                                                        \
   template Guards<K> PlanGuards<K>(const StarComplex<K>&, const SizeField<K>&); \
+  template std::size_t MostSplits<K>(const Guards<K>&);                         \
   template bool LacksGuards<K>(const StarComplex<K>&);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
