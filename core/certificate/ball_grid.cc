@@ -31,8 +31,13 @@ BallGrid::BallGrid(int d, const double* centres, std::vector<double> radii)
   std::stable_sort(order.begin(), order.end(),
                    [&](int a, int b) { return lengths[a] > lengths[b]; });
   order.resize(static_cast<std::size_t>(std::min(d, kMaxAxes)));
-  const int most =
-      static_cast<int>(std::pow(kMaxCells, 1 / static_cast<double>(order.size())) + 1e-9);
+  const auto fit = [&order](int cells) {
+    double all = 1;
+    for (std::size_t axis = 0; axis < order.size(); ++axis) all *= cells;
+    return all <= kMaxCells;
+  };
+  int most = 1;
+  while (!order.empty() && fit(most + 1)) ++most;
   std::size_t cells = 1;
   for (const int c : order) {
     Axis axis = spread[static_cast<std::size_t>(c)];

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <numeric>
 
@@ -61,17 +60,18 @@ Eigen::VectorXd PointInBox(const Eigen::VectorXd& lower, const Eigen::VectorXd& 
 
 Eigen::VectorXd PointNearSimplex(const MeshView& mesh, const std::uint32_t* ids, double push,
                                  Random& random) {
-  // Exponential weights make a uniform point of the simplex.
+  // What k uniform numbers cut the unit interval into are the weights of a uniform point.
+  std::array<double, kMaxDimension + 2> cuts{};
+  for (int i = 1; i <= mesh.k; ++i) cuts[static_cast<std::size_t>(i)] = random.Uniform();
+  cuts[static_cast<std::size_t>(mesh.k) + 1] = 1;
+  std::sort(cuts.begin() + 1, cuts.begin() + 1 + mesh.k);
   Eigen::VectorXd x = Eigen::VectorXd::Zero(mesh.d);
-  double total = 0;
   for (int i = 0; i <= mesh.k; ++i) {
-    const double weight = -std::log(1 - random.Uniform());
-    x += weight * PointOf(mesh, ids[i]);
-    total += weight;
+    const auto at = static_cast<std::size_t>(i);
+    x += (cuts[at + 1] - cuts[at]) * PointOf(mesh, ids[i]);
   }
-  x /= total;
   Eigen::VectorXd direction(mesh.d);
-  for (int i = 0; i < mesh.d; ++i) direction[i] = random.Normal();
+  for (double& along : direction) along = random.NearlyNormal();
   return x + push * random.Uniform() * direction.normalized();
 }
 

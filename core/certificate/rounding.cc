@@ -4,6 +4,9 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <string>
+
+#include "core/base/message.h"
 
 namespace stellate::core {
 namespace {
@@ -18,14 +21,30 @@ bool IsSingle(double x) {
          static_cast<double>(static_cast<float>(x)) == x;
 }
 
-// The fewest significant decimals that read back as x.
-int DigitsOf(double x) {
+struct Decimal {
+  int digits = 1;    // the fewest significant ones that read back as the number
+  int exponent = 0;  // of ten, of the first digit
+};
+
+Decimal DecimalOf(double x) {
   char text[40];
   const char* const end =
       std::to_chars(text, text + sizeof text, std::abs(x), std::chars_format::scientific).ptr;
   const char* const exponent = std::find(static_cast<const char*>(text), end, 'e');
   const auto length = static_cast<int>(exponent - text);
-  return length > 1 ? length - 1 : 1;  // the point is none
+  Decimal decimal;
+  if (length > 1) decimal.digits = length - 1;  // the point is none
+  const char* const first = exponent[1] == '+' ? exponent + 2 : exponent + 1;
+  std::from_chars(first, end, decimal.exponent);
+  return decimal;
+}
+
+// As the compiler reads 1eN: std::pow rounds as the processor has it.
+double PowerOfTen(int exponent) {
+  const std::string text = Message("1e", exponent);
+  double power = 0;
+  std::from_chars(text.data(), text.data() + text.size(), power);
+  return power;
 }
 
 }  // namespace
@@ -40,11 +59,11 @@ double RoundingOf(const Eigen::MatrixXd& points, double most) {
     const double x = points.data()[i];
     seen += x != 0;
     all_single = all_single && IsSingle(x);
-    if (digits <= kMostDigits) digits = std::max(digits, DigitsOf(x));
+    if (digits <= kMostDigits) digits = std::max(digits, DecimalOf(x).digits);
     if (!all_single && digits > kMostDigits) return 0;
   }
   if (seen < kFewestSeen) return 0;
-  const double last_place = std::pow(10, std::floor(std::log10(largest)) - (digits - 1));
+  const double last_place = PowerOfTen(DecimalOf(largest).exponent - (digits - 1));
   const double decimal = digits <= kMostDigits ? last_place / 2 : largest;
   const double single =
       all_single ? largest * (std::numeric_limits<float>::epsilon() / 2) : largest;

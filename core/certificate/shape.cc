@@ -89,7 +89,7 @@ double LargerSine2(const MeshView& mesh, const SimplexList& list, Corners& corne
     if (SumOfSquaredSines(frame, k, mesh.d, tangent, k) < bound) continue;
     // The angle itself costs more, and is seldom a new maximum.
     if (TiltsLess(MeasureTilt(frame, k, mesh.d, tangent, k), k, bound)) continue;
-    const double sine = std::sin(AngleToTangent(frame, k, mesh.d, tangent, k));
+    const double sine = SineToTangent(frame, k, mesh.d, tangent, k);
     sine2 = std::max(sine2, sine * sine);
   }
   return sine2;

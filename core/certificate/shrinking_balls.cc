@@ -33,7 +33,7 @@ Eigen::MatrixXd ShrinkingBalls::TangentsOf(std::uint32_t v) const {
 // A random direction across the tangents; false if there is none.
 bool ShrinkingBalls::AimAcross(const Eigen::MatrixXd& tangents, Random& random, Ball* ball) const {
   ball->normal.resize(mesh_.d);
-  for (int i = 0; i < mesh_.d; ++i) ball->normal[i] = random.Normal();
+  for (int i = 0; i < mesh_.d; ++i) ball->normal[i] = random.NearlyNormal();
   for (int pass = 0; pass < 2; ++pass)
     ball->normal -= tangents * (tangents.transpose() * ball->normal).eval();
   const double length = ball->normal.norm();

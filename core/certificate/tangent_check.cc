@@ -24,8 +24,8 @@ TangentCheck::TangentCheck(const MeshView& mesh, double size, std::uint64_t rand
     const auto v = static_cast<std::uint32_t>(random.Next() % mesh.vertices);
     const Eigen::Map<const Eigen::MatrixXd> tangents(mesh.Tangent(v), mesh.d, mesh.k);
     Eigen::VectorXd any(mesh.d), along(mesh.k);
-    for (double& x : any) x = random.Normal();
-    for (double& x : along) x = random.Normal();
+    for (double& x : any) x = random.NearlyNormal();
+    for (double& x : along) x = random.NearlyNormal();
     for (int pass = 0; pass < 2; ++pass) any -= tangents * (tangents.transpose() * any).eval();
     if (any.norm() > 1e-6) steps_.push_back({v, true, length_ * any.normalized()});
     steps_.push_back({v, false, length_ * (tangents * along).normalized()});

@@ -17,16 +17,24 @@ double LargestDistance(double rho, double reach) {
   return rho * rho / (reach + std::sqrt((reach - rho) * (reach + rho)));
 }
 
+double SineOfHalfTurn(double rho, double reach) {
+  return (rho + LargestDistance(rho, reach)) / (2 * reach);
+}
+
 double LargestTurn(double rho, double reach) {
-  const double sine = (rho + LargestDistance(rho, reach)) / (2 * reach);
+  const double sine = SineOfHalfTurn(rho, reach);
   return sine < 1 ? 2 * std::asin(sine) : kInfinity;
 }
 
 double RadiusThatTurns(double turn, double reach) {
+  return RadiusOfHalfTurn(std::sin(turn / 2), reach);
+}
+
+double RadiusOfHalfTurn(double sine, double reach) {
   double low = 0, high = reach;
   for (int step = 0; step < kBisections; ++step) {
     const double middle = (low + high) / 2;
-    (LargestTurn(middle, reach) <= turn ? low : high) = middle;
+    (SineOfHalfTurn(middle, reach) <= sine ? low : high) = middle;
   }
   return low;
 }

@@ -15,9 +15,13 @@ double LargestDistance(double rho, double reach);
 // Wintraecken: The reach, metric distortion, geodesic convexity and the variation of tangent
 // spaces). Infinity where nothing is known.
 double LargestTurn(double rho, double reach);
+// The sine of half of it, the same on every processor; no less than 1: nothing is known.
+double SineOfHalfTurn(double rho, double reach);
 
 // The largest rho with LargestTurn <= turn; turn in [0, pi / 2].
 double RadiusThatTurns(double turn, double reach);
+// By the sine of half the turn.
+double RadiusOfHalfTurn(double sine, double reach);
 
 // No k-simplex needs an enclosing ball of a radius beyond this share of its diameter (Jung).
 double JungRatio(int k);

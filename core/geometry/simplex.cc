@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/infinity.h"
+#include "core/base/power.h"
 #include "core/base/vector_ops.h"
 #include "core/geometry/simplex_frame.h"
 
@@ -74,7 +75,7 @@ SimplexMeasures MeasureSimplex(SimplexVertices vertices, int d, const SimplexFra
 
 bool IsFat(SimplexVertices vertices, int d, double theta0) {
   const SimplexMeasures m = MeasureSimplex(vertices, d);
-  return m.Fatness() >= std::pow(theta0, m.dimension);
+  return m.Fatness() >= Power(theta0, m.dimension);
 }
 
 bool IsSliver(SimplexVertices vertices, int d, double theta0) {
@@ -105,9 +106,9 @@ TiltMatrix MeasureTilt(const SimplexFrame& frame, int j, int d, const double* ta
   return tilt;
 }
 
-double AngleToTangent(const SimplexFrame& frame, int j, int d, const double* tangent, int k) {
+double SineToTangent(const SimplexFrame& frame, int j, int d, const double* tangent, int k) {
   if (j == 0) return 0;
-  if (frame.rank < j || j > k) return std::numbers::pi / 2;
+  if (frame.rank < j || j > k) return 1;
 
   // The residuals n = q - T T^t q of the directions q; their largest singular value is the sine.
   std::vector<double> residuals(frame.directions);
@@ -124,8 +125,11 @@ double AngleToTangent(const SimplexFrame& frame, int j, int d, const double* tan
     for (int b = 0; b < j; ++b) gram(a, b) = Dot(&residuals[a * d], &residuals[b * d], d);
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(gram, Eigen::EigenvaluesOnly);
-  const double sine2 = std::clamp(solver.eigenvalues()[j - 1], 0.0, 1.0);
-  return std::asin(std::sqrt(sine2));
+  return std::sqrt(std::clamp(solver.eigenvalues()[j - 1], 0.0, 1.0));
+}
+
+double AngleToTangent(const SimplexFrame& frame, int j, int d, const double* tangent, int k) {
+  return std::asin(SineToTangent(frame, j, d, tangent, k));
 }
 
 double AngleToTangent(SimplexVertices vertices, int d, const double* tangent, int k) {

@@ -67,6 +67,8 @@ SimplexMeasures MeasureSimplex(SimplexVertices vertices, int d, const SimplexFra
 // a degenerate simplex; 0 for a vertex.
 double AngleToTangent(SimplexVertices vertices, int d, const double* tangent, int k);
 double AngleToTangent(const SimplexFrame& frame, int j, int d, const double* tangent, int k);
+// Its sine, the same on every processor.
+double SineToTangent(const SimplexFrame& frame, int j, int d, const double* tangent, int k);
 
 // I - (T^t Q)^t (T^t Q) in its upper left j x j block, Q being the frame's directions: its
 // eigenvalues are the squared sines of the principal angles, to about 1e-15. A cheap way to tell

@@ -1,28 +1,12 @@
 #include "core/refinement/candidate_set.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/base/instantiate.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 
 namespace stellate::core {
-namespace {
-
-// A point of the unit ball of R^K, uniform.
-template <int K>
-void UniformInBall(Random& random, double* x) {
-  double norm2 = 0;
-  for (int a = 0; a < K; ++a) {
-    x[a] = random.Normal();
-    norm2 += x[a] * x[a];
-  }
-  const double scale = std::pow(random.Uniform(), 1.0 / K) / std::sqrt(norm2);
-  for (int a = 0; a < K; ++a) x[a] *= scale;
-}
-
-}  // namespace
 
 template <int K>
 CandidateSet<K> DrawCandidates(const StarComplex<K>& complex, const ViolationBook<K>& book,
@@ -49,7 +33,7 @@ CandidateSet<K> DrawCandidates(const StarComplex<K>& complex, const ViolationBoo
       std::copy(t.x, t.x + K, x);
       if (c > set.first[i] || has_failed) {
         double step[K];
-        UniformInBall<K>(random, step);
+        random.UniformInBall<K>(step);
         for (int a = 0; a < K; ++a) x[a] += criteria.picking_radius * t.radius * step[a];
       }
       complex.Lift(t.star, x, set.points.col(c).data());

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "core/geometry/reach.h"
 
@@ -15,17 +14,16 @@ constexpr double kInradius = 1.2;
 // simplex's fatness falls quickly with k, so the bound falls with it.
 constexpr double kDefaultSliverBound[kMaxDimension + 1] = {0, 0, 0, 0.2, 0.15, 0.1};
 
-// Dihedral angles of tetrahedra, degrees, of manifolds with walls: of solids, whose inner points
+// Least dihedral angles of tetrahedra, of manifolds with walls: of solids, whose inner points
 // cost no answer, and elsewhere. Solids have 5 % more vertices for it than with no such rule, T^3
 // cut by a half-space 1 %. Larger ones were reached, too, with more: 18 degrees of solids at 10 %.
-constexpr double kLeastDihedral = 14;
-constexpr double kLeastDihedralInside = 10;
+constexpr double kCosineOf14Degrees = 0.97029572627599647, kCosineOf10Degrees = 0.98480775301220806;
 // Down to this share of the size asked for, which ends it: near sharp edges faces are as fine.
 constexpr double kSharpRadius = 0.1;
 
-// With a declared reach: M turns by no more under a simplex of the size asked for, radians. The
-// rest of the right angle is for the simplex itself.
-constexpr double kProofTurn = 0.7;
+// With a declared reach: M turns by no more than 0.7 radians under a simplex of the size asked for.
+// The rest of the right angle is for the simplex itself.
+constexpr double kSineOfHalfProofTurn = 0.34289780745545134;
 
 constexpr double kDefaultAdvanceEpsilons = 3;
 constexpr double kDefaultAdvanceShare = 0.1;  // of the bounding box's diagonal
@@ -38,14 +36,13 @@ ResolvedCriteria Resolve(const Specification& spec) {
   r.epsilon = spec.epsilon;
   if (spec.declared_reach) {
     r.shape.reach = *spec.declared_reach;
-    r.epsilon = std::min(r.epsilon, RadiusThatTurns(kProofTurn, r.shape.reach));
+    r.epsilon = std::min(r.epsilon, RadiusOfHalfTurn(kSineOfHalfProofTurn, r.shape.reach));
   }
   r.radius_edge_bound = c.radius_edge_bound;
   r.shape.sliver_bound = c.sliver_bound.value_or(kDefaultSliverBound[spec.dimension]);
   if (spec.dimension == 3 && spec.walls > 0 && r.shape.sliver_bound > 0) {
     const bool is_solid = spec.ambient_dimension == 3;
-    r.shape.sharpest_cosine =
-        std::cos((is_solid ? kLeastDihedral : kLeastDihedralInside) * std::numbers::pi / 180);
+    r.shape.sharpest_cosine = is_solid ? kCosineOf14Degrees : kCosineOf10Degrees;
     r.shape.sharp_radius = kSharpRadius;
   }
   r.picking_radius = c.picking_radius;

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/base/parallel.h"
+#include "core/base/power.h"
 #include "core/complex/consistency.h"
 #include "core/refinement/independent_set.h"
 
@@ -301,7 +302,7 @@ double Engine<K>::CountMissing(double share) const {
   for (const auto& entry : book_.size_and_shape()) {
     CheckInterruption(step++);
     const double ratio = entry.violation.radius / sizes_.BoundAt(complex_, entry.star);
-    missing += share * std::pow(std::max(ratio, 1.0), K);
+    missing += share * Power(std::max(ratio, 1.0), K);
   }
   return missing;
 }

@@ -14,8 +14,8 @@ namespace {
 // Wedges and corners of 50 degrees were seen to close without guards, of 40 not. An edge that is
 // sharper somewhere is guarded up to the second of these along it: beside a guard there should not
 // lie the sharpest of what has none.
-constexpr double kNeedsGuard = 50;
-constexpr double kGuardedBelow = 70;
+constexpr double kNeedsGuard = 0.64278760968653933;    // cosine of 50 degrees
+constexpr double kGuardedBelow = 0.34202014332566873;  // of 70
 // Of the size asked for. A simplex at a guarded point p is measured from p, beyond its ball.
 constexpr double kLargest = 0.6;
 constexpr double kOtherEdge = 1.0 / 3;
@@ -26,9 +26,9 @@ constexpr double kMeet = 1;
 constexpr double kSplitsPerOctave = 20;
 
 template <int K>
-bool IsSharp(const StarComplex<K>& complex, std::uint32_t p, double degrees) {
+bool IsSharp(const StarComplex<K>& complex, std::uint32_t p, double cosine) {
   const auto angle = SharpestAt<K>(complex, p);
-  return angle && angle->degrees < degrees;
+  return angle && angle->cosine > cosine;
 }
 
 template <int K>

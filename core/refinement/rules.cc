@@ -5,7 +5,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <numbers>
 #include <tuple>
 #include <type_traits>
 #include <utility>
@@ -19,9 +18,10 @@
 namespace stellate::core {
 namespace {
 
-// Simplices lean at least so much less than a proof allows, radians: what tangents found by
+// Simplices lean at least 0.05 radians less than a proof allows: what tangents found by
 // differences may be wrong by where epsilon is half of the reach, with some to spare.
-constexpr double kLeanMargin = 0.05;
+constexpr double kCosineOfLeanMargin = 0.99875026039496623,
+                 kSineOfLeanMargin = 0.049979169270678331;
 // A volume this small beside the lengths of the edges that span it is one of points that are off a
 // flat wall by an oracle's error.
 constexpr double kFlat = 1e-8;
@@ -247,19 +247,21 @@ bool LeansTooFar(const StarComplex<K>& complex, std::uint32_t p, const double* a
     for (int b = 0; b <= a; ++b)
       diameter2 = std::max(diameter2, SquaredDistance(corners[a + 1], corners[b], d));
   }
-  const double turn = LargestTurn(JungRatio(K) * std::sqrt(diameter2), reach);
-  const double most = std::numbers::pi / 2 - kLeanMargin - turn;
-  if (most <= 0) return true;
+  // A proof's right angle, less how far M turns, less the margin: its sine.
+  const double half = SineOfHalfTurn(JungRatio(K) * std::sqrt(diameter2), reach);
+  if (!(half < 1)) return true;
+  const double sine = kCosineOfLeanMargin * (1 - 2 * half * half) -
+                      kSineOfLeanMargin * 2 * half * std::sqrt(1 - half * half);
+  if (sine <= 0) return true;
   thread_local SimplexFrame frame;
   frame.directions.resize(static_cast<std::size_t>(d) * K);
   TakeFrame({corners.data(), corners.size()}, K, d, frame);
   if (frame.rank < K) return true;
-  const double sine = std::sin(most);
   for (const std::uint32_t id : ids) {
     if (id >= complex.size()) continue;
     // The sum is no less than the largest: mostly that is enough to know.
     if (SumOfSquaredSines(frame, K, d, complex.Tangent(id), K) < sine * sine) continue;
-    if (AngleToTangent(frame, K, d, complex.Tangent(id), K) >= most) return true;
+    if (SineToTangent(frame, K, d, complex.Tangent(id), K) >= sine) return true;
   }
   return false;
 }

@@ -1,7 +1,6 @@
 #include "core/refinement/sharp_dihedrals.h"
 
 #include <cmath>
-#include <numbers>
 
 #include "core/base/instantiate.h"
 #include "core/base/vector_ops.h"
@@ -15,7 +14,7 @@ template <int K>
 bool MeetAsSharply(const StarComplex<K>& complex, std::uint32_t a, std::uint32_t b, double cosine) {
   if (CountWalls(complex.walls(a) & complex.walls(b)) < 2) return false;
   const auto angle = SharpestAt<K>(complex, a);
-  return angle && std::cos(angle->degrees * std::numbers::pi / 180) > cosine;
+  return angle && angle->cosine > cosine;
 }
 
 // The least of 0 to 3 that is neither.

@@ -11,10 +11,10 @@
 namespace stellate::core {
 
 template <int K>
-std::optional<WallAngle> SharpestAt(const StarComplex<K>& complex, std::uint32_t p) {
+std::optional<WallCosine> SharpestAt(const StarComplex<K>& complex, std::uint32_t p) {
   const WallSet walls = complex.walls(p);
   if (CountWalls(walls) < 2) return std::nullopt;
-  std::optional<WallAngle> sharpest;
+  std::optional<WallCosine> sharpest;
   const double* const conormals = complex.Conormals(p);
   int a = 0;
   ForEachWall(walls, [&](int first) {
@@ -22,9 +22,8 @@ std::optional<WallAngle> SharpestAt(const StarComplex<K>& complex, std::uint32_t
     ForEachWall(walls & ~((SetOfWall(first) << 1) - 1), [&](int second) {
       // Between the half-spaces that the walls leave: 0 where their conormals are opposite.
       const double cosine = -Dot(conormals + K * a, conormals + K * b, K);
-      const double degrees = std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / std::numbers::pi;
-      if (!sharpest || degrees < sharpest->degrees)
-        sharpest = WallAngle{SetOfWall(first) | SetOfWall(second), degrees, {}};
+      if (!sharpest || cosine > sharpest->cosine)
+        sharpest = WallCosine{SetOfWall(first) | SetOfWall(second), cosine};
       ++b;
     });
     ++a;
@@ -34,19 +33,24 @@ std::optional<WallAngle> SharpestAt(const StarComplex<K>& complex, std::uint32_t
 
 template <int K>
 std::optional<WallAngle> Sharpest(const StarComplex<K>& complex) {
-  std::optional<WallAngle> sharpest;
+  std::optional<WallCosine> sharpest;
+  std::uint32_t at = 0;
   for (std::uint32_t p = 0; p < complex.size(); ++p) {
     CheckInterruption(p);
-    std::optional<WallAngle> here = SharpestAt<K>(complex, p);
-    if (!here || (sharpest && sharpest->degrees <= here->degrees)) continue;
-    sharpest = std::move(here);
-    sharpest->point = Eigen::Map<const Eigen::VectorXd>(complex.Point(p), complex.d());
+    const std::optional<WallCosine> here = SharpestAt<K>(complex, p);
+    if (!here || (sharpest && sharpest->cosine >= here->cosine)) continue;
+    sharpest = here;
+    at = p;
   }
-  return sharpest;
+  if (!sharpest) return std::nullopt;
+  const double degrees =
+      std::acos(std::clamp(sharpest->cosine, -1.0, 1.0)) * 180 / std::numbers::pi;
+  return WallAngle{sharpest->walls, degrees,
+                   Eigen::Map<const Eigen::VectorXd>(complex.Point(at), complex.d())};
 }
 
-#define STELLATE_EACH(K)                                                                 \
-  template std::optional<WallAngle> SharpestAt<K>(const StarComplex<K>&, std::uint32_t); \
+#define STELLATE_EACH(K)                                                                  \
+  template std::optional<WallCosine> SharpestAt<K>(const StarComplex<K>&, std::uint32_t); \
   template std::optional<WallAngle> Sharpest<K>(const StarComplex<K>&);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

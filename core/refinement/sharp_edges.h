@@ -11,12 +11,17 @@ namespace stellate::core {
 // Where walls meet at small angles. There the refinement of one wall encroaches on the other and
 // that on the first, without end, unless the edge between them is guarded.
 
-// The two walls at a point that meet at the smallest angle inside of M, by their conormals. Nothing
-// where it is on fewer than two. `point` is left empty.
-template <int K>
-std::optional<WallAngle> SharpestAt(const StarComplex<K>& complex, std::uint32_t p);
+struct WallCosine {
+  WallSet walls = 0;  // two
+  double cosine = 0;  // of the angle at which they meet inside of M
+};
 
-// The same of all points.
+// The two walls at a point that meet at the smallest angle, by their conormals. Nothing where it is
+// on fewer than two.
+template <int K>
+std::optional<WallCosine> SharpestAt(const StarComplex<K>& complex, std::uint32_t p);
+
+// The same of all points, as reports have it.
 template <int K>
 std::optional<WallAngle> Sharpest(const StarComplex<K>& complex);
 

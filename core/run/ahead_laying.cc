@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/interruption.h"
+#include "core/base/power.h"
 #include "core/growth/growth.h"
 #include "core/refinement/rehearsal.h"
 
@@ -252,7 +253,7 @@ void AheadLaying<K>::LayCoarse() {
   const AnsweredPoints seeds = PointsOf<K>(coarse_->complex());
   Specification coarse = CoarserThan<K>(spec_, kLeastCoarse * engine_.criteria().epsilon);
   coarse.limits.max_vertices = static_cast<std::uint64_t>(std::ceil(
-      kCoarseSlack * static_cast<double>(coarse.limits.max_vertices) / std::pow(kLeastCoarse, K)));
+      kCoarseSlack * static_cast<double>(coarse.limits.max_vertices) / Power(kLeastCoarse, K)));
   coarse_ = std::make_unique<Engine<K>>(coarse, Resolve(coarse));
   rings_.emplace(*coarse_, spec_, kCoarseApart);
   rings_->Begin(seeds);
@@ -342,7 +343,7 @@ template <int K>
 double AheadLaying<K>::CountMissing() const {
   if (stage_ == Stage::kRings) return rings_->CountMissing();
   return guess_ ? static_cast<double>(asked_.cols())
-                : std::pow(kPatchesApart, K) * engine_.complex().size();
+                : Power(kPatchesApart, K) * engine_.complex().size();
 }
 
 STELLATE_INSTANTIATE_CLASS(AheadLaying)

@@ -41,7 +41,8 @@ std::vector<std::uint8_t> InteriorRoom<K>::HaveRoom(const Eigen::MatrixXd& point
 // The wall's point is nearest to both ends where it is between them, in the middle.
 template <int K>
 bool InteriorRoom<K>::IsSurelyInside(const double* point, double reach) const {
-  return !complex_.AnyWithin(point, std::hypot(kWallCovering * epsilon_, reach / 2));
+  const double covering = kWallCovering * epsilon_;
+  return !complex_.AnyWithin(point, std::sqrt(covering * covering + reach * reach / 4));
 }
 
 template <int K>

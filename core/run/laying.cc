@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/interruption.h"
+#include "core/base/power.h"
 #include "core/growth/lattice.h"
 #include "core/run/ahead_laying.h"
 #include "core/run/ring_laying.h"
@@ -44,7 +45,7 @@ double GuessSize(int k, const AnsweredPoints& seeds, double epsilon) {
   std::size_t count = found;
   for (; 2 * count > found && found > 1; apart *= 2)
     count = CountApart(seeds, seeds.points.cols(), 2 * apart);
-  return static_cast<double>(count) * std::pow(apart / epsilon, k);
+  return static_cast<double>(count) * Power(apart / epsilon, k);
 }
 
 // Of seeds drawn to ask ahead from only as many tell as there would be else.

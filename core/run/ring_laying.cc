@@ -1,9 +1,10 @@
 #include "core/run/ring_laying.h"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <utility>
+
+#include "core/base/power.h"
 
 namespace stellate::core {
 namespace {
@@ -159,7 +160,7 @@ std::vector<std::uint8_t> RingLaying<K>::Take(const CandidateSet<K>&,
 template <int K>
 double RingLaying<K>::CountMissing() const {
   const double here = 2.0 * static_cast<double>(growth_.border());
-  return scouting_ ? here + std::pow(apart_, K) * static_cast<double>(scouting_->size()) : here;
+  return scouting_ ? here + Power(apart_, K) * static_cast<double>(scouting_->size()) : here;
 }
 
 STELLATE_INSTANTIATE_CLASS(RingLaying)

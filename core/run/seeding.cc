@@ -1,9 +1,9 @@
 #include "core/run/seeding.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/base/message.h"
+#include "core/base/power.h"
 #include "core/base/random.h"
 
 namespace stellate::core {
@@ -17,7 +17,7 @@ constexpr double kMostAheadSeeds[kMaxDimension + 1] = {0, 100, 1000, 1000, 3000,
 
 int SeedsToAskAheadFrom(const Specification& spec) {
   const double width = (spec.bounding_box->upper - spec.bounding_box->lower).norm();
-  const double vertices = std::pow(width / spec.epsilon, spec.dimension);
+  const double vertices = Power(width / spec.epsilon, spec.dimension);
   return static_cast<int>(std::clamp(kSeedShare * vertices, kLeastAheadSeeds[spec.dimension],
                                      kMostAheadSeeds[spec.dimension]));
 }

@@ -58,7 +58,7 @@ void TangentFinder::Ask() {
         const double* guess = guesses_[static_cast<std::size_t>(point)] + j * d_;
         u = Eigen::Map<const Eigen::VectorXd>(guess, d_);
       } else {
-        for (int a = 0; a < d_; ++a) u[a] = random.Normal();
+        for (int a = 0; a < d_; ++a) u[a] = random.NearlyNormal();
         u.normalize();
       }
       block_.points.col((i * m + j) * 2) = points_.col(point) + StepAt(point) * u;

@@ -2,7 +2,6 @@
 
 #include <Eigen/QR>
 #include <bit>
-#include <cmath>
 #include <map>
 #include <string>
 
@@ -13,8 +12,8 @@ namespace stellate::core {
 namespace {
 
 constexpr int kPointsOfWall = 4;
-// Conormals turned by this much, radians, did no harm in trials; turned by 0.3 they did.
-constexpr double kMostTurned = 0.2;
+// Conormals turned by 0.2 radians did no harm in trials; turned by 0.3 they did.
+constexpr double kTangentOfMostTurned = 0.2027100355086725;
 // Of a step: what is farther off is not there.
 constexpr double kOff = 0.5;
 
@@ -41,7 +40,7 @@ Eigen::MatrixXd WallCheck::Questions(const AnsweredPoints& answers) {
     for (int a = 1; a < k_; ++a)
       for (const double sign : {1.0, -1.0})
         asked.push_back(p +
-                        step_ * (sign * (tangents * q.col(a)) - std::tan(kMostTurned) * conormal));
+                        step_ * (sign * (tangents * q.col(a)) - kTangentOfMostTurned * conormal));
   }
   Eigen::MatrixXd points(d_, static_cast<Eigen::Index>(asked.size()));
   for (std::size_t n = 0; n < asked.size(); ++n)

@@ -36,7 +36,6 @@ constexpr Row kRows[] = {
     {FailureReason::kJournalFailed, "JOURNAL_FAILED"},
     {FailureReason::kReplayMismatch, "REPLAY_MISMATCH"},
     {FailureReason::kInternal, "INTERNAL"},
-    {FailureReason::kRemoved, "REMOVED"},
 };
 
 }  // namespace

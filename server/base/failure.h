@@ -35,7 +35,6 @@ enum class FailureReason {
   kJournalFailed,    // the record cannot be written, or read back
   kReplayMismatch,   // recorded by a server that meshes otherwise
   kInternal,         // a fault of the server
-  kRemoved,          // in journals of earlier versions alone: it was being removed
 };
 
 // The name in errors.proto without its prefix; "" of kNone.

@@ -30,7 +30,7 @@ std::uint64_t DefaultOwnerBytes(const std::string& directory, std::uint64_t max_
 // disk before the call returns.
 class Journal {
  public:
-  // Opens the record of an earlier server, or begins one; one of the version before is taken over.
+  // Opens the record of an earlier server, or begins one.
   // Refuses, with kFailedPrecondition, words for people, and without changing a byte: a file that
   // is no journal, one of another version, one that is damaged anywhere (every record is read, and
   // none is missing), and one that another server has open.

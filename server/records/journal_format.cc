@@ -15,7 +15,7 @@ constexpr std::size_t kPartBytes = std::size_t{1} << 20;  // SQLite copies a lar
 
 // `Value` is const when writing.
 template <typename Archive, typename Value>
-void LayOutSpecification(Archive& archive, Value& spec, std::uint32_t version = kJournalVersion) {
+void LayOutSpecification(Archive& archive, Value& spec) {
   archive.Number(spec.dimension);
   archive.Number(spec.ambient_dimension);
   archive.Number(spec.epsilon);
@@ -29,14 +29,10 @@ void LayOutSpecification(Archive& archive, Value& spec, std::uint32_t version = 
   }
   archive.Numbers(spec.seeds);
   archive.Number(spec.box_seeds);
-  if (version > 4) {
-    archive.Number(spec.components);
-    archive.Number(spec.audit);
-  }
-  if (version > 5) {
-    archive.Maybe(spec.declared_reach);
-    archive.Number(spec.cover_box);
-  }
+  archive.Number(spec.components);
+  archive.Number(spec.audit);
+  archive.Maybe(spec.declared_reach);
+  archive.Number(spec.cover_box);
   archive.Number(spec.random_seed);
   auto& criteria = spec.criteria;
   archive.Number(criteria.radius_edge_bound);
@@ -54,6 +50,8 @@ void LayOutSpecification(Archive& archive, Value& spec, std::uint32_t version = 
   archive.Number(spec.limits.max_rounds);
   archive.Number(spec.limits.max_batch_queries);
   archive.Number(spec.threads);
+  archive.Number(spec.walls);
+  archive.Number(spec.oracle.conormals);
 }
 
 std::int64_t ToNumber(SystemTime time) {
@@ -161,35 +159,21 @@ std::string EncodeStart(const MeshRequest& request, SystemTime create_time) {
   writer.Number(request.timeouts.worker_wait.count());
   LayOutSpecification(writer, request.spec);
   writer.Number(request.timeouts.busy_limit.count());
-  if (request.spec.walls > 0) {
-    writer.Number(request.spec.walls);
-    writer.Number(request.spec.oracle.conormals);
-  }
   return writer.Take();
 }
 
 bool DecodeStart(std::string_view record, MeshRequest* request, SystemTime* create_time) {
-  return DecodeEarlierStart(record, kJournalVersion, request, create_time);
-}
-
-bool DecodeEarlierStart(std::string_view record, std::uint32_t version, MeshRequest* request,
-                        SystemTime* create_time) {
   RecordReader reader(record);
   std::int64_t time = 0;
-  Clock::rep answer_limit = 0, worker_wait = 0;
-  Clock::rep busy_limit = request->timeouts.busy_limit.count();
+  Clock::rep answer_limit = 0, worker_wait = 0, busy_limit = 0;
   reader.Bytes(request->name);
   reader.Bytes(request->owner);
   reader.Bytes(request->label);
   reader.Number(time);
   reader.Number(answer_limit);
   reader.Number(worker_wait);
-  LayOutSpecification(reader, request->spec, version);
-  if (!reader.Complete()) reader.Number(busy_limit);  // earlier records end before it
-  if (!reader.Complete()) {
-    reader.Number(request->spec.walls);
-    reader.Number(request->spec.oracle.conormals);
-  }
+  LayOutSpecification(reader, request->spec);
+  reader.Number(busy_limit);
   *create_time = ToTime(time);
   request->timeouts.answer_limit = Clock::duration(answer_limit);
   request->timeouts.worker_wait = Clock::duration(worker_wait);

@@ -15,7 +15,7 @@
 namespace stellate::server {
 
 // What a journal's records hold. A change of any of these is a new kJournalVersion.
-inline constexpr std::uint32_t kJournalVersion = 6;
+inline constexpr std::uint32_t kJournalVersion = 7;
 
 // Where a record belongs. Numbers are stored: they stay as they are.
 enum class RecordKind : std::int64_t {
@@ -61,10 +61,6 @@ std::string EncodeStart(const MeshRequest& request,
 // False: no such record.
 bool DecodeStart(std::string_view record, MeshRequest* request,
                  std::chrono::system_clock::time_point* create_time);
-
-// The same of a record of version 4 or 5; its bytes are not those of EncodeStart.
-bool DecodeEarlierStart(std::string_view record, std::uint32_t version, MeshRequest* request,
-                        std::chrono::system_clock::time_point* create_time);
 
 // Queries [first, end) of a block.
 struct AnswerRange {

@@ -12,8 +12,6 @@
 #include <system_error>
 
 #include "core/base/message.h"
-#include "server/base/log.h"
-#include "server/storage/earlier_journal.h"
 
 namespace stellate::server {
 namespace {
@@ -25,11 +23,6 @@ constexpr std::string_view kDatabaseMagic("SQLite format 3\0", 16);
 constexpr std::size_t kHeaderBytes = 100;
 constexpr std::size_t kVersionAt = 60, kApplicationAt = 68;  // in the header, high byte first
 constexpr std::size_t kFormatAt = 18;                        // two bytes; 2: with a log
-constexpr std::uint32_t kEarliestVersion = 4;
-
-bool IsEarlier(std::uint32_t version) {
-  return version >= kEarliestVersion && version < kJournalVersion;
-}
 
 Status Unusable(std::string message) {
   return {core::StatusCode::kFailedPrecondition, std::move(message)};
@@ -116,16 +109,15 @@ core::Expected<std::uint32_t> DataDirectory::VersionOfJournal() const {
 core::Expected<std::unique_ptr<JournalFile>> DataDirectory::OpenJournal() const {
   const auto version = VersionOfJournal();
   if (!version) return tl::unexpected(version.error());
-  if (*version != kJournalVersion && !IsEarlier(*version) && IsOfThisVersion()) {
+  if (*version != kJournalVersion && IsOfThisVersion()) {
     return tl::unexpected(DamagedJournal(journal(), "its beginning"));
   }
   if (*version != kJournalVersion) {
-    return tl::unexpected(Unusable(
-        Message(journal(), " is a journal of version ", *version, " but this server reads version ",
-                std::to_string(kJournalVersion), "; it was left as it is: ",
-                IsEarlier(*version) ? "start the server on it, which takes it over"
-                                    : "run the server that wrote it, or choose another "
-                                      "--data-dir")));
+    return tl::unexpected(
+        Unusable(Message(journal(), " is a journal of version ", *version,
+                         " but this server reads version ", std::to_string(kJournalVersion),
+                         "; it was left as it is: run the server that wrote it, or choose another "
+                         "--data-dir")));
   }
   auto beside = JournalMark::Open(mark());
   if (!beside) return tl::unexpected(DamagedJournal(journal(), beside.error().message));
@@ -139,11 +131,7 @@ core::Expected<std::unique_ptr<JournalFile>> DataDirectory::OpenJournal() const 
 
 core::Expected<std::unique_ptr<JournalFile>> DataDirectory::TakeJournal() const {
   Status status;
-  if (!HasJournal()) {
-    status = Install([](JournalFile*) { return Status::Ok(); });
-  } else if (const auto version = VersionOfJournal(); version && IsEarlier(*version)) {
-    status = TakeOver(*version);
-  }
+  if (!HasJournal()) status = Install([](JournalFile*) { return Status::Ok(); });
   if (!status.ok()) return tl::unexpected(std::move(status));
   auto file = OpenJournal();
   if (!file) return file;
@@ -193,25 +181,6 @@ Status DataDirectory::Install(const std::function<Status(JournalFile*)>& fill) c
   unlink(log().c_str());
   SyncDirectory(path_);
   return Status::Ok();
-}
-
-// The earlier one stays next to it, for whoever wants to go back.
-Status DataDirectory::TakeOver(std::uint32_t version) const {
-  const std::string kept = Message(path_, "/journal-version-", std::to_string(version), ".sqlite");
-  Log(LogLevel::kInfo, {}, Message("taking over an earlier journal; it is kept as ", kept));
-  EarlierJournal earlier(journal(), version);
-  Status status = earlier.Open();
-  if (!status.ok()) return status;
-  status = Install([&](JournalFile* file) {
-    Status copied = earlier.CopyTo(file);
-    if (!copied.ok()) return copied;
-    Status closed = earlier.Close();  // its log goes into it
-    if (!closed.ok()) return closed;
-    unlink(kept.c_str());
-    if (link(journal().c_str(), kept.c_str()) == 0) return Status::Ok();
-    return Unusable(Message("cannot keep ", kept, ": ", std::strerror(errno)));
-  });
-  return status;
 }
 
 }  // namespace stellate::server

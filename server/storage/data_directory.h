@@ -24,7 +24,7 @@ class DataDirectory {
   bool IsOfThisVersion() const;
   // As JournalFile::Open; of this version, or refused without changing a byte.
   core::Expected<std::unique_ptr<JournalFile>> OpenJournal() const;
-  // As OpenJournal; where there is none begins one, and takes one of an earlier version over.
+  // As OpenJournal; where there is none begins one.
   core::Expected<std::unique_ptr<JournalFile>> TakeJournal() const;
 
   // Puts a new journal, filled by `fill`, in the place of the one that is there. A kill leaves
@@ -41,7 +41,6 @@ class DataDirectory {
   DataDirectory(std::string path, int lock) : path_(std::move(path)), lock_(lock) {}
   // Of the journal that is there; kFailedPrecondition: it is none.
   core::Expected<std::uint32_t> VersionOfJournal() const;
-  core::Status TakeOver(std::uint32_t version) const;
 
   const std::string path_;
   const int lock_;

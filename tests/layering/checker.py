@@ -13,6 +13,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 SOURCES = {".h", ".cc", ".cpp", ".in", ".py"}
+# What the C library rounds as the processor has it, by whatever name it is called.
+INEXACT = re.compile(
+    r"(?:\bstd::|\.|(?<![\w:>])::|(?<![\w:>.]))"
+    r"(a?(?:sin|cos|tan)h?|atan2|exp2?|expm1|log(?:2|10|1p)?|pow|hypot|cbrt|erfc?|[lt]gamma|fma)[fl]?"
+    r"\s*\(|std::(normal_distribution|exponential_distribution)\b"
+)
+COMMENT = re.compile(r"//[^\n]*")
 INCLUDE = re.compile(r'^\s*#\s*include\s+(?:"([^"]+)"|<([^>]+)>)', re.MULTILINE)
 
 
@@ -25,6 +32,8 @@ class Table:
     generated: Mapping[str, str] = field(default_factory=dict)  # include prefix: room
     packages: Mapping[str, str] = field(default_factory=dict)  # Python package: its folder
     watched: tuple[str, ...] = ()  # folders of which every source must be in a room
+    # Folders whose results must be the same on every processor, and their files that may round.
+    exact: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     acyclic: tuple[str, ...] = ()  # folders whose files must not take from each other in a circle
 
 
@@ -119,6 +128,20 @@ class Tree:
         return list(self.takes_of_cpp(file, text))
 
 
+def faults_of_rounding(tree: Tree, file: str) -> Iterator[str]:
+    """What makes a result hang on the processor, where it must not."""
+    folders = [folder for folder in tree.table.exact if lies_in(file, folder)]
+    if not folders or any(file in tree.table.exact[folder] for folder in folders):
+        return
+    text = COMMENT.sub("", (tree.root / file).read_text(encoding="utf-8"))
+    for match in INEXACT.finditer(text):
+        line = text.count("\n", 0, match.start()) + 1
+        yield (
+            f"{file}:{line}: {match[1] or match[2]} is rounded as the processor has it: take + - * / "
+            "and sqrt (core/base/random.h, core/base/power.h), or the mesh is another elsewhere"
+        )
+
+
 def statements(tree: ast.AST, now: bool = True) -> Iterator[tuple[ast.AST, bool]]:
     for node in ast.iter_child_nodes(tree):
         yield node, now
@@ -202,6 +225,7 @@ def faults(root: pathlib.Path, table: Table) -> list[str]:
             if any(lies_in(file, folder) for folder in table.watched):
                 found.append(f"{file}: is in no room of the table")
             continue
+        found.extend(faults_of_rounding(tree, file))
         for take in tree.takes(file):
             if wrong := fault_of(tree, file, room, take):
                 found.append(f"{file}:{take.line}: {wrong}")

@@ -30,6 +30,7 @@ MADE_UP = checker.Table(
     generated={"made/v1/": "proto"},
     packages={"pack": "client/pack"},
     watched=("core", "server"),
+    exact={"core": ("core/words.cc",)},
     acyclic=("core", "client"),
 )
 SOUND = {
@@ -97,6 +98,23 @@ class Made(unittest.TestCase):
             found = self.faults({"server/tool.py": f"def f():\n    {line}\n"})
             self.assertEqual(len(found), 1, line)
             self.assertIn("server/tool.py:2", found[0])
+
+    def test_what_the_processor_rounds_is_kept_out(self):
+        for call in (
+            "std::log(x)",
+            "pow(x, 3)",
+            "::cosf(x)",
+            "x.array().exp()",
+            "std::hypot (x, y)",
+        ):
+            (fault,) = self.faults({"core/shape/cell.h": f"\nreturn {call};\n"})
+            self.assertIn("core/shape/cell.h:2", fault, call)
+        (fault,) = self.faults({"core/face.h": "std::normal_distribution<double> normal;\n"})
+        self.assertIn("normal_distribution", fault)
+        for line in ("return std::sqrt(x);", "// std::log(x)", "log_(x); Catalog(x); log.Add(x);"):
+            self.assertEqual(self.faults({"core/shape/cell.h": line + "\n"}), [], line)
+        self.assertEqual(self.faults({"core/words.cc": "std::acos(x);\n"}), [])
+        self.assertEqual(self.faults({"client/pack/exact.cc": "std::acos(x);\n"}), [])
 
     def test_files_in_a_circle_are_named(self):
         for changes in (

@@ -21,7 +21,7 @@ struct RandomSimplex {
 
   explicit RandomSimplex(int d) : coordinates(static_cast<std::size_t>((J + 1) * d)) {
     Random random(3);
-    for (double& x : coordinates) x = random.Normal();
+    for (double& x : coordinates) x = random.NearlyNormal();
     for (int i = 0; i <= J; ++i) {
       vertices[static_cast<std::size_t>(i)] = coordinates.data() + i * d;
     }

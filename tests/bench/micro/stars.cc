@@ -28,7 +28,7 @@ struct HalfSpaces final : Surroundings<K> {
       std::array<double, K> normal;
       double norm2 = 0;
       for (double& x : normal) {
-        x = random.Normal();
+        x = random.NearlyNormal();
         norm2 += x * x;
       }
       const double length = (1.5 + random.Uniform()) / std::sqrt(norm2);

@@ -15,8 +15,8 @@ TEST(VectorOps, AreTheSumsForEveryLength) {
     std::vector<double> a, b;
     double dot = 0, squared = 0;
     for (int i = 0; i < d; ++i) {
-      a.push_back(random.Normal());
-      b.push_back(random.Normal());
+      a.push_back(random.NearlyNormal());
+      b.push_back(random.NearlyNormal());
       dot += a.back() * b.back();
       squared += (a.back() - b.back()) * (a.back() - b.back());
     }
@@ -32,8 +32,8 @@ TEST(VectorOps, DoNotDependOnAlignment) {
   constexpr int kLength = 37;
   std::vector<double> a(kLength), b(kLength);
   for (int i = 0; i < kLength; ++i) {
-    a[static_cast<std::size_t>(i)] = random.Normal();
-    b[static_cast<std::size_t>(i)] = random.Normal();
+    a[static_cast<std::size_t>(i)] = random.NearlyNormal();
+    b[static_cast<std::size_t>(i)] = random.NearlyNormal();
   }
   for (std::size_t shift = 1; shift < 5; ++shift) {
     std::vector<double> moved(kLength + shift);

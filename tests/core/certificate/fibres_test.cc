@@ -16,7 +16,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 std::vector<double> RandomPoints(int d, int count, double spread, std::uint64_t seed) {
   Random random(seed);
   std::vector<double> points;
-  for (int i = 0; i < d * count; ++i) points.push_back(spread * random.Normal());
+  for (int i = 0; i < d * count; ++i) points.push_back(spread * random.NearlyNormal());
   return points;
 }
 

@@ -13,7 +13,7 @@ namespace {
 // With vertices moved at random.
 HandmadeMesh Shaken(HandmadeMesh mesh, double by) {
   Random random(11);
-  for (double& x : mesh.points) x += by * random.Normal();
+  for (double& x : mesh.points) x += by * random.NearlyNormal();
   return mesh;
 }
 

@@ -61,7 +61,7 @@ Vertices<K> VerticesOf(const RestrictedVoronoiCell<K>& cell) {
 // An orthogonal matrix.
 Eigen::MatrixXd RandomTurn(int k, Random& random) {
   Eigen::MatrixXd m(k, k);
-  for (int i = 0; i < k * k; ++i) m(i) = random.Normal();
+  for (int i = 0; i < k * k; ++i) m(i) = random.NearlyNormal();
   return Eigen::HouseholderQR<Eigen::MatrixXd>(m).householderQ();
 }
 

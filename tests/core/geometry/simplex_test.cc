@@ -37,14 +37,14 @@ Simplex Regular(int j) { return Simplex(Eigen::MatrixXd::Identity(j + 1, j + 1))
 Simplex RandomSimplex(int j, int d, std::uint64_t seed) {
   Random random(seed);
   Eigen::MatrixXd v(d, j + 1);
-  for (Eigen::Index i = 0; i < v.size(); ++i) v(i) = random.Normal();
+  for (Eigen::Index i = 0; i < v.size(); ++i) v(i) = random.NearlyNormal();
   return Simplex(v);
 }
 
 Eigen::MatrixXd RandomOrthonormal(int d, int k, std::uint64_t seed) {
   Random random(seed);
   Eigen::MatrixXd m(d, k);
-  for (Eigen::Index i = 0; i < m.size(); ++i) m(i) = random.Normal();
+  for (Eigen::Index i = 0; i < m.size(); ++i) m(i) = random.NearlyNormal();
   return Eigen::HouseholderQR<Eigen::MatrixXd>(m).householderQ() * Eigen::MatrixXd::Identity(d, k);
 }
 

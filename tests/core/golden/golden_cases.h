@@ -20,6 +20,7 @@ struct GoldenCase {
   std::function<void(Specification&)> change = [](Specification&) {};
   // What is done to the answers to a round, before they are given.
   std::function<void(const Specification&, const QueryBatch&, Answers&)> spoil = {};
+  bool answered_by_library = false;  // by the C library's functions, which round as they like
   std::uint64_t cancel_before = 0, fail_before = 0, interrupt_before = 0;  // rounds; 0: never
 };
 
@@ -95,7 +96,13 @@ inline std::vector<GoldenCase> Cases() {
   return {
       // Oracles and dimensions.
       {"circle", "A circle in R^10, flats and tangents given", "circle:10", 0.1},
-      {"knot_poor", "A knot, closest points alone", "torus-knot:2:3", 0.1, ClosestPointsAlone},
+      {"knot_poor",
+       "A knot, closest points alone",
+       "torus-knot:2:3",
+       0.1,
+       ClosestPointsAlone,
+       {},
+       true},
       {"torus", "A torus, flats and tangents given", "torus", 0.25},
       {"torus_poor", "A torus, closest points alone", "torus", 0.3, ClosestPointsAlone},
       {"rp2_alternating", "A projective plane, tangents given, flats approached in three steps",
@@ -178,17 +185,27 @@ inline std::vector<GoldenCase> Cases() {
        [](S& s) { s.limits.max_vertices = 150; }},
       {"round_budget", "A torus, at most 9 rounds", "torus", 0.2,
        [](S& s) { s.limits.max_rounds = 9; }},
-      {"cancelled", "A torus, cancelled after 6 rounds", "torus", 0.2, [](S&) {}, {}, 7},
+      {"cancelled", "A torus, cancelled after 6 rounds", "torus", 0.2, [](S&) {}, {}, false, 7},
       {"oracle_failed",
        "A torus whose oracle fails after 6 rounds",
        "torus",
        0.2,
        [](S&) {},
        {},
+       false,
        0,
        7},
       {"no_seeds", "Nothing is found", "torus", 0.2, ClosestPointsAlone, NothingIsFound},
-      {"interrupted", "A torus, interrupted in round 6", "torus", 0.2, [](S&) {}, {}, 0, 0, 6},
+      {"interrupted",
+       "A torus, interrupted in round 6",
+       "torus",
+       0.2,
+       [](S&) {},
+       {},
+       false,
+       0,
+       0,
+       6},
       {"not_idempotent", "Answers that do not stay where they were, refused, then put right",
        "sphere:2", 0.4, [](S& s) { s.oracle.intersect_flat = false; }, MoveTheSecondRound},
       {"sizes_change", "Sizes that are told otherwise when asked again, refused, then put right",
@@ -211,9 +228,9 @@ inline std::vector<GoldenCase> Cases() {
          s.oracle = {};
          s.limits.max_rounds = 100;
        },
-       Jitter},
+       Jitter, true},
       {"stalls", "A circle with waves shorter than epsilon", "circle:3", 0.3,
-       [](S& s) { s.oracle = {}; }, Jitter},
+       [](S& s) { s.oracle = {}; }, Jitter, true},
       {"grows", "A 3-sphere, fatter tetrahedra asked for than there are", "sphere:3", 0.9,
        [](S& s) {
          s.criteria.sliver_bound = 0.3;

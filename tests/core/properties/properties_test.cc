@@ -86,7 +86,7 @@ class Properties : public ::testing::TestWithParam<Shape> {
     Motion motion = Motion::None(d());
     motion.scale = std::pow(10.0, decades * (2 * random.Uniform() - 1));
     motion.turn = RandomTurn(d(), random);
-    for (int i = 0; i < d(); ++i) motion.shift[i] = far * motion.scale * random.Normal();
+    for (int i = 0; i < d(); ++i) motion.shift[i] = far * motion.scale * random.NearlyNormal();
     return motion;
   }
 
@@ -172,7 +172,7 @@ TEST_P(Properties, FarFromTheOriginIsLikeAnywhere) {
   Try([&](std::uint64_t seed, Random& random) {
     Motion motion = RandomMotion(random, 6, 0);
     Eigen::VectorXd away(d());
-    for (int i = 0; i < d(); ++i) away[i] = random.Normal();
+    for (int i = 0; i < d(); ++i) away[i] = random.NearlyNormal();
     const double epsilon = epsilon_ * motion.scale;
     motion.shift = GetParam().far * epsilon * away.normalized();
     Transformed moved(*manifold_, motion);

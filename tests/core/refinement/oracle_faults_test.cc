@@ -367,7 +367,7 @@ TEST_P(Imperfections, PointsMayBeWrongByATenThousandthOfEpsilon) {
       for (Eigen::Index j = 0; j < asked.size(); ++j) {
         Random random(HashOf(asked.points, j));
         Eigen::VectorXd noise(asked.points.rows());
-        for (double& x : noise) x = random.Normal();
+        for (double& x : noise) x = random.NearlyNormal();
         if (asked.kind == QueryKind::kIntersectFlat) {  // an answer off the flat would be refused
           using RowMajor = Eigen::Matrix<double, -1, -1, Eigen::RowMajor>;
           const Eigen::Map<const RowMajor> basis(asked.bases.col(j).data(), noise.size(),

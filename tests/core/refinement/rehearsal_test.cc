@@ -15,7 +15,7 @@ using testing::StepOnSphere;
 Eigen::MatrixXd ManySeeds() {
   Eigen::MatrixXd seeds(3, 300);
   Random random(4);
-  for (Eigen::Index i = 0; i < seeds.size(); ++i) seeds.data()[i] = random.Normal();
+  for (Eigen::Index i = 0; i < seeds.size(); ++i) seeds.data()[i] = random.NearlyNormal();
   return seeds;
 }
 

@@ -78,7 +78,7 @@ class TangentFinderTest : public ::testing::TestWithParam<std::string> {
     Eigen::MatrixXd basis = Exact(i);
     for (int a = 0; a < k_; ++a) {
       Eigen::VectorXd u(d_);
-      for (double& x : u) x = random.Normal();
+      for (double& x : u) x = random.NearlyNormal();
       u -= Exact(i) * (Exact(i).transpose() * u);
       basis.col(a) = std::cos(angle) * basis.col(a) + std::sin(angle) * u.normalized();
     }

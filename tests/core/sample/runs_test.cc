@@ -17,7 +17,7 @@ std::vector<double> Walk(int d, std::size_t count) {
   std::vector<double> x(count * static_cast<std::size_t>(d)), at(static_cast<std::size_t>(d));
   for (std::size_t i = 0; i < count; ++i) {
     const double step = random.Uniform() < 0.05 ? 10 : 0.1;
-    for (double& c : at) c += step * random.Normal();
+    for (double& c : at) c += step * random.NearlyNormal();
     std::copy(at.begin(), at.end(), x.begin() + static_cast<std::ptrdiff_t>(i * at.size()));
   }
   return x;

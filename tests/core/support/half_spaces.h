@@ -35,7 +35,7 @@ inline double Weight(std::uint32_t id) {
 template <int K>
 Vec<K> RandomUnit(Random& random) {
   Vec<K> u;
-  for (int a = 0; a < K; ++a) u[a] = random.Normal();
+  for (int a = 0; a < K; ++a) u[a] = random.NearlyNormal();
   return u.normalized();
 }
 

@@ -29,7 +29,7 @@ struct Motion {
 
 inline Eigen::MatrixXd RandomTurn(int d, Random& random) {
   Eigen::MatrixXd entries(d, d);
-  for (Eigen::Index i = 0; i < entries.size(); ++i) entries.data()[i] = random.Normal();
+  for (Eigen::Index i = 0; i < entries.size(); ++i) entries.data()[i] = random.NearlyNormal();
   return Eigen::HouseholderQR<Eigen::MatrixXd>(entries).householderQ();
 }
 

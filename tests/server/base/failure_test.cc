@@ -12,7 +12,7 @@ using core::StatusCode;
 
 TEST(FailureReason, EachHasANameOfItsOwnByWhichItIsFound) {
   std::set<std::string> names;
-  for (int value = 0; value <= static_cast<int>(FailureReason::kRemoved); ++value) {
+  for (int value = 0; value <= static_cast<int>(FailureReason::kInternal); ++value) {
     const auto reason = static_cast<FailureReason>(value);
     EXPECT_TRUE(names.insert(FailureReasonName(reason)).second) << value;
     EXPECT_EQ(FailureReasonOf(FailureReasonName(reason)), reason) << value;

@@ -78,7 +78,7 @@ TEST(ErrorMap, CutKeepsCharactersWhole) {
 
 // What ends a mesh is told by the names that errors.proto promises.
 TEST(ErrorMap, KnowsEachReasonThatAMeshFailsFor) {
-  for (int value = 1; value < static_cast<int>(FailureReason::kRemoved); ++value) {
+  for (int value = 1; value <= static_cast<int>(FailureReason::kInternal); ++value) {
     const auto reason = static_cast<FailureReason>(value);
     if (reason == FailureReason::kCancelled) continue;  // ends a mesh without a failure
     v1::ErrorReason known{};

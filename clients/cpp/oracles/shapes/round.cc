@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "shapes/length.h"
 #include "shapes/shapes.h"
 
 namespace stellate::shapes {
@@ -93,7 +94,7 @@ class CirclesShape final : public PointwiseOracle {
   bool Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const override {
     y.resize(ambient_dimension());
     for (int i = 0; i < dimension(); ++i) {
-      const double norm = std::hypot(x[2 * i], x[2 * i + 1]);
+      const double norm = Length(x[2 * i], x[2 * i + 1]);
       if (!std::isfinite(norm)) return false;
       const double r = radii_[Index(i)];
       y[2 * i] = norm > 0 ? r * (x[2 * i] / norm) : r;
@@ -104,7 +105,7 @@ class CirclesShape final : public PointwiseOracle {
   void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const override {
     tangent.setZero(ambient_dimension(), dimension());
     for (int i = 0; i < dimension(); ++i) {
-      const double norm = std::hypot(y[2 * i], y[2 * i + 1]);
+      const double norm = Length(y[2 * i], y[2 * i + 1]);
       tangent(2 * i, i) = -y[2 * i + 1] / norm;
       tangent(2 * i + 1, i) = y[2 * i] / norm;
     }

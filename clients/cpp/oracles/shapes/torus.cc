@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "shapes/length.h"
 #include "shapes/shapes.h"
 
 namespace stellate::shapes {
@@ -17,15 +18,15 @@ class TorusShape final : public PointwiseOracle {
     if (!x.allFinite()) return false;
     const Eigen::Vector3d around = Around(x);
     // In the half plane through x: the tube's centre is (R, 0).
-    const double u = std::hypot(x[0], x[1]) - R_;
-    const double norm = std::hypot(u, x[2]);
+    const double u = Length(x[0], x[1]) - R_;
+    const double norm = Length(u, x[2]);
     const double outward = norm > 0 ? u / norm : 1, up = norm > 0 ? x[2] / norm : 0;
     y = (R_ + r_ * outward) * around + r_ * up * Eigen::Vector3d::UnitZ();
     return true;
   }
   void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const override {
     const Eigen::Vector3d around = Around(y);
-    const Eigen::Vector2d normal = Eigen::Vector2d(std::hypot(y[0], y[1]) - R_, y[2]).normalized();
+    const Eigen::Vector2d normal = Eigen::Vector2d(Length(y[0], y[1]) - R_, y[2]).normalized();
     tangent.resize(3, 2);
     tangent.col(0) << -around[1], around[0], 0;
     tangent.col(1) = -normal[1] * around + normal[0] * Eigen::Vector3d::UnitZ();
@@ -33,13 +34,13 @@ class TorusShape final : public PointwiseOracle {
   // The medial axis is the circle inside the tube, and the axis of revolution.
   bool has_local_size() const override { return true; }
   double SizeAt(const Eigen::VectorXd& y) const override {
-    return std::min(r_, std::hypot(y[0], y[1]));
+    return std::min(r_, Length(y[0], y[1]));
   }
 
  private:
   // The unit horizontal vector from the axis to x.
   static Eigen::Vector3d Around(const Eigen::VectorXd& x) {
-    const double rho = std::hypot(x[0], x[1]);
+    const double rho = Length(x[0], x[1]);
     return rho > 0 ? Eigen::Vector3d(x[0] / rho, x[1] / rho, 0) : Eigen::Vector3d::UnitX();
   }
   double R_, r_;

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "shapes/length.h"
 #include "shapes/shapes.h"
 
 namespace stellate::shapes {
@@ -18,7 +19,7 @@ class TorusKnotShape final : public PointwiseOracle {
     step_ = 2 * std::numbers::pi / n;
     samples_.resize(3, n);
     for (int i = 0; i < n; ++i) samples_.col(i) = At(i * step_);
-    slack_ = std::hypot(3.0 * p, 1.0 * q) * step_;  // 3|p| and |q| bound the speed's two parts
+    slack_ = Length(3.0 * p, 1.0 * q) * step_;  // 3|p| and |q| bound the speed's two parts
   }
   std::optional<BoundingBox> bounding_box() const override {
     return BoundingBox{Eigen::Vector3d(-3.2, -3.2, -1.2), Eigen::Vector3d(3.2, 3.2, 1.2)};
