@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "mesh/groups.h"
+#include "mesh/surface.h"
 
 namespace stellate::client {
 namespace {
@@ -72,22 +73,23 @@ std::string Off(const Mesh& mesh) {
   text.Add(mesh.ambient_dimension() == 3
                ? "OFF\n"
                : "nOFF\n" + std::to_string(mesh.ambient_dimension()) + "\n");
-  text.Add(std::to_string(mesh.points.cols()) + " " + std::to_string(mesh.simplices.cols()) +
+  const Drawn drawn =
+      mesh.dimension() == 3 ? DrawnOf(mesh) : Drawn{mesh.points, OrientedSimplices(mesh)};
+  text.Add(std::to_string(drawn.points.cols()) + " " + std::to_string(drawn.simplices.cols()) +
            " 0\n");
-  text.AddLines("", mesh.points);
-  text.AddLines(std::to_string(mesh.simplices.rows()) + " ", OrientedSimplices(mesh));
+  text.AddLines("", drawn.points);
+  text.AddLines(std::to_string(drawn.simplices.rows()) + " ", drawn.simplices);
   return text.str();
 }
 
-Expected<std::string> Obj(const Mesh& mesh) {
+std::string Obj(const Mesh& mesh) {
   constexpr const char* kPrefixes[] = {"p ", "l ", "f "};
   Text text;
   text.AddLines("v ", InSpace(mesh));
   const std::vector<Group> groups = GroupsOf(mesh);
-  if (mesh.dimension() == 3 && groups.size() == 1) {
-    return Fail(ErrorCode::kFileFailed,
-                ".obj holds curves, surfaces and the boundaries of solids, and it is not known on "
-                "what walls this solid's boundary lies");
+  if (mesh.dimension() == 3 && groups.size() == 1) {  // it is not known on what walls it ends
+    const SimplexMatrix surface = BoundaryOf(OrientedSimplices(mesh));
+    text.AddLines("f ", SimplexMatrix(surface.array() + 1));
   }
   for (const Group& group : groups) {
     if (group.dimension() == 3) continue;  // a solid is its boundary here
@@ -99,15 +101,16 @@ Expected<std::string> Obj(const Mesh& mesh) {
 
 std::string Ply(const Mesh& mesh) {
   const bool curve = mesh.dimension() == 1;
+  const Drawn drawn = DrawnOf(mesh);
   Text text;
-  text.Add("ply\nformat ascii 1.0\nelement vertex " + std::to_string(mesh.points.cols()) +
+  text.Add("ply\nformat ascii 1.0\nelement vertex " + std::to_string(drawn.points.cols()) +
            "\nproperty double x\nproperty double y\nproperty double z\nelement " +
-           (curve ? "edge " : "face ") + std::to_string(mesh.simplices.cols()) +
+           (curve ? "edge " : "face ") + std::to_string(drawn.simplices.cols()) +
            (curve ? "\nproperty int vertex1\nproperty int vertex2"
                   : "\nproperty list uchar int vertex_indices") +
            "\nend_header\n");
-  text.AddLines("", InSpace(mesh));
-  text.AddLines(curve ? "" : "3 ", OrientedSimplices(mesh));
+  text.AddLines("", drawn.points);
+  text.AddLines(curve ? "" : "3 ", drawn.simplices);
   return text.str();
 }
 
@@ -147,8 +150,7 @@ std::string Msh(const Mesh& mesh) {
 }
 
 Expected<std::string> Stl(const Mesh& mesh) {
-  const SimplexMatrix triangles = OrientedSimplices(mesh);
-  const Eigen::MatrixXd points = InSpace(mesh);
+  const auto [points, triangles] = DrawnOf(mesh);
   std::string bytes(80, ' ');  // a header that says nothing, and never "solid"
   const auto add = [&bytes](const auto& value) {
     bytes.append(reinterpret_cast<const char*>(&value), sizeof value);

@@ -12,10 +12,9 @@ namespace stellate::client {
 std::string Txt(const Mesh& mesh);
 std::string Off(const Mesh& mesh);
 std::string Ply(const Mesh& mesh);
+std::string Obj(const Mesh& mesh);
 std::string Msh(const Mesh& mesh);  // Gmsh's, version 2.2, text
 std::string Vtu(const Mesh& mesh);
-// kFileFailed for a solid whose walls are not known.
-Expected<std::string> Obj(const Mesh& mesh);
 // Binary. kFileFailed for a mesh that is too fine for single precision.
 Expected<std::string> Stl(const Mesh& mesh);
 

@@ -20,6 +20,7 @@ struct FileFormat {
   int largest_ambient_dimension;
   const char* holds;
   Writer write;
+  bool surface_of_solids = false;  // in space, besides
 };
 
 template <auto kWrite>
@@ -30,15 +31,16 @@ Expected<std::string> As(const Mesh& mesh) {
 constexpr int kAny = 1 << 30;
 constexpr FileFormat kFormats[] = {
     {".txt", 0, kAny, kAny, "anything", As<Txt>},
-    {".off", 1, 2, kAny, "curves and surfaces", As<Off>},
-    {".obj", 1, 3, 3, "curves and surfaces, and the boundaries of solids", As<Obj>},
-    {".ply", 1, 2, 3, "curves and surfaces", As<Ply>},
-    {".stl", 2, 2, 3, "surfaces", As<Stl>},
+    {".off", 1, 2, kAny, "curves and surfaces, and the surfaces of solids in space", As<Off>, true},
+    {".obj", 1, 2, 3, "curves and surfaces, and the surfaces of solids in space", As<Obj>, true},
+    {".ply", 1, 2, 3, "curves and surfaces, and the surfaces of solids in space", As<Ply>, true},
+    {".stl", 2, 2, 3, "surfaces, and the surfaces of solids in space", As<Stl>, true},
     {".msh", 1, 3, 3, "simplices of dimension 3 at most", As<Msh>},
     {".vtu", 1, 3, kAny, "simplices of dimension 3 at most", As<Vtu>},
 };
 
 bool Holds(const FileFormat& format, int k, int d) {
+  if (format.surface_of_solids && k == 3 && d == 3) return true;
   return format.least_dimension <= k && k <= format.largest_dimension &&
          d <= format.largest_ambient_dimension;
 }

@@ -95,9 +95,10 @@ class Mesh:
 
         .txt  any k and d, exact: "k d nv ns", then nv lines of coordinates, then ns lines of ids.
         .off  any d (nOFF when d is not 3), k <= 2.
-        .obj  curves and surfaces, d <= 3, and the boundary of a solid.
+        .obj  curves and surfaces, d <= 3.
         .ply  curves and surfaces, d <= 3.
         .stl  surfaces of space, binary, in single precision as the format has it.
+              Of a solid (k = d = 3) these four hold the surface, outwards, around a cavity into that.
         .msh  k <= 3, d <= 3: Gmsh's, version 2.2.
         .vtu  k <= 3. When d > 3 the points are the first three coordinates, and all of them are the
               point data "coordinates". Its field data are "epsilon", "certified" (0 or 1),

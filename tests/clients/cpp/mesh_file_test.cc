@@ -216,14 +216,47 @@ TEST_F(MeshFile, VtuKeepsHighCoordinatesAsData) {
   EXPECT_EQ(VtuNumbers<double>(xml, "Points").size(), 12u);
 }
 
+// A tetrahedron cut at a point within: three of the four are turned inside out by ascending
+// numbers.
+TEST_F(MeshFile, ASolidIsItsSurfaceInFormatsOfTriangles) {
+  Mesh solid;
+  solid.points.resize(3, 5);
+  solid.points << 0, 0.2, 1, 0, 0, 0, 0.2, 0, 1, 0, 0, 0.2, 0, 0, 1;
+  solid.simplices = SimplexMatrix(4, 4);
+  solid.simplices << 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4;
+  std::istringstream off(Saved(solid, "a.off"));
+  std::string word;
+  int points = 0, triangles = 0, none = 0;
+  off >> word >> points >> triangles >> none;
+  EXPECT_EQ(points, 4);  // without the one within
+  ASSERT_EQ(triangles, 4);
+  Eigen::Matrix3Xd at(3, points);
+  for (double& coordinate : at.reshaped()) off >> coordinate;
+  double volume = 0;
+  for (int j = 0; j < triangles; ++j) {
+    int three = 0, a = 0, b = 0, c = 0;
+    off >> three >> a >> b >> c;
+    ASSERT_EQ(three, 3);
+    volume += at.col(a).dot(at.col(b).cross(at.col(c))) / 6;
+  }
+  EXPECT_NEAR(volume, 1.0 / 6, 1e-12);  // outwards
+  EXPECT_EQ(Saved(solid, "a.stl").size(), 84u + 4 * 50);
+  EXPECT_NE(Saved(solid, "a.ply").find("element vertex 4\n"), std::string::npos);
+  const std::string obj = Saved(solid, "a.obj");
+  EXPECT_EQ(std::count(obj.begin(), obj.end(), 'f'), 4);
+  EXPECT_TRUE(CheckSave(Path("b.stl"), 3, 3).has_value());
+}
+
 TEST_F(MeshFile, RefusesWhatAFormatCannotHold) {
   Mesh solid = Surface(3);
   solid.simplices = SimplexMatrix(4, 1);
   solid.simplices << 0, 1, 2, 3;
-  for (const std::string ending : {".off", ".ply"}) {
-    EXPECT_NE(Refusal(solid, "a" + ending).find("dimension 3"), std::string::npos) << ending;
+  solid.points = Surface(4).points;
+  for (const std::string ending : {".off", ".ply", ".obj", ".stl"}) {
+    EXPECT_NE(Refusal(solid, "a" + ending).find("surfaces of solids in space, and"),
+              std::string::npos)
+        << ending;
   }
-  EXPECT_NE(Refusal(solid, "a.obj").find("the boundaries of solids"), std::string::npos);
   EXPECT_NE(Refusal(Surface(4), "a.obj").find("in R^4"), std::string::npos);
   EXPECT_NE(Refusal(Surface(4), "a.ply").find("in R^4"), std::string::npos);
   Mesh thick = Surface(5);

@@ -42,9 +42,10 @@ struct Mesh {
   //   .txt  any k and d: "k d nv ns", then nv lines of d coordinates (%.17g), then ns lines of k+1
   //         ids from zero, in the order of `simplices`
   //   .off  curves and surfaces; nOFF with all coordinates unless d = 3
-  //   .obj  curves and surfaces, d <= 3, and the boundary of a solid, text
+  //   .obj  curves and surfaces, d <= 3, text
   //   .ply  curves and surfaces, d <= 3, text
   //   .stl  surfaces of space, binary, in single precision as the format has it
+  //   Of a solid (k = d = 3) these four hold the surface, outwards, around a cavity into that.
   //   .msh  k <= 3, d <= 3: Gmsh's, version 2.2, text
   //   .vtu  k <= 3; beyond d = 3 the first three coordinates, and all as point data "coordinates";
   //         field data "epsilon", "certified" (0 or 1), "verdict" and "version" (UTF-8 bytes)

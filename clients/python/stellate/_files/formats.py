@@ -17,7 +17,8 @@ import numpy as np
 from .._complex import Complex, in_space
 from ..errors import SaveError
 from . import meshio_formats, vtu
-from .groups import groups
+from .groups import Group, groups
+from .surface import boundary, drawn
 
 _ANY = 1 << 30
 _DEBIAN = {"meshio": "python3-meshio", "h5py": "python3-h5py", "netCDF4": "python3-netcdf4"}
@@ -71,9 +72,10 @@ class _Format:
     holds: str
     contents: Callable[[Complex], bytes] = lambda mesh: b""
     meshio: meshio_formats.MeshioFormat | None = None
+    surface_of_solids: bool = False  # in space, besides what it holds
 
     def takes(self, k: int, d: int) -> bool:
-        return (
+        return (self.surface_of_solids and k == d == 3) or (
             self.least_dimension <= k <= self.largest_dimension
             and d <= self.largest_ambient_dimension
         )
@@ -156,9 +158,12 @@ def _off(mesh: Complex) -> Iterator[str]:
     else:
         yield "nOFF"
         yield str(mesh.ambient_dimension)
-    yield f"{len(mesh.points)} {len(mesh.simplices)} 0"
-    yield from _lines(mesh.points, "%.17g")
-    yield from _lines(cells(mesh), "%d", f"{mesh.dimension + 1} ")
+    points, rows = mesh.points, cells(mesh)
+    if mesh.dimension == 3:
+        points, rows = drawn(mesh, rows)
+    yield f"{len(points)} {len(rows)} 0"
+    yield from _lines(points, "%.17g")
+    yield from _lines(rows, "%d", f"{rows.shape[1]} ")
 
 
 def _obj(mesh: Complex) -> Iterator[str]:
@@ -166,13 +171,8 @@ def _obj(mesh: Complex) -> Iterator[str]:
     yield from _lines(points, "%.17g", "v ")
     every = groups(mesh, cells(mesh))
     named = len(every) > 1
-    if mesh.dimension == 3:  # a solid is its boundary here
-        every = every[1:]
-        if not every:
-            raise SaveError(
-                ".obj holds curves, surfaces and the boundaries of solids, and it is not known on what "
-                "walls this solid's boundary lies"
-            )
+    if mesh.dimension == 3:  # a solid is its boundary here, by its walls if they are known
+        every = every[1:] or [Group(1, "surface", (), boundary(cells(mesh)))]
     for group in every:
         if named:
             yield f"g {group.name}"
@@ -180,20 +180,20 @@ def _obj(mesh: Complex) -> Iterator[str]:
 
 
 def _ply(mesh: Complex) -> Iterator[str]:
-    points = in_space(mesh.points)
+    points, rows = drawn(mesh, cells(mesh))
     yield "ply"
     yield "format ascii 1.0"
     yield f"element vertex {len(points)}"
     yield from (f"property double {axis}" for axis in "xyz")
     if mesh.dimension == 1:
-        yield f"element edge {len(mesh.simplices)}"
+        yield f"element edge {len(rows)}"
         yield from ("property int vertex1", "property int vertex2")
     else:
-        yield f"element face {len(mesh.simplices)}"
+        yield f"element face {len(rows)}"
         yield "property list uchar int vertex_indices"
     yield "end_header"
     yield from _lines(points, "%.17g")
-    yield from _lines(cells(mesh), "%d", "" if mesh.dimension == 1 else "3 ")
+    yield from _lines(rows, "%d", "" if mesh.dimension == 1 else "3 ")
 
 
 def _msh(mesh: Complex) -> Iterator[str]:
@@ -226,7 +226,8 @@ _STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attri
 
 def _stl(mesh: Complex) -> bytes:
     """Binary: a header that says nothing, and never "solid", and a record a triangle."""
-    corners = in_space(mesh.points)[cells(mesh)]
+    points, rows = drawn(mesh, cells(mesh))
+    corners = points[rows]
     facets = np.zeros(len(corners), _STL_FACET)
     facets["corners"] = corners
     ends = facets["corners"]
@@ -251,14 +252,15 @@ def _text(lines: Callable[[Complex], Iterator[str]]) -> Callable[[Complex], byte
 
 
 _LOW = "curves and surfaces"
+_SOLIDS = "and the surfaces of solids in space"
 _CELLULAR = "simplices of dimension 3 at most"
 
 _FORMATS = {
     ".txt": _Format(0, _ANY, _ANY, "anything", _text(_txt)),
-    ".off": _Format(1, 2, _ANY, _LOW, _text(_off)),
-    ".obj": _Format(1, 3, 3, f"{_LOW}, and the boundaries of solids", _text(_obj)),
-    ".ply": _Format(1, 2, 3, _LOW, _text(_ply)),
-    ".stl": _Format(2, 2, 3, "surfaces", _stl),
+    ".off": _Format(1, 2, _ANY, f"{_LOW}, {_SOLIDS}", _text(_off), surface_of_solids=True),
+    ".obj": _Format(1, 2, 3, f"{_LOW}, {_SOLIDS}", _text(_obj), surface_of_solids=True),
+    ".ply": _Format(1, 2, 3, f"{_LOW}, {_SOLIDS}", _text(_ply), surface_of_solids=True),
+    ".stl": _Format(2, 2, 3, f"surfaces, {_SOLIDS}", _stl, surface_of_solids=True),
     ".msh": _Format(1, 3, 3, _CELLULAR, _text(_msh)),
     ".vtu": _Format(1, 3, _ANY, _CELLULAR, _text(_vtu_lines)),
     **{
