@@ -141,19 +141,6 @@ TEST(PointCloud, TellsTheNoiseThatItSmoothes) {
   EXPECT_LT(off.maxCoeff(), 0.02);
 }
 
-TEST(SignedDistance, TellsWhatAGridResolves) {
-  Vector values(125);
-  for (int i = 0; i < 125; ++i) {
-    values[i] = Eigen::Vector3d(i / 25 - 2, i / 5 % 5 - 2, i % 5 - 2).norm() - 1.2;
-  }
-  const SignedDistance sphere =
-      SignedDistance::OfGrid(values, {5, 5, 5}, {-2 * Vector::Ones(3), Eigen::Vector3d(2, 2, 2)});
-  EXPECT_EQ(sphere.resolution(), 1);
-  EXPECT_EQ(
-      SignedDistance([](const Vector& x) { return x.norm() - 1; }, {}, Cube(3, 1.5)).resolution(),
-      0);
-}
-
 TEST(Linkage, KnowsItsJoints) {
   Linkage linkage({{"a", "p", 1.0}, {"p", "q", 1.3}, {"q", "b", 1.1}, {"q", "r", 0.5}},
                   {{"a", Eigen::Vector2d(0, 0)}, {"b", Eigen::Vector2d(1.5, 0)}});

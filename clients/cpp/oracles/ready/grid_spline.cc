@@ -27,33 +27,52 @@ void ToCoefficients(double* line, std::ptrdiff_t count, std::ptrdiff_t stride) {
 
 }  // namespace
 
-GridSpline::GridSpline(Eigen::VectorXd values, std::vector<int> shape, const BoundingBox& box)
-    : coefficients_(std::move(values)), lower_(box.lower), shape_(std::move(shape)) {
-  const std::ptrdiff_t d = std::ssize(shape_);
-  if (d == 0 || lower_.size() != d || box.upper.size() != d ||
-      !(lower_.array() < box.upper.array()).all()) {
+void GridSpline::Check(const Eigen::VectorXd& values, const std::vector<int>& shape,
+                       const BoundingBox& box) {
+  const std::ptrdiff_t d = std::ssize(shape);
+  if (d == 0 || box.lower.size() != d || box.upper.size() != d ||
+      !(box.lower.array() < box.upper.array()).all()) {
     Refuse("values on a grid of " + std::to_string(d) + " axes need a box of R^" +
            std::to_string(d) + ", lower < upper");
   }
-  if (const int least = *std::min_element(shape_.begin(), shape_.end()); least < 4) {
+  if (const int least = *std::min_element(shape.begin(), shape.end()); least < 4) {
     Refuse("a cubic spline needs 4 values an axis, and has " + std::to_string(least));
   }
+  std::ptrdiff_t count = 1;
+  for (const int side : shape) count *= side;
+  if (count != values.size()) {
+    Refuse("a grid of this shape has " + std::to_string(count) + " values, and there are " +
+           std::to_string(values.size()));
+  }
+  if (!values.allFinite()) Refuse("values on the grid have to be finite");
+}
+
+GridSpline::GridSpline(Eigen::VectorXd values, std::vector<int> shape, const BoundingBox& box,
+                       double outside)
+    : coefficients_(std::move(values)), lower_(box.lower), shape_(std::move(shape)) {
+  Check(coefficients_, shape_, box);
+  const std::ptrdiff_t d = std::ssize(shape_);
   strides_.assign(static_cast<size_t>(d), 1);
   std::ptrdiff_t count = 1;
   for (std::ptrdiff_t a = d - 1; a >= 0; --a) {
     strides_[static_cast<size_t>(a)] = count;
     count *= shape_[static_cast<size_t>(a)];
   }
-  if (count != coefficients_.size()) {
-    Refuse("a grid of this shape has " + std::to_string(count) + " values, and there are " +
-           std::to_string(coefficients_.size()));
-  }
-  if (!coefficients_.allFinite()) Refuse("values on the grid have to be finite");
   spacing_.resize(d);
   for (std::ptrdiff_t a = 0; a < d; ++a) {
     const std::ptrdiff_t n = shape_[static_cast<size_t>(a)],
                          stride = strides_[static_cast<size_t>(a)];
     spacing_[a] = (box.upper[a] - lower_[a]) / static_cast<double>(n - 1);
+    for (std::ptrdiff_t i = 0; i + stride < count; ++i) {
+      if (i / stride % n + 1 == n) continue;
+      const double change = std::abs(coefficients_[i + stride] - coefficients_[i]);
+      steepness_ = std::max(steepness_, change / spacing_[a]);
+    }
+  }
+  steepness_ *= outside;
+  for (std::ptrdiff_t a = 0; a < d; ++a) {
+    const std::ptrdiff_t n = shape_[static_cast<size_t>(a)],
+                         stride = strides_[static_cast<size_t>(a)];
     for (std::ptrdiff_t i = 0; i < count; ++i) {
       if (i / stride % n == 0) ToCoefficients(&coefficients_[i], n, stride);
     }
@@ -113,7 +132,7 @@ double GridSpline::Sum(const std::vector<Along>& around, int derived) const {
 
 double GridSpline::Value(const Eigen::VectorXd& x) const {
   const Place place = Locate(x);
-  return Sum(Around(place.inside), -1) + place.beyond.cwiseProduct(spacing_).norm();
+  return Sum(Around(place.inside), -1) + steepness_ * place.beyond.cwiseProduct(spacing_).norm();
 }
 
 Eigen::VectorXd GridSpline::Gradient(const Eigen::VectorXd& x) const {
@@ -122,7 +141,7 @@ Eigen::VectorXd GridSpline::Gradient(const Eigen::VectorXd& x) const {
   const Eigen::VectorXd away = place.beyond.cwiseProduct(spacing_);
   Eigen::VectorXd gradient(x.size());
   for (int a = 0; a < x.size(); ++a) {
-    gradient[a] = away[a] != 0 ? away[a] / away.norm() : Sum(around, a) / spacing_[a];
+    gradient[a] = away[a] != 0 ? steepness_ * away[a] / away.norm() : Sum(around, a) / spacing_[a];
   }
   return gradient;
 }

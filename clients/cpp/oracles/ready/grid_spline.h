@@ -8,11 +8,16 @@
 namespace stellate::oracles {
 
 // The tensor product of cubic B-splines through values on a grid of a box, in any dimension.
-// Mirrored at the border, beyond which it grows with the distance.
+// Mirrored at the border, beyond which it grows or falls with the distance.
 class GridSpline {
  public:
-  // As in SignedDistance::OfGrid. Throws std::invalid_argument.
-  GridSpline(Eigen::VectorXd values, std::vector<int> shape, const BoundingBox& box);
+  // As in SignedDistance::OfGrid. `outside`: 1 or -1, whether it grows or falls beyond the border,
+  // as steeply as it changes anywhere; 0: neither. Throws std::invalid_argument.
+  GridSpline(Eigen::VectorXd values, std::vector<int> shape, const BoundingBox& box,
+             double outside);
+  // What the constructor insists on.
+  static void Check(const Eigen::VectorXd& values, const std::vector<int>& shape,
+                    const BoundingBox& box);
 
   double Value(const Eigen::VectorXd& x) const;
   Eigen::VectorXd Gradient(const Eigen::VectorXd& x) const;
@@ -34,6 +39,7 @@ class GridSpline {
   Eigen::VectorXd coefficients_, lower_, spacing_;
   std::vector<int> shape_;
   std::vector<std::ptrdiff_t> strides_;
+  double steepness_ = 0;
 };
 
 }  // namespace stellate::oracles

@@ -1,6 +1,7 @@
 #include <memory>
 
 #include "oracles/ready/common.h"
+#include "oracles/ready/grid_check.h"
 #include "oracles/ready/grid_spline.h"
 #include "stellate/oracles/equations.h"
 
@@ -30,12 +31,14 @@ SignedDistance::SignedDistance(Function f, Gradient gradient, BoundingBox box, d
                      Shifted(std::move(f), level), AsRow(std::move(gradient)), box) {}
 
 SignedDistance SignedDistance::OfGrid(const Eigen::VectorXd& values, const std::vector<int>& shape,
-                                      const BoundingBox& box, double level) {
-  const auto spline = std::make_shared<const GridSpline>(values, shape, box);
-  if (!(values.minCoeff() < level && level < values.maxCoeff())) {
-    Refuse("no set of level " + Short(level) + ": the values lie between " +
-           Short(values.minCoeff()) + " and " + Short(values.maxCoeff()));
-  }
+                                      const BoundingBox& box, double level, GridBorder border) {
+  GridSpline::Check(values, shape, box);
+  const bool open = border == GridBorder::kOpen;
+  const double outside = InsistOnASurface({values, shape, box}, level, open);
+  const WiderGrid wider =
+      open ? GoneOnStraight({values, shape, box}) : WiderGrid{values, shape, box};
+  const auto spline =
+      std::make_shared<const GridSpline>(wider.values, wider.shape, wider.box, open ? 0 : outside);
   SignedDistance oracle([spline](const Eigen::VectorXd& x) { return spline->Value(x); },
                         [spline](const Eigen::VectorXd& x) { return spline->Gradient(x); }, box,
                         level);

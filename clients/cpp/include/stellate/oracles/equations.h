@@ -12,6 +12,10 @@
 // Constructors throw std::invalid_argument.
 namespace stellate::oracles {
 
+// What a surface on a grid does at the box's sides: it does not reach them; or it may, and goes on
+// beyond, to be clipped by Clipped with the grid's box.
+enum class GridBorder { kClosed, kOpen };
+
 // The zero set of a signed distance, or of any smooth function with a gradient that is not zero
 // there: a network that was trained to be one, for example.
 //
@@ -31,8 +35,12 @@ class SignedDistance final : public ImplicitOracle {
   // know: thin parts and gaps of fewer than some three spacings come out otherwise or not at all,
   // and the set is within about spacing^2 times the curvature of the one that was sampled. An
   // epsilon below the resolution meshes the spline ever better, and not what was sampled.
+  //
+  // Any smooth function's values will do, of either sign inside. Refused where there is no such
+  // set, where it leaves the grid, and where values are those of labels or a mask.
   static SignedDistance OfGrid(const Eigen::VectorXd& values, const std::vector<int>& shape,
-                               const BoundingBox& box, double level = 0);
+                               const BoundingBox& box, double level = 0,
+                               GridBorder border = GridBorder::kClosed);
 
   // The largest spacing of the grid; 0 where there is none.
   double resolution() const { return resolution_; }
