@@ -6,6 +6,7 @@ import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { pathToFileURL } from "node:url";
 import { kPatience, picture, shown, Stage, until } from "./stage.mjs";
+import { walk } from "./walk.mjs";
 
 let stage;
 before(async () => (stage = await Stage.open()), { timeout: kPatience });
@@ -170,17 +171,16 @@ test("a page that falls behind goes on with the newest revision", async () => {
   await page.close();
 });
 
-test("a demonstration goes through the catalogue by itself", async () => {
-  const demo = await stage.viewer("--demo");
-  const page = await stage.page(demo.url);
-  await until(page, () => document.getElementById("facts").textContent.includes("torus:1:0.4"));
-  await until(page, () => document.getElementById("facts").textContent.includes("tanglecube"));
-  await until(page, () => Number(document.getElementById("stage").dataset.vertices) > 50);
-  assert.match(await text(page, "#list"), /tanglecube.*torus:1:0\.4\s+certified/s);
+test("meshes of all dimensions, there and back, are seen at every revision", async () => {
+  const labels = ["a surface", "three dimensions in six", "another surface"];
+  await stage.mesh({ shape: "torus", epsilon: 0.15, label: labels[0] });
+  await stage.mesh({ shape: "flat torus", epsilon: 0.7, label: labels[1] });
+  const name = await stage.mesh({ shape: "two spheres", epsilon: 0.2, label: labels[2] });
+  const gateway = await stage.gateway(name);
+  const page = await stage.page(gateway.url);
+  await walk(page, labels);
   assert.deepEqual(page.faults, []);
   await page.close();
-  demo.process.kill("SIGINT");
-  assert.deepEqual(await demo.ended, [0, null], "Ctrl-C ends it well");
 });
 
 test("a mesh at fault leads to where it is", async () => {
@@ -211,6 +211,7 @@ test("what the certificate's words name leads there, too", async () => {
   const page = await stage.page(gateway.url);
   await until(page, () => document.querySelector("#verdict .place") !== null);
   assert.match(await text(page, "#verdict"), /^Not certified/);
+  assert.ok((await page.locator("#verdict li.fails").count()) > 0, "a mark says so, too");
   const before = await picture(page);
   const place = await page.locator("#verdict .place").first().innerText();
   await page.locator("#verdict .place").first().click();

@@ -27,6 +27,12 @@ export interface Rim {
   points: Float32Array;
 }
 
+// Vertices in no simplex, as all are at first.
+export interface Bare {
+  positions: Float32Array; // 3 a vertex
+  values: Float32Array; // 0..1: when it came
+}
+
 const kWalls = [
   "#d97706",
   "#7c3aed",

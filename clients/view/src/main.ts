@@ -52,6 +52,7 @@ let past: PastRow[] = [];
 let shownRevision = 0;
 let boundary = ""; // of what is shown, in words
 let following = true; // the newest revision
+let led = false; // from mesh to mesh, by a demonstration, until somebody chooses
 let fault: { kind: FaultKind; next: number; count: number } | { place: string } | null = null;
 let look: Look = {
   frame: axesFrame(3, [0, 1, 2]),
@@ -61,6 +62,7 @@ let look: Look = {
   colour: "plain",
   colourAxis: 0,
 };
+let replay: ReturnType<typeof setInterval> | undefined;
 let tour: { tour: Tour; start: number } | null = null;
 let measured = { revision: -1, name: "" };
 
@@ -77,15 +79,23 @@ function choose(name: string) {
   mesh = null;
   past = [];
   leaveFault();
+  stopReplay();
+  stopTour();
   following = true;
   shownRevision = 0;
   boundary = "";
   measured = { revision: -1, name: "" };
   at("histograms").replaceChildren();
+  at("stage").dataset.vertices = "0"; // what is drawn still is the last one's
   note("Waiting for the first vertices");
   view.refit();
-  drawList(at("list"), list, chosen, choose);
+  drawList(at("list"), list, chosen, chooseByHand);
   ask({ type: "watch", name });
+}
+
+function chooseByHand(name: string) {
+  led = demo && name === list.at(-1)?.name;
+  choose(name);
 }
 
 // --- what is looked at, and how
@@ -100,8 +110,7 @@ function fill(id: string, options: [value: string, text: string][], value: strin
 function meet(row: MeshRow) {
   const { parts, colours, first, oblique } = choicesOf(row);
   look = first;
-  tour = null;
-  at<HTMLInputElement>("tour").checked = false;
+  stopTour();
   at<HTMLInputElement>("level").value = "0.5";
   fill("part", parts, look.part);
   fill("axis", coordinates(row.d), `${look.axis}`);
@@ -116,7 +125,12 @@ function meet(row: MeshRow) {
   at("axes-box").hidden = row.d <= 3;
   drawWalls(at("walls"), row.k <= 3 ? row.walls : 0);
   setParts();
-  ask({ type: "look", look });
+  ask({ type: "look", name: chosen, look });
+}
+
+function stopTour() {
+  tour = null;
+  at<HTMLInputElement>("tour").checked = false;
 }
 
 function setParts() {
@@ -125,9 +139,10 @@ function setParts() {
 }
 
 function changeLook(change: Partial<Look>) {
+  if (mesh === null) return; // there is nothing to look at yet, and its first look comes with it
   look = { ...look, ...change };
   setParts();
-  ask({ type: "look", look });
+  ask({ type: "look", name: chosen, look });
 }
 
 at<HTMLSelectElement>("part").onchange = (e) =>
@@ -150,8 +165,7 @@ for (const id of ["axis-0", "axis-1", "axis-2"]) {
       selects.forEach((select, i) => (select.value = `${i}`)); // one by hand, all by hand
     }
     const axes = selects.map((select) => Number(select.value));
-    tour = null;
-    at<HTMLInputElement>("tour").checked = false;
+    stopTour();
     changeLook({ frame: axesFrame(mesh?.d ?? 3, axes) });
     view.refit();
   };
@@ -202,7 +216,6 @@ at("live").onclick = () => {
   show(null);
 };
 
-let replay: ReturnType<typeof setInterval> | undefined;
 function stopReplay() {
   clearInterval(replay);
   replay = undefined;
@@ -297,12 +310,14 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
   },
   list: ({ meshes }) => {
     list = meshes;
-    drawList(at("list"), list, chosen, choose);
+    drawList(at("list"), list, chosen, chooseByHand);
     const newestMesh = meshes.at(-1);
     if (!chosen && newestMesh) choose(newestMesh.name);
     if (!chosen) note("No mesh yet");
-    // A demonstration goes from mesh to mesh.
-    if (demo && newestMesh && mesh?.over && newestMesh.name !== chosen) choose(newestMesh.name);
+    const looking = !following || fault !== null || replay !== undefined; // at something of this one
+    if (led && !looking && newestMesh && mesh?.over && newestMesh.name !== chosen) {
+      choose(newestMesh.name);
+    }
   },
   mesh: (message) => {
     const first = mesh === null;
@@ -337,7 +352,6 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
     at("revision-text").textContent = text;
   },
   scene: (scene) => {
-    if (!recorded && scene.name !== chosen) return ask({ type: "drawn" });
     shownRevision = scene.revision;
     at("note").hidden = scene.vertices > 0;
     if (!view.draws) note(kCannotDraw);
@@ -355,6 +369,7 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
 };
 view.onDrawn = () => ask({ type: "drawn" });
 worker.onmessage = ({ data }: MessageEvent<FromWorker>) => {
+  if (data.of !== undefined && data.of !== chosen) return; // it was on its way when another was chosen
   (hear[data.type] as (message: FromWorker) => void)(data);
 };
 worker.onerror = (event) => {
@@ -369,7 +384,7 @@ setColours();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", setColours);
 
 const [secret, mode] = location.hash.slice(1).split("&");
-const demo = mode === "demo";
+const demo = (led = mode === "demo");
 const recording = at("recording").textContent?.trim();
 if (recording) {
   recorded = true;

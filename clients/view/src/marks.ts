@@ -63,12 +63,24 @@ function disc(): DataTexture {
 export class Dots {
   readonly object: Points<BufferGeometry, PointsMaterial>;
 
-  constructor({ size, colour, through }: { size: number; colour?: string; through?: boolean }) {
+  // `each`: has its own colour.
+  constructor({
+    size,
+    colour,
+    through,
+    each,
+  }: {
+    size: number;
+    colour?: string;
+    through?: boolean;
+    each?: boolean;
+  }) {
     this.object = new Points(
       new BufferGeometry(),
       new PointsMaterial({
         size: size * Math.min(window.devicePixelRatio, 2),
         color: colour ?? "#ffffff",
+        vertexColors: each ?? false,
         map: disc(),
         alphaTest: 0.5,
         sizeAttenuation: false,
@@ -80,11 +92,16 @@ export class Dots {
     this.object.frustumCulled = false;
   }
 
-  show(positions: Float32Array, colour?: string) {
+  // A colour of all, or three bytes of each.
+  show(positions: Float32Array, colour?: string | Uint8Array) {
     this.object.visible = positions.length > 0;
     this.object.geometry.dispose();
     this.object.geometry = new BufferGeometry();
     this.object.geometry.setAttribute("position", new BufferAttribute(positions, 3));
-    if (colour !== undefined) this.object.material.color.set(colour);
+    if (colour instanceof Uint8Array) {
+      this.object.geometry.setAttribute("color", new BufferAttribute(colour, 3, true));
+    } else if (colour !== undefined) {
+      this.object.material.color.set(colour);
+    }
   }
 }

@@ -1,5 +1,5 @@
 // What the page and its worker say to each other.
-import type { Look, Rim, Shape } from "./look";
+import type { Bare, Look, Rim, Shape } from "./look";
 import type { Histogram } from "./measure";
 import type { Recording } from "./source";
 
@@ -73,7 +73,7 @@ export type ToWorker =
   | { type: "replay"; recording: Recording }
   | { type: "watch"; name: string }
   | { type: "revision"; revision: number | null } // null: the newest, as it comes
-  | { type: "look"; look: Look }
+  | { type: "look"; name: string; look: Look } // at that mesh: others may have other dimensions
   | { type: "faults"; fault: Fault | null }
   | { type: "measure" }
   | { type: "drawn" };
@@ -86,6 +86,7 @@ export interface Scene {
   simplices: number;
   shape: Shape;
   rim: Rim;
+  bare: Bare;
   boundary: string; // in words; empty: none
   faults: Float32Array; // positions of vertices at fault
   faultEdges: Float32Array; // pairs of positions
@@ -96,7 +97,10 @@ export interface Scene {
   radius: number;
 }
 
-export type FromWorker =
+// `of`: the mesh that it is about, where it is about one. Another may have been chosen meanwhile.
+export type FromWorker = Said & { of?: string };
+
+export type Said =
   | { type: "greeting"; server: string; mesh: string; secret: string }
   | { type: "connection"; ok: boolean; message: string }
   | { type: "list"; meshes: MeshRow[] }

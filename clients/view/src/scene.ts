@@ -66,6 +66,7 @@ export class View {
   );
   private readonly rim = new ThickLines({ width: 3 });
   private readonly corners = new Dots({ size: 9 });
+  private readonly bare = new Dots({ size: 4, each: true });
   private readonly faultEdges = new ThickLines({ width: 2.5, colour: "#d92d20", through: true });
   private readonly chosenEdges = new ThickLines({ width: 2.5, colour: "#ffb020", through: true });
   private readonly faults = new Dots({ size: 9, colour: "#d92d20", through: true });
@@ -101,6 +102,7 @@ export class View {
     const sky = new HemisphereLight("#ffffff", "#8b93a5", 1.25);
     this.scene.add(this.camera, sky, this.surface, this.rough, this.wires, this.segments);
     const marks = [
+      this.bare,
       this.rim,
       this.corners,
       this.chosenEdges,
@@ -149,12 +151,13 @@ export class View {
     const colourOf = (wall: number) => (wall === kSeveral ? several : wallColour(wall));
     this.rim.show(rim.segments, Array.from(rim.walls, colourOf));
     this.corners.show(rim.points, several);
+    this.bare.show(scene.bare.positions, coloursOf({ ...scene.bare, byWall: false }, kWhite));
     this.chosenEdges.show(scene.chosenEdges);
     this.faultEdges.show(scene.faultEdges);
     this.faults.show(scene.faults);
     this.chosen.show(scene.chosen);
     this.ball = { centre: new Vector3(...scene.centre), radius: scene.radius };
-    if (!this.fitted) this.fit();
+    if (!this.fitted && scene.vertices > 0) this.fit();
     this.dirty = true;
     this.owed = true;
   }
@@ -291,7 +294,7 @@ function geometryOf(positions: Float32Array, index: Uint32Array | null): BufferG
   return geometry;
 }
 
-function coloursOf({ values, byWall }: Shape, plain: Color): Uint8Array {
+function coloursOf({ values, byWall }: Pick<Shape, "values" | "byWall">, plain: Color): Uint8Array {
   const colours = new Uint8Array(3 * values.length);
   const colour = new Color();
   const of = (value: number) =>

@@ -1,6 +1,6 @@
 // From a mesh and a look at it to what can be drawn: triangles or segments in space.
 import { boundaryOf, wallOf } from "./boundary";
-import type { Look, Shape } from "./look";
+import type { Bare, Look, Shape } from "./look";
 import { fattest, Simplices } from "./measure";
 import type { MeshStore } from "./store";
 
@@ -225,6 +225,17 @@ function surface(
     walls.fill(wallOf(store, triangles.slice(i, i + 3)), i, i + 3);
   }
   return { kind: "triangles", positions, values: walls, byWall: true, index: null };
+}
+
+export function bareOf(store: MeshStore, projected: Float32Array): Bare {
+  const { k, vertices, simplices, cells } = store;
+  const covered = new Uint8Array(vertices);
+  for (let i = 0; i < simplices * (k + 1); i++) covered[cells[i]] = 1;
+  const bare: number[] = [];
+  covered.forEach((is, v) => is || bare.push(v));
+  const positions = new Float32Array(3 * bare.length);
+  bare.forEach((v, i) => positions.set(projected.subarray(3 * v, 3 * v + 3), 3 * i));
+  return { positions, values: Float32Array.from(bare, (v) => v / vertices) };
 }
 
 // Of vertices, above the slice. One on the very level counts as above: no segment of length zero over

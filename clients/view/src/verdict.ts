@@ -161,14 +161,18 @@ function claimsOf(mesh: Mesh, c: Certificate): Claim[] {
   number("Radius / edge", `at most ${brief(c.maxRadiusEdge)}`);
   number("Fatness", `at least ${brief(c.minFatness)}`);
   if (k === 2) number("Angles", `at least ${brief(c.minAngleDegrees)}°`);
-  number(
-    "Reach",
-    Number.isFinite(c.estimatedReach)
-      ? `${c.certified ? "about" : "at most"} ${brief(c.estimatedReach)}, epsilon is ${brief(c.epsilonOverReach)} of it`
-      : "nothing limits it: all is flat",
-  );
-  if (c.declaredReach > 0) number("Reach declared", brief(c.declaredReach));
+  const reach = Number.isFinite(c.estimatedReach)
+    ? `${c.certified ? "about" : "at most"} ${brief(c.estimatedReach)}, epsilon is ${brief(c.epsilonOverReach)} of it`
+    : "nothing limits it: all is flat";
+  claims.push({ title: "Reach", text: reach, holds: c.onlyTooCoarse ? false : null });
+  if (c.declaredReach > 0) {
+    const holds = c.reachRefuted ? false : null;
+    claims.push({ title: "Reach declared", text: brief(c.declaredReach), holds });
+  }
   if (c.provedDistance > 0) number("Distance", `at most ${brief(c.provedDistance)}`);
+  if (!c.certified && claims.every(({ holds }) => holds !== false)) {
+    claims.unshift({ title: "Others", text: "what the words above name", holds: false });
+  }
   return claims;
 }
 
@@ -216,7 +220,8 @@ export function verdictOf(mesh: Mesh): Verdict | null {
 }
 
 function unfinishedClaims(mesh: Mesh, c: Certificate): Claim[] {
-  return claimsOf(mesh, c).filter(
+  const looked = claimsOf(mesh, c).filter(
     (claim) => claim.title === "Consistent" || claim.title === "Reach",
   );
+  return [{ title: "Finished", text: "rules still ask for points", holds: false }, ...looked];
 }

@@ -13,10 +13,10 @@ import {
 } from "./generated/stellate/v1/stellate_pb";
 import type { Look } from "./look";
 import { histograms } from "./measure";
-import type { Fault, PastRow, Scene } from "./messages";
+import type { Fault, PastRow, Said, Scene } from "./messages";
 import { rimOf } from "./rim";
-import { report, send, sleep } from "./say";
-import { extent, project, shapeOf } from "./shape";
+import { report, send as say, sleep } from "./say";
+import { bareOf, extent, project, shapeOf } from "./shape";
 import type { Source } from "./source";
 import { MeshStore } from "./store";
 import { crewOf, faultsOf, isOver, pastOf, rowOf, verdictOf } from "./verdict";
@@ -30,6 +30,7 @@ const kRemembered = 6; // revisions that the slider came by
 // A mesh that is looked at, until another is.
 export class Viewing {
   private readonly stop = new AbortController();
+  private look: Look | null = null; // the page's first, once it knows what is looked at
   private store: MeshStore | null = null; // the newest
   private shown: MeshStore | null = null; // an earlier revision; null: the newest
   private readonly earlier = new Map<number, MeshStore>();
@@ -47,11 +48,14 @@ export class Viewing {
 
   constructor(
     private readonly source: Source,
-    private look: Look | null,
     readonly name: string,
   ) {
     void this.inquire();
     void this.watch();
+  }
+
+  private send(message: Said, transfer: Transferable[] = []) {
+    say({ ...message, of: this.name }, transfer);
   }
 
   leave() {
@@ -96,13 +100,13 @@ export class Viewing {
     }
     const ended = mesh.endTime !== undefined;
     this.mesh = mesh;
-    send({ type: "mesh", mesh: rowOf(mesh) });
-    send({ type: "verdict", verdict: ended ? verdictOf(mesh) : null });
+    this.send({ type: "mesh", mesh: rowOf(mesh) });
+    this.send({ type: "verdict", verdict: ended ? verdictOf(mesh) : null });
     if (mesh.pastProgress.length > 0) {
       this.past.push(...pastOf(mesh));
-      send({ type: "past", rows: this.past });
+      this.send({ type: "past", rows: this.past });
     }
-    send({ type: "crew", rows: crewOf(mesh) });
+    this.send({ type: "crew", rows: crewOf(mesh) });
   }
 
   // The newest, as it comes; a connection that breaks off is opened again, from where it was.
@@ -206,7 +210,7 @@ export class Viewing {
       },
       { stop: this.stop.signal, revision },
     );
-    if (end.code !== 0) send({ type: "loading", text: end.message });
+    if (end.code !== 0) this.send({ type: "loading", text: end.message });
     return end.code === 0 ? store : null;
   }
 
@@ -263,7 +267,7 @@ export class Viewing {
     const flight = flightTo(store, this.look, projected, this.epsilon, faults);
     if (this.flightDue && flight !== null) {
       this.flightDue = false;
-      send(flight);
+      this.send(flight);
     }
     const scene: Scene = {
       type: "scene",
@@ -273,19 +277,20 @@ export class Viewing {
       simplices: store.simplices,
       shape,
       rim,
+      bare: bareOf(store, projected),
       boundary: describe(store),
       ...marksOf(store, projected, faults),
       ...ballOf(store, this.look),
     };
     const buffers: Transferable[] = [shape.positions.buffer, shape.values.buffer];
     if (shape.index) buffers.push(shape.index.buffer);
-    send(scene, buffers);
+    this.send(scene, buffers);
   }
 
   measure() {
     const store = this.visible;
-    if (store === null) return;
-    send({
+    if (store === null || store.simplices === 0) return;
+    this.send({
       type: "histograms",
       histograms: histograms(store, this.epsilon),
       revision: store.revision,

@@ -6,7 +6,6 @@ import {
   ListMeshesRequestSchema,
   ListMeshesResponseSchema,
 } from "./generated/stellate/v1/stellate_pb";
-import type { Look } from "./look";
 import type { ToWorker } from "./messages";
 import { report, send, sleep } from "./say";
 import { GatewaySource, RecordedSource, type CallEnd, type Source } from "./source";
@@ -16,7 +15,6 @@ import { Viewing } from "./viewing";
 const kListSeconds = 2;
 
 let source: Source;
-let look: Look | null = null;
 
 async function list() {
   const encode = (request: object) =>
@@ -45,7 +43,7 @@ function view(name: string) {
   send({ type: "crew", rows: [] });
   send({ type: "past", rows: [] });
   send({ type: "verdict", verdict: null });
-  viewing = new Viewing(source, look, name);
+  viewing = new Viewing(source, name);
 }
 
 const answers: { [T in ToWorker["type"]]: (m: Extract<ToWorker, { type: T }>) => unknown } = {
@@ -64,9 +62,8 @@ const answers: { [T in ToWorker["type"]]: (m: Extract<ToWorker, { type: T }>) =>
   },
   watch: ({ name }) => view(name),
   revision: ({ revision }) => viewing?.show(revision),
-  look: (message) => {
-    look = message.look;
-    viewing?.lookAt(message.look);
+  look: ({ name, look }) => {
+    if (viewing?.name === name) viewing.lookAt(look);
   },
   faults: ({ fault }) => viewing?.choose(fault),
   measure: () => viewing?.measure(),
