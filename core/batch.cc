@@ -8,6 +8,7 @@
 
 #include "core/base/message.h"
 #include "core/base/name_point.h"
+#include "core/wall_beyond.h"
 
 namespace stellate::core {
 namespace {
@@ -196,9 +197,12 @@ std::string NameTangential(WallSet walls, const Eigen::MatrixXd& along) {
   return Message("walls ", pair[0], " and ", pair[1], " at ", Brief(degrees), " degrees");
 }
 
-// Unit, tangent, and independent of each other: by the tangent basis that came with them.
+// Unit, tangent, and independent of each other: by the tangent basis that came with them. How walls
+// meet beyond others is nobody's concern: M is not there.
 Status CheckConormals(const Specification& spec, const QueryBlock& block, Index query,
-                      const Eigen::VectorXd& point, const double* basis, const double* conormals) {
+                      const AnswerBlock& answer, Index j) {
+  const double* const basis = answer.tangents.col(j).data();
+  const double* const conormals = answer.conormals.col(j).data();
   const Index k = spec.dimension, d = spec.ambient_dimension;
   const int count = CountWalls(block.face);
   const auto refuse = [&](const auto&... parts) {
@@ -226,14 +230,16 @@ Status CheckConormals(const Specification& spec, const QueryBlock& block, Index 
                       "normal and project it onto that, or is the wall tangential here?");
     ++n;
   });
-  if (!status.ok() || count < 2) return status;
+  if (!status.ok() || count < 2 ||
+      WallBeyond(answer.clearances.col(j).data(), spec.walls, block.face))
+    return status;
   const Eigen::MatrixXd gram = along.transpose() * along;
   const double independent = gram.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff();
   if (independent >= kLeastTransversality) return Status::Ok();
   return refuse("the walls meet nearly tangentially: ", NameTangential(block.face, along), ", at ",
-                NamePoint(point), "; the smallest eigenvalue of their conormals' Gram matrix is ",
-                independent, ", less than ", kLeastTransversality,
-                "; walls must cross at an angle");
+                NamePoint(answer.points.col(j)),
+                "; the smallest eigenvalue of their conormals' Gram matrix is ", independent,
+                ", less than ", kLeastTransversality, "; walls must cross at an angle");
 }
 
 Status CheckSize(const QueryBlock& block, Index query, double size) {
@@ -270,10 +276,7 @@ Status CheckAnswer(const Specification& spec, const QueryBlock& block, Index que
     if (Status s = CheckFinite(block, query, "conormal", conormals, answer.conormals.rows());
         !s.ok())
       return s;
-    if (Status s = CheckConormals(spec, block, query, answer.points.col(j),
-                                  answer.tangents.col(j).data(), conormals);
-        !s.ok())
-      return s;
+    if (Status s = CheckConormals(spec, block, query, answer, j); !s.ok()) return s;
   }
   return answer.sizes.size() > 0 ? CheckSize(block, query, answer.sizes[j]) : Status::Ok();
 }

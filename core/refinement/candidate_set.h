@@ -8,6 +8,7 @@
 #include "core/refinement/criteria.h"
 #include "core/refinement/target.h"
 #include "core/refinement/violation_book.h"
+#include "core/wall_beyond.h"
 
 namespace stellate::core {
 
@@ -52,13 +53,9 @@ struct AnsweredPoints {
 
   // The wall that a point lies beyond, of those that it is not on: by the most. None: it is in M.
   std::optional<int> Beyond(Eigen::Index c) const {
-    std::optional<int> wall;
-    for (Eigen::Index i = 0; i < clearances.rows(); ++i)
-      if (clearances(i, c) < 0 &&
-          !IsSubset(SetOfWall(static_cast<int>(i)), walls[static_cast<std::size_t>(c)]) &&
-          !(wall && clearances(*wall, c) <= clearances(i, c)))
-        wall = static_cast<int>(i);
-    return wall;
+    if (clearances.rows() == 0) return std::nullopt;
+    return WallBeyond(clearances.col(c).data(), static_cast<int>(clearances.rows()),
+                      walls[static_cast<std::size_t>(c)]);
   }
 };
 
