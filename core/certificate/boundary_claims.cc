@@ -99,10 +99,11 @@ void BoundaryClaims::JudgeFaces() {
   Count(boundary, &whole);
   c.boundary_components = whole.components;
   c.boundary_euler_characteristic = whole.euler_characteristic;
+  if (boundary.simplices.empty()) return;  // no cone, and no apex
   // Without its cones the complex has as many faces fewer as the cone over the boundary has
   // beyond it.
   c.euler_characteristic += whole.euler_characteristic - 1;
-  if (x_.mesh.k < 3 || boundary.simplices.empty()) return;  // circles and points have no links
+  if (x_.mesh.k < 3) return;  // circles and points have no links
   const SimplexList list{x_.mesh.k - 1, static_cast<std::uint32_t>(x_.mesh.vertices),
                          &boundary.simplices};
   const Adjacency adjacency(list);
@@ -141,11 +142,10 @@ std::vector<QueryBlock> BoundaryClaims::FaceQuestions() {
   return blocks;
 }
 
-void BoundaryClaims::JudgeFace(const QueryBlock& asked, const AnswerBlock& answer) {
-  const auto at = std::find_if(faces_.begin(), faces_.end(),
-                               [&](const FaceMesh* f) { return f->walls == asked.face; });
-  const FaceMesh& face = **at;
-  const std::vector<std::uint32_t>& chosen = chosen_[static_cast<std::size_t>(at - faces_.begin())];
+void BoundaryClaims::JudgeFace(std::size_t block, const Eigen::MatrixXd& asked,
+                               const AnswerBlock& answer) {
+  const FaceMesh& face = *faces_[block];
+  const std::vector<std::uint32_t>& chosen = chosen_[block];
   const auto width = static_cast<std::size_t>(face.dimension) + 1;
   for (std::size_t n = 0; n < chosen.size(); ++n) {
     const auto j = static_cast<Eigen::Index>(n);
@@ -155,7 +155,7 @@ void BoundaryClaims::JudgeFace(const QueryBlock& asked, const AnswerBlock& answe
       diameter = std::max(diameter, (x_.Vertex(ids[i]) - x_.Vertex(ids[0])).norm());
     const double bound = x_.DistanceAllowed(diameter);
     const double distance =
-        Found(answer, j) ? (answer.points.col(j) - asked.points.col(j)).norm() : INFINITY;
+        Found(answer, j) ? (answer.points.col(j) - asked.col(j)).norm() : INFINITY;
     if (x_.spec.criteria.max_deviation && distance > *x_.spec.criteria.max_deviation)
       x_.findings.Refuse(
           Findings::kDeviation,

@@ -23,9 +23,9 @@ class BoundaryClaims {
   // What is told of each face; and that the boundary itself is a closed manifold.
   void JudgeFaces();
 
-  // Barycentres of some simplices of the boundary, a block for each wall.
+  // Barycentres of some simplices of the boundary, a block for each wall; and the answers to one.
   std::vector<QueryBlock> FaceQuestions();
-  void JudgeFace(const QueryBlock& asked, const AnswerBlock& answer);
+  void JudgeFace(std::size_t block, const Eigen::MatrixXd& asked, const AnswerBlock& answer);
   // That no simplex lies beyond a wall that it does not touch. `chosen`, `each`: see PointsInside.
   void JudgeInside(const std::vector<std::uint32_t>& chosen, std::uint32_t each,
                    const AnswerBlock& answer);

@@ -13,6 +13,7 @@
 #include "core/certificate/probes.h"
 #include "core/certificate/reach_claims.h"
 #include "core/certificate/rim_check.h"
+#include "core/certificate/sheet_claims.h"
 
 namespace stellate::core {
 
@@ -46,14 +47,12 @@ class Certifier::Impl {
     if (ball_steps_ == 0) claims_->closeness.JudgeVertices(answers[vertices_]);
     for (std::size_t b = 0; b < blocks_.size(); ++b)
       if (judges_[b]) judges_[b](blocks_[b].points, answers[b]);
-    if (boundary_ && ball_steps_ == 0)
-      for (std::size_t b = faces_; b < blocks_.size(); ++b)
-        boundary_->JudgeFace(blocks_[b], answers[b]);
     AskMore();
   }
 
   const Certificate& certificate() const { return x_.certificate; }
   const std::vector<double>& wanted() const { return x_.wanted; }
+  const PointsOnWalls& wanted_on_walls() const { return x_.wanted_on_walls; }
   std::vector<double>& seen() { return x_.seen; }
 
  private:
@@ -119,12 +118,21 @@ class Certifier::Impl {
     Ask(c.closeness.TangentQuestions(),
         [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.closeness.JudgeTangents(a); });
     AskBalls();
-    faces_ = blocks_.size();
-    if (!boundary_) return;
-    for (QueryBlock& block : boundary_->FaceQuestions()) {
-      blocks_.push_back(std::move(block));
-      judges_.push_back(nullptr);
-    }
+    if (boundary_) AskOnWalls();
+  }
+
+  void AskOnWalls() {
+    const auto ask = [this](auto& claims, std::vector<QueryBlock> blocks, auto judge) {
+      for (std::size_t n = 0; n < blocks.size(); ++n) {
+        blocks_.push_back(std::move(blocks[n]));
+        judges_.push_back([&claims, judge, n](const Eigen::MatrixXd& asked, const AnswerBlock& a) {
+          (claims.*judge)(n, asked, a);
+        });
+      }
+    };
+    ask(*boundary_, boundary_->FaceQuestions(), &BoundaryClaims::JudgeFace);
+    sheets_.emplace(x_);
+    ask(*sheets_, sheets_->Questions(claims_->closeness.simplices()), &SheetClaims::Judge);
   }
 
   void AskMore() {
@@ -169,12 +177,12 @@ class Certifier::Impl {
   Examination x_;
   std::optional<Claims> claims_;            // if it is a complex
   std::optional<BoundaryClaims> boundary_;  // of a manifold with boundary
+  std::optional<SheetClaims> sheets_;       // of that, too
   int ball_steps_ = 0;
   bool finished_ = false;
   std::vector<QueryBlock> blocks_;
   std::vector<Judge> judges_;  // of the blocks; none of the vertices', which come first
   std::size_t vertices_ = 0;   // their block in the first round
-  std::size_t faces_ = 0;      // the first of the faces' blocks there, which come last
 };
 
 Certifier::Certifier(const Specification& spec, const MeshView& mesh, const StarFacts& facts,
@@ -186,6 +194,7 @@ const std::vector<QueryBlock>* Certifier::NextBlocks() { return impl_->NextBlock
 void Certifier::Absorb(const std::vector<AnswerBlock>& answers) { impl_->Absorb(answers); }
 const Certificate& Certifier::certificate() const { return impl_->certificate(); }
 const std::vector<double>& Certifier::Uncovered() const { return impl_->wanted(); }
+const PointsOnWalls& Certifier::UncoveredOnWalls() const { return impl_->wanted_on_walls(); }
 std::vector<double> Certifier::TakeSeen() { return std::move(impl_->seen()); }
 
 }  // namespace stellate::core

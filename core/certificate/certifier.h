@@ -27,6 +27,8 @@ class Certifier {
   // for max_deviation. Where there are any it is refused, but may become right when they are
   // inserted.
   const std::vector<double>& Uncovered() const;
+  // The same of walls: points of M on walls where the mesh does not end.
+  const PointsOnWalls& UncoveredOnWalls() const;
   // All that it knew or was answered, d each.
   std::vector<double> TakeSeen();
 

@@ -106,7 +106,8 @@ Topology ExamineTopology(const Examination& x, const Adjacency& adjacency) {
       x.mesh.faces ? BoundaryClaims::CloseOff(x.mesh) : std::vector<std::uint32_t>();
   const SimplexList& list = adjacency.list();
   std::optional<Adjacency> closed_adjacency;
-  if (x.mesh.faces) closed_adjacency.emplace(SimplexList{list.k, list.vertices + 1, &closed_off});
+  if (x.mesh.faces)
+    closed_adjacency.emplace(SimplexList{list.k, list.vertices + 1, &closed_off}, list.vertices);
   const Adjacency& closed = closed_adjacency ? *closed_adjacency : adjacency;
   Topology topology;
   ParallelFor(2, [&](int part) {
@@ -151,7 +152,6 @@ void JudgeTopology(Examination& x, const Topology& topology) {
              connectivity.some_isolated.end(), std::back_inserter(c.violations.links));
   c.violations.links.resize(std::min(c.violations.links.size(), Violations::kMost));
   c.euler_characteristic = links.euler_characteristic;
-  if (x.mesh.faces && x.mesh.faces->empty()) --c.euler_characteristic;  // the apex of no cone
   if (x.mesh.faces) BoundaryClaims(x).JudgeFaces();
   RefuseWhatIsNoManifold(x, topology);
   RefuseWhatIsUnfinished(x);

@@ -55,6 +55,7 @@ struct Examination {
   double position_error = 0;         // of the oracle, as seen at the vertices
   std::vector<double> seen;          // points of M that were answered, d each
   std::vector<double> wanted;  // points of M that the mesh should have a vertex nearer to, d each
+  PointsOnWalls wanted_on_walls;  // where the mesh should end
 };
 
 // Whether question j was answered.

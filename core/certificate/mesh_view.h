@@ -42,6 +42,12 @@ struct StarFacts {
   double tangent_error_length = 0;  // sin(tangent_error) times the reach (TangentFinder), length
 };
 
+// Points of M, d each, and the walls that each is on.
+struct PointsOnWalls {
+  std::vector<double> points;
+  std::vector<WallSet> walls;
+};
+
 // What was learned of M before, while the mesh was made.
 struct KnownOfManifold {
   std::vector<double> points;  // of M, d each, that are no vertices

@@ -236,17 +236,20 @@ Stars::Stars(const SimplexList& list) : list_(list) {
   }
 }
 
-Adjacency::Adjacency(Stars stars) : Stars(std::move(stars)) { MatchFacets(); }
+Adjacency::Adjacency(Stars stars, std::uint32_t apex) : Stars(std::move(stars)) {
+  MatchFacets(apex);
+}
 
 // Each facet is matched at its lowest vertex, among the few that share it: parts of the vertices
 // write to different places.
-void Adjacency::MatchFacets() {
+void Adjacency::MatchFacets(std::uint32_t apex) {
   const SimplexList& list = this->list();
   across_.assign(list.ids->size(), kNone);
   std::vector<FacetCount> parts(ChunkCount(list.vertices));
   ParallelChunks(list.vertices, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     parts[chunk] = WithMeshDimension(list.k, [&](auto k) {
-      return MatchFacetsOf<k()>(static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end));
+      return MatchFacetsOf<k()>(static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end),
+                                apex);
     });
   });
   for (FacetCount& part : parts) {
@@ -260,11 +263,13 @@ void Adjacency::MatchFacets() {
 }
 
 template <int K>
-Adjacency::FacetCount Adjacency::MatchFacetsOf(std::uint32_t begin, std::uint32_t end) {
+Adjacency::FacetCount Adjacency::MatchFacetsOf(std::uint32_t begin, std::uint32_t end,
+                                               std::uint32_t apex) {
   const SimplexList& list = this->list();
   FacetCount count;
   std::vector<FacetSide<K>> sides;
   for (std::uint32_t v = begin; v < end; ++v) {
+    if (K == 1 && v == apex) continue;
     sides.clear();
     for (const std::uint32_t s : Star(v)) {
       const std::uint32_t* ids = list[s];

@@ -70,9 +70,11 @@ class Stars {
 // Linear in the mesh in time and memory, for bounded stars: 8 (k + 1) bytes a simplex.
 class Adjacency : public Stars {
  public:
-  // REQUIRES: as for Stars.
-  explicit Adjacency(const SimplexList& list) : Adjacency(Stars(list)) {}
-  explicit Adjacency(Stars stars);
+  // REQUIRES: as for Stars. `apex`: a vertex that is in as many simplices as may be: of a complex
+  // of edges it is a facet itself, which is left out then.
+  explicit Adjacency(const SimplexList& list, std::uint32_t apex = kNone)
+      : Adjacency(Stars(list), apex) {}
+  explicit Adjacency(Stars stars, std::uint32_t apex = kNone);
 
   // The simplex across the facet opposite vertex number i of simplex s; kNone unless that facet
   // is in exactly two simplices, on different vertex sets.
@@ -101,9 +103,9 @@ class Adjacency : public Stars {
     std::string first_bad;
     std::vector<std::uint32_t> some_bad;
   };
-  void MatchFacets();
+  void MatchFacets(std::uint32_t apex);
   template <int K>
-  FacetCount MatchFacetsOf(std::uint32_t begin, std::uint32_t end);
+  FacetCount MatchFacetsOf(std::uint32_t begin, std::uint32_t end, std::uint32_t apex);
 
   std::vector<std::uint32_t> across_;
   FacetCount facets_;

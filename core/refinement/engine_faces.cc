@@ -13,6 +13,7 @@
 #include "core/refinement/engine.h"
 #include "core/refinement/exchange.h"
 #include "core/refinement/guards.h"
+#include "core/refinement/unmet_faces.h"
 
 namespace stellate::core {
 namespace {
@@ -31,6 +32,23 @@ constexpr double kSameCorner = 1e-6;
 constexpr double kCollar = 0.5;
 constexpr double kCollarShare = 0.4;
 constexpr double kCollarLength = 1.1;
+
+// A face of the stage that no vertex is on takes a seed however near to the sample: it is a small
+// piece of walls beside others, and without it the mesh would be another manifold's.
+template <int K>
+void TakeSeedsOfUnmetFaces(const StarComplex<K>& complex, int stage,
+                           std::vector<typename FaceBook<K>::Seed>* seeds,
+                           std::vector<typename FaceBook<K>::Seed>* taken) {
+  std::erase_if(*seeds, [&](auto& seed) {
+    const bool is_taken = std::any_of(taken->begin(), taken->end(),
+                                      [&](const auto& other) { return other.walls == seed.walls; });
+    if (K - CountWalls(seed.walls) != stage || seed.walls == 0 || is_taken ||
+        HasPointOn<K>(complex, seed.walls) || complex.EncroachedBy(seed.point.data(), seed.walls))
+      return false;
+    taken->push_back(std::move(seed));
+    return true;
+  });
+}
 
 }  // namespace
 
@@ -194,6 +212,8 @@ PlannedPoints Engine<K>::ChooseSeeds() {
                       !complex_.EncroachedBy(seed.point.data(), seed.walls);
     (ripe ? chosen : left).push_back(std::move(seed));
   }
+  if (chosen.empty() && !is_full())
+    TakeSeedsOfUnmetFaces<K>(complex_, faces_.stage(), &left, &chosen);
   faces_.seeds() = std::move(left);
   if (chosen.empty() && faces_.stage() == 0 && K > 1 && !faces_.has_collars()) return SetCollars();
   PlannedPoints points;

@@ -6,6 +6,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/vector_ops.h"
+#include "core/refinement/unmet_faces.h"
 
 namespace stellate::core {
 namespace {
@@ -216,6 +217,8 @@ void Inserter<K>::InsertPlanned() {
     }
     if (to_.complex.AnyWithin(answers_.points.col(c).data(), kKeptSpacing * planned.spacing[i])) {
       ++done_.duplicates;
+      if (WallsOf(c) != 0 && !HasPointOn<K>(to_.complex, WallsOf(c)))
+        to_.faces.KeepSeed(answers_.points.col(c), WallsOf(c));
       continue;
     }
     Insert(c, planned.rules[static_cast<std::size_t>(i)], StarComplex<K>::kNone);

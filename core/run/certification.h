@@ -42,6 +42,7 @@ class Certification final : public Asker {
   // Once there are no more questions; see Certifier.
   const Certificate& certificate() const { return certifier_.certificate(); }
   const std::vector<double>& Uncovered() const { return certifier_.Uncovered(); }
+  const PointsOnWalls& UncoveredOnWalls() const { return certifier_.UncoveredOnWalls(); }
   std::vector<double> TakeSeen() { return certifier_.TakeSeen(); }
 
  private:

@@ -97,7 +97,8 @@ void TellUnmetWall(const Engine<K>& engine, int walls, Certificate* certificate)
 }
 
 template <int K>
-void TellBend(const Engine<K>& engine, double epsilon, Certificate* certificate) {
+void TellBend(const Engine<K>& engine, double epsilon, const std::optional<PieceOfWall>& piece,
+              Certificate* certificate) {
   if (certificate->certified) return;
   const StarComplex<K>& complex = engine.complex();
   const std::optional<WallBend> bend = SharpestBend<K>(complex);
@@ -105,7 +106,7 @@ void TellBend(const Engine<K>& engine, double epsilon, Certificate* certificate)
   // No edge of a mesh of that size is longer.
   const std::optional<std::uint32_t> lone =
       is_sharp ? std::nullopt : LoneVertex<K>(complex, 2 * epsilon);
-  if (!is_sharp && !lone) return;
+  if (!is_sharp && !lone && !piece) return;
   if (certificate->verdict.ends_with('.')) certificate->verdict.pop_back();
   if (is_sharp) {
     certificate->verdict += Message(
@@ -117,12 +118,15 @@ void TellBend(const Engine<K>& engine, double epsilon, Certificate* certificate)
         Brief(bend->size_to_take()), ".");
     return;
   }
-  const Eigen::Map<const Eigen::VectorXd> at(complex.Point(*lone), complex.d());
+  const PieceOfWall small =
+      lone ? PieceOfWall{std::countr_zero(complex.walls(*lone)),
+                         Eigen::Map<const Eigen::VectorXd>(complex.Point(*lone), complex.d())}
+           : *piece;
   certificate->verdict +=
-      Message("; wall ", std::countr_zero(complex.walls(*lone)), " has a piece at ", NamePoint(at),
-              " that is too small for epsilon ", Brief(epsilon), ": vertex ", *lone,
-              " finds no neighbour on it; take epsilon at most a fifth of the width of that hole "
-              "or piece.");
+      Message("; wall ", small.wall, " has a piece at ", NamePoint(small.point),
+              " that is too small for epsilon ", Brief(epsilon), ": ",
+              lone ? Message("vertex ", *lone, " finds no neighbour on it") : "no mesh ends there",
+              "; take epsilon at most a fifth of the width of that hole or piece.");
 }
 
 template <int K>
@@ -181,13 +185,14 @@ void WarnOfCompromises(const Engine<K>& engine, double epsilon, Certificate* cer
         " places; ", filled.filling, " simplices fill these instead, not all of them Delaunay."));
 }
 
-#define STELLATE_EACH(K)                                                       \
-  template void DescribeUnfinished<K>(const Engine<K>&, double, Certificate*); \
-  template std::string WhatIsLeft<K>(const Engine<K>&, std::uint64_t);         \
-  template void TellSharpest<K>(const Engine<K>&, Certificate*);               \
-  template void TellUnmetWall<K>(const Engine<K>&, int, Certificate*);         \
-  template void TellBend<K>(const Engine<K>&, double, Certificate*);           \
-  template void TellNearCorners<K>(const Engine<K>&, double, Certificate*);    \
+#define STELLATE_EACH(K)                                                                 \
+  template void DescribeUnfinished<K>(const Engine<K>&, double, Certificate*);           \
+  template std::string WhatIsLeft<K>(const Engine<K>&, std::uint64_t);                   \
+  template void TellSharpest<K>(const Engine<K>&, Certificate*);                         \
+  template void TellUnmetWall<K>(const Engine<K>&, int, Certificate*);                   \
+  template void TellBend<K>(const Engine<K>&, double, const std::optional<PieceOfWall>&, \
+                            Certificate*);                                               \
+  template void TellNearCorners<K>(const Engine<K>&, double, Certificate*);              \
   template void WarnOfCompromises<K>(const Engine<K>&, double, Certificate*);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <optional>
 #include <string>
 
 #include "core/refinement/engine.h"
@@ -23,10 +25,17 @@ void TellSharpest(const Engine<K>& engine, Certificate* certificate);
 template <int K>
 void TellUnmetWall(const Engine<K>& engine, int walls, Certificate* certificate);
 
+struct PieceOfWall {
+  int wall = 0;
+  Eigen::VectorXd point;
+};
+
 // Where a wall bends by more than epsilon can follow, or has a piece that is smaller, of a mesh
 // that is not certified although nothing kept it from being finished: at the verdict's end.
+// `piece`: one that the mesh had been without, if there is one.
 template <int K>
-void TellBend(const Engine<K>& engine, double epsilon, Certificate* certificate);
+void TellBend(const Engine<K>& engine, double epsilon, const std::optional<PieceOfWall>& piece,
+              Certificate* certificate);
 
 // Where walls all but meet in one point, so that corners are far nearer to each other than epsilon,
 // of a mesh that is not certified: at the verdict's end.

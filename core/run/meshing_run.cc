@@ -292,7 +292,8 @@ template <int K>
 void MeshingRun<K>::AfterCertificate() {
   if (engine_.filled().is_handed_out() ||
       certification_->certificate().epsilon_over_reach > kCoarse ||
-      !AskForSpares(certification_->Uncovered()))
+      !(AskForSparesOnWalls(certification_->UncoveredOnWalls()) ||
+        AskForSpares(certification_->Uncovered())))
     Finish(Termination::kConverged);
 }
 

@@ -12,6 +12,7 @@
 #include "core/run/asker.h"
 #include "core/run/batch_parts.h"
 #include "core/run/certification.h"
+#include "core/run/ending.h"
 #include "core/run/laying.h"
 #include "core/run/repeat_check.h"
 #include "core/run/rim_watch.h"
@@ -77,6 +78,7 @@ class MeshingRun final : public Mesher {
   void Certify();
   void AfterCertificate();
   bool AskForSpares(const std::vector<double>& points);
+  bool AskForSparesOnWalls(const PointsOnWalls& points);
 
   void Finish(Termination termination);
   void DescribeEnding(bool is_whole);
@@ -109,8 +111,9 @@ class MeshingRun final : public Mesher {
   BoxWatch box_watch_;
   StallWatch stall_watch_;
   RimWatch rim_watch_;
-  bool rehearsal_failed_ = false;  // the last round of candidates inserted nothing
-  bool covers_box_ = false;        // each seed of a covered box has its closest point
+  std::optional<PieceOfWall> small_piece_;  // that a mesh has been without
+  bool rehearsal_failed_ = false;           // the last round of candidates inserted nothing
+  bool covers_box_ = false;                 // each seed of a covered box has its closest point
 };
 
 STELLATE_DECLARE_CLASS(MeshingRun)

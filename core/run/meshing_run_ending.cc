@@ -41,7 +41,7 @@ void MeshingRun<K>::DescribeEnding(bool is_whole) {
   if (termination == Termination::kNoProgress) TellUnmetWall<K>(engine_, spec_.walls, &certificate);
   TellNearCorners<K>(engine_, spec_.epsilon, &certificate);
   if (termination == Termination::kConverged || termination == Termination::kNoProgress)
-    TellBend<K>(engine_, spec_.epsilon, &certificate);
+    TellBend<K>(engine_, spec_.epsilon, small_piece_, &certificate);
   TellSharpest<K>(engine_, &certificate);
 }
 

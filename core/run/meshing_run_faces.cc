@@ -1,5 +1,6 @@
 // What a run of a manifold with boundary asks for besides: seeds of its faces.
 
+#include <bit>
 #include <string>
 #include <utility>
 
@@ -8,6 +9,12 @@
 #include "core/run/meshing_run.h"
 
 namespace stellate::core {
+namespace {
+
+// Of epsilon: a piece of a wall that has a vertex so near, and yet no simplex there, is too small.
+constexpr double kKnownWithin = 0.1;
+
+}  // namespace
 
 // The seeds' closest points on M, and on each wall of it.
 template <int K>
@@ -55,6 +62,34 @@ void MeshingRun<K>::KeepFaceSeeds() {
 template <int K>
 void MeshingRun<K>::JudgeWalls() {
   if (Status status = wall_check_.Judge(trip_->answers()); !status.ok()) Fail(std::move(status));
+}
+
+// Points of walls where the mesh should end, and does not: faces are meshed from there. False as of
+// AskForSpares.
+template <int K>
+bool MeshingRun<K>::AskForSparesOnWalls(const PointsOnWalls& points) {
+  const StarComplex<K>& complex = engine_.complex();
+  const double epsilon = engine_.criteria().epsilon;
+  PointsOnWalls news;
+  for (std::size_t i = 0; i < points.walls.size(); ++i) {
+    CheckInterruption(i);
+    const double* y = points.points.data() + i * static_cast<std::size_t>(complex.d());
+    bool is_news = true;
+    complex.ForEachWithin(y, kKnownWithin * epsilon, [&](std::uint32_t p) {
+      is_news = is_news && !IsSubset(points.walls[i], complex.walls(p));
+    });
+    if (!is_news) continue;
+    news.points.insert(news.points.end(), y, y + complex.d());
+    news.walls.push_back(points.walls[i]);
+  }
+  CandidateSet<K> candidates;
+  candidates.planned = spare_points_.ChooseOnWalls(news, epsilon);
+  if (candidates.planned.size() == 0) return false;
+  small_piece_ = {std::countr_zero(candidates.planned.walls.front()),
+                  candidates.planned.points.col(0)};
+  spare_points_.GiveBack(certification_->TakeSeen());
+  Ask(std::move(candidates), &MeshingRun::InsertSpares);
+  return true;
 }
 
 // Lays the interior, once its faces are meshed, if it has any. Whether it asks for some of it; else
@@ -105,11 +140,12 @@ bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
   return true;
 }
 
-#define STELLATE_EACH(K)                                            \
-  template void MeshingRun<K>::AskForFaces(const Eigen::MatrixXd&); \
-  template void MeshingRun<K>::KeepFaceSeeds();                     \
-  template void MeshingRun<K>::JudgeWalls();                        \
-  template bool MeshingRun<K>::AskToLayInterior();                  \
+#define STELLATE_EACH(K)                                                  \
+  template void MeshingRun<K>::AskForFaces(const Eigen::MatrixXd&);       \
+  template void MeshingRun<K>::KeepFaceSeeds();                           \
+  template void MeshingRun<K>::JudgeWalls();                              \
+  template bool MeshingRun<K>::AskForSparesOnWalls(const PointsOnWalls&); \
+  template bool MeshingRun<K>::AskToLayInterior();                        \
   template bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>*);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

@@ -64,6 +64,29 @@ Eigen::MatrixXd SparePoints::Choose(const std::vector<double>& points,
   return all;
 }
 
+PlannedPoints SparePoints::ChooseOnWalls(const PointsOnWalls& points, double epsilon) {
+  PlannedPoints chosen;
+  if (points.walls.empty() || chosen_ == kMostChosen) return chosen;
+  ++chosen_;
+  std::vector<const double*> at;
+  for (std::size_t i = 0; i < points.walls.size(); ++i) {
+    CheckInterruption(i);
+    const double* y = points.points.data() + i * d_;
+    bool is_near = false;
+    for (std::size_t j = 0; j < at.size() && !is_near; ++j)
+      is_near =
+          chosen.walls[j] == points.walls[i] && Distance(y, at[j], static_cast<int>(d_)) < epsilon;
+    if (is_near) continue;
+    at.push_back(y);
+    chosen.walls.push_back(points.walls[i]);
+  }
+  const auto d = static_cast<Eigen::Index>(d_);
+  chosen.points.resize(d, static_cast<Eigen::Index>(at.size()));
+  for (std::size_t i = 0; i < at.size(); ++i)
+    chosen.points.col(static_cast<Eigen::Index>(i)) = Eigen::Map<const Eigen::VectorXd>(at[i], d);
+  return chosen;
+}
+
 #define STELLATE_EACH(K)                                                               \
   template std::vector<double> SparePoints::Uncovered<K>(const StarComplex<K>&) const; \
   template Eigen::MatrixXd SparePoints::Choose<K>(const std::vector<double>&,          \

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/certificate/mesh_view.h"
 #include "core/refinement/candidate_set.h"
 
 namespace stellate::core {
@@ -26,6 +27,9 @@ class SparePoints {
   template <int K>
   Eigen::MatrixXd Choose(const std::vector<double>& points, const StarComplex<K>& complex,
                          double epsilon);
+
+  // The same of points on walls, of each wall one of those that lie together.
+  PlannedPoints ChooseOnWalls(const PointsOnWalls& points, double epsilon);
 
   // To and from a certificate, d each.
   std::vector<double> Take() { return std::move(points_); }
