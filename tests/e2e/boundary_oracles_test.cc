@@ -143,6 +143,27 @@ TEST(Bounded, NormalsOfTheBoundaryAreFound) {
   EXPECT_LT((oracle.ClosestPoint(beyond).points - beyond).norm(), 1e-3);
 }
 
+// A disc that ends 1e-5 before, or beyond, where its boundary is said to be.
+TEST(Bounded, OraclesThatDisagreeAboutTheEndAreToldByHowMuch) {
+  const auto edge = std::make_shared<Points>(1, 2, OntoCircle);
+  for (const double radius : {1 - 1e-5, 1 + 1e-5}) {
+    const auto disc = std::make_shared<Points>(2, 2, [radius](const VectorXd& x) -> VectorXd {
+      return x / std::max(1.0, x.norm() / radius);
+    });
+    const MatrixXd on = edge->ClosestPoint(MatrixXd::Random(2, 20)).points;
+    try {
+      ManifoldWithBoundary(disc, edge).Conormals(on, {0});
+      ADD_FAILURE() << "nothing is said";
+    } catch (const std::runtime_error& told) {
+      EXPECT_NE(std::string(told.what()).find("disagree by 1e-05"), std::string::npos)
+          << told.what();
+      EXPECT_NE(std::string(told.what()).find("take a tolerance of"), std::string::npos);
+    }
+    ManifoldWithBoundary lenient(disc, edge, {}, 2e-5);
+    EXPECT_LT((lenient.Conormals(on, {0}) - on).cwiseAbs().maxCoeff(), 1e-3);
+  }
+}
+
 TEST(Bounded, BadDeclarationsAreRefused) {
   const auto refusal = [](std::shared_ptr<Oracle> inner, std::shared_ptr<Oracle> rim,
                           double tolerance = 1e-6) -> std::string {

@@ -97,6 +97,25 @@ def test_oracles_that_do_not_belong_together_are_refused(server, inner, rim, wor
         stellate.mesh(oracles.ManifoldWithBoundary(inner, rim), 0.25, server=server)
 
 
+def onto_disc(radius):
+    return lambda x: x / np.maximum(1, np.linalg.norm(x, axis=1) / radius)[:, None]
+
+
+# A disc that ends 1e-5 before, or beyond, where its boundary is said to be.
+@pytest.mark.parametrize("radius", [1 - 1e-5, 1 + 1e-5])
+def test_oracles_that_disagree_about_the_end_are_told_by_how_much(radius):
+    disc = Points(2, PLANE, onto_disc(radius))
+    edge = Points(1, PLANE, lambda x: x / np.linalg.norm(x, axis=1)[:, None])
+    on = edge.closest_point(np.random.default_rng(1).normal(size=(20, 2)))
+    with pytest.raises(
+        stellate.OracleError, match=r"disagree by 1e-05 .*take tolerance=\d"
+    ) as told:
+        oracles.ManifoldWithBoundary(disc, edge).conormals(on, (0,))
+    advised = float(str(told.value).split("tolerance=")[1].split(",")[0])
+    outward = oracles.ManifoldWithBoundary(disc, edge, tolerance=advised).conormals(on, (0,))
+    assert np.abs(outward[:, 0] - on).max() < 1e-3
+
+
 def test_bad_declarations_are_refused():
     with pytest.raises(stellate.InvalidArgument, match="has dimension 1 there, and this has 2"):
         oracles.ManifoldWithBoundary(CAP, CAP)

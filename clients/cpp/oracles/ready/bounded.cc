@@ -17,6 +17,8 @@ using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
 
 constexpr double kStep = 1e-4;     // of differences of closest points, in shares of where M is
 constexpr double kOneSided = 0.1;  // of what a step outwards loses at the boundary, at least
+constexpr double kMargin =
+    3;  // of the tolerance that is advised: elsewhere they may differ by more
 
 void CheckShape(const MatrixXd& columns, Index rows, Index count, const std::string& what) {
   if (columns.rows() == rows && columns.cols() == count && columns.allFinite()) return;
@@ -181,8 +183,10 @@ MatrixXd ManifoldWithBoundary::Clearances(const MatrixXd& points) {
 }
 
 MatrixXd ManifoldWithBoundary::Conormals(const MatrixXd& points, const Walls& /*face*/) {
-  CheckOn(points);
-  return Outward(points, TangentBasis(points));
+  const VectorXd off = CheckOn(points);
+  MatrixXd outward = Outward(points, TangentBasis(points));
+  if (!clearance_) CheckEnds(points, outward, off);
+  return outward;
 }
 
 // At points of the boundary with these tangent bases of M, d x n.
@@ -231,14 +235,34 @@ VectorXd ManifoldWithBoundary::ToRim(const MatrixXd& points) {
   return distances;
 }
 
-void ManifoldWithBoundary::CheckOn(const MatrixXd& points) {
+// How far points of the boundary are from M.
+VectorXd ManifoldWithBoundary::CheckOn(const MatrixXd& points) {
   const Answer near = Nearest(*inner_, points);
-  if (points.cols() == 0) return;
+  VectorXd off = (near.points - points).colwise().norm();
   Index worst = 0;
-  const double off = (near.points - points).colwise().norm().maxCoeff(&worst);
-  if (off <= kStep * scale_) return;
-  throw std::runtime_error(PlaceOf(points.col(worst)) + " is of the boundary, and " + Short(off) +
+  if (points.cols() == 0 || off.maxCoeff(&worst) <= kStep * scale_) return off;
+  throw std::runtime_error(PlaceOf(points.col(worst)) + " is of the boundary, and " +
+                           Short(off[worst]) +
                            " away from the manifold: the two oracles have to be of one manifold");
+}
+
+// That M ends where its boundary is said to be, to within the tolerance: `off` before that, or, as
+// a step outwards shows, beyond it. Else M would not go on beyond its end.
+void ManifoldWithBoundary::CheckEnds(const MatrixXd& points, const MatrixXd& outward,
+                                     const VectorXd& off) {
+  const Answer back = Nearest(*inner_, points + kStep * scale_ * outward);
+  VectorXd apart = off;
+  for (Index j = 0; j < points.cols(); ++j) {
+    if (!back.IsFound(j)) continue;
+    apart[j] = std::max(apart[j], (back.points.col(j) - points.col(j)).dot(outward.col(j)));
+  }
+  Index worst = 0;
+  if (points.cols() == 0 || apart.maxCoeff(&worst) <= tolerance_) return;
+  throw std::runtime_error(
+      "the two oracles disagree by " + Short(apart[worst]) + " about where the manifold ends, at " +
+      PlaceOf(points.col(worst)) + ", and by no more than " + Short(tolerance_) +
+      " they may: take a tolerance of " + Short(kMargin * apart[worst] / scale_) +
+      ", or solve for nearest points more exactly");
 }
 
 }  // namespace stellate::oracles

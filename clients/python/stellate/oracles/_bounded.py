@@ -14,6 +14,7 @@ from ._common import all_or_raise, refuse_walls
 
 _STEP = 1e-4  # of differences of closest points, in shares of where M is
 _ONE_SIDED = 0.1  # of what a step outwards loses at the boundary, at least
+_MARGIN = 3  # of the tolerance that is advised: elsewhere the two may differ by more
 
 
 class ManifoldWithBoundary:
@@ -28,7 +29,8 @@ class ManifoldWithBoundary:
         where it is asked from beyond that; or, with `clearance`, of a manifold that M is a part of.
       boundary: of the boundary, of dimension k - 1, which is closed.
       clearance: (n, d) -> (n,), positive in M, zero on its boundary and negative beyond it.
-      tolerance: of M's size: a nearest point so near the boundary is on it.
+      tolerance: of M's size: a nearest point so near the boundary is on it. The two oracles may
+        disagree by as much about where M ends.
     """
 
     walls = 1
@@ -112,8 +114,10 @@ class ManifoldWithBoundary:
     def conormals(self, points: Array, face: tuple[int, ...]) -> Array:
         """(n, d) -> (n, 1, d): the outward unit normals of the boundary within M."""
         points = np.ascontiguousarray(points, dtype=np.float64)
-        self._check_on(points)
+        off = self._check_on(points)
         outward = self._outward(points, self.tangent_basis(points))
+        if self._clearance is None:
+            self._check_ends(points, outward, off)
         return np.asarray(outward[:, None, :])
 
     def _outward(self, points: Array, bases: Array) -> Array:
@@ -141,7 +145,8 @@ class ManifoldWithBoundary:
         nearest, found = self._rim.closest_points(np.ascontiguousarray(points))
         return np.where(found, norms(points - nearest), self._scale)
 
-    def _check_on(self, points: Array) -> None:
+    def _check_on(self, points: Array) -> Array:
+        """How far points of the boundary are from M, (n,)."""
         nearest, found = self._inner.closest_points(points)
         off = np.where(found, norms(nearest - points), 0.0)
         worst = int(np.argmax(off)) if len(off) else 0
@@ -149,6 +154,23 @@ class ManifoldWithBoundary:
             raise OracleError(
                 f"{points[worst].tolist()} is of the boundary, and {off[worst]:.3g} away from the "
                 "manifold: the two oracles have to be of one manifold",
+                "ORACLE_BAD_CONORMAL",
+            )
+        return np.asarray(off)
+
+    def _check_ends(self, points: Array, outward: Array, off: Array) -> None:
+        """That M ends where its boundary is said to be, to within the tolerance: `off` before that,
+        or, as a step outwards shows, beyond it. Else M would not go on beyond its end."""
+        back, found = self._inner.closest_points(points + _STEP * self._scale * outward)
+        past = np.where(found, ((back - points) * outward).sum(axis=1), 0.0)
+        apart = np.maximum(off, past)
+        worst = int(np.argmax(apart)) if len(apart) else 0
+        if len(apart) and apart[worst] > self._tolerance:
+            raise OracleError(
+                f"the two oracles disagree by {apart[worst]:.3g} about where the manifold ends, at "
+                f"{points[worst].tolist()}, and by no more than {self._tolerance:.3g} they may: take "
+                f"tolerance={_MARGIN * apart[worst] / self._scale:.1g}, or solve for nearest points "
+                "more exactly",
                 "ORACLE_BAD_CONORMAL",
             )
 

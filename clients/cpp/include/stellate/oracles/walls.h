@@ -91,7 +91,7 @@ class ManifoldWithBoundary final : public Oracle {
   // `oracle`, of dimension k, answers with nearest points of M itself, so on the boundary where it
   // is asked from beyond that; or, with a clearance, of a manifold that M is a part of. `boundary`
   // is closed, of dimension k - 1. `tolerance`, of M's size: a nearest point so near the boundary
-  // is on it.
+  // is on it; the two oracles may disagree by as much about where M ends.
   ManifoldWithBoundary(std::shared_ptr<Oracle> oracle, std::shared_ptr<Oracle> boundary,
                        Clearance clearance = {}, double tolerance = 1e-6);
 
@@ -117,7 +117,9 @@ class ManifoldWithBoundary final : public Oracle {
   Eigen::MatrixXd Outward(const Eigen::MatrixXd& points, const Eigen::MatrixXd& bases);
   Eigen::VectorXd Climb(const Eigen::VectorXd& x, const Eigen::MatrixXd& basis) const;
   Eigen::VectorXd ToRim(const Eigen::MatrixXd& points);
-  void CheckOn(const Eigen::MatrixXd& points);
+  Eigen::VectorXd CheckOn(const Eigen::MatrixXd& points);
+  void CheckEnds(const Eigen::MatrixXd& points, const Eigen::MatrixXd& outward,
+                 const Eigen::VectorXd& off);
 
   std::shared_ptr<Oracle> inner_, rim_;
   Clearance clearance_;
