@@ -1,13 +1,16 @@
 #include "stellate/client.h"
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "net/channel.h"
 #include "net/embedded_server.h"
 #include "run/declare.h"
+#include "run/epsilon.h"
 #include "run/run.h"
+#include "shared/doctor.h"
 #include "stellate/monitor.h"
 
 namespace stellate {
@@ -28,11 +31,17 @@ Expected<Mesh> MeshManifold(Oracle& oracle, const MeshOptions& options) {
       embedded ? client::Connect(server, {}, client::kNoPings)
                : client::Connect(server, options.credentials, options.keepalive_seconds);
   if (!channel) return tl::unexpected(channel.error());
-  client::Run run(*channel, oracle, request->options,
-                  [&embedded] { return embedded && !embedded->alive(); });
-  Expected<Mesh> mesh = run.Go();
-  if (mesh) mesh->report.epsilon_reason = std::move(request->epsilon_reason);
-  return mesh;
+  for (int retries = options.auto_epsilon ? doctor::kAutoRetries : 0;; --retries) {
+    client::Run run(*channel, oracle, request->options,
+                    [&embedded] { return embedded && !embedded->alive(); });
+    Expected<Mesh> mesh = run.Go();
+    if (!mesh) return mesh;
+    mesh->report.epsilon_reason = request->epsilon_reason;
+    if (retries == 0 || options.stop.stop_requested()) return mesh;
+    const std::optional<ChosenEpsilon> finer = client::Finer(mesh->report);
+    if (!finer) return mesh;
+    client::Take(*finer, &*request);
+  }
 }
 
 Expected<ServerHealth> CheckHealth(const std::string& server, double timeout_seconds,

@@ -19,14 +19,18 @@ Expected<Request> Settle(Oracle& oracle, const MeshOptions& options) {
     }
     Expected<ChosenEpsilon> chosen = ChooseEpsilon(oracle);
     if (!chosen) return tl::unexpected(chosen.error());
-    request.options.epsilon = chosen->epsilon;
-    request.epsilon_reason = std::move(chosen->reason);
-    if (options.on_epsilon) options.on_epsilon(chosen->epsilon, request.epsilon_reason);
+    Take(*chosen, &request);
   }
   // Round trips are what a far server costs.
   const bool far = !options.server.empty() && !StaysOnThisMachine(options.server);
   if (!options.ask_ahead && far) request.options.ask_ahead = true;
   return request;
+}
+
+void Take(const ChosenEpsilon& chosen, Request* request) {
+  request->options.epsilon = chosen.epsilon;
+  request->epsilon_reason = chosen.reason;
+  if (request->options.on_epsilon) request->options.on_epsilon(chosen.epsilon, chosen.reason);
 }
 
 Expected<std::string> CreateMesh(v1::Stellate::Stub& stub, Oracle& oracle,

@@ -18,6 +18,9 @@ struct Request {
 // none is named.
 Expected<Request> Settle(Oracle& oracle, const MeshOptions& options);
 
+// Takes an epsilon that was chosen, and tells of it.
+void Take(const ChosenEpsilon& chosen, Request* request);
+
 // The name of a new mesh. Not tried again when it fails: whether the server made the mesh would not
 // be known.
 Expected<std::string> CreateMesh(v1::Stellate::Stub& stub, Oracle& oracle,

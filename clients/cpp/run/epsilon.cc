@@ -16,6 +16,8 @@ std::string Show(const char* format, double value) {
   return text;
 }
 
+double Rounded(double length) { return std::strtod(Show("%.2g", length).c_str(), nullptr); }
+
 }  // namespace
 
 Expected<ChosenEpsilon> ChooseEpsilon(Oracle& oracle) {
@@ -36,10 +38,25 @@ Expected<ChosenEpsilon> client::ChooseEpsilon(CheckReport report) {
                 "epsilon shall be",
                 "ORACLE_NO_REACH");
   }
-  const double chosen =
-      std::strtod(Show("%.2g", *report.reach / doctor::kAutoEpsilon).c_str(), nullptr);
-  return ChosenEpsilon{chosen, "a quarter of the reach, about " + Show("%.3g", *report.reach) +
-                                   " by " + std::to_string(report.queries) + " queries"};
+  return ChosenEpsilon{Rounded(*report.reach / doctor::kAutoEpsilon),
+                       "a quarter of the reach, about " + Show("%.3g", *report.reach) + " by " +
+                           std::to_string(report.queries) + " queries"};
+}
+
+std::optional<ChosenEpsilon> client::Finer(const Report& report) {
+  const Certificate& c = report.certificate;
+  const bool ended = report.termination == Termination::kConverged ||
+                     report.termination == Termination::kNoProgress;
+  const double coarsest = doctor::kSafeRatio * c.estimated_reach;
+  if (c.certified || c.reach_refuted || !ended) return std::nullopt;
+  if (!(coarsest > 0 && coarsest < report.epsilon)) return std::nullopt;
+  const std::string why = "a quarter of the reach, about " + Show("%.3g", c.estimated_reach) +
+                          " by the certificate of epsilon " + Show("%g", report.epsilon) +
+                          ", which was too coarse";
+  const double quarter = Rounded(c.estimated_reach / doctor::kAutoEpsilon);
+  const double least = Rounded(doctor::kAutoLeastShare * report.epsilon);
+  if (quarter < least) return ChosenEpsilon{least, "no finer at once, though " + why};
+  return ChosenEpsilon{quarter, why};
 }
 
 }  // namespace stellate

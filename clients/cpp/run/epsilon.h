@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "stellate/client.h"
 #include "stellate/doctor.h"
 
@@ -7,5 +9,8 @@ namespace stellate::client {
 
 // What ChooseEpsilon says of a Check that was made.
 Expected<ChosenEpsilon> ChooseEpsilon(CheckReport report);
+// What an automatic epsilon goes on with after a mesh of which this is the report; none: a smaller
+// one would mend nothing.
+std::optional<ChosenEpsilon> Finer(const Report& report);
 
 }  // namespace stellate::client

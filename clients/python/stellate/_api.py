@@ -41,7 +41,8 @@ def mesh(
       epsilon: the largest circumradius of a simplex, a length. The mesh lies within about
         epsilon^2 / (2 reach) of the manifold; 0.4 reach and below is safe. The number of vertices
         grows with epsilon^-k. "auto": a quarter of the reach that stellate.check finds, to two
-        digits; `on_progress.note`, if there is one, and the report are told what and why.
+        digits; where that was too coarse, twice at most, a quarter of what the certificate shows.
+        `on_progress.note`, if there is one, and the report are told what and why.
       server: "host:port", "unix:/path", a stellate.Server or Client; None starts a stellated on a
         private unix socket and stops it afterwards.
       on_progress: called in this thread with a stellate.Progress now and then. If it raises, the

@@ -6,15 +6,16 @@ import dataclasses
 import logging
 import numbers
 import threading
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from types import TracebackType
 from typing import Any, Callable
 
 from ._checkpoint import Checkpoint
-from ._epsilon import choose
+from ._epsilon import choose, finer
 from ._follow import Following, OnProgress
 from ._mesh import Mesh
 from ._server import Server
+from ._shared import table
 from ._wire.spec import mesh_spec
 from ._worker import Ask, answer, check_max_chunk, join_all
 from .client import Client, MeshInfo
@@ -133,17 +134,18 @@ class Run:
         checked = CheckedOracle(oracle)
         mesh_spec(checked, 1.0, criteria)  # what is misspelt shows before the oracle is probed
         choice = checkpoint.choose_epsilon if checkpoint is not None else choose
-        epsilon, self._epsilon_reason = choice(oracle, epsilon)
-        if self._epsilon_reason:
-            _note(on_progress, f"epsilon {epsilon:g}, {self._epsilon_reason}")
         self._on_progress, self._checkpoint = on_progress, checkpoint
+        self._epsilon_reason = ""
+        chosen = self._say(choice(oracle, epsilon))
+        self._retries = table("doctor.toml")["auto_retries"] if self._epsilon_reason else 0
         self._interrupted = self._ended = False
+        self._next: tuple[float, str] | None = None  # what epsilon is to be tried after this one
         self._server: Server | None = None
         self._own_client: Client | None = None
         self._live: _Live | None = None
         self._kept: Mesh | None = None
         if checkpoint is not None:
-            spec = mesh_spec(checked, epsilon, criteria)
+            spec = mesh_spec(checked, chosen, criteria)
             checkpoint.require(spec)
             self._kept = checkpoint.finished(spec)
             if self._kept is not None:
@@ -153,14 +155,28 @@ class Run:
                 server = self._server = Server(*(checkpoint.server_flags() if checkpoint else ()))
             if not isinstance(server, Client):
                 server = self._own_client = Client(server)
-            info = self._declare(server, checked, epsilon, criteria)
+            client = server
+
+            def begin(size: float) -> _Live:
+                info = self._declare(client, checked, size, criteria)
+                live = _Live(client, info, Following(client, info, on_progress, every))
+                live.workers = _Workers(
+                    client, checked, info.name, int(workers), max_chunk, self._on_failure, ask
+                )
+                return live
+
+            self._begin, self._every = begin, every
+            self._live = begin(chosen)
         except BaseException:
             self._close_connection()
             raise
-        self._live = _Live(server, info, Following(server, info, on_progress, every))
-        self._live.workers = _Workers(
-            server, checked, info.name, int(workers), max_chunk, self._on_failure, ask
-        )
+
+    def _say(self, choice: tuple[float, str]) -> float:
+        """Tells of an epsilon that was chosen, with a reason, and returns it."""
+        epsilon, self._epsilon_reason = choice
+        if self._epsilon_reason:
+            _note(self._on_progress, f"epsilon {epsilon:g}, {self._epsilon_reason}")
+        return epsilon
 
     @property
     def _at_work(self) -> _Live:
@@ -200,17 +216,52 @@ class Run:
             raise error
 
     def __iter__(self) -> Iterator[Mesh]:
-        """The mesh as it grows, the last with its report. Raises how it failed."""
+        """The mesh as it grows, the last with its report. Raises how it failed.
+
+        Where epsilon was to be chosen and was too coarse, a finer mesh begins anew.
+        """
         if self._kept is not None:
             yield self._kept
             return
-        mesh = None
+        coarse = None
+        while True:
+            try:
+                last = yield from self._one_mesh()
+            except StellateError as error:
+                if error.mesh is None:
+                    error.mesh = coarse
+                raise
+            if self._next is None:
+                return
+            coarse = last
+            self._begin_anew(self._next)
+
+    def _finer(self, mesh: Mesh) -> tuple[float, str] | None:
+        """What is to follow a mesh that is over."""
+        if self._retries == 0 or self._interrupted or mesh.report is None:
+            return None
+        return finer(mesh.report)
+
+    def _begin_anew(self, choice: tuple[float, str]) -> None:
+        self._retries -= 1
+        self._leave(self._at_work)
+        if self._checkpoint is not None:
+            self._checkpoint.forget()
+        self._ended = False
+        self._live = self._begin(self._say(choice))
+        if self._interrupted:  # meanwhile
+            self.interrupt()
+
+    def _one_mesh(self) -> Generator[Mesh, None, Mesh | None]:
+        mesh = self._next = None
         try:
             for mesh in self._at_work.following:
                 mesh = self._told(mesh)
-                if mesh.report is not None:
+                self._next = self._finer(mesh)
+                if mesh.report is not None and self._next is None:
                     self._finish(mesh)
-                yield mesh
+                if self._every or self._next is None:
+                    yield mesh
         except StellateError as error:
             if isinstance(error.mesh, Mesh):  # the server says that it is over
                 error.mesh = mesh = self._told(error.mesh)
@@ -223,6 +274,7 @@ class Run:
             raise self._interruption(mesh)
         if self._failure is not None and not self._ended:
             raise self._failure from None
+        return mesh
 
     def _finish(self, mesh: Mesh) -> None:
         self._ended = True

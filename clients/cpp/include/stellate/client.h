@@ -32,8 +32,10 @@ struct Outage {
 // What to mesh and how. Absent values take the server's defaults; see mesh.proto for each.
 struct MeshOptions {
   double epsilon = 0;  // largest circumradius of a simplex, a length; must be given, or else:
-  bool auto_epsilon = false;  // ChooseEpsilon says it, before the server is asked
-  // Called on the calling thread with what it said; Report::epsilon_reason keeps it.
+  // ChooseEpsilon says it, before the server is asked; where that was too coarse for a certificate,
+  // twice at most, what the certificate shows.
+  bool auto_epsilon = false;
+  // Called on the calling thread with each that was chosen; Report::epsilon_reason keeps the last.
   std::function<void(double epsilon, const std::string& reason)> on_epsilon;
 
   // "host:port" or "unix:/path". Empty: a private stellated is started for this mesh and stopped
