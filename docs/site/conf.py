@@ -51,6 +51,8 @@ html_theme_options = {"navigation_with_keys": True}
 # What Pygments cannot place is shown as it is.
 suppress_warnings = ["misc.highlighting_failure"]
 napoleon_use_ivar = True
+# Ours are sentences, of which Napoleon would take each line for the name of a class.
+napoleon_custom_sections = ["Raises"]
 
 
 _LINK = re.compile(r"(?<!!)\[([^\]\n]*(?:\n[^\]\n]*)?)\]\(([^)\s]+)\)")
@@ -146,7 +148,19 @@ def _plain_words(app, what, name, subject, options, lines):
     lines[:] = out
 
 
+def _styles_stand_alone(app, error):
+    """Debian's Furo imports normalize.css from where its web servers have it: it goes along."""
+    style = pathlib.Path(app.outdir) / "_static" / "styles" / "furo.css"
+    absolute = "/javascript/normalize.css/normalize.css"
+    if error is not None or not style.exists() or absolute not in style.read_text():
+        return
+    kept = pathlib.Path("/usr/share/nodejs/normalize.css/normalize.css").read_text()
+    (style.parent / "normalize.css").write_text(kept)
+    style.write_text(style.read_text().replace(absolute, "normalize.css"))
+
+
 def setup(app):
+    app.connect("build-finished", _styles_stand_alone)
     app.connect("source-read", _lists_are_contents)
     app.connect("source-read", _folders_are_no_pages)
     app.connect("autodoc-process-docstring", _plain_words, priority=100)

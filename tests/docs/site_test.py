@@ -54,6 +54,22 @@ def broken(html: pathlib.Path) -> list[str]:
     return found
 
 
+def unstyled(html: pathlib.Path) -> list[str]:
+    """What styles want and is not in the site, and sections whose words were taken for names."""
+    found = []
+    for style in html.rglob("*.css"):
+        for url in re.findall(r"url\(['\"]?([^'\")]+)", style.read_text()):
+            there = style.parent / url.partition("?")[0].partition("#")[0]
+            if not url.startswith(("data:", "#")) and (url.startswith("/") or not there.exists()):
+                found.append(f"{style.relative_to(html)}: {url} is not in the site")
+    for page in html.rglob("*.html"):
+        if re.search(r"<dt[^>]*>\s*Raises", page.read_text()):
+            found.append(
+                f"{page.relative_to(html)}: 'Raises' is a list of names, and has to be words"
+            )
+    return found
+
+
 def missing(html: pathlib.Path, programs: pathlib.Path) -> list[str]:
     """Of the pages, and of the reference."""
     found = []
@@ -106,7 +122,7 @@ def main() -> int:
     programs, output = map(pathlib.Path, sys.argv[1:])
     subprocess.run([ROOT / "docs/build", "--bin", programs, "--output", output], check=True)
     html = output / "html"
-    wrong = broken(html) + missing(html, programs)
+    wrong = broken(html) + unstyled(html) + missing(html, programs)
     print("\n".join(wrong) or f"{len(list(html.rglob('*.html')))} pages, all whole")
     return 1 if wrong else 0
 

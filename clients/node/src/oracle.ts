@@ -183,10 +183,10 @@ export class CheckedOracle {
     return spread;
   }
 
-  private checked(method: string, answer: Float64Array | Found | undefined, n: number): Found {
-    const all = answer instanceof Float64Array || answer === undefined;
-    const points = numbersOf(method, all ? answer : answer.points, n, this.d);
-    const found = all ? new Uint8Array(n).fill(1) : answer.found;
+  private checked(method: string, answer: unknown, n: number): Found {
+    const some = typeof answer === "object" && answer !== null && "points" in answer;
+    const points = numbersOf(method, some ? answer.points : answer, n, this.d);
+    const found = some ? (answer as Partial<Found>).found : new Uint8Array(n).fill(1);
     if (!(found instanceof Uint8Array) || found.length !== n) {
       throw new OracleError(`${method}: found has to be a Uint8Array of ${n}`, {
         reason: "ORACLE_SHAPE",
@@ -202,11 +202,18 @@ export class CheckedOracle {
 
 function numbersOf(method: string, value: unknown, n: number, width: number): Float64Array {
   if (value instanceof Float64Array && value.length === n * width) return value;
-  const got = value instanceof Float64Array ? `${value.length} numbers` : typeof value;
   throw new OracleError(
-    `${method} returned ${got}; for ${n} points it has to be a Float64Array of ${n * width}`,
+    `${method} returned ${whatIs(value)}; for ${n} points it has to be a Float64Array of ${n * width}`,
     { reason: "ORACLE_SHAPE" },
   );
+}
+
+// Of an answer: "a plain array of 6", "undefined".
+function whatIs(value: unknown): string {
+  if (value instanceof Float64Array) return `${value.length} numbers`;
+  if (Array.isArray(value)) return `a plain array of ${value.length}`;
+  if (typeof value !== "object" || value === null) return String(value);
+  return `an object of class ${value.constructor?.name ?? "none"}`;
 }
 
 function notFinite(method: string, row: number, value: number): OracleError {

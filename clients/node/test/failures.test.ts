@@ -67,6 +67,16 @@ test("answers that break a rule are an OracleError with the rule's name", async 
   }
 });
 
+test("a plain array is called one, alone and among what is found", async () => {
+  for (const spoil of [
+    ({ points }: stellate.Found) => [...points] as unknown,
+    ({ points, found }: stellate.Found) => ({ points: [...points], found }) as unknown,
+  ]) {
+    const oracle = new Spoilt(spoil as (answer: stellate.Found) => stellate.Found);
+    await assert.rejects(meshed(oracle), /returned a plain array of \d+; .* a Float64Array of \d+/);
+  }
+});
+
 test("a worker of another manifold leaves the mesh alone", async () => {
   const client = new stellate.Client(server);
   const info = await client.create(new stellate.Torus(), { epsilon: 0.1 });
