@@ -17,22 +17,20 @@ from typing import Any
 import numpy as np
 
 _builtin_open = open
-_END_IS_READ = (
-    1000  # times in a row before it is taken for a loop; right readers do it once or twice
-)
-_MEMORY = (
-    1 << 30,
-    200,
-)  # bytes, and bytes for each of the file's: Python, numpy; lists of Python objects
+# Times in a row before it is taken for a loop; right readers do it once or twice.
+_END_IS_READ = 1000
+# Of Python and numpy; of lists of Python's objects, for each byte of the file.
+_BYTES, _BYTES_A_BYTE = 1 << 30, 200
 
 
 def main(path: str) -> None:
     import meshio
 
-    bytes_each, most = os.path.getsize(path), resource.getrlimit(resource.RLIMIT_AS)[1]
-    wanted = _MEMORY[0] + _MEMORY[1] * bytes_each
-    resource.setrlimit(resource.RLIMIT_AS, (wanted if most < 0 else min(wanted, most), most))
-    builtins.open = _open  # meshio's
+    most = resource.getrlimit(resource.RLIMIT_AS)[1]
+    wanted = _BYTES + _BYTES_A_BYTE * os.path.getsize(path)
+    with contextlib.suppress(ValueError):  # macOS has no such limit
+        resource.setrlimit(resource.RLIMIT_AS, (wanted if most < 0 else min(wanted, most), most))
+    builtins.open = _open  # type: ignore[assignment]  # meshio's
     with contextlib.redirect_stdout(sys.stderr):
         mesh = meshio.read(path)
     corners: list[Any] = [np.empty((0, 3), np.int64)]
@@ -51,27 +49,31 @@ def main(path: str) -> None:
     sys.stdout.buffer.write(found.getvalue())
 
 
-class _Ending:
-    """A file whose end is not read for ever."""
+def _count(line: bytes | str, ends: int) -> int:
+    """How often in a row the end was read. Raises EOFError where it is read for ever."""
+    if line:
+        return 0
+    if ends == _END_IS_READ:
+        raise EOFError("the file ends too soon")
+    return ends + 1
 
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        self._ends = 0
 
-    def readline(self, *size: Any) -> Any:
-        line = super().readline(*size)  # type: ignore[misc]
-        self._ends = 0 if line else self._ends + 1
-        if self._ends > _END_IS_READ:
-            raise EOFError("the file ends too soon")
+class _Binary(io.BufferedReader):
+    _ends = 0
+
+    def readline(self, size: int | None = -1, /) -> bytes:
+        line = super().readline(size)
+        self._ends = _count(line, self._ends)
         return line
 
 
-class _Binary(_Ending, io.BufferedReader):
-    pass
+class _Text(io.TextIOWrapper):
+    _ends = 0
 
-
-class _Text(_Ending, io.TextIOWrapper):
-    pass
+    def readline(self, size: int = -1, /) -> str:  # type: ignore[override]
+        line = super().readline(size)
+        self._ends = _count(line, self._ends)
+        return line
 
 
 def _open(path: Any, mode: str = "r", *args: Any, **kwargs: Any) -> Any:
