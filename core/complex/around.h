@@ -150,7 +150,8 @@ class StarComplex<K>::Around final : public Surroundings<K> {
   }
 
   // The same for a simplex of a face, by the face's own tangent spaces. Foreign ones are left where
-  // they are: no other star agrees about them.
+  // they are: no other star agrees about them. So are those that reach from one sheet of a wall to
+  // another: in the middle between the two a centre says nothing of either.
   bool CommonOnFace(const std::uint32_t* ids, int count, WallSet walls, double* centre) const {
     if (count < 2) return false;
     const int n = complex_.d_;
@@ -163,6 +164,7 @@ class StarComplex<K>::Around final : public Surroundings<K> {
     for (int i = 0; i < count; ++i) {
       const Site site = Find(ids[i]);
       if (!IsSubset(walls, site.walls)) return false;
+      if (i > 0 && !FaceAlike(Find(ids[0]), site, walls, n)) return false;
       FaceTangents(site, walls, n, bases.data() + static_cast<std::size_t>(i) * stride);
       points[i] = site.point;
       tangents[i] = bases.data() + static_cast<std::size_t>(i) * stride;
@@ -180,6 +182,21 @@ class StarComplex<K>::Around final : public Surroundings<K> {
     if (!found) return false;
     for (int i = 0; i < n; ++i) centre[i] += points[0][i] - p_.point[i];
     return true;
+  }
+
+  // Whether the conormals at two points of a face are less than a right angle apart, wall by wall.
+  static bool FaceAlike(const Site& one, const Site& other, WallSet walls, int n) {
+    bool alike = true;
+    ForEachWall(walls, [&](int wall) {
+      const double* const here = ConormalOf(one, wall);
+      const double* const there = ConormalOf(other, wall);
+      double cosine = 0;
+      for (int a = 0; a < K; ++a)
+        for (int b = 0; b < K; ++b)
+          cosine += here[a] * there[b] * Dot(one.tangent + a * n, other.tangent + b * n, n);
+      alike = alike && cosine > 0;
+    });
+    return alike;
   }
 
   static const double* ConormalOf(const Site& site, int wall) {

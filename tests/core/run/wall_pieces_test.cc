@@ -149,6 +149,15 @@ TEST(WallPiecesTest, SheetsOfOneWallAreNotDropped) {
       }
 }
 
+// Nearer than two epsilons, so that a centre common to points of both is nearer than epsilon to
+// each.
+TEST(WallPiecesTest, SheetsOfOneWallMayBeNearToEachOther) {
+  for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6})
+    for (const bool product : {false, true})
+      EXPECT_TRUE(
+          ExpectNothingDropped(HollowBallOfOneWall(3, 0.4, 0.3, seed, product), 0.2, seed, 0));
+}
+
 // Circles of these radii, centres on the first axis.
 Domain Circles(const std::vector<double>& radii, const std::vector<Domain::Function>& walls) {
   Domain m = Make(1, 2, 2.5 * static_cast<double>(radii.size()), {}, {});
