@@ -283,6 +283,58 @@ Status CheckAnswer(const Specification& spec, const QueryBlock& block, Index que
 
 }  // namespace
 
+QueryBlock QueryBlock::Rows(Index first, Index count) const {
+  QueryBlock some;
+  some.kind = kind;
+  some.want_tangents = want_tangents;
+  some.want_sizes = want_sizes;
+  some.face = face;
+  some.want_clearances = want_clearances;
+  ForEachField([&](auto field) { some.*field = columns::Some(this->*field, first, count); });
+  return some;
+}
+
+AnswerBlock AnswerBlock::Shape(int dimension, int walls, const QueryBlock& block, Index count) {
+  const Index d = block.points.rows();
+  AnswerBlock shape;
+  shape.points.setZero(d, count);
+  shape.found.assign(static_cast<std::size_t>(count), 1);
+  if (block.want_tangents) shape.tangents.setZero(d * dimension, count);
+  if (block.want_sizes) shape.sizes.setZero(count);
+  if (block.want_clearances) {
+    shape.clearances.setZero(walls, count);
+    if (block.face != 0) shape.conormals.setZero(CountWalls(block.face) * d, count);
+  }
+  return shape;
+}
+
+AnswerBlock AnswerBlock::Rows(Index first, Index count) const {
+  AnswerBlock some;
+  ForEachField([&](auto field) { some.*field = columns::Some(this->*field, first, count); });
+  return some;
+}
+
+void AnswerBlock::Put(Index first, const AnswerBlock& some) {
+  ForEachField([&](auto field) {
+    const auto& from = some.*field;
+    auto& to = this->*field;
+    const bool fits = columns::Count(to) > 0 && columns::Count(from) == some.size() &&
+                      columns::Rows(from) == columns::Rows(to);
+    if (fits) columns::Put(from, first, &to);
+  });
+}
+
+bool AnswerBlock::Fits(const AnswerBlock& shape) const {
+  bool fits = true;
+  ForEachField([&](auto field) {
+    const auto& own = this->*field;
+    fits = fits &&
+           (columns::Count(own) == 0 ||
+            (columns::Count(own) == size() && columns::Rows(own) == columns::Rows(shape.*field)));
+  });
+  return fits;
+}
+
 Status CheckAnswers(const Specification& spec, const QueryBlock& block, Eigen::Index first,
                     const AnswerBlock& answer) {
   if (Status s = CheckShape(spec, block, first, answer); !s.ok()) return s;

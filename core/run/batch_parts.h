@@ -11,7 +11,7 @@ namespace stellate::core {
 class BatchParts {
  public:
   // most: queries a part, > 0
-  BatchParts(QueryBatch whole, std::uint64_t most);
+  BatchParts(const Specification& spec, QueryBatch whole, std::uint64_t most);
 
   QueryBatch& part() { return part_; }
   bool is_last() const { return first_ + part_.size() == whole_.size(); }

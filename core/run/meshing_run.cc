@@ -47,7 +47,7 @@ template <int K>
 QueryBatch& MeshingRun<K>::OpenBatch() {
   const std::uint64_t most = spec_.limits.max_batch_queries;
   if (most == 0 || static_cast<std::uint64_t>(batch_->size()) <= most) return *batch_;
-  if (!parts_) parts_.emplace(*batch_, most);
+  if (!parts_) parts_.emplace(spec_, *batch_, most);
   return parts_->part();
 }
 

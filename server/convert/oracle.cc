@@ -114,7 +114,7 @@ Allowed<core::AnswerBlock> FromProto(const v1::AnswerChunk& answers, const Chunk
   }
   if (chunk.block().want_clearances) {
     status = WallsFromProto(answers, chunk, spec, &block);
-    if (!status.ok()) return tl::unexpected(std::move(status));
+    if (!status.ok()) return refuse(std::move(status));
   }
   return block;
 }

@@ -113,28 +113,28 @@ SessionJournal::Known RecordedMesh::BeginRound(const core::QueryBatch& batch) {
   return {};
 }
 
-// False: it cannot be read. A part that is not there is no fault here.
-bool RecordedMesh::ReadAnswers(JournalFile* file, std::int64_t round, std::int64_t part,
+// False: it cannot be read. A part that is not there is no fault here, nor are answers to other
+// questions, of which nothing is known.
+bool RecordedMesh::ReadAnswers(JournalFile* file, const core::QueryBatch& batch, std::int64_t part,
                                RecordedAnswers* answers, Found* found) const {
+  const auto round = static_cast<std::int64_t>(batch.round);
   std::string record;
   *found = file->Read({id_, RecordKind::kAnswers, round, part}, &record);
   if (*found != Found::kYes) return *found == Found::kNo;
   auto decoded = DecodeAnswers(record);
   if (!decoded) return false;
   *answers = std::move(*decoded);
-  return std::all_of(answers->parts.begin(), answers->parts.end(),
-                     [this](const PartOfRound& one) { return Fits(one); });
+  return answers->questions != questions_ ||
+         std::all_of(answers->parts.begin(), answers->parts.end(),
+                     [&](const PartOfRound& one) { return Fits(batch, one); });
 }
 
-bool RecordedMesh::Fits(const PartOfRound& part) const {
-  const core::AnswerBlock& answers = part.answers;
-  const Index count = answers.points.cols();
-  return part.block_index < sizes_.size() && part.first >= 0 && count <= sizes_[part.block_index] &&
-         part.first <= sizes_[part.block_index] - count &&
-         answers.points.rows() == ambient_dimension_ &&
-         (answers.found.empty() || static_cast<Index>(answers.found.size()) == count) &&
-         (answers.tangents.cols() == 0 ||
-          answers.tangents.rows() == Index{ambient_dimension_} * dimension_);
+bool RecordedMesh::Fits(const core::QueryBatch& batch, const PartOfRound& part) const {
+  if (part.block_index >= batch.blocks.size()) return false;
+  const core::QueryBlock& block = batch.blocks[part.block_index];
+  const Index count = part.answers.size();
+  return part.first >= 0 && count <= block.size() && part.first <= block.size() - count &&
+         part.answers.Fits(core::AnswerBlock::Shape(dimension_, walls_, block, 1));
 }
 
 SessionJournal::Known RecordedMesh::ReadRound(const core::QueryBatch& batch) {
@@ -152,11 +152,12 @@ SessionJournal::Known RecordedMesh::ReadRound(const core::QueryBatch& batch) {
                                           "recorded the answers: mesh anew")};
       return true;
     }
-    core::Answers answers = EmptyAnswers(dimension_, ambient_dimension_, batch, walls_);
+    core::Answers answers = EmptyAnswers(dimension_, batch, walls_);
     for (std::uint64_t part = 0; part < round->parts; ++part) {
       RecordedAnswers some;
       Found found;
-      if (!ReadAnswers(file, number, static_cast<std::int64_t>(part), &some, &found)) return true;
+      if (!ReadAnswers(file, batch, static_cast<std::int64_t>(part), &some, &found)) return true;
+      if (found != Found::kYes || some.questions != questions_) return true;
       for (const PartOfRound& one : some.parts) server::PutAnswers(one, &answers);
     }
     if (DigestOf(answers) != round->answers) return true;
@@ -176,7 +177,7 @@ SessionJournal::Known RecordedMesh::ReadPartOfRound(const core::QueryBatch& batc
         Found found = Found::kYes;
         for (std::int64_t part = 0; found == Found::kYes; ++part) {
           RecordedAnswers some;
-          if (!ReadAnswers(file, number, part, &some, &found)) {
+          if (!ReadAnswers(file, batch, part, &some, &found)) {
             known.failure = Unreadable(Message("some of round ", batch.round));
             return true;
           }

@@ -58,9 +58,9 @@ class RecordedMesh final : public SessionJournal,
                   const std::vector<AnswerRange>& ranges, std::int64_t* next_part) const;
   Known ReadRound(const core::QueryBatch& batch);
   Known ReadPartOfRound(const core::QueryBatch& batch);
-  bool ReadAnswers(JournalFile* file, std::int64_t round, std::int64_t part,
+  bool ReadAnswers(JournalFile* file, const core::QueryBatch& batch, std::int64_t part,
                    RecordedAnswers* answers, JournalFile::Found* found) const;
-  bool Fits(const PartOfRound& part) const;
+  bool Fits(const core::QueryBatch& batch, const PartOfRound& part) const;
 
   const std::shared_ptr<SharedJournal> journal_;
   const std::uint64_t owner_limit_;

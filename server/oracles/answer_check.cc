@@ -10,21 +10,12 @@ namespace {
 using core::StatusCode;
 using Eigen::Index;
 
-core::AnswerBlock RowOf(const core::AnswerBlock& answer, Index row) {
-  core::AnswerBlock one;
-  one.points = answer.points.col(row);
-  if (!answer.found.empty()) one.found = {answer.found[static_cast<std::size_t>(row)]};
-  if (answer.tangents.size() > 0) one.tangents = answer.tangents.col(row);
-  if (answer.sizes.size() > 0) one.sizes = answer.sizes.segment(row, 1);
-  return one;
-}
-
 // The first row that breaks a rule by itself; none where the answer as a whole has the wrong shape.
 std::optional<std::int64_t> RowAtFault(const core::Specification& spec, const Chunk& chunk,
                                        const core::AnswerBlock& answer) {
   for (Index row = 0; row < answer.points.cols(); ++row) {
     const auto alone =
-        core::CheckAnswers(spec, chunk.block(), chunk.first + row, RowOf(answer, row));
+        core::CheckAnswers(spec, chunk.block(), chunk.first + row, answer.Rows(row, 1));
     if (!alone.ok()) return row;
   }
   return std::nullopt;

@@ -23,6 +23,17 @@ std::string PointText(const Eigen::VectorXd& point) {
   return text + ")";
 }
 
+// "wall 3", "walls 0 and 2".
+std::string WallsText(core::WallSet walls) {
+  std::string text;
+  int left = core::CountWalls(walls);
+  core::ForEachWall(walls, [&](int wall) {
+    text += Message(wall);
+    if (--left > 0) text += left > 1 ? ", " : " and ";
+  });
+  return (core::CountWalls(walls) > 1 ? "walls " : "wall ") + text;
+}
+
 // Sine of the angle at which the worst vector of basis `b` leaves the span of basis `a`; both d x k
 // in C order, orthonormal.
 double LargestSine(const double* a, const double* b, Index d, Index k) {
@@ -40,10 +51,55 @@ double LargestSine(const double* a, const double* b, Index d, Index k) {
   return worst;
 }
 
+// Of the conormals of the walls of `face`, d rows each: what is wrong with them; empty: they agree.
+std::string CompareConormals(core::WallSet face, Index d, const Testimony& a, const Testimony& b) {
+  if (a.answers->conormals.size() == 0 || b.answers->conormals.size() == 0) return "";
+  std::string rule;
+  Index row = 0;
+  core::ForEachWall(face, [&](int wall) {
+    const Eigen::VectorXd mine = a.answers->conormals.col(a.at).segment(row, d).normalized();
+    const Eigen::VectorXd theirs = b.answers->conormals.col(b.at).segment(row, d).normalized();
+    row += d;
+    const double cosine = mine.dot(theirs), sine = (theirs - cosine * mine).norm();
+    if (!rule.empty() || (cosine > 0 && sine <= kConormalDisagreement)) return;
+    rule = cosine <= -std::sqrt(1 - kConormalDisagreement * kConormalDisagreement)
+               ? Message("the conormals of wall ", wall,
+                         " there are opposite: what is inside for "
+                         "the one is outside for the other")
+               : Message("the conormals of wall ", wall, " there have an angle of cosine ",
+                         Brief(cosine), " and sine ", Brief(sine), ", of which ",
+                         kConormalDisagreement, " is allowed");
+  });
+  return rule;
+}
+
 }  // namespace
 
 bool Testimony::found() const {
   return answers->found.empty() || answers->found[static_cast<std::size_t>(at)] != 0;
+}
+
+std::string DescribeDisagreement(const core::QueryBlock& block, Index query, const Testimony& a,
+                                 const Testimony& b, const std::string& rule) {
+  const Eigen::VectorXd x = block.points.col(query);
+  const auto says = [&](const Testimony& t) {
+    const Eigen::VectorXd point = t.answers->points.col(t.at);
+    return Message(t.worker, " answered ",
+                   t.found() ? PointText(point) + ", " + Brief((point - x).norm()) + " away"
+                             : "\"not found\"");
+  };
+  const bool flat = block.kind == core::QueryKind::kIntersectFlat;
+  return Message(flat ? "intersect_flat query " : "closest_point query ", query,
+                 block.face != 0 ? " on " + WallsText(block.face) : "", " at ", PointText(x), ": ",
+                 says(a), ", and ", says(b), "; ", rule, ": serve one manifold by all workers");
+}
+
+double AllowedApart(const core::Specification& spec, const core::QueryBlock& block, Index query,
+                    const Testimony& a, const Testimony& b) {
+  const double largest = std::max({block.points.col(query).lpNorm<Eigen::Infinity>(),
+                                   a.answers->points.col(a.at).lpNorm<Eigen::Infinity>(),
+                                   b.answers->points.col(b.at).lpNorm<Eigen::Infinity>()});
+  return kDisagreementTolerance * spec.epsilon + core::kRoundingTolerance * largest;
 }
 
 std::string FindDisagreement(const core::Specification& spec, const core::QueryBlock& block,
@@ -51,15 +107,8 @@ std::string FindDisagreement(const core::Specification& spec, const core::QueryB
   const bool flat = block.kind == core::QueryKind::kIntersectFlat;
   const Eigen::VectorXd x = block.points.col(query);
   const auto point = [](const Testimony& t) { return t.answers->points.col(t.at); };
-  const auto says = [&](const Testimony& t) {
-    return Message(t.worker, " answered ",
-                   t.found() ? PointText(point(t)) + ", " + Brief((point(t) - x).norm()) + " away"
-                             : "\"not found\"");
-  };
   const auto complain = [&](const std::string& rule) {
-    return Message(flat ? "intersect_flat query " : "closest_point query ", query, " at ",
-                   PointText(x), ": ", says(a), ", and ", says(b), "; ", rule,
-                   ": serve one manifold by all workers");
+    return DescribeDisagreement(block, query, a, b, rule);
   };
 
   if (!a.found() && !b.found()) return "";
@@ -69,10 +118,7 @@ std::string FindDisagreement(const core::Specification& spec, const core::QueryB
     return complain("an intersection well inside the radius, " + Brief(block.radii[query]) +
                     ", is found by all");
   }
-  const double largest = std::max({x.lpNorm<Eigen::Infinity>(), point(a).lpNorm<Eigen::Infinity>(),
-                                   point(b).lpNorm<Eigen::Infinity>()});
-  const double tolerance =
-      kDisagreementTolerance * spec.epsilon + core::kRoundingTolerance * largest;
+  const double tolerance = AllowedApart(spec, block, query, a, b);
   const double apart = (point(a) - point(b)).norm();
   const double gap = flat ? apart : std::abs((point(a) - x).norm() - (point(b) - x).norm());
   if (gap > tolerance) {
@@ -87,6 +133,8 @@ std::string FindDisagreement(const core::Specification& spec, const core::QueryB
                             Brief(b.answers->sizes[b.at]), ", more than a share of ",
                             core::kSameSizeTolerance, " apart"));
   }
+  if (const std::string rule = CompareConormals(block.face, x.size(), a, b); !rule.empty())
+    return complain(rule);
   const Index k = spec.dimension;
   const bool both_tangents = a.answers->tangents.size() > 0 && b.answers->tangents.size() > 0;
   if (!both_tangents) return "";

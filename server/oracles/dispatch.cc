@@ -16,11 +16,6 @@ constexpr double kSoon =
 constexpr double kWorthWhile = 0.1;  // share of a worker's time that asking ahead should save it
 constexpr double kMostChecked = 16;  // queries at a time
 
-// Multiplicative hashing: a different place in each chunk, the same in each run.
-Index Scatter(LeaseId id, Index range) {
-  return static_cast<Index>((id * 0x9e3779b97f4a7c15u >> 33) % static_cast<std::uint64_t>(range));
-}
-
 Pace::Chunk Timed(const Lease& lease, TimePoint end) {
   return {static_cast<double>(lease.count), Seconds(end - lease.started), lease.cut, lease.queued};
 }
@@ -67,6 +62,7 @@ void Dispatch::End() {
   unsettled_ = 0;
   newest_.reset();
   newest_other_.reset();
+  debts_.clear();
   for (auto& [id, worker] : workers_) worker.leases.clear();
 }
 
@@ -89,6 +85,7 @@ void Dispatch::Leave(WorkerId worker, TimePoint now) {
 void Dispatch::TakeBack(Worker* worker, bool timed_out) {
   if (worker->leases.empty()) return;
   const WorkerId id = worker->leases.front().worker;
+  Forget(id);
   if (newest_ && newest_->worker == id) newest_.reset();
   if (newest_other_ && newest_other_->worker == id) newest_other_.reset();
   for (auto it = worker->leases.rbegin(); it != worker->leases.rend(); ++it) {
@@ -187,7 +184,7 @@ Lease Dispatch::Give(WorkerId id, Lease lease, TimePoint now) {
   Worker& worker = workers_.at(id);
   lease.queued = !worker.leases.empty();
   worker.leases.push_back(lease);
-  ++worker.unanswered;
+  worker.unanswered.insert(lease.id);
   if (!lease.check) worker.newest_chunk = static_cast<std::uint64_t>(lease.count);
   return lease;
 }
@@ -198,7 +195,12 @@ std::vector<Lease> Dispatch::Assign(TimePoint now) {
   while (active_ && !pending_.empty()) {
     Worker* const worker = PickWorker(&id);
     if (worker == nullptr) break;
-    // Before its own chunk, which then cannot be used before the check is.
+    // Before its own chunk, so that it is done with both no later than with that.
+    const Family family = blocks_[pending_.front().block].family;
+    for (Debt& debt : debts_)
+      if (debt.check == 0 && debt.worker != id && blocks_[debt.block].family == family &&
+          !IsCompared(id, family) && !IsBeingCompared(id, family))
+        leases.push_back(AskToCompare(&debt, id, now));
     if (const auto check = NextCheck(id, worker)) {
       worker->check_credit -= static_cast<double>(check->count);
       leases.push_back(Give(id, *check, now));
@@ -209,30 +211,17 @@ std::vector<Lease> Dispatch::Assign(TimePoint now) {
     if (pending_.front().count == 0) pending_.pop_front();
     lease = Give(id, lease, now);
     leases.push_back(lease);
+    Owe(lease);
     const double earned = options_.check_share * static_cast<double>(lease.count);
     worker->check_credit = std::min(worker->check_credit + earned, kMostChecked);
     if (newest_ && newest_->worker != id) newest_other_ = newest_;
     newest_ = lease;
   }
+  for (Debt& debt : debts_)
+    if (const auto checker = PickChecker(debt))
+      leases.push_back(AskToCompare(&debt, *checker, now));
   if (active_ && pending_.empty()) BackUp(now, &leases);
   return leases;
-}
-
-// Some queries of another worker's newest chunk, if it is time to ask `worker` any.
-std::optional<Lease> Dispatch::NextCheck(WorkerId id, Worker* worker) const {
-  if (options_.check_share <= 0 || worker->check_credit < 1 || worker->Lagging()) return {};
-  const auto& other = newest_ && newest_->worker != id ? newest_ : newest_other_;
-  if (!other || other->worker == id) return {};
-  Index n = std::min(static_cast<Index>(worker->check_credit), other->count);
-  if (!worker->Wants(n)) n = static_cast<Index>(worker->max_chunk);
-  const std::size_t bytes = std::max<std::size_t>(blocks_[other->block].bytes_per_query, 1);
-  n = std::clamp<Index>(static_cast<Index>(options_.chunk_bytes / bytes), 1, n);
-  Lease check;
-  check.check = true;
-  check.block = other->block;
-  check.first = other->first + Scatter(next_lease_, other->count - n + 1);
-  check.count = n;
-  return check;
 }
 
 TimePoint Dispatch::OverdueAt(const Worker& worker, std::size_t position) const {
@@ -283,6 +272,7 @@ void Dispatch::BackUp(TimePoint now, std::vector<Lease>* leases) {
     copy.twin = straggler->id;
     leases->push_back(Give(best, copy, now));
     straggler->twin = leases->back().id;
+    Owe(leases->back());
   }
 }
 
@@ -290,8 +280,7 @@ Dispatch::ClaimResult Dispatch::Claim(WorkerId worker_id, LeaseId id, TimePoint 
   const auto entry = workers_.find(worker_id);
   if (entry == workers_.end()) return ClaimResult::kLate;
   Worker& worker = entry->second;
-  if (id == 0 || id >= next_lease_ || worker.unanswered == 0) return ClaimResult::kUnknown;
-  --worker.unanswered;
+  if (worker.unanswered.erase(id) == 0) return ClaimResult::kUnknown;
   worker.stalled = false;
   const auto it = std::find_if(worker.leases.begin(), worker.leases.end(),
                                [id](const Lease& l) { return l.id == id; });
@@ -304,7 +293,15 @@ Dispatch::ClaimResult Dispatch::Claim(WorkerId worker_id, LeaseId id, TimePoint 
   // A handful of queries to check says nothing.
   if (!lease->check) worker.pace.Answered(Timed(*lease, now));
   if (oldest && !worker.leases.empty()) worker.leases.front().started = now;  // the next in line
+  for (Debt& debt : debts_) debt.taken = debt.taken || debt.check == id;
   if (lease->check || lease->answered) return ClaimResult::kSecond;
+  const auto covers = [&](const Debt& debt) {
+    return debt.block == lease->block && debt.query >= lease->first &&
+           debt.query < lease->first + lease->count;
+  };
+  // Whoever was slower with it owes another one.
+  std::erase_if(debts_, [&](const Debt& d) { return covers(d) && d.worker != worker_id; });
+  for (Debt& debt : debts_) debt.answered = debt.answered || covers(debt);
   if (Lease* const twin = Find(lease->twin)) {
     twin->answered = true;
     twin->twin = 0;
@@ -366,6 +363,11 @@ TimePoint Dispatch::NextDeadline() const {
       if (MayBackUp(worker.leases[i], room)) next = std::min(next, OverdueAt(worker, i));
     }
   }
+  // When no comparison is waited for any more.
+  std::optional<TimePoint> last;
+  for (const Debt& debt : debts_)
+    if (const auto until = Patience(debt)) last = std::max(last.value_or(*until), *until);
+  if (last && unsettled_ == 0) next = std::min(next, *last);
   return next;
 }
 

@@ -6,6 +6,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -43,7 +44,7 @@ struct DispatchPolicy {
   Clock::duration straggler_unknown = std::chrono::seconds(2);
 
   // Share of its queries that a worker is asked on top, from another's chunks, so that the answers
-  // can be compared. The first is due at once. 0: none.
+  // can be compared; and one of each family that it answers, before the round ends. 0: none.
   double check_share = 0.01;
 };
 
@@ -75,9 +76,12 @@ struct Lease {
 // crew.
 class Dispatch {
  public:
+  // What may go wrong by itself: queries of a kind, about a face. Any number will do.
+  using Family = std::pair<int, std::uint64_t>;
   struct Block {
     Eigen::Index queries = 0;
     std::size_t bytes_per_query = 0;  // the larger of question and answer
+    Family family = {};
     // Queries [first, second) that have their answers from the start; ascending and disjoint.
     std::vector<std::pair<Eigen::Index, Eigen::Index>> answered = {};
   };
@@ -88,8 +92,9 @@ class Dispatch {
   void Begin(const std::vector<Block>& blocks, TimePoint now);
   void End();  // forgets the round; its leases become late
   bool Active() const { return active_; }
-  // Every query has an answer. Checks and beaten stragglers are not waited for.
-  bool Done() const { return active_ && unsettled_ == 0; }
+  // Every query has an answer, and of each worker one of each family has been compared with
+  // another's. Further checks and beaten stragglers are not waited for.
+  bool Done(TimePoint now) const;
   Eigen::Index unanswered() const { return unsettled_; }
 
   // `max_chunk` queries at most in one chunk; 0: no wish.
@@ -111,6 +116,8 @@ class Dispatch {
   // An answer came. The lease ends; the piece counts as answered once Settle is called.
   ClaimResult Claim(WorkerId worker, LeaseId id, TimePoint now, Lease* lease);
   void Settle(const Lease& lease);  // kClaimed only
+  // Answers of the two to a query of that block have been compared.
+  void Compared(WorkerId a, WorkerId b, std::size_t block);
   // The worker is still computing. A lease that it does not have is ignored.
   void Busy(WorkerId worker, LeaseId id, TimePoint now);
 
@@ -130,19 +137,40 @@ class Dispatch {
   struct Worker {
     std::uint32_t max_chunk = 0;
     Pace pace{Pace::Aim{}};
-    double check_credit = 1;       // queries that it may be asked on top
+    double check_credit = 0;       // queries that it may be asked on top
+    std::set<Family> compared;     // of which an answer was compared with another worker's
     bool stalled = false;          // let a lease run out and has not answered since
-    std::uint64_t unanswered = 0;  // chunks sent less answers come, late ones too
+    std::set<LeaseId> unanswered;  // chunks sent whose answers have not come, late ones too
     std::uint64_t answered_queries = 0, answered_chunks = 0, newest_chunk = 0;  // for Crew
     std::deque<Lease> leases;  // oldest first; only the first one's time runs
 
     // Is still at something that nobody waits for any more, or has stopped answering.
-    bool Lagging() const { return stalled || unanswered > leases.size(); }
+    bool Lagging() const { return stalled || unanswered.size() > leases.size(); }
     bool Idle() const { return leases.empty() && !Lagging(); }
     int InFlight() const;
     bool Wants(Eigen::Index count) const { return max_chunk == 0 || count <= max_chunk; }
   };
 
+  // A query of the round that `worker` has or had, to be asked of another: nothing of the family
+  // was compared with another's yet.
+  struct Debt {
+    WorkerId worker = 0;
+    std::size_t block = 0;
+    Eigen::Index query = 0;
+    bool answered = false;  // by `worker`, and that counts
+    LeaseId check = 0;      // of whoever is asked
+    WorkerId checker = 0;
+    bool taken = false;  // his answer is here, and not compared yet
+  };
+
+  bool IsCompared(WorkerId worker, const Family& family) const;
+  void Owe(const Lease& lease);
+  void Forget(WorkerId worker);
+  bool IsBeingCompared(WorkerId worker, const Family& family) const;
+  std::optional<WorkerId> PickChecker(const Debt& debt) const;
+  Lease AskToCompare(Debt* debt, WorkerId checker, TimePoint now);
+  // Until when the check of a debt is waited for; nothing: it is not.
+  std::optional<TimePoint> Patience(const Debt& debt) const;
   Eigen::Index ShareOfTheRest(const Worker& worker) const;
   void Cut(const Worker& worker, Piece* piece, Lease* lease) const;
   bool MayHaveAnother(const Worker& worker) const;
@@ -165,6 +193,7 @@ class Dispatch {
   Eigen::Index pending_queries_ = 0;
   Eigen::Index unsettled_ = 0;
   std::map<WorkerId, Worker> workers_;
+  std::vector<Debt> debts_;  // of the round; one at most for each worker and family
   LeaseId first_of_round_ = 1;
   LeaseId next_lease_ = 1;
   TimePoint deserted_since_;  // last moment with a worker, or the start of the round

@@ -13,51 +13,17 @@ namespace {
 using core::StatusCode;
 using Eigen::Index;
 
-void CopyInto(const core::AnswerBlock& answer, Index first, core::AnswerBlock* whole) {
-  const Index count = answer.points.cols();
-  whole->points.middleCols(first, count) = answer.points;
-  if (!answer.found.empty()) {
-    std::copy(answer.found.begin(), answer.found.end(), whole->found.begin() + first);
-  }
-  if (whole->tangents.cols() > 0 && answer.tangents.cols() == count) {
-    whole->tangents.middleCols(first, count) = answer.tangents;
-  }
-  if (whole->sizes.size() > 0 && answer.sizes.size() == count) {
-    whole->sizes.segment(first, count) = answer.sizes;
-  }
-  const auto copy = [&](const Eigen::MatrixXd& some, Eigen::MatrixXd* all) {
-    const bool fits = all->cols() > 0 && some.cols() == count && some.rows() == all->rows();
-    if (fits) all->middleCols(first, count) = some;
-  };
-  copy(answer.clearances, &whole->clearances);
-  copy(answer.conormals, &whole->conormals);
-}
-
 }  // namespace
 
-core::Answers EmptyAnswers(int dimension, int ambient_dimension, const core::QueryBatch& batch,
-                           int walls) {
+core::Answers EmptyAnswers(int dimension, const core::QueryBatch& batch, int walls) {
   core::Answers answers;
-  for (const core::QueryBlock& block : batch.blocks) {
-    const Index n = block.size();
-    core::AnswerBlock& empty = answers.blocks.emplace_back();
-    empty.points = Eigen::MatrixXd::Zero(ambient_dimension, n);
-    empty.found.assign(n, 1);
-    if (block.want_tangents) {
-      empty.tangents = Eigen::MatrixXd::Zero(Index{ambient_dimension} * dimension, n);
-    }
-    if (block.want_sizes) empty.sizes = Eigen::VectorXd::Zero(n);
-    if (block.want_clearances) {
-      empty.clearances = Eigen::MatrixXd::Zero(walls, n);
-      const Index on = core::CountWalls(block.face);
-      if (on > 0) empty.conormals = Eigen::MatrixXd::Zero(on * ambient_dimension, n);
-    }
-  }
+  for (const core::QueryBlock& block : batch.blocks)
+    answers.blocks.push_back(core::AnswerBlock::Shape(dimension, walls, block, block.size()));
   return answers;
 }
 
 void PutAnswers(const PartOfRound& part, core::Answers* answers) {
-  CopyInto(part.answers, part.first, &answers->blocks[part.block_index]);
+  answers->blocks[part.block_index].Put(part.first, part.answers);
 }
 
 OraclePool::OraclePool(const core::Specification& spec, DispatchOptions options,
@@ -66,7 +32,8 @@ OraclePool::OraclePool(const core::Specification& spec, DispatchOptions options,
       options_(options),
       max_workers_(max_workers),
       observer_(std::move(observer)),
-      dispatch_(options) {}
+      dispatch_(options),
+      signs_(spec) {}
 
 Allowed<WorkerId> OraclePool::Join(std::shared_ptr<OracleWorker> worker, std::uint32_t max_chunk) {
   std::vector<Delivery> deliveries;
@@ -172,15 +139,21 @@ Refused OraclePool::Deliver(const Chunk& chunk, const core::AnswerBlock& answer)
 }
 
 void OraclePool::TakeOver(const Chunk& chunk, const core::AnswerBlock& answer) {
-  CopyInto(answer, chunk.first, &chunk.round->answers.blocks[chunk.block_index]);
+  chunk.round->answers.blocks[chunk.block_index].Put(chunk.first, answer);
   std::vector<std::shared_ptr<const SecondAnswer>> seconds;
+  std::string contradiction;
   {
     const std::lock_guard lock(mutex_);
     if (round_ != chunk.round) return;
+    if (spec_.walls > 0) {
+      signs_.Learn(answer);
+      contradiction = signs_.Verdict();
+    }
     auto& by = round_->answered_by[chunk.block_index];
     std::fill_n(by.begin() + chunk.first, chunk.count, chunk.worker);
     seconds = seconds_;
   }
+  TellDisagreement(chunk, contradiction);
   // Before the round can end: what two workers disagree about goes into no mesh.
   for (const auto& second : seconds) {
     const Chunk& other = second->chunk;
@@ -214,22 +187,34 @@ void OraclePool::Compare(const SecondAnswer& second, Index first, Index count) {
   }
   // Answers that are taken over do not change any more.
   const core::AnswerBlock& answers = chunk.round->answers.blocks[chunk.block_index];
+  std::string words;
   for (const auto& [q, id] : others) {
     Testimony counted{"", &answers, q};
     Testimony own{"", &second.answer, q - chunk.first};
-    if (FindDisagreement(spec_, chunk.block(), q, counted, own).empty()) continue;
-    {
-      const std::lock_guard lock(mutex_);
-      counted.worker = TitleLocked(id);
-      own.worker = TitleLocked(chunk.worker);
-    }
-    if (observer_ != nullptr) observer_->OnDisagreement();
-    Fail({FailureReason::kWorkersDisagree,
-          core::Message("round ", chunk.round->batch->round, ", block ", chunk.block_index, ", ",
-                        FindDisagreement(spec_, chunk.block(), q, counted, own))});
-    break;
+    const bool agree = FindDisagreement(spec_, chunk.block(), q, counted, own).empty();
+    if (agree && spec_.walls == 0) continue;
+    const std::lock_guard lock(mutex_);
+    counted.worker = TitleLocked(id);
+    own.worker = TitleLocked(chunk.worker);
+    if (agree) signs_.Compare(chunk.block(), q, counted, own);
+    words = agree ? signs_.Verdict() : FindDisagreement(spec_, chunk.block(), q, counted, own);
+    if (!words.empty()) break;
   }
-  if (observer_ != nullptr && !others.empty()) observer_->OnCompared(others.size());
+  TellDisagreement(chunk, words);
+  if (others.empty()) return;
+  if (observer_ != nullptr) observer_->OnCompared(others.size());
+  const std::lock_guard lock(mutex_);
+  if (round_ != chunk.round) return;
+  for (const auto& [q, id] : others) dispatch_.Compared(id, chunk.worker, chunk.block_index);
+  changed_.notify_one();
+}
+
+void OraclePool::TellDisagreement(const Chunk& chunk, const std::string& words) {
+  if (words.empty()) return;
+  if (observer_ != nullptr) observer_->OnDisagreement();
+  Fail(
+      {FailureReason::kWorkersDisagree, core::Message("round ", chunk.round->batch->round,
+                                                      ", block ", chunk.block_index, ", ", words)});
 }
 
 std::string OraclePool::TitleLocked(WorkerId worker) const {
@@ -279,7 +264,7 @@ OraclePool::Outcome OraclePool::Ask(std::shared_ptr<const core::QueryBatch> batc
       outcome.failure = failure_;
       break;
     }
-    if (dispatch_.Done()) {
+    if (dispatch_.Done(now)) {
       outcome.round = std::move(round);
       break;
     }
@@ -347,7 +332,7 @@ std::vector<OraclePool::Delivery> OraclePool::AssignLocked(TimePoint now) {
 
 std::shared_ptr<Round> OraclePool::MakeRound(std::shared_ptr<const core::QueryBatch> batch) const {
   auto round = std::make_shared<Round>();
-  round->answers = EmptyAnswers(spec_.dimension, spec_.ambient_dimension, *batch, spec_.walls);
+  round->answers = EmptyAnswers(spec_.dimension, *batch, spec_.walls);
   for (const core::QueryBlock& block : batch->blocks) {
     round->answered_by.emplace_back(static_cast<std::size_t>(block.size()), WorkerId{0});
   }
@@ -357,18 +342,12 @@ std::shared_ptr<Round> OraclePool::MakeRound(std::shared_ptr<const core::QueryBa
 
 std::vector<Dispatch::Block> OraclePool::Measure(const core::QueryBatch& batch,
                                                  const std::vector<PartOfRound>& known) const {
-  const std::size_t point = sizeof(double) * spec_.ambient_dimension;
-  const std::size_t basis = point * spec_.dimension;
   std::vector<Dispatch::Block> blocks;
   for (const core::QueryBlock& block : batch.blocks) {
-    const bool flat = block.kind == core::QueryKind::kIntersectFlat;
-    const std::size_t question = point + (flat ? basis + sizeof(double) : 0);
-    const std::size_t answer =
-        point + 1 + (block.want_tangents ? basis : 0) + (block.want_sizes ? sizeof(double) : 0) +
-        (block.want_clearances ? sizeof(double) * static_cast<std::size_t>(spec_.walls) +
-                                     point * static_cast<std::size_t>(core::CountWalls(block.face))
-                               : 0);
-    blocks.push_back({block.size(), std::max(question, answer)});
+    const auto answer = core::AnswerBlock::Shape(spec_.dimension, spec_.walls, block, 1);
+    blocks.push_back({block.size(),
+                      std::max(core::BytesPerQuery(block), core::BytesPerQuery(answer)),
+                      {static_cast<int>(block.kind), block.face}});
   }
   for (const PartOfRound& part : known) {
     const Index end = part.first + part.answers.points.cols();

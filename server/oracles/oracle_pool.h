@@ -17,6 +17,7 @@
 #include "server/base/refusal.h"
 #include "server/oracles/cross_check.h"
 #include "server/oracles/dispatch.h"
+#include "server/oracles/wall_signs.h"
 
 namespace stellate::server {
 
@@ -37,8 +38,7 @@ struct PartOfRound {
 };
 
 // Of the shape that a batch asks for, with nothing in it: what is put into it are its answers.
-core::Answers EmptyAnswers(int dimension, int ambient_dimension, const core::QueryBatch& batch,
-                           int walls = 0);
+core::Answers EmptyAnswers(int dimension, const core::QueryBatch& batch, int walls = 0);
 // `first` and those after it must be there; what is more than was asked for is left out.
 void PutAnswers(const PartOfRound& part, core::Answers* answers);
 
@@ -152,6 +152,8 @@ class OraclePool {
   MeshFailure Describe(Dispatch::Failure failure) const;
   void TakeOver(const Chunk& chunk, const core::AnswerBlock& answer);
   void Compare(const SecondAnswer& second, Eigen::Index first, Eigen::Index count);
+  // Fails the mesh if its words are not empty.
+  void TellDisagreement(const Chunk& chunk, const std::string& words);
   std::string TitleLocked(WorkerId worker) const;
   static void Send(std::vector<Delivery> deliveries);
 
@@ -169,6 +171,7 @@ class OraclePool {
   WorkerId next_worker_ = 1;
   std::shared_ptr<Round> round_;
   std::vector<std::shared_ptr<const SecondAnswer>> seconds_;  // of the round
+  WallSigns signs_;
   std::unordered_map<WorkerId, std::string> titles_;  // of those here or who answered in the round
   std::optional<MeshFailure> failure_;
   bool interrupted_ = false;

@@ -65,34 +65,23 @@ SystemTime ToTime(std::int64_t number) {
   return SystemTime(Microseconds(std::clamp(number, -kFarthest, kFarthest)));
 }
 
-core::AnswerBlock Columns(const core::AnswerBlock& block, Index first, Index count) {
-  core::AnswerBlock some;
-  some.points = block.points.middleCols(first, count);
-  if (!block.found.empty()) {
-    some.found.assign(block.found.begin() + first, block.found.begin() + first + count);
-  }
-  if (block.tangents.cols() > 0) some.tangents = block.tangents.middleCols(first, count);
-  if (block.sizes.size() > 0) some.sizes = block.sizes.segment(first, count);
-  if (block.clearances.cols() > 0) some.clearances = block.clearances.middleCols(first, count);
-  if (block.conormals.cols() > 0) some.conormals = block.conormals.middleCols(first, count);
-  return some;
-}
-
-template <typename Archive, typename Value>
-void LayOutAnswers(Archive& archive, Value& answers) {
-  archive.Numbers(answers.points);
-  archive.Bytes(answers.found);
-  archive.Numbers(answers.tangents);
-  archive.Numbers(answers.sizes);
-}
-
-// Marks, in the number of a block, that clearances and conormals follow its answers.
+// Marks, in the number of a block, that clearances and conormals follow its answers. Arrays that a
+// later version adds go behind them, with a mark of their own.
 constexpr std::size_t kWithWalls = std::size_t{1} << 62;
+constexpr int kFieldsWithoutWalls = 4;
+
+// f(field) for the arrays of an answer that are recorded.
+template <typename F>
+void ForEachRecorded(bool with_walls, const F& f) {
+  int fields = 0;
+  core::AnswerBlock::ForEachField([&](auto field) {
+    if (fields++ < kFieldsWithoutWalls || with_walls) f(field);
+  });
+}
 
 template <typename Archive, typename Value>
-void LayOutWalls(Archive& archive, Value& answers) {
-  archive.Numbers(answers.clearances);
-  archive.Numbers(answers.conormals);
+void LayOutAnswers(Archive& archive, Value& answers, bool with_walls) {
+  ForEachRecorded(with_walls, [&](auto field) { archive.Field(answers.*field); });
 }
 
 template <typename Archive, typename Value>
@@ -220,17 +209,14 @@ bool EncodeAnswers(const core::Answers& answers, const std::vector<AnswerRange>&
   bool empty = true;
   for (const AnswerRange& range : ranges) {
     const core::AnswerBlock& block = answers.blocks[range.block];
-    const auto column =
-        static_cast<std::size_t>(block.points.rows() + block.tangents.rows() +
-                                 block.clearances.rows() + block.conormals.rows() + 2);
-    const auto most = std::max<Index>(static_cast<Index>(kPartBytes / (column * kWord)), 1);
+    const std::size_t bytes = std::max<std::size_t>(core::BytesPerQuery(block), 1);
+    const auto most = std::max<Index>(static_cast<Index>(kPartBytes / bytes), 1);
     for (Index first = range.first; first < range.end; first += most) {
       const bool with_walls = block.clearances.cols() > 0;
       writer.Number(range.block | (with_walls ? kWithWalls : 0));
       writer.Number(first);
-      const core::AnswerBlock some = Columns(block, first, std::min(most, range.end - first));
-      LayOutAnswers(writer, some);
-      if (with_walls) LayOutWalls(writer, some);
+      const core::AnswerBlock some = block.Rows(first, std::min(most, range.end - first));
+      LayOutAnswers(writer, some, with_walls);
       empty = writer.size() >= kPartBytes;
       if (!empty) continue;
       if (!take(writer.Take())) return false;
@@ -248,8 +234,7 @@ std::optional<RecordedAnswers> DecodeAnswers(std::string_view record) {
     PartOfRound& part = recorded.parts.emplace_back();
     reader.Number(part.block_index);
     reader.Number(part.first);
-    LayOutAnswers(reader, part.answers);
-    if (part.block_index & kWithWalls) LayOutWalls(reader, part.answers);
+    LayOutAnswers(reader, part.answers, (part.block_index & kWithWalls) != 0);
     part.block_index &= ~kWithWalls;
   }
   if (!reader.Complete()) return std::nullopt;
@@ -304,9 +289,7 @@ std::uint64_t DigestOf(const core::QueryBatch& batch) {
     digest.Add(static_cast<std::uint64_t>(block.kind));
     digest.Add(block.want_tangents);
     digest.Add(block.want_sizes);
-    digest.Add(block.points);
-    digest.Add(block.bases);
-    digest.Add(block.radii);
+    core::QueryBlock::ForEachField([&](auto field) { digest.Add(block.*field); });
     if (block.want_clearances) digest.Add(block.face);
   }
   return digest.value();
@@ -315,13 +298,7 @@ std::uint64_t DigestOf(const core::QueryBatch& batch) {
 std::uint64_t DigestOf(const core::Answers& answers) {
   RecordDigest digest;
   for (const core::AnswerBlock& block : answers.blocks) {
-    digest.Add(block.points);
-    digest.Add(block.found.data(), block.found.size());
-    digest.Add(block.tangents);
-    digest.Add(block.sizes);
-    if (block.clearances.cols() == 0) continue;
-    digest.Add(block.clearances);
-    digest.Add(block.conormals);
+    ForEachRecorded(block.clearances.cols() > 0, [&](auto field) { digest.Add(block.*field); });
   }
   return digest.value();
 }

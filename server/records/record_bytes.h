@@ -42,6 +42,7 @@ class RecordDigest {
     Add(static_cast<std::uint64_t>(matrix.rows()));
     Add(matrix.data(), static_cast<std::size_t>(matrix.size()) * sizeof(double));
   }
+  void Add(const std::vector<std::uint8_t>& bytes) { Add(bytes.data(), bytes.size()); }
   std::uint64_t value() const { return state_; }
 
  private:
@@ -73,6 +74,14 @@ class RecordWriter {
   void Numbers(const Matrix& matrix) {
     Number(matrix.rows());
     Array(matrix.data(), static_cast<std::size_t>(matrix.size()) * sizeof(double));
+  }
+  // Of a block of answers: numbers, or flags.
+  template <typename Array>
+  void Field(const Array& array) {
+    if constexpr (std::is_same_v<Array, std::vector<std::uint8_t>>)
+      Bytes(array);
+    else
+      Numbers(array);
   }
   template <typename T>
   void Maybe(const std::optional<T>& value) {
@@ -145,6 +154,13 @@ class RecordReader {
                     rows == 0 ? 0 : static_cast<Eigen::Index>(size / rows));
     }
     if (size > 0) std::memcpy(matrix.data(), data.data(), data.size());
+  }
+  template <typename Array>
+  void Field(Array& array) {
+    if constexpr (std::is_same_v<Array, std::vector<std::uint8_t>>)
+      Bytes(array);
+    else
+      Numbers(array);
   }
   template <typename T>
   void Maybe(std::optional<T>& value) {

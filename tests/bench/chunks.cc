@@ -79,8 +79,9 @@ class Simulation {
       dispatch_.Begin(blocks, Time());
       for (const auto& block : blocks) result_.queries += block.queries;
       Give();
-      while (!dispatch_.Done()) Step();
+      while (!dispatch_.Done(Time())) Step();
       dispatch_.End();
+      given_.clear();
     }
     result_.seconds = std::max(now_ - kBegin, 1e-9);
     result_.efficiency =
@@ -103,10 +104,9 @@ class Simulation {
       const Lease lease = answers_.begin()->second;
       answers_.erase(answers_.begin());
       Lease claimed;
-      if (dispatch_.Claim(lease.worker, lease.id, Time(), &claimed) ==
-          Dispatch::ClaimResult::kClaimed) {
-        dispatch_.Settle(claimed);
-      }
+      const auto result = dispatch_.Claim(lease.worker, lease.id, Time(), &claimed);
+      if (result == Dispatch::ClaimResult::kClaimed) dispatch_.Settle(claimed);
+      if (result == Dispatch::ClaimResult::kSecond) Compare(claimed);
     } else {
       now_ = std::max(now_, deadline) + 1e-9;
       dispatch_.Expire(Time());
@@ -114,8 +114,17 @@ class Simulation {
     Give();
   }
 
+  void Compare(const Lease& second) {
+    for (const Lease& first : given_) {
+      const bool same = first.block == second.block && first.first <= second.first &&
+                        second.first < first.first + first.count;
+      if (same) dispatch_.Compared(first.worker, second.worker, second.block);
+    }
+  }
+
   void Give() {
     for (const Lease& lease : dispatch_.Assign(Time())) {
+      if (!lease.check) given_.push_back(lease);
       double work = crew_.fixed;
       for (Eigen::Index i = 0; i < lease.count && crew_.spread > 0; ++i) {
         work += crew_.per_query * FactorOf(crew_, &random_);
@@ -133,6 +142,7 @@ class Simulation {
   Dispatch dispatch_;
   double now_ = kBegin;
   std::vector<double> free_at_;
+  std::vector<Lease> given_;              // of the round, without checks
   std::multimap<double, Lease> answers_;  // by when they come
   Result result_;
 };

@@ -135,7 +135,7 @@ TEST_F(FailingDisk, ADeletionMakesRoomOnAFullDisk) {
   core::QueryBatch batch;
   batch.blocks.resize(1);
   batch.blocks[0].points = Eigen::MatrixXd::Random(3, 50'000);
-  const core::Answers answers = EmptyAnswers(2, 3, batch);
+  const core::Answers answers = EmptyAnswers(2, batch);
   {
     const auto journal = Journal::Open({data_});
     ASSERT_TRUE(journal) << journal.error().message;

@@ -44,7 +44,7 @@ class DispatchTest : public ::testing::Test {
     std::map<WorkerId, TimePoint> free;
     std::multimap<TimePoint, Lease> answers;
     dispatch->Begin({{queries, 8}}, now);
-    while (!dispatch->Done()) {
+    while (!dispatch->Done(now)) {
       for (const Lease& lease : dispatch->Assign(now)) {
         TimePoint& end = free[lease.worker];
         end = std::max(end, now) + fixed + lease.count * each;
@@ -74,7 +74,7 @@ TEST_F(DispatchTest, EveryQueryIsAnsweredOnce) {
   std::vector<std::vector<int>> seen = {std::vector<int>(500), {}, std::vector<int>(33)};
   auto now = At(0s);
   std::vector<Lease> open;
-  while (!dispatch.Done()) {
+  while (!dispatch.Done(now)) {
     for (const Lease& lease : dispatch.Assign(now)) open.push_back(lease);
     ASSERT_FALSE(open.empty());
     now += 1ms;
@@ -214,7 +214,7 @@ TEST_F(DispatchTest, WorkOfAWorkerThatLeavesGoesToAnother) {
   dispatch.Join(2, 20);
   Index asked = 0;
   std::vector<Lease> after;
-  for (auto now = At(2s); !dispatch.Done(); now += 1ms) {
+  for (auto now = At(2s); !dispatch.Done(now); now += 1ms) {
     for (const Lease& lease : dispatch.Assign(now)) {
       asked += lease.count;
       after.push_back(lease);
@@ -242,9 +242,9 @@ TEST_F(DispatchTest, AnswersAfterALeaseRanOutAreLateAndHarmless) {
   for (const Lease& lease : again) EXPECT_EQ(lease.worker, 2u) << "a lively worker comes first";
   Lease claimed;
   EXPECT_EQ(dispatch.Claim(1, lost[0].id, At(11s), &claimed), Dispatch::ClaimResult::kLate);
-  EXPECT_FALSE(dispatch.Done());
+  EXPECT_FALSE(dispatch.Done(At(100s)));
   for (const Lease& lease : again) Answer(&dispatch, lease, At(11s));
-  EXPECT_TRUE(dispatch.Done());
+  EXPECT_TRUE(dispatch.Done(At(100s)));
 }
 
 TEST_F(DispatchTest, LeasesThatWereNeverGivenAreUnknown) {
@@ -290,7 +290,7 @@ TEST_F(DispatchTest, AnOracleThatHasBecomeSlowIsTriedWithOneQuery) {
   ASSERT_EQ(again.size(), 1u) << "one at a time for a worker that let a lease run out";
   EXPECT_EQ(again[0].count, 1);
   // Nine seconds for each: it has to be meshed.
-  while (!dispatch.Done()) {
+  while (!dispatch.Done(now)) {
     ASSERT_FALSE(again.empty());
     for (const Lease& lease : again) {
       now += 9s * lease.count;
@@ -323,7 +323,7 @@ TEST_F(DispatchTest, AWorkerThatSaysItIsBusyKeepsItsLeaseForAWhile) {
   dispatch.Busy(1, lease.id, At(69s));
   dispatch.Expire(At(78s));
   Answer(&dispatch, lease, At(78s));
-  EXPECT_TRUE(dispatch.Done());
+  EXPECT_TRUE(dispatch.Done(At(100s)));
 }
 
 TEST_F(DispatchTest, AHungOracleThatSaysItIsBusyFailsAfterThreeTimesTheLimit) {
@@ -352,7 +352,7 @@ TEST_F(DispatchTest, ChunksInAWorkersQueueDoNotAge) {
   Answer(&dispatch, leases[0], At(10s));
   dispatch.Expire(At(13s));  // the second had 3 s of its own
   Answer(&dispatch, leases[1], At(16s));
-  EXPECT_TRUE(dispatch.Done());
+  EXPECT_TRUE(dispatch.Done(At(100s)));
 }
 
 TEST_F(DispatchTest, WithoutAWorkerTheRoundFailsAfterTheWait) {
@@ -387,7 +387,7 @@ TEST_F(DispatchTest, LeasesOfAnEarlierRoundAreLate) {
   Lease claimed;
   EXPECT_EQ(dispatch.Claim(1, old[0].id, At(1s), &claimed), Dispatch::ClaimResult::kLate);
   Answer(&dispatch, fresh[0], At(2s));
-  EXPECT_TRUE(dispatch.Done());
+  EXPECT_TRUE(dispatch.Done(At(100s)));
 }
 
 }  // namespace

@@ -115,7 +115,7 @@ inline core::QueryBatch BatchOf(std::uint64_t round, Eigen::Index queries = 4, d
 }
 
 inline core::Answers AnswersTo(const core::QueryBatch& batch) {
-  core::Answers answers = EmptyAnswers(2, 3, batch);
+  core::Answers answers = EmptyAnswers(2, batch);
   core::AnswerBlock& block = answers.blocks[0];
   block.points.setRandom();
   block.tangents.setRandom();
