@@ -30,6 +30,12 @@ constexpr int kLookMilliseconds = 20;      // between two looks: some hundred ca
 constexpr int kHurryMilliseconds = 2;      // while much is unread: some megabytes may come
 constexpr std::uint64_t kFewBytes = 4096;  // too little for many calls, 16 bytes each at least
 constexpr std::size_t kFewCalls = 64;
+constexpr std::uint64_t kHelloBytes = 33;  // HTTP/2's preface and an empty frame of settings
+constexpr int kSilentMilliseconds = 250;   // between two looks at who has said hello
+// Beyond the bound: whoever had so long and has not said hello makes room. A handshake takes two
+// round trips and some milliseconds.
+constexpr auto kHelloTime = std::chrono::seconds(1);
+constexpr std::size_t kManySilent = 16;           // that leave without a hello leave memory behind
 constexpr std::int64_t kLittle = 256 << 10;       // unread: a request or two, as most are
 constexpr double kMoment = 0.01;                  // seconds that anybody may hold anything for
 constexpr auto kAwake = std::chrono::seconds(1);  // after something came
@@ -68,15 +74,20 @@ ConnectionGuard::ConnectionGuard(int port, const Limits& limits, CallJudge judge
 
 ConnectionGuard::~ConnectionGuard() {
   thread_.request_stop();
-  const std::uint64_t one = 1;
-  [[maybe_unused]] const auto written = write(wake_, &one, sizeof(one));
+  Wake();
   thread_.join();
   close(epoll_);
   close(wake_);
 }
 
+void ConnectionGuard::Wake() const {
+  const std::uint64_t one = 1;
+  [[maybe_unused]] const auto written = write(wake_, &one, sizeof(one));
+}
+
 void ConnectionGuard::Watch(int fd) {
   Connection connection;
+  connection.came = Clock::now();
   connection.fd = fd;
   connection.number = NumberOf(fd);
   connection.peer = PeerOf(fd);
@@ -85,6 +96,9 @@ void ConnectionGuard::Watch(int fd) {
   NothingIsUnread(&connection.of_owners);
   const std::lock_guard lock(mutex_);
   connections_.emplace(++last_key_, std::move(connection));
+  silent_.insert(last_key_);
+  silent_count_ = silent_.size();
+  if (napping_) Wake();
   // Once for all that came meanwhile. It ends when gRPC closes the descriptor.
   epoll_event event{};
   event.events = EPOLLIN | EPOLLRDHUP | EPOLLET;
@@ -98,7 +112,12 @@ void ConnectionGuard::Run(const std::stop_token& stop) {
     const bool idle = busy_.empty() && gone_.empty() && !untidy_ &&
                       unread_->strangers.bytes + unread_->owners.bytes == 0 &&
                       Clock::now() > awake_until_;
-    const int count = epoll_wait(epoll_, events.data(), kMostEvents, idle ? -1 : 0);
+    napping_ = idle;  // first, or somebody who comes now is not looked at
+    const int nap = silent_count_ > 0 ? kSilentMilliseconds : -1;
+    const int count = epoll_wait(epoll_, events.data(), kMostEvents, idle ? nap : 0);
+    napping_ = false;
+    std::uint64_t woken = 0;
+    [[maybe_unused]] const auto taken = read(wake_, &woken, sizeof(woken));
     if (count > 0) awake_until_ = Clock::now() + kAwake;
     {
       const std::lock_guard lock(mutex_);
@@ -106,13 +125,14 @@ void ConnectionGuard::Run(const std::stop_token& stop) {
       for (int i = 0; i < count; ++i) {
         const epoll_event& event = events[static_cast<std::size_t>(i)];
         const auto found = connections_.find(event.data.u64);
-        if (found == connections_.end()) continue;  // it is to stop
+        if (found == connections_.end()) continue;  // it was woken
         busy_.insert(found->first);
         if ((event.events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0) found->second.ending = true;
       }
       hurried_ = false;  // first, as the other takes longer
       BoundUnread(&ConnectionUnread::strangers, &Connection::of_strangers);
       BoundUnread(&ConnectionUnread::owners, &Connection::of_owners);
+      BoundHellos();
       Look();
     }
     CountLeftBehind();
@@ -131,7 +151,7 @@ void ConnectionGuard::Look() {
   if (sweep) {
     for (const auto& [key, connection] : connections_) busy_.insert(key);
   }
-  FindIds();
+  FindIds(busy_);
   ending_calls_ = 0;
   for (auto key = busy_.begin(); key != busy_.end();) {
     const auto found = connections_.find(*key);
@@ -141,6 +161,7 @@ void ConnectionGuard::Look() {
     if (open && connection.closed) ending_calls_ += connection.calls;
     if (!open) {
       if (connection.closed && connection.id != 0) gone_.push_back(connection.id);
+      silent_.erase(found->first);
       connections_.erase(found);
     }
     key = calm ? busy_.erase(key) : std::next(key);
@@ -169,9 +190,9 @@ bool ConnectionGuard::IsCalm(Connection* connection) {
   return calls && !waits && *calls <= kFewCalls;
 }
 
-void ConnectionGuard::FindIds() {
+void ConnectionGuard::FindIds(const std::set<std::uint64_t>& keys) {
   std::unordered_map<std::string_view, Connection*> unknown;
-  for (const std::uint64_t key : busy_) {
+  for (const std::uint64_t key : keys) {
     Connection& connection = connections_.at(key);
     if (connection.id == 0) unknown.emplace(connection.peer, &connection);
   }
@@ -180,6 +201,40 @@ void ConnectionGuard::FindIds() {
     const auto found = unknown.find(peer);
     if (found != unknown.end() && CameToPort(port_, id)) found->second->id = id;
   });
+}
+
+// gRPC names a connection once the handshake is over.
+void ConnectionGuard::BoundHellos() {
+  const auto now = Clock::now();
+  silent_count_ = silent_.size();
+  const bool crowded = silent_.size() >= limits_.hellos;
+  if (!crowded && now < silent_seen_ + std::chrono::milliseconds(kSilentMilliseconds)) return;
+  silent_seen_ = now;
+  if (!silent_.empty()) FindIds(silent_);
+  std::erase_if(silent_, [this](std::uint64_t key) {
+    const Connection& connection = connections_.at(key);
+    if (NumberOf(connection.fd) != connection.number) {  // given up by either side
+      busy_.insert(key);
+      ++left_silent_;
+      return true;
+    }
+    return connection.id != 0 && BytesReceived(connection.fd) >= kHelloBytes;
+  });
+  for (auto key = silent_.begin(); crowded && key != silent_.end();) {
+    Connection& connection = connections_.at(*key);
+    if (now - connection.came < kHelloTime) break;
+    Close(&connection, "max-connections",
+          Message("had not said hello, as ", silent_.size(),
+                  " others; an eighth of --max-connections may"));
+    ++left_silent_;
+    busy_.insert(*key);
+    key = silent_.erase(key);
+  }
+  silent_count_ = silent_.size();
+  if (left_silent_ < kManySilent) return;
+  left_silent_ = 0;
+  untidy_ = true;
+  quiet_at_ = now + kQuiet;
 }
 
 void ConnectionGuard::CountLeftBehind() {

@@ -33,6 +33,9 @@ class ConnectionGuard {
     std::int64_t unread_bytes = 0;
     std::int64_t request_bytes = 0;                // the largest request
     std::chrono::duration<double> request_time{};  // for a connection's next request to be whole
+    // Connections at once that have not said hello: the handshake of TLS is not over, or HTTP/2 has
+    // not begun. Half a handshake takes 100 kB. gRPC itself ends them after --hello-seconds.
+    std::size_t hellos = 0;
   };
 
   // `port`: where the server listens. `judge`: unread.h. `closed` is told, on another thread, of
@@ -44,8 +47,9 @@ class ConnectionGuard {
   // Has to be told of every connection, before gRPC has it. One thread at a time.
   void Watch(int fd);
 
-  // Connections that were closed have left enough calls behind that others should wait.
-  bool IsBehind() const { return behind_; }
+  // Connections that were closed have left enough calls behind that others should wait, or as many
+  // as may be have not said hello.
+  bool IsBehind() const { return behind_ || silent_count_ >= limits_.hellos; }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -55,6 +59,7 @@ class ConnectionGuard {
     Clock::time_point light = {};  // when it held little
   };
   struct Connection {
+    Clock::time_point came = {};
     int fd = -1;
     ino_t number = 0;         // by which it is told from another that got the same descriptor
     std::string peer;         // as gRPC writes it
@@ -70,7 +75,9 @@ class ConnectionGuard {
   void Run(const std::stop_token& stop);
   void Look();
   bool IsCalm(Connection* connection);
-  void FindIds();
+  void FindIds(const std::set<std::uint64_t>& keys);
+  void BoundHellos();
+  void Wake() const;
   void CountLeftBehind();
   void NothingWasUnread();
   static void NothingIsUnread(Holding* holding);
@@ -84,11 +91,12 @@ class ConnectionGuard {
   const std::shared_ptr<UnreadRules> unread_;
   const std::function<void(const char* setting)> closed_;
   const int epoll_;
-  const int wake_;  // readable once it is to stop
+  const int wake_;  // readable when it is to stop, or somebody came
 
   std::mutex mutex_;  // of the connections
   std::uint64_t last_key_ = 0;
   std::unordered_map<std::uint64_t, Connection> connections_;
+  std::set<std::uint64_t> silent_;  // have not said hello, as far as is known; the eldest first
 
   // Of the thread.
   std::set<std::uint64_t> busy_;    // to be looked at again
@@ -96,15 +104,19 @@ class ConnectionGuard {
   std::size_t ending_calls_ = 0;    // of those that are closed and not gone yet
   bool hurried_ = false;            // much is unread
   Clock::time_point awake_until_;   // gRPC may not have read yet what came
-  std::size_t swept_ = 0;           // how many were left when all were last looked at
-  std::size_t unsaid_ = 0;          // were closed since the log last said so
-  std::string last_;                // of those: which, and why
+  Clock::time_point silent_seen_;
+  std::size_t left_silent_ = 0;  // never said hello and are gone, since memory was given back
+  std::size_t swept_ = 0;        // how many were left when all were last looked at
+  std::size_t unsaid_ = 0;       // were closed since the log last said so
+  std::string last_;             // of those: which, and why
   Clock::time_point said_;
   bool untidy_ = false;  // memory is to be given back once it is quiet
   Clock::time_point quiet_at_;
   Clock::time_point given_back_;
 
   std::atomic<bool> behind_{false};
+  std::atomic<std::size_t> silent_count_{0};
+  std::atomic<bool> napping_{false};  // looks at nothing before it is woken
   std::jthread thread_;
 };
 

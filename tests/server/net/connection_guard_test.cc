@@ -109,6 +109,36 @@ TEST_F(ConnectionGuardTest, StormsOfResetsHarmNobodyElse) {
   EXPECT_TRUE(MeshesWell());
 }
 
+// Nothing else ends those that say nothing here. An eighth of 128 may.
+TEST_F(ConnectionGuardTest, WhoSaysNoHelloMakesRoomForThoseWhoDo) {
+  constexpr int kSilent = 100, kMaySay = 16;
+  Config config;
+  config.max_connections = 128;
+  config.hello_seconds = config.keepalive_seconds = 3600;
+  StartTcp(config);
+  ASSERT_TRUE(MeshesWell());
+  const auto before = std::move(stub_);
+  std::vector<int> silent;
+  for (int i = 0; i < kSilent; ++i) {
+    silent.push_back(ConnectTo(port()));
+    const std::string half = "PRI * HTTP/2.0\r\n";
+    if (i % 2 == 1) send(silent.back(), half.data(), half.size(), MSG_NOSIGNAL);
+  }
+  stub_ = NewStub();
+  EXPECT_TRUE(MeshesWell()) << "behind all of them";
+  for (int i = 0; i < kSilent - kMaySay; ++i) {
+    char byte = 0;
+    while (recv(silent[static_cast<std::size_t>(i)], &byte, 1, 0) > 0) {  // gRPC's settings
+    }
+  }
+  stub_ = NewStub();
+  EXPECT_TRUE(MeshesWell());
+  v1::ServerInfo info;
+  grpc::ClientContext context;
+  EXPECT_TRUE(before->GetServerInfo(&context, {}, &info).ok()) << "who has said hello stays";
+  for (const int fd : silent) close(fd);
+}
+
 TEST(Channelz, NamesTheOtherEndAsGrpcDoes) {
   const int server = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   EXPECT_EQ(PeerOf(server), "");
