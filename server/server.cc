@@ -55,7 +55,9 @@ class Server::Impl {
 
   Status ListenForPrometheus() {
     if (state.config.metrics_listen.empty()) return Status::Ok();
-    return state.metrics.Listen(state.config.metrics_listen, [this] { return state.store.All(); });
+    return state.metrics.Listen(
+        state.config.metrics_listen, [this] { return state.store.All(); },
+        [this] { return !state.draining; });
   }
 
   // Takes up the meshes of an earlier server.

@@ -1,16 +1,19 @@
 #include "server/metrics/metrics.h"
 
 #include <prometheus/counter.h>
-#include <prometheus/exposer.h>
 #include <prometheus/gauge.h>
 #include <prometheus/histogram.h>
 #include <prometheus/metric_family.h>
 #include <prometheus/registry.h>
+#include <prometheus/text_serializer.h>
 
 #include <map>
 #include <utility>
 
 #include "core/base/message.h"
+#include "server/metrics/counts.h"
+#include "server/metrics/front_page.h"
+#include "server/metrics/page_server.h"
 #include "server/metrics/process_metrics.h"
 
 namespace stellate::server {
@@ -49,18 +52,7 @@ class Census final : public prometheus::Collectable {
   explicit Census(Metrics::Sessions sessions) : sessions_(std::move(sessions)) {}
 
   std::vector<MetricFamily> Collect() const override {
-    std::map<SessionState, int> states;
-    double workers = 0, watchers = 0, vertices = 0, waiting = 0, bytes = 0, idle = 0;
-    for (const auto& session : sessions_()) {
-      const SessionView view = session->View();
-      ++states[view.state];
-      workers += static_cast<double>(view.workers);
-      watchers += static_cast<double>(view.watchers);
-      vertices += static_cast<double>(view.progress.vertices);
-      waiting += static_cast<double>(view.waiting_queries);
-      bytes += static_cast<double>(view.bytes);
-      if (view.workers == 0 && view.waiting_queries > 0 && !session->HasEnded()) ++idle;
-    }
+    const Counts counts = CountAll(sessions_());
     std::vector<MetricFamily> families = {
         Gauge("stellate_meshes", "Meshes that the server holds, by state"),
         Gauge("stellate_workers", "Open worker streams that serve a mesh"),
@@ -69,15 +61,12 @@ class Census final : public prometheus::Collectable {
         Gauge("stellate_queries_waiting", "Queries of the rounds under way, not answered yet"),
         Gauge("stellate_mesh_bytes", "Memory of the meshes that the server holds, estimated"),
         Gauge("stellate_meshes_idle", "Meshes that have questions and no worker")};
-    for (const SessionState state : kStates) {
-      Add(&families[0], states[state], "state", SessionStateName(state));
-    }
-    Add(&families[1], workers);
-    Add(&families[2], watchers);
-    Add(&families[3], vertices);
-    Add(&families[4], waiting);
-    Add(&families[5], bytes);
-    Add(&families[6], idle);
+    for (const auto& [state, count] : counts.states)
+      Add(&families[0], static_cast<double>(count), "state", SessionStateName(state));
+    std::size_t next = 1;
+    for (const std::uint64_t count : {counts.workers, counts.watchers, counts.vertices,
+                                      counts.waiting, counts.bytes, counts.idle})
+      Add(&families[next++], static_cast<double>(count));
     return families;
   }
 
@@ -157,35 +146,50 @@ class Metrics::Impl final : public SessionObserver {
 
   std::shared_ptr<Census> census;
   const std::shared_ptr<ProcessMetrics> process = std::make_shared<ProcessMetrics>();
-  std::unique_ptr<prometheus::Exposer> exposer;
+  std::unique_ptr<PageServer> pages;
+
+  Page PageAt(std::string_view path, const Sessions& sessions, const IsServing& is_serving) const {
+    if (path == "/metrics") {
+      std::vector<MetricFamily> families = registry->Collect();
+      for (const prometheus::Collectable* some :
+           {static_cast<const prometheus::Collectable*>(census.get()),
+            static_cast<const prometheus::Collectable*>(process.get())})
+        for (MetricFamily& family : some->Collect()) families.push_back(std::move(family));
+      return {200, "text/plain; version=0.0.4; charset=utf-8",
+              prometheus::TextSerializer().Serialize(families)};
+    }
+    if (path == "/healthz") {
+      if (is_serving()) return {200, "text/plain; charset=utf-8", "serving\n"};
+      return {503, "text/plain; charset=utf-8", "draining: no new meshes are taken\n"};
+    }
+    if (path == "/")
+      return {200, "text/html; charset=utf-8", FrontPage(CountAll(sessions()), is_serving())};
+    return {404, "text/plain; charset=utf-8", "there are /, /healthz and /metrics\n"};
+  }
 };
 
 Metrics::Metrics() : impl_(std::make_shared<Impl>()) {}
 Metrics::~Metrics() { StopListening(); }
 
-core::Status Metrics::Listen(const std::string& address, Sessions sessions) {
-  impl_->census = std::make_shared<Census>(std::move(sessions));
-  try {
-    impl_->exposer = std::make_unique<prometheus::Exposer>(address, /*num_threads=*/2);
-  } catch (const std::exception&) {
+core::Status Metrics::Listen(const std::string& address, Sessions sessions, IsServing is_serving) {
+  impl_->census = std::make_shared<Census>(sessions);
+  auto listening =
+      PageServer::Listen(address, [impl = impl_.get(), sessions = std::move(sessions),
+                                   is_serving = std::move(is_serving)](std::string_view path) {
+        return impl->PageAt(path, sessions, is_serving);
+      });
+  if (!listening) {
     return {core::StatusCode::kFailedPrecondition,
-            core::Message("cannot listen on ", address,
-                          ": another program has it, or this machine does not; choose another "
-                          "--metrics-listen")};
+            core::Message("cannot listen on ", address, ": ", listening.error().message,
+                          "; choose another --metrics-listen")};
   }
-  impl_->exposer->RegisterCollectable(impl_->registry);
-  impl_->exposer->RegisterCollectable(impl_->census);
-  impl_->exposer->RegisterCollectable(impl_->process);
+  impl_->pages = std::move(*listening);
   return core::Status::Ok();
 }
 
-int Metrics::port() const {
-  if (impl_->exposer == nullptr) return 0;
-  const auto ports = impl_->exposer->GetListeningPorts();
-  return ports.empty() ? 0 : ports.front();
-}
+int Metrics::port() const { return impl_->pages == nullptr ? 0 : impl_->pages->port(); }
 
-void Metrics::StopListening() { impl_->exposer.reset(); }
+void Metrics::StopListening() { impl_->pages.reset(); }
 
 std::shared_ptr<SessionObserver> Metrics::observer() const { return impl_; }
 

@@ -12,9 +12,9 @@
 
 namespace stellate::server {
 
-// What the server counts, in Prometheus's text format; docs/running/metrics.md lists it. Counters
-// are kept as things happen and cost an atomic addition; gauges are counted when somebody asks. No
-// metric names an owner or a mesh.
+// What the server counts, in Prometheus's text format and for people; docs/running/metrics.md lists
+// it. Counters are kept as things happen and cost an atomic addition; gauges are counted when
+// somebody asks. No metric names an owner or a mesh.
 class Metrics {
  public:
   Metrics();
@@ -22,8 +22,11 @@ class Metrics {
 
   // Where the meshes are to be found, for the gauges. Must outlive Listen's answers.
   using Sessions = std::function<std::vector<std::shared_ptr<Session>>()>;
-  // Answers http://address/metrics from now on. kFailedPrecondition: the address is taken.
-  core::Status Listen(const std::string& address, Sessions sessions);
+  // Whether new meshes are taken.
+  using IsServing = std::function<bool()>;
+  // Answers http://address from now on: /metrics for Prometheus, /healthz for probes, / for people.
+  // kFailedPrecondition: the address is taken.
+  core::Status Listen(const std::string& address, Sessions sessions, IsServing is_serving);
   int port() const;  // 0: does not listen
   void StopListening();
 

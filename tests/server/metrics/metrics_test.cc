@@ -203,6 +203,49 @@ TEST_F(MetricsTest, NamesNoMeshNoOwnerAndNoToken) {
   }
 }
 
+// However many there are, and however long they say nothing or do not come to an end.
+TEST_F(MetricsTest, SilentConnectionsKeepNobodyFromBeingAnswered) {
+  StartWithMetrics();
+  std::vector<int> silent;
+  for (int i = 0; i < 200; ++i) {
+    silent.push_back(ConnectTo(server_->metrics_port()));
+    const std::string half = "GET /metrics HTTP/1.1\r\nHost: ";
+    if (i % 2 == 1) send(silent.back(), half.data(), half.size(), MSG_NOSIGNAL);
+  }
+  EXPECT_EQ(Scrape().at("stellate_meshes{state=\"WAITING\"}"), 0);
+  for (const int fd : silent) close(fd);
+}
+
+TEST_F(MetricsTest, ProbesAndPeopleAreAnsweredToo) {
+  StartWithMetrics();
+  CreateSphere();
+  const int port = server_->metrics_port();
+  EXPECT_EQ(GetPage(port, "/healthz").find("HTTP/1.1 200"), 0u);
+  EXPECT_EQ(GetPage(port, "/nothing").find("HTTP/1.1 404"), 0u);
+  const std::string page = GetPage(port, "/?from=a+bookmark");
+  EXPECT_EQ(page.find("HTTP/1.1 200"), 0u) << page;
+  EXPECT_NE(page.find("Content-Type: text/html"), std::string::npos) << page;
+  EXPECT_NE(page.find(Version()), std::string::npos) << page;
+  EXPECT_NE(page.find("<tr><td>WAITING<td>1"), std::string::npos) << page;
+
+  // While it drains a worker's mesh it still answers, and probes are told.
+  std::atomic<bool> open{false};
+  const std::string name = CreateSphere();
+  RawWorker worker(stub_.get(), name, [&open](const v1::QueryChunk& queries) {
+    while (!open) std::this_thread::yield();
+    return RawWorker::Truly(queries);
+  });
+  while (worker.chunks() == 0) std::this_thread::yield();
+  std::thread stopping([this] { server_->Stop(60s); });
+  std::string health;
+  do health = GetPage(port, "/healthz");
+  while (health.find("HTTP/1.1 200") == 0);
+  EXPECT_EQ(health.find("HTTP/1.1 503"), 0u) << health;
+  EXPECT_NE(GetPage(port, "/").find("Draining"), std::string::npos);
+  open = true;
+  stopping.join();
+}
+
 TEST_F(MetricsTest, ATakenPortIsRefusedAndAStoppedServerAnswersNoMore) {
   StartWithMetrics();
   const int port = server_->metrics_port();

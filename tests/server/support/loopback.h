@@ -27,11 +27,11 @@ inline int ConnectTo(int port) {
   return fd;
 }
 
-// The reply to GET /metrics, headers included; "" when nobody listens.
-inline std::string GetMetrics(int port) {
+// The reply to a GET, headers included; "" when nobody listens.
+inline std::string GetPage(int port, const std::string& path) {
   const int fd = TryConnect(port);
   if (fd < 0) return "";
-  const std::string request = "GET /metrics HTTP/1.0\r\n\r\n";
+  const std::string request = "GET " + path + " HTTP/1.0\r\n\r\n";
   EXPECT_EQ(send(fd, request.data(), request.size(), 0), static_cast<ssize_t>(request.size()));
   std::string reply;
   char bytes[4096];
@@ -41,5 +41,6 @@ inline std::string GetMetrics(int port) {
   close(fd);
   return reply;
 }
+inline std::string GetMetrics(int port) { return GetPage(port, "/metrics"); }
 
 }  // namespace stellate::server::testing
