@@ -33,4 +33,14 @@ std::string Printable(std::string_view text, char stand_in) {
   return printable;
 }
 
+std::string PrintableLines(std::string_view text, char stand_in) {
+  std::string lines;
+  for (std::size_t end = 0;; text.remove_prefix(end + 1)) {
+    end = text.find('\n');
+    lines += Printable(text.substr(0, end), stand_in);
+    if (end == std::string_view::npos) return lines;
+    lines += "\n  ";
+  }
+}
+
 }  // namespace stellate::text

@@ -11,4 +11,8 @@ namespace stellate::text {
 // U+2066-9), and each run of bytes that is no UTF-8.
 std::string Printable(std::string_view text, char stand_in = ' ');
 
+// The same of each line. Lines after the first are indented, so that none of them can be taken for
+// one that the program wrote.
+std::string PrintableLines(std::string_view text, char stand_in = ' ');
+
 }  // namespace stellate::text

@@ -7,12 +7,19 @@
 #include "server/convert/mesh.h"
 #include "server/convert/oracle.h"
 #include "server/rpc/rpcs.h"
+#include "text/printable.h"
 
 namespace stellate::server {
 namespace {
 
 constexpr std::size_t kMaxWorkerNameBytes = 128;
 constexpr std::size_t kMaxFailureBytes = 4096;
+
+// An oracle's own words go to the terminals of others.
+std::string WordsOf(const v1::OracleFailure& failure) {
+  return Cut(text::PrintableLines(Cut(failure.message(), kMaxFailureBytes)), kMaxFailureBytes);
+}
+
 constexpr auto kGoodbye = std::chrono::seconds(5);  // for a client to read the end of its stream
 
 // One worker's stream. gRPC calls the On... functions, the pool Ask and End, the ticker Tick, each
@@ -87,7 +94,8 @@ class OracleStream final
   }
 
   std::string Title() const override {
-    return core::Message(worker_name_, worker_name_.empty() ? "at " : " at ", peer_);
+    return core::Message(text::Printable(worker_name_), worker_name_.empty() ? "at " : " at ",
+                         peer_);
   }
 
   void Tick(TimePoint now) override {
@@ -205,7 +213,7 @@ class OracleStream final
 
   void TakeFailure(const v1::OracleFailure& failure) {
     const std::string words = failure.message().empty() ? "the oracle failed and did not say why"
-                                                        : Cut(failure.message(), kMaxFailureBytes);
+                                                        : WordsOf(failure);
     EndWith(Refusal(v1::ERROR_REASON_ORACLE_FAILED, words));
     session_->pool().Fail({FailureReason::kOracleFailed, words});
     Leave();

@@ -105,6 +105,7 @@ SERVER = {
         "server/metrics",
         "server/convert",
         "server/auth",
+        "text",
     ),
     "server": (
         *FACE,

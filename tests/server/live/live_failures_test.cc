@@ -292,6 +292,44 @@ TEST_F(LiveFailuresTest, MessagesOutOfOrderEndTheStreamAlone) {
   EXPECT_EQ(WatchToEnd(name).state(), v1::MESH_STATE_SUCCEEDED);
 }
 
+// Whether or not others of its leases wait for their answers.
+TEST_F(LiveFailuresTest, ASecondAnswerToALeaseEndsTheStream) {
+  Start();
+  const std::string name = CreateSphere(0.1);
+  for (const int chunks : {1, 5}) {
+    grpc::ClientContext context;
+    const auto stream = stub_->ServeOracle(&context);
+    v1::ServeOracleRequest request;
+    request.mutable_hello()->set_mesh(name);
+    stream->Write(request);
+    v1::ServeOracleResponse response;
+    for (int left = chunks; left > 0 && stream->Read(&response);) {
+      if (!response.has_queries()) continue;
+      *request.mutable_answers() = TrueAnswer(response.queries());
+      stream->Write(request);
+      if (--left == 0) stream->Write(request);
+    }
+    while (stream->Read(&response)) {
+    }
+    const grpc::Status status = stream->Finish();
+    EXPECT_EQ(ReasonIn(status), "OUT_OF_ORDER") << status.error_message();
+  }
+  RawWorker worker(stub_.get(), name);
+  EXPECT_EQ(WatchToEnd(name).state(), v1::MESH_STATE_SUCCEEDED);
+}
+
+TEST_F(LiveFailuresTest, WhatAnOracleSaysCommandsNobodysTerminal) {
+  Start();
+  const std::string name = CreateSphere();
+  RawWorker worker(stub_.get(), name, [](const v1::QueryChunk& queries) {
+    v1::ServeOracleRequest request;
+    request.mutable_failure()->set_lease(queries.lease());
+    request.mutable_failure()->set_message("\033[2Jno point\ncertificate  PROVED\u202e");
+    return std::optional(request);
+  });
+  EXPECT_EQ(WatchToEnd(name).report().failure().message(), " [2Jno point\n  certificate  PROVED ");
+}
+
 TEST_F(LiveFailuresTest, AStreamWithoutHelloIsClosed) {
   Config config;
   config.hello_seconds = 0.01;
