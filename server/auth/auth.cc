@@ -67,24 +67,25 @@ tl::expected<Identity, grpc::Status> Authenticator::Identify(
   if (tokens_ != nullptr) {
     const auto digest = TokenIn(context);
     if (!digest) return tl::unexpected(digest.error());
-    auto owner = tokens_->OwnerOf(*digest);
-    if (!owner) return Unauthenticated("the token is not known to this server");
-    return Identity{std::move(*owner), *digest};
+    auto holder = tokens_->HolderOf(*digest);
+    if (!holder) return Unauthenticated("the token is not known to this server");
+    return Identity{std::move(holder->owner), *digest, holder->administrator};
   }
   if (!by_certificate_) return Identity{};
   std::string owner = OwnerIn(*context.auth_context());
   if (owner.empty()) return Unauthenticated("the client certificate names nobody");
-  return Identity{std::move(owner), std::nullopt};
+  return Identity{std::move(owner), std::nullopt, false};
 }
 
 bool Authenticator::Knows(std::string_view authorization) const {
   return tokens_ != nullptr && IsBearer(authorization) &&
-         tokens_->OwnerOf(Digest(authorization.substr(kScheme.size())));
+         tokens_->HolderOf(Digest(authorization.substr(kScheme.size())));
 }
 
 bool Authenticator::StillHolds(const Identity& identity) const {
   return tokens_ == nullptr ||
-         (identity.token && tokens_->OwnerOf(*identity.token) == identity.owner);
+         (identity.token && tokens_->HolderOf(*identity.token) ==
+                                TokenHolder{identity.owner, identity.administrator});
 }
 
 void Authenticator::Reload(bool force) {

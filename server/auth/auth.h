@@ -18,6 +18,7 @@ namespace stellate::server {
 struct Identity {
   std::string owner;  // empty: the server tells nobody apart
   std::optional<TokenDigest> token;
+  bool administrator = false;  // sees and ends anybody's
 };
 
 // Tells callers apart: by bearer token if there is a token file, else by the client certificate if

@@ -23,6 +23,7 @@ using core::StatusCode;
 constexpr std::size_t kMaxOwnerBytes = 64;
 constexpr std::size_t kMinTokenBytes = 16;
 constexpr std::size_t kMaxTokenBytes = 512;
+constexpr std::string_view kAdministrator = "administrator";
 constexpr std::size_t kMaxFileBytes = std::size_t{16} << 20;
 
 bool IsOwnerCharacter(unsigned char c) {
@@ -88,17 +89,24 @@ core::Expected<TokenTable> TokenTable::Parse(std::string_view text) {
     const std::size_t gap = line.find_first_of(kBlank);
     if (gap == std::string_view::npos) return BadLine(number, "must be an owner and a token");
     const std::string_view owner = line.substr(0, gap);
-    const std::string_view token = line.substr(line.find_first_not_of(kBlank, gap));
+    std::string_view token = line.substr(line.find_first_not_of(kBlank, gap));
+    const std::size_t word = token.find_last_of(kBlank);
+    const bool administrator =
+        word != std::string_view::npos && token.substr(word + 1) == kAdministrator;
+    if (administrator) token = token.substr(0, token.find_last_not_of(kBlank, word) + 1);
     if (owner.size() > kMaxOwnerBytes || !std::all_of(owner.begin(), owner.end(), IsOwnerCharacter))
       return BadLine(number, Message("must begin with an owner of 1 to ", kMaxOwnerBytes,
                                      " letters, digits, '.', '_', '-' or '@'"));
     if (token.size() < kMinTokenBytes || token.size() > kMaxTokenBytes ||
         !std::all_of(token.begin(), token.end(), IsTokenCharacter)) {
-      return BadLine(number, Message("must end with a token of ", kMinTokenBytes, " to ",
-                                     kMaxTokenBytes, " visible ASCII characters without blanks"));
+      return BadLine(number,
+                     Message("must end with a token of ", kMinTokenBytes, " to ", kMaxTokenBytes,
+                             " visible ASCII characters without blanks, or "
+                             "with such a one and the word ",
+                             kAdministrator));
     }
-    Entry entry{Digest(token), std::string(owner)};
-    if (table.OwnerOf(entry.digest)) return BadLine(number, "repeats the token of another line");
+    Entry entry{Digest(token), {std::string(owner), administrator}};
+    if (table.HolderOf(entry.digest)) return BadLine(number, "repeats the token of another line");
     table.entries_.push_back(std::move(entry));
   }
   if (table.entries_.empty()) {
@@ -107,14 +115,14 @@ core::Expected<TokenTable> TokenTable::Parse(std::string_view text) {
   return table;
 }
 
-std::optional<std::string> TokenTable::OwnerOf(const TokenDigest& digest) const {
+std::optional<TokenHolder> TokenTable::HolderOf(const TokenDigest& digest) const {
   const Entry* found = nullptr;
   for (const Entry& entry : entries_) {
     const bool same = CRYPTO_memcmp(entry.digest.data(), digest.data(), digest.size()) == 0;
     found = same ? &entry : found;
   }
   if (found == nullptr) return std::nullopt;
-  return found->owner;
+  return found->holder;
 }
 
 core::Expected<std::unique_ptr<TokenFile>> TokenFile::Open(const std::string& path) {
@@ -130,13 +138,13 @@ core::Expected<std::unique_ptr<TokenFile>> TokenFile::Open(const std::string& pa
   return file;
 }
 
-std::optional<std::string> TokenFile::OwnerOf(const TokenDigest& digest) const {
+std::optional<TokenHolder> TokenFile::HolderOf(const TokenDigest& digest) const {
   std::shared_ptr<const TokenTable> table;
   {
     const std::lock_guard lock(mutex_);
     table = table_;
   }
-  return table->OwnerOf(digest);
+  return table->HolderOf(digest);
 }
 
 void TokenFile::Reload(bool force) {

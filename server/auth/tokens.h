@@ -14,22 +14,30 @@ namespace stellate::server {
 
 using TokenDigest = std::array<unsigned char, 32>;  // SHA-256
 
+// Who shows a token.
+struct TokenHolder {
+  std::string owner;
+  bool administrator = false;  // may see and end anybody's mesh
+  bool operator==(const TokenHolder&) const = default;
+};
+
 // Who a bearer token speaks for. Tokens themselves are forgotten once read: digests are kept, so
 // that neither a log nor a core dump gives one away.
 class TokenTable {
  public:
-  // Lines "owner token"; blank lines and lines that start with '#' are skipped. An owner may have
-  // several tokens. kInvalidArgument names the line, never what it holds.
+  // Lines "owner token" or "owner token administrator"; blank lines and lines that start with '#'
+  // are skipped. An owner may have several tokens. kInvalidArgument names the line, never what it
+  // holds.
   static core::Expected<TokenTable> Parse(std::string_view text);
 
   // Looks at every entry, whatever it finds: the time taken says nothing about the tokens.
-  std::optional<std::string> OwnerOf(const TokenDigest& digest) const;
+  std::optional<TokenHolder> HolderOf(const TokenDigest& digest) const;
   std::size_t size() const { return entries_.size(); }
 
  private:
   struct Entry {
     TokenDigest digest;
-    std::string owner;
+    TokenHolder holder;
   };
   std::vector<Entry> entries_;
 };
@@ -41,7 +49,7 @@ class TokenFile {
  public:
   static core::Expected<std::unique_ptr<TokenFile>> Open(const std::string& path);
 
-  std::optional<std::string> OwnerOf(const TokenDigest& digest) const;
+  std::optional<TokenHolder> HolderOf(const TokenDigest& digest) const;
   // Reads the file again if it is another than before, or in any case where `force`. One that
   // cannot be read, or is wrong, changes nothing and is logged once.
   void Reload(bool force = false);

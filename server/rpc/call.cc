@@ -1,9 +1,25 @@
 #include "server/rpc/call.h"
 
 #include "core/base/message.h"
+#include "server/base/log.h"
 #include "server/convert/error_map.h"
+#include "server/convert/mesh.h"
 
 namespace stellate::server {
+
+void Audit(const Session& session, const Identity& caller, const std::string& peer,
+           const char* action) {
+  LogContext context = session.log_context();
+  context.owner = caller.owner;
+  Log(LogLevel::kInfo, context, "audit",
+      LogFields()
+          .Add("action", action)
+          .Add("by", caller.owner)
+          .Add("administrator", caller.administrator)
+          .Add("owner", session.request().owner)
+          .Add("address", peer));
+}
+
 tl::expected<std::shared_ptr<Session>, grpc::Status> FindMesh(const ServerState& state,
                                                               const Identity& caller,
                                                               const std::string& name,
@@ -17,13 +33,18 @@ tl::expected<std::shared_ptr<Session>, grpc::Status> FindMesh(const ServerState&
                 field));
   }
   auto session = state.store.Find(name);
-  if (session == nullptr || session->request().owner != caller.owner) {
+  if (session == nullptr || (session->request().owner != caller.owner && !caller.administrator)) {
     return tl::unexpected(Refusal(v1::ERROR_REASON_MESH_NOT_FOUND,
                                   core::Message("there is no mesh ", name,
                                                 ": the name is wrong, or it was deleted, or it "
                                                 "ended too long ago to be kept")));
   }
   return session;
+}
+
+void ShowMesh(const Call& call, const Session& session, v1::Mesh* mesh) {
+  ToProto(session, mesh);
+  if (call.caller.administrator) mesh->set_owner(session.request().owner);
 }
 
 tl::expected<Identity, grpc::Status> Identify(ServerState& state,

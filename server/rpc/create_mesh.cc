@@ -37,6 +37,7 @@ grpc::Status CreateMesh(const Call& call, const v1::CreateMeshRequest& request, 
   }
   const auto session = state.store.Create(std::move(options));
   if (!session) return Refuse(state, session.error());
+  Audit(**session, call.caller, call.peer, "create");
   ToProto(**session, mesh);
   return grpc::Status::OK;
 }

@@ -42,6 +42,8 @@ class DownloadStream final
     return grpc::Status::OK;
   }
 
+  const char* Action() const override { return "download"; }
+
   Step Next() override {
     if (!cursor_) Begin();
     if (!cursor_) return Step::kWait;

@@ -6,7 +6,7 @@ namespace stellate::server {
 grpc::Status GetMesh(const Call& call, const v1::GetMeshRequest& request, v1::Mesh* mesh) {
   const auto session = FindMesh(call.state, call.caller, request.name());
   if (!session) return session.error();
-  ToProto(**session, mesh);
+  ShowMesh(call, **session, mesh);
   if (request.crew()) ToProto((*session)->pool().Crew(), mesh);
   if (request.has_past_progress_after())
     ToProto((*session)->PastAfter(request.past_progress_after()), mesh);

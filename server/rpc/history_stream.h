@@ -34,7 +34,10 @@ class HistoryStream : public grpc::ServerBidiReactor<Request, Response>,
                       public std::enable_shared_from_this<HistoryStream<Request, Response>> {
  public:
   HistoryStream(ServerState& state, grpc::CallbackServerContext* context)
-      : state_(state), context_(context), caller_(Identify(state, *context)) {}
+      : state_(state),
+        context_(context),
+        peer_(context->peer()),
+        caller_(Identify(state, *context)) {}
 
   void Start() {
     self_ = this->shared_from_this();
@@ -101,6 +104,8 @@ class HistoryStream : public grpc::ServerBidiReactor<Request, Response>,
 
   // Where to start in `session`, or why not. Before anything else, without the lock.
   virtual grpc::Status Choose(const Request& request, const Session& session) = 0;
+  // What the log says is done with the mesh, after Choose; null: nothing worth a line.
+  virtual const char* Action() const = 0;
   // Bytes of mesh in a message, after Choose.
   virtual std::uint64_t PartBytes() const { return server::PartBytes(state_.config); }
   // Fills response(), which is empty, or calls End.
@@ -147,8 +152,9 @@ class HistoryStream : public grpc::ServerBidiReactor<Request, Response>,
       last_write_ = Clock::now();
       session_ = *session;
     }
-    if ((*session)->AddWatcher(this->weak_from_this())) return grpc::Status::OK;
-    return TooManyWatchers(state_, **session);
+    if (!(*session)->AddWatcher(this->weak_from_this())) return TooManyWatchers(state_, **session);
+    if (const char* const action = Action()) Audit(**session, *caller_, peer_, action);
+    return grpc::Status::OK;
   }
 
   // Starts the next write, or the end, if none is on its way.
@@ -174,6 +180,7 @@ class HistoryStream : public grpc::ServerBidiReactor<Request, Response>,
 
   ServerState& state_;
   grpc::CallbackServerContext* const context_;
+  const std::string peer_;  // asked of the context while there surely is a call
   const tl::expected<Identity, grpc::Status> caller_;
 
   std::mutex mutex_;

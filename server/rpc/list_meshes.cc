@@ -1,4 +1,5 @@
 #include <charconv>
+#include <optional>
 
 #include "core/base/message.h"
 #include "server/convert/error_map.h"
@@ -28,12 +29,13 @@ grpc::Status ListMeshes(const Call& call, const v1::ListMeshesRequest& request,
     }
   }
   const std::uint32_t size = request.page_size() == 0 ? kDefaultPage : request.page_size();
-  const SessionStore::Page page =
-      call.state.store.List(after, std::min(size, kLargestPage), call.caller.owner);
+  const SessionStore::Page page = call.state.store.List(
+      after, std::min(size, kLargestPage),
+      call.caller.administrator ? std::nullopt : std::optional(call.caller.owner));
   std::size_t bytes = 0;
   for (std::size_t i = 0; i < page.sessions.size(); ++i) {
     v1::Mesh* const mesh = response->add_meshes();
-    ToProto(*page.sessions[i], mesh);
+    ShowMesh(call, *page.sessions[i], mesh);
     bytes += mesh->ByteSizeLong();
     const bool full = bytes >= ChunkBytes(call.state.config) / 2;
     const bool last = i + 1 == page.sessions.size();

@@ -155,6 +155,12 @@ class OracleStream final
   void Greet(const v1::Hello& hello) {
     auto session = FindMesh(state_, *caller_, hello.mesh(), "hello.mesh");
     if (!session) return EndWith(session.error());
+    if ((*session)->request().owner != caller_->owner) {
+      return EndWith(Refusal(v1::ERROR_REASON_INVALID_ARGUMENT,
+                             "the mesh is another owner's: an administrator may see and end it, "
+                             "not answer for it",
+                             "hello.mesh"));
+    }
     if (hello.worker().size() > kMaxWorkerNameBytes) {
       return EndWith(Refusal(v1::ERROR_REASON_INVALID_ARGUMENT,
                              core::Message("hello.worker has ", hello.worker().size(),
@@ -180,6 +186,7 @@ class OracleStream final
     }
     Log(LogLevel::kInfo, session_->log_context(), "worker joined",
         LogFields().Add("worker", worker_name_).Add("address", peer_));
+    Audit(*session_, *caller_, peer_, "serve");
     bool ended = false;
     {
       const std::lock_guard lock(mutex_);
@@ -212,8 +219,8 @@ class OracleStream final
   }
 
   void TakeFailure(const v1::OracleFailure& failure) {
-    const std::string words = failure.message().empty() ? "the oracle failed and did not say why"
-                                                        : WordsOf(failure);
+    const std::string words =
+        failure.message().empty() ? "the oracle failed and did not say why" : WordsOf(failure);
     EndWith(Refusal(v1::ERROR_REASON_ORACLE_FAILED, words));
     session_->pool().Fail({FailureReason::kOracleFailed, words});
     Leave();

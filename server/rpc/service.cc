@@ -29,7 +29,7 @@ class UnaryCall final : public grpc::ServerBidiReactor<Request, Response> {
       this->Finish(caller.error());
       return;
     }
-    call_.emplace(Call{state, std::move(*caller)});
+    call_.emplace(Call{state, std::move(*caller), context.peer()});
     this->StartRead(&request_);
   }
 

@@ -28,6 +28,7 @@ class WatchStream final : public HistoryStream<v1::WatchMeshRequest, v1::WatchMe
     return grpc::Status::OK;
   }
 
+  const char* Action() const override { return geometry_ ? "watch" : nullptr; }
   std::uint64_t PartBytes() const override { return geometry_ ? HistoryStream::PartBytes() : 0; }
   void OnNews() override { progress_due_ = true; }
   // Whoever watches a mesh to the end may take his time, as long as there is a mesh.

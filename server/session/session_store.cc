@@ -200,11 +200,11 @@ bool SessionStore::Delete(const std::string& name) {
 }
 
 SessionStore::Page SessionStore::List(std::uint64_t after, std::size_t count,
-                                      const std::string& owner) const {
+                                      const std::optional<std::string>& owner) const {
   const std::lock_guard lock(mutex_);
   Page page;
   for (auto it = entries_.upper_bound(after); it != entries_.end(); ++it) {
-    if (it->second.session->request().owner != owner) continue;
+    if (owner && it->second.session->request().owner != *owner) continue;
     if (page.sessions.size() == count) {
       page.more = true;
       break;

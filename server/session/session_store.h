@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <unordered_map>
@@ -65,8 +66,8 @@ class SessionStore {
     std::vector<std::uint64_t> numbers;              // of each; later ones are greater
     bool more = false;
   };
-  // One owner's.
-  Page List(std::uint64_t after, std::size_t count, const std::string& owner = "") const;
+  // One owner's; of everybody without one.
+  Page List(std::uint64_t after, std::size_t count, const std::optional<std::string>& owner) const;
   std::vector<std::shared_ptr<Session>> All() const;  // everyone's
 
   std::size_t Running() const;

@@ -21,12 +21,23 @@ TEST(TokenTable, TellsOwnersApart) {
                                        "  \r\nalice second-0123456789");
   ASSERT_TRUE(table) << table.error().message;
   EXPECT_EQ(table->size(), 3u);
-  EXPECT_EQ(table->OwnerOf(Digest(kAlice)), "alice");
-  EXPECT_EQ(table->OwnerOf(Digest("second-0123456789")), "alice");
-  EXPECT_EQ(table->OwnerOf(Digest(kBob)), "bob");
-  EXPECT_EQ(table->OwnerOf(Digest("")), std::nullopt);
-  EXPECT_EQ(table->OwnerOf(Digest("alice-0123456789abcdeg")), std::nullopt);
-  EXPECT_EQ(table->OwnerOf(Digest("alice-0123456789abcde")), std::nullopt);
+  EXPECT_EQ(table->HolderOf(Digest(kAlice)), TokenHolder{"alice"});
+  EXPECT_EQ(table->HolderOf(Digest("second-0123456789")), TokenHolder{"alice"});
+  EXPECT_EQ(table->HolderOf(Digest(kBob)), TokenHolder{"bob"});
+  EXPECT_EQ(table->HolderOf(Digest("")), std::nullopt);
+  EXPECT_EQ(table->HolderOf(Digest("alice-0123456789abcdeg")), std::nullopt);
+  EXPECT_EQ(table->HolderOf(Digest("alice-0123456789abcde")), std::nullopt);
+}
+
+TEST(TokenTable, AThirdWordMakesAnAdministrator) {
+  const auto table = TokenTable::Parse(std::string("alice ") + kAlice + " \tadministrator \r\n" +
+                                       Line("alice", "second-0123456789") + Line("bob", kBob));
+  ASSERT_TRUE(table) << table.error().message;
+  EXPECT_EQ(table->HolderOf(Digest(kAlice)), (TokenHolder{"alice", true}));
+  EXPECT_EQ(table->HolderOf(Digest("second-0123456789")), TokenHolder{"alice"});
+  EXPECT_EQ(table->HolderOf(Digest(kBob)), TokenHolder{"bob"});
+  for (const char* word : {"Administrator", "admin", "administrator administrator"})
+    EXPECT_FALSE(TokenTable::Parse(std::string("alice ") + kAlice + " " + word)) << word;
 }
 
 TEST(TokenTable, RefusesBadLinesAndNeverQuotesThem) {
@@ -52,11 +63,11 @@ TEST(TokenFile, IsReadAgainWhenItChanges) {
   WriteFile(path, Line("alice", kAlice));
   const auto file = TokenFile::Open(path);
   ASSERT_TRUE(file) << file.error().message;
-  EXPECT_EQ((*file)->OwnerOf(Digest(kAlice)), "alice");
+  EXPECT_EQ((*file)->HolderOf(Digest(kAlice)), TokenHolder{"alice"});
   WriteFile(path, Line("bob", kBob));
   (*file)->Reload();
-  EXPECT_EQ((*file)->OwnerOf(Digest(kAlice)), std::nullopt);
-  EXPECT_EQ((*file)->OwnerOf(Digest(kBob)), "bob");
+  EXPECT_EQ((*file)->HolderOf(Digest(kAlice)), std::nullopt);
+  EXPECT_EQ((*file)->HolderOf(Digest(kBob)), TokenHolder{"bob"});
 }
 
 TEST(TokenFile, ABadOrMissingFileLeavesTheTokensInForce) {
@@ -67,13 +78,13 @@ TEST(TokenFile, ABadOrMissingFileLeavesTheTokensInForce) {
   ASSERT_TRUE(file);
   WriteFile(path, "nonsense\n");
   (*file)->Reload();
-  EXPECT_EQ((*file)->OwnerOf(Digest(kAlice)), "alice");
+  EXPECT_EQ((*file)->HolderOf(Digest(kAlice)), TokenHolder{"alice"});
   std::filesystem::remove(path);
   (*file)->Reload(/*force=*/true);
-  EXPECT_EQ((*file)->OwnerOf(Digest(kAlice)), "alice");
+  EXPECT_EQ((*file)->HolderOf(Digest(kAlice)), TokenHolder{"alice"});
   WriteFile(path, Line("bob", kBob));
   (*file)->Reload();
-  EXPECT_EQ((*file)->OwnerOf(Digest(kAlice)), std::nullopt);
+  EXPECT_EQ((*file)->HolderOf(Digest(kAlice)), std::nullopt);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // Strangers, wrong certificates and other people's meshes, against a live server.
 
+#include <sstream>
 #include <vector>
 
 #include "server/net/health_check.h"
@@ -176,6 +177,83 @@ TEST_F(LiveSafetyTest, TokensComeAndGoWithoutARestart) {
   WriteTokens(std::string("alice ") + kAlice + "\n");
   while (!alice.Info().ok()) std::this_thread::sleep_for(50ms);
   EXPECT_TRUE(alice.Get(name, &mesh).ok()) << "a mesh outlives its owner's absence";
+}
+
+TEST_F(LiveSafetyTest, AnAdministratorSeesAndEndsEverybodysAndAnswersForNobody) {
+  StartWithTokens();
+  const std::string token = "root-0123456789abcdef";
+  WriteTokens(std::string("alice ") + kAlice + "\nbob " + kBob + "\nroot " + token +
+              " administrator\n");
+  server_->ReloadFiles();
+  TokenClient alice = Plain(kAlice), bob = Plain(kBob), root = Plain(token);
+  const std::string first = CreateBy(&alice), second = CreateBy(&bob);
+
+  v1::ListMeshesResponse page;
+  ASSERT_TRUE(root.List(&page).ok());
+  ASSERT_EQ(page.meshes_size(), 1);
+  EXPECT_EQ(page.meshes(0).name(), first);
+  EXPECT_EQ(page.meshes(0).owner(), "alice");
+  const std::string next = page.next_page_token();
+  page.Clear();
+  ASSERT_TRUE(root.List(&page, next).ok());
+  ASSERT_EQ(page.meshes_size(), 1);
+  EXPECT_EQ(page.meshes(0).name(), second);
+  EXPECT_EQ(page.meshes(0).owner(), "bob");
+
+  v1::Mesh mesh;
+  ASSERT_TRUE(root.Get(first, &mesh).ok());
+  EXPECT_EQ(mesh.owner(), "alice");
+  ASSERT_TRUE(alice.Get(first, &mesh).ok());
+  EXPECT_EQ(mesh.owner(), "") << "which is nothing to owners";
+  EXPECT_EQ(root.Serve(first).error_code(), StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(bob.Cancel(first).error_code(), StatusCode::NOT_FOUND);
+  EXPECT_TRUE(root.Cancel(first).ok());
+  v1::Mesh final;
+  EXPECT_TRUE(root.Watch(first, &final).ok());
+  EXPECT_EQ(final.state(), v1::MESH_STATE_CANCELLED);
+  EXPECT_TRUE(root.Delete(second).ok());
+  EXPECT_EQ(bob.Get(second, &mesh).error_code(), StatusCode::NOT_FOUND);
+
+  // Once the word is taken away he is an owner as others are.
+  WriteTokens(std::string("alice ") + kAlice + "\nroot " + token + "\n");
+  server_->ReloadFiles();
+  EXPECT_EQ(root.Get(first, &mesh).error_code(), StatusCode::NOT_FOUND);
+}
+
+TEST_F(LiveSafetyTest, TheLogSaysWhoDidWhatWithWhoseMesh) {
+  ::testing::internal::CaptureStderr();
+  StartLogging(LogLevel::kInfo, LogFormat::kText);
+  StartWithTokens();
+  const std::string token = "root-0123456789abcdef";
+  WriteTokens(std::string("alice ") + kAlice + "\nroot " + token + " administrator\n");
+  server_->ReloadFiles();
+  TokenClient alice = Plain(kAlice), root = Plain(token);
+  const std::string served = CreateBy(&alice), ended = CreateBy(&alice);
+  std::thread serving([&] { alice.Serve(served); });
+  EXPECT_TRUE(alice.Watch(served).ok());
+  serving.join();
+  EXPECT_TRUE(alice.Download(served).ok());
+  EXPECT_TRUE(root.Cancel(ended).ok());
+  EXPECT_TRUE(root.Delete(ended).ok());
+  server_->Stop(0s);
+  StartLogging(LogLevel::kWarning, LogFormat::kText);
+  const std::string log = ::testing::internal::GetCapturedStderr();
+  const auto expect = [&log](const std::string& mesh, const std::string& words) {
+    std::istringstream lines(log);
+    std::string line;
+    const auto fits = [&] {
+      return line.find(mesh) != std::string::npos &&
+             line.find("audit action=" + words) != std::string::npos;
+    };
+    while (std::getline(lines, line) && !fits()) {
+    }
+    EXPECT_TRUE(fits()) << words << " in " << log;
+    EXPECT_NE(line.find(" address="), std::string::npos) << line;
+  };
+  for (const char* action : {"create", "serve", "watch", "download"})
+    expect(served, std::string(action) + " by=alice administrator=false owner=alice");
+  for (const char* action : {"cancel", "delete"})
+    expect(ended, std::string(action) + " by=root administrator=true owner=alice");
 }
 
 TEST_F(LiveSafetyTest, TokensAreNeverLogged) {

@@ -51,11 +51,11 @@ TEST(SessionStore, FindsListsAndDeletes) {
   const auto a = *store.Create(Options());
   const auto b = *store.Create(Options());
   EXPECT_EQ(store.Find(a->request().name), a);
-  const auto page = store.List(0, 1);
+  const auto page = store.List(0, 1, "");
   ASSERT_EQ(page.sessions.size(), 1u);
   EXPECT_EQ(page.sessions[0], a) << "oldest first";
   EXPECT_TRUE(page.more);
-  const auto rest = store.List(page.numbers[0], 10);
+  const auto rest = store.List(page.numbers[0], 10, "");
   ASSERT_EQ(rest.sessions.size(), 1u);
   EXPECT_EQ(rest.sessions[0], b);
   EXPECT_FALSE(rest.more);
@@ -134,7 +134,7 @@ TEST(SessionStore, AMeshWithoutAThreadIsRefusedAndTheNextOneIsNot) {
     EXPECT_EQ(refused.error().code, core::StatusCode::kLimitExceeded);
     EXPECT_NE(refused.error().message.find("thread"), std::string::npos);
   }
-  EXPECT_EQ(store.List(0, 10).sessions.size(), 0u);
+  EXPECT_EQ(store.List(0, 10, "").sessions.size(), 0u);
   EXPECT_TRUE(store.Create(Options()));
 }
 

@@ -60,6 +60,16 @@ class TokenClient {
     }
     return reader->Finish();
   }
+  grpc::Status Download(const std::string& name) {
+    const auto context = Context();
+    v1::DownloadMeshRequest request;
+    request.set_name(name);
+    const auto reader = stub_->DownloadMesh(context.get(), request);
+    v1::DownloadMeshResponse part;
+    while (reader->Read(&part)) {
+    }
+    return reader->Finish();
+  }
   grpc::Status Serve(const std::string& name) {
     const auto context = Context();
     const auto stream = stub_->ServeOracle(context.get());
