@@ -7,10 +7,10 @@ from typing import Callable
 import numpy as np
 
 from ._rows import Array, Flags, apply, norms
+from ._shared import table
 
-_FIRST, _LAST = 0.1, 1e-7  # lengths of steps, in shares of the manifold's size
+_K = table("doctor.toml")
 _WAYS = 2  # that are tried at a time, each forth and back
-_MOST = 200  # rounds
 
 
 def descend(
@@ -32,9 +32,9 @@ def descend(
     """
     random = np.random.default_rng(1)
     p, least = starts.copy(), measure(starts)
-    steps = np.full(len(p), _FIRST * size)
-    for _ in range(_MOST):
-        rows = np.flatnonzero(steps > _LAST * size)
+    steps = np.full(len(p), _K["rank_first_step"] * size)
+    for _ in range(_K["rank_rounds"]):
+        rows = np.flatnonzero(steps > _K["rank_last_step"] * size)
         if not rows.size:
             break
         bases = tangents(p[rows])

@@ -11,7 +11,12 @@ import numpy as np
 from ._derivatives import with_derivatives
 from ._equations import Equations, Solution, solve
 from ._rows import apply, norms, product, transposed
-from .errors import InvalidArgument, NotConverged
+from .errors import InvalidArgument, NotConverged, OracleError
+
+_LOOKS = 64  # points that F is looked at from where none leads to M
+_FEW = 0.25  # of the first batch, fewer of which find M where something is wrong with F
+_ZERO = 1e-6  # of what F is usually, where solvers that find no zero come to one
+_FLAT = 1e-2  # of how steep F is usually, where it is flat
 
 
 class ImplicitManifold:
@@ -76,7 +81,7 @@ class ImplicitManifold:
         self.seeds = seeds
         self.local_size = local_size
         self.thread_safe = thread_safe
-        self._max_iterations = max_iterations
+        self._max_iterations, self._looked = max_iterations, False
         self._scale = float(np.linalg.norm(upper - lower))
         library = jacobian if isinstance(jacobian, str) else None
         if isinstance(jacobian, str):
@@ -161,6 +166,10 @@ class ImplicitManifold:
             y[lost], found[lost] = again, found_again
         return y, found
 
+    def jacobian(self, points: np.ndarray) -> np.ndarray:
+        """F's Jacobian (n, d-k, d) at points (n, d), for stellate.check to see where it loses rank."""
+        return self._equations.jacobian(np.asarray(points, dtype=float))
+
     def tangent_basis(self, points: np.ndarray) -> np.ndarray:
         """Orthonormal bases (n, d, k) of the null space of the Jacobian at points of M."""
         return self._null_space(self._equations.jacobian(np.asarray(points, dtype=float)))
@@ -168,9 +177,45 @@ class ImplicitManifold:
     # Pieces.
 
     def _all_or_raise(self, y: np.ndarray, converged: np.ndarray) -> np.ndarray:
+        if len(y) and not self._looked:
+            self._looked = True
+            if converged.mean() < _FEW:
+                self._insist_on_a_change_of_sign()
         if not converged.all():
             raise NotConverged(y, converged)
         return y
+
+    def _insist_on_a_change_of_sign(self) -> None:
+        """Raises: OracleError where F comes down to zero from wherever it begins, and is flat there."""
+        lower, upper = self.bounding_box
+        random = np.random.default_rng(1)
+        starts = lower + random.random((_LOOKS, self.ambient_dimension)) * (upper - lower)
+        before = np.abs(self._equations.values(starts))
+        y, values, _ = self._descend_to_manifold(starts)
+        usable = np.isfinite(values).all(axis=1)
+        least = np.abs(values) <= _ZERO * np.nanmedian(before, axis=0)
+        if not usable.any() or not least[usable].all(axis=1).mean() > 0.5:
+            return  # where F is zero is found, or it is zero nowhere
+        row = int(np.flatnonzero(usable & least.all(axis=1))[0])
+        around = y[row] + 1e-3 * self._scale * random.standard_normal((_LOOKS, y.shape[1]))
+        signs = np.sign(self._equations.values(around))
+        for number, side in enumerate(signs.T):
+            if (side >= 0).all() or (side <= 0).all():
+                which = "f" if signs.shape[1] == 1 else f"f's value {number}"
+                raise OracleError(
+                    f"{which} touches zero without changing its sign, as near {y[row].tolist()}: |f| is "
+                    "least there, as a square is, or a distance without a sign, and its gradient is zero "
+                    "or has none. Give what is squared, or a signed distance",
+                    "ORACLE_TOUCHES_ZERO",
+                )
+        steep = [np.abs(self._equations.jacobian(x)).max(axis=(1, 2)) for x in (starts, y)]
+        if not np.nanmedian(steep[1]) <= _FLAT * np.nanmedian(steep[0]):
+            return
+        raise OracleError(
+            f"f is flat where it is zero, as near {y[row].tolist()}: its gradient vanishes with it, as a "
+            "cube's does. Give what is raised to a power",
+            "ORACLE_TOUCHES_ZERO",
+        )
 
     def _null_space(self, jacobian: np.ndarray) -> np.ndarray:
         jacobian = np.where(

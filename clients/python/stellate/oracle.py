@@ -36,6 +36,8 @@ class Oracle(Protocol):
       clearances(points (n, d)) -> (n, walls): the g_i, of which the sign counts.
       conormals(points (n, d), face) -> (n, len(face), d): at points of a face, the outward unit normal
         of each of its walls within the tangent space. stellate.oracles.Clipped has all of these.
+      jacobian(points (n, d)) -> (n, m, d): of the equations that M is given by, if it is. Only
+        stellate.check asks, to find where they lose rank.
       bounding_box: (lower (d,), upper (d,)), where to look for M, or
       seeds: (m, d), points near M, one at least on each component. One of the two is needed.
       thread_safe: True lets several workers call it at once.
@@ -64,6 +66,7 @@ class CheckedOracle:
         self.has_intersect_flat = callable(getattr(oracle, "intersect_flat", None))
         self.has_tangent_basis = callable(getattr(oracle, "tangent_basis", None))
         self.has_local_size = callable(getattr(oracle, "local_size", None))
+        self.has_jacobian = callable(getattr(oracle, "jacobian", None))
         self.walls = self._count_walls(oracle)
         self.bounding_box = _box(getattr(oracle, "bounding_box", None))
         self.seeds = _seeds(getattr(oracle, "seeds", None))
@@ -157,6 +160,14 @@ class CheckedOracle:
     def sizes(self, points: np.ndarray, found: np.ndarray) -> np.ndarray:
         """(n, d) -> (n,) lengths; the rows that were not found hold any."""
         return self._at_found("local_size", points, found, np.ones(()))
+
+    def jacobians(self, points: np.ndarray) -> np.ndarray:
+        """(n, d) -> (n, m, d), for any m."""
+        with self._one_at_a_time:
+            answer = np.asarray(self._oracle.jacobian(points))
+        rows = answer.shape[1] if answer.ndim == 3 else 1
+        shape = (len(points), rows, self.ambient_dimension)
+        return _numbers("jacobian", answer, shape, np.ones(len(points), dtype=bool))
 
     def _at_found(
         self, method: str, points: np.ndarray, found: np.ndarray, anywhere: np.ndarray, *more: Any

@@ -42,3 +42,10 @@ def torus(columns: int = 12, rows: int = 7) -> stellate.Mesh:
     upper = np.stack([at(u, v), at(u + 1, v + 1), at(u, v + 1)], axis=-1).reshape(-1, 3)
     triangles = np.sort(np.concatenate([lower, upper]), axis=1)
     return stellate.Mesh(points, triangles[np.lexsort(triangles.T[::-1])])
+
+
+def equation(f):
+    """A surface in a cube, by one equation."""
+    return stellate.ImplicitManifold(
+        f, ambient_dimension=3, dimension=2, bounding_box=([-1.4] * 3, [1.4] * 3)
+    )

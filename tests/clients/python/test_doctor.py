@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 import stellate
+from shapes import equation
 from stellate import manifolds, oracles
 from stellate._command_line import main
 from stellate._doctor.findings import all_words
@@ -182,6 +183,10 @@ BROKEN = {
     "TANGENT_WRONG": Torus(tangent_basis=turned),
     "SIZE_WRONG": Torus(local_size=lambda p: np.where(p[:, 0] > 0, 0.4, -0.4)),
     "SIZE_CHANGES": Torus(local_size=lambda p: 0.4 + 0.001 / np.full(len(p), len(p))),
+    "TOUCHES_ZERO": equation(lambda x: ((x * x).sum(axis=1) - 1) ** 2),
+    "SINGULAR": equation(
+        lambda x: (x * x).sum(axis=1) ** 2 - x[:, 0] ** 2 + x[:, 1] ** 2 + x[:, 2] ** 2
+    ),
     "ROUGH": Torus(
         closest_point=cube,
         tangent_basis=None,

@@ -237,3 +237,47 @@ def test_credentials_say_where_they_are_given(capsys):
     shown = capsys.readouterr().out
     for words in ("stellate.mesh(oracle", "credentials=", "InvalidArgument", "not shown by repr"):
         assert words in shown
+
+
+TOUCHING = {
+    "square": lambda x: sphere(x) ** 2,
+    "minus a square": lambda x: -(sphere(x) ** 2),
+    "fourth power": lambda x: sphere(x) ** 4,
+    "distance without a sign": lambda x: np.abs(sphere(x)),
+}
+
+
+@pytest.mark.parametrize("name", TOUCHING)
+@pytest.mark.parametrize("taker", ["ImplicitManifold", "SignedDistance"])
+def test_a_minimum_at_zero_is_told(taker, name):
+    make, _ = TAKERS[taker]
+    with pytest.raises(stellate.OracleError, match="touches zero without changing") as caught:
+        ask(make(TOUCHING[name]))
+    assert caught.value.reason == "ORACLE_TOUCHES_ZERO"
+    place = str(caught.value).split("near [")[1].split("]")[0]
+    assert np.linalg.norm([float(c) for c in place.split(",")]) == pytest.approx(1, abs=1e-2)
+    report = stellate.check(make(TOUCHING[name]))
+    assert report.codes[0] == "TOUCHES_ZERO"
+
+
+def test_the_equation_that_touches_zero_is_named():
+    def f(x):
+        return np.stack([norm2(x[:, :2]) - 1, (norm2(x[:, 2:]) - 1) ** 2], axis=1)
+
+    oracle = stellate.ImplicitManifold(
+        f, ambient_dimension=4, dimension=2, bounding_box=([-1.5] * 4, [1.5] * 4)
+    )
+    with pytest.raises(stellate.OracleError, match="f's value 1 touches zero"):
+        ask(oracle)
+
+
+def test_a_cube_is_flat_where_it_is_zero():
+    with pytest.raises(stellate.OracleError, match="f is flat where it is zero"):
+        ask(implicit(lambda x: sphere(x) ** 3))
+
+
+def test_solvers_that_fail_elsewhere_accuse_nobody():
+    with pytest.raises(stellate.NotConverged):
+        implicit(lambda x: norm2(x) - 1).closest_point(np.zeros((3, 3)))
+    with pytest.raises(stellate.NotConverged):
+        ask(implicit(lambda x: norm2(x) + 1))

@@ -12,6 +12,7 @@ import numpy as np
 
 from .._shared import table
 from ..errors import InvalidArgument, OracleError
+from .equations import examine_rank
 from .findings import CheckReport, Finding
 from .probe import Probe, Stop, norms
 from .walls import WallProbe
@@ -66,7 +67,9 @@ class _Examination:
         except (InvalidArgument, OracleError) as error:
             raise Stop(Finding.of("WRONG_SHAPE", what=str(error))) from None
         probe.find_points(self.add)
-        for line in _K["laws"]:
+        laws = list(_K["laws"])
+        after = 1 + laws.index("answers_are_closest")
+        for line in [*laws[:after], *_K["laws_of_equations"], *laws[after:]]:
             name, *passed_over = line.split()  # "unless" and codes
             if probe.fills_space and name in _K["of_normals"]:
                 continue
@@ -222,6 +225,10 @@ class _Examination:
         if row is not None:
             self.add(Finding.of("TANGENT_WRONG", query=probe.some[row], degrees=turned[row]))
         probe.trusts_given = row is None and "TANGENT_NOT_ORTHONORMAL" not in self._findings
+
+    def _equations_have_rank(self, probe: Probe) -> None:
+        if probe.has_jacobian and probe.size > 0:
+            examine_rank(probe, self.add)
 
     def _walls_are_right(self, probe: Probe) -> None:
         if probe.walls:

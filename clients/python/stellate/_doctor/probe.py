@@ -15,6 +15,10 @@ from .findings import Finding
 _K: Mapping[str, Any] = table("doctor.toml")
 
 
+# What an oracle's own complaints are found as; others are of what it answered.
+_CODES = {"ORACLE_NOT_FINITE": "NOT_FINITE", "ORACLE_TOUCHES_ZERO": "TOUCHES_ZERO"}
+
+
 class Stop(Exception):
     """A finding that leaves nothing to go on with."""
 
@@ -44,6 +48,7 @@ class Probe:
         self.has_tangent_basis = checked.has_tangent_basis
         self.has_intersect_flat = checked.has_intersect_flat
         self.has_local_size = checked.has_local_size
+        self.has_jacobian = checked.has_jacobian
         self.walls = checked.walls
         self.fills_space = self.dimension == self.ambient_dimension
         self.random = np.random.default_rng(seed)
@@ -68,6 +73,9 @@ class Probe:
         everywhere = np.ones(len(p), dtype=bool)
         return self._ask("local_size", self._oracle.sizes, p, everywhere)
 
+    def jacobian(self, p: np.ndarray) -> np.ndarray:
+        return self._ask("jacobian", self._oracle.jacobians, p)
+
     def face(self, x: np.ndarray, face: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
         return self._ask("face_point", lambda at: self._oracle.face_points(at, face), x)
 
@@ -87,7 +95,7 @@ class Probe:
         try:
             return ask(*arguments)
         except OracleError as error:
-            code = "NOT_FINITE" if error.reason == "ORACLE_NOT_FINITE" else "WRONG_SHAPE"
+            code = _CODES.get(error.reason, "WRONG_SHAPE")
             raise Stop(Finding.of(code, what=str(error))) from error
         except Exception as error:
             what = f"{type(error).__name__}: {error}"
