@@ -21,7 +21,7 @@ namespace stellate::core {
 //   1. points inside simplices, vertices, coverage probes, small steps that hold given tangent
 //      spaces against closest points, and the first step of the balls;
 //   2. tangents at the probes' closest points, by differences, if the oracle sends none; the second
-//      step of the balls; steps over what may be rims;
+//      step of the balls; steps over what may be rims; shorter steps where small ones went wrong;
 //   of a thorough audit, also balls at the barycentres' closest points, a round later.
 // All answers, and those that were known before, are then held against the mesh.
 class Certifier::Impl {
@@ -115,8 +115,7 @@ class Certifier::Impl {
           c.coverage.JudgeProbes(asked, a);
         },
         x_.spec.oracle.tangent_basis);
-    Ask(c.closeness.TangentQuestions(),
-        [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.closeness.JudgeTangents(a); });
+    AskTangents();
     AskBalls();
     if (boundary_) AskOnWalls();
   }
@@ -143,6 +142,7 @@ class Certifier::Impl {
     if (first && !x_.spec.oracle.tangent_basis)
       Ask(c.coverage.DifferenceQuestions(),
           [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.coverage.JudgeDifferences(a); });
+    AskTangents();
     if (ball_steps_ < kMaxBallSteps) AskBalls();
     if (ball_steps_ <= kMaxBallSteps)
       AskWithin(c.reach.FootQuestions(),
@@ -150,6 +150,12 @@ class Certifier::Impl {
     Ask(c.closeness.RimQuestions(),
         [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.closeness.JudgeRims(a); });
     if (blocks_.empty()) Finish();
+  }
+
+  void AskTangents() {
+    Claims& c = *claims_;
+    Ask(c.closeness.TangentQuestions(),
+        [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.closeness.JudgeTangents(a); });
   }
 
   void AskBalls() {
@@ -162,6 +168,7 @@ class Certifier::Impl {
     finished_ = true;
     x_.ForgetStars();
     if (claims_) {
+      claims_->closeness.JudgeBends();
       claims_->reach.TellWhatBallsMet();
       claims_->reach.Hold(claims_->coverage.JudgeSeen());
       x_.certificate.answers_held =

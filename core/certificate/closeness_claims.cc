@@ -71,7 +71,7 @@ Eigen::MatrixXd ClosenessClaims::VertexQuestions() const {
 
 Eigen::MatrixXd ClosenessClaims::TangentQuestions() {
   if (!x_.spec.oracle.tangent_basis) return {};
-  tangents_.emplace(x_.mesh, x_.size, x_.spec.random_seed);
+  if (!tangents_) tangents_.emplace(x_);
   return tangents_->Questions();
 }
 
@@ -160,8 +160,14 @@ void ClosenessClaims::JudgeInside(const Eigen::MatrixXd& asked, const AnswerBloc
 }
 
 void ClosenessClaims::JudgeTangents(const AnswerBlock& answer) {
-  std::string problem = tangents_->Judge(answer, x_.position_error);
+  std::string problem = tangents_->Judge(answer);
   if (!problem.empty()) x_.findings.Refuse(Findings::kTangents, std::move(problem));
+}
+
+void ClosenessClaims::JudgeBends() {
+  if (!tangents_) return;
+  for (const TangentCheck::Bend& bend : tangents_->bends())
+    reach_.HoldPoint(bend.vertex, bend.y, TangentCheck::kTolerance);
 }
 
 void ClosenessClaims::JudgeRims(const AnswerBlock& answer) {

@@ -22,13 +22,14 @@ class ClosenessClaims {
 
   Eigen::MatrixXd InsideQuestions() const;
   Eigen::MatrixXd VertexQuestions() const;
-  Eigen::MatrixXd TangentQuestions();  // none where the oracle gives no tangents
+  Eigen::MatrixXd TangentQuestions();  // none where the oracle gives no tangents, or all is told
   Eigen::MatrixXd RimQuestions() { return rims_.Questions(x_.position_error); }
 
   // Sets the examination's position_error, which all other judgements need.
   void JudgeVertices(const AnswerBlock& answer);
   void JudgeInside(const Eigen::MatrixXd& asked, const AnswerBlock& answer);
   void JudgeTangents(const AnswerBlock& answer);
+  void JudgeBends();  // once there are no more TangentQuestions
   void JudgeRims(const AnswerBlock& answer);
   void JudgeDeviation();
   const std::vector<std::uint32_t>& simplices() const { return simplices_; }

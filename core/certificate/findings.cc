@@ -20,7 +20,7 @@ std::string TooCoarse(double ratio, double reach, const std::string& where) {
       where.empty() ? "" : ", which was seen ", where,
       ": the manifold bends that sharply, or comes so near to itself, there; take epsilon "
       "at most ",
-      Brief(0.4 * reach));
+      Brief(kAdvised * reach));
 }
 
 void Findings::Refuse(Subject subject, std::string problem) {
@@ -28,6 +28,11 @@ void Findings::Refuse(Subject subject, std::string problem) {
                                       [](const Problem& p, Subject s) { return p.subject < s; });
   if (place != problems_.end() && place->subject == subject) return;
   problems_.insert(place, {subject, std::move(problem)});
+}
+
+bool Findings::IsOnlyTooCoarse(double epsilon_over_reach) const {
+  return problems_.size() == 1 && problems_.front().subject == kReach &&
+         epsilon_over_reach <= kNearlyFine;
 }
 
 bool Findings::MayBeBoundary() const {
@@ -90,6 +95,11 @@ void Findings::Conclude(int k, const Specification& spec, Certificate& certifica
       certificate.verdict += Message(" Other checks failed too (", problems_.size() - 1,
                                      "), next: ", problems_[1].text, ".");
     }
+    certificate.only_too_coarse = IsOnlyTooCoarse(certificate.epsilon_over_reach);
+    if (certificate.only_too_coarse)
+      certificate.verdict +=
+          " Nothing that was seen contradicts the mesh: it may be right, and is too coarse to "
+          "certify.";
     if (spec.walls == 0 && MayBeBoundary()) certificate.verdict += Message(" ", kDeclareWalls, ".");
     return;
   }

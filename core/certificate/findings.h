@@ -14,6 +14,10 @@ namespace stellate::core {
 
 // Mesh size over reach: up to this, meshing was seen to work reliably; coarser meshes are refused.
 inline constexpr double kCoarse = 0.8;
+// Up to this, what is refused for its size alone is mostly right.
+inline constexpr double kNearlyFine = 1.5;
+// What is advised instead: the reach is estimated from above.
+inline constexpr double kAdvised = 0.4;
 
 // That a mesh is `ratio` times as coarse as a reach, and what to do; `where` it was seen, or empty.
 std::string TooCoarse(double ratio, double reach, const std::string& where);
@@ -59,6 +63,8 @@ class Findings {
   bool clean() const { return problems_.empty(); }
   // Whether an unannounced boundary may be behind one of the problems.
   bool MayBeBoundary() const;
+  // Whether that is all that speaks against it, and not so much that little else could be seen.
+  bool IsOnlyTooCoarse(double epsilon_over_reach) const;
   // Sets certified, level, verdict and warnings from these findings and the certificate's values.
   void Conclude(int k, const Specification& spec, Certificate& certificate) const;
 

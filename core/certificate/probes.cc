@@ -161,23 +161,22 @@ Eigen::MatrixXd PointsInside(const MeshView& mesh, const SimplexList& list,
 Eigen::MatrixXd CoverageProbes(const Specification& spec, const MeshView& mesh,
                                const SimplexList& list, double push) {
   Random random(spec.random_seed, kProbeStream);
-  std::vector<Eigen::VectorXd> probes;
-  for (int n = 0; n < kProbesOfAKind; ++n) {
-    const auto s = static_cast<std::uint32_t>(random.Next() % list.size());
-    probes.push_back(PointNearSimplex(mesh, list[s], push, random));
-  }
-
   auto [lower, upper] = BoxOf(mesh);
   const double margin = kBoxMargin * (upper - lower).norm();
   lower.array() -= margin;
   upper.array() += margin;
-  for (int n = 0; n < kProbesOfAKind; ++n) probes.push_back(PointInBox(lower, upper, random));
-
-  if (spec.bounding_box) {
-    for (int n = 0; n < kProbesOfAKind; ++n) {
-      probes.push_back(PointInBox(spec.bounding_box->lower, spec.bounding_box->upper, random));
-    }
-  }
+  const int kinds = spec.bounding_box ? 3 : 2;
+  const auto probe = [&](int kind) -> Eigen::VectorXd {
+    if (kind == 1) return PointInBox(lower, upper, random);
+    if (kind == 2) return PointInBox(spec.bounding_box->lower, spec.bounding_box->upper, random);
+    const auto s = static_cast<std::uint32_t>(random.Next() % list.size());
+    return PointNearSimplex(mesh, list[s], push, random);
+  };
+  std::vector<Eigen::VectorXd> probes;
+  for (int kind = 0; kind < kinds; ++kind)
+    for (int n = 0; n < kProbesOfAKind; ++n) probes.push_back(probe(kind));
+  for (std::uint64_t n = probes.size(); n < mesh.vertices / kVerticesAProbe; ++n)
+    probes.push_back(probe(static_cast<int>(n % static_cast<std::uint64_t>(kinds))));
   const Eigen::Index seeds = std::min<Eigen::Index>(spec.seeds.cols(), kProbesOfAKind);
   for (Eigen::Index n = 0; n < seeds; ++n) {
     probes.push_back(spec.seeds.col(n * spec.seeds.cols() / seeds));

@@ -11,12 +11,14 @@
 
 namespace stellate::core {
 
-// Where the certifier looks. Their numbers bound the queries of a certificate, about 5000 in all,
-// whatever the size of the mesh; the checks that need no oracle see the whole mesh.
+// Where the certifier looks. Their numbers bound the queries of a certificate: about 5000, and a
+// probe for so many vertices of a large mesh, which is a fiftieth of what it took; the checks that
+// need no oracle see the whole mesh.
 inline constexpr std::uint32_t kMaxBarycentres = 2000;     // random ones, or all when no more
 inline constexpr std::uint32_t kExtremeBarycentres = 100;  // of largest diameter; of largest tilt
 inline constexpr std::uint32_t kMaxVertexProbes = 256;
 inline constexpr int kProbesOfAKind = 80;  // near the mesh; its box; the client's box; its seeds
+inline constexpr std::uint64_t kVerticesAProbe = 50;  // of the first three kinds in turn
 inline constexpr int kBallCount = 64;
 inline constexpr int kMaxBallSteps = 2;
 // Balls of this radius, in mesh sizes, on either side of every eighth vertex, a bounded number of
@@ -45,7 +47,8 @@ Eigen::MatrixXd PointsInside(const MeshView& mesh, const SimplexList& list,
                              const std::vector<std::uint32_t>& chosen, int each);
 
 // Points whose closest points on M the mesh must cover: points of simplices pushed up to `push` in
-// random ambient directions, random points of the mesh's own box and of the client's, and seeds.
+// random ambient directions, random points of the mesh's own box and of the client's, and seeds; of
+// the first three at least one for kVerticesAProbe vertices.
 Eigen::MatrixXd CoverageProbes(const Specification& spec, const MeshView& mesh,
                                const SimplexList& list, double push);
 

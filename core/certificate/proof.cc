@@ -258,12 +258,14 @@ std::string DescribeLeaning(const MeshView& mesh, const SimplexList& list, const
 
 }  // namespace
 
+double Blame(const ReachClaim& claim, double length, double noise) {
+  // Positions that are wrong by `noise` change `away` by twice that, and the length by as much.
+  return (2 + 2 * length / claim.reach) * noise + std::sin(claim.tangent_error) * length;
+}
+
 bool Contradicts(const ReachClaim& claim, double length, double away, double noise) {
   const double allowed = length * length / (2 * claim.reach);
-  // Positions that are wrong by `noise` change `away` by twice that, and the length by as much.
-  const double blame =
-      (2 + 2 * length / claim.reach) * noise + std::sin(claim.tangent_error) * length;
-  return away * (1 - kLengthMargin) > allowed * (1 + kLengthMargin) + blame;
+  return away * (1 - kLengthMargin) > allowed * (1 + kLengthMargin) + Blame(claim, length, noise);
 }
 
 Proof ProveFromReach(const MeshView& mesh, const Stars& stars, const MeshShape& shape,

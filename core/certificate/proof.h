@@ -34,6 +34,8 @@ struct ReachClaim {
 // is at most length^2 / 2r. Whether it is more, beyond what the claim's tangents and positions that
 // are wrong by `noise` could be blamed for.
 bool Contradicts(const ReachClaim& claim, double length, double away, double noise);
+// How much of `away` the claim's tangents and positions wrong by `noise` may be to blame for.
+double Blame(const ReachClaim& claim, double length, double noise);
 
 struct Proof {
   bool holds = false;

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 
 #include "core/base/message.h"
@@ -16,6 +17,11 @@ namespace {
 
 // Two points of M so much nearer to each other than the mesh size are on two sides of something.
 constexpr double kThin = 0.25;
+// Of the places that were looked at: where no more are too coarse, sizes that follow the manifold
+// are cheaper than a smaller epsilon.
+constexpr double kFewPlaces = 0.5;
+// What is too coarse by less costs little everywhere.
+constexpr double kMuchFiner = 2;
 
 // Whether a point at this distance, so far off a tangent space, both squared, may bound the reach
 // by less than `reach`, or rounding hides whether it does.
@@ -27,9 +33,12 @@ bool MayBound(double length2, double away2, double reach) {
 }  // namespace
 
 ReachClaims::ReachClaims(Examination& examination, const StarGeometry& stars)
-    : x_(examination), balls_(x_.mesh, x_.longest_edge), reach_(stars.reach) {
-  narrowest_ = {stars.narrowest_p,
-                (x_.Vertex(stars.narrowest_p) - x_.Vertex(stars.narrowest_q)).norm()};
+    : x_(examination),
+      balls_(x_.mesh, x_.longest_edge),
+      edge_p_(stars.narrowest_p),
+      edge_q_(stars.narrowest_q),
+      reach_(stars.reach) {
+  narrowest_ = {edge_p_, (x_.Vertex(edge_p_) - x_.Vertex(edge_q_)).norm()};
   if (x_.spec.declared_reach) HoldDeclared(stars);
   if (x_.thorough()) feet_.emplace(x_.mesh, x_.longest_edge);
   balls_.AddLadders(x_.spec.random_seed, kBallCount);
@@ -44,8 +53,8 @@ ReachClaims::ReachClaims(Examination& examination, const StarGeometry& stars)
 void ReachClaims::HoldDeclared(const StarGeometry& stars) {
   const double reach = *x_.spec.declared_reach;
   declared_.emplace(
-      x_.mesh, ReachClaim{reach, std::asin(std::min(1.0, x_.facts.tangent_error_length / reach))});
-  if (std::isfinite(stars.reach)) declared_->HoldAgainstEdge(stars.narrowest_p, stars.narrowest_q);
+      x_.mesh, ReachClaim{reach, std::asin(std::min(1.0, x_.facts.tangent_error_length / reach))},
+      x_.spec.oracle.tangent_basis);
   if (x_.certificate.closed && stars.unembedded_stars == 0) declared_->Prove(*x_.stars, x_.shape);
 }
 
@@ -75,7 +84,7 @@ Eigen::MatrixXd ReachClaims::TangentsUnder(const std::uint32_t* ids) const {
 
 void ReachClaims::HoldFoot(const std::uint32_t* ids, double circumradius, double distance,
                            const Eigen::VectorXd& y, std::optional<std::uint64_t> number) {
-  if (declared_) declared_->HoldAgainstDistance(ids, circumradius, distance);
+  if (declared_) declared_->HoldAgainstDistance(ids, circumradius, distance, x_.position_error);
   if (feet_ && number)
     feet_->AddPair(ids, y, TangentsUnder(ids), kPairRadius * x_.LocalSize(ids[0]),
                    ~(Mix64(x_.spec.random_seed) + *number));
@@ -93,13 +102,25 @@ void ReachClaims::HoldFoot(const std::uint32_t* ids, double circumradius, double
   }
 }
 
+void ReachClaims::HoldPoint(std::uint32_t v, const Eigen::VectorXd& y, double tilt) {
+  const Eigen::VectorXd step = y - x_.Vertex(v);
+  const auto tangent = x_.Tangents(v);
+  const double length = step.norm();
+  const double away =
+      (step - tangent * (tangent.transpose() * step)).norm() - tilt * length - x_.position_error;
+  if (!(away > 0)) return;
+  const double reach = ReachBound(length * length, away);
+  coarseness_ = std::max(coarseness_, x_.longest_edge[v] * std::numbers::inv_sqrt3 / reach);
+  Take(reach, {v, length});
+}
+
 void ReachClaims::TellWhatBallsMet() {
   x_.seen.insert(x_.seen.end(), balls_.met().begin(), balls_.met().end());
   if (feet_) x_.seen.insert(x_.seen.end(), feet_->met().begin(), feet_->met().end());
 }
 
 void ReachClaims::Hold(const Evidence& evidence) {
-  coarseness_ = evidence.coarseness;
+  coarseness_ = std::max(coarseness_, evidence.coarseness);
   Take(evidence.reach, {evidence.vertex, evidence.distance});
 }
 
@@ -107,6 +128,17 @@ void ReachClaims::Take(double reach, Narrow where) {
   if (reach >= reach_) return;
   reach_ = reach;
   narrowest_ = where;
+}
+
+// What else than a smaller epsilon would do.
+std::string ReachClaims::Cure(double ratio) const {
+  const std::optional<double>& rate = x_.spec.criteria.size_rate;
+  if (x_.graded() && rate)
+    return Message(", or size_rate at most ", Brief(*rate * kAdvised / ratio));
+  // A ball on one of two sides sees a bend.
+  if (ratio < kMuchFiner * kCoarse || 2 * balls_.coarse_share() >= kFewPlaces) return {};
+  return Message(", or, if it bends so sharply in a few places only, size_rate ", kAdvised,
+                 ", which makes the mesh finer there alone");
 }
 
 void ReachClaims::Judge() {
@@ -126,6 +158,7 @@ void ReachClaims::Judge() {
               TooCoarse(ratio, reach_,
                         Message("near vertex ", narrowest_.vertex, " at ",
                                 NamePoint(x_.Vertex(narrowest_.vertex)))),
+              Cure(ratio),
               narrowest_.across < kThin * x_.size
                   ? Message(". Two points of it there are only ", Brief(narrowest_.across),
                             " apart: if nothing so thin should be there, check the dimension (a "
@@ -135,8 +168,12 @@ void ReachClaims::Judge() {
 
 void ReachClaims::JudgeDeclared() {
   if (!declared_) return;
-  declared_->HoldAgainstBall(balls_.narrowest(), balls_.reach(), balls_.distance());
-  declared_->Conclude(x_.position_error, x_.facts.covers_box, x_.findings, x_.certificate);
+  const double noise = x_.position_error;
+  if (edge_p_ != edge_q_) declared_->HoldAgainstEdge(edge_p_, edge_q_, noise);
+  declared_->HoldAgainstBall(balls_.narrowest(), balls_.reach(), balls_.distance(), noise);
+  // Whatever else was seen: a point of M and a tangent space make a ball, too.
+  declared_->HoldAgainstBall(narrowest_.vertex, reach_, narrowest_.across, noise);
+  declared_->Conclude(x_.facts.covers_box, x_.findings, x_.certificate);
 }
 
 }  // namespace stellate::core

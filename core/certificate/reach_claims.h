@@ -34,6 +34,8 @@ class ReachClaims {
 
   // Points that the balls met are seen then, too.
   void TellWhatBallsMet();
+  // The point y of M, seen from vertex v, whose tangent space is right to a sine of `tilt`.
+  void HoldPoint(std::uint32_t v, const Eigen::VectorXd& y, double tilt);
   void Hold(const Evidence& evidence);
 
   void Judge();
@@ -47,13 +49,15 @@ class ReachClaims {
   };
   void Take(double reach, Narrow where);
   void HoldDeclared(const StarGeometry& stars);
+  std::string Cure(double ratio) const;
   Eigen::MatrixXd TangentsUnder(const std::uint32_t* ids) const;
 
   Examination& x_;
   ShrinkingBalls balls_;
   std::optional<ShrinkingBalls> feet_;
   std::optional<DeclaredReach> declared_;
-  double reach_;  // at most
+  std::uint32_t edge_p_, edge_q_;  // of the edge that bounds the reach most
+  double reach_;                   // at most
   Narrow narrowest_;
   double coarseness_ = 0;
 };

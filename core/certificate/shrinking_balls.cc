@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/certificate/evidence.h"
+#include "core/certificate/findings.h"
 #include "core/certificate/probes.h"
 #include "core/geometry/reach_bound.h"
 
@@ -50,7 +51,7 @@ void ShrinkingBalls::AddLadders(std::uint64_t random_seed, int count) {
     ball.vertex = static_cast<std::uint32_t>(random.Next() % mesh_.vertices);
     ball.rungs = kLadder;
     ball.radius = (box.upper - box.lower).norm() / 2;
-    if (AimAcross(TangentsOf(ball.vertex), random, &ball)) active_.push_back(std::move(ball));
+    if (AimAcross(TangentsOf(ball.vertex), random, &ball)) Add(std::move(ball));
   }
 }
 
@@ -84,9 +85,9 @@ void ShrinkingBalls::AddBothSides(Ball ball, const Eigen::MatrixXd& tangents,
                                   std::uint64_t random_key) {
   Random random(random_key, 0x70616972);
   if (!AimAcross(tangents, random, &ball)) return;
-  active_.push_back(ball);
+  Add(ball);
   ball.normal = -ball.normal;
-  active_.push_back(std::move(ball));
+  Add(std::move(ball));
 }
 
 Eigen::MatrixXd ShrinkingBalls::Centres() const {
@@ -124,7 +125,10 @@ void ShrinkingBalls::Absorb(const Eigen::MatrixXd& nearest, const std::vector<st
       across = distance;
     }
     if (std::isinf(narrowest)) continue;
-    coarseness_ = std::max(coarseness_, edge * std::numbers::inv_sqrt3 / narrowest);
+    const double coarseness = edge * std::numbers::inv_sqrt3 / narrowest;
+    coarseness_ = std::max(coarseness_, coarseness);
+    coarse_ += !ball.is_coarse && coarseness > kCoarse;
+    ball.is_coarse |= coarseness > kCoarse;
     if (narrowest < reach_) {
       reach_ = narrowest;
       narrowest_ = ball.vertex;

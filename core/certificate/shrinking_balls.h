@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "core/base/random.h"
@@ -47,6 +48,10 @@ class ShrinkingBalls {
   double distance() const { return distance_; }  // from there to where the ball touches M again
   // The largest circumradius, told from a vertex's longest edge, over the ball's radius there.
   double coarseness() const { return coarseness_; }
+  // Of all balls, those that settle where that is more than a mesh may be (kCoarse).
+  double coarse_share() const {
+    return added_ > 0 ? static_cast<double>(coarse_) / static_cast<double>(added_) : 0;
+  }
 
  private:
   struct Ball {
@@ -56,11 +61,16 @@ class ShrinkingBalls {
     Eigen::VectorXd point;   // that it touches; empty: the vertex
     Eigen::VectorXd normal;  // unit
     double tilt = 0;         // sine of the angle that the normal may be wrong by
+    bool is_coarse = false;
   };
   void AddBothSides(Ball ball, const Eigen::MatrixXd& tangents, std::uint64_t random_key);
   // How far a direction is from being normal at a vertex: the sine of the angle.
   double TiltAt(std::uint32_t v, const Eigen::VectorXd& normal) const;
   Eigen::VectorXd PointOf(const Ball& ball) const;
+  void Add(Ball ball) {
+    ++added_;
+    active_.push_back(std::move(ball));
+  }
   bool AimAcross(const Eigen::MatrixXd& tangents, Random& random, Ball* ball) const;
   Eigen::MatrixXd TangentsOf(std::uint32_t v) const;
 
@@ -72,6 +82,7 @@ class ShrinkingBalls {
   double distance_ = 0;
   std::uint32_t narrowest_ = 0;
   double coarseness_ = 0;
+  std::uint64_t added_ = 0, coarse_ = 0;
 };
 
 }  // namespace stellate::core

@@ -104,8 +104,32 @@ TEST(Certifier, AsksAboutAsMuchOfALargeMeshAsOfASmallOne) {
   const HandmadeMesh mesh = Icosphere(6);
   const CertifiedRun run = Certify(SpecificationFor(mesh, 0.03), mesh, ClosestOnSphere);
   EXPECT_TRUE(run.certificate.certified) << run.certificate.verdict;
-  EXPECT_LE(run.queries, 5000);
+  // And a probe, with its differences, for 50 vertices.
+  EXPECT_LE(run.queries, 5000 + 3 * mesh.vertices() / 50);
   EXPECT_LE(run.rounds, 2);
+}
+
+// Components so small that a hundred probes of a large mesh mostly miss them.
+TEST(Certifier, SeesSmallComponentsOfALargeMesh) {
+  const HandmadeMesh mesh = Icosphere(6);
+  int seen = 0;
+  for (int i = 0; i < 6; ++i) {
+    const Eigen::Vector3d centre = 1.1 * Eigen::Vector3d(std::cos(i), std::sin(i), 0.3 * i - 0.7);
+    const auto closest = TwoSpheres(1.1 * centre.normalized(), 0.06);
+    seen += !Certify(SpecificationFor(mesh, 0.03), mesh, closest).certificate.certified;
+  }
+  EXPECT_GE(seen, 5);
+}
+
+TEST(Certifier, SaysOfACoarseMeshThatNothingContradictsIt) {
+  const HandmadeMesh mesh = CrossPolytope(2);
+  const Certificate c = Certify(SpecificationFor(mesh, 0.82), mesh, ClosestOnSphere).certificate;
+  EXPECT_FALSE(c.certified);
+  EXPECT_TRUE(c.only_too_coarse) << c.verdict;
+  EXPECT_TRUE(Says(c.verdict, "Nothing that was seen contradicts the mesh")) << c.verdict;
+  EXPECT_TRUE(Says(c.verdict, "take epsilon at most 0.4")) << c.verdict;
+  EXPECT_FALSE(Certify(SpecificationFor(Icosphere(3), 0.2), Icosphere(3), ClosestOnSphere)
+                   .certificate.only_too_coarse);
 }
 
 TEST(Certifier, TakesTangentsThatRideAlong) {
@@ -234,6 +258,7 @@ TEST(Certifier, RefusesASphereThatStandsForATorus) {
   EXPECT_TRUE(c.links_are_spheres);
   EXPECT_EQ(c.euler_characteristic, 2);
   EXPECT_FALSE(c.certified);
+  EXPECT_FALSE(c.only_too_coarse) << c.verdict;
   EXPECT_GT(c.epsilon_over_reach, 3);
 }
 
