@@ -3,14 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <string>
+
+#include "core/base/infinity.h"
+#include "tests/core/support/nan.h"
 
 namespace stellate::core {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+using testing::kNaN;
 
 // Surfaces in R^3 at a given scale, `far` away from the origin. Flats are vertical lines.
 class CheckAnswersTest : public ::testing::TestWithParam<double> {

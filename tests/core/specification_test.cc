@@ -3,17 +3,17 @@
 #include <gtest/gtest.h>
 
 #include <functional>
-#include <limits>
 #include <string>
 #include <vector>
 
+#include "core/base/infinity.h"
 #include "core/report.h"
+#include "tests/core/support/nan.h"
 
 namespace stellate::core {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+using testing::kNaN;
 
 Specification Good() {
   Specification spec;

@@ -18,18 +18,18 @@ namespace {
 using Eigen::MatrixXd, Eigen::VectorXd;
 using oracles::Ball, oracles::Box, oracles::Clipped, oracles::HalfSpace, oracles::Solid;
 
-struct Case {
+struct DomainCase {
   std::string spec;
   double epsilon;
   int euler;
   size_t walls, edge_faces, corners;  // in the mesh
 };
-void PrintTo(const Case& c, std::ostream* out) { *out << c.spec << " at " << c.epsilon; }
+void PrintTo(const DomainCase& c, std::ostream* out) { *out << c.spec << " at " << c.epsilon; }
 
-class EveryDomain : public Live, public ::testing::WithParamInterface<Case> {};
+class EveryDomain : public Live, public ::testing::WithParamInterface<DomainCase> {};
 
 TEST_P(EveryDomain, IsMeshedUpToItsWalls) {
-  const Case& want = GetParam();
+  const DomainCase& want = GetParam();
   std::string why;
   const auto domain = oracles::MakeDomain(want.spec, &why);
   ASSERT_NE(domain, nullptr) << why;
@@ -53,15 +53,18 @@ TEST_P(EveryDomain, IsMeshedUpToItsWalls) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Catalogue, EveryDomain,
-    ::testing::Values(Case{"hemisphere", 0.3, 1, 1, 0, 0}, Case{"hemisphere:3", 0.5, 1, 1, 0, 0},
-                      Case{"half-torus:1:0.4", 0.16, 0, 1, 0, 0}, Case{"moebius", 0.25, 0, 1, 0, 0},
-                      Case{"ball", 0.5, 1, 1, 0, 0}, Case{"cube", 0.5, 1, 6, 12, 8},
-                      Case{"cube:2", 0.3, 1, 4, 0, 4}, Case{"cylinder", 0.3, 1, 3, 2, 0},
-                      Case{"drilled-cube:0.5", 0.25, 0, 7, 14, 8},
-                      Case{"shell:0.4", 0.2, 2, 2, 0, 0},
-                      Case{"solid-torus:1:0.4", 0.2, 0, 1, 0, 0}));
+INSTANTIATE_TEST_SUITE_P(Catalogue, EveryDomain,
+                         ::testing::Values(DomainCase{"hemisphere", 0.3, 1, 1, 0, 0},
+                                           DomainCase{"hemisphere:3", 0.5, 1, 1, 0, 0},
+                                           DomainCase{"half-torus:1:0.4", 0.16, 0, 1, 0, 0},
+                                           DomainCase{"moebius", 0.25, 0, 1, 0, 0},
+                                           DomainCase{"ball", 0.5, 1, 1, 0, 0},
+                                           DomainCase{"cube", 0.5, 1, 6, 12, 8},
+                                           DomainCase{"cube:2", 0.3, 1, 4, 0, 4},
+                                           DomainCase{"cylinder", 0.3, 1, 3, 2, 0},
+                                           DomainCase{"drilled-cube:0.5", 0.25, 0, 7, 14, 8},
+                                           DomainCase{"shell:0.4", 0.2, 2, 2, 0, 0},
+                                           DomainCase{"solid-torus:1:0.4", 0.2, 0, 1, 0, 0}));
 
 class WallsFromCpp : public Live {};
 

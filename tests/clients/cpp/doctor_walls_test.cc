@@ -57,13 +57,13 @@ std::unique_ptr<Oracle> By(std::vector<Wall> walls) {
   return std::make_unique<Clipped>(Known("sphere:2"), std::move(walls));
 }
 
-struct Broken {
+struct BrokenWall {
   std::string code;
   std::function<std::unique_ptr<Oracle>()> make;
 };
-void PrintTo(const Broken& b, std::ostream* out) { *out << b.code; }
+void PrintTo(const BrokenWall& b, std::ostream* out) { *out << b.code; }
 
-class BrokenWalls : public ::testing::TestWithParam<Broken> {};
+class BrokenWalls : public ::testing::TestWithParam<BrokenWall> {};
 
 TEST_P(BrokenWalls, AreFoundOut) {
   const auto oracle = GetParam().make();
@@ -76,74 +76,80 @@ TEST_P(BrokenWalls, AreFoundOut) {
 INSTANTIATE_TEST_SUITE_P(
     Walls, BrokenWalls,
     ::testing::Values(
-        Broken{"NOTHING_LEFT", [] { return By({HalfSpace(Up(), 5)}); }},
-        Broken{"FACE_OFF_MANIFOLD",
-               [] {
-                 return With(
-                     [](Cut& o) { o.on_face = [](MatrixXd& points) { points.array() += 0.01; }; });
-               }},
-        Broken{"FACE_CLEARANCE", [] { return With([](Cut& o) { o.off = 0.05; }); }},
-        Broken{"FACE_NOT_CLOSEST",
-               [] {
-                 return With(
-                     [](Cut& o) { o.on_face = [](MatrixXd& points) { points.topRows(2) *= -1; }; });
-               }},
-        Broken{"CONORMAL_NOT_UNIT",
-               [] {
-                 return With(
-                     [](Cut& o) { o.on_conormals = [](const MatrixXd&, MatrixXd& n) { n *= 2; }; });
-               }},
-        Broken{"CONORMAL_NOT_TANGENT",
-               [] {
-                 return With([](Cut& o) {
-                   o.on_conormals = [](const MatrixXd& p, MatrixXd& n) { n = 0.96 * n + 0.28 * p; };
-                 });
-               }},
-        Broken{"CONORMAL_INWARD",
-               [] {
-                 return With([](Cut& o) {
-                   o.on_conormals = [](const MatrixXd&, MatrixXd& n) { n *= -1; };
-                 });
-               }},
-        Broken{"CONORMAL_WRONG",
-               [] {
-                 return With([](Cut& o) {
-                   o.on_conormals = [](const MatrixXd& p, MatrixXd& n) {
-                     for (Eigen::Index j = 0; j < n.cols(); ++j) {
-                       const Eigen::Vector3d point = p.col(j), right = n.col(j);
-                       n.col(j) = 0.8 * right + 0.6 * point.cross(right);
-                     }
-                   };
-                 });
-               }},
-        Broken{"WALL_TOUCHES",
-               [] {
-                 MatrixXd seeds(3, 2);
-                 seeds << 0.6, 0.6, 0, 1, 0.01, 0;
-                 return std::make_unique<Clipped>(Known("torus:1:0.4"),
-                                                  std::vector{HalfSpace(VectorXd::Unit(3, 0), 0.6)},
-                                                  seeds);
-               }},
-        Broken{"WALLS_TANGENTIAL",
-               [] {
-                 const VectorXd tilted = Eigen::Vector3d(0.05, 0, 1);
-                 return By({HalfSpace(Up(), -0.1), HalfSpace(tilted, -0.1)});
-               }},
-        Broken{"ACUTE_EDGE",
-               [] {
-                 const VectorXd flat = Eigen::Vector3d(0, 1, 0), steep = Eigen::Vector3d(1, -2, 0),
-                                half = VectorXd::Constant(3, 1.3);
-                 return std::make_unique<Solid>(
-                     std::vector{HalfSpace(flat), HalfSpace(steep), Ball(VectorXd::Zero(3), 1)},
-                     BoundingBox{-half, half});
-               }},
-        Broken{
+        BrokenWall{"NOTHING_LEFT", [] { return By({HalfSpace(Up(), 5)}); }},
+        BrokenWall{"FACE_OFF_MANIFOLD",
+                   [] {
+                     return With([](Cut& o) {
+                       o.on_face = [](MatrixXd& points) { points.array() += 0.01; };
+                     });
+                   }},
+        BrokenWall{"FACE_CLEARANCE", [] { return With([](Cut& o) { o.off = 0.05; }); }},
+        BrokenWall{"FACE_NOT_CLOSEST",
+                   [] {
+                     return With([](Cut& o) {
+                       o.on_face = [](MatrixXd& points) { points.topRows(2) *= -1; };
+                     });
+                   }},
+        BrokenWall{"CONORMAL_NOT_UNIT",
+                   [] {
+                     return With([](Cut& o) {
+                       o.on_conormals = [](const MatrixXd&, MatrixXd& n) { n *= 2; };
+                     });
+                   }},
+        BrokenWall{"CONORMAL_NOT_TANGENT",
+                   [] {
+                     return With([](Cut& o) {
+                       o.on_conormals = [](const MatrixXd& p, MatrixXd& n) {
+                         n = 0.96 * n + 0.28 * p;
+                       };
+                     });
+                   }},
+        BrokenWall{"CONORMAL_INWARD",
+                   [] {
+                     return With([](Cut& o) {
+                       o.on_conormals = [](const MatrixXd&, MatrixXd& n) { n *= -1; };
+                     });
+                   }},
+        BrokenWall{"CONORMAL_WRONG",
+                   [] {
+                     return With([](Cut& o) {
+                       o.on_conormals = [](const MatrixXd& p, MatrixXd& n) {
+                         for (Eigen::Index j = 0; j < n.cols(); ++j) {
+                           const Eigen::Vector3d point = p.col(j), right = n.col(j);
+                           n.col(j) = 0.8 * right + 0.6 * point.cross(right);
+                         }
+                       };
+                     });
+                   }},
+        BrokenWall{"WALL_TOUCHES",
+                   [] {
+                     MatrixXd seeds(3, 2);
+                     seeds << 0.6, 0.6, 0, 1, 0.01, 0;
+                     return std::make_unique<Clipped>(
+                         Known("torus:1:0.4"), std::vector{HalfSpace(VectorXd::Unit(3, 0), 0.6)},
+                         seeds);
+                   }},
+        BrokenWall{"WALLS_TANGENTIAL",
+                   [] {
+                     const VectorXd tilted = Eigen::Vector3d(0.05, 0, 1);
+                     return By({HalfSpace(Up(), -0.1), HalfSpace(tilted, -0.1)});
+                   }},
+        BrokenWall{"ACUTE_EDGE",
+                   [] {
+                     const VectorXd flat = Eigen::Vector3d(0, 1, 0),
+                                    steep = Eigen::Vector3d(1, -2, 0),
+                                    half = VectorXd::Constant(3, 1.3);
+                     return std::make_unique<Solid>(
+                         std::vector{HalfSpace(flat), HalfSpace(steep), Ball(VectorXd::Zero(3), 1)},
+                         BoundingBox{-half, half});
+                   }},
+        BrokenWall{
             "FACE_NOT_FOUND",
             [] { return By({Wall{[](const VectorXd& x) { return std::pow(x[2] + 0.1, 3); }}}); }},
-        Broken{"WALL_CUTS_NOTHING",
-               [] {
-                 return By({HalfSpace(Up(), -0.1), HalfSpace(Up(), -5)});
-               }}),
+        BrokenWall{"WALL_CUTS_NOTHING",
+                   [] {
+                     return By({HalfSpace(Up(), -0.1), HalfSpace(Up(), -5)});
+                   }}),
     [](const auto& broken) { return broken.param.code; });
 
 class GoodWalls : public ::testing::TestWithParam<std::string> {};

@@ -6,13 +6,12 @@
 
 #include "core/base/random.h"
 #include "tests/core/certificate/handmade_meshes.h"
+#include "tests/core/support/says.h"
 
 namespace stellate::core {
 namespace {
 
-bool Says(const std::string& text, const std::string& words) {
-  return text.find(words) != std::string::npos;
-}
+using testing::Says;
 
 ClosestPoint OnRevolution(double big, double small) {
   return [big, small](const Eigen::VectorXd& x) { return ClosestOnRevolution(big, small, x); };

@@ -7,13 +7,12 @@
 #include "core/certificate/certifier.h"
 #include "core/geometry/reach_bound.h"
 #include "tests/core/certificate/handmade_meshes.h"
+#include "tests/core/support/says.h"
 
 namespace stellate::core {
 namespace {
 
-bool Says(const std::string& text, const std::string& words) {
-  return text.find(words) != std::string::npos;
-}
+using testing::Says;
 
 // The unit sphere, and another around the same centre.
 ClosestPoint Concentric(double radius) {

@@ -2,16 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
-
+#include "core/base/infinity.h"
 #include "core/base/random.h"
 #include "core/certificate/ball_grid.h"
 #include "tests/core/certificate/handmade_meshes.h"
 
 namespace stellate::core {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::vector<double> RandomPoints(int d, int count, double spread, std::uint64_t seed) {
   Random random(seed);

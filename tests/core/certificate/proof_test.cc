@@ -6,19 +6,18 @@
 
 #include "core/certificate/star_geometry.h"
 #include "tests/core/certificate/handmade_meshes.h"
+#include "tests/core/support/says.h"
 
 namespace stellate::core {
 namespace {
+
+using testing::Says;
 
 Proof Prove(const HandmadeMesh& mesh, double reach, double tangent_error = 0) {
   const Adjacency adjacency(mesh.List());
   const MeshView view = mesh.View();
   const MeshShape shape = MeasureStars(view, adjacency).shape;
   return ProveFromReach(view, adjacency, shape, {reach, tangent_error});
-}
-
-bool Says(const std::string& text, const std::string& words) {
-  return text.find(words) != std::string::npos;
 }
 
 TEST(Proof, ProvesASphereFromItsReach) {

@@ -26,7 +26,7 @@ using testing::Sample;
 using testing::SpecificationFor;
 using testing::TorusGrid;
 
-struct Case {
+struct FilledCase {
   std::string manifold;
   double epsilon;
 };
@@ -52,7 +52,7 @@ std::map<std::array<std::uint32_t, K>, int> FacetsOf(const std::vector<std::uint
 template <int K>
 class Cavities {
  public:
-  explicit Cavities(const Case& c) : manifold_(Make(c.manifold)), epsilon_(c.epsilon) {
+  explicit Cavities(const FilledCase& c) : manifold_(Make(c.manifold)), epsilon_(c.epsilon) {
     Specification spec = SpecificationFor(*manifold_, c.epsilon);
     spec.criteria.judging = Judging::kCommonCentre;
     const DrivenRun run = Drive(spec, *manifold_);
@@ -96,7 +96,7 @@ TEST(CavitiesTest, AreNoneWhereStarsAgree) {
 
 // Judged in flats, stars of the same sample disagree.
 template <int K>
-void ExpectClosedButForUnfilled(const Case& c) {
+void ExpectClosedButForUnfilled(const FilledCase& c) {
   const FilledCavities filled = Cavities<K>(c).Fill(Judging::kFlats);
   EXPECT_GT(filled.inconsistent, 0u);
   EXPECT_GT(filled.cavities, 0u);

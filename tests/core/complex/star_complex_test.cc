@@ -55,13 +55,14 @@ class StarComplexTest : public ::testing::Test {};
 
 // k, and where simplices are judged: what follows holds for both unless it says otherwise.
 template <int K, Judging J>
-struct Case {
+struct Judged {
   static constexpr int kDimension = K;
   static constexpr Judging kJudging = J;
 };
-using Cases = ::testing::Types<Case<1, Judging::kFlats>, Case<2, Judging::kFlats>,
-                               Case<3, Judging::kFlats>, Case<4, Judging::kFlats>,
-                               Case<2, Judging::kCommonCentre>, Case<3, Judging::kCommonCentre>>;
+using Cases =
+    ::testing::Types<Judged<1, Judging::kFlats>, Judged<2, Judging::kFlats>,
+                     Judged<3, Judging::kFlats>, Judged<4, Judging::kFlats>,
+                     Judged<2, Judging::kCommonCentre>, Judged<3, Judging::kCommonCentre>>;
 TYPED_TEST_SUITE(StarComplexTest, Cases);
 
 TYPED_TEST(StarComplexTest, ClipsEachCellByAllThatMatter) {

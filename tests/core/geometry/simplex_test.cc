@@ -4,17 +4,15 @@
 
 #include <Eigen/Dense>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <vector>
 
+#include "core/base/infinity.h"
 #include "core/base/random.h"
 #include "core/geometry/simplex_frame.h"
 
 namespace stellate::core {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Vertices as columns.
 struct Simplex {

@@ -1,5 +1,5 @@
 // Runs held against their records, a file each in this directory: a change of behaviour is a diff
-// of these, which somebody has to read and to explain. `golden_test --rewrite` records anew.
+// of these, which somebody has to read and to explain. `core_golden_test --rewrite` records anew.
 
 #include <gtest/gtest.h>
 
@@ -226,7 +226,7 @@ std::vector<std::string> HowItEnded(const std::string& record) {
 void ExpectRecorded(const GoldenCase& c, const std::string& now) {
   const std::string path = Path(c.name);
   const std::string then = ReadFile(path);
-  ASSERT_FALSE(then.empty()) << "no record " << path << "; golden_test --rewrite writes it";
+  ASSERT_FALSE(then.empty()) << "no record " << path << "; core_golden_test --rewrite writes it";
   const bool exact = AnswersAsRecorded(c);
   const auto was = exact ? Lines(then) : HowItEnded(then);
   const auto is = exact ? Lines(now) : HowItEnded(now);
@@ -235,7 +235,7 @@ void ExpectRecorded(const GoldenCase& c, const std::string& now) {
     const std::string b = i < is.size() ? is[i] : "(no such line)";
     ASSERT_EQ(a, b) << "line " << i + 1 << " of " << path
                     << " is the first that differs. If that is meant, record anew with "
-                       "golden_test --rewrite and say why in the commit.";
+                       "core_golden_test --rewrite and say why in the commit.";
   }
 }
 

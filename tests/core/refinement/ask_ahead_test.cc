@@ -19,17 +19,17 @@ using testing::ExpectGoodMesh;
 using testing::Make;
 using testing::SpecificationFor;
 
-struct Case {
+struct AheadCase {
   std::string manifold;
   double epsilon;
   bool tangents = true;
 };
 
-void PrintTo(const Case& c, std::ostream* out) {
+void PrintTo(const AheadCase& c, std::ostream* out) {
   *out << c.manifold << " epsilon " << c.epsilon << (c.tangents ? "" : " without tangents");
 }
 
-class AskAhead : public ::testing::TestWithParam<Case> {
+class AskAhead : public ::testing::TestWithParam<AheadCase> {
  protected:
   Specification Spec(Manifold& manifold) const {
     Specification spec = SpecificationFor(manifold, GetParam().epsilon);
@@ -73,9 +73,9 @@ TEST_P(AskAhead, IsDeterministicForAnyNumberOfThreads) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Catalogue, AskAhead,
-                         ::testing::Values(Case{"torus", 0.08}, Case{"sphere:2:10", 0.08},
-                                           Case{"torus", 0.1, false}, Case{"rp2", 0.12},
-                                           Case{"two-spheres", 0.15}, Case{"so3", 0.5}));
+                         ::testing::Values(AheadCase{"torus", 0.08}, AheadCase{"sphere:2:10", 0.08},
+                                           AheadCase{"torus", 0.1, false}, AheadCase{"rp2", 0.12},
+                                           AheadCase{"two-spheres", 0.15}, AheadCase{"so3", 0.5}));
 
 // What an oracle gets wrong costs rounds, never the guarantee.
 

@@ -14,17 +14,17 @@ using testing::DrivenRun;
 using testing::Make;
 using testing::SpecificationFor;
 
-struct Case {
+struct CoarseCase {
   std::string manifold;
   double share;  // epsilon, of the reach
   bool tangents;
 };
 
-void PrintTo(const Case& c, std::ostream* out) {
+void PrintTo(const CoarseCase& c, std::ostream* out) {
   *out << c.manifold << " at " << c.share << (c.tangents ? "" : " without tangents");
 }
 
-class CoarseRuns : public ::testing::TestWithParam<Case> {};
+class CoarseRuns : public ::testing::TestWithParam<CoarseCase> {};
 
 // Runs that converge take some dozens of rounds; what ends otherwise does so after a few hundred,
 // and its advice, an epsilon of 0.4 of the reach that it tells, is of use.
@@ -47,11 +47,11 @@ TEST_P(CoarseRuns, EndSoonWithAdviceThatIsOfUse) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Catalogue, CoarseRuns,
-                         ::testing::Values(Case{"so3", 0.85, true}, Case{"so3", 0.85, false},
-                                           Case{"so3", 1.2, true}, Case{"flat-torus:3", 1.3, true},
-                                           Case{"torus:1:0.4", 1.5, false},
-                                           Case{"torus:1:0.4", 3, true}));
+INSTANTIATE_TEST_SUITE_P(
+    Catalogue, CoarseRuns,
+    ::testing::Values(CoarseCase{"so3", 0.85, true}, CoarseCase{"so3", 0.85, false},
+                      CoarseCase{"so3", 1.2, true}, CoarseCase{"flat-torus:3", 1.3, true},
+                      CoarseCase{"torus:1:0.4", 1.5, false}, CoarseCase{"torus:1:0.4", 3, true}));
 
 }  // namespace
 }  // namespace stellate::core

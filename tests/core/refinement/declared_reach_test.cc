@@ -5,6 +5,7 @@
 #include <string>
 
 #include "tests/core/support/in_process_run.h"
+#include "tests/core/support/says.h"
 
 namespace stellate::core {
 namespace {
@@ -12,16 +13,17 @@ namespace {
 using testing::Drive;
 using testing::DrivenRun;
 using testing::Make;
+using testing::Says;
 using testing::SpecificationFor;
 using testing::TopologyOf;
 
-struct Case {
+struct ReachCase {
   std::string manifold;
   double share;  // epsilon, of the reach
   bool tangents = true;
 };
 
-void PrintTo(const Case& c, std::ostream* out) {
+void PrintTo(const ReachCase& c, std::ostream* out) {
   *out << c.manifold << " at " << c.share << (c.tangents ? "" : " without tangents");
 }
 
@@ -29,10 +31,6 @@ Specification Declared(Manifold& manifold, double epsilon, double reach) {
   Specification spec = SpecificationFor(manifold, epsilon);
   spec.declared_reach = reach;
   return spec;
-}
-
-bool Says(const std::string& text, const std::string& words) {
-  return text.find(words) != std::string::npos;
 }
 
 template <typename Closest>
@@ -49,7 +47,7 @@ DrivenRun DriveClosest(const Specification& spec, const Closest& closest) {
   });
 }
 
-class TrueReach : public ::testing::TestWithParam<Case> {};
+class TrueReach : public ::testing::TestWithParam<ReachCase> {};
 
 TEST_P(TrueReach, ProvesTheMesh) {
   const auto manifold = Make(GetParam().manifold);
@@ -72,12 +70,13 @@ TEST_P(TrueReach, ProvesTheMesh) {
 
 INSTANTIATE_TEST_SUITE_P(
     Catalogue, TrueReach,
-    ::testing::Values(Case{"circle:10", 0.4}, Case{"sphere:2:3", 0.4}, Case{"sphere:2:3", 1},
-                      Case{"torus:1:0.4", 0.25}, Case{"torus:1:0.4", 0.25, false},
-                      Case{"torus:1:0.4", 1}, Case{"two-spheres", 0.4},
-                      Case{"ellipsoid:1:0.8:0.6", 0.4}, Case{"clifford-torus", 0.2},
-                      Case{"clifford-torus@20", 0.3, false}, Case{"rp2", 0.3},
-                      Case{"sphere:3:4", 0.4}, Case{"flat-torus:3", 0.4}, Case{"so3", 0.4}));
+    ::testing::Values(ReachCase{"circle:10", 0.4}, ReachCase{"sphere:2:3", 0.4},
+                      ReachCase{"sphere:2:3", 1}, ReachCase{"torus:1:0.4", 0.25},
+                      ReachCase{"torus:1:0.4", 0.25, false}, ReachCase{"torus:1:0.4", 1},
+                      ReachCase{"two-spheres", 0.4}, ReachCase{"ellipsoid:1:0.8:0.6", 0.4},
+                      ReachCase{"clifford-torus", 0.2}, ReachCase{"clifford-torus@20", 0.3, false},
+                      ReachCase{"rp2", 0.3}, ReachCase{"sphere:3:4", 0.4},
+                      ReachCase{"flat-torus:3", 0.4}, ReachCase{"so3", 0.4}));
 
 // Federer's bound of neighbours, or a ball, or a barycentre, tells.
 TEST(DeclaredReach, IsRefutedWhereItIsTooLarge) {

@@ -16,17 +16,17 @@ using testing::Make;
 using testing::SameMesh;
 using testing::SpecificationFor;
 
-struct Case {
+struct RepeatedCase {
   std::string manifold;
   double epsilon;
   bool poor = false;  // closest points alone
 };
 
-void PrintTo(const Case& c, std::ostream* out) {
+void PrintTo(const RepeatedCase& c, std::ostream* out) {
   *out << c.manifold << " epsilon " << c.epsilon << (c.poor ? " poor" : "");
 }
 
-class Determinism : public ::testing::TestWithParam<Case> {
+class Determinism : public ::testing::TestWithParam<RepeatedCase> {
  protected:
   Determinism()
       : manifold_(Make(GetParam().manifold)),
@@ -108,9 +108,11 @@ TEST_P(Determinism, DeltasAddUpToTheMesh) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Catalogue, Determinism,
-                         ::testing::Values(Case{"circle:10", 0.2}, Case{"torus", 0.2},
-                                           Case{"torus", 0.3, true}, Case{"rp2", 0.4},
-                                           Case{"so3", 0.8}, Case{"flat-torus:3", 0.7, true}));
+                         ::testing::Values(RepeatedCase{"circle:10", 0.2},
+                                           RepeatedCase{"torus", 0.2},
+                                           RepeatedCase{"torus", 0.3, true},
+                                           RepeatedCase{"rp2", 0.4}, RepeatedCase{"so3", 0.8},
+                                           RepeatedCase{"flat-torus:3", 0.7, true}));
 
 // A mesh that is made twice as fine, or moved, or measured in other units, is as good.
 

@@ -23,7 +23,7 @@ using testing::ExpectGoodMesh;
 using testing::Make;
 using testing::SpecificationFor;
 
-constexpr int kDimension = 4;
+constexpr int kFilledDimension = 4;
 
 DrivenRun Mesh(Manifold& manifold, double epsilon, std::uint64_t seed) {
   Specification spec = SpecificationFor(manifold, epsilon);
@@ -39,12 +39,13 @@ bool IsFilled(const DrivenRun& run) {
 
 // The last round swaps the fillings in for what the stars disagreed about.
 void ExpectDeltasToTellAll(const DrivenRun& run) {
-  std::set<StarComplex<kDimension>::Simplex> replayed;
+  std::set<StarComplex<kFilledDimension>::Simplex> replayed;
   for (const MeshDelta& delta : run.deltas) {
-    for (const auto& s : AsSet<kDimension>(delta.removed)) EXPECT_EQ(replayed.erase(s), 1u);
-    for (const auto& s : AsSet<kDimension>(delta.added)) EXPECT_TRUE(replayed.insert(s).second);
+    for (const auto& s : AsSet<kFilledDimension>(delta.removed)) EXPECT_EQ(replayed.erase(s), 1u);
+    for (const auto& s : AsSet<kFilledDimension>(delta.added))
+      EXPECT_TRUE(replayed.insert(s).second);
   }
-  EXPECT_EQ(replayed, AsSet<kDimension>(run.mesher->Simplices()));
+  EXPECT_EQ(replayed, AsSet<kFilledDimension>(run.mesher->Simplices()));
 }
 
 TEST(FilledMesh, OfAnEllipsoidIsToldByItsDeltas) {

@@ -28,7 +28,7 @@ double CurvatureRadius(const double* p) {
   return cosine > 0 ? std::min(kTube, from_axis / cosine) : kTube;
 }
 
-void ExpectCertified(const DrivenRun& run, std::int64_t euler_characteristic) {
+void ExpectOneCertified(const DrivenRun& run, std::int64_t euler_characteristic) {
   ASSERT_EQ(run.report().termination, Termination::kConverged);
   EXPECT_TRUE(run.report().certificate.certified) << run.report().certificate.verdict;
   const auto topology = TopologyOf(run.mesher->Simplices(), run.mesher->specification().dimension);
@@ -43,10 +43,10 @@ TEST(GradedSize, FollowsTheCurvatureOfAThinTorus) {
   Specification spec = SpecificationFor(*torus, 0.5);
   spec.criteria.size_rate = rate;
   const DrivenRun graded = Drive(spec, *torus);
-  ExpectCertified(graded, 0);
+  ExpectOneCertified(graded, 0);
   // As fine everywhere as at the hole.
   const DrivenRun uniform = Drive(SpecificationFor(*torus, rate * (1 - kTube)), *torus);
-  ExpectCertified(uniform, 0);
+  ExpectOneCertified(uniform, 0);
   EXPECT_LT(8 * graded.report().counts.vertices, uniform.report().counts.vertices);
   EXPECT_LE(graded.report().certificate.epsilon_over_reach, 1.0);
   EXPECT_TRUE(graded.report().certificate.warnings.empty())
@@ -76,7 +76,7 @@ TEST(GradedSize, SparesMostOfALongEllipsoid) {
   Specification spec = SpecificationFor(*ellipsoid, 0.8);
   spec.criteria.size_rate = 0.4;
   const DrivenRun graded = Drive(spec, *ellipsoid);
-  ExpectCertified(graded, 2);
+  ExpectOneCertified(graded, 2);
   const DrivenRun uniform = Drive(SpecificationFor(*ellipsoid, 0.08), *ellipsoid);
   EXPECT_LT(5 * graded.report().counts.vertices, uniform.report().counts.vertices);
 }
@@ -87,7 +87,7 @@ TEST(GradedSize, KeepsToADeviation) {
     Specification spec = SpecificationFor(*torus, 0.5);
     spec.criteria.max_deviation = deviation;
     const DrivenRun run = Drive(spec, *torus);
-    ExpectCertified(run, 0);
+    ExpectOneCertified(run, 0);
     EXPECT_LE(run.report().certificate.max_barycentre_distance, deviation);
     EXPECT_GT(run.report().certificate.max_barycentre_distance, deviation / 10) << "far too fine";
   }
@@ -116,7 +116,7 @@ TEST(GradedSize, KeepsToADeviationWhereItBendsMoreThanTheVerticesShow) {
       EXPECT_FALSE(c.certified);
       continue;
     }
-    ExpectCertified(run, 2);
+    ExpectOneCertified(run, 2);
     EXPECT_LE(LargestBarycentreDistance(run, *ellipsoid), deviation * (1 + 1e-9));
   }
 }

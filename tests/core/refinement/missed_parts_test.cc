@@ -9,18 +9,16 @@
 #include <vector>
 
 #include "tests/core/support/in_process_run.h"
+#include "tests/core/support/says.h"
 
 namespace stellate::core {
 namespace {
 
 using testing::Drive;
 using testing::DrivenRun;
+using testing::Says;
 
 using Closest = Eigen::VectorXd (*)(const Eigen::VectorXd&);
-
-bool Says(const std::string& text, const std::string& words) {
-  return text.find(words) != std::string::npos;
-}
 
 testing::Answerer AnswererOf(Closest closest) {
   return [closest](const QueryBatch& batch) {

@@ -6,12 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <optional>
 #include <string>
 
+#include "core/base/infinity.h"
 #include "core/base/random.h"
 #include "tests/core/support/in_process_run.h"
+#include "tests/core/support/nan.h"
 
 namespace stellate::core {
 namespace {
@@ -27,8 +28,7 @@ using testing::SameMesh;
 using testing::SpecificationFor;
 using testing::Step;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using testing::kNaN;
 
 // Endings.
 

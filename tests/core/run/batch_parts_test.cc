@@ -17,12 +17,12 @@ using testing::Make;
 using testing::NewMesher;
 using testing::SpecificationFor;
 
-struct Case {
+struct PartsCase {
   std::uint64_t most;
   bool ahead, tangents;
 };
 
-class BatchParts : public ::testing::TestWithParam<Case> {};
+class BatchParts : public ::testing::TestWithParam<PartsCase> {};
 
 TEST_P(BatchParts, NeverExceedTheLimitNorChangeTheMesh) {
   const auto torus = Make("torus");
@@ -50,8 +50,9 @@ TEST_P(BatchParts, NeverExceedTheLimitNorChangeTheMesh) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Limits, BatchParts,
-                         ::testing::Values(Case{64, false, true}, Case{64, true, true},
-                                           Case{37, true, false}, Case{1000, true, true}));
+                         ::testing::Values(PartsCase{64, false, true}, PartsCase{64, true, true},
+                                           PartsCase{37, true, false},
+                                           PartsCase{1000, true, true}));
 
 // A refused answer to a part leaves all as it was: the part can be answered again.
 TEST(BatchParts, AreAskedAgainAfterARefusal) {

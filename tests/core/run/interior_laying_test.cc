@@ -22,8 +22,6 @@ using testing::DrivenRun;
 using testing::SameMesh;
 using namespace stellate::testing;  // NOLINT(google-build-using-namespace): the domains
 
-constexpr double kPi = std::numbers::pi;
-
 core::testing::Answerer Answering(Domain& m) {
   return [&m](const QueryBatch& batch) { return m.AnswersOf(batch); };
 }
@@ -73,19 +71,22 @@ TEST_P(InteriorTest, HasFewerVertices) {
   EXPECT_EQ(SimplicesOf(run, m.k), SimplicesOf(*run.mesher, m.k));
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, InteriorTest,
-    ::testing::Values(Laid{"disc", Disc, 0.05, kPi, 0.6},
-                      Laid{"hemisphere", Hemisphere, 0.05, 1.8 * kPi, 0.6},
-                      Laid{"half a Clifford torus", HalfClifford, 0.1, 1.9 * kPi* kPi, 0.6},
-                      Laid{"ball", Ball, 0.1, 4 * kPi / 3, 0.7},
-                      Laid{"solid torus", SolidTorus, 0.1, 0.72 * kPi* kPi, 0.9},
-                      Laid{"half of S^3", HalfSphere3, 0.2, kPi* kPi, 0.87}),
-    [](const auto& laid) {
-      std::string name = laid.param.name;
-      std::erase_if(name, [](char c) { return !std::isalnum(c); });
-      return name;
-    });
+INSTANTIATE_TEST_SUITE_P(All, InteriorTest,
+                         ::testing::Values(Laid{"disc", Disc, 0.05, std::numbers::pi, 0.6},
+                                           Laid{"hemisphere", Hemisphere, 0.05,
+                                                1.8 * std::numbers::pi, 0.6},
+                                           Laid{"half a Clifford torus", HalfClifford, 0.1,
+                                                1.9 * std::numbers::pi* std::numbers::pi, 0.6},
+                                           Laid{"ball", Ball, 0.1, 4 * std::numbers::pi / 3, 0.7},
+                                           Laid{"solid torus", SolidTorus, 0.1,
+                                                0.72 * std::numbers::pi* std::numbers::pi, 0.9},
+                                           Laid{"half of S^3", HalfSphere3, 0.2,
+                                                std::numbers::pi* std::numbers::pi, 0.87}),
+                         [](const auto& laid) {
+                           std::string name = laid.param.name;
+                           std::erase_if(name, [](char c) { return !std::isalnum(c); });
+                           return name;
+                         });
 
 TEST(InteriorLaying, IsTheSameForAnyThreads) {
   for (const Domain& m : {Ball(), HalfSphere3(), BoxMinusBall()}) {
@@ -141,7 +142,7 @@ TEST(InteriorLaying, MayBeCancelledAnywhere) {
 
 // A wall of two parts, of which the seeds show one: the lattice runs into the other.
 TEST(InteriorLaying, FindsWallsThatNoSeedHasShown) {
-  Domain m = Make(2, 3, 1.3, {1, 1, 0}, {2, 2});
+  Domain m = stellate::testing::Make(2, 3, 1.3, {1, 1, 0}, {2, 2});
   m.equations = {BallOf(Vector3d::Zero(), 1, 1, 3)};
   m.walls = {[](const VectorXd& p, VectorXd* g) {
     if (g) *g = -2 * p[2] * Vector3d::UnitZ();

@@ -34,7 +34,7 @@ Simplices<K> SetOf(const std::vector<std::uint32_t>& ids) {
   return simplices;
 }
 
-struct Case {
+struct PartedCase {
   std::string manifold;
   double epsilon;
   double halo;  // in epsilon: what the stars of the stars around a part's own ones hang on
@@ -45,7 +45,7 @@ struct Case {
 template <int K>
 class Whole {
  public:
-  explicit Whole(const Case& it)
+  explicit Whole(const PartedCase& it)
       : case_(it),
         manifold_(Make(it.manifold)),
         spec_(SpecificationFor(*manifold_, it.epsilon)),
@@ -85,7 +85,7 @@ class Whole {
     return rows;
   }
 
-  const Case case_;
+  const PartedCase case_;
   const std::unique_ptr<Manifold> manifold_;
   const Specification spec_;
   const DrivenRun run_;
@@ -93,7 +93,7 @@ class Whole {
 };
 
 template <int K>
-std::set<Rule> ExpectSameInParts(const Case& it) {
+std::set<Rule> ExpectSameInParts(const PartedCase& it) {
   const Whole<K> whole(it);
   std::set<Rule> rules;
   for (const int parts : {1, 2, 3, 7}) {

@@ -13,7 +13,7 @@ using testing::Octahedron;
 using testing::OnSphere;
 using testing::SphereSpec;
 
-constexpr double kStep = 1e-3;
+constexpr double kTangentStep = 1e-3;
 
 class RoundTripTest : public ::testing::Test {
  protected:
@@ -57,7 +57,7 @@ class RoundTripTest : public ::testing::Test {
   }
 
   Engine<2> engine_;
-  TangentFinder finder_{2, 3, kStep, 1};
+  TangentFinder finder_{2, 3, kTangentStep, 1};
   std::vector<bool> for_tangents_;
 };
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "server/oracles/dispatch.h"
+#include "tests/server/support/at.h"
 
 namespace stellate::server {
 namespace {
@@ -10,7 +11,7 @@ namespace {
 using namespace std::chrono_literals;
 using Claim = Dispatch::ClaimResult;
 
-TimePoint At(Clock::duration since) { return TimePoint{} + since; }
+using testing::At;
 
 // Time is a number here: no test waits.
 class ComparisonsTest : public ::testing::Test {

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "server/oracles/dispatch.h"
+#include "tests/server/support/at.h"
 
 namespace stellate::server {
 namespace {
@@ -16,7 +17,7 @@ using namespace std::chrono_literals;
 using Claim = Dispatch::ClaimResult;
 using Eigen::Index;
 
-TimePoint At(Clock::duration since) { return TimePoint{} + since; }
+using testing::At;
 
 // Time is a number here: no test waits.
 class StragglersTest : public ::testing::Test {
