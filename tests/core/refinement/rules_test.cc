@@ -56,11 +56,17 @@ bool IsInStars(const StarComplex<K>& complex, const Simplex<K>& simplex) {
                      [&](std::uint32_t q) { return StarOf(complex, q).contains(simplex); });
 }
 
-TEST(SizeAndShape, GiveTheWorstSimplexOfTheFirstRuleBroken) {
+// Stars that break R1, those that break R2 alone, those that break neither, and fakes among the
+// first.
+struct SizesAndShapes {
+  int sizes = 0, shapes = 0, fine = 0, fakes = 0;
+};
+
+// Expects of each star the worst simplex of the first rule broken.
+void ExpectWorst(SizesAndShapes* seen) {
   // In a plane the circumradius in T_p is that of the triangle.
   const Sample sample = testing::FlatSample(2, 3, 400, 1);
   const auto complex = Build<2>(sample);
-  int sizes = 0, shapes = 0, fine = 0, fakes = 0;
   for (const double epsilon : {0.03, 0.1, 5.0}) {
     for (const double rho0 : {1.2, 6.0}) {
       for (std::uint32_t p = 0; p < complex->size(); ++p) {
@@ -69,7 +75,7 @@ TEST(SizeAndShape, GiveTheWorstSimplexOfTheFirstRuleBroken) {
           ASSERT_TRUE(got.has_value());
           EXPECT_EQ(got->rule, Rule::kSize);
           EXPECT_NEAR(got->radius, std::hypot(got->x[0], got->x[1]), 1e-12);
-          fakes += got->fake;
+          seen->fakes += got->fake;
           continue;
         }
         double largest = 0, worst_rho = 0;
@@ -85,15 +91,15 @@ TEST(SizeAndShape, GiveTheWorstSimplexOfTheFirstRuleBroken) {
           ASSERT_TRUE(got.has_value());
           EXPECT_EQ(got->rule, Rule::kSize);
           EXPECT_NEAR(got->radius, largest, 1e-6 * largest);
-          ++sizes;
+          ++seen->sizes;
         } else if (worst_rho > rho0) {
           ASSERT_TRUE(got.has_value());
           EXPECT_EQ(got->rule, Rule::kRadiusEdge);
           EXPECT_LE(got->radius, epsilon);
-          ++shapes;
+          ++seen->shapes;
         } else {
           EXPECT_FALSE(got.has_value());
-          ++fine;
+          ++seen->fine;
         }
         if (got) {
           EXPECT_FALSE(got->fake);
@@ -102,10 +108,20 @@ TEST(SizeAndShape, GiveTheWorstSimplexOfTheFirstRuleBroken) {
       }
     }
   }
-  EXPECT_GT(sizes, 50);
-  EXPECT_GT(shapes, 50);
-  EXPECT_GT(fine, 50);
-  EXPECT_GT(fakes, 10);
+}
+
+TEST(RuleR1Size, GivesTheLargestSimplexThatIsTooLarge) {
+  SizesAndShapes seen;
+  ExpectWorst(&seen);
+  EXPECT_GT(seen.sizes, 50);
+  EXPECT_GT(seen.fakes, 10);
+}
+
+TEST(RuleR2RadiusEdge, GivesTheWorstSimplexWhereNoneIsTooLarge) {
+  SizesAndShapes seen;
+  ExpectWorst(&seen);
+  EXPECT_GT(seen.shapes, 50);
+  EXPECT_GT(seen.fine, 50);
 }
 
 template <int K>
@@ -129,14 +145,14 @@ void ExpectSliversAsMeasured(const Sample& sample) {
   EXPECT_GT(fat, 20);
 }
 
-TEST(Slivers, AreTheThinFacesAtTheStarsPoint) {
+TEST(RuleR3Slivers, AreTheThinFacesAtTheStarsPoint) {
   ExpectSliversAsMeasured<2>(RandomSample(*Make("torus"), 200, 2));
   ExpectSliversAsMeasured<3>(RandomSample(*Make("so3"), 200, 3));
   ExpectSliversAsMeasured<4>(RandomSample(*Make("sphere:4:6"), 80, 4));
 }
 
 // All stars together see every sliver that the simplex has.
-TEST(Slivers, AreSeenFromSomeVertexOfTheSimplex) {
+TEST(RuleR3Slivers, AreSeenFromSomeVertexOfTheSimplex) {
   const Sample sample = RandomSample(*Make("flat-torus:3"), 250, 5);
   const auto complex = Build<3>(sample);
   int slivers = 0;
@@ -234,7 +250,7 @@ void ExpectConsistencyByDefinition(const Sample& sample, double sliver_bound) {
   }
 }
 
-TEST(Consistency, IsMembershipInTheStarsOfAllVertices) {
+TEST(RuleR4Consistency, IsMembershipInTheStarsOfAllVertices) {
   ExpectConsistencyByDefinition<1>(RandomSample(*Make("torus-knot:2:3"), 40, 7), 0);
   ExpectConsistencyByDefinition<2>(RandomSample(*Make("torus"), 300, 8), 0);
   ExpectConsistencyByDefinition<2>(RandomSample(*Make("torus"), 300, 8), 0.2);
