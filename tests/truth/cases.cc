@@ -182,6 +182,22 @@ void Holes(Case& c, Dice& dice) {
   c.shape = SphereWithoutCap(c.hole);
 }
 
+// Voids in a ball, from far below epsilon on, and as near to its skin: walls of their own, or one
+// wall together with the skin.
+void VoidOf(Case& c, Dice& dice, bool one_wall) {
+  const int d = dice.Int(2, 3);
+  c.epsilon = dice.Uniform(0.15, 0.4);
+  c.tangents = true;
+  const double radius = std::min(0.3, c.epsilon * dice.LogUniform(0.05, 2));
+  const double gap = std::min(0.3, c.epsilon * dice.LogUniform(0.1, 2));
+  VectorXd centre(d);
+  for (int i = 0; i < d; ++i) centre[i] = dice.Uniform(-1, 1);
+  c.shape = HollowBall((1 - radius - gap) * centre.normalized(), radius, one_wall);
+}
+
+void Voids(Case& c, Dice& dice) { VoidOf(c, dice, false); }
+void Sheets(Case& c, Dice& dice) { VoidOf(c, dice, true); }
+
 // Anything, at 0.05 to 1.5 of its reach.
 void Anything(Case& c, Dice& dice) {
   const auto radial = [&](bool even) {
@@ -254,6 +270,8 @@ const std::map<std::string, Maker>& Makers() {
       {"wires", Wires},
       {"shells", Shells},
       {"holes", Holes},
+      {"voids", Voids},
+      {"sheets", Sheets},
       {"anything", Anything},
   };
   return makers;
@@ -281,12 +299,12 @@ Case MakeCase(const std::string& family, std::uint64_t seed, std::uint64_t n) {
   c.tangents = dice.Coin();
   c.seeds = dice.Coin();
   Makers().at(family)(c, dice);
-  const bool places = !c.shape->Betti().empty() && !c.shape->curves();
+  const bool places = !c.shape->Betti().empty() && !c.shape->curves() && c.shape->walls() == 0;
   if (places && dice.Int(0, 2) == 0)
     c.shape = Placed(c.shape, c.shape->d() + dice.Int(0, 2), dice.engine);
   return c;
 }
 
-bool IsBeyondSeeing(const std::string& family) { return family == "holes"; }
+bool IsBeyondSeeing(const std::string& family) { return family == "holes" || family == "sheets"; }
 
 }  // namespace stellate::truth

@@ -37,7 +37,7 @@ bool SawAll(const Case& c, bool thorough) {
   core::Specification spec = SpecificationOf(c, oracle);
   spec.audit = thorough ? core::Audit::kThorough : core::Audit::kStandard;
   testing::RunMesher(oracle, spec);
-  return static_cast<int>(oracle.components().size()) == c.shape->Betti().front();
+  return static_cast<int>(oracle.components().size()) == c.shape->parts();
 }
 
 }  // namespace

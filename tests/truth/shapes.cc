@@ -346,7 +346,7 @@ Answer ShapeOracle::ClosestPoint(const MatrixXd& x) {
   MatrixXd tangent;
   for (Eigen::Index j = 0; j < x.cols(); ++j) {
     answer.points.col(j) = shape_->Closest(x.col(j), tangents_ ? &tangent : nullptr);
-    if (notes_) components_.insert(shape_->Component(answer.points.col(j)));
+    if (notes_ && shape_->walls() == 0) components_.insert(shape_->Component(answer.points.col(j)));
     if (!tangents_) continue;
     for (int i = 0; i < d; ++i)
       for (int a = 0; a < k; ++a) answer.tangents(i * k + a, j) = tangent(i, a);

@@ -25,6 +25,13 @@ class Shape {
   virtual MatrixXd Seeds() const = 0;                  // a point of each component
   virtual double Radius() const = 0;                   // of a ball around the origin that holds it
   virtual int Component(const VectorXd& y) const = 0;  // that a point of it is on, 0 .. b_0 - 1
+  // How many there are whose every one some answer has to fall on.
+  virtual int parts() const { return Betti().front(); }
+  // Of manifolds with boundary, as oracles have it (stellate/oracle.h); no two walls meet.
+  virtual int walls() const { return 0; }
+  virtual VectorXd FacePoint(const VectorXd& x, int /*wall*/) const { return x; }
+  virtual VectorXd Clearances(const VectorXd& /*x*/) const { return {}; }
+  virtual VectorXd Conormal(const VectorXd& y, int /*wall*/) const { return y; }
   // Where knots and links are to be judged: the curves themselves.
   virtual const std::vector<Curve>* curves() const { return nullptr; }
 };
@@ -38,6 +45,8 @@ ShapePtr Revolution(std::vector<Curve> profiles, bool symmetric, int m);
 ShapePtr Product(ShapePtr a, ShapePtr b);
 // Disjoint round spheres S^k in R^(k+1).
 ShapePtr Spheres(int k, MatrixXd centres, std::vector<double> radii);
+// The unit ball of R^d without a smaller one: a domain whose skins are two walls, or one.
+ShapePtr HollowBall(VectorXd centre, double radius, bool one_wall);
 // Turned at random into R^d.
 ShapePtr Placed(ShapePtr shape, int d, std::mt19937_64& random);
 
@@ -56,6 +65,10 @@ class ShapeOracle : public Oracle {
   int ambient_dimension() const override { return shape_->d(); }
   Answer ClosestPoint(const MatrixXd& x) override;
   bool has_tangent_basis() const override { return tangents_; }
+  int walls() const override { return shape_->walls(); }
+  Answer FacePoint(const MatrixXd& x, const Walls& face) override;
+  MatrixXd Clearances(const MatrixXd& points) override;
+  MatrixXd Conormals(const MatrixXd& points, const Walls& face) override;
   std::optional<BoundingBox> bounding_box() const override;
   MatrixXd seeds() const override { return seeds_ ? shape_->Seeds() : MatrixXd(); }
   std::uint64_t asked() const { return asked_; }
