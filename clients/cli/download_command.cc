@@ -63,7 +63,7 @@ int DownloadCommand::Deliver(const Mesh& mesh) const {
   if (json_) {
     std::cout << ToJson(mesh.report) << "\n";
   } else if (!quiet_ && has_report) {
-    std::cout << ToText(mesh.report);
+    PrintReport(mesh.report);
   } else if (!quiet_) {
     std::printf("%lld vertices, %lld simplices, not the end of the mesh\n",
                 static_cast<long long>(mesh.points.cols()),

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <thread>
 
+#include "cancel_command.h"
 #include "conform_command.h"
 #include "declare_command.h"
 #include "doctor_command.h"
@@ -104,6 +105,7 @@ int Main(int argc, char** argv) {
   app.require_subcommand(1);
   stellate::cli::MeshCommand mesh(app);
   const CLI::App* list = app.add_subcommand("list", "Show the catalogue of manifolds");
+  const stellate::cli::CancelCommand cancel(app);
   const stellate::cli::ConformCommand conform(app);
   stellate::cli::DoctorCommand doctor(app);
   stellate::cli::DownloadCommand download(app);
@@ -125,6 +127,7 @@ int Main(int argc, char** argv) {
   if (list->parsed()) return List();
   if (health->parsed()) return Health(health_server);
   const StopOnSignal signals;
+  if (cancel.chosen()) return cancel.Run();
   if (doctor.chosen()) return doctor.Run(signals.token());
   if (declare.chosen()) return declare.Run(signals.token());
   if (serve.chosen()) return serve.Run(signals.token());

@@ -97,7 +97,7 @@ int MeshCommand::Deliver(const Mesh& mesh) const {
   if (json_) {
     std::cout << ToJson(mesh.report) << "\n";
   } else if (!quiet_) {
-    std::cout << ToText(mesh.report);
+    PrintReport(mesh.report);
   }
   return status;
 }

@@ -6,6 +6,8 @@
 #include <fstream>
 #include <iostream>
 
+#include "text/printable.h"
+
 namespace stellate::cli {
 
 ServerOptions::ServerOptions(CLI::App* command, const std::string& default_address)
@@ -45,14 +47,20 @@ void PrintOutage(const Outage& outage, double patience) {
     std::fprintf(stderr, "stellate: the server is back after %.1f s\n", outage.seconds);
   } else if (outage.attempts == 1) {
     std::fprintf(stderr, "stellate: lost the server (%s): trying again for up to %.0f s\n",
-                 outage.message.c_str(), patience);
+                 text::Printable(outage.message, '?').c_str(), patience);
   }
 }
 
 int PrintError(const Error& error) {
-  std::cerr << "stellate: " << (error.reason.empty() ? "" : error.reason + ": ") << error.message
-            << "\n";
+  const std::string words = (error.reason.empty() ? "" : error.reason + ": ") + error.message;
+  std::cerr << "stellate: " << text::PrintableLines(words, '?') << "\n";
   return ExitStatusOf(error);
+}
+
+void PrintReport(Report report) {
+  report.failure_reason = text::Printable(report.failure_reason, '?');
+  report.failure_message = text::PrintableLines(report.failure_message, '?');
+  std::cout << ToText(report);
 }
 
 }  // namespace stellate::cli

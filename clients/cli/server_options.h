@@ -5,6 +5,7 @@
 
 #include "exit_status.h"
 #include "stellate/client.h"
+#include "stellate/report.h"
 
 namespace stellate::cli {
 
@@ -27,7 +28,11 @@ class ServerOptions {
 // for.
 void PrintOutage(const Outage& outage, double patience);
 
+// What servers and the oracles of others say is made text::Printable by both that follow.
+
 // Prints the error on standard error and gives the exit status that stands for it.
 int PrintError(const Error& error);
+// On standard output.
+void PrintReport(Report report);
 
 }  // namespace stellate::cli

@@ -54,7 +54,8 @@ std::string LowerPhase(Phase phase) {
 std::string Title(const MeshStatus& mesh) {
   const size_t slash = mesh.name.find('/');
   const std::string id = mesh.name.substr(slash == std::string::npos ? 0 : slash + 1, kIdDigits);
-  return mesh.label.empty() ? id : id + " " + mesh.label;
+  const std::string whose = mesh.owner.empty() ? "" : " of " + mesh.owner;
+  return id + (mesh.label.empty() ? "" : " " + mesh.label) + whose;
 }
 
 std::string Cells(const MeshStatus& mesh, double rate) {

@@ -94,6 +94,37 @@ test("others are turned away", async () => {
   }
 });
 
+// 300 of them, and as many that have become sockets and show no proof.
+test("strangers do not lock us out", async () => {
+  const { port, url } = await stage.gateway();
+  const ours = `http://127.0.0.1:${port}`;
+  const open = [];
+  for (let i = 0; i < 300; ++i) {
+    const silent = createConnection({ host: "127.0.0.1", port: Number(port) });
+    silent.on("error", () => {});
+    open.push(silent);
+    const socket = createConnection({ host: "127.0.0.1", port: Number(port) });
+    socket.on("error", () => {});
+    const { path, headers } = upgrade(port, "/call/GetMesh", ours);
+    const lines = Object.entries(headers).map(([name, value]) => `${name}: ${value}\r\n`);
+    socket.write(`GET ${path} HTTP/1.1\r\n${lines.join("")}\r\n`);
+    open.push(socket);
+  }
+  const page = await stage.page(url);
+  // It asks for the list again and again: a call is answered once the page is known.
+  await new Promise((resolve, reject) => {
+    setTimeout(() => reject(new Error("the page gets no answer")), kPatience).unref();
+    page.on("websocket", (socket) =>
+      socket.on("framereceived", ({ payload }) => {
+        if (String(payload).includes('"proof"')) resolve();
+      }),
+    );
+  });
+  assert.equal((await get(port, { path: "/" })).status, 200);
+  await page.close();
+  for (const socket of open) socket.destroy();
+});
+
 test("whoever does not know the secret sees nothing", async () => {
   const { port } = await stage.gateway();
   const page = await stage.page(`http://127.0.0.1:${port}/#${"0".repeat(32)}`);

@@ -1,5 +1,7 @@
 #include "run/delta_mesh.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -17,6 +19,10 @@ namespace {
 template <size_t N>
 class FixedSet final : public SimplexSet {
  public:
+  std::size_t bytes() const override {
+    return nodes_.capacity() * sizeof(Node) + first_of_.capacity() * sizeof(first_of_[0]);
+  }
+
   bool Add(const char* ids, Eigen::Index count, std::uint64_t vertices) override {
     for (Eigen::Index i = 0; i < count; ++i) {
       const Simplex simplex = Read(ids, i);
@@ -120,7 +126,7 @@ std::unique_ptr<SimplexSet> MakeSimplexSet(int k) {
   }
 }
 
-Expected<DeltaMesh> DeltaMesh::Create(int k, int d) {
+Expected<DeltaMesh> DeltaMesh::Create(int k, int d, std::size_t most_bytes) {
   std::unique_ptr<SimplexSet> set = MakeSimplexSet(k);
   if (set == nullptr) {
     return Fail(ErrorCode::kRefused,
@@ -128,12 +134,29 @@ Expected<DeltaMesh> DeltaMesh::Create(int k, int d) {
                     std::to_string(kMaxSimplexDimension),
                 k < 1 ? "INVALID_ARGUMENT" : "LIMIT_EXCEEDED");
   }
-  return DeltaMesh(k, d, std::move(set));
+  return DeltaMesh(k, d, std::move(set), most_bytes);
+}
+
+std::size_t DeltaMesh::HalfOfTheMemory() {
+  return static_cast<std::size_t>(sysconf(_SC_PHYS_PAGES)) *
+         static_cast<std::size_t>(sysconf(_SC_PAGESIZE)) / 2;
+}
+
+Expected<void> DeltaMesh::CheckRoom(std::size_t more) const {
+  const std::size_t held = coordinates_.capacity() * sizeof(coordinates_[0]) +
+                           boundary_.capacity() * sizeof(boundary_[0]) + simplex_set_->bytes() +
+                           pending_bytes_ + more;
+  if (held <= most_bytes_) return {};
+  return Fail(ErrorCode::kServerFailed,
+              "the mesh that the server sends takes more than " +
+                  std::to_string(most_bytes_ >> 20) +
+                  " MB, half of this machine's memory: fetch it on a larger one",
+              "LIMIT_EXCEEDED");
 }
 
 void DeltaMesh::Reset() {
   revision_ = 0;
-  pending_.clear();
+  ForgetPending();
   coordinates_.clear();
   boundary_.clear();
   simplex_set_ = MakeSimplexSet(k_);
@@ -144,8 +167,12 @@ Expected<void> DeltaMesh::Absorb(v1::DeltaChunk&& chunk) {
   if (revision <= revision_ || (!pending_.empty() && pending_.back().revision() != revision)) {
     return tl::unexpected(BrokenProtocol("revision " + std::to_string(revision) + " out of order"));
   }
+  const std::size_t bytes = chunk.ByteSizeLong();
+  if (Expected<void> ok = CheckRoom(bytes); !ok) return ok;
+  pending_bytes_ += bytes;
   pending_.push_back(std::move(*chunk.mutable_delta()));
   if (!chunk.complete()) return {};
+  pending_bytes_ = 0;
   for (const v1::MeshDelta& delta : std::exchange(pending_, {})) {
     if (Expected<void> ok = Apply(delta); !ok) return ok;
   }
@@ -154,6 +181,7 @@ Expected<void> DeltaMesh::Absorb(v1::DeltaChunk&& chunk) {
 }
 
 Expected<void> DeltaMesh::Add(v1::DownloadMeshResponse&& part) {
+  if (Expected<void> ok = CheckRoom(part.ByteSizeLong()); !ok) return ok;
   v1::MeshDelta delta;
   delta.set_first_vertex(part.first_vertex());
   delta.mutable_points()->Swap(part.mutable_points());

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -17,6 +18,7 @@ namespace stellate::client {
 class SimplexSet {
  public:
   virtual ~SimplexSet() = default;
+  virtual std::size_t bytes() const = 0;
   // `count` simplices of k+1 uint32 each; `ids` need not be aligned. False, and the set is spoilt,
   // where a vertex is not below `vertices`.
   virtual bool Add(const char* ids, Eigen::Index count, std::uint64_t vertices) = 0;
@@ -34,10 +36,12 @@ std::unique_ptr<SimplexSet> MakeSimplexSet(int k);
 // so that what a broken stream leaves undone can be sent again from revision() on.
 class DeltaMesh {
  public:
+  // At most `most_bytes` of it are held at once: half of what this machine has, unless it is said.
   // Errors: a k that this client cannot hold.
-  static Expected<DeltaMesh> Create(int k, int d);
+  static Expected<DeltaMesh> Create(int k, int d, std::size_t most_bytes = HalfOfTheMemory());
 
-  // Takes the chunk's arrays. Errors: what does not follow on revision() and what came before.
+  // Takes the chunk's arrays. Errors: what does not follow on revision() and what came before, and
+  // more than there is room for.
   Expected<void> Absorb(v1::DeltaChunk&& chunk);
   // The last complete revision; 0: none yet.
   std::uint64_t revision() const { return revision_; }
@@ -50,21 +54,29 @@ class DeltaMesh {
   std::uint64_t vertices() const { return coordinates_.size() / static_cast<std::size_t>(d_); }
   std::uint64_t simplices() const { return parts_simplices_; }
   // Drops the chunks of a revision that was cut short.
-  void ForgetPending() { pending_.clear(); }
+  void ForgetPending() {
+    pending_.clear();
+    pending_bytes_ = 0;
+  }
 
   // The mesh as of revision(). Errors: a simplex that was added twice.
   Expected<Mesh> Take() const;
 
  private:
-  DeltaMesh(int k, int d, std::unique_ptr<SimplexSet> set)
-      : k_(k), d_(d), simplex_set_(std::move(set)) {}
+  DeltaMesh(int k, int d, std::unique_ptr<SimplexSet> set, std::size_t most_bytes)
+      : k_(k), d_(d), most_bytes_(most_bytes), simplex_set_(std::move(set)) {}
 
+  static std::size_t HalfOfTheMemory();
+  // With so many bytes more, which have come.
+  Expected<void> CheckRoom(std::size_t more) const;
   Expected<void> Apply(const v1::MeshDelta& delta);
   Expected<void> NoteWalls(const v1::MeshDelta& delta);
 
   int k_, d_;
+  std::size_t most_bytes_;
   std::uint64_t revision_ = 0;
   std::vector<v1::MeshDelta> pending_;
+  std::size_t pending_bytes_ = 0;
   std::vector<double> coordinates_;  // of the vertices so far, one after another
   std::vector<std::pair<std::uint32_t, std::uint64_t>> boundary_;  // vertices, walls as bits
   std::unique_ptr<SimplexSet> simplex_set_;

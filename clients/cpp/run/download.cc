@@ -129,7 +129,10 @@ class Download {
         request.set_position(part.next_position());
         vertices_ = part.vertices();
         simplices_ = part.simplices();
-        if (auto ok = builder_->Add(std::move(part)); !ok) {
+        auto ok = builder_->Add(std::move(part));
+        if (ok && (builder_->vertices() > vertices_ || builder_->simplices() > simplices_))
+          ok = tl::unexpected(BrokenProtocol("more of the mesh than it had announced"));
+        if (!ok) {
           context.TryCancel();
           return ok;
         }

@@ -92,7 +92,29 @@ class Monitor::Impl {
     return meshes;
   }
 
+  Expected<void> Cancel(const std::string& name, Deadline deadline) {
+    v1::CancelMeshRequest request;
+    request.set_name(name);
+    grpc::ClientContext context;
+    context.set_deadline(deadline);
+    v1::Mesh mesh;
+    return DoneOr(stub_->CancelMesh(&context, request, &mesh));
+  }
+  Expected<void> Delete(const std::string& name, Deadline deadline) {
+    v1::DeleteMeshRequest request;
+    request.set_name(name);
+    grpc::ClientContext context;
+    context.set_deadline(deadline);
+    google::protobuf::Empty nothing;
+    return DoneOr(stub_->DeleteMesh(&context, request, &nothing));
+  }
+
  private:
+  static Expected<void> DoneOr(const grpc::Status& status) {
+    if (!status.ok()) return tl::unexpected(FromStatus(status));
+    return {};
+  }
+
   grpc::TemplatedGenericStub<google::protobuf::StringValue, google::protobuf::UInt32Value> health_;
   const std::unique_ptr<v1::Stellate::Stub> stub_;
 };
@@ -113,6 +135,14 @@ Expected<ServerHealth> Monitor::Health(double timeout_seconds) {
 
 Expected<std::vector<MeshStatus>> Monitor::Meshes(double timeout_seconds) {
   return impl_->Meshes(After(timeout_seconds));
+}
+
+Expected<void> Monitor::Cancel(const std::string& name, double timeout_seconds) {
+  return impl_->Cancel(name, After(timeout_seconds));
+}
+
+Expected<void> Monitor::Delete(const std::string& name, double timeout_seconds) {
+  return impl_->Delete(name, After(timeout_seconds));
 }
 
 }  // namespace stellate

@@ -268,6 +268,7 @@ MeshStatus StatusOf(const v1::Mesh& m) {
   MeshStatus mesh;
   mesh.name = m.name();
   mesh.label = m.spec().label();
+  mesh.owner = m.owner();
   mesh.state = FromProto(m.state());
   mesh.dimension = static_cast<int>(m.spec().dimension());
   mesh.ambient_dimension = static_cast<int>(m.spec().ambient_dimension());

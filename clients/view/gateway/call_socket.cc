@@ -8,10 +8,12 @@
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/websocket.hpp>
 #include <charconv>
+#include <chrono>
 #include <deque>
 #include <initializer_list>
 #include <utility>
@@ -28,6 +30,7 @@ namespace websocket = beast::websocket;
 using boost::system::error_code;
 
 constexpr std::size_t kMostUnderWay = std::size_t{4} << 20;
+constexpr auto kProofTime = std::chrono::seconds(15);  // until a page has shown its proof
 constexpr std::size_t kMostRequestBytes = std::size_t{1} << 16;
 
 using Fields = std::initializer_list<std::pair<const char*, std::string>>;
@@ -88,11 +91,16 @@ class CallSocket : public std::enable_shared_from_this<CallSocket> {
       : shared_(shared),
         stream_(std::move(stream)),
         request_(std::move(request)),
+        patience_(shared.io),
         host_(request_[beast::http::field::host]),
         nonce_(NewSecret()) {}
 
   void Start() {
-    shared_.open[this] = [this] { Leave(); };
+    shared_.sockets.Open(this, [this] { Leave(); });
+    patience_.expires_after(kProofTime);
+    patience_.async_wait([self = shared_from_this()](error_code) {
+      if (!self->trusted_) self->Leave();
+    });
     beast::get_lowest_layer(stream_).expires_never();
     stream_.set_option(websocket::stream_base::timeout::suggested(beast::role_type::server));
     stream_.read_message_max(kMostRequestBytes);
@@ -195,6 +203,8 @@ class CallSocket : public std::enable_shared_from_this<CallSocket> {
                     "`stellate view` printed");
     }
     trusted_ = true;
+    shared_.sockets.Trust(this);
+    patience_.cancel();
     SendText(Json({{"proof", Proof(*known, "gateway", host_, nonce)},
                    {"server", shared_.title},
                    {"mesh", shared_.mesh},
@@ -218,12 +228,14 @@ class CallSocket : public std::enable_shared_from_this<CallSocket> {
     if (paused_ && call_ != nullptr) call_->ReadOn();
     error_code ignored;
     beast::get_lowest_layer(stream_).socket().close(ignored);
-    shared_.open.erase(this);
+    patience_.cancel();
+    shared_.sockets.Close(this);
   }
 
   Shared& shared_;
   websocket::stream<beast::tcp_stream> stream_;
   const HttpRequest request_;
+  asio::steady_timer patience_;  // with a stranger
   const std::string host_, nonce_;
   beast::flat_buffer input_;
   std::deque<Message> queue_;

@@ -6,12 +6,11 @@
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http/message.hpp>
 #include <boost/beast/http/string_body.hpp>
-#include <functional>
-#include <map>
 #include <memory>
 #include <string>
 
 #include "keys.h"
+#include "sockets.h"
 
 namespace stellate::view {
 
@@ -25,8 +24,7 @@ struct Shared {
   std::unique_ptr<grpc::GenericStub> stub;
   Keys keys;
   std::string title, mesh;  // as GatewayOptions has them
-  // Of each socket that is open: how to end it.
-  std::map<const void*, std::function<void()>> open;
+  Sockets sockets;
 };
 
 // The calls that a page may make: those that change nothing.

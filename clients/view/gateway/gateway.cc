@@ -29,7 +29,6 @@ namespace http = beast::http;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-constexpr std::size_t kMostSockets = 256;
 constexpr std::uint32_t kMostHeaderBytes = 16384;
 constexpr auto kPatience = std::chrono::seconds(15);
 constexpr std::string_view kCalls = "/call/";
@@ -53,7 +52,7 @@ class Visit : public std::enable_shared_from_this<Visit> {
   }
 
   void Start() {
-    shared_.open[this] = [this] { Leave(); };
+    shared_.sockets.Open(this, [this] { Leave(); });
     stream_.expires_after(kPatience);
     http::async_read(stream_, buffer_, parser_,
                      [self = shared_from_this()](error_code error, std::size_t) {
@@ -78,7 +77,7 @@ class Visit : public std::enable_shared_from_this<Visit> {
         return Refuse(http::status::forbidden, "another page's call");
       if (target.rfind(kCalls, 0) != 0 || !IsCall(target.substr(kCalls.size())))
         return Refuse(http::status::not_found, "no such call");
-      shared_.open.erase(this);
+      shared_.sockets.Close(this);
       return ServeCall(shared_, std::move(stream_), parser_.release());
     }
     if (request.method() != http::verb::get && request.method() != http::verb::head)
@@ -115,7 +114,7 @@ class Visit : public std::enable_shared_from_this<Visit> {
     error_code ignored;
     stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
     stream_.close();
-    shared_.open.erase(this);
+    shared_.sockets.Close(this);
   }
 
   Shared& shared_;
@@ -171,7 +170,7 @@ class Gateway::Impl {
   void Accept() {
     acceptor_.async_accept([this](error_code error, tcp::socket socket) {
       if (!acceptor_.is_open()) return;
-      if (!error && shared_.open.size() < kMostSockets)
+      if (!error && shared_.sockets.MakeRoom())
         std::make_shared<Visit>(shared_, std::move(socket), port_)->Start();
       Accept();
     });
@@ -180,8 +179,7 @@ class Gateway::Impl {
   void Stop() {
     error_code ignored;
     acceptor_.close(ignored);
-    const auto open = shared_.open;  // each takes itself out
-    for (const auto& [socket, leave] : open) leave();
+    shared_.sockets.EndAll();
   }
 
   Shared shared_;

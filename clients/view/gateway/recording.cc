@@ -4,8 +4,14 @@
 #include <openssl/evp.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <memory>
+#include <mutex>
+#include <stop_token>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -19,7 +25,9 @@
 namespace stellate::view {
 namespace {
 
-constexpr double kMostBytes = 16e6;  // of earlier revisions
+constexpr double kMostBytes = 16e6;                             // of earlier revisions
+constexpr std::size_t kMostFileBytes = std::size_t{500} << 20;  // a browser's longest text
+constexpr std::chrono::seconds kSilence{60};
 
 std::string Base64(const std::string& bytes) {
   std::string text(4 * ((bytes.size() + 2) / 3) + 1, '\0');  // and a zero
@@ -29,6 +37,37 @@ std::string Base64(const std::string& bytes) {
   text.resize(static_cast<size_t>(size));
   return text;
 }
+
+// A server says how a mesh is every second; one that says nothing for long is given up.
+class Patience {
+ public:
+  explicit Patience(grpc::ClientContext& context)
+      : thread_([this, &context](const std::stop_token& stop) {
+          std::unique_lock lock(mutex_);
+          while (!stop.stop_requested()) {
+            heard_ = false;
+            if (wake_.wait_for(lock, stop, kSilence, [this] { return heard_; })) continue;
+            if (stop.stop_requested()) return;
+            over_ = true;
+            context.TryCancel();
+            return;
+          }
+        }) {}
+
+  void Heard() {
+    const std::lock_guard lock(mutex_);
+    heard_ = true;
+    wake_.notify_one();
+  }
+  bool IsOver() const { return over_; }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable_any wake_;
+  bool heard_ = false;
+  std::atomic<bool> over_{false};
+  std::jthread thread_;
+};
 
 class Recorder {
  public:
@@ -62,6 +101,7 @@ class Recorder {
     first_ = false;
   }
   void End() { replies_ += "]}"; }
+  bool IsTooLarge() const { return replies_.size() > kMostFileBytes; }
 
   // The name opens the mesh on its server, which a file that goes around should not.
   static void Anonymize(v1::Mesh* mesh) { mesh->set_name("meshes/recorded"); }
@@ -70,12 +110,29 @@ class Recorder {
   Expected<void> Read(const Request& request, const Call& call, const Take& take) {
     grpc::ClientContext context;
     const std::stop_callback cancel(options_.stop, [&context] { context.TryCancel(); });
+    Patience patience(context);
     const auto stream = call(&context, request);
     Response response;
-    while (stream->Read(&response)) take(&response);
+    while (!IsTooLarge() && stream->Read(&response)) {
+      patience.Heard();
+      take(&response);
+    }
+    if (IsTooLarge()) context.TryCancel();
     const grpc::Status status = stream->Finish();
     if (options_.stop.stop_requested())
       return Fail(ErrorCode::kServerFailed, "nothing was written", "CANCELLED");
+    if (patience.IsOver()) {
+      return Fail(ErrorCode::kServerFailed,
+                  "the server said nothing for " + std::to_string(kSilence.count()) + " seconds",
+                  "PROTOCOL");
+    }
+    if (IsTooLarge()) {
+      return Fail(ErrorCode::kServerFailed,
+                  "a file with this mesh would have more than " +
+                      std::to_string(kMostFileBytes >> 20) +
+                      " MB, which no browser opens: fetch it by `stellate download`",
+                  "LIMIT_EXCEEDED");
+    }
     if (!status.ok()) return tl::unexpected(client::FromStatus(status));
     return {};
   }
@@ -107,6 +164,7 @@ class Recorder {
 
   Expected<void> Look() {
     grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + client::kCallTime);
     const std::stop_callback cancel(options_.stop, [&context] { context.TryCancel(); });
     v1::GetMeshRequest request;
     request.set_name(mesh_);

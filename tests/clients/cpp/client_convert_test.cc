@@ -246,6 +246,25 @@ v1::DeltaChunk Delta(std::uint64_t revision, std::uint64_t first, const Eigen::M
   return chunk;
 }
 
+// Neither a revision without an end nor revisions without an end.
+TEST(DeltaMesh, AServerThatSendsOnAndOnIsEndedAtSomePoint) {
+  for (const bool complete : {false, true}) {
+    auto builder = DeltaMesh::Create(1, 2, /*most_bytes=*/1 << 20);
+    ASSERT_TRUE(builder.has_value());
+    Expected<void> ok;
+    std::uint64_t sent = 0;
+    for (; ok && sent < (1 << 20); sent += 1000) {
+      v1::DeltaChunk chunk =
+          Delta(complete ? sent / 1000 + 1 : 1, sent, Eigen::MatrixXd::Zero(2, 1000), {}, {});
+      chunk.set_complete(complete);
+      ok = builder->Absorb(std::move(chunk));
+    }
+    ASSERT_FALSE(ok);
+    EXPECT_EQ(ok.error().reason, "LIMIT_EXCEEDED");
+    EXPECT_LE(sent * 16, 2u << 20);
+  }
+}
+
 TEST(DeltaMesh, EndsWithWhatWasAddedAndNotRemoved) {
   auto builder = DeltaMesh::Create(1, 2);
   ASSERT_TRUE(builder.has_value());

@@ -101,6 +101,16 @@ TEST(TopTable, KeepsToItsRoom) {
   EXPECT_EQ(table.Lines(132, 60).size(), 52u);
 }
 
+TEST(TopTable, SaysWhoseAMeshIsWhereItIsTold) {
+  MeshStatus mesh = Mesh("0123456789", "torus", MeshState::kRunning, 900, 400);
+  TopTable table(TopOrder::kState);
+  table.Update({mesh}, 0);
+  EXPECT_EQ(table.Lines(0, 0)[2].find(" of "), std::string::npos);
+  mesh.owner = "ada";
+  table.Update({mesh}, 1);
+  EXPECT_EQ(table.Lines(0, 0)[2].rfind("01234567 torus of ada ", 0), 0u) << table.Lines(0, 0)[2];
+}
+
 TEST(Tame, KeepsStrangersFromTheTerminal) {
   EXPECT_EQ(Tame("a\033[2Jb\x7f\n", 20), "a?[2Jb??");
   EXPECT_EQ(Tame("x\xC2\x9Bm", 20), "x?m");          // a control of eight bits, in UTF-8

@@ -26,6 +26,7 @@ const char* MeshStateName(MeshState state);  // "WAITING", ...
 struct MeshStatus {
   std::string name;   // "meshes/<id>": who knows it may serve and watch the mesh
   std::string label;  // free text of whoever made it
+  std::string owner;  // whose it is, where the token is an administrator's
   MeshState state = MeshState::kUnknown;
   int dimension = 0, ambient_dimension = 0;
   double epsilon = 0;
@@ -48,6 +49,10 @@ class Monitor {
   Expected<ServerHealth> Health(double timeout_seconds = 5);
   // All meshes that these credentials show, oldest first.
   Expected<std::vector<MeshStatus>> Meshes(double timeout_seconds = 5);
+  // Ends a mesh; what is meshed stays readable, unless it is deleted. kRefused: there is none, or
+  // it is another's and the token no administrator's.
+  Expected<void> Cancel(const std::string& name, double timeout_seconds = 5);
+  Expected<void> Delete(const std::string& name, double timeout_seconds = 5);
 
  private:
   class Impl;
