@@ -90,6 +90,28 @@ TEST(MemoryBudget, EstimatesGrowWithTheMeshAndTheRound) {
   EXPECT_GT(EstimateMeshBytes(spec, 100'000, 0), 2 * mesh);
 }
 
+// As `tests/bench/run memory` measured them: bytes a vertex of a mesh with its history.
+TEST(MemoryBudget, EstimatesAreWhatWasMeasured) {
+  struct Measured {
+    int k, d;
+    std::uint64_t vertices;
+    double bytes;
+  };
+  for (const auto& [k, d, vertices, bytes] :
+       {Measured{1, 2, 108'007, 489}, Measured{1, 20, 32'430, 1243}, Measured{2, 3, 155'669, 531},
+        Measured{2, 20, 25'234, 1527}, Measured{2, 100, 3602, 5753}, Measured{3, 4, 10'962, 4178},
+        Measured{3, 6, 22'701, 4652}, Measured{3, 9, 13'431, 5656}}) {
+    core::Specification spec;
+    spec.dimension = k;
+    spec.ambient_dimension = d;
+    const double share =
+        static_cast<double>(EstimateMeshBytes(spec, vertices, 0) - EstimateMeshBytes(spec, 0, 0)) /
+        (static_cast<double>(vertices) * bytes);
+    EXPECT_GE(share, 0.8) << "k " << k << ", d " << d;
+    EXPECT_LE(share, 1.5) << "k " << k << ", d " << d;
+  }
+}
+
 TEST(MemoryBudget, SeedsAreCountedEvenOfWhatIsFinished) {
   core::Specification spec = testing::SphereSpec(0.1);
   const std::uint64_t few = EstimateFinishedBytes(spec);
