@@ -16,11 +16,11 @@
 #include <vector>
 
 #include "core/base/message.h"
+#include "server/base/clock.h"
 
 namespace stellate::server {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using core::Message;
 
 constexpr std::size_t kMostVisits = 64;  // at once: a scraper has one, a browser six
