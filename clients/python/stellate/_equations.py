@@ -66,8 +66,9 @@ class Equations:
 
     def values(self, x: np.ndarray) -> np.ndarray:
         """F at the rows of x."""
-        if len(x):
-            self._exactness.insist(self._f)
+        if not len(x):
+            return np.empty((0, self.shape[0]))
+        self._exactness.insist(self._f)
         return self._f(x)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:

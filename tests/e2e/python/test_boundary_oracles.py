@@ -215,7 +215,7 @@ def test_clipping_twice_is_clipping_by_all(server):
 @pytest.mark.parametrize(
     ("wall", "gradient", "said"),
     [
-        (lambda x: x, None, r"wall 0 returned shape \(1, 3\)"),
+        (lambda x: x, None, r"wall 0 returned shape \(\d+, 3\)"),
         (lambda x: 1 - (x**2).sum(), None, r"wall 0 returned shape \(\)"),
         (
             lambda x: 1 - (x**2).sum(axis=1),
