@@ -8,13 +8,12 @@
 
 #include "core/certificate/certifier.h"
 #include "tests/core/certificate/handmade_meshes.h"
+#include "tests/core/support/says.h"
 
 namespace stellate::core {
 namespace {
 
-bool Says(const std::string& text, const std::string& words) {
-  return text.find(words) != std::string::npos;
-}
+using testing::Says;
 
 // n points of the unit circle, their tangents turned by wrong * cos(7 angle).
 HandmadeMesh Circle(int n, double wrong = 0) {

@@ -9,9 +9,12 @@
 
 #include "core/certificate/certifier.h"
 #include "tests/core/certificate/handmade_meshes.h"
+#include "tests/core/support/says.h"
 
 namespace stellate::core {
 namespace {
+
+using testing::Says;
 
 // The ellipse x = A cos t, y = sin t, whose tips have the radius 1 / A.
 constexpr double kA = 100;
@@ -77,10 +80,6 @@ Certificate CertifyEllipse(double size_ratio, double turned) {
     for (int i = 0; i < 2; ++i) given.tangents[2 * v + i] = tangent(i, 0);
   }
   return Certify(spec, given, ClosestOnEllipse, facts, turn).certificate;
-}
-
-bool Says(const std::string& text, const std::string& words) {
-  return text.find(words) != std::string::npos;
 }
 
 TEST(TangentCheck, DoesNotAccuseARightOracleOfAGradedMesh) {
