@@ -70,7 +70,8 @@ int MeshCommand::Run(std::stop_token stop) {
 
 Expected<Mesh> MeshCommand::MeshIt(Oracle& oracle) {
   ProgressBar bar(quiet_);
-  options_.on_epsilon = [this](double epsilon, const std::string& reason) {
+  options_.on_epsilon = [this, &bar](double epsilon, const std::string& reason) {
+    bar.Clear();
     if (!quiet_) std::fprintf(stderr, "epsilon %g, %s\n", epsilon, reason.c_str());
   };
   options_.on_progress = [&bar](const Progress& progress) { bar.Show(progress); };
