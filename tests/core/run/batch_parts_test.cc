@@ -22,9 +22,9 @@ struct PartsCase {
   bool ahead, tangents;
 };
 
-class BatchParts : public ::testing::TestWithParam<PartsCase> {};
+class PartsOfBatches : public ::testing::TestWithParam<PartsCase> {};
 
-TEST_P(BatchParts, NeverExceedTheLimitNorChangeTheMesh) {
+TEST_P(PartsOfBatches, NeverExceedTheLimitNorChangeTheMesh) {
   const auto torus = Make("torus");
   Specification spec = SpecificationFor(*torus, 0.15);
   spec.criteria.ask_ahead = GetParam().ahead;
@@ -49,13 +49,13 @@ TEST_P(BatchParts, NeverExceedTheLimitNorChangeTheMesh) {
   EXPECT_EQ(cut.report().counts.rounds, cut.deltas.size());
 }
 
-INSTANTIATE_TEST_SUITE_P(Limits, BatchParts,
+INSTANTIATE_TEST_SUITE_P(Limits, PartsOfBatches,
                          ::testing::Values(PartsCase{64, false, true}, PartsCase{64, true, true},
                                            PartsCase{37, true, false},
                                            PartsCase{1000, true, true}));
 
 // A refused answer to a part leaves all as it was: the part can be answered again.
-TEST(BatchParts, AreAskedAgainAfterARefusal) {
+TEST(PartsOfBatches, AreAskedAgainAfterARefusal) {
   const auto torus = Make("torus");
   Specification spec = SpecificationFor(*torus, 0.2);
   spec.oracle.intersect_flat = false;  // every answer is found, so each is looked at
@@ -75,7 +75,7 @@ TEST(BatchParts, AreAskedAgainAfterARefusal) {
   EXPECT_EQ(mesher->Points(), good.mesher->Points());
 }
 
-TEST(BatchParts, CountAsRoundsOfTheBudget) {
+TEST(PartsOfBatches, CountAsRoundsOfTheBudget) {
   const auto torus = Make("torus");
   Specification spec = SpecificationFor(*torus, 0.2);
   spec.limits.max_batch_queries = 10;
