@@ -56,7 +56,8 @@ struct Criteria {
   double small_sliver_radius = 2.0;    // beta: only simplices of circumradius <= beta R_p
                                        // count against a candidate; >= 1
   std::optional<int> candidates;       // points tried in a picking region, 1..100. Default 1
-                                       // for k <= 2, 10 for k >= 3
+                                       // for k <= 2, 10 for k >= 3, 40 there
+                                       // where sliver_bound is above 0.25
   std::optional<double> advance_step;  // h, length: how far the front steps over unknown
                                        // ground. Default 3 epsilon, or a tenth of the
                                        // bounding box's diagonal if that is more

@@ -265,5 +265,16 @@ TEST(Refinement, LeavesSharedQuestionsAsTheyWere) {
   }
 }
 
+// The largest bound that may be asked for, with the candidates that it takes.
+TEST(Refinement, FatTetrahedraTakeTheirCandidates) {
+  const auto sphere = Make("sphere:3");
+  Specification spec = SpecificationFor(*sphere, 0.3);
+  const std::uint64_t plain = Drive(spec, *sphere).report().counts.vertices;
+  spec.criteria.sliver_bound = 0.3;
+  const Report fat = Drive(spec, *sphere).report();
+  EXPECT_TRUE(fat.certificate.certified) << fat.certificate.verdict;
+  EXPECT_LT(static_cast<double>(fat.counts.vertices), 1.3 * static_cast<double>(plain));
+}
+
 }  // namespace
 }  // namespace stellate::core
