@@ -38,7 +38,8 @@ struct Progress {
   std::uint64_t bad_radius_edge = 0;   // ... R2
   std::uint64_t bad_sliver = 0;        // ... R3
   std::uint64_t bad_inconsistent = 0;  // ... R4; R3 and R4 are counted once R1 and R2 hold
-  double fraction = 0;                 // estimated share of the work done, 0..1
+  double fraction = 0;                 // estimated share of the work done, 0..1; never falls
+  bool is_foreseeable = false;         // the fraction tells how long the rest will take
 };
 
 // What changed in one round. Vertex ids count up from 0 and never change. While the mesh grows, a

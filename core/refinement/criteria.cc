@@ -13,8 +13,8 @@ constexpr double kInradius = 1.2;
 // Theta0 by k: for k = 3 larger bounds do not terminate, for k <= 2 none is needed. A regular
 // simplex's fatness falls quickly with k, so the bound falls with it.
 constexpr double kDefaultSliverBound[kMaxDimension + 1] = {0, 0, 0, 0.2, 0.15, 0.1};
-// Beyond this bound ten candidates of a picking region are too few to find a point that makes no new
-// sliver, and there is no end; 40 do at 0.3, the largest, with 6 to 25 % more vertices.
+// Beyond this bound ten candidates of a picking region are too few to find a point that makes no
+// new sliver, and there is no end; 40 do at 0.3, the largest, with 6 to 25 % more vertices.
 constexpr double kFatter = 0.25;
 constexpr int kCandidates = 10, kCandidatesForFatter = 40;
 

@@ -42,6 +42,7 @@ class ViolationBook {
   // A star that was judged: with which rule it breaks, or without a blemish.
   void NoteJudged(std::uint32_t star, std::optional<Rule> blemish);
   std::uint64_t blemished() const { return blemished_.size(); }
+  const std::vector<std::uint32_t>& blemished_stars() const { return blemished_; }
   std::uint64_t slivers() const { return slivers_; }  // of the blemished
   std::uint64_t inconsistent() const { return inconsistent_; }
 

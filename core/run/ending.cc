@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "core/base/instantiate.h"
 #include "core/base/interruption.h"
@@ -30,10 +31,12 @@ constexpr double kNearlyMeet = 0.25;
 
 // The reach comes from neighbours alone: |q - p|^2 / (2 dist(q, T_pM)).
 template <int K>
-void DescribeUnfinished(const Engine<K>& engine, double epsilon, Certificate* certificate) {
+void DescribeUnfinished(const Engine<K>& engine, double epsilon, bool is_smooth,
+                        Certificate* certificate) {
   const StarComplex<K>& complex = engine.complex();
   const std::uint32_t count = std::min(complex.size(), engine.book().star_count());
   double reach = std::numeric_limits<double>::infinity();
+  std::uint32_t narrowest = 0;
   for (std::uint32_t p = 0; p < count; ++p) {
     CheckInterruption(p);
     const auto& cell = complex.cell(p);
@@ -51,8 +54,11 @@ void DescribeUnfinished(const Engine<K>& engine, double epsilon, Certificate* ce
       double along2 = 0;
       for (const double a : along) along2 += a * a;
       const double away = std::sqrt(std::max(distance2 - along2, 0.0));
-      if (IsTelling(std::sqrt(distance2), away, epsilon, kLikelyError * epsilon))
-        reach = std::min(reach, ReachBound(distance2, away));
+      if (!IsTelling(std::sqrt(distance2), away, epsilon, kLikelyError * epsilon) ||
+          ReachBound(distance2, away) >= reach)
+        continue;
+      reach = ReachBound(distance2, away);
+      narrowest = p;
     }
   }
   if (std::isinf(reach)) {
@@ -64,8 +70,29 @@ void DescribeUnfinished(const Engine<K>& engine, double epsilon, Certificate* ce
   }
   certificate->estimated_reach = reach;
   certificate->epsilon_over_reach = epsilon / reach;
-  if (epsilon > kCoarse * reach)
-    certificate->warnings.push_back(TooCoarse(epsilon / reach, reach, "") + ".");
+  if (epsilon > kCoarse * reach && is_smooth)
+    certificate->warnings.push_back(
+        TooCoarse(epsilon / reach, reach,
+                  Message("near vertex ", narrowest, " at ",
+                          NamePoint(Eigen::Map<const Eigen::VectorXd>(complex.Point(narrowest),
+                                                                      complex.d())))) +
+        ".");
+}
+
+std::string DescribeCrease(const Crease& crease) {
+  const double degrees = std::asin(std::min(crease.sine, 1.0)) * 180 / std::numbers::pi;
+  const std::string turns =
+      Message(NamePoint(crease.point), ": its tangent spaces there differ by ", Brief(degrees),
+              " degrees between points that are ", Brief(crease.length), " apart");
+  if (crease.crosses)
+    return Message("the manifold crosses itself or is singular near ", turns,
+                   ", and it goes on to all sides; no epsilon will do. Change it so that nothing "
+                   "crosses there, or cut a ball around that point out of it by a wall");
+  return Message(
+      "the manifold has a crease near ", turns,
+      "; no epsilon will do. Round it off, or declare its smooth pieces, which then meet in edges: "
+      "where a function is the largest of several (max), these are walls of a solid or "
+      "inequalities; where it is the least (min), those of the outside, cut off by a box");
 }
 
 template <int K>
@@ -186,7 +213,7 @@ void WarnOfCompromises(const Engine<K>& engine, double epsilon, Certificate* cer
 }
 
 #define STELLATE_EACH(K)                                                                 \
-  template void DescribeUnfinished<K>(const Engine<K>&, double, Certificate*);           \
+  template void DescribeUnfinished<K>(const Engine<K>&, double, bool, Certificate*);     \
   template std::string WhatIsLeft<K>(const Engine<K>&, std::uint64_t);                   \
   template void TellSharpest<K>(const Engine<K>&, Certificate*);                         \
   template void TellUnmetWall<K>(const Engine<K>&, int, Certificate*);                   \

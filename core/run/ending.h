@@ -6,14 +6,19 @@
 
 #include "core/refinement/engine.h"
 #include "core/report.h"
+#include "core/run/crease_probe.h"
 
 namespace stellate::core {
 
 // What can be said without further questions of a mesh that did not converge: inconsistent
-// simplices, circumradii, the reach that neighbours show, and a warning where epsilon is too coarse
-// for that. epsilon: as the client asked for it, length.
+// simplices, circumradii, the reach that neighbours show, and, if M is smooth as far as is known, a
+// warning where epsilon is too coarse for that. epsilon: as the client asked for it, length.
 template <int K>
-void DescribeUnfinished(const Engine<K>& engine, double epsilon, Certificate* certificate);
+void DescribeUnfinished(const Engine<K>& engine, double epsilon, bool is_smooth,
+                        Certificate* certificate);
+
+// What it is, where, and what to do, for people.
+std::string DescribeCrease(const Crease& crease);
 
 // Where walls meet at the smallest angle; below what the refinement is sure to cope with, also in
 // words: a warning of a certified mesh, else at the verdict's end.

@@ -9,7 +9,6 @@
 #include "core/certificate/findings.h"
 #include "core/refinement/rehearsal.h"
 #include "core/run/ending.h"
-#include "core/run/progress_meter.h"
 #include "core/run/seeding.h"
 
 namespace stellate::core {
@@ -30,6 +29,9 @@ MeshingRun<K>::MeshingRun(Specification spec)
       engine_(spec_, Resolve(spec_)),
       tangent_finder_(K, spec_.ambient_dimension, kTangentStep * engine_.criteria().epsilon,
                       spec_.random_seed, kTangentError * spec_.declared_reach.value_or(INFINITY)),
+      crease_probe_(K, spec_.ambient_dimension, spec_.oracle.tangent_basis, spec_.walls > 0,
+                    spec_.random_seed),
+      progress_meter_(spec_),
       repeat_check_(spec_.epsilon),
       wall_check_(K, spec_.ambient_dimension, spec_.epsilon),
       spare_points_(spec_.ambient_dimension),
@@ -149,22 +151,26 @@ Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
 // From the answers to the next batch, or to the end.
 template <int K>
 void MeshingRun<K>::Advance(const Answers& answers) {
-  Asker& asker = trip_ ? static_cast<Asker&>(*trip_) : *certification_;
-  asker.Absorb(answers.blocks);
+  if (!end_) (trip_ ? static_cast<Asker&>(*trip_) : *certification_).Absorb(answers.blocks);
+  TakeBeside(answers);
   NextQuestions();
-  if (batch_ && repeat_check_.has_questions()) batch_->blocks.push_back(repeat_check_.Questions());
+  if (batch_) AskBeside();
 }
 
 // Asks on until some asker has questions, or the run is over.
 template <int K>
 void MeshingRun<K>::NextQuestions() {
   while (!over_) {
-    Asker& asker = trip_ ? static_cast<Asker&>(*trip_) : *certification_;
+    Asker& asker = end_    ? static_cast<Asker&>(crease_probe_)
+                   : trip_ ? static_cast<Asker&>(*trip_)
+                           : *certification_;
     if (std::vector<QueryBlock> blocks = asker.Questions(); !blocks.empty()) {
       batch_ = std::make_shared<QueryBatch>(QueryBatch{0, std::move(blocks)});
       return;
     }
-    if (trip_)
+    if (end_)
+      Finish(*end_);
+    else if (trip_)
       AfterTrip();
     else
       AfterCertificate();
@@ -210,7 +216,10 @@ void MeshingRun<K>::InsertCandidates() {
   counts.inserted_sliver += count(Rule::kSliver);
   counts.inserted_inconsistent += count(Rule::kInconsistent);
   counts.duplicates += inserted.duplicates;
-  if (inserted.front_moved) stall_watch_.NoteFrontMoved();
+  if (inserted.front_moved) {
+    stall_watch_.NoteFrontMoved();
+    crease_watch_.NoteFrontMoved();
+  }
   if (engine_.criteria().flat_alternations == 1 && spec_.walls == 0)
     rim_watch_.Look(trip_->candidates(), trip_->answers());
   rehearsal_failed_ = inserted.rules.empty();
@@ -240,16 +249,17 @@ void MeshingRun<K>::Plan() {
   if (engine_.is_full()) return Finish(Termination::kVertexBudget);
   if (box_watch_.has_left()) return Finish(Termination::kNoProgress);
   auto targets = engine_.Plan();
-  if (!targets) return Finish(Termination::kNoProgress);
+  if (!targets) return End(Termination::kNoProgress);
   if (spec_.walls > 0 && !PlanFaces(&targets)) return;
   FaceBook<K>& faces = engine_.faces();
   if (targets->empty() && !faces.has_discoveries())
-    return engine_.AllRulesHold() ? Certify() : Finish(Termination::kNoProgress);
+    return engine_.AllRulesHold() ? Certify() : End(Termination::kNoProgress);
   const ViolationBook<K>& book = engine_.book();
   if (stall_watch_.IsHopeless(book.size_and_shape().size(), engine_.complex().size()) ||
       stall_watch_.HasStalled(book.size_and_shape().size() + book.blemished(),
                               !book.are_all_suspect()))
-    return Finish(Termination::kNoProgress);
+    return End(Termination::kNoProgress);
+  WatchForCreases();
   *targets = engine_.Select(*targets);
   PlannedPoints planned;
   if (faces.has_discoveries())
@@ -282,6 +292,7 @@ void MeshingRun<K>::Certify() {
   mesh.points = complex.points().data();
   mesh.tangents = complex.Tangent(0);
   trip_.reset();
+  crease_probe_.Stop();
   certification_ = std::make_unique<Certification>(
       spec_, mesh, engine_.Simplices(), facts,
       KnownOfManifold{spare_points_.Take(), rim_watch_.leans()},
@@ -294,7 +305,7 @@ void MeshingRun<K>::AfterCertificate() {
       certification_->certificate().epsilon_over_reach > kCoarse ||
       !(AskForSparesOnWalls(certification_->UncoveredOnWalls()) ||
         AskForSpares(certification_->Uncovered())))
-    Finish(Termination::kConverged);
+    End(Termination::kConverged);
 }
 
 // False if there are none, or if it did not help before.
@@ -340,8 +351,9 @@ void MeshingRun<K>::Finish(Termination termination) {
 template <int K>
 void MeshingRun<K>::Measure() {
   if (!over_)
-    return core::Measure<K>(engine_, certification_ != nullptr,
-                            laying_ ? laying_->CountMissing() : 0, &progress_);
+    return progress_meter_.Measure<K>(engine_, certification_ != nullptr,
+                                      laying_ ? laying_->CountMissing() : 0, &progress_);
+  progress_.is_foreseeable = false;
   progress_.phase = Phase::kDone;
   progress_.vertices = engine_.complex().size();
   progress_.simplices = engine_.simplex_count();

@@ -12,8 +12,11 @@
 #include "core/run/asker.h"
 #include "core/run/batch_parts.h"
 #include "core/run/certification.h"
+#include "core/run/crease_probe.h"
+#include "core/run/crease_watch.h"
 #include "core/run/ending.h"
 #include "core/run/laying.h"
+#include "core/run/progress_meter.h"
 #include "core/run/repeat_check.h"
 #include "core/run/rim_watch.h"
 #include "core/run/round_trip.h"
@@ -60,6 +63,9 @@ class MeshingRun final : public Mesher {
   void Ask(CandidateSet<K> candidates, Insertion then, const Engine<K>& asking);
   void AskFor(Eigen::MatrixXd&& points, Insertion then);
   void NextQuestions();
+  void WatchForCreases();
+  void AskBeside();
+  void TakeBeside(const Answers& answers);
 
   // What follows when an asker is done.
   void AfterTrip();
@@ -80,6 +86,7 @@ class MeshingRun final : public Mesher {
   bool AskForSpares(const std::vector<double>& points);
   bool AskForSparesOnWalls(const PointsOnWalls& points);
 
+  void End(Termination termination);
   void Finish(Termination termination);
   void DescribeEnding(bool is_whole);
   void Measure();
@@ -105,6 +112,13 @@ class MeshingRun final : public Mesher {
   std::unique_ptr<Certification> certification_;
   Insertion insertion_ = nullptr;  // of the trip's answers
 
+  // Asks beside these, or alone before the run ends.
+  CreaseProbe crease_probe_;
+  CreaseWatch crease_watch_;
+  std::optional<std::size_t> probe_block_;  // of batch_, that is its question
+  std::optional<Termination> end_;          // as what the run ends then
+
+  ProgressMeter progress_meter_;
   RepeatCheck repeat_check_;
   WallCheck wall_check_;
   SparePoints spare_points_;

@@ -14,6 +14,9 @@ void MeshingRun<K>::DescribeEnding(bool is_whole) {
   if (termination == Termination::kConverged) {
     certificate = certification_->certificate();
     WarnOfCompromises<K>(engine_, spec_.epsilon, &certificate);
+    // All else that was found wrong may be its doing.
+    if (crease_probe_.crease())
+      certificate.verdict = Message("Not certified: ", DescribeCrease(*crease_probe_.crease()));
   } else {
     certificate.verdict = Message("not certified: the run ended as ", TerminationName(termination),
                                   certification_ ? " when every rule held, before it was certified"
@@ -21,17 +24,18 @@ void MeshingRun<K>::DescribeEnding(bool is_whole) {
     if (!report_.failure.message.empty()) certificate.verdict += ": " + report_.failure.message;
     // Whoever cancels a large mesh does not want to wait for it to be described.
     if (termination != Termination::kCancelled && termination != Termination::kOracleFailed)
-      DescribeUnfinished<K>(engine_, spec_.epsilon, &certificate);
+      DescribeUnfinished<K>(engine_, spec_.epsilon, !crease_probe_.crease(), &certificate);
     if (termination == Termination::kNoProgress)
       certificate.verdict +=
-          "; " + (box_watch_.has_left()
-                      ? box_watch_.WhyStopped()
+          "; " + (box_watch_.has_left() ? box_watch_.WhyStopped()
+                  : crease_probe_.crease()
+                      ? DescribeCrease(*crease_probe_.crease())
                       : WhatIsLeft<K>(engine_, certificate.inconsistent_simplices) +
                             rim_watch_.Describe(engine_.complex().d()));
     // A front that never closes may be where the manifold ends.
     const bool spent =
         termination == Termination::kVertexBudget || termination == Termination::kRoundBudget;
-    if (spec_.walls == 0 && !box_watch_.has_left() &&
+    if (spec_.walls == 0 && !box_watch_.has_left() && !crease_probe_.crease() &&
         (termination == Termination::kNoProgress || (spent && !rim_watch_.leans().empty())))
       certificate.verdict += Message(". ", kDeclareWalls);
   }

@@ -133,7 +133,7 @@ bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
     }
     stall_watch_.NoteFrontMoved();
     if (!*targets) {
-      Finish(Termination::kNoProgress);
+      End(Termination::kNoProgress);
       return false;
     }
   }

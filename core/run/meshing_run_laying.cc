@@ -19,7 +19,11 @@ void MeshingRun<K>::InsertSeeds() {
   repeat_check_.Sample(answers);
   std::vector<std::uint8_t> used(static_cast<std::size_t>(count), 0);
   laying_ = LayingFor<K>(engine_, spec_, answers);
-  if (laying_) return spare_points_.Keep(answers, laying_->Begin(answers));
+  if (laying_) {
+    used = laying_->Begin(answers);
+    progress_meter_.Know(answers, used);
+    return spare_points_.Keep(answers, used);
+  }
   for (Eigen::Index c = 0; c < count; ++c) {
     const auto i = static_cast<std::size_t>(c);
     CheckInterruption(i);
@@ -31,6 +35,7 @@ void MeshingRun<K>::InsertSeeds() {
     else
       ++report_.counts.duplicates;
   }
+  progress_meter_.Know(answers, used);
   spare_points_.Keep(answers, used);
 }
 

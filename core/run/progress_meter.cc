@@ -3,19 +3,32 @@
 #include <algorithm>
 
 #include "core/base/instantiate.h"
-#include "core/base/interruption.h"
+#include "core/base/parallel.h"
+#include "core/base/vector_ops.h"
 
 namespace stellate::core {
+namespace {
+
+// So few points say nothing of M's area; more say little more.
+constexpr std::size_t kFewestKnown = 8, kMostKnown = 64;
+// What refinement adds to a sample that was laid, as long as nothing is known of it, and to one
+// whose R1 and R2 alone were judged.
+constexpr double kRefined = 0.25, kMended = 0.05;
+// Rounds that a trend is taken from, and the least share of a broken rule that a vertex mends.
+constexpr std::size_t kLongestTrend = 12, kShortestTrend = 3;
+constexpr double kLeastYield = 0.02;
+// A fraction that has proved too large by more than this tells nothing of the time.
+constexpr double kTooLarge = 0.05;
+// The certificate's questions about simplices, at most, for each vertex, at most, and besides; of a
+// thorough audit those for each simplex.
+constexpr double kOfSimplices = 2200, kOfVertices = 1500, kBesides = 1000, kThorough = 5;
 
 template <int K>
-void Measure(const Engine<K>& engine, bool is_certifying, double to_lay, Progress* progress) {
+void CountAll(const Engine<K>& engine, Progress* progress) {
   const StarComplex<K>& complex = engine.complex();
   const ViolationBook<K>& book = engine.book();
   progress->vertices = complex.size();
   progress->simplices = engine.simplex_count();
-  progress->phase = is_certifying         ? Phase::kCertifying
-                    : complex.size() == 0 ? Phase::kSeeding
-                                          : Phase::kRefining;
   progress->bad_size = progress->bad_radius_edge = progress->unbounded_stars = 0;
   std::size_t step = 0;
   for (const auto& entry : book.size_and_shape()) {
@@ -25,14 +38,124 @@ void Measure(const Engine<K>& engine, bool is_certifying, double to_lay, Progres
   }
   progress->bad_sliver = book.slivers();
   progress->bad_inconsistent = book.inconsistent();
-  // Half as many as would fill the flat cells: their points serve several.
-  const double missing = to_lay + engine.CountMissing(0.5) + static_cast<double>(book.blemished());
-  const double have = static_cast<double>(complex.size());
-  const double share = is_certifying ? 0.99 : 0.98 * have / (have + missing + 1);
-  progress->fraction = std::max(progress->fraction, share);
 }
 
-#define STELLATE_EACH(K) template void Measure<K>(const Engine<K>&, bool, double, Progress*);
+}  // namespace
+
+ProgressMeter::ProgressMeter(const Specification& spec)
+    : epsilon_(spec.epsilon), is_thorough_(spec.audit == Audit::kThorough), k_(spec.dimension) {}
+
+void ProgressMeter::Know(const AnsweredPoints& seeds, const std::vector<std::uint8_t>& used) {
+  for (Eigen::Index c = 0; c < seeds.points.cols() && known_ < kMostKnown; ++c) {
+    const auto i = static_cast<std::size_t>(c);
+    if (!seeds.found[i] || used[i]) continue;
+    open_.insert(open_.end(), seeds.points.col(c).begin(), seeds.points.col(c).end());
+    ++known_;
+  }
+}
+
+template <int K>
+void ProgressMeter::Cover(const StarComplex<K>& complex) {
+  const auto d = static_cast<std::size_t>(complex.d());
+  const std::size_t count = open_.size() / d;
+  std::vector<std::uint8_t> covered(count, 0);
+  ParallelFor(count, [&](std::size_t i) {
+    for (std::uint32_t v = looked_at_; v < complex.size() && !covered[i]; ++v)
+      covered[i] = SquaredDistance(open_.data() + i * d, complex.Point(v), complex.d()) <=
+                   epsilon_ * epsilon_;
+  });
+  looked_at_ = complex.size();
+  std::vector<double> left;
+  for (std::size_t i = 0; i < count; ++i)
+    if (!covered[i])
+      left.insert(left.end(), open_.begin() + static_cast<std::ptrdiff_t>(i * d),
+                  open_.begin() + static_cast<std::ptrdiff_t>((i + 1) * d));
+  open_ = std::move(left);
+}
+
+// The front against M's area, and what refinement adds.
+template <int K>
+ProgressMeter::Left ProgressMeter::LeftToLay(const Engine<K>& engine, double to_lay) {
+  const double have = static_cast<double>(engine.complex().size());
+  Left left{to_lay, false};
+  if (known_ >= kFewestKnown) {
+    const double covered =
+        1 - static_cast<double>(open_.size()) /
+                static_cast<double>(known_ * static_cast<std::size_t>(engine.complex().d()));
+    left.is_known = covered > 0;
+    // Nothing near any: there is far more than what is there.
+    const double least = 0.5 / static_cast<double>(known_);
+    left.vertices = have * (1 - covered) / std::max(covered, least);
+  }
+  left.vertices += kRefined * (have + left.vertices);
+  return left;
+}
+
+// By the trend: how many broken rules each new vertex mends, beyond those that it breaks.
+template <int K>
+ProgressMeter::Left ProgressMeter::LeftToRefine(const Engine<K>& engine) {
+  const ViolationBook<K>& book = engine.book();
+  const double have = static_cast<double>(engine.complex().size());
+  const double broken = static_cast<double>(book.size_and_shape().size() + book.blemished());
+  const bool judges_all = !book.are_all_suspect();
+  if (judges_all != judged_all_) seen_.clear();
+  judged_all_ = judges_all;
+  seen_.push_back({have, broken});
+  if (seen_.size() > kLongestTrend) seen_.pop_front();
+  const double later = judges_all ? 0 : kMended * have;
+  if (broken == 0) return {later, true};
+  const Seen& then = seen_.front();
+  const double yield = have > then.vertices ? (then.broken - broken) / (have - then.vertices) : 0;
+  if (seen_.size() > kShortestTrend && yield >= kLeastYield) return {later + broken / yield, true};
+  return {std::max(later + engine.CountMissing(0.5) + static_cast<double>(book.blemished()),
+                   kRefined * have),
+          false};
+}
+
+double ProgressMeter::QuestionsOfCertificate(const Progress& progress) const {
+  const double vertices = static_cast<double>(progress.vertices);
+  // As many as a closed manifold has.
+  const double simplices =
+      progress.simplices > 0 ? static_cast<double>(progress.simplices) : k_ * vertices;
+  if (is_thorough_) return kThorough * simplices;
+  return std::min(simplices, kOfSimplices) + std::min(vertices, kOfVertices) + kBesides;
+}
+
+template <int K>
+void ProgressMeter::Measure(const Engine<K>& engine, bool is_certifying, double to_lay,
+                            Progress* progress) {
+  CountAll<K>(engine, progress);
+  const StarComplex<K>& complex = engine.complex();
+  progress->phase = is_certifying         ? Phase::kCertifying
+                    : complex.size() == 0 ? Phase::kSeeding
+                                          : Phase::kRefining;
+  progress->is_foreseeable = false;
+  if (complex.size() == 0) return;
+
+  const auto asked = static_cast<double>(progress->queries);
+  double left = QuestionsOfCertificate(*progress);
+  bool is_known = true;
+  if (is_certifying) {
+    if (before_certificate_ == 0) before_certificate_ = progress->queries;
+    left = std::max(left - static_cast<double>(progress->queries - before_certificate_), 0.0);
+  } else {
+    before_certificate_ = 0;
+    Cover(complex);
+    // Stars that stay open where the sample is near all that is known of M are no front.
+    const bool is_covered = known_ >= kFewestKnown && open_.empty();
+    const bool grows = to_lay > 0 || (progress->unbounded_stars > 0 && !is_covered);
+    const Left vertices = grows ? LeftToLay<K>(engine, std::max(to_lay, engine.CountMissing(0.5)))
+                                : LeftToRefine<K>(engine);
+    left += vertices.vertices * std::max(asked / static_cast<double>(complex.size()), 1.0);
+    is_known = vertices.is_known;
+  }
+  const double share = std::min(0.99, asked / (asked + left + 1));
+  progress->fraction = std::max(progress->fraction, share);
+  progress->is_foreseeable = is_known && share > progress->fraction - kTooLarge;
+}
+
+#define STELLATE_EACH(K) \
+  template void ProgressMeter::Measure<K>(const Engine<K>&, bool, double, Progress*);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 

@@ -1,14 +1,57 @@
 #pragma once
 
+#include <cstdint>
+#include <deque>
+#include <vector>
+
 #include "core/refinement/engine.h"
 #include "core/report.h"
 
 namespace stellate::core {
 
-// Brings the counts, the phase and the fraction of a run up to date with its mesh; rounds and
-// queries are the caller's. is_certifying: every rule holds, and the certificate asks. to_lay:
-// about how many points are to come before there are stars.
-template <int K>
-void Measure(const Engine<K>& engine, bool is_certifying, double to_lay, Progress* progress);
+// What of a run is left to do, in questions: those that the vertices still to come will take, as
+// many as each took so far, and the certificate's.
+class ProgressMeter {
+ public:
+  explicit ProgressMeter(const Specification& spec);
+
+  // Points of M all over it: the seeds' that did not join the sample. While that grows, how many of
+  // them it has come near tells how much of M it covers.
+  void Know(const AnsweredPoints& seeds, const std::vector<std::uint8_t>& used);
+
+  // Brings the counts, the phase, the fraction and whether it tells of the time of a run up to date
+  // with its mesh; rounds and queries are the caller's. is_certifying: every rule holds, and the
+  // certificate asks. to_lay: about how many points are to come before there are stars; 0: there
+  // are.
+  template <int K>
+  void Measure(const Engine<K>& engine, bool is_certifying, double to_lay, Progress* progress);
+
+ private:
+  struct Left {
+    double vertices = 0;
+    bool is_known = false;
+  };
+  struct Seen {
+    double vertices = 0, broken = 0;
+  };
+
+  template <int K>
+  void Cover(const StarComplex<K>& complex);
+  template <int K>
+  Left LeftToLay(const Engine<K>& engine, double to_lay);
+  template <int K>
+  Left LeftToRefine(const Engine<K>& engine);
+  double QuestionsOfCertificate(const Progress& progress) const;
+
+  double epsilon_;
+  bool is_thorough_;
+  int k_;
+  std::vector<double> open_;     // known points that the sample is not near yet, d each
+  std::size_t known_ = 0;        // of them at first
+  std::uint32_t looked_at_ = 0;  // vertices
+  std::deque<Seen> seen_;        // of late, while the same rules were judged
+  bool judged_all_ = false;
+  std::uint64_t before_certificate_ = 0;  // queries
+};
 
 }  // namespace stellate::core

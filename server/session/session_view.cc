@@ -157,14 +157,14 @@ SessionView Session::View() const {
     return view;
   }
   view.elapsed_seconds = std::chrono::duration<double>(Clock::now() - created_).count();
-  if (view.progress.fraction > 0.02 && view.progress.fraction <= 1) {
-    view.remaining_seconds =
-        view.elapsed_seconds * (1 - view.progress.fraction) / view.progress.fraction;
-  }
   // A cancelled mesh is over for its owner, even while its last round is being computed.
   view.state = cancelled_          ? SessionState::kCancelled
                : view.workers == 0 ? SessionState::kWaiting
                                    : SessionState::kRunning;
+  if (view.state == SessionState::kRunning && view.progress.is_foreseeable) {
+    view.remaining_seconds =
+        view.elapsed_seconds * (1 - view.progress.fraction) / view.progress.fraction;
+  }
   return view;
 }
 

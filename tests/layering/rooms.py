@@ -236,6 +236,7 @@ TABLE = Table(
             "core/geometry/simplex.cc",
             "core/refinement/sharp_edges.cc",
             "core/refinement/wall_bends.cc",
+            "core/run/ending.cc",
         )
     },
     acyclic=("core", "text", "server", "clients", "tests"),

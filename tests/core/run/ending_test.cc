@@ -1,10 +1,9 @@
-// What is said of a run that ended, and how far one is.
+// What is said of a run that ended.
 
 #include "core/run/ending.h"
 
 #include <gtest/gtest.h>
 
-#include "core/run/progress_meter.h"
 #include "tests/core/support/in_process_run.h"
 #include "tests/core/support/unit_sphere.h"
 
@@ -24,20 +23,23 @@ TEST(Ending, TellsTheReachThatNeighboursShow) {
   Engine<2> engine = EngineOnSphere(SphereSpec(0.2), Octahedron());
   for (std::uint64_t round = 1; round < 6; ++round) ASSERT_TRUE(StepOnSphere(&engine, round));
   Certificate certificate;
-  DescribeUnfinished<2>(engine, 0.2, &certificate);
+  DescribeUnfinished<2>(engine, 0.2, true, &certificate);
   EXPECT_NEAR(certificate.estimated_reach, 1, 1e-6);
   EXPECT_NEAR(certificate.epsilon_over_reach, 0.2, 1e-6);
   EXPECT_GT(certificate.max_circumradius, 0.2);
   EXPECT_TRUE(certificate.warnings.empty());
-  DescribeUnfinished<2>(engine, 0.9, &certificate);
+  DescribeUnfinished<2>(engine, 0.9, false, &certificate);
+  EXPECT_TRUE(certificate.warnings.empty()) << "no epsilon will do";
+  DescribeUnfinished<2>(engine, 0.9, true, &certificate);
   ASSERT_EQ(certificate.warnings.size(), 1u);
   EXPECT_TRUE(Says(certificate.warnings[0], "times the estimated reach"));
+  EXPECT_TRUE(Says(certificate.warnings[0], "which was seen near vertex ")) << "there is where";
 }
 
 TEST(Ending, AsksWhetherItIsAManifoldAtAllWhereNoStarCloses) {
   const Engine<2> engine = EngineOnSphere(SphereSpec(0.2), Octahedron().leftCols(1));
   Certificate certificate;
-  DescribeUnfinished<2>(engine, 0.2, &certificate);
+  DescribeUnfinished<2>(engine, 0.2, true, &certificate);
   ASSERT_EQ(certificate.warnings.size(), 1u);
   EXPECT_TRUE(Says(certificate.warnings[0], "no star could be closed"));
 }
@@ -84,36 +86,6 @@ TEST(Ending, TellsARunThatOnlyHadToBeCertified) {
   spec.limits.max_rounds = 4;
   EXPECT_EQ(testing::Drive(spec, *sphere).report().certificate.verdict,
             "not certified: the run ended as ROUND_BUDGET before every rule held");
-}
-
-TEST(ProgressMeter, FollowsTheMesh) {
-  const Specification spec = SphereSpec(0.2);
-  Engine<2> empty(spec, Resolve(spec));
-  Progress progress;
-  Measure<2>(empty, false, 0, &progress);
-  EXPECT_EQ(progress.phase, Phase::kSeeding);
-  EXPECT_EQ(progress.fraction, 0);
-
-  Engine<2> engine = EngineOnSphere(spec, Octahedron());
-  Measure<2>(engine, false, 0, &progress);
-  EXPECT_EQ(progress.phase, Phase::kRefining);
-  EXPECT_EQ(progress.vertices, 6u);
-  EXPECT_EQ(progress.bad_size, 6u);
-  EXPECT_EQ(progress.unbounded_stars, 6u);  // too far from each other to see each other yet
-  double before = progress.fraction;
-  for (std::uint64_t round = 1; StepOnSphere(&engine, round); ++round) {
-    Measure<2>(engine, false, 0, &progress);
-    EXPECT_GE(progress.fraction, before);
-    before = progress.fraction;
-  }
-  EXPECT_EQ(progress.simplices, engine.simplex_count());
-  EXPECT_EQ(progress.unbounded_stars, 0u);
-  EXPECT_EQ(progress.bad_size + progress.bad_radius_edge, 0u);
-  EXPECT_EQ(progress.bad_sliver + progress.bad_inconsistent, 0u);
-  Measure<2>(engine, true, 0, &progress);
-  EXPECT_EQ(progress.phase, Phase::kCertifying);
-  EXPECT_GE(progress.fraction, before);
-  EXPECT_LT(progress.fraction, 1);
 }
 
 }  // namespace

@@ -27,6 +27,7 @@ class FakeMesher : public stellate::testing::StubMesher {
     bool throws = false;              // Absorb throws
     std::uint64_t revision_step = 1;  // 2: deltas that do not follow
     std::shared_future<void> gate;    // Absorb waits for it, or to be interrupted
+    bool foreseeable = false;         // a half of the work is done, as far as is known
   };
 
   FakeMesher(core::Specification spec, Plan plan)
@@ -49,6 +50,8 @@ class FakeMesher : public stellate::testing::StubMesher {
     if (plan_.throws) throw std::runtime_error("boom");
     if (!plan_.absorb_error.ok()) return tl::unexpected(plan_.absorb_error);
     ++progress_.round;
+    progress_.fraction = 0.5;
+    progress_.is_foreseeable = plan_.foreseeable;
     core::MeshDelta delta;
     delta.revision = progress_.round * plan_.revision_step;
     delta.first_vertex = progress_.vertices;
@@ -236,6 +239,26 @@ TEST(Session, WhatARoundLedToIsShownBeforeTheNextIsAnswered) {
       });
   EXPECT_EQ(running.Finish().revision, 3u);
   EXPECT_EQ(seen, 3);
+}
+
+TEST(Session, TheTimeLeftIsToldOnlyWhereItIsKnown) {
+  for (const bool foreseeable : {true, false}) {
+    FakeMesher::Plan plan;
+    plan.foreseeable = foreseeable;
+    Running running(Faking(plan));
+    SessionView meanwhile;
+    const auto worker = FakeWorker::Join(&running.session->pool(),
+                                         [&](const Chunk& chunk, core::AnswerBlock* answer) {
+                                           if (chunk.round->batch->round == 3)
+                                             meanwhile = running.session->View();
+                                           return FakeWorker::AnswerTruly(chunk, answer);
+                                         });
+    running.Finish();
+    EXPECT_EQ(meanwhile.progress.fraction, 0.5);
+    EXPECT_GT(meanwhile.elapsed_seconds, 0);
+    EXPECT_EQ(meanwhile.remaining_seconds, foreseeable ? meanwhile.elapsed_seconds : 0);
+    EXPECT_EQ(running.session->View().remaining_seconds, 0) << "it is over";
+  }
 }
 
 // The real mesher, and workers that answer for the sphere.

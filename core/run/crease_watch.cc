@@ -1,0 +1,128 @@
+#include "core/run/crease_watch.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <set>
+#include <tuple>
+
+#include "core/base/instantiate.h"
+#include "core/base/parallel.h"
+#include "core/base/vector_ops.h"
+
+namespace stellate::core {
+namespace {
+
+// In fewer rounds runs that end by themselves halve what is left, once their front rests; and in so
+// many it rests, if it ever does.
+constexpr std::uint64_t kLongestFront = 100;
+constexpr std::size_t kMostWays = 6;
+constexpr double kLeastSine2 = 0.03;  // ten degrees
+
+struct Edge {
+  std::uint32_t p = 0, q = 0;
+  double turn2 = 0, length2 = 0;  // the sum of squared sines; the length, squared
+};
+
+template <int K>
+double SumOfSquaredSinesBetween(const double* one, const double* other, int d) {
+  double kept = 0;
+  for (int a = 0; a < K; ++a)
+    for (int b = 0; b < K; ++b) {
+      const double cosine = Dot(one + a * d, other + b * d, d);
+      kept += cosine * cosine;
+    }
+  return K - kept;
+}
+
+template <int K>
+std::vector<Edge> EdgesThatTurn(const StarComplex<K>& complex,
+                                const std::vector<std::uint32_t>& stars, double longest) {
+  return ParallelGather<Edge>(stars.size(), [&](std::size_t i, std::vector<Edge>* found) {
+    const std::uint32_t p = stars[i];
+    const auto& cell = complex.cell(p);
+    for (std::size_t f = 0; f < cell.facet_count(); ++f) {
+      const std::uint32_t q = cell.id(f);
+      if (!IsSample(q)) continue;
+      Edge edge{std::min(p, q), std::max(p, q), 0, 0};
+      edge.length2 = SquaredDistance(complex.Point(p), complex.Point(q), complex.d());
+      if (edge.length2 > longest * longest || edge.length2 == 0) continue;
+      edge.turn2 = SumOfSquaredSinesBetween<K>(complex.Tangent(edge.p), complex.Tangent(edge.q),
+                                               complex.d());
+      if (edge.turn2 >= kLeastSine2) found->push_back(edge);
+    }
+  });
+}
+
+template <int K>
+std::vector<Way> Steepest(const StarComplex<K>& complex, std::vector<Edge> edges) {
+  std::vector<Way> ways;
+  std::set<std::uint32_t> used;
+  const auto take = [&](std::size_t most) {
+    for (std::size_t i = 0; i < edges.size() && ways.size() < most; ++i) {
+      const auto& [p, q, turn2, length2] = edges[i];
+      if (used.count(p) + used.count(q) > 0) continue;
+      used.insert({p, q});
+      const auto point = [&](std::uint32_t v) {
+        return Eigen::Map<const Eigen::VectorXd>(complex.Point(v), complex.d());
+      };
+      const auto basis = [&](std::uint32_t v) {
+        return Eigen::Map<const Eigen::MatrixXd>(complex.Tangent(v), complex.d(), K);
+      };
+      ways.push_back({point(p), point(q), basis(p), basis(q)});
+    }
+  };
+  ParallelSort(edges, [](const Edge& a, const Edge& b) {
+    return std::tuple(-a.turn2, a.length2, a.p, a.q) < std::tuple(-b.turn2, b.length2, b.p, b.q);
+  });
+  take(kMostWays / 2);
+  ParallelSort(edges, [](const Edge& a, const Edge& b) {
+    return std::tuple(-a.turn2 / a.length2, a.p, a.q) < std::tuple(-b.turn2 / b.length2, b.p, b.q);
+  });
+  take(kMostWays);
+  return ways;
+}
+
+}  // namespace
+
+bool CreaseWatch::IsDue(std::uint64_t left, bool judges_all) {
+  const bool begins = judges_all && !judged_all_;
+  const bool progress = 2 * left <= left_then_ || (front_moved_ && rounds_ < kLongestFront);
+  judged_all_ = judges_all;
+  front_moved_ = false;
+  ++rounds_;
+  if (begins || progress) {
+    left_then_ = left;
+    rounds_since_ = 0;
+  }
+  if (rounds_since_++ < patience_) return false;
+  patience_ *= 2;
+  rounds_since_ = 0;
+  left_then_ = left;
+  return true;
+}
+
+template <int K>
+std::vector<Way> SteepWaysAtFaults(const Engine<K>& engine, double longest) {
+  std::vector<std::uint32_t> stars = engine.book().blemished_stars();
+  for (const auto& entry : engine.book().size_and_shape()) {
+    CheckInterruption(stars.size());
+    stars.push_back(entry.star);
+  }
+  return Steepest<K>(engine.complex(), EdgesThatTurn<K>(engine.complex(), stars, longest));
+}
+
+template <int K>
+std::vector<Way> SteepWays(const StarComplex<K>& complex, double longest) {
+  std::vector<std::uint32_t> stars(complex.size());
+  std::iota(stars.begin(), stars.end(), 0u);
+  return Steepest<K>(complex, EdgesThatTurn<K>(complex, stars, longest));
+}
+
+#define STELLATE_EACH(K)                                                    \
+  template std::vector<Way> SteepWaysAtFaults<K>(const Engine<K>&, double); \
+  template std::vector<Way> SteepWays<K>(const StarComplex<K>&, double);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core

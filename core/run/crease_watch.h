@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/refinement/engine.h"
+#include "core/run/crease_probe.h"
+
+namespace stellate::core {
+
+// When to ask whether M is smooth where rules keep failing.
+class CreaseWatch {
+ public:
+  // A star on the advancing front was mended since the last round.
+  void NoteFrontMoved() { front_moved_ = true; }
+  // Whether no round of late has left much less than `left` violations. Called once a round;
+  // judges_all: R3 and R4 are among them. After it was so, it is so again much later.
+  bool IsDue(std::uint64_t left, bool judges_all);
+
+ private:
+  bool front_moved_ = false;
+  bool judged_all_ = false;                      // in the round before
+  std::uint64_t left_then_ = ~std::uint64_t{0};  // at the last progress
+  std::uint64_t rounds_ = 0, rounds_since_ = 0, patience_ = 16;
+};
+
+// Edges at stars that break a rule, no longer than `longest`, along which M's tangent spaces turn
+// most: by how much, and for their length. A few, without common ends; none if all turn little.
+template <int K>
+std::vector<Way> SteepWaysAtFaults(const Engine<K>& engine, double longest);
+
+// The same of the whole sample.
+template <int K>
+std::vector<Way> SteepWays(const StarComplex<K>& complex, double longest);
+
+}  // namespace stellate::core
