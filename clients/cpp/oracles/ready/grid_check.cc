@@ -7,8 +7,8 @@
 namespace stellate::oracles {
 namespace {
 
-constexpr double kFlat = 0.5;  // of the places where a level is passed, of which no more may lie
-                               // between equal values
+constexpr double kFlatShare = 0.5;  // of the places where a level is passed, of which no more may
+                                    // lie between equal values
 constexpr std::ptrdiff_t kOpen = 3;  // cells that an open border goes on for
 
 // The place of a value along each axis, and the next one. The last axis changes fastest.
@@ -81,7 +81,7 @@ double InsistOnASurface(const GridValues& grid, double level, bool open_border) 
     Refuse("no set of level " + Short(level) + ": the values lie between " + Short(low) + " and " +
            Short(high));
   }
-  if (FlatShare(grid, level) > kFlat) {
+  if (FlatShare(grid, level) > kFlatShare) {
     Refuse("values are all but constant on both sides of the level " + Short(level) +
            ", as labels and masks are: the surface between them is stairs, and no smooth one. "
            "Smooth them, by a Gaussian of some 1.5 spacings, or take distances to their surface");
