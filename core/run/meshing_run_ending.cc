@@ -15,8 +15,10 @@ void MeshingRun<K>::DescribeEnding(bool is_whole) {
     certificate = certification_->certificate();
     WarnOfCompromises<K>(engine_, spec_.epsilon, &certificate);
     // All else that was found wrong may be its doing.
-    if (crease_probe_.crease())
+    if (crease_probe_.crease()) {
       certificate.verdict = Message("Not certified: ", DescribeCrease(*crease_probe_.crease()));
+      certificate.only_too_coarse = false;
+    }
   } else {
     certificate.verdict = Message("not certified: the run ended as ", TerminationName(termination),
                                   certification_ ? " when every rule held, before it was certified"
