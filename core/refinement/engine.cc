@@ -132,8 +132,9 @@ std::vector<typename ViolationBook<K>::Entry> Engine<K>::JudgeSizeAndShape(
   using Entry = typename ViolationBook<K>::Entry;
   return ParallelGather<Entry>(stars.size(), [&](std::size_t i, std::vector<Entry>* found) {
     const std::uint32_t p = stars[i];
-    if (const auto worst = WorstSizeOrShape<K>(complex_, p, sizes_.BoundAt(complex_, p),
-                                               criteria_.radius_edge_bound, faces_.stage()))
+    if (const auto worst =
+            WorstSizeOrShape<K>(complex_, p, sizes_.BoundAt(complex_, p),
+                                criteria_.radius_edge_bound, faces_.stage(), faces_.left() + 1))
       found->push_back({p, *worst});
   });
 }
@@ -148,9 +149,9 @@ std::vector<Target<K>> Engine<K>::GoodPointTargets() {
   if (kMostlySuspect * suspects.size() >= complex_.size()) consistent.emplace(complex_);
   ParallelFor(suspects.size(), [&](std::size_t i) {
     const std::uint32_t p = suspects[near[i]];
-    found[near[i]] =
-        WorstSliverOrInconsistent<K>(complex_, p, criteria_.shape, sizes_.BoundAt(complex_, p),
-                                     faces_.stage(), consistent ? consistent->Of(p) : 0);
+    found[near[i]] = WorstSliverOrInconsistent<K>(
+        complex_, p, criteria_.shape, sizes_.BoundAt(complex_, p), faces_.stage(),
+        consistent ? consistent->Of(p) : 0, faces_.left() + 1);
   });
   filled_.ForgetMended();
   if (faces_.stage() == K &&
@@ -216,7 +217,7 @@ std::optional<std::vector<Target<K>>> Engine<K>::Plan() {
 template <int K>
 bool Engine<K>::AllRulesHold() const {
   const auto& entries = book_.size_and_shape();
-  return book_.blemished() == 0 &&
+  return faces_.left() == 0 && book_.blemished() == 0 &&
          std::all_of(entries.begin(), entries.end(), [&](const auto& entry) {
            return filled_.Mends(complex_, entry.star, entry.violation);
          });

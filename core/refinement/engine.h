@@ -18,6 +18,14 @@
 
 namespace stellate::core {
 
+// A corner where more walls than K meet, such that M has no inside there, or more than K - 1 of
+// them
+// (`along`) meet along an edge that leaves it, or there are more than can be told apart.
+struct CrowdedCorner {
+  Eigen::VectorXd point;
+  WallSet walls, along;
+};
+
 // The algorithm of Sec. 5.3.5 between rounds: the sample, its stars, and all that is known of them.
 // A round of whoever drives it is
 //
@@ -69,6 +77,12 @@ class Engine {
   AnsweredPoints InteriorSeeds();
   // On to faces of the next dimension. False after the last.
   bool AdvanceStage();
+  // The same where the faces of this stage are refined without end: no rule looks at them any more.
+  // False in the last stage.
+  bool LeaveStage();
+  // Of a run that ends before its last stage: makes simplices inside of what there is, however
+  // large. `added`, `removed`: as of Commit, of the round.
+  void CompleteStars(std::vector<std::uint32_t>* added, std::vector<std::uint32_t>* removed);
   // Whether edges and corners are at rest, and some sharp one is not guarded (core/refinement/
   // guards.h).
   bool WantsGuards(const std::vector<Target<K>>& targets) const;
@@ -76,6 +90,10 @@ class Engine {
   // Commit, of the round.
   std::optional<std::vector<Target<K>>> GuardSharpEdges(std::vector<std::uint32_t>* added,
                                                         std::vector<std::uint32_t>* removed);
+  // Whether corners of more walls than K are as they are is asked for, and they are inserted, or
+  // left out where M has no more than that point. One that the refinement cannot cope with, if any.
+  PlannedPoints CrowdQuestions() const;
+  std::optional<CrowdedCorner> SettleCrowds(const AnsweredPoints& answers);
   // Where faces were discovered since; to be asked for beside the targets.
   PlannedPoints TakeDiscoveries();
 
@@ -97,6 +115,7 @@ class Engine {
   const SizeField<K>& sizes() const { return sizes_; }
   const ViolationBook<K>& book() const { return book_; }
   FaceBook<K>& faces() { return faces_; }
+  const FaceBook<K>& faces() const { return faces_; }
   FilledMesh<K>& filled() { return filled_; }
   const FilledMesh<K>& filled() const { return filled_; }
 

@@ -1,7 +1,6 @@
 // What the engine does for manifolds with boundary alone: faces are meshed by dimension, the lowest
 // first, and each insertion yields to faces of lower dimension, as in Ruppert's refinement.
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -26,11 +25,7 @@ constexpr double kLeastSplit = 0.02;
 // A point of a face is news this far from the sample, in sizes asked for; a corner, which nothing
 // else can be instead of, anywhere but at itself.
 constexpr double kNewsAway = 0.5;
-constexpr double kSameCorner = 1e-6;
-// How far a corner's collar is: this share of epsilon, and of the distance to the nearest other
-// corner, so that two collars leave room between them. On a curved edge it may be a little longer.
-constexpr double kCollar = 0.5;
-constexpr double kCollarShare = 0.4;
+// On a curved edge a collar may be a little longer than it was set.
 constexpr double kCollarLength = 1.1;
 
 // A face of the stage that no vertex is on takes a seed however near to the sample: it is a small
@@ -51,38 +46,6 @@ void TakeSeedsOfUnmetFaces(const StarComplex<K>& complex, int stage,
 }
 
 }  // namespace
-
-// Around each corner, before anything else, a point on each of its edges: these are equally far
-// then, and no two edges that leave a corner at a sharp angle split each other without end.
-template <int K>
-PlannedPoints Engine<K>::SetCollars() {
-  std::vector<std::uint32_t> corners;
-  for (std::uint32_t p = 0; p < complex_.size(); ++p)
-    if (CountWalls(complex_.walls(p)) == K) corners.push_back(p);
-  PlannedPoints planned;
-  planned.points.resize(complex_.d(), static_cast<Eigen::Index>(corners.size() * K));
-  Eigen::Index column = 0;
-  for (const std::uint32_t p : corners) {
-    CheckInterruption(static_cast<std::size_t>(column));
-    double radius = kCollar * criteria_.epsilon;
-    for (const std::uint32_t q : corners)
-      if (q != p)
-        radius = std::min(
-            radius, kCollarShare * Distance(complex_.Point(p), complex_.Point(q), complex_.d()));
-    faces_.SetCollar(p, radius);
-    // Along the edge on all walls but one: what leaves that one alone inwards.
-    const Eigen::Map<const Eigen::Matrix<double, K, K, Eigen::RowMajor>> conormals(
-        complex_.Conormals(p));
-    const Eigen::Matrix<double, K, K> edges = -conormals.inverse();
-    int number = 0;
-    ForEachWall(complex_.walls(p), [&](int wall) {
-      const Eigen::Matrix<double, K, 1> x = radius * edges.col(number++).normalized();
-      complex_.Lift(p, x.data(), planned.points.col(column++).data());
-      planned.walls.push_back(complex_.walls(p) & ~SetOfWall(wall));
-    });
-  }
-  return planned;
-}
 
 template <int K>
 bool Engine<K>::IsCollar(const typename StarComplex<K>::FaceSimplex& simplex) const {
@@ -116,6 +79,7 @@ std::optional<Target<K>> Engine<K>::SplitOf(const typename StarComplex<K>::CellV
   violation.split = true;
   const auto simplex = complex_.FaceSimplexOf(at.star, cell, at.vertex);
   if (IsCollar(simplex)) return std::nullopt;
+  if (violation.dimension() <= faces_.left()) return std::nullopt;
   // The middle of an edge between guards is in both.
   if (simplex.count == 2 && complex_.GuardOf(simplex.ids[0]) > 0 &&
       complex_.GuardOf(simplex.ids[1]) > 0)
@@ -202,7 +166,8 @@ PlannedPoints Engine<K>::ChooseSeeds() {
   for (auto& seed : faces_.seeds()) {
     CheckInterruption(chosen.size() + left.size());
     const int dimension = K - CountWalls(seed.walls);
-    const double apart = dimension == 0 ? kSameCorner * criteria_.epsilon : criteria_.epsilon;
+    const double apart =
+        dimension == 0 ? FaceBook<K>::kSameCorner * criteria_.epsilon : criteria_.epsilon;
     const bool covered =
         complex_.AnyWithin(seed.point.data(), apart) ||
         std::any_of(chosen.begin(), chosen.end(), [&](const auto& other) {
@@ -254,6 +219,24 @@ bool Engine<K>::AdvanceStage() {
 }
 
 template <int K>
+bool Engine<K>::LeaveStage() {
+  if (!faces_.has_walls() || faces_.stage() == K) return false;
+  faces_.Leave();
+  return AdvanceStage();
+}
+
+// What is known of the boundary is as far as stars are followed while faces are meshed alone.
+template <int K>
+void Engine<K>::CompleteStars(std::vector<std::uint32_t>* added,
+                              std::vector<std::uint32_t>* removed) {
+  if (faces_.stage() == K || complex_.size() == 0) return;
+  const std::vector<std::uint32_t> before = complex_.Simplices();
+  complex_.FollowAll();
+  complex_.Commit();
+  ExchangeSimplices<K>(before, complex_.Simplices(), added, removed);
+}
+
+template <int K>
 bool Engine<K>::WantsGuards(const std::vector<Target<K>>& targets) const {
   return K == 3 && faces_.stage() >= 1 && !faces_.has_discoveries() &&
          std::all_of(targets.begin(), targets.end(),
@@ -265,11 +248,14 @@ template <int K>
 std::optional<std::vector<Target<K>>> Engine<K>::GuardSharpEdges(
     std::vector<std::uint32_t>* added, std::vector<std::uint32_t>* removed) {
   Guards<K> guards = PlanGuards<K>(complex_, sizes_);
-  std::vector<Target<K>> splits;
-  for (const auto& gap : guards.gaps)
-    if (!book_.is_given_up(gap.star))
-      if (const auto split = SplitOf(gap, Rule::kSize)) splits.push_back(*split);
-  if (!splits.empty()) return splits;
+  if (faces_.MaySplitForGuards(complex_.size(), MostSplits<K>(guards))) {
+    std::vector<Target<K>> splits;
+    for (const auto& gap : guards.gaps)
+      if (!book_.is_given_up(gap.star))
+        if (const auto split = SplitOf(gap, Rule::kSize)) splits.push_back(*split);
+    if (!splits.empty()) return splits;
+  }
+  faces_.NoteGuarded();
   const std::vector<std::uint32_t> before = complex_.Simplices();
   complex_.Guard(std::move(guards.radii2));
   ExchangeSimplices<K>(before, complex_.Simplices(), added, removed);
@@ -292,7 +278,8 @@ PlannedPoints Engine<K>::TakeDiscoveries() {
     planned.points.col(column) = found[i].point;
     planned.walls.push_back(found[i].walls);
     planned.spacing[column] =
-        criteria_.epsilon * (CountWalls(found[i].walls) == K ? kSameCorner : kNewsAway);
+        criteria_.epsilon *
+        (CountWalls(found[i].walls) == K ? FaceBook<K>::kSameCorner : kNewsAway);
   }
   return planned;
 }
@@ -308,7 +295,9 @@ std::vector<FaceMesh> Engine<K>::Faces() const {
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
       const auto simplex = complex_.FaceSimplexOf(p, cell, v);
       if (simplex.walls == 0 || simplex.fake || simplex.ids[0] != p) continue;
-      Simplex& corners = faces[{simplex.dimension(), simplex.walls}].emplace_back();
+      // A corner of more walls than K has several vertices of its cell at itself.
+      const WallSet walls = simplex.dimension() == 0 ? complex_.walls(p) : simplex.walls;
+      Simplex& corners = faces[{simplex.dimension(), walls}].emplace_back();
       std::copy_n(simplex.ids.begin(), simplex.count, corners.begin());
     }
   }
@@ -332,10 +321,12 @@ std::vector<FaceMesh> Engine<K>::Faces() const {
   template void Engine<K>::YieldToFaces(std::vector<Target<K>>*);                               \
   template PlannedPoints Engine<K>::ChooseSeeds();                                              \
   template AnsweredPoints Engine<K>::InteriorSeeds();                                           \
-  template PlannedPoints Engine<K>::SetCollars();                                               \
   template bool Engine<K>::IsSliverAtBoundary(std::uint32_t, const Violation<K>&) const;        \
   template bool Engine<K>::IsCollar(const StarComplex<K>::FaceSimplex&) const;                  \
   template bool Engine<K>::AdvanceStage();                                                      \
+  template bool Engine<K>::LeaveStage();                                                        \
+  template void Engine<K>::CompleteStars(std::vector<std::uint32_t>*,                           \
+                                         std::vector<std::uint32_t>*);                          \
   template bool Engine<K>::WantsGuards(const std::vector<Target<K>>&) const;                    \
   template std::optional<std::vector<Target<K>>> Engine<K>::GuardSharpEdges(                    \
       std::vector<std::uint32_t>*, std::vector<std::uint32_t>*);                                \

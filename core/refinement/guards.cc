@@ -33,7 +33,7 @@ bool IsSharp(const StarComplex<K>& complex, std::uint32_t p, double cosine) {
 
 template <int K>
 bool IsCorner(const StarComplex<K>& complex, std::uint32_t p) {
-  return CountWalls(complex.walls(p)) == K;
+  return CountWalls(complex.walls(p)) >= K;
 }
 
 // An edge of the mesh of edges, seen from one end.

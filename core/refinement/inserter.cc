@@ -206,6 +206,9 @@ void Inserter<K>::InsertPlanned() {
     if (to_.complex.size() >= max_vertices_) break;
     const Eigen::Index c = candidates_.drawn() + i;
     if (!answers_.found[static_cast<std::size_t>(c)]) continue;
+    if (CountWalls(WallsOf(c)) == K &&
+        to_.faces.KeepCrowd(answers_, c, FaceBook<K>::kSameCorner * to_.criteria.epsilon))
+      continue;
     if (!FitsFaces(c)) {
       if (const auto beyond = answers_.Beyond(c))
         to_.faces.Discover(answers_.points.col(c), WallsOf(c), *beyond);

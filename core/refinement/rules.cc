@@ -130,13 +130,13 @@ bool HasThinFace(const SimplexEdges<K>& edges, double sliver_bound) {
 template <int K>
 std::optional<Violation<K>> WorstSizeOrShapeOnFaces(const StarComplex<K>& complex, std::uint32_t p,
                                                     double epsilon, double radius_edge_bound,
-                                                    int stage) {
+                                                    int stage, int least) {
   const auto& cell = complex.cell(p);
   std::optional<Violation<K>> worst;
   for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
     const auto simplex = complex.FaceSimplexOf(p, cell, v);
     const int dimension = simplex.dimension();
-    if (dimension == 0 || dimension > stage) continue;
+    if (dimension < least || dimension > stage) continue;
     const double norm2 = cell.norm2(v);
     double edge2 = INFINITY;
     for (int i = 0; i < simplex.count; ++i) {
@@ -162,9 +162,10 @@ std::optional<Violation<K>> WorstSizeOrShapeOnFaces(const StarComplex<K>& comple
 
 template <int K>
 std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std::uint32_t p,
-                                             double epsilon, double radius_edge_bound, int stage) {
+                                             double epsilon, double radius_edge_bound, int stage,
+                                             int least) {
   if (complex.walls(p) != 0)
-    return WorstSizeOrShapeOnFaces<K>(complex, p, epsilon, radius_edge_bound, stage);
+    return WorstSizeOrShapeOnFaces<K>(complex, p, epsilon, radius_edge_bound, stage, least);
   if (stage < K) return std::nullopt;
   const auto& cell = complex.cell(p);
   std::optional<std::size_t> worst;
@@ -303,7 +304,8 @@ template <int K>
 std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const StarComplex<K>& complex,
                                                              std::uint32_t p,
                                                              const ShapeBounds& bounds,
-                                                             double size_bound, int stage) {
+                                                             double size_bound, int stage,
+                                                             int least) {
   const auto& cell = complex.cell(p);
   std::optional<Folds<K>> folds;
   if (complex.judging() == Judging::kCommonCentre) folds.emplace(complex, p);
@@ -311,7 +313,7 @@ std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const StarComplex<K
   for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
     const auto simplex = complex.FaceSimplexOf(p, cell, v);
     const int dimension = simplex.dimension();
-    if (dimension == 0 || dimension > stage) continue;
+    if (dimension < least || dimension > stage) continue;
     if (simplex.fake) return std::nullopt;  // R1 gave up there: nothing to judge yet
     const bool whole = dimension == K, held = simplex.ids[0] == p;
     const bool thin =
@@ -336,9 +338,9 @@ template <int K>
 std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& complex,
                                                       std::uint32_t p, const ShapeBounds& bounds,
                                                       double size_bound, int stage,
-                                                      std::uint64_t consistent) {
+                                                      std::uint64_t consistent, int least) {
   if (complex.walls(p) != 0)
-    return WorstSliverOrInconsistentOnFaces<K>(complex, p, bounds, size_bound, stage);
+    return WorstSliverOrInconsistentOnFaces<K>(complex, p, bounds, size_bound, stage, least);
   if (stage < K) return std::nullopt;
   const auto& cell = complex.cell(p);
   if (!cell.bounded()) return std::nullopt;  // R1 gave up there: nothing to judge yet
@@ -378,15 +380,15 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& comp
   return violation;
 }
 
-#define STELLATE_EACH(K)                                                                      \
-  template std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>&, std::uint32_t, \
-                                                        double, double, int);                 \
-  template std::optional<Violation<K>> WorstSliverOrInconsistent(                             \
-      const StarComplex<K>&, std::uint32_t, const ShapeBounds&, double, int, std::uint64_t);  \
-  template bool HasThinFaceAt(const StarComplex<K>&, const double*,                           \
-                              const RestrictedVoronoiCell<K>&, std::size_t, double,           \
-                              const double*);                                                 \
-  template bool LeansTooFar(const StarComplex<K>&, std::uint32_t, const double*,              \
+#define STELLATE_EACH(K)                                                                          \
+  template std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>&, std::uint32_t,     \
+                                                        double, double, int, int);                \
+  template std::optional<Violation<K>> WorstSliverOrInconsistent(                                 \
+      const StarComplex<K>&, std::uint32_t, const ShapeBounds&, double, int, std::uint64_t, int); \
+  template bool HasThinFaceAt(const StarComplex<K>&, const double*,                               \
+                              const RestrictedVoronoiCell<K>&, std::size_t, double,               \
+                              const double*);                                                     \
+  template bool LeansTooFar(const StarComplex<K>&, std::uint32_t, const double*,                  \
                             const RestrictedVoronoiCell<K>&, std::size_t, double, const double*);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

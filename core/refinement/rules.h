@@ -44,26 +44,26 @@ struct Violation {
 // for R1 and by rho for R2. Of rho, star(p) looks at the edges at p: the others are at some other
 // vertex of the simplex, whose star looks at them.
 //
-// Faces of dimension at most `stage` are looked at, those of the lowest dimension first; to R2
+// Faces of dimension `least` to `stage` are looked at, those of the lowest dimension first; to R2
 // there belongs that no simplex is foreign. R2 and R3 leave simplices at guarded points alone.
 template <int K>
 std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std::uint32_t p,
                                              double epsilon, double radius_edge_bound,
-                                             int stage = K);
+                                             int stage = K, int least = 1);
 
 // R3 and R4, which need the neighbours' stars, and star(p) closed: first the worst simplex, by R_p,
 // that is or contains a sliver and whose lowest vertex p is, then the worst one that is
 // inconsistent, or, where stars are judged at common centres, that lies on the same side as a
 // neighbour of the facet they share in T_pM: such a star is no embedded disk although all its
 // vertices agree on it; then the worst one whose lowest vertex p is and that leans too far, or else
-// that has a sharp dihedral angle. Of faces up to `stage`, those of the lowest dimension first.
+// that has a sharp dihedral angle. Of faces as above, those of the lowest dimension first.
 // `size_bound`: of R1 for p, length. `consistent`: what is known of p already
 // (ConsistentSimplices).
 template <int K>
 std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& complex,
                                                       std::uint32_t p, const ShapeBounds& bounds,
                                                       double size_bound, int stage = K,
-                                                      std::uint64_t consistent = 0);
+                                                      std::uint64_t consistent = 0, int least = 1);
 
 // Whether the simplex on p and the facets of v is or contains a Theta0-sliver (Sec. 2.3): that is,
 // whether some face at p, of dimension 2 or more, has fatness below Theta0^j.

@@ -7,6 +7,7 @@
 #include "core/base/instantiate.h"
 #include "core/base/interruption.h"
 #include "core/base/vector_ops.h"
+#include "core/refinement/corner_cone.h"
 
 namespace stellate::core {
 
@@ -16,13 +17,20 @@ std::optional<WallCosine> SharpestAt(const StarComplex<K>& complex, std::uint32_
   if (CountWalls(walls) < 2) return std::nullopt;
   std::optional<WallCosine> sharpest;
   const double* const conormals = complex.Conormals(p);
+  // Of more walls than K some meet in the corner alone, and in no edge.
+  const CornerCone<K> cone = CountWalls(walls) > K ? ConeOf<K>(walls, conormals) : CornerCone<K>();
+  const auto share_edge = [&](WallSet pair) {
+    return cone.rays.empty() || std::any_of(cone.rays.begin(), cone.rays.end(),
+                                            [&](const auto& r) { return IsSubset(pair, r.walls); });
+  };
   int a = 0;
   ForEachWall(walls, [&](int first) {
     int b = a + 1;
     ForEachWall(walls & ~((SetOfWall(first) << 1) - 1), [&](int second) {
       // Between the half-spaces that the walls leave: 0 where their conormals are opposite.
       const double cosine = -Dot(conormals + K * a, conormals + K * b, K);
-      if (!sharpest || cosine > sharpest->cosine)
+      if ((!sharpest || cosine > sharpest->cosine) &&
+          share_edge(SetOfWall(first) | SetOfWall(second)))
         sharpest = WallCosine{SetOfWall(first) | SetOfWall(second), cosine};
       ++b;
     });

@@ -25,7 +25,10 @@ std::optional<WallCosine> SharpestAt(const StarComplex<K>& complex, std::uint32_
 template <int K>
 std::optional<WallAngle> Sharpest(const StarComplex<K>& complex);
 
-// From this angle on, degrees, the refinement was seen to end: any below are told by name.
-inline constexpr double SafeAngle(int k) { return k <= 2 ? 15 : 55; }
+// From this angle on, degrees, the refinement was seen to end, in dimension 3 by guards: if it does
+// not, any below are told by name.
+inline constexpr double SafeAngle(int k) { return k <= 2 ? 15 : k == 3 ? 22 : 55; }
+// Below this angle simplices are told to be as thin.
+inline constexpr double ThinAngle(int k) { return k <= 2 ? 15 : 55; }
 
 }  // namespace stellate::core

@@ -80,7 +80,7 @@ template <int K>
 std::optional<NearCorners> NearestCorners(const StarComplex<K>& complex) {
   std::vector<std::uint32_t> corners;
   for (std::uint32_t p = 0; K > 1 && p < complex.size(); ++p)
-    if (CountWalls(complex.walls(p)) == K) corners.push_back(p);
+    if (CountWalls(complex.walls(p)) >= K) corners.push_back(p);
   std::optional<NearCorners> nearest;
   for (std::size_t i = 0; i < corners.size(); ++i) {
     CheckInterruption(i);

@@ -14,6 +14,7 @@
 #include "core/certificate/first_ids.h"
 #include "core/complex/consistency.h"
 #include "core/geometry/reach_bound.h"
+#include "core/refinement/corner_cone.h"
 #include "core/refinement/sharp_edges.h"
 #include "core/refinement/wall_bends.h"
 
@@ -26,6 +27,13 @@ constexpr double kLikelyError = 1e-3;
 // Of epsilon: corners of a solid that are so near to each other, or nearer, were seen to keep runs
 // from their end.
 constexpr double kNearlyMeet = 0.25;
+
+// 0, 2, 5
+std::string NameWalls(WallSet walls) {
+  std::string names;
+  ForEachWall(walls, [&](int wall) { names += Message(names.empty() ? "" : ", ", wall); });
+  return names;
+}
 
 }  // namespace
 
@@ -98,7 +106,8 @@ std::string DescribeCrease(const Crease& crease) {
 template <int K>
 void TellSharpest(const Engine<K>& engine, Certificate* certificate) {
   certificate->sharpest = Sharpest<K>(engine.complex());
-  if (!certificate->sharpest || certificate->sharpest->degrees >= SafeAngle(K)) return;
+  const double told_below = certificate->certified ? ThinAngle(K) : SafeAngle(K);
+  if (!certificate->sharpest || certificate->sharpest->degrees >= told_below) return;
   const WallAngle& sharpest = *certificate->sharpest;
   const int first = std::countr_zero(sharpest.walls);
   const int second = std::countr_zero(sharpest.walls & (sharpest.walls - 1));
@@ -163,25 +172,58 @@ void TellNearCorners(const Engine<K>& engine, double epsilon, Certificate* certi
   const std::optional<NearCorners> near = NearestCorners<K>(complex);
   if (!near || near->distance > kNearlyMeet * epsilon) return;
   if (certificate->verdict.ends_with('.')) certificate->verdict.pop_back();
-  std::string walls;
-  ForEachWall(complex.walls(near->first) | complex.walls(near->second),
-              [&](int wall) { walls += Message(walls.empty() ? "" : ", ", wall); });
   certificate->verdict += Message(
-      "; walls ", walls, " all but meet in one point: two corners are ", Brief(near->distance),
-      " apart at ",
+      "; walls ", NameWalls(complex.walls(near->first) | complex.walls(near->second)),
+      " all but meet in one point: two corners are ", Brief(near->distance), " apart at ",
       NamePoint(Eigen::Map<const Eigen::VectorXd>(complex.Point(near->first), complex.d())),
       ", far less than epsilon ", Brief(epsilon),
       "; move one of these walls, so that it passes farther away, or take a smaller epsilon.");
+}
+
+std::string WhyTooCrowded(const Eigen::VectorXd& point, WallSet walls, WallSet along, int k) {
+  std::string why =
+      Message("walls ", NameWalls(walls), " meet in one point at ", NamePoint(point), ", where ");
+  if (along != 0)
+    why += Message("more than ", k - 1, " of them meet along one edge of the manifold (walls ",
+                   NameWalls(along), "), or touch it");
+  else if (CountWalls(walls) > kMostAtCorner)
+    why += Message("at most ", kMostAtCorner, " can be told apart");
+  else
+    why += "they leave nothing of the manifold but a part without an inside";
+  return why + ": move one of them, so that it passes beside that, or cuts it at an angle";
+}
+
+// Stars of faces that were left before the rest was meshed.
+template <int K>
+std::string AboutLeftFaces(const Engine<K>& engine) {
+  const StarComplex<K>& complex = engine.complex();
+  const int most = engine.faces().left();
+  std::uint64_t bad = 0;
+  std::uint32_t first = 0;
+  for (std::uint32_t p = 0; most > 0 && p < complex.size(); ++p) {
+    CheckInterruption(p);
+    if (complex.walls(p) == 0) continue;
+    const double bound = engine.sizes().BoundAt(complex, p);
+    if (!WorstSizeOrShape<K>(complex, p, bound, engine.criteria().radius_edge_bound, most) &&
+        !WorstSliverOrInconsistent<K>(complex, p, engine.criteria().shape, bound, most))
+      continue;
+    if (bad++ == 0) first = p;
+  }
+  if (bad == 0) return "";
+  return Message(most == 1 ? "edges" : "faces of the boundary", " could not be mended at ", bad,
+                 " vertices, the first at ",
+                 NamePoint(Eigen::Map<const Eigen::VectorXd>(complex.Point(first), complex.d())),
+                 ", and the rest was meshed beside them; ");
 }
 
 template <int K>
 std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent) {
   const StarComplex<K>& complex = engine.complex();
   const auto& entries = engine.book().size_and_shape();
-  std::string left;
+  std::string left = AboutLeftFaces<K>(engine);
   if (!entries.empty())
-    left = Message(entries.size(), " stars break rule R1 or R2, one of them that of vertex ",
-                   entries.front().star, "; ");
+    left += Message(entries.size(), " stars break rule R1 or R2, one of them that of vertex ",
+                    entries.front().star, "; ");
   if (!entries.empty() && inconsistent == 0) return left + "try a smaller epsilon";
   left += Message(inconsistent, " simplices are inconsistent");
   for (std::uint32_t p = 0; p < complex.size(); ++p) {

@@ -47,6 +47,10 @@ void TellBend(const Engine<K>& engine, double epsilon, const std::optional<Piece
 template <int K>
 void TellNearCorners(const Engine<K>& engine, double epsilon, Certificate* certificate);
 
+// Why a corner of more walls than k cannot be meshed: `along`, those that meet along an edge there,
+// if that is why.
+std::string WhyTooCrowded(const Eigen::VectorXd& point, WallSet walls, WallSet along, int k);
+
 // What still breaks a rule, for people. inconsistent: simplices that DescribeUnfinished counted.
 template <int K>
 std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent);

@@ -249,7 +249,7 @@ void MeshingRun<K>::Plan() {
   if (engine_.is_full()) return Finish(Termination::kVertexBudget);
   if (box_watch_.has_left()) return Finish(Termination::kNoProgress);
   auto targets = engine_.Plan();
-  if (!targets) return End(Termination::kNoProgress);
+  if (!targets) return LeaveFaces();
   if (spec_.walls > 0 && !PlanFaces(&targets)) return;
   FaceBook<K>& faces = engine_.faces();
   if (targets->empty() && !faces.has_discoveries())
@@ -258,7 +258,7 @@ void MeshingRun<K>::Plan() {
   if (stall_watch_.IsHopeless(book.size_and_shape().size(), engine_.complex().size()) ||
       stall_watch_.HasStalled(book.size_and_shape().size() + book.blemished(),
                               !book.are_all_suspect()))
-    return End(Termination::kNoProgress);
+    return LeaveFaces();
   WatchForCreases();
   *targets = engine_.Select(*targets);
   PlannedPoints planned;
@@ -331,6 +331,9 @@ void MeshingRun<K>::Finish(Termination termination) {
   over_ = true;
   // What is laid has no stars yet.
   if (laying_ && termination == Termination::kRoundBudget) CommitLaid();
+  // A round that was absorbed ends so; else nobody would get what is added.
+  if (termination != Termination::kCancelled && termination != Termination::kOracleFailed)
+    engine_.CompleteStars(&delta_.added, &delta_.removed);
   laying_.reset();
   laid_.reset();
   batch_.reset();

@@ -75,6 +75,8 @@ class MeshingRun final : public Mesher {
   void JudgeWalls();
   bool PlanFaces(std::optional<std::vector<Target<K>>>* targets);
   bool AskToLayInterior();
+  void SettleCrowds();
+  void LeaveFaces();
   void CommitLaid();
   void LayAnswered();
   bool AskToLay();

@@ -6,6 +6,7 @@
 
 #include "core/base/message.h"
 #include "core/base/parallel.h"
+#include "core/run/ending.h"
 #include "core/run/meshing_run.h"
 
 namespace stellate::core {
@@ -38,6 +39,7 @@ void MeshingRun<K>::KeepFaceSeeds() {
     CheckInterruption(i);
     if (!answers.found[i]) continue;
     found += answers.walls[i] == 0;
+    engine_.faces().NoteClearances(answers, c);
     if (const std::optional<int> beyond = answers.Beyond(c)) {
       if (answers.walls[i] != 0)
         engine_.faces().Discover(answers.points.col(c), answers.walls[i], *beyond);
@@ -110,6 +112,12 @@ bool MeshingRun<K>::AskToLayInterior() {
 template <int K>
 bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
   const FaceBook<K>& faces = engine_.faces();
+  if (!faces.crowds().empty()) {
+    CandidateSet<K> candidates;
+    candidates.planned = engine_.CrowdQuestions();
+    Ask(std::move(candidates), &MeshingRun::SettleCrowds);
+    return false;
+  }
   while (true) {
     const bool idle = (*targets)->empty() && !faces.has_discoveries();
     if (PlannedPoints seeds = idle ? engine_.ChooseSeeds() : PlannedPoints(); seeds.size() > 0) {
@@ -133,11 +141,28 @@ bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
     }
     stall_watch_.NoteFrontMoved();
     if (!*targets) {
-      End(Termination::kNoProgress);
+      LeaveFaces();
       return false;
     }
   }
   return true;
+}
+
+template <int K>
+void MeshingRun<K>::SettleCrowds() {
+  const std::optional<CrowdedCorner> bad = engine_.SettleCrowds(trip_->answers());
+  if (bad)
+    Fail({StatusCode::kOracleBadConormal, WhyTooCrowded(bad->point, bad->walls, bad->along, K)});
+}
+
+// Where rounds have stopped to help: faces of this stage are left as they are, for the sake of the
+// rest; in the last the run is over.
+template <int K>
+void MeshingRun<K>::LeaveFaces() {
+  if (spec_.walls == 0 || !engine_.LeaveStage()) return End(Termination::kNoProgress);
+  stall_watch_ = StallWatch(1);  // beside them not all will yield: with less patience
+  if (engine_.faces().stage() == K && AskToLayInterior()) return;
+  Plan();
 }
 
 #define STELLATE_EACH(K)                                                  \
@@ -146,6 +171,8 @@ bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
   template void MeshingRun<K>::JudgeWalls();                              \
   template bool MeshingRun<K>::AskForSparesOnWalls(const PointsOnWalls&); \
   template bool MeshingRun<K>::AskToLayInterior();                        \
+  template void MeshingRun<K>::SettleCrowds();                            \
+  template void MeshingRun<K>::LeaveFaces();                              \
   template bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>*);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

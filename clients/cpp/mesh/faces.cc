@@ -113,7 +113,7 @@ std::vector<Face> Mesh::edges() const {
 std::vector<Face> Mesh::corners() const {
   std::vector<Face> corners = faces(0);
   std::erase_if(corners, [this](const Face& face) {
-    return face.walls.size() != static_cast<size_t>(dimension());
+    return face.walls.size() < static_cast<size_t>(dimension());
   });
   return corners;
 }

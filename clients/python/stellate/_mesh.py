@@ -52,8 +52,8 @@ class Mesh:
 
     @property
     def corners(self) -> tuple[Face, ...]:
-        """Where as many walls meet as the mesh has dimensions: points."""
-        return tuple(face for face in self.faces(0) if len(face.walls) == self.dimension)
+        """Where as many walls meet as the mesh has dimensions, or more: points."""
+        return tuple(face for face in self.faces(0) if len(face.walls) >= self.dimension)
 
     def faces(self, dimension: int) -> tuple[Face, ...]:
         """The faces of a dimension below k, of a manifold with boundary, by ascending walls."""

@@ -236,6 +236,59 @@ inline Domain GyroidSolid(double half) {
 inline Domain SmallGyroidSolid() { return GyroidSolid(1); }
 inline Domain LargeGyroidSolid() { return GyroidSolid(2.5); }
 
+// The gyroid's one side in a cell of one period.
+inline Domain GyroidCell(const Vector3d& low) {
+  constexpr double kPeriod = 2 * std::numbers::pi;
+  Domain m = Make(3, 3, 1, {}, {});
+  m.box = {low.array() - 0.05, low.array() + kPeriod + 0.05};
+  m.walls = {Gyroid};
+  for (int i = 0; i < 3; ++i) {
+    m.walls.push_back(HalfSpaceOf(Vector3d::Unit(i), -low[i]));
+    m.walls.push_back(HalfSpaceOf(-Vector3d::Unit(i), low[i] + kPeriod));
+  }
+  return m;
+}
+
+// The sheets |G| <= t: walls meet at 18 to 21 degrees where t is 0.8.
+inline Domain GyroidSheets(double t) {
+  Domain m = GyroidCell(Vector3d::Constant(0.13));
+  m.walls[0] = [t](const VectorXd& p, VectorXd* g) { return Gyroid(p, g) + t; };
+  m.walls.push_back([t](const VectorXd& p, VectorXd* g) {
+    const double value = t - Gyroid(p, g);
+    if (g) *g = -*g;
+    return value;
+  });
+  return m;
+}
+
+// What two unit balls have in common: its edge is a circle, of sin (degrees / 2) as radius.
+inline Domain Lens(double degrees) {
+  const double half = degrees * std::numbers::pi / 360;
+  const Vector3d up = std::cos(half) * Vector3d::UnitZ();
+  Domain m = Make(3, 3, 1.1 * std::sin(half), {1, 0, 0, 0}, {1, 0, 1});
+  m.walls = {BallOf(up, 1, -1, 3), BallOf(-up, 1, -1, 3)};
+  return m;
+}
+
+// Four walls meet in each corner.
+inline Domain Octahedron() {
+  Domain m = Make(3, 3, 1.1, {1, 0, 0, 0}, {1, 0, 1});
+  for (int i = 0; i < 8; ++i)
+    m.walls.push_back(HalfSpaceOf(Vector3d(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1), 1));
+  return m;
+}
+
+// ... in its top. With its ground, which leans, they meet at 37 degrees and more.
+inline Domain Pyramid() {
+  Domain m = Make(3, 3, 1.9, {1, 0, 0, 0}, {1, 0, 1});
+  for (int i = 0; i < 2; ++i)
+    for (const double sign : {1.0, -1.0})
+      m.walls.push_back(
+          HalfSpaceOf((sign * Vector3d::Unit(i) - 1.1 * Vector3d::UnitZ()).normalized(), 0.7));
+  m.walls.push_back(HalfSpaceOf(Vector3d(0.1, 0, 1).normalized(), 0.5));
+  return m;
+}
+
 // An interval times a torus.
 inline Domain CutTorus3() {
   Domain m = Make(3, 6, 1.2, {1, 2, 1, 0}, {2, 4, 2});

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "core/walls.h"
+
+namespace stellate::core {
+
+// What the walls that meet in a corner leave of its tangent space, by their conormals alone. Where
+// there are K of them, which are independent, each has a facet of it. Where there are more, as at
+// an octahedron's corner, or where a level set passes through the corner of a box, some may not.
+inline constexpr int kMostAtCorner = 16;
+template <int K>
+struct CornerCone {
+  // Where M's edges leave the corner.
+  struct Ray {
+    Eigen::Matrix<double, K, 1> along;  // unit
+    WallSet walls;                      // that it is on
+  };
+  std::vector<Ray> rays;  // none: M has no more than the corner itself there
+  WallSet walls = 0;      // those that have a facet of it
+  // It has an inside, and K - 1 walls meet along each ray.
+  bool is_simple = false;
+  WallSet crowded = 0;  // else: more walls than that which meet along one ray; or none
+};
+
+// `conormals`: K numbers for each of the walls, ascending, outward and unit.
+// REQUIRES: K > 1, and K of them are independent; there are kMostAtCorner at most.
+template <int K>
+CornerCone<K> ConeOf(WallSet walls, const double* conormals);
+
+}  // namespace stellate::core

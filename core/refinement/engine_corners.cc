@@ -1,0 +1,151 @@
+// What the engine does for corners of a manifold with boundary: what is there of M where more walls
+// than K meet, and where the first points of edges are.
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "core/base/parallel.h"
+#include "core/refinement/corner_cone.h"
+#include "core/refinement/engine.h"
+
+namespace stellate::core {
+namespace {
+
+// How far a corner's collar is: this share of epsilon, and of the distance to the nearest other
+// corner, so that two collars leave room between them.
+constexpr double kCollar = 0.5;
+constexpr double kCollarShare = 0.4;
+
+template <int K>
+using Vector = Eigen::Matrix<double, K, 1>;
+
+// Along the edges that leave a corner, and the walls of each. Of K walls: on all but one, what
+// leaves that one alone inwards.
+template <int K>
+std::vector<std::pair<Vector<K>, WallSet>> EdgesAtCorner(const StarComplex<K>& complex,
+                                                         std::uint32_t p) {
+  std::vector<std::pair<Vector<K>, WallSet>> edges;
+  const WallSet walls = complex.walls(p);
+  if (CountWalls(walls) > K) {
+    for (const auto& ray : ConeOf<K>(walls, complex.Conormals(p)).rays)
+      edges.emplace_back(ray.along, ray.walls);
+    return edges;
+  }
+  const Eigen::Map<const Eigen::Matrix<double, K, K, Eigen::RowMajor>> conormals(
+      complex.Conormals(p));
+  const Eigen::Matrix<double, K, K> along = -conormals.inverse();
+  int number = 0;
+  ForEachWall(walls, [&](int wall) {
+    edges.emplace_back(along.col(number++).normalized(), walls & ~SetOfWall(wall));
+  });
+  return edges;
+}
+
+}  // namespace
+
+// Around each corner, before anything else, a point on each of its edges: these are equally far
+// then, and no two edges that leave a corner at a sharp angle split each other without end.
+template <int K>
+PlannedPoints Engine<K>::SetCollars() {
+  std::vector<std::uint32_t> corners;
+  for (std::uint32_t p = 0; p < complex_.size(); ++p)
+    if (CountWalls(complex_.walls(p)) >= K) corners.push_back(p);
+  PlannedPoints planned;
+  std::vector<Eigen::VectorXd> points;
+  for (const std::uint32_t p : corners) {
+    CheckInterruption(points.size());
+    double radius = kCollar * criteria_.epsilon;
+    for (const std::uint32_t q : corners)
+      if (q != p)
+        radius = std::min(
+            radius, kCollarShare * Distance(complex_.Point(p), complex_.Point(q), complex_.d()));
+    faces_.SetCollar(p, radius);
+    for (const auto& [along, walls] : EdgesAtCorner<K>(complex_, p)) {
+      const Vector<K> x = radius * along;
+      complex_.Lift(p, x.data(), points.emplace_back(complex_.d()).data());
+      planned.walls.push_back(walls);
+    }
+  }
+  planned.points.resize(complex_.d(), static_cast<Eigen::Index>(points.size()));
+  for (std::size_t i = 0; i < points.size(); ++i)
+    planned.points.col(static_cast<Eigen::Index>(i)) = points[i];
+  return planned;
+}
+
+// Each wall by itself: a corner on some of them need not be where these alone are independent.
+template <int K>
+PlannedPoints Engine<K>::CrowdQuestions() const {
+  PlannedPoints planned;
+  for (const auto& crowd : faces_.crowds())
+    ForEachWall(crowd.suspects, [&](int wall) { planned.walls.push_back(SetOfWall(wall)); });
+  planned.points.resize(complex_.d(), static_cast<Eigen::Index>(planned.walls.size()));
+  Eigen::Index column = 0;
+  for (const auto& crowd : faces_.crowds())
+    for (int i = 0; i < CountWalls(crowd.suspects); ++i) planned.points.col(column++) = crowd.point;
+  return planned;
+}
+
+template <int K>
+std::optional<CrowdedCorner> Engine<K>::SettleCrowds(const AnsweredPoints& answers) {
+  std::optional<CrowdedCorner> bad;
+  const double same = FaceBook<K>::kSameCorner * criteria_.epsilon;
+  Eigen::Index column = 0;
+  for (const auto& crowd : faces_.TakeCrowds()) {
+    const auto dk = Eigen::Index{complex_.d()};
+    const Eigen::Map<const Eigen::MatrixXd> tangents(crowd.tangent.data(), dk, K);
+    std::map<int, Vector<K>> conormals;
+    int number = 0;
+    ForEachWall(crowd.walls, [&](int wall) {
+      conormals[wall] = crowd.conormals.template segment<K>(K * Eigen::Index{number++});
+    });
+    WallSet walls = crowd.walls;
+    ForEachWall(crowd.suspects, [&](int wall) {
+      const Eigen::Index c = column++;
+      if (!answers.found[static_cast<std::size_t>(c)] ||
+          (answers.points.col(c) - crowd.point).norm() > same)
+        return;
+      const Eigen::Map<const Eigen::MatrixXd> own(answers.tangents.col(c).data(), dk, K);
+      const Eigen::VectorXd outward = own * answers.conormals.col(c).template head<K>();
+      conormals[wall] = (tangents.transpose() * outward).normalized();
+      walls |= SetOfWall(wall);
+    });
+    if (!IsSubset(crowd.beyond, walls) || is_full() ||
+        complex_.AnyWithin(crowd.point.data(), same) || complex_.InGuard(crowd.point.data()))
+      continue;
+    std::vector<double> all;
+    const auto gather = [&](WallSet of) {
+      all.clear();
+      ForEachWall(of, [&](int wall) {
+        all.insert(all.end(), conormals[wall].data(), conormals[wall].data() + K);
+      });
+    };
+    gather(walls);
+    if (CountWalls(walls) > kMostAtCorner) {
+      bad = CrowdedCorner{crowd.point, walls, 0};
+      continue;
+    }
+    const CornerCone<K> cone = ConeOf<K>(walls, all.data());
+    if (cone.rays.empty()) continue;  // M has no more than that point there
+    if (!cone.is_simple) {
+      bad = CrowdedCorner{crowd.point, walls, cone.crowded};
+      continue;
+    }
+    gather(cone.walls);
+    complex_.Append(crowd.point.data(), crowd.tangent.data(), StarComplex<K>::kNone, cone.walls,
+                    all.data());
+    if (answers.sizes.size() > 0) sizes_.AppendGiven(crowd.size);
+  }
+  return bad;
+}
+
+#define STELLATE_EACH(K)                                    \
+  template PlannedPoints Engine<K>::SetCollars();           \
+  template PlannedPoints Engine<K>::CrowdQuestions() const; \
+  template std::optional<CrowdedCorner> Engine<K>::SettleCrowds(const AnsweredPoints&);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core
