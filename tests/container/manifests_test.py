@@ -363,6 +363,11 @@ def files_of(folder: pathlib.Path) -> dict[str, bytes]:
     return {file.name: file.read_bytes() for file in folder.iterdir() if file.is_file()}
 
 
+def public_key(kind: str, *options: str, text: bytes) -> bytes:
+    command = ["openssl", kind, *options]
+    return subprocess.run(command, input=text, capture_output=True, check=True).stdout
+
+
 class Secrets(unittest.TestCase):
     def test_what_is_there_is_kept_and_private(self) -> None:
         with tempfile.TemporaryDirectory() as scratch:
@@ -384,18 +389,11 @@ class Secrets(unittest.TestCase):
     def test_what_goes_to_a_cluster_signs_nothing(self) -> None:
         with tempfile.TemporaryDirectory() as folder:
             subprocess.run([ROOT / "docker/make-secrets", folder], check=True, capture_output=True)
-            authority = pathlib.Path(folder, "ca.pem").read_text()
-            self.assertIn("server.key", files_of(pathlib.Path(folder)))
-            for name, content in files_of(pathlib.Path(folder)).items():
-                if b"PRIVATE KEY" in content:
-                    public = subprocess.run(
-                        ["openssl", "pkey", "-pubout"], input=content, capture_output=True, check=True
-                    ).stdout.decode()
-                    signs = subprocess.run(
-                        ["openssl", "x509", "-noout", "-pubkey"],
-                        input=authority, capture_output=True, text=True, check=True,
-                    ).stdout  # fmt: skip
-                    self.assertNotEqual(public, signs, f"{name} is the authority's")
+            files = files_of(pathlib.Path(folder))
+            keys = {name: text for name, text in files.items() if b"PRIVATE KEY" in text}
+            self.assertEqual(keys.keys(), {"server.key", "proxy.pem"})
+            signs = public_key("x509", "-noout", "-pubkey", text=files["ca.pem"])
+            self.assertNotIn(signs, [public_key("pkey", "-pubout", text=k) for k in keys.values()])
 
 
 if __name__ == "__main__":

@@ -135,10 +135,12 @@ PYTHON = {
     "_faces.py": (),
     "_complex.py": ("_faces.py", "report.py"),
     "errors.py": ("_complex.py", "_shared.py", "proto"),
+    "_rows.py": (),
+    "_lowest.py": ("_rows.py", "_shared.py"),
     "oracle.py": ("errors.py",),
     "_wire": ("errors.py", "oracle.py", "_wire/enums.py", "proto"),
     "_files": ("_complex.py", "_version.py", "errors.py"),
-    "_doctor": ("_html.py", "_shared.py", "errors.py", "oracle.py"),
+    "_doctor": ("_html.py", "_lowest.py", "_shared.py", "errors.py", "oracle.py"),
     "_pipe": ("errors.py",),
 }
 

@@ -171,9 +171,9 @@ class Certificate:
     boundary_euler_characteristic: int = 0
     faces: tuple[FaceCertificate, ...] = ()  # by dimension, the lowest first
     sharpest: WallAngle | None = None  # where walls meet at the smallest angle, if any meet
-    # Refused for its size alone: nothing that was seen contradicts the mesh, which is too coarse for
-    # the reach to be certified.
-    only_too_coarse: bool = False
+    only_too_coarse: bool = (
+        False  # refused for its size alone: nothing that was seen contradicts it
+    )
 
 
 @dataclasses.dataclass(frozen=True)

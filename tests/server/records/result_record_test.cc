@@ -57,7 +57,8 @@ TEST(ResultRecord, HoldsFacesAndWhereWallsMeetMostSharply) {
   EXPECT_EQ(read->report.certificate.sharpest->point, Eigen::Vector3d(1, 2, 3));
 }
 
-// Those of earlier servers end before the boundary, or behind it, the past or the angle; what ends elsewhere is damaged.
+// Those of earlier servers end before the boundary, or behind it, the past or the angle; what ends
+// elsewhere is damaged.
 TEST(ResultRecord, EarlierOnesAreRead) {
   SessionResult result = Refused();
   result.report.certificate.only_too_coarse = true;

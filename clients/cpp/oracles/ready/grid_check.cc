@@ -7,8 +7,8 @@
 namespace stellate::oracles {
 namespace {
 
-constexpr double kFlatShare = 0.5;  // of the places where a level is passed, of which no more may
-                                    // lie between equal values
+constexpr double kFlatShare = 0.5;   // of the places where a level is passed, of which no more may
+                                     // lie between equal values
 constexpr std::ptrdiff_t kOpen = 3;  // cells that an open border goes on for
 
 // The place of a value along each axis, and the next one. The last axis changes fastest.
