@@ -171,9 +171,7 @@ class Certificate:
     boundary_euler_characteristic: int = 0
     faces: tuple[FaceCertificate, ...] = ()  # by dimension, the lowest first
     sharpest: WallAngle | None = None  # where walls meet at the smallest angle, if any meet
-    only_too_coarse: bool = (
-        False  # refused for its size alone: nothing that was seen contradicts it
-    )
+    only_too_coarse: bool = False  # refused for its size alone: nothing seen contradicts it
 
 
 @dataclasses.dataclass(frozen=True)
