@@ -1,9 +1,9 @@
 #include "core/certificate/probes.h"
 
 #include <algorithm>
-#include <array>
 #include <limits>
 #include <numeric>
+#include <vector>
 
 #include "core/base/parallel.h"
 #include "core/base/random.h"
@@ -61,10 +61,10 @@ Eigen::VectorXd PointInBox(const Eigen::VectorXd& lower, const Eigen::VectorXd& 
 Eigen::VectorXd PointNearSimplex(const MeshView& mesh, const std::uint32_t* ids, double push,
                                  Random& random) {
   // What k uniform numbers cut the unit interval into are the weights of a uniform point.
-  std::array<double, kMaxDimension + 2> cuts{};
-  for (int i = 1; i <= mesh.k; ++i) cuts[static_cast<std::size_t>(i)] = random.Uniform();
-  cuts[static_cast<std::size_t>(mesh.k) + 1] = 1;
-  std::sort(cuts.begin() + 1, cuts.begin() + 1 + mesh.k);
+  std::vector<double> cuts(static_cast<std::size_t>(mesh.k) + 2);
+  std::generate(cuts.begin() + 1, cuts.end() - 1, [&] { return random.Uniform(); });
+  cuts.back() = 1;
+  std::sort(cuts.begin(), cuts.end());
   Eigen::VectorXd x = Eigen::VectorXd::Zero(mesh.d);
   for (int i = 0; i <= mesh.k; ++i) {
     const auto at = static_cast<std::size_t>(i);
