@@ -33,7 +33,9 @@ using testing::Transformed;
 struct Shape {
   const char* manifold;
   double epsilon;
-  bool steady = true;  // its tangent bases do not turn round because of rounding
+  // Neither do its tangent bases turn round because of rounding, nor is anything else decided by a
+  // hair.
+  bool steady = true;
   // How far from the origin it can be, in epsilon. The tangents of rotations are taken from their
   // entries, and are orthonormal no longer where these have been rounded too much.
   double far = 1e12;
@@ -48,7 +50,7 @@ constexpr Shape kShapes[] = {{"circle:3", 0.3},
                              {"rp2:5", 0.35, false},
                              {"two-spheres", 0.3},
                              {"so3", 0.8, true, 1e10},
-                             {"flat-torus:3", 0.7},
+                             {"flat-torus:3", 0.7, false},
                              {"ellipsoid:1:0.9:0.8:0.76", 0.45}};
 
 void PrintTo(const Shape& s, std::ostream* out) { *out << s.manifold; }
@@ -123,7 +125,7 @@ TEST_P(Properties, PowersOfTwoChangeNothing) {
 }
 
 // Where axes change places sums round differently, and what is decided by a hair may be decided
-// otherwise; on these manifolds nothing is.
+// otherwise: on steady manifolds nothing is.
 TEST_P(Properties, AxesMayChangePlacesAndDirections) {
   Try([&](std::uint64_t seed, Random& random) {
     Specification spec = SpecificationFor(*manifold_, epsilon_);

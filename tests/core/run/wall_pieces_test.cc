@@ -106,6 +106,8 @@ bool ExpectNothingDropped(const Domain& m, double epsilon, std::uint64_t seed, i
     EXPECT_EQ(BettiNumbers(mesh.Rim()), m.boundary_homology) << c.verdict;
     return true;
   }
+  // Stars that never agreed say where, and not for which wall.
+  if (mesh.report.termination == Termination::kNoProgress) return false;
   EXPECT_NE(c.verdict.find("wall " + std::to_string(wall)), std::string::npos) << c.verdict;
   EXPECT_NE(c.verdict.find("("), std::string::npos) << c.verdict;
   EXPECT_NE(c.verdict.find("epsilon"), std::string::npos) << c.verdict;
