@@ -158,7 +158,7 @@ const std::map<std::string, std::function<std::unique_ptr<Oracle>()>>& Makers() 
       {"grid", TorusGrid},
       {"constraint_set", Clifford},
       {"linkage", FourBars},
-      {"point_cloud", [] { return std::make_unique<PointCloud>(TorusCloud(), 2); }},
+      {"point_cloud", [] { return std::make_unique<PointCloud>(TorusCloud(), 2, 0.2); }},
       {"triangle_mesh", [] { return std::make_unique<TriangleMesh>(TorusTriangles()); }},
   };
   return kMakers;

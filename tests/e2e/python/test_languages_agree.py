@@ -13,6 +13,7 @@ from ready_shapes import (
     clifford,
     closest,
     near,
+    torus_cloud,
     torus_triangles,
 )
 from stellate import oracles
@@ -53,7 +54,8 @@ ORACLES = {
     "grid": (ALL["signed_distance"][0], 0.2, 1e-7),
     "constraint_set": (clifford, 0.2, 1e-8),
     "linkage": (four_bars, 0.05, 1e-8),
-    "point_cloud": (ALL["point_cloud"][0], 0.1, 1e-9),
+    # By default Python's has a bandwidth of its own for each point, C++'s one for all.
+    "point_cloud": (lambda: oracles.PointCloud(torus_cloud(), 2, bandwidth=0.2), 0.1, 1e-9),
     "triangle_mesh": (lambda: oracles.TriangleMesh(*torus_triangles()), 0.1, 1e-9),
 }
 OF_THE_CATALOGUE = ("product", "transformed", "level_set")  # whose boxes have margins of their own
