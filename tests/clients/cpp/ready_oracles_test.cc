@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -203,8 +204,8 @@ class Files : public ::testing::Test {
     std::ofstream(folder_ / name) << text;
     return folder_ / name;
   }
-  const std::filesystem::path folder_ =
-      std::filesystem::path(::testing::TempDir()) / "stellate_ready_oracles_test";
+  const std::filesystem::path folder_ = std::filesystem::path(::testing::TempDir()) /
+                                        ("stellate-ready-oracles-" + std::to_string(getpid()));
 };
 
 TEST_F(Files, TrianglesAreReadExactly) {

@@ -27,8 +27,8 @@ class TriangleFiles : public ::testing::Test {
     std::ofstream(folder_ / ("a" + ending), std::ios::binary) << bytes;
     return folder_ / ("a" + ending);
   }
-  const std::filesystem::path folder_ =
-      std::filesystem::path(::testing::TempDir()) / "stellate_triangle_files_test";
+  const std::filesystem::path folder_ = std::filesystem::path(::testing::TempDir()) /
+                                        ("stellate-triangle-files-" + std::to_string(getpid()));
 };
 
 TEST_F(TriangleFiles, AllFormatsHoldTheSame) {
