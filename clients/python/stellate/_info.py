@@ -32,6 +32,7 @@ class MeshInfo:
     report: Report | None  # once it is over
     workers: int
     watchers: int
+    owner: str = ""  # told to administrators of the server alone
 
     @property
     def over(self) -> bool:
@@ -62,6 +63,7 @@ class MeshInfo:
             report=report,
             workers=mesh.workers,
             watchers=mesh.watchers,
+            owner=mesh.owner,
         )
 
 
