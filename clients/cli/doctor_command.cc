@@ -9,8 +9,9 @@
 #include <memory>
 #include <utility>
 
+#include "doctor_server.h"
 #include "server_options.h"
-#include "stellate/doctor_server.h"
+#include "text/printable.h"
 
 namespace stellate::cli {
 
@@ -25,6 +26,15 @@ DoctorCommand::DoctorCommand(CLI::App& parent)
   CLI::Option* const listen = command_->add_option(
       "--listen", listen_,
       "examine the oracles of workers that come here as to a server: host:port or unix:/path");
+  command_
+      ->add_option("--tls-cert", tls_certificate_,
+                   "PEM file with its certificate: others than this machine may come, over TLS")
+      ->needs(listen);
+  command_->add_option("--tls-key", tls_key_, "PEM file with its key")->needs(listen);
+  command_
+      ->add_option("--tls-client-ca", tls_client_ca_,
+                   "PEM file: workers show certificates of these authorities")
+      ->needs(listen);
   command_->add_flag("--exit-with-parent", exit_with_parent_, "stop when the parent process ends")
       ->needs(listen);
   command_->footer(
@@ -53,6 +63,9 @@ int DoctorCommand::Listen(const std::stop_token& stop) {
   std::atomic<bool> all_well = true;
   DoctorOptions options;
   options.listen = listen_;
+  options.tls_certificate = tls_certificate_;
+  options.tls_key = tls_key_;
+  options.tls_client_ca = tls_client_ca_;
   options.random_seed = options_.random_seed;
   options.on_listening = [](const std::string& address) {
     std::cout << "stellate doctor listening on " << address << std::endl;
@@ -69,7 +82,13 @@ int DoctorCommand::Listen(const std::stop_token& stop) {
 }
 
 void DoctorCommand::Print(const CheckReport& report) const {
-  std::cout << (json_ ? ToJson(report) : ToText(report)) << std::flush;
+  if (json_) {
+    std::cout << ToJson(report) << std::flush;
+    return;
+  }
+  CheckReport shown = report;  // in the words of oracles that may be others'
+  for (Finding& finding : shown.findings) finding.message = text::Printable(finding.message, '?');
+  std::cout << ToText(shown) << std::flush;
 }
 
 }  // namespace stellate::cli

@@ -24,7 +24,7 @@ class DoctorCommand {
   CLI::App* command_;
   OracleSource source_;
   CheckOptions options_;
-  std::string listen_;
+  std::string listen_, tls_certificate_, tls_key_, tls_client_ca_;
   bool exit_with_parent_ = false, json_ = false;
 };
 

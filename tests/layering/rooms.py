@@ -165,7 +165,18 @@ CLIENTS = {
         "clients/cpp/wire",
         "proto",
     ),
-    "clients/cli": ("clients/cpp/include", "clients/view/gateway", "text"),
+    # The one place where a client listens, and does so as the server does.
+    "clients/listening": (
+        *FACE,
+        "clients/cpp/include",
+        "clients/cpp/net",
+        "clients/cpp/run",
+        "clients/cpp/wire",
+        "proto",
+        "server/config",
+        "server/net",
+    ),
+    "clients/cli": ("clients/cpp/include", "clients/listening", "clients/view/gateway", "text"),
     **{
         in_package(room): tuple(in_package(taken) for taken in takes)
         for room, takes in PYTHON.items()
@@ -207,6 +218,7 @@ TABLE = Table(
             "server/net",
             "server/base",
             "clients/cpp/run",
+            "clients/listening",
             "clients/python/stellate",
             "clients/view/gateway",
             "tests",

@@ -3,6 +3,8 @@
 import contextlib
 import json
 import pathlib
+import socket
+import struct
 import subprocess
 
 import pytest
@@ -17,11 +19,13 @@ def doctor(*flags):
     program = pathlib.Path(stellate.find_stellated()).parent / "stellate"
     command = [program, "doctor", "--listen", "127.0.0.1:0", "--exit-with-parent", *flags]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        said, _, address = process.stdout.readline().strip().rpartition(" ")
-        assert said == "stellate doctor listening on"
-        with stellate.Client(address) as client:
-            yield process, client
-        process.terminate()
+        try:
+            said, _, address = process.stdout.readline().strip().rpartition(" ")
+            assert said == "stellate doctor listening on"
+            with stellate.Client(address) as client:
+                yield process, client
+        finally:
+            process.terminate()
 
 
 def examine(client, oracle, epsilon):
@@ -37,6 +41,102 @@ class Moving(Torus):
 class Raising(Torus):
     def closest_point(self, x):
         raise ArithmeticError("no such surface")
+
+
+def test_others_than_this_machine_come_over_tls_alone():
+    program = pathlib.Path(stellate.find_stellated()).parent / "stellate"
+    for flags in ["0.0.0.0:0"], ["[::]:0"], ["127.0.0.1:0", "--tls-cert", "a.pem"]:
+        done = subprocess.run(
+            [program, "doctor", "--listen", *flags], capture_output=True, text=True, timeout=60
+        )
+        assert done.returncode == 2, done
+        assert "--tls-key" in done.stderr
+        assert done.stdout == ""
+
+
+def frame(kind, flags, stream, payload=b""):
+    """Of HTTP/2."""
+    return (
+        struct.pack(">I", len(payload))[1:]
+        + bytes([kind, flags])
+        + struct.pack(">I", stream)
+        + payload
+    )
+
+
+def header(name, value):
+    """Without a table or Huffman's code."""
+    return b"\0" + bytes([len(name)]) + name.encode() + bytes([len(value)]) + value.encode()
+
+
+CREATE_MESH = b"".join(
+    header(*field)
+    for field in (
+        (":method", "POST"),
+        (":scheme", "http"),
+        (":path", "/stellate.v1.Stellate/CreateMesh"),
+        (":authority", "doctor"),
+        ("content-type", "application/grpc"),
+        ("te", "trailers"),
+    )
+)
+SETTINGS, PING, WINDOW = 4, 6, 8
+INITIAL_WINDOW = 4  # among the settings
+
+
+def send_unfinished(stranger, streams, size):
+    """Requests of `size` bytes that lack their last one, as fast as the windows allow.
+    ConnectionError when the server hangs up."""
+    left = {stream: size + 4 for stream in range(1, 2 * streams, 2)}
+    windows, initial = {0: 65535, **dict.fromkeys(left, 65535)}, 65535
+    # Their lengths, and zeros.
+    begins = {stream: struct.pack(">BI", 0, size) for stream in left}
+    stranger.sendall(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + frame(SETTINGS, 0, 0))
+    for stream in left:
+        stranger.sendall(frame(1, 4, stream, CREATE_MESH))
+    incoming = stranger.makefile("rb")
+    while True:
+        for stream in left:
+            while (n := min(16384, left[stream], windows[stream], windows[0])) > 0:
+                body = begins.pop(stream, b"").ljust(n, b"\0")
+                stranger.sendall(frame(0, 0, stream, body))
+                for counted in left, windows:
+                    counted[stream] -= n
+                windows[0] -= n
+        if not any(left.values()):
+            return
+        head = incoming.read(9)
+        if len(head) < 9:
+            raise ConnectionResetError
+        payload = incoming.read(int.from_bytes(head[:3], "big"))
+        kind, flags, stream = head[3], head[4], int.from_bytes(head[5:], "big")
+        if kind == WINDOW:
+            windows[stream] = windows.get(stream, 0) + int.from_bytes(payload, "big")
+        elif kind == SETTINGS and not flags:
+            for setting, value in struct.iter_unpack(">HI", payload):
+                if setting == INITIAL_WINDOW:
+                    for other in left:
+                        windows[other] += value - initial
+                    initial = value
+            stranger.sendall(frame(SETTINGS, 1, 0))
+        elif kind == PING and not flags:
+            stranger.sendall(frame(PING, 1, 0, payload))
+
+
+# 64 requests of 4 MB each, 5 of 60 MB each: more than 250 MB, if they were kept.
+@pytest.mark.parametrize(("streams", "size"), [(64, 4 << 20), (5, 60 << 20)])
+def test_requests_that_never_become_whole_are_not_kept(streams, size):
+    with doctor() as (process, client):
+        host, port = client.address.rsplit(":", 1)
+        with (
+            socket.create_connection((host, int(port)), 60) as stranger,
+            pytest.raises(ConnectionError),
+        ):
+            send_unfinished(stranger, streams, size - 64)
+        status = pathlib.Path(f"/proc/{process.pid}/status").read_text()
+        peak = int(status.split("VmHWM:")[1].split()[0]) >> 10
+        assert peak < 150, f"{peak} MB"
+        assert examine(client, Torus(), 0.01) == "SUCCEEDED"
 
 
 def test_finds_what_the_doctor_beside_the_oracle_finds():

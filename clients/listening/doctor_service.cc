@@ -1,4 +1,4 @@
-#include "run/doctor_service.h"
+#include "doctor_service.h"
 
 #include <algorithm>
 #include <chrono>
@@ -11,6 +11,7 @@ namespace stellate::client {
 namespace {
 
 constexpr size_t kMostPatients = 64;
+constexpr size_t kMostPatientBytes = size_t{16} << 20;  // of all: seeds may be many
 constexpr std::uint32_t kMostDimensions = 100'000;
 
 grpc::Status NotFound(const std::string& name) {
@@ -80,7 +81,12 @@ grpc::Status DoctorService::CreateMesh(grpc::ServerContext*, const v1::CreateMes
                 "; the doctor goes up to " + std::to_string(kMostDimensions)};
   }
   const std::lock_guard lock(mutex_);
-  if (patients_.size() == kMostPatients) patients_.pop_front();
+  size_t bytes = request->spec().ByteSizeLong();
+  for (const Patient& patient : patients_) bytes += patient.mesh.ByteSizeLong();
+  while (!patients_.empty() && (patients_.size() >= kMostPatients || bytes > kMostPatientBytes)) {
+    bytes -= patients_.front().mesh.ByteSizeLong();
+    patients_.pop_front();
+  }
   v1::Mesh& made = patients_.emplace_back().mesh;
   made.set_name("meshes/oracle-" + std::to_string(++count_));
   *made.mutable_spec() = request->spec();
