@@ -86,8 +86,8 @@ module Stellate
     # The record, if it is a file of this user's and no link; nil if there is none.
     def read_own
       # NONBLOCK: a pipe without another end would wait for it.
-      File.open(@record, File::RDONLY | File::NOFOLLOW | File::NONBLOCK | File::BINARY) do |file|
-        return file.read if file.stat.file? && file.stat.owned?
+      File.open(@record, File::RDONLY | File::NOFOLLOW | File::NONBLOCK) do |file|
+        return file.binmode.read if file.stat.file? && file.stat.owned?
       end
       raise Stellate.invalid("#{@record} is no file of this user's: take another directory")
     rescue Errno::ENOENT
