@@ -272,8 +272,8 @@ def write_meshes() -> None:
         entry = {"name": name, "about": about, "mesh": f"meshes/{name}.txt", "files": {}}
         mesh.save(_HERE / entry["mesh"])
         for ending in ("off", "obj", "ply", "msh", "stl"):
-            if (name, ending) == ("solid", "obj"):
-                continue  # its surface, or refused: some clients' .obj holds what they can orient alone
+            if name == "solid" and ending != "msh":
+                continue  # its surface, its triangles in any order, or refused by clients without it
             path = f"meshes/{name}.{ending}"
             try:
                 mesh.save(_HERE / path)

@@ -140,5 +140,7 @@ def watcher_scenarios(folder: pathlib.Path, *arguments: Any) -> Iterator[Scenari
 
 def file_scenarios(folder: pathlib.Path, *arguments: Any) -> Iterator[Scenario]:
     for entry in entries("meshes.json"):
-        for ending in ("txt", "obj"):  # what every client writes; the rest `stellate download` does
+        told = {"txt", *entry["files"], *entry.get("refused", ())}
+        # What every client writes; the rest `stellate download` does.
+        for ending in sorted(told & {"txt", "obj"}):
             yield Saved(entry, ending, folder, *arguments)
