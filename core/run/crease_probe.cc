@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -12,26 +13,31 @@ namespace {
 
 // Sine of ten degrees: what turns by less on a short way is no crease that a mesh could not follow.
 constexpr double kLeastSine = 0.17364817766693033;
-// A walk's end: a manifold that is smooth, and turns by as much on so short a way, bends
-// 20,000 times as sharply as the mesh is fine.
-constexpr double kShare = 1.0 / 4096;
-constexpr int kMostLegs = 24;
-// A leg is no longer than this share of that before; nor so short that rounding has its ends.
+// Of the mesh size: from ways as short walks are at their end. A manifold that is smooth, and turns
+// by as much on so short a way, bends thousands of times as sharply as the mesh is fine.
+constexpr double kShare = 1.0 / 2048;
+constexpr int kMostLegs = 48;
+// A leg is no longer than this share of that before; nor so short that what the oracle takes for
+// its differences, or rounding, is passed over.
 constexpr double kLongestLeg = 0.75;
-constexpr double kShortestLeg = 1e-3;
-constexpr double kKeptSine = 0.5;  // of the sine, by each leg
-// On either side of a crease tangent spaces agree, by this share of what they differ by across it,
-// and so many times as far from it as the way is long: noise has no sides, and what bends with some
-// radius turns on beyond a way of that length.
-constexpr double kAgree = 1.0 / 3, kNearSide = 4, kFarSide = 64;
-constexpr double kAround = 1.0 / 16;       // of a way: so far about its corner is looked
+constexpr double kShortestLeg = 0.2;
+constexpr double kKeptSine = 0.5;          // of the sine, by each leg
+constexpr double kSteepSine = 0.8;         // of it, by a leg that is taken rather than others
+constexpr double kAround = 3.0 / 16;       // of a way: so far about its corner is looked
 constexpr double kDifference = 1.0 / 128;  // of it: for tangents by differences
-constexpr double kBeyond = 8;              // times it: whether M goes on there
-constexpr double kStays = 0.3;             // of how far off M a step beyond a crease would be
-constexpr double kParallel = 0.05;         // of directions that meet nowhere
-constexpr double kFarthestCorner = 2;      // of a way's length, from its middle
+// At its end, so many times a way's length from its corner, along either tangent space: on the
+// sides of a crease M is straight from the one to the other, by this share of what it turns by.
+// Noise has no sides; what bends with some radius turns on there.
+constexpr double kBeyond = 8, kFarBeyond = 32, kNearest = 4;
+constexpr double kAgree = 1.0 / 3;
+constexpr double kOnTheWay = 0.6;    // of the turn between the sides, on the way itself
+constexpr double kStays = 0.3;       // of how far off M a step beyond a crease would be
+constexpr double kSharp = 0.1;       // of a way and its turn: M is so near to where its sides meet
+constexpr double kOpposite = -0.95;  // cosine of directions in which a side goes on
+constexpr double kParallel = 0.05;   // of directions that meet nowhere
+constexpr double kFarthestCorner = 2;  // of a way's length, from its middle
 
-constexpr Eigen::Index kAsked = 8, kSteps = 4;
+constexpr Eigen::Index kAsked = 8, kSteps = 4;  // steps, as far each of both
 
 // Of the space that `of` spans the unit direction that is farthest off `off`, and its sine.
 std::pair<Eigen::VectorXd, double> FarthestOff(const Eigen::MatrixXd& of,
@@ -73,23 +79,25 @@ double SineBetween(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other) {
   return FarthestOff(one, other).second;
 }
 
-CreaseProbe::CreaseProbe(int k, int d, bool gives_tangents, bool has_walls, std::uint64_t seed)
+CreaseProbe::CreaseProbe(int k, int d, double size, bool gives_tangents, bool has_walls,
+                         std::uint64_t seed)
     : k_(k),
       d_(d),
+      size_(size),
       gives_tangents_(gives_tangents),
       has_walls_(has_walls),
       finder_(k, d, 1, seed) {}
 
 void CreaseProbe::Start(std::vector<Way> ways) {
-  stage_ = Stage::kPoints;
+  is_difference_ = looks_beyond_ = false;
   walks_.clear();
   crease_.reset();
+  suspected_.reset();
   for (Way& way : ways) {
     Walk walk;
-    walk.first_length = way.length();
     walk.sine = SineBetween(way.at_a, way.at_b);
     walk.way = std::move(way);
-    if (walk.first_length > 0 && walk.sine >= kLeastSine) walks_.push_back(std::move(walk));
+    if (walk.way.length() > 0 && walk.sine >= kLeastSine) walks_.push_back(std::move(walk));
   }
 }
 
@@ -104,12 +112,15 @@ Eigen::MatrixXd CreaseProbe::PointsAbout(const Way& way) const {
   return points;
 }
 
+// Far beyond its corner, to both sides along either tangent space, and again farther.
 Eigen::MatrixXd CreaseProbe::StepsFrom(const Way& way) const {
   const Eigen::VectorXd corner = CornerOf(way);
-  const Eigen::VectorXd along_a = kBeyond * way.length() * FarthestOff(way.at_a, way.at_b).first;
-  const Eigen::VectorXd along_b = kBeyond * way.length() * FarthestOff(way.at_b, way.at_a).first;
-  Eigen::MatrixXd points(d_, kSteps);
-  points << corner + along_a, corner - along_a, corner + along_b, corner - along_b;
+  const Eigen::VectorXd along_a = way.length() * FarthestOff(way.at_a, way.at_b).first;
+  const Eigen::VectorXd along_b = way.length() * FarthestOff(way.at_b, way.at_a).first;
+  Eigen::MatrixXd points(d_, 2 * kSteps);
+  points << corner + kBeyond * along_a, corner - kBeyond * along_a, corner + kBeyond * along_b,
+      corner - kBeyond * along_b, corner + kFarBeyond * along_a, corner - kFarBeyond * along_a,
+      corner + kFarBeyond * along_b, corner - kFarBeyond * along_b;
   return points;
 }
 
@@ -117,9 +128,12 @@ std::vector<QueryBlock> CreaseProbe::Questions() {
   if (!is_asking()) return {};
   QueryBlock block;
   block.kind = QueryKind::kClosestPoint;
-  if (stage_ == Stage::kTangents) {
+  if (suspected_) {
+    block.points = suspected_->point;
+  } else if (is_difference_) {
     block = *finder_.Next();
-  } else if (stage_ == Stage::kSteps) {
+  } else if (looks_beyond_) {
+    block.want_tangents = gives_tangents_;
     block.points = StepsFrom(walks_.front().way);
   } else {
     block.want_tangents = gives_tangents_;
@@ -133,127 +147,168 @@ std::vector<QueryBlock> CreaseProbe::Questions() {
 }
 
 void CreaseProbe::Absorb(const std::vector<AnswerBlock>& answers) {
-  switch (stage_) {
-    case Stage::kPoints:
-      return TakePoints(answers.front());
-    case Stage::kTangents:
-      finder_.Absorb(answers.front());
-      if (finder_.Next() == nullptr) TakeTangents();
-      return;
-    case Stage::kSteps:
-      return TakeSteps(answers.front());
-  }
+  if (suspected_) return TakeCorner(answers.front());
+  if (!is_difference_) return TakePoints(answers.front());
+  finder_.Absorb(answers.front());
+  if (finder_.Next() == nullptr) TakeTangents();
 }
 
 void CreaseProbe::TakePoints(const AnswerBlock& answer) {
   std::vector<Eigen::Index> found;
-  walk_of_.clear();
-  for (Eigen::Index c = 0; c < answer.points.cols(); ++c) {
-    if (!answer.found.empty() && !answer.found[static_cast<std::size_t>(c)]) continue;
-    found.push_back(c);
-    walk_of_.push_back(static_cast<std::size_t>(c / kAsked));
-  }
+  for (Eigen::Index c = 0; c < answer.points.cols(); ++c)
+    if (answer.found.empty() || answer.found[static_cast<std::size_t>(c)]) found.push_back(c);
   for (Walk& walk : walks_) {
-    walk.nodes = {{walk.way.a, walk.way.at_a}, {walk.way.b, walk.way.at_b}};
+    walk.nodes.clear();
+    if (!looks_beyond_)
+      walk.nodes = {{-1, walk.way.a, walk.way.at_a}, {-1, walk.way.b, walk.way.at_b}};
   }
   found_ = answer.points(Eigen::all, found);
+  asked_ = found;
   if (found.empty()) return GoOn();
   if (gives_tangents_) {
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      Walk& walk = walks_[walk_of_[i]];
-      walk.nodes.push_back({answer.points.col(found[i]), Eigen::MatrixXd(d_, k_)});
-      ToByVector(answer.tangents.col(found[i]).data(), d_, k_, walk.nodes.back().basis.data());
+    for (const Eigen::Index c : found) {
+      Node node{c, answer.points.col(c), Eigen::MatrixXd(d_, k_)};
+      ToByVector(answer.tangents.col(c).data(), d_, k_, node.basis.data());
+      WalkOf(c).nodes.push_back(std::move(node));
     }
     return GoOn();
   }
   std::vector<double> steps;
-  for (const std::size_t w : walk_of_) steps.push_back(kDifference * walks_[w].way.length());
+  for (const Eigen::Index c : found) steps.push_back(kDifference * WalkOf(c).way.length());
   finder_.Start(found_, std::vector<const double*>(found.size(), nullptr), std::move(steps));
-  stage_ = Stage::kTangents;
+  is_difference_ = true;
+}
+
+// That asked for this.
+CreaseProbe::Walk& CreaseProbe::WalkOf(Eigen::Index asked) {
+  return looks_beyond_ ? walks_.front() : walks_[static_cast<std::size_t>(asked / kAsked)];
 }
 
 void CreaseProbe::TakeTangents() {
-  for (std::size_t i = 0; i < walk_of_.size(); ++i) {
+  is_difference_ = false;
+  for (std::size_t i = 0; i < asked_.size(); ++i) {
     if (!finder_.ok()[i]) continue;
     const auto c = static_cast<Eigen::Index>(i);
-    Walk& walk = walks_[walk_of_[i]];
-    walk.nodes.push_back({found_.col(c), Eigen::Map<const Eigen::MatrixXd>(
-                                             finder_.tangents().col(c).data(), d_, k_)});
+    WalkOf(asked_[i]).nodes.push_back(
+        {asked_[i], found_.col(c),
+         Eigen::Map<const Eigen::MatrixXd>(finder_.tangents().col(c).data(), d_, k_)});
   }
   GoOn();
 }
 
-// Each walk goes a leg on, as far as it leads anywhere; the first that is at its end is looked at
-// alone.
+// Each walk goes a leg on, as far as it leads anywhere; one that is so short that it tells is
+// looked at alone, and given up if there is nothing.
 void CreaseProbe::GoOn() {
-  stage_ = Stage::kPoints;
-  std::vector<Walk> left;
-  for (Walk& walk : walks_) {
-    if (!TakeLeg(&walk)) continue;
-    if (IsSettled(walk)) {
-      stage_ = Stage::kSteps;
-      left.clear();
-      left.push_back(std::move(walk));
-      break;
-    }
-    if (walk.legs < kMostLegs) left.push_back(std::move(walk));
+  if (looks_beyond_) {
+    looks_beyond_ = false;
+    suspected_ = WhatIsAt(walks_.front());
+    if (suspected_) return;
+    walks_.erase(walks_.begin());
+  } else {
+    std::erase_if(walks_, [&](Walk& walk) { return !TakeLeg(&walk) || walk.legs >= kMostLegs; });
   }
-  walks_ = std::move(left);
+  ChooseEnd();
+}
+
+// M goes to where its sides meet; what is rounded there, or passes by, stays away. Where an oracle
+// finds nothing there it has no tangent space.
+void CreaseProbe::TakeCorner(const AnswerBlock& answer) {
+  const bool found = answer.found.empty() || answer.found.front() != 0;
+  const double off = (answer.points.col(0) - suspected_->point).norm();
+  if (!found || off <= kSharp * turn_ * suspected_->length) {
+    crease_ = std::move(suspected_);
+    suspected_.reset();
+    return;
+  }
+  suspected_.reset();
+  walks_.erase(walks_.begin());
+  ChooseEnd();
+}
+
+void CreaseProbe::ChooseEnd() {
+  const auto ends = std::find_if(walks_.begin(), walks_.end(), [&](const Walk& walk) {
+    return walk.way.length() <= kShare * size_;
+  });
+  if (ends == walks_.end()) return;
+  std::swap(*ends, walks_.front());
+  looks_beyond_ = true;
 }
 
 // The shortest way between two points that were found, of those on which the tangent spaces still
-// turn.
+// turn as they did; else of those on which they turn half as much.
 bool CreaseProbe::TakeLeg(Walk* walk) const {
   const double length = walk->way.length();
-  double shortest = kLongestLeg * length;
   std::optional<Way> next;
-  double sine = 0;
+  double shortest = 0, sine = 0;
+  bool is_steep = false;
   const std::vector<Node>& nodes = walk->nodes;
   for (std::size_t i = 0; i < nodes.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
       const double apart = (nodes[i].point - nodes[j].point).norm();
-      if (apart >= shortest || apart < kShortestLeg * length) continue;
+      if (apart > kLongestLeg * length || apart < kShortestLeg * length) continue;
       const double turn = SineBetween(nodes[j].basis, nodes[i].basis);
       if (turn < std::max(kLeastSine, kKeptSine * walk->sine)) continue;
+      const bool steep = turn >= kSteepSine * walk->sine;
+      if (next && (is_steep == steep ? apart >= shortest : is_steep)) continue;
       next = Way{nodes[j].point, nodes[i].point, nodes[j].basis, nodes[i].basis};
       shortest = apart;
       sine = turn;
+      is_steep = steep;
     }
   if (!next) return false;
-  walk->before.insert(walk->before.end(), nodes.begin(), nodes.end());
   walk->way = std::move(*next);
   walk->sine = sine;
   ++walk->legs;
   return true;
 }
 
-bool CreaseProbe::IsSettled(const Walk& walk) const {
-  if (walk.way.length() > kShare * walk.first_length) return false;
-  bool with_a = false, with_b = false;
-  for (const Node& node : walk.before) {
-    const double away = (node.point - walk.way.a).norm() / walk.way.length();
-    if (away < kNearSide || away > kFarSide) continue;
-    with_a = with_a || SineBetween(node.basis, walk.way.at_a) <= kAgree * walk.sine;
-    with_b = with_b || SineBetween(node.basis, walk.way.at_b) <= kAgree * walk.sine;
-  }
-  return with_a && with_b;
-}
-
-// Of a step along a side beyond a crease no point of M is near; beyond a crossing there is one.
-void CreaseProbe::TakeSteps(const AnswerBlock& answer) {
-  const Walk& walk = walks_.front();
+// A crease has two sides at least that are straight, and the way itself turns by most of what there
+// is between them. Of a step along a side beyond a crease no point of M is near; beyond a crossing
+// there is one, and through the tip of a cone a side goes straight on.
+std::optional<Crease> CreaseProbe::WhatIsAt(const Walk& walk) {
+  const double length = walk.way.length();
   const Eigen::MatrixXd steps = StepsFrom(walk.way);
   Crease crease;
   crease.point = CornerOf(walk.way);
   crease.sine = walk.sine;
-  crease.length = walk.way.length();
-  crease.crosses = true;
-  for (Eigen::Index c = 0; c < kSteps; ++c) {
-    if (!answer.found.empty() && !answer.found[static_cast<std::size_t>(c)]) continue;
-    const double off = (answer.points.col(c) - steps.col(c)).norm();
-    if (off > kStays * walk.sine * kBeyond * crease.length) crease.crosses = false;
+  crease.length = length;
+  std::vector<const Node*> at(2 * kSteps, nullptr);
+  for (const Node& node : walk.nodes) at[static_cast<std::size_t>(node.asked)] = &node;
+  std::vector<const Node*> sides;
+  int stay = 0, leave = 0;
+  for (std::size_t s = 0; s < kSteps; ++s) {
+    const Node *near = at[s], *far = at[s + kSteps];
+    if (near == nullptr) continue;
+    const double off = (near->point - steps.col(static_cast<Eigen::Index>(s))).norm();
+    ++(off > kStays * walk.sine * kBeyond * length ? leave : stay);
+    if (far == nullptr || (near->point - crease.point).norm() < kNearest * length) continue;
+    const Eigen::VectorXd along = (far->point - near->point).normalized();
+    const double bends = (along - near->basis * (near->basis.transpose() * along)).norm();
+    if (std::max(bends, SineBetween(near->basis, far->basis)) <= kAgree * walk.sine)
+      sides.push_back(near);
   }
-  crease_ = std::move(crease);
+  double turn = 0;
+  Eigen::VectorXd meet, middle;
+  bool goes_through = false;
+  for (const Node* one : sides)
+    for (const Node* other : sides) {
+      const double between = SineBetween(one->basis, other->basis);
+      if (between > turn) {
+        turn = between;
+        meet = CornerOf({one->point, other->point, one->basis, other->basis});
+      }
+      const double cosine =
+          (one->point - crease.point).normalized().dot((other->point - crease.point).normalized());
+      if (goes_through || cosine > kOpposite || between > kAgree * walk.sine) continue;
+      goes_through = true;
+      middle = (one->point + other->point) / 2;
+    }
+  if (turn < kLeastSine || walk.sine < kOnTheWay * turn) return std::nullopt;
+  crease.crosses = goes_through || (leave == 0 && stay >= kSteps - 1);
+  if (!crease.crosses && leave == 0) return std::nullopt;  // one or the other, nobody knows
+  crease.point = goes_through ? middle : meet;
+  turn_ = turn;
+  return crease;
 }
 
 }  // namespace stellate::core

@@ -30,13 +30,14 @@ struct Crease {
 };
 
 // Whether M is smooth where rules keep failing: walks from ways along which its tangent spaces
-// turn to ways that are ever shorter. Where M is smooth they turn less, whatever M's reach and the
-// mesh size are; where they turn as much on a way thousands of times as short there is a crease, a
-// corner or a crossing. It asks for closest points, and tangents where they are given.
+// turn to ways that are ever shorter, to a share of the mesh size. Where M is smooth they turn
+// less; where they turn as much on a way so short, and M is straight on both of its sides, there is
+// a crease, a corner or a crossing. It asks for closest points, and tangents where they are given.
 class CreaseProbe final : public Asker {
  public:
-  // k, d: dimensions of M and of space. gives_tangents, has_walls: as the oracle has them.
-  CreaseProbe(int k, int d, bool gives_tangents, bool has_walls, std::uint64_t seed);
+  // k, d: dimensions of M and of space. size: of the mesh, a length. gives_tangents, has_walls: as
+  // the oracle has them.
+  CreaseProbe(int k, int d, double size, bool gives_tangents, bool has_walls, std::uint64_t seed);
 
   // Begins anew, from these; nothing found so far.
   void Start(std::vector<Way> ways);
@@ -50,35 +51,40 @@ class CreaseProbe final : public Asker {
   const std::optional<Crease>& crease() const { return crease_; }
 
  private:
-  enum class Stage { kPoints, kTangents, kSteps };
   struct Node {
+    Eigen::Index asked;  // the question it answers; -1: none
     Eigen::VectorXd point;
     Eigen::MatrixXd basis;
   };
   struct Walk {
     Way way;
-    double first_length = 0, sine = 0;
+    double sine = 0;
     int legs = 0;
-    std::vector<Node> nodes;   // what was found about it last, the way's ends among them
-    std::vector<Node> before;  // on earlier legs
+    std::vector<Node> nodes = {};  // what was found about it last
   };
 
   Eigen::MatrixXd PointsAbout(const Way& way) const;
   Eigen::MatrixXd StepsFrom(const Way& way) const;
+  Walk& WalkOf(Eigen::Index asked);
   void TakePoints(const AnswerBlock& answer);
   void TakeTangents();
   void GoOn();
   bool TakeLeg(Walk* walk) const;
-  bool IsSettled(const Walk& walk) const;
-  void TakeSteps(const AnswerBlock& answer);
+  std::optional<Crease> WhatIsAt(const Walk& walk);
+  void TakeCorner(const AnswerBlock& answer);
+  void ChooseEnd();
 
   int k_, d_;
+  double size_;
   bool gives_tangents_, has_walls_;
   TangentFinder finder_;
-  Stage stage_ = Stage::kPoints;
+  bool is_difference_ = false;  // asks for tangents of what it has found
+  bool looks_beyond_ = false;   // asks what is about the first walk's end
   std::vector<Walk> walks_;
-  std::vector<std::size_t> walk_of_;  // by point whose tangents are being found
-  Eigen::MatrixXd found_;             // those points
+  std::vector<Eigen::Index> asked_;  // the questions that have an answer
+  Eigen::MatrixXd found_;            // those answers
+  std::optional<Crease> suspected_;  // asks whether M goes to its point
+  double turn_ = 0;                  // its sides' sine
   std::optional<Crease> crease_;
 };
 

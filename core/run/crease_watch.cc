@@ -13,11 +13,9 @@
 namespace stellate::core {
 namespace {
 
-// In fewer rounds runs that end by themselves halve what is left, once their front rests; and in so
-// many it rests, if it ever does.
-constexpr std::uint64_t kLongestFront = 100;
 constexpr std::size_t kMostWays = 6;
-constexpr double kLeastSine2 = 0.03;  // ten degrees
+// Of the mesh size: at crossings points that are nearer are off by as much as they are apart.
+constexpr double kShortest = 1.0 / 256;
 
 struct Edge {
   std::uint32_t p = 0, q = 0;
@@ -37,7 +35,8 @@ double SumOfSquaredSinesBetween(const double* one, const double* other, int d) {
 
 template <int K>
 std::vector<Edge> EdgesThatTurn(const StarComplex<K>& complex,
-                                const std::vector<std::uint32_t>& stars, double longest) {
+                                const std::vector<std::uint32_t>& stars, double longest,
+                                double shortest, double least_sine2) {
   return ParallelGather<Edge>(stars.size(), [&](std::size_t i, std::vector<Edge>* found) {
     const std::uint32_t p = stars[i];
     const auto& cell = complex.cell(p);
@@ -46,10 +45,10 @@ std::vector<Edge> EdgesThatTurn(const StarComplex<K>& complex,
       if (!IsSample(q)) continue;
       Edge edge{std::min(p, q), std::max(p, q), 0, 0};
       edge.length2 = SquaredDistance(complex.Point(p), complex.Point(q), complex.d());
-      if (edge.length2 > longest * longest || edge.length2 == 0) continue;
+      if (edge.length2 > longest * longest || edge.length2 < shortest * shortest) continue;
       edge.turn2 = SumOfSquaredSinesBetween<K>(complex.Tangent(edge.p), complex.Tangent(edge.q),
                                                complex.d());
-      if (edge.turn2 >= kLeastSine2) found->push_back(edge);
+      if (edge.turn2 >= least_sine2) found->push_back(edge);
     }
   });
 }
@@ -103,24 +102,33 @@ bool CreaseWatch::IsDue(std::uint64_t left, bool judges_all) {
 }
 
 template <int K>
-std::vector<Way> SteepWaysAtFaults(const Engine<K>& engine, double longest) {
+std::vector<Way> SteepWaysAtFaults(const Engine<K>& engine, double longest, double least_sine2) {
   std::vector<std::uint32_t> stars = engine.book().blemished_stars();
   for (const auto& entry : engine.book().size_and_shape()) {
     CheckInterruption(stars.size());
     stars.push_back(entry.star);
   }
-  return Steepest<K>(engine.complex(), EdgesThatTurn<K>(engine.complex(), stars, longest));
+  const StarComplex<K>& complex = engine.complex();
+  const double epsilon = engine.criteria().epsilon;
+  std::vector<Edge> edges =
+      EdgesThatTurn<K>(complex, stars, longest, kShortest * epsilon, least_sine2);
+  std::erase_if(edges, [&](const Edge& edge) {
+    const double size = std::min(engine.sizes().BoundAt(complex, edge.p) / epsilon, 1.0);
+    return edge.length2 > longest * longest * size * size;
+  });
+  return Steepest<K>(complex, std::move(edges));
 }
 
 template <int K>
 std::vector<Way> SteepWays(const StarComplex<K>& complex, double longest) {
   std::vector<std::uint32_t> stars(complex.size());
   std::iota(stars.begin(), stars.end(), 0u);
-  return Steepest<K>(complex, EdgesThatTurn<K>(complex, stars, longest));
+  return Steepest<K>(complex,
+                     EdgesThatTurn<K>(complex, stars, longest, kShortest * longest, kLeastSine2));
 }
 
-#define STELLATE_EACH(K)                                                    \
-  template std::vector<Way> SteepWaysAtFaults<K>(const Engine<K>&, double); \
+#define STELLATE_EACH(K)                                                            \
+  template std::vector<Way> SteepWaysAtFaults<K>(const Engine<K>&, double, double); \
   template std::vector<Way> SteepWays<K>(const StarComplex<K>&, double);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

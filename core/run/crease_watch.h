@@ -16,18 +16,30 @@ class CreaseWatch {
   // Whether no round of late has left much less than `left` violations. Called once a round;
   // judges_all: R3 and R4 are among them. After it was so, it is so again much later.
   bool IsDue(std::uint64_t left, bool judges_all);
+  // Whether it is time to look at what tells by itself, also while a front moves.
+  bool MayLookAgain() const { return rounds_ % 4 == 0 && rounds_ <= kLongestFront; }
 
  private:
+  // In fewer rounds runs that end by themselves halve what is left, once their front rests; and in
+  // so many it rests, if it ever does.
+  static constexpr std::uint64_t kLongestFront = 100;
+
   bool front_moved_ = false;
   bool judged_all_ = false;                      // in the round before
   std::uint64_t left_then_ = ~std::uint64_t{0};  // at the last progress
   std::uint64_t rounds_ = 0, rounds_since_ = 0, patience_ = 16;
 };
 
-// Edges at stars that break a rule, no longer than `longest`, along which M's tangent spaces turn
-// most: by how much, and for their length. A few, without common ends; none if all turn little.
+constexpr double kLeastSine2 = 0.03;  // ten degrees
+
+// Edges at stars that break a rule, no longer than `longest` or, where sizes are finer,
+// that share of them, along which M's tangent spaces turn
+// most: by how much, and for their length. A few, without common ends; none of those where the sum
+// of the squared sines of the angles between them is below least_sine2, or which are shorter than
+// M's points may be known to.
 template <int K>
-std::vector<Way> SteepWaysAtFaults(const Engine<K>& engine, double longest);
+std::vector<Way> SteepWaysAtFaults(const Engine<K>& engine, double longest,
+                                   double least_sine2 = kLeastSine2);
 
 // The same of the whole sample.
 template <int K>

@@ -220,10 +220,13 @@ template <int K>
 std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent) {
   const StarComplex<K>& complex = engine.complex();
   const auto& entries = engine.book().size_and_shape();
+  const auto place = [&](std::uint32_t v) {
+    return NamePoint(Eigen::Map<const Eigen::VectorXd>(complex.Point(v), complex.d()));
+  };
   std::string left = AboutLeftFaces<K>(engine);
   if (!entries.empty())
     left += Message(entries.size(), " stars break rule R1 or R2, one of them that of vertex ",
-                    entries.front().star, "; ");
+                    entries.front().star, " near ", place(entries.front().star), "; ");
   if (!entries.empty() && inconsistent == 0) return left + "try a smaller epsilon";
   left += Message(inconsistent, " simplices are inconsistent");
   for (std::uint32_t p = 0; p < complex.size(); ++p) {
@@ -235,6 +238,7 @@ std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent) {
     left += Message(", the first in the star of vertex ", found->holder, " but not in that of ",
                     found->refuser);
     if (found->nearer) left += Message(", where vertex ", *found->nearer, " is nearer");
+    left += Message(", near ", place(found->holder));
     break;
   }
   return left + "; try a smaller epsilon";

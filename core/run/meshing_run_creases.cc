@@ -11,6 +11,9 @@ namespace stellate::core {
 namespace {
 
 constexpr double kLongestWay = 2;  // of epsilon
+// Of epsilon: where a front refines it passes by edges so short, along which tangent spaces turn by
+// 30 degrees, only at creases, or at what bends far more sharply than it is fine.
+constexpr double kTellingWay = 0.5, kTellingSine2 = 0.25;
 
 }  // namespace
 
@@ -20,8 +23,11 @@ void MeshingRun<K>::WatchForCreases() {
   const ViolationBook<K>& book = engine_.book();
   const bool due =
       crease_watch_.IsDue(book.size_and_shape().size() + book.blemished(), !book.are_all_suspect());
-  if (due && !crease_probe_.is_asking() && K < spec_.ambient_dimension)
+  if (crease_probe_.is_asking() || K == spec_.ambient_dimension) return;
+  if (due)
     crease_probe_.Start(SteepWaysAtFaults<K>(engine_, kLongestWay * spec_.epsilon));
+  else if (crease_watch_.MayLookAgain())
+    crease_probe_.Start(SteepWaysAtFaults<K>(engine_, kTellingWay * spec_.epsilon, kTellingSine2));
 }
 
 template <int K>

@@ -1,0 +1,42 @@
+"""Functions of users whose zero sets are no manifolds: the run ends, and says what there is and where."""
+
+import re
+
+import numpy as np
+import stellate
+
+BOX = [-1.5] * 3, [1.5] * 3
+
+
+def place(verdict, words):
+    found = re.search(words + r" near \(([^)]*)\)", verdict)
+    assert found and "no epsilon will do" in verdict, verdict
+    return np.array([float(x) for x in found[1].split(",")])
+
+
+def test_the_union_of_a_block_and_a_ball_has_creases(server):
+    half = np.array([1.0, 1.0, 0.3])
+
+    def f(p):
+        q = np.abs(p) - half
+        block = np.linalg.norm(np.maximum(q, 0), axis=1) + np.minimum(q.max(axis=1), 0)
+        return np.minimum(block, np.linalg.norm(p - [0, 0, 0.6], axis=1) - 0.6)
+
+    mesh = stellate.mesh(stellate.oracles.SignedDistance(f, bounding_box=BOX), 0.12, server=server)
+    at = place(mesh.report.certificate.verdict, "has a crease")
+    gaps = np.sort(np.abs(np.abs(at) - half))
+    edge = np.hypot(gaps[0], gaps[1])
+    seam = np.hypot(at[2] - 0.3, np.hypot(at[0], at[1]) - np.sqrt(0.27))
+    assert min(edge, seam) < 1e-3, at
+
+
+def test_cylinders_of_one_radius_cross(server):
+    curves = stellate.ImplicitManifold(
+        lambda x: np.stack([x[:, 0] ** 2 + x[:, i] ** 2 - 1 for i in (1, 2)], axis=1),
+        ambient_dimension=3,
+        dimension=1,
+        bounding_box=BOX,
+    )
+    mesh = stellate.mesh(curves, 0.05, server=server)
+    at = place(mesh.report.certificate.verdict, "crosses itself or is singular")
+    np.testing.assert_allclose([abs(at[0]), at[1], at[2]], [1, 0, 0], atol=1e-3)
