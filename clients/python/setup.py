@@ -1,6 +1,7 @@
 """Writes the gRPC stubs before the package is packed, and takes the version of the source tree.
 
-With $STELLATE_WHEEL_SERVER, a folder that packaging/wheel has filled, the wheel carries a server.
+With $STELLATE_WHEEL_SERVER, a folder that packaging/wheel has filled, the wheel carries a server and
+the command `stellate`, which on Debian is a package of its own.
 All else is in pyproject.toml.
 """
 
@@ -50,8 +51,11 @@ def _with_server() -> dict[str, Any]:
         def get_tag(self) -> tuple[str, str, str]:
             return "py3", "none", os.environ["STELLATE_WHEEL_PLATFORM"]
 
-    commands = {"build_py": _WithServer, "bdist_wheel": _Tagged}
-    return {"cmdclass": commands, "distclass": _OfOnePlatform}
+    return {
+        "cmdclass": {"build_py": _WithServer, "bdist_wheel": _Tagged},
+        "distclass": _OfOnePlatform,
+        "entry_points": {"console_scripts": ["stellate = stellate._script:main"]},
+    }
 
 
 _generate_stubs()

@@ -22,6 +22,8 @@ assert pathlib.Path(stellate.find_stellated()).is_relative_to(inside), stellate.
 mesh = stellate.mesh(stellate.manifolds.Torus(), epsilon=0.2)
 assert mesh.certified and len(mesh.simplices) == 2 * len(mesh.points), mesh
 mesh.save("torus.vtu")
+mesh.show("torus.html")
+assert "<canvas" in (page := pathlib.Path("torus.html").read_text()) and len(page) > 100_000
 print(grpc.__file__, google.protobuf.__version__, grpc.__version__)
 """
 
@@ -61,7 +63,11 @@ class Wheel(unittest.TestCase):
     def mesh(self, python: pathlib.Path) -> str:
         with tempfile.TemporaryDirectory() as nowhere:
             said = run(python, "-I", "-c", MESH, VERSION, cwd=nowhere)
-            self.assertEqual(os.listdir(nowhere), ["torus.vtu"])
+            self.assertEqual(sorted(os.listdir(nowhere)), ["torus.html", "torus.vtu"])
+            command = python.with_name("stellate")
+            self.assertIn(VERSION, run(command, "--version", cwd=nowhere))
+            run(command, "mesh", "torus", "-e", "0.3", "-o", "torus.off", cwd=nowhere)
+            self.assertIn("usage", run(command, "conform", "--help", cwd=nowhere).lower())
         return said
 
     def test_with_what_pypi_has(self) -> None:
@@ -81,7 +87,8 @@ class Wheel(unittest.TestCase):
             folder = pathlib.Path(name)
             zipfile.ZipFile(self.wheel).extractall(folder)
             bundled = folder / "stellate" / "_bundled"
-            for file in [bundled / "stellated", *(bundled / "lib").iterdir()]:
+            programs = [bundled / "stellated", bundled / "stellate"]
+            for file in [*programs, *(bundled / "lib").iterdir()]:
                 for library, path in re.findall(r"(\S+) => (\S+)", run("ldd", file)):
                     of_the_machine = re.match(r"lib(c|m|stdc\+\+|gcc_s)\.so", library)
                     if not of_the_machine:
@@ -91,7 +98,7 @@ class Wheel(unittest.TestCase):
 
     def test_it_names_its_platform(self) -> None:
         self.assertRegex(
-            self.wheel.name, rf"^stellate-{re.escape(VERSION)}-py3-none-manylinux_2_\d+_\w+\.whl$"
+            self.wheel.name, rf"^stellate-{re.escape(VERSION)}-py3-none-manylinux_2_34_\w+\.whl$"
         )
 
 

@@ -17,7 +17,7 @@ from .errors import ServerNotFound, Unavailable
 _READY_SECONDS = 30.0
 _STOP_SECONDS = 10.0
 _LONGEST_SOCKET_PATH = 100  # the kernel takes 107 bytes
-_BUNDLED = pathlib.Path(__file__).resolve().parent / "_bundled" / "stellated"  # packaging/wheel's
+BUNDLED = pathlib.Path(__file__).resolve().parent / "_bundled" / "stellated"  # packaging/wheel's
 # When its client goes there is nobody left to finish a mesh for.
 _OWN_FLAGS = ("--drain-seconds", "0")
 # Over a unix socket the end of a client shows at once. One that answers no pings is merely busy in
@@ -36,8 +36,8 @@ def find_stellated() -> str:
         if path is None:
             raise ServerNotFound(f"$STELLATED is {named!r}, which is not a program that can be run")
         return path
-    if os.access(_BUNDLED, os.X_OK):
-        return str(_BUNDLED)
+    if os.access(BUNDLED, os.X_OK):
+        return str(BUNDLED)
     source_tree = pathlib.Path(__file__).resolve().parents[3]
     built = []
     if (source_tree / "proto" / "stellate").is_dir():  # not an installed package
