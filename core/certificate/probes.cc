@@ -161,13 +161,13 @@ Eigen::MatrixXd PointsInside(const MeshView& mesh, const SimplexList& list,
 Eigen::MatrixXd CoverageProbes(const Specification& spec, const MeshView& mesh,
                                const SimplexList& list, double push) {
   Random random(spec.random_seed, kProbeStream);
-  auto [lower, upper] = BoxOf(mesh);
-  const double margin = kBoxMargin * (upper - lower).norm();
-  lower.array() -= margin;
-  upper.array() += margin;
+  MeshBox box = BoxOf(mesh);
+  const double margin = kBoxMargin * (box.upper - box.lower).norm();
+  box.lower.array() -= margin;
+  box.upper.array() += margin;
   const int kinds = spec.bounding_box ? 3 : 2;
   const auto probe = [&](int kind) -> Eigen::VectorXd {
-    if (kind == 1) return PointInBox(lower, upper, random);
+    if (kind == 1) return PointInBox(box.lower, box.upper, random);
     if (kind == 2) return PointInBox(spec.bounding_box->lower, spec.bounding_box->upper, random);
     const auto s = static_cast<std::uint32_t>(random.Next() % list.size());
     return PointNearSimplex(mesh, list[s], push, random);
