@@ -1,6 +1,7 @@
 // A mesh, finished or growing.
 import { readFile, rename, writeFile } from "node:fs/promises";
 import { extname } from "node:path";
+import { general } from "./decimal.js";
 import { SaveError } from "./errors.js";
 import { orient } from "./orientation.js";
 import type { Progress, Report } from "./report.js";
@@ -121,21 +122,10 @@ export function checkSave(path: string, k: number, d: number): void {
   }
 }
 
-/** C's %.17g: the same text from all clients, which comes back to the same double. */
-function exact(value: number): string {
-  if (value === 0) return Object.is(value, -0) ? "-0" : "0";
-  const [digits, power] = value.toExponential(16).split("e");
-  const exponent = Number(power);
-  const trimmed = (text: string) => (text.includes(".") ? text.replace(/\.?0+$/, "") : text);
-  if (exponent >= -4 && exponent < 17) return trimmed(value.toFixed(16 - exponent));
-  const sign = exponent < 0 ? "-" : "+";
-  return `${trimmed(digits)}e${sign}${String(Math.abs(exponent)).padStart(2, "0")}`;
-}
-
 function lines(values: Float64Array | Uint32Array, width: number): string[] {
   const rows: string[] = [];
   for (let i = 0; i < values.length; i += width) {
-    rows.push(Array.from(values.subarray(i, i + width), exact).join(" "));
+    rows.push(Array.from(values.subarray(i, i + width), (value) => general(value, 17)).join(" "));
   }
   return rows;
 }
