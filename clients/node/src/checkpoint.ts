@@ -1,5 +1,6 @@
 // A directory in which one mesh outlives the processes that make it:
-//   mesh     the mesh's name on the private server, and, on the next line, what is meshed
+//   mesh     the mesh's name on the private server, and, where epsilon was chosen, how often it may be
+//            followed by a finer one, and why it is that; on the next line what is meshed
 //   server/  that server's --data-dir
 import {
   closeSync,
@@ -18,6 +19,7 @@ import { join } from "node:path";
 import { setTimeout as sleep } from "node:timers/promises";
 import type { Client } from "./client.js";
 import { FailedPrecondition, InvalidArgument, StellateError } from "./errors.js";
+import type { Choice } from "./epsilon.js";
 import type { MeshSpec } from "./generated/stellate/v1/MeshSpec.js";
 import type { MeshInfo } from "./report.js";
 import { Server } from "./server.js";
@@ -59,14 +61,25 @@ export class Checkpoint {
     }
   }
 
-  /** The mesh that is there, or a new one. */
-  async declare(client: Client, spec: MeshSpec): Promise<MeshInfo> {
+  /** The epsilon that was chosen for the mesh that is there; undefined: none was. */
+  choice(): Choice | undefined {
+    const { retries, reason, spec } = this.read();
+    if (!reason) return undefined;
+    const { epsilon = 0 } = Stub.service.CreateMesh.requestDeserialize(spec).spec ?? {};
+    return { epsilon, reason, retries };
+  }
+
+  /** The mesh that is there, or a new one; with `anew` a new one in its place. */
+  async declare(
+    client: Client,
+    spec: MeshSpec,
+    { retries, reason }: Choice,
+    anew: boolean,
+  ): Promise<MeshInfo> {
     const essence = { spec: { ...spec, label: "" } };
     const wanted = Buffer.from(Stub.service.CreateMesh.requestSerialize(essence));
-    const kept = readOwn(this.record);
-    const end = kept.indexOf("\n");
-    const name = kept.subarray(0, Math.max(0, end)).toString();
-    if (name && !kept.subarray(end + 1).equals(wanted)) {
+    const { name, spec: kept } = this.read();
+    if (name && !anew && !kept.equals(wanted)) {
       throw new InvalidArgument(
         `the checkpoint ${this.folder} is of a mesh of another specification: ` +
           "take another directory, or remove it",
@@ -74,17 +87,28 @@ export class Checkpoint {
     }
     let found: MeshInfo | undefined;
     for await (const info of client.list()) {
-      if (info.name === name) found = info;
-      else await client.delete(info.name); // was forgotten, or never put down
+      if (info.name === name && !anew) found = info;
+      else if (info.name !== name) await client.delete(info.name); // forgotten, or never put down
     }
     if (found) return found;
     found = await client.createFrom(spec);
     const draft = `${this.record}.new`;
     rmSync(draft, { force: true }); // of a process that was killed; a link itself, not where it leads
-    const all = Buffer.concat([Buffer.from(`${found.name}\n`), wanted]);
+    const first = [found.name, ...(reason ? [retries, reason] : [])].join(" ");
+    const all = Buffer.concat([Buffer.from(`${first}\n`), wanted]);
     writeFileSync(draft, all, { flag: "wx", mode: 0o600 });
     renameSync(draft, this.record); // all of it or nothing
+    if (anew) await client.delete(name);
     return found;
+  }
+
+  /** What was put down; the name is "" where nothing was. */
+  private read() {
+    const kept = readOwn(this.record);
+    const end = kept.indexOf("\n");
+    const first = kept.subarray(0, Math.max(0, end)).toString();
+    const [, name = "", retries, reason = ""] = /^(\S*)(?: (\d+) (.*))?$/.exec(first) ?? [];
+    return { name, retries: Number(retries ?? 0), reason, spec: kept.subarray(end + 1) };
   }
 
   /** Has the next call begin anew where this mesh has failed for good. */

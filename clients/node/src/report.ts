@@ -23,6 +23,10 @@ export interface Report {
   counts?: Counts__Output;
   certificate?: Certificate;
   elapsedSeconds: number;
+  /** That the mesh was made with. */
+  epsilon: number;
+  /** Why it is that, where mesh() or watch() chose it; else "". */
+  epsilonReason: string;
 }
 
 /** A mesh on the server, without its geometry. */
@@ -46,7 +50,7 @@ export function progressFrom(message: Progress__Output): Progress {
   return { ...message, phase: enumName(message.phase, "PHASE_") };
 }
 
-export function reportFrom(message: Report__Output): Report {
+export function reportFrom(message: Report__Output, epsilon: number): Report {
   const proved = message.certificate;
   return {
     termination: enumName(message.termination, "TERMINATION_"),
@@ -58,6 +62,8 @@ export function reportFrom(message: Report__Output): Report {
       ? { ...proved, level: enumName(proved.level, "CERTIFICATE_LEVEL_") }
       : undefined,
     elapsedSeconds: message.elapsedSeconds,
+    epsilon,
+    epsilonReason: "",
   };
 }
 
@@ -72,7 +78,7 @@ export function infoFrom(mesh: Mesh__Output): MeshInfo {
     over: mesh.endTime != null,
     revision: mesh.revision,
     progress: mesh.progress ? progressFrom(mesh.progress) : undefined,
-    report: mesh.report ? reportFrom(mesh.report) : undefined,
+    report: mesh.report ? reportFrom(mesh.report, mesh.spec?.epsilon ?? 0) : undefined,
     workers: mesh.workers,
     watchers: mesh.watchers,
   };

@@ -1,8 +1,8 @@
 // A mesh from its declaration to its end: the server asks, the oracle answers, we watch.
 import { setTimeout as sleep } from "node:timers/promises";
-import { chooseEpsilon } from "./check.js";
 import { Checkpoint } from "./checkpoint.js";
 import { Client, type ClientOptions } from "./client.js";
+import { choose, finer } from "./epsilon.js";
 import { Cancelled, errorClass, FailedPrecondition, InvalidArgument } from "./errors.js";
 import { NotCertified, protocolError, StellateError } from "./errors.js";
 import { GrowingComplex } from "./growth.js";
@@ -24,8 +24,13 @@ export interface Connection extends ClientOptions {
 
 export interface RunOptions
   extends Connection, Omit<MeshOptions, "epsilon">, Omit<WorkerOptions, "worker"> {
-  /** Largest circumradius of a simplex, a length; "auto": what chooseEpsilon() says. */
+  /**
+   * Largest circumradius of a simplex, a length; "auto": what chooseEpsilon() says, and, where the mesh
+   * came out too coarse to certify, a quarter of the reach that its certificate shows, twice at most.
+   */
   epsilon: number | "auto";
+  /** Told of each epsilon that "auto" takes, before it is meshed with, and why. */
+  onEpsilon?: (epsilon: number, reason: string) => void;
   /** Streams on which the oracle is asked at once; more than one helps an async oracle. Default 1. */
   workers?: number;
   onProgress?: (progress: Progress) => void;
@@ -80,7 +85,8 @@ export async function mesh(
 }
 
 /**
- * The mesh as it grows, the last with its report. With the name of a mesh in place of an oracle, one
+ * The mesh as it grows, the last with its report; where epsilon "auto" was too coarse a finer mesh begins
+ * anew after that, from nothing. With the name of a mesh in place of an oracle, one
  * that others serve is watched. Leaving the loop cancels the mesh, or leaves that of others alone.
  */
 export function watch(oracle: Oracle, options: RunOptions): AsyncGenerator<Mesh>;
@@ -228,7 +234,7 @@ function judged(mesh: Mesh, { state, report }: MeshInfo): Mesh {
 
 async function* run(oracle: Oracle, options: RunOptions, every: boolean): AsyncGenerator<Mesh> {
   const { workers = 1, onProgress, signal, maxChunk, server, epsilon: wanted, ...more } = options;
-  const { checkpoint, ...rest } = more;
+  const { checkpoint, onEpsilon, ...rest } = more;
   const { credentials, reconnectSeconds, keepaliveSeconds, onOutage, ...others } = rest;
   if (!Number.isInteger(workers) || workers < 1) {
     throw new InvalidArgument(`workers has to be a whole number from 1 on, and is ${workers}`);
@@ -243,19 +249,31 @@ async function* run(oracle: Oracle, options: RunOptions, every: boolean): AsyncG
   const own = await kept?.server();
   const link = { credentials, reconnectSeconds, keepaliveSeconds, onOutage };
   const [client, close] = await connect({ server: own ?? server, ...link });
+  const serving = { workers, onProgress, signal, maxChunk, checkpoint };
+  let coarse: Mesh | undefined;
   try {
-    const epsilon = wanted === "auto" ? (await chooseEpsilon(oracle)).epsilon : wanted;
-    const spec = client.specOf(oracle, { ...others, epsilon });
-    const info = await (kept?.declare(client, spec) ?? client.createFrom(spec));
-    yield* served(
-      client,
-      oracle,
-      info,
-      { workers, onProgress, signal, maxChunk, checkpoint },
-      every,
-    );
+    const taken = wanted === "auto" ? kept?.choice() : undefined;
+    let choice = taken ?? (await choose(oracle, wanted));
+    for (let next: typeof choice | undefined; ; choice = next) {
+      const { epsilon, reason } = choice;
+      if (reason) onEpsilon?.(epsilon, reason);
+      const spec = client.specOf(oracle, { ...others, epsilon });
+      const anew = coarse !== undefined;
+      const info = await (kept?.declare(client, spec, choice, anew) ?? client.createFrom(spec));
+      next = undefined;
+      for await (const grown of served(client, oracle, info, serving, every)) {
+        if (grown.report) {
+          grown.report.epsilonReason = reason;
+          next = signal?.aborted ? undefined : finer(choice, grown.report);
+          coarse = grown;
+        }
+        if (every || !next) yield grown;
+      }
+      if (!next) return;
+    }
   } catch (error) {
     kept?.forgetAfter(error);
+    if (error instanceof StellateError) error.mesh ??= coarse;
     throw error;
   } finally {
     await close();
@@ -297,6 +315,7 @@ async function* served(
   const cancel = () =>
     kept ? leaving.abort() : void client.cancel(info.name, { once: true }).catch(() => {});
   options.signal?.addEventListener("abort", cancel);
+  if (options.signal?.aborted) cancel(); // while the mesh was declared
   let ended = false;
   try {
     for await (const grown of follow(client, info, options.onProgress, every, leaving.signal)) {

@@ -108,6 +108,11 @@ class Checkpoint:
             return self._record["spec"]["epsilon"], self._record["epsilon_reason"]
         return choose(oracle, epsilon)
 
+    @property
+    def retries(self) -> int | None:
+        """How often the mesh that is there may be followed by a finer one; None: there is none."""
+        return self._record.get("retries")
+
     def require(self, spec: pb.MeshSpec) -> None:
         """Raises InvalidArgument if this is the directory of a mesh of another specification."""
         if self._record and self._record["digest"] != _digest(spec):
@@ -117,13 +122,14 @@ class Checkpoint:
                 f"{'; '.join(differences) or 'by its digest'}. Take another directory, or remove it"
             )
 
-    def note(self, spec: pb.MeshSpec, name: str, epsilon_reason: str) -> None:
+    def note(self, spec: pb.MeshSpec, name: str, epsilon_reason: str, retries: int) -> None:
         """Puts down what is meshed, before it is."""
         self._record = {
             "layout": _LAYOUT,
             "name": name,
             "digest": _digest(spec),
             "epsilon_reason": epsilon_reason,
+            "retries": retries,
             "spec": _plain(spec),
         }
         text = json.dumps(self._record, indent=1) + "\n"

@@ -137,7 +137,9 @@ class Run:
         self._on_progress, self._checkpoint = on_progress, checkpoint
         self._epsilon_reason = ""
         chosen = self._say(choice(oracle, epsilon))
-        self._retries = table("doctor.toml")["auto_retries"] if self._epsilon_reason else 0
+        kept = checkpoint.retries if checkpoint is not None else None
+        most = table("doctor.toml")["auto_retries"] if kept is None else kept
+        self._retries = most if self._epsilon_reason else 0
         self._interrupted = self._ended = False
         self._next: tuple[float, str] | None = None  # what epsilon is to be tried after this one
         self._server: Server | None = None
@@ -206,7 +208,7 @@ class Run:
             return kept
         info = client.create(oracle, epsilon, **criteria)
         spec = mesh_spec(oracle, epsilon, criteria)
-        self._checkpoint.note(spec, info.name, self._epsilon_reason)
+        self._checkpoint.note(spec, info.name, self._epsilon_reason, self._retries)
         return info
 
     def _on_failure(self, error: BaseException) -> None:

@@ -9,7 +9,8 @@ python <- function() reticulate::import("stellate")
 #'   row of NA where there is none.
 #' @param dimension,ambient_dimension k and d.
 #' @param epsilon largest circumradius of a simplex, a length; or "auto": a quarter of the reach
-#'   that `check` finds.
+#'   that `check` finds, and, where the mesh came out too coarse to certify, of the reach that its
+#'   certificate shows, twice at most.
 #' @param bounding_box list(lower, upper), where the manifold is; or `seeds`, an m x d matrix of
 #'   points near it, one at least on each component.
 #' @param ... what else the oracle can answer:

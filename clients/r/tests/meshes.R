@@ -123,6 +123,20 @@ stopifnot(grepl("NOT_IDEMPOTENT", failure(
   mesh(function(x) (x + half$closest_point(x)) / 2, 2, 3, "auto", unit_box, server = address)
 )))
 
+# It goes on where that was too coarse: for a circle beside the unit circle, which the doctor
+# hardly sees.
+two_circles <- function(x) {
+  y <- cbind(x[, 1] - 1.05, x[, 2])
+  large <- abs(norm(x) - 1) <= abs(norm(y) - 0.005)
+  beside <- 0.005 * y / norm(y)
+  beside[, 1] <- beside[, 1] + 1.05
+  ifelse(cbind(large, large), x / norm(x), beside)
+}
+grown <- mesh(two_circles, 1, 2, "auto", list(c(-1.1, -1.1), c(1.2, 1.1)),
+  seeds = rbind(c(-1, 0), c(1.05, 0.005)), server = address
+)
+stopifnot(grown$certified, grepl("too coarse", grown$python$report$epsilon_reason))
+
 # A checkpoint: an oracle stops in the middle, and the same call goes on from there.
 folder <- tempfile("checkpoint")
 asked <- 0

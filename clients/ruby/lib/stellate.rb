@@ -4,6 +4,7 @@ $LOAD_PATH.unshift(File.join(__dir__, 'stellate', 'proto'))
 require 'stellate/v1/stellate_services_pb'
 require 'stellate/v1/doctor_services_pb'
 require 'stellate/rpc/status_details_pb'
+require 'stellate/doctor_numbers'
 $LOAD_PATH.shift
 
 require_relative 'stellate/errors'
@@ -18,5 +19,6 @@ require_relative 'stellate/worker'
 require_relative 'stellate/checkpoint'
 require_relative 'stellate/session'
 require_relative 'stellate/check'
+require_relative 'stellate/epsilon'
 require_relative 'stellate/manifolds'
 require_relative 'stellate/progress_bar'

@@ -22,7 +22,7 @@ def kept(directory, spec=SPEC):
 
 def keep(directory, spec=SPEC):
     with Checkpoint(directory) as checkpoint:
-        checkpoint.note(spec, "meshes/1", "")
+        checkpoint.note(spec, "meshes/1", "", 0)
         checkpoint.keep(MESH)
 
 
@@ -94,6 +94,6 @@ def test_drafts_overwrite_nothing(name, link, tmp_path):
 def test_a_result_of_another_specification_is_refused(tmp_path):
     keep(tmp_path / "planted", pb.MeshSpec(dimension=1, ambient_dimension=2, epsilon=0.25))
     with Checkpoint(tmp_path / "c") as checkpoint:
-        checkpoint.note(SPEC, "meshes/1", "")
+        checkpoint.note(SPEC, "meshes/1", "", 0)
     os.replace(tmp_path / "planted" / "mesh.npz", tmp_path / "c" / "mesh.npz")
     refused(tmp_path / "c", "mesh.npz is no mesh that was kept .*another specification.*remove")

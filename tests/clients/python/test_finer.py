@@ -1,6 +1,8 @@
 """What epsilon="auto" goes on with after a mesh that is not certified."""
 
 import dataclasses
+import json
+import pathlib
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,39 +11,38 @@ import stellate
 from stellate import Client, Mesh, _run, manifolds
 from stellate._epsilon import finer
 
+HERE = pathlib.Path(__file__).resolve().parent
 
-def report(epsilon=0.1, reach=0.2, certified=False, refuted=False, termination="CONVERGED"):
-    certificate = SimpleNamespace(certified=certified, reach_refuted=refuted, estimated_reach=reach)
-    return SimpleNamespace(epsilon=epsilon, termination=termination, certificate=certificate)
-
-
-def test_a_mesh_that_was_too_coarse_is_followed_by_a_quarter_of_the_reach_that_it_shows():
-    epsilon, why = finer(report(epsilon=0.1, reach=0.2))
-    assert epsilon == 0.05
-    assert why.startswith("a quarter of the reach, about 0.2 by the certificate of epsilon 0.1")
-    assert finer(report(termination="NO_PROGRESS"))[0] == 0.05
+CASES = json.loads((HERE.parents[1] / "conformance" / "finer.json").read_text())
 
 
-def test_it_is_never_finer_at_once_than_a_quarter_of_before():
-    epsilon, why = finer(report(epsilon=0.1, reach=0.001))
-    assert epsilon == 0.025 and why.startswith("no finer at once, though")
+@pytest.mark.parametrize("case", CASES, ids=[case["about"] for case in CASES])
+def test_what_a_mesh_is_followed_by_is_what_the_kit_says(case):
+    said = {
+        "certified": False,
+        "reach_refuted": False,
+        "termination": "CONVERGED",
+        **case["report"],
+    }
+    certificate = SimpleNamespace(
+        certified=said["certified"],
+        reach_refuted=said["reach_refuted"],
+        estimated_reach=float(said["estimated_reach"]),
+    )
+    last = SimpleNamespace(
+        epsilon=said["epsilon"], termination=said["termination"], certificate=certificate
+    )
+    then = case["then"]
+    assert finer(last) == (then and (then["epsilon"], then["reason"]))
 
 
-@pytest.mark.parametrize(
-    "last",
-    [
-        report(certified=True),
-        report(refuted=True),
-        report(reach=0.26),  # what was refused is something else
-        report(reach=float("inf")),
-        report(reach=0.0),  # of a run that saw none
-        report(termination="VERTEX_BUDGET"),
-        report(termination="CANCELLED"),
-        report(epsilon=None),
-    ],
-)
-def test_what_a_smaller_epsilon_would_not_mend_is_left_alone(last):
-    assert finer(last) is None
+def test_a_mesh_without_an_epsilon_of_its_own_is_left_alone():
+    assert finer(dataclasses.replace(Report(0.1, shows(0.2)), epsilon=None)) is None
+    assert finer(Report(0.1, shows(0.2))) is not None
+
+
+def shows(reach, certified=False):
+    return SimpleNamespace(certified=certified, reach_refuted=False, estimated_reach=reach)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,11 +76,7 @@ class Following:
         self.every = every
         self.report = Report(
             info.epsilon,
-            SimpleNamespace(
-                certified=info.epsilon <= client.enough,
-                reach_refuted=False,
-                estimated_reach=1.5 * info.epsilon,
-            ),
+            shows(1.5 * info.epsilon, certified=info.epsilon <= client.enough),
         )
 
     def __iter__(self):

@@ -147,6 +147,50 @@ def test_automatic_epsilon_is_chosen_once(tmp_path):
     assert again.report == first.report and first.report.epsilon_reason
 
 
+class TwoCircles:
+    """The unit circle, and a small one beside it that few questions of the doctor fall upon."""
+
+    dimension, ambient_dimension = 1, 2
+    bounding_box = [-1.1, -1.1], [1.2, 1.1]
+    seeds = [[-1, 0], [1.05, 0.005]]
+
+    def closest_point(self, x):
+        y = x - [1.05, 0]
+        away, beside = (np.sqrt((z * z).sum(axis=1, keepdims=True)) for z in (x, y))
+        large = np.abs(away - 1) <= np.abs(beside - 0.005)
+        return np.where(large, x / away, [1.05, 0] + y * (0.005 / beside))
+
+
+class Leaving:
+    """Leaves at the first progress of the second mesh."""
+
+    def __init__(self):
+        self.told = []
+
+    def note(self, text):
+        self.told.append(text)
+
+    def __call__(self, progress):
+        if len(self.told) == 2:
+            raise ZeroDivisionError("on purpose")
+
+
+def test_what_automatic_epsilon_goes_on_with_is_kept(tmp_path):
+    def record():
+        return json.loads((tmp_path / "mesh.json").read_text())
+
+    leaving = Leaving()
+    with pytest.raises(ZeroDivisionError):
+        stellate.mesh(TwoCircles(), "auto", checkpoint=tmp_path, on_progress=leaving)
+    kept = record()
+    assert kept["retries"] == 1 and "too coarse" in kept["epsilon_reason"]
+    mesh = stellate.mesh(TwoCircles(), "auto", checkpoint=tmp_path)
+    assert mesh.certified and mesh.report.certificate.components == 2
+    assert mesh.report.epsilon == kept["spec"]["epsilon"]
+    assert f"epsilon {mesh.report.epsilon:g}, {mesh.report.epsilon_reason}" == leaving.told[1]
+    assert record() == kept
+
+
 def test_one_process_at_a_time(tmp_path):
     seen = []
 

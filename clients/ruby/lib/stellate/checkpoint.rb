@@ -4,7 +4,8 @@ require 'fileutils'
 
 module Stellate
   # A directory in which one mesh outlives the processes that make it:
-  #   mesh     the mesh's name on the private server, and, on the next line, what is meshed
+  #   mesh     the mesh's name on the private server, and, where epsilon was chosen, how often it may be
+  #            followed by a finer one, and why it is that; on the next line what is meshed
   #   server/  that server's --data-dir
   class Checkpoint
     LAST_SERVER_SECONDS = 20 # that the server of a killed process may take to end
@@ -27,20 +28,32 @@ module Stellate
       Server.closing(start, &)
     end
 
-    # The mesh that is there, or a new one.
-    def declare(client, spec)
+    # The epsilon that was chosen for the mesh that is there; nil: none was.
+    def choice
+      _, retries, reason, there = read
+      Choice.new(V1::MeshSpec.decode(there).epsilon, reason, Integer(retries)) if reason
+    end
+
+    # The mesh that is there, or a new one; with `anew` a new one in its place.
+    def declare(client, spec, choice, anew:)
       essence = spec.dup
       essence.label = ''
       wanted = V1::MeshSpec.encode(essence)
-      name, there = read_own&.split("\n", 2)
-      if name && there != wanted
+      name, _, _, there = read
+      if name && !anew && there != wanted
         raise Stellate.invalid("the checkpoint #{folder} is of a mesh of another specification: " \
                                'take another directory, or remove it')
       end
 
       others, found = client.list.partition { |info| info.name != name }
       others.each { |info| client.delete(info.name) } # were forgotten, or never put down
-      found.first || client.create_from(spec).tap { |info| note("#{info.name}\n".b + wanted) }
+      return found.first unless anew || found.empty?
+
+      made = client.create_from(spec)
+      chosen = choice.reason.empty? ? [] : [choice.retries, choice.reason]
+      note("#{[made.name, *chosen].join(' ')}\n".b + wanted)
+      found.each { |info| client.delete(info.name) }
+      made
     end
 
     # Has the next call begin anew where this mesh has failed for good.
@@ -81,6 +94,15 @@ module Stellate
                        'chmod go-w', found.mode & 0o7777)
               end
       raise Stellate.invalid("the checkpoint #{folder} #{wrong}") if wrong
+    end
+
+    # The name, retries and reason of a choice, and what is meshed; nil for what was not put down.
+    def read
+      first, there = read_own&.split("\n", 2)
+      return [] if first.nil?
+
+      name, retries, reason = first.force_encoding('UTF-8').split(' ', 3)
+      [name, retries, reason, there]
     end
 
     # The record, if it is a file of this user's and no link; nil if there is none.

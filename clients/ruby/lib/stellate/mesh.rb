@@ -6,6 +6,8 @@ module Stellate
   # on; nil without a boundary.
   class Mesh
     attr_reader :dimension, :ambient_dimension, :points, :simplices, :revision, :progress, :report, :walls
+    # What a mesh that is over was made with, and why it is that where 'auto' chose it, else ''; nil of others.
+    attr_accessor :epsilon, :epsilon_reason
 
     def initialize(k, d, points, simplices, revision, progress: nil, report: nil, walls: nil)
       @dimension, @ambient_dimension, @points, @simplices = k, d, points, simplices

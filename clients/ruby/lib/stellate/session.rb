@@ -6,7 +6,9 @@ module Stellate
 
   class << self
     # Meshes the oracle's manifold. `epsilon` is the largest circumradius of a simplex, a length, or 'auto':
-    # what `choose_epsilon` says.
+    # what `choose_epsilon` says, and, where the mesh came out too coarse to certify, a quarter of the reach
+    # that its certificate shows, twice at most.
+    #   on_epsilon: a proc of each epsilon that 'auto' takes, before it is meshed with, and why
     #   server: "host:port", a Server or Client; without it one is started, and stopped afterwards
     #   credentials: for a server that wants them; on_progress: a proc that is called in this thread
     #   workers: streams on which the oracle is asked at once; max_chunk: most points at once
@@ -28,8 +30,9 @@ module Stellate
       finished
     end
 
-    # Yields the mesh as it grows, at every revision; the last one has its report. Leaving the block with
-    # `break` cancels the mesh. With a name in place of an oracle a mesh of others is watched.
+    # Yields the mesh as it grows, at every revision; the last one has its report. Where epsilon 'auto' was
+    # too coarse a finer mesh begins anew after that, from nothing. Leaving the block with `break` cancels
+    # the mesh. With a name in place of an oracle a mesh of others is watched.
     def watch(what, epsilon: nil, **options, &each)
       return run(what, epsilon, true, options, &each) unless what.is_a?(String)
 
@@ -114,6 +117,7 @@ module Stellate
     end
 
     def judged(mesh, info)
+      mesh.epsilon, mesh.epsilon_reason = info.spec.epsilon, ''
       case info.state
       when :MESH_STATE_CANCELLED
         raise Cancelled.new('the mesh was cancelled', reason: 'CANCELLED', mesh:)
@@ -125,21 +129,37 @@ module Stellate
     end
 
     def run(oracle, epsilon, every, options, &each)
-      mine = %i[server credentials on_progress workers max_chunk checkpoint].to_h do |name|
+      mine = %i[server credentials on_progress on_epsilon workers max_chunk checkpoint].to_h do |name|
         [name, options.delete(name)]
       end
-      kept = mine[:checkpoint] && Checkpoint.new(mine[:checkpoint])
-      epsilon, = choose_epsilon(oracle) if epsilon == 'auto'
+      kept, last = mine[:checkpoint] && Checkpoint.new(mine[:checkpoint]), nil
       reached(kept, mine) do |client|
-        spec = client.spec(oracle, epsilon, options)
-        info = kept ? kept.declare(client, spec) : client.create_from(spec)
-        Session.new(client, CheckedOracle.new(oracle), info, mine).run do |stream|
-          follow(client, info, mine[:on_progress], every, **stream, &each)
+        choice = (kept&.choice if epsilon == 'auto') || Choice.of(oracle, epsilon)
+        while choice
+          mine[:on_epsilon]&.call(choice.epsilon, choice.reason) unless choice.reason.empty?
+          spec = client.spec(oracle, choice.epsilon, options)
+          info = kept ? kept.declare(client, spec, choice, anew: !last.nil?) : client.create_from(spec)
+          last = one_mesh(client, oracle, info, every, mine, choice.reason, &each)
+          choice = choice.finer(last.report)
         end
       end
     rescue StellateError => e
       kept&.forget_after(e)
+      e.mesh ||= last
       raise
+    end
+
+    # Yields a mesh as `follow` does, and returns it when it is over.
+    def one_mesh(client, oracle, info, every, mine, reason)
+      last = nil
+      Session.new(client, CheckedOracle.new(oracle), info, mine).run do |stream|
+        follow(client, info, mine[:on_progress], every, **stream) do |mesh|
+          last = mesh
+          mesh.epsilon_reason = reason if mesh.report
+          yield mesh
+        end
+      end
+      last
     end
 
     def reached(kept, mine, &)

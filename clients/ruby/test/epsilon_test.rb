@@ -1,0 +1,78 @@
+# frozen_string_literal: true
+
+require 'json'
+require_relative 'live'
+
+# The epsilon 'auto', and what it goes on with.
+class EpsilonTest < Minitest::Test
+  CASES = JSON.parse(File.read(File.join(__dir__, '../../../tests/conformance/finer.json')))
+
+  # The unit circle, and a small one beside it that few questions of the doctor fall upon.
+  class TwoCircles
+    attr_reader :asked
+
+    def dimension = 1
+    def ambient_dimension = 2
+    def bounding_box = [[-1.1, -1.1], [1.2, 1.1]]
+    def seeds = [[-1.0, 0.0], [1.05, 0.005]]
+
+    def closest_point(points)
+      @asked = asked.to_i + points.size
+      points.map do |x, y|
+        away, beside = Math.sqrt((x * x) + (y * y)), Math.sqrt(((x - 1.05) * (x - 1.05)) + (y * y))
+        from, scale = (away - 1).abs <= (beside - 0.005).abs ? [0, 1 / away] : [1.05, 0.005 / beside]
+        [from + (scale * (x - from)), scale * y]
+      end
+    end
+  end
+
+  def test_what_the_kit_says
+    CASES.each do |one|
+      said = one['report']
+      proved = Stellate::V1::Certificate.new(
+        certified: said.fetch('certified', false), reach_refuted: said.fetch('reach_refuted', false),
+        estimated_reach: said['estimated_reach'] == 'Infinity' ? Float::INFINITY : said['estimated_reach']
+      )
+      termination = :"TERMINATION_#{said.fetch('termination', 'CONVERGED')}"
+      report = Stellate::V1::Report.new(certificate: proved, termination:)
+      first = Stellate::Choice.new(said['epsilon'], 'so', 2)
+      found = first.finer(report)
+      assert_equal [one['then']&.values], [found && [found.epsilon, found.reason]], one['about']
+      assert_equal 1, found.retries if found
+      assert_nil Stellate::Choice.new(said['epsilon'], 'so', 0).finer(report)
+    end
+  end
+
+  def test_auto_goes_on_and_a_checkpoint_knows_of_it
+    Dir.mktmpdir('stellate-test-') do |checkpoint|
+      told, ends = [], []
+      options = { epsilon: 'auto', checkpoint:, on_epsilon: ->(*choice) { told << choice } }
+      on_progress = ->(_progress) { raise Interrupt if told.size == 2 }
+      error = assert_raises(Stellate::Cancelled) do
+        Stellate.watch(TwoCircles.new, on_progress:, **options) { |mesh| ends << mesh if mesh.report }
+      end
+      assert_includes error.message, 'the same call goes on from there'
+      coarse = ends.first
+      assert_equal [1, false, told[0]], [ends.size, coarse.certified?, [coarse.epsilon, coarse.epsilon_reason]]
+      assert_equal told[1], Stellate::Choice.finer_epsilon(coarse.epsilon, coarse.report)
+      see_it_finished(told, options)
+    end
+  end
+
+  private
+
+  def see_it_finished(told, options)
+    second, third = TwoCircles.new, TwoCircles.new
+    mesh = Stellate.mesh(second, **options)
+    assert_equal told[1], told[2]
+    assert mesh.certified?, mesh.report.certificate.verdict
+    assert_equal 2, mesh.report.certificate.components
+    assert_equal told.last, [mesh.epsilon, mesh.epsilon_reason]
+    again = Stellate.mesh(third, **options)
+    assert_nil third.asked
+    assert_equal mesh.points, again.points
+    straight = Stellate.mesh(third, epsilon: mesh.epsilon)
+    assert_equal [mesh.points, ''], [straight.points, straight.epsilon_reason]
+    assert_operator second.asked, :<=, third.asked # nobody examined it
+  end
+end
