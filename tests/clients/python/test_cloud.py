@@ -66,3 +66,14 @@ def test_a_bandwidth_that_is_given_is_everybodys():
 def test_a_cloud_says_how_far_its_neighbours_reach():
     said = repr(oracles.PointCloud(scan(4000, 0.003), 2))
     assert "4,000 points of R^3" in said and "bandwidth 0." in said and "residual 0.00" in said
+
+
+def test_points_that_come_several_times_are_no_neighbours_of_themselves():
+    points = scan(4000, 0.003)
+    again = np.concatenate([points, points[:1000], np.repeat(points[:3], 40, axis=0)])
+    cloud = oracles.PointCloud(again, 2)
+    assert cloud.bandwidths.min() > 0.7 * oracles.PointCloud(points, 2).bandwidths.min()
+    off, turned = errors(cloud)
+    assert off < 0.01 and turned < 5
+    with pytest.raises(stellate.InvalidArgument, match="7 different points are too few"):
+        oracles.PointCloud(np.repeat(points[:7], 40, axis=0), 2)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._rows import Array
+from ._common import tree_of
 
 _ROUNDS = 12  # of bandwidths from noise, and noise from fits of these bandwidths
 _SETTLED = 0.02  # a share: no round that changes them by less is followed by another
@@ -25,11 +26,18 @@ class Fits(NamedTuple):
     bend_error: Array  # what the noise makes of it, a standard deviation
 
 
-def by_density(tree: Any, points: Array, dimension: int) -> Array:
-    """(n,): twice the distance within which a point, and those about it, have 2 k + 3 others."""
-    count = min(len(points), 2 * dimension + 4)
-    away, near = tree.query(points, k=count)
-    return np.asarray(2.0 * away[:, -1][near].max(axis=1))
+def by_density(distinct: Array, which: Any, dimension: int) -> Array:
+    """(n,): twice the distance within which a point, and those about it, have 2 k + 3 others.
+
+    Scans that were put together have points several times, which are no others.
+
+    Args:
+      distinct: (m, d), each point once.
+      which: (n,), of each point its row there.
+    """
+    count = min(len(distinct), 2 * dimension + 4)
+    away, near = tree_of(distinct).query(distinct, k=count)
+    return np.asarray(2.0 * away[:, -1][near].max(axis=1))[which]
 
 
 def noise_aware(widths: Array, dimension: int, fit: Callable[[Array], Fits]) -> Array:
@@ -44,6 +52,8 @@ def noise_aware(widths: Array, dimension: int, fit: Callable[[Array], Fits]) -> 
     fall = 2 + dimension / 2
     for _ in range(_ROUNDS):
         seen = fit(wider)
+        if not len(seen.bend):  # nowhere are neighbours enough
+            break
         # What is left of the curvatures that are seen without what noise adds to them.
         true = np.sqrt(np.maximum(seen.bend**2 - seen.bend_error**2, 0))
         bend = max(float(np.median(true)), _LEAST * float(np.median(seen.bend)), 1e-300)

@@ -49,14 +49,16 @@ class PointCloud(Projection):
             )
         self.dimension, self.ambient_dimension = dimension, d
         terms = 1 + dimension + dimension * (dimension + 1) // 2
-        if n <= 2 * terms:
+        distinct, which = np.unique(self._points, axis=0, return_inverse=True)
+        if len(distinct) <= 2 * terms:
             raise InvalidArgument(
-                f"{n} points are too few: a quadric has {terms} coefficients in each direction"
+                f"{len(distinct)} different points are too few: a quadric has {terms} coefficients in "
+                "each direction"
             )
         self._tree = tree_of(self._points)
         if bandwidth is None:
             some = self._points[:: max(1, n // _LOOKS)]
-            self._reach(by_density(self._tree, self._points, dimension))
+            self._reach(by_density(distinct, which.reshape(-1), dimension))
             self._reach(
                 noise_aware(self.bandwidths, dimension, lambda w: self._reach(w)._fits(some))
             )
