@@ -1,11 +1,12 @@
 #include "core/batch.h"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
 
+#include "core/base/dense.h"
 #include "core/base/message.h"
 #include "core/base/name_point.h"
 #include "core/wall_beyond.h"
@@ -234,7 +235,7 @@ Status CheckConormals(const Specification& spec, const QueryBlock& block, Index 
       WallBeyond(answer.clearances.col(j).data(), spec.walls, block.face))
     return status;
   const Eigen::MatrixXd gram = along.transpose() * along;
-  const double independent = gram.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff();
+  const double independent = EigenvaluesOfSymmetric(gram)[0];
   if (independent >= kLeastTransversality) return Status::Ok();
   return refuse("the walls meet nearly tangentially: ", NameTangential(block.face, along), ", at ",
                 NamePoint(answer.points.col(j)),

@@ -2,11 +2,7 @@
 
 #include <atomic>
 #include <cstddef>
-
-#if !defined(__SANITIZE_THREAD__)
-#include <tbb/task.h>
-#include <tbb/task_group.h>
-#endif
+#include <memory>
 
 namespace stellate::core {
 
@@ -18,37 +14,20 @@ namespace stellate::core {
 // Thrown out of work that was interrupted.
 struct Interrupted {};
 
-#if defined(__SANITIZE_THREAD__)
 // Ends the work of another thread, once and for all.
 class Interruption {
  public:
-  void Raise() { raised_ = true; }
+  Interruption();
+  ~Interruption();
+  void Raise();
   bool raised() const { return raised_; }
 
- private:
-  std::atomic<bool> raised_ = false;
-};
-
-inline bool IsInterrupted() { return false; }
-inline void ThrowIfInterrupted() {}
-class InterruptionCheck {
- public:
-  bool operator()() const { return false; }
-};
-#else
-// Ends the work of another thread, once and for all.
-class Interruption {
- public:
-  void Raise() {
-    raised_ = true;
-    context_.cancel_group_execution();
-  }
-  bool raised() const { return raised_; }
-  tbb::task_group_context& context() { return context_; }
+  struct Group;  // of oneTBB's tasks: core/base/task_group.h, for those who start them
+  Group& group() { return *group_; }
 
  private:
   std::atomic<bool> raised_ = false;  // oneTBB forgets once a group has been waited for
-  tbb::task_group_context context_{tbb::task_group_context::isolated};
+  const std::unique_ptr<Group> group_;
 };
 
 // For tests: called at each check, by the thread that checks.
@@ -57,22 +36,17 @@ inline std::atomic<void (*)()> on_interruption_check = nullptr;
 // Made by a task that asks often: whom to ask costs more than the answer, and is found once.
 class InterruptionCheck {
  public:
-  bool operator()() const {
-    if (void (*const told)() = on_interruption_check.load(std::memory_order_relaxed)) told();
-    return context_ != nullptr && context_->is_group_execution_cancelled();
-  }
+  InterruptionCheck();
+  bool operator()() const;
 
  private:
-  tbb::task_group_context* context_ = tbb::task::current_context();
+  void* const group_;
 };
 
 inline bool IsInterrupted() { return InterruptionCheck()(); }
 
 // For long stretches of work on one thread.
-inline void ThrowIfInterrupted() {
-  if (IsInterrupted()) throw Interrupted{};
-}
-#endif
+void ThrowIfInterrupted();
 
 // In a loop on one thread: checks at every 4096th step.
 inline void CheckInterruption(std::size_t step) {

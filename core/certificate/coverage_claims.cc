@@ -1,10 +1,11 @@
 #include "core/certificate/coverage_claims.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cstdint>
 #include <utility>
 
+#include "core/base/dense.h"
 #include "core/base/message.h"
 #include "core/base/random.h"
 #include "core/certificate/probes.h"
@@ -93,8 +94,7 @@ void CoverageClaims::JudgeDifferences(const AnswerBlock& answer) {
       if (complete) steps.col(a) = answer.points.col(j) - probes_[n].x;
     }
     if (!complete) continue;  // the nearest vertex's tangents have to do
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(steps);
-    const Eigen::MatrixXd basis = qr.householderQ() * Eigen::MatrixXd::Identity(x_.mesh.d, k);
+    const Eigen::MatrixXd basis = OrthonormalBasis(steps, k);
     for (int i = 0; i < x_.mesh.d; ++i) {
       for (Eigen::Index a = 0; a < k; ++a)
         probes_[n].tangent[static_cast<std::size_t>(a * x_.mesh.d + i)] = basis(i, a);
@@ -138,7 +138,7 @@ bool CoverageClaims::IsBeyondFacet(const Eigen::VectorXd& x, std::uint32_t verte
       for (int j = 1; j < x_.mesh.k; ++j)
         along.col(j - 1) = x_.Vertex(corners[static_cast<std::size_t>(j)]) - x_.Vertex(corners[0]);
       const Eigen::VectorXd step = x - x_.Vertex(corners[0]);
-      const double away = (step - along * along.colPivHouseholderQr().solve(step)).norm();
+      const double away = (step - along * LeastSquares(along, step)).norm();
       if (away <= x_.DistanceAllowed(x_.Circumradius(ids))) return true;
     }
     return false;

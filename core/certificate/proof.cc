@@ -1,12 +1,13 @@
 #include "core/certificate/proof.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
 
+#include "core/base/dense.h"
 #include "core/base/infinity.h"
 #include "core/base/message.h"
 #include "core/base/parallel.h"
@@ -130,23 +131,21 @@ double DistanceAtLeast(const double* p, SimplexVertices corners, int d) {
     int size = 0;
     for (int i = 0; i < n; ++i)
       if (face >> i & 1u) at[static_cast<std::size_t>(size++)] = i;
-    using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxDimension + 1,
-                                kMaxDimension + 1>;
-    Small g(size, size);
+    Eigen::MatrixXd g(size, size);
     for (int a = 0; a < size; ++a)
       for (int b = 0; b < size; ++b) g(a, b) = gram(at[a], at[b]);
-    const Small weights = g.ldlt().solve(Small::Ones(size, 1));
+    const Eigen::VectorXd weights = SolveSymmetric(g, Eigen::VectorXd::Ones(size));
     // Weights of both signs cancel, and are those of no point of the simplex.
     if (!(weights.minCoeff() >= 0)) continue;
     // The direction x = sum of weights times offsets; x . offset i for each vertex.
     double squared = 0, least = kInfinity;
     for (int i = 0; i < n; ++i) {
       double along = 0;
-      for (int a = 0; a < size; ++a) along += weights(a, 0) * gram(at[a], i);
+      for (int a = 0; a < size; ++a) along += weights[a] * gram(at[a], i);
       least = std::min(least, along);
     }
     for (int a = 0; a < size; ++a)
-      for (int b = 0; b < size; ++b) squared += weights(a, 0) * weights(b, 0) * g(a, b);
+      for (int b = 0; b < size; ++b) squared += weights[a] * weights[b] * g(a, b);
     if (squared > 0 && std::isfinite(least)) best = std::max(best, least / std::sqrt(squared));
   }
   return best - kLengthMargin * std::sqrt(longest2);

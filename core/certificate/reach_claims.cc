@@ -1,11 +1,12 @@
 #include "core/certificate/reach_claims.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
 
+#include "core/base/dense.h"
 #include "core/base/message.h"
 #include "core/base/random.h"
 #include "core/certificate/along.h"
@@ -78,8 +79,7 @@ Eigen::MatrixXd ReachClaims::TangentsUnder(const std::uint32_t* ids) const {
     const auto tangent = x_.Tangents(ids[i]);
     sum += tangent * (tangent.transpose() * first);
   }
-  return Eigen::HouseholderQR<Eigen::MatrixXd>(sum).householderQ() *
-         Eigen::MatrixXd::Identity(x_.mesh.d, x_.mesh.k);
+  return OrthonormalBasis(sum, x_.mesh.k);
 }
 
 void ReachClaims::HoldFoot(const std::uint32_t* ids, double circumradius, double distance,

@@ -1,11 +1,12 @@
 #include "core/certificate/shape.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
+#include "core/base/dense.h"
 #include "core/base/parallel.h"
 #include "core/certificate/corners.h"
 #include "core/geometry/simplex_frame.h"
@@ -41,7 +42,7 @@ double RadiusAmongGuards(const MeshView& mesh, const std::uint32_t* ids) {
     powers[i] =
         0.5 * (edges.col(i).squaredNorm() + mesh.GuardOf(ids[0]) - mesh.GuardOf(ids[i + 1]));
   }
-  const Eigen::VectorXd centre = edges * (edges.transpose() * edges).ldlt().solve(powers).eval();
+  const Eigen::VectorXd centre = edges * SolveSymmetric(edges.transpose() * edges, powers);
   double radius = centre.norm();
   for (int i = 0; i < mesh.k; ++i) radius = std::max(radius, (centre - edges.col(i)).norm());
   return radius;

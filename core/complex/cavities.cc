@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "core/base/parallel.h"
+#include "core/base/parallel_sort.h"
 #include "core/complex/cavity_census.h"
 #include "core/geometry/simplex.h"
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/base/parallel.h"
+#include "core/base/parallel_sort.h"
 #include "core/complex/consistency.h"
 
 namespace stellate::core {

@@ -1,8 +1,9 @@
 #include "core/complex/consistency.h"
 
-#include <Eigen/LU>
+#include <Eigen/Core>
 #include <algorithm>
 
+#include "core/base/dense.h"
 #include "core/base/instantiate.h"
 #include "core/base/parallel.h"
 
@@ -23,7 +24,7 @@ Eigen::VectorXd CentreIn(const StarComplex<K>& complex, std::uint32_t q,
     for (int a = 0; a < K; ++a) rows(r, a) = normal[a];
     ++r;
   }
-  const Eigen::Matrix<double, K, 1> x = rows.fullPivLu().solve(rhs);
+  const Eigen::Matrix<double, K, 1> x = SolvePivoted(rows, rhs);
   Eigen::VectorXd centre(complex.d());
   complex.Lift(q, x.data(), centre.data());
   return centre;

@@ -6,6 +6,7 @@
 
 #include "core/base/instantiate.h"
 #include "core/base/parallel.h"
+#include "core/base/parallel_sort.h"
 #include "core/complex/around.h"
 #include "core/complex/cut_by_near.h"
 #include "core/complex/star_complex.h"

@@ -8,6 +8,7 @@
 
 #include "core/base/instantiate.h"
 #include "core/base/parallel.h"
+#include "core/base/parallel_sort.h"
 #include "core/base/room.h"
 #include "core/complex/around.h"
 #include "core/complex/star_complex.h"

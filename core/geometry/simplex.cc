@@ -1,12 +1,13 @@
 #include "core/geometry/simplex.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
 
+#include "core/base/dense.h"
 #include "core/base/infinity.h"
 #include "core/base/power.h"
 #include "core/base/vector_ops.h"
@@ -124,8 +125,7 @@ double SineToTangent(const SimplexFrame& frame, int j, int d, const double* tang
   for (int a = 0; a < j; ++a) {
     for (int b = 0; b < j; ++b) gram(a, b) = Dot(&residuals[a * d], &residuals[b * d], d);
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(gram, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::clamp(solver.eigenvalues()[j - 1], 0.0, 1.0));
+  return std::sqrt(std::clamp(EigenvaluesOfSymmetric(gram)[j - 1], 0.0, 1.0));
 }
 
 double AngleToTangent(const SimplexFrame& frame, int j, int d, const double* tangent, int k) {

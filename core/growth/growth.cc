@@ -1,10 +1,11 @@
 #include "core/growth/growth.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "core/base/dense.h"
 #include "core/base/local_maxima.h"
 #include "core/base/parallel.h"
 #include "core/growth/lattice.h"
@@ -40,8 +41,8 @@ bool Align(const double* tangent, int d, double* frame) {
   const Eigen::Map<const Rows> t(tangent, K, d);
   Eigen::Map<Rows> f(frame, K, d);
   Eigen::Matrix<double, K, K> a = f * t.transpose();
-  if (!(std::abs(a.determinant()) > kLeastVolume)) return false;
-  for (int step = 0; step < 5; ++step) a = 0.5 * (a + a.inverse().transpose().eval()).eval();
+  if (!(std::abs(Determinant<K>(a)) > kLeastVolume)) return false;
+  for (int step = 0; step < 5; ++step) a = 0.5 * (a + Inverse<K>(a).transpose()).eval();
   f = a * t;
   return true;
 }

@@ -1,11 +1,13 @@
 // Where a lattice goes on.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/dense.h"
 #include "core/base/local_maxima.h"
 #include "core/base/parallel.h"
+#include "core/base/parallel_sort.h"
 #include "core/growth/growth.h"
 #include "core/sample/near_lists.h"
 
@@ -40,7 +42,7 @@ Eigen::Matrix<double, K, 1> SlopeOf(const double* begin, const double* end, doub
     moments += along * along.transpose();
     changes += along * (at[K + 1] - share);
   }
-  return moments.ldlt().solve(changes);
+  return SolveSymmetric(moments, changes);
 }
 
 }  // namespace

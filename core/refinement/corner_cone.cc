@@ -1,8 +1,9 @@
 #include "core/refinement/corner_cone.h"
 
-#include <Eigen/LU>
+#include <Eigen/Core>
 #include <algorithm>
 
+#include "core/base/dense.h"
 #include "core/base/instantiate.h"
 #include "core/base/interruption.h"
 
@@ -46,12 +47,10 @@ CornerCone<K> ConeOf(WallSet walls, const double* conormals) {
     std::size_t step = 0;
     for (WallSet set = SetOfWall(K - 1) - 1; set < SetOfWall(count); set = NextOfSize(set)) {
       CheckInterruption(step++);
-      Eigen::Matrix<double, K - 1, K> rows;
+      Eigen::MatrixXd rows(K - 1, K);
       int row = 0;
       ForEachWall(set, [&](int i) { rows.row(row++) = normals.col(i).transpose(); });
-      Eigen::FullPivLU<Eigen::Matrix<double, K - 1, K>> lu(rows);
-      lu.setThreshold(kAlong);
-      if (lu.rank() == K - 1) try_along(lu.kernel().col(0).normalized());
+      if (const auto along = DirectionOffRows(rows, kAlong)) try_along(*along);
     }
   }
   Vector middle = Vector::Zero();

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/base/parallel.h"
+#include "core/base/parallel_sort.h"
 #include "core/base/power.h"
 #include "core/complex/consistency.h"
 #include "core/refinement/independent_set.h"

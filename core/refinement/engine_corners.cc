@@ -1,12 +1,13 @@
 // What the engine does for corners of a manifold with boundary: what is there of M where more walls
 // than K meet, and where the first points of edges are.
 
-#include <Eigen/LU>
+#include <Eigen/Core>
 #include <algorithm>
 #include <map>
 #include <utility>
 #include <vector>
 
+#include "core/base/dense.h"
 #include "core/base/parallel.h"
 #include "core/refinement/corner_cone.h"
 #include "core/refinement/engine.h"
@@ -36,7 +37,7 @@ std::vector<std::pair<Vector<K>, WallSet>> EdgesAtCorner(const StarComplex<K>& c
   }
   const Eigen::Map<const Eigen::Matrix<double, K, K, Eigen::RowMajor>> conormals(
       complex.Conormals(p));
-  const Eigen::Matrix<double, K, K> along = -conormals.inverse();
+  const Eigen::Matrix<double, K, K> along = -Inverse<K>(conormals);
   int number = 0;
   ForEachWall(walls, [&](int wall) {
     edges.emplace_back(along.col(number++).normalized(), walls & ~SetOfWall(wall));

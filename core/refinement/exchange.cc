@@ -7,6 +7,7 @@
 
 #include "core/base/instantiate.h"
 #include "core/base/parallel.h"
+#include "core/base/parallel_sort.h"
 
 namespace stellate::core {
 namespace {

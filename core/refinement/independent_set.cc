@@ -6,6 +6,7 @@
 #include "core/base/instantiate.h"
 #include "core/base/local_maxima.h"
 #include "core/base/parallel.h"
+#include "core/base/parallel_sort.h"
 #include "core/sample/ball_tree.h"
 
 namespace stellate::core {

@@ -1,6 +1,6 @@
 #include "core/refinement/rules.h"
 
-#include <Eigen/LU>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/dense.h"
 #include "core/base/instantiate.h"
 #include "core/geometry/reach.h"
 #include "core/geometry/simplex_frame.h"
@@ -284,7 +285,7 @@ bool IsFlatOnWall(const StarComplex<K>& complex, std::uint32_t p,
     if (common == 0) return false;
     complex.Project(p, complex.Point(id), edges.col(a).data());
   }
-  return std::abs(edges.determinant()) <= kFlat * edges.colwise().norm().prod();
+  return std::abs(Determinant<K>(edges)) <= kFlat * edges.colwise().norm().prod();
 }
 
 // Of a closed star that breaks no rule besides.

@@ -1,10 +1,11 @@
 #include "core/refinement/surrogate.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "core/base/dense.h"
 #include "core/base/parallel.h"
 #include "core/base/vector_ops.h"
 
@@ -114,7 +115,7 @@ void Surrogate<K>::Fit(std::uint32_t p, std::uint32_t slot) {
     }
     n[K] = std::sqrt(length2);
     Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, K>> slopes(n + K + 1 + d, d, K);
-    const Eigen::Matrix<double, K, K> back = turn.inverse();
+    const Eigen::Matrix<double, K, K> back = Inverse<K>(turn);
     slopes.noalias() = other * back;
     slopes -= tangent;
     total += n[K];
@@ -152,16 +153,10 @@ void Surrogate<K>::Fit(std::uint32_t p, std::uint32_t slot) {
     for (int a = 0; a < K; ++a) add(slopes[a], n + K + 1 + (a + 1) * d, weight, weight * scale);
   }
   for (int t = 0; t < kTerms; ++t) normal[t][t] += t < kQuadratic ? kQuadraticRidge : kCubicRidge;
-  // Sizes known at run time only: unrolled for k = 5 this would be a megabyte of code.
-  using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kTerms, kTerms>;
-  const Square lower =
-      Eigen::Map<const Eigen::Matrix<double, kTerms, kTerms, Eigen::RowMajor>>(normal[0]);
-  const Eigen::LDLT<Square> solver(lower);
-  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> forms(
-      out, kTerms, d);
-  forms = solver.solve(
-      Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
-          right.data(), kTerms, d));
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  Eigen::Map<Rows>(out, kTerms, d) =
+      SolveSymmetric(Eigen::Map<const Rows>(normal[0], kTerms, kTerms),
+                     Eigen::Map<const Rows>(right.data(), kTerms, d));
   graph.scale = scale;
   const bool scant = static_cast<double>(count * (K + 1)) < 1.5 * kTerms;
   graph.error = (scant ? kScantDoubt : kLeastDoubt) * scale;

@@ -5,7 +5,7 @@
 #include <numeric>
 #include <utility>
 
-#include "core/base/parallel.h"
+#include "core/base/parallel_sort.h"
 
 namespace stellate::core {
 

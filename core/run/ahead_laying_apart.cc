@@ -6,6 +6,7 @@
 
 #include "core/base/interruption.h"
 #include "core/base/parallel.h"
+#include "core/base/parallel_sort.h"
 #include "core/base/vector_ops.h"
 #include "core/growth/growth.h"
 #include "core/run/ahead_laying.h"

@@ -1,12 +1,12 @@
 #include "core/run/crease_probe.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "core/base/basis_layout.h"
+#include "core/base/dense.h"
 
 namespace stellate::core {
 namespace {
@@ -43,10 +43,9 @@ constexpr Eigen::Index kAsked = 8, kSteps = 4;  // steps, as far each of both
 std::pair<Eigen::VectorXd, double> FarthestOff(const Eigen::MatrixXd& of,
                                                const Eigen::MatrixXd& off) {
   const Eigen::MatrixXd beside = of - off * (off.transpose() * of);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(beside.transpose() * beside);
+  const SymmetricEigen eigen = EigenOfSymmetric(beside.transpose() * beside);
   const Eigen::Index last = of.cols() - 1;
-  return {of * solver.eigenvectors().col(last),
-          std::sqrt(std::max(solver.eigenvalues()[last], 0.0))};
+  return {of * eigen.vectors.col(last), std::sqrt(std::max(eigen.values[last], 0.0))};
 }
 
 // Where the tangent spaces at both ends come nearest to each other, nearest to the middle: on a
@@ -56,9 +55,7 @@ Eigen::VectorXd CornerOf(const Way& way) {
   const Eigen::VectorXd middle = (way.a + way.b) / 2;
   Eigen::MatrixXd span(d, 2 * k + 1);
   span << way.at_a, way.at_b, (way.b - way.a).normalized();
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(span);
-  const Eigen::MatrixXd basis =
-      qr.householderQ() * Eigen::MatrixXd::Identity(d, std::min(d, span.cols()));
+  const Eigen::MatrixXd basis = PivotedBasis(span, std::min(d, span.cols()));
   Eigen::MatrixXd off(2 * d, basis.cols());
   off << basis - way.at_a * (way.at_a.transpose() * basis),
       basis - way.at_b * (way.at_b.transpose() * basis);
@@ -66,10 +63,7 @@ Eigen::VectorXd CornerOf(const Way& way) {
   const Eigen::VectorXd from_a = way.a - middle, from_b = way.b - middle;
   to << from_a - way.at_a * (way.at_a.transpose() * from_a),
       from_b - way.at_b * (way.at_b.transpose() * from_b);
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
-  solver.setThreshold(kParallel);
-  solver.compute(off);
-  const Eigen::VectorXd step = basis * solver.solve(to);
+  const Eigen::VectorXd step = basis * ShortestLeastSquares(off, to, kParallel);
   return step.norm() <= kFarthestCorner * way.length() ? (middle + step).eval() : middle;
 }
 

@@ -8,6 +8,7 @@
 
 #include "core/base/instantiate.h"
 #include "core/base/parallel.h"
+#include "core/base/parallel_sort.h"
 #include "core/base/vector_ops.h"
 
 namespace stellate::core {

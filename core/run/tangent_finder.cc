@@ -1,9 +1,10 @@
 #include "core/run/tangent_finder.h"
 
-#include <Eigen/SVD>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/dense.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 
@@ -81,12 +82,11 @@ void TangentFinder::Absorb(const AnswerBlock& answers) {
       derivative.col(j) = (answers.points.col(q) - answers.points.col(q + 1)) / (2 * StepAt(point));
     }
     if (!complete) return;
-    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(derivative, Eigen::ComputeThinU);
-    const auto& s = svd.singularValues();
+    const auto [directions, s] = LeftSingular(derivative);
     const bool spans = guessed_ ? s[k_ - 1] > kLeastKept : s[k_ - 1] > kLeastRatio * s[0];
     const bool flat = m <= k_ || s[k_] < kMostBeyond * s[k_ - 1];
     if (spans && flat) {
-      for (int a = 0; a < k_; ++a) tangents_.col(point).segment(a * d_, d_) = svd.matrixU().col(a);
+      for (int a = 0; a < k_; ++a) tangents_.col(point).segment(a * d_, d_) = directions.col(a);
       ok_[static_cast<std::size_t>(point)] = 1;
       errors_[static_cast<std::size_t>(point)] =
           std::sqrt(static_cast<double>(m)) * 2 * StepAt(point) / s[k_ - 1];

@@ -1,10 +1,11 @@
 #include "core/run/wall_check.h"
 
-#include <Eigen/QR>
+#include <Eigen/Core>
 #include <bit>
 #include <map>
 #include <string>
 
+#include "core/base/dense.h"
 #include "core/base/message.h"
 #include "core/certificate/findings.h"
 
@@ -36,7 +37,7 @@ Eigen::MatrixXd WallCheck::Questions(const AnsweredPoints& answers) {
     asked.push_back(p + step_ * conormal);
     if (k_ == 1) asked.push_back(p - step_ * conormal);
     // The other columns of an orthogonal matrix that has the conormal as its first, up to sign.
-    const Eigen::MatrixXd q = Eigen::HouseholderQR<Eigen::MatrixXd>(within).householderQ();
+    const Eigen::MatrixXd q = OrthonormalBasis(within, k_);
     for (int a = 1; a < k_; ++a)
       for (const double sign : {1.0, -1.0})
         asked.push_back(p +

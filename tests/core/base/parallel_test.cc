@@ -2,13 +2,18 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <barrier>
+#include <cstdint>
+#include <functional>
 #include <stdexcept>
 #include <thread>
 #include <vector>
 
 #include "core/base/arenas.h"
+#include "core/base/parallel_sort.h"
+#include "core/base/random.h"
 
 namespace stellate::core {
 namespace {
@@ -23,6 +28,18 @@ int Sum(int threads) {
 
 TEST(Parallel, EveryIndexIsCalledOnce) {
   for (const int threads : {0, 1, 2}) EXPECT_EQ(Sum(threads), 4950);
+}
+
+// Fewer than a block, whole blocks, one item beyond, pairs that do not come out even.
+TEST(Parallel, SortsAnyNumberOfItems) {
+  for (const std::size_t count : {0u, 1u, 1023u, 1024u, 1025u, 3'000u, 5'121u, 100'003u}) {
+    std::vector<std::uint64_t> items(count);
+    for (std::size_t i = 0; i < count; ++i) items[i] = Mix64(i);
+    std::vector<std::uint64_t> expected = items;
+    std::sort(expected.begin(), expected.end(), std::greater<>());
+    ParallelSort(items, std::greater<>());
+    EXPECT_EQ(items, expected) << count;
+  }
 }
 
 #if !defined(__SANITIZE_THREAD__)

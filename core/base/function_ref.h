@@ -1,0 +1,31 @@
+#pragma once
+
+#include <type_traits>
+#include <utility>
+
+namespace stellate::core {
+
+template <typename Signature>
+class FunctionRef;
+
+// Calls something that outlives it, whatever its type: what a function takes that is compiled once.
+template <typename Result, typename... Arguments>
+class FunctionRef<Result(Arguments...)> {
+ public:
+  template <typename Call>
+    requires(!std::is_same_v<std::remove_cvref_t<Call>, FunctionRef>)
+  FunctionRef(const Call& call)
+      : object_(&call), call_([](const void* object, Arguments... arguments) -> Result {
+          return (*static_cast<const Call*>(object))(std::forward<Arguments>(arguments)...);
+        }) {}
+
+  Result operator()(Arguments... arguments) const {
+    return call_(object_, std::forward<Arguments>(arguments)...);
+  }
+
+ private:
+  const void* object_;
+  Result (*call_)(const void*, Arguments...);
+};
+
+}  // namespace stellate::core
