@@ -32,6 +32,7 @@ def mesh(
     require_certified: bool = False,
     checkpoint: str | os.PathLike[str] | None = None,
     save: Path | Sequence[Path] = (),
+    keep: str | None = None,
     **criteria: Any,
 ) -> Mesh:
     """Meshes the manifold that an oracle knows.
@@ -54,6 +55,9 @@ def mesh(
         and returns at once when the mesh is finished.
       save: a file or several to write the mesh to, certified or not, as Mesh.save does. What their
         formats cannot hold is an error before anything is meshed.
+      keep: "box": what lies in the oracle's bounding box, cut at its sides where the manifold leaves
+        it; "seeds": the components that seeds lie on, and no other. The mesh is that of
+        oracles.kept(oracle, keep, seeds), which further workers have to serve.
       **criteria: radius_edge_bound, sliver_bound, picking_radius, small_sliver_radius, candidates,
         advance_step, flat_alternations, ask_ahead, common_centre, size_rate, max_deviation;
         max_vertices, max_rounds, max_batch_queries, worker_wait_seconds, answer_seconds,
@@ -98,7 +102,16 @@ def mesh(
         if credentials is not None:
             server = stack.enter_context(_connect(server, credentials))
         session = stack.enter_context(
-            Run(oracle, epsilon, server, on_progress, criteria, every=False, checkpoint=kept)
+            Run(
+                oracle,
+                epsilon,
+                server,
+                on_progress,
+                criteria,
+                keep=keep,
+                every=False,
+                checkpoint=kept,
+            )
         )
         interrupts.on_first = session.interrupt
         (finished,) = session  # or an exception
@@ -122,6 +135,7 @@ def watch(
     server: str | Server | Client | None = None,
     on_progress: OnProgress | None = None,
     credentials: Credentials | None = None,
+    keep: str | None = None,
     **criteria: Any,
 ) -> Iterator[Mesh]:
     """The mesh as it grows: an iterator over Mesh, the last of which has its report.
@@ -132,17 +146,18 @@ def watch(
     """
     if credentials is not None:
         with _connect(server, credentials) as client:
-            yield from watch(oracle, epsilon, client, on_progress, **criteria)
+            yield from watch(oracle, epsilon, client, on_progress, keep=keep, **criteria)
         return
     if isinstance(oracle, str):
-        if criteria:
-            raise TypeError(f"a mesh that exists already takes no {', '.join(criteria)}")
+        given = [*criteria, *(["keep"] if keep is not None else [])]
+        if given:
+            raise TypeError(f"a mesh that exists already takes no {', '.join(given)}")
         yield from _watch_by_name(oracle, server, on_progress)
         return
     if epsilon is None:
         raise TypeError("watch() needs epsilon, a length or 'auto', to mesh an oracle's manifold")
     interrupts = Interrupts()
-    with Run(oracle, epsilon, server, on_progress, criteria) as session:
+    with Run(oracle, epsilon, server, on_progress, criteria, keep=keep) as session:
         interrupts.on_first = session.interrupt
         meshes = iter(session)
         while True:

@@ -21,6 +21,7 @@ from ._worker import Ask, answer, check_max_chunk, join_all
 from .client import Client, MeshInfo
 from .errors import Interrupted, InvalidArgument, StellateError
 from .oracle import CheckedOracle
+from .oracles import kept as part_of
 from .progress import progress_bar
 
 _log = logging.getLogger("stellate")
@@ -113,11 +114,14 @@ class Run:
         on_progress: OnProgress | None,
         criteria: dict[str, Any],
         *,
+        keep: str | None = None,
         every: bool = True,
         checkpoint: Checkpoint | None = None,
         ask: Ask = answer,
     ) -> None:
-        """`every`: iterating gives the mesh at every revision, and not only when it is finished.
+        """`keep`: see oracles.kept.
+
+        `every`: iterating gives the mesh at every revision, and not only when it is finished.
 
         `ask`: see Client.worker.
         """
@@ -131,6 +135,8 @@ class Run:
                 f"and is {on_progress!r}"
             )
         max_chunk = check_max_chunk(criteria.pop("max_chunk", None))
+        if keep is not None:
+            oracle = part_of(oracle, keep, criteria.get("seeds"))
         checked = CheckedOracle(oracle)
         mesh_spec(checked, 1.0, criteria)  # what is misspelt shows before the oracle is probed
         choice = checkpoint.choose_epsilon if checkpoint is not None else choose

@@ -69,6 +69,8 @@ def mesh_spec(oracle: CheckedOracle, epsilon: float, criteria: dict[str, Any]) -
             spec.seeds.CopyFrom(to_wire(_points(value)))
         elif name in _SERVING:
             raise TypeError(f"{name!r} is for who serves the mesh, not for declaring it")
+        elif name == "keep":
+            raise TypeError("'keep' is about the oracle: give oracles.kept(oracle, keep, seeds)")
         else:
             raise TypeError(_unknown(name))
     return spec

@@ -9,6 +9,7 @@ from ._cloud import PointCloud
 from ._combined import LevelSet, Product, Transformed
 from ._constraints import ConstraintSet
 from ._distance import SignedDistance
+from ._kept import kept
 from ._linkage import Linkage
 from ._network import NeuralImplicit
 from ._parametrized import Chart, Parametrized
@@ -34,4 +35,5 @@ __all__ = [
     "Solid",
     "Transformed",
     "TriangleMesh",
+    "kept",
 ]
