@@ -71,11 +71,9 @@ double LeastDihedral(const WallMesh& mesh) {
   return least;
 }
 
-// What the refinement gives, degrees: more of solids, whose inner points cost no answer. Next to an
-// edge of 20 degrees it is between two cells.
-double PromisedDihedral(const Case& c, const Domain& m) {
+// What the refinement gives, degrees: more of solids, whose inner points cost no answer.
+double PromisedDihedral(const Domain& m) {
   if (m.k != 3) return 0;
-  if (c.make == stellate::testing::Wedge20) return 6;
   return m.d == 3 ? 14 : 10;
 }
 
@@ -109,7 +107,7 @@ TEST_P(Walls, AreWhereTheMeshEnds) {
         EXPECT_TRUE(on ? std::abs(g) < 1e-9 : g > -1e-9) << "vertex " << v << ", wall " << w;
       }
     const double dihedral = m.k == 3 ? LeastDihedral(mesh) : 180;
-    EXPECT_GE(dihedral, PromisedDihedral(GetParam(), m) - 1e-6);
+    EXPECT_GE(dihedral, PromisedDihedral(m) - 1e-6);
     if (Setting("STELLATE_WALL_FIGURES", 0) > 0)
       std::cout << GetParam().name << ' ' << trial << " epsilon " << spec.epsilon << " vertices "
                 << mesh.points.size() << " rounds " << mesh.report.counts.rounds << " queries "
@@ -184,7 +182,7 @@ TEST(WallsTest, SliversGoWhereFacesYieldLate) {
     const Domain m = Trial(c, 1009, &spec);
     const WallMesh mesh = MeshOf(m, spec);
     EXPECT_TRUE(mesh.report.certificate.certified) << mesh.report.certificate.verdict;
-    EXPECT_GE(LeastDihedral(mesh), PromisedDihedral(c, m) - 1e-6);
+    EXPECT_GE(LeastDihedral(mesh), PromisedDihedral(m) - 1e-6);
   }
 }
 
