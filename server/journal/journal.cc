@@ -103,7 +103,7 @@ bool Journal::Take(std::int64_t id, const JournalFile::StoredMesh& stored, std::
     return true;
   }
   record.rounds = stored.rounds;
-  record.vertices = stored.vertices;
+  record.last = stored.last;
   if (!stored.end.empty()) record.end = DecodeEnd(stored.end);
   std::uint64_t parts = 0;
   if (!stored.result.empty()) record.result = DecodeResult(stored.result, &parts);

@@ -253,13 +253,13 @@ bool RecordedMesh::PutAnswers(JournalFile* file, const core::Answers& answers,
 
 std::optional<MeshFailure> RecordedMesh::WriteRound(const core::QueryBatch& batch,
                                                     const core::Answers& answers,
-                                                    std::uint64_t vertices) {
+                                                    const Standing& standing) {
   {
     const std::lock_guard lock(mutex_);  // the rest is written here
     pending_.clear();
     answers_.reset();
   }
-  RecordedRound round{questions_, DigestOf(answers), 0, vertices};
+  RecordedRound round{questions_, DigestOf(answers), 0, standing};
   auto failure = Do("the answers of a round", FairMutex::Place::kLast, 1, [&](JournalFile* file) {
     return file->Transact([&] {
       std::int64_t parts = next_part_;

@@ -34,7 +34,7 @@ class RecordedMesh final : public SessionJournal,
   void TakeAnswers(const std::shared_ptr<const Round>& round, std::size_t block, Eigen::Index first,
                    Eigen::Index count) override;
   std::optional<MeshFailure> WriteRound(const core::QueryBatch& batch, const core::Answers& answers,
-                                        std::uint64_t vertices) override;
+                                        const Standing& standing) override;
   std::optional<MeshFailure> WriteEnd(const SessionEnd& end) override;
   std::optional<MeshFailure> WriteResult(const SessionResult& result,
                                          const WatchLog& history) override;

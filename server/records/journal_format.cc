@@ -98,7 +98,8 @@ void LayOutRound(Archive& archive, Value& round) {
   archive.Number(round.questions);
   archive.Number(round.answers);
   archive.Number(round.parts);
-  archive.Number(round.vertices);
+  archive.Number(round.standing.vertices);
+  archive.Number(round.standing.elapsed_seconds);
 }
 
 template <typename Value, typename LayOut>

@@ -15,7 +15,7 @@
 namespace stellate::server {
 
 // What a journal's records hold. A change of any of these is a new kJournalVersion.
-inline constexpr std::uint32_t kJournalVersion = 7;
+inline constexpr std::uint32_t kJournalVersion = 8;
 
 // Where a record belongs. Numbers are stored: they stay as they are.
 enum class RecordKind : std::int64_t {
@@ -89,7 +89,7 @@ struct RecordedRound {
   std::uint64_t questions = 0;  // DigestOf the batch
   std::uint64_t answers = 0;    // DigestOf all of them
   std::uint64_t parts = 0;      // records that hold them
-  std::uint64_t vertices = 0;   // of the mesh, when it asked
+  Standing standing;
 };
 std::string EncodeRound(const RecordedRound& round);
 std::optional<RecordedRound> DecodeRound(std::string_view record);

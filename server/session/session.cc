@@ -14,10 +14,12 @@ namespace {
 
 using core::StatusCode;
 
-// When it was created, on the clock that measures how long it takes. The clock on the wall may have
-// been set back since.
-TimePoint CreatedAt(std::chrono::system_clock::time_point create_time) {
-  return Clock::now() - AgeOf(create_time);
+// When it would have been created, had this server had it all the time that earlier ones had it.
+TimePoint CreatedAt(const std::optional<SessionRecord>& record) {
+  constexpr double kLongest = 1e9;  // what only a forged record exceeds must not overflow the clock
+  const double had = record ? record->last.elapsed_seconds : 0;
+  const std::chrono::duration<double> before(had > 0 ? std::min(had, kLongest) : 0);
+  return Clock::now() - std::chrono::duration_cast<Clock::duration>(before);
 }
 
 double Seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
@@ -58,7 +60,7 @@ Session::Session(SessionOptions options, MesherFactory factory)
             policy().max_workers, ports().observer),
       create_time_(options_.record ? options_.record->create_time
                                    : std::chrono::system_clock::now()),
-      created_(CreatedAt(create_time_)),
+      created_(CreatedAt(options_.record)),
       replaying_(options_.record.has_value()) {
   if (ports().journal != nullptr) {
     pool_.TellOfAnswers([journal = ports().journal.get()](const auto& round, std::size_t block,
@@ -155,7 +157,7 @@ void Session::RunRounds(core::Mesher* mesher) {
 }
 
 std::uint64_t Session::ReplayBytes() const {
-  return EstimateMeshBytes(request().spec, options_.record ? options_.record->vertices : 0, 0);
+  return EstimateMeshBytes(request().spec, options_.record ? options_.record->last.vertices : 0, 0);
 }
 
 // False, and the mesh has failed, if it has grown beyond what the server can hold.
@@ -227,8 +229,8 @@ void Session::RunRound(core::Mesher* mesher, const std::shared_ptr<const core::Q
   if (!outcome.round) return;  // interrupted: the caller cancels
   const core::Answers& answers = outcome.round->answers;
   if (ports().journal != nullptr) {
-    const std::uint64_t vertices = mesher->progress().vertices;
-    if (auto failure = ports().journal->WriteRound(*batch, answers, vertices)) {
+    const Standing standing{mesher->progress().vertices, Seconds(Clock::now() - created_)};
+    if (auto failure = ports().journal->WriteRound(*batch, answers, standing)) {
       FailBlameless(mesher, std::move(*failure));
       return;
     }

@@ -37,11 +37,19 @@ struct SessionResult {
   ProgressHistory past;             // empty in records of earlier servers
 };
 
+// How a mesh stood when a round of it was answered.
+struct Standing {
+  std::uint64_t vertices = 0;  // that it had when it asked
+  // That servers have had it for. The clock on the wall may be set while none has, so that no
+  // difference of its times says this.
+  double elapsed_seconds = 0;
+};
+
 // What a journal knows of a mesh that an earlier server left.
 struct SessionRecord {
   std::chrono::system_clock::time_point create_time;
   std::uint64_t rounds = 0;             // 1 to `rounds` can be replayed
-  std::uint64_t vertices = 0;           // that it had in the last of them
+  Standing last;                        // in the last of them
   std::optional<SessionEnd> end;        // none: it is to go on
   std::optional<SessionResult> result;  // set: it needs no replay
 };
@@ -69,10 +77,10 @@ class SessionJournal {
   // so that a server that is killed does not ask for them again. Any thread; does not block.
   virtual void TakeAnswers(const std::shared_ptr<const Round>& round, std::size_t block,
                            Eigen::Index first, Eigen::Index count) = 0;
-  // Before anyone may see what the answers lead to. `vertices`: that the mesh had when it asked.
+  // Before anyone may see what the answers lead to.
   virtual std::optional<MeshFailure> WriteRound(const core::QueryBatch& batch,
                                                 const core::Answers& answers,
-                                                std::uint64_t vertices) = 0;
+                                                const Standing& standing) = 0;
   virtual std::optional<MeshFailure> WriteEnd(const SessionEnd& end) = 0;
 
   // After WriteEnd: from now on the mesh needs no replay, and its answers are removed.

@@ -35,7 +35,7 @@ class JournalFile {
     std::string start, end, result;  // as recorded; empty: none
     bool removed = false;            // marked so
     std::uint64_t rounds = 0;        // 1 to `rounds` are whole
-    std::uint64_t vertices = 0;      // in the last of them
+    Standing last;                   // in the last of them
     bool has_answers = false, has_history = false;
   };
   std::map<std::int64_t, StoredMesh> TakeMeshes() { return std::move(meshes_); }

@@ -163,7 +163,7 @@ bool JournalFile::Note(const Place& place, std::string_view record) {
       const auto number = static_cast<std::uint64_t>(place.number);
       if (number > mesh.rounds) {
         mesh.rounds = number;
-        mesh.vertices = round->vertices;
+        mesh.last = round->standing;
       }
       return true;
     }

@@ -126,6 +126,29 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
   EXPECT_EQ(readable.LoadHistory(), Session::Loading::kDone) << "and back again";
 }
 
+// A clock that was an hour fast, or slow, and was set right while no server ran.
+TEST_F(JournalTest, ASteppedClockChangesNothingOfHowLongAMeshTook) {
+  for (const std::chrono::hours step : {std::chrono::hours(-1), std::chrono::hours(1)}) {
+    double before = 0;
+    {
+      const auto journal = Open();
+      before = RunMesh(RecordedSphere(journal->NewMesh()), 3).view.elapsed_seconds;
+    }
+    const auto journal = Open();
+    auto meshes = journal->TakeMeshes();
+    ASSERT_FALSE(meshes.empty());
+    SessionOptions resumed = std::move(meshes.back());
+    const double recorded = resumed.record->last.elapsed_seconds;
+    EXPECT_GT(recorded, 0);
+    EXPECT_LE(recorded, before);
+    resumed.record->create_time += step;
+    const TimePoint began = Clock::now();
+    const double after = RunMesh(std::move(resumed)).view.elapsed_seconds;
+    EXPECT_GT(after, recorded);
+    EXPECT_LE(after, recorded + std::chrono::duration<double>(Clock::now() - began).count());
+  }
+}
+
 // As a server leaves it that was killed between the end and the result.
 TEST_F(JournalTest, AnEndWithoutItsResultIsReplayedAndThenRecorded) {
   const Outcome whole = RunMesh(RecordedSphere(nullptr));
@@ -180,7 +203,7 @@ TEST_F(JournalTest, ACancelledMeshStaysAsItWas) {
 // Writes as told.
 struct FailingJournal : testing::BlankJournal {
   std::optional<MeshFailure> WriteRound(const core::QueryBatch& batch, const core::Answers&,
-                                        std::uint64_t) override {
+                                        const Standing&) override {
     if (batch.round < 3) return std::nullopt;
     return MeshFailure{FailureReason::kJournalFull, "no room"};
   }

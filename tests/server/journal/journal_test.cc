@@ -26,7 +26,7 @@ TEST_F(JournalTest, GivesBackWhatWasWritten) {
     const auto mesh = journal->NewMesh();
     ASSERT_FALSE(mesh->WriteStart(RecordedSphere(mesh).request, now));
     mesh->BeginRound(batch);
-    ASSERT_FALSE(mesh->WriteRound(batch, answers, 17));
+    ASSERT_FALSE(mesh->WriteRound(batch, answers, {17, 0.5}));
     ASSERT_FALSE(WriteOneRound(mesh.get(), 2));  // led to nothing: cancelled, say
     ASSERT_FALSE(mesh->WriteEnd(end));
     EXPECT_GT(journal->OwnerBytes("somebody"), 400u);
@@ -39,6 +39,7 @@ TEST_F(JournalTest, GivesBackWhatWasWritten) {
             EncodeStart(RecordedSphere(nullptr).request, now));
   EXPECT_EQ(back.request.spec.seeds, RecordedSphere(nullptr).request.spec.seeds);
   EXPECT_EQ(back.record->rounds, 1u);
+  EXPECT_EQ(back.record->last.elapsed_seconds, 0.5);
   ASSERT_TRUE(back.record->end);
   EXPECT_EQ(EncodeEnd(*back.record->end), EncodeEnd(end));
   EXPECT_FALSE(back.record->result);
@@ -62,7 +63,7 @@ TEST_F(JournalTest, LargeRoundsAreKeptInParts) {
     const auto mesh = journal->NewMesh();
     ASSERT_FALSE(mesh->WriteStart(RecordedSphere(mesh).request, {}));
     mesh->BeginRound(batch);
-    ASSERT_FALSE(mesh->WriteRound(batch, answers, 1));
+    ASSERT_FALSE(mesh->WriteRound(batch, answers, {1, 0.5}));
   }
   const auto replay = Open()->TakeMeshes().at(0).ports.journal->BeginRound(batch);
   ASSERT_TRUE(replay.answers);
@@ -104,7 +105,7 @@ TEST_F(JournalTest, AnswersOfARoundThatIsNotWholeAreKept) {
     EXPECT_EQ(parts[0].answers.points.cols(), 100);
     EXPECT_EQ(parts[1].first, 900);
     // The rest of it, and the whole is what it would have been.
-    ASSERT_FALSE(meshes[0].ports.journal->WriteRound(batch, answers, 1));
+    ASSERT_FALSE(meshes[0].ports.journal->WriteRound(batch, answers, {1, 0.5}));
     const auto whole = meshes[0].ports.journal->BeginRound(batch);
     ASSERT_TRUE(whole.answers);
     EXPECT_EQ(DigestOf(*whole.answers), DigestOf(answers));
@@ -117,8 +118,8 @@ TEST_F(JournalTest, AnswersOfARoundThatIsNotWholeAreKept) {
   core::QueryBatch others = BatchOf(2, 1000, 3.0);
   const auto known = meshes.at(0).ports.journal->BeginRound(others);
   EXPECT_TRUE(known.parts.empty() && !known.failure && !known.answers);
-  EXPECT_FALSE(meshes[0].ports.journal->WriteRound(others, answers, 1));
-  ASSERT_FALSE(mesh->WriteRound(batch, answers, 1));
+  EXPECT_FALSE(meshes[0].ports.journal->WriteRound(others, answers, {1, 0.5}));
+  ASSERT_FALSE(mesh->WriteRound(batch, answers, {1, 0.5}));
   EXPECT_GT(journal->OwnerBytes("somebody"), before);
 }
 

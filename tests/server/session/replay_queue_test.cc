@@ -96,7 +96,7 @@ TEST_F(ReplayQueue, AsTheMemoryBudgetAllows) {
   SessionStore store({}, Counting());
   std::shared_ptr<MemoryBudget> budget;
   for (SessionOptions& options : journal->TakeMeshes()) {
-    options.record->vertices = 1000;
+    options.record->last.vertices = 1000;
     if (budget == nullptr) {
       const std::uint64_t one = EstimateMeshBytes(options.request.spec, 1000, 0);
       budget = std::make_shared<MemoryBudget>(MemoryBudget::Limits{one * 3 / 2, 0});

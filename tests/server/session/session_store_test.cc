@@ -270,7 +270,7 @@ class ClockSetBackTest : public ::testing::Test {
     SessionOptions options = Options();
     options.request.name = NewMeshName();
     options.ports.journal = journal_;
-    options.record = SessionRecord{created_, 0, 0, std::move(end), {}};
+    options.record = SessionRecord{created_, 0, {}, std::move(end), {}};
     const std::string name = options.request.name;
     store_.Restore(std::move(options));
     return store_.Find(name);

@@ -15,7 +15,7 @@ class BlankJournal : public SessionJournal {
   void TakeAnswers(const std::shared_ptr<const Round>&, std::size_t, Eigen::Index,
                    Eigen::Index) override {}
   std::optional<MeshFailure> WriteRound(const core::QueryBatch&, const core::Answers&,
-                                        std::uint64_t) override {
+                                        const Standing&) override {
     return std::nullopt;
   }
   std::optional<MeshFailure> WriteEnd(const SessionEnd&) override { return std::nullopt; }

@@ -128,7 +128,7 @@ inline std::optional<MeshFailure> WriteOneRound(SessionJournal* mesh, std::uint6
                                                 Eigen::Index queries = 4) {
   const core::QueryBatch batch = BatchOf(round, queries);
   mesh->BeginRound(batch);
-  return mesh->WriteRound(batch, AnswersTo(batch), round);
+  return mesh->WriteRound(batch, AnswersTo(batch), {round, 0.5});
 }
 
 inline std::shared_ptr<SessionJournal> WriteRounds(Journal* journal, std::uint64_t rounds,

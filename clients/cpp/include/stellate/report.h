@@ -34,7 +34,7 @@ struct Progress {
   // Stars with a simplex that breaks rule R1, R2, R3, R4.
   std::uint64_t bad_size = 0, bad_radius_edge = 0, bad_sliver = 0, bad_inconsistent = 0;
   double fraction = 0;           // estimated share of the work done, 0..1
-  double elapsed_seconds = 0;    // since the mesh was created
+  double elapsed_seconds = 0;    // since the mesh was created, while a server had it
   double remaining_seconds = 0;  // an estimate; 0 when unknown
 };
 
