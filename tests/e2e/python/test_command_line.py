@@ -9,6 +9,7 @@ import sys
 import pytest
 import stellate
 from stellate import manifolds
+from stellate._command_line import main
 
 SHAPES = """
 import os, time
@@ -176,10 +177,15 @@ def test_tokens_come_from_a_file_or_the_environment(shell, tmp_path):
         assert "one token and nothing else" in shell(*mesh, "--token-file", "two").stderr
 
 
-def test_help(shell):
-    assert "MODULE:OBJECT" in shell("--help").stdout
-    for command in ("mesh", "declare", "serve", "download", "doctor"):
-        assert shell(command, "--help").returncode == 0
+def test_help(shell, capsys):
+    whole = shell("--help")
+    assert whole.returncode == 0 and "MODULE:OBJECT" in whole.stdout
+    for command in ("mesh", "declare", "serve", "download", "doctor", "conform"):
+        assert command in whole.stdout
+        with pytest.raises(SystemExit) as ended:  # here: a process would have to import it all again
+            main([command, "--help"])
+        assert ended.value.code == 0
+        assert f"stellate {command}" in capsys.readouterr().out
 
 
 def test_declaring_takes_nothing_that_only_serving_needs(shell):
