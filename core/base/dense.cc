@@ -66,8 +66,8 @@ double Determinant(const Eigen::Matrix<double, K, K>& a) {
   return a.determinant();
 }
 
-#define STELLATE_EACH(K)                                                                     \
-  template Eigen::Matrix<double, K, K> Inverse<K>(const Eigen::Matrix<double, K, K>&);      \
+#define STELLATE_EACH(K)                                                               \
+  template Eigen::Matrix<double, K, K> Inverse<K>(const Eigen::Matrix<double, K, K>&); \
   template double Determinant<K>(const Eigen::Matrix<double, K, K>&);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

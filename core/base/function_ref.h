@@ -13,8 +13,7 @@ template <typename Result, typename... Arguments>
 class FunctionRef<Result(Arguments...)> {
  public:
   template <typename Call>
-    requires(!std::is_same_v<std::remove_cvref_t<Call>, FunctionRef>)
-  FunctionRef(const Call& call)
+  requires(!std::is_same_v<std::remove_cvref_t<Call>, FunctionRef>) FunctionRef(const Call& call)
       : object_(&call), call_([](const void* object, Arguments... arguments) -> Result {
           return (*static_cast<const Call*>(object))(std::forward<Arguments>(arguments)...);
         }) {}
