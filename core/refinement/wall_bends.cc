@@ -15,6 +15,7 @@ namespace {
 // Conormals may be wrong by some 11 degrees each (core/run/wall_check.cc).
 constexpr double kTelling = 23;  // degrees
 // A neighbour across a thin part of M is no bend: each is behind the other by most of its distance.
+// One that is so far behind, or ahead, is on another sheet, or the piece of the wall is too small.
 constexpr double kBehind = 0.8;
 
 template <int K>
@@ -28,6 +29,29 @@ Eigen::VectorXd ConormalOf(const StarComplex<K>& complex, std::uint32_t p) {
   return tangents * Eigen::Map<const Eigen::Matrix<double, K, 1>>(complex.Conormals(p));
 }
 
+// Whether q, on p's wall, may be on the same piece of it.
+template <int K>
+bool IsAlong(const StarComplex<K>& complex, std::uint32_t p, std::uint32_t q) {
+  const Eigen::VectorXd here = ConormalOf<K>(complex, p), there = ConormalOf<K>(complex, q);
+  const Eigen::VectorXd step = PointOf<K>(complex, q) - PointOf<K>(complex, p);
+  const double off = std::max(std::abs(step.dot(here)), std::abs(step.dot(there)));
+  return here.dot(there) >= 0 && off <= kBehind * step.norm();
+}
+
+// Of vertices on one wall alone, else false.
+template <int K>
+bool IsAlone(const StarComplex<K>& complex, std::uint32_t p, double far) {
+  if (K == 1 || CountWalls(complex.walls(p)) != 1) return false;
+  for (std::size_t f = 0; f < complex.cell(p).facet_count(); ++f) {
+    const std::uint32_t q = complex.cell(p).id(f);
+    if (!IsSample(q) || !IsSubset(complex.walls(p), complex.walls(q)) ||
+        (PointOf<K>(complex, p) - PointOf<K>(complex, q)).norm() > far)
+      continue;
+    if (complex.walls(q) != complex.walls(p) || IsAlong<K>(complex, p, q)) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 double WallBend::radius() const {
@@ -35,12 +59,13 @@ double WallBend::radius() const {
 }
 
 template <int K>
-std::optional<WallBend> SharpestBend(const StarComplex<K>& complex) {
+std::optional<WallBend> SharpestBend(const StarComplex<K>& complex, double far) {
   std::optional<WallBend> sharpest;
   for (std::uint32_t p = 0; p < complex.size(); ++p) {
     CheckInterruption(p);
     if (CountWalls(complex.walls(p)) != 1) continue;
     const auto& cell = complex.cell(p);
+    const bool is_alone = IsAlone<K>(complex, p, far);
     for (std::size_t f = 0; f < cell.facet_count(); ++f) {
       const std::uint32_t q = cell.id(f);
       if (!IsSample(q) || q <= p || complex.walls(q) != complex.walls(p)) continue;
@@ -53,6 +78,7 @@ std::optional<WallBend> SharpestBend(const StarComplex<K>& complex) {
       if (degrees < kTelling || is_behind) continue;
       WallBend bend{std::countr_zero(complex.walls(p)), degrees, length, {}};
       if (sharpest && sharpest->radius() <= bend.radius()) continue;
+      if (is_alone != IsAlone<K>(complex, q, far)) continue;
       bend.point = PointOf<K>(complex, p) + step / 2;
       sharpest = std::move(bend);
     }
@@ -62,16 +88,9 @@ std::optional<WallBend> SharpestBend(const StarComplex<K>& complex) {
 
 template <int K>
 std::optional<std::uint32_t> LoneVertex(const StarComplex<K>& complex, double far) {
-  for (std::uint32_t p = 0; K > 1 && p < complex.size(); ++p) {
+  for (std::uint32_t p = 0; p < complex.size(); ++p) {
     CheckInterruption(p);
-    if (CountWalls(complex.walls(p)) != 1) continue;
-    bool alone = true;
-    for (std::size_t f = 0; f < complex.cell(p).facet_count() && alone; ++f) {
-      const std::uint32_t q = complex.cell(p).id(f);
-      alone = !IsSample(q) || !IsSubset(complex.walls(p), complex.walls(q)) ||
-              (PointOf<K>(complex, p) - PointOf<K>(complex, q)).norm() > far;
-    }
-    if (alone) return p;
+    if (IsAlone<K>(complex, p, far)) return p;
   }
   return std::nullopt;
 }
@@ -93,9 +112,9 @@ std::optional<NearCorners> NearestCorners(const StarComplex<K>& complex) {
   return nearest;
 }
 
-#define STELLATE_EACH(K)                                                        \
-  template std::optional<NearCorners> NearestCorners<K>(const StarComplex<K>&); \
-  template std::optional<WallBend> SharpestBend<K>(const StarComplex<K>&);      \
+#define STELLATE_EACH(K)                                                           \
+  template std::optional<NearCorners> NearestCorners<K>(const StarComplex<K>&);    \
+  template std::optional<WallBend> SharpestBend<K>(const StarComplex<K>&, double); \
   template std::optional<std::uint32_t> LoneVertex<K>(const StarComplex<K>&, double);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

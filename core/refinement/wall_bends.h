@@ -19,12 +19,14 @@ struct WallBend {
   double size_to_take() const { return 0.4 * radius(); }
 };
 
-// Of all whose conormals differ by more than errors may explain, the one of the least radius.
+// Of all whose conormals differ by more than errors may explain, the one of the least radius; not
+// between a vertex that is alone on its piece (LoneVertex) and one that is not. `far`: as of that.
 template <int K>
-std::optional<WallBend> SharpestBend(const StarComplex<K>& complex);
+std::optional<WallBend> SharpestBend(const StarComplex<K>& complex, double far);
 
-// A vertex on one wall alone that has no neighbour on it within `far`: that piece of the wall is so
-// small that all of it is too near to its first vertex.
+// A vertex on one wall alone that has no neighbour on the same piece of it within `far`: that piece
+// is so small that all of it is too near to its first vertex. A neighbour on another sheet of the
+// wall is none: it faces away, or lies far off the wall's tangent space.
 template <int K>
 std::optional<std::uint32_t> LoneVertex(const StarComplex<K>& complex, double far);
 

@@ -27,6 +27,8 @@ constexpr double kLikelyError = 1e-3;
 // Of epsilon: corners of a solid that are so near to each other, or nearer, were seen to keep runs
 // from their end.
 constexpr double kNearlyMeet = 0.25;
+// Of the radius that a wall bends by: no mesh of such an epsilon is certified, or likely to end.
+constexpr double kMuchTooCoarse = 2;
 
 // 0, 2, 5
 std::string NameWalls(WallSet walls) {
@@ -133,15 +135,23 @@ void TellUnmetWall(const Engine<K>& engine, int walls, Certificate* certificate)
 }
 
 template <int K>
+bool HasPieceTooSmall(const Engine<K>& engine, double epsilon) {
+  if (LoneVertex<K>(engine.complex(), 2 * epsilon)) return true;
+  if (engine.sizes().given() || engine.sizes().is_estimated()) return false;  // sizes may follow
+  const std::optional<WallBend> bend = SharpestBend<K>(engine.complex(), 2 * epsilon);
+  return bend && epsilon > kMuchTooCoarse * bend->radius();
+}
+
+template <int K>
 void TellBend(const Engine<K>& engine, double epsilon, const std::optional<PieceOfWall>& piece,
               Certificate* certificate) {
   if (certificate->certified) return;
   const StarComplex<K>& complex = engine.complex();
-  const std::optional<WallBend> bend = SharpestBend<K>(complex);
+  const double longest = 2 * epsilon;  // of a mesh of that size no edge is longer
+  const std::optional<WallBend> bend = SharpestBend<K>(complex, longest);
   const bool is_sharp = bend && epsilon > kCoarse * bend->radius();
-  // No edge of a mesh of that size is longer.
   const std::optional<std::uint32_t> lone =
-      is_sharp ? std::nullopt : LoneVertex<K>(complex, 2 * epsilon);
+      is_sharp ? std::nullopt : LoneVertex<K>(complex, longest);
   if (!is_sharp && !lone && !piece) return;
   if (certificate->verdict.ends_with('.')) certificate->verdict.pop_back();
   if (is_sharp) {
@@ -221,7 +231,11 @@ std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent) {
   const StarComplex<K>& complex = engine.complex();
   const auto& entries = engine.book().size_and_shape();
   const auto place = [&](std::uint32_t v) {
-    return NamePoint(Eigen::Map<const Eigen::VectorXd>(complex.Point(v), complex.d()));
+    const WallSet walls = complex.walls(v);
+    return NamePoint(Eigen::Map<const Eigen::VectorXd>(complex.Point(v), complex.d())) +
+           (walls == 0
+                ? ""
+                : (CountWalls(walls) == 1 ? ", on wall " : ", on walls ") + NameWalls(walls));
   };
   std::string left = AboutLeftFaces<K>(engine);
   if (!entries.empty())
@@ -263,6 +277,7 @@ void WarnOfCompromises(const Engine<K>& engine, double epsilon, Certificate* cer
   template std::string WhatIsLeft<K>(const Engine<K>&, std::uint64_t);                   \
   template void TellSharpest<K>(const Engine<K>&, Certificate*);                         \
   template void TellUnmetWall<K>(const Engine<K>&, int, Certificate*);                   \
+  template bool HasPieceTooSmall<K>(const Engine<K>&, double);                           \
   template void TellBend<K>(const Engine<K>&, double, const std::optional<PieceOfWall>&, \
                             Certificate*);                                               \
   template void TellNearCorners<K>(const Engine<K>&, double, Certificate*);              \

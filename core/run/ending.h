@@ -30,6 +30,11 @@ void TellSharpest(const Engine<K>& engine, Certificate* certificate);
 template <int K>
 void TellUnmetWall(const Engine<K>& engine, int walls, Certificate* certificate);
 
+// Whether a wall bends by more than epsilon can follow, or has a piece that is smaller: such a mesh
+// is not going to be certified.
+template <int K>
+bool HasPieceTooSmall(const Engine<K>& engine, double epsilon);
+
 struct PieceOfWall {
   int wall = 0;
   Eigen::VectorXd point;

@@ -255,7 +255,9 @@ void MeshingRun<K>::Plan() {
   if (targets->empty() && !faces.has_discoveries())
     return engine_.AllRulesHold() ? Certify() : End(Termination::kNoProgress);
   const ViolationBook<K>& book = engine_.book();
-  if (stall_watch_.IsHopeless(book.size_and_shape().size(), engine_.complex().size()) ||
+  const bool is_lost = stall_watch_.ShouldLookForLostCauses() && spec_.walls > 0 &&
+                       HasPieceTooSmall<K>(engine_, spec_.epsilon);
+  if (is_lost || stall_watch_.IsHopeless(book.size_and_shape().size(), engine_.complex().size()) ||
       stall_watch_.HasStalled(book.size_and_shape().size() + book.blemished(),
                               !book.are_all_suspect()))
     return LeaveFaces();

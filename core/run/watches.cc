@@ -73,6 +73,11 @@ bool StallWatch::HasStalled(std::uint64_t left, bool judges_all) {
   return rounds_since_++ > kPatience * static_cast<std::uint64_t>(k_);
 }
 
+bool StallWatch::ShouldLookForLostCauses() {
+  if (front_moved_) rounds_since_front_ = 0;
+  return ++rounds_since_front_ == kPatience;
+}
+
 bool StallWatch::IsHopeless(std::uint64_t bad, std::uint64_t stars) {
   return ++rounds_ > kPatience * static_cast<std::uint64_t>(k_) &&
          static_cast<double>(bad) > kHopelessShare * static_cast<double>(stars);

@@ -45,6 +45,9 @@ class StallWatch {
   // Whether after many rounds most of the `stars` still break R1 or R2, `bad` of them: a front
   // would be a small part of the mesh by then. Called once a round.
   bool IsHopeless(std::uint64_t bad, std::uint64_t stars);
+  // True once where so many rounds have passed without a step of the front, whatever they mended,
+  // that what can never be mended should be looked for. Called once a round, before HasStalled.
+  bool ShouldLookForLostCauses();
 
  private:
   int k_;
@@ -52,6 +55,7 @@ class StallWatch {
   bool judged_all_ = false;                      // in the round before
   std::uint64_t left_then_ = ~std::uint64_t{0};  // violations, at the last progress
   std::uint64_t rounds_since_ = 0;
+  std::uint64_t rounds_since_front_ = 0;
   std::uint64_t rounds_ = 0;
 };
 
