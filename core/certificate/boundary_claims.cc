@@ -227,51 +227,50 @@ void BoundaryClaims::JudgeBeyond(const AnswerBlock& answer) {
   }
 }
 
-// What q, on the same wall as p, shows at p: p's distance from it over that from the wall's tangent
-// space, which leaves the conormal out. Infinity where p is on other walls too.
-double BoundaryClaims::ReachAt(const FaceMesh& face, std::uint32_t p, std::uint32_t q) const {
-  if (x_.mesh.WallsOf(p) != face.walls) return INFINITY;
-  const Eigen::VectorXd step = x_.Vertex(q) - x_.Vertex(p);
+// Takes what q, on the same wall as p, shows at p: p's distance from it over that from the wall's
+// tangent space, which leaves the conormal out. Nothing where p is on other walls too.
+void BoundaryClaims::HoldAt(WallSet walls, std::uint32_t p, const double* q) {
+  if (x_.mesh.WallsOf(p) != walls) return;
+  const Eigen::VectorXd step =
+      Eigen::Map<const Eigen::VectorXd>(q, x_.mesh.d) - Eigen::VectorXd(x_.Vertex(p));
   const Eigen::VectorXd along = x_.Tangents(p).transpose() * step;
   const double out = Eigen::Map<const Eigen::VectorXd>(x_.mesh.Outward(p), x_.mesh.k).dot(along);
   const double away2 = step.squaredNorm() - along.squaredNorm() + out * out;
   const double away = std::sqrt(std::max(away2, 0.0)), length = step.norm();
-  return IsTelling(length, away, x_.longest_edge[p], x_.position_error)
-             ? ReachBound(length * length, away)
-             : INFINITY;
+  if (!IsTelling(length, away, x_.longest_edge[p], x_.position_error)) return;
+  const double here = ReachBound(length * length, away);
+  ratio_ = std::max(ratio_, x_.size / here);
+  if (here >= reach_) return;
+  reach_ = here;
+  narrowest_ = p;
+  narrowest_walls_ = walls;
+}
+
+void BoundaryClaims::HoldPoint(int wall, const std::uint32_t* ids, const double* y) {
+  for (int i = 0; i < x_.mesh.k; ++i) HoldAt(SetOfWall(wall), ids[i], y);
 }
 
 void BoundaryClaims::JudgeReach() {
-  double reach = INFINITY, ratio = 0;
-  std::uint32_t narrowest = 0;
-  WallSet walls = 0;
   for (const FaceMesh& face : *x_.mesh.faces) {
     if (CountWalls(face.walls) != 1) continue;
     const auto width = static_cast<std::size_t>(face.dimension) + 1;
     for (std::size_t s = 0; s < face.simplices.size(); s += width)
       for (std::size_t i = 0; i < width; ++i)
-        for (std::size_t j = 0; j < width; ++j) {
-          if (i == j) continue;
-          const std::uint32_t p = face.simplices[s + i];
-          const double here = ReachAt(face, p, face.simplices[s + j]);
-          ratio = std::max(ratio, x_.size / here);
-          if (here >= reach) continue;
-          reach = here;
-          narrowest = p;
-          walls = face.walls;
-        }
+        for (std::size_t j = 0; j < width; ++j)
+          if (i != j)
+            HoldAt(face.walls, face.simplices[s + i], x_.mesh.Point(face.simplices[s + j]));
   }
   Certificate& c = x_.certificate;
-  c.estimated_reach = std::min(c.estimated_reach, reach);
+  c.estimated_reach = std::min(c.estimated_reach, reach_);
   if (x_.graded()) return;  // what is seen there counts in the sizes
-  c.epsilon_over_reach = std::max(c.epsilon_over_reach, x_.spec.epsilon / reach);
-  if (ratio > kCoarse)
+  c.epsilon_over_reach = std::max(c.epsilon_over_reach, x_.spec.epsilon / reach_);
+  if (ratio_ > kCoarse)
     x_.findings.Refuse(
         Findings::kReach,
         Message("too coarse to trust: ",
-                TooCoarse(ratio, reach,
-                          Message("along ", NameWalls(walls), " near vertex ", narrowest, " at ",
-                                  NamePoint(x_.Vertex(narrowest))))));
+                TooCoarse(ratio_, reach_,
+                          Message("along ", NameWalls(narrowest_walls_), " near vertex ",
+                                  narrowest_, " at ", NamePoint(x_.Vertex(narrowest_))))));
 }
 
 }  // namespace stellate::core

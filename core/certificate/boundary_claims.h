@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -31,16 +32,25 @@ class BoundaryClaims {
                    const AnswerBlock& answer);
   // Of points of M^: where one near the mesh is beyond a wall that the mesh does not end at.
   void JudgeBeyond(const AnswerBlock& answer);
-  // That the boundary's own reach within M, as its edges show it, is not too small for the mesh.
+  // Takes a point of the wall that was answered, d, beside that simplex of its mesh, k ids: what it
+  // shows of the boundary's reach. After the oracle's error is known.
+  void HoldPoint(int wall, const std::uint32_t* ids, const double* y);
+  // That the boundary's own reach within M, as its edges and answers show it, is not too small for
+  // the mesh.
   // After what M's is was told.
   void JudgeReach();
 
  private:
-  double ReachAt(const FaceMesh& face, std::uint32_t p, std::uint32_t q) const;
+  void HoldAt(WallSet walls, std::uint32_t p, const double* q);
 
   Examination& x_;
   std::vector<std::vector<std::uint32_t>> chosen_;  // by block: places in its face
   std::vector<const FaceMesh*> faces_;              // by block
+  // What was seen of the boundary's reach: the least, at which vertex, and of which wall; and the
+  // largest share that the mesh size is of it.
+  double reach_ = INFINITY, ratio_ = 0;
+  std::uint32_t narrowest_ = 0;
+  WallSet narrowest_walls_ = 0;
 };
 
 }  // namespace stellate::core

@@ -1,6 +1,7 @@
 #include "core/certificate/certifier.h"
 
 #include <Eigen/Core>
+#include <bit>
 #include <functional>
 #include <optional>
 #include <utility>
@@ -30,6 +31,7 @@ class Certifier::Impl {
        KnownOfManifold known)
       : x_(spec, mesh, facts) {
     x_.seen = std::move(known.points);
+    ends_ = std::move(known.ends);
     if (mesh.faces) boundary_.emplace(x_);
     if (const std::optional<StarGeometry> stars = JudgeComplex(x_)) {
       claims_.emplace(x_, *stars, known.leans);
@@ -45,8 +47,11 @@ class Certifier::Impl {
     if (finished_) return;
     // What they say of the oracle's own error the others need.
     if (ball_steps_ == 0) claims_->closeness.JudgeVertices(answers[vertices_]);
-    for (std::size_t b = 0; b < blocks_.size(); ++b)
+    if (ball_steps_ == 0 && sheets_) sheets_->JudgeKnown(ends_);
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      if (sheets_ && ball_steps_ == 0 && blocks_[b].face == 0) sheets_->NoteClearances(answers[b]);
       if (judges_[b]) judges_[b](blocks_[b].points, answers[b]);
+    }
     AskMore();
   }
 
@@ -120,18 +125,29 @@ class Certifier::Impl {
     if (boundary_) AskOnWalls();
   }
 
+  // judge(n, asked, answer) of the n-th block.
+  template <typename OfWalls, typename JudgeOne>
+  void AskOfEach(OfWalls& claims, std::vector<QueryBlock> blocks, JudgeOne judge) {
+    for (std::size_t n = 0; n < blocks.size(); ++n) {
+      if (blocks[n].points.cols() == 0) continue;
+      blocks_.push_back(std::move(blocks[n]));
+      judges_.push_back([&claims, judge, n](const Eigen::MatrixXd& asked, const AnswerBlock& a) {
+        (claims.*judge)(n, asked, a);
+      });
+    }
+  }
+
   void AskOnWalls() {
-    const auto ask = [this](auto& claims, std::vector<QueryBlock> blocks, auto judge) {
-      for (std::size_t n = 0; n < blocks.size(); ++n) {
-        blocks_.push_back(std::move(blocks[n]));
-        judges_.push_back([&claims, judge, n](const Eigen::MatrixXd& asked, const AnswerBlock& a) {
-          (claims.*judge)(n, asked, a);
-        });
-      }
-    };
-    ask(*boundary_, boundary_->FaceQuestions(), &BoundaryClaims::JudgeFace);
-    sheets_.emplace(x_);
-    ask(*sheets_, sheets_->Questions(claims_->closeness.simplices()), &SheetClaims::Judge);
+    const std::size_t first = blocks_.size();
+    sheets_.emplace(x_, *boundary_);
+    AskOfEach(*boundary_, boundary_->FaceQuestions(), &BoundaryClaims::JudgeFace);
+    for (std::size_t b = first; b < blocks_.size(); ++b)
+      judges_[b] = [this, judge = judges_[b], wall = std::countr_zero(blocks_[b].face)](
+                       const Eigen::MatrixXd& asked, const AnswerBlock& answer) {
+        judge(asked, answer);
+        sheets_->Judge(static_cast<std::size_t>(wall), asked, answer);
+      };
+    AskOfEach(*sheets_, sheets_->Questions(claims_->closeness.simplices()), &SheetClaims::Judge);
   }
 
   void AskMore() {
@@ -142,6 +158,8 @@ class Certifier::Impl {
     if (first && !x_.spec.oracle.tangent_basis)
       Ask(c.coverage.DifferenceQuestions(),
           [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.coverage.JudgeDifferences(a); });
+    if (first && sheets_)
+      AskOfEach(*sheets_, sheets_->QuestionsWhereClearancesDip(), &SheetClaims::Judge);
     AskTangents();
     if (ball_steps_ < kMaxBallSteps) AskBalls();
     if (ball_steps_ <= kMaxBallSteps)
@@ -185,6 +203,7 @@ class Certifier::Impl {
   std::optional<Claims> claims_;            // if it is a complex
   std::optional<BoundaryClaims> boundary_;  // of a manifold with boundary
   std::optional<SheetClaims> sheets_;       // of that, too
+  EndsOfManifold ends_;                     // known before
   int ball_steps_ = 0;
   bool finished_ = false;
   std::vector<QueryBlock> blocks_;

@@ -137,8 +137,8 @@ void Findings::Conclude(int k, const Specification& spec, Certificate& certifica
       " show no reach below ", Brief(certificate.estimated_reach), ", and all of ",
       certificate.answers_held,
       " answers that are no vertices lie on the mesh. Assumed: that the manifold has no ",
-      has_walls ? "boundary but its walls, " : "boundary, ",
-      "and no part narrower than epsilon that no question came near. ", unseen, declared);
+      has_walls ? "boundary but its walls, and no part, hole or void" : "boundary, and no part",
+      " narrower than epsilon that no question came near. ", unseen, declared);
 }
 
 }  // namespace stellate::core

@@ -48,11 +48,19 @@ struct PointsOnWalls {
   std::vector<WallSet> walls;
 };
 
+// Points of M on one wall each, that wall, and its outward conormal within M there: d each.
+struct EndsOfManifold {
+  std::vector<double> points;
+  std::vector<int> walls;
+  std::vector<double> conormals;
+};
+
 // What was learned of M before, while the mesh was made.
 struct KnownOfManifold {
   std::vector<double> points;  // of M, d each, that are no vertices
   std::vector<double> leans;   // where M may end: points y of M and the parts of q - y along
                                // it (RimCheck), 2 d each
+  EndsOfManifold ends;         // that are no vertices
 };
 
 }  // namespace stellate::core

@@ -23,6 +23,15 @@ namespace {
 constexpr std::size_t kMostQuestions = kMaxBarycentres;
 constexpr std::size_t kLeastOfWall = 250;
 constexpr std::size_t kMostOfUnmet = 100;
+// Questions where clearances dip, of all walls together and of each at least. A dip is where a
+// clearance is this share, or less, of what so many points near it let expect.
+constexpr std::size_t kMostDips = 64;
+constexpr std::size_t kLeastDips = 8;
+constexpr double kDip = 0.85;
+constexpr std::size_t kPointsNear = 8;
+constexpr double kApart = 0.25;  // of the mesh size: what is nearer is in the same dip
+// Of the mesh size: so near to a wall the distance from its mesh says little of that from the wall.
+constexpr double kBeside = 0.15;
 
 // The squared distance of y from a simplex: from the nearest of those of its faces above or below
 // which y lies.
@@ -66,9 +75,29 @@ std::vector<std::uint32_t> Thinned(const std::vector<std::uint32_t>& all, std::s
   return some;
 }
 
+// Of the points in the tree those nearest to q that are no nearer than `apart`, nearest first.
+std::vector<std::uint32_t> NearestBeyond(const BallTree& tree, const double* q, double apart) {
+  std::vector<std::pair<double, std::uint32_t>> nearest;
+  tree.VisitNear(
+      q,
+      [&] {
+        return nearest.size() < kPointsNear ? double{INFINITY} : std::sqrt(nearest.back().first);
+      },
+      [&](std::uint32_t other, double squared) {
+        if (squared < apart * apart) return;
+        const std::pair<double, std::uint32_t> entry{squared, other};
+        nearest.insert(std::upper_bound(nearest.begin(), nearest.end(), entry), entry);
+        if (nearest.size() > kPointsNear) nearest.pop_back();
+      });
+  std::vector<std::uint32_t> ids;
+  for (const auto& [squared, other] : nearest) ids.push_back(other);
+  return ids;
+}
+
 }  // namespace
 
-SheetClaims::SheetClaims(Examination& examination) : x_(examination) {
+SheetClaims::SheetClaims(Examination& examination, BoundaryClaims& boundary)
+    : x_(examination), boundary_(boundary) {
   for (int wall = 0; wall < x_.spec.walls; ++wall) sheets_.push_back(SheetOf(wall));
 }
 
@@ -158,56 +187,158 @@ std::vector<QueryBlock> SheetClaims::Questions(const std::vector<std::uint32_t>&
           radii[n], Distance(x_.mesh.Point(x_.list()[chosen[n]][i]),
                              barycentres.col(static_cast<Eigen::Index>(n)).data(), x_.mesh.d));
   });
-  std::vector<QueryBlock> blocks(sheets_.size());
-  for (std::size_t wall = 0; wall < sheets_.size(); ++wall) {
-    blocks[wall].face = SetOfWall(static_cast<int>(wall));
-    blocks[wall].want_clearances = blocks[wall].want_tangents = true;
-    blocks[wall].points = barycentres(Eigen::all, Spread(*sheets_[wall], barycentres, radii));
-  }
+  std::vector<QueryBlock> blocks;
+  for (std::size_t wall = 0; wall < sheets_.size(); ++wall)
+    blocks.push_back(
+        QuestionsOf(wall, barycentres(Eigen::all, Spread(*sheets_[wall], barycentres, radii))));
   return blocks;
 }
 
-// Whether the mesh ends at a point of the wall, as the wall does there.
-bool SheetClaims::Ends(const Sheet& sheet, const Eigen::VectorXd& y,
-                       const Eigen::VectorXd& conormal) const {
-  std::vector<std::uint32_t> near;
-  sheet.tree.Gather(y.data(), x_.DistanceAllowed(sheet.largest_radius) + x_.position_error, &near);
-  return std::any_of(near.begin(), near.end(), [&](std::uint32_t f) {
-    const auto width = static_cast<std::size_t>(x_.mesh.k), d = static_cast<std::size_t>(x_.mesh.d);
-    const double bound = x_.DistanceAllowed(sheet.radii[f]) + x_.position_error;
-    return Dot(sheet.outward.data() + f * d, conormal.data(), x_.mesh.d) >= 0 &&
-           SquaredDistanceFrom(x_.mesh, sheet.simplices.data() + f * width, x_.mesh.k, y.data()) <=
-               bound * bound;
-  });
+QueryBlock SheetClaims::QuestionsOf(std::size_t wall, Eigen::MatrixXd points) const {
+  QueryBlock block;
+  block.face = SetOfWall(static_cast<int>(wall));
+  block.want_clearances = block.want_tangents = true;
+  block.points = std::move(points);
+  return block;
 }
 
-void SheetClaims::Judge(std::size_t wall, const Eigen::MatrixXd& asked, const AnswerBlock& answer) {
-  const WallSet face = SetOfWall(static_cast<int>(wall));
-  std::vector<std::uint8_t> is_missed(static_cast<std::size_t>(asked.cols()));
-  ParallelFor(is_missed.size(), [&](std::size_t n) {
-    const auto j = static_cast<Eigen::Index>(n);
-    is_missed[n] = Found(answer, j) &&
-                   !WallBeyond(answer.clearances.col(j).data(), x_.spec.walls, face) &&
-                   !Ends(*sheets_[wall], answer.points.col(j), answer.conormals.col(j));
-  });
-  const auto missed = std::count(is_missed.begin(), is_missed.end(), 1);
-  if (missed == 0) return;
-  PointsOnWalls& wanted = x_.wanted_on_walls;
-  const std::size_t first = wanted.points.size();
-  for (std::size_t n = 0; n < is_missed.size(); ++n) {
-    if (!is_missed[n]) continue;
-    const auto y = answer.points.col(static_cast<Eigen::Index>(n));
-    wanted.points.insert(wanted.points.end(), y.begin(), y.end());
-    wanted.walls.push_back(face);
+void SheetClaims::NoteClearances(const AnswerBlock& answer) {
+  for (Eigen::Index j = 0; j < answer.clearances.cols(); ++j) {
+    CheckInterruption(static_cast<std::size_t>(j));
+    const auto clear = answer.clearances.col(j);
+    if (!Found(answer, j) || !(clear.minCoeff() > 0)) continue;
+    noted_.insert(noted_.end(), answer.points.col(j).begin(), answer.points.col(j).end());
+    clearances_.insert(clearances_.end(), clear.begin(), clear.end());
   }
-  const Eigen::Map<const Eigen::VectorXd> y(wanted.points.data() + first, x_.mesh.d);
+}
+
+// From the mesh of the wall; infinity where it has none.
+double SheetClaims::DistanceFrom(const Sheet& sheet, const double* y) const {
+  const auto width = static_cast<std::size_t>(x_.mesh.k);
+  double best = INFINITY;
+  sheet.tree.VisitNear(
+      y, [&] { return best + sheet.largest_radius; },
+      [&](std::uint32_t f, double squared) {
+        if (std::sqrt(squared) - sheet.radii[f] >= best) return;
+        const std::uint32_t* ids = sheet.simplices.data() + f * width;
+        best = std::min(best, std::sqrt(SquaredDistanceFrom(x_.mesh, ids, x_.mesh.k, y)));
+      });
+  return best;
+}
+
+// The deepest first. `near`: of each noted point those next to it.
+std::vector<std::uint32_t> SheetClaims::Dips(
+    std::size_t wall, const std::vector<std::vector<std::uint32_t>>& near) const {
+  const Sheet& sheet = *sheets_[wall];
+  const auto d = static_cast<std::size_t>(x_.mesh.d);
+  std::vector<double> far(near.size()), share(near.size()), dip(near.size(), 1.0);
+  ParallelFor(near.size(), [&](std::size_t n) {
+    far[n] = DistanceFrom(sheet, noted_.data() + n * d);
+    share[n] = clearances_[n * sheets_.size() + wall] / far[n];
+  });
+  ParallelFor(near.size(), [&](std::size_t n) {
+    if (near[n].empty() || !(far[n] > kBeside * x_.size)) return;
+    std::vector<double> shares;
+    for (const std::uint32_t other : near[n]) shares.push_back(share[other]);
+    const auto middle = shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2);
+    std::nth_element(shares.begin(), middle, shares.end());
+    dip[n] = share[n] / *middle;
+  });
+  std::vector<std::uint32_t> dips;
+  for (std::uint32_t n = 0; n < dip.size(); ++n)
+    if (dip[n] <= kDip) dips.push_back(n);
+  std::stable_sort(dips.begin(), dips.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return dip[a] < dip[b]; });
+  dips.resize(std::min(dips.size(), std::max(kLeastDips, kMostDips / sheets_.size())));
+  return dips;
+}
+
+std::vector<QueryBlock> SheetClaims::QuestionsWhereClearancesDip() {
+  const auto d = static_cast<std::size_t>(x_.mesh.d);
+  const std::size_t count = noted_.size() / d;
+  BallTree tree(x_.mesh.d, &noted_);
+  tree.Assign(std::vector<double>(count));
+  std::vector<std::vector<std::uint32_t>> near(count);
+  ParallelFor(count, [&](std::size_t n) {
+    near[n] = NearestBeyond(tree, noted_.data() + n * d, kApart * x_.size);
+  });
+  const Eigen::Map<const Eigen::MatrixXd> noted(noted_.data(), x_.mesh.d,
+                                                static_cast<Eigen::Index>(count));
+  std::vector<QueryBlock> blocks;
+  for (std::size_t wall = 0; wall < sheets_.size(); ++wall)
+    if (!sheets_[wall]->radii.empty())
+      blocks.push_back(QuestionsOf(wall, noted(Eigen::all, Dips(wall, near))));
+    else
+      blocks.push_back(QuestionsOf(wall, {}));
+  return blocks;
+}
+
+// Of the wall's simplices that are near enough to end the mesh there, and face as the wall does,
+// the nearest.
+std::optional<std::uint32_t> SheetClaims::NearestThatEnds(const Sheet& sheet,
+                                                          const End& end) const {
+  const auto width = static_cast<std::size_t>(x_.mesh.k), d = static_cast<std::size_t>(x_.mesh.d);
+  std::vector<std::uint32_t> near;
+  sheet.tree.Gather(end.y, x_.DistanceAllowed(sheet.largest_radius) + x_.position_error, &near);
+  std::optional<std::uint32_t> nearest;
+  double least = INFINITY;
+  for (const std::uint32_t f : near) {
+    const double bound = x_.DistanceAllowed(sheet.radii[f]) + x_.position_error;
+    if (Dot(sheet.outward.data() + f * d, end.conormal, x_.mesh.d) < 0) continue;
+    const double squared =
+        SquaredDistanceFrom(x_.mesh, sheet.simplices.data() + f * width, x_.mesh.k, end.y);
+    if (squared > bound * bound || squared >= least) continue;
+    least = squared;
+    nearest = f;
+  }
+  return nearest;
+}
+
+void SheetClaims::Judge(std::size_t wall, const Eigen::MatrixXd&, const AnswerBlock& answer) {
+  std::vector<End> ends;
+  for (Eigen::Index j = 0; j < answer.points.cols(); ++j)
+    if (Found(answer, j) && !WallBeyond(answer.clearances.col(j).data(), x_.spec.walls,
+                                        SetOfWall(static_cast<int>(wall))))
+      ends.push_back({answer.points.col(j).data(), answer.conormals.col(j).data()});
+  Hold(wall, ends);
+}
+
+void SheetClaims::JudgeKnown(const EndsOfManifold& known) {
+  const auto d = static_cast<std::size_t>(x_.mesh.d);
+  std::vector<std::vector<End>> ends(sheets_.size());
+  for (std::size_t n = 0; n < known.walls.size(); ++n)
+    ends[static_cast<std::size_t>(known.walls[n])].push_back(
+        {known.points.data() + n * d, known.conormals.data() + n * d});
+  for (std::size_t wall = 0; wall < ends.size(); ++wall) Hold(wall, ends[wall]);
+}
+
+// That the mesh ends at each, as the wall does, and is fine enough for what it shows.
+void SheetClaims::Hold(std::size_t wall, const std::vector<End>& ends) {
+  const Sheet& sheet = *sheets_[wall];
+  std::vector<std::optional<std::uint32_t>> nearest(ends.size());
+  ParallelFor(ends.size(), [&](std::size_t n) { nearest[n] = NearestThatEnds(sheet, ends[n]); });
+  PointsOnWalls& wanted = x_.wanted_on_walls;
+  std::vector<const double*> missed;
+  for (std::size_t n = 0; n < ends.size(); ++n) {
+    CheckInterruption(n);
+    if (nearest[n]) {
+      const std::size_t first = *nearest[n] * static_cast<std::size_t>(x_.mesh.k);
+      boundary_.HoldPoint(static_cast<int>(wall), sheet.simplices.data() + first, ends[n].y);
+      continue;
+    }
+    missed.push_back(ends[n].y);
+    wanted.points.insert(wanted.points.end(), ends[n].y, ends[n].y + x_.mesh.d);
+    wanted.walls.push_back(SetOfWall(static_cast<int>(wall)));
+  }
+  if (missed.empty()) return;
   x_.findings.Refuse(
       Findings::kCoverage,
-      Message("the manifold ends at ", NamePoint(y), ", on wall ", wall,
-              ", and the mesh does not: ",
-              sheets_[wall]->radii.empty() ? "no vertex is on that wall"
-                                           : "no simplex of that wall is there and faces that way",
-              "; answers like it: ", missed,
+      Message("the manifold ends at ",
+              NamePoint(Eigen::Map<const Eigen::VectorXd>(missed.front(), x_.mesh.d)), ", on wall ",
+              wall, ", and the mesh does not: ",
+              sheet.radii.empty() ? "no vertex is on that wall"
+                                  : "no simplex of that wall is there and faces that way",
+              "; answers like it: ", missed.size(),
               "; take epsilon at most a fifth of the width of that hole or piece"));
 }
 

@@ -3,9 +3,11 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/batch.h"
+#include "core/certificate/boundary_claims.h"
 #include "core/certificate/examination.h"
 #include "core/sample/ball_tree.h"
 
@@ -17,13 +19,24 @@ namespace stellate::core {
 // second sheet close to the first, a void just under the skin, faces the other way.
 class SheetClaims {
  public:
-  explicit SheetClaims(Examination& examination);
+  SheetClaims(Examination& examination, BoundaryClaims& boundary);
 
   // A block for each wall: barycentres of some of the `chosen` simplices. What lies deep inside is
   // asked about once: a closest point that far away leaves no room for others in between.
   std::vector<QueryBlock> Questions(const std::vector<std::uint32_t>& chosen);
-  // The answers to one.
+  // The answers to one of these, or to others of points on that wall alone.
   void Judge(std::size_t wall, const Eigen::MatrixXd& asked, const AnswerBlock& answer);
+
+  // What was known before.
+  void JudgeKnown(const EndsOfManifold& ends);
+
+  // What answers to other questions say of the walls: points of M, and how clear they are of them.
+  void NoteClearances(const AnswerBlock& answer);
+  // Of what was noted, after the first round: a block for each wall, of points that are much less
+  // clear of it than points near them are, by their distance from its mesh. What is that near to a
+  // second sheet may not have been asked about: a solver's "closest" point of the wall may be far
+  // beyond others, and then a ball up to it is not empty.
+  std::vector<QueryBlock> QuestionsWhereClearancesDip();
 
  private:
   // The mesh of a wall.
@@ -43,10 +56,23 @@ class SheetClaims {
   Eigen::VectorXd OutwardAt(const std::uint32_t* facet) const;
   std::vector<std::uint32_t> Spread(const Sheet& sheet, const Eigen::MatrixXd& barycentres,
                                     const std::vector<double>& radii) const;
-  bool Ends(const Sheet& sheet, const Eigen::VectorXd& y, const Eigen::VectorXd& conormal) const;
+  double DistanceFrom(const Sheet& sheet, const double* y) const;
+  std::vector<std::uint32_t> Dips(std::size_t wall,
+                                  const std::vector<std::vector<std::uint32_t>>& near) const;
+  QueryBlock QuestionsOf(std::size_t wall, Eigen::MatrixXd points) const;
+  // A point of M on a wall, and the conormal there, d each; borrowed.
+  struct End {
+    const double* y;
+    const double* conormal;
+  };
+  std::optional<std::uint32_t> NearestThatEnds(const Sheet& sheet, const End& end) const;
+  void Hold(std::size_t wall, const std::vector<End>& ends);
 
   Examination& x_;
+  BoundaryClaims& boundary_;
   std::vector<std::unique_ptr<Sheet>> sheets_;  // by wall
+  std::vector<double> noted_;                   // points of M, d each
+  std::vector<double> clearances_;              // theirs, of all walls each
 };
 
 }  // namespace stellate::core

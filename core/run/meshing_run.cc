@@ -297,7 +297,7 @@ void MeshingRun<K>::Certify() {
   crease_probe_.Stop();
   certification_ = std::make_unique<Certification>(
       spec_, mesh, engine_.Simplices(), facts,
-      KnownOfManifold{spare_points_.Take(), rim_watch_.leans()},
+      KnownOfManifold{spare_points_.Take(), rim_watch_.leans(), spare_points_.ends()},
       spec_.walls > 0 ? std::optional(BoundaryOf<K>(engine_)) : std::nullopt);
 }
 

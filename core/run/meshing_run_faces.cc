@@ -46,6 +46,8 @@ void MeshingRun<K>::KeepFaceSeeds() {
       continue;
     }
     ++inside;
+    // Not all seeds are taken, and one may be the only thing known of a piece of its wall.
+    spare_points_.KeepEnd(answers, c);
     engine_.faces().KeepSeed(answers.points.col(c), answers.walls[i], answers.tangents.col(c));
   }
   if (inside > 0 || engine_.faces().has_discoveries()) {

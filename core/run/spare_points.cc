@@ -1,6 +1,7 @@
 #include "core/run/spare_points.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -31,7 +32,22 @@ void SparePoints::Keep(const AnsweredPoints& answers, const std::vector<std::uin
     const auto i = static_cast<std::size_t>(c);
     if (!answers.answered[i] || used[i] || answers.Beyond(c)) continue;
     points_.insert(points_.end(), answers.points.col(c).begin(), answers.points.col(c).end());
+    KeepEnd(answers, c);
   }
+}
+
+void SparePoints::KeepEnd(const AnsweredPoints& answers, Eigen::Index c) {
+  const auto i = static_cast<std::size_t>(c);
+  if (answers.conormals.size() == 0 || !answers.found[i] || CountWalls(answers.walls[i]) != 1)
+    return;
+  const auto d = static_cast<Eigen::Index>(d_), k = answers.tangents.rows() / d;
+  const Eigen::VectorXd tangents = answers.tangents.col(c);
+  const Eigen::VectorXd conormal =
+      tangents.reshaped(d, k) * Eigen::VectorXd(answers.conormals.col(c).head(k));
+  ends_.points.insert(ends_.points.end(), answers.points.col(c).begin(),
+                      answers.points.col(c).end());
+  ends_.walls.push_back(std::countr_zero(answers.walls[i]));
+  ends_.conormals.insert(ends_.conormals.end(), conormal.begin(), conormal.end());
 }
 
 template <int K>

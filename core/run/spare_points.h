@@ -18,6 +18,8 @@ class SparePoints {
 
   // Keeps what was answered and not used; `used` by candidate.
   void Keep(const AnsweredPoints& answers, const std::vector<std::uint8_t>& used);
+  // Keeps a point of M for one that M ends at, if it was asked for on one wall.
+  void KeepEnd(const AnsweredPoints& answers, Eigen::Index c);
   // Those that the sample covers nowhere near, d each.
   template <int K>
   std::vector<double> Uncovered(const StarComplex<K>& complex) const;
@@ -33,12 +35,14 @@ class SparePoints {
 
   // To and from a certificate, d each.
   std::vector<double> Take() { return std::move(points_); }
+  const EndsOfManifold& ends() const { return ends_; }
   void GiveBack(std::vector<double> points) { points_ = std::move(points); }
 
  private:
   std::size_t d_;
   std::vector<double> points_;  // d each
-  int chosen_ = 0;              // times that Choose had some
+  EndsOfManifold ends_;
+  int chosen_ = 0;  // times that Choose had some
 };
 
 }  // namespace stellate::core

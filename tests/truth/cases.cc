@@ -305,6 +305,6 @@ Case MakeCase(const std::string& family, std::uint64_t seed, std::uint64_t n) {
   return c;
 }
 
-bool IsBeyondSeeing(const std::string& family) { return family == "holes" || family == "sheets"; }
+bool IsBeyondSeeing(const std::string& family) { return family == "holes"; }
 
 }  // namespace stellate::truth
