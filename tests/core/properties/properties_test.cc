@@ -41,6 +41,9 @@ struct Shape {
   double far = 1e12;
 };
 
+// The lattice that is laid over the flat torus is as symmetric as that: of the 46 circumcentres
+// that are asked for first when it is refined, seven have the radius of another to twelve digits,
+// and which of them goes first, rounding decides.
 constexpr Shape kShapes[] = {{"circle:3", 0.3},
                              {"ellipsoid:2:1", 0.2},
                              {"torus-knot:2:3", 0.2},
