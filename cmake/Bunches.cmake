@@ -1,18 +1,26 @@
-# stellate_bunch(TARGET): where CMAKE_UNITY_BUILD is on, sources are compiled at once with others of
-# their folder, eight at most: those tools/tidy.py reads at once, too, so names do not meet.
+# stellate_bunch(TARGET [ACROSS_ROOMS]): where CMAKE_UNITY_BUILD is on, sources are compiled at once
+# with others of their folder, eight at most: those tools/tidy.py reads at once, too, so names do not
+# meet. ACROSS_ROOMS: with others of the target, sixteen: what all of a library reads is then read,
+# and made code of, a few times.
 function(stellate_bunch target)
+  cmake_parse_arguments(PARSE_ARGV 1 bunch "ACROSS_ROOMS" "" "")
   if(NOT CMAKE_UNITY_BUILD)
     return()
   endif()
   get_target_property(sources ${target} SOURCES)
   foreach(source ${sources})
-    get_filename_component(folder ${source} ABSOLUTE)
-    get_filename_component(folder ${folder} DIRECTORY)
-    string(MAKE_C_IDENTIFIER "${folder}" folder)
-    list(APPEND seen_${folder} ${source})
-    list(LENGTH seen_${folder} count)
-    math(EXPR bunch "(${count} - 1) / 8")
-    set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${folder}_${bunch})
+    set(group all)
+    set(most 16)
+    if(NOT bunch_ACROSS_ROOMS)
+      get_filename_component(folder ${source} ABSOLUTE)
+      get_filename_component(folder ${folder} DIRECTORY)
+      string(MAKE_C_IDENTIFIER "${folder}" group)
+      set(most 8)
+    endif()
+    list(APPEND seen_${group} ${source})
+    list(LENGTH seen_${group} count)
+    math(EXPR bunch "(${count} - 1) / ${most}")
+    set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${group}_${bunch})
   endforeach()
   set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
 endfunction()

@@ -30,9 +30,8 @@ Eigen::VectorXd LeastSquares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b)
 
 Eigen::VectorXd ShortestLeastSquares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
                                      double threshold) {
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
-  solver.setThreshold(threshold);
-  return solver.compute(a).solve(b);
+  Eigen::JacobiSVD<Eigen::MatrixXd> svd(a, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  return svd.setThreshold(threshold).solve(b);
 }
 
 SymmetricEigen EigenOfSymmetric(const Eigen::MatrixXd& a) {

@@ -15,7 +15,7 @@ namespace stellate::core {
 namespace {
 
 // An answer farther than this many spacings from what was asked is no neighbour: M bends away.
-constexpr double kFarthest = 1;
+constexpr double kFarthestAnswer = 1;
 // Tangent spaces that keep less of a frame's volume than this have turned too far to carry it on.
 constexpr double kLeastVolume = 0.1;
 // Points of a run lie within this many spacings of its first: of higher dimension there are more of
@@ -300,7 +300,7 @@ std::vector<Eigen::Index> Growth<K>::Join(const Eigen::MatrixXd& points,
   ParallelFor(count, [&](std::size_t i) {
     const auto c = static_cast<Eigen::Index>(i);
     const double* const proposed = asked_.sites.points.data() + i * stride();
-    const double farthest = asked_.sites.shares[i] * (kFarthest * spacing_);
+    const double farthest = asked_.sites.shares[i] * (kFarthestAnswer * spacing_);
     fits[i] = found[i] && Distance(points.col(c).data(), proposed, d_) <= farthest &&
               Align<K>(tangents.col(c).data(), d_, frames + i * stride() * K);
   });

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/message.h"
+#include "server/storage/sqlite.h"
 
 namespace stellate::server {
 namespace {
@@ -17,7 +18,6 @@ using core::Message;
 // SQLite's formats, as its documents "Database File Format" and "WAL-mode File Format" have them.
 constexpr std::size_t kLogHeaderBytes = 32, kFrameHeaderBytes = 24;
 constexpr std::size_t kPageBytes = 4096;  // of every journal
-constexpr std::size_t kFormatAt = 18;     // in the file: two bytes, 1: without a log
 constexpr std::size_t kPagesAt = 28, kChangesAt = 24, kChangesOfPagesAt = 92;
 constexpr std::uint64_t kMostPages = std::uint64_t{1} << 30;
 
@@ -101,7 +101,7 @@ bool Apply(const std::string& log_path, const std::vector<Frame>& frames, bool g
 // So that SQLite reads it without a log, and counts its pages by its size.
 bool SetAlone(const std::string& first_page, bool replace, std::fstream* view) {
   if (replace && !WriteAt(view, 0, first_page)) return false;
-  return WriteAt(view, kFormatAt, std::string(2, '\1')) &&
+  return WriteAt(view, kSqliteFormatAt, std::string(2, '\1')) &&
          WriteAt(view, kPagesAt, std::string(4, '\0')) &&
          WriteAt(view, kChangesAt, std::string(4, '\1')) &&
          WriteAt(view, kChangesOfPagesAt, std::string(4, '\2'));

@@ -23,7 +23,7 @@ using core::Status;
 
 constexpr std::int64_t kFarthest = 100'000;  // rows without a readable one between them
 
-Status Unusable(std::string message) {
+Status CannotSalvage(std::string message) {
   return {core::StatusCode::kFailedPrecondition, std::move(message)};
 }
 
@@ -57,8 +57,8 @@ class Salvage {
   Status Remove(std::int64_t mesh, JournalFile::Kinds kinds);
   Status RemoveOne(const Place& place);
   Status CannotWrite() const {
-    return Unusable(Message("cannot write what was salvaged: ", file_->database().error(),
-                            "; nothing was changed: make room on the disk, and try again"));
+    return CannotSalvage(Message("cannot write what was salvaged: ", file_->database().error(),
+                                 "; nothing was changed: make room on the disk, and try again"));
   }
 
   JournalFile* const file_;
@@ -240,8 +240,8 @@ core::Expected<std::string> SetAside(const DataDirectory& directory) {
     fs::create_hard_link(path, Message(aside, "/", fs::path(path).filename().string()), error);
   }
   if (!error) return aside;
-  return tl::unexpected(Unusable(Message("cannot set the damaged files aside in ", aside, ": ",
-                                         error.message(), "; nothing was changed")));
+  return tl::unexpected(CannotSalvage(Message("cannot set the damaged files aside in ", aside, ": ",
+                                              error.message(), "; nothing was changed")));
 }
 
 Status ReadViews(const DataDirectory& directory, const std::string& work, Salvage* salvage) {
@@ -269,7 +269,7 @@ core::Expected<std::string> VerifyDataDir(const std::string& path) {
   auto directory = DataDirectory::Open(path);
   if (!directory) return tl::unexpected(std::move(directory.error()));
   if (!(*directory)->HasJournal()) {
-    return tl::unexpected(Unusable(Message("there is no journal in ", path)));
+    return tl::unexpected(CannotSalvage(Message("there is no journal in ", path)));
   }
   const auto journal = (*directory)->OpenJournal();
   if (!journal) return tl::unexpected(journal.error());

@@ -22,7 +22,6 @@ using core::Status;
 constexpr std::string_view kDatabaseMagic("SQLite format 3\0", 16);
 constexpr std::size_t kHeaderBytes = 100;
 constexpr std::size_t kVersionAt = 60, kApplicationAt = 68;  // in the header, high byte first
-constexpr std::size_t kFormatAt = 18;                        // two bytes; 2: with a log
 
 Status Unusable(std::string message) {
   return {core::StatusCode::kFailedPrecondition, std::move(message)};
@@ -100,7 +99,7 @@ core::Expected<std::uint32_t> DataDirectory::VersionOfJournal() const {
                 " is no journal of a stellated, or its beginning is damaged; it was left as it "
                 "is: choose another --data-dir")));
   }
-  if (header[kFormatAt] != 2 || header[kFormatAt + 1] != 2) {
+  if (header[kSqliteFormatAt] != 2 || header[kSqliteFormatAt + 1] != 2) {
     return tl::unexpected(DamagedJournal(journal(), "its beginning"));
   }
   return version;

@@ -2,6 +2,7 @@
 
 #include <sqlite3.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -10,6 +11,9 @@
 #include "core/status.h"
 
 namespace stellate::server {
+
+// In a database's header: two bytes, 1: without a write-ahead log, 2: with one.
+inline constexpr std::size_t kSqliteFormatAt = 18;
 
 // As much of SQLite as the journal needs. Not thread-safe.
 class Sqlite {
