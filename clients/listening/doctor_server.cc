@@ -62,8 +62,8 @@ Expected<void> RunDoctor(const DoctorOptions& options) {
   grpc::ServerBuilder builder;
   builder.RegisterService(static_cast<v1::Stellate::Service*>(&service));
   builder.RegisterService(static_cast<v1::Doctor::Service*>(&service));
-  const auto guarded =
-      server::GuardedServer::Start(*config, &builder, {KindOf, [](const char* /*setting*/) {}});
+  const auto guarded = server::GuardedServer::Start(
+      *config, &builder, {KindOf, [](const char* /*setting*/) {}, /*has_flags=*/false});
   if (!guarded) return Refuse(guarded.error().message);
   options.on_listening((*guarded)->address());
   for (int look = 1; options.goes_on(); ++look) {

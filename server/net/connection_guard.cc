@@ -19,6 +19,7 @@
 #include "core/base/message.h"
 #include "server/base/log.h"
 #include "server/net/socket_number.h"
+#include "server/net/who_allows.h"
 
 namespace stellate::server {
 namespace {
@@ -182,10 +183,10 @@ bool ConnectionGuard::IsCalm(Connection* connection) {
   connection->calls = calls.value_or(0);
   if (!calls) connection->id = 0;  // gRPC is about to close it, or it was another's of that name
   if (connection->calls > limits_.calls && !connection->closed) {
-    Close(
-        connection, "max-connection-streams",
-        Message("had ", connection->calls, " calls that were open or were reset faster than they ",
-                "end; --max-connection-streams allows ", limits_.calls));
+    Close(connection, "max-connection-streams",
+          Message("had ", connection->calls,
+                  " calls that were open or were reset faster than they ", "end"),
+          Message(limits_.calls, " with those that were reset"));
   }
   return calls && !waits && *calls <= kFewCalls;
 }
@@ -220,12 +221,12 @@ void ConnectionGuard::BoundHellos() {
     }
     return connection.id != 0 && BytesReceived(connection.fd) >= kHelloBytes;
   });
+  const std::size_t seen = silent_.size();
   for (auto key = silent_.begin(); crowded && key != silent_.end();) {
     Connection& connection = connections_.at(*key);
     if (now - connection.came < kHelloTime) break;
-    Close(&connection, "max-connections",
-          Message("had not said hello, as ", silent_.size(),
-                  " others; an eighth of --max-connections may"));
+    Close(&connection, "max-connections", Message("was one of ", seen, " that had not said hello"),
+          Message("as many as ", limits_.hellos));
     ++left_silent_;
     busy_.insert(*key);
     key = silent_.erase(key);
@@ -272,9 +273,8 @@ void ConnectionGuard::BoundUnread(Unread ConnectionUnread::*account, Holding Con
     held.whole = whole;
     if (bytes == 0 || connection.closed) continue;
     if (now - held.moved > limits_.request_time) {
-      Close(&connection, "request-seconds",
-            Message("had sent a part of a request, and no whole one for ",
-                    limits_.request_time.count(), " seconds"));
+      Close(&connection, "request-seconds", "had sent a part of a request, and no whole one",
+            Message(limits_.request_time.count(), " seconds for each"));
       continue;
     }
     total += bytes;
@@ -294,9 +294,8 @@ void ConnectionGuard::BoundUnread(Unread ConnectionUnread::*account, Holding Con
     if (total <= most) return;
     const std::int64_t bytes = ((*connection->unread).*account).bytes;
     total -= bytes;
-    Close(connection, "max-unread-bytes",
-          Message("held ", bytes, " bytes of unfinished requests; --max-unread-bytes allows all ",
-                  "connections ", limits_.unread_bytes));
+    Close(connection, "max-unread-bytes", Message("held ", bytes, " bytes of unfinished requests"),
+          Message("all connections ", limits_.unread_bytes));
   }
 }
 
@@ -307,8 +306,9 @@ void ConnectionGuard::GiveBack() {
   given_back_ = Clock::now();
 }
 
-void ConnectionGuard::Close(Connection* connection, const char* setting,
-                            const std::string& reason) {
+// `what` it did, where the setting allows only `allowed`.
+void ConnectionGuard::Close(Connection* connection, const char* setting, const std::string& what,
+                            const std::string& allowed) {
   connection->closed = connection->ending = true;
   closed_(setting);  // first: the client is not to know of it before
   const int fd = fcntl(connection->fd, F_DUPFD_CLOEXEC, 0);  // stays the same from here on
@@ -323,7 +323,8 @@ void ConnectionGuard::Close(Connection* connection, const char* setting,
   untidy_ = true;
   quiet_at_ = now + kQuiet;
   ++unsaid_;
-  last_ = Message("the last, of ", connection->peer, ", ", reason);
+  last_ = Message("the last, of ", connection->peer, ", ", what, "; ",
+                  WhoAllows(setting, limits_.have_flags), " allows ", allowed);
   if (now - said_ >= kLogPause) SayWhatWasClosed();
 }
 

@@ -36,6 +36,7 @@ class ConnectionGuard {
     // Connections at once that have not said hello: the handshake of TLS is not over, or HTTP/2 has
     // not begun. Half a handshake takes 100 kB. gRPC itself ends them after --hello-seconds.
     std::size_t hellos = 0;
+    bool have_flags = true;  // who_allows.h
   };
 
   // `port`: where the server listens. `judge`: unread.h. `closed` is told, on another thread, of
@@ -83,7 +84,8 @@ class ConnectionGuard {
   static void NothingIsUnread(Holding* holding);
   void BoundUnread(Unread ConnectionUnread::*account, Holding Connection::*holding);
   void GiveBack();
-  void Close(Connection* connection, const char* setting, const std::string& reason);
+  void Close(Connection* connection, const char* setting, const std::string& what,
+             const std::string& allowed);
   void SayWhatWasClosed();
 
   const int port_;

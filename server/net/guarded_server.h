@@ -25,6 +25,8 @@ class GuardedServer {
     CallJudge judge;  // unread.h
     // A connection was refused or closed by a setting. From any thread.
     std::function<void(const char* setting)> limit_reached;
+    // Who started this can set the limits by their flags, which messages then name.
+    bool has_flags = true;
   };
 
   // `builder` has the services. Of `config`, which is valid: the address, the files of TLS, and the

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -24,9 +25,10 @@ class Listener {
 
   // Binds every address that the host stands for; port 0 takes a free one. Raises the process's
   // soft limit of open files where that many connections need it; where the hard limit is lower, so
-  // is the number of connections.
-  static core::Expected<std::unique_ptr<Listener>> Open(ListenAddress address,
-                                                        std::size_t max_connections);
+  // is the number of connections. `who_allows` them: who_allows.h.
+  static core::Expected<std::unique_ptr<Listener>> Open(
+      ListenAddress address, std::size_t max_connections,
+      std::string who_allows = "--max-connections");
   ~Listener();
 
   int port() const { return port_; }
@@ -42,7 +44,7 @@ class Listener {
   void Stop();
 
  private:
-  Listener(std::vector<int> sockets, int port, std::size_t max_connections);
+  Listener(std::vector<int> sockets, int port, std::size_t max_connections, std::string who_allows);
   void Run(const std::stop_token& stop);
   void Accept(int socket, const std::stop_token& stop);
   bool IsFull();
@@ -51,6 +53,7 @@ class Listener {
   const std::vector<int> sockets_;
   const int port_;
   const std::size_t max_connections_;
+  const std::string who_allows_;
   int wake_ = -1;  // readable once it is to stop
   Taker take_;
   std::function<void()> refused_;

@@ -3,22 +3,26 @@
 import contextlib
 import json
 import pathlib
+import re
+import resource
 import socket
 import struct
 import subprocess
+import time
 
 import pytest
 import stellate
 from stellate.manifolds import ProductOfCircles, Sphere, Torus
 from stellate.oracles import Clipped, HalfSpace, Solid
 
+STELLATE = pathlib.Path(stellate.find_stellated()).parent / "stellate"
+
 
 @contextlib.contextmanager
-def doctor(*flags):
+def doctor(*flags, **options):
     """The process, and a client of it."""
-    program = pathlib.Path(stellate.find_stellated()).parent / "stellate"
-    command = [program, "doctor", "--listen", "127.0.0.1:0", "--exit-with-parent", *flags]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    command = [STELLATE, "doctor", "--listen", "127.0.0.1:0", "--exit-with-parent", *flags]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, **options) as process:
         try:
             said, _, address = process.stdout.readline().strip().rpartition(" ")
             assert said == "stellate doctor listening on"
@@ -44,10 +48,9 @@ class Raising(Torus):
 
 
 def test_others_than_this_machine_come_over_tls_alone():
-    program = pathlib.Path(stellate.find_stellated()).parent / "stellate"
     for flags in ["0.0.0.0:0"], ["[::]:0"], ["127.0.0.1:0", "--tls-cert", "a.pem"]:
         done = subprocess.run(
-            [program, "doctor", "--listen", *flags], capture_output=True, text=True, timeout=60
+            [STELLATE, "doctor", "--listen", *flags], capture_output=True, text=True, timeout=60
         )
         assert done.returncode == 2, done
         assert "--tls-key" in done.stderr
@@ -137,6 +140,40 @@ def test_requests_that_never_become_whole_are_not_kept(streams, size):
         peak = int(status.split("VmHWM:")[1].split()[0]) >> 10
         assert peak < 150, f"{peak} MB"
         assert examine(client, Torus(), 0.01) == "SUCCEEDED"
+
+
+def test_what_it_says_of_its_bounds_names_no_flag_that_it_lacks(tmp_path):
+    log = tmp_path / "log"
+
+    def await_said(what):
+        while what not in log.read_text():
+            time.sleep(0.05)
+
+    def few_files():
+        resource.setrlimit(resource.RLIMIT_NOFILE, (200, 200))
+
+    with log.open("w") as file, doctor(stderr=file, preexec_fn=few_files) as (process, client):
+        host, port = client.address.rsplit(":", 1)
+        await_said("files: it serves")
+        with contextlib.ExitStack() as strangers:
+
+            def stranger():
+                return strangers.enter_context(socket.create_connection((host, int(port)), 60))
+
+            with pytest.raises(ConnectionError):
+                send_unfinished(stranger(), 64, (4 << 20) - 64)
+            await_said("unfinished requests")
+            for _ in range(64):  # say nothing
+                stranger()
+            await_said("that had not said hello")
+            while process.poll() is None and "the most that" not in log.read_text():
+                polite = stranger()
+                with contextlib.suppress(ConnectionError):
+                    polite.sendall(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + frame(SETTINGS, 0, 0))
+                    polite.recv(1)
+    known = subprocess.run([STELLATE, "doctor", "--help"], capture_output=True, text=True).stdout
+    for flag in re.findall(r"--[a-z-]+", log.read_text()):
+        assert flag in known, log.read_text()
 
 
 def test_finds_what_the_doctor_beside_the_oracle_finds():
