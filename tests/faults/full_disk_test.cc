@@ -144,7 +144,7 @@ TEST_F(FailingDisk, ADeletionMakesRoomOnAFullDisk) {
     while (!failure) {
       ++batch.round;
       mesh->BeginRound(batch);
-      failure = mesh->WriteRound(batch, answers, 0);
+      failure = mesh->WriteRound(batch, answers, {});
     }
     EXPECT_EQ(failure->reason, FailureReason::kJournalFull);
     EXPECT_GT(batch.round, 10u) << "12 MB, of which 8 are removed at once";
@@ -158,7 +158,7 @@ TEST_F(FailingDisk, ADeletionMakesRoomOnAFullDisk) {
   const auto mesh = Begin(journal->get());
   batch.round = 1;
   mesh->BeginRound(batch);
-  EXPECT_FALSE(mesh->WriteRound(batch, answers, 0)) << "there is room again";
+  EXPECT_FALSE(mesh->WriteRound(batch, answers, {})) << "there is room again";
 }
 
 }  // namespace
