@@ -93,6 +93,8 @@ class Wheel(unittest.TestCase):
                     of_the_machine = re.match(r"lib(c|m|stdc\+\+|gcc_s)\.so", library)
                     if not of_the_machine:
                         self.assertEqual(path, str(bundled / "lib" / library))
+            hardening = ROOT / "tests" / "packages" / "hardening_test.py"
+            run("/usr/bin/python3", "-B", hardening, *programs)
             licences = {file.name for file in (bundled / "licences").iterdir()}
             self.assertLessEqual({"stellate", "libgrpc29", "libssl3", "libtbb12"}, licences)
 
