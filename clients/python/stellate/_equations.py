@@ -141,18 +141,23 @@ class Equations:
         return curvature
 
     def drive(
-        self, start: np.ndarray, step_from: StepFrom, jacobian: np.ndarray | None = None
+        self,
+        start: np.ndarray,
+        step_from: StepFrom,
+        jacobian: np.ndarray | None = None,
+        most: int | None = None,
     ) -> Solution:
         """Drives F to zero from each row of `start`; steps are halved until |F| falls.
 
         `jacobian`: of points near `start`, which saves computing it where Jacobians are shared.
+        `most`: steps, if fewer than max_iterations are to do.
         """
         y = np.array(start, dtype=float)
         values = self.values(y)
         alive = np.isfinite(values).all(axis=1)
         converged = np.zeros(len(y), dtype=bool)
         jacobians = _Shared(self, y, jacobian)
-        for _ in range(self._max_iterations):
+        for _ in range(min(most or self._max_iterations, self._max_iterations)):
             rows = np.flatnonzero(alive & ~converged)
             if not rows.size:
                 break

@@ -17,6 +17,13 @@ _LOOKS = 64  # points that F is looked at from where none leads to M
 _FEW = 0.25  # of the first batch, fewer of which find M where something is wrong with F
 _ZERO = 1e-6  # of what F is usually, where solvers that find no zero come to one
 _FLAT = 1e-2  # of how steep F is usually, where it is flat
+# Halvings of a step along M: where 1/1024 of it is too long there is a crease. So many are tried at once,
+# of few points all: a call costs more than what is in it.
+_HALVINGS, _ALL_HALVINGS, _FEW_POINTS = (1, 1, 8), (10,), 50
+_LANDING = 20  # steps down to M from a step along it; three do, and fifteen where M bends sharply
+# Ten steps along M, from the sixth on, have to become shorter by a factor of 0.7 or come nearer by a
+# thousandth: what is slower, as at creases, does not arrive in a hundred. Steps that grow leave a saddle.
+_FROM, _PATIENCE, _SHORTER, _NEARER, _GROWN = 5, 10, 0.7, 1e-3, 1.2
 
 
 class ImplicitManifold:
@@ -115,15 +122,19 @@ class ImplicitManifold:
         """
         target = np.asarray(points, dtype=float)
         y, values, converged = self._descend_to_manifold(target)
-        done = ~converged
-        for _ in range(self._max_iterations):
+        done, pace = ~converged, _Pace(len(y))
+        for iteration in range(self._max_iterations):
             active = np.flatnonzero(~done)
             if not active.size:
                 return self._all_or_raise(y, converged)
             x, here = target[active], y[active]
             step, length, jacobian = self._newton_step_along(x, here, values[active])
+            slow = pace.is_too_slow(iteration, active, length, norms(here - x))
+            if slow.any():
+                done[active[slow]], converged[active[slow]] = True, False
+                continue
             arrived = length <= 1e-9 * self._scale  # and the step squares what error is left
-            there, there_values, landed = self._descend_to_manifold(here + step, jacobian)
+            there, there_values, landed = self._descend_to_manifold(here + step, jacobian, _LANDING)
             before, after = norms(here - x), norms(there - x)
             # Near the minimum distances no longer tell better from worse.
             slack = np.where(length <= 1e-6 * self._scale, self._equations.tolerance, 0.0)
@@ -227,10 +238,10 @@ class ImplicitManifold:
         )
 
     def _descend_to_manifold(
-        self, start: np.ndarray, jacobian: np.ndarray | None = None
+        self, start: np.ndarray, jacobian: np.ndarray | None = None, most: int | None = None
     ) -> Solution:
         """Gauss-Newton with halved steps from `start` down to M, straight towards it at the end."""
-        return self._equations.drive(start, _normal_step, jacobian)
+        return self._equations.drive(start, _normal_step, jacobian, most)
 
     def _newton_in_flat(
         self, start: np.ndarray, centers: np.ndarray, bases: np.ndarray
@@ -277,18 +288,49 @@ class ImplicitManifold:
         Returns: `converged` where it did, and y as it was elsewhere.
         """
         best = Solution(y.copy(), values.copy(), np.zeros(len(y), dtype=bool))
-        fraction = 0.5
-        for _ in range(20):
+        first = 1
+        for count in _ALL_HALVINGS if len(y) <= _FEW_POINTS else _HALVINGS:
             rows = np.flatnonzero(~best.converged)
             if not rows.size:
                 break
-            there, there_values, landed = self._descend_to_manifold(y[rows] + fraction * step[rows])
-            better = landed & (norms(there - x[rows]) < norms(y[rows] - x[rows]))
-            moved = rows[better]
-            best.points[moved], best.values[moved] = there[better], there_values[better]
+            fractions = 0.5 ** np.arange(first, first + count)
+            first += count
+            along = fractions[None, :, None] * step[rows, None, :]
+            there, there_values, landed = (
+                part.reshape(len(rows), count, *part.shape[1:])
+                for part in self._descend_to_manifold(
+                    (y[rows, None, :] + along).reshape(-1, y.shape[1]), most=_LANDING
+                )
+            )
+            before = norms(y[rows] - x[rows])
+            better = landed & (norms(there - x[rows, None, :]) < before[:, None])
+            some, longest = better.any(axis=1), better.argmax(axis=1)
+            moved, taken = rows[some], (np.flatnonzero(some), longest[some])
+            best.points[moved], best.values[moved] = there[taken], there_values[taken]
             best.converged[moved] = True
-            fraction /= 2
         return best
+
+
+class _Pace:
+    """How the steps of a batch on its way along M become shorter, a row each."""
+
+    def __init__(self, count: int) -> None:
+        # The shortest of these ten steps and of those before, and how far x was then.
+        self._shortest, self._before, self._distance = np.full((3, count), np.inf)
+
+    def is_too_slow(
+        self, iteration: int, rows: np.ndarray, length: np.ndarray, distance: np.ndarray
+    ) -> np.ndarray:
+        """Which of the rows have gained too little since they were last looked at, if it is time."""
+        self._shortest[rows] = np.minimum(self._shortest[rows], length)
+        if iteration % _PATIENCE != _FROM:
+            return np.zeros(len(rows), dtype=bool)
+        shortest, before = self._shortest[rows], self._before[rows]
+        slow = (_SHORTER * before < shortest) & (shortest < _GROWN * before)
+        slow &= distance > (1 - _NEARER) * self._distance[rows]
+        self._before[rows], self._distance[rows] = shortest, distance
+        self._shortest[rows] = np.inf
+        return slow
 
 
 def _normal_step(

@@ -225,3 +225,23 @@ def test_bad_declarations_are_refused(changed, words):
     good = {"ambient_dimension": 3, "dimension": 2, "bounding_box": ([0, 0, 0], [1, 1, 1])}
     with pytest.raises(stellate.InvalidArgument, match=words):
         stellate.ImplicitManifold(lambda x: x[:, :1], **{**good, **changed})
+
+
+def test_points_that_creases_are_nearest_to_are_given_up_soon(rng):
+    calls = []
+
+    def cut_cube(p):  # less a cylinder along each axis
+        calls.append(len(p))
+        cube = (np.abs(p) - 0.75).max(axis=1)
+        axes = [np.hypot(p[:, i], p[:, i - 1]) - 0.5 for i in range(3)]
+        return np.maximum(cube, -np.minimum.reduce(axes))
+
+    oracle = stellate.oracles.SignedDistance(cut_cube, bounding_box=([-1.5] * 3, [1.5] * 3))
+    x = rng.uniform(-1.2, 1.2, (150, 3))
+    with pytest.raises(stellate.NotConverged) as lost:
+        oracle.closest_point(x)
+    asked, found = len(calls), lost.value.converged
+    assert 0.3 < found.mean() < 0.9
+    for point, y in zip(x[found], lost.value.points[found]):
+        np.testing.assert_array_equal(oracle.closest_point(point[None])[0], y)
+    assert asked < 2000, "calls of f, each for a few points, are what a search costs"
