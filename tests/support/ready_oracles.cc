@@ -74,6 +74,19 @@ Eigen::MatrixXd TorusCloud() {
   return points;
 }
 
+// Closer together towards one meridian, and noisy; the same numbers in both languages.
+Eigen::MatrixXd UnevenCloud() {
+  Eigen::MatrixXd points(3, 4000);
+  const auto part = [](double number) { return number - std::floor(number); };
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    const auto number = static_cast<double>(i);
+    const double u = part(0.7548776662466927 * number), v = part(0.5698402909980532 * number);
+    points.col(i) =
+        (1 + 0.003 * std::sin(12.9898 * number)) * Torus(kTurn * Eigen::Vector2d(u * u, v));
+  }
+  return points;
+}
+
 Triangles TorusTriangles() {
   constexpr int kLong = 120, kRound = 60;
   Triangles torus{Eigen::MatrixXd(3, kLong * kRound), Eigen::MatrixXi(3, 2 * kLong * kRound)};
@@ -159,6 +172,7 @@ const std::map<std::string, std::function<std::unique_ptr<Oracle>()>>& Makers() 
       {"constraint_set", Clifford},
       {"linkage", FourBars},
       {"point_cloud", [] { return std::make_unique<PointCloud>(TorusCloud(), 2, 0.2); }},
+      {"uneven_cloud", [] { return std::make_unique<PointCloud>(UnevenCloud(), 2); }},
       {"triangle_mesh", [] { return std::make_unique<TriangleMesh>(TorusTriangles()); }},
   };
   return kMakers;

@@ -10,10 +10,12 @@ import stellate
 from ready_shapes import (
     ALL,
     TORUS,
+    TURN,
     clifford,
     closest,
     near,
     torus_cloud,
+    torus_map,
     torus_triangles,
 )
 from stellate import oracles
@@ -35,6 +37,13 @@ def torus_distance():
     )
 
 
+def uneven_cloud():
+    number = np.arange(4000.0)
+    u = np.stack([0.7548776662466927 * number % 1, 0.5698402909980532 * number % 1], axis=1)
+    u[:, 0] *= u[:, 0]
+    return (1 + 0.003 * np.sin(12.9898 * number))[:, None] * torus_map(TURN * u)
+
+
 def four_bars():
     return oracles.Linkage(
         [("a", "p", 1.0), ("p", "q", 1.3), ("q", "b", 1.1)], {"a": (0, 0), "b": (1.5, 0)}
@@ -54,8 +63,8 @@ ORACLES = {
     "grid": (ALL["signed_distance"][0], 0.2, 1e-7),
     "constraint_set": (clifford, 0.2, 1e-8),
     "linkage": (four_bars, 0.05, 1e-8),
-    # By default Python's has a bandwidth of its own for each point, C++'s one for all.
     "point_cloud": (lambda: oracles.PointCloud(torus_cloud(), 2, bandwidth=0.2), 0.1, 1e-9),
+    "uneven_cloud": (lambda: oracles.PointCloud(uneven_cloud(), 2), 0.1, 1e-8),
     "triangle_mesh": (lambda: oracles.TriangleMesh(*torus_triangles()), 0.1, 1e-9),
 }
 OF_THE_CATALOGUE = ("product", "transformed", "level_set")  # whose boxes have margins of their own

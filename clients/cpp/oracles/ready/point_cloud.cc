@@ -1,8 +1,7 @@
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <cmath>
+#include <cstdio>
 
+#include "oracles/ready/cloud_quadrics.h"
 #include "oracles/ready/common.h"
 #include "oracles/ready/point_tree.h"
 #include "stellate/oracles/points.h"
@@ -13,47 +12,60 @@ namespace {
 constexpr int kMaxMoves = 100;
 constexpr double kShortestMove = 1e-11;  // a step, in bandwidths
 constexpr double kLongestMove = 0.5;     // of one step, likewise
-constexpr double kLeastCurving = 0.2;    // of the distance, whose own is 1 where M is flat
-// Neighbours that all but determine no quadric: a flat one is preferred, by a share of the weights
-// that is far below what noise does.
-constexpr double kFlat = 1e-10;
-constexpr Eigen::Index kBandwidthPoints = 2000, kResidualPoints = 500;  // looked at for these
+constexpr Eigen::Index kFitLooks = 400;  // points at which fits are looked at, for the bandwidths
+constexpr Eigen::Index kResidualPoints = 500;
 
-Eigen::Index Terms(Eigen::Index k) { return 1 + k + k * (k + 1) / 2; }
+// So that each so many of them are about so many.
+Eigen::Index Stride(Eigen::Index points, Eigen::Index looks) {
+  return std::max<Eigen::Index>(1, points / looks);
+}
 
-// A surface of second order over a plane, at one place.
-struct Quadric {
-  Eigen::VectorXd place;          // d, on it
-  Eigen::MatrixXd tangents;       // d x k, there
-  Eigen::MatrixXd along, across;  // d x k, the plane; d x (d - k)
-  Eigen::MatrixXd coefficients;   // terms x (d - k), of the heights across, in bandwidths
-};
+std::string Digits(double number, int digits) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.*g", digits, number);
+  return text;
+}
 
 }  // namespace
 
 class PointCloud::Neighbourhoods {
  public:
   Neighbourhoods(Eigen::MatrixXd points, int dimension, std::optional<double> bandwidth)
-      : tree_(Checked(std::move(points), dimension)), k_(dimension) {
-    bandwidth_ = bandwidth ? *bandwidth : Usual();
-    if (!std::isfinite(bandwidth_) || bandwidth_ <= 0) {
-      Refuse("bandwidth has to be positive, and is " + Short(bandwidth_));
+      : tree_(Checked(std::move(points), dimension)), quadrics_(tree_.points(), dimension) {
+    if (bandwidth && !(std::isfinite(*bandwidth) && *bandwidth > 0)) {
+      Refuse("bandwidth has to be positive, and is " + Short(*bandwidth));
     }
+    const DistinctPoints distinct(tree_.points());
+    InsistOnEnough(std::ssize(distinct.first), dimension);
+    if (bandwidth) {
+      quadrics_.Reach(Eigen::VectorXd::Constant(tree_.points().cols(), *bandwidth));
+      return;
+    }
+    const Eigen::Index stride = Stride(tree_.points().cols(), kFitLooks);
+    quadrics_.Reach(NoiseAware(ByDensity(tree_.points(), distinct, dimension), dimension,
+                               [this, stride](const Eigen::VectorXd& widths) {
+                                 quadrics_.Reach(widths);
+                                 return quadrics_.FitsAt(stride);
+                               }));
   }
 
   const Eigen::MatrixXd& points() const { return tree_.points(); }
-  double bandwidth() const { return bandwidth_; }
+  const Eigen::VectorXd& bandwidths() const { return quadrics_.bandwidths(); }
 
   // To where the quadric about a place goes through it, and the way to x is normal to it.
   bool Project(const Eigen::VectorXd& x, Eigen::VectorXd& y, Eigen::MatrixXd& tangents) const {
-    y = points().col(tree_.Nearest(x, 1).front());
-    Quadric quadric;
+    const Eigen::Index nearest = tree_.Nearest(x, 1).front();
+    const double reach = bandwidths()[nearest], longest = kLongestMove * reach;
+    y = points().col(nearest);
+    CloudFit fit;
     for (int i = 0; i < kMaxMoves; ++i) {
-      if (!Fit(y, &quadric)) return false;
-      Eigen::VectorXd step = Towards(quadric, x);
-      step *= std::min(1.0, kLongestMove * bandwidth_ / std::max(step.norm(), 1e-300));
+      if (!quadrics_.Fit(y, &fit)) return false;
+      const CloudQuadric quadric = quadrics_.QuadricOf(fit, y);
+      Eigen::VectorXd step = quadrics_.Towards(fit, quadric, x);
+      step *= longest / std::max(step.norm(), longest);
       const Eigen::VectorXd there = quadric.place + step;
-      const bool arrived = (there - y).norm() <= kShortestMove * bandwidth_;
+      if (!there.allFinite()) return false;
+      const bool arrived = (there - y).norm() <= kShortestMove * reach;
       y = there;
       tangents = quadric.tangents;
       if (arrived) return true;
@@ -68,111 +80,26 @@ class PointCloud::Neighbourhoods {
       Refuse("dimension has to be a whole number from 1 to " + std::to_string(points.rows() - 1) +
              ": " + std::to_string(k));
     }
-    if (points.cols() <= 2 * Terms(k)) {
-      Refuse(std::to_string(points.cols()) + " points are too few: a quadric has " +
-             std::to_string(Terms(k)) + " coefficients in each direction");
-    }
     return points;
   }
 
-  double Usual() const {
-    const Eigen::Index stride = std::max<Eigen::Index>(1, points().cols() / kBandwidthPoints);
-    std::vector<double> reaches, distances;
-    for (Eigen::Index j = 0; j < points().cols(); j += stride) {
-      tree_.Nearest(points().col(j), 2 * k_ + 4, &distances);
-      reaches.push_back(distances.back());
-    }
-    return 2 * Quantile(std::move(reaches), 0.95);
-  }
-
-  // 1, s_a, and s_a s_b for a <= b.
-  void Monomials(const Eigen::VectorXd& s, Eigen::VectorXd* terms) const {
-    (*terms)[0] = 1;
-    terms->segment(1, k_) = s;
-    Eigen::Index at = 1 + k_;
-    for (Eigen::Index a = 0; a < k_; ++a) {
-      for (Eigen::Index b = a; b < k_; ++b) (*terms)[at++] = s[a] * s[b];
-    }
-  }
-
-  // The least-squares quadric about a place, over the plane through its neighbours. False where
-  // these are too few.
-  bool Fit(const Eigen::VectorXd& place, Quadric* quadric) const {
-    const std::vector<Eigen::Index> near = tree_.Within(place, bandwidth_);
-    const auto count = std::ssize(near);
-    if (count < Terms(k_)) return false;
-    Eigen::MatrixXd away(place.size(), count);
-    Eigen::VectorXd weights(count);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      away.col(i) = (points().col(near[static_cast<size_t>(i)]) - place) / bandwidth_;
-      const double share = away.col(i).norm(), rest = std::max(0.0, 1 - share);
-      weights[i] = rest * rest * rest * rest * (4 * share + 1);  // Wendland's, twice smooth
-    }
-    const double total = std::max(weights.sum(), 1e-300);
-    const Eigen::VectorXd middle = away * weights / total;
-    const Eigen::MatrixXd spread =
-        away * weights.asDiagonal() * away.transpose() - total * middle * middle.transpose();
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(spread);
-    quadric->along = axes.eigenvectors().rightCols(k_);
-    quadric->across = axes.eigenvectors().leftCols(place.size() - k_);
-    Solve(away, weights, total, quadric);
-    const Eigen::MatrixXd slopes = quadric->coefficients.middleRows(1, k_);
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(quadric->along +
-                                                   quadric->across * slopes.transpose());
-    quadric->tangents = qr.householderQ() * Eigen::MatrixXd::Identity(place.size(), k_);
-    quadric->place =
-        place + bandwidth_ * (quadric->across * quadric->coefficients.row(0).transpose());
-    return quadric->place.allFinite() && quadric->tangents.allFinite();
-  }
-
-  void Solve(const Eigen::MatrixXd& away, const Eigen::VectorXd& weights, double total,
-             Quadric* quadric) const {
-    const Eigen::Index size = Terms(k_);
-    Eigen::MatrixXd system = (kFlat * total + 1e-300) * Eigen::MatrixXd::Identity(size, size);
-    Eigen::MatrixXd right = Eigen::MatrixXd::Zero(size, quadric->across.cols());
-    Eigen::VectorXd terms(size);
-    for (Eigen::Index i = 0; i < away.cols(); ++i) {
-      Monomials(quadric->along.transpose() * away.col(i), &terms);
-      system.noalias() += weights[i] * terms * terms.transpose();
-      right.noalias() +=
-          weights[i] * terms * (quadric->across.transpose() * away.col(i)).transpose();
-    }
-    quadric->coefficients = system.ldlt().solve(right);
-  }
-
-  // The tangent step towards the point nearest to x: Newton's, downhill in any case.
-  Eigen::VectorXd Towards(const Quadric& quadric, const Eigen::VectorXd& x) const {
-    const Eigen::VectorXd gap = x - quadric.place;
-    const Eigen::MatrixXd turn = quadric.along.transpose() * quadric.tangents;
-    const Eigen::VectorXd wish = turn * (quadric.tangents.transpose() * gap);
-    // Second derivatives of the heights over the plane, times how far x is above it.
-    const Eigen::VectorXd bends = quadric.coefficients.bottomRows(k_ * (k_ + 1) / 2) *
-                                  (quadric.across.transpose() * gap) / bandwidth_;
-    Eigen::MatrixXd hessian = Eigen::MatrixXd::Identity(k_, k_);
-    Eigen::Index at = 0;
-    for (Eigen::Index a = 0; a < k_; ++a) {
-      hessian(a, a) -= 2 * bends[at++];
-      for (Eigen::Index b = a + 1; b < k_; ++b, ++at) {
-        hessian(a, b) -= bends[at];
-        hessian(b, a) -= bends[at];
-      }
-    }
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(hessian);
-    const Eigen::VectorXd shares = (axes.eigenvectors().transpose() * wish).array() /
-                                   axes.eigenvalues().array().abs().max(kLeastCurving);
-    return quadric.tangents * (turn.transpose() * (axes.eigenvectors() * shares));
+  static void InsistOnEnough(Eigen::Index distinct, int k) {
+    if (distinct > 2 * QuadricTerms(k)) return;
+    Refuse(std::to_string(distinct) + " different points are too few: a quadric has " +
+           std::to_string(QuadricTerms(k)) + " coefficients in each direction");
   }
 
   const PointTree tree_;
-  const Eigen::Index k_;
-  double bandwidth_ = 0;
+  CloudQuadrics quadrics_;
 };
 
 PointCloud::PointCloud(Eigen::MatrixXd points, int dimension, std::optional<double> bandwidth)
     : PointwiseOracle(dimension, static_cast<int>(points.rows())),
       around_(std::make_unique<const Neighbourhoods>(std::move(points), dimension, bandwidth)) {
+  const Eigen::VectorXd& widths = around_->bandwidths();
+  bandwidth_ = Quantile({widths.begin(), widths.end()}, 0.5);
   const Eigen::MatrixXd& all = around_->points();
-  const Eigen::Index stride = std::max<Eigen::Index>(1, all.cols() / kResidualPoints);
+  const Eigen::Index stride = Stride(all.cols(), kResidualPoints);
   std::vector<double> off;
   Eigen::VectorXd y;
   Eigen::MatrixXd tangents;
@@ -180,15 +107,14 @@ PointCloud::PointCloud(Eigen::MatrixXd points, int dimension, std::optional<doub
     if (around_->Project(all.col(j), y, tangents)) off.push_back((y - all.col(j)).norm());
   }
   if (off.empty()) {
-    Refuse("no point has enough neighbours within " + Short(around_->bandwidth()) +
-           ": a larger bandwidth?");
+    Refuse("no point has enough neighbours within " + Short(bandwidth_) + ": a larger bandwidth?");
   }
   residual_ = Quantile(std::move(off), 0.95);
 }
 
 PointCloud::~PointCloud() = default;
 
-double PointCloud::bandwidth() const { return around_->bandwidth(); }
+const Eigen::VectorXd& PointCloud::bandwidths() const { return around_->bandwidths(); }
 
 std::optional<BoundingBox> PointCloud::bounding_box() const {
   return BoxAround(around_->points(), 0.02);
@@ -204,6 +130,16 @@ void PointCloud::Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) con
   if (!around_->Project(y, again, tangent)) {
     tangent = Eigen::MatrixXd::Identity(ambient_dimension(), dimension());
   }
+}
+
+std::string ToText(const PointCloud& cloud) {
+  const double low = cloud.bandwidths().minCoeff(), high = cloud.bandwidths().maxCoeff();
+  const std::string local =
+      low < high ? " (" + Digits(low, 3) + " to " + Digits(high, 3) + ")" : "";
+  return std::to_string(cloud.bandwidths().size()) + " points of R^" +
+         std::to_string(cloud.ambient_dimension()) + ", dimension " +
+         std::to_string(cloud.dimension()) + ", bandwidth " + Digits(cloud.bandwidth(), 3) + local +
+         ", residual " + Digits(cloud.residual(), 2);
 }
 
 }  // namespace stellate::oracles

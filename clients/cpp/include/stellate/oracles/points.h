@@ -15,17 +15,19 @@ namespace stellate::oracles {
 // It is where the least-squares quadric through a place's neighbours, weighted by how near they
 // are, goes through the place itself. Where the points' noise is s, it lies within about s of the
 // manifold that they were taken from, plus bandwidth^3 times the change of its curvature; an
-// epsilon below the bandwidth meshes the smoothing.
+// epsilon below the bandwidth meshes the smoothing. ToText tells what the bandwidth is.
 class PointCloud : public PointwiseOracle {
  public:
   // The points (d x n) have to lie on all of the manifold, at distances well below its reach.
-  // `bandwidth` is how far the neighbours of a place reach; by default twice the distance within
-  // which nearly all points have 2 k + 3 others. Smoother when larger; sheets have to be farther
-  // apart.
+  // `bandwidth` is how far points are neighbours of a place. By default each point has one of its
+  // own: twice the distance within which it and those about it have 2 k + 3 others, or what it
+  // takes for noise to add no more than a tenth to the curvature. Smoother when larger; sheets have
+  // to be farther apart.
   PointCloud(Eigen::MatrixXd points, int dimension, std::optional<double> bandwidth = {});
   ~PointCloud() override;
 
-  double bandwidth() const;
+  double bandwidth() const { return bandwidth_; }  // the points' median
+  const Eigen::VectorXd& bandwidths() const;       // n, the points' own
   // How far the points are from the manifold, 95 in 100 of them: the noise, and what the quadric
   // does not follow.
   double residual() const { return residual_; }
@@ -41,8 +43,11 @@ class PointCloud : public PointwiseOracle {
   class Neighbourhoods;
 
   std::unique_ptr<const Neighbourhoods> around_;
-  double residual_ = 0;
+  double bandwidth_ = 0, residual_ = 0;
 };
+
+// One line, for people: how many points, how far neighbours reach, how far the points are off.
+std::string ToText(const PointCloud& cloud);
 
 // Triangles in R^3 that share their corners.
 struct Triangles {
