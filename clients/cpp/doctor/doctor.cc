@@ -63,6 +63,7 @@ void Examination::ObeyLaws() {
       {"answers_repeat", &Examination::AnswersRepeat},
       {"answers_stay", &Examination::AnswersStay},
       {"answers_are_closest", &Examination::AnswersAreClosest},
+      {"equations_have_rank", &Examination::EquationsHaveRank},
       {"dimension_is_right", &Examination::DimensionIsRight},
       {"tangents_are_right", &Examination::TangentsAreRight},
       {"sizes_are_lengths", &Examination::SizesAreLengths},

@@ -36,6 +36,7 @@ class Examination {
   void AnswersAreClosest();
   void NoneSeenIsNearer(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, const char* code);
   void NearPointsComeBack();
+  void EquationsHaveRank();
   // Of dimension, tangents and smoothness.
   void DimensionIsRight();
   void FewRanksAreWrong() { JudgeRanks(kFewWrongRanks); }

@@ -22,6 +22,9 @@ auto Guarded(const char* method, Eigen::Index count, const Ask& ask) {
   std::string what = "an exception that is no std::exception";
   try {
     return ask();
+  } catch (const OracleError& error) {
+    const bool inexact = error.reason() == "ORACLE_PRECISION";
+    throw Stop{MakeFinding(inexact ? "INEXACT" : "WRONG_SHAPE", {{"what", error.what()}})};
   } catch (const std::exception& error) {
     what = error.what();
   } catch (...) {
@@ -146,6 +149,11 @@ Eigen::MatrixXd Probe::Numbers(const char* method, const Eigen::MatrixXd& at, Ei
         "NOT_FINITE", {{"what", std::string(method) + " returned numbers that are not finite"}})};
   }
   return numbers;
+}
+
+Eigen::MatrixXd Probe::EquationGradients(const Eigen::MatrixXd& at) {
+  return Numbers("EquationGradients", at, static_cast<Eigen::Index>(equations()) * d_,
+                 [&] { return oracle_.EquationGradients(at); });
 }
 
 Eigen::MatrixXd Probe::Clearances(const Eigen::MatrixXd& at) {

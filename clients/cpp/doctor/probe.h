@@ -38,6 +38,7 @@ class Probe {
   bool intersects_flats() const { return oracle_.has_intersect_flat(); }
   bool gives_sizes() const { return oracle_.has_local_size(); }
   int walls() const { return walls_; }
+  int equations() const { return oracle_.equations(); }
   bool fills_space() const { return k_ == d_; }
 
   Answered Closest(const Eigen::MatrixXd& x);
@@ -45,6 +46,7 @@ class Probe {
                      const Eigen::VectorXd& radii);
   std::vector<Basis> GivenTangents(const Eigen::MatrixXd& points);
   Eigen::VectorXd GivenSizes(const Eigen::MatrixXd& points);
+  Eigen::MatrixXd EquationGradients(const Eigen::MatrixXd& points);
   // Of walls, as the oracle's own.
   Answered FacePoints(const Eigen::MatrixXd& x, const Walls& face);
   Eigen::MatrixXd Clearances(const Eigen::MatrixXd& points);

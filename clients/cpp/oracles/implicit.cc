@@ -8,6 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "exactness.h"
+
 namespace stellate {
 namespace {
 
@@ -32,7 +34,8 @@ ImplicitOracle::ImplicitOracle(int dimension, int ambient_dimension, Function f,
     : PointwiseOracle(dimension, ambient_dimension),
       f_(std::move(f)),
       jacobian_(std::move(jacobian)),
-      box_(std::move(box)) {
+      box_(std::move(box)),
+      exactness_(std::make_shared<const Exactness>("f", box_)) {
   if (dimension < 1 || dimension >= ambient_dimension) {
     throw std::invalid_argument("ImplicitOracle needs 1 <= dimension < ambient_dimension");
   }
@@ -48,23 +51,38 @@ ImplicitOracle::ImplicitOracle(int dimension, int ambient_dimension, Function f,
   rounding_ = kRoundings * std::numeric_limits<double>::epsilon() * largest;
 }
 
+Eigen::VectorXd ImplicitOracle::F(const Eigen::VectorXd& x) const {
+  Eigen::VectorXd value = f_(x);
+  if (value.size() == equations()) return value;
+  throw OracleError("ORACLE_SHAPE", "f returned " + std::to_string(value.size()) +
+                                        " numbers; they have to be " + std::to_string(equations()) +
+                                        ", one for each equation");
+}
+
 Eigen::MatrixXd ImplicitOracle::J(const Eigen::VectorXd& x) const {
-  if (jacobian_) return jacobian_(x);
+  if (jacobian_) {
+    Eigen::MatrixXd given = jacobian_(x);
+    if (given.rows() == equations() && given.cols() == x.size()) return given;
+    throw OracleError("ORACLE_SHAPE",
+                      "the jacobian returned a matrix " + std::to_string(given.rows()) + " x " +
+                          std::to_string(given.cols()) + "; it has to be " +
+                          std::to_string(equations()) + " x " + std::to_string(x.size()));
+  }
   Eigen::MatrixXd result(ambient_dimension() - dimension(), ambient_dimension());
   const double h = kJacobianStep * length_;
   Eigen::VectorXd y = x;
   for (int i = 0; i < ambient_dimension(); ++i) {
     y[i] = x[i] + h;
-    result.col(i) = f_(y);
+    result.col(i) = F(y);
     y[i] = x[i] - h;
-    result.col(i) = (result.col(i) - f_(y)) / (2 * h);
+    result.col(i) = (result.col(i) - F(y)) / (2 * h);
     y[i] = x[i];
   }
   return result;
 }
 
 bool ImplicitOracle::Correct(Eigen::VectorXd& y) const {
-  Eigen::VectorXd value = f_(y);
+  Eigen::VectorXd value = F(y);
   double last_step = length_;
   for (int i = 0; i < kMaxIterations; ++i) {
     Eigen::VectorXd step = NormalStep(J(y), value);
@@ -76,7 +94,7 @@ bool ImplicitOracle::Correct(Eigen::VectorXd& y) const {
     double fraction = 1;
     for (; fraction >= kSmallestStep; fraction /= 2) {
       const Eigen::VectorXd next = y + fraction * step;
-      const Eigen::VectorXd next_value = f_(next);
+      const Eigen::VectorXd next_value = F(next);
       if (next_value.norm() >= value.norm()) continue;
       y = next;
       value = next_value;
@@ -135,6 +153,7 @@ bool ImplicitOracle::Descend(const Eigen::VectorXd& x, Eigen::VectorXd& y, doubl
 }
 
 bool ImplicitOracle::Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const {
+  exactness_->Insist(f_);
   y = x;
   if (!Correct(y)) return false;
   double slope = 0;
@@ -143,6 +162,14 @@ bool ImplicitOracle::Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const
   // The distance is flat to second order: a slope of the root of rounding already is the minimum
   // as far as double precision can tell, and Descend's last step polished it.
   return slope <= 1e-6 * length_;
+}
+
+Eigen::MatrixXd ImplicitOracle::EquationGradients(const Eigen::MatrixXd& points) {
+  Eigen::MatrixXd gradients(equations() * ambient_dimension(), points.cols());
+  for (Eigen::Index j = 0; j < points.cols(); ++j) {
+    gradients.col(j) = J(points.col(j)).transpose().reshaped();
+  }
+  return gradients;
 }
 
 }  // namespace stellate

@@ -164,6 +164,7 @@ BROKEN = {
     "NO_WHEREABOUTS": Torus(bounding_box=None),
     "RAISED": Torus(closest_point=fail),
     "WRONG_SHAPE": Torus(closest_point=lambda x: x[:, :2]),
+    "INEXACT": equation(lambda x: np.linalg.norm(x.astype(np.float32), axis=1) - 1.0),
     "NOT_FINITE": Torus(closest_point=lambda x: x * np.nan),
     "NOTHING_FOUND": Torus(closest_point=nowhere),
     "MOSTLY_NOT_FOUND": Torus(closest_point=hardly_anywhere),

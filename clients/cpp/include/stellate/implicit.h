@@ -2,16 +2,22 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <memory>
 
 #include "stellate/pointwise.h"
 
 namespace stellate {
+
+class Exactness;
 
 // M = { x : F(x) = 0 } for F: R^d -> R^(d-k) whose Jacobian has full rank on M.
 //
 // Closest points by Newton's method on the Lagrange conditions, started where steepest descent of
 // |F| from x first meets M: the nearest point when x is nearer to M than its reach, a critical
 // point of the distance otherwise. Points that do not converge are reported as not found.
+//
+// Asked for points it throws OracleError where f rounds to single precision, or has another shape
+// than it has to have.
 class ImplicitOracle : public PointwiseOracle {
  public:
   using Function = std::function<Eigen::VectorXd(const Eigen::VectorXd& x)>;  // d -> d-k
@@ -27,8 +33,11 @@ class ImplicitOracle : public PointwiseOracle {
 
   bool Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const override;
   void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const override;
+  int equations() const override { return ambient_dimension() - dimension(); }
+  Eigen::MatrixXd EquationGradients(const Eigen::MatrixXd& points) override;
 
  private:
+  Eigen::VectorXd F(const Eigen::VectorXd& x) const;
   bool Correct(Eigen::VectorXd& y) const;  // onto M, along the normals
   bool Descend(const Eigen::VectorXd& x, Eigen::VectorXd& y, double* slope) const;
   Eigen::MatrixXd J(const Eigen::VectorXd& x) const;
@@ -36,6 +45,7 @@ class ImplicitOracle : public PointwiseOracle {
   Function f_;
   Jacobian jacobian_;
   BoundingBox box_;
+  std::shared_ptr<const Exactness> exactness_;
   double length_;    // of the box's diagonal: the unit of every tolerance
   double rounding_;  // of points in the box, a length: no step can be asked to be shorter
 };

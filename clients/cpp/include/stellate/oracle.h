@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <optional>
 #include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
 namespace stellate {
@@ -26,6 +28,19 @@ struct Answer {
   Eigen::MatrixXd clearances = {}, conormals = {};
 
   bool IsFound(Eigen::Index j) const { return found.empty() || found[static_cast<size_t>(j)] != 0; }
+};
+
+// What an oracle throws that finds fault with the functions it is made of: a std::runtime_error
+// with a stable name, "ORACLE_PRECISION" or "ORACLE_SHAPE".
+class OracleError : public std::runtime_error {
+ public:
+  OracleError(std::string reason, const std::string& what)
+      : std::runtime_error(what), reason_(std::move(reason)) {}
+
+  const std::string& reason() const { return reason_; }
+
+ private:
+  std::string reason_;
 };
 
 // A compact smooth k-submanifold M of R^d, known by what it answers. Derive from
@@ -70,6 +85,14 @@ class Oracle {
   virtual bool has_local_size() const { return false; }
   virtual Eigen::VectorXd LocalSize(const Eigen::MatrixXd& /*points*/) {
     throw std::logic_error("this oracle has no local sizes");
+  }
+
+  // How many equations F_i = 0 M is known to be given by, if it is, and their gradients at points
+  // (d x n): (m d) x n for m equations, entry i*d + j is dF_i / dx_j. Only Check asks for them, to
+  // tell where M crosses itself or has a tip.
+  virtual int equations() const { return 0; }
+  virtual Eigen::MatrixXd EquationGradients(const Eigen::MatrixXd& /*points*/) {
+    throw std::logic_error("this oracle tells no equations");
   }
 
   // How many walls bound M. It has a boundary then: M = { x in M^ : g_i(x) >= 0, i < walls() }, and

@@ -44,6 +44,7 @@ Parametrized::Atlas::Atlas(std::vector<Chart> charts) {
     Refuse("charts of R^" + std::to_string(dimension()) + " into R^" +
            std::to_string(ambient_dimension()) + ": the first has to be the smaller");
   }
+  for (const CheckedChart& chart : charts_) chart.InsistOnExactness();
   scale_ = (points().rowwise().maxCoeff() - points().rowwise().minCoeff()).norm();
 }
 

@@ -19,6 +19,8 @@ class CheckedChart {
   const Eigen::VectorXd& extent() const { return extent_; }
   bool wraps(Eigen::Index a) const { return chart_.periodic[static_cast<size_t>(a)]; }
 
+  // Throws OracleError where the map rounds to single precision.
+  void InsistOnExactness() const;
   // Throws std::runtime_error for values of another length than the first's.
   Eigen::VectorXd Point(const Eigen::VectorXd& u) const;
   // d x k, as given or by central differences within the box.

@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "oracles/exactness.h"
 #include "oracles/ready/atlas.h"
 #include "oracles/ready/common.h"
 
@@ -29,6 +30,10 @@ CheckedChart::CheckedChart(Chart chart, size_t number)
            std::to_string(chart_.periodic.size()) + " whether they are periodic");
   }
   d_ = Point((lower + upper) / 2).size();
+}
+
+void CheckedChart::InsistOnExactness() const {
+  Exactness(name_ + "'s x", {chart_.lower, chart_.upper}).Insist(chart_.x);
 }
 
 Eigen::VectorXd CheckedChart::Point(const Eigen::VectorXd& u) const {

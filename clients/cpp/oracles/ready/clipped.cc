@@ -1,6 +1,7 @@
 #include <cmath>
 #include <utility>
 
+#include "oracles/exactness.h"
 #include "oracles/ready/common.h"
 #include "oracles/ready/level_solver.h"
 #include "stellate/oracles/walls.h"
@@ -100,6 +101,17 @@ Clipped::Clipped(std::shared_ptr<Oracle> oracle, std::vector<Wall> walls, Matrix
     Refuse("seeds have to be points of R^" + std::to_string(ambient_dimension()));
   }
   scale_ = ScaleOf(*base_);
+  const BoundingBox where = WhereOf(*base_);
+  for (size_t i = 0; i < walls_.size(); ++i) {
+    exactness_.push_back(
+        std::make_shared<const Exactness>("wall " + std::to_string(i), where, base_->seeds()));
+  }
+}
+
+void Clipped::InsistOnExactness(int wall) const {
+  const auto number = static_cast<size_t>(wall);
+  exactness_[number]->Insist(
+      [&g = walls_[number].g](const VectorXd& x) { return VectorXd::Constant(1, g(x)); });
 }
 
 bool Clipped::has_intersect_flat() const {
@@ -115,6 +127,7 @@ VectorXd Clipped::Slope(int wall, const VectorXd& x) const {
 
 Answer Clipped::FacePoint(const MatrixXd& x, const Walls& face) {
   CheckFace(face, walls());
+  for (const int wall : face) InsistOnExactness(wall);
   const auto count = static_cast<Index>(face.size());
   const Level level{[&](const VectorXd& y) {
                       VectorXd values(count);
@@ -136,6 +149,7 @@ Answer Clipped::FacePoint(const MatrixXd& x, const Walls& face) {
 }
 
 MatrixXd Clipped::Clearances(const MatrixXd& points) {
+  for (int wall = 0; wall < walls(); ++wall) InsistOnExactness(wall);
   MatrixXd clearances(walls(), points.cols());
   VectorXd x;
   for (Index j = 0; j < points.cols(); ++j) {

@@ -26,11 +26,21 @@ BoundingBox BoxAround(const Eigen::MatrixXd& points, double share) {
   return {lower.array() - margin, upper.array() + margin};
 }
 
+BoundingBox WhereOf(const Oracle& oracle) {
+  if (const auto box = oracle.bounding_box()) return *box;
+  const int d = oracle.ambient_dimension();
+  Eigen::MatrixXd seeds = oracle.seeds();
+  if (seeds.cols() == 0 || seeds.rows() != d) seeds = Eigen::MatrixXd::Zero(d, 1);
+  const Eigen::VectorXd lower = seeds.rowwise().minCoeff(), upper = seeds.rowwise().maxCoeff();
+  const double apart = (upper - lower).norm();
+  const double side = (apart > 0 ? apart : 1) / std::sqrt(d);
+  const Eigen::ArrayXd middle = (lower + upper) / 2;
+  return {middle - side / 2, middle + side / 2};
+}
+
 double ScaleOf(const Oracle& oracle) {
-  if (const auto box = oracle.bounding_box()) return (box->upper - box->lower).norm();
-  const Eigen::MatrixXd seeds = oracle.seeds();
-  if (seeds.cols() < 2) return 1;
-  return (seeds.rowwise().maxCoeff() - seeds.rowwise().minCoeff()).norm();
+  const BoundingBox where = WhereOf(oracle);
+  return (where.upper - where.lower).norm();
 }
 
 double Quantile(std::vector<double> values, double share) {

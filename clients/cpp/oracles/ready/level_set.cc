@@ -1,6 +1,7 @@
 #include <Eigen/QR>
 #include <random>
 
+#include "oracles/exactness.h"
 #include "oracles/ready/common.h"
 #include "oracles/ready/level_solver.h"
 #include "stellate/oracles/combined.h"
@@ -27,21 +28,28 @@ Eigen::MatrixXd Starts(const Oracle& oracle) {
   return starts;
 }
 
+// The points of M that these lead to.
+Eigen::MatrixXd OnManifold(Oracle& oracle, const Eigen::MatrixXd& starts) {
+  const Answer near = oracle.ClosestPoint(starts);
+  std::vector<Eigen::Index> found;
+  for (Eigen::Index j = 0; j < near.points.cols(); ++j) {
+    if (near.IsFound(j)) found.push_back(j);
+  }
+  return near.points(Eigen::all, found);
+}
+
 // k - m, m told by a value of f on M. Refuses what cannot be a level set.
 int DimensionOf(Oracle* oracle, const LevelSet::Function& f) {
   if (oracle == nullptr) Refuse("a level set needs an oracle");
   if (!oracle->has_tangent_basis()) Refuse("a level set on a manifold needs its tangent bases");
   RefuseWalls(*oracle, "a level set");
   if (!f) Refuse("a level set needs a function f");
-  const Answer near = oracle->ClosestPoint(Starts(*oracle));
-  for (Eigen::Index j = 0; j < near.points.cols(); ++j) {
-    if (!near.IsFound(j)) continue;
-    const auto count = static_cast<int>(f(near.points.col(j)).size());
-    if (count >= 1 && count < oracle->dimension()) return oracle->dimension() - count;
-    Refuse(std::to_string(count) + " equations on a manifold of dimension " +
-           std::to_string(oracle->dimension()) + " leave none");
-  }
-  Refuse("no point of M was found, to look for the level set from");
+  const Eigen::MatrixXd points = OnManifold(*oracle, Starts(*oracle));
+  if (points.cols() == 0) Refuse("no point of M was found, to look for the level set from");
+  const auto count = static_cast<int>(f(points.col(0)).size());
+  if (count >= 1 && count < oracle->dimension()) return oracle->dimension() - count;
+  Refuse(std::to_string(count) + " equations on a manifold of dimension " +
+         std::to_string(oracle->dimension()) + " leave none");
 }
 
 }  // namespace
@@ -54,7 +62,9 @@ LevelSet::LevelSet(std::shared_ptr<Oracle> oracle, Function f, Jacobian jacobian
       jacobian_(std::move(jacobian)),
       seeds_(std::move(seeds)) {
   const Eigen::MatrixXd starts = Starts(*base_);
-  scale_ = (starts.rowwise().maxCoeff() - starts.rowwise().minCoeff()).norm();
+  const BoundingBox where{starts.rowwise().minCoeff(), starts.rowwise().maxCoeff()};
+  scale_ = (where.upper - where.lower).norm();
+  Exactness("f", where, OnManifold(*base_, starts)).Insist(f_);
   if (seeds_.size() == 0) seeds_ = base_->seeds();
   if (seeds_.size() > 0 && seeds_.rows() != ambient_dimension()) {
     Refuse("seeds have to be points of R^" + std::to_string(ambient_dimension()));

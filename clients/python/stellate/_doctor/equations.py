@@ -27,16 +27,24 @@ def examine_rank(probe: Probe, add: Callable[[Finding], None]) -> None:
         return probe.jacobian(p) / usual[:, None]
 
     def least(p: np.ndarray) -> np.ndarray:
-        return np.linalg.svd(scaled(p), compute_uv=False)[:, -1]
+        values: np.ndarray = np.linalg.svd(scaled(p), compute_uv=False)[:, -1]
+        if probe.walls and len(p):  # beyond them M may be whatever it is
+            values = np.where((probe.clearances(p) >= 0).all(axis=1), values, np.inf)
+        return values
 
     def tangents(p: np.ndarray) -> np.ndarray:
         across = np.linalg.svd(scaled(p), full_matrices=True)[2]
         return across[:, probe.ambient_dimension - probe.dimension :].transpose(0, 2, 1)
 
     sizes = least(probe.points)
-    starts = probe.points[np.argsort(sizes, kind="stable")[: _K["rank_descents"]]]
+    inside = np.isfinite(sizes)
+    if not inside.any():
+        return
+    order = np.argsort(sizes, kind="stable")[: min(_K["rank_descents"], np.count_nonzero(inside))]
+    starts = probe.points[order]
     places, lowest = descend(starts, least, probe.closest, tangents, probe.size)
     worst = int(np.argmin(lowest))
-    if lowest[worst] <= _K["least_rank_share"] * float(np.median(sizes)):
-        ratio = float(lowest[worst]) / max(float(np.median(sizes)), 1e-300)
+    usual = float(np.median(sizes[inside]))
+    if lowest[worst] <= _K["least_rank_share"] * usual:
+        ratio = float(lowest[worst]) / max(usual, 1e-300)
         add(Finding.of("SINGULAR", query=places[worst], ratio=ratio))

@@ -16,7 +16,11 @@ _K: Mapping[str, Any] = table("doctor.toml")
 
 
 # What an oracle's own complaints are found as; others are of what it answered.
-_CODES = {"ORACLE_NOT_FINITE": "NOT_FINITE", "ORACLE_TOUCHES_ZERO": "TOUCHES_ZERO"}
+_CODES = {
+    "ORACLE_NOT_FINITE": "NOT_FINITE",
+    "ORACLE_PRECISION": "INEXACT",
+    "ORACLE_TOUCHES_ZERO": "TOUCHES_ZERO",
+}
 
 
 class Stop(Exception):

@@ -9,7 +9,8 @@
 #include "stellate/pointwise.h"
 
 // Manifolds made of others. All take oracles that others may hold too, and are as safe to call from
-// several threads as these are. Constructors throw std::invalid_argument.
+// several threads as these are. Constructors throw std::invalid_argument, and LevelSet's
+// OracleError for a function that rounds to single precision.
 namespace stellate::oracles {
 
 // The product A x B x ... in R^(a + b + ...), points one after the other. Has tangent bases and

@@ -9,7 +9,7 @@
 #include "stellate/implicit.h"
 
 // Manifolds given by equations of particular kinds; stellate/implicit.h has equations in general.
-// Constructors throw std::invalid_argument.
+// Constructors throw std::invalid_argument, and ConstraintSet's OracleError as ImplicitOracle does.
 namespace stellate::oracles {
 
 // What a surface on a grid does at the box's sides: it does not reach them; or it may, and goes on

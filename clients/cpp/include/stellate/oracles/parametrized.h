@@ -30,7 +30,7 @@ struct Chart {
 // called from several threads where the oracle is.
 class Parametrized final : public PointwiseOracle {
  public:
-  // Throws std::invalid_argument.
+  // Throws std::invalid_argument, and OracleError for a map that rounds to single precision.
   explicit Parametrized(std::vector<Chart> charts);
   explicit Parametrized(Chart chart) : Parametrized(std::vector<Chart>{std::move(chart)}) {}
   ~Parametrized() override;

@@ -13,6 +13,10 @@
 // Manifolds with boundary: what walls leave of another manifold, and domains of space. All are as
 // safe to call from several threads as what they are made of. Constructors throw
 // std::invalid_argument.
+namespace stellate {
+class Exactness;
+}
+
 namespace stellate::oracles {
 
 // {g >= 0}, g smooth near where it is zero; what counts elsewhere is its sign.
@@ -31,7 +35,8 @@ Wall Ball(const Eigen::VectorXd& centre, double radius);
 
 // {x in M : g(x) >= 0 for all walls g}: a manifold with boundary, edges and corners.
 //
-// Where several walls meet on M they have to cross at an angle: tangential walls are refused.
+// Where several walls meet on M they have to cross at an angle: tangential walls are refused. Asked
+// for values of a wall that rounds to single precision it throws OracleError.
 class Clipped : public Oracle {
  public:
   // Of M, with tangent bases; 1 to 64 walls. Those of an oracle that is Clipped itself come first.
@@ -59,14 +64,20 @@ class Clipped : public Oracle {
   Answer FacePoint(const Eigen::MatrixXd& x, const Walls& face) override;
   Eigen::MatrixXd Clearances(const Eigen::MatrixXd& points) override;
   Eigen::MatrixXd Conormals(const Eigen::MatrixXd& points, const Walls& face) override;
+  int equations() const override { return base_->equations(); }
+  Eigen::MatrixXd EquationGradients(const Eigen::MatrixXd& points) override {
+    return base_->EquationGradients(points);
+  }
   std::optional<BoundingBox> bounding_box() const override { return base_->bounding_box(); }
   Eigen::MatrixXd seeds() const override { return seeds_; }
 
  private:
+  void InsistOnExactness(int wall) const;
   Eigen::VectorXd Slope(int wall, const Eigen::VectorXd& x) const;
 
   std::shared_ptr<Oracle> base_;
   std::vector<Wall> walls_;
+  std::vector<std::shared_ptr<const Exactness>> exactness_;  // of each wall
   Eigen::MatrixXd seeds_;
   double scale_ = 1;  // of where M is: the unit of lengths
 };
