@@ -3,6 +3,7 @@
 //
 // An input is a byte that chooses the format, and the file.
 
+#include <iterator>
 #include <stdexcept>
 
 #include "oracles/files/formats.h"
@@ -12,25 +13,16 @@
 namespace stellate::fuzz {
 namespace {
 
-using oracles::Triangles;
-namespace files = oracles::files;
-
-struct Format {
-  const char* ending;
-  Triangles (*parse)(std::string_view bytes);
-};
-constexpr Format kFormats[] = {{".off", files::ParseOff},
-                               {".ply", files::ParsePly},
-                               {".stl", files::ParseStl},
-                               {".obj", files::ParseObj}};
+constexpr std::size_t kCount = std::size(oracles::files::kFormats);
 
 }  // namespace
 
 std::vector<std::string> Seeds() {
   std::vector<std::string> seeds;
   for (const testing::TriangleFile& file : testing::TetrahedronFiles()) {
-    for (int i = 0; i < 4; ++i) {
-      if (file.ending == kFormats[i].ending) seeds.push_back(std::string(1, char(i)) + file.bytes);
+    for (std::size_t i = 0; i < kCount; ++i) {
+      if (file.ending != oracles::files::kFormats[i].ending) continue;
+      seeds.push_back(std::string(1, char(i)) + file.bytes);
     }
   }
   seeds.push_back(std::string(1, '\1') +
@@ -46,7 +38,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size == 0) return 0;
   const std::string_view bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
   try {
-    const oracles::Triangles read = fuzz::kFormats[data[0] % 4].parse(bytes);
+    const oracles::Triangles read = oracles::files::kFormats[data[0] % fuzz::kCount].parse(bytes);
     const auto most = static_cast<Eigen::Index>(size);
     fuzz::Require(read.points.rows() == 3 && read.points.allFinite(), "points are finite");
     fuzz::Require(read.corners.rows() == 3 && read.corners.cols() > 0, "there are triangles");

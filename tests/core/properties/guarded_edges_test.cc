@@ -19,7 +19,6 @@ namespace stellate::core {
 namespace {
 
 using stellate::testing::BettiNumbers;
-using stellate::testing::Complex;
 using stellate::testing::Domain;
 using stellate::testing::MeshOf;
 using stellate::testing::WallMesh;
@@ -59,19 +58,7 @@ TEST_P(SharpSolids, CloseAndAreCertified) {
     const Certificate& c = mesh.report.certificate;
     ASSERT_TRUE(c.certified) << c.verdict << mesh.report.failure.message;
     EXPECT_EQ(BettiNumbers(mesh.simplices), GetParam().homology);
-    const Complex rim = mesh.Rim();
-    EXPECT_TRUE(stellate::testing::RimOf(rim).empty()) << "the boundary has none";
-    for (const auto& facet : rim) {
-      WallSet common = ~WallSet{0};
-      for (const std::uint32_t v : facet) common &= mesh.walls[v];
-      EXPECT_NE(common, 0u) << "a rim that is on no wall";
-    }
-    for (std::size_t v = 0; v < mesh.points.size(); ++v)
-      for (std::size_t w = 0; w < m.walls.size(); ++w) {
-        const double g = m.walls[w](mesh.points[v], nullptr);
-        const bool on = (mesh.walls[v] & SetOfWall(static_cast<int>(w))) != 0;
-        EXPECT_TRUE(on ? std::abs(g) < 1e-9 : g > -1e-9) << "vertex " << v << ", wall " << w;
-      }
+    stellate::testing::ExpectToEndAtWalls(mesh, m);
     if (GetParam().volume > 0) {
       EXPECT_NEAR(VolumeOf(mesh) / GetParam().volume, 1, 0.05);
     }

@@ -23,7 +23,6 @@ using stellate::testing::BettiNumbers;
 using stellate::testing::Complex;
 using stellate::testing::Domain;
 using stellate::testing::MeshOf;
-using stellate::testing::RimOf;
 using stellate::testing::WallMesh;
 
 unsigned Setting(const char* name, unsigned otherwise) {
@@ -94,18 +93,7 @@ TEST_P(Walls, AreWhereTheMeshEnds) {
     EXPECT_EQ(BettiNumbers(rim), m.boundary_homology);
     EXPECT_EQ(c.boundary_components, static_cast<std::uint64_t>(m.boundary_homology[0]));
     EXPECT_EQ(c.boundary_simplices, rim.size());
-    EXPECT_TRUE(m.k == 1 || RimOf(rim).empty()) << "the boundary has none";
-    for (const auto& facet : rim) {
-      WallSet common = ~WallSet{0};
-      for (const std::uint32_t v : facet) common &= mesh.walls[v];
-      EXPECT_NE(common, 0u) << "a rim that is on no wall";
-    }
-    for (std::size_t v = 0; v < mesh.points.size(); ++v)
-      for (std::size_t w = 0; w < m.walls.size(); ++w) {
-        const double g = m.walls[w](mesh.points[v], nullptr);
-        const bool on = (mesh.walls[v] & SetOfWall(static_cast<int>(w))) != 0;
-        EXPECT_TRUE(on ? std::abs(g) < 1e-9 : g > -1e-9) << "vertex " << v << ", wall " << w;
-      }
+    stellate::testing::ExpectToEndAtWalls(mesh, m);
     const double dihedral = m.k == 3 ? LeastDihedral(mesh) : 180;
     EXPECT_GE(dihedral, PromisedDihedral(m) - 1e-6);
     if (Setting("STELLATE_WALL_FIGURES", 0) > 0)

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
+#include <cmath>
 #include <cstdint>
 #include <stdexcept>
 #include <utility>
@@ -40,6 +43,23 @@ inline WallMesh MeshOf(Domain m, core::Specification spec) {
   }
   mesh.report = (*mesher)->report();
   return mesh;
+}
+
+// Each facet of the rim is on a wall, and each vertex on those that it is said to be on.
+inline void ExpectToEndAtWalls(const WallMesh& mesh, const Domain& m) {
+  const Complex rim = mesh.Rim();
+  EXPECT_TRUE(m.k == 1 || RimOf(rim).empty()) << "the boundary has none";
+  for (const auto& facet : rim) {
+    core::WallSet common = ~core::WallSet{0};
+    for (const std::uint32_t v : facet) common &= mesh.walls[v];
+    EXPECT_NE(common, 0u) << "a rim that is on no wall";
+  }
+  for (std::size_t v = 0; v < mesh.points.size(); ++v)
+    for (std::size_t w = 0; w < m.walls.size(); ++w) {
+      const double g = m.walls[w](mesh.points[v], nullptr);
+      const bool on = (mesh.walls[v] & core::SetOfWall(static_cast<int>(w))) != 0;
+      EXPECT_TRUE(on ? std::abs(g) < 1e-9 : g > -1e-9) << "vertex " << v << ", wall " << w;
+    }
 }
 
 }  // namespace stellate::testing

@@ -15,4 +15,11 @@ Triangles ParseOff(std::string_view bytes);  // as text
 Triangles ParsePly(std::string_view bytes);  // as text, or binary of either byte order
 Triangles ParseStl(std::string_view bytes);  // as text, or binary; equal corners become one point
 
+struct Format {
+  const char* ending;
+  Triangles (*parse)(std::string_view bytes);
+};
+inline constexpr Format kFormats[] = {
+    {".off", ParseOff}, {".ply", ParsePly}, {".stl", ParseStl}, {".obj", ParseObj}};
+
 }  // namespace stellate::oracles::files

@@ -8,19 +8,10 @@
 namespace stellate::oracles {
 namespace {
 
-struct Format {
-  const char* ending;
-  Triangles (*parse)(std::string_view bytes);
-};
-constexpr Format kFormats[] = {{".off", files::ParseOff},
-                               {".ply", files::ParsePly},
-                               {".stl", files::ParseStl},
-                               {".obj", files::ParseObj}};
-
-const Format& FormatOf(const std::filesystem::path& path) {
+const files::Format& FormatOf(const std::filesystem::path& path) {
   std::string ending = path.extension().string();
   for (char& c : ending) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c;
-  for (const Format& format : kFormats) {
+  for (const files::Format& format : files::kFormats) {
     if (ending == format.ending) return format;
   }
   Refuse("files that are read end in .off, .ply, .stl or .obj");
@@ -43,7 +34,7 @@ std::string Contents(const std::filesystem::path& path) {
 Triangles ReadTriangles(const std::string& path) {
   const std::string begin = "'" + path + "' cannot be read as a mesh: ";
   try {
-    const Format& format = FormatOf(path);
+    const files::Format& format = FormatOf(path);
     return format.parse(Contents(path));
   } catch (const std::invalid_argument& e) {
     Refuse(begin + e.what());
