@@ -43,7 +43,7 @@ const css = (name: string) =>
 const worker = new MeshWorker();
 const ask = (message: ToWorker) => worker.postMessage(message);
 
-const view = new View(at<HTMLCanvasElement>("canvas"));
+const view = new View(at<HTMLCanvasElement>("canvas"), at("look"));
 let chosen = "";
 let recorded = false;
 let list: MeshRow[] = [];

@@ -31,19 +31,20 @@ export class ThickLines {
     this.object.frustumCulled = false;
   }
 
-  // Pairs of positions; a colour for each pair.
-  show(positions: Float32Array, colours: string[] = []) {
+  // Pairs of positions; a colour for each pair, or red, green and blue, 0..1, for each position.
+  show(positions: Float32Array, colours: string[] | Float32Array = []) {
     this.object.visible = positions.length > 0;
     if (positions.length === 0) return;
     this.object.geometry.dispose();
     this.object.geometry = new LineSegmentsGeometry();
     this.object.geometry.setPositions(positions);
     if (!this.material.vertexColors) return;
-    const both = colours.flatMap((name) => {
+    const ofPair = (name: string) => {
       const { r, g, b } = new Color(name);
       return [r, g, b, r, g, b];
-    });
-    this.object.geometry.setColors(both);
+    };
+    const all = colours instanceof Float32Array ? colours : colours.flatMap(ofPair);
+    this.object.geometry.setColors(all);
   }
 }
 

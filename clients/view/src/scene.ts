@@ -6,8 +6,6 @@ import {
   DirectionalLight,
   DoubleSide,
   HemisphereLight,
-  LineBasicMaterial,
-  LineSegments,
   Mesh,
   MeshStandardMaterial,
   PerspectiveCamera,
@@ -60,10 +58,7 @@ export class View {
     this.surface.geometry,
     new LineWires() as unknown as MeshStandardMaterial,
   );
-  private readonly segments = new LineSegments(
-    new BufferGeometry(),
-    new LineBasicMaterial({ vertexColors: true, transparent: true, opacity: 0.85 }),
-  );
+  private readonly curve = new ThickLines({ width: 2.5 });
   private readonly rim = new ThickLines({ width: 3 });
   private readonly corners = new Dots({ size: 9 });
   private readonly bare = new Dots({ size: 4, each: true });
@@ -75,12 +70,17 @@ export class View {
   private moving = false;
   private slow = 0; // seconds that all of the mesh takes to be drawn, lately
   private fitted = false;
+  private below = 0; // pixels
   private ball = { centre: new Vector3(), radius: 1 };
   private flight: { from: [Vector3, Vector3]; to: [Vector3, Vector3]; start: number } | null = null;
   onDrawn: () => void = () => {};
   private owed = false;
 
-  constructor(private readonly canvas: HTMLCanvasElement) {
+  // `over`: what stands on the lower end of the canvas, which meshes are fitted above.
+  constructor(
+    private readonly canvas: HTMLCanvasElement,
+    over: HTMLElement,
+  ) {
     this.renderer = rendererOf(canvas);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.zoomToCursor = true;
@@ -100,7 +100,7 @@ export class View {
     sun.position.set(-0.6, 1, 1.2);
     this.camera.add(sun);
     const sky = new HemisphereLight("#ffffff", "#8b93a5", 1.25);
-    this.scene.add(this.camera, sky, this.surface, this.rough, this.wires, this.segments);
+    this.scene.add(this.camera, sky, this.surface, this.rough, this.wires, this.curve.object);
     const marks = [
       this.bare,
       this.rim,
@@ -112,7 +112,14 @@ export class View {
     ];
     marks.forEach((mark, i) => (mark.object.renderOrder = i + 1));
     this.scene.add(...marks.map((mark) => mark.object));
-    new ResizeObserver(() => (this.dirty = true)).observe(canvas);
+    const resized = new ResizeObserver(() => {
+      const hidden = canvas.getBoundingClientRect().bottom - over.getBoundingClientRect().top;
+      this.below = Math.min(Math.max(hidden, 0), canvas.clientHeight / 2);
+      if (!this.fitted) this.fit();
+      this.dirty = true;
+    });
+    resized.observe(canvas);
+    resized.observe(over);
     this.setWires(true);
     requestAnimationFrame((now) => this.tick(now));
   }
@@ -135,16 +142,19 @@ export class View {
   show(scene: Scene, plain: string, several: string) {
     const { shape, rim } = scene;
     const solid = shape.kind === "triangles";
-    const target = solid ? this.surface : this.segments;
-    const other = solid ? this.segments : this.surface;
-    target.geometry.dispose();
-    target.geometry = geometryOf(shape.positions, shape.index);
-    target.geometry.setAttribute(
-      "color",
-      new BufferAttribute(coloursOf(shape, new Color(plain)), 3, true),
+    const colours = coloursOf(shape, new Color(plain));
+    this.surface.geometry.dispose();
+    this.surface.geometry = new BufferGeometry();
+    if (solid) {
+      this.surface.geometry = geometryOf(shape.positions, shape.index);
+      this.surface.geometry.setAttribute("color", new BufferAttribute(colours, 3, true));
+    }
+    const ofCurve = (rows: ArrayLike<number>) =>
+      solid ? new Float32Array(0) : pairsOf(rows, shape.index);
+    this.curve.show(
+      ofCurve(shape.positions),
+      ofCurve(colours).map((byte) => byte / 255),
     );
-    other.geometry.dispose();
-    other.geometry = new BufferGeometry();
     this.wires.geometry = this.surface.geometry;
     this.rough.geometry.dispose();
     this.rough.geometry = new BufferGeometry(); // until it is needed
@@ -165,9 +175,10 @@ export class View {
   // All of the mesh, from where one looks now; follows it as it grows until somebody turns it.
   fit() {
     const direction = this.camera.position.clone().sub(this.controls.target).normalize();
-    const half = (this.camera.fov * Math.PI) / 360;
-    const narrow = Math.min(1, this.camera.aspect);
-    const distance = (1.08 * this.ball.radius) / Math.sin(half) / narrow;
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const narrow = height > 0 ? Math.min(height - this.below, width) / height : 1;
+    const half = Math.atan(narrow * Math.tan((this.camera.fov * Math.PI) / 360));
+    const distance = (1.08 * this.ball.radius) / Math.sin(half);
     this.controls.target.copy(this.ball.centre);
     this.camera.position.copy(this.ball.centre).addScaledVector(direction, distance);
     this.controls.update();
@@ -243,7 +254,7 @@ export class View {
     if (renderer === null || width === 0 || height === 0) return;
     renderer.setPixelRatio(ratio);
     renderer.setSize(width, height, false);
-    this.camera.aspect = width / height;
+    this.camera.setViewOffset(width, height, 0, this.below / 2, width, height);
     const distance = this.camera.position.distanceTo(this.controls.target);
     this.camera.near = Math.max(distance - 4 * this.ball.radius, distance / 500);
     this.camera.far = distance + 20 * this.ball.radius;
@@ -292,6 +303,14 @@ function geometryOf(positions: Float32Array, index: Uint32Array | null): BufferG
   geometry.setAttribute("position", new BufferAttribute(positions, 3));
   if (index) geometry.setIndex(new BufferAttribute(index, 1));
   return geometry;
+}
+
+// Of segments' ends three numbers each, one after the other.
+function pairsOf(rows: ArrayLike<number>, index: Uint32Array | null): Float32Array {
+  if (index === null) return Float32Array.from(rows);
+  return Float32Array.from({ length: 3 * index.length }, (_, i) => {
+    return rows[3 * index[Math.floor(i / 3)] + (i % 3)];
+  });
 }
 
 function coloursOf({ values, byWall }: Pick<Shape, "values" | "byWall">, plain: Color): Uint8Array {
