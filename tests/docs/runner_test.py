@@ -133,9 +133,13 @@ class Running(unittest.TestCase):
 
     def test_syntax_and_names_are_checked(self) -> None:
         self.check("bash", "tests/run -R x # words\n")
+        self.check("bash", "tests/bench/run peers --full --only=x && tools/check --fix\n")
         for kind, text in (
             ("bash", "if true\n"),
             ("bash", "tests/rum -R x\n"),
+            ("bash", "tools/chek\n"),
+            ("bash", "tests/run --asam\n"),
+            ("bash", "tests/bench/run peers --ful\n"),
             ("bash", "cmake --build build/release --target no_such_target\n"),
             ("bash", "build/release/bin/no_such_target\n"),
             ("python", "def f(:\n"),

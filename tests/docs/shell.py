@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pathlib
 import re
 import shlex
 import signal
@@ -24,6 +25,7 @@ await() {  # LOG PROCESS TEXT
   done
 }
 """
+_OURS = r"\.ci|clients|docker|docs|gallery|packaging|tests|tools"  # folders of programs
 _SHOWN = 60  # lines of what failed
 
 
@@ -109,7 +111,7 @@ def check(block: Block, around: Surroundings) -> None:
     try:
         if block.kind == "bash":
             for command in commands(text):
-                _programs_exist(command)
+                programs_exist(command)
         elif block.kind == "python":
             compile(text, "block", "exec")
         elif block.kind == "toml":
@@ -120,18 +122,39 @@ def check(block: Block, around: Surroundings) -> None:
         raise Wrong(f"no {block.kind}: {error}") from None
 
 
-def _programs_exist(command: str) -> None:
-    """Ours, and the targets of the build."""
+def programs_exist(command: str) -> None:
+    """Ours, with the options that they are given; and the targets of the build.
+
+    Raises: Wrong.
+    """
     words = shlex.split(command, comments=True)
+    program = None
     for word in words:
-        ours = re.fullmatch(r"(\./)?((tests|docker|clients)/[\w./-]+)", word)
-        if ours and not (ROOT / ours[2]).exists():
-            raise Wrong(f"there is no {word}")
+        ours = re.fullmatch(rf"(?:\./)?((?:{_OURS})/[\w./-]+)", word)
+        if ours:
+            path = ROOT / ours[1]
+            if not path.exists():
+                raise Wrong(f"there is no {word}")
+            if path.is_file() and os.access(path, os.X_OK):
+                program = path
+        elif word in ("&&", "||", "|", ";"):
+            program = None
+        option = re.match(r"(--[a-z-]+)(=|$)", word)
+        if program and option and not _has_option(program, option[1]):
+            raise Wrong(f"{program.relative_to(ROOT)} has no option {option[1]}")
         if built := re.fullmatch(r"build/release/bin/(\w+)", word):
             _target_exists(built[1])
     if words[:2] == ["cmake", "--build"] and "--target" in words:
         for target in words[words.index("--target") + 1 :]:
             _target_exists(target)
+
+
+def _has_option(program: pathlib.Path, option: str) -> bool:
+    """Whether its text has it, or that of a program in Python below it that it starts."""
+    text = program.read_text()
+    started = (source for source in program.parent.rglob("*.py") if source.name in text)
+    name = rf"(?<![\w-]){option}(?![\w-])"
+    return any(re.search(name, part) for part in (text, *(s.read_text() for s in started)))
 
 
 def _target_exists(target: str) -> None:
