@@ -40,7 +40,7 @@ KNOWN = {
     "genus_two": (1.0, 1, True, [1, 4, 1]),
     "grassmannian": (1.0, 1, True, [1, 1, 2, 1, 1]),
     "gyroid": (1.4, 1, True, [1, 10, 1]),
-    "gyroid_box": (1.2, 1, True, [1, 3, 0]),
+    "gyroid_box": (1.0, 1, True, [1, 3, 0]),
     "hemisphere": (2.0, 1, True, [1, 0, 0]),
     "invariant_torus": (1.4, 1, True, [1, 2, 1]),
     "joint_limits": (1.3, 1, True, [1, 1, 0, 0]),

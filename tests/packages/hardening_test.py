@@ -5,12 +5,17 @@ hardening_test.py PROGRAM... looks at these, stripped or not, wherever they were
 
 from __future__ import annotations
 
+import platform
 import re
 import subprocess
 import sys
 import unittest
 
 PROGRAMS = sys.argv[1:]
+# Functions of ours that may be called by address begin with this instruction, which says so to a
+# processor that watches. Each program has thousands; what is linked into it without them has none.
+ENDBR64 = bytes.fromhex("f30f1efa")
+LEAST_TARGETS = 1000
 
 
 def readelf(*arguments: str) -> str:
@@ -51,6 +56,28 @@ class Hardening(unittest.TestCase):
                 r"\n\s*(GNU_STACK|LOAD)(?:\s+0x\w+){5}\s+([RWE ]{3})", segments
             ):
                 self.assertFalse({"W", "E"} <= set(flags), f"{name} is {flags}")
+
+        self.each(check)
+
+    def test_stacks_and_copies_are_guarded(self) -> None:
+        def check(program: str) -> None:
+            wanted = readelf("--dyn-syms", program)
+            self.says(wanted, r" UND __stack_chk_fail\b")
+            self.says(wanted, r" UND __(?!stack)\w+_chk\b")
+
+        self.each(check)
+
+    @unittest.skipUnless(platform.machine() == "x86_64", "an instruction of this processor alone")
+    def test_calls_by_address_reach_beginnings_of_functions_alone(self) -> None:
+        def check(program: str) -> None:
+            where = re.search(
+                r" \.text\s+PROGBITS\s+\w+\s+(\w+)\s+(\w+)", readelf("--sections", program)
+            )
+            self.assertIsNotNone(where)
+            offset, size = (int(number, 16) for number in where.groups())
+            with open(program, "rb") as file:
+                file.seek(offset)
+                self.assertGreater(file.read(size).count(ENDBR64), LEAST_TARGETS)
 
         self.each(check)
 
