@@ -44,10 +44,12 @@ bool BoxWatch::has_left() const {
 }
 
 std::string BoxWatch::WhyStopped() const {
-  return Message("the manifold leaves the bounding box and goes on for ", Brief(farthest_outside_),
-                 " beyond it, with ", outside_, " of ", looked_at_,
-                 " vertices outside. Is it open or unbounded? Cut it by walls, a box for instance, "
-                 "or, if it is closed, give a box that holds all of it");
+  return Message(
+      "the manifold leaves the bounding box and goes on for ", Brief(farthest_outside_),
+      " beyond it, with ", outside_, " of ", looked_at_,
+      " vertices outside. Is it open or unbounded? Cut it by walls, a box for instance "
+      "(in Python keep=\"box\"), keep a component that is closed (keep=\"seeds\"), or give a "
+      "box that holds all of it");
 }
 
 void BoxWatch::Warn(Certificate* certificate) const {
@@ -56,7 +58,8 @@ void BoxWatch::Warn(Certificate* certificate) const {
       Message("The manifold leaves the bounding box: ", outside_, " of ", looked_at_,
               " vertices lie outside, by up to ", Brief(farthest_outside_),
               ". Components outside of the box may have been missed; is the manifold open or "
-              "unbounded?"));
+              "unbounded? In Python keep=\"box\" keeps what lies in the box, keep=\"seeds\" the "
+              "components that seeds lie on."));
 }
 
 bool StallWatch::HasStalled(std::uint64_t left, bool judges_all) {

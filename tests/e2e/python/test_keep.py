@@ -36,6 +36,7 @@ def test_without_keep_other_components_are_meshed_or_run_after(server):
     mesh = stellate.mesh(oval_and_branch(), 0.1, server=server)
     verdict = mesh.report.certificate.verdict
     assert not mesh.certified and "leaves the bounding box and goes on" in verdict
+    assert 'keep="box"' in verdict and 'keep="seeds"' in verdict
 
 
 @pytest.mark.parametrize("keep, seeds", [("box", None), ("seeds", [[-1.0, 0, 0]])])
