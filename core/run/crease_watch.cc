@@ -55,14 +55,18 @@ std::vector<Edge> EdgesThatTurn(const StarComplex<K>& complex,
 }
 
 template <int K>
-std::vector<Way> Steepest(const StarComplex<K>& complex, std::vector<Edge> edges) {
+std::vector<Way> Steepest(const StarComplex<K>& complex, std::vector<Edge> edges,
+                          WalkedEdges* walked = nullptr) {
   std::vector<Way> ways;
   std::set<std::uint32_t> used;
+  std::size_t taken = 0;
   const auto take = [&](std::size_t most) {
-    for (std::size_t i = 0; i < edges.size() && ways.size() < most; ++i) {
+    for (std::size_t i = 0; i < edges.size() && taken < most; ++i) {
       const auto& [p, q, turn2, length2] = edges[i];
       if (used.count(p) + used.count(q) > 0) continue;
       used.insert({p, q});
+      ++taken;
+      if (walked && !walked->insert({p, q}).second) continue;
       const auto point = [&](std::uint32_t v) {
         return Eigen::Map<const Eigen::VectorXd>(complex.Point(v), complex.d());
       };
@@ -103,7 +107,8 @@ bool CreaseWatch::IsDue(std::uint64_t left, bool judges_all) {
 }
 
 template <int K>
-std::vector<Way> SteepWaysAtFaults(const Engine<K>& engine, double longest, double least_sine2) {
+std::vector<Way> SteepWaysAtFaults(const Engine<K>& engine, double longest, double least_sine2,
+                                   WalkedEdges* walked) {
   std::vector<std::uint32_t> stars = engine.book().blemished_stars();
   for (const auto& entry : engine.book().size_and_shape()) {
     CheckInterruption(stars.size());
@@ -117,7 +122,7 @@ std::vector<Way> SteepWaysAtFaults(const Engine<K>& engine, double longest, doub
     const double size = std::min(engine.sizes().BoundAt(complex, edge.p) / epsilon, 1.0);
     return edge.length2 > longest * longest * size * size;
   });
-  return Steepest<K>(complex, std::move(edges));
+  return Steepest<K>(complex, std::move(edges), walked);
 }
 
 template <int K>
@@ -128,8 +133,8 @@ std::vector<Way> SteepWays(const StarComplex<K>& complex, double longest) {
                      EdgesThatTurn<K>(complex, stars, longest, kShortest * longest, kLeastSine2));
 }
 
-#define STELLATE_EACH(K)                                                            \
-  template std::vector<Way> SteepWaysAtFaults<K>(const Engine<K>&, double, double); \
+#define STELLATE_EACH(K)                                                                          \
+  template std::vector<Way> SteepWaysAtFaults<K>(const Engine<K>&, double, double, WalkedEdges*); \
   template std::vector<Way> SteepWays<K>(const StarComplex<K>&, double);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

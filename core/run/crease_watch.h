@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
+#include <utility>
 #include <vector>
 
 #include "core/refinement/engine.h"
@@ -32,14 +34,18 @@ class CreaseWatch {
 
 constexpr double kLeastSine2 = 0.03;  // ten degrees
 
+// Edges along which it was asked before, as pairs of vertices, the smaller first.
+using WalkedEdges = std::set<std::pair<std::uint32_t, std::uint32_t>>;
+
 // Edges at stars that break a rule, no longer than `longest` or, where sizes are finer,
 // that share of them, along which M's tangent spaces turn
 // most: by how much, and for their length. A few, without common ends; none of those where the sum
 // of the squared sines of the angles between them is below least_sine2, or which are shorter than
-// M's points may be known to.
+// M's points may be known to. With `walked` those of them that it has not, and they are added to
+// it: the same way would be answered alike.
 template <int K>
 std::vector<Way> SteepWaysAtFaults(const Engine<K>& engine, double longest,
-                                   double least_sine2 = kLeastSine2);
+                                   double least_sine2 = kLeastSine2, WalkedEdges* walked = nullptr);
 
 // The same of the whole sample.
 template <int K>

@@ -295,6 +295,7 @@ void MeshingRun<K>::Certify() {
   mesh.tangents = complex.Tangent(0);
   trip_.reset();
   crease_probe_.Stop();
+  walked_.clear();  // not all of them to their end
   certification_ = std::make_unique<Certification>(
       spec_, mesh, engine_.Simplices(), facts,
       KnownOfManifold{spare_points_.Take(), rim_watch_.leans(), spare_points_.ends()},

@@ -117,6 +117,7 @@ class MeshingRun final : public Mesher {
   // Asks beside these, or alone before the run ends.
   CreaseProbe crease_probe_;
   CreaseWatch crease_watch_;
+  WalkedEdges walked_;                      // while rounds went on
   std::optional<std::size_t> probe_block_;  // of batch_, that is its question
   std::optional<Termination> end_;          // as what the run ends then
 

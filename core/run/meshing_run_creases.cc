@@ -25,9 +25,11 @@ void MeshingRun<K>::WatchForCreases() {
       crease_watch_.IsDue(book.size_and_shape().size() + book.blemished(), !book.are_all_suspect());
   if (crease_probe_.is_asking() || K == spec_.ambient_dimension) return;
   if (due)
-    crease_probe_.Start(SteepWaysAtFaults<K>(engine_, kLongestWay * spec_.epsilon));
+    crease_probe_.Start(
+        SteepWaysAtFaults<K>(engine_, kLongestWay * spec_.epsilon, kLeastSine2, &walked_));
   else if (crease_watch_.MayLookAgain())
-    crease_probe_.Start(SteepWaysAtFaults<K>(engine_, kTellingWay * spec_.epsilon, kTellingSine2));
+    crease_probe_.Start(
+        SteepWaysAtFaults<K>(engine_, kTellingWay * spec_.epsilon, kTellingSine2, &walked_));
 }
 
 template <int K>
