@@ -83,6 +83,26 @@ TEST(SignedDistance, TellsOfLabels) {
   }
 }
 
+TEST(SignedDistance, TellsOfNumbersRoundedToTheSizeOfVoxels) {
+  constexpr int kSide = 20;
+  Vector values(kSide * kSide * kSide);
+  for (int i = 0; i < values.size(); ++i) {
+    const Eigen::Vector3d x(i / (kSide * kSide), i / kSide % kSide, i % kSide);
+    values[i] = (x - Eigen::Vector3d::Constant(9.5)).norm() - 6;
+  }
+  const auto refusal = [&](double parts) -> std::string {
+    try {
+      SignedDistance::OfGrid((parts * values.array()).round() / parts, {kSide, kSide, kSide},
+                             Cube(9.5), 0.1);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  EXPECT_TRUE(Says(refusal(1), "rounded too coarsely")) << refusal(1);
+  EXPECT_EQ(refusal(8), "none");
+}
+
 TEST(SignedDistance, TellsWhatAGridResolves) {
   Vector values(125);
   for (int i = 0; i < 125; ++i) {

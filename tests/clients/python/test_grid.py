@@ -67,9 +67,14 @@ def test_there_is_no_other_surface_beyond_the_border(sign, scale):
     assert (np.abs(np.linalg.norm(points[found] - 11.5, axis=1) - 8) < 0.05).all()
 
 
-def test_whole_numbers_that_equal_the_level_make_a_surface():
+def rounded_egg(parts):
     x, y, z = lattice()
-    values = np.round(10 - np.sqrt(x**2 + y**2 + 2 * z**2))
+    return np.round(parts * (10 - np.sqrt(x**2 + y**2 + 2 * z**2))) / parts
+
+
+def test_numbers_that_equal_the_level_make_a_surface():
+    values = rounded_egg(8)
+    assert (values == 3).sum() > 50
     oracle = OfGrid(values, box_of(values), level=3)
     points, found = closest(oracle, np.random.default_rng(1).uniform(0, 23, (100, 3)))
     away = points[found] - 11.5
@@ -109,6 +114,14 @@ def test_two_valued_data_is_told_and_smoothed(level):
             OfGrid(values, box_of(values), level=level)
     smooth = radii(OfVolume(mask, smooth=1.5))
     assert np.abs(smooth - (8 - 1.5**2 / 8)).max() < 0.15
+
+
+@pytest.mark.parametrize("parts", [1, 0.1])
+def test_numbers_rounded_to_the_size_of_voxels_are_told(parts):
+    values = rounded_egg(1) if parts == 1 else 10 * rounded_egg(1).astype(np.int16)
+    with pytest.raises(stellate.InvalidArgument, match=r"rounded too coarsely.*smooth=1.5"):
+        OfGrid(values, box_of(values), level=3 / parts)
+    OfVolume(values, level=3 / parts, smooth=1.5)
 
 
 def test_labels_are_told():

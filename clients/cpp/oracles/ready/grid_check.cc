@@ -1,14 +1,19 @@
 #include "oracles/ready/grid_check.h"
 
+#include <algorithm>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "oracles/ready/common.h"
 
 namespace stellate::oracles {
 namespace {
 
-constexpr double kFlatShare = 0.5;   // of the places where a level is passed, of which no more may
-                                     // lie between equal values
+constexpr double kFlatShare = 0.5;  // of the places where a level is passed, of which no more may
+                                    // lie between equal values
+constexpr std::size_t kFewSteps =
+    300;  // such places, among which numbers tell whether they are rounded
 constexpr std::ptrdiff_t kOpen = 3;  // cells that an open border goes on for
 
 // The place of a value along each axis, and the next one. The last axis changes fastest.
@@ -57,6 +62,31 @@ double FlatShare(const GridValues& grid, double level) {
   return steps > 0 ? flat / steps : 0;
 }
 
+// Of the same steps, those between two of the numbers there with none in between. Where they are
+// few, symmetric values may be as few, too.
+double RoundedShare(const GridValues& grid, double level) {
+  const std::vector<std::ptrdiff_t> strides = Strides(grid.shape);
+  std::vector<std::pair<double, double>> steps;
+  Count at(grid.shape);
+  for (Eigen::Index i = 0; i < grid.values.size(); ++i, at.Next()) {
+    for (std::size_t a = 0; a < strides.size(); ++a) {
+      if (at[a] < 1 || at[a] + 2 >= grid.shape[a]) continue;
+      const double one = grid.values[i], other = grid.values[i + strides[a]];
+      if ((one > level) != (other > level)) steps.push_back(std::minmax({one, other}));
+    }
+  }
+  if (steps.size() < kFewSteps) return 0;
+  std::vector<double> numbers;
+  for (const auto& [lower, upper] : steps) numbers.insert(numbers.end(), {lower, upper});
+  std::sort(numbers.begin(), numbers.end());
+  numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+  const auto is_next = [&](const auto& step) {
+    return *std::upper_bound(numbers.begin(), numbers.end(), step.first) == step.second;
+  };
+  return static_cast<double>(std::count_if(steps.begin(), steps.end(), is_next)) /
+         static_cast<double>(steps.size());
+}
+
 [[noreturn]] void RefuseToLeave(const GridValues& grid, const Count& at, double level) {
   std::string place;
   for (std::size_t a = 0; a < grid.shape.size(); ++a) {
@@ -85,6 +115,13 @@ double InsistOnASurface(const GridValues& grid, double level, bool open_border) 
     Refuse("values are all but constant on both sides of the level " + Short(level) +
            ", as labels and masks are: the surface between them is stairs, and no smooth one. "
            "Smooth them, by a Gaussian of some 1.5 spacings, or take distances to their surface");
+  }
+  if (RoundedShare(grid, level) > kFlatShare) {
+    Refuse("values are rounded too coarsely: where they pass the level " + Short(level) +
+           ", most go from one of the numbers that they take to the next one, and the surface "
+           "between them is terraced, as no smooth one is. Take them as they were before, or "
+           "smooth them, "
+           "by a Gaussian of some 1.5 spacings");
   }
   const bool side = grid.values[0] > level;
   Count at(grid.shape);

@@ -11,6 +11,7 @@ from .._rows import Array, norms
 from ..errors import InvalidArgument
 
 _FLAT = 0.5  # of the places where a level is passed, of which no more may lie between equal values
+_FEW = 300  # such places, among which numbers tell whether they are rounded
 _OPEN = 3  # cells that an open border goes on for
 _BLOCK = 1024  # places at a time, whose taps the processor's cache holds
 
@@ -73,10 +74,14 @@ class Grid:
             raise InvalidArgument(
                 f"values are all but constant on both sides of the level {level:g}, as labels and masks "
                 "are: the surface between them is stairs, and no smooth one. Smooth them: "
-                f"SignedDistance.of_volume(values, spacing={self._short_spacing()}, "
-                f"origin={self.lower.tolist()}, level={level:g}, "
-                f"smooth={1.5 * float(self.spacing.max()):.4g}), or take distances to the label's "
+                f"{self._smoothed(level)}, or take distances to the label's "
                 "surface, of scipy.ndimage.distance_transform_edt"
+            )
+        if self._rounded_share(level) > _FLAT:
+            raise InvalidArgument(
+                f"values are rounded too coarsely: where they pass the level {level:g}, most go from one of "
+                "the numbers that they take to the next one, and the surface between them is terraced, as "
+                f"no smooth one is. Take them as they were before, or smooth them: {self._smoothed(level)}"
             )
         above = self.values > level
         side = bool(above.flat[0])
@@ -109,6 +114,29 @@ class Grid:
             steps += int(np.count_nonzero(passed))
             flat += int(np.count_nonzero(passed & same))
         return flat / steps if steps else 0.0
+
+    def _rounded_share(self, level: float) -> float:
+        """Of the same steps, those between two of the numbers there with none in between.
+
+        Where they are few, symmetric values may be as few, too.
+        """
+        ends = []
+        for axis in range(self.values.ndim):
+            line = np.moveaxis(self.values, axis, 0)[1:-1]
+            passed = (line[:-1] > level) != (line[1:] > level)
+            ends.append(np.stack([line[:-1][passed], line[1:][passed]]))
+        steps = np.concatenate(ends, axis=1)
+        if steps.shape[1] < _FEW:
+            return 0.0
+        _, ranks = np.unique(steps, return_inverse=True)
+        return float((np.abs(np.diff(ranks.reshape(steps.shape), axis=0)) == 1).mean())
+
+    def _smoothed(self, level: float) -> str:
+        return (
+            f"SignedDistance.of_volume(values, spacing={self._short_spacing()}, "
+            f"origin={self.lower.tolist()}, level={level:g}, "
+            f"smooth={1.5 * float(self.spacing.max()):.4g})"
+        )
 
     def _short_spacing(self) -> Any:
         sides = [float(f"{side:.6g}") for side in self.spacing]
