@@ -2,7 +2,7 @@
 
 Gem::Specification.new do |gem|
   gem.name = 'stellate'
-  gem.version = '0.1.0'
+  gem.version = '0.2.0'
   gem.summary = 'Meshes of smooth manifolds of any dimension, known through oracles alone'
   gem.authors = ['Stellate authors']
   gem.license = 'Apache-2.0'

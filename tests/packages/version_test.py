@@ -10,20 +10,10 @@ import sys
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+import version  # noqa: E402
+
 VERSION = (ROOT / "VERSION").read_text()
-# Files of other tools, each with an expression for every mention of our version.
-STATED = {
-    "docker/Dockerfile": r"\bstellate:(\d\S*)",
-    "clients/node/package.json": r'"version": "(\S+)"',
-    "clients/java/pom.xml": r"<artifactId>stellate</artifactId>\s*<version>(\S+)</version>",
-    "clients/java/README.md": r"`stellate:stellate:(\S+)`",
-    "clients/r/DESCRIPTION": r"\nVersion: (\S+)",
-    "clients/ruby/stellate.gemspec": r"gem\.version = '(\S+)'",
-    "clients/rust/Cargo.toml": r'\nversion = "(\S+)"',
-    "clients/rust/Cargo.lock": r'name = "stellate"\nversion = "(\S+)"',
-    "examples/CMakeLists.txt": r"find_package\(stellate (\S+)",
-    "docs/using/building.md": r"find_package\(stellate (\S+)",
-}
 
 
 class Version(unittest.TestCase):
@@ -45,13 +35,21 @@ class Version(unittest.TestCase):
         self.assertEqual(done.stdout, VERSION, done.stderr)
 
     def test_files_that_state_it_agree(self) -> None:
-        for path, pattern in STATED.items():
-            stated = re.findall(pattern, (ROOT / path).read_text())
-            self.assertTrue(stated, path)
-            for version in stated:  # all of it, or the part that has to be the same
-                self.assertTrue(
-                    f"{VERSION.strip()}.".startswith(f"{version}."), f"{path}: {version}"
-                )
+        for path in version.STATED:
+            text = (ROOT / path).read_text()
+            self.assertTrue(version.stated(path, text), path)
+            self.assertEqual(version.with_version(path, text, VERSION.strip()), text, path)
+
+    def test_a_new_one_is_set_everywhere(self) -> None:
+        for path in version.STATED:
+            text = version.with_version(path, (ROOT / path).read_text(), "7.8.9")
+            found = [match[match.lastindex or 1] for match in version.stated(path, text)]
+            self.assertTrue(found, path)
+            self.assertLessEqual(set(found), {"7.8", "7.8.9"}, path)
+
+    def test_the_list_of_changes_begins_with_it(self) -> None:
+        headings = re.findall(r"(?m)^## (\S+),", (ROOT / "CHANGELOG.md").read_text())
+        self.assertEqual(headings[0] + "\n", VERSION)
 
 
 if __name__ == "__main__":

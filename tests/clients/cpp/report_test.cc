@@ -91,7 +91,7 @@ TEST(ReportJson, IsThatOfAllClients) {
       R"("boundary_components": 0, "boundary_euler_characteristic": 0, "faces": [], )"
       R"("sharpest": null, "only_too_coarse": false}, )"
       R"("elapsed_seconds": 0.5, )"
-      R"("version": "0.1.0"})");
+      R"("version": "0.2.0"})");
   report.epsilon = 0;
   EXPECT_NE(ToJson(report).find("\"epsilon\": null"), std::string::npos);
 }
