@@ -16,7 +16,8 @@ project = "Stellate"
 release = (ROOT / "VERSION").read_text().strip()
 root_doc = "docs/index"
 include_patterns = [
-    "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "docs/**.md", "gallery/**.md",
+    "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "MAINTAINERS.md",
+    "docs/**.md", "gallery/**.md",
     "clients/*/README.md", "proto/README.md", "tests/conformance/README.md", "reference/**",
 ]  # fmt: skip
 exclude_patterns = [
