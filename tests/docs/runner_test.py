@@ -140,6 +140,7 @@ class Running(unittest.TestCase):
             ("bash", "tools/chek\n"),
             ("bash", "tests/run --asam\n"),
             ("bash", "tests/bench/run peers --ful\n"),
+            ("bash", "python3 tests/proto/surface.py --recrod\n"),
             ("bash", "cmake --build build/release --target no_such_target\n"),
             ("bash", "build/release/bin/no_such_target\n"),
             ("python", "def f(:\n"),

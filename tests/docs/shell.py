@@ -135,7 +135,7 @@ def programs_exist(command: str) -> None:
             path = ROOT / ours[1]
             if not path.exists():
                 raise Wrong(f"there is no {word}")
-            if path.is_file() and os.access(path, os.X_OK):
+            if path.is_file() and (path.suffix == ".py" or os.access(path, os.X_OK)):
                 program = path
         elif word in ("&&", "||", "|", ";"):
             program = None

@@ -142,7 +142,9 @@ class Templates(unittest.TestCase):
             text = path.read_text()
             for named in re.findall(r"\b[A-Z]+\.md\b", text):
                 self.assertTrue((ROOT / named).exists(), f"{path.name}: {named}")
-            for code in re.findall(r"`((?:tests|tools|docs|proto|docker)/[^`]+)`", text):
+            for code in re.findall(
+                r"`(?:python3 )?((?:tests|tools|docs|proto|docker)/[^`]+)`", text
+            ):
                 self.assertTrue((ROOT / code.split()[0]).exists(), f"{path.name}: {code}")
                 self.assertEqual(faults(code), [], path.name)
 
