@@ -1,6 +1,5 @@
 #pragma once
 
-#include <type_traits>
 #include <utility>
 
 namespace stellate::core {
@@ -13,7 +12,7 @@ template <typename Result, typename... Arguments>
 class FunctionRef<Result(Arguments...)> {
  public:
   template <typename Call>
-  requires(!std::is_same_v<std::remove_cvref_t<Call>, FunctionRef>) FunctionRef(const Call& call)
+  FunctionRef(const Call& call)  // NOLINT: a body is given as it is
       : object_(&call), call_([](const void* object, Arguments... arguments) -> Result {
           return (*static_cast<const Call*>(object))(std::forward<Arguments>(arguments)...);
         }) {}

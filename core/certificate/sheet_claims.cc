@@ -90,6 +90,7 @@ std::vector<std::uint32_t> NearestBeyond(const BallTree& tree, const double* q, 
         if (nearest.size() > kPointsNear) nearest.pop_back();
       });
   std::vector<std::uint32_t> ids;
+  ids.reserve(nearest.size());
   for (const auto& [squared, other] : nearest) ids.push_back(other);
   return ids;
 }

@@ -117,7 +117,7 @@ module Stellate
     end
 
     def judged(mesh, info)
-      mesh.epsilon, mesh.epsilon_reason = info.spec.epsilon, ''
+      mesh.epsilon, mesh.epsilon_reason = info.spec&.epsilon, ''
       case info.state
       when :MESH_STATE_CANCELLED
         raise Cancelled.new('the mesh was cancelled', reason: 'CANCELLED', mesh:)
