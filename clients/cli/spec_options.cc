@@ -1,6 +1,7 @@
 #include "spec_options.h"
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <type_traits>
 
 #include "mesh_settings.h"
@@ -16,7 +17,9 @@ void Add(CLI::App* to, const MeshSetting& setting, MeshOptions* options) {
         auto& value = options->*field;
         using T = std::decay_t<decltype(value)>;
         if constexpr (std::is_same_v<T, std::optional<bool>>) {
-          to->add_flag(setting.flag, value, setting.help);
+          // Not add_flag(value), which makes false of what nobody said.
+          to->add_flag_function(
+              setting.flag, [&value](std::int64_t said) { value = said > 0; }, setting.help);
         } else {
           CLI::Option* const option = to->add_option(setting.flag, value, setting.help);
           if constexpr (std::is_arithmetic_v<T>) option->capture_default_str();
