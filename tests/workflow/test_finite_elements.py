@@ -1,14 +1,17 @@
 """Finite elements on meshed manifolds, against what is known exactly."""
 
 import pathlib
+import re
 import sys
 
 import numpy as np
+import pytest
 import scipy.sparse.linalg
 import shapes
 import stellate
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "examples/finite_elements"))
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "examples/finite_elements"))
 
 import elements  # noqa: E402
 import heat  # noqa: E402
@@ -31,8 +34,12 @@ def test_linear_functions_have_their_exact_energy_and_mass():
 
 def test_heat_on_the_rotations_decays_at_the_laplacians_rate():
     errors = []
+    page = (ROOT / "docs/using/finite-elements.md").read_text()
     for epsilon in (0.6, 0.45):
         times, temperatures, mass = heat.cool(epsilon)
+        vertices, rate = re.search(rf"\| {epsilon} \| ([\d,]+) \| ([\d.]+) \|", page).groups()
+        assert temperatures.shape[1] == pytest.approx(int(vertices.replace(",", "")), rel=0.05)
+        assert heat.decay_rate(times, temperatures, mass) == pytest.approx(float(rate), rel=0.01)
         kept = (temperatures @ mass).sum(axis=1)
         assert np.allclose(kept, kept[0], rtol=1e-12, atol=0)
         errors.append(heat.decay_rate(times, temperatures, mass) - 1)

@@ -1,5 +1,7 @@
 """Sizes that an oracle gives: graded meshes through the real server, and sizes that make no sense."""
 
+import re
+
 import numpy as np
 import pytest
 import stellate
@@ -45,6 +47,60 @@ def test_local_feature_size_spares_most_of_a_mesh(name, server):
     topology.assert_closed_manifold(mesh, euler)
     assert largest_share(oracle, mesh) <= 0.4 * (1 + 1e-9)
     assert 10 * len(mesh.points) < least_vertices(area, 0.4 * reach)
+
+
+class TwoSpheres:
+    """Unit spheres about the origin and (3, 0, 0), a unit apart."""
+
+    dimension, ambient_dimension = 2, 3
+    bounding_box = [-1.1] * 3, [4.1, 1.1, 1.1]
+
+    def centers(self, x):
+        return np.where(x[:, :1] > 1.5, [3.0, 0, 0], 0.0)
+
+    def closest_point(self, x):
+        away = x - self.centers(x)
+        return x - away + away / np.linalg.norm(away, axis=1, keepdims=True)
+
+    def local_size(self, points):
+        return np.minimum(1, np.abs(points[:, 0] - 1.5))
+
+
+class Sizeless:
+    """An oracle without its sizes."""
+
+    def __init__(self, oracle):
+        for name in (
+            "dimension",
+            "ambient_dimension",
+            "bounding_box",
+            "closest_point",
+            "tangent_basis",
+        ):
+            if hasattr(oracle, name):
+                setattr(self, name, getattr(oracle, name))
+
+
+# As the page calls them.
+COMPARED = {
+    "torus 1:0.9": manifolds.Torus(1.0, 0.9),
+    "ellipsoid 1:1:10": manifolds.ellipsoid((1.0, 1.0, 10.0)),
+    "two spheres a unit apart": TwoSpheres(),
+}
+
+
+@pytest.mark.parametrize("name", COMPARED)
+def test_the_page_tells_how_many_vertices_graded_meshes_have(name, server, repository):
+    page = (repository / "docs" / "using" / "sizes.md").read_text()
+    row = re.search(rf"(?m)^\| {name}, `size_rate` 0.4 (\|.*)$", page)[1]
+    _, *told = (int(count.replace(",", "")) for count in re.findall(r"\| ([\d,]+)", row))
+    oracle = COMPARED[name]
+    meshes = [
+        stellate.mesh(one, 0.5, server=server, size_rate=0.4) for one in (Sizeless(oracle), oracle)
+    ]
+    assert all(mesh.certified for mesh in meshes)
+    # On another machine oracles round otherwise.
+    assert [len(mesh.points) for mesh in meshes] == pytest.approx(told, rel=0.05), "mend the page"
 
 
 def test_a_field_of_ones_own(server):
