@@ -24,7 +24,7 @@ constexpr double kUnansweredShare = 0.01;
 // Answers are taken to be wrong by this share of the mesh size, and by a few roundings, even where
 // none is seen to be: what lies nearer together than ten times that is one point.
 constexpr double kLeastError = 1e-7;
-constexpr double kRounding = 16 * std::numeric_limits<double>::epsilon();
+constexpr double kRoundingShare = 16 * std::numeric_limits<double>::epsilon();
 
 double LargestCoordinate(const MeshView& mesh) {
   const MeshBox box = BoxOf(mesh);
@@ -95,8 +95,8 @@ void ClosenessClaims::JudgeVertices(const AnswerBlock& answer) {
   }
   // More would not have passed for answers that stay where they are (core/run/repeat_check.h).
   const double rounding = RoundingOf(answer.points, kNoticeablePositionError * x_.size);
-  x_.position_error =
-      std::max({worst, rounding, kLeastError * x_.size, kRounding * LargestCoordinate(x_.mesh)});
+  x_.position_error = std::max(
+      {worst, rounding, kLeastError * x_.size, kRoundingShare * LargestCoordinate(x_.mesh)});
   if (worst > kNoticeablePositionError * x_.size && worst <= kPositionTolerance * x_.size) {
     x_.findings.Warn(Message("The oracle moves points that it returned itself by up to ",
                              Brief(worst), ", ", Brief(100 * worst / x_.size),

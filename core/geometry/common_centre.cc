@@ -14,14 +14,14 @@ namespace {
 
 // Cholesky of the Gram matrix of K edges. A pivot below this share of its edge's square is lost in
 // rounding: the simplex is flat.
-constexpr double kFlat = 1e-14;
+constexpr double kFlatGram = 1e-14;
 
 template <int K>
 bool Factor(double (&gram)[K][K]) {
   for (int c = 0; c < K; ++c) {
     const double whole = gram[c][c];
     for (int j = 0; j < c; ++j) gram[c][c] -= gram[c][j] * gram[c][j];
-    if (!(gram[c][c] > kFlat * whole)) return false;
+    if (!(gram[c][c] > kFlatGram * whole)) return false;
     gram[c][c] = std::sqrt(gram[c][c]);
     for (int r = c + 1; r < K; ++r) {
       for (int j = 0; j < c; ++j) gram[r][c] -= gram[r][j] * gram[c][j];
@@ -97,7 +97,7 @@ bool MeanTangent(int d, const double* const* tangents, const double* barycentric
         for (int j = 0; j < d; ++j) row[j] -= s * next[b * d + j];
       }
       const double length = std::sqrt(Dot(row, row, d));
-      if (!(length > kFlat)) return false;
+      if (!(length > kFlatGram)) return false;
       for (int j = 0; j < d; ++j) row[j] /= length;
     }
     std::copy_n(next, K * d, mean);

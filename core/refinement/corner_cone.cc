@@ -12,7 +12,7 @@ namespace {
 
 // A direction this near to a wall is along it: sine. Conormals are as precise as the walls'
 // gradients; walls that cross at less than 14 degrees are refused anyway.
-constexpr double kAlong = 1e-6;
+constexpr double kAlongFace = 1e-6;
 
 // The next of the sets of as many, in the order of their numbers.
 WallSet NextOfSize(WallSet set) {
@@ -34,10 +34,11 @@ CornerCone<K> ConeOf(WallSet walls, const double* conormals) {
   [[maybe_unused]] const auto try_along = [&](Vector along) {
     const Vector inward = -along;
     for (const Vector& u : {along, inward}) {
-      if ((normals.transpose() * u).maxCoeff() > kAlong) continue;
+      if ((normals.transpose() * u).maxCoeff() > kAlongFace) continue;
       WallSet on = 0;
       for (int i = 0; i < count; ++i)
-        if (normals.col(i).dot(u) >= -kAlong) on |= SetOfWall(number[static_cast<std::size_t>(i)]);
+        if (normals.col(i).dot(u) >= -kAlongFace)
+          on |= SetOfWall(number[static_cast<std::size_t>(i)]);
       const bool is_known = std::any_of(cone.rays.begin(), cone.rays.end(),
                                         [&](const auto& ray) { return ray.walls == on; });
       if (!is_known) cone.rays.push_back({u, on});
@@ -50,7 +51,7 @@ CornerCone<K> ConeOf(WallSet walls, const double* conormals) {
       Eigen::MatrixXd rows(K - 1, K);
       int row = 0;
       ForEachWall(set, [&](int i) { rows.row(row++) = normals.col(i).transpose(); });
-      if (const auto along = DirectionOffRows(rows, kAlong)) try_along(*along);
+      if (const auto along = DirectionOffRows(rows, kAlongFace)) try_along(*along);
     }
   }
   Vector middle = Vector::Zero();
@@ -60,7 +61,7 @@ CornerCone<K> ConeOf(WallSet walls, const double* conormals) {
     if (CountWalls(ray.walls) > K - 1) cone.crowded |= ray.walls;
   }
   cone.is_simple = !cone.rays.empty() && cone.crowded == 0 &&
-                   (normals.transpose() * middle).maxCoeff() < -kAlong;
+                   (normals.transpose() * middle).maxCoeff() < -kAlongFace;
   return cone;
 }
 

@@ -18,7 +18,7 @@ constexpr double kMended = 0.9;
 constexpr double kMostWanted = 4;
 // What is known of the whole is coarse. Sizes that just hold by it are just above what was asked
 // for, in truth: so they are planned this much finer, instead of mended in a round of their own.
-constexpr double kShare = 0.995;
+constexpr double kShareOfSizes = 0.995;
 
 template <int K>
 AnsweredPoints AnswersOf(Surrogate<K>& surrogate, const StarComplex<K>& complex,
@@ -87,7 +87,7 @@ std::vector<Rule> Drive(Engine<K>* rehearsal, const Engine<K>& original, std::ui
 template <int K>
 PlannedPoints Rehearse(const Engine<K>& engine, std::uint64_t round,
                        std::vector<Target<K>>* targets, Rehearsed rules, Surrogate<K>* known) {
-  Engine<K> rehearsal = engine.ForRehearsal(known ? kShare : 1);
+  Engine<K> rehearsal = engine.ForRehearsal(known ? kShareOfSizes : 1);
   PlannedPoints planned;
   planned.rules = Drive(&rehearsal, engine, round, rules, known);
   const StarComplex<K>& rehearsed = rehearsal.complex();

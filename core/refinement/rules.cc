@@ -25,7 +25,7 @@ constexpr double kCosineOfLeanMargin = 0.99875026039496623,
                  kSineOfLeanMargin = 0.049979169270678331;
 // A volume this small beside the lengths of the edges that span it is one of points that are off a
 // flat wall by an oracle's error.
-constexpr double kFlat = 1e-8;
+constexpr double kFlatEdges = 1e-8;
 // Below this dimension such simplices were not seen to stay.
 constexpr int kFirstFlat = 4;
 
@@ -285,7 +285,7 @@ bool IsFlatOnWall(const StarComplex<K>& complex, std::uint32_t p,
     if (common == 0) return false;
     complex.Project(p, complex.Point(id), edges.col(a).data());
   }
-  return std::abs(Determinant<K>(edges)) <= kFlat * edges.colwise().norm().prod();
+  return std::abs(Determinant<K>(edges)) <= kFlatEdges * edges.colwise().norm().prod();
 }
 
 // Of a closed star that breaks no rule besides.

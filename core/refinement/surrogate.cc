@@ -37,7 +37,7 @@ constexpr double kNearGuess = 0.1;
 constexpr std::size_t kRun = 32;
 constexpr double Shared(int k) { return k < 3 ? 1 : 0.5; }
 // More than rounding can take from a distance in R^d, d up to thousands.
-constexpr double kRounding = 1 + 1e-12;
+constexpr double kRoundedUp = 1 + 1e-12;
 // What a fit is trusted at best, as a share of the neighbours' distance; and where there are hardly
 // more equations than coefficients.
 constexpr double kLeastDoubt = 0.003;
@@ -220,7 +220,7 @@ std::vector<typename Surrogate<K>::Near> Surrogate<K>::FindNear(
       Near& here = near[i];
       if (from && Distance(at(i), from, d) <= Shared(K) * radius) {
         if (around.empty())
-          complex_.ForEachWithin(from, kRounding * (1 + 2 * Shared(K)) * radius,
+          complex_.ForEachWithin(from, kRoundedUp * (1 + 2 * Shared(K)) * radius,
                                  [&](std::uint32_t p) { around.push_back(p); });
         for (const std::uint32_t p : around)
           here.Add({SquaredDistance(at(i), complex_.Point(p), d), p});

@@ -13,7 +13,7 @@ namespace stellate::core {
 namespace {
 
 // Conormals may be wrong by some 11 degrees each (core/run/wall_check.cc).
-constexpr double kTelling = 23;  // degrees
+constexpr double kTellingDegrees = 23;
 // A neighbour across a thin part of M is no bend: each is behind the other by most of its distance.
 // One that is so far behind, or ahead, is on another sheet, or the piece of the wall is too small.
 constexpr double kBehind = 0.8;
@@ -75,7 +75,7 @@ std::optional<WallBend> SharpestBend(const StarComplex<K>& complex, double far) 
       const Eigen::VectorXd step = PointOf<K>(complex, q) - PointOf<K>(complex, p);
       const double length = step.norm();
       const bool is_behind = std::max(step.dot(here), -step.dot(there)) < -kBehind * length;
-      if (degrees < kTelling || is_behind) continue;
+      if (degrees < kTellingDegrees || is_behind) continue;
       WallBend bend{std::countr_zero(complex.walls(p)), degrees, length, {}};
       if (sharpest && sharpest->radius() <= bend.radius()) continue;
       if (is_alone != IsAlone<K>(complex, q, far)) continue;

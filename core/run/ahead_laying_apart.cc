@@ -19,7 +19,7 @@ namespace {
 // quality.
 constexpr double kKept = 0.6;
 // Points of a run lie within this many spacings of its first.
-constexpr double kRunReach = 3;
+constexpr double kRunReachApart = 3;
 
 // Which of the points, `first` of the sample's own and then those asked for at `columns`, come too
 // near to an earlier one that stays. As guessed they kept their distance: one of two that come near
@@ -31,7 +31,7 @@ std::vector<std::uint8_t> AreTooNear(const std::vector<double>& points, std::siz
   const auto d = static_cast<int>(asked.rows());
   const auto stride = static_cast<std::size_t>(d);
   const double apart = kKept * spacing;
-  const RunTree tree(points, d, kRunReach * spacing);
+  const RunTree tree(points, d, kRunReachApart * spacing);
   using Pair = std::pair<std::uint32_t, std::uint32_t>;  // the later one first
   std::vector<Pair> near = ParallelGather<Pair>(columns.size(), [&](std::size_t at, auto* pairs) {
     const auto i = static_cast<std::uint32_t>(first + at);

@@ -31,7 +31,7 @@ constexpr double kNearlyMeet = 0.25;
 constexpr double kMuchTooCoarse = 2;
 
 // 0, 2, 5
-std::string NameWalls(WallSet walls) {
+std::string ListWalls(WallSet walls) {
   std::string names;
   ForEachWall(walls, [&](int wall) { names += Message(names.empty() ? "" : ", ", wall); });
   return names;
@@ -183,7 +183,7 @@ void TellNearCorners(const Engine<K>& engine, double epsilon, Certificate* certi
   if (!near || near->distance > kNearlyMeet * epsilon) return;
   if (certificate->verdict.ends_with('.')) certificate->verdict.pop_back();
   certificate->verdict += Message(
-      "; walls ", NameWalls(complex.walls(near->first) | complex.walls(near->second)),
+      "; walls ", ListWalls(complex.walls(near->first) | complex.walls(near->second)),
       " all but meet in one point: two corners are ", Brief(near->distance), " apart at ",
       NamePoint(Eigen::Map<const Eigen::VectorXd>(complex.Point(near->first), complex.d())),
       ", far less than epsilon ", Brief(epsilon),
@@ -192,10 +192,10 @@ void TellNearCorners(const Engine<K>& engine, double epsilon, Certificate* certi
 
 std::string WhyTooCrowded(const Eigen::VectorXd& point, WallSet walls, WallSet along, int k) {
   std::string why =
-      Message("walls ", NameWalls(walls), " meet in one point at ", NamePoint(point), ", where ");
+      Message("walls ", ListWalls(walls), " meet in one point at ", NamePoint(point), ", where ");
   if (along != 0)
     why += Message("more than ", k - 1, " of them meet along one edge of the manifold (walls ",
-                   NameWalls(along), "), or touch it");
+                   ListWalls(along), "), or touch it");
   else if (CountWalls(walls) > kMostAtCorner)
     why += Message("at most ", kMostAtCorner, " can be told apart");
   else
@@ -235,7 +235,7 @@ std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent) {
     return NamePoint(Eigen::Map<const Eigen::VectorXd>(complex.Point(v), complex.d())) +
            (walls == 0
                 ? ""
-                : (CountWalls(walls) == 1 ? ", on wall " : ", on walls ") + NameWalls(walls));
+                : (CountWalls(walls) == 1 ? ", on wall " : ", on walls ") + ListWalls(walls));
   };
   std::string left = AboutLeftFaces<K>(engine);
   if (!entries.empty())

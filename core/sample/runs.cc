@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t kMostPoints = 32;
 // More than rounding can take from a distance in R^d, d up to thousands.
-constexpr double kRounding = 1 + 1e-12;
+constexpr double kRoundedUp = 1 + 1e-12;
 
 }  // namespace
 
@@ -48,7 +48,7 @@ RunTree::RunTree(std::span<const double> points, int d, double reach,
 void RunTree::Gather(const double* q, double radius, std::vector<std::uint32_t>* ids) const {
   thread_local std::vector<std::uint32_t> near;
   near.clear();
-  const double far = kRounding * radius;
+  const double far = kRoundedUp * radius;
   tree_.Gather(q, far, &near);
   WithDimension(d_, [&](auto known) {
     const auto stride = static_cast<std::size_t>(known() > 0 ? known() : d_);

@@ -30,6 +30,8 @@ v1::ErrorReason ReasonOf(core::StatusCode code);  // UNSPECIFIED for kOk alone
 grpc::Status ToGrpc(const core::Status& status, const std::string& prefix = "");
 grpc::Status ToGrpc(const Refused& refused, const std::string& prefix = "");
 
+constexpr std::size_t kMaxFailureBytes = 4096;  // of the words in which a mesh or an oracle failed
+
 // At most `limit` bytes of `text`, never cutting a UTF-8 character.
 std::string Cut(const std::string& text, std::size_t limit);
 

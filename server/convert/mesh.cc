@@ -7,8 +7,6 @@
 namespace stellate::server {
 namespace {
 
-constexpr std::size_t kMaxFailureBytes = 4096;
-
 void SetTime(std::chrono::system_clock::time_point time, google::protobuf::Timestamp* out) {
   using std::chrono::duration_cast, std::chrono::nanoseconds, std::chrono::seconds;
   const auto since = time.time_since_epoch();

@@ -13,7 +13,6 @@ namespace stellate::server {
 namespace {
 
 constexpr std::size_t kMaxWorkerNameBytes = 128;
-constexpr std::size_t kMaxFailureBytes = 4096;
 
 // An oracle's own words go to the terminals of others.
 std::string WordsOf(const v1::OracleFailure& failure) {

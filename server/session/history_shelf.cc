@@ -6,7 +6,7 @@
 namespace stellate::server {
 namespace {
 
-constexpr auto kRetry = std::chrono::seconds(1);  // where there was no memory
+constexpr auto kRetryShelving = std::chrono::seconds(1);  // where there was no memory
 
 }  // namespace
 
@@ -47,7 +47,7 @@ void HistoryShelf::Load(const std::stop_token& stop) {
     lock.lock();
     if (loading != Session::Loading::kNoMemory || stopped_) continue;
     wanted_.push_back(session);  // others may be smaller
-    wanted_changed_.wait_for(lock, stop, kRetry, [] { return false; });
+    wanted_changed_.wait_for(lock, stop, kRetryShelving, [] { return false; });
   }
 }
 
