@@ -5,7 +5,7 @@ import { DOCTOR } from "./generated/numbers.js";
 import type { Oracle } from "./oracle.js";
 import type { Report } from "./report.js";
 
-/** An epsilon, and, where it was chosen, why, and how often it may be followed by a finer one. */
+/** An epsilon; if "auto" chose it, why, and how many finer ones may follow. */
 export interface Choice {
   epsilon: number;
   reason: string;

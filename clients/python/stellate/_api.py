@@ -56,8 +56,8 @@ def mesh(
       save: a file or several to write the mesh to, certified or not, as Mesh.save does. What their
         formats cannot hold is an error before anything is meshed.
       keep: "box": what lies in the oracle's bounding box, cut at its sides where the manifold leaves
-        it; "seeds": the components that seeds lie on, and no other. The mesh is that of
-        oracles.kept(oracle, keep, seeds), which further workers have to serve.
+        it; "seeds": the components that seeds lie on, and no other. What is meshed is
+        oracles.kept(oracle, keep, seeds): workers that join have to serve that.
       **criteria: radius_edge_bound, sliver_bound, picking_radius, small_sliver_radius, candidates,
         advance_step, flat_alternations, ask_ahead, common_centre, size_rate, max_deviation;
         max_vertices, max_rounds, max_batch_queries, worker_wait_seconds, answer_seconds,

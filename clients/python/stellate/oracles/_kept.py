@@ -38,7 +38,7 @@ def kept(oracle: Any, keep: str, seeds: Any = None) -> Any:
         "seeds": the components that seeds lie on, whole, and no other; needs scipy. They are
         followed once, from the seeds on, with steps by how M bends. A component that is nearer to them
         than a few hundredths of the radius of curvature there is kept with them.
-      seeds: (s, d) points near M, instead of the oracle's; for "seeds" alone.
+      seeds: (s, d) points near what is kept, instead of the oracle's.
 
     Raises: InvalidArgument, also where a component of the seeds has no end or a crease.
     """

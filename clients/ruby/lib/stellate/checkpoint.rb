@@ -4,8 +4,8 @@ require 'fileutils'
 
 module Stellate
   # A directory in which one mesh outlives the processes that make it:
-  #   mesh     the mesh's name on the private server, and, where epsilon was chosen, how often it may be
-  #            followed by a finer one, and why it is that; on the next line what is meshed
+  #   mesh     a line with the mesh's name on the private server and, if 'auto' chose epsilon, how many finer
+  #            ones may follow and why it is this one; then the specification
   #   server/  that server's --data-dir
   class Checkpoint
     LAST_SERVER_SECONDS = 20 # that the server of a killed process may take to end

@@ -1,7 +1,7 @@
 # frozen_string_literal: true
 
 module Stellate
-  # An epsilon, and, where it was chosen, why, and how often it may be followed by a finer one.
+  # An epsilon; if 'auto' chose it, why, and how many finer ones may follow.
   Choice = Struct.new(:epsilon, :reason, :retries) do
     # What an oracle is meshed with at first.
     def self.of(oracle, epsilon)
