@@ -52,9 +52,9 @@ class Hardening(unittest.TestCase):
         def check(program: str) -> None:
             segments = readelf("--segments", program)
             self.says(segments, r"\n\s*GNU_STACK ")
-            for name, flags in re.findall(
-                r"\n\s*(GNU_STACK|LOAD)(?:\s+0x\w+){5}\s+([RWE ]{3})", segments
-            ):
+            found = re.findall(r"\n\s*(GNU_STACK|LOAD)(?:\s+0x\w+){5}\s+([RWE ]{3})", segments)
+            self.assertEqual({name for name, _ in found}, {"GNU_STACK", "LOAD"})
+            for name, flags in found:
                 self.assertFalse({"W", "E"} <= set(flags), f"{name} is {flags}")
 
         self.each(check)

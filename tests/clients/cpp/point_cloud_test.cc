@@ -78,7 +78,7 @@ TEST(PointCloud, MorePointsOfOneScanAreNoWorse) {
   EXPECT_LT(of_many.off, 0.003);
   EXPECT_LT(of_many.turned, of_few.turned);
   EXPECT_LT(of_many.turned, 3);
-  EXPECT_LT(few.bandwidths().minCoeff(), 1.1 * few.bandwidth());
+  EXPECT_GT(few.bandwidths().minCoeff(), 0.9 * few.bandwidth()) << "noise is alike everywhere";
   // As far as the noise takes, five times as far as twice the seventh neighbour.
   EXPECT_GT(many.bandwidth(), 5 * std::sqrt(15.8 / 80000));
 }

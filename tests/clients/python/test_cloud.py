@@ -32,7 +32,7 @@ def test_more_points_of_one_scan_are_no_worse():
     (off, turned), (many_off, many_turned) = errors(few), errors(many)
     assert many_off < off and many_off < 0.003
     assert many_turned < turned and many_turned < 3
-    assert few.bandwidths.min() < 1.1 * few.bandwidth
+    assert few.bandwidths.min() > 0.9 * few.bandwidth  # the noise decides, alike everywhere
     # As far as the noise takes, five times as far as twice the seventh neighbour.
     spacing = np.sqrt(15.8 / 80000)
     assert many.bandwidth > 5 * spacing

@@ -182,9 +182,8 @@ def test_help(shell, capsys):
     assert whole.returncode == 0 and "MODULE:OBJECT" in whole.stdout
     for command in ("mesh", "declare", "serve", "download", "doctor", "conform"):
         assert command in whole.stdout
-        with pytest.raises(
-            SystemExit
-        ) as ended:  # here: a process would have to import it all again
+        # In this process: another would have to import it all again.
+        with pytest.raises(SystemExit) as ended:
             main([command, "--help"])
         assert ended.value.code == 0
         assert f"stellate {command}" in capsys.readouterr().out

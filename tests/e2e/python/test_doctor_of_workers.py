@@ -145,15 +145,17 @@ def test_requests_that_never_become_whole_are_not_kept(streams, size):
 def test_what_it_says_of_its_bounds_names_no_flag_that_it_lacks(tmp_path):
     log = tmp_path / "log"
 
-    def await_said(what):
-        while what not in log.read_text():
-            time.sleep(0.05)
-
     def few_files():
         resource.setrlimit(resource.RLIMIT_NOFILE, (200, 200))
 
     with log.open("w") as file, doctor(stderr=file, preexec_fn=few_files) as (process, client):
         host, port = client.address.rsplit(":", 1)
+
+        def await_said(what):
+            while what not in log.read_text():
+                assert process.poll() is None, log.read_text()
+                time.sleep(0.05)
+
         await_said("files: it serves")
         with contextlib.ExitStack() as strangers:
 
@@ -166,7 +168,8 @@ def test_what_it_says_of_its_bounds_names_no_flag_that_it_lacks(tmp_path):
             for _ in range(64):  # say nothing
                 stranger()
             await_said("that had not said hello")
-            while process.poll() is None and "the most that" not in log.read_text():
+            while "the most that" not in log.read_text():
+                assert process.poll() is None, log.read_text()
                 polite = stranger()
                 with contextlib.suppress(ConnectionError):
                     polite.sendall(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + frame(SETTINGS, 0, 0))
