@@ -1,0 +1,102 @@
+#!/usr/bin/python3
+"""No class of the core or the server has more state, or does more, than one can keep in mind.
+
+Members and methods (overloads apart) are counted in headers as clang-format leaves them: two spaces in.
+"""
+
+from __future__ import annotations
+
+import pathlib
+import re
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+MOST_MEMBERS, MOST_METHODS = 20, 40
+
+# Classes that are still above a limit, with what they have at most. Lower a number with the class; a class
+# within the limits loses its line.
+LARGE = {
+    "core/complex/star_complex.h StarComplex": (24, 84),
+    "core/refinement/engine.h Engine": (MOST_MEMBERS, 51),
+    "core/run/meshing_run.h MeshingRun": (32, 47),
+    "core/sample/ball_tree.h BallTree": (MOST_MEMBERS, 41),
+    "server/journal/recorded_mesh.h RecordedMesh": (22, MOST_METHODS),
+    "server/net/connection_guard.h ConnectionGuard": (28, MOST_METHODS),
+    "server/session/session.h Session": (31, 43),
+}
+
+CLASS = re.compile(r"^class (\w+)[^;{]*\{\n(.*?)^\};", re.M | re.S)
+MEMBER = re.compile(r"(?<![\w.>(])\w+_(?:\[[^\]]*\])*(?= = |\{|;|,)")
+METHOD = re.compile(r"(?:[\w:<>,&*\[\] ]*?\s[&*]*)??(?:~?\w+|operator[^ \w]{1,3})\(")
+NEITHER = re.compile(
+    r"//|using |friend |typedef |template|static_assert|static constexpr \w+ k|[}:]|struct |class |enum "
+)
+
+
+def count(body: str) -> tuple[int, int]:
+    """The members and the methods of a class."""
+    members = methods = 0
+    for line in body.splitlines():
+        if not re.match(r"  \S", line) or NEITHER.match(line, 2):
+            continue
+        code = line[2:].split("//")[0]
+        if METHOD.match(code):
+            methods += 1
+        else:
+            members += len(MEMBER.findall(code))
+    return members, methods
+
+
+def classes() -> dict[str, tuple[int, int]]:
+    return {
+        f"{path.relative_to(ROOT)} {found[1]}": count(found[2])
+        for room in ("core", "server")
+        for path in sorted((ROOT / room).rglob("*.h"))
+        for found in CLASS.finditer(path.read_text())
+    }
+
+
+class ClassLimits(unittest.TestCase):
+    def test_no_class_is_larger(self) -> None:
+        for name, (members, methods) in classes().items():
+            with self.subTest(name):
+                most_members, most_methods = LARGE.get(name, (MOST_MEMBERS, MOST_METHODS))
+                self.assertLessEqual(members, most_members, "members")
+                self.assertLessEqual(methods, most_methods, "methods")
+
+    def test_large_ones_are_as_large_as_the_table_says(self) -> None:
+        found = classes()
+        for name, most in LARGE.items():
+            with self.subTest(name):
+                members, methods = found[name]
+                self.assertEqual((max(members, MOST_MEMBERS), max(methods, MOST_METHODS)), most)
+
+    def test_members_and_methods_are_counted(self) -> None:
+        body = """ public:
+  using Cell = int;
+  explicit Stars(int d) : d_(d) {}
+  Stars(const Stars&) = delete;
+  template <typename Visit>
+  void ForEach(const Visit& visit) const {
+    visit(d_);
+  }
+  // Says how many there are (or 0).
+  std::vector<int> Of(
+      int p) const;
+  bool operator<(const Stars& other) const { return d_ < other.d_; }
+
+ private:
+  static constexpr int kMost = 3;
+  struct Part {
+    int part_ = 0;
+  };
+  int d_;
+  double low_ = 0, high_{1};
+  std::array<int, 3> few_[2];
+  std::function<void(int)> on_end_;
+"""
+        self.assertEqual(count(body), (5, 5))
+
+
+if __name__ == "__main__":
+    unittest.main()
