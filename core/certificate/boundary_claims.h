@@ -36,8 +36,7 @@ class BoundaryClaims {
   // shows of the boundary's reach. After the oracle's error is known.
   void HoldPoint(int wall, const std::uint32_t* ids, const double* y);
   // That the boundary's own reach within M, as its edges and answers show it, is not too small for
-  // the mesh.
-  // After what M's is was told.
+  // the mesh. After M's own reach is known.
   void JudgeReach();
 
  private:

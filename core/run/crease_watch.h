@@ -37,12 +37,11 @@ constexpr double kLeastSine2 = 0.03;  // ten degrees
 // Edges along which it was asked before, as pairs of vertices, the smaller first.
 using WalkedEdges = std::set<std::pair<std::uint32_t, std::uint32_t>>;
 
-// Edges at stars that break a rule, no longer than `longest` or, where sizes are finer,
-// that share of them, along which M's tangent spaces turn
-// most: by how much, and for their length. A few, without common ends; none of those where the sum
-// of the squared sines of the angles between them is below least_sine2, or which are shorter than
-// M's points may be known to. With `walked` those of them that it has not, and they are added to
-// it: the same way would be answered alike.
+// A few edges at stars that break a rule, without common ends, along which M's tangent spaces turn
+// most: by how much, and for their length. They are no longer than `longest` or, where sizes are
+// finer, than that share of it; no shorter than the error that points of M may have; and the
+// squared sines of the angles along each add up to least_sine2 at least. `walked` has those that
+// were returned before, which are left out, as they would be answered alike; the others are added.
 template <int K>
 std::vector<Way> SteepWaysAtFaults(const Engine<K>& engine, double longest,
                                    double least_sine2 = kLeastSine2, WalkedEdges* walked = nullptr);

@@ -185,7 +185,7 @@ bool ConnectionGuard::IsCalm(Connection* connection) {
   if (connection->calls > limits_.calls && !connection->closed) {
     Close(connection, "max-connection-streams",
           Message("had ", connection->calls,
-                  " calls that were open or were reset faster than they ", "end"),
+                  " calls that were open or were reset faster than they end"),
           Message(limits_.calls, " with those that were reset"));
   }
   return calls && !waits && *calls <= kFewCalls;

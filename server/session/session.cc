@@ -14,7 +14,7 @@ namespace {
 
 using core::StatusCode;
 
-// When it would have been created, had this server had it all the time that earlier ones had it.
+// So that the time since then is how long servers have had the mesh, earlier ones included.
 TimePoint CreatedAt(const std::optional<SessionRecord>& record) {
   constexpr double kLongest = 1e9;  // what only a forged record exceeds must not overflow the clock
   const double had = record ? record->last.elapsed_seconds : 0;

@@ -154,7 +154,7 @@ class Session {
   const MesherFactory factory_;
   OraclePool pool_;
   const std::chrono::system_clock::time_point create_time_;
-  const TimePoint created_;  // less what no server had it for
+  const TimePoint created_;  // as if no time had passed without a server
   std::atomic<bool> cancelled_{false};
   std::atomic<bool> abandoned_{false};
   std::atomic<bool> stopping_{false};  // the server does

@@ -28,7 +28,8 @@ void CheckPoints(const Eigen::MatrixXd& points, const std::string& what);
 // The points' box, wider by a share of its diagonal at each side.
 BoundingBox BoxAround(const Eigen::MatrixXd& points, double share);
 
-// The box that an oracle has, or one about its seeds, whose diagonal is as long as theirs; else 1.
+// The box that an oracle has; else a cube about its seeds with the diagonal of their box, or with 1
+// where there are no two seeds.
 BoundingBox WhereOf(const Oracle& oracle);
 // How large a manifold is, by where it says to look for it.
 double ScaleOf(const Oracle& oracle);

@@ -10,10 +10,11 @@
 namespace stellate::oracles {
 namespace {
 
-constexpr double kFlatShare = 0.5;  // of the places where a level is passed, of which no more may
-                                    // lie between equal values
-constexpr std::size_t kFewSteps =
-    300;  // such places, among which numbers tell whether they are rounded
+// Of the places where a level is passed: no more may lie between equal values, or between numbers
+// next to each other.
+constexpr double kFlatShare = 0.5;
+// With fewer such places symmetric values, too, are mostly next to each other.
+constexpr std::size_t kFewSteps = 300;
 constexpr std::ptrdiff_t kOpen = 3;  // cells that an open border goes on for
 
 // The place of a value along each axis, and the next one. The last axis changes fastest.
@@ -62,8 +63,7 @@ double FlatShare(const GridValues& grid, double level) {
   return steps > 0 ? flat / steps : 0;
 }
 
-// Of the same steps, those between two of the numbers there with none in between. Where they are
-// few, symmetric values may be as few, too.
+// Of the same steps, those between two of the numbers there with none in between.
 double RoundedShare(const GridValues& grid, double level) {
   const std::vector<std::ptrdiff_t> strides = Strides(grid.shape);
   std::vector<std::pair<double, double>> steps;
@@ -120,8 +120,7 @@ double InsistOnASurface(const GridValues& grid, double level, bool open_border) 
     Refuse("values are rounded too coarsely: where they pass the level " + Short(level) +
            ", most go from one of the numbers that they take to the next one, and the surface "
            "between them is terraced, as no smooth one is. Take them as they were before, or "
-           "smooth them, "
-           "by a Gaussian of some 1.5 spacings");
+           "smooth them, by a Gaussian of some 1.5 spacings");
   }
   const bool side = grid.values[0] > level;
   Count at(grid.shape);

@@ -15,7 +15,7 @@ constexpr double kLongestMove = 0.5;     // of one step, likewise
 constexpr Eigen::Index kFitLooks = 400;  // points at which fits are looked at, for the bandwidths
 constexpr Eigen::Index kResidualPoints = 500;
 
-// So that each so many of them are about so many.
+// The step through so many points that takes about `looks` of them.
 Eigen::Index Stride(Eigen::Index points, Eigen::Index looks) {
   return std::max<Eigen::Index>(1, points / looks);
 }

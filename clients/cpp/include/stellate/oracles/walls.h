@@ -10,13 +10,13 @@
 #include "stellate/catalogue.h"
 #include "stellate/oracle.h"
 
-// Manifolds with boundary: what walls leave of another manifold, and domains of space. All are as
-// safe to call from several threads as what they are made of. Constructors throw
-// std::invalid_argument.
 namespace stellate {
 class Exactness;
 }
 
+// Manifolds with boundary: what walls leave of another manifold, and domains of space. All are as
+// safe to call from several threads as what they are made of. Constructors throw
+// std::invalid_argument.
 namespace stellate::oracles {
 
 // {g >= 0}, g smooth near where it is zero; what counts elsewhere is its sign.
