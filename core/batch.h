@@ -189,8 +189,8 @@ inline constexpr double kConormalTolerance = 1e-3;
 // Least eigenvalue of the Gram matrix of the conormals that meet in a point: walls that cross at
 // less than some 14 degrees.
 inline constexpr double kLeastTransversality = 0.03;
-// How much larger a point's size may be when it is told again, as a share of the larger: sizes
-// guide the mesh and need not be exact, but must be a function of the point.
+// How much two answers' sizes at one point may differ, as a share of the larger: sizes guide the
+// mesh and need not be exact, but must be a function of the point.
 inline constexpr double kSameSizeTolerance = 0.1;
 // Added to the first two, as a share of the largest coordinate involved: what rounding alone does
 // to a point far from the origin.

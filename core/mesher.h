@@ -33,7 +33,7 @@ class Mesher {
   // The queries of the next round, or nullptr when the run is over. The batch stays the same, and
   // the pointer valid, until Absorb, Cancel or Fail.
   virtual const QueryBatch* NextBatch() = 0;
-  // The same, for whoever may still need it after Absorb: it lives as long as anyone holds it.
+  // The same, if you need it after Absorb: it lives as long as its pointers.
   virtual std::shared_ptr<const QueryBatch> ShareBatch() {
     const QueryBatch* const batch = NextBatch();
     return batch == nullptr ? nullptr : std::make_shared<const QueryBatch>(*batch);

@@ -8,7 +8,8 @@
 
 namespace stellate::cli {
 
-// `stellate cancel`: ends meshes of a server, whoever made them where the token allows it.
+// `stellate cancel`: ends meshes of a server: the token's own, or those of all owners if it is an
+// administrator's.
 class CancelCommand {
  public:
   explicit CancelCommand(CLI::App& parent);

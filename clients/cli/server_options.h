@@ -16,7 +16,7 @@ class ServerOptions {
   ServerOptions(CLI::App* command, const std::string& default_address);
 
   const std::string& address() const { return address_; }
-  // With the token from its file or from $STELLATE_TOKEN, neither of which `ps` shows.
+  // The token comes from its file or from $STELLATE_TOKEN, so that `ps` does not show it.
   Expected<Credentials> ReadCredentials() const;
 
  private:

@@ -20,7 +20,7 @@ class TopTable {
   void Update(std::vector<MeshStatus> meshes, double now);
 
   // A line of totals, the column titles, and a line a mesh. Each at most `width` columns wide; at
-  // most `height` lines, the last of which says how many meshes have no room. 0: no limit.
+  // most `height` lines; the last line counts the meshes that do not fit. 0: no limit.
   std::vector<std::string> Lines(int width, int height) const;
 
  private:

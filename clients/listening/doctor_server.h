@@ -22,8 +22,8 @@ struct DoctorOptions {
   std::function<bool()> goes_on;                      // asked ten times a second
 };
 
-// Examines until it shall not go on, behind the bounds of a server (server/net/guarded_server.h).
-// kRefused where it cannot listen, or should not.
+// Serves examinations until `goes_on` returns false, behind the bounds of a server
+// (server/net/guarded_server.h). kRefused where it cannot listen, or should not.
 Expected<void> RunDoctor(const DoctorOptions& options);
 
 std::string ToJson(const CheckReport& report);  // as doctor.proto has it, indented

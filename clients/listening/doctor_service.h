@@ -19,7 +19,7 @@ v1::CheckReport ToProto(const CheckReport& report);
 // Examines the oracles of workers that come as to a server (doctor.proto). Any thread may call.
 class DoctorService final : public v1::Stellate::Service, public v1::Doctor::Service {
  public:
-  // `on_report` is told of every examination, one at a time.
+  // `on_report` receives the report of every examination, one at a time.
   DoctorService(std::uint64_t random_seed, std::function<void(const CheckReport&)> on_report);
 
   grpc::Status CreateMesh(grpc::ServerContext* context, const v1::CreateMeshRequest* request,

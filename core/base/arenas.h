@@ -15,7 +15,7 @@ namespace stellate::core {
 // given up stays in memory for good.
 bool WithThreads(int threads, Interruption& interruption, FunctionRef<void()> work);
 
-// Those of this process: as many as were ever in use at once.
+// The arenas of this process: the most that were ever in use at the same time.
 std::size_t ArenaCount();
 
 }  // namespace stellate::core

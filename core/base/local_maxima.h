@@ -9,9 +9,10 @@
 
 namespace stellate::core {
 
-// The greedy choice among things in conflict: each is taken unless a stronger one that it conflicts
-// with was. Found in passes, in each of which all are decided that no open stronger conflict holds
-// up: it needs no order to walk along, and is the same for any number of threads.
+// Makes the greedy choice among things in conflict: each is chosen unless a stronger one in
+// conflict with it is. Works in parallel passes; a pass decides everything that waits for no
+// undecided stronger thing. The choice is the same for any number of threads. Call
+// ChooseLocalMaxima.
 //
 // visit_stronger(i, visit) calls visit(j) for each stronger conflict j of i, until that returns
 // false; "stronger" is a strict order.

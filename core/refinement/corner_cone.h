@@ -7,9 +7,9 @@
 
 namespace stellate::core {
 
-// What the walls that meet in a corner leave of its tangent space, by their conormals alone. Where
-// there are K of them, which are independent, each has a facet of it. Where there are more, as at
-// an octahedron's corner, or where a level set passes through the corner of a box, some may not.
+// The cone that the walls at a corner leave of its tangent space, from their conormals. K
+// independent walls have a facet of it each. Where more walls meet, as at an octahedron's corner,
+// or where a level set passes through the corner of a box, some may have none.
 inline constexpr int kMostAtCorner = 16;
 template <int K>
 struct CornerCone {
@@ -18,7 +18,7 @@ struct CornerCone {
     Eigen::Matrix<double, K, 1> along;  // unit
     WallSet walls;                      // that it is on
   };
-  std::vector<Ray> rays;  // none: M has no more than the corner itself there
+  std::vector<Ray> rays;  // none: M is only the corner there
   WallSet walls = 0;      // those that have a facet of it
   // It has an inside, and K - 1 walls meet along each ray.
   bool is_simple = false;

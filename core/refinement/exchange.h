@@ -5,9 +5,9 @@
 
 namespace stellate::core {
 
-// Another list of simplices takes the place of one, in a round that has added and removed some
-// already: says what it does in all. All are K+1 ascending ids each; `before` is the list that
-// `added` and `removed` lead to.
+// Composes a round's change with the replacement of `before` by `after`. `added` and `removed` come
+// in as the change that led to `before`, and go out as the change that leads to `after`. All are
+// K+1 ascending ids each.
 template <int K>
 void ExchangeSimplices(const std::vector<std::uint32_t>& before,
                        const std::vector<std::uint32_t>& after, std::vector<std::uint32_t>* added,

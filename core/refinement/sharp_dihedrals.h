@@ -7,7 +7,7 @@
 
 namespace stellate::core {
 
-// Sharp dihedral angles of tetrahedra, k = 3: simplices may be no slivers and still have some. An
+// Sharp dihedral angles of tetrahedra, k = 3, which simplices may have without being slivers. An
 // angle is sharp if its cosine is larger than `cosine`, and no walls meet as sharply along its edge
 // themselves.
 

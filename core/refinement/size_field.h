@@ -9,12 +9,16 @@
 
 namespace stellate::core {
 
-// How large the simplices of each star may be: epsilon, or less where the size is graded
-// (Criteria::size_rate, max_deviation). Then the bound follows a local size of each vertex: what
-// the client gives, or the local feature size that the sample shows.
+// The bound of rule R1 at each star: epsilon, or less where the size is graded
+// (Criteria::size_rate, max_deviation). A graded bound follows a local size of each vertex: the
+// client's, or an estimate of the local feature size from the sample. The curvature of the boundary
+// within M counts like M's.
 //
-// Sizes are by star; all lengths. At the boundary of M that counts too: its curvature within M is
-// seen as M's is.
+//   sizes.Look(complex, changed_stars);      // after each round
+//   if (sizes.NeedsSpreading(complex, false)) sizes.Spread(complex);
+//   sizes.BoundAt(complex, star);
+//
+// Sizes are by star; all are lengths.
 template <int K>
 class SizeField {
  public:
@@ -22,30 +26,30 @@ class SizeField {
 
   bool is_estimated() const { return is_graded_ && !is_given_; }
 
-  // What the client gives, of the next vertex.
+  // Appends the client's size at the next vertex.
   void AppendGiven(double size) { given_.push_back(size); }
-  // By vertex, or nullptr where the client gives none.
+  // The client's sizes by vertex, or nullptr.
   const double* given() const { return is_given_ ? given_.data() : nullptr; }
 
-  // Estimates anew what is seen from `stars`, which are new or changed.
+  // Estimates the sizes at `stars`, which are new or changed.
   void Look(const StarComplex<K>& complex, const std::vector<std::uint32_t>& stars);
   // Makes the estimates 1-Lipschitz over all stars.
   void Spread(const StarComplex<K>& complex);
-  // Whether they should be spread: when the sample has grown much since that was last done, and,
-  // if there is nothing else to do, when it has changed at all.
+  // Whether to call Spread: if the sample has grown much since the last call, or, if there is
+  // nothing else to do, if it has changed at all.
   bool NeedsSpreading(const StarComplex<K>& complex, bool nothing_else_to_do) const;
 
-  // R1 of a star: its circumradii must not be larger.
+  // The largest circumradius that R1 allows at a star.
   double BoundAt(const StarComplex<K>& complex, std::uint32_t star) const;
   // The same where the local size is `size`.
   double BoundFor(double size) const;
-  // No bound is below.
+  // The least bound anywhere.
   double FinestBound() const;
 
-  // The largest circumradius of a star over the local feature size that the sample shows there,
-  // even where sizes are given: those need not be local feature sizes.
+  // The largest ratio of a star's circumradius to the local feature size estimated there, even
+  // where the client gives sizes, since those need not be local feature sizes.
   double MaxRadiusOverSize(const StarComplex<K>& complex);
-  // Vertices whose given size asks for a bound below the finest.
+  // Counts vertices whose given size asks for a bound below the finest.
   std::uint64_t CountTooFine() const;
 
  private:
@@ -59,7 +63,7 @@ class SizeField {
   std::vector<double> seen_;       // the local feature size seen from the star
   std::vector<double> spread_;     // the same, 1-Lipschitz over the stars, when last spread
   std::uint32_t spread_over_ = 0;  // stars then
-  bool is_spread_ = false;         // nothing was seen anew since
+  bool is_spread_ = false;         // no estimate has changed since
 };
 
 STELLATE_DECLARE_CLASS(SizeField)

@@ -12,15 +12,15 @@
 
 namespace stellate::core {
 
-// What M looks like between the sample points, guessed at no query cost: at each point p a graph
-// over its tangent space,
+// Estimates M between the sample points, without queries: at each point p by a graph over its
+// tangent space,
 //
 //   y(u) = p + T_p u + N_p(u),   u in R^K,   N_p a polynomial of degrees 2 and 3,
 //
-// fitted to the places and the tangent spaces of p's neighbours in the star. The graphs of the
-// nearest points are blended by weights that vanish before a graph drops out, so the guessed M has
-// no seams: where it is off it is off smoothly, and what is well spaced on it is well spaced on M.
-// Good enough to plan by, never to mesh by: what is planned on it is asked for.
+// fitted to the positions and the tangent spaces of p's neighbours in the star. The graphs of the
+// nearest points are blended by weights that vanish before a graph drops out, so the estimate has
+// no seams: its error is smooth, and points well spaced on it are well spaced on M. Use it to plan
+// queries; never mesh its points.
 template <int K>
 class Surrogate {
  public:

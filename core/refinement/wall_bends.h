@@ -8,7 +8,7 @@
 
 namespace stellate::core {
 
-// How a wall bends between two neighbouring vertices on it that are on no other wall.
+// The bend of a wall between two neighbouring vertices that are on no other wall.
 struct WallBend {
   int wall = 0;
   double degrees = 0;     // between the conormals at the two
@@ -19,14 +19,15 @@ struct WallBend {
   double size_to_take() const { return 0.4 * radius(); }
 };
 
-// Of all whose conormals differ by more than errors may explain, the one of the least radius; not
-// between a vertex that is alone on its piece (LoneVertex) and one that is not. `far`: as of that.
+// Returns the bend of least radius among those that exceed the errors of conormals; never one
+// between a vertex that is alone on its piece (LoneVertex) and one that is not. `far`: as for
+// LoneVertex.
 template <int K>
 std::optional<WallBend> SharpestBend(const StarComplex<K>& complex, double far);
 
-// A vertex on one wall alone that has no neighbour on the same piece of it within `far`: that piece
-// is so small that all of it is too near to its first vertex. A neighbour on another sheet of the
-// wall is none: it faces away, or lies far off the wall's tangent space.
+// Returns a vertex on only one wall that has no neighbour on the same piece of it within `far`: all
+// of that piece is too near to its first vertex. A neighbour on another sheet of the wall does not
+// count: it faces away, or lies far off the wall's tangent space.
 template <int K>
 std::optional<std::uint32_t> LoneVertex(const StarComplex<K>& complex, double far);
 
@@ -36,7 +37,7 @@ struct NearCorners {
   double distance = 0;
 };
 
-// Of all pairs of corners, the nearest to each other.
+// Returns the pair of corners nearest to each other.
 template <int K>
 std::optional<NearCorners> NearestCorners(const StarComplex<K>& complex);
 

@@ -6,8 +6,8 @@
 
 namespace stellate::core {
 
-// A round's batch, asked in parts because the client takes no more at once. The answers come
-// together again as if it had been asked whole, so that the mesh does not depend on the cut.
+// Cuts a round's batch into parts, where the client bounds the size of a batch, and joins their
+// answers. The mesh does not depend on the cut.
 class BatchParts {
  public:
   // most: queries a part, > 0
@@ -16,9 +16,9 @@ class BatchParts {
   QueryBatch& part() { return part_; }
   bool is_last() const { return first_ + part_.size() == whole_.size(); }
 
-  // The answers to all parts so far and to part(), which they answer and have been checked against.
+  // Returns the answers to all parts so far, with `answers` to part(), which have been checked.
   Answers With(const Answers& answers) const;
-  // Keeps them and goes on to the next part.
+  // Keeps the answers to part() and goes to the next one.
   void Take(const Answers& answers);
 
  private:

@@ -10,10 +10,10 @@
 
 namespace stellate::core {
 
-// When to ask whether M is smooth where rules keep failing.
+// Decides when to test whether M is smooth where rules keep failing (CreaseProbe).
 class CreaseWatch {
  public:
-  // A star on the advancing front was mended since the last round.
+  // Call it when a star on the advancing front was fixed since the last round.
   void NoteFrontMoved() { front_moved_ = true; }
   // Whether no round of late has left much less than `left` violations. Called once a round;
   // judges_all: R3 and R4 are among them. After it was so, it is so again much later.

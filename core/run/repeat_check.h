@@ -9,13 +9,13 @@
 
 namespace stellate::core {
 
-// Asks for the closest points of a few answered points once more: a closest-point map leaves points
-// of M where they are, and their sizes as they were told.
+// Queries the closest points of a few answers again: a closest-point map must leave points of M
+// where they are, with the same sizes.
 class RepeatCheck {
  public:
   explicit RepeatCheck(double epsilon) : epsilon_(epsilon) {}
 
-  // Keeps the first of the answers that were found, to be asked for again.
+  // Keeps the first answers that were found, to be queried again.
   void Sample(const AnsweredPoints& answers);
   bool has_questions() const { return points_.cols() > 0; }
   QueryBlock Questions() const;
@@ -27,7 +27,7 @@ class RepeatCheck {
  private:
   double epsilon_;
   Eigen::MatrixXd points_;  // d x m
-  Eigen::VectorXd sizes_;   // m, as told first; or empty
+  Eigen::VectorXd sizes_;   // m, as first answered; or empty
 };
 
 }  // namespace stellate::core

@@ -7,11 +7,11 @@
 
 namespace stellate::core {
 
-// The points whose closest points a run begins with, d x n: the client's seeds, or those that cover
-// the box, or others drawn from it.
+// Returns the points whose closest points a run begins with, d x n: the client's seeds, or seeds
+// that cover the box, or random points of it.
 Eigen::MatrixXd SeedsOf(const Specification& spec);
 
-// That none of `count` seeds was found, for people.
+// Explains that none of `count` seeds was found, for people.
 std::string WhyNoSeeds(const Specification& spec, Eigen::Index count);
 
 }  // namespace stellate::core

@@ -10,27 +10,28 @@
 
 namespace stellate::core {
 
-// Answers that were not inserted are known points of M all the same: where the finished mesh has
-// nothing near one, refinement goes on from there.
+// Collects answers that were not inserted. They are known points of M: where the finished mesh is
+// far from one, refinement continues from it.
 class SparePoints {
  public:
   explicit SparePoints(int d) : d_(static_cast<std::size_t>(d)) {}
 
-  // Keeps what was answered and not used; `used` by candidate.
+  // Keeps the answers that are not `used` (by candidate).
   void Keep(const AnsweredPoints& answers, const std::vector<std::uint8_t>& used);
-  // Keeps a point of M for one that M ends at, if it was asked for on one wall.
+  // Keeps a point of M as one where M ends, if the query was for one wall.
   void KeepEnd(const AnsweredPoints& answers, Eigen::Index c);
-  // Those that the sample covers nowhere near, d each.
+  // Returns the points that are far from the sample, d each.
   template <int K>
   std::vector<double> Uncovered(const StarComplex<K>& complex) const;
 
-  // Of `points`, d each, one of those that lie together: to be asked for with all that inserting
-  // them needs, d x n. Empty if there are none, or if that was done so often that it does not help.
+  // Returns one representative of each cluster of `points` (d each), d x n, to be queried with
+  // tangents and sizes. Empty if there are none, or if this was done so often that it does not
+  // help.
   template <int K>
   Eigen::MatrixXd Choose(const std::vector<double>& points, const StarComplex<K>& complex,
                          double epsilon);
 
-  // The same of points on walls, of each wall one of those that lie together.
+  // The same for points on walls, by wall.
   PlannedPoints ChooseOnWalls(const PointsOnWalls& points, double epsilon);
 
   // To and from a certificate, d each.

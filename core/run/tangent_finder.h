@@ -9,7 +9,7 @@
 
 namespace stellate::core {
 
-// Tangent spaces for clients that cannot give them (Sec. 5.3.1): the derivative of the
+// Finds tangent spaces for oracles that do not give them (Sec. 5.3.1). The derivative of the
 // closest-point map at y on M is the projection on T_yM, so differences of closest points along a
 // few directions span it. With a guess (the tangent basis of a nearby sample point) k directions
 // do, else k + 4 random ones, whatever d is: 2k closest points a vertex.

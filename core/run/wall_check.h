@@ -8,9 +8,9 @@
 
 namespace stellate::core {
 
-// Whether the answers about walls agree with those about M, by a few points of each wall: these are
-// on M and on the wall, and their conormals point out of it, turned by less than does harm. Of
-// clearances it goes by the signs alone.
+// Checks whether the answers about walls agree with those about M, by a few points of each wall:
+// they must be on M and on the wall, and their conormals must point outward, turned by less than
+// does harm. Of clearances only the signs are used.
 class WallCheck {
  public:
   // epsilon: as the client gave it, length.

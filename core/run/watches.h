@@ -9,18 +9,19 @@
 
 namespace stellate::core {
 
-// What would go on without end: a manifold that leaves the client's box, and rounds that mend as
-// much as they break.
+// Detect runs that would not end: a manifold that leaves the client's box, and rounds that break as
+// many simplices as they fix.
 
 class BoxWatch {
  public:
   BoxWatch(const std::optional<BoundingBox>& box, double epsilon) : box_(box), epsilon_(epsilon) {}
 
-  // Looks at the vertices that came since the last call, of all `count`, d numbers each.
+  // Takes all `count` vertices, d numbers each, and looks at those that are new since the last
+  // call.
   void Look(const double* points, std::uint32_t count);
-  // Whether they go on outside for longer than a box that is merely too small explains.
+  // Whether the vertices outside are more than a box that is merely too small explains.
   bool has_left() const;
-  // That, for people. REQUIRES: has_left().
+  // Explains it, for people. REQUIRES: has_left().
   std::string WhyStopped() const;
   // Warns of vertices outside.
   void Warn(Certificate* certificate) const;
@@ -37,16 +38,16 @@ class StallWatch {
  public:
   explicit StallWatch(int k) : k_(k) {}
 
-  // A star on the advancing front was mended since the last round.
+  // Call it when a star on the advancing front was fixed since the last round.
   void NoteFrontMoved() { front_moved_ = true; }
-  // Whether the last rounds have mended little that their own points did not break again. Called
-  // once a round: `left` violations are known, and of R3 and R4 only if `judges_all`.
+  // Whether the last rounds have fixed little that their own points did not break again. Call it
+  // once a round. `left`: known violations; of R3 and R4 only if `judges_all`.
   bool HasStalled(std::uint64_t left, bool judges_all);
-  // Whether after many rounds most of the `stars` still break R1 or R2, `bad` of them: a front
-  // would be a small part of the mesh by then. Called once a round.
+  // Whether after many rounds most of the `stars` still break R1 or R2 (`bad` of them): a front
+  // would be a small part of the mesh by then. Call it once a round.
   bool IsHopeless(std::uint64_t bad, std::uint64_t stars);
-  // True once where so many rounds have passed without a step of the front, whatever they mended,
-  // that what can never be mended should be looked for. Called once a round, before HasStalled.
+  // True once so many rounds have passed without a step of the front that violations that cannot be
+  // fixed should be searched for. Call it once a round, before HasStalled.
   bool ShouldLookForLostCauses();
 
  private:

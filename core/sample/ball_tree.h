@@ -11,12 +11,17 @@
 
 namespace stellate::core {
 
-// Points of R^d, each with a radius of influence, searched by distance alone: it works alike in
-// any d. Used for "whose star can a new point cut?" (influence 2 R_max) and "what is near?".
+// A spatial index of points of R^d, each with a radius of influence, for any d. Use it to find the
+// stars that a new point can cut (influence 2 R_max), and the points near a point:
 //
-// A binary tree of balls over leaves of a few points. Each node knows the ball around its points
-// and its outreach: the largest distance from its centre at which one of its points still has
-// influence. Grown by insertion, rebuilt balanced whenever it has grown fourfold: O(log n) a point.
+//   BallTree tree(d, &coordinates);
+//   tree.Insert(influence);                     // the next point of `coordinates`
+//   tree.Gather(q, radius, &ids);               // whose influence comes within radius of q
+//   tree.ForEachInfluencing(q, [&](std::uint32_t id) { ... });
+//
+// It is a binary tree of balls over leaves of a few points. Each node has the ball around its
+// points and its outreach, the largest distance from its centre at which one of its points has
+// influence. It is rebuilt balanced whenever it has grown fourfold: O(log n) a point.
 //
 // Deterministic. Queries are const and may run in parallel.
 class BallTree {
@@ -24,7 +29,7 @@ class BallTree {
   // `coordinates` holds the points, d each, by id; borrowed, may grow and move between calls.
   BallTree(int d, const std::vector<double>* coordinates) : d_(d), coordinates_(coordinates) {}
 
-  // A copy that searches a copy of the points.
+  // Copies a tree, to search a copy of its points.
   BallTree(const BallTree& other, const std::vector<double>* coordinates) : BallTree(other) {
     coordinates_ = coordinates;
   }
@@ -34,26 +39,26 @@ class BallTree {
   // Adds the point with the next id, size().
   void Insert(double influence);
 
-  // Where what is built is parted: by the number of points, so that insertion keeps it flat, or at
-  // the middle of their extent, so that balls shrink as fast as can be.
+  // Where Assign halves points: by their number, so that insertion keeps the tree flat, or at the
+  // middle of their extent, so that balls are as small as possible.
   enum class Halving { kNumber, kExtent };
   // Makes it the tree of the points 0 to influences.size() - 1, built in parallel.
   void Assign(std::vector<double> influences, Halving halving = Halving::kNumber);
 
-  // All influences anew, by id.
+  // Replaces all influences, by id.
   void SetInfluences(std::vector<double> influences);
 
-  // Points that lie together: those of a leaf, in the ball around its centre.
+  // The points of a leaf, and the ball around them.
   struct Bunch {
     const std::uint32_t* ids;
     std::uint32_t count;
     const double* centre;
     double radius;
   };
-  // Every point is in one, and bunches that follow each other are mostly near each other.
+  // Every point is in one bunch; consecutive bunches are mostly near each other.
   std::vector<Bunch> Bunches() const;
-  // Appends the points whose influence comes within `radius` of q, and such as only rounding keeps
-  // out, in no meaningful but a fixed order. Without influence: the points within `radius`.
+  // Appends the points whose influence comes within `radius` of q, in a fixed but arbitrary order.
+  // May append others that only rounding excludes. Without influence: the points within `radius`.
   void Gather(const double* q, double radius, std::vector<std::uint32_t>* ids) const {
     if (!nodes_.empty()) Gather(0, q, radius, ids);
   }
@@ -62,7 +67,8 @@ class BallTree {
     Gather(bunch.centre, bunch.radius + radius, ids);
   }
 
-  // Growth takes effect at once; shrinking makes searches faster after Refit, never different.
+  // A larger influence takes effect immediately; a smaller one makes searches faster after Refit.
+  // The results are the same.
   void SetInfluence(std::uint32_t id, double influence);
   void Refit();
 
@@ -74,8 +80,8 @@ class BallTree {
     Influencing(0, SquaredDistance(q, Centre(0), d_), q, visit);
   }
 
-  // Visits points roughly nearest first. `radius()` is asked again and again and may shrink;
-  // visit(id, squared distance) is called for the points within it.
+  // Calls visit(id, squared distance) for the points within `radius()`, roughly nearest first.
+  // `radius()` is called repeatedly, and may shrink meanwhile.
   template <typename Radius, typename Visit>
   void VisitNear(const double* q, Radius&& radius, Visit&& visit) const {
     if (nodes_.empty()) return;
@@ -95,11 +101,11 @@ class BallTree {
     return !nodes_.empty() && AnyWithin(0, SquaredDistance(q, Centre(0), d_), q, radius);
   }
 
-  // Room for one part in `parts` more points, and little more, after Assign.
+  // After Assign: fits the capacity to one part in `parts` more points.
   void LeaveRoom(std::size_t parts);
 
-  // Points in the order of their places are mostly near the ones before them: handled so, they find
-  // in the cache what those have touched.
+  // Process points in the order of their places: each is mostly near the one before it, and finds
+  // what that touched in the cache.
   std::uint32_t PlaceOf(std::uint32_t id) const {
     std::uint32_t node = leaf_of_[id];
     while (node >= built_nodes_) node = nodes_[node].parent;
@@ -122,8 +128,8 @@ class BallTree {
   static constexpr std::size_t kBuiltLeaf = 8;  // points of a leaf at most, when built
   static constexpr std::size_t kRebuild = 4;
   static constexpr std::uint32_t kNone = 0xffffffffu;
-  // More than rounding can take from a distance in R^d, d up to thousands: no point is overlooked
-  // at the very border of a ball.
+  // Exceeds the rounding error of a distance in R^d, d up to thousands: no point at the border of a
+  // ball is missed.
   static constexpr double kRounding = 1 + 1e-12;
 
   struct Node {

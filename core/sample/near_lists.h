@@ -6,12 +6,12 @@
 
 namespace stellate::core {
 
-// For each of many points the others that are near it. Built in parallel; the same for any number
-// of threads.
+// Lists, for each of many points, the others that are near it. Built in parallel; the same for any
+// number of threads.
 class NearLists {
  public:
-  // `points`: d each. Near is what lies nearer than `radius`, or than that share of it that is the
-  // smaller of the two points': `shares` is by point, or empty.
+  // `points`: d each. Two points are near if their distance is below `radius`, times the smaller of
+  // their `shares` if these are given (one a point).
   NearLists(const std::vector<double>& points, int d, double radius,
             const std::vector<double>& shares = {});
 

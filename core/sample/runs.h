@@ -9,12 +9,12 @@
 
 namespace stellate::core {
 
-// Points in an order in which neighbours mostly follow each other, cut into runs that lie together:
-// what is near them is searched for once a run, instead of once a point.
+// Cuts points, in an order in which neighbours mostly follow each other, into runs of near points.
+// Search for what is near them once a run, instead of once a point.
 class Runs {
  public:
-  // `points`: d each. The points of a run lie within `reach` of its first, or within that share of
-  // it that is the first's: `shares` is by point, or empty.
+  // `points`: d each. The points of a run lie within `reach` of its first, times the first's share
+  // if `shares` are given (one a point).
   Runs(std::span<const double> points, int d, double reach, std::span<const double> shares = {});
 
   std::size_t count() const { return radii_.size(); }
@@ -33,8 +33,8 @@ class Runs {
   std::vector<double> radii_;
 };
 
-// Such points, searched by distance: a tree of the runs alone, much cheaper to build than one of
-// the points.
+// A spatial index of such points by a ball tree of the runs, much cheaper to build than one of the
+// points.
 class RunTree {
  public:
   // `points` as above; borrowed.
@@ -43,8 +43,8 @@ class RunTree {
   RunTree& operator=(const RunTree&) = delete;
 
   const Runs& runs() const { return runs_; }
-  // Appends the points within `radius` of q, in no meaningful but a fixed order, and such as only
-  // rounding keeps out.
+  // Appends the points within `radius` of q, in a fixed but arbitrary order. May append others that
+  // only rounding excludes.
   void Gather(const double* q, double radius, std::vector<std::uint32_t>* ids) const;
 
  private:

@@ -28,7 +28,7 @@ class WallProbe {
   // The laws of one wall at points of its face; gives those of them that lie in M.
   Eigen::MatrixXd One(int wall, const Eigen::MatrixXd& found);
   Eigen::MatrixXd OnManifold(int wall, const Eigen::MatrixXd& found);
-  // Looks between samples on both sides for where a wall of which no point is found is zero.
+  // Bisects between samples on both sides of each wall that has no known point.
   bool Crosses(int wall);
   // How the wall's value changes along M, k x n.
   Eigen::MatrixXd Slopes(int wall, const Eigen::MatrixXd& y, const std::vector<Basis>& bases);

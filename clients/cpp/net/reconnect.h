@@ -24,7 +24,7 @@ bool IsTransient(const grpc::Status& status);
 Error Explain(const grpc::Status& status, bool reconnecting);
 
 // The pauses between attempts: 0.1 s, doubled each time up to 5 s, each shortened at random by up
-// to half, so that the clients of a server that comes back do not all come at once.
+// to half, so that the clients of a server that comes back do not all come together.
 class Backoff {
  public:
   explicit Backoff(std::uint64_t random_seed) : random_(random_seed) {}

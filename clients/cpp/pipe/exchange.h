@@ -32,7 +32,7 @@ class StopSignal {
 
   Descriptor event_;
   std::atomic<std::chrono::steady_clock::time_point> deadline_;
-  std::stop_callback<std::function<void()>> callback_;  // last: it may be called at once
+  std::stop_callback<std::function<void()>> callback_;  // last: it may be called immediately
 };
 
 // Writes `question` and at the same time reads, until `take` is content with what came; `take` is

@@ -17,7 +17,7 @@ class AskedOracle final : public Oracle {
  public:
   using Stream = grpc::ServerReaderWriter<v1::ServeOracleResponse, v1::ServeOracleRequest>;
 
-  // At most `max_chunk` queries at once; 0: as many as a message should have.
+  // At most `max_chunk` queries in a chunk; 0: as many as a message should have.
   AskedOracle(Stream& stream, const v1::MeshSpec& spec, std::uint32_t max_chunk);
 
   int dimension() const override { return static_cast<int>(spec_.dimension()); }
@@ -40,7 +40,7 @@ class AskedOracle final : public Oracle {
   Eigen::MatrixXd Clearances(const Eigen::MatrixXd& points) override;
   Eigen::MatrixXd Conormals(const Eigen::MatrixXd& points, const Walls& face) override;
 
-  // The worker failed, or is gone: there is nobody to ask.
+  // The worker failed, or has left: no query can be answered.
   bool lost() const { return lost_; }
 
  private:

@@ -8,7 +8,7 @@
 
 namespace stellate::client {
 
-// What a server is asked for: options of which nothing is left to be chosen.
+// What a server is asked for: options without any that are still to be chosen.
 struct Request {
   MeshOptions options;
   std::string epsilon_reason;  // empty where epsilon was given
@@ -18,7 +18,7 @@ struct Request {
 // none is named.
 Expected<Request> Settle(Oracle& oracle, const MeshOptions& options);
 
-// Takes an epsilon that was chosen, and tells of it.
+// Sets the epsilon that was chosen, and reports it.
 void Take(const ChosenEpsilon& chosen, Request* request);
 
 // The name of a new mesh. Not tried again when it fails: whether the server made the mesh would not

@@ -36,7 +36,7 @@ std::unique_ptr<SimplexSet> MakeSimplexSet(int k);
 // so that what a broken stream leaves undone can be sent again from revision() on.
 class DeltaMesh {
  public:
-  // At most `most_bytes` of it are held at once: half of what this machine has, unless it is said.
+  // At most `most_bytes` of it are in memory: half of what this machine has, unless it is said.
   // Errors: a k that this client cannot hold.
   static Expected<DeltaMesh> Create(int k, int d, std::size_t most_bytes = HalfOfTheMemory());
 
@@ -45,7 +45,7 @@ class DeltaMesh {
   Expected<void> Absorb(v1::DeltaChunk&& chunk);
   // The last complete revision; 0: none yet.
   std::uint64_t revision() const { return revision_; }
-  // Drops everything: the server begins anew.
+  // Drops everything: the server starts from the empty mesh.
   void Reset();
   // Takes a part of a download, which is never sent again. Errors: what does not follow on the
   // parts before it.

@@ -9,7 +9,7 @@ namespace stellate::client {
 
 // What ChooseEpsilon says of a Check that was made.
 Expected<ChosenEpsilon> ChooseEpsilon(CheckReport report);
-// What an automatic epsilon goes on with after a mesh of which this is the report; none: a smaller
+// The next automatic epsilon after a mesh with this report; none: a smaller
 // one would mend nothing.
 std::optional<ChosenEpsilon> Finer(const Report& report);
 

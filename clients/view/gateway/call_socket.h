@@ -16,7 +16,7 @@ namespace stellate::view {
 
 using HttpRequest = boost::beast::http::request<boost::beast::http::string_body>;
 
-// What all sockets share. The thread of `io` alone, but for the stub.
+// What all sockets share. Only the thread of `io` may use it, except the stub.
 struct Shared {
   explicit Shared(std::uint16_t port) : keys(port) {}
 

@@ -11,7 +11,7 @@ namespace stellate::view {
 // why.
 Expected<std::string_view> Page();
 
-// The page with a recording inside: it shows that alone, and connects to nobody. JSON,
+// The page with a recording inside: it shows only that, and makes no connection. JSON,
 // {"replies": [{"method": "WatchMesh", "frames": [base64 of each message]}, ...]}, a reply for each
 // call that the page makes: WatchMesh, GetMesh, and DownloadMesh with its "revision".
 Expected<std::string> PageWith(std::string_view recording);

@@ -18,7 +18,7 @@ std::string Proof(std::string_view secret, std::string_view who, std::string_vie
 // In a time that does not tell where they differ.
 bool Same(std::string_view a, std::string_view b);
 
-// The secret of whoever serves pages at a port of this user's. One that was killed leaves it
+// The secret of the process that serves pages at a port of this user. One that was killed leaves it
 // behind, so that its successor at the same port is known to the pages that are open; one that ends
 // well takes it away. Without a file (port 0, or nowhere to put it) it lives as long as this.
 class KeptSecret {

@@ -15,7 +15,8 @@ namespace stellate {
 
 struct CommandOptions {
   std::string command;  // for /bin/sh -c
-  int processes = 1;    // of it, each with a batch of its own; as many threads may ask at once
+  int processes =
+      1;  // of it, each with a batch of its own; as many threads may call the oracle in parallel
 
   // Where the command says them too, they have to be the same.
   std::optional<int> dimension, ambient_dimension;

@@ -26,7 +26,7 @@ struct DownloadOptions {
   // of a mesh that is over has a report.
   std::uint64_t revision = 0;
   // A server that goes away is waited for so long, and the download resumed where it broke off;
-  // 0: not at all. One that cannot be reached in the first place is an error at once.
+  // 0: not at all. A server that cannot be reached at the start is an error immediately.
   double reconnect_seconds = 180;
   std::function<void(const Outage&)> on_outage;
   double keepalive_seconds = 4;  // as in MeshOptions

@@ -25,7 +25,7 @@ const char* MeshStateName(MeshState state);  // "WAITING", ...
 // A mesh on a server, without its geometry.
 struct MeshStatus {
   std::string name;   // "meshes/<id>": who knows it may serve and watch the mesh
-  std::string label;  // free text of whoever made it
+  std::string label;  // free text of the client that created it
   std::string owner;  // whose it is, where the token is an administrator's
   MeshState state = MeshState::kUnknown;
   int dimension = 0, ambient_dimension = 0;
@@ -37,10 +37,10 @@ struct MeshStatus {
   bool over() const { return state != MeshState::kWaiting && state != MeshState::kRunning; }
 };
 
-// Watches over a server: one connection, opened anew by itself when it is lost.
+// Monitors a server over one connection, which is opened again automatically when it is lost.
 class Monitor {
  public:
-  // kRefused: credentials that cannot be used. Whether anybody is there shows in the calls.
+  // kRefused: credentials that cannot be used. Whether the server exists shows in the first call.
   static Expected<Monitor> Connect(const std::string& server, const Credentials& credentials = {});
   Monitor(Monitor&&) noexcept;
   ~Monitor();

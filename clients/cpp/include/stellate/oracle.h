@@ -50,7 +50,7 @@ class OracleError : public std::runtime_error {
 // A basis of k vectors of R^d travels as a column of d k numbers: entry i*k + a is coordinate i of
 // vector a. Whole batches come in, one query a column.
 //
-// With several workers the methods are called from several threads at once. What they throw ends
+// With several workers, several threads call the methods in parallel. What they throw ends
 // the run and reaches the caller of MeshManifold as it is.
 class Oracle {
  public:
@@ -104,7 +104,7 @@ class Oracle {
   virtual Answer FacePoint(const Eigen::MatrixXd& /*x*/, const Walls& /*face*/) {
     throw std::logic_error("this oracle has no walls");
   }
-  // The walls' values g_i at points (d x n), walls() x n, of which the sign counts.
+  // The walls' values g_i at points (d x n), walls() x n. Only the sign counts.
   virtual Eigen::MatrixXd Clearances(const Eigen::MatrixXd& /*points*/) {
     throw std::logic_error("this oracle has no walls");
   }

@@ -11,7 +11,7 @@ namespace stellate::oracles::files {
 // Points and polygons as they come from a file.
 class Soup {
  public:
-  // What polygons are told apart by in messages: "line" or "face", and a number.
+  // How messages name a polygon: "line" or "face", and a number.
   explicit Soup(std::string places) : places_(std::move(places)) {}
 
   void Reserve(size_t points) { points_.reserve(3 * points); }

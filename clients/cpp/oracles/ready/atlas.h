@@ -67,7 +67,7 @@ class Parametrized::Atlas {
 
   std::vector<CheckedChart> charts_;
   Eigen::MatrixXd grid_;       // k x m, parameters
-  std::vector<size_t> owner_;  // m, of which chart
+  std::vector<size_t> owner_;  // m: the chart of each
   int per_side_ = 0;
   std::unique_ptr<const PointTree> tree_;
   double scale_ = 0;  // of M: the unit of lengths

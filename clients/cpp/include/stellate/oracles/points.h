@@ -66,7 +66,7 @@ struct TriangleMeshOptions {
   std::optional<double> bandwidth;  // how far creases are rounded; by default 3 spacings
 };
 
-// The smooth surface in R^3 near a closed mesh of triangles, to be meshed anew.
+// The smooth surface in R^3 near a closed mesh of triangles, to be meshed again.
 //
 // It is a PointCloud through the vertices, and through the middle of triangles that are large:
 // nearer to the surface that was triangulated than the triangles are, where it is smooth. Edges and

@@ -92,7 +92,7 @@ class Solid final : public Clipped {
 //
 // Nothing else is needed: tangent spaces, where an oracle has none, and the boundary's outward
 // normals come from differences of nearest points. Where the boundary has corners, or where there
-// are equations for it, take Clipped. Oracles that are not of one manifold are told by the points
+// are equations for it, take Clipped. Oracles of different manifolds are detected by the points
 // where they differ, in a std::runtime_error.
 class ManifoldWithBoundary final : public Oracle {
  public:
