@@ -55,7 +55,8 @@ class Equations:
     ) -> None:
         """`shape`: (m, d)."""
         self.shape, d = shape, str(shape[1])
-        self._f = UserFunction(f, "f", shape[:1], d)
+        why = f"; a manifold of dimension {shape[1] - shape[0]} in R^{d} is given by {d} - {shape[1] - shape[0]} = {shape[0]} equations"
+        self._f = UserFunction(f, "f", shape[:1], d, why)
         self._given = None if jacobian is None else UserFunction(jacobian, "jacobian", shape, d)
         self._exactness = Exactness(about, *box)
         largest = float(max(np.abs(corner).max() for corner in box))

@@ -6,7 +6,7 @@ from typing import Any, Callable
 
 import numpy as np
 
-from .errors import OracleError, StellateError
+from .errors import OracleError, StellateError, add_words
 
 _LINES = 12  # that the exactness of a function is measured along
 _FEWEST = 3  # of them that have to tell it
@@ -18,15 +18,19 @@ _FOURTH_SIZE = np.sqrt(70.0)  # so many times the error of a value
 # The most that values may err by, as a length in shares of the box: a hundred times what points are
 # found to. Single precision errs by some 1e-8, double by 1e-16.
 _INEXACT = 1e-10
+# An error of no more than this share of a value is its own rounding: next to a level, where values are
+# small, it is not there. Densities far from what they are dense in are flat, and all but the level.
+_OWN_ROUNDING = 16 * float(np.finfo(float).eps)
 _ROUNDINGS = 1600 * float(np.finfo(float).eps)  # likewise, of the largest coordinate
 
 
 class UserFunction:
     """A function of a user's, which is checked.
 
-    Shapes without the batch are called rows. An answer of another shape, or in single precision, is
-    an OracleError that says what is right. An exception of the function's own goes on as it is; until
-    it has answered once, words on how it is called are added.
+    Shapes without the batch are called rows. An answer of another shape, in single precision or in
+    whole numbers is an OracleError that says what is right. An exception of the function's own goes on
+    as it is; until it has answered once, words on how it is called are added. Its argument is a copy:
+    what it does there does not reach the solvers, which go on with theirs.
 
     Args:
       f: (n, *asked) -> (n, *row); of one number a row (n,) and (n, 1) are the same.
@@ -34,12 +38,18 @@ class UserFunction:
       asked: letters for what a row of its argument has, such as "d".
       row: the shape of a row of its values, whose whole numbers are insisted on; a letter stands for
         any, and is replaced by what the first answer has.
+      why: a row has to have that shape, for messages.
     """
 
     def __init__(
-        self, f: Callable[[Any], Any], name: str, row: tuple[int | str, ...], asked: str = "d"
+        self,
+        f: Callable[[Any], Any],
+        name: str,
+        row: tuple[int | str, ...],
+        asked: str = "d",
+        why: str = "",
     ) -> None:
-        self._f, self.name, self._asked, self.row = f, name, asked, row
+        self._f, self.name, self._asked, self.row, self._why = f, name, asked, row, why
         self._worked = False
 
     @property
@@ -52,13 +62,13 @@ class UserFunction:
         if not len(x):
             return np.empty((0, *(1 if isinstance(n, str) else n for n in self.row)))
         if self._worked:
-            return self._checked(self._f(x), x.shape)
+            return self._checked(self._f(x.copy()), x.shape)
         try:
-            answer = self._f(x)
+            answer = self._f(x.copy())
         except StellateError:
             raise
         except Exception as error:
-            _add(error, self._called(x.shape))
+            add_words(error, self._called(x.shape))
             raise
         values = self._checked(answer, x.shape)
         self.row, self._worked = values.shape[1:], True
@@ -69,7 +79,7 @@ class UserFunction:
         return (
             f"{self.name} is called with a whole batch at once, an array (n, {self._asked}), here "
             f"{shape}, and returns {_shape('n', *self.row)}{one}, a row for each of its rows: "
-            "x[:, 0] are all first coordinates, x[0] is the first point"
+            f"x[:, 0] are all first coordinates, x[0] is the first point{self._why}"
         )
 
     def _checked(self, answer: Any, asked: tuple[int, ...]) -> np.ndarray:
@@ -82,7 +92,7 @@ class UserFunction:
             for wanted, got in zip((count, *self.row), values.shape)
         )
         if not fits or not real:
-            got = f"shape {values.shape}" if real else type(answer).__name__
+            got = f"shape {values.shape}" if real else _kind(answer, values)
             raise OracleError(
                 f"{self.name} returned {got}; it has to be {_shape(count, *self.row)} for a batch of "
                 f"{count} points, a row each"
@@ -93,6 +103,12 @@ class UserFunction:
             raise OracleError(
                 f"{self.name} returned {values.dtype} numbers; points are found to twelve digits, "
                 "which takes float64 throughout (for a function of jax's say jacobian='jax')",
+                "ORACLE_PRECISION",
+            )
+        if values.dtype.kind in "iu":
+            raise OracleError(
+                f"{self.name} returned {values.dtype} numbers; it has to be smooth, and whole numbers "
+                "have steps: leave out what rounds, such as astype(int) or //",
                 "ORACLE_PRECISION",
             )
         return values.astype(float, copy=False)
@@ -128,11 +144,29 @@ class Exactness:
         if inexact <= max(_INEXACT, _ROUNDINGS * far):
             return
         which = f.name if f.width == 1 else f"{f.name}'s value {value}"
+        self._insist_on_one_value(f, which)
         raise OracleError(
-            f"{which} is exact to {inexact:.1g} of its box only, as neighbouring points show, which is "
+            f"{which} is exact to {inexact:.1g} of its box at best, as neighbouring points show, which is "
             "what single precision does. Points are found to twelve digits, which takes "
             "float64 throughout, within the function as well; what is solved or integrated inside it "
             "takes as many digits",
+            "ORACLE_PRECISION",
+        )
+
+    def _insist_on_one_value(self, f: UserFunction, which: str) -> None:
+        """Raises: OracleError, where f of the same points is not always the same."""
+        random = np.random.default_rng(2)
+        sides = self._upper - self._lower
+        x = self._lower + sides * random.random((_LINES, len(sides)))
+        first, again = f(x), f(x)
+        changed = ~((first == again) | (np.isnan(first) & np.isnan(again))).all(axis=1)
+        if not changed.any():
+            return
+        row = int(np.flatnonzero(changed)[0])
+        raise OracleError(
+            f"{which} is not a function of the point alone: asked twice at {x[row].tolist()} it returned "
+            f"{first[row].tolist()} and {again[row].tolist()}. Fix the seed of what is random in it, and "
+            "average before it is meshed, not in each call",
             "ORACLE_PRECISION",
         )
 
@@ -155,7 +189,8 @@ class Exactness:
             with np.errstate(invalid="ignore", divide="ignore"):
                 error = np.abs((values * _FOURTH[None, :, None]).sum(axis=1)) / _FOURTH_SIZE
                 shares = error * (4 * step) / np.abs(values[:, 4] - values[:, 0])
-            told = np.isfinite(shares)
+            own = _OWN_ROUNDING * np.abs(values).max(axis=1)
+            told = np.isfinite(shares) & (error > own)
             enough = told.sum(axis=0) >= _FEWEST
             if enough.any():
                 usual = [np.median(c[t]) if e else 0.0 for c, t, e in zip(shares.T, told.T, enough)]
@@ -173,16 +208,18 @@ def _points(about: Any, d: int) -> np.ndarray | None:
     return points if right else None
 
 
+def _kind(answer: Any, values: np.ndarray) -> str:
+    """What was returned in place of real numbers."""
+    if values.dtype.kind == "c":
+        return f"{values.dtype} numbers, where real ones are taken"
+    if values.dtype.kind == "b":
+        return (
+            "truth values, where numbers are taken: give the difference in place of the comparison"
+        )
+    if isinstance(answer, np.ndarray):
+        return f"an array of {values.dtype}, where float64 is taken"
+    return type(answer).__name__
+
+
 def _shape(*sides: Any) -> str:
     return f"({', '.join(map(str, sides))}{',' if len(sides) == 1 else ''})"
-
-
-def _add(error: Exception, words: str) -> None:
-    """To the message of somebody else's exception, once; its type stays."""
-    if getattr(error, "_stellate_told", False):
-        return
-    error._stellate_told = True  # type: ignore[attr-defined]
-    if len(error.args) == 1 and isinstance(error.args[0], str) and str(error) == error.args[0]:
-        error.args = (f"{error.args[0]}; {words}",)
-    elif hasattr(error, "add_note"):
-        error.add_note(words)

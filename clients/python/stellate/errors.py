@@ -256,3 +256,14 @@ def _advice(code: grpc.StatusCode, message: str) -> str:
             "with --server"
         )
     return ""
+
+
+def add_words(error: Exception, words: str) -> None:
+    """To the message of somebody else's exception, once; its type stays."""
+    if getattr(error, "_stellate_told", False):
+        return
+    error._stellate_told = True  # type: ignore[attr-defined]
+    if len(error.args) == 1 and isinstance(error.args[0], str) and str(error) == error.args[0]:
+        error.args = (f"{error.args[0]}; {words}",)
+    elif hasattr(error, "add_note"):
+        error.add_note(words)

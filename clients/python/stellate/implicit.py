@@ -61,7 +61,8 @@ class ImplicitManifold:
         thread_safe: bool = False,
     ) -> None:
         for name, function in (("f", f), ("jacobian", jacobian)):
-            if not callable(function) and not isinstance(function, (str, type(None))):
+            named = name == "jacobian" and isinstance(function, (str, type(None)))
+            if not callable(function) and not named:
                 raise InvalidArgument(f"{name} has to be a function, and is {function!r}")
         sizes = np.asarray([dimension, ambient_dimension])
         if sizes.dtype.kind not in "iu" or not 1 <= dimension < ambient_dimension:
@@ -202,6 +203,13 @@ class ImplicitManifold:
         random = np.random.default_rng(1)
         starts = lower + random.random((_LOOKS, self.ambient_dimension)) * (upper - lower)
         before = np.abs(self._equations.values(starts))
+        if not np.isfinite(before).all(axis=1).any():
+            raise OracleError(
+                f"f is not finite at any of {_LOOKS} places of its box, nor of its seeds: at "
+                f"{starts[0].tolist()} it is {self._equations.values(starts[:1])[0].tolist()}. Is the box "
+                "where f is defined, and in its unit?",
+                "ORACLE_NOT_FINITE",
+            )
         y, values, _ = self._descend_to_manifold(starts)
         usable = np.isfinite(values).all(axis=1)
         least = np.abs(values) <= _ZERO * np.nanmedian(before, axis=0)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import threading
+from collections.abc import Iterator
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from .errors import InvalidArgument, NotConverged, OracleError
+from .errors import InvalidArgument, NotConverged, OracleError, add_words
 
 
 @runtime_checkable
@@ -69,13 +71,27 @@ class CheckedOracle:
         self.has_jacobian = callable(getattr(oracle, "jacobian", None))
         self.walls = self._count_walls(oracle)
         self.bounding_box = _box(getattr(oracle, "bounding_box", None))
-        self.seeds = _seeds(getattr(oracle, "seeds", None))
+        seeds = getattr(oracle, "seeds", None)
+        self.seeds = None if seeds is None else points_of(seeds, self.ambient_dimension)
         shared = bool(getattr(oracle, "thread_safe", False))
         self._one_at_a_time = _Turns()
         if shared:
             self._one_at_a_time = contextlib.nullcontext()
 
     _one_at_a_time: contextlib.AbstractContextManager[Any]
+
+    @contextlib.contextmanager
+    def _turn(self, method: str) -> Iterator[None]:
+        """Around a call of the oracle's; numpy does not say whose the arrays are that it protects."""
+        with self._one_at_a_time:
+            try:
+                yield
+            except ValueError as error:
+                if "read-only" in str(error):
+                    add_words(
+                        error, f"the arrays that {method} is given are not its own: copy them"
+                    )
+                raise
 
     def closest_points(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(n, d) -> the closest points (n, d), and where they were found (n,).
@@ -84,7 +100,7 @@ class CheckedOracle:
         """
         if not len(points):
             return _none(points)
-        with self._one_at_a_time:
+        with self._turn("closest_point"):
             try:
                 answer = self._oracle.closest_point(points)
                 found = np.ones(len(points), dtype=bool)
@@ -114,7 +130,7 @@ class CheckedOracle:
         """As closest_points, of a face of a manifold with boundary."""
         if not len(points):
             return _none(points)
-        with self._one_at_a_time:
+        with self._turn("face_point"):
             try:
                 answer = self._oracle.face_point(points, face)
                 found = np.ones(len(points), dtype=bool)
@@ -138,7 +154,7 @@ class CheckedOracle:
         """The points (n, d) where M meets the flats, and where it does (n,)."""
         if not len(centers):
             return _none(centers)
-        with self._one_at_a_time:
+        with self._turn("intersect_flat"):
             try:
                 answer = self._oracle.intersect_flat(centers, bases, radii)
             except NotConverged as error:
@@ -179,7 +195,7 @@ class CheckedOracle:
         count = len(on_manifold)
         values = np.empty((0, *anywhere.shape))
         if count:
-            with self._one_at_a_time:
+            with self._turn(method):
                 answer = getattr(self._oracle, method)(on_manifold, *more)
             all_rows = np.ones(count, dtype=bool)
             values = _numbers(method, answer, (count, *anywhere.shape), all_rows)
@@ -271,7 +287,7 @@ def _whole_number(oracle: Any, name: str) -> int:
     except AttributeError:
         raise InvalidArgument(
             f"{type(oracle).__name__} has no attribute {name}: an oracle needs dimension (k), "
-            "ambient_dimension (d) and closest_point"
+            f"ambient_dimension (d) and closest_point{_instead(oracle)}"
         ) from None
     try:
         as_float = float(value)
@@ -280,6 +296,23 @@ def _whole_number(oracle: Any, name: str) -> int:
     if not as_float.is_integer():
         raise InvalidArgument(f"{name} has to be a whole number, and is {value!r}")
     return int(value)
+
+
+def _instead(given: Any) -> str:
+    """What makes an oracle of something that is none."""
+    if callable(given):
+        return (
+            "; of an equation f(x) = 0 stellate.ImplicitManifold(f, ambient_dimension=, dimension=, "
+            "bounding_box=) makes one, of a parametrization stellate.oracles.Parametrized"
+        )
+    if isinstance(given, np.ndarray):
+        return "; of points stellate.oracles.PointCloud(points, k) makes one"
+    if isinstance(given, (str, os.PathLike)):
+        return (
+            "; of a file of triangles stellate.oracles.TriangleMesh(file) makes one, and "
+            "stellate.manifolds has a few ready"
+        )
+    return ""
 
 
 def _box(box: Any) -> tuple[np.ndarray, np.ndarray] | None:
@@ -294,11 +327,16 @@ def _box(box: Any) -> tuple[np.ndarray, np.ndarray] | None:
     return lower, upper
 
 
-def _seeds(seeds: Any) -> np.ndarray | None:
-    if seeds is None:
-        return None
+def points_of(seeds: Any, d: int) -> np.ndarray:
+    """(m, d), as float64. Raises: InvalidArgument."""
     try:
         array = np.asarray(seeds, dtype=np.float64)
     except (TypeError, ValueError):
         raise InvalidArgument("seeds have to be an array of points (m, d)") from None
+    if array.ndim != 2 or array.shape[1] != d or not len(array):
+        one = f"; a single one is [{seeds!r}]" if array.shape == (d,) else ""
+        raise InvalidArgument(
+            f"seeds have to be points as rows, of the shape (m, {d}), and have the shape "
+            f"{array.shape}{one}"
+        )
     return array

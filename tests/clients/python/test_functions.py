@@ -126,6 +126,76 @@ def test_a_function_of_one_point_is_told_how_it_is_called(taker):
         ask(make(lambda x: x[0] ** 2 + x[1] ** 2 + x[2] ** 2 - 1))
 
 
+@pytest.mark.parametrize(
+    "f, words",
+    [
+        (lambda x: sphere(x) + 0j, "returned complex128 numbers, where real ones are taken"),
+        (lambda x: sphere(x) > 0, "returned truth values, .* in place of the comparison"),
+        (lambda x: sphere(x).astype(object), "returned an array of object, where float64"),
+        (
+            lambda x: (10 * sphere(x)).astype(int),
+            "returned int64 numbers; .* whole numbers have steps",
+        ),
+        (lambda x: sphere(x) * np.nan, "f is not finite at any of 64 places of its box"),
+    ],
+)
+def test_values_that_are_no_smooth_numbers_are_told_by_what_they_are(f, words):
+    with pytest.raises(stellate.OracleError, match=words):
+        ask(implicit(f))
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e-9])
+def test_a_function_that_draws_random_numbers_is_not_called_single_precision(size):
+    random = np.random.default_rng(1)
+    with pytest.raises(
+        stellate.OracleError, match="not a function of the point alone: asked twice"
+    ):
+        ask(implicit(lambda x: sphere(x) + size * random.standard_normal(len(x))))
+
+
+def test_a_density_is_exact_enough_though_it_is_flat_far_from_what_it_is_dense_in():
+    centers = np.random.default_rng(1).standard_normal((50, 3))
+
+    def density(x):
+        return np.exp(-2 * ((x[:, None] - centers) ** 2).sum(axis=2)).mean(axis=1) - 0.02
+
+    box = [-5.0] * 3, [5.0] * 3
+
+    def made(f):
+        return oracles.SignedDistance(f, bounding_box=box)
+
+    near_by = np.full((1, 3), 0.5)
+    made(density).closest_point(near_by)
+    with pytest.raises(stellate.OracleError, match="is exact to"):
+        made(lambda x: density(x.astype(np.float32)).astype(float)).closest_point(near_by)
+
+
+@pytest.mark.parametrize("taker", TAKERS)
+def test_a_function_may_write_into_its_argument(taker):
+    make, f = TAKERS[taker]
+
+    def scribbles(x):
+        value = f(x)
+        x *= 7
+        return value
+
+    x = np.random.default_rng(1).uniform(-1, 1, (20, make(f).ambient_dimension))
+    assert (make(scribbles).closest_point(x) == make(f).closest_point(x)).all()
+
+
+def test_how_many_equations_there_have_to_be_is_said():
+    curve = stellate.ImplicitManifold(sphere, ambient_dimension=3, dimension=1, bounding_box=CUBE)
+    with pytest.raises(
+        stellate.OracleError, match=r"dimension 1 in R\^3 is given by 3 - 1 = 2 equations"
+    ):
+        ask(curve)
+
+
+def test_a_formula_in_words_is_no_function():
+    with pytest.raises(stellate.InvalidArgument, match="f has to be a function, and is 'x - 1'"):
+        implicit("x - 1")
+
+
 def test_an_exception_of_a_function_that_worked_is_left_alone():
     calls = []
 

@@ -117,7 +117,7 @@ def test_queries_cannot_be_scribbled_on():
         return x
 
     chunk = oracle_pb2.QueryChunk(kind=oracle_pb2.QUERY_KIND_CLOSEST_POINT, points=to_wire(POINTS))
-    with pytest.raises(ValueError, match="read-only"):
+    with pytest.raises(ValueError, match="read-only; the arrays that closest_point .*: copy them"):
         answer(CheckedOracle(Odd(closest_point=closest_point)), chunk)
 
 
@@ -171,10 +171,14 @@ def test_keywords_reach_their_fields():
     [
         ({"candidate": 3}, TypeError, "did you mean 'candidates'"),
         ({"qqqq": 3}, TypeError, "known: .*radius_edge_bound"),
+        ({"epsilom": 3}, TypeError, "did you mean 'epsilon'"),
+        ({"checkpint": "x"}, TypeError, "did you mean 'checkpoint'"),
         ({"candidates": -1}, stellate.InvalidArgument, "candidates cannot be -1"),
         ({"candidates": 1.5}, stellate.InvalidArgument, "candidates cannot be 1.5"),
         ({"radius_edge_bound": "two"}, stellate.InvalidArgument, "radius_edge_bound"),
         ({"seeds": "here"}, stellate.InvalidArgument, "seeds"),
+        ({"seeds": [1, 0, 0]}, stellate.InvalidArgument, r"shape \(m, 3\).*one is \[\[1, 0, 0\]\]"),
+        ({"seeds": []}, stellate.InvalidArgument, r"shape \(m, 3\), and have the shape \(0,\)"),
     ],
 )
 def test_bad_keywords(keywords, error, words):
@@ -202,4 +206,20 @@ def test_bad_oracles(changed, words):
 def test_what_is_missing_is_named():
     with pytest.raises(stellate.InvalidArgument, match="int has no attribute dimension"):
         CheckedOracle(3)
+
+
+@pytest.mark.parametrize(
+    "given, words",
+    [
+        (lambda x: x, "ImplicitManifold"),
+        (POINTS, "PointCloud"),
+        ("scan.stl", "TriangleMesh"),
+    ],
+)
+def test_what_makes_an_oracle_of_something_else_is_said(given, words):
+    with pytest.raises(stellate.InvalidArgument, match=words):
+        CheckedOracle(given)
+
+
+def test_a_ready_manifold_is_an_oracle():
     assert isinstance(Sphere(), stellate.Oracle)

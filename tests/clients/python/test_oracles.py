@@ -159,12 +159,14 @@ def constraints(*functions, d=3):
 
 
 WRONG = {
-    "closed": lambda: oracles.TriangleMesh(POINTS, TRIANGLES[1:]),
+    r"not closed: 3 edges .*, as near \[.*\]\. Fill its holes": lambda: oracles.TriangleMesh(
+        POINTS, TRIANGLES[1:]
+    ),
     "triangles have to name points": lambda: oracles.TriangleMesh(POINTS, TRIANGLES + 1),
     "cannot be read": lambda: oracles.TriangleMesh("no such file.obj"),
     "takes a file": lambda: oracles.TriangleMesh(7),
     "not finite": lambda: oracles.PointCloud([[0.0, np.nan]] * 30, 1),
-    "too few": lambda: oracles.PointCloud(np.eye(3), 1),
+    "too few, at least 7 are": lambda: oracles.PointCloud(np.eye(3), 1),
     "whole number from 1 to 2": lambda: oracles.PointCloud(torus_cloud(), 3),
     "has to be positive": lambda: oracles.PointCloud(torus_cloud(), 2, bandwidth=-1),
     "larger bandwidth": lambda: oracles.PointCloud(torus_cloud(), 2, bandwidth=1e-6),
@@ -177,8 +179,8 @@ WRONG = {
     "scale": lambda: oracles.Transformed(TORUS, scale=0),
     "a level set on _Bare needs": lambda: oracles.LevelSet(_Bare(), lambda x: x[:, 0]),
     "leave none": lambda: oracles.LevelSet(TORUS, lambda x: x[:, :2]),
-    "no set of level": lambda: oracles.SignedDistance.of_grid(
-        torus_grid(8) + 9, ([-1.5] * 3, [1.5] * 3)
+    "no set of level 0.*; give level=, between them, such as": lambda: (
+        oracles.SignedDistance.of_grid(torus_grid(8) + 9, ([-1.5] * 3, [1.5] * 3))
     ),
     "4 values an axis": lambda: oracles.SignedDistance.of_grid(
         np.zeros((3, 9)), ([0] * 2, [1] * 2)
@@ -207,6 +209,9 @@ WRONG = {
         [("a", "p", 0.1), ("p", "b", 0.1), ("p", "q", 1), ("q", "s", 1)], GROUND
     ),
     "length > 0": lambda: oracles.Linkage([("a", "p", 0)], GROUND),
+    "a bar is .joint, joint, length., and is .'a', 'p'.": lambda: oracles.Linkage(
+        [("a", "p")], GROUND
+    ),
 }
 
 

@@ -10,7 +10,7 @@ from google.protobuf.descriptor import FieldDescriptor
 
 from .._generated import mesh_pb2 as pb
 from ..errors import InvalidArgument
-from ..oracle import CheckedOracle
+from ..oracle import CheckedOracle, points_of
 from .arrays import to_wire
 
 _WHOLE = {
@@ -30,6 +30,8 @@ _SPEC = {
     "cover_box": "cover_box",
 }
 _SERVING = {"workers", "max_chunk"}  # keywords of stellate.mesh alone
+# Arguments with names of their own, which somebody may have meant.
+_NAMED = {"epsilon", "server", "on_progress", "credentials", "checkpoint", "save", "keep"}
 _AUDITS = {"standard": pb.AUDIT_STANDARD, "thorough": pb.AUDIT_THOROUGH}
 _LIMITS = {field.name for field in pb.MeshLimits.DESCRIPTOR.fields}
 
@@ -66,7 +68,7 @@ def mesh_spec(oracle: CheckedOracle, epsilon: float, criteria: dict[str, Any]) -
         elif name == "audit":
             _set(spec, name, _audit(value))
         elif name == "seeds":
-            spec.seeds.CopyFrom(to_wire(_points(value)))
+            spec.seeds.CopyFrom(to_wire(points_of(value, oracle.ambient_dimension)))
         elif name in _SERVING:
             raise TypeError(f"{name!r} is for who serves the mesh, not for declaring it")
         elif name == "keep":
@@ -99,15 +101,8 @@ def _audit(value: Any) -> int:
     return _AUDITS[value]
 
 
-def _points(seeds: Any) -> np.ndarray:
-    try:
-        return np.asarray(seeds, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InvalidArgument("seeds have to be an array of points (m, d)") from None
-
-
 def _unknown(name: str) -> str:
     known = sorted(_CRITERIA | _LIMITS | set(_SPEC) | _SERVING | {"audit", "seeds"})
-    near = difflib.get_close_matches(name, known, 1)
+    near = difflib.get_close_matches(name, [*known, *_NAMED], 1)
     hint = f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(known)}"
     return f"unknown keyword {name!r}{hint}"

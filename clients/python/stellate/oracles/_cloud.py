@@ -52,8 +52,8 @@ class PointCloud(Projection):
         distinct, which = np.unique(self._points, axis=0, return_inverse=True)
         if len(distinct) <= 2 * terms:
             raise InvalidArgument(
-                f"{len(distinct)} different points are too few: a quadric has {terms} coefficients in "
-                "each direction"
+                f"{len(distinct)} different points are too few, at least {2 * terms + 1} are needed: a "
+                f"quadric has {terms} coefficients in each direction"
             )
         self._tree = tree_of(self._points)
         if bandwidth is None:

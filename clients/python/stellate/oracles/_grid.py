@@ -67,8 +67,11 @@ class Grid:
         """
         low, high = float(self.values.min()), float(self.values.max())
         if not low < level < high:
+            between = (
+                f"; give level=, between them, such as {(low + high) / 2:g}" if low < high else ""
+            )
             raise InvalidArgument(
-                f"no set of level {level:g}: the values lie between {low:g} and {high:g}"
+                f"no set of level {level:g}: the values lie between {low:g} and {high:g}{between}"
             )
         if self._flat_share(level) > _FLAT:
             raise InvalidArgument(

@@ -34,7 +34,12 @@ class Linkage(ImplicitManifold):
         if space not in (2, 3) or any(place.shape != (space,) for place in places.values()):
             raise InvalidArgument("fixed joints have to lie all in the plane, or all in space")
         self.moving: list[Any] = []
-        for a, b, length in bars:
+        for bar in bars:
+            try:
+                a, b, length = bar
+                length = float(length)
+            except (TypeError, ValueError):
+                raise InvalidArgument(f"a bar is (joint, joint, length), and is {bar!r}") from None
             if a == b or not (np.isfinite(length) and length > 0):
                 raise InvalidArgument(f"a bar ({a!r}, {b!r}, {length!r}): two joints, length > 0")
             self.moving += [j for j in (a, b) if j not in places and j not in self.moving]

@@ -48,7 +48,7 @@ class TriangleMesh(PointCloud):
         points, triangles = _merged(as_points(points, "points"), np.asarray(triangles))
         if points.shape[1] != 3:
             raise InvalidArgument(f"triangles have to be in R^3, and are in R^{points.shape[1]}")
-        _insist_on_closed(triangles)
+        _insist_on_closed(points, triangles)
         corners = points[triangles]
         edges = norms(corners - np.roll(corners, 1, axis=1))
         if spacing is None:
@@ -135,12 +135,15 @@ def _merged(points: Array, triangles: Any) -> tuple[Array, Any]:
     return unique, names.reshape(-1)[triangles]
 
 
-def _insist_on_closed(triangles: Any) -> None:
+def _insist_on_closed(points: Array, triangles: Any) -> None:
     edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    _, counts = np.unique(edges, axis=0, return_counts=True)
+    distinct, counts = np.unique(edges, axis=0, return_counts=True)
     if (counts == 2).all():
         return
+    middle = points[distinct[np.flatnonzero(counts != 2)[0]]].mean(axis=0)
     raise InvalidArgument(
         f"the surface is not closed: {np.count_nonzero(counts == 1)} edges have one triangle, "
-        f"{np.count_nonzero(counts > 2)} more than two"
+        f"{np.count_nonzero(counts > 2)} more than two, as near {middle.tolist()}. Fill its holes and "
+        "remove what hangs from it, in a program that repairs meshes; of a surface that is meant to have "
+        "an end, PointCloud of its vertices is cut by walls"
     )
