@@ -129,8 +129,8 @@ struct Certificate {
   std::uint64_t fibre_failures = 0;  // sampled normal flats that do not meet the mesh once nearby
   std::uint64_t fibre_samples = 0;
 
-  std::uint64_t answers_held = 0;  // answers of the whole run, beside vertices, that were held
-                                   // against the mesh
+  std::uint64_t answers_held = 0;  // answers of the whole run, besides vertices, that were
+                                   // compared with the mesh
 
   double max_circumradius = 0;           // max R_p(sigma), length
   double max_radius_edge = 0;            // max rho, no unit
@@ -158,7 +158,7 @@ struct Certificate {
   std::uint64_t boundary_components = 0;
   std::int64_t boundary_euler_characteristic = 0;
   std::vector<FaceReport> faces;  // those that there are, by dimension, the lowest first
-  // Of all vertices on several walls, the smallest angle; none: no walls meet. Told however the run
+  // Of all vertices on several walls, the smallest angle; none: no walls meet. Set however the run
   // ends.
   std::optional<WallAngle> sharpest;
 

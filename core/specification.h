@@ -38,7 +38,7 @@ struct BoundingBox {
   Eigen::VectorXd lower, upper;  // d each
 };
 
-// Where a simplex of a star is judged when a point comes near.
+// Where a simplex of a star is tested against a new point.
 enum class Judging {
   kFlats,         // in each vertex's tangent space alone, as the thesis has it
   kCommonCentre,  // at one centre for all its vertices (core/geometry/common_centre.h)
@@ -63,8 +63,8 @@ struct Criteria {
                                        // bounding box's diagonal if that is more
   std::optional<Judging> judging;      // default kFlats for k <= 2 and for graded sizes, else
                                        // kCommonCentre
-  bool ask_ahead = false;              // lay or refine the sample on a guess of M first and
-                                       // ask for all that this wants at once: a handful of
+  bool ask_ahead = false;              // sample and refine on a surrogate of M first, then
+                                       // query all those points in one batch: a handful of
                                        // round trips for up to three times the processor time
   // Adaptive size: where the mesh must be finer than epsilon, which stays the upper bound. Both go
   // by size(p), p a vertex:
@@ -110,8 +110,8 @@ struct Specification {
   // The client promises that M's reach is at least this, a length: the mesh is refined until that
   // promise and the mesh prove its topology (core/certificate/proof.h), or refute the promise.
   std::optional<double> declared_reach;
-  // Seeds are laid so densely into the box that every component of M in it is found, which the
-  // declared reach makes finite: CoverOfBox. Needs both, and no seeds.
+  // Cover the box with seeds so densely that every component of M in it is found (CoverOfBox).
+  // Needs the box and the declared reach, and no seeds.
   bool cover_box = false;
   std::uint64_t random_seed = 1;  // of everything random
   Criteria criteria;

@@ -6,8 +6,9 @@
 
 namespace stellate::core {
 
-// For a vector that is almost all there is to come: room for one part in `parts` more. It has up to
-// as much again where it grew one by one, and would take that at the next one where it did not.
+// Call it on a vector that is almost complete: sets the capacity to its size and one part in
+// `parts` more. A vector that grew one by one may hold twice its size, and one that did not would
+// double at the next push_back.
 template <typename T>
 void LeaveRoom(std::size_t parts, std::vector<T>* vector) {
   std::vector<T> fitting;
@@ -16,8 +17,8 @@ void LeaveRoom(std::size_t parts, std::vector<T>* vector) {
   vector->swap(fitting);
 }
 
-// For a vector of all there is that is about to grow by `more`: where it must be moved, it gets a
-// little more room, and not as much again as it has.
+// Call it before a large vector grows by `more`: if it must be moved, reserves a little more than
+// that, instead of twice its size.
 template <typename T>
 void MakeRoom(std::size_t more, std::vector<T>* vector) {
   constexpr std::size_t kParts = 8;

@@ -12,19 +12,19 @@
 
 namespace stellate::core {
 
-// Lays a sample of M at its final spacing: from each seed a patch of the lattice A_k^* is carried
-// over M ring by ring, in the tangent spaces of its own points, until it meets the others. Where it
-// cannot be carried (M bends too much, or answers are missing) it leaves a hole.
+// Samples M at its final spacing by advancing-front lattice packing. From each seed a patch of the
+// lattice A_k^* grows over M ring by ring, in the tangent spaces of its own points, until it meets
+// the others. It leaves a hole where M bends too much, or where answers are missing.
 //
-//   growth.Begin(points, tangents, found)            seeds
-//   while (growth.Propose().points.cols() > 0)       a ring about all that is new
-//     joined = growth.Join(closest points of that)
+//   growth.Begin(points, tangents, found);               // seeds
+//   while ((ring = growth.Propose()).points.cols() > 0)  // the sites next to all new points
+//     joined = growth.Join(closest points of the ring);
 //
-// Where the spacing is graded, each point has a share of it of its own, in (0, 1], and lengths
-// below that are said in spacings are in its. Where an answer's is not what was expected of it, it
-// is left out; and where that is so of most, nothing more is proposed.
+// Where the spacing is graded, each point has a share in (0, 1]; lengths in spacings are multiplied
+// by it. An answer whose share differs from the expected one does not join; if that is so of most
+// answers, Propose returns nothing more.
 //
-// Deterministic: the same for any number of threads. Pure geometry: it asks nobody.
+// Deterministic: the same for any number of threads. Pure geometry, without queries.
 template <int K>
 class Growth {
  public:
@@ -32,36 +32,36 @@ class Growth {
   // spacing  nearest-neighbour distance of the lattice, length; the largest where it is graded
   Growth(int d, double spacing);
 
-  // Of points of M, d x n with tangent bases (K rows of d) x n, those become seeds that are found,
-  // farther than `room` lattice spacings from all that is laid, and `apart`, or its share of it,
-  // from each other. `shares`: of the spacing, n, or empty where it is not graded. Returns their
-  // columns, ascending.
+  // Makes seeds of those points of M, d x n with tangent bases (K rows of d) x n, that are found,
+  // farther than `room` lattice spacings from all points so far, and `apart` (times the share)
+  // from each other. `shares`: of the spacing, n, or empty where it is not graded. Returns the
+  // columns of the seeds, ascending.
   std::vector<Eigen::Index> Begin(const Eigen::MatrixXd& points, const Eigen::MatrixXd& tangents,
                                   const std::vector<std::uint8_t>& found, double apart,
                                   const Eigen::VectorXd& shares = {}, double room = 1);
 
-  // Where the lattice goes on from what joined last: points near M, d x n, with tangent bases
-  // there, (K rows of d) x n, roughly orthonormal.
+  // The next sites of the lattice: points near M, d x n, with roughly orthonormal tangent bases, (K
+  // rows of d) x n.
   struct Ring {
     Eigen::MatrixXd points, tangents;
   };
   Ring Propose();
 
-  // The closest points of the ring, tangent bases at them, and which were found; `shares` as
-  // above. Returns the columns of those that join the sample, ascending: no two points of it are
-  // nearer than kKeep spacings.
+  // Takes the closest points of the ring, tangent bases at them, and which were found; `shares` as
+  // above. Returns the columns of those that join the sample, ascending. No two points of the
+  // sample are nearer than kKeep spacings.
   std::vector<Eigen::Index> Join(const Eigen::MatrixXd& points, const Eigen::MatrixXd& tangents,
                                  const std::vector<std::uint8_t>& found,
                                  const Eigen::VectorXd& shares = {});
 
-  // Gives its memory back. Nothing is proposed afterwards.
+  // Frees its memory. Propose returns nothing afterwards.
   void Forget();
 
   std::uint32_t size() const { return size_; }
   // The points that joined last.
   std::size_t border() const { return border_.size(); }
   double spacing() const { return spacing_; }
-  // How far from what it goes on from a ring reaches, length.
+  // The largest distance of a site from the point that proposed it, length.
   double reach() const { return longest_; }
 
   // Least distance in the sample, in spacings: of a lattice that covers with radius epsilon, 1.4
@@ -69,7 +69,7 @@ class Growth {
   static constexpr double kKeep = 0.72;
 
  private:
-  // Points that the lattice goes on from, or is proposed at.
+  // Places of the lattice: points that joined, or that are proposed.
   struct Sites {
     std::vector<double> points;        // d each
     std::vector<double> frames;        // K rows of d each: the lattice's directions
@@ -79,14 +79,14 @@ class Growth {
     std::size_t size() const { return patch.size(); }
     void Append(const Sites& others);
   };
-  // Means of what points proposed.
+  // The means of proposals for one site.
   struct Proposed {
     explicit Proposed(std::size_t count = 0, std::size_t stride = 0);
     Sites sites;
     std::vector<std::uint16_t> parents;  // how many proposed it
-    std::vector<double> clear;           // no less far than this is all that is laid, length
+    std::vector<double> clear;           // no point is nearer than this, length
   };
-  // What was laid by rounds; those of about as many are joined into one.
+  // The points of some rounds; layers of about the same size are merged.
   struct Layer {
     Layer(int d, std::vector<double> laid, std::vector<double> its_shares, double reach);
     std::vector<double> points, shares;
@@ -97,13 +97,13 @@ class Growth {
     std::uint32_t patch;
     std::uint32_t parent;     // in border_
     std::uint32_t direction;  // of the lattice
-    double share;             // of the lattice's spacing, that it is proposed at
-    double clear;             // no less far than this is all that is laid, length
+    double share;             // of the lattice's spacing, at the proposed site
+    double clear;             // no point is nearer than this, length
   };
 
   std::size_t stride() const { return static_cast<std::size_t>(d_); }
   Runs RunsOf(const std::vector<double>& points, const std::vector<double>& shares) const;
-  // What is laid around some points.
+  // The points of the sample around a run.
   struct Laid {
     std::vector<double> points, shares;  // d each; of the spacing
   };
@@ -134,7 +134,7 @@ class Growth {
   LatticeNames names_{K};
   std::vector<std::unique_ptr<Layer>> layers_;
   bool is_graded_ = false;
-  std::uint64_t answered_ = 0, unexpected_ = 0;  // with shares, and of those not as expected
+  std::uint64_t answered_ = 0, unexpected_ = 0;  // answers with shares; those not as expected
   std::uint32_t size_ = 0;
   std::uint32_t patches_ = 0;
   Sites border_;

@@ -12,25 +12,25 @@
 
 namespace stellate::core {
 
-// Points that shall be inserted if M has a point near each: not for a target, but because a
-// rehearsal inserted them, or because they are seeds.
+// Points to insert, without a target, if M has a point near each: a speculative run inserted them,
+// or they are seeds.
 struct PlannedPoints {
   Eigen::MatrixXd points;      // d x n
   Eigen::MatrixXd tangents;    // (K rows of d) x n, predicted; or empty
   Eigen::VectorXd spacing;     // n, predicted distance to the nearest; or empty
-  std::vector<Rule> rules;     // n, what they are for; or empty
-  std::vector<WallSet> walls;  // n, the face that each shall be on; or empty: all are on M
+  std::vector<Rule> rules;     // n, the rule that asks for each; or empty
+  std::vector<WallSet> walls;  // n, the face to find each on; or empty: all on M
 
   Eigen::Index size() const { return points.cols(); }
 };
 
-// What a round asks for: points drawn for each of its targets, and after them planned ones. A
-// candidate is known by its place in that order.
+// The points to query in a round: those drawn for each of its targets, then the planned ones. A
+// candidate's number is its place in that order.
 template <int K>
 struct CandidateSet {
   std::vector<Target<K>> targets;
   std::vector<Eigen::Index> first = {0};  // by target: its first candidate; the end, at the end
-  std::vector<std::uint8_t> in_flats;     // by target: to be found in its star's normal flats
+  std::vector<std::uint8_t> in_flats;     // by target: query the intersection with a normal flat
   Eigen::MatrixXd points;                 // d x n, as drawn
   PlannedPoints planned;
 
@@ -38,9 +38,9 @@ struct CandidateSet {
   Eigen::Index size() const { return drawn() + planned.size(); }
 };
 
-// What became of candidates, in their order.
+// The answers to a CandidateSet, in its order.
 struct AnsweredPoints {
-  Eigen::MatrixXd points;              // d x n, on M; without meaning where not answered
+  Eigen::MatrixXd points;              // d x n, on M; undefined where not answered
   std::vector<std::uint8_t> answered;  // a point of M was found
   std::vector<std::uint8_t> found;     // ... and its tangents
   Eigen::MatrixXd tangents;            // (K rows of d) x n
@@ -51,7 +51,8 @@ struct AnsweredPoints {
   Eigen::MatrixXd conormals;   // (K numbers for each wall of the face, ascending) x n, in the
                                // points' own tangent coordinates
 
-  // The wall that a point lies beyond, of those that it is not on: by the most. None: it is in M.
+  // The wall that answer c violates most, or nothing if the point is in M. Walls that the point
+  // lies on do not count.
   std::optional<int> Beyond(Eigen::Index c) const {
     if (clearances.rows() == 0) return std::nullopt;
     return WallBeyond(clearances.col(c).data(), static_cast<int>(clearances.rows()),
@@ -61,13 +62,14 @@ struct AnsweredPoints {
 
 // How candidates are drawn.
 struct Drawing {
-  bool from_flats = false;  // intersections with flats can be asked for
+  bool from_flats = false;  // the oracle answers intersections with flats
   std::uint64_t seed = 0;   // of the run
   std::uint64_t round = 0;
 };
 
-// One candidate for a target of R1 or R2, and criteria.candidates for one of R3 or R4: the first is
-// the insertion point itself, unless that has failed before; the others lie in the picking region.
+// Draws the candidates of a round: one for a target of R1 or R2, criteria.candidates for one of R3
+// or R4. The first is the insertion point itself, unless that has failed before; the others lie in
+// the picking region.
 template <int K>
 CandidateSet<K> DrawCandidates(const StarComplex<K>& complex, const ViolationBook<K>& book,
                                const ResolvedCriteria& criteria, const Drawing& drawing,

@@ -7,7 +7,7 @@
 
 namespace stellate::core {
 
-// The constants of a run, defaults filled in for this k.
+// The constants of a run, with the defaults for this k. Get them from Resolve.
 struct ResolvedCriteria {
   double epsilon, radius_edge_bound, picking_radius, small_sliver_radius, advance_step;
   double inradius;  // of the fake simplex that a cell begins as, length
@@ -16,7 +16,7 @@ struct ResolvedCriteria {
   bool ask_ahead;
   Judging judging;
   double size_rate, max_deviation;  // infinity: no such criterion
-  bool sizes_given;                 // graded by what the client says
+  bool sizes_given;                 // graded by the client's sizes
   bool graded() const { return std::isfinite(size_rate) || std::isfinite(max_deviation); }
 };
 

@@ -18,23 +18,23 @@
 
 namespace stellate::core {
 
-// A corner where more walls than K meet, such that M has no inside there, or more than K - 1 of
-// them
-// (`along`) meet along an edge that leaves it, or there are more than can be told apart.
+// A corner of more than K walls that cannot be refined: M has no interior there, or more than K - 1
+// of them (`along`) meet along an edge that leaves it, or there are too many (kMostAtCorner).
 struct CrowdedCorner {
   Eigen::VectorXd point;
   WallSet walls, along;
 };
 
-// The algorithm of Sec. 5.3.5 between rounds: the sample, its stars, and all that is known of them.
-// A round of whoever drives it is
+// The algorithm of Sec. 5.3.5 between rounds: the sample, its stars, and their violations. A round
+// is
 //
-//   targets = Plan()                        which simplices break a rule
-//   targets = Select(targets)               which of them can be mended together
-//   candidates = Draw(targets, round)       what to ask for
-//   Insert(candidates, answers); Commit()   what the answers change
+//   targets = *engine.Plan();                        // the simplices that break a rule
+//   targets = engine.Select(targets);                // those that can be fixed together
+//   candidates = engine.Draw(targets, round);        // the points to query
+//   engine.Insert(candidates, answers);
+//   change = engine.Commit();                        // updates stars and violations
 //
-// A value: a copy goes on from the same state by itself. It asks nobody, and knows nothing of
+// A value: a copy continues independently from the same state. It sends no queries, and knows no
 // batches.
 template <int K>
 class Engine {
@@ -43,16 +43,16 @@ class Engine {
 
   Engine(const Specification& spec, const ResolvedCriteria& criteria);
 
-  // A copy to be driven by guesses instead of M's points, to this share of the sizes asked for: 1,
-  // or less where they are the same everywhere.
+  // Returns a copy for a speculative run, on a surrogate instead of M. `share`: refine to this
+  // share of the sizes; 1, or less where sizes are the same everywhere.
   Engine ForRehearsal(double share = 1) const;
 
   bool is_full() const { return complex_.size() >= max_vertices_; }
 
-  // The violations to mend next, by the first rules that any star breaks. Empty: no more can be
-  // done, see AllRulesHold. Nothing: points are inserted without end.
+  // Returns the violations to fix next, those of the first rules that any star breaks. Empty:
+  // nothing more can be done, see AllRulesHold. Nothing: points are inserted without end.
   std::optional<std::vector<Target<K>>> Plan();
-  // Plan's parts: R1 and R2, of all stars that break them; then, if none does, R3 and R4.
+  // The parts of Plan: targets of R1 and R2; if there are none, those of R3 and R4.
   std::vector<Target<K>> SizeAndShapeTargets() const;
   std::vector<Target<K>> GoodPointTargets();
   // After a Plan that found no targets.
@@ -61,52 +61,55 @@ class Engine {
   CandidateSet<K> Draw(std::vector<Target<K>> targets, std::uint64_t round) const;
 
   Inserted Insert(const CandidateSet<K>& candidates, const AnsweredPoints& answers);
-  // The same step by step, for who has only a part of the round's targets.
+  // The same step by step, if only a part of the round's targets is at hand.
   Inserter<K> InserterOf(const CandidateSet<K>& candidates, const AnsweredPoints& answers);
-  // Appends a candidate whatever the rules say. REQUIRES: !is_full() and that it was found.
+  // Appends a candidate without testing any rule. REQUIRES: !is_full(), and the candidate was
+  // found.
   void Append(const AnsweredPoints& answers, Eigen::Index candidate);
-  // The same for a sample that is laid before there is any star: cheaper, and no search finds the
+  // The same for the initial sample, before there is any star: cheaper, but no search finds the
   // point before Commit.
   void Lay(const AnsweredPoints& answers, Eigen::Index candidate);
-  // Brings the stars and all that is known of them up to date with what was inserted.
+  // Updates the stars and their violations after insertions.
   Change Commit();
-  // Of a manifold with boundary, when no targets are left: points of the faces of this stage that
-  // the sample has nothing near, if any, to be asked for and appended.
+  // Manifolds with boundary, when no targets are left: returns points of the faces of this stage
+  // that are far from the sample. Query and append them.
   PlannedPoints ChooseSeeds();
-  // The points of no face that wait to be seeds, all that are known with their tangents.
+  // Returns the known interior points that wait to be seeds, with their tangents.
   AnsweredPoints InteriorSeeds();
-  // On to faces of the next dimension. False after the last.
+  // Goes to faces of the next dimension. Returns false after the last.
   bool AdvanceStage();
-  // The same where the faces of this stage are refined without end: no rule looks at them any more.
-  // False in the last stage.
+  // The same where refining the faces of this stage does not end: rules skip them from now on.
+  // Returns false in the last stage.
   bool LeaveStage();
-  // Of a run that ends before its last stage: makes simplices inside of what there is, however
-  // large. `added`, `removed`: as of Commit, of the round.
+  // Call it when a run ends before its last stage: makes interior simplices of the points that
+  // there are, however large. `added`, `removed`: the round's change, as of Commit.
   void CompleteStars(std::vector<std::uint32_t>* added, std::vector<std::uint32_t>* removed);
-  // Whether edges and corners are at rest, and some sharp one is not guarded (core/refinement/
-  // guards.h).
+  // Whether edges and corners have no targets, and some sharp one has no protecting balls
+  // (core/refinement/guards.h).
   bool WantsGuards(const std::vector<Target<K>>& targets) const;
-  // Guards them, or finds what is to be split first, and plans anew. `added`, `removed`: as of
-  // Commit, of the round.
+  // Sets protecting balls, or finds the edges to split first, and plans again. `added`, `removed`:
+  // the round's change, as of Commit.
   std::optional<std::vector<Target<K>>> GuardSharpEdges(std::vector<std::uint32_t>* added,
                                                         std::vector<std::uint32_t>* removed);
-  // Whether corners of more walls than K are as they are is asked for, and they are inserted, or
-  // left out where M has no more than that point. One that the refinement cannot cope with, if any.
+  // Corners that more than K walls may meet in: query CrowdQuestions, then pass the answers on.
+  // They are inserted, or left out where M is only that point. Returns one that cannot be refined,
+  // if any.
   PlannedPoints CrowdQuestions() const;
   std::optional<CrowdedCorner> SettleCrowds(const AnsweredPoints& answers);
-  // Where faces were discovered since; to be asked for beside the targets.
+  // Points near faces that were discovered since the last call. Query them together with the
+  // targets.
   PlannedPoints TakeDiscoveries();
 
-  // The point inserted last is known by that name, in place of its id: see StarComplex::NameLast.
+  // Gives the point inserted last a name, in place of its id: see StarComplex::NameLast.
   void NameLast(std::uint32_t name) { complex_.NameLast(name); }
-  // An attempt to mend that star has failed, elsewhere.
+  // Records an attempt to fix that star that failed elsewhere.
   void NoteFailedAttempt(std::uint32_t star) { book_.NoteFailedAttempt(star); }
 
-  // What grows from the points appended last is judged by all rules once it is whole.
+  // Has all rules test all stars again.
   void JudgeAllAnew();
 
-  // How much is left to do: the vertices still to come, as far as circumradii tell. A cell of
-  // circumradius R will have to hold `share` (R / bound)^K more.
+  // Estimates the vertices still to come from circumradii: a cell of circumradius R will get
+  // `share` (R / bound)^K more.
   double CountMissing(double share) const;
 
   const StarComplex<K>& complex() const { return complex_; }
@@ -119,7 +122,7 @@ class Engine {
   FilledMesh<K>& filled() { return filled_; }
   const FilledMesh<K>& filled() const { return filled_; }
 
-  // Of a manifold with boundary: the faces that there are, by dimension, the lowest first.
+  // Manifolds with boundary: all faces, by dimension, the lowest first.
   std::vector<FaceMesh> Faces() const;
 
   // The mesh: K+1 ascending ids each.

@@ -9,29 +9,26 @@
 
 namespace stellate::core {
 
-// The mesh where the stars disagree about a few simplices and the cavities that these leave were
-// tiled instead (core/complex/cavities.h). It stands beside the union of the stars until HandOut,
-// which puts it in its place.
+// The mesh whose cavities, where a few stars disagree, are filled by tilings
+// (core/complex/cavities.h). HandOut replaces the union of the stars by it.
 template <int K>
 class FilledMesh {
  public:
-  // Fills the cavities of the complex as it is, for those k where that is done; forgets all that
-  // was filled before.
+  // Fills the cavities of the complex, for k >= 4, and forgets earlier fillings.
   void Fill(const StarComplex<K>& complex, const ResolvedCriteria& criteria);
   void Clear() { cavities_ = {}; }
 
-  // Whether the violating simplex is not in the mesh anyway, because its cavity is filled without
-  // it.
+  // Whether the filling leaves the violating simplex out of the mesh.
   bool Mends(const StarComplex<K>& complex, std::uint32_t star,
              const Violation<K>& violation) const;
 
-  // The stars whose violations of R3 and R4 it mends, kept here until they are judged again.
+  // The stars whose violations of R3 and R4 the filling resolves, until they are tested again.
   const std::vector<std::uint32_t>& mended() const { return mended_; }
   void NoteMended(std::uint32_t star) { mended_.push_back(star); }
   void ForgetMended() { mended_.clear(); }
 
-  // From here on this is the mesh. `added` and `removed`, K+1 ids each, say what a round changed in
-  // the union of the stars, and now what it changes in the mesh.
+  // Makes this the mesh. `added` and `removed`, K+1 ids each, come in as a round's change of the
+  // union of the stars, and go out as its change of the mesh.
   void HandOut(const StarComplex<K>& complex, std::vector<std::uint32_t>* added,
                std::vector<std::uint32_t>* removed);
   bool is_handed_out() const { return is_handed_out_; }

@@ -12,39 +12,40 @@
 
 namespace stellate::core {
 
-// How far answers are trusted to be where they were aimed.
+// How near to their targets answers are assumed to be.
 struct Caution {
-  // Where all is coarse the image of a circumcentre may fall anywhere: one that comes nearer to the
-  // sample than this share of the size asked for, or of a shorter step, would cost quality, so that
-  // the step is shortened instead.
+  // In a coarse mesh the closest point of a circumcentre may be anywhere. If it is nearer to the
+  // sample than this share of the size bound, or of a shorter step, shorten the step instead of
+  // inserting it.
   double coarse_spacing = 0.5;
-  // Otherwise the ball around the circumcentre is empty except for curvature. A point of it that
-  // has the sample nearer than this share of the circumradius says that the sample is too coarse
-  // for that; to insert it could make edges shorter than the one that R2 complained of (rho0 = 2),
-  // without end.
+  // Otherwise the ball around the circumcentre is empty, except for curvature. An answer in it that
+  // has a sample point nearer than this share of the circumradius shows that the sample is too
+  // coarse. Inserting it could make edges shorter than the one that violates R2 (rho0 = 2), without
+  // end.
   double empty_ball = 0.5;
-  // A guess only: no answer is relied upon to lie near its target, and a star whose target the
-  // guess has no answer for is left alone.
+  // The answers come from a surrogate: none is assumed to lie near its target, and a star whose
+  // target has no answer is skipped.
   bool is_rehearsal = false;
 };
-// What is rehearsed can wait until it is known better.
+// A speculative run inserts less: later rounds know better.
 inline constexpr Caution kRehearsalCaution = {0.9, 0.9, true};
 
 // What one round inserted.
 struct Inserted {
   std::vector<std::uint8_t> used;  // by candidate
-  std::vector<Rule> rules;         // by inserted point: what it is for
+  std::vector<Rule> rules;         // by inserted point: the rule that it was for
   std::uint64_t duplicates = 0;    // answers too near to another point
-  bool front_moved = false;        // a star on the advancing front was mended
+  bool front_moved = false;        // a star on the advancing front was fixed
 };
 
-// Inserts the answered candidates that help: of a target of R1 or R2 the one if it mends anything,
-// of R3 and R4 the best, each judged against the complex as it was before the round; then the
-// planned points that still have room. The complex waits for its Commit afterwards.
+// Inserts the answered candidates that help: for a target of R1 or R2 its candidate, if that
+// removes the violation; for one of R3 or R4 the best candidate. Each is tested against the complex
+// before the round. Then inserts the planned points that are not too near to others. Commit the
+// complex afterwards.
 template <int K>
 class Inserter {
  public:
-  // All are borrowed, for as long as the inserter lives.
+  // References must outlive the inserter.
   struct Parts {
     StarComplex<K>& complex;
     SizeField<K>& sizes;
@@ -52,16 +53,17 @@ class Inserter {
     const ResolvedCriteria& criteria;
     FaceBook<K>& faces;
   };
-  // max_vertices: the planned points go no further.
+  // max_vertices: stops inserting planned points at this size.
   Inserter(const Parts& to, const CandidateSet<K>& candidates, const AnsweredPoints& answers,
            const Caution& caution, std::uint64_t max_vertices);
 
   Inserted Run();
 
-  // The steps of a run. Judge: returns whether all points of R1 and R2 lie near where they were
-  // aimed, and so cannot have come near each other; to be told of all of the round, if others have
-  // some of it. InsertTarget: in the order of the round. Returns what became of it; kPutOff: it is
-  // as it was, for its star to be asked about otherwise, or since another point came near.
+  // The steps of Run. Call Judge first: it returns whether all answers of R1 and R2 lie near their
+  // targets, and so cannot be near each other. If other inserters have parts of the round, pass
+  // them the conjunction (TellAllNearAim). Then call InsertTarget for each target in order.
+  // kPutOff: the target is unchanged, because its star needs another kind of query, or another
+  // point came near.
   enum class Outcome : std::uint8_t { kInserted, kFailed, kPutOff };
   bool Judge();
   void TellAllNearAim(bool all) { all_near_aim_ = all; }
@@ -73,8 +75,9 @@ class Inserter {
     bool found = false;
     bool duplicate = false;       // too near another point
     bool cuts_violation = false;  // takes the violating simplex out of its star
-    bool near_aim = false;        // lies near where it was aimed
-    // Of manifolds with boundary: it would spoil that face simplex; it lies beyond that wall.
+    bool near_aim = false;        // lies near its target
+    // Manifolds with boundary: the face simplex that it encroaches on; the wall that it lies
+    // beyond.
     std::optional<typename StarComplex<K>::CellVertex> encroached;
     std::optional<int> beyond;
   };

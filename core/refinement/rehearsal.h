@@ -8,13 +8,13 @@
 
 namespace stellate::core {
 
-// Asking ahead: drives a copy of the engine by guesses (core/refinement/surrogate.h) until it needs
-// no more or they tell no more, and returns all points that it inserted, in that order. Targets
-// that one of them mends are taken out of `targets`. Only the rules, checked on true points, decide
-// when a run is over.
+// Runs a copy of the engine on a surrogate of M (core/refinement/surrogate.h), until no rule
+// applies or the surrogate has no more answers, and returns the points that it inserted, in that
+// order. Query them all in one batch. Removes the targets that one of them resolves from `targets`.
+// Only the rules on true points decide when a run is over.
 //
-// round: whatever Draw would be given next.
-// known: what is guessed already, of the manifold's whole; or null: from the engine's own sample.
+// round: as for the next Engine::Draw.
+// known: a surrogate of the whole manifold, or null: make one from the engine's sample.
 enum class Rehearsed { kAllRules, kSizes };  // kSizes: R1 and R2 alone
 template <int K>
 PlannedPoints Rehearse(const Engine<K>& engine, std::uint64_t round,

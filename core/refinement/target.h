@@ -8,8 +8,7 @@
 
 namespace stellate::core {
 
-// A refinement that a round may make: star `star` has a violation, to be mended by a point near
-// star + T_star x.
+// A violation of star `star` that a round may remove by a point near star + T_star x.
 template <int K>
 struct Target {
   std::uint32_t star = 0;
@@ -18,12 +17,12 @@ struct Target {
   double radius = 0;      // |x|
   double size_bound = 0;  // of R1 for the star, length
 
-  // So large that M between may be anything: more than twice the size asked for.
+  // Whether the simplex is so large, above twice its bound, that M may be anywhere between.
   bool is_coarse() const { return violation.radius > 2 * size_bound; }
 };
 
-// Where to insert for a violation: at the circumcentre, but no farther out than the advance step,
-// and, where all is coarse, nearer after each failed attempt.
+// Returns where to insert for a violation: at the circumcentre, but no farther out than the advance
+// step, and, in a coarse mesh, nearer after each failed attempt.
 template <int K>
 Target<K> TargetFor(std::uint32_t star, const Violation<K>& violation, double size_bound,
                     double advance_step, int failed_attempts) {

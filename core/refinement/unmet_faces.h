@@ -4,7 +4,7 @@
 
 namespace stellate::core {
 
-// Whether some point of the sample is on all walls of a face.
+// Whether a sample point is on all walls of a face. Without one the face is inactive.
 template <int K>
 bool HasPointOn(const StarComplex<K>& complex, WallSet face) {
   for (std::uint32_t p = 0; p < complex.size(); ++p)

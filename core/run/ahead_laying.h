@@ -10,17 +10,20 @@
 
 namespace stellate::core {
 
-// Lays the sample in a handful of round trips. On what the stars of the seeds guess of M
-// (core/refinement/surrogate.h) a sample several times as coarse is grown, asked for at once, and
-// refined where it has to be; on what that guesses one of the final spacing, asked for at once as
-// well, with what R1 and R2 will ask for if it is right. Of the coarse points those that patches
-// begin from are of the sample, from when they are found. Where seeds that are given tell too
-// little the coarse sample is laid ring by ring; where the coarse mesh does not come about the
-// final one is.
+// Samples M in a handful of round trips, on surrogates of it (core/refinement/surrogate.h):
+//
+//   1. grow a coarse sample on the surrogate of the seeds, query it in one batch, and refine it;
+//   2. grow the final sample on the surrogate of the coarse mesh, run R1 and R2 on it
+//   speculatively,
+//      and query all of these points in one batch.
+//
+// Coarse points that patches start from join the sample as they are found. If the given seeds tell
+// too little about M, the coarse sample grows ring by ring; if there is no usable coarse mesh, the
+// final sample does.
 template <int K>
 class AheadLaying final : public Laying<K> {
  public:
-  // Both are borrowed; `spec` is the engine's.
+  // Both must outlive the sampler; `spec` is the engine's.
   AheadLaying(Engine<K>& engine, const Specification& spec);
 
   std::vector<std::uint8_t> Begin(const AnsweredPoints& seeds) override;
@@ -55,21 +58,21 @@ class AheadLaying final : public Laying<K> {
   const Specification& spec_;
   double spacing_;
   enum class Stage {
-    kSeeds,        // they are the coarse sample
-    kGrown,        // that was grown on what they tell
-    kCoarseRings,  // it is laid ring by ring
+    kSeeds,        // the seeds are the coarse sample
+    kGrown,        // the coarse sample was grown on the seeds' surrogate
+    kCoarseRings,  // the coarse sample grows ring by ring
     kCoarse,       // the coarse mesh is refined
-    kGuessed,      // the sample was grown on what it tells
-    kRings,        // the sample is laid ring by ring
+    kGuessed,      // the sample was grown on the coarse mesh's surrogate
+    kRings,        // the sample grows ring by ring
   };
   Stage stage_ = Stage::kSeeds;
   std::unique_ptr<Engine<K>> coarse_;
-  bool is_coarse_in_rings_ = false;     // laid so
+  bool is_coarse_in_rings_ = false;     // the coarse sample grew ring by ring
   int rounds_ = 0;                      // of the coarse mesh
   std::optional<Surrogate<K>> guess_;   // of the coarse mesh
   std::optional<RingLaying<K>> rings_;  // of either sample
   BallTree scouts_;                     // the sample until then
-  Eigen::MatrixXd asked_;               // what was grown, while it is asked for
+  Eigen::MatrixXd asked_;               // what was grown, while it is queried
 };
 
 STELLATE_DECLARE_CLASS(AheadLaying)

@@ -6,18 +6,20 @@
 
 namespace stellate::core {
 
-// Whatever asks for something: questions and answers in turn, until it knows what it wanted to.
+// A source of queries: the initial sample, a round, tangent spaces, the certificate. Drive it so:
+//
+//   while (!(questions = source.Questions()).empty()) source.Absorb(answers of the questions);
 class Asker {
  public:
   virtual ~Asker() = default;
 
-  // What it asks next, all to be answered together; empty once it is done. To be called once before
+  // Returns the next queries, to be answered together; empty when it is done. Call it once before
   // each Absorb.
   virtual std::vector<QueryBlock> Questions() = 0;
-  // The answers, a block for each block of questions (there may be more after these), which have
-  // passed CheckAnswers.
+  // Takes the answers, one block for each block of queries; further blocks are ignored. REQUIRES:
+  // they passed CheckAnswers.
   virtual void Absorb(const std::vector<AnswerBlock>& answers) = 0;
-  // Whether the open questions are spent on finding tangents.
+  // Whether the open queries are for finding tangents.
   virtual bool asks_for_tangents() const { return false; }
 };
 

@@ -10,27 +10,27 @@
 
 namespace stellate::core {
 
-// What the stars of a mesh that every rule holds for say of it. `engine` learns what the sample
-// shows of its sizes.
+// Collects facts from the stars of a mesh that satisfies every rule. `engine` estimates its sizes
+// meanwhile.
 template <int K>
 StarFacts FactsOf(Engine<K>& engine);
 
-// What MeshView has of a manifold with boundary.
+// The part of MeshView about the boundary.
 struct BoundaryOfMesh {
   std::vector<WallSet> walls;   // by vertex
   std::vector<double> outward;  // k tangent coordinates by vertex
   std::vector<FaceMesh> faces;
-  std::vector<double> guards;  // by vertex; empty: none
+  std::vector<double> guards;  // squared radii of protecting balls, by vertex; empty: none
 };
 template <int K>
 BoundaryOfMesh BoundaryOf(const Engine<K>& engine);
 
-// Asks for what a certificate wants to know, and holds it.
+// Queries what the certificate needs, and owns it.
 class Certification final : public Asker {
  public:
   // spec      borrowed
   // mesh      its points and tangents are borrowed and must not change; its simplices are set here
-  // known     what was learned of M before
+  // known     what the run knows of M
   // boundary  of a manifold with boundary
   Certification(const Specification& spec, MeshView mesh, std::vector<std::uint32_t> simplices,
                 const StarFacts& facts, KnownOfManifold known,

@@ -21,31 +21,32 @@ struct Way {
 // The sine of the largest angle between the spaces that two orthonormal bases span, d x k each.
 double SineBetween(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other);
 
-// Where M's tangent spaces turn within no distance.
+// A place where M's tangent spaces turn within no distance.
 struct Crease {
   Eigen::VectorXd point;  // on M, or within `length` of it
   double sine = 0;        // of the angle by which they turn
   double length = 0;      // between the two points that show it
-  bool crosses = false;   // M goes on beyond it to all sides, and is no crease or corner
+  bool crosses = false;   // M continues on all sides: it crosses itself, without a crease or corner
 };
 
-// Whether M is smooth where rules keep failing: walks from ways along which its tangent spaces
-// turn to ways that are ever shorter, to a share of the mesh size. Where M is smooth they turn
-// less; where they turn as much on a way so short, and M is straight on both of its sides, there is
-// a crease, a corner or a crossing. It asks for closest points, and tangents where they are given.
+// Tests whether M is smooth where rules keep failing. It starts from ways (pairs of points) along
+// which the tangent spaces turn, and bisects them down to a share of the mesh size. Where M is
+// smooth the spaces turn less on shorter ways. If they turn as much, and M is straight on both
+// sides, there is a crease, a corner or a crossing. Queries closest points, and tangents where the
+// oracle gives them.
 class CreaseProbe final : public Asker {
  public:
   // k, d: dimensions of M and of space. size: of the mesh, a length. gives_tangents, has_walls: as
   // the oracle has them.
   CreaseProbe(int k, int d, double size, bool gives_tangents, bool has_walls, std::uint64_t seed);
 
-  // Begins anew, from these; nothing found so far.
+  // Starts again, from these ways, and forgets what it found.
   void Start(std::vector<Way> ways);
   void Stop() { Start({}); }
 
-  // Empty: it knows.
+  // Empty: it is done.
   std::vector<QueryBlock> Questions() override;
-  // The first of the answers is to its question.
+  // Uses the first block of the answers.
   void Absorb(const std::vector<AnswerBlock>& answers) override;
   bool is_asking() const { return !walks_.empty() && !crease_; }
   const std::optional<Crease>& crease() const { return crease_; }

@@ -10,23 +10,22 @@
 
 namespace stellate::core {
 
-// What can be said without further questions of a mesh that did not converge: inconsistent
-// simplices, circumradii, the reach that neighbours show, and, if M is smooth as far as is known, a
-// warning where epsilon is too coarse for that. epsilon: as the client asked for it, length.
+// Describes a mesh that did not converge, without further queries: inconsistent simplices,
+// circumradii, the reach that neighbours show, and, if M is smooth as far as is known, a warning
+// where epsilon is too coarse for that. epsilon: the client's, length.
 template <int K>
 void DescribeUnfinished(const Engine<K>& engine, double epsilon, bool is_smooth,
                         Certificate* certificate);
 
-// What it is, where, and what to do, for people.
+// Says what a crease is, where, and what to do, for people.
 std::string DescribeCrease(const Crease& crease);
 
-// Where walls meet at the smallest angle; below what the refinement is sure to cope with, also in
-// words: a warning of a certified mesh, else at the verdict's end.
+// Records where walls meet at the smallest angle. If that is below SafeAngle, also adds a sentence:
+// a warning of a certified mesh, else at the end of the verdict.
 template <int K>
 void TellSharpest(const Engine<K>& engine, Certificate* certificate);
 
-// A wall that no vertex is on, if there is one, of a mesh that made no progress: at the verdict's
-// end.
+// Adds an inactive wall, on which no vertex lies, to the verdict of a mesh that made no progress.
 template <int K>
 void TellUnmetWall(const Engine<K>& engine, int walls, Certificate* certificate);
 
@@ -40,28 +39,28 @@ struct PieceOfWall {
   Eigen::VectorXd point;
 };
 
-// Where a wall bends by more than epsilon can follow, or has a piece that is smaller, of a mesh
-// that is not certified although nothing kept it from being finished: at the verdict's end.
-// `piece`: one that the mesh had been without, if there is one.
+// Adds to the verdict where a wall bends more than epsilon can follow, or has a piece smaller than
+// that, of a finished mesh that is not certified. `piece`: one that the mesh lacked, if any.
 template <int K>
 void TellBend(const Engine<K>& engine, double epsilon, const std::optional<PieceOfWall>& piece,
               Certificate* certificate);
 
-// Where walls all but meet in one point, so that corners are far nearer to each other than epsilon,
-// of a mesh that is not certified: at the verdict's end.
+// Adds to the verdict where walls nearly meet in one point, so that corners are far nearer to each
+// other than epsilon, of a mesh that is not certified.
 template <int K>
 void TellNearCorners(const Engine<K>& engine, double epsilon, Certificate* certificate);
 
-// Why a corner of more walls than k cannot be meshed: `along`, those that meet along an edge there,
-// if that is why.
+// Explains why a corner of more than k walls cannot be meshed. `along`: the walls that meet along
+// an edge there, if that is the reason.
 std::string WhyTooCrowded(const Eigen::VectorXd& point, WallSet walls, WallSet along, int k);
 
-// What still breaks a rule, for people. inconsistent: simplices that DescribeUnfinished counted.
+// Says what still breaks a rule, for people. inconsistent: simplices that DescribeUnfinished
+// counted.
 template <int K>
 std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent);
 
-// Warns where a converged mesh is not what was asked for to the last star: sizes finer than are
-// meshed, cavities that were filled.
+// Warns where a converged mesh differs from the request: sizes finer than the finest bound, and
+// filled cavities.
 template <int K>
 void WarnOfCompromises(const Engine<K>& engine, double epsilon, Certificate* certificate);
 

@@ -9,24 +9,24 @@
 
 namespace stellate::core {
 
-// Where there is room for points of the interior of a manifold with boundary whose faces are
-// meshed: what is laid there comes too near to no vertex of theirs, and spoils no simplex.
+// Tests where interior points of a manifold with boundary may be placed, once its faces are meshed:
+// not too near to a vertex of a face, and without encroaching on a simplex.
 template <int K>
 class InteriorRoom {
  public:
-  // The engine is borrowed. spacing: of what is laid, length
+  // The engine must outlive this. spacing: of the interior points, length
   InteriorRoom(const Engine<K>& engine, double spacing);
 
   bool HasRoomFor(const double* point) const;
-  // Which columns there is room for, if they are `found`.
+  // Returns by column whether it is `found` and clear.
   std::vector<std::uint8_t> HaveRoom(const Eigen::MatrixXd& points,
                                      const std::vector<std::uint8_t>& found) const;
 
-  // Whether a point, known to be in M but for the walls, is in M: it is `reach` or less from one
-  // that is. Between a vertex of M and a point beyond a wall lies a point of that, and the faces'
+  // Whether a point of M^ is certainly inside all walls, given an interior point within `reach`:
+  // between a vertex of M and a point beyond a wall lies a point of that wall, and the faces'
   // vertices cover the walls.
   bool IsSurelyInside(const double* point, double reach) const;
-  // Whether a wall that passes within `reach` of the point has vertices.
+  // Whether a vertex on a wall lies within `reach` of the point.
   bool KnowsWallNear(const double* point, double reach) const;
 
  private:

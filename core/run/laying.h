@@ -10,8 +10,12 @@
 
 namespace stellate::core {
 
-// How a sample is laid at its final spacing before there is any star. Whoever drives it asks what
-// Next says, and hands over the answers, until there is nothing more to ask.
+// Makes the initial sample at its final spacing, before there is any star:
+//
+//   sampler->Begin(seeds);
+//   while (!(candidates = sampler->Next(round)).empty()) sampler->Take(candidates, their answers);
+//
+// LayingFor chooses one.
 template <int K>
 class Laying {
  public:
@@ -19,59 +23,63 @@ class Laying {
   Laying(const Laying&) = delete;
   Laying& operator=(const Laying&) = delete;
 
-  // Begins from those of the seeds that were found. Returns which of them joined the sample.
+  // Begins from the seeds that were found. Returns which of them joined the sample.
   virtual std::vector<std::uint8_t> Begin(const AnsweredPoints& seeds) = 0;
 
-  // What to ask next; empty when the sample is laid, as far as it can be. round: whatever
-  // Engine::Draw would be given.
+  // Returns the points to query next; empty when the sample is complete, or cannot be continued.
+  // round: as for Engine::Draw.
   virtual CandidateSet<K> Next(std::uint64_t round) = 0;
-  // Takes the answers. Returns which of them joined the sample.
+  // Takes the answers to Next. Returns which of them joined the sample.
   virtual std::vector<std::uint8_t> Take(const CandidateSet<K>& candidates,
                                          const AnsweredPoints& answers) = 0;
-  // Whose stars what was asked last is about.
+  // The engine whose stars the last candidates refer to.
   virtual const Engine<K>& asking() const = 0;
 
-  // What it went by, for what is left to refine; or null. Lasts as long as this.
+  // The surrogate that it used, or null. Use it for what is left to refine, while this exists.
   virtual Surrogate<K>* guess() { return nullptr; }
 
-  // About how many points are still to come.
+  // Estimates how many points are still to come.
   virtual double CountMissing() const = 0;
 
  protected:
   Laying() = default;
 };
 
-// How a run lays its sample: ahead, if that is asked for, k < 4 and the sample is not too large for
-// it, else ring by ring. With walls, once their faces are meshed: the interior, of a domain of R^k
-// at once. Null where it does not: where sizes are estimated, or given and asked for ahead; between
-// walls where sizes are graded, where it would ask ahead, and from k = 4 on; elsewhere where what
-// was found of the seeds is dense (a sample itself, or much of what so coarse a mesh needs). The
-// engine is borrowed; `spec` is its.
+// Chooses the sampler of a run:
+//
+//   no walls, sizes uniform or given | speculative, k < 4, sample not too large |
+//   AheadLaying
+//                                    | else                                     | RingLaying
+//   walls, faces meshed, k < 4,      | a domain of R^k                          | SolidLaying
+//   sizes uniform                    | else, unless speculative                 | RingLaying
+//
+// Null in all other cases, where sizes are both given and speculative, and where the seeds found
+// are dense (a sample themselves, or a large part of a coarse mesh): refinement alone makes the
+// sample. The engine must outlive the sampler; `spec` is the engine's.
 template <int K>
 std::unique_ptr<Laying<K>> LayingFor(Engine<K>& engine, const Specification& spec,
                                      const AnsweredPoints& seeds);
 
-// Adds columns of the answers to the sample, as long as there is room in it. Returns which columns
-// were added.
+// Adds columns of the answers to the sample, up to its limit. Returns which columns were added.
 template <int K>
 std::vector<std::uint8_t> LayColumns(Engine<K>& engine, const AnsweredPoints& answers,
                                      const std::vector<Eigen::Index>& columns);
 
 // The lattice's nearest-neighbour distance for circumradii of epsilon, length.
 double LaidSpacing(int k, double epsilon);
-// Patches of it begin about so many spacings apart: nearer, and seams between them cost more
-// vertices; farther, and the strain within them does.
+// The distance between the starts of patches, in spacings. If smaller, the seams between patches
+// cost more vertices; if larger, the strain within them does.
 inline constexpr double kPatchesApart = 10;
 
-// How many points at most are grown before anybody is asked for one, and then asked for at once.
+// The most points to grow on a surrogate before they are queried, in one batch.
 std::uint64_t MostAtOnce(int k, int d);
 
-// The points' sizes in epsilon, where they are graded and given; else empty.
+// Returns the points' sizes in epsilon, if sizes are graded and given; else nothing.
 template <int K>
 Eigen::VectorXd SharesOf(const SizeField<K>& sizes, const AnsweredPoints& answers);
 
-// How many of the first `most` points that were found, in their order, lie `apart`, or their share
-// of it, from all that were counted before.
+// Counts those of the first `most` found points that lie at least `apart` (times their share) from
+// all points counted before.
 std::size_t CountApart(const AnsweredPoints& from, Eigen::Index most, double apart,
                        const Eigen::VectorXd& shares = {});
 

@@ -27,9 +27,9 @@
 
 namespace stellate::core {
 
-// A run of the engine as the state machine of mesher.h, for one k: hands the word from one asker to
-// the next. First the seeds ask, then each round's candidates; when no rule applies any more the
-// certificate does, and points of M that the mesh misses, if it comes upon any.
+// Runs the engine as the state machine of mesher.h, for one k, from one query source to the next:
+// the seeds, each round's candidates, and, when no rule applies, the certificate. Points of M that
+// the mesh misses start refinement again.
 template <int K>
 class MeshingRun final : public Mesher {
  public:
@@ -50,7 +50,7 @@ class MeshingRun final : public Mesher {
   std::vector<std::uint32_t> Simplices() const override { return engine_.Simplices(); }
 
  private:
-  // What is done with a round trip's answers.
+  // What to do with a round trip's answers.
   using Insertion = void (MeshingRun::*)();
 
   QueryBatch& OpenBatch();
@@ -67,7 +67,7 @@ class MeshingRun final : public Mesher {
   void AskBeside();
   void TakeBeside(const Answers& answers);
 
-  // What follows when an asker is done.
+  // What follows when a query source is done.
   void AfterTrip();
   void InsertSeeds();
   void AskForFaces(const Eigen::MatrixXd& seeds);
@@ -103,12 +103,12 @@ class MeshingRun final : public Mesher {
   bool over_ = false;
 
   std::shared_ptr<QueryBatch> batch_;  // of the open round; null: there is none
-  std::optional<BatchParts> parts_;    // of batch_, if that is too large to ask at once
+  std::optional<BatchParts> parts_;    // of batch_, if that is too large for one batch
   std::uint64_t whole_rounds_ = 0;     // rounds in which parts count once
 
   // One of these asks.
   std::unique_ptr<RoundTrip<K>> trip_;
-  std::unique_ptr<Laying<K>> laying_;  // while the sample is laid
+  std::unique_ptr<Laying<K>> laying_;  // while the sample is made
   std::unique_ptr<Laying<K>> laid_;    // until what that left is planned
   bool was_laid_ = false;              // the sample
   std::unique_ptr<Certification> certification_;

@@ -9,20 +9,19 @@
 
 namespace stellate::core {
 
-// What of a run is left to do, in questions: those that the vertices still to come will take, as
-// many as each took so far, and the certificate's.
+// Estimates what is left of a run, in queries: those of the vertices still to come, as many as each
+// took so far, and those of the certificate.
 class ProgressMeter {
  public:
   explicit ProgressMeter(const Specification& spec);
 
-  // Points of M all over it: the seeds' that did not join the sample. While that grows, how many of
-  // them it has come near tells how much of M it covers.
+  // Takes known points of M that did not join the sample: the seeds'. The share of them that the
+  // growing sample has come near is the share of M that it covers.
   void Know(const AnsweredPoints& seeds, const std::vector<std::uint8_t>& used);
 
-  // Brings the counts, the phase, the fraction and whether it tells of the time of a run up to date
-  // with its mesh; rounds and queries are the caller's. is_certifying: every rule holds, and the
-  // certificate asks. to_lay: about how many points are to come before there are stars; 0: there
-  // are.
+  // Updates the counts, the phase, the fraction and is_foreseeable; rounds and queries are the
+  // caller's. is_certifying: every rule holds, and the certificate queries. to_lay: an estimate
+  // of the points still to come before there are stars; 0: there are stars.
   template <int K>
   void Measure(const Engine<K>& engine, bool is_certifying, double to_lay, Progress* progress);
 

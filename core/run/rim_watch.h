@@ -7,17 +7,18 @@
 
 namespace stellate::core {
 
-// Notes where M may end: answers that do not lie straight below what was asked (RimCheck). From a
-// closed manifold with exact tangents there are none.
+// Detects an undeclared boundary: collects answers with a tangential offset, which do not lie
+// straight below their queries (RimCheck). A closed manifold with exact tangents has none.
 class RimWatch {
  public:
-  // Closest points of candidates, with their tangents. REQUIRES: no alternations.
+  // Collects offsets from the closest points of candidates, with their tangents. REQUIRES: no
+  // alternations.
   template <int K>
   void Look(const CandidateSet<K>& candidates, const AnsweredPoints& answers);
 
-  // Points y of M and the parts of q - y along it, 2 d each, as KnownOfManifold has them.
+  // Points y of M and the components of q - y along M, 2 d each, as KnownOfManifold has them.
   const std::vector<double>& leans() const { return leans_; }
-  // What an unfinished run says of them, d numbers a point: a further sentence, or nothing.
+  // A sentence about them for the verdict of an unfinished run, or "".
   std::string Describe(int d) const;
 
  private:

@@ -10,18 +10,19 @@
 
 namespace stellate::core {
 
-// What is asked is what joins, ring by ring (core/growth/growth.h). A coarser lattice goes before,
-// to have a seed near everything; but where all that was drawn in a box is within its spacing of
-// one seed. Of a manifold with boundary it is the interior that is laid, as far as there is room.
+// Grows the lattice ring by ring (core/growth/growth.h), with one round trip a ring. A coarser
+// lattice of scouts grows first, to have a seed near every part of M, unless all random seeds fell
+// within one spacing. On a manifold with boundary it samples the interior, where InteriorRoom
+// allows it.
 template <int K>
 class RingLaying final : public Laying<K> {
  public:
-  // The engine is borrowed; of `spec` only its walls and whether it gives seeds are heeded.
-  // apart: of patches, in spacings of the lattice.
+  // The engine must outlive the sampler. Uses of `spec` only its walls and whether it has seeds.
+  // apart: the distance between patches, in spacings of the lattice.
   RingLaying(Engine<K>& engine, const Specification& spec, double apart = kPatchesApart);
 
   std::vector<std::uint8_t> Begin(const AnsweredPoints& seeds) override;
-  // In place of Begin: from the sample as it is, and from seeds where no patch comes.
+  // In place of Begin: continues from an existing sample, and from seeds that no patch reaches.
   void GoOn(const AnsweredPoints& sample, const AnsweredPoints& seeds);
   CandidateSet<K> Next(std::uint64_t round) override;
   std::vector<std::uint8_t> Take(const CandidateSet<K>& candidates,
@@ -40,11 +41,11 @@ class RingLaying final : public Laying<K> {
   const bool are_drawn_;  // the seeds, from a box
   const double apart_;    // patches, in spacings
   Growth<K> growth_;
-  std::unique_ptr<Growth<K>> scouting_;  // the coarse lattice, until it is laid
+  std::unique_ptr<Growth<K>> scouting_;  // the coarse lattice, until it is complete
   AnsweredPoints seeds_, scouts_;        // as given; of the coarse lattice
   std::optional<InteriorRoom<K>> room_;  // between walls
-  Eigen::Index proposed_ = 0;            // of the ring that was asked for last
-  std::vector<Eigen::Index> asked_;      // its columns for which there was room
+  Eigen::Index proposed_ = 0;            // points of the last ring
+  std::vector<Eigen::Index> asked_;      // its columns that are clear, and were queried
 };
 
 STELLATE_DECLARE_CLASS(RingLaying)

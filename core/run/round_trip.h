@@ -12,13 +12,13 @@
 
 namespace stellate::core {
 
-// Asks for a set of candidates, with all that inserting them needs. Where the client has no flats
-// it goes to and fro between a candidate's flat and M instead (Criteria::flat_alternations); where
-// it gives no tangents they are found by a TangentFinder.
+// Queries a set of candidates, with all that inserting them needs. Where the oracle has no flats it
+// alternates between a candidate's flat and M instead (Criteria::flat_alternations); where it gives
+// no tangents a TangentFinder finds them.
 template <int K>
 class RoundTrip final : public Asker {
  public:
-  // The engine and the finder are borrowed; the engine does not change meanwhile.
+  // The engine and the finder must outlive this; the engine must not change meanwhile.
   RoundTrip(const Engine<K>& engine, const OracleCapabilities& oracle, TangentFinder& finder,
             CandidateSet<K> candidates, int walls = 0);
 

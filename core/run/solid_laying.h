@@ -9,8 +9,8 @@
 
 namespace stellate::core {
 
-// The interior of a domain of R^k whose boundary is meshed: one lattice, as far as there is room.
-// Each point is its own closest point there; only where it may lie beyond a wall it is asked for.
+// Samples the interior of a domain of R^k whose boundary is meshed, by one lattice. Each point
+// there is its own closest point, so only points that may lie beyond a wall are queried.
 template <int K>
 class SolidLaying final : public Laying<K> {
  public:

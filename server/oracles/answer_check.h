@@ -4,8 +4,8 @@
 
 namespace stellate::server {
 
-// core::CheckAnswers of the answer to a chunk; what it refuses says the lease and the row at fault.
-// kOracleShape if the answer is not as long as the chunk.
+// Checks the answer to a chunk by core::CheckAnswers. A refusal names the lease and the row that is
+// wrong. kOracleShape if the answer is not as long as the chunk.
 Refused CheckAnswer(const core::Specification& spec, const Chunk& chunk,
                     const core::AnswerBlock& answer);
 

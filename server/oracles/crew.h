@@ -5,17 +5,17 @@
 
 namespace stellate::server {
 
-// What a worker has done and does, for people.
+// What the server has measured of one worker, for people. Get it from OraclePool::Crew.
 struct CrewMember {
   std::uint64_t id = 0;
-  std::string title;          // as it called itself, and where it is
+  std::string title;          // from its Hello, and its address
   std::uint64_t queries = 0;  // answered in time
-  std::uint64_t chunks = 0;   // that these came in
-  double fixed_seconds = 0;   // its time for n queries, as measured: fixed + each * n
-  double each_seconds = 0;    // 0, as is fixed_seconds: nothing is known yet
-  std::uint64_t holds = 0;    // queries that it has been asked and has not answered
-  std::uint64_t newest = 0;   // queries of the chunk that it was asked last
-  bool lagging = false;       // let a chunk run out, or is at one that nobody waits for
+  std::uint64_t chunks = 0;   // answered in time
+  double fixed_seconds = 0;   // its measured time for n queries is fixed + each * n
+  double each_seconds = 0;    // 0, like fixed_seconds: not known yet
+  std::uint64_t holds = 0;    // queries sent to it and not answered yet
+  std::uint64_t newest = 0;   // queries in its newest chunk
+  bool lagging = false;       // let a lease run out, or still computes what is no longer needed
 };
 
 }  // namespace stellate::server

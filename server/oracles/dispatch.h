@@ -28,61 +28,70 @@ struct OracleTimeouts {
 
 // How a round is shared among the workers.
 struct DispatchPolicy {
-  // What a chunk should take, unless its worker's fixed cost (a start, a licence, a schedule) would
-  // be more than a quarter of it.
+  // Target time of a chunk. A worker whose fixed cost (a start, a licence, a schedule) exceeds a
+  // quarter of it gets longer ones.
   Clock::duration chunk_target = std::chrono::milliseconds(250);
-  // What is left of a round is shared among the crew, but not in pieces that take less.
+  // The rest of a round is shared among the workers, in pieces that take at least this.
   Clock::duration least_share = std::chrono::milliseconds(1);
   std::size_t chunk_bytes = std::size_t{1} << 20;  // of a chunk's queries, and of their answers
   int max_leases = 3;     // of one query alone, all timed out, before the round fails
-  int max_in_flight = 2;  // chunks that one worker holds, so that it need not wait between two
+  int max_in_flight = 2;  // chunks of one worker, so that it need not wait between two
 
-  // A chunk is a straggler once it has taken this many times what its worker's pace promises, and
-  // no less than the floor: an idle worker gets it as well. Without a pace to go by: so long.
+  // A chunk is a straggler, and hedged by an idle worker, once it has taken this many times its
+  // expected time, and at least the floor; `unknown` where no worker's pace is known.
   double straggler_factor = 3;
   Clock::duration straggler_floor = std::chrono::milliseconds(200);
   Clock::duration straggler_unknown = std::chrono::seconds(2);
 
-  // Share of its queries that a worker is asked on top, from another's chunks, so that the answers
-  // can be compared; and one of each family that it answers, before the round ends. 0: none.
+  // Share of a worker's queries that it is asked in addition, from another worker's chunks, to
+  // compare the answers; before the round ends, at least one of each family that it answers. 0:
+  // none.
   double check_share = 0.01;
 };
 
 struct DispatchOptions : OracleTimeouts, DispatchPolicy {};
 
-// A piece of a round given to one worker for a while.
+// A piece of a round, given to one worker for a limited time.
 struct Lease {
   LeaseId id = 0;  // 1, 2, ...; never used twice
   WorkerId worker = 0;
   std::size_t block = 0;
   Eigen::Index first = 0;
   Eigen::Index count = 0;
-  int timeouts = 0;       // earlier leases of this query alone that ran out
+  int timeouts = 0;       // earlier leases of this single query that ran out
   TimePoint started;      // when the worker could start on it: chunks of one worker queue up
-  TimePoint heard;        // when its worker last said that it is working on it
-  bool cut = false;       // smaller than its worker might have had: the round ended, or is shared
+  TimePoint heard;        // when its worker last sent Busy for it
+  bool cut = false;       // smaller than a full chunk: the round ended, or is shared
   bool queued = false;    // given while its worker had others
-  bool check = false;     // another has these queries: the answers are for comparing
-  LeaseId twin = 0;       // of the same piece, given to another too: the first answer counts
-  bool answered = false;  // the twin was first: this answer is for comparing
+  bool check = false;     // a cross-check of another worker's queries
+  LeaseId twin = 0;       // the other lease of a hedged piece: the first answer counts
+  bool answered = false;  // the twin was first: this answer is only compared
 };
 
-// Who answers what: cuts the blocks of a round into chunks, leases these to workers by their
-// measured pace, takes back what a worker leaves undone, gives stragglers to idle workers as
-// well, and has a sample of queries answered twice. A plain state machine: no threads, no clock of
-// its own, no network. Times passed in must not go back.
+// Distributes the queries of a round among workers. It cuts blocks into chunks by each worker's
+// measured pace, leases them, takes back leases that run out, hedges stragglers, and has a sample
+// of queries answered twice. A plain state machine: no threads, no clock of its own, no network.
+// Times passed in must not decrease.
 //
-// A chunk is what fits the worker's pace. Towards a round's end what is left is shared among the
-// crew.
+//   dispatch.Join(worker, 0);
+//   dispatch.Begin(blocks, now);
+//   while (!dispatch.Done(now)) {
+//     for (const Lease& lease : dispatch.Assign(now)) ...;      // send it to lease.worker
+//     if (dispatch.Claim(worker, id, now, &lease) == kClaimed)  // an answer came
+//       dispatch.Settle(lease);                                 // once it is checked and stored
+//     dispatch.Expire(now);                                     // at NextDeadline(), or sooner
+//   }
+//
+// Towards the end of a round the rest is shared among the workers in smaller chunks.
 class Dispatch {
  public:
-  // What may go wrong by itself: queries of a kind, about a face. Any number will do.
+  // Queries of one kind about one face, which may be answered wrongly independently of others.
   using Family = std::pair<int, std::uint64_t>;
   struct Block {
     Eigen::Index queries = 0;
-    std::size_t bytes_per_query = 0;  // the larger of question and answer
+    std::size_t bytes_per_query = 0;  // the larger of query and answer
     Family family = {};
-    // Queries [first, second) that have their answers from the start; ascending and disjoint.
+    // Queries [first, second) that are answered already; ascending and disjoint.
     std::vector<std::pair<Eigen::Index, Eigen::Index>> answered = {};
   };
   enum class Failure { kNone, kNoWorker, kAnswerTimeout };
@@ -90,41 +99,42 @@ class Dispatch {
   explicit Dispatch(DispatchOptions options) : options_(options) {}
 
   void Begin(const std::vector<Block>& blocks, TimePoint now);
-  void End();  // forgets the round; its leases become late
+  void End();  // forgets the round; answers to its leases are late from now on
   bool Active() const { return active_; }
-  // Every query has an answer, and of each worker one of each family has been compared with
-  // another's. Further checks and beaten stragglers are not waited for.
+  // Whether every query has an answer, and each worker has had one answer of each family compared
+  // with another worker's. Does not wait for further cross-checks, or for the slower of two hedged
+  // leases.
   bool Done(TimePoint now) const;
   Eigen::Index unanswered() const { return unsettled_; }
 
-  // `max_chunk` queries at most in one chunk; 0: no wish.
+  // `max_chunk`: the most queries in one chunk; 0: no limit.
   void Join(WorkerId worker, std::uint32_t max_chunk);
   void Leave(WorkerId worker, TimePoint now);
   std::size_t workers() const { return workers_.size(); }
-  // All workers, without their titles; the earliest first.
+  // All workers, the earliest first, without their display names.
   std::vector<CrewMember> Crew() const;
 
-  // Hands out what the workers can take now.
+  // Returns new leases, to be sent to their workers.
   std::vector<Lease> Assign(TimePoint now);
 
   enum class ClaimResult {
     kClaimed,
-    kSecond,   // for comparing: another worker's answer counts
-    kLate,     // the lease ended before; the answer is ignored, and no fault
-    kUnknown,  // never given to this worker, or answered more often than asked
+    kSecond,   // another worker's answer counts; compare this one with it
+    kLate,     // the lease has ended; ignore the answer, which is no error
+    kUnknown,  // never given to this worker, or answered twice
   };
-  // An answer came. The lease ends; the piece counts as answered once Settle is called.
+  // Takes note of an answer and ends its lease. Call Settle once the answer is stored.
   ClaimResult Claim(WorkerId worker, LeaseId id, TimePoint now, Lease* lease);
-  void Settle(const Lease& lease);  // kClaimed only
-  // Answers of the two to a query of that block have been compared.
+  void Settle(const Lease& lease);  // after kClaimed only
+  // Takes note that answers of `a` and `b` to a query of that block have been compared.
   void Compared(WorkerId a, WorkerId b, std::size_t block);
-  // The worker is still computing. A lease that it does not have is ignored.
+  // Renews the lease of a worker that is still computing. Ignored if the worker does not have it.
   void Busy(WorkerId worker, LeaseId id, TimePoint now);
 
-  // Takes back the chunks of workers that are too slow.
+  // Takes back the leases that have run out.
   void Expire(TimePoint now);
   Failure failure(TimePoint now) const;
-  // When Expire, failure or Assign next has something to say; TimePoint::max() if never.
+  // When to call Expire, failure and Assign next; TimePoint::max(): not before another event.
   TimePoint NextDeadline() const;
 
  private:
@@ -137,30 +147,30 @@ class Dispatch {
   struct Worker {
     std::uint32_t max_chunk = 0;
     Pace pace{Pace::Aim{}};
-    double check_credit = 0;       // queries that it may be asked on top
-    std::set<Family> compared;     // of which an answer was compared with another worker's
+    double check_credit = 0;       // queries that it may be asked in addition
+    std::set<Family> compared;     // families in which an answer was compared
     bool stalled = false;          // let a lease run out and has not answered since
-    std::set<LeaseId> unanswered;  // chunks sent whose answers have not come, late ones too
-    std::uint64_t answered_queries = 0, answered_chunks = 0, newest_chunk = 0;  // for Crew
+    std::set<LeaseId> unanswered;  // chunks sent and not answered, late ones too
+    std::uint64_t answered_queries = 0, answered_chunks = 0, newest_chunk = 0;  // for CrewMember
     std::deque<Lease> leases;  // oldest first; only the first one's time runs
 
-    // Is still at something that nobody waits for any more, or has stopped answering.
+    // Whether it still computes a chunk that is no longer needed, or has stopped answering.
     bool Lagging() const { return stalled || unanswered.size() > leases.size(); }
     bool Idle() const { return leases.empty() && !Lagging(); }
     int InFlight() const;
     bool Wants(Eigen::Index count) const { return max_chunk == 0 || count <= max_chunk; }
   };
 
-  // A query of the round that `worker` has or had, to be asked of another: nothing of the family
-  // was compared with another's yet.
+  // A comparison that the round still needs: ask another worker a query that `worker` has or had,
+  // since no answer of `worker` in that family has been compared yet.
   struct Debt {
     WorkerId worker = 0;
     std::size_t block = 0;
     Eigen::Index query = 0;
-    bool answered = false;  // by `worker`, and that counts
-    LeaseId check = 0;      // of whoever is asked
+    bool answered = false;  // `worker` has answered it, and that answer counts
+    LeaseId check = 0;      // the lease of `checker`; 0: not asked yet
     WorkerId checker = 0;
-    bool taken = false;  // his answer is here, and not compared yet
+    bool taken = false;  // the checker has answered; the comparison is under way
   };
 
   bool IsCompared(WorkerId worker, const Family& family) const;
@@ -169,7 +179,7 @@ class Dispatch {
   bool IsBeingCompared(WorkerId worker, const Family& family) const;
   std::optional<WorkerId> PickChecker(const Debt& debt) const;
   Lease AskToCompare(Debt* debt, WorkerId checker, TimePoint now);
-  // Until when the check of a debt is waited for; nothing: it is not.
+  // How long to wait for a comparison; nothing: do not wait.
   std::optional<TimePoint> Patience(const Debt& debt) const;
   Eigen::Index ShareOfTheRest(const Worker& worker) const;
   void Cut(const Worker& worker, Piece* piece, Lease* lease) const;
@@ -182,7 +192,7 @@ class Dispatch {
   void BackUp(TimePoint now, std::vector<Lease>* leases);
   TimePoint EndOf(const Lease& lease) const;
   TimePoint OverdueAt(const Worker& worker, std::size_t position) const;
-  // The most queries that an idle worker would take; 0: none is idle.
+  // The most queries that an idle worker would accept; 0: none is idle.
   Eigen::Index IdleRoom() const;
 
   DispatchOptions options_;
@@ -193,11 +203,12 @@ class Dispatch {
   Eigen::Index pending_queries_ = 0;
   Eigen::Index unsettled_ = 0;
   std::map<WorkerId, Worker> workers_;
-  std::vector<Debt> debts_;  // of the round; one at most for each worker and family
+  std::vector<Debt> debts_;  // at most one for each worker and family
   LeaseId first_of_round_ = 1;
   LeaseId next_lease_ = 1;
   TimePoint deserted_since_;  // last moment with a worker, or the start of the round
-  // The last chunk of the round given out, and the last one to any other worker: what to check by.
+  // The newest lease of the round, and the newest of any other worker: cross-checks come from
+  // these.
   std::optional<Lease> newest_, newest_other_;
 };
 

@@ -21,25 +21,27 @@
 
 namespace stellate::server {
 
-// One round on its way: the questions, and the answers as they come in. Chunks write to disjoint
-// columns, so no lock is needed; it lives until the last chunk lets go of it.
+// One round in progress: its queries, and the answers so far. Chunks write to disjoint columns, so
+// no lock is needed. It lives until the last chunk releases it.
 struct Round {
   std::shared_ptr<const core::QueryBatch> batch;
   core::Answers answers;  // of full size from the start
-  // Of each query of each block, whose answer it has; 0: nobody's yet. The pool's lock guards it.
+  // For each query of each block, the worker whose answer counts; 0: none yet. Guarded by the
+  // pool's lock.
   std::vector<std::vector<WorkerId>> answered_by;
 };
 
-// Answers to some queries of a round: `first` and those after it.
+// Answers to consecutive queries of a block, from `first` on.
 struct PartOfRound {
   std::size_t block_index = 0;
   Eigen::Index first = 0;
   core::AnswerBlock answers;
 };
 
-// Of the shape that a batch asks for, with nothing in it: what is put into it are its answers.
+// Returns answers of the shape that the batch asks for, all zero. Fill them with PutAnswers.
 core::Answers EmptyAnswers(int dimension, const core::QueryBatch& batch, int walls = 0);
-// `first` and those after it must be there; what is more than was asked for is left out.
+// Writes a part into `answers`. REQUIRES: its queries exist. Ignores arrays that were not asked
+// for.
 void PutAnswers(const PartOfRound& part, core::Answers* answers);
 
 // A chunk for a worker: queries [first, first + count) of a block.
@@ -49,42 +51,49 @@ struct Chunk {
   std::size_t block_index = 0;
   Eigen::Index first = 0;
   Eigen::Index count = 0;
-  WorkerId worker = 0;  // of a claimed chunk: who answers
-  bool second = false;  // of a claimed chunk: another's answer counts, this one is compared with it
+  // Set by OraclePool::Claim: the worker that answers, and whether its answer is only compared
+  // with another worker's.
+  WorkerId worker = 0;
+  bool second = false;
 
   const core::QueryBlock& block() const { return round->batch->blocks[block_index]; }
 };
 
-// What becomes of a worker's stream when its mesh is over.
+// How a worker's stream ends when its mesh is over.
 struct WorkerEnd {
-  core::Status blame;  // not Ok: the oracle's answers were refused, by a check that names no worker
+  core::Status blame;  // not Ok: a check that names no worker refused the oracle's answers
 };
 
-// A worker, as the pool sees it. Both calls come from any thread, with no lock of the pool held;
-// they must not block. After End nothing follows.
+// A worker, as the pool sees it. The pool calls Ask and End from any thread, without holding its
+// lock; they must not block. End is the last call.
 class OracleWorker {
  public:
   virtual ~OracleWorker() = default;
   virtual void Ask(Chunk chunk) = 0;
   virtual void End(const WorkerEnd& end) = 0;
-  // For messages to people; asked once, as it joins. Empty: it has no name.
+  // For messages to people; called once, when the worker joins. Empty: it has no name.
   virtual std::string Title() const { return ""; }
 };
 
-// Told what a pool does, for the metrics. From any thread; must not block.
+// Receives what a pool does, for the metrics. Called from any thread; must not block.
 class PoolObserver {
  public:
   virtual ~PoolObserver() = default;
-  virtual void OnBackUps(std::size_t chunks) = 0;    // given to an idle worker as well
+  virtual void OnBackUps(std::size_t chunks) = 0;    // also given to an idle worker
   virtual void OnCompared(std::size_t queries) = 0;  // answered by two workers
   virtual void OnDisagreement() = 0;
 };
 
-// The workers of one mesh. The session's thread asks a whole round and waits; workers' streams
-// join, answer and leave from their own threads. No call but Ask waits for anything.
+// The workers of one mesh. The session's thread calls Ask with a whole round and waits. Workers'
+// streams join, answer and leave from their own threads, and never wait:
+//
+//   pool.Join(worker, 0);                        // the pool calls worker->Ask(chunk)
+//   auto chunk = pool.Claim(id, lease);         // an answer to that lease came
+//   if (chunk && *chunk) pool.Deliver(**chunk, answer);
+//   pool.Leave(id);
 class OraclePool {
  public:
-  // `max_workers` at once.
+  // `max_workers`: the most that may be joined at a time. `observer` may be null.
   OraclePool(const core::Specification& spec, DispatchOptions options, std::size_t max_workers,
              std::shared_ptr<PoolObserver> observer = nullptr);
 
@@ -92,50 +101,50 @@ class OraclePool {
   Allowed<WorkerId> Join(std::shared_ptr<OracleWorker> worker, std::uint32_t max_chunk);
   void Leave(WorkerId worker);
 
-  // An answer to `lease` came. The chunk that it answers; nothing if the lease has ended, which is
-  // no fault of the worker's; kInvalidArgument if it never was this worker's.
+  // Ends a lease that has been answered. Returns its chunk, or nothing if the lease has ended
+  // before, which is no error of the worker; kInvalidArgument if it never was this worker's.
   core::Expected<std::optional<Chunk>> Claim(WorkerId worker, LeaseId lease);
-  // The worker is still at a lease's chunk.
+  // Renews the lease of a worker that is still computing.
   void Busy(WorkerId worker, LeaseId lease);
-  // Checks the answers to a claimed chunk and takes them over, or compares them with another
-  // worker's, who may come later. On error nothing is taken, and the caller should call Fail. Two
-  // workers that disagree fail the mesh, which is no error of this one.
+  // Checks the answers to an accepted chunk and stores them, or compares them with another
+  // worker's, now or when those come. On error nothing is stored, and the caller should call Fail.
+  // Two workers that disagree fail the mesh; this call succeeds nevertheless.
   Refused Deliver(const Chunk& chunk, const core::AnswerBlock& answer);
   // Ends the round, and with it the mesh. The first failure counts.
   void Fail(MeshFailure failure);
 
   struct Outcome {
-    std::shared_ptr<Round> round;        // set when every query was answered
-    std::optional<MeshFailure> failure;  // set when the round failed; neither: interrupted
+    std::shared_ptr<Round> round;        // set if every query was answered
+    std::optional<MeshFailure> failure;  // set if the round failed; neither: interrupted
   };
-  // Session's thread only. Does `meanwhile` once the workers have the questions, or there are none.
-  // Every wait in it ends: with answers, or by a limit of the options. What is `known` is asked of
-  // nobody: answers to this very batch, ascending by block and query, no query twice.
+  // Has a batch answered, and returns when it is. Session's thread only. Calls `meanwhile` once the
+  // workers have their chunks. Every wait ends, with answers or by a limit of the options. `known`:
+  // answers to this batch that need no worker, ascending by block and query, no query twice.
   Outcome Ask(
       std::shared_ptr<const core::QueryBatch> batch, const std::function<void()>& meanwhile = [] {},
       const std::vector<PartOfRound>& known = {});
-  // Told of queries [first, first + count) of a block as their answers are taken over: they change
-  // no more while the round lives. From any thread; must not block.
+  // Called with queries [first, first + count) of a block when their answers are stored; those do
+  // not change while the round lives. Called from any thread; must not block.
   using OnAnswered = std::function<void(const std::shared_ptr<const Round>& round,
                                         std::size_t block, Eigen::Index first, Eigen::Index count)>;
   // Before the first Ask.
   void TellOfAnswers(OnAnswered on_answered) { on_answered_ = std::move(on_answered); }
-  // Makes Ask return, now and ever after.
+  // Makes Ask return, and all later calls of it.
   void Interrupt();
 
-  // No worker may join any more.
+  // Lets no further worker join.
   void Shut();
-  // Shut, and those here are told.
+  // Shuts the pool and ends its workers.
   void Close(const WorkerEnd& end);
 
   std::size_t workers() const { return worker_count_; }
-  // Who they are, the earliest first.
+  // All workers, the earliest first.
   std::vector<CrewMember> Crew() const;
   // Queries of the round that have no answer yet.
   std::size_t waiting() const;
 
  private:
-  // An answer for comparing, kept while the round lasts.
+  // An answer that is only compared, kept while the round lasts.
   struct SecondAnswer {
     Chunk chunk;
     core::AnswerBlock answer;
@@ -152,7 +161,7 @@ class OraclePool {
   MeshFailure Describe(Dispatch::Failure failure) const;
   void TakeOver(const Chunk& chunk, const core::AnswerBlock& answer);
   void Compare(const SecondAnswer& second, Eigen::Index first, Eigen::Index count);
-  // Fails the mesh if its words are not empty.
+  // Fails the mesh if `words` is not empty.
   void TellDisagreement(const Chunk& chunk, const std::string& words);
   std::string TitleLocked(WorkerId worker) const;
   static void Send(std::vector<Delivery> deliveries);
@@ -172,7 +181,8 @@ class OraclePool {
   std::shared_ptr<Round> round_;
   std::vector<std::shared_ptr<const SecondAnswer>> seconds_;  // of the round
   WallSigns signs_;
-  std::unordered_map<WorkerId, std::string> titles_;  // of those here or who answered in the round
+  // Workers that are joined, or that answered in the round.
+  std::unordered_map<WorkerId, std::string> titles_;
   std::optional<MeshFailure> failure_;
   bool interrupted_ = false;
   bool closed_ = false;

@@ -5,38 +5,41 @@
 
 namespace stellate::server {
 
-// How long a worker takes for n queries, seconds = fixed + each * n, by the newest of its chunks,
-// and how many it should have at once.
+// Estimates how long a worker takes for n queries, seconds = fixed + each * n, and how many queries
+// to put into its next chunk.
 //
-// The line through its chunks has least squares of relative errors, the older counting less. Of the
-// fixed cost that it shows as much is believed as is beyond doubt, for where times scatter a part
-// of them looks fixed. Where all chunks are of one size nothing can be seen of it: then it is what
-// it was held to be, at first nothing.
+//   Pace pace({0.25, 60});                      // chunks of a quarter of a second, a minute at
+//   most pace.Answered({1, 0.01, false, false});     // after each chunk n = pace.FullChunk(); //
+//   for the next one
 //
-// A query is held to take no more than its share of the largest chunk, however long ago that was:
-// of small ones, whose times scatter by what is asked, no line tells that a call takes long
-// whatever it holds.
+// The line is fitted to the newest chunks by least squares of relative errors; older chunks weigh
+// less. Only the part of the fixed cost that exceeds its uncertainty is used, since scattered times
+// look like a fixed cost. Chunks of one size show no fixed cost: the last estimate stays, at first
+// 0.
 //
-// A worker begins with one query. While the queries take far less than they may, a chunk may be
-// eight times the largest before, else twice.
+// The cost of a query is at most the mean of the largest chunk, however old that is: small chunks,
+// whose times scatter with their queries, do not show that a call has a high fixed cost.
+//
+// A worker begins with one query. A chunk may be eight times the largest chunk so far while that
+// took far less than the target, else twice.
 class Pace {
  public:
   struct Chunk {
     double queries = 0;
     double seconds = 0;
-    bool cut = false;     // smaller than it might have been
-    bool queued = false;  // asked while the worker had another: travelled meanwhile
+    bool cut = false;     // smaller than FullChunk
+    bool queued = false;  // sent while the worker had another: its travel took no time
   };
   struct Aim {
-    double seconds = 0;  // that a chunk should take, or four times the fixed cost if that is more
-    double limit = 0;    // seconds that it may take
+    double seconds = 0;  // target for a chunk, or four times the fixed cost if that is more
+    double limit = 0;    // the most that a chunk may take
   };
 
   explicit Pace(Aim aim) : aim_(aim) {}
   void MayTake(double seconds) { aim_.limit = seconds; }
 
   void Answered(const Chunk& chunk);
-  // A chunk took longer than it may, and who knows how long.
+  // Forgets all measurements, after a chunk that ran out of time.
   void BeginAgain() { *this = Pace(aim_); }
 
   bool known() const { return !newest_.empty(); }
@@ -44,12 +47,12 @@ class Pace {
   double fixed() const { return fixed_; }
   double each() const { return each_; }
   double Seconds(double queries) const { return fixed_ + each_ * queries; }
-  // Chunks of more than one size were seen, so that the fixed cost is more than a guess.
+  // Whether chunks of more than one size were measured, so that the fixed cost is known.
   bool SizesDiffer() const;
-  // The longest that n queries may be expected to take: while all chunks were of one size, all of
-  // their time may be fixed.
+  // An upper estimate for n queries: while all chunks were of one size, all of their time may be
+  // fixed.
   double AtMost(double queries) const;
-  // The most queries that it should have at once, 1 or more.
+  // The most queries to put into one chunk, 1 or more.
   double FullChunk() const;
 
  private:
@@ -62,8 +65,8 @@ class Pace {
   std::deque<Chunk> newest_;               // the newest last
   Chunk largest_;                          // of all, or a later one of half its size or more
   double line_fixed_ = 0, line_each_ = 0;  // of the line
-  double fixed_ = 0, each_ = 0;            // with what is believed of it
-  double reach_ = 1;                       // the most that it has shown itself fit for
+  double fixed_ = 0, each_ = 0;            // the estimate
+  double reach_ = 1;                       // the largest chunk that its times allow so far
 };
 
 }  // namespace stellate::server

@@ -10,22 +10,24 @@
 
 namespace stellate::server {
 
-// Whether workers have the same side of each wall inside, over a whole mesh.
+// Detects workers that disagree about which side of a wall is inside M. Give it every answer that
+// counts (Learn) and every pair of answers to one query (Compare), then ask for the Verdict.
 //
-// Where the points of two answers agree, the signs of their clearances must. But on the wall itself
-// a sign is rounding, and a wall's values have no unit: so what counts is whether the two are
-// farther apart than the values change, from end to end of M, along what the points may be apart.
-// That is not known at the first query; what looks like a contradiction waits until it is.
+// Where the points of two answers agree, the signs of their clearances must agree too, except on
+// the wall, where a sign is rounding. A wall's values have no unit, so two values contradict each
+// other if they differ by more than the values change, on average over M, along the distance that
+// the points may have. The first queries do not tell how much that is: a suspected contradiction
+// waits until it is known.
 class WallSigns {
  public:
   explicit WallSigns(const core::Specification& spec);
 
-  // Answers that count, and passed CheckAnswers.
+  // REQUIRES: the answers count, and passed CheckAnswers.
   void Learn(const core::AnswerBlock& answer);
-  // Two answers to query `query` of `block` that FindDisagreement has nothing against.
+  // Compares two answers to query `query` of `block`. REQUIRES: FindDisagreement returned "".
   void Compare(const core::QueryBlock& block, Eigen::Index query, const Testimony& a,
                const Testimony& b);
-  // What the workers disagree about, as FindDisagreement says it; empty: nothing that is certain.
+  // Returns a certain disagreement as a sentence, as of DescribeDisagreement, or "".
   std::string Verdict() const;
 
  private:
