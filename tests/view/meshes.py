@@ -4,7 +4,7 @@
 
 Reads a line of JSON for each mesh wanted, {"shape": NAME, "epsilon": E, ...}; writes its name once
 it is declared, and "over" when it is done. "seconds": that each call of the oracle takes at least.
-"wait": for one more line before it is begun.
+"wait": for one more line before it is begun. "cancel": it before that.
 """
 
 from __future__ import annotations
@@ -49,6 +49,8 @@ class Slow:
 
 
 SHAPES = {
+    "circle": lambda: manifolds.Sphere(1),
+    "four-sphere": lambda: manifolds.Sphere(4),
     "torus": lambda: manifolds.Torus(1.0, 0.4),
     "thin torus": lambda: manifolds.Torus(1.0, 0.12),
     "two spheres": TwoSpheres,
@@ -67,13 +69,17 @@ def main() -> None:
         oracle = SHAPES[wish.pop("shape")]()
         seconds = wish.pop("seconds", 0.0)
         wait = wish.pop("wait", False)
+        cancel = wish.pop("cancel", False)
         if seconds:
             oracle = Slow(oracle, seconds)
         name = client.create(oracle, **wish).name
         print(name, flush=True)
         if wait:
             sys.stdin.readline()
-        client.serve(oracle, name, worker="a worker")
+        if cancel:
+            client.cancel(name)
+        else:
+            client.serve(oracle, name, worker="a worker")
         print("over", flush=True)
 
 

@@ -109,7 +109,7 @@ export class Stage {
 }
 
 // What the canvas shows: how much of it is no background, in how many parts, how many colours, and
-// a digest by which two pictures are told apart.
+// a digest by which two pictures are told apart, the sides of what is seen, how far down it comes, 0 to 1.
 export function picture(page) {
   return page.evaluate(async () => {
     await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
@@ -144,8 +144,12 @@ export function picture(page) {
     }
     let digest = 0;
     for (let i = 0; i < ink.length; i++) digest = (Math.imul(digest, 31) + word(i)) | 0;
+    const lines = [...ink.keys()].filter((i) => ink[i]);
+    const side = (of) => (lines.length > 0 ? Math.max(...lines.map(of)) - Math.min(...lines.map(of)) + 1 : 0);
+    const sides = [side((i) => i % width), side((i) => Math.floor(i / width))];
+    const lowest = Math.ceil((ink.lastIndexOf(true) + 1) / width) / height;
     const colours = new Set(ink.flatMap((on, i) => (on ? [word(i)] : []))).size;
-    return { share: ink.filter(Boolean).length / ink.length, parts, colours, digest };
+    return { share: ink.filter(Boolean).length / ink.length, parts, colours, digest, sides, lowest };
   });
 }
 

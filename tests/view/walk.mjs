@@ -12,7 +12,10 @@ async function see(page, what, saw) {
   const { share } = await picture(page);
   await saw?.(what);
   const { vertices } = await shown(page);
-  assert.ok(share >= Math.min(kLeast, kDot * vertices), `${what}: ${share} of the canvas is mesh, of ${vertices} vertices`);
+  assert.ok(
+    share >= Math.min(kLeast, kDot * vertices),
+    `${what}: ${share} of the canvas is mesh, of ${vertices} vertices`,
+  );
 }
 
 // Until some of it is drawn.
@@ -31,30 +34,47 @@ export async function choose(page, label) {
   await there(page, label);
 }
 
-// A demonstration that leads through these, as they grow and when they are done. It does not wait for a
-// slow browser: what is looked at is what it shows by then, and the last of them it stays with.
+// A demonstration that leads through these, each in its turn, as they grow.
 export async function follow(page, labels, saw) {
-  for (let at = 0; at < labels.length; at++) {
-    await until(
-      page,
-      (coming) => {
-        const label = document.querySelector("#facts b")?.textContent;
-        return coming.includes(label) && Number(document.getElementById("stage").dataset.vertices) > 0;
-      },
-      labels.slice(at),
-    );
-    const label = await page.locator("#facts b").first().innerText();
-    at = labels.indexOf(label);
+  await page.evaluate(() => {
+    window.told = [];
+    const { dataset } = document.getElementById("stage");
+    const tell = () => {
+      const label = document.querySelector("#facts b")?.textContent;
+      window.told.push({
+        label,
+        vertices: Number(dataset.vertices),
+        simplices: Number(dataset.simplices),
+      });
+    };
+    new MutationObserver(tell).observe(document.getElementById("stage"), {
+      attributeFilter: ["data-vertices"],
+    });
+  });
+  for (const label of labels) {
+    await there(page, label);
     await see(page, `${label}, growing`, saw);
     await until(
       page,
-      (label) =>
-        document.querySelector("#facts b")?.textContent !== label ||
-        document.querySelector("#verdict .headline") !== null,
-      label,
+      () =>
+        document.querySelector("#verdict .headline") !== null &&
+        document.getElementById("play").textContent === "replay" &&
+        document.getElementById("live").disabled &&
+        document.getElementById("stage").dataset.revision ===
+          document.getElementById("revision").max,
     );
-    await see(page, `${label}, or the next, done`, saw);
+    await see(page, `${label}, done`, saw);
+    const told = await page.evaluate(() => window.told);
+    const sizes = told.filter((one) => one.label === label && one.vertices > 0);
+    const steps = new Set(sizes.map(({ vertices }) => vertices)).size;
+    assert.ok(steps >= 5, `${label} is seen to grow: ${steps} steps`);
+    assert.ok(sizes.at(-1).simplices > 0, label);
   }
+  const told = await page.evaluate(() => window.told);
+  assert.ok(
+    told.some(({ vertices, simplices }) => vertices > 0 && simplices === 0),
+    "dots come first",
+  );
 }
 
 // Every mesh of these, there and back again, each at revisions from its first vertices to its end.
@@ -74,5 +94,16 @@ export async function walk(page, labels, saw) {
     }
     await page.locator("#fit").click();
     await see(page, `${label}, all of it`, saw);
+    const { lowest } = await picture(page);
+    assert.ok(lowest <= (await toolsBegin(page)), `${label}: the tools hide its lower end`);
   }
 }
+
+// As `lowest` of a picture.
+const toolsBegin = (page) =>
+  page.evaluate(() => {
+    const canvas = document.getElementById("canvas").getBoundingClientRect();
+    return (
+      (document.getElementById("look").getBoundingClientRect().top - canvas.top) / canvas.height
+    );
+  });

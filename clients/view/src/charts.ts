@@ -97,6 +97,7 @@ export class Curves {
 
 export function drawHistograms(host: HTMLElement, histograms: Histogram[]) {
   host.replaceChildren();
+  host.parentElement!.hidden = histograms.length === 0;
   for (const { name, unit, low, high, bins } of histograms) {
     const figure = document.createElement("figure");
     const caption = document.createElement("figcaption");

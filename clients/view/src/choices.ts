@@ -49,21 +49,25 @@ export function choicesOf({ k, d, walls }: MeshRow): Choices {
     ...(solid ? [["wall", "wall"] as Option] : []),
     ["order", "order of coming"],
     ["size", "circumradius"],
-    ["shape", "thinness"],
+    ...(k > 1 ? [["shape", "thinness"] as Option] : []),
     ...coordinates(d),
   ];
-  // A surface lies over itself when coordinates are left out, but less so from an oblique side.
-  const oblique = (k <= 2 || solid) && d > 3;
+  // What lies over itself when coordinates are left out does so less from an oblique side.
+  const part = parts[0][0] as Part;
+  const axis = Math.min(3, d - 1); // along an axis of the picture a slice would be seen edge on
+  const seen = part === "slice" ? d - 1 : d; // dimensions of what holds what is seen
+  const oblique = seen > 3;
   const axes = axesFrame(d, [0, 1, 2]);
+  const still = part === "slice" ? [axis] : [];
   // Not by the coordinate that is the same all over a slice.
-  const byCoordinate = k === 3 ? d > 4 : d > 3;
+  const colourAxis = Math.min(part === "slice" ? axis + 1 : 3, d - 1);
   const first: Look = {
-    frame: oblique ? new Tour(d, axes).at(kObliqueSeconds) : axes,
-    part: parts[0][0] as Part,
-    axis: Math.min(3, d - 1), // along an axis of the picture a slice would be seen edge on
+    frame: oblique ? new Tour(d, axes, still).at(kObliqueSeconds) : axes,
+    part,
+    axis,
     level: 0.5,
-    colour: solid ? "wall" : byCoordinate ? "coordinate" : "plain",
-    colourAxis: Math.min(k === 3 ? 4 : 3, d - 1),
+    colour: solid ? "wall" : oblique ? "coordinate" : "plain",
+    colourAxis,
   };
   return { parts, colours, first, oblique };
 }

@@ -25,6 +25,7 @@ export interface Rim {
   segments: Float32Array; // pairs of positions
   walls: Uint8Array; // of each segment, as of boundary.ts
   points: Float32Array;
+  pointWalls: Uint8Array; // of each point
 }
 
 // Vertices in no simplex, as all are at first.
@@ -72,10 +73,12 @@ export class Tour {
   constructor(
     private readonly d: number,
     private readonly start: number[],
+    still: number[] = [], // coordinates that do not turn
   ) {
     const next = random(1);
     for (let a = 0; a < d; a++) {
       for (let b = a + 1; b < d; b++) {
+        if (still.includes(a) || still.includes(b)) continue;
         if (d <= 6 || next() < 6 / d) this.turns.push({ a, b, speed: 0.1 + 0.2 * next() });
       }
     }

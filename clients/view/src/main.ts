@@ -4,7 +4,7 @@ import "./stage.css";
 import { Curves, drawHistograms } from "./charts";
 import { choicesOf, coordinates } from "./choices";
 import { axesFrame, Tour, type Colour, type Look, type Part } from "./look";
-import type { FaultKind, FromWorker, MeshRow, PastRow, ToWorker } from "./messages";
+import type { FaultKind, FromWorker, MeshRow, ToWorker } from "./messages";
 import {
   badgeOf,
   drawCrew,
@@ -17,12 +17,13 @@ import {
   shortName,
   superscript,
 } from "./panels";
+import { Leader } from "./leader";
 import { View } from "./scene";
 import type { Recording } from "./source";
+import { Time } from "./time";
 import MeshWorker from "./worker?worker&inline";
 
 const kTourSeconds = 0.05;
-const kReplaySeconds = 0.35;
 
 const kFaults: { [K in FaultKind]: string } = {
   faces: "the face of",
@@ -32,6 +33,13 @@ const kFaults: { [K in FaultKind]: string } = {
   fibres: "a normal flat near",
 };
 
+const kEnded: Record<string, string> = {
+  stopped: "was stopped",
+  cancelled: "was cancelled",
+  failed: "failed",
+};
+
+const kNothingHere = "Nothing of it is at this level";
 const kCannotDraw =
   "This browser cannot draw the mesh: it has no WebGL, or WebGL is switched off in its settings. " +
   "Certificate and figures are beside this.";
@@ -48,11 +56,7 @@ let chosen = "";
 let recorded = false;
 let list: MeshRow[] = [];
 let mesh: MeshRow | null = null;
-let past: PastRow[] = [];
-let shownRevision = 0;
 let boundary = ""; // of what is shown, in words
-let following = true; // the newest revision
-let led = false; // from mesh to mesh, by a demonstration, until somebody chooses
 let fault: { kind: FaultKind; next: number; count: number } | { place: string } | null = null;
 let look: Look = {
   frame: axesFrame(3, [0, 1, 2]),
@@ -62,39 +66,54 @@ let look: Look = {
   colour: "plain",
   colourAxis: 0,
 };
-let replay: ReturnType<typeof setInterval> | undefined;
 let tour: { tour: Tour; start: number } | null = null;
 let measured = { revision: -1, name: "" };
 
-const curves = new Curves(at("curves"), at("legend"), (revision) => show(revision));
+const time = new Time(
+  (revision) => ask({ type: "revision", revision }),
+  () => !recorded,
+);
+const [secret, mode] = location.hash.slice(1).split("&");
+const demo = mode === "demo";
+const leader = new Leader(demo, time, () => {
+  const next = list[list.findIndex(({ name }) => name === chosen) + 1];
+  if (next && fault === null) choose(next.name);
+});
+const curves = new Curves(at("curves"), at("legend"), (revision) => time.show(revision));
 
 function note(text: string) {
   at("note").hidden = false;
   at("note").textContent = text;
 }
 
+// Why there is nothing of it yet, or ever.
+function emptyOf(row: MeshRow | null): string {
+  if (row?.over && row.vertices === 0) {
+    return `It ${kEnded[row.state] ?? "ended"} before its first vertex`;
+  }
+  return `Waiting for the first vertices${row?.state === "waiting" ? ": no worker serves it" : ""}`;
+}
+
 function choose(name: string) {
   if (name === chosen) return;
   chosen = name;
   mesh = null;
-  past = [];
   leaveFault();
-  stopReplay();
   stopTour();
-  following = true;
-  shownRevision = 0;
+  time.reset();
+  leader.reset();
   boundary = "";
   measured = { revision: -1, name: "" };
-  at("histograms").replaceChildren();
-  at("stage").dataset.vertices = "0"; // what is drawn still is the last one's
-  note("Waiting for the first vertices");
-  view.refit();
+  drawHistograms(at("histograms"), []);
+  at("stage").dataset.vertices = "0";
+  note(emptyOf(null));
+  view.clear();
   drawList(at("list"), list, chosen, chooseByHand);
   ask({ type: "watch", name });
 }
 
 function chooseByHand(name: string) {
-  led = demo && name === list.at(-1)?.name;
+  leader.leads = demo && name === list.at(-1)?.name;
   choose(name);
 }
 
@@ -111,8 +130,12 @@ function meet(row: MeshRow) {
   const { parts, colours, first, oblique } = choicesOf(row);
   look = first;
   stopTour();
+  view.stand(row.d);
+  at("look").hidden = at("right").hidden = false;
   at<HTMLInputElement>("level").value = "0.5";
   fill("part", parts, look.part);
+  at("part-box").hidden = parts.length === 1;
+  at("wires-box").hidden = row.k === 1;
   fill("axis", coordinates(row.d), `${look.axis}`);
   fill("colour", colours, look.colour === "coordinate" ? `${look.colourAxis}` : look.colour);
   [0, 1, 2].forEach((axis) =>
@@ -185,71 +208,19 @@ setInterval(() => {
   }
 }, 1000 * kTourSeconds);
 
-// --- time
-
-function show(revision: number | null) {
-  following = revision === null;
-  ask({ type: "revision", revision });
-  drawTime();
-}
-
-function newest(): number {
-  return Math.max(mesh?.revision ?? 0, past.at(-1)?.revision ?? 0, shownRevision, 1);
-}
-
-function drawTime() {
-  const slider = at<HTMLInputElement>("revision");
-  at("time").hidden = recorded && newest() === 1;
-  slider.max = `${newest()}`;
-  if (following) slider.value = slider.max;
-  at<HTMLButtonElement>("live").disabled = following;
-  at("live").textContent = mesh?.over ? "newest" : "live";
-}
-
-at<HTMLInputElement>("revision").oninput = (e) => {
-  const value = Number((e.target as HTMLInputElement).value);
-  stopReplay();
-  show(value >= newest() ? null : value);
-};
-at("live").onclick = () => {
-  stopReplay();
-  show(null);
-};
-
-function stopReplay() {
-  clearInterval(replay);
-  replay = undefined;
-  at("play").textContent = "replay";
-}
-at("play").onclick = () => {
-  if (replay !== undefined) return stopReplay();
-  at("play").textContent = "pause";
-  let next = following || shownRevision >= newest() ? 1 : shownRevision;
-  const step = Math.max(1, Math.round(newest() / 60));
-  replay = setInterval(() => {
-    if (next >= newest()) {
-      stopReplay();
-      return show(null);
-    }
-    at<HTMLInputElement>("revision").value = `${next}`;
-    show(next);
-    next += step;
-  }, 1000 * kReplaySeconds);
-};
-
 // --- faults
 
 function fly(kind: FaultKind, count: number) {
   const next = fault && "kind" in fault && fault.kind === kind ? (fault.next + 1) % count : 0;
   fault = { kind, next, count };
-  show(null);
+  time.show(null);
   ask({ type: "faults", fault: { kind, chosen: next } });
 }
 
 // To what the certificate's words name.
 function flyTo(place: string, ids: number[]) {
   fault = { place };
-  show(null);
+  time.show(null);
   ask({ type: "faults", fault: { ids } });
 }
 
@@ -291,9 +262,9 @@ function drawFacts() {
 
 // Histograms take a while: of what stands still, and of what grows now and then.
 setInterval(() => {
-  const due = measured.revision !== shownRevision || measured.name !== chosen;
-  if (!due || shownRevision === 0 || document.hidden) return;
-  measured = { revision: shownRevision, name: chosen };
+  const due = measured.revision !== time.shown || measured.name !== chosen;
+  if (!due || time.shown === 0 || document.hidden) return;
+  measured = { revision: time.shown, name: chosen };
   ask({ type: "measure" });
 }, 1000);
 
@@ -311,27 +282,27 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
   list: ({ meshes }) => {
     list = meshes;
     drawList(at("list"), list, chosen, chooseByHand);
-    const newestMesh = meshes.at(-1);
-    if (!chosen && newestMesh) choose(newestMesh.name);
+    const first = meshes.at(leader.leads ? 0 : -1);
+    if (!chosen && first) choose(first.name);
     if (!chosen) note("No mesh yet");
-    const looking = !following || fault !== null || replay !== undefined; // at something of this one
-    if (led && !looking && newestMesh && mesh?.over && newestMesh.name !== chosen) {
-      choose(newestMesh.name);
-    }
   },
   mesh: (message) => {
     const first = mesh === null;
     mesh = message.mesh;
     if (first) meet(mesh);
     drawFacts();
-    drawTime();
+    time.hear(mesh.revision, mesh.over);
+    leader.hear(mesh);
+    if (time.shown === 0) note(emptyOf(mesh));
   },
   past: ({ rows }) => {
-    past = rows;
     curves.show(rows);
-    drawTime();
+    time.hear(rows.at(-1)?.revision ?? 0);
   },
-  crew: ({ rows }) => drawCrew(at("crew"), rows),
+  crew: ({ rows }) => {
+    at("crew-box").hidden = rows.length === 0 && (mesh?.over ?? true);
+    drawCrew(at("crew"), rows);
+  },
   verdict: ({ verdict }) => drawVerdict(at("verdict"), verdict, fly, flyTo),
   histograms: ({ histograms }) => drawHistograms(at("histograms"), histograms),
   fly: ({ centre, radius, normal, level, text }) => {
@@ -352,11 +323,11 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
     at("revision-text").textContent = text;
   },
   scene: (scene) => {
-    shownRevision = scene.revision;
-    at("note").hidden = scene.vertices > 0;
+    leader.arrived(scene.revision);
+    time.arrived(scene.revision, scene.vertices);
+    at("note").hidden = true;
+    if (!scene.drawn) note(scene.vertices > 0 ? kNothingHere : emptyOf(mesh));
     if (!view.draws) note(kCannotDraw);
-    at("revision-text").textContent =
-      `revision ${scene.revision} of ${newest()} · ${grouped(scene.vertices)} vertices`;
     at("stage").dataset.revision = `${scene.revision}`;
     at("stage").dataset.vertices = `${scene.vertices}`;
     at("stage").dataset.simplices = `${scene.simplices}`;
@@ -364,7 +335,8 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
       boundary = scene.boundary;
       drawFacts();
     }
-    view.show(scene, css("--mesh"), css("--text"));
+    const plain = css(mesh?.k === 1 ? "--curve" : "--mesh");
+    view.show(scene, plain, css("--text"), mesh?.k === 1);
   },
 };
 view.onDrawn = () => ask({ type: "drawn" });
@@ -383,8 +355,6 @@ const setColours = () => view.setBackground(css("--stage"));
 setColours();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", setColours);
 
-const [secret, mode] = location.hash.slice(1).split("&");
-const demo = (led = mode === "demo");
 const recording = at("recording").textContent?.trim();
 if (recording) {
   recorded = true;

@@ -87,6 +87,7 @@ export interface Scene {
   shape: Shape;
   rim: Rim;
   bare: Bare;
+  drawn: boolean; // any of it
   boundary: string; // in words; empty: none
   faults: Float32Array; // positions of vertices at fault
   faultEdges: Float32Array; // pairs of positions

@@ -25,6 +25,7 @@ function isNews(host: HTMLElement, ...content: unknown[]): boolean {
 export const grouped = (n: number) => Math.round(n).toLocaleString("en");
 
 export function seconds(s: number): string {
+  if (s < 1) return `${Number(s.toPrecision(1))} s`;
   if (s < 10) return `${s.toFixed(1)} s`;
   if (s < 120) return `${s.toFixed(0)} s`;
   return s < 7200 ? `${(s / 60).toFixed(0)} min` : `${(s / 3600).toFixed(1)} h`;
@@ -53,6 +54,8 @@ export function badgeOf(row: MeshRow): HTMLElement {
   return element("span", `badge ${kind}`, text);
 }
 
+const lastChosen = new WeakMap<HTMLElement, string>();
+
 export function drawList(
   host: HTMLElement,
   rows: MeshRow[],
@@ -71,12 +74,13 @@ export function drawList(
         item.dataset.name = row.name;
         item.setAttribute("aria-pressed", `${row.name === chosen}`);
         const title = element("span", "title", row.label || shortName(row.name));
+        item.title = row.label;
         const facts = element(
           "span",
           "facts",
           `${row.k} in R${superscript(row.d)} · ${grouped(row.vertices)} vertices`,
         );
-        item.append(title, badgeOf(row), facts);
+        item.append(title, facts, badgeOf(row));
         if (row.certified === null) {
           const bar = element("span", "bar");
           bar.style.setProperty("--share", `${row.fraction}`);
@@ -86,6 +90,10 @@ export function drawList(
         return item;
       }),
   );
+  const pressed = host.querySelector('[aria-pressed="true"]');
+  if (chosen !== lastChosen.get(host))
+    pressed?.scrollIntoView({ block: "nearest", inline: "nearest" });
+  lastChosen.set(host, chosen);
   if (focused) host.querySelector<HTMLElement>(`[data-name="${CSS.escape(focused)}"]`)?.focus();
   if (rows.length === 0) {
     host.append(
@@ -178,11 +186,19 @@ export function drawVerdict(
   const headline = element("p", `headline ${verdict.level}`, verdict.headline);
   const text = element("p", "verdict");
   text.append(...withPlaces(verdict.text, onPlace));
-  text.title = "Read all of it";
-  text.onclick = () => text.classList.add("open");
   const claims = element("ul", "claims");
   claims.append(...verdict.claims.map((claim) => drawClaim(claim, onFault)));
   host.replaceChildren(headline, text, claims);
+  // What is cut off can be read.
+  if (text.scrollHeight > text.clientHeight) {
+    const more = element("button", "more", "read on");
+    more.type = "button";
+    more.onclick = () => {
+      text.classList.add("open");
+      more.remove();
+    };
+    text.after(more);
+  }
   for (const warning of verdict.warnings) {
     const line = element("p", "warning");
     line.append(...withPlaces(warning, onPlace));

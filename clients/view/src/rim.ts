@@ -28,6 +28,7 @@ function cut(store: MeshStore, look: Look, projected: Float32Array): Rim {
     segments: Float32Array.from(segments),
     walls: Uint8Array.from(walls),
     points: new Float32Array(),
+    pointWalls: new Uint8Array(),
   };
 }
 
@@ -46,5 +47,6 @@ export function rimOf(store: MeshStore, look: Look, projected: Float32Array): Ri
     segments: Float32Array.from(segments.flat().flatMap(at)),
     walls: Uint8Array.from(segments.map((ids) => wallOf(store, ids))),
     points: Float32Array.from(points.flat().flatMap(at)),
+    pointWalls: Uint8Array.from(points.map((ids) => wallOf(store, ids))),
   };
 }

@@ -5,6 +5,7 @@ import {
   Color,
   DirectionalLight,
   DoubleSide,
+  Group,
   HemisphereLight,
   Mesh,
   MeshStandardMaterial,
@@ -28,6 +29,8 @@ const kMap = ["#440154", "#414487", "#2a788e", "#22a884", "#7ad151", "#fde725"].
 const kWhite = new Color("#ffffff");
 const kSlowFrame = 0.08; // seconds: from here on, moving is drawn coarser
 const kFlight = 0.6; // seconds
+const kAside = new Vector3(1.4, -2.2, 1.3); // where one stands at first
+const kAbove = new Vector3(0, -0.001, 1); // a plane is seen from straight above it
 
 export function colourAt(value: number, out: Color): Color {
   const place = Math.min(Math.max(value, 0), 1) * (kMap.length - 1);
@@ -59,13 +62,17 @@ export class View {
     new LineWires() as unknown as MeshStandardMaterial,
   );
   private readonly curve = new ThickLines({ width: 2.5 });
+  private readonly net = new ThickLines({ width: 1 }); // of edges that are many
   private readonly rim = new ThickLines({ width: 3 });
-  private readonly corners = new Dots({ size: 9 });
-  private readonly bare = new Dots({ size: 4, each: true });
+  private readonly corners = new Dots({ size: 9, each: true });
+  private readonly bare = new Dots({ size: 5, each: true });
+  private readonly bareEdge = new Dots({ size: 7 }); // about each of them, that pale ones are seen
   private readonly faultEdges = new ThickLines({ width: 2.5, colour: "#d92d20", through: true });
   private readonly chosenEdges = new ThickLines({ width: 2.5, colour: "#ffb020", through: true });
   private readonly faults = new Dots({ size: 9, colour: "#d92d20", through: true });
   private readonly chosen = new Dots({ size: 15, colour: "#ffb020", through: true });
+  private readonly all = new Group();
+  private flat = false;
   private dirty = true;
   private moving = false;
   private slow = 0; // seconds that all of the mesh takes to be drawn, lately
@@ -95,13 +102,15 @@ export class View {
       this.dirty = true;
     });
     this.camera.up.set(0, 0, 1);
-    this.camera.position.set(1.4, -2.2, 1.3);
+    this.camera.position.copy(kAside);
     const sun = new DirectionalLight("#ffffff", 2.1);
     sun.position.set(-0.6, 1, 1.2);
     this.camera.add(sun);
     const sky = new HemisphereLight("#ffffff", "#8b93a5", 1.25);
-    this.scene.add(this.camera, sky, this.surface, this.rough, this.wires, this.curve.object);
+    this.all.add(this.surface, this.rough, this.wires, this.curve.object, this.net.object);
+    this.scene.add(this.camera, sky, this.all);
     const marks = [
+      this.bareEdge,
       this.bare,
       this.rim,
       this.corners,
@@ -111,7 +120,7 @@ export class View {
       this.faults,
     ];
     marks.forEach((mark, i) => (mark.object.renderOrder = i + 1));
-    this.scene.add(...marks.map((mark) => mark.object));
+    this.all.add(...marks.map((mark) => mark.object));
     const resized = new ResizeObserver(() => {
       const hidden = canvas.getBoundingClientRect().bottom - over.getBoundingClientRect().top;
       this.below = Math.min(Math.max(hidden, 0), canvas.clientHeight / 2);
@@ -138,8 +147,26 @@ export class View {
     this.dirty = true;
   }
 
-  // `plain`: of what has no colour of its own. `several`: of where walls meet.
-  show(scene: Scene, plain: string, several: string) {
+  // Nothing, until something else is shown.
+  clear() {
+    this.all.visible = false;
+    this.fitted = false;
+    this.flight = null;
+    this.dirty = true;
+  }
+
+  // In R^d: a plane is looked at from above, whatever was looked at before.
+  stand(d: number) {
+    if (this.flat === (d === 2)) return;
+    this.flat = d === 2;
+    this.controls.target.set(0, 0, 0);
+    this.camera.position.copy(this.flat ? kAbove : kAside);
+  }
+
+  // `plain`: of what has no colour of its own. `several`: of where walls meet, and about dots.
+  // `curve`: its segments are the mesh, not edges of it.
+  show(scene: Scene, plain: string, several: string, curve: boolean) {
+    this.all.visible = true;
     const { shape, rim } = scene;
     const solid = shape.kind === "triangles";
     const colours = coloursOf(shape, new Color(plain));
@@ -151,7 +178,9 @@ export class View {
     }
     const ofCurve = (rows: ArrayLike<number>) =>
       solid ? new Float32Array(0) : pairsOf(rows, shape.index);
-    this.curve.show(
+    const [lines, none] = curve ? [this.curve, this.net] : [this.net, this.curve];
+    none.show(new Float32Array(0));
+    lines.show(
       ofCurve(shape.positions),
       ofCurve(colours).map((byte) => byte / 255),
     );
@@ -160,7 +189,9 @@ export class View {
     this.rough.geometry = new BufferGeometry(); // until it is needed
     const colourOf = (wall: number) => (wall === kSeveral ? several : wallColour(wall));
     this.rim.show(rim.segments, Array.from(rim.walls, colourOf));
-    this.corners.show(rim.points, several);
+    const corners = Array.from(rim.pointWalls, (wall) => new Color(colourOf(wall)));
+    this.corners.show(rim.points, bytesOf(corners));
+    this.bareEdge.show(scene.bare.positions, several);
     this.bare.show(scene.bare.positions, coloursOf({ ...scene.bare, byWall: false }, kWhite));
     this.chosenEdges.show(scene.chosenEdges);
     this.faultEdges.show(scene.faultEdges);
@@ -313,11 +344,15 @@ function pairsOf(rows: ArrayLike<number>, index: Uint32Array | null): Float32Arr
   });
 }
 
+function bytesOf(colours: Color[]): Uint8Array {
+  return Uint8Array.from(colours.flatMap(({ r, g, b }) => [255 * r, 255 * g, 255 * b]));
+}
+
 function coloursOf({ values, byWall }: Pick<Shape, "values" | "byWall">, plain: Color): Uint8Array {
   const colours = new Uint8Array(3 * values.length);
   const colour = new Color();
   const of = (value: number) =>
-    byWall ? colour.set(wallColour(value)).lerp(kWhite, 0.3) : colourAt(value, colour);
+    byWall ? colour.set(wallColour(value)).lerp(kWhite, 0.12) : colourAt(value, colour);
   values.forEach((value, i) => {
     const { r, g, b } = Number.isNaN(value) ? plain : of(value);
     colours[3 * i] = 255 * r;

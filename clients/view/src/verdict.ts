@@ -154,24 +154,28 @@ function claimsOf(mesh: Mesh, c: Certificate): Claim[] {
   number("Euler char.", grouped(c.eulerCharacteristic));
   number("Components", grouped(c.components));
   number("Orientable", c.orientable ? "yes" : "no");
-  number(
-    "Circumradius",
-    `at most ${brief(c.maxCircumradius)}, epsilon is ${brief(mesh.spec?.epsilon ?? 0)}`,
-  );
+  const [radius, epsilon] = [c.maxCircumradius, mesh.spec?.epsilon ?? 0].map(brief);
+  claims.push({
+    title: "Circumradius",
+    text: `at most ${radius}, epsilon is ${epsilon}`,
+    holds: !c.certified && Number(radius) > Number(epsilon) ? false : null, // as they read
+  });
   number("Radius / edge", `at most ${brief(c.maxRadiusEdge)}`);
   number("Fatness", `at least ${brief(c.minFatness)}`);
   if (k === 2) number("Angles", `at least ${brief(c.minAngleDegrees)}°`);
   const reach = Number.isFinite(c.estimatedReach)
     ? `${c.certified ? "about" : "at most"} ${brief(c.estimatedReach)}, epsilon is ${brief(c.epsilonOverReach)} of it`
     : "nothing limits it: all is flat";
-  claims.push({ title: "Reach", text: reach, holds: c.onlyTooCoarse ? false : null });
+  const coarse = c.onlyTooCoarse || (!c.certified && c.epsilonOverReach >= 1);
+  if (c.estimatedReach > 0)
+    claims.push({ title: "Reach", text: reach, holds: coarse ? false : null });
   if (c.declaredReach > 0) {
     const holds = c.reachRefuted ? false : null;
     claims.push({ title: "Reach declared", text: brief(c.declaredReach), holds });
   }
   if (c.provedDistance > 0) number("Distance", `at most ${brief(c.provedDistance)}`);
   if (!c.certified && claims.every(({ holds }) => holds !== false)) {
-    claims.unshift({ title: "Others", text: "what the words above name", holds: false });
+    claims.unshift({ title: "Not in this list", text: "what the words above name", holds: false });
   }
   return claims;
 }
@@ -221,7 +225,8 @@ export function verdictOf(mesh: Mesh): Verdict | null {
 
 function unfinishedClaims(mesh: Mesh, c: Certificate): Claim[] {
   const looked = claimsOf(mesh, c).filter(
-    (claim) => claim.title === "Consistent" || claim.title === "Reach",
+    (claim) =>
+      (claim.title === "Consistent" && mesh.progress?.simplices) || claim.title === "Reach",
   );
   return [{ title: "Finished", text: "rules still ask for points", holds: false }, ...looked];
 }

@@ -67,7 +67,7 @@ export class Viewing {
     return this.mesh?.spec?.epsilon ?? 1;
   }
   private get visible(): MeshStore | null {
-    return this.shown ?? this.store;
+    return this.shown ?? (this.wanted === null ? this.store : null);
   }
 
   // State, crew and history, again and again until it is over.
@@ -181,7 +181,10 @@ export class Viewing {
     while (this.wanted !== null && this.wanted !== revision && this.store) {
       revision = this.wanted;
       const store = this.earlier.get(revision) ?? (await this.download(revision));
-      if (store === null) break;
+      if (store === null) {
+        if (this.shown === null) this.show(null); // the newest stays
+        break;
+      }
       this.earlier.delete(revision);
       this.earlier.set(revision, store);
       if (this.earlier.size > kRemembered) this.earlier.delete(this.earlier.keys().next().value!);
@@ -263,6 +266,9 @@ export class Viewing {
     const projected = project(store, this.look.frame);
     const shape = shapeOf(store, this.look, projected, this.epsilon);
     const rim = rimOf(store, this.look, projected);
+    const bare = bareOf(store, projected);
+    const corners = shape.index ?? shape.positions;
+    const drawn = [corners, rim.segments, rim.points, bare.positions].some((x) => x.length > 0);
     const faults = this.faults(store);
     const flight = flightTo(store, this.look, projected, this.epsilon, faults);
     if (this.flightDue && flight !== null) {
@@ -277,7 +283,8 @@ export class Viewing {
       simplices: store.simplices,
       shape,
       rim,
-      bare: bareOf(store, projected),
+      bare,
+      drawn,
       boundary: describe(store),
       ...marksOf(store, projected, faults),
       ...ballOf(store, this.look),

@@ -1,0 +1,132 @@
+// `stellate view` in a real browser: how meshes look at first, and in windows of all sizes.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { kPatience, picture, Stage, until } from "./stage.mjs";
+import { choose } from "./walk.mjs";
+
+let stage;
+before(async () => (stage = await Stage.open()), { timeout: kPatience });
+after(() => stage?.close());
+
+const certified = () => document.querySelector("#verdict .headline")?.textContent === "Certified";
+const press = (page, label) =>
+  page.locator("#list button", { has: page.getByText(label, { exact: true }) }).click();
+const says = (page, words) =>
+  until(page, (words) => document.getElementById("note").textContent.includes(words), words);
+
+test("words about a mesh without vertices stand over nothing, and are true", async () => {
+  const label = "stopped after six rounds of it";
+  await stage.mesh({ shape: "torus", epsilon: 0.2, cancel: true, label: "cancelled" });
+  await stage.mesh({ shape: "torus", epsilon: 0.2, max_rounds: 6, label });
+  const gateway = await stage.gateway();
+  const page = await stage.page(gateway.url);
+  await choose(page, label);
+  await until(page, () => document.querySelector("#verdict .headline") !== null);
+  assert.ok((await picture(page)).share > 0.001);
+  const title = page.locator("#list .title", { hasText: label });
+  assert.ok(await title.evaluate((e) => e.scrollWidth <= e.clientWidth), "its label is whole");
+
+  await press(page, "cancelled");
+  await says(page, "It was cancelled before its first vertex");
+  assert.equal((await picture(page)).share, 0, "the last one is gone");
+  assert.doesNotMatch(await page.locator("#verdict").innerText(), /Reach|Consistent/);
+  assert.ok(await page.locator("#crew-box").isHidden(), "nobody is to serve what is over");
+  assert.ok(await page.locator("#histograms-box").isHidden());
+
+  await choose(page, label);
+  await stage.mesh({ shape: "torus", epsilon: 0.2, wait: true, label: "waits" });
+  await until(page, () => document.querySelectorAll("#list button").length === 3);
+  await press(page, "waits");
+  await says(page, "no worker serves it");
+  assert.equal((await picture(page)).share, 0, "the last one is gone");
+  stage.begin();
+  await stage.over();
+  await until(page, certified);
+  await until(page, () => document.getElementById("note").hidden);
+  assert.ok((await picture(page)).share > 0.01);
+  assert.deepEqual(page.faults, []);
+  await page.close();
+});
+
+test("in a window of any size a mesh is chosen, whole and beside its certificate", async () => {
+  await stage.mesh({ shape: "torus", epsilon: 0.2, label: "one" });
+  await stage.mesh({ shape: "cube", epsilon: 0.7, label: "two" });
+  const gateway = await stage.gateway();
+  const page = await stage.page(gateway.url);
+  for (const width of [1600, 1000, 600, 1200]) {
+    await page.setViewportSize({ width, height: 760 });
+    for (const label of ["one", "two"]) {
+      await choose(page, label);
+      await until(page, certified);
+      await page.waitForTimeout(300); // the window's new size
+      const { share, sides } = await picture(page);
+      assert.ok(share > 0.05 && sides[0] < 199, `${label} at ${width}: ${share}, ${sides}`);
+    }
+    const cut = await page.evaluate(() => {
+      const { scrollWidth, clientWidth } = document.documentElement;
+      const narrow = [...document.querySelectorAll("#look select")].filter((select) => {
+        const { width } = select.getBoundingClientRect();
+        select.style.maxWidth = "none";
+        const whole = select.getBoundingClientRect().width;
+        select.style.maxWidth = "";
+        return whole > width + 1;
+      });
+      return [scrollWidth > clientWidth, ...narrow.map(({ id }) => id)];
+    });
+    assert.deepEqual(cut, [false], `nothing is cut off at ${width}`);
+  }
+  assert.deepEqual(page.faults, []);
+  await page.close();
+});
+
+test("a plane curve is seen from above, and is no pale line", async () => {
+  const name = await stage.mesh({ shape: "circle", epsilon: 0.1, label: "a circle" });
+  const gateway = await stage.gateway(name);
+  const page = await stage.page(gateway.url);
+  for (const colorScheme of ["light", "dark"]) {
+    await page.emulateMedia({ colorScheme });
+    await page.reload();
+    await until(page, certified);
+    await until(page, () => Number(document.getElementById("stage").dataset.simplices) > 20);
+    const [width, height] = (await picture(page)).sides;
+    assert.ok(Math.abs(width / height - 1) < 0.05, `round: ${width} x ${height}`);
+    const contrast = await page.evaluate(() => {
+      const light = (name) => {
+        const hex = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+        const [r, g, b] = [1, 3, 5].map((i) => (parseInt(hex.slice(i, i + 2), 16) / 255) ** 2.2);
+        return 0.2126 * r + 0.7152 * g + 0.0722 * b + 0.05;
+      };
+      const [a, b] = [light("--curve"), light("--stage")];
+      return Math.max(a / b, b / a);
+    });
+    assert.ok(contrast > 3, `${contrast} to 1 in ${colorScheme}`);
+  }
+  assert.ok(await page.locator("#part").isHidden(), "there is nothing to choose");
+  assert.deepEqual(page.faults, []);
+  await page.close();
+});
+
+test("a slice is seen from an oblique side, by a coordinate that changes on it", async () => {
+  await stage.mesh({ shape: "four-sphere", epsilon: 0.7, label: "four" });
+  await stage.mesh({ shape: "flat torus", epsilon: 0.7, label: "three" });
+  const gateway = await stage.gateway();
+  const page = await stage.page(gateway.url);
+  for (const label of ["four", "three"]) {
+    await choose(page, label);
+    await until(page, certified);
+    const chosen = await page.evaluate(() =>
+      ["part", "axis", "colour", "axis-0"].map((id) => document.getElementById(id).value),
+    );
+    assert.equal(chosen[0], "slice");
+    assert.notEqual(chosen[1], chosen[2], "the coordinate of the slice colours nothing");
+    assert.equal(chosen[3], "", "no axis alone");
+    await page.waitForTimeout(300);
+    const { share } = await picture(page);
+    assert.ok(share > 0.08, `${label} is no smear: ${share}`);
+  }
+  // At its end there is nothing, and words say so.
+  await page.locator("#level").fill("0");
+  await says(page, "Nothing of it is at this level");
+  assert.deepEqual(page.faults, []);
+  await page.close();
+});
