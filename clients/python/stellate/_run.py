@@ -141,7 +141,7 @@ class Run:
         mesh_spec(checked, 1.0, criteria)  # what is misspelt shows before the oracle is probed
         choice = checkpoint.choose_epsilon if checkpoint is not None else choose
         self._on_progress, self._checkpoint = on_progress, checkpoint
-        self._epsilon_reason = ""
+        self._epsilon_reason, self._note = "", checked.note
         chosen = self._say(choice(oracle, epsilon))
         kept = checkpoint.retries if checkpoint is not None else None
         most = table("doctor.toml")["auto_retries"] if kept is None else kept
@@ -329,10 +329,12 @@ class Run:
         )
 
     def _told(self, mesh: Mesh) -> Mesh:
-        """With what the server does not know: why epsilon is what it is."""
-        if mesh.report is None or not self._epsilon_reason:
+        """With what the server does not know: why epsilon is what it is, and of what oracle."""
+        if mesh.report is None or not (self._epsilon_reason or self._note):
             return mesh
-        report = dataclasses.replace(mesh.report, epsilon_reason=self._epsilon_reason)
+        report = dataclasses.replace(
+            mesh.report, epsilon_reason=self._epsilon_reason, oracle=self._note
+        )
         return dataclasses.replace(mesh, report=report)
 
     def __enter__(self) -> Run:

@@ -12,6 +12,8 @@ import numpy as np
 
 from .errors import InvalidArgument, NotConverged, OracleError, add_words
 
+_MOST_OF_NOTE = 200  # characters
+
 
 @runtime_checkable
 class Oracle(Protocol):
@@ -43,6 +45,8 @@ class Oracle(Protocol):
       bounding_box: (lower (d,), upper (d,)), where to look for M, or
       seeds: (m, d), points near M, one at least on each component. One of the two is needed.
       thread_safe: True lets several workers call it at once.
+      note: a line for people, such as what it was fitted with; the mesh's report has its first 200
+        characters, as the oracle's own words.
     """
 
     dimension: int  # k
@@ -70,6 +74,7 @@ class CheckedOracle:
         self.has_local_size = callable(getattr(oracle, "local_size", None))
         self.has_jacobian = callable(getattr(oracle, "jacobian", None))
         self.walls = self._count_walls(oracle)
+        self.note = _note(getattr(oracle, "note", ""))
         self.bounding_box = _box(getattr(oracle, "bounding_box", None))
         seeds = getattr(oracle, "seeds", None)
         self.seeds = None if seeds is None else points_of(seeds, self.ambient_dimension)
@@ -313,6 +318,14 @@ def _instead(given: Any) -> str:
             "stellate.manifolds has a few ready"
         )
     return ""
+
+
+def _note(note: Any) -> str:
+    """In one line, without what terminals obey."""
+    if not isinstance(note, str):
+        return ""
+    printable = "".join(c if c.isprintable() else " " for c in note)
+    return " ".join(printable.split())[:_MOST_OF_NOTE]
 
 
 def _box(box: Any) -> tuple[np.ndarray, np.ndarray] | None:

@@ -77,3 +77,10 @@ def test_points_that_come_several_times_are_no_neighbours_of_themselves():
     assert off < 0.01 and turned < 5
     with pytest.raises(stellate.InvalidArgument, match="7 different points are too few"):
         oracles.PointCloud(np.repeat(points[:7], 40, axis=0), 2)
+
+
+def test_what_is_made_of_a_cloud_tells_of_it_too():
+    cloud = oracles.PointCloud(scan(4000, 0.003), 2)
+    assert cloud.note == repr(cloud)
+    half = oracles.Clipped(cloud, [oracles.HalfSpace([1, 0, 0])])
+    assert half.note == cloud.note

@@ -223,3 +223,19 @@ def test_what_makes_an_oracle_of_something_else_is_said(given, words):
 
 def test_a_ready_manifold_is_an_oracle():
     assert isinstance(Sphere(), stellate.Oracle)
+
+
+@pytest.mark.parametrize(
+    "note, told",
+    [
+        (None, ""),
+        ("fitted with 3 knots", "fitted with 3 knots"),
+        ("two\nlines\x1b[2J", "two lines [2J"),
+        ("long " * 100, ("long " * 40)),
+    ],
+)
+def test_an_oracle_tells_of_itself_in_a_line_that_is_fit_to_be_shown(note, told):
+    oracle = Sphere(2)
+    if note is not None:
+        oracle.note = note
+    assert CheckedOracle(oracle).note == told

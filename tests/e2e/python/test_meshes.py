@@ -303,3 +303,13 @@ def test_a_mesh_that_could_not_be_written_is_the_exceptions(server, tmp_path):
     with pytest.raises(stellate.SaveError, match="No such file") as lost:
         stellate.mesh(manifolds.Torus(), 0.3, server, remove, save=folder / "torus.txt")
     assert lost.value.mesh.certified
+
+
+def test_the_report_has_the_oracles_own_words(server):
+    told = manifolds.Sphere(2)
+    told.note = "of radius 1, as it says itself"
+    report = stellate.mesh(told, 0.5, server=server).report
+    assert report.oracle == told.note == report.to_dict()["oracle"]
+    assert f"oracle  {told.note}" in str(report)
+    silent = stellate.mesh(manifolds.Sphere(2), 0.5, server=server).report
+    assert silent.oracle == "" and "oracle" not in silent.to_dict()

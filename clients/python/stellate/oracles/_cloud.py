@@ -75,6 +75,11 @@ class PointCloud(Projection):
             )
         self.residual = float(np.quantile(norms(nearest - some)[found], 0.95))
 
+    @property
+    def note(self) -> str:
+        """What it was fitted with, for the mesh's report."""
+        return repr(self)
+
     def __repr__(self) -> str:
         low, high = float(self.bandwidths.min()), float(self.bandwidths.max())
         local = f" ({low:.3g} to {high:.3g})" if low < high else ""
