@@ -51,6 +51,7 @@ class Report:
     certificate: SimpleNamespace
     termination: str = "CONVERGED"
     epsilon_reason: str = ""
+    oracle: str = ""
 
     @property
     def certified(self):
