@@ -100,7 +100,7 @@ class HistoryStream : public grpc::ServerBidiReactor<Request, Response>,
   }
 
  protected:
-  enum class Step { kWait, kSend, kSendMoreFollows, kSendLast };
+  enum class Step { kWait, kSend, kSendLast };
 
   // Where to start in `session`, or why not. Before anything else, without the lock.
   virtual grpc::Status Choose(const Request& request, const Session& session) = 0;
@@ -171,11 +171,11 @@ class HistoryStream : public grpc::ServerBidiReactor<Request, Response>,
     if (finished_) history_.reset();
     if (end_) return this->Finish(*end_);
     state_.metrics.Sent(response_.ByteSizeLong());
-    grpc::WriteOptions options;
-    if (finished_) return this->StartWriteAndFinish(&response_, options, grpc::Status::OK);
+    if (finished_) return this->StartWriteAndFinish(&response_, {}, grpc::Status::OK);
     writing_ = true;
-    if (step == Step::kSendMoreFollows) options.set_buffer_hint();  // they go out together
-    this->StartWrite(&response_, options);
+    // Never with a buffer hint: gRPC 1.51 may keep such a message, and not call OnWriteDone, until
+    // something else goes out on the connection.
+    this->StartWrite(&response_);
   }
 
   ServerState& state_;

@@ -58,7 +58,7 @@ class WatchStream final : public HistoryStream<v1::WatchMeshRequest, v1::WatchMe
     } else {
       return Step::kWait;
     }
-    return progress_due_ ? Step::kSendMoreFollows : Step::kSend;
+    return Step::kSend;
   }
 
   void TakePart() {
