@@ -21,8 +21,8 @@ Eigen::MatrixXd SolveSymmetric(const Eigen::MatrixXd& a, const Eigen::MatrixXd& 
 // The same where a may be any square, by elimination with full pivoting.
 Eigen::VectorXd SolvePivoted(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
 
-// The shortest x with the least |a x - b|. Singular values below `threshold` of the largest are
-// zero, where it is given.
+// An x with the least |a x - b|, by column pivoting: where columns depend on each other, one of
+// several. The shortest of them takes singular values below `threshold` of the largest for zero.
 Eigen::VectorXd LeastSquares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
 Eigen::VectorXd ShortestLeastSquares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
                                      double threshold);
