@@ -37,17 +37,21 @@ void BatchParts::Cut() {
   });
 }
 
-Answers BatchParts::With(const Answers& answers) const {
-  Answers all = answers_;
+void BatchParts::PutInto(Answers* all, const Answers& answers) const {
   std::size_t next = 0;
   ForEachPiece(whole_, first_, most_, [&](std::size_t b, Eigen::Index from, Eigen::Index) {
-    all.blocks[b].Put(from, answers.blocks[next++]);
+    all->blocks[b].Put(from, answers.blocks[next++]);
   });
+}
+
+Answers BatchParts::With(const Answers& answers) const {
+  Answers all = answers_;
+  PutInto(&all, answers);
   return all;
 }
 
 void BatchParts::Take(const Answers& answers) {
-  answers_ = With(answers);
+  PutInto(&answers_, answers);
   first_ += part_.size();
   Cut();
 }

@@ -17,12 +17,14 @@ class BatchParts {
   bool is_last() const { return first_ + part_.size() == whole_.size(); }
 
   // Returns the answers to all parts so far, with `answers` to part(), which have been checked.
+  // Copies the whole: only for the last part, which can then be answered again.
   Answers With(const Answers& answers) const;
-  // Keeps the answers to part() and goes to the next one.
+  // Keeps the answers to part() and goes to the next one. Copies these answers alone.
   void Take(const Answers& answers);
 
  private:
   void Cut();
+  void PutInto(Answers* all, const Answers& answers) const;
 
   QueryBatch whole_, part_;
   Eigen::Index most_;

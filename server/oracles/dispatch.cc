@@ -309,8 +309,8 @@ Dispatch::ClaimResult Dispatch::Claim(WorkerId worker_id, LeaseId id, TimePoint 
   return ClaimResult::kClaimed;
 }
 
-void Dispatch::Settle(const Lease& lease) {
-  if (active_ && lease.id >= first_of_round_) unsettled_ -= lease.count;
+void Dispatch::Settle(LeaseId id, Index count) {
+  if (active_ && id >= first_of_round_) unsettled_ -= count;
 }
 
 void Dispatch::Busy(WorkerId worker_id, LeaseId id, TimePoint now) {

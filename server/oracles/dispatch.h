@@ -125,7 +125,8 @@ class Dispatch {
   };
   // Takes note of an answer and ends its lease. Call Settle once the answer is stored.
   ClaimResult Claim(WorkerId worker, LeaseId id, TimePoint now, Lease* lease);
-  void Settle(const Lease& lease);  // after kClaimed only
+  // Takes note that `count` queries of a claimed lease have their answers. After kClaimed only.
+  void Settle(LeaseId id, Eigen::Index count);
   // Takes note that answers of `a` and `b` to a query of that block have been compared.
   void Compared(WorkerId a, WorkerId b, std::size_t block);
   // Renews the lease of a worker that is still computing. Ignored if the worker does not have it.

@@ -164,11 +164,7 @@ void OraclePool::TakeOver(const Chunk& chunk, const core::AnswerBlock& answer) {
   }
   if (on_answered_) on_answered_(chunk.round, chunk.block_index, chunk.first, chunk.count);
   const std::lock_guard lock(mutex_);
-  if (round_ != chunk.round) return;
-  Lease lease;
-  lease.id = chunk.lease;
-  lease.count = chunk.count;
-  dispatch_.Settle(lease);
+  if (round_ == chunk.round) dispatch_.Settle(chunk.lease, chunk.count);
 }
 
 // Of the queries [first, first + count), those that have another worker's answer already. The

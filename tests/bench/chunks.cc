@@ -105,7 +105,7 @@ class Simulation {
       answers_.erase(answers_.begin());
       Lease claimed;
       const auto result = dispatch_.Claim(lease.worker, lease.id, Time(), &claimed);
-      if (result == Dispatch::ClaimResult::kClaimed) dispatch_.Settle(claimed);
+      if (result == Dispatch::ClaimResult::kClaimed) dispatch_.Settle(claimed.id, claimed.count);
       if (result == Dispatch::ClaimResult::kSecond) Compare(claimed);
     } else {
       now_ = std::max(now_, deadline) + 1e-9;

@@ -21,7 +21,7 @@ class ComparisonsTest : public ::testing::Test {
   static void Settle(Dispatch* dispatch, const Lease& lease, TimePoint now) {
     Lease claimed;
     ASSERT_EQ(dispatch->Claim(lease.worker, lease.id, now, &claimed), Claim::kClaimed);
-    dispatch->Settle(claimed);
+    dispatch->Settle(claimed.id, claimed.count);
   }
 
   DispatchOptions options_;
@@ -37,7 +37,7 @@ TEST_F(ComparisonsTest, AWorkerThatComesLateIsComparedBeforeTheRoundEnds) {
   const auto answer = [&](const Lease& lease, TimePoint now) {
     const auto result = dispatch.Claim(lease.worker, lease.id, now, &claimed_);
     ASSERT_EQ(result, lease.check ? Claim::kSecond : Claim::kClaimed);
-    if (!lease.check) dispatch.Settle(claimed_);
+    if (!lease.check) dispatch.Settle(claimed_.id, claimed_.count);
   };
   const auto ask = [&](Dispatch::Family family, TimePoint now, WorkerId wanted) {
     dispatch.Begin({{1, 8, family}}, now);

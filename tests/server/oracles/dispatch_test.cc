@@ -34,7 +34,7 @@ class DispatchTest : public ::testing::Test {
               Dispatch::ClaimResult::kClaimed);
     EXPECT_EQ(claimed.first, lease.first);
     EXPECT_EQ(claimed.count, lease.count);
-    dispatch->Settle(claimed);
+    dispatch->Settle(claimed.id, claimed.count);
   }
 
   // A round of `queries` by workers that take `fixed` for a chunk and `each` for a query. When it

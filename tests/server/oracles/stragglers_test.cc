@@ -43,7 +43,7 @@ class StragglersTest : public ::testing::Test {
   static void Settle(Dispatch* dispatch, const Lease& lease, TimePoint now) {
     Lease claimed;
     ASSERT_EQ(dispatch->Claim(lease.worker, lease.id, now, &claimed), Claim::kClaimed);
-    dispatch->Settle(claimed);
+    dispatch->Settle(claimed.id, claimed.count);
   }
 
   DispatchOptions options_;
@@ -225,7 +225,7 @@ TEST_F(StragglersTest, AFewQueriesAreAskedOfTwo) {
       ASSERT_EQ(result, Claim::kClaimed);
       answered[lease.worker] += lease.count;
       given[lease.worker].push_back(lease);
-      dispatch.Settle(claimed_);
+      dispatch.Settle(claimed_.id, claimed_.count);
     }
   }
   EXPECT_EQ(answered[1] + answered[2], 100000);
@@ -308,7 +308,7 @@ TEST_F(StragglersTest, HoweverWorkersBehaveEveryQueryCountsOnce) {
               ++counted[static_cast<std::size_t>(claimed_.first + i)];
               by[static_cast<std::size_t>(claimed_.first + i)] = lease.worker;
             }
-            dispatch.Settle(claimed_);
+            dispatch.Settle(claimed_.id, claimed_.count);
             break;
           case Claim::kSecond:
             ++seconds;
