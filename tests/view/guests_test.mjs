@@ -4,12 +4,10 @@ import { createHash } from "node:crypto";
 import http from "node:http";
 import { createConnection } from "node:net";
 import { networkInterfaces } from "node:os";
-import { after, before, test } from "node:test";
-import { kPatience, Stage, until } from "./stage.mjs";
+import { test } from "node:test";
+import { kPatience, setStage, until } from "./stage.mjs";
 
-let stage;
-before(async () => (stage = await Stage.open()), { timeout: kPatience });
-after(() => stage?.close());
+const stage = setStage();
 
 function get(port, options) {
   return new Promise((resolve, reject) => {
@@ -121,7 +119,6 @@ test("strangers do not lock us out", async () => {
     );
   });
   assert.equal((await get(port, { path: "/" })).status, 200);
-  await page.close();
   for (const socket of open) socket.destroy();
 });
 
@@ -135,7 +132,6 @@ test("whoever does not know the secret sees nothing", async () => {
       document.getElementById("connection").textContent.includes("no longer"),
   );
   assert.equal(await page.locator("#list button").count(), 0);
-  await page.close();
 
   // And an impostor is told nothing: no name of a mesh, no request.
   const impostor = await Impostor.open(port);

@@ -1,14 +1,11 @@
 // `stellate view` in a real browser: how meshes look at first, and in windows of all sizes.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { kPatience, picture, Stage, until } from "./stage.mjs";
+import { test } from "node:test";
+import { finished, picture, resize, setStage, until } from "./stage.mjs";
 import { choose } from "./walk.mjs";
 
-let stage;
-before(async () => (stage = await Stage.open()), { timeout: kPatience });
-after(() => stage?.close());
+const stage = setStage();
 
-const certified = () => document.querySelector("#verdict .headline")?.textContent === "Certified";
 const press = (page, label) =>
   page.locator("#list button", { has: page.getByText(label, { exact: true }) }).click();
 const says = (page, words) =>
@@ -18,10 +15,9 @@ test("words about a mesh without vertices stand over nothing, and are true", asy
   const label = "stopped after six rounds of it";
   await stage.mesh({ shape: "torus", epsilon: 0.2, cancel: true, label: "cancelled" });
   await stage.mesh({ shape: "torus", epsilon: 0.2, max_rounds: 6, label });
-  const gateway = await stage.gateway();
-  const page = await stage.page(gateway.url);
+  const page = await stage.look();
   await choose(page, label);
-  await until(page, () => document.querySelector("#verdict .headline") !== null);
+  await finished(page);
   assert.ok((await picture(page)).share > 0.001);
   const title = page.locator("#list .title", { hasText: label });
   assert.ok(await title.evaluate((e) => e.scrollWidth <= e.clientWidth), "its label is whole");
@@ -41,26 +37,34 @@ test("words about a mesh without vertices stand over nothing, and are true", asy
   assert.equal((await picture(page)).share, 0, "the last one is gone");
   stage.begin();
   await stage.over();
-  await until(page, certified);
+  await finished(page);
   await until(page, () => document.getElementById("note").hidden);
   assert.ok((await picture(page)).share > 0.01);
-  assert.deepEqual(page.faults, []);
-  await page.close();
 });
+
+// From far away, by its button.
+async function comesBack(page, sides, what) {
+  await page.locator("#canvas").hover();
+  await page.mouse.wheel(0, 500);
+  await until(page, (width) => window.glance().sides[0] < 0.9 * width, sides[0]);
+  await page.locator("#fit").click();
+  const fitted = (await picture(page)).sides;
+  const same = fitted.every((side, i) => Math.abs(side - sides[i]) <= 1);
+  assert.ok(same, `${what} fills ${fitted} once it is fitted, ${sides} before`);
+}
 
 test("in a window of any size a mesh is chosen, whole and beside its certificate", async () => {
   await stage.mesh({ shape: "torus", epsilon: 0.2, label: "one" });
   await stage.mesh({ shape: "cube", epsilon: 0.7, label: "two" });
-  const gateway = await stage.gateway();
-  const page = await stage.page(gateway.url);
+  const page = await stage.look();
   for (const width of [1600, 1000, 600, 1200]) {
-    await page.setViewportSize({ width, height: 760 });
+    await resize(page, width, 760);
     for (const label of ["one", "two"]) {
       await choose(page, label);
-      await until(page, certified);
-      await page.waitForTimeout(300); // the window's new size
+      await finished(page);
       const { share, sides } = await picture(page);
       assert.ok(share > 0.05 && sides[0] < 199, `${label} at ${width}: ${share}, ${sides}`);
+      await comesBack(page, sides, `${label} at ${width}`);
     }
     const cut = await page.evaluate(() => {
       const { scrollWidth, clientWidth } = document.documentElement;
@@ -75,19 +79,15 @@ test("in a window of any size a mesh is chosen, whole and beside its certificate
     });
     assert.deepEqual(cut, [false], `nothing is cut off at ${width}`);
   }
-  assert.deepEqual(page.faults, []);
-  await page.close();
 });
 
 test("a plane curve is seen from above, and is no pale line", async () => {
   const name = await stage.mesh({ shape: "circle", epsilon: 0.1, label: "a circle" });
-  const gateway = await stage.gateway(name);
-  const page = await stage.page(gateway.url);
+  const page = await stage.look(name);
   for (const colorScheme of ["light", "dark"]) {
     await page.emulateMedia({ colorScheme });
     await page.reload();
-    await until(page, certified);
-    await until(page, () => Number(document.getElementById("stage").dataset.simplices) > 20);
+    await finished(page);
     const [width, height] = (await picture(page)).sides;
     assert.ok(Math.abs(width / height - 1) < 0.05, `round: ${width} x ${height}`);
     const contrast = await page.evaluate(() => {
@@ -102,31 +102,25 @@ test("a plane curve is seen from above, and is no pale line", async () => {
     assert.ok(contrast > 3, `${contrast} to 1 in ${colorScheme}`);
   }
   assert.ok(await page.locator("#part").isHidden(), "there is nothing to choose");
-  assert.deepEqual(page.faults, []);
-  await page.close();
 });
 
 test("a slice is seen from an oblique side, by a coordinate that changes on it", async () => {
   await stage.mesh({ shape: "four-sphere", epsilon: 0.7, label: "four" });
   await stage.mesh({ shape: "flat torus", epsilon: 0.7, label: "three" });
-  const gateway = await stage.gateway();
-  const page = await stage.page(gateway.url);
+  const page = await stage.look();
   for (const label of ["four", "three"]) {
     await choose(page, label);
-    await until(page, certified);
+    await finished(page);
     const chosen = await page.evaluate(() =>
       ["part", "axis", "colour", "axis-0"].map((id) => document.getElementById(id).value),
     );
     assert.equal(chosen[0], "slice");
     assert.notEqual(chosen[1], chosen[2], "the coordinate of the slice colours nothing");
     assert.equal(chosen[3], "", "no axis alone");
-    await page.waitForTimeout(300);
     const { share } = await picture(page);
     assert.ok(share > 0.08, `${label} is no smear: ${share}`);
   }
   // At its end there is nothing, and words say so.
   await page.locator("#level").fill("0");
   await says(page, "Nothing of it is at this level");
-  assert.deepEqual(page.faults, []);
-  await page.close();
 });

@@ -3,8 +3,8 @@
     tests/view/meshes.py ADDRESS
 
 Reads a line of JSON for each mesh wanted, {"shape": NAME, "epsilon": E, ...}; writes its name once
-it is declared, and "over" when it is done. "seconds": that each call of the oracle takes at least.
-"wait": for one more line before it is begun. "cancel": it before that.
+it is declared, and "over" when it is done. "wait": for one more line before it is begun. "hold": for
+one more line once the oracle has answered so many calls. "cancel": it before it is begun.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import pathlib
 import sys
-import time
+import threading
 
 import numpy as np
 
@@ -34,17 +34,20 @@ class TwoSpheres:
         return centre + away / np.linalg.norm(away, axis=1, keepdims=True)
 
 
-class Slow:
-    """The same, but each call takes a while."""
+class Held:
+    """The same, but after some calls it answers no more, until there is one more line."""
 
-    def __init__(self, oracle: object, seconds: float) -> None:
-        self._oracle, self._seconds = oracle, seconds
+    def __init__(self, oracle: object, calls: int) -> None:
+        self._oracle, self._calls, self._lock = oracle, calls, threading.Lock()
 
     def __getattr__(self, name: str) -> object:
         return getattr(self._oracle, name)
 
     def closest_point(self, x: np.ndarray) -> np.ndarray:
-        time.sleep(self._seconds)
+        with self._lock:
+            if self._calls == 0:
+                sys.stdin.readline()
+            self._calls -= 1
         return self._oracle.closest_point(x)
 
 
@@ -67,11 +70,11 @@ def main() -> None:
     for line in sys.stdin:
         wish = json.loads(line)
         oracle = SHAPES[wish.pop("shape")]()
-        seconds = wish.pop("seconds", 0.0)
+        hold = wish.pop("hold", None)
         wait = wish.pop("wait", False)
         cancel = wish.pop("cancel", False)
-        if seconds:
-            oracle = Slow(oracle, seconds)
+        if hold is not None:
+            oracle = Held(oracle, hold)
         name = client.create(oracle, **wish).name
         print(name, flush=True)
         if wait:

@@ -1,33 +1,47 @@
 // What the viewer's tests stand on: a server of meshes, its gateways, a browser.
+import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { once } from "node:events";
 import { existsSync, mkdtempSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
+import { createServer } from "node:net";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { createInterface } from "node:readline";
+import { after, afterEach, before } from "node:test";
 import { fileURLToPath } from "node:url";
 
 // From where the page was built: one lock file names all that comes from npm.
 const require = createRequire(join(process.env.STELLATE_VIEW_WORK, "package.json"));
 const { chromium } = require("playwright-core");
 
-export const kPatience = 60_000;
+// With a thing that takes a second on a machine with nothing else to do.
+export const kPatience = 180_000;
 const here = fileURLToPath(new URL(".", import.meta.url));
 
+// For all tests of a file. What each of them opened is closed behind it, and must not have failed.
+export function setStage() {
+  const stage = new Stage();
+  before(() => stage.open(), { timeout: kPatience });
+  afterEach(() => stage.clear());
+  after(() => stage.close());
+  return stage;
+}
+
 export class Stage {
-  static async open() {
-    const stage = new Stage();
-    stage.folder = mkdtempSync(join(tmpdir(), "stellate-view-"));
-    stage.address = `unix:${stage.folder}/server`;
-    stage.children = [];
-    const ready = join(stage.folder, "ready");
-    const server = stage.spawn(process.env.STELLATED, [
+  children = [];
+  pages = [];
+
+  async open() {
+    this.folder = mkdtempSync(join(tmpdir(), "stellate-view-"));
+    this.address = `unix:${this.folder}/server`;
+    const ready = join(this.folder, "ready");
+    const server = this.spawn(process.env.STELLATED, [
       "--listen",
-      stage.address,
+      this.address,
       "--exit-with-parent",
       "--data-dir",
-      join(stage.folder, "data"),
+      join(this.folder, "data"),
       "--ready-file",
       ready,
     ]);
@@ -38,14 +52,19 @@ export class Stage {
     })();
     failed.catch(() => {}); // it is stopped in the end
     await Promise.race([listens, failed]);
-    stage.meshes = stage.spawn("/usr/bin/python3", [join(here, "meshes.py"), stage.address]);
-    stage.said = createInterface(stage.meshes.stdout)[Symbol.asyncIterator]();
-    stage.meshes.stderr.pipe(process.stderr);
-    stage.browser = await chromium.launch({
+    this.serve();
+    this.browser = await chromium.launch({
       executablePath: process.env.CHROMIUM,
       args: ["--no-sandbox"],
+      timeout: kPatience,
     });
-    return stage;
+  }
+
+  serve() {
+    this.meshes = this.spawn("/usr/bin/python3", [join(here, "meshes.py"), this.address]);
+    this.said = createInterface(this.meshes.stdout)[Symbol.asyncIterator]();
+    this.meshes.stderr.pipe(process.stderr);
+    this.serves = false; // one of them
   }
 
   spawn(program, args) {
@@ -57,11 +76,12 @@ export class Stage {
     return child;
   }
 
-  // Declares a mesh and, unless it is slow or is to wait for begin(), waits for its end. Its name.
+  // Declares a mesh and, unless it waits for begin(), waits for its end. Its name.
   async mesh(wish) {
+    this.serves = true;
     this.meshes.stdin.write(JSON.stringify(wish) + "\n");
     const { value: name } = await this.said.next();
-    if (!wish.seconds && !wish.wait) await this.over();
+    if (!wish.wait && wish.hold === undefined) await this.over();
     return name;
   }
   begin() {
@@ -70,6 +90,7 @@ export class Stage {
   async over() {
     const { value } = await this.said.next();
     if (value !== "over") throw new Error(`the mesh is not over: ${value}`);
+    this.serves = false;
   }
 
   // `stellate view ...`, and the address that it prints.
@@ -90,15 +111,43 @@ export class Stage {
 
   async page(url, script = () => {}) {
     const page = await this.browser.newPage({ viewport: { width: 1200, height: 760 } });
-    await page.addInitScript(script);
+    this.pages.push(page);
     page.requested = [];
+    page.sockets = [];
+    page.said = [];
     page.faults = [];
     page.on("request", (request) => page.requested.push(request.url()));
-    page.on("websocket", (socket) => page.requested.push(socket.url()));
+    page.on("websocket", (socket) => {
+      page.sockets.push(socket);
+      page.requested.push(socket.url());
+    });
+    page.on("console", (line) => page.said.push(line.text()));
     page.on("pageerror", (error) => page.faults.push(error.message));
     page.setDefaultTimeout(kPatience);
+    await page.addInitScript(lookOn);
+    await page.addInitScript(script);
     await page.goto(url);
     return page;
+  }
+
+  // A page with a gateway of its own: to that mesh, if there is one.
+  async look(name, script) {
+    const gateway = await this.gateway(...(name ? [name] : []));
+    const page = await this.page(gateway.url, script);
+    return Object.assign(page, { gateway });
+  }
+
+  async clear() {
+    const pages = this.pages.splice(0);
+    await Promise.all(pages.map((page) => page.close()));
+    if (this.serves) {
+      this.meshes.kill("SIGKILL"); // a test that failed left it there
+      this.serve();
+    }
+    assert.deepEqual(
+      pages.flatMap(({ faults }) => faults),
+      [],
+    );
   }
 
   async close() {
@@ -108,11 +157,26 @@ export class Stage {
   }
 }
 
-// What the canvas shows: how much of it is no background, in how many parts, how many colours, and
-// a digest by which two pictures are told apart, the sides of what is seen, how far down it comes, 0 to 1.
-export function picture(page) {
-  return page.evaluate(async () => {
-    await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+// That nobody listens on, nor is given for the asking: those begin above it.
+export async function freePort() {
+  for (let port = 20_000 + (process.pid % 10_000); port < 32_000; port++) {
+    const server = createServer();
+    const listens = new Promise((resolve) => {
+      server.once("listening", () => resolve(true)).once("error", () => resolve(false));
+    });
+    server.listen(port, "127.0.0.1");
+    if (!(await listens)) continue;
+    await new Promise((resolve) => server.close(resolve));
+    return port;
+  }
+  throw new Error("no port is free");
+}
+
+// In the page: what its canvas shows now. How much of it is no background, in how many parts, how many
+// colours, a digest by which two pictures are told apart, the sides of what is seen, how far down it
+// comes, 0 to 1; and of what mesh that is, as the page says.
+function lookOn() {
+  window.glance = () => {
     const canvas = document.getElementById("canvas");
     const [width, height] = [200, Math.round((200 * canvas.height) / canvas.width)];
     const copy = new OffscreenCanvas(width, height).getContext("2d");
@@ -145,12 +209,56 @@ export function picture(page) {
     let digest = 0;
     for (let i = 0; i < ink.length; i++) digest = (Math.imul(digest, 31) + word(i)) | 0;
     const lines = [...ink.keys()].filter((i) => ink[i]);
-    const side = (of) => (lines.length > 0 ? Math.max(...lines.map(of)) - Math.min(...lines.map(of)) + 1 : 0);
+    const side = (of) =>
+      lines.length > 0 ? Math.max(...lines.map(of)) - Math.min(...lines.map(of)) + 1 : 0;
     const sides = [side((i) => i % width), side((i) => Math.floor(i / width))];
     const lowest = Math.ceil((ink.lastIndexOf(true) + 1) / width) / height;
     const colours = new Set(ink.flatMap((on, i) => (on ? [word(i)] : []))).size;
-    return { share: ink.filter(Boolean).length / ink.length, parts, colours, digest, sides, lowest };
+    const share = ink.filter(Boolean).length / ink.length;
+    const { dataset } = document.getElementById("stage");
+    const [revision, vertices, simplices] = ["revision", "vertices", "simplices"].map((name) =>
+      Number(dataset[name]),
+    );
+    return { share, parts, colours, digest, sides, lowest, revision, vertices, simplices };
+  };
+}
+
+// Of what moves by itself.
+export const glance = (page) => page.evaluate(() => window.glance());
+
+// Of what was asked for, once it is there.
+export async function picture(page) {
+  await still(page);
+  return glance(page);
+}
+
+// Waits until all that was asked for is on the screen, and stays: a window's new size takes a frame to
+// be seen, and one to be drawn.
+export async function still(page) {
+  await page.evaluate(() => (window.framesStill = 0));
+  await page.waitForFunction(
+    () => {
+      const busy = document.getElementById("stage").ariaBusy !== "false";
+      return (window.framesStill = busy ? 0 : window.framesStill + 1) > 3;
+    },
+    undefined,
+    { timeout: kPatience, polling: "raf" },
+  );
+}
+
+// Waits until the mesh that is looked at is over, and all of it on the screen.
+export async function finished(page) {
+  await until(page, () => {
+    const newest = document.getElementById("revision").max;
+    const over = document.querySelector("#verdict .headline") !== null;
+    return over && document.getElementById("stage").dataset.revision === newest;
   });
+  await still(page);
+}
+
+export async function resize(page, width, height) {
+  await page.setViewportSize({ width, height });
+  await until(page, (size) => `${[innerWidth, innerHeight]}` === `${size}`, [width, height]);
 }
 
 export const shown = (page) =>
@@ -159,7 +267,7 @@ export const shown = (page) =>
     return { revision: Number(revision), vertices: Number(vertices), simplices: Number(simplices) };
   });
 
-// Waits until what is shown has changed to something for which `holds`.
+// Waits until something holds in the page, or in a frame of it.
 export function until(page, holds, argument) {
   return page.waitForFunction(holds, argument, { timeout: kPatience, polling: 100 });
 }

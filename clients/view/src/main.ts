@@ -4,7 +4,7 @@ import "./stage.css";
 import { Curves, drawHistograms } from "./charts";
 import { choicesOf, coordinates } from "./choices";
 import { axesFrame, Tour, type Colour, type Look, type Part } from "./look";
-import type { FaultKind, FromWorker, MeshRow, ToWorker } from "./messages";
+import type { FaultKind, FromWorker, MeshRow, Told, ToWorker } from "./messages";
 import {
   badgeOf,
   drawCrew,
@@ -40,6 +40,7 @@ const kEnded: Record<string, string> = {
 };
 
 const kNothingHere = "Nothing of it is at this level";
+const kNothingYet = "It had no vertex yet at this revision";
 const kCannotDraw =
   "This browser cannot draw the mesh: it has no WebGL, or WebGL is switched off in its settings. " +
   "Certificate and figures are beside this.";
@@ -50,8 +51,24 @@ const css = (name: string) =>
 
 const worker = new MeshWorker();
 const ask = (message: ToWorker) => worker.postMessage(message);
+let asked = 0; // times that something else was to be seen
+let drawn = 0; // the last of them that is on the screen
+
+// What changes the picture.
+function askToSee(message: Told): number {
+  ask({ ...message, asked: ++asked });
+  tellBusy();
+  return asked;
+}
 
 const view = new View(at<HTMLCanvasElement>("canvas"), at("look"));
+view.onBusy = tellBusy;
+
+// Whether something else is about to be seen.
+function tellBusy() {
+  at("stage").setAttribute("aria-busy", `${view.busy || asked !== drawn}`);
+}
+
 let chosen = "";
 let recorded = false;
 let list: MeshRow[] = [];
@@ -70,7 +87,8 @@ let tour: { tour: Tour; start: number } | null = null;
 let measured = { revision: -1, name: "" };
 
 const time = new Time(
-  (revision) => ask({ type: "revision", revision }),
+  (revision) => askToSee({ type: "revision", revision }),
+  () => drawn,
   () => !recorded,
 );
 const [secret, mode] = location.hash.slice(1).split("&");
@@ -105,11 +123,11 @@ function choose(name: string) {
   boundary = "";
   measured = { revision: -1, name: "" };
   drawHistograms(at("histograms"), []);
-  at("stage").dataset.vertices = "0";
+  Object.assign(at("stage").dataset, { revision: "0", vertices: "0", simplices: "0" });
   note(emptyOf(null));
   view.clear();
   drawList(at("list"), list, chosen, chooseByHand);
-  ask({ type: "watch", name });
+  askToSee({ type: "watch", name });
 }
 
 function chooseByHand(name: string) {
@@ -148,7 +166,7 @@ function meet(row: MeshRow) {
   at("axes-box").hidden = row.d <= 3;
   drawWalls(at("walls"), row.k <= 3 ? row.walls : 0);
   setParts();
-  ask({ type: "look", name: chosen, look });
+  askToSee({ type: "look", name: chosen, look });
 }
 
 function stopTour() {
@@ -165,7 +183,7 @@ function changeLook(change: Partial<Look>) {
   if (mesh === null) return; // there is nothing to look at yet, and its first look comes with it
   look = { ...look, ...change };
   setParts();
-  ask({ type: "look", name: chosen, look });
+  askToSee({ type: "look", name: chosen, look });
 }
 
 at<HTMLSelectElement>("part").onchange = (e) =>
@@ -214,18 +232,18 @@ function fly(kind: FaultKind, count: number) {
   const next = fault && "kind" in fault && fault.kind === kind ? (fault.next + 1) % count : 0;
   fault = { kind, next, count };
   time.show(null);
-  ask({ type: "faults", fault: { kind, chosen: next } });
+  askToSee({ type: "faults", fault: { kind, chosen: next } });
 }
 
 // To what the certificate's words name.
 function flyTo(place: string, ids: number[]) {
   fault = { place };
   time.show(null);
-  ask({ type: "faults", fault: { ids } });
+  askToSee({ type: "faults", fault: { ids } });
 }
 
 function leaveFault() {
-  if (fault) ask({ type: "faults", fault: null });
+  if (fault) askToSee({ type: "faults", fault: null });
   fault = null;
   at("fault").hidden = true;
 }
@@ -323,14 +341,6 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
     at("revision-text").textContent = text;
   },
   scene: (scene) => {
-    leader.arrived(scene.revision);
-    time.arrived(scene.revision, scene.vertices);
-    at("note").hidden = true;
-    if (!scene.drawn) note(scene.vertices > 0 ? kNothingHere : emptyOf(mesh));
-    if (!view.draws) note(kCannotDraw);
-    at("stage").dataset.revision = `${scene.revision}`;
-    at("stage").dataset.vertices = `${scene.vertices}`;
-    at("stage").dataset.simplices = `${scene.simplices}`;
     if (boundary !== scene.boundary) {
       boundary = scene.boundary;
       drawFacts();
@@ -339,7 +349,18 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
     view.show(scene, plain, css("--text"), mesh?.k === 1);
   },
 };
-view.onDrawn = () => ask({ type: "drawn" });
+view.onDrawn = (scene) => {
+  const { revision, vertices, simplices } = scene;
+  leader.arrived(revision);
+  time.arrived(revision, vertices);
+  at("note").hidden = true;
+  if (!scene.drawn)
+    note(vertices > 0 ? kNothingHere : time.following ? emptyOf(mesh) : kNothingYet);
+  if (!view.draws) note(kCannotDraw);
+  Object.assign(at("stage").dataset, { revision, vertices, simplices });
+  drawn = scene.asked;
+  ask({ type: "drawn" });
+};
 worker.onmessage = ({ data }: MessageEvent<FromWorker>) => {
   if (data.of !== undefined && data.of !== chosen) return; // it was on its way when another was chosen
   (hear[data.type] as (message: FromWorker) => void)(data);

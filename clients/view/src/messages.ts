@@ -68,7 +68,11 @@ export interface Verdict {
   warnings: string[];
 }
 
-export type ToWorker =
+// `asked`: how many times the page has asked for another picture, with this one. A scene says which of
+// them it answers.
+export type ToWorker = Told & { asked?: number };
+
+export type Told =
   | { type: "open"; host: string; secret: string }
   | { type: "replay"; recording: Recording }
   | { type: "watch"; name: string }
@@ -80,6 +84,7 @@ export type ToWorker =
 
 export interface Scene {
   type: "scene";
+  asked: number; // as of ToWorker: all that was asked until then is in it
   name: string;
   revision: number;
   vertices: number;

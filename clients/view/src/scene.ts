@@ -73,15 +73,16 @@ export class View {
   private readonly chosen = new Dots({ size: 15, colour: "#ffb020", through: true });
   private readonly all = new Group();
   private flat = false;
-  private dirty = true;
+  private dirty = true; // a frame is due
   private moving = false;
   private slow = 0; // seconds that all of the mesh takes to be drawn, lately
   private fitted = false;
   private below = 0; // pixels
   private ball = { centre: new Vector3(), radius: 1 };
   private flight: { from: [Vector3, Vector3]; to: [Vector3, Vector3]; start: number } | null = null;
-  onDrawn: () => void = () => {};
-  private owed = false;
+  private owed: Scene | null = null; // not drawn yet
+  onDrawn: (scene: Scene) => void = () => {};
+  onBusy: () => void = () => {}; // it is, or is no longer
 
   // `over`: what stands on the lower end of the canvas, which meshes are fitted above.
   constructor(
@@ -91,15 +92,16 @@ export class View {
     this.renderer = rendererOf(canvas);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.zoomToCursor = true;
-    this.controls.addEventListener("change", () => (this.dirty = true));
+    this.controls.addEventListener("change", () => this.redraw());
     this.controls.addEventListener("start", () => {
       this.moving = true;
       this.flight = null;
       this.fitted = true;
+      this.redraw();
     });
     this.controls.addEventListener("end", () => {
       this.moving = false;
-      this.dirty = true;
+      this.redraw();
     });
     this.camera.up.set(0, 0, 1);
     this.camera.position.copy(kAside);
@@ -125,7 +127,7 @@ export class View {
       const hidden = canvas.getBoundingClientRect().bottom - over.getBoundingClientRect().top;
       this.below = Math.min(Math.max(hidden, 0), canvas.clientHeight / 2);
       if (!this.fitted) this.fit();
-      this.dirty = true;
+      this.redraw();
     });
     resized.observe(canvas);
     resized.observe(over);
@@ -137,14 +139,24 @@ export class View {
     return this.renderer !== null;
   }
 
+  // What it was told is not on the screen yet, or the camera flies.
+  get busy(): boolean {
+    return this.dirty || this.flight !== null;
+  }
+
+  private redraw() {
+    this.dirty = true;
+    this.onBusy();
+  }
+
   setBackground(colour: string) {
     this.scene.background = new Color(colour);
-    this.dirty = true;
+    this.redraw();
   }
 
   setWires(on: boolean) {
     this.wires.visible = on;
-    this.dirty = true;
+    this.redraw();
   }
 
   // Nothing, until something else is shown.
@@ -152,7 +164,8 @@ export class View {
     this.all.visible = false;
     this.fitted = false;
     this.flight = null;
-    this.dirty = true;
+    this.owed = null;
+    this.redraw();
   }
 
   // In R^d: a plane is looked at from above, whatever was looked at before.
@@ -199,8 +212,8 @@ export class View {
     this.chosen.show(scene.chosen);
     this.ball = { centre: new Vector3(...scene.centre), radius: scene.radius };
     if (!this.fitted && scene.vertices > 0) this.fit();
-    this.dirty = true;
-    this.owed = true;
+    this.owed = scene;
+    this.redraw();
   }
 
   // All of the mesh, from where one looks now; follows it as it grows until somebody turns it.
@@ -214,7 +227,7 @@ export class View {
     this.camera.position.copy(this.ball.centre).addScaledVector(direction, distance);
     this.controls.update();
     this.flight = null;
-    this.dirty = true;
+    this.redraw();
   }
 
   refit() {
@@ -242,6 +255,7 @@ export class View {
       start: performance.now(),
     };
     this.fitted = true;
+    this.onBusy();
   }
 
   // Whether nothing of the mesh stands between.
@@ -266,9 +280,10 @@ export class View {
     if (!this.dirty) return;
     this.dirty = false;
     this.draw();
-    if (!this.owed) return;
-    this.owed = false;
-    this.onDrawn();
+    const scene = this.owed;
+    this.owed = null;
+    if (scene) this.onDrawn(scene);
+    this.onBusy();
   }
 
   private draw() {

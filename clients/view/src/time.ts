@@ -11,11 +11,14 @@ export class Time {
   following = true; // the newest
   private grownTo = 0; // the newest that is known of
   private over = false;
+  private awaited = 0; // as of `drawn`
   private replay: ReturnType<typeof setInterval> | undefined;
 
-  // `ask`: for a revision to be shown; null: the newest, as it comes. `always`: though there is but one.
+  // `ask`: for a revision to be shown; null: the newest, as it comes; counts what was asked. `drawn`: the
+  // last of these that is on the screen. `always`: though there is but one.
   constructor(
-    private readonly ask: (revision: number | null) => void,
+    private readonly ask: (revision: number | null) => number,
+    private readonly drawn: () => number,
     private readonly always: () => boolean,
   ) {
     at<HTMLInputElement>("revision").oninput = (e) => {
@@ -57,13 +60,15 @@ export class Time {
   arrived(revision: number, vertices: number) {
     this.shown = revision;
     at("revision-text").textContent =
-      vertices > 0 ? `revision ${revision} of ${this.newest} · ${grouped(vertices)} vertices` : "";
+      vertices > 0 || !this.following
+        ? `revision ${revision} of ${this.newest} · ${grouped(vertices)} vertices`
+        : "";
     this.draw();
   }
 
   show(revision: number | null) {
     this.following = revision === null;
-    this.ask(revision);
+    this.awaited = this.ask(revision);
     this.draw();
   }
 
@@ -79,6 +84,7 @@ export class Time {
     let next = this.following || this.shown >= this.newest ? 1 : this.shown;
     const step = Math.max(1, Math.round(this.newest / kMostSteps));
     const turn = () => {
+      if (this.drawn() < this.awaited) return; // each step is seen
       if (next >= this.newest) {
         this.stop();
         return this.show(null);

@@ -42,6 +42,7 @@ export class Viewing {
   private fault: Fault | null = null;
   private flightDue = false; // to it, once it is there
   private due = false;
+  private answered = 0; // as of ToWorker
   private waiting = false; // the page has not drawn the last scene yet
   private drawnAt = 0;
   private timer: ReturnType<typeof setTimeout> | undefined;
@@ -49,6 +50,7 @@ export class Viewing {
   constructor(
     private readonly source: Source,
     readonly name: string,
+    private readonly asked: () => number, // as of ToWorker, lately
   ) {
     void this.inquire();
     void this.watch();
@@ -193,6 +195,7 @@ export class Viewing {
       this.draw();
     }
     this.fetching = false;
+    this.draw(); // what was asked is answered, be it by what is there already
   }
 
   private async download(revision: number): Promise<MeshStore | null> {
@@ -263,6 +266,7 @@ export class Viewing {
     this.due = false;
     this.waiting = true;
     this.drawnAt = performance.now();
+    if (!this.fetching) this.answered = this.asked();
     const projected = project(store, this.look.frame);
     const shape = shapeOf(store, this.look, projected, this.epsilon);
     const rim = rimOf(store, this.look, projected);
@@ -277,6 +281,7 @@ export class Viewing {
     }
     const scene: Scene = {
       type: "scene",
+      asked: this.answered,
       name: this.name,
       revision: store.revision,
       vertices: store.vertices,

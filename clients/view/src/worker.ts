@@ -6,7 +6,7 @@ import {
   ListMeshesRequestSchema,
   ListMeshesResponseSchema,
 } from "./generated/stellate/v1/stellate_pb";
-import type { ToWorker } from "./messages";
+import type { Told, ToWorker } from "./messages";
 import { report, send, sleep } from "./say";
 import { GatewaySource, RecordedSource, type CallEnd, type Source } from "./source";
 import { rowOf } from "./verdict";
@@ -37,16 +37,17 @@ async function list() {
 }
 
 let viewing: Viewing | null = null;
+let asked = 0; // as of ToWorker
 
 function view(name: string) {
   viewing?.leave();
   send({ type: "crew", rows: [] });
   send({ type: "past", rows: [] });
   send({ type: "verdict", verdict: null });
-  viewing = new Viewing(source, name);
+  viewing = new Viewing(source, name, () => asked);
 }
 
-const answers: { [T in ToWorker["type"]]: (m: Extract<ToWorker, { type: T }>) => unknown } = {
+const answers: { [T in Told["type"]]: (m: Extract<Told, { type: T }>) => unknown } = {
   open: async ({ host, secret }) => {
     const gateway = await GatewaySource.open(host, secret);
     gateway.onGreeting = ({ server, mesh, secret: kept }) => {
@@ -71,5 +72,6 @@ const answers: { [T in ToWorker["type"]]: (m: Extract<ToWorker, { type: T }>) =>
 };
 
 self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
-  void (answers[data.type] as (message: ToWorker) => unknown)(data);
+  asked = data.asked ?? asked;
+  void (answers[data.type] as (message: Told) => unknown)(data);
 };
