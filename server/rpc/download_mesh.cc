@@ -30,7 +30,7 @@ class DownloadStream final
 
  private:
   grpc::Status Choose(const v1::DownloadMeshRequest& request, const Session& session) override {
-    const std::uint64_t newest = session.PublishedRevision();
+    const std::uint64_t newest = session.history().PublishedRevision();
     if (request.revision() > newest) return NoSuchRevision(request.revision(), newest);
     if (request.position() > 0 && request.revision() == 0) {
       return BadPosition(request.position(),

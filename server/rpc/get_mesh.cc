@@ -9,7 +9,7 @@ grpc::Status GetMesh(const Call& call, const v1::GetMeshRequest& request, v1::Me
   ShowMesh(call, **session, mesh);
   if (request.crew()) ToProto((*session)->pool().Crew(), mesh);
   if (request.has_past_progress_after())
-    ToProto((*session)->PastAfter(request.past_progress_after()), mesh);
+    ToProto((*session)->history().PastAfter(request.past_progress_after()), mesh);
   return grpc::Status::OK;
 }
 

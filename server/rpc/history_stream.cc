@@ -19,7 +19,7 @@ grpc::Status TooManyWatchers(ServerState& state, const Session& session) {
 
 std::optional<grpc::Status> NoHistory(ServerState& state, const Session& session,
                                       Clock::duration waited) {
-  if (session.HistoryIsLost()) {
+  if (session.history().IsLost()) {
     return Refusal(v1::ERROR_REASON_INTERNAL,
                    "the server cannot read the mesh back from its record: see its log");
   }

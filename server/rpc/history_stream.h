@@ -152,7 +152,7 @@ class HistoryStream : public grpc::ServerBidiReactor<Request, Response>,
       last_write_ = Clock::now();
       session_ = *session;
     }
-    if (!(*session)->AddWatcher(this->weak_from_this())) return TooManyWatchers(state_, **session);
+    if (!(*session)->history().AddWatcher(this->weak_from_this())) return TooManyWatchers(state_, **session);
     if (const char* const action = Action()) Audit(**session, *caller_, peer_, action);
     return grpc::Status::OK;
   }

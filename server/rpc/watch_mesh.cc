@@ -15,7 +15,7 @@ class WatchStream final : public HistoryStream<v1::WatchMeshRequest, v1::WatchMe
 
  private:
   grpc::Status Choose(const v1::WatchMeshRequest& request, const Session& session) override {
-    const std::uint64_t newest = session.PublishedRevision();
+    const std::uint64_t newest = session.history().PublishedRevision();
     if (request.from_revision() > newest) {
       return Refusal(v1::ERROR_REASON_REVISION_TOO_NEW,
                      core::Message("from_revision is ", request.from_revision(),
@@ -38,7 +38,7 @@ class WatchStream final : public HistoryStream<v1::WatchMeshRequest, v1::WatchMe
 
   Step Next() override {
     const bool over = session().HasEnded();  // before the revision: nothing follows then
-    const std::uint64_t newest = session().revision();
+    const std::uint64_t newest = session().history().revision();
     const bool behind = geometry_ && !cursor_ && newest > at_;
     if (behind) {
       if (const WatchLog* const history = OpenHistory()) cursor_ = history->Begin(at_);

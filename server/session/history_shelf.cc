@@ -3,52 +3,143 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/base/log.h"
+
 namespace stellate::server {
-namespace {
 
-constexpr auto kRetryShelving = std::chrono::seconds(1);  // where there was no memory
+HistoryShelf::HistoryShelf(const SessionOptions& options) : options_(options) {
+  if (!options_.record || !options_.record->result) {
+    const core::Specification& spec = options_.request.spec;
+    log_ = std::make_shared<WatchLog>(spec.dimension, spec.ambient_dimension);
+    return;
+  }
+  const SessionResult& result = *options_.record->result;
+  place_ = Place::kJournal;
+  revision_ = result.revision;
+  bytes_ = result.history_bytes;
+  past_ = result.past;
+  CountBytes();
+}
 
-}  // namespace
+core::Status HistoryShelf::Publish(const core::MeshDelta& delta, const PastProgress& now) {
+  core::Status status = log_->Append(delta);  // which only this thread changes
+  if (!status.ok()) return status;
+  const std::lock_guard lock(mutex_);
+  past_.Add(now);
+  return status;
+}
 
-std::shared_ptr<const WatchLog> HistoryShelf::Open(const std::shared_ptr<Session>& session) {
-  auto history = session->history();
-  if (history != nullptr || session->HistoryIsLost()) return history;
+std::optional<MeshFailure> HistoryShelf::Record(const core::Progress& progress,
+                                                const core::Report& report) {
+  const SessionResult result{progress, report, log_->revision(), log_->MemoryBytes(), past_};
+  if (auto failure = options_.ports.journal->WriteResult(result, *log_)) return failure;
+  const std::lock_guard lock(mutex_);
+  place_ = Place::kMemoryAndJournal;
+  revision_ = result.revision;
+  bytes_ = result.history_bytes;
+  used_ = Clock::now();
+  return std::nullopt;
+}
+
+std::shared_ptr<const WatchLog> HistoryShelf::log() const {
+  const std::lock_guard lock(mutex_);
+  return log_;
+}
+
+std::uint64_t HistoryShelf::revision() const {
+  const std::lock_guard lock(mutex_);
+  return log_ != nullptr ? log_->revision() : revision_;
+}
+
+std::uint64_t HistoryShelf::PublishedRevision() const {
+  const std::lock_guard lock(mutex_);
+  if (place_ != Place::kMemory) return revision_;
+  return std::max(log_->revision(), options_.record ? options_.record->rounds : 0);
+}
+
+std::vector<PastProgress> HistoryShelf::PastAfter(std::uint64_t revision) const {
+  const std::lock_guard lock(mutex_);
+  return past_.After(revision);
+}
+
+HistoryShelf::Loading HistoryShelf::Load() {
+  if (log() != nullptr) {
+    WakeWatchers();
+    return Loading::kDone;
+  }
+  const MeshRequest& request = options_.request;
+  const auto& memory = options_.ports.memory;
+  if (memory != nullptr && memory->Set(EstimateFinishedBytes(request.spec) + bytes_)) {
+    return Loading::kNoMemory;
+  }
+  auto read = options_.ports.journal->ReadHistory();
+  if (!read) {
+    Log(LogLevel::kError, {request.name, revision_, request.owner}, read.error().message);
+  }
+  const bool is_whole = read && (*read)->revision() == revision_;
   {
     const std::lock_guard lock(mutex_);
-    if (stopped_ || std::find(wanted_.begin(), wanted_.end(), session) != wanted_.end()) {
-      return nullptr;
+    place_ = is_whole ? Place::kMemoryAndJournal : Place::kLost;
+    if (is_whole) log_ = std::move(*read);
+    used_ = Clock::now();
+  }
+  CountBytes();
+  WakeWatchers();
+  return is_whole ? Loading::kDone : Loading::kFailed;
+}
+
+bool HistoryShelf::IsLost() const {
+  const std::lock_guard lock(mutex_);
+  return place_ == Place::kLost;
+}
+
+bool HistoryShelf::PutAway(Clock::duration unused) {
+  std::shared_ptr<WatchLog> log;  // freed without the lock
+  {
+    const std::lock_guard lock(mutex_);
+    if (place_ != Place::kMemoryAndJournal) return false;
+    const TimePoint now = Clock::now();
+    if (log_.use_count() > 1) used_ = now;
+    if (log_.use_count() > 1 || now - used_ < unused) return false;
+    place_ = Place::kJournal;
+    log = std::move(log_);
+  }
+  log.reset();
+  CountBytes();
+  return true;
+}
+
+void HistoryShelf::CountBytes() {
+  const auto& memory = options_.ports.memory;
+  if (memory == nullptr) return;
+  const auto held = log();
+  const std::uint64_t bytes = held != nullptr ? held->MemoryBytes() : 0;
+  memory->SetUnchecked(EstimateFinishedBytes(options_.request.spec) + bytes);
+}
+
+bool HistoryShelf::AddWatcher(std::weak_ptr<SessionWatcher> watcher) {
+  const std::lock_guard lock(mutex_);
+  std::erase_if(watchers_, [](const auto& w) { return w.expired(); });
+  if (watchers_.size() >= options_.policy.max_watchers) return false;
+  watchers_.push_back(std::move(watcher));
+  return true;
+}
+
+std::size_t HistoryShelf::watchers() const {
+  const std::lock_guard lock(mutex_);
+  return static_cast<std::size_t>(std::count_if(watchers_.begin(), watchers_.end(),
+                                                [](const auto& w) { return !w.expired(); }));
+}
+
+void HistoryShelf::WakeWatchers() {
+  std::vector<std::shared_ptr<SessionWatcher>> watchers;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& weak : watchers_) {
+      if (auto watcher = weak.lock()) watchers.push_back(std::move(watcher));
     }
-    wanted_.push_back(session);
-    if (!thread_.joinable())
-      thread_ = std::jthread([this](const std::stop_token& stop) { Load(stop); });
   }
-  wanted_changed_.notify_one();
-  return nullptr;
-}
-
-void HistoryShelf::Stop() {
-  {
-    const std::lock_guard lock(mutex_);
-    stopped_ = true;
-    wanted_.clear();
-  }
-  if (!thread_.joinable()) return;
-  thread_.request_stop();
-  thread_.join();
-}
-
-void HistoryShelf::Load(const std::stop_token& stop) {
-  std::unique_lock lock(mutex_);
-  while (wanted_changed_.wait(lock, stop, [this] { return !wanted_.empty(); })) {
-    const std::shared_ptr<Session> session = std::move(wanted_.front());
-    wanted_.pop_front();
-    lock.unlock();
-    const auto loading = session->LoadHistory();
-    lock.lock();
-    if (loading != Session::Loading::kNoMemory || stopped_) continue;
-    wanted_.push_back(session);  // others may be smaller
-    wanted_changed_.wait_for(lock, stop, kRetryShelving, [] { return false; });
-  }
+  for (const auto& watcher : watchers) watcher->Wake();
 }
 
 }  // namespace stellate::server

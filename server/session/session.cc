@@ -46,6 +46,14 @@ LogFields EndFields(const MeshRequest& request, const SessionEnd& end, bool susp
   return fields;
 }
 
+Life FirstLife(const std::optional<SessionRecord>& record) {
+  if (!record) return Life::kMeshing;
+  if (record->result) return Life::kOver;
+  if (!record->end) return Life::kReplaying;
+  const bool was_cancelled = record->end->state == SessionState::kCancelled;
+  return was_cancelled ? Life::kReplayingCancelled : Life::kRepeating;
+}
+
 }  // namespace
 
 Clock::duration AgeOf(std::chrono::system_clock::time_point time) {
@@ -58,37 +66,22 @@ Session::Session(SessionOptions options, MesherFactory factory)
       factory_(std::move(factory)),
       pool_(request().spec, DispatchOptions{request().timeouts, policy().dispatch},
             policy().max_workers, ports().observer),
+      history_(options_),
       create_time_(options_.record ? options_.record->create_time
                                    : std::chrono::system_clock::now()),
       created_(CreatedAt(options_.record)),
-      replaying_(options_.record.has_value()) {
+      life_(FirstLife(options_.record)) {
   if (ports().journal != nullptr) {
     pool_.TellOfAnswers([journal = ports().journal.get()](const auto& round, std::size_t block,
                                                           auto first, auto count) {
       journal->TakeAnswers(round, block, first, count);
     });
   }
-  if (!options_.record || !options_.record->result) {
-    history_ =
-        std::make_shared<WatchLog>(request().spec.dimension, request().spec.ambient_dimension);
-    return;
-  }
-  const SessionEnd& end = *options_.record->end;
-  const SessionResult& result = *options_.record->result;
-  replaying_ = false;
-  final_state_ = end.state;
-  end_time_ = end.time;
-  final_seconds_ = end.elapsed_seconds;
-  failure_ = end.failure;
-  progress_ = result.progress;
-  past_ = result.past;
-  report_ = result.report;
-  revision_ = result.revision;
-  history_bytes_ = result.history_bytes;
-  result_is_recorded_ = true;
+  if (life_.now() != Life::kOver) return;
+  end_ = options_.record->end;
+  report_ = options_.record->result->report;
+  progress_ = options_.record->result->progress;
   pool_.Shut();
-  CountHistory();
-  over_ = true;
 }
 
 void Session::Run() {
@@ -116,15 +109,17 @@ void Session::Run() {
          core::Status::Ok());
   }
   SetInterruptible(nullptr);
-  Finish(report ? &*report : nullptr);
+  const Ending ending = ChooseEnd(report ? &*report : nullptr);
+  const bool is_recorded = RecordEnd(ending);
+  ShowEnd(ending);
   mesher.reset();  // it is large, and watchers, who have heard the end, do not need it
   // The allocator would keep the memory of each mesh's own thread. A server that stops has it back
   // sooner by leaving.
-  if (!stopping_) malloc_trim(0);
-  RecordResult();
-  CountHistory();
-  over_ = true;
-  EndReplay();
+  if (!ending.server_stops) malloc_trim(0);
+  if (is_recorded) RecordResult();
+  history_.CountBytes();
+  if (ports().on_replayed) ports().on_replayed();
+  Step(LifeEvent::kRelease);
 }
 
 // What Cancel may interrupt in the middle of a round.
@@ -134,7 +129,7 @@ void Session::SetInterruptible(core::Mesher* mesher) {
 }
 
 void Session::RunRounds(core::Mesher* mesher) {
-  Log(LogLevel::kInfo, log_context(), replaying_ ? "replaying" : "meshing",
+  Log(LogLevel::kInfo, log_context(), IsReplaying() ? "replaying" : "meshing",
       WhatItIs(request())
           .Add("dimension", request().spec.dimension)
           .Add("ambient_dimension", request().spec.ambient_dimension)
@@ -145,14 +140,20 @@ void Session::RunRounds(core::Mesher* mesher) {
     }
   }
   while (true) {
-    if (abandoned_ || (cancelled_ && !replaying_)) mesher->Cancel();
+    const Life now = life();  // as it was before NextBatch, all through this pass
+    if (MustEnd(now)) mesher->Cancel();
     const core::QueryBatch* const batch = mesher->NextBatch();
     if (batch == nullptr) {
       if (auto failure = PublishRound(mesher)) FailBlameless(mesher, std::move(*failure));
       return;
     }
-    if (!FitsMemory(mesher, static_cast<std::uint64_t>(batch->size()))) continue;
-    replaying_ ? ReplayRound(mesher, *batch) : RunRound(mesher, mesher->ShareBatch());
+    if (options_.record && batch->round <= options_.record->rounds) {
+      ReplayRound(mesher, *batch);
+    } else if (server::IsReplaying(now)) {
+      EndReplay(mesher, batch->round);
+    } else if (FitsMemory(mesher, static_cast<std::uint64_t>(batch->size()))) {
+      RunRound(mesher, mesher->ShareBatch());
+    }
   }
 }
 
@@ -160,29 +161,11 @@ std::uint64_t Session::ReplayBytes() const {
   return EstimateMeshBytes(request().spec, options_.record ? options_.record->last.vertices : 0, 0);
 }
 
-// False, and the mesh has failed, if it has grown beyond what the server can hold.
-bool Session::FitsMemory(core::Mesher* mesher, std::uint64_t queries) {
-  if (ports().memory == nullptr) return true;
-  const std::uint64_t bytes =
-      EstimateMeshBytes(request().spec, mesher->progress().vertices, queries);
-  if (replaying_) {
-    ports().memory->SetUnchecked(std::max(bytes, ReplayBytes()));  // its own, all the while
-    return true;
-  }
-  auto refused = ports().memory->Set(bytes);
-  if (refused) FailBlameless(mesher, ToMeshFailure(*refused));
-  return !refused;
-}
-
-// Where there is nothing to replay any more, only says so: the mesh goes on from this batch, unless
-// it was cancelled meanwhile.
 void Session::ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch) {
-  if (batch.round > options_.record->rounds) {
-    EndReplay();
-    if (options_.record->end) return RepeatEnd(mesher);
-    Log(LogLevel::kInfo, {request().name, batch.round, request().owner},
-        "replayed; going on with new answers");
-    return;
+  if (ports().memory != nullptr) {
+    const std::uint64_t bytes = EstimateMeshBytes(request().spec, mesher->progress().vertices,
+                                                  static_cast<std::uint64_t>(batch.size()));
+    ports().memory->SetUnchecked(std::max(bytes, ReplayBytes()));  // its own, all the while
   }
   SessionJournal::Known known = ports().journal->BeginRound(batch);
   if (!known.failure) known.failure = PublishRound(mesher);
@@ -193,21 +176,35 @@ void Session::ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch) {
   }
 }
 
-void Session::EndReplay() {
-  if (replaying_.exchange(false) && ports().on_replayed) ports().on_replayed();
+// The recorded answers are used up. The mesh goes on from this batch, unless it has been cancelled
+// or has ended here before.
+void Session::EndReplay(core::Mesher* mesher, std::uint64_t next_round) {
+  if (options_.record->end) return RepeatEnd(mesher);
+  {
+    const std::lock_guard lock(mutex_);
+    if (!life_.Step(LifeEvent::kReplayed)) return;
+  }
+  if (ports().on_replayed) ports().on_replayed();
+  Log(LogLevel::kInfo, {request().name, next_round, request().owner},
+      "replayed; going on with new answers");
 }
 
-// The recorded answers are used up, and the mesh ended here.
 void Session::RepeatEnd(core::Mesher* mesher) {
   const SessionEnd& end = *options_.record->end;
   if (end.state == SessionState::kFailed) return FailBlameless(mesher, end.failure);
-  if (end.state == SessionState::kCancelled) {
-    cancelled_ = true;
-    return mesher->Cancel();
-  }
+  if (end.state == SessionState::kCancelled) return mesher->Cancel();
   FailBlameless(mesher, {FailureReason::kReplayMismatch,
                          "the recorded answers made a whole mesh once, and now do not: this "
                          "server meshes differently from the one that recorded them; mesh anew"});
+}
+
+// False, and the mesh has failed, if it has grown beyond what the server can hold.
+bool Session::FitsMemory(core::Mesher* mesher, std::uint64_t queries) {
+  if (ports().memory == nullptr) return true;
+  auto refused =
+      ports().memory->Set(EstimateMeshBytes(request().spec, mesher->progress().vertices, queries));
+  if (refused) FailBlameless(mesher, ToMeshFailure(*refused));
+  return !refused;
 }
 
 // While the workers are at this round's queries, watchers are shown what the last one led to.
@@ -261,21 +258,20 @@ bool Session::Absorb(core::Mesher* mesher, const core::Answers& answers) {
 // How the mesh stands, and what has changed since it was last shown.
 std::optional<MeshFailure> Session::PublishRound(core::Mesher* mesher) {
   if (unseen_) {
-    const std::uint64_t revision = unseen_->revision;
-    const core::Status logged = history_->Append(*unseen_);  // it is there until the end
+    const double seconds = IsReplaying() ? 0 : Seconds(Clock::now() - created_);
+    const core::Status published =
+        history_.Publish(*unseen_, {unseen_->revision, mesher->progress(), seconds});
     unseen_.reset();
-    if (!logged.ok()) {
+    if (!published.ok()) {
       return MeshFailure{FailureReason::kInternal,
-                         core::Message("a fault of the server: ", logged.message)};
+                         core::Message("a fault of the server: ", published.message)};
     }
-    const std::lock_guard lock(mutex_);
-    past_.Add({revision, mesher->progress(), replaying_ ? 0 : Seconds(Clock::now() - created_)});
   }
   {
     const std::lock_guard lock(mutex_);
     progress_ = mesher->progress();
   }
-  WakeWatchers();
+  history_.WakeWatchers();
   return {};
 }
 
@@ -287,17 +283,14 @@ void Session::FailBlameless(core::Mesher* mesher, MeshFailure failure) {
 }
 
 void Session::Fail(core::Mesher* mesher, MeshFailure failure, core::Status status) {
-  {
-    const std::lock_guard lock(mutex_);
-    failure_ = std::move(failure);
-  }
+  failure_ = std::move(failure);
   blame_ = status;
   if (mesher != nullptr) mesher->Fail(std::move(status));
 }
 
 SessionState Session::FinalState(const core::Report* report) const {
   if (failure_.reason != FailureReason::kNone) return SessionState::kFailed;
-  if (cancelled_ || report == nullptr) return SessionState::kCancelled;
+  if (IsSeenAsCancelled(life_.now()) || report == nullptr) return SessionState::kCancelled;
   switch (report->termination) {
     case core::Termination::kConverged:
       return SessionState::kSucceeded;
@@ -310,70 +303,74 @@ SessionState Session::FinalState(const core::Report* report) const {
   }
 }
 
-void Session::Finish(const core::Report* report) {
-  SessionEnd end;
-  bool suspended = false;
-  {
-    const std::lock_guard lock(mutex_);
-    if (report != nullptr && report->termination == core::Termination::kOracleFailed &&
-        failure_.reason == FailureReason::kNone) {
-      failure_ = ToMeshFailure(report->failure);
-    }
-    end = {FinalState(report), std::max(std::chrono::system_clock::now(), create_time_),
-           Seconds(Clock::now() - created_), failure_, progress_.round};
-    suspended = suspended_ && end.state == SessionState::kCancelled;
-    ending_ = true;
+Session::Ending Session::ChooseEnd(const core::Report* report) {
+  Ending ending;
+  if (report != nullptr) ending.report = *report;
+  if (ending.report.termination == core::Termination::kOracleFailed &&
+      failure_.reason == FailureReason::kNone) {
+    failure_ = ToMeshFailure(ending.report.failure);
   }
-  const bool ended_before = options_.record && options_.record->end.has_value();
-  if (ended_before && end.state == options_.record->end->state) end = *options_.record->end;
-  // Before anyone hears of it, so that nobody finds it running later.
-  if (ports().journal != nullptr && !suspended && !ended_before) {
-    const auto failure = ports().journal->WriteEnd(end);
-    end_is_recorded_ = !failure;
-    if (failure) {
-      Log(LogLevel::kWarning, log_context(),
-          core::Message("the end of the mesh is not recorded: ", failure->message));
-    }
+  const auto& record = options_.record;
+  const std::lock_guard lock(mutex_);
+  SessionEnd& end = ending.end;
+  end = {FinalState(report), std::max(std::chrono::system_clock::now(), create_time_),
+         Seconds(Clock::now() - created_), failure_, progress_.round};
+  ending.server_stops = life_.now() == Life::kSuspended;
+  ending.is_suspended =
+      ending.server_stops && ports().journal != nullptr && end.state == SessionState::kCancelled;
+  const bool ended_before = record && record->end;
+  // Cancelled, and its replay broken off: the next server repeats all that watchers have seen.
+  if (record && end.state == SessionState::kCancelled) {
+    end.rounds = std::max(end.rounds, record->rounds);
   }
-  // A replay that got there, and not one that failed on its way.
-  if (ended_before) end_is_recorded_ = !abandoned_ && progress_.round == end.rounds;
-  // Counted before it can be seen, as whoever sees the end may look at the metrics next.
-  if (ports().observer != nullptr && !suspended && !ended_before) {
-    ports().observer->OnEnd(end.state, report != nullptr ? *report : core::Report{});
+  if (ended_before && record->end->state == end.state) end = *record->end;
+  const bool is_broken_off = ended_before && MustEnd(life_.now());
+  ending.is_whole = end.rounds == progress_.round && !is_broken_off &&
+                    (!ended_before || record->end->state == end.state);
+  life_.Step(LifeEvent::kEnd);
+  return ending;
+}
+
+// Before the end can be seen, so that the mesh is not found running later. True: the journal has
+// the end of the mesh as it is, and may be given its result.
+bool Session::RecordEnd(const Ending& ending) {
+  if (options_.record && options_.record->end) return ending.is_whole;
+  if (ending.is_suspended) return false;
+  std::optional<MeshFailure> failure;
+  if (ports().journal != nullptr) failure = ports().journal->WriteEnd(ending.end);
+  if (failure) {
+    Log(LogLevel::kWarning, log_context(),
+        core::Message("the end of the mesh is not recorded: ", failure->message));
   }
-  // Whoever has seen the end finds the door shut.
-  pool_.Shut();
+  // Counted before it can be seen, as the client that sees the end may look at the metrics next.
+  if (ports().observer != nullptr) ports().observer->OnEnd(ending.end.state, ending.report);
+  return ports().journal != nullptr && !failure && ending.is_whole;
+}
+
+void Session::ShowEnd(const Ending& ending) {
+  pool_.Shut();  // first: a worker that has seen the end finds the door shut
   LogFields fields;
   {
     const std::lock_guard lock(mutex_);
-    final_state_ = end.state;
-    report_ = report != nullptr ? *report : core::Report{};
-    end_time_ = end.time;
-    final_seconds_ = end.elapsed_seconds;
-    fields = EndFields(request(), end, suspended, *report_, progress_);
+    end_ = ending.end;
+    report_ = ending.report;
+    fields = EndFields(request(), ending.end, ending.is_suspended, ending.report, progress_);
+    life_.Step(LifeEvent::kShow);
   }
-  Log(end.state == SessionState::kFailed ? LogLevel::kWarning : LogLevel::kInfo, log_context(),
-      suspended ? "mesh suspended until the server is back" : "mesh ended", fields);
+  Log(ending.end.state == SessionState::kFailed ? LogLevel::kWarning : LogLevel::kInfo,
+      log_context(), ending.is_suspended ? "mesh suspended until the server is back" : "mesh ended",
+      fields);
   pool_.Close({blame_});
-  WakeWatchers();
+  history_.WakeWatchers();
 }
 
 // The mesh itself, in the place of the answers that led to it. Until then, or if the disk has no
 // room for it, the next server replays these once more.
 void Session::RecordResult() {
-  if (!end_is_recorded_) return;
-  const SessionResult result{progress_, *report_, history_->revision(), history_->MemoryBytes(),
-                             past_};
-  if (const auto failure = ports().journal->WriteResult(result, *history_)) {
+  if (const auto failure = history_.Record(progress_, *report_)) {
     Log(LogLevel::kWarning, log_context(),
         core::Message("the next server will have to replay the mesh: ", failure->message));
-    return;
   }
-  const std::lock_guard lock(mutex_);
-  revision_ = result.revision;
-  history_bytes_ = result.history_bytes;
-  result_is_recorded_ = true;
-  history_used_ = Clock::now();
 }
 
 }  // namespace stellate::server

@@ -1,52 +1,19 @@
 #pragma once
 
-#include <atomic>
 #include <chrono>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <string>
-#include <vector>
 
 #include "core/mesher.h"
 #include "server/base/log.h"
-#include "server/history/watch_log.h"
-#include "server/memory/memory_budget.h"
 #include "server/oracles/oracle_pool.h"
-#include "server/session/session_journal.h"
+#include "server/session/history_shelf.h"
+#include "server/session/session_life.h"
+#include "server/session/session_options.h"
 
 namespace stellate::server {
-
-// Told what becomes of a session, for the metrics. From the session's thread; must not block.
-class SessionObserver : public PoolObserver {
- public:
-  virtual void OnRound(std::size_t queries) = 0;  // answered
-  virtual void OnEnd(SessionState state, const core::Report& report) = 0;
-};
-
-// What the server decides about a mesh, whoever asked for it.
-struct MeshPolicy {
-  DispatchPolicy dispatch;
-  std::size_t max_workers = 64;
-  std::size_t max_watchers = 64;
-};
-
-// What a session works with.
-struct SessionPorts {
-  std::shared_ptr<SessionObserver> observer;      // may be null
-  std::shared_ptr<SessionJournal> journal;        // may be null: the mesh lives in memory alone
-  std::shared_ptr<MemoryBudget::Account> memory;  // may be null: nobody counts
-  std::function<void()> on_replayed;  // after the replay, or when Run is over; may be empty
-};
-
-// What a session is made of, fixed for its life.
-struct SessionOptions {
-  MeshRequest request;
-  MeshPolicy policy;
-  SessionPorts ports;
-  std::optional<SessionRecord> record;  // set: the journal has it from an earlier server
-};
 
 // A session at one moment.
 struct SessionView {
@@ -61,18 +28,12 @@ struct SessionView {
   MeshFailure failure;                 // when it failed
   std::size_t workers = 0, watchers = 0;
   std::size_t waiting_queries = 0;  // of this round, unanswered
-  std::uint64_t bytes = 0;          // estimated; 0 where nobody counts
+  std::uint64_t bytes = 0;          // estimated; 0 where memory is not counted
 };
 
-// Told when a session has something new. Wake comes from any thread and must not block.
-class SessionWatcher {
- public:
-  virtual ~SessionWatcher() = default;
-  virtual void Wake() = 0;
-};
-
-// One mesh: drives a core::Mesher on a thread of its own, asks the pool, keeps the history, in
-// memory or, once it is over, in its journal. Knows nothing of the network.
+// One mesh: drives a core::Mesher on a thread of its own, asks the pool, publishes each round on
+// the shelf of its history, and records itself in its journal. session_life.h has its states, and
+// what leads from one to the next. Knows nothing of the network.
 class Session {
  public:
   using MesherFactory =
@@ -84,35 +45,25 @@ class Session {
   // finished mesh that its journal has whole.
   void Run();
   // Run has nothing left to do but return, and the memory of the mesher is given back. It follows
-  // HasEnded at once, or a tenth of a second later after millions of vertices.
-  bool Over() const { return over_; }
+  // HasEnded immediately, or a tenth of a second later after millions of vertices.
+  bool Over() const;
 
-  // Ends the mesh; any thread, at once where Run waits, else after the round being computed, or
-  // after the replay. One that had ended before its replay stays as it was.
+  // Ends the mesh; any thread. Takes effect immediately where Run waits, else after the round being
+  // computed, or after the replay. A mesh that had ended before its replay stays as it was.
   void Cancel();
 
-  // Ends Run as soon as can be: nobody wants the mesh any more.
+  // Ends Run as soon as can be: the mesh was deleted.
   void Abandon();
-  // The same for one that was never run and will not be.
+  // The same for a mesh that was never run and will not be.
   void AbandonUnrun();
   // As Abandon, because the server stops: with a journal, the next server goes on.
   void Suspend();
 
-  bool IsReplaying() const { return replaying_; }
-  bool IsCancelled() const { return cancelled_; }
+  bool IsReplaying() const;
   // What the mesh will hold when its replay is over, in bytes.
   std::uint64_t ReplayBytes() const;
 
-  // False when there are too many.
-  bool AddWatcher(std::weak_ptr<SessionWatcher> watcher);
-
   SessionView View() const;
-  std::uint64_t revision() const;  // the newest that can be read
-  // The newest revision that anyone may have seen: while a recorded mesh is replayed, the one at
-  // which the replay will end.
-  std::uint64_t PublishedRevision() const;
-  // How it stood at revisions after this one.
-  std::vector<PastProgress> PastAfter(std::uint64_t revision) const;
   bool HasVertices() const;
   bool HasEnded() const;           // state, report and history are final
   LogContext log_context() const;  // in the round that was last shown
@@ -120,68 +71,56 @@ class Session {
   const MeshPolicy& policy() const { return options_.policy; }
   const SessionPorts& ports() const { return options_.ports; }
   OraclePool& pool() { return pool_; }
-
-  // Null: the journal has it, and it is not in memory. Whoever holds it keeps it there.
-  std::shared_ptr<const WatchLog> history() const;
-  // Reads it back, if the memory budget allows, and wakes the watchers. May take a while.
-  enum class Loading { kDone, kNoMemory, kFailed };
-  Loading LoadHistory();
-  // kFailed came of it.
-  bool HistoryIsLost() const;
-  // Takes it from memory, if the journal has it and nobody has held it for `unused`.
-  bool PutAwayHistory(Clock::duration unused);
+  HistoryShelf& history() { return history_; }
+  const HistoryShelf& history() const { return history_; }
 
  private:
+  // How Run ends the mesh.
+  struct Ending {
+    SessionEnd end;
+    core::Report report;
+    bool server_stops = false;
+    bool is_suspended = false;  // the next server goes on with the mesh: nothing is recorded
+    bool is_whole = false;      // the mesh is what led to this end, on this server or before
+  };
+
+  Life life() const;
+  void Step(LifeEvent event);
   void SetInterruptible(core::Mesher* mesher);
   void RunRounds(core::Mesher* mesher);
   void ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch);
-  void EndReplay();
+  void EndReplay(core::Mesher* mesher, std::uint64_t next_round);
   void RepeatEnd(core::Mesher* mesher);
   void RunRound(core::Mesher* mesher, const std::shared_ptr<const core::QueryBatch>& batch);
+  bool FitsMemory(core::Mesher* mesher, std::uint64_t queries);
   bool Absorb(core::Mesher* mesher, const core::Answers& answers);
   std::optional<MeshFailure> PublishRound(core::Mesher* mesher);
-  bool FitsMemory(core::Mesher* mesher, std::uint64_t queries);
   void FailBlameless(core::Mesher* mesher, MeshFailure failure);
   void Fail(core::Mesher* mesher, MeshFailure failure, core::Status status);
-  void Finish(const core::Report* report);
-  void RecordResult();
-  void CountHistory();
-  void Interrupt();
   SessionState FinalState(const core::Report* report) const;
-  void WakeWatchers();
+  Ending ChooseEnd(const core::Report* report);
+  bool RecordEnd(const Ending& ending);
+  void ShowEnd(const Ending& ending);
+  void RecordResult();
 
   const SessionOptions options_;
   const MesherFactory factory_;
   OraclePool pool_;
+  HistoryShelf history_;
   const std::chrono::system_clock::time_point create_time_;
   const TimePoint created_;  // as if no time had passed without a server
-  std::atomic<bool> cancelled_{false};
-  std::atomic<bool> abandoned_{false};
-  std::atomic<bool> stopping_{false};  // the server does
-  std::atomic<bool> over_{false};
-  std::atomic<bool> replaying_;            // the journal has the next answers
-  bool end_is_recorded_ = false;           // Run's thread only
-  core::Status blame_;                     // Run's thread only: told to all workers at the end
-  std::optional<core::MeshDelta> unseen_;  // Run's thread only: absorbed, not in the history yet
+
+  // Run's thread alone:
+  MeshFailure failure_;
+  core::Status blame_;                     // what all workers hear at the end
+  std::optional<core::MeshDelta> unseen_;  // absorbed, not published yet
 
   mutable std::mutex mutex_;
-  std::shared_ptr<WatchLog> history_;  // null: only in the journal
-  std::uint64_t revision_ = 0;         // the last, where the journal has it
-  std::uint64_t history_bytes_ = 0;    // in memory, about; where the journal has it
-  bool result_is_recorded_ = false;
-  bool history_is_lost_ = false;
-  mutable TimePoint history_used_;
+  SessionLife life_;
   core::Mesher* computing_ = nullptr;  // while it lives
-  bool ending_ = false;                // the final state is chosen, and being recorded
-  bool suspended_ = false;             // the server stopped it, not its owner
-  std::optional<SessionState> final_state_;
-  std::optional<std::chrono::system_clock::time_point> end_time_;
-  double final_seconds_ = 0;
   core::Progress progress_;
-  ProgressHistory past_;
+  std::optional<SessionEnd> end_;  // once it can be seen, as the report
   std::optional<core::Report> report_;
-  MeshFailure failure_;
-  std::vector<std::weak_ptr<SessionWatcher>> watchers_;
 };
 
 }  // namespace stellate::server

@@ -170,7 +170,8 @@ void SessionStore::AdvanceLocked() {
 
 bool SessionStore::PutAwayHistories() {
   bool any = false;
-  for (const auto& session : All()) any = session->PutAwayHistory(Clock::duration::zero()) || any;
+  for (const auto& session : All())
+    any = session->history().PutAway(Clock::duration::zero()) || any;
   if (any) malloc_trim(0);
   return any;
 }
@@ -284,7 +285,7 @@ std::vector<std::uint64_t> SessionStore::OutlivedLocked(TimePoint now) {
 
 void SessionStore::Sweep(TimePoint now) {
   bool any = false;
-  for (const auto& session : All()) any = session->PutAwayHistory(kUnread) || any;
+  for (const auto& session : All()) any = session->history().PutAway(kUnread) || any;
   if (any) malloc_trim(0);
   std::vector<Entry> dead;  // freeing a large mesh takes time: after the lock
   const std::lock_guard lock(mutex_);
@@ -300,7 +301,7 @@ void SessionStore::Sweep(TimePoint now) {
 }
 
 bool SessionStore::Stop(TimePoint deadline) {
-  shelf_.Stop();
+  loader_.Stop();
   std::vector<Entry> all;
   {
     const std::lock_guard lock(mutex_);

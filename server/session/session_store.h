@@ -14,7 +14,7 @@
 
 #include "core/status.h"
 #include "server/base/refusal.h"
-#include "server/session/history_shelf.h"
+#include "server/session/history_loader.h"
 #include "server/session/session.h"
 
 namespace stellate::server {
@@ -56,7 +56,7 @@ class SessionStore {
   // The history of a mesh. Null: it is being read back from the journal, and the mesh's watchers
   // are woken when it is there, or lost.
   std::shared_ptr<const WatchLog> OpenHistory(const std::shared_ptr<Session>& session) {
-    return shelf_.Open(session);
+    return loader_.Open(session);
   }
   // Takes from memory what the journal has, and nobody reads. False: there was nothing.
   bool PutAwayHistories();
@@ -110,7 +110,7 @@ class SessionStore {
   std::deque<std::uint64_t> unreplayed_;
   std::uint64_t next_number_ = 1;
   bool stopped_ = false;
-  HistoryShelf shelf_;
+  HistoryLoader loader_;
 };
 
 }  // namespace stellate::server

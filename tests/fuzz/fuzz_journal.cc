@@ -133,7 +133,8 @@ void GoOn(server::Journal* journal, const std::string& geometry) {
       Script truth(nullptr, 0);
       Play(&session, &truth);
     }
-    Require(session.LoadHistory() == server::Session::Loading::kDone, "its history can be read");
+    Require(session.history().Load() == server::HistoryShelf::Loading::kDone,
+            "its history can be read");
     const server::SessionView view = session.View();
     // Less may have been kept than was recorded, never anything else.
     Require(view.state == server::SessionState::kSucceeded, "what is read back can go on");

@@ -283,7 +283,7 @@ server::SessionOptions SmallSphere() {
 }
 
 std::string GeometryOf(const Session& session) {
-  const server::WatchLog& history = *session.history();
+  const server::WatchLog& history = *session.history().log();
   server::WatchLog::Cursor cursor = history.Begin(0);
   std::string points;
   std::set<std::vector<std::uint32_t>> simplices;

@@ -22,7 +22,6 @@ LARGE = {
     "core/sample/ball_tree.h BallTree": (MOST_MEMBERS, 41),
     "server/journal/recorded_mesh.h RecordedMesh": (22, MOST_METHODS),
     "server/net/connection_guard.h ConnectionGuard": (28, MOST_METHODS),
-    "server/session/session.h Session": (31, 43),
 }
 
 CLASS = re.compile(r"^class (\w+)[^;{]*\{\n(.*?)^\};", re.M | re.S)

@@ -74,9 +74,9 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
     const auto worker = FakeWorker::Join(&session.pool());
     thread.join();
     before = session.View();
-    past = session.PastAfter(0);
-    wholes = all_of(*session.history());
-    bytes = session.history()->MemoryBytes();
+    past = session.history().PastAfter(0);
+    wholes = all_of(*session.history().log());
+    bytes = session.history().log()->MemoryBytes();
   }
   const auto journal = Open();
   auto meshes = journal->TakeMeshes();
@@ -88,14 +88,14 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
     return core::Refuse(core::StatusCode::kInvalidArgument, "none");
   });
   EXPECT_TRUE(session.Over() && session.HasEnded());
-  EXPECT_EQ(session.history(), nullptr);
+  EXPECT_EQ(session.history().log(), nullptr);
   EXPECT_EQ(session.View().revision, before.revision);
-  EXPECT_EQ(session.PublishedRevision(), before.revision);
+  EXPECT_EQ(session.history().PublishedRevision(), before.revision);
   EXPECT_EQ(session.View().report->certificate.euler_characteristic, 2);
   ASSERT_EQ(past.size(), before.revision);
-  ASSERT_EQ(session.PastAfter(0).size(), past.size());
+  ASSERT_EQ(session.history().PastAfter(0).size(), past.size());
   for (std::size_t i = 0; i < past.size(); ++i) {
-    const PastProgress then = session.PastAfter(0)[i];
+    const PastProgress then = session.history().PastAfter(0)[i];
     EXPECT_EQ(then.revision, i + 1);
     EXPECT_EQ(then.progress.vertices, past[i].progress.vertices);
     EXPECT_EQ(then.progress.bad_size, past[i].progress.bad_size);
@@ -103,8 +103,8 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
   }
   EXPECT_EQ(past.back().progress.vertices, before.progress.vertices);
   EXPECT_EQ(budget->total(), EstimateFinishedBytes(session.request().spec));
-  EXPECT_EQ(session.LoadHistory(), Session::Loading::kNoMemory);
-  EXPECT_EQ(session.history(), nullptr);
+  EXPECT_EQ(session.history().Load(), HistoryShelf::Loading::kNoMemory);
+  EXPECT_EQ(session.history().log(), nullptr);
 
   budget->MakeRoomBy([&] { return true; });
   const auto larger = std::make_shared<MemoryBudget>(MemoryBudget::Limits{2 * bytes, 0});
@@ -112,18 +112,18 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
   EXPECT_TRUE(again.empty());
   reopened.ports.memory = MemoryBudget::Open(larger, "");
   Session readable(std::move(reopened));
-  ASSERT_EQ(readable.LoadHistory(), Session::Loading::kDone);
-  EXPECT_GE(larger->total(), readable.history()->MemoryBytes());
-  EXPECT_TRUE(all_of(*readable.history()) == wholes);
+  ASSERT_EQ(readable.history().Load(), HistoryShelf::Loading::kDone);
+  EXPECT_GE(larger->total(), readable.history().log()->MemoryBytes());
+  EXPECT_TRUE(all_of(*readable.history().log()) == wholes);
   {
-    const auto held = readable.history();
-    EXPECT_FALSE(readable.PutAwayHistory(Clock::duration::zero())) << "somebody reads it";
+    const auto held = readable.history().log();
+    EXPECT_FALSE(readable.history().PutAway(Clock::duration::zero())) << "somebody reads it";
   }
-  EXPECT_FALSE(readable.PutAwayHistory(std::chrono::hours(1))) << "somebody has just read it";
-  EXPECT_TRUE(readable.PutAwayHistory(Clock::duration::zero()));
-  EXPECT_EQ(readable.history(), nullptr);
+  EXPECT_FALSE(readable.history().PutAway(std::chrono::hours(1))) << "somebody has just read it";
+  EXPECT_TRUE(readable.history().PutAway(Clock::duration::zero()));
+  EXPECT_EQ(readable.history().log(), nullptr);
   EXPECT_EQ(larger->total(), EstimateFinishedBytes(session.request().spec));
-  EXPECT_EQ(readable.LoadHistory(), Session::Loading::kDone) << "and back again";
+  EXPECT_EQ(readable.history().Load(), HistoryShelf::Loading::kDone) << "and back again";
 }
 
 // A clock that was an hour fast, or slow, and was set right while no server ran.
@@ -169,12 +169,70 @@ TEST_F(JournalTest, AnEndWithoutItsResultIsReplayedAndThenRecorded) {
     EXPECT_EQ(meshes.at(0).record->result.has_value(), server == 1);
     const std::uint64_t rounds =
         server == 0 ? meshes[0].record->rounds : meshes[0].record->result->revision;
+    const Session before(meshes[0]);
+    EXPECT_EQ(before.View().state, SessionState::kCancelled) << "before its replay, too";
     const Outcome outcome = RunMesh(std::move(meshes[0]), 0, false);
     EXPECT_EQ(outcome.view.state, SessionState::kCancelled);
     EXPECT_EQ(outcome.view.revision, rounds);
     ASSERT_LE(outcome.points.size(), whole.points.size());
     EXPECT_TRUE(std::equal(outcome.points.begin(), outcome.points.end(), whole.points.begin()));
   }
+}
+
+// Its answers lead to another end than the one recorded: they stay for a server that knows better.
+TEST_F(JournalTest, AReplayThatFailsTakesNoRecordsPlace) {
+  {
+    const auto journal = Open();
+    RunMesh(RecordedSphere(journal->NewMesh()), 2);
+  }
+  {
+    const auto journal = Open();
+    auto meshes = journal->TakeMeshes();
+    const std::uint64_t rounds = meshes.at(0).record->rounds;
+    ASSERT_FALSE(meshes[0].ports.journal->WriteEnd(
+        {SessionState::kSucceeded, std::chrono::system_clock::now(), 1, {}, rounds}));
+  }
+  for (int server = 0; server < 2; ++server) {
+    const auto journal = Open();
+    auto meshes = journal->TakeMeshes();
+    ASSERT_FALSE(meshes.at(0).record->result) << "of another mesh than the one that ended";
+    const Outcome outcome = RunMesh(std::move(meshes[0]), 0, false);
+    EXPECT_EQ(outcome.view.state, SessionState::kFailed);
+    EXPECT_EQ(outcome.view.failure.reason, FailureReason::kReplayMismatch);
+  }
+}
+
+// Cancelled while it waits for its replay, by a server that stops before that: the next one replays
+// all that watchers have seen.
+TEST_F(JournalTest, AMeshCancelledInItsReplayLosesNothingWhenTheServerStops) {
+  {
+    const auto journal = Open();
+    RunMesh(RecordedSphere(journal->NewMesh()), 4);
+  }
+  std::uint64_t rounds = 0;
+  {
+    const auto journal = Open();
+    auto meshes = journal->TakeMeshes();
+    rounds = meshes.at(0).record->rounds;
+    bool over_when_replayed = false;
+    Session* replayed = nullptr;
+    meshes[0].ports.on_replayed = [&] { over_when_replayed = replayed->Over(); };
+    Session session(std::move(meshes[0]));
+    replayed = &session;
+    session.Cancel();
+    EXPECT_EQ(session.View().state, SessionState::kCancelled);
+    session.Suspend();
+    session.Run();
+    EXPECT_EQ(session.View().state, SessionState::kCancelled);
+    EXPECT_LT(session.View().revision, rounds);
+    EXPECT_FALSE(over_when_replayed) << "the store would wait for the thread that waits for it";
+  }
+  const auto journal = Open();
+  auto meshes = journal->TakeMeshes();
+  ASSERT_TRUE(meshes.at(0).record->end);
+  const Outcome after = RunMesh(std::move(meshes[0]), 0, false);
+  EXPECT_EQ(after.view.state, SessionState::kCancelled);
+  EXPECT_EQ(after.view.revision, rounds);
 }
 
 // Cancelled at any moment, in the middle of a round too.

@@ -71,7 +71,7 @@ TEST_F(ReplayQueue, AFewAtATimeAndFinishedOnesAtOnce) {
   WaitForMeshers(2);
   EXPECT_EQ(store.Running(), 5u);
   EXPECT_EQ(store.Find(Named(4).request.name)->View().state, SessionState::kWaiting);
-  const std::uint64_t revision = store.Find(Named(4).request.name)->PublishedRevision();
+  const std::uint64_t revision = store.Find(Named(4).request.name)->history().PublishedRevision();
   EXPECT_GE(revision, 4u) << "as a watcher may have it";
   // One in the queue can be deleted; what is cancelled there is replayed first.
   EXPECT_TRUE(store.Delete(Named(3).request.name));
@@ -135,7 +135,7 @@ TEST_F(ReplayQueue, AHistoryIsReadBackForWhoeverAsks) {
     std::atomic<bool> woken{false};
   };
   const auto watcher = std::make_shared<Watcher>();
-  ASSERT_TRUE(session->AddWatcher(watcher));
+  ASSERT_TRUE(session->history().AddWatcher(watcher));
   EXPECT_EQ(store.OpenHistory(session), nullptr);
   while (!watcher->woken) std::this_thread::yield();
   auto history = store.OpenHistory(session);
@@ -144,7 +144,7 @@ TEST_F(ReplayQueue, AHistoryIsReadBackForWhoeverAsks) {
   EXPECT_FALSE(store.PutAwayHistories()) << "it is being read";
   history.reset();
   EXPECT_TRUE(store.PutAwayHistories());
-  EXPECT_EQ(session->history(), nullptr);
+  EXPECT_EQ(session->history().log(), nullptr);
 }
 
 }  // namespace

@@ -189,7 +189,7 @@ TEST(Session, AMeshThatOutgrowsTheMemoryFailsAndGivesItBack) {
   EXPECT_NE(view.failure.message.find("--max-memory-bytes"), std::string::npos);
   EXPECT_EQ(view.revision, 2u);
   EXPECT_EQ(view.bytes,
-            EstimateFinishedBytes(session.request().spec) + session.history()->MemoryBytes())
+            EstimateFinishedBytes(session.request().spec) + session.history().log()->MemoryBytes())
       << "the mesher is gone";
   EXPECT_EQ(budget->total(), view.bytes);
   worker->WaitForEnd();
@@ -214,9 +214,9 @@ TEST(Session, WatchersAreWokenEachRoundAndBounded) {
   Running running(Faking({}));
   auto first = std::make_shared<CountingWatcher>();
   auto second = std::make_shared<CountingWatcher>();
-  EXPECT_TRUE(running.session->AddWatcher(first));
-  EXPECT_TRUE(running.session->AddWatcher(second));
-  EXPECT_FALSE(running.session->AddWatcher(std::make_shared<CountingWatcher>()));
+  EXPECT_TRUE(running.session->history().AddWatcher(first));
+  EXPECT_TRUE(running.session->history().AddWatcher(second));
+  EXPECT_FALSE(running.session->history().AddWatcher(std::make_shared<CountingWatcher>()));
   second.reset();
   EXPECT_EQ(running.session->View().watchers, 1u);
   const auto worker = FakeWorker::Join(&running.session->pool());
@@ -230,7 +230,7 @@ TEST(Session, WhatARoundLedToIsShownBeforeTheNextIsAnswered) {
   const auto worker = FakeWorker::Join(
       &running.session->pool(), [&](const Chunk& chunk, core::AnswerBlock* answer) {
         const TimePoint patience = Clock::now() + 60s;
-        while (running.session->history()->revision() + 1 < chunk.round->batch->round) {
+        while (running.session->history().log()->revision() + 1 < chunk.round->batch->round) {
           if (Clock::now() > patience) return false;
           std::this_thread::sleep_for(1ms);
         }
@@ -270,7 +270,7 @@ std::vector<double> MeshSphere(int workers, std::vector<std::uint32_t>* simplice
   EXPECT_EQ(view.state, SessionState::kSucceeded);
   EXPECT_TRUE(view.report->certificate.certified) << view.report->certificate.verdict;
   EXPECT_EQ(view.report->certificate.euler_characteristic, 2);
-  const WatchLog& log = *running.session->history();
+  const WatchLog& log = *running.session->history().log();
   WatchLog::Cursor cursor = log.Begin(0);
   std::vector<double> points;
   for (DeltaPart part; !part.complete;) {

@@ -171,9 +171,9 @@ inline Outcome RunMesh(SessionOptions options, std::uint64_t stop_at = 0, bool w
     if (stop_at > 0) session.Suspend();
     thread.join();
   }
-  EXPECT_EQ(session.LoadHistory(), Session::Loading::kDone);
+  EXPECT_EQ(session.history().Load(), HistoryShelf::Loading::kDone);
   Outcome outcome{session.View(), {}, {}};
-  Read(*session.history(), &outcome);
+  Read(*session.history().log(), &outcome);
   return outcome;
 }
 

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include "core/report.h"
+#include "server/memory/memory_budget.h"
+#include "server/oracles/oracle_pool.h"
+#include "server/session/session_journal.h"
+
+namespace stellate::server {
+
+// Hears what becomes of a session, for the metrics. On the session's thread; must not block.
+class SessionObserver : public PoolObserver {
+ public:
+  virtual void OnRound(std::size_t queries) = 0;  // answered
+  virtual void OnEnd(SessionState state, const core::Report& report) = 0;
+};
+
+// What the server decides about a mesh, for every owner.
+struct MeshPolicy {
+  DispatchPolicy dispatch;
+  std::size_t max_workers = 64;
+  std::size_t max_watchers = 64;
+};
+
+// What a session works with.
+struct SessionPorts {
+  std::shared_ptr<SessionObserver> observer;      // may be null
+  std::shared_ptr<SessionJournal> journal;        // may be null: the mesh lives in memory alone
+  std::shared_ptr<MemoryBudget::Account> memory;  // may be null: its memory is not counted
+  // Called when the replay is over, and again before Run is; may be empty.
+  std::function<void()> on_replayed;
+};
+
+// What a session is made of, fixed for its life.
+struct SessionOptions {
+  MeshRequest request;
+  MeshPolicy policy;
+  SessionPorts ports;
+  std::optional<SessionRecord> record;  // set: the journal has it from an earlier server
+};
+
+}  // namespace stellate::server
