@@ -72,7 +72,8 @@ final class Checkpoint {
         Files.createDirectories(folder.toAbsolutePath().getParent());
       }
       Files.createDirectory(
-          folder, PosixFilePermissions.asFileAttribute(PosixFilePermissions.fromString("rwx------")));
+          folder,
+          PosixFilePermissions.asFileAttribute(PosixFilePermissions.fromString("rwx------")));
     }
     if (!isOwn(folder)) {
       throw wrong("belongs to another user: take another directory");

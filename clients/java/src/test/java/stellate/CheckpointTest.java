@@ -93,8 +93,7 @@ final class CheckpointTest {
 
   private static void refused(Path checkpoint, String words) {
     var error =
-        assertThrows(
-            StellateException.class, () -> Stellate.mesh(Live.TORUS, 0.3, in(checkpoint)));
+        assertThrows(StellateException.class, () -> Stellate.mesh(Live.TORUS, 0.3, in(checkpoint)));
     assertEquals(StellateException.Kind.INVALID_ARGUMENT, error.kind());
     assertTrue(error.getMessage().contains(words), error.getMessage());
   }
