@@ -10,8 +10,9 @@ from .errors import OracleError, StellateError, add_words
 
 _LINES = 12  # that the exactness of a function is measured along
 _FEWEST = 3  # of them that have to tell it
-# Of a line's five places, in shares of the box: no smooth function bends in so little. Single
-# precision far from the origin does not tell them apart: then those of the second length.
+# Of a line's five places, in shares of the box: no smooth function bends in the first. Single
+# precision far from the origin does not tell them apart: then those of the second length, in which a
+# spline does bend, where its pieces meet.
 _STEPS = (1e-6, 1e-4)
 _FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # their fourth difference, of what is not smooth:
 _FOURTH_SIZE = np.sqrt(70.0)  # so many times the error of a value
@@ -183,18 +184,24 @@ class Exactness:
             starts = self._about[np.arange(_LINES) % len(self._about)]
         ways = random.standard_normal((_LINES, d))
         ways *= sides / np.sqrt((ways * ways).sum(axis=1))[:, None]
+        exact = np.zeros(1, dtype=bool)  # values that lines have shown to be
         for step in _STEPS:
             along = step * np.arange(-2, 3)[None, :, None] * ways[:, None, :]
             values = f((starts[:, None, :] + along).reshape(-1, d)).reshape(_LINES, 5, -1)
             with np.errstate(invalid="ignore", divide="ignore"):
                 error = np.abs((values * _FOURTH[None, :, None]).sum(axis=1)) / _FOURTH_SIZE
-                shares = error * (4 * step) / np.abs(values[:, 4] - values[:, 0])
+                change = np.abs(values[:, 4] - values[:, 0])
+                shares = error * (4 * step) / change
             own = _OWN_ROUNDING * np.abs(values).max(axis=1)
             told = np.isfinite(shares) & (error > own)
-            enough = told.sum(axis=0) >= _FEWEST
+            enough = (told.sum(axis=0) >= _FEWEST) & ~exact
             if enough.any():
                 usual = [np.median(c[t]) if e else 0.0 for c, t, e in zip(shares.T, told.T, enough)]
                 return float(max(usual)), int(np.argmax(usual))
+            # Where it changes, and as a straight line does, longer lines would show how it bends.
+            exact = exact | (((change > own) & (error <= own)).sum(axis=0) >= _FEWEST)
+            if exact.all():
+                break
         return 0.0, 0
 
 

@@ -153,6 +153,24 @@ def test_a_function_that_draws_random_numbers_is_not_called_single_precision(siz
         ask(implicit(lambda x: sphere(x) + size * random.standard_normal(len(x))))
 
 
+def test_a_spline_is_not_called_inexact_where_its_pieces_meet():
+    random = np.random.default_rng(1)
+    places = np.arange(400.0)
+    distances = np.hypot(places[:, None] - 200, places - 200) - 100
+    values = distances + 0.05 * random.standard_normal(distances.shape)
+    made = oracles.SignedDistance.of_volume(values)
+    ways = random.standard_normal((20, 2))
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    found = made.closest_point(200 + 103 * ways)
+    assert np.abs(np.linalg.norm(found - 200, axis=1) - 100).max() < 0.5
+
+    def single(x):
+        return made._distance(x.astype(np.float32).astype(float))
+
+    with pytest.raises(stellate.OracleError, match="is exact to"):
+        oracles.SignedDistance(single, bounding_box=made.bounding_box).closest_point(200 + ways)
+
+
 def test_a_density_is_exact_enough_though_it_is_flat_far_from_what_it_is_dense_in():
     centers = np.random.default_rng(1).standard_normal((50, 3))
 

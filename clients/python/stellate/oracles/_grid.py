@@ -77,8 +77,7 @@ class Grid:
             raise InvalidArgument(
                 f"values are all but constant on both sides of the level {level:g}, as labels and masks "
                 "are: the surface between them is stairs, and no smooth one. Smooth them: "
-                f"{self._smoothed(level)}, or take distances to the label's "
-                "surface, of scipy.ndimage.distance_transform_edt"
+                f"{self._smoothed(level)}"
             )
         if self._rounded_share(level) > _FLAT:
             raise InvalidArgument(
