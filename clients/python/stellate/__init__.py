@@ -10,8 +10,9 @@
 `stellate.CommandOracle` of a program, and `stellate.manifolds` has a few ready.
 """
 
-from . import _stubs
+from . import _requirements, _stubs
 
+_requirements.insist()
 _stubs.ensure()  # before anything imports them
 
 from . import manifolds, oracles  # noqa: E402

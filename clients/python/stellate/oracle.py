@@ -311,7 +311,10 @@ def _instead(given: Any) -> str:
             "bounding_box=) makes one, of a parametrization stellate.oracles.Parametrized"
         )
     if isinstance(given, np.ndarray):
-        return "; of points stellate.oracles.PointCloud(points, k) makes one"
+        return (
+            "; of points stellate.oracles.PointCloud(points, k) makes one, of a mask, an image or a "
+            "volume of voxels stellate.oracles.SignedDistance.of_volume(array, spacing=, level=, smooth=)"
+        )
     if isinstance(given, (str, os.PathLike)):
         return (
             "; of a file of triangles stellate.oracles.TriangleMesh(file) makes one, and "

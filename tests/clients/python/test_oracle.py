@@ -213,6 +213,7 @@ def test_what_is_missing_is_named():
     [
         (lambda x: x, "ImplicitManifold"),
         (POINTS, "PointCloud"),
+        (POINTS > 0, r"of a mask, .*SignedDistance.of_volume\(array"),
         ("scan.stl", "TriangleMesh"),
     ],
 )

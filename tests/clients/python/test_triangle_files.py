@@ -37,6 +37,21 @@ def test_a_file_that_promises_too_much_fills_no_memory(tmp_path):
         oracles.TriangleMesh(path)
 
 
+@pytest.mark.parametrize(
+    "name, words",
+    [
+        ("part.STEP", "exact faces .* Write .stl or .obj, .* gmsh"),
+        ("part.igs", "exact faces .* Write .stl or .obj, .* gmsh"),
+        ("part.blend", r"no format that meshio knows has the ending '\.blend'\. Write one"),
+    ],
+)
+def test_a_file_of_another_kind_is_told_and_not_called_damaged(name, words, tmp_path):
+    (tmp_path / name).write_text("ISO-10303-21;\nHEADER;\n")
+    with pytest.raises(stellate.InvalidArgument, match=words) as caught:
+        oracles.TriangleMesh(tmp_path / name)
+    assert "damaged" not in str(caught.value)
+
+
 def test_what_is_no_file_is_refused(tmp_path):
     os.mkfifo(tmp_path / "pipe.off")  # opened, it would wait for ever
     for path in (tmp_path / "pipe.off", tmp_path):

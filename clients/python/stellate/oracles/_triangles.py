@@ -18,6 +18,7 @@ from ._common import as_points
 _MOST_POINTS = 5_000_000
 # For meshio to begin on a busy machine, and to read: ten times what its slowest formats take.
 _SECONDS, _SECONDS_A_MB = 20, 20
+_CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 
 
 class TriangleMesh(PointCloud):
@@ -96,6 +97,13 @@ def _read_file(path: str) -> tuple[Any, Any]:
     begin = f"{path!r} cannot be read as a mesh: "
     if not os.path.isfile(path):  # a device or a pipe may have no end
         raise InvalidArgument(begin + "it is not there, or no file")
+    ending = os.path.splitext(path)[1].lower()
+    if ending in _CAD:
+        raise InvalidArgument(
+            begin + f"{ending} holds exact faces (CAD), and no triangles. Write .stl or .obj, with "
+            "triangles smaller than epsilon, in the program that it is from, or by gmsh: "
+            "gmsh PART -2 -clmax EPSILON -o part.stl"
+        )
     seconds = _SECONDS + _SECONDS_A_MB * os.path.getsize(path) / 1e6
     reader = os.path.join(os.path.dirname(__file__), "_read_file.py")
     try:
@@ -114,6 +122,12 @@ def _read_file(path: str) -> tuple[Any, Any]:
         raise InvalidArgument(
             begin + f"meshio was not done after {seconds:.0f} s: is it damaged?"
         ) from None
+    if run.returncode != 0 and b"Could not deduce file format" in run.stderr:
+        raise InvalidArgument(
+            begin
+            + f"no format that meshio knows has the ending {ending!r}. Write one that it does: "
+            ".stl, .obj, .ply, .off, .msh, .vtu"
+        )
     if run.returncode != 0:
         said = run.stderr.decode(errors="replace").split("\n")
         said = [line for line in said if line.strip()][-3:]
