@@ -1,5 +1,7 @@
 // Strangers, wrong certificates and other people's meshes, against a live server.
 
+#include <grpcpp/generic/generic_stub.h>
+
 #include <sstream>
 #include <vector>
 
@@ -177,6 +179,39 @@ TEST_F(LiveSafetyTest, TokensComeAndGoWithoutARestart) {
   WriteTokens(std::string("alice ") + kAlice + "\n");
   while (!alice.Info().ok()) std::this_thread::sleep_for(50ms);
   EXPECT_TRUE(alice.Get(name, &mesh).ok()) << "a mesh outlives its owner's absence";
+}
+
+TEST_F(LiveSafetyTest, AWithdrawnTokenEndsAStreamThatHasSentNoRequest) {
+  StartWithTokens();
+  const auto channel = grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials());
+  grpc::GenericStub stub(channel);
+  for (const char* rpc : {"WatchMesh", "DownloadMesh", "ServeOracle"}) {
+    WriteTokens(std::string("alice ") + kAlice + "\nbob " + kBob + "\n");
+    server_->ReloadFiles();
+    grpc::ClientContext context;
+    context.AddMetadata("authorization", std::string("Bearer ") + kAlice);
+    grpc::CompletionQueue queue;
+    const auto call =
+        stub.PrepareCall(&context, std::string("/stellate.v1.Stellate/") + rpc, &queue);
+    const auto await = [&queue] {
+      void* tag = nullptr;
+      bool ok = false;
+      EXPECT_TRUE(queue.Next(&tag, &ok));
+    };
+    call->StartCall(nullptr);
+    await();
+    grpc::ClientContext next;
+    next.AddMetadata("authorization", std::string("Bearer ") + kAlice);
+    v1::ServerInfo info;
+    EXPECT_TRUE(v1::Stellate::NewStub(channel)->GetServerInfo(&next, {}, &info).ok())
+        << "on the same connection, so that the server has the stream by now";
+    WriteTokens(std::string("bob ") + kBob + "\n");
+    server_->ReloadFiles();
+    grpc::Status status;
+    call->Finish(&status, nullptr);
+    await();
+    EXPECT_EQ(status.error_code(), StatusCode::UNAUTHENTICATED) << rpc << status.error_message();
+  }
 }
 
 TEST_F(LiveSafetyTest, AnAdministratorSeesAndEndsEverybodysAndAnswersForNobody) {
