@@ -61,5 +61,6 @@ def _with_server() -> dict[str, Any]:
 _generate_stubs()
 setup(
     version=(_PACKAGE / "_generated" / "VERSION").read_text().strip(),
-    **(_with_server() if _SERVER else {}),
+    # Without a command it has to be said that there is none, as pyproject.toml leaves that to here.
+    **(_with_server() if _SERVER else {"entry_points": {}}),
 )
