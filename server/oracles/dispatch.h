@@ -100,7 +100,6 @@ class Dispatch {
 
   void Begin(const std::vector<Block>& blocks, TimePoint now);
   void End();  // forgets the round; answers to its leases are late from now on
-  bool Active() const { return active_; }
   // Whether every query has an answer, and each worker has had one answer of each family compared
   // with another worker's. Does not wait for further cross-checks, or for the slower of two hedged
   // leases.
