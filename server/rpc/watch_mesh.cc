@@ -15,7 +15,7 @@ class WatchStream final : public HistoryStream<v1::WatchMeshRequest, v1::WatchMe
 
  private:
   grpc::Status Choose(const v1::WatchMeshRequest& request, const Session& session) override {
-    const std::uint64_t newest = session.history().PublishedRevision();
+    const std::uint64_t newest = session.history().SeenRevision();
     if (request.from_revision() > newest) {
       return Refusal(v1::ERROR_REASON_REVISION_TOO_NEW,
                      core::Message("from_revision is ", request.from_revision(),

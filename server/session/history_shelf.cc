@@ -57,6 +57,10 @@ std::uint64_t HistoryShelf::PublishedRevision() const {
   return std::max(log_->revision(), options_.record ? options_.record->rounds : 0);
 }
 
+std::uint64_t HistoryShelf::SeenRevision() const {
+  return std::max(PublishedRevision(), options_.record ? options_.record->rounds : 0);
+}
+
 std::vector<PastProgress> HistoryShelf::PastAfter(std::uint64_t revision) const {
   const std::lock_guard lock(mutex_);
   return past_.After(revision);

@@ -38,9 +38,12 @@ class HistoryShelf {
   // it.
   std::shared_ptr<const WatchLog> log() const;
   std::uint64_t revision() const;  // the newest that can be read
-  // The newest revision that any watcher may have seen: while a recorded mesh is replayed, the one
-  // at which the replay will end.
+  // The newest revision that can be asked for: while a recorded mesh is replayed, the one at which
+  // the replay will end.
   std::uint64_t PublishedRevision() const;
+  // The newest revision that any watcher may have. Later than the published one where a replay has
+  // failed on its way to what an earlier server had shown.
+  std::uint64_t SeenRevision() const;
   // How the mesh stood at revisions after this one.
   std::vector<PastProgress> PastAfter(std::uint64_t revision) const;
 

@@ -202,6 +202,26 @@ TEST_F(JournalTest, AReplayThatFailsTakesNoRecordsPlace) {
   }
 }
 
+// Another version asks otherwise, so that the replay fails on its way. A watcher who comes later
+// than that has a revision that is lost: it is told to forget it, not refused.
+TEST_F(JournalTest, ARevisionThatAReplayLosesWasSeenNevertheless) {
+  {
+    const auto journal = Open();
+    RunMesh(RecordedSphere(journal->NewMesh()), 4);
+  }
+  const auto journal = Open();
+  auto meshes = journal->TakeMeshes();
+  const std::uint64_t rounds = meshes.at(0).record->rounds;
+  Session session(std::move(meshes[0]), [](core::Specification spec) {
+    spec.seeds *= -1;
+    return core::Mesher::Create(std::move(spec));
+  });
+  session.Run();
+  EXPECT_EQ(session.View().state, SessionState::kFailed);
+  EXPECT_LT(session.history().PublishedRevision(), rounds);
+  EXPECT_EQ(session.history().SeenRevision(), rounds);
+}
+
 // Cancelled while it waits for its replay, by a server that stops before that: the next one replays
 // all that watchers have seen.
 TEST_F(JournalTest, AMeshCancelledInItsReplayLosesNothingWhenTheServerStops) {

@@ -217,14 +217,18 @@ TEST_F(TwoVersions, AWatcherOfALostRevisionIsReset) {
   const std::string name = CreateSphere();
   std::uint64_t revision = 0;
   {
-    std::atomic<bool> enough{false};
+    // Leaves unanswered what is asked once there are three revisions, so that the mesh cannot end.
+    v1::GetMeshRequest which;
+    which.set_name(name);
     RawWorker worker(stub_.get(), name,
                      [&](const v1::QueryChunk& queries) -> std::optional<v1::ServeOracleRequest> {
-                       if (enough) return std::nullopt;
+                       grpc::ClientContext context;
+                       v1::Mesh mesh;
+                       const bool known = stub_->GetMesh(&context, which, &mesh).ok();
+                       if (!known || mesh.revision() >= 3) return std::nullopt;
                        return RawWorker::Truly(queries);
                      });
     while (Get(name).revision() < 3) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    enough = true;
     revision = Get(name).revision();
     server_.reset();
   }
