@@ -5,6 +5,7 @@ import pytest
 import stellate
 from ready_shapes import TORUS, TURN, closest, torus_map
 from stellate import oracles
+from stellate.oracles._bandwidth import insist_on_flatness
 
 
 def scan(count, noise, crowding=1):
@@ -84,3 +85,28 @@ def test_what_is_made_of_a_cloud_tells_of_it_too():
     assert cloud.note == repr(cloud)
     half = oracles.Clipped(cloud, [oracles.HalfSpace([1, 0, 0])])
     assert half.note == cloud.note
+
+
+def colours(count):
+    return np.random.default_rng(3).integers(0, 256, (count, 3)) / 50
+
+
+@pytest.mark.parametrize(
+    "points, dimension",
+    [
+        (scan(8000, 0.003), 1),
+        (np.hstack([scan(8000, 0.003), colours(8000)]), 2),
+        (np.random.default_rng(1).uniform(-1, 1, (8000, 3)), 2),
+    ],
+    ids=["a surface as a curve", "colours as coordinates", "a solid as a surface"],
+)
+def test_points_of_no_manifold_of_that_dimension_are_refused_before_all_are_neighbours(
+    points, dimension
+):
+    with pytest.raises(stellate.InvalidArgument, match=f"no manifold of dimension {dimension}: .*"):
+        oracles.PointCloud(points, dimension)
+
+
+@pytest.mark.parametrize("count, noise", [(400, 0), (1000, 0.02), (8000, 0.08)])
+def test_noise_and_distance_between_points_are_not_taken_for_a_wrong_dimension(count, noise):
+    insist_on_flatness(scan(count, noise), 2)

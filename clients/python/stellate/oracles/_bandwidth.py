@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .._rows import Array
+from .._rows import Array, product, transposed
+from ..errors import InvalidArgument
 from ._common import tree_of
 
 _ROUNDS = 12  # of bandwidths from noise, and noise from fits of these bandwidths
@@ -18,12 +19,47 @@ _LEAST = 0.1  # of the curvature that is seen: no less is left of it by the nois
 _GROWTH = 1.5  # of a bandwidth in a round
 _WIDEST = 0.5  # of the smallest radius of curvature: a quadric follows no more of a surface
 
+_PLACES = 100  # where it is looked at whether the cloud is flat
+_NEAR = 40  # points about each of them
+_SHARE = 10  # of so many at least: a larger part of a closed curve is not flat
+# Of the spread along, the spread across at the best of all scales. Points without order have .80 to .90
+# by these numbers, a sphere with noise of a fifth of its radius .65 to .71.
+_ROUND = 0.75
+
 
 class Fits(NamedTuple):
     """Of the quadrics at some points of the cloud, all (n,)."""
 
     bend: Array  # their largest curvature
     bend_error: Array  # what the noise makes of it, a standard deviation
+
+
+def insist_on_flatness(points: Array, dimension: int) -> None:
+    """That there is a scale at which the points spread less across k directions than along them.
+
+    Else noise, which is what all that lies across is taken for, would widen the neighbourhoods until
+    each has all points. Scales are those of the nearest of all points, of every second, and so on.
+
+    Raises: InvalidArgument.
+    """
+    order = np.random.default_rng(1).permutation(len(points))
+    some, sample, flattest = points[order[:_PLACES]], points[order], np.inf
+    while len(sample) >= _SHARE * _NEAR:
+        about = sample[tree_of(sample).query(some, k=_NEAR)[1]]
+        about = about - about.mean(axis=1, keepdims=True)
+        spreads = np.linalg.eigvalsh(product(transposed(about), about))
+        across, along = spreads[:, -dimension - 1], np.maximum(spreads[:, -dimension], 1e-300)
+        flattest = min(flattest, float(np.median(np.sqrt(np.maximum(across, 0) / along))))
+        if flattest <= _ROUND:
+            return
+        sample = sample[: len(sample) // 2]
+    if np.isfinite(flattest):
+        raise InvalidArgument(
+            f"the points lie near no manifold of dimension {dimension}: at every scale they spread across it "
+            f"nearly as far as along it, by {flattest:.2f} at the least. Is the dimension right? Are all "
+            "columns coordinates, and not colours or times? Noise has to be far below the radius of "
+            "curvature, and so has the distance between points. If all is so, give a bandwidth"
+        )
 
 
 def by_density(distinct: Array, which: Any, dimension: int) -> Array:

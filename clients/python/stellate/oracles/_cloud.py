@@ -9,7 +9,7 @@ import numpy as np
 
 from .._rows import Array, Flags, apply, norms, product, transposed
 from ..errors import InvalidArgument
-from ._bandwidth import Fits, by_density, noise_aware
+from ._bandwidth import Fits, by_density, insist_on_flatness, noise_aware
 from ._common import Projection, as_points, box_around, tree_of
 
 _ITERATIONS = 100
@@ -57,6 +57,7 @@ class PointCloud(Projection):
             )
         self._tree = tree_of(self._points)
         if bandwidth is None:
+            insist_on_flatness(distinct, dimension)
             some = self._points[:: max(1, n // _LOOKS)]
             self._reach(by_density(distinct, which.reshape(-1), dimension))
             self._reach(
