@@ -1,6 +1,7 @@
 # stellate_effort(TARGET OPTION...): how hard the compiler works on a target in builds of type Release,
-# which are -O3 otherwise. Outside of the loops that meshes spend their time in, -O3 takes a third of
-# the build's time and saves none of a mesh's.
+# which are -O3 otherwise. No target needs all of -O3: the loops that meshes spend their time in are
+# as fast with -O2 and its inlining, and elsewhere -O3 takes a third of the build's time and saves
+# none of a mesh's.
 function(stellate_effort target)
   target_compile_options(${target} PRIVATE "$<$<CONFIG:Release>:${ARGN}>")
 endfunction()

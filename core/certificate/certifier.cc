@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/base/interruption.h"
 #include "core/certificate/boundary_claims.h"
 #include "core/certificate/closeness_claims.h"
 #include "core/certificate/complex_claims.h"
@@ -32,6 +33,7 @@ class Certifier::Impl {
       : x_(spec, mesh, facts) {
     x_.seen = std::move(known.points);
     ends_ = std::move(known.ends);
+    clear_ = std::move(known.clear);
     if (mesh.faces) boundary_.emplace(x_);
     if (const std::optional<StarGeometry> stars = JudgeComplex(x_)) {
       claims_.emplace(x_, *stars, known.leans);
@@ -47,9 +49,9 @@ class Certifier::Impl {
     if (finished_) return;
     // What they say of the oracle's own error the others need.
     if (ball_steps_ == 0) claims_->closeness.JudgeVertices(answers[vertices_]);
-    if (ball_steps_ == 0 && sheets_) sheets_->JudgeKnown(ends_);
+    if (ball_steps_ == 0 && sheets_) sheets_->JudgeKnown();
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
-      if (sheets_ && ball_steps_ == 0 && blocks_[b].face == 0) sheets_->NoteClearances(answers[b]);
+      if (sheets_) Note(blocks_[b].face, answers[b]);
       if (judges_[b]) judges_[b](blocks_[b].points, answers[b]);
     }
     AskMore();
@@ -58,7 +60,9 @@ class Certifier::Impl {
   const Certificate& certificate() const { return x_.certificate; }
   const std::vector<double>& wanted() const { return x_.wanted; }
   const PointsOnWalls& wanted_on_walls() const { return x_.wanted_on_walls; }
-  std::vector<double>& seen() { return x_.seen; }
+  KnownOfManifold TakeKnown() {
+    return {std::move(x_.seen), {}, std::move(ends_), std::move(clear_)};
+  }
 
  private:
   using Judge = std::function<void(const Eigen::MatrixXd& asked, const AnswerBlock& answer)>;
@@ -139,7 +143,7 @@ class Certifier::Impl {
 
   void AskOnWalls() {
     const std::size_t first = blocks_.size();
-    sheets_.emplace(x_, *boundary_);
+    sheets_.emplace(x_, *boundary_, ends_, clear_);
     AskOfEach(*boundary_, boundary_->FaceQuestions(), &BoundaryClaims::JudgeFace);
     for (std::size_t b = first; b < blocks_.size(); ++b)
       judges_[b] = [this, judge = judges_[b], wall = std::countr_zero(blocks_[b].face)](
@@ -150,6 +154,17 @@ class Certifier::Impl {
     AskOfEach(*sheets_, sheets_->Questions(claims_->closeness.simplices()), &SheetClaims::Judge);
   }
 
+  // What is asked about walls from where clearances dip may not have it asked again and again.
+  void Note(WallSet face, const AnswerBlock& answer) {
+    if (face != 0 && ball_steps_ > 0) return;
+    for (Eigen::Index j = 0; j < answer.clearances.cols(); ++j) {
+      CheckInterruption(static_cast<std::size_t>(j));
+      if (Found(answer, j))
+        clear_.Note(answer.points.col(j).data(), x_.mesh.d, answer.clearances.col(j).data(),
+                    x_.spec.walls, face);
+    }
+  }
+
   void AskMore() {
     Claims& c = *claims_;
     const bool first = ball_steps_++ == 0;
@@ -158,8 +173,7 @@ class Certifier::Impl {
     if (first && !x_.spec.oracle.tangent_basis)
       Ask(c.coverage.DifferenceQuestions(),
           [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.coverage.JudgeDifferences(a); });
-    if (first && sheets_)
-      AskOfEach(*sheets_, sheets_->QuestionsWhereClearancesDip(), &SheetClaims::Judge);
+    if (sheets_) AskOfEach(*sheets_, sheets_->QuestionsWhereClearancesDip(), &SheetClaims::Judge);
     AskTangents();
     if (ball_steps_ < kMaxBallSteps) AskBalls();
     if (ball_steps_ <= kMaxBallSteps)
@@ -202,8 +216,9 @@ class Certifier::Impl {
   Examination x_;
   std::optional<Claims> claims_;            // if it is a complex
   std::optional<BoundaryClaims> boundary_;  // of a manifold with boundary
-  std::optional<SheetClaims> sheets_;       // of that, too
-  EndsOfManifold ends_;                     // known before
+  EndsOfManifold ends_;                     // known before, and answered
+  ClearPoints clear_;                       // the same
+  std::optional<SheetClaims> sheets_;       // of a manifold with boundary, too
   int ball_steps_ = 0;
   bool finished_ = false;
   std::vector<QueryBlock> blocks_;
@@ -221,6 +236,6 @@ void Certifier::Absorb(const std::vector<AnswerBlock>& answers) { impl_->Absorb(
 const Certificate& Certifier::certificate() const { return impl_->certificate(); }
 const std::vector<double>& Certifier::Uncovered() const { return impl_->wanted(); }
 const PointsOnWalls& Certifier::UncoveredOnWalls() const { return impl_->wanted_on_walls(); }
-std::vector<double> Certifier::TakeSeen() { return std::move(impl_->seen()); }
+KnownOfManifold Certifier::TakeKnown() { return impl_->TakeKnown(); }
 
 }  // namespace stellate::core

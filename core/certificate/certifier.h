@@ -29,8 +29,8 @@ class Certifier {
   const std::vector<double>& Uncovered() const;
   // The same of walls: points of M on walls where the mesh does not end.
   const PointsOnWalls& UncoveredOnWalls() const;
-  // All that it knew or was answered, d each.
-  std::vector<double> TakeSeen();
+  // All that it knew or was answered, without leans.
+  KnownOfManifold TakeKnown();
 
  private:
   class Impl;

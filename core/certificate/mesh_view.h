@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/certificate/clear_points.h"
 #include "core/report.h"
 
 namespace stellate::core {
@@ -53,6 +54,12 @@ struct EndsOfManifold {
   std::vector<double> points;
   std::vector<int> walls;
   std::vector<double> conormals;
+
+  void Add(const double* y, int wall, const double* conormal, int d) {
+    points.insert(points.end(), y, y + d);
+    walls.push_back(wall);
+    conormals.insert(conormals.end(), conormal, conormal + d);
+  }
 };
 
 // What was learned of M before, while the mesh was made.
@@ -61,6 +68,7 @@ struct KnownOfManifold {
   std::vector<double> leans;   // where M may end: points y of M and the parts of q - y along
                                // it (RimCheck), 2 d each
   EndsOfManifold ends;         // that are no vertices
+  ClearPoints clear;           // whatever was answered, vertices too
 };
 
 }  // namespace stellate::core

@@ -29,9 +29,11 @@ constexpr std::size_t kMostDips = 64;
 constexpr std::size_t kLeastDips = 8;
 constexpr double kDip = 0.85;
 constexpr std::size_t kPointsNear = 8;
+constexpr std::size_t kCandidatesNear = 6 * kPointsNear;  // most lie where others lie
 constexpr double kApart = 0.25;  // of the mesh size: what is nearer is in the same dip
 // Of the mesh size: so near to a wall the distance from its mesh says little of that from the wall.
 constexpr double kBeside = 0.15;
+constexpr double kAfar = 4;  // of the largest radius of the mesh's simplices
 
 // The squared distance of y from a simplex: from the nearest of those of its faces above or below
 // which y lies.
@@ -75,30 +77,43 @@ std::vector<std::uint32_t> Thinned(const std::vector<std::uint32_t>& all, std::s
   return some;
 }
 
-// Of the points in the tree those nearest to q that are no nearer than `apart`, nearest first.
-std::vector<std::uint32_t> NearestBeyond(const BallTree& tree, const double* q, double apart) {
+// The clear points nearest to q that are no nearer to it, or to each other, than `apart`, nearest
+// first. What is asked about again and again is not to outvote the rest.
+std::vector<std::uint32_t> NearestApart(const BallTree& tree, const std::vector<double>& points,
+                                        const std::vector<double>& shares, const double* q, int d,
+                                        double apart) {
   std::vector<std::pair<double, std::uint32_t>> nearest;
   tree.VisitNear(
       q,
       [&] {
-        return nearest.size() < kPointsNear ? double{INFINITY} : std::sqrt(nearest.back().first);
+        return nearest.size() < kCandidatesNear ? double{INFINITY}
+                                                : std::sqrt(nearest.back().first);
       },
       [&](std::uint32_t other, double squared) {
-        if (squared < apart * apart) return;
+        if (squared < apart * apart || shares[other] == 0) return;
         const std::pair<double, std::uint32_t> entry{squared, other};
         nearest.insert(std::upper_bound(nearest.begin(), nearest.end(), entry), entry);
-        if (nearest.size() > kPointsNear) nearest.pop_back();
+        if (nearest.size() > kCandidatesNear) nearest.pop_back();
       });
   std::vector<std::uint32_t> ids;
-  ids.reserve(nearest.size());
-  for (const auto& [squared, other] : nearest) ids.push_back(other);
+  const auto point = [&](std::uint32_t n) {
+    return points.data() + static_cast<std::size_t>(n) * static_cast<std::size_t>(d);
+  };
+  for (const auto& [squared, other] : nearest) {
+    if (ids.size() == kPointsNear) break;
+    const bool is_apart = std::none_of(ids.begin(), ids.end(), [&](std::uint32_t id) {
+      return SquaredDistance(point(id), point(other), d) < apart * apart;
+    });
+    if (is_apart) ids.push_back(other);
+  }
   return ids;
 }
 
 }  // namespace
 
-SheetClaims::SheetClaims(Examination& examination, BoundaryClaims& boundary)
-    : x_(examination), boundary_(boundary) {
+SheetClaims::SheetClaims(Examination& examination, BoundaryClaims& boundary, EndsOfManifold& ends,
+                         const ClearPoints& clear)
+    : x_(examination), boundary_(boundary), ends_(ends), clear_(clear) {
   for (int wall = 0; wall < x_.spec.walls; ++wall) sheets_.push_back(SheetOf(wall));
 }
 
@@ -160,7 +175,7 @@ std::vector<std::uint32_t> SheetClaims::Spread(const Sheet& sheet,
   std::vector<double> far(radii.size());
   ParallelFor(radii.size(), [&](std::size_t n) {
     const double* at = barycentres.col(static_cast<Eigen::Index>(n)).data();
-    far[n] = std::sqrt(sheet.tree.NearestSquaredDistance(at)) - sheet.largest_radius;
+    far[n] = DistanceFrom(sheet, at);
   });
   std::stable_sort(order.begin(), order.end(),
                    [&](std::uint32_t a, std::uint32_t b) { return far[a] > far[b]; });
@@ -203,16 +218,6 @@ QueryBlock SheetClaims::QuestionsOf(std::size_t wall, Eigen::MatrixXd points) co
   return block;
 }
 
-void SheetClaims::NoteClearances(const AnswerBlock& answer) {
-  for (Eigen::Index j = 0; j < answer.clearances.cols(); ++j) {
-    CheckInterruption(static_cast<std::size_t>(j));
-    const auto clear = answer.clearances.col(j);
-    if (!Found(answer, j) || !(clear.minCoeff() > 0)) continue;
-    noted_.insert(noted_.end(), answer.points.col(j).begin(), answer.points.col(j).end());
-    clearances_.insert(clearances_.end(), clear.begin(), clear.end());
-  }
-}
-
 // From the mesh of the wall; infinity where it has none.
 double SheetClaims::DistanceFrom(const Sheet& sheet, const double* y) const {
   const auto width = static_cast<std::size_t>(x_.mesh.k);
@@ -227,22 +232,40 @@ double SheetClaims::DistanceFrom(const Sheet& sheet, const double* y) const {
   return best;
 }
 
-// The deepest first. `near`: of each noted point those next to it.
-std::vector<std::uint32_t> SheetClaims::Dips(
-    std::size_t wall, const std::vector<std::vector<std::uint32_t>>& near) const {
-  const Sheet& sheet = *sheets_[wall];
+// Of the clear points that have none yet.
+void SheetClaims::TakeShares(std::size_t wall) {
+  Sheet& sheet = *sheets_[wall];
   const auto d = static_cast<std::size_t>(x_.mesh.d);
-  std::vector<double> far(near.size()), share(near.size()), dip(near.size(), 1.0);
-  ParallelFor(near.size(), [&](std::size_t n) {
-    far[n] = DistanceFrom(sheet, noted_.data() + n * d);
-    share[n] = clearances_[n * sheets_.size() + wall] / far[n];
+  const std::size_t first = sheet.shares.size(), count = clear_.points.size() / d;
+  sheet.shares.resize(count, 0);
+  ParallelFor(count - first, [&](std::size_t i) {
+    const std::size_t n = first + i;
+    const double clear = clear_.clearances[n * sheets_.size() + wall];
+    if (clear == 0) return;
+    const double* y = clear_.points.data() + n * d;
+    // From afar a barycentre is about as far as its simplex.
+    double far = std::sqrt(sheet.tree.NearestSquaredDistance(y));
+    if (far < kAfar * sheet.largest_radius) far = DistanceFrom(sheet, y);
+    if (far > kBeside * x_.size) sheet.shares[n] = clear / far;
   });
-  ParallelFor(near.size(), [&](std::size_t n) {
-    if (near[n].empty() || !(far[n] > kBeside * x_.size)) return;
-    std::vector<double> shares;
-    for (const std::uint32_t other : near[n]) shares.push_back(share[other]);
-    const auto middle = shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2);
-    std::nth_element(shares.begin(), middle, shares.end());
+}
+
+// The deepest first. `tree`: of all clear points.
+std::vector<std::uint32_t> SheetClaims::Dips(const Sheet& sheet, const BallTree& tree) const {
+  const std::vector<double>& share = sheet.shares;
+  const double most = kDip * *std::max_element(share.begin(), share.end());
+  std::vector<double> dip(share.size(), 1.0);
+  ParallelFor(share.size() - looked_at_, [&](std::size_t i) {
+    const std::size_t n = looked_at_ + i;
+    if (share[n] == 0 || share[n] > most) return;
+    std::vector<double> near;
+    const double* y = clear_.points.data() + n * static_cast<std::size_t>(x_.mesh.d);
+    for (const std::uint32_t other :
+         NearestApart(tree, clear_.points, share, y, x_.mesh.d, kApart * x_.size))
+      near.push_back(share[other]);
+    if (near.empty()) return;
+    const auto middle = near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2);
+    std::nth_element(near.begin(), middle, near.end());
     dip[n] = share[n] / *middle;
   });
   std::vector<std::uint32_t> dips;
@@ -255,22 +278,19 @@ std::vector<std::uint32_t> SheetClaims::Dips(
 }
 
 std::vector<QueryBlock> SheetClaims::QuestionsWhereClearancesDip() {
-  const auto d = static_cast<std::size_t>(x_.mesh.d);
-  const std::size_t count = noted_.size() / d;
-  BallTree tree(x_.mesh.d, &noted_);
+  const std::size_t count = clear_.points.size() / static_cast<std::size_t>(x_.mesh.d);
+  std::vector<QueryBlock> blocks(sheets_.size());
+  if (looked_at_ == count) return blocks;
+  BallTree tree(x_.mesh.d, &clear_.points);
   tree.Assign(std::vector<double>(count));
-  std::vector<std::vector<std::uint32_t>> near(count);
-  ParallelFor(count, [&](std::size_t n) {
-    near[n] = NearestBeyond(tree, noted_.data() + n * d, kApart * x_.size);
-  });
-  const Eigen::Map<const Eigen::MatrixXd> noted(noted_.data(), x_.mesh.d,
-                                                static_cast<Eigen::Index>(count));
-  std::vector<QueryBlock> blocks;
-  for (std::size_t wall = 0; wall < sheets_.size(); ++wall)
-    if (!sheets_[wall]->radii.empty())
-      blocks.push_back(QuestionsOf(wall, noted(Eigen::all, Dips(wall, near))));
-    else
-      blocks.push_back(QuestionsOf(wall, {}));
+  const Eigen::Map<const Eigen::MatrixXd> points(clear_.points.data(), x_.mesh.d,
+                                                 static_cast<Eigen::Index>(count));
+  for (std::size_t wall = 0; wall < sheets_.size(); ++wall) {
+    if (sheets_[wall]->radii.empty()) continue;
+    TakeShares(wall);
+    blocks[wall] = QuestionsOf(wall, points(Eigen::all, Dips(*sheets_[wall], tree)));
+  }
+  looked_at_ = count;
   return blocks;
 }
 
@@ -297,19 +317,23 @@ std::optional<std::uint32_t> SheetClaims::NearestThatEnds(const Sheet& sheet,
 
 void SheetClaims::Judge(std::size_t wall, const Eigen::MatrixXd&, const AnswerBlock& answer) {
   std::vector<End> ends;
-  for (Eigen::Index j = 0; j < answer.points.cols(); ++j)
-    if (Found(answer, j) && !WallBeyond(answer.clearances.col(j).data(), x_.spec.walls,
+  for (Eigen::Index j = 0; j < answer.points.cols(); ++j) {
+    const double *y = answer.points.col(j).data(), *conormal = answer.conormals.col(j).data();
+    if (!Found(answer, j) || WallBeyond(answer.clearances.col(j).data(), x_.spec.walls,
                                         SetOfWall(static_cast<int>(wall))))
-      ends.push_back({answer.points.col(j).data(), answer.conormals.col(j).data()});
+      continue;
+    ends.push_back({y, conormal});
+    ends_.Add(y, static_cast<int>(wall), conormal, x_.mesh.d);
+  }
   Hold(wall, ends);
 }
 
-void SheetClaims::JudgeKnown(const EndsOfManifold& known) {
+void SheetClaims::JudgeKnown() {
   const auto d = static_cast<std::size_t>(x_.mesh.d);
   std::vector<std::vector<End>> ends(sheets_.size());
-  for (std::size_t n = 0; n < known.walls.size(); ++n)
-    ends[static_cast<std::size_t>(known.walls[n])].push_back(
-        {known.points.data() + n * d, known.conormals.data() + n * d});
+  for (std::size_t n = 0; n < ends_.walls.size(); ++n)
+    ends[static_cast<std::size_t>(ends_.walls[n])].push_back(
+        {ends_.points.data() + n * d, ends_.conormals.data() + n * d});
   for (std::size_t wall = 0; wall < ends.size(); ++wall) Hold(wall, ends[wall]);
 }
 

@@ -19,7 +19,9 @@ namespace stellate::core {
 // second sheet close to the first, a void just under the skin, faces the other way.
 class SheetClaims {
  public:
-  SheetClaims(Examination& examination, BoundaryClaims& boundary);
+  // `ends`, `clear`: what is known, borrowed; answers on walls are added to the ends.
+  SheetClaims(Examination& examination, BoundaryClaims& boundary, EndsOfManifold& ends,
+              const ClearPoints& clear);
 
   // A block for each wall: barycentres of some of the `chosen` simplices. What lies deep inside is
   // asked about once: a closest point that far away leaves no room for others in between.
@@ -27,15 +29,13 @@ class SheetClaims {
   // The answers to one of these, or to others of points on that wall alone.
   void Judge(std::size_t wall, const Eigen::MatrixXd& asked, const AnswerBlock& answer);
 
-  // What was known before.
-  void JudgeKnown(const EndsOfManifold& ends);
+  // The ends that were known before.
+  void JudgeKnown();
 
-  // What answers to other questions say of the walls: points of M, and how clear they are of them.
-  void NoteClearances(const AnswerBlock& answer);
-  // Of what was noted, after the first round: a block for each wall, of points that are much less
-  // clear of it than points near them are, by their distance from its mesh. What is that near to a
-  // second sheet may not have been asked about: a solver's "closest" point of the wall may be far
-  // beyond others, and then a ball up to it is not empty.
+  // A block for each wall: those points that became known since the last call, or before the first,
+  // that are much less clear of it than points near them are, by their distance from its mesh. What
+  // is that near to a second sheet may not have been asked about: a solver's "closest" point of the
+  // wall may be far beyond others, and then a ball up to it is not empty.
   std::vector<QueryBlock> QuestionsWhereClearancesDip();
 
  private:
@@ -51,14 +51,17 @@ class SheetClaims {
     std::vector<double> radii;             // around the barycentres
     double largest_radius = 0;
     BallTree tree;  // of the barycentres, by these radii
+    // By clear point: its clearance over its distance from the mesh; 0: so near to that it tells
+    // nothing, or on the wall.
+    std::vector<double> shares;
   };
   std::unique_ptr<Sheet> SheetOf(int wall) const;
   Eigen::VectorXd OutwardAt(const std::uint32_t* facet) const;
   std::vector<std::uint32_t> Spread(const Sheet& sheet, const Eigen::MatrixXd& barycentres,
                                     const std::vector<double>& radii) const;
   double DistanceFrom(const Sheet& sheet, const double* y) const;
-  std::vector<std::uint32_t> Dips(std::size_t wall,
-                                  const std::vector<std::vector<std::uint32_t>>& near) const;
+  void TakeShares(std::size_t wall);
+  std::vector<std::uint32_t> Dips(const Sheet& sheet, const BallTree& tree) const;
   QueryBlock QuestionsOf(std::size_t wall, Eigen::MatrixXd points) const;
   // A point of M on a wall, and the conormal there, d each; borrowed.
   struct End {
@@ -71,8 +74,9 @@ class SheetClaims {
   Examination& x_;
   BoundaryClaims& boundary_;
   std::vector<std::unique_ptr<Sheet>> sheets_;  // by wall
-  std::vector<double> noted_;                   // points of M, d each
-  std::vector<double> clearances_;              // theirs, of all walls each
+  EndsOfManifold& ends_;
+  const ClearPoints& clear_;
+  std::size_t looked_at_ = 0;  // clear points whose dips were asked about
 };
 
 }  // namespace stellate::core

@@ -43,7 +43,7 @@ class Certification final : public Asker {
   const Certificate& certificate() const { return certifier_.certificate(); }
   const std::vector<double>& Uncovered() const { return certifier_.Uncovered(); }
   const PointsOnWalls& UncoveredOnWalls() const { return certifier_.UncoveredOnWalls(); }
-  std::vector<double> TakeSeen() { return certifier_.TakeSeen(); }
+  KnownOfManifold TakeKnown() { return certifier_.TakeKnown(); }
 
  private:
   std::vector<std::uint32_t> simplices_;

@@ -21,6 +21,10 @@ constexpr double kTangentStep = 0.01;
 // With a declared reach: what tangents found by differences may be wrong by, radians.
 constexpr double kTangentError = 0.03;
 
+// Meshes that end are answered 1.2 to 5 times a vertex: all of that is kept. What a mesh that does
+// not end is answered beyond this is not.
+std::size_t ClearPointsKept(std::size_t vertices) { return 8 * vertices + 16384; }
+
 }  // namespace
 
 template <int K>
@@ -195,6 +199,7 @@ void MeshingRun<K>::AskFor(Eigen::MatrixXd&& points, Insertion then) {
 template <int K>
 void MeshingRun<K>::AfterTrip() {
   const auto* const answered = trip_.get();
+  spare_points_.KeepClearances(trip_->answers(), ClearPointsKept(engine_.complex().size()));
   (this->*insertion_)();
   if (over_ || trip_.get() != answered || AskToLay()) return;  // it asks on
   typename Engine<K>::Change change = engine_.Commit();
@@ -282,6 +287,8 @@ template <int K>
 void MeshingRun<K>::Certify() {
   if (AskForSpares(spare_points_.Uncovered(engine_.complex()))) return;
   const StarComplex<K>& complex = engine_.complex();
+  if (complex.size() == 0 && !nothing_inside_.empty())  // what was discovered led nowhere
+    return Fail({StatusCode::kNoSeeds, nothing_inside_});
   if (!engine_.filled().mended().empty())
     engine_.filled().HandOut(complex, &delta_.added, &delta_.removed);
   StarFacts facts = FactsOf<K>(engine_);
@@ -296,9 +303,10 @@ void MeshingRun<K>::Certify() {
   trip_.reset();
   crease_probe_.Stop();
   walked_.clear();  // not all of them to their end
+  KnownOfManifold known = spare_points_.Take();
+  known.leans = rim_watch_.leans();
   certification_ = std::make_unique<Certification>(
-      spec_, mesh, engine_.Simplices(), facts,
-      KnownOfManifold{spare_points_.Take(), rim_watch_.leans(), spare_points_.ends()},
+      spec_, mesh, engine_.Simplices(), facts, std::move(known),
       spec_.walls > 0 ? std::optional(BoundaryOf<K>(engine_)) : std::nullopt);
 }
 
@@ -317,7 +325,7 @@ bool MeshingRun<K>::AskForSpares(const std::vector<double>& points) {
   Eigen::MatrixXd chosen =
       spare_points_.Choose(points, engine_.complex(), engine_.criteria().epsilon);
   if (chosen.cols() == 0) return false;
-  if (certification_) spare_points_.GiveBack(certification_->TakeSeen());
+  if (certification_) spare_points_.GiveBack(certification_->TakeKnown());
   AskFor(std::move(chosen), &MeshingRun::InsertSpares);
   return true;
 }

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -129,6 +130,7 @@ class MeshingRun final : public Mesher {
   StallWatch stall_watch_;
   RimWatch rim_watch_;
   std::optional<PieceOfWall> small_piece_;  // that a mesh has been without
+  std::string nothing_inside_;              // why no seed's point is in M with boundary, if so
   bool rehearsal_failed_ = false;           // the last round of candidates inserted nothing
   bool covers_box_ = false;                 // each seed of a covered box has its closest point
 };

@@ -33,12 +33,11 @@ void MeshingRun<K>::AskForFaces(const Eigen::MatrixXd& seeds) {
 template <int K>
 void MeshingRun<K>::KeepFaceSeeds() {
   const AnsweredPoints& answers = trip_->answers();
-  std::uint64_t found = 0, inside = 0;
+  std::uint64_t inside = 0;
   for (Eigen::Index c = 0; c < answers.points.cols(); ++c) {
     const auto i = static_cast<std::size_t>(c);
     CheckInterruption(i);
     if (!answers.found[i]) continue;
-    found += answers.walls[i] == 0;
     engine_.faces().NoteClearances(answers, c);
     if (const std::optional<int> beyond = answers.Beyond(c)) {
       if (answers.walls[i] != 0)
@@ -50,17 +49,11 @@ void MeshingRun<K>::KeepFaceSeeds() {
     spare_points_.KeepEnd(answers, c);
     engine_.faces().KeepSeed(answers.points.col(c), answers.walls[i], answers.tangents.col(c));
   }
-  if (inside > 0 || engine_.faces().has_discoveries()) {
-    Eigen::MatrixXd steps = wall_check_.Questions(answers);
-    if (steps.cols() > 0) AskFor(std::move(steps), &MeshingRun::JudgeWalls);
-    return;
-  }
-  Fail({StatusCode::kNoSeeds,
-        found == 0 ? "no seed has a closest point on the manifold; give seeds near it, or a box "
-                     "that holds it"
-                   : Message("the walls leave nothing of the manifold: all ", found,
-                             " closest points of the seeds lie beyond a wall. Is a wall's sign "
-                             "inverted? What is inside has clearances >= 0")});
+  if (inside == 0) nothing_inside_ = WhyNothingInside(spec_, answers);
+  if (inside == 0 && !engine_.faces().has_discoveries())
+    return Fail({StatusCode::kNoSeeds, nothing_inside_});
+  Eigen::MatrixXd steps = wall_check_.Questions(answers);
+  if (steps.cols() > 0) AskFor(std::move(steps), &MeshingRun::JudgeWalls);
 }
 
 template <int K>
@@ -91,7 +84,7 @@ bool MeshingRun<K>::AskForSparesOnWalls(const PointsOnWalls& points) {
   if (candidates.planned.size() == 0) return false;
   small_piece_ = {std::countr_zero(candidates.planned.walls.front()),
                   candidates.planned.points.col(0)};
-  spare_points_.GiveBack(certification_->TakeSeen());
+  spare_points_.GiveBack(certification_->TakeKnown());
   Ask(std::move(candidates), &MeshingRun::InsertSpares);
   return true;
 }

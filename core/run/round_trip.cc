@@ -221,7 +221,7 @@ void RoundTrip<K>::SortFaces(const std::vector<AnswerBlock>& answers) {
     const auto i = static_cast<std::size_t>(c);
     CheckInterruption(i);
     if (c < candidates_.drawn() && IsKnown(c)) {
-      answers_.clearances.col(c).setOnes();  // what counts is the sign
+      answers_.clearances.col(c).setConstant(INFINITY);  // inside; nobody has told by how much
       continue;
     }
     const auto [b, column] = places_[i];

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 
+#include "core/base/interruption.h"
 #include "core/base/message.h"
+#include "core/base/name_point.h"
 #include "core/base/power.h"
 #include "core/base/random.h"
 
@@ -50,6 +52,37 @@ std::string WhyNoSeeds(const Specification& spec, Eigen::Index count) {
     message += Message("; seeds where the manifold does not look ", spec.dimension,
                        "-dimensional count as not found");
   return message;
+}
+
+std::string WhyNothingInside(const Specification& spec, const AnsweredPoints& answers) {
+  std::uint64_t found = 0;
+  Eigen::Index nearest = 0;  // to the box
+  double distance = INFINITY;
+  for (Eigen::Index c = 0; c < answers.points.cols(); ++c) {
+    const auto i = static_cast<std::size_t>(c);
+    CheckInterruption(i);
+    if (!answers.found[i] || answers.walls[i] != 0) continue;
+    ++found;
+    if (!spec.bounding_box) continue;
+    const Eigen::VectorXd y = answers.points.col(c);
+    const double away =
+        (y - y.cwiseMax(spec.bounding_box->lower).cwiseMin(spec.bounding_box->upper)).norm();
+    if (away >= distance) continue;
+    distance = away;
+    nearest = c;
+  }
+  if (found == 0)
+    return "no seed has a closest point on the manifold; give seeds near it, or a box that holds "
+           "it";
+  if (spec.bounding_box && distance > 0)
+    return Message("nothing of the manifold was found in the bounding box, from ",
+                   NamePoint(spec.bounding_box->lower), " to ", NamePoint(spec.bounding_box->upper),
+                   ": all ", found, " closest points of the seeds lie outside of it, the nearest ",
+                   Brief(distance), " away at ", NamePoint(answers.points.col(nearest)),
+                   ". Move the box there, or enlarge it");
+  return Message("the walls leave nothing of the manifold: all ", found,
+                 " closest points of the seeds lie beyond a wall. Is a wall's sign inverted? What "
+                 "is inside has clearances >= 0");
 }
 
 }  // namespace stellate::core

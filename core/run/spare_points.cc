@@ -31,9 +31,22 @@ void SparePoints::Keep(const AnsweredPoints& answers, const std::vector<std::uin
     CheckInterruption(static_cast<std::size_t>(c));
     const auto i = static_cast<std::size_t>(c);
     if (!answers.answered[i] || used[i] || answers.Beyond(c)) continue;
-    points_.insert(points_.end(), answers.points.col(c).begin(), answers.points.col(c).end());
+    known_.points.insert(known_.points.end(), answers.points.col(c).begin(),
+                         answers.points.col(c).end());
     KeepEnd(answers, c);
   }
+}
+
+void SparePoints::KeepClearances(const AnsweredPoints& answers, std::size_t most) {
+  const auto walls = static_cast<int>(answers.clearances.rows());
+  for (Eigen::Index c = 0; c < answers.clearances.cols(); ++c) {
+    CheckInterruption(static_cast<std::size_t>(c));
+    const auto i = static_cast<std::size_t>(c);
+    if (answers.found[i])
+      known_.clear.Note(answers.points.col(c).data(), static_cast<int>(d_),
+                        answers.clearances.col(c).data(), walls, answers.walls[i]);
+  }
+  known_.clear.KeepNewest(most, d_);
 }
 
 void SparePoints::KeepEnd(const AnsweredPoints& answers, Eigen::Index c) {
@@ -44,16 +57,14 @@ void SparePoints::KeepEnd(const AnsweredPoints& answers, Eigen::Index c) {
   const Eigen::VectorXd tangents = answers.tangents.col(c);
   const Eigen::VectorXd conormal =
       tangents.reshaped(d, k) * Eigen::VectorXd(answers.conormals.col(c).head(k));
-  ends_.points.insert(ends_.points.end(), answers.points.col(c).begin(),
-                      answers.points.col(c).end());
-  ends_.walls.push_back(std::countr_zero(answers.walls[i]));
-  ends_.conormals.insert(ends_.conormals.end(), conormal.begin(), conormal.end());
+  known_.ends.Add(answers.points.col(c).data(), std::countr_zero(answers.walls[i]), conormal.data(),
+                  static_cast<int>(d_));
 }
 
 template <int K>
 std::vector<double> SparePoints::Uncovered(const StarComplex<K>& complex) const {
-  return ParallelGather<double>(points_.size() / d_, [&](std::size_t i, auto* uncovered) {
-    const double* y = points_.data() + i * d_;
+  return ParallelGather<double>(known_.points.size() / d_, [&](std::size_t i, auto* uncovered) {
+    const double* y = known_.points.data() + i * d_;
     if (ClearanceOf(y, complex) > kCoverageShare) uncovered->insert(uncovered->end(), y, y + d_);
   });
 }

@@ -18,9 +18,12 @@ class SparePoints {
 
   // Keeps the answers that are not `used` (by candidate).
   void Keep(const AnsweredPoints& answers, const std::vector<std::uint8_t>& used);
+  // Keeps by how much each answer is clear of the walls, used or not. No more than `most` are kept:
+  // beyond that the oldest go.
+  void KeepClearances(const AnsweredPoints& answers, std::size_t most);
   // Keeps a point of M as one where M ends, if the query was for one wall.
   void KeepEnd(const AnsweredPoints& answers, Eigen::Index c);
-  // Returns the points that are far from the sample, d each.
+  // Returns the points that were not used and are far from the sample, d each.
   template <int K>
   std::vector<double> Uncovered(const StarComplex<K>& complex) const;
 
@@ -34,16 +37,15 @@ class SparePoints {
   // The same for points on walls, by wall.
   PlannedPoints ChooseOnWalls(const PointsOnWalls& points, double epsilon);
 
-  // To and from a certificate, d each.
-  std::vector<double> Take() { return std::move(points_); }
-  const EndsOfManifold& ends() const { return ends_; }
-  void GiveBack(std::vector<double> points) { points_ = std::move(points); }
+  // Hands what is known to a certificate, and takes it back with what that was answered. Both are
+  // without leans.
+  KnownOfManifold Take() { return std::exchange(known_, {}); }
+  void GiveBack(KnownOfManifold known) { known_ = std::move(known); }
 
  private:
   std::size_t d_;
-  std::vector<double> points_;  // d each
-  EndsOfManifold ends_;
-  int chosen_ = 0;  // times that Choose had some
+  KnownOfManifold known_;  // no leans
+  int chosen_ = 0;         // times that Choose had some
 };
 
 }  // namespace stellate::core

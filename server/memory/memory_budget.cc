@@ -32,10 +32,14 @@ std::uint64_t EstimateMeshBytes(const core::Specification& spec, std::uint64_t v
   // A point and its tangent basis: in the sample and, while that grows, half as much again, in the
   // round that brought it; the point in the search tree and the history, too.
   const std::uint64_t coordinates = sizeof(double) * d * (5 * (k + 1) / 2 + 1);
+  // How far each is from the walls, as the certificate holds it against the mesh.
+  const auto walls = static_cast<std::uint64_t>(spec.walls);
+  const std::uint64_t clearances = walls > 0 ? sizeof(double) * 2 * (d + walls) : 0;
   const std::uint64_t seeds = 3 * SeedBytes(spec);  // the mesh's, its pool's, the mesher's
   // A question, and its answer with a basis.
   const std::uint64_t message = sizeof(double) * d * (k + 2);
-  return kEmptyMeshBytes + seeds + vertices * (coordinates + kStarBytes[k]) + queries * message;
+  return kEmptyMeshBytes + seeds + vertices * (coordinates + clearances + kStarBytes[k]) +
+         queries * message;
 }
 
 std::uint64_t EstimateFinishedBytes(const core::Specification& spec) {

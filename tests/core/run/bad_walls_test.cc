@@ -102,6 +102,29 @@ TEST(BadWallsTest, WallsThatLeaveNothingAreRefused) {
                 "leave nothing of the manifold");
 }
 
+// Walls may be the sides of the box: the refusal says that the manifold lies beside it. The tilted
+// plane has points on walls, all beyond others; the sphere has none.
+TEST(BadWallsTest, ABoxBesideTheManifoldIsRefusedInWordsOfBoxes) {
+  const Eigen::Vector3d lower(-1, -1, 2), upper(1, 1, 3);
+  for (const auto& equation : {stellate::testing::HalfSpaceOf(Eigen::Vector3d(0.2, 0.1, 1), 0),
+                               stellate::testing::BallOf(Eigen::Vector3d(0, 0, -1), 1, 1, 3)}) {
+    Domain m = stellate::testing::Make(2, 3, 1, {}, {});
+    m.equations = {equation};
+    for (int i = 0; i < 3; ++i) {
+      m.walls.push_back(stellate::testing::HalfSpaceOf(Eigen::Vector3d::Unit(i), -lower[i]));
+      m.walls.push_back(stellate::testing::HalfSpaceOf(-Eigen::Vector3d::Unit(i), upper[i]));
+    }
+    Specification spec = m.SpecificationFor(0.3);
+    spec.bounding_box = BoundingBox{lower, upper};
+    spec.seeds = {};
+    const Report report = stellate::testing::MeshOf(m, spec).report;
+    ExpectFailure(report, StatusCode::kNoSeeds,
+                  "nothing of the manifold was found in the bounding box");
+    EXPECT_NE(report.failure.message.find(" away at ("), std::string::npos)
+        << report.failure.message;
+  }
+}
+
 TEST(BadWallsTest, TangentialWallsAreRefused) {
   Domain m = stellate::testing::Hemisphere();
   m.walls.push_back(stellate::testing::HalfSpaceOf(Eigen::Vector3d(0.25, 0.3, 1), 0.1));

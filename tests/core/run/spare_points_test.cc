@@ -23,7 +23,24 @@ SparePoints KeptOnAxis() {
 }
 
 TEST(SparePoints, AreThoseAnsweredAndNotUsed) {
-  EXPECT_EQ(KeptOnAxis().Take(), (std::vector<double>{4, 0, 0, 10, 0, 0}));
+  EXPECT_EQ(KeptOnAxis().Take().points, (std::vector<double>{4, 0, 0, 10, 0, 0}));
+}
+
+// One of the five answers is beyond wall 0, one was not found, and one has no clearances.
+TEST(SparePoints, KeepTheClearancesOfAllAnswers) {
+  AnsweredPoints answers;
+  answers.points = Eigen::MatrixXd::Zero(2, 5);
+  answers.points.row(0) << 1, 2, 3, 4, 5;
+  answers.found = {1, 1, 0, 1, 1};
+  answers.walls = {0, 0, 0, SetOfWall(1), 0};
+  answers.clearances.resize(2, 5);
+  answers.clearances << 0.5, -0.5, 1, 0.25, INFINITY,  //
+      0.7, 0.7, 1, -1e-17, INFINITY;
+  SparePoints spare(2);
+  spare.KeepClearances(answers, 100);
+  const ClearPoints clear = spare.Take().clear;
+  EXPECT_EQ(clear.points, (std::vector<double>{1, 0, 4, 0}));
+  EXPECT_EQ(clear.clearances, (std::vector<double>{0.5, 0.7, 0.25, 0}));
 }
 
 TEST(SparePoints, AreUncoveredFarFromTheSample) {

@@ -163,6 +163,9 @@ TEST(WallPiecesTest, SheetsOfOneWallAreNotDropped) {
 TEST(WallPiecesTest, ClearancesTellOfSheetsThatClosestPointsPassBy) {
   for (const std::uint64_t seed : {12, 14, 22, 24, 25, 30, 35, 40})
     ExpectNothingDropped(HollowBallOfOneWall(3, 0.04, 0.4, seed, false), 0.4, seed, 0);
+  // Here refinement has the clearance that tells, long before the certificate asks anything.
+  for (const std::uint64_t seed : {13, 15, 26})
+    ExpectNothingDropped(HollowBallOfOneWall(3, 0.02, 0.2, seed, false), 0.2, seed, 0);
 }
 
 // Nearer than two epsilons, so that a centre common to points of both is nearer than epsilon to
