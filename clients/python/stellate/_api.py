@@ -98,7 +98,7 @@ def mesh(
                     "checkpoint is for a private server: one that is named keeps meshes itself, "
                     "with --data-dir"
                 )
-            kept = stack.enter_context(Checkpoint(checkpoint))
+            kept = stack.enter_context(Checkpoint(checkpoint, keep))
         if credentials is not None:
             server = stack.enter_context(_connect(server, credentials))
         session = stack.enter_context(

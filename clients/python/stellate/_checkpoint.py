@@ -42,7 +42,10 @@ class Checkpoint:
     others could have written there, OSError.
     """
 
-    def __init__(self, directory: str | os.PathLike[str]) -> None:
+    def __init__(self, directory: str | os.PathLike[str], part: str | None = None) -> None:
+        """`part`: which part of the oracle's manifold is meshed (`keep` of stellate.mesh), where the
+        specification does not tell."""
+        self._part = part
         self.directory = os.fspath(directory).rstrip("/") or "/"  # "link/" would be followed
         self._server_directory = os.path.join(self.directory, "server")
         self._record_path = os.path.join(self.directory, "mesh.json")
@@ -115,8 +118,13 @@ class Checkpoint:
 
     def require(self, spec: pb.MeshSpec) -> None:
         """Raises InvalidArgument if this is the directory of a mesh of another specification."""
-        if self._record and self._record["digest"] != _digest(spec):
-            differences = _differences(self._record["spec"], _plain(spec))
+        if not self._record:
+            return
+        part = self._record.get("keep")
+        if self._record["digest"] != _digest(spec) or part != self._part:
+            differences = _differences(
+                {**self._record["spec"], "keep": part}, {**_plain(spec), "keep": self._part}
+            )
             raise InvalidArgument(
                 f"the checkpoint {self.directory} is of a mesh of another specification: "
                 f"{'; '.join(differences) or 'by its digest'}. Take another directory, or remove it"
@@ -131,6 +139,7 @@ class Checkpoint:
             "epsilon_reason": epsilon_reason,
             "retries": retries,
             "spec": _plain(spec),
+            "keep": self._part,
         }
         text = json.dumps(self._record, indent=1) + "\n"
         self._replace(self._record_path, lambda file: file.write(text.encode()))

@@ -37,6 +37,19 @@ def test_what_was_kept_is_there(tmp_path):
     assert os.stat(tmp_path / "c").st_mode & 0o777 == 0o700
 
 
+def test_a_part_of_a_manifold_is_not_taken_for_the_whole(tmp_path):
+    with Checkpoint(tmp_path / "c", "seeds") as checkpoint:
+        checkpoint.note(SPEC, "meshes/1", "", 0)
+        checkpoint.keep(MESH)
+    refused(tmp_path / "c", "keep is seeds there and not given here")
+    with Checkpoint(tmp_path / "c", "seeds") as checkpoint:
+        checkpoint.require(SPEC)
+    keep(tmp_path / "whole")
+    with Checkpoint(tmp_path / "whole", "seeds") as checkpoint:
+        with pytest.raises(stellate.InvalidArgument, match="keep is not given there and seeds"):
+            checkpoint.require(SPEC)
+
+
 def test_a_link_to_a_directory_is_refused(tmp_path):
     (tmp_path / "theirs").mkdir(mode=0o700)
     (tmp_path / "c").symlink_to(tmp_path / "theirs")
