@@ -142,6 +142,7 @@ class Run:
         choice = checkpoint.choose_epsilon if checkpoint is not None else choose
         self._on_progress, self._checkpoint = on_progress, checkpoint
         self._epsilon_reason, self._note = "", checked.note
+        self._where_it_ends: Callable[[], str] | None = getattr(oracle, "where_it_ends", None)
         chosen = self._say(choice(oracle, epsilon))
         kept = checkpoint.retries if checkpoint is not None else None
         most = table("doctor.toml")["auto_retries"] if kept is None else kept
@@ -329,12 +330,21 @@ class Run:
         )
 
     def _told(self, mesh: Mesh) -> Mesh:
-        """With what the server does not know: why epsilon is what it is, and of what oracle."""
-        if mesh.report is None or not (self._epsilon_reason or self._note):
+        """With what the server does not know: why epsilon is what it is, of what oracle, and where
+        that ends."""
+        report = mesh.report
+        if report is None:
             return mesh
-        report = dataclasses.replace(
-            mesh.report, epsilon_reason=self._epsilon_reason, oracle=self._note
-        )
+        if self._where_it_ends is not None and report.termination == "NO_PROGRESS":
+            end = self._where_it_ends()
+            verdict = f"not certified: {end}. The run ended as NO_PROGRESS"
+            if end:
+                certificate = dataclasses.replace(report.certificate, verdict=verdict)
+                report = dataclasses.replace(report, certificate=certificate)
+        if self._epsilon_reason or self._note:
+            report = dataclasses.replace(
+                report, epsilon_reason=self._epsilon_reason, oracle=self._note
+            )
         return dataclasses.replace(mesh, report=report)
 
     def __enter__(self) -> Run:

@@ -227,6 +227,41 @@ def test_what_is_wrong_is_said(words):
         WRONG[words]()
 
 
+def circle(u):
+    return np.stack([np.cos(u[:, 0]), np.sin(u[:, 0])], axis=1)
+
+
+def arcs(count, overlap):
+    quarters = TURN / 4 * np.arange(count)
+    return [oracles.Chart(circle, None, [q], [q + TURN / 4 + overlap]) for q in quarters]
+
+
+def test_where_a_parametrization_ends_is_told():
+    half = oracles.Parametrized(circle, None, [0], [TURN / 2])
+    assert "where the map does, at the lower end 0 of its parameter 0, as near [1.0, 0.0]" in (
+        half.where_it_ends()
+    )
+    lacking = oracles.Parametrized(charts=arcs(3, 0.0))
+    assert "where chart 0 does, at the lower end 0 of its" in lacking.where_it_ends()
+    tube = oracles.Parametrized(torus_map, None, [0, 0], [TURN, TURN / 2], [True, False])
+    assert "at the lower end 0 of its parameter 1" in tube.where_it_ends()
+
+
+@pytest.mark.parametrize(
+    "closed",
+    [
+        lambda: oracles.Parametrized(circle, None, [0], [TURN]),
+        lambda: oracles.Parametrized(torus_map, None, [0, 0], [TURN] * 2, [True, False]),
+        lambda: oracles.Parametrized(charts=arcs(4, 1e-5)),
+        ALL["charts"][0],
+        ALL["parametrized"][0],
+    ],
+    ids=["periodic is forgotten", "periodic is forgotten of one", "arcs", "charts", "periodic"],
+)
+def test_a_parametrization_that_goes_on_is_not_said_to_end(closed):
+    assert closed().where_it_ends() == ""
+
+
 def test_a_chart_of_the_wrong_shape_is_an_oracle_error():
     with pytest.raises(stellate.OracleError, match="a chart's x returned"):
         oracles.Parametrized(lambda u: torus_map(u)[:-1], None, [0, 0], [TURN, TURN], True)

@@ -313,3 +313,15 @@ def test_the_report_has_the_oracles_own_words(server):
     assert f"oracle  {told.note}" in str(report)
     silent = stellate.mesh(manifolds.Sphere(2), 0.5, server=server).report
     assert silent.oracle == "" and "oracle" not in silent.to_dict()
+
+
+def test_a_parametrization_that_ends_is_told_where_and_what_to_do(server):
+    def helix(u):
+        return np.stack([np.cos(u[:, 0]), np.sin(u[:, 0]), u[:, 0] / 5], axis=1)
+
+    open_ends = stellate.oracles.Parametrized(helix, None, [0], [4 * np.pi])
+    report = stellate.mesh(open_ends, 0.1, server=server).report
+    assert report.termination == "NO_PROGRESS"
+    verdict = report.certificate.verdict
+    assert verdict.startswith("not certified: the manifold ends where the map does, at the lower end 0")
+    assert "oracles.Clipped(parametrized, [wall])" in verdict and "epsilon" not in verdict

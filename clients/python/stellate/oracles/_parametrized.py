@@ -19,6 +19,7 @@ _BASINS = 3  # the most of these that begin a search
 _STEP = 1e-4  # of second differences, in shares of a chart's box: about the fourth root of rounding
 _FIRST_STEP = 6e-6  # of first differences: about its cube root
 _ITERATIONS = 100
+_ENDS = 16  # samples of each end of a parameter's interval that are looked beyond
 
 Map = Callable[[Array], Any]
 
@@ -164,6 +165,49 @@ class Parametrized(Projection):
             )
         self._scale = float(norms(np.ptp(self._points, axis=0)))
         self.bounding_box = box_around(self._points, 0.05)
+
+    def where_it_ends(self) -> str:
+        """Of what end of an interval M goes on nowhere, and what to do; "" if of none.
+
+        Places a thousandth of a cell beyond the samples there should be on M. Where the map has no
+        derivative of full rank, as at poles, it is not asked. Takes up to thousands of calls.
+        """
+        ends = [end for number in range(len(self._charts)) for end in self._beyond(number)]
+        if not ends:
+            return ""
+        beyond = np.concatenate([points + step for _, _, points, step in ends])
+        nearest, _, found = self._project(beyond)  # of all at once: maps may be slow
+        away, first = norms(nearest - beyond), 0
+        for chart, name, points, step in ends:
+            rows = slice(first, first + len(points))
+            first += len(points)
+            if (found[rows] & (away[rows] < 0.5 * norms(step))).any():
+                continue
+            which = "the map" if len(self._charts) == 1 else f"chart {chart}"
+            return (
+                f"the manifold ends where {which} does, at {name}, as near "
+                f"{points[len(points) // 2].round(6).tolist()}: no chart goes on there. If the parameter "
+                "comes round, say periodic; if the manifold has a boundary, let the map go on beyond "
+                "it and cut it by a wall: oracles.Clipped(parametrized, [wall])"
+            )
+        return ""
+
+    def _beyond(self, number: int) -> list[tuple[int, str, Array, Array]]:
+        """Of each end of a chart's intervals: its name, samples there, and a step beyond each."""
+        chart, found = self._charts[number], []
+        for axis in np.flatnonzero(~chart.wraps):
+            cell = float(chart.extent[axis]) / (self._cells - 1)
+            for side, end, way in (("lower", chart.lower, -1), ("upper", chart.upper, 1)):
+                at = (self._owner == number) & (self._grid[:, axis] == end[axis])
+                there = np.flatnonzero(at)
+                there = there[:: max(1, len(there) // _ENDS)]
+                slopes = chart.jacobian(self._grid[there])
+                sizes = np.linalg.svd(slopes, compute_uv=False)
+                if (sizes[:, -1] > 1e-6 * sizes[:, 0]).all():
+                    name = f"the {side} end {end[axis]:g} of its parameter {axis}"
+                    step = 1e-3 * cell * way * slopes[:, :, axis]
+                    found.append((number, name, self._points[there], step))
+        return found
 
     def intersect_flat(self, centers: Array, bases: Array, radii: Array) -> tuple[Array, Flags]:
         """Where M meets the flats {c + v : basis^T v = 0}: (points (n, d), found (n,))."""
