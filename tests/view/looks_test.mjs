@@ -1,7 +1,7 @@
 // `stellate view` in a real browser: how meshes look at first, and in windows of all sizes.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { finished, picture, resize, setStage, until } from "./stage.mjs";
+import { finished, glance, picture, resize, setStage, still, until } from "./stage.mjs";
 import { choose } from "./walk.mjs";
 
 const stage = setStage();
@@ -78,6 +78,44 @@ test("in a window of any size a mesh is chosen, whole and beside its certificate
       return [scrollWidth > clientWidth, ...narrow.map(({ id }) => id)];
     });
     assert.deepEqual(cut, [false], `nothing is cut off at ${width}`);
+  }
+});
+
+test("charts and mesh take the window's new width, and the new colours of day and night", async () => {
+  const name = await stage.mesh({ shape: "torus", epsilon: 0.2, label: "by day and night" });
+  const page = await stage.look(name);
+  const charts = () => document.querySelectorAll("#curves canvas, #histograms canvas").length === 5;
+  await finished(page);
+  await until(page, charts);
+  for (const width of [600, 1200]) {
+    await resize(page, width, 760);
+    await until(page, () => {
+      const { right } = document.getElementById("histograms").getBoundingClientRect();
+      const all = [...document.querySelectorAll("#curves canvas, #histograms canvas")];
+      return all.every((one) => Math.abs(one.getBoundingClientRect().right - right) < 2);
+    });
+  }
+  await still(page);
+  for (const [colorScheme, ground] of [
+    ["dark", [14, 18, 24]],
+    ["light", [238, 241, 245]],
+  ]) {
+    await page.emulateMedia({ colorScheme });
+    // By night nothing of a chart is white, and by day its lines are nearly so.
+    await until(
+      page,
+      (night) => {
+        const all = [...document.querySelectorAll("#curves canvas, #histograms canvas")];
+        return all.every((one) => {
+          const { data } = one.getContext("2d").getImageData(0, 0, one.width, one.height);
+          const white = (_, i) => i % 4 === 0 && Math.min(...data.subarray(i, i + 4)) > 200;
+          return data.some(white) !== night;
+        });
+      },
+      colorScheme === "dark",
+    );
+    await still(page);
+    assert.deepEqual((await glance(page)).ground, ground);
   }
 });
 

@@ -4,7 +4,7 @@
 
 Reads a line of JSON for each mesh wanted, {"shape": NAME, "epsilon": E, ...}; writes its name once
 it is declared, and "over" when it is done. "wait": for one more line before it is begun. "hold": for
-one more line once the oracle has answered so many calls. "cancel": it before it is begun.
+one more line once the oracle has answered for so many points. "cancel": it before it is begun.
 """
 
 from __future__ import annotations
@@ -35,19 +35,23 @@ class TwoSpheres:
 
 
 class Held:
-    """The same, but after some calls it answers no more, until there is one more line."""
+    """The same, but after some points it answers no more, until there is one more line.
 
-    def __init__(self, oracle: object, calls: int) -> None:
-        self._oracle, self._calls, self._lock = oracle, calls, threading.Lock()
+    How many calls these come in depends on how fast they are answered.
+    """
+
+    def __init__(self, oracle: object, points: float) -> None:
+        self._oracle, self._points, self._lock = oracle, points, threading.Lock()
 
     def __getattr__(self, name: str) -> object:
         return getattr(self._oracle, name)
 
     def closest_point(self, x: np.ndarray) -> np.ndarray:
         with self._lock:
-            if self._calls == 0:
+            if self._points <= 0:
                 sys.stdin.readline()
-            self._calls -= 1
+                self._points = np.inf
+            self._points -= len(x)
         return self._oracle.closest_point(x)
 
 

@@ -219,7 +219,8 @@ function lookOn() {
     const [revision, vertices, simplices] = ["revision", "vertices", "simplices"].map((name) =>
       Number(dataset[name]),
     );
-    return { share, parts, colours, digest, sides, lowest, revision, vertices, simplices };
+    const ground = [...data.subarray(0, 3)];
+    return { ground, share, parts, colours, digest, sides, lowest, revision, vertices, simplices };
   };
 }
 

@@ -6,7 +6,7 @@ import { join } from "node:path";
 import { test } from "node:test";
 import { pathToFileURL } from "node:url";
 import { finished, freePort, glance, picture, setStage, shown, until } from "./stage.mjs";
-import { walk } from "./walk.mjs";
+import { choose, walk } from "./walk.mjs";
 
 const stage = setStage();
 
@@ -70,13 +70,14 @@ test("a mesh grows before one's eyes, and goes on with the gateway's successor",
   const name = await stage.mesh({
     shape: "two spheres",
     epsilon: 0.12,
-    hold: 25,
+    hold: 2500,
     label: "growing",
   });
   const first = await stage.gateway(name, "--port", port);
   const page = await stage.page(first.url);
   await until(page, () => Number(document.getElementById("stage").dataset.vertices) > 20);
-  await until(page, () => /a worker at .*\d/.test(document.getElementById("crew").innerText));
+  await until(page, () => /a worker at [^]*\d/.test(document.getElementById("crew").innerText));
+  assert.ok(await page.locator("#right").evaluate((e) => e.scrollWidth <= e.clientWidth));
   const early = await picture(page);
   first.process.kill("SIGKILL");
   await first.ended;
@@ -200,6 +201,7 @@ test("a mesh at fault leads to where it is", async () => {
 });
 
 test("what the certificate's words name leads there, too", async () => {
+  await stage.mesh({ shape: "torus", epsilon: 0.3, label: "beside it" });
   const name = await stage.mesh({ shape: "thin torus", epsilon: 0.25, label: "too coarse" });
   const page = await stage.look(name);
   await finished(page);
@@ -212,6 +214,15 @@ test("what the certificate's words name leads there, too", async () => {
   await until(page, () => !document.getElementById("fault").hidden);
   assert.equal((await text(page, "#fault")).split("\n")[0].replace(/ ?(next|leave).*/, ""), place);
   assert.notEqual((await picture(page)).digest, before.digest);
+
+  // It does not take the next mesh's first sight with it.
+  await page.locator("#fault-leave").click();
+  await choose(page, "beside it");
+  await choose(page, "too coarse");
+  await finished(page);
+  const { sides } = await picture(page);
+  const same = sides.every((side, i) => Math.abs(side - before.sides[i]) <= 1);
+  assert.ok(same, `${sides}, and ${before.sides} before the flight`);
 });
 
 // In the page, before its own scripts.

@@ -26,6 +26,17 @@ function axis(options: Partial<uPlot.Axis>): uPlot.Axis {
   };
 }
 
+// Draws again what has another width, or other colours, than before.
+function keepDrawn(host: HTMLElement, draw: () => void) {
+  let width = host.clientWidth;
+  new ResizeObserver(() => {
+    if (host.clientWidth === width) return;
+    width = host.clientWidth;
+    draw();
+  }).observe(host);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+}
+
 // Stars that break each rule, one upon the other, over the revisions.
 export class Curves {
   private plot: uPlot | null = null;
@@ -42,9 +53,7 @@ export class Curves {
       item.textContent = rule.name;
       legend.append(item);
     }
-    new ResizeObserver(() => {
-      if (host.clientWidth !== this.plot?.width) this.draw();
-    }).observe(host);
+    keepDrawn(host, () => this.draw());
   }
 
   show(rows: PastRow[]) {
@@ -95,18 +104,33 @@ export class Curves {
   }
 }
 
-export function drawHistograms(host: HTMLElement, histograms: Histogram[]) {
-  host.replaceChildren();
-  host.parentElement!.hidden = histograms.length === 0;
-  for (const { name, unit, low, high, bins } of histograms) {
+export class Histograms {
+  private histograms: Histogram[] = [];
+
+  constructor(private readonly host: HTMLElement) {
+    keepDrawn(host, () => this.draw());
+  }
+
+  show(histograms: Histogram[]) {
+    this.histograms = histograms;
+    this.draw();
+  }
+
+  private draw() {
+    this.host.replaceChildren();
+    this.host.parentElement!.hidden = this.histograms.length === 0;
+    this.histograms.forEach((histogram) => this.add(histogram));
+  }
+
+  private add({ name, unit, low, high, bins }: Histogram) {
     const figure = document.createElement("figure");
     const caption = document.createElement("figcaption");
     caption.textContent = name;
     const place = document.createElement("div");
     figure.append(caption, place);
-    host.append(figure);
+    this.host.append(figure);
     const width = place.clientWidth;
-    if (width === 0) continue;
+    if (width === 0) return;
     const step = (high - low) / bins.length;
     const bars = uPlot.paths.bars!({ size: [1, Infinity], align: 1, gap: 1 });
     new uPlot(

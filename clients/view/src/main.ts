@@ -1,7 +1,7 @@
 // The page: what is chosen, and what of it is shown where.
 import "./style.css";
 import "./stage.css";
-import { Curves, drawHistograms } from "./charts";
+import { Curves, Histograms } from "./charts";
 import { choicesOf, coordinates } from "./choices";
 import { axesFrame, Tour, type Colour, type Look, type Part } from "./look";
 import type { FaultKind, FromWorker, MeshRow, Told, ToWorker } from "./messages";
@@ -97,6 +97,7 @@ const leader = new Leader(demo, time, () => {
   const next = list[list.findIndex(({ name }) => name === chosen) + 1];
   if (next && fault === null) choose(next.name);
 });
+const histograms = new Histograms(at("histograms"));
 const curves = new Curves(at("curves"), at("legend"), (revision) => time.show(revision));
 
 function note(text: string) {
@@ -122,7 +123,7 @@ function choose(name: string) {
   leader.reset();
   boundary = "";
   measured = { revision: -1, name: "" };
-  drawHistograms(at("histograms"), []);
+  histograms.show([]);
   Object.assign(at("stage").dataset, { revision: "0", vertices: "0", simplices: "0" });
   note(emptyOf(null));
   view.clear();
@@ -322,7 +323,7 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
     drawCrew(at("crew"), rows);
   },
   verdict: ({ verdict }) => drawVerdict(at("verdict"), verdict, fly, flyTo),
-  histograms: ({ histograms }) => drawHistograms(at("histograms"), histograms),
+  histograms: (message) => histograms.show(message.histograms),
   fly: ({ centre, radius, normal, level, text }) => {
     if (!fault) return;
     at("fault").hidden = false;
@@ -372,7 +373,10 @@ worker.onerror = (event) => {
 
 // --- the beginning
 
-const setColours = () => view.setBackground(css("--stage"));
+function setColours() {
+  view.setBackground(css("--stage"));
+  changeLook({}); // drawn again, with the new ones
+}
 setColours();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", setColours);
 

@@ -109,15 +109,16 @@ export function drawCrew(host: HTMLElement, rows: CrewRow[]) {
   if (!isNews(host, rows)) return;
   const table = element("table");
   const head = table.createTHead().insertRow();
-  for (const title of ["worker", "answered", "per second", "chunk", "holds"]) {
+  for (const title of ["answered", "per second", "chunk", "holds"]) {
     head.append(element("th", "", title));
   }
   const body = table.createTBody();
   for (const row of rows) {
-    const line = body.insertRow();
-    const who = line.insertCell();
+    const who = body.insertRow().insertCell();
+    who.colSpan = head.cells.length;
     who.textContent = row.title;
     who.title = row.title;
+    const line = body.insertRow();
     if (row.lagging) line.className = "lagging";
     for (const value of [
       grouped(row.queries),

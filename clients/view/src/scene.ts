@@ -73,6 +73,7 @@ export class View {
   private readonly chosen = new Dots({ size: 15, colour: "#ffb020", through: true });
   private readonly all = new Group();
   private flat = false;
+  private stood: Vector3 | null = null; // whence it was looked at, before flights that nobody ended by hand
   private dirty = true; // a frame is due
   private moving = false;
   private slow = 0; // seconds that all of the mesh takes to be drawn, lately
@@ -96,6 +97,7 @@ export class View {
     this.controls.addEventListener("start", () => {
       this.moving = true;
       this.flight = null;
+      this.stood = null;
       this.fitted = true;
       this.redraw();
     });
@@ -159,8 +161,10 @@ export class View {
     this.redraw();
   }
 
-  // Nothing, until something else is shown.
+  // Nothing, until something else is shown, from where somebody stood last.
   clear() {
+    if (this.stood) this.camera.position.copy(this.controls.target).add(this.stood);
+    this.stood = null;
     this.all.visible = false;
     this.fitted = false;
     this.flight = null;
@@ -239,6 +243,7 @@ export class View {
     const target = new Vector3(...centre);
     const distance = (2.5 * radius) / Math.tan((this.camera.fov * Math.PI) / 360);
     const sight = this.camera.position.clone().sub(target).normalize();
+    this.stood ??= this.camera.position.clone().sub(this.controls.target);
     // From outside, if nothing better is found.
     const outside = target.clone().sub(this.ball.centre).normalize().addScaledVector(sight, 0.6);
     const ways = [outside.lengthSq() > 0.01 ? outside.normalize() : sight];
