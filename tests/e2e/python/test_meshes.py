@@ -323,5 +323,7 @@ def test_a_parametrization_that_ends_is_told_where_and_what_to_do(server):
     report = stellate.mesh(open_ends, 0.1, server=server).report
     assert report.termination == "NO_PROGRESS"
     verdict = report.certificate.verdict
-    assert verdict.startswith("not certified: the manifold ends where the map does, at the lower end 0")
+    assert verdict.startswith(
+        "not certified: the manifold ends where the map does, at the lower end 0"
+    )
     assert "oracles.Clipped(parametrized, [wall])" in verdict and "epsilon" not in verdict

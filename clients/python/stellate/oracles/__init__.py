@@ -5,6 +5,7 @@ themselves are stellate.ImplicitManifold.
 """
 
 from ._bounded import ManifoldWithBoundary
+from ._chart import Chart
 from ._cloud import PointCloud
 from ._combined import LevelSet, Product, Transformed
 from ._constraints import ConstraintSet
@@ -12,7 +13,7 @@ from ._distance import SignedDistance
 from ._kept import kept
 from ._linkage import Linkage
 from ._network import NeuralImplicit
-from ._parametrized import Chart, Parametrized
+from ._parametrized import Parametrized
 from ._quotient import Quotient
 from ._triangles import TriangleMesh
 from ._walls import Clipped, HalfSpace, ImplicitSolid, Solid
