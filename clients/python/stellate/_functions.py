@@ -103,7 +103,8 @@ class UserFunction:
         if values.dtype.kind == "f" and values.dtype.itemsize < 8:
             raise OracleError(
                 f"{self.name} returned {values.dtype} numbers; points are found to twelve digits, "
-                "which takes float64 throughout (for a function of jax's say jacobian='jax')",
+                "which takes float64 throughout (of a function of jax's say jacobian='jax'; in torch compute "
+                "with torch.from_numpy(x) and model.double(), or take oracles.NeuralImplicit)",
                 "ORACLE_PRECISION",
             )
         if values.dtype.kind in "iu":
