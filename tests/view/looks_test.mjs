@@ -155,6 +155,8 @@ test("a slice is seen from an oblique side, by a coordinate that changes on it",
     assert.equal(chosen[0], "slice");
     assert.notEqual(chosen[1], chosen[2], "the coordinate of the slice colours nothing");
     assert.equal(chosen[3], "", "no axis alone");
+    const named = page.getByRole("combobox", { name: /./ });
+    assert.equal(await named.count(), await page.locator("select:visible").count());
     const { share } = await picture(page);
     assert.ok(share > 0.08, `${label} is no smear: ${share}`);
   }
