@@ -149,20 +149,22 @@ TEST_F(JournalTest, ASteppedClockChangesNothingOfHowLongAMeshTook) {
   }
 }
 
-// As a server leaves it that was killed between the end and the result.
-TEST_F(JournalTest, AnEndWithoutItsResultIsReplayedAndThenRecorded) {
-  const Outcome whole = RunMesh(RecordedSphere(nullptr));
-  {
-    const auto journal = Open();
-    RunMesh(RecordedSphere(journal->NewMesh()), 2);
-  }
-  {
+class EndAloneTest : public JournalTest {
+ protected:
+  // What a server leaves behind that was killed between a mesh's end and its result.
+  void RecordEndAlone(SessionState end) {
+    RunMesh(RecordedSphere(Open()->NewMesh()), 2);
     const auto journal = Open();
     auto meshes = journal->TakeMeshes();
     const std::uint64_t rounds = meshes.at(0).record->rounds;
-    ASSERT_FALSE(meshes[0].ports.journal->WriteEnd(
-        {SessionState::kCancelled, std::chrono::system_clock::now(), 1, {}, rounds}));
+    ASSERT_FALSE(
+        meshes[0].ports.journal->WriteEnd({end, std::chrono::system_clock::now(), 1, {}, rounds}));
   }
+};
+
+TEST_F(EndAloneTest, AnEndWithoutItsResultIsReplayedAndThenRecorded) {
+  const Outcome whole = RunMesh(RecordedSphere(nullptr));
+  RecordEndAlone(SessionState::kCancelled);
   for (int server = 0; server < 2; ++server) {
     const auto journal = Open();
     auto meshes = journal->TakeMeshes();
@@ -180,18 +182,8 @@ TEST_F(JournalTest, AnEndWithoutItsResultIsReplayedAndThenRecorded) {
 }
 
 // Its answers lead to another end than the one recorded: they stay for a server that knows better.
-TEST_F(JournalTest, AReplayThatFailsTakesNoRecordsPlace) {
-  {
-    const auto journal = Open();
-    RunMesh(RecordedSphere(journal->NewMesh()), 2);
-  }
-  {
-    const auto journal = Open();
-    auto meshes = journal->TakeMeshes();
-    const std::uint64_t rounds = meshes.at(0).record->rounds;
-    ASSERT_FALSE(meshes[0].ports.journal->WriteEnd(
-        {SessionState::kSucceeded, std::chrono::system_clock::now(), 1, {}, rounds}));
-  }
+TEST_F(EndAloneTest, AReplayThatFailsTakesNoRecordsPlace) {
+  RecordEndAlone(SessionState::kSucceeded);
   for (int server = 0; server < 2; ++server) {
     const auto journal = Open();
     auto meshes = journal->TakeMeshes();
