@@ -99,10 +99,11 @@ std::vector<std::uint32_t> NearestApart(const BallTree& tree, const std::vector<
   const auto point = [&](std::uint32_t n) {
     return points.data() + static_cast<std::size_t>(n) * static_cast<std::size_t>(d);
   };
-  for (const auto& [squared, other] : nearest) {
+  for (const auto& entry : nearest) {
     if (ids.size() == kPointsNear) break;
-    const bool is_apart = std::none_of(ids.begin(), ids.end(), [&](std::uint32_t id) {
-      return SquaredDistance(point(id), point(other), d) < apart * apart;
+    const std::uint32_t other = entry.second;
+    const bool is_apart = std::none_of(ids.begin(), ids.end(), [&](std::uint32_t taken) {
+      return SquaredDistance(point(taken), point(other), d) < apart * apart;
     });
     if (is_apart) ids.push_back(other);
   }
