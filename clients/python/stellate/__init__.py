@@ -51,6 +51,7 @@ from .errors import (  # noqa: E402
     ViewerNotFound,
 )
 from .implicit import ImplicitManifold  # noqa: E402
+from .options import MeshOptions  # noqa: E402
 from .oracle import Oracle  # noqa: E402
 from .oracles import ImplicitSolid  # noqa: E402
 from .progress import ProgressBar, progress_bar  # noqa: E402
@@ -89,6 +90,7 @@ __all__ = [
     "Mesh",
     "MeshInfo",
     "MeshNotFound",
+    "MeshOptions",
     "NotCertified",
     "NotConverged",
     "Oracle",

@@ -5,11 +5,12 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator, Sequence
-from typing import Any, Union
+from typing import TYPE_CHECKING, Any, Union
 
 from ._checkpoint import Checkpoint
 from ._credentials import Credentials
-from ._download import OnPart, fetch
+from ._download import OnPart, Unfinished, fetch
+from ._epsilon import Epsilon
 from ._files.formats import check_save
 from ._follow import Following, OnProgress
 from ._interrupt import Interrupts, told
@@ -18,22 +19,28 @@ from ._run import Run
 from ._server import Server
 from .client import Client
 from .errors import InvalidArgument, NotCertified, SaveError
+from .options import MeshOptions, takes
 from .oracle import CheckedOracle
+from .oracles._kept import Keep
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 Path = Union[str, "os.PathLike[str]"]
 
 
+@takes(MeshOptions)
 def mesh(
     oracle: Any,
-    epsilon: float | str,
+    epsilon: Epsilon,
     server: str | Server | Client | None = None,
     on_progress: OnProgress | None = None,
     credentials: Credentials | None = None,
     require_certified: bool = False,
     checkpoint: str | os.PathLike[str] | None = None,
     save: Path | Sequence[Path] = (),
-    keep: str | None = None,
-    **criteria: Any,
+    keep: Keep | None = None,
+    **options: Unpack[MeshOptions],
 ) -> Mesh:
     """Meshes the manifold that an oracle knows.
 
@@ -58,20 +65,8 @@ def mesh(
       keep: "box": what lies in the oracle's bounding box, cut at its sides where the manifold leaves
         it; "seeds": the components that seeds lie on, and no other. What is meshed is
         oracles.kept(oracle, keep, seeds): workers that join have to serve that.
-      **criteria: radius_edge_bound, sliver_bound, picking_radius, small_sliver_radius, candidates,
-        advance_step, flat_alternations, ask_ahead, common_centre, size_rate, max_deviation;
-        max_vertices, max_rounds, max_batch_queries, worker_wait_seconds, answer_seconds,
-        busy_seconds; random_seed, box_seeds, seeds, components, label: the protocol's MeshSpec says
-        what each
-        is. audit: "standard", or "thorough", which asks about every vertex and every simplex
-        before it certifies. components: a mesh with fewer is not certified.
-        reach: a lower bound of the manifold's reach, from which the mesh is proved; cover_box: miss
-        no component in the box, which needs `reach` (docs/using/proof.md). size_rate
-        and max_deviation go by the oracle's local_size where it has one. ask_ahead is on unless the
-        server is on this machine. workers: how many threads call the oracle, which takes effect
-        when the oracle says `thread_safe = True`; the mesh is the same for any number. max_chunk:
-        the most points that the oracle is asked at once; by default as many as take it a quarter of
-        a second, or four times what a call of it costs.
+      **options: each is None, or is left out, where the default will do:
+        {options}
 
     Returns:
       The mesh. It may be uncertified, when a budget was spent or epsilon is too coarse: its report
@@ -107,7 +102,7 @@ def mesh(
                 epsilon,
                 server,
                 on_progress,
-                criteria,
+                options,
                 keep=keep,
                 every=False,
                 checkpoint=kept,
@@ -129,14 +124,15 @@ def mesh(
     return finished
 
 
+@takes(MeshOptions)
 def watch(
     oracle: Any,
-    epsilon: float | str | None = None,
+    epsilon: Epsilon | None = None,
     server: str | Server | Client | None = None,
     on_progress: OnProgress | None = None,
     credentials: Credentials | None = None,
-    keep: str | None = None,
-    **criteria: Any,
+    keep: Keep | None = None,
+    **options: Unpack[MeshOptions],
 ) -> Iterator[Mesh]:
     """The mesh as it grows: an iterator over Mesh, the last of which has its report.
 
@@ -146,10 +142,10 @@ def watch(
     """
     if credentials is not None:
         with _connect(server, credentials) as client:
-            yield from watch(oracle, epsilon, client, on_progress, keep=keep, **criteria)
+            yield from watch(oracle, epsilon, client, on_progress, keep=keep, **options)
         return
     if isinstance(oracle, str):
-        given = [*criteria, *(["keep"] if keep is not None else [])]
+        given = [*options, *(["keep"] if keep is not None else [])]
         if given:
             raise TypeError(f"a mesh that exists already takes no {', '.join(given)}")
         yield from _watch_by_name(oracle, server, on_progress)
@@ -157,7 +153,7 @@ def watch(
     if epsilon is None:
         raise TypeError("watch() needs epsilon, a length or 'auto', to mesh an oracle's manifold")
     interrupts = Interrupts()
-    with Run(oracle, epsilon, server, on_progress, criteria, keep=keep) as session:
+    with Run(oracle, epsilon, server, on_progress, options, keep=keep) as session:
         interrupts.on_first = session.interrupt
         meshes = iter(session)
         while True:
@@ -185,7 +181,7 @@ def download(
     path: str | os.PathLike[str] | None = None,
     *,
     server: str | Server | Client,
-    unfinished: str = "refuse",
+    unfinished: Unfinished = "refuse",
     revision: int = 0,
     on_progress: OnProgress | None = None,
     on_part: OnPart | None = None,

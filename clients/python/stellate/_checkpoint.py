@@ -18,7 +18,7 @@ from typing import IO, Any, Callable
 import numpy as np
 from google.protobuf.json_format import MessageToDict
 
-from ._epsilon import AUTO, choose
+from ._epsilon import AUTO, Epsilon, choose
 from ._generated import mesh_pb2 as pb
 from ._mesh import Mesh
 from .errors import FailedPrecondition, InvalidArgument
@@ -105,7 +105,7 @@ class Checkpoint:
         """The mesh's name on the private server; "" if none was made yet."""
         return self._record.get("name", "")
 
-    def choose_epsilon(self, oracle: Any, epsilon: float | str) -> tuple[float, str]:
+    def choose_epsilon(self, oracle: Any, epsilon: Epsilon) -> tuple[float, str]:
         """As _epsilon.choose, which is asked for "auto" only once."""
         if epsilon == AUTO and self._record.get("epsilon_reason"):
             return self._record["spec"]["epsilon"], self._record["epsilon_reason"]

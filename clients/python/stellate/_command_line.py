@@ -22,18 +22,21 @@ from collections.abc import Sequence
 from typing import Any
 
 from . import _shared
+from . import options as _options
 from ._api import download, mesh
 from ._command_oracle import CommandOracle
 from ._complex import Complex
 from ._conform import command as conform
 from ._credentials import Credentials
 from ._doctor.check import check
+from ._download import Unfinished
 from ._executors import workers_on
 from ._files.formats import check_save
 from ._oracle_source import Refused, add_oracle, name_of, oracle_of
 from ._version import __version__
 from .client import Client
 from .errors import Interrupted, StellateError, exit_status
+from .options import MeshOptions
 from .progress import progress_bar
 
 _STATUS = _shared.table("errors.toml")
@@ -41,36 +44,37 @@ _WELL, _NOT_CERTIFIED = _STATUS["exit_well"], _STATUS["exit_not_certified"]
 _REFUSED, _FAILED = _STATUS["exit_refused"], _STATUS["exit_failed"]
 _LABEL_BYTES = 128
 
-# The flags of the program `stellate`, and those that only one's own oracle needs; the keywords of
-# stellate.mesh; their types.
-_RUN: list[tuple[str, str, type, str]] = [
-    ("--seed", "random_seed", int, "seed of everything random"),
-    ("--max-vertices", "max_vertices", int, "stop there"),
-    ("--max-rounds", "max_rounds", int, "stop after this many round trips"),
-    ("--max-batch-queries", "max_batch_queries", int, "ask larger rounds in several batches"),
-    ("--box-seeds", "box_seeds", int, "points of the box tried as seeds"),
-    ("--worker-wait", "worker_wait_seconds", float, "seconds that the mesh waits for a worker"),
-    ("--answer", "answer_seconds", float, "seconds that a worker may be silent over a chunk"),
-    ("--busy", "busy_seconds", float, "seconds that it may take for one in all"),
-]
-_SERVING: list[tuple[str, str, type, str]] = [
-    ("--max-chunk", "max_chunk", int, "most points that the oracle is asked at once"),
-    ("--workers", "workers", int, "threads that call the oracle, if it has thread_safe = True"),
-]
-_CRITERIA: list[tuple[str, str, type, str]] = [
-    ("--radius-edge", "radius_edge_bound", float, "rho0 of rule R2"),
-    ("--sliver", "sliver_bound", float, "Theta0 of rule R3, 0: off"),
-    ("--picking-radius", "picking_radius", float, "delta of the picking region"),
-    ("--small-sliver-radius", "small_sliver_radius", float, "beta: which slivers count"),
-    ("--candidates", "candidates", int, "tried in a picking region"),
-    ("--advance-step", "advance_step", float, "h: the front's step, a length"),
-    ("--flat-alternations", "flat_alternations", int, "closest points towards a flat"),
-    ("--ask-ahead", "ask_ahead", bool, "refine a guess first: fewer round trips, more work"),
-    ("--size-rate", "size_rate", float, "R_p at most this share of the local size"),
-    ("--max-deviation", "max_deviation", float, "circumcentres so far off at most, a length"),
-    ("--common-centre", "common_centre", bool, "judge a simplex at one centre"),
-]
-_ALL = (*_RUN, *_SERVING, *_CRITERIA)
+# The flags of the program `stellate`, and those that only one's own oracle needs, with the options
+# that they set. Two options have none: the oracle has seeds, and label is for `declare`.
+_RUN = {
+    "--seed": "random_seed",
+    "--max-vertices": "max_vertices",
+    "--max-rounds": "max_rounds",
+    "--max-batch-queries": "max_batch_queries",
+    "--box-seeds": "box_seeds",
+    "--worker-wait": "worker_wait_seconds",
+    "--answer": "answer_seconds",
+    "--busy": "busy_seconds",
+    "--components": "components",
+    "--reach": "reach",
+    "--cover-box": "cover_box",
+    "--audit": "audit",
+}
+_SERVING = {"--max-chunk": "max_chunk", "--workers": "workers"}
+_CRITERIA = {
+    "--radius-edge": "radius_edge_bound",
+    "--sliver": "sliver_bound",
+    "--picking-radius": "picking_radius",
+    "--small-sliver-radius": "small_sliver_radius",
+    "--candidates": "candidates",
+    "--advance-step": "advance_step",
+    "--flat-alternations": "flat_alternations",
+    "--ask-ahead": "ask_ahead",
+    "--size-rate": "size_rate",
+    "--max-deviation": "max_deviation",
+    "--common-centre": "common_centre",
+}
+FLAGS = {**_RUN, **_SERVING, **_CRITERIA}
 
 
 def add_server(to: argparse.ArgumentParser, default: str | None) -> None:
@@ -107,7 +111,7 @@ def credentials_of(options: argparse.Namespace) -> Credentials | None:
 
 
 def _settings(options: argparse.Namespace) -> dict[str, Any]:
-    given = {name: getattr(options, name) for _, name, _, _ in _ALL if hasattr(options, name)}
+    given = {name: getattr(options, name, None) for name in FLAGS.values()}
     return {name: value for name, value in given.items() if value is not None}
 
 
@@ -194,6 +198,7 @@ def _serve(options: argparse.Namespace) -> int:
 
 
 def _download(options: argparse.Namespace) -> int:
+    unfinished: Unfinished
     unfinished = "wait" if options.wait else "take" if options.unfinished else "refuse"
     first, *others = options.output
     with _connected(options) as client:
@@ -236,14 +241,19 @@ def _add_settings(command: argparse.ArgumentParser, serves: bool) -> None:
         "the doctor finds",
     )  # fmt: skip
     criteria = command.add_argument_group("criteria", "absent: the server's defaults")
-    run = [*_RUN, *_SERVING] if serves else _RUN
-    for to, settings in ((command, run), (criteria, _CRITERIA)):
-        for flag, name, kind, words in settings:
+    kinds, words = _options.types(MeshOptions), _options.meanings(MeshOptions)
+    run = {**_RUN, **_SERVING} if serves else _RUN
+    for to, flags in ((command, run), (criteria, _CRITERIA)):
+        for flag, name in flags.items():
+            kind, help = _options.plain_type(kinds[name]), words[name]
+            choices = _options.choices(kinds[name])
             if kind is bool:
                 both = argparse.BooleanOptionalAction
-                to.add_argument(flag, dest=name, action=both, help=words)
+                to.add_argument(flag, dest=name, action=both, help=help)
+            elif choices:
+                to.add_argument(flag, dest=name, choices=choices, help=help)
             else:
-                to.add_argument(flag, dest=name, type=kind, metavar="N", help=words)
+                to.add_argument(flag, dest=name, type=kind, metavar="N", help=help)
 
 
 def _add_results(command: argparse.ArgumentParser, required: bool) -> None:

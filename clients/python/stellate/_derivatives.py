@@ -5,7 +5,7 @@ None of these is needed by the package; each is imported when it is asked for.
 
 from __future__ import annotations
 
-from typing import Any, Callable
+from typing import Any, Callable, Literal
 
 import numpy as np
 
@@ -13,13 +13,14 @@ from .errors import InvalidArgument
 
 _ROWS = 128  # that jax compiles a function for; batches come in all sizes
 
+Library = Literal["autograd", "jax", "torch"]
 Batched = Callable[[np.ndarray], np.ndarray]
 # An array of the library's -> F there, and what makes of (n, m) weights the (n, d) gradient of
 # their sum over F.
 Differentiate = Callable[[Any], "tuple[Any, Callable[[Any], Any]]"]
 
 
-def with_derivatives(f: Callable[[Any], Any], library: str) -> tuple[Batched, Batched]:
+def with_derivatives(f: Callable[[Any], Any], library: Library) -> tuple[Batched, Batched]:
     """f and its Jacobian, both from arrays of numpy's to such arrays.
 
     Row i of f(x) depends on row i of x alone: the gradient of a sum over all rows has those of all.
@@ -44,7 +45,7 @@ def with_derivatives(f: Callable[[Any], Any], library: str) -> tuple[Batched, Ba
 class _Derived:
     """What a library makes of f; another process has it made anew."""
 
-    def __init__(self, f: Callable[[Any], Any], library: str) -> None:
+    def __init__(self, f: Callable[[Any], Any], library: Library) -> None:
         self._made_of = f, library
         self._values, self._jacobian = _MAKERS[library](f)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Callable
+from typing import Callable, Literal, get_args
 
 import numpy as np
 
@@ -19,14 +19,15 @@ from .report import Progress
 OnProgress = Callable[[Progress], None]
 OnPart = Callable[[int, int], None]
 
-UNFINISHED = ("refuse", "wait", "take")
+Unfinished = Literal["refuse", "wait", "take"]
+UNFINISHED = get_args(Unfinished)
 
 
 def fetch(
     client: Client,
     name: str,
     revision: int,
-    unfinished: str,
+    unfinished: Unfinished,
     on_progress: OnProgress | None,
     on_part: OnPart | None,
     path: str | os.PathLike[str] | None = None,

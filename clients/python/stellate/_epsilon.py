@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
-from typing import Any
+from typing import Any, Literal, Union
 
 import numpy as np
 
@@ -13,10 +13,12 @@ from ._shared import table
 from .errors import InvalidArgument, OracleError
 from .report import Report
 
-AUTO = "auto"
+Auto = Literal["auto"]
+Epsilon = Union[float, Auto]  # a length, or to be chosen
+AUTO: Auto = "auto"
 
 
-def choose(oracle: Any, epsilon: float | str) -> tuple[float, str]:
+def choose(oracle: Any, epsilon: Epsilon) -> tuple[float, str]:
     """epsilon as it is and "", or for "auto" a quarter of the reach that check() finds, and why.
 
     Raises: OracleError with what check() found where the oracle breaks its contract.

@@ -7,36 +7,42 @@ from __future__ import annotations
 
 import contextlib
 import os
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ._checkpoint import Checkpoint
 from ._chunks import Declared, Puller
 from ._credentials import Credentials
 from ._doctor.check import check
+from ._epsilon import Epsilon
 from ._generated.oracle_pb2 import QueryChunk, ServeOracleRequest
 from ._run import Run
 from ._server import Server
 from .client import Client
 from .errors import InvalidArgument
+from .options import SpecOptions, takes
 from .oracle import CheckedOracle
 from .report import Progress
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
+
+@takes(SpecOptions)
 def pull(
     dimension: int,
     ambient_dimension: int,
-    epsilon: float | str,
+    epsilon: Epsilon,
     server: str | Server | None = None,
     *,
     bounding_box: Any = None,
-    seeds: Any = None,
     intersect_flat: bool = False,
     tangent_basis: bool = False,
     local_size: bool = False,
     walls: int = 0,
     checkpoint: str | os.PathLike[str] | None = None,
     credentials: Credentials | None = None,
-    **criteria: Any,
+    max_chunk: int | None = None,
+    **options: Unpack[SpecOptions],
 ) -> Puller:
     """Meshes a manifold whose questions are answered in a loop of yours, on your own thread.
 
@@ -48,11 +54,11 @@ def pull(
     Args:
       dimension, ambient_dimension: k and d.
       epsilon: a length, or "auto": then the first chunks are the doctor's.
-      bounding_box, seeds: where the manifold is: see stellate.Oracle. One of the two is needed.
+      bounding_box: around the manifold: see stellate.Oracle. Without one `seeds` are needed.
       intersect_flat, tangent_basis, local_size: what the answers will have when a chunk wants it.
       walls: how many walls bound the manifold: then chunks may be about a face, and want clearances
         and conormals.
-      server, checkpoint, credentials, criteria: as for stellate.mesh; `workers` is 1.
+      server, checkpoint, credentials, max_chunk, options: as for stellate.mesh.
 
     The loop ends when the mesh is finished, and raises how it failed. A loop that takes minutes over a
     chunk has to let Python run meanwhile, or the server takes it for dead: see `answer_seconds`.
@@ -61,8 +67,8 @@ def pull(
         raise InvalidArgument("checkpoint is for a private server: one that is named keeps meshes")
     puller = Puller()
     declared = _examined(
-        puller, dimension, ambient_dimension, bounding_box=bounding_box, seeds=seeds, walls=walls,
-        intersect_flat=intersect_flat, tangent_basis=tangent_basis, local_size=local_size,
+        puller, dimension, ambient_dimension, bounding_box=bounding_box, walls=walls,
+        seeds=options.get("seeds"), intersect_flat=intersect_flat, tangent_basis=tangent_basis, local_size=local_size,
     )  # fmt: skip
 
     def note(progress: Progress) -> None:
@@ -77,7 +83,7 @@ def pull(
             if credentials is not None:
                 at = stack.enter_context(Client(server, credentials))
             session = Run(
-                declared, epsilon, at, note, {**criteria, "workers": 1}, every=False,
+                declared, epsilon, at, note, {**options, "max_chunk": max_chunk}, every=False,
                 checkpoint=kept, ask=puller.ask,
             )  # fmt: skip
             stack.enter_context(session)
@@ -90,7 +96,16 @@ def pull(
 
 
 def pull_check(
-    dimension: int, ambient_dimension: int, epsilon: float | None = None, **oracle: Any
+    dimension: int,
+    ambient_dimension: int,
+    epsilon: float | None = None,
+    *,
+    bounding_box: Any = None,
+    seeds: Any = None,
+    intersect_flat: bool = False,
+    tangent_basis: bool = False,
+    local_size: bool = False,
+    walls: int = 0,
 ) -> Puller:
     """As stellate.check, of an oracle whose questions are answered in a loop of yours.
 
@@ -99,14 +114,13 @@ def pull_check(
                 chunk.answer(closest(chunk.points))
         print(worker.report)
 
-    Args:
-      oracle: bounding_box, seeds, intersect_flat, tangent_basis, local_size and walls, as for
-        stellate.pull.
-
-    An answer that cannot be one, and fail(), are findings, too.
+    The arguments are those of stellate.pull. An answer that cannot be one, and fail(), are findings, too.
     """
     puller = Puller()
-    declared = _examined(puller, dimension, ambient_dimension, **oracle)
+    declared = _examined(
+        puller, dimension, ambient_dimension, bounding_box=bounding_box, seeds=seeds, walls=walls,
+        intersect_flat=intersect_flat, tangent_basis=tangent_basis, local_size=local_size,
+    )  # fmt: skip
 
     def work() -> None:
         puller.report = check(declared, epsilon)

@@ -6,12 +6,12 @@ import dataclasses
 import logging
 import numbers
 import threading
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Mapping
 from types import TracebackType
 from typing import Any, Callable
 
 from ._checkpoint import Checkpoint
-from ._epsilon import choose, finer
+from ._epsilon import Epsilon, choose, finer
 from ._follow import Following, OnProgress
 from ._mesh import Mesh
 from ._server import Server
@@ -22,6 +22,7 @@ from .client import Client, MeshInfo
 from .errors import Interrupted, InvalidArgument, StellateError
 from .oracle import CheckedOracle
 from .oracles import kept as part_of
+from .oracles._kept import Keep
 from .progress import progress_bar
 
 _log = logging.getLogger("stellate")
@@ -109,12 +110,12 @@ class Run:
     def __init__(
         self,
         oracle: Any,
-        epsilon: float | str,
+        epsilon: Epsilon,
         server: str | Server | Client | None,
         on_progress: OnProgress | None,
-        criteria: dict[str, Any],
+        options: Mapping[str, Any],
         *,
-        keep: str | None = None,
+        keep: Keep | None = None,
         every: bool = True,
         checkpoint: Checkpoint | None = None,
         ask: Ask = answer,
@@ -125,7 +126,8 @@ class Run:
 
         `ask`: see Client.worker.
         """
-        workers = criteria.pop("workers", 1)
+        options = {name: value for name, value in options.items() if value is not None}
+        workers = options.pop("workers", 1)
         if not isinstance(workers, numbers.Integral) or workers < 1:
             raise InvalidArgument(f"workers has to be a whole number from 1 on, and is {workers!r}")
         given: Any = on_progress
@@ -134,11 +136,11 @@ class Run:
                 "on_progress has to be a function of a Progress, such as stellate.progress_bar(), "
                 f"and is {on_progress!r}"
             )
-        max_chunk = check_max_chunk(criteria.pop("max_chunk", None))
+        max_chunk = check_max_chunk(options.pop("max_chunk", None))
         if keep is not None:
-            oracle = part_of(oracle, keep, criteria.get("seeds"))
+            oracle = part_of(oracle, keep, options.get("seeds"))
         checked = CheckedOracle(oracle)
-        mesh_spec(checked, 1.0, criteria)  # what is misspelt shows before the oracle is probed
+        mesh_spec(checked, 1.0, options)  # what is misspelt shows before the oracle is probed
         choice = checkpoint.choose_epsilon if checkpoint is not None else choose
         self._on_progress, self._checkpoint = on_progress, checkpoint
         self._epsilon_reason, self._note = "", checked.note
@@ -154,7 +156,7 @@ class Run:
         self._live: _Live | None = None
         self._kept: Mesh | None = None
         if checkpoint is not None:
-            spec = mesh_spec(checked, chosen, criteria)
+            spec = mesh_spec(checked, chosen, options)
             checkpoint.require(spec)
             self._kept = checkpoint.finished(spec)
             if self._kept is not None:
@@ -167,7 +169,7 @@ class Run:
             client = server
 
             def begin(size: float) -> _Live:
-                info = self._declare(client, checked, size, criteria)
+                info = self._declare(client, checked, size, options)
                 live = _Live(client, info, Following(client, info, on_progress, every))
                 live.workers = _Workers(
                     client, checked, info.name, int(workers), max_chunk, self._on_failure, ask
@@ -200,11 +202,11 @@ class Run:
         return None if workers is None else workers.failure
 
     def _declare(
-        self, client: Client, oracle: CheckedOracle, epsilon: float, criteria: dict[str, Any]
+        self, client: Client, oracle: CheckedOracle, epsilon: float, options: Mapping[str, Any]
     ) -> MeshInfo:
         """A new mesh, or the one that the checkpoint has."""
         if self._checkpoint is None:
-            return client.create(oracle, epsilon, **criteria)
+            return client.create(oracle, epsilon, **options)
         kept = None
         for info in client.list():
             if info.name == self._checkpoint.name:
@@ -213,8 +215,8 @@ class Run:
                 client.delete(info.name)
         if kept is not None:
             return kept
-        info = client.create(oracle, epsilon, **criteria)
-        spec = mesh_spec(oracle, epsilon, criteria)
+        info = client.create(oracle, epsilon, **options)
+        spec = mesh_spec(oracle, epsilon, options)
         self._checkpoint.note(spec, info.name, self._epsilon_reason, self._retries)
         return info
 

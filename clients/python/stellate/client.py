@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import Any, Callable, TypeVar
+from typing import TYPE_CHECKING, Any, Callable, TypeVar
 
 import grpc
 
 from ._chunks import Declared, Puller
 from ._credentials import Credentials, stays_on_this_machine
-from ._epsilon import choose
+from ._epsilon import Epsilon, choose
 from ._generated import mesh_pb2
 from ._generated import stellate_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
@@ -21,7 +21,11 @@ from ._streams import Parts, Watch
 from ._wire.spec import mesh_spec
 from ._worker import Ask, Worker, answer
 from .errors import InvalidArgument, MeshNotFound, StellateError, from_rpc
+from .options import SpecOptions, takes
 from .oracle import CheckedOracle
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 __all__ = ["Client", "MeshInfo", "ServerInfo", "Watch", "Parts"]
 
@@ -89,15 +93,16 @@ class Client:
         self._stub = rpc.StellateStub(self._channel)
         self._policy = ReconnectPolicy(reconnect_seconds, self._connect, self._why_hopeless)
 
-    def create(self, oracle: Any, epsilon: float | str, **criteria: Any) -> MeshInfo:
-        """Declares a mesh, which waits to be served. epsilon and keywords: see stellate.mesh.
+    @takes(SpecOptions)
+    def create(self, oracle: Any, epsilon: Epsilon, **options: Unpack[SpecOptions]) -> MeshInfo:
+        """Declares a mesh, which waits to be served. epsilon and options: see stellate.mesh.
 
         Not repeated when the server is lost: whether it made the mesh would not be known.
         """
         checked = oracle if isinstance(oracle, CheckedOracle) else CheckedOracle(oracle)
-        if criteria.get("ask_ahead") is None and not stays_on_this_machine(self.address):
-            criteria["ask_ahead"] = True  # round trips are what a far server costs
-        spec = mesh_spec(checked, choose(oracle, epsilon)[0], criteria)
+        if options.get("ask_ahead") is None and not stays_on_this_machine(self.address):
+            options["ask_ahead"] = True  # round trips are what a far server costs
+        spec = mesh_spec(checked, choose(oracle, epsilon)[0], options)
         request = pb.CreateMeshRequest(spec=spec)
         return MeshInfo.from_wire(self._call(self._stub.CreateMesh, request, once=True))
 
@@ -171,14 +176,29 @@ class Client:
         )
 
     def pull(
-        self, name: str, *, worker: str = "", max_chunk: int | None = None, **can: Any
+        self,
+        name: str,
+        *,
+        worker: str = "",
+        max_chunk: int | None = None,
+        intersect_flat: bool | None = None,
+        tangent_basis: bool | None = None,
+        local_size: bool | None = None,
+        walls: int | None = None,
     ) -> Puller:
         """Serves a mesh from a loop of the caller's, on the caller's own thread: see stellate.pull.
 
-        `can`: what answers can have, intersect_flat, tangent_basis, local_size and walls, where that
-        is to be compared with what the mesh was declared with; without any it is all of that.
+        `intersect_flat`, `tangent_basis`, `local_size`, `walls`: what answers can have, where that is
+        to be compared with what the mesh was declared with; without any it is all of that.
         """
-        puller, declared = Puller(), Declared.of(self.get_spec(name), **can)
+        can = {
+            "intersect_flat": intersect_flat,
+            "tangent_basis": tangent_basis,
+            "local_size": local_size,
+            "walls": walls,
+        }
+        given = {name: value for name, value in can.items() if value is not None}
+        puller, declared = Puller(), Declared.of(self.get_spec(name), **given)
         return puller.serve(
             self.worker(declared, name, worker, ask=puller.ask, max_chunk=max_chunk)
         )

@@ -8,7 +8,7 @@ from typing import Any, Callable
 
 import numpy as np
 
-from ._derivatives import with_derivatives
+from ._derivatives import Library, with_derivatives
 from ._equations import Equations, Solution, solve
 from ._rows import apply, norms, product, transposed
 from .errors import InvalidArgument, NotConverged, OracleError
@@ -49,7 +49,7 @@ class ImplicitManifold:
     def __init__(
         self,
         f: Callable[[Any], Any],
-        jacobian: Callable[[np.ndarray], np.ndarray] | str | None = None,
+        jacobian: Callable[[np.ndarray], np.ndarray] | Library | None = None,
         *,
         ambient_dimension: int,
         dimension: int,
@@ -100,7 +100,7 @@ class ImplicitManifold:
         if len(inequalities) > 0:
             self._bound(inequalities, library)
 
-    def _bound(self, inequalities: Sequence[Callable[[Any], Any]], library: str | None) -> None:
+    def _bound(self, inequalities: Sequence[Callable[[Any], Any]], library: Library | None) -> None:
         """Becomes the manifold with boundary that the inequalities leave."""
         from .oracles import Clipped  # which has ready oracles that are made of this one
 

@@ -6,11 +6,13 @@ import dataclasses
 import functools
 import textwrap
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal, cast
 
 import numpy as np
 
 from .. import _html, _shared
+
+Severity = Literal["error", "warning", "note"]
 
 _WIDTH = 100
 _SHOWN_ENTRIES = 6
@@ -34,7 +36,7 @@ def show(value: Any) -> str:
 class Words:
     """One block of findings.txt."""
 
-    severity: str
+    severity: Severity
     message: str
     advice: str
 
@@ -49,7 +51,9 @@ def all_words() -> Mapping[str, Words]:
             continue
         head, message, *rest = block.strip().splitlines()
         code, severity = head.split()
-        words[code] = Words(severity, message, rest[0].removeprefix("- ") if rest else "")
+        words[code] = Words(
+            cast(Severity, severity), message, rest[0].removeprefix("- ") if rest else ""
+        )
     return words
 
 
@@ -57,7 +61,7 @@ def all_words() -> Mapping[str, Words]:
 class Finding:
     """One thing that was found."""
 
-    severity: str  # "error": the mesh will not come out right; "warning": it may not; "note"
+    severity: Severity  # "error": the mesh will not come out right; "warning": it may not; "note"
     code: str  # stable, e.g. "NOT_CLOSEST"
     message: str  # what is wrong, with the first counterexample
     advice: str  # what to do about it

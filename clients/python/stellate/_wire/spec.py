@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import difflib
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, get_args
 
 import numpy as np
 from google.protobuf.descriptor import FieldDescriptor
 
 from .._generated import mesh_pb2 as pb
 from ..errors import InvalidArgument
+from ..options import Audit, MeshOptions, SpecOptions, types
 from ..oracle import CheckedOracle, points_of
 from .arrays import to_wire
 
@@ -29,14 +31,14 @@ _SPEC = {
     "reach": "declared_reach",
     "cover_box": "cover_box",
 }
-_SERVING = {"workers", "max_chunk"}  # keywords of stellate.mesh alone
+_SERVING = set(types(MeshOptions)) - set(types(SpecOptions))  # keywords of stellate.mesh alone
 # Arguments with names of their own, which somebody may have meant.
 _NAMED = {"epsilon", "server", "on_progress", "credentials", "checkpoint", "save", "keep"}
-_AUDITS = {"standard": pb.AUDIT_STANDARD, "thorough": pb.AUDIT_THOROUGH}
+_AUDITS = {name: pb.Audit.Value(f"AUDIT_{name.upper()}") for name in get_args(Audit)}
 _LIMITS = {field.name for field in pb.MeshLimits.DESCRIPTOR.fields}
 
 
-def mesh_spec(oracle: CheckedOracle, epsilon: float, criteria: dict[str, Any]) -> pb.MeshSpec:
+def mesh_spec(oracle: CheckedOracle, epsilon: float, options: Mapping[str, Any]) -> pb.MeshSpec:
     """The specification of a mesh. Ranges are the server's to check; here only types are.
 
     Raises: TypeError for an unknown keyword, InvalidArgument for a value of the wrong type.
@@ -56,7 +58,7 @@ def mesh_spec(oracle: CheckedOracle, epsilon: float, criteria: dict[str, Any]) -
         spec.bounding_box.upper.CopyFrom(to_wire(upper))
     if oracle.seeds is not None:
         spec.seeds.CopyFrom(to_wire(oracle.seeds))
-    for name, value in criteria.items():
+    for name, value in options.items():
         if value is None:
             continue
         if name in _CRITERIA:
@@ -102,7 +104,7 @@ def _audit(value: Any) -> int:
 
 
 def _unknown(name: str) -> str:
-    known = sorted(_CRITERIA | _LIMITS | set(_SPEC) | _SERVING | {"audit", "seeds"})
+    known = sorted(types(MeshOptions))
     near = difflib.get_close_matches(name, [*known, *_NAMED], 1)
     hint = f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(known)}"
     return f"unknown keyword {name!r}{hint}"

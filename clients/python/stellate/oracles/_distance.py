@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from .._rows import Array
 from ..errors import InvalidArgument
 from ..implicit import ImplicitManifold
 from ._grid import Grid, Spline, smoothed
+
+Border = Literal["closed", "open"]
 
 
 class SignedDistance(ImplicitManifold):
@@ -65,7 +67,7 @@ class SignedDistance(ImplicitManifold):
 
     @classmethod
     def of_grid(
-        cls, values: Any, bounding_box: Any, *, level: float = 0.0, border: str = "closed"
+        cls, values: Any, bounding_box: Any, *, level: float = 0.0, border: Border = "closed"
     ) -> SignedDistance:
         """The zero set of the cubic spline through values on a grid; needs scipy.
 
@@ -84,7 +86,7 @@ class SignedDistance(ImplicitManifold):
         Raises: InvalidArgument where there is no such set, where it leaves the grid, and where values
           are those of labels or a mask: what to do about it is said.
         """
-        if border not in ("closed", "open"):
+        if border not in get_args(Border):
             raise InvalidArgument(f"border has to be 'closed' or 'open', and is {border!r}")
         grid = Grid(values, bounding_box)
         outside = grid.insist_on_a_surface(level, border == "open")
@@ -108,7 +110,7 @@ class SignedDistance(ImplicitManifold):
         origin: Any = 0.0,
         level: float | None = None,
         smooth: float = 0.0,
-        border: str = "closed",
+        border: Border = "closed",
     ) -> SignedDistance:
         """The surface of a level in a volume of voxels, as scanners and simulations write them.
 

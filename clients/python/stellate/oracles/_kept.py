@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -11,6 +11,8 @@ from ..errors import InvalidArgument
 from ..oracle import CheckedOracle
 from ._common import all_or_raise, as_points, tree_of, where_of
 from ._walls import Clipped
+
+Keep = Literal["box", "seeds"]
 
 _FIRST_STEP = 0.05  # of the walk, in shares of the box, and its longest if there is one
 _LEAST_STEP = 1e-6  # where M bends within less, it has a crease
@@ -27,7 +29,7 @@ _NEAREST = 8  # points of the net that are compared with
 _MOST = 200_000  # points of the net, from which a component counts as endless
 
 
-def kept(oracle: Any, keep: str, seeds: Any = None) -> Any:
+def kept(oracle: Any, keep: Keep, seeds: Any = None) -> Any:
     """The oracle of a part of a manifold; `stellate.mesh(oracle, epsilon, keep=...)` is of it.
 
     Args:

@@ -8,7 +8,7 @@ from typing import Any, Callable
 
 import numpy as np
 
-from .._derivatives import with_derivatives
+from .._derivatives import Library, with_derivatives
 from .._functions import Exactness, UserFunction
 from .._rows import Array, apply, norms, transposed
 from ..errors import InvalidArgument
@@ -67,7 +67,7 @@ class Clipped:
         oracle: Any,
         walls: Sequence[Wall] = (),
         *,
-        gradients: Sequence[Wall | str | None] | str | None = None,
+        gradients: Sequence[Wall | Library | None] | Library | None = None,
         box: Sequence[Any] | None = None,
         ball: Sequence[Any] | None = None,
         seeds: Any = None,
@@ -164,7 +164,9 @@ class Clipped:
         ]
         return np.stack(columns, axis=1)
 
-    def _add(self, walls: list[Wall], gradients: Sequence[Wall | str | None] | str | None) -> None:
+    def _add(
+        self, walls: list[Wall], gradients: Sequence[Wall | Library | None] | Library | None
+    ) -> None:
         if gradients is None or isinstance(gradients, str):
             gradients = [gradients] * len(walls)
         if len(gradients) != len(walls) or not all(map(callable, walls)):
@@ -232,7 +234,7 @@ class HalfSpace:
         return np.broadcast_to(self._normal, points.shape)
 
 
-def _derived(wall: Wall, library: str) -> tuple[Wall, Wall]:
+def _derived(wall: Wall, library: Library) -> tuple[Wall, Wall]:
     """A wall written for a library, and its gradient, on numpy's arrays."""
     return with_derivatives(_Column(wall), library)
 
@@ -260,14 +262,19 @@ class Solid(Clipped):
         self,
         walls: Wall | Sequence[Wall] = (),
         bounding_box: Sequence[Any] | None = None,
-        **options: Any,
+        *,
+        gradients: Sequence[Wall | Library | None] | Wall | Library | None = None,
+        box: Sequence[Any] | None = None,
+        ball: Sequence[Any] | None = None,
+        seeds: Any = None,
     ) -> None:
-        one = callable(walls)
-        if one and callable(options.get("gradients")):
-            options["gradients"] = [options["gradients"]]
+        several = [walls] if callable(walls) else walls
+        slopes = [gradients] if callable(gradients) else gradients
         if bounding_box is None:
-            bounding_box = _around(options.get("box"), options.get("ball"))
-        super().__init__(Space(bounding_box), [walls] if one else walls, **options)  # type: ignore[list-item, arg-type]
+            bounding_box = _around(box, ball)
+        super().__init__(
+            Space(bounding_box), several, gradients=slopes, box=box, ball=ball, seeds=seeds
+        )
         self.thread_safe = False
 
 
@@ -288,7 +295,7 @@ class ImplicitSolid(Solid):
     def __init__(
         self,
         g: Wall,
-        jacobian: Wall | str | None = None,
+        jacobian: Wall | Library | None = None,
         *,
         bounding_box: Sequence[Any],
         inequalities: Sequence[Wall] = (),

@@ -1,0 +1,64 @@
+"""What mypy says of a user's script, as of one that uses the installed package."""
+
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+import pytest
+import stellate
+
+pytest.importorskip("mypy", reason="tools/check installs it")
+
+RIGHT = """
+import stellate
+
+settings: stellate.MeshOptions = {"max_vertices": 1000, "audit": "thorough"}
+mesh = stellate.mesh(stellate.manifolds.Torus(), 0.2, candidates=3, workers=2, keep="box")
+for grown in stellate.watch(stellate.manifolds.Torus(), "auto", **settings):
+    print(grown.revision)
+with stellate.Client("there:7717") as client:
+    print(client.create(stellate.manifolds.Torus(), 0.2, reach=0.4, cover_box=True).name)
+    stellate.download("meshes/x", server=client, unfinished="wait").save("torus.vtu")
+stellate.ImplicitManifold(
+    print, "jax", ambient_dimension=3, dimension=2, bounding_box=([-1.0] * 3, [1.0] * 3)
+)
+"""
+
+# What is wrong, and what is said of it.
+WRONG = {
+    "stellate.mesh(torus, 0.2, max_vertexes=9)": 'Unexpected keyword argument "max_vertexes"',
+    "stellate.mesh(torus, 0.2, max_vertices='9')": 'Argument "max_vertices" .* "str"',
+    "stellate.mesh(torus, 0.2, audit='through')": "'through'.*'standard', 'thorough'",
+    "stellate.mesh(torus, 'atuo')": "'atuo'.*'auto'",
+    "stellate.mesh(torus, 0.2, keep='seed')": "'seed'.*'box', 'seeds'",
+    "stellate.watch(torus, 0.2, candidate=9)": 'Unexpected keyword argument "candidate"',
+    "client.create(torus, 0.2, workers=2)": 'Unexpected keyword argument "workers"',
+    "stellate.download('x', server=client, unfinished='no')": "'no'.*'refuse', 'wait', 'take'",
+    "stellate.ImplicitSolid(print, 'jaxx', bounding_box=[[0], [1]])": "'jaxx'.*'autograd'",
+}
+SETTING = (
+    "import stellate\ntorus, client = stellate.manifolds.Torus(), stellate.Client('there:1')\n"
+)
+
+
+def test_mypy_strict_lets_a_right_script_pass_and_names_what_is_wrong(tmp_path):
+    (tmp_path / "right.py").write_text(RIGHT)
+    (tmp_path / "wrong.py").write_text(SETTING + "\n".join(WRONG) + "\n")
+    packages = str(pathlib.Path(stellate.__file__).parents[1])
+    # Of packages that are installed mypy does not report what is wrong inside. Unpack: for mypy 1.0.
+    run = subprocess.run(
+        [sys.executable, "-m", "mypy", "--strict", "--follow-imports=silent", "--no-error-summary",
+         "--ignore-missing-imports", "--enable-incomplete-feature=Unpack", "--hide-error-context",
+         "right.py", "wrong.py"],
+        cwd=tmp_path, env={**os.environ, "MYPYPATH": packages}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert not run.stderr
+    said = re.findall(r"^(\w+)\.py:(\d+): error: (.*)$", run.stdout, re.M)
+    first = SETTING.count("\n") + 1
+    assert [(name, int(line) - first) for name, line, _ in said] == [
+        ("wrong", i) for i in range(len(WRONG))
+    ], run.stdout
+    for (_, _, words), (code, wanted) in zip(said, WRONG.items()):
+        assert re.search(wanted, words), f"{code}: {words}"
