@@ -118,6 +118,15 @@ int Main(int argc, char** argv) {
   if (argc > 1 && std::string_view(argv[1]) == "conform") {
     return stellate::cli::ConformCommand::Run(argc - 2, argv + 2);
   }
+  // CLI11 would say of a misspelt one that a command is required.
+  if (const std::string name = argc > 1 ? argv[1] : "-"; !name.starts_with('-')) {
+    const auto named = [&](const CLI::App* command) { return command->get_name() == name; };
+    if (app.get_subcommands(named).empty()) {
+      std::cerr << "stellate: there is no command '" << name
+                << "'; stellate --help shows all of them\n";
+      return stellate::cli::kExitRefused;
+    }
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

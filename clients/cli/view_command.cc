@@ -116,6 +116,14 @@ Expected<void> ViewCommand::Serve(const std::string& server, const Credentials& 
 }
 
 int ViewCommand::ShowLive(const std::stop_token& stop) const {
+  if (!mesh_.empty() && !mesh_.starts_with("meshes/")) {
+    std::cerr
+        << "stellate: '" << mesh_
+        << "' is not the name of a mesh on a server: such a name is meshes/ and 32 digits, and "
+           "stellate top shows all of them. To look at a file, use ParaView or MeshLab, or "
+           "stellate.load_txt(file).show() in Python\n";
+    return kExitRefused;
+  }
   const Expected<Credentials> credentials = server_.ReadCredentials();
   if (!credentials) return PrintError(credentials.error());
   // Whoever mistypes hears of it here, not in the browser.

@@ -90,6 +90,18 @@ TEST_F(CommandLine, UsageAndRefusalsExitTwo) {
   EXPECT_EQ(OnServer("mesh torus -e 0.2 -q -o /no/such/place.txt").status, 2);
 }
 
+TEST_F(CommandLine, NamesWhatItDoesNotKnow) {
+  const Result misspelt = Run("msh torus -e 0.2");
+  EXPECT_EQ(misspelt.status, 2);
+  EXPECT_EQ(misspelt.output,
+            "stellate: there is no command 'msh'; stellate --help shows all of them\n");
+  const Result file = Run("view torus.vtu");
+  EXPECT_EQ(file.status, 2);
+  EXPECT_NE(file.output.find("'torus.vtu' is not the name of a mesh on a server"),
+            std::string::npos)
+      << file.output;
+}
+
 // With a server that is not there: 2, and not 3, says that it was not even looked for.
 TEST_F(CommandLine, FilesAreRefusedBeforeMeshing) {
   for (const std::string arguments :
