@@ -24,6 +24,10 @@ void MeshingRun<K>::DescribeEnding(bool is_whole) {
                                   certification_ ? " when every rule held, before it was certified"
                                                  : " before every rule held");
     if (!report_.failure.message.empty()) certificate.verdict += ": " + report_.failure.message;
+    if (termination == Termination::kVertexBudget)
+      certificate.verdict += ": allow more vertices (max_vertices), or take a larger epsilon";
+    if (termination == Termination::kRoundBudget)
+      certificate.verdict += ": allow more rounds (max_rounds)";
     // Whoever cancels a large mesh does not want to wait for it to be described.
     if (termination != Termination::kCancelled && termination != Termination::kOracleFailed)
       DescribeUnfinished<K>(engine_, spec_.epsilon, !crease_probe_.crease(), &certificate);

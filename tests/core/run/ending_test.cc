@@ -82,10 +82,13 @@ TEST(Ending, TellsARunThatOnlyHadToBeCertified) {
   EXPECT_FALSE(refined.report().certificate.certified);
   EXPECT_EQ(
       refined.report().certificate.verdict,
-      "not certified: the run ended as ROUND_BUDGET when every rule held, before it was certified");
+      "not certified: the run ended as ROUND_BUDGET when every rule held, before it was certified: "
+      "allow more rounds (max_rounds)");
   spec.limits.max_rounds = 4;
-  EXPECT_EQ(testing::Drive(spec, *sphere).report().certificate.verdict,
-            "not certified: the run ended as ROUND_BUDGET before every rule held");
+  EXPECT_EQ(
+      testing::Drive(spec, *sphere).report().certificate.verdict,
+      "not certified: the run ended as ROUND_BUDGET before every rule held: allow more rounds "
+      "(max_rounds)");
 }
 
 }  // namespace
