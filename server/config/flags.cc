@@ -41,6 +41,9 @@ void AddSetting(CLI::App* app, const Setting& setting, Config* config) {
           return AddChoice(app, setting, &value, LogLevelName(value), ReadLogLevel);
         } else if constexpr (std::is_same_v<T, LogFormat>) {
           return AddChoice(app, setting, &value, LogFormatName(value), ReadLogFormat);
+        } else if constexpr (std::is_unsigned_v<T>) {  // which CLI11 would read -3 into
+          return app->add_option(setting.flag, value, setting.help)
+              ->check(CLI::Validator(CLI::NonNegativeNumber).description(""));
         } else {
           return app->add_option(setting.flag, value, setting.help);
         }

@@ -49,6 +49,11 @@ Refused ReadDimensions(const v1::MeshSpec& spec, const Config& config, core::Spe
                             ": map the manifold into a space of lower dimension, or raise "
                             "--max-ambient-dimension"));
   }
+  // Before arrays are held against it.
+  if (spec.ambient_dimension() == 0) {
+    return Invalid("ambient_dimension",
+                   "ambient_dimension (d) is 0: set it to the number of coordinates of a point");
+  }
   return ToInt(spec.ambient_dimension(), "ambient_dimension", &out->ambient_dimension);
 }
 
@@ -209,11 +214,10 @@ Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config) {
   request.spec.oracle.tangent_basis = spec.oracle().tangent_basis();
   request.spec.oracle.local_size = spec.oracle().local_size();
   request.spec.oracle.conormals = spec.oracle().conormals();
-  // Any larger number is refused as one too many.
-  request.spec.walls = static_cast<int>(std::min<std::uint32_t>(spec.walls(), core::kMaxWalls + 1));
   request.spec.random_seed = spec.random_seed() == 0 ? 1 : spec.random_seed();
   request.label = spec.label();
-  Refused status = ReadDimensions(spec, config, &request.spec);
+  Refused status = ToInt(spec.walls(), "walls", &request.spec.walls);
+  if (status.ok()) status = ReadDimensions(spec, config, &request.spec);
   if (status.ok()) status = ReadPlace(spec, &request.spec);
   if (status.ok()) status = ReadAudit(spec, &request.spec);
   if (status.ok()) status = ReadCriteria(spec, &request.spec);

@@ -130,6 +130,8 @@ TEST_F(FlagsTest, MistakesOnTheCommandLineToo) {
     EXPECT_EQ(Parse(arguments).exit_status, 2) << arguments[0];
     EXPECT_NE(error_, "");
   }
+  EXPECT_EQ(Parse({"--max-meshes", "-3"}).exit_status, 2);
+  EXPECT_NE(error_.find("-3"), std::string::npos) << error_;
 }
 
 TEST_F(FlagsTest, HelpHasEveryFlagOnce) {

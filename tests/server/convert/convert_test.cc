@@ -110,6 +110,11 @@ TEST(ConvertSpec, RefusalsStartWithTheField) {
   expect("dimension", StatusCode::kLimitExceeded, [](Spec* s) { s->set_dimension(4294967295u); });
   expect("ambient_dimension", StatusCode::kLimitExceeded,
          [](Spec* s) { s->set_ambient_dimension(4294967295u); });
+  expect("ambient_dimension", StatusCode::kInvalidArgument, [](Spec* s) {
+    s->set_ambient_dimension(0);  // and a box that has coordinates
+  });
+  expect("walls is 4294967295", StatusCode::kLimitExceeded,
+         [](Spec* s) { s->set_walls(4294967295u); });
   expect("bounding_box.lower", StatusCode::kInvalidArgument, [](Spec* s) {
     *s->mutable_bounding_box()->mutable_lower() = Numbers({0, 0}, {2});
   });
