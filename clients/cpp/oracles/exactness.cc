@@ -24,6 +24,9 @@ const double kFourthSize = std::sqrt(70.0);
 // The most that values may err by, as a length in shares of the box: a hundred times what points
 // are found to. Single precision errs by some 1e-8, double by 1e-16.
 constexpr double kInexact = 1e-10;
+// An error of no more than this share of a value is its own rounding: next to a level, where values
+// are small, it is not there. Densities far from what they are dense in are all but the level.
+constexpr double kOwnRounding = 16 * std::numeric_limits<double>::epsilon();
 // Likewise, of the largest coordinate.
 constexpr double kCoordinateRoundings = 1600 * std::numeric_limits<double>::epsilon();
 
@@ -51,19 +54,21 @@ Share Measure(const Exactness::Function& f, const MatrixXd& starts, const Matrix
   for (const double step : kSteps) {
     std::vector<std::vector<double>> shares;  // of each value, on each line that tells any
     for (Index line = 0; line < kLines; ++line) {
-      VectorXd fourth, first, last;
+      VectorXd fourth, first, last, largest;
       for (int i = 0; i < 5; ++i) {
         last = f(starts.col(line) + step * (i - 2) * ways.col(line));
         if (i == 0) first = last;
-        if (i == 0) fourth = VectorXd::Zero(last.size());
+        if (i == 0) fourth = largest = VectorXd::Zero(last.size());
         if (last.size() != first.size()) return {};
         fourth += kFourth[i] * last;
+        largest = largest.cwiseMax(last.cwiseAbs());
       }
       shares.resize(std::max(shares.size(), static_cast<size_t>(last.size())));
       for (Index value = 0; value < last.size(); ++value) {
         const double error = std::abs(fourth[value]) / kFourthSize;
         const double share = error * (4 * step) / std::abs(last[value] - first[value]);
-        if (std::isfinite(share)) shares[static_cast<size_t>(value)].push_back(share);
+        if (std::isfinite(share) && error > kOwnRounding * largest[value])
+          shares[static_cast<size_t>(value)].push_back(share);
       }
     }
     Share worst{-1, 0, std::ssize(shares)};
@@ -110,7 +115,7 @@ std::string Exactness::Judge(const Function& f) const {
   const std::string which =
       seen.values == 1 ? name_ : name_ + "'s value " + std::to_string(seen.value);
   return which + " is exact to " + digits +
-         " of its box only, as neighbouring points show, which is what single precision does. "
+         " of its box at best, as neighbouring points show, which is what single precision does. "
          "Points are found to twelve digits, which takes doubles throughout, within the function "
          "as well; what is solved or integrated inside it takes as many digits";
 }

@@ -270,7 +270,7 @@ INSTANTIATE_TEST_SUITE_P(
               }},
         Wrong{"not finite", [] { PointCloud(Eigen::MatrixXd::Constant(2, 30, kNaN), 1); }},
         Wrong{"there are none", [] { PointCloud(Eigen::MatrixXd(), 1); }},
-        Wrong{"too few", [] { PointCloud(Eigen::MatrixXd::Identity(3, 3), 1); }},
+        Wrong{"too few, at least 7 are", [] { PointCloud(Eigen::MatrixXd::Identity(3, 3), 1); }},
         Wrong{"whole number from 1 to 2", [] { PointCloud(Scattered(3, 40, 1), 3); }},
         Wrong{"has to be positive", [] { PointCloud(Scattered(3, 40, 1), 2, -1); }},
         Wrong{"larger bandwidth", [] { PointCloud(Scattered(3, 40, 1), 2, 1e-6); }},
@@ -307,7 +307,7 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"leave none",
               [] { LevelSet(Torus(), [](const Vector& x) -> Vector { return x.head(2); }); }},
         Wrong{"needs a function", [] { LevelSet(Torus(), {}); }},
-        Wrong{"no set of level",
+        Wrong{"give a level between them, such as",
               [] {
                 SignedDistance::OfGrid(Grid(64), {4, 4, 4}, Cube(3, 1), 2);
               }},

@@ -109,7 +109,8 @@ double InsistOnASurface(const GridValues& grid, double level, bool open_border) 
   const double low = grid.values.minCoeff(), high = grid.values.maxCoeff();
   if (!(low < level && level < high)) {
     Refuse("no set of level " + Short(level) + ": the values lie between " + Short(low) + " and " +
-           Short(high));
+           Short(high) +
+           (low < high ? "; give a level between them, such as " + Short((low + high) / 2) : ""));
   }
   if (FlatShare(grid, level) > kFlatShare) {
     Refuse("values are all but constant on both sides of the level " + Short(level) +

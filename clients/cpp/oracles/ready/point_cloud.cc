@@ -85,7 +85,8 @@ class PointCloud::Neighbourhoods {
 
   static void InsistOnEnough(Eigen::Index distinct, int k) {
     if (distinct > 2 * QuadricTerms(k)) return;
-    Refuse(std::to_string(distinct) + " different points are too few: a quadric has " +
+    Refuse(std::to_string(distinct) + " different points are too few, at least " +
+           std::to_string(2 * QuadricTerms(k) + 1) + " are needed: a quadric has " +
            std::to_string(QuadricTerms(k)) + " coefficients in each direction");
   }
 

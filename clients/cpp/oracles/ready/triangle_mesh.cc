@@ -59,7 +59,7 @@ Triangles Merged(const Triangles& given) {
   return merged;
 }
 
-void InsistOnClosed(const Eigen::MatrixXi& triangles) {
+void InsistOnClosed(const Eigen::MatrixXd& points, const Eigen::MatrixXi& triangles) {
   std::map<std::array<int, 2>, int> counts;
   for (Eigen::Index j = 0; j < triangles.cols(); ++j) {
     for (Eigen::Index i = 0; i < 3; ++i) {
@@ -74,8 +74,15 @@ void InsistOnClosed(const Eigen::MatrixXi& triangles) {
   const bool closed =
       std::all_of(counts.begin(), counts.end(), [](const auto& edge) { return edge.second == 2; });
   if (closed) return;
+  const auto odd =
+      std::find_if(counts.begin(), counts.end(), [](const auto& edge) { return edge.second != 2; });
+  const Eigen::Vector3d middle = (points.col(odd->first[0]) + points.col(odd->first[1])) / 2;
   Refuse("the surface is not closed: " + with([](int n) { return n == 1; }) +
-         " edges have one triangle, " + with([](int n) { return n > 2; }) + " more than two");
+         " edges have one triangle, " + with([](int n) { return n > 2; }) +
+         " more than two, as near (" + Short(middle[0]) + ", " + Short(middle[1]) + ", " +
+         Short(middle[2]) +
+         "). Fill its holes and remove what hangs from it, in a program that repairs meshes; of a "
+         "surface that is meant to have an end, a PointCloud of its vertices is cut by walls");
 }
 
 // The edges of each triangle, 3 x m.
@@ -147,7 +154,7 @@ struct TriangleMesh::Samples {
   Samples(const Triangles& given, const TriangleMeshOptions& options) {
     Check(given);
     const Triangles triangles = Merged(given);
-    InsistOnClosed(triangles.corners);
+    InsistOnClosed(triangles.points, triangles.corners);
     const Eigen::MatrixXd edges = EdgesOf(triangles);
     const double spacing = options.spacing
                                ? *options.spacing
