@@ -105,12 +105,9 @@ def serve_on_all(server: str, label: str, oracle: Any, credentials: stellate.Cre
 def make(client: stellate.Client, label: str, oracle: Any, epsilon: float) -> int:
     """Declares a mesh for the standing workers and waits for its end."""
     info = client.create(oracle, epsilon, label=label)
-    last = None
-    for progress in stellate.watch(info.name, server=client):
-        last = progress
-    assert last is not None and last.report is not None
-    print(last.report)
-    return 0 if last.certified else 1
+    mesh = stellate.download(info.name, server=client, unfinished="wait")
+    print(mesh.report)
+    return 0 if mesh.certified else 1
 
 
 def run(arguments: argparse.Namespace) -> int:

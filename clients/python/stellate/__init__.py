@@ -24,7 +24,7 @@ from ._doctor.check import check  # noqa: E402
 from ._doctor.findings import CheckReport, Finding  # noqa: E402
 from ._executors import ExecutorWorkers, workers_on  # noqa: E402
 from ._files.formats import check_save  # noqa: E402
-from ._mesh import Mesh, load_txt  # noqa: E402
+from ._mesh import FinishedMesh, Mesh, load_txt  # noqa: E402
 from ._pull import pull, pull_check  # noqa: E402
 from ._series import save_series  # noqa: E402
 from ._server import Server, find_stellated  # noqa: E402
@@ -81,6 +81,7 @@ __all__ = [
     "FailedPrecondition",
     "Failure",
     "Finding",
+    "FinishedMesh",
     "ImplicitManifold",
     "ImplicitSolid",
     "Interrupted",

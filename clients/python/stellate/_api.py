@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any, Literal, Union, overload
 
 from ._checkpoint import Checkpoint
 from ._credentials import Credentials
@@ -14,11 +14,11 @@ from ._epsilon import Epsilon
 from ._files.formats import check_save
 from ._follow import Following, OnProgress
 from ._interrupt import Interrupts, told
-from ._mesh import Mesh
+from ._mesh import FinishedMesh, Mesh
 from ._run import Run
 from ._server import Server
 from .client import Client
-from .errors import InvalidArgument, NotCertified, SaveError
+from .errors import InvalidArgument, NotCertified, SaveError, protocol_error
 from .options import MeshOptions, takes
 from .oracle import CheckedOracle
 from .oracles._kept import Keep
@@ -41,7 +41,7 @@ def mesh(
     save: Path | Sequence[Path] = (),
     keep: Keep | None = None,
     **options: Unpack[MeshOptions],
-) -> Mesh:
+) -> FinishedMesh:
     """Meshes the manifold that an oracle knows.
 
     Args:
@@ -110,15 +110,15 @@ def mesh(
         )
         interrupts.on_first = session.interrupt
         (finished,) = session  # or an exception
+    assert isinstance(finished, FinishedMesh)
     for file in files:
         try:
             finished.save(file)
         except (OSError, SaveError) as error:
             raise SaveError(f"{error}; the mesh is the exception's", mesh=finished) from error
     if require_certified and not finished.certified:
-        what_failed = finished.report.what_failed if finished.report is not None else "no report"
         raise NotCertified(
-            f"the mesh is not certified: {what_failed}; it is the exception's mesh",
+            f"the mesh is not certified: {finished.report.what_failed}; it is the exception's mesh",
             mesh=finished,
         )
     return finished
@@ -134,7 +134,7 @@ def watch(
     keep: Keep | None = None,
     **options: Unpack[MeshOptions],
 ) -> Iterator[Mesh]:
-    """The mesh as it grows: an iterator over Mesh, the last of which has its report.
+    """The mesh as it grows: an iterator over Mesh, the last of which is a FinishedMesh.
 
     With an oracle, everything is as in stellate.mesh; closing the iterator cancels the mesh. With
     the name of a mesh in place of the oracle, a mesh that others made and serve is watched, from
@@ -176,9 +176,36 @@ def _watch_by_name(
         yield from Following(client, client.get(name), on_progress)
 
 
+@overload
 def download(
     mesh_name: str,
-    path: str | os.PathLike[str] | None = None,
+    path: Path | None = None,
+    *,
+    server: str | Server | Client,
+    unfinished: Literal["refuse", "wait"] = "refuse",
+    on_progress: OnProgress | None = None,
+    on_part: OnPart | None = None,
+    credentials: Credentials | None = None,
+) -> FinishedMesh: ...
+
+
+@overload
+def download(
+    mesh_name: str,
+    path: Path | None = None,
+    *,
+    server: str | Server | Client,
+    unfinished: Unfinished = "refuse",
+    revision: int = 0,
+    on_progress: OnProgress | None = None,
+    on_part: OnPart | None = None,
+    credentials: Credentials | None = None,
+) -> Mesh: ...
+
+
+def download(
+    mesh_name: str,
+    path: Path | None = None,
     *,
     server: str | Server | Client,
     unfinished: Unfinished = "refuse",
@@ -204,7 +231,7 @@ def download(
       credentials: as for stellate.mesh.
 
     Returns:
-      The mesh, with its report if it is the last revision of one that is over.
+      The mesh: a FinishedMesh if it is the last revision of one that is over.
 
     Raises:
       MeshNotFound; FailedPrecondition for a mesh that is refused because it is not over; how the
@@ -212,6 +239,9 @@ def download(
     """
     with _client(server, credentials) as client, told(f"{mesh_name} is left on its server"):
         mesh = fetch(client, mesh_name, revision, unfinished, on_progress, on_part, path)
+    asked_for_last = revision == 0 and unfinished != "take"
+    if asked_for_last and not isinstance(mesh, FinishedMesh):
+        raise protocol_error(f"revision {mesh.revision} is not the last, or has no report")
     if path is not None:
         mesh.save(path)
     return mesh

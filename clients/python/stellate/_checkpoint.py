@@ -20,7 +20,7 @@ from google.protobuf.json_format import MessageToDict
 
 from ._epsilon import AUTO, Epsilon, choose
 from ._generated import mesh_pb2 as pb
-from ._mesh import Mesh
+from ._mesh import FinishedMesh
 from .errors import FailedPrecondition, InvalidArgument
 from .report import Progress, Report
 
@@ -149,7 +149,7 @@ class Checkpoint:
         os.remove(self._record_path)
         self._record = {}
 
-    def finished(self, spec: pb.MeshSpec) -> Mesh | None:
+    def finished(self, spec: pb.MeshSpec) -> FinishedMesh | None:
         """The mesh, if it is finished. Raises InvalidArgument if it is of another specification."""
         try:
             file = os.fdopen(_open_own(self._mesh_path, os.O_RDONLY), "rb")
@@ -164,16 +164,16 @@ class Checkpoint:
                 raise ValueError("its digest is of another specification")
             progress = about["progress"] and Progress(**about["progress"])
             report = Report.from_fields(about["report"])
-            return Mesh(points, simplices, report, progress, about["revision"], walls)
+            return FinishedMesh(points, simplices, report, progress, about["revision"], walls)
         except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
             raise InvalidArgument(
                 f"{self._mesh_path} is no mesh that was kept ({error}): remove {self.directory}"
             ) from error
 
-    def keep(self, mesh: Mesh) -> None:
+    def keep(self, mesh: FinishedMesh) -> None:
         """Keeps a finished mesh, which needs its server no more."""
         about = {
-            "report": mesh.report and dataclasses.asdict(mesh.report),
+            "report": dataclasses.asdict(mesh.report),
             "progress": mesh.progress and dataclasses.asdict(mesh.progress),
             "revision": mesh.revision,
             "digest": self._record["digest"],

@@ -12,7 +12,7 @@ import numpy as np
 from ._doctor.findings import CheckReport
 from ._generated import oracle_pb2 as pb
 from ._generated.mesh_pb2 import MeshSpec
-from ._mesh import Mesh
+from ._mesh import FinishedMesh
 from ._wire.arrays import from_wire, to_wire
 from ._worker import Worker, answer
 from .errors import FailedPrecondition, NotConverged, OracleError
@@ -242,7 +242,7 @@ class Puller:
 
     def __init__(self) -> None:
         self.progress: Progress | None = None
-        self.mesh: Mesh | None = None
+        self.mesh: FinishedMesh | None = None
         self.report: CheckReport | None = None
         self.state = ""
         self._chunks: queue.SimpleQueue[Chunk | None] = queue.SimpleQueue()

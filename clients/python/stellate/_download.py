@@ -9,7 +9,7 @@ import numpy as np
 
 from ._files.formats import check_save
 from ._info import MeshInfo, unless_failed
-from ._mesh import Mesh
+from ._mesh import Mesh, with_report
 from ._wire.arrays import from_wire, indices_from_wire
 from ._wire.delta_mesh import in_order, spread_walls, walls_from_wire
 from .client import Client
@@ -48,7 +48,9 @@ def fetch(
             )
         info = _await_end(client, name, on_progress)
     mesh = _assemble(client, info, revision, on_part)
-    return mesh if as_it_is else unless_failed(mesh, info)
+    if not as_it_is:
+        unless_failed(mesh, info)
+    return mesh
 
 
 def _await_end(client: Client, name: str, on_progress: OnProgress | None) -> MeshInfo:
@@ -101,11 +103,12 @@ def _assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | N
     if cells.size and int(cells.max()) >= vertices:
         raise protocol_error(f"a simplex has vertex {int(cells.max())} of {vertices} vertices")
     last = info.end_time is not None and revision == info.revision
-    return Mesh(
+    mesh = Mesh(
         np.concatenate(points),
         in_order(cells),
-        info.report if last else None,
+        None,
         info.progress if last else None,
         revision,
         spread_walls(boundary, vertices),
     )
+    return with_report(mesh, info.report if last else None)

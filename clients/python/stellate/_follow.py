@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any, Callable, TypeVar
 
 from ._info import MeshInfo, unless_failed
-from ._mesh import Mesh
+from ._mesh import FinishedMesh, Mesh, with_report
 from ._wire.delta_mesh import DeltaMesh
 from .client import Client
 from .errors import protocol_error
@@ -81,9 +81,13 @@ def _sound(step: Callable[..., T], *arguments: Any) -> T:
         raise protocol_error(str(error)) from error
 
 
-def _finished(growth: DeltaMesh, final: MeshInfo) -> Mesh:
+def _finished(growth: DeltaMesh, final: MeshInfo) -> FinishedMesh:
     simplices = _sound(growth.simplices)
-    mesh = Mesh(
-        growth.points(), simplices, final.report, final.progress, growth.revision, growth.walls()
+    mesh = with_report(
+        Mesh(growth.points(), simplices, None, final.progress, growth.revision, growth.walls()),
+        final.report,
     )
-    return unless_failed(mesh, final)
+    unless_failed(mesh, final)
+    if not isinstance(mesh, FinishedMesh):
+        raise protocol_error("it ended the mesh without a report")
+    return mesh

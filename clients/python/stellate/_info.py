@@ -94,8 +94,8 @@ class ServerInfo:
         return cls(**values)
 
 
-def unless_failed(mesh: Mesh, info: MeshInfo) -> Mesh:
-    """The mesh of a server that says how it ended. Raises: Cancelled, and how it failed."""
+def unless_failed(mesh: Mesh, info: MeshInfo) -> None:
+    """Raises: Cancelled, or how the mesh failed, by what the server says, with the mesh."""
     if info.state == "CANCELLED":
         raise Cancelled("the mesh was cancelled", mesh=mesh)
     if info.state == "FAILED":
@@ -103,4 +103,3 @@ def unless_failed(mesh: Mesh, info: MeshInfo) -> Mesh:
         reason = failure.reason if failure else "ORACLE_FAILED"
         message = failure.message if failure else "the mesh failed, and the server does not say why"
         raise error_class(reason)(message, reason, mesh=mesh)
-    return mesh

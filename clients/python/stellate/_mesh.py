@@ -26,7 +26,8 @@ class Mesh:
       points: (n, d) float64, the sample points.
       simplices: (m, k+1) int64, zero-based ids of points, ascending in each row, rows in
         lexicographic order.
-      report: how it ended and what is proved; None while the mesh grows, or if that is not known.
+      report: how it ended and what is proved. Only a FinishedMesh has to have one: None while the mesh
+        grows, and of slices and files.
       progress: how it stood at this revision; None if that is not known.
       revision: one for each round that changed the mesh.
       walls: of a manifold with boundary, (n,) uint64: the walls that each point lies on, wall i as
@@ -232,6 +233,22 @@ class Mesh:
             f"<stellate.Mesh k={self.dimension} d={self.ambient_dimension} "
             f"{len(self.points)} points, {len(self.simplices)} simplices, {state}>"
         )
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class FinishedMesh(Mesh):
+    """A mesh that has come to its end, certified or not: its `report` says which."""
+
+    report: Report = dataclasses.field()
+
+
+def with_report(mesh: Mesh, report: Report | None) -> Mesh:
+    """A FinishedMesh, or the mesh itself where there is no report."""
+    if report is None:
+        return mesh
+    return FinishedMesh(
+        mesh.points, mesh.simplices, report, mesh.progress, mesh.revision, mesh.walls
+    )
 
 
 def load_txt(path: str | os.PathLike[str]) -> Mesh:

@@ -15,6 +15,7 @@ from ._credentials import Credentials
 from ._doctor.check import check
 from ._epsilon import Epsilon
 from ._generated.oracle_pb2 import QueryChunk, ServeOracleRequest
+from ._mesh import FinishedMesh
 from ._run import Run
 from ._server import Server
 from .client import Client
@@ -90,7 +91,9 @@ def pull(
             puller.stop = session.interrupt
             if puller.left:
                 session.interrupt()
-            (puller.mesh,) = session
+            (finished,) = session
+            assert isinstance(finished, FinishedMesh)
+            puller.mesh = finished
 
     return puller.start(work).begun()
 

@@ -8,12 +8,12 @@ import numbers
 import threading
 from collections.abc import Generator, Iterator, Mapping
 from types import TracebackType
-from typing import Any, Callable
+from typing import Any, Callable, TypeVar
 
 from ._checkpoint import Checkpoint
 from ._epsilon import Epsilon, choose, finer
 from ._follow import Following, OnProgress
-from ._mesh import Mesh
+from ._mesh import FinishedMesh, Mesh
 from ._server import Server
 from ._shared import table
 from ._wire.spec import mesh_spec
@@ -26,6 +26,8 @@ from .oracles._kept import Keep
 from .progress import progress_bar
 
 _log = logging.getLogger("stellate")
+
+M = TypeVar("M", bound=Mesh)
 
 _FAREWELL_SECONDS = 2.0  # that an oracle may take to come to an end when nobody waits for it
 
@@ -154,7 +156,7 @@ class Run:
         self._server: Server | None = None
         self._own_client: Client | None = None
         self._live: _Live | None = None
-        self._kept: Mesh | None = None
+        self._kept: FinishedMesh | None = None
         if checkpoint is not None:
             spec = mesh_spec(checked, chosen, options)
             checkpoint.require(spec)
@@ -269,7 +271,7 @@ class Run:
             for mesh in self._at_work.following:
                 mesh = self._told(mesh)
                 self._next = self._finer(mesh)
-                if mesh.report is not None and self._next is None:
+                if isinstance(mesh, FinishedMesh) and self._next is None:
                     self._finish(mesh)
                 if self._every or self._next is None:
                     yield mesh
@@ -287,7 +289,7 @@ class Run:
             raise self._failure from None
         return mesh
 
-    def _finish(self, mesh: Mesh) -> None:
+    def _finish(self, mesh: FinishedMesh) -> None:
         self._ended = True
         if self._checkpoint is not None:
             self._checkpoint.keep(mesh)
@@ -331,7 +333,7 @@ class Run:
             mesh,
         )
 
-    def _told(self, mesh: Mesh) -> Mesh:
+    def _told(self, mesh: M) -> M:
         """With what the server does not know: why epsilon is what it is, of what oracle, and where
         that ends."""
         report = mesh.report

@@ -11,7 +11,7 @@ from stellate._generated import mesh_pb2 as pb
 
 SPEC = pb.MeshSpec(dimension=1, ambient_dimension=2, epsilon=0.5)
 REPORT = stellate.Report.from_wire(pb.Report(certificate=pb.Certificate(certified=True)), 0.5)
-MESH = stellate.Mesh(np.eye(3, 2), np.array([[0, 1], [1, 2], [0, 2]], np.uint32), REPORT)
+MESH = stellate.FinishedMesh(np.eye(3, 2), np.array([[0, 1], [1, 2], [0, 2]], np.uint32), REPORT)
 
 
 def kept(directory, spec=SPEC):

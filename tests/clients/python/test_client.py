@@ -44,6 +44,15 @@ def test_a_server_that_breaks_the_protocol_is_found_out():
     assert caught.value.reason == "PROTOCOL"
 
 
+def test_a_mesh_that_ends_without_a_report_is_no_mesh_of_a_server():
+    end = final()
+    end.final.ClearField("report")
+    with serving(FakeServer([[delta(1, 0, TRIANGLE, EDGES), end]])) as address:
+        with pytest.raises(stellate.StellateError, match="without a report") as caught:
+            stellate.mesh(CIRCLE, 0.1, server=address)
+    assert caught.value.reason == "PROTOCOL"
+
+
 def test_a_mesh_cancelled_by_others_keeps_what_there_is():
     fake = FakeServer([[delta(1, 0, TRIANGLE, EDGES), final(mesh_pb2.MESH_STATE_CANCELLED)]])
     with serving(fake) as address, pytest.raises(stellate.Cancelled) as caught:

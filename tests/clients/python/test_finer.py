@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import stellate
-from stellate import Client, Mesh, _run, manifolds
+from stellate import Client, FinishedMesh, Mesh, _run, manifolds
 from stellate._epsilon import finer
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -84,7 +84,7 @@ class Following:
         none = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint32)
         if self.every:
             yield Mesh(*none)
-        yield Mesh(*none, self.report)
+        yield FinishedMesh(*none, self.report)
 
 
 class Workers:

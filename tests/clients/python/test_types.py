@@ -16,11 +16,16 @@ import stellate
 
 settings: stellate.MeshOptions = {"max_vertices": 1000, "audit": "thorough"}
 mesh = stellate.mesh(stellate.manifolds.Torus(), 0.2, candidates=3, workers=2, keep="box")
+if not mesh.report.certified:
+    print(mesh.report.certificate.verdict, mesh.slice(0).report is None)
 for grown in stellate.watch(stellate.manifolds.Torus(), "auto", **settings):
     print(grown.revision)
+    if isinstance(grown, stellate.FinishedMesh):
+        print(grown.report.termination)
 with stellate.Client("there:7717") as client:
     print(client.create(stellate.manifolds.Torus(), 0.2, reach=0.4, cover_box=True).name)
-    stellate.download("meshes/x", server=client, unfinished="wait").save("torus.vtu")
+    waited = stellate.download("meshes/x", "torus.vtu", server=client, unfinished="wait")
+    print(waited.report.epsilon)
 stellate.ImplicitManifold(
     print, "jax", ambient_dimension=3, dimension=2, bounding_box=([-1.0] * 3, [1.0] * 3)
 )
@@ -35,7 +40,9 @@ WRONG = {
     "stellate.mesh(torus, 0.2, keep='seed')": "'seed'.*'box', 'seeds'",
     "stellate.watch(torus, 0.2, candidate=9)": 'Unexpected keyword argument "candidate"',
     "client.create(torus, 0.2, workers=2)": 'Unexpected keyword argument "workers"',
-    "stellate.download('x', server=client, unfinished='no')": "'no'.*'refuse', 'wait', 'take'",
+    "stellate.download('x', server=client, unfinished='no')": 'No overload variant of "download"',
+    "stellate.download('x', server=client, unfinished='take').report.epsilon": '"None" of .* has no attribute "epsilon"',
+    "stellate.load_txt('torus.txt').report.epsilon": '"None" of .* has no attribute "epsilon"',
     "stellate.ImplicitSolid(print, 'jaxx', bounding_box=[[0], [1]])": "'jaxx'.*'autograd'",
 }
 SETTING = (

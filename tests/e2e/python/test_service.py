@@ -44,6 +44,7 @@ def test_watching_the_mesh_grow(server):
     assert len(meshes) > 3
     *growing, last = meshes
     assert all(mesh.report is None for mesh in growing) and last.certified
+    assert isinstance(last, stellate.FinishedMesh)
     revisions = [mesh.revision for mesh in growing]
     assert revisions == sorted(set(revisions))
     for earlier, later in zip(meshes, meshes[1:]):
