@@ -15,7 +15,11 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 VERSION = (ROOT / "VERSION").read_text().strip()
 MESH = """
 import os, pathlib, subprocess, sys
-import google.protobuf, grpc, stellate
+import google.protobuf, grpc
+started = []
+sys.addaudithook(lambda event, about: event == "subprocess.Popen" and started.append(about))
+import stellate
+assert not started, started  # no protoc: the wheel carries the stubs
 assert stellate.__version__ == sys.argv[1], stellate.__version__
 inside = pathlib.Path(stellate.__file__).parent
 assert pathlib.Path(stellate.find_stellated()).is_relative_to(inside), stellate.find_stellated()

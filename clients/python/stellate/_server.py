@@ -12,6 +12,7 @@ import tempfile
 import threading
 import time
 
+from ._stubs import source_tree
 from .errors import ServerNotFound, Unavailable
 
 _READY_SECONDS = 30.0
@@ -38,10 +39,9 @@ def find_stellated() -> str:
         return path
     if os.access(BUNDLED, os.X_OK):
         return str(BUNDLED)
-    source_tree = pathlib.Path(__file__).resolve().parents[3]
-    built = []
-    if (source_tree / "proto" / "stellate").is_dir():  # not an installed package
-        candidates = source_tree.glob("build/*/bin/stellated")
+    built, tree = [], source_tree()
+    if tree is not None:
+        candidates = tree.glob("build/*/bin/stellated")
         built = [p for p in candidates if os.access(p, os.X_OK)]
     if built:
         # The release build before others, then the newest.

@@ -25,9 +25,21 @@ _SHARED = _ROOT / "clients" / "shared"
 _CONFORMANCE = _ROOT / "tests" / "conformance"
 
 
+def source_tree() -> pathlib.Path | None:
+    """The tree whose package this is; None: it is installed, whatever lies around it."""
+    here = _ROOT / "clients" / "python"
+    if (
+        _PACKAGE.parent == here
+        and (here / "setup.py").is_file()
+        and (_PROTOS / "stellate").is_dir()
+    ):
+        return _ROOT
+    return None
+
+
 def _sources() -> list[pathlib.Path]:
     """The .proto files, or none when this is not a source tree."""
-    return sorted((_PROTOS / "stellate").glob("*/*.proto"))
+    return sorted((_PROTOS / "stellate").glob("*/*.proto")) if source_tree() else []
 
 
 def _carried() -> dict[str, pathlib.Path]:
