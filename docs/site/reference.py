@@ -6,14 +6,17 @@ Usage: reference.py FOLDER BIN XML    BIN: where stellated and stellate are; XML
 
 from __future__ import annotations
 
+import importlib
 import os
 import pathlib
+import pkgutil
 import re
 import socket
 import subprocess
 import sys
 import tempfile
 import time
+import types
 import urllib.request
 
 import headers
@@ -95,27 +98,31 @@ def metrics(programs: pathlib.Path) -> str:
     )  # fmt: skip
 
 
-def package() -> str:
-    sys.path.insert(0, str(ROOT / "clients" / "python"))
-    import stellate
-
-    names = [n for n in stellate.__all__ if n not in ("manifolds", "oracles")]
-    page = ["# Python\n", "```{eval-rst}", ".. automodule:: stellate", "   :no-members:\n"]
-    for name in sorted(names, key=lambda n: (n[0].isupper(), n.lower())):
-        subject = getattr(stellate, name)
+def offered(module: types.ModuleType, above: set[str]) -> list[str]:
+    """What a module of the package has, but for what is `above` already."""
+    page = ["```{eval-rst}", f".. automodule:: {module.__name__}", "   :no-members:\n"]
+    for name in sorted(module.__all__, key=lambda n: (n[0].isupper(), n.lower())):
+        subject = getattr(module, name)
+        if name in above or isinstance(subject, types.ModuleType):
+            continue
         if isinstance(subject, type) and issubclass(subject, (Exception, KeyboardInterrupt)):
             kind = "autoexception"
         else:
             kind = "autoclass" if isinstance(subject, type) else "autofunction"
-        page.append(f".. {kind}:: stellate.{name}")
-    page += ["```\n", "## Ready oracles\n", "```{eval-rst}"]
-    page += [".. automodule:: stellate.oracles", "   :no-members:\n"]
-    for name in stellate.oracles.__all__:
-        if name in names:  # which has it already
-            continue
-        page.append(f".. autoclass:: stellate.oracles.{name}")
-    page += ["```\n", "## Manifolds of the catalogue\n", "```{eval-rst}"]
-    page += [".. automodule:: stellate.manifolds", "```\n"]
+        page.append(f".. {kind}:: {module.__name__}.{name}")
+    return [*page, "```\n"]
+
+
+def package() -> str:
+    sys.path.insert(0, str(ROOT / "clients" / "python"))
+    import stellate
+
+    page = ["# Python\n", *offered(stellate, set())]
+    for _, name, _ in pkgutil.iter_modules(stellate.__path__, "stellate."):
+        module = None if "._" in name else importlib.import_module(name)
+        top = set(stellate.__all__)
+        if module is not None and set(getattr(module, "__all__", ())) - top:
+            page += [f"## {name}\n", *offered(module, top)]
     return "\n".join(page)
 
 

@@ -92,7 +92,7 @@ def test_the_state_at_the_end_has_its_name(entry):
             (size,) = struct.unpack_from("<I", raw, at)
             last = stellate_pb2.WatchMeshResponse.FromString(raw[at + 4 : at + 4 + size])
             at += 4 + size
-        assert stellate.MeshInfo.from_wire(last.final).state == entry["state"]
+        assert stellate.client.MeshInfo.from_wire(last.final).state == entry["state"]
 
 
 # Files

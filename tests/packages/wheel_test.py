@@ -22,7 +22,8 @@ import stellate
 assert not started, started  # no protoc: the wheel carries the stubs
 assert stellate.__version__ == sys.argv[1], stellate.__version__
 inside = pathlib.Path(stellate.__file__).parent
-assert pathlib.Path(stellate.find_stellated()).is_relative_to(inside), stellate.find_stellated()
+found = stellate.server.find_stellated()
+assert pathlib.Path(found).is_relative_to(inside), found
 mesh = stellate.mesh(stellate.manifolds.Torus(), epsilon=0.2)
 assert mesh.certified and len(mesh.simplices) == 2 * len(mesh.points), mesh
 mesh.save("torus.vtu")

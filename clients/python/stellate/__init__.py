@@ -8,6 +8,11 @@
 `stellate.ImplicitManifold` makes one from equations, `stellate.ImplicitSolid` a solid,
 `stellate.oracles` makes them of charts, distances, points and triangles, and cuts them by walls,
 `stellate.CommandOracle` of a program, and `stellate.manifolds` has a few ready.
+
+What fewer need is in modules of its own: `stellate.executors`, an oracle on many processes and
+machines; `stellate.pulling`, on a thread of yours alone; `stellate.client`, a server call by call;
+`stellate.server`, where it is looked for; `stellate.viewer`, meshes that grow in a browser;
+`stellate.options` and `stellate.report`, all that a mesh is asked for and says.
 """
 
 from . import _requirements, _stubs
@@ -15,22 +20,27 @@ from . import _requirements, _stubs
 _requirements.insist()
 _stubs.ensure()  # before anything imports them
 
+from . import client as client  # noqa: E402
+from . import errors as errors  # noqa: E402
+from . import executors as executors  # noqa: E402
 from . import manifolds, oracles  # noqa: E402
+from . import options as options  # noqa: E402
+from . import progress as progress  # noqa: E402
+from . import pulling as pulling  # noqa: E402
+from . import report as report  # noqa: E402
+from . import server as server  # noqa: E402
+from . import viewer as viewer  # noqa: E402
 from ._api import download, mesh, serve, watch  # noqa: E402
-from ._chunks import Chunk, Puller  # noqa: E402
 from ._command_oracle import CommandOracle  # noqa: E402
 from ._credentials import Credentials  # noqa: E402
 from ._doctor.check import check  # noqa: E402
 from ._doctor.findings import CheckReport, Finding  # noqa: E402
-from ._executors import ExecutorWorkers, workers_on  # noqa: E402
+from ._faces import Face  # noqa: E402
 from ._files.formats import check_save  # noqa: E402
 from ._mesh import FinishedMesh, Mesh, load_txt  # noqa: E402
-from ._pull import pull, pull_check  # noqa: E402
 from ._series import save_series  # noqa: E402
-from ._server import Server, find_stellated  # noqa: E402
 from ._version import __version__ as __version__  # noqa: E402
-from ._view import LiveView  # noqa: E402
-from .client import Client, MeshInfo, ServerInfo  # noqa: E402
+from .client import Client  # noqa: E402
 from .errors import (  # noqa: E402
     Cancelled,
     ExecutorError,
@@ -50,36 +60,22 @@ from .errors import (  # noqa: E402
     UncertifiedWarning,
     ViewerNotFound,
 )
-from .implicit import ImplicitManifold  # noqa: E402
 from .options import MeshOptions  # noqa: E402
 from .oracle import Oracle  # noqa: E402
-from .oracles import ImplicitSolid  # noqa: E402
-from .progress import ProgressBar, progress_bar  # noqa: E402
-from .report import (  # noqa: E402
-    Certificate,
-    Counts,
-    FaceCertificate,
-    Failure,
-    Progress,
-    Report,
-    Violations,
-    WallAngle,
-)
+from .oracles import ImplicitManifold, ImplicitSolid  # noqa: E402
+from .progress import progress_bar  # noqa: E402
+from .report import Progress, Report  # noqa: E402
+from .server import Server  # noqa: E402
 
 __all__ = [
     "Cancelled",
-    "Certificate",
     "CheckReport",
-    "Chunk",
     "Client",
     "CommandOracle",
-    "Counts",
     "Credentials",
     "ExecutorError",
-    "ExecutorWorkers",
-    "FaceCertificate",
+    "Face",
     "FailedPrecondition",
-    "Failure",
     "Finding",
     "FinishedMesh",
     "ImplicitManifold",
@@ -87,9 +83,7 @@ __all__ = [
     "Interrupted",
     "InvalidArgument",
     "LimitExceeded",
-    "LiveView",
     "Mesh",
-    "MeshInfo",
     "MeshNotFound",
     "MeshOptions",
     "NotCertified",
@@ -97,33 +91,24 @@ __all__ = [
     "Oracle",
     "OracleError",
     "Progress",
-    "ProgressBar",
-    "Puller",
     "Report",
     "SaveError",
     "Server",
-    "ServerInfo",
     "ServerNotFound",
     "StellateError",
     "Unauthenticated",
     "Unavailable",
     "UncertifiedWarning",
     "ViewerNotFound",
-    "Violations",
-    "WallAngle",
     "check",
     "check_save",
     "download",
-    "find_stellated",
     "load_txt",
     "manifolds",
     "oracles",
     "mesh",
     "progress_bar",
-    "pull",
-    "pull_check",
     "save_series",
     "serve",
     "watch",
-    "workers_on",
 ]

@@ -16,12 +16,12 @@ from ._follow import Following, OnProgress
 from ._interrupt import Interrupts, told
 from ._mesh import FinishedMesh, Mesh
 from ._run import Run
-from ._server import Server
 from .client import Client
 from .errors import InvalidArgument, NotCertified, SaveError, protocol_error
 from .options import MeshOptions, takes
 from .oracle import CheckedOracle
 from .oracles._kept import Keep
+from .server import Server
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

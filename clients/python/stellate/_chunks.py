@@ -231,12 +231,12 @@ class Chunk:
 
 
 class Puller:
-    """Chunks of questions, as an iterator and a context manager: see stellate.pull, Client.pull.
+    """Chunks of questions, as an iterator and a context manager: see pull() and Client.pull.
 
     Attributes:
-      progress: of stellate.pull, how the mesh stands, as far as is known.
-      mesh: of stellate.pull, the finished mesh, once the loop is over.
-      report: of stellate.pull_check, what it found, once the loop is over.
+      progress: of pull(), how the mesh stands, as far as is known.
+      mesh: of pull(), the finished mesh, once the loop is over.
+      report: of pull_check(), what it found, once the loop is over.
       state: of Client.pull, how the mesh ended, e.g. "SUCCEEDED", once the loop is over.
     """
 
@@ -317,7 +317,7 @@ class Puller:
         return self._open
 
     def close(self) -> None:
-        """Leaves the loop early: a mesh of stellate.pull is cancelled, another goes on without us."""
+        """Leaves the loop early: a mesh of pull() is cancelled, another goes on without us."""
         if self._over:
             return
         self._left = self._over = True

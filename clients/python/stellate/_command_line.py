@@ -30,12 +30,12 @@ from ._conform import command as conform
 from ._credentials import Credentials
 from ._doctor.check import check
 from ._download import Unfinished
-from ._executors import workers_on
 from ._files.formats import check_save
 from ._oracle_source import Refused, add_oracle, name_of, oracle_of
 from ._version import __version__
 from .client import Client
 from .errors import Interrupted, StellateError, exit_status
+from .executors import workers_on
 from .options import MeshOptions
 from .progress import progress_bar
 

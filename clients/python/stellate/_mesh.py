@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _convert, _faces, _html, _plot, _slice, _view
+from . import _convert, _faces, _html, _plot, _slice, viewer
 from ._faces import Face
 from ._files import formats
 from ._files.orientation import orient, turn_outwards, turn_positive
@@ -175,7 +175,9 @@ class Mesh:
         label: str = "",
         height: int = 640,
     ) -> Any:
-        """The mesh in a browser, to be turned, sliced and measured; stellate.LiveView shows one grow.
+        """The mesh in a browser, to be turned, sliced and measured.
+
+        stellate.viewer.LiveView shows one grow.
 
         Args:
           path: a file to write, which needs no network; by default a temporary one is opened in the
@@ -185,7 +187,7 @@ class Mesh:
 
         Raises: ViewerNotFound, OSError.
         """
-        return _view.show(self, path, label, height)
+        return viewer.show(self, path, label, height)
 
     def to_meshio(self) -> Any:
         """A meshio.Mesh, k from 1 to 3.

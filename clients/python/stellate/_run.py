@@ -14,7 +14,6 @@ from ._checkpoint import Checkpoint
 from ._epsilon import Epsilon, choose, finer
 from ._follow import Following, OnProgress
 from ._mesh import FinishedMesh, Mesh
-from ._server import Server
 from ._shared import table
 from ._wire.spec import mesh_spec
 from ._worker import Ask, answer, check_max_chunk, join_all
@@ -24,6 +23,7 @@ from .oracle import CheckedOracle
 from .oracles import kept as part_of
 from .oracles._kept import Keep
 from .progress import progress_bar
+from .server import Server
 
 _log = logging.getLogger("stellate")
 

@@ -6,7 +6,7 @@ import os
 import sys
 
 from ._command_line import main as in_python
-from ._server import BUNDLED
+from .server import BUNDLED
 
 
 def main() -> int:

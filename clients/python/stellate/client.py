@@ -16,13 +16,13 @@ from ._generated import stellate_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
 from ._info import MeshInfo, ServerInfo
 from ._reconnect import Reconnector, ReconnectPolicy
-from ._server import Server
 from ._streams import Parts, Watch
 from ._wire.spec import mesh_spec
 from ._worker import Ask, Worker, answer
 from .errors import InvalidArgument, MeshNotFound, StellateError, from_rpc
 from .options import SpecOptions, takes
 from .oracle import CheckedOracle
+from .server import Server
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -168,7 +168,7 @@ class Client:
         """A worker for a thread of its own; `on_failure` is told of an exception of the oracle.
 
         A `quiet` one leaves it to others to log that the server is lost. `ask` has the oracle
-        answer a chunk of questions, somewhere else perhaps: see stellate.workers_on.
+        answer a chunk of questions, somewhere else perhaps: see stellate.executors.workers_on.
         """
         checked = oracle if isinstance(oracle, CheckedOracle) else CheckedOracle(oracle)
         return Worker(
@@ -186,7 +186,7 @@ class Client:
         local_size: bool | None = None,
         walls: int | None = None,
     ) -> Puller:
-        """Serves a mesh from a loop of the caller's, on the caller's own thread: see stellate.pull.
+        """Serves a mesh from a loop of the caller's, on the caller's own thread: see stellate.pulling.
 
         `intersect_flat`, `tangent_basis`, `local_size`, `walls`: what answers can have, where that is
         to be compared with what the mesh was declared with; without any it is all of that.

@@ -18,6 +18,26 @@ from . import _shared
 from ._complex import Complex
 from ._generated import status_details_pb2 as details_pb
 
+__all__ = [
+    "Cancelled",
+    "ExecutorError",
+    "FailedPrecondition",
+    "Interrupted",
+    "InvalidArgument",
+    "LimitExceeded",
+    "MeshNotFound",
+    "NotCertified",
+    "NotConverged",
+    "OracleError",
+    "SaveError",
+    "ServerNotFound",
+    "StellateError",
+    "Unauthenticated",
+    "Unavailable",
+    "UncertifiedWarning",
+    "ViewerNotFound",
+]
+
 
 class StellateError(Exception):
     """Base of all errors of this package.
@@ -93,7 +113,7 @@ class OracleError(StellateError):
 
 
 class ExecutorError(StellateError):
-    """An executor that lost what it was given. The mesh is still there: see stellate.workers_on."""
+    """An executor that lost what it was given. The mesh is still there: see stellate.executors."""
 
     default_reason = "EXECUTOR"
 

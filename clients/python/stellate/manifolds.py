@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .errors import InvalidArgument, NotConverged
-from .implicit import ImplicitManifold
+from .oracles import ImplicitManifold
 
 __all__ = [
     "ProductOfCircles",

@@ -12,6 +12,8 @@ import numpy as np
 
 from .errors import InvalidArgument, NotConverged, OracleError, add_words
 
+__all__ = ["Oracle"]
+
 _MOST_OF_NOTE = 200  # characters
 
 

@@ -9,6 +9,8 @@ from typing import TextIO
 
 from .report import Progress
 
+__all__ = ["ProgressBar", "progress_bar"]
+
 _REDRAW_SECONDS = 0.05
 _PLAIN_SECONDS = 5.0
 _PHASES = {

@@ -16,6 +16,17 @@ from ._generated import mesh_pb2 as pb
 from ._version import __version__
 from ._wire import enums
 
+__all__ = [
+    "Certificate",
+    "Counts",
+    "FaceCertificate",
+    "Failure",
+    "Progress",
+    "Report",
+    "Violations",
+    "WallAngle",
+]
+
 
 def _copy_fields(cls: type, message: Any) -> Any:
     """A dataclass from the message with the same plain fields."""

@@ -27,7 +27,7 @@ python <- function() reticulate::import("stellate")
 #'     counts. `conormals` (points, face): of each wall of the face the unit normal within the
 #'     tangent space along which its value falls, n x length(face) x d.
 #'
-#'   and more keywords of Python's `stellate.pull`: size_rate, max_vertices, credentials...
+#'   and more keywords of Python's `stellate.pulling.pull`: size_rate, max_vertices, credentials...
 #' @param server "host:port"; by default a server is started.
 #' @param checkpoint a directory, made if it is not there, in which the mesh outlives this R: the
 #'   same call goes on from where the last one was interrupted or killed, or its oracle stopped,
@@ -40,7 +40,7 @@ mesh <- function(closest_point, dimension, ambient_dimension, epsilon, bounding_
                  seeds = NULL, ..., server = NULL, checkpoint = NULL, on_progress = NULL) {
   given <- list(...)
   oracle <- oracle_of(closest_point, dimension, given)
-  worker <- do.call(python()$pull, c(
+  worker <- do.call(python()$pulling$pull, c(
     list(
       as.integer(dimension), as.integer(ambient_dimension), epsilon, server,
       bounding_box = bounding_box, seeds = seeds, checkpoint = checkpoint
@@ -94,7 +94,7 @@ boundary <- function(mesh) {
 check <- function(closest_point, dimension, ambient_dimension, bounding_box = NULL, seeds = NULL,
                   epsilon = NULL, ...) {
   oracle <- oracle_of(closest_point, dimension, list(...))
-  worker <- do.call(python()$pull_check, c(
+  worker <- do.call(python()$pulling$pull_check, c(
     list(
       as.integer(dimension), as.integer(ambient_dimension), epsilon,
       bounding_box = bounding_box, seeds = seeds

@@ -127,10 +127,10 @@ def test_a_binary_that_dies_says_why(monkeypatch, tmp_path):
 def test_where_the_binary_is_looked_for(monkeypatch, tmp_path):
     mine = program(tmp_path / "stellated", "exit 0\n")
     monkeypatch.setenv("STELLATED", str(mine))
-    assert stellate.find_stellated() == str(mine)
+    assert stellate.server.find_stellated() == str(mine)
     monkeypatch.setenv("STELLATED", "stellated")
     monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
-    assert stellate.find_stellated() == str(mine)
+    assert stellate.server.find_stellated() == str(mine)
 
 
 def test_the_fake_speaks_the_whole_service():

@@ -16,14 +16,14 @@ def test_enum_values_without_a_name_are_unknown():
     mesh.progress.phase = NEW
     mesh.report.termination = NEW
     mesh.report.certificate.level = NEW
-    info = stellate.MeshInfo.from_wire(mesh)
+    info = stellate.client.MeshInfo.from_wire(mesh)
     assert info.state == "UNKNOWN" and info.over
     assert info.progress.phase == "UNKNOWN"
     assert info.report.termination == "UNKNOWN"
     assert info.report.certificate.level == "UNKNOWN"
     assert "unknown" in str(info.report)
     assert info.report.to_dict()["termination"] == "UNKNOWN"
-    stellate.ProgressBar()(info.progress)
+    stellate.progress.ProgressBar()(info.progress)
 
 
 def fields(message):
@@ -33,14 +33,14 @@ def fields(message):
 @pytest.mark.parametrize(
     ("ours", "message", "elsewhere"),
     [
-        (stellate.ServerInfo, stellate_pb2.ServerInfo, set()),
-        (stellate.Counts, mesh_pb2.Counts, set()),
-        (stellate.Certificate, mesh_pb2.Certificate, set()),
+        (stellate.client.ServerInfo, stellate_pb2.ServerInfo, set()),
+        (stellate.report.Counts, mesh_pb2.Counts, set()),
+        (stellate.report.Certificate, mesh_pb2.Certificate, set()),
         (stellate.Progress, mesh_pb2.Progress, set()),
-        (stellate.Failure, mesh_pb2.Failure, set()),
+        (stellate.report.Failure, mesh_pb2.Failure, set()),
         (stellate.Report, mesh_pb2.Report, set()),
         # The last two come only where they are asked for, as the viewer does.
-        (stellate.MeshInfo, mesh_pb2.Mesh, {"spec", "crew", "past_progress"}),
+        (stellate.client.MeshInfo, mesh_pb2.Mesh, {"spec", "crew", "past_progress"}),
     ],
 )
 def test_every_field_of_the_protocol_is_there(ours, message, elsewhere):

@@ -19,7 +19,7 @@ TAKERS = {
     stellate.mesh: ALL,
     stellate.watch: ALL,
     stellate.Client.create: OF_SPEC,
-    stellate.pull: OF_SPEC,
+    stellate.pulling.pull: OF_SPEC,
 }
 
 

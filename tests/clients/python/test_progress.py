@@ -103,7 +103,7 @@ def test_a_failure_is_told():
     message = mesh_pb2.Report(termination=mesh_pb2.TERMINATION_ORACLE_FAILED)
     message.failure.reason, message.failure.message = "ORACLE_NOT_FINITE", "query 3 is nan"
     failed = stellate.Report.from_wire(message)
-    assert failed.failure == stellate.Failure("ORACLE_NOT_FINITE", "query 3 is nan")
+    assert failed.failure == stellate.report.Failure("ORACLE_NOT_FINITE", "query 3 is nan")
     assert "ORACLE_NOT_FINITE: query 3 is nan" in str(failed)
 
 

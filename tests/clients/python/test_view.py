@@ -62,7 +62,7 @@ def test_no_command_line_is_an_error_of_its_own(monkeypatch):
     with pytest.raises(stellate.ViewerNotFound, match="clients/quickstart"):
         mesh.show("never.html")
     with pytest.raises(FileNotFoundError):
-        stellate.LiveView("127.0.0.1:1")
+        stellate.viewer.LiveView("127.0.0.1:1")
 
 
 def test_a_build_without_its_page_says_so(command):
@@ -77,7 +77,7 @@ def test_a_live_view_is_told_where_and_whom_and_ends(tmp_path, command):
         "echo http://127.0.0.1:4321/#key\ntrap 'exit 0' INT\nwhile :; do sleep 0.05; done"
     )
     credentials = stellate.Credentials(token="hush", ca="ca.pem")
-    with stellate.LiveView("there:7717", "meshes/1", credentials=credentials) as view:
+    with stellate.viewer.LiveView("there:7717", "meshes/1", credentials=credentials) as view:
         assert view.url == "http://127.0.0.1:4321/#key"
         assert 'src="http://127.0.0.1:4321/#key"' in view._repr_html_()
         process = view._process
@@ -90,4 +90,4 @@ def test_a_live_view_is_told_where_and_whom_and_ends(tmp_path, command):
 def test_a_live_view_of_no_server_says_why(command):
     command("echo 'stellate: no answer from there:1' >&2; exit 3")
     with pytest.raises(stellate.Unavailable, match="^no answer from there:1$"):
-        stellate.LiveView("there:1")
+        stellate.viewer.LiveView("there:1")

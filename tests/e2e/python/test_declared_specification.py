@@ -8,7 +8,7 @@ import stellate
 from stellate import manifolds
 from stellate._generated import stellate_pb2
 
-STELLATE = pathlib.Path(stellate.find_stellated()).parent / "stellate"
+STELLATE = pathlib.Path(stellate.server.find_stellated()).parent / "stellate"
 
 
 def criteria(client, name):

@@ -15,7 +15,7 @@ import stellate
 from stellate.manifolds import ProductOfCircles, Sphere, Torus
 from stellate.oracles import Clipped, HalfSpace, Solid
 
-STELLATE = pathlib.Path(stellate.find_stellated()).parent / "stellate"
+STELLATE = pathlib.Path(stellate.server.find_stellated()).parent / "stellate"
 
 
 @contextlib.contextmanager

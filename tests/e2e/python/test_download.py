@@ -49,7 +49,7 @@ def test_what_a_format_cannot_hold_is_refused_before_anything_is_waited_for(clie
     name = client.create(manifolds.SpecialOrthogonal3(), 0.4).name  # which nobody serves
     with pytest.raises(stellate.SaveError, match="surfaces"):
         stellate.download(name, tmp_path / "so3.stl", server=client, unfinished="wait")
-    program = pathlib.Path(stellate.find_stellated()).with_name("stellate")
+    program = pathlib.Path(stellate.server.find_stellated()).with_name("stellate")
     command = [program, "download", name, "-o", "so3.stl", "--wait", "--server", client.address]
     refused = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert refused.returncode == 2 and "surfaces" in refused.stderr

@@ -69,7 +69,7 @@ def test_a_note_breaks_a_live_line():
             return True
 
     screen = Terminal()
-    bar = stellate.ProgressBar("t", screen)
+    bar = stellate.progress.ProgressBar("t", screen)
     bar._open = True
     bar.note("epsilon 0.1")
     assert screen.getvalue() == "\r\x1b[Kt epsilon 0.1\n"

@@ -90,7 +90,7 @@ def test_processes_make_the_same_mesh(client, declare, tmp_path):
     oracle = Torus(tmp_path)
     name = declare(oracle)
     with processes() as pool:
-        states = stellate.workers_on(pool, oracle, name, 4, server=client).wait()
+        states = stellate.executors.workers_on(pool, oracle, name, 4, server=client).wait()
     assert states == ["SUCCEEDED"] * 4
     assert same(stellate.download(name, server=client), plain)
     elsewhere = [mark.name for mark in tmp_path.glob("process-*")]
@@ -100,13 +100,13 @@ def test_processes_make_the_same_mesh(client, declare, tmp_path):
 def test_tangents_go_along(client, declare, undisturbed):
     name = declare(manifolds.Torus())
     with futures.ThreadPoolExecutor(2) as pool:
-        stellate.workers_on(pool, manifolds.Torus(), name, 2, server=client).wait()
+        stellate.executors.workers_on(pool, manifolds.Torus(), name, 2, server=client).wait()
     assert same(stellate.download(name, server=client), undisturbed)
 
 
 def test_an_executor_made_anew_survives_a_dead_process(client, declare, tmp_path, caplog):
     name = declare(Torus(tmp_path))
-    crew = stellate.workers_on(processes, Torus(tmp_path, "die"), name, 2, server=client)
+    crew = stellate.executors.workers_on(processes, Torus(tmp_path, "die"), name, 2, server=client)
     assert crew.wait() == ["SUCCEEDED"] * 2
     assert (tmp_path / "died").exists() and "making another" in caplog.text
     plain = stellate.mesh(Torus(tmp_path), EPSILON, server=client)
@@ -116,19 +116,21 @@ def test_an_executor_made_anew_survives_a_dead_process(client, declare, tmp_path
 def test_a_broken_pool_is_no_failure_of_the_oracle(client, declare, tmp_path):
     name = declare(Torus(tmp_path))
     with processes() as pool:
-        crew = stellate.workers_on(pool, Torus(tmp_path, "die"), name, 2, server=client)
+        crew = stellate.executors.workers_on(pool, Torus(tmp_path, "die"), name, 2, server=client)
         with pytest.raises(stellate.ExecutorError, match="new executor") as broken:
             crew.wait()
     assert isinstance(broken.value.__cause__, futures.BrokenExecutor)
     assert not client.get(name).over
     with processes() as pool:  # as the message says
-        stellate.workers_on(pool, Torus(tmp_path), name, 2, server=client).wait()
+        stellate.executors.workers_on(pool, Torus(tmp_path), name, 2, server=client).wait()
     assert stellate.download(name, server=client).certified
 
 
 def test_a_chunk_that_always_kills_is_given_up(client, declare, tmp_path):
     name = declare(Torus(tmp_path))
-    crew = stellate.workers_on(processes, Torus(tmp_path, "always die"), name, 1, server=client)
+    crew = stellate.executors.workers_on(
+        processes, Torus(tmp_path, "always die"), name, 1, server=client
+    )
     with pytest.raises(stellate.ExecutorError, match="3 times"):
         crew.wait()
     assert not client.get(name).over
@@ -137,7 +139,7 @@ def test_a_chunk_that_always_kills_is_given_up(client, declare, tmp_path):
 def test_what_the_oracle_raises_is_told_as_its_own(client, declare, tmp_path):
     name = declare(Torus(tmp_path))
     with processes(1) as pool:
-        crew = stellate.workers_on(pool, Torus(tmp_path, "raise"), name, 2, server=client)
+        crew = stellate.executors.workers_on(pool, Torus(tmp_path, "raise"), name, 2, server=client)
         with pytest.raises(stellate.OracleError, match="the solver has no licence") as raised:
             crew.wait()
     assert "in closest_point" in str(raised.value.__cause__)  # the other process's traceback
@@ -148,7 +150,9 @@ def test_what_the_oracle_raises_is_told_as_its_own(client, declare, tmp_path):
 def test_an_oracles_errors_are_not_taken_for_the_executors(client, declare, tmp_path):
     name = declare(Torus(tmp_path))
     with futures.ThreadPoolExecutor(1) as pool:
-        crew = stellate.workers_on(pool, Torus(tmp_path, "interrupted"), name, 1, server=client)
+        crew = stellate.executors.workers_on(
+            pool, Torus(tmp_path, "interrupted"), name, 1, server=client
+        )
         with pytest.raises(futures.CancelledError):
             crew.wait()
     assert client.get(name).state == "FAILED"
@@ -162,14 +166,16 @@ def test_answers_that_break_a_rule_are_the_oracles(client, declare, tmp_path):
     name = declare(Torus(tmp_path))
     with futures.ThreadPoolExecutor(1) as pool:
         with pytest.raises(stellate.OracleError, match="not finite") as raised:
-            stellate.workers_on(pool, Flat(tmp_path), name, 1, server=client).wait()
+            stellate.executors.workers_on(pool, Flat(tmp_path), name, 1, server=client).wait()
     assert raised.value.reason == "ORACLE_NOT_FINITE"
 
 
 def test_leaving_takes_the_workers_away_and_the_mesh_stays(client, declare, tmp_path):
     name = declare(Torus(tmp_path))
     pool = processes(1)
-    with stellate.workers_on(pool, Torus(tmp_path, "hang"), name, 2, server=client) as crew:
+    with stellate.executors.workers_on(
+        pool, Torus(tmp_path, "hang"), name, 2, server=client
+    ) as crew:
         while not (tmp_path / "hanging").exists():
             with pytest.raises(TimeoutError):
                 crew.wait(timeout=0.05)
@@ -179,7 +185,7 @@ def test_leaving_takes_the_workers_away_and_the_mesh_stays(client, declare, tmp_
         process.kill()
     pool.shutdown()
     with futures.ThreadPoolExecutor(1) as threads:
-        stellate.workers_on(threads, Torus(tmp_path), name, 1, server=client).wait()
+        stellate.executors.workers_on(threads, Torus(tmp_path), name, 1, server=client).wait()
     assert stellate.download(name, server=client).certified
 
 
@@ -188,7 +194,7 @@ def test_what_cannot_be_sent_is_said(client, declare, tmp_path):
     oracle.lock = threading.Lock()
     name = declare(oracle)
     with processes(1) as pool, pytest.raises(stellate.ExecutorError, match="pickle"):
-        stellate.workers_on(pool, oracle, name, 1, server=client).wait()
+        stellate.executors.workers_on(pool, oracle, name, 1, server=client).wait()
     assert not client.get(name).over
 
 
@@ -197,17 +203,19 @@ def test_an_executor_that_is_closed_is_said(client, declare, tmp_path):
     pool.shutdown()
     name = declare(Torus(tmp_path))
     with pytest.raises(stellate.ExecutorError, match="shutdown"):
-        stellate.workers_on(pool, Torus(tmp_path), name, 1, server=client).wait()
+        stellate.executors.workers_on(pool, Torus(tmp_path), name, 1, server=client).wait()
 
 
 @pytest.mark.parametrize("slots", [0, -1, 1.5])
 def test_slots_are_a_whole_number(client, slots):
     with pytest.raises(ValueError, match="slots"):
-        stellate.workers_on(None, manifolds.Torus(), "meshes/x", slots, server=client)
+        stellate.executors.workers_on(None, manifolds.Torus(), "meshes/x", slots, server=client)
 
 
 def test_a_mesh_that_is_not_there(client):
     with futures.ThreadPoolExecutor(1) as pool:
-        crew = stellate.workers_on(pool, manifolds.Torus(), "meshes/" + "0" * 32, 2, server=client)
+        crew = stellate.executors.workers_on(
+            pool, manifolds.Torus(), "meshes/" + "0" * 32, 2, server=client
+        )
         with pytest.raises(stellate.MeshNotFound):
             crew.wait()

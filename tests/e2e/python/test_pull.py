@@ -29,7 +29,7 @@ def answer(chunk):
 
 def test_the_mesh_is_that_of_an_oracle_that_is_called(server):
     threads = set()
-    with stellate.pull(2, 3, 0.1, server, tangent_basis=True, **WHERE) as worker:
+    with stellate.pulling.pull(2, 3, 0.1, server, tangent_basis=True, **WHERE) as worker:
         for chunk in worker:
             threads.add(threading.current_thread())
             assert chunk.kind == "closest_point" and len(chunk) == len(chunk.points)
@@ -42,7 +42,7 @@ def test_the_mesh_is_that_of_an_oracle_that_is_called(server):
 
 
 def test_arrays_of_column_major_languages_will_do(server):
-    with stellate.pull(2, 3, 0.2, server, tangent_basis=True, **WHERE) as worker:
+    with stellate.pulling.pull(2, 3, 0.2, server, tangent_basis=True, **WHERE) as worker:
         for chunk in worker:
             points, found = closest(chunk.points)
             tangents = TORUS.tangent_basis(np.where(found[:, None], points, 1.4))
@@ -56,7 +56,7 @@ def test_intersections_and_sizes(server):
     sphere = manifolds.Sphere()
     kinds = set()
     box = {"bounding_box": sphere.bounding_box}
-    with stellate.pull(
+    with stellate.pulling.pull(
         2, 3, 0.4, server, intersect_flat=True, local_size=True, size_rate=0.3, **box
     ) as worker:
         for chunk in worker:
@@ -78,7 +78,7 @@ def test_intersections_and_sizes(server):
 
 
 def test_a_wrong_answer_is_refused_at_once_and_may_be_mended(server):
-    with stellate.pull(2, 3, 0.2, server, tangent_basis=True, **WHERE) as worker:
+    with stellate.pulling.pull(2, 3, 0.2, server, tangent_basis=True, **WHERE) as worker:
         for chunk in worker:
             with pytest.raises(stellate.OracleError, match="shape"):
                 chunk.answer(chunk.points[:, :2])
@@ -96,27 +96,27 @@ def test_a_wrong_answer_is_refused_at_once_and_may_be_mended(server):
 
 
 def test_a_chunk_has_to_be_answered_before_the_next(server):
-    with stellate.pull(2, 3, 0.2, server, **WHERE) as worker:
+    with stellate.pulling.pull(2, 3, 0.2, server, **WHERE) as worker:
         next(worker)
         with pytest.raises(stellate.FailedPrecondition):
             next(worker)
 
 
 def test_failing_and_what_the_server_refuses(server):
-    with stellate.pull(2, 3, 0.2, server, **WHERE) as worker:
+    with stellate.pulling.pull(2, 3, 0.2, server, **WHERE) as worker:
         chunk = next(worker)
         chunk.fail("no such surface")
         with pytest.raises(stellate.OracleError, match="no such surface"):
             next(worker)
         assert list(worker) == []
     with pytest.raises(stellate.InvalidArgument, match="epsilon"):
-        stellate.pull(2, 3, -1.0, server, **WHERE)
+        stellate.pulling.pull(2, 3, -1.0, server, **WHERE)
 
 
 def test_leaving_early_cancels_the_mesh(server, client):
     before = {info.name for info in client.list()}
     with pytest.raises(ZeroDivisionError):
-        with stellate.pull(2, 3, 0.05, server, label="left", **WHERE) as worker:
+        with stellate.pulling.pull(2, 3, 0.05, server, label="left", **WHERE) as worker:
             for i, chunk in enumerate(worker):
                 chunk.answer(closest(chunk.points)[0])
                 1 / (5 - i)
@@ -162,7 +162,7 @@ LUNE_CAN = {"bounding_box": LUNE.bounding_box, "tangent_basis": True, "walls": 2
 
 def test_manifolds_with_boundary(server, client):
     faces = set()
-    with stellate.pull(2, 3, 0.3, server, **LUNE_CAN) as worker:
+    with stellate.pulling.pull(2, 3, 0.3, server, **LUNE_CAN) as worker:
         for chunk in worker:
             faces.add(chunk.face)
             answer_with(LUNE, chunk)
@@ -184,7 +184,7 @@ def test_manifolds_with_boundary(server, client):
     (TORUS, {"tangent_basis": True, **WHERE}), (LUNE, LUNE_CAN),
 ])  # fmt: skip
 def test_a_doctor_says_what_it_says_of_an_oracle_that_is_called(oracle, can):
-    with stellate.pull_check(2, 3, 0.1, **can) as worker:
+    with stellate.pulling.pull_check(2, 3, 0.1, **can) as worker:
         for chunk in worker:
             answer_with(oracle, chunk)
     called = stellate.check(oracle, 0.1)
@@ -196,7 +196,7 @@ def test_a_doctor_says_what_it_says_of_an_oracle_that_is_called(oracle, can):
 
 def test_a_doctor_finds_what_is_wrong_with_answers():
     def codes(do):
-        with stellate.pull_check(2, 3, **WHERE) as worker:
+        with stellate.pulling.pull_check(2, 3, **WHERE) as worker:
             for chunk in worker:
                 do(chunk)
         return worker.report.codes
@@ -205,20 +205,20 @@ def test_a_doctor_finds_what_is_wrong_with_answers():
     assert "NOT_FINITE" in codes(lambda chunk: chunk.answer(chunk.points * np.nan))
     assert "RAISED" in codes(lambda chunk: chunk.fail("no such surface"))
     assert "NOT_IDEMPOTENT" in codes(lambda chunk: chunk.answer(chunk.points * 0.9))
-    with stellate.pull_check(2, 3, **WHERE) as worker:
+    with stellate.pulling.pull_check(2, 3, **WHERE) as worker:
         next(worker)  # and no more
     with pytest.raises(stellate.InvalidArgument, match="length"):
-        stellate.pull_check(2, 3, "small", **WHERE)
+        stellate.pulling.pull_check(2, 3, "small", **WHERE)
 
 
 def test_automatic_sizes(server):
-    with stellate.pull(2, 3, "auto", server, tangent_basis=True, **WHERE) as worker:
+    with stellate.pulling.pull(2, 3, "auto", server, tangent_basis=True, **WHERE) as worker:
         for chunk in worker:
             answer_with(TORUS, chunk)
     assert worker.mesh.report.epsilon == pytest.approx(0.1, rel=0.2)
     assert "a quarter of the reach" in worker.mesh.report.epsilon_reason
     with pytest.raises(stellate.OracleError, match="NOT_IDEMPOTENT"):
-        with stellate.pull(2, 3, "auto", server, **WHERE) as worker:
+        with stellate.pulling.pull(2, 3, "auto", server, **WHERE) as worker:
             for chunk in worker:
                 chunk.answer(chunk.points * 0.9)
 
@@ -226,7 +226,9 @@ def test_automatic_sizes(server):
 def test_a_checkpoint_goes_on_where_the_loop_was_left(tmp_path, server):
     def grow(limit):
         asked = 0
-        with stellate.pull(2, 3, 0.15, tangent_basis=True, checkpoint=tmp_path, **WHERE) as worker:
+        with stellate.pulling.pull(
+            2, 3, 0.15, tangent_basis=True, checkpoint=tmp_path, **WHERE
+        ) as worker:
             for chunk in worker:
                 asked += len(chunk)
                 if asked > limit:
@@ -242,4 +244,4 @@ def test_a_checkpoint_goes_on_where_the_loop_was_left(tmp_path, server):
     whole = stellate.mesh(TORUS, 0.15, server)
     assert np.array_equal(mesh.points, whole.points)
     with pytest.raises(stellate.InvalidArgument, match="private server"):
-        stellate.pull(2, 3, 0.15, server, checkpoint=tmp_path, **WHERE)
+        stellate.pulling.pull(2, 3, 0.15, server, checkpoint=tmp_path, **WHERE)

@@ -23,7 +23,13 @@ class MortalServer:
     def start(self, remembers: bool = True) -> None:
         ready = self._directory / "ready"
         ready.unlink(missing_ok=True)
-        command = [stellate.find_stellated(), "--listen", self.address, "--ready-file", str(ready)]
+        command = [
+            stellate.server.find_stellated(),
+            "--listen",
+            self.address,
+            "--ready-file",
+            str(ready),
+        ]
         command += ["--log-level", "off", "--exit-with-parent"]
         if remembers:
             command += ["--data-dir", str(self._directory / "data")]

@@ -38,7 +38,7 @@ def files(tmp_path_factory):
 @pytest.fixture(scope="module")
 def address(files):
     """A server that wants a client certificate and a token, on a port of the loopback."""
-    command = [stellate.find_stellated(), "--listen", "127.0.0.1:0", "--log-level", "off"]
+    command = [stellate.server.find_stellated(), "--listen", "127.0.0.1:0", "--log-level", "off"]
     command += ["--tls-cert", "server.pem", "--tls-key", "server.key", "--tls-client-ca", "ca.pem"]
     command += ["--token-file", "tokens", "--drain-seconds", "0"]
     with subprocess.Popen(command, cwd=files, stdout=subprocess.PIPE, text=True) as process:
@@ -65,7 +65,7 @@ def test_a_mesh_over_mutual_tls_with_a_token(address, full):
 
 def test_health_under_mutual_tls(files, tmp_path):
     """The server's certificate is of another authority than its clients'."""
-    program = stellate.find_stellated()
+    program = stellate.server.find_stellated()
     server = ["--tls-cert", "server.pem", "--tls-key", "server.key", "--tls-client-ca", "other.pem"]
     command = [program, "--listen", "127.0.0.1:0", *server, "--ready-file", str(tmp_path / "ready")]
     with subprocess.Popen(command, cwd=files, stdout=subprocess.PIPE, text=True) as process:
@@ -137,7 +137,7 @@ def test_errors_name_what_helps(address, plain, files, full):
                 manifolds.Torus(), "meshes/" + "0" * 32, server=server,
                 credentials=stellate.Credentials(**credentials),
             )  # fmt: skip
-        program = pathlib.Path(stellate.find_stellated()).with_name("stellate")
+        program = pathlib.Path(stellate.server.find_stellated()).with_name("stellate")
         command = [program, "health", "--server", server, *flags]
         said = subprocess.run(command, cwd=files, capture_output=True, text=True)
         assert said.returncode in (2, 3) and words in said.stderr and flag in said.stderr
@@ -153,7 +153,7 @@ def test_tokens_are_kept_secret():
 
 
 def test_the_command_line(address, files):
-    program = pathlib.Path(stellate.find_stellated()).with_name("stellate")
+    program = pathlib.Path(stellate.server.find_stellated()).with_name("stellate")
 
     def run(*arguments):
         command = [program, *arguments, "--server", address]

@@ -1,7 +1,7 @@
-"""Oracles for manifolds that are given in other ways than by equations.
+"""Oracles for manifolds that are given by equations, charts, distances, points, triangles...
 
-Each is an object that `stellate.mesh` takes; `stellate.check` examines them like any other. Equations
-themselves are stellate.ImplicitManifold.
+Each is an object that `stellate.mesh` takes; `stellate.check` examines them like any other.
+ImplicitManifold and ImplicitSolid are at the top of `stellate`, too.
 """
 
 from ._bounded import ManifoldWithBoundary
@@ -10,6 +10,7 @@ from ._cloud import PointCloud
 from ._combined import LevelSet, Product, Transformed
 from ._constraints import ConstraintSet
 from ._distance import SignedDistance
+from ._implicit import ImplicitManifold
 from ._kept import kept
 from ._linkage import Linkage
 from ._network import NeuralImplicit
@@ -23,6 +24,7 @@ __all__ = [
     "Clipped",
     "ConstraintSet",
     "HalfSpace",
+    "ImplicitManifold",
     "ImplicitSolid",
     "LevelSet",
     "Linkage",

@@ -10,7 +10,7 @@ import numpy as np
 from .._functions import UserFunction
 from .._rows import Array, Flags, norms
 from ..errors import InvalidArgument, NotConverged
-from ..implicit import ImplicitManifold
+from ._implicit import ImplicitManifold
 
 _LOOKS = 64  # points of the box that constraints are looked at from
 # What is left of a gradient across those before it, as a share, where it follows from them; and a

@@ -10,8 +10,8 @@ import numpy as np
 from .._functions import UserFunction
 from .._rows import Array
 from ..errors import InvalidArgument
-from ..implicit import ImplicitManifold
 from ._grid import Grid, Spline, smoothed
+from ._implicit import ImplicitManifold
 
 Border = Literal["closed", "open"]
 

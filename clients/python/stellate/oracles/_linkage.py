@@ -9,7 +9,7 @@ import numpy as np
 
 from .._rows import Array
 from ..errors import InvalidArgument
-from ..implicit import ImplicitManifold
+from ._implicit import ImplicitManifold
 
 
 class Linkage(ImplicitManifold):

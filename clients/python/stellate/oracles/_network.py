@@ -13,7 +13,7 @@ import numpy as np
 from .._derivatives import with_derivatives
 from .._rows import Array
 from ..errors import InvalidArgument, OracleError
-from ..implicit import ImplicitManifold
+from ._implicit import ImplicitManifold
 
 _ROWS = 256  # asked at a time: always this number, whatever the batch
 

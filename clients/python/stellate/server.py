@@ -15,6 +15,8 @@ import time
 from ._stubs import source_tree
 from .errors import ServerNotFound, Unavailable
 
+__all__ = ["Server", "find_stellated"]
+
 _READY_SECONDS = 30.0
 _STOP_SECONDS = 10.0
 _LONGEST_SOCKET_PATH = 100  # the kernel takes 107 bytes

@@ -8,10 +8,10 @@ from typing import Any, Callable
 
 import numpy as np
 
-from ._derivatives import Library, with_derivatives
-from ._equations import Equations, Solution, solve
-from ._rows import apply, norms, product, transposed
-from .errors import InvalidArgument, NotConverged, OracleError
+from .._derivatives import Library, with_derivatives
+from .._equations import Equations, Solution, solve
+from .._rows import apply, norms, product, transposed
+from ..errors import InvalidArgument, NotConverged, OracleError
 
 _LOOKS = 64  # points that F is looked at from where none leads to M
 _FEW = 0.25  # of the first batch, fewer of which find M where something is wrong with F
@@ -102,7 +102,7 @@ class ImplicitManifold:
 
     def _bound(self, inequalities: Sequence[Callable[[Any], Any]], library: Library | None) -> None:
         """Becomes the manifold with boundary that the inequalities leave."""
-        from .oracles import Clipped  # which has ready oracles that are made of this one
+        from ._walls import Clipped  # which imports what is made of this one
 
         clipped = Clipped(copy.copy(self), inequalities, gradients=library)
         self.walls: int = clipped.walls

@@ -22,10 +22,12 @@ from ._credentials import Credentials
 from ._generated import geometry_pb2 as geometry
 from ._generated import mesh_pb2 as pb
 from ._generated import stellate_pb2 as calls
-from ._server import Server, find_stellated
 from ._wire import arrays
 from .errors import Unavailable, ViewerNotFound
 from .report import Report
+from .server import Server, find_stellated
+
+__all__ = ["LiveView"]
 
 _PLACE = 'id="recording">'  # where the page keeps its recording
 _STATES = {

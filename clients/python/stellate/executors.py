@@ -15,11 +15,13 @@ from typing import Any, Callable
 from ._credentials import Credentials
 from ._generated import oracle_pb2 as pb
 from ._interrupt import told
-from ._server import Server
 from ._worker import answer, join_all
 from .client import Client
 from .errors import ExecutorError, InvalidArgument, OracleError
 from .oracle import CheckedOracle
+from .server import Server
+
+__all__ = ["ExecutorWorkers", "workers_on"]
 
 MakeExecutor = Callable[[], futures.Executor]
 
@@ -281,7 +283,8 @@ def workers_on(
     """Workers for a mesh whose oracle runs on an executor: processes, Dask, MPI.
 
         with ProcessPoolExecutor(32) as pool:
-            states = stellate.workers_on(pool, oracle, mesh.name, 32, server=server).wait()
+            crew = stellate.executors.workers_on(pool, oracle, mesh.name, 32, server=server)
+            states = crew.wait()
 
     Returns at once. Each slot is a stream to the server, which hands every chunk of questions that
     comes to `executor.submit`; a slot for each of the executor's workers keeps all of them busy.

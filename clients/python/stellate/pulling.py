@@ -10,22 +10,25 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from ._checkpoint import Checkpoint
-from ._chunks import Declared, Puller
+from ._chunks import Chunk, Declared, Puller
 from ._credentials import Credentials
 from ._doctor.check import check
 from ._epsilon import Epsilon
 from ._generated.oracle_pb2 import QueryChunk, ServeOracleRequest
 from ._mesh import FinishedMesh
 from ._run import Run
-from ._server import Server
 from .client import Client
 from .errors import InvalidArgument
 from .options import SpecOptions, takes
 from .oracle import CheckedOracle
 from .report import Progress
+from .server import Server
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
+
+
+__all__ = ["Chunk", "Puller", "pull", "pull_check"]
 
 
 @takes(SpecOptions)
@@ -47,7 +50,7 @@ def pull(
 ) -> Puller:
     """Meshes a manifold whose questions are answered in a loop of yours, on your own thread.
 
-        with stellate.pull(2, 3, 0.1, bounding_box=([-1.5] * 3, [1.5] * 3)) as worker:
+        with stellate.pulling.pull(2, 3, 0.1, bounding_box=([-1.5] * 3, [1.5] * 3)) as worker:
             for chunk in worker:
                 chunk.answer(closest(chunk.points))
         print(worker.mesh.report)
@@ -112,12 +115,12 @@ def pull_check(
 ) -> Puller:
     """As stellate.check, of an oracle whose questions are answered in a loop of yours.
 
-        with stellate.pull_check(2, 3, bounding_box=([-1.5] * 3, [1.5] * 3)) as worker:
+        with stellate.pulling.pull_check(2, 3, bounding_box=([-1.5] * 3, [1.5] * 3)) as worker:
             for chunk in worker:
                 chunk.answer(closest(chunk.points))
         print(worker.report)
 
-    The arguments are those of stellate.pull. An answer that cannot be one, and fail(), are findings, too.
+    The arguments are those of pull(). An answer that cannot be one, and fail(), are findings, too.
     """
     puller = Puller()
     declared = _examined(
