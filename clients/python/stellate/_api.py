@@ -65,8 +65,10 @@ def mesh(
       keep: "box": what lies in the oracle's bounding box, cut at its sides where the manifold leaves
         it; "seeds": the components that seeds lie on, and no other. What is meshed is
         oracles.kept(oracle, keep, seeds): workers that join have to serve that.
-      **options: each is None, or is left out, where the default will do:
-        {options}
+      **options: those below; one that is left out, or None, takes its default.
+
+    Keyword Args:
+      {options}
 
     Returns:
       The mesh. It may be uncertified, when a budget was spent or epsilon is too coarse: its report
