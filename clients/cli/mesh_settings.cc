@@ -35,8 +35,8 @@ constexpr MeshSetting kCriteria[] = {
     {"--advance-step", &O::advance_step, "h: the front's step, a length"},
     {"--flat-alternations", &O::flat_alternations,
      "closest points towards a flat, without intersections"},
-    {"--ask-ahead,!--no-ask-ahead", &O::ask_ahead,
-     "refine a guess first: fewer round trips, more processor time"},
+    {"--speculative,!--no-speculative", &O::speculative,
+     "refine a surrogate first: fewer round trips, more processor time"},
     {"--size-rate", &O::size_rate,
      "R_p at most this share of the local size: the manifold's own where it is known, or "
      "estimated"},

@@ -63,7 +63,7 @@ func meshSpec(c *checkedOracle, epsilon float64, o *Options, far bool) *pb.MeshS
 		DeclaredReach: positive(o.Reach),
 	}
 	if far { // round trips are what a far server costs
-		spec.Criteria.AskAhead = &far
+		spec.Criteria.Speculative = &far
 	}
 	if o.ThoroughAudit {
 		spec.Audit = pb.Audit_AUDIT_THOROUGH

@@ -107,7 +107,7 @@ void ToProto(const core::Certificate& c, int k, v1::Certificate* out) {
   out->set_declared_reach(c.declared_reach);
   out->set_reach_refuted(c.reach_refuted);
   out->set_proved_distance(c.proved_distance);
-  out->set_answers_held(c.answers_held);
+  out->set_answers_checked(c.answers_held);
   out->set_only_too_coarse(c.only_too_coarse);
   ToProto(c.violations, k, out);
   BoundaryToProto(c, out);
@@ -197,17 +197,17 @@ void ToProto(const core::Report& report, int k, v1::Report* out) {
   ToProto(report.certificate, k, out->mutable_certificate());
 }
 
-void ToProto(const std::vector<CrewMember>& crew, v1::Mesh* out) {
-  for (const CrewMember& member : crew) {
-    v1::WorkerStatus* const worker = out->add_crew();
+void ToProto(const std::vector<WorkerStats>& workers, v1::Mesh* out) {
+  for (const WorkerStats& member : workers) {
+    v1::WorkerStats* const worker = out->add_worker_stats();
     worker->set_number(member.id);
-    worker->set_title(member.title);
+    worker->set_display_name(member.display_name);
     worker->set_queries(member.queries);
     worker->set_chunks(member.chunks);
     worker->set_fixed_seconds(member.fixed_seconds);
     worker->set_each_seconds(member.each_seconds);
-    worker->set_newest_chunk(member.newest);
-    worker->set_holds(member.holds);
+    worker->set_newest_chunk(member.newest_chunk);
+    worker->set_unanswered(member.unanswered);
     worker->set_lagging(member.lagging);
   }
 }

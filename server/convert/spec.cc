@@ -123,7 +123,7 @@ Status ReadCriteria(const v1::MeshSpec& spec, core::Specification* out) {
     if (!status.ok()) return status;
     to.candidates = candidates;
   }
-  to.ask_ahead = c.ask_ahead();
+  to.ask_ahead = c.speculative();
   if (c.has_size_rate()) to.size_rate = c.size_rate();
   if (c.has_max_deviation()) to.max_deviation = c.max_deviation();
   if (c.has_common_centre()) {
@@ -256,7 +256,7 @@ void ToProto(const core::Specification& spec, v1::MeshSpec* out) {
   if (spec.criteria.candidates) criteria->set_candidates(*spec.criteria.candidates);
   if (spec.criteria.advance_step) criteria->set_advance_step(*spec.criteria.advance_step);
   criteria->set_flat_alternations(spec.criteria.flat_alternations);
-  criteria->set_ask_ahead(spec.criteria.ask_ahead);
+  criteria->set_speculative(spec.criteria.ask_ahead);
   if (spec.criteria.size_rate) criteria->set_size_rate(*spec.criteria.size_rate);
   if (spec.criteria.max_deviation) criteria->set_max_deviation(*spec.criteria.max_deviation);
   if (spec.criteria.judging) {

@@ -108,9 +108,9 @@ void Dispatch::TakeBack(Worker* worker, bool timed_out) {
 // Alone, a worker takes all. Among many, smaller pieces towards the end let all end together; a
 // piece that takes less than what comes with each would make no end sooner.
 Index Dispatch::ShareOfTheRest(const Worker& worker) const {
-  const auto crew = static_cast<Index>(workers_.size());
-  if (crew == 1) return pending_queries_;
-  const Index share = (pending_queries_ + 2 * crew - 1) / (2 * crew);
+  const auto workers = static_cast<Index>(workers_.size());
+  if (workers == 1) return pending_queries_;
+  const Index share = (pending_queries_ + 2 * workers - 1) / (2 * workers);
   const double least = std::max(Seconds(options_.least_share), worker.pace.fixed());
   const double queries =
       std::min(static_cast<double>(pending_queries_), least / worker.pace.each());
@@ -140,8 +140,8 @@ bool Dispatch::MayHaveAnother(const Worker& worker) const {
   if (in_flight == 0) return true;
   const Pace& pace = worker.pace;
   if (in_flight >= options_.max_in_flight || worker.Lagging() || !pace.settled()) return false;
-  const auto crew = static_cast<double>(workers_.size());
-  if (crew == 1 || static_cast<double>(pending_queries_) > 2 * crew * pace.FullChunk()) return true;
+  const auto workers = static_cast<double>(workers_.size());
+  if (workers == 1 || static_cast<double>(pending_queries_) > 2 * workers * pace.FullChunk()) return true;
   double held = 0;
   for (const Lease& lease : worker.leases) held += pace.Seconds(static_cast<double>(lease.count));
   return held <= std::max(kSoon, pace.fixed() / kWorthWhile);

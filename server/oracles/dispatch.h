@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "server/base/clock.h"
-#include "server/oracles/crew.h"
+#include "server/oracles/worker_stats.h"
 #include "server/oracles/pace.h"
 
 namespace stellate::server {
@@ -111,7 +111,7 @@ class Dispatch {
   void Leave(WorkerId worker, TimePoint now);
   std::size_t workers() const { return workers_.size(); }
   // All workers, the earliest first, without their display names.
-  std::vector<CrewMember> Crew() const;
+  std::vector<WorkerStats> ListWorkers() const;
 
   // Returns new leases, to be sent to their workers.
   std::vector<Lease> Assign(TimePoint now);
@@ -151,7 +151,7 @@ class Dispatch {
     std::set<Family> compared;     // families in which an answer was compared
     bool stalled = false;          // let a lease run out and has not answered since
     std::set<LeaseId> unanswered;  // chunks sent and not answered, late ones too
-    std::uint64_t answered_queries = 0, answered_chunks = 0, newest_chunk = 0;  // for CrewMember
+    std::uint64_t answered_queries = 0, answered_chunks = 0, newest_chunk = 0;  // for WorkerStats
     std::deque<Lease> leases;  // oldest first; only the first one's time runs
 
     // Whether it still computes a chunk that is no longer needed, or has stopped answering.

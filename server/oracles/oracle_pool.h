@@ -139,7 +139,7 @@ class OraclePool {
 
   std::size_t workers() const { return worker_count_; }
   // All workers, the earliest first.
-  std::vector<CrewMember> Crew() const;
+  std::vector<WorkerStats> ListWorkers() const;
   // Queries of the round that have no answer yet.
   std::size_t waiting() const;
 

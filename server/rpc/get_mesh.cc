@@ -7,7 +7,7 @@ grpc::Status GetMesh(const Call& call, const v1::GetMeshRequest& request, v1::Me
   const auto session = FindMesh(call.state, call.caller, request.name());
   if (!session) return session.error();
   ShowMesh(call, **session, mesh);
-  if (request.crew()) ToProto((*session)->pool().Crew(), mesh);
+  if (request.worker_stats()) ToProto((*session)->pool().ListWorkers(), mesh);
   if (request.has_past_progress_after())
     ToProto((*session)->history().PastAfter(request.past_progress_after()), mesh);
   return grpc::Status::OK;

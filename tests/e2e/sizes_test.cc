@@ -53,7 +53,7 @@ TEST_F(Sizes, AreTheSameFromAnyNumberOfWorkers) {
   const Expected<Mesh> one = MeshManifold(*torus, options);
   options.workers = 3;
   const Expected<Mesh> three = MeshManifold(*torus, options);
-  options.ask_ahead = true;
+  options.speculative = true;
   const Expected<Mesh> ahead = MeshManifold(*torus, options);
   ASSERT_TRUE(one.has_value() && three.has_value() && ahead.has_value());
   EXPECT_TRUE(AreIdentical(*one, *three));

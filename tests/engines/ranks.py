@@ -12,5 +12,5 @@ from mpi4py.futures import MPIPoolExecutor
 if __name__ == "__main__":
     address, name, gate = sys.argv[1:]
     with MPIPoolExecutor() as ranks:
-        crew = stellate.executors.workers_on(ranks, gated.Gated(gate), name, 2, server=address)
-        print(*crew.wait(), flush=True)
+        workers = stellate.executors.workers_on(ranks, gated.Gated(gate), name, 2, server=address)
+        print(*workers.wait(), flush=True)

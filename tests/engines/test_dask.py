@@ -41,10 +41,10 @@ def test_pilots(cluster):
 def test_executor(cluster):
     with gated.Gate() as gate, gated.declared(gate) as (client, name, undisturbed):
         executor = cluster.get_executor(pure=False, retries=5)
-        crew = stellate.executors.workers_on(
+        workers = stellate.executors.workers_on(
             executor, gated.Gated(gate.folder), name, 2, server=client
         )
         os.kill(gate.held(), signal.SIGKILL)
         gate.open()
-        assert crew.wait() == ["SUCCEEDED"] * 2
+        assert workers.wait() == ["SUCCEEDED"] * 2
         assert gated.finished(client, name) == undisturbed

@@ -73,7 +73,7 @@ std::vector<std::string> Seeds() {
   spec.clear_bounding_box();
   const double points[] = {1, 0, 0, 0, -1, 0};
   ToProto(points, {2, 3}, spec.mutable_seeds());
-  spec.mutable_criteria()->set_ask_ahead(true);
+  spec.mutable_criteria()->set_speculative(true);
   spec.mutable_criteria()->set_common_centre(true);
   spec.mutable_criteria()->set_candidates(7);
   spec.mutable_criteria()->set_advance_step(1);

@@ -1,6 +1,6 @@
 """A large mesh from Python over a long path: how the time divides.
 
-    delay.py --proxy PROGRAM [--rtt-ms 50] [--vertices 100000] [--ask-ahead]
+    delay.py --proxy PROGRAM [--rtt-ms 50] [--vertices 100000] [--speculative]
 
 PROGRAM is called as `PROGRAM LISTEN_PORT HOST:PORT ONE_WAY_MS`, and has to carry connections on with
 that delay each way. The sphere is meshed twice, next to the server and over the long path; what the
@@ -48,13 +48,13 @@ def processor_seconds(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def run(address: str, pid: int, epsilon: float, ask_ahead: bool) -> Run:
+def run(address: str, pid: int, epsilon: float, speculative: bool) -> Run:
     """Meshes the sphere on a server."""
     oracle = Timed(stellate.manifolds.Sphere())
     before = processor_seconds(pid)
     client_before = time.process_time()
     begin = time.perf_counter()
-    mesh = stellate.mesh(oracle, epsilon, server=address, ask_ahead=ask_ahead)
+    mesh = stellate.mesh(oracle, epsilon, server=address, speculative=speculative)
     seconds = time.perf_counter() - begin
     counts = mesh.report.counts
     return Run(
@@ -82,7 +82,7 @@ def main() -> int:
     parser.add_argument("--proxy", default=os.environ.get("DELAY_PROXY", "delay-proxy"))
     parser.add_argument("--rtt-ms", type=float, default=50)
     parser.add_argument("--vertices", type=float, default=100_000)
-    parser.add_argument("--ask-ahead", action="store_true")
+    parser.add_argument("--speculative", action="store_true")
     arguments = parser.parse_args()
     epsilon = (_DENSITY / arguments.vertices) ** 0.5
     rtt = arguments.rtt_ms / 1000
@@ -102,8 +102,8 @@ def main() -> int:
             stdout=subprocess.DEVNULL,
         )
         try:
-            near = run(address, server.pid, epsilon, arguments.ask_ahead)
-            far = run(f"127.0.0.1:{port}", server.pid, epsilon, arguments.ask_ahead)
+            near = run(address, server.pid, epsilon, arguments.speculative)
+            far = run(f"127.0.0.1:{port}", server.pid, epsilon, arguments.speculative)
         finally:
             proxy.terminate()
             server.terminate()
@@ -113,7 +113,7 @@ def main() -> int:
     latency = far.rounds * rtt
     print(
         f"sphere, epsilon {epsilon:.5f}: {far.vertices} vertices, {far.rounds} rounds, "
-        f"{far.queries} queries, ask ahead: {'yes' if arguments.ask_ahead else 'no'}, "
+        f"{far.queries} queries, speculative: {'yes' if arguments.speculative else 'no'}, "
         f"certified: {far.certified}, same counts near and far: {same}"
     )
     for where, one in (

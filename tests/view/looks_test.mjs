@@ -26,7 +26,7 @@ test("words about a mesh without vertices stand over nothing, and are true", asy
   await says(page, "It was cancelled before its first vertex");
   assert.equal((await picture(page)).share, 0, "the last one is gone");
   assert.doesNotMatch(await page.locator("#verdict").innerText(), /Reach|Consistent/);
-  assert.ok(await page.locator("#crew-box").isHidden(), "nobody is to serve what is over");
+  assert.ok(await page.locator("#workers-box").isHidden(), "nobody is to serve what is over");
   assert.ok(await page.locator("#histograms-box").isHidden());
 
   await choose(page, label);

@@ -76,7 +76,7 @@ test("a mesh grows before one's eyes, and goes on with the gateway's successor",
   const first = await stage.gateway(name, "--port", port);
   const page = await stage.page(first.url);
   await until(page, () => Number(document.getElementById("stage").dataset.vertices) > 20);
-  await until(page, () => /a worker at [^]*\d/.test(document.getElementById("crew").innerText));
+  await until(page, () => /a worker at [^]*\d/.test(document.getElementById("workers").innerText));
   assert.ok(await page.locator("#right").evaluate((e) => e.scrollWidth <= e.clientWidth));
   const early = await picture(page);
   first.process.kill("SIGKILL");

@@ -223,7 +223,7 @@ std::string CertificateJson(const Certificate& c) {
   json.Add("declared_reach", c.declared_reach);
   json.Add("reach_refuted", c.reach_refuted);
   json.Add("proved_distance", c.proved_distance);
-  json.Add("answers_held", c.answers_held);
+  json.Add("answers_checked", c.answers_checked);
   json.Raw("violations", ViolationsJson(c.violations));
   json.Add("boundary_simplices", c.boundary_simplices);
   json.Add("boundary_components", c.boundary_components);

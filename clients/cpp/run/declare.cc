@@ -23,7 +23,7 @@ Expected<Request> Settle(Oracle& oracle, const MeshOptions& options) {
   }
   // Round trips are what a far server costs.
   const bool far = !options.server.empty() && !StaysOnThisMachine(options.server);
-  if (!options.ask_ahead && far) request.options.ask_ahead = true;
+  if (!options.speculative && far) request.options.speculative = true;
   return request;
 }
 

@@ -127,7 +127,7 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   if (options.candidates) criteria.set_candidates(*options.candidates);
   if (options.advance_step) criteria.set_advance_step(*options.advance_step);
   if (options.flat_alternations) criteria.set_flat_alternations(*options.flat_alternations);
-  if (options.ask_ahead) criteria.set_ask_ahead(*options.ask_ahead);
+  if (options.speculative) criteria.set_speculative(*options.speculative);
   if (options.size_rate) criteria.set_size_rate(*options.size_rate);
   if (options.max_deviation) criteria.set_max_deviation(*options.max_deviation);
   if (options.common_centre) criteria.set_common_centre(*options.common_centre);
@@ -240,7 +240,7 @@ Report ReportOf(const v1::Mesh& mesh) {
   out.declared_reach = c.declared_reach();
   out.reach_refuted = c.reach_refuted();
   out.proved_distance = c.proved_distance();
-  out.answers_held = c.answers_held();
+  out.answers_checked = c.answers_checked();
   out.violations = FromProto(c.violations());
   out.boundary_simplices = c.boundary_simplices();
   out.boundary_components = c.boundary_components();

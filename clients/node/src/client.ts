@@ -87,7 +87,7 @@ export class Client {
   /** What create() asks for. */
   specOf(oracle: Oracle, options: MeshOptions): MeshSpec {
     // Round trips are what a far server costs.
-    const far = staysOnThisMachine(this.address) ? {} : { askAhead: true };
+    const far = staysOnThisMachine(this.address) ? {} : { speculative: true };
     return meshSpec(new CheckedOracle(oracle), oracle, { ...far, ...options });
   }
 

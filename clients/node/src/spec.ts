@@ -10,10 +10,10 @@ type Plain<T> = { [Name in keyof T as Name extends `_${string}` ? never : Name]?
 
 /** All that is asked of a mesh beside its oracle. mesh.proto says what each means. */
 export interface MeshOptions
-  extends Omit<Plain<WireCriteria>, "askAhead" | "commonCentre">, Plain<WireLimits> {
+  extends Omit<Plain<WireCriteria>, "speculative" | "commonCentre">, Plain<WireLimits> {
   /** Largest circumradius of a simplex, a length. */
   epsilon: number;
-  askAhead?: boolean;
+  speculative?: boolean;
   commonCentre?: boolean;
   seeds?: Float64Array;
   randomSeed?: number | bigint;
@@ -34,7 +34,7 @@ const CRITERIA = [
   "candidates",
   "advanceStep",
   "flatAlternations",
-  "askAhead",
+  "speculative",
   "commonCentre",
   "sizeRate",
   "maxDeviation",
@@ -66,7 +66,7 @@ export function meshSpec(checked: CheckedOracle, oracle: Oracle, options: MeshOp
       new InvalidArgument(`${name} ${what}`, { details: { fields: { [name]: what } } });
     if (!KNOWN.has(name)) throw wrong(`is no option; known: ${[...KNOWN].sort().join(", ")}`);
     const like = { label: "string", audit: "string", seeds: "object" }[name];
-    const flag = name === "coverBox" || name === "askAhead" || name === "commonCentre";
+    const flag = name === "coverBox" || name === "speculative" || name === "commonCentre";
     const wanted = like ?? (flag ? "boolean" : typeof value === "bigint" ? "bigint" : "number");
     if (value !== undefined && typeof value !== wanted) {
       throw wrong(`has to be a ${wanted}, and is ${typeof value}`);

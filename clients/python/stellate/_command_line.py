@@ -69,7 +69,7 @@ _CRITERIA = {
     "--candidates": "candidates",
     "--advance-step": "advance_step",
     "--flat-alternations": "flat_alternations",
-    "--ask-ahead": "ask_ahead",
+    "--speculative": "speculative",
     "--size-rate": "size_rate",
     "--max-deviation": "max_deviation",
     "--common-centre": "common_centre",
@@ -190,9 +190,9 @@ def _serve(options: argparse.Namespace) -> int:
             spawn = multiprocessing.get_context("spawn")  # gRPC's threads do not outlive a fork
             with (
                 futures.ProcessPoolExecutor(count, spawn) as pool,
-                workers_on(pool, oracle, options.mesh, count, server=client, **more) as crew,
+                workers_on(pool, oracle, options.mesh, count, server=client, **more) as workers,
             ):
-                state = max(crew.wait())
+                state = max(workers.wait())
     print(state)
     return _FAILED if state == "FAILED" else _WELL
 

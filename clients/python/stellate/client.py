@@ -100,8 +100,8 @@ class Client:
         Not repeated when the server is lost: whether it made the mesh would not be known.
         """
         checked = oracle if isinstance(oracle, CheckedOracle) else CheckedOracle(oracle)
-        if options.get("ask_ahead") is None and not stays_on_this_machine(self.address):
-            options["ask_ahead"] = True  # round trips are what a far server costs
+        if options.get("speculative") is None and not stays_on_this_machine(self.address):
+            options["speculative"] = True  # round trips are what a far server costs
         spec = mesh_spec(checked, choose(oracle, epsilon)[0], options)
         request = pb.CreateMeshRequest(spec=spec)
         return MeshInfo.from_wire(self._call(self._stub.CreateMesh, request, once=True))

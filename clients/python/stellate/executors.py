@@ -283,8 +283,8 @@ def workers_on(
     """Workers for a mesh whose oracle runs on an executor: processes, Dask, MPI.
 
         with ProcessPoolExecutor(32) as pool:
-            crew = stellate.executors.workers_on(pool, oracle, mesh.name, 32, server=server)
-            states = crew.wait()
+            workers = stellate.executors.workers_on(pool, oracle, mesh.name, 32, server=server)
+            states = workers.wait()
 
     Returns at once. Each slot is a stream to the server, which hands every chunk of questions that
     comes to `executor.submit`; a slot for each of the executor's workers keeps all of them busy.

@@ -67,7 +67,7 @@ class SpecOptions(TypedDict, total=False):
         Optional[int],
         "closest points spent on reaching a flat, where there is no intersect_flat; default 1",
     ]
-    ask_ahead: Annotated[
+    speculative: Annotated[
         Optional[bool],
         "refine a guess of the manifold first: fewer round trips, more processor time; default: on "
         "where the server is on another machine",

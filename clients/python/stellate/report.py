@@ -174,7 +174,7 @@ class Certificate:
     declared_reach: float  # 0: none
     reach_refuted: bool  # points of the manifold contradict it; the verdict names them
     proved_distance: float  # PROVED: bounds the Hausdorff distance to the components it meets
-    answers_held: int = 0  # answers of the whole run, beside vertices, held against the mesh
+    answers_checked: int = 0  # answers of the whole run, besides vertices, compared with the mesh
     violations: Violations = Violations()
     # Of manifolds with boundary:
     boundary_simplices: int = 0  # of dimension k - 1

@@ -31,8 +31,8 @@ impl MeshOptions {
     pub(crate) fn spec(&self, checked: &Checked, epsilon: f64, far: bool) -> MeshSpec {
         let d = checked.d;
         let mut criteria = self.criteria;
-        if far && criteria.ask_ahead.is_none() {
-            criteria.ask_ahead = Some(true); // round trips are what a far server costs
+        if far && criteria.speculative.is_none() {
+            criteria.speculative = Some(true); // round trips are what a far server costs
         }
         MeshSpec {
             dimension: checked.k as u32,

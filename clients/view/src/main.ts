@@ -7,7 +7,7 @@ import { axesFrame, Tour, type Colour, type Look, type Part } from "./look";
 import type { FaultKind, FromWorker, MeshRow, Told, ToWorker } from "./messages";
 import {
   badgeOf,
-  drawCrew,
+  drawWorkers,
   drawList,
   drawVerdict,
   drawWalls,
@@ -318,9 +318,9 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
     curves.show(rows);
     time.hear(rows.at(-1)?.revision ?? 0);
   },
-  crew: ({ rows }) => {
-    at("crew-box").hidden = rows.length === 0 && (mesh?.over ?? true);
-    drawCrew(at("crew"), rows);
+  workers: ({ rows }) => {
+    at("workers-box").hidden = rows.length === 0 && (mesh?.over ?? true);
+    drawWorkers(at("workers"), rows);
   },
   verdict: ({ verdict }) => drawVerdict(at("verdict"), verdict, fly, flyTo),
   histograms: (message) => histograms.show(message.histograms),

@@ -35,14 +35,14 @@ export interface PastRow {
   front: number;
 }
 
-export interface CrewRow {
+export interface WorkerRow {
   number: number;
   title: string;
   queries: number;
   chunks: number;
   perSecond: number; // 0: unknown
   newestChunk: number;
-  holds: number;
+  unanswered: number;
   lagging: boolean;
 }
 
@@ -112,7 +112,7 @@ export type Said =
   | { type: "list"; meshes: MeshRow[] }
   | { type: "mesh"; mesh: MeshRow }
   | { type: "past"; rows: PastRow[] }
-  | { type: "crew"; rows: CrewRow[] }
+  | { type: "workers"; rows: WorkerRow[] }
   | { type: "verdict"; verdict: Verdict | null }
   | { type: "histograms"; histograms: Histogram[]; revision: number }
   | {

@@ -1,6 +1,6 @@
 // The lists beside the mesh. All text goes in as text: labels and titles are strangers'.
 import { wallColour } from "./look";
-import type { Claim, CrewRow, FaultKind, MeshRow, Verdict } from "./messages";
+import type { Claim, WorkerRow, FaultKind, MeshRow, Verdict } from "./messages";
 
 export function element<T extends keyof HTMLElementTagNameMap>(
   tag: T,
@@ -105,11 +105,11 @@ export function drawList(
 export const superscript = (n: number) =>
   `${n}`.replace(/\d/g, (digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(digit)]);
 
-export function drawCrew(host: HTMLElement, rows: CrewRow[]) {
+export function drawWorkers(host: HTMLElement, rows: WorkerRow[]) {
   if (!isNews(host, rows)) return;
   const table = element("table");
   const head = table.createTHead().insertRow();
-  for (const title of ["answered", "per second", "chunk", "holds"]) {
+  for (const title of ["answered", "per second", "chunk", "unanswered"]) {
     head.append(element("th", "", title));
   }
   const body = table.createTBody();
@@ -124,7 +124,7 @@ export function drawCrew(host: HTMLElement, rows: CrewRow[]) {
       grouped(row.queries),
       row.perSecond > 0 ? grouped(row.perSecond) : "–",
       grouped(row.newestChunk),
-      row.lagging ? "lags" : grouped(row.holds),
+      row.lagging ? "lags" : grouped(row.unanswered),
     ]) {
       line.insertCell().textContent = value;
     }

@@ -6,9 +6,9 @@ import {
   Phase,
   type Certificate,
   type Mesh,
-  type WorkerStatus,
+  type WorkerStats,
 } from "./generated/stellate/v1/mesh_pb";
-import type { Claim, CrewRow, FaultKind, MeshRow, PastRow, Verdict } from "./messages";
+import type { Claim, WorkerRow, FaultKind, MeshRow, PastRow, Verdict } from "./messages";
 
 const kOver = new Set([
   MeshState.SUCCEEDED,
@@ -59,21 +59,21 @@ export function pastOf(mesh: Mesh): PastRow[] {
 }
 
 // At chunks like its newest; 0: not known.
-function speedOf({ fixedSeconds, eachSeconds, newestChunk }: WorkerStatus): number {
+function speedOf({ fixedSeconds, eachSeconds, newestChunk }: WorkerStats): number {
   const n = Number(newestChunk);
   const seconds = fixedSeconds + n * eachSeconds;
   return seconds > 0 ? n / seconds : 0;
 }
 
-export function crewOf(mesh: Mesh): CrewRow[] {
-  return mesh.crew.map((worker) => ({
+export function workersOf(mesh: Mesh): WorkerRow[] {
+  return mesh.workerStats.map((worker) => ({
     number: Number(worker.number),
     title: worker.title,
     queries: Number(worker.queries),
     chunks: Number(worker.chunks),
     perSecond: speedOf(worker),
     newestChunk: Number(worker.newestChunk),
-    holds: Number(worker.holds),
+    unanswered: Number(worker.unanswered),
     lagging: worker.lagging,
   }));
 }

@@ -19,7 +19,7 @@ import { report, send as say, sleep } from "./say";
 import { bareOf, extent, project, shapeOf } from "./shape";
 import type { Source } from "./source";
 import { MeshStore } from "./store";
-import { crewOf, faultsOf, isOver, pastOf, rowOf, verdictOf } from "./verdict";
+import { workersOf, faultsOf, isOver, pastOf, rowOf, verdictOf } from "./verdict";
 
 const kLookSeconds = 1;
 const kDrawSeconds = 0.1; // ten frames a second while it grows
@@ -72,13 +72,13 @@ export class Viewing {
     return this.shown ?? (this.wanted === null ? this.store : null);
   }
 
-  // State, crew and history, again and again until it is over.
+  // State, workers and history, again and again until it is over.
   private async inquire() {
     let wasOver = false;
     while (!this.stop.signal.aborted) {
       const request = create(GetMeshRequestSchema, {
         name: this.name,
-        crew: true,
+        workerStats: true,
         pastProgressAfter: BigInt(this.past.at(-1)?.revision ?? 0),
       });
       const end = await this.source.call(
@@ -108,7 +108,7 @@ export class Viewing {
       this.past.push(...pastOf(mesh));
       this.send({ type: "past", rows: this.past });
     }
-    this.send({ type: "crew", rows: crewOf(mesh) });
+    this.send({ type: "workers", rows: workersOf(mesh) });
   }
 
   // The newest, as it comes; a connection that breaks off is opened again, from where it was.

@@ -41,7 +41,7 @@ let asked = 0; // as of ToWorker
 
 function view(name: string) {
   viewing?.leave();
-  send({ type: "crew", rows: [] });
+  send({ type: "workers", rows: [] });
   send({ type: "past", rows: [] });
   send({ type: "verdict", verdict: null });
   viewing = new Viewing(source, name, () => asked);

@@ -85,7 +85,7 @@ TEST(ReportJson, IsThatOfAllClients) {
       R"("min_angle_degrees": 0, "max_tangent_angle_degrees": 0, "max_barycentre_distance": 0, )"
       R"("estimated_reach": null, "epsilon_over_reach": 0, "components": 1, )"
       R"("euler_characteristic": -8, "orientable": false, "level": "UNKNOWN", )"
-      R"("declared_reach": 0, "reach_refuted": false, "proved_distance": 0, "answers_held": 0, )"
+      R"("declared_reach": 0, "reach_refuted": false, "proved_distance": 0, "answers_checked": 0, )"
       R"("violations": {"faces": [[1, 2], [1, 5]], "links": [], "stars": [7], )"
       R"("inconsistent": [], "fibres": [0, 3]}, "boundary_simplices": 0, )"
       R"("boundary_components": 0, "boundary_euler_characteristic": 0, "faces": [], )"

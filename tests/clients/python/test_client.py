@@ -157,5 +157,5 @@ def test_far_servers_are_asked_ahead(monkeypatch, address, asked, wanted):
         return mesh_pb2.Mesh(name="meshes/x")
 
     monkeypatch.setattr(stellate.Client, "_call", create)
-    stellate.Client(address).create(CIRCLE, 0.1, ask_ahead=asked)
-    assert specs[0].criteria.ask_ahead is wanted
+    stellate.Client(address).create(CIRCLE, 0.1, speculative=asked)
+    assert specs[0].criteria.speculative is wanted

@@ -40,7 +40,7 @@ def fields(message):
         (stellate.report.Failure, mesh_pb2.Failure, set()),
         (stellate.Report, mesh_pb2.Report, set()),
         # The last two come only where they are asked for, as the viewer does.
-        (stellate.client.MeshInfo, mesh_pb2.Mesh, {"spec", "crew", "past_progress"}),
+        (stellate.client.MeshInfo, mesh_pb2.Mesh, {"spec", "worker_stats", "past_progress"}),
     ],
 )
 def test_every_field_of_the_protocol_is_there(ours, message, elsewhere):

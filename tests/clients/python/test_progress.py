@@ -128,7 +128,7 @@ AS_JSON = (
     '"min_angle_degrees": 0, "max_tangent_angle_degrees": 0, "max_barycentre_distance": 0, '
     '"estimated_reach": null, "epsilon_over_reach": 0, "components": 1, '
     '"euler_characteristic": -8, "orientable": false, "level": "UNKNOWN", '
-    '"declared_reach": 0, "reach_refuted": false, "proved_distance": 0, "answers_held": 0, '
+    '"declared_reach": 0, "reach_refuted": false, "proved_distance": 0, "answers_checked": 0, '
     '"violations": {"faces": [[1, 2], [1, 5]], "links": [], "stars": [7], "inconsistent": [], '
     '"fibres": [0, 3]}, "boundary_simplices": 0, "boundary_components": 0, '
     '"boundary_euler_characteristic": 0, "faces": [], "sharpest": null, '

@@ -52,11 +52,11 @@ def shell(tmp_path, repository):
 def test_mesh_writes_what_was_asked_for(shell, tmp_path):
     done = shell(
         "mesh", "shapes:torus", "-e", "0.3", "-o", "a.txt", "-o", "a.stl", "--report", "a.json",
-        "--max-rounds", "1000", "--no-ask-ahead", "--seed", "1",
+        "--max-rounds", "1000", "--no-speculative", "--seed", "1",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "CERTIFIED" in done.stdout and "vertices" in done.stderr
-    same = stellate.mesh(manifolds.Torus(), 0.3, ask_ahead=False)
+    same = stellate.mesh(manifolds.Torus(), 0.3, speculative=False)
     assert stellate.load_txt(tmp_path / "a.txt").points.tobytes() == same.points.tobytes()
     assert (tmp_path / "a.stl").stat().st_size == 84 + 50 * len(same.simplices)
     assert json.loads((tmp_path / "a.json").read_text())["certificate"]

@@ -32,7 +32,7 @@ def test_what_nobody_says_is_left_to_the_server(client):
     assert declared(client) == created(client)
 
 
-@pytest.mark.parametrize("name", ["ask_ahead", "common_centre"])
+@pytest.mark.parametrize("name", ["speculative", "common_centre"])
 @pytest.mark.parametrize("wanted", [True, False])
 def test_what_is_said_is_declared(client, name, wanted):
     flag = ("--" if wanted else "--no-") + name.replace("_", "-")

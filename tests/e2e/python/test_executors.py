@@ -106,8 +106,8 @@ def test_tangents_go_along(client, declare, undisturbed):
 
 def test_an_executor_made_anew_survives_a_dead_process(client, declare, tmp_path, caplog):
     name = declare(Torus(tmp_path))
-    crew = stellate.executors.workers_on(processes, Torus(tmp_path, "die"), name, 2, server=client)
-    assert crew.wait() == ["SUCCEEDED"] * 2
+    workers = stellate.executors.workers_on(processes, Torus(tmp_path, "die"), name, 2, server=client)
+    assert workers.wait() == ["SUCCEEDED"] * 2
     assert (tmp_path / "died").exists() and "making another" in caplog.text
     plain = stellate.mesh(Torus(tmp_path), EPSILON, server=client)
     assert same(stellate.download(name, server=client), plain)
@@ -116,9 +116,9 @@ def test_an_executor_made_anew_survives_a_dead_process(client, declare, tmp_path
 def test_a_broken_pool_is_no_failure_of_the_oracle(client, declare, tmp_path):
     name = declare(Torus(tmp_path))
     with processes() as pool:
-        crew = stellate.executors.workers_on(pool, Torus(tmp_path, "die"), name, 2, server=client)
+        workers = stellate.executors.workers_on(pool, Torus(tmp_path, "die"), name, 2, server=client)
         with pytest.raises(stellate.ExecutorError, match="new executor") as broken:
-            crew.wait()
+            workers.wait()
     assert isinstance(broken.value.__cause__, futures.BrokenExecutor)
     assert not client.get(name).over
     with processes() as pool:  # as the message says
@@ -128,20 +128,20 @@ def test_a_broken_pool_is_no_failure_of_the_oracle(client, declare, tmp_path):
 
 def test_a_chunk_that_always_kills_is_given_up(client, declare, tmp_path):
     name = declare(Torus(tmp_path))
-    crew = stellate.executors.workers_on(
+    workers = stellate.executors.workers_on(
         processes, Torus(tmp_path, "always die"), name, 1, server=client
     )
     with pytest.raises(stellate.ExecutorError, match="3 times"):
-        crew.wait()
+        workers.wait()
     assert not client.get(name).over
 
 
 def test_what_the_oracle_raises_is_told_as_its_own(client, declare, tmp_path):
     name = declare(Torus(tmp_path))
     with processes(1) as pool:
-        crew = stellate.executors.workers_on(pool, Torus(tmp_path, "raise"), name, 2, server=client)
+        workers = stellate.executors.workers_on(pool, Torus(tmp_path, "raise"), name, 2, server=client)
         with pytest.raises(stellate.OracleError, match="the solver has no licence") as raised:
-            crew.wait()
+            workers.wait()
     assert "in closest_point" in str(raised.value.__cause__)  # the other process's traceback
     with pytest.raises(stellate.OracleError, match="the solver has no licence"):
         stellate.download(name, server=client)
@@ -150,11 +150,11 @@ def test_what_the_oracle_raises_is_told_as_its_own(client, declare, tmp_path):
 def test_an_oracles_errors_are_not_taken_for_the_executors(client, declare, tmp_path):
     name = declare(Torus(tmp_path))
     with futures.ThreadPoolExecutor(1) as pool:
-        crew = stellate.executors.workers_on(
+        workers = stellate.executors.workers_on(
             pool, Torus(tmp_path, "interrupted"), name, 1, server=client
         )
         with pytest.raises(futures.CancelledError):
-            crew.wait()
+            workers.wait()
     assert client.get(name).state == "FAILED"
 
 
@@ -175,11 +175,11 @@ def test_leaving_takes_the_workers_away_and_the_mesh_stays(client, declare, tmp_
     pool = processes(1)
     with stellate.executors.workers_on(
         pool, Torus(tmp_path, "hang"), name, 2, server=client
-    ) as crew:
+    ) as workers:
         while not (tmp_path / "hanging").exists():
             with pytest.raises(TimeoutError):
-                crew.wait(timeout=0.05)
-    assert crew.wait() == ["", ""]  # left, without an error
+                workers.wait(timeout=0.05)
+    assert workers.wait() == ["", ""]  # left, without an error
     assert not client.get(name).over
     for process in list(pool._processes.values()):
         process.kill()
@@ -214,8 +214,8 @@ def test_slots_are_a_whole_number(client, slots):
 
 def test_a_mesh_that_is_not_there(client):
     with futures.ThreadPoolExecutor(1) as pool:
-        crew = stellate.executors.workers_on(
+        workers = stellate.executors.workers_on(
             pool, manifolds.Torus(), "meshes/" + "0" * 32, 2, server=client
         )
         with pytest.raises(stellate.MeshNotFound):
-            crew.wait()
+            workers.wait()

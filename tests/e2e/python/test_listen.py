@@ -53,10 +53,10 @@ def test_tokens_are_asked_for(tmp_path):
         alice = stellate.Credentials(token="alice-0123456789abcdef")
         with stellate.Client(server, alice) as client, futures.ThreadPoolExecutor(1) as pool:
             name = client.create(manifolds.Torus(), 0.3).name
-            crew = stellate.executors.workers_on(
+            workers = stellate.executors.workers_on(
                 pool, manifolds.Torus(), name, 2, server=server, credentials=alice
             )
-            assert crew.wait() == ["SUCCEEDED", "SUCCEEDED"]
+            assert workers.wait() == ["SUCCEEDED", "SUCCEEDED"]
 
 
 def test_what_the_server_says_of_bad_files_is_passed_on(tmp_path):

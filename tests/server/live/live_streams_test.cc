@@ -88,10 +88,10 @@ TEST_F(LiveStreamsTest, TheMeshGrowsBeforeItsWatcherAndIsCertified) {
 TEST_F(LiveStreamsTest, AMeshTellsOfItsPastAndItsCrewWhenAsked) {
   Start();
   const std::string name = CreateSphere(0.1);
-  const auto look = [&](bool crew, std::optional<std::uint64_t> after) {
+  const auto look = [&](bool workers, std::optional<std::uint64_t> after) {
     v1::GetMeshRequest request;
     request.set_name(name);
-    request.set_crew(crew);
+    request.set_worker_stats(workers);
     if (after) request.set_past_progress_after(*after);
     grpc::ClientContext context;
     v1::Mesh mesh;
@@ -101,15 +101,15 @@ TEST_F(LiveStreamsTest, AMeshTellsOfItsPastAndItsCrewWhenAsked) {
   {
     RawWorker silent(stub_.get(), name, [](const auto&) { return std::nullopt; });
     v1::Mesh mesh;
-    while ((mesh = look(true, {})).crew_size() == 0) std::this_thread::yield();
-    EXPECT_EQ(mesh.crew(0).title().substr(0, 8), "test at ");
-    EXPECT_EQ(mesh.crew(0).queries(), 0u);
+    while ((mesh = look(true, {})).worker_stats_size() == 0) std::this_thread::yield();
+    EXPECT_EQ(mesh.worker_stats(0).display_name().substr(0, 8), "test at ");
+    EXPECT_EQ(mesh.worker_stats(0).queries(), 0u);
   }
   Copy copy;
   RawWorker worker(stub_.get(), name);
   const v1::Mesh final = Follow(name, &copy);
   EXPECT_EQ(look(false, {}).past_progress_size(), 0);
-  EXPECT_EQ(look(true, {}).crew_size(), 0) << "nobody serves it any more";
+  EXPECT_EQ(look(true, {}).worker_stats_size(), 0) << "nobody serves it any more";
   const v1::Mesh whole = look(false, 0);
   ASSERT_EQ(static_cast<std::uint64_t>(whole.past_progress_size()), final.revision());
   std::uint64_t broken = 0;

@@ -264,8 +264,8 @@ TEST(Session, TheTimeLeftIsToldOnlyWhereItIsKnown) {
 // The real mesher, and workers that answer for the sphere.
 std::vector<double> MeshSphere(int workers, std::vector<std::uint32_t>* simplices) {
   Running running;
-  std::vector<std::shared_ptr<FakeWorker>> crew;
-  for (int i = 0; i < workers; ++i) crew.push_back(FakeWorker::Join(&running.session->pool()));
+  std::vector<std::shared_ptr<FakeWorker>> joined;
+  for (int i = 0; i < workers; ++i) joined.push_back(FakeWorker::Join(&running.session->pool()));
   const SessionView view = running.Finish();
   EXPECT_EQ(view.state, SessionState::kSucceeded);
   EXPECT_TRUE(view.report->certificate.certified) << view.report->certificate.verdict;

@@ -81,7 +81,7 @@ struct MeshOptions {
   std::optional<std::uint32_t> flat_alternations;
   // A handful of round trips for one and a half to three times the processor time; on unless the
   // server is on this machine.
-  std::optional<bool> ask_ahead;
+  std::optional<bool> speculative;
   // R_p at most this share of the local size, (0, 1]: the oracle's if it has one, else estimated.
   std::optional<double> size_rate;
   std::optional<double> max_deviation;  // circumcentres at most so far from M, a length

@@ -121,8 +121,8 @@ struct Certificate {
   bool reach_refuted = false;  // points of the manifold contradict it; the verdict names them
   double proved_distance = 0;  // kProved: a bound of the Hausdorff distance to these components
 
-  std::uint64_t answers_held =
-      0;  // answers of the whole run, beside vertices, held against the mesh
+  // Answers of the whole run, besides vertices, that were compared with the mesh.
+  std::uint64_t answers_checked = 0;
   Violations violations;
 
   // Of manifolds with boundary:

@@ -68,7 +68,7 @@ module Stellate
 
     # What `create` asks for: a V1::MeshSpec.
     def spec(oracle, epsilon, options)
-      options[:ask_ahead] = true unless options.key?(:ask_ahead) || Credentials.stays_on_this_machine?(address)
+      options[:speculative] = true unless options.key?(:speculative) || Credentials.stays_on_this_machine?(address)
       Spec.from(CheckedOracle.new(oracle), epsilon, options)
     end
 

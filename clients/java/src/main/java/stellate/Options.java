@@ -61,8 +61,8 @@ public final class Options {
             .setOracle(checked.capabilities())
             .setWalls(checked.walls);
     Criteria.Builder rules = criteria.clone();
-    if (far && !rules.hasAskAhead()) {
-      rules.setAskAhead(true); // round trips are what a far server costs
+    if (far && !rules.hasSpeculative()) {
+      rules.setSpeculative(true); // round trips are what a far server costs
     }
     double[][] box = checked.oracle.boundingBox();
     if (box != null) {

@@ -1,14 +1,14 @@
-#include "server/oracles/crew.h"
+#include "server/oracles/worker_stats.h"
 
 #include "server/oracles/dispatch.h"
 #include "server/oracles/oracle_pool.h"
 
 namespace stellate::server {
 
-std::vector<CrewMember> Dispatch::Crew() const {
-  std::vector<CrewMember> crew;
+std::vector<WorkerStats> Dispatch::ListWorkers() const {
+  std::vector<WorkerStats> workers;
   for (const auto& [id, worker] : workers_) {
-    CrewMember& member = crew.emplace_back();
+    WorkerStats& member = workers.emplace_back();
     member.id = id;
     member.queries = worker.answered_queries;
     member.chunks = worker.answered_chunks;
@@ -17,19 +17,19 @@ std::vector<CrewMember> Dispatch::Crew() const {
       member.each_seconds = worker.pace.each();
     }
     for (const Lease& lease : worker.leases) {
-      member.holds += static_cast<std::uint64_t>(lease.count);
+      member.unanswered += static_cast<std::uint64_t>(lease.count);
     }
-    member.newest = worker.newest_chunk;
+    member.newest_chunk = worker.newest_chunk;
     member.lagging = worker.Lagging();
   }
-  return crew;
+  return workers;
 }
 
-std::vector<CrewMember> OraclePool::Crew() const {
+std::vector<WorkerStats> OraclePool::ListWorkers() const {
   const std::lock_guard lock(mutex_);
-  std::vector<CrewMember> crew = dispatch_.Crew();
-  for (CrewMember& member : crew) member.title = titles_.at(member.id);
-  return crew;
+  std::vector<WorkerStats> workers = dispatch_.ListWorkers();
+  for (WorkerStats& member : workers) member.display_name = titles_.at(member.id);
+  return workers;
 }
 
 }  // namespace stellate::server
