@@ -73,7 +73,7 @@ tl::expected<Identity, grpc::Status> Authenticator::Identify(
   }
   if (!by_certificate_) return Identity{};
   std::string owner = OwnerIn(*context.auth_context());
-  if (owner.empty()) return Unauthenticated("the client certificate names nobody");
+  if (owner.empty()) return Unauthenticated("the client certificate names no owner");
   return Identity{std::move(owner), std::nullopt, false};
 }
 

@@ -14,15 +14,15 @@
 
 namespace stellate::server {
 
-// Who calls. Meshes belong to owners; an owner sees his own alone.
+// The caller of an rpc. Meshes belong to owners; an owner sees only their own.
 struct Identity {
-  std::string owner;  // empty: the server tells nobody apart
+  std::string owner;  // empty: clients are not authenticated
   std::optional<TokenDigest> token;
-  bool administrator = false;  // sees and ends anybody's
+  bool administrator = false;  // sees and ends the meshes of all owners
 };
 
-// Tells callers apart: by bearer token if there is a token file, else by the client certificate if
-// those are asked for, else not at all. Any thread; never waits.
+// Authenticates callers: by bearer token if there is a token file, else by the client certificate
+// if those are asked for, else not at all. Any thread; never waits.
 class Authenticator {
  public:
   static core::Expected<std::unique_ptr<Authenticator>> Create(const Config& config);

@@ -14,10 +14,10 @@ namespace stellate::server {
 
 using TokenDigest = std::array<unsigned char, 32>;  // SHA-256
 
-// Who shows a token.
+// The holder of a token.
 struct TokenHolder {
   std::string owner;
-  bool administrator = false;  // may see and end anybody's mesh
+  bool administrator = false;  // may see and end the meshes of all owners
   bool operator==(const TokenHolder&) const = default;
 };
 
@@ -44,7 +44,7 @@ class TokenTable {
 
 TokenDigest Digest(std::string_view token);
 
-// A token file, read anew when it changes. Any thread.
+// A token file, read again when it changes. Any thread.
 class TokenFile {
  public:
   static core::Expected<std::unique_ptr<TokenFile>> Open(const std::string& path);

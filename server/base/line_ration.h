@@ -10,8 +10,9 @@
 
 namespace stellate::server {
 
-// How many lines each of several parties may write: `burst` at once, and `per_second` on and on.
-// A party that is silent long enough to have its whole burst again costs nothing. Any thread.
+// Limits how many lines each of several parties may write: `burst` immediately, and `per_second` in
+// the long run. A party that was silent until its whole burst is available again costs no memory.
+// Any thread.
 class LineRation {
  public:
   using Time = std::chrono::steady_clock::time_point;

@@ -24,7 +24,7 @@ struct Config {
   std::string metrics_listen;            // host:port for Prometheus; empty: none
 
   // Of the server.
-  std::uint64_t max_meshes = 64;        // running at once
+  std::uint64_t max_meshes = 64;        // running at a time
   std::uint64_t max_memory_bytes = 0;   // of all meshes, estimated; 0: WithDefaults says
   std::uint64_t max_journal_bytes = 0;  // 0: what the disk holds
   std::uint64_t max_message_bytes = std::uint64_t{4} << 20;
@@ -32,8 +32,8 @@ struct Config {
   std::uint64_t max_connections = 2048;                      // over TCP
   std::uint64_t max_connection_streams = 1024;
 
-  // Of each owner, where the server tells owners apart.
-  std::uint64_t owner_meshes = 32;  // running at once; 0: as many as the server
+  // Of each owner, where clients are authenticated.
+  std::uint64_t owner_meshes = 32;  // running at a time; 0: as many as the server
   std::uint64_t keep_finished_meshes = 32;
   std::uint64_t owner_memory_bytes = 0;   // 0: WithDefaults says
   std::uint64_t owner_journal_bytes = 0;  // 0: half of what the record may have
@@ -80,7 +80,7 @@ double MaxWaitSeconds(const Config& config);
 
 // Arrays travel in chunks of about this size.
 std::size_t ChunkBytes(const Config& config);
-// Of a mesh that is sent to whoever may read it slowly, or not at all: a part.
+// Largest part of a mesh that is sent to a client, which may read it slowly or not at all.
 std::size_t PartBytes(const Config& config);
 
 }  // namespace stellate::server

@@ -18,7 +18,7 @@ constexpr double kMebibyte = 1024.0 * 1024.0;
 
 constexpr char kSafety[] = "Safety";
 constexpr char kServerLimits[] = "Limits of the server";
-constexpr char kOwnerLimits[] = "Limits of each owner, where clients are told apart";
+constexpr char kOwnerLimits[] = "Limits of each owner, where clients are authenticated";
 constexpr char kMeshLimits[] = "Limits of each mesh";
 constexpr char kWorkers[] = "Workers";
 constexpr char kTimes[] = "Times, in seconds";
@@ -93,7 +93,7 @@ const std::vector<Setting>& Settings() {
        "File of lines \"OWNER TOKEN\": clients must send one of these tokens, and see their "
        "owner's meshes alone. Read again when it changes, or after SIGHUP"},
 
-      {kServerLimits, "--max-meshes", &Config::max_meshes, "Meshes running at once", 1, 100'000},
+      {kServerLimits, "--max-meshes", &Config::max_meshes, "Meshes running at a time", 1, 100'000},
       {kServerLimits, "--max-memory-bytes", &Config::max_memory_bytes,
        "Estimated memory of all meshes; 0: three quarters of what the machine or container has", 0,
        kBytes},
@@ -106,16 +106,17 @@ const std::vector<Setting>& Settings() {
        "beyond it those are closed that hold most for longest",
        16 * kMebibyte, kBytes},
       {kServerLimits, "--max-connections", &Config::max_connections,
-       "Connections open at once; further ones are closed", 1, 1'000'000},
+       "Connections open at a time; further ones are closed", 1, 1'000'000},
       {kServerLimits, "--max-connection-streams", &Config::max_connection_streams,
-       "Calls open at once on one connection; more wait in the client. A TCP connection with 256 "
+       "Calls open at a time on one connection; more wait in the client. A TCP connection with 256 "
        "more that are open, or reset and not done with, is closed",
        4, 1'000'000},
 
       {kOwnerLimits, "--owner-meshes", &Config::owner_meshes,
-       "Meshes running at once; 0: as many as the server allows", 0, 100'000},
+       "Meshes running at a time; 0: as many as the server allows", 0, 100'000},
       {kOwnerLimits, "--keep-finished-meshes", &Config::keep_finished_meshes,
-       "Finished meshes that can be read, of all clients together where they are not told apart. "
+       "Finished meshes that can be read, of all clients together where they are not "
+       "authenticated. "
        "What is beyond is forgotten, first what has no vertex, nothing else within a minute of its "
        "end",
        0, 1'000'000},
@@ -135,11 +136,11 @@ const std::vector<Setting>& Settings() {
        core::kMaxAmbientDimension},
       {kMeshLimits, "--max-rounds", &Config::max_rounds, "Rounds", 1,
        static_cast<double>(std::uint64_t{1} << 40)},
-      {kMeshLimits, "--max-workers", &Config::max_workers, "Workers at once", 1, 100'000},
-      {kMeshLimits, "--max-watchers", &Config::max_watchers, "Watchers at once", 1, 100'000},
+      {kMeshLimits, "--max-workers", &Config::max_workers, "Workers at a time", 1, 100'000},
+      {kMeshLimits, "--max-watchers", &Config::max_watchers, "Watchers at a time", 1, 100'000},
 
       {kWorkers, "--max-in-flight", &Config::max_in_flight,
-       "Chunks of queries that one worker holds at once", 1, 64},
+       "Chunks of queries that one worker holds at a time", 1, 64},
       {kWorkers, "--check-share", &Config::check_share,
        "Share of the queries that is asked of two workers, where there are several, to compare "
        "the answers; 0: none",

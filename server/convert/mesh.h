@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "core/report.h"
-#include "server/history/watch_log.h"
+#include "server/history/mesh_history.h"
 #include "server/session/session.h"
 #include "stellate/v1/mesh.pb.h"
 #include "stellate/v1/stellate.pb.h"

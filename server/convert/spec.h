@@ -13,7 +13,7 @@ namespace stellate::server {
 // in MeshSpec. What it lets through core::Validate accepts too.
 Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config);
 
-// Seeds are left out: there may be many, and whoever needs them sent them.
+// Without the seeds: there may be many, and the client that needs them sent them.
 void ToProto(const core::Specification& spec, v1::MeshSpec* out);
 
 }  // namespace stellate::server

@@ -7,10 +7,10 @@ namespace stellate::server {
 
 // An end for HTTP/2 header blocks. gRPC before 1.53.2 (1.54.3, 1.55.2, 1.56.2) takes blocks of any
 // length, keeps a string in them until it is whole, and copies all of it again with each frame: two
-// clients at 3 Mbit/s each stop a server for everybody (CVE-2023-33953). No call is open meanwhile,
-// so nothing that counts calls sees it. In such a gRPC, where it is a shared library, this replaces
-// three functions of its header parser by ones of the same name, which the program's own come
-// before; they count, and call gRPC's. Delete it when no such gRPC is supported any more.
+// clients at 3 Mbit/s each stop a server for all clients (CVE-2023-33953). No call is open
+// meanwhile, so nothing that counts calls sees it. In such a gRPC, where it is a shared library,
+// this replaces three functions of its header parser by ones of the same name, which the program's
+// own come before; they count, and call gRPC's. Delete it when no such gRPC is supported any more.
 //
 // Of clients, in every server of this process: a header block has at most kMostHeaderBytes on the
 // wire in kMostHeaderFrames frames, and its headers at most kMostMetadataBytes, also before the

@@ -27,7 +27,7 @@ struct UnreadOfAll {
 enum class CallKind {
   kAnybodys,  // to be read, as no tokens are asked for
   kOwners,    // to be read, with a token that is known
-  kSmall,     // of a service that is open to everybody: beyond kSmallBytes, closes the connection
+  kSmall,     // of a service that is open to all clients: beyond kSmallBytes, closes the connection
   // The call is refused whatever it says: what is beyond kSparedBytes is let go of as it comes. It
   // closes the connection beyond kLetGoBytes, or when strangers have a quarter of what they may
   // hold: gRPC reads ever larger pieces, up to 4 MB, from a connection that it can read fast.
@@ -46,7 +46,7 @@ struct UnreadRules {
 struct Unread {
   UnreadOfAll& all;
   // Of the connection's calls that wait for their first message, kCallBytes each, and of messages
-  // that are not whole or that nobody has asked for.
+  // that are incomplete or that no reader has asked for.
   std::atomic<std::int64_t> bytes{0};
   std::atomic<std::uint64_t> whole{0};  // messages that were taken, ever
 };

@@ -7,8 +7,8 @@
 
 namespace stellate::server {
 
-// A lock that each gets in its turn: handed over in the order in which it was asked for, but first
-// to those in a hurry. Whoever gives it up and asks again, over and over, holds up nobody.
+// A mutex that threads get in the order in which they asked for it, those in a hurry first. A
+// thread that unlocks and locks it again in a loop does not starve the others.
 class FairMutex {
  public:
   enum class Place { kLast, kFirst };  // in the queue; kFirst: behind others in a hurry

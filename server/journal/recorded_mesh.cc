@@ -70,7 +70,7 @@ std::optional<MeshFailure> RecordedMesh::RefuseShare(std::uint64_t bytes) const 
                      Message("the records of your meshes have ", owned, " bytes, and ", bytes,
                              " more are beyond the ", owner_limit_,
                              " that the server allows each owner: delete meshes that are no longer "
-                             "needed, then mesh anew")};
+                             "needed, then mesh again")};
 }
 
 void RecordedMesh::Recount(const JournalFile& file) {
@@ -149,7 +149,7 @@ SessionJournal::Known RecordedMesh::ReadRound(const core::QueryBatch& batch) {
       known.failure = MeshFailure{FailureReason::kReplayMismatch,
                                   Message("in round ", batch.round,
                                           " this server asks other questions than the server that "
-                                          "recorded the answers: mesh anew")};
+                                          "recorded the answers: mesh again")};
       return true;
     }
     core::Answers answers = EmptyAnswers(dimension_, batch, walls_);
@@ -282,7 +282,7 @@ std::optional<MeshFailure> RecordedMesh::WriteEnd(const SessionEnd& end) {
 }
 
 std::optional<MeshFailure> RecordedMesh::WriteResult(const SessionResult& result,
-                                                     const WatchLog& history) {
+                                                     const MeshHistory& history) {
   if (id_ == 0) return std::nullopt;
   std::optional<MeshFailure> failure;
   // Of a server that was killed as it wrote.
@@ -328,7 +328,7 @@ std::optional<MeshFailure> RecordedMesh::WriteResult(const SessionResult& result
   return failure;
 }
 
-core::Expected<std::unique_ptr<WatchLog>> RecordedMesh::ReadHistory() {
+core::Expected<std::unique_ptr<MeshHistory>> RecordedMesh::ReadHistory() {
   std::string record;
   std::size_t used = 0;
   std::int64_t part = 0;
@@ -350,7 +350,7 @@ core::Expected<std::unique_ptr<WatchLog>> RecordedMesh::ReadHistory() {
     }
     return true;
   };
-  return WatchLog::Read(dimension_, ambient_dimension_, read);
+  return MeshHistory::Read(dimension_, ambient_dimension_, read);
 }
 
 void RecordedMesh::RemoveRounds() { journal_->RemoveLater(shared_from_this()); }

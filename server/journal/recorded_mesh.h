@@ -37,8 +37,8 @@ class RecordedMesh final : public SessionJournal,
                                         const Standing& standing) override;
   std::optional<MeshFailure> WriteEnd(const SessionEnd& end) override;
   std::optional<MeshFailure> WriteResult(const SessionResult& result,
-                                         const WatchLog& history) override;
-  core::Expected<std::unique_ptr<WatchLog>> ReadHistory() override;
+                                         const MeshHistory& history) override;
+  core::Expected<std::unique_ptr<MeshHistory>> ReadHistory() override;
   void Forget() override;
 
   bool HasAnswers() const override;
@@ -68,7 +68,7 @@ class RecordedMesh final : public SessionJournal,
   int dimension_ = 0, ambient_dimension_ = 0, walls_ = 0;
   std::atomic<bool> forgotten_{false};
 
-  // Whoever has the file to himself.
+  // Only for the thread that has locked the file.
   std::int64_t id_ = 0;               // 0: not recorded
   std::uint64_t counted_ = 0;         // of its bytes, for its owner
   bool has_history_ = false;          // some of it

@@ -40,7 +40,7 @@ MeshFailure SharedJournal::WhyNot(const char* what) {
   const bool full = database.IsFull();
   MeshFailure failure{full ? FailureReason::kJournalFull : FailureReason::kJournalFailed,
                       Message("the server cannot record ", what, ": ", database.error(),
-                              full ? "; free space by deleting meshes, then mesh anew" : "")};
+                              full ? "; free space by deleting meshes, then mesh again" : "")};
   file_->Abandon();
   return failure;
 }

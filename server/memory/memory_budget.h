@@ -47,9 +47,9 @@ class MemoryBudget {
     Account(const Account&) = delete;
     Account& operator=(const Account&) = delete;
 
-    // What it is estimated to hold now. kLimitExceeded, with the old value kept, if it grew
-    // and the budget does not allow it; one that shrinks is always allowed.
-    // First what nobody needs is given up, as MakeRoomBy says.
+    // Sets the estimate of its memory. kLimitExceeded, with the old value kept, if it grew and the
+    // budget does not allow it, even after releasing memory as MakeRoomBy says; a smaller value is
+    // always allowed.
     std::optional<Refused> Set(std::uint64_t bytes) {
       auto refused = TrySet(bytes);
       if (refused && budget_->make_room_ && budget_->make_room_()) refused = TrySet(bytes);
@@ -71,7 +71,8 @@ class MemoryBudget {
     std::uint64_t bytes_ = 0;  // the budget's lock guards it
   };
 
-  // Gives up memory that nobody needs; false: there was none. Any thread. Before the first Open.
+  // `make_room` releases memory that no client needs; false: there was none. Called on any thread.
+  // Set it before the first Open.
   void MakeRoomBy(std::function<bool()> make_room) { make_room_ = std::move(make_room); }
 
   // For a new mesh or call of `owner`, with nothing in it.

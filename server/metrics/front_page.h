@@ -6,7 +6,7 @@
 
 namespace stellate::server {
 
-// What the server is and does, for whoever opens its address in a browser: HTML, without a name of
+// An HTML page about the server, for a person who opens its address in a browser. It has no name of
 // a mesh, a worker or an owner.
 std::string FrontPage(const Counts& counts, bool is_serving);
 

@@ -100,7 +100,7 @@ class Metrics::Impl final : public SessionObserver {
     (report.certificate.certified ? certified : uncertified).Increment();
   }
 
-  void OnBackUps(std::size_t chunks) override { backups.Increment(static_cast<double>(chunks)); }
+  void OnHedged(std::size_t chunks) override { hedged.Increment(static_cast<double>(chunks)); }
   void OnCompared(std::size_t queries) override {
     compared.Increment(static_cast<double>(queries));
   }
@@ -115,8 +115,8 @@ class Metrics::Impl final : public SessionObserver {
   Counter& rounds = Count("stellate_rounds_total", "Rounds of refinement that were answered");
   Counter& answered_queries =
       Count("stellate_queries_total", "Oracle queries of the rounds that were answered");
-  Counter& backups =
-      Count("stellate_backups_total", "Chunks of stragglers given to an idle worker as well");
+  Counter& hedged =
+      Count("stellate_hedged_chunks_total", "Overdue chunks that an idle worker received as well");
   Counter& compared = Count("stellate_compared_queries_total",
                             "Queries that two workers answered and that were compared");
   Counter& disagreements = Count("stellate_disagreements_total",

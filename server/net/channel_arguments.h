@@ -6,7 +6,7 @@
 
 namespace stellate::server {
 
-// What gRPC is told of sizes, times and numbers: all that bounds a connection.
+// Sets gRPC's limits of a connection: sizes, times and numbers of calls.
 void SetChannelArguments(const Config& config, grpc::ServerBuilder* builder);
 
 }  // namespace stellate::server

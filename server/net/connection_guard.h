@@ -33,19 +33,19 @@ class ConnectionGuard {
     std::int64_t unread_bytes = 0;
     std::int64_t request_bytes = 0;                // the largest request
     std::chrono::duration<double> request_time{};  // for a connection's next request to be whole
-    // Connections at once that have not said hello: the handshake of TLS is not over, or HTTP/2 has
-    // not begun. Half a handshake takes 100 kB. gRPC itself ends them after --hello-seconds.
+    // Connections at a time that have not said hello: the handshake of TLS is not over, or HTTP/2
+    // has not begun. Half a handshake takes 100 kB. gRPC itself ends them after --hello-seconds.
     std::size_t hellos = 0;
     bool have_flags = true;  // who_allows.h
   };
 
-  // `port`: where the server listens. `judge`: unread.h. `closed` is told, on another thread, of
-  // each connection that is closed, and by which setting.
+  // `port`: where the server listens. `judge`: unread.h. `closed` is called, on another thread,
+  // for each connection that is closed, with the setting that closed it.
   ConnectionGuard(int port, const Limits& limits, CallJudge judge,
                   std::function<void(const char* setting)> closed);
   ~ConnectionGuard();
 
-  // Has to be told of every connection, before gRPC has it. One thread at a time.
+  // Call it for every connection, before gRPC has it. One thread at a time.
   void Watch(int fd);
 
   // Connections that were closed have left enough calls behind that others should wait, or as many
@@ -62,7 +62,7 @@ class ConnectionGuard {
   struct Connection {
     Clock::time_point came = {};
     int fd = -1;
-    ino_t number = 0;         // by which it is told from another that got the same descriptor
+    ino_t number = 0;         // distinguishes it from another that got the same descriptor
     std::string peer;         // as gRPC writes it
     ConnectionId id = 0;      // 0: not known yet
     std::uint64_t bytes = 0;  // received, and

@@ -34,7 +34,7 @@ void WarnOnceOfHeaders() {
     if (HeaderBlocksEnd()) return;
     Log(LogLevel::kWarning, {},
         Message("gRPC ", grpc::Version(), " takes headers without end (CVE-2023-33953), which ",
-                "stops the server for everybody: let strangers reach it through a proxy alone"));
+                "stops the server for all clients: let strangers reach it through a proxy alone"));
   });
 }
 

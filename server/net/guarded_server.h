@@ -18,7 +18,7 @@
 namespace stellate::server {
 
 // A gRPC server that strangers may reach: our own listener, TLS, and the bounds on what connections
-// hold. Whoever serves anything over gRPC serves it through this.
+// hold. Every gRPC service of this project uses it.
 class GuardedServer {
  public:
   struct Hooks {
@@ -40,8 +40,8 @@ class GuardedServer {
   const std::string& address() const { return address_; }
   grpc::Server& grpc() { return *server_; }
 
-  // Files of TLS that changed, or all of them; and what closed connections are told of. To be
-  // called about once a second.
+  // Reads changed files of TLS, and reports closed connections to the hooks. Call it about once a
+  // second.
   void Tick();
   void ReloadFiles() { tls_->Reload(/*force=*/true); }
   // Takes no further connection.

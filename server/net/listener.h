@@ -15,7 +15,7 @@
 
 namespace stellate::server {
 
-// Accepts TCP connections for gRPC, up to a number at once. gRPC's own listener (1.51)
+// Accepts TCP connections for gRPC, up to a number of open ones. gRPC's own listener (1.51)
 // stops for good when the process has once run out of files, which any stranger can bring about by
 // opening connections; this one closes what is too much, and goes on.
 class Listener {
@@ -34,8 +34,8 @@ class Listener {
   int port() const { return port_; }
   std::size_t max_connections() const { return max_connections_; }
 
-  // Accepts, on a thread of its own, all whose clients are still there. `refused` is told of each
-  // connection that was one too many.
+  // Accepts, on a thread of its own, all whose clients are still there. `refused` is called for
+  // each connection that was one too many.
   // While `later` says so, connections wait in the kernel.
   void Start(
       Taker take, std::function<void()> refused,
@@ -58,8 +58,8 @@ class Listener {
   Taker take_;
   std::function<void()> refused_;
   std::function<bool()> later_;
-  // What was handed over: a socket, and its number among all sockets there ever were, by which one
-  // that was closed is told from another that got the same descriptor.
+  // What was handed over: a socket, and its inode, which distinguishes a closed socket from another
+  // that got the same descriptor.
   std::vector<std::pair<int, ino_t>> open_;
   bool was_full_ = false;
   std::jthread thread_;

@@ -24,7 +24,7 @@ class TlsFiles {
 
   // TLS by the files as they stand and as they will, within seconds of a Reload; with
   // --tls-client-ca for clients that have a certificate of that authority alone. This must outlive
-  // whoever listens with them.
+  // the servers that listen with them.
   std::shared_ptr<grpc::ServerCredentials> Credentials() const;
 
   // Reads the files again if one is another than before, or in any case where `force`.

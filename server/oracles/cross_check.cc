@@ -51,8 +51,8 @@ double LargestSine(const double* a, const double* b, Index d, Index k) {
   return worst;
 }
 
-// Of the conormals of the walls of `face`, d rows each: what is wrong with them; empty: they agree.
-std::string CompareConormals(core::WallSet face, Index d, const Testimony& a, const Testimony& b) {
+// Returns how the conormals of the walls of `face`, d rows each, disagree, or "".
+std::string CompareConormals(core::WallSet face, Index d, const AnswerRef& a, const AnswerRef& b) {
   if (a.answers->conormals.size() == 0 || b.answers->conormals.size() == 0) return "";
   std::string rule;
   Index row = 0;
@@ -67,22 +67,22 @@ std::string CompareConormals(core::WallSet face, Index d, const Testimony& a, co
                          " there are opposite: what is inside for "
                          "the one is outside for the other")
                : Message("the conormals of wall ", wall, " there have an angle of cosine ",
-                         Brief(cosine), " and sine ", Brief(sine), ", of which ",
-                         kConormalDisagreement, " is allowed");
+                         Brief(cosine), " and sine ", Brief(sine), ", more than the ",
+                         kConormalDisagreement, " allowed");
   });
   return rule;
 }
 
 }  // namespace
 
-bool Testimony::found() const {
+bool AnswerRef::found() const {
   return answers->found.empty() || answers->found[static_cast<std::size_t>(at)] != 0;
 }
 
-std::string DescribeDisagreement(const core::QueryBlock& block, Index query, const Testimony& a,
-                                 const Testimony& b, const std::string& rule) {
+std::string DescribeDisagreement(const core::QueryBlock& block, Index query, const AnswerRef& a,
+                                 const AnswerRef& b, const std::string& rule) {
   const Eigen::VectorXd x = block.points.col(query);
-  const auto says = [&](const Testimony& t) {
+  const auto says = [&](const AnswerRef& t) {
     const Eigen::VectorXd point = t.answers->points.col(t.at);
     return Message(t.worker, " answered ",
                    t.found() ? PointText(point) + ", " + Brief((point - x).norm()) + " away"
@@ -95,7 +95,7 @@ std::string DescribeDisagreement(const core::QueryBlock& block, Index query, con
 }
 
 double AllowedApart(const core::Specification& spec, const core::QueryBlock& block, Index query,
-                    const Testimony& a, const Testimony& b) {
+                    const AnswerRef& a, const AnswerRef& b) {
   const double largest = std::max({block.points.col(query).lpNorm<Eigen::Infinity>(),
                                    a.answers->points.col(a.at).lpNorm<Eigen::Infinity>(),
                                    b.answers->points.col(b.at).lpNorm<Eigen::Infinity>()});
@@ -103,11 +103,11 @@ double AllowedApart(const core::Specification& spec, const core::QueryBlock& blo
 }
 
 std::string FindDisagreement(const core::Specification& spec, const core::QueryBlock& block,
-                             Index query, const Testimony& a, const Testimony& b) {
+                             Index query, const AnswerRef& a, const AnswerRef& b) {
   const bool flat = block.kind == core::QueryKind::kIntersectFlat;
   const Eigen::VectorXd x = block.points.col(query);
-  const auto point = [](const Testimony& t) { return t.answers->points.col(t.at); };
-  const auto complain = [&](const std::string& rule) {
+  const auto point = [](const AnswerRef& t) { return t.answers->points.col(t.at); };
+  const auto disagree = [&](const std::string& rule) {
     return DescribeDisagreement(block, query, a, b, rule);
   };
 
@@ -115,33 +115,33 @@ std::string FindDisagreement(const core::Specification& spec, const core::QueryB
   if (a.found() != b.found()) {
     const double distance = (point(a.found() ? a : b) - x).norm();
     if (!flat || distance > kSurelyInside * block.radii[query]) return "";
-    return complain("an intersection well inside the radius, " + Brief(block.radii[query]) +
+    return disagree("an intersection well inside the radius, " + Brief(block.radii[query]) +
                     ", is found by all");
   }
   const double tolerance = AllowedApart(spec, block, query, a, b);
   const double apart = (point(a) - point(b)).norm();
   const double gap = flat ? apart : std::abs((point(a) - x).norm() - (point(b) - x).norm());
   if (gap > tolerance) {
-    return complain(Message(flat ? "the points are " : "the distances differ by ", Brief(gap),
+    return disagree(Message(flat ? "the points are " : "the distances differ by ", Brief(gap),
                             flat ? " apart" : "", ", more than the ", Brief(tolerance), " (",
                             kDisagreementTolerance, " epsilon) allowed"));
   }
   if (apart > tolerance) return "";
   const bool both_sizes = a.answers->sizes.size() > 0 && b.answers->sizes.size() > 0;
   if (both_sizes && !core::AreOneSize(a.answers->sizes[a.at], b.answers->sizes[b.at])) {
-    return complain(Message("the sizes there are ", Brief(a.answers->sizes[a.at]), " and ",
+    return disagree(Message("the sizes there are ", Brief(a.answers->sizes[a.at]), " and ",
                             Brief(b.answers->sizes[b.at]), ", more than a share of ",
                             core::kSameSizeTolerance, " apart"));
   }
   if (const std::string rule = CompareConormals(block.face, x.size(), a, b); !rule.empty())
-    return complain(rule);
+    return disagree(rule);
   const Index k = spec.dimension;
   const bool both_tangents = a.answers->tangents.size() > 0 && b.answers->tangents.size() > 0;
   if (!both_tangents) return "";
   const double sine = LargestSine(a.answers->tangents.col(a.at).data(),
                                   b.answers->tangents.col(b.at).data(), x.size(), k);
   if (sine <= kTangentDisagreement) return "";
-  return complain(Message("their tangent spaces are turned against each other by an angle of sine ",
+  return disagree(Message("their tangent spaces are turned against each other by an angle of sine ",
                           Brief(sine), ", more than the ", kTangentDisagreement, " allowed"));
 }
 

@@ -20,7 +20,7 @@ inline constexpr double kConormalDisagreement = 0.1;
 inline constexpr double kSurelyInside = 0.5;
 
 // Refers to one worker's answer to one query: number `at` of a block.
-struct Testimony {
+struct AnswerRef {
   std::string worker;  // its name in messages
   const core::AnswerBlock* answers = nullptr;
   Eigen::Index at = 0;
@@ -30,10 +30,10 @@ struct Testimony {
 
 // Returns one sentence: which worker answered what, and the rule that the two break.
 std::string DescribeDisagreement(const core::QueryBlock& block, Eigen::Index query,
-                                 const Testimony& a, const Testimony& b, const std::string& rule);
+                                 const AnswerRef& a, const AnswerRef& b, const std::string& rule);
 // Returns the largest distance at which the points of two answers agree. REQUIRES: both were found.
 double AllowedApart(const core::Specification& spec, const core::QueryBlock& block,
-                    Eigen::Index query, const Testimony& a, const Testimony& b);
+                    Eigen::Index query, const AnswerRef& a, const AnswerRef& b);
 
 // Compares two answers to query `query` of `block`. Returns "" if they agree, else a sentence as of
 // DescribeDisagreement. REQUIRES: both passed CheckAnswers.
@@ -44,6 +44,6 @@ double AllowedApart(const core::Specification& spec, const core::QueryBlock& blo
 // inside the radius, since solvers fail to converge in some places. WallSigns compares the signs of
 // clearances.
 std::string FindDisagreement(const core::Specification& spec, const core::QueryBlock& block,
-                             Eigen::Index query, const Testimony& a, const Testimony& b);
+                             Eigen::Index query, const AnswerRef& a, const AnswerRef& b);
 
 }  // namespace stellate::server

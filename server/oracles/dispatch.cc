@@ -11,18 +11,18 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kSoon =
-    0.01;  // seconds: of work that lasts no longer there is always more to give
-constexpr double kWorthWhile = 0.1;  // share of a worker's time that asking ahead should save it
+// Seconds: a worker with no more work than this may always have another chunk.
+constexpr double kSoon = 0.01;
+constexpr double kWorthWhile = 0.1;  // share of a worker's time that a second chunk should save
 constexpr double kMostChecked = 16;  // queries at a time
 
 Pace::Chunk Timed(const Lease& lease, TimePoint end) {
   return {static_cast<double>(lease.count), Seconds(end - lease.started), lease.cut, lease.queued};
 }
 
-// One worker at a time answers it, and one with room for it is idle.
-bool MayBackUp(const Lease& lease, Index room) {
-  return !lease.check && !lease.answered && lease.twin == 0 && lease.count <= room;
+// Whether only one worker has it, and an idle one would accept it.
+bool MayHedge(const Lease& lease, Index capacity) {
+  return !lease.check && !lease.answered && lease.twin == 0 && lease.count <= capacity;
 }
 
 }  // namespace
@@ -36,7 +36,7 @@ void Dispatch::Begin(const std::vector<Block>& blocks, TimePoint now) {
   End();
   active_ = true;
   blocks_ = blocks;
-  deserted_since_ = now;
+  without_worker_since_ = now;
   first_of_round_ = next_lease_;
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     Index next = 0;
@@ -44,7 +44,7 @@ void Dispatch::Begin(const std::vector<Block>& blocks, TimePoint now) {
       if (end <= next) return;
       pending_.push_back({b, next, end - next, 0});
       pending_queries_ += end - next;
-      unsettled_ += end - next;
+      unanswered_ += end - next;
     };
     for (const auto& [first, end] : blocks_[b].answered) {
       ask_until(first);
@@ -59,10 +59,10 @@ void Dispatch::End() {
   timed_out_ = false;
   pending_.clear();
   pending_queries_ = 0;
-  unsettled_ = 0;
+  unanswered_ = 0;
   newest_.reset();
   newest_other_.reset();
-  debts_.clear();
+  comparisons_.clear();
   for (auto& [id, worker] : workers_) worker.leases.clear();
 }
 
@@ -77,21 +77,21 @@ void Dispatch::Leave(WorkerId worker, TimePoint now) {
   if (it == workers_.end()) return;
   TakeBack(&it->second, /*timed_out=*/false);
   workers_.erase(it);
-  if (workers_.empty()) deserted_since_ = now;
+  if (workers_.empty()) without_worker_since_ = now;
 }
 
-// Its pieces go to the front: others may be waiting for just these. What another worker has too,
-// or has answered, is that one's business.
+// Its pieces go to the front, since the round may wait for them. Pieces that another worker has
+// too, or has answered, need no new lease.
 void Dispatch::TakeBack(Worker* worker, bool timed_out) {
   if (worker->leases.empty()) return;
   const WorkerId id = worker->leases.front().worker;
-  Forget(id);
+  DropComparisons(id);
   if (newest_ && newest_->worker == id) newest_.reset();
   if (newest_other_ && newest_other_->worker == id) newest_other_.reset();
   for (auto it = worker->leases.rbegin(); it != worker->leases.rend(); ++it) {
     const bool oldest = std::next(it) == worker->leases.rend();
     if (it->check || it->answered) continue;
-    // Only the oldest had its time. Several queries may have been too much at once.
+    // Only the oldest lease had its full time. Several queries may be too many for one chunk.
     const int timeouts = it->timeouts + (timed_out && oldest && it->count == 1 ? 1 : 0);
     if (Lease* const twin = Find(it->twin)) {
       twin->twin = 0;
@@ -105,8 +105,8 @@ void Dispatch::TakeBack(Worker* worker, bool timed_out) {
   worker->leases.clear();
 }
 
-// Alone, a worker takes all. Among many, smaller pieces towards the end let all end together; a
-// piece that takes less than what comes with each would make no end sooner.
+// A single worker takes all. Several get smaller pieces towards the end, so that all finish
+// together; pieces below the fixed cost of a chunk would not end the round sooner.
 Index Dispatch::ShareOfTheRest(const Worker& worker) const {
   const auto workers = static_cast<Index>(workers_.size());
   if (workers == 1) return pending_queries_;
@@ -133,22 +133,24 @@ void Dispatch::Cut(const Worker& worker, Piece* piece, Lease* lease) const {
   piece->count -= lease->count;
 }
 
-// Besides those that it has: so that it need not wait between two. Towards a round's end that would
-// keep slow queries from others who are idle sooner.
+// A further chunk saves the wait between two. Towards the end of a round it could keep slow queries
+// from workers that are idle sooner.
 bool Dispatch::MayHaveAnother(const Worker& worker) const {
   const int in_flight = worker.InFlight();
   if (in_flight == 0) return true;
   const Pace& pace = worker.pace;
-  if (in_flight >= options_.max_in_flight || worker.Lagging() || !pace.settled()) return false;
+  if (in_flight >= options_.max_in_flight || worker.Lagging() || !pace.is_calibrated())
+    return false;
   const auto workers = static_cast<double>(workers_.size());
-  if (workers == 1 || static_cast<double>(pending_queries_) > 2 * workers * pace.FullChunk()) return true;
+  if (workers == 1 || static_cast<double>(pending_queries_) > 2 * workers * pace.FullChunk())
+    return true;
   double held = 0;
   for (const Lease& lease : worker.leases) held += pace.Seconds(static_cast<double>(lease.count));
   return held <= std::max(kSoon, pace.fixed() / kWorthWhile);
 }
 
-// The worker with the fewest chunks, the quickest of these, or whoever is not known yet. One that
-// lags is asked only when there is no other, and for one chunk at a time.
+// The worker with the fewest chunks; of these the fastest, or one with unknown pace. A lagging
+// worker is chosen only if there is no other, and gets one chunk at a time.
 Dispatch::Worker* Dispatch::PickWorker(WorkerId* id) {
   const bool any_lively = std::any_of(workers_.begin(), workers_.end(),
                                       [](const auto& entry) { return !entry.second.Lagging(); });
@@ -195,12 +197,13 @@ std::vector<Lease> Dispatch::Assign(TimePoint now) {
   while (active_ && !pending_.empty()) {
     Worker* const worker = PickWorker(&id);
     if (worker == nullptr) break;
-    // Before its own chunk, so that it is done with both no later than with that.
+    // Before its own chunk, so that the comparison does not end later than that.
     const Family family = blocks_[pending_.front().block].family;
-    for (Debt& debt : debts_)
-      if (debt.check == 0 && debt.worker != id && blocks_[debt.block].family == family &&
-          !IsCompared(id, family) && !IsBeingCompared(id, family))
-        leases.push_back(AskToCompare(&debt, id, now));
+    for (Comparison& comparison : comparisons_)
+      if (comparison.check == 0 && comparison.worker != id &&
+          blocks_[comparison.block].family == family && !IsCompared(id, family) &&
+          !IsCheckingFamily(id, family))
+        leases.push_back(AskToCompare(&comparison, id, now));
     if (const auto check = NextCheck(id, worker)) {
       worker->check_credit -= static_cast<double>(check->count);
       leases.push_back(Give(id, *check, now));
@@ -211,16 +214,16 @@ std::vector<Lease> Dispatch::Assign(TimePoint now) {
     if (pending_.front().count == 0) pending_.pop_front();
     lease = Give(id, lease, now);
     leases.push_back(lease);
-    Owe(lease);
+    RequireComparison(lease);
     const double earned = options_.check_share * static_cast<double>(lease.count);
     worker->check_credit = std::min(worker->check_credit + earned, kMostChecked);
     if (newest_ && newest_->worker != id) newest_other_ = newest_;
     newest_ = lease;
   }
-  for (Debt& debt : debts_)
-    if (const auto checker = PickChecker(debt))
-      leases.push_back(AskToCompare(&debt, *checker, now));
-  if (active_ && pending_.empty()) BackUp(now, &leases);
+  for (Comparison& comparison : comparisons_)
+    if (const auto checker = PickChecker(comparison))
+      leases.push_back(AskToCompare(&comparison, *checker, now));
+  if (active_ && pending_.empty()) Hedge(now, &leases);
   return leases;
 }
 
@@ -231,86 +234,90 @@ TimePoint Dispatch::OverdueAt(const Worker& worker, std::size_t position) const 
     if (!pace->known() || other.pace.Seconds(1) < pace->Seconds(1)) pace = &other.pace;
   }
   const TimePoint started = worker.leases.front().started;
-  if (!pace->known()) return started + options_.straggler_unknown;
+  if (!pace->known()) return started + options_.hedge_unknown;
   double expected = 0;
   for (std::size_t i = 0; i <= position; ++i) {
     expected += pace->AtMost(static_cast<double>(worker.leases[i].count));
   }
-  const double patience = std::min(options_.straggler_factor * expected, 1e6);
-  return started + std::max(options_.straggler_floor, std::chrono::duration_cast<Clock::duration>(
-                                                          std::chrono::duration<double>(patience)));
+  const double patience = std::min(options_.hedge_factor * expected, 1e6);
+  return started + std::max(options_.hedge_floor, std::chrono::duration_cast<Clock::duration>(
+                                                      std::chrono::duration<double>(patience)));
 }
 
-Index Dispatch::IdleRoom() const {
-  Index room = 0;
+Index Dispatch::IdleCapacity() const {
+  Index capacity = 0;
   for (const auto& [id, worker] : workers_) {
     if (!worker.Idle()) continue;
     if (worker.max_chunk == 0) return std::numeric_limits<Index>::max();
-    room = std::max(room, static_cast<Index>(worker.max_chunk));
+    capacity = std::max(capacity, static_cast<Index>(worker.max_chunk));
   }
-  return room;
+  return capacity;
 }
 
-// Stragglers, oldest first, to idle workers, quickest first.
-void Dispatch::BackUp(TimePoint now, std::vector<Lease>* leases) {
-  while (const Index room = IdleRoom()) {
-    Lease* straggler = nullptr;
+// Gives overdue chunks, oldest first, to idle workers, fastest first.
+void Dispatch::Hedge(TimePoint now, std::vector<Lease>* leases) {
+  while (const Index capacity = IdleCapacity()) {
+    Lease* overdue = nullptr;
     for (auto& [id, worker] : workers_) {
       for (std::size_t i = 0; i < worker.leases.size(); ++i) {
         Lease& lease = worker.leases[i];
-        if (straggler != nullptr && straggler->id < lease.id) continue;
-        if (MayBackUp(lease, room) && OverdueAt(worker, i) <= now) straggler = &lease;
+        if (overdue != nullptr && overdue->id < lease.id) continue;
+        if (MayHedge(lease, capacity) && OverdueAt(worker, i) <= now) overdue = &lease;
       }
     }
-    if (straggler == nullptr) return;
+    if (overdue == nullptr) return;
     WorkerId best = 0;
     for (const auto& [id, worker] : workers_) {
-      if (!worker.Idle() || !worker.Wants(straggler->count)) continue;
+      if (!worker.Idle() || !worker.Wants(overdue->count)) continue;
       if (best == 0 || worker.pace.Seconds(1) < workers_.at(best).pace.Seconds(1)) best = id;
     }
-    Lease copy = *straggler;
-    copy.twin = straggler->id;
+    Lease copy = *overdue;
+    copy.twin = overdue->id;
     leases->push_back(Give(best, copy, now));
-    straggler->twin = leases->back().id;
-    Owe(leases->back());
+    overdue->twin = leases->back().id;
+    RequireComparison(leases->back());
   }
 }
 
-Dispatch::ClaimResult Dispatch::Claim(WorkerId worker_id, LeaseId id, TimePoint now, Lease* lease) {
+Dispatch::AcceptResult Dispatch::Accept(WorkerId worker_id, LeaseId id, TimePoint now,
+                                        Lease* lease) {
   const auto entry = workers_.find(worker_id);
-  if (entry == workers_.end()) return ClaimResult::kLate;
+  if (entry == workers_.end()) return AcceptResult::kLate;
   Worker& worker = entry->second;
-  if (worker.unanswered.erase(id) == 0) return ClaimResult::kUnknown;
+  if (worker.unanswered.erase(id) == 0) return AcceptResult::kUnknown;
   worker.stalled = false;
   const auto it = std::find_if(worker.leases.begin(), worker.leases.end(),
                                [id](const Lease& l) { return l.id == id; });
-  if (it == worker.leases.end()) return ClaimResult::kLate;
+  if (it == worker.leases.end()) return AcceptResult::kLate;
   *lease = *it;
   worker.answered_queries += static_cast<std::uint64_t>(lease->count);
   ++worker.answered_chunks;
   const bool oldest = it == worker.leases.begin();
   worker.leases.erase(it);
-  // A handful of queries to check says nothing.
+  // A cross-check of a few queries does not show the pace.
   if (!lease->check) worker.pace.Answered(Timed(*lease, now));
   if (oldest && !worker.leases.empty()) worker.leases.front().started = now;  // the next in line
-  for (Debt& debt : debts_) debt.taken = debt.taken || debt.check == id;
-  if (lease->check || lease->answered) return ClaimResult::kSecond;
-  const auto covers = [&](const Debt& debt) {
-    return debt.block == lease->block && debt.query >= lease->first &&
-           debt.query < lease->first + lease->count;
+  for (Comparison& comparison : comparisons_)
+    comparison.has_answer = comparison.has_answer || comparison.check == id;
+  if (lease->check || lease->answered) return AcceptResult::kForComparison;
+  const auto covers = [&](const Comparison& comparison) {
+    return comparison.block == lease->block && comparison.query >= lease->first &&
+           comparison.query < lease->first + lease->count;
   };
-  // Whoever was slower with it owes another one.
-  std::erase_if(debts_, [&](const Debt& d) { return covers(d) && d.worker != worker_id; });
-  for (Debt& debt : debts_) debt.answered = debt.answered || covers(debt);
+  // The comparison of a slower worker is dropped: its answer does not count.
+  std::erase_if(comparisons_,
+                [&](const Comparison& d) { return covers(d) && d.worker != worker_id; });
+  for (Comparison& comparison : comparisons_)
+    comparison.answered = comparison.answered || covers(comparison);
   if (Lease* const twin = Find(lease->twin)) {
     twin->answered = true;
     twin->twin = 0;
   }
-  return ClaimResult::kClaimed;
+  return AcceptResult::kCounts;
 }
 
-void Dispatch::Settle(LeaseId id, Index count) {
-  if (active_ && id >= first_of_round_) unsettled_ -= count;
+void Dispatch::MarkAnswered(LeaseId id, Index count) {
+  if (active_ && id >= first_of_round_) unanswered_ -= count;
 }
 
 void Dispatch::Busy(WorkerId worker_id, LeaseId id, TimePoint now) {
@@ -323,7 +330,7 @@ void Dispatch::Busy(WorkerId worker_id, LeaseId id, TimePoint now) {
   }
 }
 
-// Of a lease whose time runs.
+// REQUIRES: the lease's time runs.
 TimePoint Dispatch::EndOf(const Lease& lease) const {
   const TimePoint silent = lease.started + options_.answer_limit;
   if (lease.heard <= lease.started) return silent;
@@ -344,8 +351,9 @@ void Dispatch::Expire(TimePoint now) {
 Dispatch::Failure Dispatch::failure(TimePoint now) const {
   if (!active_) return Failure::kNone;
   if (timed_out_) return Failure::kAnswerTimeout;
-  // A piece claimed but not yet settled is being checked: that worker's answer still counts.
-  if (workers_.empty() && pending_queries_ > 0 && now - deserted_since_ >= options_.worker_wait) {
+  // A piece that is accepted but not marked yet is being checked: its worker's answer still counts.
+  if (workers_.empty() && pending_queries_ > 0 &&
+      now - without_worker_since_ >= options_.worker_wait) {
     return Failure::kNoWorker;
   }
   return Failure::kNone;
@@ -354,20 +362,21 @@ Dispatch::Failure Dispatch::failure(TimePoint now) const {
 TimePoint Dispatch::NextDeadline() const {
   TimePoint next = TimePoint::max();
   if (!active_) return next;
-  if (workers_.empty()) next = deserted_since_ + options_.worker_wait;
-  const Index room = pending_.empty() ? IdleRoom() : 0;
+  if (workers_.empty()) next = without_worker_since_ + options_.worker_wait;
+  const Index capacity = pending_.empty() ? IdleCapacity() : 0;
   for (const auto& [id, worker] : workers_) {
     if (worker.leases.empty()) continue;
     next = std::min(next, EndOf(worker.leases.front()));
-    for (std::size_t i = 0; room > 0 && i < worker.leases.size(); ++i) {
-      if (MayBackUp(worker.leases[i], room)) next = std::min(next, OverdueAt(worker, i));
+    for (std::size_t i = 0; capacity > 0 && i < worker.leases.size(); ++i) {
+      if (MayHedge(worker.leases[i], capacity)) next = std::min(next, OverdueAt(worker, i));
     }
   }
-  // When no comparison is waited for any more.
+  // The end of the wait for comparisons.
   std::optional<TimePoint> last;
-  for (const Debt& debt : debts_)
-    if (const auto until = Patience(debt)) last = std::max(last.value_or(*until), *until);
-  if (last && unsettled_ == 0) next = std::min(next, *last);
+  for (const Comparison& comparison : comparisons_)
+    if (const auto until = ComparisonDeadline(comparison))
+      last = std::max(last.value_or(*until), *until);
+  if (last && unanswered_ == 0) next = std::min(next, *last);
   return next;
 }
 

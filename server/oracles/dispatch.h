@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "server/base/clock.h"
-#include "server/oracles/worker_stats.h"
 #include "server/oracles/pace.h"
+#include "server/oracles/worker_stats.h"
 
 namespace stellate::server {
 
@@ -21,8 +21,8 @@ using LeaseId = std::uint64_t;
 
 // How long a mesh waits for its oracles, before it fails.
 struct OracleTimeouts {
-  Clock::duration answer_limit = std::chrono::seconds(60);  // for one chunk, without a word
-  Clock::duration busy_limit = std::chrono::hours(1);       // for one chunk, with words
+  Clock::duration answer_limit = std::chrono::seconds(60);  // for one chunk, without a Busy
+  Clock::duration busy_limit = std::chrono::hours(1);       // for one chunk, however often Busy
   Clock::duration worker_wait = std::chrono::seconds(60);   // with queries and no worker
 };
 
@@ -34,14 +34,14 @@ struct DispatchPolicy {
   // The rest of a round is shared among the workers, in pieces that take at least this.
   Clock::duration least_share = std::chrono::milliseconds(1);
   std::size_t chunk_bytes = std::size_t{1} << 20;  // of a chunk's queries, and of their answers
-  int max_leases = 3;     // of one query alone, all timed out, before the round fails
+  int max_leases = 3;     // of a single query, all timed out, before the round fails
   int max_in_flight = 2;  // chunks of one worker, so that it need not wait between two
 
-  // A chunk is a straggler, and hedged by an idle worker, once it has taken this many times its
+  // A chunk is overdue, and hedged by an idle worker, once it has taken this many times its
   // expected time, and at least the floor; `unknown` where no worker's pace is known.
-  double straggler_factor = 3;
-  Clock::duration straggler_floor = std::chrono::milliseconds(200);
-  Clock::duration straggler_unknown = std::chrono::seconds(2);
+  double hedge_factor = 3;
+  Clock::duration hedge_floor = std::chrono::milliseconds(200);
+  Clock::duration hedge_unknown = std::chrono::seconds(2);
 
   // Share of a worker's queries that it is asked in addition, from another worker's chunks, to
   // compare the answers; before the round ends, at least one of each family that it answers. 0:
@@ -69,16 +69,16 @@ struct Lease {
 };
 
 // Distributes the queries of a round among workers. It cuts blocks into chunks by each worker's
-// measured pace, leases them, takes back leases that run out, hedges stragglers, and has a sample
-// of queries answered twice. A plain state machine: no threads, no clock of its own, no network.
-// Times passed in must not decrease.
+// measured pace, leases them, takes back leases that run out, hedges overdue chunks, and has a
+// sample of queries answered twice. A plain state machine: no threads, no clock of its own, no
+// network. Times passed in must not decrease.
 //
 //   dispatch.Join(worker, 0);
 //   dispatch.Begin(blocks, now);
 //   while (!dispatch.Done(now)) {
 //     for (const Lease& lease : dispatch.Assign(now)) ...;      // send it to lease.worker
-//     if (dispatch.Claim(worker, id, now, &lease) == kClaimed)  // an answer came
-//       dispatch.Settle(lease);                                 // once it is checked and stored
+//     if (dispatch.Accept(worker, id, now, &lease) == kCounts)  // an answer came
+//       dispatch.MarkAnswered(lease.id, lease.count);           // once it is stored
 //     dispatch.Expire(now);                                     // at NextDeadline(), or sooner
 //   }
 //
@@ -104,7 +104,7 @@ class Dispatch {
   // with another worker's. Does not wait for further cross-checks, or for the slower of two hedged
   // leases.
   bool Done(TimePoint now) const;
-  Eigen::Index unanswered() const { return unsettled_; }
+  Eigen::Index unanswered() const { return unanswered_; }
 
   // `max_chunk`: the most queries in one chunk; 0: no limit.
   void Join(WorkerId worker, std::uint32_t max_chunk);
@@ -116,16 +116,18 @@ class Dispatch {
   // Returns new leases, to be sent to their workers.
   std::vector<Lease> Assign(TimePoint now);
 
-  enum class ClaimResult {
-    kClaimed,
-    kSecond,   // another worker's answer counts; compare this one with it
-    kLate,     // the lease has ended; ignore the answer, which is no error
-    kUnknown,  // never given to this worker, or answered twice
+  enum class AcceptResult {
+    kCounts,
+    kForComparison,  // another worker's answer counts; compare this one with it
+    kLate,           // the lease has ended; ignore the answer, which is no error
+    kUnknown,        // never given to this worker, or answered twice
   };
-  // Takes note of an answer and ends its lease. Call Settle once the answer is stored.
-  ClaimResult Claim(WorkerId worker, LeaseId id, TimePoint now, Lease* lease);
-  // Takes note that `count` queries of a claimed lease have their answers. After kClaimed only.
-  void Settle(LeaseId id, Eigen::Index count);
+  // Takes note of an answer and ends its lease, which it returns in `lease`. After kCounts, call
+  // MarkAnswered once the answer is stored.
+  AcceptResult Accept(WorkerId worker, LeaseId id, TimePoint now, Lease* lease);
+  // Takes note that the answers to the `count` queries of an accepted lease are stored. REQUIRES:
+  // Accept returned kCounts.
+  void MarkAnswered(LeaseId id, Eigen::Index count);
   // Takes note that answers of `a` and `b` to a query of that block have been compared.
   void Compared(WorkerId a, WorkerId b, std::size_t block);
   // Renews the lease of a worker that is still computing. Ignored if the worker does not have it.
@@ -163,24 +165,24 @@ class Dispatch {
 
   // A comparison that the round still needs: ask another worker a query that `worker` has or had,
   // since no answer of `worker` in that family has been compared yet.
-  struct Debt {
+  struct Comparison {
     WorkerId worker = 0;
     std::size_t block = 0;
     Eigen::Index query = 0;
     bool answered = false;  // `worker` has answered it, and that answer counts
     LeaseId check = 0;      // the lease of `checker`; 0: not asked yet
     WorkerId checker = 0;
-    bool taken = false;  // the checker has answered; the comparison is under way
+    bool has_answer = false;  // the checker has answered; the comparison is under way
   };
 
   bool IsCompared(WorkerId worker, const Family& family) const;
-  void Owe(const Lease& lease);
-  void Forget(WorkerId worker);
-  bool IsBeingCompared(WorkerId worker, const Family& family) const;
-  std::optional<WorkerId> PickChecker(const Debt& debt) const;
-  Lease AskToCompare(Debt* debt, WorkerId checker, TimePoint now);
+  void RequireComparison(const Lease& lease);
+  void DropComparisons(WorkerId worker);
+  bool IsCheckingFamily(WorkerId worker, const Family& family) const;
+  std::optional<WorkerId> PickChecker(const Comparison& comparison) const;
+  Lease AskToCompare(Comparison* comparison, WorkerId checker, TimePoint now);
   // How long to wait for a comparison; nothing: do not wait.
-  std::optional<TimePoint> Patience(const Debt& debt) const;
+  std::optional<TimePoint> ComparisonDeadline(const Comparison& comparison) const;
   Eigen::Index ShareOfTheRest(const Worker& worker) const;
   void Cut(const Worker& worker, Piece* piece, Lease* lease) const;
   bool MayHaveAnother(const Worker& worker) const;
@@ -189,11 +191,11 @@ class Dispatch {
   Lease* Find(LeaseId id);
   Lease Give(WorkerId id, Lease lease, TimePoint now);
   std::optional<Lease> NextCheck(WorkerId id, Worker* worker) const;
-  void BackUp(TimePoint now, std::vector<Lease>* leases);
+  void Hedge(TimePoint now, std::vector<Lease>* leases);
   TimePoint EndOf(const Lease& lease) const;
   TimePoint OverdueAt(const Worker& worker, std::size_t position) const;
   // The most queries that an idle worker would accept; 0: none is idle.
-  Eigen::Index IdleRoom() const;
+  Eigen::Index IdleCapacity() const;
 
   DispatchOptions options_;
   bool active_ = false;
@@ -201,12 +203,12 @@ class Dispatch {
   std::vector<Block> blocks_;
   std::deque<Piece> pending_;
   Eigen::Index pending_queries_ = 0;
-  Eigen::Index unsettled_ = 0;
+  Eigen::Index unanswered_ = 0;
   std::map<WorkerId, Worker> workers_;
-  std::vector<Debt> debts_;  // at most one for each worker and family
+  std::vector<Comparison> comparisons_;  // at most one for each worker and family
   LeaseId first_of_round_ = 1;
   LeaseId next_lease_ = 1;
-  TimePoint deserted_since_;  // last moment with a worker, or the start of the round
+  TimePoint without_worker_since_;  // last moment with a worker, or the start of the round
   // The newest lease of the round, and the newest of any other worker: cross-checks come from
   // these.
   std::optional<Lease> newest_, newest_other_;

@@ -1,4 +1,4 @@
-// What Dispatch has answered twice, so that workers can be compared.
+// Cross-checks: which queries Dispatch has answered twice.
 #include <algorithm>
 #include <utility>
 
@@ -38,41 +38,45 @@ bool Dispatch::IsCompared(WorkerId worker, const Family& family) const {
   return it != workers_.end() && it->second.compared.contains(family);
 }
 
-// It was given these.
-void Dispatch::Owe(const Lease& lease) {
+// After a worker received a lease.
+void Dispatch::RequireComparison(const Lease& lease) {
   const Family& family = blocks_[lease.block].family;
-  const bool owes = std::any_of(debts_.begin(), debts_.end(), [&](const Debt& debt) {
-    return debt.worker == lease.worker && blocks_[debt.block].family == family;
+  const bool is_required =
+      std::any_of(comparisons_.begin(), comparisons_.end(), [&](const Comparison& comparison) {
+        return comparison.worker == lease.worker && blocks_[comparison.block].family == family;
+      });
+  if (options_.check_share <= 0 || is_required || IsCompared(lease.worker, family)) return;
+  comparisons_.push_back({lease.worker, lease.block, lease.first + Scatter(lease.id, lease.count)});
+}
+
+// Its leases go to other workers, and so do the comparisons of them. Answers that it gave before
+// still count, and are compared although it has left.
+void Dispatch::DropComparisons(WorkerId worker) {
+  std::erase_if(comparisons_,
+                [&](const Comparison& d) { return d.worker == worker && !d.answered; });
+  for (Comparison& comparison : comparisons_)
+    if (comparison.checker == worker && !comparison.has_answer)
+      comparison.check = comparison.checker = 0;
+}
+
+// Whether the worker is the checker of another worker's comparison.
+bool Dispatch::IsCheckingFamily(WorkerId worker, const Family& family) const {
+  return std::any_of(comparisons_.begin(), comparisons_.end(), [&](const Comparison& comparison) {
+    return comparison.check != 0 && comparison.checker == worker &&
+           blocks_[comparison.block].family == family;
   });
-  if (options_.check_share <= 0 || owes || IsCompared(lease.worker, family)) return;
-  debts_.push_back({lease.worker, lease.block, lease.first + Scatter(lease.id, lease.count)});
 }
 
-// Its leases go to others: what it owes is theirs to owe, and what it was to compare is for others.
-// What it answered before still counts, and is compared though it is gone.
-void Dispatch::Forget(WorkerId worker) {
-  std::erase_if(debts_, [&](const Debt& d) { return d.worker == worker && !d.answered; });
-  for (Debt& debt : debts_)
-    if (debt.checker == worker && !debt.taken) debt.check = debt.checker = 0;
-}
-
-// By another's debt.
-bool Dispatch::IsBeingCompared(WorkerId worker, const Family& family) const {
-  return std::any_of(debts_.begin(), debts_.end(), [&](const Debt& debt) {
-    return debt.check != 0 && debt.checker == worker && blocks_[debt.block].family == family;
-  });
-}
-
-// Who owes himself is the better for it, then who has the least to do.
-std::optional<WorkerId> Dispatch::PickChecker(const Debt& debt) const {
-  const Family& family = blocks_[debt.block].family;
-  if (debt.check != 0 || IsBeingCompared(debt.worker, family)) return {};
+// Prefers a worker that needs a comparison itself, then the one with the fewest leases.
+std::optional<WorkerId> Dispatch::PickChecker(const Comparison& comparison) const {
+  const Family& family = blocks_[comparison.block].family;
+  if (comparison.check != 0 || IsCheckingFamily(comparison.worker, family)) return {};
   std::optional<WorkerId> best;
   std::pair<bool, std::size_t> least;
   for (const auto& [id, worker] : workers_) {
     const bool beaten = std::any_of(worker.leases.begin(), worker.leases.end(),
                                     [](const Lease& lease) { return lease.answered; });
-    if (id == debt.worker || worker.Lagging() || beaten) continue;
+    if (id == comparison.worker || worker.Lagging() || beaten) continue;
     const std::pair<bool, std::size_t> load(worker.compared.contains(family), worker.leases.size());
     if (best && load >= least) continue;
     best = id;
@@ -81,34 +85,34 @@ std::optional<WorkerId> Dispatch::PickChecker(const Debt& debt) const {
   return best;
 }
 
-Lease Dispatch::AskToCompare(Debt* debt, WorkerId checker, TimePoint now) {
+Lease Dispatch::AskToCompare(Comparison* comparison, WorkerId checker, TimePoint now) {
   Lease check;
   check.check = true;
-  check.block = debt->block;
-  check.first = debt->query;
+  check.block = comparison->block;
+  check.first = comparison->query;
   check.count = 1;
   check = Give(checker, check, now);
-  debt->check = check.id;
-  debt->checker = checker;
+  comparison->check = check.id;
+  comparison->checker = checker;
   return check;
 }
 
-// As long as for a straggler: whoever is far slower than his pace promises may hang.
-std::optional<TimePoint> Dispatch::Patience(const Debt& debt) const {
-  if (debt.taken) return TimePoint::max();
-  const auto it = workers_.find(debt.checker);
-  if (debt.check == 0 || it == workers_.end()) return {};
+// Until the check is overdue: a worker far slower than its pace may hang.
+std::optional<TimePoint> Dispatch::ComparisonDeadline(const Comparison& comparison) const {
+  if (comparison.has_answer) return TimePoint::max();
+  const auto it = workers_.find(comparison.checker);
+  if (comparison.check == 0 || it == workers_.end()) return {};
   const auto& leases = it->second.leases;
   for (std::size_t i = 0; i < leases.size(); ++i)
-    if (leases[i].id == debt.check) return OverdueAt(it->second, i);
+    if (leases[i].id == comparison.check) return OverdueAt(it->second, i);
   return {};
 }
 
 bool Dispatch::Done(TimePoint now) const {
-  if (!active_ || unsettled_ > 0) return false;
-  return std::none_of(debts_.begin(), debts_.end(), [&](const Debt& debt) {
-    const auto until = Patience(debt);
-    return until ? now < *until : PickChecker(debt).has_value();
+  if (!active_ || unanswered_ > 0) return false;
+  return std::none_of(comparisons_.begin(), comparisons_.end(), [&](const Comparison& comparison) {
+    const auto until = ComparisonDeadline(comparison);
+    return until ? now < *until : PickChecker(comparison).has_value();
   });
 }
 
@@ -118,8 +122,8 @@ void Dispatch::Compared(WorkerId a, WorkerId b, std::size_t block) {
   for (const WorkerId id : {a, b}) {
     const auto it = workers_.find(id);
     if (it != workers_.end()) it->second.compared.insert(family);
-    std::erase_if(debts_, [&](const Debt& debt) {
-      return debt.worker == id && blocks_[debt.block].family == family;
+    std::erase_if(comparisons_, [&](const Comparison& comparison) {
+      return comparison.worker == id && blocks_[comparison.block].family == family;
     });
   }
 }

@@ -53,7 +53,7 @@ Allowed<WorkerId> OraclePool::Join(std::shared_ptr<OracleWorker> worker, std::ui
                                 "raise --max-workers")));
     }
     id = next_worker_++;
-    titles_[id] = worker->Title();
+    display_names_[id] = worker->DisplayName();
     members_.emplace(id, std::move(worker));
     worker_count_ = members_.size();
     dispatch_.Join(id, max_chunk);
@@ -82,31 +82,31 @@ void OraclePool::Leave(WorkerId worker) {
   Send(std::move(deliveries));
 }
 
-core::Expected<std::optional<Chunk>> OraclePool::Claim(WorkerId worker, LeaseId lease_id) {
+core::Expected<std::optional<Chunk>> OraclePool::Accept(WorkerId worker, LeaseId lease_id) {
   std::vector<Delivery> deliveries;
   std::optional<Chunk> chunk;
   {
     const std::lock_guard lock(mutex_);
     const TimePoint now = Clock::now();
     Lease lease;
-    const auto result = dispatch_.Claim(worker, lease_id, now, &lease);
+    const auto result = dispatch_.Accept(worker, lease_id, now, &lease);
     switch (result) {
-      case Dispatch::ClaimResult::kUnknown:
+      case Dispatch::AcceptResult::kUnknown:
         return core::Refuse(StatusCode::kInvalidArgument,
                             core::Message("answers.lease is ", lease_id,
                                           " but no such chunk is waiting for this worker's answer: "
                                           "answer each QueryChunk once, with its own lease"));
-      case Dispatch::ClaimResult::kLate:
+      case Dispatch::AcceptResult::kLate:
         break;
-      case Dispatch::ClaimResult::kClaimed:
-      case Dispatch::ClaimResult::kSecond:
+      case Dispatch::AcceptResult::kCounts:
+      case Dispatch::AcceptResult::kForComparison:
         chunk = Chunk{lease.id,
                       round_,
                       lease.block,
                       lease.first,
                       lease.count,
                       worker,
-                      result == Dispatch::ClaimResult::kSecond};
+                      result == Dispatch::AcceptResult::kForComparison};
         break;
     }
     deliveries = AssignLocked(now);
@@ -117,30 +117,30 @@ core::Expected<std::optional<Chunk>> OraclePool::Claim(WorkerId worker, LeaseId 
 
 void OraclePool::Busy(WorkerId worker, LeaseId lease) {
   const std::lock_guard lock(mutex_);
-  dispatch_.Busy(worker, lease, Clock::now());  // puts off deadlines: nobody need wake up
+  dispatch_.Busy(worker, lease, Clock::now());  // only postpones deadlines: no thread need wake up
 }
 
 Refused OraclePool::Deliver(const Chunk& chunk, const core::AnswerBlock& answer) {
   Refused checked = CheckAnswer(spec_, chunk, answer);
   if (!checked.ok()) return checked;
-  if (chunk.second) {
-    const auto second = std::make_shared<const SecondAnswer>(SecondAnswer{chunk, answer});
+  if (chunk.for_comparison) {
+    const auto compared = std::make_shared<const ComparedAnswer>(ComparedAnswer{chunk, answer});
     {
       const std::lock_guard lock(mutex_);
       if (round_ != chunk.round) return core::Status::Ok();
-      seconds_.push_back(second);
+      compared_answers_.push_back(compared);
     }
-    Compare(*second, chunk.first, chunk.count);
+    Compare(*compared, chunk.first, chunk.count);
   } else {
-    TakeOver(chunk, answer);
+    Store(chunk, answer);
   }
   changed_.notify_one();
   return core::Status::Ok();
 }
 
-void OraclePool::TakeOver(const Chunk& chunk, const core::AnswerBlock& answer) {
+void OraclePool::Store(const Chunk& chunk, const core::AnswerBlock& answer) {
   chunk.round->answers.blocks[chunk.block_index].Put(chunk.first, answer);
-  std::vector<std::shared_ptr<const SecondAnswer>> seconds;
+  std::vector<std::shared_ptr<const ComparedAnswer>> compared;
   std::string contradiction;
   {
     const std::lock_guard lock(mutex_);
@@ -151,26 +151,26 @@ void OraclePool::TakeOver(const Chunk& chunk, const core::AnswerBlock& answer) {
     }
     auto& by = round_->answered_by[chunk.block_index];
     std::fill_n(by.begin() + chunk.first, chunk.count, chunk.worker);
-    seconds = seconds_;
+    compared = compared_answers_;
   }
-  TellDisagreement(chunk, contradiction);
-  // Before the round can end: what two workers disagree about goes into no mesh.
-  for (const auto& second : seconds) {
-    const Chunk& other = second->chunk;
+  FailOnDisagreement(chunk, contradiction);
+  // Before the round can end: answers that two workers disagree about must not enter a mesh.
+  for (const auto& other_answer : compared) {
+    const Chunk& other = other_answer->chunk;
     if (other.block_index != chunk.block_index) continue;
     const Index first = std::max(chunk.first, other.first);
     const Index end = std::min(chunk.first + chunk.count, other.first + other.count);
-    if (first < end) Compare(*second, first, end - first);
+    if (first < end) Compare(*other_answer, first, end - first);
   }
   if (on_answered_) on_answered_(chunk.round, chunk.block_index, chunk.first, chunk.count);
   const std::lock_guard lock(mutex_);
-  if (round_ == chunk.round) dispatch_.Settle(chunk.lease, chunk.count);
+  if (round_ == chunk.round) dispatch_.MarkAnswered(chunk.lease, chunk.count);
 }
 
-// Of the queries [first, first + count), those that have another worker's answer already. The
-// others' turn comes when it does.
-void OraclePool::Compare(const SecondAnswer& second, Index first, Index count) {
-  const Chunk& chunk = second.chunk;
+// Compares the queries of [first, first + count) that have another worker's answer already. The
+// others follow when they have one.
+void OraclePool::Compare(const ComparedAnswer& compared, Index first, Index count) {
+  const Chunk& chunk = compared.chunk;
   std::vector<std::pair<Index, WorkerId>> others;
   {
     const std::lock_guard lock(mutex_);
@@ -181,22 +181,22 @@ void OraclePool::Compare(const SecondAnswer& second, Index first, Index count) {
       if (other != 0 && other != chunk.worker) others.push_back({q, other});
     }
   }
-  // Answers that are taken over do not change any more.
+  // Stored answers do not change any more.
   const core::AnswerBlock& answers = chunk.round->answers.blocks[chunk.block_index];
   std::string words;
   for (const auto& [q, id] : others) {
-    Testimony counted{"", &answers, q};
-    Testimony own{"", &second.answer, q - chunk.first};
+    AnswerRef counted{"", &answers, q};
+    AnswerRef own{"", &compared.answer, q - chunk.first};
     const bool agree = FindDisagreement(spec_, chunk.block(), q, counted, own).empty();
     if (agree && spec_.walls == 0) continue;
     const std::lock_guard lock(mutex_);
-    counted.worker = TitleLocked(id);
-    own.worker = TitleLocked(chunk.worker);
+    counted.worker = NameLocked(id);
+    own.worker = NameLocked(chunk.worker);
     if (agree) signs_.Compare(chunk.block(), q, counted, own);
     words = agree ? signs_.Verdict() : FindDisagreement(spec_, chunk.block(), q, counted, own);
     if (!words.empty()) break;
   }
-  TellDisagreement(chunk, words);
+  FailOnDisagreement(chunk, words);
   if (others.empty()) return;
   if (observer_ != nullptr) observer_->OnCompared(others.size());
   const std::lock_guard lock(mutex_);
@@ -205,7 +205,7 @@ void OraclePool::Compare(const SecondAnswer& second, Index first, Index count) {
   changed_.notify_one();
 }
 
-void OraclePool::TellDisagreement(const Chunk& chunk, const std::string& words) {
+void OraclePool::FailOnDisagreement(const Chunk& chunk, const std::string& words) {
   if (words.empty()) return;
   if (observer_ != nullptr) observer_->OnDisagreement();
   Fail(
@@ -213,9 +213,9 @@ void OraclePool::TellDisagreement(const Chunk& chunk, const std::string& words) 
                                                       ", block ", chunk.block_index, ", ", words)});
 }
 
-std::string OraclePool::TitleLocked(WorkerId worker) const {
-  const auto it = titles_.find(worker);
-  return it == titles_.end() || it->second.empty()
+std::string OraclePool::NameLocked(WorkerId worker) const {
+  const auto it = display_names_.find(worker);
+  return it == display_names_.end() || it->second.empty()
              ? core::Message("worker number ", worker)
              : core::Message("worker number ", worker, " (", it->second, ")");
 }
@@ -240,7 +240,8 @@ OraclePool::Outcome OraclePool::Ask(std::shared_ptr<const core::QueryBatch> batc
   for (const PartOfRound& part : known) PutAnswers(part, &round->answers);
   std::unique_lock lock(mutex_);
   round_ = round;
-  std::erase_if(titles_, [this](const auto& entry) { return !members_.contains(entry.first); });
+  std::erase_if(display_names_,
+                [this](const auto& entry) { return !members_.contains(entry.first); });
   TimePoint now = Clock::now();
   dispatch_.Begin(Measure(*round->batch, known), now);
   auto first_deliveries = AssignLocked(now);
@@ -273,14 +274,14 @@ OraclePool::Outcome OraclePool::Ask(std::shared_ptr<const core::QueryBatch> batc
     }
     const TimePoint deadline = dispatch_.NextDeadline();
     if (deadline == TimePoint::max()) {
-      changed_.wait(lock);  // a claimed answer is being checked: its worker's thread will notify
+      changed_.wait(lock);  // an accepted answer is being checked: its worker's thread will notify
     } else {
       changed_.wait_until(lock, deadline);
     }
   }
   dispatch_.End();
   round_.reset();
-  seconds_.clear();
+  compared_answers_.clear();
   return outcome;
 }
 
@@ -316,13 +317,13 @@ void OraclePool::Close(const WorkerEnd& end) {
 std::vector<OraclePool::Delivery> OraclePool::AssignLocked(TimePoint now) {
   std::vector<Delivery> deliveries;
   if (interrupted_ || failure_) return deliveries;
-  std::size_t backed_up = 0;
+  std::size_t hedged = 0;
   for (const Lease& lease : dispatch_.Assign(now)) {
-    if (lease.twin != 0) ++backed_up;
+    if (lease.twin != 0) ++hedged;
     deliveries.push_back({members_.at(lease.worker),
                           Chunk{lease.id, round_, lease.block, lease.first, lease.count}});
   }
-  if (observer_ != nullptr && backed_up > 0) observer_->OnBackUps(backed_up);
+  if (observer_ != nullptr && hedged > 0) observer_->OnHedged(hedged);
   return deliveries;
 }
 

@@ -51,10 +51,10 @@ struct Chunk {
   std::size_t block_index = 0;
   Eigen::Index first = 0;
   Eigen::Index count = 0;
-  // Set by OraclePool::Claim: the worker that answers, and whether its answer is only compared
+  // Set by OraclePool::Accept: the worker that answers, and whether its answer is only compared
   // with another worker's.
   WorkerId worker = 0;
-  bool second = false;
+  bool for_comparison = false;
 
   const core::QueryBlock& block() const { return round->batch->blocks[block_index]; }
 };
@@ -72,14 +72,14 @@ class OracleWorker {
   virtual void Ask(Chunk chunk) = 0;
   virtual void End(const WorkerEnd& end) = 0;
   // For messages to people; called once, when the worker joins. Empty: it has no name.
-  virtual std::string Title() const { return ""; }
+  virtual std::string DisplayName() const { return ""; }
 };
 
 // Receives what a pool does, for the metrics. Called from any thread; must not block.
 class PoolObserver {
  public:
   virtual ~PoolObserver() = default;
-  virtual void OnBackUps(std::size_t chunks) = 0;    // also given to an idle worker
+  virtual void OnHedged(std::size_t chunks) = 0;     // given to an idle worker as well
   virtual void OnCompared(std::size_t queries) = 0;  // answered by two workers
   virtual void OnDisagreement() = 0;
 };
@@ -88,7 +88,7 @@ class PoolObserver {
 // streams join, answer and leave from their own threads, and never wait:
 //
 //   pool.Join(worker, 0);                        // the pool calls worker->Ask(chunk)
-//   auto chunk = pool.Claim(id, lease);         // an answer to that lease came
+//   auto chunk = pool.Accept(id, lease);         // an answer to that lease came
 //   if (chunk && *chunk) pool.Deliver(**chunk, answer);
 //   pool.Leave(id);
 class OraclePool {
@@ -103,7 +103,7 @@ class OraclePool {
 
   // Ends a lease that has been answered. Returns its chunk, or nothing if the lease has ended
   // before, which is no error of the worker; kInvalidArgument if it never was this worker's.
-  core::Expected<std::optional<Chunk>> Claim(WorkerId worker, LeaseId lease);
+  core::Expected<std::optional<Chunk>> Accept(WorkerId worker, LeaseId lease);
   // Renews the lease of a worker that is still computing.
   void Busy(WorkerId worker, LeaseId lease);
   // Checks the answers to an accepted chunk and stores them, or compares them with another
@@ -128,7 +128,7 @@ class OraclePool {
   using OnAnswered = std::function<void(const std::shared_ptr<const Round>& round,
                                         std::size_t block, Eigen::Index first, Eigen::Index count)>;
   // Before the first Ask.
-  void TellOfAnswers(OnAnswered on_answered) { on_answered_ = std::move(on_answered); }
+  void SetOnAnswered(OnAnswered on_answered) { on_answered_ = std::move(on_answered); }
   // Makes Ask return, and all later calls of it.
   void Interrupt();
 
@@ -145,7 +145,7 @@ class OraclePool {
 
  private:
   // An answer that is only compared, kept while the round lasts.
-  struct SecondAnswer {
+  struct ComparedAnswer {
     Chunk chunk;
     core::AnswerBlock answer;
   };
@@ -159,11 +159,11 @@ class OraclePool {
   std::vector<Dispatch::Block> Measure(const core::QueryBatch& batch,
                                        const std::vector<PartOfRound>& known) const;
   MeshFailure Describe(Dispatch::Failure failure) const;
-  void TakeOver(const Chunk& chunk, const core::AnswerBlock& answer);
-  void Compare(const SecondAnswer& second, Eigen::Index first, Eigen::Index count);
+  void Store(const Chunk& chunk, const core::AnswerBlock& answer);
+  void Compare(const ComparedAnswer& compared, Eigen::Index first, Eigen::Index count);
   // Fails the mesh if `words` is not empty.
-  void TellDisagreement(const Chunk& chunk, const std::string& words);
-  std::string TitleLocked(WorkerId worker) const;
+  void FailOnDisagreement(const Chunk& chunk, const std::string& words);
+  std::string NameLocked(WorkerId worker) const;
   static void Send(std::vector<Delivery> deliveries);
 
   const core::Specification spec_;
@@ -179,10 +179,10 @@ class OraclePool {
   std::atomic<std::size_t> worker_count_{0};
   WorkerId next_worker_ = 1;
   std::shared_ptr<Round> round_;
-  std::vector<std::shared_ptr<const SecondAnswer>> seconds_;  // of the round
+  std::vector<std::shared_ptr<const ComparedAnswer>> compared_answers_;  // of the round
   WallSigns signs_;
   // Workers that are joined, or that answered in the round.
-  std::unordered_map<WorkerId, std::string> titles_;
+  std::unordered_map<WorkerId, std::string> display_names_;
   std::optional<MeshFailure> failure_;
   bool interrupted_ = false;
   bool closed_ = false;

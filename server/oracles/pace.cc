@@ -7,21 +7,22 @@ namespace stellate::server {
 namespace {
 
 constexpr std::size_t kRemembered = 16;  // chunks
-constexpr double kFading = 0.8;          // weight of a chunk, as against the next
-constexpr double kShortest = 1e-6;       // seconds: below that clocks tell nothing
-// Weight of what the fixed cost was held to be, as against all chunks: sizes a tenth apart are too
-// few to tell it by, twofold ones are enough.
-constexpr double kHeldTo = 0.01;
-constexpr double kLeastError = 0.03;  // relative, of times: no two chunks show that there is less
+constexpr double kDecay = 0.8;           // weight of a chunk, relative to the next one
+constexpr double kShortest = 1e-6;       // seconds: clocks measure nothing shorter
+// Weight of the last estimate of the fixed cost, relative to all chunks: sizes a tenth apart do not
+// suffice to measure it, sizes a factor of two apart do.
+constexpr double kPriorWeight = 0.01;
+constexpr double kLeastError = 0.03;  // relative, of times: two chunks do not prove a smaller one
 
 constexpr double kFixedShare = 0.25;  // of a chunk's time, at most, where the chunk may be larger
 constexpr double kGrowth = 2;         // of chunks, at most
 constexpr double kFastGrowth = 8;     // of chunks whose queries take less than this share:
 constexpr double kFast = 0.1;
-constexpr double kTellingSize =
-    4;                             // a chunk that was cut so much smaller tells little of the pace,
-constexpr double kComparable = 2;  // so many times as large a chunk is forgotten for it
-constexpr double kSurprise = 2;    // unless it took this many times what it should have
+// A chunk cut to less than this part of the largest is no evidence of the pace, unless it took
+// kSurprise times its expected time.
+constexpr double kSmallCut = 4;
+constexpr double kSurprise = 2;
+constexpr double kComparable = 2;  // a chunk replaces one at most so many times as large
 
 }  // namespace
 
@@ -46,30 +47,30 @@ double Pace::Whole() const { return std::max(aim_.seconds, fixed_ / kFixedShare)
 
 double Pace::FullChunk() const {
   if (!known()) return 1;
-  const double room = std::max(aim_.limit - fixed_, 0.0) / 2;
-  const double seconds = std::min(Whole() - fixed_, room);
+  const double allowed = std::max(aim_.limit - fixed_, 0.0) / 2;
+  const double seconds = std::min(Whole() - fixed_, allowed);
   double queries = each_ > 0 ? seconds / each_ : reach_;
-  // Two sizes tell what is fixed.
+  // Two sizes show the fixed cost.
   const double twofold = 2 * Largest();
-  if (!SizesDiffer() && each_ * twofold < room) queries = std::max(queries, twofold);
+  if (!SizesDiffer() && each_ * twofold < allowed) queries = std::max(queries, twofold);
   return std::clamp(queries, 1.0, reach_);
 }
 
 void Pace::Answered(const Chunk& chunk) {
-  // One that travelled while another was answered seems to have taken nothing for it.
+  // A chunk that travelled while another was being answered seems to have no travel time.
   const bool overlapped = chunk.queued && kSurprise * chunk.seconds < Seconds(chunk.queries);
   const bool dearer = chunk.seconds * largest_.queries > largest_.seconds * chunk.queries;
   if ((!chunk.queued || dearer) && kComparable * chunk.queries >= largest_.queries) {
     largest_ = chunk;
   }
-  const bool telling = !chunk.cut || !SizesDiffer() || kTellingSize * chunk.queries >= Largest() ||
-                       chunk.seconds > kSurprise * Seconds(chunk.queries);
-  if (!telling) return;
+  const bool is_evidence = !chunk.cut || !SizesDiffer() || kSmallCut * chunk.queries >= Largest() ||
+                           chunk.seconds > kSurprise * Seconds(chunk.queries);
+  if (!is_evidence) return;
   if (!overlapped) {
     newest_.push_back(chunk);
     Fit();
   }
-  const bool guess = !SizesDiffer();  // all of it may be the queries'
+  const bool guess = !SizesDiffer();  // all of the time may be the queries'
   const double fixed = guess ? 0 : fixed_;
   const double each = guess ? chunk.seconds / chunk.queries : each_;
   const bool fast = each * chunk.queries < kFast * (Whole() - fixed);
@@ -79,10 +80,10 @@ void Pace::Answered(const Chunk& chunk) {
 
 void Pace::Fit() {
   if (newest_.size() > kRemembered) newest_.pop_front();
-  // Errors are relative to what was expected: relative to what came, the fastest would win.
+  // Errors are relative to the expected time: relative to the measured one, the fastest would win.
   const bool first = newest_.size() == 1;
   double weight = 1, sum = 0, sum_n = 0, sum_nn = 0, sum_t = 0, sum_nt = 0;
-  for (auto chunk = newest_.rbegin(); chunk != newest_.rend(); ++chunk, weight *= kFading) {
+  for (auto chunk = newest_.rbegin(); chunk != newest_.rend(); ++chunk, weight *= kDecay) {
     const double n = chunk->queries;
     const double t = std::max(chunk->seconds, kShortest);
     const double expected = first ? t : std::max(Seconds(n), kShortest);
@@ -93,22 +94,22 @@ void Pace::Fit() {
     sum_t += w * t;
     sum_nt += w * n * t;
   }
-  const double held = kHeldTo * sum;
-  const double all = sum + held;
+  const double prior = kPriorWeight * sum;
+  const double all = sum + prior;
   const double determinant = all * sum_nn - sum_n * sum_n;
-  line_each_ = (all * sum_nt - sum_n * (sum_t + held * line_fixed_)) / determinant;
-  line_fixed_ = (sum_t + held * line_fixed_ - line_each_ * sum_n) / all;
-  if (line_each_ < 0) {  // larger chunks were quicker: all that is seen is fixed
+  line_each_ = (all * sum_nt - sum_n * (sum_t + prior * line_fixed_)) / determinant;
+  line_fixed_ = (sum_t + prior * line_fixed_ - line_each_ * sum_n) / all;
+  if (line_each_ < 0) {  // larger chunks were faster: all of the time is fixed
     line_each_ = 0;
     line_fixed_ = sum_t / sum;
   } else if (line_fixed_ < 0) {
     line_fixed_ = 0;
     line_each_ = sum_nt / sum_nn;
   }
-  fixed_ = std::max(line_fixed_ - Doubt(sum_nn, determinant), 0.0);
+  fixed_ = std::max(line_fixed_ - FixedError(sum_nn, determinant), 0.0);
   each_ = std::max((sum_nt - fixed_ * sum_n) / sum_nn, 0.0);
-  // No query takes more than its share of the largest chunk: what small ones took beyond is theirs,
-  // however it scatters.
+  // A query costs at most the mean of the largest chunk; the rest of a small chunk's time is
+  // scatter.
   const double share = std::max(largest_.seconds, kShortest) / largest_.queries;
   if (each_ <= share) return;
   each_ = share;
@@ -116,9 +117,9 @@ void Pace::Fit() {
 }
 
 // The standard error of the line's fixed cost, by how the chunks scatter about it.
-double Pace::Doubt(double sum_nn, double determinant) const {
+double Pace::FixedError(double sum_nn, double determinant) const {
   double errors = kLeastError * kLeastError, count = 0, weight = 1;
-  for (auto chunk = newest_.rbegin(); chunk != newest_.rend(); ++chunk, weight *= kFading) {
+  for (auto chunk = newest_.rbegin(); chunk != newest_.rend(); ++chunk, weight *= kDecay) {
     const double expected = std::max(line_fixed_ + line_each_ * chunk->queries, kShortest);
     const double error = chunk->seconds / expected - 1;
     errors += weight * error * error;

@@ -8,9 +8,9 @@ namespace stellate::server {
 // Estimates how long a worker takes for n queries, seconds = fixed + each * n, and how many queries
 // to put into its next chunk.
 //
-//   Pace pace({0.25, 60});                      // chunks of a quarter of a second, a minute at
-//   most pace.Answered({1, 0.01, false, false});     // after each chunk n = pace.FullChunk(); //
-//   for the next one
+//   Pace pace({0.25, 60});                   // chunks of 0.25 seconds, of a minute at most
+//   pace.Answered({1, 0.01, false, false});  // after each chunk
+//   n = pace.FullChunk();                    // for the next chunk
 //
 // The line is fitted to the newest chunks by least squares of relative errors; older chunks weigh
 // less. Only the part of the fixed cost that exceeds its uncertainty is used, since scattered times
@@ -43,7 +43,7 @@ class Pace {
   void BeginAgain() { *this = Pace(aim_); }
 
   bool known() const { return !newest_.empty(); }
-  bool settled() const { return newest_.size() > 1; }
+  bool is_calibrated() const { return newest_.size() > 1; }
   double fixed() const { return fixed_; }
   double each() const { return each_; }
   double Seconds(double queries) const { return fixed_ + each_ * queries; }
@@ -59,7 +59,7 @@ class Pace {
   double Largest() const;
   double Whole() const;
   void Fit();
-  double Doubt(double sum_nn, double determinant) const;
+  double FixedError(double sum_nn, double determinant) const;
 
   Aim aim_;
   std::deque<Chunk> newest_;               // the newest last

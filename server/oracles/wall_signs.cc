@@ -12,8 +12,8 @@ using core::Brief;
 using core::Message;
 using Eigen::Index;
 
-// Points that tell how a wall's values change over M. Seeds may all lie on the wall.
-constexpr Index kTelling = 64;
+// Points that show how a wall's values change over M. Seeds may all lie on the wall.
+constexpr Index kEnoughPoints = 64;
 
 }  // namespace
 
@@ -36,10 +36,10 @@ void WallSigns::Learn(const core::AnswerBlock& answer) {
   }
 }
 
-void WallSigns::Compare(const core::QueryBlock& block, Index query, const Testimony& a,
-                        const Testimony& b) {
-  const bool told = a.answers->clearances.size() > 0 && b.answers->clearances.size() > 0;
-  if (!told || !a.found() || !b.found()) return;
+void WallSigns::Compare(const core::QueryBlock& block, Index query, const AnswerRef& a,
+                        const AnswerRef& b) {
+  const bool have_both = a.answers->clearances.size() > 0 && b.answers->clearances.size() > 0;
+  if (!have_both || !a.found() || !b.found()) return;
   const double between = (a.answers->points.col(a.at) - b.answers->points.col(b.at)).norm();
   if (between > AllowedApart(spec_, block, query, a, b)) return;
   for (std::size_t w = 0; w < walls_.size(); ++w) {
@@ -58,7 +58,7 @@ void WallSigns::Compare(const core::QueryBlock& block, Index query, const Testim
 }
 
 std::string WallSigns::Verdict() const {
-  if (seen_ < kTelling) return "";
+  if (seen_ < kEnoughPoints) return "";
   const double across = (high_ - low_).norm();
   for (const Wall& wall : walls_) {
     if (wall.words.empty() || !(across > 0)) continue;

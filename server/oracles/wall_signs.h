@@ -16,8 +16,8 @@ namespace stellate::server {
 // Where the points of two answers agree, the signs of their clearances must agree too, except on
 // the wall, where a sign is rounding. A wall's values have no unit, so two values contradict each
 // other if they differ by more than the values change, on average over M, along the distance that
-// the points may have. The first queries do not tell how much that is: a suspected contradiction
-// waits until it is known.
+// the points may have. The first queries do not show how much that is: a contradiction waits until
+// it is known.
 class WallSigns {
  public:
   explicit WallSigns(const core::Specification& spec);
@@ -25,8 +25,8 @@ class WallSigns {
   // REQUIRES: the answers count, and passed CheckAnswers.
   void Learn(const core::AnswerBlock& answer);
   // Compares two answers to query `query` of `block`. REQUIRES: FindDisagreement returned "".
-  void Compare(const core::QueryBlock& block, Eigen::Index query, const Testimony& a,
-               const Testimony& b);
+  void Compare(const core::QueryBlock& block, Eigen::Index query, const AnswerRef& a,
+               const AnswerRef& b);
   // Returns a certain disagreement as a sentence, as of DescribeDisagreement, or "".
   std::string Verdict() const;
 

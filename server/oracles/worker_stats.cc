@@ -28,7 +28,7 @@ std::vector<WorkerStats> Dispatch::ListWorkers() const {
 std::vector<WorkerStats> OraclePool::ListWorkers() const {
   const std::lock_guard lock(mutex_);
   std::vector<WorkerStats> workers = dispatch_.ListWorkers();
-  for (WorkerStats& member : workers) member.display_name = titles_.at(member.id);
+  for (WorkerStats& member : workers) member.display_name = display_names_.at(member.id);
   return workers;
 }
 

@@ -32,7 +32,7 @@ void Audit(const Session& session, const Identity& caller, const std::string& pe
            const char* action);
 
 // The caller's mesh of that name, or an administrator's choice of any, or INVALID_ARGUMENT or
-// NOT_FOUND. Another owner's mesh is not told from one that does not exist. `field`: where the name
+// NOT_FOUND. Another owner's mesh looks like one that does not exist. `field`: where the name
 // stands.
 tl::expected<std::shared_ptr<Session>, grpc::Status> FindMesh(const ServerState& state,
                                                               const Identity& caller,

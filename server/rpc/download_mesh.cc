@@ -60,7 +60,7 @@ class DownloadStream final
   // disk.
   void Begin() {
     const bool over = session().HasEnded();  // before the revision: nothing follows then
-    const WatchLog* const history = OpenHistory();
+    const MeshHistory* const history = OpenHistory();
     if (history == nullptr) return;
     const std::uint64_t newest = history->revision();
     if (newest < revision_) {
@@ -80,8 +80,8 @@ class DownloadStream final
 
   std::uint64_t revision_ = 0;
   std::uint64_t position_ = 0;
-  WatchLog::Snapshot snapshot_;
-  std::optional<WatchLog::Cursor> cursor_;
+  MeshHistory::Snapshot snapshot_;
+  std::optional<MeshHistory::Cursor> cursor_;
 };
 
 }  // namespace

@@ -67,7 +67,7 @@ class HistoryStream : public ServerStream<Request, Response>, public SessionWatc
   virtual bool MayLeaveUnread() const { return false; }
 
   // (locked) The mesh's history, read from the disk if need be; null: not yet, or this calls End.
-  const WatchLog* OpenHistory() {
+  const MeshHistory* OpenHistory() {
     const TimePoint now = Clock::now();
     history_ = state().store.OpenHistory(Base::session());
     if (history_ != nullptr) {
@@ -78,7 +78,7 @@ class HistoryStream : public ServerStream<Request, Response>, public SessionWatc
     if (auto status = NoHistory(state(), session(), now - *wanted_since_)) End(std::move(*status));
     return nullptr;
   }
-  const WatchLog* history() const { return history_.get(); }
+  const MeshHistory* history() const { return history_.get(); }
   void CloseHistory() { history_.reset(); }
 
   const Session& session() const { return *Base::session(); }
@@ -108,8 +108,8 @@ class HistoryStream : public ServerStream<Request, Response>, public SessionWatc
     return grpc::Status::OK;
   }
 
-  std::shared_ptr<const WatchLog> history_;  // while it is read
-  std::optional<TimePoint> wanted_since_;    // the history
+  std::shared_ptr<const MeshHistory> history_;  // while it is read
+  std::optional<TimePoint> wanted_since_;       // the history
 };
 
 }  // namespace stellate::server

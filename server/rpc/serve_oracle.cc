@@ -56,7 +56,7 @@ class OracleStream final : public ServerStream<v1::ServeOracleRequest, v1::Serve
     Pump();
   }
 
-  std::string Title() const override {
+  std::string DisplayName() const override {
     return core::Message(text::Printable(worker_name_), worker_name_.empty() ? "at " : " at ",
                          peer());
   }
@@ -132,7 +132,7 @@ class OracleStream final : public ServerStream<v1::ServeOracleRequest, v1::Serve
 
   void TakeAnswers(const v1::AnswerChunk& answers) {
     NoteAnswer(answers.lease());
-    auto chunk = session()->pool().Claim(worker_, answers.lease());
+    auto chunk = session()->pool().Accept(worker_, answers.lease());
     if (!chunk) return OutOfOrder(chunk.error().message);
     if (!*chunk) return;  // late: another has the work, or it is done
     const auto block = FromProto(answers, **chunk, session()->request().spec);

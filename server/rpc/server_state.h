@@ -23,7 +23,7 @@ struct ServerState {
             MemoryBudget::Limits{config.max_memory_bytes, config.owner_memory_bytes},
             MemoryBudget::Of::kStreams)),
         store(limits, std::move(factory)) {
-    memory->MakeRoomBy([this] { return store.PutAwayHistories(); });
+    memory->MakeRoomBy([this] { return store.UnloadHistories(); });
   }
 
   const Config config;
@@ -36,7 +36,8 @@ struct ServerState {
   std::atomic<bool> draining{false};  // no new meshes
 };
 
-// What a server decides about a mesh, whoever asked for it, into `options`, whose owner is set.
+// Writes the server's policy for a mesh, whatever its owner, into `options`. REQUIRES: its owner is
+// set.
 void ApplyServerPolicy(ServerState& state, SessionOptions* options);
 
 }  // namespace stellate::server

@@ -10,10 +10,11 @@
 
 namespace stellate::server {
 
-// The rpcs of stellate.v1. gRPC tells of a unary call, or of one that is answered by a stream, once
-// its request is whole: until then anybody could have it kept, with no token asked for. So each is
-// taken as a stream in both directions, which looks the same to its client; of those gRPC tells
-// when the headers have come. A caller who is not known is refused then, and his request not read.
+// The rpcs of stellate.v1. gRPC reports a unary call, or one that is answered by a stream, once its
+// request is complete; until then it would keep the request of any client, without a token. So each
+// rpc is implemented as a stream in both directions, which looks the same to its client: gRPC
+// reports it when the headers have arrived. An unknown caller is refused then, and the request is
+// not read.
 class Rpcs final : public grpc::Service {
  public:
   // By its path on the wire.
@@ -39,7 +40,7 @@ class Rpcs final : public grpc::Service {
   int count_ = 0;
 };
 
-// What nobody serves: UNIMPLEMENTED, at the headers as well.
+// Unknown methods: UNIMPLEMENTED, at the headers as well.
 class UnknownRpcs final : public grpc::CallbackGenericService {
  public:
   grpc::ServerGenericBidiReactor* CreateReactor(

@@ -19,7 +19,7 @@ class Stream {
 // The open streams of a server.
 class StreamRegistry {
  public:
-  // Stops the stream at once if the server is stopping already.
+  // Stops the stream immediately if the server is stopping already.
   void Add(const std::shared_ptr<Stream>& stream);
   void Tick(TimePoint now);
   void StopAll();

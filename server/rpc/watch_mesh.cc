@@ -41,7 +41,7 @@ class WatchStream final : public HistoryStream<v1::WatchMeshRequest, v1::WatchMe
     const std::uint64_t newest = session().history().revision();
     const bool behind = geometry_ && !cursor_ && newest > at_;
     if (behind) {
-      if (const WatchLog* const history = OpenHistory()) cursor_ = history->Begin(at_);
+      if (const MeshHistory* const history = OpenHistory()) cursor_ = history->Begin(at_);
     }
     if (cursor_) {
       TakePart();
@@ -74,7 +74,7 @@ class WatchStream final : public HistoryStream<v1::WatchMeshRequest, v1::WatchMe
 
   bool geometry_ = true;
   std::uint64_t at_ = 0;  // the client has all up to this revision
-  std::optional<WatchLog::Cursor> cursor_;
+  std::optional<MeshHistory::Cursor> cursor_;
   bool progress_due_ = true;
 };
 

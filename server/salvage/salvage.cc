@@ -301,7 +301,7 @@ core::Expected<std::string> SalvageDataDir(const std::string& path) {
   if (!status.ok()) return tl::unexpected(status);
   return Message("damage: ", sound.error().message, "\n", findings,
                  findings.empty() ? "no mesh could be read\n" : "",
-                 "a mesh of which nothing is said here is lost, or was deleted; one that was "
+                 "a mesh that is not listed here is lost, or was deleted; one that was "
                  "deleted of late may be back\nthe damaged files are in ",
                  *aside, "\n");
 }

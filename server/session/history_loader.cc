@@ -10,9 +10,9 @@ constexpr auto kRetryLoading = std::chrono::seconds(1);  // where there was no m
 
 }  // namespace
 
-std::shared_ptr<const WatchLog> HistoryLoader::Open(const std::shared_ptr<Session>& session) {
-  auto log = session->history().log();
-  if (log != nullptr || session->history().IsLost()) return log;
+std::shared_ptr<const MeshHistory> HistoryLoader::Open(const std::shared_ptr<Session>& session) {
+  auto history = session->history().loaded();
+  if (history != nullptr || session->history().IsLost()) return history;
   {
     const std::lock_guard lock(mutex_);
     if (stopped_ || std::find(wanted_.begin(), wanted_.end(), session) != wanted_.end()) {

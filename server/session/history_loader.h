@@ -17,10 +17,10 @@ class HistoryLoader {
   HistoryLoader() = default;
   ~HistoryLoader() { Stop(); }
 
-  // The session's history. Null: it is lost, or will be loaded; the session's watchers are woken
-  // then. Does not block.
-  std::shared_ptr<const WatchLog> Open(const std::shared_ptr<Session>& session);
-  // Loads no more.
+  // Returns the session's history. Null: it is lost, or will be loaded, and wakes the session's
+  // watchers then. Does not block.
+  std::shared_ptr<const MeshHistory> Open(const std::shared_ptr<Session>& session);
+  // Loads no further history.
   void Stop();
 
  private:
@@ -30,7 +30,7 @@ class HistoryLoader {
   std::condition_variable_any wanted_changed_;
   std::deque<std::shared_ptr<Session>> wanted_;
   bool stopped_ = false;
-  std::jthread thread_;  // from the first that is wanted
+  std::jthread thread_;  // starts with the first that is wanted
 };
 
 }  // namespace stellate::server

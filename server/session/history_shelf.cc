@@ -10,7 +10,7 @@ namespace stellate::server {
 HistoryShelf::HistoryShelf(const SessionOptions& options) : options_(options) {
   if (!options_.record || !options_.record->result) {
     const core::Specification& spec = options_.request.spec;
-    log_ = std::make_shared<WatchLog>(spec.dimension, spec.ambient_dimension);
+    loaded_ = std::make_shared<MeshHistory>(spec.dimension, spec.ambient_dimension);
     return;
   }
   const SessionResult& result = *options_.record->result;
@@ -22,7 +22,7 @@ HistoryShelf::HistoryShelf(const SessionOptions& options) : options_(options) {
 }
 
 core::Status HistoryShelf::Publish(const core::MeshDelta& delta, const PastProgress& now) {
-  core::Status status = log_->Append(delta);  // which only this thread changes
+  core::Status status = loaded_->Append(delta);  // which only this thread changes
   if (!status.ok()) return status;
   const std::lock_guard lock(mutex_);
   past_.Add(now);
@@ -31,8 +31,8 @@ core::Status HistoryShelf::Publish(const core::MeshDelta& delta, const PastProgr
 
 std::optional<MeshFailure> HistoryShelf::Record(const core::Progress& progress,
                                                 const core::Report& report) {
-  const SessionResult result{progress, report, log_->revision(), log_->MemoryBytes(), past_};
-  if (auto failure = options_.ports.journal->WriteResult(result, *log_)) return failure;
+  const SessionResult result{progress, report, loaded_->revision(), loaded_->MemoryBytes(), past_};
+  if (auto failure = options_.ports.journal->WriteResult(result, *loaded_)) return failure;
   const std::lock_guard lock(mutex_);
   place_ = Place::kMemoryAndJournal;
   revision_ = result.revision;
@@ -41,20 +41,20 @@ std::optional<MeshFailure> HistoryShelf::Record(const core::Progress& progress,
   return std::nullopt;
 }
 
-std::shared_ptr<const WatchLog> HistoryShelf::log() const {
+std::shared_ptr<const MeshHistory> HistoryShelf::loaded() const {
   const std::lock_guard lock(mutex_);
-  return log_;
+  return loaded_;
 }
 
 std::uint64_t HistoryShelf::revision() const {
   const std::lock_guard lock(mutex_);
-  return log_ != nullptr ? log_->revision() : revision_;
+  return loaded_ != nullptr ? loaded_->revision() : revision_;
 }
 
 std::uint64_t HistoryShelf::PublishedRevision() const {
   const std::lock_guard lock(mutex_);
   if (place_ != Place::kMemory) return revision_;
-  return std::max(log_->revision(), options_.record ? options_.record->rounds : 0);
+  return std::max(loaded_->revision(), options_.record ? options_.record->rounds : 0);
 }
 
 std::uint64_t HistoryShelf::SeenRevision() const {
@@ -67,7 +67,7 @@ std::vector<PastProgress> HistoryShelf::PastAfter(std::uint64_t revision) const 
 }
 
 HistoryShelf::Loading HistoryShelf::Load() {
-  if (log() != nullptr) {
+  if (loaded() != nullptr) {
     WakeWatchers();
     return Loading::kDone;
   }
@@ -84,7 +84,7 @@ HistoryShelf::Loading HistoryShelf::Load() {
   {
     const std::lock_guard lock(mutex_);
     place_ = is_whole ? Place::kMemoryAndJournal : Place::kLost;
-    if (is_whole) log_ = std::move(*read);
+    if (is_whole) loaded_ = std::move(*read);
     used_ = Clock::now();
   }
   CountBytes();
@@ -97,18 +97,18 @@ bool HistoryShelf::IsLost() const {
   return place_ == Place::kLost;
 }
 
-bool HistoryShelf::PutAway(Clock::duration unused) {
-  std::shared_ptr<WatchLog> log;  // freed without the lock
+bool HistoryShelf::Unload(Clock::duration unused) {
+  std::shared_ptr<MeshHistory> unloaded;  // freed without the lock
   {
     const std::lock_guard lock(mutex_);
     if (place_ != Place::kMemoryAndJournal) return false;
     const TimePoint now = Clock::now();
-    if (log_.use_count() > 1) used_ = now;
-    if (log_.use_count() > 1 || now - used_ < unused) return false;
+    if (loaded_.use_count() > 1) used_ = now;
+    if (loaded_.use_count() > 1 || now - used_ < unused) return false;
     place_ = Place::kJournal;
-    log = std::move(log_);
+    unloaded = std::move(loaded_);
   }
-  log.reset();
+  unloaded.reset();
   CountBytes();
   return true;
 }
@@ -116,7 +116,7 @@ bool HistoryShelf::PutAway(Clock::duration unused) {
 void HistoryShelf::CountBytes() {
   const auto& memory = options_.ports.memory;
   if (memory == nullptr) return;
-  const auto held = log();
+  const auto held = loaded();
   const std::uint64_t bytes = held != nullptr ? held->MemoryBytes() : 0;
   memory->SetUnchecked(EstimateFinishedBytes(options_.request.spec) + bytes);
 }

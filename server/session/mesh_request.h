@@ -7,10 +7,10 @@
 
 namespace stellate::server {
 
-// A mesh as it was asked for: all of it that a journal keeps.
+// All that a client declared of a mesh, as a journal keeps it.
 struct MeshRequest {
   std::string name;   // "meshes/<id>"
-  std::string owner;  // whose it is; empty where the server tells nobody apart
+  std::string owner;  // empty where clients are not authenticated
   std::string label;  // the client's
   core::Specification spec;
   OracleTimeouts timeouts;

@@ -8,30 +8,29 @@
 
 namespace stellate::server {
 
-// How a mesh stood at one of its revisions.
+// The progress of a mesh at one revision.
 struct PastProgress {
   std::uint64_t revision = 0;
   core::Progress progress;
   double elapsed_seconds = 0;  // since creation; 0: unknown
 };
 
-// How a mesh stood at each of its revisions. Memory is bounded: once there are kMost, every second
-// is forgotten, and from then on only every second revision is kept, and so on. The newest is
-// always there.
+// The progress of a mesh at its revisions. Memory is bounded: beyond kMost revisions it keeps only
+// every second one, then every fourth, and so on, and always the newest.
 class ProgressHistory {
  public:
   static constexpr std::size_t kMost = 4096;
 
-  // Revisions ascend.
+  // REQUIRES: revisions ascend.
   void Add(const PastProgress& past);
-  // Of revisions after this one, ascending.
+  // Returns those of later revisions, ascending.
   std::vector<PastProgress> After(std::uint64_t revision) const;
 
   const std::vector<PastProgress>& all() const { return all_; }
 
  private:
   std::vector<PastProgress> all_;
-  std::uint64_t step_ = 1;  // but for the newest, only multiples of it are kept
+  std::uint64_t step_ = 1;  // only multiples of it are kept, and the newest
 };
 
 }  // namespace stellate::server

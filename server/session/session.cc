@@ -72,7 +72,7 @@ Session::Session(SessionOptions options, MesherFactory factory)
       created_(CreatedAt(options_.record)),
       life_(FirstLife(options_.record)) {
   if (ports().journal != nullptr) {
-    pool_.TellOfAnswers([journal = ports().journal.get()](const auto& round, std::size_t block,
+    pool_.SetOnAnswered([journal = ports().journal.get()](const auto& round, std::size_t block,
                                                           auto first, auto count) {
       journal->TakeAnswers(round, block, first, count);
     });
@@ -195,7 +195,7 @@ void Session::RepeatEnd(core::Mesher* mesher) {
   if (end.state == SessionState::kCancelled) return mesher->Cancel();
   FailBlameless(mesher, {FailureReason::kReplayMismatch,
                          "the recorded answers made a whole mesh once, and now do not: this "
-                         "server meshes differently from the one that recorded them; mesh anew"});
+                         "server meshes differently from the one that recorded them; mesh again"});
 }
 
 // False, and the mesh has failed, if it has grown beyond what the server can hold.

@@ -31,9 +31,14 @@ struct SessionView {
   std::uint64_t bytes = 0;          // estimated; 0 where memory is not counted
 };
 
-// One mesh: drives a core::Mesher on a thread of its own, asks the pool, publishes each round on
-// the shelf of its history, and records itself in its journal. session_life.h has its states, and
-// what leads from one to the next. Knows nothing of the network.
+// Runs one mesh: passes a core::Mesher's queries to the pool, publishes each round to the history,
+// and records everything in the journal. session_life.h has its states and transitions. Does not
+// use the network.
+//
+//   auto session = std::make_shared<Session>(options);
+//   std::thread thread([session] { session->Run(); });
+//   session->pool().Join(worker, 0);                // workers' streams, on any thread
+//   session->history().AddWatcher(watcher);         // watchers' streams, on any thread
 class Session {
  public:
   using MesherFactory =
@@ -41,18 +46,18 @@ class Session {
 
   explicit Session(SessionOptions options, MesherFactory factory = core::Mesher::Create);
 
-  // Meshes to the end, on the calling thread. Once only, and not at all when it is Over before: a
-  // finished mesh that its journal has whole.
+  // Meshes to the end, on the calling thread. Call it once, and not if Over() is true already: a
+  // finished mesh whose journal is complete.
   void Run();
-  // Run has nothing left to do but return, and the memory of the mesher is given back. It follows
-  // HasEnded immediately, or a tenth of a second later after millions of vertices.
+  // Whether Run only has to return: the mesher's memory has been released. That follows HasEnded
+  // immediately, or a tenth of a second later after millions of vertices.
   bool Over() const;
 
   // Ends the mesh; any thread. Takes effect immediately where Run waits, else after the round being
   // computed, or after the replay. A mesh that had ended before its replay stays as it was.
   void Cancel();
 
-  // Ends Run as soon as can be: the mesh was deleted.
+  // Ends Run as soon as possible: the mesh was deleted.
   void Abandon();
   // The same for a mesh that was never run and will not be.
   void AbandonUnrun();
@@ -60,7 +65,7 @@ class Session {
   void Suspend();
 
   bool IsReplaying() const;
-  // What the mesh will hold when its replay is over, in bytes.
+  // Memory that the mesh will occupy when its replay is over, in bytes.
   std::uint64_t ReplayBytes() const;
 
   SessionView View() const;
@@ -110,16 +115,16 @@ class Session {
   const std::chrono::system_clock::time_point create_time_;
   const TimePoint created_;  // as if no time had passed without a server
 
-  // Run's thread alone:
+  // For Run's thread alone:
   MeshFailure failure_;
-  core::Status blame_;                     // what all workers hear at the end
+  core::Status blame_;                     // what all workers receive at the end
   std::optional<core::MeshDelta> unseen_;  // absorbed, not published yet
 
   mutable std::mutex mutex_;
   SessionLife life_;
   core::Mesher* computing_ = nullptr;  // while it lives
   core::Progress progress_;
-  std::optional<SessionEnd> end_;  // once it can be seen, as the report
+  std::optional<SessionEnd> end_;  // once clients can see it, as the report
   std::optional<core::Report> report_;
 };
 

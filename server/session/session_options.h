@@ -12,7 +12,8 @@
 
 namespace stellate::server {
 
-// Hears what becomes of a session, for the metrics. On the session's thread; must not block.
+// Receives the rounds and the end of a session, for the metrics. On the session's thread; must not
+// block.
 class SessionObserver : public PoolObserver {
  public:
   virtual void OnRound(std::size_t queries) = 0;  // answered

@@ -168,10 +168,9 @@ void SessionStore::AdvanceLocked() {
   });
 }
 
-bool SessionStore::PutAwayHistories() {
+bool SessionStore::UnloadHistories() {
   bool any = false;
-  for (const auto& session : All())
-    any = session->history().PutAway(Clock::duration::zero()) || any;
+  for (const auto& session : All()) any = session->history().Unload(Clock::duration::zero()) || any;
   if (any) malloc_trim(0);
   return any;
 }
@@ -285,7 +284,7 @@ std::vector<std::uint64_t> SessionStore::OutlivedLocked(TimePoint now) {
 
 void SessionStore::Sweep(TimePoint now) {
   bool any = false;
-  for (const auto& session : All()) any = session->history().PutAway(kUnread) || any;
+  for (const auto& session : All()) any = session->history().Unload(kUnread) || any;
   if (any) malloc_trim(0);
   std::vector<Entry> dead;  // freeing a large mesh takes time: after the lock
   const std::lock_guard lock(mutex_);

@@ -40,45 +40,46 @@ class SessionStore {
   explicit SessionStore(StoreLimits limits, Session::MesherFactory factory = core::Mesher::Create);
   ~SessionStore();
 
-  // Names the mesh and sets it going. kLimitExceeded: too many are running, or the system gives no
-  // thread for it.
+  // Names the mesh and starts its thread. kLimitExceeded: too many meshes are running, or the
+  // system has no further thread.
   Allowed<std::shared_ptr<Session>> Create(SessionOptions options);
   // Before the first Create.
   void RecordIn(JournalFactory new_journal) { new_journal_ = std::move(new_journal); }
-  // Takes up a mesh that an earlier server recorded: options.journal and options.record are set.
-  // One that ended too long ago is forgotten instead. One that its journal has whole is there at
-  // once; others are replayed a few at a time, the oldest first, as the memory budget allows.
+  // Restores a mesh that an earlier server recorded. REQUIRES: options.journal and options.record
+  // are set. A mesh that ended too long ago is deleted instead. A finished one is available
+  // immediately; others are replayed a few at a time, the oldest first, as the memory budget
+  // allows.
   void Restore(SessionOptions options);
   std::shared_ptr<Session> Find(const std::string& name) const;  // null: none
-  // Cancels and forgets; false if there is none.
+  // Cancels and deletes a mesh; false if there is none.
   bool Delete(const std::string& name);
 
-  // The history of a mesh. Null: it is being read back from the journal, and the mesh's watchers
-  // are woken when it is there, or lost.
-  std::shared_ptr<const WatchLog> OpenHistory(const std::shared_ptr<Session>& session) {
+  // Returns the history of a mesh. Null: it is being read back from the journal; the mesh's
+  // watchers are woken when it has been read, or is lost.
+  std::shared_ptr<const MeshHistory> OpenHistory(const std::shared_ptr<Session>& session) {
     return loader_.Open(session);
   }
-  // Takes from memory what the journal has, and nobody reads. False: there was nothing.
-  bool PutAwayHistories();
+  // Frees the memory of histories that a journal has and no client reads. False: there were none.
+  bool UnloadHistories();
 
   struct Page {
     std::vector<std::shared_ptr<Session>> sessions;  // oldest first
     std::vector<std::uint64_t> numbers;              // of each; later ones are greater
     bool more = false;
   };
-  // One owner's; of everybody without one.
+  // The meshes of one owner, or of all owners.
   Page List(std::uint64_t after, std::size_t count, const std::optional<std::string>& owner) const;
-  std::vector<std::shared_ptr<Session>> All() const;  // everyone's
+  std::vector<std::shared_ptr<Session>> All() const;  // of all owners
 
   std::size_t Running() const;
   std::size_t Served() const;  // running, with a worker
-  // Forgets finished meshes that were kept long enough, and what an owner has beyond his number:
-  // first those without a vertex, then the oldest, but none of these within a minute of its end. So
-  // whoever is told apart from nobody can not have another's result forgotten by making and
-  // cancelling meshes. To be called now and then.
+  // Deletes finished meshes that were kept long enough, and those beyond an owner's number: first
+  // the ones without a vertex, then the oldest, but none of these within a minute of its end. So,
+  // where clients are not authenticated, one client cannot evict another's result by creating and
+  // cancelling meshes. Call it every second or so.
   void Sweep(TimePoint now);
-  // Suspends all and waits for their threads until `deadline`. False: some are still computing;
-  // they are left to themselves and the process must end.
+  // Suspends all meshes and waits for their threads until `deadline`. False: some still compute;
+  // the process must end without them.
   bool Stop(TimePoint deadline);
 
  private:
@@ -97,7 +98,7 @@ class SessionStore {
 
   std::vector<std::uint64_t> OutlivedLocked(TimePoint now);
 
-  // Deleted entries whose thread is done and which nobody else holds; to be destroyed unlocked.
+  // Deleted entries whose thread has ended and which no other thread holds; destroy them unlocked.
   std::vector<Entry> TakeDeadLocked();
 
   const StoreLimits limits_;
@@ -106,7 +107,7 @@ class SessionStore {
   mutable std::mutex mutex_;
   std::map<std::uint64_t, Entry> entries_;
   std::unordered_map<std::string, std::uint64_t> numbers_;
-  std::vector<Entry> dying_;  // deleted; until their threads end and their watchers go
+  std::vector<Entry> dying_;  // deleted; until their threads end and their watchers leave
   std::deque<std::uint64_t> unreplayed_;
   std::uint64_t next_number_ = 1;
   bool stopped_ = false;

@@ -89,7 +89,7 @@ class JournalFile {
   bool RemovePiece(std::int64_t mesh, Kinds kinds, bool* done);
   void Count(std::int64_t mesh, std::int64_t bytes);
 
-  std::unique_ptr<JournalMark> mark_;  // null: nobody needs it yet
+  std::unique_ptr<JournalMark> mark_;  // null: not needed yet
   const std::unique_ptr<Sqlite> database_;
   std::string reserve_;
   JournalState state_, pending_;  // pending: of the transaction under way

@@ -12,12 +12,12 @@ namespace stellate::server {
 // How far a journal got: a small file next to it, written after each transaction and before anyone
 // hears of that. SQLite takes a damaged end of its log for one that was never written; a journal
 // that is behind its mark gives that away. The mark itself may lag: its writes are not waited for
-// until Sync, so that it outlives the server at once, and the machine a moment later.
+// until Sync, so that it outlives the server immediately, and the machine a moment later.
 class JournalMark {
  public:
   struct State {
     std::uint64_t identity = 0;  // of the journal
-    std::uint64_t commits = 0;   // of which this many transactions are on the disk
+    std::uint64_t commits = 0;   // transactions of the journal that are on the disk
   };
 
   // A new file at `path`, on the disk once this returns.

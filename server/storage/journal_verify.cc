@@ -117,8 +117,8 @@ Status JournalFile::Verify(const std::string& path) {
   if (!(found == state_)) {
     return DamagedJournal(
         path, Message("it should hold ", state_.records, " records and holds ", found.records,
-                      found.records == state_.records ? ", of which some are not the last "
-                                                        "that was written"
+                      found.records == state_.records ? "; some of these are not the last "
+                                                        "version written"
                                                       : ""));
   }
   return Status::Ok();

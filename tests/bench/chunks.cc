@@ -104,9 +104,10 @@ class Simulation {
       const Lease lease = answers_.begin()->second;
       answers_.erase(answers_.begin());
       Lease claimed;
-      const auto result = dispatch_.Claim(lease.worker, lease.id, Time(), &claimed);
-      if (result == Dispatch::ClaimResult::kClaimed) dispatch_.Settle(claimed.id, claimed.count);
-      if (result == Dispatch::ClaimResult::kSecond) Compare(claimed);
+      const auto result = dispatch_.Accept(lease.worker, lease.id, Time(), &claimed);
+      if (result == Dispatch::AcceptResult::kCounts)
+        dispatch_.MarkAnswered(claimed.id, claimed.count);
+      if (result == Dispatch::AcceptResult::kForComparison) Compare(claimed);
     } else {
       now_ = std::max(now_, deadline) + 1e-9;
       dispatch_.Expire(Time());

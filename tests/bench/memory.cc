@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "server/history/watch_log.h"
+#include "server/history/mesh_history.h"
 #include "server/memory/memory_budget.h"
 #include "tests/support/run_mesher.h"
 
@@ -70,7 +70,7 @@ Taken Mesh(const std::string& name, double epsilon) {
     std::fprintf(stderr, "%s\n", mesher.error().message.c_str());
     std::exit(2);
   }
-  stellate::server::WatchLog history(spec.dimension, spec.ambient_dimension);
+  stellate::server::MeshHistory history(spec.dimension, spec.ambient_dimension);
   Taken taken;
   while (const auto* batch = (*mesher)->NextBatch()) {
     taken.vertices = static_cast<double>((*mesher)->progress().vertices);

@@ -131,7 +131,7 @@ class Theatre {
 
   // Whether the chunk was this worker's to answer.
   bool Answer(const Asked& asked, const AnswerBlock& answer) {
-    const auto claimed = session_->pool().Claim(asked.actor->id, asked.chunk.lease);
+    const auto claimed = session_->pool().Accept(asked.actor->id, asked.chunk.lease);
     if (!claimed || !*claimed) return false;
     const core::Status status = session_->pool().Deliver(**claimed, answer);
     if (!status.ok()) {
@@ -185,14 +185,14 @@ class Theatre {
       case Act::kStolenLease:
         for (const auto& thief : actors_) {
           if (thief->id == asked.actor->id) continue;
-          const auto stolen = pool.Claim(thief->id, chunk.lease);
+          const auto stolen = pool.Accept(thief->id, chunk.lease);
           Require(!stolen || !*stolen, "another's lease opens nothing");
         }
         Answer(asked, Truth(chunk));
         return;
       case Act::kStaleLease: {
         const std::uint64_t lease = script_->Number(4);
-        const auto stale = pool.Claim(asked.actor->id, lease);
+        const auto stale = pool.Accept(asked.actor->id, lease);
         Require(!stale || !*stale || leases_.contains(lease), "no lease that was never given");
         // It may have hit one of its own: then that one is claimed and stays unanswered.
         if (stale && *stale)
@@ -283,8 +283,8 @@ server::SessionOptions SmallSphere() {
 }
 
 std::string GeometryOf(const Session& session) {
-  const server::WatchLog& history = *session.history().log();
-  server::WatchLog::Cursor cursor = history.Begin(0);
+  const server::MeshHistory& history = *session.history().loaded();
+  server::MeshHistory::Cursor cursor = history.Begin(0);
   std::string points;
   std::set<std::vector<std::uint32_t>> simplices;
   bool complete = false;

@@ -50,10 +50,10 @@ TEST_F(JournalTest, AMeshStoppedAgainAndAgainIsTheUndisturbedOne) {
 TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
   SessionView before;
   std::vector<std::string> wholes;
-  const auto all_of = [](const WatchLog& history) {
+  const auto all_of = [](const MeshHistory& history) {
     std::vector<std::string> revisions;
     for (std::uint64_t revision = 1; revision <= history.revision(); ++revision) {
-      WatchLog::Cursor cursor = history.BeginAt(revision, 0);
+      MeshHistory::Cursor cursor = history.BeginAt(revision, 0);
       std::string& bytes = revisions.emplace_back();
       for (DeltaPart part; !part.complete;) {
         part = history.Next(&cursor, 1 << 12);
@@ -75,8 +75,8 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
     thread.join();
     before = session.View();
     past = session.history().PastAfter(0);
-    wholes = all_of(*session.history().log());
-    bytes = session.history().log()->MemoryBytes();
+    wholes = all_of(*session.history().loaded());
+    bytes = session.history().loaded()->MemoryBytes();
   }
   const auto journal = Open();
   auto meshes = journal->TakeMeshes();
@@ -88,7 +88,7 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
     return core::Refuse(core::StatusCode::kInvalidArgument, "none");
   });
   EXPECT_TRUE(session.Over() && session.HasEnded());
-  EXPECT_EQ(session.history().log(), nullptr);
+  EXPECT_EQ(session.history().loaded(), nullptr);
   EXPECT_EQ(session.View().revision, before.revision);
   EXPECT_EQ(session.history().PublishedRevision(), before.revision);
   EXPECT_EQ(session.View().report->certificate.euler_characteristic, 2);
@@ -104,7 +104,7 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
   EXPECT_EQ(past.back().progress.vertices, before.progress.vertices);
   EXPECT_EQ(budget->total(), EstimateFinishedBytes(session.request().spec));
   EXPECT_EQ(session.history().Load(), HistoryShelf::Loading::kNoMemory);
-  EXPECT_EQ(session.history().log(), nullptr);
+  EXPECT_EQ(session.history().loaded(), nullptr);
 
   budget->MakeRoomBy([&] { return true; });
   const auto larger = std::make_shared<MemoryBudget>(MemoryBudget::Limits{2 * bytes, 0});
@@ -113,15 +113,15 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
   reopened.ports.memory = MemoryBudget::Open(larger, "");
   Session readable(std::move(reopened));
   ASSERT_EQ(readable.history().Load(), HistoryShelf::Loading::kDone);
-  EXPECT_GE(larger->total(), readable.history().log()->MemoryBytes());
-  EXPECT_TRUE(all_of(*readable.history().log()) == wholes);
+  EXPECT_GE(larger->total(), readable.history().loaded()->MemoryBytes());
+  EXPECT_TRUE(all_of(*readable.history().loaded()) == wholes);
   {
-    const auto held = readable.history().log();
-    EXPECT_FALSE(readable.history().PutAway(Clock::duration::zero())) << "somebody reads it";
+    const auto held = readable.history().loaded();
+    EXPECT_FALSE(readable.history().Unload(Clock::duration::zero())) << "somebody reads it";
   }
-  EXPECT_FALSE(readable.history().PutAway(std::chrono::hours(1))) << "somebody has just read it";
-  EXPECT_TRUE(readable.history().PutAway(Clock::duration::zero()));
-  EXPECT_EQ(readable.history().log(), nullptr);
+  EXPECT_FALSE(readable.history().Unload(std::chrono::hours(1))) << "somebody has just read it";
+  EXPECT_TRUE(readable.history().Unload(Clock::duration::zero()));
+  EXPECT_EQ(readable.history().loaded(), nullptr);
   EXPECT_EQ(larger->total(), EstimateFinishedBytes(session.request().spec));
   EXPECT_EQ(readable.history().Load(), HistoryShelf::Loading::kDone) << "and back again";
 }
@@ -281,7 +281,7 @@ struct FailingJournal : testing::BlankJournal {
     state = end.state;
     return MeshFailure{FailureReason::kJournalFull, "no room"};
   }
-  std::optional<MeshFailure> WriteResult(const SessionResult&, const WatchLog&) override {
+  std::optional<MeshFailure> WriteResult(const SessionResult&, const MeshHistory&) override {
     ADD_FAILURE() << "its end is not recorded";
     return std::nullopt;
   }

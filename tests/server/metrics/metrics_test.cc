@@ -76,7 +76,7 @@ TEST_F(MetricsTest, CountsAMeshFromItsStartToItsEnd) {
   EXPECT_GT(series.at("stellate_queries_waiting"), 0);
   EXPECT_GT(series.at("stellate_mesh_bytes"), 0);
   EXPECT_GT(series.at("process_resident_memory_bytes"), series.at("stellate_mesh_bytes"));
-  EXPECT_EQ(series.at("stellate_backups_total"), 0) << "nobody is idle";
+  EXPECT_EQ(series.at("stellate_hedged_chunks_total"), 0) << "nobody is idle";
 
   open = true;
   watching.join();

@@ -9,7 +9,7 @@ namespace stellate::server {
 namespace {
 
 using namespace std::chrono_literals;
-using Claim = Dispatch::ClaimResult;
+using Accepted = Dispatch::AcceptResult;
 
 using testing::At;
 
@@ -18,10 +18,10 @@ class ComparisonsTest : public ::testing::Test {
  protected:
   ComparisonsTest() { options_.answer_limit = 100s; }
 
-  static void Settle(Dispatch* dispatch, const Lease& lease, TimePoint now) {
+  static void AnswerInTime(Dispatch* dispatch, const Lease& lease, TimePoint now) {
     Lease claimed;
-    ASSERT_EQ(dispatch->Claim(lease.worker, lease.id, now, &claimed), Claim::kClaimed);
-    dispatch->Settle(claimed.id, claimed.count);
+    ASSERT_EQ(dispatch->Accept(lease.worker, lease.id, now, &claimed), Accepted::kCounts);
+    dispatch->MarkAnswered(claimed.id, claimed.count);
   }
 
   DispatchOptions options_;
@@ -35,9 +35,9 @@ TEST_F(ComparisonsTest, AWorkerThatComesLateIsComparedBeforeTheRoundEnds) {
   dispatch.Join(1, 0);
   dispatch.Join(2, 0);
   const auto answer = [&](const Lease& lease, TimePoint now) {
-    const auto result = dispatch.Claim(lease.worker, lease.id, now, &claimed_);
-    ASSERT_EQ(result, lease.check ? Claim::kSecond : Claim::kClaimed);
-    if (!lease.check) dispatch.Settle(claimed_.id, claimed_.count);
+    const auto result = dispatch.Accept(lease.worker, lease.id, now, &claimed_);
+    ASSERT_EQ(result, lease.check ? Accepted::kForComparison : Accepted::kCounts);
+    if (!lease.check) dispatch.MarkAnswered(claimed_.id, claimed_.count);
   };
   const auto ask = [&](Dispatch::Family family, TimePoint now, WorkerId wanted) {
     dispatch.Begin({{1, 8, family}}, now);
@@ -84,7 +84,7 @@ TEST_F(ComparisonsTest, WhoHangsWhileHeComparesHoldsUpNoRoundForLong) {
   dispatch.Begin({{1, 8}}, At(0s));
   const auto leases = dispatch.Assign(At(0s));
   ASSERT_EQ(leases.size(), 2u);
-  Settle(&dispatch, leases[0], At(1ms));
+  AnswerInTime(&dispatch, leases[0], At(1ms));
   EXPECT_FALSE(dispatch.Done(At(1ms)));
   const TimePoint end = dispatch.NextDeadline();
   EXPECT_LE(end, At(10s));

@@ -30,11 +30,11 @@ class DispatchTest : public ::testing::Test {
 
   static void Answer(Dispatch* dispatch, const Lease& lease, TimePoint now) {
     Lease claimed;
-    ASSERT_EQ(dispatch->Claim(lease.worker, lease.id, now, &claimed),
-              Dispatch::ClaimResult::kClaimed);
+    ASSERT_EQ(dispatch->Accept(lease.worker, lease.id, now, &claimed),
+              Dispatch::AcceptResult::kCounts);
     EXPECT_EQ(claimed.first, lease.first);
     EXPECT_EQ(claimed.count, lease.count);
-    dispatch->Settle(claimed.id, claimed.count);
+    dispatch->MarkAnswered(claimed.id, claimed.count);
   }
 
   // A round of `queries` by workers that take `fixed` for a chunk and `each` for a query. When it
@@ -241,7 +241,7 @@ TEST_F(DispatchTest, AnswersAfterALeaseRanOutAreLateAndHarmless) {
   EXPECT_EQ(Queries(again), 1);
   for (const Lease& lease : again) EXPECT_EQ(lease.worker, 2u) << "a lively worker comes first";
   Lease claimed;
-  EXPECT_EQ(dispatch.Claim(1, lost[0].id, At(11s), &claimed), Dispatch::ClaimResult::kLate);
+  EXPECT_EQ(dispatch.Accept(1, lost[0].id, At(11s), &claimed), Dispatch::AcceptResult::kLate);
   EXPECT_FALSE(dispatch.Done(At(100s)));
   for (const Lease& lease : again) Answer(&dispatch, lease, At(11s));
   EXPECT_TRUE(dispatch.Done(At(100s)));
@@ -252,12 +252,12 @@ TEST_F(DispatchTest, LeasesThatWereNeverGivenAreUnknown) {
   dispatch.Join(1, 0);
   dispatch.Begin({{10, 8}}, At(0s));
   Lease claimed;
-  EXPECT_EQ(dispatch.Claim(1, 1, At(0s), &claimed), Dispatch::ClaimResult::kUnknown);
+  EXPECT_EQ(dispatch.Accept(1, 1, At(0s), &claimed), Dispatch::AcceptResult::kUnknown);
   const auto leases = dispatch.Assign(At(0s));
-  EXPECT_EQ(dispatch.Claim(1, 0, At(0s), &claimed), Dispatch::ClaimResult::kUnknown);
-  EXPECT_EQ(dispatch.Claim(1, 99, At(0s), &claimed), Dispatch::ClaimResult::kUnknown);
+  EXPECT_EQ(dispatch.Accept(1, 0, At(0s), &claimed), Dispatch::AcceptResult::kUnknown);
+  EXPECT_EQ(dispatch.Accept(1, 99, At(0s), &claimed), Dispatch::AcceptResult::kUnknown);
   Answer(&dispatch, leases[0], At(1s));
-  EXPECT_EQ(dispatch.Claim(1, leases[0].id, At(1s), &claimed), Dispatch::ClaimResult::kUnknown)
+  EXPECT_EQ(dispatch.Accept(1, leases[0].id, At(1s), &claimed), Dispatch::AcceptResult::kUnknown)
       << "answered twice";
 }
 
@@ -385,7 +385,7 @@ TEST_F(DispatchTest, LeasesOfAnEarlierRoundAreLate) {
   dispatch.Begin({{1, 8}}, At(1s));
   const auto fresh = dispatch.Assign(At(1s));
   Lease claimed;
-  EXPECT_EQ(dispatch.Claim(1, old[0].id, At(1s), &claimed), Dispatch::ClaimResult::kLate);
+  EXPECT_EQ(dispatch.Accept(1, old[0].id, At(1s), &claimed), Dispatch::AcceptResult::kLate);
   Answer(&dispatch, fresh[0], At(2s));
   EXPECT_TRUE(dispatch.Done(At(100s)));
 }

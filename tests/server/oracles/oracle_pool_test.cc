@@ -32,11 +32,11 @@ core::QueryBatch SomeQueries(int n) {
 
 class Counts : public PoolObserver {
  public:
-  void OnBackUps(std::size_t chunks) override { backups += chunks; }
+  void OnHedged(std::size_t chunks) override { hedged += chunks; }
   void OnCompared(std::size_t queries) override { compared += queries; }
   void OnDisagreement() override { ++disagreements; }
 
-  std::atomic<std::size_t> backups{0}, compared{0}, disagreements{0};
+  std::atomic<std::size_t> hedged{0}, compared{0}, disagreements{0};
 };
 
 // A worker that answers when the test says so.
@@ -50,7 +50,7 @@ class HandWorker : public OracleWorker {
     changed_.notify_all();
   }
   void End(const WorkerEnd&) override {}
-  std::string Title() const override { return title_; }
+  std::string DisplayName() const override { return title_; }
 
   std::size_t Held() {
     const std::lock_guard lock(mutex_);
@@ -87,7 +87,7 @@ class OraclePoolTest : public ::testing::Test {
                   const FakeWorker::Answer& answer = FakeWorker::AnswerTruly) {
     core::AnswerBlock block;
     answer(chunk, &block);
-    const auto claimed = pool->Claim(worker, chunk.lease);
+    const auto claimed = pool->Accept(worker, chunk.lease);
     ASSERT_TRUE(claimed);
     ASSERT_TRUE(*claimed);
     EXPECT_TRUE(pool->Deliver(**claimed, block).ok());
@@ -137,7 +137,7 @@ TEST_F(OraclePoolTest, WhatIsKnownIsAskedOfNobody) {
     const std::lock_guard lock(mutex);
     for (Eigen::Index i = 0; i < n; ++i) ++(*which)[block * 700 + first + i];
   };
-  pool.TellOfAnswers([&](const std::shared_ptr<const Round>& round, std::size_t block,
+  pool.SetOnAnswered([&](const std::shared_ptr<const Round>& round, std::size_t block,
                          Eigen::Index first, Eigen::Index n) {
     EXPECT_EQ(round->answers.blocks[block].points.middleCols(first, n),
               AnswerSphere(batch_.blocks[block], first, n).points);
@@ -211,7 +211,7 @@ TEST_F(OraclePoolTest, AnotherTakesOverWhenAWorkerIsTooSlow) {
 // It never answers; with hours of patience the round ends all the same.
 TEST_F(OraclePoolTest, AnIdleWorkerAnswersForAStraggler) {
   options_.answer_limit = 10h;
-  options_.straggler_unknown = options_.straggler_floor = 1ms;
+  options_.hedge_unknown = options_.hedge_floor = 1ms;
   const auto counts = std::make_shared<Counts>();
   OraclePool pool(spec_, options_, 8, counts);
   const auto silent =
@@ -220,13 +220,13 @@ TEST_F(OraclePoolTest, AnIdleWorkerAnswersForAStraggler) {
   silent->WaitForChunks(1);
   const auto other = FakeWorker::Join(&pool);
   ExpectAllAnswered(outcome.get());
-  EXPECT_GT(counts->backups, 0u);
+  EXPECT_GT(counts->hedged, 0u);
   EXPECT_EQ(counts->disagreements, 0u);
   EXPECT_EQ(silent->answered(), 0);
 }
 
 TEST_F(OraclePoolTest, WorkersThatAgreeAreComparedAndLeftInPeace) {
-  options_.straggler_unknown = options_.straggler_floor = 1h;
+  options_.hedge_unknown = options_.hedge_floor = 1h;
   const auto counts = std::make_shared<Counts>();
   OraclePool pool(spec_, options_, 8, counts);
   const auto a = FakeWorker::Join(&pool);
@@ -237,7 +237,7 @@ TEST_F(OraclePoolTest, WorkersThatAgreeAreComparedAndLeftInPeace) {
 }
 
 TEST_F(OraclePoolTest, TellsWhatEachWorkerDid) {
-  options_.straggler_unknown = options_.straggler_floor = 1h;
+  options_.hedge_unknown = options_.hedge_floor = 1h;
   options_.check_share = 0;
   OraclePool pool(spec_, options_, 8);
   const auto idle = std::make_shared<HandWorker>("left out");
@@ -265,7 +265,7 @@ TEST_F(OraclePoolTest, TellsWhatEachWorkerDid) {
 }
 
 TEST_F(OraclePoolTest, WorkersThatServeDifferentManifoldsFailTheRound) {
-  options_.straggler_unknown = options_.straggler_floor = 1h;
+  options_.hedge_unknown = options_.hedge_floor = 1h;
   for (const bool liar_first : {true, false}) {
     const auto counts = std::make_shared<Counts>();
     OraclePool pool(spec_, options_, 8, counts);
@@ -288,9 +288,9 @@ TEST_F(OraclePoolTest, WorkersThatServeDifferentManifoldsFailTheRound) {
 // The straggler's answer comes after the other's, while a third worker holds up the round.
 TEST_F(OraclePoolTest, AStragglersOwnAnswerIsComparedWithTheOneThatCounts) {
   options_.check_share = 0;
-  options_.straggler_unknown = 10h;
-  options_.straggler_floor = 0ms;
-  options_.straggler_factor = 0;
+  options_.hedge_unknown = 10h;
+  options_.hedge_floor = 0ms;
+  options_.hedge_factor = 0;
   const auto counts = std::make_shared<Counts>();
   OraclePool pool(spec_, options_, 8, counts);
   core::QueryBatch batch;

@@ -141,10 +141,10 @@ TEST_F(ReplayQueue, AHistoryIsReadBackForWhoeverAsks) {
   auto history = store.OpenHistory(session);
   ASSERT_NE(history, nullptr);
   EXPECT_EQ(history->revision(), session->View().revision);
-  EXPECT_FALSE(store.PutAwayHistories()) << "it is being read";
+  EXPECT_FALSE(store.UnloadHistories()) << "it is being read";
   history.reset();
-  EXPECT_TRUE(store.PutAwayHistories());
-  EXPECT_EQ(session->history().log(), nullptr);
+  EXPECT_TRUE(store.UnloadHistories());
+  EXPECT_EQ(session->history().loaded(), nullptr);
 }
 
 }  // namespace

@@ -188,8 +188,8 @@ TEST(Session, AMeshThatOutgrowsTheMemoryFailsAndGivesItBack) {
   EXPECT_EQ(view.failure.reason, FailureReason::kLimitExceeded);
   EXPECT_NE(view.failure.message.find("--max-memory-bytes"), std::string::npos);
   EXPECT_EQ(view.revision, 2u);
-  EXPECT_EQ(view.bytes,
-            EstimateFinishedBytes(session.request().spec) + session.history().log()->MemoryBytes())
+  EXPECT_EQ(view.bytes, EstimateFinishedBytes(session.request().spec) +
+                            session.history().loaded()->MemoryBytes())
       << "the mesher is gone";
   EXPECT_EQ(budget->total(), view.bytes);
   worker->WaitForEnd();
@@ -230,7 +230,7 @@ TEST(Session, WhatARoundLedToIsShownBeforeTheNextIsAnswered) {
   const auto worker = FakeWorker::Join(
       &running.session->pool(), [&](const Chunk& chunk, core::AnswerBlock* answer) {
         const TimePoint patience = Clock::now() + 60s;
-        while (running.session->history().log()->revision() + 1 < chunk.round->batch->round) {
+        while (running.session->history().loaded()->revision() + 1 < chunk.round->batch->round) {
           if (Clock::now() > patience) return false;
           std::this_thread::sleep_for(1ms);
         }
@@ -270,11 +270,11 @@ std::vector<double> MeshSphere(int workers, std::vector<std::uint32_t>* simplice
   EXPECT_EQ(view.state, SessionState::kSucceeded);
   EXPECT_TRUE(view.report->certificate.certified) << view.report->certificate.verdict;
   EXPECT_EQ(view.report->certificate.euler_characteristic, 2);
-  const WatchLog& log = *running.session->history().log();
-  WatchLog::Cursor cursor = log.Begin(0);
+  const MeshHistory& history = *running.session->history().loaded();
+  MeshHistory::Cursor cursor = history.Begin(0);
   std::vector<double> points;
   for (DeltaPart part; !part.complete;) {
-    part = log.Next(&cursor, 1 << 20);
+    part = history.Next(&cursor, 1 << 20);
     points.insert(points.end(), part.points.begin(), part.points.end());
     simplices->insert(simplices->end(), part.added.begin(), part.added.end());
   }

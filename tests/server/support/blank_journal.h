@@ -19,10 +19,10 @@ class BlankJournal : public SessionJournal {
     return std::nullopt;
   }
   std::optional<MeshFailure> WriteEnd(const SessionEnd&) override { return std::nullopt; }
-  std::optional<MeshFailure> WriteResult(const SessionResult&, const WatchLog&) override {
+  std::optional<MeshFailure> WriteResult(const SessionResult&, const MeshHistory&) override {
     return std::nullopt;
   }
-  core::Expected<std::unique_ptr<WatchLog>> ReadHistory() override {
+  core::Expected<std::unique_ptr<MeshHistory>> ReadHistory() override {
     return core::Refuse(core::StatusCode::kFailedPrecondition, "there is none");
   }
   void Forget() override {}

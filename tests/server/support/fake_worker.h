@@ -102,7 +102,7 @@ class FakeWorker : public OracleWorker {
       core::AnswerBlock answer;
       bool delivered = false;
       if (answer_(chunk, &answer)) {
-        const auto claimed = pool_->Claim(id_, chunk.lease);
+        const auto claimed = pool_->Accept(id_, chunk.lease);
         if (claimed && *claimed) {
           const core::Status status = pool_->Deliver(**claimed, answer);
           if (!status.ok()) {

@@ -147,8 +147,8 @@ struct Outcome {
   std::vector<std::uint32_t> simplices;
 };
 
-inline void Read(const WatchLog& history, Outcome* outcome) {
-  WatchLog::Cursor cursor = history.Begin(0);
+inline void Read(const MeshHistory& history, Outcome* outcome) {
+  MeshHistory::Cursor cursor = history.Begin(0);
   for (DeltaPart part; !part.complete;) {
     part = history.Next(&cursor, 1 << 20);
     outcome->points.insert(outcome->points.end(), part.points.begin(), part.points.end());
@@ -173,7 +173,7 @@ inline Outcome RunMesh(SessionOptions options, std::uint64_t stop_at = 0, bool w
   }
   EXPECT_EQ(session.history().Load(), HistoryShelf::Loading::kDone);
   Outcome outcome{session.View(), {}, {}};
-  Read(*session.history().log(), &outcome);
+  Read(*session.history().loaded(), &outcome);
   return outcome;
 }
 

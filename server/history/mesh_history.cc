@@ -1,4 +1,4 @@
-#include "server/history/watch_log.h"
+#include "server/history/mesh_history.h"
 
 #include <algorithm>
 #include <limits>
@@ -21,7 +21,7 @@ Status OutOfStep(std::string message) {
 }
 
 template <typename T>
-bool WriteRows(const GrowingRows<T>& rows, std::size_t width, const WatchLog::Sink& write) {
+bool WriteRows(const GrowingRows<T>& rows, std::size_t width, const MeshHistory::Sink& write) {
   for (std::size_t row = 0; row < rows.size(); row += rows.Run(row)) {
     if (!write(rows[row], rows.Run(row) * width * sizeof(T))) return false;
   }
@@ -31,7 +31,7 @@ bool WriteRows(const GrowingRows<T>& rows, std::size_t width, const WatchLog::Si
 // Takes memory only for what is there.
 template <typename T>
 bool ReadInto(GrowingRows<T>* rows, std::size_t width, std::uint64_t count,
-              const WatchLog::Source& read) {
+              const MeshHistory::Source& read) {
   constexpr std::uint64_t kAtOnce = 4096;
   std::vector<T> some;
   for (std::uint64_t left = count; left > 0;) {
@@ -46,7 +46,7 @@ bool ReadInto(GrowingRows<T>* rows, std::size_t width, std::uint64_t count,
 
 }  // namespace
 
-WatchLog::WatchLog(int dimension, int ambient_dimension)
+MeshHistory::MeshHistory(int dimension, int ambient_dimension)
     : row_size_(static_cast<std::size_t>(dimension) + 1),
       d_(ambient_dimension),
       points_(d_),
@@ -57,7 +57,7 @@ WatchLog::WatchLog(int dimension, int ambient_dimension)
       next_(1) {}
 
 // Takes a simplex from the living; kNone if it is not among them.
-std::uint32_t WatchLog::Unlink(const std::uint32_t* row) {
+std::uint32_t MeshHistory::Unlink(const std::uint32_t* row) {
   if (row[0] >= first_of_.size()) return kNone;
   std::uint32_t* link = &first_of_[row[0]];
   while (*link != kNone && !std::equal(row, row + row_size_, rows_[*link])) link = next_[*link];
@@ -66,13 +66,13 @@ std::uint32_t WatchLog::Unlink(const std::uint32_t* row) {
   return simplex;
 }
 
-void WatchLog::Link(std::uint32_t simplex) {
+void MeshHistory::Link(std::uint32_t simplex) {
   std::uint32_t& first = first_of_[*rows_[simplex]];
   *next_[simplex] = first;
   first = simplex;
 }
 
-Status WatchLog::Append(const core::MeshDelta& delta) {
+Status MeshHistory::Append(const core::MeshDelta& delta) {
   // The appending thread alone writes, so it reads without the lock.
   const std::uint64_t revision = marks_.size();
   const Mark& last = marks_.back();
@@ -90,7 +90,7 @@ Status WatchLog::Append(const core::MeshDelta& delta) {
   const std::size_t new_simplices = delta.added.size() / row_size_;
   if (first_simplex + new_simplices >= kNone) {
     return OutOfStep(core::Message("the mesh has had ", first_simplex + new_simplices,
-                                   " simplices, more than the log can number"));
+                                   " simplices, more than a history can number"));
   }
   for (std::size_t i = 0; i < new_simplices; ++i) {
     if (delta.added[i * row_size_] < last.vertices + new_vertices) continue;
@@ -129,7 +129,7 @@ Status WatchLog::Append(const core::MeshDelta& delta) {
   return Status::Ok();
 }
 
-bool WatchLog::Write(const Sink& write) const {
+bool MeshHistory::Write(const Sink& write) const {
   const std::uint64_t revisions = marks_.size() - 1;
   return write(&revisions, sizeof(revisions)) &&
          write(marks_.data() + 1, revisions * sizeof(Mark)) && WriteRows(points_, d_, write) &&
@@ -137,13 +137,13 @@ bool WatchLog::Write(const Sink& write) const {
 }
 
 // Nothing where there is no boundary: so it was before there were any.
-bool WatchLog::WriteWalls(const Sink& write) const {
+bool MeshHistory::WriteWalls(const Sink& write) const {
   const std::uint64_t count = boundary_.size();
   return count == 0 || (write(&count, sizeof(count)) &&
                         write(boundary_.data(), boundary_.size() * sizeof(OnWalls)));
 }
 
-bool WatchLog::ReadWalls(const Source& read) {
+bool MeshHistory::ReadWalls(const Source& read) {
   std::uint64_t count = 0;
   if (!read(&count, sizeof(count))) return true;
   const std::uint64_t vertices = marks_.back().vertices;
@@ -157,17 +157,17 @@ bool WatchLog::ReadWalls(const Source& read) {
   return true;
 }
 
-core::Expected<std::unique_ptr<WatchLog>> WatchLog::Read(int dimension, int ambient_dimension,
-                                                         const Source& read) {
-  auto log = std::make_unique<WatchLog>(dimension, ambient_dimension);
-  log->complete_ = true;
-  if (!log->ReadRows(read) || !log->ReckonLives()) {
+core::Expected<std::unique_ptr<MeshHistory>> MeshHistory::Read(int dimension, int ambient_dimension,
+                                                               const Source& read) {
+  auto history = std::make_unique<MeshHistory>(dimension, ambient_dimension);
+  history->complete_ = true;
+  if (!history->ReadRows(read) || !history->ComputeLives()) {
     return tl::unexpected(OutOfStep("these are not the bytes of a mesh's history"));
   }
-  return log;
+  return history;
 }
 
-bool WatchLog::ReadRows(const Source& read) {
+bool MeshHistory::ReadRows(const Source& read) {
   std::uint64_t revisions = 0;
   if (!read(&revisions, sizeof(revisions))) return false;
   for (std::uint64_t revision = 1; revision <= revisions; ++revision) {
@@ -187,7 +187,7 @@ bool WatchLog::ReadRows(const Source& read) {
 }
 
 // From the order of births and deaths.
-bool WatchLog::ReckonLives() {
+bool MeshHistory::ComputeLives() {
   for (std::uint64_t revision = 1; revision < marks_.size(); ++revision) {
     const Mark &from = marks_[revision - 1], &to = marks_[revision];
     for (std::uint64_t i = from.deaths; i < to.deaths; ++i) {
@@ -205,30 +205,30 @@ bool WatchLog::ReckonLives() {
   return true;
 }
 
-std::uint64_t WatchLog::revision() const {
+std::uint64_t MeshHistory::revision() const {
   const std::lock_guard lock(mutex_);
   return marks_.size() - 1;
 }
 
-WatchLog::Cursor WatchLog::Begin(std::uint64_t from) const {
+MeshHistory::Cursor MeshHistory::Begin(std::uint64_t from) const {
   const std::lock_guard lock(mutex_);
   const Mark& mark = marks_[from];
   return {from, marks_.size() - 1, mark.deaths, mark.vertices, mark.simplices};
 }
 
-std::uint64_t WatchLog::MemoryBytes() const {
+std::uint64_t MeshHistory::MemoryBytes() const {
   const std::lock_guard lock(mutex_);
   return points_.bytes() + boundary_.capacity() * sizeof(OnWalls) + rows_.bytes() + lives_.bytes() +
          deaths_.bytes() + marks_.capacity() * sizeof(Mark) + appenders_bytes_;
 }
 
-WatchLog::Snapshot WatchLog::At(std::uint64_t revision) const {
+MeshHistory::Snapshot MeshHistory::At(std::uint64_t revision) const {
   const std::lock_guard lock(mutex_);
   const Mark& mark = marks_[revision];
   return {mark.vertices, mark.simplices - mark.deaths, mark.vertices + mark.simplices};
 }
 
-WatchLog::Cursor WatchLog::BeginAt(std::uint64_t revision, std::uint64_t position) const {
+MeshHistory::Cursor MeshHistory::BeginAt(std::uint64_t revision, std::uint64_t position) const {
   const std::lock_guard lock(mutex_);
   const Mark& mark = marks_[revision];
   const std::size_t vertex = std::min<std::size_t>(position, mark.vertices);
@@ -236,7 +236,7 @@ WatchLog::Cursor WatchLog::BeginAt(std::uint64_t revision, std::uint64_t positio
   return {0, revision, mark.deaths, vertex, position - vertex};
 }
 
-DeltaPart WatchLog::Next(Cursor* cursor, std::size_t max_bytes) const {
+DeltaPart MeshHistory::Next(Cursor* cursor, std::size_t max_bytes) const {
   const std::size_t row_bytes = row_size_ * sizeof(std::uint32_t);
   const std::size_t point_bytes = d_ * sizeof(double);
   const std::size_t max_rows = std::max<std::size_t>(max_bytes / row_bytes, 1);
@@ -294,8 +294,8 @@ DeltaPart WatchLog::Next(Cursor* cursor, std::size_t max_bytes) const {
 }
 
 // Alive at `to`, from the cursor on: `max_rows` at most.
-void WatchLog::AppendAdded(Cursor* cursor, std::size_t end, std::size_t max_rows,
-                           DeltaPart* part) const {
+void MeshHistory::AppendAdded(Cursor* cursor, std::size_t end, std::size_t max_rows,
+                              DeltaPart* part) const {
   const std::size_t stop = std::min(end, cursor->added + kScanLimit);
   part->added.reserve(std::min(stop - cursor->added, max_rows) * row_size_);
   std::size_t rows = 0;

@@ -14,15 +14,15 @@ namespace stellate::server {
 namespace {
 
 using namespace std::chrono_literals;
-using Claim = Dispatch::ClaimResult;
+using Accepted = Dispatch::AcceptResult;
 using Eigen::Index;
 
 using testing::At;
 
 // Time is a number here: no test waits.
-class StragglersTest : public ::testing::Test {
+class HedgingTest : public ::testing::Test {
  protected:
-  StragglersTest() {
+  HedgingTest() {
     options_.answer_limit = 100s;
     options_.check_share = 0;
   }
@@ -36,78 +36,78 @@ class StragglersTest : public ::testing::Test {
     ASSERT_EQ(leases.size(), 2u);
     ASSERT_EQ(leases[0].worker, 1u);
     late_ = leases[0];
-    Settle(dispatch, leases[1], At(1s));
+    AnswerInTime(dispatch, leases[1], At(1s));
     EXPECT_TRUE(dispatch->Assign(At(1s)).empty()) << "nothing is overdue yet";
   }
 
-  static void Settle(Dispatch* dispatch, const Lease& lease, TimePoint now) {
+  static void AnswerInTime(Dispatch* dispatch, const Lease& lease, TimePoint now) {
     Lease claimed;
-    ASSERT_EQ(dispatch->Claim(lease.worker, lease.id, now, &claimed), Claim::kClaimed);
-    dispatch->Settle(claimed.id, claimed.count);
+    ASSERT_EQ(dispatch->Accept(lease.worker, lease.id, now, &claimed), Accepted::kCounts);
+    dispatch->MarkAnswered(claimed.id, claimed.count);
   }
 
   DispatchOptions options_;
   Lease late_, claimed_;
 };
 
-TEST_F(StragglersTest, AnIdleWorkerIsGivenWhatIsFarOverdueAndTheFirstAnswerCounts) {
+TEST_F(HedgingTest, AnIdleWorkerIsGivenWhatIsFarOverdueAndTheFirstAnswerCounts) {
   Dispatch dispatch(options_);
   BeginWithOneLate(&dispatch);
   // A query a second is the only pace known, and three times that time is patience enough.
   EXPECT_EQ(dispatch.NextDeadline(), At(3s));
   EXPECT_TRUE(dispatch.Assign(At(2999ms)).empty());
-  const auto backup = dispatch.Assign(At(3s));
-  ASSERT_EQ(backup.size(), 1u);
-  EXPECT_EQ(backup[0].worker, 2u);
-  EXPECT_EQ(backup[0].twin, late_.id);
-  EXPECT_EQ(backup[0].block, late_.block);
-  EXPECT_EQ(backup[0].first, late_.first);
-  EXPECT_EQ(backup[0].count, late_.count);
+  const auto hedge = dispatch.Assign(At(3s));
+  ASSERT_EQ(hedge.size(), 1u);
+  EXPECT_EQ(hedge[0].worker, 2u);
+  EXPECT_EQ(hedge[0].twin, late_.id);
+  EXPECT_EQ(hedge[0].block, late_.block);
+  EXPECT_EQ(hedge[0].first, late_.first);
+  EXPECT_EQ(hedge[0].count, late_.count);
   EXPECT_TRUE(dispatch.Assign(At(50s)).empty()) << "two are enough";
-  Settle(&dispatch, backup[0], At(4s));
+  AnswerInTime(&dispatch, hedge[0], At(4s));
   EXPECT_TRUE(dispatch.Done(At(100s)));
-  EXPECT_EQ(dispatch.Claim(1, late_.id, At(5s), &claimed_), Claim::kSecond);
+  EXPECT_EQ(dispatch.Accept(1, late_.id, At(5s), &claimed_), Accepted::kForComparison);
   EXPECT_EQ(claimed_.first, late_.first);
   EXPECT_EQ(claimed_.count, late_.count);
-  EXPECT_EQ(dispatch.Claim(1, late_.id, At(5s), &claimed_), Claim::kUnknown) << "twice";
+  EXPECT_EQ(dispatch.Accept(1, late_.id, At(5s), &claimed_), Accepted::kUnknown) << "twice";
 }
 
-TEST_F(StragglersTest, WhoSaysItIsBusyIsBackedUpAsWell) {
+TEST_F(HedgingTest, WhoSaysItIsBusyIsBackedUpAsWell) {
   Dispatch dispatch(options_);
   BeginWithOneLate(&dispatch);
   dispatch.Busy(1, late_.id, At(2s));
-  const auto backup = dispatch.Assign(At(3s));
-  ASSERT_EQ(backup.size(), 1u);
-  EXPECT_EQ(backup[0].twin, late_.id);
+  const auto hedge = dispatch.Assign(At(3s));
+  ASSERT_EQ(hedge.size(), 1u);
+  EXPECT_EQ(hedge[0].twin, late_.id);
 }
 
-TEST_F(StragglersTest, TheStragglerMayBeTheFirst) {
+TEST_F(HedgingTest, TheStragglerMayBeTheFirst) {
   Dispatch dispatch(options_);
   BeginWithOneLate(&dispatch);
-  const auto backup = dispatch.Assign(At(3s));
-  ASSERT_EQ(backup.size(), 1u);
-  Settle(&dispatch, late_, At(4s));
+  const auto hedge = dispatch.Assign(At(3s));
+  ASSERT_EQ(hedge.size(), 1u);
+  AnswerInTime(&dispatch, late_, At(4s));
   EXPECT_TRUE(dispatch.Done(At(100s)));
-  EXPECT_EQ(dispatch.Claim(2, backup[0].id, At(5s), &claimed_), Claim::kSecond);
+  EXPECT_EQ(dispatch.Accept(2, hedge[0].id, At(5s), &claimed_), Accepted::kForComparison);
 }
 
-TEST_F(StragglersTest, AnAnswerAfterTheRoundIsLate) {
+TEST_F(HedgingTest, AnAnswerAfterTheRoundIsLate) {
   Dispatch dispatch(options_);
   BeginWithOneLate(&dispatch);
-  Settle(&dispatch, dispatch.Assign(At(3s)).at(0), At(4s));
+  AnswerInTime(&dispatch, dispatch.Assign(At(3s)).at(0), At(4s));
   dispatch.End();
   dispatch.Begin({{20, 8}}, At(4s));
-  EXPECT_EQ(dispatch.Claim(1, late_.id, At(5s), &claimed_), Claim::kLate);
+  EXPECT_EQ(dispatch.Accept(1, late_.id, At(5s), &claimed_), Accepted::kLate);
   EXPECT_EQ(dispatch.unanswered(), 20);
 }
 
-TEST_F(StragglersTest, WhoeverOfTheTwoLeavesTheOtherHasItAlone) {
+TEST_F(HedgingTest, WhoeverOfTheTwoLeavesTheOtherHasItAlone) {
   Dispatch gone(options_);
   BeginWithOneLate(&gone);
-  const auto backup = gone.Assign(At(3s));
+  const auto hedge = gone.Assign(At(3s));
   gone.Leave(1, At(4s));
   EXPECT_TRUE(gone.Assign(At(4s)).empty()) << "worker 2 has it";
-  Settle(&gone, backup.at(0), At(5s));
+  AnswerInTime(&gone, hedge.at(0), At(5s));
   EXPECT_TRUE(gone.Done(At(100s)));
 
   Dispatch again(options_);
@@ -121,59 +121,59 @@ TEST_F(StragglersTest, WhoeverOfTheTwoLeavesTheOtherHasItAlone) {
   EXPECT_EQ(second[0].twin, late_.id);
 }
 
-TEST_F(StragglersTest, ALeaseThatRunsOutIsNotGivenOutAThirdTime) {
+TEST_F(HedgingTest, ALeaseThatRunsOutIsNotGivenOutAThirdTime) {
   Dispatch dispatch(options_);
   BeginWithOneLate(&dispatch);
-  const auto backup = dispatch.Assign(At(3s));
+  const auto hedge = dispatch.Assign(At(3s));
   dispatch.Expire(At(100s));
   EXPECT_TRUE(dispatch.Assign(At(100s)).empty());
   EXPECT_EQ(dispatch.failure(At(100s)), Dispatch::Failure::kNone);
-  Settle(&dispatch, backup.at(0), At(101s));
+  AnswerInTime(&dispatch, hedge.at(0), At(101s));
   EXPECT_TRUE(dispatch.Done(At(100s)));
-  EXPECT_EQ(dispatch.Claim(1, late_.id, At(102s), &claimed_), Claim::kLate);
+  EXPECT_EQ(dispatch.Accept(1, late_.id, At(102s), &claimed_), Accepted::kLate);
 }
 
-TEST_F(StragglersTest, WhoHasNotFinishedAnOldChunkIsAskedLast) {
+TEST_F(HedgingTest, WhoHasNotFinishedAnOldChunkIsAskedLast) {
   Dispatch dispatch(options_);
   BeginWithOneLate(&dispatch);
-  Settle(&dispatch, dispatch.Assign(At(3s)).at(0), At(4s));
+  AnswerInTime(&dispatch, dispatch.Assign(At(3s)).at(0), At(4s));
   dispatch.End();
   dispatch.Begin({{100, 8}}, At(4s));
   for (const Lease& lease : dispatch.Assign(At(4s))) EXPECT_EQ(lease.worker, 2u);
-  EXPECT_EQ(dispatch.Claim(1, late_.id, At(5s), &claimed_), Claim::kLate);
+  EXPECT_EQ(dispatch.Accept(1, late_.id, At(5s), &claimed_), Accepted::kLate);
   const auto leases = dispatch.Assign(At(5s));
   ASSERT_FALSE(leases.empty()) << "it has finished";
   for (const Lease& lease : leases) EXPECT_EQ(lease.worker, 1u);
 }
 
-TEST_F(StragglersTest, WithoutAnySpeedPatienceIsFixed) {
+TEST_F(HedgingTest, WithoutAnySpeedPatienceIsFixed) {
   Dispatch dispatch(options_);
   dispatch.Join(1, 0);
   dispatch.Begin({{1, 8}}, At(0s));
   ASSERT_EQ(dispatch.Assign(At(0s)).size(), 1u);
   EXPECT_EQ(dispatch.NextDeadline(), At(100s)) << "nobody is idle";
   dispatch.Join(2, 0);
-  EXPECT_EQ(dispatch.NextDeadline(), At(options_.straggler_unknown));
-  EXPECT_TRUE(dispatch.Assign(At(options_.straggler_unknown - 1ns)).empty());
-  EXPECT_EQ(dispatch.Assign(At(options_.straggler_unknown)).size(), 1u);
+  EXPECT_EQ(dispatch.NextDeadline(), At(options_.hedge_unknown));
+  EXPECT_TRUE(dispatch.Assign(At(options_.hedge_unknown - 1ns)).empty());
+  EXPECT_EQ(dispatch.Assign(At(options_.hedge_unknown)).size(), 1u);
 }
 
-TEST_F(StragglersTest, ShortChunksHaveTheFloorAndLongWaysTheirRoundTrip) {
+TEST_F(HedgingTest, ShortChunksHaveTheFloorAndLongWaysTheirRoundTrip) {
   Dispatch dispatch(options_);
   dispatch.Join(1, 0);
   dispatch.Begin({{1, 8}}, At(0s));
-  Settle(&dispatch, dispatch.Assign(At(0s)).at(0), At(1ms));
+  AnswerInTime(&dispatch, dispatch.Assign(At(0s)).at(0), At(1ms));
   dispatch.End();
   dispatch.Begin({{8, 8}}, At(1s));
   ASSERT_EQ(dispatch.Assign(At(1s)).size(), 1u);
   dispatch.Join(2, 0);
-  EXPECT_EQ(dispatch.NextDeadline(), At(1s + options_.straggler_floor));
+  EXPECT_EQ(dispatch.NextDeadline(), At(1s + options_.hedge_floor));
 
   Dispatch far(options_);  // one query takes as long as two: it is the way
   far.Join(1, 0);
   far.Begin({{3, 8}}, At(0s));
-  Settle(&far, far.Assign(At(0s)).at(0), At(400ms));
-  Settle(&far, far.Assign(At(400ms)).at(0), At(800ms));
+  AnswerInTime(&far, far.Assign(At(0s)).at(0), At(400ms));
+  AnswerInTime(&far, far.Assign(At(400ms)).at(0), At(800ms));
   far.End();
   far.Begin({{1, 8}}, At(1s));
   ASSERT_EQ(far.Assign(At(1s)).size(), 1u);
@@ -182,11 +182,11 @@ TEST_F(StragglersTest, ShortChunksHaveTheFloorAndLongWaysTheirRoundTrip) {
   EXPECT_LE(far.NextDeadline(), At(2200ms));
 }
 
-TEST_F(StragglersTest, NobodyIsGivenMoreThanItWishesFor) {
+TEST_F(HedgingTest, NobodyIsGivenMoreThanItWishesFor) {
   Dispatch dispatch(options_);
   dispatch.Join(1, 0);
   dispatch.Begin({{1, 8}}, At(0s));
-  Settle(&dispatch, dispatch.Assign(At(0s)).at(0), At(1ms));
+  AnswerInTime(&dispatch, dispatch.Assign(At(0s)).at(0), At(1ms));
   dispatch.End();
   dispatch.Begin({{8, 8}}, At(1s));
   ASSERT_EQ(dispatch.Assign(At(1s)).at(0).count, 8);
@@ -195,7 +195,7 @@ TEST_F(StragglersTest, NobodyIsGivenMoreThanItWishesFor) {
   EXPECT_EQ(dispatch.NextDeadline(), At(101s)) << "or the caller would spin";
 }
 
-TEST_F(StragglersTest, AFewQueriesAreAskedOfTwo) {
+TEST_F(HedgingTest, AFewQueriesAreAskedOfTwo) {
   options_.check_share = 0.01;
   options_.chunk_bytes = 1 << 20;
   Dispatch dispatch(options_);
@@ -212,9 +212,9 @@ TEST_F(StragglersTest, AFewQueriesAreAskedOfTwo) {
     const Lease lease = open.front();
     open.erase(open.begin());
     now += 1ms;
-    const auto result = dispatch.Claim(lease.worker, lease.id, now, &claimed_);
+    const auto result = dispatch.Accept(lease.worker, lease.id, now, &claimed_);
     if (lease.check) {
-      EXPECT_EQ(result, Claim::kSecond);
+      EXPECT_EQ(result, Accepted::kForComparison);
       checked[lease.worker] += lease.count;
       dispatch.Compared(lease.worker, 3 - lease.worker, 0);
       const auto& theirs = given[3 - lease.worker];
@@ -222,10 +222,10 @@ TEST_F(StragglersTest, AFewQueriesAreAskedOfTwo) {
         return other.first <= lease.first && lease.first + lease.count <= other.first + other.count;
       })) << "of the other's queries";
     } else {
-      ASSERT_EQ(result, Claim::kClaimed);
+      ASSERT_EQ(result, Accepted::kCounts);
       answered[lease.worker] += lease.count;
       given[lease.worker].push_back(lease);
-      dispatch.Settle(claimed_.id, claimed_.count);
+      dispatch.MarkAnswered(claimed_.id, claimed_.count);
     }
   }
   EXPECT_EQ(answered[1] + answered[2], 100000);
@@ -235,7 +235,7 @@ TEST_F(StragglersTest, AFewQueriesAreAskedOfTwo) {
   }
 }
 
-TEST_F(StragglersTest, ACheckComesBeforeTheFirstChunkAndNotToOneAlone) {
+TEST_F(HedgingTest, ACheckComesBeforeTheFirstChunkAndNotToOneAlone) {
   options_.check_share = 0.01;
   Dispatch dispatch(options_);
   dispatch.Join(1, 0);
@@ -243,7 +243,7 @@ TEST_F(StragglersTest, ACheckComesBeforeTheFirstChunkAndNotToOneAlone) {
   auto leases = dispatch.Assign(At(0s));
   ASSERT_EQ(leases.size(), 1u);
   EXPECT_FALSE(leases[0].check);
-  Settle(&dispatch, leases[0], At(1ms));
+  AnswerInTime(&dispatch, leases[0], At(1ms));
   dispatch.End();
 
   dispatch.Join(2, 0);
@@ -259,13 +259,13 @@ TEST_F(StragglersTest, ACheckComesBeforeTheFirstChunkAndNotToOneAlone) {
 }
 
 // Workers join, leave, answer late, never or out of order, for hundreds of rounds.
-TEST_F(StragglersTest, HoweverWorkersBehaveEveryQueryCountsOnce) {
+TEST_F(HedgingTest, HoweverWorkersBehaveEveryQueryCountsOnce) {
   options_.check_share = 0.05;
   options_.answer_limit = 2s;
   options_.max_leases = 1000;
   std::mt19937 random(11);
   const auto below = [&random](unsigned n) { return random() % n; };
-  std::size_t backups = 0, seconds = 0;
+  std::size_t hedged = 0, seconds = 0;
   Dispatch dispatch(options_);
   WorkerId next_worker = 1;
   std::set<WorkerId> workers;
@@ -293,7 +293,7 @@ TEST_F(StragglersTest, HoweverWorkersBehaveEveryQueryCountsOnce) {
       ASSERT_EQ(dispatch.failure(now), Dispatch::Failure::kNone);
       for (const Lease& lease : dispatch.Assign(now)) {
         EXPECT_TRUE(workers.contains(lease.worker));
-        backups += lease.twin != 0 ? 1 : 0;
+        hedged += lease.twin != 0 ? 1 : 0;
         open.push_back(lease);
       }
       ASSERT_TRUE(dispatch.NextDeadline() > now || workers.empty() || dispatch.Done(now));
@@ -301,22 +301,22 @@ TEST_F(StragglersTest, HoweverWorkersBehaveEveryQueryCountsOnce) {
         const std::size_t which = below(4) == 0 ? below(open.size()) : 0;
         const Lease lease = open[which];
         open.erase(open.begin() + static_cast<std::ptrdiff_t>(which));
-        switch (dispatch.Claim(lease.worker, lease.id, now, &claimed_)) {
-          case Claim::kClaimed:
+        switch (dispatch.Accept(lease.worker, lease.id, now, &claimed_)) {
+          case Accepted::kCounts:
             EXPECT_FALSE(claimed_.check);
             for (Index i = 0; i < claimed_.count; ++i) {
               ++counted[static_cast<std::size_t>(claimed_.first + i)];
               by[static_cast<std::size_t>(claimed_.first + i)] = lease.worker;
             }
-            dispatch.Settle(claimed_.id, claimed_.count);
+            dispatch.MarkAnswered(claimed_.id, claimed_.count);
             break;
-          case Claim::kSecond:
+          case Accepted::kForComparison:
             ++seconds;
             to_compare.push_back(claimed_);
             break;
-          case Claim::kLate:
+          case Accepted::kLate:
             break;
-          case Claim::kUnknown:
+          case Accepted::kUnknown:
             FAIL() << "it was given and is answered once";
         }
       }
@@ -329,7 +329,7 @@ TEST_F(StragglersTest, HoweverWorkersBehaveEveryQueryCountsOnce) {
     for (const int times : counted) ASSERT_EQ(times, 1) << "round " << round;
     dispatch.End();
   }
-  EXPECT_GT(backups, 50u);
+  EXPECT_GT(hedged, 50u);
   EXPECT_GT(seconds, 100u);
 }
 

@@ -15,8 +15,8 @@
 
 namespace stellate::server {
 
-// Rows of `width` numbers each, of which there come only more, in blocks that never move: appending
-// is cheap whatever the size, and a row lies in one piece.
+// Append-only rows of `width` numbers each, in blocks that never move: appending is cheap at any
+// size, and each row is contiguous.
 template <typename T>
 class GrowingRows {
  public:
@@ -31,7 +31,7 @@ class GrowingRows {
   }
   T* operator[](std::size_t row) { return blocks_[row >> shift_].get() + Offset(row); }
   const T* operator[](std::size_t row) const { return blocks_[row >> shift_].get() + Offset(row); }
-  // From `row` on, how many lie in one piece with it.
+  // How many rows from `row` on are contiguous.
   std::size_t Run(std::size_t row) const {
     return std::min(size_ - row, RowsOfBlock() - (row & (RowsOfBlock() - 1)));
   }
@@ -61,46 +61,51 @@ class GrowingRows {
   std::size_t size_ = 0;
 };
 
-// A part of the change between two revisions.
+// A part of the change from one revision to another.
 struct DeltaPart {
   std::uint64_t revision = 0;  // where the change leads
   std::uint64_t first_vertex = 0;
   std::vector<double> points;                 // d each
   std::vector<std::uint32_t> added, removed;  // k+1 each; none is in both
-  // Those of its vertices that are on walls, and these.
+  // The vertices among them that are on walls, and the walls of each.
   std::vector<std::uint32_t> boundary;
   std::vector<core::WallSet> walls;
   bool complete = false;  // the last part
 };
 
-// The history of a mesh, from which the change from any revision to any later one is read in
-// parts. Nothing is queued for a watcher: however slow, it costs a cursor, and several rounds
-// reach it merged. What is kept is each vertex once and each simplex once, with the revisions in
-// which it came and went, so memory grows with the work done and not with watchers or time.
+// All revisions of a mesh. Read the change from any revision to any later one, in parts:
 //
-// One thread appends; any threads read. Readers wait at most for the copying-in of one round.
-class WatchLog {
+//   MeshHistory::Cursor cursor = history.Begin(seen);   // from revision `seen` to the newest
+//   DeltaPart part;
+//   do part = history.Next(&cursor, max_bytes); while (!part.complete);
+//
+// Nothing is queued for a watcher: a slow one costs a cursor, and receives several rounds merged.
+// Each vertex and each simplex is stored once, with the revisions at which it was added and
+// removed, so memory grows with the work done, not with watchers or time.
+//
+// One thread appends; any threads read. Readers wait at most while one round is copied in.
+class MeshHistory {
  public:
-  WatchLog(int dimension, int ambient_dimension);
+  MeshHistory(int dimension, int ambient_dimension);
 
-  // kFailedPrecondition, and no change, if the revision is not the next one, vertex ids leave a
-  // gap, or a simplex goes that is not there.
+  // Adds a revision. kFailedPrecondition, and no change, if it is not the next one, vertex ids
+  // leave a gap, or a removed simplex does not exist.
   core::Status Append(const core::MeshDelta& delta);
 
-  // All of it as bytes, little-endian, in pieces. False: `write` was. Only while nothing is
-  // appended.
+  // Writes everything as bytes, little-endian, in pieces. Returns false if `write` did. REQUIRES:
+  // no Append at the same time.
   using Sink = std::function<bool(const void* data, std::size_t bytes)>;
   bool Write(const Sink& write) const;
-  // From what Write wrote; `read` gives the next bytes, or false if there are no more. What comes
-  // back takes no changes. kFailedPrecondition: no such bytes.
+  // Reads back what Write wrote; `read` returns the next bytes, or false if there are no more. The
+  // result cannot be appended to. kFailedPrecondition: the bytes are not a history.
   using Source = std::function<bool(void* data, std::size_t bytes)>;
-  static core::Expected<std::unique_ptr<WatchLog>> Read(int dimension, int ambient_dimension,
-                                                        const Source& read);
+  static core::Expected<std::unique_ptr<MeshHistory>> Read(int dimension, int ambient_dimension,
+                                                           const Source& read);
 
   std::uint64_t revision() const;
-  std::uint64_t MemoryBytes() const;  // that it holds
+  std::uint64_t MemoryBytes() const;  // that it occupies
 
-  // Where a reader stands between two revisions.
+  // The position of a reader between two revisions.
   struct Cursor {
     std::uint64_t from = 0, to = 0;
     std::size_t removed = 0, vertex = 0, added = 0;  // next to look at
@@ -108,21 +113,21 @@ class WatchLog {
     std::uint64_t Position() const { return vertex + added; }
   };
 
-  // From `from` to the newest revision; `from` must not lie beyond that.
+  // Reads from `from` to the newest revision. REQUIRES: `from` is not later than that.
   Cursor Begin(std::uint64_t from) const;
-  // The next part, of `max_bytes` at most: all removed simplices first, then vertices, then added
-  // simplices. Looks at a bounded number of simplices, so a part may be small or empty.
+  // Returns the next part, of `max_bytes` at most: all removed simplices first, then vertices, then
+  // added simplices. Visits a bounded number of simplices, so a part may be small or empty.
   DeltaPart Next(Cursor* cursor, std::size_t max_bytes) const;
 
-  // The mesh as it was at a revision, to be read from the start or from where a reader stopped.
+  // The size of the mesh at a revision. BeginAt reads it from the start, or from a position.
   struct Snapshot {
     std::uint64_t vertices = 0, simplices = 0;
     std::uint64_t positions = 0;  // 0: the start; this: the end
   };
-  // `revision` must not lie beyond the newest.
+  // REQUIRES: `revision` is not later than the newest.
   Snapshot At(std::uint64_t revision) const;
-  // `position` must not lie beyond At(revision).positions. The cursor's Position tells where the
-  // next part begins.
+  // REQUIRES: `position` is at most At(revision).positions. Cursor::Position is where the next part
+  // begins.
   Cursor BeginAt(std::uint64_t revision, std::uint64_t position) const;
 
  private:
@@ -133,7 +138,7 @@ class WatchLog {
   bool ReadRows(const Source& read);
   bool WriteWalls(const Sink& write) const;
   bool ReadWalls(const Source& read);
-  bool ReckonLives();
+  bool ComputeLives();
   std::uint32_t Unlink(const std::uint32_t* row);
   void Link(std::uint32_t simplex);
   void AppendAdded(Cursor* cursor, std::size_t end, std::size_t max_rows, DeltaPart* part) const;
@@ -148,20 +153,20 @@ class WatchLog {
     core::WallSet walls = 0;
   };
   std::vector<OnWalls> boundary_;      // of the vertices, ascending
-  GrowingRows<std::uint32_t> rows_;    // ids of each simplex that ever was
+  GrowingRows<std::uint32_t> rows_;    // ids of every simplex so far
   GrowingRows<Life> lives_;            // by simplex
-  GrowingRows<std::uint32_t> deaths_;  // simplices in the order in which they went
+  GrowingRows<std::uint32_t> deaths_;  // simplices in the order of their removal
   struct Mark {
     std::uint64_t vertices = 0, simplices = 0, deaths = 0;
   };
   std::vector<Mark> marks_;  // sizes at each revision, 0 first
-  bool complete_ = false;    // nothing is appended any more
+  bool complete_ = false;    // nothing can be appended
 
-  // The appending thread's own: simplices alive now, in a list for each vertex that is the lowest
-  // of any. A list is no longer than a star is large.
+  // For the appending thread only: the simplices of the newest revision, in a list for each vertex,
+  // by their lowest vertex. A list is at most as long as a star.
   std::vector<std::uint32_t> first_of_;            // by vertex
   GrowingRows<std::uint32_t> next_;                // by simplex
-  std::atomic<std::uint64_t> appenders_bytes_{0};  // of these two, for others to know
+  std::atomic<std::uint64_t> appenders_bytes_{0};  // of these two, for other threads
 };
 
 }  // namespace stellate::server

@@ -1,4 +1,4 @@
-#include "server/history/watch_log.h"
+#include "server/history/mesh_history.h"
 
 #include <gtest/gtest.h>
 #include <malloc.h>
@@ -76,10 +76,10 @@ struct Client {
     if (part.complete) revision = part.revision;
   }
 
-  void CatchUp(const WatchLog& log, std::size_t max_bytes) {
-    WatchLog::Cursor cursor = log.Begin(revision);
+  void CatchUp(const MeshHistory& history, std::size_t max_bytes) {
+    MeshHistory::Cursor cursor = history.Begin(revision);
     for (DeltaPart part;;) {
-      part = log.Next(&cursor, max_bytes);
+      part = history.Next(&cursor, max_bytes);
       Apply(part);
       if (part.complete) return;
     }
@@ -88,7 +88,7 @@ struct Client {
 
 // Random growth; states[r] is the mesh at revision r.
 struct History {
-  WatchLog log{kDimension, kAmbient};
+  MeshHistory mesh{kDimension, kAmbient};
   std::vector<State> states{State{}};
   std::vector<std::size_t> vertices{0};
 
@@ -115,28 +115,28 @@ struct History {
         state.insert(triangle);
         added.push_back(triangle);
       }
-      ASSERT_TRUE(log.Append(Delta(revision, first, 3, added, removed)).ok());
+      ASSERT_TRUE(mesh.Append(Delta(revision, first, 3, added, removed)).ok());
       states.push_back(state);
       vertices.push_back(first + 3);
     }
   }
 };
 
-class WatchLogTest : public ::testing::TestWithParam<std::size_t> {};
+class MeshHistoryTest : public ::testing::TestWithParam<std::size_t> {};
 
 // Whatever was read before and however small the parts, the state arrived at is the same.
-TEST_P(WatchLogTest, AnyRevisionLeadsToAnyLaterOne) {
+TEST_P(MeshHistoryTest, AnyRevisionLeadsToAnyLaterOne) {
   std::mt19937 random(7);
   History history;
   std::vector<Client> clients(1);
   for (int step = 0; step < 12; ++step) {
     history.Grow(1 + step % 3, &random);
     clients.push_back(clients[random() % clients.size()]);
-    clients.back().CatchUp(history.log, GetParam());
+    clients.back().CatchUp(history.mesh, GetParam());
   }
   for (Client client : clients) {
     ASSERT_EQ(client.state, history.states[client.revision]);
-    client.CatchUp(history.log, GetParam());
+    client.CatchUp(history.mesh, GetParam());
     EXPECT_EQ(client.revision, history.states.size() - 1);
     EXPECT_EQ(client.state, history.states.back());
     ASSERT_EQ(client.points.size(), history.vertices.back() * kAmbient);
@@ -145,51 +145,51 @@ TEST_P(WatchLogTest, AnyRevisionLeadsToAnyLaterOne) {
     }
   }
 }
-INSTANTIATE_TEST_SUITE_P(PartSizes, WatchLogTest, ::testing::Values(24, 60, 1 << 20));
+INSTANTIATE_TEST_SUITE_P(PartSizes, MeshHistoryTest, ::testing::Values(24, 60, 1 << 20));
 
-TEST(WatchLog, APartBegunBeforeMoreCameLeadsWhereItSaid) {
+TEST(MeshHistory, APartBegunBeforeMoreCameLeadsWhereItSaid) {
   std::mt19937 random(11);
   History history;
   history.Grow(5, &random);
   Client client;
-  WatchLog::Cursor cursor = history.log.Begin(0);
-  client.Apply(history.log.Next(&cursor, 24));
+  MeshHistory::Cursor cursor = history.mesh.Begin(0);
+  client.Apply(history.mesh.Next(&cursor, 24));
   history.Grow(5, &random);  // between two parts
-  while (client.revision == 0) client.Apply(history.log.Next(&cursor, 24));
+  while (client.revision == 0) client.Apply(history.mesh.Next(&cursor, 24));
   EXPECT_EQ(client.revision, 5u);
   EXPECT_EQ(client.state, history.states[5]);
 }
 
-TEST(WatchLog, PartsKeepToTheirSize) {
+TEST(MeshHistory, PartsKeepToTheirSize) {
   std::mt19937 random(3);
   History history;
   history.Grow(30, &random);
-  WatchLog::Cursor cursor = history.log.Begin(0);
+  MeshHistory::Cursor cursor = history.mesh.Begin(0);
   for (bool complete = false; !complete;) {
-    const DeltaPart part = history.log.Next(&cursor, 100);
+    const DeltaPart part = history.mesh.Next(&cursor, 100);
     EXPECT_LE(8 * part.points.size() + 4 * (part.added.size() + part.removed.size()), 100u);
     complete = part.complete;
   }
 }
 
-TEST(WatchLog, RefusesWhatDoesNotFollow) {
-  WatchLog log(kDimension, kAmbient);
-  ASSERT_TRUE(log.Append(Delta(1, 0, 4, {{0, 1, 2}, {1, 2, 3}}, {})).ok());
-  EXPECT_FALSE(log.Append(Delta(3, 4, 1, {}, {})).ok()) << "a revision left out";
-  EXPECT_FALSE(log.Append(Delta(2, 9, 1, {}, {})).ok()) << "vertices left out";
-  EXPECT_FALSE(log.Append(Delta(2, 4, 0, {}, {{1, 2, 3}, {0, 1, 3}})).ok()) << "not there";
-  EXPECT_FALSE(log.Append(Delta(2, 4, 0, {}, {{9, 10, 11}})).ok()) << "not even its vertices";
-  EXPECT_FALSE(log.Append(Delta(2, 4, 1, {{5, 6, 7}}, {})).ok()) << "a vertex left out";
-  EXPECT_EQ(log.revision(), 1u);
-  EXPECT_TRUE(log.Append(Delta(2, 4, 0, {}, {{1, 2, 3}})).ok()) << "a refusal changes nothing";
+TEST(MeshHistory, RefusesWhatDoesNotFollow) {
+  MeshHistory history(kDimension, kAmbient);
+  ASSERT_TRUE(history.Append(Delta(1, 0, 4, {{0, 1, 2}, {1, 2, 3}}, {})).ok());
+  EXPECT_FALSE(history.Append(Delta(3, 4, 1, {}, {})).ok()) << "a revision left out";
+  EXPECT_FALSE(history.Append(Delta(2, 9, 1, {}, {})).ok()) << "vertices left out";
+  EXPECT_FALSE(history.Append(Delta(2, 4, 0, {}, {{1, 2, 3}, {0, 1, 3}})).ok()) << "not there";
+  EXPECT_FALSE(history.Append(Delta(2, 4, 0, {}, {{9, 10, 11}})).ok()) << "not even its vertices";
+  EXPECT_FALSE(history.Append(Delta(2, 4, 1, {{5, 6, 7}}, {})).ok()) << "a vertex left out";
+  EXPECT_EQ(history.revision(), 1u);
+  EXPECT_TRUE(history.Append(Delta(2, 4, 0, {}, {{1, 2, 3}})).ok()) << "a refusal changes nothing";
 }
 
-TEST(WatchLog, ARevisionIsOnePartWhereItFits) {
-  WatchLog log(kDimension, kAmbient);
-  ASSERT_TRUE(log.Append(Delta(1, 0, 4, {{0, 1, 2}, {1, 2, 3}}, {})).ok());
-  ASSERT_TRUE(log.Append(Delta(2, 4, 1, {{0, 1, 4}, {0, 2, 4}}, {{0, 1, 2}})).ok());
-  WatchLog::Cursor cursor = log.Begin(1);
-  const DeltaPart part = log.Next(&cursor, 1000);
+TEST(MeshHistory, ARevisionIsOnePartWhereItFits) {
+  MeshHistory history(kDimension, kAmbient);
+  ASSERT_TRUE(history.Append(Delta(1, 0, 4, {{0, 1, 2}, {1, 2, 3}}, {})).ok());
+  ASSERT_TRUE(history.Append(Delta(2, 4, 1, {{0, 1, 4}, {0, 2, 4}}, {{0, 1, 2}})).ok());
+  MeshHistory::Cursor cursor = history.Begin(1);
+  const DeltaPart part = history.Next(&cursor, 1000);
   EXPECT_TRUE(part.complete);
   EXPECT_EQ(part.removed, (Triangle{0, 1, 2}));
   EXPECT_EQ(part.points.size(), 3u);
@@ -197,20 +197,20 @@ TEST(WatchLog, ARevisionIsOnePartWhereItFits) {
 }
 
 // Any revision, read in parts, each by a reader that knows but the position.
-TEST(WatchLog, EveryRevisionIsReadFromAnyPosition) {
+TEST(MeshHistory, EveryRevisionIsReadFromAnyPosition) {
   std::mt19937 random(5);
   History history;
   history.Grow(12, &random);
   for (std::uint64_t revision = 0; revision < history.states.size(); ++revision) {
-    const WatchLog::Snapshot snapshot = history.log.At(revision);
+    const MeshHistory::Snapshot snapshot = history.mesh.At(revision);
     EXPECT_EQ(snapshot.vertices, history.vertices[revision]);
     EXPECT_EQ(snapshot.simplices, history.states[revision].size());
     for (const std::size_t bytes : {std::size_t{1}, std::size_t{200}, std::size_t{1} << 20}) {
       Client client;
       std::uint64_t position = 0;
       for (bool complete = false; !complete;) {
-        WatchLog::Cursor cursor = history.log.BeginAt(revision, position);
-        const DeltaPart part = history.log.Next(&cursor, bytes);
+        MeshHistory::Cursor cursor = history.mesh.BeginAt(revision, position);
+        const DeltaPart part = history.mesh.Next(&cursor, bytes);
         EXPECT_TRUE(part.removed.empty());
         EXPECT_TRUE(part.complete || cursor.Position() > position) << "it gets on";
         client.Apply(part);
@@ -235,14 +235,14 @@ core::MeshDelta Strip(std::uint32_t vertices) {
   return delta;
 }
 
-TEST(WatchLog, MemoryIsThatOfTheHeap) {
+TEST(MeshHistory, MemoryIsThatOfTheHeap) {
   for (const std::uint32_t vertices : {3u, 1000u, 100'000u}) {
     const core::MeshDelta delta = Strip(vertices);
     const std::uint64_t before = allocated;
-    const auto log = std::make_unique<WatchLog>(2, kAmbient);
-    ASSERT_TRUE(log->Append(delta).ok());
+    const auto history = std::make_unique<MeshHistory>(2, kAmbient);
+    ASSERT_TRUE(history->Append(delta).ok());
     const auto held = static_cast<double>(allocated - before);
-    const auto counted = static_cast<double>(log->MemoryBytes());
+    const auto counted = static_cast<double>(history->MemoryBytes());
     EXPECT_GE(counted, 0.9 * held) << vertices;
     EXPECT_LE(counted, 1.1 * held) << vertices;
   }
