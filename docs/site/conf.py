@@ -120,7 +120,7 @@ def _toctree(caption, pages):
     return f"```{{toctree}}\n:hidden:\n{named}\n{listed}\n```\n"
 
 
-_SECTION = re.compile(r"(Args|Attributes|Raises|Returns|Warns|Yields):( .*)?$")
+_SECTION = re.compile(r"(Args|Keyword Args|Attributes|Raises|Returns|Warns|Yields):( .*)?$")
 
 
 def _plain_words(app, what, name, subject, options, lines):

@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import tempfile
+import types
 from html.parser import HTMLParser
 from urllib.parse import unquote, urlsplit
 
@@ -87,14 +88,20 @@ def missing(html: pathlib.Path, programs: pathlib.Path) -> list[str]:
         found.extend(f"the reference of {page} has no {name} ({source})" for name in lost)
 
     headers = [*(ROOT / "clients/cpp/include/stellate").rglob("*.h"), ROOT / "core/mesher.h"]
-    types = {
+    classes = {
         t for h in headers for t in re.findall(r"(?m)^(?:class|struct) (\w+)[^;]*{", h.read_text())
     }
-    wants("cpp", types, "public headers")
+    wants("cpp", classes, "public headers")
     sys.path.insert(0, str(ROOT / "clients" / "python"))
     import stellate
 
-    wants("python", set(stellate.__all__) | set(stellate.oracles.__all__), "__all__")
+    offering = [m for m in vars(stellate).values() if isinstance(m, types.ModuleType)]
+    offered = {name for m in (stellate, *offering) for name in getattr(m, "__all__", ())}
+    wants("python", offered, "__all__")
+    text = (html / "reference" / "python.html").read_text()
+    for name in stellate.MeshOptions.__annotations__:
+        if f"<strong>{name}</strong>" not in text:
+            found.append(f"the reference of stellate.mesh does not list {name}")
     proto = "".join(path.read_text() for path in (ROOT / "proto/stellate/v1").glob("*.proto"))
     wants("protocol", set(re.findall(r"(?m)^ *(?:message|enum|rpc) (\w+)", proto)), "proto")
     printed = subprocess.run(
