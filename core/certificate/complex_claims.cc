@@ -114,7 +114,7 @@ Topology ExamineTopology(const Examination& x, const Adjacency& adjacency) {
     if (part == 0)
       topology.connectivity = ComputeConnectivity(adjacency);
     else
-      topology.links = CheckLinks(closed, x.mesh.faces ? list.vertices : Stars::kNone);
+      topology.links = CheckLinks(closed, x.mesh.faces ? list.vertices : VertexStars::kNone);
   });
   topology.bad_facets = closed.bad_facets();
   topology.first_bad_facet = closed.first_bad_facet();

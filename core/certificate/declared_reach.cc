@@ -25,7 +25,7 @@ constexpr double kUnseenTilt = 0.15;
 
 }  // namespace
 
-void DeclaredReach::Prove(const Stars& stars, const MeshShape& shape) {
+void DeclaredReach::Prove(const VertexStars& stars, const MeshShape& shape) {
   proof_ = ProveFromReach(mesh_, stars, shape, claim_);
 }
 

@@ -22,7 +22,7 @@ class DeclaredReach {
       : mesh_(mesh), claim_(claim), given_(given) {}
 
   // The mesh is closed and its stars embed.
-  void Prove(const Stars& stars, const MeshShape& shape);
+  void Prove(const VertexStars& stars, const MeshShape& shape);
 
   // Two vertices p and q, q as it is seen from p.
   void HoldAgainstEdge(std::uint32_t p, std::uint32_t q, double noise);

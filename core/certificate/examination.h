@@ -40,7 +40,7 @@ struct Examination {
   Certificate certificate;
   Findings findings;
 
-  std::optional<Stars> stars;
+  std::optional<VertexStars> stars;
   // Once no claim asks for them: most of what the certificate takes up.
   void ForgetStars() { stars.reset(); }
   // Whether some vertex of a simplex is on the boundary.

@@ -38,7 +38,7 @@ std::size_t PartCount(const MeshView& mesh) {
 // no farther than `beside` from it.
 class FibreCounter {
  public:
-  FibreCounter(const MeshView& mesh, const Stars& stars, const Fibre& fibre,
+  FibreCounter(const MeshView& mesh, const VertexStars& stars, const Fibre& fibre,
                const std::vector<std::uint32_t>& near, double beside)
       : mesh_(mesh), stars_(stars), fibre_(fibre) {
     corner_index_.Clear(near.size());
@@ -153,7 +153,7 @@ class FibreCounter {
   }
 
   const MeshView& mesh_;
-  const Stars& stars_;
+  const VertexStars& stars_;
   const Fibre& fibre_;
   std::vector<Candidate> candidates_;
   SmallIndex corner_index_;
@@ -203,8 +203,8 @@ std::vector<NearestVertex> FindNearestVertices(const MeshView& mesh,
   return nearest;
 }
 
-std::vector<FibreHits> CountHits(const MeshView& mesh, const Stars& stars, double max_diameter,
-                                 const std::vector<Fibre>& fibres) {
+std::vector<FibreHits> CountHits(const MeshView& mesh, const VertexStars& stars,
+                                 double max_diameter, const std::vector<Fibre>& fibres) {
   // Each point of a simplex has a vertex within this share of its diameter (Jung).
   const double jung = std::sqrt(mesh.k / (2.0 * (mesh.k + 1)));
   std::vector<double> points, radii, beside;

@@ -43,7 +43,7 @@ struct FibreHits {
 // decide, parallel ones, at most kSideStep reach_out to the side, are tried. `max_diameter`: of the
 // mesh's simplices.
 inline constexpr double kSideStep = 0.02;
-std::vector<FibreHits> CountHits(const MeshView& mesh, const Stars& stars, double max_diameter,
-                                 const std::vector<Fibre>& fibres);
+std::vector<FibreHits> CountHits(const MeshView& mesh, const VertexStars& stars,
+                                 double max_diameter, const std::vector<Fibre>& fibres);
 
 }  // namespace stellate::core

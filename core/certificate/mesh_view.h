@@ -23,7 +23,7 @@ struct MeshView {
   const WallSet* walls = nullptr;
   const double* outward = nullptr;
   const std::vector<FaceMesh>* faces = nullptr;
-  const double* guards = nullptr;  // by vertex, squared radii (StarComplex::Guard); null: none
+  const double* guards = nullptr;  // by vertex, squared radii (Sample::SetGuards); null: none
 
   WallSet WallsOf(std::uint32_t v) const { return walls ? walls[v] : 0; }
   double GuardOf(std::uint32_t v) const { return guards ? guards[v] : 0; }

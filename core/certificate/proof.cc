@@ -33,7 +33,7 @@ constexpr int kTriedVertices = 4;
 
 // A simplex that (A) fails for, and by how much.
 struct Leaning {
-  std::uint32_t simplex = Stars::kNone;
+  std::uint32_t simplex = VertexStars::kNone;
   double alpha = 0, rho = 0;
   double sum = 0;  // alpha + theta, radians
 };
@@ -158,15 +158,15 @@ struct Chosen {
   std::uint32_t component_count = 0;
 };
 
-Chosen ChooseVertices(const Stars& stars) {
+Chosen ChooseVertices(const VertexStars& stars) {
   const SimplexList& list = stars.list();
-  std::vector<std::uint32_t> component(list.vertices, Stars::kNone);
+  std::vector<std::uint32_t> component(list.vertices, VertexStars::kNone);
   std::vector<std::uint32_t> open;
   Chosen chosen;
   std::vector<int> taken;
   std::size_t step = 0;
   for (std::uint32_t v = 0; v < list.vertices; ++v) {
-    if (component[v] == Stars::kNone) {
+    if (component[v] == VertexStars::kNone) {
       component[v] = chosen.component_count++;
       taken.push_back(0);
       open.push_back(v);
@@ -177,7 +177,7 @@ Chosen ChooseVertices(const Stars& stars) {
           CheckInterruption(step++);
           for (int i = 0; i <= list.k; ++i) {
             const std::uint32_t w = list[s][i];
-            if (component[w] != Stars::kNone) continue;
+            if (component[w] != VertexStars::kNone) continue;
             component[w] = component[v];
             open.push_back(w);
           }
@@ -192,7 +192,7 @@ Chosen ChooseVertices(const Stars& stars) {
 }
 
 // Condition (B): empty, or what is in the way.
-std::string FindOtherSheet(const MeshView& mesh, const Stars& stars, const MeshShape& shape,
+std::string FindOtherSheet(const MeshView& mesh, const VertexStars& stars, const MeshShape& shape,
                            double most_rho, double reach) {
   const Chosen chosen = ChooseVertices(stars);
   const double near = LargestDistance(most_rho, reach) + shape.max_diameter;
@@ -267,7 +267,7 @@ bool Contradicts(const ReachClaim& claim, double length, double away, double noi
   return away * (1 - kLengthMargin) > allowed * (1 + kLengthMargin) + Blame(claim, length, noise);
 }
 
-Proof ProveFromReach(const MeshView& mesh, const Stars& stars, const MeshShape& shape,
+Proof ProveFromReach(const MeshView& mesh, const VertexStars& stars, const MeshShape& shape,
                      const ReachClaim& claim) {
   Proof proof;
   const SimplexList& list = stars.list();

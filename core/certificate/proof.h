@@ -44,7 +44,7 @@ struct Proof {
 };
 
 // Decides (A) and (B). The mesh is closed and its stars embed. Linear in the mesh.
-Proof ProveFromReach(const MeshView& mesh, const Stars& stars, const MeshShape& shape,
+Proof ProveFromReach(const MeshView& mesh, const VertexStars& stars, const MeshShape& shape,
                      const ReachClaim& claim);
 
 }  // namespace stellate::core

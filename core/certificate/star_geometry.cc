@@ -58,7 +58,7 @@ StarGeometry MeasureStars(const MeshView& mesh, const Adjacency& adjacency,
   return MeasureBy(sweep, &neighbours);
 }
 
-std::optional<EmbeddedStars> MeasureIfEmbedded(const MeshView& mesh, const Stars& stars) {
+std::optional<EmbeddedStars> MeasureIfEmbedded(const MeshView& mesh, const VertexStars& stars) {
   if (mesh.k > kMostLocal || mesh.walls) return std::nullopt;
   const std::uint32_t simplices = stars.list().size();
   Sweep sweep{mesh, stars, nullptr, {}, {mesh, stars.list()}, {}, {}};

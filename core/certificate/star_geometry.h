@@ -49,6 +49,6 @@ struct EmbeddedStars {
 // and the link of its centre. None if it is not one, or if this cannot be told so: for k > 3, of
 // manifolds with boundary, and of very large stars. MeasureStars then says what is wrong. Time
 // linear in the mesh.
-std::optional<EmbeddedStars> MeasureIfEmbedded(const MeshView& mesh, const Stars& stars);
+std::optional<EmbeddedStars> MeasureIfEmbedded(const MeshView& mesh, const VertexStars& stars);
 
 }  // namespace stellate::core

@@ -37,7 +37,7 @@ inline constexpr const char* kFolded = "folds over itself in its tangent space";
 // What all parts of the vertices share.
 struct Sweep {
   const MeshView& mesh;
-  const Stars& stars;
+  const VertexStars& stars;
   const Adjacency* adjacency;                // none: all stars must embed
   std::span<const std::int8_t> orientation;  // empty when it does not help
   ShapeSearch shape;
@@ -347,7 +347,7 @@ class StarMeasurer {
 
   Sweep& sweep_;
   const MeshView& mesh_;
-  const Stars& stars_;
+  const VertexStars& stars_;
   const std::uint32_t* const ids_;  // of all simplices
   PartOfStars& part_;
   StarGeometry& result_;

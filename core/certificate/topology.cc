@@ -221,7 +221,7 @@ std::string CheckSimplexList(const SimplexList& list) {
                  " does not name ascending vertices below ", list.vertices);
 }
 
-Stars::Stars(const SimplexList& list) : list_(list) {
+VertexStars::VertexStars(const SimplexList& list) : list_(list) {
   begin_.assign(static_cast<std::size_t>(list_.vertices) + 1, 0);
   for (std::size_t i = 0; i < list_.ids->size(); ++i) {
     CheckInterruption(i);
@@ -236,7 +236,7 @@ Stars::Stars(const SimplexList& list) : list_(list) {
   }
 }
 
-Adjacency::Adjacency(Stars stars, std::uint32_t apex) : Stars(std::move(stars)) {
+Adjacency::Adjacency(VertexStars stars, std::uint32_t apex) : VertexStars(std::move(stars)) {
   MatchFacets(apex);
 }
 

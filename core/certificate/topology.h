@@ -45,12 +45,12 @@ auto WithMeshDimension(int k, const Call& call) {
 }
 
 // Which simplices meet at a vertex. 4 (k + 1) bytes a simplex and 8 a vertex.
-class Stars {
+class VertexStars {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
   // REQUIRES: CheckSimplexList(list) is empty.
-  explicit Stars(const SimplexList& list);
+  explicit VertexStars(const SimplexList& list);
 
   const SimplexList& list() const { return list_; }
 
@@ -68,13 +68,13 @@ class Stars {
 // And which share a facet.
 //
 // Linear in the mesh in time and memory, for bounded stars: 8 (k + 1) bytes a simplex.
-class Adjacency : public Stars {
+class Adjacency : public VertexStars {
  public:
-  // REQUIRES: as for Stars. `apex`: a vertex that is in as many simplices as may be: of a complex
-  // of edges it is a facet itself, which is left out then.
+  // REQUIRES: as for VertexStars. `apex`: a vertex that is in as many simplices as may be: of a
+  // complex of edges it is a facet itself, which is left out then.
   explicit Adjacency(const SimplexList& list, std::uint32_t apex = kNone)
-      : Adjacency(Stars(list), apex) {}
-  explicit Adjacency(Stars stars, std::uint32_t apex = kNone);
+      : Adjacency(VertexStars(list), apex) {}
+  explicit Adjacency(VertexStars stars, std::uint32_t apex = kNone);
 
   // The simplex across the facet opposite vertex number i of simplex s; kNone unless that facet
   // is in exactly two simplices, on different vertex sets.

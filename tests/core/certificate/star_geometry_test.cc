@@ -68,7 +68,8 @@ void ExpectTheSame(const HandmadeMesh& mesh) {
   const Connectivity connectivity = ComputeConnectivity(adjacency);
   const LinkReport links = CheckLinks(adjacency);
   const StarGeometry stars = MeasureStars(mesh.View(), adjacency, connectivity.orientation);
-  const std::optional<EmbeddedStars> embedded = MeasureIfEmbedded(mesh.View(), Stars(mesh.List()));
+  const std::optional<EmbeddedStars> embedded =
+      MeasureIfEmbedded(mesh.View(), VertexStars(mesh.List()));
   const bool good = adjacency.bad_facets() == 0 && links.bad_links == 0 &&
                     connectivity.isolated_vertices == 0 && stars.unembedded_stars == 0;
   ASSERT_EQ(embedded.has_value(), good);
@@ -101,7 +102,7 @@ TEST(MeasureIfEmbedded, SaysWhatNeighboursSay) {
   for (const HandmadeMesh& mesh :
        {SimplexBoundary(1), TorusGrid(1, 9, CliffordPoint), SimplexBoundary(2), Icosphere(2),
         TorusGrid(2, 9, CliffordPoint), SimplexBoundary(3), TorusGrid(3, 8, CliffordPoint)}) {
-    ASSERT_TRUE(MeasureIfEmbedded(mesh.View(), Stars(mesh.List())).has_value()) << mesh.k;
+    ASSERT_TRUE(MeasureIfEmbedded(mesh.View(), VertexStars(mesh.List())).has_value()) << mesh.k;
     ExpectTheSame(mesh);
     ExpectTheSame(Joined(mesh, mesh, 0));
     ExpectTheSame(Joined(mesh, mesh, 1));
