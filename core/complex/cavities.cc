@@ -52,11 +52,11 @@ inline int Sign(double x) { return (x > 0) - (x < 0); }
 template <int K>
 class Cavity {
  public:
-  using Simplex = typename StarComplex<K>::Simplex;
+  using Simplex = typename Stars<K>::Simplex;
   using Facet = typename Census<K>::Facet;
 
   Cavity(const Census<K>& census, const FillingRules& rules, std::vector<Simplex> doubtful)
-      : census_(census), complex_(census.complex), rules_(rules), doubtful_(std::move(doubtful)) {
+      : census_(census), stars_(census.stars), rules_(rules), doubtful_(std::move(doubtful)) {
     for (const Simplex& s : doubtful_) vertices_.insert(vertices_.end(), s.begin(), s.end());
     std::sort(vertices_.begin(), vertices_.end());
     vertices_.erase(std::unique(vertices_.begin(), vertices_.end()), vertices_.end());
@@ -101,13 +101,14 @@ class Cavity {
 
   // How each vertex's tangent basis is oriented relative to that of the vertex nearest to all.
   bool Orient() {
-    const int d = complex_.d();
+    const int d = stars_.sample().d();
     std::uint32_t middle = vertices_.front();
     double least = INFINITY;
     for (const std::uint32_t p : vertices_) {
       double farthest = 0;
       for (const std::uint32_t q : vertices_)
-        farthest = std::max(farthest, SquaredDistance(complex_.Point(p), complex_.Point(q), d));
+        farthest = std::max(farthest,
+                            SquaredDistance(stars_.sample().Point(p), stars_.sample().Point(q), d));
       if (farthest < least) {
         least = farthest;
         middle = p;
@@ -117,7 +118,8 @@ class Cavity {
       double m[K][K];
       for (int a = 0; a < K; ++a)
         for (int b = 0; b < K; ++b)
-          m[a][b] = Dot(complex_.Tangent(middle) + a * d, complex_.Tangent(p) + b * d, d);
+          m[a][b] =
+              Dot(stars_.sample().Tangent(middle) + a * d, stars_.sample().Tangent(p) + b * d, d);
       orientation_.push_back(Sign(Determinant<K>(m)));
       if (orientation_.back() == 0) return false;
     }
@@ -127,14 +129,14 @@ class Cavity {
   // The sign of a simplex, its vertices ascending, in p's tangent space; 0 if it is
   // degenerate there, as those are whose vertices are all on one flat wall.
   int SignAt(std::uint32_t p, const Simplex& s) const {
-    const int d = complex_.d();
+    const int d = stars_.sample().d();
     double m[K][K], lengths2 = 1;
     for (int i = 0; i < K; ++i) {
-      const double* const at = complex_.Point(s[static_cast<std::size_t>(i) + 1]);
+      const double* const at = stars_.sample().Point(s[static_cast<std::size_t>(i) + 1]);
       for (int a = 0; a < K; ++a) {
-        const double* const t = complex_.Tangent(p) + a * d;
+        const double* const t = stars_.sample().Tangent(p) + a * d;
         m[i][a] = 0;
-        for (int j = 0; j < d; ++j) m[i][a] += t[j] * (at[j] - complex_.Point(s[0])[j]);
+        for (int j = 0; j < d; ++j) m[i][a] += t[j] * (at[j] - stars_.sample().Point(s[0])[j]);
       }
       lengths2 *= Dot(m[i], m[i], K);
     }
@@ -179,10 +181,10 @@ class Cavity {
     }
     loose_.assign(vertices_.size(), 1);
     for (std::size_t i = 0; i < vertices_.size(); ++i) {
-      const auto& cell = complex_.cell(vertices_[i]);
+      const auto& cell = stars_.cell(vertices_[i]);
       Simplex s;
       for (std::size_t v = 0; v < cell.vertex_count(); ++v)
-        if (complex_.SimplexOf(vertices_[i], cell, v, &s) && !census_.IsDoubtful(s)) {
+        if (stars_.SimplexOf(vertices_[i], cell, v, &s) && !census_.IsDoubtful(s)) {
           loose_[i] = 0;
           break;
         }
@@ -205,10 +207,11 @@ class Cavity {
     int side = 0;
     for (const std::uint32_t p : facet) {
       const double* const outward =
-          complex_.Conormals(p) + K * CountWalls(complex_.walls(p) & (SetOfWall(wall) - 1));
+          stars_.sample().Conormals(p) +
+          K * CountWalls(stars_.sample().walls(p) & (SetOfWall(wall) - 1));
       double m[K][K];
       for (int i = 0; i < K; ++i) {
-        complex_.Project(p, complex_.Point(facet[static_cast<std::size_t>(i)]), m[i]);
+        stars_.sample().Project(p, stars_.sample().Point(facet[static_cast<std::size_t>(i)]), m[i]);
         for (int a = 0; a < K; ++a) m[i][a] -= outward[a];
       }
       const int here = Sign(Determinant<K>(m)) * orientation_[Place(p)];
@@ -228,13 +231,14 @@ class Cavity {
 
   void Propose(const Simplex& s) {
     const double* corners[K + 1];
-    for (std::size_t i = 0; i <= K; ++i) corners[i] = complex_.Point(s[i]);
+    for (std::size_t i = 0; i <= K; ++i) corners[i] = stars_.sample().Point(s[i]);
     const SimplexVertices span(corners, K + 1);
-    const SimplexMeasures measures = MeasureSimplex(span, complex_.d());
+    const SimplexMeasures measures = MeasureSimplex(span, stars_.sample().d());
     if (!(measures.circumradius <= rules_.epsilon) ||
         !(measures.RadiusEdgeRatio() <= rules_.radius_edge_bound))
       return;
-    if (rules_.sliver_bound > 0 && ContainsSliver(span, complex_.d(), rules_.sliver_bound)) return;
+    if (rules_.sliver_bound > 0 && ContainsSliver(span, stars_.sample().d(), rules_.sliver_bound))
+      return;
     const int orientation = OrientationOf(s, s);
     if (orientation == 0) return;
     Candidate c{s, {}, {}, census_.Holders(s), measures.Fatness()};
@@ -328,7 +332,7 @@ class Cavity {
   }
 
   const Census<K>& census_;
-  const StarComplex<K>& complex_;
+  const Stars<K>& stars_;
   const FillingRules& rules_;
   std::vector<Simplex> doubtful_;
   std::vector<std::uint32_t> vertices_;  // ascending
@@ -346,8 +350,8 @@ class Cavity {
 }  // namespace
 
 template <int K>
-FilledCavities FillCavities(const StarComplex<K>& complex, const FillingRules& rules) {
-  const Census<K> census(complex);
+FilledCavities FillCavities(const Stars<K>& stars, const FillingRules& rules) {
+  const Census<K> census(stars);
   std::vector<Cavity<K>> cavities;
   for (auto& part : PartDoubtful<K>(census)) cavities.emplace_back(census, rules, std::move(part));
   std::vector<std::uint8_t> filled(cavities.size());
@@ -376,10 +380,10 @@ FilledCavities FillCavities(const StarComplex<K>& complex, const FillingRules& r
   return result;
 }
 
-template FilledCavities FillCavities<1>(const StarComplex<1>&, const FillingRules&);
-template FilledCavities FillCavities<2>(const StarComplex<2>&, const FillingRules&);
-template FilledCavities FillCavities<3>(const StarComplex<3>&, const FillingRules&);
-template FilledCavities FillCavities<4>(const StarComplex<4>&, const FillingRules&);
-template FilledCavities FillCavities<5>(const StarComplex<5>&, const FillingRules&);
+template FilledCavities FillCavities<1>(const Stars<1>&, const FillingRules&);
+template FilledCavities FillCavities<2>(const Stars<2>&, const FillingRules&);
+template FilledCavities FillCavities<3>(const Stars<3>&, const FillingRules&);
+template FilledCavities FillCavities<4>(const Stars<4>&, const FillingRules&);
+template FilledCavities FillCavities<5>(const Stars<5>&, const FillingRules&);
 
 }  // namespace stellate::core

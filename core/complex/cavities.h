@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/complex/star_complex.h"
+#include "core/complex/stars.h"
 
 namespace stellate::core {
 
@@ -41,6 +41,6 @@ struct FilledCavities {
 // neighbour in none of them. Deterministic, parallel; time linear in the mesh, and bounded for each
 // cavity.
 template <int K>
-FilledCavities FillCavities(const StarComplex<K>& complex, const FillingRules& rules);
+FilledCavities FillCavities(const Stars<K>& stars, const FillingRules& rules);
 
 }  // namespace stellate::core

@@ -20,11 +20,11 @@ namespace stellate::core {
 // The stars' simplices, parted into those that all agree on and the doubtful ones.
 template <int K>
 struct Census {
-  using Simplex = typename StarComplex<K>::Simplex;
+  using Simplex = typename Stars<K>::Simplex;
   using Facet = std::array<std::uint32_t, K>;
 
-  explicit Census(const StarComplex<K>& whole) : complex(whole) {
-    const std::uint32_t n = complex.size();
+  explicit Census(const Stars<K>& whole) : stars(whole) {
+    const std::uint32_t n = stars.size();
     const std::size_t chunks = ChunkCount(n);
     std::vector<std::vector<Simplex>> owned(chunks), doubts(chunks);
     ParallelChunks(n, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
@@ -57,14 +57,14 @@ struct Census {
   // The agreed simplices that have a facet: two at most, as the facet is an edge of a cell.
   int AgreedOn(const Facet& facet, Simplex (&found)[2]) const {
     const std::uint32_t p = facet[0];
-    const auto& cell = complex.cell(p);
+    const auto& cell = stars.cell(p);
     int count = 0;
     Simplex s;
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
       int has = 0;
       for (int i = 0; i < K; ++i)
         has += std::binary_search(facet.begin() + 1, facet.end(), cell.id(cell.facet(v, i)));
-      if (has < K - 1 || !complex.SimplexOf(p, cell, v, &s) || IsDoubtful(s)) continue;
+      if (has < K - 1 || !stars.SimplexOf(p, cell, v, &s) || IsDoubtful(s)) continue;
       if (count < 2) found[count] = s;
       ++count;
     }
@@ -74,13 +74,13 @@ struct Census {
   // The wall that a facet lies in: nothing is beyond it there. Stars agree that it is of that face.
   std::optional<int> WallUnder(const Facet& facet) const {
     const std::uint32_t p = facet[0];
-    if (complex.walls(p) == 0) return std::nullopt;
-    const auto& cell = complex.cell(p);
+    if (stars.sample().walls(p) == 0) return std::nullopt;
+    const auto& cell = stars.cell(p);
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
-      const auto simplex = complex.FaceSimplexOf(p, cell, v);
+      const auto simplex = stars.FaceSimplexOf(p, cell, v);
       if (simplex.fake || CountWalls(simplex.walls) != 1 || simplex.count != K) continue;
       if (std::equal(facet.begin(), facet.end(), simplex.ids.begin()) &&
-          IsConsistent<K>(complex, p, v))
+          IsConsistent<K>(stars, p, v))
         return std::countr_zero(simplex.walls);
     }
     return std::nullopt;
@@ -92,17 +92,17 @@ struct Census {
     return count == 2 || (count == 1 && WallUnder(facet));
   }
 
-  const StarComplex<K>& complex;
+  const Stars<K>& stars;
   std::vector<Simplex> agreed, doubtful, all_doubts;
 
  private:
   void Survey(std::uint32_t p, std::vector<Simplex>& owned, std::vector<Simplex>& doubts) const {
-    const auto& cell = complex.cell(p);
-    const Folds<K> folds(complex, p);
+    const auto& cell = stars.cell(p);
+    const Folds<K> folds(stars, p);
     Simplex s;
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
-      if (!complex.SimplexOf(p, cell, v, &s)) continue;
-      if (!IsConsistent<K>(complex, p, v) || folds.IsFolded(v))
+      if (!stars.SimplexOf(p, cell, v, &s)) continue;
+      if (!IsConsistent<K>(stars, p, v) || folds.IsFolded(v))
         doubts.push_back(s);
       else if (s[0] == p)
         owned.push_back(s);
@@ -113,7 +113,7 @@ struct Census {
 // Doubtful simplices that share a facet lie in one cavity, unless agreed ones are on both its
 // sides, or on the one that it has in a wall.
 template <int K>
-std::vector<std::vector<typename StarComplex<K>::Simplex>> PartDoubtful(const Census<K>& census) {
+std::vector<std::vector<typename Stars<K>::Simplex>> PartDoubtful(const Census<K>& census) {
   using Facet = typename Census<K>::Facet;
   const auto& doubtful = census.doubtful;
   std::vector<std::pair<Facet, std::uint32_t>> facets;
@@ -140,7 +140,7 @@ std::vector<std::vector<typename StarComplex<K>::Simplex>> PartDoubtful(const Ce
     if (!census.IsClosed(facets[i].first)) parent[std::max(a, b)] = std::min(a, b);
   }
   std::vector<std::size_t> number(doubtful.size());
-  std::vector<std::vector<typename StarComplex<K>::Simplex>> parts;
+  std::vector<std::vector<typename Stars<K>::Simplex>> parts;
   for (std::size_t s = 0; s < doubtful.size(); ++s) {
     const std::size_t r = root(s);
     if (r == s) {

@@ -17,11 +17,28 @@ class CentreCache {
  public:
   using Simplex = std::array<std::uint32_t, K + 1>;  // ascending ids
 
-  // Names whose points and weights the centres are of: a new one whenever they change.
-  static std::uint64_t NewOwner() {
-    static std::atomic<std::uint64_t> last{0};
-    return ++last;
-  }
+  // Stands for the points and weights that centres are of: give whatever holds these an Owner, and
+  // assign a new one whenever they change. A copy is another owner, as what it belongs to goes on
+  // apart from the original.
+  class Owner {
+   public:
+    Owner() : id_(NewId()) {}
+    Owner(const Owner&) : Owner() {}
+    Owner& operator=(const Owner&) {
+      id_ = NewId();
+      return *this;
+    }
+    ~Owner() = default;
+    std::uint64_t id() const { return id_; }
+
+   private:
+    static std::uint64_t NewId() {
+      static std::atomic<std::uint64_t> last{0};
+      return ++last;
+    }
+
+    std::uint64_t id_;
+  };
 
   // Writes the centre of a simplex (d numbers), or returns false if it has none. What is not
   // remembered `find(centre)` tells. `key` scatters simplices.
@@ -47,7 +64,7 @@ class CentreCache {
   static constexpr std::size_t kEntries = 8192;
 
   struct Entry {
-    std::uint64_t owner = 0;  // nobody
+    std::uint64_t owner = 0;  // none
     Simplex simplex{};
     bool found = false;
   };

@@ -12,29 +12,29 @@ namespace {
 
 // c_q(sigma): the point of T_qM equidistant from sigma's vertices, in ambient coordinates.
 template <int K>
-Eigen::VectorXd CentreIn(const StarComplex<K>& complex, std::uint32_t q,
-                         const typename StarComplex<K>::Simplex& simplex) {
+Eigen::VectorXd CentreIn(const Stars<K>& stars, std::uint32_t q,
+                         const typename Stars<K>::Simplex& simplex) {
   Eigen::Matrix<double, K, K> rows;
   Eigen::Matrix<double, K, 1> rhs;
   int r = 0;
   for (const std::uint32_t v : simplex) {
     if (v == q) continue;
     double normal[K];
-    rhs[r] = 0.5 * complex.Project(q, complex.Point(v), normal);
+    rhs[r] = 0.5 * stars.sample().Project(q, stars.sample().Point(v), normal);
     for (int a = 0; a < K; ++a) rows(r, a) = normal[a];
     ++r;
   }
   const Eigen::Matrix<double, K, 1> x = SolvePivoted(rows, rhs);
-  Eigen::VectorXd centre(complex.d());
-  complex.Lift(q, x.data(), centre.data());
+  Eigen::VectorXd centre(stars.sample().d());
+  stars.sample().Lift(q, x.data(), centre.data());
   return centre;
 }
 
 // The sign of the simplex on p and the K points of the facets at vertex v of its cell, seen in
 // T_pM.
 template <int K>
-double Orientation(const StarComplex<K>& complex, std::uint32_t p, std::size_t v) {
-  const auto& cell = complex.cell(p);
+double Orientation(const Stars<K>& stars, std::uint32_t p, std::size_t v) {
+  const auto& cell = stars.cell(p);
   if constexpr (K == 3) {  // by far the most often
     const double* const a = cell.normal(cell.facet(v, 0));
     const double* const b = cell.normal(cell.facet(v, 1));
@@ -43,7 +43,7 @@ double Orientation(const StarComplex<K>& complex, std::uint32_t p, std::size_t v
            a[2] * (b[0] * c[1] - b[1] * c[0]);
   }
   double m[K][K];
-  for (int r = 0; r < K; ++r) complex.HalfSpace(p, cell.facet(v, r), m[r]);
+  for (int r = 0; r < K; ++r) stars.HalfSpace(p, cell.facet(v, r), m[r]);
   double sign = 1;
   for (int c = 0; c < K; ++c) {
     int pivot = c;
@@ -98,7 +98,7 @@ Turned TurnOf(const RestrictedVoronoiCell<K>& cell, std::size_t v, int s, std::s
 
 template <int K>
 std::optional<std::size_t> FindSimplex(const RestrictedVoronoiCell<K>& cell, std::uint32_t q,
-                                       const typename StarComplex<K>::Simplex& simplex,
+                                       const typename Stars<K>::Simplex& simplex,
                                        std::uint64_t key) {
   if constexpr (K == 2) {  // no key is quicker than the ids themselves
     const auto has = [&](std::uint32_t id) {
@@ -117,14 +117,13 @@ namespace {
 
 // Of a star at the boundary, where the simplex may be one of a face.
 template <int K>
-bool IsConsistentOnFaces(const StarComplex<K>& complex, std::uint32_t p, std::size_t v) {
-  const auto simplex = complex.FaceSimplexOf(p, complex.cell(p), v);
+bool IsConsistentOnFaces(const Stars<K>& stars, std::uint32_t p, std::size_t v) {
+  const auto simplex = stars.FaceSimplexOf(p, stars.cell(p), v);
   if (simplex.fake || simplex.foreign) return false;
-  const std::uint64_t key = SimplexKey<K>(complex.cell(p), v, p);
+  const std::uint64_t key = SimplexKey<K>(stars.cell(p), v, p);
   for (int i = 0; i < simplex.count; ++i) {
     const std::uint32_t q = simplex.ids[static_cast<std::size_t>(i)];
-    if (q != p && complex.cell(q).Find(key - Mix64(q)) == complex.cell(q).vertex_count())
-      return false;
+    if (q != p && stars.cell(q).Find(key - Mix64(q)) == stars.cell(q).vertex_count()) return false;
   }
   return true;
 }
@@ -149,9 +148,9 @@ std::size_t FindIn(const RestrictedVoronoiCell<K>& cell, std::uint32_t q, std::u
 // Looks for the simplex dual to vertex v of p's cell in the stars of its other vertices: where it
 // is, by facet of v. False: not in all of them.
 template <int K>
-bool FindInStars(const StarComplex<K>& complex, std::uint32_t p, std::size_t v,
-                 std::uint32_t (&others)[K], std::size_t (&at)[K]) {
-  const auto& cell = complex.cell(p);
+bool FindInStars(const Stars<K>& stars, std::uint32_t p, std::size_t v, std::uint32_t (&others)[K],
+                 std::size_t (&at)[K]) {
+  const auto& cell = stars.cell(p);
   for (int s = 0; s < K; ++s) {
     others[s] = cell.id(cell.facet(v, s));
     if (!IsSample(others[s])) return false;
@@ -161,7 +160,7 @@ bool FindInStars(const StarComplex<K>& complex, std::uint32_t p, std::size_t v,
     std::uint32_t rest[K];
     std::copy_n(others, K, rest);
     rest[s] = p;
-    const auto& there = complex.cell(others[s]);
+    const auto& there = stars.cell(others[s]);
     at[s] = FindIn<K>(there, others[s], key, rest);
     if (at[s] == there.vertex_count()) return false;
   }
@@ -171,25 +170,24 @@ bool FindInStars(const StarComplex<K>& complex, std::uint32_t p, std::size_t v,
 }  // namespace
 
 template <int K>
-bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p, std::size_t v) {
-  if (complex.walls(p) != 0) return IsConsistentOnFaces<K>(complex, p, v);
+bool IsConsistent(const Stars<K>& stars, std::uint32_t p, std::size_t v) {
+  if (stars.sample().walls(p) != 0) return IsConsistentOnFaces<K>(stars, p, v);
   std::uint32_t others[K];
   std::size_t at[K];
-  return FindInStars<K>(complex, p, v, others, at);
+  return FindInStars<K>(stars, p, v, others, at);
 }
 
 template <int K>
-ConsistentSimplices<K>::ConsistentSimplices(const StarComplex<K>& complex)
-    : known_(complex.size()) {
-  ParallelFor(complex.size(), [&](std::uint32_t p) {
-    if (complex.walls(p) != 0) return;
-    const auto& cell = complex.cell(p);
+ConsistentSimplices<K>::ConsistentSimplices(const Stars<K>& stars) : known_(stars.size()) {
+  ParallelFor(stars.size(), [&](std::uint32_t p) {
+    if (stars.sample().walls(p) != 0) return;
+    const auto& cell = stars.cell(p);
     std::uint32_t others[K];
     std::size_t at[K];
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
       bool lowest = true;
       for (int s = 0; s < K; ++s) lowest = lowest && cell.id(cell.facet(v, s)) > p;
-      if (!lowest || !FindInStars<K>(complex, p, v, others, at)) continue;
+      if (!lowest || !FindInStars<K>(stars, p, v, others, at)) continue;
       Note(p, v);
       for (int s = 0; s < K; ++s) Note(others[s], at[s]);
     }
@@ -199,13 +197,12 @@ ConsistentSimplices<K>::ConsistentSimplices(const StarComplex<K>& complex)
 // Neighbours lie on different sides of the facet they share if, with the one's vertex off it in the
 // place of the other's, their signs differ.
 template <int K>
-Folds<K>::Folds(const StarComplex<K>& complex, std::uint32_t p)
-    : folded_(complex.cell(p).vertex_count()) {
-  const auto& cell = complex.cell(p);
+Folds<K>::Folds(const Stars<K>& stars, std::uint32_t p) : folded_(stars.cell(p).vertex_count()) {
+  const auto& cell = stars.cell(p);
   thread_local std::vector<double> sides;
   sides.resize(folded_.size());
   for (std::size_t v = 0; v < sides.size(); ++v) {
-    sides[v] = Orientation<K>(complex, p, v);
+    sides[v] = Orientation<K>(stars, p, v);
     folded_[v] = sides[v] == 0;
   }
   const auto is_wall = [&](std::size_t facet) { return IsWall(cell.id(facet)); };
@@ -224,34 +221,34 @@ Folds<K>::Folds(const StarComplex<K>& complex, std::uint32_t p)
 }
 
 template <int K>
-std::uint64_t CountInconsistent(const StarComplex<K>& complex, std::uint32_t p) {
+std::uint64_t CountInconsistent(const Stars<K>& stars, std::uint32_t p) {
   std::uint64_t count = 0;
-  for (std::size_t v = 0; v < complex.cell(p).vertex_count(); ++v)
-    count += !IsConsistent<K>(complex, p, v);
+  for (std::size_t v = 0; v < stars.cell(p).vertex_count(); ++v)
+    count += !IsConsistent<K>(stars, p, v);
   return count;
 }
 
 template <int K>
-std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(
-    const StarComplex<K>& complex, std::uint32_t p) {
+std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(const Stars<K>& stars,
+                                                                          std::uint32_t p) {
   InconsistentConfiguration<K> found;
   found.holder = p;
-  for (std::size_t v = 0; v < complex.cell(p).vertex_count(); ++v) {
-    if (!complex.SimplexOf(p, complex.cell(p), v, &found.simplex)) continue;
-    const std::uint64_t key = SimplexKey<K>(complex.cell(p), v, p);
+  for (std::size_t v = 0; v < stars.cell(p).vertex_count(); ++v) {
+    if (!stars.SimplexOf(p, stars.cell(p), v, &found.simplex)) continue;
+    const std::uint64_t key = SimplexKey<K>(stars.cell(p), v, p);
     for (const std::uint32_t q : found.simplex) {
-      if (q == p || FindSimplex<K>(complex.cell(q), q, found.simplex, key)) continue;
+      if (q == p || FindSimplex<K>(stars.cell(q), q, found.simplex, key)) continue;
       found.refuser = q;
-      const Eigen::VectorXd from = CentreIn<K>(complex, p, found.simplex);
-      const Eigen::VectorXd to = CentreIn<K>(complex, q, found.simplex);
+      const Eigen::VectorXd from = CentreIn<K>(stars, p, found.simplex);
+      const Eigen::VectorXd to = CentreIn<K>(stars, q, found.simplex);
       // |z - l|^2 - |z - q|^2 is linear in z: where it turns negative, l becomes nearer.
       double first = 2;
-      const int d = complex.d();
-      const double radius = Distance(to.data(), complex.Point(q), d);
-      complex.ForEachWithin(to.data(), radius, [&](std::uint32_t l) {
-        const double* at = complex.Point(l);
-        const double start =
-            SquaredDistance(from.data(), at, d) - SquaredDistance(from.data(), complex.Point(q), d);
+      const int d = stars.sample().d();
+      const double radius = Distance(to.data(), stars.sample().Point(q), d);
+      stars.sample().ForEachWithin(to.data(), radius, [&](std::uint32_t l) {
+        const double* at = stars.sample().Point(l);
+        const double start = SquaredDistance(from.data(), at, d) -
+                             SquaredDistance(from.data(), stars.sample().Point(q), d);
         const double end = SquaredDistance(to.data(), at, d) - radius * radius;
         if (std::find(found.simplex.begin(), found.simplex.end(), l) != found.simplex.end() ||
             !(end < 0))
@@ -268,14 +265,13 @@ std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(
   return std::nullopt;
 }
 
-#define STELLATE_EACH(K)                                                              \
-  template std::optional<std::size_t> FindSimplex<K>(                                 \
-      const RestrictedVoronoiCell<K>&, std::uint32_t, const StarComplex<K>::Simplex&, \
-      std::uint64_t);                                                                 \
-  template bool IsConsistent(const StarComplex<K>&, std::uint32_t, std::size_t);      \
-  template std::uint64_t CountInconsistent(const StarComplex<K>&, std::uint32_t);     \
-  template std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration( \
-      const StarComplex<K>&, std::uint32_t);
+#define STELLATE_EACH(K)                                                                        \
+  template std::optional<std::size_t> FindSimplex<K>(                                           \
+      const RestrictedVoronoiCell<K>&, std::uint32_t, const Stars<K>::Simplex&, std::uint64_t); \
+  template bool IsConsistent(const Stars<K>&, std::uint32_t, std::size_t);                      \
+  template std::uint64_t CountInconsistent(const Stars<K>&, std::uint32_t);                     \
+  template std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(           \
+      const Stars<K>&, std::uint32_t);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 STELLATE_INSTANTIATE_CLASS(ConsistentSimplices)

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/base/instantiate.h"
-#include "core/complex/star_complex.h"
+#include "core/complex/stars.h"
 
 namespace stellate::core {
 
@@ -23,13 +23,13 @@ std::uint64_t SimplexKey(const RestrictedVoronoiCell<K>& cell, std::size_t v, st
 // The vertex of `cell`, the cell of q, that is dual to a simplex on q with that key, or nothing.
 template <int K>
 std::optional<std::size_t> FindSimplex(const RestrictedVoronoiCell<K>& cell, std::uint32_t q,
-                                       const typename StarComplex<K>::Simplex& simplex,
+                                       const typename Stars<K>::Simplex& simplex,
                                        std::uint64_t key);
 
 // Whether the simplex dual to vertex v of p's cell is in the stars of all its vertices; one of a
 // face, that it is not foreign either.
 template <int K>
-bool IsConsistent(const StarComplex<K>& complex, std::uint32_t p, std::size_t v);
+bool IsConsistent(const Stars<K>& stars, std::uint32_t p, std::size_t v);
 
 // The consistent simplices of all stars, looked for once a simplex and not once for each of its
 // stars. It does not know of all: of the others IsConsistent tells, as of those at the boundary.
@@ -37,7 +37,7 @@ template <int K>
 class ConsistentSimplices {
  public:
   // In parallel.
-  explicit ConsistentSimplices(const StarComplex<K>& complex);
+  explicit ConsistentSimplices(const Stars<K>& stars);
 
   // The vertices of p's cell that are known to be dual to consistent simplices: a bit each, of the
   // first 64.
@@ -56,7 +56,7 @@ class ConsistentSimplices {
 template <int K>
 class Folds {
  public:
-  Folds(const StarComplex<K>& complex, std::uint32_t p);
+  Folds(const Stars<K>& stars, std::uint32_t p);
 
   // Of the simplex dual to vertex v of p's cell.
   bool IsFolded(std::size_t v) const { return folded_[v] != 0; }
@@ -67,14 +67,14 @@ class Folds {
 
 // Simplices of star(p) that are missing from the star of one of their vertices.
 template <int K>
-std::uint64_t CountInconsistent(const StarComplex<K>& complex, std::uint32_t p);
+std::uint64_t CountInconsistent(const Stars<K>& stars, std::uint32_t p);
 
 // sigma is in star(p) but not in star(q), although q is a vertex of it: on the way from c_p(sigma)
 // to c_q(sigma), in the flat of points equidistant from sigma's vertices, `nearer` is the first
 // sample point that becomes nearer than they are. sigma and it are the (k+1)-simplex of Sec. 3.2.
 template <int K>
 struct InconsistentConfiguration {
-  typename StarComplex<K>::Simplex simplex;
+  typename Stars<K>::Simplex simplex;
   std::uint32_t holder = 0;             // p
   std::uint32_t refuser = 0;            // q
   std::optional<std::uint32_t> nearer;  // none where rounding or a common centre decided
@@ -82,8 +82,8 @@ struct InconsistentConfiguration {
 
 // The first inconsistent configuration of star(p), by vertex and then by id, if it has one.
 template <int K>
-std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(
-    const StarComplex<K>& complex, std::uint32_t p);
+std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(const Stars<K>& stars,
+                                                                          std::uint32_t p);
 
 STELLATE_DECLARE_CLASS(ConsistentSimplices)
 STELLATE_DECLARE_CLASS(Folds)

@@ -9,7 +9,7 @@
 namespace stellate::core {
 
 template <int K>
-CandidateSet<K> DrawCandidates(const StarComplex<K>& complex, const ViolationBook<K>& book,
+CandidateSet<K> DrawCandidates(const Stars<K>& stars, const ViolationBook<K>& book,
                                const ResolvedCriteria& criteria, const Drawing& drawing,
                                std::vector<Target<K>> targets) {
   CandidateSet<K> set;
@@ -23,10 +23,10 @@ CandidateSet<K> DrawCandidates(const StarComplex<K>& complex, const ViolationBoo
     set.in_flats.push_back(drawing.from_flats && !t.violation.fake && t.violation.walls == 0 &&
                            !book.has_no_flat(t.star));
   }
-  set.points.resize(complex.d(), set.drawn());
+  set.points.resize(stars.sample().d(), set.drawn());
   ParallelFor(set.targets.size(), [&](std::size_t i) {
     const Target<K>& t = set.targets[i];
-    Random random(drawing.seed ^ Mix64(complex.NameOf(t.star)), drawing.round);
+    Random random(drawing.seed ^ Mix64(stars.sample().NameOf(t.star)), drawing.round);
     const bool has_failed = book.failed_attempts(t.star) > 0 && !t.is_coarse();
     for (Eigen::Index c = set.first[i]; c < set.first[i + 1]; ++c) {
       double x[K];
@@ -36,15 +36,15 @@ CandidateSet<K> DrawCandidates(const StarComplex<K>& complex, const ViolationBoo
         random.UniformInBall<K>(step);
         for (int a = 0; a < K; ++a) x[a] += criteria.picking_radius * t.radius * step[a];
       }
-      complex.Lift(t.star, x, set.points.col(c).data());
+      stars.sample().Lift(t.star, x, set.points.col(c).data());
     }
   });
   return set;
 }
 
-#define STELLATE_EACH(K)                                                                     \
-  template CandidateSet<K> DrawCandidates<K>(const StarComplex<K>&, const ViolationBook<K>&, \
-                                             const ResolvedCriteria&, const Drawing&,        \
+#define STELLATE_EACH(K)                                                               \
+  template CandidateSet<K> DrawCandidates<K>(const Stars<K>&, const ViolationBook<K>&, \
+                                             const ResolvedCriteria&, const Drawing&,  \
                                              std::vector<Target<K>>);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

@@ -71,7 +71,7 @@ struct Drawing {
 // or R4. The first is the insertion point itself, unless that has failed before; the others lie in
 // the picking region.
 template <int K>
-CandidateSet<K> DrawCandidates(const StarComplex<K>& complex, const ViolationBook<K>& book,
+CandidateSet<K> DrawCandidates(const Stars<K>& stars, const ViolationBook<K>& book,
                                const ResolvedCriteria& criteria, const Drawing& drawing,
                                std::vector<Target<K>> targets);
 

@@ -7,12 +7,12 @@
 namespace stellate::core {
 
 template <int K>
-int CountBad(const StarComplex<K>& complex, const double* point,
-             const typename StarComplex<K>::Tentative& tentative, const ShapeBounds& bounds,
+int CountBad(const Stars<K>& stars, const double* point,
+             const typename Stars<K>::Tentative& tentative, const ShapeBounds& bounds,
              double small_radius, int enough, WallSet walls) {
   using Cell = RestrictedVoronoiCell<K>;
-  using Simplex = typename StarComplex<K>::Simplex;
-  const std::uint32_t id = complex.size();
+  using Simplex = typename Stars<K>::Simplex;
+  const std::uint32_t id = stars.size();
   const auto changed = [&](std::uint32_t q) -> const Cell* {
     if (q == id) return &tentative.own;
     const auto at = std::lower_bound(tentative.cut.begin(), tentative.cut.end(), q,
@@ -25,7 +25,7 @@ int CountBad(const StarComplex<K>& complex, const double* point,
   };
   // Of a simplex of a face: is it none, foreign, or one that stars disagree about?
   const auto is_bad_face = [&](std::uint32_t p, const Cell& cell, std::size_t v) {
-    const auto face = complex.FaceSimplexOf(p, cell, v, walls);
+    const auto face = stars.FaceSimplexOf(p, cell, v, walls);
     if (face.fake || face.foreign) return true;
     const bool fresh = face.ids[static_cast<std::size_t>(face.count - 1)] == id;
     const std::uint64_t key = SimplexKey<K>(cell, v, p);
@@ -41,17 +41,17 @@ int CountBad(const StarComplex<K>& complex, const double* point,
   const auto is_badly_shaped = [&](std::uint32_t p, const double* at, const Cell& cell,
                                    std::size_t v) {
     return (bounds.sharpest_cosine < 1 &&
-            HasSharpDihedral<K>(complex, p, at, cell, v, bounds.sharpest_cosine, point)) ||
-           (!complex.TouchesGuard(p, cell, v) &&
-            (HasThinFaceAt<K>(complex, at, cell, v, bounds.sliver_bound, point) ||
-             LeansTooFar<K>(complex, p, at, cell, v, bounds.reach, point)));
+            HasSharpDihedral<K>(stars, p, at, cell, v, bounds.sharpest_cosine, point)) ||
+           (!stars.TouchesGuard(p, cell, v) &&
+            (HasThinFaceAt<K>(stars, at, cell, v, bounds.sliver_bound, point) ||
+             LeansTooFar<K>(stars, p, at, cell, v, bounds.reach, point)));
   };
   const auto survey = [&](std::uint32_t p, const double* at, const Cell& cell) {
     Simplex simplex;
-    const bool on_boundary = (p == id ? walls : complex.walls(p)) != 0;
+    const bool on_boundary = (p == id ? walls : stars.sample().walls(p)) != 0;
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
       if (bad >= enough) return;
-      if (!complex.SimplexOf(p, cell, v, &simplex)) {
+      if (!stars.SimplexOf(p, cell, v, &simplex)) {
         bad += !on_boundary || is_bad_face(p, cell, v);
         continue;
       }
@@ -74,18 +74,18 @@ int CountBad(const StarComplex<K>& complex, const double* point,
     }
   };
   survey(id, point, tentative.own);
-  for (const auto& [p, cell] : tentative.cut) survey(p, complex.Point(p), cell);
+  for (const auto& [p, cell] : tentative.cut) survey(p, stars.sample().Point(p), cell);
   // Simplices that a cut star loses and an uncut one keeps.
   for (const auto& [p, cell] : tentative.cut) {
     Simplex simplex;
-    const Cell& before = complex.cell(p);
+    const Cell& before = stars.cell(p);
     for (std::size_t v = 0; v < before.vertex_count(); ++v) {
       if (bad >= enough) return bad;
-      if (!complex.SimplexOf(p, before, v, &simplex)) continue;
+      if (!stars.SimplexOf(p, before, v, &simplex)) continue;
       const std::uint64_t key = SimplexKey<K>(before, v, p);
       if (FindSimplex<K>(cell, p, simplex, key)) continue;
       for (const std::uint32_t q : simplex)
-        if (q != p && !changed(q) && FindSimplex<K>(complex.cell(q), q, simplex, key)) {
+        if (q != p && !changed(q) && FindSimplex<K>(stars.cell(q), q, simplex, key)) {
           ++bad;
           break;
         }
@@ -94,8 +94,8 @@ int CountBad(const StarComplex<K>& complex, const double* point,
   return bad;
 }
 
-#define STELLATE_EACH(K)                                                                        \
-  template int CountBad(const StarComplex<K>&, const double*, const StarComplex<K>::Tentative&, \
+#define STELLATE_EACH(K)                                                            \
+  template int CountBad(const Stars<K>&, const double*, const Stars<K>::Tentative&, \
                         const ShapeBounds&, double, int, WallSet);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

@@ -23,11 +23,11 @@ constexpr std::size_t kMostlySuspect = 2;
 // The order in which to go through `ids` so that neighbours follow each other: what one star's
 // judge has read of theirs is in the cache for the next.
 template <int K>
-std::vector<std::uint32_t> InOrderOfPlace(const StarComplex<K>& complex,
+std::vector<std::uint32_t> InOrderOfPlace(const Stars<K>& stars,
                                           const std::vector<std::uint32_t>& ids) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> places(ids.size());
   ParallelFor(ids.size(), [&](std::size_t i) {
-    places[i] = {complex.PlaceOf(ids[i]), static_cast<std::uint32_t>(i)};
+    places[i] = {stars.sample().PlaceOf(ids[i]), static_cast<std::uint32_t>(i)};
   });
   ParallelSort(places, std::less<>());
   std::vector<std::uint32_t> order;
@@ -47,11 +47,11 @@ Engine<K>::Engine(const Specification& spec, const ResolvedCriteria& criteria)
       asks_flats_(spec.oracle.intersect_flat),
       random_seed_(spec.random_seed),
       max_vertices_(spec.limits.max_vertices),
-      complex_(spec.ambient_dimension, criteria.epsilon, criteria.inradius, criteria.judging),
+      stars_(spec.ambient_dimension, criteria.epsilon, {criteria.inradius, criteria.judging}),
       sizes_(criteria),
       faces_(spec.walls) {
   // Sizes are estimated from whole stars.
-  if (faces_.has_walls() && !sizes_.is_estimated()) complex_.FollowFacesAlone();
+  if (faces_.has_walls() && !sizes_.is_estimated()) stars_.RestrictToBoundary();
 }
 
 template <int K>
@@ -71,7 +71,7 @@ Engine<K> Engine<K>::ForRehearsal(double share) const {
 
 template <int K>
 Target<K> Engine<K>::Aim(std::uint32_t star, const Violation<K>& violation) const {
-  return TargetFor<K>(star, violation, sizes_.BoundAt(complex_, star), criteria_.advance_step,
+  return TargetFor<K>(star, violation, sizes_.BoundAt(stars_, star), criteria_.advance_step,
                       book_.failed_attempts(star));
 }
 
@@ -82,20 +82,19 @@ std::vector<Target<K>> Engine<K>::SizeAndShapeTargets() const {
   using Entry = typename ViolationBook<K>::Entry;
   const std::vector<Entry>& entries = book_.size_and_shape();
   constexpr std::uint16_t kNone = 0xffff;
-  std::vector<std::uint16_t> worst(complex_.size(), kNone);
+  std::vector<std::uint16_t> worst(stars_.size(), kNone);
   for (std::size_t i = 0; i < entries.size(); ++i) {
     CheckInterruption(i);
     worst[entries[i].star] = static_cast<std::uint16_t>(entries[i].violation.vertex);
   }
   const auto is_seen_from_lower = [&](const Entry& entry) {
-    typename StarComplex<K>::Simplex simplex, other;
-    if (!complex_.SimplexOf(entry.star, complex_.cell(entry.star), entry.violation.vertex,
-                            &simplex))
+    typename Stars<K>::Simplex simplex, other;
+    if (!stars_.SimplexOf(entry.star, stars_.cell(entry.star), entry.violation.vertex, &simplex))
       return false;
     for (const std::uint32_t q : simplex) {
       if (q == entry.star) return false;
       if (worst[q] != kNone && book_.failed_attempts(q) == 0 &&
-          complex_.SimplexOf(q, complex_.cell(q), worst[q], &other) && other == simplex)
+          stars_.SimplexOf(q, stars_.cell(q), worst[q], &other) && other == simplex)
         return true;
     }
     return false;
@@ -116,13 +115,13 @@ std::vector<Target<K>> Engine<K>::SizeAndShapeTargets() const {
 // A star's bound also follows its neighbours, whose sizes may have changed after it was judged.
 template <int K>
 void Engine<K>::RejudgeSizes() {
-  sizes_.Spread(complex_);
+  sizes_.Spread(stars_);
   RejudgeAll();
 }
 
 template <int K>
 void Engine<K>::RejudgeAll() {
-  std::vector<std::uint32_t> all(complex_.size());
+  std::vector<std::uint32_t> all(stars_.size());
   std::iota(all.begin(), all.end(), 0u);
   book_.Replace(JudgeSizeAndShape(all));
 }
@@ -134,37 +133,37 @@ std::vector<typename ViolationBook<K>::Entry> Engine<K>::JudgeSizeAndShape(
   return ParallelGather<Entry>(stars.size(), [&](std::size_t i, std::vector<Entry>* found) {
     const std::uint32_t p = stars[i];
     if (const auto worst =
-            WorstSizeOrShape<K>(complex_, p, sizes_.BoundAt(complex_, p),
-                                criteria_.radius_edge_bound, faces_.stage(), faces_.left() + 1))
+            WorstSizeOrShape<K>(stars_, p, sizes_.BoundAt(stars_, p), criteria_.radius_edge_bound,
+                                faces_.stage(), faces_.left() + 1))
       found->push_back({p, *worst});
   });
 }
 
 template <int K>
 std::vector<Target<K>> Engine<K>::GoodPointTargets() {
-  if (book_.are_all_suspect()) before_good_points_ = complex_.size();
+  if (book_.are_all_suspect()) before_good_points_ = stars_.size();
   const std::vector<std::uint32_t> suspects = book_.TakeSuspects(filled_.mended());
   std::vector<std::optional<Violation<K>>> found(suspects.size());
-  const std::vector<std::uint32_t> near = InOrderOfPlace<K>(complex_, suspects);
+  const std::vector<std::uint32_t> near = InOrderOfPlace<K>(stars_, suspects);
   std::optional<ConsistentSimplices<K>> consistent;
-  if (kMostlySuspect * suspects.size() >= complex_.size()) consistent.emplace(complex_);
+  if (kMostlySuspect * suspects.size() >= stars_.size()) consistent.emplace(stars_);
   ParallelFor(suspects.size(), [&](std::size_t i) {
     const std::uint32_t p = suspects[near[i]];
     found[near[i]] = WorstSliverOrInconsistent<K>(
-        complex_, p, criteria_.shape, sizes_.BoundAt(complex_, p), faces_.stage(),
+        stars_, p, criteria_.shape, sizes_.BoundAt(stars_, p), faces_.stage(),
         consistent ? consistent->Of(p) : 0, faces_.left() + 1);
   });
   filled_.ForgetMended();
   if (faces_.stage() == K &&
       std::any_of(found.begin(), found.end(), [](const auto& v) { return v.has_value(); }))
-    filled_.Fill(complex_, criteria_);
+    filled_.Fill(stars_, criteria_);
   else
     filled_.Clear();
   std::vector<Target<K>> targets;
   for (std::size_t i = 0; i < suspects.size(); ++i) {
     CheckInterruption(i);
     const std::uint32_t p = suspects[i];
-    const bool is_mended = found[i] && filled_.Mends(complex_, p, *found[i]);
+    const bool is_mended = found[i] && filled_.Mends(stars_, p, *found[i]);
     if (is_mended) filled_.NoteMended(p);
     // A simplex that leans or is sharp will not always yield, nor a sliver between faces that are
     // nearer to each other than their sizes: the certificate says so.
@@ -187,7 +186,7 @@ bool Engine<K>::HasGrownTooMuch() const {
   if (book_.are_all_suspect()) return false;
   const double most = std::max(kMostGrowth * static_cast<double>(before_good_points_),
                                static_cast<double>(before_good_points_ + kLeastGrowth));
-  return static_cast<double>(complex_.size()) > most;
+  return static_cast<double>(stars_.size()) > most;
 }
 
 template <int K>
@@ -195,7 +194,7 @@ std::optional<std::vector<Target<K>>> Engine<K>::Plan() {
   if (HasGrownTooMuch()) {
     if (criteria_.shape.sharpest_cosine < 1) {  // what it grew for: a mesh is worth more
       criteria_.shape.sharpest_cosine = 1;
-      before_good_points_ = complex_.size();
+      before_good_points_ = stars_.size();
     } else if (std::isfinite(criteria_.shape.reach)) {
       criteria_.shape.reach = INFINITY;  // unproved, but a mesh
     } else {
@@ -203,7 +202,7 @@ std::optional<std::vector<Target<K>>> Engine<K>::Plan() {
     }
   }
   std::vector<Target<K>> targets = SizeAndShapeTargets();
-  if (sizes_.NeedsSpreading(complex_, targets.empty())) {
+  if (sizes_.NeedsSpreading(stars_, targets.empty())) {
     RejudgeSizes();
     targets = SizeAndShapeTargets();
   }
@@ -220,14 +219,14 @@ bool Engine<K>::AllRulesHold() const {
   const auto& entries = book_.size_and_shape();
   return faces_.left() == 0 && book_.blemished() == 0 &&
          std::all_of(entries.begin(), entries.end(), [&](const auto& entry) {
-           return filled_.Mends(complex_, entry.star, entry.violation);
+           return filled_.Mends(stars_, entry.star, entry.violation);
          });
 }
 
 template <int K>
 std::vector<Target<K>> Engine<K>::Select(const std::vector<Target<K>>& targets) const {
   const std::vector<std::size_t> chosen = SelectIndependent<K>(
-      complex_.d(), CentresOf<K>(complex_, targets), targets, max_vertices_ - complex_.size());
+      stars_.sample().d(), CentresOf<K>(stars_, targets), targets, max_vertices_ - stars_.size());
   std::vector<Target<K>> selected;
   selected.reserve(chosen.size());
   for (const std::size_t i : chosen) {
@@ -239,15 +238,14 @@ std::vector<Target<K>> Engine<K>::Select(const std::vector<Target<K>>& targets) 
 
 template <int K>
 CandidateSet<K> Engine<K>::Draw(std::vector<Target<K>> targets, std::uint64_t round) const {
-  return DrawCandidates<K>(complex_, book_, criteria_, {asks_flats_, random_seed_, round},
+  return DrawCandidates<K>(stars_, book_, criteria_, {asks_flats_, random_seed_, round},
                            std::move(targets));
 }
 
 template <int K>
 Inserter<K> Engine<K>::InserterOf(const CandidateSet<K>& candidates,
                                   const AnsweredPoints& answers) {
-  return {
-      {complex_, sizes_, book_, criteria_, faces_}, candidates, answers, caution_, max_vertices_};
+  return {{stars_, sizes_, book_, criteria_, faces_}, candidates, answers, caution_, max_vertices_};
 }
 
 template <int K>
@@ -258,19 +256,20 @@ Inserted Engine<K>::Insert(const CandidateSet<K>& candidates, const AnsweredPoin
 template <int K>
 void Engine<K>::Append(const AnsweredPoints& answers, Eigen::Index c) {
   const bool on_faces = !answers.walls.empty();
-  complex_.Append(answers.points.col(c).data(), answers.tangents.col(c).data(),
-                  StarComplex<K>::kNone,
-                  on_faces ? answers.walls[static_cast<std::size_t>(c)] : WallSet{0},
-                  on_faces ? answers.conormals.col(c).data() : nullptr);
+  stars_.Add(answers.points.col(c).data(), answers.tangents.col(c).data(), Stars<K>::kNone,
+             on_faces ? answers.walls[static_cast<std::size_t>(c)] : WallSet{0},
+             on_faces ? answers.conormals.col(c).data() : nullptr);
   if (answers.sizes.size() > 0) sizes_.AppendGiven(answers.sizes[c]);
 }
 
 template <int K>
 void Engine<K>::Lay(const AnsweredPoints& answers, Eigen::Index c) {
-  complex_.Lay(answers.points.col(c).data(), answers.tangents.col(c).data());
-  if (answers.sizes.size() == 0) return;
-  sizes_.AppendGiven(answers.sizes[c]);
-  complex_.LaidAt(sizes_.BoundFor(answers.sizes[c]));
+  double bound = 0;
+  if (answers.sizes.size() > 0) {
+    sizes_.AppendGiven(answers.sizes[c]);
+    bound = sizes_.BoundFor(answers.sizes[c]);
+  }
+  stars_.AddInBulk(answers.points.col(c).data(), answers.tangents.col(c).data(), bound);
 }
 
 template <int K>
@@ -278,12 +277,12 @@ typename Engine<K>::Change Engine<K>::Commit() {
   const std::uint32_t first = book_.star_count();
   const bool judged = !book_.are_all_suspect();
   std::vector<std::uint32_t> around;
-  Change change = complex_.Commit(judged ? &around : nullptr);
+  Change change = stars_.Commit(judged ? &around : nullptr);
   std::vector<std::uint32_t>& touched = change.stars;
-  touched.resize(touched.size() + complex_.size() - first);
-  std::iota(touched.end() - (complex_.size() - first), touched.end(), first);
-  if (sizes_.is_estimated()) sizes_.Look(complex_, touched);
-  book_.Update(complex_.size(), touched, JudgeSizeAndShape(touched));
+  touched.resize(touched.size() + stars_.size() - first);
+  std::iota(touched.end() - (stars_.size() - first), touched.end(), first);
+  if (sizes_.is_estimated()) sizes_.Look(stars_, touched);
+  book_.Update(stars_.size(), touched, JudgeSizeAndShape(touched));
   if (judged) {
     book_.Suspect(around);
     book_.Suspect(touched);
@@ -303,7 +302,7 @@ double Engine<K>::CountMissing(double share) const {
   std::size_t step = 0;
   for (const auto& entry : book_.size_and_shape()) {
     CheckInterruption(step++);
-    const double ratio = entry.violation.radius / sizes_.BoundAt(complex_, entry.star);
+    const double ratio = entry.violation.radius / sizes_.BoundAt(stars_, entry.star);
     missing += share * Power(std::max(ratio, 1.0), K);
   }
   return missing;
@@ -311,13 +310,13 @@ double Engine<K>::CountMissing(double share) const {
 
 template <int K>
 std::vector<std::uint32_t> Engine<K>::Simplices() const {
-  return filled_.is_handed_out() ? filled_.cavities().simplices : complex_.Simplices();
+  return filled_.is_handed_out() ? filled_.cavities().simplices : stars_.Simplices();
 }
 
 template <int K>
 std::uint64_t Engine<K>::simplex_count() const {
   return filled_.is_handed_out() ? filled_.cavities().simplices.size() / (K + 1)
-                                 : complex_.simplex_count();
+                                 : stars_.simplex_count();
 }
 
 STELLATE_INSTANTIATE_CLASS(Engine)

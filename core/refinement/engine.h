@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/base/instantiate.h"
-#include "core/complex/star_complex.h"
+#include "core/complex/stars.h"
 #include "core/refinement/candidate_set.h"
 #include "core/refinement/criteria.h"
 #include "core/refinement/face_book.h"
@@ -39,7 +39,7 @@ struct CrowdedCorner {
 template <int K>
 class Engine {
  public:
-  using Change = typename StarComplex<K>::Change;
+  using Change = typename Stars<K>::Change;
 
   Engine(const Specification& spec, const ResolvedCriteria& criteria);
 
@@ -47,7 +47,7 @@ class Engine {
   // share of the sizes; 1, or less where sizes are the same everywhere.
   Engine ForRehearsal(double share = 1) const;
 
-  bool is_full() const { return complex_.size() >= max_vertices_; }
+  bool is_full() const { return stars_.size() >= max_vertices_; }
 
   // Returns the violations to fix next, those of the first rules that any star breaks. Empty:
   // nothing more can be done, see AllRulesHold. Nothing: points are inserted without end.
@@ -100,8 +100,8 @@ class Engine {
   // targets.
   PlannedPoints TakeDiscoveries();
 
-  // Gives the point inserted last a name, in place of its id: see StarComplex::NameLast.
-  void NameLast(std::uint32_t name) { complex_.NameLast(name); }
+  // Gives the point inserted last a name, in place of its id: see Sample::NameLast.
+  void NameLast(std::uint32_t name) { stars_.NameLast(name); }
   // Records an attempt to fix that star that failed elsewhere.
   void NoteFailedAttempt(std::uint32_t star) { book_.NoteFailedAttempt(star); }
 
@@ -112,7 +112,7 @@ class Engine {
   // `share` (R / bound)^K more.
   double CountMissing(double share) const;
 
-  const StarComplex<K>& complex() const { return complex_; }
+  const Stars<K>& stars() const { return stars_; }
   const ResolvedCriteria& criteria() const { return criteria_; }
   SizeField<K>& sizes() { return sizes_; }
   const SizeField<K>& sizes() const { return sizes_; }
@@ -140,15 +140,15 @@ class Engine {
   bool IsSliverAtBoundary(std::uint32_t star, const Violation<K>& violation) const;
   std::optional<Target<K>> SplitUnderSliver(std::uint32_t star,
                                             const Violation<K>& violation) const;
-  bool IsCollar(const typename StarComplex<K>::FaceSimplex& simplex) const;
-  std::optional<Target<K>> SplitOf(const typename StarComplex<K>::CellVertex& at, Rule by) const;
+  bool IsCollar(const typename Stars<K>::FaceSimplex& simplex) const;
+  std::optional<Target<K>> SplitOf(const typename Stars<K>::CellVertex& at, Rule by) const;
   Target<K> Aim(std::uint32_t star, const Violation<K>& violation) const;
 
   ResolvedCriteria criteria_;
   Caution caution_;
   bool asks_flats_;
   std::uint64_t random_seed_, max_vertices_;
-  StarComplex<K> complex_;
+  Stars<K> stars_;
   SizeField<K> sizes_;
   ViolationBook<K> book_;
   FaceBook<K> faces_;

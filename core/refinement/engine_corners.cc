@@ -26,17 +26,16 @@ using Vector = Eigen::Matrix<double, K, 1>;
 // Along the edges that leave a corner, and the walls of each. Of K walls: on all but one, what
 // leaves that one alone inwards.
 template <int K>
-std::vector<std::pair<Vector<K>, WallSet>> EdgesAtCorner(const StarComplex<K>& complex,
-                                                         std::uint32_t p) {
+std::vector<std::pair<Vector<K>, WallSet>> EdgesAtCorner(const Stars<K>& stars, std::uint32_t p) {
   std::vector<std::pair<Vector<K>, WallSet>> edges;
-  const WallSet walls = complex.walls(p);
+  const WallSet walls = stars.sample().walls(p);
   if (CountWalls(walls) > K) {
-    for (const auto& ray : ConeOf<K>(walls, complex.Conormals(p)).rays)
+    for (const auto& ray : ConeOf<K>(walls, stars.sample().Conormals(p)).rays)
       edges.emplace_back(ray.along, ray.walls);
     return edges;
   }
   const Eigen::Map<const Eigen::Matrix<double, K, K, Eigen::RowMajor>> conormals(
-      complex.Conormals(p));
+      stars.sample().Conormals(p));
   const Eigen::Matrix<double, K, K> along = -Inverse<K>(conormals);
   int number = 0;
   ForEachWall(walls, [&](int wall) {
@@ -52,8 +51,8 @@ std::vector<std::pair<Vector<K>, WallSet>> EdgesAtCorner(const StarComplex<K>& c
 template <int K>
 PlannedPoints Engine<K>::SetCollars() {
   std::vector<std::uint32_t> corners;
-  for (std::uint32_t p = 0; p < complex_.size(); ++p)
-    if (CountWalls(complex_.walls(p)) >= K) corners.push_back(p);
+  for (std::uint32_t p = 0; p < stars_.size(); ++p)
+    if (CountWalls(stars_.sample().walls(p)) >= K) corners.push_back(p);
   PlannedPoints planned;
   std::vector<Eigen::VectorXd> points;
   for (const std::uint32_t p : corners) {
@@ -62,15 +61,16 @@ PlannedPoints Engine<K>::SetCollars() {
     for (const std::uint32_t q : corners)
       if (q != p)
         radius = std::min(
-            radius, kCollarShare * Distance(complex_.Point(p), complex_.Point(q), complex_.d()));
+            radius, kCollarShare * Distance(stars_.sample().Point(p), stars_.sample().Point(q),
+                                            stars_.sample().d()));
     faces_.SetCollar(p, radius);
-    for (const auto& [along, walls] : EdgesAtCorner<K>(complex_, p)) {
+    for (const auto& [along, walls] : EdgesAtCorner<K>(stars_, p)) {
       const Vector<K> x = radius * along;
-      complex_.Lift(p, x.data(), points.emplace_back(complex_.d()).data());
+      stars_.sample().Lift(p, x.data(), points.emplace_back(stars_.sample().d()).data());
       planned.walls.push_back(walls);
     }
   }
-  planned.points.resize(complex_.d(), static_cast<Eigen::Index>(points.size()));
+  planned.points.resize(stars_.sample().d(), static_cast<Eigen::Index>(points.size()));
   for (std::size_t i = 0; i < points.size(); ++i)
     planned.points.col(static_cast<Eigen::Index>(i)) = points[i];
   return planned;
@@ -82,7 +82,7 @@ PlannedPoints Engine<K>::CrowdQuestions() const {
   PlannedPoints planned;
   for (const auto& crowd : faces_.crowds())
     ForEachWall(crowd.suspects, [&](int wall) { planned.walls.push_back(SetOfWall(wall)); });
-  planned.points.resize(complex_.d(), static_cast<Eigen::Index>(planned.walls.size()));
+  planned.points.resize(stars_.sample().d(), static_cast<Eigen::Index>(planned.walls.size()));
   Eigen::Index column = 0;
   for (const auto& crowd : faces_.crowds())
     for (int i = 0; i < CountWalls(crowd.suspects); ++i) planned.points.col(column++) = crowd.point;
@@ -95,7 +95,7 @@ std::optional<CrowdedCorner> Engine<K>::SettleCrowds(const AnsweredPoints& answe
   const double same = FaceBook<K>::kSameCorner * criteria_.epsilon;
   Eigen::Index column = 0;
   for (const auto& crowd : faces_.TakeCrowds()) {
-    const auto dk = Eigen::Index{complex_.d()};
+    const auto dk = Eigen::Index{stars_.sample().d()};
     const Eigen::Map<const Eigen::MatrixXd> tangents(crowd.tangent.data(), dk, K);
     std::map<int, Vector<K>> conormals;
     int number = 0;
@@ -114,7 +114,8 @@ std::optional<CrowdedCorner> Engine<K>::SettleCrowds(const AnsweredPoints& answe
       walls |= SetOfWall(wall);
     });
     if (!IsSubset(crowd.beyond, walls) || is_full() ||
-        complex_.AnyWithin(crowd.point.data(), same) || complex_.InGuard(crowd.point.data()))
+        stars_.sample().AnyWithin(crowd.point.data(), same) ||
+        stars_.sample().InGuard(crowd.point.data()))
       continue;
     std::vector<double> all;
     const auto gather = [&](WallSet of) {
@@ -135,8 +136,7 @@ std::optional<CrowdedCorner> Engine<K>::SettleCrowds(const AnsweredPoints& answe
       continue;
     }
     gather(cone.walls);
-    complex_.Append(crowd.point.data(), crowd.tangent.data(), StarComplex<K>::kNone, cone.walls,
-                    all.data());
+    stars_.Add(crowd.point.data(), crowd.tangent.data(), Stars<K>::kNone, cone.walls, all.data());
     if (answers.sizes.size() > 0) sizes_.AppendGiven(crowd.size);
   }
   return bad;

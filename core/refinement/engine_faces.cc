@@ -31,14 +31,14 @@ constexpr double kCollarLength = 1.1;
 // A face of the stage that no vertex is on takes a seed however near to the sample: it is a small
 // piece of walls beside others, and without it the mesh would be another manifold's.
 template <int K>
-void TakeSeedsOfUnmetFaces(const StarComplex<K>& complex, int stage,
+void TakeSeedsOfUnmetFaces(const Stars<K>& stars, int stage,
                            std::vector<typename FaceBook<K>::Seed>* seeds,
                            std::vector<typename FaceBook<K>::Seed>* taken) {
   std::erase_if(*seeds, [&](auto& seed) {
     const bool is_taken = std::any_of(taken->begin(), taken->end(),
                                       [&](const auto& other) { return other.walls == seed.walls; });
     if (K - CountWalls(seed.walls) != stage || seed.walls == 0 || is_taken ||
-        HasPointOn<K>(complex, seed.walls) || complex.EncroachedBy(seed.point.data(), seed.walls))
+        HasPointOn<K>(stars, seed.walls) || stars.EncroachedBy(seed.point.data(), seed.walls))
       return false;
     taken->push_back(std::move(seed));
     return true;
@@ -48,10 +48,10 @@ void TakeSeedsOfUnmetFaces(const StarComplex<K>& complex, int stage,
 }  // namespace
 
 template <int K>
-bool Engine<K>::IsCollar(const typename StarComplex<K>::FaceSimplex& simplex) const {
+bool Engine<K>::IsCollar(const typename Stars<K>::FaceSimplex& simplex) const {
   if (simplex.count != 2) return false;
-  const double length =
-      Distance(complex_.Point(simplex.ids[0]), complex_.Point(simplex.ids[1]), complex_.d());
+  const double length = Distance(stars_.sample().Point(simplex.ids[0]),
+                                 stars_.sample().Point(simplex.ids[1]), stars_.sample().d());
   return length <=
          kCollarLength * std::max(faces_.CollarOf(simplex.ids[0]), faces_.CollarOf(simplex.ids[1]));
 }
@@ -59,17 +59,17 @@ bool Engine<K>::IsCollar(const typename StarComplex<K>::FaceSimplex& simplex) co
 template <int K>
 bool Engine<K>::IsSliverAtBoundary(std::uint32_t star, const Violation<K>& violation) const {
   if (violation.rule != Rule::kSliver || !faces_.has_walls()) return false;
-  const auto simplex = complex_.FaceSimplexOf(star, complex_.cell(star), violation.vertex);
+  const auto simplex = stars_.FaceSimplexOf(star, stars_.cell(star), violation.vertex);
   return std::any_of(simplex.ids.begin(), simplex.ids.begin() + simplex.count,
-                     [&](std::uint32_t id) { return complex_.walls(id) != 0; });
+                     [&](std::uint32_t id) { return stars_.sample().walls(id) != 0; });
 }
 
 // The simplex dual to a vertex of a star's cell, to be split although it breaks no rule. Nothing
 // where that would go too far.
 template <int K>
-std::optional<Target<K>> Engine<K>::SplitOf(const typename StarComplex<K>::CellVertex& at,
+std::optional<Target<K>> Engine<K>::SplitOf(const typename Stars<K>::CellVertex& at,
                                             Rule by) const {
-  const auto& cell = complex_.cell(at.star);
+  const auto& cell = stars_.cell(at.star);
   Violation<K> violation;
   violation.rule = std::min(by, Rule::kRadiusEdge);
   violation.radius = std::sqrt(cell.norm2(at.vertex));
@@ -77,14 +77,14 @@ std::optional<Target<K>> Engine<K>::SplitOf(const typename StarComplex<K>::CellV
   violation.vertex = at.vertex;
   violation.walls = WallsAt<K>(cell, at.vertex);
   violation.split = true;
-  const auto simplex = complex_.FaceSimplexOf(at.star, cell, at.vertex);
+  const auto simplex = stars_.FaceSimplexOf(at.star, cell, at.vertex);
   if (IsCollar(simplex)) return std::nullopt;
   if (violation.dimension() <= faces_.left()) return std::nullopt;
   // The middle of an edge between guards is in both.
-  if (simplex.count == 2 && complex_.GuardOf(simplex.ids[0]) > 0 &&
-      complex_.GuardOf(simplex.ids[1]) > 0)
+  if (simplex.count == 2 && stars_.sample().GuardOf(simplex.ids[0]) > 0 &&
+      stars_.sample().GuardOf(simplex.ids[1]) > 0)
     return std::nullopt;
-  if (by > Rule::kSize && violation.radius < kLeastSplit * sizes_.BoundAt(complex_, at.star))
+  if (by > Rule::kSize && violation.radius < kLeastSplit * sizes_.BoundAt(stars_, at.star))
     return std::nullopt;
   return Aim(at.star, violation);
 }
@@ -98,9 +98,10 @@ std::optional<Target<K>> Engine<K>::SplitUnderSliver(std::uint32_t star,
   if (violation.rule != Rule::kSliver || !faces_.has_walls() || violation.walls != 0 ||
       book_.failed_attempts(star) == 0)
     return std::nullopt;
-  const auto& cell = complex_.cell(star);
-  WallSet common = complex_.walls(star);
-  for (int s = 0; s < K; ++s) common &= complex_.walls(cell.id(cell.facet(violation.vertex, s)));
+  const auto& cell = stars_.cell(star);
+  WallSet common = stars_.sample().walls(star);
+  for (int s = 0; s < K; ++s)
+    common &= stars_.sample().walls(cell.id(cell.facet(violation.vertex, s)));
   if (common == 0) return std::nullopt;
   for (int s = 0; s < K; ++s) {
     const std::size_t below = cell.adjacent(violation.vertex, s);
@@ -122,14 +123,14 @@ void Engine<K>::YieldToFaces(std::vector<Target<K>>* targets) {
   });
   std::vector<Target<K>> kept;
   for (const auto& [star, key, by] : faces_.TakeSplits()) {
-    const std::size_t v = complex_.cell(star).Find(key);
-    if (v == complex_.cell(star).vertex_count()) continue;
+    const std::size_t v = stars_.cell(star).Find(key);
+    if (v == stars_.cell(star).vertex_count()) continue;
     if (auto split = SplitOf({star, v}, by)) kept.push_back(*split);
   }
   const auto encroached = [&](const Target<K>& t) {
-    std::vector<double> aim(static_cast<std::size_t>(complex_.d()));
-    complex_.Lift(t.star, t.x, aim.data());
-    return complex_.EncroachedBy(aim.data(), t.violation.walls);
+    std::vector<double> aim(static_cast<std::size_t>(stars_.sample().d()));
+    stars_.sample().Lift(t.star, t.x, aim.data());
+    return stars_.EncroachedBy(aim.data(), t.violation.walls);
   };
   // The image of a far aim may fall anywhere; good points have several candidates, and after a
   // failed attempt the point is another.
@@ -137,7 +138,7 @@ void Engine<K>::YieldToFaces(std::vector<Target<K>>* targets) {
     return t.violation.rule < Rule::kSliver && book_.failed_attempts(t.star) == 0;
   };
   const auto is_near = [](const Target<K>& t) { return !t.violation.fake && !t.is_coarse(); };
-  std::vector<std::optional<typename StarComplex<K>::CellVertex>> first(targets->size());
+  std::vector<std::optional<typename Stars<K>::CellVertex>> first(targets->size());
   ParallelFor(targets->size(), [&](std::size_t i) {
     const Target<K>& t = (*targets)[i];
     if (may_yield(t) && is_near(t)) first[i] = encroached(t);
@@ -169,20 +170,20 @@ PlannedPoints Engine<K>::ChooseSeeds() {
     const double apart =
         dimension == 0 ? FaceBook<K>::kSameCorner * criteria_.epsilon : criteria_.epsilon;
     const bool covered =
-        complex_.AnyWithin(seed.point.data(), apart) ||
+        stars_.sample().AnyWithin(seed.point.data(), apart) ||
         std::any_of(chosen.begin(), chosen.end(), [&](const auto& other) {
-          return Distance(other.point.data(), seed.point.data(), complex_.d()) <= apart;
+          return Distance(other.point.data(), seed.point.data(), stars_.sample().d()) <= apart;
         });
     const bool ripe = dimension == faces_.stage() && !covered && !is_full() &&
-                      !complex_.EncroachedBy(seed.point.data(), seed.walls);
+                      !stars_.EncroachedBy(seed.point.data(), seed.walls);
     (ripe ? chosen : left).push_back(std::move(seed));
   }
   if (chosen.empty() && !is_full())
-    TakeSeedsOfUnmetFaces<K>(complex_, faces_.stage(), &left, &chosen);
+    TakeSeedsOfUnmetFaces<K>(stars_, faces_.stage(), &left, &chosen);
   faces_.seeds() = std::move(left);
   if (chosen.empty() && faces_.stage() == 0 && K > 1 && !faces_.has_collars()) return SetCollars();
   PlannedPoints points;
-  points.points.resize(complex_.d(), static_cast<Eigen::Index>(chosen.size()));
+  points.points.resize(stars_.sample().d(), static_cast<Eigen::Index>(chosen.size()));
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     points.points.col(static_cast<Eigen::Index>(i)) = chosen[i].point;
     points.walls.push_back(chosen[i].walls);
@@ -197,8 +198,8 @@ AnsweredPoints Engine<K>::InteriorSeeds() {
     if (seed.walls == 0 && seed.tangent.size() > 0) seeds.push_back(&seed);
   AnsweredPoints all;
   const auto count = static_cast<Eigen::Index>(seeds.size());
-  all.points.resize(complex_.d(), count);
-  all.tangents.resize(complex_.d() * K, count);
+  all.points.resize(stars_.sample().d(), count);
+  all.tangents.resize(stars_.sample().d() * K, count);
   all.answered.assign(seeds.size(), 1);
   all.found = all.answered;
   for (Eigen::Index c = 0; c < count; ++c) {
@@ -211,7 +212,7 @@ AnsweredPoints Engine<K>::InteriorSeeds() {
 template <int K>
 bool Engine<K>::AdvanceStage() {
   if (!faces_.Advance()) return false;
-  if (faces_.stage() == K) complex_.FollowAll();
+  if (faces_.stage() == K) stars_.IncludeInterior();
   RejudgeAll();
   JudgeAllAnew();
   book_.ForgetAttempts();
@@ -229,11 +230,11 @@ bool Engine<K>::LeaveStage() {
 template <int K>
 void Engine<K>::CompleteStars(std::vector<std::uint32_t>* added,
                               std::vector<std::uint32_t>* removed) {
-  if (faces_.stage() == K || complex_.size() == 0) return;
-  const std::vector<std::uint32_t> before = complex_.Simplices();
-  complex_.FollowAll();
-  complex_.Commit();
-  ExchangeSimplices<K>(before, complex_.Simplices(), added, removed);
+  if (faces_.stage() == K || stars_.size() == 0) return;
+  const std::vector<std::uint32_t> before = stars_.Simplices();
+  stars_.IncludeInterior();
+  stars_.Commit();
+  ExchangeSimplices<K>(before, stars_.Simplices(), added, removed);
 }
 
 template <int K>
@@ -241,14 +242,14 @@ bool Engine<K>::WantsGuards(const std::vector<Target<K>>& targets) const {
   return K == 3 && faces_.stage() >= 1 && !faces_.has_discoveries() &&
          std::all_of(targets.begin(), targets.end(),
                      [](const Target<K>& t) { return t.violation.dimension() >= 2; }) &&
-         LacksGuards<K>(complex_);
+         LacksGuards<K>(stars_);
 }
 
 template <int K>
 std::optional<std::vector<Target<K>>> Engine<K>::GuardSharpEdges(
     std::vector<std::uint32_t>* added, std::vector<std::uint32_t>* removed) {
-  Guards<K> guards = PlanGuards<K>(complex_, sizes_);
-  if (faces_.MaySplitForGuards(complex_.size(), MostSplits<K>(guards))) {
+  Guards<K> guards = PlanGuards<K>(stars_, sizes_);
+  if (faces_.MaySplitForGuards(stars_.size(), MostSplits<K>(guards))) {
     std::vector<Target<K>> splits;
     for (const auto& gap : guards.gaps)
       if (!book_.is_given_up(gap.star))
@@ -256,9 +257,9 @@ std::optional<std::vector<Target<K>>> Engine<K>::GuardSharpEdges(
     if (!splits.empty()) return splits;
   }
   faces_.NoteGuarded();
-  const std::vector<std::uint32_t> before = complex_.Simplices();
-  complex_.Guard(std::move(guards.radii2));
-  ExchangeSimplices<K>(before, complex_.Simplices(), added, removed);
+  const std::vector<std::uint32_t> before = stars_.Simplices();
+  stars_.SetGuards(std::move(guards.radii2));
+  ExchangeSimplices<K>(before, stars_.Simplices(), added, removed);
   RejudgeAll();
   JudgeAllAnew();
   book_.ForgetAttempts();
@@ -270,7 +271,7 @@ PlannedPoints Engine<K>::TakeDiscoveries() {
   const auto found = faces_.TakeDiscoveries();
   PlannedPoints planned;
   const auto count = static_cast<Eigen::Index>(found.size());
-  planned.points.resize(complex_.d(), count);
+  planned.points.resize(stars_.sample().d(), count);
   planned.spacing.resize(count);
   planned.rules.assign(found.size(), Rule::kSize);
   for (std::size_t i = 0; i < found.size(); ++i) {
@@ -288,15 +289,15 @@ template <int K>
 std::vector<FaceMesh> Engine<K>::Faces() const {
   using Simplex = std::array<std::uint32_t, K + 1>;  // as many of them as the face has corners
   std::map<std::pair<int, WallSet>, std::vector<Simplex>> faces;
-  for (std::uint32_t p = 0; p < complex_.size(); ++p) {
+  for (std::uint32_t p = 0; p < stars_.size(); ++p) {
     CheckInterruption(p);
-    if (complex_.walls(p) == 0) continue;
-    const auto& cell = complex_.cell(p);
+    if (stars_.sample().walls(p) == 0) continue;
+    const auto& cell = stars_.cell(p);
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
-      const auto simplex = complex_.FaceSimplexOf(p, cell, v);
+      const auto simplex = stars_.FaceSimplexOf(p, cell, v);
       if (simplex.walls == 0 || simplex.fake || simplex.ids[0] != p) continue;
       // A corner of more walls than K has several vertices of its cell at itself.
-      const WallSet walls = simplex.dimension() == 0 ? complex_.walls(p) : simplex.walls;
+      const WallSet walls = simplex.dimension() == 0 ? stars_.sample().walls(p) : simplex.walls;
       Simplex& corners = faces[{simplex.dimension(), walls}].emplace_back();
       std::copy_n(simplex.ids.begin(), simplex.count, corners.begin());
     }
@@ -313,24 +314,23 @@ std::vector<FaceMesh> Engine<K>::Faces() const {
   return all;
 }
 
-#define STELLATE_EACH(K)                                                                        \
-  template std::optional<Target<K>> Engine<K>::SplitOf(const StarComplex<K>::CellVertex&, Rule) \
-      const;                                                                                    \
-  template std::optional<Target<K>> Engine<K>::SplitUnderSliver(std::uint32_t,                  \
-                                                                const Violation<K>&) const;     \
-  template void Engine<K>::YieldToFaces(std::vector<Target<K>>*);                               \
-  template PlannedPoints Engine<K>::ChooseSeeds();                                              \
-  template AnsweredPoints Engine<K>::InteriorSeeds();                                           \
-  template bool Engine<K>::IsSliverAtBoundary(std::uint32_t, const Violation<K>&) const;        \
-  template bool Engine<K>::IsCollar(const StarComplex<K>::FaceSimplex&) const;                  \
-  template bool Engine<K>::AdvanceStage();                                                      \
-  template bool Engine<K>::LeaveStage();                                                        \
-  template void Engine<K>::CompleteStars(std::vector<std::uint32_t>*,                           \
-                                         std::vector<std::uint32_t>*);                          \
-  template bool Engine<K>::WantsGuards(const std::vector<Target<K>>&) const;                    \
-  template std::optional<std::vector<Target<K>>> Engine<K>::GuardSharpEdges(                    \
-      std::vector<std::uint32_t>*, std::vector<std::uint32_t>*);                                \
-  template std::vector<FaceMesh> Engine<K>::Faces() const;                                      \
+#define STELLATE_EACH(K)                                                                         \
+  template std::optional<Target<K>> Engine<K>::SplitOf(const Stars<K>::CellVertex&, Rule) const; \
+  template std::optional<Target<K>> Engine<K>::SplitUnderSliver(std::uint32_t,                   \
+                                                                const Violation<K>&) const;      \
+  template void Engine<K>::YieldToFaces(std::vector<Target<K>>*);                                \
+  template PlannedPoints Engine<K>::ChooseSeeds();                                               \
+  template AnsweredPoints Engine<K>::InteriorSeeds();                                            \
+  template bool Engine<K>::IsSliverAtBoundary(std::uint32_t, const Violation<K>&) const;         \
+  template bool Engine<K>::IsCollar(const Stars<K>::FaceSimplex&) const;                         \
+  template bool Engine<K>::AdvanceStage();                                                       \
+  template bool Engine<K>::LeaveStage();                                                         \
+  template void Engine<K>::CompleteStars(std::vector<std::uint32_t>*,                            \
+                                         std::vector<std::uint32_t>*);                           \
+  template bool Engine<K>::WantsGuards(const std::vector<Target<K>>&) const;                     \
+  template std::optional<std::vector<Target<K>>> Engine<K>::GuardSharpEdges(                     \
+      std::vector<std::uint32_t>*, std::vector<std::uint32_t>*);                                 \
+  template std::vector<FaceMesh> Engine<K>::Faces() const;                                       \
   template PlannedPoints Engine<K>::TakeDiscoveries();
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

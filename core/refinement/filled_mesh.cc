@@ -14,26 +14,26 @@ constexpr int kFirstFilled = 4;
 }  // namespace
 
 template <int K>
-void FilledMesh<K>::Fill(const StarComplex<K>& complex, const ResolvedCriteria& criteria) {
+void FilledMesh<K>::Fill(const Stars<K>& stars, const ResolvedCriteria& criteria) {
   Clear();
   if (K < kFirstFilled || criteria.judging != Judging::kCommonCentre) return;
   cavities_ = FillCavities<K>(
-      complex, {criteria.epsilon, criteria.radius_edge_bound, criteria.shape.sliver_bound});
+      stars, {criteria.epsilon, criteria.radius_edge_bound, criteria.shape.sliver_bound});
 }
 
 template <int K>
-bool FilledMesh<K>::Mends(const StarComplex<K>& complex, std::uint32_t star,
+bool FilledMesh<K>::Mends(const Stars<K>& stars, std::uint32_t star,
                           const Violation<K>& violation) const {
   if (cavities_.cavities == 0 || violation.fake || violation.walls != 0 ||
       std::binary_search(cavities_.unfilled.begin(), cavities_.unfilled.end(), star))
     return false;
-  return violation.rule == Rule::kInconsistent || !IsConsistent<K>(complex, star, violation.vertex);
+  return violation.rule == Rule::kInconsistent || !IsConsistent<K>(stars, star, violation.vertex);
 }
 
 template <int K>
-void FilledMesh<K>::HandOut(const StarComplex<K>& complex, std::vector<std::uint32_t>* added,
+void FilledMesh<K>::HandOut(const Stars<K>& stars, std::vector<std::uint32_t>* added,
                             std::vector<std::uint32_t>* removed) {
-  ExchangeSimplices<K>(complex.Simplices(), cavities_.simplices, added, removed);
+  ExchangeSimplices<K>(stars.Simplices(), cavities_.simplices, added, removed);
   is_handed_out_ = true;
 }
 

@@ -15,12 +15,11 @@ template <int K>
 class FilledMesh {
  public:
   // Fills the cavities of the complex, for k >= 4, and forgets earlier fillings.
-  void Fill(const StarComplex<K>& complex, const ResolvedCriteria& criteria);
+  void Fill(const Stars<K>& stars, const ResolvedCriteria& criteria);
   void Clear() { cavities_ = {}; }
 
   // Whether the filling leaves the violating simplex out of the mesh.
-  bool Mends(const StarComplex<K>& complex, std::uint32_t star,
-             const Violation<K>& violation) const;
+  bool Mends(const Stars<K>& stars, std::uint32_t star, const Violation<K>& violation) const;
 
   // The stars whose violations of R3 and R4 the filling resolves, until they are tested again.
   const std::vector<std::uint32_t>& mended() const { return mended_; }
@@ -29,7 +28,7 @@ class FilledMesh {
 
   // Makes this the mesh. `added` and `removed`, K+1 ids each, come in as a round's change of the
   // union of the stars, and go out as its change of the mesh.
-  void HandOut(const StarComplex<K>& complex, std::vector<std::uint32_t>* added,
+  void HandOut(const Stars<K>& stars, std::vector<std::uint32_t>* added,
                std::vector<std::uint32_t>* removed);
   bool is_handed_out() const { return is_handed_out_; }
 

@@ -26,29 +26,29 @@ constexpr double kMeet = 1;
 constexpr double kSplitsPerOctave = 20;
 
 template <int K>
-bool IsSharp(const StarComplex<K>& complex, std::uint32_t p, double cosine) {
-  const auto angle = SharpestAt<K>(complex, p);
+bool IsSharp(const Stars<K>& stars, std::uint32_t p, double cosine) {
+  const auto angle = SharpestAt<K>(stars, p);
   return angle && angle->cosine > cosine;
 }
 
 template <int K>
-bool IsCorner(const StarComplex<K>& complex, std::uint32_t p) {
-  return CountWalls(complex.walls(p)) >= K;
+bool IsCorner(const Stars<K>& stars, std::uint32_t p) {
+  return CountWalls(stars.sample().walls(p)) >= K;
 }
 
 // An edge of the mesh of edges, seen from one end.
 template <int K>
 struct HalfEdge {
-  typename StarComplex<K>::CellVertex at;
+  typename Stars<K>::CellVertex at;
   std::uint32_t other;
 };
 
 template <int K>
-std::vector<HalfEdge<K>> EdgesAt(const StarComplex<K>& complex, std::uint32_t p) {
+std::vector<HalfEdge<K>> EdgesAt(const Stars<K>& stars, std::uint32_t p) {
   std::vector<HalfEdge<K>> edges;
-  const auto& cell = complex.cell(p);
+  const auto& cell = stars.cell(p);
   for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
-    const auto simplex = complex.FaceSimplexOf(p, cell, v);
+    const auto simplex = stars.FaceSimplexOf(p, cell, v);
     if (simplex.dimension() != 1 || simplex.fake || simplex.foreign || simplex.count != 2) continue;
     edges.push_back({{p, v}, simplex.ids[simplex.ids[0] == p]});
   }
@@ -57,60 +57,60 @@ std::vector<HalfEdge<K>> EdgesAt(const StarComplex<K>& complex, std::uint32_t p)
 
 // What a ball around p has room for beside everything that is not along its own edge.
 template <int K>
-double RoomAt(const StarComplex<K>& complex, std::uint32_t p, double bound) {
+double RoomAt(const Stars<K>& stars, std::uint32_t p, double bound) {
   double room = kLargest * bound;
-  complex.ForEachWithin(complex.Point(p), room / kOtherEdge, [&](std::uint32_t q) {
+  stars.sample().ForEachWithin(stars.sample().Point(p), room / kOtherEdge, [&](std::uint32_t q) {
     if (q == p) return;
-    const double distance = Distance(complex.Point(p), complex.Point(q), complex.d());
-    const WallSet there = complex.walls(q);
+    const double distance =
+        Distance(stars.sample().Point(p), stars.sample().Point(q), stars.sample().d());
+    const WallSet there = stars.sample().walls(q);
     if (CountWalls(there) < 2)
       room = std::min(room, kOtherPoint * distance);
-    else if (CountWalls(there & complex.walls(p)) < 2)  // not along the same edge
+    else if (CountWalls(there & stars.sample().walls(p)) < 2)  // not along the same edge
       room = std::min(room, kOtherEdge * distance);
   });
   return room;
 }
 
 template <int K>
-double LengthOf(const StarComplex<K>& complex, std::uint32_t p, std::uint32_t q) {
-  return Distance(complex.Point(p), complex.Point(q), complex.d());
+double LengthOf(const Stars<K>& stars, std::uint32_t p, std::uint32_t q) {
+  return Distance(stars.sample().Point(p), stars.sample().Point(q), stars.sample().d());
 }
 
 }  // namespace
 
 template <int K>
-Guards<K> PlanGuards(const StarComplex<K>& complex, const SizeField<K>& sizes) {
+Guards<K> PlanGuards(const Stars<K>& stars, const SizeField<K>& sizes) {
   Guards<K> guards;
   std::vector<std::uint32_t> sharp;
-  for (std::uint32_t p = 0; p < complex.size(); ++p) {
+  for (std::uint32_t p = 0; p < stars.size(); ++p) {
     CheckInterruption(p);
-    if (complex.GuardOf(p) > 0 || IsSharp<K>(complex, p, kGuardedBelow)) sharp.push_back(p);
+    if (stars.sample().GuardOf(p) > 0 || IsSharp<K>(stars, p, kGuardedBelow)) sharp.push_back(p);
   }
-  guards.radii2.assign(complex.size(), 0);
+  guards.radii2.assign(stars.size(), 0);
   guards.least_room = INFINITY;
   std::vector<std::vector<HalfEdge<K>>> edges;
   for (const std::uint32_t p : sharp) {
     CheckInterruption(edges.size());
-    edges.push_back(EdgesAt<K>(complex, p));
-    guards.radii2[p] = complex.GuardOf(p);
+    edges.push_back(EdgesAt<K>(stars, p));
+    guards.radii2[p] = stars.sample().GuardOf(p);
     if (guards.radii2[p] > 0) continue;
-    double radius = RoomAt<K>(complex, p, sizes.BoundAt(complex, p));
+    double radius = RoomAt<K>(stars, p, sizes.BoundAt(stars, p));
     guards.least_room = std::min(guards.least_room, radius);
     for (const HalfEdge<K>& edge : edges.back())
-      radius = std::min(radius, kGuardShare * LengthOf<K>(complex, p, edge.other));
+      radius = std::min(radius, kGuardShare * LengthOf<K>(stars, p, edge.other));
     guards.radii2[p] = radius * radius;
   }
   for (std::size_t i = 0; i < sharp.size(); ++i)
     for (const HalfEdge<K>& edge : edges[i]) {
       const std::uint32_t p = sharp[i], q = edge.other;
       if (q < p || guards.radii2[q] == 0) continue;
-      const double length = LengthOf<K>(complex, p, q);
+      const double length = LengthOf<K>(stars, p, q);
       ++guards.edges;
       guards.longest = std::max(guards.longest, length);
       guards.least_room = std::min(guards.least_room, length);
-      if (complex.GuardOf(p) > 0 && complex.GuardOf(q) > 0) continue;
-      const double overlap =
-          IsCorner<K>(complex, p) || IsCorner<K>(complex, q) ? kMeet : kGuardOverlap;
+      if (stars.sample().GuardOf(p) > 0 && stars.sample().GuardOf(q) > 0) continue;
+      const double overlap = IsCorner<K>(stars, p) || IsCorner<K>(stars, q) ? kMeet : kGuardOverlap;
       if (std::sqrt(guards.radii2[p]) + std::sqrt(guards.radii2[q]) < overlap * length)
         guards.gaps.push_back(edge.at);
     }
@@ -126,16 +126,16 @@ std::size_t MostSplits(const Guards<K>& guards) {
 }
 
 template <int K>
-bool LacksGuards(const StarComplex<K>& complex) {
-  for (std::uint32_t p = 0; p < complex.size(); ++p)
-    if (complex.GuardOf(p) == 0 && IsSharp<K>(complex, p, kNeedsGuard)) return true;
+bool LacksGuards(const Stars<K>& stars) {
+  for (std::uint32_t p = 0; p < stars.size(); ++p)
+    if (stars.sample().GuardOf(p) == 0 && IsSharp<K>(stars, p, kNeedsGuard)) return true;
   return false;
 }
 
-#define STELLATE_EACH(K)                                                        \
-  template Guards<K> PlanGuards<K>(const StarComplex<K>&, const SizeField<K>&); \
-  template std::size_t MostSplits<K>(const Guards<K>&);                         \
-  template bool LacksGuards<K>(const StarComplex<K>&);
+#define STELLATE_EACH(K)                                                  \
+  template Guards<K> PlanGuards<K>(const Stars<K>&, const SizeField<K>&); \
+  template std::size_t MostSplits<K>(const Guards<K>&);                   \
+  template bool LacksGuards<K>(const Stars<K>&);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "core/complex/star_complex.h"
+#include "core/complex/stars.h"
 #include "core/refinement/size_field.h"
 
 namespace stellate::core {
@@ -19,7 +19,7 @@ template <int K>
 struct Guards {
   std::vector<double> radii2;  // squared, by point; 0: no ball
   // The dual vertices of edges that are too long for their balls, except between two existing ones.
-  std::vector<typename StarComplex<K>::CellVertex> gaps;
+  std::vector<typename Stars<K>::CellVertex> gaps;
   // For MostSplits, which bounds the splits of gaps.
   std::size_t edges = 0;  // between points with balls
   double longest = 0;     // of them, length
@@ -28,7 +28,7 @@ struct Guards {
 
 // Plans the balls. REQUIRES: LacksGuards, and that no rule applies to edges and corners.
 template <int K>
-Guards<K> PlanGuards(const StarComplex<K>& complex, const SizeField<K>& sizes);
+Guards<K> PlanGuards(const Stars<K>& stars, const SizeField<K>& sizes);
 
 // The law of the two shares. A ball is at most a = kGuardShare of the shorter of the edges at its
 // point, and an edge is split while the balls at its ends are less than o = kGuardOverlap of it. An
@@ -55,6 +55,6 @@ std::size_t MostSplits(const Guards<K>& guards);
 
 // Whether walls meet too sharply at some point that has no ball.
 template <int K>
-bool LacksGuards(const StarComplex<K>& complex);
+bool LacksGuards(const Stars<K>& stars);
 
 }  // namespace stellate::core

@@ -92,12 +92,11 @@ class Conflicts {
 }  // namespace
 
 template <int K>
-std::vector<double> CentresOf(const StarComplex<K>& complex,
-                              const std::vector<Target<K>>& targets) {
-  const auto d = static_cast<std::size_t>(complex.d());
+std::vector<double> CentresOf(const Stars<K>& stars, const std::vector<Target<K>>& targets) {
+  const auto d = static_cast<std::size_t>(stars.sample().d());
   std::vector<double> centres(targets.size() * d);
   ParallelFor(targets.size(), [&](std::size_t i) {
-    complex.Lift(targets[i].star, targets[i].x, centres.data() + i * d);
+    stars.sample().Lift(targets[i].star, targets[i].x, centres.data() + i * d);
   });
   return centres;
 }
@@ -134,9 +133,9 @@ std::vector<std::size_t> SelectIndependent(int d, const std::vector<double>& cen
   return chosen;
 }
 
-#define STELLATE_EACH(K)                                                                        \
-  template std::vector<double> CentresOf(const StarComplex<K>&, const std::vector<Target<K>>&); \
-  template std::vector<std::size_t> SelectIndependent(int, const std::vector<double>&,          \
+#define STELLATE_EACH(K)                                                                  \
+  template std::vector<double> CentresOf(const Stars<K>&, const std::vector<Target<K>>&); \
+  template std::vector<std::size_t> SelectIndependent(int, const std::vector<double>&,    \
                                                       const std::vector<Target<K>>&, std::size_t);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

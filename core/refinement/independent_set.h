@@ -3,14 +3,14 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/complex/star_complex.h"
+#include "core/complex/stars.h"
 #include "core/refinement/target.h"
 
 namespace stellate::core {
 
 // Returns the insertion points of targets, d each.
 template <int K>
-std::vector<double> CentresOf(const StarComplex<K>& complex, const std::vector<Target<K>>& targets);
+std::vector<double> CentresOf(const Stars<K>& stars, const std::vector<Target<K>>& targets);
 
 // Chooses the targets of one round, by their places: a maximal set in which no insertion point
 // (`centres`, d each) lies in the conflict ball of another (radius |x| for rules R1 and R2, 2|x|

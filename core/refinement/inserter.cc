@@ -72,7 +72,7 @@ typename Inserter<K>::Outcome Inserter<K>::InsertTarget(std::size_t i) {
 // orthogonally.
 template <int K>
 double Inserter<K>::EmptyRadius(const Target<K>& t) const {
-  const double guard2 = to_.complex.GuardOf(t.star);
+  const double guard2 = to_.stars.sample().GuardOf(t.star);
   return guard2 == 0 ? t.radius : std::sqrt(std::max(t.radius * t.radius - guard2, 0.0));
 }
 
@@ -92,15 +92,15 @@ typename Inserter<K>::RefinedPoint Inserter<K>::JudgeRefined(std::size_t i) cons
   judged.found = answers_.found[static_cast<std::size_t>(c)];
   if (!judged.found) return judged;
   const double* y = answers_.points.col(c).data();
-  const StarComplex<K>& complex = to_.complex;
-  judged.duplicate = complex.AnyWithin(y, Clearance(t)) || complex.InGuard(y);
-  judged.cuts_violation = !judged.duplicate && complex.CutsVertex(t.star, t.violation.vertex, y);
+  const Stars<K>& stars = to_.stars;
+  judged.duplicate = stars.sample().AnyWithin(y, Clearance(t)) || stars.sample().InGuard(y);
+  judged.cuts_violation = !judged.duplicate && stars.CutsVertex(t.star, t.violation.vertex, y);
   if (to_.faces.has_walls()) {
-    judged.encroached = complex.EncroachedBy(y, t.violation.walls);
+    judged.encroached = stars.EncroachedBy(y, t.violation.walls);
     judged.beyond = answers_.Beyond(c);
   }
   judged.near_aim = !caution_.is_rehearsal && Distance(y, candidates_.points.col(c).data(),
-                                                       complex.d()) <= kNearAim * t.radius;
+                                                       stars.sample().d()) <= kNearAim * t.radius;
   return judged;
 }
 
@@ -117,7 +117,7 @@ typename Inserter<K>::Outcome Inserter<K>::InsertRefined(std::size_t i, RefinedP
   const double* y = answers_.points.col(c).data();
   // Another of this round may have come near, unless all have stayed near where they were aimed.
   if (judged.cuts_violation && !all_near_aim_)
-    judged.duplicate = to_.complex.AnyWithin(y, Clearance(t));
+    judged.duplicate = to_.stars.sample().AnyWithin(y, Clearance(t));
   if (judged.duplicate || !judged.cuts_violation) {
     done_.duplicates += judged.duplicate;
     return NoteFailedAttempt(t.star);
@@ -132,7 +132,7 @@ template <int K>
 bool Inserter<K>::YieldsToFaces(const RefinedPoint& judged, const Target<K>& t, Eigen::Index c) {
   if (judged.encroached) {
     const auto& [star, vertex] = *judged.encroached;
-    to_.faces.NoteEncroached({star, to_.complex.cell(star).key(vertex), t.violation.rule});
+    to_.faces.NoteEncroached({star, to_.stars.cell(star).key(vertex), t.violation.rule});
     return true;
   }
   if (!judged.beyond) return false;
@@ -144,29 +144,28 @@ bool Inserter<K>::YieldsToFaces(const RefinedPoint& judged, const Target<K>& t, 
 template <int K>
 bool Inserter<K>::FitsFaces(Eigen::Index c) const {
   return !to_.faces.has_walls() ||
-         (!answers_.Beyond(c) && !to_.complex.InGuard(answers_.points.col(c).data()) &&
-          !to_.complex.EncroachedBy(answers_.points.col(c).data(), WallsOf(c)));
+         (!answers_.Beyond(c) && !to_.stars.sample().InGuard(answers_.points.col(c).data()) &&
+          !to_.stars.EncroachedBy(answers_.points.col(c).data(), WallsOf(c)));
 }
 
 template <int K>
 int Inserter<K>::BestCandidate(std::size_t i) const {
   const Target<K>& t = candidates_.targets[i];
-  const StarComplex<K>& complex = to_.complex;
-  thread_local typename StarComplex<K>::Cell::Scratch scratch;
-  thread_local typename StarComplex<K>::Tentative tentative;
+  const Stars<K>& stars = to_.stars;
+  thread_local typename Stars<K>::Tentative tentative;
   int best = -1, fewest = std::numeric_limits<int>::max();
   const Eigen::Index first = candidates_.first[i];
   for (Eigen::Index c = first; c < candidates_.first[i + 1] && fewest > 0; ++c) {
     if (!answers_.found[static_cast<std::size_t>(c)]) continue;
     const double* y = answers_.points.col(c).data();
-    if (!complex.CutsVertex(t.star, t.violation.vertex, y) ||
-        complex.AnyWithin(y, kGoodPointSpacing * EmptyRadius(t)) || !FitsFaces(c))
+    if (!stars.CutsVertex(t.star, t.violation.vertex, y) ||
+        stars.sample().AnyWithin(y, kGoodPointSpacing * EmptyRadius(t)) || !FitsFaces(c))
       continue;
     const int index = static_cast<int>(c - first);
     if (to_.criteria.candidates == 1) return index;
-    complex.TryPoint(y, answers_.tangents.col(c).data(), t.star, scratch, &tentative, WallsOf(c),
-                     ConormalsOf(c));
-    const int bad = CountBad<K>(complex, y, tentative, to_.criteria.shape,
+    stars.TryPoint(y, answers_.tangents.col(c).data(), t.star, &tentative, WallsOf(c),
+                   ConormalsOf(c));
+    const int bad = CountBad<K>(stars, y, tentative, to_.criteria.shape,
                                 to_.criteria.small_sliver_radius * t.radius, fewest, WallsOf(c));
     if (bad < fewest) {
       fewest = bad;
@@ -184,8 +183,7 @@ typename Inserter<K>::Outcome Inserter<K>::InsertGoodPoint(std::size_t i, int be
     for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c) {
       if (!to_.faces.has_walls() || !answers_.found[static_cast<std::size_t>(c)]) continue;
       RefinedPoint judged;
-      judged.encroached =
-          to_.complex.EncroachedBy(answers_.points.col(c).data(), t.violation.walls);
+      judged.encroached = to_.stars.EncroachedBy(answers_.points.col(c).data(), t.violation.walls);
       judged.beyond = answers_.Beyond(c);
       if (YieldsToFaces(judged, t, c)) break;
     }
@@ -193,7 +191,8 @@ typename Inserter<K>::Outcome Inserter<K>::InsertGoodPoint(std::size_t i, int be
     return NoteFailedAttempt(t.star);
   }
   const Eigen::Index c = candidates_.first[i] + best;
-  if (to_.complex.AnyWithin(answers_.points.col(c).data(), kGoodPointSpacing * EmptyRadius(t)))
+  if (to_.stars.sample().AnyWithin(answers_.points.col(c).data(),
+                                   kGoodPointSpacing * EmptyRadius(t)))
     return Outcome::kPutOff;  // another of this round came near
   return Insert(c, t.violation.rule, t.star);
 }
@@ -203,7 +202,7 @@ void Inserter<K>::InsertPlanned() {
   const PlannedPoints& planned = candidates_.planned;
   for (Eigen::Index i = 0; i < planned.size(); ++i) {
     CheckInterruption(static_cast<std::size_t>(i));
-    if (to_.complex.size() >= max_vertices_) break;
+    if (to_.stars.size() >= max_vertices_) break;
     const Eigen::Index c = candidates_.drawn() + i;
     if (!answers_.found[static_cast<std::size_t>(c)]) continue;
     if (CountWalls(WallsOf(c)) == K &&
@@ -218,20 +217,21 @@ void Inserter<K>::InsertPlanned() {
       to_.faces.KeepSeed(answers_.points.col(c), WallsOf(c));
       continue;
     }
-    if (to_.complex.AnyWithin(answers_.points.col(c).data(), kKeptSpacing * planned.spacing[i])) {
+    if (to_.stars.sample().AnyWithin(answers_.points.col(c).data(),
+                                     kKeptSpacing * planned.spacing[i])) {
       ++done_.duplicates;
-      if (WallsOf(c) != 0 && !HasPointOn<K>(to_.complex, WallsOf(c)))
+      if (WallsOf(c) != 0 && !HasPointOn<K>(to_.stars, WallsOf(c)))
         to_.faces.KeepSeed(answers_.points.col(c), WallsOf(c));
       continue;
     }
-    Insert(c, planned.rules[static_cast<std::size_t>(i)], StarComplex<K>::kNone);
+    Insert(c, planned.rules[static_cast<std::size_t>(i)], Stars<K>::kNone);
   }
 }
 
 template <int K>
 typename Inserter<K>::Outcome Inserter<K>::Insert(Eigen::Index c, Rule rule, std::uint32_t near) {
-  to_.complex.Append(answers_.points.col(c).data(), answers_.tangents.col(c).data(), near,
-                     WallsOf(c), ConormalsOf(c));
+  to_.stars.Add(answers_.points.col(c).data(), answers_.tangents.col(c).data(), near, WallsOf(c),
+                ConormalsOf(c));
   if (answers_.sizes.size() > 0) to_.sizes.AppendGiven(answers_.sizes[c]);
   done_.used[static_cast<std::size_t>(c)] = 1;
   done_.rules.push_back(rule);

@@ -47,7 +47,7 @@ class Inserter {
  public:
   // References must outlive the inserter.
   struct Parts {
-    StarComplex<K>& complex;
+    Stars<K>& stars;
     SizeField<K>& sizes;
     ViolationBook<K>& book;
     const ResolvedCriteria& criteria;
@@ -78,7 +78,7 @@ class Inserter {
     bool near_aim = false;        // lies near its target
     // Manifolds with boundary: the face simplex that it encroaches on; the wall that it lies
     // beyond.
-    std::optional<typename StarComplex<K>::CellVertex> encroached;
+    std::optional<typename Stars<K>::CellVertex> encroached;
     std::optional<int> beyond;
   };
   double EmptyRadius(const Target<K>& target) const;

@@ -21,7 +21,7 @@ constexpr double kMostWanted = 4;
 constexpr double kShareOfSizes = 0.995;
 
 template <int K>
-AnsweredPoints AnswersOf(Surrogate<K>& surrogate, const StarComplex<K>& complex,
+AnsweredPoints AnswersOf(Surrogate<K>& surrogate, const Stars<K>& stars,
                          const CandidateSet<K>& candidates) {
   std::vector<const double*> flats(static_cast<std::size_t>(candidates.size()), nullptr);
   Eigen::VectorXd spacing(candidates.size());
@@ -30,7 +30,8 @@ AnsweredPoints AnswersOf(Surrogate<K>& surrogate, const StarComplex<K>& complex,
     const Target<K>& t = candidates.targets[i];
     for (Eigen::Index c = candidates.first[i]; c < candidates.first[i + 1]; ++c) {
       spacing[c] = t.radius;
-      if (candidates.in_flats[i]) flats[static_cast<std::size_t>(c)] = complex.Tangent(t.star);
+      if (candidates.in_flats[i])
+        flats[static_cast<std::size_t>(c)] = stars.sample().Tangent(t.star);
     }
   }
   return surrogate.Answer(candidates.points, flats, spacing);
@@ -38,16 +39,16 @@ AnsweredPoints AnswersOf(Surrogate<K>& surrogate, const StarComplex<K>& complex,
 
 // The guess knows no walls: what would come near one is left to true points.
 template <int K>
-void LeaveWallsAlone(const StarComplex<K>& complex, double epsilon,
-                     std::vector<Target<K>>* targets) {
-  std::vector<double> aim(static_cast<std::size_t>(complex.d()));
+void LeaveWallsAlone(const Stars<K>& stars, double epsilon, std::vector<Target<K>>* targets) {
+  std::vector<double> aim(static_cast<std::size_t>(stars.sample().d()));
   std::erase_if(*targets, [&, step = std::size_t{0}](const Target<K>& t) mutable {
     CheckInterruption(step++);
     if (t.violation.walls != 0) return true;
-    complex.Lift(t.star, t.x, aim.data());
+    stars.sample().Lift(t.star, t.x, aim.data());
     bool near = false;
-    complex.ForEachWithin(aim.data(), t.radius + epsilon,
-                          [&](std::uint32_t p) { near = near || complex.walls(p) != 0; });
+    stars.sample().ForEachWithin(aim.data(), t.radius + epsilon, [&](std::uint32_t p) {
+      near = near || stars.sample().walls(p) != 0;
+    });
     return near;
   });
 }
@@ -56,26 +57,26 @@ void LeaveWallsAlone(const StarComplex<K>& complex, double epsilon,
 template <int K>
 std::vector<Rule> Drive(Engine<K>* rehearsal, const Engine<K>& original, std::uint64_t round,
                         Rehearsed by, Surrogate<K>* known) {
-  const double count = original.complex().size();
+  const double count = original.stars().size();
   const double most = count + kMostWanted * (original.CountMissing(1) + count);
   const ResolvedCriteria& criteria = original.criteria();
   std::optional<Surrogate<K>> own;
   if (!known)
-    known = &own.emplace(original.complex(), criteria.advance_step, criteria.epsilon,
+    known = &own.emplace(original.stars(), criteria.advance_step, criteria.epsilon,
                          original.sizes().given());
   std::vector<Rule> rules;
   for (int good_rounds = 0; good_rounds < kGoodPointRounds; ++round) {
-    if (rehearsal->is_full() || rehearsal->complex().size() > most) break;
+    if (rehearsal->is_full() || rehearsal->stars().size() > most) break;
     if (by == Rehearsed::kSizes && rehearsal->book().size_and_shape().empty()) break;
     auto targets = rehearsal->Plan();
     if (targets && rehearsal->faces().has_walls())
-      LeaveWallsAlone<K>(rehearsal->complex(), criteria.epsilon, &*targets);
+      LeaveWallsAlone<K>(rehearsal->stars(), criteria.epsilon, &*targets);
     if (!targets || targets->empty()) break;
     if (by == Rehearsed::kSizes && targets->front().violation.rule >= Rule::kSliver) break;
     const CandidateSet<K> candidates = rehearsal->Draw(rehearsal->Select(*targets), round);
     good_rounds += candidates.targets.front().violation.rule >= Rule::kSliver;
     const Inserted inserted =
-        rehearsal->Insert(candidates, AnswersOf(*known, rehearsal->complex(), candidates));
+        rehearsal->Insert(candidates, AnswersOf(*known, rehearsal->stars(), candidates));
     rules.insert(rules.end(), inserted.rules.begin(), inserted.rules.end());
     rehearsal->Commit();
   }
@@ -90,18 +91,19 @@ PlannedPoints Rehearse(const Engine<K>& engine, std::uint64_t round,
   Engine<K> rehearsal = engine.ForRehearsal(known ? kShareOfSizes : 1);
   PlannedPoints planned;
   planned.rules = Drive(&rehearsal, engine, round, rules, known);
-  const StarComplex<K>& rehearsed = rehearsal.complex();
-  const std::uint32_t count = engine.complex().size();
+  const Stars<K>& rehearsed = rehearsal.stars();
+  const Sample<K>& sample = rehearsed.sample();
+  const std::uint32_t count = engine.stars().size();
   const auto wanted = static_cast<Eigen::Index>(rehearsed.size() - count);
-  const int d = rehearsed.d();
+  const int d = sample.d();
   planned.points.resize(d, wanted);
   planned.tangents.resize(d * K, wanted);
   planned.spacing.resize(wanted);
   for (Eigen::Index i = 0; i < wanted; ++i) {
     CheckInterruption(static_cast<std::size_t>(i));
     const std::uint32_t p = count + static_cast<std::uint32_t>(i);
-    std::copy_n(rehearsed.Point(p), d, planned.points.col(i).data());
-    std::copy_n(rehearsed.Tangent(p), d * K, planned.tangents.col(i).data());
+    std::copy_n(sample.Point(p), d, planned.points.col(i).data());
+    std::copy_n(sample.Tangent(p), d * K, planned.tangents.col(i).data());
     double nearest2 = INFINITY;
     const auto& cell = rehearsed.cell(p);
     for (std::size_t f = 0; f < cell.facet_count(); ++f)
@@ -111,10 +113,10 @@ PlannedPoints Rehearse(const Engine<K>& engine, std::uint64_t round,
   std::vector<double> centre(static_cast<std::size_t>(d));
   std::erase_if(*targets, [&, step = std::size_t{0}](const Target<K>& t) mutable {
     CheckInterruption(step++);
-    engine.complex().Lift(t.star, t.x, centre.data());
+    engine.stars().sample().Lift(t.star, t.x, centre.data());
     bool mended = false;
-    rehearsed.ForEachWithin(centre.data(), kMended * t.radius,
-                            [&](std::uint32_t p) { mended = mended || p >= count; });
+    sample.ForEachWithin(centre.data(), kMended * t.radius,
+                         [&](std::uint32_t p) { mended = mended || p >= count; });
     return mended;
   });
   return planned;

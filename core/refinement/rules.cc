@@ -129,13 +129,13 @@ bool HasThinFace(const SimplexEdges<K>& edges, double sliver_bound) {
 
 // Of a star at the boundary, whose vertices are dual to simplices of several faces.
 template <int K>
-std::optional<Violation<K>> WorstSizeOrShapeOnFaces(const StarComplex<K>& complex, std::uint32_t p,
+std::optional<Violation<K>> WorstSizeOrShapeOnFaces(const Stars<K>& stars, std::uint32_t p,
                                                     double epsilon, double radius_edge_bound,
                                                     int stage, int least) {
-  const auto& cell = complex.cell(p);
+  const auto& cell = stars.cell(p);
   std::optional<Violation<K>> worst;
   for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
-    const auto simplex = complex.FaceSimplexOf(p, cell, v);
+    const auto simplex = stars.FaceSimplexOf(p, cell, v);
     const int dimension = simplex.dimension();
     if (dimension < least || dimension > stage) continue;
     const double norm2 = cell.norm2(v);
@@ -143,11 +143,12 @@ std::optional<Violation<K>> WorstSizeOrShapeOnFaces(const StarComplex<K>& comple
     for (int i = 0; i < simplex.count; ++i) {
       const std::uint32_t q = simplex.ids[static_cast<std::size_t>(i)];
       if (q != p)
-        edge2 = std::min(edge2, SquaredDistance(complex.Point(p), complex.Point(q), complex.d()));
+        edge2 = std::min(edge2, SquaredDistance(stars.sample().Point(p), stars.sample().Point(q),
+                                                stars.sample().d()));
     }
     const bool large = simplex.fake || norm2 > epsilon * epsilon;
     const bool long_enough =
-        norm2 <= radius_edge_bound * radius_edge_bound * edge2 || complex.TouchesGuard(p, cell, v);
+        norm2 <= radius_edge_bound * radius_edge_bound * edge2 || stars.TouchesGuard(p, cell, v);
     if (!large && !simplex.foreign && long_enough) continue;
     const Rule rule = large ? Rule::kSize : Rule::kRadiusEdge;
     if (worst && std::tuple(worst->dimension(), worst->rule, -worst->radius) <=
@@ -162,13 +163,12 @@ std::optional<Violation<K>> WorstSizeOrShapeOnFaces(const StarComplex<K>& comple
 }  // namespace
 
 template <int K>
-std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std::uint32_t p,
-                                             double epsilon, double radius_edge_bound, int stage,
-                                             int least) {
-  if (complex.walls(p) != 0)
-    return WorstSizeOrShapeOnFaces<K>(complex, p, epsilon, radius_edge_bound, stage, least);
+std::optional<Violation<K>> WorstSizeOrShape(const Stars<K>& stars, std::uint32_t p, double epsilon,
+                                             double radius_edge_bound, int stage, int least) {
+  if (stars.sample().walls(p) != 0)
+    return WorstSizeOrShapeOnFaces<K>(stars, p, epsilon, radius_edge_bound, stage, least);
   if (stage < K) return std::nullopt;
-  const auto& cell = complex.cell(p);
+  const auto& cell = stars.cell(p);
   std::optional<std::size_t> worst;
   double worst_norm2 = 0;
   if (!cell.bounded() || cell.max_norm2() > epsilon * epsilon) {
@@ -186,7 +186,7 @@ std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std:
   }
   thread_local std::vector<double> edges2;
   edges2.clear();
-  for (std::size_t f = 0; f < cell.facet_count(); ++f) edges2.push_back(complex.EdgeLength2(p, f));
+  for (std::size_t f = 0; f < cell.facet_count(); ++f) edges2.push_back(stars.EdgeLength2(p, f));
   const double bound2 = radius_edge_bound * radius_edge_bound;
   double worst_rho2 = 0;
   // Mostly the longest radius is short enough for the shortest edge.
@@ -198,7 +198,7 @@ std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std:
     const double norm2 = cell.norm2(v);
     const double rho2 = norm2 / edge2;
     if (!(rho2 > bound2) || !IsWorse<K>(cell, v, rho2, worst, worst_rho2)) continue;
-    if (complex.TouchesGuard(p, cell, v)) continue;
+    if (stars.TouchesGuard(p, cell, v)) continue;
     worst_rho2 = rho2;
     worst = v;
   }
@@ -207,15 +207,14 @@ std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std:
 }
 
 template <int K>
-bool HasThinFaceAt(const StarComplex<K>& complex, const double* p,
-                   const RestrictedVoronoiCell<K>& cell, std::size_t v, double sliver_bound,
-                   const double* unborn) {
+bool HasThinFaceAt(const Stars<K>& stars, const double* p, const RestrictedVoronoiCell<K>& cell,
+                   std::size_t v, double sliver_bound, const double* unborn) {
   if (K < 2 || sliver_bound <= 0) return false;
-  const int d = complex.d();
+  const int d = stars.sample().d();
   const double* q[K];
   for (int a = 0; a < K; ++a) {
     const std::uint32_t id = cell.id(cell.facet(v, a));
-    q[a] = id < complex.size() ? complex.Point(id) : unborn;
+    q[a] = id < stars.size() ? stars.sample().Point(id) : unborn;
   }
   SimplexEdges<K> edges;
   WithDimension(d, [&](auto known) {
@@ -233,11 +232,11 @@ bool HasThinFaceAt(const StarComplex<K>& complex, const double* p,
 }
 
 template <int K>
-bool LeansTooFar(const StarComplex<K>& complex, std::uint32_t p, const double* at,
+bool LeansTooFar(const Stars<K>& stars, std::uint32_t p, const double* at,
                  const RestrictedVoronoiCell<K>& cell, std::size_t v, double reach,
                  const double* unborn) {
   if (!std::isfinite(reach)) return false;
-  const int d = complex.d();
+  const int d = stars.sample().d();
   std::array<const double*, K + 1> corners;
   std::array<std::uint32_t, K + 1> ids;
   corners[0] = at;
@@ -245,7 +244,7 @@ bool LeansTooFar(const StarComplex<K>& complex, std::uint32_t p, const double* a
   double diameter2 = 0;
   for (int a = 0; a < K; ++a) {
     ids[a + 1] = cell.id(cell.facet(v, a));
-    corners[a + 1] = ids[a + 1] < complex.size() ? complex.Point(ids[a + 1]) : unborn;
+    corners[a + 1] = ids[a + 1] < stars.size() ? stars.sample().Point(ids[a + 1]) : unborn;
     for (int b = 0; b <= a; ++b)
       diameter2 = std::max(diameter2, SquaredDistance(corners[a + 1], corners[b], d));
   }
@@ -260,10 +259,10 @@ bool LeansTooFar(const StarComplex<K>& complex, std::uint32_t p, const double* a
   TakeFrame({corners.data(), corners.size()}, K, d, frame);
   if (frame.rank < K) return true;
   for (const std::uint32_t id : ids) {
-    if (id >= complex.size()) continue;
+    if (id >= stars.size()) continue;
     // The sum is no less than the largest: mostly that is enough to know.
-    if (SumOfSquaredSines(frame, K, d, complex.Tangent(id), K) < sine * sine) continue;
-    if (SineToTangent(frame, K, d, complex.Tangent(id), K) >= sine) return true;
+    if (SumOfSquaredSines(frame, K, d, stars.sample().Tangent(id), K) < sine * sine) continue;
+    if (SineToTangent(frame, K, d, stars.sample().Tangent(id), K) >= sine) return true;
   }
   return false;
 }
@@ -274,55 +273,53 @@ namespace {
 // p sees it. Stars may agree on one where the wall's own simplices and those inside are not of one
 // mind about cospherical points of a flat wall.
 template <int K>
-bool IsFlatOnWall(const StarComplex<K>& complex, std::uint32_t p,
-                  const RestrictedVoronoiCell<K>& cell, std::size_t v) {
+bool IsFlatOnWall(const Stars<K>& stars, std::uint32_t p, const RestrictedVoronoiCell<K>& cell,
+                  std::size_t v) {
   if (K < kFirstFlat) return false;
-  WallSet common = complex.walls(p);
+  WallSet common = stars.sample().walls(p);
   Eigen::Matrix<double, K, K> edges;
   for (int a = 0; a < K; ++a) {
     const std::uint32_t id = cell.id(cell.facet(v, a));
-    common &= complex.walls(id);
+    common &= stars.sample().walls(id);
     if (common == 0) return false;
-    complex.Project(p, complex.Point(id), edges.col(a).data());
+    stars.sample().Project(p, stars.sample().Point(id), edges.col(a).data());
   }
   return std::abs(Determinant<K>(edges)) <= kFlatEdges * edges.colwise().norm().prod();
 }
 
 // Of a closed star that breaks no rule besides.
 template <int K>
-std::optional<Violation<K>> SharpSimplex(const StarComplex<K>& complex, std::uint32_t p,
+std::optional<Violation<K>> SharpSimplex(const Stars<K>& stars, std::uint32_t p,
                                          const ShapeBounds& bounds, double size_bound) {
   if (bounds.sharpest_cosine >= 1) return std::nullopt;
   const auto worst =
-      WorstSharp<K>(complex, p, bounds.sharpest_cosine, bounds.sharp_radius * size_bound);
+      WorstSharp<K>(stars, p, bounds.sharpest_cosine, bounds.sharp_radius * size_bound);
   if (!worst) return std::nullopt;
-  Violation<K> violation = AtVertex<K>(Rule::kSliver, complex.cell(p), *worst, false);
+  Violation<K> violation = AtVertex<K>(Rule::kSliver, stars.cell(p), *worst, false);
   violation.sharp = true;
   return violation;
 }
 
 template <int K>
-std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const StarComplex<K>& complex,
-                                                             std::uint32_t p,
+std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const Stars<K>& stars, std::uint32_t p,
                                                              const ShapeBounds& bounds,
                                                              double size_bound, int stage,
                                                              int least) {
-  const auto& cell = complex.cell(p);
+  const auto& cell = stars.cell(p);
   std::optional<Folds<K>> folds;
-  if (complex.judging() == Judging::kCommonCentre) folds.emplace(complex, p);
+  if (stars.judging() == Judging::kCommonCentre) folds.emplace(stars, p);
   std::optional<Violation<K>> worst;
   for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
-    const auto simplex = complex.FaceSimplexOf(p, cell, v);
+    const auto simplex = stars.FaceSimplexOf(p, cell, v);
     const int dimension = simplex.dimension();
     if (dimension < least || dimension > stage) continue;
     if (simplex.fake) return std::nullopt;  // R1 gave up there: nothing to judge yet
     const bool whole = dimension == K, held = simplex.ids[0] == p;
     const bool thin =
-        whole && held && bounds.sliver_bound > 0 && !complex.TouchesGuard(p, cell, v) &&
-        (HasThinFaceAt<K>(complex, complex.Point(p), cell, v, bounds.sliver_bound, nullptr) ||
-         IsFlatOnWall<K>(complex, p, cell, v));
-    if (!thin && IsConsistent<K>(complex, p, v) && !(whole && folds && folds->IsFolded(v)))
-      continue;
+        whole && held && bounds.sliver_bound > 0 && !stars.TouchesGuard(p, cell, v) &&
+        (HasThinFaceAt<K>(stars, stars.sample().Point(p), cell, v, bounds.sliver_bound, nullptr) ||
+         IsFlatOnWall<K>(stars, p, cell, v));
+    if (!thin && IsConsistent<K>(stars, p, v) && !(whole && folds && folds->IsFolded(v))) continue;
     const Rule rule = thin ? Rule::kSliver : Rule::kInconsistent;
     if (worst && std::tuple(worst->dimension(), worst->rule, -worst->radius) <=
                      std::tuple(dimension, rule, -std::sqrt(cell.norm2(v))))
@@ -330,20 +327,20 @@ std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const StarComplex<K
     worst = AtVertex<K>(rule, cell, v, false);
     worst->walls = simplex.walls;
   }
-  return worst || stage < K ? worst : SharpSimplex<K>(complex, p, bounds, size_bound);
+  return worst || stage < K ? worst : SharpSimplex<K>(stars, p, bounds, size_bound);
 }
 
 }  // namespace
 
 template <int K>
-std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& complex,
-                                                      std::uint32_t p, const ShapeBounds& bounds,
-                                                      double size_bound, int stage,
-                                                      std::uint64_t consistent, int least) {
-  if (complex.walls(p) != 0)
-    return WorstSliverOrInconsistentOnFaces<K>(complex, p, bounds, size_bound, stage, least);
+std::optional<Violation<K>> WorstSliverOrInconsistent(const Stars<K>& stars, std::uint32_t p,
+                                                      const ShapeBounds& bounds, double size_bound,
+                                                      int stage, std::uint64_t consistent,
+                                                      int least) {
+  if (stars.sample().walls(p) != 0)
+    return WorstSliverOrInconsistentOnFaces<K>(stars, p, bounds, size_bound, stage, least);
   if (stage < K) return std::nullopt;
-  const auto& cell = complex.cell(p);
+  const auto& cell = stars.cell(p);
   if (!cell.bounded()) return std::nullopt;  // R1 gave up there: nothing to judge yet
   std::optional<std::size_t> worst;
   const auto is_worse = [&](std::size_t v) {
@@ -357,39 +354,38 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& comp
   };
   if (bounds.sliver_bound > 0) {
     for (std::size_t v = 0; v < cell.vertex_count(); ++v)
-      if (is_worse(v) && held(v) && !complex.TouchesGuard(p, cell, v) &&
-          HasThinFaceAt<K>(complex, complex.Point(p), cell, v, bounds.sliver_bound, nullptr))
+      if (is_worse(v) && held(v) && !stars.TouchesGuard(p, cell, v) &&
+          HasThinFaceAt<K>(stars, stars.sample().Point(p), cell, v, bounds.sliver_bound, nullptr))
         worst = v;
     if (worst) return AtVertex<K>(Rule::kSliver, cell, *worst, false);
   }
   const auto is_consistent = [&](std::size_t v) {
-    return (v < 64 && (consistent >> v & 1) != 0) || IsConsistent<K>(complex, p, v);
+    return (v < 64 && (consistent >> v & 1) != 0) || IsConsistent<K>(stars, p, v);
   };
   std::optional<Folds<K>> folds;
-  if (complex.judging() == Judging::kCommonCentre) folds.emplace(complex, p);
+  if (stars.judging() == Judging::kCommonCentre) folds.emplace(stars, p);
   for (std::size_t v = 0; v < cell.vertex_count(); ++v)
     if (is_worse(v) && (!is_consistent(v) || (folds && folds->IsFolded(v)))) worst = v;
   if (worst) return AtVertex<K>(Rule::kInconsistent, cell, *worst, false);
-  if (!std::isfinite(bounds.reach)) return SharpSimplex<K>(complex, p, bounds, size_bound);
+  if (!std::isfinite(bounds.reach)) return SharpSimplex<K>(stars, p, bounds, size_bound);
   for (std::size_t v = 0; v < cell.vertex_count(); ++v)
     if (is_worse(v) && held(v) &&
-        LeansTooFar<K>(complex, p, complex.Point(p), cell, v, bounds.reach, nullptr))
+        LeansTooFar<K>(stars, p, stars.sample().Point(p), cell, v, bounds.reach, nullptr))
       worst = v;
-  if (!worst) return SharpSimplex<K>(complex, p, bounds, size_bound);
+  if (!worst) return SharpSimplex<K>(stars, p, bounds, size_bound);
   Violation<K> violation = AtVertex<K>(Rule::kSliver, cell, *worst, false);
   violation.lean = true;
   return violation;
 }
 
-#define STELLATE_EACH(K)                                                                          \
-  template std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>&, std::uint32_t,     \
-                                                        double, double, int, int);                \
-  template std::optional<Violation<K>> WorstSliverOrInconsistent(                                 \
-      const StarComplex<K>&, std::uint32_t, const ShapeBounds&, double, int, std::uint64_t, int); \
-  template bool HasThinFaceAt(const StarComplex<K>&, const double*,                               \
-                              const RestrictedVoronoiCell<K>&, std::size_t, double,               \
-                              const double*);                                                     \
-  template bool LeansTooFar(const StarComplex<K>&, std::uint32_t, const double*,                  \
+#define STELLATE_EACH(K)                                                                        \
+  template std::optional<Violation<K>> WorstSizeOrShape(const Stars<K>&, std::uint32_t, double, \
+                                                        double, int, int);                      \
+  template std::optional<Violation<K>> WorstSliverOrInconsistent(                               \
+      const Stars<K>&, std::uint32_t, const ShapeBounds&, double, int, std::uint64_t, int);     \
+  template bool HasThinFaceAt(const Stars<K>&, const double*, const RestrictedVoronoiCell<K>&,  \
+                              std::size_t, double, const double*);                              \
+  template bool LeansTooFar(const Stars<K>&, std::uint32_t, const double*,                      \
                             const RestrictedVoronoiCell<K>&, std::size_t, double, const double*);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

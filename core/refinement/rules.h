@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "core/complex/consistency.h"
-#include "core/complex/star_complex.h"
+#include "core/complex/stars.h"
 
 namespace stellate::core {
 
@@ -48,9 +48,9 @@ struct Violation {
 // Tests faces of dimension `least` to `stage`, the lowest first. R2 also forbids foreign simplices.
 // R2 and R3 skip simplices at points with protecting balls.
 template <int K>
-std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std::uint32_t p,
-                                             double epsilon, double radius_edge_bound,
-                                             int stage = K, int least = 1);
+std::optional<Violation<K>> WorstSizeOrShape(const Stars<K>& stars, std::uint32_t p, double epsilon,
+                                             double radius_edge_bound, int stage = K,
+                                             int least = 1);
 
 // Tests R3 and R4, which need the neighbours' stars, and star(p) closed. Returns the worst simplex,
 // by R_p, of the first of these that occurs:
@@ -65,23 +65,22 @@ std::optional<Violation<K>> WorstSizeOrShape(const StarComplex<K>& complex, std:
 // Tests faces as above. `size_bound`: of R1 for p, length. `consistent`: simplices of p that are
 // known to be consistent (ConsistentSimplices).
 template <int K>
-std::optional<Violation<K>> WorstSliverOrInconsistent(const StarComplex<K>& complex,
-                                                      std::uint32_t p, const ShapeBounds& bounds,
-                                                      double size_bound, int stage = K,
-                                                      std::uint64_t consistent = 0, int least = 1);
+std::optional<Violation<K>> WorstSliverOrInconsistent(const Stars<K>& stars, std::uint32_t p,
+                                                      const ShapeBounds& bounds, double size_bound,
+                                                      int stage = K, std::uint64_t consistent = 0,
+                                                      int least = 1);
 
 // Whether the simplex on p and the facets of v is or contains a Theta0-sliver (Sec. 2.3): that is,
 // whether some face at p, of dimension 2 or more, has fatness below Theta0^j.
 template <int K>
-bool HasThinFaceAt(const StarComplex<K>& complex, const double* p,
-                   const RestrictedVoronoiCell<K>& cell, std::size_t v, double sliver_bound,
-                   const double* unborn);
+bool HasThinFaceAt(const Stars<K>& stars, const double* p, const RestrictedVoronoiCell<K>& cell,
+                   std::size_t v, double sliver_bound, const double* unborn);
 
 // Whether the simplex on p and the facets of v is tilted too far from the tangent space of one of
 // its vertices for a proof from this reach, or is so large that M itself may turn too far under it.
 // `unborn` as above: it has no tangent space yet.
 template <int K>
-bool LeansTooFar(const StarComplex<K>& complex, std::uint32_t p, const double* at,
+bool LeansTooFar(const Stars<K>& stars, std::uint32_t p, const double* at,
                  const RestrictedVoronoiCell<K>& cell, std::size_t v, double reach,
                  const double* unborn);
 
@@ -89,8 +88,8 @@ bool LeansTooFar(const StarComplex<K>& complex, std::uint32_t p, const double* a
 // most `small_radius`, simplices that stars would disagree about, and foreign ones. Stops counting
 // at `enough`. `walls`: those that the point is on.
 template <int K>
-int CountBad(const StarComplex<K>& complex, const double* point,
-             const typename StarComplex<K>::Tentative& tentative, const ShapeBounds& bounds,
+int CountBad(const Stars<K>& stars, const double* point,
+             const typename Stars<K>::Tentative& tentative, const ShapeBounds& bounds,
              double small_radius, int enough, WallSet walls = 0);
 
 }  // namespace stellate::core

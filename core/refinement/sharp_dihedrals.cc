@@ -11,9 +11,9 @@ namespace {
 
 // Whether two points are on an edge where walls meet at an angle whose cosine is larger.
 template <int K>
-bool MeetAsSharply(const StarComplex<K>& complex, std::uint32_t a, std::uint32_t b, double cosine) {
-  if (CountWalls(complex.walls(a) & complex.walls(b)) < 2) return false;
-  const auto angle = SharpestAt<K>(complex, a);
+bool MeetAsSharply(const Stars<K>& stars, std::uint32_t a, std::uint32_t b, double cosine) {
+  if (CountWalls(stars.sample().walls(a) & stars.sample().walls(b)) < 2) return false;
+  const auto angle = SharpestAt<K>(stars, a);
   return angle && angle->cosine > cosine;
 }
 
@@ -29,16 +29,16 @@ int LeastOther(int a, int b) {
 // A facet's inner normal is the gradient of the barycentric coordinate of the vertex off it. Up to
 // one factor, the gradients' inner products are the minors of the edges' inner products.
 template <int K>
-bool HasSharpDihedral(const StarComplex<K>& complex, std::uint32_t p, const double* at,
+bool HasSharpDihedral(const Stars<K>& stars, std::uint32_t p, const double* at,
                       const RestrictedVoronoiCell<K>& cell, std::size_t v, double cosine,
                       const double* unborn) {
   if constexpr (K == 3) {
-    const int d = complex.d();
+    const int d = stars.sample().d();
     std::uint32_t ids[4] = {p};
     const double* q[3];
     for (int a = 0; a < 3; ++a) {
       ids[a + 1] = cell.id(cell.facet(v, a));
-      q[a] = ids[a + 1] < complex.size() ? complex.Point(ids[a + 1]) : unborn;
+      q[a] = ids[a + 1] < stars.size() ? stars.sample().Point(ids[a + 1]) : unborn;
     }
     double gram[3][3];
     for (int a = 0; a < 3; ++a) gram[a][a] = SquaredDistance(at, q[a], d);
@@ -61,16 +61,16 @@ bool HasSharpDihedral(const StarComplex<K>& complex, std::uint32_t p, const doub
         if (!is_acute || inner[a][b] * inner[a][b] <= cosine * cosine * inner[a][a] * inner[b][b])
           continue;
         const int c = LeastOther(a, b);
-        if (!MeetAsSharply<K>(complex, ids[c], ids[6 - a - b - c], cosine)) return true;
+        if (!MeetAsSharply<K>(stars, ids[c], ids[6 - a - b - c], cosine)) return true;
       }
   }
   return false;
 }
 
 template <int K>
-std::optional<std::size_t> WorstSharp(const StarComplex<K>& complex, std::uint32_t p, double cosine,
+std::optional<std::size_t> WorstSharp(const Stars<K>& stars, std::uint32_t p, double cosine,
                                       double least_radius) {
-  const auto& cell = complex.cell(p);
+  const auto& cell = stars.cell(p);
   const auto is_held = [&](std::size_t v) {
     for (int s = 0; s < K; ++s)
       if (const std::uint32_t id = cell.id(cell.facet(v, s)); id < p || !IsSample(id)) return false;
@@ -80,7 +80,7 @@ std::optional<std::size_t> WorstSharp(const StarComplex<K>& complex, std::uint32
   double most2 = least_radius * least_radius;
   for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
     if (cell.norm2(v) <= most2 || !is_held(v) ||
-        !HasSharpDihedral<K>(complex, p, complex.Point(p), cell, v, cosine, nullptr))
+        !HasSharpDihedral<K>(stars, p, stars.sample().Point(p), cell, v, cosine, nullptr))
       continue;
     worst = v;
     most2 = cell.norm2(v);
@@ -88,12 +88,11 @@ std::optional<std::size_t> WorstSharp(const StarComplex<K>& complex, std::uint32
   return worst;
 }
 
-#define STELLATE_EACH(K)                                                                          \
-  template bool HasSharpDihedral<K>(const StarComplex<K>&, std::uint32_t, const double*,          \
-                                    const RestrictedVoronoiCell<K>&, std::size_t, double,         \
-                                    const double*);                                               \
-  template std::optional<std::size_t> WorstSharp<K>(const StarComplex<K>&, std::uint32_t, double, \
-                                                    double);
+#define STELLATE_EACH(K)                                                                  \
+  template bool HasSharpDihedral<K>(const Stars<K>&, std::uint32_t, const double*,        \
+                                    const RestrictedVoronoiCell<K>&, std::size_t, double, \
+                                    const double*);                                       \
+  template std::optional<std::size_t> WorstSharp<K>(const Stars<K>&, std::uint32_t, double, double);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "core/complex/star_complex.h"
+#include "core/complex/stars.h"
 
 namespace stellate::core {
 
@@ -14,14 +14,14 @@ namespace stellate::core {
 // Whether the simplex on p, which is `at`, and the facets of v has one. `unborn`: as of
 // HasThinFaceAt.
 template <int K>
-bool HasSharpDihedral(const StarComplex<K>& complex, std::uint32_t p, const double* at,
+bool HasSharpDihedral(const Stars<K>& stars, std::uint32_t p, const double* at,
                       const RestrictedVoronoiCell<K>& cell, std::size_t v, double cosine,
                       const double* unborn);
 
 // Of the simplices of star(p) that have one, whose lowest vertex p is, and whose circumradius is
 // larger than `least_radius`: the largest, by its dual vertex.
 template <int K>
-std::optional<std::size_t> WorstSharp(const StarComplex<K>& complex, std::uint32_t p, double cosine,
+std::optional<std::size_t> WorstSharp(const Stars<K>& stars, std::uint32_t p, double cosine,
                                       double least_radius);
 
 }  // namespace stellate::core

@@ -12,11 +12,11 @@
 namespace stellate::core {
 
 template <int K>
-std::optional<WallCosine> SharpestAt(const StarComplex<K>& complex, std::uint32_t p) {
-  const WallSet walls = complex.walls(p);
+std::optional<WallCosine> SharpestAt(const Stars<K>& stars, std::uint32_t p) {
+  const WallSet walls = stars.sample().walls(p);
   if (CountWalls(walls) < 2) return std::nullopt;
   std::optional<WallCosine> sharpest;
-  const double* const conormals = complex.Conormals(p);
+  const double* const conormals = stars.sample().Conormals(p);
   // Of more walls than K some meet in the corner alone, and in no edge.
   const CornerCone<K> cone = CountWalls(walls) > K ? ConeOf<K>(walls, conormals) : CornerCone<K>();
   const auto share_edge = [&](WallSet pair) {
@@ -40,12 +40,12 @@ std::optional<WallCosine> SharpestAt(const StarComplex<K>& complex, std::uint32_
 }
 
 template <int K>
-std::optional<WallAngle> Sharpest(const StarComplex<K>& complex) {
+std::optional<WallAngle> Sharpest(const Stars<K>& stars) {
   std::optional<WallCosine> sharpest;
   std::uint32_t at = 0;
-  for (std::uint32_t p = 0; p < complex.size(); ++p) {
+  for (std::uint32_t p = 0; p < stars.size(); ++p) {
     CheckInterruption(p);
-    const std::optional<WallCosine> here = SharpestAt<K>(complex, p);
+    const std::optional<WallCosine> here = SharpestAt<K>(stars, p);
     if (!here || (sharpest && sharpest->cosine >= here->cosine)) continue;
     sharpest = here;
     at = p;
@@ -54,12 +54,12 @@ std::optional<WallAngle> Sharpest(const StarComplex<K>& complex) {
   const double degrees =
       std::acos(std::clamp(sharpest->cosine, -1.0, 1.0)) * 180 / std::numbers::pi;
   return WallAngle{sharpest->walls, degrees,
-                   Eigen::Map<const Eigen::VectorXd>(complex.Point(at), complex.d())};
+                   Eigen::Map<const Eigen::VectorXd>(stars.sample().Point(at), stars.sample().d())};
 }
 
-#define STELLATE_EACH(K)                                                                  \
-  template std::optional<WallCosine> SharpestAt<K>(const StarComplex<K>&, std::uint32_t); \
-  template std::optional<WallAngle> Sharpest<K>(const StarComplex<K>&);
+#define STELLATE_EACH(K)                                                            \
+  template std::optional<WallCosine> SharpestAt<K>(const Stars<K>&, std::uint32_t); \
+  template std::optional<WallAngle> Sharpest<K>(const Stars<K>&);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "core/complex/star_complex.h"
+#include "core/complex/stars.h"
 #include "core/report.h"
 
 namespace stellate::core {
@@ -19,11 +19,11 @@ struct WallCosine {
 // Returns the two walls at a point that meet at the smallest angle, by their conormals; nothing if
 // it is on fewer than two.
 template <int K>
-std::optional<WallCosine> SharpestAt(const StarComplex<K>& complex, std::uint32_t p);
+std::optional<WallCosine> SharpestAt(const Stars<K>& stars, std::uint32_t p);
 
 // The same of all points, as reports have it.
 template <int K>
-std::optional<WallAngle> Sharpest(const StarComplex<K>& complex);
+std::optional<WallAngle> Sharpest(const Stars<K>& stars);
 
 // The refinement was seen to end from this angle on, degrees, in dimension 3 with protecting balls.
 // If it does not end, messages name the angles below.

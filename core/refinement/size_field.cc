@@ -16,7 +16,7 @@ namespace {
 // Shorter edges than this share of a star's longest say little of curvature and much of noise.
 constexpr double kTellingEdge = 0.5;
 // The finest graded sizes, in epsilon: an estimate may come of noise; what is given is meant, but
-// below it the weights of StarComplex would no longer be small against circumradii.
+// below it the weights of Stars would no longer be small against circumradii.
 constexpr double kFinestEstimated = 1.0 / 64;
 constexpr double kFinestGiven = 1.0 / 1024;
 // Estimates are spread anew whenever the sample has grown by this factor.
@@ -25,13 +25,12 @@ constexpr double kSpreadingGrowth = 1.25;
 // How far q is, along M, from the tangent space of the walls that it shares with p: the most of
 // them, squared. `along`: q - p in p's tangent coordinates.
 template <int K>
-double OffWalls2(const StarComplex<K>& complex, std::uint32_t p, std::uint32_t q,
-                 const double* along) {
+double OffWalls2(const Stars<K>& stars, std::uint32_t p, std::uint32_t q, const double* along) {
   double most2 = 0;
-  const double* conormal = complex.Conormals(p);
-  ForEachWall(complex.walls(p), [&](int wall) {
+  const double* conormal = stars.sample().Conormals(p);
+  ForEachWall(stars.sample().walls(p), [&](int wall) {
     const double out = Dot(conormal, along, K);
-    if (IsSubset(SetOfWall(wall), complex.walls(q))) most2 = std::max(most2, out * out);
+    if (IsSubset(SetOfWall(wall), stars.sample().walls(q))) most2 = std::max(most2, out * out);
     conormal += K;
   });
   return most2;
@@ -50,22 +49,22 @@ SizeField<K>::SizeField(const ResolvedCriteria& criteria)
 // |q - p|^2 / (2 dist(q, T_pM)) bounds the reach from above for any q of M (Federer); over the
 // edges of a star, short ones left out, it is the radius of curvature there.
 template <int K>
-double SizeField<K>::SeenFrom(const StarComplex<K>& complex, std::uint32_t p) const {
-  const auto& cell = complex.cell(p);
+double SizeField<K>::SeenFrom(const Stars<K>& stars, std::uint32_t p) const {
+  const auto& cell = stars.cell(p);
   double longest2 = 0;
   for (std::size_t f = 0; f < cell.facet_count(); ++f)
-    if (IsSample(cell.id(f))) longest2 = std::max(longest2, complex.EdgeLength2(p, f));
+    if (IsSample(cell.id(f))) longest2 = std::max(longest2, stars.EdgeLength2(p, f));
   double size = INFINITY;
   for (std::size_t f = 0; f < cell.facet_count(); ++f) {
     if (!IsSample(cell.id(f))) continue;
     double along[K];
-    const double distance2 =
-        2 * complex.HalfSpace(p, f, along) - complex.GuardOf(p) + complex.GuardOf(cell.id(f));
+    const double distance2 = 2 * stars.HalfSpace(p, f, along) - stars.sample().GuardOf(p) +
+                             stars.sample().GuardOf(cell.id(f));
     if (distance2 < kTellingEdge * kTellingEdge * longest2) continue;
     double along2 = 0;
     for (const double a : along) along2 += a * a;
     double away2 = std::max(distance2 - along2, 0.0);
-    if (complex.walls(p) != 0) away2 += OffWalls2(complex, p, cell.id(f), along);
+    if (stars.sample().walls(p) != 0) away2 += OffWalls2(stars, p, cell.id(f), along);
     const double away = std::sqrt(away2);
     if (away > 0) size = std::min(size, ReachBound(distance2, away));
   }
@@ -73,32 +72,32 @@ double SizeField<K>::SeenFrom(const StarComplex<K>& complex, std::uint32_t p) co
 }
 
 template <int K>
-void SizeField<K>::Look(const StarComplex<K>& complex, const std::vector<std::uint32_t>& stars) {
-  seen_.resize(complex.size(), INFINITY);
-  ParallelFor(stars.size(), [&](std::size_t i) { seen_[stars[i]] = SeenFrom(complex, stars[i]); });
+void SizeField<K>::Look(const Stars<K>& stars, const std::vector<std::uint32_t>& ids) {
+  seen_.resize(stars.size(), INFINITY);
+  ParallelFor(ids.size(), [&](std::size_t i) { seen_[ids[i]] = SeenFrom(stars, ids[i]); });
   is_spread_ = false;
 }
 
 // What is seen from there, from the neighbours, and from all when that was last spread.
 template <int K>
-double SizeField<K>::Estimate(const StarComplex<K>& complex, std::uint32_t p) const {
+double SizeField<K>::Estimate(const Stars<K>& stars, std::uint32_t p) const {
   double size = seen_[p];
-  const auto& cell = complex.cell(p);
+  const auto& cell = stars.cell(p);
   for (std::size_t f = 0; f < cell.facet_count(); ++f) {
     const std::uint32_t q = cell.id(f);
     if (!IsSample(q)) continue;
     const double there = q < spread_.size() ? std::min(spread_[q], seen_[q]) : seen_[q];
-    size = std::min(size, there + std::sqrt(complex.EdgeLength2(p, f)));
+    size = std::min(size, there + std::sqrt(stars.EdgeLength2(p, f)));
   }
   return size;
 }
 
 // The largest 1-Lipschitz function over the edges of the stars that is nowhere above what is seen.
 template <int K>
-void SizeField<K>::Spread(const StarComplex<K>& complex) {
+void SizeField<K>::Spread(const Stars<K>& stars) {
   using Entry = std::pair<double, std::uint32_t>;
   std::vector<Entry> queue;
-  for (std::uint32_t p = 0; p < complex.size(); ++p)
+  for (std::uint32_t p = 0; p < stars.size(); ++p)
     if (seen_[p] < INFINITY) queue.emplace_back(seen_[p], p);
   std::make_heap(queue.begin(), queue.end(), std::greater<>());
   spread_ = seen_;
@@ -108,11 +107,11 @@ void SizeField<K>::Spread(const StarComplex<K>& complex) {
     const auto [size, p] = queue.back();
     queue.pop_back();
     if (size > spread_[p]) continue;
-    const auto& cell = complex.cell(p);
+    const auto& cell = stars.cell(p);
     for (std::size_t f = 0; f < cell.facet_count(); ++f) {
       const std::uint32_t q = cell.id(f);
       if (!IsSample(q)) continue;
-      const double there = size + std::sqrt(complex.EdgeLength2(p, f));
+      const double there = size + std::sqrt(stars.EdgeLength2(p, f));
       if (!(there < spread_[q])) continue;
       spread_[q] = there;
       queue.emplace_back(there, q);
@@ -120,13 +119,13 @@ void SizeField<K>::Spread(const StarComplex<K>& complex) {
     }
   }
   is_spread_ = true;
-  spread_over_ = complex.size();
+  spread_over_ = stars.size();
 }
 
 template <int K>
-bool SizeField<K>::NeedsSpreading(const StarComplex<K>& complex, bool nothing_else_to_do) const {
+bool SizeField<K>::NeedsSpreading(const Stars<K>& stars, bool nothing_else_to_do) const {
   return is_estimated() &&
-         ((nothing_else_to_do && !is_spread_) || complex.size() > kSpreadingGrowth * spread_over_);
+         ((nothing_else_to_do && !is_spread_) || stars.size() > kSpreadingGrowth * spread_over_);
 }
 
 template <int K>
@@ -148,23 +147,23 @@ double SizeField<K>::BoundFor(double size) const {
 // Of given sizes the star's own alone: where they differ within a simplex, the star of the vertex
 // that has the smallest sees to it.
 template <int K>
-double SizeField<K>::BoundAt(const StarComplex<K>& complex, std::uint32_t p) const {
+double SizeField<K>::BoundAt(const Stars<K>& stars, std::uint32_t p) const {
   if (!is_graded_) return epsilon_;
-  return BoundFor(is_given_ ? given_[p] : Estimate(complex, p));
+  return BoundFor(is_given_ ? given_[p] : Estimate(stars, p));
 }
 
 template <int K>
-double SizeField<K>::MaxRadiusOverSize(const StarComplex<K>& complex) {
+double SizeField<K>::MaxRadiusOverSize(const Stars<K>& stars) {
   if (is_given_) {
-    std::vector<std::uint32_t> all(complex.size());
+    std::vector<std::uint32_t> all(stars.size());
     std::iota(all.begin(), all.end(), 0u);
-    Look(complex, all);
-    Spread(complex);
+    Look(stars, all);
+    Spread(stars);
   }
   double most = 0;
-  for (std::uint32_t p = 0; p < complex.size(); ++p) {
+  for (std::uint32_t p = 0; p < stars.size(); ++p) {
     CheckInterruption(p);
-    most = std::max(most, std::sqrt(complex.cell(p).max_norm2()) / Estimate(complex, p));
+    most = std::max(most, std::sqrt(stars.cell(p).max_norm2()) / Estimate(stars, p));
   }
   return most;
 }

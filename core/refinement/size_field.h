@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/base/instantiate.h"
-#include "core/complex/star_complex.h"
+#include "core/complex/stars.h"
 #include "core/refinement/criteria.h"
 
 namespace stellate::core {
@@ -31,16 +31,16 @@ class SizeField {
   // The client's sizes by vertex, or nullptr.
   const double* given() const { return is_given_ ? given_.data() : nullptr; }
 
-  // Estimates the sizes at `stars`, which are new or changed.
-  void Look(const StarComplex<K>& complex, const std::vector<std::uint32_t>& stars);
+  // Estimates the sizes at the stars `ids`, which are new or changed.
+  void Look(const Stars<K>& stars, const std::vector<std::uint32_t>& ids);
   // Makes the estimates 1-Lipschitz over all stars.
-  void Spread(const StarComplex<K>& complex);
+  void Spread(const Stars<K>& stars);
   // Whether to call Spread: if the sample has grown much since the last call, or, if there is
   // nothing else to do, if it has changed at all.
-  bool NeedsSpreading(const StarComplex<K>& complex, bool nothing_else_to_do) const;
+  bool NeedsSpreading(const Stars<K>& stars, bool nothing_else_to_do) const;
 
   // The largest circumradius that R1 allows at a star.
-  double BoundAt(const StarComplex<K>& complex, std::uint32_t star) const;
+  double BoundAt(const Stars<K>& stars, std::uint32_t star) const;
   // The same where the local size is `size`.
   double BoundFor(double size) const;
   // The least bound anywhere.
@@ -48,13 +48,13 @@ class SizeField {
 
   // The largest ratio of a star's circumradius to the local feature size estimated there, even
   // where the client gives sizes, since those need not be local feature sizes.
-  double MaxRadiusOverSize(const StarComplex<K>& complex);
+  double MaxRadiusOverSize(const Stars<K>& stars);
   // Counts vertices whose given size asks for a bound below the finest.
   std::uint64_t CountTooFine() const;
 
  private:
-  double SeenFrom(const StarComplex<K>& complex, std::uint32_t star) const;
-  double Estimate(const StarComplex<K>& complex, std::uint32_t star) const;
+  double SeenFrom(const Stars<K>& stars, std::uint32_t star) const;
+  double Estimate(const Stars<K>& stars, std::uint32_t star) const;
   double WantedFor(double size) const;
 
   double epsilon_, size_rate_, max_deviation_;

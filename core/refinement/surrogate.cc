@@ -72,21 +72,20 @@ void Surrogate<K>::Slopes(const double* v, double (*slopes)[kTerms]) {
 }
 
 template <int K>
-Surrogate<K>::Surrogate(const StarComplex<K>& complex, double step, double epsilon,
-                        const double* sizes)
-    : complex_(complex),
+Surrogate<K>::Surrogate(const Stars<K>& stars, double step, double epsilon, const double* sizes)
+    : stars_(stars),
       sizes_(sizes),
       step_(step),
       epsilon_(epsilon),
-      form_size_(static_cast<std::size_t>(kTerms) * static_cast<std::size_t>(complex.d())),
-      slot_(complex.size(), kNone) {}
+      form_size_(static_cast<std::size_t>(kTerms) * static_cast<std::size_t>(stars.sample().d())),
+      slot_(stars.size(), kNone) {}
 
 template <int K>
 void Surrogate<K>::Fit(std::uint32_t p, std::uint32_t slot) {
   using Frame = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, K>>;
-  const auto& cell = complex_.cell(p);
-  const int d = complex_.d();
-  const Frame tangent(complex_.Tangent(p), d, K);
+  const auto& cell = stars_.cell(p);
+  const int d = stars_.sample().d();
+  const Frame tangent(stars_.sample().Tangent(p), d, K);
   // Neighbours one after the other: u and length, q off the tangent plane, and the slopes there,
   // the derivatives of that by u (K rows of d).
   thread_local std::vector<double> neighbours;
@@ -96,16 +95,16 @@ void Surrogate<K>::Fit(std::uint32_t p, std::uint32_t slot) {
   for (std::size_t f = 0; f < cell.facet_count(); ++f) {
     const std::uint32_t neighbour = cell.id(f);
     if (!IsSample(neighbour)) continue;
-    const Frame other(complex_.Tangent(neighbour), d, K);
+    const Frame other(stars_.sample().Tangent(neighbour), d, K);
     const Eigen::Matrix<double, K, K> turn = tangent.transpose() * other;
     if (turn.squaredNorm() < K - 1 + kLeastCosine * kLeastCosine) continue;
     neighbours.resize(neighbours.size() + stride);
     double* const n = neighbours.data() + neighbours.size() - stride;
-    complex_.HalfSpace(p, f, n);
+    stars_.HalfSpace(p, f, n);
     const Eigen::Map<const Eigen::Matrix<double, K, 1>> u(n);
     Eigen::Map<Eigen::VectorXd> away(n + K + 1, d);
-    const double* q = complex_.Point(neighbour);
-    const double* at = complex_.Point(p);
+    const double* q = stars_.sample().Point(neighbour);
+    const double* at = stars_.sample().Point(p);
     for (int j = 0; j < d; ++j) away[j] = q[j] - at[j];
     away.noalias() -= tangent * u;
     const double length2 = u.squaredNorm();
@@ -208,7 +207,7 @@ void Surrogate<K>::Near::Close() {
 template <int K>
 std::vector<typename Surrogate<K>::Near> Surrogate<K>::FindNear(
     const Eigen::MatrixXd& points) const {
-  const int d = complex_.d();
+  const int d = stars_.sample().d();
   const auto count = static_cast<std::size_t>(points.cols());
   const auto at = [&](std::size_t i) { return points.col(static_cast<Eigen::Index>(i)).data(); };
   std::vector<Near> near(count);
@@ -220,12 +219,12 @@ std::vector<typename Surrogate<K>::Near> Surrogate<K>::FindNear(
       Near& here = near[i];
       if (from && Distance(at(i), from, d) <= Shared(K) * radius) {
         if (around.empty())
-          complex_.ForEachWithin(from, kRoundedUp * (1 + 2 * Shared(K)) * radius,
-                                 [&](std::uint32_t p) { around.push_back(p); });
+          stars_.sample().ForEachWithin(from, kRoundedUp * (1 + 2 * Shared(K)) * radius,
+                                        [&](std::uint32_t p) { around.push_back(p); });
         for (const std::uint32_t p : around)
-          here.Add({SquaredDistance(at(i), complex_.Point(p), d), p});
+          here.Add({SquaredDistance(at(i), stars_.sample().Point(p), d), p});
       } else {
-        here.count = complex_.Nearest(at(i), kBlended + 1, here.points.data());
+        here.count = stars_.sample().Nearest(at(i), kBlended + 1, here.points.data());
         if (here.count == 0) return;
         from = at(i);
         radius = std::sqrt(here.points[static_cast<std::size_t>(here.count) - 1].first);
@@ -260,7 +259,7 @@ void Surrogate<K>::Prepare(const std::vector<Near>& near) {
 template <int K>
 bool Surrogate<K>::Blend(const Near& near, const double* x, double* point, double* tangent,
                          Guess* guess) const {
-  const int d = complex_.d();
+  const int d = stars_.sample().d();
   thread_local std::vector<double> guesses;
   guesses.resize(static_cast<std::size_t>(d) * kBlended);
   double weights[kBlended];
@@ -270,7 +269,7 @@ bool Surrogate<K>::Blend(const Near& near, const double* x, double* point, doubl
   for (int i = 0; i < near.count; ++i) {
     const std::uint32_t p = near.points[static_cast<std::size_t>(i)].second;
     double u[K], v[K], terms[kTerms];
-    const double distance2 = complex_.Project(p, x, u);
+    const double distance2 = stars_.sample().Project(p, x, u);
     double along2 = 0;
     for (int a = 0; a < K; ++a) along2 += u[a] * u[a];
     const double off2 = std::max(distance2 - along2, 0.0);
@@ -282,7 +281,7 @@ bool Surrogate<K>::Blend(const Near& near, const double* x, double* point, doubl
     const double weight = far * far * far * across * across;
     const Graph& graph = graphs_[slot_[p]];
     double* y = guesses.data() + i * d;
-    complex_.Lift(p, u, y);
+    stars_.sample().Lift(p, u, y);
     if (graph.scale > 0) {
       for (int a = 0; a < K; ++a) v[a] = u[a] / graph.scale;
       Terms(v, terms);
@@ -311,10 +310,10 @@ bool Surrogate<K>::Blend(const Near& near, const double* x, double* point, doubl
   // Of the nearest graph: T_a + dN / du_a, made orthonormal.
   const std::uint32_t p = near.points[static_cast<std::size_t>(nearest)].second;
   const Graph& graph = graphs_[slot_[p]];
-  std::copy_n(complex_.Tangent(p), K * d, tangent);
+  std::copy_n(stars_.sample().Tangent(p), K * d, tangent);
   if (graph.scale > 0) {
     double u[K], slopes[K][kTerms];
-    complex_.Project(p, x, u);
+    stars_.sample().Project(p, x, u);
     for (int a = 0; a < K; ++a) u[a] /= graph.scale;
     Slopes(u, slopes);
     const double* form = forms_.data() + slot_[p] * form_size_;
@@ -340,7 +339,7 @@ bool Surrogate<K>::Blend(const Near& near, const double* x, double* point, doubl
 template <int K>
 bool Surrogate<K>::Predict(const Near& near, const double* x, const double* flat, double spacing,
                            double* point, double* tangent, double* size) const {
-  const int d = complex_.d();
+  const int d = stars_.sample().d();
   thread_local std::vector<double> from;
   from.resize(static_cast<std::size_t>(d));
   Guess guess;
@@ -371,8 +370,8 @@ AnsweredPoints Surrogate<K>::Answer(const Eigen::MatrixXd& points,
   const std::vector<Near> near = FindNear(points);
   Prepare(near);
   AnsweredPoints answer;
-  answer.points.setZero(complex_.d(), points.cols());
-  answer.tangents.setZero(complex_.d() * K, points.cols());
+  answer.points.setZero(stars_.sample().d(), points.cols());
+  answer.tangents.setZero(stars_.sample().d() * K, points.cols());
   answer.found.assign(count, 0);
   Eigen::VectorXd sizes = Eigen::VectorXd::Zero(points.cols());
   ParallelFor(count, [&](std::size_t c) {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/base/instantiate.h"
-#include "core/complex/star_complex.h"
+#include "core/complex/stars.h"
 #include "core/refinement/candidate_set.h"
 
 namespace stellate::core {
@@ -31,8 +31,7 @@ class Surrogate {
   //          sure for the spacing asked for
   // sizes    of the sample points, borrowed, or nullptr; between them they are blended like the
   //          graphs: right to second order, where the least of a few would ask for far too much
-  Surrogate(const StarComplex<K>& complex, double step, double epsilon,
-            const double* sizes = nullptr);
+  Surrogate(const Stars<K>& stars, double step, double epsilon, const double* sizes = nullptr);
 
   // What is guessed of M near each of `points`, d x n: its closest point, or, where `flats` has a
   // tangent basis T (K rows of d) instead of nullptr, its intersection with x + T^perp. Found, with
@@ -75,7 +74,7 @@ class Surrogate {
   bool Predict(const Near& near, const double* x, const double* flat, double spacing, double* point,
                double* tangent, double* size) const;
 
-  const StarComplex<K>& complex_;
+  const Stars<K>& stars_;
   const double* sizes_;
   double step_, epsilon_;
   std::size_t form_size_;

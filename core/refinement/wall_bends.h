@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "core/complex/star_complex.h"
+#include "core/complex/stars.h"
 
 namespace stellate::core {
 
@@ -23,13 +23,13 @@ struct WallBend {
 // between a vertex that is alone on its piece (LoneVertex) and one that is not. `far`: as for
 // LoneVertex.
 template <int K>
-std::optional<WallBend> SharpestBend(const StarComplex<K>& complex, double far);
+std::optional<WallBend> SharpestBend(const Stars<K>& stars, double far);
 
 // Returns a vertex on only one wall that has no neighbour on the same piece of it within `far`: all
 // of that piece is too near to its first vertex. A neighbour on another sheet of the wall does not
 // count: it faces away, or lies far off the wall's tangent space.
 template <int K>
-std::optional<std::uint32_t> LoneVertex(const StarComplex<K>& complex, double far);
+std::optional<std::uint32_t> LoneVertex(const Stars<K>& stars, double far);
 
 // Two corners, vertices on K walls each, and how far from each other they are, length.
 struct NearCorners {
@@ -39,6 +39,6 @@ struct NearCorners {
 
 // Returns the pair of corners nearest to each other.
 template <int K>
-std::optional<NearCorners> NearestCorners(const StarComplex<K>& complex);
+std::optional<NearCorners> NearestCorners(const Stars<K>& stars);
 
 }  // namespace stellate::core

@@ -69,13 +69,13 @@ Specification CoarserThan(Specification spec, double epsilon) {
 }
 
 template <int K>
-AnsweredPoints PointsOf(const StarComplex<K>& complex) {
+AnsweredPoints PointsOf(const Stars<K>& stars) {
   AnsweredPoints answers;
-  answers.points =
-      Eigen::Map<const Eigen::MatrixXd>(complex.points().data(), complex.d(), complex.size());
-  answers.tangents =
-      Eigen::Map<const Eigen::MatrixXd>(complex.Tangent(0), complex.d() * K, complex.size());
-  answers.found.assign(complex.size(), 1);
+  answers.points = Eigen::Map<const Eigen::MatrixXd>(stars.sample().points().data(),
+                                                     stars.sample().d(), stars.size());
+  answers.tangents = Eigen::Map<const Eigen::MatrixXd>(stars.sample().Tangent(0),
+                                                       stars.sample().d() * K, stars.size());
+  answers.found.assign(stars.size(), 1);
   return answers;
 }
 
@@ -86,7 +86,7 @@ AheadLaying<K>::AheadLaying(Engine<K>& engine, const Specification& spec)
     : engine_(engine),
       spec_(spec),
       spacing_(LaidSpacing(K, engine.criteria().epsilon)),
-      scouts_(engine.complex().d(), &engine.complex().points()) {}
+      scouts_(engine.stars().sample().d(), &engine.stars().sample().points()) {}
 
 template <int K>
 std::vector<std::uint8_t> AheadLaying<K>::Begin(const AnsweredPoints& seeds) {
@@ -97,8 +97,9 @@ std::vector<std::uint8_t> AheadLaying<K>::Begin(const AnsweredPoints& seeds) {
   for (std::size_t i = 0; i < used.size(); ++i) {
     CheckInterruption(i);
     const auto c = static_cast<Eigen::Index>(i);
-    used[i] = seeds.found[i] && !coarse_->is_full() &&
-              !coarse_->complex().AnyWithin(seeds.points.col(c).data(), kSeedSpacing * epsilon);
+    used[i] =
+        seeds.found[i] && !coarse_->is_full() &&
+        !coarse_->stars().sample().AnyWithin(seeds.points.col(c).data(), kSeedSpacing * epsilon);
     if (used[i]) coarse_->Append(seeds, c);
   }
   coarse_->Commit();
@@ -124,7 +125,7 @@ std::vector<std::uint8_t> AheadLaying<K>::Scout(const AnsweredPoints& answers,
 
 template <int K>
 double AheadLaying<K>::BadShare() const {
-  return static_cast<double>(coarse_->book().size_and_shape().size()) / coarse_->complex().size();
+  return static_cast<double>(coarse_->book().size_and_shape().size()) / coarse_->stars().size();
 }
 
 // Until R1 mostly holds.
@@ -155,7 +156,7 @@ template <int K>
 typename AheadLaying<K>::Grown AheadLaying<K>::Grow(Surrogate<K>& guess, double spacing,
                                                     const AnsweredPoints& starts,
                                                     const AnsweredPoints& others) const {
-  const int d = engine_.complex().d();
+  const int d = engine_.stars().sample().d();
   const std::uint64_t most = std::min(spec_.limits.max_vertices, 2 * MostAtOnce(K, d));
   Growth<K> growth(d, spacing);
   std::vector<double> points, tangents;
@@ -196,8 +197,8 @@ double AheadLaying<K>::coarse_spacing() const {
 // points than there are seeds: they tell too little of M then.
 template <int K>
 PlannedPoints AheadLaying<K>::GrowCoarse() {
-  Surrogate<K> guess(coarse_->complex(), coarse_->criteria().advance_step, 0);
-  const AnsweredPoints seeds = PointsOf<K>(coarse_->complex());
+  Surrogate<K> guess(coarse_->stars(), coarse_->criteria().advance_step, 0);
+  const AnsweredPoints seeds = PointsOf<K>(coarse_->stars());
   Grown grown = Grow(guess, coarse_spacing(), {}, seeds);
   const Eigen::Index count = grown.planned.size();
   if (count == 0 || count + std::ssize(grown.begun) < seeds.points.cols()) return {};
@@ -220,7 +221,7 @@ PlannedPoints AheadLaying<K>::RefineGuessed(const PlannedPoints& grown, std::uin
       guessed.Lay(points, c);
     }
   };
-  AnsweredPoints all = PointsOf<K>(engine_.complex());
+  AnsweredPoints all = PointsOf<K>(engine_.stars());
   lay(all);
   all.points = grown.points;
   all.tangents = grown.tangents;
@@ -238,10 +239,10 @@ PlannedPoints AheadLaying<K>::RefineGuessed(const PlannedPoints& grown, std::uin
 
 template <int K>
 PlannedPoints AheadLaying<K>::GrowOnGuesses(std::uint64_t round) {
-  const StarComplex<K>& coarse = coarse_->complex();
+  const Stars<K>& coarse = coarse_->stars();
   guess_.emplace(coarse, coarse_->criteria().advance_step, 0);
   const AnsweredPoints all = PointsOf<K>(coarse);
-  Grown grown = Grow(*guess_, spacing_, PointsOf<K>(engine_.complex()), all);
+  Grown grown = Grow(*guess_, spacing_, PointsOf<K>(engine_.stars()), all);
   for (const Eigen::Index c : grown.begun)
     if (!engine_.is_full()) engine_.Lay(all, c);
   return RefineGuessed(grown.planned, round);
@@ -250,7 +251,7 @@ PlannedPoints AheadLaying<K>::GrowOnGuesses(std::uint64_t round) {
 // Ring by ring, from what there is of it on.
 template <int K>
 void AheadLaying<K>::LayCoarse() {
-  const AnsweredPoints seeds = PointsOf<K>(coarse_->complex());
+  const AnsweredPoints seeds = PointsOf<K>(coarse_->stars());
   Specification coarse = CoarserThan<K>(spec_, kLeastCoarse * engine_.criteria().epsilon);
   coarse.limits.max_vertices = static_cast<std::uint64_t>(std::ceil(
       kCoarseSlack * static_cast<double>(coarse.limits.max_vertices) / Power(kLeastCoarse, K)));
@@ -265,7 +266,7 @@ void AheadLaying<K>::LayCoarse() {
 template <int K>
 void AheadLaying<K>::GiveUp() {
   rings_.emplace(engine_, spec_);
-  rings_->GoOn(PointsOf<K>(engine_.complex()), PointsOf<K>(coarse_->complex()));
+  rings_->GoOn(PointsOf<K>(engine_.stars()), PointsOf<K>(coarse_->stars()));
   stage_ = Stage::kRings;
 }
 
@@ -343,7 +344,7 @@ template <int K>
 double AheadLaying<K>::CountMissing() const {
   if (stage_ == Stage::kRings) return rings_->CountMissing();
   return guess_ ? static_cast<double>(asked_.cols())
-                : Power(kPatchesApart, K) * engine_.complex().size();
+                : Power(kPatchesApart, K) * engine_.stars().size();
 }
 
 STELLATE_INSTANTIATE_CLASS(AheadLaying)

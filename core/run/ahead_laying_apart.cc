@@ -61,8 +61,8 @@ std::vector<std::uint8_t> AreTooNear(const std::vector<double>& points, std::siz
 template <int K>
 std::vector<std::uint8_t> AheadLaying<K>::LayThoseApart(Engine<K>& engine, double spacing,
                                                         const AnsweredPoints& answers) {
-  const std::size_t first = engine.complex().size();
-  std::vector<double> points = engine.complex().points();
+  const std::size_t first = engine.stars().size();
+  std::vector<double> points = engine.stars().sample().points();
   std::vector<Eigen::Index> found;
   for (std::size_t i = 0; i < answers.found.size(); ++i) {
     CheckInterruption(i);

@@ -14,11 +14,11 @@ namespace {
 
 // max R_p over the simplices that all stars agree on, squared: the others are not in the mesh.
 template <int K>
-double MaxAgreedNorm2(const StarComplex<K>& complex, std::uint32_t p) {
-  const auto& cell = complex.cell(p);
+double MaxAgreedNorm2(const Stars<K>& stars, std::uint32_t p) {
+  const auto& cell = stars.cell(p);
   double most = 0;
   for (std::size_t v = 0; v < cell.vertex_count(); ++v)
-    if (cell.norm2(v) > most && IsConsistent<K>(complex, p, v)) most = cell.norm2(v);
+    if (cell.norm2(v) > most && IsConsistent<K>(stars, p, v)) most = cell.norm2(v);
   return most;
 }
 
@@ -37,20 +37,20 @@ MeshView WithSimplices(MeshView mesh, const std::vector<std::uint32_t>& simplice
 
 template <int K>
 StarFacts FactsOf(Engine<K>& engine) {
-  const StarComplex<K>& complex = engine.complex();
+  const Stars<K>& stars = engine.stars();
   StarFacts facts;
   facts.converged = true;
   const bool agreed = engine.filled().is_handed_out();
-  std::vector<double> parts(ChunkCount(complex.size()), 0);
-  ParallelChunks(complex.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+  std::vector<double> parts(ChunkCount(stars.size()), 0);
+  ParallelChunks(stars.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     double most = 0;
     for (auto p = static_cast<std::uint32_t>(begin); p < end; ++p)
-      most = std::max(most, agreed ? MaxAgreedNorm2<K>(complex, p) : complex.cell(p).max_norm2());
+      most = std::max(most, agreed ? MaxAgreedNorm2<K>(stars, p) : stars.cell(p).max_norm2());
     parts[chunk] = most;
   });
   for (const double norm2 : parts)
     facts.max_circumradius = std::max(facts.max_circumradius, std::sqrt(norm2));
-  if (engine.criteria().graded()) facts.max_size_ratio = engine.sizes().MaxRadiusOverSize(complex);
+  if (engine.criteria().graded()) facts.max_size_ratio = engine.sizes().MaxRadiusOverSize(stars);
   return facts;
 }
 
@@ -68,21 +68,21 @@ std::vector<QueryBlock> Certification::Questions() {
 
 template <int K>
 BoundaryOfMesh BoundaryOf(const Engine<K>& engine) {
-  const StarComplex<K>& complex = engine.complex();
+  const Stars<K>& stars = engine.stars();
   BoundaryOfMesh boundary;
-  boundary.walls.resize(complex.size());
-  boundary.outward.assign(std::size_t{complex.size()} * K, 0);
-  for (std::uint32_t p = 0; p < complex.size(); ++p) {
+  boundary.walls.resize(stars.size());
+  boundary.outward.assign(std::size_t{stars.size()} * K, 0);
+  for (std::uint32_t p = 0; p < stars.size(); ++p) {
     CheckInterruption(p);
-    boundary.walls[p] = complex.walls(p);
-    for (int w = 0; w < CountWalls(complex.walls(p)); ++w)
+    boundary.walls[p] = stars.sample().walls(p);
+    for (int w = 0; w < CountWalls(stars.sample().walls(p)); ++w)
       for (int a = 0; a < K; ++a)
         boundary.outward[std::size_t{p} * K + static_cast<std::size_t>(a)] +=
-            complex.Conormals(p)[w * K + a];
+            stars.sample().Conormals(p)[w * K + a];
   }
   boundary.faces = engine.Faces();
-  for (std::uint32_t p = 0; complex.has_guards() && p < complex.size(); ++p)
-    boundary.guards.push_back(complex.GuardOf(p));
+  for (std::uint32_t p = 0; stars.sample().has_guards() && p < stars.size(); ++p)
+    boundary.guards.push_back(stars.sample().GuardOf(p));
   return boundary;
 }
 

@@ -35,27 +35,27 @@ double SumOfSquaredSinesBetween(const double* one, const double* other, int d) {
 }
 
 template <int K>
-std::vector<Edge> EdgesThatTurn(const StarComplex<K>& complex,
-                                const std::vector<std::uint32_t>& stars, double longest,
-                                double shortest, double least_sine2) {
-  return ParallelGather<Edge>(stars.size(), [&](std::size_t i, std::vector<Edge>* found) {
-    const std::uint32_t p = stars[i];
-    const auto& cell = complex.cell(p);
+std::vector<Edge> EdgesThatTurn(const Stars<K>& stars, const std::vector<std::uint32_t>& ids,
+                                double longest, double shortest, double least_sine2) {
+  return ParallelGather<Edge>(ids.size(), [&](std::size_t i, std::vector<Edge>* found) {
+    const std::uint32_t p = ids[i];
+    const auto& cell = stars.cell(p);
     for (std::size_t f = 0; f < cell.facet_count(); ++f) {
       const std::uint32_t q = cell.id(f);
       if (!IsSample(q)) continue;
       Edge edge{std::min(p, q), std::max(p, q), 0, 0};
-      edge.length2 = SquaredDistance(complex.Point(p), complex.Point(q), complex.d());
+      edge.length2 =
+          SquaredDistance(stars.sample().Point(p), stars.sample().Point(q), stars.sample().d());
       if (edge.length2 > longest * longest || edge.length2 < shortest * shortest) continue;
-      edge.turn2 = SumOfSquaredSinesBetween<K>(complex.Tangent(edge.p), complex.Tangent(edge.q),
-                                               complex.d());
+      edge.turn2 = SumOfSquaredSinesBetween<K>(stars.sample().Tangent(edge.p),
+                                               stars.sample().Tangent(edge.q), stars.sample().d());
       if (edge.turn2 >= least_sine2) found->push_back(edge);
     }
   });
 }
 
 template <int K>
-std::vector<Way> Steepest(const StarComplex<K>& complex, std::vector<Edge> edges,
+std::vector<Way> Steepest(const Stars<K>& stars, std::vector<Edge> edges,
                           WalkedEdges* walked = nullptr) {
   std::vector<Way> ways;
   std::set<std::uint32_t> used;
@@ -68,10 +68,10 @@ std::vector<Way> Steepest(const StarComplex<K>& complex, std::vector<Edge> edges
       ++taken;
       if (walked && !walked->insert({p, q}).second) continue;
       const auto point = [&](std::uint32_t v) {
-        return Eigen::Map<const Eigen::VectorXd>(complex.Point(v), complex.d());
+        return Eigen::Map<const Eigen::VectorXd>(stars.sample().Point(v), stars.sample().d());
       };
       const auto basis = [&](std::uint32_t v) {
-        return Eigen::Map<const Eigen::MatrixXd>(complex.Tangent(v), complex.d(), K);
+        return Eigen::Map<const Eigen::MatrixXd>(stars.sample().Tangent(v), stars.sample().d(), K);
       };
       ways.push_back({point(p), point(q), basis(p), basis(q)});
     }
@@ -109,33 +109,32 @@ bool CreaseWatch::IsDue(std::uint64_t left, bool judges_all) {
 template <int K>
 std::vector<Way> SteepWaysAtFaults(const Engine<K>& engine, double longest, double least_sine2,
                                    WalkedEdges* walked) {
-  std::vector<std::uint32_t> stars = engine.book().blemished_stars();
+  std::vector<std::uint32_t> ids = engine.book().blemished_stars();
   for (const auto& entry : engine.book().size_and_shape()) {
-    CheckInterruption(stars.size());
-    stars.push_back(entry.star);
+    CheckInterruption(ids.size());
+    ids.push_back(entry.star);
   }
-  const StarComplex<K>& complex = engine.complex();
+  const Stars<K>& stars = engine.stars();
   const double epsilon = engine.criteria().epsilon;
-  std::vector<Edge> edges =
-      EdgesThatTurn<K>(complex, stars, longest, kShortest * epsilon, least_sine2);
+  std::vector<Edge> edges = EdgesThatTurn<K>(stars, ids, longest, kShortest * epsilon, least_sine2);
   std::erase_if(edges, [&](const Edge& edge) {
-    const double size = std::min(engine.sizes().BoundAt(complex, edge.p) / epsilon, 1.0);
+    const double size = std::min(engine.sizes().BoundAt(stars, edge.p) / epsilon, 1.0);
     return edge.length2 > longest * longest * size * size;
   });
-  return Steepest<K>(complex, std::move(edges), walked);
+  return Steepest<K>(stars, std::move(edges), walked);
 }
 
 template <int K>
-std::vector<Way> SteepWays(const StarComplex<K>& complex, double longest) {
-  std::vector<std::uint32_t> stars(complex.size());
-  std::iota(stars.begin(), stars.end(), 0u);
-  return Steepest<K>(complex,
-                     EdgesThatTurn<K>(complex, stars, longest, kShortest * longest, kLeastSine2));
+std::vector<Way> SteepWays(const Stars<K>& stars, double longest) {
+  std::vector<std::uint32_t> ids(stars.size());
+  std::iota(ids.begin(), ids.end(), 0u);
+  return Steepest<K>(stars,
+                     EdgesThatTurn<K>(stars, ids, longest, kShortest * longest, kLeastSine2));
 }
 
 #define STELLATE_EACH(K)                                                                          \
   template std::vector<Way> SteepWaysAtFaults<K>(const Engine<K>&, double, double, WalkedEdges*); \
-  template std::vector<Way> SteepWays<K>(const StarComplex<K>&, double);
+  template std::vector<Way> SteepWays<K>(const Stars<K>&, double);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 

@@ -48,6 +48,6 @@ std::vector<Way> SteepWaysAtFaults(const Engine<K>& engine, double longest,
 
 // The same of the whole sample.
 template <int K>
-std::vector<Way> SteepWays(const StarComplex<K>& complex, double longest);
+std::vector<Way> SteepWays(const Stars<K>& stars, double longest);
 
 }  // namespace stellate::core

@@ -43,15 +43,15 @@ std::string ListWalls(WallSet walls) {
 template <int K>
 void DescribeUnfinished(const Engine<K>& engine, double epsilon, bool is_smooth,
                         Certificate* certificate) {
-  const StarComplex<K>& complex = engine.complex();
-  const std::uint32_t count = std::min(complex.size(), engine.book().star_count());
+  const Stars<K>& stars = engine.stars();
+  const std::uint32_t count = std::min(stars.size(), engine.book().star_count());
   double reach = std::numeric_limits<double>::infinity();
   std::uint32_t narrowest = 0;
   for (std::uint32_t p = 0; p < count; ++p) {
     CheckInterruption(p);
-    const auto& cell = complex.cell(p);
+    const auto& cell = stars.cell(p);
     if (!cell.bounded()) continue;
-    const std::uint64_t inconsistent = CountInconsistent<K>(complex, p);
+    const std::uint64_t inconsistent = CountInconsistent<K>(stars, p);
     certificate->inconsistent_simplices += inconsistent;
     if (inconsistent > 0)
       AppendFirst({p}, Violations::kMost, &certificate->violations.inconsistent);
@@ -59,8 +59,8 @@ void DescribeUnfinished(const Engine<K>& engine, double epsilon, bool is_smooth,
         std::max(certificate->max_circumradius, std::sqrt(cell.max_norm2()));
     for (std::size_t f = 0; f < cell.facet_count(); ++f) {
       double along[K];
-      const double distance2 =
-          2 * complex.HalfSpace(p, f, along) - complex.GuardOf(p) + complex.GuardOf(cell.id(f));
+      const double distance2 = 2 * stars.HalfSpace(p, f, along) - stars.sample().GuardOf(p) +
+                               stars.sample().GuardOf(cell.id(f));
       double along2 = 0;
       for (const double a : along) along2 += a * a;
       const double away = std::sqrt(std::max(distance2 - along2, 0.0));
@@ -84,8 +84,8 @@ void DescribeUnfinished(const Engine<K>& engine, double epsilon, bool is_smooth,
     certificate->warnings.push_back(
         TooCoarse(epsilon / reach, reach,
                   Message("near vertex ", narrowest, " at ",
-                          NamePoint(Eigen::Map<const Eigen::VectorXd>(complex.Point(narrowest),
-                                                                      complex.d())))) +
+                          NamePoint(Eigen::Map<const Eigen::VectorXd>(
+                              stars.sample().Point(narrowest), stars.sample().d())))) +
         ".");
 }
 
@@ -107,7 +107,7 @@ std::string DescribeCrease(const Crease& crease) {
 
 template <int K>
 void TellSharpest(const Engine<K>& engine, Certificate* certificate) {
-  certificate->sharpest = Sharpest<K>(engine.complex());
+  certificate->sharpest = Sharpest<K>(engine.stars());
   const double told_below = certificate->certified ? ThinAngle(K) : SafeAngle(K);
   if (!certificate->sharpest || certificate->sharpest->degrees >= told_below) return;
   const WallAngle& sharpest = *certificate->sharpest;
@@ -128,17 +128,17 @@ void TellSharpest(const Engine<K>& engine, Certificate* certificate) {
 
 template <int K>
 void TellUnmetWall(const Engine<K>& engine, int walls, Certificate* certificate) {
-  const StarComplex<K>& complex = engine.complex();
+  const Stars<K>& stars = engine.stars();
   WallSet met = 0;
-  for (std::uint32_t p = 0; p < complex.size(); ++p) met |= complex.walls(p);
+  for (std::uint32_t p = 0; p < stars.size(); ++p) met |= stars.sample().walls(p);
   certificate->verdict += AboutUnmetWall(walls, met);
 }
 
 template <int K>
 bool HasPieceTooSmall(const Engine<K>& engine, double epsilon) {
-  if (LoneVertex<K>(engine.complex(), 2 * epsilon)) return true;
+  if (LoneVertex<K>(engine.stars(), 2 * epsilon)) return true;
   if (engine.sizes().given() || engine.sizes().is_estimated()) return false;  // sizes may follow
-  const std::optional<WallBend> bend = SharpestBend<K>(engine.complex(), 2 * epsilon);
+  const std::optional<WallBend> bend = SharpestBend<K>(engine.stars(), 2 * epsilon);
   return bend && epsilon > kMuchTooCoarse * bend->radius();
 }
 
@@ -146,12 +146,11 @@ template <int K>
 void TellBend(const Engine<K>& engine, double epsilon, const std::optional<PieceOfWall>& piece,
               Certificate* certificate) {
   if (certificate->certified) return;
-  const StarComplex<K>& complex = engine.complex();
+  const Stars<K>& stars = engine.stars();
   const double longest = 2 * epsilon;  // of a mesh of that size no edge is longer
-  const std::optional<WallBend> bend = SharpestBend<K>(complex, longest);
+  const std::optional<WallBend> bend = SharpestBend<K>(stars, longest);
   const bool is_sharp = bend && epsilon > kCoarse * bend->radius();
-  const std::optional<std::uint32_t> lone =
-      is_sharp ? std::nullopt : LoneVertex<K>(complex, longest);
+  const std::optional<std::uint32_t> lone = is_sharp ? std::nullopt : LoneVertex<K>(stars, longest);
   if (!is_sharp && !lone && !piece) return;
   if (certificate->verdict.ends_with('.')) certificate->verdict.pop_back();
   if (is_sharp) {
@@ -164,10 +163,10 @@ void TellBend(const Engine<K>& engine, double epsilon, const std::optional<Piece
         Brief(bend->size_to_take()), ".");
     return;
   }
-  const PieceOfWall small =
-      lone ? PieceOfWall{std::countr_zero(complex.walls(*lone)),
-                         Eigen::Map<const Eigen::VectorXd>(complex.Point(*lone), complex.d())}
-           : *piece;
+  const PieceOfWall small = lone ? PieceOfWall{std::countr_zero(stars.sample().walls(*lone)),
+                                               Eigen::Map<const Eigen::VectorXd>(
+                                                   stars.sample().Point(*lone), stars.sample().d())}
+                                 : *piece;
   certificate->verdict +=
       Message("; wall ", small.wall, " has a piece at ", NamePoint(small.point),
               " that is too small for epsilon ", Brief(epsilon), ": ",
@@ -178,14 +177,15 @@ void TellBend(const Engine<K>& engine, double epsilon, const std::optional<Piece
 template <int K>
 void TellNearCorners(const Engine<K>& engine, double epsilon, Certificate* certificate) {
   if (certificate->certified) return;
-  const StarComplex<K>& complex = engine.complex();
-  const std::optional<NearCorners> near = NearestCorners<K>(complex);
+  const Stars<K>& stars = engine.stars();
+  const std::optional<NearCorners> near = NearestCorners<K>(stars);
   if (!near || near->distance > kNearlyMeet * epsilon) return;
   if (certificate->verdict.ends_with('.')) certificate->verdict.pop_back();
   certificate->verdict += Message(
-      "; walls ", ListWalls(complex.walls(near->first) | complex.walls(near->second)),
+      "; walls ", ListWalls(stars.sample().walls(near->first) | stars.sample().walls(near->second)),
       " all but meet in one point: two corners are ", Brief(near->distance), " apart at ",
-      NamePoint(Eigen::Map<const Eigen::VectorXd>(complex.Point(near->first), complex.d())),
+      NamePoint(
+          Eigen::Map<const Eigen::VectorXd>(stars.sample().Point(near->first), stars.sample().d())),
       ", far less than epsilon ", Brief(epsilon),
       "; move one of these walls, so that it passes farther away, or take a smaller epsilon.");
 }
@@ -206,33 +206,35 @@ std::string WhyTooCrowded(const Eigen::VectorXd& point, WallSet walls, WallSet a
 // Stars of faces that were left before the rest was meshed.
 template <int K>
 std::string AboutLeftFaces(const Engine<K>& engine) {
-  const StarComplex<K>& complex = engine.complex();
+  const Stars<K>& stars = engine.stars();
   const int most = engine.faces().left();
   std::uint64_t bad = 0;
   std::uint32_t first = 0;
-  for (std::uint32_t p = 0; most > 0 && p < complex.size(); ++p) {
+  for (std::uint32_t p = 0; most > 0 && p < stars.size(); ++p) {
     CheckInterruption(p);
-    if (complex.walls(p) == 0) continue;
-    const double bound = engine.sizes().BoundAt(complex, p);
-    if (!WorstSizeOrShape<K>(complex, p, bound, engine.criteria().radius_edge_bound, most) &&
-        !WorstSliverOrInconsistent<K>(complex, p, engine.criteria().shape, bound, most))
+    if (stars.sample().walls(p) == 0) continue;
+    const double bound = engine.sizes().BoundAt(stars, p);
+    if (!WorstSizeOrShape<K>(stars, p, bound, engine.criteria().radius_edge_bound, most) &&
+        !WorstSliverOrInconsistent<K>(stars, p, engine.criteria().shape, bound, most))
       continue;
     if (bad++ == 0) first = p;
   }
   if (bad == 0) return "";
-  return Message(most == 1 ? "edges" : "faces of the boundary", " could not be mended at ", bad,
-                 " vertices, the first at ",
-                 NamePoint(Eigen::Map<const Eigen::VectorXd>(complex.Point(first), complex.d())),
-                 ", and the rest was meshed beside them; ");
+  return Message(
+      most == 1 ? "edges" : "faces of the boundary", " could not be mended at ", bad,
+      " vertices, the first at ",
+      NamePoint(Eigen::Map<const Eigen::VectorXd>(stars.sample().Point(first), stars.sample().d())),
+      ", and the rest was meshed beside them; ");
 }
 
 template <int K>
 std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent) {
-  const StarComplex<K>& complex = engine.complex();
+  const Stars<K>& stars = engine.stars();
   const auto& entries = engine.book().size_and_shape();
   const auto place = [&](std::uint32_t v) {
-    const WallSet walls = complex.walls(v);
-    return NamePoint(Eigen::Map<const Eigen::VectorXd>(complex.Point(v), complex.d())) +
+    const WallSet walls = stars.sample().walls(v);
+    return NamePoint(
+               Eigen::Map<const Eigen::VectorXd>(stars.sample().Point(v), stars.sample().d())) +
            (walls == 0
                 ? ""
                 : (CountWalls(walls) == 1 ? ", on wall " : ", on walls ") + ListWalls(walls));
@@ -243,11 +245,11 @@ std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent) {
                     entries.front().star, " near ", place(entries.front().star), "; ");
   if (!entries.empty() && inconsistent == 0) return left + "try a smaller epsilon";
   left += Message(inconsistent, " simplices are inconsistent");
-  for (std::uint32_t p = 0; p < complex.size(); ++p) {
+  for (std::uint32_t p = 0; p < stars.size(); ++p) {
     CheckInterruption(p);
     // As they are counted: an open star says nothing of its simplices.
-    if (!complex.cell(p).bounded()) continue;
-    const auto found = FindInconsistentConfiguration<K>(complex, p);
+    if (!stars.cell(p).bounded()) continue;
+    const auto found = FindInconsistentConfiguration<K>(stars, p);
     if (!found) continue;
     left += Message(", the first in the star of vertex ", found->holder, " but not in that of ",
                     found->refuser);

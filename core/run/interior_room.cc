@@ -18,14 +18,12 @@ constexpr double kFromFaces = 0.66;
 
 template <int K>
 InteriorRoom<K>::InteriorRoom(const Engine<K>& engine, double spacing)
-    : complex_(engine.complex()),
-      epsilon_(engine.criteria().epsilon),
-      apart_(kFromFaces * spacing) {}
+    : stars_(engine.stars()), epsilon_(engine.criteria().epsilon), apart_(kFromFaces * spacing) {}
 
 template <int K>
 bool InteriorRoom<K>::HasRoomFor(const double* point) const {
-  return !complex_.AnyWithin(point, apart_) && !complex_.InGuard(point) &&
-         !complex_.EncroachedBy(point, 0);
+  return !stars_.sample().AnyWithin(point, apart_) && !stars_.sample().InGuard(point) &&
+         !stars_.EncroachedBy(point, 0);
 }
 
 template <int K>
@@ -42,12 +40,12 @@ std::vector<std::uint8_t> InteriorRoom<K>::HaveRoom(const Eigen::MatrixXd& point
 template <int K>
 bool InteriorRoom<K>::IsSurelyInside(const double* point, double reach) const {
   const double covering = kWallCovering * epsilon_;
-  return !complex_.AnyWithin(point, std::sqrt(covering * covering + reach * reach / 4));
+  return !stars_.sample().AnyWithin(point, std::sqrt(covering * covering + reach * reach / 4));
 }
 
 template <int K>
 bool InteriorRoom<K>::KnowsWallNear(const double* point, double reach) const {
-  return complex_.AnyWithin(point, kWallCovering * epsilon_ + reach);
+  return stars_.sample().AnyWithin(point, kWallCovering * epsilon_ + reach);
 }
 
 STELLATE_INSTANTIATE_CLASS(InteriorRoom)

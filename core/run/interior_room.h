@@ -30,7 +30,7 @@ class InteriorRoom {
   bool KnowsWallNear(const double* point, double reach) const;
 
  private:
-  const StarComplex<K>& complex_;
+  const Stars<K>& stars_;
   double epsilon_, apart_;
 };
 

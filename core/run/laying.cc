@@ -127,7 +127,7 @@ std::unique_ptr<Laying<K>> LayingFor(Engine<K>& engine, const Specification& spe
   if ((criteria.graded() && (!criteria.sizes_given || criteria.ask_ahead)) ||
       !AreSparse<K>(engine, seeds, spec))
     return nullptr;
-  const auto most = static_cast<double>(MostAtOnce(K, engine.complex().d()));
+  const auto most = static_cast<double>(MostAtOnce(K, engine.stars().sample().d()));
   if (criteria.ask_ahead && K <= kMostAhead && GuessSize(K, seeds, criteria.epsilon) <= most)
     return std::make_unique<AheadLaying<K>>(engine, spec);
   return std::make_unique<RingLaying<K>>(engine, spec);

@@ -120,7 +120,7 @@ Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
   Count(asked);
   delta_ = {};
   delta_.revision = progress_.round;
-  delta_.first_vertex = engine_.complex().size();
+  delta_.first_vertex = engine_.stars().size();
   if (complete) {
     parts_.reset();
     batch_.reset();
@@ -142,13 +142,13 @@ Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
     report_ = report_before;
     return Refuse(StatusCode::kCancelled, "the computation was interrupted");
   }
-  const StarComplex<K>& complex = engine_.complex();
-  delta_.points =
-      Eigen::Map<const Eigen::MatrixXd>(complex.points().data(), complex.d(), complex.size())
-          .rightCols(complex.size() - static_cast<Eigen::Index>(delta_.first_vertex));
+  const Stars<K>& stars = engine_.stars();
+  delta_.points = Eigen::Map<const Eigen::MatrixXd>(stars.sample().points().data(),
+                                                    stars.sample().d(), stars.size())
+                      .rightCols(stars.size() - static_cast<Eigen::Index>(delta_.first_vertex));
   if (spec_.walls > 0)
-    for (auto v = static_cast<std::uint32_t>(delta_.first_vertex); v < complex.size(); ++v)
-      delta_.walls.push_back(complex.walls(v));
+    for (auto v = static_cast<std::uint32_t>(delta_.first_vertex); v < stars.size(); ++v)
+      delta_.walls.push_back(stars.sample().walls(v));
   return std::move(delta_);
 }
 
@@ -199,7 +199,7 @@ void MeshingRun<K>::AskFor(Eigen::MatrixXd&& points, Insertion then) {
 template <int K>
 void MeshingRun<K>::AfterTrip() {
   const auto* const answered = trip_.get();
-  spare_points_.KeepClearances(trip_->answers(), ClearPointsKept(engine_.complex().size()));
+  spare_points_.KeepClearances(trip_->answers(), ClearPointsKept(engine_.stars().size()));
   (this->*insertion_)();
   if (over_ || trip_.get() != answered || AskToLay()) return;  // it asks on
   typename Engine<K>::Change change = engine_.Commit();
@@ -250,7 +250,7 @@ void MeshingRun<K>::InsertSpares() {
 template <int K>
 void MeshingRun<K>::Plan() {
   const std::unique_ptr<Laying<K>> laid = std::move(laid_);
-  box_watch_.Look(engine_.complex().points().data(), engine_.complex().size());
+  box_watch_.Look(engine_.stars().sample().points().data(), engine_.stars().size());
   if (engine_.is_full()) return Finish(Termination::kVertexBudget);
   if (box_watch_.has_left()) return Finish(Termination::kNoProgress);
   auto targets = engine_.Plan();
@@ -262,7 +262,7 @@ void MeshingRun<K>::Plan() {
   const ViolationBook<K>& book = engine_.book();
   const bool is_lost = stall_watch_.ShouldLookForLostCauses() && spec_.walls > 0 &&
                        HasPieceTooSmall<K>(engine_, spec_.epsilon);
-  if (is_lost || stall_watch_.IsHopeless(book.size_and_shape().size(), engine_.complex().size()) ||
+  if (is_lost || stall_watch_.IsHopeless(book.size_and_shape().size(), engine_.stars().size()) ||
       stall_watch_.HasStalled(book.size_and_shape().size() + book.blemished(),
                               !book.are_all_suspect()))
     return LeaveFaces();
@@ -285,21 +285,21 @@ void MeshingRun<K>::Plan() {
 
 template <int K>
 void MeshingRun<K>::Certify() {
-  if (AskForSpares(spare_points_.Uncovered(engine_.complex()))) return;
-  const StarComplex<K>& complex = engine_.complex();
-  if (complex.size() == 0 && !nothing_inside_.empty())  // what was discovered led nowhere
+  if (AskForSpares(spare_points_.Uncovered(engine_.stars()))) return;
+  const Stars<K>& stars = engine_.stars();
+  if (stars.size() == 0 && !nothing_inside_.empty())  // what was discovered led nowhere
     return Fail({StatusCode::kNoSeeds, nothing_inside_});
   if (!engine_.filled().mended().empty())
-    engine_.filled().HandOut(complex, &delta_.added, &delta_.removed);
+    engine_.filled().HandOut(stars, &delta_.added, &delta_.removed);
   StarFacts facts = FactsOf<K>(engine_);
   facts.covers_box = covers_box_;
   if (!spec_.oracle.tangent_basis) facts.tangent_error_length = tangent_finder_.error_length();
   MeshView mesh;
   mesh.k = K;
-  mesh.d = complex.d();
-  mesh.vertices = complex.size();
-  mesh.points = complex.points().data();
-  mesh.tangents = complex.Tangent(0);
+  mesh.d = stars.sample().d();
+  mesh.vertices = stars.size();
+  mesh.points = stars.sample().points().data();
+  mesh.tangents = stars.sample().Tangent(0);
   trip_.reset();
   crease_probe_.Stop();
   walked_.clear();  // not all of them to their end
@@ -323,7 +323,7 @@ void MeshingRun<K>::AfterCertificate() {
 template <int K>
 bool MeshingRun<K>::AskForSpares(const std::vector<double>& points) {
   Eigen::MatrixXd chosen =
-      spare_points_.Choose(points, engine_.complex(), engine_.criteria().epsilon);
+      spare_points_.Choose(points, engine_.stars(), engine_.criteria().epsilon);
   if (chosen.cols() == 0) return false;
   if (certification_) spare_points_.GiveBack(certification_->TakeKnown());
   AskFor(std::move(chosen), &MeshingRun::InsertSpares);
@@ -352,7 +352,7 @@ void MeshingRun<K>::Finish(Termination termination) {
   report_.termination = termination;
   // What a round that was interrupted has left behind was never handed out.
   const bool is_whole = !interruption_.raised();
-  report_.counts.vertices = is_whole ? engine_.complex().size() : progress_.vertices;
+  report_.counts.vertices = is_whole ? engine_.stars().size() : progress_.vertices;
   report_.counts.simplices = is_whole ? engine_.simplex_count() : progress_.simplices;
   DescribeEnding(is_whole);
   certification_.reset();
@@ -369,7 +369,7 @@ void MeshingRun<K>::Measure() {
                                       laying_ ? laying_->CountMissing() : 0, &progress_);
   progress_.is_foreseeable = false;
   progress_.phase = Phase::kDone;
-  progress_.vertices = engine_.complex().size();
+  progress_.vertices = engine_.stars().size();
   progress_.simplices = engine_.simplex_count();
   progress_.bad_sliver = engine_.book().slivers();
   progress_.bad_inconsistent = engine_.book().inconsistent();
@@ -378,8 +378,9 @@ void MeshingRun<K>::Measure() {
 
 template <int K>
 Eigen::MatrixXd MeshingRun<K>::Points() const {
-  const StarComplex<K>& complex = engine_.complex();
-  return Eigen::Map<const Eigen::MatrixXd>(complex.points().data(), complex.d(), complex.size());
+  const Stars<K>& stars = engine_.stars();
+  return Eigen::Map<const Eigen::MatrixXd>(stars.sample().points().data(), stars.sample().d(),
+                                           stars.size());
 }
 
 STELLATE_INSTANTIATE_CLASS(MeshingRun)

@@ -47,7 +47,7 @@ class MeshingRun final : public Mesher {
   const Progress& progress() const override { return progress_; }
   const Report& report() const override { return report_; }
   Eigen::MatrixXd Points() const override;
-  Eigen::MatrixXd Tangents() const override { return engine_.complex().TangentMatrix(); }
+  Eigen::MatrixXd Tangents() const override { return engine_.stars().sample().TangentMatrix(); }
   std::vector<std::uint32_t> Simplices() const override { return engine_.Simplices(); }
 
  private:

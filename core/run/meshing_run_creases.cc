@@ -59,7 +59,7 @@ void MeshingRun<K>::End(Termination termination) {
     if (termination == Termination::kNoProgress)
       crease_probe_.Start(SteepWaysAtFaults<K>(engine_, longest));
     else if (certification_ && certification_->certificate().epsilon_over_reach > kCoarse)
-      crease_probe_.Start(SteepWays<K>(engine_.complex(), longest));
+      crease_probe_.Start(SteepWays<K>(engine_.stars(), longest));
   }
   if (!may_be_creased || !crease_probe_.is_asking()) return Finish(termination);
   end_ = termination;

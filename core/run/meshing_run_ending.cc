@@ -37,7 +37,7 @@ void MeshingRun<K>::DescribeEnding(bool is_whole) {
                   : crease_probe_.crease()
                       ? DescribeCrease(*crease_probe_.crease())
                       : WhatIsLeft<K>(engine_, certificate.inconsistent_simplices) +
-                            rim_watch_.Describe(engine_.complex().d()));
+                            rim_watch_.Describe(engine_.stars().sample().d()));
     // A front that never closes may be where the manifold ends.
     const bool spent =
         termination == Termination::kVertexBudget || termination == Termination::kRoundBudget;

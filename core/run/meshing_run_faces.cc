@@ -65,18 +65,18 @@ void MeshingRun<K>::JudgeWalls() {
 // AskForSpares.
 template <int K>
 bool MeshingRun<K>::AskForSparesOnWalls(const PointsOnWalls& points) {
-  const StarComplex<K>& complex = engine_.complex();
+  const Stars<K>& stars = engine_.stars();
   const double epsilon = engine_.criteria().epsilon;
   PointsOnWalls news;
   for (std::size_t i = 0; i < points.walls.size(); ++i) {
     CheckInterruption(i);
-    const double* y = points.points.data() + i * static_cast<std::size_t>(complex.d());
+    const double* y = points.points.data() + i * static_cast<std::size_t>(stars.sample().d());
     bool is_news = true;
-    complex.ForEachWithin(y, kKnownWithin * epsilon, [&](std::uint32_t p) {
-      is_news = is_news && !IsSubset(points.walls[i], complex.walls(p));
+    stars.sample().ForEachWithin(y, kKnownWithin * epsilon, [&](std::uint32_t p) {
+      is_news = is_news && !IsSubset(points.walls[i], stars.sample().walls(p));
     });
     if (!is_news) continue;
-    news.points.insert(news.points.end(), y, y + complex.d());
+    news.points.insert(news.points.end(), y, y + stars.sample().d());
     news.walls.push_back(points.walls[i]);
   }
   CandidateSet<K> candidates;
@@ -93,7 +93,7 @@ bool MeshingRun<K>::AskForSparesOnWalls(const PointsOnWalls& points) {
 // all stars are whole.
 template <int K>
 bool MeshingRun<K>::AskToLayInterior() {
-  if (engine_.complex().size() == 0) return false;
+  if (engine_.stars().size() == 0) return false;
   AnsweredPoints seeds = engine_.InteriorSeeds();
   laying_ = LayingFor<K>(engine_, spec_, seeds);
   if (laying_) laying_->Begin(seeds);

@@ -28,8 +28,8 @@ void MeshingRun<K>::InsertSeeds() {
     const auto i = static_cast<std::size_t>(c);
     CheckInterruption(i);
     if (!answers.found[i]) continue;
-    used[i] = !engine_.is_full() && !engine_.complex().AnyWithin(answers.points.col(c).data(),
-                                                                 engine_.criteria().epsilon);
+    used[i] = !engine_.is_full() && !engine_.stars().sample().AnyWithin(
+                                        answers.points.col(c).data(), engine_.criteria().epsilon);
     if (used[i])
       engine_.Append(answers, c);
     else
@@ -51,7 +51,7 @@ void MeshingRun<K>::LayAnswered() {
 template <int K>
 bool MeshingRun<K>::AskToLay() {
   if (!laying_) return false;
-  box_watch_.Look(engine_.complex().points().data(), engine_.complex().size());
+  box_watch_.Look(engine_.stars().sample().points().data(), engine_.stars().size());
   CandidateSet<K> candidates;
   if (!box_watch_.has_left()) candidates = laying_->Next(whole_rounds_);
   if (candidates.size() == 0) {
@@ -66,13 +66,13 @@ bool MeshingRun<K>::AskToLay() {
 // Besides what else the round has changed.
 template <int K>
 void MeshingRun<K>::CommitLaid() {
-  const std::vector<std::uint32_t> before = engine_.complex().Simplices();
+  const std::vector<std::uint32_t> before = engine_.stars().Simplices();
   if (before.empty() && delta_.removed.empty()) {
     delta_.added = engine_.Commit().added;
     return;
   }
   engine_.Commit();
-  ExchangeSimplices<K>(before, engine_.complex().Simplices(), &delta_.added, &delta_.removed);
+  ExchangeSimplices<K>(before, engine_.stars().Simplices(), &delta_.added, &delta_.removed);
 }
 
 #define STELLATE_EACH(K)                      \

@@ -25,15 +25,15 @@ constexpr double kOfSimplices = 2200, kOfVertices = 1500, kBesides = 1000, kThor
 
 template <int K>
 void CountAll(const Engine<K>& engine, Progress* progress) {
-  const StarComplex<K>& complex = engine.complex();
+  const Stars<K>& stars = engine.stars();
   const ViolationBook<K>& book = engine.book();
-  progress->vertices = complex.size();
+  progress->vertices = stars.size();
   progress->simplices = engine.simplex_count();
   progress->bad_size = progress->bad_radius_edge = progress->unbounded_stars = 0;
   std::size_t step = 0;
   for (const auto& entry : book.size_and_shape()) {
     CheckInterruption(step++);
-    progress->unbounded_stars += !complex.cell(entry.star).bounded();
+    progress->unbounded_stars += !stars.cell(entry.star).bounded();
     ++(entry.violation.rule == Rule::kSize ? progress->bad_size : progress->bad_radius_edge);
   }
   progress->bad_sliver = book.slivers();
@@ -55,16 +55,16 @@ void ProgressMeter::Know(const AnsweredPoints& seeds, const std::vector<std::uin
 }
 
 template <int K>
-void ProgressMeter::Cover(const StarComplex<K>& complex) {
-  const auto d = static_cast<std::size_t>(complex.d());
+void ProgressMeter::Cover(const Stars<K>& stars) {
+  const auto d = static_cast<std::size_t>(stars.sample().d());
   const std::size_t count = open_.size() / d;
   std::vector<std::uint8_t> covered(count, 0);
   ParallelFor(count, [&](std::size_t i) {
-    for (std::uint32_t v = looked_at_; v < complex.size() && !covered[i]; ++v)
-      covered[i] = SquaredDistance(open_.data() + i * d, complex.Point(v), complex.d()) <=
-                   epsilon_ * epsilon_;
+    for (std::uint32_t v = looked_at_; v < stars.size() && !covered[i]; ++v)
+      covered[i] = SquaredDistance(open_.data() + i * d, stars.sample().Point(v),
+                                   stars.sample().d()) <= epsilon_ * epsilon_;
   });
-  looked_at_ = complex.size();
+  looked_at_ = stars.size();
   std::vector<double> left;
   for (std::size_t i = 0; i < count; ++i)
     if (!covered[i])
@@ -76,12 +76,12 @@ void ProgressMeter::Cover(const StarComplex<K>& complex) {
 // The front against M's area, and what refinement adds.
 template <int K>
 ProgressMeter::Left ProgressMeter::LeftToLay(const Engine<K>& engine, double to_lay) {
-  const double have = static_cast<double>(engine.complex().size());
+  const double have = static_cast<double>(engine.stars().size());
   Left left{to_lay, false};
   if (known_ >= kFewestKnown) {
     const double covered =
         1 - static_cast<double>(open_.size()) /
-                static_cast<double>(known_ * static_cast<std::size_t>(engine.complex().d()));
+                static_cast<double>(known_ * static_cast<std::size_t>(engine.stars().sample().d()));
     left.is_known = covered > 0;
     // Nothing near any: there is far more than what is there.
     const double least = 0.5 / static_cast<double>(known_);
@@ -95,7 +95,7 @@ ProgressMeter::Left ProgressMeter::LeftToLay(const Engine<K>& engine, double to_
 template <int K>
 ProgressMeter::Left ProgressMeter::LeftToRefine(const Engine<K>& engine) {
   const ViolationBook<K>& book = engine.book();
-  const double have = static_cast<double>(engine.complex().size());
+  const double have = static_cast<double>(engine.stars().size());
   const double broken = static_cast<double>(book.size_and_shape().size() + book.blemished());
   const bool judges_all = !book.are_all_suspect();
   if (judges_all != judged_all_) seen_.clear();
@@ -125,12 +125,12 @@ template <int K>
 void ProgressMeter::Measure(const Engine<K>& engine, bool is_certifying, double to_lay,
                             Progress* progress) {
   CountAll<K>(engine, progress);
-  const StarComplex<K>& complex = engine.complex();
-  progress->phase = is_certifying         ? Phase::kCertifying
-                    : complex.size() == 0 ? Phase::kSeeding
-                                          : Phase::kRefining;
+  const Stars<K>& stars = engine.stars();
+  progress->phase = is_certifying       ? Phase::kCertifying
+                    : stars.size() == 0 ? Phase::kSeeding
+                                        : Phase::kRefining;
   progress->is_foreseeable = false;
-  if (complex.size() == 0) return;
+  if (stars.size() == 0) return;
 
   const auto asked = static_cast<double>(progress->queries);
   double left = QuestionsOfCertificate(*progress);
@@ -140,13 +140,13 @@ void ProgressMeter::Measure(const Engine<K>& engine, bool is_certifying, double 
     left = std::max(left - static_cast<double>(progress->queries - before_certificate_), 0.0);
   } else {
     before_certificate_ = 0;
-    Cover(complex);
+    Cover(stars);
     // Stars that stay open where the sample is near all that is known of M are no front.
     const bool is_covered = known_ >= kFewestKnown && open_.empty();
     const bool grows = to_lay > 0 || (progress->unbounded_stars > 0 && !is_covered);
     const Left vertices = grows ? LeftToLay<K>(engine, std::max(to_lay, engine.CountMissing(0.5)))
                                 : LeftToRefine<K>(engine);
-    left += vertices.vertices * std::max(asked / static_cast<double>(complex.size()), 1.0);
+    left += vertices.vertices * std::max(asked / static_cast<double>(stars.size()), 1.0);
     is_known = vertices.is_known;
   }
   const double share = std::min(0.99, asked / (asked + left + 1));

@@ -35,7 +35,7 @@ class ProgressMeter {
   };
 
   template <int K>
-  void Cover(const StarComplex<K>& complex);
+  void Cover(const Stars<K>& stars);
   template <int K>
   Left LeftToLay(const Engine<K>& engine, double to_lay);
   template <int K>

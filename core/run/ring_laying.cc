@@ -34,8 +34,9 @@ RingLaying<K>::RingLaying(Engine<K>& engine, const Specification& spec, double a
     : engine_(engine),
       are_drawn_(spec.seeds.cols() == 0),
       apart_(apart),
-      growth_(engine.complex().d(), LaidSpacing(K, engine.criteria().epsilon)),
-      scouting_(std::make_unique<Growth<K>>(engine.complex().d(), apart_ * growth_.spacing())) {
+      growth_(engine.stars().sample().d(), LaidSpacing(K, engine.criteria().epsilon)),
+      scouting_(
+          std::make_unique<Growth<K>>(engine.stars().sample().d(), apart_ * growth_.spacing())) {
   if (spec.walls > 0) room_.emplace(engine, growth_.spacing());
 }
 

@@ -29,18 +29,19 @@ RoundTrip<K>::RoundTrip(const Engine<K>& engine, const OracleCapabilities& oracl
 template <int K>
 void RoundTrip<K>::FindKnown() {
   constexpr double kCovering = 1.25;  // of epsilon: R1 bounds it in tangent spaces, walls bend
-  const StarComplex<K>& complex = engine_.complex();
+  const Stars<K>& stars = engine_.stars();
   const std::vector<Target<K>>& targets = candidates_.targets;
-  if (walls_ == 0 || complex.d() != K || engine_.criteria().sizes_given) return;
+  if (walls_ == 0 || stars.sample().d() != K || engine_.criteria().sizes_given) return;
   known_.resize(static_cast<std::size_t>(candidates_.drawn()));
   ParallelFor(targets.size(), [&](std::size_t i) {
     if (targets[i].violation.walls != 0) return;
     for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c) {
       const double* point = candidates_.points.col(c).data();
-      const double far = Distance(point, complex.Point(targets[i].star), K) +
+      const double far = Distance(point, stars.sample().Point(targets[i].star), K) +
                          kCovering * engine_.criteria().epsilon;
       bool deep = true;
-      complex.ForEachWithin(point, far, [&](std::uint32_t p) { deep &= complex.walls(p) == 0; });
+      stars.sample().ForEachWithin(point, far,
+                                   [&](std::uint32_t p) { deep &= stars.sample().walls(p) == 0; });
       known_[static_cast<std::size_t>(c)] = deep;
     }
   });
@@ -93,14 +94,14 @@ std::map<WallSet, int> RoundTrip<K>::OpenBlocks(const std::vector<WallSet>& face
   for (const auto& [face, count] : counts) {
     block_of[face] = static_cast<int>(open_.size());
     open_.push_back(NewBlock(QueryKind::kClosestPoint, face));
-    open_.back().points.resize(engine_.complex().d(), count);
+    open_.back().points.resize(engine_.stars().sample().d(), count);
   }
   return block_of;
 }
 
 template <int K>
 void RoundTrip<K>::AskForDrawn() {
-  const StarComplex<K>& complex = engine_.complex();
+  const Stars<K>& stars = engine_.stars();
   const std::vector<Target<K>>& targets = candidates_.targets;
   Eigen::Index flat_count = 0;
   std::vector<WallSet> faces;  // of the others, by candidate
@@ -116,8 +117,8 @@ void RoundTrip<K>::AskForDrawn() {
   }
   if (flat_count > 0) {
     QueryBlock flats = NewBlock(QueryKind::kIntersectFlat, 0);
-    flats.points.resize(complex.d(), flat_count);
-    flats.bases.resize(complex.d() * K, flat_count);
+    flats.points.resize(stars.sample().d(), flat_count);
+    flats.bases.resize(stars.sample().d() * K, flat_count);
     flats.radii.resize(flat_count);
     open_.push_back(std::move(flats));
   }
@@ -141,7 +142,7 @@ void RoundTrip<K>::AskForDrawn() {
       QueryBlock& block = open_[static_cast<std::size_t>(b)];
       block.points.col(column) = candidates_.points.col(c);
       if (!candidates_.in_flats[i]) continue;
-      ToByCoordinate(complex.Tangent(targets[i].star), complex.d(), K,
+      ToByCoordinate(stars.sample().Tangent(targets[i].star), stars.sample().d(), K,
                      block.bases.col(column).data());
       block.radii[column] = targets[i].radius;
     }
@@ -176,7 +177,7 @@ void RoundTrip<K>::Absorb(const std::vector<AnswerBlock>& answers) {
 // Sorts the answers back into candidates.
 template <int K>
 void RoundTrip<K>::Sort(const std::vector<AnswerBlock>& answers) {
-  const int d = engine_.complex().d();
+  const int d = engine_.stars().sample().d();
   const Eigen::Index count = candidates_.size();
   const bool sizes_given = engine_.criteria().sizes_given;
   answers_.points.resize(d, count);
@@ -212,7 +213,7 @@ void RoundTrip<K>::TakeKnown(Eigen::Index c) {
 // What answers say of the walls.
 template <int K>
 void RoundTrip<K>::SortFaces(const std::vector<AnswerBlock>& answers) {
-  const int d = engine_.complex().d();
+  const int d = engine_.stars().sample().d();
   const Eigen::Index count = candidates_.size();
   answers_.walls.assign(static_cast<std::size_t>(count), 0);
   answers_.clearances.resize(walls_, count);
@@ -247,13 +248,13 @@ void RoundTrip<K>::SortFaces(const std::vector<AnswerBlock>& answers) {
 template <int K>
 void RoundTrip<K>::AskAgain() {
   --alternations_left_;
-  const int d = engine_.complex().d();
+  const int d = engine_.stars().sample().d();
   QueryBlock block = NewBlock(QueryKind::kClosestPoint, 0);
   block.points = answers_.points;
   for (std::size_t i = 0; i < candidates_.targets.size(); ++i) {
     CheckInterruption(i);
     const Target<K>& target = candidates_.targets[i];
-    const double* tangent = engine_.complex().Tangent(target.star);
+    const double* tangent = engine_.stars().sample().Tangent(target.star);
     for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c) {
       if (!answers_.found[static_cast<std::size_t>(c)] || target.violation.fake) continue;
       for (int a = 0; a < K; ++a) {
@@ -284,7 +285,7 @@ void RoundTrip<K>::AskForTangents() {
     CheckInterruption(i);
     // Far steps may turn any corner: no guess there.
     const Target<K>& t = candidates_.targets[i];
-    const double* guess = t.is_coarse() ? nullptr : engine_.complex().Tangent(t.star);
+    const double* guess = t.is_coarse() ? nullptr : engine_.stars().sample().Tangent(t.star);
     for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c) add(c, guess);
   }
   const PlannedPoints& planned = candidates_.planned;

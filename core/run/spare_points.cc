@@ -18,10 +18,10 @@ constexpr int kMostChosen = 16;
 
 // How far y is from the sample, in circumradii of the star there.
 template <int K>
-double ClearanceOf(const double* y, const StarComplex<K>& complex) {
+double ClearanceOf(const double* y, const Stars<K>& stars) {
   std::pair<double, std::uint32_t> nearest;
-  if (complex.Nearest(y, 1, &nearest) == 0) return INFINITY;
-  return std::sqrt(nearest.first / complex.cell(nearest.second).max_norm2());
+  if (stars.sample().Nearest(y, 1, &nearest) == 0) return INFINITY;
+  return std::sqrt(nearest.first / stars.cell(nearest.second).max_norm2());
 }
 
 }  // namespace
@@ -62,16 +62,16 @@ void SparePoints::KeepEnd(const AnsweredPoints& answers, Eigen::Index c) {
 }
 
 template <int K>
-std::vector<double> SparePoints::Uncovered(const StarComplex<K>& complex) const {
+std::vector<double> SparePoints::Uncovered(const Stars<K>& stars) const {
   return ParallelGather<double>(known_.points.size() / d_, [&](std::size_t i, auto* uncovered) {
     const double* y = known_.points.data() + i * d_;
-    if (ClearanceOf(y, complex) > kCoverageShare) uncovered->insert(uncovered->end(), y, y + d_);
+    if (ClearanceOf(y, stars) > kCoverageShare) uncovered->insert(uncovered->end(), y, y + d_);
   });
 }
 
 template <int K>
-Eigen::MatrixXd SparePoints::Choose(const std::vector<double>& points,
-                                    const StarComplex<K>& complex, double epsilon) {
+Eigen::MatrixXd SparePoints::Choose(const std::vector<double>& points, const Stars<K>& stars,
+                                    double epsilon) {
   if (points.empty() || chosen_ == kMostChosen) return {};
   ++chosen_;
   std::vector<const double*> chosen;
@@ -79,13 +79,14 @@ Eigen::MatrixXd SparePoints::Choose(const std::vector<double>& points,
     CheckInterruption(at);
     const double* y = points.data() + at;
     std::pair<double, std::uint32_t> nearest;
-    complex.Nearest(y, 1, &nearest);
+    stars.sample().Nearest(y, 1, &nearest);
     const double apart = std::min(epsilon, std::sqrt(nearest.first) / 2);
-    if (std::none_of(chosen.begin(), chosen.end(),
-                     [&](const double* other) { return Distance(y, other, complex.d()) < apart; }))
+    if (std::none_of(chosen.begin(), chosen.end(), [&](const double* other) {
+          return Distance(y, other, stars.sample().d()) < apart;
+        }))
       chosen.push_back(y);
   }
-  Eigen::MatrixXd all(complex.d(), static_cast<Eigen::Index>(chosen.size()));
+  Eigen::MatrixXd all(stars.sample().d(), static_cast<Eigen::Index>(chosen.size()));
   for (std::size_t i = 0; i < chosen.size(); ++i)
     std::copy_n(chosen[i], d_, all.col(static_cast<Eigen::Index>(i)).data());
   return all;
@@ -114,10 +115,10 @@ PlannedPoints SparePoints::ChooseOnWalls(const PointsOnWalls& points, double eps
   return chosen;
 }
 
-#define STELLATE_EACH(K)                                                               \
-  template std::vector<double> SparePoints::Uncovered<K>(const StarComplex<K>&) const; \
-  template Eigen::MatrixXd SparePoints::Choose<K>(const std::vector<double>&,          \
-                                                  const StarComplex<K>&, double);
+#define STELLATE_EACH(K)                                                                       \
+  template std::vector<double> SparePoints::Uncovered<K>(const Stars<K>&) const;               \
+  template Eigen::MatrixXd SparePoints::Choose<K>(const std::vector<double>&, const Stars<K>&, \
+                                                  double);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 

@@ -25,14 +25,13 @@ class SparePoints {
   void KeepEnd(const AnsweredPoints& answers, Eigen::Index c);
   // Returns the points that were not used and are far from the sample, d each.
   template <int K>
-  std::vector<double> Uncovered(const StarComplex<K>& complex) const;
+  std::vector<double> Uncovered(const Stars<K>& stars) const;
 
   // Returns one representative of each cluster of `points` (d each), d x n, to be queried with
   // tangents and sizes. Empty if there are none, or if this was done so often that it does not
   // help.
   template <int K>
-  Eigen::MatrixXd Choose(const std::vector<double>& points, const StarComplex<K>& complex,
-                         double epsilon);
+  Eigen::MatrixXd Choose(const std::vector<double>& points, const Stars<K>& stars, double epsilon);
 
   // The same for points on walls, by wall.
   PlannedPoints ChooseOnWalls(const PointsOnWalls& points, double epsilon);

@@ -21,7 +21,7 @@ class TangentFinder {
   TangentFinder(int k, int d, double step, std::uint64_t seed,
                 double most_error = std::numeric_limits<double>::infinity());
 
-  // Points y on M, d x n; guesses one a point: K rows of d (as StarComplex::Tangent) or nullptr;
+  // Points y on M, d x n; guesses one a point: K rows of d (as Stars::Tangent) or nullptr;
   // shares of `step` to look at, one a point, or empty: where M is known to bend more than
   // elsewhere.
   void Start(const Eigen::MatrixXd& points, std::vector<const double*> guesses,

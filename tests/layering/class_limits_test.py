@@ -16,7 +16,6 @@ MOST_MEMBERS, MOST_METHODS = 20, 40
 # Classes that are still above a limit, with what they have at most. Lower a number with the class; a class
 # within the limits loses its line.
 LARGE = {
-    "core/complex/star_complex.h StarComplex": (24, 84),
     "core/refinement/engine.h Engine": (MOST_MEMBERS, 51),
     "core/run/meshing_run.h MeshingRun": (33, 47),
     "core/sample/ball_tree.h BallTree": (MOST_MEMBERS, 41),

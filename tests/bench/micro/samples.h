@@ -11,7 +11,7 @@
 namespace stellate::core::bench {
 
 // A random sample of the product of K unit circles, padded with zeros to R^D: points of D
-// coordinates, and tangent bases of K rows of D, as StarComplex takes them.
+// coordinates, and tangent bases of K rows of D, as Stars takes them.
 template <int K, int D = 2 * K>
 struct FlatTorus {
   static_assert(D >= 2 * K);

@@ -1,3 +1,5 @@
+#include "core/complex/stars.h"
+
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -6,7 +8,6 @@
 #include <vector>
 
 #include "core/base/random.h"
-#include "core/complex/star_complex.h"
 #include "core/geometry/restricted_voronoi_cell.h"
 #include "tests/bench/micro/samples.h"
 
@@ -127,10 +128,10 @@ void StarsCommit(benchmark::State& state) {
   const int n = static_cast<int>(state.range(0));
   const FlatTorus<K> sample(n);
   for (auto _ : state) {
-    StarComplex<K> complex(2 * K, 0.2, 1.0, kJudging);
+    Stars<K> stars(2 * K, 0.2, {1.0, kJudging});
     for (int begin = 0, end = 32; begin < n; begin = end, end = std::min(n, 2 * end)) {
-      for (int i = begin; i < end; ++i) complex.Append(sample.Point(i), sample.Tangent(i));
-      benchmark::DoNotOptimize(complex.Commit());
+      for (int i = begin; i < end; ++i) stars.Add(sample.Point(i), sample.Tangent(i));
+      benchmark::DoNotOptimize(stars.Commit());
     }
   }
   state.SetItemsProcessed(state.iterations() * n);

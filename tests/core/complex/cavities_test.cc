@@ -21,8 +21,8 @@ namespace {
 using testing::AppendTo;
 using testing::Drive;
 using testing::DrivenRun;
+using testing::FramedPoints;
 using testing::Make;
-using testing::Sample;
 using testing::SpecificationFor;
 using testing::TorusGrid;
 
@@ -62,30 +62,30 @@ class Cavities {
   }
 
   FilledCavities Fill(Judging judging) const {
-    StarComplex<K> complex(sample_.d, epsilon_, 4 * epsilon_, judging);
-    AppendTo(&complex, sample_);
-    complex.Commit();
-    return FillCavities<K>(complex, RulesAt(epsilon_));
+    Stars<K> stars(sample_.d, epsilon_, {4 * epsilon_, judging});
+    AppendTo(&stars, sample_);
+    stars.Commit();
+    return FillCavities<K>(stars, RulesAt(epsilon_));
   }
 
  private:
   std::unique_ptr<Manifold> manifold_;
   double epsilon_;
-  Sample sample_;
+  FramedPoints sample_;
 };
 
 // Cospherical as it is, all stars of a grid agree.
 template <int K>
 void ExpectNothingToFill(int n) {
-  const Sample sample = TorusGrid(K, n);
+  const FramedPoints sample = TorusGrid(K, n);
   const double epsilon = 1.1 * std::sqrt(K) * std::tan(std::numbers::pi / n);
-  StarComplex<K> complex(sample.d, epsilon, 4 * epsilon, Judging::kCommonCentre);
-  AppendTo(&complex, sample);
-  complex.Commit();
-  const FilledCavities filled = FillCavities<K>(complex, RulesAt(epsilon));
+  Stars<K> stars(sample.d, epsilon, {4 * epsilon, Judging::kCommonCentre});
+  AppendTo(&stars, sample);
+  stars.Commit();
+  const FilledCavities filled = FillCavities<K>(stars, RulesAt(epsilon));
   EXPECT_EQ(filled.cavities, 0u);
   EXPECT_EQ(filled.inconsistent, 0u);
-  EXPECT_EQ(filled.simplices, complex.Simplices());
+  EXPECT_EQ(filled.simplices, stars.Simplices());
 }
 
 TEST(CavitiesTest, AreNoneWhereStarsAgree) {

@@ -49,8 +49,13 @@ TEST(CentreCache, TakesNoSimplexForAnotherOfTheSameKey) {
 
 TEST(CentreCache, TakesNothingFromAnotherOwner) {
   Asked asked;
-  const std::uint64_t one = CentreCache<2>::NewOwner(), other = CentreCache<2>::NewOwner();
+  CentreCache<2>::Owner owner;
+  const CentreCache<2>::Owner copy = owner;
+  const std::uint64_t one = owner.id(), other = copy.id();
   EXPECT_NE(one, other);
+  owner = copy;
+  EXPECT_NE(owner.id(), one);
+  EXPECT_NE(owner.id(), other);
   const std::vector<double> first = asked.Centre(one, {4, 5, 6}, 77, 2);
   EXPECT_NE(asked.Centre(other, {4, 5, 6}, 77, 2), first);
   EXPECT_EQ(asked.times, 2);

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/complex/star_complex.h"
+#include "core/complex/stars.h"
 #include "tests/core/support/cells.h"
 #include "tests/core/support/in_process_run.h"
 #include "tests/core/support/samples.h"
@@ -20,9 +20,9 @@ namespace {
 
 using testing::Canonical;
 using testing::Drive;
+using testing::FramedPoints;
 using testing::Make;
 using testing::RandomSample;
-using testing::Sample;
 using testing::SpecificationFor;
 using testing::TorusGrid;
 
@@ -31,7 +31,7 @@ using Cells = std::vector<decltype(Canonical(RestrictedVoronoiCell<K>()))>;
 
 // What is known of a sample's stars: the cells, and the simplices by their lowest vertex.
 template <int K>
-struct Stars {
+struct BuiltStars {
   Cells<K> cells;
   std::vector<std::vector<std::uint32_t>> simplices;
   int asked_again = 0;  // times that a part had to ask for points farther off
@@ -45,13 +45,14 @@ struct Criteria {
 template <int K>
 class Builder {
  public:
-  Builder(const Sample& sample, const Criteria& criteria) : sample_(sample), criteria_(criteria) {
+  Builder(const FramedPoints& sample, const Criteria& criteria)
+      : sample_(sample), criteria_(criteria) {
     stars_.cells.resize(sample.size());
     stars_.simplices.resize(sample.size());
   }
 
   // `part_of`: by point.
-  Stars<K> InParts(int parts, const std::vector<int>& part_of) {
+  BuiltStars<K> InParts(int parts, const std::vector<int>& part_of) {
     for (int part = 0; part < parts; ++part) {
       own_.assign(sample_.size(), 0);
       for (std::uint32_t i = 0; i < sample_.size(); ++i) own_[i] = part_of[i] == part;
@@ -61,19 +62,19 @@ class Builder {
   }
 
  private:
-  using Complex = StarComplex<K>;
+  using Complex = Stars<K>;
 
   // A star that reaches farther than its part has looked asks for what lies there.
   void BuildPart() {
     looked_.assign(sample_.size(), kFirstLook * criteria_.epsilon);
     std::vector<std::uint32_t> names = Known();
-    std::unique_ptr<Complex> complex = Lay(names);
-    while (LookFarther(*complex, names)) {
+    std::unique_ptr<Complex> stars = Lay(names);
+    while (LookFarther(*stars, names)) {
       ++stars_.asked_again;
       names = Known();
-      complex = Lay(names);
+      stars = Lay(names);
     }
-    Keep(*complex, names);
+    Keep(*stars, names);
   }
 
   // The points of its own and what lies within reach of them, ascending.
@@ -89,19 +90,20 @@ class Builder {
   }
 
   std::unique_ptr<Complex> Lay(const std::vector<std::uint32_t>& names) const {
-    auto complex = std::make_unique<Complex>(sample_.d, criteria_.epsilon, 3.0, criteria_.judging);
+    auto stars = std::make_unique<Complex>(sample_.d, criteria_.epsilon,
+                                           StarOptions{3.0, criteria_.judging});
     for (const std::uint32_t q : names) {
-      complex->Lay(sample_.Point(q), sample_.Tangent(q));
-      complex->NameLast(q);
+      stars->AddInBulk(sample_.Point(q), sample_.Tangent(q));
+      stars->NameLast(q);
     }
-    complex->Commit();
-    return complex;
+    stars->Commit();
+    return stars;
   }
 
-  bool LookFarther(const Complex& complex, const std::vector<std::uint32_t>& names) {
+  bool LookFarther(const Complex& stars, const std::vector<std::uint32_t>& names) {
     bool farther = false;
     for (std::uint32_t i = 0; i < names.size(); ++i) {
-      const double reach = 2 * std::sqrt(complex.cell(i).max_norm2()) * (1 + 1e-9);
+      const double reach = 2 * std::sqrt(stars.cell(i).max_norm2()) * (1 + 1e-9);
       if (!own_[names[i]] || reach <= looked_[names[i]]) continue;
       looked_[names[i]] = reach;
       farther = true;
@@ -109,17 +111,17 @@ class Builder {
     return farther;
   }
 
-  void Keep(const Complex& complex, const std::vector<std::uint32_t>& names) {
+  void Keep(const Complex& stars, const std::vector<std::uint32_t>& names) {
     const auto name = [&](std::uint32_t id) { return IsSample(id) ? names[id] : id; };
     for (std::uint32_t i = 0; i < names.size(); ++i) {
       if (!own_[names[i]]) continue;
-      for (const auto& [facets, bits] : Canonical(complex.cell(i))) {
+      for (const auto& [facets, bits] : Canonical(stars.cell(i))) {
         auto named = facets;  // and as ascending as before
         for (std::uint32_t& id : named) id = name(id);
         stars_.cells[names[i]][named] = bits;
       }
     }
-    const std::vector<std::uint32_t> simplices = complex.Simplices();
+    const std::vector<std::uint32_t> simplices = stars.Simplices();
     for (std::size_t at = 0; at < simplices.size(); at += K + 1) {
       const std::uint32_t lowest = names[simplices[at]];
       if (!own_[lowest]) continue;
@@ -130,15 +132,15 @@ class Builder {
 
   static constexpr double kFirstLook = 2 * (1 + 1e-6);
 
-  const Sample& sample_;
+  const FramedPoints& sample_;
   const Criteria criteria_;
   std::vector<std::uint8_t> own_;
   std::vector<double> looked_;  // around each of its own, length
-  Stars<K> stars_;
+  BuiltStars<K> stars_;
 };
 
 // Slabs along the first coordinate, about equally many points each.
-std::vector<int> Slabs(const Sample& sample, int parts) {
+std::vector<int> Slabs(const FramedPoints& sample, int parts) {
   std::vector<std::pair<double, std::uint32_t>> along;
   for (std::uint32_t i = 0; i < sample.size(); ++i) along.emplace_back(sample.Point(i)[0], i);
   std::sort(along.begin(), along.end());
@@ -149,7 +151,7 @@ std::vector<int> Slabs(const Sample& sample, int parts) {
 }
 
 // As bad as can be: no two neighbours need be in one part.
-std::vector<int> Scattered(const Sample& sample, int parts) {
+std::vector<int> Scattered(const FramedPoints& sample, int parts) {
   std::vector<int> part_of(sample.size());
   for (std::uint32_t i = 0; i < sample.size(); ++i)
     part_of[i] = static_cast<int>(Mix64(i) % static_cast<std::uint64_t>(parts));
@@ -158,12 +160,13 @@ std::vector<int> Scattered(const Sample& sample, int parts) {
 
 // Returns the whole's, with how often all parts asked again.
 template <int K>
-Stars<K> ExpectSameInParts(const Sample& sample, const Criteria& criteria) {
-  Stars<K> whole = Builder<K>(sample, criteria).InParts(1, std::vector<int>(sample.size(), 0));
+BuiltStars<K> ExpectSameInParts(const FramedPoints& sample, const Criteria& criteria) {
+  BuiltStars<K> whole = Builder<K>(sample, criteria).InParts(1, std::vector<int>(sample.size(), 0));
   whole.asked_again = 0;
   for (const int parts : {2, 3, 7})
     for (const auto& cut : {Slabs, Scattered}) {
-      const Stars<K> together = Builder<K>(sample, criteria).InParts(parts, cut(sample, parts));
+      const BuiltStars<K> together =
+          Builder<K>(sample, criteria).InParts(parts, cut(sample, parts));
       EXPECT_EQ(together.simplices, whole.simplices) << parts << " parts";
       for (std::uint32_t p = 0; p < sample.size(); ++p)
         EXPECT_EQ(together.cells[p], whole.cells[p]) << parts << " parts, star " << p;
@@ -174,7 +177,7 @@ Stars<K> ExpectSameInParts(const Sample& sample, const Criteria& criteria) {
 
 // Of a finished mesh.
 struct Finished {
-  Sample sample;
+  FramedPoints sample;
   std::vector<std::uint32_t> simplices;
 };
 
@@ -221,10 +224,10 @@ TEST(Parts, AgreeWherePointsAreCospherical) {
 // Cells reach farther than 2 epsilon, or are open.
 TEST(Parts, AskForWhatLiesFartherOff) {
   const auto torus = Make("torus:1:0.4");
-  const Sample sparse = RandomSample(*torus, 150, 3);
+  const FramedPoints sparse = RandomSample(*torus, 150, 3);
   EXPECT_GT(ExpectSameInParts<2>(sparse, {0.1, Judging::kFlats}).asked_again, 0);
   const auto so3 = Make("so3");
-  const Sample sparser = RandomSample(*so3, 150, 3);
+  const FramedPoints sparser = RandomSample(*so3, 150, 3);
   EXPECT_GT(ExpectSameInParts<3>(sparser, {0.5, Judging::kFlats}).asked_again, 0);
 }
 

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/complex/star_complex.h"
+#include "core/complex/stars.h"
 
 namespace stellate::core {
 namespace {
@@ -14,7 +14,7 @@ constexpr double kFrame[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 constexpr double kOutward[6] = {-1, 0, 0, 0, -1, 0};  // of x >= 0 and of y >= 0
 
 // Points of the quarter of space that two walls leave, some of them on the walls and their edge.
-void AppendQuarter(StarComplex<3>* complex, unsigned seed, int count) {
+void AppendQuarter(Stars<3>* stars, unsigned seed, int count) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> uniform(0, 1);
   for (int i = 0; i < count; ++i) {
@@ -22,29 +22,28 @@ void AppendQuarter(StarComplex<3>* complex, unsigned seed, int count) {
     const auto walls = static_cast<WallSet>(i % 8 < 4 ? i % 8 : 0);
     for (const int wall : {0, 1})
       if ((walls & SetOfWall(wall)) != 0) point[wall] = 0;
-    complex->Append(point, kFrame, StarComplex<3>::kNone, walls,
-                    kOutward + (walls == SetOfWall(1) ? 3 : 0));
+    stars->Add(point, kFrame, Stars<3>::kNone, walls, kOutward + (walls == SetOfWall(1) ? 3 : 0));
   }
-  complex->Commit();
+  stars->Commit();
 }
 
 // What is encroached on, by looking at every vertex of every cell.
-std::optional<StarComplex<3>::CellVertex> WorstOfAll(const StarComplex<3>& complex,
-                                                     const double* point, WallSet walls) {
-  std::optional<StarComplex<3>::CellVertex> worst;
+std::optional<Stars<3>::CellVertex> WorstOfAll(const Stars<3>& stars, const double* point,
+                                               WallSet walls) {
+  std::optional<Stars<3>::CellVertex> worst;
   int lowest = 3 - CountWalls(walls);
   double farthest2 = 0;
-  for (std::uint32_t p = 0; p < complex.size(); ++p) {
-    const auto& cell = complex.cell(p);
+  for (std::uint32_t p = 0; p < stars.size(); ++p) {
+    const auto& cell = stars.cell(p);
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
       const WallSet at = WallsAt<3>(cell, v);
       const int dimension = 3 - CountWalls(at);
       if (IsSubset(at, walls) || dimension == 0 || cell.HasFakeFacet(v) ||
-          !complex.CutsVertex(p, v, point))
+          !stars.CutsVertex(p, v, point))
         continue;
       if (dimension > lowest || (dimension == lowest && !(cell.norm2(v) > farthest2))) continue;
       if (!worst && dimension == 3 - CountWalls(walls)) continue;
-      worst = StarComplex<3>::CellVertex{p, v};
+      worst = Stars<3>::CellVertex{p, v};
       lowest = dimension;
       farthest2 = cell.norm2(v);
     }
@@ -53,35 +52,35 @@ std::optional<StarComplex<3>::CellVertex> WorstOfAll(const StarComplex<3>& compl
 }
 
 // The simplices of faces that a star holds: their walls and corners.
-std::set<std::pair<WallSet, std::vector<std::uint32_t>>> OnFaces(const StarComplex<3>& complex,
+std::set<std::pair<WallSet, std::vector<std::uint32_t>>> OnFaces(const Stars<3>& stars,
                                                                  std::uint32_t p) {
   std::set<std::pair<WallSet, std::vector<std::uint32_t>>> simplices;
-  const auto& cell = complex.cell(p);
+  const auto& cell = stars.cell(p);
   for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
-    const auto simplex = complex.FaceSimplexOf(p, cell, v);
+    const auto simplex = stars.FaceSimplexOf(p, cell, v);
     if (simplex.walls != 0 && !simplex.fake)
       simplices.insert({simplex.walls, {simplex.ids.begin(), simplex.ids.begin() + simplex.count}});
   }
   return simplices;
 }
 
-TEST(FollowFacesAlone, KnowsTheSameSimplicesOfFacesAndNoOthers) {
-  StarComplex<3> whole(3, 0.5, 3.0, Judging::kFlats), alone(3, 0.5, 3.0, Judging::kFlats);
-  alone.FollowFacesAlone();
+TEST(RestrictToBoundary, KnowsTheSameSimplicesOfFacesAndNoOthers) {
+  Stars<3> whole(3, 0.5, {3.0, Judging::kFlats}), alone(3, 0.5, {3.0, Judging::kFlats});
+  alone.RestrictToBoundary();
   std::size_t known = 0;
   for (unsigned part = 0; part < 4; ++part) {
     AppendQuarter(&whole, part, 40 << part);
     AppendQuarter(&alone, part, 40 << part);
     EXPECT_TRUE(alone.Simplices().empty());
     for (std::uint32_t p = 0; p < whole.size(); ++p) {
-      if (whole.walls(p) == 0) continue;
+      if (whole.sample().walls(p) == 0) continue;
       const auto expected = OnFaces(whole, p);
       EXPECT_EQ(OnFaces(alone, p), expected);
       known += expected.size();
     }
   }
   EXPECT_GT(known, 1000u);
-  alone.FollowAll();
+  alone.IncludeInterior();
   const auto change = alone.Commit();
   EXPECT_EQ(alone.Simplices(), whole.Simplices());
   EXPECT_EQ(change.added.size(), whole.Simplices().size());
@@ -92,13 +91,13 @@ TEST(FollowFacesAlone, KnowsTheSameSimplicesOfFacesAndNoOthers) {
 // looked for, by how far their simplices of faces reach.
 TEST(EncroachedBy, FindsTheWorstOfAllFaces) {
   int encroached = 0, free = 0;
-  StarComplex<3> complex(3, 0.5, 3.0, Judging::kFlats);
+  Stars<3> stars(3, 0.5, {3.0, Judging::kFlats});
   for (unsigned part = 0; part < 6; ++part) {
-    AppendQuarter(&complex, part, 40 << part);
+    AppendQuarter(&stars, part, 40 << part);
     if (part == 4) {
-      std::vector<double> radii2(complex.size(), 0.0);
-      for (std::uint32_t p = 0; p < complex.size(); p += 7) radii2[p] = 1e-4;
-      complex.Guard(std::move(radii2));
+      std::vector<double> radii2(stars.size(), 0.0);
+      for (std::uint32_t p = 0; p < stars.size(); p += 7) radii2[p] = 1e-4;
+      stars.SetGuards(std::move(radii2));
     }
     std::mt19937 random(100 + part);
     std::uniform_real_distribution<double> uniform(0, 1);
@@ -106,8 +105,8 @@ TEST(EncroachedBy, FindsTheWorstOfAllFaces) {
       const auto walls = static_cast<WallSet>(i % 3);
       double point[3] = {0.3 * uniform(random), 0.3 * uniform(random), uniform(random)};
       if (walls != 0) point[walls - 1] = 0;
-      const auto got = complex.EncroachedBy(point, walls);
-      const auto expected = WorstOfAll(complex, point, walls);
+      const auto got = stars.EncroachedBy(point, walls);
+      const auto expected = WorstOfAll(stars, point, walls);
       ASSERT_EQ(got.has_value(), expected.has_value());
       ++(got ? encroached : free);
       if (!got) continue;

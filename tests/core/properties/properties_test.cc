@@ -271,7 +271,7 @@ void PrintTo(const Symmetric& s, std::ostream* out) { *out << s.name; }
 // n^k angles on a product of k circles.
 template <int K, int N>
 Eigen::MatrixXd Grid() {
-  const testing::Sample grid = testing::TorusGrid(K, N);
+  const testing::FramedPoints grid = testing::TorusGrid(K, N);
   return Eigen::Map<const Eigen::MatrixXd>(grid.points.data(), 2 * K, grid.size());
 }
 

@@ -155,17 +155,17 @@ TEST(Surrogate, ConvergesToFourthOrder) {
   for (const int level : {0, 1}) {
     const double h = level == 0 ? 0.12 : 0.06;
     const DrivenRun run = Drive(SpecificationFor(*torus, h), *torus);
-    StarComplex<2> complex(3, h, 10 * h, Judging::kFlats);
+    Stars<2> stars(3, h, {10 * h, Judging::kFlats});
     const Eigen::MatrixXd points = run.mesher->Points();
     const Eigen::MatrixXd tangents = torus->TangentBasis(points);
     for (Eigen::Index i = 0; i < points.cols(); ++i) {
       double rows[6];
       for (int j = 0; j < 3; ++j)
         for (int a = 0; a < 2; ++a) rows[a * 3 + j] = tangents(j * 2 + a, i);
-      complex.Append(points.col(i).data(), rows);
+      stars.Add(points.col(i).data(), rows);
     }
-    complex.Commit();
-    Surrogate<2> surrogate(complex, h, h);
+    stars.Commit();
+    Surrogate<2> surrogate(stars, h, h);
     const Eigen::MatrixXd middles =
         0.5 * (points.leftCols(points.cols() - 1) + points.rightCols(points.cols() - 1));
     const Eigen::MatrixXd near = torus->ClosestPoint(middles).points;

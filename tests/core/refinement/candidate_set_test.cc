@@ -15,9 +15,9 @@ constexpr double kRadius = 0.2;
 // A flat sample, a target of R1 for star 3 and one of R3 for star 5.
 class CandidateSetTest : public ::testing::Test {
  protected:
-  CandidateSetTest() : complex_(4, 1, 1, Judging::kFlats) {
-    AppendTo(&complex_, FlatSample(2, 4, 50, 1));
-    complex_.Commit();
+  CandidateSetTest() : stars_(4, 1, {1, Judging::kFlats}) {
+    AppendTo(&stars_, FlatSample(2, 4, 50, 1));
+    stars_.Commit();
     std::vector<std::uint32_t> all(50);
     for (std::uint32_t p = 0; p < 50; ++p) all[p] = p;
     book_.Update(50, all, {});
@@ -36,15 +36,15 @@ class CandidateSetTest : public ::testing::Test {
     return TargetFor<2>(star, violation, 1, 1, book_.failed_attempts(star));
   }
   CandidateSet<2> Draw(const Drawing& drawing = {true, 1, 1}) const {
-    return DrawCandidates<2>(complex_, book_, criteria_, drawing,
+    return DrawCandidates<2>(stars_, book_, criteria_, drawing,
                              {TargetOf(3, Rule::kSize), TargetOf(5, Rule::kSliver)});
   }
   Eigen::Vector4d CentreOf(std::uint32_t star) const {
-    return Eigen::Map<const Eigen::Vector4d>(complex_.Point(star)) +
+    return Eigen::Map<const Eigen::Vector4d>(stars_.sample().Point(star)) +
            Eigen::Vector4d(kRadius, 0, 0, 0);
   }
 
-  StarComplex<2> complex_;
+  Stars<2> stars_;
   ViolationBook<2> book_;
   ResolvedCriteria criteria_;
 };

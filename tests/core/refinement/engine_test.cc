@@ -28,21 +28,21 @@ TEST(Engine, EndsWhenAllRulesHold) {
   const auto topology = testing::TopologyOf(engine.Simplices(), 2);
   EXPECT_TRUE(topology.closed);
   EXPECT_EQ(topology.euler_characteristic, 2);
-  for (std::uint32_t p = 0; p < engine.complex().size(); ++p)
-    EXPECT_LE(engine.complex().cell(p).max_norm2(), 0.3 * 0.3 * (1 + 1e-9));
+  for (std::uint32_t p = 0; p < engine.stars().size(); ++p)
+    EXPECT_LE(engine.stars().cell(p).max_norm2(), 0.3 * 0.3 * (1 + 1e-9));
 }
 
 TEST(Engine, IsAValueThatGoesOnByItself) {
   Engine<2> engine = EngineOnSphere(SphereSpec(0.2), Octahedron());
   std::uint64_t round = 1;
   while (round < 4) ASSERT_TRUE(StepOnSphere(&engine, round++));
-  const std::vector<double> before = engine.complex().points();
+  const std::vector<double> before = engine.stars().sample().points();
   Engine<2> copy(engine);
   const std::uint64_t end = Finish(&copy, round);
-  EXPECT_EQ(engine.complex().points(), before);
-  EXPECT_GT(copy.complex().size(), engine.complex().size());
+  EXPECT_EQ(engine.stars().sample().points(), before);
+  EXPECT_GT(copy.stars().size(), engine.stars().size());
   EXPECT_EQ(Finish(&engine, round), end);
-  EXPECT_EQ(engine.complex().points(), copy.complex().points());
+  EXPECT_EQ(engine.stars().sample().points(), copy.stars().sample().points());
   EXPECT_EQ(engine.Simplices(), copy.Simplices());
 }
 
@@ -61,7 +61,7 @@ TEST(Engine, KeepsToItsVertices) {
   Engine<2> engine = EngineOnSphere(spec, Octahedron());
   for (std::uint64_t round = 1; !engine.is_full(); ++round)
     ASSERT_TRUE(StepOnSphere(&engine, round));
-  EXPECT_EQ(engine.complex().size(), 40u);
+  EXPECT_EQ(engine.stars().size(), 40u);
 }
 
 TEST(Engine, JudgesAllAnewWhereItIsTold) {

@@ -39,7 +39,7 @@ bool IsFilled(const DrivenRun& run) {
 
 // The last round swaps the fillings in for what the stars disagreed about.
 void ExpectDeltasToTellAll(const DrivenRun& run) {
-  std::set<StarComplex<kFilledDimension>::Simplex> replayed;
+  std::set<Stars<kFilledDimension>::Simplex> replayed;
   for (const MeshDelta& delta : run.deltas) {
     for (const auto& s : AsSet<kFilledDimension>(delta.removed)) EXPECT_EQ(replayed.erase(s), 1u);
     for (const auto& s : AsSet<kFilledDimension>(delta.added))

@@ -13,7 +13,7 @@ namespace stellate::core {
 namespace {
 
 using testing::AsSet;
-using Set = std::set<StarComplex<4>::Simplex>;
+using Set = std::set<Stars<4>::Simplex>;
 
 AnsweredPoints ClosestTo(Manifold& manifold, const Eigen::MatrixXd& x) {
   AnsweredPoints answers;
@@ -57,7 +57,7 @@ TEST(FilledMesh, TellsWhatItChangesWhenItIsHandedOut) {
     const Set before = AsSet<4>(engine->Simplices());
     EXPECT_FALSE(engine->filled().is_handed_out());
     std::vector<std::uint32_t> added, removed;
-    engine->filled().HandOut(engine->complex(), &added, &removed);
+    engine->filled().HandOut(engine->stars(), &added, &removed);
     EXPECT_TRUE(engine->filled().is_handed_out());
     const Set after = AsSet<4>(engine->Simplices());
     changed = after != before;
@@ -73,11 +73,11 @@ TEST(FilledMesh, TellsWhatItChangesWhenItIsHandedOut) {
 TEST(FilledMesh, IsOnlyMadeForHighDimensions) {
   const Engine<2> engine = testing::EngineOnSphere(testing::SphereSpec(0.5), testing::Octahedron());
   FilledMesh<2> filled;
-  filled.Fill(engine.complex(), engine.criteria());
+  filled.Fill(engine.stars(), engine.criteria());
   EXPECT_EQ(filled.cavities().cavities, 0u);
   Violation<2> violation;
   violation.rule = Rule::kInconsistent;
-  EXPECT_FALSE(filled.Mends(engine.complex(), 0, violation));
+  EXPECT_FALSE(filled.Mends(engine.stars(), 0, violation));
 }
 
 }  // namespace

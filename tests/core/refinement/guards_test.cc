@@ -68,16 +68,16 @@ TEST(GuardShares, MakeNoEdgeShorterThanTheShortest) {
 }
 
 // The edge of a wedge of 30 degrees, with points at these heights.
-StarComplex<3> WedgeEdge(const std::vector<double>& heights) {
+Stars<3> WedgeEdge(const std::vector<double>& heights) {
   constexpr double kFrame[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   const double conormals[6] = {-0.5, std::numbers::sqrt3 / 2, 0, 0, -1, 0};
-  StarComplex<3> complex(3, 1, 10, Judging::kFlats);
+  Stars<3> stars(3, 1, {10, Judging::kFlats});
   for (const double height : heights) {
     const double point[3] = {0, 0, height};
-    complex.Append(point, kFrame, StarComplex<3>::kNone, WallSet{3}, conormals);
+    stars.Add(point, kFrame, Stars<3>::kNone, WallSet{3}, conormals);
   }
-  complex.Commit();
-  return complex;
+  stars.Commit();
+  return stars;
 }
 
 SizeField<3> SizesOf(double epsilon) {
@@ -89,9 +89,9 @@ SizeField<3> SizesOf(double epsilon) {
 }
 
 TEST(PlanGuards, TellsWhichEdgesAreTooLongForTheirBalls) {
-  const StarComplex<3> complex = WedgeEdge({0, 1, 1.2, 1.4, 1.6});
-  ASSERT_TRUE(LacksGuards<3>(complex));
-  const Guards<3> guards = PlanGuards<3>(complex, SizesOf(1));
+  const Stars<3> stars = WedgeEdge({0, 1, 1.2, 1.4, 1.6});
+  ASSERT_TRUE(LacksGuards<3>(stars));
+  const Guards<3> guards = PlanGuards<3>(stars, SizesOf(1));
   EXPECT_NEAR(std::sqrt(guards.radii2[2]), kGuardShare * 0.2, 1e-12);
   ASSERT_EQ(guards.gaps.size(), 1u) << "beside 1 and 0.2 alone";
   EXPECT_EQ(guards.edges, 4u);
@@ -102,18 +102,18 @@ TEST(PlanGuards, TellsWhichEdgesAreTooLongForTheirBalls) {
 
 // A later pass: what was inserted since lies just outside of the balls, and would shrink them.
 TEST(PlanGuards, LeavesTheBallsThatThereAre) {
-  StarComplex<3> complex = WedgeEdge({0, 1, 2, 3});
-  Guards<3> first = PlanGuards<3>(complex, SizesOf(2));
+  Stars<3> stars = WedgeEdge({0, 1, 2, 3});
+  Guards<3> first = PlanGuards<3>(stars, SizesOf(2));
   EXPECT_TRUE(first.gaps.empty());
   first.radii2[3] = 0;
-  complex.Guard(first.radii2);
+  stars.SetGuards(first.radii2);
   constexpr double kFrame[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   constexpr double kBelow[3] = {0, -1, 0};
   const double radius = std::sqrt(first.radii2[1]);
   const double beside[3] = {1.0001 * radius, 0, 1};
-  complex.Append(beside, kFrame, StarComplex<3>::kNone, WallSet{2}, kBelow);
-  complex.Commit();
-  const Guards<3> second = PlanGuards<3>(complex, SizesOf(2));
+  stars.Add(beside, kFrame, Stars<3>::kNone, WallSet{2}, kBelow);
+  stars.Commit();
+  const Guards<3> second = PlanGuards<3>(stars, SizesOf(2));
   for (std::uint32_t p = 0; p < 3; ++p) EXPECT_EQ(second.radii2[p], first.radii2[p]);
   EXPECT_GT(second.radii2[3], 0);
   EXPECT_EQ(second.radii2[4], 0);

@@ -12,9 +12,9 @@ namespace stellate::core {
 namespace {
 
 using testing::AppendTo;
+using testing::FramedPoints;
 using testing::Make;
 using testing::RandomSample;
-using testing::Sample;
 
 constexpr int kDimension = 2;
 using Targets = std::vector<Target<kDimension>>;
@@ -22,14 +22,14 @@ using Targets = std::vector<Target<kDimension>>;
 class IndependentSetTest : public ::testing::Test {
  protected:
   IndependentSetTest() : sample_(RandomSample(*Make("torus:1:0.4@6"), 300, 1)) {
-    AppendTo(&complex_, sample_);
-    complex_.Commit();
+    AppendTo(&stars_, sample_);
+    stars_.Commit();
   }
 
   Targets RandomTargets(std::uint64_t seed, double largest) const {
     Random random(seed);
-    Targets targets(complex_.size());
-    for (std::uint32_t p = 0; p < complex_.size(); ++p) {
+    Targets targets(stars_.size());
+    for (std::uint32_t p = 0; p < stars_.size(); ++p) {
       Target<kDimension>& t = targets[p];
       t.star = p;
       t.violation.rule = static_cast<Rule>(random.Next() % 4);
@@ -45,7 +45,7 @@ class IndependentSetTest : public ::testing::Test {
   Targets Select(const Targets& targets, std::size_t most) const {
     Targets selected;
     for (const std::size_t i :
-         SelectIndependent<kDimension>(6, CentresOf<kDimension>(complex_, targets), targets, most))
+         SelectIndependent<kDimension>(6, CentresOf<kDimension>(stars_, targets), targets, most))
       selected.push_back(targets[i]);
     return selected;
   }
@@ -53,20 +53,20 @@ class IndependentSetTest : public ::testing::Test {
   // Whether a point at b's insertion point would lie in a's conflict ball.
   bool Conflict(const Target<kDimension>& a, const Target<kDimension>& b) const {
     double at[6], bt[6];
-    complex_.Lift(a.star, a.x, at);
-    complex_.Lift(b.star, b.x, bt);
+    stars_.sample().Lift(a.star, a.x, at);
+    stars_.sample().Lift(b.star, b.x, bt);
     const double reach = a.violation.rule >= Rule::kSliver ? 2 * a.radius : a.radius;
     return Distance(at, bt, 6) < reach;
   }
 
-  static std::vector<std::uint32_t> Stars(const Targets& targets) {
+  static std::vector<std::uint32_t> StarsOf(const Targets& targets) {
     std::vector<std::uint32_t> stars;
     for (const auto& t : targets) stars.push_back(t.star);
     return stars;
   }
 
-  Sample sample_;
-  StarComplex<kDimension> complex_{6, 0.3, 3, Judging::kFlats};
+  FramedPoints sample_;
+  Stars<kDimension> stars_{6, 0.3, {3, Judging::kFlats}};
 };
 
 constexpr std::size_t kAll = static_cast<std::size_t>(-1);
@@ -87,7 +87,7 @@ TEST_F(IndependentSetTest, IsGreedyIndependentAndMaximal) {
     for (std::size_t i = 0; i < chosen.size(); ++i)
       for (std::size_t j = i + 1; j < chosen.size(); ++j)
         EXPECT_FALSE(Conflict(chosen[i], chosen[j]));
-    const std::vector<std::uint32_t> stars = Stars(chosen);
+    const std::vector<std::uint32_t> stars = StarsOf(chosen);
     for (const auto& t : targets) {
       if (std::find(stars.begin(), stars.end(), t.star) != stars.end()) continue;
       EXPECT_TRUE(std::any_of(chosen.begin(), chosen.end(),
@@ -98,17 +98,17 @@ TEST_F(IndependentSetTest, IsGreedyIndependentAndMaximal) {
 }
 
 TEST_F(IndependentSetTest, TakesAllThatAreFarApart) {
-  EXPECT_EQ(Select(RandomTargets(8, 1e-9), kAll).size(), complex_.size());
+  EXPECT_EQ(Select(RandomTargets(8, 1e-9), kAll).size(), stars_.size());
 }
 
 TEST_F(IndependentSetTest, DoesNotDependOnTheOrderOfTheTargets) {
   Targets targets = RandomTargets(9, 0.3);
-  const auto chosen = Stars(Select(targets, kAll));
+  const auto chosen = StarsOf(Select(targets, kAll));
   Random random(3);
   for (int shuffle = 0; shuffle < 5; ++shuffle) {
     for (std::size_t i = targets.size(); i > 1; --i)
       std::swap(targets[i - 1], targets[random.Next() % i]);
-    EXPECT_EQ(Stars(Select(targets, kAll)), chosen);
+    EXPECT_EQ(StarsOf(Select(targets, kAll)), chosen);
   }
 }
 
@@ -120,7 +120,7 @@ TEST_F(IndependentSetTest, TheFirstOfItAreTheWorst) {
   std::sort(all.begin(), all.end(), Before);
   std::sort(some.begin(), some.end(), Before);
   all.resize(20);
-  EXPECT_EQ(Stars(some), Stars(all));
+  EXPECT_EQ(StarsOf(some), StarsOf(all));
 }
 
 TEST_F(IndependentSetTest, OfNothingIsNothing) { EXPECT_TRUE(Select({}, kAll).empty()); }

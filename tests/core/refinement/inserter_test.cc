@@ -17,29 +17,29 @@ class InserterTest : public ::testing::Test {
  protected:
   InserterTest()
       : criteria_(Resolve(SphereSpec(0.5))),
-        complex_(3, criteria_.epsilon, criteria_.inradius, criteria_.judging),
+        stars_(3, criteria_.epsilon, {criteria_.inradius, criteria_.judging}),
         sizes_(criteria_) {
     const AnsweredPoints seeds = OnSphere(Octahedron());
     for (Eigen::Index c = 0; c < 6; ++c)
-      complex_.Append(seeds.points.col(c).data(), seeds.tangents.col(c).data());
-    complex_.Commit();
+      stars_.Add(seeds.points.col(c).data(), seeds.tangents.col(c).data());
+    stars_.Commit();
     std::vector<std::uint32_t> all;
     std::vector<ViolationBook<2>::Entry> entries;
     for (std::uint32_t p = 0; p < 6; ++p) {
       all.push_back(p);
-      if (const auto worst = WorstSizeOrShape<2>(complex_, p, criteria_.epsilon, 2))
+      if (const auto worst = WorstSizeOrShape<2>(stars_, p, criteria_.epsilon, 2))
         entries.push_back({p, *worst});
     }
     book_.Update(6, all, std::move(entries));
     const auto& entry = book_.size_and_shape().front();
     candidates_ = DrawCandidates<2>(
-        complex_, book_, criteria_, {true, 1, 1},
+        stars_, book_, criteria_, {true, 1, 1},
         {TargetFor<2>(entry.star, entry.violation, criteria_.epsilon, criteria_.advance_step, 0)});
     answers_ = OnSphere(candidates_.points);
   }
 
   Inserted Run(const Caution& caution = {}, std::uint64_t max_vertices = 100) {
-    return Inserter<2>({complex_, sizes_, book_, criteria_, faces_}, candidates_, answers_, caution,
+    return Inserter<2>({stars_, sizes_, book_, criteria_, faces_}, candidates_, answers_, caution,
                        max_vertices)
         .Run();
   }
@@ -47,7 +47,7 @@ class InserterTest : public ::testing::Test {
   std::uint32_t star() const { return candidates_.targets[0].star; }
 
   ResolvedCriteria criteria_;
-  StarComplex<2> complex_;
+  Stars<2> stars_;
   SizeField<2> sizes_;
   ViolationBook<2> book_;
   FaceBook<2> faces_{0};
@@ -59,7 +59,7 @@ TEST_F(InserterTest, InsertsWhatCutsTheViolation) {
   const Inserted inserted = Run();
   EXPECT_EQ(inserted.used, std::vector<std::uint8_t>{1});
   EXPECT_EQ(inserted.rules, std::vector<Rule>{Rule::kSize});
-  EXPECT_EQ(complex_.size(), 7u);
+  EXPECT_EQ(stars_.size(), 7u);
   EXPECT_EQ(book_.failed_attempts(star()), 0);
 }
 
@@ -68,7 +68,7 @@ TEST_F(InserterTest, DoesNotInsertWhatIsThereAlready) {
   const Inserted inserted = Run();
   EXPECT_EQ(inserted.used, std::vector<std::uint8_t>{0});
   EXPECT_EQ(inserted.duplicates, 1u);
-  EXPECT_EQ(complex_.size(), 6u);
+  EXPECT_EQ(stars_.size(), 6u);
   EXPECT_EQ(book_.failed_attempts(star()), 1);
 }
 
@@ -108,7 +108,7 @@ TEST_F(InserterTest, InsertsPlannedPointsThatHaveRoomAsLongAsThereIsRoom) {
   EXPECT_EQ(all.used, (std::vector<std::uint8_t>{1, 1, 0, 1}));
   EXPECT_EQ(all.rules, (std::vector<Rule>{Rule::kSize, Rule::kRadiusEdge, Rule::kInconsistent}));
   EXPECT_EQ(all.duplicates, 1u);
-  const Inserted none = Run({}, complex_.size());
+  const Inserted none = Run({}, stars_.size());
   EXPECT_EQ(none.used[1] + none.used[2] + none.used[3], 0);
 }
 

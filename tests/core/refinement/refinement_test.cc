@@ -13,9 +13,9 @@ using testing::AsSet;
 using testing::Drive;
 using testing::DrivenRun;
 using testing::ExpectGoodMesh;
+using testing::FramedPoints;
 using testing::Make;
 using testing::RandomPointsOn;
-using testing::Sample;
 using testing::SpecificationFor;
 using testing::StarOf;
 
@@ -75,21 +75,21 @@ INSTANTIATE_TEST_SUITE_P(
 template <int K>
 void ExpectRulesHold(const DrivenRun& run, const Specification& spec) {
   const ResolvedCriteria criteria = Resolve(spec);
-  Sample sample;
+  FramedPoints sample;
   sample.d = spec.ambient_dimension;
   sample.k = K;
   sample.Append(run.mesher->Points(), run.mesher->Tangents());
-  StarComplex<K> complex(sample.d, spec.epsilon, criteria.advance_step, Judging::kFlats);
-  AppendTo(&complex, sample);
-  complex.Commit();
-  std::set<typename StarComplex<K>::Simplex> all;
-  for (std::uint32_t p = 0; p < complex.size(); ++p) {
+  Stars<K> stars(sample.d, spec.epsilon, {criteria.advance_step, Judging::kFlats});
+  AppendTo(&stars, sample);
+  stars.Commit();
+  std::set<typename Stars<K>::Simplex> all;
+  for (std::uint32_t p = 0; p < stars.size(); ++p) {
     EXPECT_FALSE(
-        WorstSizeOrShape<K>(complex, p, spec.epsilon, criteria.radius_edge_bound).has_value());
+        WorstSizeOrShape<K>(stars, p, spec.epsilon, criteria.radius_edge_bound).has_value());
     EXPECT_FALSE(
-        WorstSliverOrInconsistent<K>(complex, p, criteria.shape, criteria.epsilon).has_value());
-    EXPECT_EQ(CountInconsistent<K>(complex, p), 0u);
-    all.merge(StarOf(complex, p));
+        WorstSliverOrInconsistent<K>(stars, p, criteria.shape, criteria.epsilon).has_value());
+    EXPECT_EQ(CountInconsistent<K>(stars, p), 0u);
+    all.merge(StarOf(stars, p));
   }
   EXPECT_EQ(all, AsSet<K>(run.mesher->Simplices()));
 }
@@ -152,7 +152,7 @@ TEST(Seeds, OnARegularGridMeshAsWellAsAny) {
 TEST(Seeds, OnAGridOfTheFlatTorusMeshAsWellAsAny) {
   for (const int k : {2, 3}) {
     const auto manifold = Make(k == 2 ? "clifford-torus" : "flat-torus:3");
-    const Sample grid = testing::TorusGrid(k, k == 2 ? 16 : 10);
+    const FramedPoints grid = testing::TorusGrid(k, k == 2 ? 16 : 10);
     Specification spec = SpecificationFor(*manifold, k == 2 ? 0.25 : 0.6);
     spec.bounding_box.reset();
     spec.seeds = Eigen::Map<const Eigen::MatrixXd>(grid.points.data(), grid.d, grid.size());

@@ -15,31 +15,32 @@ namespace stellate::core {
 namespace {
 
 using testing::AppendTo;
+using testing::FramedPoints;
 using testing::Make;
 using testing::RandomSample;
-using testing::Sample;
 using testing::StarOf;
 
 template <int K>
-using Simplex = typename StarComplex<K>::Simplex;
+using Simplex = typename Stars<K>::Simplex;
 
 template <int K>
-std::unique_ptr<StarComplex<K>> Build(const Sample& sample) {
-  auto complex = std::make_unique<StarComplex<K>>(sample.d, 0.3, 3.0, Judging::kFlats);
-  AppendTo(complex.get(), sample);
-  complex->Commit();
-  return complex;
+std::unique_ptr<Stars<K>> Build(const FramedPoints& sample) {
+  auto stars = std::make_unique<Stars<K>>(sample.d, 0.3, StarOptions{3.0, Judging::kFlats});
+  AppendTo(stars.get(), sample);
+  stars->Commit();
+  return stars;
 }
 
-std::vector<const double*> Vertices(const Sample& sample, const std::vector<std::uint32_t>& ids) {
+std::vector<const double*> Vertices(const FramedPoints& sample,
+                                    const std::vector<std::uint32_t>& ids) {
   std::vector<const double*> vertices;
   for (const std::uint32_t id : ids) vertices.push_back(sample.Point(id));
   return vertices;
 }
 
 // Whether a face at p of dimension 2 or more is not Theta0-fat, face by face.
-bool HasThinFaceAt(const Sample& sample, const std::vector<std::uint32_t>& simplex, std::uint32_t p,
-                   double theta0) {
+bool HasThinFaceAt(const FramedPoints& sample, const std::vector<std::uint32_t>& simplex,
+                   std::uint32_t p, double theta0) {
   for (unsigned subset = 1; subset < (1u << simplex.size()); ++subset) {
     std::vector<std::uint32_t> face;
     for (std::size_t s = 0; s < simplex.size(); ++s)
@@ -51,9 +52,9 @@ bool HasThinFaceAt(const Sample& sample, const std::vector<std::uint32_t>& simpl
 }
 
 template <int K>
-bool IsInStars(const StarComplex<K>& complex, const Simplex<K>& simplex) {
+bool IsInStars(const Stars<K>& stars, const Simplex<K>& simplex) {
   return std::all_of(simplex.begin(), simplex.end(),
-                     [&](std::uint32_t q) { return StarOf(complex, q).contains(simplex); });
+                     [&](std::uint32_t q) { return StarOf(stars, q).contains(simplex); });
 }
 
 // Stars that break R1, those that break R2 alone, those that break neither, and fakes among the
@@ -65,13 +66,13 @@ struct SizesAndShapes {
 // Expects of each star the worst simplex of the first rule broken.
 void ExpectWorst(SizesAndShapes* seen) {
   // In a plane the circumradius in T_p is that of the triangle.
-  const Sample sample = testing::FlatSample(2, 3, 400, 1);
-  const auto complex = Build<2>(sample);
+  const FramedPoints sample = testing::FlatSample(2, 3, 400, 1);
+  const auto stars = Build<2>(sample);
   for (const double epsilon : {0.03, 0.1, 5.0}) {
     for (const double rho0 : {1.2, 6.0}) {
-      for (std::uint32_t p = 0; p < complex->size(); ++p) {
-        const auto got = WorstSizeOrShape<2>(*complex, p, epsilon, rho0);
-        if (!complex->cell(p).bounded()) {
+      for (std::uint32_t p = 0; p < stars->size(); ++p) {
+        const auto got = WorstSizeOrShape<2>(*stars, p, epsilon, rho0);
+        if (!stars->cell(p).bounded()) {
           ASSERT_TRUE(got.has_value());
           EXPECT_EQ(got->rule, Rule::kSize);
           EXPECT_NEAR(got->radius, std::hypot(got->x[0], got->x[1]), 1e-12);
@@ -79,7 +80,7 @@ void ExpectWorst(SizesAndShapes* seen) {
           continue;
         }
         double largest = 0, worst_rho = 0;
-        for (const auto& s : StarOf(*complex, p)) {
+        for (const auto& s : StarOf(*stars, p)) {
           const SimplexMeasures m = MeasureSimplex(Vertices(sample, {s[0], s[1], s[2]}), sample.d);
           largest = std::max(largest, m.circumradius);
           double edge = INFINITY;
@@ -125,19 +126,19 @@ TEST(RuleR2RadiusEdge, GivesTheWorstSimplexWhereNoneIsTooLarge) {
 }
 
 template <int K>
-void ExpectSliversAsMeasured(const Sample& sample) {
-  const auto complex = Build<K>(sample);
+void ExpectSliversAsMeasured(const FramedPoints& sample) {
+  const auto stars = Build<K>(sample);
   int thin = 0, fat = 0;
   for (const double theta0 : {0.1, 0.2, 0.3}) {
-    for (std::uint32_t p = 0; p < complex->size(); ++p) {
-      for (std::size_t v = 0; v < complex->cell(p).vertex_count(); ++v) {
+    for (std::uint32_t p = 0; p < stars->size(); ++p) {
+      for (std::size_t v = 0; v < stars->cell(p).vertex_count(); ++v) {
         Simplex<K> s;
-        if (!complex->SimplexOf(p, complex->cell(p), v, &s)) continue;
+        if (!stars->SimplexOf(p, stars->cell(p), v, &s)) continue;
         const bool expected = HasThinFaceAt(sample, {s.begin(), s.end()}, p, theta0);
-        EXPECT_EQ(HasThinFaceAt<K>(*complex, sample.Point(p), complex->cell(p), v, theta0, nullptr),
+        EXPECT_EQ(HasThinFaceAt<K>(*stars, sample.Point(p), stars->cell(p), v, theta0, nullptr),
                   expected);
         ++(expected ? thin : fat);
-        EXPECT_FALSE(HasThinFaceAt<K>(*complex, sample.Point(p), complex->cell(p), v, 0, nullptr));
+        EXPECT_FALSE(HasThinFaceAt<K>(*stars, sample.Point(p), stars->cell(p), v, 0, nullptr));
       }
     }
   }
@@ -153,20 +154,19 @@ TEST(RuleR3Slivers, AreTheThinFacesAtTheStarsPoint) {
 
 // All stars together see every sliver that the simplex has.
 TEST(RuleR3Slivers, AreSeenFromSomeVertexOfTheSimplex) {
-  const Sample sample = RandomSample(*Make("flat-torus:3"), 250, 5);
-  const auto complex = Build<3>(sample);
+  const FramedPoints sample = RandomSample(*Make("flat-torus:3"), 250, 5);
+  const auto stars = Build<3>(sample);
   int slivers = 0;
-  for (std::uint32_t p = 0; p < complex->size(); ++p) {
-    for (const auto& s : StarOf(*complex, p)) {
-      if (s[0] != p || !IsInStars(*complex, s)) continue;
+  for (std::uint32_t p = 0; p < stars->size(); ++p) {
+    for (const auto& s : StarOf(*stars, p)) {
+      if (s[0] != p || !IsInStars(*stars, s)) continue;
       std::uint64_t key = 0;
       for (const std::uint32_t q : s) key += Mix64(q);
       bool seen = false;
       for (const std::uint32_t q : s) {
-        const auto v = FindSimplex<3>(complex->cell(q), q, s, key);
+        const auto v = FindSimplex<3>(stars->cell(q), q, s, key);
         ASSERT_TRUE(v.has_value());
-        seen =
-            seen || HasThinFaceAt<3>(*complex, sample.Point(q), complex->cell(q), *v, 0.2, nullptr);
+        seen = seen || HasThinFaceAt<3>(*stars, sample.Point(q), stars->cell(q), *v, 0.2, nullptr);
       }
       const std::vector<std::uint32_t> ids(s.begin(), s.end());
       EXPECT_EQ(seen, ContainsSliver(Vertices(sample, ids), sample.d, 0.2));
@@ -177,49 +177,49 @@ TEST(RuleR3Slivers, AreSeenFromSomeVertexOfTheSimplex) {
 }
 
 TEST(FindSimplex, FindsWhatTheStarHoldsAndNothingElse) {
-  const Sample sample = RandomSample(*Make("torus"), 150, 6);
-  const auto complex = Build<2>(sample);
-  for (std::uint32_t p = 0; p < complex->size(); ++p) {
-    for (const auto& s : StarOf(*complex, p)) {
+  const FramedPoints sample = RandomSample(*Make("torus"), 150, 6);
+  const auto stars = Build<2>(sample);
+  for (std::uint32_t p = 0; p < stars->size(); ++p) {
+    for (const auto& s : StarOf(*stars, p)) {
       std::uint64_t key = 0;
       for (const std::uint32_t q : s) key += Mix64(q);
       for (const std::uint32_t q : s) {
-        const auto v = FindSimplex<2>(complex->cell(q), q, s, key);
-        EXPECT_EQ(v.has_value(), StarOf(*complex, q).contains(s));
+        const auto v = FindSimplex<2>(stars->cell(q), q, s, key);
+        EXPECT_EQ(v.has_value(), StarOf(*stars, q).contains(s));
         Simplex<2> found;
         if (!v) continue;
-        ASSERT_TRUE(complex->SimplexOf(q, complex->cell(q), *v, &found));
+        ASSERT_TRUE(stars->SimplexOf(q, stars->cell(q), *v, &found));
         EXPECT_EQ(found, s);
       }
       Simplex<2> other = s;
-      other[2] = (other[2] + 1) % complex->size();
+      other[2] = (other[2] + 1) % stars->size();
       if (std::find(s.begin(), s.end(), other[2]) == s.end()) {
         const std::uint64_t other_key = key - Mix64(s[2]) + Mix64(other[2]);
         std::sort(other.begin(), other.end());
-        EXPECT_EQ(FindSimplex<2>(complex->cell(p), p, other, other_key).has_value(),
-                  StarOf(*complex, p).contains(other));
+        EXPECT_EQ(FindSimplex<2>(stars->cell(p), p, other, other_key).has_value(),
+                  StarOf(*stars, p).contains(other));
       }
     }
   }
 }
 
 template <int K>
-void ExpectConsistencyByDefinition(const Sample& sample, double sliver_bound) {
-  const auto complex = Build<K>(sample);
-  const ConsistentSimplices<K> known(*complex);
+void ExpectConsistencyByDefinition(const FramedPoints& sample, double sliver_bound) {
+  const auto stars = Build<K>(sample);
+  const ConsistentSimplices<K> known(*stars);
   std::uint64_t inconsistent = 0, slivers = 0, fine = 0;
-  for (std::uint32_t p = 0; p < complex->size(); ++p) {
+  for (std::uint32_t p = 0; p < stars->size(); ++p) {
     std::uint64_t expected = 0;
     double worst_sliver = 0, worst_inconsistent = 0;
-    for (std::size_t v = 0; v < complex->cell(p).vertex_count(); ++v) {
-      const double radius = std::sqrt(complex->cell(p).norm2(v));
+    for (std::size_t v = 0; v < stars->cell(p).vertex_count(); ++v) {
+      const double radius = std::sqrt(stars->cell(p).norm2(v));
       Simplex<K> s;
-      const bool real = complex->SimplexOf(p, complex->cell(p), v, &s);
+      const bool real = stars->SimplexOf(p, stars->cell(p), v, &s);
       // Slivers are judged in the star of their lowest vertex.
       if (real && s[0] == p &&
-          HasThinFaceAt<K>(*complex, sample.Point(p), complex->cell(p), v, sliver_bound, nullptr))
+          HasThinFaceAt<K>(*stars, sample.Point(p), stars->cell(p), v, sliver_bound, nullptr))
         worst_sliver = std::max(worst_sliver, radius);
-      const bool consistent = real && IsInStars(*complex, s);
+      const bool consistent = real && IsInStars(*stars, s);
       ASSERT_LT(v, 64u);
       EXPECT_EQ((known.Of(p) >> v & 1) != 0, consistent) << "star " << p;
       if (!consistent) {
@@ -227,9 +227,9 @@ void ExpectConsistencyByDefinition(const Sample& sample, double sliver_bound) {
         worst_inconsistent = std::max(worst_inconsistent, radius);
       }
     }
-    EXPECT_EQ(CountInconsistent<K>(*complex, p), expected) << "star " << p;
-    const auto got = WorstSliverOrInconsistent<K>(*complex, p, {sliver_bound}, 0.3, K, known.Of(p));
-    if (!complex->cell(p).bounded()) {  // R1's, not yet to be judged by others
+    EXPECT_EQ(CountInconsistent<K>(*stars, p), expected) << "star " << p;
+    const auto got = WorstSliverOrInconsistent<K>(*stars, p, {sliver_bound}, 0.3, K, known.Of(p));
+    if (!stars->cell(p).bounded()) {  // R1's, not yet to be judged by others
       EXPECT_FALSE(got) << "star " << p;
       inconsistent += expected > 0;
       continue;
@@ -267,27 +267,26 @@ void ExpectBadCountedRightly(const std::string& name, double epsilon) {
   spec.criteria.judging = Judging::kFlats;
   const testing::DrivenRun run = testing::Drive(spec, *manifold);
   ASSERT_TRUE(run.report().certificate.certified) << run.report().certificate.verdict;
-  Sample mesh;
+  FramedPoints mesh;
   mesh.d = spec.ambient_dimension;
   mesh.k = K;
   mesh.Append(run.mesher->Points(), run.mesher->Tangents());
-  const Sample candidates = RandomSample(*manifold, 60, 10);
-  const auto complex = Build<K>(mesh);
-  typename StarComplex<K>::Cell::Scratch scratch;
-  typename StarComplex<K>::Tentative tentative;
+  const FramedPoints candidates = RandomSample(*manifold, 60, 10);
+  const auto stars = Build<K>(mesh);
+  typename Stars<K>::Tentative tentative;
   int good = 0, bad = 0;
   for (std::uint32_t c = 0; c < candidates.size(); ++c) {
     const double* point = candidates.Point(c);
-    complex->TryPoint(point, candidates.Tangent(c), StarComplex<K>::kNone, scratch, &tentative);
-    const int count = CountBad<K>(*complex, point, tentative, {}, epsilon, 1'000'000);
+    stars->TryPoint(point, candidates.Tangent(c), Stars<K>::kNone, &tentative);
+    const int count = CountBad<K>(*stars, point, tentative, {}, epsilon, 1'000'000);
     for (const int enough : {0, 1, 2})
-      EXPECT_EQ(CountBad<K>(*complex, point, tentative, {}, epsilon, enough),
+      EXPECT_EQ(CountBad<K>(*stars, point, tentative, {}, epsilon, enough),
                 std::min(count, enough));
     // A bound that every new simplex fails counts no fewer.
     const ShapeBounds thick{K >= 2 ? 0.3 : 0};
-    EXPECT_GE(CountBad<K>(*complex, point, tentative, thick, epsilon, 1'000'000), count);
+    EXPECT_GE(CountBad<K>(*stars, point, tentative, thick, epsilon, 1'000'000), count);
 
-    Sample grown = mesh;
+    FramedPoints grown = mesh;
     grown.points.insert(grown.points.end(), point, point + mesh.d);
     grown.tangents.insert(grown.tangents.end(), candidates.Tangent(c),
                           candidates.Tangent(c) + mesh.d * K);

@@ -22,15 +22,15 @@ Specification Spec(double epsilon) {
   return spec;
 }
 
-StarComplex<2> ComplexOn(const std::string& manifold, int count) {
-  StarComplex<2> complex(3, 0.3, 3, Judging::kFlats);
-  AppendTo(&complex, RandomSample(*Make(manifold), count, 1));
-  complex.Commit();
-  return complex;
+Stars<2> ComplexOn(const std::string& manifold, int count) {
+  Stars<2> stars(3, 0.3, {3, Judging::kFlats});
+  AppendTo(&stars, RandomSample(*Make(manifold), count, 1));
+  stars.Commit();
+  return stars;
 }
 
-std::vector<std::uint32_t> All(const StarComplex<2>& complex) {
-  std::vector<std::uint32_t> all(complex.size());
+std::vector<std::uint32_t> All(const Stars<2>& stars) {
+  std::vector<std::uint32_t> all(stars.size());
   std::iota(all.begin(), all.end(), 0u);
   return all;
 }
@@ -48,12 +48,12 @@ TEST(SizeField, FollowsWhatIsGivenUpToEpsilonAndDownToTheFinest) {
   spec.criteria.size_rate = 0.5;
   SizeField<2> sizes(Resolve(spec));
   for (const double size : {0.2, 100.0, 1e-9}) sizes.AppendGiven(size);
-  const StarComplex<2> complex = ComplexOn("sphere", 20);
+  const Stars<2> stars = ComplexOn("sphere", 20);
   EXPECT_FALSE(sizes.is_estimated());
   EXPECT_EQ(sizes.given()[1], 100);
-  EXPECT_DOUBLE_EQ(sizes.BoundAt(complex, 0), 0.1);
-  EXPECT_EQ(sizes.BoundAt(complex, 1), 0.3);
-  EXPECT_EQ(sizes.BoundAt(complex, 2), sizes.FinestBound());
+  EXPECT_DOUBLE_EQ(sizes.BoundAt(stars, 0), 0.1);
+  EXPECT_EQ(sizes.BoundAt(stars, 1), 0.3);
+  EXPECT_EQ(sizes.BoundAt(stars, 2), sizes.FinestBound());
   EXPECT_LT(sizes.FinestBound(), 0.3 / 1000);
   EXPECT_EQ(sizes.CountTooFine(), 1u);
 }
@@ -73,35 +73,35 @@ TEST(SizeField, SeesTheRadiusOfASphere) {
   spec.criteria.size_rate = 0.4;
   SizeField<2> sizes(Resolve(spec));
   EXPECT_TRUE(sizes.is_estimated());
-  const StarComplex<2> complex = ComplexOn("sphere", 200);
-  sizes.Look(complex, All(complex));
+  const Stars<2> stars = ComplexOn("sphere", 200);
+  sizes.Look(stars, All(stars));
   double most = 0;
-  for (std::uint32_t p = 0; p < complex.size(); ++p) {
-    EXPECT_NEAR(sizes.BoundAt(complex, p), 0.4, 1e-6);
-    most = std::max(most, std::sqrt(complex.cell(p).max_norm2()));
+  for (std::uint32_t p = 0; p < stars.size(); ++p) {
+    EXPECT_NEAR(sizes.BoundAt(stars, p), 0.4, 1e-6);
+    most = std::max(most, std::sqrt(stars.cell(p).max_norm2()));
   }
-  EXPECT_NEAR(sizes.MaxRadiusOverSize(complex), most, 1e-6 * most);
+  EXPECT_NEAR(sizes.MaxRadiusOverSize(stars), most, 1e-6 * most);
 }
 
 TEST(SizeField, IsLipschitzOnceSpread) {
   Specification spec = Spec(10);
   spec.criteria.size_rate = 1;
   SizeField<2> sizes(Resolve(spec));
-  const StarComplex<2> complex = ComplexOn("ellipsoid:1:0.6:0.3", 400);
-  sizes.Look(complex, All(complex));
-  EXPECT_TRUE(sizes.NeedsSpreading(complex, true));
-  sizes.Spread(complex);
-  EXPECT_FALSE(sizes.NeedsSpreading(complex, true));
-  for (std::uint32_t p = 0; p < complex.size(); ++p) {
-    const auto& cell = complex.cell(p);
+  const Stars<2> stars = ComplexOn("ellipsoid:1:0.6:0.3", 400);
+  sizes.Look(stars, All(stars));
+  EXPECT_TRUE(sizes.NeedsSpreading(stars, true));
+  sizes.Spread(stars);
+  EXPECT_FALSE(sizes.NeedsSpreading(stars, true));
+  for (std::uint32_t p = 0; p < stars.size(); ++p) {
+    const auto& cell = stars.cell(p);
     for (std::size_t f = 0; f < cell.facet_count(); ++f) {
-      const double apart = std::sqrt(complex.EdgeLength2(p, f));
-      EXPECT_LE(sizes.BoundAt(complex, p), sizes.BoundAt(complex, cell.id(f)) + apart * (1 + 1e-6));
+      const double apart = std::sqrt(stars.EdgeLength2(p, f));
+      EXPECT_LE(sizes.BoundAt(stars, p), sizes.BoundAt(stars, cell.id(f)) + apart * (1 + 1e-6));
     }
   }
-  sizes.Look(complex, {0});
-  EXPECT_TRUE(sizes.NeedsSpreading(complex, true));
-  EXPECT_FALSE(sizes.NeedsSpreading(complex, false));
+  sizes.Look(stars, {0});
+  EXPECT_TRUE(sizes.NeedsSpreading(stars, true));
+  EXPECT_FALSE(sizes.NeedsSpreading(stars, false));
 }
 
 }  // namespace

@@ -8,10 +8,10 @@ namespace stellate::core {
 namespace {
 
 using Book = ViolationBook<2>;
-using Stars = std::vector<std::uint32_t>;
+using Ids = std::vector<std::uint32_t>;
 
-Stars Entered(const Book& book) {
-  Stars stars;
+Ids Entered(const Book& book) {
+  Ids stars;
   for (const auto& entry : book.size_and_shape()) stars.push_back(entry.star);
   return stars;
 }
@@ -26,12 +26,12 @@ Book FiveStars() {
 
 TEST(ViolationBook, HoldsOneEntryForEachStarThatBreaksR1OrR2) {
   Book book = FiveStars();
-  EXPECT_EQ(Entered(book), (Stars{1, 3, 4}));
+  EXPECT_EQ(Entered(book), (Ids{1, 3, 4}));
   // 3 was mended, 0 and a new star were broken.
   book.Update(6, {0, 3, 5}, {{0, {}}, {5, {}}});
-  EXPECT_EQ(Entered(book), (Stars{1, 4, 0, 5}));
+  EXPECT_EQ(Entered(book), (Ids{1, 4, 0, 5}));
   book.Replace({{2, {}}});
-  EXPECT_EQ(Entered(book), Stars{2});
+  EXPECT_EQ(Entered(book), Ids{2});
 }
 
 TEST(ViolationBook, ForgetsFailuresOfAStarThatChanges) {
@@ -62,12 +62,12 @@ TEST(ViolationBook, GivesUpAfterManyAttemptsOrAtOnce) {
 TEST(ViolationBook, SuspectsAllUntilTheyWereTakenOnce) {
   Book book = FiveStars();
   EXPECT_TRUE(book.are_all_suspect());
-  EXPECT_EQ(book.TakeSuspects({}), (Stars{0, 1, 2, 3, 4}));
+  EXPECT_EQ(book.TakeSuspects({}), (Ids{0, 1, 2, 3, 4}));
   EXPECT_FALSE(book.are_all_suspect());
-  EXPECT_EQ(book.TakeSuspects({}), Stars{});
+  EXPECT_EQ(book.TakeSuspects({}), Ids{});
   book.Suspect({3, 2});
   book.Suspect({2});
-  EXPECT_EQ(book.TakeSuspects({4}), (Stars{2, 3, 4}));
+  EXPECT_EQ(book.TakeSuspects({4}), (Ids{2, 3, 4}));
 }
 
 TEST(ViolationBook, JudgesBlemishedStarsAgain) {
@@ -80,7 +80,7 @@ TEST(ViolationBook, JudgesBlemishedStarsAgain) {
   EXPECT_EQ(book.slivers(), 1u);
   EXPECT_EQ(book.inconsistent(), 1u);
   book.Suspect({1});
-  EXPECT_EQ(book.TakeSuspects({}), (Stars{0, 1, 2}));
+  EXPECT_EQ(book.TakeSuspects({}), (Ids{0, 1, 2}));
   EXPECT_EQ(book.blemished(), 0u);
   book.JudgeAllAnew();
   EXPECT_EQ(book.TakeSuspects({}).size(), 5u);

@@ -74,7 +74,7 @@ TEST_F(RoundTripTest, AsksOnceWhereTheClientHasAll) {
   double by_vector[6];
   ToByVector(flats.bases.col(1).data(), 3, 2, by_vector);
   for (int i = 0; i < 6; ++i)
-    EXPECT_EQ(by_vector[i], engine_.complex().Tangent(candidates.targets[1].star)[i]);
+    EXPECT_EQ(by_vector[i], engine_.stars().sample().Tangent(candidates.targets[1].star)[i]);
   EXPECT_EQ(flats.radii[1], candidates.targets[1].radius);
   EXPECT_EQ(trip.answers().points, OnSphere(candidates.points).points);
   EXPECT_EQ(trip.answers().tangents, OnSphere(candidates.points).tangents);
@@ -116,7 +116,7 @@ TEST_F(RoundTripTest, GoesBackToTheFlatBeforeEachFurtherClosestPoint) {
   for (std::size_t i = 0; i < candidates.targets.size(); ++i) {
     const auto c = static_cast<Eigen::Index>(i);
     if (candidates.targets[i].violation.fake) continue;
-    const double* tangent = engine.complex().Tangent(candidates.targets[i].star);
+    const double* tangent = engine.stars().sample().Tangent(candidates.targets[i].star);
     const Eigen::Map<const Eigen::Matrix<double, 3, 2>> basis(tangent);
     const Eigen::Vector3d off = asked[1][0].points.col(c) - candidates.points.col(c);
     EXPECT_LT((basis.transpose() * off).norm(), 1e-12);

@@ -51,18 +51,18 @@ TEST(SparePoints, AreUncoveredFarFromTheSample) {
   answers.answered = {1, 1};
   SparePoints spare(3);
   spare.Keep(answers, {0, 0});
-  EXPECT_EQ(spare.Uncovered(engine.complex()), (std::vector<double>{100, 0, 0}));
+  EXPECT_EQ(spare.Uncovered(engine.stars()), (std::vector<double>{100, 0, 0}));
 }
 
 TEST(SparePoints, AreChosenApartAndNotForEver) {
   const Engine<2> engine = EngineOnSphere(SphereSpec(0.5), Octahedron());
   SparePoints spare(3);
-  EXPECT_EQ(spare.Choose({}, engine.complex(), 0.5).cols(), 0);
+  EXPECT_EQ(spare.Choose({}, engine.stars(), 0.5).cols(), 0);
   // Two that lie together, and one by itself.
   const std::vector<double> points = {5, 0, 0, 5.1, 0, 0, 9, 0, 0};
   int times = 0;
   while (true) {
-    const Eigen::MatrixXd chosen = spare.Choose(points, engine.complex(), 0.5);
+    const Eigen::MatrixXd chosen = spare.Choose(points, engine.stars(), 0.5);
     if (chosen.cols() == 0) break;
     ASSERT_EQ(chosen.cols(), 2);
     EXPECT_EQ(chosen(0, 0), 5);

@@ -11,9 +11,9 @@
 namespace stellate::core {
 namespace {
 
+using testing::FramedPoints;
 using testing::Make;
 using testing::RandomPointsOn;
-using testing::Sample;
 
 constexpr int kPoints = 40;
 constexpr double kStep = 0.003;
@@ -98,7 +98,7 @@ class TangentFinderTest : public ::testing::TestWithParam<std::string> {
   std::unique_ptr<Manifold> manifold_;
   int k_, d_;
   TangentFinder finder_;
-  Sample exact_;
+  FramedPoints exact_;
   Eigen::MatrixXd points_;
   std::vector<std::vector<double>> guesses_;
 };

@@ -26,7 +26,7 @@ struct HalfSpace {
 template <int K>
 using HalfSpaces = std::vector<HalfSpace<K>>;
 
-// A weight such as StarComplex adds to each point, against degenerate positions, for lengths near
+// A weight such as Stars adds to each point, against degenerate positions, for lengths near
 // 1: far above rounding, far below anything geometric.
 inline double Weight(std::uint32_t id) {
   return 1e-10 * static_cast<double>(Mix64(id) >> 11) * 0x1p-53;

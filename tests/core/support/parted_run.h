@@ -136,7 +136,7 @@ class PartedRun {
     for (int part = 0; part < cubes_.parts(); ++part)
       for (std::uint32_t i = 0; i < parts_[part].names.size(); ++i)
         if (IsOwn(part, i))
-          std::copy_n(parts_[part].engine->complex().Point(i), d,
+          std::copy_n(parts_[part].engine->stars().sample().Point(i), d,
                       points.data() + parts_[part].names[i] * d);
     return points;
   }
@@ -181,7 +181,7 @@ class PartedRun {
     std::vector<double> centres;
     for (const auto& [part, target] : seen) {
       const std::vector<double> centre =
-          CentresOf<K>(parts_[part].engine->complex(), std::vector{target});
+          CentresOf<K>(parts_[part].engine->stars(), std::vector{target});
       centres.insert(centres.end(), centre.begin(), centre.end());
       named.push_back(target);
       named.back().star = parts_[part].names[target.star];
@@ -240,13 +240,13 @@ class PartedRun {
 
   // What a part inserted last.
   void Tell(int from) {
-    const StarComplex<K>& complex = parts_[from].engine->complex();
-    const std::uint32_t last = complex.size() - 1, name = size();
+    const Stars<K>& stars = parts_[from].engine->stars();
+    const std::uint32_t last = stars.size() - 1, name = size();
     const int d = spec_.ambient_dimension;
     AnsweredPoints point;
-    point.points = Eigen::Map<const Eigen::VectorXd>(complex.Point(last), d);
-    point.tangents = Eigen::Map<const Eigen::VectorXd>(complex.Tangent(last), d * K);
-    owner_.push_back(cubes_.OwnerOf(complex.Point(last)));
+    point.points = Eigen::Map<const Eigen::VectorXd>(stars.sample().Point(last), d);
+    point.tangents = Eigen::Map<const Eigen::VectorXd>(stars.sample().Tangent(last), d * K);
+    owner_.push_back(cubes_.OwnerOf(stars.sample().Point(last)));
     for (int part = 0; part < cubes_.parts(); ++part) {
       if (part != from && !Knows(part, point.points.data())) continue;
       if (part != from) parts_[part].engine->Append(point, 0);

@@ -11,13 +11,13 @@
 
 #include "core/base/basis_layout.h"
 #include "core/base/random.h"
-#include "core/complex/star_complex.h"
+#include "core/complex/stars.h"
 #include "stellate/catalogue.h"
 
 namespace stellate::core::testing {
 
-// Points of R^d with tangent bases as StarComplex wants them: k rows of d a point.
-struct Sample {
+// Points of R^d with tangent bases as Stars wants them: k rows of d a point.
+struct FramedPoints {
   int d = 0, k = 0;
   std::vector<double> points, tangents;
 
@@ -58,8 +58,8 @@ inline Eigen::MatrixXd RandomPointsOn(Manifold& manifold, int count, std::uint64
   return manifold.ClosestPoint(x).points;
 }
 
-inline Sample RandomSample(Manifold& manifold, int count, std::uint64_t seed) {
-  Sample sample;
+inline FramedPoints RandomSample(Manifold& manifold, int count, std::uint64_t seed) {
+  FramedPoints sample;
   sample.d = manifold.ambient_dimension();
   sample.k = manifold.dimension();
   const Eigen::MatrixXd points = RandomPointsOn(manifold, count, seed);
@@ -69,8 +69,8 @@ inline Sample RandomSample(Manifold& manifold, int count, std::uint64_t seed) {
 
 // The grid of n^k points of the k-torus (circles of radius 1 in R^2 each): all neighbours are
 // cospherical, 2^k at a time. Tangents point along the circles.
-inline Sample TorusGrid(int k, int n) {
-  Sample sample;
+inline FramedPoints TorusGrid(int k, int n) {
+  FramedPoints sample;
   sample.d = 2 * k;
   sample.k = k;
   int total = 1;
@@ -90,8 +90,8 @@ inline Sample TorusGrid(int k, int n) {
 }
 
 // Random points of the first k coordinates' unit cube in R^d, all with that plane as tangent.
-inline Sample FlatSample(int k, int d, int count, std::uint64_t seed) {
-  Sample sample;
+inline FramedPoints FlatSample(int k, int d, int count, std::uint64_t seed) {
+  FramedPoints sample;
   sample.d = d;
   sample.k = k;
   Random random(seed, 98);
@@ -107,26 +107,25 @@ inline Sample FlatSample(int k, int d, int count, std::uint64_t seed) {
 }
 
 template <int K>
-void AppendTo(StarComplex<K>* complex, const Sample& sample) {
-  for (std::uint32_t i = 0; i < sample.size(); ++i)
-    complex->Append(sample.Point(i), sample.Tangent(i));
+void AppendTo(Stars<K>* stars, const FramedPoints& sample) {
+  for (std::uint32_t i = 0; i < sample.size(); ++i) stars->Add(sample.Point(i), sample.Tangent(i));
 }
 
 // All simplices without a fake facet that star(p) holds.
 template <int K>
-std::set<typename StarComplex<K>::Simplex> StarOf(const StarComplex<K>& complex, std::uint32_t p) {
-  std::set<typename StarComplex<K>::Simplex> star;
-  typename StarComplex<K>::Simplex simplex;
-  for (std::size_t v = 0; v < complex.cell(p).vertex_count(); ++v)
-    if (complex.SimplexOf(p, complex.cell(p), v, &simplex)) star.insert(simplex);
+std::set<typename Stars<K>::Simplex> StarOf(const Stars<K>& stars, std::uint32_t p) {
+  std::set<typename Stars<K>::Simplex> star;
+  typename Stars<K>::Simplex simplex;
+  for (std::size_t v = 0; v < stars.cell(p).vertex_count(); ++v)
+    if (stars.SimplexOf(p, stars.cell(p), v, &simplex)) star.insert(simplex);
   return star;
 }
 
 template <int K>
-std::set<typename StarComplex<K>::Simplex> AsSet(const std::vector<std::uint32_t>& flat) {
-  std::set<typename StarComplex<K>::Simplex> simplices;
+std::set<typename Stars<K>::Simplex> AsSet(const std::vector<std::uint32_t>& flat) {
+  std::set<typename Stars<K>::Simplex> simplices;
   for (std::size_t i = 0; i + K < flat.size(); i += K + 1) {
-    typename StarComplex<K>::Simplex s;
+    typename Stars<K>::Simplex s;
     std::copy_n(flat.begin() + static_cast<std::ptrdiff_t>(i), K + 1, s.begin());
     simplices.insert(s);
   }

@@ -9,72 +9,59 @@
 #include <vector>
 
 #include "core/complex/centre_cache.h"
-#include "core/complex/star_complex.h"
+#include "core/complex/star_builder.h"
 #include "core/geometry/common_centre.h"
 
 namespace stellate::core {
 
-// How far outwards walls are moved, as a share of the fake simplex' inradius: corners of that may
-// lie in the planes of walls along the axes, and rounding would decide which side of it they are
-// on.
-inline constexpr double kWallOffset = 1e-12;
-
-// Room for q - p, on the stack where d is small.
-class Step {
- public:
-  explicit Step(int d) {
-    if (d > kSmall) heap_.resize(static_cast<std::size_t>(d));
-  }
-  double* data() { return heap_.empty() ? stack_ : heap_.data(); }
-
- private:
-  static constexpr int kSmall = 16;
-  double stack_[kSmall];
-  std::vector<double> heap_;
-};
-
-// What the cell of p may ask.
+// What the cell of p asks while it is clipped: half-spaces of facets, and the centres at which
+// simplices are judged. Borrows all that it is given.
 template <int K>
-class StarComplex<K>::Around final : public Surroundings<K> {
+class StarSurroundings final : public Surroundings<K> {
  public:
-  Around(const StarComplex& complex, const Site& p, const Site* guest,
-         const Site* newcomer = nullptr, const Cell* born = nullptr)
-      : complex_(complex),
+  using Cell = RestrictedVoronoiCell<K>;
+  using Simplex = typename CentreCache<K>::Simplex;
+
+  // judging   instead of the builder's
+  // newcomer  the site that cuts p's cell now, which may not be in the sample
+  // born      the newcomer's star if there is one, in which centres are looked up first
+  StarSurroundings(const StarBuilder<K>& builder, const Site& p, Judging judging,
+                   const Site* newcomer = nullptr, const Cell* born = nullptr)
+      : sample_(builder.sample()),
+        builder_(builder),
         p_(p),
-        judging_(complex.judging_),
-        guest_(guest),
+        judging_(judging),
         newcomer_(newcomer),
         born_(born) {}
-  Around(const StarComplex& complex, const Site& p, Judging judging)
-      : complex_(complex), p_(p), judging_(judging) {}
 
   double HalfSpace(std::uint32_t id, double* normal) const override {
     if (IsFake(id))
-      return FakeHalfSpace<K>(static_cast<int>(id - kFirstFakeId), complex_.inradius_, normal);
+      return FakeHalfSpace<K>(static_cast<int>(id - kFirstFakeId), builder_.options().inradius,
+                              normal);
     if (IsWall(id)) {
       std::copy_n(ConormalOf(p_, WallOf(id)), K, normal);
-      return kWallOffset * complex_.inradius_;
+      return kWallOffset * builder_.options().inradius;
     }
-    Step step(complex_.d_);
-    return complex_.HalfSpace(p_, Find(id), step.data(), normal);
+    Step step(sample_.d());
+    return builder_.HalfSpace(p_, Find(id), step.data(), normal);
   }
 
-  int judged_in() const override { return judging_ == Judging::kFlats ? 0 : complex_.d_; }
+  int judged_in() const override { return judging_ == Judging::kFlats ? 0 : sample_.d(); }
 
   bool Centre(const std::uint32_t* ids, std::uint64_t key, double* x,
               double* centre) const override {
     // Of a k-simplex in R^k, the place where its facets meet is the circumcentre.
-    if (complex_.d_ == K && std::none_of(ids, ids + K, IsWall)) return false;
+    if (sample_.d() == K && std::none_of(ids, ids + K, IsWall)) return false;
     if (!(born_ && Known(key, centre)) && !Common(ids, key, centre)) return false;
-    WithDimension(complex_.d_, [&](auto known) {
-      const int n = known() > 0 ? known() : complex_.d_;
+    WithDimension(sample_.d(), [&](auto known) {
+      const int n = known() > 0 ? known() : sample_.d();
       for (int a = 0; a < K; ++a) x[a] = Dot(p_.tangent + a * n, centre, n);
     });
     return true;
   }
 
   void Lift(const double* x, double* centre) const override {
-    const int n = complex_.d_;
+    const int n = sample_.d();
     std::fill(centre, centre + n, 0.0);
     for (int a = 0; a < K; ++a)
       for (int i = 0; i < n; ++i) centre[i] += x[a] * p_.tangent[a * n + i];
@@ -82,15 +69,15 @@ class StarComplex<K>::Around final : public Surroundings<K> {
 
  private:
   Site Find(std::uint32_t id) const {
-    return id == p_.id ? p_ : IsGuest(id) ? *guest_ : complex_.At(id);
+    return id == p_.id ? p_ : IsNewcomer(id) ? *newcomer_ : sample_.At(id);
   }
 
-  bool IsGuest(std::uint32_t id) const { return guest_ && id == guest_->id; }
+  bool IsNewcomer(std::uint32_t id) const { return newcomer_ && id == newcomer_->id; }
   const double* PointOf(std::uint32_t id) const {
-    return id == p_.id ? p_.point : IsGuest(id) ? guest_->point : complex_.Point(id);
+    return id == p_.id ? p_.point : IsNewcomer(id) ? newcomer_->point : sample_.Point(id);
   }
   const double* TangentOf(std::uint32_t id) const {
-    return id == p_.id ? p_.tangent : IsGuest(id) ? guest_->tangent : complex_.Tangent(id);
+    return id == p_.id ? p_.tangent : IsNewcomer(id) ? newcomer_->tangent : sample_.Tangent(id);
   }
 
   // The centre from the newcomer's star, which all simplices of the vertices that it creates are in
@@ -100,7 +87,7 @@ class StarComplex<K>::Around final : public Surroundings<K> {
     const std::size_t v = born_->Find(key);
     if (v == born_->vertex_count() || !born_->judged(v)) return false;
     const double* const there = born_->Centre(v);
-    for (int j = 0; j < complex_.d_; ++j)
+    for (int j = 0; j < sample_.d(); ++j)
       centre[j] = there[j] + (newcomer_->point[j] - p_.point[j]);
     return true;
   }
@@ -122,12 +109,12 @@ class StarComplex<K>::Around final : public Surroundings<K> {
     for (int i = 1; i < count; ++i)  // they are few
       for (int j = i; j > 0 && first[j] < first[j - 1]; --j) std::swap(first[j], first[j - 1]);
     if (walls != 0) return CommonOnFace(ids.data(), count, walls, centre);
-    const int n = complex_.d_;
-    // A guest's id may be another's next.
-    const bool lasts = ids[K] < complex_.size();
+    const int n = sample_.d();
+    // The id of a point that may join the sample may be another's next.
+    const bool lasts = ids[K] < sample_.size();
     thread_local CentreCache<K> cache;
     const auto find = [&](double* found) { return FindCommon(ids, found); };
-    if (!(lasts ? cache.Centre(complex_.centre_owner_, ids, key + Mix64(p_.id), n, centre, find)
+    if (!(lasts ? cache.Centre(sample_.centre_owner(), ids, key + Mix64(p_.id), n, centre, find)
                 : find(centre)))
       return false;
     const double* const origin = PointOf(ids[0]);
@@ -143,9 +130,9 @@ class StarComplex<K>::Around final : public Surroundings<K> {
     for (std::size_t i = 0; i <= K; ++i) {
       points[i] = PointOf(ids[i]);
       tangents[i] = TangentOf(ids[i]);
-      weights[i] = complex_.Weight(ids[i]);
+      weights[i] = sample_.Weight(ids[i]);
     }
-    return CommonCentre<K>(complex_.d_, points, tangents, weights, complex_.judged_radius2_,
+    return CommonCentre<K>(sample_.d(), points, tangents, weights, builder_.judged_radius2(),
                            centre);
   }
 
@@ -154,7 +141,7 @@ class StarComplex<K>::Around final : public Surroundings<K> {
   // another: in the middle between the two a centre says nothing of either.
   bool CommonOnFace(const std::uint32_t* ids, int count, WallSet walls, double* centre) const {
     if (count < 2) return false;
-    const int n = complex_.d_;
+    const int n = sample_.d();
     const double* points[K + 1];
     const double* tangents[K + 1];
     double weights[K + 1];
@@ -168,11 +155,11 @@ class StarComplex<K>::Around final : public Surroundings<K> {
       FaceTangents(site, walls, n, bases.data() + static_cast<std::size_t>(i) * stride);
       points[i] = site.point;
       tangents[i] = bases.data() + static_cast<std::size_t>(i) * stride;
-      weights[i] = complex_.Weight(site.id);
+      weights[i] = sample_.Weight(site.id);
     }
     const auto common = [&](auto dimension) {
       return CommonCentre<decltype(dimension)::value>(n, points, tangents, weights,
-                                                      complex_.judged_radius2_, centre);
+                                                      builder_.judged_radius2(), centre);
     };
     bool found = false;
     [&]<int... J>(std::integer_sequence<int, J...>) {
@@ -246,12 +233,12 @@ class StarComplex<K>::Around final : public Surroundings<K> {
       }
   }
 
-  const StarComplex& complex_;
+  const Sample<K>& sample_;
+  const StarBuilder<K>& builder_;
   const Site& p_;
   const Judging judging_;
-  const Site* guest_ = nullptr;
-  const Site* newcomer_ = nullptr;
-  const Cell* born_ = nullptr;
+  const Site* newcomer_;
+  const Cell* born_;
 };
 
 }  // namespace stellate::core

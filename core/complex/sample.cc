@@ -1,0 +1,114 @@
+#include "core/complex/sample.h"
+
+#include <cmath>
+
+#include "core/base/basis_layout.h"
+#include "core/base/room.h"
+
+namespace stellate::core {
+
+template <int K>
+Sample<K>::Sample(int d, double epsilon)
+    : d_(d),
+      epsilon_(epsilon),
+      weight_scale_(1e-10 * epsilon * epsilon),
+      points_(d),
+      boundary_points_(d) {}
+
+template <int K>
+std::uint32_t Sample<K>::Add(const double* point, const double* tangent, WallSet walls,
+                             const double* conormals) {
+  const std::uint32_t id = size();
+  if (walls != 0) {
+    walls_.resize(id, 0);
+    walls_.push_back(walls);
+    conormals_at_.resize(id, 0);
+    conormals_at_.push_back(static_cast<std::uint32_t>(conormals_.size()));
+    conormals_.insert(conormals_.end(), conormals, conormals + K * CountWalls(walls));
+    boundary_.push_back(id);
+    boundary_points_.Add(point);
+  }
+  MakeRoom(stride() * K, &tangents_);
+  tangents_.insert(tangents_.end(), tangent, tangent + d_ * K);
+  points_.Add(point);
+  return id;
+}
+
+template <int K>
+void Sample<K>::AddUnindexed(const double* point, const double* tangent, double bound) {
+  points_.AddUnindexed(point);
+  tangents_.insert(tangents_.end(), tangent, tangent + d_ * K);
+  if (bound > 0) bounds_.push_back(bound);
+}
+
+template <int K>
+void Sample<K>::Index(BallTree::Halving halving, std::size_t room) {
+  points_.Index(halving);
+  if (room == 0) return;
+  points_.LeaveRoom(room);
+  LeaveRoom(room, &tangents_);
+}
+
+template <int K>
+void Sample<K>::NameLast(std::uint32_t name) {
+  const std::uint32_t last = size() - 1;
+  if (name == last) return;
+  for (auto id = static_cast<std::uint32_t>(names_.size()); id < last; ++id) names_.push_back(id);
+  names_.push_back(name);
+}
+
+template <int K>
+void Sample<K>::SetGuards(std::vector<double> radii2) {
+  guards_ = std::move(radii2);
+  largest_guard_ = guards_.empty() ? 0 : *std::max_element(guards_.begin(), guards_.end());
+  centre_owner_ = {};
+}
+
+template <int K>
+Eigen::MatrixXd Sample<K>::TangentMatrix() const {
+  Eigen::MatrixXd matrix(d_ * K, size());
+  for (std::uint32_t p = 0; p < size(); ++p)
+    ToByCoordinate(Tangent(p), d_, K, matrix.col(p).data());
+  return matrix;
+}
+
+template <int K>
+bool Sample<K>::InGuard(const double* point) const {
+  if (!has_guards()) return false;
+  bool in = false;
+  tree().VisitNear(
+      point, [&] { return std::sqrt(largest_guard_); },
+      [&](std::uint32_t id, double distance2) { in = in || distance2 < GuardOf(id); });
+  return in;
+}
+
+template <int K>
+void Sample<K>::Lift(std::uint32_t p, const double* x, double* point) const {
+  const double* at = Point(p);
+  const double* tangent = Tangent(p);
+  for (int i = 0; i < d_; ++i) {
+    double s = at[i];
+    for (int a = 0; a < K; ++a) s += x[a] * tangent[a * d_ + i];
+    point[i] = s;
+  }
+}
+
+template <int K>
+int Sample<K>::Nearest(const double* q, int count,
+                       std::pair<double, std::uint32_t>* nearest) const {
+  int found = 0;
+  tree().VisitNear(
+      q, [&] { return found < count ? INFINITY : std::sqrt(nearest[count - 1].first); },
+      [&](std::uint32_t id, double distance2) {
+        const std::pair<double, std::uint32_t> candidate{distance2, id};
+        if (found == count && !(candidate < nearest[count - 1])) return;
+        int at = found < count ? found++ : count - 1;
+        for (; at > 0 && candidate < nearest[at - 1]; --at) nearest[at] = nearest[at - 1];
+        nearest[at] = candidate;
+      });
+  return found;
+}
+
+STELLATE_INSTANTIATE_CLASS(Sample)
+
+}  // namespace stellate::core

@@ -1,0 +1,446 @@
+#include "core/complex/star_builder.h"
+
+#include "core/complex/star_surroundings.h"
+#include "core/geometry/laid_polygon.h"
+#include "core/geometry/laid_polytope.h"
+
+namespace stellate::core {
+namespace {
+
+// How much farther than its star in the flats reaches the neighbours of a new point are gathered:
+// judged stars are mostly that much larger at most.
+constexpr double kJudgedReach = 1.1;
+// ... and how far at most, in epsilon: a star that is open so far would gather half of the sample.
+constexpr double kFarthest = 5;
+// As far a star is cut all along, in epsilon, before it is known how far it reaches.
+constexpr double kAtFirst = 2;
+
+// Far above what rounding leaves of tangent bases and inner products, far below any distance that
+// matters: the share of a length by which a bound on its part off the tangent space is larger.
+constexpr double kOffRounding = 1e-10;
+double LengthOff(double whole2, double along2) {
+  return std::sqrt(std::max(whole2 - along2, 0.0) + kOffRounding * whole2);
+}
+
+// The vertices of a judged cell, by coordinate: their places in T_pM, and how far their centres are
+// off it. A half-space of R^d is held against them all at once in T_pM, where that is enough.
+template <int K>
+class JudgedPlaces {
+ public:
+  void Take(const RestrictedVoronoiCell<K>& cell) {
+    count_ = cell.vertex_count();
+    places_.resize(K * count_);
+    off_.resize(count_);
+    bounds_.resize(count_);
+    for (std::size_t v = 0; v < count_; ++v) {
+      for (std::size_t a = 0; a < K; ++a) places_[a * count_ + v] = cell.x(v)[a];
+      off_[v] = LengthOff(cell.norm2(v), Dot(cell.x(v), cell.x(v), K));
+    }
+  }
+
+  // What step . c can be at most, by vertex: `normal` is the part of `step` along T_pM, `off` the
+  // length of the rest. Returns whether one is above `offset`.
+  bool Bound(const double* normal, double off, double offset) {
+    const double* const places = places_.data();
+    const double* const off_flat = off_.data();
+    double* const bounds = bounds_.data();
+    const std::size_t count = count_;
+    std::size_t above = 0;
+    for (std::size_t v = 0; v < count; ++v) {
+      double bound = off * off_flat[v];
+      for (std::size_t a = 0; a < K; ++a) bound += normal[a] * places[a * count + v];
+      bounds[v] = bound;
+      above += bound > offset;
+    }
+    return above > 0;
+  }
+  double bound(std::size_t v) const { return bounds_[v]; }
+
+ private:
+  std::size_t count_ = 0;
+  std::vector<double> places_, off_, bounds_;
+};
+
+// Cuts by what is near, nearest first and ties by id, out to where nothing can cut any more. `near`
+// holds all points within `known`, sorted; search(from, to) appends those between. Returns how far
+// all points are known in the end.
+template <typename Reach, typename Clip, typename Search>
+double CutByNear(double known, NearPoints* near, const Reach& reach, const Clip& clip,
+                 const Search& search) {
+  for (std::size_t next = 0;;) {
+    double far = reach();
+    for (; next < near->size() && (*near)[next].first <= far * far; ++next)
+      if (clip((*near)[next].second)) far = reach();
+    if (far <= known) return known;
+    const double farther = std::min(far, 2 * known);
+    search(known, farther);
+    std::sort(near->begin() + static_cast<std::ptrdiff_t>(next), near->end());
+    known = farther;
+  }
+}
+
+bool Contains(std::span<const std::uint32_t> ids, std::uint32_t id) {
+  return std::find(ids.begin(), ids.end(), id) != ids.end();
+}
+
+// One for each thread.
+LaidPolygon& BuilderPolygon() {
+  thread_local LaidPolygon polygon;
+  return polygon;
+}
+
+}  // namespace
+
+template <int K>
+typename StarBuilder<K>::Cell::Scratch& StarBuilder<K>::ThreadScratch() {
+  thread_local typename Cell::Scratch scratch;
+  return scratch;
+}
+
+template <int K>
+double StarBuilder<K>::HalfSpace(const Site& p, std::uint32_t id, double* normal) const {
+  return StarSurroundings<K>(*this, p, options_.judging).HalfSpace(id, normal);
+}
+
+template <int K>
+bool StarBuilder<K>::Clip(const Site& p, const Site& q, const Cell* born, Cell* star) const {
+  Step step(sample_.d());
+  double normal[K];
+  const double offset = HalfSpace(p, q, step.data(), normal);
+  const StarSurroundings<K> around(*this, p, options_.judging, &q, born);
+  return star->Clip(q.id, normal, offset, ThreadScratch(), around, step.data());
+}
+
+template <int K>
+bool StarBuilder<K>::IsCutBy(const Cell& star, const Site& p, const Site& q) const {
+  Step step(sample_.d());
+  double normal[K];
+  const double offset = HalfSpace(p, q, step.data(), normal);
+  return star.WouldCut(normal, offset, step.data());
+}
+
+template <int K>
+void StarBuilder<K>::Cut(const Site& p, std::span<const StarCut> cuts, const Blocks<Cell>& stars,
+                         Cell* star) const {
+  if constexpr (K == 2)
+    if (options_.judging == Judging::kFlats && p.walls == 0) return CutPolygon(p, cuts, star);
+  for (const StarCut& cut : cuts) Clip(p, sample_.At(cut.by), &stars[cut.by], star);
+}
+
+// The half-spaces of facets beside a cut are found as they are needed, once each.
+template <int K>
+void StarBuilder<K>::CutPolygon(const Site& p, std::span<const StarCut> cuts, Cell* star) const {
+  if constexpr (K == 2) {
+    LaidPolygon& polygon = BuilderPolygon();
+    const int d = sample_.d();
+    const double weight = sample_.Weight(p.id);
+    const auto half_space = [&](std::uint32_t q, double* normal) {
+      if (IsFake(q))
+        return FakeHalfSpace<2>(static_cast<int>(q - kFirstFakeId), options_.inradius, normal);
+      return polygon.HalfSpace(d, p.point, p.tangent, weight, sample_.Point(q), sample_.Weight(q),
+                               normal);
+    };
+    polygon.Resume(*star);
+    for (const StarCut& cut : cuts)
+      polygon.ClipBy(cut.by, d, p.point, p.tangent, weight, sample_.Point(cut.by),
+                     sample_.Weight(cut.by), half_space);
+    star->Take(polygon);
+  }
+}
+
+// The cell before any other point is known.
+template <int K>
+void StarBuilder<K>::Reset(const Site& p, Cell* star) const {
+  const StarSurroundings<K> around(*this, p, options_.judging);
+  star->Reset(options_.inradius, around);
+  if (p.walls == 0) return;
+  Step step(sample_.d());
+  const double* conormal = p.conormals;
+  ForEachWall(p.walls, [&](int wall) {
+    around.Lift(conormal, step.data());
+    star->Clip(IdOfWall(wall), conormal, kWallOffset * options_.inradius, ThreadScratch(), around,
+               step.data());
+    conormal += K;
+  });
+}
+
+// The same of a cell that is judged at common centres only when it is done.
+template <int K>
+void StarBuilder<K>::ResetInFlats(const Site& p, Cell* star) const {
+  star->Reset(options_.inradius, StarSurroundings<K>(*this, p, Judging::kFlats));
+}
+
+template <int K>
+bool StarBuilder<K>::ClipInFlats(const Site& p, const Site& q, Cell* star) const {
+  Step step(sample_.d());
+  double normal[K];
+  const double offset = HalfSpace(p, q, step.data(), normal);
+  return star->Clip(q.id, normal, offset, ThreadScratch(),
+                    StarSurroundings<K>(*this, p, Judging::kFlats));
+}
+
+// Clips a cell in the flats that is built apart from RestrictedVoronoiCell.
+template <int K>
+template <typename Polytope>
+bool StarBuilder<K>::ClipApart(const Site& p, std::uint32_t q, double* step,
+                               Polytope* polytope) const {
+  double normal[K];
+  const double offset = HalfSpace(p, sample_.At(q), step, normal);
+  return polytope->Clip(q, normal, offset);
+}
+
+// Judges a cell that was built in the flats. Returns whether its vertices are those that it has at
+// common centres, too: none of `near`, the points within reach, is nearer to a common centre than
+// the simplex' own.
+template <int K>
+bool StarBuilder<K>::Judge(const Site& p, const NearPoints& near, Cell* star) const {
+  if constexpr (K == 2) {
+    return false;
+  } else {
+    star->Judge(StarSurroundings<K>(*this, p, options_.judging));
+    if (near.empty()) return true;
+    thread_local JudgedPlaces<K> places;
+    places.Take(*star);
+    const double reach = Influence(p.id, *star), weight = sample_.Weight(p.id);
+    // Whether v is on q's own facet is left to rounding.
+    const auto is_off = [&](std::size_t v, std::uint32_t q) {
+      for (int s = 0; s < K; ++s)
+        if (star->id(star->facet(v, s)) == q) return false;
+      return true;
+    };
+    Step step(sample_.d());
+    double normal[K];
+    for (const auto& [distance2, q] : near) {
+      if (distance2 > reach * reach) break;
+      const double length2 = sample_.Project(p, sample_.Point(q), step.data(), normal);
+      const double offset = 0.5 * (length2 + weight - sample_.Weight(q));
+      if (!places.Bound(normal, LengthOff(length2, Dot(normal, normal, K)), offset)) continue;
+      for (std::size_t v = 0; v < star->vertex_count(); ++v)
+        if (places.bound(v) > offset && is_off(v, q) &&
+            star->WouldCutVertex(v, normal, offset, step.data()))
+          return false;
+    }
+    return true;
+  }
+}
+
+template <int K>
+double StarBuilder<K>::MaxNorm2OnFaces(const Cell& star) {
+  double most2 = 0;
+  for (std::size_t v = 0; v < star.vertex_count(); ++v)
+    if (star.norm2(v) > most2 && WallsAt<K>(star, v) != 0) most2 = star.norm2(v);
+  return most2 > 0 ? most2 : star.max_norm2();  // of a point inside: all of it
+}
+
+// At common centres cuts are refused that would leave no polytope, and a cell may stay open in the
+// midst of the sample, to which R1 would add points forever. It is closed in the flats then, and
+// judged: where it is not as it would be there stars disagree, which R4 mends.
+template <int K>
+void StarBuilder<K>::CloseInFlats(const Site& p, Cell* star) const {
+  const bool has_joined = p.id < sample_.size();
+  if (K < 3 || !has_joined || options_.judging != Judging::kCommonCentre || p.walls != 0 ||
+      star->bounded())
+    return;
+  thread_local Cell flat;
+  ResetInFlats(p, &flat);
+  sample_.tree().VisitNear(
+      p.point, [&] { return Influence(p.id, flat); },
+      [&](std::uint32_t q, double) {
+        if (q != p.id) ClipInFlats(p, sample_.At(q), &flat);
+      });
+  if (!flat.bounded()) return;
+  Judge(p, {}, &flat);
+  *star = flat;
+}
+
+// Clips by `first`, and then by all that can cut in the order in which the search tree finds it.
+// Each point cuts once: a second cut by the same plane would be decided by rounding.
+template <int K>
+template <typename Reach, typename ClipBy>
+void StarBuilder<K>::ClipAsFound(const Site& p, std::span<const std::uint32_t> first,
+                                 const Reach& reach_now, const ClipBy& clip,
+                                 std::vector<std::uint32_t>* influenced) const {
+  for (const std::uint32_t q : first)
+    if (q != p.id) clip(q);
+  double reach = reach_now();
+  sample_.tree().VisitAround(
+      p.point, [&] { return reach; },
+      [&](std::uint32_t q, double) {
+        if (q == p.id || Contains(first, q)) return;
+        if (clip(q)) reach = reach_now();
+      },
+      [&](std::uint32_t q) { influenced->push_back(q); });
+}
+
+template <int K>
+void StarBuilder<K>::BuildAsFound(const Site& p, std::span<const std::uint32_t> first, Cell* star,
+                                  std::vector<std::uint32_t>* influenced) const {
+  Reset(p, star);
+  ClipAsFound(
+      p, first, [&] { return Influence(p.id, *star); },
+      [&](std::uint32_t q) { return Clip(p, sample_.At(q), nullptr, star); }, influenced);
+  CloseInFlats(p, star);
+}
+
+template <int K>
+void StarBuilder<K>::BuildPolygon(const Site& p, std::span<const std::uint32_t> first, Cell* star,
+                                  std::vector<std::uint32_t>* influenced) const {
+  if constexpr (K == 2) {
+    LaidPolygon& polygon = BuilderPolygon();
+    const double weight = sample_.Weight(p.id);
+    polygon.Reset(options_.inradius);
+    ClipAsFound(
+        p, first, [&] { return InfluenceWithin(polygon.max_norm2()); },
+        [&](std::uint32_t q) {
+          return polygon.ClipBy(q, sample_.d(), p.point, p.tangent, weight, sample_.Point(q),
+                                sample_.Weight(q));
+        },
+        influenced);
+    star->Take(polygon);
+  }
+}
+
+// Returns false where that will not do.
+template <int K>
+bool StarBuilder<K>::BuildPolytope(const Site& p, std::span<const std::uint32_t> first, Cell* star,
+                                   std::vector<std::uint32_t>* influenced) const {
+  if constexpr (K != 3) {
+    return false;
+  } else {
+    LaidPolytope& polytope = ThreadPolytope();
+    Step step(sample_.d());
+    polytope.Reset(options_.inradius);
+    ClipAsFound(
+        p, first, [&] { return InfluenceWithin(polytope.max_norm2()); },
+        [&](std::uint32_t q) { return ClipApart(p, q, step.data(), &polytope); }, influenced);
+    if (polytope.gave_up()) return false;
+    star->Take(polytope);
+    return true;
+  }
+}
+
+// Returns false where that will not do, which depends on what lies around p alone.
+template <int K>
+bool StarBuilder<K>::BuildAsInFlats(const Site& p, std::span<const std::uint32_t> first, Cell* star,
+                                    std::vector<std::uint32_t>* influenced) const {
+  if constexpr (K != 3) {
+    return false;
+  } else {
+    LaidPolytope& polytope = ThreadPolytope();
+    thread_local NearPoints around;
+    Step step(sample_.d());
+    polytope.Reset(options_.inradius);
+    const auto clip = [&](std::uint32_t q) { ClipApart(p, q, step.data(), &polytope); };
+    for (const std::uint32_t q : first)
+      if (q != p.id) clip(q);
+    const auto judged_reach = [&] { return kJudgedReach * Influence(p.id, polytope.max_norm2()); };
+    const double farthest = kFarthest * sample_.epsilon();
+    const double gathered = std::min(judged_reach(), farthest);
+    around.clear();
+    sample_.tree().VisitAround(
+        p.point, [&] { return gathered; },
+        [&](std::uint32_t q, double distance2) {
+          if (q != p.id) around.emplace_back(distance2, q);
+        },
+        [&](std::uint32_t q) { influenced->push_back(q); });
+    std::sort(around.begin(), around.end());
+    for (const auto& [distance2, q] : around)
+      if (!Contains(first, q)) clip(q);
+    const double reach = judged_reach();
+    if (polytope.gave_up() || reach > farthest) return false;
+    star->Take(polytope);
+    return Judge(p, around, star) && Influence(p.id, *star) <= reach;
+  }
+}
+
+template <int K>
+void StarBuilder<K>::BuildNearestFirst(const Site& p, Cell* star) const {
+  thread_local NearPoints near;
+  near.clear();
+  const auto search = [&](double from, double to) {
+    sample_.tree().VisitNear(
+        p.point, [&] { return to; },
+        [&](std::uint32_t q, double distance2) {
+          if (q != p.id && (distance2 > from * from || from == 0)) near.emplace_back(distance2, q);
+        });
+  };
+  const double known = kAtFirst * sample_.epsilon();
+  search(0, known);
+  std::sort(near.begin(), near.end());
+  BuildNearestFirst(p, known, &near, search, star);
+}
+
+template <int K>
+void StarBuilder<K>::BuildNearestFirst(const Site& p, double known, NearPoints* near,
+                                       const Search& search, Cell* star) const {
+  Reset(p, star);
+  CutByNear(
+      known, near, [&] { return Influence(p.id, *star); },
+      [&](std::uint32_t q) { return Clip(p, sample_.At(q), nullptr, star); }, search);
+  CloseInFlats(p, star);
+}
+
+template <int K>
+void StarBuilder<K>::Build(const Site& p, std::span<const std::uint32_t> first, Cell* star,
+                           std::vector<std::uint32_t>* influenced) const {
+  influenced->clear();
+  if (p.walls != 0) return BuildAsFound(p, first, star, influenced);
+  const bool in_flats = options_.judging == Judging::kFlats;
+  if constexpr (K == 2) {
+    const bool has_joined = p.id < sample_.size();
+    if (in_flats && has_joined && !sample_.has_guards())
+      return BuildPolygon(p, first, star, influenced);
+  }
+  if constexpr (K == 3) {
+    if (!in_flats && !options_.boundary_only) {
+      if (!BuildAsInFlats(p, first, star, influenced)) BuildNearestFirst(p, star);
+      return;
+    }
+    if (in_flats && !options_.boundary_only && !sample_.has_guards()) {
+      if (BuildPolytope(p, first, star, influenced)) return;
+      influenced->clear();
+    }
+  }
+  BuildAsFound(p, first, star, influenced);
+}
+
+// Builds the cell in the flats. Afterwards `near` holds all points within `known`.
+template <int K>
+void StarBuilder<K>::CutInFlats(const Site& p, double* known, NearPoints* near,
+                                const Search& search, Cell* star) const {
+  if constexpr (K == 3) {
+    LaidPolytope& polytope = ThreadPolytope();
+    Step step(sample_.d());
+    polytope.Reset(options_.inradius);
+    *known = CutByNear(
+        *known, near, [&] { return Influence(p.id, polytope.max_norm2()); },
+        [&](std::uint32_t q) { return ClipApart(p, q, step.data(), &polytope); }, search);
+    if (!polytope.gave_up()) return star->Take(polytope);
+  }
+  ResetInFlats(p, star);
+  *known = CutByNear(
+      *known, near, [&] { return Influence(p.id, *star); },
+      [&](std::uint32_t q) { return ClipInFlats(p, sample_.At(q), star); }, search);
+}
+
+// Most stars are the same in the flats, where clips cost a fraction. Returns false where that is
+// not so, and the star has to be judged all along.
+template <int K>
+bool StarBuilder<K>::BuildInFlats(const Site& p, double* known, NearPoints* near,
+                                  const Search& search, Cell* star) const {
+  CutInFlats(p, known, near, search, star);
+  return Judge(p, *near, star) && Influence(p.id, *star) <= *known;
+}
+
+template <int K>
+void StarBuilder<K>::BuildFromNear(const Site& p, double known, NearPoints* near,
+                                   const Search& search, Cell* star) const {
+  if (K > 2 && options_.judging == Judging::kCommonCentre && p.walls == 0 &&
+      BuildInFlats(p, &known, near, search, star))
+    return;
+  BuildNearestFirst(p, known, near, search, star);
+}
+
+STELLATE_INSTANTIATE_CLASS(StarBuilder)
+
+}  // namespace stellate::core

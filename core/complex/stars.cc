@@ -1,0 +1,452 @@
+#include "core/complex/stars.h"
+
+#include <cmath>
+#include <functional>
+#include <numeric>
+#include <span>
+
+#include "core/base/parallel.h"
+#include "core/base/parallel_sort.h"
+#include "core/complex/bulk_star_builder.h"
+
+namespace stellate::core {
+namespace {
+
+// The point itself, and as many neighbours as close a cell.
+template <int K>
+inline constexpr int kNearestFirst = 2 * K + 3;
+
+// The rules mostly insert fewer points into a sample that came in bulk than one in so many.
+constexpr std::size_t PartsToCome(int k) { return k <= 2 ? 8 : 4; }
+
+// Whether a polygon has a vertex on both these facets.
+template <typename Polygon>
+bool HoldsTriangle(const Polygon& cell, std::uint32_t a, std::uint32_t b) {
+  const std::size_t count = cell.facet_count();
+  for (std::size_t v = 0; v < count; ++v)
+    if (cell.id(v) == a)
+      return cell.id(v + 1 < count ? v + 1 : 0) == b || cell.id(v > 0 ? v - 1 : count - 1) == b;
+  return false;
+}
+
+// Calls visit(v, triangle) for the triangles of a polygon, the cell of p, whose lowest vertex is p.
+template <typename Polygon, typename Visit>
+void ForEachOwnedTriangle(std::uint32_t p, const Polygon& cell, const Visit& visit) {
+  using Triangle = std::array<std::uint32_t, 3>;
+  const std::size_t count = cell.facet_count();
+  const auto is_above = [p](std::uint32_t q) { return q > p && IsSample(q); };
+  for (std::size_t v = 0; v < count; ++v) {
+    const std::uint32_t a = cell.id(v), b = cell.id(v + 1 < count ? v + 1 : 0);
+    if (is_above(a) && is_above(b)) visit(v, a < b ? Triangle{p, a, b} : Triangle{p, b, a});
+  }
+}
+
+template <std::size_t N>
+void AppendTo(std::vector<std::uint32_t>* ids, const std::array<std::uint32_t, N>& simplex) {
+  ids->insert(ids->end(), simplex.begin(), simplex.end());
+}
+
+}  // namespace
+
+// Calls visit(v, simplex) for the simplices of star(p) of which p is the lowest vertex, once for
+// each: at common centres a cell that is far from convex may hold one at two vertices.
+template <int K>
+template <typename Visit>
+void Stars<K>::ForEachOwned(std::uint32_t p, const Visit& visit) const {
+  if (options_.boundary_only) return;
+  const Cell& cell = cells_[p];
+  if constexpr (K == 2) {
+    if (judging() == Judging::kFlats) return ForEachOwnedTriangle(p, cell, visit);
+  }
+  Simplex simplex;
+  thread_local std::vector<std::uint64_t> keys;
+  keys.clear();
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+    bool lowest = true;
+    for (int i = 0; i < K; ++i) lowest = lowest && cell.id(cell.facet(v, i)) > p;
+    if (!lowest || !SimplexOf(p, cell, v, &simplex)) continue;
+    if (judging() == Judging::kCommonCentre) {
+      if (std::find(keys.begin(), keys.end(), cell.key(v)) != keys.end()) continue;
+      keys.push_back(cell.key(v));
+    }
+    visit(v, simplex);
+  }
+}
+
+template <int K>
+std::vector<std::uint32_t> Stars<K>::Simplices() const {
+  return ParallelGather<std::uint32_t>(cells_.size(), [&](std::size_t p, auto* all) {
+    thread_local std::vector<Simplex> owned;
+    owned.clear();
+    ForEachOwned(static_cast<std::uint32_t>(p),
+                 [&](std::size_t, const Simplex& s) { owned.push_back(s); });
+    std::sort(owned.begin(), owned.end());
+    for (const Simplex& s : owned) AppendTo(all, s);
+  });
+}
+
+template <int K>
+double Stars<K>::HalfSpace(std::uint32_t p, std::size_t facet, double* normal) const {
+  if constexpr (K == 2) {
+    return builder().HalfSpace(sample_.At(p), cells_[p].id(facet), normal);
+  } else {
+    std::copy_n(cells_[p].normal(facet), K, normal);
+    return cells_[p].offset(facet);
+  }
+}
+
+template <int K>
+double Stars<K>::EdgeLength2(std::uint32_t p, std::size_t facet) const {
+  const std::uint32_t q = cells_[p].id(facet);
+  if constexpr (K == 2)
+    return SquaredDistance(sample_.Point(p), sample_.Point(q), sample_.d());
+  else
+    return 2 * cells_[p].offset(facet) - sample_.GuardOf(p) + sample_.GuardOf(q);
+}
+
+template <int K>
+bool Stars<K>::CutsVertex(std::uint32_t p, std::size_t vertex, const double* point) const {
+  Step step(sample_.d());
+  double normal[K];
+  const double offset =
+      0.5 * (sample_.Project(sample_.At(p), point, step.data(), normal) + sample_.GuardOf(p));
+  return cells_[p].WouldCutVertex(vertex, normal, offset, step.data());
+}
+
+template <int K>
+typename Stars<K>::FaceSimplex Stars<K>::FaceSimplexOf(std::uint32_t p, const Cell& cell,
+                                                       std::size_t v, WallSet guest_walls) const {
+  FaceSimplex simplex;
+  simplex.ids[0] = p;
+  simplex.count = 1;
+  for (int s = 0; s < K; ++s) {
+    const std::uint32_t id = cell.id(cell.facet(v, s));
+    if (IsFake(id))
+      simplex.fake = true;
+    else if (IsWall(id))
+      simplex.walls |= SetOfWall(WallOf(id));
+    else
+      simplex.ids[static_cast<std::size_t>(simplex.count++)] = id;
+  }
+  const auto end = simplex.ids.begin() + simplex.count;
+  std::sort(simplex.ids.begin(), end);
+  simplex.foreign = std::any_of(simplex.ids.begin(), end, [&](std::uint32_t id) {
+    return !IsSubset(simplex.walls, id == size() ? guest_walls : sample_.walls(id));
+  });
+  return simplex;
+}
+
+template <int K>
+std::optional<typename Stars<K>::CellVertex> Stars<K>::EncroachedBy(const double* point,
+                                                                    WallSet walls) const {
+  const std::vector<std::uint32_t>& boundary = sample_.boundary();
+  if (boundary.empty()) return std::nullopt;
+  std::optional<CellVertex> worst;
+  const int own = K - CountWalls(walls);
+  int lowest = own;
+  double farthest2 = 0;
+  Step step(sample_.d());
+  sample_.boundary_tree().ForEachInfluencing(point, [&](std::uint32_t i) {
+    const std::uint32_t p = boundary[i];
+    if (IsSubset(sample_.walls(p), walls)) return;
+    const Cell& cell = cells_[p];
+    double normal[K];
+    const double offset =
+        0.5 * (sample_.Project(sample_.At(p), point, step.data(), normal) + sample_.GuardOf(p));
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      // Few vertices are cut, so that this is checked first.
+      if (!cell.WouldCutVertex(v, normal, offset, step.data())) continue;
+      const WallSet at = WallsAt<K>(cell, v);
+      const int dimension = K - CountWalls(at);
+      if (IsSubset(at, walls) || dimension == 0 || dimension > lowest || cell.HasFakeFacet(v))
+        continue;
+      const double norm2 = cell.norm2(v);
+      const bool is_first = !worst && dimension < own;
+      const bool is_worse = worst && (dimension < lowest || norm2 > farthest2 ||
+                                      (norm2 == farthest2 && p < worst->star));
+      if (!is_first && !is_worse) continue;
+      worst = CellVertex{p, v};
+      lowest = dimension;
+      farthest2 = norm2;
+    }
+  });
+  return worst;
+}
+
+// The sample points that most likely close a cell around q, the nearest first: those nearest, or,
+// where a star near q is known, that star and the stars of its points nearest to q.
+template <int K>
+void Stars<K>::FindClosing(const double* q, std::uint32_t near,
+                           std::vector<std::uint32_t>* ids) const {
+  ids->clear();
+  constexpr int kCount = kNearestFirst<K>;
+  std::array<std::pair<double, std::uint32_t>, kCount> nearest;
+  if (near == kNone || !cells_[near].bounded()) {
+    const int count = sample_.Nearest(q, kCount, nearest.data());
+    for (int i = 0; i < count; ++i) ids->push_back(nearest[static_cast<std::size_t>(i)].second);
+    return;
+  }
+  int count = 0;
+  const auto offer = [&](std::uint32_t id) {
+    const std::pair<double, std::uint32_t> candidate{
+        SquaredDistance(q, sample_.Point(id), sample_.d()), id};
+    if (count == K + 1 && !(candidate < nearest[K])) return;
+    int at = count < K + 1 ? count++ : K;
+    for (; at > 0 && candidate < nearest[at - 1]; --at) nearest[at] = nearest[at - 1];
+    nearest[at] = candidate;
+  };
+  offer(near);
+  for (std::size_t f = 0; f < cells_[near].facet_count(); ++f)
+    if (IsSample(cells_[near].id(f))) offer(cells_[near].id(f));
+  const auto add = [&](std::uint32_t id) {
+    if (IsSample(id) && std::find(ids->begin(), ids->end(), id) == ids->end()) ids->push_back(id);
+  };
+  for (int i = 0; i < count; ++i) ids->push_back(nearest[i].second);
+  for (int i = 0; i < count; ++i) {
+    const Cell& cell = cells_[nearest[i].second];
+    for (std::size_t f = 0; f < cell.facet_count(); ++f) add(cell.id(f));
+  }
+}
+
+template <int K>
+void Stars<K>::TryPoint(const double* point, const double* tangent, std::uint32_t near,
+                        Tentative* result, WallSet walls, const double* conormals) const {
+  thread_local std::vector<std::uint32_t> closing, influenced;
+  const Site guest{size(), point, tangent, walls, conormals};
+  const StarBuilder<K> builder = this->builder();
+  FindClosing(point, near, &closing);
+  builder.Build(guest, closing, &result->own, &influenced);
+  result->cut.clear();
+  for (const std::uint32_t p : influenced)
+    if (builder.IsCutBy(cells_[p], sample_.At(p), guest)) result->cut.emplace_back(p, cells_[p]);
+  for (auto& [p, cell] : result->cut) builder.Clip(sample_.At(p), guest, &result->own, &cell);
+  std::sort(result->cut.begin(), result->cut.end(),
+            [](const auto& a, const auto& b) { return a.first < b.first; });
+}
+
+// Also finds the old stars that each new point cuts, by star: their influence is still that of
+// before.
+template <int K>
+std::vector<StarCut> Stars<K>::BuildNewStars(std::uint32_t first) {
+  cells_.resize(size());
+  const StarBuilder<K> builder = this->builder();
+  std::vector<StarCut> cuts =
+      ParallelGather<StarCut>(near_.size(), [&](std::size_t i, auto* found) {
+        thread_local std::vector<std::uint32_t> closing, influenced;
+        thread_local Cell cell;  // its memory is used again; what is kept is as small as can be
+        const Site q = sample_.At(first + static_cast<std::uint32_t>(i));
+        FindClosing(q.point, near_[i], &closing);
+        builder.Build(q, closing, &cell, &influenced);
+        for (const std::uint32_t p : influenced)
+          if (builder.IsCutBy(cells_[p], sample_.At(p), q)) found->push_back({p, q.id});
+        cells_[q.id] = cell;
+      });
+  near_.clear();
+  ParallelSort(cuts, std::less<>());
+  return cuts;
+}
+
+// New points that follow each other are mostly near each other: stars in the order in which these
+// come to them find in the cache what their neighbours have read.
+template <int K>
+std::vector<typename Stars<K>::Turn> Stars<K>::InTurns(const std::vector<StarCut>& cuts) {
+  std::vector<Turn> turns = ParallelGather<Turn>(cuts.size(), [&](std::size_t i, auto* found) {
+    if (i > 0 && cuts[i].star == cuts[i - 1].star) return;
+    std::size_t end = i + 1;
+    while (end < cuts.size() && cuts[end].star == cuts[i].star) ++end;
+    found->push_back({cuts[i].by, cuts[i].star, i, end});
+  });
+  ParallelSort(turns, std::less<>());
+  return turns;
+}
+
+// Clips the old stars. A simplex that a cut creates has the new point that cuts, and so an id from
+// `first` on; one without is as old as the star.
+template <int K>
+void Stars<K>::CutStars(const std::vector<Turn>& turns, const std::vector<StarCut>& cuts,
+                        std::uint32_t first, Change* change) {
+  const std::uint32_t count = size() - first;
+  const StarBuilder<K> builder = this->builder();
+  std::vector<std::vector<std::uint32_t>> removed(ChunkCount(turns.size()));
+  std::vector<std::vector<std::uint32_t>> added(removed.size() + ChunkCount(count));
+  std::vector<double> influence(turns.size() + count);
+  ParallelChunks(turns.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    // For K = 2 the ids of the facets tell simplices apart, else keys.
+    std::vector<std::pair<std::uint64_t, Simplex>> before;
+    const auto key_of = [](const Cell& cell, std::size_t v) {
+      return K == 2 ? std::uint64_t{0} : cell.key(v);
+    };
+    const auto is_left = [](const Cell& cell, std::uint64_t key, const Simplex& s) {
+      if constexpr (K == 2) return HoldsTriangle(cell, s[1], s[2]);
+      return cell.Find(key) != cell.vertex_count();
+    };
+    for (std::size_t i = begin; i < end && !IsInterrupted(); ++i) {
+      const std::uint32_t p = turns[i].star;
+      Cell& cell = cells_[p];
+      before.clear();
+      ForEachOwned(p, [&](std::size_t v, const Simplex& s) {
+        before.push_back({key_of(cell, v), s});
+      });
+      builder.Cut(sample_.At(p),
+                  std::span(cuts).subspan(turns[i].begin, turns[i].end - turns[i].begin), cells_,
+                  &cell);
+      for (const auto& [key, s] : before)
+        if (!is_left(cell, key, s)) AppendTo(&removed[chunk], s);
+      ForEachOwned(p, [&](std::size_t, const Simplex& s) {
+        if (s.back() >= first) AppendTo(&added[chunk], s);
+      });
+      influence[i] = builder.Influence(p, cell);
+    }
+  });
+  // A new point has the largest id of its simplices, except of those among new points alone.
+  ParallelChunks(count, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint32_t p = first + static_cast<std::uint32_t>(i);
+      ForEachOwned(
+          p, [&](std::size_t, const Simplex& s) { AppendTo(&added[removed.size() + chunk], s); });
+      influence[turns.size() + i] = builder.Influence(p, cells_[p]);
+    }
+  });
+  SetInfluences(turns, first, influence);
+  change->removed = Concatenate(std::move(removed));
+  change->added = Concatenate(std::move(added));
+  simplex_count_ += change->added.size() / (K + 1);
+  simplex_count_ -= change->removed.size() / (K + 1);
+}
+
+// `influence`: of the stars of `turns`, and of those from `first` on.
+template <int K>
+void Stars<K>::SetInfluences(const std::vector<Turn>& turns, std::uint32_t first,
+                             const std::vector<double>& influence) {
+  BallTree& tree = sample_.tree();
+  for (std::size_t i = 0; i < influence.size(); ++i) {
+    CheckInterruption(i);
+    const bool is_new = i >= turns.size();
+    tree.SetInfluence(is_new ? first + static_cast<std::uint32_t>(i - turns.size()) : turns[i].star,
+                      influence[i]);
+  }
+  tree.Refit();
+  MeasureFaces(turns, first);
+}
+
+// The influence of points on walls on their stars' simplices of faces: those inside are larger, and
+// no point yields to them.
+template <int K>
+void Stars<K>::MeasureFaces(const std::vector<Turn>& turns, std::uint32_t first) {
+  const std::vector<std::uint32_t>& boundary = sample_.boundary();
+  if (boundary.empty()) return;
+  std::vector<std::uint32_t> changed;  // by place in `boundary`
+  for (const Turn& turn : turns) {
+    CheckInterruption(changed.size());
+    if (sample_.walls(turn.star) == 0) continue;
+    const auto at = std::lower_bound(boundary.begin(), boundary.end(), turn.star);
+    changed.push_back(static_cast<std::uint32_t>(at - boundary.begin()));
+  }
+  for (auto at = std::lower_bound(boundary.begin(), boundary.end(), first); at != boundary.end();
+       ++at)
+    changed.push_back(static_cast<std::uint32_t>(at - boundary.begin()));
+  const StarBuilder<K> builder = this->builder();
+  std::vector<double> influence(changed.size());
+  ParallelFor(changed.size(), [&](std::size_t i) {
+    const std::uint32_t p = boundary[changed[i]];
+    const Cell& cell = cells_[p];
+    double most2 = 0;
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+      if (cell.norm2(v) > most2 && WallsAt<K>(cell, v) != 0 && !cell.HasFakeFacet(v))
+        most2 = cell.norm2(v);
+    influence[i] = builder.Influence(p, most2);
+  });
+  BallTree& tree = sample_.boundary_tree();
+  for (std::size_t i = 0; i < changed.size(); ++i) {
+    CheckInterruption(i);
+    tree.SetInfluence(changed[i], influence[i]);
+  }
+  tree.Refit();
+}
+
+template <int K>
+typename Stars<K>::Change Stars<K>::Commit(std::vector<std::uint32_t>* around) {
+  const auto first = static_cast<std::uint32_t>(cells_.size());
+  if (!sample_.is_indexed()) return BuildAllInBulk();
+  if (includes_interior_next_) return BuildAllAsAdded();
+  if (size() == first) return {};
+  return Insert(first, around);
+}
+
+template <int K>
+typename Stars<K>::Change Stars<K>::Insert(std::uint32_t first,
+                                           std::vector<std::uint32_t>* around) {
+  Change change;
+  const std::vector<StarCut> cuts = BuildNewStars(first);
+  const std::vector<Turn> turns = InTurns(cuts);
+  change.stars = ParallelGather<std::uint32_t>(
+      turns.size(), [&](std::size_t i, auto* found) { found->push_back(turns[i].star); });
+
+  const auto note_neighbours = [&](std::size_t count, const auto& star) {
+    const auto found =
+        ParallelGather<std::uint32_t>(count, [&](std::size_t i, std::vector<std::uint32_t>* ids) {
+          const Cell& cell = cells_[star(i)];
+          for (std::size_t f = 0; f < cell.facet_count(); ++f)
+            if (IsSample(cell.id(f))) ids->push_back(cell.id(f));
+        });
+    around->insert(around->end(), found.begin(), found.end());
+  };
+  const auto changed = [&](std::size_t i) { return turns[i].star; };
+  const auto born = [&](std::size_t i) { return first + static_cast<std::uint32_t>(i); };
+  if (around) note_neighbours(turns.size(), changed);
+  CutStars(turns, cuts, first, &change);
+  if (around) {
+    note_neighbours(turns.size(), changed);
+    note_neighbours(size() - first, born);
+  }
+  return change;
+}
+
+// Builds all stars anew, each from one point to the next, as if all points had just been added.
+template <int K>
+typename Stars<K>::Change Stars<K>::BuildAllAsAdded() {
+  options_.boundary_only = options_.boundary_only && !includes_interior_next_;
+  includes_interior_next_ = false;
+  sample_.Index(BallTree::Halving::kNumber);
+  near_.assign(size(), kNone);
+  simplex_count_ = 0;
+  Change change;
+  change.stars.resize(cells_.size());
+  std::iota(change.stars.begin(), change.stars.end(), std::uint32_t{0});
+  BuildNewStars(0);
+  CutStars({}, {}, 0, &change);
+  return change;
+}
+
+template <int K>
+typename Stars<K>::Change Stars<K>::BuildAllInBulk() {
+  Change change;
+  change.removed = Simplices();
+  options_.boundary_only = includes_interior_next_ = false;
+  change.stars.resize(cells_.size());
+  std::iota(change.stars.begin(), change.stars.end(), std::uint32_t{0});
+  cells_.resize(size());
+  sample_.Index(BallTree::Halving::kExtent, PartsToCome(K));
+  std::vector<double> influence(size());
+  const StarBuilder<K> builder = this->builder();
+  BulkStarBuilder<K>(builder).Build(&cells_, influence.data());
+  sample_.tree().SetInfluences(std::move(influence));
+  MeasureFaces({}, 0);
+  sample_.ForgetBounds();
+  change.added = ParallelGather<std::uint32_t>(size(), [&](std::size_t p, auto* ids) {
+    ForEachOwned(static_cast<std::uint32_t>(p),
+                 [&](std::size_t, const Simplex& s) { AppendTo(ids, s); });
+  });
+  simplex_count_ = change.added.size() / (K + 1);
+  return change;
+}
+
+template <int K>
+void Stars<K>::SetGuards(std::vector<double> radii2) {
+  sample_.SetGuards(std::move(radii2));
+  BuildAllAsAdded();
+}
+
+STELLATE_INSTANTIATE_CLASS(Stars)
+
+}  // namespace stellate::core

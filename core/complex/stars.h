@@ -1,0 +1,194 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/base/instantiate.h"
+#include "core/complex/blocks.h"
+#include "core/complex/sample.h"
+#include "core/complex/star_builder.h"
+#include "core/geometry/restricted_voronoi_cell.h"
+#include "core/specification.h"
+
+namespace stellate::core {
+
+// The stars of a growing sample (Sec. 5.2.1): star(p) is kept as its dual, the Voronoi cell of p
+// restricted to T_pM. The mesh is the union of the stars. Add points, then Commit(): stars and
+// counts do not change in between. A value: a copy goes on from the same state by itself.
+//
+//   Stars<2> stars(3, epsilon, {.inradius = 10 * epsilon});
+//   for (...) stars.Add(point, tangent);
+//   const Stars<2>::Change change = stars.Commit();  // simplices added and removed
+//   stars.cell(0).max_norm2();                       // of the star of the first point
+//   stars.sample().Point(0);
+//
+// Ids are those of the sample's points. Const calls may run in parallel.
+template <int K>
+class Stars {
+ public:
+  using Cell = RestrictedVoronoiCell<K>;
+  using Simplex = std::array<std::uint32_t, K + 1>;  // ascending ids
+
+  // d        ambient dimension
+  // epsilon  the size bound, length: sets the scale of the perturbing weights
+  Stars(int d, double epsilon, const StarOptions& options)
+      : options_(options), sample_(d, epsilon) {}
+
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
+  // Adds a point, whose star the next Commit builds, and returns its id; searches of the sample see
+  // it immediately. `walls`, `conormals`: as in Site.
+  // near  a sample point whose star the new one will change, if one is known: its star is found
+  //       sooner. The star is the same in the flats; at common centres the order of the cuts may
+  //       matter in a cell that is far from convex.
+  std::uint32_t Add(const double* point, const double* tangent, std::uint32_t near = kNone,
+                    WallSet walls = 0, const double* conormals = nullptr) {
+    near_.push_back(near);
+    return sample_.Add(point, tangent, walls, conormals);
+  }
+  // Adds a point inside all walls that no search finds before Commit, which then builds all stars
+  // again, together (BulkStarBuilder): cheaper, where most of a sample comes together. `bound`: as
+  // in Sample::AddUnindexed. REQUIRES: only points added so wait for Commit.
+  void AddInBulk(const double* point, const double* tangent, double bound = 0) {
+    sample_.AddUnindexed(point, tangent, bound);
+  }
+  // See Sample::NameLast. REQUIRES: the point added last waits for Commit.
+  void NameLast(std::uint32_t name) { sample_.NameLast(name); }
+  // From now on stars are built for the boundary only, and have no simplices inside (see
+  // StarOptions). REQUIRES: there are no stars yet.
+  void RestrictToBoundary() { options_.boundary_only = true; }
+  // Ends that: the next Commit builds all stars again, whole.
+  void IncludeInterior() { includes_interior_next_ = options_.boundary_only; }
+  // Sets protecting balls (see Sample::SetGuards), and builds all stars again. REQUIRES: nothing
+  // waits for Commit.
+  void SetGuards(std::vector<double> radii2);
+
+  // What Commit changed.
+  struct Change {
+    // Old stars that changed, mostly each near the one before it. New stars are not listed.
+    std::vector<std::uint32_t> stars;
+    // Simplices in the star of their lowest vertex, K+1 ids each.
+    std::vector<std::uint32_t> added, removed;
+  };
+  // Builds the stars of the added points and clips all others by them, in parallel; the result does
+  // not depend on the number of threads. `around`, if given, gets the neighbours that changed stars
+  // have or had (with repetitions): their simplices may have become inconsistent.
+  Change Commit(std::vector<std::uint32_t>* around = nullptr);
+
+  // The sample with the points that wait for Commit; there are stars of all others.
+  const Sample<K>& sample() const { return sample_; }
+  std::uint32_t size() const { return sample_.size(); }
+  Judging judging() const { return options_.judging; }
+  const Cell& cell(std::uint32_t id) const { return cells_[id]; }
+  // Simplices in the star of their lowest vertex: K+1 ids each, and how many there are.
+  std::vector<std::uint32_t> Simplices() const;
+  std::uint64_t simplex_count() const { return simplex_count_; }
+
+  // Writes the k-simplex dual to vertex v of p's cell. Returns false if a facet of it is fake or a
+  // wall.
+  static bool SimplexOf(std::uint32_t p, const Cell& cell, std::size_t v, Simplex* simplex) {
+    (*simplex)[0] = p;
+    for (int s = 0; s < K; ++s) {
+      const std::uint32_t id = cell.id(cell.facet(v, s));
+      if (!IsSample(id)) return false;
+      std::size_t at = static_cast<std::size_t>(s) + 1;
+      for (; at > 0 && (*simplex)[at - 1] > id; --at) (*simplex)[at] = (*simplex)[at - 1];
+      (*simplex)[at] = id;
+    }
+    return true;
+  }
+  // What vertex v of p's cell is dual to: a simplex of the face of its walls.
+  struct FaceSimplex {
+    Simplex ids;        // the first `count`, ascending
+    int count = 0;      // its dimension, and one
+    WallSet walls = 0;  // of the vertex
+    bool fake = false;  // a facet is: it is no simplex yet
+    // A vertex of it is not on the face: a point off the face is nearer to the vertex than the
+    // face's own.
+    bool foreign = false;
+    int dimension() const { return K - CountWalls(walls); }
+  };
+  // `guest_walls`: of the point with the id size(), if a facet is its.
+  FaceSimplex FaceSimplexOf(std::uint32_t p, const Cell& cell, std::size_t v,
+                            WallSet guest_walls = 0) const;
+  // Whether p or a sample point of a facet at vertex v of its cell is guarded.
+  bool TouchesGuard(std::uint32_t p, const Cell& cell, std::size_t v) const {
+    if (!sample_.has_guards()) return false;
+    bool touches = sample_.GuardOf(p) > 0;
+    for (int s = 0; s < K; ++s) {
+      const std::uint32_t id = cell.id(cell.facet(v, s));
+      touches = touches || (IsSample(id) && sample_.GuardOf(id) > 0);
+    }
+    return touches;
+  }
+
+  // Writes the normal of a facet's half-space in p's cell, T_p^t (q - p), and returns its offset.
+  double HalfSpace(std::uint32_t p, std::size_t facet, double* normal) const;
+  // |q - p|^2 for the sample point q of a facet of p's cell, without the weights' share.
+  double EdgeLength2(std::uint32_t p, std::size_t facet) const;
+
+  // A vertex of a star's cell.
+  struct CellVertex {
+    std::uint32_t star;
+    std::size_t vertex;
+  };
+  // The vertex dual to a simplex of a face of lower dimension that a point on the face of `walls`
+  // would cut off, off that face: of the lowest dimension, and there the farthest out. Nothing if
+  // the point encroaches on no face.
+  std::optional<CellVertex> EncroachedBy(const double* point, WallSet walls) const;
+  // Whether a point would take the simplex dual to a vertex of p's cell out of star(p).
+  bool CutsVertex(std::uint32_t p, std::size_t vertex, const double* point) const;
+
+  // The cells as they would be with one more point: its own, and those that it would cut, ascending
+  // by id.
+  struct Tentative {
+    Cell own;
+    std::vector<std::pair<std::uint32_t, Cell>> cut;
+  };
+  // Writes them, and changes nothing else. The arguments are those of Add.
+  void TryPoint(const double* point, const double* tangent, std::uint32_t near, Tentative* result,
+                WallSet walls = 0, const double* conormals = nullptr) const;
+
+ private:
+  // The cuts of one star, which take their turns in the order of the first new points that cut.
+  struct Turn {
+    std::uint32_t first, star;  // the first new point that cuts the star
+    std::size_t begin, end;     // its cuts
+    bool operator<(const Turn& other) const {
+      return first != other.first ? first < other.first : star < other.star;
+    }
+  };
+
+  StarBuilder<K> builder() const { return {sample_, options_}; }
+  // Ways of Commit.
+  Change BuildAllAsAdded();
+  Change BuildAllInBulk();
+  Change Insert(std::uint32_t first, std::vector<std::uint32_t>* around);
+  // Their steps.
+  std::vector<StarCut> BuildNewStars(std::uint32_t first);
+  static std::vector<Turn> InTurns(const std::vector<StarCut>& cuts);
+  void CutStars(const std::vector<Turn>& turns, const std::vector<StarCut>& cuts,
+                std::uint32_t first, Change* change);
+  void SetInfluences(const std::vector<Turn>& turns, std::uint32_t first,
+                     const std::vector<double>& influence);
+  void MeasureFaces(const std::vector<Turn>& turns, std::uint32_t first);
+  void FindClosing(const double* q, std::uint32_t near, std::vector<std::uint32_t>* ids) const;
+  template <typename Visit>
+  void ForEachOwned(std::uint32_t p, const Visit& visit) const;
+
+  StarOptions options_;
+  bool includes_interior_next_ = false;
+  Sample<K> sample_;
+  std::vector<std::uint32_t> near_;  // of the points that wait for Commit
+  Blocks<Cell> cells_;
+  std::uint64_t simplex_count_ = 0;
+};
+
+STELLATE_DECLARE_CLASS(Stars)
+
+}  // namespace stellate::core
