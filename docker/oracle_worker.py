@@ -71,7 +71,7 @@ class StandingWorker:
 
 
 def serve_on(address: str, label: str, oracle: Any, credentials: stellate.Credentials) -> None:
-    """Meshes of one server, until the process is told to stop."""
+    """Meshes of one server, until the process is asked to stop."""
     with stellate.Client(address, credentials) as client:
         worker = StandingWorker(client, label, oracle)
         while True:

@@ -1,4 +1,4 @@
-"""A surface, meshed anew
+"""A surface, meshed again
 
 A file of long thin triangles, as a program for drawing makes them, and the same surface in
 triangles of one size.

@@ -35,8 +35,8 @@ CancelCommand::CancelCommand(CLI::App& parent)
       ->required();
   command_->add_flag("--delete", forget_, "forget them too, with what is meshed");
   command_->footer(
-      "An administrator's token ends anybody's. Exit status: 0 done, 2 usage or refused, 3 no "
-      "server.");
+      "An administrator's token ends the meshes of all owners. Exit status: 0 done, 2 usage or "
+      "refused, 3 no server.");
 }
 
 int CancelCommand::Run() const {

@@ -92,7 +92,7 @@ int Health(const stellate::cli::ServerOptions& server) {
             << ", stellated " << health->version << "\n"
             << "limits: dimension " << health->max_dimension << " in R^"
             << health->max_ambient_dimension << ", " << health->max_vertices << " vertices, "
-            << health->max_meshes << " meshes at once";
+            << health->max_meshes << " meshes at a time";
   if (health->owner_meshes > 0) std::cout << ", " << health->owner_meshes << " of one owner";
   std::cout << "; of one mesh " << health->max_workers << " workers, " << health->max_watchers
             << " watchers\n";

@@ -21,7 +21,7 @@ constexpr MeshSetting kRun[] = {
 
 constexpr MeshSetting kServing[] = {
     {"--workers", &O::workers, "threads that answer the server"},
-    {"--max-chunk", &O::max_chunk, "most points that the oracle is asked at once"},
+    {"--max-chunk", &O::max_chunk, "most points in one call of the oracle"},
     {"--reconnect", &O::reconnect_seconds, "seconds to wait for a server that went away"},
 };
 

@@ -17,8 +17,7 @@ ServeCommand::ServeCommand(CLI::App& parent)
       source_(command_),
       server_(command_, "127.0.0.1:7717") {
   command_->add_option("--worker", options_.worker, "this worker's name, for logs");
-  command_->add_option("--max-chunk", options_.max_chunk,
-                       "most points that the oracle is asked at once");
+  command_->add_option("--max-chunk", options_.max_chunk, "most points in one call of the oracle");
   command_
       ->add_option("--reconnect", options_.reconnect_seconds,
                    "seconds to wait for a server that went away")

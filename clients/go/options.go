@@ -35,8 +35,8 @@ type Options struct {
 	// Spec, if there is one, changes the rest of the specification before it is sent.
 	Spec func(*pb.MeshSpec)
 
-	Workers          int // streams on which the oracle is asked at once; default 1
-	MaxChunk         int // most points that the oracle is asked at once; default: the server decides
+	Workers          int // streams that call the oracle in parallel; default 1
+	MaxChunk         int // most points in one call of the oracle; default: the server decides
 	RequireCertified bool
 	// Checkpoint is a directory, made if it is not there, in which the mesh outlives this program: the same
 	// call goes on from where the last one was interrupted or killed, or its oracle failed, and gives a mesh

@@ -23,7 +23,7 @@ const (
 // WorkerOptions say how a worker serves; all may be left out.
 type WorkerOptions struct {
 	Worker   string // its name, for logs
-	MaxChunk int    // most points that the oracle is asked at once; default: the server decides
+	MaxChunk int    // most points in one call of the oracle; default: the server decides
 }
 
 // Serve is one more worker for a mesh: it answers the server's questions until the mesh is over, and

@@ -63,7 +63,7 @@ def _folders_are_no_pages(app, page, source):
     """A link to a folder leads to its README, where that is a page; else it is its words."""
     here = pathlib.Path(app.env.doc2path(page)).parent
 
-    def mend(match):
+    def resolve(match):
         words, target = match.groups()
         path, _, anchor = target.partition("#")
         there = here / path
@@ -74,7 +74,7 @@ def _folders_are_no_pages(app, page, source):
             return f"[{words}]({path.rstrip('/')}/README.md)"
         return words
 
-    source[0] = _LINK.sub(mend, source[0])
+    source[0] = _LINK.sub(resolve, source[0])
 
 
 def _lists_are_contents(app, page, source):

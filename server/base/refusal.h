@@ -16,13 +16,13 @@ struct LimitHit {
   std::string scope;
 };
 
-// An answer that broke a rule: its chunk's lease, and the row, from 0, if one alone is at fault.
+// An answer that broke a rule: its chunk's lease, and the wrong row, from 0, if it is a single one.
 struct AnswerPlace {
   std::uint64_t lease = 0;
   std::optional<std::int64_t> row;
 };
 
-// A status, the limit where one was reached, the answer where one is to blame. Ok converts as
+// A status, with the limit if one was reached, and the answer if one was wrong. Ok converts as
 // core::Status does.
 struct Refused : core::Status {
   Refused(core::Status status)  // NOLINT: every status is one

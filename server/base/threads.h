@@ -6,13 +6,13 @@
 
 namespace stellate::server {
 
-// Threads that a server has when it has no mesh, and some to spare: gRPC makes more of its own on a
-// machine with many processors.
+// The threads of a server without a mesh, and a reserve: gRPC creates more on a machine with many
+// processors.
 std::size_t LeastThreads();
 
-// Ok if this process may have `count` more threads; else kFailedPrecondition, and what to do. They
-// are made, and gone again when this returns. To be asked before any library makes its own, since
-// those would abort, or go on without.
+// Ok if this process may create `count` more threads; else kFailedPrecondition, and what to do.
+// Creates and ends them. Call it before any library creates its own, since those would abort, or go
+// on without.
 core::Status CheckThreads(std::size_t count);
 
 }  // namespace stellate::server

@@ -11,7 +11,7 @@
 
 namespace stellate::server {
 
-// Everything that can be set, with its default; settings.h says what each is for. Times in seconds.
+// All settings of a server, with their defaults; settings.cc explains each. Times in seconds.
 struct Config {
   std::string listen = "127.0.0.1:7717";
   bool insecure_listen = false;  // plain text beyond this machine
@@ -28,7 +28,7 @@ struct Config {
   std::uint64_t max_memory_bytes = 0;   // of all meshes, estimated; 0: WithDefaults says
   std::uint64_t max_journal_bytes = 0;  // 0: what the disk holds
   std::uint64_t max_message_bytes = std::uint64_t{4} << 20;
-  std::uint64_t max_unread_bytes = std::uint64_t{64} << 20;  // of requests that are not whole
+  std::uint64_t max_unread_bytes = std::uint64_t{64} << 20;  // of incomplete requests
   std::uint64_t max_connections = 2048;                      // over TCP
   std::uint64_t max_connection_streams = 1024;
 
@@ -56,7 +56,7 @@ struct Config {
   double max_wait_seconds = 0;      // most that a client may ask for of these; 0: MaxWaitSeconds
   double keep_finished_seconds = 3600;
   double hello_seconds = 10;    // for a worker's first message
-  double request_seconds = 60;  // for a request to be whole
+  double request_seconds = 60;  // for a request to be complete
 
   double drain_seconds = 10;  // for running meshes to end, after SIGTERM
   double keepalive_seconds = 2;
@@ -68,14 +68,14 @@ struct Config {
   bool operator==(const Config&) const = default;
 };
 
-// kInvalidArgument naming the flag, its value and what to do.
+// kInvalidArgument, with the flag, its value and what to do.
 core::Status Validate(const Config& config);
 
-// Puts numbers for zeros that stand for a part of this machine, or of the server's own limit.
+// Replaces zeros that stand for a part of this machine, or of another limit, by numbers.
 Config WithDefaults(Config config);
 
-// The most that a client may ask for: an hour, and 30 days where meshes outlive the server, since
-// batch queues take their time, unless the config says.
+// The longest wait that a client may ask for: by default an hour, or 30 days where meshes are
+// recorded, since batch queues take their time.
 double MaxWaitSeconds(const Config& config);
 
 // Arrays travel in chunks of about this size.

@@ -15,9 +15,9 @@ struct Flags {
   bool verify_data_dir = false, salvage = false;  // instead of serving
 };
 
-// Reads the command line and the configuration file that it names; what stands on the command line
-// comes first. When there is nothing more to do (--help, --version, --print-config, a mistake),
-// prints what there is to say and returns the exit status instead.
+// Reads the command line and the configuration file that it names; the command line takes
+// precedence. After --help, --version, --print-config or a mistake, prints the output and returns
+// the exit status instead.
 struct ParsedFlags {
   Flags flags;
   std::optional<int> exit_status;

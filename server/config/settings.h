@@ -8,8 +8,8 @@
 
 namespace stellate::server {
 
-// One thing that can be set: a flag of the command line, and under its name without the dashes a
-// key of the configuration file.
+// One setting: a flag of the command line, and a key of the configuration file under the same name
+// without the dashes.
 struct Setting {
   using Field =
       std::variant<std::string Config::*, bool Config::*, int Config::*, std::uint64_t Config::*,
@@ -26,13 +26,13 @@ struct Setting {
 // Every one, in the order of --help. A new setting is a member of Config and a row of this table.
 const std::vector<Setting>& Settings();
 
-// kInvalidArgument naming the flag, its value and what it may be, where a number is out of range.
+// kInvalidArgument, with the flag, its value and the range, if a number is out of range.
 core::Status CheckRanges(const Config& config);
 
 // A configuration file with every setting, as --config reads it.
 std::string ToConfigFile(const Config& config);
 
-// Names of the choices, and what they stand for; nullptr and false: no such name.
+// Names of the choices, and back. nullptr or false: no such choice.
 const char* LogLevelName(LogLevel level);
 const char* LogFormatName(LogFormat format);
 bool ReadLogLevel(const std::string& name, LogLevel* level);

@@ -17,9 +17,8 @@ namespace stellate::server {
 // "[3, 2]".
 std::string ShapeText(const google::protobuf::RepeatedField<std::uint32_t>& shape);
 
-// Ok if `array` has just this shape and the bytes that it needs; else `code`, with what came and
-// what was expected. `name` starts the message, and is
-// the field.
+// Ok if `array` has exactly this shape and its number of bytes; else `code`, with a message that
+// says what was received and expected, and starts with `name`, the field.
 core::Status CheckArray(const v1::Array& array, std::initializer_list<std::uint64_t> shape,
                         const std::string& name, core::StatusCode code);
 

@@ -16,14 +16,14 @@ v1::Termination ToProto(core::Termination termination);
 
 void ToProto(const SessionView& view, v1::Progress* out);
 void ToProto(const core::Report& report, int k, v1::Report* out);
-// Add to what a mesh says of itself.
+// Add to a mesh's state.
 void ToProto(const std::vector<WorkerStats>& workers, v1::Mesh* out);
 void ToProto(const std::vector<PastProgress>& past, v1::Mesh* out);
 // State, progress and report; no geometry, neither the mesh's nor the seeds'.
 void ToProto(const Session& session, v1::Mesh* out);
 // `d`: ambient dimension; `k`: dimension.
 void ToProto(const DeltaPart& part, int k, int d, v1::DeltaChunk* out);
-// Of a whole mesh: nothing is removed.
+// For a download: nothing is removed.
 void ToProto(const DeltaPart& part, int k, int d, v1::DownloadMeshResponse* out);
 
 }  // namespace stellate::server

@@ -9,9 +9,9 @@ namespace stellate::server {
 void ToProto(const core::Specification& spec, v1::Welcome* welcome);
 void ToProto(const Chunk& chunk, const core::Specification& spec, v1::QueryChunk* out);
 
-// kOracleShape if an array is not of the shape that `chunk` asks for; nothing is allocated on the
-// word of a declared shape. Tangents that were not asked for are ignored. Values are not looked at.
-// The refusal names the lease, and the row at fault where there is one.
+// kOracleShape if an array does not have the shape that `chunk` asks for; a declared shape alone
+// allocates nothing. Tangents that were not asked for are ignored. Values are not checked. The
+// refusal names the lease, and the row if there is one.
 Allowed<core::AnswerBlock> FromProto(const v1::AnswerChunk& answers, const Chunk& chunk,
                                      const core::Specification& spec);
 

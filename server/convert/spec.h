@@ -8,9 +8,9 @@
 
 namespace stellate::server {
 
-// A MeshSpec with every default filled in and every limit of the server checked; without a name and
-// an owner. Errors: kInvalidArgument or kLimitExceeded, the message starting with the field's path
-// in MeshSpec. What it lets through core::Validate accepts too.
+// Fills in every default of a MeshSpec and checks every limit of the server; the result has no name
+// and no owner yet. Errors: kInvalidArgument or kLimitExceeded, with a message that starts with the
+// field's path in MeshSpec. core::Validate accepts the result.
 Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config);
 
 // Without the seeds: there may be many, and the client that needs them sent them.

@@ -21,34 +21,37 @@ struct JournalOptions {
                                   // 0: no limit
 };
 
-// Half of what a journal may have: of its limit, or of what the disk has free for it and it holds.
+// Half of the space that a journal may use: its limit, or its size and the free space of the disk.
 std::uint64_t DefaultOwnerBytes(const std::string& directory, std::uint64_t max_bytes);
 
-// The record of all meshes of a server, in one SQLite file of its data directory: for each its
-// specification, the answers of each round, and its end; once it has ended, the mesh itself in the
-// place of the answers. Meshes write from their own threads, one transaction a round, synced to the
-// disk before the call returns.
+// The record of all meshes of a server, in one SQLite file of its data directory. It has each
+// mesh's specification, the answers of each round, and its end; once the mesh has ended, the mesh
+// itself replaces the answers. Meshes write from their own threads, one transaction a round, synced
+// to the disk before the call returns.
+//
+//   auto journal = Journal::Open(options);
+//   for (SessionOptions& mesh : (*journal)->TakeMeshes()) store.Restore(std::move(mesh));
+//   options.ports.journal = (*journal)->NewMesh();   // for a new mesh
 class Journal {
  public:
-  // Opens the record of an earlier server, or begins one.
-  // Refuses, with kFailedPrecondition, words for people, and without changing a byte: a file that
-  // is no journal, one of another version, one that is damaged anywhere (every record is read, and
-  // none is missing), and one that another server has open.
+  // Opens the record of an earlier server, or creates one. kFailedPrecondition, without changing a
+  // byte: the file is not a journal, has another version, is damaged (every record is read, and
+  // must exist), or is open in another server.
   static core::Expected<std::unique_ptr<Journal>> Open(const JournalOptions& options);
-  // Meshes still running keep their part of it open.
+  // Running meshes keep their part of it open.
   ~Journal();
 
-  // The meshes that were there when it was opened, oldest first: what is recorded of
-  // SessionOptions, the journal among its ports.
+  // Returns the meshes that it had when it was opened, oldest first: the recorded part of
+  // SessionOptions, and their journal.
   std::vector<SessionOptions> TakeMeshes() { return std::move(meshes_); }
 
   // For a new mesh.
   std::shared_ptr<SessionJournal> NewMesh();
-  // Whether the record of a new mesh of `owner` has room for its first `bytes`, and what to do if
-  // not. Any thread; does not wait.
+  // Returns why the first `bytes` of a new mesh of `owner` cannot be recorded, and what to do;
+  // nothing if they can. Any thread; does not wait.
   std::optional<Refused> RefuseNewMesh(const std::string& owner, std::uint64_t bytes) const;
 
-  // Bytes of the records of an owner's meshes; the file has a twentieth or so on top.
+  // Bytes of the records of an owner's meshes; the file is larger by about a twentieth.
   std::uint64_t OwnerBytes(const std::string& owner) const { return file_->OwnerBytes(owner); }
 
  private:

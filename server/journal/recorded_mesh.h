@@ -14,16 +14,16 @@
 
 namespace stellate::server {
 
-// A mesh's place in a shared journal.
+// The record of one mesh in a shared journal.
 class RecordedMesh final : public SessionJournal,
                            public SharedJournal::Mesh,
                            public std::enable_shared_from_this<RecordedMesh> {
  public:
-  // A new one. `owner_limit`: most bytes that the records of one owner's meshes may have, where
-  // owners have names; 0: none.
+  // A new mesh. `owner_limit`: the most bytes of the records of one owner's meshes, where clients
+  // are authenticated; 0: no limit.
   RecordedMesh(std::shared_ptr<SharedJournal> journal, std::uint64_t owner_limit)
       : journal_(std::move(journal)), owner_limit_(owner_limit) {}
-  // One that is there: `options` as they were recorded.
+  // A recorded mesh.
   RecordedMesh(std::shared_ptr<SharedJournal> journal, std::uint64_t owner_limit, std::int64_t id,
                const JournalFile::StoredMesh& stored, const MeshRequest& request,
                std::uint64_t bytes);
@@ -45,7 +45,7 @@ class RecordedMesh final : public SessionJournal,
   bool WriteAnswers(JournalFile* file) override;
   void AnswersWritten(bool written) override;
   bool RemoveSome(JournalFile* file, bool* done) override;
-  // Its result is recorded: what led to it can go.
+  // The result is recorded: removes the rounds that led to it.
   void RemoveRounds();
 
  private:
@@ -74,15 +74,15 @@ class RecordedMesh final : public SessionJournal,
   bool has_history_ = false;          // some of it
   std::vector<AnswerRange> written_;  // of the round
   std::int64_t next_part_ = 0, draft_part_ = 0;
-  std::vector<AnswerRange> draft_;  // written once the transaction is
+  std::vector<AnswerRange> draft_;  // written once the transaction is committed
 
-  // The session's thread alone.
-  std::uint64_t rounds_ = 0;  // that are whole
-  bool has_answers_ = false;  // of the one after these
+  // For the session's thread alone:
+  std::uint64_t rounds_ = 0;  // that are complete
+  bool has_answers_ = false;  // of the next round
 
   mutable std::mutex mutex_;
-  std::int64_t round_ = 0;  // under way; 0: none
-  std::uint64_t questions_ = 0;
+  std::int64_t round_ = 0;       // under way; 0: none
+  std::uint64_t questions_ = 0;  // digest of the round's queries
   std::vector<Eigen::Index> sizes_;
   std::shared_ptr<const Round> answers_;
   std::vector<AnswerRange> pending_;  // answered and not written

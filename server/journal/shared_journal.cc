@@ -118,7 +118,7 @@ void SharedJournal::Keep(const std::stop_token& stop) {
   std::unique_lock lock(due_mutex_);
   const auto is_due = [this] { return log_is_long_ || space_is_due_ || !removing_.empty(); };
   while (true) {
-    if (!work_due_.wait_for(lock, stop, kSync, is_due)) {  // told to stop, until nothing is due
+    if (!work_due_.wait_for(lock, stop, kSync, is_due)) {  // asked to stop, until nothing is due
       if (stop.stop_requested()) return;
       lock.unlock();
       Do("the mark", FairMutex::Place::kFirst,

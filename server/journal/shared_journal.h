@@ -20,42 +20,41 @@
 
 namespace stellate::server {
 
-// A journal's file for many threads, and two threads that work at it: one writes the answers of
-// rounds that are not whole yet, the other removes what is not needed any more and keeps the file
-// in order, in pieces, between which others write. Neither those who answer nor those who delete
-// wait for the disk.
+// A journal's file, shared by many threads, and two threads of its own: one writes the answers of
+// incomplete rounds; the other removes records and compacts the file, in pieces, so that others can
+// write in between. Neither workers nor callers of DeleteMesh wait for the disk.
 class SharedJournal {
  public:
-  // What the two threads do for a mesh; both have the file to themselves meanwhile.
+  // Called by the two threads, which have locked the file.
   class Mesh {
    public:
     virtual ~Mesh() = default;
     virtual bool HasAnswers() const = 0;
-    // In a transaction. False: the disk's fault.
+    // In a transaction. False: the disk failed.
     virtual bool WriteAnswers(JournalFile* file) = 0;
-    // What WriteAnswers wrote since is on the disk, or not.
+    // Whether what WriteAnswers wrote is on the disk.
     virtual void AnswersWritten(bool written) = 0;
-    // One piece; `done` once nothing is left.
+    // Removes one piece; sets `done` once nothing is left.
     virtual bool RemoveSome(JournalFile* file, bool* done) = 0;
   };
 
   SharedJournal(std::unique_ptr<DataDirectory> directory, std::unique_ptr<JournalFile> file)
       : directory_(std::move(directory)), file_(std::move(file)) {}
 
-  // Runs `action` on the file, alone. What went wrong, if it returned false: the server cannot
-  // record `what`.
+  // Runs `action` with the file locked. Returns why the server cannot record `what` if it returned
+  // false.
   std::optional<MeshFailure> Do(const char* what, FairMutex::Place place,
                                 const std::function<bool(JournalFile*)>& action);
 
   void StartThreads();
-  // What is due is tried once more.
+  // Tries once more whatever is due.
   void StopThreads();
   void WriteAnswersLater(std::shared_ptr<Mesh> mesh);
   void RemoveLater(std::shared_ptr<Mesh> mesh);
 
   // Bytes of all records of an owner's meshes.
   std::uint64_t OwnerBytes(const std::string& owner) const;
-  std::uint64_t TotalBytes() const;  // of everyone's
+  std::uint64_t TotalBytes() const;  // of all owners
   void CountFor(const std::string& owner, std::int64_t bytes);
 
  private:
@@ -67,11 +66,11 @@ class SharedJournal {
   bool RemoveSome(Mesh* mesh, bool* done);
   bool GiveBackSome(bool* done);
 
-  const std::unique_ptr<DataDirectory> directory_;  // not another's before the file is closed
+  const std::unique_ptr<DataDirectory> directory_;  // kept locked until the file is closed
   FairMutex mutex_;
   const std::unique_ptr<JournalFile> file_;
 
-  mutable std::mutex due_mutex_;  // of all that follows; never held while the disk is waited for
+  mutable std::mutex due_mutex_;  // of all that follows; never locked during a wait for the disk
   std::condition_variable_any answers_due_, work_due_;
   std::vector<std::shared_ptr<Mesh>> writing_;  // have answers
   std::deque<std::shared_ptr<Mesh>> removing_;

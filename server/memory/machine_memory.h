@@ -4,10 +4,10 @@
 
 namespace stellate::server {
 
-// Bytes of memory that this process may have: the machine's, or what a control group allows if
+// The memory that this process may use, in bytes: the machine's, or the limit of a control group if
 // that is less.
 std::uint64_t MachineBytes();
-// Bytes of memory that this process has now; 0 where the system does not say.
+// The memory that this process uses, in bytes; 0: unknown.
 std::uint64_t ResidentBytes();
 
 }  // namespace stellate::server

@@ -14,20 +14,23 @@
 
 namespace stellate::server {
 
-// What a running mesh of this specification holds with `vertices` vertices, in bytes, its
-// history included, while a round of `queries` is under way. An estimate: for k <= 3
-// 0.8 to 1.5 times what is measured (`tests/bench/run memory`), beside what a process takes alone.
+// Estimates the memory of a running mesh with `vertices` vertices, in bytes, with its history,
+// during a round of `queries`. For k <= 3 it is 0.8 to 1.5 times the measured memory
+// (`tests/bench/run memory`), without that of an idle process.
 std::uint64_t EstimateMeshBytes(const core::Specification& spec, std::uint64_t vertices,
                                 std::uint64_t queries);
 
-// What a mesh that has ended holds apart from its history: itself, and its seeds.
+// Estimates the memory of an ended mesh without its history: itself, and its seeds.
 std::uint64_t EstimateFinishedBytes(const core::Specification& spec);
 
-// What an open call on a mesh holds while its client reads nothing: itself, and a message of `part`
-// bytes, or one that repeats the specification, as it is and as it is sent.
+// Estimates the memory of an open call whose client reads nothing: itself, and a message of `part`
+// bytes or with the specification, both parsed and serialized.
 std::uint64_t EstimateStreamBytes(const core::Specification& spec, std::uint64_t part);
 
-// Keeps the estimates of all meshes below a budget, and those of each owner's. Any thread.
+// Keeps the estimates of all meshes below a budget, and those of each owner. Any thread.
+//
+//   auto account = MemoryBudget::Open(budget, owner);   // for a mesh, as long as it lives
+//   if (auto refused = account->Set(bytes)) ...         // it may not grow
 class MemoryBudget {
  public:
   // 0: no limit. `owner` holds for named owners.
@@ -40,7 +43,7 @@ class MemoryBudget {
   enum class Of { kMeshes, kStreams };
   explicit MemoryBudget(Limits limits, Of what = Of::kMeshes) : limits_(limits), what_(what) {}
 
-  // One mesh's or call's part, given back when this goes. Holds no more than it was last set to.
+  // The share of one mesh or call, released by the destructor.
   class Account {
    public:
     ~Account() { budget_->Release(this); }
@@ -55,9 +58,9 @@ class MemoryBudget {
       if (refused && budget_->make_room_ && budget_->make_room_()) refused = TrySet(bytes);
       return refused;
     }
-    // The same, of what there is.
+    // The same, without releasing memory.
     std::optional<Refused> TrySet(std::uint64_t bytes) { return budget_->Set(this, bytes, false); }
-    // For a mesh that is there already, from an earlier server.
+    // For a mesh of an earlier server, which exists already.
     void SetUnchecked(std::uint64_t bytes) { budget_->Set(this, bytes, true); }
     std::uint64_t bytes() const { return budget_->BytesOf(this); }
 

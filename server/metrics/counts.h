@@ -9,13 +9,13 @@
 
 namespace stellate::server {
 
-// Of the meshes that the server holds, together.
+// Totals over all meshes of a server.
 struct Counts {
   std::map<SessionState, std::uint64_t> states;  // meshes in each of them, all states
   std::uint64_t workers = 0, watchers = 0, vertices = 0;
   std::uint64_t waiting = 0;  // queries without an answer yet
   std::uint64_t bytes = 0;    // estimated
-  std::uint64_t idle = 0;     // meshes that have questions and no worker
+  std::uint64_t idle = 0;     // meshes that have queries and no worker
 };
 
 Counts CountAll(const std::vector<std::shared_ptr<Session>>& sessions);

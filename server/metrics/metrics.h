@@ -13,16 +13,16 @@
 namespace stellate::server {
 
 // What the server counts, in Prometheus's text format and for people; docs/running/metrics.md lists
-// it. Counters are kept as things happen and cost an atomic addition; gauges are counted when
-// somebody asks. No metric names an owner or a mesh.
+// it. A counter costs an atomic addition; gauges are counted at each scrape. No metric names an
+// owner or a mesh.
 class Metrics {
  public:
   Metrics();
   ~Metrics();
 
-  // Where the meshes are to be found, for the gauges. Must outlive Listen's answers.
+  // Returns the meshes, for the gauges. Must outlive StopListening.
   using Sessions = std::function<std::vector<std::shared_ptr<Session>>()>;
-  // Whether new meshes are taken.
+  // Whether new meshes are accepted.
   using IsServing = std::function<bool()>;
   // Answers http://address from now on: /metrics for Prometheus, /healthz for probes, / for people.
   // kFailedPrecondition: the address is taken.

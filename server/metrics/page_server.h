@@ -15,18 +15,18 @@ struct Page {
   std::string body;
 };
 
-// Answers GET and HEAD over plain HTTP, a request a connection, on one thread of its own. No number
-// of silent connections keeps others from being answered: of too many the eldest is closed.
+// Answers GET and HEAD over plain HTTP, one request a connection, on one thread. Silent connections
+// do not block others: of too many the oldest is closed.
 class PageServer {
  public:
-  // The page at a path, as it was asked for; called on the thread.
+  // Returns the page at a path; called on the server's thread.
   using Pages = std::function<Page(std::string_view path)>;
 
-  // At every address that `address`, "host:port" or "[ipv6]:port", stands for; port 0 takes a free
-  // one. kFailedPrecondition: none of them can be had; the message has no start and no advice.
+  // Listens at every address of `address`, "host:port" or "[ipv6]:port"; port 0 takes a free one.
+  // kFailedPrecondition: none is available; the caller completes the message.
   static core::Expected<std::unique_ptr<PageServer>> Listen(const std::string& address,
                                                             Pages pages);
-  // Nothing is asked of `pages` after this.
+  // Calls `pages` no more.
   ~PageServer();
 
   int port() const;

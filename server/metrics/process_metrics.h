@@ -4,8 +4,8 @@
 
 namespace stellate::server {
 
-// What the system says of this process, under the names that Prometheus's own libraries give it,
-// and stellate_build_info. What the system does not say is left out.
+// The system's figures of this process, under the names that Prometheus's own libraries use, and
+// stellate_build_info. Figures that the system does not have are left out.
 class ProcessMetrics final : public prometheus::Collectable {
  public:
   std::vector<prometheus::MetricFamily> Collect() const override;

@@ -20,19 +20,19 @@
 
 namespace stellate::server {
 
-// Closes TCP connections whose calls, or what was begun of their messages, pile up. gRPC 1.51
-// bounds the calls open on a connection, but not before the client has acknowledged the bound; and
-// it takes new calls faster than it lets go of those that the client resets (CVE-2023-44487).
-// Either takes 10 to 20 kB a call, without end. For messages that never become whole: unread.h.
+// Closes TCP connections that hold too many calls or unread bytes. gRPC 1.51 limits the calls open
+// on a connection, but only once the client has acknowledged the limit; and it accepts new calls
+// faster than it frees those that the client resets (CVE-2023-44487). Both cost 10 to 20 kB a call,
+// without bound. Messages that never become complete: unread.h.
 class ConnectionGuard {
  public:
   struct Limits {
-    std::size_t calls = 0;  // of a connection, that gRPC has not let go of
-    // Of all connections, owners' requests and others apart; those are closed that hold most for
-    // longest.
+    std::size_t calls = 0;  // of a connection, that gRPC has not freed
+    // Of all connections, counted separately for owners' requests and others; the connections that
+    // hold the most for the longest time are closed.
     std::int64_t unread_bytes = 0;
     std::int64_t request_bytes = 0;                // the largest request
-    std::chrono::duration<double> request_time{};  // for a connection's next request to be whole
+    std::chrono::duration<double> request_time{};  // for a connection's next request to be complete
     // Connections at a time that have not said hello: the handshake of TLS is not over, or HTTP/2
     // has not begun. Half a handshake takes 100 kB. gRPC itself ends them after --hello-seconds.
     std::size_t hellos = 0;
@@ -48,15 +48,15 @@ class ConnectionGuard {
   // Call it for every connection, before gRPC has it. One thread at a time.
   void Watch(int fd);
 
-  // Connections that were closed have left enough calls behind that others should wait, or as many
-  // as may be have not said hello.
+  // Whether further connections should wait: closed ones have left many calls behind, or as many as
+  // allowed have not said hello.
   bool IsBehind() const { return behind_ || silent_count_ >= limits_.hellos; }
 
  private:
   using Clock = std::chrono::steady_clock;
-  struct Holding {                 // what a connection has unread
-    std::uint64_t whole = 0;       // messages, when they last were counted
-    Clock::time_point moved = {};  // when one became whole, or nothing was unread
+  struct Holding {                 // of a connection's unread messages
+    std::uint64_t whole = 0;       // complete messages, at the last count
+    Clock::time_point moved = {};  // when one became complete, or nothing was unread
     Clock::time_point light = {};  // when it held little
   };
   struct Connection {
@@ -67,7 +67,7 @@ class ConnectionGuard {
     ConnectionId id = 0;      // 0: not known yet
     std::uint64_t bytes = 0;  // received, and
     std::size_t calls = 0;    // held, when it was last asked about
-    bool ending = false;      // either side has hung up
+    bool ending = false;      // either side has closed it
     bool closed = false;      // by this guard
     std::shared_ptr<ConnectionUnread> unread;
     Holding of_strangers, of_owners;
@@ -93,32 +93,32 @@ class ConnectionGuard {
   const std::shared_ptr<UnreadRules> unread_;
   const std::function<void(const char* setting)> closed_;
   const int epoll_;
-  const int wake_;  // readable when it is to stop, or somebody came
+  const int wake_;  // readable when the thread must stop, or a connection came
 
   std::mutex mutex_;  // of the connections
   std::uint64_t last_key_ = 0;
   std::unordered_map<std::uint64_t, Connection> connections_;
-  std::set<std::uint64_t> silent_;  // have not said hello, as far as is known; the eldest first
+  std::set<std::uint64_t> silent_;  // not known to have said hello; the oldest first
 
-  // Of the thread.
-  std::set<std::uint64_t> busy_;    // to be looked at again
+  // For the thread alone:
+  std::set<std::uint64_t> busy_;    // to be examined again
   std::vector<ConnectionId> gone_;  // may have left calls behind
   std::size_t ending_calls_ = 0;    // of those that are closed and not gone yet
   bool hurried_ = false;            // much is unread
-  Clock::time_point awake_until_;   // gRPC may not have read yet what came
+  Clock::time_point awake_until_;   // until then gRPC may have unread data
   Clock::time_point silent_seen_;
   std::size_t left_silent_ = 0;  // never said hello and are gone, since memory was given back
   std::size_t swept_ = 0;        // how many were left when all were last looked at
-  std::size_t unsaid_ = 0;       // were closed since the log last said so
-  std::string last_;             // of those: which, and why
+  std::size_t unsaid_ = 0;       // closed since the last line of the log
+  std::string last_;             // the last of those, and why
   Clock::time_point said_;
-  bool untidy_ = false;  // memory is to be given back once it is quiet
+  bool untidy_ = false;  // memory must be released once it is quiet
   Clock::time_point quiet_at_;
   Clock::time_point given_back_;
 
   std::atomic<bool> behind_{false};
   std::atomic<std::size_t> silent_count_{0};
-  std::atomic<bool> napping_{false};  // looks at nothing before it is woken
+  std::atomic<bool> napping_{false};  // examines nothing until it is woken
   std::jthread thread_;
 };
 

@@ -25,13 +25,13 @@ class GuardedServer {
     CallJudge judge;  // unread.h
     // A connection was refused or closed by a setting. From any thread.
     std::function<void(const char* setting)> limit_reached;
-    // Who started this can set the limits by their flags, which messages then name.
+    // Whether the program has flags for the limits, which messages then name.
     bool has_flags = true;
   };
 
-  // `builder` has the services. Of `config`, which is valid: the address, the files of TLS, and the
-  // limits of connections and messages. Listens once this returns. kInvalidArgument: a file of TLS;
-  // kFailedPrecondition: the address cannot be had.
+  // Starts to listen. `builder` has the services. Uses the address, the files of TLS, and the
+  // limits of connections and messages from `config`, which must be valid. kInvalidArgument: a file
+  // of TLS; kFailedPrecondition: the address is not available.
   static core::Expected<std::unique_ptr<GuardedServer>> Start(const Config& config,
                                                               grpc::ServerBuilder* builder,
                                                               Hooks hooks);
@@ -55,10 +55,10 @@ class GuardedServer {
 
   const Hooks hooks_;
   std::string address_;
-  // Destroyed from the last to the first.
+  // The order matters: members are destroyed from the last to the first.
   std::unique_ptr<TlsFiles> tls_;
   std::unique_ptr<grpc::Server> server_;
-  std::unique_ptr<ConnectionGuard> guard_;  // TCP alone, as the next
+  std::unique_ptr<ConnectionGuard> guard_;  // for TCP only, as the listener
   std::unique_ptr<Listener> listener_;
   std::uint64_t header_blocks_;  // that were counted
 };

@@ -16,16 +16,16 @@
 namespace stellate::server {
 
 // Accepts TCP connections for gRPC, up to a number of open ones. gRPC's own listener (1.51)
-// stops for good when the process has once run out of files, which any stranger can bring about by
-// opening connections; this one closes what is too much, and goes on.
+// stops for good once the process has run out of files, which any stranger can cause by opening
+// connections; this one closes the connections beyond the limit, and goes on.
 class Listener {
  public:
-  // Takes a connection over, and closes it in the end.
+  // Takes ownership of a connection.
   using Taker = std::function<void(int listener_fd, int fd)>;
 
-  // Binds every address that the host stands for; port 0 takes a free one. Raises the process's
-  // soft limit of open files where that many connections need it; where the hard limit is lower, so
-  // is the number of connections. `who_allows` them: who_allows.h.
+  // Binds every address of the host; port 0 takes a free one. Raises the process's soft limit of
+  // open files if that many connections need it; a lower hard limit lowers the number of
+  // connections. `who_allows`: who_allows.h.
   static core::Expected<std::unique_ptr<Listener>> Open(
       ListenAddress address, std::size_t max_connections,
       std::string who_allows = "--max-connections");
@@ -34,13 +34,12 @@ class Listener {
   int port() const { return port_; }
   std::size_t max_connections() const { return max_connections_; }
 
-  // Accepts, on a thread of its own, all whose clients are still there. `refused` is called for
-  // each connection that was one too many.
-  // While `later` says so, connections wait in the kernel.
+  // Accepts connections on a thread of its own. `refused` is called for each connection beyond the
+  // limit. While `later` returns true, connections wait in the kernel.
   void Start(
       Taker take, std::function<void()> refused,
       std::function<bool()> later = [] { return false; });
-  // Nothing is handed over after this.
+  // No connection is handed over after this.
   void Stop();
 
  private:
@@ -54,12 +53,12 @@ class Listener {
   const int port_;
   const std::size_t max_connections_;
   const std::string who_allows_;
-  int wake_ = -1;  // readable once it is to stop
+  int wake_ = -1;  // readable when the thread must stop
   Taker take_;
   std::function<void()> refused_;
   std::function<bool()> later_;
-  // What was handed over: a socket, and its inode, which distinguishes a closed socket from another
-  // that got the same descriptor.
+  // Connections that were handed over: a socket, and its inode, which distinguishes a closed socket
+  // from another that got the same descriptor.
   std::vector<std::pair<int, ino_t>> open_;
   bool was_full_ = false;
   std::jthread thread_;

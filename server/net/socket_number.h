@@ -5,7 +5,8 @@
 
 namespace stellate::server {
 
-// Tells a socket from whatever has its file descriptor after it. Zero: it is no socket any more.
+// A socket's inode, which distinguishes it from later users of its file descriptor. 0: not a
+// socket.
 inline ino_t NumberOf(int fd) {
   struct stat info {};
   return fstat(fd, &info) == 0 && S_ISSOCK(info.st_mode) ? info.st_ino : 0;

@@ -14,23 +14,23 @@
 namespace stellate::server {
 
 // The server's certificate, its key, and the authorities of clients. The files are read again when
-// they change, so that a renewed certificate needs no restart; files that cannot be used change
-// nothing, all of them, and are logged once. Any thread.
+// they change, so that a renewed certificate needs no restart. If one cannot be used, all stay as
+// they were, and the log says so once. Any thread.
 class TlsFiles {
  public:
   // Plain text without --tls-cert. kInvalidArgument: a file cannot be used, and why.
   static core::Expected<std::unique_ptr<TlsFiles>> Open(const Config& config);
   ~TlsFiles();
 
-  // TLS by the files as they stand and as they will, within seconds of a Reload; with
-  // --tls-client-ca for clients that have a certificate of that authority alone. This must outlive
-  // the servers that listen with them.
+  // Credentials by the files in force, also after later Reloads, within seconds. With
+  // --tls-client-ca only clients with a certificate of that authority are accepted. This must
+  // outlive the servers that listen with them.
   std::shared_ptr<grpc::ServerCredentials> Credentials() const;
 
-  // Reads the files again if one is another than before, or in any case where `force`.
+  // Reads the files again if one has changed, or if `force`.
   void Reload(bool force = false);
 
-  // Where the text in force of a file stands, for this process.
+  // A path, for this process, of the version of a file that is in force.
   enum File { kCertificate, kKey, kClientCa };
   std::string PathOf(File file) const;
 

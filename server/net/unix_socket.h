@@ -6,8 +6,8 @@
 
 namespace stellate::server {
 
-// Removes the socket that a server which has ended left at `path`, as gRPC would take over any, a
-// living server's too. kFailedPrecondition: a server listens there, or it is no socket.
+// Removes a socket that an ended server left at `path`. gRPC would replace any socket, even that of
+// a running server. kFailedPrecondition: a server listens there, or it is no socket.
 core::Status ClearUnixPath(const std::string& path);
 
 }  // namespace stellate::server

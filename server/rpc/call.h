@@ -13,25 +13,26 @@
 
 namespace stellate::server {
 
-// A call and who makes it.
+// A call and its caller.
 struct Call {
   ServerState& state;
   Identity caller;
   std::string peer;  // the address that it comes from
 };
 
-// Who calls, or UNAUTHENTICATED, counted.
+// Returns the caller, or UNAUTHENTICATED, which it counts.
 tl::expected<Identity, grpc::Status> Identify(ServerState& state,
                                               const grpc::ServerContextBase& context);
 
-// As ToGrpc; limits that were reached are counted.
+// As ToGrpc; counts the limits that were reached.
 grpc::Status Refuse(ServerState& state, const Refused& refused, const std::string& prefix = "");
 
-// A line of the log: who does what with a mesh, and whose that is. Rationed by who does it.
+// Logs a caller's action on a mesh, and the mesh's owner. The number of lines of each caller is
+// limited.
 void Audit(const Session& session, const Identity& caller, const std::string& peer,
            const char* action);
 
-// The caller's mesh of that name, or an administrator's choice of any, or INVALID_ARGUMENT or
+// Returns the caller's mesh of that name (an administrator may name any), or INVALID_ARGUMENT or
 // NOT_FOUND. Another owner's mesh looks like one that does not exist. `field`: where the name
 // stands.
 tl::expected<std::shared_ptr<Session>, grpc::Status> FindMesh(const ServerState& state,
@@ -39,15 +40,15 @@ tl::expected<std::shared_ptr<Session>, grpc::Status> FindMesh(const ServerState&
                                                               const std::string& name,
                                                               const std::string& field = "name");
 
-// What a mesh says of itself to the caller.
+// Writes the state of a mesh as the caller may see it.
 void ShowMesh(const Call& call, const Session& session, v1::Mesh* mesh);
 
-// Counts an open call on the caller's mesh that sends messages of `part` bytes, as long as what it
-// returns lives; or RESOURCE_EXHAUSTED.
+// Counts the memory of an open call that sends messages of `part` bytes, while the returned account
+// lives; or RESOURCE_EXHAUSTED.
 tl::expected<std::unique_ptr<MemoryBudget::Account>, grpc::Status> CountStream(
     ServerState& state, const Session& session, std::uint64_t part);
 
-// INVALID_ARGUMENT: the call has ended without a request, or with bytes that are none.
+// INVALID_ARGUMENT: the call has ended without a valid request.
 grpc::Status NoRequest();
 
 // UNAVAILABLE: the server stops.

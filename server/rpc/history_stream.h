@@ -8,19 +8,21 @@
 
 namespace stellate::server {
 
-// How long a client may leave what it was sent unread, unless MayLeaveUnread. It can resume.
+// How long a client may leave a message unread, unless MayLeaveUnread. It can resume later.
 inline constexpr auto kUnreadPatience = std::chrono::seconds(30);
 
 // RESOURCE_EXHAUSTED: AddWatcher refused.
 grpc::Status TooManyWatchers(ServerState& state, const Session& session);
 
-// Of a mesh whose history is on the disk and has not come for `waited`. RESOURCE_EXHAUSTED: the
-// server has no memory for it; INTERNAL: it cannot be read back; nothing: wait on.
+// The status of a stream that has waited for `waited` for a mesh's history from the disk.
+// RESOURCE_EXHAUSTED: the server has no memory for it; INTERNAL: it cannot be read back; nothing:
+// wait on.
 std::optional<grpc::Status> NoHistory(ServerState& state, const Session& session,
                                       Clock::duration waited);
 
-// One client's stream of a mesh's history: a cursor in it, and at most one message on its way. What
-// the client does not read waits in the history, not here.
+// One client's stream of a mesh's history: a cursor in it, and at most one message on its way. A
+// client that reads slowly costs no more: the rest waits in the history. WatchMesh and DownloadMesh
+// are its subclasses.
 template <typename Request, typename Response>
 class HistoryStream : public ServerStream<Request, Response>, public SessionWatcher {
   using Base = ServerStream<Request, Response>;
@@ -55,18 +57,19 @@ class HistoryStream : public ServerStream<Request, Response>, public SessionWatc
   using typename Base::Phase;
   using typename Base::Step;
 
-  // Where to start in `session`, or why not. Before anything else, without the lock.
+  // Chooses where to start in `session`, or returns why not. Called first, without the lock.
   virtual grpc::Status Choose(const Request& request, const Session& session) = 0;
-  // What the log says is done with the mesh, after Choose; null: nothing worth a line.
+  // The action in the log, after Choose; null: none.
   virtual const char* Action() const = 0;
   // Bytes of mesh in a message, after Choose.
   virtual std::uint64_t PartBytes() const { return server::PartBytes(state().config); }
   // (locked) The mesh has changed, or a second has passed.
   virtual void OnNews() {}
-  // (locked)
+  // (locked) Whether the client may leave a message unread for longer than kUnreadPatience.
   virtual bool MayLeaveUnread() const { return false; }
 
-  // (locked) The mesh's history, read from the disk if need be; null: not yet, or this calls End.
+  // (locked) Returns the mesh's history, which it has read from the disk if necessary. Null: not
+  // read yet, or this has called End.
   const MeshHistory* OpenHistory() {
     const TimePoint now = Clock::now();
     history_ = state().store.OpenHistory(Base::session());

@@ -13,7 +13,7 @@
 
 namespace stellate::server {
 
-// What the calls of a server share.
+// The state that all calls of a server share.
 struct ServerState {
   ServerState(const Config& config_in, StoreLimits limits, Session::MesherFactory factory)
       : config(config_in),

@@ -88,7 +88,7 @@ class ServerStream : public grpc::ServerBidiReactor<Request, Response>,
   enum class Phase {
     kIdle,
     kWriting,   // a message is on its way
-    kFinished,  // so is the end: nothing follows it
+    kFinished,  // the end is on its way: nothing follows it
     kDone,      // gRPC has forgotten the call
   };
 
@@ -96,15 +96,15 @@ class ServerStream : public grpc::ServerBidiReactor<Request, Response>,
   virtual Step Next() = 0;
   // (locked) The same once End was called: the last messages before its status. kWait: none.
   virtual Step AfterEnd() { return Step::kWait; }
-  // (locked) The client has had all the time it gets, and the call is to be broken off.
+  // (locked) Whether the client has exceeded its time, so that the call must be cancelled.
   virtual bool IsStuck(TimePoint now) const = 0;
   // (locked) About once a second. Calls Pump if there may be something to send.
   virtual void OnTick(TimePoint now) = 0;
-  // (locked) The stream is to end: drops what has not been sent.
+  // (locked) The stream ends: drop what has not been sent.
   virtual void OnEnd() {}
   // (locked) The last message, or the status, is on its way.
   virtual void OnFinish() {}
-  // Gives back what the stream has of the mesh. Called without the lock, any number of times.
+  // Releases what the stream holds of the mesh. Called without the lock, any number of times.
   virtual void Leave() {}
 
   [[nodiscard]] std::unique_lock<std::mutex> Lock() { return std::unique_lock(mutex_); }

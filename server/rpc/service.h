@@ -17,7 +17,7 @@ namespace stellate::server {
 // not read.
 class Rpcs final : public grpc::Service {
  public:
-  // By its path on the wire.
+  // Whether an rpc has this path on the wire.
   static bool Serves(std::string_view path);
 
   explicit Rpcs(ServerState* state);

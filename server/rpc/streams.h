@@ -8,7 +8,7 @@
 
 namespace stellate::server {
 
-// A call that lasts. Both come from any thread and must not block.
+// A call that lasts. Both methods are called on any thread and must not block.
 class Stream {
  public:
   virtual ~Stream() = default;

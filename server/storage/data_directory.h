@@ -10,10 +10,10 @@
 
 namespace stellate::server {
 
-// A directory with a journal in it, while this server alone has it.
+// The directory of a journal, locked for this server.
 class DataDirectory {
  public:
-  // Made if it is not there. Refuses one that another server uses.
+  // Creates it if it does not exist. Refuses one that another server uses.
   static core::Expected<std::unique_ptr<DataDirectory>> Open(const std::string& path);
   ~DataDirectory();
   DataDirectory(const DataDirectory&) = delete;
@@ -22,13 +22,12 @@ class DataDirectory {
   bool HasJournal() const;
   // It may be damaged.
   bool IsOfThisVersion() const;
-  // As JournalFile::Open; of this version, or refused without changing a byte.
+  // As JournalFile::Open. Refuses another version, without changing a byte.
   core::Expected<std::unique_ptr<JournalFile>> OpenJournal() const;
-  // As OpenJournal; where there is none begins one.
+  // As OpenJournal, but creates a journal if there is none.
   core::Expected<std::unique_ptr<JournalFile>> TakeJournal() const;
 
-  // Puts a new journal, filled by `fill`, in the place of the one that is there. A kill leaves
-  // either.
+  // Replaces the journal by a new one, filled by `fill`. After a kill either of them is there.
   core::Status Install(const std::function<core::Status(JournalFile*)>& fill) const;
 
   const std::string& path() const { return path_; }
@@ -39,7 +38,7 @@ class DataDirectory {
 
  private:
   DataDirectory(std::string path, int lock) : path_(std::move(path)), lock_(lock) {}
-  // Of the journal that is there; kFailedPrecondition: it is none.
+  // kFailedPrecondition: the file is not a journal.
   core::Expected<std::uint32_t> VersionOfJournal() const;
 
   const std::string path_;

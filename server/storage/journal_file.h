@@ -18,23 +18,23 @@ namespace stellate::server {
 
 inline constexpr std::uint32_t kApplication = 0x53744c74;  // SQLite's application_id of a journal
 
-// A journal's file: sealed records, each in its place, whatever they mean. One thread at a time.
+// A journal's file: sealed records by place, whatever their meaning. One thread at a time.
 // After a call that returned false, error() and IsFull() of database() say why, and Abandon() must
 // be called before the next.
 class JournalFile {
  public:
-  // A new one with nothing in it, at a path where there is none.
+  // Creates an empty one at a path where there is none.
   static core::Expected<std::unique_ptr<JournalFile>> Make(const std::string& path);
-  // One that is there, with `mark` next to it (null: there was none). Refuses what is damaged,
-  // naming it, without changing a byte: every record is read.
+  // Opens one, with its `mark` (null: there was none). Reads every record; refuses a damaged file,
+  // naming the damage, without changing a byte.
   static core::Expected<std::unique_ptr<JournalFile>> Open(const std::string& path,
                                                            std::unique_ptr<JournalMark> mark);
 
-  // What of a mesh was there when it was opened.
+  // What the file had of a mesh when it was opened.
   struct StoredMesh {
     std::string start, end, result;  // as recorded; empty: none
     bool removed = false;            // marked so
-    std::uint64_t rounds = 0;        // 1 to `rounds` are whole
+    std::uint64_t rounds = 0;        // 1 to `rounds` are complete
     Standing last;                   // in the last of them
     bool has_answers = false, has_history = false;
   };
@@ -51,16 +51,16 @@ class JournalFile {
 
   // Which records of a mesh.
   enum class Kinds { kAll, kRounds, kHistory };
-  // A transaction of its own: removes a bounded piece of these; sets `done` once nothing is left of
-  // them. Of kAll, all but the last one leave a mark by which the mesh is known to lack something.
+  // A transaction of its own: removes a bounded number of these; sets `done` once none are left.
+  // With kAll the mesh is marked as incomplete until the last one.
   bool RemoveSome(std::int64_t mesh, Kinds kinds, bool* done);
-  // Gives a bounded piece of what was removed back to the disk; sets `done` once nothing is left.
+  // Returns a bounded piece of the freed space to the disk; sets `done` once nothing is left.
   bool GiveBackSome(bool* done);
   bool HasSpaceToGiveBack();
-  // Records go to a log first: moves them to their place, which no other call does.
+  // Moves records from the log, where they are written first, to their place.
   bool Checkpoint() { return database_->Checkpoint(); }
   bool IsLogLong() const;
-  // Moves all of the log, and empties it.
+  // The same for the whole log, which is then empty.
   bool Finish() { return database_->Execute("PRAGMA wal_checkpoint(TRUNCATE)"); }
   void SetMark(std::unique_ptr<JournalMark> mark) { mark_ = std::move(mark); }
   bool SyncMark() { return mark_ == nullptr || mark_->Sync(); }
@@ -71,9 +71,9 @@ class JournalFile {
   // Bytes of all records of a mesh.
   std::uint64_t BytesOf(std::int64_t mesh) const;
   JournalMark::State mark_state() const { return {state_.identity, state_.commits}; }
-  // Grows to `max_bytes` at most; 0: what the disk holds.
+  // Limits the file's size; 0: no limit but the disk's.
   void Limit(std::uint64_t max_bytes);
-  // A file of this path is kept, whose space removals may use on a full disk.
+  // Keeps a file at this path, whose space removals may use on a full disk.
   void Reserve(const std::string& path);
 
   Sqlite& database() { return *database_; }

@@ -30,7 +30,7 @@ class PersistentWorker {
     stopping_ = true;
     Wait();
   }
-  // Until the mesh is over, or this worker is told to stop.
+  // Until the mesh is over, or this worker is asked to stop.
   void Wait() {
     if (thread_.joinable()) thread_.join();
   }

@@ -1,6 +1,6 @@
 // How soon a cancelled mesh ends, and how soon nothing is left of it: meshes of several sizes, each
 // cancelled at a moment drawn from the time that an undisturbed one takes. And beside the largest:
-// calls with a deadline, and a server that is told to stop.
+// calls with a deadline, and a server that is asked to stop.
 
 #include <grpcpp/create_channel.h>
 
@@ -219,9 +219,9 @@ int KeepDeadlines(v1::Stellate::Stub& stub, Oracle& oracle) {
   return wrong;
 }
 
-// A server that is told to stop, and to wait for no mesh, while it computes one.
+// A server that is asked to stop, and to wait for no mesh, while it computes one.
 int StopAt(Oracle& oracle, double whole_seconds, int stops, bool durable, std::mt19937_64& random) {
-  std::printf("  the server told to stop %d times while it computes one of the largest\n", stops);
+  std::printf("  the server asked to stop %d times while it computes one of the largest\n", stops);
   std::uniform_real_distribution<double> moment(0, whole_seconds);
   std::vector<double> gone;
   int wrong = 0;

@@ -64,7 +64,7 @@ class Conversation {
       if (Move()) deadline = Clock::now() + patience;
       const Clock::time_point now = Clock::now();
       if (done_ || now < std::min(deadline, stop_.deadline())) continue;
-      if (now >= stop_.deadline()) throw std::runtime_error("it was told to stop");
+      if (now >= stop_.deadline()) throw std::runtime_error("it was asked to stop");
       char seconds[32];
       std::snprintf(seconds, sizeof seconds, "%g", silence.count());
       throw std::runtime_error("it has neither read nor written for " + std::string(seconds) +

@@ -35,7 +35,7 @@ Expected<ChosenEpsilon> client::ChooseEpsilon(CheckReport report) {
   if (!report.reach || !std::isfinite(*report.reach)) {
     return Fail(ErrorCode::kOracleFailed,
                 "the reach is taken from the oracle's answers, and they show none: say how large "
-                "epsilon shall be",
+                "epsilon should be",
                 "ORACLE_NO_REACH");
   }
   return ChosenEpsilon{Rounded(*report.reach / doctor::kAutoEpsilon),
@@ -55,7 +55,7 @@ std::optional<ChosenEpsilon> client::Finer(const Report& report) {
                           ", which was too coarse";
   const double quarter = Rounded(c.estimated_reach / doctor::kAutoEpsilon);
   const double least = Rounded(doctor::kAutoLeastShare * report.epsilon);
-  if (quarter < least) return ChosenEpsilon{least, "no finer at once, though " + why};
+  if (quarter < least) return ChosenEpsilon{least, "no finer in one step, though " + why};
   return ChosenEpsilon{quarter, why};
 }
 

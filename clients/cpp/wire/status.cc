@@ -93,7 +93,8 @@ std::string_view Advice(const grpc::Status& status) {
            "and --tls-key (in C++ Credentials)";
   }
   if (says("failed to connect") && says("Connection refused")) {
-    return "nobody listens there: start a server with `stellated`, or name another with --server";
+    return "no server listens there: start a server with `stellated`, or name another with "
+           "--server";
   }
   return "";
 }

@@ -37,7 +37,7 @@ export function finerEpsilon(report: Report): { epsilon: number; reason: string 
     `by the certificate of epsilon ${general(epsilon, 6)}, which was too coarse`;
   const quarter = rounded(reach / DOCTOR.auto_epsilon);
   const least = rounded(DOCTOR.auto_least_share * epsilon);
-  if (quarter < least) return { epsilon: least, reason: `no finer at once, though ${why}` };
+  if (quarter < least) return { epsilon: least, reason: `no finer in one step, though ${why}` };
   return { epsilon: quarter, reason: why };
 }
 

@@ -31,7 +31,7 @@ export interface RunOptions
   epsilon: number | "auto";
   /** Told of each epsilon that "auto" takes, before it is meshed with, and why. */
   onEpsilon?: (epsilon: number, reason: string) => void;
-  /** Streams on which the oracle is asked at once; more than one helps an async oracle. Default 1. */
+  /** Streams that call the oracle in parallel; more than one helps an async oracle. Default 1. */
   workers?: number;
   onProgress?: (progress: Progress) => void;
   /**

@@ -64,7 +64,7 @@ async function wallsAt(oracle: CheckedOracle, reply: Found, n: number, face: num
 export interface WorkerOptions {
   /** Its name, for logs. */
   worker?: string;
-  /** Most points that the oracle is asked at once; by default the server decides. */
+  /** Most points in one call of the oracle; by default the server decides. */
   maxChunk?: number;
 }
 

@@ -25,7 +25,7 @@ from .errors import FailedPrecondition, InvalidArgument
 from .report import Progress, Report
 
 _LAYOUT = 1  # of the files
-_LAST_SERVER_SECONDS = 60.0  # it has been told to stop, and may be busy with a round
+_LAST_SERVER_SECONDS = 60.0  # it has been asked to stop, and may be busy with a round
 
 
 class Checkpoint:

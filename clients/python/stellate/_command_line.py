@@ -311,7 +311,7 @@ def _parser(by_command: bool) -> argparse.ArgumentParser:
     one.add_argument("mesh", help="its whole name: meshes/ and 32 digits")
     one.add_argument("--processes", type=int, metavar="N", help="of this machine, that answer")
     one.add_argument("--worker", default="", help="what the server's log calls this one")
-    one.add_argument("--max-chunk", type=int, metavar="N", help="most points asked at once")
+    one.add_argument("--max-chunk", type=int, metavar="N", help="most points in one call")
     _add_connection(one, "127.0.0.1:7717")
 
     one = add("download", _download, "fetch a mesh that is on a server")

@@ -41,7 +41,7 @@ def choose(oracle: Any, epsilon: Epsilon) -> tuple[float, str]:
     if report.reach is None or not math.isfinite(report.reach):
         raise OracleError(
             "epsilon='auto' takes the reach from the oracle's answers, and they show none: say how "
-            "large epsilon shall be",
+            "large epsilon should be",
             "ORACLE_NO_REACH",
         )
     chosen = _quarter(report.reach)
@@ -62,7 +62,7 @@ def finer(report: Report) -> tuple[float, str] | None:
     why = f"about {reach:.3g} by the certificate of epsilon {epsilon:g}, which was too coarse"
     least = _rounded(rule["auto_least_share"] * epsilon)
     if _quarter(reach) < least:
-        return least, f"no finer at once, though a quarter of the reach, {why}"
+        return least, f"no finer in one step, though a quarter of the reach, {why}"
     return _quarter(reach), f"a quarter of the reach, {why}"
 
 

@@ -187,7 +187,7 @@ class Worker:
     ) -> None:
         """`on_failure` is told what the oracle raised before the server is. `quiet`: no log.
 
-        `max_chunk`: the most queries that the oracle is asked at once; None: the server decides.
+        `max_chunk`: the most queries in one call of the oracle; None: the server decides.
         `ask` has the oracle answer a chunk, somewhere. Its ExecutorError ends this worker alone.
         """
         self._ask = ask

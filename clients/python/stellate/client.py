@@ -147,7 +147,7 @@ class Client:
     ) -> str:
         """Serves a mesh with this oracle until it is over; returns the state it ended in.
 
-        `max_chunk`: the most points that the oracle is asked at once; None: as many as take it a
+        `max_chunk`: the most points in one call of the oracle; None: as many as take it a
         quarter of a second, or four times what a call of it costs.
 
         Raises: what the oracle raises, or StellateError.

@@ -272,7 +272,7 @@ def _advice(code: grpc.StatusCode, message: str) -> str:
         )
     if "failed to connect" in said and "connection refused" in said:
         return (
-            "nobody listens there: start a server with `stellated`, or name another, in the shell "
+            "no server listens there: start a server with `stellated`, or name another, in the shell "
             "with --server"
         )
     return ""

@@ -302,7 +302,7 @@ def workers_on(
       mesh_name: "meshes/<id>", as Client.create gives it.
       server, credentials: as for stellate.serve.
       worker: what the server's log calls them, with the slot's number.
-      max_chunk: the most points that the oracle is asked at once.
+      max_chunk: the most points in one call of the oracle.
     """
     return ExecutorWorkers(
         executor, oracle, mesh_name, slots, server, credentials, worker, max_chunk

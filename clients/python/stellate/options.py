@@ -69,7 +69,7 @@ class SpecOptions(TypedDict, total=False):
     ]
     speculative: Annotated[
         Optional[bool],
-        "refine a guess of the manifold first: fewer round trips, more processor time; default: on "
+        "refine a surrogate of M first: fewer round trips, more processor time; default: on "
         "where the server is on another machine",
     ]
     common_centre: Annotated[
@@ -138,7 +138,7 @@ class MeshOptions(SpecOptions, total=False):
     ]
     max_chunk: Annotated[
         Optional[int],
-        "most points that the oracle is asked at once; default: as many as take it a quarter of a "
+        "most points in one call of the oracle; default: as many as take it a quarter of a "
         "second, or four times what a call of it costs",
     ]
 

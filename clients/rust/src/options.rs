@@ -37,9 +37,9 @@ pub struct RunOptions<'a> {
     pub connection: Connection<'a>,
     /// What is asked of it.
     pub mesh: MeshOptions,
-    /// Streams on which the oracle is asked at once, each on a thread of its own.
+    /// Streams that call the oracle in parallel, each on a thread of its own.
     pub workers: usize,
-    /// Most points that the oracle is asked at once; by default the server decides.
+    /// Most points in one call of the oracle; by default the server decides.
     pub max_chunk: Option<usize>,
     /// A mesh that is not proved good is an error of kind `NotCertified`.
     pub require_certified: bool,

@@ -25,7 +25,7 @@ const BUSY_SHARE: f64 = 0.25; // of the time that the server bears silence
 pub struct WorkerOptions {
     /// Its name, for logs.
     pub worker: String,
-    /// Most points that the oracle is asked at once; by default the server decides.
+    /// Most points in one call of the oracle; by default the server decides.
     pub max_chunk: Option<usize>,
 }
 

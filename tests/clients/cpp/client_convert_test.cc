@@ -224,7 +224,7 @@ TEST(FromStatus, NamesTheFlagThatHelps) {
   EXPECT_TRUE(
       names(said(UNAVAILABLE, connect + "certificate verify failed"), "--tls-ca FILE names"));
   EXPECT_EQ(said(UNAVAILABLE, "Socket closed"), "Socket closed");  // it was there
-  EXPECT_TRUE(names(said(UNAVAILABLE, connect + "Connection refused"), "nobody listens there"));
+  EXPECT_TRUE(names(said(UNAVAILABLE, connect + "Connection refused"), "no server listens there"));
   EXPECT_EQ(said(UNAVAILABLE, connect + "No route to host"), connect + "No route to host");
 }
 

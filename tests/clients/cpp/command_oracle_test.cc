@@ -358,7 +358,7 @@ TEST_F(CommandOracle, StopEndsABatchThatIsNotAnswered) {
     oracle->ClosestPoint(Eigen::Vector3d::Ones());
     ADD_FAILURE();
   } catch (const std::runtime_error& e) {
-    EXPECT_THAT(e.what(), HasSubstr("told to stop"));
+    EXPECT_THAT(e.what(), HasSubstr("asked to stop"));
   }
   stopper.join();
 }

@@ -203,7 +203,7 @@ std::vector<std::string> Examples() {
 }
 INSTANTIATE_TEST_SUITE_P(Catalogue, GoodOracle, ::testing::ValuesIn(Examples()));
 
-TEST(Check, EpsilonIsHeldAgainstTheReach) {
+TEST(Check, EpsilonIsComparedWithTheReach) {
   const auto torus = MakeManifold("torus:1:0.4", nullptr);
   CheckOptions options;
   options.epsilon = 0.3;

@@ -106,7 +106,9 @@ def test_tangents_go_along(client, declare, undisturbed):
 
 def test_an_executor_made_anew_survives_a_dead_process(client, declare, tmp_path, caplog):
     name = declare(Torus(tmp_path))
-    workers = stellate.executors.workers_on(processes, Torus(tmp_path, "die"), name, 2, server=client)
+    workers = stellate.executors.workers_on(
+        processes, Torus(tmp_path, "die"), name, 2, server=client
+    )
     assert workers.wait() == ["SUCCEEDED"] * 2
     assert (tmp_path / "died").exists() and "making another" in caplog.text
     plain = stellate.mesh(Torus(tmp_path), EPSILON, server=client)
@@ -116,7 +118,9 @@ def test_an_executor_made_anew_survives_a_dead_process(client, declare, tmp_path
 def test_a_broken_pool_is_no_failure_of_the_oracle(client, declare, tmp_path):
     name = declare(Torus(tmp_path))
     with processes() as pool:
-        workers = stellate.executors.workers_on(pool, Torus(tmp_path, "die"), name, 2, server=client)
+        workers = stellate.executors.workers_on(
+            pool, Torus(tmp_path, "die"), name, 2, server=client
+        )
         with pytest.raises(stellate.ExecutorError, match="new executor") as broken:
             workers.wait()
     assert isinstance(broken.value.__cause__, futures.BrokenExecutor)
@@ -139,7 +143,9 @@ def test_a_chunk_that_always_kills_is_given_up(client, declare, tmp_path):
 def test_what_the_oracle_raises_is_told_as_its_own(client, declare, tmp_path):
     name = declare(Torus(tmp_path))
     with processes(1) as pool:
-        workers = stellate.executors.workers_on(pool, Torus(tmp_path, "raise"), name, 2, server=client)
+        workers = stellate.executors.workers_on(
+            pool, Torus(tmp_path, "raise"), name, 2, server=client
+        )
         with pytest.raises(stellate.OracleError, match="the solver has no licence") as raised:
             workers.wait()
     assert "in closest_point" in str(raised.value.__cause__)  # the other process's traceback

@@ -214,7 +214,7 @@ def test_epsilon_far_above_the_reach_is_told_and_never_certified_wrongly(epsilon
     assert not mesh.certified
 
 
-def test_what_is_declared_and_asked_for_is_held_against_the_mesh(server):
+def test_what_is_declared_and_asked_for_is_compared_with_the_mesh(server):
     plain = stellate.mesh(manifolds.Torus(), 0.2, server=server)
     assert "no boundary" in plain.report.certificate.verdict
     two = stellate.mesh(manifolds.Torus(), 0.2, server=server, components=2)

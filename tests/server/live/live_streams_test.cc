@@ -85,7 +85,7 @@ TEST_F(LiveStreamsTest, TheMeshGrowsBeforeItsWatcherAndIsCertified) {
   EXPECT_EQ(worker.over(), "MESH_STATE_SUCCEEDED");
 }
 
-TEST_F(LiveStreamsTest, AMeshTellsOfItsPastAndItsCrewWhenAsked) {
+TEST_F(LiveStreamsTest, AMeshHasItsPastAndItsWorkersWhenAsked) {
   Start();
   const std::string name = CreateSphere(0.1);
   const auto look = [&](bool workers, std::optional<std::uint64_t> after) {

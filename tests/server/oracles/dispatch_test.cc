@@ -184,7 +184,7 @@ TEST_F(DispatchTest, TheEndsOfRoundsDoNotSpoilThePace) {
   EXPECT_NEAR(static_cast<double>(leases.at(0).count), 200, 20);
 }
 
-TEST_F(DispatchTest, WhatIsLeftIsSharedAmongTheCrewButNotInCrumbs) {
+TEST_F(DispatchTest, WhatIsLeftIsSharedAmongTheWorkersButNotInCrumbs) {
   options_.chunk_bytes = 1 << 20;
   Dispatch dear(options_);
   for (WorkerId id = 1; id <= 8; ++id) dear.Join(id, 0);

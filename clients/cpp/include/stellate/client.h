@@ -13,7 +13,7 @@
 
 namespace stellate {
 
-// For a server that wants TLS or a token. None of it: plain text. With any tls_ file, TLS.
+// For a server that requires TLS or a token. Empty: plain text. Any tls_ file implies TLS.
 struct Credentials {
   bool tls = false;                      // TLS, trusting the system's authorities
   std::string tls_ca;                    // PEM file: trust these instead
@@ -31,41 +31,43 @@ struct Outage {
 
 // What to mesh and how. Absent values take the server's defaults; see mesh.proto for each.
 struct MeshOptions {
-  double epsilon = 0;  // largest circumradius of a simplex, a length; must be given, or else:
-  // ChooseEpsilon says it, before the server is asked; where that was too coarse for a certificate,
-  // twice at most, what the certificate shows.
+  double epsilon = 0;  // largest circumradius of a simplex, a length; required, unless auto_epsilon
+  // Use ChooseEpsilon. If the mesh is too coarse to be certified, mesh again, twice at most, with
+  // what its certificate shows.
   bool auto_epsilon = false;
-  // Called on the calling thread with each that was chosen; Report::epsilon_reason keeps the last.
+  // Called on the calling thread with each chosen epsilon; Report::epsilon_reason has the last
+  // reason.
   std::function<void(double epsilon, const std::string& reason)> on_epsilon;
 
   // "host:port" or "unix:/path". Empty: a private stellated is started for this mesh and stopped
   // after it; found by $STELLATED, next to the running program, or on PATH.
   std::string server;
   Credentials credentials;  // for `server`
-  // A server that goes away while it meshes is waited for so long, its streams opened again and
-  // carried on; 0: not at all. It has to remember its meshes (stellated --data-dir). One that
-  // cannot be reached in the first place, or refuses, is an error at once.
+  // How long to wait for a server that goes away while it meshes; its streams are then opened again
+  // and continued. 0: do not wait. The server must record its meshes (stellated --data-dir). A
+  // server that cannot be reached at the start, or refuses, is an error without a wait.
   double reconnect_seconds = 180;
   // Called on the calling thread at every failed attempt to come back, and when it succeeded.
   std::function<void(const Outage&)> on_outage;
-  // How long a silent server is trusted before it is pinged; it has twice as long to answer.
+  // A server that is silent for so long is pinged, and lost if it does not answer in twice that
+  // time.
   double keepalive_seconds = 4;
-  // How many threads answer, each with a stream of its own. The oracle is called from all at once.
+  // How many threads answer, each with a stream of its own. They call the oracle in parallel.
   int workers = 1;
-  // The most points that the oracle is asked at once. By default as many as take it a quarter of a
+  // The most points in one call of the oracle. By default as many as take it a quarter of a
   // second, or four times what a call of it costs.
   std::optional<std::uint32_t> max_chunk;
-  // Called on the calling thread. What it throws cancels the mesh and reaches the caller.
+  // Called on the calling thread. An exception from it cancels the mesh and reaches the caller.
   std::function<void(const Progress&)> on_progress;
   // Cancels the mesh when stop is requested; the mesh so far is returned, not certified.
   std::stop_token stop;
 
   std::uint64_t random_seed = 1;
   std::optional<std::uint64_t> max_vertices, max_rounds;
-  std::optional<std::uint64_t> max_batch_queries;  // larger rounds are asked in several batches
+  std::optional<std::uint64_t> max_batch_queries;  // larger rounds are sent in several batches
   std::optional<std::uint32_t> box_seeds;
-  std::optional<std::uint32_t> components;  // that M has at least; with fewer it is not certified
-  bool thorough_audit = false;  // ask about every vertex and every simplex before certifying
+  std::optional<std::uint32_t> components;  // of M, at least; a mesh with fewer is not certified
+  bool thorough_audit = false;  // query every vertex and every simplex for the certificate
   // A promise: the manifold's reach is at least this length. The mesh is refined until the promise
   // proves its topology, or is refuted; see docs/using/proof.md.
   std::optional<double> reach;
@@ -79,13 +81,13 @@ struct MeshOptions {
   std::optional<std::uint32_t> candidates;    // tried in a picking region
   std::optional<double> advance_step;         // h, a length
   std::optional<std::uint32_t> flat_alternations;
-  // A handful of round trips for one and a half to three times the processor time; on unless the
-  // server is on this machine.
+  // Speculative sampling: a handful of round trips, and one and a half to three times the processor
+  // time. Default: on, unless the server is on this machine.
   std::optional<bool> speculative;
   // R_p at most this share of the local size, (0, 1]: the oracle's if it has one, else estimated.
   std::optional<double> size_rate;
   std::optional<double> max_deviation;  // circumcentres at most so far from M, a length
-  std::optional<bool> common_centre;    // judge simplices at a centre common to their vertices
+  std::optional<bool> common_centre;    // test simplices at a centre common to their vertices
 
   std::optional<double> worker_wait_seconds, answer_seconds, busy_seconds;
   std::string label;  // shown in the server's lists and logs
@@ -93,18 +95,25 @@ struct MeshOptions {
 
 struct ChosenEpsilon {
   double epsilon = 0;
-  std::string reason;  // in words
+  std::string reason;  // a sentence
 };
 
-// A quarter of the reach that Check finds, to two digits. kOracleFailed, with what was found, where
-// the oracle breaks its contract.
+// Returns a quarter of the reach that Check estimates, to two digits. kOracleFailed, with the
+// findings, if the oracle breaks its contract.
 Expected<ChosenEpsilon> ChooseEpsilon(Oracle& oracle);
 
 // Meshes the oracle's manifold: offers the oracle to the server and collects the mesh.
 //
-// Returns a mesh whenever the run ends by itself, certified or not: read Mesh::report. An error
-// when the request is refused, the server cannot be reached, or the oracle's answers break a rule.
-// An exception out of the oracle reaches the caller as it is, and the server as a failed oracle.
+//   stellate::MeshOptions options;
+//   options.epsilon = 0.1;
+//   const auto mesh = stellate::MeshManifold(oracle, options);
+//   if (!mesh) std::cerr << mesh.error().message;
+//   else if (mesh->report.certified()) ...
+//
+// Returns a mesh whenever the run ends by itself, certified or not: read Mesh::report. Returns an
+// error if the request is refused, the server cannot be reached, or the oracle's answers break a
+// rule. An exception from the oracle reaches the caller unchanged, and the server as a failed
+// oracle.
 Expected<Mesh> MeshManifold(Oracle& oracle, const MeshOptions& options);
 
 struct ServerHealth {
@@ -113,15 +122,15 @@ struct ServerHealth {
   std::vector<std::string> protocols;
   std::uint32_t max_dimension = 0, max_ambient_dimension = 0, max_meshes = 0;
   std::uint64_t max_vertices = 0, max_rounds = 0, max_message_bytes = 0;
-  std::uint32_t owner_meshes = 0;      // of one owner at once, where the server tells owners apart
-  std::uint64_t max_memory_bytes = 0;  // of all meshes, as the server estimates it
+  std::uint32_t owner_meshes = 0;        // of one owner, where clients are authenticated
+  std::uint64_t max_memory_bytes = 0;    // of all meshes, as the server estimates it
   std::uint64_t owner_memory_bytes = 0;  // of one owner's meshes
   std::uint32_t max_workers = 0;         // of one mesh
   std::uint32_t max_watchers = 0;        // of one mesh, downloads included
   double check_share = 0;  // of the queries, asked of two workers to compare the answers
 };
 
-// Asks a server how it is. kServerFailed when none answers within `timeout_seconds`.
+// Asks a server for its health and limits. kServerFailed if none answers within `timeout_seconds`.
 Expected<ServerHealth> CheckHealth(const std::string& server, double timeout_seconds = 5,
                                    const Credentials& credentials = {});
 

@@ -15,39 +15,42 @@ namespace stellate {
 
 struct CommandOptions {
   std::string command;  // for /bin/sh -c
-  int processes =
-      1;  // of it, each with a batch of its own; as many threads may call the oracle in parallel
+  // Copies of it, each with a batch of its own; as many threads may call the oracle in parallel.
+  int processes = 1;
 
-  // Where the command says them too, they have to be the same.
+  // If the command states them too, they must be equal.
   std::optional<int> dimension, ambient_dimension;
   // Instead of the command's own.
   std::optional<BoundingBox> box;
   Eigen::MatrixXd seeds;  // d x m
 
   double start_seconds = 60;     // until its first line
-  double silence_seconds = 600;  // in a batch, without a byte read or written by it
+  double silence_seconds = 600;  // during a batch, without a byte read or written by it
 
-  // Ends the batches that are not answered within a second more, and with them the command.
+  // Ends the command, and the batches that are not answered within one more second.
   std::stop_token stop;
-  // Called with how a process ended otherwise than in order, when it is started again; from the
-  // thread that asked.
+  // Called with how a process ended unexpectedly, when it is started again; on the thread that sent
+  // the batch.
   std::function<void(const std::string&)> on_restart;
 };
 
 // An oracle that is a program in any language: it reads batches of queries from its standard input
-// and writes the answers to its standard output. docs/using/pipe.md says how.
+// and writes the answers to its standard output, as docs/using/pipe.md specifies.
 //
-// A process that ends after it has answered a batch is started again and asked the same; once for
-// a batch. Whatever else goes wrong is thrown by the oracle's methods as a std::runtime_error that
-// says what, in which row, and what the command last wrote to its standard error. No process
-// outlives the oracle.
+//   auto oracle = stellate::StartCommand({.command = "python3 torus.py"});
+//   if (oracle) mesh = stellate::MeshManifold(**oracle, options);
 //
-// kRefused for options that make no sense or contradict the command, kOracleFailed for a command
-// that does not begin as it should.
+// A process that ends after it has answered a batch is started again, and asked the same batch once
+// more. For any other failure the oracle's methods throw a std::runtime_error, which says what went
+// wrong, in which row, and what the command last wrote to its standard error. No process outlives
+// the oracle.
+//
+// kRefused: the options are invalid or contradict the command. kOracleFailed: the command does not
+// begin as specified.
 Expected<std::unique_ptr<Oracle>> StartCommand(const CommandOptions& options);
 
-// "x1,...,xd:y1,...,yd", the lower and the upper corner; "x1,...,xd;y1,...,yd;...", points in
-// columns.
+// Parse "x1,...,xd:y1,...,yd", the lower and the upper corner; and "x1,...,xd;y1,...,yd;...",
+// points, which are returned in columns.
 Expected<BoundingBox> ParseBox(std::string_view text);
 Expected<Eigen::MatrixXd> ParsePoints(std::string_view text);
 

@@ -11,40 +11,40 @@
 
 namespace stellate {
 
-// What to do about a mesh that is not over yet.
+// What to do if the mesh is not over yet.
 enum class Unfinished {
-  kRefuse,  // an error that says how it stands
-  kWait,    // for its end, however long that takes
-  kTake,    // as it is now: a complex that need not be closed, and has no report
+  kRefuse,  // return an error with its progress
+  kWait,    // wait for its end, without a limit of time
+  kTake,    // fetch it as it is: a complex that need not be closed, and has no report
 };
 
 struct DownloadOptions {
   std::string server;  // "host:port" or "unix:/path"; must be given
   Credentials credentials;
   Unfinished unfinished = Unfinished::kRefuse;
-  // Any that the mesh has had, whatever became of the mesh; 0: the newest. Only the last revision
-  // of a mesh that is over has a report.
+  // Any revision that the mesh has had, however it ended; 0: the newest. Only the last revision of
+  // a mesh that is over has a report.
   std::uint64_t revision = 0;
-  // A server that goes away is waited for so long, and the download resumed where it broke off;
-  // 0: not at all. A server that cannot be reached at the start is an error immediately.
+  // How long to wait for a server that goes away; the download then resumes. 0: do not wait. A
+  // server that cannot be reached at the start is an error without a wait.
   double reconnect_seconds = 180;
   std::function<void(const Outage&)> on_outage;
   double keepalive_seconds = 4;  // as in MeshOptions
-  // Called once it is known what kind of mesh it is, before anything is waited for or fetched. An
-  // error ends the download with it.
+  // Called with the mesh's dimensions before any wait or transfer. An error that it returns ends
+  // the download.
   std::function<Expected<void>(int dimension, int ambient_dimension)> on_found;
-  // Called on the calling thread: while the mesh is waited for, and at each part that comes, with
-  // the vertices and simplices that are here and those of the whole mesh.
+  // Called on the calling thread: on_progress during the wait, and on_part at each part, with the
+  // vertices and simplices received and those of the whole mesh.
   std::function<void(const Progress&)> on_progress;
   std::function<void(std::uint64_t received, std::uint64_t all)> on_part;
   std::stop_token stop;  // ends it with an error; nothing happens to the mesh
 };
 
-// Fetches a mesh that is on a server, by its name ("meshes/<id>"). It stays there.
+// Fetches a mesh from a server by its name ("meshes/<id>"). The server keeps it.
 //
 // Returns a mesh whenever it ended by itself or was cancelled, certified or not: read Mesh::report.
-// An error when there is none of that name, when it failed (its reason is the error's; kTake
-// fetches what there is of it), or when the server is lost for good.
+// Returns an error if there is no such mesh, if it failed (with its reason; kTake fetches what it
+// has), or if the server is lost.
 Expected<Mesh> DownloadMesh(const std::string& name, const DownloadOptions& options);
 
 }  // namespace stellate

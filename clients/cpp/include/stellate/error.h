@@ -6,11 +6,11 @@
 
 namespace stellate {
 
-// Whose fault it is.
+// The kind of an error.
 enum class ErrorCode {
-  kRefused,       // the request makes no sense or asks for too much: mend it and try again
+  kRefused,       // the request is invalid or asks for too much: correct it and try again
   kOracleFailed,  // the oracle answered wrongly, or not at all
-  kServerFailed,  // no server found, none answers, or it broke off
+  kServerFailed,  // no server was found, none answers, or the connection was lost
   kFileFailed,    // a file cannot be written, or its format cannot hold the mesh
 };
 

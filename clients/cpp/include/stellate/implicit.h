@@ -16,8 +16,7 @@ class Exactness;
 // |F| from x first meets M: the nearest point when x is nearer to M than its reach, a critical
 // point of the distance otherwise. Points that do not converge are reported as not found.
 //
-// Asked for points it throws OracleError where f rounds to single precision, or has another shape
-// than it has to have.
+// Throws OracleError from the queries if f rounds to single precision, or returns a wrong shape.
 class ImplicitOracle : public PointwiseOracle {
  public:
   using Function = std::function<Eigen::VectorXd(const Eigen::VectorXd& x)>;  // d -> d-k

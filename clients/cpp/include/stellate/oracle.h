@@ -30,8 +30,8 @@ struct Answer {
   bool IsFound(Eigen::Index j) const { return found.empty() || found[static_cast<size_t>(j)] != 0; }
 };
 
-// What an oracle throws that finds fault with the functions it is made of: a std::runtime_error
-// with a stable name, "ORACLE_PRECISION" or "ORACLE_SHAPE".
+// Thrown by an oracle if a function that it is made of is wrong: a std::runtime_error with a stable
+// name, "ORACLE_PRECISION" or "ORACLE_SHAPE".
 class OracleError : public std::runtime_error {
  public:
   OracleError(std::string reason, const std::string& what)
@@ -43,15 +43,24 @@ class OracleError : public std::runtime_error {
   std::string reason_;
 };
 
-// A compact smooth k-submanifold M of R^d, known by what it answers. Derive from
-// this to mesh a manifold of your own: dimension, ambient_dimension, ClosestPoint, and one of
-// bounding_box and seeds are all it takes. PointwiseOracle and ImplicitOracle do more of the work.
+// A compact smooth k-submanifold M of R^d, known by its answers to queries. Derive from it to mesh
+// a manifold of your own. Required: dimension, ambient_dimension, ClosestPoint, and one of
+// bounding_box and seeds. PointwiseOracle and ImplicitOracle do more of the work.
 //
-// A basis of k vectors of R^d travels as a column of d k numbers: entry i*k + a is coordinate i of
-// vector a. Whole batches come in, one query a column.
+//   struct Circle : stellate::Oracle {
+//     int dimension() const override { return 1; }
+//     int ambient_dimension() const override { return 2; }
+//     stellate::Answer ClosestPoint(const Eigen::MatrixXd& x) override {
+//       return {x.colwise().normalized()};
+//     }
+//     Eigen::MatrixXd seeds() const override { return Eigen::Vector2d(1, 0); }
+//   };
 //
-// With several workers, several threads call the methods in parallel. What they throw ends
-// the run and reaches the caller of MeshManifold as it is.
+// Queries come in batches, one a column. A basis of k vectors of R^d is a column of d k numbers:
+// entry i*k + a is coordinate i of vector a.
+//
+// With several workers, several threads call the methods in parallel. An exception ends the
+// run and reaches the caller of MeshManifold unchanged.
 class Oracle {
  public:
   virtual ~Oracle() = default;
@@ -72,34 +81,34 @@ class Oracle {
   }
 
   // Orthonormal tangent bases, (d k) x n, at points of M (d x n). Called only when
-  // has_tangent_basis and the answer did not bring its own; without, the server finds them.
+  // has_tangent_basis and the answer has none; without, the server computes them.
   virtual bool has_tangent_basis() const { return false; }
   virtual Eigen::MatrixXd TangentBasis(const Eigen::MatrixXd& /*points*/) {
     throw std::logic_error("this oracle has no tangent bases");
   }
 
-  // How large things are at points of M (d x n), one positive length each: the local feature size
-  // there, or any size field of yours. MeshOptions::size_rate and max_deviation go by it then; it
-  // is asked for only with them, and only where the answer did not bring its own. Without, the
-  // server estimates. A point's size must depend on the point alone.
+  // Sizes at points of M (d x n), one positive length each: the local feature size there, or any
+  // size field of yours. MeshOptions::size_rate and max_deviation use it; it is called only with
+  // them, and only where the answer has none. Without, the server estimates sizes. A point's size
+  // must depend on the point alone.
   virtual bool has_local_size() const { return false; }
   virtual Eigen::VectorXd LocalSize(const Eigen::MatrixXd& /*points*/) {
     throw std::logic_error("this oracle has no local sizes");
   }
 
-  // How many equations F_i = 0 M is known to be given by, if it is, and their gradients at points
-  // (d x n): (m d) x n for m equations, entry i*d + j is dF_i / dx_j. Only Check asks for them, to
-  // tell where M crosses itself or has a tip.
+  // The number of equations F_i = 0 of M, if it has any, and their gradients at points (d x n): (m
+  // d) x n for m equations, entry i*d + j is dF_i / dx_j. Only Check calls it, to find points where
+  // M crosses itself or has a tip.
   virtual int equations() const { return 0; }
   virtual Eigen::MatrixXd EquationGradients(const Eigen::MatrixXd& /*points*/) {
-    throw std::logic_error("this oracle tells no equations");
+    throw std::logic_error("this oracle has no equations");
   }
 
-  // How many walls bound M. It has a boundary then: M = { x in M^ : g_i(x) >= 0, i < walls() }, and
-  // the methods above are those of M^, whose dimension may be d. It takes tangent bases, and the
-  // three below, which oracles::Clipped has.
+  // The number of walls of a manifold with boundary, M = { x in M^ : g_i(x) >= 0, i < walls() }.
+  // The methods above are then those of M^, whose dimension may be d. Tangent bases and the three
+  // methods below are required then; oracles::Clipped implements them.
   virtual int walls() const { return 0; }
-  // A point nearest to each column of x (d x n) of those of M^ where the walls of the face are
+  // For each column of x (d x n) a nearest one of the points of M^ where the walls of the face are
   // zero.
   virtual Answer FacePoint(const Eigen::MatrixXd& /*x*/, const Walls& /*face*/) {
     throw std::logic_error("this oracle has no walls");
@@ -109,12 +118,13 @@ class Oracle {
     throw std::logic_error("this oracle has no walls");
   }
   // At points of a face (d x n), for each of its walls the outward unit normal within the tangent
-  // space, which g_i falls along: (f d) x n for f walls, entry i*d + j is coordinate j of wall i's.
+  // space, along which g_i decreases: (f d) x n for f walls, entry i*d + j is coordinate j of wall
+  // i's.
   virtual Eigen::MatrixXd Conormals(const Eigen::MatrixXd& /*points*/, const Walls& /*face*/) {
     throw std::logic_error("this oracle has no walls");
   }
 
-  // Where to look for M: a box, or points near M, one at least on each component.
+  // Where to look for M: a box, or points near M, at least one on each component.
   virtual std::optional<BoundingBox> bounding_box() const { return std::nullopt; }
   virtual Eigen::MatrixXd seeds() const { return {}; }  // d x m
 };

@@ -6,8 +6,8 @@
 
 namespace stellate {
 
-// An oracle written one point at a time: say where the closest point is and what the tangent
-// space there is, and batches and flat intersections follow.
+// An oracle written one point at a time: implement Project, the closest point, and Tangent, the
+// tangent space there. Batches and flat intersections follow.
 //
 // Project, Tangent and SizeAt must be safe to call from several threads.
 class PointwiseOracle : public Oracle {
@@ -23,17 +23,17 @@ class PointwiseOracle : public Oracle {
   Eigen::MatrixXd TangentBasis(const Eigen::MatrixXd& points) override;
   Eigen::VectorXd LocalSize(const Eigen::MatrixXd& points) override;
 
-  // y := a point of M nearest to x. False when none was found.
+  // Sets y to a point of M nearest to x. False: none was found.
   virtual bool Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const = 0;
-  // tangent (d x k) := an orthonormal basis of the tangent space at y, a point of M.
+  // Sets tangent (d x k) to an orthonormal basis of the tangent space at y, a point of M.
   virtual void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const = 0;
 
   // The size at y, a point of M: override it together with has_local_size.
   virtual double SizeAt(const Eigen::VectorXd& y) const;
 
-  // m := the point of M with basis^T m = level that Newton's method along M reaches from the
-  // closest point of `start`. That is the nearest one when M is nearly flat on the way; false when
-  // none is reached. `basis` (d x k) need not be orthonormal.
+  // Sets m to the point of M with basis^T m = level that Newton's method along M reaches from the
+  // closest point of `start`. That is the nearest one if M is nearly flat on the way. False: it
+  // does not converge. `basis` (d x k) need not be orthonormal.
   //
   // Accuracy: |basis^T m - level| is at most kFlatTolerance (1 + |level| + |m|), mostly near
   // rounding; m is as near M as Project puts it.

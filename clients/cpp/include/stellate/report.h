@@ -24,7 +24,7 @@ const char* TerminationName(Termination termination);  // "CONVERGED", ...
 enum class Phase { kUnknown = 0, kSeeding, kRefining, kCertifying, kDone };
 const char* PhaseName(Phase phase);  // "SEEDING", ...
 
-// A picture of a mesh at work.
+// The progress of a mesh.
 struct Progress {
   Phase phase = Phase::kUnknown;
   std::uint64_t round = 0;    // batches of queries answered
@@ -38,7 +38,7 @@ struct Progress {
   double remaining_seconds = 0;  // an estimate; 0 when unknown
 };
 
-// What a mesh took.
+// The cost of a mesh.
 struct Counts {
   std::uint64_t vertices = 0, simplices = 0;
   std::uint64_t rounds = 0;  // round trips
@@ -51,18 +51,18 @@ struct Counts {
 
 // How far a certificate goes.
 enum class CertificateLevel {
-  kUnknown,  // of a server that knows no levels
+  kUnknown,  // the server has no levels
   kRefused,
   kSampled,  // every check passed; some look at samples of the manifold
   kProved,   // and if its reach is as declared, the mesh is isotopic to the components it meets
 };
 const char* CertificateLevelName(CertificateLevel level);  // "PROVED", ...
 
-// Where a mesh is at fault: vertex ids, ascending, of the first 100 of each kind that the
+// Where a mesh is wrong: vertex ids, ascending, of the first 100 of each kind that the
 // certificate counts.
 struct Violations {
   // (k-1)-faces that are not in exactly two simplices, k ids each. With a boundary, the number of
-  // vertices stands for what is beyond it.
+  // vertices is the id of a point beyond it.
   std::vector<std::vector<std::uint32_t>> faces;
   std::vector<std::uint32_t> links;         // whose link is no sphere
   std::vector<std::uint32_t> stars;         // whose star overlaps itself
@@ -82,7 +82,7 @@ struct FaceCertificate {
 // Two walls that meet.
 struct WallAngle {
   std::vector<std::uint32_t> walls;  // ascending
-  double degrees = 0;                // between them, inside of the manifold
+  double degrees = 0;                // between them, inside the manifold
   std::vector<double> point;         // a vertex
 };
 
@@ -132,8 +132,8 @@ struct Certificate {
   std::vector<FaceCertificate> faces;  // by dimension, the lowest first
   std::optional<WallAngle> sharpest;   // where walls meet at the smallest angle, if any meet
 
-  // Refused for its size alone: nothing that was seen contradicts the mesh, which is too coarse for
-  // the reach to be certified.
+  // Refused for epsilon alone: no check contradicts the mesh, which is too coarse, compared with
+  // the reach, to be certified.
   bool only_too_coarse = false;
 };
 
@@ -143,14 +143,14 @@ struct Report {
   Counts counts;
   Certificate certificate;
   double elapsed_seconds = 0;
-  double epsilon = 0;          // that the mesh was made with; 0: not known
-  std::string epsilon_reason;  // why it is what it is, where it was not given
+  double epsilon = 0;          // of the mesh; 0: not known
+  std::string epsilon_reason;  // why it was chosen; empty if it was given
 
   bool certified() const { return certificate.certified; }
 };
 
 std::string ToText(const Report& report);  // several lines, for people
-// One object in one line, keys as in the protocol; null for infinite, no number and not known.
+// One object in one line, keys as in the protocol; null for infinite, NaN and unknown.
 std::string ToJson(const Report& report);
 // ToJson into a file. kFileFailed when it cannot be written.
 Expected<void> SaveJson(const Report& report, const std::string& path);

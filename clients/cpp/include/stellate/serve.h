@@ -13,9 +13,9 @@
 
 namespace stellate {
 
-// Declares a mesh of the oracle's manifold on options.server, which must be given, for ServeMesh to
-// answer for, here or elsewhere. Gives its name. No worker serves it yet; a server deletes a mesh
-// that has no worker for too long. Errors as of MeshManifold.
+// Declares a mesh of the oracle's manifold on options.server, which is required, and returns its
+// name. Workers call ServeMesh with that name, here or elsewhere. No worker serves it yet; a server
+// deletes a mesh that has no worker for too long. Errors as of MeshManifold.
 Expected<std::string> DeclareMesh(Oracle& oracle, const MeshOptions& options);
 
 struct ServeOptions {
@@ -28,17 +28,17 @@ struct ServeOptions {
   double reconnect_seconds = 180;
   std::function<void(const Outage&)> on_outage;
   double keepalive_seconds = 4;
-  std::stop_token stop;  // takes this worker away: what it has not answered goes to others
+  std::stop_token stop;  // this worker leaves: its unanswered queries go to others
 };
 
-// One more worker for a mesh that somebody else declared: answers the server's questions, on the
-// calling thread, until the mesh is over. All workers of a mesh have to answer for one manifold.
+// Serves a declared mesh as one of its workers: answers the server's queries, on the calling
+// thread, until the mesh is over. All workers of a mesh must answer for the same manifold.
 //
 // Returns the state that the mesh ended in; immediately for a mesh that was over before this worker
-// came, so a late batch job is a success. kRefused for an oracle of another kind than the mesh was
-// declared with, and for a mesh that is not there, or was over and is no longer kept. Reason
-// "CANCELLED" where `stop` was requested. An exception out of the oracle reaches the caller as it
-// is, and the server as a failed oracle.
+// came, so a late batch job is a success. kRefused: the oracle differs in kind from the one that
+// the mesh was declared with, or there is no such mesh (any more). Reason "CANCELLED": `stop` was
+// requested. An exception from the oracle reaches the caller unchanged, and the server as a failed
+// oracle.
 Expected<MeshState> ServeMesh(Oracle& oracle, const std::string& mesh_name,
                               const ServeOptions& options);
 

@@ -9,8 +9,8 @@
 
 namespace stellate::oracles::files {
 
-void HoldAgainstSize(std::uint64_t count, const std::string& what, size_t least, size_t left,
-                     const std::string& place) {
+void CheckAgainstSize(std::uint64_t count, const std::string& what, size_t least, size_t left,
+                      const std::string& place) {
   if (count <= left / least) return;
   oracles::Refuse(place + ": says that " + std::to_string(count) + " " + what + " follow, and " +
                   std::to_string(left) + " bytes cannot hold them: is the file cut short?");

@@ -9,8 +9,8 @@ namespace stellate::oracles::files {
 
 // Refuses what follows `place`, "line 7" or "byte 120", unless `left` bytes can hold `count` things
 // of at least `least` bytes each.
-void HoldAgainstSize(std::uint64_t count, const std::string& what, size_t least, size_t left,
-                     const std::string& place);
+void CheckAgainstSize(std::uint64_t count, const std::string& what, size_t least, size_t left,
+                      const std::string& place);
 
 // A text, line by line. Everything refused is refused with the line's number.
 class Lines {
@@ -32,9 +32,9 @@ class Lines {
   double Number(size_t word) const;       // finite
   std::int64_t Whole(size_t word) const;  // of either sign
   std::uint64_t Count(std::string_view text, const std::string& what) const;
-  // Holds a count that this line told against the bytes that follow; the last line may have no end.
+  // Compares a count from this line with the bytes that follow; the last line may have no end.
   void Expect(std::uint64_t count, const std::string& what, size_t least) const {
-    if (count > (left() + 1) / least) HoldAgainstSize(count, what, least, left(), place());
+    if (count > (left() + 1) / least) CheckAgainstSize(count, what, least, left(), place());
   }
 
   size_t number() const { return number_; }  // of this line, from 1

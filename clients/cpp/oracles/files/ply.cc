@@ -62,7 +62,7 @@ class BinaryBody {
   std::int64_t Whole(PlyType type) { return Take<std::int64_t>(type); }
   void Skip(PlyType type) { bytes_.Skip(SizeOf(type)); }
   void Expect(std::uint64_t count, const std::string& what, size_t least) const {
-    HoldAgainstSize(count, what, least, bytes_.left(), place());
+    CheckAgainstSize(count, what, least, bytes_.left(), place());
   }
   void ExpectList(std::uint64_t length, PlyType type) const {
     Expect(length, "numbers of a list", SizeOf(type));

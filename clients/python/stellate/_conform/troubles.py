@@ -129,7 +129,7 @@ class Stopping(Outage):
 
 
 class Gone(Outage):
-    """Its connections break, and for a while nobody listens."""
+    """Its connections break, and for a while no server listens."""
 
     name = "worker.server-gone"
 

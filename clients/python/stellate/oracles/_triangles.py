@@ -1,4 +1,4 @@
-"""Surfaces given as meshes of triangles, to be meshed anew."""
+"""Surfaces given as meshes of triangles, to be meshed again."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ module Stellate
       why = format('a quarter of the reach, about %.3g by the certificate of epsilon %g, which was too coarse',
                    reach, epsilon)
       quarter, least = rounded(reach / DOCTOR[:auto_epsilon]), rounded(DOCTOR[:auto_least_share] * epsilon)
-      quarter < least ? [least, "no finer at once, though #{why}"] : [quarter, why]
+      quarter < least ? [least, "no finer in one step, though #{why}"] : [quarter, why]
     end
 
     def self.rounded(length)

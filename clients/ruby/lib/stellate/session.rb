@@ -11,7 +11,7 @@ module Stellate
     #   on_epsilon: a proc of each epsilon that 'auto' takes, before it is meshed with, and why
     #   server: "host:port", a Server or Client; without it one is started, and stopped afterwards
     #   credentials: for a server that wants them; on_progress: a proc that is called in this thread
-    #   workers: streams on which the oracle is asked at once; max_chunk: most points at once
+    #   workers: streams that call the oracle in parallel; max_chunk: most points in one call
     #   checkpoint: a directory, made if it is not there, in which the mesh outlives this program: the same
     #     call goes on from where the last one was interrupted or killed, or its oracle raised, and gives a
     #     mesh that is finished at once. For a private server; one that is named keeps meshes itself

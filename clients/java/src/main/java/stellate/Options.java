@@ -23,10 +23,10 @@ public final class Options {
   /** The rest of the specification: label, seed, declared reach, audit... */
   public final MeshSpec.Builder spec = MeshSpec.newBuilder();
 
-  /** Streams on which the oracle is asked at once, each on a thread of its own. */
+  /** Streams that call the oracle in parallel, each on a thread of its own. */
   public int workers = 1;
 
-  /** Most points that the oracle is asked at once; 0: the server decides. */
+  /** Most points in one call of the oracle; 0: the server decides. */
   public int maxChunk;
 
   /** A mesh that is not proved good is an exception of kind NOT_CERTIFIED. */
