@@ -37,7 +37,7 @@ export interface PastRow {
 
 export interface WorkerRow {
   number: number;
-  title: string;
+  displayName: string;
   queries: number;
   chunks: number;
   perSecond: number; // 0: unknown

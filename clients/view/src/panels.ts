@@ -116,8 +116,8 @@ export function drawWorkers(host: HTMLElement, rows: WorkerRow[]) {
   for (const row of rows) {
     const who = body.insertRow().insertCell();
     who.colSpan = head.cells.length;
-    who.textContent = row.title;
-    who.title = row.title;
+    who.textContent = row.displayName;
+    who.title = row.displayName;
     const line = body.insertRow();
     if (row.lagging) line.className = "lagging";
     for (const value of [

@@ -68,7 +68,7 @@ function speedOf({ fixedSeconds, eachSeconds, newestChunk }: WorkerStats): numbe
 export function workersOf(mesh: Mesh): WorkerRow[] {
   return mesh.workerStats.map((worker) => ({
     number: Number(worker.number),
-    title: worker.title,
+    displayName: worker.displayName,
     queries: Number(worker.queries),
     chunks: Number(worker.chunks),
     perSecond: speedOf(worker),
