@@ -76,11 +76,12 @@ def mesh(
 
     Raises:
       What the oracle raises, as itself; OracleError for answers that break a rule, and for "auto"
-      where stellate.check finds an error; InvalidArgument,
-      LimitExceeded, Unavailable, Cancelled, ServerNotFound, NotCertified; SaveError, which has the
-      mesh where there is one already; OSError; FailedPrecondition where another process is meshing
-      in the checkpoint. Ctrl-C cancels the mesh, or leaves it to the checkpoint, and is Interrupted, a
-      KeyboardInterrupt with the mesh so far; a second Ctrl-C does not wait for that.
+      where stellate.check finds an error; TypeError for an option that there is not;
+      InvalidArgument, LimitExceeded, Unavailable, Cancelled, ServerNotFound, NotCertified;
+      SaveError, which has the mesh where there is one already; OSError; FailedPrecondition where
+      another process is meshing in the checkpoint. Ctrl-C cancels the mesh, or leaves it to the
+      checkpoint, and is Interrupted, a KeyboardInterrupt with the mesh so far; a second Ctrl-C does
+      not wait for that.
     """
     files = [save] if isinstance(save, (str, os.PathLike)) else list(save)
     checked = CheckedOracle(oracle)

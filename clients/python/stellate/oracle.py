@@ -19,7 +19,7 @@ _MOST_OF_NOTE = 200  # characters
 
 @runtime_checkable
 class Oracle(Protocol):
-    """A compact smooth k-submanifold M of R^d, 1 <= k < d; with `walls`, what they leave of one.
+    """A compact smooth k-submanifold M of R^d: closed, with k < d, or bounded by `walls`, with k <= d.
 
     Every method takes and returns whole batches as numpy arrays of float64; those it is given are
     read-only. The answer to a query must not depend on the rest of its batch: batches are cut
