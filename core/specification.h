@@ -108,7 +108,8 @@ struct Specification {
   int box_seeds = 0;                        // points drawn from the box; 0: the default
   int components = 0;  // that M has at least; a mesh with fewer is refused. 0: not known
   // The client promises that M's reach is at least this, a length: the mesh is refined until that
-  // promise and the mesh prove its topology (core/certificate/proof.h), or refute the promise.
+  // promise and the mesh prove its topology (core/certificate/claims/proof.h), or refute the
+  // promise.
   std::optional<double> declared_reach;
   // Cover the box with seeds so densely that every component of M in it is found (CoverOfBox).
   // Needs the box and the declared reach, and no seeds.

@@ -7,15 +7,15 @@
 #include <utility>
 
 #include "core/base/interruption.h"
-#include "core/certificate/boundary_claims.h"
-#include "core/certificate/closeness_claims.h"
-#include "core/certificate/complex_claims.h"
-#include "core/certificate/coverage_claims.h"
-#include "core/certificate/examination.h"
-#include "core/certificate/probes.h"
-#include "core/certificate/reach_claims.h"
-#include "core/certificate/rim_check.h"
-#include "core/certificate/sheet_claims.h"
+#include "core/certificate/claims/boundary_claims.h"
+#include "core/certificate/claims/closeness_claims.h"
+#include "core/certificate/claims/complex_claims.h"
+#include "core/certificate/claims/coverage_claims.h"
+#include "core/certificate/claims/examination.h"
+#include "core/certificate/claims/reach_claims.h"
+#include "core/certificate/claims/sheet_claims.h"
+#include "core/certificate/evidence/probes.h"
+#include "core/certificate/evidence/rim_check.h"
 
 namespace stellate::core {
 

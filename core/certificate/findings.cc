@@ -6,7 +6,7 @@
 
 namespace stellate::core {
 
-std::string AboutUnmetWall(int walls, WallSet met) {
+std::string AboutInactiveWall(int walls, WallSet met) {
   for (int wall = 0; wall < walls; ++wall)
     if ((met & SetOfWall(wall)) == 0)
       return Message("; no point of wall ", wall,

@@ -24,7 +24,7 @@ std::string TooCoarse(double ratio, double reach, const std::string& where);
 
 // Of a mesh with walls, whose vertices are on the walls `met`: of a wall that none of them is on,
 // what to look for, to go on from what was wrong. Empty: there is none.
-std::string AboutUnmetWall(int walls, WallSet met);
+std::string AboutInactiveWall(int walls, WallSet met);
 
 // What speaks against a mesh, in plain words: problems refuse it, warnings do not.
 class Findings {

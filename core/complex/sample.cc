@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "core/base/basis_layout.h"
-#include "core/base/room.h"
+#include "core/base/capacity.h"
 
 namespace stellate::core {
 
@@ -28,7 +28,7 @@ std::uint32_t Sample<K>::Add(const double* point, const double* tangent, WallSet
     boundary_.push_back(id);
     boundary_points_.Add(point);
   }
-  MakeRoom(stride() * K, &tangents_);
+  ReserveMore(stride() * K, &tangents_);
   tangents_.insert(tangents_.end(), tangent, tangent + d_ * K);
   points_.Add(point);
   return id;
@@ -45,8 +45,8 @@ template <int K>
 void Sample<K>::Index(BallTree::Halving halving, std::size_t room) {
   points_.Index(halving);
   if (room == 0) return;
-  points_.LeaveRoom(room);
-  LeaveRoom(room, &tangents_);
+  points_.FitCapacity(room);
+  FitCapacity(room, &tangents_);
 }
 
 template <int K>

@@ -10,7 +10,7 @@
 #include "core/base/random.h"
 #include "core/base/vector_ops.h"
 #include "core/complex/centre_cache.h"
-#include "core/sample/indexed_points.h"
+#include "core/index/indexed_points.h"
 #include "core/walls.h"
 
 namespace stellate::core {

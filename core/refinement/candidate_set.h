@@ -7,7 +7,7 @@
 
 #include "core/refinement/criteria.h"
 #include "core/refinement/target.h"
-#include "core/refinement/violation_book.h"
+#include "core/refinement/violation_index.h"
 #include "core/wall_beyond.h"
 
 namespace stellate::core {
@@ -71,7 +71,7 @@ struct Drawing {
 // or R4. The first is the insertion point itself, unless that has failed before; the others lie in
 // the picking region.
 template <int K>
-CandidateSet<K> DrawCandidates(const Stars<K>& stars, const ViolationBook<K>& book,
+CandidateSet<K> DrawCandidates(const Stars<K>& stars, const ViolationIndex<K>& violations,
                                const ResolvedCriteria& criteria, const Drawing& drawing,
                                std::vector<Target<K>> targets);
 

@@ -1,8 +1,8 @@
 #include <algorithm>
 
 #include "core/base/instantiate.h"
+#include "core/boundary/sharp_dihedrals.h"
 #include "core/refinement/rules.h"
-#include "core/refinement/sharp_dihedrals.h"
 
 namespace stellate::core {
 
@@ -44,7 +44,7 @@ int CountBad(const Stars<K>& stars, const double* point,
             HasSharpDihedral<K>(stars, p, at, cell, v, bounds.sharpest_cosine, point)) ||
            (!stars.TouchesGuard(p, cell, v) &&
             (HasThinFaceAt<K>(stars, at, cell, v, bounds.sliver_bound, point) ||
-             LeansTooFar<K>(stars, p, at, cell, v, bounds.reach, point)));
+             TiltsTooFar<K>(stars, p, at, cell, v, bounds.reach, point)));
   };
   const auto survey = [&](std::uint32_t p, const double* at, const Cell& cell) {
     Simplex simplex;

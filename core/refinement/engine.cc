@@ -18,7 +18,7 @@ namespace {
 constexpr double kMostGrowth = 4;
 constexpr std::uint64_t kLeastGrowth = 2000;
 // Where one star in so many is suspect, simplices are looked for once for all stars.
-constexpr std::size_t kMostlySuspect = 2;
+constexpr std::size_t kMostlyDirty = 2;
 
 // The order in which to go through `ids` so that neighbours follow each other: what one star's
 // judge has read of theirs is in the cache for the next.
@@ -49,38 +49,38 @@ Engine<K>::Engine(const Specification& spec, const ResolvedCriteria& criteria)
       max_vertices_(spec.limits.max_vertices),
       stars_(spec.ambient_dimension, criteria.epsilon, {criteria.inradius, criteria.judging}),
       sizes_(criteria),
-      faces_(spec.walls) {
+      boundary_(spec.walls) {
   // Sizes are estimated from whole stars.
-  if (faces_.has_walls() && !sizes_.is_estimated()) stars_.RestrictToBoundary();
+  if (boundary_.has_walls() && !sizes_.is_estimated()) stars_.RestrictToBoundary();
 }
 
 template <int K>
-Engine<K> Engine<K>::ForRehearsal(double share) const {
-  Engine rehearsal(*this);
-  rehearsal.caution_ = kRehearsalCaution;
-  rehearsal.asks_flats_ = true;
-  rehearsal.book_.ForgetFlats();
-  rehearsal.filled_ = {};
+Engine<K> Engine<K>::ForSpeculation(double share) const {
+  Engine speculation(*this);
+  speculation.caution_ = kSpeculativeCaution;
+  speculation.asks_flats_ = true;
+  speculation.violations_.ForgetFlats();
+  speculation.filled_ = {};
   if (share < 1) {
-    rehearsal.criteria_.epsilon *= share;
-    rehearsal.sizes_ = SizeField<K>(rehearsal.criteria_);
-    rehearsal.RejudgeAll();
+    speculation.criteria_.epsilon *= share;
+    speculation.sizes_ = SizeField<K>(speculation.criteria_);
+    speculation.RejudgeAll();
   }
-  return rehearsal;
+  return speculation;
 }
 
 template <int K>
-Target<K> Engine<K>::Aim(std::uint32_t star, const Violation<K>& violation) const {
+Target<K> Engine<K>::TargetOf(std::uint32_t star, const Violation<K>& violation) const {
   return TargetFor<K>(star, violation, sizes_.BoundAt(stars_, star), criteria_.advance_step,
-                      book_.failed_attempts(star));
+                      violations_.failed_attempts(star));
 }
 
 // A simplex is mostly the worst one of several of its vertices' stars: the lowest of them has the
 // target, unless an attempt from there has failed.
 template <int K>
 std::vector<Target<K>> Engine<K>::SizeAndShapeTargets() const {
-  using Entry = typename ViolationBook<K>::Entry;
-  const std::vector<Entry>& entries = book_.size_and_shape();
+  using Entry = typename ViolationIndex<K>::Entry;
+  const std::vector<Entry>& entries = violations_.size_and_shape();
   constexpr std::uint16_t kNone = 0xffff;
   std::vector<std::uint16_t> worst(stars_.size(), kNone);
   for (std::size_t i = 0; i < entries.size(); ++i) {
@@ -93,7 +93,7 @@ std::vector<Target<K>> Engine<K>::SizeAndShapeTargets() const {
       return false;
     for (const std::uint32_t q : simplex) {
       if (q == entry.star) return false;
-      if (worst[q] != kNone && book_.failed_attempts(q) == 0 &&
+      if (worst[q] != kNone && violations_.failed_attempts(q) == 0 &&
           stars_.SimplexOf(q, stars_.cell(q), worst[q], &other) && other == simplex)
         return true;
     }
@@ -101,13 +101,13 @@ std::vector<Target<K>> Engine<K>::SizeAndShapeTargets() const {
   };
   std::vector<std::uint8_t> is_target(entries.size());
   ParallelFor(entries.size(), [&](std::size_t i) {
-    is_target[i] = !book_.is_given_up(entries[i].star) && !is_seen_from_lower(entries[i]);
+    is_target[i] = !violations_.is_given_up(entries[i].star) && !is_seen_from_lower(entries[i]);
   });
   std::vector<Target<K>> targets;
   targets.reserve(static_cast<std::size_t>(std::count(is_target.begin(), is_target.end(), 1)));
   for (std::size_t i = 0; i < entries.size(); ++i) {
     CheckInterruption(i);
-    if (is_target[i]) targets.push_back(Aim(entries[i].star, entries[i].violation));
+    if (is_target[i]) targets.push_back(TargetOf(entries[i].star, entries[i].violation));
   }
   return targets;
 }
@@ -123,67 +123,67 @@ template <int K>
 void Engine<K>::RejudgeAll() {
   std::vector<std::uint32_t> all(stars_.size());
   std::iota(all.begin(), all.end(), 0u);
-  book_.Replace(JudgeSizeAndShape(all));
+  violations_.Replace(JudgeSizeAndShape(all));
 }
 
 template <int K>
-std::vector<typename ViolationBook<K>::Entry> Engine<K>::JudgeSizeAndShape(
+std::vector<typename ViolationIndex<K>::Entry> Engine<K>::JudgeSizeAndShape(
     const std::vector<std::uint32_t>& stars) const {
-  using Entry = typename ViolationBook<K>::Entry;
+  using Entry = typename ViolationIndex<K>::Entry;
   return ParallelGather<Entry>(stars.size(), [&](std::size_t i, std::vector<Entry>* found) {
     const std::uint32_t p = stars[i];
     if (const auto worst =
             WorstSizeOrShape<K>(stars_, p, sizes_.BoundAt(stars_, p), criteria_.radius_edge_bound,
-                                faces_.stage(), faces_.left() + 1))
+                                boundary_.stage(), boundary_.left() + 1))
       found->push_back({p, *worst});
   });
 }
 
 template <int K>
 std::vector<Target<K>> Engine<K>::GoodPointTargets() {
-  if (book_.are_all_suspect()) before_good_points_ = stars_.size();
-  const std::vector<std::uint32_t> suspects = book_.TakeSuspects(filled_.mended());
-  std::vector<std::optional<Violation<K>>> found(suspects.size());
-  const std::vector<std::uint32_t> near = InOrderOfPlace<K>(stars_, suspects);
+  if (violations_.are_all_dirty()) before_good_points_ = stars_.size();
+  const std::vector<std::uint32_t> dirty = violations_.TakeDirty(filled_.resolved());
+  std::vector<std::optional<Violation<K>>> found(dirty.size());
+  const std::vector<std::uint32_t> near = InOrderOfPlace<K>(stars_, dirty);
   std::optional<ConsistentSimplices<K>> consistent;
-  if (kMostlySuspect * suspects.size() >= stars_.size()) consistent.emplace(stars_);
-  ParallelFor(suspects.size(), [&](std::size_t i) {
-    const std::uint32_t p = suspects[near[i]];
+  if (kMostlyDirty * dirty.size() >= stars_.size()) consistent.emplace(stars_);
+  ParallelFor(dirty.size(), [&](std::size_t i) {
+    const std::uint32_t p = dirty[near[i]];
     found[near[i]] = WorstSliverOrInconsistent<K>(
-        stars_, p, criteria_.shape, sizes_.BoundAt(stars_, p), faces_.stage(),
-        consistent ? consistent->Of(p) : 0, faces_.left() + 1);
+        stars_, p, criteria_.shape, sizes_.BoundAt(stars_, p), boundary_.stage(),
+        consistent ? consistent->Of(p) : 0, boundary_.left() + 1);
   });
-  filled_.ForgetMended();
-  if (faces_.stage() == K &&
+  filled_.ForgetResolved();
+  if (boundary_.stage() == K &&
       std::any_of(found.begin(), found.end(), [](const auto& v) { return v.has_value(); }))
     filled_.Fill(stars_, criteria_);
   else
     filled_.Clear();
   std::vector<Target<K>> targets;
-  for (std::size_t i = 0; i < suspects.size(); ++i) {
+  for (std::size_t i = 0; i < dirty.size(); ++i) {
     CheckInterruption(i);
-    const std::uint32_t p = suspects[i];
-    const bool is_mended = found[i] && filled_.Mends(stars_, p, *found[i]);
-    if (is_mended) filled_.NoteMended(p);
+    const std::uint32_t p = dirty[i];
+    const bool is_resolved = found[i] && filled_.Resolves(stars_, p, *found[i]);
+    if (is_resolved) filled_.NoteResolved(p);
     // A simplex that leans or is sharp will not always yield, nor a sliver between faces that are
     // nearer to each other than their sizes: the certificate says so.
     const bool may_stay =
-        found[i] && (found[i]->lean || found[i]->sharp || IsSliverAtBoundary(p, *found[i]));
-    if (!found[i] || is_mended || (may_stay && book_.is_given_up(p))) {
-      book_.NoteJudged(p, std::nullopt);
+        found[i] && (found[i]->tilted || found[i]->sharp || IsSliverAtBoundary(p, *found[i]));
+    if (!found[i] || is_resolved || (may_stay && violations_.is_given_up(p))) {
+      violations_.NoteJudged(p, std::nullopt);
       continue;
     }
-    book_.NoteJudged(p, found[i]->rule);
-    if (book_.is_given_up(p)) continue;
+    violations_.NoteJudged(p, found[i]->rule);
+    if (violations_.is_given_up(p)) continue;
     const auto split = SplitUnderSliver(p, *found[i]);
-    targets.push_back(split ? *split : Aim(p, *found[i]));
+    targets.push_back(split ? *split : TargetOf(p, *found[i]));
   }
   return targets;
 }
 
 template <int K>
 bool Engine<K>::HasGrownTooMuch() const {
-  if (book_.are_all_suspect()) return false;
+  if (violations_.are_all_dirty()) return false;
   const double most = std::max(kMostGrowth * static_cast<double>(before_good_points_),
                                static_cast<double>(before_good_points_ + kLeastGrowth));
   return static_cast<double>(stars_.size()) > most;
@@ -207,7 +207,7 @@ std::optional<std::vector<Target<K>>> Engine<K>::Plan() {
     targets = SizeAndShapeTargets();
   }
   if (targets.empty()) targets = GoodPointTargets();
-  if (!faces_.has_walls()) return targets;
+  if (!boundary_.has_walls()) return targets;
   const bool any = !targets.empty();
   YieldToFaces(&targets);
   if (any && targets.empty()) return Plan();  // all were refused, which is not done forever
@@ -216,10 +216,10 @@ std::optional<std::vector<Target<K>>> Engine<K>::Plan() {
 
 template <int K>
 bool Engine<K>::AllRulesHold() const {
-  const auto& entries = book_.size_and_shape();
-  return faces_.left() == 0 && book_.blemished() == 0 &&
+  const auto& entries = violations_.size_and_shape();
+  return boundary_.left() == 0 && violations_.violating() == 0 &&
          std::all_of(entries.begin(), entries.end(), [&](const auto& entry) {
-           return filled_.Mends(stars_, entry.star, entry.violation);
+           return filled_.Resolves(stars_, entry.star, entry.violation);
          });
 }
 
@@ -238,14 +238,18 @@ std::vector<Target<K>> Engine<K>::Select(const std::vector<Target<K>>& targets) 
 
 template <int K>
 CandidateSet<K> Engine<K>::Draw(std::vector<Target<K>> targets, std::uint64_t round) const {
-  return DrawCandidates<K>(stars_, book_, criteria_, {asks_flats_, random_seed_, round},
+  return DrawCandidates<K>(stars_, violations_, criteria_, {asks_flats_, random_seed_, round},
                            std::move(targets));
 }
 
 template <int K>
 Inserter<K> Engine<K>::InserterOf(const CandidateSet<K>& candidates,
                                   const AnsweredPoints& answers) {
-  return {{stars_, sizes_, book_, criteria_, faces_}, candidates, answers, caution_, max_vertices_};
+  return {{stars_, sizes_, violations_, criteria_, boundary_},
+          candidates,
+          answers,
+          caution_,
+          max_vertices_};
 }
 
 template <int K>
@@ -263,7 +267,7 @@ void Engine<K>::Append(const AnsweredPoints& answers, Eigen::Index c) {
 }
 
 template <int K>
-void Engine<K>::Lay(const AnsweredPoints& answers, Eigen::Index c) {
+void Engine<K>::AddToSample(const AnsweredPoints& answers, Eigen::Index c) {
   double bound = 0;
   if (answers.sizes.size() > 0) {
     sizes_.AppendGiven(answers.sizes[c]);
@@ -274,33 +278,33 @@ void Engine<K>::Lay(const AnsweredPoints& answers, Eigen::Index c) {
 
 template <int K>
 typename Engine<K>::Change Engine<K>::Commit() {
-  const std::uint32_t first = book_.star_count();
-  const bool judged = !book_.are_all_suspect();
+  const std::uint32_t first = violations_.star_count();
+  const bool judged = !violations_.are_all_dirty();
   std::vector<std::uint32_t> around;
   Change change = stars_.Commit(judged ? &around : nullptr);
   std::vector<std::uint32_t>& touched = change.stars;
   touched.resize(touched.size() + stars_.size() - first);
   std::iota(touched.end() - (stars_.size() - first), touched.end(), first);
   if (sizes_.is_estimated()) sizes_.Look(stars_, touched);
-  book_.Update(stars_.size(), touched, JudgeSizeAndShape(touched));
+  violations_.Update(stars_.size(), touched, JudgeSizeAndShape(touched));
   if (judged) {
-    book_.Suspect(around);
-    book_.Suspect(touched);
+    violations_.MarkDirty(around);
+    violations_.MarkDirty(touched);
   }
   return change;
 }
 
 template <int K>
-void Engine<K>::JudgeAllAnew() {
-  book_.JudgeAllAnew();
-  filled_.ForgetMended();
+void Engine<K>::MarkAllDirty() {
+  violations_.MarkAllDirty();
+  filled_.ForgetResolved();
 }
 
 template <int K>
 double Engine<K>::CountMissing(double share) const {
   double missing = 0;
   std::size_t step = 0;
-  for (const auto& entry : book_.size_and_shape()) {
+  for (const auto& entry : violations_.size_and_shape()) {
     CheckInterruption(step++);
     const double ratio = entry.violation.radius / sizes_.BoundAt(stars_, entry.star);
     missing += share * Power(std::max(ratio, 1.0), K);

@@ -7,13 +7,13 @@
 
 #include "core/base/instantiate.h"
 #include "core/complex/stars.h"
+#include "core/refinement/boundary_state.h"
 #include "core/refinement/candidate_set.h"
 #include "core/refinement/criteria.h"
-#include "core/refinement/face_book.h"
 #include "core/refinement/filled_mesh.h"
 #include "core/refinement/inserter.h"
 #include "core/refinement/size_field.h"
-#include "core/refinement/violation_book.h"
+#include "core/refinement/violation_index.h"
 #include "core/report.h"
 
 namespace stellate::core {
@@ -45,7 +45,7 @@ class Engine {
 
   // Returns a copy for a speculative run, on a surrogate instead of M. `share`: refine to this
   // share of the sizes; 1, or less where sizes are the same everywhere.
-  Engine ForRehearsal(double share = 1) const;
+  Engine ForSpeculation(double share = 1) const;
 
   bool is_full() const { return stars_.size() >= max_vertices_; }
 
@@ -68,7 +68,7 @@ class Engine {
   void Append(const AnsweredPoints& answers, Eigen::Index candidate);
   // The same for the initial sample, before there is any star: cheaper, but no search finds the
   // point before Commit.
-  void Lay(const AnsweredPoints& answers, Eigen::Index candidate);
+  void AddToSample(const AnsweredPoints& answers, Eigen::Index candidate);
   // Updates the stars and their violations after insertions.
   Change Commit();
   // Manifolds with boundary, when no targets are left: returns points of the faces of this stage
@@ -85,12 +85,12 @@ class Engine {
   // there are, however large. `added`, `removed`: the round's change, as of Commit.
   void CompleteStars(std::vector<std::uint32_t>* added, std::vector<std::uint32_t>* removed);
   // Whether edges and corners have no targets, and some sharp one has no protecting balls
-  // (core/refinement/guards.h).
-  bool WantsGuards(const std::vector<Target<K>>& targets) const;
+  // (core/refinement/protecting_balls.h).
+  bool NeedsProtectingBalls(const std::vector<Target<K>>& targets) const;
   // Sets protecting balls, or finds the edges to split first, and plans again. `added`, `removed`:
   // the round's change, as of Commit.
-  std::optional<std::vector<Target<K>>> GuardSharpEdges(std::vector<std::uint32_t>* added,
-                                                        std::vector<std::uint32_t>* removed);
+  std::optional<std::vector<Target<K>>> ProtectSharpEdges(std::vector<std::uint32_t>* added,
+                                                          std::vector<std::uint32_t>* removed);
   // Corners that more than K walls may meet in: query CrowdQuestions, then pass the answers on.
   // They are inserted, or left out where M is only that point. Returns one that cannot be refined,
   // if any.
@@ -103,10 +103,10 @@ class Engine {
   // Gives the point inserted last a name, in place of its id: see Sample::NameLast.
   void NameLast(std::uint32_t name) { stars_.NameLast(name); }
   // Records an attempt to fix that star that failed elsewhere.
-  void NoteFailedAttempt(std::uint32_t star) { book_.NoteFailedAttempt(star); }
+  void NoteFailedAttempt(std::uint32_t star) { violations_.NoteFailedAttempt(star); }
 
   // Has all rules test all stars again.
-  void JudgeAllAnew();
+  void MarkAllDirty();
 
   // Estimates the vertices still to come from circumradii: a cell of circumradius R will get
   // `share` (R / bound)^K more.
@@ -116,9 +116,9 @@ class Engine {
   const ResolvedCriteria& criteria() const { return criteria_; }
   SizeField<K>& sizes() { return sizes_; }
   const SizeField<K>& sizes() const { return sizes_; }
-  const ViolationBook<K>& book() const { return book_; }
-  FaceBook<K>& faces() { return faces_; }
-  const FaceBook<K>& faces() const { return faces_; }
+  const ViolationIndex<K>& violations() const { return violations_; }
+  BoundaryState<K>& boundary() { return boundary_; }
+  const BoundaryState<K>& boundary() const { return boundary_; }
   FilledMesh<K>& filled() { return filled_; }
   const FilledMesh<K>& filled() const { return filled_; }
 
@@ -133,16 +133,16 @@ class Engine {
   void RejudgeSizes();
   bool HasGrownTooMuch() const;
   void RejudgeAll();
-  std::vector<typename ViolationBook<K>::Entry> JudgeSizeAndShape(
+  std::vector<typename ViolationIndex<K>::Entry> JudgeSizeAndShape(
       const std::vector<std::uint32_t>& stars) const;
   void YieldToFaces(std::vector<Target<K>>* targets);
-  PlannedPoints SetCollars();
+  PlannedPoints PlanShells();
   bool IsSliverAtBoundary(std::uint32_t star, const Violation<K>& violation) const;
   std::optional<Target<K>> SplitUnderSliver(std::uint32_t star,
                                             const Violation<K>& violation) const;
-  bool IsCollar(const typename Stars<K>::FaceSimplex& simplex) const;
+  bool IsOnShell(const typename Stars<K>::FaceSimplex& simplex) const;
   std::optional<Target<K>> SplitOf(const typename Stars<K>::CellVertex& at, Rule by) const;
-  Target<K> Aim(std::uint32_t star, const Violation<K>& violation) const;
+  Target<K> TargetOf(std::uint32_t star, const Violation<K>& violation) const;
 
   ResolvedCriteria criteria_;
   Caution caution_;
@@ -150,8 +150,8 @@ class Engine {
   std::uint64_t random_seed_, max_vertices_;
   Stars<K> stars_;
   SizeField<K> sizes_;
-  ViolationBook<K> book_;
-  FaceBook<K> faces_;
+  ViolationIndex<K> violations_;
+  BoundaryState<K> boundary_;
   FilledMesh<K> filled_;
   std::uint64_t before_good_points_ = 0;  // vertices when R1 and R2 first held
 };

@@ -9,7 +9,7 @@
 
 #include "core/base/dense.h"
 #include "core/base/parallel.h"
-#include "core/refinement/corner_cone.h"
+#include "core/boundary/corner_cone.h"
 #include "core/refinement/engine.h"
 
 namespace stellate::core {
@@ -17,8 +17,8 @@ namespace {
 
 // How far a corner's collar is: this share of epsilon, and of the distance to the nearest other
 // corner, so that two collars leave room between them.
-constexpr double kCollar = 0.5;
-constexpr double kCollarShare = 0.4;
+constexpr double kShell = 0.5;
+constexpr double kShellShare = 0.4;
 
 template <int K>
 using Vector = Eigen::Matrix<double, K, 1>;
@@ -49,7 +49,7 @@ std::vector<std::pair<Vector<K>, WallSet>> EdgesAtCorner(const Stars<K>& stars, 
 // Around each corner, before anything else, a point on each of its edges: these are equally far
 // then, and no two edges that leave a corner at a sharp angle split each other without end.
 template <int K>
-PlannedPoints Engine<K>::SetCollars() {
+PlannedPoints Engine<K>::PlanShells() {
   std::vector<std::uint32_t> corners;
   for (std::uint32_t p = 0; p < stars_.size(); ++p)
     if (CountWalls(stars_.sample().walls(p)) >= K) corners.push_back(p);
@@ -57,13 +57,13 @@ PlannedPoints Engine<K>::SetCollars() {
   std::vector<Eigen::VectorXd> points;
   for (const std::uint32_t p : corners) {
     CheckInterruption(points.size());
-    double radius = kCollar * criteria_.epsilon;
+    double radius = kShell * criteria_.epsilon;
     for (const std::uint32_t q : corners)
       if (q != p)
-        radius = std::min(
-            radius, kCollarShare * Distance(stars_.sample().Point(p), stars_.sample().Point(q),
-                                            stars_.sample().d()));
-    faces_.SetCollar(p, radius);
+        radius =
+            std::min(radius, kShellShare * Distance(stars_.sample().Point(p),
+                                                    stars_.sample().Point(q), stars_.sample().d()));
+    boundary_.SetShell(p, radius);
     for (const auto& [along, walls] : EdgesAtCorner<K>(stars_, p)) {
       const Vector<K> x = radius * along;
       stars_.sample().Lift(p, x.data(), points.emplace_back(stars_.sample().d()).data());
@@ -80,21 +80,21 @@ PlannedPoints Engine<K>::SetCollars() {
 template <int K>
 PlannedPoints Engine<K>::CrowdQuestions() const {
   PlannedPoints planned;
-  for (const auto& crowd : faces_.crowds())
-    ForEachWall(crowd.suspects, [&](int wall) { planned.walls.push_back(SetOfWall(wall)); });
+  for (const auto& crowd : boundary_.crowds())
+    ForEachWall(crowd.possible, [&](int wall) { planned.walls.push_back(SetOfWall(wall)); });
   planned.points.resize(stars_.sample().d(), static_cast<Eigen::Index>(planned.walls.size()));
   Eigen::Index column = 0;
-  for (const auto& crowd : faces_.crowds())
-    for (int i = 0; i < CountWalls(crowd.suspects); ++i) planned.points.col(column++) = crowd.point;
+  for (const auto& crowd : boundary_.crowds())
+    for (int i = 0; i < CountWalls(crowd.possible); ++i) planned.points.col(column++) = crowd.point;
   return planned;
 }
 
 template <int K>
 std::optional<CrowdedCorner> Engine<K>::SettleCrowds(const AnsweredPoints& answers) {
   std::optional<CrowdedCorner> bad;
-  const double same = FaceBook<K>::kSameCorner * criteria_.epsilon;
+  const double same = BoundaryState<K>::kSameCorner * criteria_.epsilon;
   Eigen::Index column = 0;
-  for (const auto& crowd : faces_.TakeCrowds()) {
+  for (const auto& crowd : boundary_.TakeCrowds()) {
     const auto dk = Eigen::Index{stars_.sample().d()};
     const Eigen::Map<const Eigen::MatrixXd> tangents(crowd.tangent.data(), dk, K);
     std::map<int, Vector<K>> conormals;
@@ -103,7 +103,7 @@ std::optional<CrowdedCorner> Engine<K>::SettleCrowds(const AnsweredPoints& answe
       conormals[wall] = crowd.conormals.template segment<K>(K * Eigen::Index{number++});
     });
     WallSet walls = crowd.walls;
-    ForEachWall(crowd.suspects, [&](int wall) {
+    ForEachWall(crowd.possible, [&](int wall) {
       const Eigen::Index c = column++;
       if (!answers.found[static_cast<std::size_t>(c)] ||
           (answers.points.col(c) - crowd.point).norm() > same)
@@ -143,7 +143,7 @@ std::optional<CrowdedCorner> Engine<K>::SettleCrowds(const AnsweredPoints& answe
 }
 
 #define STELLATE_EACH(K)                                    \
-  template PlannedPoints Engine<K>::SetCollars();           \
+  template PlannedPoints Engine<K>::PlanShells();           \
   template PlannedPoints Engine<K>::CrowdQuestions() const; \
   template std::optional<CrowdedCorner> Engine<K>::SettleCrowds(const AnsweredPoints&);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "core/base/parallel.h"
+#include "core/boundary/inactive_faces.h"
 #include "core/refinement/engine.h"
 #include "core/refinement/exchange.h"
-#include "core/refinement/guards.h"
-#include "core/refinement/unmet_faces.h"
+#include "core/refinement/protecting_balls.h"
 
 namespace stellate::core {
 namespace {
@@ -26,14 +26,14 @@ constexpr double kLeastSplit = 0.02;
 // else can be instead of, anywhere but at itself.
 constexpr double kNewsAway = 0.5;
 // On a curved edge a collar may be a little longer than it was set.
-constexpr double kCollarLength = 1.1;
+constexpr double kShellLength = 1.1;
 
 // A face of the stage that no vertex is on takes a seed however near to the sample: it is a small
 // piece of walls beside others, and without it the mesh would be another manifold's.
 template <int K>
-void TakeSeedsOfUnmetFaces(const Stars<K>& stars, int stage,
-                           std::vector<typename FaceBook<K>::Seed>* seeds,
-                           std::vector<typename FaceBook<K>::Seed>* taken) {
+void TakeSeedsOfInactiveFaces(const Stars<K>& stars, int stage,
+                              std::vector<typename BoundaryState<K>::Seed>* seeds,
+                              std::vector<typename BoundaryState<K>::Seed>* taken) {
   std::erase_if(*seeds, [&](auto& seed) {
     const bool is_taken = std::any_of(taken->begin(), taken->end(),
                                       [&](const auto& other) { return other.walls == seed.walls; });
@@ -48,17 +48,17 @@ void TakeSeedsOfUnmetFaces(const Stars<K>& stars, int stage,
 }  // namespace
 
 template <int K>
-bool Engine<K>::IsCollar(const typename Stars<K>::FaceSimplex& simplex) const {
+bool Engine<K>::IsOnShell(const typename Stars<K>::FaceSimplex& simplex) const {
   if (simplex.count != 2) return false;
   const double length = Distance(stars_.sample().Point(simplex.ids[0]),
                                  stars_.sample().Point(simplex.ids[1]), stars_.sample().d());
-  return length <=
-         kCollarLength * std::max(faces_.CollarOf(simplex.ids[0]), faces_.CollarOf(simplex.ids[1]));
+  return length <= kShellLength * std::max(boundary_.ShellOf(simplex.ids[0]),
+                                           boundary_.ShellOf(simplex.ids[1]));
 }
 
 template <int K>
 bool Engine<K>::IsSliverAtBoundary(std::uint32_t star, const Violation<K>& violation) const {
-  if (violation.rule != Rule::kSliver || !faces_.has_walls()) return false;
+  if (violation.rule != Rule::kShape || !boundary_.has_walls()) return false;
   const auto simplex = stars_.FaceSimplexOf(star, stars_.cell(star), violation.vertex);
   return std::any_of(simplex.ids.begin(), simplex.ids.begin() + simplex.count,
                      [&](std::uint32_t id) { return stars_.sample().walls(id) != 0; });
@@ -76,17 +76,17 @@ std::optional<Target<K>> Engine<K>::SplitOf(const typename Stars<K>::CellVertex&
   std::copy_n(cell.x(at.vertex), K, violation.x);
   violation.vertex = at.vertex;
   violation.walls = WallsAt<K>(cell, at.vertex);
-  violation.split = true;
+  violation.encroached = true;
   const auto simplex = stars_.FaceSimplexOf(at.star, cell, at.vertex);
-  if (IsCollar(simplex)) return std::nullopt;
-  if (violation.dimension() <= faces_.left()) return std::nullopt;
+  if (IsOnShell(simplex)) return std::nullopt;
+  if (violation.dimension() <= boundary_.left()) return std::nullopt;
   // The middle of an edge between guards is in both.
   if (simplex.count == 2 && stars_.sample().GuardOf(simplex.ids[0]) > 0 &&
       stars_.sample().GuardOf(simplex.ids[1]) > 0)
     return std::nullopt;
   if (by > Rule::kSize && violation.radius < kLeastSplit * sizes_.BoundAt(stars_, at.star))
     return std::nullopt;
-  return Aim(at.star, violation);
+  return TargetOf(at.star, violation);
 }
 
 // Where no point near a sliver was good and all its corners are on one wall, which may be flat: a
@@ -95,8 +95,8 @@ std::optional<Target<K>> Engine<K>::SplitOf(const typename Stars<K>::CellVertex&
 template <int K>
 std::optional<Target<K>> Engine<K>::SplitUnderSliver(std::uint32_t star,
                                                      const Violation<K>& violation) const {
-  if (violation.rule != Rule::kSliver || !faces_.has_walls() || violation.walls != 0 ||
-      book_.failed_attempts(star) == 0)
+  if (violation.rule != Rule::kShape || !boundary_.has_walls() || violation.walls != 0 ||
+      violations_.failed_attempts(star) == 0)
     return std::nullopt;
   const auto& cell = stars_.cell(star);
   WallSet common = stars_.sample().walls(star);
@@ -106,7 +106,7 @@ std::optional<Target<K>> Engine<K>::SplitUnderSliver(std::uint32_t star,
   for (int s = 0; s < K; ++s) {
     const std::size_t below = cell.adjacent(violation.vertex, s);
     if (CountWalls(WallsAt<K>(cell, below)) == 1 && !cell.HasFakeFacet(below))
-      return SplitOf({star, below}, Rule::kSliver);
+      return SplitOf({star, below}, Rule::kShape);
   }
   return std::nullopt;
 }
@@ -122,7 +122,7 @@ void Engine<K>::YieldToFaces(std::vector<Target<K>>* targets) {
     return t.violation.rule > Rule::kSize && t.violation.dimension() > lowest;
   });
   std::vector<Target<K>> kept;
-  for (const auto& [star, key, by] : faces_.TakeSplits()) {
+  for (const auto& [star, key, by] : boundary_.TakeSplits()) {
     const std::size_t v = stars_.cell(star).Find(key);
     if (v == stars_.cell(star).vertex_count()) continue;
     if (auto split = SplitOf({star, v}, by)) kept.push_back(*split);
@@ -135,7 +135,7 @@ void Engine<K>::YieldToFaces(std::vector<Target<K>>* targets) {
   // The image of a far aim may fall anywhere; good points have several candidates, and after a
   // failed attempt the point is another.
   const auto may_yield = [&](const Target<K>& t) {
-    return t.violation.rule < Rule::kSliver && book_.failed_attempts(t.star) == 0;
+    return t.violation.rule < Rule::kShape && violations_.failed_attempts(t.star) == 0;
   };
   const auto is_near = [](const Target<K>& t) { return !t.violation.fake && !t.is_coarse(); };
   std::vector<std::optional<typename Stars<K>::CellVertex>> first(targets->size());
@@ -150,38 +150,39 @@ void Engine<K>::YieldToFaces(std::vector<Target<K>>* targets) {
     const bool is_one = may_yield(t);
     for (int step = 0; target && is_one && is_near(*target) && step < K; ++step) {
       const auto at = step == 0 ? first[i] : encroached(*target);
-      if (!at || book_.is_given_up(at->star)) break;
+      if (!at || violations_.is_given_up(at->star)) break;
       target = SplitOf(*at, target->violation.rule);
     }
     if (target)
       kept.push_back(*target);
     else
-      book_.NoteFailedAttempt(t.star);
+      violations_.NoteFailedAttempt(t.star);
   }
   *targets = std::move(kept);
 }
 
 template <int K>
 PlannedPoints Engine<K>::ChooseSeeds() {
-  std::vector<typename FaceBook<K>::Seed> chosen, left;
-  for (auto& seed : faces_.seeds()) {
+  std::vector<typename BoundaryState<K>::Seed> chosen, left;
+  for (auto& seed : boundary_.seeds()) {
     CheckInterruption(chosen.size() + left.size());
     const int dimension = K - CountWalls(seed.walls);
     const double apart =
-        dimension == 0 ? FaceBook<K>::kSameCorner * criteria_.epsilon : criteria_.epsilon;
+        dimension == 0 ? BoundaryState<K>::kSameCorner * criteria_.epsilon : criteria_.epsilon;
     const bool covered =
         stars_.sample().AnyWithin(seed.point.data(), apart) ||
         std::any_of(chosen.begin(), chosen.end(), [&](const auto& other) {
           return Distance(other.point.data(), seed.point.data(), stars_.sample().d()) <= apart;
         });
-    const bool ripe = dimension == faces_.stage() && !covered && !is_full() &&
+    const bool ripe = dimension == boundary_.stage() && !covered && !is_full() &&
                       !stars_.EncroachedBy(seed.point.data(), seed.walls);
     (ripe ? chosen : left).push_back(std::move(seed));
   }
   if (chosen.empty() && !is_full())
-    TakeSeedsOfUnmetFaces<K>(stars_, faces_.stage(), &left, &chosen);
-  faces_.seeds() = std::move(left);
-  if (chosen.empty() && faces_.stage() == 0 && K > 1 && !faces_.has_collars()) return SetCollars();
+    TakeSeedsOfInactiveFaces<K>(stars_, boundary_.stage(), &left, &chosen);
+  boundary_.seeds() = std::move(left);
+  if (chosen.empty() && boundary_.stage() == 0 && K > 1 && !boundary_.has_shells())
+    return PlanShells();
   PlannedPoints points;
   points.points.resize(stars_.sample().d(), static_cast<Eigen::Index>(chosen.size()));
   for (std::size_t i = 0; i < chosen.size(); ++i) {
@@ -193,8 +194,8 @@ PlannedPoints Engine<K>::ChooseSeeds() {
 
 template <int K>
 AnsweredPoints Engine<K>::InteriorSeeds() {
-  std::vector<const typename FaceBook<K>::Seed*> seeds;
-  for (const auto& seed : faces_.seeds())
+  std::vector<const typename BoundaryState<K>::Seed*> seeds;
+  for (const auto& seed : boundary_.seeds())
     if (seed.walls == 0 && seed.tangent.size() > 0) seeds.push_back(&seed);
   AnsweredPoints all;
   const auto count = static_cast<Eigen::Index>(seeds.size());
@@ -211,18 +212,18 @@ AnsweredPoints Engine<K>::InteriorSeeds() {
 
 template <int K>
 bool Engine<K>::AdvanceStage() {
-  if (!faces_.Advance()) return false;
-  if (faces_.stage() == K) stars_.IncludeInterior();
+  if (!boundary_.Advance()) return false;
+  if (boundary_.stage() == K) stars_.IncludeInterior();
   RejudgeAll();
-  JudgeAllAnew();
-  book_.ForgetAttempts();
+  MarkAllDirty();
+  violations_.ForgetAttempts();
   return true;
 }
 
 template <int K>
 bool Engine<K>::LeaveStage() {
-  if (!faces_.has_walls() || faces_.stage() == K) return false;
-  faces_.Leave();
+  if (!boundary_.has_walls() || boundary_.stage() == K) return false;
+  boundary_.Leave();
   return AdvanceStage();
 }
 
@@ -230,7 +231,7 @@ bool Engine<K>::LeaveStage() {
 template <int K>
 void Engine<K>::CompleteStars(std::vector<std::uint32_t>* added,
                               std::vector<std::uint32_t>* removed) {
-  if (faces_.stage() == K || stars_.size() == 0) return;
+  if (boundary_.stage() == K || stars_.size() == 0) return;
   const std::vector<std::uint32_t> before = stars_.Simplices();
   stars_.IncludeInterior();
   stars_.Commit();
@@ -238,37 +239,37 @@ void Engine<K>::CompleteStars(std::vector<std::uint32_t>* added,
 }
 
 template <int K>
-bool Engine<K>::WantsGuards(const std::vector<Target<K>>& targets) const {
-  return K == 3 && faces_.stage() >= 1 && !faces_.has_discoveries() &&
+bool Engine<K>::NeedsProtectingBalls(const std::vector<Target<K>>& targets) const {
+  return K == 3 && boundary_.stage() >= 1 && !boundary_.has_discoveries() &&
          std::all_of(targets.begin(), targets.end(),
                      [](const Target<K>& t) { return t.violation.dimension() >= 2; }) &&
-         LacksGuards<K>(stars_);
+         NeedsProtection<K>(stars_);
 }
 
 template <int K>
-std::optional<std::vector<Target<K>>> Engine<K>::GuardSharpEdges(
+std::optional<std::vector<Target<K>>> Engine<K>::ProtectSharpEdges(
     std::vector<std::uint32_t>* added, std::vector<std::uint32_t>* removed) {
-  Guards<K> guards = PlanGuards<K>(stars_, sizes_);
-  if (faces_.MaySplitForGuards(stars_.size(), MostSplits<K>(guards))) {
+  ProtectingBalls<K> balls = PlanProtectingBalls<K>(stars_, sizes_);
+  if (boundary_.MaySplitForBalls(stars_.size(), MostSplits<K>(balls))) {
     std::vector<Target<K>> splits;
-    for (const auto& gap : guards.gaps)
-      if (!book_.is_given_up(gap.star))
+    for (const auto& gap : balls.gaps)
+      if (!violations_.is_given_up(gap.star))
         if (const auto split = SplitOf(gap, Rule::kSize)) splits.push_back(*split);
     if (!splits.empty()) return splits;
   }
-  faces_.NoteGuarded();
+  boundary_.NoteProtected();
   const std::vector<std::uint32_t> before = stars_.Simplices();
-  stars_.SetGuards(std::move(guards.radii2));
+  stars_.SetGuards(std::move(balls.radii2));
   ExchangeSimplices<K>(before, stars_.Simplices(), added, removed);
   RejudgeAll();
-  JudgeAllAnew();
-  book_.ForgetAttempts();
+  MarkAllDirty();
+  violations_.ForgetAttempts();
   return Plan();
 }
 
 template <int K>
 PlannedPoints Engine<K>::TakeDiscoveries() {
-  const auto found = faces_.TakeDiscoveries();
+  const auto found = boundary_.TakeDiscoveries();
   PlannedPoints planned;
   const auto count = static_cast<Eigen::Index>(found.size());
   planned.points.resize(stars_.sample().d(), count);
@@ -280,7 +281,7 @@ PlannedPoints Engine<K>::TakeDiscoveries() {
     planned.walls.push_back(found[i].walls);
     planned.spacing[column] =
         criteria_.epsilon *
-        (CountWalls(found[i].walls) == K ? FaceBook<K>::kSameCorner : kNewsAway);
+        (CountWalls(found[i].walls) == K ? BoundaryState<K>::kSameCorner : kNewsAway);
   }
   return planned;
 }
@@ -322,13 +323,13 @@ std::vector<FaceMesh> Engine<K>::Faces() const {
   template PlannedPoints Engine<K>::ChooseSeeds();                                               \
   template AnsweredPoints Engine<K>::InteriorSeeds();                                            \
   template bool Engine<K>::IsSliverAtBoundary(std::uint32_t, const Violation<K>&) const;         \
-  template bool Engine<K>::IsCollar(const Stars<K>::FaceSimplex&) const;                         \
+  template bool Engine<K>::IsOnShell(const Stars<K>::FaceSimplex&) const;                        \
   template bool Engine<K>::AdvanceStage();                                                       \
   template bool Engine<K>::LeaveStage();                                                         \
   template void Engine<K>::CompleteStars(std::vector<std::uint32_t>*,                            \
                                          std::vector<std::uint32_t>*);                           \
-  template bool Engine<K>::WantsGuards(const std::vector<Target<K>>&) const;                     \
-  template std::optional<std::vector<Target<K>>> Engine<K>::GuardSharpEdges(                     \
+  template bool Engine<K>::NeedsProtectingBalls(const std::vector<Target<K>>&) const;            \
+  template std::optional<std::vector<Target<K>>> Engine<K>::ProtectSharpEdges(                   \
       std::vector<std::uint32_t>*, std::vector<std::uint32_t>*);                                 \
   template std::vector<FaceMesh> Engine<K>::Faces() const;                                       \
   template PlannedPoints Engine<K>::TakeDiscoveries();

@@ -22,8 +22,8 @@ void FilledMesh<K>::Fill(const Stars<K>& stars, const ResolvedCriteria& criteria
 }
 
 template <int K>
-bool FilledMesh<K>::Mends(const Stars<K>& stars, std::uint32_t star,
-                          const Violation<K>& violation) const {
+bool FilledMesh<K>::Resolves(const Stars<K>& stars, std::uint32_t star,
+                             const Violation<K>& violation) const {
   if (cavities_.cavities == 0 || violation.fake || violation.walls != 0 ||
       std::binary_search(cavities_.unfilled.begin(), cavities_.unfilled.end(), star))
     return false;

@@ -19,12 +19,12 @@ class FilledMesh {
   void Clear() { cavities_ = {}; }
 
   // Whether the filling leaves the violating simplex out of the mesh.
-  bool Mends(const Stars<K>& stars, std::uint32_t star, const Violation<K>& violation) const;
+  bool Resolves(const Stars<K>& stars, std::uint32_t star, const Violation<K>& violation) const;
 
   // The stars whose violations of R3 and R4 the filling resolves, until they are tested again.
-  const std::vector<std::uint32_t>& mended() const { return mended_; }
-  void NoteMended(std::uint32_t star) { mended_.push_back(star); }
-  void ForgetMended() { mended_.clear(); }
+  const std::vector<std::uint32_t>& resolved() const { return resolved_; }
+  void NoteResolved(std::uint32_t star) { resolved_.push_back(star); }
+  void ForgetResolved() { resolved_.clear(); }
 
   // Makes this the mesh. `added` and `removed`, K+1 ids each, come in as a round's change of the
   // union of the stars, and go out as its change of the mesh.
@@ -36,7 +36,7 @@ class FilledMesh {
 
  private:
   FilledCavities cavities_;
-  std::vector<std::uint32_t> mended_;
+  std::vector<std::uint32_t> resolved_;
   bool is_handed_out_ = false;
 };
 

@@ -7,7 +7,7 @@
 #include "core/base/local_maxima.h"
 #include "core/base/parallel.h"
 #include "core/base/parallel_sort.h"
-#include "core/sample/ball_tree.h"
+#include "core/index/ball_tree.h"
 
 namespace stellate::core {
 namespace {
@@ -17,7 +17,7 @@ constexpr std::uint32_t kMostListed = 48;
 
 template <int K>
 double Reach(const Target<K>& t) {
-  return t.violation.rule >= Rule::kSliver ? 2 * t.radius : t.radius;
+  return t.violation.rule >= Rule::kShape ? 2 * t.radius : t.radius;
 }
 
 // The conflicts between targets, each with the stronger ones: those that are taken before it and

@@ -6,7 +6,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/vector_ops.h"
-#include "core/refinement/unmet_faces.h"
+#include "core/boundary/inactive_faces.h"
 
 namespace stellate::core {
 namespace {
@@ -38,7 +38,7 @@ Inserter<K>::Inserter(const Parts& to, const CandidateSet<K>& candidates,
 
 template <int K>
 Inserted Inserter<K>::Run() {
-  TellAllNearAim(Judge());
+  SetAllNearTarget(Judge());
   for (std::size_t i = 0; i < candidates_.targets.size(); ++i) {
     CheckInterruption(i);
     InsertTarget(i);
@@ -53,19 +53,20 @@ bool Inserter<K>::Judge() {
   best_.assign(targets.size(), 0);
   refined_.assign(targets.size(), {});
   ParallelFor(targets.size(), [&](std::size_t i) {
-    if (targets[i].violation.rule >= Rule::kSliver)
+    if (targets[i].violation.rule >= Rule::kShape)
       best_[i] = BestCandidate(i);
     else
       refined_[i] = JudgeRefined(i);
   });
-  return std::all_of(refined_.begin(), refined_.end(),
-                     [](const RefinedPoint& judged) { return !judged.found || judged.near_aim; });
+  return std::all_of(refined_.begin(), refined_.end(), [](const RefinedPoint& judged) {
+    return !judged.found || judged.near_target;
+  });
 }
 
 template <int K>
 typename Inserter<K>::Outcome Inserter<K>::InsertTarget(std::size_t i) {
-  return candidates_.targets[i].violation.rule >= Rule::kSliver ? InsertGoodPoint(i, best_[i])
-                                                                : InsertRefined(i, refined_[i]);
+  return candidates_.targets[i].violation.rule >= Rule::kShape ? InsertGoodPoint(i, best_[i])
+                                                               : InsertRefined(i, refined_[i]);
 }
 
 // Of the ball around the insertion point: from a guarded point it reaches to its ball's border,
@@ -79,7 +80,7 @@ double Inserter<K>::EmptyRadius(const Target<K>& t) const {
 template <int K>
 double Inserter<K>::Clearance(const Target<K>& t) const {
   const double radius = EmptyRadius(t);
-  if (t.violation.split) return kSplitSpacing * radius;
+  if (t.violation.encroached) return kSplitSpacing * radius;
   return t.is_coarse() ? caution_.coarse_spacing * std::min(t.size_bound, radius)
                        : caution_.empty_ball * radius;
 }
@@ -95,12 +96,13 @@ typename Inserter<K>::RefinedPoint Inserter<K>::JudgeRefined(std::size_t i) cons
   const Stars<K>& stars = to_.stars;
   judged.duplicate = stars.sample().AnyWithin(y, Clearance(t)) || stars.sample().InGuard(y);
   judged.cuts_violation = !judged.duplicate && stars.CutsVertex(t.star, t.violation.vertex, y);
-  if (to_.faces.has_walls()) {
+  if (to_.boundary.has_walls()) {
     judged.encroached = stars.EncroachedBy(y, t.violation.walls);
     judged.beyond = answers_.Beyond(c);
   }
-  judged.near_aim = !caution_.is_rehearsal && Distance(y, candidates_.points.col(c).data(),
-                                                       stars.sample().d()) <= kNearAim * t.radius;
+  judged.near_target =
+      !caution_.is_speculative &&
+      Distance(y, candidates_.points.col(c).data(), stars.sample().d()) <= kNearAim * t.radius;
   return judged;
 }
 
@@ -109,14 +111,14 @@ typename Inserter<K>::Outcome Inserter<K>::InsertRefined(std::size_t i, RefinedP
   const Target<K>& t = candidates_.targets[i];
   const Eigen::Index c = candidates_.first[i];
   if (!judged.found) {
-    if (!candidates_.in_flats[i] || caution_.is_rehearsal) return NoteFailedAttempt(t.star);
-    to_.book.NoteNoFlat(t.star);
+    if (!candidates_.in_flats[i] || caution_.is_speculative) return NoteFailedAttempt(t.star);
+    to_.violations.NoteNoFlat(t.star);
     return Outcome::kPutOff;
   }
   if (YieldsToFaces(judged, t, c)) return NoteFailedAttempt(t.star);
   const double* y = answers_.points.col(c).data();
   // Another of this round may have come near, unless all have stayed near where they were aimed.
-  if (judged.cuts_violation && !all_near_aim_)
+  if (judged.cuts_violation && !all_near_target_)
     judged.duplicate = to_.stars.sample().AnyWithin(y, Clearance(t));
   if (judged.duplicate || !judged.cuts_violation) {
     done_.duplicates += judged.duplicate;
@@ -132,18 +134,18 @@ template <int K>
 bool Inserter<K>::YieldsToFaces(const RefinedPoint& judged, const Target<K>& t, Eigen::Index c) {
   if (judged.encroached) {
     const auto& [star, vertex] = *judged.encroached;
-    to_.faces.NoteEncroached({star, to_.stars.cell(star).key(vertex), t.violation.rule});
+    to_.boundary.NoteEncroached({star, to_.stars.cell(star).key(vertex), t.violation.rule});
     return true;
   }
   if (!judged.beyond) return false;
-  to_.faces.Discover(answers_.points.col(c), t.violation.walls, *judged.beyond);
+  to_.boundary.Discover(answers_.points.col(c), t.violation.walls, *judged.beyond);
   return true;
 }
 
 // Whether a point is in M and spoils no face.
 template <int K>
 bool Inserter<K>::FitsFaces(Eigen::Index c) const {
-  return !to_.faces.has_walls() ||
+  return !to_.boundary.has_walls() ||
          (!answers_.Beyond(c) && !to_.stars.sample().InGuard(answers_.points.col(c).data()) &&
           !to_.stars.EncroachedBy(answers_.points.col(c).data(), WallsOf(c)));
 }
@@ -181,13 +183,13 @@ typename Inserter<K>::Outcome Inserter<K>::InsertGoodPoint(std::size_t i, int be
   if (best < 0) {
     // The first that is in the way of a face has that refined.
     for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c) {
-      if (!to_.faces.has_walls() || !answers_.found[static_cast<std::size_t>(c)]) continue;
+      if (!to_.boundary.has_walls() || !answers_.found[static_cast<std::size_t>(c)]) continue;
       RefinedPoint judged;
       judged.encroached = to_.stars.EncroachedBy(answers_.points.col(c).data(), t.violation.walls);
       judged.beyond = answers_.Beyond(c);
       if (YieldsToFaces(judged, t, c)) break;
     }
-    to_.book.NoteNoFlat(t.star);  // if that was why
+    to_.violations.NoteNoFlat(t.star);  // if that was why
     return NoteFailedAttempt(t.star);
   }
   const Eigen::Index c = candidates_.first[i] + best;
@@ -206,22 +208,23 @@ void Inserter<K>::InsertPlanned() {
     const Eigen::Index c = candidates_.drawn() + i;
     if (!answers_.found[static_cast<std::size_t>(c)]) continue;
     if (CountWalls(WallsOf(c)) == K &&
-        to_.faces.KeepCrowd(answers_, c, FaceBook<K>::kSameCorner * to_.criteria.epsilon))
+        to_.boundary.KeepCrowd(answers_, c, BoundaryState<K>::kSameCorner * to_.criteria.epsilon))
       continue;
     if (!FitsFaces(c)) {
       if (const auto beyond = answers_.Beyond(c))
-        to_.faces.Discover(answers_.points.col(c), WallsOf(c), *beyond);
+        to_.boundary.Discover(answers_.points.col(c), WallsOf(c), *beyond);
       continue;
     }
-    if (K - CountWalls(WallsOf(c)) > to_.faces.stage()) {  // corners and their collars come first
-      to_.faces.KeepSeed(answers_.points.col(c), WallsOf(c));
+    if (K - CountWalls(WallsOf(c)) >
+        to_.boundary.stage()) {  // corners and their collars come first
+      to_.boundary.KeepSeed(answers_.points.col(c), WallsOf(c));
       continue;
     }
     if (to_.stars.sample().AnyWithin(answers_.points.col(c).data(),
                                      kKeptSpacing * planned.spacing[i])) {
       ++done_.duplicates;
       if (WallsOf(c) != 0 && !HasPointOn<K>(to_.stars, WallsOf(c)))
-        to_.faces.KeepSeed(answers_.points.col(c), WallsOf(c));
+        to_.boundary.KeepSeed(answers_.points.col(c), WallsOf(c));
       continue;
     }
     Insert(c, planned.rules[static_cast<std::size_t>(i)], Stars<K>::kNone);
@@ -238,14 +241,14 @@ typename Inserter<K>::Outcome Inserter<K>::Insert(Eigen::Index c, Rule rule, std
   return Outcome::kInserted;
 }
 
-// In a rehearsal at once: what the surrogate refuses is left for true points, since shorter steps
+// When speculating at once: what the surrogate refuses is left for true points, since shorter steps
 // would only crowd the border of what it knows.
 template <int K>
 typename Inserter<K>::Outcome Inserter<K>::NoteFailedAttempt(std::uint32_t star) {
-  if (caution_.is_rehearsal)
-    to_.book.GiveUp(star);
+  if (caution_.is_speculative)
+    to_.violations.GiveUp(star);
   else
-    to_.book.NoteFailedAttempt(star);
+    to_.violations.NoteFailedAttempt(star);
   return Outcome::kFailed;
 }
 

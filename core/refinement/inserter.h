@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "core/base/instantiate.h"
+#include "core/refinement/boundary_state.h"
 #include "core/refinement/candidate_set.h"
-#include "core/refinement/face_book.h"
 #include "core/refinement/size_field.h"
-#include "core/refinement/violation_book.h"
+#include "core/refinement/violation_index.h"
 
 namespace stellate::core {
 
@@ -25,10 +25,10 @@ struct Caution {
   double empty_ball = 0.5;
   // The answers come from a surrogate: none is assumed to lie near its target, and a star whose
   // target has no answer is skipped.
-  bool is_rehearsal = false;
+  bool is_speculative = false;
 };
 // A speculative run inserts less: later rounds know better.
-inline constexpr Caution kRehearsalCaution = {0.9, 0.9, true};
+inline constexpr Caution kSpeculativeCaution = {0.9, 0.9, true};
 
 // What one round inserted.
 struct Inserted {
@@ -49,9 +49,9 @@ class Inserter {
   struct Parts {
     Stars<K>& stars;
     SizeField<K>& sizes;
-    ViolationBook<K>& book;
+    ViolationIndex<K>& violations;
     const ResolvedCriteria& criteria;
-    FaceBook<K>& faces;
+    BoundaryState<K>& boundary;
   };
   // max_vertices: stops inserting planned points at this size.
   Inserter(const Parts& to, const CandidateSet<K>& candidates, const AnsweredPoints& answers,
@@ -61,12 +61,12 @@ class Inserter {
 
   // The steps of Run. Call Judge first: it returns whether all answers of R1 and R2 lie near their
   // targets, and so cannot be near each other. If other inserters have parts of the round, pass
-  // them the conjunction (TellAllNearAim). Then call InsertTarget for each target in order.
+  // them the conjunction (SetAllNearTarget). Then call InsertTarget for each target in order.
   // kPutOff: the target is unchanged, because its star needs another kind of query, or another
   // point came near.
   enum class Outcome : std::uint8_t { kInserted, kFailed, kPutOff };
   bool Judge();
-  void TellAllNearAim(bool all) { all_near_aim_ = all; }
+  void SetAllNearTarget(bool all) { all_near_target_ = all; }
   Outcome InsertTarget(std::size_t target);
 
  private:
@@ -75,7 +75,7 @@ class Inserter {
     bool found = false;
     bool duplicate = false;       // too near another point
     bool cuts_violation = false;  // takes the violating simplex out of its star
-    bool near_aim = false;        // lies near its target
+    bool near_target = false;     // lies near its target
     // Manifolds with boundary: the face simplex that it encroaches on; the wall that it lies
     // beyond.
     std::optional<typename Stars<K>::CellVertex> encroached;
@@ -106,7 +106,7 @@ class Inserter {
   std::uint64_t max_vertices_;
   std::vector<int> best_;              // by target of R3 and R4: its candidate; -1: none
   std::vector<RefinedPoint> refined_;  // by target of R1 and R2
-  bool all_near_aim_ = false;
+  bool all_near_target_ = false;
   Inserted done_;
 };
 

@@ -12,17 +12,17 @@
 
 #include "core/base/dense.h"
 #include "core/base/instantiate.h"
+#include "core/boundary/sharp_dihedrals.h"
 #include "core/geometry/reach.h"
 #include "core/geometry/simplex_frame.h"
-#include "core/refinement/sharp_dihedrals.h"
 
 namespace stellate::core {
 namespace {
 
 // Simplices lean at least 0.05 radians less than a proof allows: what tangents found by
 // differences may be wrong by where epsilon is half of the reach, with some to spare.
-constexpr double kCosineOfLeanMargin = 0.99875026039496623,
-                 kSineOfLeanMargin = 0.049979169270678331;
+constexpr double kCosineOfTiltMargin = 0.99875026039496623,
+                 kSineOfTiltMargin = 0.049979169270678331;
 // A volume this small beside the lengths of the edges that span it is one of points that are off a
 // flat wall by an oracle's error.
 constexpr double kFlatEdges = 1e-8;
@@ -232,7 +232,7 @@ bool HasThinFaceAt(const Stars<K>& stars, const double* p, const RestrictedVoron
 }
 
 template <int K>
-bool LeansTooFar(const Stars<K>& stars, std::uint32_t p, const double* at,
+bool TiltsTooFar(const Stars<K>& stars, std::uint32_t p, const double* at,
                  const RestrictedVoronoiCell<K>& cell, std::size_t v, double reach,
                  const double* unborn) {
   if (!std::isfinite(reach)) return false;
@@ -251,8 +251,8 @@ bool LeansTooFar(const Stars<K>& stars, std::uint32_t p, const double* at,
   // A proof's right angle, less how far M turns, less the margin: its sine.
   const double half = SineOfHalfTurn(JungRatio(K) * std::sqrt(diameter2), reach);
   if (!(half < 1)) return true;
-  const double sine = kCosineOfLeanMargin * (1 - 2 * half * half) -
-                      kSineOfLeanMargin * 2 * half * std::sqrt(1 - half * half);
+  const double sine = kCosineOfTiltMargin * (1 - 2 * half * half) -
+                      kSineOfTiltMargin * 2 * half * std::sqrt(1 - half * half);
   if (sine <= 0) return true;
   thread_local SimplexFrame frame;
   frame.directions.resize(static_cast<std::size_t>(d) * K);
@@ -295,7 +295,7 @@ std::optional<Violation<K>> SharpSimplex(const Stars<K>& stars, std::uint32_t p,
   const auto worst =
       WorstSharp<K>(stars, p, bounds.sharpest_cosine, bounds.sharp_radius * size_bound);
   if (!worst) return std::nullopt;
-  Violation<K> violation = AtVertex<K>(Rule::kSliver, stars.cell(p), *worst, false);
+  Violation<K> violation = AtVertex<K>(Rule::kShape, stars.cell(p), *worst, false);
   violation.sharp = true;
   return violation;
 }
@@ -320,7 +320,7 @@ std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const Stars<K>& sta
         (HasThinFaceAt<K>(stars, stars.sample().Point(p), cell, v, bounds.sliver_bound, nullptr) ||
          IsFlatOnWall<K>(stars, p, cell, v));
     if (!thin && IsConsistent<K>(stars, p, v) && !(whole && folds && folds->IsFolded(v))) continue;
-    const Rule rule = thin ? Rule::kSliver : Rule::kInconsistent;
+    const Rule rule = thin ? Rule::kShape : Rule::kInconsistent;
     if (worst && std::tuple(worst->dimension(), worst->rule, -worst->radius) <=
                      std::tuple(dimension, rule, -std::sqrt(cell.norm2(v))))
       continue;
@@ -357,7 +357,7 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const Stars<K>& stars, std
       if (is_worse(v) && held(v) && !stars.TouchesGuard(p, cell, v) &&
           HasThinFaceAt<K>(stars, stars.sample().Point(p), cell, v, bounds.sliver_bound, nullptr))
         worst = v;
-    if (worst) return AtVertex<K>(Rule::kSliver, cell, *worst, false);
+    if (worst) return AtVertex<K>(Rule::kShape, cell, *worst, false);
   }
   const auto is_consistent = [&](std::size_t v) {
     return (v < 64 && (consistent >> v & 1) != 0) || IsConsistent<K>(stars, p, v);
@@ -370,11 +370,11 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const Stars<K>& stars, std
   if (!std::isfinite(bounds.reach)) return SharpSimplex<K>(stars, p, bounds, size_bound);
   for (std::size_t v = 0; v < cell.vertex_count(); ++v)
     if (is_worse(v) && held(v) &&
-        LeansTooFar<K>(stars, p, stars.sample().Point(p), cell, v, bounds.reach, nullptr))
+        TiltsTooFar<K>(stars, p, stars.sample().Point(p), cell, v, bounds.reach, nullptr))
       worst = v;
   if (!worst) return SharpSimplex<K>(stars, p, bounds, size_bound);
-  Violation<K> violation = AtVertex<K>(Rule::kSliver, cell, *worst, false);
-  violation.lean = true;
+  Violation<K> violation = AtVertex<K>(Rule::kShape, cell, *worst, false);
+  violation.tilted = true;
   return violation;
 }
 
@@ -385,7 +385,7 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const Stars<K>& stars, std
       const Stars<K>&, std::uint32_t, const ShapeBounds&, double, int, std::uint64_t, int);     \
   template bool HasThinFaceAt(const Stars<K>&, const double*, const RestrictedVoronoiCell<K>&,  \
                               std::size_t, double, const double*);                              \
-  template bool LeansTooFar(const Stars<K>&, std::uint32_t, const double*,                      \
+  template bool TiltsTooFar(const Stars<K>&, std::uint32_t, const double*,                      \
                             const RestrictedVoronoiCell<K>&, std::size_t, double, const double*);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

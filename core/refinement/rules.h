@@ -10,13 +10,13 @@
 namespace stellate::core {
 
 // The refinement rules of Sec. 5.3.5, in their order.
-enum class Rule : std::uint8_t { kSize = 0, kRadiusEdge, kSliver, kInconsistent };
+enum class Rule : std::uint8_t { kSize = 0, kRadiusEdge, kShape, kInconsistent };
 
 // The bounds of R3 on the shape of a simplex.
 struct ShapeBounds {
   double sliver_bound = 0;  // Theta0; 0: none
   // The declared reach, length: no simplex may be tilted so far from a vertex's tangent space that
-  // ProveFromReach would fail (core/certificate/proof.h). Infinity: any tilt is allowed.
+  // ProveFromReach would fail (core/certificate/claims/proof.h). Infinity: any tilt is allowed.
   double reach = INFINITY;
   // The cosine of the least dihedral angle of tetrahedra. 1: any angle is allowed.
   double sharpest_cosine = 1;
@@ -29,14 +29,14 @@ struct ShapeBounds {
 template <int K>
 struct Violation {
   Rule rule = Rule::kSize;
-  double radius = 0;       // R_p(sigma), length
-  double x[K] = {};        // c_p(sigma) in p's tangent coordinates
-  std::size_t vertex = 0;  // of p's cell; valid until that changes
-  bool fake = false;       // not a simplex yet: the cell is unbounded there
-  bool lean = false;       // R3: not a sliver, but tilted too far for a proof
-  bool sharp = false;      // R3: not a sliver, but has a sharp dihedral angle
-  WallSet walls = 0;       // of the dual vertex: the simplex is one of their face
-  bool split = false;      // breaks no rule, but a point off its face would come too near
+  double radius = 0;        // R_p(sigma), length
+  double x[K] = {};         // c_p(sigma) in p's tangent coordinates
+  std::size_t vertex = 0;   // of p's cell; valid until that changes
+  bool fake = false;        // not a simplex yet: the cell is unbounded there
+  bool tilted = false;      // R3: not a sliver, but tilted too far for a proof
+  bool sharp = false;       // R3: not a sliver, but has a sharp dihedral angle
+  WallSet walls = 0;        // of the dual vertex: the simplex is one of their face
+  bool encroached = false;  // breaks no rule, but a point off its face would come too near
 
   int dimension() const { return K - CountWalls(walls); }
 };
@@ -80,7 +80,7 @@ bool HasThinFaceAt(const Stars<K>& stars, const double* p, const RestrictedVoron
 // its vertices for a proof from this reach, or is so large that M itself may turn too far under it.
 // `unborn` as above: it has no tangent space yet.
 template <int K>
-bool LeansTooFar(const Stars<K>& stars, std::uint32_t p, const double* at,
+bool TiltsTooFar(const Stars<K>& stars, std::uint32_t p, const double* at,
                  const RestrictedVoronoiCell<K>& cell, std::size_t v, double reach,
                  const double* unborn);
 

@@ -33,7 +33,7 @@ Target<K> TargetFor(std::uint32_t star, const Violation<K>& violation, double si
   // Many steps are as long as they may be: exactly so, or else rounding would say which comes
   // first.
   target.radius = violation.radius;
-  if (violation.rule < Rule::kSliver) {
+  if (violation.rule < Rule::kShape) {
     target.radius = std::min(target.radius, advance_step);
     if (target.is_coarse()) target.radius = std::ldexp(target.radius, -failed_attempts);
   }

@@ -29,7 +29,7 @@ MeshView WithSimplices(MeshView mesh, const std::vector<std::uint32_t>& simplice
   mesh.walls = boundary->walls.data();
   mesh.outward = boundary->outward.data();
   mesh.faces = &boundary->faces;
-  if (!boundary->guards.empty()) mesh.guards = boundary->guards.data();
+  if (!boundary->balls.empty()) mesh.guards = boundary->balls.data();
   return mesh;
 }
 
@@ -82,7 +82,7 @@ BoundaryOfMesh BoundaryOf(const Engine<K>& engine) {
   }
   boundary.faces = engine.Faces();
   for (std::uint32_t p = 0; stars.sample().has_guards() && p < stars.size(); ++p)
-    boundary.guards.push_back(stars.sample().GuardOf(p));
+    boundary.balls.push_back(stars.sample().GuardOf(p));
   return boundary;
 }
 

@@ -6,7 +6,7 @@
 
 #include "core/certificate/certifier.h"
 #include "core/refinement/engine.h"
-#include "core/run/asker.h"
+#include "core/run/query_source.h"
 
 namespace stellate::core {
 
@@ -20,13 +20,13 @@ struct BoundaryOfMesh {
   std::vector<WallSet> walls;   // by vertex
   std::vector<double> outward;  // k tangent coordinates by vertex
   std::vector<FaceMesh> faces;
-  std::vector<double> guards;  // squared radii of protecting balls, by vertex; empty: none
+  std::vector<double> balls;  // squared radii of protecting balls, by vertex; empty: none
 };
 template <int K>
 BoundaryOfMesh BoundaryOf(const Engine<K>& engine);
 
 // Queries what the certificate needs, and owns it.
-class Certification final : public Asker {
+class Certification final : public QuerySource {
  public:
   // spec      borrowed
   // mesh      its points and tangents are borrowed and must not change; its simplices are set here

@@ -86,7 +86,7 @@ void CreaseProbe::Start(std::vector<Way> ways) {
   is_difference_ = looks_beyond_ = false;
   walks_.clear();
   crease_.reset();
-  suspected_.reset();
+  unconfirmed_.reset();
   for (Way& way : ways) {
     Walk walk;
     walk.sine = SineBetween(way.at_a, way.at_b);
@@ -122,8 +122,8 @@ std::vector<QueryBlock> CreaseProbe::Questions() {
   if (!is_asking()) return {};
   QueryBlock block;
   block.kind = QueryKind::kClosestPoint;
-  if (suspected_) {
-    block.points = suspected_->point;
+  if (unconfirmed_) {
+    block.points = unconfirmed_->point;
   } else if (is_difference_) {
     block = *finder_.Next();
   } else if (looks_beyond_) {
@@ -141,7 +141,7 @@ std::vector<QueryBlock> CreaseProbe::Questions() {
 }
 
 void CreaseProbe::Absorb(const std::vector<AnswerBlock>& answers) {
-  if (suspected_) return TakeCorner(answers.front());
+  if (unconfirmed_) return TakeCorner(answers.front());
   if (!is_difference_) return TakePoints(answers.front());
   finder_.Absorb(answers.front());
   if (finder_.Next() == nullptr) TakeTangents();
@@ -196,8 +196,8 @@ void CreaseProbe::TakeTangents() {
 void CreaseProbe::GoOn() {
   if (looks_beyond_) {
     looks_beyond_ = false;
-    suspected_ = WhatIsAt(walks_.front());
-    if (suspected_) return;
+    unconfirmed_ = WhatIsAt(walks_.front());
+    if (unconfirmed_) return;
     walks_.erase(walks_.begin());
   } else {
     std::erase_if(walks_, [&](Walk& walk) { return !TakeLeg(&walk) || walk.legs >= kMostLegs; });
@@ -209,13 +209,13 @@ void CreaseProbe::GoOn() {
 // finds nothing there it has no tangent space.
 void CreaseProbe::TakeCorner(const AnswerBlock& answer) {
   const bool found = answer.found.empty() || answer.found.front() != 0;
-  const double off = (answer.points.col(0) - suspected_->point).norm();
-  if (!found || off <= kSharp * turn_ * suspected_->length) {
-    crease_ = std::move(suspected_);
-    suspected_.reset();
+  const double off = (answer.points.col(0) - unconfirmed_->point).norm();
+  if (!found || off <= kSharp * turn_ * unconfirmed_->length) {
+    crease_ = std::move(unconfirmed_);
+    unconfirmed_.reset();
     return;
   }
-  suspected_.reset();
+  unconfirmed_.reset();
   walks_.erase(walks_.begin());
   ChooseEnd();
 }

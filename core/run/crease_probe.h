@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/run/asker.h"
+#include "core/run/query_source.h"
 #include "core/run/tangent_finder.h"
 
 namespace stellate::core {
@@ -34,7 +34,7 @@ struct Crease {
 // smooth the spaces turn less on shorter ways. If they turn as much, and M is straight on both
 // sides, there is a crease, a corner or a crossing. Queries closest points, and tangents where the
 // oracle gives them.
-class CreaseProbe final : public Asker {
+class CreaseProbe final : public QuerySource {
  public:
   // k, d: dimensions of M and of space. size: of the mesh, a length. gives_tangents, has_walls: as
   // the oracle has them.
@@ -82,10 +82,10 @@ class CreaseProbe final : public Asker {
   bool is_difference_ = false;  // asks for tangents of what it has found
   bool looks_beyond_ = false;   // asks what is about the first walk's end
   std::vector<Walk> walks_;
-  std::vector<Eigen::Index> asked_;  // the questions that have an answer
-  Eigen::MatrixXd found_;            // those answers
-  std::optional<Crease> suspected_;  // asks whether M goes to its point
-  double turn_ = 0;                  // its sides' sine
+  std::vector<Eigen::Index> asked_;    // the questions that have an answer
+  Eigen::MatrixXd found_;              // those answers
+  std::optional<Crease> unconfirmed_;  // asks whether M goes to its point
+  double turn_ = 0;                    // its sides' sine
   std::optional<Crease> crease_;
 };
 

@@ -109,8 +109,8 @@ bool CreaseWatch::IsDue(std::uint64_t left, bool judges_all) {
 template <int K>
 std::vector<Way> SteepWaysAtFaults(const Engine<K>& engine, double longest, double least_sine2,
                                    WalkedEdges* walked) {
-  std::vector<std::uint32_t> ids = engine.book().blemished_stars();
-  for (const auto& entry : engine.book().size_and_shape()) {
+  std::vector<std::uint32_t> ids = engine.violations().violating_stars();
+  for (const auto& entry : engine.violations().size_and_shape()) {
     CheckInterruption(ids.size());
     ids.push_back(entry.star);
   }

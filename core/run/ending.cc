@@ -6,17 +6,17 @@
 #include <limits>
 #include <numbers>
 
+#include "core/base/first_ids.h"
 #include "core/base/instantiate.h"
 #include "core/base/interruption.h"
 #include "core/base/message.h"
-#include "core/certificate/evidence.h"
+#include "core/boundary/corner_cone.h"
+#include "core/boundary/sharp_edges.h"
+#include "core/boundary/wall_bends.h"
+#include "core/certificate/evidence/evidence.h"
 #include "core/certificate/findings.h"
-#include "core/certificate/first_ids.h"
 #include "core/complex/consistency.h"
 #include "core/geometry/reach_bound.h"
-#include "core/refinement/corner_cone.h"
-#include "core/refinement/sharp_edges.h"
-#include "core/refinement/wall_bends.h"
 
 namespace stellate::core {
 namespace {
@@ -44,7 +44,7 @@ template <int K>
 void DescribeUnfinished(const Engine<K>& engine, double epsilon, bool is_smooth,
                         Certificate* certificate) {
   const Stars<K>& stars = engine.stars();
-  const std::uint32_t count = std::min(stars.size(), engine.book().star_count());
+  const std::uint32_t count = std::min(stars.size(), engine.violations().star_count());
   double reach = std::numeric_limits<double>::infinity();
   std::uint32_t narrowest = 0;
   for (std::uint32_t p = 0; p < count; ++p) {
@@ -106,7 +106,7 @@ std::string DescribeCrease(const Crease& crease) {
 }
 
 template <int K>
-void TellSharpest(const Engine<K>& engine, Certificate* certificate) {
+void ExplainSharpest(const Engine<K>& engine, Certificate* certificate) {
   certificate->sharpest = Sharpest<K>(engine.stars());
   const double told_below = certificate->certified ? ThinAngle(K) : SafeAngle(K);
   if (!certificate->sharpest || certificate->sharpest->degrees >= told_below) return;
@@ -127,11 +127,11 @@ void TellSharpest(const Engine<K>& engine, Certificate* certificate) {
 }
 
 template <int K>
-void TellUnmetWall(const Engine<K>& engine, int walls, Certificate* certificate) {
+void ExplainInactiveWall(const Engine<K>& engine, int walls, Certificate* certificate) {
   const Stars<K>& stars = engine.stars();
   WallSet met = 0;
   for (std::uint32_t p = 0; p < stars.size(); ++p) met |= stars.sample().walls(p);
-  certificate->verdict += AboutUnmetWall(walls, met);
+  certificate->verdict += AboutInactiveWall(walls, met);
 }
 
 template <int K>
@@ -143,8 +143,8 @@ bool HasPieceTooSmall(const Engine<K>& engine, double epsilon) {
 }
 
 template <int K>
-void TellBend(const Engine<K>& engine, double epsilon, const std::optional<PieceOfWall>& piece,
-              Certificate* certificate) {
+void ExplainWallCurvature(const Engine<K>& engine, double epsilon,
+                          const std::optional<PieceOfWall>& piece, Certificate* certificate) {
   if (certificate->certified) return;
   const Stars<K>& stars = engine.stars();
   const double longest = 2 * epsilon;  // of a mesh of that size no edge is longer
@@ -175,7 +175,7 @@ void TellBend(const Engine<K>& engine, double epsilon, const std::optional<Piece
 }
 
 template <int K>
-void TellNearCorners(const Engine<K>& engine, double epsilon, Certificate* certificate) {
+void ExplainNearCorners(const Engine<K>& engine, double epsilon, Certificate* certificate) {
   if (certificate->certified) return;
   const Stars<K>& stars = engine.stars();
   const std::optional<NearCorners> near = NearestCorners<K>(stars);
@@ -207,7 +207,7 @@ std::string WhyTooCrowded(const Eigen::VectorXd& point, WallSet walls, WallSet a
 template <int K>
 std::string AboutLeftFaces(const Engine<K>& engine) {
   const Stars<K>& stars = engine.stars();
-  const int most = engine.faces().left();
+  const int most = engine.boundary().left();
   std::uint64_t bad = 0;
   std::uint32_t first = 0;
   for (std::uint32_t p = 0; most > 0 && p < stars.size(); ++p) {
@@ -230,7 +230,7 @@ std::string AboutLeftFaces(const Engine<K>& engine) {
 template <int K>
 std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent) {
   const Stars<K>& stars = engine.stars();
-  const auto& entries = engine.book().size_and_shape();
+  const auto& entries = engine.violations().size_and_shape();
   const auto place = [&](std::uint32_t v) {
     const WallSet walls = stars.sample().walls(v);
     return NamePoint(
@@ -274,15 +274,15 @@ void WarnOfCompromises(const Engine<K>& engine, double epsilon, Certificate* cer
         " places; ", filled.filling, " simplices fill these instead, not all of them Delaunay."));
 }
 
-#define STELLATE_EACH(K)                                                                 \
-  template void DescribeUnfinished<K>(const Engine<K>&, double, bool, Certificate*);     \
-  template std::string WhatIsLeft<K>(const Engine<K>&, std::uint64_t);                   \
-  template void TellSharpest<K>(const Engine<K>&, Certificate*);                         \
-  template void TellUnmetWall<K>(const Engine<K>&, int, Certificate*);                   \
-  template bool HasPieceTooSmall<K>(const Engine<K>&, double);                           \
-  template void TellBend<K>(const Engine<K>&, double, const std::optional<PieceOfWall>&, \
-                            Certificate*);                                               \
-  template void TellNearCorners<K>(const Engine<K>&, double, Certificate*);              \
+#define STELLATE_EACH(K)                                                                  \
+  template void DescribeUnfinished<K>(const Engine<K>&, double, bool, Certificate*);      \
+  template std::string WhatIsLeft<K>(const Engine<K>&, std::uint64_t);                    \
+  template void ExplainSharpest<K>(const Engine<K>&, Certificate*);                       \
+  template void ExplainInactiveWall<K>(const Engine<K>&, int, Certificate*);              \
+  template bool HasPieceTooSmall<K>(const Engine<K>&, double);                            \
+  template void ExplainWallCurvature<K>(const Engine<K>&, double,                         \
+                                        const std::optional<PieceOfWall>&, Certificate*); \
+  template void ExplainNearCorners<K>(const Engine<K>&, double, Certificate*);            \
   template void WarnOfCompromises<K>(const Engine<K>&, double, Certificate*);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH

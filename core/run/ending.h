@@ -23,11 +23,11 @@ std::string DescribeCrease(const Crease& crease);
 // Records where walls meet at the smallest angle. If that is below SafeAngle, also adds a sentence:
 // a warning of a certified mesh, else at the end of the verdict.
 template <int K>
-void TellSharpest(const Engine<K>& engine, Certificate* certificate);
+void ExplainSharpest(const Engine<K>& engine, Certificate* certificate);
 
 // Adds an inactive wall, on which no vertex lies, to the verdict of a mesh that made no progress.
 template <int K>
-void TellUnmetWall(const Engine<K>& engine, int walls, Certificate* certificate);
+void ExplainInactiveWall(const Engine<K>& engine, int walls, Certificate* certificate);
 
 // Whether a wall bends by more than epsilon can follow, or has a piece that is smaller: such a mesh
 // is not going to be certified.
@@ -42,13 +42,13 @@ struct PieceOfWall {
 // Adds to the verdict where a wall bends more than epsilon can follow, or has a piece smaller than
 // that, of a finished mesh that is not certified. `piece`: one that the mesh lacked, if any.
 template <int K>
-void TellBend(const Engine<K>& engine, double epsilon, const std::optional<PieceOfWall>& piece,
-              Certificate* certificate);
+void ExplainWallCurvature(const Engine<K>& engine, double epsilon,
+                          const std::optional<PieceOfWall>& piece, Certificate* certificate);
 
 // Adds to the verdict where walls nearly meet in one point, so that corners are far nearer to each
 // other than epsilon, of a mesh that is not certified.
 template <int K>
-void TellNearCorners(const Engine<K>& engine, double epsilon, Certificate* certificate);
+void ExplainNearCorners(const Engine<K>& engine, double epsilon, Certificate* certificate);
 
 // Explains why a corner of more than k walls cannot be meshed. `along`: the walls that meet along
 // an edge there, if that is the reason.

@@ -7,9 +7,9 @@
 #include "core/base/arenas.h"
 #include "core/base/message.h"
 #include "core/certificate/findings.h"
-#include "core/refinement/rehearsal.h"
 #include "core/run/ending.h"
-#include "core/run/seeding.h"
+#include "core/sampling/seeding.h"
+#include "core/speculation/speculation.h"
 
 namespace stellate::core {
 namespace {
@@ -155,7 +155,7 @@ Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
 // From the answers to the next batch, or to the end.
 template <int K>
 void MeshingRun<K>::Advance(const Answers& answers) {
-  if (!end_) (trip_ ? static_cast<Asker&>(*trip_) : *certification_).Absorb(answers.blocks);
+  if (!end_) (trip_ ? static_cast<QuerySource&>(*trip_) : *certification_).Absorb(answers.blocks);
   TakeBeside(answers);
   NextQuestions();
   if (batch_) AskBeside();
@@ -165,10 +165,10 @@ void MeshingRun<K>::Advance(const Answers& answers) {
 template <int K>
 void MeshingRun<K>::NextQuestions() {
   while (!over_) {
-    Asker& asker = end_    ? static_cast<Asker&>(crease_probe_)
-                   : trip_ ? static_cast<Asker&>(*trip_)
-                           : *certification_;
-    if (std::vector<QueryBlock> blocks = asker.Questions(); !blocks.empty()) {
+    QuerySource& source = end_    ? static_cast<QuerySource&>(crease_probe_)
+                          : trip_ ? static_cast<QuerySource&>(*trip_)
+                                  : *certification_;
+    if (std::vector<QueryBlock> blocks = source.Questions(); !blocks.empty()) {
       batch_ = std::make_shared<QueryBatch>(QueryBatch{0, std::move(blocks)});
       return;
     }
@@ -201,7 +201,7 @@ void MeshingRun<K>::AfterTrip() {
   const auto* const answered = trip_.get();
   spare_points_.KeepClearances(trip_->answers(), ClearPointsKept(engine_.stars().size()));
   (this->*insertion_)();
-  if (over_ || trip_.get() != answered || AskToLay()) return;  // it asks on
+  if (over_ || trip_.get() != answered || AskForSample()) return;  // it asks on
   typename Engine<K>::Change change = engine_.Commit();
   delta_.added = std::move(change.added);
   delta_.removed = std::move(change.removed);
@@ -218,7 +218,7 @@ void MeshingRun<K>::InsertCandidates() {
   };
   counts.inserted_size += count(Rule::kSize);
   counts.inserted_radius_edge += count(Rule::kRadiusEdge);
-  counts.inserted_sliver += count(Rule::kSliver);
+  counts.inserted_sliver += count(Rule::kShape);
   counts.inserted_inconsistent += count(Rule::kInconsistent);
   counts.duplicates += inserted.duplicates;
   if (inserted.front_moved) {
@@ -226,8 +226,8 @@ void MeshingRun<K>::InsertCandidates() {
     crease_watch_.NoteFrontMoved();
   }
   if (engine_.criteria().flat_alternations == 1 && spec_.walls == 0)
-    rim_watch_.Look(trip_->candidates(), trip_->answers());
-  rehearsal_failed_ = inserted.rules.empty();
+    boundary_detector_.Look(trip_->candidates(), trip_->answers());
+  speculation_failed_ = inserted.rules.empty();
   spare_points_.Keep(trip_->answers(), inserted.used);
 }
 
@@ -242,41 +242,42 @@ void MeshingRun<K>::InsertSpares() {
     engine_.Append(answers, static_cast<Eigen::Index>(i));
     used[i] = 1;
   }
-  engine_.JudgeAllAnew();
+  engine_.MarkAllDirty();
   spare_points_.Keep(answers, used);
 }
 
 // Finds what to do next and asks for it, or ends the refinement.
 template <int K>
 void MeshingRun<K>::Plan() {
-  const std::unique_ptr<Laying<K>> laid = std::move(laid_);
+  const std::unique_ptr<Sampler<K>> finished = std::move(finished_sampler_);
   box_watch_.Look(engine_.stars().sample().points().data(), engine_.stars().size());
   if (engine_.is_full()) return Finish(Termination::kVertexBudget);
   if (box_watch_.has_left()) return Finish(Termination::kNoProgress);
   auto targets = engine_.Plan();
   if (!targets) return LeaveFaces();
   if (spec_.walls > 0 && !PlanFaces(&targets)) return;
-  FaceBook<K>& faces = engine_.faces();
-  if (targets->empty() && !faces.has_discoveries())
+  BoundaryState<K>& boundary = engine_.boundary();
+  if (targets->empty() && !boundary.has_discoveries())
     return engine_.AllRulesHold() ? Certify() : End(Termination::kNoProgress);
-  const ViolationBook<K>& book = engine_.book();
+  const ViolationIndex<K>& violations = engine_.violations();
   const bool is_lost = stall_watch_.ShouldLookForLostCauses() && spec_.walls > 0 &&
                        HasPieceTooSmall<K>(engine_, spec_.epsilon);
-  if (is_lost || stall_watch_.IsHopeless(book.size_and_shape().size(), engine_.stars().size()) ||
-      stall_watch_.HasStalled(book.size_and_shape().size() + book.blemished(),
-                              !book.are_all_suspect()))
+  if (is_lost ||
+      stall_watch_.IsHopeless(violations.size_and_shape().size(), engine_.stars().size()) ||
+      stall_watch_.HasStalled(violations.size_and_shape().size() + violations.violating(),
+                              !violations.are_all_dirty()))
     return LeaveFaces();
   WatchForCreases();
   *targets = engine_.Select(*targets);
   PlannedPoints planned;
-  if (faces.has_discoveries())
+  if (boundary.has_discoveries())
     planned = engine_.TakeDiscoveries();
-  else if (engine_.criteria().ask_ahead && !rehearsal_failed_ && faces.stage() == K) {
+  else if (engine_.criteria().ask_ahead && !speculation_failed_ && boundary.stage() == K) {
     // What is left then of R1 and R2 is not worth judging all stars for.
-    const bool is_rest = was_laid_ && !laid && book.are_all_suspect();
-    planned = Rehearse<K>(engine_, whole_rounds_, &*targets,
-                          is_rest ? Rehearsed::kSizes : Rehearsed::kAllRules,
-                          laid ? laid->guess() : nullptr);
+    const bool is_rest = is_sampled_ && !finished && violations.are_all_dirty();
+    planned = RunSpeculatively<K>(engine_, whole_rounds_, &*targets,
+                                  is_rest ? SpeculativeRules::kSizes : SpeculativeRules::kAllRules,
+                                  finished ? finished->guess() : nullptr);
   }
   CandidateSet<K> candidates = engine_.Draw(std::move(*targets), whole_rounds_);
   candidates.planned = std::move(planned);
@@ -287,9 +288,9 @@ template <int K>
 void MeshingRun<K>::Certify() {
   if (AskForSpares(spare_points_.Uncovered(engine_.stars()))) return;
   const Stars<K>& stars = engine_.stars();
-  if (stars.size() == 0 && !nothing_inside_.empty())  // what was discovered led nowhere
-    return Fail({StatusCode::kNoSeeds, nothing_inside_});
-  if (!engine_.filled().mended().empty())
+  if (stars.size() == 0 && !lacks_.inside.empty())  // what was discovered led nowhere
+    return Fail({StatusCode::kNoSeeds, lacks_.inside});
+  if (!engine_.filled().resolved().empty())
     engine_.filled().HandOut(stars, &delta_.added, &delta_.removed);
   StarFacts facts = FactsOf<K>(engine_);
   facts.covers_box = covers_box_;
@@ -304,7 +305,7 @@ void MeshingRun<K>::Certify() {
   crease_probe_.Stop();
   walked_.clear();  // not all of them to their end
   KnownOfManifold known = spare_points_.Take();
-  known.leans = rim_watch_.leans();
+  known.leans = boundary_detector_.offsets();
   certification_ = std::make_unique<Certification>(
       spec_, mesh, engine_.Simplices(), facts, std::move(known),
       spec_.walls > 0 ? std::optional(BoundaryOf<K>(engine_)) : std::nullopt);
@@ -341,12 +342,12 @@ void MeshingRun<K>::Finish(Termination termination) {
   if (over_) return;
   over_ = true;
   // What is laid has no stars yet.
-  if (laying_ && termination == Termination::kRoundBudget) CommitLaid();
+  if (sampler_ && termination == Termination::kRoundBudget) CommitSample();
   // A round that was absorbed ends so; else nobody would get what is added.
   if (termination != Termination::kCancelled && termination != Termination::kOracleFailed)
     engine_.CompleteStars(&delta_.added, &delta_.removed);
-  laying_.reset();
-  laid_.reset();
+  sampler_.reset();
+  finished_sampler_.reset();
   batch_.reset();
   parts_.reset();
   report_.termination = termination;
@@ -366,13 +367,13 @@ template <int K>
 void MeshingRun<K>::Measure() {
   if (!over_)
     return progress_meter_.Measure<K>(engine_, certification_ != nullptr,
-                                      laying_ ? laying_->CountMissing() : 0, &progress_);
+                                      sampler_ ? sampler_->CountMissing() : 0, &progress_);
   progress_.is_foreseeable = false;
   progress_.phase = Phase::kDone;
   progress_.vertices = engine_.stars().size();
   progress_.simplices = engine_.simplex_count();
-  progress_.bad_sliver = engine_.book().slivers();
-  progress_.bad_inconsistent = engine_.book().inconsistent();
+  progress_.bad_sliver = engine_.violations().slivers();
+  progress_.bad_inconsistent = engine_.violations().inconsistent();
   if (report_.termination == Termination::kConverged) progress_.fraction = 1;
 }
 

@@ -10,21 +10,21 @@
 #include "core/base/interruption.h"
 #include "core/mesher.h"
 #include "core/refinement/engine.h"
-#include "core/run/asker.h"
 #include "core/run/batch_parts.h"
+#include "core/run/boundary_detector.h"
 #include "core/run/certification.h"
 #include "core/run/crease_probe.h"
 #include "core/run/crease_watch.h"
 #include "core/run/ending.h"
-#include "core/run/laying.h"
 #include "core/run/progress_meter.h"
+#include "core/run/query_source.h"
 #include "core/run/repeat_check.h"
-#include "core/run/rim_watch.h"
 #include "core/run/round_trip.h"
 #include "core/run/spare_points.h"
 #include "core/run/tangent_finder.h"
 #include "core/run/wall_check.h"
 #include "core/run/watches.h"
+#include "core/sampling/sampler.h"
 
 namespace stellate::core {
 
@@ -75,12 +75,12 @@ class MeshingRun final : public Mesher {
   void KeepFaceSeeds();
   void JudgeWalls();
   bool PlanFaces(std::optional<std::vector<Target<K>>>* targets);
-  bool AskToLayInterior();
+  bool AskForInterior();
   void SettleCrowds();
   void LeaveFaces();
-  void CommitLaid();
-  void LayAnswered();
-  bool AskToLay();
+  void CommitSample();
+  void AddAnswered();
+  bool AskForSample();
   void InsertCandidates();
   void InsertSpares();
   void Plan();
@@ -109,9 +109,9 @@ class MeshingRun final : public Mesher {
 
   // One of these asks.
   std::unique_ptr<RoundTrip<K>> trip_;
-  std::unique_ptr<Laying<K>> laying_;  // while the sample is made
-  std::unique_ptr<Laying<K>> laid_;    // until what that left is planned
-  bool was_laid_ = false;              // the sample
+  std::unique_ptr<Sampler<K>> sampler_;           // while the sample is made
+  std::unique_ptr<Sampler<K>> finished_sampler_;  // until what that left is planned
+  bool is_sampled_ = false;                       // the sample
   std::unique_ptr<Certification> certification_;
   Insertion insertion_ = nullptr;  // of the trip's answers
 
@@ -128,11 +128,14 @@ class MeshingRun final : public Mesher {
   SparePoints spare_points_;
   BoxWatch box_watch_;
   StallWatch stall_watch_;
-  RimWatch rim_watch_;
-  std::optional<PieceOfWall> small_piece_;  // that a mesh has been without
-  std::string nothing_inside_;              // why no seed's point is in M with boundary, if so
-  bool rehearsal_failed_ = false;           // the last round of candidates inserted nothing
-  bool covers_box_ = false;                 // each seed of a covered box has its closest point
+  BoundaryDetector boundary_detector_;
+  bool speculation_failed_ = false;  // the last round of candidates inserted nothing
+  bool covers_box_ = false;          // each seed of a covered box has its closest point
+  // What a mesh has been without.
+  struct {
+    std::optional<PieceOfWall> piece;
+    std::string inside;  // why no seed's point is in M with boundary, if so
+  } lacks_;
 };
 
 STELLATE_DECLARE_CLASS(MeshingRun)

@@ -20,9 +20,9 @@ constexpr double kTellingWay = 0.5, kTellingSine2 = 0.25;
 // A way is asked along from when rules have kept failing for a while.
 template <int K>
 void MeshingRun<K>::WatchForCreases() {
-  const ViolationBook<K>& book = engine_.book();
-  const bool due =
-      crease_watch_.IsDue(book.size_and_shape().size() + book.blemished(), !book.are_all_suspect());
+  const ViolationIndex<K>& violations = engine_.violations();
+  const bool due = crease_watch_.IsDue(violations.size_and_shape().size() + violations.violating(),
+                                       !violations.are_all_dirty());
   if (crease_probe_.is_asking() || K == spec_.ambient_dimension) return;
   if (due)
     crease_probe_.Start(

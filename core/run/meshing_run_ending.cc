@@ -37,22 +37,24 @@ void MeshingRun<K>::DescribeEnding(bool is_whole) {
                   : crease_probe_.crease()
                       ? DescribeCrease(*crease_probe_.crease())
                       : WhatIsLeft<K>(engine_, certificate.inconsistent_simplices) +
-                            rim_watch_.Describe(engine_.stars().sample().d()));
+                            boundary_detector_.Describe(engine_.stars().sample().d()));
     // A front that never closes may be where the manifold ends.
     const bool spent =
         termination == Termination::kVertexBudget || termination == Termination::kRoundBudget;
     if (spec_.walls == 0 && !box_watch_.has_left() && !crease_probe_.crease() &&
-        (termination == Termination::kNoProgress || (spent && !rim_watch_.leans().empty())))
+        (termination == Termination::kNoProgress ||
+         (spent && !boundary_detector_.offsets().empty())))
       certificate.verdict += Message(". ", kDeclareWalls);
   }
   if (!is_whole) return;
   box_watch_.Warn(&certificate);
   if (spec_.walls == 0) return;
-  if (termination == Termination::kNoProgress) TellUnmetWall<K>(engine_, spec_.walls, &certificate);
-  TellNearCorners<K>(engine_, spec_.epsilon, &certificate);
+  if (termination == Termination::kNoProgress)
+    ExplainInactiveWall<K>(engine_, spec_.walls, &certificate);
+  ExplainNearCorners<K>(engine_, spec_.epsilon, &certificate);
   if (termination == Termination::kConverged || termination == Termination::kNoProgress)
-    TellBend<K>(engine_, spec_.epsilon, small_piece_, &certificate);
-  TellSharpest<K>(engine_, &certificate);
+    ExplainWallCurvature<K>(engine_, spec_.epsilon, lacks_.piece, &certificate);
+  ExplainSharpest<K>(engine_, &certificate);
 }
 
 #define STELLATE_EACH(K) template void MeshingRun<K>::DescribeEnding(bool);

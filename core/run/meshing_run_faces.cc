@@ -8,6 +8,8 @@
 #include "core/base/parallel.h"
 #include "core/run/ending.h"
 #include "core/run/meshing_run.h"
+#include "core/run/sampler_choice.h"
+#include "core/sampling/seeding.h"
 
 namespace stellate::core {
 namespace {
@@ -38,20 +40,20 @@ void MeshingRun<K>::KeepFaceSeeds() {
     const auto i = static_cast<std::size_t>(c);
     CheckInterruption(i);
     if (!answers.found[i]) continue;
-    engine_.faces().NoteClearances(answers, c);
+    engine_.boundary().NoteClearances(answers, c);
     if (const std::optional<int> beyond = answers.Beyond(c)) {
       if (answers.walls[i] != 0)
-        engine_.faces().Discover(answers.points.col(c), answers.walls[i], *beyond);
+        engine_.boundary().Discover(answers.points.col(c), answers.walls[i], *beyond);
       continue;
     }
     ++inside;
     // Not all seeds are taken, and one may be the only thing known of a piece of its wall.
     spare_points_.KeepEnd(answers, c);
-    engine_.faces().KeepSeed(answers.points.col(c), answers.walls[i], answers.tangents.col(c));
+    engine_.boundary().KeepSeed(answers.points.col(c), answers.walls[i], answers.tangents.col(c));
   }
-  if (inside == 0) nothing_inside_ = WhyNothingInside(spec_, answers);
-  if (inside == 0 && !engine_.faces().has_discoveries())
-    return Fail({StatusCode::kNoSeeds, nothing_inside_});
+  if (inside == 0) lacks_.inside = WhyNothingInside(spec_, answers);
+  if (inside == 0 && !engine_.boundary().has_discoveries())
+    return Fail({StatusCode::kNoSeeds, lacks_.inside});
   Eigen::MatrixXd steps = wall_check_.Questions(answers);
   if (steps.cols() > 0) AskFor(std::move(steps), &MeshingRun::JudgeWalls);
 }
@@ -82,7 +84,7 @@ bool MeshingRun<K>::AskForSparesOnWalls(const PointsOnWalls& points) {
   CandidateSet<K> candidates;
   candidates.planned = spare_points_.ChooseOnWalls(news, epsilon);
   if (candidates.planned.size() == 0) return false;
-  small_piece_ = {std::countr_zero(candidates.planned.walls.front()),
+  lacks_.piece = {std::countr_zero(candidates.planned.walls.front()),
                   candidates.planned.points.col(0)};
   spare_points_.GiveBack(certification_->TakeKnown());
   Ask(std::move(candidates), &MeshingRun::InsertSpares);
@@ -92,13 +94,13 @@ bool MeshingRun<K>::AskForSparesOnWalls(const PointsOnWalls& points) {
 // Lays the interior, once its faces are meshed, if it has any. Whether it asks for some of it; else
 // all stars are whole.
 template <int K>
-bool MeshingRun<K>::AskToLayInterior() {
+bool MeshingRun<K>::AskForInterior() {
   if (engine_.stars().size() == 0) return false;
   AnsweredPoints seeds = engine_.InteriorSeeds();
-  laying_ = LayingFor<K>(engine_, spec_, seeds);
-  if (laying_) laying_->Begin(seeds);
-  if (AskToLay()) return true;
-  CommitLaid();
+  sampler_ = SamplerFor<K>(engine_, spec_, seeds);
+  if (sampler_) sampler_->Begin(seeds);
+  if (AskForSample()) return true;
+  CommitSample();
   return false;
 }
 
@@ -106,27 +108,27 @@ bool MeshingRun<K>::AskToLayInterior() {
 // False where these are asked for, or the run is over.
 template <int K>
 bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
-  const FaceBook<K>& faces = engine_.faces();
-  if (!faces.crowds().empty()) {
+  const BoundaryState<K>& boundary = engine_.boundary();
+  if (!boundary.crowds().empty()) {
     CandidateSet<K> candidates;
     candidates.planned = engine_.CrowdQuestions();
     Ask(std::move(candidates), &MeshingRun::SettleCrowds);
     return false;
   }
   while (true) {
-    const bool idle = (*targets)->empty() && !faces.has_discoveries();
+    const bool idle = (*targets)->empty() && !boundary.has_discoveries();
     if (PlannedPoints seeds = idle ? engine_.ChooseSeeds() : PlannedPoints(); seeds.size() > 0) {
       CandidateSet<K> candidates;
       candidates.planned = std::move(seeds);
       Ask(std::move(candidates), &MeshingRun::InsertSpares);
       return false;
     }
-    if (engine_.WantsGuards(**targets)) {
-      *targets = engine_.GuardSharpEdges(&delta_.added, &delta_.removed);
+    if (engine_.NeedsProtectingBalls(**targets)) {
+      *targets = engine_.ProtectSharpEdges(&delta_.added, &delta_.removed);
     } else {
       if (!idle || !engine_.AdvanceStage()) break;
-      if (faces.stage() == K) {
-        if (AskToLayInterior()) return false;
+      if (boundary.stage() == K) {
+        if (AskForInterior()) return false;
         if (engine_.is_full()) {
           Finish(Termination::kVertexBudget);
           return false;
@@ -156,7 +158,7 @@ template <int K>
 void MeshingRun<K>::LeaveFaces() {
   if (spec_.walls == 0 || !engine_.LeaveStage()) return End(Termination::kNoProgress);
   stall_watch_ = StallWatch(1);  // beside them not all will yield: with less patience
-  if (engine_.faces().stage() == K && AskToLayInterior()) return;
+  if (engine_.boundary().stage() == K && AskForInterior()) return;
   Plan();
 }
 
@@ -165,7 +167,7 @@ void MeshingRun<K>::LeaveFaces() {
   template void MeshingRun<K>::KeepFaceSeeds();                           \
   template void MeshingRun<K>::JudgeWalls();                              \
   template bool MeshingRun<K>::AskForSparesOnWalls(const PointsOnWalls&); \
-  template bool MeshingRun<K>::AskToLayInterior();                        \
+  template bool MeshingRun<K>::AskForInterior();                          \
   template void MeshingRun<K>::SettleCrowds();                            \
   template void MeshingRun<K>::LeaveFaces();                              \
   template bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>*);

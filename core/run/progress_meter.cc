@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kFewestKnown = 8, kMostKnown = 64;
 // What refinement adds to a sample that was laid, as long as nothing is known of it, and to one
 // whose R1 and R2 alone were judged.
-constexpr double kRefined = 0.25, kMended = 0.05;
+constexpr double kRefined = 0.25, kCovered = 0.05;
 // Rounds that a trend is taken from, and the least share of a broken rule that a vertex mends.
 constexpr std::size_t kLongestTrend = 12, kShortestTrend = 3;
 constexpr double kLeastYield = 0.02;
@@ -26,18 +26,18 @@ constexpr double kOfSimplices = 2200, kOfVertices = 1500, kBesides = 1000, kThor
 template <int K>
 void CountAll(const Engine<K>& engine, Progress* progress) {
   const Stars<K>& stars = engine.stars();
-  const ViolationBook<K>& book = engine.book();
+  const ViolationIndex<K>& violations = engine.violations();
   progress->vertices = stars.size();
   progress->simplices = engine.simplex_count();
   progress->bad_size = progress->bad_radius_edge = progress->unbounded_stars = 0;
   std::size_t step = 0;
-  for (const auto& entry : book.size_and_shape()) {
+  for (const auto& entry : violations.size_and_shape()) {
     CheckInterruption(step++);
     progress->unbounded_stars += !stars.cell(entry.star).bounded();
     ++(entry.violation.rule == Rule::kSize ? progress->bad_size : progress->bad_radius_edge);
   }
-  progress->bad_sliver = book.slivers();
-  progress->bad_inconsistent = book.inconsistent();
+  progress->bad_sliver = violations.slivers();
+  progress->bad_inconsistent = violations.inconsistent();
 }
 
 }  // namespace
@@ -75,9 +75,9 @@ void ProgressMeter::Cover(const Stars<K>& stars) {
 
 // The front against M's area, and what refinement adds.
 template <int K>
-ProgressMeter::Left ProgressMeter::LeftToLay(const Engine<K>& engine, double to_lay) {
+ProgressMeter::Left ProgressMeter::LeftToSample(const Engine<K>& engine, double to_sample) {
   const double have = static_cast<double>(engine.stars().size());
-  Left left{to_lay, false};
+  Left left{to_sample, false};
   if (known_ >= kFewestKnown) {
     const double covered =
         1 - static_cast<double>(open_.size()) /
@@ -94,20 +94,21 @@ ProgressMeter::Left ProgressMeter::LeftToLay(const Engine<K>& engine, double to_
 // By the trend: how many broken rules each new vertex mends, beyond those that it breaks.
 template <int K>
 ProgressMeter::Left ProgressMeter::LeftToRefine(const Engine<K>& engine) {
-  const ViolationBook<K>& book = engine.book();
+  const ViolationIndex<K>& violations = engine.violations();
   const double have = static_cast<double>(engine.stars().size());
-  const double broken = static_cast<double>(book.size_and_shape().size() + book.blemished());
-  const bool judges_all = !book.are_all_suspect();
+  const double broken =
+      static_cast<double>(violations.size_and_shape().size() + violations.violating());
+  const bool judges_all = !violations.are_all_dirty();
   if (judges_all != judged_all_) seen_.clear();
   judged_all_ = judges_all;
   seen_.push_back({have, broken});
   if (seen_.size() > kLongestTrend) seen_.pop_front();
-  const double later = judges_all ? 0 : kMended * have;
+  const double later = judges_all ? 0 : kCovered * have;
   if (broken == 0) return {later, true};
   const Seen& then = seen_.front();
   const double yield = have > then.vertices ? (then.broken - broken) / (have - then.vertices) : 0;
   if (seen_.size() > kShortestTrend && yield >= kLeastYield) return {later + broken / yield, true};
-  return {std::max(later + engine.CountMissing(0.5) + static_cast<double>(book.blemished()),
+  return {std::max(later + engine.CountMissing(0.5) + static_cast<double>(violations.violating()),
                    kRefined * have),
           false};
 }
@@ -122,7 +123,7 @@ double ProgressMeter::QuestionsOfCertificate(const Progress& progress) const {
 }
 
 template <int K>
-void ProgressMeter::Measure(const Engine<K>& engine, bool is_certifying, double to_lay,
+void ProgressMeter::Measure(const Engine<K>& engine, bool is_certifying, double to_sample,
                             Progress* progress) {
   CountAll<K>(engine, progress);
   const Stars<K>& stars = engine.stars();
@@ -143,9 +144,10 @@ void ProgressMeter::Measure(const Engine<K>& engine, bool is_certifying, double 
     Cover(stars);
     // Stars that stay open where the sample is near all that is known of M are no front.
     const bool is_covered = known_ >= kFewestKnown && open_.empty();
-    const bool grows = to_lay > 0 || (progress->unbounded_stars > 0 && !is_covered);
-    const Left vertices = grows ? LeftToLay<K>(engine, std::max(to_lay, engine.CountMissing(0.5)))
-                                : LeftToRefine<K>(engine);
+    const bool grows = to_sample > 0 || (progress->unbounded_stars > 0 && !is_covered);
+    const Left vertices =
+        grows ? LeftToSample<K>(engine, std::max(to_sample, engine.CountMissing(0.5)))
+              : LeftToRefine<K>(engine);
     left += vertices.vertices * std::max(asked / static_cast<double>(stars.size()), 1.0);
     is_known = vertices.is_known;
   }

@@ -20,10 +20,10 @@ class ProgressMeter {
   void Know(const AnsweredPoints& seeds, const std::vector<std::uint8_t>& used);
 
   // Updates the counts, the phase, the fraction and is_foreseeable; rounds and queries are the
-  // caller's. is_certifying: every rule holds, and the certificate queries. to_lay: an estimate
+  // caller's. is_certifying: every rule holds, and the certificate queries. to_sample: an estimate
   // of the points still to come before there are stars; 0: there are stars.
   template <int K>
-  void Measure(const Engine<K>& engine, bool is_certifying, double to_lay, Progress* progress);
+  void Measure(const Engine<K>& engine, bool is_certifying, double to_sample, Progress* progress);
 
  private:
   struct Left {
@@ -37,7 +37,7 @@ class ProgressMeter {
   template <int K>
   void Cover(const Stars<K>& stars);
   template <int K>
-  Left LeftToLay(const Engine<K>& engine, double to_lay);
+  Left LeftToSample(const Engine<K>& engine, double to_sample);
   template <int K>
   Left LeftToRefine(const Engine<K>& engine);
   double QuestionsOfCertificate(const Progress& progress) const;

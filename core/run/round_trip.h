@@ -7,7 +7,7 @@
 
 #include "core/base/instantiate.h"
 #include "core/refinement/engine.h"
-#include "core/run/asker.h"
+#include "core/run/query_source.h"
 #include "core/run/tangent_finder.h"
 
 namespace stellate::core {
@@ -16,7 +16,7 @@ namespace stellate::core {
 // alternates between a candidate's flat and M instead (Criteria::flat_alternations); where it gives
 // no tangents a TangentFinder finds them.
 template <int K>
-class RoundTrip final : public Asker {
+class RoundTrip final : public QuerySource {
  public:
   // The engine and the finder must outlive this; the engine must not change meanwhile.
   RoundTrip(const Engine<K>& engine, const OracleCapabilities& oracle, TangentFinder& finder,

@@ -8,7 +8,7 @@
 #include "core/base/instantiate.h"
 #include "core/base/parallel.h"
 #include "core/base/vector_ops.h"
-#include "core/certificate/evidence.h"
+#include "core/certificate/evidence/evidence.h"
 
 namespace stellate::core {
 namespace {

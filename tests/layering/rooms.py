@@ -14,31 +14,51 @@ from __future__ import annotations
 
 from checker import Table
 
+_GROUND = ("core", "core/base", "core/index", "core/geometry")
+
 CORE = {
     "core/base": (),
     "core": ("core/base",),
-    "core/sample": ("core", "core/base"),
-    "core/geometry": ("core", "core/base", "core/sample"),
-    "core/complex": ("core", "core/base", "core/sample", "core/geometry"),
-    "core/certificate": ("core", "core/base", "core/sample", "core/geometry"),
-    "core/refinement": (
-        "core",
-        "core/base",
-        "core/sample",
-        "core/geometry",
-        "core/complex",
+    "core/index": ("core", "core/base"),
+    "core/geometry": ("core", "core/base", "core/index"),
+    "core/complex": _GROUND,
+    # What is judged; the complex alone; its shape; what was answered; what follows from all that.
+    "core/certificate": ("core", "core/base"),
+    "core/certificate/complex": ("core", "core/base"),
+    "core/certificate/measure": (*_GROUND, "core/certificate", "core/certificate/complex"),
+    "core/certificate/evidence": (
+        *_GROUND,
         "core/certificate",
+        "core/certificate/complex",
+        "core/certificate/measure",
     ),
-    "core/growth": ("core", "core/base", "core/sample"),
-    "core/run": (
+    "core/certificate/claims": (
+        *_GROUND,
+        "core/certificate",
+        "core/certificate/complex",
+        "core/certificate/measure",
+        "core/certificate/evidence",
+    ),
+    "core/certificate/certifier.cc": (
         "core",
         "core/base",
-        "core/geometry",
+        "core/certificate",
+        "core/certificate/claims",
+        "core/certificate/evidence",
+    ),
+    "core/boundary": (*_GROUND, "core/complex"),
+    "core/refinement": (*_GROUND, "core/complex", "core/boundary"),
+    "core/sampling": (*_GROUND, "core/refinement"),
+    "core/speculation": (*_GROUND, "core/complex", "core/refinement", "core/sampling"),
+    "core/run": (
+        *_GROUND,
         "core/complex",
         "core/certificate",
-        "core/growth",
+        "core/certificate/evidence",
+        "core/boundary",
         "core/refinement",
-        "core/sample",
+        "core/sampling",
+        "core/speculation",
     ),
     "core/mesher.cc": ("core", "core/base", "core/run"),  # the one door from the face
 }
@@ -244,13 +264,13 @@ TABLE = Table(
     exact={
         "core": (
             "core/batch.cc",
-            "core/certificate/proof.cc",
-            "core/certificate/reach_claims.cc",
-            "core/certificate/shape.cc",
+            "core/certificate/claims/proof.cc",
+            "core/certificate/claims/reach_claims.cc",
+            "core/certificate/measure/shape.cc",
             "core/geometry/reach.cc",
             "core/geometry/simplex.cc",
-            "core/refinement/sharp_edges.cc",
-            "core/refinement/wall_bends.cc",
+            "core/boundary/sharp_edges.cc",
+            "core/boundary/wall_bends.cc",
             "core/run/ending.cc",
         )
     },

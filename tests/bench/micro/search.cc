@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "core/sample/ball_tree.h"
+#include "core/index/ball_tree.h"
 #include "tests/bench/micro/samples.h"
 
 // The ball tree against the size of the sample and the ambient dimension. A surface, so that what

@@ -1,4 +1,4 @@
-#include "core/certificate/evidence.h"
+#include "core/certificate/evidence/evidence.h"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
-#include "core/certificate/fibres.h"
+#include "core/certificate/evidence/fibres.h"
 
 #include <gtest/gtest.h>
 
 #include "core/base/infinity.h"
 #include "core/base/random.h"
-#include "core/certificate/ball_grid.h"
+#include "core/certificate/evidence/ball_grid.h"
 #include "tests/core/certificate/handmade_meshes.h"
 
 namespace stellate::core {

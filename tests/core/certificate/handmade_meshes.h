@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/certificate/certifier.h"
-#include "core/certificate/topology.h"
+#include "core/certificate/complex/topology.h"
 
 namespace stellate::core {
 

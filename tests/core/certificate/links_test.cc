@@ -1,8 +1,8 @@
-#include "core/certificate/links.h"
+#include "core/certificate/complex/links.h"
 
 #include <gtest/gtest.h>
 
-#include "core/certificate/fundamental_group.h"
+#include "core/certificate/complex/fundamental_group.h"
 #include "tests/core/certificate/handmade_meshes.h"
 
 namespace stellate::core {

@@ -1,10 +1,10 @@
-#include "core/certificate/proof.h"
+#include "core/certificate/claims/proof.h"
 
 #include <gtest/gtest.h>
 
 #include <numbers>
 
-#include "core/certificate/star_geometry.h"
+#include "core/certificate/measure/star_geometry.h"
 #include "tests/core/certificate/handmade_meshes.h"
 #include "tests/core/support/says.h"
 

@@ -1,4 +1,4 @@
-#include "core/certificate/rim_check.h"
+#include "core/certificate/evidence/rim_check.h"
 
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ std::string Told(RimCheck& check, double hole, double position_error = 0) {
   return check.Judge(answer, position_error);
 }
 
-void Suspect(RimCheck& check, const Vector3d& q, const Vector3d& y) {
+void MarkDirty(RimCheck& check, const Vector3d& q, const Vector3d& y) {
   const Vector3d step = q - y;
   check.SuspectIfLeans(y, Vector3d(step[0], step[1], 0), step.norm());
 }
@@ -33,14 +33,14 @@ TEST(RimCheck, FindsTheRimOfAHoleOfAnySize) {
   for (const double hole : {0.5, 0.05, 1e-6}) {
     RimCheck check(1);
     const Vector3d q(0.3 * hole, 0.2 * hole, 0.5 * hole);
-    Suspect(check, q, Punctured(q, hole));
+    MarkDirty(check, q, Punctured(q, hole));
     EXPECT_NE(Told(check, hole).find("the manifold ends"), std::string::npos) << hole;
   }
 }
 
 TEST(RimCheck, TakesNoPoorTangentForARim) {
   RimCheck check(1);
-  Suspect(check, {0.7, 0, 0.2}, {0.6, 0, 0});  // as if the answer were to the side by mistake
+  MarkDirty(check, {0.7, 0, 0.2}, {0.6, 0, 0});  // as if the answer were to the side by mistake
   EXPECT_EQ(Told(check, 0.1), "");
   // As if the tangent space were wrong by 80 degrees: neither step is along the plane.
   const Vector3d up(std::cos(1.4), 0, std::sin(1.4));
@@ -50,11 +50,11 @@ TEST(RimCheck, TakesNoPoorTangentForARim) {
 
 TEST(RimCheck, AsksOnlyWhereItLeansByMoreThanTheErrorOfAnswers) {
   RimCheck check(1);
-  Suspect(check, {1.01, 0, 0.1}, {1, 0, 0});
+  MarkDirty(check, {1.01, 0, 0.1}, {1, 0, 0});
   EXPECT_EQ(check.Questions(0).cols(), 0);
-  Suspect(check, {0.999, 0, 0.001}, {1, 0, 0});
+  MarkDirty(check, {0.999, 0, 0.001}, {1, 0, 0});
   EXPECT_EQ(check.Questions(1e-3).cols(), 0);
-  for (int i = 0; i < 1000; ++i) Suspect(check, {0.5, 0, 0.1}, {1, 0, 0});
+  for (int i = 0; i < 1000; ++i) MarkDirty(check, {0.5, 0, 0.1}, {1, 0, 0});
   EXPECT_EQ(check.Questions(1e-3).cols(), 2 * 32);
 }
 

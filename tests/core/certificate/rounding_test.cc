@@ -1,4 +1,4 @@
-#include "core/certificate/rounding.h"
+#include "core/certificate/claims/rounding.h"
 
 #include <gtest/gtest.h>
 

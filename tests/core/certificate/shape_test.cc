@@ -1,9 +1,9 @@
-#include "core/certificate/shape.h"
+#include "core/certificate/measure/shape.h"
 
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
-#include "core/certificate/star_geometry.h"
+#include "core/certificate/measure/star_geometry.h"
 #include "core/geometry/simplex.h"
 #include "tests/core/certificate/handmade_meshes.h"
 

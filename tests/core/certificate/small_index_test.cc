@@ -1,4 +1,4 @@
-#include "core/certificate/small_index.h"
+#include "core/certificate/complex/small_index.h"
 
 #include <gtest/gtest.h>
 

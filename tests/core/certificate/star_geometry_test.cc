@@ -1,4 +1,4 @@
-#include "core/certificate/star_geometry.h"
+#include "core/certificate/measure/star_geometry.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "core/base/random.h"
-#include "core/certificate/links.h"
+#include "core/certificate/complex/links.h"
 #include "tests/core/certificate/handmade_meshes.h"
 
 namespace stellate::core {

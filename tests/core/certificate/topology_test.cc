@@ -1,8 +1,8 @@
-#include "core/certificate/topology.h"
+#include "core/certificate/complex/topology.h"
 
 #include <gtest/gtest.h>
 
-#include "core/certificate/links.h"
+#include "core/certificate/complex/links.h"
 #include "tests/core/certificate/handmade_meshes.h"
 
 namespace stellate::core {

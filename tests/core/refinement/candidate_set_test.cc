@@ -37,7 +37,7 @@ class CandidateSetTest : public ::testing::Test {
   }
   CandidateSet<2> Draw(const Drawing& drawing = {true, 1, 1}) const {
     return DrawCandidates<2>(stars_, book_, criteria_, drawing,
-                             {TargetOf(3, Rule::kSize), TargetOf(5, Rule::kSliver)});
+                             {TargetOf(3, Rule::kSize), TargetOf(5, Rule::kShape)});
   }
   Eigen::Vector4d CentreOf(std::uint32_t star) const {
     return Eigen::Map<const Eigen::Vector4d>(stars_.sample().Point(star)) +
@@ -45,7 +45,7 @@ class CandidateSetTest : public ::testing::Test {
   }
 
   Stars<2> stars_;
-  ViolationBook<2> book_;
+  ViolationIndex<2> book_;
   ResolvedCriteria criteria_;
 };
 

@@ -67,9 +67,9 @@ TEST(Engine, KeepsToItsVertices) {
 TEST(Engine, JudgesAllAnewWhereItIsTold) {
   Engine<2> engine = EngineOnSphere(SphereSpec(0.4), Octahedron());
   Finish(&engine, 1);
-  EXPECT_FALSE(engine.book().are_all_suspect());
-  engine.JudgeAllAnew();
-  EXPECT_TRUE(engine.book().are_all_suspect());
+  EXPECT_FALSE(engine.violations().are_all_dirty());
+  engine.MarkAllDirty();
+  EXPECT_TRUE(engine.violations().are_all_dirty());
   ASSERT_TRUE(engine.Plan());
   EXPECT_TRUE(engine.AllRulesHold());
 }

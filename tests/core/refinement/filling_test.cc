@@ -44,7 +44,7 @@ std::optional<Engine<4>> Disagreeing(Manifold& manifold, std::uint64_t seed) {
     engine.Insert(candidates, ClosestTo(manifold, candidates.points));
     engine.Commit();
   }
-  if (!engine.AllRulesHold() || engine.filled().mended().empty()) return std::nullopt;
+  if (!engine.AllRulesHold() || engine.filled().resolved().empty()) return std::nullopt;
   return engine;
 }
 
@@ -77,7 +77,7 @@ TEST(FilledMesh, IsOnlyMadeForHighDimensions) {
   EXPECT_EQ(filled.cavities().cavities, 0u);
   Violation<2> violation;
   violation.rule = Rule::kInconsistent;
-  EXPECT_FALSE(filled.Mends(engine.stars(), 0, violation));
+  EXPECT_FALSE(filled.Resolves(engine.stars(), 0, violation));
 }
 
 }  // namespace

@@ -55,7 +55,7 @@ class IndependentSetTest : public ::testing::Test {
     double at[6], bt[6];
     stars_.sample().Lift(a.star, a.x, at);
     stars_.sample().Lift(b.star, b.x, bt);
-    const double reach = a.violation.rule >= Rule::kSliver ? 2 * a.radius : a.radius;
+    const double reach = a.violation.rule >= Rule::kShape ? 2 * a.radius : a.radius;
     return Distance(at, bt, 6) < reach;
   }
 

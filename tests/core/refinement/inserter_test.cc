@@ -24,7 +24,7 @@ class InserterTest : public ::testing::Test {
       stars_.Add(seeds.points.col(c).data(), seeds.tangents.col(c).data());
     stars_.Commit();
     std::vector<std::uint32_t> all;
-    std::vector<ViolationBook<2>::Entry> entries;
+    std::vector<ViolationIndex<2>::Entry> entries;
     for (std::uint32_t p = 0; p < 6; ++p) {
       all.push_back(p);
       if (const auto worst = WorstSizeOrShape<2>(stars_, p, criteria_.epsilon, 2))
@@ -49,8 +49,8 @@ class InserterTest : public ::testing::Test {
   ResolvedCriteria criteria_;
   Stars<2> stars_;
   SizeField<2> sizes_;
-  ViolationBook<2> book_;
-  FaceBook<2> faces_{0};
+  ViolationIndex<2> book_;
+  BoundaryState<2> faces_{0};
   CandidateSet<2> candidates_;
   AnsweredPoints answers_;
 };
@@ -90,9 +90,9 @@ TEST_F(InserterTest, AsksForClosestPointsWhereAFlatDoesNotMeetM) {
   EXPECT_EQ(book_.failed_attempts(star()), 1);
 }
 
-TEST_F(InserterTest, LeavesAStarAloneThatARehearsalKnowsNothingOf) {
+TEST_F(InserterTest, LeavesAStarAloneThatASpeculationKnowsNothingOf) {
   answers_.found[0] = 0;
-  Run(kRehearsalCaution);
+  Run(kSpeculativeCaution);
   EXPECT_TRUE(book_.is_given_up(star()));
   EXPECT_FALSE(book_.has_no_flat(star()));
 }

@@ -174,7 +174,7 @@ TEST_F(AtALookUp, OfARunThatFindsTangentsItself) {
   InterruptAtMany(spec, *torus);
 }
 
-TEST_F(AtALookUp, OfARehearsal) {
+TEST_F(AtALookUp, OfASpeculation) {
   const auto torus = Make("torus");
   Specification spec = SpecificationFor(*torus, 0.2);
   spec.criteria.ask_ahead = true;

@@ -239,7 +239,7 @@ void ExpectConsistencyByDefinition(const FramedPoints& sample, double sliver_bou
       ++fine;
       continue;
     }
-    EXPECT_EQ(got->rule, worst_sliver > 0 ? Rule::kSliver : Rule::kInconsistent);
+    EXPECT_EQ(got->rule, worst_sliver > 0 ? Rule::kShape : Rule::kInconsistent);
     EXPECT_EQ(got->radius, worst_sliver > 0 ? worst_sliver : worst_inconsistent);
     ++(worst_sliver > 0 ? slivers : inconsistent);
   }

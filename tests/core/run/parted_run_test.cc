@@ -109,7 +109,7 @@ TEST(PartedRun, OfASurfaceIsTheMesh) {
 }
 
 TEST(PartedRun, InThreeDimensionsIsTheMesh) {
-  EXPECT_TRUE(ExpectSameInParts<3>({"flat-torus:3", 0.25, 5, 1.25, 2}).contains(Rule::kSliver));
+  EXPECT_TRUE(ExpectSameInParts<3>({"flat-torus:3", 0.25, 5, 1.25, 2}).contains(Rule::kShape));
 }
 
 }  // namespace

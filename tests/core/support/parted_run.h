@@ -90,7 +90,7 @@ class PartedRun {
       owner_.push_back(cubes_.OwnerOf(points.col(c).data()));
       for (int part = 0; part < cubes_.parts(); ++part) {
         if (!Knows(part, points.col(c).data())) continue;
-        parts_[part].engine->Lay(laid, c);
+        parts_[part].engine->AddToSample(laid, c);
         Name(&parts_[part], static_cast<std::uint32_t>(c));
       }
     }
@@ -221,7 +221,7 @@ class PartedRun {
           part.engine->InserterOf(part.trip->candidates(), part.trip->answers()));
       near = part.inserter->Judge() && near;
     }
-    for (Part& part : parts_) part.inserter->TellAllNearAim(near);
+    for (Part& part : parts_) part.inserter->SetAllNearTarget(near);
     for (const auto& [at, target] : order_) {
       Part& part = parts_[at];
       const std::uint32_t star = part.names[part.targets[target].star];

@@ -1,0 +1,66 @@
+#include "core/boundary/sharp_edges.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/base/instantiate.h"
+#include "core/base/interruption.h"
+#include "core/base/vector_ops.h"
+#include "core/boundary/corner_cone.h"
+
+namespace stellate::core {
+
+template <int K>
+std::optional<WallCosine> SharpestAt(const Stars<K>& stars, std::uint32_t p) {
+  const WallSet walls = stars.sample().walls(p);
+  if (CountWalls(walls) < 2) return std::nullopt;
+  std::optional<WallCosine> sharpest;
+  const double* const conormals = stars.sample().Conormals(p);
+  // Of more walls than K some meet in the corner alone, and in no edge.
+  const CornerCone<K> cone = CountWalls(walls) > K ? ConeOf<K>(walls, conormals) : CornerCone<K>();
+  const auto share_edge = [&](WallSet pair) {
+    return cone.rays.empty() || std::any_of(cone.rays.begin(), cone.rays.end(),
+                                            [&](const auto& r) { return IsSubset(pair, r.walls); });
+  };
+  int a = 0;
+  ForEachWall(walls, [&](int first) {
+    int b = a + 1;
+    ForEachWall(walls & ~((SetOfWall(first) << 1) - 1), [&](int second) {
+      // Between the half-spaces that the walls leave: 0 where their conormals are opposite.
+      const double cosine = -Dot(conormals + K * a, conormals + K * b, K);
+      if ((!sharpest || cosine > sharpest->cosine) &&
+          share_edge(SetOfWall(first) | SetOfWall(second)))
+        sharpest = WallCosine{SetOfWall(first) | SetOfWall(second), cosine};
+      ++b;
+    });
+    ++a;
+  });
+  return sharpest;
+}
+
+template <int K>
+std::optional<WallAngle> Sharpest(const Stars<K>& stars) {
+  std::optional<WallCosine> sharpest;
+  std::uint32_t at = 0;
+  for (std::uint32_t p = 0; p < stars.size(); ++p) {
+    CheckInterruption(p);
+    const std::optional<WallCosine> here = SharpestAt<K>(stars, p);
+    if (!here || (sharpest && sharpest->cosine >= here->cosine)) continue;
+    sharpest = here;
+    at = p;
+  }
+  if (!sharpest) return std::nullopt;
+  const double degrees =
+      std::acos(std::clamp(sharpest->cosine, -1.0, 1.0)) * 180 / std::numbers::pi;
+  return WallAngle{sharpest->walls, degrees,
+                   Eigen::Map<const Eigen::VectorXd>(stars.sample().Point(at), stars.sample().d())};
+}
+
+#define STELLATE_EACH(K)                                                            \
+  template std::optional<WallCosine> SharpestAt<K>(const Stars<K>&, std::uint32_t); \
+  template std::optional<WallAngle> Sharpest<K>(const Stars<K>&);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core

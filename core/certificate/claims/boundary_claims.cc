@@ -1,0 +1,276 @@
+#include "core/certificate/claims/boundary_claims.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "core/base/message.h"
+#include "core/base/random.h"
+#include "core/certificate/complex/links.h"
+#include "core/certificate/evidence/fibres.h"
+#include "core/geometry/reach_bound.h"
+
+namespace stellate::core {
+namespace {
+
+constexpr std::size_t kMaxFaceBarycentres = 500;  // of each face
+
+std::string NameWalls(WallSet walls) {
+  std::string name = Message(CountWalls(walls) == 1 ? "wall" : "walls");
+  ForEachWall(walls, [&](int wall) { name = Message(name, " ", wall); });
+  return name;
+}
+
+// Of a list of simplices of one dimension, how many faces with `size` corners it has.
+std::int64_t CountFaces(const FaceMesh& face, int size) {
+  const auto width = static_cast<std::size_t>(face.dimension) + 1;
+  std::vector<std::array<std::uint32_t, kMaxDimension>> parts;
+  for (std::size_t s = 0; s < face.simplices.size(); s += width)
+    for (unsigned mask = 1; mask < 1u << width; ++mask) {
+      if (std::popcount(mask) != size) continue;
+      std::size_t corners = 0;
+      auto& part = parts.emplace_back();
+      for (std::size_t i = 0; i < width; ++i)
+        if (mask >> i & 1u) part[corners++] = face.simplices[s + i];
+    }
+  std::sort(parts.begin(), parts.end());
+  return std::unique(parts.begin(), parts.end()) - parts.begin();
+}
+
+// Components and Euler characteristic of a list of simplices of one dimension.
+void Count(const FaceMesh& face, FaceReport* report) {
+  const auto width = static_cast<std::size_t>(face.dimension) + 1;
+  std::vector<std::uint32_t> vertices = face.simplices;
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  std::vector<std::size_t> parent(vertices.size());
+  std::iota(parent.begin(), parent.end(), std::size_t{0});
+  const auto root = [&](std::uint32_t id) {
+    auto v = static_cast<std::size_t>(std::lower_bound(vertices.begin(), vertices.end(), id) -
+                                      vertices.begin());
+    while (parent[v] != v) v = parent[v] = parent[parent[v]];
+    return v;
+  };
+  for (std::size_t s = 0; s < face.simplices.size(); s += width)
+    for (std::size_t i = 1; i < width; ++i)
+      parent[root(face.simplices[s + i])] = root(face.simplices[s]);
+  for (std::size_t v = 0; v < parent.size(); ++v) report->components += parent[v] == v;
+  for (int size = 1; size <= face.dimension + 1; ++size)
+    report->euler_characteristic += (size % 2 == 1 ? 1 : -1) * CountFaces(face, size);
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> BoundaryClaims::CloseOff(const MeshView& mesh) {
+  std::vector<std::uint32_t> all = *mesh.simplices;
+  const auto apex = static_cast<std::uint32_t>(mesh.vertices);
+  for (const FaceMesh& face : *mesh.faces) {
+    if (face.dimension != mesh.k - 1) continue;
+    for (std::size_t s = 0; s < face.simplices.size(); s += static_cast<std::size_t>(mesh.k)) {
+      all.insert(all.end(), face.simplices.begin() + static_cast<std::ptrdiff_t>(s),
+                 face.simplices.begin() + static_cast<std::ptrdiff_t>(s) + mesh.k);
+      all.push_back(apex);
+    }
+  }
+  return all;
+}
+
+void BoundaryClaims::JudgeFaces() {
+  Certificate& c = x_.certificate;
+  FaceMesh boundary{0, x_.mesh.k - 1, {}};
+  for (const FaceMesh& face : *x_.mesh.faces) {
+    FaceReport report;
+    report.walls = face.walls;
+    report.dimension = face.dimension;
+    report.simplices = face.simplices.size() / (static_cast<std::size_t>(face.dimension) + 1);
+    Count(face, &report);
+    c.faces.push_back(report);
+    if (face.dimension == boundary.dimension)
+      boundary.simplices.insert(boundary.simplices.end(), face.simplices.begin(),
+                                face.simplices.end());
+  }
+  c.boundary_simplices = boundary.simplices.size() / static_cast<std::size_t>(x_.mesh.k);
+  FaceReport whole;
+  Count(boundary, &whole);
+  c.boundary_components = whole.components;
+  c.boundary_euler_characteristic = whole.euler_characteristic;
+  if (boundary.simplices.empty()) return;  // no cone, and no apex
+  // Without its cones the complex has as many faces fewer as the cone over the boundary has
+  // beyond it.
+  c.euler_characteristic += whole.euler_characteristic - 1;
+  if (x_.mesh.k < 3) return;  // circles and points have no links
+  const SimplexList list{x_.mesh.k - 1, static_cast<std::uint32_t>(x_.mesh.vertices),
+                         &boundary.simplices};
+  const Adjacency adjacency(list);
+  const LinkReport links = CheckLinks(adjacency);
+  if (adjacency.bad_facets() > 0)
+    x_.findings.Refuse(Findings::kComplex,
+                       Message("the boundary is not closed: ", adjacency.first_bad_facet(),
+                               " of it; faces like it: ", adjacency.bad_facets()));
+  if (links.bad_links > 0)
+    x_.findings.Refuse(Findings::kLinks, Message("in the boundary ", links.first_bad_link,
+                                                 "; vertices like it: ", links.bad_links));
+}
+
+std::vector<QueryBlock> BoundaryClaims::FaceQuestions() {
+  std::vector<QueryBlock> blocks;
+  for (const FaceMesh& face : *x_.mesh.faces) {
+    if (CountWalls(face.walls) != 1 || face.dimension == 0) continue;
+    const auto width = static_cast<std::size_t>(face.dimension) + 1;
+    const std::size_t count = face.simplices.size() / width;
+    const std::size_t step = std::max<std::size_t>(1, count / kMaxFaceBarycentres);
+    std::vector<std::uint32_t> chosen;
+    for (std::size_t s = Mix64(x_.spec.random_seed) % step; s < count; s += step)
+      chosen.push_back(static_cast<std::uint32_t>(s));
+    QueryBlock block;
+    block.face = face.walls;
+    block.want_clearances = block.want_tangents = true;
+    block.points.setZero(x_.mesh.d, static_cast<Eigen::Index>(chosen.size()));
+    for (std::size_t n = 0; n < chosen.size(); ++n)
+      for (std::size_t i = 0; i < width; ++i)
+        block.points.col(static_cast<Eigen::Index>(n)) +=
+            x_.Vertex(face.simplices[chosen[n] * width + i]) / static_cast<double>(width);
+    blocks.push_back(std::move(block));
+    chosen_.push_back(std::move(chosen));
+    faces_.push_back(&face);
+  }
+  return blocks;
+}
+
+void BoundaryClaims::JudgeFace(std::size_t block, const Eigen::MatrixXd& asked,
+                               const AnswerBlock& answer) {
+  const FaceMesh& face = *faces_[block];
+  const std::vector<std::uint32_t>& chosen = chosen_[block];
+  const auto width = static_cast<std::size_t>(face.dimension) + 1;
+  for (std::size_t n = 0; n < chosen.size(); ++n) {
+    const auto j = static_cast<Eigen::Index>(n);
+    const std::uint32_t* ids = face.simplices.data() + chosen[n] * width;
+    double diameter = 0;
+    for (std::size_t i = 1; i < width; ++i)
+      diameter = std::max(diameter, (x_.Vertex(ids[i]) - x_.Vertex(ids[0])).norm());
+    const double bound = x_.DistanceAllowed(diameter);
+    const double distance =
+        Found(answer, j) ? (answer.points.col(j) - asked.col(j)).norm() : INFINITY;
+    if (x_.spec.criteria.max_deviation && distance > *x_.spec.criteria.max_deviation)
+      x_.findings.Refuse(
+          Findings::kDeviation,
+          Message("a barycentre of ", NameWalls(face.walls), " lies ", Brief(distance),
+                  " from it, more than max_deviation = ", Brief(*x_.spec.criteria.max_deviation),
+                  ": the wall bends more there than the vertices show; take epsilon smaller, or "
+                  "max_deviation"));
+    if (distance <= bound) continue;
+    x_.findings.Refuse(
+        Findings::kBarycentres,
+        Message("the barycentre of simplex ", NameSimplex(ids, static_cast<int>(width)), " of ",
+                NameWalls(face.walls), " is ", Brief(distance),
+                " away from that, where its size "
+                "allows ",
+                Brief(bound)));
+  }
+}
+
+void BoundaryClaims::JudgeInside(const std::vector<std::uint32_t>& chosen, std::uint32_t each,
+                                 const AnswerBlock& answer) {
+  if (answer.clearances.size() == 0) return;
+  for (std::size_t n = 0; n < chosen.size(); ++n) {
+    const std::uint32_t* ids = x_.list()[chosen[n]];
+    // A simplex at a wall may lie beyond that, by as much as the wall bends.
+    WallSet touched = 0;
+    for (int i = 0; i <= x_.mesh.k; ++i) touched |= x_.mesh.WallsOf(ids[i]);
+    for (std::size_t m = n * each; m < (n + 1) * each; ++m) {
+      const auto j = static_cast<Eigen::Index>(m);
+      if (!Found(answer, j)) continue;
+      int wall = 0;
+      while (wall < x_.spec.walls &&
+             ((touched & SetOfWall(wall)) != 0 || answer.clearances(wall, j) >= 0))
+        ++wall;
+      if (wall == x_.spec.walls) continue;
+      x_.findings.Refuse(
+          Findings::kCoverage,
+          Message("the mesh lies beyond wall ", wall, " at ", NamePoint(answer.points.col(j)),
+                  ", inside of simplex ", NameSimplex(ids, x_.mesh.k + 1),
+                  ": the manifold has a hole there that is smaller than epsilon; take epsilon "
+                  "smaller, or give seeds on that wall"));
+    }
+  }
+}
+
+void BoundaryClaims::JudgeBeyond(const AnswerBlock& answer) {
+  WallSet met = 0;
+  for (const FaceMesh& face : *x_.mesh.faces) met |= face.walls;
+  std::vector<double> points;
+  std::vector<int> walls;
+  for (Eigen::Index j = 0; j < answer.clearances.cols(); ++j) {
+    if (!Found(answer, j)) continue;
+    WallSet beyond = 0;
+    for (int wall = 0; wall < x_.spec.walls; ++wall)
+      if (answer.clearances(wall, j) < 0) beyond |= SetOfWall(wall);
+    if (beyond == 0 || (beyond & met) != 0) continue;
+    walls.push_back(std::countr_zero(beyond));
+    points.insert(points.end(), answer.points.col(j).begin(), answer.points.col(j).end());
+  }
+  const std::vector<NearestVertex> nearest = FindNearestVertices(x_.mesh, points, x_.size);
+  for (std::size_t n = 0; n < walls.size(); ++n) {
+    if (nearest[n].distance > x_.size) continue;
+    const Eigen::Map<const Eigen::VectorXd> at(
+        points.data() + n * static_cast<std::size_t>(x_.mesh.d), x_.mesh.d);
+    x_.findings.Refuse(
+        Findings::kCoverage,
+        Message("no vertex is on wall ", walls[n], ", which cuts the manifold: ", NamePoint(at),
+                " is beyond it, ", Brief(nearest[n].distance), " from vertex ", nearest[n].vertex,
+                "; take epsilon smaller, or give seeds on that wall"));
+  }
+}
+
+// Takes what q, on the same wall as p, shows at p: p's distance from it over that from the wall's
+// tangent space, which leaves the conormal out. Nothing where p is on other walls too.
+void BoundaryClaims::HoldAt(WallSet walls, std::uint32_t p, const double* q) {
+  if (x_.mesh.WallsOf(p) != walls) return;
+  const Eigen::VectorXd step =
+      Eigen::Map<const Eigen::VectorXd>(q, x_.mesh.d) - Eigen::VectorXd(x_.Vertex(p));
+  const Eigen::VectorXd along = x_.Tangents(p).transpose() * step;
+  const double out = Eigen::Map<const Eigen::VectorXd>(x_.mesh.Outward(p), x_.mesh.k).dot(along);
+  const double away2 = step.squaredNorm() - along.squaredNorm() + out * out;
+  const double away = std::sqrt(std::max(away2, 0.0)), length = step.norm();
+  if (!IsTelling(length, away, x_.longest_edge[p], x_.position_error)) return;
+  const double here = ReachBound(length * length, away);
+  ratio_ = std::max(ratio_, x_.size / here);
+  if (here >= reach_) return;
+  reach_ = here;
+  narrowest_ = p;
+  narrowest_walls_ = walls;
+}
+
+void BoundaryClaims::HoldPoint(int wall, const std::uint32_t* ids, const double* y) {
+  for (int i = 0; i < x_.mesh.k; ++i) HoldAt(SetOfWall(wall), ids[i], y);
+}
+
+void BoundaryClaims::JudgeReach() {
+  for (const FaceMesh& face : *x_.mesh.faces) {
+    if (CountWalls(face.walls) != 1) continue;
+    const auto width = static_cast<std::size_t>(face.dimension) + 1;
+    for (std::size_t s = 0; s < face.simplices.size(); s += width)
+      for (std::size_t i = 0; i < width; ++i)
+        for (std::size_t j = 0; j < width; ++j)
+          if (i != j)
+            HoldAt(face.walls, face.simplices[s + i], x_.mesh.Point(face.simplices[s + j]));
+  }
+  Certificate& c = x_.certificate;
+  c.estimated_reach = std::min(c.estimated_reach, reach_);
+  if (x_.graded()) return;  // what is seen there counts in the sizes
+  c.epsilon_over_reach = std::max(c.epsilon_over_reach, x_.spec.epsilon / reach_);
+  if (ratio_ > kCoarse)
+    x_.findings.Refuse(
+        Findings::kReach,
+        Message("too coarse to trust: ",
+                TooCoarse(ratio_, reach_,
+                          Message("along ", NameWalls(narrowest_walls_), " near vertex ",
+                                  narrowest_, " at ", NamePoint(x_.Vertex(narrowest_))))));
+}
+
+}  // namespace stellate::core

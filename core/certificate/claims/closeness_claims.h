@@ -1,0 +1,51 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/batch.h"
+#include "core/certificate/claims/examination.h"
+#include "core/certificate/claims/reach_claims.h"
+#include "core/certificate/claims/tangent_check.h"
+#include "core/certificate/evidence/rim_check.h"
+
+namespace stellate::core {
+
+// That the mesh lies on M: its vertices and, nearly, points inside its simplices; that the tangent
+// spaces that the oracle gave are M's; that M does not end there. What the closest points say of
+// the reach goes to `reach`, where they lean to `rims`.
+class ClosenessClaims {
+ public:
+  ClosenessClaims(Examination& examination, ReachClaims& reach, RimCheck& rims);
+
+  Eigen::MatrixXd InsideQuestions() const;
+  Eigen::MatrixXd VertexQuestions() const;
+  Eigen::MatrixXd TangentQuestions();  // none where the oracle gives no tangents, or all is told
+  Eigen::MatrixXd RimQuestions() { return rims_.Questions(x_.position_error); }
+
+  // Sets the examination's position_error, which all other judgements need.
+  void JudgeVertices(const AnswerBlock& answer);
+  void JudgeInside(const Eigen::MatrixXd& asked, const AnswerBlock& answer);
+  void JudgeTangents(const AnswerBlock& answer);
+  void JudgeBends();  // once there are no more TangentQuestions
+  void JudgeRims(const AnswerBlock& answer);
+  void JudgeDeviation();
+  const std::vector<std::uint32_t>& simplices() const { return simplices_; }
+  std::uint32_t points_inside() const { return points_inside_; }
+  std::uint64_t points_held() const { return points_inside_ * simplices_.size(); }
+
+ private:
+  Eigen::VectorXd AlongSimplex(const std::uint32_t* ids, const Eigen::VectorXd& step) const;
+
+  Examination& x_;
+  ReachClaims& reach_;
+  RimCheck& rims_;
+  std::vector<std::uint32_t> simplices_, vertices_;  // that are asked about
+  std::uint32_t points_inside_ = 1;                  // of each simplex
+  std::optional<TangentCheck> tangents_;
+  std::vector<double> deviating_;  // closest to barycentres farther away than max_deviation, d each
+};
+
+}  // namespace stellate::core

@@ -1,0 +1,193 @@
+#include "core/certificate/claims/coverage_claims.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+
+#include "core/base/dense.h"
+#include "core/base/message.h"
+#include "core/base/random.h"
+#include "core/certificate/evidence/probes.h"
+
+namespace stellate::core {
+namespace {
+
+// Step of tangents by differences, as a share of the mesh size: above the noise, below curvature.
+constexpr double kDifferenceStep = 0.1;
+
+}  // namespace
+
+Eigen::MatrixXd CoverageClaims::ProbeQuestions() const {
+  return CoverageProbes(x_.spec, x_.mesh, x_.list(), x_.size);
+}
+
+void CoverageClaims::JudgeProbes(const Eigen::MatrixXd& asked, const AnswerBlock& answer) {
+  std::vector<Eigen::Index> found;
+  std::vector<double> points;
+  for (Eigen::Index j = 0; j < answer.points.cols(); ++j) {
+    if (!Found(answer, j)) continue;
+    found.push_back(j);
+    points.insert(points.end(), answer.points.col(j).begin(), answer.points.col(j).end());
+  }
+  x_.seen.insert(x_.seen.end(), points.begin(), points.end());
+  const std::vector<NearestVertex> nearest = FindNearestVertices(x_.mesh, points, x_.size);
+  for (std::size_t n = 0; n < found.size(); ++n) {
+    const Eigen::Index j = found[n];
+    Probe probe{answer.points.col(j), nearest[n], {}};
+    if (probe.nearest.distance > kCoverageShare * x_.size) {
+      ++x_.certificate.fibre_samples;
+      Fail(probe);
+      x_.findings.Refuse(
+          Findings::kCoverage,
+          Message("the mesh misses a part of the manifold: its point ", NamePoint(probe.x), " is ",
+                  Brief(probe.nearest.distance), " away from the nearest vertex, ",
+                  probe.nearest.vertex, ", where the mesh size is ", Brief(x_.size)));
+      continue;
+    }
+    if (answer.tangents.size() > 0) {
+      for (int a = 0; a < x_.mesh.k; ++a)
+        for (int i = 0; i < x_.mesh.d; ++i)
+          probe.tangent.push_back(answer.tangents(i * x_.mesh.k + a, j));
+    } else {
+      const double* t = x_.mesh.Tangent(probe.nearest.vertex);
+      probe.tangent.assign(t, t + x_.mesh.d * x_.mesh.k);
+    }
+    const Eigen::Map<const Eigen::MatrixXd> tangent(probe.tangent.data(), x_.mesh.d, x_.mesh.k);
+    // At the boundary the flat may miss the mesh by as much as the boundary bends.
+    if (x_.mesh.WallsOf(probe.nearest.vertex) != 0) continue;
+    const Eigen::VectorXd step = asked.col(j) - probe.x;
+    // Another vertex's tangent space says little of where M leans.
+    if (answer.tangents.size() > 0)
+      rims_.SuspectIfLeans(probe.x, tangent * (tangent.transpose() * step), step.norm());
+    probes_.push_back(std::move(probe));
+  }
+  if (x_.spec.oracle.tangent_basis) JudgeFibres();
+}
+
+// The derivative of the closest-point map at a point of M is the projection on the tangent space:
+// small steps along the nearest vertex's tangents come back as tangents of the point.
+Eigen::MatrixXd CoverageClaims::DifferenceQuestions() const {
+  const Eigen::Index k = x_.mesh.k;
+  Eigen::MatrixXd points(x_.mesh.d, static_cast<Eigen::Index>(probes_.size()) * k);
+  for (std::size_t n = 0; n < probes_.size(); ++n) {
+    for (Eigen::Index a = 0; a < k; ++a) {
+      auto point = points.col(static_cast<Eigen::Index>(n) * k + a);
+      point = probes_[n].x;
+      for (int i = 0; i < x_.mesh.d; ++i) {
+        point[i] += kDifferenceStep * x_.size *
+                    probes_[n].tangent[static_cast<std::size_t>(a * x_.mesh.d + i)];
+      }
+    }
+  }
+  return points;
+}
+
+void CoverageClaims::JudgeDifferences(const AnswerBlock& answer) {
+  const Eigen::Index k = x_.mesh.k;
+  for (std::size_t n = 0; n < probes_.size(); ++n) {
+    Eigen::MatrixXd steps(x_.mesh.d, k);
+    bool complete = true;
+    for (Eigen::Index a = 0; a < k; ++a) {
+      const Eigen::Index j = static_cast<Eigen::Index>(n) * k + a;
+      complete = complete && Found(answer, j);
+      if (complete) steps.col(a) = answer.points.col(j) - probes_[n].x;
+    }
+    if (!complete) continue;  // the nearest vertex's tangents have to do
+    const Eigen::MatrixXd basis = OrthonormalBasis(steps, k);
+    for (int i = 0; i < x_.mesh.d; ++i) {
+      for (Eigen::Index a = 0; a < k; ++a)
+        probes_[n].tangent[static_cast<std::size_t>(a * x_.mesh.d + i)] = basis(i, a);
+    }
+  }
+  JudgeFibres();
+}
+
+void CoverageClaims::JudgeFibres() {
+  std::vector<Fibre> fibres;
+  for (std::size_t n = 0; n < probes_.size(); ++n)
+    fibres.push_back({probes_[n].x.data(), probes_[n].tangent.data(),
+                      x_.LocalSize(probes_[n].nearest.vertex), Mix64(x_.spec.random_seed) + n});
+  const std::vector<FibreHits> hits = CountHits(x_.mesh, *x_.stars, x_.shape.max_diameter, fibres);
+  for (std::size_t n = 0; n < probes_.size(); ++n) JudgeHits(probes_[n], hits[n]);
+  probes_.clear();
+}
+
+void CoverageClaims::Fail(const Probe& probe) {
+  ++x_.certificate.fibre_failures;
+  std::vector<std::uint32_t>& near = x_.certificate.violations.fibres;
+  const auto place = std::lower_bound(near.begin(), near.end(), probe.nearest.vertex);
+  if (place != near.end() && *place == probe.nearest.vertex) return;
+  near.insert(place, probe.nearest.vertex);
+  if (near.size() > Violations::kMost) near.pop_back();
+}
+
+// Whether a point is beyond a facet of the boundary near a vertex, by no more than that may bend.
+bool CoverageClaims::IsBeyondFacet(const Eigen::VectorXd& x, std::uint32_t vertex) const {
+  const auto is_near = [&](const std::uint32_t* ids) {
+    for (int i = 0; i <= x_.mesh.k; ++i) {
+      WallSet common = ~WallSet{0};
+      std::vector<std::uint32_t> corners;
+      for (int j = 0; j <= x_.mesh.k; ++j) {
+        if (j == i) continue;
+        common &= x_.mesh.WallsOf(ids[j]);
+        corners.push_back(ids[j]);
+      }
+      if (common == 0) continue;
+      Eigen::MatrixXd along(x_.mesh.d, x_.mesh.k - 1);
+      for (int j = 1; j < x_.mesh.k; ++j)
+        along.col(j - 1) = x_.Vertex(corners[static_cast<std::size_t>(j)]) - x_.Vertex(corners[0]);
+      const Eigen::VectorXd step = x - x_.Vertex(corners[0]);
+      const double away = (step - along * LeastSquares(along, step)).norm();
+      if (away <= x_.DistanceAllowed(x_.Circumradius(ids))) return true;
+    }
+    return false;
+  };
+  for (const std::uint32_t s : x_.stars->Star(vertex))
+    for (int i = 0; i <= x_.mesh.k; ++i)
+      for (const std::uint32_t t : x_.stars->Star(x_.list()[s][i]))
+        if (is_near(x_.list()[t])) return true;
+  return false;
+}
+
+void CoverageClaims::JudgeHits(const Probe& probe, const FibreHits& hits) {
+  if (hits.count < 0) return;  // undecided by rounding
+  if (hits.count == 0 && x_.mesh.walls && IsBeyondFacet(probe.x, probe.nearest.vertex)) return;
+  ++x_.certificate.fibre_samples;
+  const double size = x_.LocalSize(probe.nearest.vertex);
+  if (hits.count != 1) {
+    Fail(probe);
+    x_.findings.Refuse(Findings::kFibres,
+                       Message("the normal flat of the manifold at its point ", NamePoint(probe.x),
+                               ", near vertex ", probe.nearest.vertex, ", meets the mesh ",
+                               hits.count, " times within ", Brief(size), " instead of once"));
+    return;
+  }
+  const double bound =
+      x_.DistanceAllowed(x_.Circumradius(x_.list()[hits.simplex])) + kSideStep * size;
+  if (hits.distance <= bound) return;
+  Fail(probe);
+  x_.findings.Refuse(
+      Findings::kFibres,
+      Message("the mesh lies ", Brief(hits.distance), " above the manifold at its point ",
+              NamePoint(probe.x), ", where its size allows ", Brief(bound)));
+}
+
+Evidence CoverageClaims::JudgeSeen() {
+  const std::uint64_t vertices = x_.thorough() ? x_.mesh.vertices : kMaxVerticesHeld;
+  Evidence evidence = HoldAgainst(x_.mesh, x_.seen, x_.longest_edge, x_.size, x_.graded(),
+                                  x_.position_error, vertices);
+  if (evidence.uncovered.empty()) return evidence;
+  for (const std::uint64_t i : evidence.uncovered) {
+    const double* y = x_.seen.data() + i * static_cast<std::size_t>(x_.mesh.d);
+    x_.wanted.insert(x_.wanted.end(), y, y + x_.mesh.d);
+  }
+  const Eigen::VectorXd first = Eigen::Map<const Eigen::VectorXd>(x_.wanted.data(), x_.mesh.d);
+  x_.findings.Refuse(
+      Findings::kCoverage,
+      Message("the mesh misses a part of the manifold: the oracle answered with ", NamePoint(first),
+              ", and no vertex is near; answers like it: ", evidence.uncovered.size()));
+  return evidence;
+}
+
+}  // namespace stellate::core

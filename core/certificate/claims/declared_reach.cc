@@ -1,0 +1,155 @@
+#include "core/certificate/claims/declared_reach.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/base/infinity.h"
+#include "core/base/message.h"
+#include "core/base/vector_ops.h"
+#include "core/certificate/point_of.h"
+#include "core/geometry/reach.h"
+#include "core/geometry/reach_bound.h"
+
+namespace stellate::core {
+namespace {
+
+// Tangent spaces that the oracle gives: so wrong, in radians, they are to rounding and to
+// differences, and no proof depends on it, whose own angles are no better.
+constexpr double kHarmlessTilt = 1e-6;
+// By so much solvers may have left them wrong without anybody noticing. What that would explain is
+// proof of nothing: neither that the reach is as declared, nor that it is not.
+constexpr double kLikelyTilt = 1e-3;
+// Tangent spaces that are wrong by more are found to be (TangentCheck).
+constexpr double kUnseenTilt = 0.15;
+
+}  // namespace
+
+void DeclaredReach::Prove(const VertexStars& stars, const MeshShape& shape) {
+  proof_ = ProveFromReach(mesh_, stars, shape, claim_);
+}
+
+void DeclaredReach::HoldAgainstEdge(std::uint32_t p, std::uint32_t q, double noise) {
+  const Eigen::VectorXd offset = PointOf(mesh_, q) - PointOf(mesh_, p);
+  const Eigen::Map<const Eigen::MatrixXd> tangent(mesh_.Tangent(p), mesh_.d, mesh_.k);
+  const double length = offset.norm();
+  const double away = (offset - tangent * (tangent.transpose() * offset)).norm();
+  if (!(away > 0)) return;
+  Hold({ReachBound(length * length, away), length, away, noise, true, {}}, [&] {
+    return Message("its points ", NamePoint(PointOf(mesh_, p)), ", vertex ", p, ", and ",
+                   NamePoint(PointOf(mesh_, q)));
+  });
+}
+
+void DeclaredReach::HoldAgainstBall(std::uint32_t v, double radius, double length, double noise) {
+  if (!std::isfinite(radius)) return;
+  Hold({radius, length, length * length / (2 * radius), noise, true, {}}, [&] {
+    return Message("a ball of that radius that touches it at vertex ", v, ", ",
+                   NamePoint(PointOf(mesh_, v)), ", and again ", Brief(length), " from there");
+  });
+}
+
+void DeclaredReach::HoldAgainstDistance(const std::uint32_t* ids, double circumradius,
+                                        double distance, double noise) {
+  if (!(distance > 0)) return;
+  // LargestDistance(rho, r) = distance, solved for r, in the lengths of Contradicts; no distance
+  // above rho says more than that one.
+  const double rho = RadiusOf(ids, circumradius), away = std::min(distance, rho);
+  const double length2 = rho * rho + away * away;
+  Hold({ReachBound(length2, away), std::sqrt(length2), away, noise, false, {}}, [&] {
+    return Message("a point of simplex ", NameSimplex(ids, mesh_.k + 1), ", which is ",
+                   Brief(distance), " away from it");
+  });
+}
+
+// As the proof bounds the smallest ball around a simplex.
+double DeclaredReach::RadiusOf(const std::uint32_t* ids, double circumradius) const {
+  double longest2 = 0;
+  for (int i = 0; i <= mesh_.k; ++i)
+    for (int j = 0; j < i; ++j)
+      longest2 =
+          std::max(longest2, SquaredDistance(mesh_.Point(ids[i]), mesh_.Point(ids[j]), mesh_.d));
+  return std::min(circumradius, JungRatio(mesh_.k) * std::sqrt(longest2));
+}
+
+template <typename Describe>
+void DeclaredReach::Hold(Witness witness, const Describe& describe) {
+  const double known = witness.by_tangents ? claim_.tangent_error : 0;
+  const bool unknown = witness.by_tangents && given_;
+  Keep(witness, describe, known + (unknown ? kLikelyTilt : 0), &sure_);
+  Keep(witness, describe, known + (unknown ? kHarmlessTilt : 0), &doubted_);
+}
+
+template <typename Describe>
+void DeclaredReach::Keep(const Witness& witness, const Describe& describe, double tilt,
+                         Strongest* strongest) const {
+  const double left = witness.away - Blame({claim_.reach, tilt}, witness.length, witness.noise);
+  const double possible = left > 0 ? ReachBound(witness.length * witness.length, left) : kInfinity;
+  if (strongest->witness && !(possible < strongest->possible)) return;
+  *strongest = {tilt, possible, witness};
+  strongest->witness->text = describe();
+}
+
+bool DeclaredReach::Refutes(const Strongest& strongest) const {
+  if (!strongest.witness) return false;
+  const Witness& w = *strongest.witness;
+  return Contradicts({claim_.reach, strongest.tilt}, w.length, w.away, w.noise);
+}
+
+// How wrong a tangent space has to be, radians, for the witness to say nothing.
+double DeclaredReach::TiltBehind(const Witness& w) const {
+  return (w.away - w.length * w.length / (2 * claim_.reach) -
+          Blame({claim_.reach, 0}, w.length, w.noise)) /
+         w.length;
+}
+
+// The reach that the witness allows, told apart from the declared one.
+std::string DeclaredReach::SayAtMost(const Witness& w) const {
+  std::string said = Message("at most ", Brief(w.reach));
+  if (Brief(w.reach) == Brief(claim_.reach))
+    said += Message(", less by ", Brief(claim_.reach - w.reach));
+  return said;
+}
+
+void DeclaredReach::Conclude(bool covered, Findings& findings, Certificate& certificate) const {
+  certificate.declared_reach = claim_.reach;
+  if (Refutes(sure_)) {
+    const Witness& w = *sure_.witness;
+    certificate.reach_refuted = true;
+    findings.Refuse(
+        Findings::kDeclaredReach,
+        Message("the manifold's reach is not ", Brief(claim_.reach), " as declared, but ",
+                SayAtMost(w), ": see ", w.text, "; declare no more than that",
+                w.by_tangents && given_ && TiltBehind(w) < kUnseenTilt
+                    ? Message(" (or are tangent spaces that the oracle gives wrong by ",
+                              Brief(TiltBehind(w)), " radians there?)")
+                    : std::string()));
+    return;
+  }
+  if (!proof_) return;
+  if (proof_->holds && Refutes(doubted_)) {
+    const Witness& w = *doubted_.witness;
+    findings.Warn(Message("Not proved for the declared reach ", Brief(claim_.reach), ": ", w.text,
+                          " would show that it is ", SayAtMost(w),
+                          ", unless tangent spaces that the oracle gives are wrong by ",
+                          Brief(TiltBehind(w)),
+                          " radians there: solve for them more exactly, or "
+                          "declare a little less."));
+    return;
+  }
+  if (!proof_->holds) {
+    findings.Warn(Message("Not proved for the declared reach ", Brief(claim_.reach), ": ",
+                          proof_->obstacle, "."));
+    return;
+  }
+  certificate.proved_distance = proof_->distance;
+  findings.Prove(
+      Message("if the manifold's reach is at least ", Brief(claim_.reach),
+              ", as declared, the mesh is isotopic to ",
+              covered ? "all components of the manifold that meet the bounding box"
+                      : "the components of the manifold that it meets",
+              ", and neither is farther than ", Brief(proof_->distance), " from the other"),
+      covered);
+}
+
+}  // namespace stellate::core

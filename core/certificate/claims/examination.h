@@ -1,0 +1,66 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/batch.h"
+#include "core/certificate/complex/topology.h"
+#include "core/certificate/findings.h"
+#include "core/certificate/measure/shape.h"
+#include "core/certificate/mesh_view.h"
+#include "core/report.h"
+#include "core/specification.h"
+
+namespace stellate::core {
+
+// A mesh under examination: what every claim about it looks at, and what was found so far.
+struct Examination {
+  Examination(const Specification& asked, const MeshView& view, const StarFacts& known)
+      : spec(asked), mesh(view), facts(known) {}
+
+  bool thorough() const { return spec.audit == Audit::kThorough; }
+  bool graded() const { return facts.max_size_ratio > 0; }
+  const SimplexList& list() const { return stars->list(); }
+  Eigen::Map<const Eigen::VectorXd> Vertex(std::uint32_t v) const {
+    return {mesh.Point(v), mesh.d};
+  }
+  Eigen::Map<const Eigen::MatrixXd> Tangents(std::uint32_t v) const {  // d x k
+    return {mesh.Tangent(v), mesh.d, mesh.k};
+  }
+  // How far from the mesh M may be at a vertex, and from a point of a simplex.
+  double LocalSize(std::uint32_t v) const;
+  double DistanceAllowed(double circumradius) const;
+  double Circumradius(const std::uint32_t* ids) const;
+
+  const Specification spec;
+  const MeshView mesh;
+  const StarFacts facts;
+  Certificate certificate;
+  Findings findings;
+
+  std::optional<VertexStars> stars;
+  // Once no claim asks for them: most of what the certificate takes up.
+  void ForgetStars() { stars.reset(); }
+  // Whether some vertex of a simplex is on the boundary.
+  bool AtBoundary(const std::uint32_t* ids) const {
+    bool any = false;
+    for (int i = 0; i <= mesh.k; ++i) any = any || mesh.WallsOf(ids[i]) != 0;
+    return any;
+  }
+  MeshShape shape;
+  std::vector<double> longest_edge;  // by vertex
+  double size = 0;                   // the mesh's own: its largest circumradius, epsilon at most
+  double position_error = 0;         // of the oracle, as seen at the vertices
+  std::vector<double> seen;          // points of M that were answered, d each
+  std::vector<double> wanted;  // points of M that the mesh should have a vertex nearer to, d each
+  PointsOnWalls wanted_on_walls;  // where the mesh should end
+};
+
+// Whether question j was answered.
+inline bool Found(const AnswerBlock& answer, Eigen::Index j) {
+  return answer.found.empty() || answer.found[static_cast<std::size_t>(j)] != 0;
+}
+
+}  // namespace stellate::core

@@ -1,0 +1,64 @@
+#include "core/certificate/evidence/rim_check.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/message.h"
+#include "core/certificate/findings.h"
+
+namespace stellate::core {
+namespace {
+
+constexpr std::size_t kMostSuspects = 32;
+constexpr double kLongestStep = 0.05;  // of the mesh size
+// Within M both steps go as far; at a rim the one back into M does, if it is along M at all.
+constexpr double kComesBack = 0.5;  // of the step back
+constexpr double kAlong = 0.25;     // of its length
+// Steps of at least this number of position errors tell what became of them.
+constexpr double kErrorsInStep = 10;
+
+}  // namespace
+
+void RimCheck::SuspectIfLeans(const Eigen::VectorXd& y, const Eigen::VectorXd& along,
+                              double distance) {
+  const double length = along.norm();
+  if (!IsLean(length, distance)) return;
+  suspects_.push_back(
+      {y, along / length, std::min(length / 2, kLongestStep * size_), length / distance});
+}
+
+Eigen::MatrixXd RimCheck::Questions(double position_error) {
+  asked_ = std::move(suspects_);
+  suspects_.clear();
+  std::erase_if(asked_,
+                [&](const Lean& l) { return !(l.length > kErrorsInStep * position_error); });
+  std::stable_sort(asked_.begin(), asked_.end(),
+                   [](const Lean& a, const Lean& b) { return a.share > b.share; });
+  if (asked_.size() > kMostSuspects) asked_.resize(kMostSuspects);
+  if (asked_.empty()) return {};
+  Eigen::MatrixXd points(asked_.front().y.size(), 2 * static_cast<Eigen::Index>(asked_.size()));
+  for (std::size_t i = 0; i < asked_.size(); ++i) {
+    const Eigen::VectorXd step = asked_[i].length * asked_[i].direction;
+    points.col(2 * static_cast<Eigen::Index>(i)) = asked_[i].y + step;
+    points.col(2 * static_cast<Eigen::Index>(i) + 1) = asked_[i].y - step;
+  }
+  return points;
+}
+
+std::string RimCheck::Judge(const AnswerBlock& answer, double position_error) const {
+  for (std::size_t i = 0; i < asked_.size(); ++i) {
+    const Lean& lean = asked_[i];
+    const auto gone = [&](std::size_t j) {
+      return std::abs(lean.direction.dot(answer.points.col(static_cast<Eigen::Index>(j)) - lean.y));
+    };
+    if (!answer.found.empty() && !(answer.found[2 * i] && answer.found[2 * i + 1])) continue;
+    const double over = gone(2 * i) + position_error, back = gone(2 * i + 1);
+    if (over >= kComesBack * back || back < kAlong * lean.length) continue;
+    return Message("the manifold ends, or has a sharp edge, at its point ", NamePoint(lean.y),
+                   ": what was asked there does not lie straight above it, and a step of ",
+                   Brief(lean.length), " along it comes back, unlike the step the other way");
+  }
+  return {};
+}
+
+}  // namespace stellate::core

@@ -1,0 +1,144 @@
+#include "core/certificate/evidence/shrinking_balls.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/certificate/evidence/evidence.h"
+#include "core/certificate/evidence/probes.h"
+#include "core/certificate/findings.h"
+#include "core/geometry/reach_bound.h"
+
+namespace stellate::core {
+namespace {
+
+// A ball is asked about at slightly less than the radius found: the centre of the very ball that
+// touches M twice is on the medial axis, where oracles divide by zero.
+constexpr double kInside = 0.98;
+constexpr int kLadder = 6;
+constexpr double kMet = 1e-3;  // of the longest edge
+// Sine of the angle by which the tangent space at a point that is no vertex may be wrong at least.
+constexpr double kTilt = 0.25;
+
+}  // namespace
+
+Eigen::VectorXd ShrinkingBalls::PointOf(const Ball& ball) const {
+  if (ball.point.size() > 0) return ball.point;
+  return Eigen::Map<const Eigen::VectorXd>(mesh_.Point(ball.vertex), mesh_.d);
+}
+
+Eigen::MatrixXd ShrinkingBalls::TangentsOf(std::uint32_t v) const {
+  return Eigen::Map<const Eigen::MatrixXd>(mesh_.Tangent(v), mesh_.d, mesh_.k);
+}
+
+// A random direction across the tangents; false if there is none.
+bool ShrinkingBalls::AimAcross(const Eigen::MatrixXd& tangents, Random& random, Ball* ball) const {
+  ball->normal.resize(mesh_.d);
+  for (int i = 0; i < mesh_.d; ++i) ball->normal[i] = random.NearlyNormal();
+  for (int pass = 0; pass < 2; ++pass)
+    ball->normal -= tangents * (tangents.transpose() * ball->normal).eval();
+  const double length = ball->normal.norm();
+  if (!(length > 1e-6) || !(longest_edge_[ball->vertex] > 0)) return false;
+  ball->normal /= length;
+  return true;
+}
+
+void ShrinkingBalls::AddLadders(std::uint64_t random_seed, int count) {
+  const MeshBox box = BoxOf(mesh_);
+  Random random(random_seed, 0x62616c6c73);
+  for (int n = 0; n < count; ++n) {
+    Ball ball;
+    ball.vertex = static_cast<std::uint32_t>(random.Next() % mesh_.vertices);
+    ball.rungs = kLadder;
+    ball.radius = (box.upper - box.lower).norm() / 2;
+    if (AimAcross(TangentsOf(ball.vertex), random, &ball)) Add(std::move(ball));
+  }
+}
+
+void ShrinkingBalls::AddPair(std::uint32_t v, double radius, std::uint64_t random_seed) {
+  Ball ball;
+  ball.vertex = v;
+  ball.radius = radius;
+  AddBothSides(std::move(ball), TangentsOf(v), Mix64(random_seed) + v);
+}
+
+void ShrinkingBalls::AddPair(const std::uint32_t* simplex, const Eigen::VectorXd& point,
+                             const Eigen::MatrixXd& tangents, double radius,
+                             std::uint64_t random_key) {
+  Ball ball;
+  ball.vertex = simplex[0];
+  ball.radius = radius;
+  ball.point = point;
+  ball.tilt = kTilt;
+  const std::size_t first = active_.size();
+  AddBothSides(std::move(ball), tangents, random_key);
+  for (std::size_t b = first; b < active_.size(); ++b)
+    for (int i = 0; i <= mesh_.k; ++i)
+      active_[b].tilt = std::max(active_[b].tilt, TiltAt(simplex[i], active_[b].normal));
+}
+
+double ShrinkingBalls::TiltAt(std::uint32_t v, const Eigen::VectorXd& normal) const {
+  return (TangentsOf(v).transpose() * normal).norm();
+}
+
+void ShrinkingBalls::AddBothSides(Ball ball, const Eigen::MatrixXd& tangents,
+                                  std::uint64_t random_key) {
+  Random random(random_key, 0x70616972);
+  if (!AimAcross(tangents, random, &ball)) return;
+  Add(ball);
+  ball.normal = -ball.normal;
+  Add(std::move(ball));
+}
+
+Eigen::MatrixXd ShrinkingBalls::Centres() const {
+  Eigen::Index count = 0;
+  for (const Ball& ball : active_) count += ball.rungs;
+  Eigen::MatrixXd centres(mesh_.d, count);
+  Eigen::Index next = 0;
+  for (const Ball& ball : active_)
+    for (int rung = 0; rung < ball.rungs; ++rung)
+      centres.col(next++) = PointOf(ball) + std::ldexp(ball.radius, -rung) * ball.normal;
+  return centres;
+}
+
+void ShrinkingBalls::Absorb(const Eigen::MatrixXd& nearest, const std::vector<std::uint8_t>& found,
+                            double position_error) {
+  std::vector<Ball> still;
+  Eigen::Index next = 0;
+  for (Ball& ball : active_) {
+    const double edge = longest_edge_[ball.vertex];
+    double narrowest = std::numeric_limits<double>::infinity(), across = 0;
+    for (int rung = 0; rung < ball.rungs; ++rung) {
+      const Eigen::Index n = next++;
+      if (!found.empty() && !found[static_cast<std::size_t>(n)]) continue;
+      const Eigen::VectorXd offset = nearest.col(n) - PointOf(ball);
+      const double distance = offset.norm();
+      if (distance > kMet * edge)
+        met_.insert(met_.end(), nearest.col(n).begin(), nearest.col(n).end());
+      const bool exact = ball.point.size() == 0;
+      const double along = ball.normal.dot(offset) - ball.tilt * distance;
+      const double far = exact ? edge : std::numeric_limits<double>::infinity();
+      if (along <= 0 || !IsTelling(distance, along, far, position_error)) continue;
+      const double radius = ReachBound(distance * distance, along);
+      if (radius >= std::ldexp(ball.radius, -rung) || radius >= narrowest) continue;
+      narrowest = radius;
+      across = distance;
+    }
+    if (std::isinf(narrowest)) continue;
+    const double coarseness = edge * std::numbers::inv_sqrt3 / narrowest;
+    coarseness_ = std::max(coarseness_, coarseness);
+    coarse_ += !ball.is_coarse && coarseness > kCoarse;
+    ball.is_coarse |= coarseness > kCoarse;
+    if (narrowest < reach_) {
+      reach_ = narrowest;
+      narrowest_ = ball.vertex;
+      distance_ = across;
+    }
+    ball.rungs = 1;
+    ball.radius = kInside * narrowest;
+    still.push_back(std::move(ball));
+  }
+  active_ = std::move(still);
+}
+
+}  // namespace stellate::core

@@ -1,0 +1,116 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "core/certificate/complex/topology.h"
+#include "core/certificate/measure/simplex_gram.h"
+#include "core/certificate/mesh_view.h"
+#include "core/geometry/simplex.h"
+
+namespace stellate::core {
+
+// Extremes of the shapes of a mesh's k-simplices.
+struct MeshShape {
+  double max_circumradius = 0;  // of a k-simplex, length
+  std::uint32_t largest = 0;    // the simplex that has it
+  double max_diameter = 0;      // length
+  double max_radius_edge = 0;
+  double min_fatness = 1;
+  double min_angle_degrees = 0;  // k = 2; else 0
+  double max_tangent_angle_degrees = 0;
+
+  std::vector<float> diameters;  // by simplex, length
+  std::vector<float> tilts;      // by simplex: largest sum of squared sines to a vertex's tangents,
+                                 // right to kTiltError or to a float's rounding
+};
+inline constexpr double kTiltError = 1e-9;
+
+// Seeks the extremes while the stars of a mesh are gone through. Gram matrices tell of most
+// simplices that they are none; what may be one is measured again by its frame, to the last digit.
+// What is found does not depend on the order.
+class ShapeSearch {
+ public:
+  ShapeSearch(const MeshView& mesh, const SimplexList& list);
+
+  // Of some of the simplices: one for each thread.
+  struct Part {
+    double circumradius = 0, diameter = 0, radius_edge = 0;
+    double fatness = std::numeric_limits<double>::infinity();
+    float tilt = 0;
+    std::uint32_t largest = 0, longest = 0;  // of circumradius and radius-edge, the first
+    SimplexFrame frame;                      // working memory
+  };
+
+  // Once for each simplex. `gram`: null where it says little. Edges are squared lengths.
+  template <int K>
+  void Measure(std::uint32_t s, const SimplexGram<K>* gram, double shortest2, double longest2,
+               Part* part) {
+    const double diameter = std::sqrt(longest2);
+    part->diameter = std::max(part->diameter, diameter);
+    shape_.diameters[s] = static_cast<float>(diameter);
+    if (gram && !MayBeExtreme(*gram, shortest2, longest2)) return;
+    MeasureByFrame(s, part);
+  }
+
+  // Once for each vertex of each simplex, by different threads perhaps. `gram`: as above;
+  // `columns`: the edges that it is of, in tangent coordinates of the vertex.
+  template <int K>
+  void Lean(std::uint32_t s, std::uint32_t vertex, const SimplexGram<K>* gram,
+            const std::array<const double*, K>& columns, Part* part) {
+    double tilt = K;
+    if (gram) {
+      for (int a = 0; a < K; ++a) {
+        typename SimplexGram<K>::Row row;
+        for (int c = 0; c < K; ++c) row[c] = columns[c][a];
+        tilt -= gram->InverseForm(row);
+      }
+    } else {
+      tilt = TiltByFrame(s, vertex, part);
+    }
+    const auto rounded = static_cast<float>(tilt);
+    part->tilt = std::max(part->tilt, rounded);
+    const std::atomic_ref<float> largest(shape_.tilts[s]);
+    float known = largest.load(std::memory_order_relaxed);
+    while (known < rounded &&
+           !largest.compare_exchange_weak(known, rounded, std::memory_order_relaxed)) {
+    }
+  }
+
+  MeshShape Conclude(const std::vector<Part>& parts);
+
+ private:
+  static constexpr double kMargin = 1e-6;  // of what Gram matrices say, as a share
+
+  template <int K>
+  bool MayBeExtreme(const SimplexGram<K>& gram, double shortest2, double longest2) const {
+    const double radius2 = gram.SquaredCircumradius() * (1 + kMargin);
+    double power = longest2, faculty = 1;
+    for (int i = 2; i <= K; ++i) {
+      power *= longest2;
+      faculty *= i;
+    }
+    return mesh_.guards || radius2 >= radius2_.load(std::memory_order_relaxed) ||
+           radius2 >= shortest2 * radius_edge2_.load(std::memory_order_relaxed) ||
+           gram.determinant * (1 - kMargin) <=
+               faculty * faculty * power * fatness2_.load(std::memory_order_relaxed);
+  }
+  void MeasureByFrame(std::uint32_t s, Part* part);
+  double TiltByFrame(std::uint32_t s, std::uint32_t vertex, Part* part) const;
+  double LargestTilt(std::uint32_t s, Part* part) const;
+  double MaxSine2(float largest_tilt) const;
+
+  const MeshView& mesh_;
+  const SimplexList list_;
+  MeshShape shape_;
+  // The most extreme ones that some thread has found by now, squared.
+  std::atomic<double> radius2_ = 0, radius_edge2_ = 0;
+  std::atomic<double> fatness2_ = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace stellate::core

@@ -1,0 +1,143 @@
+#include "core/refinement/protecting_balls.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/instantiate.h"
+#include "core/base/interruption.h"
+#include "core/base/vector_ops.h"
+#include "core/boundary/sharp_edges.h"
+
+namespace stellate::core {
+namespace {
+
+// Wedges and corners of 50 degrees were seen to close without balls, of 40 not. An edge that is
+// sharper somewhere is guarded up to the second of these along it: beside a guard there should not
+// lie the sharpest of what has none.
+constexpr double kNeedsBall = 0.64278760968653933;       // cosine of 50 degrees
+constexpr double kProtectedBelow = 0.34202014332566873;  // of 70
+// Of the size asked for. A simplex at a guarded point p is measured from p, beyond its ball.
+constexpr double kLargest = 0.6;
+constexpr double kOtherEdge = 1.0 / 3;
+constexpr double kOtherPoint = 0.9;  // of the distance to points inside of faces
+// Of the length of an edge at a corner, the sum of the radii at its ends: there they only have to
+// meet.
+constexpr double kMeet = 1;
+constexpr double kSplitsPerOctave = 20;
+
+template <int K>
+bool IsSharp(const Stars<K>& stars, std::uint32_t p, double cosine) {
+  const auto angle = SharpestAt<K>(stars, p);
+  return angle && angle->cosine > cosine;
+}
+
+template <int K>
+bool IsCorner(const Stars<K>& stars, std::uint32_t p) {
+  return CountWalls(stars.sample().walls(p)) >= K;
+}
+
+// An edge of the mesh of edges, seen from one end.
+template <int K>
+struct HalfEdge {
+  typename Stars<K>::CellVertex at;
+  std::uint32_t other;
+};
+
+template <int K>
+std::vector<HalfEdge<K>> EdgesAt(const Stars<K>& stars, std::uint32_t p) {
+  std::vector<HalfEdge<K>> edges;
+  const auto& cell = stars.cell(p);
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+    const auto simplex = stars.FaceSimplexOf(p, cell, v);
+    if (simplex.dimension() != 1 || simplex.fake || simplex.foreign || simplex.count != 2) continue;
+    edges.push_back({{p, v}, simplex.ids[simplex.ids[0] == p]});
+  }
+  return edges;
+}
+
+// What a ball around p has room for beside everything that is not along its own edge.
+template <int K>
+double ClearanceAt(const Stars<K>& stars, std::uint32_t p, double bound) {
+  double clearance = kLargest * bound;
+  stars.sample().ForEachWithin(
+      stars.sample().Point(p), clearance / kOtherEdge, [&](std::uint32_t q) {
+        if (q == p) return;
+        const double distance =
+            Distance(stars.sample().Point(p), stars.sample().Point(q), stars.sample().d());
+        const WallSet there = stars.sample().walls(q);
+        if (CountWalls(there) < 2)
+          clearance = std::min(clearance, kOtherPoint * distance);
+        else if (CountWalls(there & stars.sample().walls(p)) < 2)  // not along the same edge
+          clearance = std::min(clearance, kOtherEdge * distance);
+      });
+  return clearance;
+}
+
+template <int K>
+double LengthOf(const Stars<K>& stars, std::uint32_t p, std::uint32_t q) {
+  return Distance(stars.sample().Point(p), stars.sample().Point(q), stars.sample().d());
+}
+
+}  // namespace
+
+template <int K>
+ProtectingBalls<K> PlanProtectingBalls(const Stars<K>& stars, const SizeField<K>& sizes) {
+  ProtectingBalls<K> balls;
+  std::vector<std::uint32_t> sharp;
+  for (std::uint32_t p = 0; p < stars.size(); ++p) {
+    CheckInterruption(p);
+    if (stars.sample().GuardOf(p) > 0 || IsSharp<K>(stars, p, kProtectedBelow)) sharp.push_back(p);
+  }
+  balls.radii2.assign(stars.size(), 0);
+  balls.least_clearance = INFINITY;
+  std::vector<std::vector<HalfEdge<K>>> edges;
+  for (const std::uint32_t p : sharp) {
+    CheckInterruption(edges.size());
+    edges.push_back(EdgesAt<K>(stars, p));
+    balls.radii2[p] = stars.sample().GuardOf(p);
+    if (balls.radii2[p] > 0) continue;
+    double radius = ClearanceAt<K>(stars, p, sizes.BoundAt(stars, p));
+    balls.least_clearance = std::min(balls.least_clearance, radius);
+    for (const HalfEdge<K>& edge : edges.back())
+      radius = std::min(radius, kBallShare * LengthOf<K>(stars, p, edge.other));
+    balls.radii2[p] = radius * radius;
+  }
+  for (std::size_t i = 0; i < sharp.size(); ++i)
+    for (const HalfEdge<K>& edge : edges[i]) {
+      const std::uint32_t p = sharp[i], q = edge.other;
+      if (q < p || balls.radii2[q] == 0) continue;
+      const double length = LengthOf<K>(stars, p, q);
+      ++balls.edges;
+      balls.longest = std::max(balls.longest, length);
+      balls.least_clearance = std::min(balls.least_clearance, length);
+      if (stars.sample().GuardOf(p) > 0 && stars.sample().GuardOf(q) > 0) continue;
+      const double overlap = IsCorner<K>(stars, p) || IsCorner<K>(stars, q) ? kMeet : kBallOverlap;
+      if (std::sqrt(balls.radii2[p]) + std::sqrt(balls.radii2[q]) < overlap * length)
+        balls.gaps.push_back(edge.at);
+    }
+  return balls;
+}
+
+template <int K>
+std::size_t MostSplits(const ProtectingBalls<K>& balls) {
+  if (balls.edges == 0) return 0;
+  int octaves = 1;
+  for (double length = balls.least_clearance; length < balls.longest; length *= 2) ++octaves;
+  return static_cast<std::size_t>(kSplitsPerOctave * octaves) * balls.edges;
+}
+
+template <int K>
+bool NeedsProtection(const Stars<K>& stars) {
+  for (std::uint32_t p = 0; p < stars.size(); ++p)
+    if (stars.sample().GuardOf(p) == 0 && IsSharp<K>(stars, p, kNeedsBall)) return true;
+  return false;
+}
+
+#define STELLATE_EACH(K)                                                                    \
+  template ProtectingBalls<K> PlanProtectingBalls<K>(const Stars<K>&, const SizeField<K>&); \
+  template std::size_t MostSplits<K>(const ProtectingBalls<K>&);                            \
+  template bool NeedsProtection<K>(const Stars<K>&);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core

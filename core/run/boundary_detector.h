@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/refinement/candidate_set.h"
+
+namespace stellate::core {
+
+// Detects an undeclared boundary: collects answers with a tangential offset, which do not lie
+// straight below their queries (RimCheck). A closed manifold with exact tangents has none.
+class BoundaryDetector {
+ public:
+  // Collects offsets from the closest points of candidates, with their tangents. REQUIRES: no
+  // alternations.
+  template <int K>
+  void Look(const CandidateSet<K>& candidates, const AnsweredPoints& answers);
+
+  // Points y of M and the components of q - y along M, 2 d each, as KnownOfManifold has them.
+  const std::vector<double>& offsets() const { return offsets_; }
+  // A sentence about them for the verdict of an unfinished run, or "".
+  std::string Describe(int d) const;
+
+ private:
+  std::vector<double> offsets_;
+};
+
+}  // namespace stellate::core

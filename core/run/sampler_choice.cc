@@ -1,0 +1,91 @@
+#include "core/run/sampler_choice.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/power.h"
+#include "core/sampling/ring_sampler.h"
+#include "core/sampling/solid_sampler.h"
+#include "core/speculation/speculative_sampler.h"
+
+namespace stellate::core {
+namespace {
+
+// Seeds are dense where, of those a sample may have, fewer than this share lie so many spacings
+// from each other: then the lattice would have no room between them. A tenth of those drawn do
+// where a surface begins to need a fifth to a third fewer vertices for it, at some 300, and, of a
+// given sample of dimension 3, of which one in ninety does, where that does, at some 1,500. Curves
+// need fewer only where they take many more rounds.
+constexpr double kSparse = 3;
+constexpr double SparseShare(int k) { return k < 2 ? 0.5 : 0.1; }
+// From 4 on hardly any lie so far from each other where a lattice begins to need fewer vertices:
+// what counts is how many more than the seeds there will be, by a guess that is low there. A sphere
+// breaks even at some 2,500 vertices, a flat torus below 3,000.
+constexpr int kFirstByGuess = 4;
+constexpr double kTimesSeeds = 5;
+// From 4 on as many seeds as tell enough to guess by are a good part of the sample: it is laid ring
+// by ring, and asked ahead for what the rules add.
+constexpr int kMaxSpeculativeDimension = 3;
+// From 4 on there are no fewer vertices between walls, and a cut T^4 that closes without a lattice
+// does not with one.
+constexpr int kMostBetweenWalls = 3;
+
+// About how many points the sample will have, from how far apart half of the seeds lie.
+double GuessSize(int k, const AnsweredPoints& seeds, double epsilon) {
+  const auto found = static_cast<std::size_t>(std::ranges::count(seeds.found, 1));
+  double apart = epsilon;
+  std::size_t count = found;
+  for (; 2 * count > found && found > 1; apart *= 2)
+    count = CountApart(seeds, seeds.points.cols(), 2 * apart);
+  return static_cast<double>(count) * Power(apart / epsilon, k);
+}
+
+// Of seeds drawn to ask ahead from only as many tell as there would be else.
+template <int K>
+bool AreSparse(const Engine<K>& engine, const AnsweredPoints& seeds, const Specification& spec) {
+  const double epsilon = engine.criteria().epsilon;
+  const Eigen::VectorXd shares = SharesOf(engine.sizes(), seeds);
+  const bool many =
+      spec.criteria.ask_ahead && spec.seeds.cols() == 0 && spec.box_seeds == 0 && !spec.cover_box;
+  const Eigen::Index most = many ? kDefaultBoxSeeds : seeds.points.cols();
+  if (K >= kFirstByGuess)
+    return GuessSize(K, seeds, epsilon) >=
+           kTimesSeeds * static_cast<double>(std::max<std::size_t>(
+                             kDefaultBoxSeeds, CountApart(seeds, most, epsilon, shares)));
+  return static_cast<double>(
+             CountApart(seeds, most, kSparse * SampleSpacing(K, epsilon), shares)) >=
+         SparseShare(K) * static_cast<double>(CountApart(seeds, most, epsilon, shares));
+}
+
+// Seeds are no vertices yet there, and in nobody's way.
+template <int K>
+std::unique_ptr<Sampler<K>> SamplerBetweenWalls(Engine<K>& engine, const Specification& spec) {
+  if (K > kMostBetweenWalls || engine.criteria().graded()) return nullptr;
+  if (K == spec.ambient_dimension) return std::make_unique<SolidSampler<K>>(engine);
+  return spec.criteria.ask_ahead ? nullptr : std::make_unique<RingSampler<K>>(engine, spec);
+}
+
+}  // namespace
+
+template <int K>
+std::unique_ptr<Sampler<K>> SamplerFor(Engine<K>& engine, const Specification& spec,
+                                       const AnsweredPoints& seeds) {
+  const ResolvedCriteria& criteria = engine.criteria();
+  if (spec.walls > 0) return SamplerBetweenWalls<K>(engine, spec);
+  if ((criteria.graded() && (!criteria.sizes_given || criteria.ask_ahead)) ||
+      !AreSparse<K>(engine, seeds, spec))
+    return nullptr;
+  const auto most = static_cast<double>(MaxPointsPerBatch(K, engine.stars().sample().d()));
+  if (criteria.ask_ahead && K <= kMaxSpeculativeDimension &&
+      GuessSize(K, seeds, criteria.epsilon) <= most)
+    return std::make_unique<SpeculativeSampler<K>>(engine, spec);
+  return std::make_unique<RingSampler<K>>(engine, spec);
+}
+
+#define STELLATE_EACH(K)                                                               \
+  template std::unique_ptr<Sampler<K>> SamplerFor<K>(Engine<K>&, const Specification&, \
+                                                     const AnsweredPoints&);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core

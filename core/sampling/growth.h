@@ -1,0 +1,146 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/base/instantiate.h"
+#include "core/index/ball_tree.h"
+#include "core/index/runs.h"
+#include "core/sampling/lattice.h"
+
+namespace stellate::core {
+
+// Samples M at its final spacing by advancing-front lattice packing. From each seed a patch of the
+// lattice A_k^* grows over M ring by ring, in the tangent spaces of its own points, until it meets
+// the others. It leaves a hole where M bends too much, or where answers are missing.
+//
+//   growth.Begin(points, tangents, found);               // seeds
+//   while ((ring = growth.Propose()).points.cols() > 0)  // the sites next to all new points
+//     joined = growth.Join(closest points of the ring);
+//
+// Where the spacing is graded, each point has a share in (0, 1]; lengths in spacings are multiplied
+// by it. An answer whose share differs from the expected one does not join; if that is so of most
+// answers, Propose returns nothing more.
+//
+// Deterministic: the same for any number of threads. Pure geometry, without queries.
+template <int K>
+class Growth {
+ public:
+  // d        ambient dimension
+  // spacing  nearest-neighbour distance of the lattice, length; the largest where it is graded
+  Growth(int d, double spacing);
+
+  // Makes seeds of those points of M, d x n with tangent bases (K rows of d) x n, that are found,
+  // farther than `room` lattice spacings from all points so far, and `apart` (times the share)
+  // from each other. `shares`: of the spacing, n, or empty where it is not graded. Returns the
+  // columns of the seeds, ascending.
+  std::vector<Eigen::Index> Begin(const Eigen::MatrixXd& points, const Eigen::MatrixXd& tangents,
+                                  const std::vector<std::uint8_t>& found, double apart,
+                                  const Eigen::VectorXd& shares = {}, double clearance = 1);
+
+  // The next sites of the lattice: points near M, d x n, with roughly orthonormal tangent bases, (K
+  // rows of d) x n.
+  struct Ring {
+    Eigen::MatrixXd points, tangents;
+  };
+  Ring Propose();
+
+  // Takes the closest points of the ring, tangent bases at them, and which were found; `shares` as
+  // above. Returns the columns of those that join the sample, ascending. No two points of the
+  // sample are nearer than kKeep spacings.
+  std::vector<Eigen::Index> Join(const Eigen::MatrixXd& points, const Eigen::MatrixXd& tangents,
+                                 const std::vector<std::uint8_t>& found,
+                                 const Eigen::VectorXd& shares = {});
+
+  // Frees its memory. Propose returns nothing afterwards.
+  void Forget();
+
+  std::uint32_t size() const { return size_; }
+  // The points that joined last.
+  std::size_t border() const { return border_.size(); }
+  double spacing() const { return spacing_; }
+  // The largest distance of a site from the point that proposed it, length.
+  double reach() const { return longest_; }
+
+  // Least distance in the sample, in spacings: of a lattice that covers with radius epsilon, 1.4
+  // epsilon for k = 1, 1.2, 1.1, 1.0 and 0.9 for k = 2 to 5.
+  static constexpr double kKeep = 0.72;
+
+ private:
+  // Places of the lattice: points that joined, or that are proposed.
+  struct Sites {
+    std::vector<double> points;        // d each
+    std::vector<double> frames;        // K rows of d each: the lattice's directions
+    std::vector<double> shares;        // of the spacing
+    std::vector<std::uint32_t> patch;  // the seed that it came from
+    std::vector<std::uint64_t> name;   // in the lattice of its patch
+    std::size_t size() const { return patch.size(); }
+    void Append(const Sites& others);
+  };
+  // The means of proposals for one site.
+  struct Proposed {
+    explicit Proposed(std::size_t count = 0, std::size_t stride = 0);
+    Sites sites;
+    std::vector<std::uint16_t> parents;  // how many proposed it
+    std::vector<double> clear;           // no point is nearer than this, length
+  };
+  // The points of some rounds; layers of about the same size are merged.
+  struct Layer {
+    Layer(int d, std::vector<double> placed, std::vector<double> its_shares, double reach);
+    std::vector<double> points, shares;
+    RunTree tree;
+  };
+  struct Proposal {
+    std::uint64_t name;  // in the lattice of its patch
+    std::uint32_t patch;
+    std::uint32_t parent;     // in border_
+    std::uint32_t direction;  // of the lattice
+    double share;             // of the lattice's spacing, at the proposed site
+    double clear;             // no point is nearer than this, length
+  };
+
+  std::size_t stride() const { return static_cast<std::size_t>(d_); }
+  Runs RunsOf(const std::vector<double>& points, const std::vector<double>& shares) const;
+  // The points of the sample around a run.
+  struct Placed {
+    std::vector<double> points, shares;  // d each; of the spacing
+  };
+  void GatherPlaced(const Runs& runs, std::size_t run, const std::vector<double>& shares,
+                    double radius, Placed* near) const;
+  std::vector<std::uint8_t> AreFarFromPlaced(const std::vector<double>& points,
+                                             const std::vector<double>& shares,
+                                             double distance) const;
+  void Land(const Proposal& proposal, double* point) const;
+  void ProposeFrom(std::uint32_t p, const Placed& near, std::vector<Proposal>* free) const;
+  std::vector<Proposal> FreePlaces() const;
+  Proposed ByPlace(std::vector<Proposal> proposals) const;
+  Proposed Merge(Proposed places) const;
+  std::vector<std::uint8_t> AreFree(const std::vector<double>& candidates,
+                                    const std::vector<double>& shares, const Proposed& proposed,
+                                    const std::vector<std::uint32_t>& columns) const;
+  std::vector<std::uint32_t> Choose(const std::vector<double>& candidates,
+                                    const std::vector<double>& shares, const Proposed& proposed,
+                                    const std::vector<std::uint32_t>& columns) const;
+  Sites SitesOf(const Proposed& proposed, const std::vector<std::uint32_t>& columns) const;
+  bool IsExpected(std::size_t asked, double share);
+  void Carry(Sites sites);
+
+  int d_;
+  double spacing_;
+  std::vector<double> vectors_;  // of the lattice, length, K each
+  double longest_;               // of them
+  LatticeNames names_{K};
+  std::vector<std::unique_ptr<Layer>> layers_;
+  bool is_graded_ = false;
+  std::uint64_t answered_ = 0, unexpected_ = 0;  // answers with shares; those not as expected
+  std::uint32_t size_ = 0;
+  std::uint32_t patches_ = 0;
+  Sites border_;
+  Proposed asked_;
+};
+
+STELLATE_DECLARE_CLASS(Growth)
+
+}  // namespace stellate::core
