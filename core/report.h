@@ -129,8 +129,8 @@ struct Certificate {
   std::uint64_t fibre_failures = 0;  // sampled normal flats that do not meet the mesh once nearby
   std::uint64_t fibre_samples = 0;
 
-  std::uint64_t answers_held = 0;  // answers of the whole run, besides vertices, that were
-                                   // compared with the mesh
+  std::uint64_t answers_checked = 0;  // answers of the whole run, besides vertices, that were
+                                      // compared with the mesh
 
   double max_circumradius = 0;           // max R_p(sigma), length
   double max_radius_edge = 0;            // max rho, no unit

@@ -39,33 +39,33 @@ struct BoundingBox {
 };
 
 // Where a simplex of a star is tested against a new point.
-enum class Judging {
-  kFlats,         // in each vertex's tangent space alone, as the thesis has it
+enum class CentreRule {
+  kTangentSpace,  // in each vertex's tangent space alone, as the thesis has it
   kCommonCentre,  // at one centre for all its vertices (core/geometry/common_centre.h)
 };
 
 // The constants of Chapter 5. The proofs' values are far too small to use; the defaults here are
 // the measured ones. nullopt means "the default for this k".
 struct Criteria {
-  double radius_edge_bound = 2.0;      // rho0 of rule R2, no unit, > 1
-  std::optional<double> sliver_bound;  // Theta0 of rule R3, no unit, in [0, 0.3]; 0 turns R3
-                                       // off. Default 0 for k <= 2; 0.2, 0.15, 0.1 for
-                                       // k = 3, 4, 5
-  double picking_radius = 0.4;         // delta: the picking region is B(c_p, delta R_p); in
-                                       // (0, 1)
-  double small_sliver_radius = 2.0;    // beta: only simplices of circumradius <= beta R_p
-                                       // count against a candidate; >= 1
-  std::optional<int> candidates;       // points tried in a picking region, 1..100. Default 1
-                                       // for k <= 2, 10 for k >= 3, 40 there
-                                       // where sliver_bound is above 0.25
-  std::optional<double> advance_step;  // h, length: how far the front steps over unknown
-                                       // ground. Default 3 epsilon, or a tenth of the
-                                       // bounding box's diagonal if that is more
-  std::optional<Judging> judging;      // default kFlats for k <= 2 and for graded sizes, else
-                                       // kCommonCentre
-  bool ask_ahead = false;              // sample and refine on a surrogate of M first, then
-                                       // query all those points in one batch: a handful of
-                                       // round trips for up to three times the processor time
+  double radius_edge_bound = 2.0;         // rho0 of rule R2, no unit, > 1
+  std::optional<double> sliver_bound;     // Theta0 of rule R3, no unit, in [0, 0.3]; 0 turns R3
+                                          // off. Default 0 for k <= 2; 0.2, 0.15, 0.1 for
+                                          // k = 3, 4, 5
+  double picking_radius = 0.4;            // delta: the picking region is B(c_p, delta R_p); in
+                                          // (0, 1)
+  double small_sliver_radius = 2.0;       // beta: only simplices of circumradius <= beta R_p
+                                          // count against a candidate; >= 1
+  std::optional<int> candidates;          // points tried in a picking region, 1..100. Default 1
+                                          // for k <= 2, 10 for k >= 3, 40 there
+                                          // where sliver_bound is above 0.25
+  std::optional<double> advance_step;     // h, length: how far the front steps over unknown
+                                          // ground. Default 3 epsilon, or a tenth of the
+                                          // bounding box's diagonal if that is more
+  std::optional<CentreRule> centre_rule;  // default kTangentSpace for k <= 2 and for graded sizes,
+                                          // else kCommonCentre
+  bool speculative = false;  // sample and refine on a surrogate of M first, then
+                             // query all those points in one batch: a handful of
+                             // round trips for up to three times the processor time
   // Adaptive size: where the mesh must be finer than epsilon, which stays the upper bound. Both go
   // by size(p), p a vertex:
   // - what the client says of p, where OracleCapabilities::local_size: its local feature size or

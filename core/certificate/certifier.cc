@@ -15,7 +15,7 @@
 #include "core/certificate/claims/reach_claims.h"
 #include "core/certificate/claims/sheet_claims.h"
 #include "core/certificate/evidence/probes.h"
-#include "core/certificate/evidence/rim_check.h"
+#include "core/certificate/evidence/undeclared_boundary_check.h"
 
 namespace stellate::core {
 
@@ -23,7 +23,8 @@ namespace stellate::core {
 //   1. points inside simplices, vertices, coverage probes, small steps that hold given tangent
 //      spaces against closest points, and the first step of the balls;
 //   2. tangents at the probes' closest points, by differences, if the oracle sends none; the second
-//      step of the balls; steps over what may be rims; shorter steps where small ones went wrong;
+//      step of the balls; steps over what may be boundary_check; shorter steps where small ones
+//      went wrong;
 //   of a thorough audit, also balls at the barycentres' closest points, a round later.
 // All answers, and those that were known before, are then held against the mesh.
 class Certifier::Impl {
@@ -36,7 +37,7 @@ class Certifier::Impl {
     clear_ = std::move(known.clear);
     if (mesh.faces) boundary_.emplace(x_);
     if (const std::optional<StarGeometry> stars = JudgeComplex(x_)) {
-      claims_.emplace(x_, *stars, known.leans);
+      claims_.emplace(x_, *stars, known.tangential_offsets);
       AskFirst();
     } else {
       Finish();
@@ -68,16 +69,20 @@ class Certifier::Impl {
   using Judge = std::function<void(const Eigen::MatrixXd& asked, const AnswerBlock& answer)>;
 
   struct Claims {
-    Claims(Examination& x, const StarGeometry& stars, const std::vector<double>& leans)
-        : rims(x.size), reach(x, stars), closeness(x, reach, rims), coverage(x, rims) {
-      const Eigen::Index d = x.mesh.d, count = static_cast<Eigen::Index>(leans.size()) / (2 * d);
-      const Eigen::Map<const Eigen::MatrixXd> columns(leans.data(), 2 * d, count);
+    Claims(Examination& x, const StarGeometry& stars, const std::vector<double>& tangential_offsets)
+        : boundary_check(x.size),
+          reach(x, stars),
+          closeness(x, reach, boundary_check),
+          coverage(x, boundary_check) {
+      const Eigen::Index d = x.mesh.d,
+                         count = static_cast<Eigen::Index>(tangential_offsets.size()) / (2 * d);
+      const Eigen::Map<const Eigen::MatrixXd> columns(tangential_offsets.data(), 2 * d, count);
       for (Eigen::Index i = 0; i < count; ++i) {
-        const Eigen::VectorXd lean = columns.col(i).tail(d);
-        rims.SuspectIfLeans(columns.col(i).head(d), lean, lean.norm());
+        const Eigen::VectorXd offset = columns.col(i).tail(d);
+        boundary_check.Add(columns.col(i).head(d), offset, offset.norm());
       }
     }
-    RimCheck rims;
+    UndeclaredBoundaryCheck boundary_check;
     ReachClaims reach;
     ClosenessClaims closeness;
     CoverageClaims coverage;
@@ -179,8 +184,8 @@ class Certifier::Impl {
     if (ball_steps_ <= kMaxBallSteps)
       AskWithin(c.reach.FootQuestions(),
                 [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.reach.TakeFeet(a); });
-    Ask(c.closeness.RimQuestions(),
-        [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.closeness.JudgeRims(a); });
+    Ask(c.closeness.BoundaryQuestions(),
+        [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.closeness.JudgeBoundary(a); });
     if (blocks_.empty()) Finish();
   }
 
@@ -203,7 +208,7 @@ class Certifier::Impl {
       claims_->closeness.JudgeBends();
       claims_->reach.TellWhatBallsMet();
       claims_->reach.Hold(claims_->coverage.JudgeSeen());
-      x_.certificate.answers_held =
+      x_.certificate.answers_checked =
           x_.seen.size() / static_cast<std::size_t>(x_.mesh.d) + claims_->closeness.points_held();
       claims_->reach.Judge();
       if (boundary_) boundary_->JudgeReach();

@@ -42,7 +42,7 @@ bool Findings::MayBeBoundary() const {
       case kLinks:
       case kConsistency:
       case kStars:
-      case kRim:
+      case kUndeclaredBoundary:
       case kBarycentres:
       case kCoverage:
       case kFibres:
@@ -135,7 +135,7 @@ void Findings::Conclude(int k, const Specification& spec, Certificate& certifica
       spec.audit == Audit::kThorough ? "balls at every vertex and simplex"
                                      : "balls at some vertices",
       " show no reach below ", Brief(certificate.estimated_reach), ", and all of ",
-      certificate.answers_held,
+      certificate.answers_checked,
       " answers that are no vertices lie on the mesh. Assumed: that the manifold has no ",
       has_walls ? "boundary but its walls, and no part, hole or void" : "boundary, and no part",
       " narrower than epsilon that no question came near. ", unseen, declared);

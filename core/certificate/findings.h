@@ -39,7 +39,7 @@ class Findings {
     kVertices,
     kTangents,
     kReach,
-    kRim,
+    kUndeclaredBoundary,
     kBarycentres,
     kCoverage,
     kFibres,

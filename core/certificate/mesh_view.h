@@ -23,10 +23,13 @@ struct MeshView {
   const WallSet* walls = nullptr;
   const double* outward = nullptr;
   const std::vector<FaceMesh>* faces = nullptr;
-  const double* guards = nullptr;  // by vertex, squared radii (Sample::SetGuards); null: none
+  const double* protecting_radii2 =
+      nullptr;  // by vertex, squared radii (Sample::SetProtectingBalls); null: none
 
   WallSet WallsOf(std::uint32_t v) const { return walls ? walls[v] : 0; }
-  double GuardOf(std::uint32_t v) const { return guards ? guards[v] : 0; }
+  double ProtectingRadius2(std::uint32_t v) const {
+    return protecting_radii2 ? protecting_radii2[v] : 0;
+  }
   const double* Outward(std::uint32_t v) const { return outward + std::size_t{v} * k; }
   const double* Point(std::uint32_t v) const { return points + std::size_t{v} * d; }
   const double* Tangent(std::uint32_t v) const { return tangents + std::size_t{v} * d * k; }
@@ -64,11 +67,11 @@ struct EndsOfManifold {
 
 // What was learned of M before, while the mesh was made.
 struct KnownOfManifold {
-  std::vector<double> points;  // of M, d each, that are no vertices
-  std::vector<double> leans;   // where M may end: points y of M and the parts of q - y along
-                               // it (RimCheck), 2 d each
-  EndsOfManifold ends;         // that are no vertices
-  ClearPoints clear;           // whatever was answered, vertices too
+  std::vector<double> points;              // of M, d each, that are no vertices
+  std::vector<double> tangential_offsets;  // where M may end: points y of M and the parts of q - y
+                                           // along it (UndeclaredBoundaryCheck), 2 d each
+  EndsOfManifold ends;  // that are no vertices
+  ClearPoints clear;    // whatever was answered, vertices too
 };
 
 }  // namespace stellate::core

@@ -5,7 +5,7 @@
 #include <span>
 
 #include "core/base/parallel.h"
-#include "core/geometry/laid_polygon.h"
+#include "core/geometry/draft_polygon.h"
 
 namespace stellate::core {
 namespace {
@@ -227,7 +227,8 @@ void BuildFromAround(const StarBuilder<K>& builder, const Site& p, PointsAround&
 template <int K>
 void BulkStarBuilder<K>::Build(Blocks<Cell>* stars, double* influence) const {
   if constexpr (K == 2)
-    if (builder_.options().judging == Judging::kFlats && !sample_.has_guards())
+    if (builder_.options().centre_rule == CentreRule::kTangentSpace &&
+        !sample_.has_protecting_balls())
       return BuildPolygons(stars, influence);
   const std::vector<BallTree::Bunch> bunches = sample_.tree().Bunches();
   ParallelFor(bunches.size(), [&](std::size_t b) {
@@ -304,7 +305,7 @@ double BulkStarBuilder<K>::BuildPolygon(const Site& p, const GatheredPoints& gat
   } else {
     thread_local std::vector<std::uint32_t> farther;
     thread_local GatheredPoints more;
-    thread_local LaidPolygon polygon;
+    thread_local DraftPolygon polygon;
     const int d = sample_.d();
     const double weight = sample_.Weight(p.id), bound = sample_.BoundAt(p.id);
     const auto search = [&](double reach) {

@@ -58,9 +58,12 @@ void Sample<K>::NameLast(std::uint32_t name) {
 }
 
 template <int K>
-void Sample<K>::SetGuards(std::vector<double> radii2) {
-  guards_ = std::move(radii2);
-  largest_guard_ = guards_.empty() ? 0 : *std::max_element(guards_.begin(), guards_.end());
+void Sample<K>::SetProtectingBalls(std::vector<double> radii2) {
+  protecting_radii2_ = std::move(radii2);
+  largest_protecting_radius2_ =
+      protecting_radii2_.empty()
+          ? 0
+          : *std::max_element(protecting_radii2_.begin(), protecting_radii2_.end());
   centre_owner_ = {};
 }
 
@@ -73,12 +76,12 @@ Eigen::MatrixXd Sample<K>::TangentMatrix() const {
 }
 
 template <int K>
-bool Sample<K>::InGuard(const double* point) const {
-  if (!has_guards()) return false;
+bool Sample<K>::InProtectingBall(const double* point) const {
+  if (!has_protecting_balls()) return false;
   bool in = false;
   tree().VisitNear(
-      point, [&] { return std::sqrt(largest_guard_); },
-      [&](std::uint32_t id, double distance2) { in = in || distance2 < GuardOf(id); });
+      point, [&] { return std::sqrt(largest_protecting_radius2_); },
+      [&](std::uint32_t id, double distance2) { in = in || distance2 < ProtectingRadius2(id); });
   return in;
 }
 

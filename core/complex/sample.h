@@ -75,7 +75,7 @@ class Sample {
   // Sets the protecting balls around points of sharp edges: `radii2` by point, squared radii, 0:
   // none; later points have none. A squared radius is added to the point's weight, so that what
   // lies outside the balls comes no nearer to an edge than the edge's own points do.
-  void SetGuards(std::vector<double> radii2);
+  void SetProtectingBalls(std::vector<double> radii2);
 
   std::uint32_t size() const { return static_cast<std::uint32_t>(points_.size()); }
   int d() const { return d_; }
@@ -95,17 +95,21 @@ class Sample {
   }
   Site At(std::uint32_t id) const { return {id, Point(id), Tangent(id), walls(id), Conormals(id)}; }
 
-  bool has_guards() const { return largest_guard_ > 0; }
-  double largest_guard() const { return largest_guard_; }  // squared radius
+  bool has_protecting_balls() const { return largest_protecting_radius2_ > 0; }
+  double largest_protecting_radius2() const {
+    return largest_protecting_radius2_;
+  }  // squared radius
   // Squared radius; 0: the point has none.
-  double GuardOf(std::uint32_t id) const { return id < guards_.size() ? guards_[id] : 0; }
-  bool InGuard(const double* point) const;
+  double ProtectingRadius2(std::uint32_t id) const {
+    return id < protecting_radii2_.size() ? protecting_radii2_[id] : 0;
+  }
+  bool InProtectingBall(const double* point) const;
   // Cospherical points would have every star decide alone how to split them; weights this much
   // larger than rounding, and this much smaller than anything geometric, make all decide alike.
   double Weight(std::uint32_t id) const {
     // Of a signed number, which takes an instruction where an unsigned one takes a branch.
     const auto bits = static_cast<std::int64_t>(Mix64(NameOf(id)) >> 11);
-    return weight_scale_ * (static_cast<double>(bits) * 0x1p-53) + GuardOf(id);
+    return weight_scale_ * (static_cast<double>(bits) * 0x1p-53) + ProtectingRadius2(id);
   }
   // The size bound at a point: how far to look at first for what cuts its star.
   double BoundAt(std::uint32_t id) const { return bounds_.empty() ? epsilon_ : bounds_[id]; }
@@ -165,8 +169,8 @@ class Sample {
   std::vector<WallSet> walls_;
   std::vector<std::uint32_t> conormals_at_;
   std::vector<double> conormals_;
-  std::vector<double> guards_;  // squared radii, by point, up to the last; or empty
-  double largest_guard_ = 0;
+  std::vector<double> protecting_radii2_;  // squared radii, by point, up to the last; or empty
+  double largest_protecting_radius2_ = 0;
   std::vector<double> bounds_;  // size bounds, by point, until ForgetBounds(); or empty
   std::vector<std::uint32_t> boundary_;
   IndexedPoints boundary_points_;

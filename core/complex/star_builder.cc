@@ -1,8 +1,8 @@
 #include "core/complex/star_builder.h"
 
 #include "core/complex/star_surroundings.h"
-#include "core/geometry/laid_polygon.h"
-#include "core/geometry/laid_polytope.h"
+#include "core/geometry/draft_polygon.h"
+#include "core/geometry/draft_polytope.h"
 
 namespace stellate::core {
 namespace {
@@ -84,8 +84,8 @@ bool Contains(std::span<const std::uint32_t> ids, std::uint32_t id) {
 }
 
 // One for each thread.
-LaidPolygon& BuilderPolygon() {
-  thread_local LaidPolygon polygon;
+DraftPolygon& BuilderPolygon() {
+  thread_local DraftPolygon polygon;
   return polygon;
 }
 
@@ -99,7 +99,7 @@ typename StarBuilder<K>::Cell::Scratch& StarBuilder<K>::ThreadScratch() {
 
 template <int K>
 double StarBuilder<K>::HalfSpace(const Site& p, std::uint32_t id, double* normal) const {
-  return StarSurroundings<K>(*this, p, options_.judging).HalfSpace(id, normal);
+  return StarSurroundings<K>(*this, p, options_.centre_rule).HalfSpace(id, normal);
 }
 
 template <int K>
@@ -107,7 +107,7 @@ bool StarBuilder<K>::Clip(const Site& p, const Site& q, const Cell* born, Cell* 
   Step step(sample_.d());
   double normal[K];
   const double offset = HalfSpace(p, q, step.data(), normal);
-  const StarSurroundings<K> around(*this, p, options_.judging, &q, born);
+  const StarSurroundings<K> around(*this, p, options_.centre_rule, &q, born);
   return star->Clip(q.id, normal, offset, ThreadScratch(), around, step.data());
 }
 
@@ -123,7 +123,8 @@ template <int K>
 void StarBuilder<K>::Cut(const Site& p, std::span<const StarCut> cuts, const Blocks<Cell>& stars,
                          Cell* star) const {
   if constexpr (K == 2)
-    if (options_.judging == Judging::kFlats && p.walls == 0) return CutPolygon(p, cuts, star);
+    if (options_.centre_rule == CentreRule::kTangentSpace && p.walls == 0)
+      return CutPolygon(p, cuts, star);
   for (const StarCut& cut : cuts) Clip(p, sample_.At(cut.by), &stars[cut.by], star);
 }
 
@@ -131,7 +132,7 @@ void StarBuilder<K>::Cut(const Site& p, std::span<const StarCut> cuts, const Blo
 template <int K>
 void StarBuilder<K>::CutPolygon(const Site& p, std::span<const StarCut> cuts, Cell* star) const {
   if constexpr (K == 2) {
-    LaidPolygon& polygon = BuilderPolygon();
+    DraftPolygon& polygon = BuilderPolygon();
     const int d = sample_.d();
     const double weight = sample_.Weight(p.id);
     const auto half_space = [&](std::uint32_t q, double* normal) {
@@ -151,7 +152,7 @@ void StarBuilder<K>::CutPolygon(const Site& p, std::span<const StarCut> cuts, Ce
 // The cell before any other point is known.
 template <int K>
 void StarBuilder<K>::Reset(const Site& p, Cell* star) const {
-  const StarSurroundings<K> around(*this, p, options_.judging);
+  const StarSurroundings<K> around(*this, p, options_.centre_rule);
   star->Reset(options_.inradius, around);
   if (p.walls == 0) return;
   Step step(sample_.d());
@@ -166,17 +167,17 @@ void StarBuilder<K>::Reset(const Site& p, Cell* star) const {
 
 // The same of a cell that is judged at common centres only when it is done.
 template <int K>
-void StarBuilder<K>::ResetInFlats(const Site& p, Cell* star) const {
-  star->Reset(options_.inradius, StarSurroundings<K>(*this, p, Judging::kFlats));
+void StarBuilder<K>::ResetInTangentSpace(const Site& p, Cell* star) const {
+  star->Reset(options_.inradius, StarSurroundings<K>(*this, p, CentreRule::kTangentSpace));
 }
 
 template <int K>
-bool StarBuilder<K>::ClipInFlats(const Site& p, const Site& q, Cell* star) const {
+bool StarBuilder<K>::ClipInTangentSpace(const Site& p, const Site& q, Cell* star) const {
   Step step(sample_.d());
   double normal[K];
   const double offset = HalfSpace(p, q, step.data(), normal);
   return star->Clip(q.id, normal, offset, ThreadScratch(),
-                    StarSurroundings<K>(*this, p, Judging::kFlats));
+                    StarSurroundings<K>(*this, p, CentreRule::kTangentSpace));
 }
 
 // Clips a cell in the flats that is built apart from RestrictedVoronoiCell.
@@ -197,7 +198,7 @@ bool StarBuilder<K>::Judge(const Site& p, const NearPoints& near, Cell* star) co
   if constexpr (K == 2) {
     return false;
   } else {
-    star->Judge(StarSurroundings<K>(*this, p, options_.judging));
+    star->Judge(StarSurroundings<K>(*this, p, options_.centre_rule));
     if (near.empty()) return true;
     thread_local JudgedPlaces<K> places;
     places.Take(*star);
@@ -236,17 +237,17 @@ double StarBuilder<K>::MaxNorm2OnFaces(const Cell& star) {
 // midst of the sample, to which R1 would add points forever. It is closed in the flats then, and
 // judged: where it is not as it would be there stars disagree, which R4 mends.
 template <int K>
-void StarBuilder<K>::CloseInFlats(const Site& p, Cell* star) const {
+void StarBuilder<K>::CloseInTangentSpace(const Site& p, Cell* star) const {
   const bool has_joined = p.id < sample_.size();
-  if (K < 3 || !has_joined || options_.judging != Judging::kCommonCentre || p.walls != 0 ||
+  if (K < 3 || !has_joined || options_.centre_rule != CentreRule::kCommonCentre || p.walls != 0 ||
       star->bounded())
     return;
   thread_local Cell flat;
-  ResetInFlats(p, &flat);
+  ResetInTangentSpace(p, &flat);
   sample_.tree().VisitNear(
       p.point, [&] { return Influence(p.id, flat); },
       [&](std::uint32_t q, double) {
-        if (q != p.id) ClipInFlats(p, sample_.At(q), &flat);
+        if (q != p.id) ClipInTangentSpace(p, sample_.At(q), &flat);
       });
   if (!flat.bounded()) return;
   Judge(p, {}, &flat);
@@ -279,14 +280,14 @@ void StarBuilder<K>::BuildAsFound(const Site& p, std::span<const std::uint32_t> 
   ClipAsFound(
       p, first, [&] { return Influence(p.id, *star); },
       [&](std::uint32_t q) { return Clip(p, sample_.At(q), nullptr, star); }, influenced);
-  CloseInFlats(p, star);
+  CloseInTangentSpace(p, star);
 }
 
 template <int K>
 void StarBuilder<K>::BuildPolygon(const Site& p, std::span<const std::uint32_t> first, Cell* star,
                                   std::vector<std::uint32_t>* influenced) const {
   if constexpr (K == 2) {
-    LaidPolygon& polygon = BuilderPolygon();
+    DraftPolygon& polygon = BuilderPolygon();
     const double weight = sample_.Weight(p.id);
     polygon.Reset(options_.inradius);
     ClipAsFound(
@@ -307,7 +308,7 @@ bool StarBuilder<K>::BuildPolytope(const Site& p, std::span<const std::uint32_t>
   if constexpr (K != 3) {
     return false;
   } else {
-    LaidPolytope& polytope = ThreadPolytope();
+    DraftPolytope& polytope = ThreadPolytope();
     Step step(sample_.d());
     polytope.Reset(options_.inradius);
     ClipAsFound(
@@ -321,12 +322,13 @@ bool StarBuilder<K>::BuildPolytope(const Site& p, std::span<const std::uint32_t>
 
 // Returns false where that will not do, which depends on what lies around p alone.
 template <int K>
-bool StarBuilder<K>::BuildAsInFlats(const Site& p, std::span<const std::uint32_t> first, Cell* star,
-                                    std::vector<std::uint32_t>* influenced) const {
+bool StarBuilder<K>::BuildAsInTangentSpace(const Site& p, std::span<const std::uint32_t> first,
+                                           Cell* star,
+                                           std::vector<std::uint32_t>* influenced) const {
   if constexpr (K != 3) {
     return false;
   } else {
-    LaidPolytope& polytope = ThreadPolytope();
+    DraftPolytope& polytope = ThreadPolytope();
     thread_local NearPoints around;
     Step step(sample_.d());
     polytope.Reset(options_.inradius);
@@ -377,7 +379,7 @@ void StarBuilder<K>::BuildNearestFirst(const Site& p, double known, NearPoints* 
   CutByNear(
       known, near, [&] { return Influence(p.id, *star); },
       [&](std::uint32_t q) { return Clip(p, sample_.At(q), nullptr, star); }, search);
-  CloseInFlats(p, star);
+  CloseInTangentSpace(p, star);
 }
 
 template <int K>
@@ -385,18 +387,18 @@ void StarBuilder<K>::Build(const Site& p, std::span<const std::uint32_t> first, 
                            std::vector<std::uint32_t>* influenced) const {
   influenced->clear();
   if (p.walls != 0) return BuildAsFound(p, first, star, influenced);
-  const bool in_flats = options_.judging == Judging::kFlats;
+  const bool in_tangent_space = options_.centre_rule == CentreRule::kTangentSpace;
   if constexpr (K == 2) {
     const bool has_joined = p.id < sample_.size();
-    if (in_flats && has_joined && !sample_.has_guards())
+    if (in_tangent_space && has_joined && !sample_.has_protecting_balls())
       return BuildPolygon(p, first, star, influenced);
   }
   if constexpr (K == 3) {
-    if (!in_flats && !options_.boundary_only) {
-      if (!BuildAsInFlats(p, first, star, influenced)) BuildNearestFirst(p, star);
+    if (!in_tangent_space && !options_.boundary_only) {
+      if (!BuildAsInTangentSpace(p, first, star, influenced)) BuildNearestFirst(p, star);
       return;
     }
-    if (in_flats && !options_.boundary_only && !sample_.has_guards()) {
+    if (in_tangent_space && !options_.boundary_only && !sample_.has_protecting_balls()) {
       if (BuildPolytope(p, first, star, influenced)) return;
       influenced->clear();
     }
@@ -406,10 +408,10 @@ void StarBuilder<K>::Build(const Site& p, std::span<const std::uint32_t> first, 
 
 // Builds the cell in the flats. Afterwards `near` holds all points within `known`.
 template <int K>
-void StarBuilder<K>::CutInFlats(const Site& p, double* known, NearPoints* near,
-                                const Search& search, Cell* star) const {
+void StarBuilder<K>::CutInTangentSpace(const Site& p, double* known, NearPoints* near,
+                                       const Search& search, Cell* star) const {
   if constexpr (K == 3) {
-    LaidPolytope& polytope = ThreadPolytope();
+    DraftPolytope& polytope = ThreadPolytope();
     Step step(sample_.d());
     polytope.Reset(options_.inradius);
     *known = CutByNear(
@@ -417,26 +419,26 @@ void StarBuilder<K>::CutInFlats(const Site& p, double* known, NearPoints* near,
         [&](std::uint32_t q) { return ClipApart(p, q, step.data(), &polytope); }, search);
     if (!polytope.gave_up()) return star->Take(polytope);
   }
-  ResetInFlats(p, star);
+  ResetInTangentSpace(p, star);
   *known = CutByNear(
       *known, near, [&] { return Influence(p.id, *star); },
-      [&](std::uint32_t q) { return ClipInFlats(p, sample_.At(q), star); }, search);
+      [&](std::uint32_t q) { return ClipInTangentSpace(p, sample_.At(q), star); }, search);
 }
 
 // Most stars are the same in the flats, where clips cost a fraction. Returns false where that is
 // not so, and the star has to be judged all along.
 template <int K>
-bool StarBuilder<K>::BuildInFlats(const Site& p, double* known, NearPoints* near,
-                                  const Search& search, Cell* star) const {
-  CutInFlats(p, known, near, search, star);
+bool StarBuilder<K>::BuildInTangentSpace(const Site& p, double* known, NearPoints* near,
+                                         const Search& search, Cell* star) const {
+  CutInTangentSpace(p, known, near, search, star);
   return Judge(p, *near, star) && Influence(p.id, *star) <= *known;
 }
 
 template <int K>
 void StarBuilder<K>::BuildFromNear(const Site& p, double known, NearPoints* near,
                                    const Search& search, Cell* star) const {
-  if (K > 2 && options_.judging == Judging::kCommonCentre && p.walls == 0 &&
-      BuildInFlats(p, &known, near, search, star))
+  if (K > 2 && options_.centre_rule == CentreRule::kCommonCentre && p.walls == 0 &&
+      BuildInTangentSpace(p, &known, near, search, star))
     return;
   BuildNearestFirst(p, known, near, search, star);
 }

@@ -24,8 +24,8 @@ inline constexpr double kWallOffset = 1e-12;
 
 // How the stars of a mesh are built.
 struct StarOptions {
-  double inradius = 0;                // of the fake simplex that each cell begins as, length
-  Judging judging = Judging::kFlats;  // where simplices are judged
+  double inradius = 0;  // of the fake simplex that each cell begins as, length
+  CentreRule centre_rule = CentreRule::kTangentSpace;  // where simplices are judged
   // Stars are built no farther out than their simplices of boundary faces reach. Those inside would
   // reach from one side of M to the other while the boundary is meshed by itself.
   bool boundary_only = false;
@@ -60,7 +60,8 @@ using NearPoints = std::vector<std::pair<double, std::uint32_t>>;
 //   2  flats    inside, no guards        BuildPolygon: without half-spaces being found twice
 //   3  flats    inside, no guards        BuildPolytope: without knowing who is next to whom; if
 //                                        rounding spoils that, BuildAsFound
-//   3  common   inside                   BuildAsInFlats: a polytope in the flats, judged when it is
+//   3  common   inside                   BuildAsInTangentSpace: a polytope in the flats, judged
+//   when it is
 //                                        done; if that is not the star, BuildNearestFirst
 //   any other case                       BuildAsFound: a cell, clipped as the search tree goes
 //
@@ -110,8 +111,9 @@ class StarBuilder {
   }
   // The same for vertices no farther out than the root of `most2`.
   double Influence(std::uint32_t p, double most2) const {
-    if (!sample_.has_guards()) return InfluenceWithin(most2);
-    const double power2 = std::max(most2 - sample_.GuardOf(p) + sample_.largest_guard(), 0.0);
+    if (!sample_.has_protecting_balls()) return InfluenceWithin(most2);
+    const double power2 =
+        std::max(most2 - sample_.ProtectingRadius2(p) + sample_.largest_protecting_radius2(), 0.0);
     return (std::sqrt(most2) + std::sqrt(power2)) * (1 + 1e-9);
   }
   // The same where there are no guards.
@@ -138,26 +140,26 @@ class StarBuilder {
                     std::vector<std::uint32_t>* influenced) const;
   bool BuildPolytope(const Site& p, std::span<const std::uint32_t> first, Cell* star,
                      std::vector<std::uint32_t>* influenced) const;
-  bool BuildAsInFlats(const Site& p, std::span<const std::uint32_t> first, Cell* star,
-                      std::vector<std::uint32_t>* influenced) const;
+  bool BuildAsInTangentSpace(const Site& p, std::span<const std::uint32_t> first, Cell* star,
+                             std::vector<std::uint32_t>* influenced) const;
   void BuildAsFound(const Site& p, std::span<const std::uint32_t> first, Cell* star,
                     std::vector<std::uint32_t>* influenced) const;
   void BuildNearestFirst(const Site& p, Cell* star) const;
   void BuildNearestFirst(const Site& p, double known, NearPoints* near, const Search& search,
                          Cell* star) const;
-  bool BuildInFlats(const Site& p, double* known, NearPoints* near, const Search& search,
-                    Cell* star) const;
-  void CutInFlats(const Site& p, double* known, NearPoints* near, const Search& search,
-                  Cell* star) const;
+  bool BuildInTangentSpace(const Site& p, double* known, NearPoints* near, const Search& search,
+                           Cell* star) const;
+  void CutInTangentSpace(const Site& p, double* known, NearPoints* near, const Search& search,
+                         Cell* star) const;
   template <typename Reach, typename ClipBy>
   void ClipAsFound(const Site& p, std::span<const std::uint32_t> first, const Reach& reach_now,
                    const ClipBy& clip, std::vector<std::uint32_t>* influenced) const;
-  void CloseInFlats(const Site& p, Cell* star) const;
+  void CloseInTangentSpace(const Site& p, Cell* star) const;
   void CutPolygon(const Site& p, std::span<const StarCut> cuts, Cell* star) const;
 
   void Reset(const Site& p, Cell* star) const;
-  void ResetInFlats(const Site& p, Cell* star) const;
-  bool ClipInFlats(const Site& p, const Site& q, Cell* star) const;
+  void ResetInTangentSpace(const Site& p, Cell* star) const;
+  bool ClipInTangentSpace(const Site& p, const Site& q, Cell* star) const;
   template <typename Polytope>
   bool ClipApart(const Site& p, std::uint32_t q, double* step, Polytope* polytope) const;
   bool Judge(const Site& p, const NearPoints& near, Cell* star) const;

@@ -22,15 +22,15 @@ class StarSurroundings final : public Surroundings<K> {
   using Cell = RestrictedVoronoiCell<K>;
   using Simplex = typename CentreCache<K>::Simplex;
 
-  // judging   instead of the builder's
+  // centre_rule   instead of the builder's
   // newcomer  the site that cuts p's cell now, which may not be in the sample
   // born      the newcomer's star if there is one, in which centres are looked up first
-  StarSurroundings(const StarBuilder<K>& builder, const Site& p, Judging judging,
+  StarSurroundings(const StarBuilder<K>& builder, const Site& p, CentreRule centre_rule,
                    const Site* newcomer = nullptr, const Cell* born = nullptr)
       : sample_(builder.sample()),
         builder_(builder),
         p_(p),
-        judging_(judging),
+        centre_rule_(centre_rule),
         newcomer_(newcomer),
         born_(born) {}
 
@@ -46,7 +46,9 @@ class StarSurroundings final : public Surroundings<K> {
     return builder_.HalfSpace(p_, Find(id), step.data(), normal);
   }
 
-  int judged_in() const override { return judging_ == Judging::kFlats ? 0 : sample_.d(); }
+  int judged_in() const override {
+    return centre_rule_ == CentreRule::kTangentSpace ? 0 : sample_.d();
+  }
 
   bool Centre(const std::uint32_t* ids, std::uint64_t key, double* x,
               double* centre) const override {
@@ -236,7 +238,7 @@ class StarSurroundings final : public Surroundings<K> {
   const Sample<K>& sample_;
   const StarBuilder<K>& builder_;
   const Site& p_;
-  const Judging judging_;
+  const CentreRule centre_rule_;
   const Site* newcomer_;
   const Cell* born_;
 };

@@ -56,7 +56,7 @@ void Stars<K>::ForEachOwned(std::uint32_t p, const Visit& visit) const {
   if (options_.boundary_only) return;
   const Cell& cell = cells_[p];
   if constexpr (K == 2) {
-    if (judging() == Judging::kFlats) return ForEachOwnedTriangle(p, cell, visit);
+    if (centre_rule() == CentreRule::kTangentSpace) return ForEachOwnedTriangle(p, cell, visit);
   }
   Simplex simplex;
   thread_local std::vector<std::uint64_t> keys;
@@ -65,7 +65,7 @@ void Stars<K>::ForEachOwned(std::uint32_t p, const Visit& visit) const {
     bool lowest = true;
     for (int i = 0; i < K; ++i) lowest = lowest && cell.id(cell.facet(v, i)) > p;
     if (!lowest || !SimplexOf(p, cell, v, &simplex)) continue;
-    if (judging() == Judging::kCommonCentre) {
+    if (centre_rule() == CentreRule::kCommonCentre) {
       if (std::find(keys.begin(), keys.end(), cell.key(v)) != keys.end()) continue;
       keys.push_back(cell.key(v));
     }
@@ -101,15 +101,16 @@ double Stars<K>::EdgeLength2(std::uint32_t p, std::size_t facet) const {
   if constexpr (K == 2)
     return SquaredDistance(sample_.Point(p), sample_.Point(q), sample_.d());
   else
-    return 2 * cells_[p].offset(facet) - sample_.GuardOf(p) + sample_.GuardOf(q);
+    return 2 * cells_[p].offset(facet) - sample_.ProtectingRadius2(p) +
+           sample_.ProtectingRadius2(q);
 }
 
 template <int K>
 bool Stars<K>::CutsVertex(std::uint32_t p, std::size_t vertex, const double* point) const {
   Step step(sample_.d());
   double normal[K];
-  const double offset =
-      0.5 * (sample_.Project(sample_.At(p), point, step.data(), normal) + sample_.GuardOf(p));
+  const double offset = 0.5 * (sample_.Project(sample_.At(p), point, step.data(), normal) +
+                               sample_.ProtectingRadius2(p));
   return cells_[p].WouldCutVertex(vertex, normal, offset, step.data());
 }
 
@@ -151,8 +152,8 @@ std::optional<typename Stars<K>::CellVertex> Stars<K>::EncroachedBy(const double
     if (IsSubset(sample_.walls(p), walls)) return;
     const Cell& cell = cells_[p];
     double normal[K];
-    const double offset =
-        0.5 * (sample_.Project(sample_.At(p), point, step.data(), normal) + sample_.GuardOf(p));
+    const double offset = 0.5 * (sample_.Project(sample_.At(p), point, step.data(), normal) +
+                                 sample_.ProtectingRadius2(p));
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
       // Few vertices are cut, so that this is checked first.
       if (!cell.WouldCutVertex(v, normal, offset, step.data())) continue;
@@ -442,8 +443,8 @@ typename Stars<K>::Change Stars<K>::BuildAllInBulk() {
 }
 
 template <int K>
-void Stars<K>::SetGuards(std::vector<double> radii2) {
-  sample_.SetGuards(std::move(radii2));
+void Stars<K>::SetProtectingBalls(std::vector<double> radii2) {
+  sample_.SetProtectingBalls(std::move(radii2));
   BuildAllAsAdded();
 }
 

@@ -64,9 +64,9 @@ class Stars {
   void RestrictToBoundary() { options_.boundary_only = true; }
   // Ends that: the next Commit builds all stars again, whole.
   void IncludeInterior() { includes_interior_next_ = options_.boundary_only; }
-  // Sets protecting balls (see Sample::SetGuards), and builds all stars again. REQUIRES: nothing
-  // waits for Commit.
-  void SetGuards(std::vector<double> radii2);
+  // Sets protecting balls (see Sample::SetProtectingBalls), and builds all stars again. REQUIRES:
+  // nothing waits for Commit.
+  void SetProtectingBalls(std::vector<double> radii2);
 
   // What Commit changed.
   struct Change {
@@ -83,7 +83,7 @@ class Stars {
   // The sample with the points that wait for Commit; there are stars of all others.
   const Sample<K>& sample() const { return sample_; }
   std::uint32_t size() const { return sample_.size(); }
-  Judging judging() const { return options_.judging; }
+  CentreRule centre_rule() const { return options_.centre_rule; }
   const Cell& cell(std::uint32_t id) const { return cells_[id]; }
   // Simplices in the star of their lowest vertex: K+1 ids each, and how many there are.
   std::vector<std::uint32_t> Simplices() const;
@@ -117,12 +117,12 @@ class Stars {
   FaceSimplex FaceSimplexOf(std::uint32_t p, const Cell& cell, std::size_t v,
                             WallSet guest_walls = 0) const;
   // Whether p or a sample point of a facet at vertex v of its cell is guarded.
-  bool TouchesGuard(std::uint32_t p, const Cell& cell, std::size_t v) const {
-    if (!sample_.has_guards()) return false;
-    bool touches = sample_.GuardOf(p) > 0;
+  bool TouchesProtectingBall(std::uint32_t p, const Cell& cell, std::size_t v) const {
+    if (!sample_.has_protecting_balls()) return false;
+    bool touches = sample_.ProtectingRadius2(p) > 0;
     for (int s = 0; s < K; ++s) {
       const std::uint32_t id = cell.id(cell.facet(v, s));
-      touches = touches || (IsSample(id) && sample_.GuardOf(id) > 0);
+      touches = touches || (IsSample(id) && sample_.ProtectingRadius2(id) > 0);
     }
     return touches;
   }

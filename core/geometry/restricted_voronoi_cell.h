@@ -14,7 +14,7 @@
 
 namespace stellate::core {
 
-class LaidPolytope;
+class DraftPolytope;
 
 // The Voronoi cell of a sample point p restricted to T_pM (Lemma 2.4.2), in tangent coordinates
 // with p at the origin:
@@ -54,7 +54,7 @@ class RestrictedVoronoiCell {
 
   // Becomes a polytope that was made apart, in the flats; nothing is judged. REQUIRES: K = 3, and
   // it did not give up.
-  void Take(const LaidPolytope& polytope);
+  void Take(const DraftPolytope& polytope);
 
   // Cuts away { x : normal . x > offset }. Returns whether anything was cut. A half-space that
   // would cut everything away (it cannot, for offset > 0, but in rounding) is refused. Where
@@ -169,7 +169,7 @@ class RestrictedVoronoiCell {
 };
 
 template <>
-void RestrictedVoronoiCell<3>::Take(const LaidPolytope& polytope);
+void RestrictedVoronoiCell<3>::Take(const DraftPolytope& polytope);
 
 extern template class RestrictedVoronoiCell<1>;
 extern template class RestrictedVoronoiCell<3>;

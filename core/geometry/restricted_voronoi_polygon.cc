@@ -2,8 +2,8 @@
 
 #include <cmath>
 
+#include "core/geometry/draft_polygon.h"
 #include "core/geometry/half_spaces.h"
-#include "core/geometry/laid_polygon.h"
 
 namespace stellate::core {
 
@@ -53,7 +53,7 @@ void Polygon::Reset(double inradius, const Surroundings<2>& around) {
   for (std::size_t v = 0; v < 3; ++v) around.Lift(x(v), centres_->at.data() + v * d);
 }
 
-void Polygon::Take(const LaidPolygon& polygon) {
+void Polygon::Take(const DraftPolygon& polygon) {
   centres_.reset();
   Resize(polygon.count());
   double* const x = corners();

@@ -12,7 +12,7 @@
 
 namespace stellate::core {
 
-class LaidPolygon;
+class DraftPolygon;
 
 template <int K>
 class RestrictedVoronoiCell;  // for any other K: restricted_voronoi_cell.h
@@ -37,7 +37,7 @@ class RestrictedVoronoiCell<2> {
 
   void Reset(double inradius, const Surroundings<2>& around);
   // Becomes a polygon that was made apart; nothing is judged.
-  void Take(const LaidPolygon& polygon);
+  void Take(const DraftPolygon& polygon);
   bool Clip(std::uint32_t id, const double* normal, double offset, Scratch& scratch,
             const Surroundings<2>& around, const double* step = nullptr);
 

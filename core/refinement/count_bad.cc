@@ -42,7 +42,7 @@ int CountBad(const Stars<K>& stars, const double* point,
                                    std::size_t v) {
     return (bounds.sharpest_cosine < 1 &&
             HasSharpDihedral<K>(stars, p, at, cell, v, bounds.sharpest_cosine, point)) ||
-           (!stars.TouchesGuard(p, cell, v) &&
+           (!stars.TouchesProtectingBall(p, cell, v) &&
             (HasThinFaceAt<K>(stars, at, cell, v, bounds.sliver_bound, point) ||
              TiltsTooFar<K>(stars, p, at, cell, v, bounds.reach, point)));
   };

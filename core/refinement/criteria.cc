@@ -55,13 +55,14 @@ ResolvedCriteria Resolve(const Specification& spec) {
                                        : r.shape.sliver_bound > kFatter ? kCandidatesForFatter
                                                                         : kCandidates);
   r.flat_alternations = c.flat_alternations;
-  r.ask_ahead = c.ask_ahead;
+  r.speculative = c.speculative;
   r.size_rate = c.size_rate.value_or(INFINITY);
   r.max_deviation = c.max_deviation.value_or(INFINITY);
   // Common centres mean something well below the local feature size; they are looked for up to
   // epsilon, which is far above it where the size is graded.
   const bool flats = spec.dimension <= 2 || r.graded();
-  r.judging = c.judging.value_or(flats ? Judging::kFlats : Judging::kCommonCentre);
+  r.centre_rule =
+      c.centre_rule.value_or(flats ? CentreRule::kTangentSpace : CentreRule::kCommonCentre);
   r.sizes_given = r.graded() && spec.oracle.local_size;
   double step = kDefaultAdvanceEpsilons * r.epsilon;
   if (spec.bounding_box) {

@@ -13,8 +13,8 @@ struct ResolvedCriteria {
   double inradius;  // of the fake simplex that a cell begins as, length
   ShapeBounds shape;
   int candidates, flat_alternations;
-  bool ask_ahead;
-  Judging judging;
+  bool speculative;
+  CentreRule centre_rule;
   double size_rate, max_deviation;  // infinity: no such criterion
   bool sizes_given;                 // graded by the client's sizes
   bool graded() const { return std::isfinite(size_rate) || std::isfinite(max_deviation); }

@@ -47,7 +47,7 @@ Engine<K>::Engine(const Specification& spec, const ResolvedCriteria& criteria)
       asks_flats_(spec.oracle.intersect_flat),
       random_seed_(spec.random_seed),
       max_vertices_(spec.limits.max_vertices),
-      stars_(spec.ambient_dimension, criteria.epsilon, {criteria.inradius, criteria.judging}),
+      stars_(spec.ambient_dimension, criteria.epsilon, {criteria.inradius, criteria.centre_rule}),
       sizes_(criteria),
       boundary_(spec.walls) {
   // Sizes are estimated from whole stars.

@@ -115,7 +115,7 @@ std::optional<CrowdedCorner> Engine<K>::SettleCrowds(const AnsweredPoints& answe
     });
     if (!IsSubset(crowd.beyond, walls) || is_full() ||
         stars_.sample().AnyWithin(crowd.point.data(), same) ||
-        stars_.sample().InGuard(crowd.point.data()))
+        stars_.sample().InProtectingBall(crowd.point.data()))
       continue;
     std::vector<double> all;
     const auto gather = [&](WallSet of) {

@@ -81,8 +81,8 @@ std::optional<Target<K>> Engine<K>::SplitOf(const typename Stars<K>::CellVertex&
   if (IsOnShell(simplex)) return std::nullopt;
   if (violation.dimension() <= boundary_.left()) return std::nullopt;
   // The middle of an edge between guards is in both.
-  if (simplex.count == 2 && stars_.sample().GuardOf(simplex.ids[0]) > 0 &&
-      stars_.sample().GuardOf(simplex.ids[1]) > 0)
+  if (simplex.count == 2 && stars_.sample().ProtectingRadius2(simplex.ids[0]) > 0 &&
+      stars_.sample().ProtectingRadius2(simplex.ids[1]) > 0)
     return std::nullopt;
   if (by > Rule::kSize && violation.radius < kLeastSplit * sizes_.BoundAt(stars_, at.star))
     return std::nullopt;
@@ -259,7 +259,7 @@ std::optional<std::vector<Target<K>>> Engine<K>::ProtectSharpEdges(
   }
   boundary_.NoteProtected();
   const std::vector<std::uint32_t> before = stars_.Simplices();
-  stars_.SetGuards(std::move(balls.radii2));
+  stars_.SetProtectingBalls(std::move(balls.radii2));
   ExchangeSimplices<K>(before, stars_.Simplices(), added, removed);
   RejudgeAll();
   MarkAllDirty();

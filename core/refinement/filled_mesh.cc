@@ -16,7 +16,7 @@ constexpr int kFirstFilled = 4;
 template <int K>
 void FilledMesh<K>::Fill(const Stars<K>& stars, const ResolvedCriteria& criteria) {
   Clear();
-  if (K < kFirstFilled || criteria.judging != Judging::kCommonCentre) return;
+  if (K < kFirstFilled || criteria.centre_rule != CentreRule::kCommonCentre) return;
   cavities_ = FillCavities<K>(
       stars, {criteria.epsilon, criteria.radius_edge_bound, criteria.shape.sliver_bound});
 }

@@ -73,8 +73,9 @@ typename Inserter<K>::Outcome Inserter<K>::InsertTarget(std::size_t i) {
 // orthogonally.
 template <int K>
 double Inserter<K>::EmptyRadius(const Target<K>& t) const {
-  const double guard2 = to_.stars.sample().GuardOf(t.star);
-  return guard2 == 0 ? t.radius : std::sqrt(std::max(t.radius * t.radius - guard2, 0.0));
+  const double ball_radius2 = to_.stars.sample().ProtectingRadius2(t.star);
+  return ball_radius2 == 0 ? t.radius
+                           : std::sqrt(std::max(t.radius * t.radius - ball_radius2, 0.0));
 }
 
 template <int K>
@@ -94,7 +95,8 @@ typename Inserter<K>::RefinedPoint Inserter<K>::JudgeRefined(std::size_t i) cons
   if (!judged.found) return judged;
   const double* y = answers_.points.col(c).data();
   const Stars<K>& stars = to_.stars;
-  judged.duplicate = stars.sample().AnyWithin(y, Clearance(t)) || stars.sample().InGuard(y);
+  judged.duplicate =
+      stars.sample().AnyWithin(y, Clearance(t)) || stars.sample().InProtectingBall(y);
   judged.cuts_violation = !judged.duplicate && stars.CutsVertex(t.star, t.violation.vertex, y);
   if (to_.boundary.has_walls()) {
     judged.encroached = stars.EncroachedBy(y, t.violation.walls);
@@ -146,7 +148,8 @@ bool Inserter<K>::YieldsToFaces(const RefinedPoint& judged, const Target<K>& t, 
 template <int K>
 bool Inserter<K>::FitsFaces(Eigen::Index c) const {
   return !to_.boundary.has_walls() ||
-         (!answers_.Beyond(c) && !to_.stars.sample().InGuard(answers_.points.col(c).data()) &&
+         (!answers_.Beyond(c) &&
+          !to_.stars.sample().InProtectingBall(answers_.points.col(c).data()) &&
           !to_.stars.EncroachedBy(answers_.points.col(c).data(), WallsOf(c)));
 }
 

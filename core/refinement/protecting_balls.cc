@@ -86,7 +86,8 @@ ProtectingBalls<K> PlanProtectingBalls(const Stars<K>& stars, const SizeField<K>
   std::vector<std::uint32_t> sharp;
   for (std::uint32_t p = 0; p < stars.size(); ++p) {
     CheckInterruption(p);
-    if (stars.sample().GuardOf(p) > 0 || IsSharp<K>(stars, p, kProtectedBelow)) sharp.push_back(p);
+    if (stars.sample().ProtectingRadius2(p) > 0 || IsSharp<K>(stars, p, kProtectedBelow))
+      sharp.push_back(p);
   }
   balls.radii2.assign(stars.size(), 0);
   balls.least_clearance = INFINITY;
@@ -94,7 +95,7 @@ ProtectingBalls<K> PlanProtectingBalls(const Stars<K>& stars, const SizeField<K>
   for (const std::uint32_t p : sharp) {
     CheckInterruption(edges.size());
     edges.push_back(EdgesAt<K>(stars, p));
-    balls.radii2[p] = stars.sample().GuardOf(p);
+    balls.radii2[p] = stars.sample().ProtectingRadius2(p);
     if (balls.radii2[p] > 0) continue;
     double radius = ClearanceAt<K>(stars, p, sizes.BoundAt(stars, p));
     balls.least_clearance = std::min(balls.least_clearance, radius);
@@ -110,7 +111,8 @@ ProtectingBalls<K> PlanProtectingBalls(const Stars<K>& stars, const SizeField<K>
       ++balls.edges;
       balls.longest = std::max(balls.longest, length);
       balls.least_clearance = std::min(balls.least_clearance, length);
-      if (stars.sample().GuardOf(p) > 0 && stars.sample().GuardOf(q) > 0) continue;
+      if (stars.sample().ProtectingRadius2(p) > 0 && stars.sample().ProtectingRadius2(q) > 0)
+        continue;
       const double overlap = IsCorner<K>(stars, p) || IsCorner<K>(stars, q) ? kMeet : kBallOverlap;
       if (std::sqrt(balls.radii2[p]) + std::sqrt(balls.radii2[q]) < overlap * length)
         balls.gaps.push_back(edge.at);
@@ -129,7 +131,7 @@ std::size_t MostSplits(const ProtectingBalls<K>& balls) {
 template <int K>
 bool NeedsProtection(const Stars<K>& stars) {
   for (std::uint32_t p = 0; p < stars.size(); ++p)
-    if (stars.sample().GuardOf(p) == 0 && IsSharp<K>(stars, p, kNeedsBall)) return true;
+    if (stars.sample().ProtectingRadius2(p) == 0 && IsSharp<K>(stars, p, kNeedsBall)) return true;
   return false;
 }
 

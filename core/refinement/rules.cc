@@ -147,8 +147,8 @@ std::optional<Violation<K>> WorstSizeOrShapeOnFaces(const Stars<K>& stars, std::
                                                 stars.sample().d()));
     }
     const bool large = simplex.fake || norm2 > epsilon * epsilon;
-    const bool long_enough =
-        norm2 <= radius_edge_bound * radius_edge_bound * edge2 || stars.TouchesGuard(p, cell, v);
+    const bool long_enough = norm2 <= radius_edge_bound * radius_edge_bound * edge2 ||
+                             stars.TouchesProtectingBall(p, cell, v);
     if (!large && !simplex.foreign && long_enough) continue;
     const Rule rule = large ? Rule::kSize : Rule::kRadiusEdge;
     if (worst && std::tuple(worst->dimension(), worst->rule, -worst->radius) <=
@@ -198,7 +198,7 @@ std::optional<Violation<K>> WorstSizeOrShape(const Stars<K>& stars, std::uint32_
     const double norm2 = cell.norm2(v);
     const double rho2 = norm2 / edge2;
     if (!(rho2 > bound2) || !IsWorse<K>(cell, v, rho2, worst, worst_rho2)) continue;
-    if (stars.TouchesGuard(p, cell, v)) continue;
+    if (stars.TouchesProtectingBall(p, cell, v)) continue;
     worst_rho2 = rho2;
     worst = v;
   }
@@ -307,7 +307,7 @@ std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const Stars<K>& sta
                                                              int least) {
   const auto& cell = stars.cell(p);
   std::optional<Folds<K>> folds;
-  if (stars.judging() == Judging::kCommonCentre) folds.emplace(stars, p);
+  if (stars.centre_rule() == CentreRule::kCommonCentre) folds.emplace(stars, p);
   std::optional<Violation<K>> worst;
   for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
     const auto simplex = stars.FaceSimplexOf(p, cell, v);
@@ -316,7 +316,7 @@ std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const Stars<K>& sta
     if (simplex.fake) return std::nullopt;  // R1 gave up there: nothing to judge yet
     const bool whole = dimension == K, held = simplex.ids[0] == p;
     const bool thin =
-        whole && held && bounds.sliver_bound > 0 && !stars.TouchesGuard(p, cell, v) &&
+        whole && held && bounds.sliver_bound > 0 && !stars.TouchesProtectingBall(p, cell, v) &&
         (HasThinFaceAt<K>(stars, stars.sample().Point(p), cell, v, bounds.sliver_bound, nullptr) ||
          IsFlatOnWall<K>(stars, p, cell, v));
     if (!thin && IsConsistent<K>(stars, p, v) && !(whole && folds && folds->IsFolded(v))) continue;
@@ -354,7 +354,7 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const Stars<K>& stars, std
   };
   if (bounds.sliver_bound > 0) {
     for (std::size_t v = 0; v < cell.vertex_count(); ++v)
-      if (is_worse(v) && held(v) && !stars.TouchesGuard(p, cell, v) &&
+      if (is_worse(v) && held(v) && !stars.TouchesProtectingBall(p, cell, v) &&
           HasThinFaceAt<K>(stars, stars.sample().Point(p), cell, v, bounds.sliver_bound, nullptr))
         worst = v;
     if (worst) return AtVertex<K>(Rule::kShape, cell, *worst, false);
@@ -363,7 +363,7 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const Stars<K>& stars, std
     return (v < 64 && (consistent >> v & 1) != 0) || IsConsistent<K>(stars, p, v);
   };
   std::optional<Folds<K>> folds;
-  if (stars.judging() == Judging::kCommonCentre) folds.emplace(stars, p);
+  if (stars.centre_rule() == CentreRule::kCommonCentre) folds.emplace(stars, p);
   for (std::size_t v = 0; v < cell.vertex_count(); ++v)
     if (is_worse(v) && (!is_consistent(v) || (folds && folds->IsFolded(v)))) worst = v;
   if (worst) return AtVertex<K>(Rule::kInconsistent, cell, *worst, false);

@@ -58,8 +58,9 @@ double SizeField<K>::SeenFrom(const Stars<K>& stars, std::uint32_t p) const {
   for (std::size_t f = 0; f < cell.facet_count(); ++f) {
     if (!IsSample(cell.id(f))) continue;
     double along[K];
-    const double distance2 = 2 * stars.HalfSpace(p, f, along) - stars.sample().GuardOf(p) +
-                             stars.sample().GuardOf(cell.id(f));
+    const double distance2 = 2 * stars.HalfSpace(p, f, along) -
+                             stars.sample().ProtectingRadius2(p) +
+                             stars.sample().ProtectingRadius2(cell.id(f));
     if (distance2 < kTellingEdge * kTellingEdge * longest2) continue;
     double along2 = 0;
     for (const double a : along) along2 += a * a;

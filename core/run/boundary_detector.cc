@@ -6,7 +6,7 @@
 #include "core/base/interruption.h"
 #include "core/base/message.h"
 #include "core/base/vector_ops.h"
-#include "core/certificate/evidence/rim_check.h"
+#include "core/certificate/evidence/undeclared_boundary_check.h"
 #include "core/certificate/findings.h"
 
 namespace stellate::core {
@@ -33,7 +33,7 @@ void BoundaryDetector::Look(const CandidateSet<K>& candidates, const AnsweredPoi
         const double along = Dot(tangent + a * d, step.data(), static_cast<int>(d));
         along2 += along * along;
       }
-      if (!IsLean(std::sqrt(along2), step.norm())) continue;
+      if (!HasTangentialOffset(std::sqrt(along2), step.norm())) continue;
       const Eigen::Map<const Eigen::MatrixXd> basis(tangent, d, K);
       step = basis * (basis.transpose() * step).eval();
       offsets_.insert(offsets_.end(), answers.points.col(c).begin(), answers.points.col(c).end());

@@ -8,7 +8,8 @@
 namespace stellate::core {
 
 // Detects an undeclared boundary: collects answers with a tangential offset, which do not lie
-// straight below their queries (RimCheck). A closed manifold with exact tangents has none.
+// straight below their queries (UndeclaredBoundaryCheck). A closed manifold with exact tangents has
+// none.
 class BoundaryDetector {
  public:
   // Collects offsets from the closest points of candidates, with their tangents. REQUIRES: no

@@ -29,7 +29,7 @@ MeshView WithSimplices(MeshView mesh, const std::vector<std::uint32_t>& simplice
   mesh.walls = boundary->walls.data();
   mesh.outward = boundary->outward.data();
   mesh.faces = &boundary->faces;
-  if (!boundary->balls.empty()) mesh.guards = boundary->balls.data();
+  if (!boundary->balls.empty()) mesh.protecting_radii2 = boundary->balls.data();
   return mesh;
 }
 
@@ -81,8 +81,8 @@ BoundaryOfMesh BoundaryOf(const Engine<K>& engine) {
             stars.sample().Conormals(p)[w * K + a];
   }
   boundary.faces = engine.Faces();
-  for (std::uint32_t p = 0; stars.sample().has_guards() && p < stars.size(); ++p)
-    boundary.balls.push_back(stars.sample().GuardOf(p));
+  for (std::uint32_t p = 0; stars.sample().has_protecting_balls() && p < stars.size(); ++p)
+    boundary.balls.push_back(stars.sample().ProtectingRadius2(p));
   return boundary;
 }
 

@@ -59,8 +59,9 @@ void DescribeUnfinished(const Engine<K>& engine, double epsilon, bool is_smooth,
         std::max(certificate->max_circumradius, std::sqrt(cell.max_norm2()));
     for (std::size_t f = 0; f < cell.facet_count(); ++f) {
       double along[K];
-      const double distance2 = 2 * stars.HalfSpace(p, f, along) - stars.sample().GuardOf(p) +
-                               stars.sample().GuardOf(cell.id(f));
+      const double distance2 = 2 * stars.HalfSpace(p, f, along) -
+                               stars.sample().ProtectingRadius2(p) +
+                               stars.sample().ProtectingRadius2(cell.id(f));
       double along2 = 0;
       for (const double a : along) along2 += a * a;
       const double away = std::sqrt(std::max(distance2 - along2, 0.0));

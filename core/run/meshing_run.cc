@@ -272,8 +272,8 @@ void MeshingRun<K>::Plan() {
   PlannedPoints planned;
   if (boundary.has_discoveries())
     planned = engine_.TakeDiscoveries();
-  else if (engine_.criteria().ask_ahead && !speculation_failed_ && boundary.stage() == K) {
-    // What is left then of R1 and R2 is not worth judging all stars for.
+  else if (engine_.criteria().speculative && !speculation_failed_ && boundary.stage() == K) {
+    // What is left then of R1 and R2 is not worth centre_rule all stars for.
     const bool is_rest = is_sampled_ && !finished && violations.are_all_dirty();
     planned = RunSpeculatively<K>(engine_, whole_rounds_, &*targets,
                                   is_rest ? SpeculativeRules::kSizes : SpeculativeRules::kAllRules,
@@ -305,7 +305,7 @@ void MeshingRun<K>::Certify() {
   crease_probe_.Stop();
   walked_.clear();  // not all of them to their end
   KnownOfManifold known = spare_points_.Take();
-  known.leans = boundary_detector_.offsets();
+  known.tangential_offsets = boundary_detector_.offsets();
   certification_ = std::make_unique<Certification>(
       spec_, mesh, engine_.Simplices(), facts, std::move(known),
       spec_.walls > 0 ? std::optional(BoundaryOf<K>(engine_)) : std::nullopt);

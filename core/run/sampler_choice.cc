@@ -46,7 +46,7 @@ bool AreSparse(const Engine<K>& engine, const AnsweredPoints& seeds, const Speci
   const double epsilon = engine.criteria().epsilon;
   const Eigen::VectorXd shares = SharesOf(engine.sizes(), seeds);
   const bool many =
-      spec.criteria.ask_ahead && spec.seeds.cols() == 0 && spec.box_seeds == 0 && !spec.cover_box;
+      spec.criteria.speculative && spec.seeds.cols() == 0 && spec.box_seeds == 0 && !spec.cover_box;
   const Eigen::Index most = many ? kDefaultBoxSeeds : seeds.points.cols();
   if (K >= kFirstByGuess)
     return GuessSize(K, seeds, epsilon) >=
@@ -62,7 +62,7 @@ template <int K>
 std::unique_ptr<Sampler<K>> SamplerBetweenWalls(Engine<K>& engine, const Specification& spec) {
   if (K > kMostBetweenWalls || engine.criteria().graded()) return nullptr;
   if (K == spec.ambient_dimension) return std::make_unique<SolidSampler<K>>(engine);
-  return spec.criteria.ask_ahead ? nullptr : std::make_unique<RingSampler<K>>(engine, spec);
+  return spec.criteria.speculative ? nullptr : std::make_unique<RingSampler<K>>(engine, spec);
 }
 
 }  // namespace
@@ -72,11 +72,11 @@ std::unique_ptr<Sampler<K>> SamplerFor(Engine<K>& engine, const Specification& s
                                        const AnsweredPoints& seeds) {
   const ResolvedCriteria& criteria = engine.criteria();
   if (spec.walls > 0) return SamplerBetweenWalls<K>(engine, spec);
-  if ((criteria.graded() && (!criteria.sizes_given || criteria.ask_ahead)) ||
+  if ((criteria.graded() && (!criteria.sizes_given || criteria.speculative)) ||
       !AreSparse<K>(engine, seeds, spec))
     return nullptr;
   const auto most = static_cast<double>(MaxPointsPerBatch(K, engine.stars().sample().d()));
-  if (criteria.ask_ahead && K <= kMaxSpeculativeDimension &&
+  if (criteria.speculative && K <= kMaxSpeculativeDimension &&
       GuessSize(K, seeds, criteria.epsilon) <= most)
     return std::make_unique<SpeculativeSampler<K>>(engine, spec);
   return std::make_unique<RingSampler<K>>(engine, spec);

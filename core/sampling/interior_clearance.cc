@@ -22,7 +22,7 @@ InteriorClearance<K>::InteriorClearance(const Engine<K>& engine, double spacing)
 
 template <int K>
 bool InteriorClearance<K>::IsClear(const double* point) const {
-  return !stars_.sample().AnyWithin(point, apart_) && !stars_.sample().InGuard(point) &&
+  return !stars_.sample().AnyWithin(point, apart_) && !stars_.sample().InProtectingBall(point) &&
          !stars_.EncroachedBy(point, 0);
 }
 

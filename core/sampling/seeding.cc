@@ -17,7 +17,7 @@ constexpr double kSeedShare = 0.05;
 constexpr double kLeastAheadSeeds[kMaxDimension + 1] = {0, 100, 300, 300, 1000, 1000};
 constexpr double kMaxSpeculativeSeeds[kMaxDimension + 1] = {0, 100, 1000, 1000, 3000, 3000};
 
-int SeedsToAskAheadFrom(const Specification& spec) {
+int SpeculativeBoxSeeds(const Specification& spec) {
   const double width = (spec.bounding_box->upper - spec.bounding_box->lower).norm();
   const double vertices = Power(width / spec.epsilon, spec.dimension);
   return static_cast<int>(std::clamp(kSeedShare * vertices, kLeastAheadSeeds[spec.dimension],
@@ -26,7 +26,7 @@ int SeedsToAskAheadFrom(const Specification& spec) {
 
 int SeedsToDraw(const Specification& spec) {
   if (spec.box_seeds > 0) return spec.box_seeds;
-  return spec.criteria.ask_ahead ? SeedsToAskAheadFrom(spec) : kDefaultBoxSeeds;
+  return spec.criteria.speculative ? SpeculativeBoxSeeds(spec) : kDefaultBoxSeeds;
 }
 
 }  // namespace

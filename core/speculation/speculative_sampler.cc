@@ -63,7 +63,7 @@ Specification CoarserThan(Specification spec, double epsilon) {
       std::min(spec.limits.max_vertices, MaxPointsPerBatch(K, spec.ambient_dimension));
   spec.declared_reach.reset();
   spec.criteria.radius_edge_bound = INFINITY;
-  spec.criteria.judging = Judging::kFlats;
+  spec.criteria.centre_rule = CentreRule::kTangentSpace;
   if (auto& step = spec.criteria.advance_step) step = std::max(*step, epsilon);
   return spec;
 }

@@ -107,7 +107,7 @@ void ToProto(const core::Certificate& c, int k, v1::Certificate* out) {
   out->set_declared_reach(c.declared_reach);
   out->set_reach_refuted(c.reach_refuted);
   out->set_proved_distance(c.proved_distance);
-  out->set_answers_checked(c.answers_held);
+  out->set_answers_checked(c.answers_checked);
   out->set_only_too_coarse(c.only_too_coarse);
   ToProto(c.violations, k, out);
   BoundaryToProto(c, out);

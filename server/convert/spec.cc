@@ -123,11 +123,12 @@ Status ReadCriteria(const v1::MeshSpec& spec, core::Specification* out) {
     if (!status.ok()) return status;
     to.candidates = candidates;
   }
-  to.ask_ahead = c.speculative();
+  to.speculative = c.speculative();
   if (c.has_size_rate()) to.size_rate = c.size_rate();
   if (c.has_max_deviation()) to.max_deviation = c.max_deviation();
   if (c.has_common_centre()) {
-    to.judging = c.common_centre() ? core::Judging::kCommonCentre : core::Judging::kFlats;
+    to.centre_rule =
+        c.common_centre() ? core::CentreRule::kCommonCentre : core::CentreRule::kTangentSpace;
   }
   if (!c.has_flat_alternations()) return Status::Ok();
   return ToInt(c.flat_alternations(), "criteria.flat_alternations", &to.flat_alternations);
@@ -256,11 +257,11 @@ void ToProto(const core::Specification& spec, v1::MeshSpec* out) {
   if (spec.criteria.candidates) criteria->set_candidates(*spec.criteria.candidates);
   if (spec.criteria.advance_step) criteria->set_advance_step(*spec.criteria.advance_step);
   criteria->set_flat_alternations(spec.criteria.flat_alternations);
-  criteria->set_speculative(spec.criteria.ask_ahead);
+  criteria->set_speculative(spec.criteria.speculative);
   if (spec.criteria.size_rate) criteria->set_size_rate(*spec.criteria.size_rate);
   if (spec.criteria.max_deviation) criteria->set_max_deviation(*spec.criteria.max_deviation);
-  if (spec.criteria.judging) {
-    criteria->set_common_centre(*spec.criteria.judging == core::Judging::kCommonCentre);
+  if (spec.criteria.centre_rule) {
+    criteria->set_common_centre(*spec.criteria.centre_rule == core::CentreRule::kCommonCentre);
   }
   out->mutable_limits()->set_max_vertices(spec.limits.max_vertices);
   out->mutable_limits()->set_max_rounds(spec.limits.max_rounds);

@@ -41,8 +41,8 @@ void LayOutSpecification(Archive& archive, Value& spec) {
   archive.Number(criteria.small_sliver_radius);
   archive.Maybe(criteria.candidates);
   archive.Maybe(criteria.advance_step);
-  archive.Maybe(criteria.judging);
-  archive.Number(criteria.ask_ahead);
+  archive.Maybe(criteria.centre_rule);
+  archive.Number(criteria.speculative);
   archive.Maybe(criteria.size_rate);
   archive.Maybe(criteria.max_deviation);
   archive.Number(criteria.flat_alternations);

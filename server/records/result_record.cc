@@ -52,7 +52,7 @@ void LayOutReport(Archive& archive, Value& report) {
   archive.Number(certificate.unembedded_stars);
   archive.Number(certificate.fibre_failures);
   archive.Number(certificate.fibre_samples);
-  archive.Number(certificate.answers_held);
+  archive.Number(certificate.answers_checked);
   archive.Number(certificate.max_circumradius);
   archive.Number(certificate.max_radius_edge);
   archive.Number(certificate.min_fatness);

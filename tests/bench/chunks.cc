@@ -27,8 +27,8 @@ constexpr double kBegin = 1;  // seconds: time zero is no time
 using Rounds = std::vector<std::vector<Dispatch::Block>>;
 
 // Seconds, except the count.
-struct Crew {
-  int workers = 1;
+struct Workers {
+  int count = 1;
   double per_query = 0;
   double fixed = 0;   // of a chunk, while which the worker does nothing else
   double trip = 0;    // there and back, while which it does
@@ -62,16 +62,18 @@ Rounds RoundsOf(const std::string& manifold, double epsilon) {
   return rounds;
 }
 
-double FactorOf(const Crew& crew, std::mt19937_64* random) {
-  if (crew.spread == 0) return 1;
-  return std::lognormal_distribution<double>(-crew.spread * crew.spread / 2, crew.spread)(*random);
+double FactorOf(const Workers& workers, std::mt19937_64* random) {
+  if (workers.spread == 0) return 1;
+  return std::lognormal_distribution<double>(-workers.spread * workers.spread / 2,
+                                             workers.spread)(*random);
 }
 
 class Simulation {
  public:
-  Simulation(const Crew& crew, std::uint64_t seed) : crew_(crew), random_(seed), dispatch_({}) {
-    for (int i = 1; i <= crew.workers; ++i) dispatch_.Join(static_cast<WorkerId>(i), 0);
-    free_at_.assign(static_cast<std::size_t>(crew.workers) + 1, kBegin);
+  Simulation(const Workers& workers, std::uint64_t seed)
+      : workers_(workers), random_(seed), dispatch_({}) {
+    for (int i = 1; i <= workers.count; ++i) dispatch_.Join(static_cast<WorkerId>(i), 0);
+    free_at_.assign(static_cast<std::size_t>(workers.count) + 1, kBegin);
   }
 
   Result Run(const Rounds& rounds) {
@@ -84,8 +86,8 @@ class Simulation {
       given_.clear();
     }
     result_.seconds = std::max(now_ - kBegin, 1e-9);
-    result_.efficiency =
-        static_cast<double>(result_.queries) * crew_.per_query / (result_.seconds * crew_.workers);
+    result_.efficiency = static_cast<double>(result_.queries) * workers_.per_query /
+                         (result_.seconds * workers_.count);
     return result_;
   }
 
@@ -126,19 +128,19 @@ class Simulation {
   void Give() {
     for (const Lease& lease : dispatch_.Assign(Time())) {
       if (!lease.check) given_.push_back(lease);
-      double work = crew_.fixed;
-      for (Eigen::Index i = 0; i < lease.count && crew_.spread > 0; ++i) {
-        work += crew_.per_query * FactorOf(crew_, &random_);
+      double work = workers_.fixed;
+      for (Eigen::Index i = 0; i < lease.count && workers_.spread > 0; ++i) {
+        work += workers_.per_query * FactorOf(workers_, &random_);
       }
-      if (crew_.spread == 0) work += crew_.per_query * static_cast<double>(lease.count);
+      if (workers_.spread == 0) work += workers_.per_query * static_cast<double>(lease.count);
       double& free = free_at_[lease.worker];
-      free = std::max(free, now_ + crew_.trip / 2) + work;
-      answers_.emplace(free + crew_.trip / 2, lease);
+      free = std::max(free, now_ + workers_.trip / 2) + work;
+      answers_.emplace(free + workers_.trip / 2, lease);
       ++result_.chunks;
     }
   }
 
-  const Crew crew_;
+  const Workers workers_;
   std::mt19937_64 random_;
   Dispatch dispatch_;
   double now_ = kBegin;
@@ -148,26 +150,28 @@ class Simulation {
   Result result_;
 };
 
-Result Simulate(const Rounds& rounds, const Crew& crew) { return Simulation(crew, 1).Run(rounds); }
+Result Simulate(const Rounds& rounds, const Workers& workers) {
+  return Simulation(workers, 1).Run(rounds);
+}
 
 // Each query to whoever is free first, for nothing: no way of sharing out unknown work does better.
-double Bound(const Rounds& rounds, const Crew& crew, std::uint64_t seed) {
+double Bound(const Rounds& rounds, const Workers& workers, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   double seconds = 0, queries = 0;
   for (const auto& blocks : rounds) {
     std::multiset<double> free;
-    for (int i = 0; i < crew.workers; ++i) free.insert(0);
+    for (int i = 0; i < workers.count; ++i) free.insert(0);
     for (const auto& block : blocks) {
       queries += static_cast<double>(block.queries);
       for (Eigen::Index i = 0; i < block.queries; ++i) {
         const double begin = *free.begin();
         free.erase(free.begin());
-        free.insert(begin + crew.per_query * FactorOf(crew, &random));
+        free.insert(begin + workers.per_query * FactorOf(workers, &random));
       }
     }
     seconds += *free.rbegin();
   }
-  return queries * crew.per_query / (seconds * crew.workers);
+  return queries * workers.per_query / (seconds * workers.count);
 }
 
 void FixedCosts(const Rounds& rounds, double per_query) {

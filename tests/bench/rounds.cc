@@ -1,4 +1,4 @@
-// Round trips, queries, vertices and quality against size, with plain rounds and asking ahead:
+// Round trips, queries, vertices and quality against size, with plain and speculative runs:
 //
 //   rounds [MANIFOLD EPSILON [SEEDS]]
 //
@@ -42,7 +42,7 @@ bool Run(const Work& work, bool ahead, std::uint64_t seed) {
   }
   stellate::core::Specification spec = stellate::testing::SpecificationFor(*manifold, work.epsilon);
   spec.seeds.resize(0, 0);
-  spec.criteria.ask_ahead = ahead;
+  spec.criteria.speculative = ahead;
   spec.random_seed = seed;
   spec.threads = 1;
   auto created = Mesher::Create(spec);

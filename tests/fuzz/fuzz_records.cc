@@ -56,7 +56,7 @@ std::vector<std::string> Seeds() {
   seeds.push_back('\0' + server::EncodeStart(request, {}));
   request.spec.bounding_box.reset();
   request.spec.seeds = Eigen::MatrixXd::Ones(3, 2);
-  request.spec.criteria.judging = core::Judging::kFlats;
+  request.spec.criteria.centre_rule = core::CentreRule::kTangentSpace;
   request.spec.criteria.sliver_bound = 0.1;
   seeds.push_back('\0' + server::EncodeStart(request, {}));
   core::Answers answers;

@@ -33,18 +33,19 @@ double LargestCoordinate(const MeshView& mesh) {
 
 // Whether the part of `step` along M at a simplex may be long enough to tell: it is no longer than
 // the mean of those along its vertices' tangent spaces. Rounding is far below the margin.
-bool MayLean(const MeshView& mesh, const std::uint32_t* ids, const Eigen::VectorXd& step,
-             double distance) {
+bool MayHaveTangentialOffset(const MeshView& mesh, const std::uint32_t* ids,
+                             const Eigen::VectorXd& step, double distance) {
   constexpr double kMargin = 1 + 1e-9;
   double sum = 0;
   for (int i = 0; i <= mesh.k; ++i) sum += std::sqrt(SquaredAlong(mesh, ids[i], step.data()));
-  return IsLean(kMargin * sum / (mesh.k + 1), distance);
+  return HasTangentialOffset(kMargin * sum / (mesh.k + 1), distance);
 }
 
 }  // namespace
 
-ClosenessClaims::ClosenessClaims(Examination& examination, ReachClaims& reach, RimCheck& rims)
-    : x_(examination), reach_(reach), rims_(rims) {
+ClosenessClaims::ClosenessClaims(Examination& examination, ReachClaims& reach,
+                                 UndeclaredBoundaryCheck& boundary_check)
+    : x_(examination), reach_(reach), boundary_check_(boundary_check) {
   const SimplexList& list = x_.list();
   if (x_.thorough()) {
     simplices_.resize(list.size());
@@ -133,8 +134,8 @@ void ClosenessClaims::JudgeInside(const Eigen::MatrixXd& asked, const AnswerBloc
     const double circumradius = x_.Circumradius(ids);
     reach_.HoldFoot(ids, circumradius, distance, y,
                     is_barycentre ? std::optional(number) : std::nullopt);
-    if (!x_.AtBoundary(ids) && MayLean(x_.mesh, ids, step, distance))
-      rims_.SuspectIfLeans(y, AlongSimplex(ids, step), distance);
+    if (!x_.AtBoundary(ids) && MayHaveTangentialOffset(x_.mesh, ids, step, distance))
+      boundary_check_.Add(y, AlongSimplex(ids, step), distance);
     if (is_barycentre) {
       x_.certificate.max_barycentre_distance =
           std::max(x_.certificate.max_barycentre_distance, distance);
@@ -170,9 +171,9 @@ void ClosenessClaims::JudgeBends() {
     reach_.HoldPoint(bend.vertex, bend.y, TangentCheck::kTolerance);
 }
 
-void ClosenessClaims::JudgeRims(const AnswerBlock& answer) {
-  std::string problem = rims_.Judge(answer, x_.position_error);
-  if (!problem.empty()) x_.findings.Refuse(Findings::kRim, std::move(problem));
+void ClosenessClaims::JudgeBoundary(const AnswerBlock& answer) {
+  std::string problem = boundary_check_.Judge(answer, x_.position_error);
+  if (!problem.empty()) x_.findings.Refuse(Findings::kUndeclaredBoundary, std::move(problem));
 }
 
 void ClosenessClaims::JudgeDeviation() {

@@ -9,28 +9,29 @@
 #include "core/certificate/claims/examination.h"
 #include "core/certificate/claims/reach_claims.h"
 #include "core/certificate/claims/tangent_check.h"
-#include "core/certificate/evidence/rim_check.h"
+#include "core/certificate/evidence/undeclared_boundary_check.h"
 
 namespace stellate::core {
 
 // That the mesh lies on M: its vertices and, nearly, points inside its simplices; that the tangent
 // spaces that the oracle gave are M's; that M does not end there. What the closest points say of
-// the reach goes to `reach`, where they lean to `rims`.
+// the reach goes to `reach`, where they lean to `boundary_check`.
 class ClosenessClaims {
  public:
-  ClosenessClaims(Examination& examination, ReachClaims& reach, RimCheck& rims);
+  ClosenessClaims(Examination& examination, ReachClaims& reach,
+                  UndeclaredBoundaryCheck& boundary_check);
 
   Eigen::MatrixXd InsideQuestions() const;
   Eigen::MatrixXd VertexQuestions() const;
   Eigen::MatrixXd TangentQuestions();  // none where the oracle gives no tangents, or all is told
-  Eigen::MatrixXd RimQuestions() { return rims_.Questions(x_.position_error); }
+  Eigen::MatrixXd BoundaryQuestions() { return boundary_check_.Questions(x_.position_error); }
 
   // Sets the examination's position_error, which all other judgements need.
   void JudgeVertices(const AnswerBlock& answer);
   void JudgeInside(const Eigen::MatrixXd& asked, const AnswerBlock& answer);
   void JudgeTangents(const AnswerBlock& answer);
   void JudgeBends();  // once there are no more TangentQuestions
-  void JudgeRims(const AnswerBlock& answer);
+  void JudgeBoundary(const AnswerBlock& answer);
   void JudgeDeviation();
   const std::vector<std::uint32_t>& simplices() const { return simplices_; }
   std::uint32_t points_inside() const { return points_inside_; }
@@ -41,7 +42,7 @@ class ClosenessClaims {
 
   Examination& x_;
   ReachClaims& reach_;
-  RimCheck& rims_;
+  UndeclaredBoundaryCheck& boundary_check_;
   std::vector<std::uint32_t> simplices_, vertices_;  // that are asked about
   std::uint32_t points_inside_ = 1;                  // of each simplex
   std::optional<TangentCheck> tangents_;

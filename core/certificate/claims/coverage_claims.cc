@@ -59,7 +59,7 @@ void CoverageClaims::JudgeProbes(const Eigen::MatrixXd& asked, const AnswerBlock
     const Eigen::VectorXd step = asked.col(j) - probe.x;
     // Another vertex's tangent space says little of where M leans.
     if (answer.tangents.size() > 0)
-      rims_.SuspectIfLeans(probe.x, tangent * (tangent.transpose() * step), step.norm());
+      boundary_check_.Add(probe.x, tangent * (tangent.transpose() * step), step.norm());
     probes_.push_back(std::move(probe));
   }
   if (x_.spec.oracle.tangent_basis) JudgeFibres();
@@ -175,8 +175,8 @@ void CoverageClaims::JudgeHits(const Probe& probe, const FibreHits& hits) {
 
 Evidence CoverageClaims::JudgeSeen() {
   const std::uint64_t vertices = x_.thorough() ? x_.mesh.vertices : kMaxVerticesHeld;
-  Evidence evidence = HoldAgainst(x_.mesh, x_.seen, x_.longest_edge, x_.size, x_.graded(),
-                                  x_.position_error, vertices);
+  Evidence evidence = CompareWithMesh(x_.mesh, x_.seen, x_.longest_edge, x_.size, x_.graded(),
+                                      x_.position_error, vertices);
   if (evidence.uncovered.empty()) return evidence;
   for (const std::uint64_t i : evidence.uncovered) {
     const double* y = x_.seen.data() + i * static_cast<std::size_t>(x_.mesh.d);

@@ -7,7 +7,7 @@
 #include "core/certificate/claims/examination.h"
 #include "core/certificate/evidence/evidence.h"
 #include "core/certificate/evidence/fibres.h"
-#include "core/certificate/evidence/rim_check.h"
+#include "core/certificate/evidence/undeclared_boundary_check.h"
 
 namespace stellate::core {
 
@@ -15,7 +15,8 @@ namespace stellate::core {
 // anywhere, meet it once and near; and whatever was answered has a vertex near.
 class CoverageClaims {
  public:
-  CoverageClaims(Examination& examination, RimCheck& rims) : x_(examination), rims_(rims) {}
+  CoverageClaims(Examination& examination, UndeclaredBoundaryCheck& boundary_check)
+      : x_(examination), boundary_check_(boundary_check) {}
 
   Eigen::MatrixXd ProbeQuestions() const;
   void JudgeProbes(const Eigen::MatrixXd& asked, const AnswerBlock& answer);
@@ -39,7 +40,7 @@ class CoverageClaims {
   void Fail(const Probe& probe);
 
   Examination& x_;
-  RimCheck& rims_;
+  UndeclaredBoundaryCheck& boundary_check_;
   std::vector<Probe> probes_;  // until their fibres are judged
 };
 

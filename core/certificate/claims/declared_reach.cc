@@ -29,7 +29,7 @@ void DeclaredReach::Prove(const VertexStars& stars, const MeshShape& shape) {
   proof_ = ProveFromReach(mesh_, stars, shape, claim_);
 }
 
-void DeclaredReach::HoldAgainstEdge(std::uint32_t p, std::uint32_t q, double noise) {
+void DeclaredReach::TestEdge(std::uint32_t p, std::uint32_t q, double noise) {
   const Eigen::VectorXd offset = PointOf(mesh_, q) - PointOf(mesh_, p);
   const Eigen::Map<const Eigen::MatrixXd> tangent(mesh_.Tangent(p), mesh_.d, mesh_.k);
   const double length = offset.norm();
@@ -41,7 +41,7 @@ void DeclaredReach::HoldAgainstEdge(std::uint32_t p, std::uint32_t q, double noi
   });
 }
 
-void DeclaredReach::HoldAgainstBall(std::uint32_t v, double radius, double length, double noise) {
+void DeclaredReach::TestBall(std::uint32_t v, double radius, double length, double noise) {
   if (!std::isfinite(radius)) return;
   Hold({radius, length, length * length / (2 * radius), noise, true, {}}, [&] {
     return Message("a ball of that radius that touches it at vertex ", v, ", ",
@@ -49,8 +49,8 @@ void DeclaredReach::HoldAgainstBall(std::uint32_t v, double radius, double lengt
   });
 }
 
-void DeclaredReach::HoldAgainstDistance(const std::uint32_t* ids, double circumradius,
-                                        double distance, double noise) {
+void DeclaredReach::TestDistance(const std::uint32_t* ids, double circumradius, double distance,
+                                 double noise) {
   if (!(distance > 0)) return;
   // LargestDistance(rho, r) = distance, solved for r, in the lengths of Contradicts; no distance
   // above rho says more than that one.

@@ -25,13 +25,12 @@ class DeclaredReach {
   void Prove(const VertexStars& stars, const MeshShape& shape);
 
   // Two vertices p and q, q as it is seen from p.
-  void HoldAgainstEdge(std::uint32_t p, std::uint32_t q, double noise);
+  void TestEdge(std::uint32_t p, std::uint32_t q, double noise);
   // A ball of this radius touches M at vertex v and, at this distance from it, again; lengths.
-  void HoldAgainstBall(std::uint32_t v, double radius, double length, double noise);
+  void TestBall(std::uint32_t v, double radius, double length, double noise);
   // A point of a simplex with this circumradius, length, is `distance` away from M: no tangent
   // space has a part in that.
-  void HoldAgainstDistance(const std::uint32_t* ids, double circumradius, double distance,
-                           double noise);
+  void TestDistance(const std::uint32_t* ids, double circumradius, double distance, double noise);
 
   // `covered`: every component of M within the bounding box was asked for. Refuses a reach that is
   // contradicted; else says in the certificate what is proved, or why nothing is.

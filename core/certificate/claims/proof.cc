@@ -32,7 +32,7 @@ constexpr double kFloatMargin = 1e-6;  // MeshShape keeps floats
 constexpr int kTriedVertices = 4;
 
 // A simplex that (A) fails for, and by how much.
-struct Leaning {
+struct Tilt {
   std::uint32_t simplex = VertexStars::kNone;
   double alpha = 0, rho = 0;
   double sum = 0;  // alpha + theta, radians
@@ -42,7 +42,7 @@ struct Leaning {
 struct Extent {
   double rho = 0;
   std::uint64_t failures = 0;
-  Leaning worst;
+  Tilt worst;
 
   void Take(const Extent& other) {
     rho = std::max(rho, other.rho);
@@ -235,9 +235,9 @@ std::string FindOtherSheet(const MeshView& mesh, const VertexStars& stars, const
   return {};
 }
 
-std::string DescribeLeaning(const MeshView& mesh, const SimplexList& list, const Extent& extent,
-                            const ReachClaim& claim) {
-  const Leaning& worst = extent.worst;
+std::string DescribeTilt(const MeshView& mesh, const SimplexList& list, const Extent& extent,
+                         const ReachClaim& claim) {
+  const Tilt& worst = extent.worst;
   std::string text = Message("simplex ", NameSimplex(list[worst.simplex], mesh.k + 1), " leans by ",
                              Brief(worst.alpha * kDegrees), " degrees from a tangent space");
   const double turn = kRight - claim.tangent_error - worst.alpha;
@@ -274,7 +274,7 @@ Proof ProveFromReach(const MeshView& mesh, const VertexStars& stars, const MeshS
   const Extent extent = AngleCondition(mesh, list, shape, claim).Decide();
   proof.distance = LargestDistance(extent.rho, claim.reach);
   if (extent.failures > 0) {
-    proof.obstacle = DescribeLeaning(mesh, list, extent, claim);
+    proof.obstacle = DescribeTilt(mesh, list, extent, claim);
     return proof;
   }
   proof.obstacle = FindOtherSheet(mesh, stars, shape, extent.rho, claim.reach);

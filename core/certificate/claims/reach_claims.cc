@@ -84,7 +84,7 @@ Eigen::MatrixXd ReachClaims::TangentsUnder(const std::uint32_t* ids) const {
 
 void ReachClaims::HoldFoot(const std::uint32_t* ids, double circumradius, double distance,
                            const Eigen::VectorXd& y, std::optional<std::uint64_t> number) {
-  if (declared_) declared_->HoldAgainstDistance(ids, circumradius, distance, x_.position_error);
+  if (declared_) declared_->TestDistance(ids, circumradius, distance, x_.position_error);
   if (feet_ && number)
     feet_->AddPair(ids, y, TangentsUnder(ids), kPairRadius * x_.LocalSize(ids[0]),
                    ~(Mix64(x_.spec.random_seed) + *number));
@@ -169,10 +169,10 @@ void ReachClaims::Judge() {
 void ReachClaims::JudgeDeclared() {
   if (!declared_) return;
   const double noise = x_.position_error;
-  if (edge_p_ != edge_q_) declared_->HoldAgainstEdge(edge_p_, edge_q_, noise);
-  declared_->HoldAgainstBall(balls_.narrowest(), balls_.reach(), balls_.distance(), noise);
+  if (edge_p_ != edge_q_) declared_->TestEdge(edge_p_, edge_q_, noise);
+  declared_->TestBall(balls_.narrowest(), balls_.reach(), balls_.distance(), noise);
   // Whatever else was seen: a point of M and a tangent space make a ball, too.
-  declared_->HoldAgainstBall(narrowest_.vertex, reach_, narrowest_.across, noise);
+  declared_->TestBall(narrowest_.vertex, reach_, narrowest_.across, noise);
   declared_->Conclude(x_.facts.covers_box, x_.findings, x_.certificate);
 }
 

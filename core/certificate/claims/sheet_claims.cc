@@ -22,7 +22,7 @@ namespace {
 // where any answer tells.
 constexpr std::size_t kMostQuestions = kMaxBarycentres;
 constexpr std::size_t kLeastOfWall = 250;
-constexpr std::size_t kMostOfUnmet = 100;
+constexpr std::size_t kMostOfInactive = 100;
 // Questions where clearances dip, of all walls together and of each at least. A dip is where a
 // clearance is this share, or less, of what so many points near it let expect.
 constexpr std::size_t kMostDips = 64;
@@ -172,7 +172,7 @@ std::vector<std::uint32_t> SheetClaims::Spread(const Sheet& sheet,
   std::vector<std::uint32_t> order(radii.size());
   std::iota(order.begin(), order.end(), 0u);
   if (x_.thorough()) return order;
-  if (sheet.radii.empty()) return Thinned(order, kMostOfUnmet);
+  if (sheet.radii.empty()) return Thinned(order, kMostOfInactive);
   std::vector<double> far(radii.size());
   ParallelFor(radii.size(), [&](std::size_t n) {
     const double* at = barycentres.col(static_cast<Eigen::Index>(n)).data();

@@ -171,9 +171,9 @@ std::vector<Evidence> HoldByRuns(const Holder& holder, const Held& held, double 
 
 }  // namespace
 
-Evidence HoldAgainst(const MeshView& mesh, const std::vector<double>& points,
-                     const std::vector<double>& longest_edge, double size, bool graded,
-                     double position_error, std::uint64_t vertices) {
+Evidence CompareWithMesh(const MeshView& mesh, const std::vector<double>& points,
+                         const std::vector<double>& longest_edge, double size, bool graded,
+                         double position_error, std::uint64_t vertices) {
   const Holder holder(mesh, longest_edge, size, graded, position_error);
   const Held held{mesh, points, std::max<std::uint64_t>(1, mesh.vertices / vertices)};
   const std::vector<Evidence> parts = IsTold(mesh) ? HoldByGrid(holder, held, kLook * size)

@@ -33,8 +33,8 @@ struct Evidence {
 // where it is `graded`: there, what a vertex's longest edge says. `position_error`: of the oracle's
 // answers, as seen. Of the mesh's own vertices about `vertices`, evenly spread, are held against
 // the others too. Time linear in both.
-Evidence HoldAgainst(const MeshView& mesh, const std::vector<double>& points,
-                     const std::vector<double>& longest_edge, double size, bool graded,
-                     double position_error, std::uint64_t vertices);
+Evidence CompareWithMesh(const MeshView& mesh, const std::vector<double>& points,
+                         const std::vector<double>& longest_edge, double size, bool graded,
+                         double position_error, std::uint64_t vertices);
 
 }  // namespace stellate::core

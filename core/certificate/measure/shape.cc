@@ -32,15 +32,15 @@ void Lower(std::atomic<double>& extreme, double value) {
 
 // What R1 bounds where a vertex is guarded: the largest distance of a vertex from the orthocentre,
 // from which all have the same power.
-double RadiusAmongGuards(const MeshView& mesh, const std::uint32_t* ids) {
+double RadiusAmongProtected(const MeshView& mesh, const std::uint32_t* ids) {
   const Eigen::Map<const Eigen::VectorXd> first(mesh.Point(ids[0]), mesh.d);
   Eigen::MatrixXd edges(mesh.d, mesh.k);
   Eigen::VectorXd powers(mesh.k);
   for (int i = 0; i < mesh.k; ++i) {
     const Eigen::Map<const Eigen::VectorXd> other(mesh.Point(ids[i + 1]), mesh.d);
     edges.col(i) = other - first;
-    powers[i] =
-        0.5 * (edges.col(i).squaredNorm() + mesh.GuardOf(ids[0]) - mesh.GuardOf(ids[i + 1]));
+    powers[i] = 0.5 * (edges.col(i).squaredNorm() + mesh.ProtectingRadius2(ids[0]) -
+                       mesh.ProtectingRadius2(ids[i + 1]));
   }
   const Eigen::VectorXd centre = edges * SolveSymmetric(edges.transpose() * edges, powers);
   double radius = centre.norm();
@@ -48,9 +48,10 @@ double RadiusAmongGuards(const MeshView& mesh, const std::uint32_t* ids) {
   return radius;
 }
 
-bool IsAmongGuards(const MeshView& mesh, const std::uint32_t* ids) {
-  return mesh.guards &&
-         std::any_of(ids, ids + mesh.k + 1, [&](std::uint32_t v) { return mesh.GuardOf(v) > 0; });
+bool HasProtectedVertex(const MeshView& mesh, const std::uint32_t* ids) {
+  return mesh.protecting_radii2 && std::any_of(ids, ids + mesh.k + 1, [&](std::uint32_t v) {
+           return mesh.ProtectingRadius2(v) > 0;
+         });
 }
 
 SimplexVertices FrameCorners(const MeshView& mesh, const std::uint32_t* ids, Corners& corners,
@@ -108,7 +109,7 @@ void ShapeSearch::MeasureByFrame(std::uint32_t s, Part* part) {
   const SimplexVertices vertices = FrameCorners(mesh_, list_[s], corners, part->frame);
   const SimplexMeasures m = MeasureSimplex(vertices, mesh_.d, part->frame);
   const double radius =
-      IsAmongGuards(mesh_, list_[s]) ? RadiusAmongGuards(mesh_, list_[s]) : m.circumradius;
+      HasProtectedVertex(mesh_, list_[s]) ? RadiusAmongProtected(mesh_, list_[s]) : m.circumradius;
   const double ratio = m.RadiusEdgeRatio(), fatness = m.Fatness();
   if (radius > part->circumradius || (radius == part->circumradius && s < part->largest)) {
     part->circumradius = radius;

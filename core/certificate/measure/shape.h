@@ -61,7 +61,7 @@ class ShapeSearch {
   // Once for each vertex of each simplex, by different threads perhaps. `gram`: as above;
   // `columns`: the edges that it is of, in tangent coordinates of the vertex.
   template <int K>
-  void Lean(std::uint32_t s, std::uint32_t vertex, const SimplexGram<K>* gram,
+  void Tilt(std::uint32_t s, std::uint32_t vertex, const SimplexGram<K>* gram,
             const std::array<const double*, K>& columns, Part* part) {
     double tilt = K;
     if (gram) {
@@ -95,7 +95,7 @@ class ShapeSearch {
       power *= longest2;
       faculty *= i;
     }
-    return mesh_.guards || radius2 >= radius2_.load(std::memory_order_relaxed) ||
+    return mesh_.protecting_radii2 || radius2 >= radius2_.load(std::memory_order_relaxed) ||
            radius2 >= shortest2 * radius_edge2_.load(std::memory_order_relaxed) ||
            gram.determinant * (1 - kMargin) <=
                faculty * faculty * power * fatness2_.load(std::memory_order_relaxed);

@@ -165,14 +165,14 @@ class StarMeasurer {
       if (places_[m] == 0) {
         const auto [shortest2, longest2] = TakeEdges(IdsOf(m), d, &gram);
         const SimplexGram<K>* telling = gram.Factor() ? &gram : nullptr;
-        sweep_.shape.Lean<K>(s, p, telling, ColumnsOf(m), &part_.shape);
+        sweep_.shape.Tilt<K>(s, p, telling, ColumnsOf(m), &part_.shape);
         sweep_.shape.Measure<K>(s, telling, shortest2, longest2, &part_.shape);
         continue;
       }
       for (int c = 1; c < K; ++c)
         for (int e = 0; e < c; ++e)
           gram.dots[c][e] = Dot(OffsetOf(column[c], d), OffsetOf(column[e], d), d);
-      sweep_.shape.Lean<K>(s, p, gram.Factor() ? &gram : nullptr, ColumnsOf(m), &part_.shape);
+      sweep_.shape.Tilt<K>(s, p, gram.Factor() ? &gram : nullptr, ColumnsOf(m), &part_.shape);
     }
   }
 

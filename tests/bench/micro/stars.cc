@@ -123,12 +123,12 @@ BENCHMARK(CellWouldCut<3>)->Arg(24);
 BENCHMARK(CellWouldCut<4>)->Arg(60);
 
 // The mesher inserts a round at a time; so does this, doubling the sample each time.
-template <int K, Judging kJudging>
+template <int K, CentreRule kCentreRule>
 void StarsCommit(benchmark::State& state) {
   const int n = static_cast<int>(state.range(0));
   const FlatTorus<K> sample(n);
   for (auto _ : state) {
-    Stars<K> stars(2 * K, 0.2, {1.0, kJudging});
+    Stars<K> stars(2 * K, 0.2, {1.0, kCentreRule});
     for (int begin = 0, end = 32; begin < n; begin = end, end = std::min(n, 2 * end)) {
       for (int i = begin; i < end; ++i) stars.Add(sample.Point(i), sample.Tangent(i));
       benchmark::DoNotOptimize(stars.Commit());
@@ -136,16 +136,16 @@ void StarsCommit(benchmark::State& state) {
   }
   state.SetItemsProcessed(state.iterations() * n);
 }
-BENCHMARK(StarsCommit<2, Judging::kFlats>)
+BENCHMARK(StarsCommit<2, CentreRule::kTangentSpace>)
     ->Arg(1'000)
     ->Arg(10'000)
     ->Unit(benchmark::kMillisecond)
     ->MeasureProcessCPUTime();
-BENCHMARK(StarsCommit<3, Judging::kFlats>)
+BENCHMARK(StarsCommit<3, CentreRule::kTangentSpace>)
     ->Arg(1'000)
     ->Unit(benchmark::kMillisecond)
     ->MeasureProcessCPUTime();
-BENCHMARK(StarsCommit<3, Judging::kCommonCentre>)
+BENCHMARK(StarsCommit<3, CentreRule::kCommonCentre>)
     ->Arg(1'000)
     ->Unit(benchmark::kMillisecond)
     ->MeasureProcessCPUTime();

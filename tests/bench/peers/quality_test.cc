@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-// The yardstick of the comparison, held against meshes of which everything is known.
+// The yardstick of the comparison, compared with meshes that are known completely.
 
 namespace stellate::bench {
 namespace {

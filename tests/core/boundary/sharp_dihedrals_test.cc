@@ -22,7 +22,7 @@ double CosineOf(double degrees) { return std::cos(degrees * std::numbers::pi / 1
 TEST(SharpDihedrals, AreAsMeasured) {
   for (const char* name : {"so3", "sphere:3:4"}) {
     const FramedPoints sample = RandomSample(*Make(name), 200, 3);
-    Stars<3> stars(sample.d, 0.3, {3.0, Judging::kFlats});
+    Stars<3> stars(sample.d, 0.3, {3.0, CentreRule::kTangentSpace});
     AppendTo(&stars, sample);
     stars.Commit();
     const auto corner = [&](std::uint32_t id) {
@@ -65,7 +65,7 @@ TEST(SharpDihedrals, AreNotThoseOfTheWalls) {
   const double tangent[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   const double down[3] = {0, -1, 0}, up[3] = {-std::sin(kAngle), std::cos(kAngle), 0};
   for (const bool on_edge : {false, true}) {
-    Stars<3> stars(3, 0.5, {3.0, Judging::kFlats});
+    Stars<3> stars(3, 0.5, {3.0, CentreRule::kTangentSpace});
     const auto append = [&](double x, double y, double z, WallSet walls) {
       const double point[3] = {x, y, z};
       std::vector<double> conormals;

@@ -35,7 +35,7 @@ TEST(Evidence, PointsOfTheMeshAreNoEvidenceAgainstIt) {
     on.insert(on.end(), y.begin(), y.end());
   }
   const Evidence evidence =
-      HoldAgainst(mesh.View(), on, LongestEdges(mesh, 0.2), 0.15, false, 1e-15, 100);
+      CompareWithMesh(mesh.View(), on, LongestEdges(mesh, 0.2), 0.15, false, 1e-15, 100);
   EXPECT_GE(evidence.reach, 0.25);  // as far as it looks, or 1
   EXPECT_TRUE(evidence.uncovered.empty());
 }
@@ -43,8 +43,8 @@ TEST(Evidence, PointsOfTheMeshAreNoEvidenceAgainstIt) {
 TEST(Evidence, ASheetNearerThanAnEdgeBoundsTheReach) {
   const HandmadeMesh mesh = Icosphere(3);
   const Eigen::Vector3d y = 0.98 * mesh.Point(7);
-  const Evidence evidence =
-      HoldAgainst(mesh.View(), {y[0], y[1], y[2]}, LongestEdges(mesh, 0.15), 0.1, false, 1e-12, 1);
+  const Evidence evidence = CompareWithMesh(mesh.View(), {y[0], y[1], y[2]},
+                                            LongestEdges(mesh, 0.15), 0.1, false, 1e-12, 1);
   EXPECT_NEAR(evidence.reach, 0.01, 1e-9);
   EXPECT_EQ(evidence.narrowest, 0u);
   EXPECT_EQ(evidence.vertex, 7u);
@@ -60,8 +60,8 @@ TEST(Evidence, WhatTheOraclesOwnErrorExplainsTellsNothing) {
 
 TEST(Evidence, APointFarFromAllVerticesIsUncovered) {
   const HandmadeMesh mesh = Icosphere(3);
-  const Evidence evidence = HoldAgainst(mesh.View(), {1, 0, 0, 5, 0, 0, 0, 1.3, 0},
-                                        LongestEdges(mesh, 0.15), 0.1, false, 0, 1);
+  const Evidence evidence = CompareWithMesh(mesh.View(), {1, 0, 0, 5, 0, 0, 0, 1.3, 0},
+                                            LongestEdges(mesh, 0.15), 0.1, false, 0, 1);
   EXPECT_EQ(evidence.uncovered, (std::vector<std::uint64_t>{1, 2}));
 }
 
@@ -111,7 +111,7 @@ TEST(Evidence, RefusesTangentsThatAreNotThoseOfTheClosestPoints) {
   EXPECT_FALSE(Certify(spec, mesh, wall, {0, 0, true}, Complement).certificate.certified);
 }
 
-TEST(Evidence, RefusesAMeshOverARim) {
+TEST(Evidence, RefusesAMeshOverAnUndeclaredBoundary) {
   const HandmadeMesh mesh = Icosphere(4);
   // Inside a triangle, off its middle.
   const std::uint32_t* ids = mesh.simplices.data();

@@ -48,7 +48,7 @@ TEST(Proof, FailsForAReachThatTheTrianglesAreTooLargeFor) {
   EXPECT_TRUE(Says(proof.obstacle, "reach")) << proof.obstacle;
 }
 
-TEST(Proof, NamesTheSimplexThatLeans) {
+TEST(Proof, NamesTheTiltedSimplex) {
   HandmadeMesh mesh = Icosphere(2);
   // The tangent space of vertex 7 turned upright.
   const Eigen::Vector3d normal = mesh.Point(7);

@@ -1,4 +1,4 @@
-// Tangent spaces are held against closest points on the mesh's own scale at each vertex.
+// Tangent spaces are compared with closest points on the mesh's own scale at each vertex.
 
 #include <gtest/gtest.h>
 
@@ -48,7 +48,7 @@ double ParameterOf(const Eigen::VectorXd& x) {  // of the nearest point
 Eigen::VectorXd ClosestOnEllipse(const Eigen::VectorXd& x) { return PointAt(ParameterOf(x)); }
 
 // Edges are 0.4 of half the width, and of the radius at the tips: as size_rate makes them. They
-// grow from the tips on, so one quarter is laid and mirrored.
+// grow from the tips on, so that one quarter is sampled and mirrored.
 HandmadeMesh Graded() {
   std::set<double> at{std::numbers::pi / 2, 3 * std::numbers::pi / 2};
   for (double t = 0; t < std::numbers::pi / 2 - 0.002;) {

@@ -54,15 +54,15 @@ class Cavities {
  public:
   explicit Cavities(const FilledCase& c) : manifold_(Make(c.manifold)), epsilon_(c.epsilon) {
     Specification spec = SpecificationFor(*manifold_, c.epsilon);
-    spec.criteria.judging = Judging::kCommonCentre;
+    spec.criteria.centre_rule = CentreRule::kCommonCentre;
     const DrivenRun run = Drive(spec, *manifold_);
     sample_.d = manifold_->ambient_dimension();
     sample_.k = K;
     sample_.Append(run.mesher->Points(), run.mesher->Tangents());
   }
 
-  FilledCavities Fill(Judging judging) const {
-    Stars<K> stars(sample_.d, epsilon_, {4 * epsilon_, judging});
+  FilledCavities Fill(CentreRule centre_rule) const {
+    Stars<K> stars(sample_.d, epsilon_, {4 * epsilon_, centre_rule});
     AppendTo(&stars, sample_);
     stars.Commit();
     return FillCavities<K>(stars, RulesAt(epsilon_));
@@ -79,7 +79,7 @@ template <int K>
 void ExpectNothingToFill(int n) {
   const FramedPoints sample = TorusGrid(K, n);
   const double epsilon = 1.1 * std::sqrt(K) * std::tan(std::numbers::pi / n);
-  Stars<K> stars(sample.d, epsilon, {4 * epsilon, Judging::kCommonCentre});
+  Stars<K> stars(sample.d, epsilon, {4 * epsilon, CentreRule::kCommonCentre});
   AppendTo(&stars, sample);
   stars.Commit();
   const FilledCavities filled = FillCavities<K>(stars, RulesAt(epsilon));
@@ -97,7 +97,7 @@ TEST(CavitiesTest, AreNoneWhereStarsAgree) {
 // Judged in flats, stars of the same sample disagree.
 template <int K>
 void ExpectClosedButForUnfilled(const FilledCase& c) {
-  const FilledCavities filled = Cavities<K>(c).Fill(Judging::kFlats);
+  const FilledCavities filled = Cavities<K>(c).Fill(CentreRule::kTangentSpace);
   EXPECT_GT(filled.inconsistent, 0u);
   EXPECT_GT(filled.cavities, 0u);
   EXPECT_GT(filled.filled, 0u);

@@ -39,7 +39,7 @@ struct BuiltStars {
 
 struct Criteria {
   double epsilon;
-  Judging judging;
+  CentreRule centre_rule;
 };
 
 template <int K>
@@ -91,7 +91,7 @@ class Builder {
 
   std::unique_ptr<Complex> Lay(const std::vector<std::uint32_t>& names) const {
     auto stars = std::make_unique<Complex>(sample_.d, criteria_.epsilon,
-                                           StarOptions{3.0, criteria_.judging});
+                                           StarOptions{3.0, criteria_.centre_rule});
     for (const std::uint32_t q : names) {
       stars->AddInBulk(sample_.Point(q), sample_.Tangent(q));
       stars->NameLast(q);
@@ -203,32 +203,32 @@ std::vector<T> Joined(const std::vector<std::vector<T>>& lists) {
 
 TEST(Parts, OfAMeshOfASurfaceAreTheMesh) {
   const Finished mesh = Mesh("torus:1:0.4", 0.08);
-  const auto whole = ExpectSameInParts<2>(mesh.sample, {0.08, Judging::kFlats});
+  const auto whole = ExpectSameInParts<2>(mesh.sample, {0.08, CentreRule::kTangentSpace});
   EXPECT_EQ(Joined(whole.simplices), mesh.simplices);
-  ExpectSameInParts<2>(mesh.sample, {0.08, Judging::kCommonCentre});
+  ExpectSameInParts<2>(mesh.sample, {0.08, CentreRule::kCommonCentre});
 }
 
 TEST(Parts, OfAMeshInThreeDimensionsHaveItsStars) {
   const Finished mesh = Mesh("flat-torus:3", 0.5);
-  ExpectSameInParts<3>(mesh.sample, {0.5, Judging::kFlats});
-  ExpectSameInParts<3>(mesh.sample, {0.5, Judging::kCommonCentre});
+  ExpectSameInParts<3>(mesh.sample, {0.5, CentreRule::kTangentSpace});
+  ExpectSameInParts<3>(mesh.sample, {0.5, CentreRule::kCommonCentre});
 }
 
 // All neighbours are cospherical: the weights alone tell what the simplices are.
 TEST(Parts, AgreeWherePointsAreCospherical) {
-  ExpectSameInParts<2>(TorusGrid(2, 24), {0.2, Judging::kFlats});
-  ExpectSameInParts<3>(TorusGrid(3, 9), {0.62, Judging::kFlats});
-  ExpectSameInParts<3>(TorusGrid(3, 9), {0.62, Judging::kCommonCentre});
+  ExpectSameInParts<2>(TorusGrid(2, 24), {0.2, CentreRule::kTangentSpace});
+  ExpectSameInParts<3>(TorusGrid(3, 9), {0.62, CentreRule::kTangentSpace});
+  ExpectSameInParts<3>(TorusGrid(3, 9), {0.62, CentreRule::kCommonCentre});
 }
 
 // Cells reach farther than 2 epsilon, or are open.
 TEST(Parts, AskForWhatLiesFartherOff) {
   const auto torus = Make("torus:1:0.4");
   const FramedPoints sparse = RandomSample(*torus, 150, 3);
-  EXPECT_GT(ExpectSameInParts<2>(sparse, {0.1, Judging::kFlats}).asked_again, 0);
+  EXPECT_GT(ExpectSameInParts<2>(sparse, {0.1, CentreRule::kTangentSpace}).asked_again, 0);
   const auto so3 = Make("so3");
   const FramedPoints sparser = RandomSample(*so3, 150, 3);
-  EXPECT_GT(ExpectSameInParts<3>(sparser, {0.5, Judging::kFlats}).asked_again, 0);
+  EXPECT_GT(ExpectSameInParts<3>(sparser, {0.5, CentreRule::kTangentSpace}).asked_again, 0);
 }
 
 }  // namespace

@@ -53,7 +53,7 @@ TEST(Sample, HasCentresOfItsOwnAsSoonAsItMayDifferFromAnother) {
   const Sample<2> copy = sample;
   EXPECT_NE(copy.centre_owner(), sample.centre_owner());
   const std::uint64_t before = sample.centre_owner();
-  sample.SetGuards(std::vector<double>(10, 0.01));
+  sample.SetProtectingBalls(std::vector<double>(10, 0.01));
   EXPECT_NE(sample.centre_owner(), before);
 }
 

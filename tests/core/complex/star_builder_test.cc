@@ -19,7 +19,7 @@ using testing::FramedPoints;
 using testing::Make;
 using testing::RandomSample;
 
-constexpr StarOptions kOptions{.inradius = 3, .judging = Judging::kFlats};
+constexpr StarOptions kOptions{.inradius = 3, .centre_rule = CentreRule::kTangentSpace};
 
 template <int K>
 FramedPoints PointsOfDimension(int count, std::uint64_t seed) {

@@ -65,7 +65,8 @@ std::set<std::pair<WallSet, std::vector<std::uint32_t>>> OnFaces(const Stars<3>&
 }
 
 TEST(RestrictToBoundary, KnowsTheSameSimplicesOfFacesAndNoOthers) {
-  Stars<3> whole(3, 0.5, {3.0, Judging::kFlats}), alone(3, 0.5, {3.0, Judging::kFlats});
+  Stars<3> whole(3, 0.5, {3.0, CentreRule::kTangentSpace}),
+      alone(3, 0.5, {3.0, CentreRule::kTangentSpace});
   alone.RestrictToBoundary();
   std::size_t known = 0;
   for (unsigned part = 0; part < 4; ++part) {
@@ -87,17 +88,17 @@ TEST(RestrictToBoundary, KnowsTheSameSimplicesOfFacesAndNoOthers) {
   EXPECT_EQ(alone.simplex_count(), whole.simplex_count());
 }
 
-// As points come, and after the stars were built anew with guards: only the boundary's stars are
-// looked for, by how far their simplices of faces reach.
+// As points come, and after the stars were rebuilt with protecting balls: only the boundary's stars
+// are looked for, by how far their simplices of faces reach.
 TEST(EncroachedBy, FindsTheWorstOfAllFaces) {
   int encroached = 0, free = 0;
-  Stars<3> stars(3, 0.5, {3.0, Judging::kFlats});
+  Stars<3> stars(3, 0.5, {3.0, CentreRule::kTangentSpace});
   for (unsigned part = 0; part < 6; ++part) {
     AppendQuarter(&stars, part, 40 << part);
     if (part == 4) {
       std::vector<double> radii2(stars.size(), 0.0);
       for (std::uint32_t p = 0; p < stars.size(); p += 7) radii2[p] = 1e-4;
-      stars.SetGuards(std::move(radii2));
+      stars.SetProtectingBalls(std::move(radii2));
     }
     std::mt19937 random(100 + part);
     std::uniform_real_distribution<double> uniform(0, 1);

@@ -32,13 +32,14 @@ constexpr double kEpsilon = 0.3;
 constexpr double kInradius = 3;
 
 template <int K>
-std::unique_ptr<Stars<K>> NewStars(int d, Judging judging) {
-  return std::make_unique<Stars<K>>(d, kEpsilon, StarOptions{kInradius, judging});
+std::unique_ptr<Stars<K>> NewStars(int d, CentreRule centre_rule) {
+  return std::make_unique<Stars<K>>(d, kEpsilon, StarOptions{kInradius, centre_rule});
 }
 
 template <int K>
-std::unique_ptr<Stars<K>> Build(const FramedPoints& sample, Judging judging = Judging::kFlats) {
-  auto stars = NewStars<K>(sample.d, judging);
+std::unique_ptr<Stars<K>> Build(const FramedPoints& sample,
+                                CentreRule centre_rule = CentreRule::kTangentSpace) {
+  auto stars = NewStars<K>(sample.d, centre_rule);
   AppendTo(stars.get(), sample);
   stars->Commit();
   return stars;
@@ -54,20 +55,21 @@ template <typename T>
 class StarsTest : public ::testing::Test {};
 
 // k, and where simplices are judged: what follows holds for both unless it says otherwise.
-template <int K, Judging J>
+template <int K, CentreRule J>
 struct Judged {
   static constexpr int kDimension = K;
-  static constexpr Judging kJudging = J;
+  static constexpr CentreRule kCentreRule = J;
 };
 using Cases =
-    ::testing::Types<Judged<1, Judging::kFlats>, Judged<2, Judging::kFlats>,
-                     Judged<3, Judging::kFlats>, Judged<4, Judging::kFlats>,
-                     Judged<2, Judging::kCommonCentre>, Judged<3, Judging::kCommonCentre>>;
+    ::testing::Types<Judged<1, CentreRule::kTangentSpace>, Judged<2, CentreRule::kTangentSpace>,
+                     Judged<3, CentreRule::kTangentSpace>, Judged<4, CentreRule::kTangentSpace>,
+                     Judged<2, CentreRule::kCommonCentre>, Judged<3, CentreRule::kCommonCentre>>;
 TYPED_TEST_SUITE(StarsTest, Cases);
 
 TYPED_TEST(StarsTest, ClipsEachCellByAllThatMatter) {
   constexpr int K = TypeParam::kDimension;
-  if (TypeParam::kJudging != Judging::kFlats) return SUCCEED();  // other cells are not polytopes
+  if (TypeParam::kCentreRule != CentreRule::kTangentSpace)
+    return SUCCEED();  // other cells are not polytopes
   const FramedPoints sample = SampleOfDimension<K>(K == 4 ? 120 : 250, 1);
   const auto stars = Build<K>(sample);
   ASSERT_EQ(stars->size(), sample.size());
@@ -98,7 +100,7 @@ TYPED_TEST(StarsTest, ClipsEachCellByAllThatMatter) {
 // of its simplex, and no sample point is nearer.
 TYPED_TEST(StarsTest, HasCircumcentresOfEmptyBalls) {
   constexpr int K = TypeParam::kDimension;
-  if (TypeParam::kJudging != Judging::kFlats) return SUCCEED();
+  if (TypeParam::kCentreRule != CentreRule::kTangentSpace) return SUCCEED();
   const FramedPoints sample = SampleOfDimension<K>(K == 4 ? 120 : 250, 2);
   const auto stars = Build<K>(sample);
   std::vector<double> centre(static_cast<std::size_t>(sample.d));
@@ -125,11 +127,11 @@ TYPED_TEST(StarsTest, HasCircumcentresOfEmptyBalls) {
 
 TYPED_TEST(StarsTest, IsTheSameFromOneBatchOrManyOrOneByOne) {
   constexpr int K = TypeParam::kDimension;
-  if (TypeParam::kJudging != Judging::kFlats) return SUCCEED();
+  if (TypeParam::kCentreRule != CentreRule::kTangentSpace) return SUCCEED();
   const FramedPoints sample = SampleOfDimension<K>(K == 4 ? 100 : 300, 3);
   const auto at_once = Build<K>(sample);
   for (const std::uint32_t batch : {1u, 17u}) {
-    auto stars = NewStars<K>(sample.d, Judging::kFlats);
+    auto stars = NewStars<K>(sample.d, CentreRule::kTangentSpace);
     for (std::uint32_t i = 0; i < sample.size(); ++i) {
       stars->Add(sample.Point(i), sample.Tangent(i));
       if (i % batch == batch - 1) stars->Commit();
@@ -141,17 +143,17 @@ TYPED_TEST(StarsTest, IsTheSameFromOneBatchOrManyOrOneByOne) {
   }
 }
 
-// A sample laid at once has the stars that it has when it is appended, and takes further points.
+// A sample added in bulk has the stars that it has when it is appended, and takes further points.
 TYPED_TEST(StarsTest, IsTheSameBuiltInBulkOrAppended) {
   constexpr int K = TypeParam::kDimension;
-  if (TypeParam::kJudging != Judging::kFlats) return SUCCEED();
+  if (TypeParam::kCentreRule != CentreRule::kTangentSpace) return SUCCEED();
   const FramedPoints sample = SampleOfDimension<K>(K == 4 ? 100 : 300, 5);
-  const std::uint32_t laid = sample.size() - 20;
-  auto stars = NewStars<K>(sample.d, Judging::kFlats);
-  auto appended = NewStars<K>(sample.d, Judging::kFlats);
-  auto graded = NewStars<K>(sample.d, Judging::kFlats);
+  const std::uint32_t sampled = sample.size() - 20;
+  auto stars = NewStars<K>(sample.d, CentreRule::kTangentSpace);
+  auto appended = NewStars<K>(sample.d, CentreRule::kTangentSpace);
+  auto graded = NewStars<K>(sample.d, CentreRule::kTangentSpace);
   Random random(5, 0);
-  for (std::uint32_t i = 0; i < laid; ++i) {
+  for (std::uint32_t i = 0; i < sampled; ++i) {
     stars->AddInBulk(sample.Point(i), sample.Tangent(i));
     graded->AddInBulk(sample.Point(i), sample.Tangent(i), 0.3 * random.Uniform());
     appended->Add(sample.Point(i), sample.Tangent(i));
@@ -166,7 +168,7 @@ TYPED_TEST(StarsTest, IsTheSameBuiltInBulkOrAppended) {
       EXPECT_EQ(Canonical(stars->cell(p)), Canonical(appended->cell(p))) << "star " << p;
     EXPECT_EQ(stars->Simplices(), appended->Simplices());
     EXPECT_EQ(stars->simplex_count(), appended->simplex_count());
-    for (std::uint32_t i = laid; i < sample.size() && last == 0; ++i) {
+    for (std::uint32_t i = sampled; i < sample.size() && last == 0; ++i) {
       stars->Add(sample.Point(i), sample.Tangent(i));
       appended->Add(sample.Point(i), sample.Tangent(i));
     }
@@ -178,7 +180,7 @@ TYPED_TEST(StarsTest, DoesNotDependOnTheNumberOfThreads) {
   constexpr int K = TypeParam::kDimension;
   const FramedPoints sample = SampleOfDimension<K>(K == 4 ? 100 : 400, 4);
   const auto build = [&](int threads) {
-    auto stars = NewStars<K>(sample.d, TypeParam::kJudging);
+    auto stars = NewStars<K>(sample.d, TypeParam::kCentreRule);
     std::vector<std::vector<std::uint32_t>> changes;
     tbb::task_arena(threads).execute([&] {
       for (std::uint32_t i = 0; i < sample.size(); ++i) {
@@ -203,7 +205,7 @@ TYPED_TEST(StarsTest, BuiltInBulkDoesNotDependOnTheNumberOfThreads) {
   constexpr int K = TypeParam::kDimension;
   const FramedPoints sample = SampleOfDimension<K>(K == 4 ? 100 : 400, 6);
   const auto build = [&](int threads) {
-    auto stars = NewStars<K>(sample.d, TypeParam::kJudging);
+    auto stars = NewStars<K>(sample.d, TypeParam::kCentreRule);
     std::vector<std::uint32_t> added;
     tbb::task_arena(threads).execute([&] {
       for (std::uint32_t i = 0; i < sample.size(); ++i)
@@ -225,7 +227,7 @@ TYPED_TEST(StarsTest, TryPointShowsWhatCommitWouldDo) {
   constexpr int K = TypeParam::kDimension;
   const FramedPoints sample = SampleOfDimension<K>(K == 4 ? 100 : 200, 5);
   const FramedPoints more = SampleOfDimension<K>(K == 4 ? 10 : 40, 6);
-  auto stars = Build<K>(sample, TypeParam::kJudging);
+  auto stars = Build<K>(sample, TypeParam::kCentreRule);
   typename Stars<K>::Tentative tentative;
   for (std::uint32_t i = 0; i < more.size(); ++i) {
     const std::uint32_t size = stars->size();
@@ -253,7 +255,7 @@ TYPED_TEST(StarsTest, TryPointShowsWhatCommitWouldDo) {
 TYPED_TEST(StarsTest, ChangesAddUpToTheComplex) {
   constexpr int K = TypeParam::kDimension;
   const FramedPoints sample = SampleOfDimension<K>(K == 4 ? 100 : 300, 7);
-  auto stars = NewStars<K>(sample.d, TypeParam::kJudging);
+  auto stars = NewStars<K>(sample.d, TypeParam::kCentreRule);
   std::set<typename Stars<K>::Simplex> replayed;
   for (std::uint32_t i = 0; i < sample.size(); ++i) {
     stars->Add(sample.Point(i), sample.Tangent(i));
@@ -294,7 +296,7 @@ TYPED_TEST(StarsTest, ACopyGoesOnFromTheSameState) {
   const FramedPoints sample = SampleOfDimension<K>(K == 4 ? 60 : 150, 13);
   const FramedPoints more = SampleOfDimension<K>(20, 14), other = SampleOfDimension<K>(20, 15);
   for (const bool in_bulk : {false, true}) {
-    auto stars = NewStars<K>(sample.d, TypeParam::kJudging);
+    auto stars = NewStars<K>(sample.d, TypeParam::kCentreRule);
     for (std::uint32_t i = 0; i < sample.size(); ++i)
       in_bulk ? stars->AddInBulk(sample.Point(i), sample.Tangent(i), 0.3)
               : static_cast<void>(stars->Add(sample.Point(i), sample.Tangent(i)));
@@ -316,7 +318,7 @@ TYPED_TEST(StarsTest, ACopyGoesOnFromTheSameState) {
 
 TYPED_TEST(StarsTest, SimplicesAreThoseOfTheirLowestVertexInOrder) {
   constexpr int K = TypeParam::kDimension;
-  const auto stars = Build<K>(SampleOfDimension<K>(100, 8), TypeParam::kJudging);
+  const auto stars = Build<K>(SampleOfDimension<K>(100, 8), TypeParam::kCentreRule);
   std::vector<std::uint32_t> expected;
   for (std::uint32_t p = 0; p < stars->size(); ++p)
     for (const auto& s : StarOf(*stars, p))
@@ -328,7 +330,7 @@ TYPED_TEST(StarsTest, FindsPointsWithinARadiusAlsoBeforeCommit) {
   constexpr int K = TypeParam::kDimension;
   const FramedPoints sample = SampleOfDimension<K>(60, 9);
   const FramedPoints probes = SampleOfDimension<K>(60, 10);
-  auto stars = NewStars<K>(sample.d, TypeParam::kJudging);
+  auto stars = NewStars<K>(sample.d, TypeParam::kCentreRule);
   for (std::uint32_t i = 0; i < sample.size(); ++i) {
     stars->Add(sample.Point(i), sample.Tangent(i));
     if (i == 30) stars->Commit();
@@ -344,7 +346,7 @@ TYPED_TEST(StarsTest, FindsPointsWithinARadiusAlsoBeforeCommit) {
 TYPED_TEST(StarsTest, ProjectsAndLifts) {
   constexpr int K = TypeParam::kDimension;
   const FramedPoints sample = SampleOfDimension<K>(20, 11);
-  const auto stars = Build<K>(sample, TypeParam::kJudging);
+  const auto stars = Build<K>(sample, TypeParam::kCentreRule);
   std::vector<double> lifted(static_cast<std::size_t>(sample.d));
   double x[K], back[K];
   for (std::uint32_t p = 0; p < sample.size(); ++p) {
@@ -372,7 +374,7 @@ TYPED_TEST(StarsTest, StarsOfAGridAgree) {
   const int n = K <= 2 ? 24 : K == 3 ? 10 : 6;
   const double circumradius = std::sqrt(K) * std::tan(std::numbers::pi / n);
   const FramedPoints sample = TorusGrid(K, n);
-  Stars<K> stars(sample.d, 1.1 * circumradius, StarOptions{kInradius, TypeParam::kJudging});
+  Stars<K> stars(sample.d, 1.1 * circumradius, StarOptions{kInradius, TypeParam::kCentreRule});
   AppendTo(&stars, sample);
   stars.Commit();
   std::uint64_t unbounded = 0, inconsistent = 0;
@@ -390,7 +392,7 @@ TYPED_TEST(StarsTest, DuplicatePointsDoNoHarm) {
   const FramedPoints once = sample;
   sample.points.insert(sample.points.end(), once.points.begin(), once.points.end());
   sample.tangents.insert(sample.tangents.end(), once.tangents.begin(), once.tangents.end());
-  const auto stars = Build<K>(sample, TypeParam::kJudging);
+  const auto stars = Build<K>(sample, TypeParam::kCentreRule);
   for (std::uint32_t p = 0; p < stars->size(); ++p) {
     EXPECT_GE(stars->cell(p).vertex_count(), K + 1u);
     EXPECT_TRUE(std::isfinite(stars->cell(p).max_norm2()));

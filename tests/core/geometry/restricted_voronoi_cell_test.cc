@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/base/random.h"
-#include "core/geometry/laid_polygon.h"
+#include "core/geometry/draft_polygon.h"
 #include "tests/core/support/cells.h"
 #include "tests/core/support/half_spaces.h"
 
@@ -350,8 +350,8 @@ TYPED_TEST(RestrictedVoronoiCellTest, CanBeUsedAgainAfterReset) {
   EXPECT_EQ(Canonical(cell), Canonical(Cell<K>(Cube<K>())));
 }
 
-TEST(LaidPolygon, IsTheCellByTheSameCutsBitForBit) {
-  LaidPolygon made, resumed;
+TEST(DraftPolygon, IsTheCellByTheSameCutsBitForBit) {
+  DraftPolygon made, resumed;
   for (std::uint64_t trial = 0; trial < 200; ++trial) {
     const double inradius = trial % 2 == 0 ? 10 : 3;
     HalfSpaces<2> half_spaces = RandomHalfSpaces<2>(40, trial);

@@ -118,7 +118,7 @@ inline std::vector<GoldenCase> Cases() {
        ClosestPointsAlone},
       {"sphere_3_flats", "A 3-sphere judged in flats, slivers allowed", "sphere:3", 0.5,
        [](S& s) {
-         s.criteria.judging = Judging::kFlats;
+         s.criteria.centre_rule = CentreRule::kTangentSpace;
          s.criteria.sliver_bound = 0;
        }},
       {"ellipsoid_4", "A 4-dimensional ellipsoid whose cavities are filled",
@@ -131,16 +131,16 @@ inline std::vector<GoldenCase> Cases() {
          s.limits.max_batch_queries = 50;
        }},
       {"torus_ahead", "A torus, asking ahead", "torus", 0.15,
-       [](S& s) { s.criteria.ask_ahead = true; }},
+       [](S& s) { s.criteria.speculative = true; }},
       {"torus_ahead_poor", "A torus, asking ahead, closest points alone, in parts of 700 queries",
        "torus", 0.2,
        [](S& s) {
          s.oracle = {};
-         s.criteria.ask_ahead = true;
+         s.criteria.speculative = true;
          s.limits.max_batch_queries = 700;
        }},
       {"so3_ahead", "Rotations, asking ahead", "so3", 0.8,
-       [](S& s) { s.criteria.ask_ahead = true; }},
+       [](S& s) { s.criteria.speculative = true; }},
 
       // Sizes.
       {"ellipsoid_estimated", "An ellipsoid, sizes estimated", "ellipsoid:1:0.6:0.4", 0.3,
@@ -158,7 +158,7 @@ inline std::vector<GoldenCase> Cases() {
          s.oracle.local_size = true;
          s.oracle.tangent_basis = false;
          s.criteria.size_rate = 0.3;
-         s.criteria.ask_ahead = true;
+         s.criteria.speculative = true;
        },
        GiveSizes},
 
@@ -220,7 +220,7 @@ inline std::vector<GoldenCase> Cases() {
       {"half_unfound", "A torus of which one half is never found, asking ahead", "torus", 0.3,
        [](S& s) {
          s.oracle.intersect_flat = false;
-         s.criteria.ask_ahead = true;
+         s.criteria.speculative = true;
        },
        FindOneHalf},
       {"noise", "A sphere with waves shorter than epsilon, at most 100 rounds", "sphere:2", 0.3,

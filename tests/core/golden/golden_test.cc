@@ -1,5 +1,6 @@
-// Runs held against their records, a file each in this directory: a change of behaviour is a diff
-// of these, which somebody has to read and to explain. `core_golden_test --rewrite` records anew.
+// Runs are compared with their records, a file each in this directory: a change of behaviour is a
+// diff of these, which somebody has to read and to explain. `core_golden_test --rewrite` records
+// anew.
 
 #include <gtest/gtest.h>
 

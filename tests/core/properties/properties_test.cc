@@ -41,7 +41,7 @@ struct Shape {
   double far = 1e12;
 };
 
-// The lattice that is laid over the flat torus is as symmetric as that: of the 46 circumcentres
+// The lattice that samples the flat torus is as symmetric as that: of the 46 circumcentres
 // that are asked for first when it is refined, seven have the radius of another to twelve digits,
 // and which of them goes first, rounding decides.
 constexpr Shape kShapes[] = {{"circle:3", 0.3},
@@ -106,7 +106,7 @@ TEST_P(Properties, PowersOfTwoChangeNothing) {
     spec.random_seed = seed;
     spec.oracle.intersect_flat = random.Uniform() < 0.5;
     spec.oracle.tangent_basis = random.Uniform() < 0.7;
-    spec.criteria.ask_ahead = random.Uniform() < 0.3;
+    spec.criteria.speculative = random.Uniform() < 0.3;
     if (manifold_->has_local_size() && manifold_->dimension() < 3 && random.Uniform() < 0.5) {
       spec.oracle.local_size = random.Uniform() < 0.5;
       spec.criteria.size_rate = 0.5;
@@ -167,7 +167,7 @@ TEST_P(Properties, UnitsAndPositionsKeepTheCertificate) {
     spec.random_seed = seed;
     spec.oracle.intersect_flat = random.Uniform() < 0.5;
     spec.oracle.tangent_basis = random.Uniform() < 0.7;
-    spec.criteria.ask_ahead = random.Uniform() < 0.3;
+    spec.criteria.speculative = random.Uniform() < 0.3;
     ExpectItsCertificate(Drive(spec, moved), epsilon);
   });
 }
@@ -348,7 +348,7 @@ TEST_P(SymmetricSamples, MeshLikeAnyOthers) {
     // Each thrice: as it is, once more, and off by rounding.
     spec.seeds.resize(d, 3 * seeds.cols());
     spec.seeds << seeds, seeds, seeds * (1 + 1e-15);
-    spec.criteria.ask_ahead = random.Uniform() < 0.3;
+    spec.criteria.speculative = random.Uniform() < 0.3;
     const DrivenRun run = Drive(spec, moved);
     const Certificate& c = run.report().certificate;
     ASSERT_EQ(run.report().termination, Termination::kConverged) << c.verdict;

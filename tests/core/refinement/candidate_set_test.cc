@@ -15,7 +15,7 @@ constexpr double kRadius = 0.2;
 // A flat sample, a target of R1 for star 3 and one of R3 for star 5.
 class CandidateSetTest : public ::testing::Test {
  protected:
-  CandidateSetTest() : stars_(4, 1, {1, Judging::kFlats}) {
+  CandidateSetTest() : stars_(4, 1, {1, CentreRule::kTangentSpace}) {
     AppendTo(&stars_, FlatSample(2, 4, 50, 1));
     stars_.Commit();
     std::vector<std::uint32_t> all(50);

@@ -179,7 +179,7 @@ double Density(const Mesher& mesher, Oracle& sizes, double rate) {
   return static_cast<double>(points.cols()) / needed;
 }
 
-TEST(GivenSize, IsLaidAsALatticeWhereItChangesSlowly) {
+TEST(GivenSize, IsSampledByALatticeWhereItChangesSlowly) {
   const auto torus = Make("torus:1:0.9");
   const Specification spec = SizedSpec(*torus, 0.5, 0.07);
   const DrivenRun run = Drive(spec, *torus);
@@ -220,7 +220,7 @@ TEST(GivenSize, AllowsForADeviation) {
 TEST(GivenSize, IsNoLargerThanEpsilon) {
   const auto torus = Make("torus");
   Sized large(*torus, [](const Eigen::VectorXd&) { return 10.0; });
-  for (const double epsilon : {0.3, 0.05}) {  // star by star, and laid as a lattice
+  for (const double epsilon : {0.3, 0.05}) {  // star by star, and by a lattice
     const DrivenRun plain = Drive(testing::SpecificationFor(*torus, epsilon), *torus);
     EXPECT_TRUE(SameMesh(*plain.mesher, *Drive(SizedSpec(large, epsilon, 1), large).mesher));
   }
@@ -247,16 +247,16 @@ TEST(GivenSize, HelpsToFindTangents) {
   EXPECT_LE(RadiiOf(*run.mesher, *ellipsoid).largest_share, 0.4 * (1 + 1e-9));
 }
 
-TEST(GivenSize, IsGuessedWhenAskingAhead) {
+TEST(GivenSize, IsGuessedInASpeculativeRun) {
   const auto torus = Make("torus:1:0.9");
   Specification spec = SizedSpec(*torus, 0.5, 0.2);
   const DrivenRun plain = Drive(spec, *torus);
-  spec.criteria.ask_ahead = true;
+  spec.criteria.speculative = true;
   const DrivenRun ahead = Drive(spec, *torus);
   ExpectCertified(ahead, 0);
   EXPECT_LE(RadiiOf(*ahead.mesher, *torus).largest_share, 0.2 * (1 + 1e-9));
   EXPECT_LT(2 * ahead.report().counts.rounds, plain.report().counts.rounds);
-  // Plain it is laid as a lattice, ahead it grows star by star.
+  // A plain run samples by a lattice, a speculative one star by star.
   EXPECT_LT(static_cast<double>(ahead.report().counts.vertices),
             1.3 * static_cast<double>(plain.report().counts.vertices));
 }

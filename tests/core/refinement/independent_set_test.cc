@@ -66,7 +66,7 @@ class IndependentSetTest : public ::testing::Test {
   }
 
   FramedPoints sample_;
-  Stars<kDimension> stars_{6, 0.3, {3, Judging::kFlats}};
+  Stars<kDimension> stars_{6, 0.3, {3, CentreRule::kTangentSpace}};
 };
 
 constexpr std::size_t kAll = static_cast<std::size_t>(-1);

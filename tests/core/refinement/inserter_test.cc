@@ -17,7 +17,7 @@ class InserterTest : public ::testing::Test {
  protected:
   InserterTest()
       : criteria_(Resolve(SphereSpec(0.5))),
-        stars_(3, criteria_.epsilon, {criteria_.inradius, criteria_.judging}),
+        stars_(3, criteria_.epsilon, {criteria_.inradius, criteria_.centre_rule}),
         sizes_(criteria_) {
     const AnsweredPoints seeds = OnSphere(Octahedron());
     for (Eigen::Index c = 0; c < 6; ++c)

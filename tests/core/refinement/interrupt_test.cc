@@ -177,14 +177,14 @@ TEST_F(AtALookUp, OfARunThatFindsTangentsItself) {
 TEST_F(AtALookUp, OfASpeculation) {
   const auto torus = Make("torus");
   Specification spec = SpecificationFor(*torus, 0.2);
-  spec.criteria.ask_ahead = true;
+  spec.criteria.speculative = true;
   InterruptAtMany(spec, *torus);
 }
 
 TEST_F(AtALookUp, OfASampleThatIsAskedForAtOnce) {
   const auto torus = Make("torus");
   Specification spec = SpecificationFor(*torus, 0.06);
-  spec.criteria.ask_ahead = true;
+  spec.criteria.speculative = true;
   InterruptAtMany(spec, *torus, 15);
 }
 

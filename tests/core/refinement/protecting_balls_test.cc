@@ -45,7 +45,7 @@ int CountEnds(double share, double overlap) {
   return ends;
 }
 
-TEST(GuardShares, EndIfAndOnlyIfTheirLawHolds) {
+TEST(BallShares, EndIfAndOnlyIfTheirLawHolds) {
   const double most = 1 + 1 / std::numbers::sqrt2;
   EXPECT_LE(kBallOverlap / kBallShare, most);
   EXPECT_EQ(CountEnds(kBallShare, kBallOverlap), 100);
@@ -55,7 +55,7 @@ TEST(GuardShares, EndIfAndOnlyIfTheirLawHolds) {
   }
 }
 
-TEST(GuardShares, MakeNoEdgeShorterThanTheShortest) {
+TEST(BallShares, MakeNoEdgeShorterThanTheShortest) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> octaves(-6, 0);
   for (int i = 0; i < 100; ++i) {
@@ -71,7 +71,7 @@ TEST(GuardShares, MakeNoEdgeShorterThanTheShortest) {
 Stars<3> WedgeEdge(const std::vector<double>& heights) {
   constexpr double kFrame[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   const double conormals[6] = {-0.5, std::numbers::sqrt3 / 2, 0, 0, -1, 0};
-  Stars<3> stars(3, 1, {10, Judging::kFlats});
+  Stars<3> stars(3, 1, {10, CentreRule::kTangentSpace});
   for (const double height : heights) {
     const double point[3] = {0, 0, height};
     stars.Add(point, kFrame, Stars<3>::kNone, WallSet{3}, conormals);
@@ -91,13 +91,13 @@ SizeField<3> SizesOf(double epsilon) {
 TEST(PlanProtectingBalls, TellsWhichEdgesAreTooLongForTheirBalls) {
   const Stars<3> stars = WedgeEdge({0, 1, 1.2, 1.4, 1.6});
   ASSERT_TRUE(NeedsProtection<3>(stars));
-  const ProtectingBalls<3> guards = PlanProtectingBalls<3>(stars, SizesOf(1));
-  EXPECT_NEAR(std::sqrt(guards.radii2[2]), kBallShare * 0.2, 1e-12);
-  ASSERT_EQ(guards.gaps.size(), 1u) << "beside 1 and 0.2 alone";
-  EXPECT_EQ(guards.edges, 4u);
-  EXPECT_NEAR(guards.longest, 1, 1e-12);
-  EXPECT_NEAR(guards.least_clearance, 0.2, 1e-12);
-  EXPECT_EQ(MostSplits<3>(guards), 20u * 4 * 4) << "from 0.2 to 1 there are four octaves";
+  const ProtectingBalls<3> balls = PlanProtectingBalls<3>(stars, SizesOf(1));
+  EXPECT_NEAR(std::sqrt(balls.radii2[2]), kBallShare * 0.2, 1e-12);
+  ASSERT_EQ(balls.gaps.size(), 1u) << "beside 1 and 0.2 alone";
+  EXPECT_EQ(balls.edges, 4u);
+  EXPECT_NEAR(balls.longest, 1, 1e-12);
+  EXPECT_NEAR(balls.least_clearance, 0.2, 1e-12);
+  EXPECT_EQ(MostSplits<3>(balls), 20u * 4 * 4) << "from 0.2 to 1 there are four octaves";
 }
 
 // A later pass: what was inserted since lies just outside of the balls, and would shrink them.
@@ -106,7 +106,7 @@ TEST(PlanProtectingBalls, LeavesTheBallsThatThereAre) {
   ProtectingBalls<3> first = PlanProtectingBalls<3>(stars, SizesOf(2));
   EXPECT_TRUE(first.gaps.empty());
   first.radii2[3] = 0;
-  stars.SetGuards(first.radii2);
+  stars.SetProtectingBalls(first.radii2);
   constexpr double kFrame[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   constexpr double kBelow[3] = {0, -1, 0};
   const double radius = std::sqrt(first.radii2[1]);

@@ -79,7 +79,7 @@ void ExpectRulesHold(const DrivenRun& run, const Specification& spec) {
   sample.d = spec.ambient_dimension;
   sample.k = K;
   sample.Append(run.mesher->Points(), run.mesher->Tangents());
-  Stars<K> stars(sample.d, spec.epsilon, {criteria.advance_step, Judging::kFlats});
+  Stars<K> stars(sample.d, spec.epsilon, {criteria.advance_step, CentreRule::kTangentSpace});
   AppendTo(&stars, sample);
   stars.Commit();
   std::set<typename Stars<K>::Simplex> all;
@@ -98,7 +98,7 @@ template <int K>
 void ExpectRulesHoldOn(const std::string& name, double epsilon) {
   const auto manifold = Make(name);
   Specification spec = SpecificationFor(*manifold, epsilon);
-  spec.criteria.judging = Judging::kFlats;
+  spec.criteria.centre_rule = CentreRule::kTangentSpace;
   const DrivenRun run = Drive(spec, *manifold);
   ExpectGoodMesh(run, manifold->facts());
   ExpectRulesHold<K>(run, spec);

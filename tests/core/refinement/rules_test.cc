@@ -25,7 +25,8 @@ using Simplex = typename Stars<K>::Simplex;
 
 template <int K>
 std::unique_ptr<Stars<K>> Build(const FramedPoints& sample) {
-  auto stars = std::make_unique<Stars<K>>(sample.d, 0.3, StarOptions{3.0, Judging::kFlats});
+  auto stars =
+      std::make_unique<Stars<K>>(sample.d, 0.3, StarOptions{3.0, CentreRule::kTangentSpace});
   AppendTo(stars.get(), sample);
   stars->Commit();
   return stars;
@@ -258,13 +259,13 @@ TEST(RuleR4Consistency, IsMembershipInTheStarsOfAllVertices) {
   ExpectConsistencyByDefinition<3>(RandomSample(*Make("flat-torus:3"), 150, 9), 0.15);
 }
 
-// Into a mesh without a blemish: a candidate that counts no bad simplex leaves none, and one that
+// Into a mesh without a violation: a candidate that counts no bad simplex leaves none, and one that
 // leaves some counts them.
 template <int K>
 void ExpectBadCountedRightly(const std::string& name, double epsilon) {
   const auto manifold = Make(name);
   Specification spec = testing::SpecificationFor(*manifold, epsilon);
-  spec.criteria.judging = Judging::kFlats;
+  spec.criteria.centre_rule = CentreRule::kTangentSpace;
   const testing::DrivenRun run = testing::Drive(spec, *manifold);
   ASSERT_TRUE(run.report().certificate.certified) << run.report().certificate.verdict;
   FramedPoints mesh;

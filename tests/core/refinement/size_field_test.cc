@@ -23,7 +23,7 @@ Specification Spec(double epsilon) {
 }
 
 Stars<2> ComplexOn(const std::string& manifold, int count) {
-  Stars<2> stars(3, 0.3, {3, Judging::kFlats});
+  Stars<2> stars(3, 0.3, {3, CentreRule::kTangentSpace});
   AppendTo(&stars, RandomSample(*Make(manifold), count, 1));
   stars.Commit();
   return stars;

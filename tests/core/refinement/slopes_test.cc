@@ -21,7 +21,7 @@ struct Range {
 // How test names and failures show a range.
 void PrintTo(const Range& range, std::ostream* out) { *out << range.manifold; }
 
-// All so fine that the sample is laid by growth: coarse meshes have more vertices for their
+// All so fine that the sample is grown as a lattice: coarse meshes have more vertices for their
 // epsilon.
 class Slopes : public ::testing::TestWithParam<Range> {};
 

@@ -59,7 +59,7 @@ TEST(ViolationIndex, GivesUpAfterManyAttemptsOrAtOnce) {
   EXPECT_FALSE(book.has_no_flat(4));
 }
 
-TEST(ViolationIndex, SuspectsAllUntilTheyWereTakenOnce) {
+TEST(ViolationIndex, HasAllDirtyUntilTheyWereTakenOnce) {
   Book book = FiveStars();
   EXPECT_TRUE(book.are_all_dirty());
   EXPECT_EQ(book.TakeDirty({}), (Ids{0, 1, 2, 3, 4}));
@@ -70,7 +70,7 @@ TEST(ViolationIndex, SuspectsAllUntilTheyWereTakenOnce) {
   EXPECT_EQ(book.TakeDirty({4}), (Ids{2, 3, 4}));
 }
 
-TEST(ViolationIndex, JudgesBlemishedStarsAgain) {
+TEST(ViolationIndex, JudgesViolatingStarsAgain) {
   Book book = FiveStars();
   book.TakeDirty({});
   book.NoteJudged(0, Rule::kShape);

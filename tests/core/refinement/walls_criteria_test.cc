@@ -1,4 +1,4 @@
-// Sizes, asking ahead and what is not asked, of manifolds with boundary.
+// Sizes, speculative runs and omitted queries of manifolds with boundary.
 
 #include <gtest/gtest.h>
 
@@ -53,11 +53,11 @@ TEST(WallsCriteriaTest, MaxDeviationHoldsAlongTheRimOfAFlatDisc) {
     EXPECT_LE(1 - (mesh.points[edge[0]] + mesh.points[edge[1]]).norm() / 2, kDeviation);
 }
 
-TEST(WallsCriteriaTest, AskingAheadTakesFewerRounds) {
+TEST(WallsCriteriaTest, ASpeculativeRunTakesFewerRounds) {
   for (const Domain& m : {stellate::testing::HalfTorus(), stellate::testing::SolidTorus()}) {
     Specification spec = m.SpecificationFor(0.12);
     const WallMesh one_by_one = MeshOf(m, spec);
-    spec.criteria.ask_ahead = true;
+    spec.criteria.speculative = true;
     const WallMesh ahead = MeshOf(m, spec);
     ExpectTheDomain(ahead, m);
     EXPECT_LT(ahead.report.counts.rounds, one_by_one.report.counts.rounds);

@@ -27,7 +27,7 @@ class PartsOfBatches : public ::testing::TestWithParam<PartsCase> {};
 TEST_P(PartsOfBatches, NeverExceedTheLimitNorChangeTheMesh) {
   const auto torus = Make("torus");
   Specification spec = SpecificationFor(*torus, 0.15);
-  spec.criteria.ask_ahead = GetParam().ahead;
+  spec.criteria.speculative = GetParam().ahead;
   spec.oracle.tangent_basis = GetParam().tangents;
   const DrivenRun whole = Drive(spec, *torus);
   spec.limits.max_batch_queries = GetParam().most;

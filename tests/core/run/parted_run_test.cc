@@ -51,17 +51,17 @@ class Whole {
         spec_(SpecificationFor(*manifold_, it.epsilon)),
         run_(Drive(spec_, *manifold_)) {
     EXPECT_TRUE(run_.report().certificate.certified) << run_.report().certificate.verdict;
-    while (run_.deltas[laid_].added.empty()) ++laid_;
+    while (run_.deltas[sampled_].added.empty()) ++sampled_;
   }
 
   // Returns the rules that it took.
   std::set<Rule> ExpectSameIn(int parts) const {
     const double halo = case_.halo * case_.epsilon;
     PartedRun<K> parted(spec_, *manifold_, Cubes(parts, case_.edge, case_.along), halo);
-    const MeshDelta& last = run_.deltas[laid_];
+    const MeshDelta& last = run_.deltas[sampled_];
     const auto count = static_cast<Eigen::Index>(last.first_vertex) + last.points.cols();
     parted.Lay(run_.mesher->Points().leftCols(count), Bases(count));
-    parted.Refine(laid_ + 1, [&](std::uint64_t round, const auto& added, const auto& removed) {
+    parted.Refine(sampled_ + 1, [&](std::uint64_t round, const auto& added, const auto& removed) {
       ASSERT_LE(round, run_.deltas.size());
       const MeshDelta& whole = run_.deltas[round - 1];
       EXPECT_EQ(SetOf<K>(added), SetOf<K>(whole.added)) << "added in round " << round;
@@ -89,7 +89,7 @@ class Whole {
   const std::unique_ptr<Manifold> manifold_;
   const Specification spec_;
   const DrivenRun run_;
-  std::size_t laid_ = 0;  // the delta with the first stars
+  std::size_t sampled_ = 0;  // the delta with the first stars
 };
 
 template <int K>

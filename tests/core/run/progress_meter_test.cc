@@ -84,7 +84,7 @@ TEST(ProgressMeter, TellsTheShareOfTheQuestions) {
         Watched{"ellipsoid:1:0.6:0.4", 0.06}, Watched{"rp2", 0.15}}) {
     const auto manifold = testing::Make(c.manifold);
     Specification spec = testing::SpecificationFor(*manifold, c.epsilon);
-    spec.criteria.ask_ahead = c.ahead;
+    spec.criteria.speculative = c.ahead;
     const std::vector<Told> all = ProgressOf(spec, AnswererFor(*manifold));
     std::size_t foreseeable = 0;
     double before = 0;

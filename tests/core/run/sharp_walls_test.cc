@@ -30,8 +30,8 @@ TEST(SharpWallsTest, AnUnfinishedRunNamesTheWallsTheAngleAndThePlace) {
       << c.verdict;
 }
 
-// Where guards were seen to cope with the angle it is not the angle that is to blame.
-TEST(SharpWallsTest, AnAngleThatIsGuardedIsNotBlamed) {
+// If protecting balls cope with the angle, it is not the angle that is to blame.
+TEST(SharpWallsTest, AnAngleWithProtectingBallsIsNotBlamed) {
   const Domain wedge = stellate::testing::Wedge(40);
   Specification spec = wedge.SpecificationFor(0.3);
   spec.limits.max_vertices = 60;

@@ -62,7 +62,7 @@ TEST(UnfinishedMesh, WithoutWallsIsTheSame) {
   }
 }
 
-// Two sheets at 18 degrees with walls of a box: no guards help, as far as is known.
+// Two sheets at 18 degrees with walls of a box: no protecting balls help, as far as is known.
 TEST(UnfinishedMesh, FacesThatAreRefinedWithoutEndAreLeft) {
   const Domain sheets = stellate::testing::GyroidSheets(0.8);
   Specification spec = sheets.SpecificationFor(0.45);

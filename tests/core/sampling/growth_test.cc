@@ -173,14 +173,14 @@ TEST(Growth, KeepsItsDistanceAndCoversWhereSizesAreGraded) {
       EXPECT_GE((grown.points[i] - grown.points[j]).norm(),
                 Growth<2>::kKeep * spacing * std::min(grown.shares[i], grown.shares[j]));
   }
-  // Cells of the lattice, each of its own spacing, would tile the sphere. They are laid a little
+  // Cells of the lattice, each of its own spacing, would tile the sphere. They are placed a little
   // smaller, and holes are left where patches meet.
   EXPECT_GT(lattice, 0.9 * 4 * std::numbers::pi);
   EXPECT_LT(lattice, 1.3 * 4 * std::numbers::pi);
   EXPECT_LT(static_cast<double>(grown.asked), 1.3 * static_cast<double>(grown.points.size()));
 }
 
-// What changes within a spacing cannot be laid, and little is asked for to see that.
+// A size that changes within a spacing cannot be sampled by a lattice, and few queries show that.
 TEST(Growth, GivesUpWhereSizesChangeWithinASpacing) {
   const auto share = [](const Eigen::Vector3d& y) {
     return 0.6 + 0.4 * std::sin(1e4 * y[0] + 7e3 * y[1]);

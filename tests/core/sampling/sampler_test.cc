@@ -1,4 +1,4 @@
-// Which meshes begin as a lattice that is laid before there is any star.
+// Which meshes begin with a lattice, before there is any star.
 
 #include "core/sampling/sampler.h"
 
@@ -27,29 +27,29 @@ struct Dense {
 
 constexpr double kPi = std::numbers::pi;
 
-class LaidTest : public ::testing::TestWithParam<Dense> {};
+class LatticeSampleTest : public ::testing::TestWithParam<Dense> {};
 
-TEST_P(LaidTest, HasFewerVerticesInThreeDimensions) {
+TEST_P(LatticeSampleTest, HasFewerVerticesInThreeDimensions) {
   const Dense& dense = GetParam();
   const auto manifold = Make(dense.manifold);
   const auto run = Drive(SpecificationFor(*manifold, dense.epsilon), *manifold);
   EXPECT_TRUE(run.report().certificate.certified) << run.report().certificate.verdict;
   const double vertices = static_cast<double>(run.report().counts.vertices);
   EXPECT_LT(vertices * std::pow(dense.epsilon, 3) / dense.volume, dense.most);
-  // It is laid ring by ring, and has no simplices meanwhile.
+  // It grows ring by ring, and has no simplices meanwhile.
   EXPECT_GT(run.deltas[2].first_vertex, run.deltas[1].first_vertex);
   EXPECT_TRUE(run.deltas[2].added.empty());
 }
 
-INSTANTIATE_TEST_SUITE_P(All, LaidTest,
+INSTANTIATE_TEST_SUITE_P(All, LatticeSampleTest,
                          ::testing::Values(Dense{"flat-torus:3", 0.4, 8 * kPi* kPi* kPi, 0.55},
                                            Dense{"sphere:3", 0.18, 2 * kPi* kPi, 0.64}));
 
 // Whether vertices come ring by ring, and simplices later.
-bool IsLaid(const char* name, double epsilon, bool ask_ahead = false) {
+bool IsSampled(const char* name, double epsilon, bool speculative = false) {
   const auto manifold = Make(name);
   Specification spec = SpecificationFor(*manifold, epsilon);
-  spec.criteria.ask_ahead = ask_ahead;
+  spec.criteria.speculative = speculative;
   spec.limits.max_rounds = 4;
   const auto run = Drive(spec, *manifold);
   return run.deltas[3].first_vertex > run.deltas[2].first_vertex && run.deltas[2].added.empty();
@@ -57,15 +57,15 @@ bool IsLaid(const char* name, double epsilon, bool ask_ahead = false) {
 
 // Few of their seeds lie far from each other, even where thousands of vertices will be needed.
 TEST(Sampler, BeginsLargeMeshesOfFourDimensions) {
-  EXPECT_TRUE(IsLaid("flat-torus:4", 0.8));  // 3,600 vertices
-  EXPECT_TRUE(IsLaid("sphere:4", 0.3));      // 2,800
-  EXPECT_FALSE(IsLaid("sphere:4", 0.5));     // 360
-  EXPECT_TRUE(IsLaid("flat-torus:4", 0.6, true));
+  EXPECT_TRUE(IsSampled("flat-torus:4", 0.8));  // 3,600 vertices
+  EXPECT_TRUE(IsSampled("sphere:4", 0.3));      // 2,800
+  EXPECT_FALSE(IsSampled("sphere:4", 0.5));     // 360
+  EXPECT_TRUE(IsSampled("flat-torus:4", 0.6, true));
 }
 
 class Given : public ::testing::TestWithParam<const char*> {};
 
-// The points of a mesh are a sample: they are kept, and nothing is laid between them.
+// The points of a mesh are a sample: they are kept, and no lattice is added between them.
 TEST_P(Given, SampleIsLeft) {
   const auto manifold = Make(GetParam());
   Specification spec = SpecificationFor(*manifold, 0.5);

@@ -30,9 +30,9 @@ TEST(Seeding, DrawsFromTheBox) {
   EXPECT_EQ(SeedsOf(spec).cols(), 7);
 }
 
-TEST(Seeding, DrawsMoreToAskAheadFromTheFinerTheMesh) {
+TEST(Seeding, DrawsMoreForASpeculativeRunTheFinerTheMesh) {
   Specification spec = SphereSpec(0.05);
-  spec.criteria.ask_ahead = true;
+  spec.criteria.speculative = true;
   EXPECT_GT(SeedsOf(spec).cols(), kDefaultBoxSeeds);
   spec.epsilon = 1e-6;
   EXPECT_LE(SeedsOf(spec).cols(), 3000);

@@ -1,4 +1,4 @@
-// The interior of a manifold with boundary is laid once its faces are meshed.
+// The interior of a manifold with boundary is sampled once its faces are meshed.
 
 #include <gtest/gtest.h>
 
@@ -50,7 +50,7 @@ std::set<std::vector<std::uint32_t>> SimplicesOf(const Mesher& mesher, int k) {
   return all;
 }
 
-struct Laid {
+struct Interior {
   const char* name;
   Domain (*make)();
   double epsilon;
@@ -58,35 +58,34 @@ struct Laid {
   double most;  // vertices times epsilon^k over the volume
 };
 
-class InteriorTest : public ::testing::TestWithParam<Laid> {};
+class InteriorTest : public ::testing::TestWithParam<Interior> {};
 
 // Point by point 0.71 to 0.83 for k = 2; for k = 3, where much of it is the boundary, 0.86 to 0.92.
 TEST_P(InteriorTest, HasFewerVertices) {
-  const Laid& laid = GetParam();
-  const Domain m = laid.make();
-  const DrivenRun run = MeshOfDomain(m, m.SpecificationFor(laid.epsilon));
+  const Interior& sampled = GetParam();
+  const Domain m = sampled.make();
+  const DrivenRun run = MeshOfDomain(m, m.SpecificationFor(sampled.epsilon));
   EXPECT_TRUE(run.report().certificate.certified) << run.report().certificate.verdict;
   const auto vertices = static_cast<double>(run.report().counts.vertices);
-  EXPECT_LT(vertices * std::pow(laid.epsilon, m.k) / laid.volume, laid.most);
+  EXPECT_LT(vertices * std::pow(sampled.epsilon, m.k) / sampled.volume, sampled.most);
   EXPECT_EQ(SimplicesOf(run, m.k), SimplicesOf(*run.mesher, m.k));
 }
 
-INSTANTIATE_TEST_SUITE_P(All, InteriorTest,
-                         ::testing::Values(Laid{"disc", Disc, 0.05, std::numbers::pi, 0.6},
-                                           Laid{"hemisphere", Hemisphere, 0.05,
-                                                1.8 * std::numbers::pi, 0.6},
-                                           Laid{"half a Clifford torus", HalfClifford, 0.1,
-                                                1.9 * std::numbers::pi* std::numbers::pi, 0.6},
-                                           Laid{"ball", Ball, 0.1, 4 * std::numbers::pi / 3, 0.7},
-                                           Laid{"solid torus", SolidTorus, 0.1,
-                                                0.72 * std::numbers::pi* std::numbers::pi, 0.9},
-                                           Laid{"half of S^3", HalfSphere3, 0.2,
-                                                std::numbers::pi* std::numbers::pi, 0.87}),
-                         [](const auto& laid) {
-                           std::string name = laid.param.name;
-                           std::erase_if(name, [](char c) { return !std::isalnum(c); });
-                           return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    All, InteriorTest,
+    ::testing::Values(
+        Interior{"disc", Disc, 0.05, std::numbers::pi, 0.6},
+        Interior{"hemisphere", Hemisphere, 0.05, 1.8 * std::numbers::pi, 0.6},
+        Interior{"half a Clifford torus", HalfClifford, 0.1,
+                 1.9 * std::numbers::pi* std::numbers::pi, 0.6},
+        Interior{"ball", Ball, 0.1, 4 * std::numbers::pi / 3, 0.7},
+        Interior{"solid torus", SolidTorus, 0.1, 0.72 * std::numbers::pi* std::numbers::pi, 0.9},
+        Interior{"half of S^3", HalfSphere3, 0.2, std::numbers::pi* std::numbers::pi, 0.87}),
+    [](const auto& sampled) {
+      std::string name = sampled.param.name;
+      std::erase_if(name, [](char c) { return !std::isalnum(c); });
+      return name;
+    });
 
 TEST(InteriorLaying, IsTheSameForAnyThreads) {
   for (const Domain& m : {Ball(), HalfSphere3(), BoxMinusBall()}) {
@@ -99,7 +98,7 @@ TEST(InteriorLaying, IsTheSameForAnyThreads) {
   }
 }
 
-// Each round may be the last: what was laid gets its stars, and what was there is given up for
+// Each round may be the last: what was sampled gets its stars, and what was there is given up for
 // them.
 TEST(InteriorLaying, EndsWithAMeshOfWhatItHas) {
   for (const Domain& m : {Ball(), Hemisphere(), HalfSphere3()}) {

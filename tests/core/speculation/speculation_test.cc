@@ -11,7 +11,7 @@ using testing::EngineOnSphere;
 using testing::SphereSpec;
 using testing::StepOnSphere;
 
-// Many seeds, as asking ahead begins with: their graphs are a good guess of the sphere.
+// Many seeds, as a speculative run begins with: their graphs are a good estimate of the sphere.
 Eigen::MatrixXd ManySeeds() {
   Eigen::MatrixXd seeds(3, 300);
   Random random(4);

@@ -1,4 +1,4 @@
-// Asking ahead where the sample is laid: it is grown on a guess, and asked for at once.
+// Speculative sampling: the sample is grown on a surrogate, and queried in one batch.
 
 #include "core/speculation/speculative_sampler.h"
 
@@ -24,7 +24,7 @@ using testing::SpecificationFor;
 
 Specification AheadOn(const Manifold& manifold, double epsilon) {
   Specification spec = SpecificationFor(manifold, epsilon);
-  spec.criteria.ask_ahead = true;
+  spec.criteria.speculative = true;
   return spec;
 }
 
@@ -36,13 +36,13 @@ struct Case {
 
 void PrintTo(const Case& c, std::ostream* out) { *out << c.manifold << " epsilon " << c.epsilon; }
 
-class AheadLaid : public ::testing::TestWithParam<Case> {};
+class SpeculativeSample : public ::testing::TestWithParam<Case> {};
 
-TEST_P(AheadLaid, TakesAHandfulOfRoundsAndHardlyMoreVertices) {
+TEST_P(SpeculativeSample, TakesAHandfulOfRoundsAndHardlyMoreVertices) {
   const auto manifold = Make(GetParam().manifold);
   Specification spec = AheadOn(*manifold, GetParam().epsilon);
   const DrivenRun ahead = Drive(spec, *manifold);
-  spec.criteria.ask_ahead = false;
+  spec.criteria.speculative = false;
   const DrivenRun plain = Drive(spec, *manifold);
   ExpectGoodMesh(ahead, manifold->facts());
   const Counts& a = ahead.report().counts;
@@ -59,7 +59,7 @@ TEST_P(AheadLaid, TakesAHandfulOfRoundsAndHardlyMoreVertices) {
                           [](const MeshDelta& delta) { return delta.added.empty(); }));
 }
 
-TEST_P(AheadLaid, IsTheSameForAnyNumberOfThreads) {
+TEST_P(SpeculativeSample, IsTheSameForAnyNumberOfThreads) {
   const auto manifold = Make(GetParam().manifold);
   Specification spec = AheadOn(*manifold, GetParam().epsilon);
   spec.threads = 1;
@@ -68,7 +68,7 @@ TEST_P(AheadLaid, IsTheSameForAnyNumberOfThreads) {
   EXPECT_TRUE(SameMesh(*one.mesher, *Drive(spec, *manifold).mesher));
 }
 
-INSTANTIATE_TEST_SUITE_P(Catalogue, AheadLaid,
+INSTANTIATE_TEST_SUITE_P(Catalogue, SpeculativeSample,
                          ::testing::Values(Case{"torus", 0.04, 8}, Case{"sphere:2", 0.04, 8},
                                            Case{"circle:3", 0.003, 8}, Case{"two-spheres", 0.06, 9},
                                            Case{"tanglecube", 0.05, 10}, Case{"sphere:3", 0.16, 9},
@@ -82,7 +82,7 @@ TEST(SpeculativeSampler, LeavesToRingsWhatCannotBeGuessed) {
   ExpectGoodMesh(ahead, torus->facts());
   spec.threads = 3;
   EXPECT_TRUE(SameMesh(*ahead.mesher, *Drive(spec, *torus).mesher));
-  spec.criteria.ask_ahead = false;
+  spec.criteria.speculative = false;
   const DrivenRun plain = Drive(spec, *torus);
   EXPECT_LT(static_cast<double>(ahead.report().counts.vertices),
             1.05 * static_cast<double>(plain.report().counts.vertices));
@@ -113,7 +113,7 @@ TEST_P(FewSeeds, TakeNoMoreRoundsThanRingsAndHardlyMoreVertices) {
   const auto manifold = Make(c.manifold);
   Specification spec = Seeded(*manifold, c.epsilon, count);
   const DrivenRun plain = Drive(spec, *manifold);
-  spec.criteria.ask_ahead = true;
+  spec.criteria.speculative = true;
   const DrivenRun ahead = Drive(spec, *manifold);
   ExpectGoodMesh(plain, manifold->facts());
   ExpectGoodMesh(ahead, manifold->facts());
@@ -128,7 +128,7 @@ TEST_P(FewSeeds, GiveTheSameForAnyNumberOfThreads) {
   const auto& [c, count] = GetParam();
   const auto manifold = Make(c.manifold);
   Specification spec = Seeded(*manifold, c.epsilon, count);
-  spec.criteria.ask_ahead = true;
+  spec.criteria.speculative = true;
   spec.threads = 1;
   const DrivenRun one = Drive(spec, *manifold);
   spec.threads = 3;
@@ -191,7 +191,7 @@ TEST(SpeculativeSampler, AsksForLittleMoreThanABudgetOfVerticesFromFewSeeds) {
   const auto torus = Make("torus");
   for (const std::uint64_t most : {5u, 200u, 3000u}) {
     Specification spec = Seeded(*torus, 1e-4, 1);
-    spec.criteria.ask_ahead = true;
+    spec.criteria.speculative = true;
     spec.limits.max_vertices = most;
     const DrivenRun run = Drive(spec, *torus);
     EXPECT_EQ(run.report().termination, Termination::kVertexBudget) << most;

@@ -62,11 +62,11 @@ class Cubes {
   int along_;
 };
 
-// A laid sample, refined by several parts. Each has an engine of its own, which knows what lies in
-// its cubes and within a halo of them, and nothing else; of what it finds only that is heeded which
-// is about its own stars. Between them go the round's targets, of which the independent set is
-// chosen, whether points fell where they were aimed, and in the order of the round what became of
-// each target: the messages that parts in many processes would send.
+// An initial sample, refined by several parts. Each has an engine of its own, which knows what lies
+// in its cubes and within a halo of them, and nothing else; of what it finds only that is heeded
+// which is about its own stars. Between them go the round's targets, of which the independent set
+// is chosen, whether points fell where they were aimed, and in the order of the round what became
+// of each target: the messages that parts in many processes would send.
 template <int K>
 class PartedRun {
  public:
@@ -83,14 +83,14 @@ class PartedRun {
 
   // tangents: (K rows of d) x n.
   void Lay(const Eigen::MatrixXd& points, const Eigen::MatrixXd& tangents) {
-    AnsweredPoints laid;
-    laid.points = points;
-    laid.tangents = tangents;
+    AnsweredPoints sampled;
+    sampled.points = points;
+    sampled.tangents = tangents;
     for (Eigen::Index c = 0; c < points.cols(); ++c) {
       owner_.push_back(cubes_.OwnerOf(points.col(c).data()));
       for (int part = 0; part < cubes_.parts(); ++part) {
         if (!Knows(part, points.col(c).data())) continue;
-        parts_[part].engine->AddToSample(laid, c);
+        parts_[part].engine->AddToSample(sampled, c);
         Name(&parts_[part], static_cast<std::uint32_t>(c));
       }
     }

@@ -95,7 +95,7 @@ inline SessionOptions RecordedSphere(std::shared_ptr<SessionJournal> journal,
   options.request.spec.threads = 1;  // oneTBB itself is not built for ThreadSanitizer
   options.request.spec.seeds = Eigen::Vector3d::UnitX();
   options.request.spec.criteria.advance_step = 0.9;
-  options.request.spec.criteria.judging = core::Judging::kCommonCentre;
+  options.request.spec.criteria.centre_rule = core::CentreRule::kCommonCentre;
   options.request.spec.criteria.size_rate = 0.4;
   options.request.spec.oracle.local_size = true;
   options.request.spec.limits.max_batch_queries = 5000;

@@ -1,4 +1,4 @@
-#include "core/certificate/evidence/rim_check.h"
+#include "core/certificate/evidence/undeclared_boundary_check.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 namespace stellate::core {
 namespace {
 
-constexpr std::size_t kMostSuspects = 32;
+constexpr std::size_t kMostPlaces = 32;
 constexpr double kLongestStep = 0.05;  // of the mesh size
 // Within M both steps go as far; at a rim the one back into M does, if it is along M at all.
 constexpr double kComesBack = 0.5;  // of the step back
@@ -19,22 +19,22 @@ constexpr double kErrorsInStep = 10;
 
 }  // namespace
 
-void RimCheck::SuspectIfLeans(const Eigen::VectorXd& y, const Eigen::VectorXd& along,
-                              double distance) {
+void UndeclaredBoundaryCheck::Add(const Eigen::VectorXd& y, const Eigen::VectorXd& along,
+                                  double distance) {
   const double length = along.norm();
-  if (!IsLean(length, distance)) return;
-  suspects_.push_back(
+  if (!HasTangentialOffset(length, distance)) return;
+  places_.push_back(
       {y, along / length, std::min(length / 2, kLongestStep * size_), length / distance});
 }
 
-Eigen::MatrixXd RimCheck::Questions(double position_error) {
-  asked_ = std::move(suspects_);
-  suspects_.clear();
+Eigen::MatrixXd UndeclaredBoundaryCheck::Questions(double position_error) {
+  asked_ = std::move(places_);
+  places_.clear();
   std::erase_if(asked_,
-                [&](const Lean& l) { return !(l.length > kErrorsInStep * position_error); });
+                [&](const Place& l) { return !(l.length > kErrorsInStep * position_error); });
   std::stable_sort(asked_.begin(), asked_.end(),
-                   [](const Lean& a, const Lean& b) { return a.share > b.share; });
-  if (asked_.size() > kMostSuspects) asked_.resize(kMostSuspects);
+                   [](const Place& a, const Place& b) { return a.share > b.share; });
+  if (asked_.size() > kMostPlaces) asked_.resize(kMostPlaces);
   if (asked_.empty()) return {};
   Eigen::MatrixXd points(asked_.front().y.size(), 2 * static_cast<Eigen::Index>(asked_.size()));
   for (std::size_t i = 0; i < asked_.size(); ++i) {
@@ -45,18 +45,19 @@ Eigen::MatrixXd RimCheck::Questions(double position_error) {
   return points;
 }
 
-std::string RimCheck::Judge(const AnswerBlock& answer, double position_error) const {
+std::string UndeclaredBoundaryCheck::Judge(const AnswerBlock& answer, double position_error) const {
   for (std::size_t i = 0; i < asked_.size(); ++i) {
-    const Lean& lean = asked_[i];
+    const Place& place = asked_[i];
     const auto gone = [&](std::size_t j) {
-      return std::abs(lean.direction.dot(answer.points.col(static_cast<Eigen::Index>(j)) - lean.y));
+      return std::abs(
+          place.direction.dot(answer.points.col(static_cast<Eigen::Index>(j)) - place.y));
     };
     if (!answer.found.empty() && !(answer.found[2 * i] && answer.found[2 * i + 1])) continue;
     const double over = gone(2 * i) + position_error, back = gone(2 * i + 1);
-    if (over >= kComesBack * back || back < kAlong * lean.length) continue;
-    return Message("the manifold ends, or has a sharp edge, at its point ", NamePoint(lean.y),
+    if (over >= kComesBack * back || back < kAlong * place.length) continue;
+    return Message("the manifold ends, or has a sharp edge, at its point ", NamePoint(place.y),
                    ": what was asked there does not lie straight above it, and a step of ",
-                   Brief(lean.length), " along it comes back, unlike the step the other way");
+                   Brief(place.length), " along it comes back, unlike the step the other way");
   }
   return {};
 }

@@ -1,4 +1,4 @@
-// Asking ahead: a handful of round trips, the same guarantee, size and shape.
+// Speculative runs: a handful of round trips, the same guarantee, size and shape.
 
 #include <gtest/gtest.h>
 
@@ -29,20 +29,20 @@ void PrintTo(const AheadCase& c, std::ostream* out) {
   *out << c.manifold << " epsilon " << c.epsilon << (c.tangents ? "" : " without tangents");
 }
 
-class AskAhead : public ::testing::TestWithParam<AheadCase> {
+class SpeculativeRun : public ::testing::TestWithParam<AheadCase> {
  protected:
   Specification Spec(Manifold& manifold) const {
     Specification spec = SpecificationFor(manifold, GetParam().epsilon);
     spec.oracle.tangent_basis = GetParam().tangents;
-    spec.criteria.ask_ahead = true;
+    spec.criteria.speculative = true;
     return spec;
   }
 };
 
-TEST_P(AskAhead, TakesFarFewerRoundsForAsGoodAMesh) {
+TEST_P(SpeculativeRun, TakesFarFewerRoundsForAsGoodAMesh) {
   const auto manifold = Make(GetParam().manifold);
   Specification plain_spec = Spec(*manifold);
-  plain_spec.criteria.ask_ahead = false;
+  plain_spec.criteria.speculative = false;
   const DrivenRun plain = Drive(plain_spec, *manifold);
   const DrivenRun ahead = Drive(Spec(*manifold), *manifold);
   ExpectGoodMesh(ahead, manifold->facts());
@@ -61,7 +61,7 @@ TEST_P(AskAhead, TakesFarFewerRoundsForAsGoodAMesh) {
   }
 }
 
-TEST_P(AskAhead, IsDeterministicForAnyNumberOfThreads) {
+TEST_P(SpeculativeRun, IsDeterministicForAnyNumberOfThreads) {
   const auto manifold = Make(GetParam().manifold);
   Specification spec = Spec(*manifold);
   spec.threads = 1;
@@ -72,7 +72,7 @@ TEST_P(AskAhead, IsDeterministicForAnyNumberOfThreads) {
   EXPECT_EQ(one.mesher->Simplices(), three.mesher->Simplices());
 }
 
-INSTANTIATE_TEST_SUITE_P(Catalogue, AskAhead,
+INSTANTIATE_TEST_SUITE_P(Catalogue, SpeculativeRun,
                          ::testing::Values(AheadCase{"torus", 0.08}, AheadCase{"sphere:2:10", 0.08},
                                            AheadCase{"torus", 0.1, false}, AheadCase{"rp2", 0.12},
                                            AheadCase{"two-spheres", 0.15}, AheadCase{"so3", 0.5}));
@@ -81,12 +81,12 @@ INSTANTIATE_TEST_SUITE_P(Catalogue, AskAhead,
 
 Specification AheadOnTorus(Manifold& torus, double epsilon) {
   Specification spec = SpecificationFor(torus, epsilon);
-  spec.criteria.ask_ahead = true;
+  spec.criteria.speculative = true;
   spec.oracle.intersect_flat = false;  // what is tampered with below must not leave its flat
   return spec;
 }
 
-TEST(AskAheadFaults, AnswersThatAreMissingHereAndThereAreDoneWithout) {
+TEST(SpeculativeRunFaults, AnswersThatAreMissingHereAndThereAreDoneWithout) {
   const auto torus = Make("torus");
   const auto mesher = testing::NewMesher(AheadOnTorus(*torus, 0.1));
   while (const QueryBatch* batch = mesher->NextBatch()) {
@@ -105,7 +105,7 @@ TEST(AskAheadFaults, AnswersThatAreMissingHereAndThereAreDoneWithout) {
   EXPECT_TRUE(mesher->report().certificate.certified) << mesher->report().certificate.verdict;
 }
 
-TEST(AskAheadFaults, APlaceThatIsNeverFoundEndsTheRun) {
+TEST(SpeculativeRunFaults, APlaceThatIsNeverFoundEndsTheRun) {
   const auto torus = Make("torus");
   Specification spec = AheadOnTorus(*torus, 0.3);
   spec.limits.max_rounds = 5000;
@@ -122,7 +122,7 @@ TEST(AskAheadFaults, APlaceThatIsNeverFoundEndsTheRun) {
   EXPECT_FALSE(run.report().certificate.certified);
 }
 
-TEST(AskAheadFaults, NoiseAtItsToleranceIsMeshed) {
+TEST(SpeculativeRunFaults, NoiseAtItsToleranceIsMeshed) {
   const auto torus = Make("torus");
   const double epsilon = 0.1;
   const DrivenRun run = Drive(AheadOnTorus(*torus, epsilon), [&](const QueryBatch& batch) {
@@ -139,7 +139,7 @@ TEST(AskAheadFaults, NoiseAtItsToleranceIsMeshed) {
   EXPECT_TRUE(run.report().certificate.certified) << run.report().certificate.verdict;
 }
 
-TEST(AskAheadFaults, ABudgetOfVerticesIsKept) {
+TEST(SpeculativeRunFaults, ABudgetOfVerticesIsKept) {
   const auto torus = Make("torus");
   Specification spec = AheadOnTorus(*torus, 0.05);
   spec.limits.max_vertices = 1000;
@@ -155,7 +155,7 @@ TEST(Surrogate, ConvergesToFourthOrder) {
   for (const int level : {0, 1}) {
     const double h = level == 0 ? 0.12 : 0.06;
     const DrivenRun run = Drive(SpecificationFor(*torus, h), *torus);
-    Stars<2> stars(3, h, {10 * h, Judging::kFlats});
+    Stars<2> stars(3, h, {10 * h, CentreRule::kTangentSpace});
     const Eigen::MatrixXd points = run.mesher->Points();
     const Eigen::MatrixXd tangents = torus->TangentBasis(points);
     for (Eigen::Index i = 0; i < points.cols(); ++i) {

@@ -1,4 +1,4 @@
-#include "core/geometry/laid_polytope.h"
+#include "core/geometry/draft_polytope.h"
 
 #include <algorithm>
 #include <memory>
@@ -8,12 +8,12 @@
 
 namespace stellate::core {
 
-LaidPolytope& ThreadPolytope() {
-  thread_local const auto polytope = std::make_unique<LaidPolytope>();
+DraftPolytope& ThreadPolytope() {
+  thread_local const auto polytope = std::make_unique<DraftPolytope>();
   return *polytope;
 }
 
-void LaidPolytope::Reset(double inradius) {
+void DraftPolytope::Reset(double inradius) {
   if (inradius != inradius_) {
     inradius_ = inradius;
     for (int i = 0; i < 4; ++i) fake_[i].offset = FakeHalfSpace<3>(i, inradius, fake_[i].normal);
@@ -33,7 +33,7 @@ void LaidPolytope::Reset(double inradius) {
   }
 }
 
-bool LaidPolytope::Clip(std::uint32_t id, const double* normal, double offset) {
+bool DraftPolytope::Clip(std::uint32_t id, const double* normal, double offset) {
   const std::size_t removed = FindRemoved(normal, offset);
   if (removed == 0 || removed == vertex_count_ || gave_up_) return false;
   const Facets touched = FindCrossings(removed);
@@ -67,7 +67,7 @@ bool LaidPolytope::Clip(std::uint32_t id, const double* normal, double offset) {
 }
 
 // How many vertices the half-space cuts off: their places, ascending.
-std::size_t LaidPolytope::FindRemoved(const double* normal, double offset) {
+std::size_t DraftPolytope::FindRemoved(const double* normal, double offset) {
   const double nx = normal[0], ny = normal[1], nz = normal[2];
   const std::size_t count = vertex_count_;
   for (std::size_t v = 0; v < count; ++v)
@@ -82,7 +82,7 @@ std::size_t LaidPolytope::FindRemoved(const double* normal, double offset) {
 
 // The edges with one end that is removed, by it and by slot. An edge is on two facets, and no two
 // edges are on the same two. Returns the facets of what is removed.
-LaidPolytope::Facets LaidPolytope::FindCrossings(std::size_t removed) {
+DraftPolytope::Facets DraftPolytope::FindCrossings(std::size_t removed) {
   std::fill_n(across_, facet_count_, Facets{0});
   Facets touched = 0;
   for (std::size_t i = 0; i < removed; ++i) {
@@ -110,7 +110,7 @@ LaidPolytope::Facets LaidPolytope::FindCrossings(std::size_t removed) {
 }
 
 // Whether the crossed edges, two on each facet that has any, go round in one circle.
-bool LaidPolytope::IsCircle() const {
+bool DraftPolytope::IsCircle() const {
   const std::size_t first = crossings_[0].first;
   std::size_t from = first, at = crossings_[0].second;
   for (std::size_t steps = 1; steps <= crossing_count_; ++steps) {
@@ -123,7 +123,7 @@ bool LaidPolytope::IsCircle() const {
   return false;
 }
 
-void LaidPolytope::Locate(std::size_t v, const Crossing& crossing) {
+void DraftPolytope::Locate(std::size_t v, const Crossing& crossing) {
   const Facet *first = &facets_[corners_[v][0]], *second = &facets_[crossing.first],
               *third = &facets_[crossing.second];
   // By id, as Meet does.
@@ -151,7 +151,7 @@ void LaidPolytope::Locate(std::size_t v, const Crossing& crossing) {
 }
 
 // The end that stays: on both facets of the edge, as the other is, and not cut off.
-std::size_t LaidPolytope::KeptEnd(const Crossing& crossing) const {
+std::size_t DraftPolytope::KeptEnd(const Crossing& crossing) const {
   const Facets edge = Bit(crossing.first) | Bit(crossing.second);
   std::size_t v = 0;
   for (;; ++v) {
@@ -160,7 +160,7 @@ std::size_t LaidPolytope::KeptEnd(const Crossing& crossing) const {
   }
 }
 
-void LaidPolytope::MoveVertex(std::size_t from, std::size_t to) {
+void DraftPolytope::MoveVertex(std::size_t from, std::size_t to) {
   x_[to] = x_[from];
   y_[to] = y_[from];
   z_[to] = z_[from];
@@ -169,7 +169,7 @@ void LaidPolytope::MoveVertex(std::size_t from, std::size_t to) {
 }
 
 // The last facet takes the place of one that no vertex is left on.
-void LaidPolytope::DropFacet(std::size_t f) {
+void DraftPolytope::DropFacet(std::size_t f) {
   const std::size_t last = --facet_count_;
   if (f == last) return;
   facets_[f] = facets_[last];
@@ -178,7 +178,7 @@ void LaidPolytope::DropFacet(std::size_t f) {
       if (g == last) g = static_cast<std::uint8_t>(f);
 }
 
-bool LaidPolytope::GiveUp() {
+bool DraftPolytope::GiveUp() {
   gave_up_ = true;
   max_norm2_ = 0;
   return false;
@@ -186,8 +186,8 @@ bool LaidPolytope::GiveUp() {
 
 // The two ends of an edge, who are on the same two facets, find each other there.
 template <>
-void RestrictedVoronoiCell<3>::Take(const LaidPolytope& polytope) {
-  constexpr std::size_t kMost = LaidPolytope::kMostFacets;
+void RestrictedVoronoiCell<3>::Take(const DraftPolytope& polytope) {
+  constexpr std::size_t kMost = DraftPolytope::kMostFacets;
   using Ends = std::array<std::array<std::uint16_t, kMost>, kMost>;
   thread_local const auto memory = std::make_unique<Ends>();  // see ThreadPolytope
   Ends& end = *memory;                                        // vertex and slot
@@ -195,7 +195,7 @@ void RestrictedVoronoiCell<3>::Take(const LaidPolytope& polytope) {
   std::uint64_t is_known[kMost] = {};  // by facet, the others whose edge's first end is known
   facets_.resize(polytope.facet_count());
   for (std::size_t f = 0; f < facets_.size(); ++f) {
-    const LaidPolytope::Facet& from = polytope.facet(f);
+    const DraftPolytope::Facet& from = polytope.facet(f);
     facets_[f] = {{from.normal[0], from.normal[1], from.normal[2]}, from.offset, from.id, 0};
     mixed[f] = Mix64(from.id);
   }

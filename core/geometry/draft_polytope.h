@@ -15,7 +15,7 @@ namespace stellate::core {
 // same polytope as by that class' own cuts, bit for bit, vertex by vertex and facet by facet. Of a
 // cut that takes away no plain disc of its border, which only rounding makes, it does not tell: it
 // gives up.
-class LaidPolytope {
+class DraftPolytope {
  public:
   static constexpr std::size_t kMostFacets = 64;  // a bit each
   static constexpr std::size_t kMostVertices = 2 * kMostFacets;
@@ -78,6 +78,6 @@ class LaidPolytope {
 
 // One a thread, for whatever that makes next. On the heap: what is static of a thread lies on its
 // stack, and a library's threads may have little of that, though they never come here.
-LaidPolytope& ThreadPolytope();
+DraftPolytope& ThreadPolytope();
 
 }  // namespace stellate::core

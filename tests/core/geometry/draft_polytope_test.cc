@@ -1,4 +1,4 @@
-#include "core/geometry/laid_polytope.h"
+#include "core/geometry/draft_polytope.h"
 
 #include <gtest/gtest.h>
 
@@ -38,8 +38,8 @@ void ExpectSame(const RestrictedVoronoiCell<3>& taken, const RestrictedVoronoiCe
   }
 }
 
-TEST(LaidPolytope, IsTheCellByTheSameCutsBitForBit) {
-  LaidPolytope made;
+TEST(DraftPolytope, IsTheCellByTheSameCutsBitForBit) {
+  DraftPolytope made;
   for (std::uint64_t trial = 0; trial < 200; ++trial) {
     const double inradius = trial % 2 == 0 ? 10 : 3;
     const HalfSpaces<3> half_spaces = RandomHalfSpaces<3>(60, trial);
@@ -58,10 +58,10 @@ TEST(LaidPolytope, IsTheCellByTheSameCutsBitForBit) {
   }
 }
 
-TEST(LaidPolytope, CanBeCutAsACellAfterwards) {
+TEST(DraftPolytope, CanBeCutAsACellAfterwards) {
   const HalfSpaces<3> half_spaces = RandomHalfSpaces<3>(40, 7);
   GivenHalfSpaces<3> given(10);
-  LaidPolytope made;
+  DraftPolytope made;
   RestrictedVoronoiCell<3> cell, taken;
   made.Reset(10);
   cell.Reset(10, given);
@@ -76,8 +76,8 @@ TEST(LaidPolytope, CanBeCutAsACellAfterwards) {
 }
 
 // More facets than it has bits for: points on a sphere, each of which cuts.
-TEST(LaidPolytope, GivesUpWhereItHasNoRoom) {
-  LaidPolytope made;
+TEST(DraftPolytope, GivesUpWhereItHasNoRoom) {
+  DraftPolytope made;
   made.Reset(100);
   bool cut = true;
   for (std::uint32_t i = 0; i < 1000 && cut; ++i) {

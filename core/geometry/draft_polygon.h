@@ -17,7 +17,7 @@ namespace stellate::core {
 // A RestrictedVoronoiCell<2> in the making: it keeps its half-spaces, which the finished cell has
 // no room for, so that each is found once. The same polygon as by that class' own cuts, bit for bit
 // and vertex by vertex.
-class LaidPolygon {
+class DraftPolygon {
  public:
   // A regular triangle of fake facets at distance `inradius` from p.
   void Reset(double inradius) {
