@@ -29,7 +29,7 @@ namespace {
 struct Arenas {
   std::mutex mutex;
   std::size_t all = 0;
-  std::vector<std::pair<int, std::unique_ptr<tbb::task_arena> > > idle;  // has room for all
+  std::vector<std::pair<int, std::unique_ptr<tbb::task_arena> > > idle;  // has capacity for all
 };
 
 // Never destroyed: a thread may still compute while the process ends.

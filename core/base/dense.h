@@ -46,7 +46,7 @@ SingularColumns LeftSingular(const Eigen::MatrixXd& a);
 // with pivots below `threshold` of the largest taken for zero.
 std::optional<Eigen::VectorXd> DirectionOffRows(const Eigen::MatrixXd& rows, double threshold);
 
-// For K = 1 to kMaxDimension. No inverse but for infinities where a is singular.
+// For K = 1 to kMaxDimension. If a is singular the result is not an inverse, and not finite.
 template <int K>
 Eigen::Matrix<double, K, K> Inverse(const Eigen::Matrix<double, K, K>& a);
 template <int K>

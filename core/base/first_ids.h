@@ -11,9 +11,9 @@ namespace stellate::core {
 // order.
 inline void AppendFirst(const std::vector<std::uint32_t>& ids, std::size_t most,
                         std::vector<std::uint32_t>* all) {
-  const std::size_t room = most - std::min(most, all->size());
+  const std::size_t missing = most - std::min(most, all->size());
   all->insert(all->end(), ids.begin(),
-              ids.begin() + static_cast<std::ptrdiff_t>(std::min(room, ids.size())));
+              ids.begin() + static_cast<std::ptrdiff_t>(std::min(missing, ids.size())));
 }
 
 }  // namespace stellate::core
