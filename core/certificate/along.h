@@ -5,7 +5,7 @@
 
 namespace stellate::core {
 
-// |the part of `step` along the tangent space at v|^2; `step`: d.
+// Returns the squared length of the projection of `step` (d) on the tangent space at v.
 inline double SquaredAlong(const MeshView& mesh, std::uint32_t v, const double* step) {
   const double* tangent = mesh.Tangent(v);
   double along2 = 0;

@@ -19,14 +19,14 @@
 
 namespace stellate::core {
 
-// The order of questions. What needs no oracle is judged at construction; then come rounds:
-//   1. points inside simplices, vertices, coverage probes, small steps that hold given tangent
-//      spaces against closest points, and the first step of the balls;
+// The order of queries. The constructor decides what needs no oracle; then come rounds:
+//   1. points inside simplices, vertices, coverage probes, small steps that compare given tangent
+//      spaces with closest points, and the first step of the balls;
 //   2. tangents at the probes' closest points, by differences, if the oracle sends none; the second
-//      step of the balls; steps over what may be boundary_check; shorter steps where small ones
-//      went wrong;
-//   of a thorough audit, also balls at the barycentres' closest points, a round later.
-// All answers, and those that were known before, are then held against the mesh.
+//      step of the balls; steps over what may be an undeclared boundary; shorter steps where small
+//      ones went wrong;
+//   3. in a thorough audit, balls at the barycentres' closest points as well.
+// All answers, and those that were known before, are then compared with the mesh.
 class Certifier::Impl {
  public:
   Impl(const Specification& spec, const MeshView& mesh, const StarFacts& facts,

@@ -11,25 +11,31 @@
 namespace stellate::core {
 
 // Proves or refutes that a finished mesh is what was asked for. A state machine like Mesher: it
-// asks for closest points in a few batches, then holds the certificate.
+// gives closest-point queries in a few batches, then holds the certificate.
+//
+//   Certifier certifier(spec, mesh, facts);
+//   while (const std::vector<QueryBlock>* blocks = certifier.NextBlocks())
+//     certifier.Absorb(Answer(*blocks));
+//   if (certifier.certificate().certified) ...
 class Certifier {
  public:
   Certifier(const Specification& spec, const MeshView& mesh, const StarFacts& facts,
             KnownOfManifold known = {});
   ~Certifier();
 
-  // The next closest-point queries, or nullptr when the certificate is complete.
+  // Returns the next closest-point queries, or nullptr once the certificate is complete.
   const std::vector<QueryBlock>* NextBlocks();
-  // Answers have passed CheckAnswers.
+  // Takes the answers to these queries. REQUIRES: they have passed CheckAnswers.
   void Absorb(const std::vector<AnswerBlock>& answers);
   const Certificate& certificate() const;
-  // Once it is complete: points of M, d each, that the mesh has no vertex near, or none near enough
-  // for max_deviation. Where there are any it is refused, but may become right when they are
-  // inserted.
+  // Returns the points of M, d each, that have no vertex of the mesh near, or none near enough for
+  // max_deviation. If there are any, the mesh is refused, but may become right when they are
+  // inserted. REQUIRES: the certificate is complete.
   const std::vector<double>& Uncovered() const;
-  // The same of walls: points of M on walls where the mesh does not end.
+  // Returns the points of M on walls at which the mesh does not end.
   const PointsOnWalls& UncoveredOnWalls() const;
-  // All that it knew or was answered, without leans.
+  // Moves out all points that were known before or came as answers; tangential offsets are left
+  // out.
   KnownOfManifold TakeKnown();
 
  private:

@@ -8,12 +8,12 @@
 
 namespace stellate::core {
 
-// Points of M that were answered, d each, and their clearances from all walls. A point's clearance
-// from a wall that it was asked for on is 0 and says nothing.
+// Points of M that were answered, d each, and their clearances from all walls. The clearance is 0,
+// without meaning, for a wall on whose face the point was queried.
 struct ClearPoints {
   std::vector<double> points, clearances;
 
-  // Adds a point that was asked for on `face`, if it is in M and its clearances are known.
+  // Adds a point that was queried on `face`, if it is in M and its clearances are known.
   void Note(const double* y, int d, const double* clear, int walls, WallSet face) {
     if (WallBeyond(clear, walls, face) || !std::isfinite(clear[0])) return;
     points.insert(points.end(), y, y + d);
@@ -22,8 +22,8 @@ struct ClearPoints {
     ForEachWall(face, [&](int wall) { own[wall] = 0; });
   }
 
-  // Halves what is kept, oldest first, once there are more than `most`: what a mesh that does not
-  // end is answered is not kept for ever.
+  // Drops the oldest points once there are more than `most`, down to half of that: a mesh that
+  // never ends does not fill the memory.
   void KeepNewest(std::size_t most, std::size_t d) {
     const std::size_t count = points.size() / d;
     if (count <= most) return;

@@ -19,17 +19,22 @@ inline constexpr double kNearlyFine = 1.5;
 // What is advised instead: the reach is estimated from above.
 inline constexpr double kAdvised = 0.4;
 
-// That a mesh is `ratio` times as coarse as a reach, and what to do; `where` it was seen, or empty.
+// Returns a sentence for the verdict: the mesh is `ratio` times as coarse as a reach, and what to
+// do. `where`: the place where it was seen, or empty.
 std::string TooCoarse(double ratio, double reach, const std::string& where);
 
-// Of a mesh with walls, whose vertices are on the walls `met`: of a wall that none of them is on,
-// what to look for, to go on from what was wrong. Empty: there is none.
+// Returns what to look for if a wall is inactive, to be appended to a problem; empty if all walls
+// are active. `met`: the walls that have vertices.
 std::string AboutInactiveWall(int walls, WallSet met);
 
-// What speaks against a mesh, in plain words: problems refuse it, warnings do not.
+// Collects what speaks against a mesh, in plain words: problems refuse it, warnings do not.
+//
+//   findings.Refuse(Findings::kLinks, "the link of vertex 3 is not a sphere");
+//   findings.Conclude(k, spec, certificate);  // the verdict
 class Findings {
  public:
-  // Most telling first: a hole explains a boundary star, not the other way round.
+  // The subject that explains the most comes first: a hole explains a boundary star, not the other
+  // way round.
   enum Subject {
     kComplex = 0,
     kLinks,
@@ -53,17 +58,18 @@ class Findings {
   void Refuse(Subject subject, std::string problem);
   void Warn(std::string warning) { warnings_.push_back(std::move(warning)); }
 
-  // A theorem about this mesh, in plain words, that holds if nothing refuses it. `covered`: it
-  // knows every component of M.
+  // Adds a theorem about this mesh, in plain words, that holds if no problem refuses it. `covered`:
+  // the mesh meets every component of M.
   void Prove(std::string theorem, bool covered) {
     theorem_ = std::move(theorem);
     covered_ = covered;
   }
 
   bool clean() const { return problems_.empty(); }
-  // Whether an unannounced boundary may be behind one of the problems.
+  // Whether an undeclared boundary may be the cause of one of the problems.
   bool MayBeBoundary() const;
-  // Whether that is all that speaks against it, and not so much that little else could be seen.
+  // Whether the mesh is refused for its size alone, and is not so coarse that little else could be
+  // seen.
   bool IsOnlyTooCoarse(double epsilon_over_reach) const;
   // Sets certified, level, verdict and warnings from these findings and the certificate's values.
   void Conclude(int k, const Specification& spec, Certificate& certificate) const;

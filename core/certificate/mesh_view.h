@@ -9,8 +9,8 @@
 
 namespace stellate::core {
 
-// A finished mesh as the certifier sees it: the complex and the sample, nothing of how they came
-// about. Borrowed; must outlive the Certifier.
+// A finished mesh as the certifier sees it: the complex and the sample, without how they came
+// about. The arrays are borrowed, and must outlive the Certifier.
 struct MeshView {
   int k = 0, d = 0;
   std::uint64_t vertices = 0;
@@ -18,13 +18,13 @@ struct MeshView {
   const double* tangents = nullptr;  // vertices x k x d, C order, orthonormal rows
   const std::vector<std::uint32_t>* simplices = nullptr;  // k+1 ascending vertex ids each
 
-  // Of manifolds with boundary, else null: by vertex, its walls, and the sum of their conormals (k
-  // tangent coordinates each); and the faces.
+  // For manifolds with boundary, else null: the walls of each vertex; the sum of their conormals, k
+  // tangent coordinates for each vertex; and the faces.
   const WallSet* walls = nullptr;
   const double* outward = nullptr;
   const std::vector<FaceMesh>* faces = nullptr;
-  const double* protecting_radii2 =
-      nullptr;  // by vertex, squared radii (Sample::SetProtectingBalls); null: none
+  // The squared radii of protecting balls, by vertex (Sample::SetProtectingBalls); null: none.
+  const double* protecting_radii2 = nullptr;
 
   WallSet WallsOf(std::uint32_t v) const { return walls ? walls[v] : 0; }
   double ProtectingRadius2(std::uint32_t v) const {
@@ -39,7 +39,7 @@ struct MeshView {
 struct StarFacts {
   std::uint64_t inconsistent_simplices = 0;
   double max_circumradius = 0;  // max R_p(sigma)
-  bool converged = false;       // no rule applies any more
+  bool converged = false;       // no rule is broken
   double max_size_ratio = 0;    // max R_p / size(p) where the size is graded, else 0
   bool covers_box = false;      // every component of M in the bounding box is met, if the declared
                                 // reach is true
@@ -52,7 +52,8 @@ struct PointsOnWalls {
   std::vector<WallSet> walls;
 };
 
-// Points of M on one wall each, that wall, and its outward conormal within M there: d each.
+// Points of M that lie on one wall each: the point (d), the wall, and the wall's outward conormal
+// within M there (d).
 struct EndsOfManifold {
   std::vector<double> points;
   std::vector<int> walls;
@@ -65,13 +66,13 @@ struct EndsOfManifold {
   }
 };
 
-// What was learned of M before, while the mesh was made.
+// What a run learned of M while it made the mesh.
 struct KnownOfManifold {
   std::vector<double> points;              // of M, d each, that are no vertices
-  std::vector<double> tangential_offsets;  // where M may end: points y of M and the parts of q - y
-                                           // along it (UndeclaredBoundaryCheck), 2 d each
-  EndsOfManifold ends;  // that are no vertices
-  ClearPoints clear;    // whatever was answered, vertices too
+  std::vector<double> tangential_offsets;  // answers y to q and the parts of q - y along M, 2 d
+                                           // each (UndeclaredBoundaryCheck): M may end there
+  EndsOfManifold ends;                     // points on walls that are no vertices
+  ClearPoints clear;                       // all answers with clearances, vertices too
 };
 
 }  // namespace stellate::core

@@ -31,8 +31,8 @@ double LargestCoordinate(const MeshView& mesh) {
   return std::max(box.lower.cwiseAbs().maxCoeff(), box.upper.cwiseAbs().maxCoeff());
 }
 
-// Whether the part of `step` along M at a simplex may be long enough to tell: it is no longer than
-// the mean of those along its vertices' tangent spaces. Rounding is far below the margin.
+// Whether the tangential part of `step` at a simplex may be long enough: it is no longer than the
+// mean of the parts along the vertices' tangent spaces. Rounding is far below the margin.
 bool MayHaveTangentialOffset(const MeshView& mesh, const std::uint32_t* ids,
                              const Eigen::VectorXd& step, double distance) {
   constexpr double kMargin = 1 + 1e-9;

@@ -13,9 +13,9 @@
 
 namespace stellate::core {
 
-// That the mesh lies on M: its vertices and, nearly, points inside its simplices; that the tangent
-// spaces that the oracle gave are M's; that M does not end there. What the closest points say of
-// the reach goes to `reach`, where they lean to `boundary_check`.
+// The claim that the mesh lies on M: its vertices do and, nearly, points inside its simplices; the
+// oracle's tangent spaces are M's; and M does not end there. Bounds of the reach that the closest
+// points give go to `reach`, those with a tangential offset to `boundary_check`.
 class ClosenessClaims {
  public:
   ClosenessClaims(Examination& examination, ReachClaims& reach,
@@ -23,10 +23,10 @@ class ClosenessClaims {
 
   Eigen::MatrixXd InsideQuestions() const;
   Eigen::MatrixXd VertexQuestions() const;
-  Eigen::MatrixXd TangentQuestions();  // none where the oracle gives no tangents, or all is told
+  Eigen::MatrixXd TangentQuestions();  // empty if the oracle gives no tangents, or all is decided
   Eigen::MatrixXd BoundaryQuestions() { return boundary_check_.Questions(x_.position_error); }
 
-  // Sets the examination's position_error, which all other judgements need.
+  // Sets the examination's position_error. Call it before all other judgements.
   void JudgeVertices(const AnswerBlock& answer);
   void JudgeInside(const Eigen::MatrixXd& asked, const AnswerBlock& answer);
   void JudgeTangents(const AnswerBlock& answer);

@@ -5,9 +5,10 @@
 
 namespace stellate::core {
 
-// What is decided on the whole mesh, without a question: that it is a closed complex whose links
-// are spheres, that its stars embed, how large and well shaped its simplices are. Sets stars,
-// shape, longest_edge and size. Nothing, if it is no complex and nothing can be asked of it.
+// Decides without a query, on the whole mesh: it is a closed complex whose links are spheres, its
+// stars embed, its simplices are so large and of such shapes. Sets stars, shape, longest_edge and
+// size of the examination. Returns nothing if the list of simplices is no complex, so that no claim
+// can be examined.
 std::optional<StarGeometry> JudgeComplex(Examination& examination);
 
 }  // namespace stellate::core

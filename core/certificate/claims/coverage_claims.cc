@@ -57,7 +57,7 @@ void CoverageClaims::JudgeProbes(const Eigen::MatrixXd& asked, const AnswerBlock
     // At the boundary the flat may miss the mesh by as much as the boundary bends.
     if (x_.mesh.WallsOf(probe.nearest.vertex) != 0) continue;
     const Eigen::VectorXd step = asked.col(j) - probe.x;
-    // Another vertex's tangent space says little of where M leans.
+    // Another vertex's tangent space says little of an offset's direction.
     if (answer.tangents.size() > 0)
       boundary_check_.Add(probe.x, tangent * (tangent.transpose() * step), step.norm());
     probes_.push_back(std::move(probe));

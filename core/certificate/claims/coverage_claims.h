@@ -11,8 +11,8 @@
 
 namespace stellate::core {
 
-// That the mesh is all of M, once: normal flats at points of M, some near the mesh and some
-// anywhere, meet it once and near; and whatever was answered has a vertex near.
+// The claim that the mesh covers all of M, once: normal flats at points of M, some near the mesh
+// and some anywhere, meet the mesh once and nearby, and every answered point has a vertex near.
 class CoverageClaims {
  public:
   CoverageClaims(Examination& examination, UndeclaredBoundaryCheck& boundary_check)
@@ -20,11 +20,12 @@ class CoverageClaims {
 
   Eigen::MatrixXd ProbeQuestions() const;
   void JudgeProbes(const Eigen::MatrixXd& asked, const AnswerBlock& answer);
-  // Where the oracle gives no tangents: differences around the probes' closest points.
+  // Returns steps around the probes' closest points, whose differences give tangents; empty if the
+  // oracle gives tangents itself.
   Eigen::MatrixXd DifferenceQuestions() const;
   void JudgeDifferences(const AnswerBlock& answer);
 
-  // All that is seen by now, against the mesh.
+  // Compares all points of M that were answered so far with the mesh.
   Evidence JudgeSeen();
 
  private:

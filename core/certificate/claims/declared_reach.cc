@@ -17,8 +17,8 @@ namespace {
 // Tangent spaces that the oracle gives: so wrong, in radians, they are to rounding and to
 // differences, and no proof depends on it, whose own angles are no better.
 constexpr double kHarmlessTilt = 1e-6;
-// By so much solvers may have left them wrong without anybody noticing. What that would explain is
-// proof of nothing: neither that the reach is as declared, nor that it is not.
+// A solver may leave them wrong by this much, unnoticed. What that would explain proves nothing:
+// neither that the reach is as declared, nor that it is not.
 constexpr double kLikelyTilt = 1e-3;
 // Tangent spaces that are wrong by more are found to be (TangentCheck).
 constexpr double kUnseenTilt = 0.15;
@@ -103,7 +103,7 @@ double DeclaredReach::TiltBehind(const Witness& w) const {
          w.length;
 }
 
-// The reach that the witness allows, told apart from the declared one.
+// The reach that the witness allows, with digits enough to differ from the declared one.
 std::string DeclaredReach::SayAtMost(const Witness& w) const {
   std::string said = Message("at most ", Brief(w.reach));
   if (Brief(w.reach) == Brief(claim_.reach))

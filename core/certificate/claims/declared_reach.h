@@ -11,29 +11,35 @@
 
 namespace stellate::core {
 
-// A reach that the client declared: what is proved from it, and what contradicts it. Each pair of
-// points of M, and each point of a simplex with its closest point, bounds the reach from above. Of
-// these the one is kept that leaves the smallest reach possible, once all that it may owe to wrong
-// positions, `noise`, and to wrong tangent spaces is taken off.
+// A reach that the client declared: proves the mesh from it, or finds what contradicts it. Each
+// pair of points of M, and each point of a simplex with its closest point, bounds the reach from
+// above. The strongest witness is kept: the one that leaves the smallest reach possible once all
+// that wrong positions (`noise`) and wrong tangent spaces may explain is taken off.
+//
+//   declared.Prove(stars, shape);    // if the mesh is closed and its stars embed
+//   declared.TestEdge(p, q, noise);  // and all else that bounds the reach
+//   declared.Conclude(covered, findings, certificate);
 class DeclaredReach {
  public:
-  // `given`: the tangent spaces are the oracle's, and no bound of their error is known.
+  // `given`: the oracle gives the tangent spaces, and no bound of their error is known.
   DeclaredReach(const MeshView& mesh, const ReachClaim& claim, bool given)
       : mesh_(mesh), claim_(claim), given_(given) {}
 
-  // The mesh is closed and its stars embed.
+  // Tries to prove the mesh. REQUIRES: it is closed and its stars embed.
   void Prove(const VertexStars& stars, const MeshShape& shape);
 
-  // Two vertices p and q, q as it is seen from p.
+  // Tests the declared reach by vertex q, seen from vertex p.
   void TestEdge(std::uint32_t p, std::uint32_t q, double noise);
-  // A ball of this radius touches M at vertex v and, at this distance from it, again; lengths.
+  // ... by a ball of this radius that touches M at vertex v and again at distance `length` from v;
+  // lengths.
   void TestBall(std::uint32_t v, double radius, double length, double noise);
-  // A point of a simplex with this circumradius, length, is `distance` away from M: no tangent
-  // space has a part in that.
+  // ... by a point at `distance` from M in a simplex with this circumradius; lengths. Tangent
+  // spaces have no part in that.
   void TestDistance(const std::uint32_t* ids, double circumradius, double distance, double noise);
 
-  // `covered`: every component of M within the bounding box was asked for. Refuses a reach that is
-  // contradicted; else says in the certificate what is proved, or why nothing is.
+  // Refuses a reach that is contradicted; else says in the certificate what is proved, or why
+  // nothing is. `covered`: the seeds covered the bounding box, so that every component of M in it
+  // is met.
   void Conclude(bool covered, Findings& findings, Certificate& certificate) const;
 
  private:
@@ -44,7 +50,7 @@ class DeclaredReach {
     bool by_tangents = false;
     std::string text;
   };
-  // The strongest witness, where tangent spaces may be wrong by `tilt`.
+  // The strongest witness if tangent spaces may be wrong by `tilt`.
   struct Strongest {
     double tilt = 0;      // radians
     double possible = 0;  // the reach that it leaves possible
@@ -64,8 +70,8 @@ class DeclaredReach {
   const ReachClaim claim_;
   const bool given_;
   std::optional<Proof> proof_;
-  Strongest sure_;     // whatever tangent spaces could be to blame for
-  Strongest doubted_;  // unless they are
+  Strongest sure_;     // holds even if tangent spaces are as wrong as they could be
+  Strongest doubted_;  // holds if tangent spaces are right
 };
 
 }  // namespace stellate::core

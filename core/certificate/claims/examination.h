@@ -15,7 +15,8 @@
 
 namespace stellate::core {
 
-// A mesh under examination: what every claim about it looks at, and what was found so far.
+// A mesh under examination: the inputs that all claims share, and what they have found so far. Each
+// class of claims borrows one, and writes what it finds to `findings` and `certificate`.
 struct Examination {
   Examination(const Specification& asked, const MeshView& view, const StarFacts& known)
       : spec(asked), mesh(view), facts(known) {}
@@ -29,7 +30,7 @@ struct Examination {
   Eigen::Map<const Eigen::MatrixXd> Tangents(std::uint32_t v) const {  // d x k
     return {mesh.Tangent(v), mesh.d, mesh.k};
   }
-  // How far from the mesh M may be at a vertex, and from a point of a simplex.
+  // How far M may be from the mesh at a vertex, and from a point of a simplex.
   double LocalSize(std::uint32_t v) const;
   double DistanceAllowed(double circumradius) const;
   double Circumradius(const std::uint32_t* ids) const;
@@ -41,7 +42,7 @@ struct Examination {
   Findings findings;
 
   std::optional<VertexStars> stars;
-  // Once no claim asks for them: most of what the certificate takes up.
+  // Frees the stars, which take most of the certificate's memory, once no claim needs them.
   void ForgetStars() { stars.reset(); }
   // Whether some vertex of a simplex is on the boundary.
   bool AtBoundary(const std::uint32_t* ids) const {

@@ -22,10 +22,10 @@ namespace {
 
 constexpr double kRight = std::numbers::pi / 2;
 constexpr double kDegrees = 180 / std::numbers::pi;
-// An angle is told from its squared sine, which is right to some 1e-15: near the right angle, where
-// that matters, the angle is right to 3e-8.
+// An angle is computed from its squared sine, which is right to some 1e-15: near the right angle,
+// where that matters, the angle is right to 3e-8.
 constexpr double kAngleMargin = 1e-6;
-// Lengths told from dot products, as shares of the lengths in these.
+// The error of lengths computed from dot products, as a share of the lengths.
 constexpr double kLengthMargin = 1e-9;
 constexpr double kFloatMargin = 1e-6;  // MeshShape keeps floats
 // Vertices of a component that (B) is tried at.
@@ -238,8 +238,9 @@ std::string FindOtherSheet(const MeshView& mesh, const VertexStars& stars, const
 std::string DescribeTilt(const MeshView& mesh, const SimplexList& list, const Extent& extent,
                          const ReachClaim& claim) {
   const Tilt& worst = extent.worst;
-  std::string text = Message("simplex ", NameSimplex(list[worst.simplex], mesh.k + 1), " leans by ",
-                             Brief(worst.alpha * kDegrees), " degrees from a tangent space");
+  std::string text =
+      Message("simplex ", NameSimplex(list[worst.simplex], mesh.k + 1), " is tilted by ",
+              Brief(worst.alpha * kDegrees), " degrees from a tangent space");
   const double turn = kRight - claim.tangent_error - worst.alpha;
   if (!(worst.rho < claim.reach))
     return text + Message(" and its enclosing ball may have the radius ", Brief(worst.rho),

@@ -9,9 +9,9 @@
 
 namespace stellate::core {
 
-// What a finished mesh proves about a manifold M of which one number is known: a lower bound r of
-// its reach. All that is needed is measured on the mesh; docs/using/proof.md has the theorem and
-// its proof. With, for a k-simplex s of the mesh,
+// What a finished mesh proves about a manifold M if one number is known: a lower bound r of M's
+// reach. Everything else is measured on the mesh; docs/using/proof.md has the theorem and its
+// proof. With, for a k-simplex s of the mesh,
 //
 //   rho(s)    a bound of the radius of its smallest enclosing ball, length
 //   h(s)      = r - sqrt(r^2 - rho^2): no point of s is farther from M (Attali, Lieutier, Salinas)
@@ -30,11 +30,12 @@ struct ReachClaim {
   double tangent_error = 0;  // radians: between the mesh's tangent bases and M's tangent spaces
 };
 
-// |q - p| = `length` for p and q on M, and q is `away` from M's tangent space at p. Federer: `away`
-// is at most length^2 / 2r. Whether it is more, beyond what the claim's tangents and positions that
-// are wrong by `noise` could be blamed for.
+// Whether two points p and q of M contradict the claim: |q - p| = `length`, and q is `away` from
+// M's tangent space at p, at most length^2 / 2r by Federer. They do if `away` is more, even if the
+// claim's tangents are wrong by tangent_error and positions by `noise`.
 bool Contradicts(const ReachClaim& claim, double length, double away, double noise);
-// How much of `away` the claim's tangents and positions wrong by `noise` may be to blame for.
+// Returns how much of `away` wrong tangents (the claim's tangent_error) and positions wrong by
+// `noise` may explain.
 double Blame(const ReachClaim& claim, double length, double noise);
 
 struct Proof {
@@ -43,7 +44,7 @@ struct Proof {
   std::string obstacle;  // plain words: what (A) or (B) fails for, and what would do; else empty
 };
 
-// Decides (A) and (B). The mesh is closed and its stars embed. Linear in the mesh.
+// Decides (A) and (B). REQUIRES: the mesh is closed and its stars embed. Time linear in the mesh.
 Proof ProveFromReach(const MeshView& mesh, const VertexStars& stars, const MeshShape& shape,
                      const ReachClaim& claim);
 

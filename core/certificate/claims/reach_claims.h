@@ -14,27 +14,29 @@
 
 namespace stellate::core {
 
-// That the mesh is fine enough for the reach of M: told by edges, by balls that shrink until M does
-// not enter them, and by whatever else was answered; and what follows from a declared reach.
+// The claim that the mesh is fine enough for the reach of M. Edges, shrinking balls and all
+// answered points bound the reach from above; a declared reach may be proved or refuted by them.
 class ReachClaims {
  public:
-  // `stars.longest_edge` has moved into the examination.
+  // REQUIRES: `stars.longest_edge` has moved into the examination.
   ReachClaims(Examination& examination, const StarGeometry& stars);
 
-  // The balls' centres, as long as they may still shrink; balls at vertices, and, of a thorough
-  // audit, at closest points of barycentres.
+  // Return the centres of balls that may still shrink: those at vertices and, in a thorough audit,
+  // those at the closest points ("feet") of barycentres.
   Eigen::MatrixXd BallQuestions() const { return balls_.Centres(); }
   Eigen::MatrixXd FootQuestions() const;
   void TakeBalls(const AnswerBlock& answer);
   void TakeFeet(const AnswerBlock& answer);
 
-  // A point of a simplex, `number`ed if it is its barycentre, and its closest point y.
+  // Takes a point of a simplex, its `distance` from M and its closest point y. `number`: of the
+  // barycentre, if it is one.
   void HoldFoot(const std::uint32_t* ids, double circumradius, double distance,
                 const Eigen::VectorXd& y, std::optional<std::uint64_t> number);
 
-  // Points that the balls met are seen then, too.
+  // Adds the points that the balls met to those seen.
   void TellWhatBallsMet();
-  // The point y of M, seen from vertex v, whose tangent space is right to a sine of `tilt`.
+  // Takes a point y of M, seen from vertex v, whose tangent space is wrong by an angle of sine
+  // `tilt` at most.
   void HoldPoint(std::uint32_t v, const Eigen::VectorXd& y, double tilt);
   void Hold(const Evidence& evidence);
 
@@ -42,7 +44,7 @@ class ReachClaims {
   void JudgeDeclared();
 
  private:
-  // Where M was seen narrow: at a vertex, and how far from there the other side is.
+  // A narrow place of M: a vertex, and how far from it the other side is.
   struct Narrow {
     std::uint32_t vertex = 0;
     double across = 0;

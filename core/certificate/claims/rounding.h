@@ -4,10 +4,11 @@
 
 namespace stellate::core {
 
-// How far points may lie from those that they stand for, because their coordinates were rounded to
-// single precision or to few decimals: a length, 0 where neither is seen. An oracle that rounds
-// gives a rounded point for itself, so that asking again shows nothing of it. What would be more
-// than `most` (a length) is no rounding: such points are short by nature, those of a grid, say.
+// Returns by how much the coordinates of `points` seem rounded, to single precision or to few
+// decimals: the largest distance from the exact points, a length; 0 if neither is seen. A repeated
+// query does not show this: an oracle that rounds answers a rounded point by itself. An error above
+// `most` (a length) is not taken for rounding: such points, a grid's for instance, have few digits
+// by nature.
 double RoundingOf(const Eigen::MatrixXd& points, double most);
 
 }  // namespace stellate::core

@@ -18,8 +18,8 @@
 namespace stellate::core {
 namespace {
 
-// Questions of all walls together, and of each at least; of a wall that the mesh does not end at,
-// where any answer tells.
+// Queries of all walls together, and of each wall at least; of an inactive wall, for which any
+// answer is news.
 constexpr std::size_t kMostQuestions = kMaxBarycentres;
 constexpr std::size_t kLeastOfWall = 250;
 constexpr std::size_t kMostOfInactive = 100;

@@ -13,29 +13,29 @@
 
 namespace stellate::core {
 
-// Of manifolds with boundary: that the mesh ends at all pieces of each wall, and not only at those
-// that the refinement came upon. From inside of the mesh each wall is asked for its closest point;
-// where that is in M, a simplex of the wall's mesh has to be near, and to face as the wall does: a
-// second sheet close to the first, a void just under the skin, faces the other way.
+// The claim that a mesh with boundary ends at all pieces of each wall, and not only at those that
+// refinement came upon. The closest point on each wall is queried from inside the mesh. If it is in
+// M, a simplex of the wall's mesh must be near and face as the wall does: a second sheet close to
+// the first, such as a void just under the skin, faces the other way.
 class SheetClaims {
  public:
-  // `ends`, `clear`: what is known, borrowed; answers on walls are added to the ends.
+  // `ends`, `clear`: what is known, borrowed; answers on walls are added to `ends`.
   SheetClaims(Examination& examination, BoundaryClaims& boundary, EndsOfManifold& ends,
               const ClearPoints& clear);
 
-  // A block for each wall: barycentres of some of the `chosen` simplices. What lies deep inside is
-  // asked about once: a closest point that far away leaves no room for others in between.
+  // Returns a block for each wall: barycentres of some of the `chosen` simplices. Deep inside, one
+  // query does for many simplices: the ball up to a closest point that far away contains no other.
   std::vector<QueryBlock> Questions(const std::vector<std::uint32_t>& chosen);
-  // The answers to one of these, or to others of points on that wall alone.
+  // Takes the answers to one of these blocks, or to other queries on that wall alone.
   void Judge(std::size_t wall, const Eigen::MatrixXd& asked, const AnswerBlock& answer);
 
-  // The ends that were known before.
+  // Judges the ends that were known before.
   void JudgeKnown();
 
-  // A block for each wall: those points that became known since the last call, or before the first,
-  // that are much less clear of it than points near them are, by their distance from its mesh. What
-  // is that near to a second sheet may not have been asked about: a solver's "closest" point of the
-  // wall may be far beyond others, and then a ball up to it is not empty.
+  // Returns a block for each wall: the points, new since the last call, whose clearance over their
+  // distance from the wall's mesh is much smaller than that of points near them. There may be a
+  // second sheet near them that no query met: a solver's "closest" point may be far beyond others,
+  // and then the ball up to it is not empty.
   std::vector<QueryBlock> QuestionsWhereClearancesDip();
 
  private:
@@ -51,8 +51,8 @@ class SheetClaims {
     std::vector<double> radii;             // around the barycentres
     double largest_radius = 0;
     BallTree tree;  // of the barycentres, by these radii
-    // By clear point: its clearance over its distance from the mesh; 0: so near to that it tells
-    // nothing, or on the wall.
+    // By clear point: its clearance over its distance from the mesh; 0: on the wall, or so near the
+    // mesh that the ratio has no meaning.
     std::vector<double> shares;
   };
   std::unique_ptr<Sheet> SheetOf(int wall) const;

@@ -10,26 +10,27 @@
 
 namespace stellate::core {
 
-// Holds tangent spaces that the client gives against its closest points: a small step off M across
-// the tangent space comes back to where it began, one along it stays where it is. A wire declared a
-// curve, or a wall declared a surface, has directions for which neither is so. Where M bends within
-// the step neither is so either: a step that goes wrong is taken once more, much shorter.
+// Compares the client's tangent spaces with its closest points: a small step off M across the
+// tangent space comes back to its start, one along it stays where it is. A wire that is declared a
+// curve, or a plate that is declared a surface, has directions for which neither holds. Neither
+// holds where M bends within the step: a step that fails is therefore repeated, much shorter.
 class TangentCheck {
  public:
-  // Of the step: tangent spaces wrong by 0.03 are harmless, by 0.2 refinement diverges; what is not
-  // a tangent space at all is wrong by about 1.
+  // As a share of the step. Tangent spaces wrong by 0.03 are harmless; by 0.2 refinement diverges;
+  // what is not a tangent space at all is wrong by about 1.
   static constexpr double kTolerance = 0.15;
 
-  // At random vertices; steps are a small share of the mesh size there.
+  // Chooses random vertices; steps are a small share of the mesh size there.
   explicit TangentCheck(const Examination& examination);
 
-  // Closest points to be asked for, d x n; none: all is told.
+  // Returns points whose closest points to query, d x n; empty: the check is done.
   Eigen::MatrixXd Questions() const;
-  // What is wrong, in plain words; empty if nothing is, or if it has to be asked again.
+  // Returns what is wrong, in plain words; empty if nothing is, or if a shorter step must be
+  // queried first.
   std::string Judge(const AnswerBlock& answer);
 
-  // Where M bends so much within a step that only a shorter one was right: from this vertex the
-  // point y of M was found, whose tangent space is right to kTolerance.
+  // A place where M bends so much within a step that only a shorter one passed: the vertex, whose
+  // tangent space is right to kTolerance, and the point y of M that the longer step found.
   struct Bend {
     std::uint32_t vertex = 0;
     Eigen::VectorXd y;

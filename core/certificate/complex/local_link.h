@@ -8,17 +8,17 @@
 
 namespace stellate::core {
 
-// The link of a vertex of a K-complex, K = 1 to 3, taken from the vertex's star alone: which of its
-// simplices share a facet, and whether it is a sphere.
+// Decides from the star of one vertex alone whether its link is a sphere, K = 1 to 3. Keep one for
+// many stars: it reuses its memory.
 template <int K>
 class LocalLink {
   static_assert(K >= 1 && K <= 3);
 
  public:
-  // Whether the link is a sphere and, of simplices that share a facet, none lies on the same side
-  // of it as the other, by the signs of their determinants. False also where the star is too large
-  // to say so here. `columns`: by simplex of the star, the numbers of its other K vertices in the
-  // order of their ids; numbers are below `vertices`, and each occurs.
+  // Whether the link is a sphere and two simplices that share a facet always lie on different sides
+  // of it, by the `signs` of their determinants. False also if the star is too large to be decided
+  // here. `columns`: by simplex of the star, the numbers of its other K vertices in the order of
+  // their ids; numbers are below `vertices`, and each occurs.
   bool IsSphereUnfolded(std::span<const std::uint32_t> columns, std::uint32_t vertices,
                         const std::vector<int>& signs) {
     const std::size_t simplices = columns.size() / K;
@@ -31,8 +31,8 @@ class LocalLink {
 
  private:
   static constexpr std::uint32_t kMostVertices = 128, kMostSimplices = 1 << 13;
-  // Of a facet; else the one simplex that was seen to have it, times four, the column opposite, and
-  // one.
+  // The state of a facet: open, closed, or 4 * simplex + opposite column + 1 of the only simplex
+  // seen with it.
   static constexpr std::uint16_t kOpen = 0, kClosed = 0xffff;
 
   // The facet opposite column c, as a place in the table.
@@ -44,8 +44,8 @@ class LocalLink {
                     : columns[0] * vertices + columns[1];
   }
 
-  // Whether each facet through the vertex is in just two simplices, that differ and lie on both
-  // sides of it.
+  // Whether each facet through the vertex is in exactly two simplices, which differ and lie on
+  // different sides of it.
   bool Match(std::span<const std::uint32_t> columns, std::uint32_t vertices, const int* signs) {
     const std::size_t facets = K == 1 ? 1 : K == 2 ? vertices : std::size_t{vertices} * vertices;
     seen_.assign(facets, kOpen);

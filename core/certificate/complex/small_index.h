@@ -7,23 +7,28 @@
 
 namespace stellate::core {
 
-// Numbers the few different ids of a star in the order in which they come: 0, 1, 2... A hash table,
-// to be used again and again. An id may be anything but kNone.
+// Numbers the few different ids of a star in the order in which they come: 0, 1, 2... A hash table
+// for repeated use. Any id is allowed except kNone.
+//
+//   index.Clear(star.size());
+//   index.Number(17);  // 0
+//   index.Number(4);   // 1
+//   index.Number(17);  // 0
 class SmallIndex {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
-  // Forgets all ids. It has room for this many without growing.
+  // Forgets all ids. `expected` ids fit without growing.
   void Clear(std::size_t expected) {
     slots_.assign(std::bit_ceil(2 * expected + 2), {});
     shift_ = 32 - std::countr_zero(slots_.size());
     size_ = 0;
   }
 
-  // Different ids so far.
+  // Returns the number of different ids so far.
   std::uint32_t size() const { return size_; }
 
-  // The id's number; the next one, size(), for an id not seen before.
+  // Returns the id's number; the next one, size(), for an id not seen before.
   [[gnu::always_inline]] std::uint32_t Number(std::uint32_t id) {
     if (2 * std::size_t{size_} >= slots_.size()) Grow();
     Slot& slot = SlotOf(id);

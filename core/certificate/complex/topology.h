@@ -22,11 +22,11 @@ struct SimplexList {
   }
 };
 
-// Empty when the list is well formed: whole simplices, ids ascending and below `vertices`, fewer
+// Returns "" if the list is well formed: whole simplices, ids ascending and below `vertices`, fewer
 // than 2^32 - 2 simplices. Else says in plain words which simplex is not.
 std::string CheckSimplexList(const SimplexList& list);
 
-// call(std::integral_constant<int, K>()), K = k, 1 to kMaxDimension.
+// Returns call(std::integral_constant<int, k>()), k = 1 to kMaxDimension: makes k a constant.
 template <typename Call>
 auto WithMeshDimension(int k, const Call& call) {
   static_assert(kMaxDimension == 5);
@@ -44,7 +44,10 @@ auto WithMeshDimension(int k, const Call& call) {
   }
 }
 
-// Which simplices meet at a vertex. 4 (k + 1) bytes a simplex and 8 a vertex.
+// Lists the simplices that meet at each vertex. Takes 4 (k + 1) bytes per simplex and 8 per vertex.
+//
+//   const VertexStars stars(list);
+//   for (std::uint32_t s : stars.Star(v)) Visit(list[s]);
 class VertexStars {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
@@ -65,25 +68,28 @@ class VertexStars {
   std::vector<std::uint32_t> incident_;
 };
 
-// And which share a facet.
+// Also knows which simplices share a facet. Time and memory are linear in the mesh for bounded
+// stars: 8 (k + 1) bytes per simplex.
 //
-// Linear in the mesh in time and memory, for bounded stars: 8 (k + 1) bytes a simplex.
+//   const Adjacency adjacency(list);
+//   if (adjacency.bad_facets() == 0) Visit(adjacency.Across(s, 0));  // opposite s's first vertex
 class Adjacency : public VertexStars {
  public:
-  // REQUIRES: as for VertexStars. `apex`: a vertex that is in as many simplices as may be: of a
-  // complex of edges it is a facet itself, which is left out then.
+  // `apex`: a vertex that may be in any number of simplices. In a complex of edges it is a facet
+  // itself, which is then not counted. REQUIRES: as for VertexStars.
   explicit Adjacency(const SimplexList& list, std::uint32_t apex = kNone)
       : Adjacency(VertexStars(list), apex) {}
   explicit Adjacency(VertexStars stars, std::uint32_t apex = kNone);
 
-  // The simplex across the facet opposite vertex number i of simplex s; kNone unless that facet
-  // is in exactly two simplices, on different vertex sets.
+  // Returns the simplex across the facet opposite vertex number i of simplex s; kNone unless that
+  // facet is in exactly two simplices, on different vertex sets.
   std::uint32_t Across(std::uint32_t s, int i) const { return Across(s)[i]; }
-  // All k + 1 of them. No simplex is across two facets: the two would have all vertices in common.
+  // Returns all k + 1 of them. No simplex is across two facets: the two would have all vertices in
+  // common.
   const std::uint32_t* Across(std::uint32_t s) const {
     return across_.data() + static_cast<std::size_t>(s) * (list().k + 1);
   }
-  // The number of t's vertex that is not in s. REQUIRES: t is across a facet of s.
+  // Returns the number of t's vertex that is not in s. REQUIRES: t is across a facet of s.
   int Apex(std::uint32_t s, std::uint32_t t) const {
     int j = 0;
     while (Across(t)[j] != s) ++j;
@@ -123,10 +129,10 @@ struct Connectivity {
 
 Connectivity ComputeConnectivity(const Adjacency& adjacency);
 
-// The same, but without an orientation, of a complex whose vertices' links are spheres, told from
-// how each simplex is oriented at its vertices. `sides`: by simplex, bit i for vertex number i: as
-// the simplices at one vertex are oriented alike, whether the order of the simplex' ids says so or
-// the opposite.
+// Returns the same, without an orientation, for a complex whose vertex links are spheres, from how
+// each simplex is oriented at its vertices. `sides`: by simplex, bit i for vertex number i: orient
+// all simplices at that vertex alike; the bit says whether this orientation is the opposite of the
+// order of the simplex's ids.
 Connectivity ComputeConnectivity(const SimplexList& list, std::span<const std::uint8_t> sides);
 
 // "(3 17 20)": vertex ids as messages name a simplex.

@@ -8,15 +8,19 @@
 
 namespace stellate::core {
 
-// A few hundred balls in R^d, asked by all vertices of a large mesh which of them they are in. A
-// grid over the coordinates in which the centres spread most tells most vertices at once that they
-// are in none; no tree's inner nodes are to be passed. Const queries may run in parallel.
+// Finds the balls that contain a point: a few hundred balls in R^d, and all vertices of a large
+// mesh as points. The balls are sorted into a grid over the coordinates in which their centres
+// spread most, so that one look-up decides for most points that no ball contains them. Const
+// queries may run in parallel.
+//
+//   BallGrid grid(d, centres, radii);
+//   grid.ForEachAround(q, [](std::uint32_t ball, double distance2) { ... });
 class BallGrid {
  public:
   // `centres`: d each, C order; borrowed.
   BallGrid(int d, const double* centres, std::vector<double> radii);
 
-  // visit(i, |q - centre i|^2) for each ball with |q - centre i| < radius i, by ascending i.
+  // Calls visit(i, |q - centre i|^2) for each ball with |q - centre i| < radius i, by ascending i.
   template <typename Visit>
   void ForEachAround(const double* q, const Visit& visit) const {
     std::size_t cell = 0;

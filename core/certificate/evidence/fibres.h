@@ -11,12 +11,12 @@
 namespace stellate::core {
 
 // How a mesh meets the normal flats (fibres) of M. If each fibre meets it exactly once nearby, the
-// mesh is M seen along its normals: nothing missing, nothing doubled, nothing bridged.
+// mesh covers M exactly once along its normals: nothing is missing, doubled or bridged.
 //
-// The points of M that are asked about are few and the mesh is large: each call takes all points
-// and goes through the mesh once, in parallel.
+// The points of M in question are few and the mesh is large: each call takes all points and goes
+// through the mesh once, in parallel.
 
-// The mesh vertex nearest to a point, the lowest of several, and its distance.
+// The mesh vertex nearest to a point, the one of lowest id if there are several, and its distance.
 struct NearestVertex {
   std::uint32_t vertex = 0;
   double distance = 0;
@@ -39,9 +39,9 @@ struct FibreHits {
   double distance = 0;        // of the farthest from x
   std::uint32_t simplex = 0;  // that it is in
 };
-// For each fibre. When a flat passes so close to the boundary of a simplex that rounding would
-// decide, parallel ones, at most kSideStep reach_out to the side, are tried. `max_diameter`: of the
-// mesh's simplices.
+// Returns the hits of each fibre. If a flat passes so close to the boundary of a simplex that
+// rounding would decide, parallel flats, at most kSideStep reach_out to the side, are tried.
+// `max_diameter`: of the mesh's simplices.
 inline constexpr double kSideStep = 0.02;
 std::vector<FibreHits> CountHits(const MeshView& mesh, const VertexStars& stars,
                                  double max_diameter, const std::vector<Fibre>& fibres);

@@ -11,9 +11,9 @@
 
 namespace stellate::core {
 
-// Where the certifier looks. Their numbers bound the queries of a certificate: about 5000, and a
-// probe for so many vertices of a large mesh, which is a fiftieth of what it took; the checks that
-// need no oracle see the whole mesh.
+// Where the certifier queries M. These numbers bound the queries of a certificate: about 5000, and
+// for a large mesh one probe per kVerticesAProbe vertices, a fiftieth of the queries that the mesh
+// took. The checks that need no oracle look at the whole mesh.
 inline constexpr std::uint32_t kMaxBarycentres = 2000;     // random ones, or all when no more
 inline constexpr std::uint32_t kExtremeBarycentres = 100;  // of largest diameter; of largest tilt
 inline constexpr std::uint32_t kMaxVertexProbes = 256;
@@ -21,13 +21,13 @@ inline constexpr int kProbesOfAKind = 80;  // near the mesh; its box; the client
 inline constexpr std::uint64_t kVerticesAProbe = 50;  // of the first three kinds in turn
 inline constexpr int kBallCount = 64;
 inline constexpr int kMaxBallSteps = 2;
-// Balls of this radius, in mesh sizes, on either side of every eighth vertex, a bounded number of
-// them; of all vertices in a thorough audit. A sheet that such a ball meets is nearer than twice
-// the reach that the mesh size needs.
+// Balls of this radius, in mesh sizes, on either side of every eighth vertex, up to kMaxBallPairs;
+// of all vertices in a thorough audit. A sheet that such a ball meets is nearer than twice the
+// reach that the mesh size needs.
 inline constexpr double kPairRadius = 2.5;
 inline constexpr std::uint64_t kBallStride = 8;
 inline constexpr std::uint64_t kMaxBallPairs = 256;
-// Vertices held against the tangent spaces of those near them.
+// Vertices compared with the tangent spaces of those near them.
 inline constexpr std::uint64_t kMaxVerticesHeld = 256;
 
 // The smallest box that holds the mesh's vertices.
@@ -42,13 +42,14 @@ std::vector<std::uint32_t> ChooseSimplices(const SimplexList& list, const MeshSh
 // Vertices that must be their own closest points, ascending.
 std::vector<std::uint32_t> ChooseVertices(std::uint32_t vertices, std::uint64_t random_seed);
 
-// Of each, `each` points: its barycentre and, if k + 2 are wanted, those halfway to its corners.
+// Returns `each` points of each chosen simplex: its barycentre and, if `each` is k + 2, the points
+// halfway to its corners.
 Eigen::MatrixXd PointsInside(const MeshView& mesh, const SimplexList& list,
                              const std::vector<std::uint32_t>& chosen, int each);
 
-// Points whose closest points on M the mesh must cover: points of simplices pushed up to `push` in
-// random ambient directions, random points of the mesh's own box and of the client's, and seeds; of
-// the first three at least one for kVerticesAProbe vertices.
+// Returns points whose closest points on M the mesh must cover: points of simplices pushed up to
+// `push` in random ambient directions, random points of the mesh's own box and of the client's, and
+// seeds; of the first three at least one for kVerticesAProbe vertices.
 Eigen::MatrixXd CoverageProbes(const Specification& spec, const MeshView& mesh,
                                const SimplexList& list, double push);
 

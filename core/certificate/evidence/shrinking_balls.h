@@ -11,44 +11,50 @@
 
 namespace stellate::core {
 
-// Estimates the reach from above by shrinking balls: a ball tangent to M at a point p of it, its
-// centre on a normal of M at p, shrinks until M does not enter it any more. Whenever the centre's
-// nearest point y is inside, the ball through y, of radius |y - p|^2 / (2 n.(y - p)), is smaller
-// and still touches M at both p and y, so its radius bounds the reach. This finds both curvature
-// and bottlenecks between sheets. All balls take their steps together. A ball that M does not enter
-// by more than two hundredths of its radius is settled.
+// Bounds the reach from above by shrinking balls. A ball is tangent to M at a point p, with its
+// centre on a normal n of M at p, and shrinks until M no longer enters it. If the point y of M
+// nearest to the centre is inside, the ball through y, of radius |y - p|^2 / (2 n.(y - p)), is
+// smaller and touches M at both p and y, so its radius bounds the reach. This finds both curvature
+// and bottlenecks between sheets. All balls take their steps together. A ball is final once M
+// enters it by no more than two hundredths of its radius.
+//
+//   ShrinkingBalls balls(mesh, longest_edge);
+//   balls.AddLadders(random_seed, count);
+//   for (Eigen::MatrixXd c = balls.Centres(); c.cols() > 0; c = balls.Centres())
+//     balls.Absorb(ClosestPoints(c), found, position_error);
 class ShrinkingBalls {
  public:
-  // `longest_edge` by vertex: the sample's local scale; answers that tell nothing at that scale
-  // (IsTelling) settle a ball.
+  // `longest_edge`: by vertex, the sample's local scale. A ball is final, too, when an answer has
+  // no meaning at that scale (IsTelling).
   ShrinkingBalls(const MeshView& mesh, const std::vector<double>& longest_edge)
       : mesh_(mesh), longest_edge_(longest_edge) {}
 
-  // At random vertices, on random normals. The first step asks for a ladder of radii, each half of
-  // the one before, from half the mesh's width on: round trips cost more than questions, and one
-  // more step then suffices.
+  // Adds balls at random vertices, on random normals. Their first step queries a ladder of radii,
+  // each half of the one before, from half the mesh's width on: round trips cost more than queries,
+  // and one more step then suffices.
   void AddLadders(std::uint64_t random_seed, int count);
-  // Two balls of one radius on either side of vertex v.
+  // Adds two balls of one radius on either side of vertex v.
   void AddPair(std::uint32_t v, double radius, std::uint64_t random_seed);
-  // The same at a point of M under a simplex, near its first vertex, where `tangents` (d x k)
-  // nearly span the tangent space: only what lies steeper above them than the tangent spaces of the
-  // simplex's vertices differ from them counts, and for no more than that allows.
+  // Adds two balls at a point of M under a simplex, near its first vertex, where `tangents` (d x k)
+  // nearly span the tangent space. How much the tangent spaces at the simplex's vertices differ
+  // from them is taken off each bound, and answers that lie no steeper do not count.
   void AddPair(const std::uint32_t* simplex, const Eigen::VectorXd& point,
                const Eigen::MatrixXd& tangents, double radius, std::uint64_t random_key);
 
-  // Centres of the balls that may still shrink, d x n, and the answers to them.
+  // Returns the centres of the balls that may still shrink, d x n. Absorb takes their closest
+  // points.
   Eigen::MatrixXd Centres() const;
   void Absorb(const Eigen::MatrixXd& nearest, const std::vector<std::uint8_t>& found,
               double position_error);
 
-  // Answers that were not the points that the balls touch, d each: points of M elsewhere.
+  // Answers other than the points that the balls touch, d each: points of M elsewhere.
   const std::vector<double>& met() const { return met_; }
   double reach() const { return reach_; }  // length; infinity while nothing was found
   std::uint32_t narrowest() const { return narrowest_; }  // the vertex where it was found
   double distance() const { return distance_; }  // from there to where the ball touches M again
-  // The largest circumradius, told from a vertex's longest edge, over the ball's radius there.
+  // The largest circumradius, estimated from a vertex's longest edge, over the ball's radius there.
   double coarseness() const { return coarseness_; }
-  // Of all balls, those that settle where that is more than a mesh may be (kCoarse).
+  // The share of balls that end where this ratio is above kCoarse.
   double coarse_share() const {
     return added_ > 0 ? static_cast<double>(coarse_) / static_cast<double>(added_) : 0;
   }
@@ -56,7 +62,7 @@ class ShrinkingBalls {
  private:
   struct Ball {
     std::uint32_t vertex = 0;
-    int rungs = 1;           // of the ladder that is asked for next
+    int rungs = 1;           // of the ladder that is queried next
     double radius = 0;       // its first
     Eigen::VectorXd point;   // that it touches; empty: the vertex
     Eigen::VectorXd normal;  // unit

@@ -11,10 +11,11 @@ namespace {
 
 constexpr std::size_t kMostPlaces = 32;
 constexpr double kLongestStep = 0.05;  // of the mesh size
-// Within M both steps go as far; at a rim the one back into M does, if it is along M at all.
+// Inside M both steps go equally far; at a boundary the step back into M goes as far, if it is
+// along M at all.
 constexpr double kComesBack = 0.5;  // of the step back
 constexpr double kAlong = 0.25;     // of its length
-// Steps of at least this number of position errors tell what became of them.
+// Steps must be this number of position errors long.
 constexpr double kErrorsInStep = 10;
 
 }  // namespace

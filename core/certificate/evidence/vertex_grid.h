@@ -10,17 +10,21 @@
 
 namespace stellate::core {
 
-// The vertices of a mesh, sorted into cubes as wide as the radius that they are asked within, along
-// the coordinates in which they spread most. Const queries may run in parallel.
+// Finds the vertices of a mesh within a fixed radius of a point. The vertices are sorted into cubes
+// as wide as the radius, along the coordinates in which they spread most. Const queries may run in
+// parallel.
+//
+//   VertexGrid grid(mesh, radius);
+//   grid.ForEachAround(q, [](std::uint32_t v, double distance2) { ... });
 class VertexGrid {
  public:
   VertexGrid(const MeshView& mesh, double radius);
 
-  // visit(v, |q - v|^2) for each vertex with |q - v| < radius, in a fixed order.
+  // Calls visit(v, |q - v|^2) for each vertex with |q - v| < radius, in a fixed order.
   template <typename Visit>
   void ForEachAround(const double* q, const Visit& visit) const {
     std::array<std::int64_t, kMaxAxes> low{}, high{}, at{};
-    std::array<double, kMaxAxes> there{};  // q along the axes; 0 along such as there are not
+    std::array<double, kMaxAxes> there{};  // q along the axes; 0 beyond the last
     for (int a = 0; a < axes_; ++a) {
       there[a] = q[coordinate_[a]];
       const double place = (there[a] - lower_[a]) * cells_per_length_;

@@ -30,8 +30,8 @@ void Lower(std::atomic<double>& extreme, double value) {
   }
 }
 
-// What R1 bounds where a vertex is guarded: the largest distance of a vertex from the orthocentre,
-// from which all have the same power.
+// What R1 bounds if a vertex has a protecting ball: the largest distance of a vertex from the
+// orthocentre, the point of equal power to all vertices.
 double RadiusAmongProtected(const MeshView& mesh, const std::uint32_t* ids) {
   const Eigen::Map<const Eigen::VectorXd> first(mesh.Point(ids[0]), mesh.d);
   Eigen::MatrixXd edges(mesh.d, mesh.k);

@@ -31,14 +31,18 @@ struct MeshShape {
 };
 inline constexpr double kTiltError = 1e-9;
 
-// Seeks the extremes while the stars of a mesh are gone through. Gram matrices tell of most
-// simplices that they are none; what may be one is measured again by its frame, to the last digit.
-// What is found does not depend on the order.
+// Finds the extremes in one pass over the stars of a mesh. Gram matrices exclude most simplices;
+// one that may be extreme is measured again by its frame, to the last digit. The result does not
+// depend on the order.
+//
+//   search.Measure(s, gram, shortest2, longest2, &part);  // once for each simplex
+//   search.Tilt(s, v, gram, columns, &part);              // once for each of its vertices
+//   MeshShape shape = search.Conclude(parts);
 class ShapeSearch {
  public:
   ShapeSearch(const MeshView& mesh, const SimplexList& list);
 
-  // Of some of the simplices: one for each thread.
+  // The extremes of some of the simplices: one for each thread.
   struct Part {
     double circumradius = 0, diameter = 0, radius_edge = 0;
     double fatness = std::numeric_limits<double>::infinity();
@@ -47,7 +51,8 @@ class ShapeSearch {
     SimplexFrame frame;                      // working memory
   };
 
-  // Once for each simplex. `gram`: null where it says little. Edges are squared lengths.
+  // Measures a simplex; call it once for each. `gram`: null if it is too ill-conditioned to use.
+  // Edges are squared lengths.
   template <int K>
   void Measure(std::uint32_t s, const SimplexGram<K>* gram, double shortest2, double longest2,
                Part* part) {
@@ -58,8 +63,9 @@ class ShapeSearch {
     MeasureByFrame(s, part);
   }
 
-  // Once for each vertex of each simplex, by different threads perhaps. `gram`: as above;
-  // `columns`: the edges that it is of, in tangent coordinates of the vertex.
+  // Measures the tilt of a simplex from the tangent space at one of its vertices; call it once for
+  // each vertex, from any thread. `gram`: as above. `columns`: the edges of the Gram matrix in
+  // tangent coordinates of the vertex.
   template <int K>
   void Tilt(std::uint32_t s, std::uint32_t vertex, const SimplexGram<K>* gram,
             const std::array<const double*, K>& columns, Part* part) {

@@ -15,14 +15,15 @@ inline bool IsTellingDeterminant(double determinant, double lengths2) {
 }
 
 // A linear system of at most kMaxDimension unknowns, solved in place by elimination with row
-// pivoting. Inner loop of the tests that ask on which side, or inside which simplex, a point is.
+// pivoting: the inner loop of tests that decide on which side of a simplex, or inside which, a
+// point is.
 struct SmallSystem {
   std::array<std::array<double, kMaxDimension>, kMaxDimension> a;  // a[row][column]
   std::array<double, kMaxDimension> b;                             // right side, then solution
 
-  // The determinant's sign, with the solution in b; 0, b undefined, when the determinant is
-  // within rounding of zero: below 1e-12 of the product of the column lengths. `n` unknowns: an
-  // int, or a std::integral_constant where it is known early.
+  // Returns the determinant's sign, with the solution in b; 0, with b undefined, if the determinant
+  // is within rounding of zero: below 1e-12 of the product of the column lengths. `n`: the number
+  // of unknowns, an int or, if the compiler knows it, a std::integral_constant.
   template <typename Number>
   int Solve(Number n) {
     double lengths2 = 1;

@@ -12,11 +12,10 @@
 
 namespace stellate::core {
 
-// What the stars look like from the tangent spaces of their centres, and the shapes of their
-// simplices.
+// How the stars look in the tangent spaces of their centres, and the shapes of their simplices.
 struct StarGeometry {
   // Stars whose projection on the tangent space of their centre is not an embedding. Consistency
-  // alone does not exclude them when simplices are judged at common centres.
+  // alone does not exclude them with CentreRule::kCommonCentre.
   std::uint64_t unembedded_stars = 0;
   std::string first_unembedded;                // plain words; empty if none
   std::vector<std::uint32_t> some_unembedded;  // the first Violations::kMost of their centres
@@ -30,11 +29,11 @@ struct StarGeometry {
   MeshShape shape;
 };
 
-// A star embeds when simplices that share a facet through its centre p lie on opposite sides of
-// it in T_pM, and one generic ray from p meets exactly one simplex: the first makes the radial
-// projection of the link a covering of the sphere of directions, the second makes it one-sheeted.
-// `orientation`: of a closed mesh, as Connectivity has it, makes the first question quick; empty if
-// there is none. Time linear in the mesh.
+// Measures all stars. A star embeds if simplices that share a facet through its centre p lie on
+// opposite sides of it in T_pM, and one generic ray from p meets exactly one simplex: the first
+// makes the radial projection of the link a covering of the sphere of directions, the second makes
+// it one-sheeted. `orientation`: of a closed mesh, as in Connectivity, makes the first test faster;
+// empty if there is none. Time linear in the mesh.
 StarGeometry MeasureStars(const MeshView& mesh, const Adjacency& adjacency,
                           std::span<const std::int8_t> orientation = {});
 
@@ -45,10 +44,10 @@ struct EmbeddedStars {
   std::int64_t euler_characteristic = 0;
 };
 
-// That the complex is one, without asking who is whose neighbour: each star says so of the facets
-// and the link of its centre. None if it is not one, or if this cannot be told so: for k > 3, of
-// manifolds with boundary, and of very large stars. MeasureStars then says what is wrong. Time
-// linear in the mesh.
+// Decides without an adjacency whether the complex is a closed manifold whose stars embed: each
+// star decides for the facets and the link of its centre. Returns nothing if it is not, or if stars
+// alone do not decide: for k > 3, for manifolds with boundary, and for very large stars.
+// MeasureStars then says what is wrong. Time linear in the mesh.
 std::optional<EmbeddedStars> MeasureIfEmbedded(const MeshView& mesh, const VertexStars& stars);
 
 }  // namespace stellate::core

@@ -23,14 +23,14 @@
 
 namespace stellate::core {
 
-// The one pass over the stars of a mesh that star_geometry.h makes.
+// The pass over the stars of a mesh that star_geometry.h makes.
 
-// Shorter edges than this share of the longest at a vertex say little of curvature and much of
-// the oracle's noise.
+// Edges shorter than this share of the longest at a vertex show the oracle's noise more than
+// curvature.
 inline constexpr double kTellingEdge = 0.5;
 // A solution this little below zero, beside its largest entry, still counts as a hit of the ray.
 inline constexpr double kRayTolerance = 1e-12;
-// LocalLink knows what a sphere is up to this k.
+// LocalLink decides up to this k.
 inline constexpr int kMostLocal = 3;
 inline constexpr const char* kFolded = "folds over itself in its tangent space";
 
@@ -47,13 +47,14 @@ struct Sweep {
   std::atomic<bool> is_refuted = false;
 };
 
-// What the stars of some of the vertices say.
+// The result for some of the vertices.
 struct PartOfStars {
   StarGeometry stars;
   ShapeSearch::Part shape;
   std::uint64_t neighbours = 0;  // of the vertices, in all
 };
 
+// Measures the stars of the vertices from `begin` to `end`, one thread's part of the pass.
 template <int K>
 class StarMeasurer {
  public:
@@ -97,8 +98,8 @@ class StarMeasurer {
     std::uint32_t id;
   };
 
-  // p's neighbours as p sees them, each once; by simplex of the star, which they are. d is a
-  // constant where it is usual.
+  // Lists p's neighbours once each, in p's tangent coordinates, and the neighbours of each simplex
+  // of the star. d is a constant for usual dimensions.
   [[gnu::always_inline]] void Project(std::uint32_t p, int d) {
     star_ = stars_.Star(p);
     index_.Clear(star_.size());
@@ -154,8 +155,7 @@ class StarMeasurer {
     return offsets_.data() + std::size_t{number} * static_cast<std::size_t>(d);
   }
 
-  // Of the star's simplices how they lean from the tangent space, and the shapes of those that p is
-  // the lowest vertex of.
+  // Measures the tilts of the star's simplices, and the shapes of those whose lowest vertex is p.
   [[gnu::always_inline]] void MeasureShapes(std::uint32_t p, int d) {
     const std::uint32_t* column = columns_.data();
     SimplexGram<K> gram;
@@ -176,8 +176,8 @@ class StarMeasurer {
     }
   }
 
-  // The Gram matrix of edges from a simplex' lowest vertex, whose squares it has, by the lengths of
-  // the others; returns the shortest and the longest of all, squared.
+  // Completes the Gram matrix of edges from a simplex's lowest vertex, whose diagonal is given, by
+  // the lengths of the other edges. Returns the shortest and the longest edge, squared.
   [[gnu::always_inline]] std::pair<double, double> TakeEdges(const std::uint32_t* ids, int d,
                                                              SimplexGram<K>* gram) const {
     double shortest2 = std::numeric_limits<double>::infinity(), longest2 = 0;
@@ -213,16 +213,16 @@ class StarMeasurer {
     }
   }
 
-  // Of a vertex of the boundary: how far a neighbour is beyond the tangent cone, squared, at least:
-  // the manifold bends back over its own boundary there.
+  // Returns for a boundary vertex how far a neighbour is beyond the tangent cone, squared, at
+  // least: the manifold bends back over its own boundary there.
   double Beyond2(std::uint32_t p, const Neighbour& n) const {
     if (CountWalls(mesh_.WallsOf(p)) != 1) return 0;
     const double beyond = Dot(mesh_.Outward(p), n.u, K);
     return beyond > 0 ? beyond * beyond : 0;
   }
 
-  // The tangent coordinates of the other vertices of the star's m-th simplex, in the order of their
-  // ids.
+  // Returns the tangent coordinates of the other vertices of the star's m-th simplex, by ascending
+  // id.
   Columns<K> ColumnsOf(std::size_t m) const {
     Columns<K> u;
     for (int c = 0; c < K; ++c) u[c] = neighbours_[columns_[m * K + static_cast<std::size_t>(c)]].u;
@@ -237,7 +237,7 @@ class StarMeasurer {
     if (result_.unembedded_stars <= Violations::kMost) result_.some_unembedded.push_back(p);
   }
 
-  // Whether the star embeds and its link is a sphere; then it tells how it orients its simplices.
+  // Whether the star embeds and its link is a sphere. If so, notes how it orients its simplices.
   bool Embeds(std::uint32_t p) {
     if constexpr (K <= kMostLocal) {
       if (WhyNotEmbedded(p)) return false;
@@ -282,7 +282,7 @@ class StarMeasurer {
                : nullptr;
   }
 
-  // Of a vertex of the boundary: whether a simplex of its star meets the ray outward.
+  // Whether a simplex in the star of a boundary vertex meets the outward ray.
   bool HasSimplexOutward(std::uint32_t p) const {
     std::array<double, K> ray;
     std::copy_n(mesh_.Outward(p), K, ray.begin());
@@ -294,8 +294,8 @@ class StarMeasurer {
     return false;
   }
 
-  // Projected, all simplices of the star must be oriented alike, or all against the orientation of
-  // the mesh: p's place decides the sign with p moved to the front.
+  // The projected simplices of the star must all have the orientation of the mesh, or all the
+  // opposite: p's place decides the sign with p moved to the front.
   bool IsOriented(std::uint32_t p) const {
     const auto star = star_;
     int all = 0;
@@ -310,12 +310,12 @@ class StarMeasurer {
   }
 
   const char* WhyFolded(std::uint32_t p) const {
-    if (!sweep_.adjacency) return nullptr;  // the link says so
+    if (!sweep_.adjacency) return nullptr;  // LocalLink decides
     if (sweep_.orientation.empty()) return WhyFoldedAtFacets(p);
     return IsOriented(p) ? nullptr : kFolded;
   }
 
-  // Without an orientation, facet by facet.
+  // Decides without an orientation, facet by facet.
   const char* WhyFoldedAtFacets(std::uint32_t p) const {
     const Adjacency& adjacency = *sweep_.adjacency;
     const auto star = star_;

@@ -44,7 +44,7 @@ TEST(Proof, FailsForAReachThatTheTrianglesAreTooLargeFor) {
   EXPECT_TRUE(Prove(mesh, 1).holds);
   const Proof proof = Prove(mesh, 0.3);
   EXPECT_FALSE(proof.holds);
-  EXPECT_TRUE(Says(proof.obstacle, "leans by")) << proof.obstacle;
+  EXPECT_TRUE(Says(proof.obstacle, "is tilted by")) << proof.obstacle;
   EXPECT_TRUE(Says(proof.obstacle, "reach")) << proof.obstacle;
 }
 
