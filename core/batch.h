@@ -18,7 +18,7 @@ enum class QueryKind {
   kIntersectFlat,  // the point of M nearest to c in the flat c + T^perp, within a radius
 };
 
-// One array of a block. Columns of it belong to queries, or it is missing: it then has none.
+// The arrays of a block. An array has a column for each query, or is missing and has none.
 namespace columns {
 
 template <typename Array>
@@ -32,7 +32,7 @@ inline Eigen::Index Count(const std::vector<std::uint8_t>& array) {
   return static_cast<Eigen::Index>(array.size());
 }
 
-// Numbers that a query has in it.
+// How many numbers each query has in the array.
 template <typename Array>
 Eigen::Index Rows(const Array& array) {
   if constexpr (Array::ColsAtCompileTime == 1)
@@ -70,8 +70,8 @@ inline void Put(const std::vector<std::uint8_t>& some, Eigen::Index first,
 
 }  // namespace columns
 
-// Queries of one kind. Column j is query j. Memory order is the wire's: points are n x d and bases
-// n x d x k in C order, so conversion is a copy.
+// Queries of one kind. Column j is query j. The memory order is the wire's: points are n x d and
+// bases n x d x k in C order, so that conversion is a copy.
 struct QueryBlock {
   QueryKind kind = QueryKind::kClosestPoint;
   Eigen::MatrixXd points;      // d x n: x, or the flat's point c
@@ -80,14 +80,14 @@ struct QueryBlock {
   Eigen::VectorXd radii;       // n, kIntersectFlat only: look no farther than this from c
   bool want_tangents = false;  // the answers must carry tangent bases
   bool want_sizes = false;     // ... and local sizes
-  // Of manifolds with boundary: the face whose points are asked for, those of M^ where g_i = 0 for
-  // its walls, whatever the other walls say. M^ itself for none.
+  // For manifolds with boundary: the face to query, the points of M^ where g_i = 0 for its walls,
+  // for any values of the other walls; 0: M^ itself.
   WallSet face = 0;
   bool want_clearances = false;  // the answers must carry clearances, and conormals on a face
 
   Eigen::Index size() const { return points.cols(); }
 
-  // f(&QueryBlock::array) for each array. What is not an array is the same for all queries.
+  // Calls f(&QueryBlock::array) for each array. All other members are the same for all queries.
   template <typename F>
   static void ForEachField(const F& f) {
     // Names all members: a new one does not compile before it is given its place here.
@@ -100,7 +100,7 @@ struct QueryBlock {
     f(&QueryBlock::radii);
   }
 
-  // Queries [first, first + count), asked in the same way.
+  // Returns the queries [first, first + count).
   QueryBlock Rows(Eigen::Index first, Eigen::Index count) const;
 };
 
@@ -116,19 +116,20 @@ struct QueryBatch {
   }
 };
 
+// The answers to a block, or to a contiguous part of it. Column j is the answer to query j.
 struct AnswerBlock {
   Eigen::MatrixXd points;           // d x n; ignored where not found
   std::vector<std::uint8_t> found;  // n, 1 or 0; empty: all found
   Eigen::MatrixXd tangents;         // (d k) x n laid out as QueryBlock::bases, or empty
   Eigen::VectorXd sizes;            // n lengths, of the points; ignored where not found; or empty
-  Eigen::MatrixXd clearances;  // walls x n: g_i at the points; what counts is the sign; or empty
+  Eigen::MatrixXd clearances;       // walls x n: g_i at the points; their signs count; or empty
   // (|face| d) x n: for each wall of the face, ascending, its outward unit normal within the
   // tangent space of M^; or empty
   Eigen::MatrixXd conormals;
 
   Eigen::Index size() const { return points.cols(); }
 
-  // f(&AnswerBlock::array) for each array, in the order of declaration.
+  // Calls f(&AnswerBlock::array) for each array, in the order of declaration.
   template <typename F>
   static void ForEachField(const F& f) {
     // Names all members: a new one does not compile before it is given its place here.
@@ -143,15 +144,16 @@ struct AnswerBlock {
     f(&AnswerBlock::conormals);
   }
 
-  // To `count` queries asked as those of `block` are: all that these want, zero and found.
+  // Returns answers of the shape that `count` queries of `block` want: all zero, all found.
   static AnswerBlock Shape(int dimension, int walls, const QueryBlock& block, Eigen::Index count);
-  // The answers to queries [first, first + count).
+  // Returns the answers to queries [first, first + count).
   AnswerBlock Rows(Eigen::Index first, Eigen::Index count) const;
-  // Overwrites those from `first` on by `some`. An array that is missing in either, or is of
-  // another shape, stays as it is: what is more than was asked for is left out, and what is missing
-  // where nothing was found is not missed.
+  // Overwrites the answers from `first` on by `some`. An array that is missing in one of the two,
+  // or has another shape, is not changed: arrays that no query wanted are left out, and arrays may
+  // be missing if no point was found.
   void Put(Eigen::Index first, const AnswerBlock& some);
-  // No array but has a column for each point, and as many rows as that of `shape`, or is missing.
+  // Whether each array either is missing, or has a column for each point and as many rows as that
+  // of `shape`.
   bool Fits(const AnswerBlock& shape) const;
 };
 
@@ -159,7 +161,7 @@ struct Answers {
   std::vector<AnswerBlock> blocks;  // one for each block of the batch, in its order
 };
 
-// Of one query of a block, or of one answer.
+// Returns the bytes of one query of a block, or of one answer.
 template <typename Block>
 std::size_t BytesPerQuery(const Block& block) {
   std::size_t bytes = 0;
@@ -172,9 +174,9 @@ std::size_t BytesPerQuery(const Block& block) {
   return bytes;
 }
 
-// What CheckAnswers forgives. A client solves equations, so its answers are right to some solver
-// tolerance and no better; each bound is far above a careful solver's error and far below what
-// could change a mesh. All scale with the query, so that units do not matter.
+// The tolerances of CheckAnswers. A client solves equations, so its answers are right to some
+// solver tolerance; each bound is far above a careful solver's error and far below what could
+// change a mesh. All scale with the query, so that units do not matter.
 
 // How far an intersection y may lie off its flat, |T^t (y - c)|, as a share of the radius asked.
 inline constexpr double kFlatTolerance = 1e-6;
@@ -186,8 +188,8 @@ inline constexpr double kRadiusTolerance = 1e-6;
 inline constexpr double kOrthonormalTolerance = 1e-6;
 // How far a conormal may be from a unit tangent vector: directions wrong by 0.2 do no harm.
 inline constexpr double kConormalTolerance = 1e-3;
-// Least eigenvalue of the Gram matrix of the conormals that meet in a point: walls that cross at
-// less than some 14 degrees.
+// The least eigenvalue that the Gram matrix of the conormals at a point may have: walls must cross
+// at some 14 degrees at least.
 inline constexpr double kLeastTransversality = 0.03;
 // How much two answers' sizes at one point may differ, as a share of the larger: sizes guide the
 // mesh and need not be exact, but must be a function of the point.
@@ -196,14 +198,14 @@ inline constexpr double kSameSizeTolerance = 0.1;
 // to a point far from the origin.
 inline constexpr double kRoundingTolerance = 1e-13;
 
-// Checks the answers to queries [first, first + answer.points.cols()) of `block` against what can
-// be checked without asking again: counts, finiteness, on the flat, within the radius, orthonormal
+// Checks the answers to queries [first, first + answer.points.cols()) of `block`, as far as one
+// answer alone can be checked: counts, finite numbers, on the flat, within the radius, orthonormal
 // tangents, positive sizes. The message holds the query's index in the block, the value and the
-// rule broken. Pure; any thread. Cost O(n d k^2).
+// broken rule. Pure; any thread. Cost O(n d k^2).
 Status CheckAnswers(const Specification& spec, const QueryBlock& block, Eigen::Index first,
                     const AnswerBlock& answer);
 
-// Whether two sizes may be of one point.
+// Whether two sizes may belong to one point.
 inline bool AreOneSize(double a, double b) {
   return std::abs(a - b) <= kSameSizeTolerance * std::max(a, b);
 }

@@ -11,9 +11,8 @@
 
 namespace stellate::core {
 
-// The epsilon-refinement of Chapter 5 as a state machine that asks.
-//
-// It never calls an oracle. It hands out the queries of one round and takes their answers:
+// The epsilon-refinement of Chapter 5 as a state machine. It never calls an oracle: it gives the
+// queries of one round and takes their answers.
 //
 //   auto mesher = Mesher::Create(spec);
 //   while (const QueryBatch* batch = (*mesher)->NextBatch()) {
@@ -21,19 +20,19 @@ namespace stellate::core {
 //   }
 //   const Report& report = (*mesher)->report();
 //
-// Deterministic: the specification and the answers determine the mesh bit for bit, whatever
-// Specification::threads. One thread at a time may use a Mesher, except that any may call
+// Deterministic: the specification and the answers determine the mesh bit for bit, for any
+// Specification::threads. One thread at a time may use a Mesher, except that any thread may call
 // Interrupt; nothing here blocks, logs or reads a clock.
 class Mesher {
  public:
-  // Errors: those of Validate(spec).
+  // Returns a mesher before its first round. Errors: those of Validate(spec).
   static Expected<std::unique_ptr<Mesher>> Create(Specification spec);
   virtual ~Mesher() = default;
 
-  // The queries of the next round, or nullptr when the run is over. The batch stays the same, and
-  // the pointer valid, until Absorb, Cancel or Fail.
+  // Returns the queries of the next round, or nullptr once the run is over. The batch does not
+  // change, and the pointer is valid, until Absorb, Cancel or Fail.
   virtual const QueryBatch* NextBatch() = 0;
-  // The same, if you need it after Absorb: it lives as long as its pointers.
+  // Returns the same as a shared pointer, for use after Absorb.
   virtual std::shared_ptr<const QueryBatch> ShareBatch() {
     const QueryBatch* const batch = NextBatch();
     return batch == nullptr ? nullptr : std::make_shared<const QueryBatch>(*batch);
@@ -44,12 +43,11 @@ class Mesher {
   // answered again, or Fail called.
   virtual Expected<MeshDelta> Absorb(const Answers& answers) = 0;
 
-  // Makes an Absorb under way, and every later one, return soon, refused with kCancelled. All that
-  // can be done with the mesh then is to cancel it. The one call that any thread may make at any
-  // time.
+  // Makes an Absorb under way, and every later one, return soon with kCancelled. The mesh can then
+  // only be cancelled. Any thread may call this at any time.
   virtual void Interrupt() = 0;
 
-  // End the run now, with the mesh as it stands. No effect once it is over.
+  // End the run now and keep the mesh as it is. No effect once it is over.
   virtual void Cancel() = 0;
   virtual void Fail(Status reason) = 0;
 
@@ -57,7 +55,7 @@ class Mesher {
   virtual const Progress& progress() const = 0;
   virtual const Report& report() const = 0;  // complete once NextBatch returned nullptr
 
-  // The mesh as it stands: points d x n, tangent bases (d k) x n laid out as QueryBlock::bases,
+  // Copy the current mesh: points d x n, tangent bases (d k) x n laid out as QueryBlock::bases,
   // simplices of k+1 ascending vertex ids each, in the order of their lowest vertex.
   virtual Eigen::MatrixXd Points() const = 0;
   virtual Eigen::MatrixXd Tangents() const = 0;

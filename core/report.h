@@ -11,22 +11,22 @@
 
 namespace stellate::core {
 
-// How a run ended. Every ending but kConverged leaves a mesh that is not certified.
+// How a run ended. Only kConverged can leave a certified mesh.
 enum class Termination {
   kRunning = 0,
-  kConverged,     // no rule applies any more
+  kConverged,     // no rule is broken
   kVertexBudget,  // Limits::max_vertices reached
   kRoundBudget,   // Limits::max_rounds reached
   kCancelled,     // Mesher::Cancel was called
   kOracleFailed,  // Mesher::Fail was called, or no seed has a closest point
-  kNoProgress,    // rules still apply, but refinement no longer helps; see Counts
+  kNoProgress,    // rules are still broken, but refinement no longer helps; see Counts
 };
 const char* TerminationName(Termination t);  // "CONVERGED", ...
 
 enum class Phase { kSeeding = 0, kRefining, kCertifying, kDone };
 const char* PhaseName(Phase p);  // "SEEDING", ...
 
-// A cheap picture of a running mesh. After the last round it is final.
+// The state of a running mesh, cheap to read. It is final after the last round.
 struct Progress {
   Phase phase = Phase::kSeeding;
   std::uint64_t round = 0;    // batches absorbed
@@ -39,13 +39,13 @@ struct Progress {
   std::uint64_t bad_sliver = 0;        // ... R3
   std::uint64_t bad_inconsistent = 0;  // ... R4; R3 and R4 are counted once R1 and R2 hold
   double fraction = 0;                 // estimated share of the work done, 0..1; never falls
-  bool is_foreseeable = false;         // the fraction tells how long the rest will take
+  bool is_foreseeable = false;         // the fraction allows to estimate how long the rest takes
 };
 
-// What changed in one round. Vertex ids count up from 0 and never change. While the mesh grows, a
-// simplex is in it when the star of its lowest vertex holds it; once all stars are consistent that
-// is the union of the stars. For k >= 4 the last delta may put other simplices in the place of the
-// few that stars still disagree about (core/complex/cavities.h).
+// What changed in one round. Vertex ids count up from 0 and never change. While the mesh grows, it
+// contains a simplex if the star of its lowest vertex does; once all stars are consistent that is
+// the union of the stars. For k >= 4 the last delta may replace the few simplices about which stars
+// still disagree (core/complex/cavities.h).
 struct MeshDelta {
   std::uint64_t revision = 0;                 // 1, 2, ...: one a round
   std::uint64_t first_vertex = 0;             // id of the first new vertex
@@ -66,15 +66,15 @@ struct Counts {
   std::uint64_t duplicates = 0;             // answers that fell on an existing sample point
 };
 
-// The mesh of a face: its simplices, whose vertices are all on its walls, dimension + 1 ascending
-// vertex ids each, sorted. The boundary is made of the faces of one wall.
+// The mesh of a face: its simplices, dimension + 1 ascending vertex ids each, sorted; all vertices
+// are on the face's walls. The boundary is the union of the faces of one wall.
 struct FaceMesh {
   WallSet walls = 0;
   int dimension = 0;
   std::vector<std::uint32_t> simplices;
 };
 
-// What a certificate says of a face.
+// A face in the certificate.
 struct FaceReport {
   WallSet walls = 0;
   int dimension = 0;
@@ -98,12 +98,13 @@ enum class CertificateLevel {
 };
 const char* CertificateLevelName(CertificateLevel level);  // "SAMPLED", ...
 
-// Where a mesh is at fault: the first of each kind that the certificate counts, in ascending order.
+// The places where a mesh is wrong: the first of each kind that the certificate counts, in
+// ascending order.
 struct Violations {
   static constexpr std::size_t kMost = 100;  // of each kind
 
-  // k vertex ids each, of faces that are not in exactly two simplices; with a boundary the number
-  // of vertices stands for what is beyond it.
+  // The faces that are not in exactly two simplices, k vertex ids each. In a mesh with boundary,
+  // the number of vertices stands as an id for what is beyond the boundary.
   std::vector<std::uint32_t> faces;
   std::vector<std::uint32_t> links;         // vertices whose link is no sphere, or that have none
   std::vector<std::uint32_t> stars;         // vertices whose star overlaps itself, projected
@@ -111,7 +112,7 @@ struct Violations {
   std::vector<std::uint32_t> fibres;        // vertices near which a normal flat fails; ascending
 };
 
-// The certificate: computed from the finished complex and never assumed.
+// The certificate, computed from the finished complex; nothing in it is assumed.
 struct Certificate {
   bool certified = false;             // every claim below holds, and the run converged
   std::string verdict;                // plain words; the first thing wrong if not certified
@@ -141,7 +142,7 @@ struct Certificate {
   double estimated_reach = 0;            // length; an estimate from above
   double epsilon_over_reach = 0;  // graded sizes: the largest R_p over the local feature size
 
-  // Where the client declared a reach (Specification::declared_reach), else 0.
+  // If the client declared a reach (Specification::declared_reach), else 0.
   CertificateLevel level = CertificateLevel::kRefused;
   double declared_reach = 0;   // length
   bool reach_refuted = false;  // points of M contradict it: the verdict names them
@@ -152,18 +153,18 @@ struct Certificate {
   std::int64_t euler_characteristic = 0;
   bool orientable = false;
 
-  // Of manifolds with boundary: `closed` says then that each (k-1)-face is in two simplices, or in
-  // one and in the boundary; links are spheres inside and balls at the boundary.
+  // For manifolds with boundary, `closed` means that each (k-1)-face is in two simplices, or in one
+  // and in the boundary; links are spheres inside and balls at the boundary.
   std::uint64_t boundary_simplices = 0;  // of dimension k - 1
   std::uint64_t boundary_components = 0;
   std::int64_t boundary_euler_characteristic = 0;
-  std::vector<FaceReport> faces;  // those that there are, by dimension, the lowest first
-  // Of all vertices on several walls, the smallest angle; none: no walls meet. Set however the run
-  // ends.
+  std::vector<FaceReport> faces;  // all faces, by dimension, the lowest first
+  // The smallest angle of walls at all vertices on several walls; none: no walls meet. Set for
+  // every ending of a run.
   std::optional<WallAngle> sharpest;
 
-  bool only_too_coarse = false;  // refused for its size alone: nothing that was seen contradicts
-                                 // the mesh, which is too coarse for the reach to be certified
+  bool only_too_coarse = false;  // refused for its size alone: nothing contradicts the mesh, but it
+                                 // is too coarse, for the reach, to be certified
 
   Violations violations;
 };

@@ -173,17 +173,17 @@ Status CheckReach(const Specification& spec) {
   }
   if (!spec.cover_box) return Status::Ok();
   if (!spec.declared_reach || !spec.bounding_box || spec.seeds.cols() > 0) {
-    return Invalid(
-        "cover_box",
-        "cover_box is set: give declared_reach and bounding_box, by which the seeds are laid, and "
-        "no seeds");
+    return Invalid("cover_box",
+                   "cover_box is set: give declared_reach and bounding_box, by which the seeds are "
+                   "placed, and "
+                   "no seeds");
   }
   const double count = CoverCounts(spec).prod();
   const auto fit = kMaxBoxSeedCoordinates / spec.ambient_dimension;
   const double most = std::min<double>(kMaxBoxSeeds, static_cast<double>(fit));
   if (!(count <= most)) {
     return TooLarge("cover_box",
-                    Message("cover_box has to lay ", Brief(count), " seeds into this box for ",
+                    Message("cover_box has to place ", Brief(count), " seeds into this box for ",
                             "declared_reach = ", *spec.declared_reach, ", but at most ", most,
                             " may be: give a smaller box, or seeds on each component instead"));
   }

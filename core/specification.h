@@ -38,14 +38,14 @@ struct BoundingBox {
   Eigen::VectorXd lower, upper;  // d each
 };
 
-// Where a simplex of a star is tested against a new point.
+// The centre at which a simplex of a star is tested against a new point.
 enum class CentreRule {
   kTangentSpace,  // in each vertex's tangent space alone, as the thesis has it
   kCommonCentre,  // at one centre for all its vertices (core/geometry/common_centre.h)
 };
 
-// The constants of Chapter 5. The proofs' values are far too small to use; the defaults here are
-// the measured ones. nullopt means "the default for this k".
+// The constants of Chapter 5. The proofs' values are far too small to use; these defaults were
+// chosen by measurement. nullopt: the default for this k.
 struct Criteria {
   double radius_edge_bound = 2.0;         // rho0 of rule R2, no unit, > 1
   std::optional<double> sliver_bound;     // Theta0 of rule R3, no unit, in [0, 0.3]; 0 turns R3
@@ -63,18 +63,19 @@ struct Criteria {
                                           // bounding box's diagonal if that is more
   std::optional<CentreRule> centre_rule;  // default kTangentSpace for k <= 2 and for graded sizes,
                                           // else kCommonCentre
-  bool speculative = false;  // sample and refine on a surrogate of M first, then
-                             // query all those points in one batch: a handful of
-                             // round trips for up to three times the processor time
-  // Adaptive size: where the mesh must be finer than epsilon, which stays the upper bound. Both go
-  // by size(p), p a vertex:
-  // - what the client says of p, where OracleCapabilities::local_size: its local feature size or
-  //   another positive length, taken as it is. Nothing is assumed of the field between vertices: a
-  //   dip that no vertex falls into goes unseen, which a 1-Lipschitz field does not have where the
-  //   rate is below 1. Never finer than epsilon / 1024; a field that asks for more is a warning.
+  bool speculative = false;               // sample and refine on a surrogate of M first, then
+                                          // query all those points in one batch: a handful of
+                                          // round trips for up to three times the processor time
+  // Graded sizes: where the mesh must be finer than epsilon, which stays the upper bound. Both
+  // criteria use size(p), p a vertex:
+  // - with OracleCapabilities::local_size, the client's value at p: its local feature size or any
+  //   other positive length, taken as it is. Nothing is assumed of the field between vertices: a
+  //   dip between vertices is missed; a 1-Lipschitz field has none if the rate is below 1. Never
+  //   finer than epsilon / 1024; a field that asks for more is a warning.
   // - else the local feature size that the sample shows: the smallest |q - p|^2 / (2 dist(q, T_pM))
-  //   over a star, made 1-Lipschitz over neighbours. It sees curvature, not another sheet coming
-  //   near, and is never finer than epsilon / 64, since noise in the answers looks like curvature.
+  //   over a star, made 1-Lipschitz over neighbours. It detects curvature, but no second sheet
+  //   nearby, and is never finer than epsilon / 64, since noise in the answers looks like
+  //   curvature.
   std::optional<double> size_rate;      // R_p <= size_rate * size(p), no unit, in (0, 1]
   std::optional<double> max_deviation;  // the Hausdorff target, a length, > 0: R_p^2 / (2
                                         // size(p)), the circumcentre's distance to M, stays
@@ -85,7 +86,7 @@ struct Criteria {
 
 // How much a certificate asks of the oracle.
 enum class Audit {
-  kStandard,  // a few thousand questions, whatever the size of the mesh
+  kStandard,  // a few thousand queries, for a mesh of any size
   kThorough,  // about every vertex and every simplex
 };
 
@@ -96,7 +97,11 @@ struct Limits {
                                         // mesh; 0: no limit
 };
 
-// All that determines a mesh, together with the answers.
+// All that determines a mesh besides the answers.
+//
+//   Specification spec;
+//   spec.dimension = 2, spec.ambient_dimension = 3, spec.epsilon = 0.1;
+//   spec.seeds = points_near_m;  // 3 x m
 struct Specification {
   int dimension = 0;          // k
   int ambient_dimension = 0;  // d, k < d
@@ -106,7 +111,7 @@ struct Specification {
   std::optional<BoundingBox> bounding_box;  // seeds are drawn from it when none are given
   Eigen::MatrixXd seeds;                    // d x m, near M, may be empty
   int box_seeds = 0;                        // points drawn from the box; 0: the default
-  int components = 0;  // that M has at least; a mesh with fewer is refused. 0: not known
+  int components = 0;  // M has at least these; a mesh with fewer is refused. 0: not known
   // The client promises that M's reach is at least this, a length: the mesh is refined until that
   // promise and the mesh prove its topology (core/certificate/claims/proof.h), or refute the
   // promise.
@@ -121,12 +126,12 @@ struct Specification {
   int threads = 0;  // 0: all cores. Never changes the mesh.
 };
 
-// The seeds that cover the box, d x n: every point of it is nearer than the declared reach to one,
-// so that the component of M which a point of M in the box belongs to is nearest to that one.
-// Columns 0 where `cover_box` is not set.
+// Returns the seeds that cover the box, d x n: each point of the box is nearer than the declared
+// reach to a seed. For a point of M in the box, that seed's closest point lies on the same
+// component of M. No columns if `cover_box` is not set.
 Eigen::MatrixXd CoverOfBox(const Specification& spec);
 
-// kInvalidArgument or kLimitExceeded with the offending field and value, else Ok.
+// Returns kInvalidArgument or kLimitExceeded with the offending field and value, else Ok.
 Status Validate(const Specification& spec);
 
 }  // namespace stellate::core

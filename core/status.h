@@ -6,7 +6,7 @@
 
 namespace stellate::core {
 
-// Why the core refuses something. One table in server/ maps these to gRPC codes.
+// The reason of a refusal. One table in server/ maps these to gRPC codes.
 enum class StatusCode {
   kOk = 0,
   kInvalidArgument,      // a specification that makes no sense: fix it, then try again
@@ -30,7 +30,7 @@ enum class StatusCode {
 struct Status {
   StatusCode code = StatusCode::kOk;
   std::string message;
-  std::string field{};  // of a Specification, "criteria.candidates": the one at fault, or empty
+  std::string field{};  // the wrong field of a Specification, "criteria.candidates", or empty
 
   bool ok() const { return code == StatusCode::kOk; }
   static Status Ok() { return {}; }

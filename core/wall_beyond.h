@@ -6,8 +6,8 @@
 
 namespace stellate::core {
 
-// The wall that a point of a face lies beyond, of those that the face is not on: by the most. None:
-// the point is in M. `clearances`: of all `walls` at the point.
+// Returns the wall that a point of a face violates most, or nothing if the point is in M. The walls
+// of the face itself do not count. `clearances`: of all `walls` at the point.
 inline std::optional<int> WallBeyond(const double* clearances, int walls, WallSet face) {
   std::optional<int> beyond;
   for (int wall = 0; wall < walls; ++wall)

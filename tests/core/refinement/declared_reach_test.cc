@@ -200,7 +200,7 @@ TEST(DeclaredReach, IsRefusedWhereItMakesNoSense) {
   spec.declared_reach = 1e-3;
   const Status status = Validate(spec);
   EXPECT_EQ(status.code, StatusCode::kLimitExceeded);
-  EXPECT_TRUE(Says(status.message, "cover_box has to lay")) << status.message;
+  EXPECT_TRUE(Says(status.message, "cover_box has to place")) << status.message;
 }
 
 }  // namespace

@@ -55,5 +55,5 @@ def test_what_makes_no_sense_is_refused(keywords, words):
 
 
 def test_a_box_that_takes_too_many_seeds_is_refused_with_their_number():
-    with pytest.raises(stellate.LimitExceeded, match="cover_box has to lay"):
+    with pytest.raises(stellate.LimitExceeded, match="cover_box has to place"):
         stellate.mesh(SphereInABox(), 0.3, reach=1e-3, cover_box=True)
