@@ -43,7 +43,7 @@ void Substitute(const double (&factor)[K][K], double* x) {
   }
 }
 
-// Room for `count` vectors of R^d, D = d where that is known early: on the stack then.
+// Memory of `count` vectors of R^d: on the stack if the compiler knows D = d.
 template <int D, int count>
 class Vectors {
  public:
@@ -155,8 +155,8 @@ void DropAlong(int d, const double* const* edge, const double (&factor)[K][K], d
 // Enough for simplices along the tangent spaces, where each turn leaves a small share of the gap.
 constexpr int kTurnsToHeight = 5;
 
-// The centre again, for simplices that are large beside the reach. `away` has room for d numbers,
-// `rows` for 2 K d.
+// Computes the centre for simplices that are large compared with the reach. `away` holds d numbers,
+// `rows` 2 K d.
 template <int K>
 bool TurnedLift(int d, const double* const* tangents, const double* const* edge,
                 const double (&factor)[K][K], const double* barycentric, const double* centre,

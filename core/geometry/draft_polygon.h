@@ -14,12 +14,17 @@
 
 namespace stellate::core {
 
-// A RestrictedVoronoiCell<2> in the making: it keeps its half-spaces, which the finished cell has
-// no room for, so that each is found once. The same polygon as by that class' own cuts, bit for bit
-// and vertex by vertex.
+// A RestrictedVoronoiCell<2> while it is being clipped. It keeps its half-spaces, which the
+// finished cell does not store, so that each is computed once. The polygon is the same as by that
+// class's own cuts, bit for bit and vertex by vertex.
+//
+//   DraftPolygon polygon;  // one for each thread: it reuses its memory
+//   polygon.Reset(inradius);
+//   for (q ...) polygon.Clip(q, normal, offset);
+//   cell.Take(polygon);
 class DraftPolygon {
  public:
-  // A regular triangle of fake facets at distance `inradius` from p.
+  // Begins with a regular triangle of fake facets at distance `inradius` from p.
   void Reset(double inradius) {
     if (inradius != inradius_) Begin(inradius);
     if (capacity_ == 0) Grow();
@@ -31,8 +36,8 @@ class DraftPolygon {
     max_norm2_ = 4 * inradius * inradius;
   }
 
-  // As a finished cell that nothing was judged in. That has no half-spaces: Clip finds those it
-  // needs.
+  // Begins with a finished cell, whose vertices are not judged. A cell has no half-spaces: Clip
+  // computes those it needs.
   void Resume(const RestrictedVoronoiCell<2>& cell) {
     count_ = cell.vertex_count();
     while (count_ > capacity_) Grow();
@@ -52,11 +57,11 @@ class DraftPolygon {
   std::uint32_t id(std::size_t facet) const { return sides_[facet].id; }
   double max_norm2() const { return max_norm2_; }
 
-  // Of a polygon that was not resumed.
+  // For a polygon that was not resumed: all half-spaces are known.
   struct KnowsAll {};
 
-  // The half-space of q in the tangent space at p, where they have these weights: writes the
-  // normal, returns the offset.
+  // Writes the normal of q's half-space in the tangent space at p, for points with these weights,
+  // and returns its offset.
   double HalfSpace(int any_d, const double* p, const double* tangent, double p_weight,
                    const double* q, double q_weight, double* normal) {
     return WithDimension(any_d, [&](auto known) {
@@ -64,7 +69,7 @@ class DraftPolygon {
     });
   }
 
-  // By that half-space; `find` as below.
+  // Clips by that half-space; `find` as below.
   template <typename Find = KnowsAll>
   bool ClipBy(std::uint32_t id, int any_d, const double* p, const double* tangent, double p_weight,
               const double* q, double q_weight, const Find& find = {}) {
@@ -75,15 +80,15 @@ class DraftPolygon {
     });
   }
 
-  // As RestrictedVoronoiCell<2>::Clip. find(id, normal) is the half-space of a facet that the cell
-  // had before Resume.
+  // Clips as RestrictedVoronoiCell<2>::Clip does. find(id, normal) writes the normal of a facet
+  // that the resumed cell had, and returns its offset.
   template <typename Find = KnowsAll>
   bool Clip(std::uint32_t id, const double* normal, double offset, const Find& find = {}) {
     const std::size_t count = count_;
     const double a = normal[0], b = normal[1];
     const double *const x = x_.data(), *const y = y_.data();
     double* const excess = excess_.data();
-    for (std::size_t v = 0; v < count; v += 2) {  // there is room for an even number
+    for (std::size_t v = 0; v < count; v += 2) {  // the capacity is even
       excess[v] = a * x[v] + b * y[v] - offset;
       excess[v + 1] = a * x[v + 1] + b * y[v + 1] - offset;
     }
@@ -173,7 +178,7 @@ class DraftPolygon {
     norm2_[v] = norm2;
   }
 
-  // Where a facet meets the cut, between a vertex that is kept and one that is not.
+  // Finds where a facet meets the cut, between a vertex that is kept and one that is removed.
   double Locate(const Side& side, std::size_t kept, std::size_t removed, const Side& cut,
                 double* created) const {
     const double at_kept[2] = {x_[kept], y_[kept]}, at_removed[2] = {x_[removed], y_[removed]};
@@ -190,8 +195,8 @@ class DraftPolygon {
     sides_[to] = sides_[from];
   }
 
-  // Makes room for the two that are created, and returns where: they take the place of the chain
-  // that is cut off, or, where it goes over the end, come last.
+  // Makes a gap for the two created vertices, and returns its place: that of the removed chain, or
+  // the end if the chain goes over the end.
   std::size_t Close(std::size_t first, std::size_t last, std::size_t cut) {
     const std::size_t count = count_;
     count_ = count - cut + 2;
@@ -208,11 +213,11 @@ class DraftPolygon {
   }
 
   double inradius_ = 0;
-  FakeCorner fake_[3];  // what it begins as
+  FakeCorner fake_[3];  // the triangle that it begins with
   std::size_t count_ = 0, capacity_ = 0;
   double max_norm2_ = 0;
   std::vector<double> x_, y_, norm2_, excess_;  // by vertex
-  std::vector<Side> sides_;                     // by vertex: the facet that goes on from it
+  std::vector<Side> sides_;                     // by vertex: the facet before it
   std::vector<double> step_;
 };
 

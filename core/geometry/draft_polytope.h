@@ -10,11 +10,16 @@
 
 namespace stellate::core {
 
-// A RestrictedVoronoiCell<3> in the making, in the flats. A vertex is the three facets that it is
-// on, and no more is kept while it is cut: who is next to whom is found once, when it is done. The
-// same polytope as by that class' own cuts, bit for bit, vertex by vertex and facet by facet. Of a
-// cut that takes away no plain disc of its border, which only rounding makes, it does not tell: it
-// gives up.
+// A RestrictedVoronoiCell<3> while it is being clipped in the tangent space. A vertex is stored as
+// its three facets alone; adjacent vertices are found once, when the polytope is complete. The
+// polytope is the same as by that class's own cuts, bit for bit, vertex by vertex and facet by
+// facet. A cut that does not remove a topological disc of the boundary (because of rounding) cannot
+// be represented: gave_up() becomes true.
+//
+//   DraftPolytope& polytope = ThreadPolytope();
+//   polytope.Reset(inradius);
+//   for (q ...) polytope.Clip(q, normal, offset);
+//   if (!polytope.gave_up()) cell.Take(polytope);
 class DraftPolytope {
  public:
   static constexpr std::size_t kMostFacets = 64;  // a bit each
@@ -27,10 +32,10 @@ class DraftPolytope {
   };
   using Corner = std::array<std::uint8_t, 3>;  // the facets of a vertex, in the order of its slots
 
-  // A regular tetrahedron of fake facets at distance `inradius` from p.
+  // Begins with a regular tetrahedron of fake facets at distance `inradius` from p.
   void Reset(double inradius);
 
-  // As RestrictedVoronoiCell<3>::Clip. False of every cut once it gave up.
+  // Clips as RestrictedVoronoiCell<3>::Clip does. Returns false for every cut once it gave up.
   bool Clip(std::uint32_t id, const double* normal, double offset);
 
   bool gave_up() const { return gave_up_; }
@@ -61,11 +66,11 @@ class DraftPolytope {
   bool GiveUp();
 
   double inradius_ = 0;
-  Facet fake_[4];  // what it begins as
+  Facet fake_[4];  // the tetrahedron that it begins with
   double max_norm2_ = 0;
   bool gave_up_ = false;
   std::size_t facet_count_ = 0, vertex_count_ = 0, crossing_count_ = 0;
-  // Vertices by coordinate: a half-space is held against two at once.
+  // Vertices by coordinate: a half-space is compared with two in one instruction.
   double x_[kMostVertices], y_[kMostVertices], z_[kMostVertices];
   double norm2_[kMostVertices], excess_[kMostVertices];
   Corner corners_[kMostVertices];
@@ -76,8 +81,8 @@ class DraftPolytope {
   Facets across_[kMostFacets];  // by facet, those that it shares a crossed edge with
 };
 
-// One a thread, for whatever that makes next. On the heap: what is static of a thread lies on its
-// stack, and a library's threads may have little of that, though they never come here.
+// Returns the thread's own polytope, for reuse. It is on the heap: a thread's static variables lie
+// on its stack, and the threads of other libraries, which never come here, may have little of that.
 DraftPolytope& ThreadPolytope();
 
 }  // namespace stellate::core

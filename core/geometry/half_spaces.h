@@ -7,7 +7,7 @@
 
 namespace stellate::core {
 
-// Where the facets of a cell meet.
+// Computes where the facets of a cell meet.
 
 // Solves the K x K system rows . x = rhs by elimination with partial pivoting. False if singular.
 template <int K>
@@ -45,7 +45,7 @@ inline bool SolveSquare<2>(double (&m)[2][3], double* x) {
 // A point of an edge is no farther from p than the edge's farther end: this share is far above
 // rounding in a well-conditioned solve and far below any distance that matters.
 inline constexpr double kSlack = 1e-9;
-// A judged cell is no convex polytope, and its edges' ends are only about where the facets meet.
+// A judged cell is no convex polytope: its edges end only near the points where the facets meet.
 inline constexpr double kJudgedSlack = 3;
 
 // { x : normal . x <= offset }, borrowed.
@@ -63,7 +63,8 @@ struct EdgeEnd {
   double excess;  // over the cut: positive where it is removed
 };
 
-// Where K half-spaces' borders meet, from them alone. False if they meet in no point.
+// Writes the point where K half-spaces' borders meet, from them alone. Returns false if they meet
+// in no point.
 template <int K>
 bool MeetPlanes(const HalfSpaceRef<K> (&planes)[K], double* x) {
   double m[K][K + 1];
@@ -74,7 +75,7 @@ bool MeetPlanes(const HalfSpaceRef<K> (&planes)[K], double* x) {
   return SolveSquare<K>(m, x);
 }
 
-// By far the most often: the same elimination of three planes that have a normal and an offset,
+// The most frequent case by far: the same elimination for three planes with a normal and an offset,
 // step by step, without a matrix.
 template <typename Plane>
 bool MeetThree(const Plane* a, const Plane* b, const Plane* c, double* x) {
@@ -122,7 +123,8 @@ double SquaredNorm(const double* x) {
   return norm2;
 }
 
-// Where the edge from `kept` to `removed` crosses the cut: writes x, returns its squared norm.
+// Writes the point x where the edge from `kept` to `removed` crosses the cut, and returns its
+// squared norm.
 template <int K>
 double Interpolate(const EdgeEnd& kept, const EdgeEnd& removed, double* x) {
   const double u = removed.excess > kept.excess ? -kept.excess / (removed.excess - kept.excess) : 0;
@@ -130,12 +132,11 @@ double Interpolate(const EdgeEnd& kept, const EdgeEnd& removed, double* x) {
   return SquaredNorm<K>(x);
 }
 
-// The vertex where K half-spaces' borders meet: writes x, returns its squared norm.
-//
-// The coordinates come from the facets alone, in the order of their ids, so that they do not
-// depend on the order of the cuts. Where the facets are too nearly parallel for that, the point is
-// interpolated on the edge that the cut crosses. `slack`: how much farther from p than the edge's
-// farther end the point may lie.
+// Writes the vertex x where K half-spaces' borders meet, and returns its squared norm. The
+// coordinates come from the facets alone, in the order of their ids, so that they do not depend on
+// the order of the cuts. If the facets are too nearly parallel for that, the point is interpolated
+// on the edge that the cut crosses. `slack`: how much farther from p than the edge's farther end
+// the point may lie, as a share.
 template <int K>
 double Meet(HalfSpaceRef<K> (&planes)[K], const EdgeEnd& kept, const EdgeEnd& removed, double slack,
             double* x) {

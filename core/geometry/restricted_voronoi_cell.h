@@ -24,19 +24,24 @@ class DraftPolytope;
 //
 // A simple polytope: each vertex lies on exactly K facets and has K neighbours; it is dual to the
 // k-simplex of star(p) on p and the K facets' points, and is that simplex's circumcentre c_p in
-// T_pM. At a point of the boundary the cell is cut by its walls' conormal half-spaces, too: facets
-// with offset 0, whose vertices are dual to simplices of the faces. Kept by clipping, one
-// half-space at a time; what is cut off is found by walking, and a cut that rounding makes
-// impossible is refused, so that the combinatorics stay those of a polytope.
+// T_pM. At a point of the boundary the cell is also cut by its walls' conormal half-spaces: facets
+// with offset 0, whose vertices are dual to simplices of the faces.
 //
-// Vertices and facets go by their place, from 0; a cut may give them other places. For K = 2 the
-// same cell is kept in less memory: restricted_voronoi_polygon.h.
+//   RestrictedVoronoiCell<3> cell;
+//   cell.Reset(inradius, around);
+//   for (q ...) cell.Clip(q, normal, offset, scratch, around);
+//   for (std::size_t v = 0; v < cell.vertex_count(); ++v) Use(cell.x(v));
+//
+// The part that a half-space cuts off is found by walking from vertex to vertex. A cut that
+// rounding makes impossible is refused, so that the combinatorics stay those of a polytope.
+// Vertices and facets are numbered from 0; a cut may change their numbers. For K = 2 the same cell
+// takes less memory: restricted_voronoi_polygon.h.
 template <int K>
 class RestrictedVoronoiCell {
  public:
   using Index = std::uint16_t;
 
-  // Working memory of Clip, one a thread.
+  // Working memory of Clip, one for each thread.
   struct Scratch {
     std::vector<double> excess;
     std::vector<std::uint8_t> cut, seen;
@@ -49,22 +54,22 @@ class RestrictedVoronoiCell {
     std::vector<std::vector<Index>> pieces;
   };
 
-  // A regular simplex of K+1 fake facets at distance `inradius` from p.
+  // Begins with a regular simplex of K+1 fake facets at distance `inradius` from p.
   void Reset(double inradius, const Surroundings<K>& around);
 
-  // Becomes a polytope that was made apart, in the flats; nothing is judged. REQUIRES: K = 3, and
-  // it did not give up.
+  // Becomes a polytope that was clipped as a draft in the tangent space; no vertex is judged.
+  // REQUIRES: K = 3, and it did not give up.
   void Take(const DraftPolytope& polytope);
 
   // Cuts away { x : normal . x > offset }. Returns whether anything was cut. A half-space that
-  // would cut everything away (it cannot, for offset > 0, but in rounding) is refused. Where
-  // vertices are judged, `step` is q - p (d numbers), and what is cut away is
-  // { c : step . c > offset }; a cut that would leave no polytope is refused too.
-  // `around`: the same for the cell's whole life.
+  // would cut everything away (for offset > 0 only rounding can do that) is refused. If vertices
+  // are judged, `step` is q - p (d numbers), and { c : step . c > offset } is cut away; a cut that
+  // would leave no polytope is refused, too. `around`: the same for the cell's whole life.
   bool Clip(std::uint32_t id, const double* normal, double offset, Scratch& scratch,
             const Surroundings<K>& around, const double* step = nullptr);
 
-  // Of a cell clipped in T_pM: judges its vertices, from now on, where `around` does.
+  // Judges the vertices of a cell that was clipped in T_pM at their common centres, from now on, if
+  // `around` has such.
   void Judge(const Surroundings<K>& around);
 
   // Whether Clip with these arguments would cut: some vertex violates the half-space.
@@ -110,9 +115,9 @@ class RestrictedVoronoiCell {
   Index facet(std::size_t v, int slot) const { return vertices_[v].facet[slot]; }
   // The vertex on all facets of v but that one.
   Index adjacent(std::size_t v, int slot) const { return vertices_[v].adjacent[slot]; }
-  // Whether v is not at its place in T_pM.
+  // Whether v is at a common centre, and not at its place in T_pM.
   bool judged(std::size_t v) const { return vertices_[v].judged; }
-  // Of a cell whose vertices are judged: the centre of v, relative to p.
+  // Returns the centre of v, relative to p. REQUIRES: the cell's vertices are judged.
   const double* Centre(std::size_t v) const { return centres_.data() + v * d_; }
 
   // max R_p, squared. A point farther from p than twice its root cannot matter.
@@ -161,7 +166,7 @@ class RestrictedVoronoiCell {
 
   std::vector<Facet> facets_;
   std::vector<Vertex> vertices_;
-  std::vector<std::uint64_t> keys_;  // by vertex, apart from what is not looked through
+  std::vector<std::uint64_t> keys_;  // by vertex, in an array of their own, which Find reads
   std::vector<double> centres_;      // by vertex, d_ each, relative to p
   std::size_t d_ = 0;                // 0: vertices are at their places in T_pM
   double max_norm2_ = 0;
@@ -176,7 +181,7 @@ extern template class RestrictedVoronoiCell<3>;
 extern template class RestrictedVoronoiCell<4>;
 extern template class RestrictedVoronoiCell<5>;
 
-// The walls that vertex v of a cell is on.
+// Returns the walls that vertex v of a cell is on.
 template <int K>
 WallSet WallsAt(const RestrictedVoronoiCell<K>& cell, std::size_t v) {
   WallSet walls = 0;

@@ -132,8 +132,8 @@ bool Polygon::Clip(std::uint32_t id, const double* normal, double offset, Scratc
   return true;
 }
 
-// Makes room for, or leaves, that many vertices. Comes back inside only with some to spare: a cell
-// in the making goes to and fro.
+// Sets the number of vertices. Moves back inside only with some to spare: the number goes up and
+// down while a cell is clipped.
 void Polygon::Resize(std::size_t count) {
   if (count > kInline || (outside_ && count + kSpare > kInline)) {
     if (!outside_) {

@@ -18,8 +18,9 @@ template <int K>
 class RestrictedVoronoiCell;  // for any other K: restricted_voronoi_cell.h
 
 // The cell for K = 2, a polygon: vertex v lies on the facets v and v + 1, cyclically. Of a facet
-// only the id is kept, and its half-space asked for when a cut needs it, so that millions of cells
-// fit in memory: three cache lines each, all in one place, for up to kInline vertices.
+// only the id is kept, and its half-space is computed when a cut needs it, so that millions of
+// cells fit in memory: three cache lines each, all in one place, for up to kInline vertices.
+// Members as in restricted_voronoi_cell.h.
 template <>
 class RestrictedVoronoiCell<2> {
  public:
@@ -36,7 +37,7 @@ class RestrictedVoronoiCell<2> {
   RestrictedVoronoiCell& operator=(RestrictedVoronoiCell&&) = default;
 
   void Reset(double inradius, const Surroundings<2>& around);
-  // Becomes a polygon that was made apart; nothing is judged.
+  // Becomes a polygon that was clipped as a draft; no vertex is judged.
   void Take(const DraftPolygon& polygon);
   bool Clip(std::uint32_t id, const double* normal, double offset, Scratch& scratch,
             const Surroundings<2>& around, const double* step = nullptr);

@@ -48,8 +48,8 @@ bool IsSliver(SimplexVertices vertices, int d, double theta0);
 bool ContainsSliver(SimplexVertices vertices, int d, double theta0);
 
 // An orthonormal frame of a simplex's affine hull, and its edges in it. The edge farthest from the
-// span of those before it is taken next and each residual is taken from residuals, so that heights
-// are right to rounding where a Gram determinant would lose half of the digits.
+// span of those before it is taken next, and each residual is computed from residuals, so that
+// heights are right to rounding where a Gram determinant would lose half of the digits.
 struct SimplexFrame {
   int rank = 0;                                        // j, or less when degenerate
   std::vector<double> directions;                      // j x d, C order: `rank` orthonormal rows
@@ -59,7 +59,7 @@ struct SimplexFrame {
 };
 SimplexFrame FrameSimplex(SimplexVertices vertices, int d);
 
-// The measures of a simplex whose frame is at hand.
+// Measures a simplex whose frame is known.
 SimplexMeasures MeasureSimplex(SimplexVertices vertices, int d, const SimplexFrame& frame);
 
 // Largest angle, radians in [0, pi/2], that a direction of the simplex's affine hull makes with

@@ -10,13 +10,13 @@
 
 namespace stellate::core {
 
-// The inner loops of simplex.h, for callers that measure very many simplices of one kind: where j
-// and d are constants they unroll, and nothing is allocated. The numbers are the same.
+// The inner loops of simplex.h, for callers that measure very many simplices of one kind: if j and
+// d are constants they unroll, and nothing is allocated. The numbers are the same.
 
-// A height this small beside the diameter is rounding error: the simplex is degenerate.
+// A height below this share of the diameter is rounding error: the simplex is degenerate.
 inline constexpr double kDegenerateHeight = 1e-14;
 
-// FrameSimplex of j + 1 vertices. REQUIRES: frame.directions has room for j x d.
+// FrameSimplex of j + 1 vertices. REQUIRES: frame.directions holds j x d numbers.
 [[gnu::always_inline]] inline void TakeFrame(SimplexVertices vertices, int j, int d,
                                              SimplexFrame& frame) {
   double* const e = frame.directions.data();
@@ -79,7 +79,7 @@ inline constexpr double kDegenerateHeight = 1e-14;
   return std::sqrt(squared);
 }
 
-// MeasureSimplex of j + 1 vertices, j >= 2, whose frame is at hand.
+// MeasureSimplex of j + 1 vertices, j >= 2, whose frame is known.
 [[gnu::always_inline]] inline SimplexMeasures MeasureFramed(SimplexVertices vertices, int j, int d,
                                                             const SimplexFrame& frame) {
   SimplexMeasures m;

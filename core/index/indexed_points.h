@@ -39,7 +39,7 @@ class IndexedPoints {
     tree_.Assign(std::vector<double>(size(), 0.0), halving);
   }
   bool is_indexed() const { return tree_.size() == size(); }
-  // Keeps room for one part in `parts` more points, and little more. REQUIRES: is_indexed().
+  // Sets the capacity to one part in `parts` more points, and little more. REQUIRES: is_indexed().
   void FitCapacity(std::size_t parts) {
     core::FitCapacity(parts, &coordinates_);
     tree_.FitCapacity(parts);
