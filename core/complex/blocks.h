@@ -8,8 +8,12 @@
 
 namespace stellate::core {
 
-// A vector that grows without moving what it holds: there is never an old copy as well as the new
-// one, and no room for as many items again.
+// A vector that grows without moving its items: there is never an old copy beside the new one, nor
+// capacity for twice the items.
+//
+//   Blocks<Cell> cells;
+//   cells.resize(n);  // keeps the items that it has
+//   cells[0] = cell;
 template <typename T>
 class Blocks {
  public:

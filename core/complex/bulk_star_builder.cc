@@ -15,7 +15,8 @@ namespace {
 constexpr double kGathered = 2 * (1 + 1e-6);
 constexpr double kSearched = 2.5;
 
-// What lies around a bunch of points, by coordinate: distances to it all are taken side by side.
+// The points around a bunch of points, by coordinate: distances to all of them are computed side by
+// side.
 class PointsAround {
  public:
   void Take(const std::vector<std::uint32_t>& ids, const std::vector<double>& points, int d) {
@@ -93,7 +94,7 @@ constexpr std::uint32_t kMostTogether = 24;
 // More than rounding can take from a distance in R^d, d up to thousands.
 constexpr double kRounding = 1 + 1e-12;
 
-// A point near another: how far it is, and who it is.
+// A point near another one: its distance and its id.
 struct FoundPoint {
   double distance2;
   std::uint32_t id;
@@ -127,9 +128,9 @@ void Gather(const std::vector<std::uint32_t>& ids, const double* points, int any
 
 // Those gathered that lie within `reach` of a point, nearest first.
 std::span<const FoundPoint> NearestFirst(const GatheredPoints& gathered, const double* point,
-                                         int any_d, double reach, std::vector<FoundPoint>* room) {
-  if (room->size() < gathered.count) room->resize(gathered.count);
-  FoundPoint* const found = room->data();
+                                         int any_d, double reach, std::vector<FoundPoint>* memory) {
+  if (memory->size() < gathered.count) memory->resize(gathered.count);
+  FoundPoint* const found = memory->data();
   const double reach2 = reach * reach;
   const std::size_t count = WithDimension(any_d, [&](auto fixed) {
     const int d = fixed() > 0 ? fixed() : any_d;
@@ -152,10 +153,10 @@ std::span<const FoundPoint> NearestFirst(const GatheredPoints& gathered, const d
 template <typename Reach, typename Clip, typename Search>
 double CutNearestFirst(const double* point, int d, const GatheredPoints* gathered, double known,
                        const Reach& reach_now, const Clip& clip, const Search& search) {
-  thread_local std::vector<FoundPoint> room;
+  thread_local std::vector<FoundPoint> memory;
   double reach = reach_now();
   for (double done2 = -1;;) {
-    for (const FoundPoint& q : NearestFirst(*gathered, point, d, known, &room)) {
+    for (const FoundPoint& q : NearestFirst(*gathered, point, d, known, &memory)) {
       if (q.distance2 > reach * reach) break;
       if (q.distance2 > done2 && clip(q.id)) reach = reach_now();
     }
@@ -185,7 +186,7 @@ std::vector<std::size_t> CutIntoStretches(const std::vector<BallTree::Bunch>& bu
   return begins;
 }
 
-// The ball around bunches: writes its centre, returns its radius.
+// Writes the centre of the ball around bunches, and returns its radius.
 double BallAround(std::span<const BallTree::Bunch> bunches, int d, std::vector<double>* centre) {
   centre->assign(static_cast<std::size_t>(d), 0.0);
   for (const BallTree::Bunch& bunch : bunches)
@@ -258,8 +259,8 @@ void BulkStarBuilder<K>::BuildPolygons(Blocks<Cell>* stars, double* influence) c
   });
 }
 
-// One search serves all of them. A part of what it finds is copied for each bunch: most of the time
-// goes into looking which of that are near a point.
+// One search serves all of them. The part that a bunch needs is copied: most of the time goes into
+// finding which of these are near a point.
 template <int K>
 void BulkStarBuilder<K>::BuildPolygonsOf(std::span<const BallTree::Bunch> bunches,
                                          Blocks<Cell>* stars, double* influence) const {
@@ -282,7 +283,7 @@ void BulkStarBuilder<K>::BuildPolygonsOf(std::span<const BallTree::Bunch> bunche
   }
 }
 
-// Of a point on walls. Returns its influence.
+// Builds the star of a point on walls, and returns its influence.
 template <int K>
 double BulkStarBuilder<K>::BuildOnWalls(const Site& p, const std::vector<std::uint32_t>& ids,
                                         Cell* star) const {
@@ -294,8 +295,8 @@ double BulkStarBuilder<K>::BuildOnWalls(const Site& p, const std::vector<std::ui
   return builder_.Influence(p.id, cell);
 }
 
-// Of any other point. `gathered`: all within kPolygonNear size bounds of it, `around`: within
-// kPolygonFar. Returns its influence.
+// Builds the star of any other point, and returns its influence. `gathered`: all points within
+// kPolygonNear size bounds of it, `around`: within kPolygonFar.
 template <int K>
 double BulkStarBuilder<K>::BuildPolygon(const Site& p, const GatheredPoints& gathered,
                                         const std::vector<std::uint32_t>& around,

@@ -10,23 +10,23 @@
 
 namespace stellate::core {
 
-// Points of the sample side by side in memory, as they are read again and again.
+// Points of the sample, copied side by side in memory to be read many times.
 struct GatheredPoints {
   std::size_t count = 0;
-  std::vector<std::uint32_t> ids;  // `count`, and room for more
+  std::vector<std::uint32_t> ids;  // the first `count` are in use
   std::vector<double> points;      // likewise, d each
 };
 
-// Builds the stars of all points of a sample together: a search serves all points that lie
-// together. For when each is built, see StarBuilder.
+// Builds the stars of all points of a sample together: one search serves a whole bunch of points.
+// StarBuilder has a table of the ways to build a star.
 //
 //   Blocks<RestrictedVoronoiCell<2>> stars;
 //   stars.resize(sample.size());
 //   BulkStarBuilder<2>(builder).Build(&stars, influence.data());
 //
-// A star depends on the points within its reach alone. A part of a sample, with all points that far
-// around it, therefore has the stars of the whole, bit for bit, if its points keep their order and
-// their names (Sample::NameLast).
+// A star depends only on the points within its reach. A part of a sample, together with all points
+// that far around it, therefore has the stars of the whole, bit for bit, if its points keep their
+// order and their names (Sample::NameLast).
 template <int K>
 class BulkStarBuilder {
  public:

@@ -7,9 +7,9 @@
 
 namespace stellate::core {
 
-// Where the stars disagree about few simplices, the consistent ones are a mesh except for cavities:
-// each facet is in at most two of them, and those in one bound the cavities. A cavity can be filled
-// without a new point.
+// If the stars disagree about few simplices, the consistent ones are a mesh except for cavities:
+// each facet is in at most two of them, and the facets in one bound the cavities. A cavity can be
+// filled without a new point.
 //
 // A filling is a set of simplices on the cavity's vertices, each oriented alike in the tangent
 // spaces of all its vertices, whose oriented boundary, with that of the consistent simplices,
@@ -18,10 +18,9 @@ namespace stellate::core {
 // choices first, and tries simplices that more stars hold, and then fatter ones, first. At a wall
 // the cavity ends: what stars agree on there has one side.
 //
-// The mesh is then no longer the union of the stars, so that it must be judged as it is: by the
-// certificate.
+// The filled mesh is not the union of the stars, so that only the certificate can judge it.
 
-// What a simplex that fills must hold to, as all others do.
+// The bounds on a filling simplex, the same as on all others.
 struct FillingRules {
   double epsilon = 0;            // circumradius in its hull at most this, length
   double radius_edge_bound = 0;  // rho0
@@ -37,9 +36,9 @@ struct FilledCavities {
   std::vector<std::uint32_t> unfilled;   // vertices of the cavities that are not filled, ascending
 };
 
-// A simplex is consistent here when all its vertices' stars hold it and it is folded over a
-// neighbour in none of them. Deterministic, parallel; time linear in the mesh, and bounded for each
-// cavity.
+// Fills the cavities that it can. A simplex is consistent here if the stars of all its vertices
+// hold it and it is folded over a neighbour in none of them. Deterministic, parallel; time linear
+// in the mesh, and bounded for each cavity.
 template <int K>
 FilledCavities FillCavities(const Stars<K>& stars, const FillingRules& rules);
 

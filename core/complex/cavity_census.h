@@ -17,7 +17,7 @@
 
 namespace stellate::core {
 
-// The stars' simplices, parted into those that all agree on and the doubtful ones.
+// The stars' simplices, divided into those on which all stars agree and the doubtful ones.
 template <int K>
 struct Census {
   using Simplex = typename Stars<K>::Simplex;
@@ -45,7 +45,7 @@ struct Census {
     agreed = std::move(rest);
   }
 
-  // In how many stars a doubtful simplex was found.
+  // Returns in how many stars a doubtful simplex was found.
   int Holders(const Simplex& s) const {
     const auto range = std::equal_range(all_doubts.begin(), all_doubts.end(), s);
     return static_cast<int>(range.second - range.first);
@@ -54,7 +54,8 @@ struct Census {
     return std::binary_search(doubtful.begin(), doubtful.end(), s);
   }
 
-  // The agreed simplices that have a facet: two at most, as the facet is an edge of a cell.
+  // Writes the agreed simplices on a facet and returns their number: two at most, as the facet is
+  // an edge of a cell.
   int AgreedOn(const Facet& facet, Simplex (&found)[2]) const {
     const std::uint32_t p = facet[0];
     const auto& cell = stars.cell(p);
@@ -71,7 +72,8 @@ struct Census {
     return std::min(count, 2);
   }
 
-  // The wall that a facet lies in: nothing is beyond it there. Stars agree that it is of that face.
+  // Returns the wall that a facet lies in, beyond which there is no simplex, if the stars agree
+  // that the facet is on that face.
   std::optional<int> WallUnder(const Facet& facet) const {
     const std::uint32_t p = facet[0];
     if (stars.sample().walls(p) == 0) return std::nullopt;
@@ -85,7 +87,8 @@ struct Census {
     }
     return std::nullopt;
   }
-  // Whether agreed simplices are wherever a facet has a side.
+  // Whether agreed simplices are on both sides of a facet, or on the one that a facet in a wall
+  // has.
   bool IsClosed(const Facet& facet) const {
     Simplex found[2];
     const int count = AgreedOn(facet, found);

@@ -9,17 +9,20 @@
 
 namespace stellate::core {
 
-// The common centres that were asked for last. A simplex is judged in the stars of all its
-// vertices, and stars that follow each other are mostly near each other: it is remembered from one
-// to the next. One a thread; what it holds changes no result.
+// Remembers the common centres that were computed last. A simplex is judged in the stars of all its
+// vertices, and consecutive stars are mostly near each other, so that its centre is needed again
+// soon. One for each thread; its contents change no result.
+//
+//   thread_local CentreCache<K> cache;
+//   cache.Centre(owner.id(), simplex, key, d, centre, [&](double* c) { return Compute(c); });
 template <int K>
 class CentreCache {
  public:
   using Simplex = std::array<std::uint32_t, K + 1>;  // ascending ids
 
-  // Stands for the points and weights that centres are of: give whatever holds these an Owner, and
-  // assign a new one whenever they change. A copy is another owner, as what it belongs to goes on
-  // apart from the original.
+  // Identifies the points and weights to which centres belong: give the class that holds these an
+  // Owner, and assign a new one whenever they change. A copy is another owner, as the copied class
+  // may then change by itself.
   class Owner {
    public:
     Owner() : id_(NewId()) {}
@@ -40,8 +43,8 @@ class CentreCache {
     std::uint64_t id_;
   };
 
-  // Writes the centre of a simplex (d numbers), or returns false if it has none. What is not
-  // remembered `find(centre)` tells. `key` scatters simplices.
+  // Writes the centre of a simplex (d numbers), or returns false if it has none. A centre that is
+  // not remembered is computed by `find(centre)`. `key`: a hash of the simplex.
   template <typename Find>
   bool Centre(std::uint64_t owner, const Simplex& simplex, std::uint64_t key, int d, double* centre,
               const Find& find) {
@@ -60,7 +63,7 @@ class CentreCache {
   }
 
  private:
-  // Those of some thousand stars for K = 3: they fit in the processor's own memory.
+  // The centres of some thousand stars for K = 3: they fit in the processor's cache.
   static constexpr std::size_t kEntries = 8192;
 
   struct Entry {

@@ -42,11 +42,11 @@ void Sample<K>::AddUnindexed(const double* point, const double* tangent, double 
 }
 
 template <int K>
-void Sample<K>::Index(BallTree::Halving halving, std::size_t room) {
+void Sample<K>::Index(BallTree::Halving halving, std::size_t parts) {
   points_.Index(halving);
-  if (room == 0) return;
-  points_.FitCapacity(room);
-  FitCapacity(room, &tangents_);
+  if (parts == 0) return;
+  points_.FitCapacity(parts);
+  FitCapacity(parts, &tangents_);
 }
 
 template <int K>

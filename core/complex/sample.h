@@ -15,12 +15,12 @@
 
 namespace stellate::core {
 
-// A point of M with its tangent basis: one of the sample, or one that may join it.
+// A point of M with its tangent basis: a sample point, or one that may join the sample.
 struct Site {
-  std::uint32_t id;       // of a point that may join: the sample's size
+  std::uint32_t id;       // the sample's size for a point that may join
   const double* point;    // d
   const double* tangent;  // K rows of d, orthonormal
-  WallSet walls = 0;      // that the point is on
+  WallSet walls = 0;      // the walls that the point is on
   // K tangent coordinates for each of the walls, ascending: the outward unit normal of the wall in
   // T_pM.
   const double* conormals = nullptr;
@@ -41,8 +41,8 @@ class Step {
 };
 
 // The sample: points of M with tangent bases, walls, names and weights, and the trees that search
-// them. It knows no stars, only for each point how far its star can be influenced, which Stars
-// sets. A value: a copy goes on by itself.
+// them. It has no stars, only the influence of each point, which Stars sets. A value: a copy is
+// independent.
 //
 //   Sample<2> sample(3, epsilon);
 //   sample.Add(point, tangent);                          // gets the id 0
@@ -64,17 +64,16 @@ class Sample {
   // there, length, if it is not epsilon for all; given for each point or for none.
   void AddUnindexed(const double* point, const double* tangent, double bound = 0);
   bool is_indexed() const { return points_.is_indexed(); }
-  // Builds the search tree of all points again, none with an influence. `room`: for one part in so
-  // many more points memory is kept, and for little more; 0: as it comes.
-  void Index(BallTree::Halving halving, std::size_t room = 0);
-  // Where this sample is a part of a larger one: sets the name of the point that was added last,
-  // which is its id in the whole. A point without a name is called by its id. Weights follow names,
-  // so that a part has the stars of the whole. REQUIRES: names ascend; no star of the point is
-  // built.
+  // Builds the search tree of all points again, without influences. `parts`: sets the capacity to
+  // one part in so many more points, and little more; 0: does not.
+  void Index(BallTree::Halving halving, std::size_t parts = 0);
+  // Sets the name of the point that was added last, if this sample is a part of a larger one: its
+  // id in the whole. A point without a name is called by its id. Weights depend on names, so that a
+  // part has the stars of the whole. REQUIRES: names ascend; no star of the point is built.
   void NameLast(std::uint32_t name);
   // Sets the protecting balls around points of sharp edges: `radii2` by point, squared radii, 0:
-  // none; later points have none. A squared radius is added to the point's weight, so that what
-  // lies outside the balls comes no nearer to an edge than the edge's own points do.
+  // none; later points have none. The squared radius is added to the point's weight, so that no
+  // point outside the balls is nearer to an edge, by power, than the edge's own points.
   void SetProtectingBalls(std::vector<double> radii2);
 
   std::uint32_t size() const { return static_cast<std::uint32_t>(points_.size()); }
@@ -96,25 +95,24 @@ class Sample {
   Site At(std::uint32_t id) const { return {id, Point(id), Tangent(id), walls(id), Conormals(id)}; }
 
   bool has_protecting_balls() const { return largest_protecting_radius2_ > 0; }
-  double largest_protecting_radius2() const {
-    return largest_protecting_radius2_;
-  }  // squared radius
-  // Squared radius; 0: the point has none.
+  double largest_protecting_radius2() const { return largest_protecting_radius2_; }
+  // Returns the squared radius of the point's protecting ball; 0: it has none.
   double ProtectingRadius2(std::uint32_t id) const {
     return id < protecting_radii2_.size() ? protecting_radii2_[id] : 0;
   }
   bool InProtectingBall(const double* point) const;
-  // Cospherical points would have every star decide alone how to split them; weights this much
-  // larger than rounding, and this much smaller than anything geometric, make all decide alike.
+  // Returns the weight of a point. Each star alone would decide how to split cospherical points;
+  // weights far larger than rounding, and far smaller than any geometric length, make all stars
+  // decide alike.
   double Weight(std::uint32_t id) const {
     // Of a signed number, which takes an instruction where an unsigned one takes a branch.
     const auto bits = static_cast<std::int64_t>(Mix64(NameOf(id)) >> 11);
     return weight_scale_ * (static_cast<double>(bits) * 0x1p-53) + ProtectingRadius2(id);
   }
-  // The size bound at a point: how far to look at first for what cuts its star.
+  // Returns the size bound at a point: the first guess how far away points cut its star.
   double BoundAt(std::uint32_t id) const { return bounds_.empty() ? epsilon_ : bounds_[id]; }
   void ForgetBounds() { bounds_ = {}; }
-  // Whose common centres are kept in a CentreCache: changes whenever the weights do.
+  // Identifies this sample's centres in a CentreCache: changes whenever the weights do.
   std::uint64_t centre_owner() const { return centre_owner_.id(); }
 
   // Writes q in p's tangent coordinates, normal = T_p^t (q - p), and returns |q - p|^2.
@@ -145,14 +143,14 @@ class Sample {
   // Writes the `count` points nearest to q as (squared distance, id), nearest first, and returns
   // how many there are.
   int Nearest(const double* q, int count, std::pair<double, std::uint32_t>* nearest) const;
-  // Sort points by place, and each is mostly near the one before it.
+  // Points sorted by place are mostly near the one before them.
   std::uint32_t PlaceOf(std::uint32_t id) const { return tree().PlaceOf(id); }
 
   // A point's influence is how far from it a point may be that changes its star.
   const BallTree& tree() const { return points_.tree(); }
   BallTree& tree() { return points_.tree(); }
-  // The points on walls, ascending, and their tree, by place in boundary(): a point's influence is
-  // there that on its star's simplices of faces.
+  // The points on walls, ascending, and their tree, by place in boundary(). In it the influence
+  // counts only for a star's simplices of faces.
   const std::vector<std::uint32_t>& boundary() const { return boundary_; }
   const BallTree& boundary_tree() const { return boundary_points_.tree(); }
   BallTree& boundary_tree() { return boundary_points_.tree(); }
@@ -164,8 +162,8 @@ class Sample {
   double epsilon_, weight_scale_;
   IndexedPoints points_;
   std::vector<double> tangents_;
-  std::vector<std::uint32_t> names_;  // up to the last that is not its point's id
-  // Of manifolds with boundary, up to the last point on a wall; else empty.
+  std::vector<std::uint32_t> names_;  // up to the last name that is not its point's id
+  // For manifolds with boundary, up to the last point on a wall; else empty.
   std::vector<WallSet> walls_;
   std::vector<std::uint32_t> conormals_at_;
   std::vector<double> conormals_;

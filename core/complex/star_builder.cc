@@ -7,12 +7,13 @@
 namespace stellate::core {
 namespace {
 
-// How much farther than its star in the flats reaches the neighbours of a new point are gathered:
-// judged stars are mostly that much larger at most.
+// The neighbours of a new point are gathered this much farther than its star in the tangent space
+// reaches: few judged stars are larger than that.
 constexpr double kJudgedReach = 1.1;
-// ... and how far at most, in epsilon: a star that is open so far would gather half of the sample.
+// ... and up to this distance, in epsilon: a star that is still open would gather half of the
+// sample.
 constexpr double kFarthest = 5;
-// As far a star is cut all along, in epsilon, before it is known how far it reaches.
+// A star is cut by all points this near, in epsilon, before it is known how far it reaches.
 constexpr double kAtFirst = 2;
 
 // Far above what rounding leaves of tangent bases and inner products, far below any distance that
@@ -23,7 +24,7 @@ double LengthOff(double whole2, double along2) {
 }
 
 // The vertices of a judged cell, by coordinate: their places in T_pM, and how far their centres are
-// off it. A half-space of R^d is held against them all at once in T_pM, where that is enough.
+// off it. A half-space of R^d is compared with all of them in one pass in T_pM, if that decides.
 template <int K>
 class JudgedPlaces {
  public:
@@ -38,8 +39,8 @@ class JudgedPlaces {
     }
   }
 
-  // What step . c can be at most, by vertex: `normal` is the part of `step` along T_pM, `off` the
-  // length of the rest. Returns whether one is above `offset`.
+  // Bounds step . c from above, by vertex: `normal` is the part of `step` along T_pM, `off` the
+  // length of the rest. Returns whether one bound is above `offset`.
   bool Bound(const double* normal, double off, double offset) {
     const double* const places = places_.data();
     const double* const off_flat = off_.data();
@@ -61,9 +62,9 @@ class JudgedPlaces {
   std::vector<double> places_, off_, bounds_;
 };
 
-// Cuts by what is near, nearest first and ties by id, out to where nothing can cut any more. `near`
-// holds all points within `known`, sorted; search(from, to) appends those between. Returns how far
-// all points are known in the end.
+// Cuts by the near points, nearest first and ties by id, as far as points can cut. `near` holds all
+// points within `known`, sorted; search(from, to) appends those between. Returns the distance
+// within which all points are known in the end.
 template <typename Reach, typename Clip, typename Search>
 double CutByNear(double known, NearPoints* near, const Reach& reach, const Clip& clip,
                  const Search& search) {
@@ -128,7 +129,7 @@ void StarBuilder<K>::Cut(const Site& p, std::span<const StarCut> cuts, const Blo
   for (const StarCut& cut : cuts) Clip(p, sample_.At(cut.by), &stars[cut.by], star);
 }
 
-// The half-spaces of facets beside a cut are found as they are needed, once each.
+// The half-spaces of facets next to a cut are computed when they are needed, once each.
 template <int K>
 void StarBuilder<K>::CutPolygon(const Site& p, std::span<const StarCut> cuts, Cell* star) const {
   if constexpr (K == 2) {
@@ -165,7 +166,7 @@ void StarBuilder<K>::Reset(const Site& p, Cell* star) const {
   });
 }
 
-// The same of a cell that is judged at common centres only when it is done.
+// The same for a cell that is judged at common centres only when it is complete.
 template <int K>
 void StarBuilder<K>::ResetInTangentSpace(const Site& p, Cell* star) const {
   star->Reset(options_.inradius, StarSurroundings<K>(*this, p, CentreRule::kTangentSpace));
@@ -180,7 +181,7 @@ bool StarBuilder<K>::ClipInTangentSpace(const Site& p, const Site& q, Cell* star
                     StarSurroundings<K>(*this, p, CentreRule::kTangentSpace));
 }
 
-// Clips a cell in the flats that is built apart from RestrictedVoronoiCell.
+// Clips a draft in the tangent space.
 template <int K>
 template <typename Polytope>
 bool StarBuilder<K>::ClipApart(const Site& p, std::uint32_t q, double* step,
@@ -190,9 +191,9 @@ bool StarBuilder<K>::ClipApart(const Site& p, std::uint32_t q, double* step,
   return polytope->Clip(q, normal, offset);
 }
 
-// Judges a cell that was built in the flats. Returns whether its vertices are those that it has at
-// common centres, too: none of `near`, the points within reach, is nearer to a common centre than
-// the simplex' own.
+// Judges a cell that was built in the tangent space. Returns whether it has the same vertices at
+// common centres: none of `near`, the points within reach, is nearer to a common centre than the
+// simplex's own.
 template <int K>
 bool StarBuilder<K>::Judge(const Site& p, const NearPoints& near, Cell* star) const {
   if constexpr (K == 2) {
@@ -230,12 +231,13 @@ double StarBuilder<K>::MaxNorm2OnFaces(const Cell& star) {
   double most2 = 0;
   for (std::size_t v = 0; v < star.vertex_count(); ++v)
     if (star.norm2(v) > most2 && WallsAt<K>(star, v) != 0) most2 = star.norm2(v);
-  return most2 > 0 ? most2 : star.max_norm2();  // of a point inside: all of it
+  return most2 > 0 ? most2 : star.max_norm2();  // the point is inside: the whole star
 }
 
-// At common centres cuts are refused that would leave no polytope, and a cell may stay open in the
-// midst of the sample, to which R1 would add points forever. It is closed in the flats then, and
-// judged: where it is not as it would be there stars disagree, which R4 mends.
+// At common centres, cuts that would leave no polytope are refused, and a cell may stay open in the
+// middle of the sample, where R1 would add points forever. Such a cell is closed in the tangent
+// space instead, and judged: if that is not the cell at common centres, stars disagree, which R4
+// resolves.
 template <int K>
 void StarBuilder<K>::CloseInTangentSpace(const Site& p, Cell* star) const {
   const bool has_joined = p.id < sample_.size();
@@ -254,8 +256,8 @@ void StarBuilder<K>::CloseInTangentSpace(const Site& p, Cell* star) const {
   *star = flat;
 }
 
-// Clips by `first`, and then by all that can cut in the order in which the search tree finds it.
-// Each point cuts once: a second cut by the same plane would be decided by rounding.
+// Clips by `first`, and then by all points that can cut, in the order in which the search tree
+// finds them. Each point cuts once: rounding would decide a second cut by the same plane.
 template <int K>
 template <typename Reach, typename ClipBy>
 void StarBuilder<K>::ClipAsFound(const Site& p, std::span<const std::uint32_t> first,
@@ -301,7 +303,7 @@ void StarBuilder<K>::BuildPolygon(const Site& p, std::span<const std::uint32_t> 
   }
 }
 
-// Returns false where that will not do.
+// Returns false if the polytope gave up.
 template <int K>
 bool StarBuilder<K>::BuildPolytope(const Site& p, std::span<const std::uint32_t> first, Cell* star,
                                    std::vector<std::uint32_t>* influenced) const {
@@ -320,7 +322,7 @@ bool StarBuilder<K>::BuildPolytope(const Site& p, std::span<const std::uint32_t>
   }
 }
 
-// Returns false where that will not do, which depends on what lies around p alone.
+// Returns false if that is not the star, which depends only on the points around p.
 template <int K>
 bool StarBuilder<K>::BuildAsInTangentSpace(const Site& p, std::span<const std::uint32_t> first,
                                            Cell* star,
@@ -406,7 +408,7 @@ void StarBuilder<K>::Build(const Site& p, std::span<const std::uint32_t> first, 
   BuildAsFound(p, first, star, influenced);
 }
 
-// Builds the cell in the flats. Afterwards `near` holds all points within `known`.
+// Builds the cell in the tangent space. Afterwards `near` holds all points within `known`.
 template <int K>
 void StarBuilder<K>::CutInTangentSpace(const Site& p, double* known, NearPoints* near,
                                        const Search& search, Cell* star) const {
@@ -425,8 +427,8 @@ void StarBuilder<K>::CutInTangentSpace(const Site& p, double* known, NearPoints*
       [&](std::uint32_t q) { return ClipInTangentSpace(p, sample_.At(q), star); }, search);
 }
 
-// Most stars are the same in the flats, where clips cost a fraction. Returns false where that is
-// not so, and the star has to be judged all along.
+// Most stars are the same in the tangent space, where clips cost a fraction. Returns false if this
+// one is not, and must be judged at each cut.
 template <int K>
 bool StarBuilder<K>::BuildInTangentSpace(const Site& p, double* known, NearPoints* near,
                                          const Search& search, Cell* star) const {

@@ -17,17 +17,17 @@
 
 namespace stellate::core {
 
-// How far outwards walls are moved, as a share of the fake simplex' inradius: corners of that may
-// lie in the planes of walls along the axes, and rounding would decide which side of it they are
-// on.
+// How far outwards walls are moved, as a share of the fake simplex's inradius: its corners may lie
+// in the planes of walls along the axes, and rounding would decide on which side they are.
 inline constexpr double kWallOffset = 1e-12;
 
 // How the stars of a mesh are built.
 struct StarOptions {
   double inradius = 0;  // of the fake simplex that each cell begins as, length
   CentreRule centre_rule = CentreRule::kTangentSpace;  // where simplices are judged
-  // Stars are built no farther out than their simplices of boundary faces reach. Those inside would
-  // reach from one side of M to the other while the boundary is meshed by itself.
+  // Boundary-only mode: stars are built only as far out as their simplices of boundary faces reach.
+  // While the boundary is meshed by itself, simplices inside would reach from one side of M to the
+  // other.
   bool boundary_only = false;
 };
 
@@ -42,41 +42,41 @@ struct StarCut {
 // Sample points around a place as (squared distance, id).
 using NearPoints = std::vector<std::pair<double, std::uint32_t>>;
 
-// Builds and cuts single stars of a sample. A star is kept as its dual, the Voronoi cell of its
+// Builds and cuts single stars of a sample. A star is stored as its dual, the Voronoi cell of its
 // point p restricted to T_pM, and built by clipping a simplex of fake facets with the bisectors of
-// p and the points around it. Pure: it changes nothing but what it is given to write, and a star
-// depends on sample and options alone.
+// p and the points around it. Pure: it writes only to its output arguments, and a star depends only
+// on the sample and the options.
 //
 //   const StarBuilder<2> builder(sample, {.inradius = 10 * epsilon});
 //   builder.Build(sample.At(p), {}, &cell, &influenced);
 //   builder.Clip(sample.At(p), newcomer, nullptr, &cell);
 //
-// There are several ways to build a star. In the flats they give the same cell; they differ in what
-// they cost. At common centres the order of the cuts may matter in a cell that is far from convex,
-// so that each case has one way.
+// There are several ways to build a star. In tangent spaces they give the same cell and differ in
+// cost. At common centres the order of the cuts may matter in a cell that is far from convex, so
+// that each case has one way.
 //
 //   A single star, Build():
-//   k  centres  point                    way
-//   2  flats    inside, no guards        BuildPolygon: without half-spaces being found twice
-//   3  flats    inside, no guards        BuildPolytope: without knowing who is next to whom; if
-//                                        rounding spoils that, BuildAsFound
-//   3  common   inside                   BuildAsInTangentSpace: a polytope in the flats, judged
-//   when it is
-//                                        done; if that is not the star, BuildNearestFirst
-//   any other case                       BuildAsFound: a cell, clipped as the search tree goes
+//   k   centre rule    point            way
+//   2   tangent space  inside, no ball  BuildPolygon: a draft, computes each half-space once
+//   3   tangent space  inside, no ball  BuildPolytope: a draft, without adjacent vertices; if
+//                                       rounding spoils that, BuildAsFound
+//   3   common centre  inside           BuildAsInTangentSpace: a draft, judged when it is complete;
+//                                       if that is not the star, BuildNearestFirst
+//   any other case                      BuildAsFound: a cell, clipped in the search tree's order
 //
 //   All stars of a sample together, BulkStarBuilder, which searches once for many:
-//   2  flats    inside, no guards        a polygon, by the nearest points first
-//   3+ common   inside                   BuildFromNear: as in the flats, judged when it is done; if
-//                                        that is not the star, BuildNearestFirst
-//   any other case                       BuildFromNear: BuildNearestFirst
+//   2   tangent space  inside, no ball  a draft, clipped by the nearest points first
+//   3+  common centre  inside           BuildFromNear: built in the tangent space, judged when
+//                                       complete; if that is not the star, BuildNearestFirst
+//   any other case                      BuildFromNear: BuildNearestFirst
 //
-// "Inside": on no wall, and not while stars are built for the boundary only, unless k = 2.
+// "Inside": on no wall and, unless k = 2, not in boundary-only mode. "No ball": the sample has no
+// protecting balls.
 template <int K>
 class StarBuilder {
  public:
   using Cell = RestrictedVoronoiCell<K>;
-  // search(from, to) appends the points between these distances from p.
+  // A call search(from, to) appends the points between these distances from p.
   using Search = FunctionRef<void(double from, double to)>;
 
   // `sample`: borrowed, indexed.
@@ -86,13 +86,13 @@ class StarBuilder {
         judged_radius2_(kJudgedRadius * kJudgedRadius * sample.epsilon() * sample.epsilon()) {}
 
   // Builds the star of p, which need not be in the sample.
-  // first       points that are likely to close the cell, in the order in which to cut by them:
-  //             without these, a search that begins on one side of p visits all of that side
-  // influenced  gets the points whose stars p may cut
+  //   first       points that are likely to close the cell, in the order in which to cut by them:
+  //               without these, a search that begins on one side of p visits all of that side
+  //   influenced  receives the points whose stars p may cut
   void Build(const Site& p, std::span<const std::uint32_t> first, Cell* star,
              std::vector<std::uint32_t>* influenced) const;
-  // Builds it from `near`: all points within `known` of p, nearest first, without p. Grows by what
-  // `search` appends.
+  // Builds the star from `near`: all points within `known` of p, nearest first, without p. `search`
+  // appends more of them.
   void BuildFromNear(const Site& p, double known, NearPoints* near, const Search& search,
                      Cell* star) const;
 
@@ -105,18 +105,19 @@ class StarBuilder {
   // Whether q cuts p's star.
   bool IsCutBy(const Cell& star, const Site& p, const Site& q) const;
 
-  // How far from p a point may be whose bisector cuts its star, as far out as that is built.
+  // Returns the influence of p: how far from p a point may be that cuts its star, as far out as
+  // that is built.
   double Influence(std::uint32_t p, const Cell& star) const {
     return Influence(p, options_.boundary_only ? MaxNorm2OnFaces(star) : star.max_norm2());
   }
-  // The same for vertices no farther out than the root of `most2`.
+  // Returns the same for a star with no vertex farther out than the root of `most2`.
   double Influence(std::uint32_t p, double most2) const {
     if (!sample_.has_protecting_balls()) return InfluenceWithin(most2);
     const double power2 =
         std::max(most2 - sample_.ProtectingRadius2(p) + sample_.largest_protecting_radius2(), 0.0);
     return (std::sqrt(most2) + std::sqrt(power2)) * (1 + 1e-9);
   }
-  // The same where there are no guards.
+  // Returns the same for a sample without protecting balls.
   static double InfluenceWithin(double most2) { return 2 * std::sqrt(most2) * (1 + 1e-9); }
 
   // Writes the normal of a facet's half-space in p's cell, and returns its offset.
@@ -129,7 +130,7 @@ class StarBuilder {
 
   const Sample<K>& sample() const { return sample_; }
   const StarOptions& options() const { return options_; }
-  // Simplices of a larger circumradius are judged in the flats.
+  // Simplices of a larger circumradius are judged in the tangent space.
   double judged_radius2() const { return judged_radius2_; }
 
  private:

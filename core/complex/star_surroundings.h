@@ -14,17 +14,17 @@
 
 namespace stellate::core {
 
-// What the cell of p asks while it is clipped: half-spaces of facets, and the centres at which
-// simplices are judged. Borrows all that it is given.
+// Gives the cell of p the half-spaces of its facets, and the centres at which its simplices are
+// judged. Borrows all its arguments.
 template <int K>
 class StarSurroundings final : public Surroundings<K> {
  public:
   using Cell = RestrictedVoronoiCell<K>;
   using Simplex = typename CentreCache<K>::Simplex;
 
-  // centre_rule   instead of the builder's
-  // newcomer  the site that cuts p's cell now, which may not be in the sample
-  // born      the newcomer's star if there is one, in which centres are looked up first
+  // centre_rule  replaces the builder's
+  // newcomer     the site that cuts p's cell now, which may not be in the sample
+  // born         the newcomer's star if there is one, in which centres are looked up first
   StarSurroundings(const StarBuilder<K>& builder, const Site& p, CentreRule centre_rule,
                    const Site* newcomer = nullptr, const Cell* born = nullptr)
       : sample_(builder.sample()),
@@ -52,7 +52,7 @@ class StarSurroundings final : public Surroundings<K> {
 
   bool Centre(const std::uint32_t* ids, std::uint64_t key, double* x,
               double* centre) const override {
-    // Of a k-simplex in R^k, the place where its facets meet is the circumcentre.
+    // The facets of a k-simplex in R^k meet at its circumcentre.
     if (sample_.d() == K && std::none_of(ids, ids + K, IsWall)) return false;
     if (!(born_ && Known(key, centre)) && !Common(ids, key, centre)) return false;
     WithDimension(sample_.d(), [&](auto known) {
@@ -82,8 +82,8 @@ class StarSurroundings final : public Surroundings<K> {
     return id == p_.id ? p_.tangent : IsNewcomer(id) ? newcomer_->tangent : sample_.Tangent(id);
   }
 
-  // The centre from the newcomer's star, which all simplices of the vertices that it creates are in
-  // if they are consistent.
+  // Looks the centre up in the newcomer's star: all simplices that it creates are in it if they are
+  // consistent.
   bool Known(std::uint64_t key_in_p, double* centre) const {
     const std::uint64_t key = key_in_p + Mix64(p_.id) - Mix64(newcomer_->id);
     const std::size_t v = born_->Find(key);
@@ -138,9 +138,9 @@ class StarSurroundings final : public Surroundings<K> {
                            centre);
   }
 
-  // The same for a simplex of a face, by the face's own tangent spaces. Foreign ones are left where
-  // they are: no other star agrees about them. So are those that reach from one sheet of a wall to
-  // another: in the middle between the two a centre says nothing of either.
+  // The same for a simplex of a face, by the face's own tangent spaces. Foreign simplices stay in
+  // the tangent space: no other star agrees about them. So do simplices that reach from one sheet
+  // of a wall to another: a centre in the middle between the two has no meaning for either.
   bool CommonOnFace(const std::uint32_t* ids, int count, WallSet walls, double* centre) const {
     if (count < 2) return false;
     const int n = sample_.d();
@@ -192,8 +192,8 @@ class StarSurroundings final : public Surroundings<K> {
     return site.conormals + K * CountWalls(site.walls & (SetOfWall(wall) - 1));
   }
 
-  // An orthonormal basis of the tangent space of a face at a point of it: what is left of T_pM off
-  // the conormals, by rows of d.
+  // Writes an orthonormal basis of the tangent space of a face at a point of it, the part of T_pM
+  // orthogonal to the conormals, in rows of d.
   static void FaceTangents(const Site& site, WallSet walls, int n, double* rows) {
     double taken[K][K] = {};  // orthonormal, conormals first
     int count = 0;

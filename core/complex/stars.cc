@@ -12,11 +12,11 @@
 namespace stellate::core {
 namespace {
 
-// The point itself, and as many neighbours as close a cell.
+// The point itself, and enough neighbours to close a cell.
 template <int K>
 inline constexpr int kNearestFirst = 2 * K + 3;
 
-// The rules mostly insert fewer points into a sample that came in bulk than one in so many.
+// After a sample was added in bulk the rules mostly insert fewer points than one in so many.
 constexpr std::size_t PartsToCome(int k) { return k <= 2 ? 8 : 4; }
 
 // Whether a polygon has a vertex on both these facets.
@@ -48,8 +48,8 @@ void AppendTo(std::vector<std::uint32_t>* ids, const std::array<std::uint32_t, N
 
 }  // namespace
 
-// Calls visit(v, simplex) for the simplices of star(p) of which p is the lowest vertex, once for
-// each: at common centres a cell that is far from convex may hold one at two vertices.
+// Calls visit(v, simplex) once for each simplex of star(p) whose lowest vertex is p: at common
+// centres a cell that is far from convex may hold one at two vertices.
 template <int K>
 template <typename Visit>
 void Stars<K>::ForEachOwned(std::uint32_t p, const Visit& visit) const {
@@ -403,7 +403,7 @@ typename Stars<K>::Change Stars<K>::Insert(std::uint32_t first,
   return change;
 }
 
-// Builds all stars anew, each from one point to the next, as if all points had just been added.
+// Rebuilds all stars, point by point, as if all points had just been added.
 template <int K>
 typename Stars<K>::Change Stars<K>::BuildAllAsAdded() {
   options_.boundary_only = options_.boundary_only && !includes_interior_next_;

@@ -17,9 +17,9 @@
 
 namespace stellate::core {
 
-// The stars of a growing sample (Sec. 5.2.1): star(p) is kept as its dual, the Voronoi cell of p
+// The stars of a growing sample (Sec. 5.2.1): star(p) is stored as its dual, the Voronoi cell of p
 // restricted to T_pM. The mesh is the union of the stars. Add points, then Commit(): stars and
-// counts do not change in between. A value: a copy goes on from the same state by itself.
+// counts do not change in between. A value: a copy has the same state and is independent.
 //
 //   Stars<2> stars(3, epsilon, {.inradius = 10 * epsilon});
 //   for (...) stars.Add(point, tangent);
@@ -41,31 +41,31 @@ class Stars {
 
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
-  // Adds a point, whose star the next Commit builds, and returns its id; searches of the sample see
-  // it immediately. `walls`, `conormals`: as in Site.
-  // near  a sample point whose star the new one will change, if one is known: its star is found
-  //       sooner. The star is the same in the flats; at common centres the order of the cuts may
-  //       matter in a cell that is far from convex.
+  // Adds a point, whose star the next Commit builds, and returns its id; searches of the sample
+  // find it immediately. `walls`, `conormals`: as in Site. `near`: a sample point whose star the
+  // new one will change, if one is known, which makes building faster. The star in the tangent
+  // space is the same; at common centres the order of the cuts may matter in a cell that is far
+  // from convex.
   std::uint32_t Add(const double* point, const double* tangent, std::uint32_t near = kNone,
                     WallSet walls = 0, const double* conormals = nullptr) {
     near_.push_back(near);
     return sample_.Add(point, tangent, walls, conormals);
   }
-  // Adds a point inside all walls that no search finds before Commit, which then builds all stars
-  // again, together (BulkStarBuilder): cheaper, where most of a sample comes together. `bound`: as
-  // in Sample::AddUnindexed. REQUIRES: only points added so wait for Commit.
+  // Adds a point inside all walls that no search finds before Commit. The next Commit rebuilds all
+  // stars together (BulkStarBuilder): cheaper if most of a sample is added in this way. `bound`: as
+  // in Sample::AddUnindexed. REQUIRES: all points that wait for Commit were added in this way.
   void AddInBulk(const double* point, const double* tangent, double bound = 0) {
     sample_.AddUnindexed(point, tangent, bound);
   }
   // See Sample::NameLast. REQUIRES: the point added last waits for Commit.
   void NameLast(std::uint32_t name) { sample_.NameLast(name); }
-  // From now on stars are built for the boundary only, and have no simplices inside (see
-  // StarOptions). REQUIRES: there are no stars yet.
+  // Starts boundary-only mode: stars contain only simplices of boundary faces (StarOptions).
+  // REQUIRES: there are no stars yet.
   void RestrictToBoundary() { options_.boundary_only = true; }
-  // Ends that: the next Commit builds all stars again, whole.
+  // Ends boundary-only mode: the next Commit rebuilds all stars, whole.
   void IncludeInterior() { includes_interior_next_ = options_.boundary_only; }
-  // Sets protecting balls (see Sample::SetProtectingBalls), and builds all stars again. REQUIRES:
-  // nothing waits for Commit.
+  // Sets protecting balls (Sample::SetProtectingBalls), and rebuilds all stars. REQUIRES: no point
+  // waits for Commit.
   void SetProtectingBalls(std::vector<double> radii2);
 
   // What Commit changed.
@@ -76,11 +76,11 @@ class Stars {
     std::vector<std::uint32_t> added, removed;
   };
   // Builds the stars of the added points and clips all others by them, in parallel; the result does
-  // not depend on the number of threads. `around`, if given, gets the neighbours that changed stars
-  // have or had (with repetitions): their simplices may have become inconsistent.
+  // not depend on the number of threads. `around`, if given, receives the neighbours that changed
+  // stars have or had (with repetitions): their simplices may have become inconsistent.
   Change Commit(std::vector<std::uint32_t>* around = nullptr);
 
-  // The sample with the points that wait for Commit; there are stars of all others.
+  // Returns the sample, including the points that wait for Commit; all others have stars.
   const Sample<K>& sample() const { return sample_; }
   std::uint32_t size() const { return sample_.size(); }
   CentreRule centre_rule() const { return options_.centre_rule; }
@@ -102,21 +102,21 @@ class Stars {
     }
     return true;
   }
-  // What vertex v of p's cell is dual to: a simplex of the face of its walls.
+  // The dual of vertex v of p's cell: a simplex of the face of its walls.
   struct FaceSimplex {
     Simplex ids;        // the first `count`, ascending
     int count = 0;      // its dimension, and one
     WallSet walls = 0;  // of the vertex
-    bool fake = false;  // a facet is: it is no simplex yet
-    // A vertex of it is not on the face: a point off the face is nearer to the vertex than the
-    // face's own.
+    bool fake = false;  // a facet is fake: it is no simplex yet
+    // A vertex of it is not on the face: a point off the face is nearer to the cell's vertex than
+    // the face's own points.
     bool foreign = false;
     int dimension() const { return K - CountWalls(walls); }
   };
-  // `guest_walls`: of the point with the id size(), if a facet is its.
+  // `guest_walls`: the walls of the point with the id size(), if it has a facet.
   FaceSimplex FaceSimplexOf(std::uint32_t p, const Cell& cell, std::size_t v,
                             WallSet guest_walls = 0) const;
-  // Whether p or a sample point of a facet at vertex v of its cell is guarded.
+  // Whether p, or a sample point of a facet at vertex v of its cell, has a protecting ball.
   bool TouchesProtectingBall(std::uint32_t p, const Cell& cell, std::size_t v) const {
     if (!sample_.has_protecting_balls()) return false;
     bool touches = sample_.ProtectingRadius2(p) > 0;
@@ -129,7 +129,7 @@ class Stars {
 
   // Writes the normal of a facet's half-space in p's cell, T_p^t (q - p), and returns its offset.
   double HalfSpace(std::uint32_t p, std::size_t facet, double* normal) const;
-  // |q - p|^2 for the sample point q of a facet of p's cell, without the weights' share.
+  // Returns |q - p|^2 for the sample point q of a facet of p's cell, without the weights' share.
   double EdgeLength2(std::uint32_t p, std::size_t facet) const;
 
   // A vertex of a star's cell.
@@ -137,11 +137,11 @@ class Stars {
     std::uint32_t star;
     std::size_t vertex;
   };
-  // The vertex dual to a simplex of a face of lower dimension that a point on the face of `walls`
-  // would cut off, off that face: of the lowest dimension, and there the farthest out. Nothing if
-  // the point encroaches on no face.
+  // Returns the vertex dual to a simplex of a face of lower dimension that a point on the face of
+  // `walls` encroaches on, which its insertion would cut off: the one of the lowest dimension, and
+  // among these the farthest out. Nothing if the point encroaches on no face.
   std::optional<CellVertex> EncroachedBy(const double* point, WallSet walls) const;
-  // Whether a point would take the simplex dual to a vertex of p's cell out of star(p).
+  // Whether inserting a point would remove the simplex dual to a vertex of p's cell from star(p).
   bool CutsVertex(std::uint32_t p, std::size_t vertex, const double* point) const;
 
   // The cells as they would be with one more point: its own, and those that it would cut, ascending
@@ -150,12 +150,12 @@ class Stars {
     Cell own;
     std::vector<std::pair<std::uint32_t, Cell>> cut;
   };
-  // Writes them, and changes nothing else. The arguments are those of Add.
+  // Writes these cells; the stars do not change. Other arguments: as for Add.
   void TryPoint(const double* point, const double* tangent, std::uint32_t near, Tentative* result,
                 WallSet walls = 0, const double* conormals = nullptr) const;
 
  private:
-  // The cuts of one star, which take their turns in the order of the first new points that cut.
+  // The cuts of one star. Stars are cut in the order of the first new points that cut them.
   struct Turn {
     std::uint32_t first, star;  // the first new point that cuts the star
     std::size_t begin, end;     // its cuts
@@ -165,7 +165,7 @@ class Stars {
   };
 
   StarBuilder<K> builder() const { return {sample_, options_}; }
-  // Ways of Commit.
+  // The three ways of Commit.
   Change BuildAllAsAdded();
   Change BuildAllInBulk();
   Change Insert(std::uint32_t first, std::vector<std::uint32_t>* around);
