@@ -7,10 +7,12 @@
 
 namespace stellate::core {
 
-// The constants of a run, with the defaults for this k. Get them from Resolve.
+// The constants of a run, with the defaults for this k:
+//
+//   const ResolvedCriteria criteria = Resolve(spec);
 struct ResolvedCriteria {
   double epsilon, radius_edge_bound, picking_radius, small_sliver_radius, advance_step;
-  double inradius;  // of the fake simplex that a cell begins as, length
+  double inradius;  // of the fake simplex that a cell begins with, length
   ShapeBounds shape;
   int candidates, flat_alternations;
   bool speculative;

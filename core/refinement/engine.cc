@@ -17,11 +17,11 @@ namespace {
 // Good points that no longer help: this many times the vertices that R1 and R2 needed.
 constexpr double kMostGrowth = 4;
 constexpr std::uint64_t kLeastGrowth = 2000;
-// Where one star in so many is suspect, simplices are looked for once for all stars.
+// If one star in so many is dirty, consistent simplices are found once for all stars.
 constexpr std::size_t kMostlyDirty = 2;
 
-// The order in which to go through `ids` so that neighbours follow each other: what one star's
-// judge has read of theirs is in the cache for the next.
+// Returns `ids` in an order in which neighbours follow each other: the cache then has what the
+// tests of the star before have read.
 template <int K>
 std::vector<std::uint32_t> InOrderOfPlace(const Stars<K>& stars,
                                           const std::vector<std::uint32_t>& ids) {
@@ -75,8 +75,8 @@ Target<K> Engine<K>::TargetOf(std::uint32_t star, const Violation<K>& violation)
                       violations_.failed_attempts(star));
 }
 
-// A simplex is mostly the worst one of several of its vertices' stars: the lowest of them has the
-// target, unless an attempt from there has failed.
+// A simplex is mostly the worst one in the stars of several of its vertices: the lowest of these
+// has the target, unless an attempt from there has failed.
 template <int K>
 std::vector<Target<K>> Engine<K>::SizeAndShapeTargets() const {
   using Entry = typename ViolationIndex<K>::Entry;
@@ -165,8 +165,8 @@ std::vector<Target<K>> Engine<K>::GoodPointTargets() {
     const std::uint32_t p = dirty[i];
     const bool is_resolved = found[i] && filled_.Resolves(stars_, p, *found[i]);
     if (is_resolved) filled_.NoteResolved(p);
-    // A simplex that leans or is sharp will not always yield, nor a sliver between faces that are
-    // nearer to each other than their sizes: the certificate says so.
+    // A simplex that is tilted or sharp cannot always be removed, nor a sliver between faces that
+    // are nearer to each other than their sizes: the certificate reports these.
     const bool may_stay =
         found[i] && (found[i]->tilted || found[i]->sharp || IsSliverAtBoundary(p, *found[i]));
     if (!found[i] || is_resolved || (may_stay && violations_.is_given_up(p))) {

@@ -1,5 +1,5 @@
-// What the engine does for corners of a manifold with boundary: what is there of M where more walls
-// than K meet, and where the first points of edges are.
+// The engine's work at corners of a manifold with boundary: how M looks where more than K walls
+// meet, and where the first points of edges are.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -15,16 +15,16 @@
 namespace stellate::core {
 namespace {
 
-// How far a corner's collar is: this share of epsilon, and of the distance to the nearest other
-// corner, so that two collars leave room between them.
+// The radius of a corner's concentric shell: this share of epsilon and, so that two shells keep
+// apart, of the distance to the nearest other corner.
 constexpr double kShell = 0.5;
 constexpr double kShellShare = 0.4;
 
 template <int K>
 using Vector = Eigen::Matrix<double, K, 1>;
 
-// Along the edges that leave a corner, and the walls of each. Of K walls: on all but one, what
-// leaves that one alone inwards.
+// Returns the directions of the edges that leave a corner, and their walls. With K walls, each edge
+// is on all walls except one, and leaves that one inwards.
 template <int K>
 std::vector<std::pair<Vector<K>, WallSet>> EdgesAtCorner(const Stars<K>& stars, std::uint32_t p) {
   std::vector<std::pair<Vector<K>, WallSet>> edges;
@@ -46,8 +46,8 @@ std::vector<std::pair<Vector<K>, WallSet>> EdgesAtCorner(const Stars<K>& stars, 
 
 }  // namespace
 
-// Around each corner, before anything else, a point on each of its edges: these are equally far
-// then, and no two edges that leave a corner at a sharp angle split each other without end.
+// Plans, before all other points, one point on each edge of each corner. All are equally far from
+// the corner, so that two edges at a sharp angle do not split each other without end.
 template <int K>
 PlannedPoints Engine<K>::PlanShells() {
   std::vector<std::uint32_t> corners;

@@ -1,5 +1,5 @@
-// What the engine does for manifolds with boundary alone: faces are meshed by dimension, the lowest
-// first, and each insertion yields to faces of lower dimension, as in Ruppert's refinement.
+// The engine's work for manifolds with boundary: faces are meshed by dimension, the lowest first,
+// and each insertion yields to faces of lower dimension, as in Ruppert's refinement.
 
 #include <algorithm>
 #include <array>
@@ -17,19 +17,18 @@
 namespace stellate::core {
 namespace {
 
-// Shape never grinds the boundary down: a face's simplex of less than this share of the size asked
-// for is split for the sake of sizes alone. A larger share leaves no shape where faces are near to
-// each other: of 63 gyroid solids that end just beside the corners of their boxes 12 do not close
-// with this, 25 with 0.05, more than half with 0.25.
+// R2 and R3 never split a boundary simplex below this share of the size bound. With a larger share
+// shapes are bad where faces are near each other: of 63 gyroid solids that end just beside the
+// corners of their boxes 12 do not close with this, 25 with 0.05, more than half with 0.25.
 constexpr double kLeastSplit = 0.02;
-// A point of a face is news this far from the sample, in sizes asked for; a corner, which nothing
-// else can be instead of, anywhere but at itself.
+// The distance from the sample, in size bounds, at which a boundary point counts as uncovered. A
+// corner, which no other point replaces, counts everywhere except at itself.
 constexpr double kNewsAway = 0.5;
-// On a curved edge a collar may be a little longer than it was set.
+// On a curved edge the radius of a shell may be a little larger than it was set.
 constexpr double kShellLength = 1.1;
 
-// A face of the stage that no vertex is on takes a seed however near to the sample: it is a small
-// piece of walls beside others, and without it the mesh would be another manifold's.
+// An inactive face of the stage takes a seed at any distance from the sample: it is a small piece
+// of walls beside others, without which the mesh would be that of another manifold.
 template <int K>
 void TakeSeedsOfInactiveFaces(const Stars<K>& stars, int stage,
                               std::vector<typename BoundaryState<K>::Seed>* seeds,
@@ -64,8 +63,8 @@ bool Engine<K>::IsSliverAtBoundary(std::uint32_t star, const Violation<K>& viola
                      [&](std::uint32_t id) { return stars_.sample().walls(id) != 0; });
 }
 
-// The simplex dual to a vertex of a star's cell, to be split although it breaks no rule. Nothing
-// where that would go too far.
+// Returns the simplex dual to a vertex of a star's cell as a target, to be split although it breaks
+// no rule; nothing if it is too small already.
 template <int K>
 std::optional<Target<K>> Engine<K>::SplitOf(const typename Stars<K>::CellVertex& at,
                                             Rule by) const {
@@ -80,7 +79,7 @@ std::optional<Target<K>> Engine<K>::SplitOf(const typename Stars<K>::CellVertex&
   const auto simplex = stars_.FaceSimplexOf(at.star, cell, at.vertex);
   if (IsOnShell(simplex)) return std::nullopt;
   if (violation.dimension() <= boundary_.left()) return std::nullopt;
-  // The middle of an edge between guards is in both.
+  // The middle of an edge between two protecting balls is in both.
   if (simplex.count == 2 && stars_.sample().ProtectingRadius2(simplex.ids[0]) > 0 &&
       stars_.sample().ProtectingRadius2(simplex.ids[1]) > 0)
     return std::nullopt;
@@ -89,9 +88,9 @@ std::optional<Target<K>> Engine<K>::SplitOf(const typename Stars<K>::CellVertex&
   return TargetOf(at.star, violation);
 }
 
-// Where no point near a sliver was good and all its corners are on one wall, which may be flat: a
-// simplex of the wall that it lies on, to be split. Its centre may be on the wall itself then, and
-// what lies near it neither cuts the sliver off nor spoils the wall.
+// Returns a simplex of a wall to be split instead of a sliver on it, all of whose vertices are on
+// that wall, which may be flat, if no point near the sliver was good. The sliver's centre may be on
+// the wall itself, and points near it neither cut the sliver off nor encroach on the wall.
 template <int K>
 std::optional<Target<K>> Engine<K>::SplitUnderSliver(std::uint32_t star,
                                                      const Violation<K>& violation) const {
@@ -111,9 +110,9 @@ std::optional<Target<K>> Engine<K>::SplitUnderSliver(std::uint32_t star,
   return std::nullopt;
 }
 
-// Has the targets that would spoil a face of lower dimension split that instead. What answers have
-// encroached on comes besides. Only what is too large is split while faces of lower dimension have
-// targets: beside a face that cannot be mended shapes never would be, however small.
+// Replaces targets that would encroach on a face of lower dimension by splits of that face, and
+// adds the simplices that answers have encroached on. While faces of lower dimension have targets,
+// only R1 splits: beside a face that cannot be fixed, no shape ever could be, however small.
 template <int K>
 void Engine<K>::YieldToFaces(std::vector<Target<K>>* targets) {
   int lowest = K;
@@ -132,8 +131,8 @@ void Engine<K>::YieldToFaces(std::vector<Target<K>>* targets) {
     stars_.sample().Lift(t.star, t.x, aim.data());
     return stars_.EncroachedBy(aim.data(), t.violation.walls);
   };
-  // The image of a far aim may fall anywhere; good points have several candidates, and after a
-  // failed attempt the point is another.
+  // The answer to a far target may lie anywhere; good points have several candidates, and after a
+  // failed attempt another point is queried.
   const auto may_yield = [&](const Target<K>& t) {
     return t.violation.rule < Rule::kShape && violations_.failed_attempts(t.star) == 0;
   };
@@ -227,7 +226,7 @@ bool Engine<K>::LeaveStage() {
   return AdvanceStage();
 }
 
-// What is known of the boundary is as far as stars are followed while faces are meshed alone.
+// In boundary-only mode stars are built only as far as the boundary is known.
 template <int K>
 void Engine<K>::CompleteStars(std::vector<std::uint32_t>* added,
                               std::vector<std::uint32_t>* removed) {

@@ -8,7 +8,7 @@
 namespace stellate::core {
 namespace {
 
-// Where cavities are filled: below, good points mend the few stars that disagree.
+// Cavities are filled from this k on: below, good points resolve the few inconsistencies.
 constexpr int kFirstFilled = 4;
 
 }  // namespace

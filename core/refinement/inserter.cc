@@ -11,15 +11,15 @@
 namespace stellate::core {
 namespace {
 
-// Targets of a round lie R apart: images no farther than this share of R from their targets lie at
-// least R / 2 apart, as far as the empty ball asks.
+// Targets of a round lie R apart: answers no farther than this share of R from their targets lie at
+// least R / 2 apart, the distance that Caution::empty_ball wants.
 constexpr double kNearAim = 0.25;
 // Good points are chosen off the centre.
 constexpr double kGoodPointSpacing = 0.25;
 // A split falls near the middle of what it splits.
 constexpr double kSplitSpacing = 0.3;
-// True points fall elsewhere than predicted: one that comes nearer to another than this share of
-// the spacing that was planned for it would cost quality.
+// True points differ from predicted ones: a point nearer to another than this share of its planned
+// spacing would cost quality.
 constexpr double kKeptSpacing = 0.95;
 
 }  // namespace
@@ -69,8 +69,8 @@ typename Inserter<K>::Outcome Inserter<K>::InsertTarget(std::size_t i) {
                                                                : InsertRefined(i, refined_[i]);
 }
 
-// Of the ball around the insertion point: from a guarded point it reaches to its ball's border,
-// orthogonally.
+// Returns the radius of the empty ball around the insertion point. If the star's point has a
+// protecting ball, the two balls are orthogonal.
 template <int K>
 double Inserter<K>::EmptyRadius(const Target<K>& t) const {
   const double ball_radius2 = to_.stars.sample().ProtectingRadius2(t.star);
@@ -119,7 +119,7 @@ typename Inserter<K>::Outcome Inserter<K>::InsertRefined(std::size_t i, RefinedP
   }
   if (YieldsToFaces(judged, t, c)) return NoteFailedAttempt(t.star);
   const double* y = answers_.points.col(c).data();
-  // Another of this round may have come near, unless all have stayed near where they were aimed.
+  // Another point of this round may be near, unless all lie near their targets.
   if (judged.cuts_violation && !all_near_target_)
     judged.duplicate = to_.stars.sample().AnyWithin(y, Clearance(t));
   if (judged.duplicate || !judged.cuts_violation) {
@@ -130,8 +130,8 @@ typename Inserter<K>::Outcome Inserter<K>::InsertRefined(std::size_t i, RefinedP
   return Insert(c, t.violation.rule, t.star);
 }
 
-// What spoils a face of lower dimension, or lies beyond a wall, is not inserted: that face is
-// refined instead, or found.
+// A point that encroaches on a face of lower dimension, or lies beyond a wall, is not inserted:
+// that face is refined instead, or discovered.
 template <int K>
 bool Inserter<K>::YieldsToFaces(const RefinedPoint& judged, const Target<K>& t, Eigen::Index c) {
   if (judged.encroached) {
@@ -144,7 +144,7 @@ bool Inserter<K>::YieldsToFaces(const RefinedPoint& judged, const Target<K>& t, 
   return true;
 }
 
-// Whether a point is in M and spoils no face.
+// Whether a point is in M and encroaches on no face.
 template <int K>
 bool Inserter<K>::FitsFaces(Eigen::Index c) const {
   return !to_.boundary.has_walls() ||
@@ -184,7 +184,7 @@ template <int K>
 typename Inserter<K>::Outcome Inserter<K>::InsertGoodPoint(std::size_t i, int best) {
   const Target<K>& t = candidates_.targets[i];
   if (best < 0) {
-    // The first that is in the way of a face has that refined.
+    // The first candidate that encroaches on a face has that face refined.
     for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c) {
       if (!to_.boundary.has_walls() || !answers_.found[static_cast<std::size_t>(c)]) continue;
       RefinedPoint judged;
@@ -198,7 +198,7 @@ typename Inserter<K>::Outcome Inserter<K>::InsertGoodPoint(std::size_t i, int be
   const Eigen::Index c = candidates_.first[i] + best;
   if (to_.stars.sample().AnyWithin(answers_.points.col(c).data(),
                                    kGoodPointSpacing * EmptyRadius(t)))
-    return Outcome::kPutOff;  // another of this round came near
+    return Outcome::kPutOff;  // another point of this round is near
   return Insert(c, t.violation.rule, t.star);
 }
 
@@ -218,8 +218,7 @@ void Inserter<K>::InsertPlanned() {
         to_.boundary.Discover(answers_.points.col(c), WallsOf(c), *beyond);
       continue;
     }
-    if (K - CountWalls(WallsOf(c)) >
-        to_.boundary.stage()) {  // corners and their collars come first
+    if (K - CountWalls(WallsOf(c)) > to_.boundary.stage()) {  // corners and their shells come first
       to_.boundary.KeepSeed(answers_.points.col(c), WallsOf(c));
       continue;
     }
@@ -244,8 +243,8 @@ typename Inserter<K>::Outcome Inserter<K>::Insert(Eigen::Index c, Rule rule, std
   return Outcome::kInserted;
 }
 
-// When speculating at once: what the surrogate refuses is left for true points, since shorter steps
-// would only crowd the border of what it knows.
+// A speculative run gives a star up after one attempt: true points will do what the surrogate
+// refuses, since shorter steps would only crowd the border of the part that it knows.
 template <int K>
 typename Inserter<K>::Outcome Inserter<K>::NoteFailedAttempt(std::uint32_t star) {
   if (caution_.is_speculative)

@@ -12,16 +12,17 @@ namespace stellate::core {
 namespace {
 
 // Wedges and corners of 50 degrees were seen to close without balls, of 40 not. An edge that is
-// sharper somewhere is guarded up to the second of these along it: beside a guard there should not
-// lie the sharpest of what has none.
+// sharper somewhere gets balls along it up to the second angle: the sharpest point without a ball
+// should not lie next to a ball.
 constexpr double kNeedsBall = 0.64278760968653933;       // cosine of 50 degrees
 constexpr double kProtectedBelow = 0.34202014332566873;  // of 70
-// Of the size asked for. A simplex at a guarded point p is measured from p, beyond its ball.
+// As a share of the size bound. A simplex at a point with a protecting ball is measured beyond that
+// ball.
 constexpr double kLargest = 0.6;
 constexpr double kOtherEdge = 1.0 / 3;
 constexpr double kOtherPoint = 0.9;  // of the distance to points inside of faces
-// Of the length of an edge at a corner, the sum of the radii at its ends: there they only have to
-// meet.
+// The sum of the radii at the ends of an edge at a corner, as a share of its length: there the
+// balls must only touch.
 constexpr double kMeet = 1;
 constexpr double kSplitsPerOctave = 20;
 
@@ -55,7 +56,8 @@ std::vector<HalfEdge<K>> EdgesAt(const Stars<K>& stars, std::uint32_t p) {
   return edges;
 }
 
-// What a ball around p has room for beside everything that is not along its own edge.
+// Returns the largest radius of a ball around p that keeps clear of everything not along its own
+// edge.
 template <int K>
 double ClearanceAt(const Stars<K>& stars, std::uint32_t p, double bound) {
   double clearance = kLargest * bound;

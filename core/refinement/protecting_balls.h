@@ -7,10 +7,10 @@
 
 namespace stellate::core {
 
-// Protecting balls of sharp edges, k = 3 (Cheng, Dey and Ramos). Where two walls meet at less than
-// about 50 degrees, refining one encroaches on the other and back, without end. So each vertex of
-// such an edge, and each corner at its ends, gets a ball in which no point is inserted. Where the
-// balls of neighbours overlap, no point outside comes nearer to the edge than they are.
+// Protecting balls of sharp edges, k = 3 (Cheng, Dey and Ramos). If two walls meet at less than
+// about 50 degrees, refining one encroaches on the other and back, without end. Therefore each
+// vertex of such an edge, and each corner at its ends, gets a ball in which no point is inserted.
+// Where the balls of neighbours overlap, no point outside is nearer to the edge than they are.
 //
 // A radius is less than the distance to the neighbours along the edge, and a third of the distance
 // to any other edge or corner. Where such balls do not overlap, split the edge first. Existing

@@ -19,12 +19,12 @@
 namespace stellate::core {
 namespace {
 
-// Simplices lean at least 0.05 radians less than a proof allows: what tangents found by
-// differences may be wrong by where epsilon is half of the reach, with some to spare.
+// Simplices must be tilted 0.05 radians less than a proof allows: more than the error of tangents
+// found by differences if epsilon is half of the reach.
 constexpr double kCosineOfTiltMargin = 0.99875026039496623,
                  kSineOfTiltMargin = 0.049979169270678331;
-// A volume this small beside the lengths of the edges that span it is one of points that are off a
-// flat wall by an oracle's error.
+// A volume below this share of the product of its edges' lengths belongs to points that an oracle's
+// error alone takes off a flat wall.
 constexpr double kFlatEdges = 1e-8;
 // Below this dimension such simplices were not seen to stay.
 constexpr int kFirstFlat = 4;
@@ -40,8 +40,8 @@ Violation<K> AtVertex(Rule rule, const RestrictedVoronoiCell<K>& cell, std::size
   return violation;
 }
 
-// Of two vertices of p's cell that are equally bad: whose simplex has the lower ids. The order in
-// which a cell keeps them hangs on how it came about.
+// Whether, of two vertices of p's cell that are equally bad, v's simplex has the lower ids. The
+// order of a cell's vertices depends on the order of its cuts.
 template <int K>
 bool Precedes(const RestrictedVoronoiCell<K>& cell, std::size_t v, std::size_t w) {
   const auto ids_of = [&](std::size_t at) {
@@ -53,7 +53,7 @@ bool Precedes(const RestrictedVoronoiCell<K>& cell, std::size_t v, std::size_t w
   return ids_of(v) < ids_of(w);
 }
 
-// Whether v is worse than what is the worst so far, by what is said of each.
+// Whether v is worse than the worst so far, by the measure of each.
 template <int K>
 bool IsWorse(const RestrictedVoronoiCell<K>& cell, std::size_t v, double badness,
              const std::optional<std::size_t>& worst, double worst_badness) {
@@ -84,7 +84,7 @@ struct SimplexEdges {
   double gram[K][K];
 };
 
-// Whether the face on p and the others in `face`, a bit each, two at least, is a sliver.
+// Whether the face on p and the vertices in `face`, a bit each, two at least, is a sliver.
 template <int K, unsigned face>
 bool IsThin(const SimplexEdges<K>& edges, double sliver_bound) {
   constexpr int j = std::popcount(face);
@@ -127,7 +127,7 @@ bool HasThinFace(const SimplexEdges<K>& edges, double sliver_bound) {
   (std::make_integer_sequence<unsigned, 1u << K>());
 }
 
-// Of a star at the boundary, whose vertices are dual to simplices of several faces.
+// Tests a star at the boundary, whose cell's vertices are dual to simplices of several faces.
 template <int K>
 std::optional<Violation<K>> WorstSizeOrShapeOnFaces(const Stars<K>& stars, std::uint32_t p,
                                                     double epsilon, double radius_edge_bound,
@@ -269,9 +269,9 @@ bool TiltsTooFar(const Stars<K>& stars, std::uint32_t p, const double* at,
 
 namespace {
 
-// Whether the simplex on p and the facets of v has all its vertices on one wall and no volume as
-// p sees it. Stars may agree on one where the wall's own simplices and those inside are not of one
-// mind about cospherical points of a flat wall.
+// Whether the simplex on p and the facets of v has all its vertices on one wall and no volume in
+// p's tangent space. Stars may agree on such a simplex if the wall's own simplices and those inside
+// split cospherical points of a flat wall differently.
 template <int K>
 bool IsFlatOnWall(const Stars<K>& stars, std::uint32_t p, const RestrictedVoronoiCell<K>& cell,
                   std::size_t v) {
@@ -287,7 +287,7 @@ bool IsFlatOnWall(const Stars<K>& stars, std::uint32_t p, const RestrictedVorono
   return std::abs(Determinant<K>(edges)) <= kFlatEdges * edges.colwise().norm().prod();
 }
 
-// Of a closed star that breaks no rule besides.
+// Tests a closed star that breaks no other rule.
 template <int K>
 std::optional<Violation<K>> SharpSimplex(const Stars<K>& stars, std::uint32_t p,
                                          const ShapeBounds& bounds, double size_bound) {

@@ -56,9 +56,8 @@ std::optional<Violation<K>> WorstSizeOrShape(const Stars<K>& stars, std::uint32_
 // by R_p, of the first of these that occurs:
 //
 //   1. it is or contains a sliver, and p is its lowest vertex;
-//   2. it is inconsistent, or, at common centres, it and a neighbour are on the same side of the
-//   facet
-//      that they share in T_pM: then the star is not an embedded disk although its vertices agree;
+//   2. it is inconsistent, or, at common centres, it and a neighbour are on the same side of their
+//      common facet in T_pM: then the star is not an embedded disk although its vertices agree;
 //   3. it is tilted too far, and p is its lowest vertex;
 //   4. it has a sharp dihedral angle, and p is its lowest vertex.
 //
@@ -71,14 +70,15 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const Stars<K>& stars, std
                                                       int least = 1);
 
 // Whether the simplex on p and the facets of v is or contains a Theta0-sliver (Sec. 2.3): that is,
-// whether some face at p, of dimension 2 or more, has fatness below Theta0^j.
+// whether some face at p, of dimension j >= 2, has fatness below Theta0^j. `unborn`: the point with
+// the id stars.size(), which is not in the sample, or nullptr.
 template <int K>
 bool HasThinFaceAt(const Stars<K>& stars, const double* p, const RestrictedVoronoiCell<K>& cell,
                    std::size_t v, double sliver_bound, const double* unborn);
 
 // Whether the simplex on p and the facets of v is tilted too far from the tangent space of one of
 // its vertices for a proof from this reach, or is so large that M itself may turn too far under it.
-// `unborn` as above: it has no tangent space yet.
+// `unborn`: as above; it has no tangent space yet.
 template <int K>
 bool TiltsTooFar(const Stars<K>& stars, std::uint32_t p, const double* at,
                  const RestrictedVoronoiCell<K>& cell, std::size_t v, double reach,
@@ -86,7 +86,7 @@ bool TiltsTooFar(const Stars<K>& stars, std::uint32_t p, const double* at,
 
 // Counts the bad simplices that a tentative insertion would make: new slivers of circumradius at
 // most `small_radius`, simplices that stars would disagree about, and foreign ones. Stops counting
-// at `enough`. `walls`: those that the point is on.
+// at `enough`. `walls`: the walls of the point.
 template <int K>
 int CountBad(const Stars<K>& stars, const double* point,
              const typename Stars<K>::Tentative& tentative, const ShapeBounds& bounds,

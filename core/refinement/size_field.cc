@@ -13,17 +13,17 @@
 namespace stellate::core {
 namespace {
 
-// Shorter edges than this share of a star's longest say little of curvature and much of noise.
+// Edges shorter than this share of a star's longest show noise more than curvature.
 constexpr double kTellingEdge = 0.5;
-// The finest graded sizes, in epsilon: an estimate may come of noise; what is given is meant, but
-// below it the weights of Stars would no longer be small against circumradii.
+// The finest graded sizes, in epsilon. A smaller estimate may be noise; below the limit of given
+// sizes the sample's weights would no longer be small compared with circumradii.
 constexpr double kFinestEstimated = 1.0 / 64;
 constexpr double kFinestGiven = 1.0 / 1024;
-// Estimates are spread anew whenever the sample has grown by this factor.
+// Estimates are spread again whenever the sample has grown by this factor.
 constexpr double kSpreadingGrowth = 1.25;
 
-// How far q is, along M, from the tangent space of the walls that it shares with p: the most of
-// them, squared. `along`: q - p in p's tangent coordinates.
+// Returns the largest squared distance of q, along M, from the tangent space of a wall that it
+// shares with p. `along`: q - p in p's tangent coordinates.
 template <int K>
 double OffWalls2(const Stars<K>& stars, std::uint32_t p, std::uint32_t q, const double* along) {
   double most2 = 0;
@@ -46,8 +46,8 @@ SizeField<K>::SizeField(const ResolvedCriteria& criteria)
       is_graded_(criteria.graded()),
       is_given_(criteria.sizes_given) {}
 
-// |q - p|^2 / (2 dist(q, T_pM)) bounds the reach from above for any q of M (Federer); over the
-// edges of a star, short ones left out, it is the radius of curvature there.
+// |q - p|^2 / (2 dist(q, T_pM)) bounds the reach from above for any q of M (Federer). Its minimum
+// over the edges of a star, without short ones, is the radius of curvature there.
 template <int K>
 double SizeField<K>::SeenFrom(const Stars<K>& stars, std::uint32_t p) const {
   const auto& cell = stars.cell(p);
@@ -79,7 +79,8 @@ void SizeField<K>::Look(const Stars<K>& stars, const std::vector<std::uint32_t>&
   is_spread_ = false;
 }
 
-// What is seen from there, from the neighbours, and from all when that was last spread.
+// The least of the sizes seen from the star, from its neighbours, and from all stars when they were
+// last spread.
 template <int K>
 double SizeField<K>::Estimate(const Stars<K>& stars, std::uint32_t p) const {
   double size = seen_[p];
@@ -93,7 +94,8 @@ double SizeField<K>::Estimate(const Stars<K>& stars, std::uint32_t p) const {
   return size;
 }
 
-// The largest 1-Lipschitz function over the edges of the stars that is nowhere above what is seen.
+// Computes the largest 1-Lipschitz function over the edges of the stars that is nowhere above the
+// sizes seen.
 template <int K>
 void SizeField<K>::Spread(const Stars<K>& stars) {
   using Entry = std::pair<double, std::uint32_t>;
@@ -145,8 +147,8 @@ double SizeField<K>::BoundFor(double size) const {
   return std::clamp(WantedFor(size), FinestBound(), epsilon_);
 }
 
-// Of given sizes the star's own alone: where they differ within a simplex, the star of the vertex
-// that has the smallest sees to it.
+// Given sizes count only for the star's own vertex: if they differ within a simplex, the star of
+// the vertex with the smallest refines it.
 template <int K>
 double SizeField<K>::BoundAt(const Stars<K>& stars, std::uint32_t p) const {
   if (!is_graded_) return epsilon_;

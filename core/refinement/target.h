@@ -30,8 +30,8 @@ Target<K> TargetFor(std::uint32_t star, const Violation<K>& violation, double si
   target.star = star;
   target.violation = violation;
   target.size_bound = size_bound;
-  // Many steps are as long as they may be: exactly so, or else rounding would say which comes
-  // first.
+  // Many steps have exactly the longest length allowed: otherwise rounding would decide their
+  // order.
   target.radius = violation.radius;
   if (violation.rule < Rule::kShape) {
     target.radius = std::min(target.radius, advance_step);

@@ -29,7 +29,7 @@ void ViolationIndex<K>::Update(std::uint32_t count, const std::vector<std::uint3
     size_and_shape_ = std::move(entries);
   else
     size_and_shape_.insert(size_and_shape_.end(), entries.begin(), entries.end());
-  // A sample that was just laid has many.
+  // The initial sample has many.
   if (size_and_shape_.size() < size_and_shape_.capacity() / 4) size_and_shape_.shrink_to_fit();
 }
 
@@ -69,7 +69,7 @@ std::vector<std::uint32_t> ViolationIndex<K>::TakeDirty(const std::vector<std::u
   return taken;
 }
 
-// A star that was given up for R1 or R2 is not entered any more once it was judged by the others.
+// A star that was given up for R1 or R2 is no longer entered once R3 and R4 were tested.
 template <int K>
 void ViolationIndex<K>::NoteJudged(std::uint32_t star, std::optional<Rule> rule) {
   is_entered_[star] = 0;

@@ -26,17 +26,17 @@ class ViolationIndex {
 
   std::uint32_t star_count() const { return static_cast<std::uint32_t>(is_entered_.size()); }
 
-  // R1 and R2, after an insertion: there are `count` stars now. Those in `judged` are new or
+  // Updates R1 and R2 after an insertion: there are `count` stars now. Those in `judged` are new or
   // changed, and `entries` has their violations, which replace the earlier ones.
   void Update(std::uint32_t count, const std::vector<std::uint32_t>& judged,
               std::vector<Entry> entries);
   // Replaces the violations of all stars, after their bounds changed.
   void Replace(std::vector<Entry> entries);
-  // One violation a star.
+  // Returns the violations of R1 and R2, one for each star.
   const std::vector<Entry>& size_and_shape() const { return size_and_shape_; }
 
-  // R3 and R4, which are tested once R1 and R2 hold. Until then, and after MarkAllDirty, all stars
-  // are dirty.
+  // R3 and R4 are tested once R1 and R2 hold. Until then, and after MarkAllDirty, all stars are
+  // dirty.
   bool are_all_dirty() const { return all_dirty_; }
   void MarkAllDirty();
   void MarkDirty(const std::vector<std::uint32_t>& stars);
