@@ -8,25 +8,25 @@
 namespace stellate::core {
 
 // The cone that the walls at a corner leave of its tangent space, from their conormals. K
-// independent walls have a facet of it each. Where more walls meet, as at an octahedron's corner,
-// or where a level set passes through the corner of a box, some may have none.
+// independent walls have a facet of it each. If more walls meet, as at an octahedron's corner, or
+// where a level set passes through the corner of a box, some may have none.
 inline constexpr int kMostAtCorner = 16;
 template <int K>
 struct CornerCone {
-  // Where M's edges leave the corner.
+  // The direction in which an edge of M leaves the corner.
   struct Ray {
     Eigen::Matrix<double, K, 1> along;  // unit
-    WallSet walls;                      // that it is on
+    WallSet walls;                      // of the edge
   };
   std::vector<Ray> rays;  // none: M is only the corner there
-  WallSet walls = 0;      // those that have a facet of it
-  // It has an inside, and K - 1 walls meet along each ray.
+  WallSet walls = 0;      // the walls that have a facet of it
+  // Whether it has an interior, and K - 1 walls meet along each ray.
   bool is_simple = false;
-  WallSet crowded = 0;  // else: more walls than that which meet along one ray; or none
+  WallSet crowded = 0;  // if not simple: more than K - 1 walls that meet along one ray; or none
 };
 
-// `conormals`: K numbers for each of the walls, ascending, outward and unit.
-// REQUIRES: K > 1, and K of them are independent; there are kMostAtCorner at most.
+// Returns the cone. `conormals`: K numbers for each of the walls, ascending, outward and unit.
+// REQUIRES: K > 1; K of them are independent; there are kMostAtCorner at most.
 template <int K>
 CornerCone<K> ConeOf(WallSet walls, const double* conormals);
 

@@ -8,7 +8,7 @@
 
 namespace stellate::core {
 
-// Where walls meet at small angles. There refining one wall encroaches on the other and back,
+// Edges where walls meet at small angles. Refining one wall there encroaches on the other and back,
 // without end, unless the edge between them has protecting balls.
 
 struct WallCosine {
@@ -17,11 +17,11 @@ struct WallCosine {
 };
 
 // Returns the two walls at a point that meet at the smallest angle, by their conormals; nothing if
-// it is on fewer than two.
+// it is on fewer than two walls.
 template <int K>
 std::optional<WallCosine> SharpestAt(const Stars<K>& stars, std::uint32_t p);
 
-// The same of all points, as reports have it.
+// Returns the smallest angle at all points, as reports have it.
 template <int K>
 std::optional<WallAngle> Sharpest(const Stars<K>& stars);
 

@@ -14,8 +14,8 @@ struct WallBend {
   double degrees = 0;     // between the conormals at the two
   double length = 0;      // from one to the other
   Eigen::VectorXd point;  // the middle between them
-  double radius() const;  // of a circle that bends so over that length
-  // As of any reach (TooCoarse).
+  double radius() const;  // of a circle that bends by as much over that length
+  // Returns the epsilon to advise for a reach of that radius (TooCoarse).
   double size_to_take() const { return 0.4 * radius(); }
 };
 

@@ -14,22 +14,23 @@
 namespace stellate::core {
 namespace {
 
-// An answer farther than this many spacings from what was asked is no neighbour: M bends away.
+// An answer farther than this many spacings from its query is no neighbour: M bends away.
 constexpr double kFarthestAnswer = 1;
 // Tangent spaces that keep less of a frame's volume than this have turned too far to carry it on.
 constexpr double kLeastVolume = 0.1;
 // Points of a run lie within this many spacings of its first: of higher dimension there are more of
 // them around a longer one than a search costs.
 constexpr double RunReach(int k) { return k < 3 ? 4 : 1.5; }
-// A lattice whose sizes change by more than this from what is expected costs more than it spares.
+// A lattice whose sizes differ by more than this factor from the expected ones costs more than it
+// saves.
 constexpr double kUnexpected = 1.25;
-// So many answers tell whether it is worth while: if more than this share is not as expected, sizes
-// change within a spacing.
+// So many answers decide whether the lattice is worth while: if more than this share is not as
+// expected, sizes change within a spacing.
 constexpr std::uint64_t kTelling = 256;
 constexpr double kMostUnexpected = 0.5;
-// Few points are laid into the newest layer, until it is as large as this share of the one before.
+// A few points join the newest layer, until it is as large as this share of the one before.
 constexpr std::size_t kLayerGrowth = 2;
-// What is known to be clear by more than rounding can take is not searched.
+// A point that is clear by more than rounding can take is not searched.
 constexpr double kSurely = 1 + 1e-9;
 
 // Makes of `frame` (K rows of d, roughly orthonormal) the orthonormal frame of the span of
@@ -87,7 +88,7 @@ Runs Growth<K>::RunsOf(const std::vector<double>& points, const std::vector<doub
   return Runs(points, d_, RunReach(K) * spacing_, shares);
 }
 
-// What is laid within its share of `radius` of some point of the run, and more.
+// Gathers the sampled points within their share of `radius` of some point of the run, and more.
 template <int K>
 void Growth<K>::GatherPlaced(const Runs& runs, std::size_t run, const std::vector<double>& shares,
                              double radius, Placed* near) const {
@@ -133,8 +134,8 @@ std::vector<std::uint8_t> Growth<K>::AreFarFromPlaced(const std::vector<double>&
   return far;
 }
 
-// Which of those below keep their distance from what is laid: what came out near a place that was
-// clear of all needs no search.
+// Returns which candidates keep their distance from the sample: a candidate near a place that was
+// clear of all points needs no search.
 template <int K>
 std::vector<std::uint8_t> Growth<K>::AreFree(const std::vector<double>& candidates,
                                              const std::vector<double>& shares,
@@ -159,9 +160,9 @@ std::vector<std::uint8_t> Growth<K>::AreFree(const std::vector<double>& candidat
   return free;
 }
 
-// Of proposals that came out as `candidates`, d each, with their shares, in the order of `columns`,
-// those that keep their distance from what is laid and from each other. Those of more parents are
-// more likely where they belong.
+// Chooses, of the answers `candidates` to proposals, d each, with their shares, in the order of
+// `columns`, those that keep their distance from the sample and from each other. Proposals of more
+// parents come first: they are more likely at their place in the lattice.
 template <int K>
 std::vector<std::uint32_t> Growth<K>::Choose(const std::vector<double>& candidates,
                                              const std::vector<double>& shares,
@@ -216,7 +217,7 @@ typename Growth<K>::Ring Growth<K>::Propose() {
           Eigen::Map<const Eigen::MatrixXd>(asked_.sites.frames.data(), d_ * K, count)};
 }
 
-// Keeps the share that the answer to the `asked`th question has, if it is about as expected.
+// Keeps the share of the answer to query `asked`, if it is about as expected.
 template <int K>
 bool Growth<K>::IsExpected(std::size_t asked, double share) {
   const double expected = std::exchange(asked_.sites.shares[asked], share);
@@ -233,7 +234,7 @@ void Growth<K>::Forget() {
   asked_ = Proposed();
 }
 
-// Appends to the sample, which goes on from there.
+// Appends sites to the sample, which grows on from them.
 template <int K>
 void Growth<K>::Carry(Sites sites) {
   border_.Append(sites);

@@ -33,9 +33,9 @@ class Growth {
   Growth(int d, double spacing);
 
   // Makes seeds of those points of M, d x n with tangent bases (K rows of d) x n, that are found,
-  // farther than `room` lattice spacings from all points so far, and `apart` (times the share)
-  // from each other. `shares`: of the spacing, n, or empty where it is not graded. Returns the
-  // columns of the seeds, ascending.
+  // farther than `clearance` lattice spacings from all points so far, and `apart` spacings (times
+  // the share) from each other. `shares`: of the spacing, n, or empty if it is not graded. Returns
+  // the columns of the seeds, ascending.
   std::vector<Eigen::Index> Begin(const Eigen::MatrixXd& points, const Eigen::MatrixXd& tangents,
                                   const std::vector<std::uint8_t>& found, double apart,
                                   const Eigen::VectorXd& shares = {}, double clearance = 1);
@@ -58,14 +58,14 @@ class Growth {
   void Forget();
 
   std::uint32_t size() const { return size_; }
-  // The points that joined last.
+  // Returns the number of points that joined last.
   std::size_t border() const { return border_.size(); }
   double spacing() const { return spacing_; }
   // The largest distance of a site from the point that proposed it, length.
   double reach() const { return longest_; }
 
-  // Least distance in the sample, in spacings: of a lattice that covers with radius epsilon, 1.4
-  // epsilon for k = 1, 1.2, 1.1, 1.0 and 0.9 for k = 2 to 5.
+  // The least distance in the sample, in spacings. In a lattice of covering radius epsilon: 1.4
+  // epsilon for k = 1; 1.2, 1.1, 1.0 and 0.9 for k = 2 to 5.
   static constexpr double kKeep = 0.72;
 
  private:

@@ -1,4 +1,4 @@
-// Where a lattice goes on.
+// How a lattice is continued.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -14,22 +14,22 @@
 namespace stellate::core {
 namespace {
 
-// Of what is laid around a point, in its spacings squared: where less lies in a direction, sizes
-// are taken to change little along it.
+// The least second moment of the sampled points around a point, in its spacings squared: if it is
+// less in a direction, sizes are taken to change little along it.
 constexpr double kLeastMoment = 0.05;
-// Simplices follow the smallest size of their corners: where sizes change, they are laid smaller
+// Simplices follow the smallest size at their vertices: where sizes change, the spacing is smaller
 // by this share of the change in a spacing, at most by half.
 constexpr double kSlopeMargin = 0.3;
 constexpr double kLeastStep = 0.5;
 // Proposals nearer to each other than this many spacings are one.
 constexpr double kMerged = 0.5;
-// Places are looked at so many spacings farther around than what would take them lies: what is
-// asked for there comes out a little beside, and mostly needs no search then. Slopes are told by
-// what is near alone.
+// Points are gathered this many spacings farther around a place than those that would take it: the
+// answer lies a little beside the place, and mostly needs no search then. Only near points decide
+// slopes.
 constexpr double Beside(bool is_graded) { return is_graded ? 0 : 0.15; }
 
-// How shares change from that of a point, by its own coordinates, as least squares over what is
-// laid around it tell: coordinates along its frame, the square of that across, and the share, each.
+// Fits how shares change from that of a point, by least squares over the sampled points around it:
+// coordinates along its frame, the squared distance across, and the share, each.
 template <int K>
 Eigen::Matrix<double, K, 1> SlopeOf(const double* begin, const double* end, double share,
                                     double spacing) {
@@ -47,7 +47,8 @@ Eigen::Matrix<double, K, 1> SlopeOf(const double* begin, const double* end, doub
 
 }  // namespace
 
-// Where a proposal lies: its parent's neighbour in the lattice, in the parent's tangent space.
+// Writes the place of a proposal: its parent's neighbour in the lattice, in the parent's tangent
+// space.
 template <int K>
 void Growth<K>::Land(const Proposal& proposal, double* point) const {
   const double* const vector = vectors_.data() + std::size_t{proposal.direction} * K;
@@ -60,8 +61,8 @@ void Growth<K>::Land(const Proposal& proposal, double* point) const {
   }
 }
 
-// Compares in the parent's own coordinates. Towards smaller sizes it goes no farther than where it
-// lands asks for.
+// Compares in the parent's own coordinates. Towards smaller sizes it goes no farther than the size
+// at the new place allows.
 template <int K>
 void Growth<K>::ProposeFrom(std::uint32_t p, const Placed& near,
                             std::vector<Proposal>* free) const {
@@ -111,7 +112,8 @@ void Growth<K>::ProposeFrom(std::uint32_t p, const Placed& near,
     for (int a = 0; a < K; ++a) place[a][i] = step[i] * v[a];
     nearest2[i] = INFINITY;
   }
-  // All places at once, which vectorises: to stop at the first that takes a place costs more.
+  // Tests all places in one loop, which vectorises: stopping at the first that takes a place costs
+  // more.
   for (const double* at = begin; at != end; at += K + 2)
     for (std::size_t i = 0; i < kDirections; ++i) {
       double distance2 = at[K];
@@ -138,8 +140,8 @@ std::vector<typename Growth<K>::Proposal> Growth<K>::FreePlaces() const {
   });
 }
 
-// Several points mostly propose the same place: their mean is asked for, with the mean of their
-// frames. What strain has torn apart is several places.
+// Several points mostly propose the same place: their mean is queried, with the mean of their
+// frames. Proposals that strain has torn apart are several places.
 template <int K>
 typename Growth<K>::Proposed Growth<K>::ByPlace(std::vector<Proposal> proposals) const {
   ParallelSort(proposals, [](const Proposal& a, const Proposal& b) {
@@ -184,8 +186,8 @@ typename Growth<K>::Proposed Growth<K>::ByPlace(std::vector<Proposal> proposals)
   return places;
 }
 
-// Places that are one though their names differ become one, if one patch proposes them. Of two
-// patches that meet only one proposes.
+// Merges places of one patch that coincide although their names differ. If two patches meet, only
+// one of them proposes.
 template <int K>
 typename Growth<K>::Proposed Growth<K>::Merge(Proposed places) const {
   const Sites& sites = places.sites;

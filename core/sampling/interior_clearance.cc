@@ -10,8 +10,9 @@ namespace {
 // How far any point of a wall is from its nearest vertices, in epsilon: R1 bounds it in tangent
 // spaces, walls bend.
 constexpr double kWallCovering = 1.25;
-// What is laid keeps this many of its spacings from the faces' vertices. Nearer makes more slivers,
-// farther more vertices; little either way from 0.5 to 0.8, since it must not encroach on them.
+// Interior points keep this many of their spacings from the faces' vertices. A smaller distance
+// makes more slivers, a larger one more vertices; the difference is small from 0.5 to 0.8, since
+// interior points must not encroach on the faces anyway.
 constexpr double kFromFaces = 0.66;
 
 }  // namespace
@@ -36,7 +37,7 @@ std::vector<std::uint8_t> InteriorClearance<K>::AreClear(
   return have;
 }
 
-// The wall's point is nearest to both ends where it is between them, in the middle.
+// The wall's point between the two ends is nearest to both if it is in the middle.
 template <int K>
 bool InteriorClearance<K>::IsSurelyInside(const double* point, double reach) const {
   const double covering = kWallCovering * epsilon_;

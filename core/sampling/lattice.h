@@ -9,7 +9,7 @@ namespace stellate::core {
 // The lattice A_k^* (hexagonal for k = 2, body-centred cubic for k = 3), the thinnest covering of
 // R^k among lattices for k <= 5 (Conway and Sloane, Sphere Packings, Lattices and Groups, Ch. 2).
 
-// Its nearest-neighbour distance where the covering radius is 1.
+// Returns its nearest-neighbour distance for a covering radius of 1.
 inline double LatticeSpacing(int k) { return std::sqrt(12.0 / (k + 2)); }
 
 // The vectors to the lattice points whose Voronoi cells share a facet with that of the origin,
@@ -22,15 +22,15 @@ inline double LongestLatticeVector(int k) {
   return std::sqrt(static_cast<double>(half * other_half) / k);
 }
 
-// Names points of the lattice, so that neighbours mostly have names that follow each other: the
-// bits of their k coordinates by k of its basis vectors, in turn. Far away, names recur.
+// Names points of the lattice, so that neighbours mostly have consecutive names: the interleaved
+// bits of their k coordinates by k basis vectors. Far away, names recur.
 class LatticeNames {
  public:
   explicit LatticeNames(int k);
 
-  // From which steps can be taken the same way in all directions.
+  // Returns the name to begin with: steps of equal number are possible from it in all directions.
   std::uint64_t origin() const { return origin_; }
-  // The neighbour by the i-th of the vectors above.
+  // Returns the name of the neighbour by the i-th of the vectors above.
   std::uint64_t Neighbour(std::uint64_t name, std::size_t i) const {
     std::uint64_t neighbour = 0;
     for (const std::uint64_t bits : coordinates_)

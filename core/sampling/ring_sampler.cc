@@ -55,7 +55,7 @@ void RingSampler<K>::GoOn(const AnsweredPoints& sample, const AnsweredPoints& se
   growth_.Begin(sample.points, sample.tangents, sample.found, 0);
 }
 
-// What scouts find is of the sample at once: it is what there is if the run ends here.
+// The scouts' points join the sample immediately: they are the mesh if the run ends here.
 template <int K>
 std::vector<std::uint8_t> RingSampler<K>::Scout(const AnsweredPoints& answers,
                                                 const std::vector<Eigen::Index>& columns) {
@@ -76,7 +76,7 @@ typename Growth<K>::Ring RingSampler<K>::NextRing() {
   if (!scouting_) {
     ring = growth_.Propose();
     if (ring.points.cols() == 0) {
-      // What no patch came near has seeds of its own.
+      // Parts that no patch came near have seeds of their own.
       AddToSample<K>(engine_, seeds_,
                      growth_.Begin(seeds_.points, seeds_.tangents, seeds_.found,
                                    apart_ * growth_.spacing(), SharesOf(engine_.sizes(), seeds_)));
@@ -86,14 +86,14 @@ typename Growth<K>::Ring RingSampler<K>::NextRing() {
   return ring;
 }
 
-// What there is room for of a ring; where there is for none of it, of the next.
+// Returns the clear points of a ring or, if it has none, of the next.
 template <int K>
 CandidateSet<K> RingSampler<K>::Next(std::uint64_t) {
   CandidateSet<K> candidates;
   while (true) {
     typename Growth<K>::Ring ring = NextRing();
     proposed_ = ring.points.cols();
-    if (proposed_ == 0) {  // all is laid: what follows needs the room
+    if (proposed_ == 0) {  // the sample is complete: what follows needs the memory
       growth_.Forget();
       seeds_ = scouts_ = {};
       return candidates;
@@ -119,8 +119,8 @@ CandidateSet<K> RingSampler<K>::Next(std::uint64_t) {
   }
 }
 
-// The answers as of the whole ring, found where there is room for them. What lies beyond a wall
-// that nobody knows of tells of that.
+// Returns the answers for the whole ring, found where they are clear. An answer beyond a wall that
+// no vertex near is on discovers that wall.
 template <int K>
 AnsweredPoints RingSampler<K>::KeepClear(const AnsweredPoints& answers) {
   std::vector<std::uint8_t> fits = clearance_->AreClear(answers.points, answers.found);

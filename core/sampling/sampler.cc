@@ -10,9 +10,9 @@
 namespace stellate::core {
 namespace {
 
-// The lattice is laid this much denser than its covering radius asks: curvature stretches it.
+// The lattice is this much denser than its covering radius requires: curvature stretches it.
 constexpr double kSlack = 0.97;
-// Of points and tangents grown ahead: 134 MB.
+// The most numbers of points and tangents that are grown before they are queried: 134 MB.
 constexpr std::uint64_t kMostNumbers = 1 << 24;
 
 }  // namespace

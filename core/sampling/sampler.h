@@ -14,7 +14,7 @@ class Surrogate;
 // Makes the initial sample at its final spacing, before there is any star:
 //
 //   sampler->Begin(seeds);
-//   while (!(candidates = sampler->Next(round)).empty()) sampler->Take(candidates, their answers);
+//   while ((candidates = sampler->Next(round)).size() > 0) sampler->Take(candidates, answers);
 //
 // SamplerFor (core/run/sampler_choice.h) chooses one.
 template <int K>
@@ -36,7 +36,7 @@ class Sampler {
   // The engine whose stars the last candidates refer to.
   virtual const Engine<K>& asking() const = 0;
 
-  // The surrogate that it used, or null. Use it for what is left to refine, while this exists.
+  // Returns the surrogate that it used, or null. Refine on it, too, while the sampler exists.
   virtual Surrogate<K>* guess() { return nullptr; }
 
   // Estimates how many points are still to come.

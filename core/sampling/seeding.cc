@@ -11,8 +11,8 @@
 namespace stellate::core {
 namespace {
 
-// A speculation that begins from many seeds needs no front: this share of the vertices to come, as
-// far as the box tells, within limits by k.
+// A speculative run that begins from many seeds needs no front: this share of the vertices to come,
+// as estimated from the box, within limits by k.
 constexpr double kSeedShare = 0.05;
 constexpr double kLeastAheadSeeds[kMaxDimension + 1] = {0, 100, 300, 300, 1000, 1000};
 constexpr double kMaxSpeculativeSeeds[kMaxDimension + 1] = {0, 100, 1000, 1000, 3000, 3000};

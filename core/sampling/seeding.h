@@ -15,8 +15,8 @@ Eigen::MatrixXd SeedsOf(const Specification& spec);
 // Explains that none of `count` seeds was found, for people.
 std::string WhyNoSeeds(const Specification& spec, Eigen::Index count);
 
-// Of a manifold with boundary, that no seed's closest point is in it, for people: there is none, or
-// the box lies beside M, or walls leave nothing of it.
+// Explains, for a manifold with boundary, that no seed's closest point is in M, for people: no
+// point was found, or the box lies beside M, or the walls leave nothing of M^.
 std::string WhyNothingInside(const Specification& spec, const AnsweredPoints& answers);
 
 }  // namespace stellate::core

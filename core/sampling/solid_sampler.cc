@@ -11,7 +11,7 @@ namespace {
 // Proposals nearer to each other than this many spacings are one place of the lattice.
 constexpr double kSamePlace = 0.5;
 
-// The lattice is turned nowhere.
+// The lattice is not rotated anywhere.
 template <int K>
 Eigen::MatrixXd FramesFor(Eigen::Index count) {
   const Eigen::Matrix<double, K, K> frame = Eigen::Matrix<double, K, K>::Identity();
@@ -34,7 +34,7 @@ std::vector<std::uint8_t> SolidSampler<K>::Begin(const AnsweredPoints& seeds) {
   return std::vector<std::uint8_t>(seeds.found.size(), 0);
 }
 
-// Each part of the domain that the lattice has not come to has a lattice of its own.
+// Each part of the domain that the lattice has not reached gets a lattice of its own.
 template <int K>
 bool SolidSampler<K>::BeginFromNextSeed() {
   const std::vector<Eigen::Index> begun =
@@ -50,7 +50,7 @@ void SolidSampler<K>::Doubt(const double* point) {
   doubts_.Insert(0);
 }
 
-// As far as it is sure that all is inside.
+// Grows as far as all points are certainly inside.
 template <int K>
 void SolidSampler<K>::Grow() {
   while (!engine_.is_full()) {

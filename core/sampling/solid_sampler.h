@@ -32,7 +32,7 @@ class SolidSampler final : public Sampler<K> {
   Growth<K> growth_;
   InteriorClearance<K> clearance_;
   AnsweredPoints seeds_;
-  std::vector<double> doubted_;  // d each: all that were asked for, or will be next
+  std::vector<double> doubted_;  // d each: all that were queried, or will be next
   BallTree doubts_;              // of them
   std::size_t asked_ = 0;        // of them
 };

@@ -12,12 +12,13 @@ namespace {
 // R3 and R4 are speculated for this many rounds: what is inconsistent on the surrogate is mostly
 // inconsistent on M, but not to the last simplex.
 constexpr int kGoodPointRounds = 12;
-// A target is left to the speculation when that has a point within this share of its circumradius.
+// A target is dropped if the speculative run has a point within this share of its circumradius.
 constexpr double kCovered = 0.9;
-// A speculation that wants this many times what seems to be missing is on the wrong track.
+// A speculative run that wants this many times the points that seem to be missing is on the wrong
+// track.
 constexpr double kMostWanted = 4;
-// What is known of the whole is coarse. Sizes that just hold by it are just above what was asked
-// for, in truth: so they are planned this much finer, instead of mended in a round of their own.
+// A surrogate of the whole is coarse. Sizes that just hold on it are just above the bound on M:
+// therefore points are planned this much finer, instead of fixing the sizes in another round.
 constexpr double kShareOfSizes = 0.995;
 
 template <int K>
@@ -37,7 +38,7 @@ AnsweredPoints AnswersOf(Surrogate<K>& surrogate, const Stars<K>& stars,
   return surrogate.Answer(candidates.points, flats, spacing);
 }
 
-// The guess knows no walls: what would come near one is left to true points.
+// The surrogate has no walls: true points decide near them.
 template <int K>
 void LeaveWallsAlone(const Stars<K>& stars, double epsilon, std::vector<Target<K>>* targets) {
   std::vector<double> aim(static_cast<std::size_t>(stars.sample().d()));
@@ -53,7 +54,7 @@ void LeaveWallsAlone(const Stars<K>& stars, double epsilon, std::vector<Target<K
   });
 }
 
-// Returns what the inserted points are for.
+// Returns the rules of the inserted points.
 template <int K>
 std::vector<Rule> Drive(Engine<K>* speculation, const Engine<K>& original, std::uint64_t round,
                         SpeculativeRules by, Surrogate<K>* known) {

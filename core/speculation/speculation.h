@@ -8,8 +8,8 @@
 
 namespace stellate::core {
 
-// Runs a copy of the engine on a surrogate of M (core/speculation/surrogate.h), until no rule
-// applies or the surrogate has no more answers, and returns the points that it inserted, in that
+// Runs a copy of the engine on a surrogate of M (core/speculation/surrogate.h), until no rule is
+// broken or the surrogate has no more answers, and returns the points that it inserted, in that
 // order. Query them all in one batch. Removes the targets that one of them resolves from `targets`.
 // Only the rules on true points decide when a run is over.
 //

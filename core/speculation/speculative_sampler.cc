@@ -12,39 +12,40 @@
 namespace stellate::core {
 namespace {
 
-// Epsilon of the coarse mesh, in those of the final one: what can be guessed from it grows less
-// exact with the fourth power. Seeds that lie nearer to each other tell for a finer one.
+// The epsilon of the coarse mesh, in those of the final one: the surrogate's error grows with its
+// fourth power. Denser seeds allow a finer coarse mesh.
 constexpr double kLeastCoarse = 2;
 constexpr double kMostCoarse = 5;
 constexpr double kCoarseStep = 0.8;
 constexpr double kShareApart = 0.5;
-// So many points tell enough of M; or all seeds, where they are fewer.
+// So many points determine M well enough; or all seeds, if they are fewer.
 constexpr double kEnough[kMaxDimension + 1] = {0, 50, 400, 600, 600, 600};
-// Seeds nearer to each other than this share of it tell nothing that one would not.
+// Seeds nearer to each other than this share of it add nothing to one of them.
 constexpr double kSeedSpacing = 0.5;
-// Of the spacing at which circumradii are mostly below its epsilon: where they all are a round is
+// A share of the spacing at which circumradii are mostly below its epsilon: if all are, a round is
 // saved.
 constexpr double kCoarseSpacing = 0.8;
-// It need not be whole: what it misses is left to the refinement of the final one. For k <= 2 a
-// hole in it costs that more rounds than mending it takes.
+// The coarse mesh may have holes, which the refinement of the final one fills. For k <= 2 a hole
+// costs that more rounds than filling it here takes.
 constexpr int kMostRounds = 4;
 constexpr double MostBad(int k) { return k <= 2 ? 0.1 : 0.25; }
-// Where so many stars are still bad after so many rounds, near the limits of what a reach allows,
-// guesses would be far off; of a lattice of dimension 3 that was laid in rings, where it should be
-// all but whole by then.
-constexpr int kTellingRounds = 2;
-constexpr double MostHopeful(int k, bool in_rings) { return in_rings && k > 2 ? MostBad(k) : 0.5; }
-// Seeds that are given may tell next to nothing: where so many are after what was grown on their
-// guess (with 4 to 32 of them mostly more, with hundreds less; eleven manifolds) the coarse sample
-// is laid in rings, as fine as it may be, since nobody knows how M bends. Patches begin as far from
-// each other as those of the final one.
-constexpr double kNothingTold = 0.85;
+// If more than this share of the stars is still bad after so many rounds, near the limits of what a
+// reach allows, surrogates would be far off. A lattice of dimension 3 that grew ring by ring should
+// be almost complete by then.
+constexpr int kRoundsBeforeGivingUp = 2;
+constexpr double MaxBadShare(int k, bool in_rings) { return in_rings && k > 2 ? MostBad(k) : 0.5; }
+// Given seeds may determine next to nothing of M. If more than this share of the stars is bad after
+// the sample was grown on their surrogate (with 4 to 32 seeds mostly more are, with hundreds fewer;
+// eleven manifolds), the coarse sample grows ring by ring instead, as fine as it may be, since M's
+// curvature is unknown. Patches begin as far from each other as those of the final sample.
+constexpr double kMaxUnsupportedShare = 0.85;
 constexpr double kCoarseApart = kPatchesApart / kLeastCoarse;
-// A sample of the most vertices that there may be comes from kLeastCoarse^-k times as many. Of a
-// coarse sample larger by this factor the final one will not fit: curvature accounts for less.
+// A sample of the most vertices allowed comes from kLeastCoarse^-k times as many coarse ones. If
+// the coarse sample is larger by this factor the final one will not fit: curvature accounts for
+// less.
 constexpr double kCoarseSlack = 1.5;
 
-// The largest at which enough of the seeds lie that far apart.
+// Returns the largest epsilon at which enough of the seeds lie that far apart.
 double CoarseEpsilon(int k, const AnsweredPoints& seeds, double epsilon) {
   const auto found = static_cast<double>(std::count(seeds.found.begin(), seeds.found.end(), 1));
   const double enough = std::min(kEnough[k], kShareApart * found);
@@ -55,7 +56,7 @@ double CoarseEpsilon(int k, const AnsweredPoints& seeds, double epsilon) {
   return coarse;
 }
 
-// Of a mesh that only has to be guessed from: nothing is asked of its shapes.
+// Returns the specification of a coarse mesh for a surrogate: no rule bounds its shapes.
 template <int K>
 Specification CoarserThan(Specification spec, double epsilon) {
   spec.epsilon = epsilon;
@@ -106,8 +107,8 @@ std::vector<std::uint8_t> SpeculativeSampler<K>::Begin(const AnsweredPoints& see
   return Scout(seeds, used);
 }
 
-// Of those found patches begin: they are of the sample at once, and all there is of it if the run
-// ends here.
+// Patches begin from the points found: these join the sample immediately, and are all of it if the
+// run ends here.
 template <int K>
 std::vector<std::uint8_t> SpeculativeSampler<K>::Scout(const AnsweredPoints& answers,
                                                        const std::vector<std::uint8_t>& found) {
@@ -129,7 +130,7 @@ double SpeculativeSampler<K>::BadShare() const {
          coarse_->stars().size();
 }
 
-// Until R1 mostly holds.
+// Refines the coarse mesh until R1 mostly holds.
 template <int K>
 CandidateSet<K> SpeculativeSampler<K>::RefineCoarse(std::uint64_t round) {
   CandidateSet<K> candidates;
@@ -144,9 +145,9 @@ CandidateSet<K> SpeculativeSampler<K>::RefineCoarse(std::uint64_t round) {
   return candidates;
 }
 
-// A lattice on a guess, from `starts` on, and from those of `others` that no patch comes near. No
-// more points than a sample may have; and where guesses go on without end, no more than twice what
-// was expected at most.
+// A lattice grown on a surrogate, from `starts` and from those of `others` that no patch comes
+// near. It has no more points than a sample may have and, if the surrogate goes on without end, no
+// more than twice the number expected.
 template <int K>
 struct SpeculativeSampler<K>::Grown {
   PlannedPoints planned;
@@ -194,8 +195,8 @@ double SpeculativeSampler<K>::coarse_spacing() const {
   return kCoarseSpacing * SampleSpacing(K, coarse_->criteria().epsilon);
 }
 
-// In place of the seeds, but for those that patches begin from. Nothing, where that would be fewer
-// points than there are seeds: they tell too little of M then.
+// Grows the coarse sample, which replaces the seeds, except those that patches begin from. Returns
+// nothing if it has fewer points than there are seeds: these then determine too little of M.
 template <int K>
 PlannedPoints SpeculativeSampler<K>::GrowCoarse() {
   Surrogate<K> guess(coarse_->stars(), coarse_->criteria().advance_step, 0);
@@ -211,8 +212,8 @@ PlannedPoints SpeculativeSampler<K>::GrowCoarse() {
   return std::move(grown.planned);
 }
 
-// What was grown with what R1 and R2 ask for where M is as it is guessed: else they would after
-// one round more.
+// Returns the grown points with those that R1 and R2 insert if M is as the surrogate predicts: this
+// saves one round.
 template <int K>
 PlannedPoints SpeculativeSampler<K>::RefineGuessed(const PlannedPoints& grown,
                                                    std::uint64_t round) {
@@ -251,7 +252,7 @@ PlannedPoints SpeculativeSampler<K>::GrowOnGuesses(std::uint64_t round) {
   return RefineGuessed(grown.planned, round);
 }
 
-// Ring by ring, from what there is of it on.
+// Samples the coarse mesh ring by ring, from the points that it has.
 template <int K>
 void SpeculativeSampler<K>::SampleCoarse() {
   const AnsweredPoints seeds = PointsOf<K>(coarse_->stars());
@@ -265,7 +266,7 @@ void SpeculativeSampler<K>::SampleCoarse() {
   stage_ = Stage::kCoarseRings;
 }
 
-// All of the sample ring by ring, from what there is of it and of the coarse one.
+// Samples everything ring by ring, from the points of the sample and of the coarse one.
 template <int K>
 void SpeculativeSampler<K>::GiveUp() {
   rings_.emplace(engine_, spec_);
@@ -273,14 +274,16 @@ void SpeculativeSampler<K>::GiveUp() {
   stage_ = Stage::kRings;
 }
 
-// Where the coarse mesh tells too little to guess from.
+// Gives up speculation, or samples the coarse mesh in another way, if it is not good enough for a
+// surrogate.
 template <int K>
 void SpeculativeSampler<K>::JudgeCoarse() {
-  const double most = rounds_ < kTellingRounds ? kNothingTold : MostHopeful(K, is_coarse_in_rings_);
+  const double most =
+      rounds_ < kRoundsBeforeGivingUp ? kMaxUnsupportedShare : MaxBadShare(K, is_coarse_in_rings_);
   if (BadShare() <= most) return;
   if (spec_.seeds.cols() > 0 && !is_coarse_in_rings_)
     SampleCoarse();
-  else if (rounds_ == kTellingRounds)
+  else if (rounds_ == kRoundsBeforeGivingUp)
     GiveUp();
 }
 
@@ -342,7 +345,7 @@ std::vector<std::uint8_t> SpeculativeSampler<K>::Take(const CandidateSet<K>& can
   return Scout(answers, used);
 }
 
-// As many spacings apart as patches begin.
+// Before there is a surrogate: each coarse point begins a patch.
 template <int K>
 double SpeculativeSampler<K>::CountMissing() const {
   if (stage_ == Stage::kRings) return rings_->CountMissing();

@@ -14,13 +14,12 @@ namespace stellate::core {
 // Samples M in a handful of round trips, on surrogates of it (core/speculation/surrogate.h):
 //
 //   1. grow a coarse sample on the surrogate of the seeds, query it in one batch, and refine it;
-//   2. grow the final sample on the surrogate of the coarse mesh, run R1 and R2 on it
-//   speculatively,
-//      and query all of these points in one batch.
+//   2. grow the final sample on the surrogate of the coarse mesh, run R1 and R2 speculatively on
+//      it, and query all of these points in one batch.
 //
-// Coarse points that patches start from join the sample as they are found. If the given seeds tell
-// too little about M, the coarse sample grows ring by ring; if there is no usable coarse mesh, the
-// final sample does.
+// Coarse points that patches start from join the sample when they are found. If the given seeds
+// determine too little of M, the coarse sample grows ring by ring; if there is no usable coarse
+// mesh, the final sample does.
 template <int K>
 class SpeculativeSampler final : public Sampler<K> {
  public:

@@ -1,4 +1,4 @@
-// Which of the points that were asked for ahead join a sample.
+// Which of the speculatively planned points join a sample.
 
 #include <algorithm>
 #include <functional>
@@ -15,15 +15,15 @@
 namespace stellate::core {
 namespace {
 
-// Answers fall elsewhere than guessed. Nearer to each other than this many spacings they would cost
+// Answers differ from predictions. Answers nearer to each other than this many spacings would cost
 // quality.
 constexpr double kKept = 0.6;
 // Points of a run lie within this many spacings of its first.
 constexpr double kRunReachApart = 3;
 
-// Which of the points, `first` of the sample's own and then those asked for at `columns`, come too
-// near to an earlier one that stays. As guessed they kept their distance: one of two that come near
-// has moved.
+// Returns which of the points, `first` of the sample's own and then those queried at `columns`, are
+// too near to an earlier one that stays. As predicted they kept their distance: one of two near
+// points has moved.
 template <int K>
 std::vector<std::uint8_t> AreTooNear(const std::vector<double>& points, std::size_t first,
                                      const Eigen::MatrixXd& asked,

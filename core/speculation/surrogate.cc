@@ -12,15 +12,15 @@
 namespace stellate::core {
 namespace {
 
-// A guess is taken when its uncertainty is below this share of the sample's spacing: then its slope
-// is about right, and a smooth error of the height moves closest points all alike;
+// A prediction is used if its uncertainty is below this share of the sample's spacing: then its
+// slope is about right, and a smooth error of the height moves all closest points alike;
 constexpr double kSure = 0.1;
 // or below this share of the spacing that the point is for.
 constexpr double kSureForSpacing = 0.25;
-// Where points shift by a few hundredths of epsilon, many simplices that were to be just smaller
-// than epsilon are just larger, and each costs a vertex. So what is not known this well, as a
-// share of the spacing, is planned this much coarser at first, unless the sample is so fine, in
-// epsilon, that the guesses will not become better.
+// If points shift by a few hundredths of epsilon, many simplices that were planned just smaller
+// than epsilon are just larger, and each costs a vertex. Therefore points that are not known this
+// well, as a share of the spacing, are planned this much coarser at first, unless the sample is so
+// fine, in epsilon, that predictions will not become better.
 constexpr double kExact = 0.02;
 constexpr double kMargin = 1.15;
 constexpr double kFine = 1.6;
@@ -30,16 +30,16 @@ constexpr double kLeastCosine = 0.5;
 // Keep the fit determined where neighbours are few; the terms are of order one after scaling.
 constexpr double kQuadraticRidge = 1e-6;
 constexpr double kCubicRidge = 1e-4;
-// A guess from so near, in shares of the sample's spacing, stays where it is seen from there.
+// A prediction from a point this near, in spacings of the sample, is used as that point alone gives
+// it.
 constexpr double kNearGuess = 0.1;
-// Of points that follow each other at most so many share a search, within this share of how far it
-// goes.
+// At most so many consecutive points share a search, if they lie within this share of its radius.
 constexpr std::size_t kRun = 32;
 constexpr double Shared(int k) { return k < 3 ? 1 : 0.5; }
 // More than rounding can take from a distance in R^d, d up to thousands.
 constexpr double kRoundedUp = 1 + 1e-12;
-// What a fit is trusted at best, as a share of the neighbours' distance; and where there are hardly
-// more equations than coefficients.
+// The least doubt in a fit, as a share of the neighbours' distance; and the least if there are
+// hardly more equations than coefficients.
 constexpr double kLeastDoubt = 0.003;
 constexpr double kScantDoubt = 0.03;
 

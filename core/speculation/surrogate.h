@@ -24,19 +24,21 @@ namespace stellate::core {
 template <int K>
 class Surrogate {
  public:
-  // complex  borrowed, must not change
-  // step     how far from a point without neighbours its tangent plane means something, length
-  // epsilon  the spacing that the points are for in the end, length: what asks for that is not
-  //          guessed from a sample too coarse to tell exactly. 0: it is, where that is
-  //          sure for the spacing asked for
-  // sizes    of the sample points, borrowed, or nullptr; between them they are blended like the
-  //          graphs: right to second order, where the least of a few would ask for far too much
+  // stars    borrowed, must not change
+  // step     the distance from a point without neighbours up to which its tangent plane is used,
+  //          length
+  // epsilon  the final spacing of the points, length: a point for that spacing is not predicted
+  //          from a sample too coarse to be exact. 0: it is predicted wherever that is certain
+  //          enough for the requested spacing
+  // sizes    of the sample points, borrowed, or nullptr. Between sample points they are blended
+  //          like the graphs, which is right to second order; the least of a few would be far too
+  //          small
   Surrogate(const Stars<K>& stars, double step, double epsilon, const double* sizes = nullptr);
 
-  // What is guessed of M near each of `points`, d x n: its closest point, or, where `flats` has a
-  // tangent basis T (K rows of d) instead of nullptr, its intersection with x + T^perp. Found, with
-  // tangents and what sizes there are, unless M is not known well enough for `spacing`, a length
-  // for each. In parallel; the same whatever was asked before.
+  // Predicts the answer for each of `points`, d x n: its closest point on M or, if `flats` has a
+  // tangent basis T (K rows of d) instead of nullptr, the intersection of M with x + T^perp. The
+  // answer is found, with tangents and sizes if there are any, unless M is not known well enough
+  // for `spacing`, a length for each. In parallel; the result does not depend on earlier calls.
   AnsweredPoints Answer(const Eigen::MatrixXd& points, const std::vector<const double*>& flats,
                         const Eigen::VectorXd& spacing);
 
@@ -50,7 +52,7 @@ class Surrogate {
     double scale = 0;  // the neighbours' mean distance: u is divided by it; 0: no neighbours
     double error = 0;  // by which it misses its neighbours, length
   };
-  // The nearest points, and how far the next is: weights vanish there.
+  // The nearest points, and the distance of the next one: weights vanish there.
   struct Near {
     std::array<std::pair<double, std::uint32_t>, kBlended + 1> points;
     int count = 0;
