@@ -6,18 +6,22 @@
 
 namespace stellate::core {
 
-// Cuts a round's batch into parts, where the client bounds the size of a batch, and joins their
+// Cuts a round's batch into parts, if the client bounds the size of a batch, and joins their
 // answers. The mesh does not depend on the cut.
+//
+//   BatchParts parts(spec, batch, most);
+//   while (!parts.is_last()) parts.Take(answers to parts.part());
+//   Use(parts.With(answers to parts.part()));
 class BatchParts {
  public:
-  // most: queries a part, > 0
+  // most: queries in a part, > 0
   BatchParts(const Specification& spec, QueryBatch whole, std::uint64_t most);
 
   QueryBatch& part() { return part_; }
   bool is_last() const { return first_ + part_.size() == whole_.size(); }
 
-  // Returns the answers to all parts so far, with `answers` to part(), which have been checked.
-  // Copies the whole: only for the last part, which can then be answered again.
+  // Returns the answers to all parts so far, including `answers` to part(), which have been
+  // checked. Copies all: use it for the last part only, which can then be answered again.
   Answers With(const Answers& answers) const;
   // Keeps the answers to part() and goes to the next one. Copies these answers alone.
   void Take(const Answers& answers);

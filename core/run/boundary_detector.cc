@@ -12,7 +12,7 @@
 namespace stellate::core {
 namespace {
 
-constexpr std::size_t kMaxOffsets = 256;  // more tell no more
+constexpr std::size_t kMaxOffsets = 256;  // more would add nothing
 
 }  // namespace
 

@@ -11,7 +11,7 @@
 namespace stellate::core {
 namespace {
 
-// Sine of ten degrees: what turns by less on a short way is no crease that a mesh could not follow.
+// Sine of ten degrees: a mesh can follow a crease with a smaller angle.
 constexpr double kLeastSine = 0.17364817766693033;
 // Of the mesh size: from ways as short walks are at their end. A manifold that is smooth, and turns
 // by as much on so short a way, bends thousands of times as sharply as the mesh is fine.
@@ -300,7 +300,7 @@ std::optional<Crease> CreaseProbe::WhatIsAt(const Walk& walk) {
     }
   if (turn < kLeastSine || walk.sine < kOnTheWay * turn) return std::nullopt;
   crease.crosses = goes_through || (leave == 0 && stay >= kSteps - 1);
-  if (!crease.crosses && leave == 0) return std::nullopt;  // one or the other, nobody knows
+  if (!crease.crosses && leave == 0) return std::nullopt;  // which of the two is unknown
   crease.point = goes_through ? middle : meet;
   turn_ = turn;
   return crease;

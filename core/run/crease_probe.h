@@ -18,10 +18,11 @@ struct Way {
   double length() const { return (b - a).norm(); }
 };
 
-// The sine of the largest angle between the spaces that two orthonormal bases span, d x k each.
+// Returns the sine of the largest angle between the spaces that two orthonormal bases span, d x k
+// each.
 double SineBetween(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other);
 
-// A place where M's tangent spaces turn within no distance.
+// A place where M's tangent space is discontinuous.
 struct Crease {
   Eigen::VectorXd point;  // on M, or within `length` of it
   double sine = 0;        // of the angle by which they turn
@@ -30,21 +31,25 @@ struct Crease {
 };
 
 // Tests whether M is smooth where rules keep failing. It starts from ways (pairs of points) along
-// which the tangent spaces turn, and bisects them down to a share of the mesh size. Where M is
-// smooth the spaces turn less on shorter ways. If they turn as much, and M is straight on both
-// sides, there is a crease, a corner or a crossing. Queries closest points, and tangents where the
+// which the tangent spaces turn, and bisects them down to a share of the mesh size. On a smooth M
+// the tangent spaces turn less along shorter ways. If they turn as much, and M is straight on both
+// sides, there is a crease, a corner or a crossing. Queries closest points, and tangents if the
 // oracle gives them.
+//
+//   probe.Start(SteepWaysAtFaults<K>(engine, longest));
+//   // ... drive it as a QuerySource, then:
+//   if (probe.crease()) verdict += DescribeCrease(*probe.crease());
 class CreaseProbe final : public QuerySource {
  public:
-  // k, d: dimensions of M and of space. size: of the mesh, a length. gives_tangents, has_walls: as
-  // the oracle has them.
+  // k, d: dimensions of M and of space. size: of the mesh, length. gives_tangents, has_walls: of
+  // the oracle.
   CreaseProbe(int k, int d, double size, bool gives_tangents, bool has_walls, std::uint64_t seed);
 
   // Starts again, from these ways, and forgets what it found.
   void Start(std::vector<Way> ways);
   void Stop() { Start({}); }
 
-  // Empty: it is done.
+  // Returns nothing once it is done.
   std::vector<QueryBlock> Questions() override;
   // Uses the first block of the answers.
   void Absorb(const std::vector<AnswerBlock>& answers) override;
@@ -53,7 +58,7 @@ class CreaseProbe final : public QuerySource {
 
  private:
   struct Node {
-    Eigen::Index asked;  // the question it answers; -1: none
+    Eigen::Index asked;  // the query that it answers; -1: none
     Eigen::VectorXd point;
     Eigen::MatrixXd basis;
   };
@@ -82,10 +87,10 @@ class CreaseProbe final : public QuerySource {
   bool is_difference_ = false;  // asks for tangents of what it has found
   bool looks_beyond_ = false;   // asks what is about the first walk's end
   std::vector<Walk> walks_;
-  std::vector<Eigen::Index> asked_;    // the questions that have an answer
+  std::vector<Eigen::Index> asked_;    // the queries that have an answer
   Eigen::MatrixXd found_;              // those answers
-  std::optional<Crease> unconfirmed_;  // asks whether M goes to its point
-  double turn_ = 0;                    // its sides' sine
+  std::optional<Crease> unconfirmed_;  // a query tests whether M reaches its point
+  double turn_ = 0;                    // the sine between its sides
   std::optional<Crease> crease_;
 };
 

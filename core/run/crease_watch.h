@@ -15,15 +15,16 @@ class CreaseWatch {
  public:
   // Call it when a star on the advancing front was fixed since the last round.
   void NoteFrontMoved() { front_moved_ = true; }
-  // Whether no round of late has left much less than `left` violations. Called once a round;
-  // judges_all: R3 and R4 are among them. After it was so, it is so again much later.
+  // Whether no recent round has reduced the violations, `left` now, by much. Call it once a round.
+  // judges_all: R3 and R4 are among them. After it was true, it is true again much later.
   bool IsDue(std::uint64_t left, bool judges_all);
-  // Whether it is time to look at what tells by itself, also while a front moves.
+  // Whether to test short steep edges, which are conclusive by themselves, also while a front
+  // moves.
   bool MayLookAgain() const { return rounds_ % 4 == 0 && rounds_ <= kLongestFront; }
 
  private:
-  // In fewer rounds runs that end by themselves halve what is left, once their front rests; and in
-  // so many it rests, if it ever does.
+  // The front of a run that ends by itself rests after so many rounds, and then such a run halves
+  // its violations in fewer.
   static constexpr std::uint64_t kLongestFront = 100;
 
   bool front_moved_ = false;
@@ -34,19 +35,19 @@ class CreaseWatch {
 
 constexpr double kLeastSine2 = 0.03;  // ten degrees
 
-// Edges along which it was asked before, as pairs of vertices, the smaller first.
+// Edges that were probed before, as pairs of vertices, the smaller first.
 using WalkedEdges = std::set<std::pair<std::uint32_t, std::uint32_t>>;
 
-// A few edges at stars that break a rule, without common ends, along which M's tangent spaces turn
-// most: by how much, and for their length. They are no longer than `longest` or, where sizes are
-// finer, than that share of it; no shorter than the error that points of M may have; and the
-// squared sines of the angles along each add up to least_sine2 at least. `walked` has those that
-// were returned before, which are left out, as they would be answered alike; the others are added.
+// Returns a few edges at stars that break a rule, without common ends, along which M's tangent
+// spaces turn most, in all and for their length. They are no longer than `longest` or, where sizes
+// are finer, than that share of it, and no shorter than the error that points of M may have. The
+// squared sines of the angles along each add up to at least least_sine2. Edges in `walked` were
+// returned before and are left out, as the answers would be the same; the others are added to it.
 template <int K>
 std::vector<Way> SteepWaysAtFaults(const Engine<K>& engine, double longest,
                                    double least_sine2 = kLeastSine2, WalkedEdges* walked = nullptr);
 
-// The same of the whole sample.
+// Returns such edges of the whole sample.
 template <int K>
 std::vector<Way> SteepWays(const Stars<K>& stars, double longest);
 

@@ -198,7 +198,7 @@ std::string WhyTooCrowded(const Eigen::VectorXd& point, WallSet walls, WallSet a
     why += Message("more than ", k - 1, " of them meet along one edge of the manifold (walls ",
                    ListWalls(along), "), or touch it");
   else if (CountWalls(walls) > kMostAtCorner)
-    why += Message("at most ", kMostAtCorner, " can be told apart");
+    why += Message("at most ", kMostAtCorner, " can be distinguished");
   else
     why += "they leave nothing of the manifold but a part without an inside";
   return why + ": move one of them, so that it passes beside that, or cuts it at an angle";
@@ -222,7 +222,7 @@ std::string AboutLeftFaces(const Engine<K>& engine) {
   }
   if (bad == 0) return "";
   return Message(
-      most == 1 ? "edges" : "faces of the boundary", " could not be mended at ", bad,
+      most == 1 ? "edges" : "faces of the boundary", " could not be fixed at ", bad,
       " vertices, the first at ",
       NamePoint(Eigen::Map<const Eigen::VectorXd>(stars.sample().Point(first), stars.sample().d())),
       ", and the rest was meshed beside them; ");

@@ -11,8 +11,8 @@
 namespace stellate::core {
 
 // Describes a mesh that did not converge, without further queries: inconsistent simplices,
-// circumradii, the reach that neighbours show, and, if M is smooth as far as is known, a warning
-// where epsilon is too coarse for that. epsilon: the client's, length.
+// circumradii, the bound of the reach by neighbours, and, if M is smooth as far as is known, a
+// warning if epsilon is too coarse for that. epsilon: the client's, length.
 template <int K>
 void DescribeUnfinished(const Engine<K>& engine, double epsilon, bool is_smooth,
                         Certificate* certificate);
@@ -20,8 +20,8 @@ void DescribeUnfinished(const Engine<K>& engine, double epsilon, bool is_smooth,
 // Says what a crease is, where, and what to do, for people.
 std::string DescribeCrease(const Crease& crease);
 
-// Records where walls meet at the smallest angle. If that is below SafeAngle, also adds a sentence:
-// a warning of a certified mesh, else at the end of the verdict.
+// Records where walls meet at the smallest angle. If that is below SafeAngle, also adds a sentence,
+// as a warning to a certified mesh, else to the verdict.
 template <int K>
 void ExplainSharpest(const Engine<K>& engine, Certificate* certificate);
 
@@ -39,14 +39,14 @@ struct PieceOfWall {
   Eigen::VectorXd point;
 };
 
-// Adds to the verdict where a wall bends more than epsilon can follow, or has a piece smaller than
-// that, of a finished mesh that is not certified. `piece`: one that the mesh lacked, if any.
+// Adds to the verdict of a finished mesh that is not certified: where a wall bends more than
+// epsilon can follow, or has a piece smaller than that. `piece`: one that the mesh lacked, if any.
 template <int K>
 void ExplainWallCurvature(const Engine<K>& engine, double epsilon,
                           const std::optional<PieceOfWall>& piece, Certificate* certificate);
 
-// Adds to the verdict where walls nearly meet in one point, so that corners are far nearer to each
-// other than epsilon, of a mesh that is not certified.
+// Adds to the verdict of a mesh that is not certified: where walls nearly meet in one point, so
+// that corners are far nearer to each other than epsilon.
 template <int K>
 void ExplainNearCorners(const Engine<K>& engine, double epsilon, Certificate* certificate);
 
@@ -59,8 +59,8 @@ std::string WhyTooCrowded(const Eigen::VectorXd& point, WallSet walls, WallSet a
 template <int K>
 std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent);
 
-// Warns where a converged mesh differs from the request: sizes finer than the finest bound, and
-// filled cavities.
+// Warns if a converged mesh differs from the request: sizes finer than the finest bound, and filled
+// cavities.
 template <int K>
 void WarnOfCompromises(const Engine<K>& engine, double epsilon, Certificate* certificate);
 

@@ -14,15 +14,15 @@
 namespace stellate::core {
 namespace {
 
-// Differences of closest points are taken over this share of epsilon: the error is its square over
-// the reach's, far below what directions may be wrong by (0.03).
+// Differences of closest points are taken over this share of epsilon. The error is proportional to
+// it over the reach, far below the error that directions may have (0.03).
 constexpr double kTangentStep = 0.01;
 
-// With a declared reach: what tangents found by differences may be wrong by, radians.
+// With a declared reach: the error that tangents found by differences may have, radians.
 constexpr double kTangentError = 0.03;
 
-// Meshes that end are answered 1.2 to 5 times a vertex: all of that is kept. What a mesh that does
-// not end is answered beyond this is not.
+// Meshes that end take 1.2 to 5 answers a vertex: all are kept. A mesh that does not end has its
+// oldest answers dropped.
 std::size_t ClearPointsKept(std::size_t vertices) { return 8 * vertices + 16384; }
 
 }  // namespace
@@ -48,7 +48,7 @@ MeshingRun<K>::MeshingRun(Specification spec)
   NextQuestions();
 }
 
-// What the client has in hand: the round's batch or a part of it.
+// Returns the batch that the client answers: the round's, or a part of it.
 template <int K>
 QueryBatch& MeshingRun<K>::OpenBatch() {
   const std::uint64_t most = spec_.limits.max_batch_queries;
@@ -136,7 +136,7 @@ Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
     Measure();
   };
   if (!WithThreads(spec_.threads, interruption_, advance)) {
-    // It may have ended in the very moment, but nobody has seen that.
+    // The run may just have ended, but no caller has seen that.
     over_ = false;
     progress_ = progress_before;
     report_ = report_before;
@@ -152,7 +152,7 @@ Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
   return std::move(delta_);
 }
 
-// From the answers to the next batch, or to the end.
+// Goes from the answers to the next batch, or to the end.
 template <int K>
 void MeshingRun<K>::Advance(const Answers& answers) {
   if (!end_) (trip_ ? static_cast<QuerySource&>(*trip_) : *certification_).Absorb(answers.blocks);
@@ -161,7 +161,7 @@ void MeshingRun<K>::Advance(const Answers& answers) {
   if (batch_) AskBeside();
 }
 
-// Asks on until some asker has questions, or the run is over.
+// Goes from source to source until one has queries, or the run is over.
 template <int K>
 void MeshingRun<K>::NextQuestions() {
   while (!over_) {
@@ -201,7 +201,7 @@ void MeshingRun<K>::AfterTrip() {
   const auto* const answered = trip_.get();
   spare_points_.KeepClearances(trip_->answers(), ClearPointsKept(engine_.stars().size()));
   (this->*insertion_)();
-  if (over_ || trip_.get() != answered || AskForSample()) return;  // it asks on
+  if (over_ || trip_.get() != answered || AskForSample()) return;  // it has more queries
   typename Engine<K>::Change change = engine_.Commit();
   delta_.added = std::move(change.added);
   delta_.removed = std::move(change.removed);
@@ -246,7 +246,7 @@ void MeshingRun<K>::InsertSpares() {
   spare_points_.Keep(answers, used);
 }
 
-// Finds what to do next and asks for it, or ends the refinement.
+// Decides what to do next and queries for it, or ends the refinement.
 template <int K>
 void MeshingRun<K>::Plan() {
   const std::unique_ptr<Sampler<K>> finished = std::move(finished_sampler_);
@@ -273,7 +273,7 @@ void MeshingRun<K>::Plan() {
   if (boundary.has_discoveries())
     planned = engine_.TakeDiscoveries();
   else if (engine_.criteria().speculative && !speculation_failed_ && boundary.stage() == K) {
-    // What is left then of R1 and R2 is not worth centre_rule all stars for.
+    // The few violations of R1 and R2 that are left are not worth testing R3 and R4 on all stars.
     const bool is_rest = is_sampled_ && !finished && violations.are_all_dirty();
     planned = RunSpeculatively<K>(engine_, whole_rounds_, &*targets,
                                   is_rest ? SpeculativeRules::kSizes : SpeculativeRules::kAllRules,
@@ -288,7 +288,7 @@ template <int K>
 void MeshingRun<K>::Certify() {
   if (AskForSpares(spare_points_.Uncovered(engine_.stars()))) return;
   const Stars<K>& stars = engine_.stars();
-  if (stars.size() == 0 && !lacks_.inside.empty())  // what was discovered led nowhere
+  if (stars.size() == 0 && !lacks_.inside.empty())  // the discoveries led nowhere
     return Fail({StatusCode::kNoSeeds, lacks_.inside});
   if (!engine_.filled().resolved().empty())
     engine_.filled().HandOut(stars, &delta_.added, &delta_.removed);
@@ -303,7 +303,7 @@ void MeshingRun<K>::Certify() {
   mesh.tangents = stars.sample().Tangent(0);
   trip_.reset();
   crease_probe_.Stop();
-  walked_.clear();  // not all of them to their end
+  walked_.clear();  // some were not probed to their end
   KnownOfManifold known = spare_points_.Take();
   known.tangential_offsets = boundary_detector_.offsets();
   certification_ = std::make_unique<Certification>(
@@ -320,7 +320,7 @@ void MeshingRun<K>::AfterCertificate() {
     End(Termination::kConverged);
 }
 
-// False if there are none, or if it did not help before.
+// Returns false if there are none, or if it did not help before.
 template <int K>
 bool MeshingRun<K>::AskForSpares(const std::vector<double>& points) {
   Eigen::MatrixXd chosen =
@@ -341,9 +341,9 @@ template <int K>
 void MeshingRun<K>::Finish(Termination termination) {
   if (over_) return;
   over_ = true;
-  // What is laid has no stars yet.
+  // The initial sample has no stars yet.
   if (sampler_ && termination == Termination::kRoundBudget) CommitSample();
-  // A round that was absorbed ends so; else nobody would get what is added.
+  // The round was absorbed, so that its delta reports the simplices added here.
   if (termination != Termination::kCancelled && termination != Termination::kOracleFailed)
     engine_.CompleteStars(&delta_.added, &delta_.removed);
   sampler_.reset();
@@ -351,7 +351,7 @@ void MeshingRun<K>::Finish(Termination termination) {
   batch_.reset();
   parts_.reset();
   report_.termination = termination;
-  // What a round that was interrupted has left behind was never handed out.
+  // An interrupted round leaves a mesh that was never reported.
   const bool is_whole = !interruption_.raised();
   report_.counts.vertices = is_whole ? engine_.stars().size() : progress_.vertices;
   report_.counts.simplices = is_whole ? engine_.simplex_count() : progress_.simplices;

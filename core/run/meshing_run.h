@@ -29,8 +29,8 @@
 namespace stellate::core {
 
 // Runs the engine as the state machine of mesher.h, for one k, from one query source to the next:
-// the seeds, each round's candidates, and, when no rule applies, the certificate. Points of M that
-// the mesh misses start refinement again.
+// the seeds, each round's candidates and, once no rule is broken, the certificate. Points of M that
+// the mesh misses start refinement again. Use it through Mesher::Create.
 template <int K>
 class MeshingRun final : public Mesher {
  public:
@@ -105,22 +105,22 @@ class MeshingRun final : public Mesher {
 
   std::shared_ptr<QueryBatch> batch_;  // of the open round; null: there is none
   std::optional<BatchParts> parts_;    // of batch_, if that is too large for one batch
-  std::uint64_t whole_rounds_ = 0;     // rounds in which parts count once
+  std::uint64_t whole_rounds_ = 0;     // rounds; the parts of one count once
 
-  // One of these asks.
+  // One of these is the query source.
   std::unique_ptr<RoundTrip<K>> trip_;
-  std::unique_ptr<Sampler<K>> sampler_;           // while the sample is made
-  std::unique_ptr<Sampler<K>> finished_sampler_;  // until what that left is planned
-  bool is_sampled_ = false;                       // the sample
+  std::unique_ptr<Sampler<K>> sampler_;           // while the initial sample is made
+  std::unique_ptr<Sampler<K>> finished_sampler_;  // until refinement is planned on its surrogate
+  bool is_sampled_ = false;                       // the initial sample is complete
   std::unique_ptr<Certification> certification_;
   Insertion insertion_ = nullptr;  // of the trip's answers
 
-  // Asks beside these, or alone before the run ends.
+  // Queries in addition to the source, or alone before the run ends.
   CreaseProbe crease_probe_;
   CreaseWatch crease_watch_;
-  WalkedEdges walked_;                      // while rounds went on
-  std::optional<std::size_t> probe_block_;  // of batch_, that is its question
-  std::optional<Termination> end_;          // as what the run ends then
+  WalkedEdges walked_;                      // edges that rounds have probed
+  std::optional<std::size_t> probe_block_;  // the probe's block in batch_
+  std::optional<Termination> end_;          // how the run ends once the probe is done
 
   ProgressMeter progress_meter_;
   RepeatCheck repeat_check_;
@@ -131,7 +131,7 @@ class MeshingRun final : public Mesher {
   BoundaryDetector boundary_detector_;
   bool speculation_failed_ = false;  // the last round of candidates inserted nothing
   bool covers_box_ = false;          // each seed of a covered box has its closest point
-  // What a mesh has been without.
+  // What the mesh lacked at some time.
   struct {
     std::optional<PieceOfWall> piece;
     std::string inside;  // why no seed's point is in M with boundary, if so

@@ -1,4 +1,5 @@
-// How a run learns that M is not smooth: beside its own questions, and before it gives up.
+// How a run finds out that M is not smooth: by queries in addition to its own, and before it gives
+// up.
 
 #include <utility>
 
@@ -11,13 +12,13 @@ namespace stellate::core {
 namespace {
 
 constexpr double kLongestWay = 2;  // of epsilon
-// Of epsilon: where a front refines it passes by edges so short, along which tangent spaces turn by
-// 30 degrees, only at creases, or at what bends far more sharply than it is fine.
+// In epsilon. A front has edges so short, along which tangent spaces turn by 30 degrees, only at
+// creases, or where M bends far more sharply than the mesh is fine.
 constexpr double kTellingWay = 0.5, kTellingSine2 = 0.25;
 
 }  // namespace
 
-// A way is asked along from when rules have kept failing for a while.
+// Probes steep edges once rules have kept failing for a while.
 template <int K>
 void MeshingRun<K>::WatchForCreases() {
   const ViolationIndex<K>& violations = engine_.violations();
@@ -50,7 +51,7 @@ void MeshingRun<K>::TakeBeside(const Answers& answers) {
   if (crease_probe_.crease()) Finish(end_.value_or(Termination::kNoProgress));
 }
 
-// Ends the run, once it is known whether what keeps it from a better end is a crease.
+// Ends the run, once it is known whether a crease keeps it from a better end.
 template <int K>
 void MeshingRun<K>::End(Termination termination) {
   const bool may_be_creased = K < spec_.ambient_dimension && !box_watch_.has_left();

@@ -1,4 +1,4 @@
-// What a run says of how it ended.
+// What a run reports of its ending.
 
 #include "core/base/message.h"
 #include "core/certificate/findings.h"
@@ -14,7 +14,7 @@ void MeshingRun<K>::DescribeEnding(bool is_whole) {
   if (termination == Termination::kConverged) {
     certificate = certification_->certificate();
     WarnOfCompromises<K>(engine_, spec_.epsilon, &certificate);
-    // All else that was found wrong may be its doing.
+    // It may be the cause of all other problems.
     if (crease_probe_.crease()) {
       certificate.verdict = Message("Not certified: ", DescribeCrease(*crease_probe_.crease()));
       certificate.only_too_coarse = false;
@@ -28,7 +28,7 @@ void MeshingRun<K>::DescribeEnding(bool is_whole) {
       certificate.verdict += ": allow more vertices (max_vertices), or take a larger epsilon";
     if (termination == Termination::kRoundBudget)
       certificate.verdict += ": allow more rounds (max_rounds)";
-    // Whoever cancels a large mesh does not want to wait for it to be described.
+    // A client that cancels a large mesh does not want to wait for its description.
     if (termination != Termination::kCancelled && termination != Termination::kOracleFailed)
       DescribeUnfinished<K>(engine_, spec_.epsilon, !crease_probe_.crease(), &certificate);
     if (termination == Termination::kNoProgress)

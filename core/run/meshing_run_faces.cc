@@ -1,4 +1,4 @@
-// What a run of a manifold with boundary asks for besides: seeds of its faces.
+// What a run of a manifold with boundary does in addition: it queries seeds of its faces.
 
 #include <bit>
 #include <string>
@@ -14,12 +14,12 @@
 namespace stellate::core {
 namespace {
 
-// Of epsilon: a piece of a wall that has a vertex so near, and yet no simplex there, is too small.
+// In epsilon: a piece of a wall with a vertex so near, and yet no simplex there, is too small.
 constexpr double kKnownWithin = 0.1;
 
 }  // namespace
 
-// The seeds' closest points on M, and on each wall of it.
+// Queries the seeds' closest points on M, and on each wall.
 template <int K>
 void MeshingRun<K>::AskForFaces(const Eigen::MatrixXd& seeds) {
   CandidateSet<K> candidates;
@@ -47,7 +47,7 @@ void MeshingRun<K>::KeepFaceSeeds() {
       continue;
     }
     ++inside;
-    // Not all seeds are taken, and one may be the only thing known of a piece of its wall.
+    // Not all seeds are used, and one may be the only point known of a piece of its wall.
     spare_points_.KeepEnd(answers, c);
     engine_.boundary().KeepSeed(answers.points.col(c), answers.walls[i], answers.tangents.col(c));
   }
@@ -63,8 +63,8 @@ void MeshingRun<K>::JudgeWalls() {
   if (Status status = wall_check_.Judge(trip_->answers()); !status.ok()) Fail(std::move(status));
 }
 
-// Points of walls where the mesh should end, and does not: faces are meshed from there. False as of
-// AskForSpares.
+// Queries points of walls where the mesh should end, but does not: faces are meshed from there.
+// Returns false as AskForSpares does.
 template <int K>
 bool MeshingRun<K>::AskForSparesOnWalls(const PointsOnWalls& points) {
   const Stars<K>& stars = engine_.stars();
@@ -91,8 +91,8 @@ bool MeshingRun<K>::AskForSparesOnWalls(const PointsOnWalls& points) {
   return true;
 }
 
-// Lays the interior, once its faces are meshed, if it has any. Whether it asks for some of it; else
-// all stars are whole.
+// Samples the interior, if there is any, once its faces are meshed. Returns whether there are
+// queries for it; else all stars are whole.
 template <int K>
 bool MeshingRun<K>::AskForInterior() {
   if (engine_.stars().size() == 0) return false;
@@ -104,8 +104,8 @@ bool MeshingRun<K>::AskForInterior() {
   return false;
 }
 
-// Where nothing is left to do on faces up to the stage: on to seeds of that stage, or to the next.
-// False where these are asked for, or the run is over.
+// Continues with seeds of the stage, or with the next stage, if nothing is left to do on faces up
+// to the stage. Returns false if there are queries for them, or the run is over.
 template <int K>
 bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
   const BoundaryState<K>& boundary = engine_.boundary();
@@ -152,12 +152,12 @@ void MeshingRun<K>::SettleCrowds() {
     Fail({StatusCode::kOracleBadConormal, WhyTooCrowded(bad->point, bad->walls, bad->along, K)});
 }
 
-// Where rounds have stopped to help: faces of this stage are left as they are, for the sake of the
-// rest; in the last the run is over.
+// Call it when rounds no longer help: leaves the faces of this stage as they are, for the sake of
+// the rest; in the last stage the run is over.
 template <int K>
 void MeshingRun<K>::LeaveFaces() {
   if (spec_.walls == 0 || !engine_.LeaveStage()) return End(Termination::kNoProgress);
-  stall_watch_ = StallWatch(1);  // beside them not all will yield: with less patience
+  stall_watch_ = StallWatch(1);  // next to them not all can be fixed: with less patience
   if (engine_.boundary().stage() == K && AskForInterior()) return;
   Plan();
 }

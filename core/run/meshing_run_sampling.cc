@@ -1,4 +1,4 @@
-// How a run begins: its seeds, and the sample that is laid from them.
+// How a run begins: its seeds, and the initial sample.
 
 #include <algorithm>
 #include <utility>
@@ -48,7 +48,8 @@ void MeshingRun<K>::AddAnswered() {
   spare_points_.Keep(trip_->answers(), used);
 }
 
-// Whether the sample is not yet laid. What goes on without end is left to Plan.
+// Returns whether the initial sample is still incomplete, and queries more of it. Plan ends a
+// sample that has no end.
 template <int K>
 bool MeshingRun<K>::AskForSample() {
   if (!sampler_) return false;
@@ -64,7 +65,7 @@ bool MeshingRun<K>::AskForSample() {
   return true;
 }
 
-// Besides what else the round has changed.
+// In addition to the other changes of the round.
 template <int K>
 void MeshingRun<K>::CommitSample() {
   const std::vector<std::uint32_t> before = engine_.stars().Simplices();

@@ -9,18 +9,18 @@
 namespace stellate::core {
 namespace {
 
-// So few points say nothing of M's area; more say little more.
+// So few points do not measure M's area; more points hardly measure it better.
 constexpr std::size_t kFewestKnown = 8, kMostKnown = 64;
-// What refinement adds to a sample that was laid, as long as nothing is known of it, and to one
-// whose R1 and R2 alone were judged.
+// What refinement adds to an initial sample, as long as no rule was tested, and if only R1 and R2
+// were.
 constexpr double kRefined = 0.25, kCovered = 0.05;
-// Rounds that a trend is taken from, and the least share of a broken rule that a vertex mends.
+// The rounds of a trend, and the least share of a violation that a vertex fixes.
 constexpr std::size_t kLongestTrend = 12, kShortestTrend = 3;
 constexpr double kLeastYield = 0.02;
-// A fraction that has proved too large by more than this tells nothing of the time.
+// A fraction that has proved too large by more than this does not foretell the time.
 constexpr double kTooLarge = 0.05;
-// The certificate's questions about simplices, at most, for each vertex, at most, and besides; of a
-// thorough audit those for each simplex.
+// The certificate's queries about simplices, about vertices (at most), and others; and those of a
+// thorough audit for each simplex.
 constexpr double kOfSimplices = 2200, kOfVertices = 1500, kBesides = 1000, kThorough = 5;
 
 template <int K>
@@ -83,7 +83,7 @@ ProgressMeter::Left ProgressMeter::LeftToSample(const Engine<K>& engine, double 
         1 - static_cast<double>(open_.size()) /
                 static_cast<double>(known_ * static_cast<std::size_t>(engine.stars().sample().d()));
     left.is_known = covered > 0;
-    // Nothing near any: there is far more than what is there.
+    // The sample is near none of them: it covers a small part of M.
     const double least = 0.5 / static_cast<double>(known_);
     left.vertices = have * (1 - covered) / std::max(covered, least);
   }
@@ -91,7 +91,7 @@ ProgressMeter::Left ProgressMeter::LeftToSample(const Engine<K>& engine, double 
   return left;
 }
 
-// By the trend: how many broken rules each new vertex mends, beyond those that it breaks.
+// Estimates by the trend: how many violations each new vertex fixes, beyond those that it adds.
 template <int K>
 ProgressMeter::Left ProgressMeter::LeftToRefine(const Engine<K>& engine) {
   const ViolationIndex<K>& violations = engine.violations();

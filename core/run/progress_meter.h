@@ -9,14 +9,14 @@
 
 namespace stellate::core {
 
-// Estimates what is left of a run, in queries: those of the vertices still to come, as many as each
-// took so far, and those of the certificate.
+// Estimates what is left of a run, in queries: those of the vertices still to come, as many for
+// each as so far, and those of the certificate.
 class ProgressMeter {
  public:
   explicit ProgressMeter(const Specification& spec);
 
-  // Takes known points of M that did not join the sample: the seeds'. The share of them that the
-  // growing sample has come near is the share of M that it covers.
+  // Takes known points of M that did not join the sample: the seeds' closest points. The share of
+  // them that the growing sample has come near is the share of M that it covers.
   void Know(const AnsweredPoints& seeds, const std::vector<std::uint8_t>& used);
 
   // Updates the counts, the phase, the fraction and is_foreseeable; rounds and queries are the
@@ -48,7 +48,7 @@ class ProgressMeter {
   std::vector<double> open_;     // known points that the sample is not near yet, d each
   std::size_t known_ = 0;        // of them at first
   std::uint32_t looked_at_ = 0;  // vertices
-  std::deque<Seen> seen_;        // of late, while the same rules were judged
+  std::deque<Seen> seen_;        // in recent rounds, while the same rules were tested
   bool judged_all_ = false;
   std::uint64_t before_certificate_ = 0;  // queries
 };

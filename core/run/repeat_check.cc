@@ -9,7 +9,7 @@
 namespace stellate::core {
 namespace {
 
-// Answers that are asked for once more.
+// Answers that are queried once more.
 constexpr Eigen::Index kSample = 64;
 // Closest points of answered points may move by this share of epsilon: positions wrong by 0.01
 // epsilon are still meshed well.

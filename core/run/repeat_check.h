@@ -11,6 +11,10 @@ namespace stellate::core {
 
 // Queries the closest points of a few answers again: a closest-point map must leave points of M
 // where they are, with the same sizes.
+//
+//   check.Sample(answers);                                  // of the first round
+//   batch.blocks.push_back(check.Questions());              // in a later one, as the last block
+//   if (Status status = check.Judge(answers); !status.ok()) ...
 class RepeatCheck {
  public:
   explicit RepeatCheck(double epsilon) : epsilon_(epsilon) {}
@@ -20,7 +24,8 @@ class RepeatCheck {
   bool has_questions() const { return points_.cols() > 0; }
   QueryBlock Questions() const;
 
-  // kOracleNotIdempotent or kOracleBadSize, naming query and block, the last of `answers`; or Ok.
+  // Judges the last block of `answers`. Returns kOracleNotIdempotent or kOracleBadSize, with query
+  // and block, or Ok.
   Status Judge(const Answers& answers) const;
   void Forget() { points_.resize(0, 0); }
 

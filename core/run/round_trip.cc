@@ -23,9 +23,10 @@ RoundTrip<K>::RoundTrip(const Engine<K>& engine, const OracleCapabilities& oracl
   AskForAll();
 }
 
-// Between a vertex of M and a point beyond a wall lies a point of that, and the sample covers
-// walls. So a point is inside that lies farther from any vertex of the boundary than its star's and
-// as far again as that covering asks. One is asked if all are: a round is a batch.
+// Between a vertex of M and a point beyond a wall lies a point of that wall, and the sample covers
+// walls. Therefore a point is inside if its distance from all vertices of the boundary is more than
+// its distance from its star's point and the covering radius together. If all are inside, one is
+// queried nevertheless: a round is a batch.
 template <int K>
 void RoundTrip<K>::FindKnown() {
   constexpr double kCovering = 1.25;  // of epsilon: R1 bounds it in tangent spaces, walls bend
@@ -61,8 +62,8 @@ QueryBlock RoundTrip<K>::NewBlock(QueryKind kind, WallSet face) const {
   return block;
 }
 
-// A block of flats, one of closest points for each face, and one of the planned points for each of
-// theirs, as far as there are any.
+// Opens a block of flats, one of closest points for each face, and one of the planned points for
+// each of their faces, if there are any.
 template <int K>
 void RoundTrip<K>::AskForAll() {
   places_.reserve(static_cast<std::size_t>(candidates_.size()));
@@ -81,8 +82,8 @@ void RoundTrip<K>::AskForAll() {
   }
 }
 
-// Opens a block of closest points for each of the faces that occur, ascending, with room for as
-// many as do. Returns the faces' blocks.
+// Opens a block of closest points for each face that occurs, ascending, with a column for each of
+// its points. Returns the faces' blocks.
 template <int K>
 std::map<WallSet, int> RoundTrip<K>::OpenBlocks(const std::vector<WallSet>& faces) {
   std::map<WallSet, Eigen::Index> counts;
@@ -210,7 +211,7 @@ void RoundTrip<K>::TakeKnown(Eigen::Index c) {
   Eigen::Map<Eigen::Matrix<double, K, K>>(answers_.tangents.col(c).data()).setIdentity();
 }
 
-// What answers say of the walls.
+// Sorts the answers about walls.
 template <int K>
 void RoundTrip<K>::SortFaces(const std::vector<AnswerBlock>& answers) {
   const int d = engine_.stars().sample().d();
@@ -222,7 +223,7 @@ void RoundTrip<K>::SortFaces(const std::vector<AnswerBlock>& answers) {
     const auto i = static_cast<std::size_t>(c);
     CheckInterruption(i);
     if (c < candidates_.drawn() && IsKnown(c)) {
-      answers_.clearances.col(c).setConstant(INFINITY);  // inside; nobody has told by how much
+      answers_.clearances.col(c).setConstant(INFINITY);  // inside, by an unknown amount
       continue;
     }
     const auto [b, column] = places_[i];
@@ -244,7 +245,7 @@ void RoundTrip<K>::SortFaces(const std::vector<AnswerBlock>& answers) {
   }
 }
 
-// Back to the flat of each candidate, and to M from there.
+// Goes back to the flat of each candidate, and to M from there.
 template <int K>
 void RoundTrip<K>::AskAgain() {
   --alternations_left_;
@@ -268,7 +269,7 @@ void RoundTrip<K>::AskAgain() {
     places_[static_cast<std::size_t>(c)] = {0, c};
 }
 
-// Of the points that were found, with the stars' own tangents as guesses.
+// Finds the tangents of the points that were found, with the stars' own tangents as guesses.
 template <int K>
 void RoundTrip<K>::AskForTangents() {
   std::vector<Eigen::Index> known;

@@ -12,9 +12,9 @@
 
 namespace stellate::core {
 
-// Queries a set of candidates, with all that inserting them needs. Where the oracle has no flats it
-// alternates between a candidate's flat and M instead (Criteria::flat_alternations); where it gives
-// no tangents a TangentFinder finds them.
+// Queries a set of candidates, with all that inserting them needs. If the oracle intersects no
+// flats it alternates between a candidate's flat and M instead (Criteria::flat_alternations); if it
+// gives no tangents a TangentFinder finds them.
 template <int K>
 class RoundTrip final : public QuerySource {
  public:
@@ -54,8 +54,8 @@ class RoundTrip final : public QuerySource {
   std::vector<QueryBlock> open_;
   std::vector<WallSet> asked_faces_;                  // by block, of the open questions
   std::vector<std::pair<int, Eigen::Index>> places_;  // by candidate: block and column of open_
-  // By drawn candidate: it is not asked for, since it lies deep inside of a domain of R^k, where
-  // each point is its own closest point. Empty: none is.
+  // By drawn candidate: it is not queried, since it lies deep inside a domain of R^k, where each
+  // point is its own closest point. Empty: all are queried.
   std::vector<std::uint8_t> known_;
   int alternations_left_ = 0;
   bool finds_tangents_ = false;

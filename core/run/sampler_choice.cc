@@ -11,26 +11,26 @@
 namespace stellate::core {
 namespace {
 
-// Seeds are dense where, of those a sample may have, fewer than this share lie so many spacings
-// from each other: then the lattice would have no room between them. A tenth of those drawn do
-// where a surface begins to need a fifth to a third fewer vertices for it, at some 300, and, of a
-// given sample of dimension 3, of which one in ninety does, where that does, at some 1,500. Curves
-// need fewer only where they take many more rounds.
+// Seeds are dense if, of those that a sample may have, fewer than this share lie so many spacings
+// from each other: the lattice would then not fit between them. A lattice saves a surface a fifth
+// to a third of its vertices from some 300 vertices on, where a tenth of the drawn seeds lie so far
+// apart, and a given sample of dimension 3 from some 1,500 on, where one in ninety does. Curves
+// need fewer vertices only if they take many more rounds.
 constexpr double kSparse = 3;
 constexpr double SparseShare(int k) { return k < 2 ? 0.5 : 0.1; }
-// From 4 on hardly any lie so far from each other where a lattice begins to need fewer vertices:
-// what counts is how many more than the seeds there will be, by a guess that is low there. A sphere
-// breaks even at some 2,500 vertices, a flat torus below 3,000.
+// From k = 4 on hardly any seeds lie so far apart where a lattice begins to save vertices: there
+// the criterion is how many more vertices than seeds there will be, by an estimate that is low. A
+// sphere breaks even at some 2,500 vertices, a flat torus below 3,000.
 constexpr int kFirstByGuess = 4;
 constexpr double kTimesSeeds = 5;
-// From 4 on as many seeds as tell enough to guess by are a good part of the sample: it is laid ring
-// by ring, and asked ahead for what the rules add.
+// From k = 4 on, the seeds that a surrogate needs are a large part of the sample: it grows ring by
+// ring, and only the points that the rules add are speculative.
 constexpr int kMaxSpeculativeDimension = 3;
-// From 4 on there are no fewer vertices between walls, and a cut T^4 that closes without a lattice
-// does not with one.
+// From k = 4 on a lattice saves no vertices between walls, and a cut T^4 that closes without a
+// lattice does not close with one.
 constexpr int kMostBetweenWalls = 3;
 
-// About how many points the sample will have, from how far apart half of the seeds lie.
+// Estimates how many points the sample will have, from how far apart half of the seeds lie.
 double GuessSize(int k, const AnsweredPoints& seeds, double epsilon) {
   const auto found = static_cast<std::size_t>(std::ranges::count(seeds.found, 1));
   double apart = epsilon;
@@ -40,7 +40,7 @@ double GuessSize(int k, const AnsweredPoints& seeds, double epsilon) {
   return static_cast<double>(count) * Power(apart / epsilon, k);
 }
 
-// Of seeds drawn to ask ahead from only as many tell as there would be else.
+// Of the seeds drawn for a speculative run only as many count as another run would draw.
 template <int K>
 bool AreSparse(const Engine<K>& engine, const AnsweredPoints& seeds, const Specification& spec) {
   const double epsilon = engine.criteria().epsilon;
@@ -57,7 +57,7 @@ bool AreSparse(const Engine<K>& engine, const AnsweredPoints& seeds, const Speci
          SparseShare(K) * static_cast<double>(CountApart(seeds, most, epsilon, shares));
 }
 
-// Seeds are no vertices yet there, and in nobody's way.
+// Between walls seeds are no vertices yet, and in no point's way.
 template <int K>
 std::unique_ptr<Sampler<K>> SamplerBetweenWalls(Engine<K>& engine, const Specification& spec) {
   if (K > kMostBetweenWalls || engine.criteria().graded()) return nullptr;

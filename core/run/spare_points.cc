@@ -13,10 +13,10 @@
 namespace stellate::core {
 namespace {
 
-// Each finds a part of M that was missed, and most manifolds have one part.
+// Each time finds a part of M that was missed, and most manifolds have one part.
 constexpr int kMostChosen = 16;
 
-// How far y is from the sample, in circumradii of the star there.
+// Returns the distance of y from the sample, in circumradii of the star there.
 template <int K>
 double ClearanceOf(const double* y, const Stars<K>& stars) {
   std::pair<double, std::uint32_t> nearest;

@@ -10,16 +10,15 @@
 
 namespace stellate::core {
 
-// Collects answers that were not inserted. They are known points of M: where the finished mesh is
-// far from one, refinement continues from it.
+// Collects answers that were not inserted. They are known points of M: if the finished mesh is far
+// from one, refinement continues from it.
 class SparePoints {
  public:
   explicit SparePoints(int d) : d_(static_cast<std::size_t>(d)) {}
 
   // Keeps the answers that are not `used` (by candidate).
   void Keep(const AnsweredPoints& answers, const std::vector<std::uint8_t>& used);
-  // Keeps by how much each answer is clear of the walls, used or not. No more than `most` are kept:
-  // beyond that the oldest go.
+  // Keeps the clearance of each answer, used or not. Drops the oldest beyond `most`.
   void KeepClearances(const AnsweredPoints& answers, std::size_t most);
   // Keeps a point of M as one where M ends, if the query was for one wall.
   void KeepEnd(const AnsweredPoints& answers, Eigen::Index c);
@@ -36,15 +35,15 @@ class SparePoints {
   // The same for points on walls, by wall.
   PlannedPoints ChooseOnWalls(const PointsOnWalls& points, double epsilon);
 
-  // Hands what is known to a certificate, and takes it back with what that was answered. Both are
-  // without leans.
+  // Give what is known to a certificate, and take it back with the answers to the certificate. Both
+  // are without tangential offsets.
   KnownOfManifold Take() { return std::exchange(known_, {}); }
   void GiveBack(KnownOfManifold known) { known_ = std::move(known); }
 
  private:
   std::size_t d_;
-  KnownOfManifold known_;  // no leans
-  int chosen_ = 0;         // times that Choose had some
+  KnownOfManifold known_;  // without tangential offsets
+  int chosen_ = 0;         // how often Choose returned points
 };
 
 }  // namespace stellate::core

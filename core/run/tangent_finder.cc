@@ -11,13 +11,13 @@
 namespace stellate::core {
 namespace {
 
-// Of a guess the derivative keeps cos(angle) of each direction: below this the guess was turned too
-// far (73 degrees) for the span to be trusted.
+// The derivative keeps cos(angle) of each direction of a guess: below this the guess is turned too
+// far (73 degrees) for a reliable span.
 constexpr double kLeastKept = 0.3;
-// Random directions lose most of their length where d is large; what must not happen is that one of
-// the k found directions is much weaker than another.
+// Random directions lose most of their length if d is large; but none of the k found directions may
+// be much weaker than another.
 constexpr double kLeastRatio = 1e-3;
-// The derivative has rank k: what lies beyond is curvature times step, or noise.
+// The derivative has rank k: further singular values are curvature times step, or noise.
 constexpr double kMostBeyond = 0.3;
 
 }  // namespace
@@ -95,8 +95,8 @@ void TangentFinder::Absorb(const AnswerBlock& answers) {
   AskMore();
 }
 
-// Guesses that were turned too far give way to random directions, and what these showed poorly is
-// looked at again along itself.
+// Replaces guesses that were turned too far by random directions, and queries tangents of poor
+// accuracy again, along themselves.
 void TangentFinder::AskMore() {
   std::vector<Eigen::Index> open;
   if (guessed_ && !again_) {

@@ -10,37 +10,40 @@
 namespace stellate::core {
 
 // Finds tangent spaces for oracles that do not give them (Sec. 5.3.1). The derivative of the
-// closest-point map at y on M is the projection on T_yM, so differences of closest points along a
-// few directions span it. With a guess (the tangent basis of a nearby sample point) k directions
-// do, else k + 4 random ones, whatever d is: 2k closest points a vertex.
+// closest-point map at y on M is the projection on T_yM, so that differences of closest points
+// along a few directions span it. With a guess (the tangent basis of a nearby sample point) k
+// directions are enough, else k + 4 random ones, for any d: 2k closest points a vertex.
+//
+//   finder.Start(points, guesses);
+//   while (const QueryBlock* block = finder.Next()) finder.Absorb(answers to *block);
+//   finder.tangents();
 class TangentFinder {
  public:
-  // step: how far from M to look, length.
-  // most_error: what the error_length of a point should not be above. Where it is, the point is
-  // asked about once more, along what was found.
+  // step: the length of the differences. most_error: the largest error_length of a point. A point
+  // with a larger one is queried once more, along the tangents found.
   TangentFinder(int k, int d, double step, std::uint64_t seed,
                 double most_error = std::numeric_limits<double>::infinity());
 
-  // Points y on M, d x n; guesses one a point: K rows of d (as Stars::Tangent) or nullptr;
-  // shares of `step` to look at, one a point, or empty: where M is known to bend more than
-  // elsewhere.
+  // Starts with points y on M, d x n. guesses: one for each point, K rows of d (as Sample::Tangent)
+  // or nullptr. shares: of `step` to use for each point, smaller where M is known to bend more, or
+  // empty.
   void Start(const Eigen::MatrixXd& points, std::vector<const double*> guesses,
              std::vector<double> shares = {});
 
-  // The closest-point queries still needed, or nullptr when Result() is complete.
+  // Returns the closest-point queries still needed, or nullptr once tangents() is complete.
   const QueryBlock* Next() const { return open_.empty() ? nullptr : &block_; }
   void Absorb(const AnswerBlock& answers);
 
-  // (k rows of d) x n, orthonormal. A column of a point where none was found is zero, and ok is 0:
-  // some closest point was missing, or M does not look k-dimensional there.
+  // (k rows of d) x n, orthonormal. If a point's tangents were not found, its column is zero and ok
+  // is 0: some closest point was missing, or M does not look k-dimensional there.
   const Eigen::MatrixXd& tangents() const { return tangents_; }
   const std::vector<std::uint8_t>& ok() const { return ok_; }
 
-  // Of all that were ever found: the sine of the largest angle to the true tangent space is at most
-  // this length over the reach. The differences' ends are points of M within 2 step of y, so
-  // that none is farther from the tangent space than (2 step)^2 / 2 reach (Federer): the columns of
-  // the derivative by 2 step / reach, the span of the k directions found by sqrt(m) times that over
-  // the least singular value.
+  // Bounds the error of all tangents found so far: the sine of the largest angle to the true
+  // tangent space is at most this length over the reach. The differences' ends are points of M
+  // within 2 step of y, so that none is farther from the tangent space than (2 step)^2 / 2 reach
+  // (Federer). The columns of the derivative are therefore wrong by 2 step / reach, and the span of
+  // the k directions found by sqrt(m) times that over the least singular value.
   double error_length() const { return error_length_; }
 
  private:
@@ -56,12 +59,12 @@ class TangentFinder {
   std::vector<double> errors_;  // by point, length
   bool again_ = false;          // the open points have tangents already
   std::uint64_t seed_;
-  bool guessed_ = false;  // the open questions lie along guesses
+  bool guessed_ = false;  // the open queries lie along guesses
   Eigen::MatrixXd points_, tangents_, directions_;
   std::vector<const double*> guesses_;
   std::vector<double> shares_;
   std::vector<std::uint8_t> ok_;
-  std::vector<Eigen::Index> open_;  // points whose tangents are asked for
+  std::vector<Eigen::Index> open_;  // points whose tangents are not found yet
   QueryBlock block_;
 };
 

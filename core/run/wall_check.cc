@@ -15,7 +15,7 @@ namespace {
 constexpr int kPointsOfWall = 4;
 // Conormals turned by 0.2 radians did no harm in trials; turned by 0.3 they did.
 constexpr double kTangentOfMostTurned = 0.2027100355086725;
-// Of a step: what is farther off is not there.
+// As a share of a step: a point farther off is another point.
 constexpr double kOff = 0.5;
 
 }  // namespace

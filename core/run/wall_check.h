@@ -9,25 +9,30 @@
 namespace stellate::core {
 
 // Checks whether the answers about walls agree with those about M, by a few points of each wall:
-// they must be on M and on the wall, and their conormals must point outward, turned by less than
-// does harm. Of clearances only the signs are used.
+// they must be on M and on the wall, and their conormals must point outward, with a harmless error.
+// Only the signs of clearances are used.
+//
+//   const Eigen::MatrixXd points = check.Questions(answers);  // then their closest points on M^:
+//   Status status = check.Judge(answers to points);
 class WallCheck {
  public:
   // epsilon: as the client gave it, length.
   WallCheck(int k, int d, double epsilon) : k_(k), d_(d), step_(kStep * epsilon) {}
 
-  // Closest points on M^ to ask for, d x n: steps from the first points of each wall among
-  // `answers` that lie beyond no other.
+  // Returns points whose closest points on M^ to query, d x n: steps from the first points of each
+  // wall among `answers` that lie beyond no other wall.
   Eigen::MatrixXd Questions(const AnsweredPoints& answers);
-  // Of these: the first wall at fault, by name and place, or Ok.
+  // Judges their answers. Returns the first wall that is wrong, with its number and the place, or
+  // Ok.
   Status Judge(const AnsweredPoints& answers) const;
 
  private:
-  // Of epsilon: the walls' curvature is not felt, and errors of positions much less.
+  // In epsilon: the walls' curvature has no effect at this length, and errors of positions even
+  // less.
   static constexpr double kStep = 0.01;
 
-  // A point of a wall, and what was asked there: itself, a step out, and steps along the wall, as
-  // its conormal has it, that turn inward a little.
+  // A point of a wall. The queries there are the point itself, a step outward, and steps along the
+  // wall, by its conormal, that turn inward a little.
   struct Sampled {
     int wall;
     Eigen::VectorXd point, conormal;

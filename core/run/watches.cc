@@ -9,8 +9,8 @@
 namespace stellate::core {
 namespace {
 
-// A box that is merely too small is left by a part of its size; what goes on for as much as its
-// diagonal on the outside has most likely no end.
+// A manifold leaves a box that is merely too small by a part of its size; one that goes on outside
+// for as much as the box's diagonal has most likely no end.
 constexpr double kBoxDiagonals = 1;
 // This many rounds, times k, without a step of the front into unknown ground must leave no more
 // than this share of the violations that there were. Runs that converge need a few dozen in all.

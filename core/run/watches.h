@@ -9,9 +9,7 @@
 
 namespace stellate::core {
 
-// Detect runs that would not end: a manifold that leaves the client's box, and rounds that break as
-// many simplices as they fix.
-
+// Detects a manifold that leaves the client's box, which a run would follow without end.
 class BoxWatch {
  public:
   BoxWatch(const std::optional<BoundingBox>& box, double epsilon) : box_(box), epsilon_(epsilon) {}
@@ -34,6 +32,7 @@ class BoxWatch {
   double farthest_outside_ = 0;  // length
 };
 
+// Detects a run that would not end because its rounds break as many simplices as they fix.
 class StallWatch {
  public:
   explicit StallWatch(int k) : k_(k) {}

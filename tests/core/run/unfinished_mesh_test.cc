@@ -70,7 +70,7 @@ TEST(UnfinishedMesh, FacesThatAreRefinedWithoutEndAreLeft) {
   const WallMesh mesh = MeshOf(sheets, spec);
   EXPECT_EQ(mesh.report.termination, Termination::kNoProgress);
   ExpectAMesh(mesh);
-  EXPECT_NE(mesh.report.certificate.verdict.find("could not be mended at "), std::string::npos)
+  EXPECT_NE(mesh.report.certificate.verdict.find("could not be fixed at "), std::string::npos)
       << mesh.report.certificate.verdict;
 }
 
