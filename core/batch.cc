@@ -25,7 +25,7 @@ std::string Where(const QueryBlock& block, Index query) {
   return Message(KindName(block.kind), " query ", query);
 }
 
-// What answers of a manifold with boundary carry besides.
+// The additional arrays of answers for a manifold with boundary.
 Status CheckFaceShape(const Specification& spec, const QueryBlock& block, const AnswerBlock& answer,
                       bool any_found) {
   if (!block.want_clearances || !any_found) return Status::Ok();
@@ -96,7 +96,7 @@ Status CheckShape(const Specification& spec, const QueryBlock& block, Index firs
   return Status::Ok();
 }
 
-// A value whose square still is finite.
+// The largest value whose square is finite.
 bool IsUsable(double value) { return std::abs(value) <= kMaxLength; }
 
 Status CheckFinite(const QueryBlock& block, Index query, const char* what, const double* values,
@@ -175,7 +175,7 @@ Status CheckTangent(const Specification& spec, const QueryBlock& block, Index qu
   return Status::Ok();
 }
 
-// Of walls that meet nearly tangentially: the two that do most, and at which angle inside of M.
+// Describes walls that meet nearly tangentially: the two that do most, and their angle inside M.
 // `along`: conormals in tangent coordinates, by ascending wall.
 std::string NameTangential(WallSet walls, const Eigen::MatrixXd& along) {
   double most = 0;
@@ -198,8 +198,8 @@ std::string NameTangential(WallSet walls, const Eigen::MatrixXd& along) {
   return Message("walls ", pair[0], " and ", pair[1], " at ", Brief(degrees), " degrees");
 }
 
-// Unit, tangent, and independent of each other: by the tangent basis that came with them. How walls
-// meet beyond others is nobody's concern: M is not there.
+// Checks that conormals are unit, tangent to the tangent basis of the same answer, and independent
+// of each other. Where walls meet beyond others they need not be: M is not there.
 Status CheckConormals(const Specification& spec, const QueryBlock& block, Index query,
                       const AnswerBlock& answer, Index j) {
   const double* const basis = answer.tangents.col(j).data();
@@ -253,7 +253,7 @@ Status CheckSize(const QueryBlock& block, Index query, double size) {
   return size >= kMinLength ? Status::Ok() : refuse(StatusCode::kOracleBadSize);
 }
 
-// Answer j, to the query of that number.
+// Checks answer j, to the query of that number.
 Status CheckAnswer(const Specification& spec, const QueryBlock& block, Index query,
                    const AnswerBlock& answer, Index j) {
   const double* const point = answer.points.col(j).data();

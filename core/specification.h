@@ -29,7 +29,7 @@ inline constexpr std::int64_t kMaxBoxSeedCoordinates = 4'000'000;  // box_seeds 
 struct OracleCapabilities {
   bool intersect_flat = false;  // answers "the point of M nearest c in c + T^perp"
   bool tangent_basis = false;   // sends an orthonormal tangent basis with every point of M
-  bool local_size = false;      // says how large things are at every point of M: see size_rate
+  bool local_size = false;      // sends a local size with every point of M: see size_rate
   bool conormals = false;       // sends the walls' conormals with points of faces
 };
 

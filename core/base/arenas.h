@@ -7,15 +7,17 @@
 
 namespace stellate::core {
 
-// Runs work() so that the ParallelFor in it use at most that many threads; 0: all cores. False if
-// it was interrupted, at any point.
+// Runs work() with at most that many threads in each ParallelFor in it; 0: all cores. Returns false
+// if it was interrupted at any point.
 //
-// Each call has an arena of oneTBB's to itself. Arenas are kept and used again: oneTBB leaves the
-// clean-up of one that had work to its own threads, and while these are busy elsewhere every arena
-// given up stays in memory for good.
+//   if (!WithThreads(4, interruption, [&] { Refine(); })) return;  // interrupted
+//
+// Each call has a oneTBB arena of its own. Arenas are kept and reused: oneTBB leaves the clean-up
+// of one that had work to its own threads, and while these are busy elsewhere every released arena
+// stays in memory.
 bool WithThreads(int threads, Interruption& interruption, FunctionRef<void()> work);
 
-// The arenas of this process: the most that were ever in use at the same time.
+// Returns the number of this process's arenas: the most that were ever in use at the same time.
 std::size_t ArenaCount();
 
 }  // namespace stellate::core

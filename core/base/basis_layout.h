@@ -4,9 +4,8 @@ namespace stellate::core {
 
 // A tangent basis is k vectors of R^d, in one of two layouts:
 //
-//   by vector      entry a*d + i is coordinate i of vector a: the mesher's own, where each vector
-//   is
-//                  an array that inner loops run along;
+//   by vector      entry a*d + i is coordinate i of vector a: the mesher's own, in which each
+//                  vector is an array for inner loops;
 //   by coordinate  entry i*k + a is the same number: the wire's, a matrix d x k in C order.
 //
 // Both functions copy; the arrays hold d*k numbers each and must not overlap.

@@ -7,8 +7,7 @@
 
 namespace stellate::core {
 
-// Appends ids, no more than make it `most` in all: what parts of a mesh have to say, in their
-// order.
+// Appends ids until there are `most` in all. Call it for the parts of a mesh in their order.
 inline void AppendFirst(const std::vector<std::uint32_t>& ids, std::size_t most,
                         std::vector<std::uint32_t>* all) {
   const std::size_t missing = most - std::min(most, all->size());

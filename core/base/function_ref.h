@@ -7,7 +7,8 @@ namespace stellate::core {
 template <typename Signature>
 class FunctionRef;
 
-// Calls something that outlives it, whatever its type: what a function takes that is compiled once.
+// A reference to a callable of any type, which must outlive it: the parameter of a function that is
+// compiled once.
 template <typename Result, typename... Arguments>
 class FunctionRef<Result(Arguments...)> {
  public:

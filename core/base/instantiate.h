@@ -1,7 +1,7 @@
 #pragma once
 
-// Classes that are templates on the manifold's dimension k are compiled once, in their own source,
-// for each k that this build carries (kMaxDimension).
+// Compiles a template on the manifold's dimension k once, in its own source, for each k that this
+// build supports (kMaxDimension).
 #define STELLATE_DECLARE_CLASS(Class) \
   extern template class Class<1>;     \
   extern template class Class<2>;     \

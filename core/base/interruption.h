@@ -6,15 +6,14 @@
 
 namespace stellate::core {
 
-// Work can be interrupted. It checks for that in all that it does: before each body of a
-// ParallelFor, at the end of each parallel stretch, and with CheckInterruption in each loop on one
-// thread that is as long as the mesh is large. What interrupted work leaves behind must not be
-// used.
+// Interruption of work by another thread. Work checks for it before each body of a ParallelFor, at
+// the end of each parallel loop, and by CheckInterruption in each loop on one thread that grows
+// with the mesh. The results of interrupted work must not be used.
 
-// Thrown out of work that was interrupted.
+// The exception that leaves interrupted work.
 struct Interrupted {};
 
-// Ends the work of another thread, once and for all.
+// Ends the work of another thread (WithThreads), for good.
 class Interruption {
  public:
   Interruption();
@@ -22,7 +21,7 @@ class Interruption {
   void Raise();
   bool raised() const { return raised_; }
 
-  struct Group;  // of oneTBB's tasks: core/base/task_group.h, for those who start them
+  struct Group;  // of oneTBB's tasks: core/base/task_group.h, for sources that start tasks
   Group& group() { return *group_; }
 
  private:
@@ -33,7 +32,8 @@ class Interruption {
 // For tests: called at each check, by the thread that checks.
 inline std::atomic<void (*)()> on_interruption_check = nullptr;
 
-// Made by a task that asks often: whom to ask costs more than the answer, and is found once.
+// For a task that checks often: make one per task, since finding what to check costs more than the
+// check.
 class InterruptionCheck {
  public:
   InterruptionCheck();
@@ -45,10 +45,10 @@ class InterruptionCheck {
 
 inline bool IsInterrupted() { return InterruptionCheck()(); }
 
-// For long stretches of work on one thread.
+// Checks for interruption, in long work on one thread.
 void ThrowIfInterrupted();
 
-// In a loop on one thread: checks at every 4096th step.
+// Checks at every 4096th step of a loop on one thread.
 inline void CheckInterruption(std::size_t step) {
   if (step % 4096 == 0) ThrowIfInterrupted();
 }

@@ -48,7 +48,7 @@ class LocalMaxima {
   State Get(std::size_t i) const { return state_[i].load(std::memory_order_relaxed); }
   void Set(std::size_t i, State state) { state_[i].store(state, std::memory_order_relaxed); }
 
-  // Decides i, or leaves it open and says what holds it up.
+  // Decides i, or leaves it open and returns what it waits for.
   bool Decide(std::size_t i, std::size_t* held_up_by) {
     State now = kChosen;
     visit_stronger_(i, [&](std::size_t j) {
@@ -86,7 +86,7 @@ class LocalMaxima {
   std::unique_ptr<std::atomic<State>[]> state_;
 };
 
-// By thing: 1 if it is chosen.
+// Returns 1 for each thing that is chosen, else 0.
 template <typename VisitStronger>
 std::vector<std::uint8_t> ChooseLocalMaxima(std::size_t count,
                                             const VisitStronger& visit_stronger) {

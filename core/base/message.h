@@ -8,8 +8,9 @@
 
 namespace stellate::core {
 
-// Pieces of text and numbers as one message. Doubles are written with the fewest digits that read
-// back as the same value, so that a refused value can be found again in the caller's data.
+// Joins text and numbers to one message: Message("epsilon is ", 0.1). Doubles are written with the
+// fewest digits that read back as the same value, so that a refused value can be found in the
+// caller's data.
 template <typename... Parts>
 std::string Message(const Parts&... parts) {
   std::string text;
@@ -33,7 +34,7 @@ std::string Message(const Parts&... parts) {
   return text;
 }
 
-// A measured value as people read it: four digits.
+// Writes a measured value for people: four digits.
 inline std::string Brief(double value) {
   char digits[40];
   const auto end =

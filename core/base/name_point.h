@@ -8,7 +8,7 @@
 
 namespace stellate::core {
 
-// "(0.5, 1, ...)": the first coordinates of a point, as messages name it.
+// Writes the first coordinates of a point, as messages name it: "(0.5, 1, ...)".
 inline std::string NamePoint(const Eigen::VectorXd& x) {
   std::string name = "(";
   for (Eigen::Index i = 0; i < std::min<Eigen::Index>(x.size(), 6); ++i) {

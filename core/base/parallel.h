@@ -11,14 +11,14 @@
 namespace stellate::core {
 
 // Calls body(begin, end) for ranges that make up [0, count), in parallel and in no order. Compiled
-// once: a loop of oneTBB's for each body was a third of the core's code, and of its compiling.
+// once: one oneTBB loop for each body was a third of the core's code, and of its time to compile.
 void ParallelRanges(std::size_t count, FunctionRef<void(std::size_t, std::size_t)> body);
 
 // Calls body(i) for each i in [0, count), in parallel and in no order. The bodies must not touch
 // each other's data; then results do not depend on the number of threads.
 //
 // oneTBB checks for interruption before each of its tasks, which may be thousands of bodies: too
-// rarely where a body takes long.
+// rarely if a body takes long.
 template <typename Index, typename Body>
 void ParallelFor(Index count, const Body& body) {
   const auto range = [&body](std::size_t begin, std::size_t end) {
@@ -28,9 +28,9 @@ void ParallelFor(Index count, const Body& body) {
   ParallelRanges(static_cast<std::size_t>(std::max(count, Index{0})), range);
 }
 
-// The same in chunks whose borders depend on `count` alone, so that what bodies gather by chunk is
-// the same whatever the number of threads: body(chunk, begin, end). Large enough to share working
-// memory, small enough for some dozens of threads.
+// Calls body(chunk, begin, end) for chunks whose borders depend only on `count`, so that results
+// gathered by chunk are the same for any number of threads. Chunks are large enough to share
+// working memory, and small enough for some dozens of threads.
 inline std::size_t ChunkSize(std::size_t count) {
   return std::clamp<std::size_t>(count / 256, 1, 64);
 }
@@ -47,7 +47,7 @@ void ParallelChunks(std::size_t count, const Body& body) {
   });
 }
 
-// What was found in parts, one after the other.
+// Joins the results of parts, one after the other.
 template <typename Item>
 std::vector<Item> Concatenate(std::vector<std::vector<Item>> parts) {
   std::vector<std::size_t> begins;

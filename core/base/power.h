@@ -2,8 +2,8 @@
 
 namespace stellate::core {
 
-// base^exponent by multiplication: std::pow rounds as the processor has it. REQUIRES: exponent >=
-// 0.
+// Returns base^exponent by multiplication, the same on every processor, unlike std::pow. REQUIRES:
+// exponent >= 0.
 inline double Power(double base, int exponent) {
   double power = 1;
   for (int i = 0; i < exponent; ++i) power *= base;

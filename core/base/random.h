@@ -12,18 +12,21 @@ inline std::uint64_t Mix64(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-// A small deterministic generator. Streams with different keys are independent, so that what one
-// star draws never depends on what another drew. The same on every processor: libm's functions
-// are not.
+// A small deterministic generator, the same on every processor, unlike one that uses libm. Streams
+// with different keys are independent, so that the numbers of one star never depend on those of
+// another.
+//
+//   Random random(seed, star);
+//   const double u = random.Uniform();
 class Random {
  public:
   explicit Random(std::uint64_t seed, std::uint64_t key = 0) : state_(Mix64(seed) ^ Mix64(~key)) {}
 
   std::uint64_t Next() { return Mix64(state_++); }
-  // In [0, 1).
+  // Returns a number in [0, 1).
   double Uniform() { return static_cast<double>(Next() >> 11) * 0x1p-53; }
-  // Nearly normal, of mean 0 and variance 1, never 0 itself: for coordinates of random directions.
-  // A sum of twelve uniform numbers of 16 bits each, exact (Irwin and Hall).
+  // Returns a nearly normal number of mean 0 and variance 1, never 0 itself, for coordinates of
+  // random directions: a sum of twelve uniform numbers of 16 bits each, exact (Irwin and Hall).
   double NearlyNormal() {
     constexpr std::int64_t kTwiceMean = 12 * 0xffff;
     std::int64_t sum = 0;
@@ -32,8 +35,8 @@ class Random {
         sum += static_cast<std::int64_t>(bits & 0xffff);
     return static_cast<double>(2 * sum - kTwiceMean + 1) * 0x1p-17;
   }
-  // A point of the unit ball of R^K, uniform: of the cube, drawn until one is in the ball, which
-  // takes 6.1 trials where K is 5.
+  // Returns a uniform point of the unit ball of R^K: draws from the cube until a point is in the
+  // ball, which takes 6.1 trials for K = 5.
   template <int K>
   void UniformInBall(double* x) {
     double norm2 = 0;

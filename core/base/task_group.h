@@ -7,8 +7,8 @@
 
 namespace stellate::core {
 
-// What an interruption ends. Here, so that no more of our sources than those that start tasks have
-// to read oneTBB.
+// The tasks that an interruption ends. In a header of its own, so that only sources that start
+// tasks include oneTBB.
 struct Interruption::Group {
   tbb::task_group_context context{tbb::task_group_context::isolated};
 };

@@ -7,9 +7,9 @@
 namespace stellate::core {
 
 // Inner loops over ambient coordinates. Four running sums: the compiler vectorises them, and the
-// order of additions depends on d alone, so that results do not depend on where an array lies.
-// R^3, where most people live, and R^4 are spelled out so that the calls vanish, as they do where
-// the compiler knows d.
+// order of additions depends only on d, so that results do not depend on an array's alignment. R^3,
+// the most frequent case, and R^4 are written out so that the calls are inlined, as they are if the
+// compiler knows d.
 [[gnu::always_inline]] inline double UnrolledDot(const double* a, const double* b, int d) {
   double s0 = 0, s1 = 0, s2 = 0, s3 = 0;
   int i = 0;
@@ -31,8 +31,8 @@ inline double LongDot(const double* a, const double* b, int d) { return Unrolled
   return __builtin_constant_p(d) ? UnrolledDot(a, b, d) : LongDot(a, b, d);
 }
 
-// call(std::integral_constant<int, D>()), D = d where d is small and 0 elsewhere: with a D known
-// early the loops over coordinates unroll.
+// Returns call(std::integral_constant<int, D>()), D = d if d is small, else 0: loops over
+// coordinates unroll if D is known at compile time.
 template <typename Call>
 inline auto WithDimension(int d, const Call& call) {
   switch (d) {
@@ -53,7 +53,7 @@ inline auto WithDimension(int d, const Call& call) {
   }
 }
 
-// dots[i] = row i . v, of `count` rows of d numbers each.
+// Writes dots[i] = row i . v, for `count` rows of d numbers each.
 inline void DotRows(const double* rows, std::size_t count, const double* v, int any_d,
                     double* dots) {
   WithDimension(any_d, [&](auto known) {

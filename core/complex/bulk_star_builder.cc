@@ -10,8 +10,8 @@
 namespace stellate::core {
 namespace {
 
-// In size bounds. Where no circumradius is above the bound nothing farther than twice that cuts a
-// star. Before R1 many a star reaches farther, and few beyond kSearched.
+// In size bounds. If no circumradius is above the bound, no point farther than twice that cuts a
+// star. Before R1 many stars reach farther, and few beyond kSearched.
 constexpr double kGathered = 2 * (1 + 1e-6);
 constexpr double kSearched = 2.5;
 
@@ -30,7 +30,8 @@ class PointsAround {
     distances2_.resize(count);
   }
 
-  // Parts what lies within `searched` of p, without p itself, by whether it is within `gathered`.
+  // Divides the points within `searched` of p, without p itself, by whether they are within
+  // `gathered`.
   void Part(std::uint32_t p, int d, double gathered, double searched, NearPoints* near,
             NearPoints* beyond) {
     near->clear();
@@ -69,8 +70,8 @@ class PointsAround {
   std::vector<double> coordinates_, distances2_;
 };
 
-// What lies from `from` to `to` around a point: of all within `searched` of it `beyond` holds what
-// is beyond `from`.
+// The points at distances from `from` to `to`: of all within `searched`, `beyond` holds those
+// beyond `from`.
 void AppendBetween(const BallTree& tree, const double* point, const NearPoints& beyond,
                    double searched, double from, double to, NearPoints* near) {
   for (const auto& [distance2, q] : beyond)
@@ -84,10 +85,10 @@ void AppendBetween(const BallTree& tree, const double* point, const NearPoints& 
       });
 }
 
-// The same for polygons: before R1 one star in five may be cut from farther than the first of
-// these, and hardly any from farther than the second.
+// The same for polygons: before R1 points farther than the first of these cut one star in five, and
+// points farther than the second hardly any.
 constexpr double kPolygonNear = 2.5, kPolygonFar = 3.2;
-// One search serves bunches that lie together: so many size bounds apart at most, and not many more
+// One search serves neighbouring bunches: so many size bounds apart at most, and not many more
 // points than this.
 constexpr double kTogether = 6;
 constexpr std::uint32_t kMostTogether = 24;
@@ -105,7 +106,7 @@ struct FoundPoint {
   }
 };
 
-// Gathers those of `ids` that lie within `reach` of a point, and such as only rounding keeps out.
+// Gathers those of `ids` that lie within `reach` of a point, and those that only rounding excludes.
 void Gather(const std::vector<std::uint32_t>& ids, const double* points, int any_d,
             const double* centre, double reach, GatheredPoints* gathered) {
   const std::size_t numbers = ids.size() * static_cast<std::size_t>(any_d);
@@ -126,7 +127,7 @@ void Gather(const std::vector<std::uint32_t>& ids, const double* points, int any
   });
 }
 
-// Those gathered that lie within `reach` of a point, nearest first.
+// Returns the gathered points within `reach` of a point, nearest first.
 std::span<const FoundPoint> NearestFirst(const GatheredPoints& gathered, const double* point,
                                          int any_d, double reach, std::vector<FoundPoint>* memory) {
   if (memory->size() < gathered.count) memory->resize(gathered.count);
@@ -147,9 +148,9 @@ std::span<const FoundPoint> NearestFirst(const GatheredPoints& gathered, const d
   return {found, count};
 }
 
-// Cuts by what lies around a point, nearest first and ties by id, out to where nothing can cut any
-// more: by what was gathered, which is all there is within `known`, and then by what search(reach)
-// gathers. Returns how far that is.
+// Cuts by the points around a point, nearest first and ties by id, as far as points can cut: first
+// by those gathered, which are all points within `known`, and then by those that search(reach)
+// gathers. Returns the distance up to which points can cut.
 template <typename Reach, typename Clip, typename Search>
 double CutNearestFirst(const double* point, int d, const GatheredPoints* gathered, double known,
                        const Reach& reach_now, const Clip& clip, const Search& search) {
@@ -167,7 +168,7 @@ double CutNearestFirst(const double* point, int d, const GatheredPoints* gathere
   }
 }
 
-// Cuts the tree's bunches into stretches that one search serves: where each begins.
+// Divides the tree's bunches into runs that one search serves, and returns where each begins.
 std::vector<std::size_t> CutIntoStretches(const std::vector<BallTree::Bunch>& bunches, int d,
                                           const auto& bound) {
   std::vector<std::size_t> begins;

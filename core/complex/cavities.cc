@@ -15,15 +15,16 @@
 namespace stellate::core {
 namespace {
 
-// Cavities of no more vertices than this also try simplices that no star holds: 462 for k = 4.
+// In cavities with at most this many vertices, simplices that no star holds are tried as well: 462
+// for k = 4.
 constexpr std::size_t kAllSubsets = 11;
 // Larger cavities are left alone.
 constexpr std::size_t kMostVertices = 48;
 // Simplices placed, in one cavity, before the search is given up.
 constexpr int kMostSteps = 4000;
 
-// A determinant this small beside the lengths of its rows is one of points that are off a wall by
-// an oracle's error.
+// A determinant below this share of the product of its rows' lengths belongs to points that are off
+// a wall by an oracle's error.
 constexpr double kFlat = 1e-8;
 
 template <int N>
@@ -154,8 +155,8 @@ class Cavity {
     return first;
   }
 
-  // Of a facet of a doubtful simplex before the cavity is filled; nothing where that cannot be
-  // told.
+  // Returns the state of a facet of a doubtful simplex before the cavity is filled; nothing if it
+  // is unknown.
   std::optional<State> StateOf(const Facet& facet) const {
     Simplex agreed[2];
     const int count = census_.AgreedOn(facet, agreed);
@@ -192,8 +193,8 @@ class Cavity {
     return true;
   }
 
-  // On which side of a facet an agreed simplex lies, seen from the facet's vertices: its apex may
-  // be no vertex of the cavity.
+  // Returns the side of a facet on which an agreed simplex lies, seen from the facet's vertices:
+  // its apex may not be a vertex of the cavity.
   int SideOf(const Simplex& s, const Facet& facet) const {
     std::size_t apex = 0;
     while (apex < K && s[apex] == facet[apex]) ++apex;
@@ -201,8 +202,8 @@ class Cavity {
     return apex % 2 == 0 ? orientation : -orientation;
   }
 
-  // On which side of a facet in a wall there is nothing: where a simplex would lie whose first
-  // vertex is beyond it.
+  // Returns the empty side of a facet in a wall: where a simplex would lie whose first vertex is
+  // beyond the wall.
   int SideBeyond(int wall, const Facet& facet) const {
     int side = 0;
     for (const std::uint32_t p : facet) {

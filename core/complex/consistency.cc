@@ -63,8 +63,8 @@ double Orientation(const Stars<K>& stars, std::uint32_t p, std::size_t v) {
   return sign;
 }
 
-// How the facets of a vertex w follow each other beside those of its neighbour v, with the one that
-// is off v in the place of v's that is off w.
+// The order of the facets of a vertex w compared with those of its neighbour v, where w's facet off
+// v takes the place of v's facet off w.
 struct Turned {
   std::size_t off_v;  // that facet
   bool odd;           // an odd permutation
@@ -115,7 +115,7 @@ std::optional<std::size_t> FindSimplex(const RestrictedVoronoiCell<K>& cell, std
 
 namespace {
 
-// Of a star at the boundary, where the simplex may be one of a face.
+// IsConsistent for a star at the boundary, where the simplex may be one of a face.
 template <int K>
 bool IsConsistentOnFaces(const Stars<K>& stars, std::uint32_t p, std::size_t v) {
   const auto simplex = stars.FaceSimplexOf(p, stars.cell(p), v);
@@ -128,8 +128,8 @@ bool IsConsistentOnFaces(const Stars<K>& stars, std::uint32_t p, std::size_t v) 
   return true;
 }
 
-// The vertex of the cell of q that is dual to a simplex on q with these other vertices, of that
-// key; vertex_count() if there is none.
+// Returns the vertex of the cell of q that is dual to a simplex on q with these other vertices and
+// that key; vertex_count() if there is none.
 template <int K>
 std::size_t FindIn(const RestrictedVoronoiCell<K>& cell, std::uint32_t q, std::uint64_t key,
                    const std::uint32_t (&others)[K]) {
@@ -145,8 +145,8 @@ std::size_t FindIn(const RestrictedVoronoiCell<K>& cell, std::uint32_t q, std::u
   }
 }
 
-// Looks for the simplex dual to vertex v of p's cell in the stars of its other vertices: where it
-// is, by facet of v. False: not in all of them.
+// Searches the stars of its other vertices for the simplex dual to vertex v of p's cell, and writes
+// its place in each, by facet of v. Returns false if it is not in all of them.
 template <int K>
 bool FindInStars(const Stars<K>& stars, std::uint32_t p, std::size_t v, std::uint32_t (&others)[K],
                  std::size_t (&at)[K]) {
@@ -194,8 +194,8 @@ ConsistentSimplices<K>::ConsistentSimplices(const Stars<K>& stars) : known_(star
   });
 }
 
-// Neighbours lie on different sides of the facet they share if, with the one's vertex off it in the
-// place of the other's, their signs differ.
+// Neighbours lie on different sides of their common facet if their signs differ, with the one's
+// vertex off it in the place of the other's.
 template <int K>
 Folds<K>::Folds(const Stars<K>& stars, std::uint32_t p) : folded_(stars.cell(p).vertex_count()) {
   const auto& cell = stars.cell(p);

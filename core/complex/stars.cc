@@ -174,8 +174,8 @@ std::optional<typename Stars<K>::CellVertex> Stars<K>::EncroachedBy(const double
   return worst;
 }
 
-// The sample points that most likely close a cell around q, the nearest first: those nearest, or,
-// where a star near q is known, that star and the stars of its points nearest to q.
+// Appends the sample points that most likely close a cell around q, the nearest first: the nearest
+// points or, if a star near q is known, that star and the stars of its points nearest to q.
 template <int K>
 void Stars<K>::FindClosing(const double* q, std::uint32_t near,
                            std::vector<std::uint32_t>* ids) const {
@@ -225,8 +225,7 @@ void Stars<K>::TryPoint(const double* point, const double* tangent, std::uint32_
             [](const auto& a, const auto& b) { return a.first < b.first; });
 }
 
-// Also finds the old stars that each new point cuts, by star: their influence is still that of
-// before.
+// Also finds the old stars that each new point cuts, by star, with their influence before the cuts.
 template <int K>
 std::vector<StarCut> Stars<K>::BuildNewStars(std::uint32_t first) {
   cells_.resize(size());
@@ -247,8 +246,8 @@ std::vector<StarCut> Stars<K>::BuildNewStars(std::uint32_t first) {
   return cuts;
 }
 
-// New points that follow each other are mostly near each other: stars in the order in which these
-// come to them find in the cache what their neighbours have read.
+// Consecutive new points are mostly near each other: stars in the order of their first cuts find in
+// the cache what their neighbours have read.
 template <int K>
 std::vector<typename Stars<K>::Turn> Stars<K>::InTurns(const std::vector<StarCut>& cuts) {
   std::vector<Turn> turns = ParallelGather<Turn>(cuts.size(), [&](std::size_t i, auto* found) {
@@ -261,8 +260,8 @@ std::vector<typename Stars<K>::Turn> Stars<K>::InTurns(const std::vector<StarCut
   return turns;
 }
 
-// Clips the old stars. A simplex that a cut creates has the new point that cuts, and so an id from
-// `first` on; one without is as old as the star.
+// Clips the old stars. A simplex that a cut creates has the new point as a vertex, whose id is
+// `first` or more; any other simplex was there before.
 template <int K>
 void Stars<K>::CutStars(const std::vector<Turn>& turns, const std::vector<StarCut>& cuts,
                         std::uint32_t first, Change* change) {
@@ -272,7 +271,7 @@ void Stars<K>::CutStars(const std::vector<Turn>& turns, const std::vector<StarCu
   std::vector<std::vector<std::uint32_t>> added(removed.size() + ChunkCount(count));
   std::vector<double> influence(turns.size() + count);
   ParallelChunks(turns.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
-    // For K = 2 the ids of the facets tell simplices apart, else keys.
+    // For K = 2 the ids of the facets distinguish simplices, else keys.
     std::vector<std::pair<std::uint64_t, Simplex>> before;
     const auto key_of = [](const Cell& cell, std::size_t v) {
       return K == 2 ? std::uint64_t{0} : cell.key(v);
@@ -330,8 +329,8 @@ void Stars<K>::SetInfluences(const std::vector<Turn>& turns, std::uint32_t first
   MeasureFaces(turns, first);
 }
 
-// The influence of points on walls on their stars' simplices of faces: those inside are larger, and
-// no point yields to them.
+// Sets the influences of points on walls by their stars' simplices of faces alone: simplices inside
+// are larger, and no point yields to them.
 template <int K>
 void Stars<K>::MeasureFaces(const std::vector<Turn>& turns, std::uint32_t first) {
   const std::vector<std::uint32_t>& boundary = sample_.boundary();

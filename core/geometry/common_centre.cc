@@ -109,7 +109,7 @@ bool MeanTangent(int d, const double* const* tangents, const double* barycentric
 // and v_i's, and C = A A^t (squared cosines), the lift is T_i^t A^t f(C) w, w the tangent
 // coordinates of x - v_i, f(c) = 1 / (c + sqrt c): exact where curvature is constant, as on spheres
 // and products of circles. f is taken as (11 + c) / (4 + 20 c), right to second order at c = 1 and
-// to 1 % for turns up to 45 degrees. False beyond that: what lies so far off is anybody's guess.
+// to 1 % for turns up to 45 degrees. Returns false for larger turns, where the lift is unreliable.
 // The bound, on the sum of squared sines, was found by trial on T^4 in R^8 at 0.8 of its reach:
 // larger ones misjudge steep simplices, and inconsistencies spread over the whole mesh.
 constexpr double kMostTurned = 0.75;
@@ -142,7 +142,7 @@ bool AddTurnedLift(int d, const double* tangent, const double* mean, double b, c
   return true;
 }
 
-// Takes off what lies along the simplex, so that distances to its vertices stay equal.
+// Removes the part along the simplex, so that distances to its vertices stay equal.
 template <int K>
 void DropAlong(int d, const double* const* edge, const double (&factor)[K][K], double* x) {
   double along[K];
@@ -168,7 +168,7 @@ bool TurnedLift(int d, const double* const* tangents, const double* const* edge,
     for (int j = 0; j < d; ++j) away[j] = i == 0 ? centre[j] : centre[j] - edge[i - 1][j];
     if (!AddTurnedLift<K>(d, tangents[i], mean, barycentric[i], away, lift)) return false;
   }
-  // Of the lift only what is normal to the mean tangent space is meant.
+  // Only the part of the lift normal to the mean tangent space counts.
   const auto drop_tangential = [&](double* x) {
     for (int a = 0; a < K; ++a) {
       const double s = Dot(mean + a * d, x, d);
@@ -176,8 +176,9 @@ bool TurnedLift(int d, const double* const* tangents, const double* const* edge,
     }
   };
   drop_tangential(lift);
-  // Towards the point at that height that is equidistant from the vertices, by turns: a simplex
-  // that stands off the tangent spaces has it far away, where none of this holds, and stops short.
+  // Moves by turns towards the point at that height that is equidistant from the vertices. For a
+  // simplex that stands off the tangent spaces that point is far away, where none of this holds,
+  // and the moves stop before it.
   double* const wanted = rows + K * d;
   double* const gap = wanted + d;
   std::copy_n(lift, d, wanted);
@@ -191,9 +192,9 @@ bool TurnedLift(int d, const double* const* tangents, const double* const* edge,
   return true;
 }
 
-// Whether the first lift leaves too many inconsistent: where simplices are large beside the reach.
-// From K = 4 on they all are, at the sizes that can be afforded; for K = 3 those that M bends away
-// from by more than this share of the circumradius, half its ratio to the reach.
+// Whether the first lift would leave too many simplices inconsistent, because they are large
+// compared with the reach. From K = 4 on they all are, at affordable sizes; for K = 3 those that M
+// bends away from by more than this share of the circumradius, half its ratio to the reach.
 constexpr int kTurns = 3;
 constexpr double kBent = 0.15;
 template <int K>
@@ -201,7 +202,7 @@ bool IsLarge(double lift2, double radius2) {
   return K > kTurns || (K == kTurns && lift2 > kBent * kBent * radius2);
 }
 
-// D: d, or 0 for any. Known early, the short loops unroll.
+// D: d, or 0 for any d. If D is known at compile time the short loops unroll.
 template <int K, int D>
 bool CentreOf(int any_d, const double* const* points, const double* const* tangents,
               const double* weights, double most2, double* centre) {

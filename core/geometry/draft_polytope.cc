@@ -55,7 +55,7 @@ bool DraftPolytope::Clip(std::uint32_t id, const double* normal, double offset) 
     --vertex_count_;
     if (removed_[i] != vertex_count_) MoveVertex(vertex_count_, removed_[i]);
   }
-  // What lost vertices and has no crossed edge lost all.
+  // A facet that lost vertices and has no crossed edge lost all.
   for (Facets dead = touched & ~kept; dead != 0;) {
     const auto last = static_cast<std::size_t>(std::bit_width(dead)) - 1;
     dead ^= Bit(last);
@@ -66,7 +66,8 @@ bool DraftPolytope::Clip(std::uint32_t id, const double* normal, double offset) 
   return true;
 }
 
-// How many vertices the half-space cuts off: their places, ascending.
+// Writes the places of the vertices that the half-space cuts off, ascending, and returns their
+// number.
 std::size_t DraftPolytope::FindRemoved(const double* normal, double offset) {
   const double nx = normal[0], ny = normal[1], nz = normal[2];
   const std::size_t count = vertex_count_;
@@ -80,8 +81,8 @@ std::size_t DraftPolytope::FindRemoved(const double* normal, double offset) {
   return removed;
 }
 
-// The edges with one end that is removed, by it and by slot. An edge is on two facets, and no two
-// edges are on the same two. Returns the facets of what is removed.
+// Finds the edges with one removed end, by that end and by slot. An edge is on two facets, and no
+// two edges are on the same two. Returns the facets of the removed vertices.
 DraftPolytope::Facets DraftPolytope::FindCrossings(std::size_t removed) {
   std::fill_n(across_, facet_count_, Facets{0});
   Facets touched = 0;
@@ -109,7 +110,7 @@ DraftPolytope::Facets DraftPolytope::FindCrossings(std::size_t removed) {
   return touched;
 }
 
-// Whether the crossed edges, two on each facet that has any, go round in one circle.
+// Whether the crossed edges, two on each facet that has any, form one cycle.
 bool DraftPolytope::IsCircle() const {
   const std::size_t first = crossings_[0].first;
   std::size_t from = first, at = crossings_[0].second;
@@ -133,7 +134,7 @@ void DraftPolytope::Locate(std::size_t v, const Crossing& crossing) {
   double x[3];
   const bool solved = MeetThree(first, second, third, x);
   double norm2 = solved ? SquaredNorm<3>(x) : 0;
-  // Mostly the end that goes is the farther one, and nobody has to look for the other.
+  // Mostly the removed end is the farther one, and the other need not be found.
   if (!solved || !(norm2 <= norm2_[crossing.removed] * (1 + kSlack))) {
     const std::size_t kept = KeptEnd(crossing), removed = crossing.removed;
     if (!solved || !(norm2 <= norm2_[kept] * (1 + kSlack))) {
@@ -150,7 +151,8 @@ void DraftPolytope::Locate(std::size_t v, const Crossing& crossing) {
   norm2_[v] = norm2;
 }
 
-// The end that stays: on both facets of the edge, as the other is, and not cut off.
+// Returns the kept end of an edge: it is on both facets of the edge, as the other end is, and not
+// cut off.
 std::size_t DraftPolytope::KeptEnd(const Crossing& crossing) const {
   const Facets edge = Bit(crossing.first) | Bit(crossing.second);
   std::size_t v = 0;
@@ -184,7 +186,7 @@ bool DraftPolytope::GiveUp() {
   return false;
 }
 
-// The two ends of an edge, who are on the same two facets, find each other there.
+// The two ends of an edge are on the same two facets: this is how adjacent vertices are found.
 template <>
 void RestrictedVoronoiCell<3>::Take(const DraftPolytope& polytope) {
   constexpr std::size_t kMost = DraftPolytope::kMostFacets;

@@ -117,8 +117,8 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
   facet.id = id;
   facet.vertices = 0;
 
-  // What a plane cuts off a polytope is connected: take the part around the worst vertex, and
-  // leave what only rounding put beyond the plane.
+  // The part that a plane cuts off a polytope is connected: take the part around the worst vertex,
+  // and keep vertices that only rounding put beyond the plane.
   scratch.cut.assign(old_count, 0);
   std::uint8_t* const cut = scratch.cut.data();
   cut[worst] = 1;
@@ -220,7 +220,7 @@ bool RestrictedVoronoiCell<K>::Clip(std::uint32_t id, const double* normal, doub
   return true;
 }
 
-// The edges that the cut crosses, from what is removed, ascending.
+// Finds the edges that the cut crosses, from the removed vertices, ascending.
 template <int K>
 void RestrictedVoronoiCell<K>::FindCrossings(Scratch& scratch) const {
   scratch.crossings.clear();
@@ -231,8 +231,9 @@ void RestrictedVoronoiCell<K>::FindCrossings(Scratch& scratch) const {
     }
 }
 
-// For K = 3, whether the crossed edges, two on each facet that has any, go round in one circle:
-// what is cut off is a disc of the cell's border then, as is what is kept. Notes which they are.
+// Whether, for K = 3, the crossed edges, two on each facet that has any, form one cycle: the
+// removed part of the cell's boundary is then a disc, as is the kept one. Notes the two crossings
+// on each facet.
 template <int K>
 bool RestrictedVoronoiCell<K>::IsDisc(Scratch& scratch) const {
   if (K != 3) return false;
@@ -269,7 +270,7 @@ bool RestrictedVoronoiCell<K>::IsDisc(Scratch& scratch) const {
   return steps == crossings.size();
 }
 
-// Stitch where what is cut off is a disc.
+// Stitch for a removed disc.
 template <int K>
 void RestrictedVoronoiCell<K>::Match(const Scratch& scratch, std::size_t old_count) {
   for (std::size_t c = 0; c < scratch.crossings.size(); ++c) {
@@ -281,9 +282,9 @@ void RestrictedVoronoiCell<K>::Match(const Scratch& scratch, std::size_t old_cou
   }
 }
 
-// Makes each vertex on the new facet a neighbour of its K-1 others: around each two-dimensional
-// face, walk from the removed end of one crossing edge through removed vertices to the next
-// crossing edge. False where that goes in circles: what was cut off is no ball.
+// Joins each vertex on the new facet to its K-1 neighbours there: around each two-dimensional face,
+// walks from the removed end of one crossing edge through removed vertices to the next crossing
+// edge. Returns false if the walk does not end: the removed part is no ball.
 template <int K>
 bool RestrictedVoronoiCell<K>::Stitch(const Scratch& scratch, std::size_t old_count) {
   for (std::size_t c = 0; c < scratch.crossings.size(); ++c) {
@@ -352,7 +353,7 @@ template <int K>
 void RestrictedVoronoiCell<K>::Measure() {
   max_norm2_ = 0;
   for (const Vertex& v : vertices_) max_norm2_ = std::max(max_norm2_, v.norm2);
-  // What is cut away does not come back.
+  // A removed part does not come back.
   has_fake_ = has_fake_ && std::any_of(facets_.begin(), facets_.end(),
                                        [](const Facet& f) { return IsFake(f.id); });
 }

@@ -104,7 +104,7 @@ class RestrictedVoronoiCell {
   std::size_t vertex_count() const { return vertices_.size(); }
   const double* x(std::size_t v) const { return vertices_[v].x; }   // c_p, tangent coordinates
   double norm2(std::size_t v) const { return vertices_[v].norm2; }  // R_p^2
-  // The sum of Mix64 over the facets' ids: tells simplices apart quickly.
+  // Returns the sum of Mix64 over the facets' ids, which distinguishes simplices quickly.
   std::uint64_t key(std::size_t v) const { return keys_[v]; }
   // The first vertex from `from` on with that key; vertex_count() if there is none.
   std::size_t Find(std::uint64_t key, std::size_t from = 0) const {

@@ -1,4 +1,4 @@
-// What a cut leaves of a cell that is no convex polytope.
+// What is left of a cell that is no convex polytope after a cut.
 
 #include <algorithm>
 
@@ -16,7 +16,7 @@ bool RestrictedVoronoiCell<K>::Tidy(Scratch& scratch) const {
     return facet == kWhole ||
            std::find(v.facet, v.facet + K, static_cast<Index>(facet)) != v.facet + K;
   };
-  // Cuts off all but the largest piece; says whether anything was.
+  // Cuts off all pieces except the largest; returns whether there were others.
   const auto keep_largest = [&](std::size_t facet) {
     auto& seen = scratch.seen;
     seen.assign(count, 0);

@@ -68,8 +68,8 @@ void Polygon::Take(const DraftPolygon& polygon) {
   max_norm2_ = polygon.max_norm2();
 }
 
-// What is cut off a polygon is a chain of vertices, from `first` to `last`, and two new ones close
-// the gap.
+// A cut removes a chain of vertices of a polygon, from `first` to `last`; two new ones close the
+// gap.
 bool Polygon::Clip(std::uint32_t id, const double* normal, double offset, Scratch& scratch,
                    const Surroundings<2>& around, const double* step) {
   const std::size_t count = count_;

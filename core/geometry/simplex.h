@@ -43,8 +43,8 @@ bool IsFat(SimplexVertices vertices, int d, double theta0);
 // A Theta0-sliver: j >= 2, Theta(sigma) < theta0^j, and every proper face is Theta0-fat.
 bool IsSliver(SimplexVertices vertices, int d, double theta0);
 
-// Is a Theta0-sliver or has one among its faces. When the vertices are distinct that is to say
-// that some face of dimension 2 or more is not Theta0-fat: the smallest such face is a sliver.
+// Whether the simplex or one of its faces is a Theta0-sliver. For distinct vertices this means that
+// some face of dimension 2 or more is not Theta0-fat: the smallest such face is a sliver.
 bool ContainsSliver(SimplexVertices vertices, int d, double theta0);
 
 // An orthonormal frame of a simplex's affine hull, and its edges in it. The edge farthest from the
@@ -71,8 +71,8 @@ double AngleToTangent(const SimplexFrame& frame, int j, int d, const double* tan
 double SineToTangent(const SimplexFrame& frame, int j, int d, const double* tangent, int k);
 
 // I - (T^t Q)^t (T^t Q) in its upper left j x j block, Q being the frame's directions: its
-// eigenvalues are the squared sines of the principal angles, to about 1e-15. A cheap way to tell
-// that a simplex tilts less than some angle; AngleToTangent resolves small angles better.
+// eigenvalues are the squared sines of the principal angles, to about 1e-15. A cheap way to decide
+// that a simplex is tilted less than some angle; AngleToTangent resolves small angles better.
 // REQUIRES: frame.rank == j.
 using TiltMatrix = Eigen::Matrix<double, kMaxSimplexDimension, kMaxSimplexDimension>;
 TiltMatrix MeasureTilt(const SimplexFrame& frame, int j, int d, const double* tangent, int k);

@@ -98,8 +98,9 @@ void BallTree::MakeLeaf(std::uint32_t node, std::uint32_t first_slot, const std:
   for (const std::uint32_t* i = begin; i != end; ++i) leaf_of_[*i] = node;
 }
 
-// Where to part them: at the middle of the coordinate in which they extend farthest, unless that
-// would leave hardly any on one side, or by their number, along the line through two far ones.
+// Returns where to divide them: at the middle of the coordinate in which they extend farthest,
+// unless that would leave hardly any on one side, or by their number, along the line through two
+// far ones.
 std::uint32_t* BallTree::Middle(std::uint32_t* begin, std::uint32_t* end, Halving halving) const {
   const auto count = static_cast<std::size_t>(end - begin);
   if (halving == Halving::kExtent) {

@@ -1,4 +1,4 @@
-// What is asked of a ball tree.
+// The searches of a ball tree.
 
 #include <utility>
 #include <vector>

@@ -10,10 +10,10 @@
 
 namespace stellate::core {
 
-// The corners of a mesh's simplices as simplex.h wants them, one simplex after the other.
+// Gives the corners of a mesh's simplices in the form of simplex.h, one simplex after the other.
 class Corners {
  public:
-  // Valid until the next call. k: the mesh's, a constant where that is faster.
+  // The result is valid until the next call. k: the mesh's, a constant if that is faster.
   [[gnu::always_inline]] SimplexVertices Of(const MeshView& mesh, const std::uint32_t* ids, int k) {
     for (int i = 0; i <= k; ++i) at_[i] = mesh.Point(ids[i]);
     return {at_.data(), static_cast<std::size_t>(k) + 1};

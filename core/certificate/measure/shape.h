@@ -91,7 +91,7 @@ class ShapeSearch {
   MeshShape Conclude(const std::vector<Part>& parts);
 
  private:
-  static constexpr double kMargin = 1e-6;  // of what Gram matrices say, as a share
+  static constexpr double kMargin = 1e-6;  // the relative error of Gram matrices
 
   template <int K>
   bool MayBeExtreme(const SimplexGram<K>& gram, double shortest2, double longest2) const {

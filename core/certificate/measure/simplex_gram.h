@@ -4,9 +4,13 @@
 
 namespace stellate::core {
 
-// The Gram matrix of a K-simplex' edges from one of its vertices, factored as L D L^t: what is
-// needed to tell in a few operations how large, how thick and how tilted it is. Half of the digits
-// are lost where it is thin; TakeFrame keeps them.
+// The Gram matrix of a K-simplex's edges from one of its vertices, factored as L D L^t. It gives
+// the size, the fatness and the tilt of the simplex in a few operations. A thin simplex loses half
+// of the digits; TakeFrame keeps them.
+//
+//   SimplexGram<2> gram;
+//   gram.dots = ...;  // lower triangle
+//   if (gram.Factor()) use gram.SquaredCircumradius();
 template <int K>
 struct SimplexGram {
   using Row = std::array<double, K>;
@@ -16,8 +20,8 @@ struct SimplexGram {
   Row inverse;             // of the pivots
   double determinant = 0;  // the squared volume times K!^2
 
-  // False where the simplex is so thin that the other results would say little: they are right to
-  // 1e-10, as shares, else.
+  // Returns false if the simplex is so thin that the other results would have little meaning; else
+  // their relative error is 1e-10.
   [[gnu::always_inline]] bool Factor() {
     constexpr double kTelling = 1e-4;
     double product = 1, least = 1;
@@ -39,7 +43,7 @@ struct SimplexGram {
     return least > 0 && determinant > kTelling * product;
   }
 
-  // x^t G^-1 x. REQUIRES: Factor() was true.
+  // Returns x^t G^-1 x. REQUIRES: Factor() was true.
   [[gnu::always_inline]] double InverseForm(const Row& x) const {
     Row y;
     double sum = 0;
@@ -51,7 +55,7 @@ struct SimplexGram {
     return sum;
   }
 
-  // The circumradius, squared.
+  // Returns the squared circumradius. REQUIRES: as above.
   [[gnu::always_inline]] double SquaredCircumradius() const {
     Row half;
     for (int i = 0; i < K; ++i) half[i] = dots[i][i] / 2;
