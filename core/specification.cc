@@ -151,13 +151,13 @@ Status CheckSeeds(const Specification& spec) {
 }
 
 // Seeds that cover a box lie in the middle of cells whose corners are this share of the reach away,
-// and a little off it, so that symmetric manifolds have none on their axes: oracles divide by zero
-// there. By that share of a cell at most, which adds twice as much of the distance to a corner:
-// less than a whole reach is left.
+// moved a little, so that symmetric manifolds have none on their axes, where oracles divide by
+// zero. They are moved by at most that share of a cell, which adds twice that share to the distance
+// from a corner: it stays below the reach.
 constexpr double kCoverShare = 0.97;
 constexpr double kOffMiddle = 0.01;
 
-// How many seeds along each axis.
+// Returns the number of seeds along each axis.
 Eigen::VectorXd CoverCounts(const Specification& spec) {
   const BoundingBox& box = *spec.bounding_box;
   const double cell = 2 * kCoverShare * *spec.declared_reach /

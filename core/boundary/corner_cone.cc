@@ -10,11 +10,11 @@
 namespace stellate::core {
 namespace {
 
-// A direction this near to a wall is along it: sine. Conormals are as precise as the walls'
+// A direction within this sine of a wall is along it. Conormals are as precise as the walls'
 // gradients; walls that cross at less than 14 degrees are refused anyway.
 constexpr double kAlongFace = 1e-6;
 
-// The next of the sets of as many, in the order of their numbers.
+// Returns the next set of the same number of walls, in the order of the sets as numbers.
 WallSet NextOfSize(WallSet set) {
   const WallSet lowest = set & (~set + 1), ripple = set + lowest;
   return ripple | ((set ^ ripple) >> 2) / lowest;
@@ -30,7 +30,7 @@ CornerCone<K> ConeOf(WallSet walls, const double* conormals) {
   std::vector<int> number;
   ForEachWall(walls, [&](int wall) { number.push_back(wall); });
   CornerCone<K> cone;
-  // The line that K - 1 walls have in common, in the direction that the others leave, if any.
+  // Returns the line common to K - 1 walls, in the direction that the others leave, if any.
   [[maybe_unused]] const auto try_along = [&](Vector along) {
     const Vector inward = -along;
     for (const Vector& u : {along, inward}) {

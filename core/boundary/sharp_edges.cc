@@ -17,7 +17,7 @@ std::optional<WallCosine> SharpestAt(const Stars<K>& stars, std::uint32_t p) {
   if (CountWalls(walls) < 2) return std::nullopt;
   std::optional<WallCosine> sharpest;
   const double* const conormals = stars.sample().Conormals(p);
-  // Of more walls than K some meet in the corner alone, and in no edge.
+  // If there are more than K walls, some meet only in the corner, and in no edge.
   const CornerCone<K> cone = CountWalls(walls) > K ? ConeOf<K>(walls, conormals) : CornerCone<K>();
   const auto share_edge = [&](WallSet pair) {
     return cone.rays.empty() || std::any_of(cone.rays.begin(), cone.rays.end(),
@@ -27,7 +27,7 @@ std::optional<WallCosine> SharpestAt(const Stars<K>& stars, std::uint32_t p) {
   ForEachWall(walls, [&](int first) {
     int b = a + 1;
     ForEachWall(walls & ~((SetOfWall(first) << 1) - 1), [&](int second) {
-      // Between the half-spaces that the walls leave: 0 where their conormals are opposite.
+      // The angle between the half-spaces that the walls leave: 0 if their conormals are opposite.
       const double cosine = -Dot(conormals + K * a, conormals + K * b, K);
       if ((!sharpest || cosine > sharpest->cosine) &&
           share_edge(SetOfWall(first) | SetOfWall(second)))

@@ -14,8 +14,9 @@ namespace {
 
 // Conormals may be wrong by some 11 degrees each (core/run/wall_check.cc).
 constexpr double kTellingDegrees = 23;
-// A neighbour across a thin part of M is no bend: each is behind the other by most of its distance.
-// One that is so far behind, or ahead, is on another sheet, or the piece of the wall is too small.
+// A neighbour across a thin part of M is no bend: each is behind the other by most of their
+// distance. A neighbour so far behind, or in front, is on another sheet, or the piece of the wall
+// is too small.
 constexpr double kBehind = 0.8;
 
 template <int K>
@@ -39,7 +40,8 @@ bool IsAlong(const Stars<K>& stars, std::uint32_t p, std::uint32_t q) {
   return here.dot(there) >= 0 && off <= kBehind * step.norm();
 }
 
-// Of vertices on one wall alone, else false.
+// Whether a vertex on exactly one wall has no neighbour within `far` on the same piece of it. False
+// for all other vertices.
 template <int K>
 bool IsAlone(const Stars<K>& stars, std::uint32_t p, double far) {
   if (K == 1 || CountWalls(stars.sample().walls(p)) != 1) return false;

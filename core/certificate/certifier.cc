@@ -48,7 +48,7 @@ class Certifier::Impl {
 
   void Absorb(const std::vector<AnswerBlock>& answers) {
     if (finished_) return;
-    // What they say of the oracle's own error the others need.
+    // They measure the oracle's own error, which all other judgements need.
     if (ball_steps_ == 0) claims_->closeness.JudgeVertices(answers[vertices_]);
     if (ball_steps_ == 0 && sheets_) sheets_->JudgeKnown();
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
@@ -98,7 +98,7 @@ class Certifier::Impl {
     blocks_.push_back(std::move(block));
     judges_.push_back(std::move(judge));
   }
-  // As Ask, of M alone: what M^ has beyond a wall counts as not found.
+  // Asks as Ask does, about M alone: a point of M^ beyond a wall counts as not found.
   void AskWithin(Eigen::MatrixXd points, const Judge& judge, bool want_tangents = false) {
     if (!boundary_) return Ask(std::move(points), judge, want_tangents);
     const auto within = [this, judge](const Eigen::MatrixXd& asked, const AnswerBlock& answer) {
@@ -134,7 +134,7 @@ class Certifier::Impl {
     if (boundary_) AskOnWalls();
   }
 
-  // judge(n, asked, answer) of the n-th block.
+  // Calls judge(n, asked, answer) for the n-th block.
   template <typename OfWalls, typename JudgeOne>
   void AskOfEach(OfWalls& claims, std::vector<QueryBlock> blocks, JudgeOne judge) {
     for (std::size_t n = 0; n < blocks.size(); ++n) {
@@ -159,7 +159,8 @@ class Certifier::Impl {
     AskOfEach(*sheets_, sheets_->Questions(claims_->closeness.simplices()), &SheetClaims::Judge);
   }
 
-  // What is asked about walls from where clearances dip may not have it asked again and again.
+  // Notes clearances of the first round only: the answers to queries where clearances dip must not
+  // cause further such queries.
   void Note(WallSet face, const AnswerBlock& answer) {
     if (face != 0 && ball_steps_ > 0) return;
     for (Eigen::Index j = 0; j < answer.clearances.cols(); ++j) {
@@ -207,9 +208,9 @@ class Certifier::Impl {
     if (claims_) {
       claims_->closeness.JudgeBends();
       claims_->reach.TellWhatBallsMet();
-      claims_->reach.Hold(claims_->coverage.JudgeSeen());
-      x_.certificate.answers_checked =
-          x_.seen.size() / static_cast<std::size_t>(x_.mesh.d) + claims_->closeness.points_held();
+      claims_->reach.TakeEvidence(claims_->coverage.JudgeSeen());
+      x_.certificate.answers_checked = x_.seen.size() / static_cast<std::size_t>(x_.mesh.d) +
+                                       claims_->closeness.points_compared();
       claims_->reach.Judge();
       if (boundary_) boundary_->JudgeReach();
       claims_->closeness.JudgeDeviation();

@@ -13,33 +13,34 @@ namespace {
 
 // Sine of ten degrees: a mesh can follow a crease with a smaller angle.
 constexpr double kLeastSine = 0.17364817766693033;
-// Of the mesh size: from ways as short walks are at their end. A manifold that is smooth, and turns
-// by as much on so short a way, bends thousands of times as sharply as the mesh is fine.
+// In mesh sizes: a walk ends at a way so short. A smooth manifold that turns as much along so short
+// a way has a curvature thousands of times that of the mesh size.
 constexpr double kShare = 1.0 / 2048;
 constexpr int kMostLegs = 48;
-// A leg is no longer than this share of that before; nor so short that what the oracle takes for
-// its differences, or rounding, is passed over.
+// A leg is no longer than this share of the one before; and no shorter than this one, lest it be
+// below the oracle's own differences, or rounding.
 constexpr double kLongestLeg = 0.75;
 constexpr double kShortestLeg = 0.2;
 constexpr double kKeptSine = 0.5;          // of the sine, by each leg
-constexpr double kSteepSine = 0.8;         // of it, by a leg that is taken rather than others
-constexpr double kAround = 3.0 / 16;       // of a way: so far about its corner is looked
-constexpr double kDifference = 1.0 / 128;  // of it: for tangents by differences
-// At its end, so many times a way's length from its corner, along either tangent space: on the
-// sides of a crease M is straight from the one to the other, by this share of what it turns by.
-// Noise has no sides; what bends with some radius turns on there.
+constexpr double kSteepSine = 0.8;         // ... by a leg that is preferred to others
+constexpr double kAround = 3.0 / 16;       // of a way's length: queries around its corner
+constexpr double kDifference = 1.0 / 128;  // ... tangents by differences
+// At the end of a walk, points are queried at these multiples of the way's length from its corner,
+// along either tangent space. On the sides of a crease M is straight between them, up to this share
+// of its turn. Noise has no sides, and a curved manifold turns further there.
 constexpr double kBeyond = 8, kFarBeyond = 32, kNearest = 4;
 constexpr double kAgree = 1.0 / 3;
-constexpr double kOnTheWay = 0.6;    // of the turn between the sides, on the way itself
-constexpr double kStays = 0.3;       // of how far off M a step beyond a crease would be
-constexpr double kSharp = 0.1;       // of a way and its turn: M is so near to where its sides meet
-constexpr double kOpposite = -0.95;  // cosine of directions in which a side goes on
-constexpr double kParallel = 0.05;   // of directions that meet nowhere
+constexpr double kOnTheWay = 0.6;    // the way's share of the turn between the sides
+constexpr double kStays = 0.3;       // of the distance from M of a step beyond a crease
+constexpr double kSharp = 0.1;       // of the way times its turn: M is so near where its sides meet
+constexpr double kOpposite = -0.95;  // cosine: a side continues in the opposite direction
+constexpr double kParallel = 0.05;   // singular values: directions do not meet
 constexpr double kFarthestCorner = 2;  // of a way's length, from its middle
 
 constexpr Eigen::Index kAsked = 8, kSteps = 4;  // steps, as far each of both
 
-// Of the space that `of` spans the unit direction that is farthest off `off`, and its sine.
+// Returns the unit direction in the span of `of` with the largest angle to the span of `off`, and
+// the sine of that angle.
 std::pair<Eigen::VectorXd, double> FarthestOff(const Eigen::MatrixXd& of,
                                                const Eigen::MatrixXd& off) {
   const Eigen::MatrixXd beside = of - off * (off.transpose() * of);
@@ -48,8 +49,9 @@ std::pair<Eigen::VectorXd, double> FarthestOff(const Eigen::MatrixXd& of,
   return {of * eigen.vectors.col(last), std::sqrt(std::max(eigen.values[last], 0.0))};
 }
 
-// Where the tangent spaces at both ends come nearest to each other, nearest to the middle: on a
-// crease between flat sides. The middle, where that is far away.
+// Returns the point where the tangent spaces at both ends are nearest to each other, the one
+// nearest to the middle: between flat sides it is on the crease. Returns the middle if that point
+// is far away.
 Eigen::VectorXd CornerOf(const Way& way) {
   const Eigen::Index d = way.a.size(), k = way.at_a.cols();
   const Eigen::VectorXd middle = (way.a + way.b) / 2;
@@ -95,7 +97,7 @@ void CreaseProbe::Start(std::vector<Way> ways) {
   }
 }
 
-// Along the way, and about its corner, to both sides along either tangent space.
+// Returns points along the way, and around its corner, to both sides along either tangent space.
 Eigen::MatrixXd CreaseProbe::PointsAbout(const Way& way) const {
   const Eigen::VectorXd step = (way.b - way.a) / 4, corner = CornerOf(way);
   const Eigen::VectorXd along_a = kAround * way.length() * FarthestOff(way.at_a, way.at_b).first;
@@ -106,7 +108,8 @@ Eigen::MatrixXd CreaseProbe::PointsAbout(const Way& way) const {
   return points;
 }
 
-// Far beyond its corner, to both sides along either tangent space, and again farther.
+// Returns points far beyond the way's corner, to both sides along either tangent space, at two
+// distances.
 Eigen::MatrixXd CreaseProbe::StepsFrom(const Way& way) const {
   const Eigen::VectorXd corner = CornerOf(way);
   const Eigen::VectorXd along_a = way.length() * FarthestOff(way.at_a, way.at_b).first;
@@ -174,7 +177,7 @@ void CreaseProbe::TakePoints(const AnswerBlock& answer) {
   is_difference_ = true;
 }
 
-// That asked for this.
+// Returns the walk that sent a query.
 CreaseProbe::Walk& CreaseProbe::WalkOf(Eigen::Index asked) {
   return looks_beyond_ ? walks_.front() : walks_[static_cast<std::size_t>(asked / kAsked)];
 }
@@ -191,8 +194,8 @@ void CreaseProbe::TakeTangents() {
   GoOn();
 }
 
-// Each walk goes a leg on, as far as it leads anywhere; one that is so short that it tells is
-// looked at alone, and given up if there is nothing.
+// Continues each walk by a leg, or drops it if there is none. A walk that has become short enough
+// is examined alone, and dropped if there is no crease.
 void CreaseProbe::GoOn() {
   if (looks_beyond_) {
     looks_beyond_ = false;
@@ -205,8 +208,8 @@ void CreaseProbe::GoOn() {
   ChooseEnd();
 }
 
-// M goes to where its sides meet; what is rounded there, or passes by, stays away. Where an oracle
-// finds nothing there it has no tangent space.
+// M reaches the point where its sides meet if that is a crease; a rounded or passing manifold stays
+// away. If the oracle finds nothing there, M has no tangent space there.
 void CreaseProbe::TakeCorner(const AnswerBlock& answer) {
   const bool found = answer.found.empty() || answer.found.front() != 0;
   const double off = (answer.points.col(0) - unconfirmed_->point).norm();
@@ -229,8 +232,8 @@ void CreaseProbe::ChooseEnd() {
   looks_beyond_ = true;
 }
 
-// The shortest way between two points that were found, of those on which the tangent spaces still
-// turn as they did; else of those on which they turn half as much.
+// Takes the shortest way between two points found on which the tangent spaces still turn as much;
+// if there is none, on which they turn half as much.
 bool CreaseProbe::TakeLeg(Walk* walk) const {
   const double length = walk->way.length();
   std::optional<Way> next;
@@ -257,9 +260,10 @@ bool CreaseProbe::TakeLeg(Walk* walk) const {
   return true;
 }
 
-// A crease has two sides at least that are straight, and the way itself turns by most of what there
-// is between them. Of a step along a side beyond a crease no point of M is near; beyond a crossing
-// there is one, and through the tip of a cone a side goes straight on.
+// Decides what is at the end of a walk. A crease has at least two straight sides, and the way
+// itself turns by most of the angle between them. No point of M is near a step along a side beyond
+// a crease; there is one beyond a crossing, and through the tip of a cone a side continues
+// straight.
 std::optional<Crease> CreaseProbe::WhatIsAt(const Walk& walk) {
   const double length = walk.way.length();
   const Eigen::MatrixXd steps = StepsFrom(walk.way);

@@ -15,7 +15,8 @@ namespace stellate::core {
 namespace {
 
 constexpr std::size_t kMostWays = 6;
-// Of the mesh size: at crossings points that are nearer are off by as much as they are apart.
+// In mesh sizes: at crossings, the error of points that are nearer to each other is as large as
+// their distance.
 constexpr double kShortest = 1.0 / 256;
 
 struct Edge {

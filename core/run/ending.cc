@@ -21,16 +21,16 @@
 namespace stellate::core {
 namespace {
 
-// Of epsilon: answers wrong by more do not go unnoticed (RepeatCheck), and points of a run that
-// does not end may lie so near to each other that this tells what they seem to bend by.
+// In epsilon: larger errors of answers are found (RepeatCheck). Points of a run that does not end
+// may lie so near each other that this error dominates the curvature that they show.
 constexpr double kLikelyError = 1e-3;
-// Of epsilon: corners of a solid that are so near to each other, or nearer, were seen to keep runs
-// from their end.
+// In epsilon: corners of a solid this near each other, or nearer, were seen to keep runs from
+// ending.
 constexpr double kNearlyMeet = 0.25;
-// Of the radius that a wall bends by: no mesh of such an epsilon is certified, or likely to end.
+// In radii of a wall's curvature: no mesh with such an epsilon is certified, or likely to end.
 constexpr double kMuchTooCoarse = 2;
 
-// 0, 2, 5
+// Writes "0, 2, 5".
 std::string ListWalls(WallSet walls) {
   std::string names;
   ForEachWall(walls, [&](int wall) { names += Message(names.empty() ? "" : ", ", wall); });
@@ -204,7 +204,7 @@ std::string WhyTooCrowded(const Eigen::VectorXd& point, WallSet walls, WallSet a
   return why + ": move one of them, so that it passes beside that, or cuts it at an angle";
 }
 
-// Stars of faces that were left before the rest was meshed.
+// Describes the stars of faces that were left before the rest was meshed.
 template <int K>
 std::string AboutLeftFaces(const Engine<K>& engine) {
   const Stars<K>& stars = engine.stars();
@@ -248,7 +248,7 @@ std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent) {
   left += Message(inconsistent, " simplices are inconsistent");
   for (std::uint32_t p = 0; p < stars.size(); ++p) {
     CheckInterruption(p);
-    // As they are counted: an open star says nothing of its simplices.
+    // As rules count them: the simplices of an open star are not judged.
     if (!stars.cell(p).bounded()) continue;
     const auto found = FindInconsistentConfiguration<K>(stars, p);
     if (!found) continue;

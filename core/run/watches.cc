@@ -12,12 +12,12 @@ namespace {
 // A manifold leaves a box that is merely too small by a part of its size; one that goes on outside
 // for as much as the box's diagonal has most likely no end.
 constexpr double kBoxDiagonals = 1;
-// This many rounds, times k, without a step of the front into unknown ground must leave no more
-// than this share of the violations that there were. Runs that converge need a few dozen in all.
+// This many rounds, times k, without a step of the front must leave no more than this share of the
+// violations at their beginning. Runs that converge need a few dozen in all.
 constexpr std::uint64_t kPatience = 100;
 constexpr double kShareLeft = 0.75;
-// After as many rounds of any kind, a manifold of which this share of the stars does not close
-// bends too much for epsilon.
+// After as many rounds of any kind, a manifold bends too much for epsilon if this share of the
+// stars does not close.
 constexpr double kHopelessShare = 0.5;
 
 }  // namespace

@@ -27,7 +27,8 @@ constexpr double kFine = 1.6;
 // Neighbours whose tangent space is turned further than this are around a corner: |T_p^t T_q| is
 // the cosine.
 constexpr double kLeastCosine = 0.5;
-// Keep the fit determined where neighbours are few; the terms are of order one after scaling.
+// Ridges keep the fit determined if there are few neighbours; the terms are of order one after
+// scaling.
 constexpr double kQuadraticRidge = 1e-6;
 constexpr double kCubicRidge = 1e-4;
 // A prediction from a point this near, in spacings of the sample, is used as that point alone gives
@@ -174,7 +175,7 @@ void Surrogate<K>::Fit(std::uint32_t p, std::uint32_t slot) {
   }
 }
 
-// By how much a graph may be wrong at |u| = length.
+// Returns by how much a graph may be wrong at |u| = length.
 template <int K>
 double Surrogate<K>::Doubt(const Graph& graph, double length) const {
   if (graph.scale == 0) return length * length / (2 * step_);
@@ -202,8 +203,8 @@ void Surrogate<K>::Near::Close() {
   }
 }
 
-// Points that follow each other are mostly near each other: what is near one of them is looked
-// through for others, too. Where one search ends and the next begins changes nothing.
+// Consecutive points are mostly near each other: one search serves several. The result does not
+// depend on where one search ends and the next begins.
 template <int K>
 std::vector<typename Surrogate<K>::Near> Surrogate<K>::FindNear(
     const Eigen::MatrixXd& points) const {
@@ -213,8 +214,8 @@ std::vector<typename Surrogate<K>::Near> Surrogate<K>::FindNear(
   std::vector<Near> near(count);
   ParallelFor((count + kRun - 1) / kRun, [&](std::size_t run) {
     thread_local std::vector<std::uint32_t> around;
-    const double* from = nullptr;  // where was searched last
-    double radius = 0;             // ... how far
+    const double* from = nullptr;  // the centre of the last search
+    double radius = 0;             // ... its radius
     for (std::size_t i = run * kRun; i < std::min(count, (run + 1) * kRun); ++i) {
       Near& here = near[i];
       if (from && Distance(at(i), from, d) <= Shared(K) * radius) {
@@ -274,7 +275,7 @@ bool Surrogate<K>::Blend(const Near& near, const double* x, double* point, doubl
     for (int a = 0; a < K; ++a) along2 += u[a] * u[a];
     const double off2 = std::max(distance2 - along2, 0.0);
     weights[i] = 0;
-    // Another sheet's points are across.
+    // Points of another sheet lie across.
     if (distance2 >= near.radius2 || off2 >= along2) continue;
     const double far = 1 - distance2 / near.radius2;
     const double across = 1 - off2 / along2;
@@ -307,7 +308,7 @@ bool Surrogate<K>::Blend(const Near& near, const double* x, double* point, doubl
   guess->size = size / total;
   if (!tangent) return true;
 
-  // Of the nearest graph: T_a + dN / du_a, made orthonormal.
+  // The tangents of the nearest graph: T_a + dN / du_a, made orthonormal.
   const std::uint32_t p = near.points[static_cast<std::size_t>(nearest)].second;
   const Graph& graph = graphs_[slot_[p]];
   std::copy_n(stars_.sample().Tangent(p), K * d, tangent);
@@ -343,7 +344,7 @@ bool Surrogate<K>::Predict(const Near& near, const double* x, const double* flat
   thread_local std::vector<double> from;
   from.resize(static_cast<std::size_t>(d));
   Guess guess;
-  // Off the graphs each sees x elsewhere; near them they can be compared.
+  // Far from the graphs, each has its own projection of x; near them they can be compared.
   if (!Blend(near, x, point, flat ? nullptr : tangent, &guess)) return false;
   const bool stays = !flat && Distance(x, point, d) <= kNearGuess * guess.spacing;
   std::copy_n(point, d, from.data());

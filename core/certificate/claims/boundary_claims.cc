@@ -26,7 +26,7 @@ std::string NameWalls(WallSet walls) {
   return name;
 }
 
-// Of a list of simplices of one dimension, how many faces with `size` corners it has.
+// Counts the faces with `size` vertices in a list of simplices of one dimension.
 std::int64_t CountFaces(const FaceMesh& face, int size) {
   const auto width = static_cast<std::size_t>(face.dimension) + 1;
   std::vector<std::array<std::uint32_t, kMaxDimension>> parts;
@@ -42,7 +42,8 @@ std::int64_t CountFaces(const FaceMesh& face, int size) {
   return std::unique(parts.begin(), parts.end()) - parts.begin();
 }
 
-// Components and Euler characteristic of a list of simplices of one dimension.
+// Counts the components, and computes the Euler characteristic, of a list of simplices of one
+// dimension.
 void Count(const FaceMesh& face, FaceReport* report) {
   const auto width = static_cast<std::size_t>(face.dimension) + 1;
   std::vector<std::uint32_t> vertices = face.simplices;
@@ -100,8 +101,8 @@ void BoundaryClaims::JudgeFaces() {
   c.boundary_components = whole.components;
   c.boundary_euler_characteristic = whole.euler_characteristic;
   if (boundary.simplices.empty()) return;  // no cone, and no apex
-  // Without its cones the complex has as many faces fewer as the cone over the boundary has
-  // beyond it.
+  // The complex without its cones has fewer faces: those that the cone over the boundary has in
+  // addition to the boundary.
   c.euler_characteristic += whole.euler_characteristic - 1;
   if (x_.mesh.k < 3) return;  // circles and points have no links
   const SimplexList list{x_.mesh.k - 1, static_cast<std::uint32_t>(x_.mesh.vertices),
@@ -227,9 +228,10 @@ void BoundaryClaims::JudgeBeyond(const AnswerBlock& answer) {
   }
 }
 
-// Takes what q, on the same wall as p, shows at p: p's distance from it over that from the wall's
-// tangent space, which leaves the conormal out. Nothing where p is on other walls too.
-void BoundaryClaims::HoldAt(WallSet walls, std::uint32_t p, const double* q) {
+// Bounds the boundary's reach by p and q, on the same wall: by q's distance from p and from the
+// wall's tangent space at p, which is orthogonal to the conormal. Does nothing if p is on other
+// walls too.
+void BoundaryClaims::TakeAt(WallSet walls, std::uint32_t p, const double* q) {
   if (x_.mesh.WallsOf(p) != walls) return;
   const Eigen::VectorXd step =
       Eigen::Map<const Eigen::VectorXd>(q, x_.mesh.d) - Eigen::VectorXd(x_.Vertex(p));
@@ -246,8 +248,8 @@ void BoundaryClaims::HoldAt(WallSet walls, std::uint32_t p, const double* q) {
   narrowest_walls_ = walls;
 }
 
-void BoundaryClaims::HoldPoint(int wall, const std::uint32_t* ids, const double* y) {
-  for (int i = 0; i < x_.mesh.k; ++i) HoldAt(SetOfWall(wall), ids[i], y);
+void BoundaryClaims::TakePoint(int wall, const std::uint32_t* ids, const double* y) {
+  for (int i = 0; i < x_.mesh.k; ++i) TakeAt(SetOfWall(wall), ids[i], y);
 }
 
 void BoundaryClaims::JudgeReach() {
@@ -258,11 +260,11 @@ void BoundaryClaims::JudgeReach() {
       for (std::size_t i = 0; i < width; ++i)
         for (std::size_t j = 0; j < width; ++j)
           if (i != j)
-            HoldAt(face.walls, face.simplices[s + i], x_.mesh.Point(face.simplices[s + j]));
+            TakeAt(face.walls, face.simplices[s + i], x_.mesh.Point(face.simplices[s + j]));
   }
   Certificate& c = x_.certificate;
   c.estimated_reach = std::min(c.estimated_reach, reach_);
-  if (x_.graded()) return;  // what is seen there counts in the sizes
+  if (x_.graded()) return;  // the sizes count what is seen there
   c.epsilon_over_reach = std::max(c.epsilon_over_reach, x_.spec.epsilon / reach_);
   if (ratio_ > kCoarse)
     x_.findings.Refuse(

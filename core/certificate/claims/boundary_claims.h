@@ -38,13 +38,13 @@ class BoundaryClaims {
   void JudgeBeyond(const AnswerBlock& answer);
   // Bounds the boundary's reach by an answered point y (d) of the wall near the simplex `ids` (k)
   // of its mesh. REQUIRES: the oracle's position error is known.
-  void HoldPoint(int wall, const std::uint32_t* ids, const double* y);
+  void TakePoint(int wall, const std::uint32_t* ids, const double* y);
   // Checks that the boundary's own reach within M, as its edges and answers bound it, is not too
   // small for the mesh. REQUIRES: M's own reach has been judged.
   void JudgeReach();
 
  private:
-  void HoldAt(WallSet walls, std::uint32_t p, const double* q);
+  void TakeAt(WallSet walls, std::uint32_t p, const double* q);
 
   Examination& x_;
   std::vector<std::vector<std::uint32_t>> chosen_;  // by block: places in its face

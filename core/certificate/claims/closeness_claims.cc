@@ -15,14 +15,14 @@
 namespace stellate::core {
 namespace {
 
-// Positions may be this wrong, as a share of the mesh size, before a mesh is refused: wrong by a
-// hundredth they do no harm, by a twentieth refinement breaks for k = 3.
+// The largest error of positions, as a share of the mesh size: an error of a hundredth does no
+// harm, with a twentieth refinement breaks for k = 3.
 constexpr double kPositionTolerance = 0.05;
 constexpr double kNoticeablePositionError = 1e-3;
-// Closest points that an oracle may fail to find near the mesh.
+// The share of closest points that an oracle may fail to find near the mesh.
 constexpr double kUnansweredShare = 0.01;
-// Answers are taken to be wrong by this share of the mesh size, and by a few roundings, even where
-// none is seen to be: what lies nearer together than ten times that is one point.
+// The least error assumed of answers, as a share of the mesh size and in roundings, even if none is
+// seen: points nearer to each other than ten times that are one point.
 constexpr double kLeastError = 1e-7;
 constexpr double kRoundingShare = 16 * std::numeric_limits<double>::epsilon();
 
@@ -94,7 +94,7 @@ void ClosenessClaims::JudgeVertices(const AnswerBlock& answer) {
                                  Brief(error), " away"));
     }
   }
-  // More would not have passed for answers that stay where they are (core/run/repeat_check.h).
+  // With a larger error the answers would have failed the repeat check (core/run/repeat_check.h).
   const double rounding = RoundingOf(answer.points, kNoticeablePositionError * x_.size);
   x_.position_error = std::max(
       {worst, rounding, kLeastError * x_.size, kRoundingShare * LargestCoordinate(x_.mesh)});
@@ -105,8 +105,8 @@ void ClosenessClaims::JudgeVertices(const AnswerBlock& answer) {
   }
 }
 
-// What of a step off M at a simplex lies along M, by its vertices' tangent spaces, which tell
-// that under the simplex to the second order of size over reach.
+// Returns the part of a step off M at a simplex that lies along M, by its vertices' tangent spaces.
+// Under the simplex this is right to the second order of size over reach.
 Eigen::VectorXd ClosenessClaims::AlongSimplex(const std::uint32_t* ids,
                                               const Eigen::VectorXd& step) const {
   Eigen::VectorXd along = Eigen::VectorXd::Zero(x_.mesh.d);
@@ -132,7 +132,7 @@ void ClosenessClaims::JudgeInside(const Eigen::MatrixXd& asked, const AnswerBloc
     const Eigen::VectorXd y = answer.points.col(j), step = asked.col(j) - y;
     const double distance = step.norm();
     const double circumradius = x_.Circumradius(ids);
-    reach_.HoldFoot(ids, circumradius, distance, y,
+    reach_.TakeFoot(ids, circumradius, distance, y,
                     is_barycentre ? std::optional(number) : std::nullopt);
     if (!x_.AtBoundary(ids) && MayHaveTangentialOffset(x_.mesh, ids, step, distance))
       boundary_check_.Add(y, AlongSimplex(ids, step), distance);
@@ -168,7 +168,7 @@ void ClosenessClaims::JudgeTangents(const AnswerBlock& answer) {
 void ClosenessClaims::JudgeBends() {
   if (!tangents_) return;
   for (const TangentCheck::Bend& bend : tangents_->bends())
-    reach_.HoldPoint(bend.vertex, bend.y, TangentCheck::kTolerance);
+    reach_.TakePoint(bend.vertex, bend.y, TangentCheck::kTolerance);
 }
 
 void ClosenessClaims::JudgeBoundary(const AnswerBlock& answer) {

@@ -35,7 +35,7 @@ class ClosenessClaims {
   void JudgeDeviation();
   const std::vector<std::uint32_t>& simplices() const { return simplices_; }
   std::uint32_t points_inside() const { return points_inside_; }
-  std::uint64_t points_held() const { return points_inside_ * simplices_.size(); }
+  std::uint64_t points_compared() const { return points_inside_ * simplices_.size(); }
 
  private:
   Eigen::VectorXd AlongSimplex(const std::uint32_t* ids, const Eigen::VectorXd& step) const;

@@ -20,7 +20,7 @@ namespace {
 // R1 is decided on circumradii in tangent spaces; rounding may differ.
 constexpr double kSizeTolerance = 1e-6;
 
-// False if it is none.
+// Whether the simplices are a complex. If not, refuses them.
 bool IsComplex(Examination& x) {
   if (x.mesh.vertices >= std::numeric_limits<std::uint32_t>::max()) {
     x.findings.Refuse(Findings::kComplex, "the mesh has too many vertices to check");
@@ -37,7 +37,7 @@ bool IsComplex(Examination& x) {
   return true;
 }
 
-// What to know of a mesh with walls that does not end where its faces are.
+// Returns what to look for if a mesh with walls does not end where its faces are.
 std::string AboutItsEnd(const Examination& x) {
   WallSet met = 0;
   for (std::uint32_t v = 0; v < x.mesh.vertices; ++v) met |= x.mesh.WallsOf(v);
@@ -45,7 +45,7 @@ std::string AboutItsEnd(const Examination& x) {
          AboutInactiveWall(x.spec.walls, met);
 }
 
-// What is known of the complex as such. A closed manifold, until something else is found.
+// The topology of the complex: a closed manifold, until something else is found.
 struct Topology {
   Connectivity connectivity;
   LinkReport links;
@@ -98,7 +98,7 @@ void RefuseWhatIsUnfinished(Examination& x) {
   }
 }
 
-// From who is whose neighbour; of manifolds with boundary in the mesh closed off by one vertex more
+// Computes the topology from adjacency; for manifolds with boundary, of the closed complex
 // (BoundaryClaims).
 Topology ExamineTopology(const Examination& x, const Adjacency& adjacency) {
   ThrowIfInterrupted();
@@ -122,7 +122,8 @@ Topology ExamineTopology(const Examination& x, const Adjacency& adjacency) {
   return topology;
 }
 
-// What the stars say of themselves; where that is not that all is well, what is wrong.
+// Measures the stars. Unless all of them embed, also examines the topology by adjacency, to find
+// what is wrong.
 StarGeometry MeasureComplex(Examination& x, Topology* topology) {
   if (std::optional<EmbeddedStars> embedded = MeasureIfEmbedded(x.mesh, *x.stars)) {
     topology->connectivity = std::move(embedded->connectivity);

@@ -93,7 +93,7 @@ void CoverageClaims::JudgeDifferences(const AnswerBlock& answer) {
       complete = complete && Found(answer, j);
       if (complete) steps.col(a) = answer.points.col(j) - probes_[n].x;
     }
-    if (!complete) continue;  // the nearest vertex's tangents have to do
+    if (!complete) continue;  // the nearest vertex's tangents are used
     const Eigen::MatrixXd basis = OrthonormalBasis(steps, k);
     for (int i = 0; i < x_.mesh.d; ++i) {
       for (Eigen::Index a = 0; a < k; ++a)
@@ -122,7 +122,8 @@ void CoverageClaims::Fail(const Probe& probe) {
   if (near.size() > Violations::kMost) near.pop_back();
 }
 
-// Whether a point is beyond a facet of the boundary near a vertex, by no more than that may bend.
+// Whether a point is beyond a facet of the boundary near a vertex, by no more than the boundary may
+// bend.
 bool CoverageClaims::IsBeyondFacet(const Eigen::VectorXd& x, std::uint32_t vertex) const {
   const auto is_near = [&](const std::uint32_t* ids) {
     for (int i = 0; i <= x_.mesh.k; ++i) {
@@ -174,7 +175,7 @@ void CoverageClaims::JudgeHits(const Probe& probe, const FibreHits& hits) {
 }
 
 Evidence CoverageClaims::JudgeSeen() {
-  const std::uint64_t vertices = x_.thorough() ? x_.mesh.vertices : kMaxVerticesHeld;
+  const std::uint64_t vertices = x_.thorough() ? x_.mesh.vertices : kMaxVerticesCompared;
   Evidence evidence = CompareWithMesh(x_.mesh, x_.seen, x_.longest_edge, x_.size, x_.graded(),
                                       x_.position_error, vertices);
   if (evidence.uncovered.empty()) return evidence;

@@ -14,13 +14,13 @@
 namespace stellate::core {
 namespace {
 
-// Tangent spaces that the oracle gives: so wrong, in radians, they are to rounding and to
-// differences, and no proof depends on it, whose own angles are no better.
+// The error of the oracle's tangent spaces, radians, by rounding and differences. No proof depends
+// on it, whose own angles are no better.
 constexpr double kHarmlessTilt = 1e-6;
 // A solver may leave them wrong by this much, unnoticed. What that would explain proves nothing:
 // neither that the reach is as declared, nor that it is not.
 constexpr double kLikelyTilt = 1e-3;
-// Tangent spaces that are wrong by more are found to be (TangentCheck).
+// Larger errors of tangent spaces are found (TangentCheck).
 constexpr double kUnseenTilt = 0.15;
 
 }  // namespace
@@ -35,7 +35,7 @@ void DeclaredReach::TestEdge(std::uint32_t p, std::uint32_t q, double noise) {
   const double length = offset.norm();
   const double away = (offset - tangent * (tangent.transpose() * offset)).norm();
   if (!(away > 0)) return;
-  Hold({ReachBound(length * length, away), length, away, noise, true, {}}, [&] {
+  TakeWitness({ReachBound(length * length, away), length, away, noise, true, {}}, [&] {
     return Message("its points ", NamePoint(PointOf(mesh_, p)), ", vertex ", p, ", and ",
                    NamePoint(PointOf(mesh_, q)));
   });
@@ -43,7 +43,7 @@ void DeclaredReach::TestEdge(std::uint32_t p, std::uint32_t q, double noise) {
 
 void DeclaredReach::TestBall(std::uint32_t v, double radius, double length, double noise) {
   if (!std::isfinite(radius)) return;
-  Hold({radius, length, length * length / (2 * radius), noise, true, {}}, [&] {
+  TakeWitness({radius, length, length * length / (2 * radius), noise, true, {}}, [&] {
     return Message("a ball of that radius that touches it at vertex ", v, ", ",
                    NamePoint(PointOf(mesh_, v)), ", and again ", Brief(length), " from there");
   });
@@ -52,17 +52,17 @@ void DeclaredReach::TestBall(std::uint32_t v, double radius, double length, doub
 void DeclaredReach::TestDistance(const std::uint32_t* ids, double circumradius, double distance,
                                  double noise) {
   if (!(distance > 0)) return;
-  // LargestDistance(rho, r) = distance, solved for r, in the lengths of Contradicts; no distance
-  // above rho says more than that one.
+  // LargestDistance(rho, r) = distance, solved for r, in the lengths of Contradicts; a distance
+  // above rho shows no more than rho itself.
   const double rho = RadiusOf(ids, circumradius), away = std::min(distance, rho);
   const double length2 = rho * rho + away * away;
-  Hold({ReachBound(length2, away), std::sqrt(length2), away, noise, false, {}}, [&] {
+  TakeWitness({ReachBound(length2, away), std::sqrt(length2), away, noise, false, {}}, [&] {
     return Message("a point of simplex ", NameSimplex(ids, mesh_.k + 1), ", which is ",
                    Brief(distance), " away from it");
   });
 }
 
-// As the proof bounds the smallest ball around a simplex.
+// Returns the proof's bound of the smallest ball around a simplex.
 double DeclaredReach::RadiusOf(const std::uint32_t* ids, double circumradius) const {
   double longest2 = 0;
   for (int i = 0; i <= mesh_.k; ++i)
@@ -73,7 +73,7 @@ double DeclaredReach::RadiusOf(const std::uint32_t* ids, double circumradius) co
 }
 
 template <typename Describe>
-void DeclaredReach::Hold(Witness witness, const Describe& describe) {
+void DeclaredReach::TakeWitness(Witness witness, const Describe& describe) {
   const double known = witness.by_tangents ? claim_.tangent_error : 0;
   const bool unknown = witness.by_tangents && given_;
   Keep(witness, describe, known + (unknown ? kLikelyTilt : 0), &sure_);
@@ -96,14 +96,14 @@ bool DeclaredReach::Refutes(const Strongest& strongest) const {
   return Contradicts({claim_.reach, strongest.tilt}, w.length, w.away, w.noise);
 }
 
-// How wrong a tangent space has to be, radians, for the witness to say nothing.
+// Returns the error of a tangent space, radians, that explains the witness.
 double DeclaredReach::TiltBehind(const Witness& w) const {
   return (w.away - w.length * w.length / (2 * claim_.reach) -
           Blame({claim_.reach, 0}, w.length, w.noise)) /
          w.length;
 }
 
-// The reach that the witness allows, with digits enough to differ from the declared one.
+// Writes the reach that the witness allows, with digits enough to differ from the declared one.
 std::string DeclaredReach::SayAtMost(const Witness& w) const {
   std::string said = Message("at most ", Brief(w.reach));
   if (Brief(w.reach) == Brief(claim_.reach))

@@ -57,7 +57,7 @@ class DeclaredReach {
     std::optional<Witness> witness;
   };
   template <typename Describe>
-  void Hold(Witness witness, const Describe& describe);
+  void TakeWitness(Witness witness, const Describe& describe);
   template <typename Describe>
   void Keep(const Witness& witness, const Describe& describe, double tilt,
             Strongest* strongest) const;

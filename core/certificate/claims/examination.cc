@@ -11,7 +11,8 @@ namespace stellate::core {
 namespace {
 
 // A point of a simplex of circumradius R with vertices on M is within reach - sqrt(reach^2 - R^2)
-// of M: 0.27 R at R = 0.5 reach, half of R at 0.8 reach. Beyond that M is somewhere else.
+// of M: 0.27 R at R = 0.5 reach, half of R at 0.8 reach. A larger distance means that M is
+// elsewhere.
 constexpr double kDistanceShare = 0.5;
 constexpr double kDistanceNoise = 0.02;  // of the mesh size, for inexact oracles
 

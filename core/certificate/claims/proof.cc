@@ -28,10 +28,10 @@ constexpr double kAngleMargin = 1e-6;
 // The error of lengths computed from dot products, as a share of the lengths.
 constexpr double kLengthMargin = 1e-9;
 constexpr double kFloatMargin = 1e-6;  // MeshShape keeps floats
-// Vertices of a component that (B) is tried at.
+// The vertices of a component at which (B) is tried.
 constexpr int kTriedVertices = 4;
 
-// A simplex that (A) fails for, and by how much.
+// The tilt of a simplex for which (A) fails, and by how much.
 struct Tilt {
   std::uint32_t simplex = VertexStars::kNone;
   double alpha = 0, rho = 0;
@@ -51,8 +51,8 @@ struct Extent {
   }
 };
 
-// Condition (A). Most simplices are told by what MeshShape knows of them: the sum of the squared
-// sines is no less than the largest, Jung's ball no smaller than the smallest one.
+// Condition (A). MeshShape decides most simplices: the sum of the squared sines is no less than the
+// largest, and Jung's ball is no smaller than the smallest one.
 class AngleCondition {
  public:
   AngleCondition(const MeshView& mesh, const SimplexList& list, const MeshShape& shape,
@@ -108,9 +108,9 @@ class AngleCondition {
   const double jung_;
 };
 
-// A number that the distance of the simplex from p is not below. The point of an affine hull of
-// some vertices that is nearest to p gives a direction, in which no vertex is nearer than that; the
-// best of all faces is the distance itself.
+// Returns a lower bound of the simplex's distance from p. The point nearest to p in the affine hull
+// of some vertices gives a direction in which no vertex is nearer than that bound; the best of all
+// faces gives the distance itself.
 double DistanceAtLeast(const double* p, SimplexVertices corners, int d) {
   const int n = static_cast<int>(corners.size());
   std::vector<double> offsets(corners.size() * static_cast<std::size_t>(d));
@@ -151,7 +151,7 @@ double DistanceAtLeast(const double* p, SimplexVertices corners, int d) {
   return best - kLengthMargin * std::sqrt(longest2);
 }
 
-// Some vertices of each component, the lowest ones.
+// The vertices of lowest id of each component.
 struct Chosen {
   std::vector<std::uint32_t> vertices;
   std::vector<std::uint32_t> components;  // of each
@@ -191,7 +191,7 @@ Chosen ChooseVertices(const VertexStars& stars) {
   return chosen;
 }
 
-// Condition (B): empty, or what is in the way.
+// Decides condition (B): returns "" or the obstacle.
 std::string FindOtherSheet(const MeshView& mesh, const VertexStars& stars, const MeshShape& shape,
                            double most_rho, double reach) {
   const Chosen chosen = ChooseVertices(stars);

@@ -16,16 +16,17 @@
 namespace stellate::core {
 namespace {
 
-// Two points of M so much nearer to each other than the mesh size are on two sides of something.
+// Two points of M nearer to each other than this share of the mesh size are on two sides of a thin
+// part or gap.
 constexpr double kThin = 0.25;
-// Of the places that were looked at: where no more are too coarse, sizes that follow the manifold
-// are cheaper than a smaller epsilon.
+// If no more than this share of the probed places is too coarse, graded sizes are cheaper than a
+// smaller epsilon.
 constexpr double kFewPlaces = 0.5;
-// What is too coarse by less costs little everywhere.
+// If the mesh is too coarse by less, a smaller epsilon costs little everywhere.
 constexpr double kMuchFiner = 2;
 
-// Whether a point at this distance, so far off a tangent space, both squared, may bound the reach
-// by less than `reach`, or rounding hides whether it does.
+// Whether a point at this distance from a vertex and this distance from its tangent space, both
+// squared, may bound the reach by less than `reach`, or is within rounding of that.
 bool MayBound(double length2, double away2, double reach) {
   constexpr double kLost = 1e-12, kMargin = 1 - 1e-6;
   return !(4 * reach * reach * (away2 + kLost * length2) < kMargin * length2 * length2);
@@ -40,7 +41,7 @@ ReachClaims::ReachClaims(Examination& examination, const StarGeometry& stars)
       edge_q_(stars.narrowest_q),
       reach_(stars.reach) {
   narrowest_ = {edge_p_, (x_.Vertex(edge_p_) - x_.Vertex(edge_q_)).norm()};
-  if (x_.spec.declared_reach) HoldDeclared(stars);
+  if (x_.spec.declared_reach) TestDeclared(stars);
   if (x_.thorough()) feet_.emplace(x_.mesh, x_.longest_edge);
   balls_.AddLadders(x_.spec.random_seed, kBallCount);
   const std::uint64_t step =
@@ -51,7 +52,7 @@ ReachClaims::ReachClaims(Examination& examination, const StarGeometry& stars)
   }
 }
 
-void ReachClaims::HoldDeclared(const StarGeometry& stars) {
+void ReachClaims::TestDeclared(const StarGeometry& stars) {
   const double reach = *x_.spec.declared_reach;
   declared_.emplace(
       x_.mesh, ReachClaim{reach, std::asin(std::min(1.0, x_.facts.tangent_error_length / reach))},
@@ -71,7 +72,7 @@ void ReachClaims::TakeFeet(const AnswerBlock& answer) {
   feet_->Absorb(answer.points, answer.found, x_.position_error);
 }
 
-// An orthonormal basis, nearly of the tangent space of M under a simplex.
+// Returns an orthonormal basis that nearly spans the tangent space of M under a simplex.
 Eigen::MatrixXd ReachClaims::TangentsUnder(const std::uint32_t* ids) const {
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(x_.mesh.d, x_.mesh.k);
   const auto first = x_.Tangents(ids[0]);
@@ -82,7 +83,7 @@ Eigen::MatrixXd ReachClaims::TangentsUnder(const std::uint32_t* ids) const {
   return OrthonormalBasis(sum, x_.mesh.k);
 }
 
-void ReachClaims::HoldFoot(const std::uint32_t* ids, double circumradius, double distance,
+void ReachClaims::TakeFoot(const std::uint32_t* ids, double circumradius, double distance,
                            const Eigen::VectorXd& y, std::optional<std::uint64_t> number) {
   if (declared_) declared_->TestDistance(ids, circumradius, distance, x_.position_error);
   if (feet_ && number)
@@ -102,7 +103,7 @@ void ReachClaims::HoldFoot(const std::uint32_t* ids, double circumradius, double
   }
 }
 
-void ReachClaims::HoldPoint(std::uint32_t v, const Eigen::VectorXd& y, double tilt) {
+void ReachClaims::TakePoint(std::uint32_t v, const Eigen::VectorXd& y, double tilt) {
   const Eigen::VectorXd step = y - x_.Vertex(v);
   const auto tangent = x_.Tangents(v);
   const double length = step.norm();
@@ -119,7 +120,7 @@ void ReachClaims::TellWhatBallsMet() {
   if (feet_) x_.seen.insert(x_.seen.end(), feet_->met().begin(), feet_->met().end());
 }
 
-void ReachClaims::Hold(const Evidence& evidence) {
+void ReachClaims::TakeEvidence(const Evidence& evidence) {
   coarseness_ = std::max(coarseness_, evidence.coarseness);
   Take(evidence.reach, {evidence.vertex, evidence.distance});
 }
@@ -130,12 +131,12 @@ void ReachClaims::Take(double reach, Narrow where) {
   narrowest_ = where;
 }
 
-// What else than a smaller epsilon would do.
+// Returns what to do instead of a smaller epsilon.
 std::string ReachClaims::Cure(double ratio) const {
   const std::optional<double>& rate = x_.spec.criteria.size_rate;
   if (x_.graded() && rate)
     return Message(", or size_rate at most ", Brief(*rate * kAdvised / ratio));
-  // A ball on one of two sides sees a bend.
+  // A ball on one side alone finds curvature.
   if (ratio < kMuchFiner * kCoarse || 2 * balls_.coarse_share() >= kFewPlaces) return {};
   return Message(", or, if it bends so sharply in a few places only, size_rate ", kAdvised,
                  ", which makes the mesh finer there alone");
@@ -171,7 +172,7 @@ void ReachClaims::JudgeDeclared() {
   const double noise = x_.position_error;
   if (edge_p_ != edge_q_) declared_->TestEdge(edge_p_, edge_q_, noise);
   declared_->TestBall(balls_.narrowest(), balls_.reach(), balls_.distance(), noise);
-  // Whatever else was seen: a point of M and a tangent space make a ball, too.
+  // All other evidence: a point of M and a tangent space make a ball, too.
   declared_->TestBall(narrowest_.vertex, reach_, narrowest_.across, noise);
   declared_->Conclude(x_.facts.covers_box, x_.findings, x_.certificate);
 }

@@ -30,15 +30,15 @@ class ReachClaims {
 
   // Takes a point of a simplex, its `distance` from M and its closest point y. `number`: of the
   // barycentre, if it is one.
-  void HoldFoot(const std::uint32_t* ids, double circumradius, double distance,
+  void TakeFoot(const std::uint32_t* ids, double circumradius, double distance,
                 const Eigen::VectorXd& y, std::optional<std::uint64_t> number);
 
   // Adds the points that the balls met to those seen.
   void TellWhatBallsMet();
   // Takes a point y of M, seen from vertex v, whose tangent space is wrong by an angle of sine
   // `tilt` at most.
-  void HoldPoint(std::uint32_t v, const Eigen::VectorXd& y, double tilt);
-  void Hold(const Evidence& evidence);
+  void TakePoint(std::uint32_t v, const Eigen::VectorXd& y, double tilt);
+  void TakeEvidence(const Evidence& evidence);
 
   void Judge();
   void JudgeDeclared();
@@ -50,7 +50,7 @@ class ReachClaims {
     double across = 0;
   };
   void Take(double reach, Narrow where);
-  void HoldDeclared(const StarGeometry& stars);
+  void TestDeclared(const StarGeometry& stars);
   std::string Cure(double ratio) const;
   Eigen::MatrixXd TangentsUnder(const std::uint32_t* ids) const;
 

@@ -11,9 +11,9 @@
 namespace stellate::core {
 namespace {
 
-// With more, rounding is beside nothing that is asked of an oracle.
+// With more digits, rounding is far below every tolerance for oracles.
 constexpr int kMostDigits = 12;
-// Fewer coordinates that are not zero may be short by nature.
+// Fewer nonzero coordinates may have few digits by nature.
 constexpr int kFewestSeen = 32;
 
 bool IsSingle(double x) {

@@ -23,19 +23,20 @@ namespace {
 constexpr std::size_t kMostQuestions = kMaxBarycentres;
 constexpr std::size_t kLeastOfWall = 250;
 constexpr std::size_t kMostOfInactive = 100;
-// Questions where clearances dip, of all walls together and of each at least. A dip is where a
-// clearance is this share, or less, of what so many points near it let expect.
+// Queries where clearances dip, of all walls together and of each at least. A clearance is a dip if
+// it is this share, or less, of what so many points near it predict.
 constexpr std::size_t kMostDips = 64;
 constexpr std::size_t kLeastDips = 8;
 constexpr double kDip = 0.85;
 constexpr std::size_t kPointsNear = 8;
 constexpr std::size_t kCandidatesNear = 6 * kPointsNear;  // most lie where others lie
 constexpr double kApart = 0.25;  // of the mesh size: what is nearer is in the same dip
-// Of the mesh size: so near to a wall the distance from its mesh says little of that from the wall.
+// In mesh sizes: so near to a wall the distance from the wall's mesh is a poor estimate of that
+// from the wall.
 constexpr double kBeside = 0.15;
 constexpr double kAfar = 4;  // of the largest radius of the mesh's simplices
 
-// The squared distance of y from a simplex: from the nearest of those of its faces above or below
+// Returns the squared distance of y from a simplex: from the nearest of the faces above or below
 // which y lies.
 double SquaredDistanceFrom(const MeshView& mesh, const std::uint32_t* ids, int count,
                            const double* y) {
@@ -69,7 +70,7 @@ double SquaredDistanceFrom(const MeshView& mesh, const std::uint32_t* ids, int c
   return nearest;
 }
 
-// At most `most` of them, evenly.
+// Returns at most `most` of them, evenly spread.
 std::vector<std::uint32_t> Thinned(const std::vector<std::uint32_t>& all, std::size_t most) {
   if (all.size() <= most) return all;
   std::vector<std::uint32_t> some(most);
@@ -77,8 +78,8 @@ std::vector<std::uint32_t> Thinned(const std::vector<std::uint32_t>& all, std::s
   return some;
 }
 
-// The clear points nearest to q that are no nearer to it, or to each other, than `apart`, nearest
-// first. What is asked about again and again is not to outvote the rest.
+// Returns the clear points nearest to q that are no nearer to it, or to each other, than `apart`,
+// nearest first. A place that was queried often must not outvote the rest.
 std::vector<std::uint32_t> NearestApart(const BallTree& tree, const std::vector<double>& points,
                                         const std::vector<double>& shares, const double* q, int d,
                                         double apart) {
@@ -118,7 +119,7 @@ SheetClaims::SheetClaims(Examination& examination, BoundaryClaims& boundary, End
   for (int wall = 0; wall < x_.spec.walls; ++wall) sheets_.push_back(SheetOf(wall));
 }
 
-// From the corner of the simplex that ends at a facet to that, straight.
+// Returns the direction from the apex of the simplex that ends at a facet straight to that facet.
 Eigen::VectorXd SheetClaims::OutwardAt(const std::uint32_t* facet) const {
   const int k = x_.mesh.k;
   for (const std::uint32_t s : x_.stars->Star(facet[0])) {
@@ -137,7 +138,7 @@ Eigen::VectorXd SheetClaims::OutwardAt(const std::uint32_t* facet) const {
     }
     return out;
   }
-  return Eigen::VectorXd::Zero(x_.mesh.d);  // none ends there, which is refused: it faces any way
+  return Eigen::VectorXd::Zero(x_.mesh.d);  // none ends there, which is refused: no direction
 }
 
 std::unique_ptr<SheetClaims::Sheet> SheetClaims::SheetOf(int wall) const {
@@ -164,8 +165,8 @@ std::unique_ptr<SheetClaims::Sheet> SheetClaims::SheetOf(int wall) const {
   return sheet;
 }
 
-// Of the barycentres those to ask from, the farthest from the sheet first: a ball that reaches to
-// the sheet is empty, or the answer tells, and what is in it needs no question of its own.
+// Chooses the barycentres to query from, the farthest from the sheet first: a ball up to the sheet
+// is empty, or the answer shows the contrary, so that barycentres in it need no query.
 std::vector<std::uint32_t> SheetClaims::Spread(const Sheet& sheet,
                                                const Eigen::MatrixXd& barycentres,
                                                const std::vector<double>& radii) const {
@@ -219,7 +220,7 @@ QueryBlock SheetClaims::QuestionsOf(std::size_t wall, Eigen::MatrixXd points) co
   return block;
 }
 
-// From the mesh of the wall; infinity where it has none.
+// Returns the distance from the mesh of the wall; infinity if it has none.
 double SheetClaims::DistanceFrom(const Sheet& sheet, const double* y) const {
   const auto width = static_cast<std::size_t>(x_.mesh.k);
   double best = INFINITY;
@@ -233,7 +234,7 @@ double SheetClaims::DistanceFrom(const Sheet& sheet, const double* y) const {
   return best;
 }
 
-// Of the clear points that have none yet.
+// Computes the shares of the clear points that have none yet.
 void SheetClaims::TakeShares(std::size_t wall) {
   Sheet& sheet = *sheets_[wall];
   const auto d = static_cast<std::size_t>(x_.mesh.d);
@@ -251,7 +252,7 @@ void SheetClaims::TakeShares(std::size_t wall) {
   });
 }
 
-// The deepest first. `tree`: of all clear points.
+// Returns the dips, the deepest first. `tree`: of all clear points.
 std::vector<std::uint32_t> SheetClaims::Dips(const Sheet& sheet, const BallTree& tree) const {
   const std::vector<double>& share = sheet.shares;
   const double most = kDip * *std::max_element(share.begin(), share.end());
@@ -295,8 +296,8 @@ std::vector<QueryBlock> SheetClaims::QuestionsWhereClearancesDip() {
   return blocks;
 }
 
-// Of the wall's simplices that are near enough to end the mesh there, and face as the wall does,
-// the nearest.
+// Returns the nearest of the wall's simplices that are near enough to end the mesh there and face
+// as the wall does.
 std::optional<std::uint32_t> SheetClaims::NearestThatEnds(const Sheet& sheet,
                                                           const End& end) const {
   const auto width = static_cast<std::size_t>(x_.mesh.k), d = static_cast<std::size_t>(x_.mesh.d);
@@ -326,7 +327,7 @@ void SheetClaims::Judge(std::size_t wall, const Eigen::MatrixXd&, const AnswerBl
     ends.push_back({y, conormal});
     ends_.Add(y, static_cast<int>(wall), conormal, x_.mesh.d);
   }
-  Hold(wall, ends);
+  JudgeEnds(wall, ends);
 }
 
 void SheetClaims::JudgeKnown() {
@@ -335,11 +336,11 @@ void SheetClaims::JudgeKnown() {
   for (std::size_t n = 0; n < ends_.walls.size(); ++n)
     ends[static_cast<std::size_t>(ends_.walls[n])].push_back(
         {ends_.points.data() + n * d, ends_.conormals.data() + n * d});
-  for (std::size_t wall = 0; wall < ends.size(); ++wall) Hold(wall, ends[wall]);
+  for (std::size_t wall = 0; wall < ends.size(); ++wall) JudgeEnds(wall, ends[wall]);
 }
 
-// That the mesh ends at each, as the wall does, and is fine enough for what it shows.
-void SheetClaims::Hold(std::size_t wall, const std::vector<End>& ends) {
+// Checks that the mesh ends at each end, facing as the wall does, and is fine enough for it.
+void SheetClaims::JudgeEnds(std::size_t wall, const std::vector<End>& ends) {
   const Sheet& sheet = *sheets_[wall];
   std::vector<std::optional<std::uint32_t>> nearest(ends.size());
   ParallelFor(ends.size(), [&](std::size_t n) { nearest[n] = NearestThatEnds(sheet, ends[n]); });
@@ -349,7 +350,7 @@ void SheetClaims::Hold(std::size_t wall, const std::vector<End>& ends) {
     CheckInterruption(n);
     if (nearest[n]) {
       const std::size_t first = *nearest[n] * static_cast<std::size_t>(x_.mesh.k);
-      boundary_.HoldPoint(static_cast<int>(wall), sheet.simplices.data() + first, ends[n].y);
+      boundary_.TakePoint(static_cast<int>(wall), sheet.simplices.data() + first, ends[n].y);
       continue;
     }
     missed.push_back(ends[n].y);

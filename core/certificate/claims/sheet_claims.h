@@ -69,7 +69,7 @@ class SheetClaims {
     const double* conormal;
   };
   std::optional<std::uint32_t> NearestThatEnds(const Sheet& sheet, const End& end) const;
-  void Hold(std::size_t wall, const std::vector<End>& ends);
+  void JudgeEnds(std::size_t wall, const std::vector<End>& ends);
 
   Examination& x_;
   BoundaryClaims& boundary_;

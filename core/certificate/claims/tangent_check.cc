@@ -10,8 +10,8 @@ namespace {
 
 constexpr int kVertices = 64;
 constexpr double kStep = 0.05;  // of the mesh size
-// Of a step that went wrong. A tangent space that is wrong is as wrong for it; what M bends within
-// a step falls with its square.
+// The length of the second step, as a share of one that failed. A wrong tangent space is as wrong
+// for it; the bend of M within a step falls with its square.
 constexpr double kShorter = 0.1;
 // Position errors of both ends, with a margin.
 constexpr double kErrorsOfStep = 4;
@@ -60,7 +60,7 @@ std::string TangentCheck::Judge(const AnswerBlock& answer) {
       step.to *= kShorter;
       step.answer = answer.points.col(j);
       shorter.push_back(std::move(step));
-    } else if (problem.empty()) {  // also where noise would hide what a shorter step tells
+    } else if (problem.empty()) {  // also if noise would hide the result of a shorter step
       problem = Accuse(step, off);
     }
   }

@@ -36,7 +36,7 @@ struct Face {
   }
 };
 
-// What a part of the vertices has to say.
+// The result for a part of the vertices.
 struct LinksOfPart {
   LinkReport report;
   std::vector<std::uint32_t> blamed;  // vertices, with repetitions
@@ -76,7 +76,8 @@ class LinkChecker {
     return face;
   }
 
-  // CheckLink of a vertex, k = 2: going round it from triangle to triangle passes all of them.
+  // Checks the link of a vertex, k = 2: going round it from triangle to triangle passes all of
+  // them.
   void CheckCircle(std::uint32_t v, Star star) {
     std::size_t passed = 0;
     std::uint32_t last = Adjacency::kNone;
@@ -120,7 +121,7 @@ class LinkChecker {
     }
     if (simplex_index_.size() < star.size())
       return CheckLink(FaceOf(v), {star.begin(), star.end()});
-    const std::int64_t vertices = vertex_index_.size() - 1;  // but v
+    const std::int64_t vertices = vertex_index_.size() - 1;  // without v
     part_.link_vertices += vertices;
     CheckSurface(FaceOf(v), vertices, static_cast<std::int64_t>(star.size()));
   }
@@ -225,8 +226,8 @@ class LinkChecker {
       part_.link_triangles += f2;
       if (blamed_here_) return;
     }
-    // A closed 3-manifold always has Euler characteristic 0; for a closed 4-manifold without
-    // first homology 2 says that there is no second homology either.
+    // A closed 3-manifold always has Euler characteristic 0; a closed 4-manifold without first
+    // homology and of Euler characteristic 2 has no second homology either.
     if (k_ - face.size == 4 && 2 * (f0 - f1 + f2) - 5 * top + 2 * top != 4) {
       Blame(face, "is not a sphere: wrong Euler characteristic");
       return;

@@ -21,8 +21,8 @@ template <int K>
 class FacetSide {
  public:
   FacetSide() = default;
-  // Of the simplex with these vertices, v among them, but the one left out; v is the facet's
-  // lowest.
+  // The facet of the simplex with these vertices without the omitted one; v is the facet's lowest
+  // vertex.
   FacetSide(std::uint32_t simplex, const std::uint32_t* ids, std::uint32_t v, int omitted)
       : omitted_(static_cast<std::uint32_t>(omitted)) {
     for (int i = 1; i <= K; ++i)
@@ -45,7 +45,8 @@ class FacetSide {
   }
 
  private:
-  // The facet's vertices but v, ascending, then the simplex: K ids, as digits of one large number.
+  // The facet's vertices without v, ascending, then the simplex: K ids, as digits of one large
+  // number.
   static constexpr int kWords = (K + 1) / 2;
 
   void Append(std::uint32_t id) {
@@ -123,9 +124,9 @@ std::size_t Orient(const Adjacency& adjacency, Connectivity& result) {
   return parts;
 }
 
-// Vertices joined in trees, by ties that say whether the stars of two are oriented oppositely: by
-// any number of threads at once. Which trees there are in the end, and whether some tie contradicts
-// others, hangs on no order.
+// A union-find forest of vertices, joined by ties that say whether the stars of two vertices are
+// oriented oppositely. Any number of threads may tie concurrently: the trees in the end, and
+// whether some tie contradicts others, do not depend on the order.
 class VertexForest {
  public:
   explicit VertexForest(std::uint32_t vertices)
@@ -133,7 +134,7 @@ class VertexForest {
     ParallelFor(vertices, [&](std::uint32_t v) { up_[v].store(Pack(v, 0), kRelaxed); });
   }
 
-  // False if other ties say the opposite of this one.
+  // Returns false if this tie contradicts others.
   bool Join(std::uint32_t a, std::uint32_t b, bool flips) {
     const Up differ = flips ? 1 : 0;
     const Up up_a = up_[a].load(kRelaxed), up_b = up_[b].load(kRelaxed);
@@ -157,16 +158,15 @@ class VertexForest {
   }
 
  private:
-  // The parent, the vertex itself at a root, and in the lowest bit whether the two are oriented
-  // oppositely: one word, so that nobody sees half of it. Nothing else is handed from thread to
-  // thread.
+  // The parent (a root is its own), and in the lowest bit whether the two are oriented oppositely:
+  // one word, so that no thread reads half of it. Threads share nothing else.
   using Up = std::uint64_t;
   static constexpr auto kRelaxed = std::memory_order_relaxed;
   static Up Pack(std::uint32_t parent, Up flips) { return Up{parent} << 1 | flips; }
   static std::uint32_t Parent(Up up) { return static_cast<std::uint32_t>(up >> 1); }
   static Up Flips(Up up) { return up & 1; }
 
-  // The root, and whether v is oriented oppositely to it. Halves the way there.
+  // Returns the root, and whether v is oriented oppositely to it. Halves the path there.
   std::pair<std::uint32_t, Up> Climb(std::uint32_t v) {
     Up flips = 0;
     while (true) {
@@ -273,7 +273,7 @@ Adjacency::FacetCount Adjacency::MatchFacetsOf(std::uint32_t begin, std::uint32_
     sides.clear();
     for (const std::uint32_t s : Star(v)) {
       const std::uint32_t* ids = list[s];
-      // v is lowest in the simplex, or once the lowest is left out.
+      // v is the lowest vertex of the simplex, or becomes it if the lowest is omitted.
       if (ids[0] != v && ids[1] != v) continue;
       const int first = ids[0] == v ? 1 : 0;
       const int last = ids[0] == v ? K : 0;

@@ -13,21 +13,20 @@
 namespace stellate::core {
 namespace {
 
-// Two sheets this number of sizes apart are no more than the reach that a mesh of this size must
-// have.
+// Two sheets this number of sizes apart are nearer than the reach that a mesh of this size needs.
 constexpr double kLook = 2.5;
 constexpr std::uint64_t kPointsInPart = 1 << 8;
-// Points that are searched around together lie within this number of sizes of their first.
+// The points of one search lie within this number of sizes of the first of them.
 constexpr double kRunReach = 1;
 
-// Whether the coordinates along which a VertexGrid sorts tell vertices apart that are far from each
-// other: of more dimensions than those and one, they mostly do not.
-bool IsTold(const MeshView& mesh) { return mesh.k < 3 || mesh.d <= mesh.k + 1; }
+// Whether the coordinates by which a VertexGrid sorts separate vertices that are far from each
+// other: in more dimensions than those and one, they mostly do not.
+bool DoesGridSeparate(const MeshView& mesh) { return mesh.k < 3 || mesh.d <= mesh.k + 1; }
 
-class Holder {
+class Comparison {
  public:
-  Holder(const MeshView& mesh, const std::vector<double>& longest_edge, double size, bool graded,
-         double position_error)
+  Comparison(const MeshView& mesh, const std::vector<double>& longest_edge, double size,
+             bool graded, double position_error)
       : mesh_(mesh),
         longest_edge_(longest_edge),
         size_(size),
@@ -38,11 +37,12 @@ class Holder {
     return graded_ ? std::min(size_, longest_edge_[v] * std::numbers::inv_sqrt3) : size_;
   }
 
-  // `index`: that y goes by in the evidence; `self`: the vertex that y is, if it is one.
-  // for_each_near(visit) calls visit(v, |y - v|^2) for each vertex nearer than kLook sizes.
+  // Compares y with the vertices near it. `index`: of y in the evidence; `self`: the vertex that y
+  // is, or kNoVertex. for_each_near(visit) calls visit(v, |y - v|^2) for each vertex nearer than
+  // kLook sizes.
   template <typename ForEachNear>
-  void Hold(const double* y, std::uint64_t index, std::uint32_t self, std::vector<double>& step,
-            Evidence* evidence, const ForEachNear& for_each_near) const {
+  void Add(const double* y, std::uint64_t index, std::uint32_t self, std::vector<double>& step,
+           Evidence* evidence, const ForEachNear& for_each_near) const {
     const int d = mesh_.d;
     step.resize(static_cast<std::size_t>(d));
     double nearest = INFINITY, nearest_size = size_;
@@ -62,7 +62,7 @@ class Holder {
         along2 += along * along;
       }
       const double away2 = squared - along2, bound = 2 * kLook * size;
-      // |y - p|^2 / (2 away) above all that matters, as nearly always.
+      // The bound |y - p|^2 / (2 away) is mostly larger than any that counts.
       if (!(away2 * bound * bound > squared * squared)) return;
       const double away = std::sqrt(away2), distance = std::sqrt(squared);
       if (!IsTelling(distance, away, longest_edge_[v], position_error_)) return;
@@ -74,12 +74,12 @@ class Holder {
       evidence->vertex = v;
       evidence->distance = distance;
     });
-    if (self == kNobody &&
+    if (self == kNoVertex &&
         !(nearest <= kCoverageShare * kCoverageShare * nearest_size * nearest_size))
       evidence->uncovered.push_back(index);
   }
 
-  static constexpr std::uint32_t kNobody = 0xffffffffu;
+  static constexpr std::uint32_t kNoVertex = 0xffffffffu;
 
  private:
   const MeshView& mesh_;
@@ -89,55 +89,58 @@ class Holder {
   const double position_error_;
 };
 
-// What is held: the points that were given, and every so many of the vertices.
-struct Held {
+// The points to compare: the given ones, and each `stride`-th vertex.
+struct Compared {
   const MeshView& mesh;
   const std::vector<double>& points;
   std::uint64_t stride;
 
   template <typename ForEachNear>
-  void HoldPoint(const Holder& holder, std::uint64_t i, std::vector<double>& step,
-                 Evidence* evidence, const ForEachNear& for_each_near) const {
+  void AddPoint(const Comparison& comparison, std::uint64_t i, std::vector<double>& step,
+                Evidence* evidence, const ForEachNear& for_each_near) const {
     const double* const y = points.data() + i * static_cast<std::size_t>(mesh.d);
-    holder.Hold(y, i, Holder::kNobody, step, evidence,
-                [&](const auto& visit) { for_each_near(y, visit); });
+    comparison.Add(y, i, Comparison::kNoVertex, step, evidence,
+                   [&](const auto& visit) { for_each_near(y, visit); });
   }
   template <typename ForEachNear>
-  void HoldVertex(const Holder& holder, std::uint32_t v, std::vector<double>& step,
-                  Evidence* evidence, const ForEachNear& for_each_near) const {
+  void AddVertex(const Comparison& comparison, std::uint32_t v, std::vector<double>& step,
+                 Evidence* evidence, const ForEachNear& for_each_near) const {
     const double* const y = mesh.Point(v);
-    holder.Hold(y, Evidence::kNone, v, step, evidence,
-                [&](const auto& visit) { for_each_near(y, visit); });
+    comparison.Add(y, Evidence::kNone, v, step, evidence,
+                   [&](const auto& visit) { for_each_near(y, visit); });
   }
 };
 
-// Point by point.
-std::vector<Evidence> HoldByGrid(const Holder& holder, const Held& held, double look) {
-  const VertexGrid grid(held.mesh, look);
+// Compares point by point.
+std::vector<Evidence> CompareByGrid(const Comparison& comparison, const Compared& compared,
+                                    double look) {
+  const VertexGrid grid(compared.mesh, look);
   const auto near = [&](const double* y, const auto& visit) { grid.ForEachAround(y, visit); };
-  const std::uint64_t given = held.points.size() / static_cast<std::size_t>(held.mesh.d);
-  const std::uint64_t all = given + (held.mesh.vertices + held.stride - 1) / held.stride;
+  const std::uint64_t given = compared.points.size() / static_cast<std::size_t>(compared.mesh.d);
+  const std::uint64_t all =
+      given + (compared.mesh.vertices + compared.stride - 1) / compared.stride;
   std::vector<Evidence> parts((all + kPointsInPart - 1) / kPointsInPart);
   ParallelFor(parts.size(), [&](std::uint64_t part) {
     std::vector<double> step;
     for (std::uint64_t i = part * kPointsInPart; i < std::min(all, (part + 1) * kPointsInPart);
          ++i) {
       if (i < given)
-        held.HoldPoint(holder, i, step, &parts[part], near);
+        compared.AddPoint(comparison, i, step, &parts[part], near);
       else
-        held.HoldVertex(holder, static_cast<std::uint32_t>((i - given) * held.stride), step,
-                        &parts[part], near);
+        compared.AddVertex(comparison, static_cast<std::uint32_t>((i - given) * compared.stride),
+                           step, &parts[part], near);
     }
   });
   return parts;
 }
 
-// In runs of points that lie together, with one search for each.
-std::vector<Evidence> HoldByRuns(const Holder& holder, const Held& held, double size, double look) {
-  const MeshView& mesh = held.mesh;
+// Compares runs of near points, with one search for each.
+std::vector<Evidence> CompareByRuns(const Comparison& comparison, const Compared& compared,
+                                    double size, double look) {
+  const MeshView& mesh = compared.mesh;
   const RunTree tree({mesh.points, mesh.vertices * static_cast<std::size_t>(mesh.d)}, mesh.d,
                      kRunReach * size);
-  const Runs given(held.points, mesh.d, kRunReach * size);
+  const Runs given(compared.points, mesh.d, kRunReach * size);
   std::vector<Evidence> parts(given.count() + tree.runs().count());
   ParallelFor(parts.size(), [&](std::size_t part) {
     thread_local std::vector<std::uint32_t> around;
@@ -145,7 +148,7 @@ std::vector<Evidence> HoldByRuns(const Holder& holder, const Held& held, double 
     const bool is_given = part < given.count();
     const Runs& runs = is_given ? given : tree.runs();
     const std::size_t run = is_given ? part : part - given.count();
-    const std::size_t stride = is_given ? 1 : held.stride;
+    const std::size_t stride = is_given ? 1 : compared.stride;
     const std::size_t first = (runs.begin(run) + stride - 1) / stride * stride;
     if (first >= runs.end(run)) return;
     around.clear();
@@ -161,9 +164,9 @@ std::vector<Evidence> HoldByRuns(const Holder& holder, const Held& held, double 
     };
     for (std::size_t i = first; i < runs.end(run); i += stride) {
       if (is_given)
-        held.HoldPoint(holder, i, step, &parts[part], near);
+        compared.AddPoint(comparison, i, step, &parts[part], near);
       else
-        held.HoldVertex(holder, static_cast<std::uint32_t>(i), step, &parts[part], near);
+        compared.AddVertex(comparison, static_cast<std::uint32_t>(i), step, &parts[part], near);
     }
   });
   return parts;
@@ -174,10 +177,11 @@ std::vector<Evidence> HoldByRuns(const Holder& holder, const Held& held, double 
 Evidence CompareWithMesh(const MeshView& mesh, const std::vector<double>& points,
                          const std::vector<double>& longest_edge, double size, bool graded,
                          double position_error, std::uint64_t vertices) {
-  const Holder holder(mesh, longest_edge, size, graded, position_error);
-  const Held held{mesh, points, std::max<std::uint64_t>(1, mesh.vertices / vertices)};
-  const std::vector<Evidence> parts = IsTold(mesh) ? HoldByGrid(holder, held, kLook * size)
-                                                   : HoldByRuns(holder, held, size, kLook * size);
+  const Comparison comparison(mesh, longest_edge, size, graded, position_error);
+  const Compared compared{mesh, points, std::max<std::uint64_t>(1, mesh.vertices / vertices)};
+  const std::vector<Evidence> parts = DoesGridSeparate(mesh)
+                                          ? CompareByGrid(comparison, compared, kLook * size)
+                                          : CompareByRuns(comparison, compared, size, kLook * size);
   Evidence whole;
   for (const Evidence& part : parts) {
     whole.coarseness = std::max(whole.coarseness, part.coarseness);

@@ -21,7 +21,7 @@ constexpr int kSideSteps = 6;
 
 constexpr std::uint32_t kVerticesInPart = 1 << 15;
 
-// body(part, begin, end) for each part of the vertices, in parallel.
+// Calls body(part, begin, end) for each part of the vertices, in parallel.
 template <typename Body>
 void ForEachPart(const MeshView& mesh, const Body& body) {
   ParallelFor((mesh.vertices + kVerticesInPart - 1) / kVerticesInPart, [&](std::uint64_t part) {
@@ -34,8 +34,8 @@ std::size_t PartCount(const MeshView& mesh) {
   return static_cast<std::size_t>((mesh.vertices + kVerticesInPart - 1) / kVerticesInPart);
 }
 
-// One fibre and the simplices that may meet it: those with a vertex in `near`, ascending, that is
-// no farther than `beside` from it.
+// One fibre and the simplices that may meet it: those with a vertex in `near` (ascending) no
+// farther than `beside` from it.
 class FibreCounter {
  public:
   FibreCounter(const MeshView& mesh, const VertexStars& stars, const Fibre& fibre,
@@ -92,8 +92,8 @@ class FibreCounter {
     return corner;
   }
 
-  // Where the flat meets a simplex's hull, in barycentric coordinates: projected on the tangent
-  // space the flat is the point `shift`.
+  // The point where the flat meets a simplex's hull, in barycentric coordinates: projected on the
+  // tangent space the flat is the point `shift`.
   FibreHits CountBeside(const Flat& shift) const {
     const int k = mesh_.k;
     FibreHits hits;
@@ -140,7 +140,7 @@ class FibreCounter {
     return hits;
   }
 
-  // From x to the simplex's point with these barycentric coordinates.
+  // The distance from x to the simplex's point with these barycentric coordinates.
   double SquaredDistance(const std::uint32_t* ids, double first, const Flat& others) const {
     const std::size_t d = static_cast<std::size_t>(mesh_.d);
     double squared = 0;
@@ -170,7 +170,7 @@ std::vector<NearestVertex> FindNearestVertices(const MeshView& mesh,
   std::vector<std::size_t> sought(nearest.size());
   std::iota(sought.begin(), sought.end(), std::size_t{0});
   if (!(near > 0)) near = kInfinity;
-  // Few are left after the first round, those that are far from the mesh.
+  // Few points are left after the first pass: those far from the mesh.
   for (bool last = false; !sought.empty() && !last; near *= 4) {
     last = std::isinf(near);
     std::vector<double> centres;
@@ -210,8 +210,8 @@ std::vector<FibreHits> CountHits(const MeshView& mesh, const VertexStars& stars,
   std::vector<double> points, radii, beside;
   for (const Fibre& f : fibres) {
     points.insert(points.end(), f.x, f.x + mesh.d);
-    // Simplices much larger than asked for are refused for their size; searching for them would
-    // turn each sample into a search of the whole mesh.
+    // Simplices much larger than the size bound are refused anyway; searching for them would make
+    // each sample a search of the whole mesh.
     const double to_vertex = jung * std::min(max_diameter, 4 * f.reach_out);
     radii.push_back((1 + kSideStep) * f.reach_out + to_vertex);
     beside.push_back(2 * kSideStep * f.reach_out + to_vertex);

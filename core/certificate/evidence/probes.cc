@@ -25,13 +25,13 @@ void SortUnique(std::vector<std::uint32_t>& ids) {
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
 }
 
-// The `count` simplices of largest value. REQUIRES: there are as many.
+// Returns the `count` simplices of largest value. REQUIRES: there are as many.
 void AppendLargest(const std::vector<float>& values, std::uint32_t count,
                    std::vector<std::uint32_t>& chosen) {
   const auto is_larger = [&values](std::uint32_t a, std::uint32_t b) {
     return values[a] != values[b] ? values[a] > values[b] : a < b;
   };
-  // Those that may be among them, a bounded number: what comes later has to be larger.
+  // The simplices that may be among them, a bounded number: later ones must be larger.
   std::vector<std::uint32_t> kept;
   float least = -std::numeric_limits<float>::infinity();
   const auto keep_largest = [&] {
@@ -60,7 +60,8 @@ Eigen::VectorXd PointInBox(const Eigen::VectorXd& lower, const Eigen::VectorXd& 
 
 Eigen::VectorXd PointNearSimplex(const MeshView& mesh, const std::uint32_t* ids, double push,
                                  Random& random) {
-  // What k uniform numbers cut the unit interval into are the weights of a uniform point.
+  // The k + 1 pieces into which k uniform numbers cut the unit interval are the weights of a
+  // uniform point.
   std::vector<double> cuts(static_cast<std::size_t>(mesh.k) + 2);
   std::generate(cuts.begin() + 1, cuts.end() - 1, [&] { return random.Uniform(); });
   cuts.back() = 1;

@@ -28,7 +28,7 @@ inline constexpr double kPairRadius = 2.5;
 inline constexpr std::uint64_t kBallStride = 8;
 inline constexpr std::uint64_t kMaxBallPairs = 256;
 // Vertices compared with the tangent spaces of those near them.
-inline constexpr std::uint64_t kMaxVerticesHeld = 256;
+inline constexpr std::uint64_t kMaxVerticesCompared = 256;
 
 // The smallest box that holds the mesh's vertices.
 struct MeshBox {

@@ -12,12 +12,12 @@
 namespace stellate::core {
 namespace {
 
-// A ball is asked about at slightly less than the radius found: the centre of the very ball that
-// touches M twice is on the medial axis, where oracles divide by zero.
+// A ball is queried at slightly less than the radius found: the centre of the ball that touches M
+// twice is on the medial axis, where oracles divide by zero.
 constexpr double kInside = 0.98;
 constexpr int kLadder = 6;
 constexpr double kMet = 1e-3;  // of the longest edge
-// Sine of the angle by which the tangent space at a point that is no vertex may be wrong at least.
+// Sine of the least error assumed of the tangent space at a point that is no vertex.
 constexpr double kTilt = 0.25;
 
 }  // namespace
@@ -31,7 +31,7 @@ Eigen::MatrixXd ShrinkingBalls::TangentsOf(std::uint32_t v) const {
   return Eigen::Map<const Eigen::MatrixXd>(mesh_.Tangent(v), mesh_.d, mesh_.k);
 }
 
-// A random direction across the tangents; false if there is none.
+// Writes a random direction normal to the tangents; returns false if there is none.
 bool ShrinkingBalls::AimAcross(const Eigen::MatrixXd& tangents, Random& random, Ball* ball) const {
   ball->normal.resize(mesh_.d);
   for (int i = 0; i < mesh_.d; ++i) ball->normal[i] = random.NearlyNormal();

@@ -23,7 +23,7 @@ VertexGrid::VertexGrid(const MeshView& mesh, double radius)
   std::stable_sort(order.begin(), order.end(),
                    [&](int a, int b) { return lengths[a] > lengths[b]; });
   axes_ = std::min(mesh.d, kMaxAxes);
-  // Wider cubes serve as well, only less quickly: there are no more of them than is of use.
+  // Wider cubes are correct as well, only slower: the number of cubes is bounded.
   double width = radius;
   for (bool fits = false; !fits; width *= fits ? 1 : 2) {
     double cells = 1;

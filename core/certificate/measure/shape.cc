@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kNegligible = 1e-14;  // difference of squared sines
 
-// Makes `extreme` no less than `value`.
+// Raises `extreme` to at least `value`.
 void Raise(std::atomic<double>& extreme, double value) {
   double known = extreme.load(std::memory_order_relaxed);
   while (known < value && !extreme.compare_exchange_weak(known, value, std::memory_order_relaxed)) {
@@ -64,7 +64,8 @@ SimplexVertices FrameCorners(const MeshView& mesh, const std::uint32_t* ids, Cor
   return vertices;
 }
 
-// Are all eigenvalues of the tilt below `bound`? Cholesky's factorisation of the difference.
+// Whether all eigenvalues of the tilt are below `bound`, by a Cholesky factorisation of the
+// difference.
 bool TiltsLess(const TiltMatrix& tilt, int k, double bound) {
   TiltMatrix a = -tilt;
   for (int i = 0; i < k; ++i) a(i, i) += bound;
@@ -78,8 +79,8 @@ bool TiltsLess(const TiltMatrix& tilt, int k, double bound) {
   return true;
 }
 
-// The larger of `sine2` and the squared sine of the largest angle between the simplex and a tangent
-// space at a vertex of it.
+// Returns the larger of `sine2` and the squared sine of the largest angle between the simplex and a
+// tangent space at one of its vertices.
 double LargerSine2(const MeshView& mesh, const SimplexList& list, Corners& corners, std::uint32_t s,
                    double sine2) {
   const int k = mesh.k;
@@ -138,8 +139,8 @@ double ShapeSearch::LargestTilt(std::uint32_t s, Part* part) const {
   return largest;
 }
 
-// A simplex' tilt is the sum of the squared sines that the largest is sought of, so that few need
-// a second look.
+// A simplex's tilt is the sum of the squared sines, an upper bound of the largest, so that few
+// simplices need a second measurement.
 double ShapeSearch::MaxSine2(float largest_tilt) const {
   // Rounding keeps the order.
   const auto may_reach = [&](std::uint32_t s, double sine2) {
