@@ -83,7 +83,7 @@ struct FaceReport {
   std::int64_t euler_characteristic = 0;
 };
 
-// Where two walls meet: a point of M, and the angle between them there inside of M.
+// A place where two walls meet: a point of M, and the angle between the walls there, inside M.
 struct WallAngle {
   WallSet walls = 0;  // the two
   double degrees = 0;

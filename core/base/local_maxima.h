@@ -44,7 +44,8 @@ class LocalMaxima {
   // Passes are few where strengths are as good as random; long chains are followed one by one.
   static constexpr int kMostPasses = 32;
 
-  // What others decide meanwhile may be seen or not: the choice is the same.
+  // It does not matter whether decisions of other threads are seen meanwhile: the choice is the
+  // same.
   State Get(std::size_t i) const { return state_[i].load(std::memory_order_relaxed); }
   void Set(std::size_t i, State state) { state_[i].store(state, std::memory_order_relaxed); }
 

@@ -10,7 +10,7 @@
 
 namespace stellate::core {
 
-// Proves or refutes that a finished mesh is what was asked for. A state machine like Mesher: it
+// Proves or refutes that a finished mesh meets its specification. A state machine like Mesher: it
 // gives closest-point queries in a few batches, then holds the certificate.
 //
 //   Certifier certifier(spec, mesh, facts);

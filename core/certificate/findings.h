@@ -14,9 +14,9 @@ namespace stellate::core {
 
 // Mesh size over reach: up to this, meshing was seen to work reliably; coarser meshes are refused.
 inline constexpr double kCoarse = 0.8;
-// Up to this, what is refused for its size alone is mostly right.
+// Up to this, a mesh that is refused for its size alone is mostly right.
 inline constexpr double kNearlyFine = 1.5;
-// What is advised instead: the reach is estimated from above.
+// The ratio to advise: smaller than kCoarse, since the reach is estimated from above.
 inline constexpr double kAdvised = 0.4;
 
 // Returns a sentence for the verdict: the mesh is `ratio` times as coarse as a reach, and what to

@@ -35,7 +35,7 @@ struct MeshView {
   const double* Tangent(std::uint32_t v) const { return tangents + std::size_t{v} * d * k; }
 };
 
-// What only the stars know.
+// Facts that only the stars give.
 struct StarFacts {
   std::uint64_t inconsistent_simplices = 0;
   double max_circumradius = 0;  // max R_p(sigma)

@@ -105,7 +105,7 @@ class Sample {
   // weights far larger than rounding, and far smaller than any geometric length, make all stars
   // decide alike.
   double Weight(std::uint32_t id) const {
-    // Of a signed number, which takes an instruction where an unsigned one takes a branch.
+    // A signed number converts in one instruction, an unsigned one with a branch.
     const auto bits = static_cast<std::int64_t>(Mix64(NameOf(id)) >> 11);
     return weight_scale_ * (static_cast<double>(bits) * 0x1p-53) + ProtectingRadius2(id);
   }

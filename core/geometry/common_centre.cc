@@ -71,7 +71,7 @@ class Vectors<0, count> {
 // An orthonormal basis of the mean of the tangent spaces, sum_i b_i P_i, the steps of a power
 // iteration from that of the heaviest vertex: K rows of d. False if they have no such mean.
 constexpr int kMeanSteps = 2;  // each leaves of the error about the squared sine of the turn
-// Of thin simplices the weights have no bound, and far below zero a vertex would push the mean away
+// The weights of thin simplices have no bound, and far below zero a vertex would push the mean away
 // from its own tangent space. Found by trial, as kMostTurned.
 constexpr double kLeastWeight = -0.25;
 template <int K>

@@ -75,7 +75,7 @@ class DraftPolytope {
   double norm2_[kMostVertices], excess_[kMostVertices];
   Corner corners_[kMostVertices];
   Facet facets_[kMostFacets];
-  // Of the last cut.
+  // Working memory of the last cut.
   std::uint8_t removed_[kMostVertices];
   Crossing crossings_[kMostVertices];
   Facets across_[kMostFacets];  // by facet, those that it shares a crossed edge with

@@ -39,7 +39,7 @@ class BallTree {
   // Adds the point with the next id, size().
   void Insert(double influence);
 
-  // Where Assign halves points: by their number, so that insertion keeps the tree flat, or at the
+  // How Assign halves points: by their number, so that insertion keeps the tree flat, or at the
   // middle of their extent, so that balls are as small as possible.
   enum class Halving { kNumber, kExtent };
   // Makes it the tree of the points 0 to influences.size() - 1, built in parallel.
@@ -152,7 +152,7 @@ class BallTree {
   }
 
   std::uint32_t NewNodes(int count);
-  // Where the descendants of a node go.
+  // The places of a node's descendants.
   struct Place {
     std::uint32_t node, slot;
   };

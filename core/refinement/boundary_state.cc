@@ -5,7 +5,8 @@
 namespace stellate::core {
 namespace {
 
-// Of the largest seen of a wall: a clearance below it may be zero. Whether it is, is asked.
+// As a share of a wall's largest clearance so far: a smaller one may be zero, which a query
+// decides.
 constexpr double kMaybeZero = 1e-6;
 
 }  // namespace

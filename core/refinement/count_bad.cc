@@ -23,7 +23,8 @@ int CountBad(const Stars<K>& stars, const double* point,
   const auto has = [](const Cell& cell, std::uint32_t q, std::uint64_t key) {
     return cell.Find(key - Mix64(q)) < cell.vertex_count();
   };
-  // Of a simplex of a face: is it none, foreign, or one that stars disagree about?
+  // Whether the dual of v is no simplex of a face yet, a foreign one, or one about which stars
+  // disagree.
   const auto is_bad_face = [&](std::uint32_t p, const Cell& cell, std::size_t v) {
     const auto face = stars.FaceSimplexOf(p, cell, v, walls);
     if (face.fake || face.foreign) return true;
@@ -75,7 +76,7 @@ int CountBad(const Stars<K>& stars, const double* point,
   };
   survey(id, point, tentative.own);
   for (const auto& [p, cell] : tentative.cut) survey(p, stars.sample().Point(p), cell);
-  // Simplices that a cut star loses and an uncut one keeps.
+  // Counts simplices that a cut star loses and an uncut one keeps.
   for (const auto& [p, cell] : tentative.cut) {
     Simplex simplex;
     const Cell& before = stars.cell(p);

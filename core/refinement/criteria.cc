@@ -14,19 +14,21 @@ constexpr double kInradius = 1.2;
 // simplex's fatness falls quickly with k, so the bound falls with it.
 constexpr double kDefaultSliverBound[kMaxDimension + 1] = {0, 0, 0, 0.2, 0.15, 0.1};
 // Beyond this bound ten candidates of a picking region are too few to find a point that makes no
-// new sliver, and there is no end; 40 do at 0.3, the largest, with 6 to 25 % more vertices.
+// new sliver, and refinement does not end; 40 are enough at 0.3, the largest bound, with 6 to 25 %
+// more vertices.
 constexpr double kFatter = 0.25;
 constexpr int kCandidates = 10, kCandidatesForFatter = 40;
 
-// Least dihedral angles of tetrahedra, of manifolds with walls: of solids, whose inner points
-// cost no answer, and elsewhere. Solids have 5 % more vertices for it than with no such rule, T^3
-// cut by a half-space 1 %. Larger ones were reached, too, with more: 18 degrees of solids at 10 %.
+// The least dihedral angles of tetrahedra in manifolds with walls: in solids, whose inner points
+// need no query, and in others. The rule costs solids 5 % more vertices, and T^3 cut by a
+// half-space 1 %. Larger angles are possible with more vertices: 18 degrees in solids with 10 %.
 constexpr double kCosineOf14Degrees = 0.97029572627599647, kCosineOf10Degrees = 0.98480775301220806;
-// Down to this share of the size asked for, which ends it: near sharp edges faces are as fine.
+// The rule applies down to this share of the size bound, so that it ends: near sharp edges faces
+// are as fine.
 constexpr double kSharpRadius = 0.1;
 
-// With a declared reach: M turns by no more than 0.7 radians under a simplex of the size asked for.
-// The rest of the right angle is for the simplex itself.
+// With a declared reach, M turns by no more than 0.7 radians under a simplex within the size bound.
+// The rest of the right angle is for the tilt of the simplex.
 constexpr double kSineOfHalfProofTurn = 0.34289780745545134;
 
 constexpr double kDefaultAdvanceEpsilons = 3;
@@ -58,8 +60,8 @@ ResolvedCriteria Resolve(const Specification& spec) {
   r.speculative = c.speculative;
   r.size_rate = c.size_rate.value_or(INFINITY);
   r.max_deviation = c.max_deviation.value_or(INFINITY);
-  // Common centres mean something well below the local feature size; they are looked for up to
-  // epsilon, which is far above it where the size is graded.
+  // Common centres have a meaning well below the local feature size; they are computed up to
+  // epsilon, which is far above it if the size is graded.
   const bool flats = spec.dimension <= 2 || r.graded();
   r.centre_rule =
       c.centre_rule.value_or(flats ? CentreRule::kTangentSpace : CentreRule::kCommonCentre);

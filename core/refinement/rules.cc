@@ -346,7 +346,8 @@ std::optional<Violation<K>> WorstSliverOrInconsistent(const Stars<K>& stars, std
   const auto is_worse = [&](std::size_t v) {
     return IsWorse<K>(cell, v, cell.norm2(v), worst, worst ? cell.norm2(*worst) : 0);
   };
-  // In the star of its lowest vertex: if it is not there, it is inconsistent besides.
+  // Tests a simplex in the star of its lowest vertex: if it is not there, it is inconsistent
+  // anyway.
   const auto held = [&](std::size_t v) {
     for (int s = 0; s < K; ++s)
       if (cell.id(cell.facet(v, s)) < p) return false;

@@ -52,14 +52,14 @@ void ViolationIndex<K>::MarkDirty(const std::vector<std::uint32_t>& stars) {
 }
 
 template <int K>
-std::vector<std::uint32_t> ViolationIndex<K>::TakeDirty(const std::vector<std::uint32_t>& besides) {
+std::vector<std::uint32_t> ViolationIndex<K>::TakeDirty(const std::vector<std::uint32_t>& others) {
   if (all_dirty_) {
     dirty_.resize(star_count());
     std::iota(dirty_.begin(), dirty_.end(), 0u);
     all_dirty_ = false;
   }
   MarkDirty(violating_);
-  MarkDirty(besides);
+  MarkDirty(others);
   violating_.clear();
   slivers_ = inconsistent_ = 0;
   std::vector<std::uint32_t> taken;

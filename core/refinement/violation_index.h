@@ -40,9 +40,9 @@ class ViolationIndex {
   bool are_all_dirty() const { return all_dirty_; }
   void MarkAllDirty();
   void MarkDirty(const std::vector<std::uint32_t>& stars);
-  // Returns the stars to test now, ascending: the dirty ones, those with a violation, and
-  // `besides`. Afterwards none is dirty or has a violation.
-  std::vector<std::uint32_t> TakeDirty(const std::vector<std::uint32_t>& besides);
+  // Returns the stars to test now, ascending: the dirty ones, those with a violation, and `others`.
+  // Afterwards none is dirty or has a violation.
+  std::vector<std::uint32_t> TakeDirty(const std::vector<std::uint32_t>& others);
   // Records the test of a star: the rule that it breaks, or nothing.
   void NoteJudged(std::uint32_t star, std::optional<Rule> rule);
   std::uint64_t violating() const { return violating_.size(); }

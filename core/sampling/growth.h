@@ -20,7 +20,7 @@ namespace stellate::core {
 //   while ((ring = growth.Propose()).points.cols() > 0)  // the sites next to all new points
 //     joined = growth.Join(closest points of the ring);
 //
-// Where the spacing is graded, each point has a share in (0, 1]; lengths in spacings are multiplied
+// If the spacing is graded, each point has a share in (0, 1]; lengths in spacings are multiplied
 // by it. An answer whose share differs from the expected one does not join; if that is so of most
 // answers, Propose returns nothing more.
 //

@@ -59,7 +59,7 @@ struct Examination {
   PointsOnWalls wanted_on_walls;  // where the mesh should end
 };
 
-// Whether question j was answered.
+// Whether the answer to query j was found.
 inline bool Found(const AnswerBlock& answer, Eigen::Index j) {
   return answer.found.empty() || answer.found[static_cast<std::size_t>(j)] != 0;
 }

@@ -117,13 +117,14 @@ class Adjacency : public VertexStars {
   FacetCount facets_;
 };
 
+// The connected parts of a complex, and its orientation.
 struct Connectivity {
   std::uint64_t components = 0;         // of the complex; vertices without a simplex not counted
   std::uint64_t isolated_vertices = 0;  // in no simplex
   std::vector<std::uint32_t> some_isolated;  // the first Violations::kMost of them
   bool orientable = false;  // neighbours across facets can be oriented alike, facets being good
-  // By simplex, 1 or -1: of the order of its ids. Neighbours across facets are oriented alike.
-  // Empty unless orientable.
+  // By simplex, 1 or -1: the orientation of its order of ids. Neighbours across facets are oriented
+  // alike. Empty unless orientable.
   std::vector<std::int8_t> orientation;
 };
 

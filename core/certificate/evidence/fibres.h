@@ -33,7 +33,7 @@ struct Fibre {
   std::uint64_t random_key;
 };
 
-// Where a fibre meets the mesh within reach_out of x.
+// The points where a fibre meets the mesh within reach_out of x.
 struct FibreHits {
   int count = 0;              // of points; -1: rounding would decide
   double distance = 0;        // of the farthest from x

@@ -34,7 +34,7 @@ inline constexpr double kRayTolerance = 1e-12;
 inline constexpr int kMostLocal = 3;
 inline constexpr const char* kFolded = "folds over itself in its tangent space";
 
-// What all parts of the vertices share.
+// The inputs and results that all parts of the vertices share.
 struct Sweep {
   const MeshView& mesh;
   const VertexStars& stars;
