@@ -234,8 +234,7 @@ public final class Client implements AutoCloseable {
 
   /**
    * Serves a mesh with this oracle until it is over, on this thread; the state that it ended in,
-   * e.g. "SUCCEEDED". maxChunk: most points in one call of the oracle; 0: the server
-   * decides.
+   * e.g. "SUCCEEDED". maxChunk: most points in one call of the oracle; 0: the server decides.
    */
   public String serve(Oracle oracle, String name, String worker, int maxChunk) {
     return new Worker(this, new CheckedOracle(oracle), name, worker, maxChunk, outage()).run();
