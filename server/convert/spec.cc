@@ -49,7 +49,7 @@ Refused ReadDimensions(const v1::MeshSpec& spec, const Config& config, core::Spe
                             ": map the manifold into a space of lower dimension, or raise "
                             "--max-ambient-dimension"));
   }
-  // Before arrays are held against it.
+  // Before the shapes of arrays are compared with it.
   if (spec.ambient_dimension() == 0) {
     return Invalid("ambient_dimension",
                    "ambient_dimension (d) is 0: set it to the number of coordinates of a point");

@@ -33,7 +33,6 @@ class Word:
 class Table:
     names: tuple[Word, ...]  # of things: refused in identifiers, comments, messages and pages
     phrases: tuple[Word, ...]  # refused in the comments of headers, messages, proto and pages
-    open: tuple[str, ...]  # folders and files that are not converted yet
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ def read_table(path: pathlib.Path) -> Table:
             for one in table[kind]
         )
 
-    return Table(words("name"), words("phrase"), tuple(table["open"]))
+    return Table(words("name"), words("phrase"))
 
 
 class Text:

@@ -25,10 +25,6 @@ def files() -> Iterator[tuple[str, str]]:
             yield path, (ROOT / path).read_text(errors="replace")
 
 
-def is_open(path: str) -> bool:
-    return any(reader.lies_in(path, room) for room in TABLE.open)
-
-
 def said(hits: list[reader.Hit], path: str) -> list[str]:
     return [f'{path}:{hit.line}: "{hit.old}"; say: {hit.new}' for hit in hits]
 
@@ -47,18 +43,8 @@ class Words(unittest.TestCase):
     def test_none_is_retired(self) -> None:
         found = []
         for path, content in files():
-            if not is_open(path):
-                found += said(reader.check(path, content, TABLE), path)
+            found += said(reader.check(path, content, TABLE), path)
         self.assertEqual(found, [], "\n" + "\n".join(found))
-
-    def test_rooms_that_are_open_have_some(self) -> None:
-        """Else they are converted, and their line in retired.toml can go."""
-        waiting = set(TABLE.open)
-        for path, content in files():
-            for room in sorted(waiting):
-                if reader.lies_in(path, room) and reader.check(path, content, TABLE):
-                    waiting.discard(room)
-        self.assertEqual(waiting, set())
 
 
 class Glossary(unittest.TestCase):
@@ -66,7 +52,7 @@ class Glossary(unittest.TestCase):
         """A word of a class's name is in the glossary, or is no term of ours: ordinary.txt."""
         known = glossary_words() | set((HERE / "ordinary.txt").read_text().split())
         for path, content in files():
-            if re.match(r"(core|server/(oracles|history))/.*\.h$", path) and not is_open(path):
+            if re.match(r"(core|server/(oracles|history))/.*\.h$", path):
                 for name in _CLASS.findall(content):
                     unknown = [
                         part.lower()

@@ -130,16 +130,16 @@ inline std::vector<GoldenCase> Cases() {
          s.oracle.tangent_basis = false;
          s.limits.max_batch_queries = 50;
        }},
-      {"torus_ahead", "A torus, asking ahead", "torus", 0.15,
+      {"torus_speculative", "A torus, speculative", "torus", 0.15,
        [](S& s) { s.criteria.speculative = true; }},
-      {"torus_ahead_poor", "A torus, asking ahead, closest points alone, in parts of 700 queries",
-       "torus", 0.2,
+      {"torus_speculative_poor",
+       "A torus, speculative, closest points alone, in parts of 700 queries", "torus", 0.2,
        [](S& s) {
          s.oracle = {};
          s.criteria.speculative = true;
          s.limits.max_batch_queries = 700;
        }},
-      {"so3_ahead", "Rotations, asking ahead", "so3", 0.8,
+      {"so3_speculative", "Rotations, speculative", "so3", 0.8,
        [](S& s) { s.criteria.speculative = true; }},
 
       // Sizes.
@@ -153,7 +153,7 @@ inline std::vector<GoldenCase> Cases() {
          s.criteria.size_rate = 0.25;
        },
        GiveSizes},
-      {"torus_given_ahead", "A torus, sizes given, asking ahead, tangents found", "torus", 0.3,
+      {"torus_given_speculative", "A torus, sizes given, speculative, tangents found", "torus", 0.3,
        [](S& s) {
          s.oracle.local_size = true;
          s.oracle.tangent_basis = false;
@@ -217,7 +217,7 @@ inline std::vector<GoldenCase> Cases() {
        GrowTheSecondRound},
       {"leaves_box", "A plane that leaves its box", "torus", 0.3, ClosestPointsAlone,
        AnswerWithAPlane},
-      {"half_unfound", "A torus of which one half is never found, asking ahead", "torus", 0.3,
+      {"half_unfound", "A torus of which one half is never found, speculative", "torus", 0.3,
        [](S& s) {
          s.oracle.intersect_flat = false;
          s.criteria.speculative = true;
