@@ -1,5 +1,6 @@
 #include "server/convert/mesh.h"
 
+#include "core/base/message.h"
 #include "server/convert/arrays.h"
 #include "server/convert/error_map.h"
 #include "server/convert/spec.h"
@@ -221,12 +222,25 @@ void ToProto(const std::vector<PastProgress>& past, v1::Mesh* out) {
   }
 }
 
+namespace {
+
+// As the last sentence of a verdict, where there is one.
+void AddWordsOfOracle(const std::string& about, std::string* verdict) {
+  if (about.empty() || verdict->empty()) return;
+  if (!verdict->ends_with('.')) *verdict += '.';
+  *verdict += core::Message(" The oracle says of itself: ", about);
+  if (!about.ends_with('.')) *verdict += '.';
+}
+
+}  // namespace
+
 void ToProto(const Session& session, v1::Mesh* out) {
   const MeshRequest& request = session.request();
   const SessionView view = session.View();
   out->set_name(request.name);
   ToProto(request.spec, out->mutable_spec());
   out->mutable_spec()->set_label(request.label);
+  out->mutable_spec()->mutable_oracle()->set_about(request.about);
   v1::MeshLimits* const limits = out->mutable_spec()->mutable_limits();
   limits->set_worker_wait_seconds(
       std::chrono::duration<double>(request.timeouts.worker_wait).count());
@@ -240,6 +254,7 @@ void ToProto(const Session& session, v1::Mesh* out) {
   if (view.report) {
     v1::Report* const report = out->mutable_report();
     ToProto(*view.report, request.spec.dimension, report);
+    AddWordsOfOracle(request.about, report->mutable_certificate()->mutable_verdict());
     report->set_elapsed_seconds(view.elapsed_seconds);
     if (view.state == SessionState::kFailed) {
       report->set_termination(v1::TERMINATION_ORACLE_FAILED);

@@ -1,10 +1,12 @@
 #include "server/convert/spec.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <limits>
 
 #include "core/base/message.h"
 #include "server/convert/arrays.h"
+#include "text/printable.h"
 
 namespace stellate::server {
 namespace {
@@ -15,6 +17,7 @@ using core::StatusCode;
 using Eigen::Index;
 
 constexpr std::size_t kMaxLabelBytes = 128;
+constexpr std::ptrdiff_t kMaxAboutCharacters = 300;
 
 Status Invalid(const char* field, std::string message) {
   return {StatusCode::kInvalidArgument, std::move(message), field};
@@ -176,6 +179,24 @@ Refused ReadLimits(const v1::MeshSpec& spec, const Config& config, core::Specifi
   return Status::Ok();
 }
 
+// What others are shown as the words of an oracle.
+Status CheckAbout(const std::string& about) {
+  if (about != text::Printable(about)) {
+    return Invalid("oracle.about",
+                   "oracle.about has control characters, line breaks or bytes that are no UTF-8: "
+                   "leave them out, it is one sentence for people");
+  }
+  const auto characters = std::count_if(about.begin(), about.end(), [](unsigned char byte) {
+    return (byte & 0xc0) != 0x80;  // all bytes of one but its first are 10xxxxxx
+  });
+  if (characters > kMaxAboutCharacters) {
+    return Invalid("oracle.about",
+                   Message("oracle.about has ", characters, " characters but may have ",
+                           kMaxAboutCharacters, ": shorten it"));
+  }
+  return Status::Ok();
+}
+
 Clock::duration ToDuration(double seconds) {
   return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
 }
@@ -217,6 +238,7 @@ Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config) {
   request.spec.oracle.conormals = spec.oracle().conormals();
   request.spec.random_seed = spec.random_seed() == 0 ? 1 : spec.random_seed();
   request.label = spec.label();
+  request.about = spec.oracle().about();
   Refused status = ToInt(spec.walls(), "walls", &request.spec.walls);
   if (status.ok()) status = ReadDimensions(spec, config, &request.spec);
   if (status.ok()) status = ReadPlace(spec, &request.spec);
@@ -228,6 +250,7 @@ Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config) {
     status = Invalid("label", Message("label has ", request.label.size(), " bytes but may have ",
                                       kMaxLabelBytes, ": shorten it"));
   }
+  if (status.ok()) status = CheckAbout(request.about);
   if (status.ok()) status = core::Validate(request.spec);
   if (!status.ok()) return tl::unexpected(std::move(status));
   return request;

@@ -144,6 +144,7 @@ std::string EncodeStart(const MeshRequest& request, SystemTime create_time) {
   writer.Bytes(request.name);
   writer.Bytes(request.owner);
   writer.Bytes(request.label);
+  writer.Bytes(request.about);
   writer.Number(ToNumber(create_time));
   writer.Number(request.timeouts.answer_limit.count());
   writer.Number(request.timeouts.worker_wait.count());
@@ -159,6 +160,7 @@ bool DecodeStart(std::string_view record, MeshRequest* request, SystemTime* crea
   reader.Bytes(request->name);
   reader.Bytes(request->owner);
   reader.Bytes(request->label);
+  reader.Bytes(request->about);
   reader.Number(time);
   reader.Number(answer_limit);
   reader.Number(worker_wait);

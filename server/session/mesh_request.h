@@ -12,6 +12,7 @@ struct MeshRequest {
   std::string name;   // "meshes/<id>"
   std::string owner;  // empty where clients are not authenticated
   std::string label;  // the client's
+  std::string about;  // what its oracle says of itself, printable
   core::Specification spec;
   OracleTimeouts timeouts;
 };

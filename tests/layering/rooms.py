@@ -110,6 +110,7 @@ SERVER = {
         "server/history",
         "server/oracles",
         "server/session",
+        "text",
     ),
     "server/auth": (*FACE, "server/base", "server/config", "server/convert"),
     "server/rpc": (

@@ -106,6 +106,7 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   spec.mutable_oracle()->set_tangent_basis(oracle.has_tangent_basis());
   spec.mutable_oracle()->set_local_size(oracle.has_local_size());
   spec.mutable_oracle()->set_conormals(oracle.walls() > 0);
+  spec.mutable_oracle()->set_about(oracle.about());
   spec.set_walls(static_cast<std::uint32_t>(oracle.walls()));
   if (const auto box = oracle.bounding_box()) {
     // Shape [d]: a corner is one point, not a list of them.

@@ -261,6 +261,7 @@ def _essence(spec: pb.MeshSpec) -> pb.MeshSpec:
     copy = pb.MeshSpec()
     copy.CopyFrom(spec)
     copy.ClearField("label")
+    copy.oracle.ClearField("about")
     return copy
 
 

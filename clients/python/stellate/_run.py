@@ -145,7 +145,7 @@ class Run:
         mesh_spec(checked, 1.0, options)  # what is misspelt shows before the oracle is probed
         choice = checkpoint.choose_epsilon if checkpoint is not None else choose
         self._on_progress, self._checkpoint = on_progress, checkpoint
-        self._epsilon_reason, self._note = "", checked.note
+        self._epsilon_reason = ""
         self._where_it_ends: Callable[[], str] | None = getattr(oracle, "where_it_ends", None)
         chosen = self._say(choice(oracle, epsilon))
         kept = checkpoint.retries if checkpoint is not None else None
@@ -334,8 +334,8 @@ class Run:
         )
 
     def _told(self, mesh: M) -> M:
-        """With what the server does not know: why epsilon is what it is, of what oracle, and where
-        that ends."""
+        """With what the server does not know: why epsilon is what it is, and where the oracle's
+        manifold ends."""
         report = mesh.report
         if report is None:
             return mesh
@@ -345,10 +345,8 @@ class Run:
             if end:
                 certificate = dataclasses.replace(report.certificate, verdict=verdict)
                 report = dataclasses.replace(report, certificate=certificate)
-        if self._epsilon_reason or self._note:
-            report = dataclasses.replace(
-                report, epsilon_reason=self._epsilon_reason, oracle=self._note
-            )
+        if self._epsilon_reason:
+            report = dataclasses.replace(report, epsilon_reason=self._epsilon_reason)
         return dataclasses.replace(mesh, report=report)
 
     def __enter__(self) -> Run:

@@ -14,7 +14,7 @@ from .errors import InvalidArgument, NotConverged, OracleError, add_words
 
 __all__ = ["Oracle"]
 
-_MOST_OF_NOTE = 200  # characters
+_MOST_ABOUT_ITSELF = 300  # characters, which servers take
 
 
 @runtime_checkable
@@ -47,8 +47,8 @@ class Oracle(Protocol):
       bounding_box: (lower (d,), upper (d,)), where to look for M, or
       seeds: (m, d), points near M, one at least on each component. One of the two is needed.
       thread_safe: True lets several workers call it at once.
-      note: a line for people, such as what it was fitted with; the mesh's report has its first 200
-        characters, as the oracle's own words.
+      about: a str, one sentence that it says of itself, for people, such as what it was fitted with:
+        the verdict ends with its first 300 characters, as the oracle's own words.
     """
 
     dimension: int  # k
@@ -76,7 +76,7 @@ class CheckedOracle:
         self.has_local_size = callable(getattr(oracle, "local_size", None))
         self.has_jacobian = callable(getattr(oracle, "jacobian", None))
         self.walls = self._count_walls(oracle)
-        self.note = _note(getattr(oracle, "note", ""))
+        self.about = _sentence(getattr(oracle, "about", ""))
         self.bounding_box = _box(getattr(oracle, "bounding_box", None))
         seeds = getattr(oracle, "seeds", None)
         self.seeds = None if seeds is None else points_of(seeds, self.ambient_dimension)
@@ -325,12 +325,12 @@ def _instead(given: Any) -> str:
     return ""
 
 
-def _note(note: Any) -> str:
+def _sentence(about: Any) -> str:
     """In one line, without what terminals obey."""
-    if not isinstance(note, str):
+    if not isinstance(about, str):
         return ""
-    printable = "".join(c if c.isprintable() else " " for c in note)
-    return " ".join(printable.split())[:_MOST_OF_NOTE]
+    printable = "".join(c if c.isprintable() else " " for c in about)
+    return " ".join(printable.split())[:_MOST_ABOUT_ITSELF]
 
 
 def _box(box: Any) -> tuple[np.ndarray, np.ndarray] | None:

@@ -216,7 +216,6 @@ class Report:
     elapsed_seconds: float
     epsilon: float | None = None  # that the mesh was made with; None if that is not known
     epsilon_reason: str = ""  # why it is what it is, where it was not given
-    oracle: str = ""  # the oracle's own words of itself, where it meshed here and has any
 
     @property
     def certified(self) -> bool:
@@ -237,15 +236,13 @@ class Report:
         """All of it as plain values for JSON, with the names of the protocol.
 
         The same as the shell's --report writes: what is not known, infinite or no number is None,
-        "failure" is there for a mesh that failed, "oracle" where that told of itself.
+        "failure" is there for a mesh that failed.
         """
         whole: dict[str, Any] = {"termination": self.termination}
         if self.failure is not None:
             whole["failure"] = dataclasses.asdict(self.failure)
         whole["epsilon"] = self.epsilon
         whole["epsilon_reason"] = self.epsilon_reason
-        if self.oracle:
-            whole["oracle"] = self.oracle
         whole["counts"] = dataclasses.asdict(self.counts)
         whole["certificate"] = dataclasses.asdict(self.certificate)
         whole["elapsed_seconds"] = self.elapsed_seconds
@@ -321,8 +318,6 @@ class Report:
         mark = "NOT CERTIFIED"
         if c.certified:
             mark = "PROVED" if c.level == "PROVED" else "CERTIFIED"
-        if self.oracle:
-            lines.append(("oracle", self.oracle))
         verdict = _plain_verdict(c)
         lines.append(("certificate", f"{mark}: {verdict}" if verdict else mark))
         if c.components:

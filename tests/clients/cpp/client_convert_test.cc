@@ -6,6 +6,7 @@
 #include "net/channel.h"
 #include "run/delta_mesh.h"
 #include "stellate/catalogue.h"
+#include "stellate/pointwise.h"
 #include "stellate/rpc/status_details.pb.h"
 #include "wire/convert.h"
 #include "wire/status.h"
@@ -146,6 +147,23 @@ TEST(Enums, OfANewerServerAreUnknown) {
   EXPECT_STREQ(TerminationName(report.termination), "UNKNOWN");
   EXPECT_STREQ(CertificateLevelName(report.certificate.level), "UNKNOWN");
   EXPECT_FALSE(ToText(report).empty());
+}
+
+TEST(Spec, CarriesWhatTheOracleSaysOfItself) {
+  class Telling final : public PointwiseOracle {
+   public:
+    Telling() : PointwiseOracle(1, 2) {}
+    bool Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const override {
+      y = x.normalized();
+      return true;
+    }
+    void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const override {
+      tangent = Eigen::Vector2d(-y[1], y[0]);
+    }
+    std::string about() const override { return "a circle by trade"; }
+  } oracle;
+  EXPECT_EQ(ToSpec(oracle, {})->oracle().about(), "a circle by trade");
+  EXPECT_EQ(ToSpec(*MakeManifold("torus", nullptr), {})->oracle().about(), "");
 }
 
 TEST(Spec, CarriesWhatIsGivenAndNothingElse) {

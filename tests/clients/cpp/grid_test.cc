@@ -111,6 +111,7 @@ TEST(SignedDistance, TellsWhatAGridResolves) {
   SignedDistance sphere =
       SignedDistance::OfGrid(values, {5, 5, 5}, {-2 * Vector::Ones(3), Eigen::Vector3d(2, 2, 2)});
   EXPECT_EQ(sphere.resolution(), 1);
+  EXPECT_EQ(sphere.about(), "a spline through 5 x 5 x 5 values on a grid, spacing 1");
   EXPECT_EQ(
       SignedDistance([](const Vector& x) { return x.norm() - 1; }, {}, Cube(1.5)).resolution(), 0);
 }

@@ -6,12 +6,14 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <random>
 #include <thread>
 
 #include "stellate/catalogue.h"
 #include "stellate/oracles/points.h"
+#include "stellate/oracles/walls.h"
 
 namespace stellate::oracles {
 namespace {
@@ -122,11 +124,13 @@ TEST(PointCloud, TakesPointsThatComeSeveralTimesForOne) {
 }
 
 TEST(PointCloud, SaysHowFarItsNeighboursReach) {
-  const std::string given = ToText(PointCloud(ScanOf(4000, 0.003), 2, 0.25));
+  const std::string given = PointCloud(ScanOf(4000, 0.003), 2, 0.25).about();
   EXPECT_THAT(given, HasSubstr("4000 points of R^3, dimension 2, bandwidth 0.25, residual 0.00"));
-  const std::string local = ToText(PointCloud(ScanOf(4000, 0, 3), 2));
+  const auto uneven = std::make_shared<PointCloud>(ScanOf(4000, 0, 3), 2);
+  const std::string local = uneven->about();
   EXPECT_THAT(local,
               ::testing::MatchesRegex(".*bandwidth 0\\.[0-9]+ \\(0\\.[0-9]+ to 0\\.[0-9]+\\).*"));
+  EXPECT_EQ(Clipped(uneven, {Ball(Eigen::Vector3d::UnitX(), 0.5)}).about(), local);
 }
 
 }  // namespace

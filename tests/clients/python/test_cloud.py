@@ -82,9 +82,9 @@ def test_points_that_come_several_times_are_no_neighbours_of_themselves():
 
 def test_what_is_made_of_a_cloud_tells_of_it_too():
     cloud = oracles.PointCloud(scan(4000, 0.003), 2)
-    assert cloud.note == repr(cloud)
+    assert cloud.about == repr(cloud)
     half = oracles.Clipped(cloud, [oracles.HalfSpace([1, 0, 0])])
-    assert half.note == cloud.note
+    assert half.about == cloud.about
 
 
 def colours(count):

@@ -112,7 +112,11 @@ def test_two_valued_data_is_told_and_smoothed(level):
     for values in (mask, mask.astype(float), mask.astype(np.uint8)):
         with pytest.raises(stellate.InvalidArgument, match=r"labels and masks.*smooth=1.5"):
             OfGrid(values, box_of(values), level=level)
-    smooth = radii(OfVolume(mask, smooth=1.5))
+    ball_of_mask = OfVolume(mask, smooth=1.5)
+    shape = " x ".join(map(str, mask.shape))
+    told = f"a spline through {shape} values on a grid, spacing 1, smoothed by 1.5"
+    assert ball_of_mask.about == told
+    smooth = radii(ball_of_mask)
     assert np.abs(smooth - (8 - 1.5**2 / 8)).max() < 0.15
 
 

@@ -227,16 +227,16 @@ def test_a_ready_manifold_is_an_oracle():
 
 
 @pytest.mark.parametrize(
-    "note, told",
+    "about, told",
     [
         (None, ""),
         ("fitted with 3 knots", "fitted with 3 knots"),
         ("two\nlines\x1b[2J", "two lines [2J"),
-        ("long " * 100, ("long " * 40)),
+        ("long " * 100, "long " * 60),
     ],
 )
-def test_an_oracle_tells_of_itself_in_a_line_that_is_fit_to_be_shown(note, told):
+def test_an_oracle_tells_of_itself_in_a_line_that_is_fit_to_be_shown(about, told):
     oracle = Sphere(2)
-    if note is not None:
-        oracle.note = note
-    assert CheckedOracle(oracle).note == told
+    if about is not None:
+        oracle.about = about
+    assert CheckedOracle(oracle).about == told

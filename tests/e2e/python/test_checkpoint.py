@@ -99,7 +99,9 @@ def test_finished_it_is_there_at_once(undisturbed, tmp_path, monkeypatch):
     first = stellate.mesh(Torus(), EPSILON, checkpoint=tmp_path)
     assert_same(first, undisturbed[0])
     monkeypatch.setenv("STELLATED", "/nonexistent")  # no server, no question
-    again = stellate.mesh(Torus(limit=0), EPSILON, checkpoint=tmp_path, label="any")
+    other = Torus(limit=0)
+    other.about = "in other words"
+    again = stellate.mesh(other, EPSILON, checkpoint=tmp_path, label="any")
     assert_same(again, first)
     assert (again.report, again.progress, again.revision) == (
         first.report,

@@ -305,14 +305,28 @@ def test_a_mesh_that_could_not_be_written_is_the_exceptions(server, tmp_path):
     assert lost.value.mesh.certified
 
 
-def test_the_report_has_the_oracles_own_words(server):
-    told = manifolds.Sphere(2)
-    told.note = "of radius 1, as it says itself"
-    report = stellate.mesh(told, 0.5, server=server).report
-    assert report.oracle == told.note == report.to_dict()["oracle"]
-    assert f"oracle  {told.note}" in str(report)
-    silent = stellate.mesh(manifolds.Sphere(2), 0.5, server=server).report
-    assert silent.oracle == "" and "oracle" not in silent.to_dict()
+def test_the_verdict_names_the_bandwidth_of_a_cloud(server):
+    rng = np.random.default_rng(1)
+    points = rng.normal(size=(4000, 3))
+    points *= rng.normal(1, 0.003, (4000, 1)) / np.linalg.norm(points, axis=1, keepdims=True)
+    cloud = stellate.oracles.PointCloud(points, 2)
+    report = stellate.mesh(cloud, 0.4, server=server).report
+    assert report.certified and f"bandwidth {cloud.bandwidth:.3g} (" in repr(cloud)
+    assert report.certificate.verdict.endswith(f". The oracle says of itself: {cloud!r}.")
+    assert repr(cloud) in " ".join(str(report).split())
+
+
+def test_what_an_oracle_says_of_itself_changes_no_mesh(server):
+    silent, told = manifolds.Sphere(2), manifolds.Sphere(2)
+    told.about = "Of radius 1, as it says itself."
+    plain, other = (stellate.mesh(oracle, 0.5, server=server) for oracle in (silent, told))
+    assert np.array_equal(plain.points, other.points)
+    assert np.array_equal(plain.simplices, other.simplices)
+    verdict = plain.report.certificate.verdict
+    words = f" The oracle says of itself: {told.about}"
+    assert other.report.certificate.verdict == verdict.removesuffix(".") + "." + words
+    coarse = stellate.mesh(told, 5, server=server).report
+    assert not coarse.certified and coarse.certificate.verdict.endswith(words)
 
 
 def test_a_parametrization_that_ends_is_told_where_and_what_to_do(server):

@@ -149,6 +149,13 @@ TEST(ConvertSpec, RefusalsStartWithTheField) {
   expect("components", StatusCode::kInvalidArgument, [](Spec* s) { s->set_components(2'000'000); });
   expect("label", StatusCode::kInvalidArgument,
          [](Spec* s) { s->set_label(std::string(129, 'x')); });
+  std::string many;
+  for (int i = 0; i < 301; ++i) many += "\xc3\xa9";
+  for (const std::string& words : {many, std::string("a\nb"), std::string("\x1b[2J"),
+                                   std::string("\xe2\x80\xae"), std::string("\xff")}) {
+    expect("oracle.about", StatusCode::kInvalidArgument,
+           [&words](Spec* s) { s->mutable_oracle()->set_about(words); });
+  }
 }
 
 TEST(ConvertSpec, VerticesAreBoundedByTheirCoordinatesToo) {

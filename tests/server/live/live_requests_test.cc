@@ -49,6 +49,10 @@ TEST_F(LiveRequestsTest, BadSpecificationsAreRefusedOneByOne) {
   });
   ExpectRefused("bounding_box", invalid, [](Spec* s) { s->clear_bounding_box(); });
   ExpectRefused("label", invalid, [](Spec* s) { s->set_label(std::string(200, 'x')); });
+  ExpectRefused("oracle.about", invalid,
+                [](Spec* s) { s->mutable_oracle()->set_about(std::string(301, 'x')); });
+  ExpectRefused("oracle.about", invalid,
+                [](Spec* s) { s->mutable_oracle()->set_about("two\nlines"); });
   // Nothing of it harmed the mesh beside.
   RawWorker worker(stub_.get(), other);
   EXPECT_EQ(WatchToEnd(other).state(), v1::MESH_STATE_SUCCEEDED);
@@ -171,6 +175,48 @@ TEST_F(LiveRequestsTest, EachLimitIsNamedWithItsValue) {
             "max-rounds=10 of mesh");
   EXPECT_EQ(limit_of_curve([](v1::MeshSpec* s) { s->mutable_limits()->set_answer_seconds(101); }),
             "max-wait=100 of mesh");
+}
+
+TEST_F(LiveRequestsTest, AVerdictEndsWithWhatTheOracleSaysOfItself) {
+  const ScratchDirectory directory;
+  Config config;
+  config.data_dir = directory / "data";
+  Start(config);
+  v1::MeshSpec spec = SpecOfSphere();
+  spec.mutable_oracle()->set_about("a sphere, fitted to 12 points");
+  v1::Mesh finished, open, cancelled;
+  for (v1::Mesh* const mesh : {&finished, &open, &cancelled}) ASSERT_TRUE(Create(spec, mesh).ok());
+  EXPECT_EQ(finished.spec().oracle().about(), spec.oracle().about());
+  const auto is_told = [](const v1::Mesh& mesh) {
+    return mesh.report().certificate().verdict().ends_with(
+        ". The oracle says of itself: a sphere, fitted to 12 points.");
+  };
+  {
+    RawWorker worker(stub_.get(), finished.name());
+    finished = WatchToEnd(finished.name());
+  }
+  EXPECT_TRUE(finished.report().certificate().certified());
+  EXPECT_TRUE(is_told(finished)) << finished.report().certificate().verdict();
+  grpc::ClientContext context;
+  v1::CancelMeshRequest cancel;
+  cancel.set_name(cancelled.name());
+  ASSERT_TRUE(stub_->CancelMesh(&context, cancel, &cancelled).ok());
+  cancelled = WatchToEnd(cancelled.name());
+  EXPECT_TRUE(is_told(cancelled)) << cancelled.report().certificate().verdict();
+
+  server_.reset();
+  Start(config);
+  EXPECT_EQ(Get(open.name()).spec().oracle().about(), spec.oracle().about());
+  EXPECT_EQ(WatchToEnd(finished.name()).report().certificate().verdict(),
+            finished.report().certificate().verdict());
+  RawWorker worker(stub_.get(), open.name());
+  open = WatchToEnd(open.name());
+  EXPECT_EQ(open.report().certificate().verdict(), finished.report().certificate().verdict());
+
+  const std::string silent = CreateSphere();
+  RawWorker another(stub_.get(), silent);
+  const v1::Certificate plain = WatchToEnd(silent).report().certificate();
+  EXPECT_EQ(plain.verdict().find("says of itself"), std::string::npos) << plain.verdict();
 }
 
 // Not a mesh that ends at once as JOURNAL_FULL.

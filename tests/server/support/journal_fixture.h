@@ -91,6 +91,7 @@ inline SessionOptions RecordedSphere(std::shared_ptr<SessionJournal> journal,
   options.request.name = "meshes/0123456789abcdef0123456789abcdef";
   options.request.owner = "somebody";
   options.request.label = "a sphere";
+  options.request.about = "fitted to nothing";
   options.request.spec = SphereSpec(epsilon);
   options.request.spec.threads = 1;  // oneTBB itself is not built for ThreadSanitizer
   options.request.spec.seeds = Eigen::Vector3d::UnitX();

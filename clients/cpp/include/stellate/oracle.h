@@ -127,6 +127,10 @@ class Oracle {
   // Where to look for M: a box, or points near M, at least one on each component.
   virtual std::optional<BoundingBox> bounding_box() const { return std::nullopt; }
   virtual Eigen::MatrixXd seeds() const { return {}; }  // d x m
+
+  // One sentence that it says of itself, for people, such as what it was fitted with: the verdict
+  // ends with it, as the oracle's own words. UTF-8, at most 300 characters, none of them a control.
+  virtual std::string about() const { return {}; }
 };
 
 }  // namespace stellate

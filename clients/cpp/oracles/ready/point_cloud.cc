@@ -121,6 +121,15 @@ std::optional<BoundingBox> PointCloud::bounding_box() const {
   return BoxAround(around_->points(), 0.02);
 }
 
+std::string PointCloud::about() const {
+  const double low = bandwidths().minCoeff(), high = bandwidths().maxCoeff();
+  const std::string local =
+      low < high ? " (" + Digits(low, 3) + " to " + Digits(high, 3) + ")" : "";
+  return std::to_string(bandwidths().size()) + " points of R^" +
+         std::to_string(ambient_dimension()) + ", dimension " + std::to_string(dimension()) +
+         ", bandwidth " + Digits(bandwidth_, 3) + local + ", residual " + Digits(residual_, 2);
+}
+
 bool PointCloud::Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const {
   Eigen::MatrixXd tangents;
   return around_->Project(x, y, tangents);
@@ -131,16 +140,6 @@ void PointCloud::Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) con
   if (!around_->Project(y, again, tangent)) {
     tangent = Eigen::MatrixXd::Identity(ambient_dimension(), dimension());
   }
-}
-
-std::string ToText(const PointCloud& cloud) {
-  const double low = cloud.bandwidths().minCoeff(), high = cloud.bandwidths().maxCoeff();
-  const std::string local =
-      low < high ? " (" + Digits(low, 3) + " to " + Digits(high, 3) + ")" : "";
-  return std::to_string(cloud.bandwidths().size()) + " points of R^" +
-         std::to_string(cloud.ambient_dimension()) + ", dimension " +
-         std::to_string(cloud.dimension()) + ", bandwidth " + Digits(cloud.bandwidth(), 3) + local +
-         ", residual " + Digits(cloud.residual(), 2);
 }
 
 }  // namespace stellate::oracles

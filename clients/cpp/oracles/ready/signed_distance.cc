@@ -1,4 +1,5 @@
 #include <memory>
+#include <string>
 
 #include "oracles/ready/common.h"
 #include "oracles/ready/grid_check.h"
@@ -43,6 +44,10 @@ SignedDistance SignedDistance::OfGrid(const Eigen::VectorXd& values, const std::
                         [spline](const Eigen::VectorXd& x) { return spline->Gradient(x); }, box,
                         level);
   oracle.resolution_ = spline->spacing();
+  std::string counts;
+  for (const int count : shape) counts += (counts.empty() ? "" : " x ") + std::to_string(count);
+  oracle.about_ =
+      "a spline through " + counts + " values on a grid, spacing " + Short(oracle.resolution_);
   return oracle;
 }
 

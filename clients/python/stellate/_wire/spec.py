@@ -51,6 +51,7 @@ def mesh_spec(oracle: CheckedOracle, epsilon: float, options: Mapping[str, Any])
     spec.oracle.tangent_basis = oracle.has_tangent_basis
     spec.oracle.local_size = oracle.has_local_size
     spec.oracle.conormals = oracle.walls > 0
+    spec.oracle.about = oracle.about
     _set(spec, "walls", oracle.walls)
     if oracle.bounding_box is not None:
         lower, upper = oracle.bounding_box

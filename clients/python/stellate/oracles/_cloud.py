@@ -77,8 +77,8 @@ class PointCloud(Projection):
         self.residual = float(np.quantile(norms(nearest - some)[found], 0.95))
 
     @property
-    def note(self) -> str:
-        """What it was fitted with, for the mesh's report."""
+    def about(self) -> str:
+        """What it was fitted with, for the mesh's verdict."""
         return repr(self)
 
     def __repr__(self) -> str:

@@ -31,6 +31,7 @@ class SignedDistance(ImplicitManifold):
     """
 
     resolution: float | None = None  # the spacing of the grid, where there is one
+    about: str = ""  # of a grid, its values and their spacing
 
     def __init__(
         self,
@@ -99,6 +100,8 @@ class SignedDistance(ImplicitManifold):
             thread_safe=True,
         )
         oracle.resolution = float(grid.spacing.max())
+        shape = " x ".join(map(str, grid.values.shape))
+        oracle.about = f"a spline through {shape} values on a grid, spacing {oracle.resolution:.6g}"
         return oracle
 
     @classmethod
@@ -146,4 +149,7 @@ class SignedDistance(ImplicitManifold):
         if smooth > 0:
             volume = smoothed(volume, smooth / sides)
         box = lower, lower + sides * (np.array(volume.shape) - 1)
-        return cls.of_grid(volume, box, level=level, border=border)
+        oracle = cls.of_grid(volume, box, level=level, border=border)
+        if smooth > 0:
+            oracle.about += f", smoothed by {smooth:.6g}"
+        return oracle

@@ -84,7 +84,7 @@ class SeedComponents:
         self.seeds = as_points(seeds, "seeds")
         self.dimension, self.ambient_dimension = base.dimension, base.ambient_dimension
         self.thread_safe = bool(getattr(oracle, "thread_safe", False))
-        self.note = base.note
+        self.about = base.about
         if base.bounding_box is not None:
             self.bounding_box = base.bounding_box
         if base.has_intersect_flat:

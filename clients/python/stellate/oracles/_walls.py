@@ -105,7 +105,7 @@ class Clipped:
         if self._base.has_local_size:
             self.local_size = oracle.local_size
         self.thread_safe = bool(getattr(oracle, "thread_safe", False))
-        self.note = self._base.note
+        self.about = self._base.about
         self._faces: dict[tuple[int, ...], _Face] = {}
         box = where_of(self._base)
         self._exactness = [Exactness(self._base.seeds, *box) for _ in self._walls]

@@ -44,9 +44,11 @@ class SignedDistance final : public ImplicitOracle {
 
   // The largest spacing of the grid; 0 where there is none.
   double resolution() const { return resolution_; }
+  std::string about() const override { return about_; }  // of a grid, its values and their spacing
 
  private:
   double resolution_ = 0;
+  std::string about_;
 };
 
 // One or several equations f = 0 out of many.

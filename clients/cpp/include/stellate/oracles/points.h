@@ -15,7 +15,7 @@ namespace stellate::oracles {
 // It is where the least-squares quadric through a place's neighbours, weighted by how near they
 // are, goes through the place itself. Where the points' noise is s, it lies within about s of the
 // manifold that they were taken from, plus bandwidth^3 times the change of its curvature; an
-// epsilon below the bandwidth meshes the smoothing. ToText tells what the bandwidth is.
+// epsilon below the bandwidth meshes the smoothing. about() tells what the bandwidth is.
 class PointCloud : public PointwiseOracle {
  public:
   // The points (d x n) have to lie on all of the manifold, at distances well below its reach.
@@ -35,6 +35,8 @@ class PointCloud : public PointwiseOracle {
   // Servers find intersections from closest points.
   bool has_intersect_flat() const override { return false; }
   std::optional<BoundingBox> bounding_box() const override;
+  // How many points, how far neighbours reach, how far the points are off.
+  std::string about() const override;
 
   bool Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const override;
   void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const override;
@@ -45,9 +47,6 @@ class PointCloud : public PointwiseOracle {
   std::unique_ptr<const Neighbourhoods> around_;
   double bandwidth_ = 0, residual_ = 0;
 };
-
-// One line, for people: how many points, how far neighbours reach, how far the points are off.
-std::string ToText(const PointCloud& cloud);
 
 // Triangles in R^3 that share their corners.
 struct Triangles {
