@@ -1,7 +1,7 @@
 """A gyroid in a box
 
 An unbounded surface, in a box that cuts it: six walls. Where two sides of the box meet on it there is a
-corner; nobody says where these are, or how many.
+corner; the mesher is not given where these are, or how many.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """A product
 
-The two-sphere times the circle, in R^5: where a ball-and-socket joint and a wheel may stand at once.
+The two-sphere times the circle, in R^5: where a ball-and-socket joint and a wheel may stand together.
 A slant slice of it.
 """
 

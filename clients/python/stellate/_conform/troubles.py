@@ -13,7 +13,8 @@ from .scenario import Refusal, Scenario, agree
 from .server import Silence, Stream
 from .worker import Answers, Flats, OtherWalls, Partly, Serving, Walls, manifold
 
-_COMES_BACK_SECONDS = 6.0
+# Long enough for a busy machine; a client that leaves all waiting to its channel takes 20 and more.
+_COMES_BACK_SECONDS = 15.0
 _FROZEN_SECONDS = 30.0
 
 
