@@ -73,6 +73,10 @@ class Wheel(unittest.TestCase):
             self.assertIn(VERSION, run(command, "--version", cwd=nowhere))
             run(command, "mesh", "torus", "-e", "0.3", "-o", "torus.off", cwd=nowhere)
             self.assertIn("usage", run(command, "conform", "--help", cwd=nowhere).lower())
+            conform = (
+                "from stellate._conform import files; print(len(files.entries('meshes.json')))"
+            )
+            self.assertGreater(int(run(python, "-I", "-c", conform, cwd=nowhere)), 0)
         return said
 
     def test_with_what_pypi_has(self) -> None:
