@@ -262,8 +262,8 @@ bool CreaseProbe::TakeLeg(Walk* walk) const {
 
 // Decides what is at the end of a walk. A crease has at least two straight sides, and the way
 // itself turns by most of the angle between them. No point of M is near a step along a side beyond
-// a crease; there is one beyond a crossing, and through the tip of a cone a side continues
-// straight.
+// a crease, and an oracle that projects by gradients may find none at all; there is one beyond a
+// crossing, and through the tip of a cone a side continues straight.
 std::optional<Crease> CreaseProbe::WhatIsAt(const Walk& walk) {
   const double length = walk.way.length();
   const Eigen::MatrixXd steps = StepsFrom(walk.way);
@@ -274,12 +274,12 @@ std::optional<Crease> CreaseProbe::WhatIsAt(const Walk& walk) {
   std::vector<const Node*> at(2 * kSteps, nullptr);
   for (const Node& node : walk.nodes) at[static_cast<std::size_t>(node.asked)] = &node;
   std::vector<const Node*> sides;
-  int stay = 0, leave = 0;
+  std::size_t stay = 0;
   for (std::size_t s = 0; s < kSteps; ++s) {
     const Node *near = at[s], *far = at[s + kSteps];
     if (near == nullptr) continue;
     const double off = (near->point - steps.col(static_cast<Eigen::Index>(s))).norm();
-    ++(off > kStays * walk.sine * kBeyond * length ? leave : stay);
+    if (off <= kStays * walk.sine * kBeyond * length) ++stay;
     if (far == nullptr || (near->point - crease.point).norm() < kNearest * length) continue;
     const Eigen::VectorXd along = (far->point - near->point).normalized();
     const double bends = (along - near->basis * (near->basis.transpose() * along)).norm();
@@ -303,8 +303,7 @@ std::optional<Crease> CreaseProbe::WhatIsAt(const Walk& walk) {
       middle = (one->point + other->point) / 2;
     }
   if (turn < kLeastSine || walk.sine < kOnTheWay * turn) return std::nullopt;
-  crease.crosses = goes_through || (leave == 0 && stay >= kSteps - 1);
-  if (!crease.crosses && leave == 0) return std::nullopt;  // which of the two is unknown
+  crease.crosses = goes_through || stay >= kSteps - 1;
   crease.point = goes_through ? middle : meet;
   turn_ = turn;
   return crease;

@@ -42,6 +42,9 @@ struct Shape {
   std::function<std::vector<Candidate>(const Vector3d&)> candidates;
   // How far a point is from the nearest place that is not smooth.
   std::function<double(const Vector3d&)> off = {};
+  // Whether a point that is not smooth can be an answer. Where gradients lead to the surface, they
+  // may fail on an edge, and find nothing.
+  bool finds_edges = true;
 };
 void PrintTo(const Shape& s, std::ostream* out) { *out << s.name; }
 
@@ -61,9 +64,12 @@ AnswerBlock AnswerOf(const Shape& shape, const QueryBlock& block) {
   AnswerBlock answer;
   answer.points = block.points;
   if (block.want_tangents) answer.tangents.resize(3 * shape.k, block.size());
+  if (!shape.finds_edges) answer.found.assign(static_cast<std::size_t>(block.size()), 1);
   for (Eigen::Index j = 0; j < block.size(); ++j) {
     const Candidate found = ClosestOf(shape, block.points.col(j));
     answer.points.col(j) = found.point;
+    if (!shape.finds_edges && shape.off(found.point) == 0)
+      answer.found[static_cast<std::size_t>(j)] = 0;
     if (!block.want_tangents) continue;
     Eigen::MatrixXd normals(3, 3 - shape.k);
     for (int a = 0; a < 3 - shape.k; ++a) normals.col(a) = found.normals[static_cast<size_t>(a)];
@@ -148,6 +154,13 @@ Shape SharpBox() {
           }};
 }
 
+Shape BoxWithoutEdges() {
+  Shape shape = SharpBox();
+  shape.name = "box without edges";
+  shape.finds_edges = false;
+  return shape;
+}
+
 // Unit circles about the origin, in two planes that meet in the first axis.
 Shape CrossingCircles() {
   return {"crossing circles", 1,
@@ -215,8 +228,8 @@ TEST_P(Creases, EndTheRunSoonWithTheirPlace) {
 
 INSTANTIATE_TEST_SUITE_P(Shapes, Creases,
                          ::testing::Combine(::testing::Values(TwoBalls(true, 1), TwoBalls(false, 1),
-                                                              SharpBox(), CrossingCircles(),
-                                                              CrossingSpheres()),
+                                                              SharpBox(), BoxWithoutEdges(),
+                                                              CrossingCircles(), CrossingSpheres()),
                                             ::testing::Bool()));
 
 // An edge that is rounded by a thousandth of the mesh size, and tubes and gaps far below it.

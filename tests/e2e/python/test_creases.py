@@ -3,6 +3,7 @@
 import re
 
 import numpy as np
+import pytest
 import stellate
 
 BOX = [-1.5] * 3, [1.5] * 3
@@ -40,3 +41,33 @@ def test_cylinders_of_one_radius_cross(server):
     mesh = stellate.mesh(curves, 0.05, server=server)
     at = place(mesh.report.certificate.verdict, "crosses itself or is singular")
     np.testing.assert_allclose([abs(at[0]), at[1], at[2]], [1, 0, 0], atol=1e-3)
+
+
+def cube(x):
+    return np.abs(x).max(axis=1) - 1
+
+
+def cylinder(x):
+    return np.maximum(np.hypot(x[:, 0], x[:, 1]) - 1, np.abs(x[:, 2]) - 0.8)
+
+
+def cut_ball(x):
+    return np.maximum(np.linalg.norm(x, axis=1) - 1.1, -x[:, 2] - 0.2)
+
+
+def off_the_edge(f, at):
+    """How far a place is from the nearest edge of these solids."""
+    if f is cube:
+        return np.hypot(*np.sort(np.abs(np.abs(at) - 1))[:2])
+    height, radius = (0.8, 1) if f is cylinder else (0.2, np.sqrt(1.1**2 - 0.2**2))
+    return np.hypot(abs(at[2]) - height, np.hypot(at[0], at[1]) - radius)
+
+
+@pytest.mark.parametrize("f", [cube, cylinder, cut_ball])
+@pytest.mark.parametrize("epsilon", [0.3, 0.5])
+def test_edges_of_a_maximum_are_named_at_any_epsilon(f, epsilon, server):
+    """Gradients find nothing beyond such an edge, which once left what it is unsaid."""
+    oracle = stellate.ImplicitManifold(f, ambient_dimension=3, dimension=2, bounding_box=BOX)
+    verdict = stellate.mesh(oracle, epsilon, server=server).report.certificate.verdict
+    assert "smaller epsilon" not in verdict
+    assert off_the_edge(f, place(verdict, "has a crease")) < 1e-3, verdict
