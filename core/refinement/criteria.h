@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "core/refinement/rules.h"
+#include "core/rules/r3_slivers.h"
 #include "core/specification.h"
 
 namespace stellate::core {

@@ -7,6 +7,7 @@
 #include "core/base/parallel.h"
 #include "core/base/vector_ops.h"
 #include "core/boundary/inactive_faces.h"
+#include "core/rules/count_bad.h"
 
 namespace stellate::core {
 namespace {

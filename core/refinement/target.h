@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "core/refinement/rules.h"
+#include "core/rules/violation.h"
 
 namespace stellate::core {
 

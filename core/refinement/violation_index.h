@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/base/instantiate.h"
-#include "core/refinement/rules.h"
+#include "core/rules/rules.h"
 
 namespace stellate::core {
 

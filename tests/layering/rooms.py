@@ -47,7 +47,8 @@ CORE = {
         "core/certificate/evidence",
     ),
     "core/boundary": (*_GROUND, "core/complex"),
-    "core/refinement": (*_GROUND, "core/complex", "core/boundary"),
+    "core/rules": (*_GROUND, "core/complex", "core/boundary"),
+    "core/refinement": (*_GROUND, "core/complex", "core/boundary", "core/rules"),
     "core/sampling": (*_GROUND, "core/refinement"),
     "core/speculation": (*_GROUND, "core/complex", "core/refinement", "core/sampling"),
     "core/run": (

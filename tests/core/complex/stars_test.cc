@@ -10,7 +10,7 @@
 #include <set>
 #include <vector>
 
-#include "core/refinement/rules.h"
+#include "core/complex/consistency.h"
 #include "tests/core/support/cells.h"
 #include "tests/core/support/samples.h"
 

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "core/complex/consistency.h"
 #include "core/refinement/criteria.h"
 #include "tests/core/support/in_process_run.h"
 

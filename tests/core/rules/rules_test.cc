@@ -1,4 +1,4 @@
-#include "core/refinement/rules.h"
+#include "core/rules/rules.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,9 @@
 #include <set>
 #include <vector>
 
+#include "core/complex/consistency.h"
 #include "core/geometry/simplex.h"
+#include "core/rules/count_bad.h"
 #include "tests/core/support/in_process_run.h"
 #include "tests/core/support/samples.h"
 

@@ -1,8 +1,10 @@
+#include "core/rules/count_bad.h"
+
 #include <algorithm>
 
 #include "core/base/instantiate.h"
 #include "core/boundary/sharp_dihedrals.h"
-#include "core/refinement/rules.h"
+#include "core/complex/consistency.h"
 
 namespace stellate::core {
 
