@@ -11,10 +11,10 @@
 
 namespace stellate::core::testing {
 
-// A run that is recorded: a specification, whatever answers it, and what happens on the way.
+// A run that is recorded: a specification, whatever answers it, and what happens on the way. Its
+// file says in words what it shows.
 struct GoldenCase {
   const char* name;  // of its file
-  const char* what;  // its first line
   std::string manifold;
   double epsilon = 0;
   std::function<void(Specification&)> change = [](Specification&) {};
@@ -95,65 +95,52 @@ inline std::vector<GoldenCase> Cases() {
   using S = Specification;
   return {
       // Oracles and dimensions.
-      {"circle", "A circle in R^10, flats and tangents given", "circle:10", 0.1},
-      {"knot_poor",
-       "A knot, closest points alone",
-       "torus-knot:2:3",
-       0.1,
-       ClosestPointsAlone,
-       {},
-       true},
-      {"torus", "A torus, flats and tangents given", "torus", 0.25},
-      {"torus_poor", "A torus, closest points alone", "torus", 0.3, ClosestPointsAlone},
-      {"rp2_alternating", "A projective plane, tangents given, flats approached in three steps",
-       "rp2", 0.4,
+      {"circle", "circle:10", 0.1},
+      {"knot_poor", "torus-knot:2:3", 0.1, ClosestPointsAlone, {}, true},
+      {"torus", "torus", 0.25},
+      {"torus_poor", "torus", 0.3, ClosestPointsAlone},
+      {"rp2_alternating", "rp2", 0.4,
        [](S& s) {
          s.oracle.intersect_flat = false;
          s.criteria.flat_alternations = 3;
        }},
-      {"sphere_misses_flats", "A sphere whose oracle misses some flats, no tangents given",
-       "sphere:2:5", 0.3, [](S& s) { s.oracle.tangent_basis = false; }, MissSomeFlats},
-      {"so3", "Rotations, flats and tangents given", "so3", 0.8},
-      {"flat_torus_3_poor", "A flat 3-torus, closest points alone", "flat-torus:3", 0.8,
-       ClosestPointsAlone},
-      {"sphere_3_flats", "A 3-sphere judged in flats, slivers allowed", "sphere:3", 0.5,
+      {"sphere_misses_flats", "sphere:2:5", 0.3, [](S& s) { s.oracle.tangent_basis = false; },
+       MissSomeFlats},
+      {"so3", "so3", 0.8},
+      {"flat_torus_3_poor", "flat-torus:3", 0.8, ClosestPointsAlone},
+      {"sphere_3_flats", "sphere:3", 0.5,
        [](S& s) {
          s.criteria.centre_rule = CentreRule::kTangentSpace;
          s.criteria.sliver_bound = 0;
        }},
-      {"ellipsoid_4", "A 4-dimensional ellipsoid whose cavities are filled",
-       "ellipsoid:1:0.9:0.85:0.8:0.76", 0.55, [](S& s) { s.random_seed = 1; }},
+      {"ellipsoid_4", "ellipsoid:1:0.9:0.85:0.8:0.76", 0.55, [](S& s) { s.random_seed = 1; }},
 
       // Batches.
-      {"torus_parts", "A torus in parts of 50 queries, tangents found", "torus", 0.3,
+      {"torus_parts", "torus", 0.3,
        [](S& s) {
          s.oracle.tangent_basis = false;
          s.limits.max_batch_queries = 50;
        }},
-      {"torus_speculative", "A torus, speculative", "torus", 0.15,
-       [](S& s) { s.criteria.speculative = true; }},
-      {"torus_speculative_poor",
-       "A torus, speculative, closest points alone, in parts of 700 queries", "torus", 0.2,
+      {"torus_speculative", "torus", 0.15, [](S& s) { s.criteria.speculative = true; }},
+      {"torus_speculative_poor", "torus", 0.2,
        [](S& s) {
          s.oracle = {};
          s.criteria.speculative = true;
          s.limits.max_batch_queries = 700;
        }},
-      {"so3_speculative", "Rotations, speculative", "so3", 0.8,
-       [](S& s) { s.criteria.speculative = true; }},
+      {"so3_speculative", "so3", 0.8, [](S& s) { s.criteria.speculative = true; }},
 
       // Sizes.
-      {"ellipsoid_estimated", "An ellipsoid, sizes estimated", "ellipsoid:1:0.6:0.4", 0.3,
-       [](S& s) { s.criteria.size_rate = 0.4; }},
-      {"ellipsoid_deviation", "An ellipsoid, its deviation bounded", "ellipsoid:1:0.6:0.4", 0.3,
+      {"ellipsoid_estimated", "ellipsoid:1:0.6:0.4", 0.3, [](S& s) { s.criteria.size_rate = 0.4; }},
+      {"ellipsoid_deviation", "ellipsoid:1:0.6:0.4", 0.3,
        [](S& s) { s.criteria.max_deviation = 0.02; }},
-      {"torus_given", "A torus, sizes given", "torus", 0.3,
+      {"torus_given", "torus", 0.3,
        [](S& s) {
          s.oracle.local_size = true;
          s.criteria.size_rate = 0.25;
        },
        GiveSizes},
-      {"torus_given_speculative", "A torus, sizes given, speculative, tangents found", "torus", 0.3,
+      {"torus_given_speculative", "torus", 0.3,
        [](S& s) {
          s.oracle.local_size = true;
          s.oracle.tangent_basis = false;
@@ -163,75 +150,49 @@ inline std::vector<GoldenCase> Cases() {
        GiveSizes},
 
       // Ways to end.
-      {"reach_proved", "A sphere, proved from its reach", "sphere:2", 0.3,
-       [](S& s) { s.declared_reach = 1; }},
-      {"reach_refuted", "A torus that contradicts the declared reach", "torus", 0.2,
-       [](S& s) { s.declared_reach = 1.5; }},
-      {"cover_box", "Two spheres found by covering the box", "two-spheres", 0.3,
+      {"reach_proved", "sphere:2", 0.3, [](S& s) { s.declared_reach = 1; }},
+      {"reach_refuted", "torus", 0.2, [](S& s) { s.declared_reach = 1.5; }},
+      {"cover_box", "two-spheres", 0.3,
        [](S& s) {
          s.seeds.resize(0, 0);
          s.declared_reach = 0.5;
          s.cover_box = true;
        }},
-      {"components_missing", "Two spheres declared as three components", "two-spheres", 0.4,
-       [](S& s) { s.components = 3; }},
-      {"component_found_late", "Two spheres from a seed on one, audited thoroughly", "two-spheres",
-       0.3,
+      {"components_missing", "two-spheres", 0.4, [](S& s) { s.components = 3; }},
+      {"component_found_late", "two-spheres", 0.3,
        [](S& s) {
          s.seeds = Eigen::Vector3d(-3, 0, 0);
          s.audit = Audit::kThorough;
        }},
-      {"vertex_budget", "A torus, at most 150 vertices", "torus", 0.2,
-       [](S& s) { s.limits.max_vertices = 150; }},
-      {"round_budget", "A torus, at most 9 rounds", "torus", 0.2,
-       [](S& s) { s.limits.max_rounds = 9; }},
-      {"cancelled", "A torus, cancelled after 6 rounds", "torus", 0.2, [](S&) {}, {}, false, 7},
-      {"oracle_failed",
-       "A torus whose oracle fails after 6 rounds",
-       "torus",
-       0.2,
-       [](S&) {},
-       {},
-       false,
-       0,
-       7},
-      {"no_seeds", "Nothing is found", "torus", 0.2, ClosestPointsAlone, NothingIsFound},
-      {"interrupted",
-       "A torus, interrupted in round 6",
-       "torus",
-       0.2,
-       [](S&) {},
-       {},
-       false,
-       0,
-       0,
-       6},
-      {"not_idempotent", "Answers that do not stay where they were, refused, then put right",
-       "sphere:2", 0.4, [](S& s) { s.oracle.intersect_flat = false; }, MoveTheSecondRound},
-      {"sizes_change", "Sizes that are told otherwise when asked again, refused, then put right",
-       "sphere:2", 0.4,
+      {"vertex_budget", "torus", 0.2, [](S& s) { s.limits.max_vertices = 150; }},
+      {"round_budget", "torus", 0.2, [](S& s) { s.limits.max_rounds = 9; }},
+      {"cancelled", "torus", 0.2, [](S&) {}, {}, false, 7},
+      {"oracle_failed", "torus", 0.2, [](S&) {}, {}, false, 0, 7},
+      {"no_seeds", "torus", 0.2, ClosestPointsAlone, NothingIsFound},
+      {"interrupted", "torus", 0.2, [](S&) {}, {}, false, 0, 0, 6},
+      {"not_idempotent", "sphere:2", 0.4, [](S& s) { s.oracle.intersect_flat = false; },
+       MoveTheSecondRound},
+      {"sizes_change", "sphere:2", 0.4,
        [](S& s) {
          s.oracle.local_size = true;
          s.criteria.size_rate = 0.3;
        },
        GrowTheSecondRound},
-      {"leaves_box", "A plane that leaves its box", "torus", 0.3, ClosestPointsAlone,
-       AnswerWithAPlane},
-      {"half_unfound", "A torus of which one half is never found, speculative", "torus", 0.3,
+      {"leaves_box", "torus", 0.3, ClosestPointsAlone, AnswerWithAPlane},
+      {"half_unfound", "torus", 0.3,
        [](S& s) {
          s.oracle.intersect_flat = false;
          s.criteria.speculative = true;
        },
        FindOneHalf},
-      {"noise", "A sphere with waves shorter than epsilon, at most 100 rounds", "sphere:2", 0.3,
+      {"noise", "sphere:2", 0.3,
        [](S& s) {
          s.oracle = {};
          s.limits.max_rounds = 100;
        },
        Jitter, true},
-      {"stalls", "A circle with waves shorter than epsilon", "circle:3", 0.3,
-       [](S& s) { s.oracle = {}; }, Jitter, true},
-      {"grows", "A 3-sphere, fatter tetrahedra asked for than there are", "sphere:3", 0.9,
+      {"stalls", "circle:3", 0.3, [](S& s) { s.oracle = {}; }, Jitter, true},
+      {"grows", "sphere:3", 0.9,
        [](S& s) {
          s.criteria.sliver_bound = 0.3;
          s.criteria.candidates = 2;

@@ -1,9 +1,10 @@
 // Runs are compared with their records, a file each in this directory: a change of behaviour is a
-// diff of these, which somebody has to read and to explain. `core_golden_test --rewrite` records
-// anew.
+// diff of these, which somebody has to read and to explain. A file begins with a paragraph in
+// words, written by hand; `core_golden_test --rewrite` keeps it and records anew what follows.
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cinttypes>
 #include <cmath>
 #include <cstdio>
@@ -12,6 +13,7 @@
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "tests/core/golden/golden_cases.h"
@@ -90,23 +92,66 @@ std::string Number(double value) {
   return text;
 }
 
+// "name number" of each that is not 0.
+std::string Named(const std::vector<std::pair<const char*, std::uint64_t>>& numbers) {
+  std::string text;
+  for (const auto& [name, number] : numbers)
+    if (number > 0) text += (text.empty() ? "" : ", ") + (name + (' ' + std::to_string(number)));
+  return text;
+}
+
+std::string Broken(const Progress& p) {
+  const std::string broken = Named({{"front", p.unbounded_stars},
+                                    {"R1", p.bad_size},
+                                    {"R2", p.bad_radius_edge},
+                                    {"R3", p.bad_sliver},
+                                    {"R4", p.bad_inconsistent}});
+  return broken.empty() ? "" : "; broken " + broken;
+}
+
+// Beyond those that `before` counts.
+std::string Inserted(const Counts& now, const Counts& before = {}) {
+  const std::string inserted =
+      Named({{"R1", now.inserted_size - before.inserted_size},
+             {"R2", now.inserted_radius_edge - before.inserted_radius_edge},
+             {"R3", now.inserted_sliver - before.inserted_sliver},
+             {"R4", now.inserted_inconsistent - before.inserted_inconsistent}});
+  return inserted.empty() ? "" : "; inserted " + inserted;
+}
+
+void WriteFirst(const Eigen::MatrixXd& points, std::ostream& out) {
+  static const Eigen::IOFormat in_clear(4, Eigen::DontAlignCols, ", ", " ", "(", ")");
+  if (points.cols() == 0) return;
+  out << "  "
+      << points.leftCols(std::min<Eigen::Index>(3, points.cols())).transpose().format(in_clear)
+      << '\n';
+}
+
+constexpr const char* kLegend =
+    R"(round: queries; vertices and simplices after it; stars on the front and stars that break R1 .. R4;
+  points inserted by R1 .. R4
+  the first three new points
+  digests of queries, new points, their tangents, delta, progress
+)";
+
 void WriteEnd(const Report& report, std::ostream& out) {
   const Counts& n = report.counts;
   const Certificate& c = report.certificate;
   out << "ended " << TerminationName(report.termination) << ' '
-      << StatusCodeName(report.failure.code) << ' ' << CertificateLevelName(c.level) << '\n'
-      << "failure " << report.failure.message << '\n'
-      << "counts " << n.vertices << ' ' << n.simplices << ' ' << n.rounds << ' ' << n.queries << ' '
-      << n.tangent_queries << ' ' << n.inserted_size << ' ' << n.inserted_radius_edge << ' '
-      << n.inserted_sliver << ' ' << n.inserted_inconsistent << ' ' << n.duplicates << '\n'
-      << "mesh " << c.components << ' ' << c.euler_characteristic << ' ' << c.inconsistent_simplices
-      << ' ' << Number(c.max_circumradius) << ' ' << Number(c.estimated_reach) << ' '
-      << Number(c.epsilon_over_reach) << '\n'
-      << "verdict " << c.verdict << '\n';
-  for (const std::string& warning : c.warnings) out << "warning " << warning << '\n';
+      << StatusCodeName(report.failure.code) << ' ' << CertificateLevelName(c.level) << '\n';
+  if (!report.failure.message.empty()) out << "failure: " << report.failure.message << '\n';
+  out << "counts: " << n.vertices << " vertices, " << n.simplices << " simplices, " << n.rounds
+      << " rounds, " << n.queries << " queries, " << n.tangent_queries << " for tangents, "
+      << n.duplicates << " duplicates" << Inserted(n) << '\n'
+      << "mesh: components " << c.components << ", Euler characteristic " << c.euler_characteristic
+      << ", inconsistent simplices " << c.inconsistent_simplices << ", circumradius "
+      << Number(c.max_circumradius) << ", reach " << Number(c.estimated_reach)
+      << ", epsilon / reach " << Number(c.epsilon_over_reach) << '\n'
+      << "verdict: " << c.verdict << '\n';
+  for (const std::string& warning : c.warnings) out << "warning: " << warning << '\n';
 }
 
-// What a run does, a line a round, and how it ends.
+// What a run does, round by round, and how it ends.
 std::string Record(const GoldenCase& c, int threads) {
   const auto manifold = testing::Make(c.manifold);
   Specification spec = testing::SpecificationFor(*manifold, c.epsilon);
@@ -115,9 +160,11 @@ std::string Record(const GoldenCase& c, int threads) {
   const auto mesher = testing::NewMesher(spec);
   const Answerer answer = AnswererFor(*manifold);
   std::ostringstream out;
-  out << "# " << c.what << "\n# round queries vertices simplices; digests of queries, new points,"
-      << " their tangents, delta, progress\n";
+  out << kLegend;
+  std::string phase;
   while (const QueryBatch* batch = mesher->NextBatch()) {
+    if (std::exchange(phase, PhaseName(mesher->progress().phase)) != phase)
+      out << "phase " << phase << '\n';
     const std::uint64_t round = batch->round;
     if (round == c.cancel_before) {
       mesher->Cancel();
@@ -133,9 +180,10 @@ std::string Record(const GoldenCase& c, int threads) {
     const Answers good = answer(*batch);
     Answers given = good;
     if (c.spoil) c.spoil(spec, *batch, given);
+    const Counts before = mesher->report().counts;
     auto delta = mesher->Absorb(given);
     if (!delta) {
-      out << "refused " << StatusCodeName(delta.error().code) << ' ' << delta.error().message
+      out << "refused: " << StatusCodeName(delta.error().code) << ' ' << delta.error().message
           << '\n';
       if (delta.error().code == StatusCode::kCancelled) {
         mesher->Cancel();
@@ -143,12 +191,15 @@ std::string Record(const GoldenCase& c, int threads) {
       }
       EXPECT_EQ(DigestOf(*mesher->NextBatch()).Hex(), asked.Hex());
       delta = mesher->Absorb(good);
-      if (!delta) return out.str() + "refused again " + delta.error().message + '\n';
+      if (!delta) return out.str() + "refused again: " + delta.error().message + '\n';
     }
     const Eigen::MatrixXd tangents = mesher->Tangents().rightCols(delta->points.cols());
     const Progress& progress = mesher->progress();
-    out << round << ' ' << queries << ' ' << progress.vertices << ' ' << progress.simplices << ' '
-        << asked.Hex() << ' ' << Digest().Add(delta->points).Hex() << ' '
+    out << "round " << round << ": " << queries << " queries; " << progress.vertices
+        << " vertices, " << progress.simplices << " simplices" << Broken(progress)
+        << Inserted(mesher->report().counts, before) << '\n';
+    WriteFirst(delta->points, out);
+    out << "  " << asked.Hex() << ' ' << Digest().Add(delta->points).Hex() << ' '
         << Digest().Add(tangents).Hex() << ' '
         << Digest()
                .Add(delta->revision)
@@ -158,9 +209,10 @@ std::string Record(const GoldenCase& c, int threads) {
                .Hex()
         << ' ' << DigestOf(progress).Hex() << '\n';
   }
-  out << "whole mesh " << Digest().Add(mesher->Points()).Hex() << ' '
-      << Digest().Add(mesher->Tangents()).Hex() << ' ' << Digest().Add(mesher->Simplices()).Hex()
-      << ' ' << DigestOf(mesher->progress()).Hex() << '\n';
+  out << "whole mesh, digests of points, tangents, simplices, progress\n  "
+      << Digest().Add(mesher->Points()).Hex() << ' ' << Digest().Add(mesher->Tangents()).Hex()
+      << ' ' << Digest().Add(mesher->Simplices()).Hex() << ' ' << DigestOf(mesher->progress()).Hex()
+      << '\n';
   WriteEnd(mesher->report(), out);
   return out.str();
 }
@@ -224,10 +276,22 @@ std::vector<std::string> HowItEnded(const std::string& record) {
   return ending;
 }
 
-void ExpectRecorded(const GoldenCase& c, const std::string& now) {
+// The paragraph that somebody wrote, with the empty line after it. A record itself has no such
+// line.
+std::string Opening(const std::string& file) {
+  const auto end = file.find("\n\n");
+  return end == std::string::npos ? "" : file.substr(0, end + 2);
+}
+
+void ExpectRecorded(const GoldenCase& c, const std::string& record) {
   const std::string path = Path(c.name);
+  const std::string opening = Opening(ReadFile(path));
+  ASSERT_FALSE(opening.empty())
+      << path << " has to begin with a paragraph and an empty line: what M is, what the run shows, "
+      << "what to look at. Write them; core_golden_test --rewrite appends the record.";
+  const std::string now = opening + record;
+  if (rewrite) WriteFile(path, now);
   const std::string then = ReadFile(path);
-  ASSERT_FALSE(then.empty()) << "no record " << path << "; core_golden_test --rewrite writes it";
   const bool exact = AnswersAsRecorded(c);
   const auto was = exact ? Lines(then) : HowItEnded(then);
   const auto is = exact ? Lines(now) : HowItEnded(now);
@@ -245,7 +309,6 @@ class GoldenFiles : public ::testing::TestWithParam<GoldenCase> {};
 TEST_P(GoldenFiles, TellWhatTheMesherDoes) {
   const GoldenCase& c = GetParam();
   const std::string one = Record(c, 1);
-  if (rewrite) WriteFile(Path(c.name), one);
   ExpectRecorded(c, one);
   EXPECT_EQ(Record(c, 4), one) << "4 threads";
 }
