@@ -10,8 +10,8 @@ namespace stellate::core {
 
 // Rule R1, size (Sec. 5.3.5): no cell is unbounded, and no circumradius is larger than epsilon.
 
-// Whether a simplex breaks R1. fake: not a simplex yet, as its cell is unbounded there. radius2: its
-// circumradius, squared.
+// Whether a simplex breaks R1. fake: not a simplex yet, as its cell is unbounded there. radius2:
+// its circumradius, squared.
 inline bool IsTooLarge(bool fake, double radius2, double epsilon) {
   return fake || radius2 > epsilon * epsilon;
 }

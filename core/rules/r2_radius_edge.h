@@ -8,9 +8,9 @@
 
 namespace stellate::core {
 
-// Rule R2, radius-edge ratio (Sec. 5.3.5): no circumradius is longer than `bound` times the shortest
-// edge. It compares the edges at p; the stars of the other vertices compare the others. Simplices
-// at points with protecting balls are excused.
+// Rule R2, radius-edge ratio (Sec. 5.3.5): no circumradius is longer than `bound` times the
+// shortest edge. It compares the edges at p; the stars of the other vertices compare the others.
+// Simplices at points with protecting balls are excused.
 
 // Whether the simplex dual to vertex v of p's cell breaks R2. edge2: its shortest edge, squared.
 template <int K>

@@ -93,8 +93,8 @@ bool HasThinFace(const SimplexEdges<K>& edges, double sliver_bound) {
   (std::make_integer_sequence<unsigned, 1u << K>());
 }
 
-// Returns the simplex of star(p) with the largest circumradius that is bad and has its lowest vertex
-// at p.
+// Returns the simplex of star(p) with the largest circumradius that is bad and has its lowest
+// vertex at p.
 template <int K, class IsBad>
 std::optional<std::size_t> LargestBad(const Stars<K>& stars, std::uint32_t p, const IsBad& is_bad) {
   const auto& cell = stars.cell(p);

@@ -22,7 +22,7 @@ std::optional<Violation<K>> WorstInconsistent(const Stars<K>& stars, std::uint32
   return ViolationAt<K>(Rule::kInconsistent, cell, worst.vertex());
 }
 
-#define STELLATE_EACH(K)                                                                    \
+#define STELLATE_EACH(K)                                                                 \
   template std::optional<Violation<K>> WorstInconsistent(const Stars<K>&, std::uint32_t, \
                                                          std::uint64_t);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)

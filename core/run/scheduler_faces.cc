@@ -7,8 +7,8 @@
 #include "core/base/message.h"
 #include "core/base/parallel.h"
 #include "core/run/ending.h"
-#include "core/run/meshing_run.h"
 #include "core/run/sampler_choice.h"
+#include "core/run/scheduler.h"
 #include "core/sampling/seeding.h"
 
 namespace stellate::core {
@@ -21,7 +21,7 @@ constexpr double kKnownWithin = 0.1;
 
 // Queries the seeds' closest points on M, and on each wall.
 template <int K>
-void MeshingRun<K>::AskForFaces(const Eigen::MatrixXd& seeds) {
+void Scheduler<K>::AskForFaces(const Eigen::MatrixXd& seeds) {
   CandidateSet<K> candidates;
   PlannedPoints& planned = candidates.planned;
   planned.points = seeds.replicate(1, spec_.walls + 1);
@@ -29,11 +29,11 @@ void MeshingRun<K>::AskForFaces(const Eigen::MatrixXd& seeds) {
   for (int wall = 0; wall < spec_.walls; ++wall)
     planned.walls.insert(planned.walls.end(), static_cast<std::size_t>(seeds.cols()),
                          SetOfWall(wall));
-  Ask(std::move(candidates), &MeshingRun::KeepFaceSeeds);
+  Ask(std::move(candidates), Purpose::kFaceSeeds);
 }
 
 template <int K>
-void MeshingRun<K>::KeepFaceSeeds() {
+void Scheduler<K>::KeepFaceSeeds() {
   const AnsweredPoints& answers = trip_->answers();
   std::uint64_t inside = 0;
   for (Eigen::Index c = 0; c < answers.points.cols(); ++c) {
@@ -51,22 +51,22 @@ void MeshingRun<K>::KeepFaceSeeds() {
     spare_points_.KeepEnd(answers, c);
     engine_.boundary().KeepSeed(answers.points.col(c), answers.walls[i], answers.tangents.col(c));
   }
-  if (inside == 0) lacks_.inside = WhyNothingInside(spec_, answers);
+  if (inside == 0) noted_.inside = WhyNothingInside(spec_, answers);
   if (inside == 0 && !engine_.boundary().has_discoveries())
-    return Fail({StatusCode::kNoSeeds, lacks_.inside});
+    return Fail({StatusCode::kNoSeeds, noted_.inside});
   Eigen::MatrixXd steps = wall_check_.Questions(answers);
-  if (steps.cols() > 0) AskFor(std::move(steps), &MeshingRun::JudgeWalls);
+  if (steps.cols() > 0) AskFor(std::move(steps), Purpose::kWallCheck);
 }
 
 template <int K>
-void MeshingRun<K>::JudgeWalls() {
+void Scheduler<K>::JudgeWalls() {
   if (Status status = wall_check_.Judge(trip_->answers()); !status.ok()) Fail(std::move(status));
 }
 
 // Queries points of walls where the mesh should end, but does not: faces are meshed from there.
 // Returns false as AskForSpares does.
 template <int K>
-bool MeshingRun<K>::AskForSparesOnWalls(const PointsOnWalls& points) {
+bool Scheduler<K>::AskForSparesOnWalls(const PointsOnWalls& points) {
   const Stars<K>& stars = engine_.stars();
   const double epsilon = engine_.criteria().epsilon;
   PointsOnWalls news;
@@ -84,21 +84,21 @@ bool MeshingRun<K>::AskForSparesOnWalls(const PointsOnWalls& points) {
   CandidateSet<K> candidates;
   candidates.planned = spare_points_.ChooseOnWalls(news, epsilon);
   if (candidates.planned.size() == 0) return false;
-  lacks_.piece = {std::countr_zero(candidates.planned.walls.front()),
+  noted_.piece = {std::countr_zero(candidates.planned.walls.front()),
                   candidates.planned.points.col(0)};
   spare_points_.GiveBack(certification_->TakeKnown());
-  Ask(std::move(candidates), &MeshingRun::InsertSpares);
+  Ask(std::move(candidates), Purpose::kSpares);
   return true;
 }
 
 // Samples the interior, if there is any, once its faces are meshed. Returns whether there are
 // queries for it; else all stars are whole.
 template <int K>
-bool MeshingRun<K>::AskForInterior() {
+bool Scheduler<K>::AskForInterior() {
   if (engine_.stars().size() == 0) return false;
   AnsweredPoints seeds = engine_.InteriorSeeds();
-  sampler_ = SamplerFor<K>(engine_, spec_, seeds);
-  if (sampler_) sampler_->Begin(seeds);
+  sampling_.sampler = SamplerFor<K>(engine_, spec_, seeds);
+  if (sampling_.sampler) sampling_.sampler->Begin(seeds);
   if (AskForSample()) return true;
   CommitSample();
   return false;
@@ -107,12 +107,12 @@ bool MeshingRun<K>::AskForInterior() {
 // Continues with seeds of the stage, or with the next stage, if nothing is left to do on faces up
 // to the stage. Returns false if there are queries for them, or the run is over.
 template <int K>
-bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
+bool Scheduler<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
   const BoundaryState<K>& boundary = engine_.boundary();
   if (!boundary.crowds().empty()) {
     CandidateSet<K> candidates;
     candidates.planned = engine_.CrowdQuestions();
-    Ask(std::move(candidates), &MeshingRun::SettleCrowds);
+    Ask(std::move(candidates), Purpose::kCrowds);
     return false;
   }
   while (true) {
@@ -120,11 +120,11 @@ bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
     if (PlannedPoints seeds = idle ? engine_.ChooseSeeds() : PlannedPoints(); seeds.size() > 0) {
       CandidateSet<K> candidates;
       candidates.planned = std::move(seeds);
-      Ask(std::move(candidates), &MeshingRun::InsertSpares);
+      Ask(std::move(candidates), Purpose::kSpares);
       return false;
     }
     if (engine_.NeedsProtectingBalls(**targets)) {
-      *targets = engine_.ProtectSharpEdges(&delta_.added, &delta_.removed);
+      *targets = engine_.ProtectSharpEdges(&change_.added, &change_.removed);
     } else {
       if (!idle || !engine_.AdvanceStage()) break;
       if (boundary.stage() == K) {
@@ -136,7 +136,7 @@ bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
       }
       *targets = engine_.Plan();
     }
-    stall_watch_.NoteFrontMoved();
+    watches_.stall.NoteFrontMoved();
     if (!*targets) {
       LeaveFaces();
       return false;
@@ -146,7 +146,7 @@ bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
 }
 
 template <int K>
-void MeshingRun<K>::SettleCrowds() {
+void Scheduler<K>::SettleCrowds() {
   const std::optional<CrowdedCorner> bad = engine_.SettleCrowds(trip_->answers());
   if (bad)
     Fail({StatusCode::kOracleBadConormal, WhyTooCrowded(bad->point, bad->walls, bad->along, K)});
@@ -155,22 +155,22 @@ void MeshingRun<K>::SettleCrowds() {
 // Call it when rounds no longer help: leaves the faces of this stage as they are, for the sake of
 // the rest; in the last stage the run is over.
 template <int K>
-void MeshingRun<K>::LeaveFaces() {
+void Scheduler<K>::LeaveFaces() {
   if (spec_.walls == 0 || !engine_.LeaveStage()) return End(Termination::kNoProgress);
-  stall_watch_ = StallWatch(1);  // next to them not all can be fixed: with less patience
+  watches_.stall = StallWatch(1);  // next to them not all can be fixed: with less patience
   if (engine_.boundary().stage() == K && AskForInterior()) return;
   Plan();
 }
 
-#define STELLATE_EACH(K)                                                  \
-  template void MeshingRun<K>::AskForFaces(const Eigen::MatrixXd&);       \
-  template void MeshingRun<K>::KeepFaceSeeds();                           \
-  template void MeshingRun<K>::JudgeWalls();                              \
-  template bool MeshingRun<K>::AskForSparesOnWalls(const PointsOnWalls&); \
-  template bool MeshingRun<K>::AskForInterior();                          \
-  template void MeshingRun<K>::SettleCrowds();                            \
-  template void MeshingRun<K>::LeaveFaces();                              \
-  template bool MeshingRun<K>::PlanFaces(std::optional<std::vector<Target<K>>>*);
+#define STELLATE_EACH(K)                                                 \
+  template void Scheduler<K>::AskForFaces(const Eigen::MatrixXd&);       \
+  template void Scheduler<K>::KeepFaceSeeds();                           \
+  template void Scheduler<K>::JudgeWalls();                              \
+  template bool Scheduler<K>::AskForSparesOnWalls(const PointsOnWalls&); \
+  template bool Scheduler<K>::AskForInterior();                          \
+  template void Scheduler<K>::SettleCrowds();                            \
+  template void Scheduler<K>::LeaveFaces();                              \
+  template bool Scheduler<K>::PlanFaces(std::optional<std::vector<Target<K>>>*);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 

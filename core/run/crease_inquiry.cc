@@ -1,0 +1,67 @@
+#include "core/run/crease_inquiry.h"
+
+#include <utility>
+
+#include "core/base/instantiate.h"
+
+namespace stellate::core {
+namespace {
+
+constexpr double kLongestWay = 2;  // of epsilon
+// In epsilon. A front has edges so short, along which tangent spaces turn by 30 degrees, only at
+// creases, or where M bends far more sharply than the mesh is fine.
+constexpr double kTellingWay = 0.5, kTellingSine2 = 0.25;
+
+}  // namespace
+
+template <int K>
+CreaseInquiry<K>::CreaseInquiry(const Specification& spec)
+    : epsilon_(spec.epsilon),
+      is_domain_(K == spec.ambient_dimension),
+      probe_(K, spec.ambient_dimension, spec.epsilon, spec.oracle.tangent_basis, spec.walls > 0,
+             spec.random_seed) {}
+
+template <int K>
+void CreaseInquiry<K>::Watch(const Engine<K>& engine) {
+  const ViolationIndex<K>& violations = engine.violations();
+  const bool due = watch_.IsDue(violations.size_and_shape().size() + violations.violating(),
+                                !violations.are_all_dirty());
+  if (probe_.is_asking() || is_domain_) return;
+  if (due)
+    probe_.Start(SteepWaysAtFaults<K>(engine, kLongestWay * epsilon_, kLeastSine2, &walked_));
+  else if (watch_.MayLookAgain())
+    probe_.Start(SteepWaysAtFaults<K>(engine, kTellingWay * epsilon_, kTellingSine2, &walked_));
+}
+
+template <int K>
+void CreaseInquiry<K>::ProbeFaults(const Engine<K>& engine) {
+  probe_.Start(SteepWaysAtFaults<K>(engine, kLongestWay * epsilon_));
+}
+
+template <int K>
+void CreaseInquiry<K>::ProbeAll(const Stars<K>& stars) {
+  probe_.Start(SteepWays<K>(stars, kLongestWay * epsilon_));
+}
+
+template <int K>
+void CreaseInquiry<K>::Stop() {
+  probe_.Stop();
+  walked_.clear();  // some were not probed to their end
+}
+
+template <int K>
+void CreaseInquiry<K>::Ask(std::vector<QueryBlock>* blocks) {
+  block_ = blocks->size();
+  blocks->push_back(std::move(probe_.Questions().front()));
+}
+
+template <int K>
+void CreaseInquiry<K>::Absorb(const std::vector<AnswerBlock>& answers) {
+  if (!block_) return;
+  probe_.Absorb({answers[*block_]});
+  block_.reset();
+}
+
+STELLATE_INSTANTIATE_CLASS(CreaseInquiry)
+
+}  // namespace stellate::core

@@ -1,0 +1,256 @@
+#include "core/run/scheduler.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/certificate/findings.h"
+#include "core/run/ending.h"
+#include "core/sampling/seeding.h"
+#include "core/speculation/speculation.h"
+
+namespace stellate::core {
+namespace {
+
+// Differences of closest points are taken over this share of epsilon. The error is proportional to
+// it over the reach, far below the error that directions may have (0.03).
+constexpr double kTangentStep = 0.01;
+
+// With a declared reach: the error that tangents found by differences may have, radians.
+constexpr double kTangentError = 0.03;
+
+// Meshes that end take 1.2 to 5 answers a vertex: all are kept. A mesh that does not end has its
+// oldest answers dropped.
+std::size_t ClearPointsKept(std::size_t vertices) { return 8 * vertices + 16384; }
+
+}  // namespace
+
+template <int K>
+Scheduler<K>::Scheduler(const Specification& spec, const Interruption& interruption)
+    : spec_(spec),
+      interruption_(interruption),
+      engine_(spec_, Resolve(spec_)),
+      tangent_finder_(K, spec_.ambient_dimension, kTangentStep * engine_.criteria().epsilon,
+                      spec_.random_seed, kTangentError * spec_.declared_reach.value_or(INFINITY)),
+      creases_(spec_),
+      progress_meter_(spec_),
+      repeat_check_(spec_.epsilon),
+      wall_check_(K, spec_.ambient_dimension, spec_.epsilon),
+      spare_points_(spec_.ambient_dimension),
+      watches_{{spec_.bounding_box, engine_.criteria().epsilon}, StallWatch(K), {}} {
+  if (spec_.walls > 0)
+    AskForFaces(SeedsOf(spec_));
+  else
+    AskFor(SeedsOf(spec_), Purpose::kSeeds);
+}
+
+template <int K>
+std::vector<QueryBlock> Scheduler<K>::Questions() {
+  while (!outcome_) {
+    std::vector<QueryBlock> blocks;
+    if (!end_) blocks = source().Questions();
+    const bool probes = creases_.is_asking() && (end_ || (trip_ && !blocks.empty()));
+    if (probes) creases_.Ask(&blocks);
+    if (!blocks.empty()) {
+      if (repeat_check_.has_questions()) blocks.push_back(repeat_check_.Questions());
+      return blocks;
+    }
+    if (end_)
+      Finish(*end_);
+    else if (trip_)
+      AfterTrip();
+    else
+      AfterCertificate();
+  }
+  return {};
+}
+
+template <int K>
+void Scheduler<K>::Absorb(const std::vector<AnswerBlock>& answers) {
+  ++rounds_;
+  repeat_check_.Forget();
+  if (!end_) source().Absorb(answers);
+  creases_.Absorb(answers);
+  if (creases_.crease()) Finish(end_.value_or(Termination::kNoProgress));
+}
+
+template <int K>
+void Scheduler<K>::CountQueries(std::uint64_t count) {
+  ++counts_.rounds;
+  (trip_ && trip_->asks_for_tangents() ? counts_.tangent_queries : counts_.queries) += count;
+}
+
+template <int K>
+void Scheduler<K>::Measure(Progress* progress) {
+  progress_meter_.Measure<K>(engine_, certification_ != nullptr,
+                             sampling_.sampler ? sampling_.sampler->CountMissing() : 0, progress);
+}
+
+template <int K>
+void Scheduler<K>::Ask(CandidateSet<K> candidates, Purpose purpose, const Engine<K>& asking) {
+  certification_.reset();
+  trip_ = std::make_unique<RoundTrip<K>>(asking, spec_.oracle, tangent_finder_,
+                                         std::move(candidates), spec_.walls);
+  purpose_ = purpose;
+}
+
+template <int K>
+void Scheduler<K>::AskFor(Eigen::MatrixXd&& points, Purpose purpose) {
+  CandidateSet<K> candidates;
+  candidates.planned.points = std::move(points);
+  Ask(std::move(candidates), purpose);
+}
+
+template <int K>
+void Scheduler<K>::AfterTrip() {
+  const auto* const answered = trip_.get();
+  spare_points_.KeepClearances(trip_->answers(), ClearPointsKept(engine_.stars().size()));
+  TakeTrip();
+  if (outcome_ || trip_.get() != answered || AskForSample()) return;  // it has more queries
+  change_ = engine_.Commit();
+  Plan();
+}
+
+template <int K>
+void Scheduler<K>::TakeTrip() {
+  switch (purpose_) {
+    case Purpose::kSeeds:
+      return InsertSeeds();
+    case Purpose::kFaceSeeds:
+      return KeepFaceSeeds();
+    case Purpose::kWallCheck:
+      return JudgeWalls();
+    case Purpose::kSample:
+      return AddAnswered();
+    case Purpose::kCandidates:
+      return InsertCandidates();
+    case Purpose::kSpares:
+      return InsertSpares();
+    case Purpose::kCrowds:
+      return SettleCrowds();
+  }
+}
+
+template <int K>
+void Scheduler<K>::InsertCandidates() {
+  const Inserted inserted = engine_.Insert(trip_->candidates(), trip_->answers());
+  const auto count = [&](Rule rule) {
+    return static_cast<std::uint64_t>(
+        std::count(inserted.rules.begin(), inserted.rules.end(), rule));
+  };
+  counts_.inserted_size += count(Rule::kSize);
+  counts_.inserted_radius_edge += count(Rule::kRadiusEdge);
+  counts_.inserted_sliver += count(Rule::kShape);
+  counts_.inserted_inconsistent += count(Rule::kInconsistent);
+  counts_.duplicates += inserted.duplicates;
+  if (inserted.front_moved) {
+    watches_.stall.NoteFrontMoved();
+    creases_.NoteFrontMoved();
+  }
+  if (engine_.criteria().flat_alternations == 1 && spec_.walls == 0)
+    watches_.boundary.Look(trip_->candidates(), trip_->answers());
+  noted_.speculation_failed = inserted.rules.empty();
+  spare_points_.Keep(trip_->answers(), inserted.used);
+}
+
+template <int K>
+void Scheduler<K>::InsertSpares() {
+  const AnsweredPoints& answers = trip_->answers();
+  std::vector<std::uint8_t> used(answers.found.size(), 0);
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    if (!answers.found[i]) continue;
+    if (engine_.is_full()) break;
+    if (answers.Beyond(static_cast<Eigen::Index>(i))) continue;
+    engine_.Append(answers, static_cast<Eigen::Index>(i));
+    used[i] = 1;
+  }
+  engine_.MarkAllDirty();
+  spare_points_.Keep(answers, used);
+}
+
+// Decides what to do next and queries for it, or ends the refinement.
+template <int K>
+void Scheduler<K>::Plan() {
+  const std::unique_ptr<Sampler<K>> finished = std::move(sampling_.finished);
+  watches_.box.Look(engine_.stars().sample().points().data(), engine_.stars().size());
+  if (engine_.is_full()) return Finish(Termination::kVertexBudget);
+  if (watches_.box.has_left()) return Finish(Termination::kNoProgress);
+  auto targets = engine_.Plan();
+  if (!targets) return LeaveFaces();
+  if (spec_.walls > 0 && !PlanFaces(&targets)) return;
+  BoundaryState<K>& boundary = engine_.boundary();
+  if (targets->empty() && !boundary.has_discoveries())
+    return engine_.AllRulesHold() ? Certify() : End(Termination::kNoProgress);
+  const ViolationIndex<K>& violations = engine_.violations();
+  const bool is_lost = watches_.stall.ShouldLookForLostCauses() && spec_.walls > 0 &&
+                       HasPieceTooSmall<K>(engine_, spec_.epsilon);
+  if (is_lost ||
+      watches_.stall.IsHopeless(violations.size_and_shape().size(), engine_.stars().size()) ||
+      watches_.stall.HasStalled(violations.size_and_shape().size() + violations.violating(),
+                              !violations.are_all_dirty()))
+    return LeaveFaces();
+  creases_.Watch(engine_);
+  *targets = engine_.Select(*targets);
+  PlannedPoints planned;
+  if (boundary.has_discoveries())
+    planned = engine_.TakeDiscoveries();
+  else if (engine_.criteria().speculative && !noted_.speculation_failed && boundary.stage() == K) {
+    // The few violations of R1 and R2 that are left are not worth testing R3 and R4 on all stars.
+    const bool is_rest = sampling_.is_done && !finished && violations.are_all_dirty();
+    planned = RunSpeculatively<K>(engine_, rounds_, &*targets,
+                                  is_rest ? SpeculativeRules::kSizes : SpeculativeRules::kAllRules,
+                                  finished ? finished->guess() : nullptr);
+  }
+  CandidateSet<K> candidates = engine_.Draw(std::move(*targets), rounds_);
+  candidates.planned = std::move(planned);
+  Ask(std::move(candidates), Purpose::kCandidates);
+}
+
+template <int K>
+void Scheduler<K>::Certify() {
+  if (AskForSpares(spare_points_.Uncovered(engine_.stars()))) return;
+  const Stars<K>& stars = engine_.stars();
+  if (stars.size() == 0 && !noted_.inside.empty())  // the discoveries led nowhere
+    return Fail({StatusCode::kNoSeeds, noted_.inside});
+  if (!engine_.filled().resolved().empty())
+    engine_.filled().HandOut(stars, &change_.added, &change_.removed);
+  StarFacts facts = FactsOf<K>(engine_);
+  facts.covers_box = noted_.covers_box;
+  if (!spec_.oracle.tangent_basis) facts.tangent_error_length = tangent_finder_.error_length();
+  MeshView mesh;
+  mesh.k = K;
+  mesh.d = stars.sample().d();
+  mesh.vertices = stars.size();
+  mesh.points = stars.sample().points().data();
+  mesh.tangents = stars.sample().Tangent(0);
+  trip_.reset();
+  creases_.Stop();
+  KnownOfManifold known = spare_points_.Take();
+  known.tangential_offsets = watches_.boundary.offsets();
+  certification_ = std::make_unique<Certification>(
+      spec_, mesh, engine_.Simplices(), facts, std::move(known),
+      spec_.walls > 0 ? std::optional(BoundaryOf<K>(engine_)) : std::nullopt);
+}
+
+template <int K>
+void Scheduler<K>::AfterCertificate() {
+  if (engine_.filled().is_handed_out() ||
+      certification_->certificate().epsilon_over_reach > kCoarse ||
+      !(AskForSparesOnWalls(certification_->UncoveredOnWalls()) ||
+        AskForSpares(certification_->Uncovered())))
+    End(Termination::kConverged);
+}
+
+// Returns false if there are none, or if it did not help before.
+template <int K>
+bool Scheduler<K>::AskForSpares(const std::vector<double>& points) {
+  Eigen::MatrixXd chosen =
+      spare_points_.Choose(points, engine_.stars(), engine_.criteria().epsilon);
+  if (chosen.cols() == 0) return false;
+  if (certification_) spare_points_.GiveBack(certification_->TakeKnown());
+  AskFor(std::move(chosen), Purpose::kSpares);
+  return true;
+}
+
+STELLATE_INSTANTIATE_CLASS(Scheduler)
+
+}  // namespace stellate::core

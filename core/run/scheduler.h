@@ -1,0 +1,149 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/instantiate.h"
+#include "core/base/interruption.h"
+#include "core/refinement/engine.h"
+#include "core/run/boundary_detector.h"
+#include "core/run/certification.h"
+#include "core/run/crease_inquiry.h"
+#include "core/run/ending.h"
+#include "core/run/progress_meter.h"
+#include "core/run/query_source.h"
+#include "core/run/repeat_check.h"
+#include "core/run/round_trip.h"
+#include "core/run/spare_points.h"
+#include "core/run/tangent_finder.h"
+#include "core/run/wall_check.h"
+#include "core/run/watches.h"
+#include "core/sampling/sampler.h"
+
+namespace stellate::core {
+
+// How a run ended.
+struct Outcome {
+  Termination termination = Termination::kConverged;
+  Status failure;  // of the oracle
+  Certificate certificate;
+};
+
+// Decides what a run asks next, around its engine: the seeds, each round's candidates and, once no
+// rule is broken, the certificate. Points of M that the mesh misses start refinement again.
+//
+//   Scheduler<K> scheduler(spec, interruption);
+//   while (!(questions = scheduler.Questions()).empty()) scheduler.Absorb(their answers);
+//   scheduler.outcome();
+template <int K>
+class Scheduler final : public QuerySource {
+ public:
+  // Both are borrowed.
+  Scheduler(const Specification& spec, const Interruption& interruption);
+
+  // Whether `answers`, to the open queries, agree with those to the same queries in an earlier
+  // round. If not, they must not be absorbed.
+  Status Judge(const Answers& answers) const { return repeat_check_.Judge(answers); }
+
+  std::vector<QueryBlock> Questions() override;
+  void Absorb(const std::vector<AnswerBlock>& answers) override;
+  bool asks_for_tangents() const override { return trip_ && trip_->asks_for_tangents(); }
+
+  // End the run now.
+  void Finish(Termination termination, Status failure = Status::Ok());
+  void Fail(Status reason);
+  // Takes back an end that an interruption left half done.
+  void Reopen() { outcome_.reset(); }
+  // Nothing until the run is over.
+  const std::optional<Outcome>& outcome() const { return outcome_; }
+
+  const Engine<K>& engine() const { return engine_; }
+  // Returns the simplices that were added and removed since the last call.
+  typename Engine<K>::Change TakeChange() { return std::exchange(change_, {}); }
+  // Counts a round, or a part of one, of so many queries.
+  void CountQueries(std::uint64_t count);
+  const Counts& counts() const { return counts_; }  // without those of the mesh itself
+  // As ProgressMeter::Measure.
+  void Measure(Progress* progress);
+
+ private:
+  // What a round trip's answers are for.
+  enum class Purpose { kSeeds, kFaceSeeds, kWallCheck, kSample, kCandidates, kSpares, kCrowds };
+
+  QuerySource& source() { return trip_ ? static_cast<QuerySource&>(*trip_) : *certification_; }
+  void Ask(CandidateSet<K> candidates, Purpose purpose) {
+    Ask(std::move(candidates), purpose, engine_);
+  }
+  void Ask(CandidateSet<K> candidates, Purpose purpose, const Engine<K>& asking);
+  void AskFor(Eigen::MatrixXd&& points, Purpose purpose);
+
+  // What follows when a query source is done.
+  void AfterTrip();
+  void TakeTrip();
+  void InsertSeeds();
+  void AskForFaces(const Eigen::MatrixXd& seeds);
+  void KeepFaceSeeds();
+  void JudgeWalls();
+  bool PlanFaces(std::optional<std::vector<Target<K>>>* targets);
+  bool AskForInterior();
+  void SettleCrowds();
+  void LeaveFaces();
+  void CommitSample();
+  void AddAnswered();
+  bool AskForSample();
+  void InsertCandidates();
+  void InsertSpares();
+  void Plan();
+  void Certify();
+  void AfterCertificate();
+  bool AskForSpares(const std::vector<double>& points);
+  bool AskForSparesOnWalls(const PointsOnWalls& points);
+  void End(Termination termination);
+  void DescribeEnding();
+
+  const Specification& spec_;
+  const Interruption& interruption_;
+  Engine<K> engine_;
+  TangentFinder tangent_finder_;
+
+  // One of these is the query source.
+  std::unique_ptr<RoundTrip<K>> trip_;
+  std::unique_ptr<Certification> certification_;
+  Purpose purpose_ = Purpose::kSeeds;  // of the trip
+  // The initial sample.
+  struct {
+    std::unique_ptr<Sampler<K>> sampler;   // while it is made
+    std::unique_ptr<Sampler<K>> finished;  // until refinement is planned on its surrogate
+    bool is_done = false;
+  } sampling_;
+  // Queries in addition to the source, or alone before the run ends.
+  CreaseInquiry<K> creases_;
+  std::optional<Termination> end_;  // how the run ends once that is done
+  std::optional<Outcome> outcome_;
+
+  std::uint64_t rounds_ = 0;  // answered
+  Counts counts_;
+  typename Engine<K>::Change change_;  // since TakeChange
+  ProgressMeter progress_meter_;
+  RepeatCheck repeat_check_;
+  WallCheck wall_check_;
+  SparePoints spare_points_;
+  struct {
+    BoxWatch box;
+    StallWatch stall;
+    BoundaryDetector boundary;
+  } watches_;
+  struct {
+    bool speculation_failed = false;   // the last round of candidates inserted nothing
+    bool covers_box = false;           // each seed of a covered box has its closest point
+    std::optional<PieceOfWall> piece;  // that the mesh lacked at some time
+    std::string inside;                // why no seed's point is in M with boundary, if so
+  } noted_;
+};
+
+STELLATE_DECLARE_CLASS(Scheduler)
+
+}  // namespace stellate::core

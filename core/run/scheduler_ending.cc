@@ -1,0 +1,104 @@
+// How a run ends, and what it reports of that.
+
+#include <utility>
+
+#include "core/base/message.h"
+#include "core/certificate/findings.h"
+#include "core/run/ending.h"
+#include "core/run/scheduler.h"
+
+namespace stellate::core {
+
+// Ends the run, once it is known whether a crease keeps it from a better end.
+template <int K>
+void Scheduler<K>::End(Termination termination) {
+  const bool may_be_creased = K < spec_.ambient_dimension && !watches_.box.has_left();
+  if (may_be_creased && !creases_.is_asking()) {
+    if (termination == Termination::kNoProgress)
+      creases_.ProbeFaults(engine_);
+    else if (certification_ && certification_->certificate().epsilon_over_reach > kCoarse)
+      creases_.ProbeAll(engine_.stars());
+  }
+  if (!may_be_creased || !creases_.is_asking()) return Finish(termination);
+  end_ = termination;
+}
+
+template <int K>
+void Scheduler<K>::Fail(Status reason) {
+  Finish(Termination::kOracleFailed, std::move(reason));
+}
+
+template <int K>
+void Scheduler<K>::Finish(Termination termination, Status failure) {
+  if (outcome_) return;
+  outcome_ = Outcome{termination, std::move(failure), {}};
+  // The initial sample has no stars yet.
+  if (sampling_.sampler && termination == Termination::kRoundBudget) CommitSample();
+  // The round was absorbed, so that its delta reports the simplices added here.
+  if (termination != Termination::kCancelled && termination != Termination::kOracleFailed)
+    engine_.CompleteStars(&change_.added, &change_.removed);
+  sampling_.sampler.reset();
+  sampling_.finished.reset();
+  DescribeEnding();
+  certification_.reset();
+}
+
+template <int K>
+void Scheduler<K>::DescribeEnding() {
+  const Termination termination = outcome_->termination;
+  Certificate& certificate = outcome_->certificate;
+  if (termination == Termination::kConverged) {
+    certificate = certification_->certificate();
+    WarnOfCompromises<K>(engine_, spec_.epsilon, &certificate);
+    // It may be the cause of all other problems.
+    if (creases_.crease()) {
+      certificate.verdict = Message("Not certified: ", DescribeCrease(*creases_.crease()));
+      certificate.only_too_coarse = false;
+    }
+  } else {
+    certificate.verdict = Message("not certified: the run ended as ", TerminationName(termination),
+                                  certification_ ? " when every rule held, before it was certified"
+                                                 : " before every rule held");
+    if (!outcome_->failure.message.empty()) certificate.verdict += ": " + outcome_->failure.message;
+    if (termination == Termination::kVertexBudget)
+      certificate.verdict += ": allow more vertices (max_vertices), or take a larger epsilon";
+    if (termination == Termination::kRoundBudget)
+      certificate.verdict += ": allow more rounds (max_rounds)";
+    // A client that cancels a large mesh does not want to wait for its description.
+    if (termination != Termination::kCancelled && termination != Termination::kOracleFailed)
+      DescribeUnfinished<K>(engine_, spec_.epsilon, !creases_.crease(), &certificate);
+    if (termination == Termination::kNoProgress)
+      certificate.verdict +=
+          "; " + (watches_.box.has_left() ? watches_.box.WhyStopped()
+                  : creases_.crease()
+                      ? DescribeCrease(*creases_.crease())
+                      : WhatIsLeft<K>(engine_, certificate.inconsistent_simplices) +
+                            watches_.boundary.Describe(engine_.stars().sample().d()));
+    // A front that never closes may be where the manifold ends.
+    const bool spent =
+        termination == Termination::kVertexBudget || termination == Termination::kRoundBudget;
+    if (spec_.walls == 0 && !watches_.box.has_left() && !creases_.crease() &&
+        (termination == Termination::kNoProgress ||
+         (spent && !watches_.boundary.offsets().empty())))
+      certificate.verdict += Message(". ", kDeclareWalls);
+  }
+  if (interruption_.raised()) return;  // the mesh was never reported
+  watches_.box.Warn(&certificate);
+  if (spec_.walls == 0) return;
+  if (termination == Termination::kNoProgress)
+    ExplainInactiveWall<K>(engine_, spec_.walls, &certificate);
+  ExplainNearCorners<K>(engine_, spec_.epsilon, &certificate);
+  if (termination == Termination::kConverged || termination == Termination::kNoProgress)
+    ExplainWallCurvature<K>(engine_, spec_.epsilon, noted_.piece, &certificate);
+  ExplainSharpest<K>(engine_, &certificate);
+}
+
+#define STELLATE_EACH(K)                                   \
+  template void Scheduler<K>::End(Termination);            \
+  template void Scheduler<K>::Fail(Status);                \
+  template void Scheduler<K>::Finish(Termination, Status); \
+  template void Scheduler<K>::DescribeEnding();
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core
