@@ -186,7 +186,7 @@ void Scheduler<K>::Plan() {
   if (is_lost ||
       watches_.stall.IsHopeless(violations.size_and_shape().size(), engine_.stars().size()) ||
       watches_.stall.HasStalled(violations.size_and_shape().size() + violations.violating(),
-                              !violations.are_all_dirty()))
+                                !violations.are_all_dirty()))
     return LeaveFaces();
   creases_.Watch(engine_);
   *targets = engine_.Select(*targets);

@@ -11,7 +11,7 @@
 #include "core/refinement/engine.h"
 #include "core/run/boundary_detector.h"
 #include "core/run/certification.h"
-#include "core/run/crease_inquiry.h"
+#include "core/run/crease_search.h"
 #include "core/run/ending.h"
 #include "core/run/progress_meter.h"
 #include "core/run/query_source.h"
@@ -120,7 +120,7 @@ class Scheduler final : public QuerySource {
     bool is_done = false;
   } sampling_;
   // Queries in addition to the source, or alone before the run ends.
-  CreaseInquiry<K> creases_;
+  CreaseSearch<K> creases_;
   std::optional<Termination> end_;  // how the run ends once that is done
   std::optional<Outcome> outcome_;
 

@@ -14,14 +14,14 @@ namespace stellate::core {
 // Finds out that M is not smooth: by queries that go with those of a round, and before a run gives
 // up.
 //
-//   inquiry.Watch(engine);                                  // once a round
-//   if (inquiry.is_asking()) inquiry.Ask(&blocks);          // with the round's queries
-//   inquiry.Absorb(answers);
-//   if (inquiry.crease()) ...
+//   search.Watch(engine);                         // once a round
+//   if (search.is_asking()) search.Ask(&blocks);  // with the round's queries
+//   search.Absorb(answers);
+//   if (search.crease()) ...
 template <int K>
-class CreaseInquiry {
+class CreaseSearch {
  public:
-  explicit CreaseInquiry(const Specification& spec);
+  explicit CreaseSearch(const Specification& spec);
 
   // Call it when a star on the advancing front was fixed since the last round.
   void NoteFrontMoved() { watch_.NoteFrontMoved(); }
@@ -30,7 +30,7 @@ class CreaseInquiry {
   // Probe now: steep edges where rules fail, or of the whole mesh.
   void ProbeFaults(const Engine<K>& engine);
   void ProbeAll(const Stars<K>& stars);
-  // Every rule holds.
+  // Call it once every rule holds. Forgets edges that were not probed to their end.
   void Stop();
 
   bool is_asking() const { return probe_.is_asking(); }
@@ -50,6 +50,6 @@ class CreaseInquiry {
   std::optional<std::size_t> block_;  // the probe's, among the open ones
 };
 
-STELLATE_DECLARE_CLASS(CreaseInquiry)
+STELLATE_DECLARE_CLASS(CreaseSearch)
 
 }  // namespace stellate::core

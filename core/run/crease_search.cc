@@ -1,4 +1,4 @@
-#include "core/run/crease_inquiry.h"
+#include "core/run/crease_search.h"
 
 #include <utility>
 
@@ -15,14 +15,14 @@ constexpr double kTellingWay = 0.5, kTellingSine2 = 0.25;
 }  // namespace
 
 template <int K>
-CreaseInquiry<K>::CreaseInquiry(const Specification& spec)
+CreaseSearch<K>::CreaseSearch(const Specification& spec)
     : epsilon_(spec.epsilon),
       is_domain_(K == spec.ambient_dimension),
       probe_(K, spec.ambient_dimension, spec.epsilon, spec.oracle.tangent_basis, spec.walls > 0,
              spec.random_seed) {}
 
 template <int K>
-void CreaseInquiry<K>::Watch(const Engine<K>& engine) {
+void CreaseSearch<K>::Watch(const Engine<K>& engine) {
   const ViolationIndex<K>& violations = engine.violations();
   const bool due = watch_.IsDue(violations.size_and_shape().size() + violations.violating(),
                                 !violations.are_all_dirty());
@@ -34,34 +34,34 @@ void CreaseInquiry<K>::Watch(const Engine<K>& engine) {
 }
 
 template <int K>
-void CreaseInquiry<K>::ProbeFaults(const Engine<K>& engine) {
+void CreaseSearch<K>::ProbeFaults(const Engine<K>& engine) {
   probe_.Start(SteepWaysAtFaults<K>(engine, kLongestWay * epsilon_));
 }
 
 template <int K>
-void CreaseInquiry<K>::ProbeAll(const Stars<K>& stars) {
+void CreaseSearch<K>::ProbeAll(const Stars<K>& stars) {
   probe_.Start(SteepWays<K>(stars, kLongestWay * epsilon_));
 }
 
 template <int K>
-void CreaseInquiry<K>::Stop() {
+void CreaseSearch<K>::Stop() {
   probe_.Stop();
-  walked_.clear();  // some were not probed to their end
+  walked_.clear();
 }
 
 template <int K>
-void CreaseInquiry<K>::Ask(std::vector<QueryBlock>* blocks) {
+void CreaseSearch<K>::Ask(std::vector<QueryBlock>* blocks) {
   block_ = blocks->size();
   blocks->push_back(std::move(probe_.Questions().front()));
 }
 
 template <int K>
-void CreaseInquiry<K>::Absorb(const std::vector<AnswerBlock>& answers) {
+void CreaseSearch<K>::Absorb(const std::vector<AnswerBlock>& answers) {
   if (!block_) return;
   probe_.Absorb({answers[*block_]});
   block_.reset();
 }
 
-STELLATE_INSTANTIATE_CLASS(CreaseInquiry)
+STELLATE_INSTANTIATE_CLASS(CreaseSearch)
 
 }  // namespace stellate::core
