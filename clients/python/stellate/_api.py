@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import sys
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Union, overload
 
@@ -21,6 +22,7 @@ from .errors import InvalidArgument, NotCertified, SaveError, protocol_error
 from .options import MeshOptions, takes
 from .oracle import CheckedOracle
 from .oracles._kept import Keep
+from .progress import Patience, somebody_looks_on
 from .server import Server
 
 if TYPE_CHECKING:
@@ -54,7 +56,8 @@ def mesh(
       server: "host:port", "unix:/path", a stellate.Server or Client; None starts a stellated on a
         private unix socket and stops it afterwards.
       on_progress: called in this thread with a stellate.Progress now and then. If it raises, the
-        mesh is cancelled.
+        mesh is cancelled. With none, one line on a terminal or in a notebook says after 10 s that
+        work goes on; `lambda progress: None` keeps that quiet, too.
       credentials: a stellate.Credentials for `server`, where it wants TLS or a token.
       require_certified: a mesh that is not certified is an error, NotCertified.
       checkpoint: a directory, made if it is not there, in which the mesh outlives this program: the
@@ -89,6 +92,8 @@ def mesh(
         check_save(file, checked.dimension, checked.ambient_dimension)
     with contextlib.ExitStack() as stack:
         interrupts = stack.enter_context(Interrupts())
+        if on_progress is None and somebody_looks_on(sys.stderr):
+            on_progress = stack.enter_context(Patience(sys.stderr))
         kept = None
         if checkpoint is not None:
             if server is not None:

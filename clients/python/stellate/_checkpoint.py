@@ -105,11 +105,13 @@ class Checkpoint:
         """The mesh's name on the private server; "" if none was made yet."""
         return self._record.get("name", "")
 
-    def choose_epsilon(self, oracle: Any, epsilon: Epsilon) -> tuple[float, str]:
+    def choose_epsilon(
+        self, oracle: Any, epsilon: Epsilon, tell: Callable[[str], None]
+    ) -> tuple[float, str]:
         """As _epsilon.choose, which is asked for "auto" only once."""
         if epsilon == AUTO and self._record.get("epsilon_reason"):
             return self._record["spec"]["epsilon"], self._record["epsilon_reason"]
-        return choose(oracle, epsilon)
+        return choose(oracle, epsilon, tell)
 
     @property
     def retries(self) -> int | None:

@@ -38,6 +38,7 @@ from .errors import Interrupted, StellateError, exit_status
 from .executors import workers_on
 from .options import MeshOptions
 from .progress import progress_bar
+from .report import Progress
 
 _STATUS = _shared.table("errors.toml")
 _WELL, _NOT_CERTIFIED = _STATUS["exit_well"], _STATUS["exit_not_certified"]
@@ -120,7 +121,11 @@ def _connected(options: argparse.Namespace) -> Client:
 
 
 def _bar(options: argparse.Namespace) -> Any:
-    return None if options.quiet else progress_bar()
+    return _say_nothing if options.quiet else progress_bar()
+
+
+def _say_nothing(progress: Progress) -> None:
+    """An `on_progress`: with none at all, a mesh that takes long says so."""
 
 
 def _deliver(finished: Complex, options: argparse.Namespace) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
-from typing import Any, Literal, Union
+from typing import Any, Callable, Literal, Union
 
 import numpy as np
 
@@ -18,8 +18,12 @@ Epsilon = Union[float, Auto]  # a length, or to be chosen
 AUTO: Auto = "auto"
 
 
-def choose(oracle: Any, epsilon: Epsilon) -> tuple[float, str]:
+def choose(
+    oracle: Any, epsilon: Epsilon, tell: Callable[[str], None] = lambda text: None
+) -> tuple[float, str]:
     """epsilon as it is and "", or for "auto" a quarter of the reach that check() finds, and why.
+
+    `tell` is told before the oracle is asked, which may take a slow one long.
 
     Raises: OracleError with what check() found where the oracle breaks its contract.
     """
@@ -30,6 +34,7 @@ def choose(oracle: Any, epsilon: Epsilon) -> tuple[float, str]:
             f"epsilon has to be a length in the coordinates' unit, or 'auto', and is {epsilon!r}",
             details={"fields": {"epsilon": "no length"}},
         )
+    tell("epsilon='auto': the oracle is asked for its reach first")
     report = check(oracle)
     if not report.ok:
         errors = [finding for finding in report.findings if finding.severity == "error"]

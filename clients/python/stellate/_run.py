@@ -143,11 +143,12 @@ class Run:
             oracle = part_of(oracle, keep, options.get("seeds"))
         checked = CheckedOracle(oracle)
         mesh_spec(checked, 1.0, options)  # what is misspelt shows before the oracle is probed
+        choice: Callable[[Any, Epsilon, Callable[[str], None]], tuple[float, str]]
         choice = checkpoint.choose_epsilon if checkpoint is not None else choose
         self._on_progress, self._checkpoint = on_progress, checkpoint
         self._epsilon_reason = ""
         self._where_it_ends: Callable[[], str] | None = getattr(oracle, "where_it_ends", None)
-        chosen = self._say(choice(oracle, epsilon))
+        chosen = self._say(choice(oracle, epsilon, lambda text: _note(on_progress, text)))
         kept = checkpoint.retries if checkpoint is not None else None
         most = table("doctor.toml")["auto_retries"] if kept is None else kept
         self._retries = most if self._epsilon_reason else 0

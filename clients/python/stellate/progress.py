@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import shutil
 import sys
+import threading
 import time
 from typing import TextIO
 
@@ -13,6 +15,7 @@ __all__ = ["ProgressBar", "progress_bar"]
 
 _REDRAW_SECONDS = 0.05
 _PLAIN_SECONDS = 5.0
+_PATIENCE_SECONDS = 10.0  # that a person looks at nothing before wondering
 _PHASES = {
     "SEEDING": "seeding",
     "REFINING": "refining",
@@ -88,3 +91,49 @@ def progress_bar(title: str = "", file: TextIO | None = None) -> ProgressBar:
         every few seconds.
     """
     return ProgressBar(title, file)
+
+
+class Patience:
+    """An `on_progress` for who gave none: it says one line, once, when the work takes long.
+
+    The time counts from entering it, a context manager, and what is left sooner says nothing.
+    """
+
+    def __init__(self, file: TextIO, seconds: float = _PATIENCE_SECONDS) -> None:
+        self._file, self._seconds = file, seconds
+        self._so_far = "no vertices yet"
+        self._timer = threading.Timer(seconds, self._speak)
+        self._timer.daemon = True
+
+    def __enter__(self) -> Patience:
+        self._timer.start()
+        return self
+
+    def __exit__(self, *unused: object) -> None:
+        self._timer.cancel()
+
+    def __call__(self, progress: Progress) -> None:
+        self._so_far = f"{progress.vertices:,} vertices by {progress.queries:,} queries so far"
+
+    def note(self, text: str) -> None:
+        """As a ProgressBar's."""
+        self._so_far = text
+
+    def _speak(self) -> None:
+        self._file.write(
+            f"stellate: at work for {self._seconds:.0f} s, {self._so_far}; "
+            "on_progress=stellate.progress_bar() shows how it goes, Ctrl-C ends it\n"
+        )
+        self._file.flush()
+
+
+def somebody_looks_on(file: TextIO | None) -> bool:
+    """Whether a person sees at once what the program writes there: on a terminal, or in a notebook.
+
+    Threads and processes beside the main ones leave it to that to speak.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return False
+    if file is None or multiprocessing.parent_process() is not None:
+        return False
+    return file.isatty() or type(file).__module__.startswith("ipykernel.")

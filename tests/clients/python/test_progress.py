@@ -3,6 +3,7 @@
 import dataclasses
 import io
 import json
+import threading
 
 import numpy as np
 import pytest
@@ -59,6 +60,48 @@ def test_plain_lines_elsewhere_one_a_phase():
     lines = out.getvalue().splitlines()
     assert len(lines) == 2 and "refining, round 7" in lines[0] and "certifying" in lines[1]
     assert "\r" not in out.getvalue() and "\x1b" not in out.getvalue()
+
+
+class Heard(Terminal):
+    """A terminal that tells when something was written there."""
+
+    def __init__(self):
+        super().__init__()
+        self.spoke = threading.Event()
+
+    def flush(self):
+        self.spoke.set()
+
+
+def test_who_gave_no_progress_is_told_once_that_work_goes_on():
+    screen = Heard()
+    patience = stellate.progress.Patience(screen, 0.0)
+    patience(progress())
+    with patience:
+        assert screen.spoke.wait(60)
+    assert screen.getvalue().count("\n") == 1
+    assert "3,456 vertices by 4,000 queries so far" in screen.getvalue()
+    assert "on_progress=stellate.progress_bar()" in screen.getvalue()
+
+
+def test_what_is_over_soon_says_nothing():
+    screen = Heard()
+    with stellate.progress.Patience(screen, 3600.0) as patience:
+        patience(progress())
+    patience._timer.join(60)
+    assert not patience._timer.is_alive() and screen.getvalue() == ""
+
+
+def test_a_line_that_nobody_asked_for_is_for_people_alone():
+    looks_on = stellate.progress.somebody_looks_on
+    notebook = type("OutStream", (io.StringIO,), {"__module__": "ipykernel.iostream"})()
+    assert looks_on(Terminal()) and looks_on(notebook)
+    assert not looks_on(io.StringIO()) and not looks_on(None)
+    elsewhere = []
+    thread = threading.Thread(target=lambda: elsewhere.append(looks_on(Terminal())))
+    thread.start()
+    thread.join()
+    assert elsewhere == [False]
 
 
 def report(certified):

@@ -28,7 +28,9 @@ def test_auto_goes_by_the_reach_whatever_the_unit(oracle, expected, server):
     assert report.to_dict()["epsilon_reason"] == report.epsilon_reason
     said = f"{report.epsilon:g}, {report.epsilon_reason}"
     assert f"epsilon  {said}" in str(report)
-    assert seen.getvalue().splitlines()[0] == f"m: epsilon {said}"
+    first, second = seen.getvalue().splitlines()[:2]
+    assert first == "m: epsilon='auto': the oracle is asked for its reach first"
+    assert second == f"m: epsilon {said}"
     given = stellate.mesh(oracle, report.epsilon, server)
     assert np.array_equal(given.points, mesh.points) and given.report.epsilon_reason == ""
 
@@ -63,11 +65,36 @@ def test_what_is_misspelt_is_said_before_the_oracle_is_asked(server):
         stellate.mesh(Untouchable(), "auto", server, max_vertex=10)
 
 
-def test_a_note_breaks_a_live_line():
-    class Terminal(io.StringIO):
-        def isatty(self):
-            return True
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
 
+
+@pytest.mark.parametrize("epsilon", ["auto", 0.3])
+def test_a_mesh_that_takes_long_says_so_on_a_terminal(epsilon, server, monkeypatch):
+    screen, waiting = Terminal(), []
+
+    def patience(file):
+        waiting.append(stellate.progress.Patience(file, 3600.0))
+        return waiting[-1]
+
+    class Slow(manifolds.Torus):
+        def closest_point(self, x):
+            if not screen.getvalue():
+                waiting[0]._timer.function()  # its time has passed
+            return super().closest_point(x)
+
+    monkeypatch.setattr("stellate._api.Patience", patience)
+    monkeypatch.setattr("sys.stderr", screen)
+    assert stellate.mesh(Slow(), epsilon, server).certified
+    (line,) = screen.getvalue().splitlines()
+    asked = "epsilon='auto': the oracle is asked for its reach first"
+    assert line.startswith("stellate: at work for ") and (asked in line) == (epsilon == "auto")
+    stellate.mesh(manifolds.Torus(), 0.3, server, on_progress=lambda progress: None)
+    assert len(waiting) == 1
+
+
+def test_a_note_breaks_a_live_line():
     screen = Terminal()
     bar = stellate.progress.ProgressBar("t", screen)
     bar._open = True
