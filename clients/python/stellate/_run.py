@@ -143,8 +143,9 @@ class Run:
             oracle = part_of(oracle, keep, options.get("seeds"))
         checked = CheckedOracle(oracle)
         mesh_spec(checked, 1.0, options)  # what is misspelt shows before the oracle is probed
-        choice: Callable[[Any, Epsilon, Callable[[str], None]], tuple[float, str]]
-        choice = checkpoint.choose_epsilon if checkpoint is not None else choose
+        choice: Callable[[Any, Epsilon, Callable[[str], None]], tuple[float, str]] = choose
+        if checkpoint is not None:
+            choice = checkpoint.choose_epsilon
         self._on_progress, self._checkpoint = on_progress, checkpoint
         self._epsilon_reason = ""
         self._where_it_ends: Callable[[], str] | None = getattr(oracle, "where_it_ends", None)
