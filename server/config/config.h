@@ -57,6 +57,7 @@ struct Config {
   double keep_finished_seconds = 3600;
   double hello_seconds = 10;    // for a worker's first message
   double request_seconds = 60;  // for a request to be complete
+  double unread_seconds = 600;  // for a watcher to read a message
 
   double drain_seconds = 10;  // for running meshes to end, after SIGTERM
   double keepalive_seconds = 2;

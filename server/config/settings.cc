@@ -165,6 +165,10 @@ const std::vector<Setting>& Settings() {
        "Time for a request to be whole; a TCP connection that began one and finished none is "
        "closed",
        kMoment, kYear},
+      {kTimes, "--unread-seconds", &Config::unread_seconds,
+       "How long a watcher may leave a message unread; then its stream ends as CANCELLED, and it "
+       "may come back with the last revision that it has",
+       kMoment, kYear},
       {kTimes, "--drain-seconds", &Config::drain_seconds,
        "Time for meshes that are served to end after SIGTERM; a second signal ends it", 0, kYear},
       {kTimes, "--keepalive", &Config::keepalive_seconds, "Time between pings to a silent client",

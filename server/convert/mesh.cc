@@ -222,18 +222,6 @@ void ToProto(const std::vector<PastProgress>& past, v1::Mesh* out) {
   }
 }
 
-namespace {
-
-// As the last sentence of a verdict, where there is one.
-void AddWordsOfOracle(const std::string& about, std::string* verdict) {
-  if (about.empty() || verdict->empty()) return;
-  if (!verdict->ends_with('.')) *verdict += '.';
-  *verdict += core::Message(" The oracle says of itself: ", about);
-  if (!about.ends_with('.')) *verdict += '.';
-}
-
-}  // namespace
-
 void ToProto(const Session& session, v1::Mesh* out) {
   const MeshRequest& request = session.request();
   const SessionView view = session.View();
@@ -254,7 +242,8 @@ void ToProto(const Session& session, v1::Mesh* out) {
   if (view.report) {
     v1::Report* const report = out->mutable_report();
     ToProto(*view.report, request.spec.dimension, report);
-    AddWordsOfOracle(request.about, report->mutable_certificate()->mutable_verdict());
+    report->mutable_certificate()->set_verdict(
+        VerdictOf(request, view.report->certificate.verdict));
     report->set_elapsed_seconds(view.elapsed_seconds);
     if (view.state == SessionState::kFailed) {
       report->set_termination(v1::TERMINATION_ORACLE_FAILED);

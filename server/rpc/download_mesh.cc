@@ -86,7 +86,7 @@ class DownloadStream final
 
 }  // namespace
 
-grpc::ServerBidiReactor<v1::DownloadMeshRequest, v1::DownloadMeshResponse>* DownloadMesh(
+grpc::ServerBidiReactor<Incoming<v1::DownloadMeshRequest>, v1::DownloadMeshResponse>* DownloadMesh(
     ServerState& state, grpc::CallbackServerContext* context) {
   const auto stream = std::make_shared<DownloadStream>(state, context);
   stream->Start();

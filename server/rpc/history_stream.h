@@ -8,7 +8,7 @@
 
 namespace stellate::server {
 
-// How long a client may leave a message unread, unless MayLeaveUnread. It can resume later.
+// How long a client may leave a part of a download unread, or the end of any stream.
 inline constexpr auto kUnreadPatience = std::chrono::seconds(30);
 
 // RESOURCE_EXHAUSTED: AddWatcher refused.
@@ -31,7 +31,7 @@ class HistoryStream : public ServerStream<Request, Response>, public SessionWatc
   using Base::Base;
 
   void OnReadDone(bool ok) final {
-    grpc::Status status = ok ? Open() : NoRequest();
+    grpc::Status status = ok && Base::request() != nullptr ? Open(*Base::request()) : NoRequest();
     const auto lock = Base::Lock();
     if (!status.ok()) End(std::move(status));
     Base::Pump();
@@ -65,8 +65,8 @@ class HistoryStream : public ServerStream<Request, Response>, public SessionWatc
   virtual std::uint64_t PartBytes() const { return server::PartBytes(state().config); }
   // (locked) The mesh has changed, or a second has passed.
   virtual void OnNews() {}
-  // (locked) Whether the client may leave a message unread for longer than kUnreadPatience.
-  virtual bool MayLeaveUnread() const { return false; }
+  // (locked) How long the client may leave a message unread. It can resume later.
+  virtual Clock::duration Patience() const { return kUnreadPatience; }
 
   // (locked) Returns the mesh's history, which it has read from the disk if necessary. Null: not
   // read yet, or this has called End.
@@ -90,7 +90,7 @@ class HistoryStream : public ServerStream<Request, Response>, public SessionWatc
   bool IsStuck(TimePoint now) const final {
     const bool finished = Base::phase() == Phase::kFinished;
     if (Base::session() == nullptr || (!finished && Base::phase() != Phase::kWriting)) return false;
-    return now - Base::last_write() > kUnreadPatience && (finished || !MayLeaveUnread());
+    return now - Base::last_write() > (finished ? kUnreadPatience : Patience());
   }
 
   void OnTick(TimePoint /*now*/) final {
@@ -100,10 +100,10 @@ class HistoryStream : public ServerStream<Request, Response>, public SessionWatc
 
   void OnFinish() final { CloseHistory(); }
 
-  grpc::Status Open() {
-    auto session = FindMesh(state(), Base::caller(), Base::request().name());
+  grpc::Status Open(const Request& request) {
+    auto session = FindMesh(state(), Base::caller(), request.name());
     if (!session) return session.error();
-    if (auto status = Choose(Base::request(), **session); !status.ok()) return status;
+    if (auto status = Choose(request, **session); !status.ok()) return status;
     if (auto status = Base::Attach(*session, PartBytes()); !status.ok()) return status;
     const auto self = std::static_pointer_cast<HistoryStream>(this->shared_from_this());
     if (!(*session)->history().AddWatcher(self)) return TooManyWatchers(state(), **session);

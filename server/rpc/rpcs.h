@@ -3,6 +3,7 @@
 #include <grpcpp/support/server_callback.h>
 
 #include "server/rpc/call.h"
+#include "server/rpc/incoming.h"
 #include "stellate/v1/stellate.pb.h"
 
 namespace stellate::server {
@@ -17,11 +18,11 @@ grpc::Status DeleteMesh(const Call& call, const v1::DeleteMeshRequest& request,
                         google::protobuf::Empty* empty);
 grpc::Status GetServerInfo(const Call& call, const v1::GetServerInfoRequest& request,
                            v1::ServerInfo* info);
-grpc::ServerBidiReactor<v1::ServeOracleRequest, v1::ServeOracleResponse>* ServeOracle(
+grpc::ServerBidiReactor<Incoming<v1::ServeOracleRequest>, v1::ServeOracleResponse>* ServeOracle(
     ServerState& state, grpc::CallbackServerContext* context);
-grpc::ServerBidiReactor<v1::WatchMeshRequest, v1::WatchMeshResponse>* WatchMesh(
+grpc::ServerBidiReactor<Incoming<v1::WatchMeshRequest>, v1::WatchMeshResponse>* WatchMesh(
     ServerState& state, grpc::CallbackServerContext* context);
-grpc::ServerBidiReactor<v1::DownloadMeshRequest, v1::DownloadMeshResponse>* DownloadMesh(
+grpc::ServerBidiReactor<Incoming<v1::DownloadMeshRequest>, v1::DownloadMeshResponse>* DownloadMesh(
     ServerState& state, grpc::CallbackServerContext* context);
 
 }  // namespace stellate::server

@@ -35,8 +35,13 @@ class OracleStream final : public ServerStream<v1::ServeOracleRequest, v1::Serve
       EndWith(grpc::Status::OK);
       return;
     }
-    state().metrics.Received(request().ByteSizeLong());
-    Handle(request());
+    if (request() == nullptr) {
+      return OutOfOrder(
+          "a message came that is no ServeOracleRequest of stellate/v1/oracle.proto: see what the "
+          "client writes, and that text in it is UTF-8");
+    }
+    state().metrics.Received(request()->ByteSizeLong());
+    Handle(*request());
     ReadNext();
   }
 
@@ -224,7 +229,7 @@ class OracleStream final : public ServerStream<v1::ServeOracleRequest, v1::Serve
 
 }  // namespace
 
-grpc::ServerBidiReactor<v1::ServeOracleRequest, v1::ServeOracleResponse>* ServeOracle(
+grpc::ServerBidiReactor<Incoming<v1::ServeOracleRequest>, v1::ServeOracleResponse>* ServeOracle(
     ServerState& state, grpc::CallbackServerContext* context) {
   const auto stream = std::make_shared<OracleStream>(state, context);
   stream->Start();

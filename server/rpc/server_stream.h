@@ -10,6 +10,7 @@
 
 #include "server/convert/error_map.h"
 #include "server/rpc/call.h"
+#include "server/rpc/incoming.h"
 #include "server/rpc/streams.h"
 
 namespace stellate::server {
@@ -20,7 +21,7 @@ namespace stellate::server {
 // messages:
 //
 //   class Counter final : public ServerStream<Request, Response> {
-//     void OnReadDone(bool ok) override { ... Attach(mesh, bytes); EndWith(status); ReadNext(); }
+//     void OnReadDone(bool ok) override { ... request() Attach(mesh, bytes); ReadNext(); }
 //     Step Next() override { response()->set_count(++count_); return Step::kSend; }
 //   };
 //   std::make_shared<Counter>(state, context)->Start();  // lives until gRPC is done with it
@@ -28,7 +29,7 @@ namespace stellate::server {
 // gRPC, the mesh and the ticker call it from their own threads. Methods marked (locked) are called
 // with the lock held, and may not call the mesh's pool; all others take the lock themselves.
 template <typename Request, typename Response>
-class ServerStream : public grpc::ServerBidiReactor<Request, Response>,
+class ServerStream : public grpc::ServerBidiReactor<Incoming<Request>, Response>,
                      public Stream,
                      public std::enable_shared_from_this<ServerStream<Request, Response>> {
  public:
@@ -169,7 +170,8 @@ class ServerStream : public grpc::ServerBidiReactor<Request, Response>,
   const Identity& caller() const { return *caller_; }  // once a request has come
   // Null before Attach. For Attach's caller, and (locked) for all others.
   const std::shared_ptr<Session>& session() const { return session_; }
-  const Request& request() const { return request_; }  // in OnReadDone
+  // In OnReadDone. Null: the message that came is no Request.
+  const Request* request() const { return request_.is_valid ? &request_.message : nullptr; }
   Response* response() { return &response_; }
 
   Phase phase() const { return phase_; }                // (locked)
@@ -190,7 +192,7 @@ class ServerStream : public grpc::ServerBidiReactor<Request, Response>,
   Phase phase_ = Phase::kIdle;
   std::optional<grpc::Status> end_;
   TimePoint ended_, last_write_ = Clock::now();
-  Request request_;
+  Incoming<Request> request_;
   Response response_;
 };
 

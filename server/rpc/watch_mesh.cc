@@ -31,9 +31,11 @@ class WatchStream final : public HistoryStream<v1::WatchMeshRequest, v1::WatchMe
   const char* Action() const override { return geometry_ ? "watch" : nullptr; }
   std::uint64_t PartBytes() const override { return geometry_ ? HistoryStream::PartBytes() : 0; }
   void OnNews() override { progress_due_ = true; }
-  // Whoever watches a mesh to the end may take his time, as long as there is a mesh.
-  bool MayLeaveUnread() const override {
-    return state().store.Find(session().request().name) != nullptr;
+  // A watcher may take its time, as long as there is a mesh.
+  Clock::duration Patience() const override {
+    if (state().store.Find(session().request().name) == nullptr) return kUnreadPatience;
+    return std::chrono::duration_cast<Clock::duration>(
+        std::chrono::duration<double>(state().config.unread_seconds));
   }
 
   Step Next() override {
@@ -80,7 +82,7 @@ class WatchStream final : public HistoryStream<v1::WatchMeshRequest, v1::WatchMe
 
 }  // namespace
 
-grpc::ServerBidiReactor<v1::WatchMeshRequest, v1::WatchMeshResponse>* WatchMesh(
+grpc::ServerBidiReactor<Incoming<v1::WatchMeshRequest>, v1::WatchMeshResponse>* WatchMesh(
     ServerState& state, grpc::CallbackServerContext* context) {
   const auto stream = std::make_shared<WatchStream>(state, context);
   stream->Start();

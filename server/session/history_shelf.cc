@@ -1,6 +1,7 @@
 #include "server/session/history_shelf.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "server/base/log.h"
@@ -58,7 +59,12 @@ std::uint64_t HistoryShelf::PublishedRevision() const {
 }
 
 std::uint64_t HistoryShelf::SeenRevision() const {
-  return std::max(PublishedRevision(), options_.record ? options_.record->rounds : 0);
+  const auto& record = options_.record;
+  // If its replay failed, on the server before this one, no record tells how far it had got.
+  if (record && record->end && record->end->state == SessionState::kFailed) {
+    return std::numeric_limits<std::uint64_t>::max();
+  }
+  return std::max(PublishedRevision(), record ? record->rounds : 0);
 }
 
 std::vector<PastProgress> HistoryShelf::PastAfter(std::uint64_t revision) const {

@@ -45,7 +45,7 @@ class HistoryShelf {
   // which the replay will end.
   std::uint64_t PublishedRevision() const;
   // The newest revision that a watcher may have. Later than the published one if a replay failed
-  // before it reached the last revision of an earlier server.
+  // before it reached the last revision of an earlier server; any, if that was before this server.
   std::uint64_t SeenRevision() const;
   // The progress at each revision after this one.
   std::vector<PastProgress> PastAfter(std::uint64_t revision) const;

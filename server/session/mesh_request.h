@@ -17,4 +17,8 @@ struct MeshRequest {
   OracleTimeouts timeouts;
 };
 
+// The certificate's verdict as people read it: what the oracle says of itself is its last sentence,
+// marked as the oracle's own words. Stays empty.
+std::string VerdictOf(const MeshRequest& request, const std::string& verdict);
+
 }  // namespace stellate::server

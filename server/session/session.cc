@@ -41,7 +41,7 @@ LogFields EndFields(const MeshRequest& request, const SessionEnd& end, bool susp
   if (end.state == SessionState::kFailed) {
     fields.Add("reason", FailureReasonName(end.failure.reason)).Add("failure", end.failure.message);
   } else if (!suspended) {
-    fields.Add("verdict", report.certificate.verdict);
+    fields.Add("verdict", VerdictOf(request, report.certificate.verdict));
   }
   return fields;
 }

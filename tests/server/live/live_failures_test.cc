@@ -271,12 +271,14 @@ TEST_F(LiveFailuresTest, AnotherWorkerTakesOver) {
 TEST_F(LiveFailuresTest, MessagesOutOfOrderEndTheStreamAlone) {
   Start();
   const std::string name = CreateSphere();
-  v1::ServeOracleRequest hello, answers, failure, nothing;
+  v1::ServeOracleRequest hello, answers, failure, nothing, garbled;
   hello.mutable_hello()->set_mesh(name);
   answers.mutable_answers()->set_lease(77);
   failure.mutable_failure()->set_message("before hello");
+  garbled.mutable_failure()->set_message("no UTF-8: \xff");  // which no parser takes
   const std::vector<v1::ServeOracleRequest> scripts[] = {
-      {answers}, {failure}, {nothing}, {hello, hello}, {hello, answers}, {hello, nothing}};
+      {answers},        {failure},        {nothing}, {hello, hello},
+      {hello, answers}, {hello, nothing}, {garbled}, {hello, garbled}};
   for (const auto& script : scripts) {
     grpc::ClientContext context;
     const auto stream = stub_->ServeOracle(&context);

@@ -178,6 +178,8 @@ TEST_F(LiveRequestsTest, EachLimitIsNamedWithItsValue) {
 }
 
 TEST_F(LiveRequestsTest, AVerdictEndsWithWhatTheOracleSaysOfItself) {
+  ::testing::internal::CaptureStderr();
+  StartLogging(LogLevel::kInfo, LogFormat::kText);
   const ScratchDirectory directory;
   Config config;
   config.data_dir = directory / "data";
@@ -217,6 +219,11 @@ TEST_F(LiveRequestsTest, AVerdictEndsWithWhatTheOracleSaysOfItself) {
   RawWorker another(stub_.get(), silent);
   const v1::Certificate plain = WatchToEnd(silent).report().certificate();
   EXPECT_EQ(plain.verdict().find("says of itself"), std::string::npos) << plain.verdict();
+
+  StartLogging(LogLevel::kWarning, LogFormat::kText);
+  const std::string log = ::testing::internal::GetCapturedStderr();
+  EXPECT_NE(log.find("verdict=\"" + finished.report().certificate().verdict()), std::string::npos)
+      << log;
 }
 
 // Not a mesh that ends at once as JOURNAL_FULL.

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "tests/server/support/live_server.h"
+#include "tests/server/support/raw_http2.h"
 
 namespace stellate::server::testing {
 namespace {
@@ -180,6 +181,25 @@ TEST_F(LiveStreamsTest, ASlowWatcherHoldsUpNobodyAndMissesNothing) {
   EXPECT_TRUE(slow->Finish().ok());
   ExpectWhole(copy, final);
   EXPECT_EQ(copy.triangles, quick.triangles);
+}
+
+// It takes in no more than HTTP/2 sends unasked, and the place of another only for a time.
+TEST_F(LiveStreamsTest, AWatcherThatNeverReadsIsGivenUp) {
+  Config config;
+  config.unread_seconds = 0.1;
+  config.keepalive_seconds = 3600;  // else it were given up because it answers no ping
+  StartTcp(config);
+  const std::string name = CreateSphere(0.03);
+  v1::WatchMeshRequest request;
+  request.set_name(name);
+  RawHttp2 silent(port());
+  ASSERT_TRUE(silent.Request("WatchMesh", request.SerializeAsString()));
+  while (Get(name).watchers() == 0) std::this_thread::yield();
+  RawWorker worker(stub_.get(), name);
+  EXPECT_EQ(WatchToEnd(name).state(), v1::MESH_STATE_SUCCEEDED);
+  while (Get(name).watchers() > 0) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));  // the test's limit ends it
+  }
 }
 
 TEST_F(LiveStreamsTest, AnIdleMeshStillReportsProgress) {

@@ -73,17 +73,12 @@ class RawHttp2 {
   // must not be larger than what a server takes unasked, 60,000 bytes on a connection. False: it is
   // closed.
   bool Request(const std::string& rpc, std::uint32_t declared, std::size_t bytes) {
-    std::string message(1, '\0');
-    for (int shift = 24; shift >= 0; shift -= 8) message += static_cast<char>(declared >> shift);
-    message += std::string(bytes, '\0');
-    std::string frames = Frame(kHeaders, kEndHeaders, stream_, HeadersOf(rpc));
-    for (std::size_t at = 0; at < message.size(); at += kFrameBytes) {
-      frames += Frame(kData, 0, stream_, message.substr(at, kFrameBytes));
-    }
-    stream_ += 2;
-    return Send(frames);
+    return Request(rpc, declared, std::string(bytes, '\0'));
   }
-
+  // Begins a call with a whole message.
+  bool Request(const std::string& rpc, const std::string& message) {
+    return Request(rpc, static_cast<std::uint32_t>(message.size()), message);
+  }
   // The headers of the first call to end, as they came; gRPC leaves text as it is. "": the
   // connection was closed before.
   std::string AwaitAnswer() {
@@ -124,6 +119,18 @@ class RawHttp2 {
   }
 
  private:
+  bool Request(const std::string& rpc, std::uint32_t declared, const std::string& part) {
+    std::string message(1, '\0');
+    for (int shift = 24; shift >= 0; shift -= 8) message += static_cast<char>(declared >> shift);
+    message += part;
+    std::string frames = Frame(kHeaders, kEndHeaders, stream_, HeadersOf(rpc));
+    for (std::size_t at = 0; at < message.size(); at += kFrameBytes) {
+      frames += Frame(kData, 0, stream_, message.substr(at, kFrameBytes));
+    }
+    stream_ += 2;
+    return Send(frames);
+  }
+
   static constexpr std::size_t kFrameBytes = 16 << 10;
   static constexpr char kData = 0, kHeaders = 1, kReset = 3, kSettings = 4, kPing = 6,
                         kContinuation = 9;
