@@ -1,29 +1,33 @@
 // How a round's queries are shared out, without a server, an oracle or a wait: the dispatcher under
-// a clock that is a number, with the rounds of a real torus.
-//
-//   chunks [MANIFOLD EPSILON]
+// a clock that is a number, with the rounds of a real torus. The time of chunks/ is that clock's.
 //
 // A worker answers one chunk after another, after a fixed cost and a time for each query, and the
 // answers travel. Efficiency is queries times the time of one, over workers times the time of all.
 
+#include <benchmark/benchmark.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <map>
+#include <memory>
 #include <random>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "server/oracles/dispatch.h"
+#include "tests/bench/timings.h"
 #include "tests/support/run_mesher.h"
 
+namespace stellate::bench {
 namespace {
 
 using namespace std::chrono_literals;
 using namespace stellate::server;
 constexpr double kBegin = 1;  // seconds: time zero is no time
+using benchmark::State;
 using Rounds = std::vector<std::vector<Dispatch::Block>>;
 
 // Seconds, except the count.
@@ -42,22 +46,19 @@ struct Result {
   long queries = 0;
 };
 
-Rounds RoundsOf(const std::string& manifold, double epsilon) {
+// The blocks of queries of each round.
+Rounds RoundsOf(const Work& work) {
   std::string error;
-  const auto oracle = stellate::MakeManifold(manifold, &error);
-  if (oracle == nullptr) {
-    std::fprintf(stderr, "%s\n", error.c_str());
-    std::exit(2);
-  }
-  auto mesher =
-      stellate::core::Mesher::Create(stellate::testing::SpecificationFor(*oracle, epsilon));
+  const auto oracle = MakeManifold(work.manifold, &error);
+  if (oracle == nullptr) throw std::runtime_error(error);
+  auto mesher = core::Mesher::Create(testing::SpecificationFor(*oracle, work.epsilon));
   Rounds rounds;
   while (const auto* batch = (*mesher)->NextBatch()) {
     auto& blocks = rounds.emplace_back();
     const auto d = static_cast<std::size_t>(oracle->ambient_dimension());
     const std::size_t bytes = 8 * d * static_cast<std::size_t>(1 + oracle->dimension()) + 9;
     for (const auto& block : batch->blocks) blocks.push_back({block.size(), bytes});
-    (void)(*mesher)->Absorb(stellate::testing::AnswersOf(*oracle, *batch));
+    (void)(*mesher)->Absorb(testing::AnswersOf(*oracle, *batch));
   }
   return rounds;
 }
@@ -150,10 +151,6 @@ class Simulation {
   Result result_;
 };
 
-Result Simulate(const Rounds& rounds, const Workers& workers) {
-  return Simulation(workers, 1).Run(rounds);
-}
-
 // Each query to whoever is free first, for nothing: no way of sharing out unknown work does better.
 double Bound(const Rounds& rounds, const Workers& workers, std::uint64_t seed) {
   std::mt19937_64 random(seed);
@@ -174,89 +171,108 @@ double Bound(const Rounds& rounds, const Workers& workers, std::uint64_t seed) {
   return queries * workers.per_query / (seconds * workers.count);
 }
 
-void FixedCosts(const Rounds& rounds, double per_query) {
-  std::printf("\nOne worker, %g ms a query: seconds / chunks by the fixed cost of a chunk\n",
-              1000 * per_query);
-  for (const double fixed : {0.0, 0.02, 0.1, 0.125, 0.15, 0.2, 0.25, 0.5, 2.0}) {
-    const Result result = Simulate(rounds, {1, per_query, fixed, 0.0002, 0});
-    std::printf("  %4.0f ms %8.2f s %6zu\n", 1000 * fixed, result.seconds, result.chunks);
+// The rounds of a mesh, which is made when the first benchmark asks for it.
+class LazyRounds {
+ public:
+  explicit LazyRounds(Work work) : work_(std::move(work)) {}
+  const Rounds& operator()() {
+    if (rounds_.empty()) rounds_ = RoundsOf(work_);
+    return rounds_;
   }
-  for (const double trip : {0.1, 0.25, 0.5}) {
-    const Result result = Simulate(rounds, {1, per_query, 0, trip, 0});
-    std::printf("  %4.0f ms %8.2f s %6zu   on the way, not at work\n", 1000 * trip, result.seconds,
-                result.chunks);
-  }
+
+ private:
+  const Work work_;
+  Rounds rounds_;
+};
+using SharedRounds = std::shared_ptr<LazyRounds>;
+
+// "10 ms" and so on, in a name.
+std::string In(const char* what, double value) {
+  char text[60];
+  std::snprintf(text, sizeof(text), "/%s:%g", what, value);
+  return text;
 }
 
-void Efficiencies(const Rounds& rounds, double spread) {
+// The mean of `seeds` simulations.
+void Register(const std::string& name, const SharedRounds& rounds, const Workers& workers,
+              std::uint64_t seeds = 1) {
+  const auto run = [=](State& state) {
+    for ([[maybe_unused]] auto _ : state) {
+      Result sum{0, 0, 0, 0};
+      for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+        const Result one = Simulation(workers, seed).Run((*rounds)());
+        sum.seconds += one.seconds;
+        sum.efficiency += one.efficiency;
+        sum.chunks += one.chunks;
+      }
+      const auto n = static_cast<double>(seeds);
+      state.SetIterationTime(sum.seconds / n);
+      state.counters["chunks"] = static_cast<double>(sum.chunks) / n;
+      state.counters["efficiency"] = sum.efficiency / n;
+    }
+  };
+  benchmark::RegisterBenchmark(("chunks/" + name).c_str(), run)
+      ->Iterations(1)
+      ->UseManualTime()
+      ->Unit(benchmark::kMillisecond);
+}
+
+// One worker, by the fixed cost of a chunk; and by time on the way, while it works.
+void RegisterFixedCosts(const SharedRounds& rounds, double per_query) {
+  const std::string name = "one_worker" + In("query_ms", 1000 * per_query);
+  for (const double fixed : {0.0, 0.02, 0.1, 0.125, 0.15, 0.2, 0.25, 0.5, 2.0})
+    Register(name + In("fixed_ms", 1000 * fixed), rounds, {1, per_query, fixed, 0.0002, 0});
+  for (const double trip : {0.1, 0.25, 0.5})
+    Register(name + In("trip_ms", 1000 * trip), rounds, {1, per_query, 0, trip, 0});
+}
+
+// Queries that differ by e^spread, by the time of a query, fixed cost and workers; then as good as
+// it gets.
+void RegisterEfficiencies(const SharedRounds& rounds, double spread) {
   constexpr std::uint64_t kSeeds = 5;
   constexpr int kWorkers[] = {1, 4, 8, 32, 100};
-  std::printf(
-      "\nEfficiency, queries that differ by e^%g: by time of a query, fixed cost, workers\n",
-      spread);
-  std::printf("%22s", "");
-  for (const int workers : kWorkers) std::printf("%8d", workers);
-  std::printf("\n");
-  for (const double per_query : {0.001, 0.02, 0.1, 2.0}) {
-    for (const double fixed : {0.0, 0.02, 0.1, 0.5}) {
-      std::printf("  %7.0f ms, %4.0f ms  ", 1000 * per_query, 1000 * fixed);
-      for (const int workers : kWorkers) {
-        double sum = 0;
-        for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-          sum +=
-              Simulation({workers, per_query, fixed, 0.001, spread}, seed).Run(rounds).efficiency;
-        }
-        std::printf("%8.2f", sum / kSeeds);
-      }
-      std::printf("\n");
-    }
-  }
-  std::printf("  as good as it gets  ");
+  const std::string name = "efficiency" + In("spread", spread);
+  for (const double per_query : {0.001, 0.02, 0.1, 2.0})
+    for (const double fixed : {0.0, 0.02, 0.1, 0.5})
+      for (const int workers : kWorkers)
+        Register(name + In("query_ms", 1000 * per_query) + In("fixed_ms", 1000 * fixed) +
+                     In("workers", workers),
+                 rounds, {workers, per_query, fixed, 0.001, spread}, kSeeds);
   for (const int workers : kWorkers) {
-    double sum = 0;
-    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-      sum += Bound(rounds, {workers, 1, 0, 0, spread}, seed);
-    }
-    std::printf("%8.2f", sum / kSeeds);
+    const auto bound = [=](State& state) {
+      for ([[maybe_unused]] auto _ : state) {
+        double sum = 0;
+        for (std::uint64_t seed = 1; seed <= kSeeds; ++seed)
+          sum += Bound((*rounds)(), {workers, 1, 0, 0, spread}, seed);
+        state.counters["efficiency"] = sum / kSeeds;
+      }
+    };
+    benchmark::RegisterBenchmark(("chunks/" + name + "/best" + In("workers", workers)).c_str(),
+                                 bound)
+        ->Iterations(1);
   }
-  std::printf("\n");
 }
 
-// What a fast oracle pays beyond its own time: trips, waits, chunks.
-void FastOracles(const Rounds& rounds) {
-  std::printf("\nFast oracles, a trip of 0.2 ms: milliseconds / chunks by workers\n");
-  for (const double per_query : {1e-7, 1e-6, 1e-5, 1e-4}) {
-    std::printf("  %5.1f us", 1e6 * per_query);
-    for (const int workers : {1, 2, 4, 16}) {
-      const Result result = Simulate(rounds, {workers, per_query, 0.00003, 0.0002, 0});
-      std::printf("  %2d: %8.2f ms %6zu", workers, 1000 * result.seconds, result.chunks);
-    }
-    std::printf("\n");
-  }
+// What a fast oracle pays beyond its own time: trips of 0.2 ms, waits, chunks.
+void RegisterFastOracles(const SharedRounds& rounds) {
+  for (const double per_query : {1e-7, 1e-6, 1e-5, 1e-4})
+    for (const int workers : {1, 2, 4, 16})
+      Register("fast" + In("query_us", 1e6 * per_query) + In("workers", workers), rounds,
+               {workers, per_query, 0.00003, 0.0002, 0});
 }
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  const std::string manifold = argc > 2 ? argv[1] : "torus:1:0.4";
-  for (const double epsilon : {0.2, 0.1, 0.02}) {
-    const Rounds rounds = RoundsOf(manifold, argc > 2 ? std::atof(argv[2]) : epsilon);
-    long queries = 0;
-    for (const auto& blocks : rounds) {
-      for (const auto& block : blocks) queries += block.queries;
-    }
-    std::printf("\n%s, epsilon %g: %ld queries in %zu rounds\n", manifold.c_str(),
-                argc > 2 ? std::atof(argv[2]) : epsilon, queries, rounds.size());
-    if (argc > 2 || epsilon == 0.1) {
-      FixedCosts(rounds, 0);
-      FixedCosts(rounds, 0.001);
-    }
-    if (argc > 2 || epsilon == 0.2) {
-      Efficiencies(rounds, 0);
-      Efficiencies(rounds, 1);
-    }
-    if (argc > 2 || epsilon == 0.02) FastOracles(rounds);
-    if (argc > 2) break;
-  }
-  return 0;
+void RegisterChunks(const std::vector<Work>& asked) {
+  const auto rounds = [&](double epsilon) {
+    return std::make_shared<LazyRounds>(asked.empty() ? Work{"torus:1:0.4", epsilon} : asked[0]);
+  };
+  const SharedRounds coarse = rounds(0.2), medium = rounds(0.1), fine = rounds(0.02);
+  RegisterFixedCosts(medium, 0);
+  RegisterFixedCosts(medium, 0.001);
+  RegisterEfficiencies(coarse, 0);
+  RegisterEfficiencies(coarse, 1);
+  RegisterFastOracles(fine);
 }
+
+}  // namespace stellate::bench

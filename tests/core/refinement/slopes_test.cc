@@ -8,7 +8,8 @@
 #include "tests/support/run_mesher.h"
 
 // The laws of Chapter 4 and the promises on cost, as exponents measured over a range of epsilon.
-// tests/bench/slopes prints the same over wider ranges, with processor times.
+// `tests/bench/run` prints the same over wider ranges: slopes, and with processor times dimension
+// and rounds.
 
 namespace stellate::testing {
 namespace {
