@@ -112,17 +112,6 @@ class BallTree {
     return node;
   }
 
-  // Squared distance from q to the nearest point; infinity when empty.
-  double NearestSquaredDistance(const double* q) const {
-    double best = INFINITY;
-    VisitNear(
-        q, [&] { return std::sqrt(best); },
-        [&](std::uint32_t, double d2) {
-          if (d2 < best) best = d2;
-        });
-    return best;
-  }
-
  private:
   static constexpr int kLeafCapacity = 12;
   static constexpr std::size_t kBuiltLeaf = 8;  // points of a leaf at most, when built
@@ -288,5 +277,16 @@ class BallTree {
   std::size_t built_ = 0;               // size at the last rebuild
   std::size_t built_nodes_ = 0;         // nodes then, numbered along the tree
 };
+
+// Returns the squared distance from q to the nearest point; infinity if there is none.
+inline double NearestSquaredDistance(const BallTree& tree, const double* q) {
+  double best = INFINITY;
+  tree.VisitNear(
+      q, [&] { return std::sqrt(best); },
+      [&](std::uint32_t, double d2) {
+        if (d2 < best) best = d2;
+      });
+  return best;
+}
 
 }  // namespace stellate::core

@@ -9,6 +9,7 @@
 #include "core/base/parallel_sort.h"
 #include "core/base/power.h"
 #include "core/complex/consistency.h"
+#include "core/refinement/face_splits.h"
 #include "core/refinement/independent_set.h"
 
 namespace stellate::core {
@@ -112,13 +113,6 @@ std::vector<Target<K>> Engine<K>::SizeAndShapeTargets() const {
   return targets;
 }
 
-// A star's bound also follows its neighbours, whose sizes may have changed after it was judged.
-template <int K>
-void Engine<K>::RejudgeSizes() {
-  sizes_.Spread(stars_);
-  RejudgeAll();
-}
-
 template <int K>
 void Engine<K>::RejudgeAll() {
   std::vector<std::uint32_t> all(stars_.size());
@@ -159,6 +153,7 @@ std::vector<Target<K>> Engine<K>::GoodPointTargets() {
     filled_.Fill(stars_, criteria_);
   else
     filled_.Clear();
+  const FaceSplits<K> face_splits(parts());
   std::vector<Target<K>> targets;
   for (std::size_t i = 0; i < dirty.size(); ++i) {
     CheckInterruption(i);
@@ -167,15 +162,15 @@ std::vector<Target<K>> Engine<K>::GoodPointTargets() {
     if (is_resolved) filled_.NoteResolved(p);
     // A simplex that is tilted or sharp cannot always be removed, nor a sliver between faces that
     // are nearer to each other than their sizes: the certificate reports these.
-    const bool may_stay =
-        found[i] && (found[i]->tilted || found[i]->sharp || IsSliverAtBoundary(p, *found[i]));
+    const bool may_stay = found[i] && (found[i]->tilted || found[i]->sharp ||
+                                       face_splits.IsSliverAtBoundary(p, *found[i]));
     if (!found[i] || is_resolved || (may_stay && violations_.is_given_up(p))) {
       violations_.NoteJudged(p, std::nullopt);
       continue;
     }
     violations_.NoteJudged(p, found[i]->rule);
     if (violations_.is_given_up(p)) continue;
-    const auto split = SplitUnderSliver(p, *found[i]);
+    const auto split = face_splits.Under(p, *found[i]);
     targets.push_back(split ? *split : TargetOf(p, *found[i]));
   }
   return targets;
@@ -203,13 +198,15 @@ std::optional<std::vector<Target<K>>> Engine<K>::Plan() {
   }
   std::vector<Target<K>> targets = SizeAndShapeTargets();
   if (sizes_.NeedsSpreading(stars_, targets.empty())) {
-    RejudgeSizes();
+    // A star's bound also follows its neighbours, whose sizes may have changed after it was judged.
+    sizes_.Spread(stars_);
+    RejudgeAll();
     targets = SizeAndShapeTargets();
   }
   if (targets.empty()) targets = GoodPointTargets();
   if (!boundary_.has_walls()) return targets;
   const bool any = !targets.empty();
-  YieldToFaces(&targets);
+  FaceSplits<K>(parts()).Yield(&targets);
   if (any && targets.empty()) return Plan();  // all were refused, which is not done forever
   return targets;
 }
@@ -245,11 +242,7 @@ CandidateSet<K> Engine<K>::Draw(std::vector<Target<K>> targets, std::uint64_t ro
 template <int K>
 Inserter<K> Engine<K>::InserterOf(const CandidateSet<K>& candidates,
                                   const AnsweredPoints& answers) {
-  return {{stars_, sizes_, violations_, criteria_, boundary_},
-          candidates,
-          answers,
-          caution_,
-          max_vertices_};
+  return {parts(), candidates, answers, caution_};
 }
 
 template <int K>

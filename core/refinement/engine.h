@@ -10,6 +10,7 @@
 #include "core/refinement/boundary_state.h"
 #include "core/refinement/candidate_set.h"
 #include "core/refinement/criteria.h"
+#include "core/refinement/engine_parts.h"
 #include "core/refinement/filled_mesh.h"
 #include "core/refinement/inserter.h"
 #include "core/refinement/size_field.h"
@@ -17,13 +18,6 @@
 #include "core/report.h"
 
 namespace stellate::core {
-
-// A corner of more than K walls that cannot be refined: M has no interior there, or more than K - 1
-// of them (`along`) meet along an edge that leaves it, or there are too many (kMostAtCorner).
-struct CrowdedCorner {
-  Eigen::VectorXd point;
-  WallSet walls, along;
-};
 
 // The algorithm of Sec. 5.3.5 between rounds: the sample, its stars, and their violations. A round
 // is
@@ -71,12 +65,7 @@ class Engine {
   void AddToSample(const AnsweredPoints& answers, Eigen::Index candidate);
   // Updates the stars and their violations after insertions.
   Change Commit();
-  // Manifolds with boundary, when no targets are left: returns points of the faces of this stage
-  // that are far from the sample. Query and append them.
-  PlannedPoints ChooseSeeds();
-  // Returns the known interior points that wait to be seeds, with their tangents.
-  AnsweredPoints InteriorSeeds();
-  // Goes to faces of the next dimension. Returns false after the last.
+  // Manifolds with boundary: goes to faces of the next dimension. Returns false after the last.
   bool AdvanceStage();
   // The same where refining the faces of this stage does not end: rules skip them from now on.
   // Returns false in the last stage.
@@ -91,20 +80,6 @@ class Engine {
   // the round's change, as of Commit.
   std::optional<std::vector<Target<K>>> ProtectSharpEdges(std::vector<std::uint32_t>* added,
                                                           std::vector<std::uint32_t>* removed);
-  // Corners that more than K walls may meet in: query CrowdQuestions, then pass the answers on.
-  // They are inserted, or left out where M is only that point. Returns one that cannot be refined,
-  // if any.
-  PlannedPoints CrowdQuestions() const;
-  std::optional<CrowdedCorner> SettleCrowds(const AnsweredPoints& answers);
-  // Points near faces that were discovered since the last call. Query them together with the
-  // targets.
-  PlannedPoints TakeDiscoveries();
-
-  // Gives the point inserted last a name, in place of its id: see Sample::NameLast.
-  void NameLast(std::uint32_t name) { stars_.NameLast(name); }
-  // Records an attempt to fix that star that failed elsewhere.
-  void NoteFailedAttempt(std::uint32_t star) { violations_.NoteFailedAttempt(star); }
-
   // Has all rules test all stars again.
   void MarkAllDirty();
 
@@ -112,6 +87,10 @@ class Engine {
   // `share` (R / bound)^K more.
   double CountMissing(double share) const;
 
+  // For helpers that work on it for one step of a round: FaceSeeds, Corners.
+  EngineParts<K> parts() {
+    return {stars_, sizes_, violations_, criteria_, boundary_, max_vertices_};
+  }
   const Stars<K>& stars() const { return stars_; }
   const ResolvedCriteria& criteria() const { return criteria_; }
   SizeField<K>& sizes() { return sizes_; }
@@ -122,26 +101,15 @@ class Engine {
   FilledMesh<K>& filled() { return filled_; }
   const FilledMesh<K>& filled() const { return filled_; }
 
-  // Manifolds with boundary: all faces, by dimension, the lowest first.
-  std::vector<FaceMesh> Faces() const;
-
   // The mesh: K+1 ascending ids each.
   std::vector<std::uint32_t> Simplices() const;
   std::uint64_t simplex_count() const;
 
  private:
-  void RejudgeSizes();
   bool HasGrownTooMuch() const;
   void RejudgeAll();
   std::vector<typename ViolationIndex<K>::Entry> JudgeSizeAndShape(
       const std::vector<std::uint32_t>& stars) const;
-  void YieldToFaces(std::vector<Target<K>>* targets);
-  PlannedPoints PlanShells();
-  bool IsSliverAtBoundary(std::uint32_t star, const Violation<K>& violation) const;
-  std::optional<Target<K>> SplitUnderSliver(std::uint32_t star,
-                                            const Violation<K>& violation) const;
-  bool IsOnShell(const typename Stars<K>::FaceSimplex& simplex) const;
-  std::optional<Target<K>> SplitOf(const typename Stars<K>::CellVertex& at, Rule by) const;
   Target<K> TargetOf(std::uint32_t star, const Violation<K>& violation) const;
 
   ResolvedCriteria criteria_;

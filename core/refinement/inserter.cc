@@ -26,14 +26,9 @@ constexpr double kKeptSpacing = 0.95;
 }  // namespace
 
 template <int K>
-Inserter<K>::Inserter(const Parts& to, const CandidateSet<K>& candidates,
-                      const AnsweredPoints& answers, const Caution& caution,
-                      std::uint64_t max_vertices)
-    : to_(to),
-      candidates_(candidates),
-      answers_(answers),
-      caution_(caution),
-      max_vertices_(max_vertices) {
+Inserter<K>::Inserter(const EngineParts<K>& to, const CandidateSet<K>& candidates,
+                      const AnsweredPoints& answers, const Caution& caution)
+    : to_(to), candidates_(candidates), answers_(answers), caution_(caution) {
   done_.used.assign(static_cast<std::size_t>(candidates.size()), 0);
 }
 
@@ -208,7 +203,7 @@ void Inserter<K>::InsertPlanned() {
   const PlannedPoints& planned = candidates_.planned;
   for (Eigen::Index i = 0; i < planned.size(); ++i) {
     CheckInterruption(static_cast<std::size_t>(i));
-    if (to_.stars.size() >= max_vertices_) break;
+    if (to_.is_full()) break;
     const Eigen::Index c = candidates_.drawn() + i;
     if (!answers_.found[static_cast<std::size_t>(c)]) continue;
     if (CountWalls(WallsOf(c)) == K &&

@@ -5,10 +5,8 @@
 #include <vector>
 
 #include "core/base/instantiate.h"
-#include "core/refinement/boundary_state.h"
 #include "core/refinement/candidate_set.h"
-#include "core/refinement/size_field.h"
-#include "core/refinement/violation_index.h"
+#include "core/refinement/engine_parts.h"
 
 namespace stellate::core {
 
@@ -45,17 +43,9 @@ struct Inserted {
 template <int K>
 class Inserter {
  public:
-  // References must outlive the inserter.
-  struct Parts {
-    Stars<K>& stars;
-    SizeField<K>& sizes;
-    ViolationIndex<K>& violations;
-    const ResolvedCriteria& criteria;
-    BoundaryState<K>& boundary;
-  };
-  // max_vertices: stops inserting planned points at this size.
-  Inserter(const Parts& to, const CandidateSet<K>& candidates, const AnsweredPoints& answers,
-           const Caution& caution, std::uint64_t max_vertices);
+  // Stops inserting planned points where the engine is full.
+  Inserter(const EngineParts<K>& to, const CandidateSet<K>& candidates,
+           const AnsweredPoints& answers, const Caution& caution);
 
   Inserted Run();
 
@@ -99,11 +89,10 @@ class Inserter {
   Outcome Insert(Eigen::Index candidate, Rule rule, std::uint32_t near);
   Outcome NoteFailedAttempt(std::uint32_t star);
 
-  Parts to_;
+  EngineParts<K> to_;
   const CandidateSet<K>& candidates_;
   const AnsweredPoints& answers_;
   Caution caution_;
-  std::uint64_t max_vertices_;
   std::vector<int> best_;              // by target of R3 and R4: its candidate; -1: none
   std::vector<RefinedPoint> refined_;  // by target of R1 and R2
   bool all_near_target_ = false;

@@ -8,6 +8,7 @@
 #include "core/base/interruption.h"
 #include "core/base/parallel.h"
 #include "core/complex/consistency.h"
+#include "core/refinement/faces.h"
 
 namespace stellate::core {
 namespace {
@@ -80,7 +81,7 @@ BoundaryOfMesh BoundaryOf(const Engine<K>& engine) {
         boundary.outward[std::size_t{p} * K + static_cast<std::size_t>(a)] +=
             stars.sample().Conormals(p)[w * K + a];
   }
-  boundary.faces = engine.Faces();
+  boundary.faces = FacesOf<K>(engine.stars());
   for (std::uint32_t p = 0; stars.sample().has_protecting_balls() && p < stars.size(); ++p)
     boundary.balls.push_back(stars.sample().ProtectingRadius2(p));
   return boundary;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/certificate/findings.h"
+#include "core/refinement/face_seeds.h"
 #include "core/run/ending.h"
 #include "core/sampling/seeding.h"
 #include "core/speculation/speculation.h"
@@ -192,7 +193,7 @@ void Scheduler<K>::Plan() {
   *targets = engine_.Select(*targets);
   PlannedPoints planned;
   if (boundary.has_discoveries())
-    planned = engine_.TakeDiscoveries();
+    planned = FaceSeeds<K>(engine_.parts()).TakeDiscoveries();
   else if (engine_.criteria().speculative && !noted_.speculation_failed && boundary.stage() == K) {
     // The few violations of R1 and R2 that are left are not worth testing R3 and R4 on all stars.
     const bool is_rest = sampling_.is_done && !finished && violations.are_all_dirty();

@@ -6,6 +6,8 @@
 
 #include "core/base/message.h"
 #include "core/base/parallel.h"
+#include "core/refinement/corners.h"
+#include "core/refinement/face_seeds.h"
 #include "core/run/ending.h"
 #include "core/run/sampler_choice.h"
 #include "core/run/scheduler.h"
@@ -96,7 +98,7 @@ bool Scheduler<K>::AskForSparesOnWalls(const PointsOnWalls& points) {
 template <int K>
 bool Scheduler<K>::AskForInterior() {
   if (engine_.stars().size() == 0) return false;
-  AnsweredPoints seeds = engine_.InteriorSeeds();
+  AnsweredPoints seeds = FaceSeeds<K>(engine_.parts()).OfInterior();
   sampling_.sampler = SamplerFor<K>(engine_, spec_, seeds);
   if (sampling_.sampler) sampling_.sampler->Begin(seeds);
   if (AskForSample()) return true;
@@ -111,13 +113,14 @@ bool Scheduler<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
   const BoundaryState<K>& boundary = engine_.boundary();
   if (!boundary.crowds().empty()) {
     CandidateSet<K> candidates;
-    candidates.planned = engine_.CrowdQuestions();
+    candidates.planned = Corners<K>(engine_.parts()).Questions();
     Ask(std::move(candidates), Purpose::kCrowds);
     return false;
   }
   while (true) {
     const bool idle = (*targets)->empty() && !boundary.has_discoveries();
-    if (PlannedPoints seeds = idle ? engine_.ChooseSeeds() : PlannedPoints(); seeds.size() > 0) {
+    if (PlannedPoints seeds = idle ? FaceSeeds<K>(engine_.parts()).Choose() : PlannedPoints();
+        seeds.size() > 0) {
       CandidateSet<K> candidates;
       candidates.planned = std::move(seeds);
       Ask(std::move(candidates), Purpose::kSpares);
@@ -147,7 +150,7 @@ bool Scheduler<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
 
 template <int K>
 void Scheduler<K>::SettleCrowds() {
-  const std::optional<CrowdedCorner> bad = engine_.SettleCrowds(trip_->answers());
+  const std::optional<CrowdedCorner> bad = Corners<K>(engine_.parts()).Settle(trip_->answers());
   if (bad)
     Fail({StatusCode::kOracleBadConormal, WhyTooCrowded(bad->point, bad->walls, bad->along, K)});
 }

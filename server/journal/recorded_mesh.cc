@@ -42,9 +42,9 @@ RecordedMesh::RecordedMesh(std::shared_ptr<SharedJournal> journal, std::uint64_t
 
 void RecordedMesh::SetShape(const MeshRequest& request) {
   owner_ = request.owner;
-  dimension_ = request.spec.dimension;
-  ambient_dimension_ = request.spec.ambient_dimension;
-  walls_ = request.spec.walls;
+  shape_.dimension = request.spec.dimension;
+  shape_.ambient_dimension = request.spec.ambient_dimension;
+  shape_.walls = request.spec.walls;
 }
 
 // Writes of about `bytes`, unless the mesh is not wanted any more.
@@ -134,7 +134,7 @@ bool RecordedMesh::Fits(const core::QueryBatch& batch, const PartOfRound& part) 
   const core::QueryBlock& block = batch.blocks[part.block_index];
   const Index count = part.answers.size();
   return part.first >= 0 && count <= block.size() && part.first <= block.size() - count &&
-         part.answers.Fits(core::AnswerBlock::Shape(dimension_, walls_, block, 1));
+         part.answers.Fits(core::AnswerBlock::Shape(shape_.dimension, shape_.walls, block, 1));
 }
 
 SessionJournal::Known RecordedMesh::ReadRound(const core::QueryBatch& batch) {
@@ -152,7 +152,7 @@ SessionJournal::Known RecordedMesh::ReadRound(const core::QueryBatch& batch) {
                                           "recorded the answers: mesh again")};
       return true;
     }
-    core::Answers answers = EmptyAnswers(dimension_, batch, walls_);
+    core::Answers answers = EmptyAnswers(shape_.dimension, batch, shape_.walls);
     for (std::uint64_t part = 0; part < round->parts; ++part) {
       RecordedAnswers some;
       Found found;
@@ -224,23 +224,23 @@ bool RecordedMesh::HasAnswers() const {
 
 bool RecordedMesh::WriteAnswers(JournalFile* file) {
   std::shared_ptr<const Round> round;
-  draft_part_ = next_part_;
+  draft_.next_part = next_part_;
   {
     const std::lock_guard lock(mutex_);
-    draft_ = Merged(std::exchange(pending_, {}));
+    draft_.written = Merged(std::exchange(pending_, {}));
     round = answers_;
   }
   // An owner who has used up his share hears of it at the end of the round.
-  if (draft_.empty() || RefuseShare(1)) return true;
-  return PutAnswers(file, round->answers, draft_, &draft_part_);
+  if (draft_.written.empty() || RefuseShare(1)) return true;
+  return PutAnswers(file, round->answers, draft_.written, &draft_.next_part);
 }
 
 void RecordedMesh::AnswersWritten(bool written) {
-  if (written && draft_part_ > next_part_) {
-    next_part_ = draft_part_;
-    written_.insert(written_.end(), draft_.begin(), draft_.end());
+  if (written && draft_.next_part > next_part_) {
+    next_part_ = draft_.next_part;
+    written_.insert(written_.end(), draft_.written.begin(), draft_.written.end());
   }
-  draft_.clear();
+  draft_.written.clear();
 }
 
 bool RecordedMesh::PutAnswers(JournalFile* file, const core::Answers& answers,
@@ -350,7 +350,7 @@ core::Expected<std::unique_ptr<MeshHistory>> RecordedMesh::ReadHistory() {
     }
     return true;
   };
-  return MeshHistory::Read(dimension_, ambient_dimension_, read);
+  return MeshHistory::Read(shape_.dimension, shape_.ambient_dimension, read);
 }
 
 void RecordedMesh::RemoveRounds() { journal_->RemoveLater(shared_from_this()); }

@@ -65,7 +65,9 @@ class RecordedMesh final : public SessionJournal,
   const std::shared_ptr<SharedJournal> journal_;
   const std::uint64_t owner_limit_;
   std::string owner_;
-  int dimension_ = 0, ambient_dimension_ = 0, walls_ = 0;
+  struct {
+    int dimension = 0, ambient_dimension = 0, walls = 0;
+  } shape_;
   std::atomic<bool> forgotten_{false};
 
   // Only for the thread that has locked the file.
@@ -73,8 +75,11 @@ class RecordedMesh final : public SessionJournal,
   std::uint64_t counted_ = 0;         // of its bytes, for its owner
   bool has_history_ = false;          // some of it
   std::vector<AnswerRange> written_;  // of the round
-  std::int64_t next_part_ = 0, draft_part_ = 0;
-  std::vector<AnswerRange> draft_;  // written once the transaction is committed
+  std::int64_t next_part_ = 0;
+  struct {
+    std::int64_t next_part = 0;
+    std::vector<AnswerRange> written;
+  } draft_;  // in force once the transaction is committed
 
   // For the session's thread alone:
   std::uint64_t rounds_ = 0;  // that are complete

@@ -98,8 +98,8 @@ void ConnectionGuard::Watch(int fd) {
   const std::lock_guard lock(mutex_);
   connections_.emplace(++last_key_, std::move(connection));
   silent_.insert(last_key_);
-  silent_count_ = silent_.size();
-  if (napping_) Wake();
+  state_.silent_count = silent_.size();
+  if (state_.napping) Wake();
   // Once for all that came meanwhile. It ends when gRPC closes the descriptor.
   epoll_event event{};
   event.events = EPOLLIN | EPOLLRDHUP | EPOLLET;
@@ -110,13 +110,13 @@ void ConnectionGuard::Watch(int fd) {
 void ConnectionGuard::Run(const std::stop_token& stop) {
   std::vector<epoll_event> events(kMostEvents);
   while (!stop.stop_requested()) {
-    const bool idle = busy_.empty() && gone_.empty() && !untidy_ &&
+    const bool idle = busy_.empty() && gone_.ids.empty() && !memory_.untidy &&
                       unread_->strangers.bytes + unread_->owners.bytes == 0 &&
                       Clock::now() > awake_until_;
-    napping_ = idle;  // first, or somebody who comes now is not looked at
-    const int nap = silent_count_ > 0 ? kSilentMilliseconds : -1;
+    state_.napping = idle;  // first, or somebody who comes now is not looked at
+    const int nap = state_.silent_count > 0 ? kSilentMilliseconds : -1;
     const int count = epoll_wait(epoll_, events.data(), kMostEvents, idle ? nap : 0);
-    napping_ = false;
+    state_.napping = false;
     std::uint64_t woken = 0;
     [[maybe_unused]] const auto taken = read(wake_, &woken, sizeof(woken));
     if (count > 0) awake_until_ = Clock::now() + kAwake;
@@ -137,8 +137,9 @@ void ConnectionGuard::Run(const std::stop_token& stop) {
       Look();
     }
     CountLeftBehind();
-    if (Clock::now() - said_ >= kLogPause) SayWhatWasClosed();
-    if (untidy_ && (Clock::now() > quiet_at_ || (hurried_ && Clock::now() > given_back_ + kTidy))) {
+    if (Clock::now() - said_.time >= kLogPause) SayWhatWasClosed();
+    if (memory_.untidy && (Clock::now() > memory_.quiet_at ||
+                           (hurried_ && Clock::now() > memory_.given_back + kTidy))) {
       GiveBack();
     }
     pollfd wake{wake_, POLLIN, 0};
@@ -148,26 +149,26 @@ void ConnectionGuard::Run(const std::stop_token& stop) {
 }
 
 void ConnectionGuard::Look() {
-  const bool sweep = connections_.size() > 2 * swept_ + kMostEvents;
+  const bool sweep = connections_.size() > 2 * gone_.swept + kMostEvents;
   if (sweep) {
     for (const auto& [key, connection] : connections_) busy_.insert(key);
   }
   FindIds(busy_);
-  ending_calls_ = 0;
+  gone_.ending_calls = 0;
   for (auto key = busy_.begin(); key != busy_.end();) {
     const auto found = connections_.find(*key);
     Connection& connection = found->second;
     const bool open = NumberOf(connection.fd) == connection.number;
     const bool calm = !open || IsCalm(&connection);
-    if (open && connection.closed) ending_calls_ += connection.calls;
+    if (open && connection.closed) gone_.ending_calls += connection.calls;
     if (!open) {
-      if (connection.closed && connection.id != 0) gone_.push_back(connection.id);
+      if (connection.closed && connection.id != 0) gone_.ids.push_back(connection.id);
       silent_.erase(found->first);
       connections_.erase(found);
     }
     key = calm ? busy_.erase(key) : std::next(key);
   }
-  if (sweep) swept_ = connections_.size();
+  if (sweep) gone_.swept = connections_.size();
 }
 
 // Nothing can come of it before more bytes come.
@@ -207,16 +208,16 @@ void ConnectionGuard::FindIds(const std::set<std::uint64_t>& keys) {
 // gRPC names a connection once the handshake is over.
 void ConnectionGuard::BoundHellos() {
   const auto now = Clock::now();
-  silent_count_ = silent_.size();
+  state_.silent_count = silent_.size();
   const bool crowded = silent_.size() >= limits_.hellos;
-  if (!crowded && now < silent_seen_ + std::chrono::milliseconds(kSilentMilliseconds)) return;
-  silent_seen_ = now;
+  if (!crowded && now < gone_.seen_silent + std::chrono::milliseconds(kSilentMilliseconds)) return;
+  gone_.seen_silent = now;
   if (!silent_.empty()) FindIds(silent_);
   std::erase_if(silent_, [this](std::uint64_t key) {
     const Connection& connection = connections_.at(key);
     if (NumberOf(connection.fd) != connection.number) {  // given up by either side
       busy_.insert(key);
-      ++left_silent_;
+      ++gone_.silent;
       return true;
     }
     return connection.id != 0 && BytesReceived(connection.fd) >= kHelloBytes;
@@ -227,25 +228,25 @@ void ConnectionGuard::BoundHellos() {
     if (now - connection.came < kHelloTime) break;
     Close(&connection, "max-connections", Message("was one of ", seen, " that had not said hello"),
           Message("as many as ", limits_.hellos));
-    ++left_silent_;
+    ++gone_.silent;
     busy_.insert(*key);
     key = silent_.erase(key);
   }
-  silent_count_ = silent_.size();
-  if (left_silent_ < kManySilent) return;
-  left_silent_ = 0;
-  untidy_ = true;
-  quiet_at_ = now + kQuiet;
+  state_.silent_count = silent_.size();
+  if (gone_.silent < kManySilent) return;
+  gone_.silent = 0;
+  memory_.untidy = true;
+  memory_.quiet_at = now + kQuiet;
 }
 
 void ConnectionGuard::CountLeftBehind() {
-  std::size_t calls = ending_calls_;
-  std::erase_if(gone_, [&calls](ConnectionId id) {
+  std::size_t calls = gone_.ending_calls;
+  std::erase_if(gone_.ids, [&calls](ConnectionId id) {
     const std::size_t left = CallsHeld(id).value_or(0);
     calls += left;
     return left == 0;
   });
-  behind_ = calls > limits_.calls / 4;
+  state_.behind = calls > limits_.calls / 4;
 }
 
 // Until now, while nobody looked.
@@ -285,8 +286,8 @@ void ConnectionGuard::BoundUnread(Unread ConnectionUnread::*account, Holding Con
   const std::int64_t most = limits_.unread_bytes / 2;  // more comes before the next look
   if (total > most / 2) {
     hurried_ = true;
-    untidy_ = true;
-    quiet_at_ = now + kQuiet;
+    memory_.untidy = true;
+    memory_.quiet_at = now + kQuiet;
   }
   if (total <= most) return;
   std::sort(holders.begin(), holders.end(), std::greater<>());
@@ -301,9 +302,9 @@ void ConnectionGuard::BoundUnread(Unread ConnectionUnread::*account, Holding Con
 
 // What the calls had; without this the allocator keeps it.
 void ConnectionGuard::GiveBack() {
-  untidy_ = hurried_;
+  memory_.untidy = hurried_;
   malloc_trim(0);
-  given_back_ = Clock::now();
+  memory_.given_back = Clock::now();
 }
 
 // `what` it did, where the setting allows only `allowed`.
@@ -320,20 +321,20 @@ void ConnectionGuard::Close(Connection* connection, const char* setting, const s
   }
   close(fd);
   const auto now = Clock::now();
-  untidy_ = true;
-  quiet_at_ = now + kQuiet;
-  ++unsaid_;
-  last_ = Message("the last, of ", connection->peer, ", ", what, "; ",
-                  WhoAllows(setting, limits_.have_flags), " allows ", allowed);
-  if (now - said_ >= kLogPause) SayWhatWasClosed();
+  memory_.untidy = true;
+  memory_.quiet_at = now + kQuiet;
+  ++said_.count;
+  said_.last = Message("the last, of ", connection->peer, ", ", what, "; ",
+                       WhoAllows(setting, limits_.have_flags), " allows ", allowed);
+  if (now - said_.time >= kLogPause) SayWhatWasClosed();
 }
 
 // At most once a second; of what comes faster, the last is said when that is over.
 void ConnectionGuard::SayWhatWasClosed() {
-  if (unsaid_ == 0) return;
-  Log(LogLevel::kWarning, {}, Message("closed ", unsaid_, " connections; ", last_));
-  said_ = Clock::now();
-  unsaid_ = 0;
+  if (said_.count == 0) return;
+  Log(LogLevel::kWarning, {}, Message("closed ", said_.count, " connections; ", said_.last));
+  said_.time = Clock::now();
+  said_.count = 0;
 }
 
 }  // namespace stellate::server

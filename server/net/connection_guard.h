@@ -50,7 +50,7 @@ class ConnectionGuard {
 
   // Whether further connections should wait: closed ones have left many calls behind, or as many as
   // allowed have not said hello.
-  bool IsBehind() const { return behind_ || silent_count_ >= limits_.hellos; }
+  bool IsBehind() const { return state_.behind || state_.silent_count >= limits_.hellos; }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -101,24 +101,35 @@ class ConnectionGuard {
   std::set<std::uint64_t> silent_;  // not known to have said hello; the oldest first
 
   // For the thread alone:
-  std::set<std::uint64_t> busy_;    // to be examined again
-  std::vector<ConnectionId> gone_;  // may have left calls behind
-  std::size_t ending_calls_ = 0;    // of those that are closed and not gone yet
-  bool hurried_ = false;            // much is unread
-  Clock::time_point awake_until_;   // until then gRPC may have unread data
-  Clock::time_point silent_seen_;
-  std::size_t left_silent_ = 0;  // never said hello and are gone, since memory was given back
-  std::size_t swept_ = 0;        // how many were left when all were last looked at
-  std::size_t unsaid_ = 0;       // closed since the last line of the log
-  std::string last_;             // the last of those, and why
-  Clock::time_point said_;
-  bool untidy_ = false;  // memory must be released once it is quiet
-  Clock::time_point quiet_at_;
-  Clock::time_point given_back_;
+  std::set<std::uint64_t> busy_;   // to be examined again
+  bool hurried_ = false;           // much is unread
+  Clock::time_point awake_until_;  // until then gRPC may have unread data
+  // Connections that are gone.
+  struct {
+    std::vector<ConnectionId> ids;  // may have left calls behind
+    std::size_t ending_calls = 0;   // of those that are closed and not gone yet
+    std::size_t silent = 0;         // never said hello, since memory was given back
+    std::size_t swept = 0;          // how many silent ones were left when all were last looked at
+    Clock::time_point seen_silent;
+  } gone_;
+  // The next line of the log.
+  struct {
+    std::size_t count = 0;  // closed since the last line
+    std::string last;       // the last of those, and why
+    Clock::time_point time;
+  } said_;
+  struct {
+    bool untidy = false;  // must be released once it is quiet
+    Clock::time_point quiet_at;
+    Clock::time_point given_back;
+  } memory_;
 
-  std::atomic<bool> behind_{false};
-  std::atomic<std::size_t> silent_count_{0};
-  std::atomic<bool> napping_{false};  // examines nothing until it is woken
+  // For other threads, too.
+  struct {
+    std::atomic<bool> behind{false};
+    std::atomic<std::size_t> silent_count{0};
+    std::atomic<bool> napping{false};  // examines nothing until it is woken
+  } state_;
   std::jthread thread_;
 };
 

@@ -246,7 +246,7 @@ void SheetClaims::TakeShares(std::size_t wall) {
     if (clear == 0) return;
     const double* y = clear_.points.data() + n * d;
     // From afar a barycentre is about as far as its simplex.
-    double far = std::sqrt(sheet.tree.NearestSquaredDistance(y));
+    double far = std::sqrt(NearestSquaredDistance(sheet.tree, y));
     if (far < kAfar * sheet.largest_radius) far = DistanceFrom(sheet, y);
     if (far > kBeside * x_.size) sheet.shares[n] = clear / far;
   });

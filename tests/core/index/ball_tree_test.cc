@@ -85,7 +85,7 @@ class BallTreeTest : public ::testing::TestWithParam<int> {
     double nearest = INFINITY;
     for (std::uint32_t id = 0; id < influence_.size(); ++id)
       nearest = std::min(nearest, SquaredDistanceTo(id, q));
-    EXPECT_EQ(tree_.NearestSquaredDistance(q.data()), nearest);
+    EXPECT_EQ(NearestSquaredDistance(tree_, q.data()), nearest);
   }
 
   void CheckQueries(int count) {
@@ -108,7 +108,7 @@ TEST_P(BallTreeTest, KnowsNothingWhenEmpty) {
   tree_.ForEachInfluencing(q.data(), [](std::uint32_t) { FAIL(); });
   tree_.VisitNear(
       q.data(), [] { return 1e9; }, [](std::uint32_t, double) { FAIL(); });
-  EXPECT_EQ(tree_.NearestSquaredDistance(q.data()), INFINITY);
+  EXPECT_EQ(NearestSquaredDistance(tree_, q.data()), INFINITY);
   EXPECT_EQ(tree_.size(), 0u);
 }
 
@@ -137,7 +137,7 @@ TEST_P(BallTreeTest, AnswersTheSameWhenGivenAllPointsAtOnce) {
   influence_.clear();
   tree_.Assign({});
   EXPECT_EQ(tree_.size(), 0u);
-  EXPECT_EQ(tree_.NearestSquaredDistance(Draw().data()), INFINITY);
+  EXPECT_EQ(NearestSquaredDistance(tree_, Draw().data()), INFINITY);
 }
 
 TEST_P(BallTreeTest, TakesAllInfluencesAnew) {

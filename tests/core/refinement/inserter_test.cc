@@ -39,8 +39,8 @@ class InserterTest : public ::testing::Test {
   }
 
   Inserted Run(const Caution& caution = {}, std::uint64_t max_vertices = 100) {
-    return Inserter<2>({stars_, sizes_, book_, criteria_, faces_}, candidates_, answers_, caution,
-                       max_vertices)
+    return Inserter<2>({stars_, sizes_, book_, criteria_, faces_, max_vertices}, candidates_,
+                       answers_, caution)
         .Run();
   }
 

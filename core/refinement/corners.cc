@@ -1,5 +1,4 @@
-// The engine's work at corners of a manifold with boundary: how M looks where more than K walls
-// meet, and where the first points of edges are.
+#include "core/refinement/corners.h"
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -8,9 +7,9 @@
 #include <vector>
 
 #include "core/base/dense.h"
-#include "core/base/parallel.h"
+#include "core/base/interruption.h"
+#include "core/base/vector_ops.h"
 #include "core/boundary/corner_cone.h"
-#include "core/refinement/engine.h"
 
 namespace stellate::core {
 namespace {
@@ -46,31 +45,29 @@ std::vector<std::pair<Vector<K>, WallSet>> EdgesAtCorner(const Stars<K>& stars, 
 
 }  // namespace
 
-// Plans, before all other points, one point on each edge of each corner. All are equally far from
-// the corner, so that two edges at a sharp angle do not split each other without end.
 template <int K>
-PlannedPoints Engine<K>::PlanShells() {
+PlannedPoints Corners<K>::PlanShells() {
   std::vector<std::uint32_t> corners;
-  for (std::uint32_t p = 0; p < stars_.size(); ++p)
-    if (CountWalls(stars_.sample().walls(p)) >= K) corners.push_back(p);
+  for (std::uint32_t p = 0; p < engine_.stars.size(); ++p)
+    if (CountWalls(engine_.stars.sample().walls(p)) >= K) corners.push_back(p);
   PlannedPoints planned;
   std::vector<Eigen::VectorXd> points;
   for (const std::uint32_t p : corners) {
     CheckInterruption(points.size());
-    double radius = kShell * criteria_.epsilon;
+    double radius = kShell * engine_.criteria.epsilon;
     for (const std::uint32_t q : corners)
       if (q != p)
         radius =
-            std::min(radius, kShellShare * Distance(stars_.sample().Point(p),
-                                                    stars_.sample().Point(q), stars_.sample().d()));
-    boundary_.SetShell(p, radius);
-    for (const auto& [along, walls] : EdgesAtCorner<K>(stars_, p)) {
+            std::min(radius, kShellShare * Distance(engine_.stars.sample().Point(p),
+                                                    engine_.stars.sample().Point(q), engine_.stars.sample().d()));
+    engine_.boundary.SetShell(p, radius);
+    for (const auto& [along, walls] : EdgesAtCorner<K>(engine_.stars, p)) {
       const Vector<K> x = radius * along;
-      stars_.sample().Lift(p, x.data(), points.emplace_back(stars_.sample().d()).data());
+      engine_.stars.sample().Lift(p, x.data(), points.emplace_back(engine_.stars.sample().d()).data());
       planned.walls.push_back(walls);
     }
   }
-  planned.points.resize(stars_.sample().d(), static_cast<Eigen::Index>(points.size()));
+  planned.points.resize(engine_.stars.sample().d(), static_cast<Eigen::Index>(points.size()));
   for (std::size_t i = 0; i < points.size(); ++i)
     planned.points.col(static_cast<Eigen::Index>(i)) = points[i];
   return planned;
@@ -78,24 +75,24 @@ PlannedPoints Engine<K>::PlanShells() {
 
 // Each wall by itself: a corner on some of them need not be where these alone are independent.
 template <int K>
-PlannedPoints Engine<K>::CrowdQuestions() const {
+PlannedPoints Corners<K>::Questions() const {
   PlannedPoints planned;
-  for (const auto& crowd : boundary_.crowds())
+  for (const auto& crowd : engine_.boundary.crowds())
     ForEachWall(crowd.possible, [&](int wall) { planned.walls.push_back(SetOfWall(wall)); });
-  planned.points.resize(stars_.sample().d(), static_cast<Eigen::Index>(planned.walls.size()));
+  planned.points.resize(engine_.stars.sample().d(), static_cast<Eigen::Index>(planned.walls.size()));
   Eigen::Index column = 0;
-  for (const auto& crowd : boundary_.crowds())
+  for (const auto& crowd : engine_.boundary.crowds())
     for (int i = 0; i < CountWalls(crowd.possible); ++i) planned.points.col(column++) = crowd.point;
   return planned;
 }
 
 template <int K>
-std::optional<CrowdedCorner> Engine<K>::SettleCrowds(const AnsweredPoints& answers) {
+std::optional<CrowdedCorner> Corners<K>::Settle(const AnsweredPoints& answers) {
   std::optional<CrowdedCorner> bad;
-  const double same = BoundaryState<K>::kSameCorner * criteria_.epsilon;
+  const double same = BoundaryState<K>::kSameCorner * engine_.criteria.epsilon;
   Eigen::Index column = 0;
-  for (const auto& crowd : boundary_.TakeCrowds()) {
-    const auto dk = Eigen::Index{stars_.sample().d()};
+  for (const auto& crowd : engine_.boundary.TakeCrowds()) {
+    const auto dk = Eigen::Index{engine_.stars.sample().d()};
     const Eigen::Map<const Eigen::MatrixXd> tangents(crowd.tangent.data(), dk, K);
     std::map<int, Vector<K>> conormals;
     int number = 0;
@@ -113,9 +110,9 @@ std::optional<CrowdedCorner> Engine<K>::SettleCrowds(const AnsweredPoints& answe
       conormals[wall] = (tangents.transpose() * outward).normalized();
       walls |= SetOfWall(wall);
     });
-    if (!IsSubset(crowd.beyond, walls) || is_full() ||
-        stars_.sample().AnyWithin(crowd.point.data(), same) ||
-        stars_.sample().InProtectingBall(crowd.point.data()))
+    if (!IsSubset(crowd.beyond, walls) || engine_.is_full() ||
+        engine_.stars.sample().AnyWithin(crowd.point.data(), same) ||
+        engine_.stars.sample().InProtectingBall(crowd.point.data()))
       continue;
     std::vector<double> all;
     const auto gather = [&](WallSet of) {
@@ -136,17 +133,12 @@ std::optional<CrowdedCorner> Engine<K>::SettleCrowds(const AnsweredPoints& answe
       continue;
     }
     gather(cone.walls);
-    stars_.Add(crowd.point.data(), crowd.tangent.data(), Stars<K>::kNone, cone.walls, all.data());
-    if (answers.sizes.size() > 0) sizes_.AppendGiven(crowd.size);
+    engine_.stars.Add(crowd.point.data(), crowd.tangent.data(), Stars<K>::kNone, cone.walls, all.data());
+    if (answers.sizes.size() > 0) engine_.sizes.AppendGiven(crowd.size);
   }
   return bad;
 }
 
-#define STELLATE_EACH(K)                                    \
-  template PlannedPoints Engine<K>::PlanShells();           \
-  template PlannedPoints Engine<K>::CrowdQuestions() const; \
-  template std::optional<CrowdedCorner> Engine<K>::SettleCrowds(const AnsweredPoints&);
-STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
-#undef STELLATE_EACH
+STELLATE_INSTANTIATE_CLASS(Corners)
 
 }  // namespace stellate::core

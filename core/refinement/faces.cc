@@ -1,0 +1,46 @@
+#include "core/refinement/faces.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <utility>
+
+#include "core/base/instantiate.h"
+#include "core/base/interruption.h"
+
+namespace stellate::core {
+
+template <int K>
+std::vector<FaceMesh> FacesOf(const Stars<K>& stars) {
+  using Simplex = std::array<std::uint32_t, K + 1>;  // as many of them as the face has corners
+  std::map<std::pair<int, WallSet>, std::vector<Simplex>> faces;
+  for (std::uint32_t p = 0; p < stars.size(); ++p) {
+    CheckInterruption(p);
+    if (stars.sample().walls(p) == 0) continue;
+    const auto& cell = stars.cell(p);
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      const auto simplex = stars.FaceSimplexOf(p, cell, v);
+      if (simplex.walls == 0 || simplex.fake || simplex.ids[0] != p) continue;
+      // A corner of more walls than K has several vertices of its cell at itself.
+      const WallSet walls = simplex.dimension() == 0 ? stars.sample().walls(p) : simplex.walls;
+      Simplex& corners = faces[{simplex.dimension(), walls}].emplace_back();
+      std::copy_n(simplex.ids.begin(), simplex.count, corners.begin());
+    }
+  }
+  std::vector<FaceMesh> all;
+  for (auto& [key, simplices] : faces) {
+    std::sort(simplices.begin(), simplices.end());
+    simplices.erase(std::unique(simplices.begin(), simplices.end()), simplices.end());
+    FaceMesh face{key.second, key.first, {}};
+    for (const Simplex& s : simplices)
+      face.simplices.insert(face.simplices.end(), s.begin(), s.begin() + key.first + 1);
+    all.push_back(std::move(face));
+  }
+  return all;
+}
+
+#define STELLATE_EACH(K) template std::vector<FaceMesh> FacesOf<K>(const Stars<K>&);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
+
+}  // namespace stellate::core
