@@ -62,13 +62,13 @@ Status CheckWalls(const Specification& spec) {
   }
   if (!spec.oracle.conormals || !spec.oracle.tangent_basis) {
     return Invalid("walls",
-                   "walls is set: the oracle must give conormals with points of faces, and tangent "
-                   "bases, by which these are read");
+                   "walls is set: the oracle must give tangent bases and, with points of faces, "
+                   "conormals, whose coordinates are in these bases");
   }
   if (spec.declared_reach || spec.cover_box) {
     return Invalid("declared_reach",
-                   "declared_reach is set beside walls, but proofs are of manifolds without "
-                   "boundary: leave one of them out");
+                   "declared_reach is set together with walls, but only manifolds without boundary "
+                   "can be proved: leave one of them out");
   }
   return Status::Ok();
 }
@@ -224,7 +224,7 @@ Status CheckCriteria(const Criteria& c) {
   }
   if (c.size_rate && !(*c.size_rate > 0 && *c.size_rate <= 1)) {
     return Invalid("criteria.size_rate", Message("criteria.size_rate is ", *c.size_rate,
-                                                 " but must be in (0, 1]: 0.3 is a good mesh"));
+                                                 " but must be in (0, 1]: 0.3 gives a good mesh"));
   }
   if (c.max_deviation && !(*c.max_deviation >= kMinLength && *c.max_deviation <= kMaxLength)) {
     return Invalid("criteria.max_deviation", Message("criteria.max_deviation is ", *c.max_deviation,

@@ -29,11 +29,11 @@ Expected<std::string> FindMesh(const std::vector<MeshStatus>& meshes, const std:
 }  // namespace
 
 CancelCommand::CancelCommand(CLI::App& parent)
-    : command_(parent.add_subcommand("cancel", "End meshes that a server is at work on")),
+    : command_(parent.add_subcommand("cancel", "End meshes that run on a server")),
       server_(command_, "127.0.0.1:7717") {
   command_->add_option("mesh", meshes_, "its name, or as much of it as `stellate top` shows")
       ->required();
-  command_->add_flag("--delete", forget_, "forget them too, with what is meshed");
+  command_->add_flag("--delete", forget_, "delete them too, with what was meshed so far");
   command_->footer(
       "An administrator's token ends the meshes of all owners. Exit status: 0 done, 2 usage or "
       "refused, 3 no server.");

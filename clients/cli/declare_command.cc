@@ -16,7 +16,8 @@ DeclareCommand::DeclareCommand(CLI::App& parent)
       source_(command_),
       server_(command_, "127.0.0.1:7717"),
       spec_(command_, /*serves=*/false) {
-  command_->add_option("--label", label_, "that lists show; default: the manifold or the command");
+  command_->add_option("--label", label_,
+                       "the mesh's name in lists; default: the manifold or the command");
   command_->footer(
       "'stellate serve' answers for it, 'stellate download' fetches it.\n"
       "Exit status: 0 declared, 2 usage or refused, 3 server or oracle failed.");

@@ -17,10 +17,10 @@ namespace stellate::cli {
 
 DoctorCommand::DoctorCommand(CLI::App& parent)
     : command_(parent.add_subcommand(
-          "doctor", "Probe an oracle for its contract, and say in words what is wrong")),
+          "doctor", "Test whether an oracle keeps its contract, and say in words what is wrong")),
       source_(command_) {
   command_->add_option("-e,--epsilon", options_.epsilon, "that a mesh is planned with");
-  command_->add_option("--seed", options_.random_seed, "of the random questions")
+  command_->add_option("--seed", options_.random_seed, "of the random queries")
       ->capture_default_str();
   command_->add_flag("--json", json_, "print the report as JSON, as doctor.proto has it");
   CLI::Option* const listen = command_->add_option(
@@ -28,7 +28,7 @@ DoctorCommand::DoctorCommand(CLI::App& parent)
       "examine the oracles of workers that come here as to a server: host:port or unix:/path");
   command_
       ->add_option("--tls-cert", tls_certificate_,
-                   "PEM file with its certificate: others than this machine may come, over TLS")
+                   "PEM file with its certificate: other machines may come, over TLS")
       ->needs(listen);
   command_->add_option("--tls-key", tls_key_, "PEM file with its key")->needs(listen);
   command_

@@ -16,14 +16,16 @@ DownloadCommand::DownloadCommand(CLI::App& parent)
   outputs_.AddTo(command_)->required();
   CLI::Option* const wait =
       command_->add_flag("--wait", wait_, "wait for the end of a mesh that is not over");
-  command_->add_flag("--unfinished", unfinished_, "take a mesh as it is, over or failed or not")
+  command_
+      ->add_flag("--unfinished", unfinished_,
+                 "take a mesh as it is, even if it has failed or still grows")
       ->excludes(wait);
   command_->add_option("--revision", options_.revision, "the mesh as of this one; 0: the newest")
       ->capture_default_str()
       ->excludes(wait);
   command_
       ->add_option("--reconnect", options_.reconnect_seconds,
-                   "seconds that a server which went away is waited for")
+                   "seconds to wait for a server that went away")
       ->capture_default_str();
   command_->add_option("--report", report_, "file for the report as JSON");
   command_->add_flag("--json", json_, "print the report as JSON");

@@ -118,7 +118,7 @@ void Findings::Conclude(int k, const Specification& spec, Certificate& certifica
                                    : ".";
   if (!theorem_.empty()) {
     certificate.verdict = Message("Proved: ", theorem_, ". It is ", what,
-                                  ". Assumed, beside the reach: that the oracle's answers are "
+                                  ". Assumed besides the reach: that the oracle's answers are "
                                   "exact, and that the manifold has "
                                   "no boundary.");
     if (!covered_) certificate.verdict += Message(" ", unseen, declared);

@@ -57,13 +57,14 @@ PlannedPoints Corners<K>::PlanShells() {
     double radius = kShell * engine_.criteria.epsilon;
     for (const std::uint32_t q : corners)
       if (q != p)
-        radius =
-            std::min(radius, kShellShare * Distance(engine_.stars.sample().Point(p),
-                                                    engine_.stars.sample().Point(q), engine_.stars.sample().d()));
+        radius = std::min(radius, kShellShare * Distance(engine_.stars.sample().Point(p),
+                                                         engine_.stars.sample().Point(q),
+                                                         engine_.stars.sample().d()));
     engine_.boundary.SetShell(p, radius);
     for (const auto& [along, walls] : EdgesAtCorner<K>(engine_.stars, p)) {
       const Vector<K> x = radius * along;
-      engine_.stars.sample().Lift(p, x.data(), points.emplace_back(engine_.stars.sample().d()).data());
+      engine_.stars.sample().Lift(p, x.data(),
+                                  points.emplace_back(engine_.stars.sample().d()).data());
       planned.walls.push_back(walls);
     }
   }
@@ -79,7 +80,8 @@ PlannedPoints Corners<K>::Questions() const {
   PlannedPoints planned;
   for (const auto& crowd : engine_.boundary.crowds())
     ForEachWall(crowd.possible, [&](int wall) { planned.walls.push_back(SetOfWall(wall)); });
-  planned.points.resize(engine_.stars.sample().d(), static_cast<Eigen::Index>(planned.walls.size()));
+  planned.points.resize(engine_.stars.sample().d(),
+                        static_cast<Eigen::Index>(planned.walls.size()));
   Eigen::Index column = 0;
   for (const auto& crowd : engine_.boundary.crowds())
     for (int i = 0; i < CountWalls(crowd.possible); ++i) planned.points.col(column++) = crowd.point;
@@ -133,7 +135,8 @@ std::optional<CrowdedCorner> Corners<K>::Settle(const AnsweredPoints& answers) {
       continue;
     }
     gather(cone.walls);
-    engine_.stars.Add(crowd.point.data(), crowd.tangent.data(), Stars<K>::kNone, cone.walls, all.data());
+    engine_.stars.Add(crowd.point.data(), crowd.tangent.data(), Stars<K>::kNone, cone.walls,
+                      all.data());
     if (answers.sizes.size() > 0) engine_.sizes.AppendGiven(crowd.size);
   }
   return bad;

@@ -40,13 +40,13 @@ PlannedPoints FaceSeeds<K>::Choose() {
   for (auto& seed : engine_.boundary.seeds()) {
     CheckInterruption(chosen.size() + left.size());
     const int dimension = K - CountWalls(seed.walls);
-    const double apart =
-        dimension == 0 ? BoundaryState<K>::kSameCorner * engine_.criteria.epsilon : engine_.criteria.epsilon;
-    const bool covered =
-        engine_.stars.sample().AnyWithin(seed.point.data(), apart) ||
-        std::any_of(chosen.begin(), chosen.end(), [&](const auto& other) {
-          return Distance(other.point.data(), seed.point.data(), engine_.stars.sample().d()) <= apart;
-        });
+    const double apart = dimension == 0 ? BoundaryState<K>::kSameCorner * engine_.criteria.epsilon
+                                        : engine_.criteria.epsilon;
+    const bool covered = engine_.stars.sample().AnyWithin(seed.point.data(), apart) ||
+                         std::any_of(chosen.begin(), chosen.end(), [&](const auto& other) {
+                           return Distance(other.point.data(), seed.point.data(),
+                                           engine_.stars.sample().d()) <= apart;
+                         });
     const bool ripe = dimension == engine_.boundary.stage() && !covered && !engine_.is_full() &&
                       !engine_.stars.EncroachedBy(seed.point.data(), seed.walls);
     (ripe ? chosen : left).push_back(std::move(seed));

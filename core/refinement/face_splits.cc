@@ -21,8 +21,9 @@ constexpr double kShellLength = 1.1;
 template <int K>
 bool FaceSplits<K>::IsOnShell(const typename Stars<K>::FaceSimplex& simplex) const {
   if (simplex.count != 2) return false;
-  const double length = Distance(engine_.stars.sample().Point(simplex.ids[0]),
-                                 engine_.stars.sample().Point(simplex.ids[1]), engine_.stars.sample().d());
+  const double length =
+      Distance(engine_.stars.sample().Point(simplex.ids[0]),
+               engine_.stars.sample().Point(simplex.ids[1]), engine_.stars.sample().d());
   return length <= kShellLength * std::max(engine_.boundary.ShellOf(simplex.ids[0]),
                                            engine_.boundary.ShellOf(simplex.ids[1]));
 }
@@ -30,14 +31,14 @@ bool FaceSplits<K>::IsOnShell(const typename Stars<K>::FaceSimplex& simplex) con
 template <int K>
 bool FaceSplits<K>::IsSliverAtBoundary(std::uint32_t star, const Violation<K>& violation) const {
   if (violation.rule != Rule::kShape || !engine_.boundary.has_walls()) return false;
-  const auto simplex = engine_.stars.FaceSimplexOf(star, engine_.stars.cell(star), violation.vertex);
+  const auto simplex =
+      engine_.stars.FaceSimplexOf(star, engine_.stars.cell(star), violation.vertex);
   return std::any_of(simplex.ids.begin(), simplex.ids.begin() + simplex.count,
                      [&](std::uint32_t id) { return engine_.stars.sample().walls(id) != 0; });
 }
 
 template <int K>
-std::optional<Target<K>> FaceSplits<K>::Of(const typename Stars<K>::CellVertex& at,
-                                            Rule by) const {
+std::optional<Target<K>> FaceSplits<K>::Of(const typename Stars<K>::CellVertex& at, Rule by) const {
   const auto& cell = engine_.stars.cell(at.star);
   Violation<K> violation;
   violation.rule = std::min(by, Rule::kRadiusEdge);
@@ -53,7 +54,8 @@ std::optional<Target<K>> FaceSplits<K>::Of(const typename Stars<K>::CellVertex& 
   if (simplex.count == 2 && engine_.stars.sample().ProtectingRadius2(simplex.ids[0]) > 0 &&
       engine_.stars.sample().ProtectingRadius2(simplex.ids[1]) > 0)
     return std::nullopt;
-  if (by > Rule::kSize && violation.radius < kLeastSplit * engine_.sizes.BoundAt(engine_.stars, at.star))
+  if (by > Rule::kSize &&
+      violation.radius < kLeastSplit * engine_.sizes.BoundAt(engine_.stars, at.star))
     return std::nullopt;
   return TargetFor<K>(at.star, violation, engine_.sizes.BoundAt(engine_.stars, at.star),
                       engine_.criteria.advance_step, engine_.violations.failed_attempts(at.star));
@@ -61,7 +63,7 @@ std::optional<Target<K>> FaceSplits<K>::Of(const typename Stars<K>::CellVertex& 
 
 template <int K>
 std::optional<Target<K>> FaceSplits<K>::Under(std::uint32_t star,
-                                                     const Violation<K>& violation) const {
+                                              const Violation<K>& violation) const {
   if (violation.rule != Rule::kShape || !engine_.boundary.has_walls() || violation.walls != 0 ||
       engine_.violations.failed_attempts(star) == 0)
     return std::nullopt;

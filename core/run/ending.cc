@@ -184,7 +184,7 @@ void ExplainNearCorners(const Engine<K>& engine, double epsilon, Certificate* ce
   if (certificate->verdict.ends_with('.')) certificate->verdict.pop_back();
   certificate->verdict += Message(
       "; walls ", ListWalls(stars.sample().walls(near->first) | stars.sample().walls(near->second)),
-      " all but meet in one point: two corners are ", Brief(near->distance), " apart at ",
+      " nearly meet in one point: two corners are ", Brief(near->distance), " apart at ",
       NamePoint(
           Eigen::Map<const Eigen::VectorXd>(stars.sample().Point(near->first), stars.sample().d())),
       ", far less than epsilon ", Brief(epsilon),
@@ -225,7 +225,7 @@ std::string AboutLeftFaces(const Engine<K>& engine) {
       most == 1 ? "edges" : "faces of the boundary", " could not be fixed at ", bad,
       " vertices, the first at ",
       NamePoint(Eigen::Map<const Eigen::VectorXd>(stars.sample().Point(first), stars.sample().d())),
-      ", and the rest was meshed beside them; ");
+      ", and the rest was meshed without them; ");
 }
 
 template <int K>

@@ -79,8 +79,8 @@ Status WallCheck::Judge(const AnsweredPoints& answers) const {
                       inward ? " points inward: " : " is turned by more than 0.2 radians: ",
                       "beside it, a step of ", Brief(step_),
                       " along the wall and a fifth of that inward, is beyond the wall. It must be "
-                      "the outward unit normal of the wall within the tangent space: what the "
-                      "wall's value falls along")};
+                      "the outward unit normal of the wall within the tangent space: the direction "
+                      "in which the wall's value falls")};
   }
   return Status::Ok();
 }

@@ -336,7 +336,7 @@ def _parser(by_command: bool) -> argparse.ArgumentParser:
     one = add("doctor", _doctor, "probe an oracle for its contract")
     add_oracle(one)
     one.add_argument("-e", "--epsilon", type=float, help="that a mesh is planned with")
-    one.add_argument("--seed", type=int, default=1, help="of the random questions")
+    one.add_argument("--seed", type=int, default=1, help="of the random queries")
     return parser
 
 

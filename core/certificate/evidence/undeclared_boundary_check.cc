@@ -57,8 +57,9 @@ std::string UndeclaredBoundaryCheck::Judge(const AnswerBlock& answer, double pos
     const double over = gone(2 * i) + position_error, back = gone(2 * i + 1);
     if (over >= kComesBack * back || back < kAlong * place.length) continue;
     return Message("the manifold ends, or has a sharp edge, at its point ", NamePoint(place.y),
-                   ": what was asked there does not lie straight above it, and a step of ",
-                   Brief(place.length), " along it comes back, unlike the step the other way");
+                   ": the query that led there was not straight above it, and a step of ",
+                   Brief(place.length),
+                   " along it comes back, while a step the other way does not");
   }
   return {};
 }

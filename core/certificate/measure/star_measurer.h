@@ -267,7 +267,8 @@ class StarMeasurer {
     for (std::size_t m = 0; m < star_.size(); ++m) {
       std::array<double, K> b;
       signs_[m] = Solve<K>(ColumnsOf(m), ray, b);
-      if (signs_[m] == 0) return "holds a simplex that is degenerate from its tangent space";
+      if (signs_[m] == 0)
+        return "holds a simplex that is degenerate as seen from its tangent space";
       double smallest = b[0], largest = std::abs(b[0]);
       for (int r = 1; r < K; ++r) {
         smallest = std::min(smallest, b[r]);

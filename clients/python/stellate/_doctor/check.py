@@ -31,7 +31,7 @@ def check(oracle: Any, epsilon: float | None = None, *, seed: int = 1) -> CheckR
     Args:
       oracle: see stellate.Oracle.
       epsilon: that a mesh is planned with.
-      seed: of the random questions.
+      seed: of the random queries.
 
     Returns:
       All that was found, `ok` if no error is among it. Exceptions of the oracle are findings too.
