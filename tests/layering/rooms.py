@@ -159,7 +159,7 @@ PYTHON = {
     "errors.py": ("_complex.py", "_shared.py", "proto"),
     "_rows.py": (),
     "_lowest.py": ("_rows.py", "_shared.py"),
-    "oracle.py": ("errors.py",),
+    "oracle.py": ("_rows.py", "errors.py"),
     "options.py": (),
     "_wire": ("errors.py", "options.py", "oracle.py", "_wire/enums.py", "proto"),
     "_files": ("_complex.py", "_version.py", "errors.py"),

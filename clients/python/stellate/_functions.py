@@ -6,6 +6,7 @@ from typing import Any, Callable
 
 import numpy as np
 
+from ._rows import unmasked
 from .errors import OracleError, StellateError, add_words
 
 _LINES = 12  # that the exactness of a function is measured along
@@ -84,7 +85,7 @@ class UserFunction:
         )
 
     def _checked(self, answer: Any, asked: tuple[int, ...]) -> np.ndarray:
-        values, count = np.asarray(answer), asked[0]
+        values, count = np.asarray(unmasked(answer)), asked[0]
         real = values.dtype.kind in "fiu"
         if real and self._lacks_an_axis(values.shape, count):
             values = values[:, None]

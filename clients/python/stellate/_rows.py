@@ -6,11 +6,24 @@ lies in memory.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
+
+
+def unmasked(values: Any) -> Any:
+    """values, or, of a masked array, an array that is NaN where a mask hides the number.
+
+    numpy.asarray takes what is behind the mask for data.
+    """
+    if not np.ma.is_masked(values):
+        return values
+    kind = values.dtype if values.dtype.kind in "fc" else np.float64
+    return np.ma.filled(values.astype(kind), np.nan)
 
 
 def norms(rows: Array) -> Array:

@@ -10,6 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from ._rows import unmasked
 from .errors import InvalidArgument, NotConverged, OracleError, add_words
 
 __all__ = ["Oracle"]
@@ -241,12 +242,10 @@ def _describe(value: Any) -> str:
 
 def _numbers(method: str, answer: Any, shape: tuple[int, ...], found: np.ndarray) -> np.ndarray:
     """The answer as float64, or an OracleError that says what is wrong with it."""
-    array = answer if isinstance(answer, np.ndarray) else None
-    if array is None:
-        try:
-            array = np.asarray(answer)
-        except ValueError:  # ragged lists
-            array = np.asarray(None)
+    try:
+        array = np.asarray(unmasked(answer))
+    except ValueError:  # ragged lists
+        array = np.asarray(None)
     if array.dtype.kind not in "fiu":
         raise OracleError(
             f"{method} returned {_describe(answer)}; it has to return real numbers "
@@ -348,7 +347,7 @@ def _box(box: Any) -> tuple[np.ndarray, np.ndarray] | None:
 def points_of(seeds: Any, d: int) -> np.ndarray:
     """(m, d), as float64. Raises: InvalidArgument."""
     try:
-        array = np.asarray(seeds, dtype=np.float64)
+        array = np.asarray(unmasked(seeds), dtype=np.float64)
     except (TypeError, ValueError):
         raise InvalidArgument("seeds have to be an array of points (m, d)") from None
     if array.ndim != 2 or array.shape[1] != d or not len(array):

@@ -110,3 +110,27 @@ def test_points_of_no_manifold_of_that_dimension_are_refused_before_all_are_neig
 @pytest.mark.parametrize("count, noise", [(400, 0), (1000, 0.02), (8000, 0.08)])
 def test_noise_and_distance_between_points_are_not_taken_for_a_wrong_dimension(count, noise):
     insist_on_flatness(scan(count, noise), 2)
+
+
+def test_a_cloud_may_lie_far_from_the_origin():
+    """As scans in coordinates of a map do, where rounding is coarser than what is converged to."""
+    away = np.array([5e5, 5e6, 100.0])
+    points = 25 * scan(4000, 0)
+    x = points[::20] + 0.5
+    near, found = closest(oracles.PointCloud(points, 2), x)
+    far, found_far = closest(oracles.PointCloud(points + away, 2), x + away)
+    assert found.all() and found_far.all()
+    assert np.abs(far - away - near).max() < 1e-7
+
+
+def test_points_as_columns_and_rows_that_are_none_are_told():
+    points = scan(500, 0)
+    with pytest.raises(stellate.InvalidArgument, match=r"give points\.T"):
+        oracles.PointCloud(points.T, 2)
+    lacking = np.arange(500) % 100 == 7
+    for given in (
+        np.where(lacking[:, None], np.nan, points),
+        np.ma.masked_array(points, np.repeat(lacking[:, None], 3, axis=1)),
+    ):
+        with pytest.raises(stellate.InvalidArgument, match="row 7 is not finite.* 5 of 500 in all"):
+            oracles.PointCloud(given, 2)

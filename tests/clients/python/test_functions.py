@@ -112,6 +112,19 @@ def test_what_is_exact_is_not_accused(f):
             pass
 
 
+def test_what_a_mask_hides_is_no_value():
+    """Masked arrays of a detector, say: what lies behind the mask is not data."""
+
+    def half(x):
+        return np.ma.masked_where(x[:, 0] > 0.2, sphere(x))
+
+    x = np.random.default_rng(1).uniform(-1, 1, (200, 3))
+    with np.errstate(invalid="ignore"), pytest.raises(stellate.NotConverged) as caught:
+        implicit(half).closest_point(x)
+    y = caught.value.points[caught.value.converged]
+    assert len(y) > 20 and y[:, 0].max() <= 0.2 + 1e-6
+
+
 @pytest.mark.parametrize("taker", [t for t in TAKERS if t not in SEVERAL])
 def test_a_function_of_one_point_is_told_how_it_is_called(taker):
     make, _ = TAKERS[taker]

@@ -160,6 +160,29 @@ def test_a_volume_that_makes_no_sense_is_refused(options, words):
         OfVolume(ball(), **options)
 
 
+@pytest.mark.parametrize("make", [lambda v: OfVolume(v), lambda v: OfVolume(v, smooth=1.0)])
+def test_what_was_not_measured_is_told_with_its_place(make):
+    values = ball()
+    lacking = values > 5
+    first = str(np.argwhere(lacking)[0].tolist())
+    for given in (np.where(lacking, np.nan, values), np.ma.masked_where(lacking, values)):
+        with pytest.raises(stellate.InvalidArgument) as refusal:
+            make(given)
+        words = str(refusal.value)
+        assert f"{lacking.sum():,} of {values.size:,} are NaN, infinite or masked" in words
+        assert f"the first at index {first}. " in words and "np.where(np.isfinite(" in words
+    make(np.ma.masked_array(values, mask=False))
+
+
+def test_smoothing_by_too_many_voxels_is_told():
+    spacing = 0.05
+    with pytest.raises(stellate.InvalidArgument, match=r"is a length.*40 voxels.*smooth=0.075"):
+        OfVolume(ball() < 0, spacing=spacing, smooth=2)
+    OfVolume(ball() < 0, spacing=spacing, smooth=0.075)
+    with pytest.raises(stellate.InvalidArgument, match="no set of level 99"):
+        OfVolume(ball(), level=99, smooth=40)  # nor was there before
+
+
 def test_numbers_in_single_precision_are_data_like_others():
     values = ball()
     single = OfGrid(values.astype(np.float32), box_of(values))

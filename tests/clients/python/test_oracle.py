@@ -170,6 +170,8 @@ def test_keywords_reach_their_fields():
     "keywords, error, words",
     [
         ({"candidate": 3}, TypeError, "did you mean 'candidates'"),
+        ({"seed": 3}, TypeError, "did you mean 'seeds' or 'random_seed'"),
+        ({"vertices": 3}, TypeError, "did you mean .*'max_vertices'"),
         ({"qqqq": 3}, TypeError, "known: .*radius_edge_bound"),
         ({"epsilom": 3}, TypeError, "did you mean 'epsilon'"),
         ({"checkpint": "x"}, TypeError, "did you mean 'checkpoint'"),

@@ -106,6 +106,11 @@ def _audit(value: Any) -> int:
 
 def _unknown(name: str) -> str:
     known = sorted(types(MeshOptions))
-    near = difflib.get_close_matches(name, [*known, *_NAMED], 1)
-    hint = f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(known)}"
+    parts = [one for one in known if name in one.split("_")]  # "seed" of random_seed
+    near = list(dict.fromkeys([*difflib.get_close_matches(name, [*known, *_NAMED], 1), *parts]))
+    hint = (
+        f"; did you mean {' or '.join(map(repr, near))}?"
+        if near
+        else f"; known: {', '.join(known)}"
+    )
     return f"unknown keyword {name!r}{hint}"

@@ -13,6 +13,8 @@ from ._bandwidth import Fits, by_density, insist_on_flatness, noise_aware
 from ._common import Projection, as_points, box_around, tree_of
 
 _ITERATIONS = 100
+_SHORTEST_MOVE = 1e-11  # a step, in bandwidths
+_ROUNDINGS = 8 * float(np.finfo(float).eps)  # a step, in coordinates
 _LOOKS = 400  # points at which fits are looked at, for how far neighbours should reach
 _BLOCK = 2048  # queries at a time, which bounds what their neighbours take
 
@@ -54,6 +56,7 @@ class PointCloud(Projection):
             raise InvalidArgument(
                 f"{len(distinct)} different points are too few, at least {2 * terms + 1} are needed: a "
                 f"quadric has {terms} coefficients in each direction"
+                + (f". A row is a point: of {d} points as columns give points.T" if n < d else "")
             )
         self._tree = tree_of(self._points)
         if bandwidth is None:
@@ -126,7 +129,10 @@ class PointCloud(Projection):
             longest = 0.5 * reach[rows]
             step *= (longest / np.maximum(norms(step), longest))[:, None]
             there = quadric.place + step
-            found[rows[norms(there - y[rows]) <= 1e-11 * reach[rows]]] = True
+            # Far from the origin, as maps have them, coordinates are rounded more coarsely than that.
+            rounded = _ROUNDINGS * np.abs(there).max(axis=1)
+            arrived = np.maximum(_SHORTEST_MOVE * reach[rows], rounded)
+            found[rows[norms(there - y[rows]) <= arrived]] = True
             y[rows], bases[rows] = there, quadric.tangents
         return y, bases, found
 

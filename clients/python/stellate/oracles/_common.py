@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .._rows import Array, Flags, norms
+from .._rows import Array, Flags, norms, unmasked
 from ..errors import InvalidArgument, NotConverged
 from ..oracle import CheckedOracle
 
@@ -81,14 +81,17 @@ def as_points(points: Any, what: str) -> Array:
     Raises: InvalidArgument.
     """
     try:
-        array = np.array(points, dtype=np.float64)
+        array = np.array(unmasked(points), dtype=np.float64)
     except (TypeError, ValueError):
         array = np.empty(0)
     if array.ndim != 2 or not array.size:
         raise InvalidArgument(f"{what} have to be an array (n, d), and are {np.shape(points)}")
     bad = ~np.isfinite(array).all(axis=1)
     if bad.any():
-        raise InvalidArgument(f"{what}: row {int(np.argmax(bad))} is not finite")
+        raise InvalidArgument(
+            f"{what}: row {int(np.argmax(bad))} is not finite, or masked, and so are "
+            f"{np.count_nonzero(bad):,} of {len(array):,} in all. Leave out rows that hold no point"
+        )
     return array
 
 

@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from .._functions import UserFunction
-from .._rows import Array
+from .._rows import Array, unmasked
 from ..errors import InvalidArgument
 from ._grid import Grid, Spline, smoothed
 from ._implicit import ImplicitManifold
@@ -128,7 +128,7 @@ class SignedDistance(ImplicitManifold):
             smooth^2 over its radius.
           border: as in `of_grid`.
         """
-        volume = np.asarray(array)
+        volume = np.asarray(unmasked(array))
         mask = volume.dtype.kind == "b"
         if level is None:
             level = 0.5 if mask else 0.0
@@ -147,7 +147,13 @@ class SignedDistance(ImplicitManifold):
                 f"spacing has to be positive, and smooth not negative: {spacing!r} and {smooth!r}"
             )
         if smooth > 0:
-            volume = smoothed(volume, smooth / sides)
+            sharp, volume = volume, smoothed(volume, smooth / sides)
+            if sharp.min() < level < sharp.max() and not volume.min() < level < volume.max():
+                raise InvalidArgument(
+                    f"smooth={smooth:g} leaves nothing of the level {level:g}: it is a length, in the unit of "
+                    f"spacing, and here {float((smooth / sides).max()):.3g} voxels. Some 1.5 voxels, "
+                    f"smooth={1.5 * float(sides.max()):.4g}, do for a mask"
+                )
         box = lower, lower + sides * (np.array(volume.shape) - 1)
         oracle = cls.of_grid(volume, box, level=level, border=border)
         if smooth > 0:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .._rows import Array, norms
+from .._rows import Array, norms, unmasked
 from ..errors import InvalidArgument
 
 _FLAT = 0.5  # of the places where a level is passed, of which no more may lie between equal values
@@ -17,9 +17,27 @@ _BLOCK = 1024  # places at a time, whose taps the processor's cache holds
 
 
 def smoothed(values: Any, deviations: Array) -> Array:
-    """By a Gaussian of standard deviations (d,), in spacings. Raises: InvalidArgument without scipy."""
-    gaussian = _ndimage().gaussian_filter
-    return np.asarray(gaussian(np.asarray(values, dtype=np.float64), deviations, mode="nearest"))
+    """By a Gaussian of standard deviations (d,), in spacings.
+
+    Raises: InvalidArgument without scipy, and for values that are not finite, which would spread.
+    """
+    numbers = np.asarray(values, dtype=np.float64)
+    insist_on_values(numbers)
+    return np.asarray(_ndimage().gaussian_filter(numbers, deviations, mode="nearest"))
+
+
+def insist_on_values(values: Array) -> None:
+    """Raises: InvalidArgument, where some are not finite, with their place and what to do."""
+    bad = ~np.isfinite(values)
+    if not bad.any():
+        return
+    first = [int(i) for i in np.unravel_index(int(bad.argmax()), values.shape)]
+    raise InvalidArgument(
+        f"values on the grid have to be finite, and {np.count_nonzero(bad):,} of {values.size:,} are NaN, "
+        f"infinite or masked, the first at index {first}. Where nothing was measured give them a value of the "
+        "side of the surface that they lie on, such as outside: np.where(np.isfinite(values), values, "
+        "outside); or cut the array to what was measured"
+    )
 
 
 def _ndimage() -> Any:
@@ -40,7 +58,7 @@ class Grid:
     """
 
     def __init__(self, values: Any, bounding_box: Any) -> None:
-        array = np.asarray(values)
+        array = np.asarray(unmasked(values))
         if array.dtype.kind not in "fiub":
             raise InvalidArgument(f"values on a grid have to be real numbers, not {array.dtype}")
         self.values = np.asarray(array, dtype=np.float64)
@@ -55,8 +73,7 @@ class Grid:
             )
         if min(array.shape) < 4:
             raise InvalidArgument(f"a cubic spline needs 4 values an axis, and has {array.shape}")
-        if not np.isfinite(self.values).all():
-            raise InvalidArgument("values on the grid have to be finite")
+        insist_on_values(self.values)
         self.lower, self.upper = lower, upper
         self.spacing = (upper - lower) / (np.array(array.shape) - 1)
 
