@@ -159,7 +159,7 @@ class PartedRun {
   bool IsOwn(int part, std::uint32_t id) const { return owner_[parts_[part].names[id]] == part; }
 
   void Name(Part* part, std::uint32_t name) {
-    part->engine->NameLast(name);
+    part->engine->parts().stars.NameLast(name);
     part->names.push_back(name);
   }
 
@@ -259,7 +259,8 @@ class PartedRun {
       const auto& names = parts_[part].names;
       const auto at = std::lower_bound(names.begin(), names.end(), star);
       if (part != from && at != names.end() && *at == star)
-        parts_[part].engine->NoteFailedAttempt(static_cast<std::uint32_t>(at - names.begin()));
+        parts_[part].engine->parts().violations.NoteFailedAttempt(
+            static_cast<std::uint32_t>(at - names.begin()));
     }
   }
 
