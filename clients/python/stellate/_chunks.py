@@ -39,11 +39,13 @@ class Declared:
         bounding_box: Any = None,
         seeds: Any = None,
         walls: Any = 0,
+        about: Any = "",
         **can: bool,
     ) -> None:
         """`ask` answers chunks; None: nobody calls a method."""
         self.dimension, self.ambient_dimension = dimension, ambient_dimension
         self.bounding_box, self.seeds, self.walls = bounding_box, seeds, walls
+        self.about = about
         self._ask = ask
         able = [method for method in _METHODS if can.get(method)]
         for method in (*able, *(_OF_WALLS if walls else ())):

@@ -28,6 +28,9 @@ def load(name: str) -> Any:
     module_name, colon, path = name.partition(":")
     if not colon or not path:
         raise Refused(f"'{name}' has to be MODULE:OBJECT, such as shapes:torus")
+    if module_name.endswith(".py"):
+        named = module_name[:-3].replace(os.sep, ".")
+        raise Refused(f"'{name}' names a file: a module goes without .py, as {named}:{path}")
     if os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())
     try:

@@ -43,6 +43,7 @@ def pull(
     tangent_basis: bool = False,
     local_size: bool = False,
     walls: int = 0,
+    about: str = "",
     checkpoint: str | os.PathLike[str] | None = None,
     credentials: Credentials | None = None,
     max_chunk: int | None = None,
@@ -62,6 +63,7 @@ def pull(
       intersect_flat, tangent_basis, local_size: what the answers will have when a chunk wants it.
       walls: how many walls bound the manifold: then chunks may be about a face, and want clearances
         and conormals.
+      about: one sentence for people, with which the verdict ends: see stellate.Oracle.
       server, checkpoint, credentials, max_chunk, options: as for stellate.mesh.
 
     The loop ends when the mesh is finished, and raises how it failed. A loop that takes minutes over a
@@ -73,6 +75,7 @@ def pull(
     declared = _examined(
         puller, dimension, ambient_dimension, bounding_box=bounding_box, walls=walls,
         seeds=options.get("seeds"), intersect_flat=intersect_flat, tangent_basis=tangent_basis, local_size=local_size,
+        about=about,
     )  # fmt: skip
 
     def note(progress: Progress) -> None:

@@ -85,6 +85,16 @@ def test_what_is_made_of_a_cloud_tells_of_it_too():
     assert cloud.about == repr(cloud)
     half = oracles.Clipped(cloud, [oracles.HalfSpace([1, 0, 0])])
     assert half.about == cloud.about
+    other = oracles.PointCloud(scan(4000, 0.003), 2, bandwidth=0.3)
+    assert oracles.Product(cloud, cloud, other).about == f"{cloud.about}; {other.about}"
+    torus = stellate.manifolds.Torus(1, 0.4)
+    assert oracles.Product(torus, cloud).about == cloud.about
+    assert oracles.Transformed(cloud).about == cloud.about
+    assert oracles.Transformed(cloud, scale=2).about == cloud.about + ", scaled by 2"
+    assert oracles.Transformed(torus, scale=2).about == ""
+    assert oracles.LevelSet(cloud, lambda x: x[:, 2:]).about == cloud.about
+    rim = oracles.Transformed(stellate.manifolds.Sphere(1), rotation=np.eye(3)[:, :2])
+    assert oracles.ManifoldWithBoundary(cloud, rim).about == cloud.about
 
 
 def colours(count):

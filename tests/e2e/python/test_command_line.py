@@ -138,6 +138,7 @@ def test_programs_serve_what_was_declared(shell, server, repository):
         (["mesh", "--oracle-command", "x", "--box", "1:0", "-e", "1"], "is not a box"),
         (["mesh", "shapes:absent", "-e", "0.3"], "has no attribute 'absent'"),
         (["mesh", "shapes", "-e", "0.3"], "MODULE:OBJECT"),
+        (["mesh", "shapes.py:ring", "-e", "0.3"], "goes without .py, as shapes:ring"),
         (["mesh", "absent:torus", "-e", "0.3"], "No module named 'absent'"),
         (["mesh", "shapes:torus"], "--epsilon"),
         (["mesh", "shapes:torus", "-e", "fine"], "length or auto"),

@@ -325,6 +325,11 @@ def test_what_an_oracle_says_of_itself_changes_no_mesh(server):
     verdict = plain.report.certificate.verdict
     words = f" The oracle says of itself: {told.about}"
     assert other.report.certificate.verdict == verdict.removesuffix(".") + "." + words
+    box = ([-1.2] * 3, [1.2] * 3)
+    with stellate.pulling.pull(2, 3, 0.5, server, bounding_box=box, about=told.about) as puller:
+        for chunk in puller:
+            chunk.answer(told.closest_point(chunk.points))
+    assert puller.mesh.report.certificate.verdict.endswith(words)
     coarse = stellate.mesh(told, 5, server=server).report
     assert not coarse.certified and coarse.certificate.verdict.endswith(words)
 

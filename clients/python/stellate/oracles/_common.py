@@ -26,6 +26,11 @@ def refuse_walls(oracle: CheckedOracle, made: str) -> None:
         )
 
 
+def told_by(*parts: CheckedOracle) -> str:
+    """What the oracles that another is made of say of themselves, each thing once."""
+    return "; ".join(dict.fromkeys(part.about for part in parts if part.about))
+
+
 def where_of(oracle: CheckedOracle) -> tuple[Array, Array]:
     """The box that an oracle has, or one about its seeds, as large as these lie apart; else 1."""
     if oracle.bounding_box is not None:
