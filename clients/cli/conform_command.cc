@@ -16,10 +16,10 @@
 namespace stellate::cli {
 namespace {
 
-// Whether `python -c "import stellate"` works.
-bool HasStellate(const char* python) {
+// Whether `python -c "import stellate_conform"` works.
+bool HasKit(const char* python) {
   std::array<char*, 4> arguments = {const_cast<char*>(python), const_cast<char*>("-c"),
-                                    const_cast<char*>("import stellate"), nullptr};
+                                    const_cast<char*>("import stellate_conform"), nullptr};
   posix_spawn_file_actions_t quiet;
   posix_spawn_file_actions_init(&quiet);
   posix_spawn_file_actions_addopen(&quiet, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
@@ -39,8 +39,8 @@ ConformCommand::ConformCommand(CLI::App& parent) {
 
 int ConformCommand::Run(int count, char** arguments) {
   for (const char* const python : {"python3", "/usr/bin/python3"}) {
-    if (!HasStellate(python)) continue;
-    std::vector<std::string> words = {python, "-m", "stellate", "conform"};
+    if (!HasKit(python)) continue;
+    std::vector<std::string> words = {python, "-m", "stellate_conform"};
     words.insert(words.end(), arguments, arguments + count);
     std::vector<char*> line;
     line.reserve(words.size() + 1);
@@ -48,8 +48,9 @@ int ConformCommand::Run(int count, char** arguments) {
     line.push_back(nullptr);
     execvp(python, line.data());
   }
-  std::cerr << "stellate: conform is a part of the Python client, and no python3 here can import "
-               "stellate: install that (docs/running/installing.md)\n";
+  std::cerr
+      << "stellate: the conformance kit is a Python package of its own, which no python3 here has: "
+         "in Stellate's sources, pip install ./clients/python ./clients/conform\n";
   return kExitFailed;
 }
 

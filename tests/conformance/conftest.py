@@ -5,4 +5,5 @@ import sys
 
 _ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(_ROOT / "clients" / "python"))
+sys.path.insert(0, str(_ROOT / "clients" / "conform"))
 sys.path.insert(0, str(_ROOT / "tests" / "clients" / "python"))

@@ -7,15 +7,15 @@ import subprocess
 import sys
 
 import pytest
-from stellate._conform.recorder import read_session
 from stellate._generated import oracle_pb2
 from stellate._wire.arrays import from_wire
+from stellate_conform.recorder import read_session
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 ENVIRONMENT = {
     **os.environ,
-    "PYTHONPATH": str(ROOT / "clients" / "python"),
+    "PYTHONPATH": f"{ROOT}/clients/python:{ROOT}/clients/conform",
     "PYTHONWARNINGS": "ignore",
     "PATH": f"{pathlib.Path(sys.executable).parent}:{os.environ['PATH']}",
 }
@@ -23,8 +23,11 @@ PYTHON_CLIENT = (sys.executable, str(HERE / "python_client.py"))
 FAULTY_CLIENT = (sys.executable, str(HERE / "faulty_client.py"))
 
 
-def start(*arguments, kit=(sys.executable, "-m", "stellate")):
-    command = [*kit, "conform", "--json", *arguments]
+KIT = (sys.executable, "-m", "stellate_conform")
+
+
+def start(*arguments, kit=KIT):
+    command = [*kit, "--json", *arguments]
     return subprocess.Popen(command, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True)
 
 
@@ -43,7 +46,9 @@ def runs(tmp_path_factory):
     cpp = os.environ["STELLATE_CPP_CLIENT"]
     return {
         "python": start("--record", str(record), "--", *PYTHON_CLIENT),
-        "cpp": start("--", cpp, kit=(os.environ["STELLATE"],)),  # handed over by the command line
+        "cpp": start(
+            "--", cpp, kit=(os.environ["STELLATE"], "conform")
+        ),  # handed over by the command line
         "faultless": start("worker", "--", *FAULTY_CLIENT, "none"),
         "record": record,
     }
@@ -126,9 +131,8 @@ def test_a_fault_is_found(fault, only, found):
     ],
 )
 def test_what_makes_no_sense_is_refused(arguments, words):
-    command = [sys.executable, "-m", "stellate", "conform", *arguments]
     done = subprocess.run(
-        command,
+        [*KIT, *arguments],
         env=ENVIRONMENT,
         stdin=subprocess.DEVNULL,
         capture_output=True,
@@ -143,3 +147,15 @@ def test_what_makes_no_sense_is_refused(arguments, words):
 def test_a_client_that_dies_fails_what_is_left():
     said = verdicts(start("creator", "--", "true"), status=1)
     assert said["passed"] == 0 and said["failed"] > 10
+
+
+def test_without_the_package_the_command_line_says_how_to_get_it(tmp_path):
+    nowhere = {"PATH": str(tmp_path), "PYTHONNOUSERSITE": "1", "PYTHONPATH": ""}
+    done = subprocess.run(
+        [os.environ["STELLATE"], "conform", "--help"],
+        env=nowhere, cwd=tmp_path, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 3
+    assert done.stderr.count("\n") == 1 and "pip install" in done.stderr
+    for folder in ("clients/python", "clients/conform"):
+        assert f"./{folder}" in done.stderr and (ROOT / folder / "pyproject.toml").is_file()

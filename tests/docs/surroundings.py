@@ -121,7 +121,7 @@ class Surroundings:
         return {
             **inherited,
             "PATH": f"{self.here}/.programs:{os.environ['PATH']}:/usr/sbin",
-            "PYTHONPATH": str(self.here / "clients" / "python"),
+            "PYTHONPATH": f"{self.here}/clients/python:{self.here}/clients/conform",
             "PYTHONDONTWRITEBYTECODE": "1",
             "HOME": str(self.here),
             "TMPDIR": str(self.here),

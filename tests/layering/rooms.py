@@ -206,6 +206,13 @@ CLIENTS = {
     },
     "clients/python/stellate": ("proto", *(in_package(room) for room in PYTHON)),
     "clients/python/examples": ("clients/python/stellate",),
+    # Which nobody takes.
+    "clients/conform": (
+        "clients/python/stellate",
+        in_package("_shared.py"),
+        in_package("_wire"),
+        "proto",
+    ),
 }
 
 # Tests may take what they test, and not more of the house than that.
@@ -242,6 +249,7 @@ TABLE = Table(
             "server/base",
             "clients/cpp/run",
             "clients/listening",
+            "clients/conform",
             "clients/python/stellate",
             "clients/view/gateway",
             "tests",
@@ -251,7 +259,10 @@ TABLE = Table(
         "boost/": ("clients/view/gateway",),  # the viewer's sockets, and nothing else
     },
     generated={"stellate/v1/": "proto", "stellate/rpc/": "proto"},
-    packages={"stellate": "clients/python/stellate"},
+    packages={
+        "stellate": "clients/python/stellate",
+        "stellate_conform": "clients/conform/stellate_conform",
+    },
     watched=(
         "core",
         "text",
@@ -259,6 +270,7 @@ TABLE = Table(
         "clients/cpp",
         "clients/view",
         "clients/cli",
+        "clients/conform",
         "clients/python/stellate",
     ),
     # Angles, of which only words and figures of the report are made, or a proof with a margin: no

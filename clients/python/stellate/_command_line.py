@@ -26,7 +26,6 @@ from . import options as _options
 from ._api import download, mesh
 from ._command_oracle import CommandOracle
 from ._complex import Complex
-from ._conform import command as conform
 from ._credentials import Credentials
 from ._doctor.check import check
 from ._download import Unfinished
@@ -225,13 +224,6 @@ def _doctor(options: argparse.Namespace) -> int:
     return _WELL if report.ok else _NOT_CERTIFIED
 
 
-def _conform(options: argparse.Namespace) -> int:
-    try:
-        return conform.main(options, options.command_of_client)
-    except ValueError as error:
-        raise Refused(str(error)) from error
-
-
 def _epsilon(text: str) -> float | str:
     try:
         return text if text == "auto" else float(text)
@@ -328,11 +320,6 @@ def _parser(by_command: bool) -> argparse.ArgumentParser:
     how.add_argument("--revision", type=int, default=0, metavar="N", help="0: the newest")
     _add_connection(one, "127.0.0.1:7717")
 
-    one = add("conform", _conform, "hold a client in any language to the rules of the protocol")
-    one.usage = "%(prog)s [ROLE ...] [OPTION ...] -- COMMAND [ARGUMENT ...]"
-    one.description, one.formatter_class = conform.HELP, argparse.RawDescriptionHelpFormatter
-    conform.add(one)
-
     one = add("doctor", _doctor, "probe an oracle for its contract")
     add_oracle(one)
     one.add_argument("-e", "--epsilon", type=float, help="that a mesh is planned with")
@@ -343,11 +330,8 @@ def _parser(by_command: bool) -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    at = given.index("--") if given[:1] == ["conform"] and "--" in given else len(given)
-    words, of_client = given[:at], given[at + 1 :]
-    by_command = any(word.partition("=")[0] == "--oracle-command" for word in words)
-    options = _parser(by_command).parse_args(words)
-    options.command_of_client = of_client
+    by_command = any(word.partition("=")[0] == "--oracle-command" for word in given)
+    options = _parser(by_command).parse_args(given)
     try:
         return options.run(options)
     except KeyboardInterrupt as stopped:

@@ -181,7 +181,7 @@ def test_tokens_come_from_a_file_or_the_environment(shell, tmp_path):
 def test_help(shell, capsys):
     whole = shell("--help")
     assert whole.returncode == 0 and "MODULE:OBJECT" in whole.stdout
-    for command in ("mesh", "declare", "serve", "download", "doctor", "conform"):
+    for command in ("mesh", "declare", "serve", "download", "doctor"):
         assert command in whole.stdout
         # In this process: another would have to import it all again.
         with pytest.raises(SystemExit) as ended:

@@ -1,17 +1,20 @@
-"""tests/conformance of the source tree, which the package carries."""
+"""tests/conformance of the source tree; its wheel carries a copy."""
 
 from __future__ import annotations
 
 import importlib.resources
 import json
+import pathlib
 from collections.abc import Iterator
 from typing import Any
 
-from .._generated import stellate_pb2 as pb
+from stellate._generated import stellate_pb2 as pb
 
 
 def carried(path: str) -> bytes:
-    at = importlib.resources.files("stellate._generated").joinpath("conformance")
+    at = importlib.resources.files("stellate_conform").joinpath("conformance")
+    if not at.is_dir():
+        at = pathlib.Path(__file__).resolve().parents[3] / "tests" / "conformance"
     for part in path.split("/"):
         at = at.joinpath(part)
     return at.read_bytes()

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import grpc
+from stellate._generated import mesh_pb2
+from stellate._generated import stellate_pb2 as pb
 
-from .._generated import mesh_pb2
-from .._generated import stellate_pb2 as pb
 from .files import carried, entries, recorded
 from .scenario import Refusal, Scenario, agree
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import grpc
 import numpy as np
+from stellate._generated import oracle_pb2 as pb
+from stellate._wire.arrays import from_wire, to_wire
 
-from .._generated import oracle_pb2 as pb
-from .._wire.arrays import from_wire, to_wire
 from . import manifolds
 from .scenario import Refusal, Scenario, agree
 from .server import Silence, Stream

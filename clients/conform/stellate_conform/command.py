@@ -1,4 +1,4 @@
-"""`stellate conform`: see HELP."""
+"""The command `stellate-conform`: see HELP."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 import pathlib
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from . import troubles
@@ -56,8 +56,13 @@ MANIFOLD is one of
 """
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    """The arguments of `stellate conform`."""
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="stellate-conform",
+        usage="%(prog)s [ROLE ...] [OPTION ...] -- COMMAND [ARGUMENT ...]",
+        description=HELP,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument(
         "roles", nargs="*", metavar="ROLE", default=[],
         help=f"of {', '.join(_ROLES)}; default: all",
@@ -73,6 +78,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-q", "--quiet", action="store_true", help="print failures alone")
     parser.add_argument("--patience", type=float, default=60.0, metavar="SECONDS",
                         help="for one line to be obeyed; default: 60")  # fmt: skip
+    return parser
 
 
 def _scenarios(
@@ -94,8 +100,22 @@ def _scenarios(
             yield scenario
 
 
-def main(options: argparse.Namespace, command: list[str]) -> int:
-    """The number of an exit status. Raises: OSError, ValueError."""
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The exit status: 0, 1 where a rule is broken or none was tried, 2 where nothing could be."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    at = given.index("--") if "--" in given else len(given)
+    options = _parser().parse_args(given[:at])
+    try:
+        return _run(options, given[at + 1 :])
+    except KeyboardInterrupt:
+        print("stellate-conform: stopped", file=sys.stderr)
+        return 1
+    except (OSError, ValueError) as error:
+        print(f"stellate-conform: {error}", file=sys.stderr)
+        return 2
+
+
+def _run(options: argparse.Namespace, command: list[str]) -> int:
     strange = [role for role in options.roles if role not in _ROLES]
     if strange:
         raise ValueError(f"'{strange[0]}' has to be one of {', '.join(_ROLES)}")

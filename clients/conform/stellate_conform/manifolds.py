@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any, Optional
 
 import numpy as np
-
-from .. import manifolds
+from stellate import manifolds
 
 # Rounding of a handful of operations on numbers of about 1, with a thousandfold to spare: languages
 # differ in hypot and in fused multiplications.

@@ -7,9 +7,9 @@ from typing import Any
 
 import grpc
 import numpy as np
+from stellate._generated import mesh_pb2, stellate_pb2
+from stellate._wire.arrays import from_wire
 
-from .._generated import mesh_pb2, stellate_pb2
-from .._wire.arrays import from_wire
 from .files import entries
 from .scenario import Refusal, Scenario, agree
 

@@ -9,9 +9,8 @@ from collections.abc import Iterator
 from typing import Any, BinaryIO
 
 from google.protobuf.message import DecodeError
-
-from .._generated import session_pb2 as pb
-from .._generated import status_details_pb2 as details_pb
+from stellate._generated import session_pb2 as pb
+from stellate._generated import status_details_pb2 as details_pb
 
 
 class Recorder:

@@ -9,10 +9,10 @@ from concurrent import futures
 from typing import Any
 
 import grpc
+from stellate._generated import oracle_pb2 as pb
+from stellate._generated import stellate_pb2
+from stellate._generated import stellate_pb2_grpc as rpc
 
-from .._generated import oracle_pb2 as pb
-from .._generated import stellate_pb2
-from .._generated import stellate_pb2_grpc as rpc
 from .recorder import Call, Recorder
 from .scenario import Refusal, Scenario
 

@@ -8,10 +8,10 @@ from collections.abc import Iterator
 from typing import Any, Callable
 
 import grpc
+from stellate._generated import mesh_pb2, stellate_pb2
+from stellate._generated import status_details_pb2 as details_pb
+from stellate._shared import table
 
-from .._generated import mesh_pb2, stellate_pb2
-from .._generated import status_details_pb2 as details_pb
-from .._shared import table
 from .driver import Speechless
 from .results import FAIL, PASS, UNTRIED, Result, Results
 

@@ -7,8 +7,8 @@ from typing import Any, Callable
 
 import grpc
 import numpy as np
+from stellate._generated import mesh_pb2
 
-from .._generated import mesh_pb2
 from .scenario import Refusal, Scenario, agree
 from .server import Silence, Stream
 from .worker import Answers, Flats, OtherWalls, Partly, Serving, Walls, manifold
