@@ -1,11 +1,14 @@
 #include "server/config/flags.h"
 
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <cstdio>
 #include <iostream>
 #include <string>
+#include <system_error>
 #include <type_traits>
 
+#include "core/base/message.h"
 #include "server/base/version.h"
 #include "server/config/settings.h"
 
@@ -30,6 +33,19 @@ CLI::Option* AddChoice(CLI::App* app, const Setting& setting, T* value, const ch
       ->default_str(current);
 }
 
+// What is wrong with a number, in place of CLI11's words, which name no range, and none that help.
+// It would also read -3 into a number without sign. Empty: nothing, but for the range.
+template <typename T>
+std::string ComplaintOf(const Setting& setting, const std::string& text) {
+  T value{};
+  const char* const end = text.data() + text.size();
+  const auto read = std::from_chars(text.data(), end, value);
+  if (read.ec == std::errc() && read.ptr == end) return "";
+  return core::Message("is \"", text, "\" but must be a ",
+                       std::is_integral_v<T> ? "whole number" : "number", " from ",
+                       static_cast<T>(setting.least), " to ", static_cast<T>(setting.most));
+}
+
 void AddSetting(CLI::App* app, const Setting& setting, Config* config) {
   CLI::Option* const option = std::visit(
       [&](auto field) {
@@ -41,9 +57,9 @@ void AddSetting(CLI::App* app, const Setting& setting, Config* config) {
           return AddChoice(app, setting, &value, LogLevelName(value), ReadLogLevel);
         } else if constexpr (std::is_same_v<T, LogFormat>) {
           return AddChoice(app, setting, &value, LogFormatName(value), ReadLogFormat);
-        } else if constexpr (std::is_unsigned_v<T>) {  // which CLI11 would read -3 into
+        } else if constexpr (std::is_arithmetic_v<T>) {
           return app->add_option(setting.flag, value, setting.help)
-              ->check(CLI::Validator(CLI::NonNegativeNumber).description(""));
+              ->check([setting](const std::string& text) { return ComplaintOf<T>(setting, text); });
         } else {
           return app->add_option(setting.flag, value, setting.help);
         }
@@ -106,11 +122,16 @@ ParsedFlags ParseFlags(int argc, const char* const* argv) {
     const std::string words = error.what();
     const std::string key = words.substr(words.rfind(' ') + 1);
     const bool known = words.find("not allowed") != std::string::npos;
-    std::fprintf(
-        stderr, "stellated: --config: %s\n",
-        known ? words.c_str()
-              : ("there is no setting \"" + key + "\": --print-config prints those that there are")
-                    .c_str());
+    const bool in_section = key.ends_with(".++");  // as CLI11 writes its beginning
+    const std::string no_section = "there is a section [" + key.substr(0, key.find('.')) +
+                                   "]: settings stand in the file without sections";
+    const std::string no_setting =
+        "there is no setting \"" + key + "\": --print-config prints those that there are";
+    std::fprintf(stderr, "stellated: --config: %s\n",
+                 (known        ? words
+                  : in_section ? no_section
+                               : no_setting)
+                     .c_str());
     parsed.exit_status = kExitUsage;
   } catch (const CLI::ParseError& error) {
     parsed.exit_status = app.exit(error) == 0 ? 0 : kExitUsage;

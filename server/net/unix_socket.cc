@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 
 #include "core/base/message.h"
 
@@ -17,6 +18,12 @@ using core::Status;
 using core::StatusCode;
 
 core::Status ClearUnixPath(const std::string& path) {
+  const std::filesystem::path directory = std::filesystem::path(path).parent_path();
+  if (access(directory.empty() ? "." : directory.c_str(), W_OK | X_OK) != 0) {
+    return {StatusCode::kFailedPrecondition,
+            Message("--listen is unix:", path,
+                    " but no socket can be made in its directory: ", std::strerror(errno))};
+  }
   struct stat info {};
   if (lstat(path.c_str(), &info) != 0) return Status::Ok();
   if (!S_ISSOCK(info.st_mode)) {

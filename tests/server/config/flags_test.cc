@@ -114,7 +114,13 @@ TEST_F(FlagsTest, TheCommandLineComesFirst) {
 
 TEST_F(FlagsTest, MistakesInTheFileAreNamed) {
   ExpectRefused("max-meshs = 5\n", "\"max-meshs\"");
-  ExpectRefused("max-meshes = many\n", "max-meshes");
+  ExpectRefused("max-meshes = many\n",
+                "--max-meshes: is \"many\" but must be a whole number from 1 to 100000\n");
+  ExpectRefused("max-meshes = 1e3\n", "is \"1e3\" but must be a whole number");
+  ExpectRefused("max-meshes\n", "--max-meshes: ");
+  ExpectRefused("hello-seconds = 10s\n",
+                "is \"10s\" but must be a number from 0.001 to 31622400\n");
+  ExpectRefused("[server]\nmax-meshes = 5\n", "there is a section [server]");
   ExpectRefused("log-level = loud\n", "loud");
   ExpectRefused("health-check = true\n", "health-check");
   EXPECT_EQ(Parse({"--config", file_ + ".none"}).exit_status, 2);
@@ -131,7 +137,8 @@ TEST_F(FlagsTest, MistakesOnTheCommandLineToo) {
     EXPECT_NE(error_, "");
   }
   EXPECT_EQ(Parse({"--max-meshes", "-3"}).exit_status, 2);
-  EXPECT_NE(error_.find("-3"), std::string::npos) << error_;
+  EXPECT_NE(error_.find("\"-3\" but must be a whole number from 1 to"), std::string::npos)
+      << error_;
 }
 
 TEST_F(FlagsTest, HelpHasEveryFlagOnce) {

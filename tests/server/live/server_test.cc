@@ -58,6 +58,15 @@ TEST_F(ServerTest, ALivingServersSocketIsNotTakenOver) {
   EXPECT_EQ(CheckHealth(server_->address(), 60s), "");
 }
 
+TEST_F(ServerTest, ADirectoryThatTakesNoSocketIsNamed) {
+  Config config;
+  config.listen = "unix:" + ::testing::TempDir() + "stellate-no-such-directory/socket";
+  const auto server = Server::Start(config);
+  ASSERT_FALSE(server);
+  EXPECT_NE(server.error().message.find("in its directory: No such file"), std::string::npos)
+      << server.error().message;
+}
+
 TEST_F(ServerTest, AFileThatIsNoSocketIsLeftAlone) {
   Config config;
   const std::string path = ::testing::TempDir() + "stellate-file-" + std::to_string(getpid());
