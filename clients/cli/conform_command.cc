@@ -16,10 +16,10 @@
 namespace stellate::cli {
 namespace {
 
-// Whether `python -c "import stellate_conform"` works.
+// Whether this Python has the kit, and all that it imports.
 bool HasKit(const char* python) {
   std::array<char*, 4> arguments = {const_cast<char*>(python), const_cast<char*>("-c"),
-                                    const_cast<char*>("import stellate_conform"), nullptr};
+                                    const_cast<char*>("import stellate_conform.command"), nullptr};
   posix_spawn_file_actions_t quiet;
   posix_spawn_file_actions_init(&quiet);
   posix_spawn_file_actions_addopen(&quiet, STDERR_FILENO, "/dev/null", O_WRONLY, 0);

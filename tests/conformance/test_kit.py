@@ -149,6 +149,18 @@ def test_a_client_that_dies_fails_what_is_left():
     assert said["passed"] == 0 and said["failed"] > 10
 
 
+def test_a_python_that_lacks_what_the_kit_imports_is_passed_over(tmp_path):
+    bare = tmp_path / "python3"
+    bare.write_text(f'#!/bin/sh\nexec {sys.executable} -S "$@"\n')  # no site-packages: no grpc
+    bare.chmod(0o755)
+    done = subprocess.run(
+        [os.environ["STELLATE"], "conform", "--help"],
+        env={**ENVIRONMENT, "PATH": str(tmp_path)}, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("usage: stellate-conform")
+
+
 def test_without_the_package_the_command_line_says_how_to_get_it(tmp_path):
     nowhere = {"PATH": str(tmp_path), "PYTHONNOUSERSITE": "1", "PYTHONPATH": ""}
     done = subprocess.run(
