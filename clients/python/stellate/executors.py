@@ -256,6 +256,15 @@ class ExecutorWorkers:
     def _after(self, error: Exception, executor: futures.Executor, attempt: int) -> None:
         """Returns when a chunk that the executor lost is worth another attempt."""
         words = f"{type(error).__name__}: {error}"
+        if (
+            isinstance(error, (pickle.PicklingError, AttributeError, TypeError))
+            and "pickle" in words
+        ):
+            raise ExecutorError(
+                f"the oracle cannot be sent to the executor's processes ({words}): they are sent what "
+                "pickle can write. Give it functions that a module defines by def, no lambda and none "
+                "within another function, and nothing open, such as a file or a lock"
+            ) from error
         if isinstance(error, futures.BrokenExecutor) and not self._pool.replace(executor):
             raise ExecutorError(
                 f"the executor broke ({words}): one of its processes died, of a signal or for want "

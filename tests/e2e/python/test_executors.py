@@ -195,11 +195,13 @@ def test_leaving_takes_the_workers_away_and_the_mesh_stays(client, declare, tmp_
     assert stellate.download(name, server=client).certified
 
 
-def test_what_cannot_be_sent_is_said(client, declare, tmp_path):
+@pytest.mark.parametrize("held", [threading.Lock(), lambda x: x], ids=["lock", "lambda"])
+def test_what_cannot_be_sent_is_said(held, client, declare, tmp_path):
     oracle = Torus(tmp_path)
-    oracle.lock = threading.Lock()
+    oracle.held = held
     name = declare(oracle)
-    with processes(1) as pool, pytest.raises(stellate.ExecutorError, match="pickle"):
+    words = "cannot be sent .*pickle.*: they .* no lambda and .* a file or a lock"
+    with processes(1) as pool, pytest.raises(stellate.ExecutorError, match=words):
         stellate.executors.workers_on(pool, oracle, name, 1, server=client).wait()
     assert not client.get(name).over
 
