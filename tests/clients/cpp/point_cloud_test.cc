@@ -133,5 +133,18 @@ TEST(PointCloud, SaysHowFarItsNeighboursReach) {
   EXPECT_EQ(Clipped(uneven, {Ball(Eigen::Vector3d::UnitX(), 0.5)}).about(), local);
 }
 
+// As scans in coordinates of a map do, where rounding is coarser than what is converged to.
+TEST(PointCloud, MayLieFarFromTheOrigin) {
+  const Eigen::Vector3d away(5e5, 5e6, 100);
+  const Eigen::MatrixXd points = 25 * ScanOf(4000, 0);
+  const Eigen::MatrixXd x = points.leftCols(200).array() + 0.5;
+  PointCloud here(points, 2), there(points.colwise() + away, 2);
+  const Answer near = here.ClosestPoint(x), far = there.ClosestPoint(x.colwise() + away);
+  for (Eigen::Index j = 0; j < x.cols(); ++j) {
+    ASSERT_TRUE(near.IsFound(j) && far.IsFound(j)) << j;
+    EXPECT_LT((far.points.col(j) - away - near.points.col(j)).norm(), 1e-7);
+  }
+}
+
 }  // namespace
 }  // namespace stellate::oracles

@@ -1,5 +1,6 @@
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "oracles/ready/cloud_quadrics.h"
 #include "oracles/ready/common.h"
@@ -10,8 +11,9 @@ namespace stellate::oracles {
 namespace {
 
 constexpr int kMaxMoves = 100;
-constexpr double kShortestMove = 1e-11;  // a step, in bandwidths
-constexpr double kLongestMove = 0.5;     // of one step, likewise
+constexpr double kShortestMove = 1e-11;                                    // a step, in bandwidths
+constexpr double kRoundings = 8 * std::numeric_limits<double>::epsilon();  // a step, in coordinates
+constexpr double kLongestMove = 0.5;     // of one step, in bandwidths
 constexpr Eigen::Index kFitLooks = 400;  // points at which fits are looked at, for the bandwidths
 constexpr Eigen::Index kResidualPoints = 500;
 
@@ -65,7 +67,9 @@ class PointCloud::Neighbourhoods {
       step *= longest / std::max(step.norm(), longest);
       const Eigen::VectorXd there = quadric.place + step;
       if (!there.allFinite()) return false;
-      const bool arrived = (there - y).norm() <= kShortestMove * reach;
+      // Far from the origin, as maps have them, coordinates are rounded more coarsely than that.
+      const double rounded = kRoundings * there.lpNorm<Eigen::Infinity>();
+      const bool arrived = (there - y).norm() <= std::max(kShortestMove * reach, rounded);
       y = there;
       tangents = quadric.tangents;
       if (arrived) return true;
