@@ -176,7 +176,7 @@ impl<'a> Worker<'a> {
     /// Leaves the mesh alone if this oracle is not of its kind.
     fn compare(&self, welcome: &Welcome) -> Result<(), Error> {
         let (k, d) = (welcome.dimension as usize, welcome.ambient_dimension as usize);
-        let (asked, able) = (welcome.oracle.unwrap_or_default(), self.oracle.capabilities());
+        let (asked, able) = (welcome.oracle.clone().unwrap_or_default(), self.oracle.capabilities());
         let lacks = [
             (asked.intersect_flat && !able.intersect_flat, "intersect_flat"),
             (asked.tangent_basis && !able.tangent_basis, "tangent_basis"),
