@@ -22,7 +22,7 @@ int main(int argc, char** argv) {
     std::cerr << mesh.error().message << "\n";
     return EXIT_FAILURE;
   }
-  std::cout << stellate::ToText(mesh->report);
+  std::cout << mesh->report.text;
   if (const auto saved = mesh->Save(argv[1]); !saved) {
     std::cerr << saved.error().message << "\n";
     return EXIT_FAILURE;

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
+#include <sstream>
 
 #include "text/printable.h"
 
@@ -57,10 +58,10 @@ int PrintError(const Error& error) {
   return ExitStatusOf(error);
 }
 
-void PrintReport(Report report) {
-  report.failure_reason = text::Printable(report.failure_reason, '?');
-  report.failure_message = text::PrintableLines(report.failure_message, '?');
-  std::cout << ToText(report);
+void PrintReport(const Report& report) {
+  std::istringstream lines(report.text);
+  for (std::string line; std::getline(lines, line);)
+    std::cout << text::Printable(line, '?') << "\n";
 }
 
 }  // namespace stellate::cli

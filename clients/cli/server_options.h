@@ -33,6 +33,6 @@ void PrintOutage(const Outage& outage, double patience);
 // Prints the error on standard error and gives the exit status that stands for it.
 int PrintError(const Error& error);
 // On standard output.
-void PrintReport(Report report);
+void PrintReport(const Report& report);
 
 }  // namespace stellate::cli

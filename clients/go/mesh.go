@@ -178,26 +178,3 @@ func writeRows(out io.StringWriter, before string, rows []uint32, width int, fir
 		_, _ = out.WriteString(before + strings.Join(words, " ") + "\n")
 	}
 }
-
-// ReportText is a report in a few lines, for people.
-func ReportText(report *pb.Report) string {
-	counts, proved := report.GetCounts(), report.GetCertificate()
-	word, verdict := "NOT CERTIFIED", proved.GetVerdict()
-	if proved.GetCertified() {
-		word = "CERTIFIED"
-	}
-	if verdict == "" {
-		verdict = report.GetFailure().GetMessage()
-	}
-	ended := strings.TrimPrefix(report.GetTermination().String(), "TERMINATION_")
-	var text strings.Builder
-	fmt.Fprintf(&text, "%s (%s): %s\n", word, ended, verdict)
-	fmt.Fprintf(&text, "%d vertices, %d simplices, %d rounds, %d queries, %.2f s\n",
-		counts.GetVertices(), counts.GetSimplices(), counts.GetRounds(), counts.GetQueries(), report.GetElapsedSeconds())
-	fmt.Fprintf(&text, "%d components, Euler characteristic %d, orientable %t, estimated reach %.3g\n",
-		proved.GetComponents(), proved.GetEulerCharacteristic(), proved.GetOrientable(), proved.GetEstimatedReach())
-	for _, warning := range proved.GetWarnings() {
-		fmt.Fprintf(&text, "warning: %s\n", warning)
-	}
-	return text.String()
-}

@@ -62,7 +62,7 @@ func TestManifoldsWithBoundary(t *testing.T) {
 	to := server(t)
 	mesh, err := stellate.NewMesh(context.Background(), hemisphere{}, 0.2, &stellate.Options{Connection: to})
 	if err != nil || !mesh.Certified() {
-		t.Fatal(err, stellate.ReportText(mesh.Report))
+		t.Fatal(err, mesh.Report.GetText())
 	}
 	if got := counts(mesh); got != hemisphereCounts(t) {
 		t.Error(got)

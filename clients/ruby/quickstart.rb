@@ -22,6 +22,6 @@ class Torus
 end
 
 mesh = Stellate.mesh(Torus.new, epsilon: (ARGV[0] || 0.1).to_f, on_progress: Stellate::ProgressBar.new)
-puts Stellate::Mesh.report_text(mesh.report)
+puts mesh.report.text
 %w[torus.obj torus.txt].each { |name| mesh.save(File.join(ARGV[1] || '.', name)) }
 exit(mesh.certified?)

@@ -3,6 +3,7 @@
 #include "core/base/message.h"
 #include "server/convert/arrays.h"
 #include "server/convert/error_map.h"
+#include "server/convert/report_text.h"
 #include "server/convert/spec.h"
 
 namespace stellate::server {
@@ -250,6 +251,7 @@ void ToProto(const Session& session, v1::Mesh* out) {
       report->mutable_failure()->set_reason(FailureReasonName(view.failure.reason));
       report->mutable_failure()->set_message(Cut(view.failure.message, kMaxFailureBytes));
     }
+    report->set_text(ReportText(*report));
   }
   out->set_workers(static_cast<std::uint32_t>(view.workers));
   out->set_watchers(static_cast<std::uint32_t>(view.watchers));

@@ -54,6 +54,7 @@ def record(oracle: object, epsilon: float, **criteria: object) -> tuple[list[Eve
             last.ClearField(field)
         for message in (last.progress, last.report):
             message.elapsed_seconds = 0
+        last.report.ClearField("text")  # it tells the time
         return events, stellate.download(name, server=client)
 
 

@@ -52,7 +52,7 @@ TEST_F(AutoEpsilon, GoesOnWithTheReachThatTheCertificateShows) {
   EXPECT_TRUE(Says(report.epsilon_reason, "by the certificate of epsilon 0."))
       << report.epsilon_reason;
   EXPECT_TRUE(Says(report.epsilon_reason, "which was too coarse")) << report.epsilon_reason;
-  EXPECT_TRUE(Says(ToText(report), report.epsilon_reason)) << ToText(report);
+  EXPECT_TRUE(Says(report.text, report.epsilon_reason)) << report.text;
 
   const Expected<Mesh> given = MeshManifold(hourglass, At(report.epsilon));
   ASSERT_TRUE(given.has_value()) << given.error().message;

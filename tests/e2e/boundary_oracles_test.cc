@@ -73,7 +73,7 @@ TEST_P(BothNearest, TwoOraclesOfNearestPointsWillDo) {
   ManifoldWithBoundary oracle(inner, rim);
   const Expected<Mesh> mesh = MeshManifold(oracle, At(epsilon));
   ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
-  EXPECT_TRUE(mesh->report.certified()) << ToText(mesh->report);
+  EXPECT_TRUE(mesh->report.certified()) << mesh->report.text;
   EXPECT_EQ(Euler(mesh->simplices), 1);
   EXPECT_EQ(mesh->boundary().size(), 1u);
   EXPECT_EQ(All(mesh->boundary()), Rim(mesh->simplices));
@@ -106,7 +106,7 @@ TEST_F(BoundedFromCpp, AClearanceSaysWhereALargerManifoldEnds) {
                               [](const VectorXd& x) { return x[2] - kTall; });
   const Expected<Mesh> mesh = MeshManifold(oracle, At(0.25));
   ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
-  EXPECT_TRUE(mesh->report.certified()) << ToText(mesh->report);
+  EXPECT_TRUE(mesh->report.certified()) << mesh->report.text;
   EXPECT_EQ(Euler(mesh->simplices), 1);
   EXPECT_TRUE(Check(oracle).ok()) << ToText(Check(oracle));
 }

@@ -72,7 +72,7 @@ TEST_P(TooCoarse, IsNeverFalselyCertifiedAndSaysWhy) {
     const std::string& verdict = mesh->report.certificate.verdict;
     EXPECT_NE(verdict.find(mesh->report.certified() ? "Certified: " : "ot certified: "),
               std::string::npos)
-        << ToText(mesh->report);
+        << mesh->report.text;
   }
 }
 

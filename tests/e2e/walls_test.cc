@@ -35,7 +35,7 @@ TEST_P(EveryDomain, IsMeshedUpToItsWalls) {
   ASSERT_NE(domain, nullptr) << why;
   const Expected<Mesh> mesh = MeshManifold(*domain, At(want.epsilon));
   ASSERT_TRUE(mesh.has_value()) << mesh.error().reason << ": " << mesh.error().message;
-  ASSERT_TRUE(mesh->report.certified()) << ToText(mesh->report);
+  ASSERT_TRUE(mesh->report.certified()) << mesh->report.text;
   EXPECT_EQ(Euler(mesh->simplices), want.euler);
   EXPECT_EQ(mesh->boundary().size(), want.walls);
   EXPECT_EQ(mesh->edges().size(), want.edge_faces);
@@ -74,7 +74,7 @@ TEST_F(WallsFromCpp, GyroidInABoxHasItsCorners) {
   const auto domain = oracles::MakeDomain("gyroid-box", &why);
   const Expected<Mesh> mesh = MeshManifold(*domain, At(0.25));
   ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
-  EXPECT_TRUE(mesh->report.certified()) << ToText(mesh->report);
+  EXPECT_TRUE(mesh->report.certified()) << mesh->report.text;
   EXPECT_EQ(Euler(mesh->simplices), mesh->report.certificate.euler_characteristic);
   EXPECT_EQ(All(mesh->boundary()), Rim(mesh->simplices));
   EXPECT_GT(Count(mesh->corners()), 2u);
@@ -95,7 +95,7 @@ TEST_F(WallsFromCpp, ClippingTwiceIsClippingByAll) {
   EXPECT_NEAR(clearances(5, 0), 0.4, 1e-12);
   const Expected<Mesh> mesh = MeshManifold(twice, At(0.2));
   ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
-  EXPECT_TRUE(mesh->report.certified()) << ToText(mesh->report);
+  EXPECT_TRUE(mesh->report.certified()) << mesh->report.text;
   EXPECT_EQ(Count(mesh->corners()), 6u);
 }
 

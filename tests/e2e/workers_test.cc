@@ -351,8 +351,8 @@ TEST_F(Workers, TenThousandVerticesInAtMostFortyFiveRoundTrips) {
   ASSERT_TRUE(mesh.has_value());
   EXPECT_TRUE(IsFaithful(*mesh, *torus, 0.027));
   EXPECT_GE(mesh->report.counts.vertices, 9'000u);
-  EXPECT_LE(mesh->report.counts.rounds, 45u) << ToText(mesh->report);
-  EXPECT_LE(mesh->report.counts.queries, 2 * mesh->report.counts.vertices) << ToText(mesh->report);
+  EXPECT_LE(mesh->report.counts.rounds, 45u) << mesh->report.text;
+  EXPECT_LE(mesh->report.counts.queries, 2 * mesh->report.counts.vertices) << mesh->report.text;
 }
 
 TEST(EmbeddedDefault, NeedsNoServerAndLeavesNoneBehind) {

@@ -132,7 +132,7 @@ Judgement Judge(const SimplexMatrix& simplices, std::uint64_t vertices) {
     return ::testing::AssertionFailure()
            << manifold.facts().spec << " at epsilon " << epsilon << ": ";
   };
-  if (!mesh.report.certified()) return wrong() << "not certified\n" << ToText(mesh.report);
+  if (!mesh.report.certified()) return wrong() << "not certified\n" << mesh.report.text;
   const Judgement seen = Judge(mesh.simplices, static_cast<std::uint64_t>(mesh.points.cols()));
   if (!seen.IsClosedManifold()) {
     return wrong() << "no closed manifold: valid " << seen.valid << ", unused vertices "
@@ -153,7 +153,7 @@ Judgement Judge(const SimplexMatrix& simplices, std::uint64_t vertices) {
       claimed.orientable != seen.orientable ||
       claimed.components != static_cast<std::uint64_t>(seen.components) || !claimed.closed ||
       !claimed.links_are_spheres) {
-    return wrong() << "the report claims another topology\n" << ToText(mesh.report);
+    return wrong() << "the report claims another topology\n" << mesh.report.text;
   }
   const double off = manifold.Distance(mesh.points).maxCoeff();
   if (!(off <= 1e-9)) return wrong() << "a vertex is off the manifold by " << off;

@@ -11,89 +11,6 @@
 namespace stellate {
 namespace {
 
-std::string Format(const char* format, double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
-}
-
-// 1234567 as 1,234,567.
-std::string Grouped(std::uint64_t value) {
-  std::string text = std::to_string(value);
-  for (size_t i = text.size(); i > 3; i -= 3) text.insert(i - 3, 1, ',');
-  return text;
-}
-
-std::string Ending(Termination termination) {
-  switch (termination) {
-    case Termination::kConverged:
-      return "converged: no refinement rule applies any more";
-    case Termination::kVertexBudget:
-      return "stopped: max_vertices is spent";
-    case Termination::kRoundBudget:
-      return "stopped: max_rounds is spent";
-    case Termination::kCancelled:
-      return "cancelled";
-    case Termination::kOracleFailed:
-      return "the oracle failed";
-    case Termination::kNoProgress:
-      return "stopped: rules still apply, but refinement no longer helps";
-    case Termination::kUnknown:
-      break;
-  }
-  return "unknown";
-}
-
-class Lines {
- public:
-  void Add(const std::string& title, const std::string& text) {
-    const size_t width = 13;
-    text_ += std::string(title.size() < width ? width - title.size() : 0, ' ') + title + "  " +
-             text + "\n";
-  }
-  std::string Take() { return std::move(text_); }
-
- private:
-  std::string text_;
-};
-
-void AddCertificate(const Certificate& c, Lines& lines) {
-  lines.Add("topology",
-            (c.components == 1 ? "1 component" : Grouped(c.components) + " components") +
-                ", Euler characteristic " + std::to_string(c.euler_characteristic) +
-                (c.orientable ? ", orientable" : ", not orientable"));
-  lines.Add("manifold",
-            (c.closed ? "closed" : "not closed (" + Grouped(c.bad_faces) + " bad faces)") + "; " +
-                (c.links_are_spheres ? std::string("every link a sphere (decided ") +
-                                           (c.links_decided_exactly ? "exactly)" : "by homology)")
-                                     : Grouped(c.bad_links) + " links are not spheres"));
-  lines.Add("stars", Grouped(c.inconsistent_simplices) + " inconsistent simplices, " +
-                         Grouped(c.unembedded_stars) + " stars overlap, " +
-                         Grouped(c.fibre_failures) + " of " + Grouped(c.fibre_samples) +
-                         " normal flats met wrongly");
-  std::string shape = "largest circumradius " + Format("%.4g", c.max_circumradius) +
-                      ", radius-edge ratio " + Format("%.3g", c.max_radius_edge) +
-                      "; smallest fatness " + Format("%.3g", c.min_fatness);
-  if (c.min_angle_degrees > 0)
-    shape += ", angle " + Format("%.1f", c.min_angle_degrees) + " degrees";
-  lines.Add("shape", shape);
-  lines.Add("closeness", "barycentres within " + Format("%.3g", c.max_barycentre_distance) +
-                             " of the manifold, simplices within " +
-                             Format("%.1f", c.max_tangent_angle_degrees) +
-                             " degrees of its tangent spaces");
-  lines.Add("reach", (c.certified ? "about " : "at most ") + Format("%.4g", c.estimated_reach) +
-                         ", epsilon is " + Format("%.3g", c.epsilon_over_reach) + " of it" +
-                         (c.certified ? "" : " or more"));
-  if (c.declared_reach > 0) {
-    lines.Add("declared", "a reach of " + Format("%.4g", c.declared_reach) +
-                              (c.reach_refuted ? ", refuted"
-                               : c.level == CertificateLevel::kProved
-                                   ? ": within " + Format("%.3g", c.proved_distance) +
-                                         " of the manifold, proved"
-                                   : ": nothing proved from it"));
-  }
-}
-
 // A JSON object as it is written. Keys are ours and need no escaping.
 class JsonObject {
  public:
@@ -108,7 +25,10 @@ class JsonObject {
 
   // JSON knows no infinity and no NaN.
   static std::string Number(double value) {
-    return std::isfinite(value) ? Format("%.17g", value) : "null";
+    if (!std::isfinite(value)) return "null";
+    char text[32];
+    std::snprintf(text, sizeof text, "%.17g", value);
+    return text;
   }
   static std::string Quoted(const std::string& value) {
     std::string text = "\"";
@@ -253,33 +173,6 @@ const char* PhaseName(Phase phase) {
   constexpr const char* kNames[] = {"UNKNOWN", "SEEDING", "REFINING", "CERTIFYING", "DONE"};
   const size_t i = static_cast<size_t>(phase);
   return i < std::size(kNames) ? kNames[i] : kNames[0];
-}
-
-std::string ToText(const Report& report) {
-  const Counts& n = report.counts;
-  const Certificate& c = report.certificate;
-  Lines lines;
-  lines.Add("mesh", Grouped(n.vertices) + " vertices, " + Grouped(n.simplices) + " simplices");
-  lines.Add("run", Ending(report.termination));
-  lines.Add("took", Format("%.2f", report.elapsed_seconds) + " s, " + Grouped(n.rounds) +
-                        " round trips, " + Grouped(n.queries) + " queries");
-  lines.Add("inserted for", "size " + Grouped(n.inserted_size) + ", radius-edge " +
-                                Grouped(n.inserted_radius_edge) + ", slivers " +
-                                Grouped(n.inserted_sliver) + ", inconsistencies " +
-                                Grouped(n.inserted_inconsistent));
-  if (!report.failure_reason.empty() || !report.failure_message.empty()) {
-    lines.Add("failure", report.failure_reason + ": " + report.failure_message);
-  }
-  if (!report.epsilon_reason.empty()) {
-    lines.Add("epsilon", Format("%g", report.epsilon) + ", " + report.epsilon_reason);
-  }
-  lines.Add("certificate", !c.certified                           ? "NOT CERTIFIED"
-                           : c.level == CertificateLevel::kProved ? "PROVED"
-                                                                  : "CERTIFIED");
-  if (!c.verdict.empty()) lines.Add("verdict", c.verdict);
-  if (c.components > 0) AddCertificate(c, lines);
-  for (const std::string& warning : c.warnings) lines.Add("warning", warning);
-  return lines.Take();
 }
 
 std::string ToJson(const Report& report) {

@@ -36,7 +36,7 @@ Expected<Mesh> MeshManifold(Oracle& oracle, const MeshOptions& options) {
                     [&embedded] { return embedded && !embedded->alive(); });
     Expected<Mesh> mesh = run.Go();
     if (!mesh) return mesh;
-    mesh->report.epsilon_reason = request->epsilon_reason;
+    client::Tell(request->epsilon_reason, &mesh->report);
     if (retries == 0 || options.stop.stop_requested()) return mesh;
     const std::optional<ChosenEpsilon> finer = client::Finer(mesh->report);
     if (!finer) return mesh;

@@ -43,6 +43,12 @@ Expected<ChosenEpsilon> client::ChooseEpsilon(CheckReport report) {
                            std::to_string(report.queries) + " queries"};
 }
 
+void client::Tell(const std::string& epsilon_reason, Report* report) {
+  if (epsilon_reason.empty()) return;
+  report->epsilon_reason = epsilon_reason;
+  report->text += "      epsilon  " + Show("%g", report->epsilon) + ", " + epsilon_reason + "\n";
+}
+
 std::optional<ChosenEpsilon> client::Finer(const Report& report) {
   const Certificate& c = report.certificate;
   const bool ended = report.termination == Termination::kConverged ||

@@ -1,12 +1,16 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "stellate/client.h"
 #include "stellate/doctor.h"
 
 namespace stellate::client {
 
+// Adds to a report why the epsilon of its mesh was chosen, which the server does not know; empty:
+// it was given.
+void Tell(const std::string& epsilon_reason, Report* report);
 // What ChooseEpsilon says of a Check that was made.
 Expected<ChosenEpsilon> ChooseEpsilon(CheckReport report);
 // The next automatic epsilon after a mesh with this report; none: a smaller

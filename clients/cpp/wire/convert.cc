@@ -200,6 +200,7 @@ Report ReportOf(const v1::Mesh& mesh) {
   r.failure_reason = m.failure().reason();
   r.failure_message = m.failure().message();
   r.elapsed_seconds = m.elapsed_seconds();
+  r.text = m.text();
   const v1::Counts& n = m.counts();
   r.counts = {n.vertices(),
               n.simplices(),

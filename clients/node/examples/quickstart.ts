@@ -2,7 +2,7 @@
 //
 // Usage: node dist/examples/quickstart.js [EPSILON] [OUTPUT_DIRECTORY]
 import { join } from "node:path";
-import { mesh, type Oracle, progressBar, reportText } from "../src/index.js";
+import { mesh, type Oracle, progressBar } from "../src/index.js";
 
 const [R, r] = [1, 0.4];
 
@@ -27,7 +27,7 @@ const torus: Oracle = {
 
 const [epsilon = "0.1", folder = "."] = process.argv.slice(2);
 const result = await mesh(torus, { epsilon: Number(epsilon), onProgress: progressBar() });
-if (result.report) console.log(reportText(result.report));
+if (result.report) console.log(result.report.text);
 await result.save(join(folder, "torus.obj"));
 await result.save(join(folder, "torus.txt"));
 process.exitCode = result.certified ? 0 : 1;

@@ -7,7 +7,7 @@ export { ProductOfCircles, Torus } from "./manifolds.js";
 export { checkSave, loadTxt, Mesh } from "./mesh.js";
 export type { Found, Oracle } from "./oracle.js";
 export { progressBar } from "./progress.js";
-export { type MeshInfo, type Progress, type Report, reportText } from "./report.js";
+export { type MeshInfo, type Progress, type Report } from "./report.js";
 export { findStellated, Server } from "./server.js";
 export { type Connection, download, mesh, type RunOptions, serve, watch } from "./session.js";
 export type { MeshOptions } from "./spec.js";

@@ -27,6 +27,8 @@ export interface Report {
   epsilon: number;
   /** Why it is that, where mesh() or watch() chose it; else "". */
   epsilonReason: string;
+  /** All of it in several lines, for people. */
+  text: string;
 }
 
 /** A mesh on the server, without its geometry. */
@@ -64,6 +66,7 @@ export function reportFrom(message: Report__Output, epsilon: number): Report {
     elapsedSeconds: message.elapsedSeconds,
     epsilon,
     epsilonReason: "",
+    text: message.text,
   };
 }
 
@@ -82,24 +85,4 @@ export function infoFrom(mesh: Mesh__Output): MeshInfo {
     workers: mesh.workers,
     watchers: mesh.watchers,
   };
-}
-
-/** The report in a few lines, for people. */
-export function reportText(report: Report): string {
-  const { counts, certificate: proved } = report;
-  const lines = [
-    `${report.certified ? "CERTIFIED" : "NOT CERTIFIED"} (${report.termination}): ${report.verdict}`,
-    `${counts?.vertices ?? 0} vertices, ${counts?.simplices ?? 0} simplices, ` +
-      `${counts?.rounds ?? 0} rounds, ${counts?.queries ?? 0} queries, ` +
-      `${report.elapsedSeconds.toFixed(2)} s`,
-  ];
-  if (proved) {
-    lines.push(
-      `${proved.components} components, Euler characteristic ${proved.eulerCharacteristic}, ` +
-        `${proved.orientable ? "orientable" : "not orientable"}, ` +
-        `estimated reach ${proved.estimatedReach.toPrecision(3)}`,
-      ...proved.warnings.map((warning) => `warning: ${warning}`),
-    );
-  }
-  return lines.join("\n");
 }

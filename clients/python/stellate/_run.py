@@ -343,10 +343,8 @@ class Run:
             return mesh
         if self._where_it_ends is not None and report.termination == "NO_PROGRESS":
             end = self._where_it_ends()
-            verdict = f"not certified: {end}. The run ended as NO_PROGRESS"
             if end:
-                certificate = dataclasses.replace(report.certificate, verdict=verdict)
-                report = dataclasses.replace(report, certificate=certificate)
+                report = report.refused(f"{end}. The run ended as NO_PROGRESS")
         if self._epsilon_reason:
             report = dataclasses.replace(report, epsilon_reason=self._epsilon_reason)
         return dataclasses.replace(mesh, report=report)

@@ -193,18 +193,6 @@ class Failure:
     message: str
 
 
-_TITLE_WIDTH = 13
-_REPORT_WIDTH = 100
-_TERMINATIONS = {
-    "CONVERGED": "converged: no refinement rule applies any more",
-    "VERTEX_BUDGET": "stopped: max_vertices is spent",
-    "ROUND_BUDGET": "stopped: max_rounds is spent",
-    "CANCELLED": "cancelled",
-    "ORACLE_FAILED": "the oracle failed",
-    "NO_PROGRESS": "stopped: rules still apply, but refinement no longer helps",
-}
-
-
 @dataclasses.dataclass(frozen=True)
 class Report:
     """The end of a mesh. `str(report)` is for people."""
@@ -216,6 +204,9 @@ class Report:
     elapsed_seconds: float
     epsilon: float | None = None  # that the mesh was made with; None if that is not known
     epsilon_reason: str = ""  # why it is what it is, where it was not given
+    text: str = (
+        ""  # all of it in several lines, for people, but for epsilon; each line with its "\n"
+    )
 
     @property
     def certified(self) -> bool:
@@ -235,7 +226,7 @@ class Report:
     def to_dict(self) -> dict[str, Any]:
         """All of it as plain values for JSON, with the names of the protocol.
 
-        The same as the shell's --report writes: what is not known, infinite or no number is None,
+        The same as the shell's --report writes, without `text`: what is not known, infinite or no number is None,
         "failure" is there for a mesh that failed.
         """
         whole: dict[str, Any] = {"termination": self.termination}
@@ -257,6 +248,8 @@ class Report:
     def from_fields(cls, fields: dict[str, Any]) -> Report:
         """Back from dataclasses.asdict(report)."""
         failure, certificate = fields["failure"], dict(fields["certificate"])
+        if "text" not in fields:  # checkpoints of earlier versions lack it
+            fields = {**fields, "text": entry("certificate", certificate["verdict"])}
         certificate["warnings"] = tuple(certificate["warnings"])
         if "violations" in certificate:  # checkpoints of earlier versions lack it
             certificate["violations"] = Violations.from_fields(certificate["violations"])
@@ -284,45 +277,45 @@ class Report:
             certificate=_certificate(message.certificate),
             elapsed_seconds=message.elapsed_seconds,
             epsilon=epsilon,
+            text=message.text,
         )
 
+    def refused(self, why: str) -> Report:
+        """For a reason that the client knows better than the server, which goes in place of its."""
+        certificate = dataclasses.replace(self.certificate, verdict=f"not certified: {why}")
+        mine = {"certificate": f"NOT CERTIFIED: {why}"}  # other titles may come again and again
+        text = "".join(entry(title, mine.get(title, said)) for title, said in self.lines())
+        return dataclasses.replace(self, certificate=certificate, text=text)
+
     def __str__(self) -> str:
-        return "\n".join(_entry(title, text) for title, text in self.lines())
+        why = f"{self.epsilon:g}, {self.epsilon_reason}" if self.epsilon_reason else ""
+        return (self.text + (entry("epsilon", why) if why else "")).rstrip("\n")
 
     def _repr_html_(self) -> str:
         marks = {"failure": "bad", "warning": "mind"}
         marks["certificate"] = "good" if self.certified else "bad"
-        rows = [(title, text, marks.get(title, "")) for title, text in self.lines()]
+        rows = [(title, words, marks.get(title, "")) for title, words in self.lines()]
         return _html.table("Stellate: report", rows)
 
     def lines(self) -> list[tuple[str, str]]:
-        """What there is to say, as (title, text)."""
-        n, c = self.counts, self.certificate
-        inserted = (
-            f"size {n.inserted_size:,}, radius-edge {n.inserted_radius_edge:,}, "
-            f"slivers {n.inserted_sliver:,}, inconsistencies {n.inserted_inconsistent:,}"
-        )
-        lines = [
-            ("mesh", f"{n.vertices:,} vertices, {n.simplices:,} simplices"),
-            ("run", _TERMINATIONS.get(self.termination, self.termination.lower())),
-            (
-                "took",
-                f"{self.elapsed_seconds:.2f} s, {n.rounds:,} round trips, {n.queries:,} queries",
-            ),
-            ("inserted for", inserted),
-        ]
-        if self.failure is not None:
-            lines.append(("failure", f"{self.failure.reason}: {self.failure.message}"))
-        if self.epsilon_reason:
-            lines.append(("epsilon", f"{self.epsilon:g}, {self.epsilon_reason}"))
-        mark = "NOT CERTIFIED"
-        if c.certified:
-            mark = "PROVED" if c.level == "PROVED" else "CERTIFIED"
-        verdict = _plain_verdict(c)
-        lines.append(("certificate", f"{mark}: {verdict}" if verdict else mark))
-        if c.components:
-            lines += _certificate_lines(c)
-        return lines + [("warning", text) for text in c.warnings]
+        """What str() says, as (title, words)."""
+        lines: list[tuple[str, str]] = []
+        for line in str(self).splitlines():
+            title, words = line[:_TITLE_WIDTH].strip(), line[_TITLE_WIDTH + 2 :]
+            if title or not lines:
+                lines.append((title, words))
+            else:
+                lines[-1] = (lines[-1][0], f"{lines[-1][1]}\n{words}")
+        return lines
+
+
+_TITLE_WIDTH = 13  # of the server's lines
+
+
+def entry(title: str, words: str) -> str:
+    """A line of a report, folded as the server folds its own."""
+    lines = textwrap.wrap(words, 85, break_long_words=False, break_on_hyphens=False)
+    return f"{title:>{_TITLE_WIDTH}}  " + f"\n{'':{_TITLE_WIDTH + 2}}".join(lines) + "\n"
 
 
 def _certificate(message: pb.Certificate) -> Certificate:
@@ -355,56 +348,3 @@ def _for_json(value: Any) -> Any:
     if isinstance(value, tuple):
         return [_for_json(entry) for entry in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _entry(title: str, text: str) -> str:
-    indent = " " * (_TITLE_WIDTH + 2)
-    return textwrap.fill(
-        text, _REPORT_WIDTH, initial_indent=f"{title:>{_TITLE_WIDTH}}  ", subsequent_indent=indent
-    )
-
-
-def _certificate_lines(c: Certificate) -> list[tuple[str, str]]:
-    closed = "closed" if c.closed else f"not closed ({c.bad_faces:,} bad faces)"
-    how = "exactly" if c.links_decided_exactly else "by homology"
-    links = (
-        f"every link a sphere (decided {how})"
-        if c.links_are_spheres
-        else f"{c.bad_links:,} links are not spheres"
-    )
-    orientable = "orientable" if c.orientable else "not orientable"
-    components = "1 component" if c.components == 1 else f"{c.components:,} components"
-    shape = (
-        f"largest circumradius {c.max_circumradius:.4g}, radius-edge ratio {c.max_radius_edge:.3g}"
-    )
-    shape += f"; smallest fatness {c.min_fatness:.3g}"
-    if c.min_angle_degrees > 0:
-        shape += f", angle {c.min_angle_degrees:.1f} degrees"
-    # What was refused may be far too coarse to tell the reach.
-    about, more = ("about", "") if c.certified else ("at most", " or more")
-    reach = f"{about} {c.estimated_reach:.4g}, epsilon is {c.epsilon_over_reach:.3g} of it{more}"
-    lines = [
-        ("topology", f"{components}, Euler characteristic {c.euler_characteristic}, {orientable}"),
-        ("manifold", f"{closed}; {links}"),
-        (
-            "stars",
-            f"{c.inconsistent_simplices:,} inconsistent simplices, {c.unembedded_stars:,} stars "
-            "overlap, "
-            f"{c.fibre_failures:,} of {c.fibre_samples:,} normal flats met wrongly",
-        ),
-        ("shape", shape),
-        (
-            "closeness",
-            f"barycentres within {c.max_barycentre_distance:.3g} of the manifold, simplices within "
-            f"{c.max_tangent_angle_degrees:.1f} degrees of its tangent spaces",
-        ),
-        ("reach", reach),
-    ]
-    if c.declared_reach > 0:
-        what = ": nothing proved from it"
-        if c.reach_refuted:
-            what = ", refuted"
-        elif c.level == "PROVED":
-            what = f": within {c.proved_distance:.3g} of the manifold, proved"
-        lines.append(("declared", f"a reach of {c.declared_reach:.4g}{what}"))
-    return lines

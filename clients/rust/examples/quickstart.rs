@@ -43,7 +43,7 @@ fn main() -> Result<ExitCode, BoxError> {
     let options = RunOptions { on_progress: Some(stellate::progress_bar()), ..Default::default() };
     let mesh = stellate::mesh(&Torus, epsilon, options)?;
     if let Some(report) = &mesh.report {
-        print!("{}", stellate::report_text(report));
+        print!("{}", report.text);
     }
     mesh.save(folder.join("torus.obj"))?;
     mesh.save(folder.join("torus.txt"))?;

@@ -39,7 +39,7 @@ pub use client::{Client, ClientOptions};
 pub use credentials::Credentials;
 pub use error::{Error, Kind};
 pub use growth::GrowingComplex;
-pub use mesh::{check_save, report_text, Mesh};
+pub use mesh::{check_save, Mesh};
 pub use options::{Cancel, Connection, Growth, OnProgress, RunOptions};
 pub use oracle::{BoxError, Capabilities, Oracle};
 pub use progress::progress_bar;

@@ -182,30 +182,3 @@ pub fn check_save(path: impl AsRef<Path>, k: usize, d: usize) -> Result<(), Erro
     };
     Err(Error::new(Kind::Save, "FORMAT", message))
 }
-
-/// A report in a few lines, for people.
-pub fn report_text(report: &Report) -> String {
-    let counts = report.counts.unwrap_or_default();
-    let proved = report.certificate.clone().unwrap_or_default();
-    let failure = report.failure.clone().unwrap_or_default();
-    let word = if proved.certified { "CERTIFIED" } else { "NOT CERTIFIED" };
-    let ended = report.termination().as_str_name().trim_start_matches("TERMINATION_");
-    let verdict = if proved.verdict.is_empty() { &failure.message } else { &proved.verdict };
-    let mut text = format!(
-        "{word} ({ended}): {verdict}\n{} vertices, {} simplices, {} rounds, {} queries, {:.2} s\n\
-         {} components, Euler characteristic {}, orientable {}, estimated reach {:.3}\n",
-        counts.vertices,
-        counts.simplices,
-        counts.rounds,
-        counts.queries,
-        report.elapsed_seconds,
-        proved.components,
-        proved.euler_characteristic,
-        proved.orientable,
-        proved.estimated_reach,
-    );
-    for warning in &proved.warnings {
-        text += &format!("warning: {warning}\n");
-    }
-    text
-}

@@ -19,24 +19,6 @@ Report Good() {
   return report;
 }
 
-TEST(ReportText, SaysWhetherItIsCertified) {
-  const std::string text = ToText(Good());
-  EXPECT_NE(text.find("1,234,567 vertices, 42 simplices"), std::string::npos) << text;
-  EXPECT_NE(text.find("  CERTIFIED\n      verdict  every check holds"), std::string::npos) << text;
-  EXPECT_NE(text.find("1 component, Euler characteristic -8"), std::string::npos) << text;
-  Report bad = Good();
-  bad.certificate.certified = false;
-  bad.certificate.warnings = {"epsilon is coarse"};
-  EXPECT_NE(ToText(bad).find("NOT CERTIFIED"), std::string::npos);
-  EXPECT_NE(ToText(bad).find("warning  epsilon is coarse"), std::string::npos);
-}
-
-TEST(ReportText, LeavesOutTheTopologyOfNothing) {
-  Report report = Good();
-  report.certificate.components = 0;
-  EXPECT_EQ(ToText(report).find("topology"), std::string::npos);
-}
-
 TEST(ReportJson, EscapesTextAndWritesNullForWhatJsonLacks) {
   Report report = Good();
   report.failure_reason = "ORACLE_FAILED";

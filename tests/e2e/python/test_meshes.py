@@ -346,3 +346,7 @@ def test_a_parametrization_that_ends_is_told_where_and_what_to_do(server):
         "not certified: the manifold ends where the map does, at the lower end 0"
     )
     assert "oracles.Clipped(parametrized, [wall])" in verdict and "epsilon" not in verdict
+    told = dict(report.lines())  # the words for people are as the server's, but for that
+    assert f"not certified: {' '.join(told['certificate'][15:].split())}" == verdict
+    assert list(told)[:5] == ["mesh", "run", "took", "inserted for", "certificate"]
+    assert max(map(len, str(report).splitlines())) <= 100

@@ -145,11 +145,13 @@ struct Report {
   double elapsed_seconds = 0;
   double epsilon = 0;          // of the mesh; 0: not known
   std::string epsilon_reason;  // why it was chosen; empty if it was given
+  // All of it in several lines, for people, each with its '\n': the server's words, and why epsilon
+  // was chosen. ToJson leaves it out.
+  std::string text;
 
   bool certified() const { return certificate.certified; }
 };
 
-std::string ToText(const Report& report);  // several lines, for people
 // One object in one line, keys as in the protocol; null for infinite, NaN and unknown.
 std::string ToJson(const Report& report);
 // ToJson into a file. kFileFailed when it cannot be written.

@@ -46,7 +46,7 @@ func main() {
 	if err != nil {
 		log.Fatal(err)
 	}
-	fmt.Print(stellate.ReportText(mesh.Report))
+	fmt.Print(mesh.Report.GetText())
 	for _, name := range []string{"torus.obj", "torus.txt"} {
 		if err := mesh.Save(filepath.Join(*folder, name)); err != nil {
 			log.Fatal(err)

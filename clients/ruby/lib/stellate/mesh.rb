@@ -73,18 +73,6 @@ module Stellate
       oriented
     end
 
-    # A report in a few lines, for people.
-    def self.report_text(report)
-      counts, proved = report.counts || V1::Counts.new, report.certificate || V1::Certificate.new
-      verdict = proved.verdict.empty? ? report.failure&.message : proved.verdict
-      ["#{'NOT ' unless proved.certified}CERTIFIED (#{Wire.name(report.termination, 'TERMINATION_')}): #{verdict}",
-       "#{counts.vertices} vertices, #{counts.simplices} simplices, #{counts.rounds} rounds, " \
-       "#{counts.queries} queries, #{report.elapsed_seconds.round(2)} s",
-       "#{proved.components} components, Euler characteristic #{proved.euler_characteristic}, " \
-       "orientable #{proved.orientable}, estimated reach #{proved.estimated_reach.round(3)}",
-       *proved.warnings.map { |warning| "warning: #{warning}" }].join("\n")
-    end
-
     private
 
     def facet_owners

@@ -10,8 +10,6 @@ import java.nio.file.Path;
 import java.nio.file.StandardCopyOption;
 import java.util.Arrays;
 import java.util.Optional;
-import stellate.v1.Certificate;
-import stellate.v1.Counts;
 import stellate.v1.Progress;
 import stellate.v1.Report;
 
@@ -210,33 +208,5 @@ public final class Mesh {
         out.print("\n");
       }
     }
-  }
-
-  /** A report in a few lines, for people. */
-  public static String reportText(Report report) {
-    Counts counts = report.getCounts();
-    Certificate proved = report.getCertificate();
-    StringBuilder text = new StringBuilder();
-    text.append(proved.getCertified() ? "CERTIFIED" : "NOT CERTIFIED");
-    text.append(" (%s): ".formatted(report.getTermination().name().replace("TERMINATION_", "")));
-    text.append(
-        proved.getVerdict().isEmpty() ? report.getFailure().getMessage() : proved.getVerdict());
-    text.append(
-        "%n%d vertices, %d simplices, %d rounds, %d queries, %.2f s%n"
-            .formatted(
-                counts.getVertices(),
-                counts.getSimplices(),
-                counts.getRounds(),
-                counts.getQueries(),
-                report.getElapsedSeconds()));
-    text.append(
-        "%d components, Euler characteristic %d, orientable %b, estimated reach %.3g%n"
-            .formatted(
-                proved.getComponents(),
-                proved.getEulerCharacteristic(),
-                proved.getOrientable(),
-                proved.getEstimatedReach()));
-    proved.getWarningsList().forEach(warning -> text.append("warning: " + warning + "\n"));
-    return text.toString();
   }
 }

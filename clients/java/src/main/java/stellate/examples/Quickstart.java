@@ -49,7 +49,7 @@ public final class Quickstart {
     Options options = new Options();
     options.onProgress = new ProgressBar();
     Mesh mesh = Stellate.mesh(new Torus(), epsilon, options);
-    System.out.print(Mesh.reportText(mesh.report().orElseThrow()));
+    System.out.print(mesh.report().orElseThrow().getText());
     mesh.save(folder.resolve("torus.obj"));
     mesh.save(folder.resolve("torus.txt"));
     System.exit(mesh.certified() ? 0 : 1);

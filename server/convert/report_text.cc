@@ -1,0 +1,169 @@
+#include "server/convert/report_text.h"
+
+#include <algorithm>
+#include <charconv>
+#include <string_view>
+
+#include "core/base/message.h"
+#include "text/printable.h"
+
+namespace stellate::server {
+namespace {
+
+using core::Message;
+
+constexpr std::size_t kTitleWidth = 13, kIndent = kTitleWidth + 2, kLineWidth = 100;
+
+// With so many significant digits, or, if `fixed`, so many after the point.
+std::string Digits(double value, int digits, bool fixed = false) {
+  char text[400];  // the largest double has 309 digits before the point
+  const auto format = fixed ? std::chars_format::fixed : std::chars_format::general;
+  return {text, std::to_chars(text, text + sizeof text, value, format, digits).ptr};
+}
+
+// 1234567 as 1,234,567.
+std::string Grouped(std::uint64_t value) {
+  std::string text = std::to_string(value);
+  for (std::size_t i = text.size(); i > 3; i -= 3) text.insert(i - 3, 1, ',');
+  return text;
+}
+
+class Entries {
+ public:
+  void Add(std::string_view title, std::string_view words) {
+    std::string before(kIndent - 2 - std::min(title.size(), kTitleWidth), ' ');
+    before.append(title).append(2, ' ');
+    for (std::size_t end = 0; end != std::string_view::npos; words.remove_prefix(end + 1)) {
+      end = words.find('\n');
+      AddFolded(std::move(before), text::Printable(words.substr(0, end), '?'));
+      before.assign(kIndent, ' ');
+      if (end == std::string_view::npos) break;
+    }
+  }
+  std::string Take() { return std::move(text_); }
+
+ private:
+  // One line of words, folded at spaces.
+  void AddFolded(std::string before, std::string_view words) {
+    constexpr std::size_t kRoom = kLineWidth - kIndent;
+    while (words.size() > kRoom) {
+      // The last space that leaves a full line, else the first one after a long word.
+      std::size_t space = words.rfind(' ', kRoom);
+      if (space == std::string_view::npos || space == 0) space = words.find(' ', 1);
+      if (space == std::string_view::npos) break;
+      text_.append(before).append(words.substr(0, space)).append(1, '\n');
+      words.remove_prefix(space + 1);
+      before.assign(kIndent, ' ');
+    }
+    text_.append(before).append(words).append(1, '\n');
+  }
+
+  std::string text_;
+};
+
+std::string_view Ending(v1::Termination termination) {
+  switch (termination) {
+    case v1::TERMINATION_CONVERGED:
+      return "converged: no refinement rule applies any more";
+    case v1::TERMINATION_VERTEX_BUDGET:
+      return "stopped: max_vertices is spent";
+    case v1::TERMINATION_ROUND_BUDGET:
+      return "stopped: max_rounds is spent";
+    case v1::TERMINATION_CANCELLED:
+      return "cancelled";
+    case v1::TERMINATION_ORACLE_FAILED:
+      return "the oracle failed";
+    case v1::TERMINATION_NO_PROGRESS:
+      return "stopped: rules still apply, but refinement no longer helps";
+    default:
+      return "unknown";
+  }
+}
+
+// The mark in capitals, then the verdict without the words that say the same.
+std::string Judgement(const v1::Certificate& c) {
+  std::string_view mark = "NOT CERTIFIED";
+  if (c.certified()) mark = c.level() == v1::CERTIFICATE_LEVEL_PROVED ? "PROVED" : "CERTIFIED";
+  std::string_view verdict = c.verdict();
+  for (const std::string_view said :
+       {"Not certified: ", "not certified: ", "Certified: ", "Proved: "}) {
+    if (!verdict.starts_with(said)) continue;
+    verdict.remove_prefix(said.size());
+    break;
+  }
+  return verdict.empty() ? std::string(mark) : Message(mark, ": ", verdict);
+}
+
+void AddTopology(const v1::Certificate& c, Entries* entries) {
+  entries->Add("topology", Message(c.components() == 1 ? "1 component"
+                                                       : Grouped(c.components()) + " components",
+                                   ", Euler characteristic ", c.euler_characteristic(),
+                                   c.orientable() ? ", orientable" : ", not orientable"));
+  const std::string closed =
+      c.closed() ? "closed" : Message("not closed (", Grouped(c.bad_faces()), " bad faces)");
+  const std::string links = c.links_are_spheres()
+                                ? Message("every link a sphere (decided ",
+                                          c.links_decided_exactly() ? "exactly)" : "by homology)")
+                                : Grouped(c.bad_links()) + " links are not spheres";
+  entries->Add("manifold", Message(closed, "; ", links));
+  entries->Add("stars", Message(Grouped(c.inconsistent_simplices()), " inconsistent simplices, ",
+                                Grouped(c.unembedded_stars()), " stars overlap, ",
+                                Grouped(c.fibre_failures()), " of ", Grouped(c.fibre_samples()),
+                                " normal flats met wrongly"));
+}
+
+void AddMeasures(const v1::Certificate& c, Entries* entries) {
+  std::string shape =
+      Message("largest circumradius ", Digits(c.max_circumradius(), 4), ", radius-edge ratio ",
+              Digits(c.max_radius_edge(), 3), "; smallest fatness ", Digits(c.min_fatness(), 3));
+  if (c.min_angle_degrees() > 0)
+    shape += Message(", angle ", Digits(c.min_angle_degrees(), 1, true), " degrees");
+  entries->Add("shape", shape);
+  entries->Add("closeness", Message("barycentres within ", Digits(c.max_barycentre_distance(), 3),
+                                    " of the manifold, simplices within ",
+                                    Digits(c.max_tangent_angle_degrees(), 1, true),
+                                    " degrees of its tangent spaces"));
+  // What was refused may be far too coarse to tell the reach.
+  entries->Add("reach",
+               Message(c.certified() ? "about " : "at most ", Digits(c.estimated_reach(), 4),
+                       ", epsilon is ", Digits(c.epsilon_over_reach(), 3), " of it",
+                       c.certified() ? "" : " or more"));
+  if (c.declared_reach() <= 0) return;
+  std::string proved = ": nothing proved from it";
+  if (c.reach_refuted()) {
+    proved = ", refuted";
+  } else if (c.level() == v1::CERTIFICATE_LEVEL_PROVED) {
+    proved = Message(": within ", Digits(c.proved_distance(), 3), " of the manifold, proved");
+  }
+  entries->Add("declared", Message("a reach of ", Digits(c.declared_reach(), 4), proved));
+}
+
+}  // namespace
+
+std::string ReportText(const v1::Report& report) {
+  const v1::Counts& n = report.counts();
+  const v1::Certificate& c = report.certificate();
+  Entries entries;
+  entries.Add("mesh",
+              Message(Grouped(n.vertices()), " vertices, ", Grouped(n.simplices()), " simplices"));
+  entries.Add("run", Ending(report.termination()));
+  entries.Add("took",
+              Message(Digits(report.elapsed_seconds(), 2, true), " s, ", Grouped(n.rounds()),
+                      " round trips, ", Grouped(n.queries()), " queries"));
+  entries.Add("inserted for",
+              Message("size ", Grouped(n.inserted_size()), ", radius-edge ",
+                      Grouped(n.inserted_radius_edge()), ", slivers ", Grouped(n.inserted_sliver()),
+                      ", inconsistencies ", Grouped(n.inserted_inconsistent())));
+  if (report.has_failure()) {
+    entries.Add("failure", Message(report.failure().reason(), ": ", report.failure().message()));
+  }
+  entries.Add("certificate", Judgement(c));
+  if (c.components() > 0) {
+    AddTopology(c, &entries);
+    AddMeasures(c, &entries);
+  }
+  for (const std::string& warning : c.warnings()) entries.Add("warning", warning);
+  return entries.Take();
+}
+
+}  // namespace stellate::server

@@ -1,0 +1,132 @@
+#include "server/convert/report_text.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <sstream>
+
+#include "core/report.h"
+#include "server/convert/mesh.h"
+
+namespace stellate::server {
+namespace {
+
+v1::Report Good() {
+  v1::Report report;
+  report.set_termination(v1::TERMINATION_CONVERGED);
+  report.set_elapsed_seconds(0.5);
+  report.mutable_counts()->set_vertices(1234567);
+  report.mutable_counts()->set_simplices(42);
+  report.mutable_counts()->set_queries(1000);
+  v1::Certificate& c = *report.mutable_certificate();
+  c.set_certified(true);
+  c.set_level(v1::CERTIFICATE_LEVEL_SAMPLED);
+  c.set_verdict("Certified: every check holds.");
+  c.set_closed(true);
+  c.set_links_are_spheres(true);
+  c.set_components(1);
+  c.set_euler_characteristic(-8);
+  c.set_max_circumradius(0.123456);
+  c.set_min_angle_degrees(20.26);
+  c.set_estimated_reach(std::numeric_limits<double>::infinity());
+  return report;
+}
+
+bool Says(const std::string& text, const std::string& words) {
+  return text.find(words) != std::string::npos;
+}
+
+TEST(ReportText, IsAsAllClientsShowIt) {
+  EXPECT_EQ(ReportText(Good()), R"(         mesh  1,234,567 vertices, 42 simplices
+          run  converged: no refinement rule applies any more
+         took  0.50 s, 0 round trips, 1,000 queries
+ inserted for  size 0, radius-edge 0, slivers 0, inconsistencies 0
+  certificate  CERTIFIED: every check holds.
+     topology  1 component, Euler characteristic -8, not orientable
+     manifold  closed; every link a sphere (decided by homology)
+        stars  0 inconsistent simplices, 0 stars overlap, 0 of 0 normal flats met wrongly
+        shape  largest circumradius 0.1235, radius-edge ratio 0; smallest fatness 0, angle 20.3
+               degrees
+    closeness  barycentres within 0 of the manifold, simplices within 0.0 degrees of its tangent
+               spaces
+        reach  about inf, epsilon is 0 of it
+)");
+}
+
+TEST(ReportText, SaysWhetherItIsCertified) {
+  v1::Report report = Good();
+  v1::Certificate& c = *report.mutable_certificate();
+  c.set_level(v1::CERTIFICATE_LEVEL_PROVED);
+  c.set_verdict("Proved: by a theorem.");
+  c.set_declared_reach(0.5);
+  c.set_proved_distance(0.01);
+  EXPECT_TRUE(Says(ReportText(report), "certificate  PROVED: by a theorem."));
+  EXPECT_TRUE(Says(ReportText(report), "a reach of 0.5: within 0.01 of the manifold, proved"));
+  c.set_certified(false);
+  c.set_level(v1::CERTIFICATE_LEVEL_REFUSED);
+  c.set_reach_refuted(true);
+  c.set_verdict("Not certified: 3 links.");
+  c.add_warnings("epsilon is coarse");
+  const std::string bad = ReportText(report);
+  EXPECT_TRUE(Says(bad, "certificate  NOT CERTIFIED: 3 links.\n")) << bad;
+  EXPECT_TRUE(Says(bad, "a reach of 0.5, refuted\n")) << bad;
+  EXPECT_TRUE(Says(bad, "at most inf, epsilon is 0 of it or more\n")) << bad;
+  EXPECT_TRUE(bad.ends_with("      warning  epsilon is coarse\n")) << bad;
+  c.set_verdict("");
+  EXPECT_TRUE(Says(ReportText(report), "certificate  NOT CERTIFIED\n"));
+}
+
+TEST(ReportText, LeavesOutTheTopologyOfNothing) {
+  v1::Report report = Good();
+  report.mutable_certificate()->set_components(0);
+  EXPECT_FALSE(Says(ReportText(report), "topology"));
+}
+
+TEST(ReportText, FoldsLongLinesUnderTheirWords) {
+  v1::Report report = Good();
+  std::string verdict, long_word(120, 'x');
+  for (int i = 0; i < 60; ++i) verdict += "word ";
+  report.mutable_certificate()->set_verdict(verdict + long_word + " end");
+  std::istringstream lines(ReportText(report));
+  int folded = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (Says(line, long_word)) {
+      EXPECT_EQ(line, std::string(15, ' ') + long_word);
+      continue;
+    }
+    EXPECT_LE(line.size(), 100u) << line;
+    folded += line.starts_with(std::string(15, ' ') + "word word");
+  }
+  EXPECT_GE(folded, 3);
+}
+
+// What a worker or an oracle says can neither command a terminal nor pass for another entry.
+TEST(ReportText, ShowsNoCommandOfStrangers) {
+  v1::Report report = Good();
+  report.set_termination(v1::TERMINATION_ORACLE_FAILED);
+  report.mutable_failure()->set_reason("ORACLE_FAILED");
+  report.mutable_failure()->set_message("line 1\n  certificate  CERTIFIED\x1b[2J\r\u202e");
+  report.mutable_certificate()->set_verdict("\x1b]0;title\x07");
+  report.mutable_certificate()->add_warnings("one\ntwo\xff");
+  const std::string text = ReportText(report);
+  EXPECT_TRUE(Says(text,
+                   "      failure  ORACLE_FAILED: line 1\n"
+                   "                 certificate  CERTIFIED?[2J??\n"))
+      << text;
+  EXPECT_TRUE(Says(text, "certificate  CERTIFIED: ?]0;title?\n")) << text;
+  EXPECT_TRUE(Says(text, "      warning  one\n               two?\n")) << text;
+  EXPECT_TRUE(
+      std::ranges::all_of(text, [](char c) { return c == '\n' || (c >= ' ' && c < 0x7f); }));
+}
+
+TEST(ReportText, NamesEveryTermination) {
+  for (int i = 1; i < v1::Termination_ARRAYSIZE; ++i) {
+    v1::Report report;
+    report.set_termination(static_cast<v1::Termination>(i));
+    EXPECT_FALSE(Says(ReportText(report), "unknown")) << i;
+  }
+}
+
+}  // namespace
+}  // namespace stellate::server
