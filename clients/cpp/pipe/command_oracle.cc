@@ -127,6 +127,7 @@ class CommandOracle final : public Oracle {
   bool has_local_size() const override { return greeting_.sizes; }
   std::optional<BoundingBox> bounding_box() const override { return options_.box; }
   Eigen::MatrixXd seeds() const override { return options_.seeds; }
+  std::string about() const override { return greeting_.about; }
 
   Answer ClosestPoint(const Eigen::MatrixXd& x) override { return Ask({dimension(), x}); }
 

@@ -30,6 +30,7 @@ struct Greeting {
   int walls = 0;
   std::optional<BoundingBox> box;
   Eigen::MatrixXd seeds;  // d x m
+  std::string about;
 };
 
 // `line` without its end. Throws Garbled.

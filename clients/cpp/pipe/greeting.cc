@@ -54,7 +54,7 @@ Expected<Eigen::MatrixXd> ParsePoints(std::string_view text) {
 namespace pipe {
 namespace {
 
-constexpr std::string_view kFirstWord = "stellate-oracle", kVersion = "1";
+constexpr std::string_view kFirstWord = "stellate-oracle", kVersion = "1", kAbout = "about=";
 
 template <typename T>
 T Value(const Expected<T>& parsed) {
@@ -97,7 +97,7 @@ void Understand(std::string_view word, Greeting* greeting) {
     greeting->seeds = Value(ParsePoints(value));
   } else {
     throw Garbled("its first line: " + Quoted(word) +
-                  " is none of k= d= tangents= flats= sizes= walls= box= seeds=");
+                  " is none of k= d= tangents= flats= sizes= walls= box= seeds= about=");
   }
 }
 
@@ -119,7 +119,14 @@ Greeting ParseGreeting(std::string_view line) {
   }
   Greeting greeting;
   greeting.text = words[2] == "text";
-  for (size_t i = 3; i < words.size(); ++i) Understand(words[i], &greeting);
+  for (size_t i = 3; i < words.size(); ++i) {
+    if (words[i].starts_with(kAbout)) {
+      greeting.about = words[i].substr(kAbout.size());
+      while (++i < words.size()) greeting.about.append(" ").append(words[i]);
+    } else {
+      Understand(words[i], &greeting);
+    }
+  }
   return greeting;
 }
 

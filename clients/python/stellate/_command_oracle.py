@@ -169,6 +169,7 @@ class CommandOracle:
     def _settle(self, k: int | None, d: int | None, bounding_box: Any, seeds: Any) -> None:
         """The options and the command's first line become one."""
         greeting = self._greeting
+        self.about = greeting.about
         self.dimension = k = _agreed("k", greeting.dimension, k)
         self.ambient_dimension = d = _agreed("d", greeting.ambient_dimension, d)
         if not (1 <= k < d or (k == d and greeting.walls)):

@@ -137,7 +137,7 @@ TEST_F(CommandOracle, DoctorFindsNothingWrongWithTheShippedOnes) {
 
 TEST_F(CommandOracle, FlatsAndSizesGoThroughBothFramings) {
   // The flat's answer is its centre, radius and a number of its basis.
-  const std::string greeting = "k=1 d=2 flats=1 sizes=1 seeds=1,0";
+  const std::string greeting = "k=1 d=2 flats=1 sizes=1 seeds=1,0 about=as it is told";
   const std::string binary = Script("perl", R"($| = 1; binmode STDIN; binmode STDOUT;
 print "stellate-oracle 1 binary )" + greeting + R"(\n";
 while (read(STDIN, my $head, 16) == 16) {
@@ -157,6 +157,7 @@ NF == 4 && /^[a-z]/ { kind = $1; left = $2; next }
     const auto oracle = Start(Options(command));
     ASSERT_NE(oracle, nullptr);
     const Eigen::Matrix2d x{{1, 2}, {3, 4}}, bases{{0.25, 0.5}, {0.75, 1}};
+    EXPECT_EQ(oracle->about(), "as it is told");
     EXPECT_EQ(oracle->LocalSize(x), Eigen::Vector2d(3, 3)) << command;
     const Answer answer = oracle->IntersectFlat(x, bases, Eigen::Vector2d(5, 6));
     EXPECT_EQ(answer.points, bases) << command;

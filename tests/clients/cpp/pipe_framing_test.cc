@@ -220,13 +220,15 @@ TEST(FramingNumbers, AreReadWhole) {
 
 TEST(FramingGreeting, SaysEverything) {
   const Greeting greeting = ParseGreeting(
-      "stellate-oracle 1 text  k=1 d=2 tangents=1 flats=0 sizes=1 box=-1,-2:1,2 seeds=1,0;0,1.5\r");
+      "stellate-oracle 1 text  k=1 d=2 tangents=1 flats=0 sizes=1 box=-1,-2:1,2 seeds=1,0;0,1.5 "
+      "about=of radius 1,  k=2 at most\r");
   EXPECT_TRUE(greeting.text && greeting.tangents && greeting.sizes && !greeting.flats);
   EXPECT_EQ(greeting.dimension, 1);
   EXPECT_EQ(greeting.ambient_dimension, 2);
   EXPECT_EQ(greeting.box->lower, Eigen::Vector2d(-1, -2));
   EXPECT_EQ(greeting.box->upper, Eigen::Vector2d(1, 2));
   EXPECT_EQ(greeting.seeds.col(1), Eigen::Vector2d(0, 1.5));
+  EXPECT_EQ(greeting.about, "of radius 1, k=2 at most");
   const Greeting bare = ParseGreeting("stellate-oracle 1 binary");
   EXPECT_FALSE(bare.text || bare.dimension || bare.box || bare.seeds.size() > 0);
 }

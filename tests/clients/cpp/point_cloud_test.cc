@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "stellate/catalogue.h"
+#include "stellate/oracles/combined.h"
 #include "stellate/oracles/points.h"
 #include "stellate/oracles/walls.h"
 
@@ -144,6 +145,25 @@ TEST(PointCloud, MayLieFarFromTheOrigin) {
     ASSERT_TRUE(near.IsFound(j) && far.IsFound(j)) << j;
     EXPECT_LT((far.points.col(j) - away - near.points.col(j)).norm(), 1e-7);
   }
+}
+
+TEST(PointCloud, IsToldOfByWhatIsMadeOfIt) {
+  const auto scan = std::make_shared<PointCloud>(ScanOf(1000, 0.003), 2, 0.25);
+  const auto other = std::make_shared<PointCloud>(ScanOf(1000, 0.003), 2, 0.3);
+  const std::string told = scan->about();
+  const std::string both = told + "; " + other->about();
+  EXPECT_EQ(Transformed(scan, {}).about(), told);
+  const Similarity doubled{{}, 2, {}}, into_space{Eigen::MatrixXd::Identity(3, 2), 1, {}};
+  EXPECT_EQ(Transformed(scan, doubled).about(), told + ", scaled by 2");
+  EXPECT_EQ(Product({scan, scan, other}).about(), both);
+  const std::shared_ptr<Oracle> torus = MakeManifold("torus", nullptr);
+  EXPECT_EQ(Product({torus, scan}).about(), told);
+  EXPECT_EQ(Transformed(torus, doubled).about(), "");
+  const auto height = [](const Eigen::VectorXd& x) { return Eigen::VectorXd(x.tail(1)); };
+  EXPECT_EQ(LevelSet(scan, height).about(), told);
+  const std::shared_ptr<Oracle> circle = MakeManifold("sphere:1", nullptr);
+  const auto rim = std::make_shared<Transformed>(circle, into_space);
+  EXPECT_EQ(ManifoldWithBoundary(scan, rim).about(), told);
 }
 
 }  // namespace

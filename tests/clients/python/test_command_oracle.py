@@ -93,6 +93,12 @@ def test_answers_are_the_program_s(program, framing):
         assert oracle.closest_point(np.empty((0, 3))).shape == (0, 3)
 
 
+def test_it_says_of_itself_what_its_first_line_says():
+    told = "of radius 1,  k=2 at most"
+    with CommandOracle(greeting(f"binary k=2 d=3 {BOX} about={told}")) as oracle:
+        assert oracle.about == "of radius 1, k=2 at most"
+
+
 def test_the_doctor_examines_it_as_any_other(program):
     with CommandOracle(program("text")) as oracle:
         assert stellate.check(oracle).ok

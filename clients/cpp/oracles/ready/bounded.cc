@@ -132,6 +132,8 @@ std::optional<BoundingBox> ManifoldWithBoundary::bounding_box() const {
   return own ? own : rim_->bounding_box();
 }
 
+std::string ManifoldWithBoundary::about() const { return AboutOf({inner_, rim_}); }
+
 MatrixXd ManifoldWithBoundary::seeds() const {
   const MatrixXd own = inner_->seeds();
   return own.size() > 0 ? own : rim_->seeds();

@@ -6,6 +6,18 @@
 
 namespace stellate::oracles {
 
+std::string AboutOf(const std::vector<std::shared_ptr<Oracle>>& parts) {
+  std::vector<std::string> known;
+  std::string all;
+  for (const auto& part : parts) {
+    const std::string about = part->about();
+    if (about.empty() || std::find(known.begin(), known.end(), about) != known.end()) continue;
+    known.push_back(about);
+    all += (all.empty() ? "" : "; ") + about;
+  }
+  return all;
+}
+
 std::string Short(double number) {
   char text[32];
   std::snprintf(text, sizeof text, "%g", number);

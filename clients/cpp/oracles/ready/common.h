@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "stellate/oracle.h"
 
@@ -18,6 +20,9 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 inline void RefuseWalls(const Oracle& oracle, const std::string& made) {
   if (oracle.walls() > 0) Refuse(made + " is made of manifolds without boundary: clip it instead");
 }
+
+// What the oracles that another is made of say of themselves, each thing once.
+std::string AboutOf(const std::vector<std::shared_ptr<Oracle>>& parts);
 
 // To six digits.
 std::string Short(double number);

@@ -75,6 +75,8 @@ std::optional<BoundingBox> LevelSet::bounding_box() const {
   return seeds_.size() > 0 ? std::nullopt : base_->bounding_box();
 }
 
+std::string LevelSet::about() const { return AboutOf({base_}); }
+
 Eigen::MatrixXd LevelSet::seeds() const { return seeds_; }
 
 Eigen::MatrixXd LevelSet::J(const Eigen::VectorXd& x) const {

@@ -99,6 +99,8 @@ std::optional<BoundingBox> Product::bounding_box() const {
 }
 
 // Every seed of one with every seed of the others, if any factor has seeds.
+std::string Product::about() const { return AboutOf(factors_); }
+
 Eigen::MatrixXd Product::seeds() const {
   const auto has_seeds = [](const auto& factor) { return factor->seeds().size() > 0; };
   if (std::none_of(factors_.begin(), factors_.end(), has_seeds)) return {};

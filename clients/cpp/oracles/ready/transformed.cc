@@ -90,6 +90,12 @@ std::optional<BoundingBox> Transformed::bounding_box() const {
   return BoundingBox{middle - half, middle + half};
 }
 
+std::string Transformed::about() const {
+  const std::string about = AboutOf({inner_});
+  if (about.empty() || map_.scale == 1) return about;
+  return about + ", scaled by " + Short(map_.scale);  // lengths in it are those of before
+}
+
 Eigen::MatrixXd Transformed::seeds() const {
   const Eigen::MatrixXd seeds = inner_->seeds();
   return seeds.size() == 0 ? seeds : Forth(seeds);

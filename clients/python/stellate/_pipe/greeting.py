@@ -69,6 +69,7 @@ class Greeting:
     walls: int = 0
     box: tuple[np.ndarray, np.ndarray] | None = None
     seeds: np.ndarray | None = None
+    about: str = ""
 
     def says_as(self, other: Greeting) -> bool:
         """Whether both are about the same oracle."""
@@ -102,7 +103,10 @@ def parse_greeting(line: bytes) -> Greeting:
     if words[1] != "1":
         raise Garbled(f"it speaks version {quoted(words[1])} of the pipe; here it is version 1")
     greeting = Greeting(words[2] == "text")
-    for word in words[3:]:
+    for i, word in enumerate(words[3:], 3):
+        if word.startswith("about="):
+            greeting.about = " ".join(words[i:]).partition("=")[2]
+            break
         _understand(word, greeting)
     return greeting
 
@@ -126,7 +130,7 @@ def _understand(word: str, greeting: Greeting) -> None:
         else:
             raise Garbled(
                 f"its first line: {quoted(word)} is none of k= d= tangents= flats= sizes= walls= "
-                "box= seeds="
+                "box= seeds= about="
             )
     except InvalidArgument as error:
         raise Garbled(f"its first line: {error}") from None

@@ -10,7 +10,7 @@ from .._functions import UserFunction
 from .._rows import Array, apply, norms, product, transposed
 from ..errors import InvalidArgument, OracleError
 from ..oracle import CheckedOracle
-from ._common import all_or_raise, refuse_walls, told_by
+from ._common import about_of, all_or_raise, refuse_walls
 
 _STEP = 1e-4  # of differences of closest points, in shares of where M is
 _ONE_SIDED = 0.1  # of what a step outwards loses at the boundary, at least
@@ -46,7 +46,7 @@ class ManifoldWithBoundary:
         self._inner, self._rim = CheckedOracle(oracle), CheckedOracle(boundary)
         for part in (self._inner, self._rim):
             refuse_walls(part, "ManifoldWithBoundary")
-        self.about = told_by(self._inner, self._rim)
+        self.about = about_of(self._inner, self._rim)
         self.dimension = k = self._inner.dimension
         self.ambient_dimension = d = self._inner.ambient_dimension
         if (self._rim.dimension, self._rim.ambient_dimension) != (k - 1, d):

@@ -11,7 +11,7 @@ from .._functions import Exactness, UserFunction
 from .._rows import Array, Flags, apply, norms, product, transposed
 from ..errors import InvalidArgument
 from ..oracle import CheckedOracle
-from ._common import all_or_raise, refuse_walls, told_by
+from ._common import about_of, all_or_raise, refuse_walls
 
 
 class Product:
@@ -28,7 +28,7 @@ class Product:
             refuse_walls(factor, "a product")
         ends = np.cumsum([factor.ambient_dimension for factor in self._factors])
         self._parts = [slice(b - f.ambient_dimension, b) for b, f in zip(ends, self._factors)]
-        self.about = told_by(*self._factors)
+        self.about = about_of(*self._factors)
         self.dimension = sum(factor.dimension for factor in self._factors)
         self.ambient_dimension = int(ends[-1])
         self.thread_safe = all(getattr(factor, "thread_safe", False) for factor in factors)
@@ -124,7 +124,7 @@ class Transformed:
         if not (np.isfinite(scale) and scale > 0):
             raise InvalidArgument(f"scale has to be positive, and is {scale!r}")
         self._turn, self._scale, self._shift = turn, float(scale), shift
-        self.about = told_by(self._inner)
+        self.about = about_of(self._inner)
         if self.about and scale != 1:
             self.about += f", scaled by {scale:.6g}"  # lengths in it are those of before
         self.dimension, self.ambient_dimension = self._inner.dimension, len(turn)
@@ -214,7 +214,7 @@ class LevelSet:
                 "a level set needs a function f, and a function or None as gradient"
             )
         self.ambient_dimension = d = self._base.ambient_dimension
-        self.about = told_by(self._base)
+        self.about = about_of(self._base)
         self._values, self._gradient = UserFunction(f, "f", ("m",), str(d)), None
         if gradient is not None:
             self._gradient = UserFunction(gradient, "gradient", ("m", d), str(d))

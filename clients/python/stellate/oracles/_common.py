@@ -26,7 +26,7 @@ def refuse_walls(oracle: CheckedOracle, made: str) -> None:
         )
 
 
-def told_by(*parts: CheckedOracle) -> str:
+def about_of(*parts: CheckedOracle) -> str:
     """What the oracles that another is made of say of themselves, each thing once."""
     return "; ".join(dict.fromkeys(part.about for part in parts if part.about))
 

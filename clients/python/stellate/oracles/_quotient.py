@@ -12,7 +12,7 @@ from .._lowest import descend
 from .._rows import Array, Flags, apply, norms, product, transposed
 from ..errors import InvalidArgument
 from ..oracle import CheckedOracle
-from ._common import all_or_raise, box_around, refuse_walls, told_by, tree_of
+from ._common import about_of, all_or_raise, box_around, refuse_walls, tree_of
 
 _SAMPLES = 20_000  # of the manifold, to begin from
 _NEAREST = 8  # of them looked at for each query
@@ -52,7 +52,7 @@ class Quotient:
         m = len(self._base.bounding_box[0])
         self._values = UserFunction(f, "a quotient's f", ("d",), str(m))
         self.dimension = self._base.dimension
-        self.about = told_by(self._base)
+        self.about = about_of(self._base)
         self.thread_safe = False
         lower, upper = self._base.bounding_box
         self._length = float(norms(upper - lower))  # of N

@@ -28,6 +28,7 @@ class Product final : public Oracle {
   Eigen::VectorXd LocalSize(const Eigen::MatrixXd& points) override;
   std::optional<BoundingBox> bounding_box() const override;
   Eigen::MatrixXd seeds() const override;
+  std::string about() const override;
 
  private:
   std::vector<std::shared_ptr<Oracle>> factors_;
@@ -58,6 +59,7 @@ class Transformed final : public Oracle {
   Eigen::VectorXd LocalSize(const Eigen::MatrixXd& points) override;
   std::optional<BoundingBox> bounding_box() const override;
   Eigen::MatrixXd seeds() const override;
+  std::string about() const override;
 
  private:
   Eigen::MatrixXd Forth(const Eigen::MatrixXd& points) const;
@@ -84,6 +86,7 @@ class LevelSet final : public PointwiseOracle {
   bool has_intersect_flat() const override { return false; }
   std::optional<BoundingBox> bounding_box() const override;
   Eigen::MatrixXd seeds() const override;
+  std::string about() const override;
 
   // Down to the level and along it towards x, in M's tangent space, and back to M, again and
   // again; a step is halved while it oversteps.

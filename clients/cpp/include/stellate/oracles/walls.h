@@ -124,6 +124,7 @@ class ManifoldWithBoundary final : public Oracle {
   Eigen::MatrixXd Conormals(const Eigen::MatrixXd& points, const Walls& face) override;
   std::optional<BoundingBox> bounding_box() const override;
   Eigen::MatrixXd seeds() const override;
+  std::string about() const override;
 
  private:
   Eigen::MatrixXd Outward(const Eigen::MatrixXd& points, const Eigen::MatrixXd& bases);
