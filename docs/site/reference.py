@@ -27,7 +27,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 def said(*command: str) -> str:
     """What a program says of itself, and names itself as users call it."""
-    package = {"PYTHONPATH": str(ROOT / "clients" / "python"), "COLUMNS": "96"}
+    ours = os.pathsep.join(str(ROOT / "clients" / package) for package in ("python", "conform"))
+    package = {"PYTHONPATH": ours, "COLUMNS": "96"}
     done = subprocess.run(
         [*command, "--help"], capture_output=True, text=True, check=True,
         env={**os.environ, **package},
