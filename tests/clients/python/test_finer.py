@@ -107,9 +107,11 @@ class Workers:
 def apart(monkeypatch):
     monkeypatch.setattr(_run, "Following", Following)
     monkeypatch.setattr(_run, "_Workers", Workers)
-    monkeypatch.setattr(
-        _run, "choose", lambda oracle, epsilon: (0.8, "so") if epsilon == "auto" else (epsilon, "")
-    )
+
+    def choose(oracle, epsilon, tell):
+        return (0.8, "so") if epsilon == "auto" else (epsilon, "")
+
+    monkeypatch.setattr(_run, "choose", choose)
 
 
 @pytest.mark.parametrize(
