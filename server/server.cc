@@ -172,7 +172,8 @@ bool Server::Stop(Clock::duration drain, const std::function<bool()>& hurry) {
   Drain(state, drain, hurry);
   state.streams.StopAll();
   impl.server->StopListening();
-  // gRPC also waits for clients that have no call open and do not look at their connection.
+  // Streams end once what is on its way has been read; a client that does not read is cut off. gRPC
+  // also waits for clients that have no call open and do not look at their connection.
   const TimePoint said = Clock::now() + kLastWords;
   while (state.streams.Count() > 0 && Clock::now() < said) {
     std::this_thread::sleep_for(kLook);

@@ -43,13 +43,6 @@ class HistoryStream : public ServerStream<Request, Response>, public SessionWatc
     Base::Pump();
   }
 
-  void StopServing() final {
-    Base::StopServing();
-    // A client that does not read must not hold up the stop.
-    const auto lock = Base::Lock();
-    if (Base::phase() == Phase::kWriting) Base::context()->TryCancel();
-  }
-
  protected:
   using Base::End;
   using Base::response;

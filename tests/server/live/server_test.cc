@@ -156,7 +156,8 @@ TEST_F(ServerTest, StoppingInAHurryEndsStreamsWithUnavailable) {
   });
   EXPECT_TRUE(server_->Stop(600s, [] { return true; }));
   EXPECT_EQ(worker.Wait().error_code(), grpc::StatusCode::UNAVAILABLE);
-  EXPECT_EQ(reading.get().error_code(), grpc::StatusCode::UNAVAILABLE);
+  const grpc::Status ended = reading.get();
+  EXPECT_EQ(ended.error_code(), grpc::StatusCode::UNAVAILABLE) << ended.error_message();
 }
 
 }  // namespace
