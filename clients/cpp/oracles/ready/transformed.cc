@@ -91,7 +91,7 @@ std::optional<BoundingBox> Transformed::bounding_box() const {
 }
 
 std::string Transformed::about() const {
-  const std::string about = AboutOf({inner_});
+  std::string about = AboutOf({inner_});
   if (about.empty() || map_.scale == 1) return about;
   return about + ", scaled by " + Short(map_.scale);  // lengths in it are those of before
 }
