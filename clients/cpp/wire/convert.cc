@@ -3,6 +3,7 @@
 #include <bit>
 #include <cstring>
 #include <string>
+#include <string_view>
 
 #include "wire/status.h"
 
@@ -69,6 +70,18 @@ tl::unexpected<Error> Invalid(const std::string& why) {
   return Fail(ErrorCode::kRefused, why, "INVALID_ARGUMENT");
 }
 
+// Servers take so much; an oracle that is made of many others may say more.
+constexpr size_t kMostAboutItself = 300;
+
+std::string FirstCharacters(std::string_view utf8, size_t most) {
+  size_t end = 0;
+  for (; end < utf8.size(); ++end) {
+    const bool begins = (static_cast<unsigned char>(utf8[end]) & 0xC0) != 0x80;
+    if (begins && most-- == 0) break;
+  }
+  return std::string(utf8.substr(0, end));
+}
+
 }  // namespace
 
 Expected<void> CheckServable(const Oracle& oracle, std::optional<std::uint32_t> max_chunk) {
@@ -106,7 +119,7 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   spec.mutable_oracle()->set_tangent_basis(oracle.has_tangent_basis());
   spec.mutable_oracle()->set_local_size(oracle.has_local_size());
   spec.mutable_oracle()->set_conormals(oracle.walls() > 0);
-  spec.mutable_oracle()->set_about(oracle.about());
+  spec.mutable_oracle()->set_about(FirstCharacters(oracle.about(), kMostAboutItself));
   spec.set_walls(static_cast<std::uint32_t>(oracle.walls()));
   if (const auto box = oracle.bounding_box()) {
     // Shape [d]: a corner is one point, not a list of them.

@@ -159,9 +159,14 @@ TEST(Spec, CarriesWhatTheOracleSaysOfItself) {
     void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const override {
       tangent = Eigen::Vector2d(-y[1], y[0]);
     }
-    std::string about() const override { return "a circle by trade"; }
+    std::string about() const override { return words; }
+    std::string words = "a circle by trade";
   } oracle;
   EXPECT_EQ(ToSpec(oracle, {})->oracle().about(), "a circle by trade");
+  std::string longest;
+  for (int i = 0; i < 300; ++i) longest += "\u00e9";
+  oracle.words = longest + "and more";
+  EXPECT_EQ(ToSpec(oracle, {})->oracle().about(), longest) << "what a server takes";
   EXPECT_EQ(ToSpec(*MakeManifold("torus", nullptr), {})->oracle().about(), "");
 }
 

@@ -129,7 +129,7 @@ class Oracle {
   virtual Eigen::MatrixXd seeds() const { return {}; }  // d x m
 
   // One sentence that it says of itself, for people, such as what it was fitted with: the verdict
-  // ends with it, as the oracle's own words. UTF-8, at most 300 characters, none of them a control.
+  // ends with its first 300 characters, as the oracle's own words. UTF-8, without controls.
   virtual std::string about() const { return {}; }
 };
 
