@@ -41,25 +41,7 @@ from ._mesh import FinishedMesh, Mesh, load_txt  # noqa: E402
 from ._series import save_series  # noqa: E402
 from ._version import __version__ as __version__  # noqa: E402
 from .client import Client  # noqa: E402
-from .errors import (  # noqa: E402
-    Cancelled,
-    ExecutorError,
-    FailedPrecondition,
-    Interrupted,
-    InvalidArgument,
-    LimitExceeded,
-    MeshNotFound,
-    NotCertified,
-    NotConverged,
-    OracleError,
-    SaveError,
-    ServerNotFound,
-    StellateError,
-    Unauthenticated,
-    Unavailable,
-    UncertifiedWarning,
-    ViewerNotFound,
-)
+from .errors import *  # noqa: E402, F403
 from .options import MeshOptions  # noqa: E402
 from .oracle import Oracle  # noqa: E402
 from .oracles import ImplicitManifold, ImplicitSolid  # noqa: E402
@@ -68,38 +50,21 @@ from .report import Progress, Report  # noqa: E402
 from .server import Server  # noqa: E402
 
 __all__ = [
-    "Cancelled",
     "CheckReport",
     "Client",
     "CommandOracle",
     "Credentials",
-    "ExecutorError",
     "Face",
-    "FailedPrecondition",
     "Finding",
     "FinishedMesh",
     "ImplicitManifold",
     "ImplicitSolid",
-    "Interrupted",
-    "InvalidArgument",
-    "LimitExceeded",
     "Mesh",
-    "MeshNotFound",
     "MeshOptions",
-    "NotCertified",
-    "NotConverged",
     "Oracle",
-    "OracleError",
     "Progress",
     "Report",
-    "SaveError",
     "Server",
-    "ServerNotFound",
-    "StellateError",
-    "Unauthenticated",
-    "Unavailable",
-    "UncertifiedWarning",
-    "ViewerNotFound",
     "check",
     "check_save",
     "download",
@@ -112,3 +77,4 @@ __all__ = [
     "serve",
     "watch",
 ]
+__all__ += errors.__all__

@@ -270,7 +270,7 @@ class CommandOracle:
             print(f"stellate: {how}\nstellate: it is started again", file=sys.stderr)
 
     def _hear_again(self, speaker: _Speaker) -> None:
-        if not speaker.greet(self._start_seconds).says_as(self._greeting):
+        if speaker.greet(self._start_seconds) != self._greeting:
             raise RuntimeError(
                 f"the oracle command {quoted(self._command)} says another first line when it is "
                 "started again"

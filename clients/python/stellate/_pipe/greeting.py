@@ -58,7 +58,7 @@ def _coordinates(text: str) -> np.ndarray:
 
 @dataclasses.dataclass
 class Greeting:
-    """A command's first line."""
+    """A command's first line. Two are equal where they are about the same oracle."""
 
     text: bool
     dimension: int | None = None
@@ -67,24 +67,9 @@ class Greeting:
     flats: bool = False
     sizes: bool = False
     walls: int = 0
-    box: tuple[np.ndarray, np.ndarray] | None = None
-    seeds: np.ndarray | None = None
-    about: str = ""
-
-    def says_as(self, other: Greeting) -> bool:
-        """Whether both are about the same oracle."""
-        return all(
-            getattr(self, name) == getattr(other, name)
-            for name in (
-                "text",
-                "dimension",
-                "ambient_dimension",
-                "tangents",
-                "flats",
-                "sizes",
-                "walls",
-            )  # fmt: skip
-        )
+    box: tuple[np.ndarray, np.ndarray] | None = dataclasses.field(default=None, compare=False)
+    seeds: np.ndarray | None = dataclasses.field(default=None, compare=False)
+    about: str = dataclasses.field(default="", compare=False)
 
 
 def parse_greeting(line: bytes) -> Greeting:

@@ -23,14 +23,10 @@ _WHOLE = {
 }
 _CRITERIA = {field.name for field in pb.Criteria.DESCRIPTOR.fields}
 # Keywords, and the fields of MeshSpec that they set.
-_SPEC = {
-    "random_seed": "random_seed",
-    "label": "label",
-    "box_seeds": "box_seeds",
-    "components": "components",
-    "reach": "declared_reach",
-    "cover_box": "cover_box",
-}
+_SPEC = {"reach": "declared_reach"}
+_SPEC.update(
+    (f.name, f.name) for f in pb.MeshSpec.DESCRIPTOR.fields if f.name in types(SpecOptions)
+)
 _SERVING = set(types(MeshOptions)) - set(types(SpecOptions))  # keywords of stellate.mesh alone
 # Arguments with names of their own, which somebody may have meant.
 _NAMED = {"epsilon", "server", "on_progress", "credentials", "checkpoint", "save", "keep"}
@@ -66,12 +62,12 @@ def mesh_spec(oracle: CheckedOracle, epsilon: float, options: Mapping[str, Any])
             _set(spec.criteria, name, value)
         elif name in _LIMITS:
             _set(spec.limits, name, value)
-        elif name in _SPEC:
-            _set(spec, _SPEC[name], value)
         elif name == "audit":
             _set(spec, name, _audit(value))
         elif name == "seeds":
             spec.seeds.CopyFrom(to_wire(points_of(value, oracle.ambient_dimension)))
+        elif name in _SPEC:
+            _set(spec, _SPEC[name], value)
         elif name in _SERVING:
             raise TypeError(f"{name!r} is for who serves the mesh, not for declaring it")
         elif name == "keep":
