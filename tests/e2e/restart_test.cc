@@ -124,15 +124,6 @@ class Restart : public ::testing::Test {
   std::function<void()> on_failure_;
 };
 
-TEST_F(Restart, KilledTwiceTheServerIsWaitedFor) {
-  disasters_ = 2;
-  AfterBatches(3, [this] {
-    server_.End(SIGKILL);
-    server_.Start();
-  });
-  ExpectTheUndisturbedMesh();
-}
-
 class GradedRestart : public Restart {
  protected:
   GradedRestart() : Restart("torus:1:0.8") {
@@ -141,7 +132,7 @@ class GradedRestart : public Restart {
   }
 };
 
-TEST_F(GradedRestart, SizesAreReplayed) {
+TEST_F(GradedRestart, KilledTwiceTheServerIsWaitedForAndReplaysSizes) {
   disasters_ = 2;
   AfterBatches(6, [this] {
     server_.End(SIGKILL);

@@ -1,5 +1,4 @@
 // Manifolds with boundary, from C++ through the real server; topology is counted here.
-#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <ostream>
@@ -35,8 +34,14 @@ TEST_P(EveryDomain, IsMeshedUpToItsWalls) {
   ASSERT_NE(domain, nullptr) << why;
   const Expected<Mesh> mesh = MeshManifold(*domain, At(want.epsilon));
   ASSERT_TRUE(mesh.has_value()) << mesh.error().reason << ": " << mesh.error().message;
-  ASSERT_TRUE(mesh->report.certified()) << mesh->report.text;
+  const Certificate& certificate = mesh->report.certificate;
+  ASSERT_TRUE(certificate.certified) << mesh->report.text;
   EXPECT_EQ(Euler(mesh->simplices), want.euler);
+  EXPECT_EQ(certificate.euler_characteristic, want.euler);
+  EXPECT_EQ(certificate.orientable, want.spec != "moebius");
+  for (const char* words : {"its walls", "a boundary of "}) {
+    EXPECT_NE(certificate.verdict.find(words), std::string::npos) << certificate.verdict;
+  }
   EXPECT_EQ(mesh->boundary().size(), want.walls);
   EXPECT_EQ(mesh->edges().size(), want.edge_faces);
   EXPECT_EQ(Count(mesh->corners()), want.corners);
@@ -132,34 +137,6 @@ TEST_F(WallsFromCpp, DownloadsKeepTheWalls) {
   EXPECT_TRUE(AreIdentical(*fetched, *watched));
   EXPECT_FALSE(fetched->walls.empty());
   EXPECT_EQ(fetched->walls, watched->walls);
-}
-
-// Conormals of a lying client.
-class Lying : public Clipped {
- public:
-  Lying(std::shared_ptr<Oracle> oracle, double length, double across)
-      : Clipped(std::move(oracle), {HalfSpace(VectorXd::Unit(3, 2), -0.1)}),
-        length_(length),
-        across_(across) {}
-  MatrixXd Conormals(const MatrixXd& points, const Walls& face) override {
-    return length_ * (Clipped::Conormals(points, face) + across_ * points);
-  }
-
- private:
-  double length_, across_;
-};
-
-TEST_F(WallsFromCpp, BadWallsAreRefusedByName) {
-  const auto refusal = [](Oracle& oracle) {
-    const Expected<Mesh> mesh = MeshManifold(oracle, At(0.3));
-    return mesh ? std::string("none") : mesh.error().message;
-  };
-  const std::shared_ptr<Oracle> sphere = Make("sphere:2");
-  Lying scaled(sphere, 2, 0), tilted(sphere, std::sqrt(0.5), 1);
-  EXPECT_NE(refusal(scaled).find("unit vector"), std::string::npos) << refusal(scaled);
-  EXPECT_NE(refusal(tilted).find("not tangent"), std::string::npos) << refusal(tilted);
-  Clipped nothing(sphere, {HalfSpace(VectorXd::Unit(3, 2), 5)});
-  EXPECT_NE(refusal(nothing).find("leave nothing"), std::string::npos) << refusal(nothing);
 }
 
 TEST_F(WallsFromCpp, WorkersOfOtherWallsAreRefused) {

@@ -3,13 +3,12 @@
 import logging
 import os
 import pathlib
-import signal
 import subprocess
 import time
 
 import pytest
 import stellate
-from stellate import _reconnect, manifolds
+from stellate import manifolds
 
 
 class MortalServer:
@@ -37,9 +36,6 @@ class MortalServer:
         while not ready.exists():
             assert self._process.poll() is None, "the server did not start"
             time.sleep(0.002)
-
-    def send(self, number: int) -> None:
-        os.kill(self._process.pid, number)
 
     def kill(self) -> None:
         self._process.kill()
@@ -107,22 +103,6 @@ def test_a_worker_by_itself_comes_back(mortal):
         info = client.create(oracle, 0.15)
         assert client.serve(oracle, info.name) == "SUCCEEDED"
         *_, mesh = stellate.watch(info.name, server=client)
-        assert_undisturbed(mesh, client)
-
-
-def test_a_frozen_server_is_found_by_pings(mortal, monkeypatch):
-    oracle = Disaster(lambda: mortal.send(signal.SIGSTOP), 3)
-    wait = _reconnect.Reconnector.wait_or_raise
-
-    def thaw_and_wait(outage, error, ours):
-        mortal.send(signal.SIGCONT)
-        wait(outage, error, ours)
-
-    monkeypatch.setattr(_reconnect.Reconnector, "wait_or_raise", thaw_and_wait)
-    with stellate.Client(mortal.address, keepalive_seconds=0.5) as client:
-        mesh = stellate.mesh(oracle, 0.15, server=client)
-    assert not oracle.left
-    with stellate.Client(mortal.address) as client:
         assert_undisturbed(mesh, client)
 
 

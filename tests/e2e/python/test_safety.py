@@ -7,7 +7,7 @@ import pytest
 import stellate
 from stellate import manifolds
 
-ALICE, BOB = "alice-0123456789abcdef", "bob-0123456789abcdef"
+ALICE = "alice-0123456789abcdef"
 
 
 def openssl(directory, *arguments):
@@ -30,7 +30,7 @@ def files(tmp_path_factory):
         openssl(directory, "req", "-new", *new_key(name), "-out", f"{name}.csr")
         sign = ("-CA", "ca.pem", "-CAkey", "ca.key", "-set_serial", "1", "-extfile", "names")
         openssl(directory, "x509", "-req", "-in", f"{name}.csr", *sign, "-out", f"{name}.pem")
-    (directory / "tokens").write_text(f"alice {ALICE}\nbob {BOB}\n")
+    (directory / "tokens").write_text(f"alice {ALICE}\n")
     (directory / "alice").write_text(ALICE + "\n")
     return directory
 
@@ -77,23 +77,6 @@ def test_health_under_mutual_tls(files, tmp_path):
             assert subprocess.run(ask, cwd=files).returncode == 0
         finally:
             process.terminate()
-
-
-def test_owners_do_not_see_each_other(address, full):
-    with (
-        stellate.Client(address, stellate.Credentials(token=ALICE, **full)) as alice,
-        stellate.Client(address, stellate.Credentials(token=BOB, **full)) as bob,
-    ):
-        name = alice.create(manifolds.Torus(), 0.2).name
-        assert [info.name for info in alice.list()] == [name]
-        assert list(bob.list()) == []
-        with pytest.raises(stellate.MeshNotFound):
-            bob.get(name)
-        with pytest.raises(stellate.MeshNotFound):
-            bob.serve(manifolds.Torus(), name)
-        with pytest.raises(stellate.MeshNotFound):
-            next(bob.watch(name))
-        alice.delete(name)
 
 
 def test_wrong_tokens_and_certificates_are_refused(address, files, full):

@@ -59,8 +59,10 @@ def test_progress(server):
     mesh = stellate.mesh(manifolds.Torus(), 0.15, server=server, on_progress=seen.append)
     assert seen[-1].phase == "DONE" and seen[-1].fraction == 1
     assert seen[-1].vertices == len(mesh.points)
-    rounds = [progress.round for progress in seen]
-    assert rounds == sorted(rounds)
+    assert seen[-1].queries <= mesh.report.counts.queries
+    for grows in ("round", "vertices", "queries"):
+        values = [getattr(progress, grows) for progress in seen]
+        assert values == sorted(values), grows
     assert all(0 <= progress.fraction <= 1 for progress in seen)
 
 
