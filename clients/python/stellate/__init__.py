@@ -29,6 +29,7 @@ from . import progress as progress  # noqa: E402
 from . import pulling as pulling  # noqa: E402
 from . import report as report  # noqa: E402
 from . import server as server  # noqa: E402
+from . import solids as solids  # noqa: E402
 from . import viewer as viewer  # noqa: E402
 from ._api import download, mesh, serve, watch  # noqa: E402
 from ._command_oracle import CommandOracle  # noqa: E402

@@ -174,7 +174,7 @@ class Clipped:
         d = self.ambient_dimension
         for wall, gradient in zip(walls, gradients):
             if isinstance(gradient, str):
-                wall, gradient = _derived(wall, gradient)
+                wall, gradient = derived(wall, gradient)
             if gradient is None:
                 gradient = getattr(wall, "gradient", None)
             name = f"wall {len(self._walls)}"
@@ -234,7 +234,7 @@ class HalfSpace:
         return np.broadcast_to(self._normal, points.shape)
 
 
-def _derived(wall: Wall, library: Library) -> tuple[Wall, Wall]:
+def derived(wall: Wall, library: Library) -> tuple[Wall, Wall]:
     """A wall written for a library, and its gradient, on numpy's arrays."""
     return with_derivatives(_Column(wall), library)
 

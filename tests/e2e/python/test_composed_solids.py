@@ -1,0 +1,139 @@
+"""Composed solids through the real server; volumes, edges and topology are counted here."""
+
+import concurrent.futures as futures
+import multiprocessing
+
+import numpy as np
+import pytest
+import stellate
+from stellate import executors, manifolds, oracles
+from stellate import solids as s
+from topology import component_count, euler_characteristic
+
+norm = np.linalg.norm
+_SPAWN = multiprocessing.get_context("spawn")
+
+
+def volume(mesh):
+    """Of simplices that fill space."""
+    corners = mesh.points[mesh.simplices]
+    edges = corners[:, 1:] - corners[:, :1]
+    return np.abs(np.linalg.det(edges)).sum() / np.prod(np.arange(1, mesh.dimension + 1))
+
+
+def thrown(inside, lower, upper, count=400_000):
+    """The volume of a set, by points thrown into a box: a function written without the package."""
+    lower, upper = np.asarray(lower, float), np.asarray(upper, float)
+    x = lower + np.random.default_rng(3).random((count, len(lower))) * (upper - lower)
+    return inside(x).mean() * np.prod(upper - lower)
+
+
+def rim(simplices):
+    facets = np.concatenate([np.delete(simplices, i, axis=1) for i in range(simplices.shape[1])])
+    rows, counts = np.unique(facets, axis=0, return_counts=True)
+    assert counts.max() <= 2
+    return rows[counts == 1]
+
+
+def hold(mesh, chi, walls):
+    """Certified, of that Euler characteristic, and bounded by so many walls and nothing else."""
+    assert mesh.certified, mesh.report
+    assert euler_characteristic(mesh.simplices) == chi
+    boundary = np.concatenate([face.simplices for face in mesh.boundary])
+    assert {face.walls for face in mesh.boundary} == {(i,) for i in range(walls)}
+    assert sorted(map(tuple, boundary)) == sorted(map(tuple, rim(mesh.simplices)))
+
+
+def test_the_first_example_of_constructive_geometry(server):
+    """A cube and a ball, three holes through both: edges where walls meet, and no others."""
+    holes = s.Cylinder(0.5, axis="x") | s.Cylinder(0.5, 4, axis="y") | s.Cylinder(0.5)
+    part = (s.Box([-1] * 3, [1] * 3) & s.Ball(1.3)) - holes
+    mesh = stellate.mesh(part, 0.2, server=server)
+    hold(mesh, -4, 10)
+    x = mesh.points
+
+    def inside(x, slack=0.0):
+        radii = [norm(np.delete(x, i, axis=1), axis=1) for i in range(3)]
+        within = (np.abs(x) <= 1 + slack).all(axis=1) & (norm(x, axis=1) <= 1.3 + slack)
+        return within & (np.min(radii, axis=0) >= 0.5 - slack)
+
+    assert inside(x, 1e-9).all()
+    assert volume(mesh) == pytest.approx(thrown(inside, [-1] * 3, [1] * 3), rel=0.03)
+    for edge in mesh.edges:
+        for wall in edge.walls:
+            on = part.half_walls()[wall](x[np.unique(edge.simplices)])
+            assert np.abs(on).max() < 1e-9
+
+
+def test_a_plate_turned_and_drilled(server):
+    """Holes with ends beyond the plate: seven walls and one, wherever it is turned to."""
+    plate = s.Box([-1, -0.6, -0.15], [1, 0.6, 0.15])
+    for x in (-0.5, 0.5):
+        plate = plate - s.Cylinder(0.25, 1, at=(x, 0, 0))
+    turn = s.rotation([1, 2, 3], 0.7)
+    mesh = stellate.mesh(plate.scaled(2).rotated(turn).at([1, 2, 3]), 0.2, server=server)
+    hold(mesh, -1, 8)
+    back = (mesh.points - [1, 2, 3]) @ turn / 2
+    assert np.abs(back).max(axis=0) == pytest.approx([1, 0.6, 0.15], abs=1e-9)
+    assert volume(mesh) / 8 == pytest.approx((2 * 1.2 - 2 * np.pi * 0.25**2) * 0.3, rel=0.01)
+    assert len(mesh.corners) == 8 and len(mesh.edges) == 12 + 4
+
+
+@pytest.mark.parametrize(
+    "solid, epsilon, chi, size",
+    [
+        (s.Cone(1, 1.5, 0.4), 0.25, 1, np.pi * 1.5 / 3 * (1 + 0.4 + 0.16)),
+        (s.Capsule([-1, 0, 0], [1, 0, 0], 0.5), 0.2, 1, np.pi * (0.25 * 2 + 4 / 3 * 0.125)),
+        (s.Torus(1, 0.4).rotated(s.rotation("x", 1)), 0.2, 0, 2 * np.pi**2 * 0.16),
+        (s.Ball() - s.Ball().offset(-0.5), 0.2, 2, 4 / 3 * np.pi * (1 - 0.125)),
+        (s.Ball(2) & s.HalfSpace([0, 0, 1], 1), 0.3, 1, np.pi / 3 * (2 * 8 - 3 * 4 + 1)),
+    ],
+    ids=["cone", "capsule", "torus", "shell", "cap"],
+)
+def test_volumes(server, solid, epsilon, chi, size):
+    mesh = stellate.mesh(solid, epsilon, server=server)
+    hold(mesh, chi, solid.walls)
+    assert size * 0.92 < volume(mesh) < size * 1.001  # chords of what is round
+
+
+def test_a_smooth_union_is_one_wall(server):
+    mesh = stellate.mesh(s.blend(s.Ball(0.6), s.Ball(0.5, at=(0.8, 0, 0)), 0.2), 0.1, server=server)
+    hold(mesh, 1, 1)
+    assert not mesh.edges
+    on = mesh.points[np.unique(mesh.boundary[0].simplices)]
+    a, b = 0.6 - norm(on, axis=1), 0.5 - norm(on - [0.8, 0, 0], axis=1)
+    fillet = (a > -0.2) & (b > -0.2)
+    assert np.abs(np.hypot(a + 0.2, b + 0.2)[fillet] - 0.2).max() < 1e-9 and fillet.sum() > 20
+    assert np.abs(np.maximum(a, b)[~fillet]).max() < 1e-9
+
+
+def test_plates_of_the_plane(server):
+    plate = s.Box([-1, -1], [1, 1]) - s.Ball(0.4, at=(0.2, 0.1)) - s.Ball(0.5, at=(1, -1))
+    mesh = stellate.mesh(plate, 0.1, server=server)
+    hold(mesh, 0, 6)
+    assert volume(mesh) == pytest.approx(4 - np.pi * (0.16 + 0.25 / 4), rel=0.01)
+
+
+def test_walls_of_a_solid_cut_a_surface(server):
+    part = s.Box([-2, -2, -2], [2, 2, 2]) & s.HalfSpace([1, 0.1, 0], 0.05)
+    quarter = oracles.Clipped(manifolds.Torus(), part.half_walls())
+    mesh = stellate.mesh(quarter, 0.15, server=server)
+    assert mesh.certified and euler_characteristic(mesh.simplices) == 0
+    assert component_count(mesh.boundary[0].simplices) == 2
+
+
+def test_processes_answer_for_a_composition(client):
+    part = s.Ball() - s.Cylinder(0.4)
+    alone = stellate.mesh(part, 0.3, server=client)
+    name = client.create(part, 0.3).name
+    with futures.ProcessPoolExecutor(2, mp_context=_SPAWN) as pool:
+        states = executors.workers_on(pool, part, name, 2, server=client).wait()
+    assert alone.certified and states == ["SUCCEEDED"] * 2
+    assert (alone.points == stellate.download(name, server=client).points).all()
+
+
+def test_a_cone_is_meshed_where_its_tip_is_cut_away(server):
+    cut = s.Cone(1, 1.5) & s.HalfSpace([0, 0, -1])
+    mesh = stellate.mesh(cut, 0.25, server=server)
+    hold(mesh, 1, 3)
+    assert volume(mesh) == pytest.approx(np.pi * 0.75 / 3 * (1 + 0.5 + 0.25), rel=0.04)
