@@ -38,10 +38,16 @@ install(DIRECTORY ${PROJECT_BINARY_DIR}/include/stellate DESTINATION ${CMAKE_INS
   COMPONENT development)
 if(NOT STELLATE_CORE_ONLY)
   stellate_export(client
-    stellate_client=client stellate_mesh=mesh stellate_oracles=oracles stellate_catalogue=catalogue
+    stellate_client=client stellate_mesh=mesh stellate_catalogue=catalogue
     stellate_doctor=doctor stellate_pipe=pipe stellate_proto=proto)
+  set(without)
+  if(STELLATE_ORACLES)
+    stellate_export(oracles stellate_oracles=oracles)
+  else()
+    set(without REGEX "/(oracles|oracles/(equations|parametrized|points)).h$" EXCLUDE)
+  endif()
   install(DIRECTORY clients/cpp/include/stellate DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-    COMPONENT development PATTERN error.h EXCLUDE PATTERN oracle.h EXCLUDE)
+    COMPONENT development PATTERN error.h EXCLUDE PATTERN oracle.h EXCLUDE ${without})
   install(DIRECTORY ${PROJECT_BINARY_DIR}/installed/stellate
     DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development)
 endif()

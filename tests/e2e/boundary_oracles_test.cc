@@ -12,7 +12,7 @@
 #include "faces.h"
 #include "live.h"
 #include "stellate/doctor.h"
-#include "stellate/oracles.h"
+#include "stellate/oracles/walls.h"
 
 namespace stellate::testing {
 namespace {

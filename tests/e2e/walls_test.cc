@@ -1,4 +1,6 @@
 // Manifolds with boundary, from C++ through the real server; topology is counted here.
+#include "stellate/oracles/walls.h"
+
 #include <cmath>
 #include <memory>
 #include <ostream>
@@ -8,7 +10,7 @@
 #include "faces.h"
 #include "live.h"
 #include "stellate/download.h"
-#include "stellate/oracles.h"
+#include "stellate/oracles/combined.h"
 #include "stellate/serve.h"
 
 namespace stellate::testing {

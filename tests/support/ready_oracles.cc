@@ -9,6 +9,7 @@
 
 #include "stellate/catalogue.h"
 #include "stellate/oracles.h"
+#include "stellate/oracles/combined.h"
 
 namespace stellate::testing {
 namespace {

@@ -10,6 +10,7 @@
 #include "stellate/catalogue.h"
 #include "stellate/doctor.h"
 #include "stellate/oracles.h"
+#include "stellate/oracles/walls.h"
 #include "support/spoiled_oracle.h"
 
 namespace stellate {

@@ -14,6 +14,7 @@
 #include "stellate/catalogue.h"
 #include "stellate/doctor.h"
 #include "stellate/oracles.h"
+#include "stellate/oracles/walls.h"
 
 namespace stellate::oracles {
 namespace {

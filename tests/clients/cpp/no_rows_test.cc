@@ -5,7 +5,8 @@
 #include <string>
 
 #include "stellate/catalogue.h"
-#include "stellate/oracles.h"
+#include "stellate/oracles/combined.h"
+#include "stellate/oracles/walls.h"
 #include "support/ready_oracles.h"
 
 namespace stellate::oracles {

@@ -13,6 +13,7 @@
 
 #include "stellate/catalogue.h"
 #include "stellate/oracles/combined.h"
+#include "stellate/oracles/equations.h"
 #include "stellate/oracles/points.h"
 #include "stellate/oracles/walls.h"
 

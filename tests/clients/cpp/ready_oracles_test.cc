@@ -17,6 +17,7 @@
 #include "stellate/catalogue.h"
 #include "stellate/doctor.h"
 #include "stellate/oracles.h"
+#include "stellate/oracles/combined.h"
 #include "support/oracle_invariants.h"
 
 namespace stellate::oracles {

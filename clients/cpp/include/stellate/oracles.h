@@ -1,8 +1,6 @@
 #pragma once
 
-// Oracles of what people have: docs/using/oracles.md.
-#include "stellate/oracles/combined.h"
+// Oracles of what people have, the library stellate::oracles: docs/using/oracles.md.
 #include "stellate/oracles/equations.h"
 #include "stellate/oracles/parametrized.h"
 #include "stellate/oracles/points.h"
-#include "stellate/oracles/walls.h"

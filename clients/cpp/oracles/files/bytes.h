@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "oracles/ready/common.h"
+#include "oracles/combined/common.h"
 
 namespace stellate::oracles::files {
 

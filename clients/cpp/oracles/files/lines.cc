@@ -4,7 +4,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "oracles/ready/common.h"
+#include "oracles/combined/common.h"
 #include "pipe/numbers.h"
 
 namespace stellate::oracles::files {

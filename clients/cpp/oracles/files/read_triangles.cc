@@ -2,8 +2,8 @@
 #include <fstream>
 #include <new>
 
+#include "oracles/combined/common.h"
 #include "oracles/files/formats.h"
-#include "oracles/ready/common.h"
 
 namespace stellate::oracles {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "oracles/ready/common.h"
+#include "oracles/combined/common.h"
 
 namespace stellate::oracles::files {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <set>
 
-#include "oracles/ready/common.h"
+#include "oracles/combined/common.h"
 
 namespace stellate::oracles {
 namespace {

@@ -1,8 +1,8 @@
 #include <cmath>
 
+#include "oracles/combined/common.h"
 #include "oracles/exactness.h"
 #include "oracles/ready/atlas.h"
-#include "oracles/ready/common.h"
 
 namespace stellate::oracles {
 namespace {

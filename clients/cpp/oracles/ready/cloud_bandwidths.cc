@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "oracles/ready/common.h"
+#include "oracles/combined/common.h"
 
 namespace stellate::oracles {
 namespace {

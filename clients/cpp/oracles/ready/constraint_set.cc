@@ -1,6 +1,6 @@
 #include <random>
 
-#include "oracles/ready/common.h"
+#include "oracles/combined/common.h"
 #include "stellate/oracles/equations.h"
 
 namespace stellate::oracles {

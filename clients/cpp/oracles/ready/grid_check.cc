@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "oracles/ready/common.h"
+#include "oracles/combined/common.h"
 
 namespace stellate::oracles {
 namespace {

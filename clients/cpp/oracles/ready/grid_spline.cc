@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "oracles/ready/common.h"
+#include "oracles/combined/common.h"
 
 namespace stellate::oracles {
 namespace {

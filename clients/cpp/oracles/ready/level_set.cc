@@ -1,10 +1,10 @@
 #include <Eigen/QR>
 #include <random>
 
+#include "oracles/combined/common.h"
+#include "oracles/combined/level_solver.h"
 #include "oracles/exactness.h"
-#include "oracles/ready/common.h"
-#include "oracles/ready/level_solver.h"
-#include "stellate/oracles/combined.h"
+#include "stellate/oracles/equations.h"
 
 namespace stellate::oracles {
 namespace {

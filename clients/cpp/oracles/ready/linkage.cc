@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "oracles/ready/common.h"
+#include "oracles/combined/common.h"
 #include "stellate/oracles/equations.h"
 
 namespace stellate::oracles {

@@ -1,7 +1,7 @@
 #include "stellate/oracles/parametrized.h"
 
+#include "oracles/combined/common.h"
 #include "oracles/ready/atlas.h"
-#include "oracles/ready/common.h"
 
 namespace stellate::oracles {
 

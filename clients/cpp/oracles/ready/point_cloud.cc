@@ -2,8 +2,8 @@
 #include <cstdio>
 #include <limits>
 
+#include "oracles/combined/common.h"
 #include "oracles/ready/cloud_quadrics.h"
-#include "oracles/ready/common.h"
 #include "oracles/ready/point_tree.h"
 #include "stellate/oracles/points.h"
 

@@ -1,7 +1,7 @@
 #include <memory>
 #include <string>
 
-#include "oracles/ready/common.h"
+#include "oracles/combined/common.h"
 #include "oracles/ready/grid_check.h"
 #include "oracles/ready/grid_spline.h"
 #include "stellate/oracles/equations.h"

@@ -5,7 +5,7 @@
 #include <numeric>
 #include <vector>
 
-#include "oracles/ready/common.h"
+#include "oracles/combined/common.h"
 #include "stellate/oracles/points.h"
 
 namespace stellate::oracles {

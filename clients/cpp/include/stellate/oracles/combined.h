@@ -4,13 +4,10 @@
 #include <memory>
 #include <vector>
 
-#include "stellate/implicit.h"
 #include "stellate/oracle.h"
-#include "stellate/pointwise.h"
 
 // Manifolds made of others. All take oracles that others may hold too, and are as safe to call from
-// several threads as these are. Constructors throw std::invalid_argument, and LevelSet's
-// OracleError for a function that rounds to single precision.
+// several threads as these are. Constructors throw std::invalid_argument.
 namespace stellate::oracles {
 
 // The product A x B x ... in R^(a + b + ...), points one after the other. Has tangent bases and
@@ -68,40 +65,6 @@ class Transformed final : public Oracle {
 
   std::shared_ptr<Oracle> inner_;
   Similarity map_;
-};
-
-// {x in M : f(x) = 0}, of a manifold M with tangent bases and a smooth f: R^d -> R^m whose
-// derivative along M has rank m where f is zero. It has dimension k - m.
-class LevelSet final : public PointwiseOracle {
- public:
-  using Function = ImplicitOracle::Function;  // d -> m
-  using Jacobian = ImplicitOracle::Jacobian;  // d -> m x d
-
-  // An empty `jacobian` is replaced by differences of f. `seeds` (d x s) are points near the set,
-  // where M's box or seeds are not to be gone by.
-  LevelSet(std::shared_ptr<Oracle> oracle, Function f, Jacobian jacobian = {},
-           Eigen::MatrixXd seeds = {});
-
-  // Servers find intersections from closest points.
-  bool has_intersect_flat() const override { return false; }
-  std::optional<BoundingBox> bounding_box() const override;
-  Eigen::MatrixXd seeds() const override;
-  std::string about() const override;
-
-  // Down to the level and along it towards x, in M's tangent space, and back to M, again and
-  // again; a step is halved while it oversteps.
-  bool Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const override;
-  void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const override;
-
- private:
-  Eigen::MatrixXd J(const Eigen::VectorXd& x) const;
-  Eigen::MatrixXd BaseTangent(const Eigen::VectorXd& y) const;
-
-  std::shared_ptr<Oracle> base_;
-  Function f_;
-  Jacobian jacobian_;
-  Eigen::MatrixXd seeds_;
-  double scale_;  // of where M is: the unit of lengths
 };
 
 }  // namespace stellate::oracles

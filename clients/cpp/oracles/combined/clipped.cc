@@ -1,9 +1,9 @@
 #include <cmath>
 #include <utility>
 
+#include "oracles/combined/common.h"
+#include "oracles/combined/level_solver.h"
 #include "oracles/exactness.h"
-#include "oracles/ready/common.h"
-#include "oracles/ready/level_solver.h"
 #include "stellate/oracles/walls.h"
 
 namespace stellate::oracles {

@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "oracles/ready/common.h"
+#include "oracles/combined/common.h"
 #include "stellate/oracles/combined.h"
 
 namespace stellate::oracles {

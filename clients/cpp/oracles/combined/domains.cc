@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "oracles/ready/common.h"
+#include "oracles/combined/common.h"
 #include "stellate/catalogue.h"
 #include "stellate/implicit.h"
 #include "stellate/oracles/walls.h"

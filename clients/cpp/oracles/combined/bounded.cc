@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "oracles/ready/common.h"
+#include "oracles/combined/common.h"
 #include "stellate/oracles/walls.h"
 
 namespace stellate::oracles {

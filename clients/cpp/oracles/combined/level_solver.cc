@@ -1,4 +1,4 @@
-#include "oracles/ready/level_solver.h"
+#include "oracles/combined/level_solver.h"
 
 #include <Eigen/QR>
 #include <algorithm>
@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "oracles/ready/common.h"
+#include "oracles/combined/common.h"
 
 namespace stellate::oracles {
 namespace {

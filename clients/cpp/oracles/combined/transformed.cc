@@ -1,4 +1,4 @@
-#include "oracles/ready/common.h"
+#include "oracles/combined/common.h"
 #include "stellate/oracles/combined.h"
 
 namespace stellate::oracles {

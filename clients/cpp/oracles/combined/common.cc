@@ -1,4 +1,4 @@
-#include "oracles/ready/common.h"
+#include "oracles/combined/common.h"
 
 #include <algorithm>
 #include <cmath>
