@@ -28,7 +28,7 @@ std::string Where(const QueryBlock& block, Index query) {
 // The additional arrays of answers for a manifold with boundary.
 Status CheckFaceShape(const Specification& spec, const QueryBlock& block, const AnswerBlock& answer,
                       bool any_found) {
-  if (!block.want_clearances || !any_found) return Status::Ok();
+  if (!block.want.clearances || !any_found) return Status::Ok();
   const Index n = answer.points.cols();
   if (answer.clearances.rows() != spec.walls || answer.clearances.cols() != n) {
     return {StatusCode::kOracleShape,
@@ -69,7 +69,7 @@ Status CheckShape(const Specification& spec, const QueryBlock& block, Index firs
   const bool any_found =
       n > 0 && (answer.found.empty() ||
                 std::any_of(answer.found.begin(), answer.found.end(), [](auto f) { return f; }));
-  if (answer.sizes.size() == 0 && block.want_sizes && any_found) {
+  if (answer.sizes.size() == 0 && block.want.sizes && any_found) {
     return refuse(
         "no sizes came but the query wants them: send one length for each point, or declare that "
         "the oracle has no local_size");
@@ -81,7 +81,7 @@ Status CheckShape(const Specification& spec, const QueryBlock& block, Index firs
   if (Status s = CheckFaceShape(spec, block, answer, any_found); !s.ok()) return s;
   const Index basis_size = d * spec.dimension;
   if (answer.tangents.size() == 0) {
-    if (block.want_tangents && any_found) {
+    if (block.want.tangents && any_found) {
       return refuse(
           "no tangent bases came but the query wants them: send n x d x k numbers, or "
           "declare that the oracle has no tangent_basis");
@@ -267,12 +267,12 @@ Status CheckAnswer(const Specification& spec, const QueryBlock& block, Index que
       return s;
     if (Status s = CheckTangent(spec, block, query, basis); !s.ok()) return s;
   }
-  if (block.want_clearances) {
+  if (block.want.clearances) {
     const double* const clearances = answer.clearances.col(j).data();
     if (Status s = CheckFinite(block, query, "clearance", clearances, spec.walls); !s.ok())
       return s;
   }
-  if (block.want_clearances && block.face != 0) {
+  if (block.want.clearances && block.face != 0) {
     const double* const conormals = answer.conormals.col(j).data();
     if (Status s = CheckFinite(block, query, "conormal", conormals, answer.conormals.rows());
         !s.ok())
@@ -287,10 +287,8 @@ Status CheckAnswer(const Specification& spec, const QueryBlock& block, Index que
 QueryBlock QueryBlock::Rows(Index first, Index count) const {
   QueryBlock some;
   some.kind = kind;
-  some.want_tangents = want_tangents;
-  some.want_sizes = want_sizes;
+  some.want = want;
   some.face = face;
-  some.want_clearances = want_clearances;
   ForEachField([&](auto field) { some.*field = columns::Some(this->*field, first, count); });
   return some;
 }
@@ -300,9 +298,9 @@ AnswerBlock AnswerBlock::Shape(int dimension, int walls, const QueryBlock& block
   AnswerBlock shape;
   shape.points.setZero(d, count);
   shape.found.assign(static_cast<std::size_t>(count), 1);
-  if (block.want_tangents) shape.tangents.setZero(d * dimension, count);
-  if (block.want_sizes) shape.sizes.setZero(count);
-  if (block.want_clearances) {
+  if (block.want.tangents) shape.tangents.setZero(d * dimension, count);
+  if (block.want.sizes) shape.sizes.setZero(count);
+  if (block.want.clearances) {
     shape.clearances.setZero(walls, count);
     if (block.face != 0) shape.conormals.setZero(CountWalls(block.face) * d, count);
   }

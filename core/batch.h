@@ -74,16 +74,19 @@ inline void Put(const std::vector<std::uint8_t>& some, Eigen::Index first,
 // bases n x d x k in C order, so that conversion is a copy.
 struct QueryBlock {
   QueryKind kind = QueryKind::kClosestPoint;
-  Eigen::MatrixXd points;      // d x n: x, or the flat's point c
-  Eigen::MatrixXd bases;       // (d k) x n, kIntersectFlat only: entry i*k + a of a column is
-                               // coordinate i of tangent vector a; orthonormal
-  Eigen::VectorXd radii;       // n, kIntersectFlat only: look no farther than this from c
-  bool want_tangents = false;  // the answers must carry tangent bases
-  bool want_sizes = false;     // ... and local sizes
+  Eigen::MatrixXd points;  // d x n: x, or the flat's point c
+  Eigen::MatrixXd bases;   // (d k) x n, kIntersectFlat only: entry i*k + a of a column is
+                           // coordinate i of tangent vector a; orthonormal
+  Eigen::VectorXd radii;   // n, kIntersectFlat only: look no farther than this from c
+  // What the answers must carry besides the points.
+  struct {
+    bool tangents = false;    // tangent bases
+    bool sizes = false;       // local sizes
+    bool clearances = false;  // clearances, and conormals on a face
+  } want;
   // For manifolds with boundary: the face to query, the points of M^ where g_i = 0 for its walls,
   // for any values of the other walls; 0: M^ itself.
   WallSet face = 0;
-  bool want_clearances = false;  // the answers must carry clearances, and conormals on a face
 
   Eigen::Index size() const { return points.cols(); }
 
@@ -92,8 +95,7 @@ struct QueryBlock {
   static void ForEachField(const F& f) {
     // Names all members: a new one does not compile before it is given its place here.
     [[maybe_unused]] const auto all = [](const QueryBlock& block) {
-      [[maybe_unused]] const auto& [kind, points, bases, radii, tangents, sizes, face, clearances] =
-          block;
+      [[maybe_unused]] const auto& [kind, points, bases, radii, want, face] = block;
     };
     f(&QueryBlock::points);
     f(&QueryBlock::bases);

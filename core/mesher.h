@@ -15,7 +15,7 @@ namespace stellate::core {
 // queries of one round and takes their answers.
 //
 //   auto mesher = Mesher::Create(spec);
-//   while (const QueryBatch* batch = (*mesher)->NextBatch()) {
+//   while (const auto batch = (*mesher)->NextBatch()) {
 //     auto delta = (*mesher)->Absorb(answers_of(*batch));
 //   }
 //   const Report& report = (*mesher)->report();
@@ -29,14 +29,9 @@ class Mesher {
   static Expected<std::unique_ptr<Mesher>> Create(Specification spec);
   virtual ~Mesher() = default;
 
-  // Returns the queries of the next round, or nullptr once the run is over. The batch does not
-  // change, and the pointer is valid, until Absorb, Cancel or Fail.
-  virtual const QueryBatch* NextBatch() = 0;
-  // Returns the same as a shared pointer, for use after Absorb.
-  virtual std::shared_ptr<const QueryBatch> ShareBatch() {
-    const QueryBatch* const batch = NextBatch();
-    return batch == nullptr ? nullptr : std::make_shared<const QueryBatch>(*batch);
-  }
+  // Returns the queries of the next round, or nullptr once the run is over: the same batch until
+  // Absorb, Cancel or Fail. It stays as it is for as long as it is held.
+  virtual std::shared_ptr<const QueryBatch> NextBatch() = 0;
 
   // Takes the answers to the current batch and refines. On error (CheckAnswers, idempotence,
   // kFailedPrecondition without a current batch) nothing has changed: the same batch may be
@@ -55,9 +50,10 @@ class Mesher {
   virtual const Progress& progress() const = 0;
   virtual const Report& report() const = 0;  // complete once NextBatch returned nullptr
 
-  // Copy the current mesh: points d x n, tangent bases (d k) x n laid out as QueryBlock::bases,
-  // simplices of k+1 ascending vertex ids each, in the order of their lowest vertex.
-  virtual Eigen::MatrixXd Points() const = 0;
+  // The points of the current mesh, d x n, valid until Absorb.
+  virtual Eigen::Map<const Eigen::MatrixXd> Points() const = 0;
+  // Compute tangent bases, (d k) x n laid out as QueryBlock::bases, and simplices, k+1 ascending
+  // vertex ids each, in the order of their lowest vertex.
   virtual Eigen::MatrixXd Tangents() const = 0;
   virtual std::vector<std::uint32_t> Simplices() const = 0;
 };

@@ -97,7 +97,7 @@ struct Limits {
                                         // mesh; 0: no limit
 };
 
-// All that determines a mesh besides the answers.
+// All that determines a mesh besides the answers; and the number of threads, which does not.
 //
 //   Specification spec;
 //   spec.dimension = 2, spec.ambient_dimension = 3, spec.epsilon = 0.1;
@@ -123,7 +123,7 @@ struct Specification {
   Criteria criteria;
   Audit audit = Audit::kStandard;
   Limits limits;
-  int threads = 0;  // 0: all cores. Never changes the mesh.
+  int threads = 0;  // 0: all cores
 };
 
 // Returns the seeds that cover the box, d x n: each point of the box is nearer than the declared

@@ -25,19 +25,4 @@ void ForEachWall(WallSet walls, const Visit& visit) {
   for (; walls != 0; walls &= walls - 1) visit(std::countr_zero(walls));
 }
 
-// The facets of a cell that lie in walls have ids above those of sample points.
-inline constexpr std::uint32_t kFirstWallId = 0xffffff00u;
-inline constexpr std::uint32_t IdOfWall(int wall) {
-  return kFirstWallId + static_cast<std::uint32_t>(wall);
-}
-inline constexpr bool IsWall(std::uint32_t id) { return id - kFirstWallId < kMaxWalls; }
-inline constexpr bool IsSample(std::uint32_t id) { return id < kFirstWallId; }
-inline constexpr int WallOf(std::uint32_t id) { return static_cast<int>(id - kFirstWallId); }
-
-// One sentence for messages: what to do if a manifold that is meshed without walls ends, or may
-// end.
-inline constexpr const char* kDeclareWalls =
-    "If the manifold has a boundary, it has to be declared by walls: see \"Boundaries and "
-    "domains\" in the documentation";
-
 }  // namespace stellate::core

@@ -47,7 +47,7 @@ int main() {
     std::cerr << mesher.error().message << "\n";
     return EXIT_FAILURE;
   }
-  while (const core::QueryBatch* batch = (*mesher)->NextBatch()) {
+  while (const auto batch = (*mesher)->NextBatch()) {
     // On success it is what has changed, to show a mesh that grows.
     const auto delta = (*mesher)->Absorb(Answer(*batch));
     if (!delta) (*mesher)->Fail(delta.error());  // an answer broke a rule: the run is over

@@ -43,7 +43,7 @@ template <int K>
 std::optional<WallAngle> Sharpest(const Stars<K>& stars) {
   std::optional<WallCosine> sharpest;
   std::uint32_t at = 0;
-  for (std::uint32_t p = 0; p < stars.size(); ++p) {
+  for (const std::uint32_t p : stars.sample().boundary()) {
     CheckInterruption(p);
     const std::optional<WallCosine> here = SharpestAt<K>(stars, p);
     if (!here || (sharpest && sharpest->cosine >= here->cosine)) continue;

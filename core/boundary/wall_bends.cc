@@ -64,7 +64,7 @@ double WallBend::radius() const {
 template <int K>
 std::optional<WallBend> SharpestBend(const Stars<K>& stars, double far) {
   std::optional<WallBend> sharpest;
-  for (std::uint32_t p = 0; p < stars.size(); ++p) {
+  for (const std::uint32_t p : stars.sample().boundary()) {
     CheckInterruption(p);
     if (CountWalls(stars.sample().walls(p)) != 1) continue;
     const auto& cell = stars.cell(p);
@@ -91,7 +91,7 @@ std::optional<WallBend> SharpestBend(const Stars<K>& stars, double far) {
 
 template <int K>
 std::optional<std::uint32_t> LoneVertex(const Stars<K>& stars, double far) {
-  for (std::uint32_t p = 0; p < stars.size(); ++p) {
+  for (const std::uint32_t p : stars.sample().boundary()) {
     CheckInterruption(p);
     if (IsAlone<K>(stars, p, far)) return p;
   }
@@ -100,8 +100,9 @@ std::optional<std::uint32_t> LoneVertex(const Stars<K>& stars, double far) {
 
 template <int K>
 std::optional<NearCorners> NearestCorners(const Stars<K>& stars) {
+  if (K == 1) return std::nullopt;
   std::vector<std::uint32_t> corners;
-  for (std::uint32_t p = 0; K > 1 && p < stars.size(); ++p)
+  for (const std::uint32_t p : stars.sample().boundary())
     if (CountWalls(stars.sample().walls(p)) >= K) corners.push_back(p);
   std::optional<NearCorners> nearest;
   for (std::size_t i = 0; i < corners.size(); ++i) {

@@ -88,19 +88,19 @@ class Certifier::Impl {
     CoverageClaims coverage;
   };
 
-  void Ask(Eigen::MatrixXd points, Judge judge, bool want_tangents = false) {
+  void Ask(Eigen::MatrixXd points, Judge judge, bool with_tangents = false) {
     if (points.cols() == 0) return;
     QueryBlock block;
     block.kind = QueryKind::kClosestPoint;
     block.points = std::move(points);
-    block.want_tangents = want_tangents;
-    block.want_clearances = boundary_.has_value();
+    block.want.tangents = with_tangents;
+    block.want.clearances = boundary_.has_value();
     blocks_.push_back(std::move(block));
     judges_.push_back(std::move(judge));
   }
   // Asks as Ask does, about M alone: a point of M^ beyond a wall counts as not found.
-  void AskWithin(Eigen::MatrixXd points, const Judge& judge, bool want_tangents = false) {
-    if (!boundary_) return Ask(std::move(points), judge, want_tangents);
+  void AskWithin(Eigen::MatrixXd points, const Judge& judge, bool with_tangents = false) {
+    if (!boundary_) return Ask(std::move(points), judge, with_tangents);
     const auto within = [this, judge](const Eigen::MatrixXd& asked, const AnswerBlock& answer) {
       boundary_->JudgeBeyond(answer);
       AnswerBlock inside = answer;
@@ -111,7 +111,7 @@ class Certifier::Impl {
           inside.found[static_cast<std::size_t>(j)] = 0;
       judge(asked, inside);
     };
-    Ask(std::move(points), within, want_tangents);
+    Ask(std::move(points), within, with_tangents);
   }
 
   void AskFirst() {

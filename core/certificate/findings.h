@@ -19,6 +19,12 @@ inline constexpr double kNearlyFine = 1.5;
 // The ratio to advise: smaller than kCoarse, since the reach is estimated from above.
 inline constexpr double kAdvised = 0.4;
 
+// One sentence for messages: what to do if a manifold that is meshed without walls ends, or may
+// end.
+inline constexpr const char* kDeclareWalls =
+    "If the manifold has a boundary, it has to be declared by walls: see \"Boundaries and "
+    "domains\" in the documentation";
+
 // Returns a sentence for the verdict: the mesh is `ratio` times as coarse as a reach, and what to
 // do. `where`: the place where it was seen, or empty.
 std::string TooCoarse(double ratio, double reach, const std::string& where);

@@ -8,9 +8,9 @@
 
 #include "core/base/random.h"
 #include "core/base/vector_ops.h"
+#include "core/geometry/facet_ids.h"
 #include "core/geometry/restricted_voronoi_polygon.h"
 #include "core/geometry/surroundings.h"
-#include "core/walls.h"
 
 namespace stellate::core {
 

@@ -2,11 +2,9 @@
 
 #include <cstdint>
 
-namespace stellate::core {
+#include "core/geometry/facet_ids.h"
 
-// Ids of the facets that bound a cell before its neighbours are known.
-inline constexpr std::uint32_t kFirstFakeId = 0xfffffff0u;
-inline constexpr bool IsFake(std::uint32_t id) { return id >= kFirstFakeId; }
+namespace stellate::core {
 
 // What a cell of a point p must know of the sample while it is clipped. Implement it to give the
 // cell its half-spaces and centres (StarSurroundings in core/complex).

@@ -48,7 +48,7 @@ std::vector<std::pair<Vector<K>, WallSet>> EdgesAtCorner(const Stars<K>& stars, 
 template <int K>
 PlannedPoints Corners<K>::PlanShells() {
   std::vector<std::uint32_t> corners;
-  for (std::uint32_t p = 0; p < engine_.stars.size(); ++p)
+  for (const std::uint32_t p : engine_.stars.sample().boundary())
     if (CountWalls(engine_.stars.sample().walls(p)) >= K) corners.push_back(p);
   PlannedPoints planned;
   std::vector<Eigen::VectorXd> points;

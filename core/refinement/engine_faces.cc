@@ -23,7 +23,7 @@ bool Engine<K>::AdvanceStage() {
 
 template <int K>
 bool Engine<K>::LeaveStage() {
-  if (!boundary_.has_walls() || boundary_.stage() == K) return false;
+  if (boundary_.stage() == K) return false;
   boundary_.Leave();
   return AdvanceStage();
 }

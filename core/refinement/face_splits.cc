@@ -30,7 +30,7 @@ bool FaceSplits<K>::IsOnShell(const typename Stars<K>::FaceSimplex& simplex) con
 
 template <int K>
 bool FaceSplits<K>::IsSliverAtBoundary(std::uint32_t star, const Violation<K>& violation) const {
-  if (violation.rule != Rule::kShape || !engine_.boundary.has_walls()) return false;
+  if (violation.rule != Rule::kShape || engine_.stars.sample().boundary().empty()) return false;
   const auto simplex =
       engine_.stars.FaceSimplexOf(star, engine_.stars.cell(star), violation.vertex);
   return std::any_of(simplex.ids.begin(), simplex.ids.begin() + simplex.count,
@@ -64,7 +64,7 @@ std::optional<Target<K>> FaceSplits<K>::Of(const typename Stars<K>::CellVertex& 
 template <int K>
 std::optional<Target<K>> FaceSplits<K>::Under(std::uint32_t star,
                                               const Violation<K>& violation) const {
-  if (violation.rule != Rule::kShape || !engine_.boundary.has_walls() || violation.walls != 0 ||
+  if (violation.rule != Rule::kShape || violation.walls != 0 ||
       engine_.violations.failed_attempts(star) == 0)
     return std::nullopt;
   const auto& cell = engine_.stars.cell(star);

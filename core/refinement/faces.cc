@@ -14,9 +14,8 @@ template <int K>
 std::vector<FaceMesh> FacesOf(const Stars<K>& stars) {
   using Simplex = std::array<std::uint32_t, K + 1>;  // as many of them as the face has corners
   std::map<std::pair<int, WallSet>, std::vector<Simplex>> faces;
-  for (std::uint32_t p = 0; p < stars.size(); ++p) {
+  for (const std::uint32_t p : stars.sample().boundary()) {
     CheckInterruption(p);
-    if (stars.sample().walls(p) == 0) continue;
     const auto& cell = stars.cell(p);
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
       const auto simplex = stars.FaceSimplexOf(p, cell, v);

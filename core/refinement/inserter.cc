@@ -94,10 +94,8 @@ typename Inserter<K>::RefinedPoint Inserter<K>::JudgeRefined(std::size_t i) cons
   judged.duplicate =
       stars.sample().AnyWithin(y, Clearance(t)) || stars.sample().InProtectingBall(y);
   judged.cuts_violation = !judged.duplicate && stars.CutsVertex(t.star, t.violation.vertex, y);
-  if (to_.boundary.has_walls()) {
-    judged.encroached = stars.EncroachedBy(y, t.violation.walls);
-    judged.beyond = answers_.Beyond(c);
-  }
+  judged.encroached = stars.EncroachedBy(y, t.violation.walls);
+  judged.beyond = answers_.Beyond(c);
   judged.near_target =
       !caution_.is_speculative &&
       Distance(y, candidates_.points.col(c).data(), stars.sample().d()) <= kNearAim * t.radius;
@@ -143,10 +141,9 @@ bool Inserter<K>::YieldsToFaces(const RefinedPoint& judged, const Target<K>& t, 
 // Whether a point is in M and encroaches on no face.
 template <int K>
 bool Inserter<K>::FitsFaces(Eigen::Index c) const {
-  return !to_.boundary.has_walls() ||
-         (!answers_.Beyond(c) &&
-          !to_.stars.sample().InProtectingBall(answers_.points.col(c).data()) &&
-          !to_.stars.EncroachedBy(answers_.points.col(c).data(), WallsOf(c)));
+  return !answers_.Beyond(c) &&
+         !to_.stars.sample().InProtectingBall(answers_.points.col(c).data()) &&
+         !to_.stars.EncroachedBy(answers_.points.col(c).data(), WallsOf(c));
 }
 
 template <int K>
@@ -182,7 +179,7 @@ typename Inserter<K>::Outcome Inserter<K>::InsertGoodPoint(std::size_t i, int be
   if (best < 0) {
     // The first candidate that encroaches on a face has that face refined.
     for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c) {
-      if (!to_.boundary.has_walls() || !answers_.found[static_cast<std::size_t>(c)]) continue;
+      if (!answers_.found[static_cast<std::size_t>(c)]) continue;
       RefinedPoint judged;
       judged.encroached = to_.stars.EncroachedBy(answers_.points.col(c).data(), t.violation.walls);
       judged.beyond = answers_.Beyond(c);

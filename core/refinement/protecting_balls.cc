@@ -86,7 +86,7 @@ template <int K>
 ProtectingBalls<K> PlanProtectingBalls(const Stars<K>& stars, const SizeField<K>& sizes) {
   ProtectingBalls<K> balls;
   std::vector<std::uint32_t> sharp;
-  for (std::uint32_t p = 0; p < stars.size(); ++p) {
+  for (const std::uint32_t p : stars.sample().boundary()) {
     CheckInterruption(p);
     if (stars.sample().ProtectingRadius2(p) > 0 || IsSharp<K>(stars, p, kProtectedBelow))
       sharp.push_back(p);
@@ -132,9 +132,10 @@ std::size_t MostSplits(const ProtectingBalls<K>& balls) {
 
 template <int K>
 bool NeedsProtection(const Stars<K>& stars) {
-  for (std::uint32_t p = 0; p < stars.size(); ++p)
-    if (stars.sample().ProtectingRadius2(p) == 0 && IsSharp<K>(stars, p, kNeedsBall)) return true;
-  return false;
+  const std::vector<std::uint32_t>& boundary = stars.sample().boundary();
+  return std::any_of(boundary.begin(), boundary.end(), [&](std::uint32_t p) {
+    return stars.sample().ProtectingRadius2(p) == 0 && IsSharp<K>(stars, p, kNeedsBall);
+  });
 }
 
 #define STELLATE_EACH(K)                                                                    \

@@ -31,9 +31,9 @@ BatchParts::BatchParts(const Specification& spec, QueryBatch whole, std::uint64_
 }
 
 void BatchParts::Cut() {
-  part_.blocks.clear();
+  part_ = std::make_shared<QueryBatch>();
   ForEachPiece(whole_, first_, most_, [&](std::size_t b, Eigen::Index from, Eigen::Index count) {
-    part_.blocks.push_back(whole_.blocks[b].Rows(from, count));
+    part_->blocks.push_back(whole_.blocks[b].Rows(from, count));
   });
 }
 
@@ -52,7 +52,7 @@ Answers BatchParts::With(const Answers& answers) const {
 
 void BatchParts::Take(const Answers& answers) {
   PutInto(&answers_, answers);
-  first_ += part_.size();
+  first_ += part_->size();
   Cut();
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 
 #include "core/batch.h"
 
@@ -17,8 +18,9 @@ class BatchParts {
   // most: queries in a part, > 0
   BatchParts(const Specification& spec, QueryBatch whole, std::uint64_t most);
 
-  QueryBatch& part() { return part_; }
-  bool is_last() const { return first_ + part_.size() == whole_.size(); }
+  // The part to ask now. Take makes another.
+  const std::shared_ptr<QueryBatch>& part() { return part_; }
+  bool is_last() const { return first_ + part_->size() == whole_.size(); }
 
   // Returns the answers to all parts so far, including `answers` to part(), which have been
   // checked. Copies all: use it for the last part only, which can then be answered again.
@@ -30,7 +32,8 @@ class BatchParts {
   void Cut();
   void PutInto(Answers* all, const Answers& answers) const;
 
-  QueryBatch whole_, part_;
+  QueryBatch whole_;
+  std::shared_ptr<QueryBatch> part_;
   Eigen::Index most_;
   Eigen::Index first_ = 0;  // query of the whole that part_ begins with
   Answers answers_;         // to the queries before

@@ -130,16 +130,16 @@ std::vector<QueryBlock> CreaseProbe::Questions() {
   } else if (is_difference_) {
     block = *finder_.Next();
   } else if (looks_beyond_) {
-    block.want_tangents = gives_tangents_;
+    block.want.tangents = gives_tangents_;
     block.points = StepsFrom(walks_.front().way);
   } else {
-    block.want_tangents = gives_tangents_;
+    block.want.tangents = gives_tangents_;
     block.points.resize(d_, kAsked * static_cast<Eigen::Index>(walks_.size()));
     for (std::size_t w = 0; w < walks_.size(); ++w)
       block.points.middleCols(kAsked * static_cast<Eigen::Index>(w), kAsked) =
           PointsAbout(walks_[w].way);
   }
-  block.want_clearances = has_walls_;
+  block.want.clearances = has_walls_;
   return {std::move(block)};
 }
 

@@ -131,7 +131,7 @@ template <int K>
 void ExplainInactiveWall(const Engine<K>& engine, int walls, Certificate* certificate) {
   const Stars<K>& stars = engine.stars();
   WallSet met = 0;
-  for (std::uint32_t p = 0; p < stars.size(); ++p) met |= stars.sample().walls(p);
+  for (const std::uint32_t p : stars.sample().boundary()) met |= stars.sample().walls(p);
   certificate->verdict += AboutInactiveWall(walls, met);
 }
 
@@ -211,9 +211,9 @@ std::string AboutLeftFaces(const Engine<K>& engine) {
   const int most = engine.boundary().left();
   std::uint64_t bad = 0;
   std::uint32_t first = 0;
-  for (std::uint32_t p = 0; most > 0 && p < stars.size(); ++p) {
+  if (most == 0) return "";
+  for (const std::uint32_t p : stars.sample().boundary()) {
     CheckInterruption(p);
-    if (stars.sample().walls(p) == 0) continue;
     const double bound = engine.sizes().BoundAt(stars, p);
     if (!WorstSizeOrShape<K>(stars, p, bound, engine.criteria().radius_edge_bound, most) &&
         !WorstSliverOrInconsistent<K>(stars, p, engine.criteria().shape, bound, most))

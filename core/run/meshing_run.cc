@@ -22,27 +22,19 @@ void MeshingRun<K>::OpenRound() {
 
 // Returns the batch that the client answers: the round's, or a part of it.
 template <int K>
-QueryBatch& MeshingRun<K>::OpenBatch() {
+const std::shared_ptr<QueryBatch>& MeshingRun<K>::OpenBatch() {
   const std::uint64_t most = spec_.limits.max_batch_queries;
-  if (most == 0 || static_cast<std::uint64_t>(batch_->size()) <= most) return *batch_;
+  if (most == 0 || static_cast<std::uint64_t>(batch_->size()) <= most) return batch_;
   if (!parts_) parts_.emplace(spec_, *batch_, most);
   return parts_->part();
 }
 
 template <int K>
-const QueryBatch* MeshingRun<K>::NextBatch() {
+std::shared_ptr<const QueryBatch> MeshingRun<K>::NextBatch() {
   if (!batch_) return nullptr;
-  QueryBatch& batch = OpenBatch();
-  batch.round = progress_.round + 1;
-  return &batch;
-}
-
-template <int K>
-std::shared_ptr<const QueryBatch> MeshingRun<K>::ShareBatch() {
-  const QueryBatch* const batch = NextBatch();
-  if (batch == nullptr) return nullptr;
-  if (batch == batch_.get()) return batch_;
-  return std::make_shared<const QueryBatch>(*batch);  // a part: its place is used again
+  const std::shared_ptr<QueryBatch>& batch = OpenBatch();
+  batch->round = progress_.round + 1;
+  return batch;
 }
 
 template <int K>
@@ -74,7 +66,8 @@ template <int K>
 Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
   if (!batch_)
     return Refuse(StatusCode::kFailedPrecondition, "Absorb without a batch: the run is over");
-  const QueryBatch& asked = OpenBatch();
+  const std::shared_ptr<const QueryBatch> batch = OpenBatch();
+  const QueryBatch& asked = *batch;
   if (Status s = Check(asked, answers); !s.ok()) return tl::unexpected<Status>(s);
   const bool complete = !parts_ || parts_->is_last();
   const std::optional<Answers> joined =
@@ -114,8 +107,7 @@ Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
   delta.added = std::move(change.added);
   delta.removed = std::move(change.removed);
   const Stars<K>& stars = scheduler_.engine().stars();
-  delta.points =
-      ViewOfPoints().rightCols(stars.size() - static_cast<Eigen::Index>(delta.first_vertex));
+  delta.points = Points().rightCols(stars.size() - static_cast<Eigen::Index>(delta.first_vertex));
   if (spec_.walls > 0)
     for (auto v = static_cast<std::uint32_t>(delta.first_vertex); v < stars.size(); ++v)
       delta.walls.push_back(stars.sample().walls(v));
@@ -157,7 +149,7 @@ void MeshingRun<K>::Update() {
 }
 
 template <int K>
-Eigen::Map<const Eigen::MatrixXd> MeshingRun<K>::ViewOfPoints() const {
+Eigen::Map<const Eigen::MatrixXd> MeshingRun<K>::Points() const {
   const Stars<K>& stars = scheduler_.engine().stars();
   return {stars.sample().points().data(), stars.sample().d(), stars.size()};
 }

@@ -21,8 +21,7 @@ class MeshingRun final : public Mesher {
  public:
   explicit MeshingRun(Specification spec);
 
-  const QueryBatch* NextBatch() override;
-  std::shared_ptr<const QueryBatch> ShareBatch() override;
+  std::shared_ptr<const QueryBatch> NextBatch() override;
   Expected<MeshDelta> Absorb(const Answers& answers) override;
   void Interrupt() override { interruption_.Raise(); }
   void Cancel() override { Finish(Termination::kCancelled, Status::Ok()); }
@@ -31,20 +30,19 @@ class MeshingRun final : public Mesher {
   const Specification& specification() const override { return spec_; }
   const Progress& progress() const override { return progress_; }
   const Report& report() const override { return report_; }
-  Eigen::MatrixXd Points() const override { return ViewOfPoints(); }
+  Eigen::Map<const Eigen::MatrixXd> Points() const override;
   Eigen::MatrixXd Tangents() const override {
     return scheduler_.engine().stars().sample().TangentMatrix();
   }
   std::vector<std::uint32_t> Simplices() const override { return scheduler_.engine().Simplices(); }
 
  private:
-  QueryBatch& OpenBatch();
+  const std::shared_ptr<QueryBatch>& OpenBatch();
   void OpenRound();
   Status Check(const QueryBatch& asked, const Answers& answers) const;
   void Count(const QueryBatch& asked);
   void Finish(Termination termination, Status failure);
   void Update();
-  Eigen::Map<const Eigen::MatrixXd> ViewOfPoints() const;
 
   const Specification spec_;
   Interruption interruption_;

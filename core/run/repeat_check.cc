@@ -32,7 +32,7 @@ void RepeatCheck::Sample(const AnsweredPoints& answers) {
 QueryBlock RepeatCheck::Questions() const {
   QueryBlock block;
   block.points = points_;
-  block.want_sizes = sizes_.size() > 0;
+  block.want.sizes = sizes_.size() > 0;
   return block;
 }
 

@@ -56,9 +56,9 @@ QueryBlock RoundTrip<K>::NewBlock(QueryKind kind, WallSet face) const {
   QueryBlock block;
   block.kind = kind;
   block.face = face;
-  block.want_clearances = walls_ > 0;
-  block.want_tangents = oracle_.tangent_basis;
-  block.want_sizes = engine_.criteria().sizes_given;
+  block.want.clearances = walls_ > 0;
+  block.want.tangents = oracle_.tangent_basis;
+  block.want.sizes = engine_.criteria().sizes_given;
   return block;
 }
 

@@ -177,13 +177,13 @@ void Scheduler<K>::Plan() {
   if (watches_.box.has_left()) return Finish(Termination::kNoProgress);
   auto targets = engine_.Plan();
   if (!targets) return LeaveFaces();
-  if (spec_.walls > 0 && !PlanFaces(&targets)) return;
+  if (!PlanFaces(&targets)) return;
   BoundaryState<K>& boundary = engine_.boundary();
   if (targets->empty() && !boundary.has_discoveries())
     return engine_.AllRulesHold() ? Certify() : End(Termination::kNoProgress);
   const ViolationIndex<K>& violations = engine_.violations();
-  const bool is_lost = watches_.stall.ShouldLookForLostCauses() && spec_.walls > 0 &&
-                       HasPieceTooSmall<K>(engine_, spec_.epsilon);
+  const bool is_lost =
+      watches_.stall.ShouldLookForLostCauses() && HasPieceTooSmall<K>(engine_, spec_.epsilon);
   if (is_lost ||
       watches_.stall.IsHopeless(violations.size_and_shape().size(), engine_.stars().size()) ||
       watches_.stall.HasStalled(violations.size_and_shape().size() + violations.violating(),

@@ -159,7 +159,7 @@ void Scheduler<K>::SettleCrowds() {
 // the rest; in the last stage the run is over.
 template <int K>
 void Scheduler<K>::LeaveFaces() {
-  if (spec_.walls == 0 || !engine_.LeaveStage()) return End(Termination::kNoProgress);
+  if (!engine_.LeaveStage()) return End(Termination::kNoProgress);
   watches_.stall = StallWatch(1);  // next to them not all can be fixed: with less patience
   if (engine_.boundary().stage() == K && AskForInterior()) return;
   Plan();

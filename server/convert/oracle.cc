@@ -53,9 +53,9 @@ void ToProto(const Chunk& chunk, const core::Specification& spec, v1::QueryChunk
   const auto k = static_cast<std::size_t>(spec.dimension);
   const core::QueryBlock& block = chunk.block();
   out->set_lease(chunk.lease);
-  out->set_want_tangents(block.want_tangents);
-  out->set_want_sizes(block.want_sizes);
-  out->set_want_clearances(block.want_clearances);
+  out->set_want_tangents(block.want.tangents);
+  out->set_want_sizes(block.want.sizes);
+  out->set_want_clearances(block.want.clearances);
   core::ForEachWall(block.face, [&](int wall) { out->add_face(static_cast<std::uint32_t>(wall)); });
   ToProto(block.points.col(chunk.first).data(), {n, d}, out->mutable_points());
   if (block.kind == core::QueryKind::kClosestPoint) {
@@ -101,18 +101,18 @@ Allowed<core::AnswerBlock> FromProto(const v1::AnswerChunk& answers, const Chunk
     }
     block.found.assign(found.begin(), found.end());
   }
-  if (chunk.block().want_tangents && answers.has_tangents()) {
+  if (chunk.block().want.tangents && answers.has_tangents()) {
     status =
         CheckArray(answers.tangents(), {n, d, k}, "answers.tangents", StatusCode::kOracleShape);
     if (!status.ok()) return refuse(std::move(status));
     block.tangents = MatrixFromProto(answers.tangents(), static_cast<Index>(d * k), chunk.count);
   }
-  if (chunk.block().want_sizes && answers.has_sizes()) {
+  if (chunk.block().want.sizes && answers.has_sizes()) {
     status = CheckArray(answers.sizes(), {n}, "answers.sizes", StatusCode::kOracleShape);
     if (!status.ok()) return refuse(std::move(status));
     block.sizes = MatrixFromProto(answers.sizes(), chunk.count, 1);
   }
-  if (chunk.block().want_clearances) {
+  if (chunk.block().want.clearances) {
     status = WallsFromProto(answers, chunk, spec, &block);
     if (!status.ok()) return refuse(std::move(status));
   }

@@ -290,10 +290,10 @@ std::uint64_t DigestOf(const core::QueryBatch& batch) {
   digest.Add(batch.round);
   for (const core::QueryBlock& block : batch.blocks) {
     digest.Add(static_cast<std::uint64_t>(block.kind));
-    digest.Add(block.want_tangents);
-    digest.Add(block.want_sizes);
+    digest.Add(block.want.tangents);
+    digest.Add(block.want.sizes);
     core::QueryBlock::ForEachField([&](auto field) { digest.Add(block.*field); });
-    if (block.want_clearances) digest.Add(block.face);
+    if (block.want.clearances) digest.Add(block.face);
   }
   return digest.value();
 }

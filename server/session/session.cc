@@ -142,7 +142,7 @@ void Session::RunRounds(core::Mesher* mesher) {
   while (true) {
     const Life now = life();  // as it was before NextBatch, all through this pass
     if (MustEnd(now)) mesher->Cancel();
-    const core::QueryBatch* const batch = mesher->NextBatch();
+    const auto batch = mesher->NextBatch();
     if (batch == nullptr) {
       if (auto failure = PublishRound(mesher)) FailBlameless(mesher, std::move(*failure));
       return;
@@ -152,7 +152,7 @@ void Session::RunRounds(core::Mesher* mesher) {
     } else if (server::IsReplaying(now)) {
       EndReplay(mesher, batch->round);
     } else if (FitsMemory(mesher, static_cast<std::uint64_t>(batch->size()))) {
-      RunRound(mesher, mesher->ShareBatch());
+      RunRound(mesher, batch);
     }
   }
 }

@@ -53,7 +53,7 @@ Rounds RoundsOf(const Work& work) {
   if (oracle == nullptr) throw std::runtime_error(error);
   auto mesher = core::Mesher::Create(testing::SpecificationFor(*oracle, work.epsilon));
   Rounds rounds;
-  while (const auto* batch = (*mesher)->NextBatch()) {
+  while (const auto batch = (*mesher)->NextBatch()) {
     auto& blocks = rounds.emplace_back();
     const auto d = static_cast<std::size_t>(oracle->ambient_dimension());
     const std::size_t bytes = 8 * d * static_cast<std::size_t>(1 + oracle->dimension()) + 9;

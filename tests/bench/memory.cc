@@ -72,7 +72,7 @@ Taken Mesh(const std::string& name, double epsilon) {
   }
   stellate::server::MeshHistory history(spec.dimension, spec.ambient_dimension);
   Taken taken;
-  while (const auto* batch = (*mesher)->NextBatch()) {
+  while (const auto batch = (*mesher)->NextBatch()) {
     taken.vertices = static_cast<double>((*mesher)->progress().vertices);
     taken.estimated = std::max(
         taken.estimated,

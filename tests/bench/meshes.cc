@@ -74,7 +74,7 @@ Meshed Mesh(Manifold& manifold, const core::Specification& spec, const Field& si
   core::Mesher& mesher = **created;
   Meshed meshed;
   const auto certifies = [&] { return mesher.progress().phase == core::Phase::kCertifying; };
-  while (const core::QueryBatch* batch = mesher.NextBatch()) {
+  while (const auto batch = mesher.NextBatch()) {
     Stage& stage = certifies() ? meshed.certificate : meshed.refinement;
     ++stage.rounds;
     stage.queries += static_cast<double>(batch->size());

@@ -84,7 +84,7 @@ TEST_P(CheckAnswersTest, RefusesWrongSizes) {
 }
 
 TEST_P(CheckAnswersTest, WantsTheTangentsItAskedForUnlessNothingWasFound) {
-  closest_.want_tangents = true;
+  closest_.want.tangents = true;
   AnswerBlock answer;
   answer.points = closest_.points;
   EXPECT_EQ(Check(closest_, answer), StatusCode::kOracleShape);
@@ -171,7 +171,7 @@ TEST_P(CheckAnswersTest, RefusesSizesThatAreNone) {
   answer.points = closest_.points;
   answer.sizes = Eigen::VectorXd::Constant(4, scale());
   EXPECT_EQ(Check(closest_, answer), StatusCode::kOk) << "not wanted, but right";
-  closest_.want_sizes = true;
+  closest_.want.sizes = true;
   EXPECT_EQ(Check(closest_, answer), StatusCode::kOk) << message_;
 
   AnswerBlock bad = answer;

@@ -33,8 +33,8 @@ Asked MakeChunk(Script* script) {
   const std::uint8_t kind = script->Byte();
   core::QueryBlock block;
   block.points = MatrixXd::Constant(d, first + count, 0.5);
-  block.want_tangents = (kind & 1) != 0;
-  block.want_sizes = (kind & 4) != 0;
+  block.want.tangents = (kind & 1) != 0;
+  block.want.sizes = (kind & 4) != 0;
   if ((kind & 2) != 0) {
     block.kind = core::QueryKind::kIntersectFlat;
     MatrixXd basis = MatrixXd::Zero(d * k, 1);
@@ -67,10 +67,10 @@ std::vector<std::string> Seeds() {
     if (choice % 2 == 0) answers.set_found(std::string(n, 1));
     MatrixXd tangents = MatrixXd::Zero(static_cast<Index>(d * k), asked.chunk.count);
     for (std::size_t a = 0; a < k; ++a) tangents.row(static_cast<Index>(a * k + a)).setOnes();
-    if (block.want_tangents) {
+    if (block.want.tangents) {
       server::ToProto(tangents.data(), {n, d, k}, answers.mutable_tangents());
     }
-    if (block.want_sizes) {
+    if (block.want.sizes) {
       const Eigen::VectorXd sizes = Eigen::VectorXd::Ones(asked.chunk.count);
       server::ToProto(sizes.data(), {n}, answers.mutable_sizes());
     }

@@ -52,7 +52,7 @@ void CheckFirstQuestions(core::Specification spec) {
   const Eigen::Index rows = spec.ambient_dimension;
   const auto mesher = core::Mesher::Create(std::move(spec));
   Require(mesher.has_value(), "a valid specification makes a mesher");
-  const core::QueryBatch* const batch = (*mesher)->NextBatch();
+  const auto batch = (*mesher)->NextBatch();
   Require(batch != nullptr && batch->size() > 0, "a mesher begins with a question");
   for (const core::QueryBlock& block : batch->blocks) {
     Require(block.points.rows() == rows, "questions are points of R^d");

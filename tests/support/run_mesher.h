@@ -52,13 +52,13 @@ inline core::Answers AnswersOf(Oracle& oracle, const core::QueryBatch& batch) {
                         ? oracle.IntersectFlat(block.points, block.bases, block.radii)
                     : face.empty() ? oracle.ClosestPoint(block.points)
                                    : oracle.FacePoint(block.points, face);
-    if (block.want_tangents && answer.tangents.size() == 0) {
+    if (block.want.tangents && answer.tangents.size() == 0) {
       answer.tangents = oracle.TangentBasis(answer.points);
     }
-    if (block.want_sizes && answer.sizes.size() == 0) {
+    if (block.want.sizes && answer.sizes.size() == 0) {
       answer.sizes = oracle.LocalSize(answer.points);
     }
-    if (block.want_clearances) {
+    if (block.want.clearances) {
       answer.clearances = oracle.Clearances(answer.points);
       if (!face.empty()) answer.conormals = oracle.Conormals(answer.points, face);
     }
@@ -77,7 +77,7 @@ inline FinishedRun RunMesher(Oracle& oracle, core::Specification spec) {
   auto mesher = core::Mesher::Create(std::move(spec));
   if (!mesher) throw std::runtime_error(mesher.error().message);
   const double start = ProcessorSeconds();
-  while (const core::QueryBatch* batch = (*mesher)->NextBatch()) {
+  while (const auto batch = (*mesher)->NextBatch()) {
     const double asked = ProcessorSeconds();
     const core::Answers answers = AnswersOf(oracle, *batch);
     run.oracle_seconds += ProcessorSeconds() - asked;

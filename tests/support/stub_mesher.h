@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -13,9 +14,9 @@ namespace stellate::testing {
 class StubMesher : public core::Mesher {
  public:
   explicit StubMesher(core::Specification spec) : spec_(std::move(spec)) {
-    batch_.round = 1;
-    batch_.blocks.resize(1);
-    batch_.blocks[0].points = Eigen::MatrixXd::Constant(spec_.ambient_dimension, 1, 1.0);
+    batch_->round = 1;
+    batch_->blocks.resize(1);
+    batch_->blocks[0].points = Eigen::MatrixXd::Constant(spec_.ambient_dimension, 1, 1.0);
   }
 
   void Interrupt() override {}
@@ -27,7 +28,7 @@ class StubMesher : public core::Mesher {
   const core::Specification& specification() const override { return spec_; }
   const core::Progress& progress() const override { return progress_; }
   const core::Report& report() const override { return report_; }
-  Eigen::MatrixXd Points() const override { return {}; }
+  Eigen::Map<const Eigen::MatrixXd> Points() const override { return {nullptr, 0, 0}; }
   Eigen::MatrixXd Tangents() const override { return {}; }
   std::vector<std::uint32_t> Simplices() const override { return {}; }
 
@@ -38,7 +39,7 @@ class StubMesher : public core::Mesher {
     if (!IsOver()) report_.termination = how;
   }
 
-  core::QueryBatch batch_;  // one point
+  std::shared_ptr<core::QueryBatch> batch_ = std::make_shared<core::QueryBatch>();  // one point
   core::Progress progress_;
   core::Report report_;
 

@@ -130,7 +130,7 @@ std::vector<QueryBlock> BoundaryClaims::FaceQuestions() {
       chosen.push_back(static_cast<std::uint32_t>(s));
     QueryBlock block;
     block.face = face.walls;
-    block.want_clearances = block.want_tangents = true;
+    block.want.clearances = block.want.tangents = true;
     block.points.setZero(x_.mesh.d, static_cast<Eigen::Index>(chosen.size()));
     for (std::size_t n = 0; n < chosen.size(); ++n)
       for (std::size_t i = 0; i < width; ++i)

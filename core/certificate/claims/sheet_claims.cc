@@ -215,7 +215,7 @@ std::vector<QueryBlock> SheetClaims::Questions(const std::vector<std::uint32_t>&
 QueryBlock SheetClaims::QuestionsOf(std::size_t wall, Eigen::MatrixXd points) const {
   QueryBlock block;
   block.face = SetOfWall(static_cast<int>(wall));
-  block.want_clearances = block.want_tangents = true;
+  block.want.clearances = block.want.tangents = true;
   block.points = std::move(points);
   return block;
 }

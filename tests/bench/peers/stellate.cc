@@ -29,7 +29,7 @@ Outcome MeshWithStellate(const Task& task, Meter& meter) {
   auto mesher = core::Mesher::Create(spec);
   if (!mesher) throw std::runtime_error(mesher.error().message);
   double refined = ProcessorSeconds();  // when the last round that inserted points was over
-  while (const core::QueryBatch* batch = (*mesher)->NextBatch()) {
+  while (const auto batch = (*mesher)->NextBatch()) {
     const double asked = ProcessorSeconds();
     const core::Answers answers = stellate::testing::AnswersOf(*oracle, *batch);
     outcome.oracle_seconds += ProcessorSeconds() - asked;

@@ -76,7 +76,7 @@ SolidMesh MeshWithStellate(const Solid& solid, double epsilon, std::vector<Curve
   const double began = ProcessorSeconds();
   auto mesher = core::Mesher::Create(std::move(spec));
   if (!mesher) throw std::runtime_error(mesher.error().message);
-  while (const core::QueryBatch* batch = (*mesher)->NextBatch()) {
+  while (const auto batch = (*mesher)->NextBatch()) {
     const double asked = ProcessorSeconds();
     const core::Answers answers = domain.AnswersOf(*batch);
     mesh.oracle_seconds += ProcessorSeconds() - asked;

@@ -257,7 +257,7 @@ inline CertifiedRun Certify(
         answer.found.push_back(y.size() > 0);  // an empty vector says "not found"
         if (y.size() == 0) continue;
         answer.points.col(j) = y;
-        if (!block.want_tangents) continue;
+        if (!block.want.tangents) continue;
         answer.tangents.resize(mesh.d * mesh.k, block.size());
         const Eigen::MatrixXd basis = tangent(y);
         for (int i = 0; i < mesh.d; ++i) {

@@ -43,7 +43,7 @@ inline void AnswerWithAPlane(const Specification&, const QueryBatch& batch, Answ
 // Finer to the one side: a length for each point.
 inline void GiveSizes(const Specification&, const QueryBatch& batch, Answers& answers) {
   for (std::size_t b = 0; b < batch.blocks.size(); ++b)
-    if (batch.blocks[b].want_sizes)
+    if (batch.blocks[b].want.sizes)
       answers.blocks[b].sizes = 0.8 + 0.4 * answers.blocks[b].points.row(0).array().max(-1).min(1);
 }
 

@@ -66,8 +66,8 @@ Digest DigestOf(const QueryBatch& batch) {
         .Add(block.points)
         .Add(block.bases)
         .Add(block.radii)
-        .Add(block.want_tangents)
-        .Add(block.want_sizes);
+        .Add(block.want.tangents)
+        .Add(block.want.sizes);
   return digest;
 }
 
@@ -162,7 +162,7 @@ std::string Record(const GoldenCase& c, int threads) {
   std::ostringstream out;
   out << kLegend;
   std::string phase;
-  while (const QueryBatch* batch = mesher->NextBatch()) {
+  while (const auto batch = mesher->NextBatch()) {
     if (std::exchange(phase, PhaseName(mesher->progress().phase)) != phase)
       out << "phase " << phase << '\n';
     const std::uint64_t round = batch->round;
@@ -210,9 +210,9 @@ std::string Record(const GoldenCase& c, int threads) {
         << ' ' << DigestOf(progress).Hex() << '\n';
   }
   out << "whole mesh, digests of points, tangents, simplices, progress\n  "
-      << Digest().Add(mesher->Points()).Hex() << ' ' << Digest().Add(mesher->Tangents()).Hex()
-      << ' ' << Digest().Add(mesher->Simplices()).Hex() << ' ' << DigestOf(mesher->progress()).Hex()
-      << '\n';
+      << Digest().Add(Eigen::MatrixXd(mesher->Points())).Hex() << ' '
+      << Digest().Add(mesher->Tangents()).Hex() << ' ' << Digest().Add(mesher->Simplices()).Hex()
+      << ' ' << DigestOf(mesher->progress()).Hex() << '\n';
   WriteEnd(mesher->report(), out);
   return out.str();
 }

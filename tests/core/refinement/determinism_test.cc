@@ -77,7 +77,7 @@ TEST_P(Determinism, DeltasAddUpToTheMesh) {
     for (auto at = flat.begin(); at != flat.end(); at += static_cast<std::ptrdiff_t>(stride))
       use(std::vector<std::uint32_t>(at, at + static_cast<std::ptrdiff_t>(stride)));
   };
-  while (const QueryBatch* batch = mesher->NextBatch()) {
+  while (const auto batch = mesher->NextBatch()) {
     EXPECT_EQ(batch->round, revision + 1);
     EXPECT_GT(batch->size(), 0);
     const MeshDelta delta = testing::Step(*mesher, AnswererFor(*manifold_));

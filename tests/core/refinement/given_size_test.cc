@@ -232,7 +232,7 @@ TEST(GivenSize, IsNotAskedForWithoutACriterion) {
   Specification spec = testing::SpecificationFor(*torus, 0.3);
   spec.oracle.local_size = true;
   const DrivenRun same = Drive(spec, [&](const QueryBatch& batch) {
-    for (const QueryBlock& block : batch.blocks) EXPECT_FALSE(block.want_sizes);
+    for (const QueryBlock& block : batch.blocks) EXPECT_FALSE(block.want.sizes);
     return AnswersOf(*torus, batch);
   });
   EXPECT_TRUE(SameMesh(*plain.mesher, *same.mesher));
@@ -300,7 +300,7 @@ void PrintTo(const Lie& lie, std::ostream* out) { *out << lie.name; }
 // At the last point that was found, where there is one.
 Lie Instead(const std::string& name, double size, StatusCode code) {
   return {name, code, [size](const QueryBatch& batch, Answers& answers) {
-            if (!batch.blocks[0].want_sizes) return false;
+            if (!batch.blocks[0].want.sizes) return false;
             AnswerBlock& block = answers.blocks[0];
             for (Eigen::Index j = batch.blocks[0].size() - 1; j >= 0; --j) {
               if (!block.found.empty() && !block.found[static_cast<std::size_t>(j)]) continue;
@@ -319,20 +319,20 @@ const Lie kLies[] = {
     Instead("denormal", 1e-310, StatusCode::kOracleBadSize),
     {"one too few", StatusCode::kOracleShape,
      [](const QueryBatch& batch, Answers& answers) {
-       if (!batch.blocks[0].want_sizes || batch.blocks[0].size() < 2) return false;
+       if (!batch.blocks[0].want.sizes || batch.blocks[0].size() < 2) return false;
        answers.blocks[0].sizes.conservativeResize(batch.blocks[0].size() - 1);
        return true;
      }},
     {"one too many", StatusCode::kOracleShape,
      [](const QueryBatch& batch, Answers& answers) {
-       if (!batch.blocks[0].want_sizes) return false;
+       if (!batch.blocks[0].want.sizes) return false;
        answers.blocks[0].sizes = Eigen::VectorXd::Ones(batch.blocks[0].size() + 1);
        return true;
      }},
     {"none", StatusCode::kOracleShape,
      [](const QueryBatch& batch, Answers& answers) {
        const auto& found = answers.blocks[0].found;
-       if (!batch.blocks[0].want_sizes || !std::count(found.begin(), found.end(), 1)) return false;
+       if (!batch.blocks[0].want.sizes || !std::count(found.begin(), found.end(), 1)) return false;
        answers.blocks[0].sizes.resize(0);
        return true;
      }},
@@ -352,7 +352,7 @@ TEST_P(SizeLies, AreRefusedAndForgotten) {
   const DrivenRun right = Drive(spec, *torus);
   const auto mesher = NewMesher(spec);
   int refusals = 0;
-  while (const QueryBatch* batch = mesher->NextBatch()) {
+  while (const auto batch = mesher->NextBatch()) {
     Answers answers = AnswersOf(*torus, *batch), spoilt = answers;
     if (GetParam().tell(*batch, spoilt)) {
       const auto delta = mesher->Absorb(spoilt);

@@ -52,7 +52,7 @@ TEST(Interrupt, ComesFromAnyThreadAtAnyTime) {
     });
     StatusCode last = StatusCode::kOk;
     std::uint64_t vertices = 0;
-    while (const QueryBatch* batch = mesher->NextBatch()) {
+    while (const auto batch = mesher->NextBatch()) {
       const Answers answers = answer(*batch);
       ++round;
       if (const auto delta = mesher->Absorb(answers)) {
@@ -105,7 +105,7 @@ class AtALookUp : public ::testing::Test {
     look_ups = 0;
     interrupt_at = at;
     on_interruption_check = &CountLookUp;
-    while (const QueryBatch* batch = run.mesher->NextBatch()) {
+    while (const auto batch = run.mesher->NextBatch()) {
       const auto delta = run.mesher->Absorb(answer(*batch));
       if (!delta) {
         EXPECT_EQ(delta.error().code, StatusCode::kCancelled);

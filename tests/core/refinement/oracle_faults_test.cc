@@ -170,7 +170,7 @@ Spoil OnTangents(const std::function<void(AnswerBlock&, Eigen::Index)>& spoil) {
   return [=](const QueryBatch& batch, Answers& answers) {
     AnswerBlock& block = answers.blocks[0];
     const auto at = std::find(block.found.begin(), block.found.end(), 1);
-    if (!batch.blocks[0].want_tangents || (!block.found.empty() && at == block.found.end()))
+    if (!batch.blocks[0].want.tangents || (!block.found.empty() && at == block.found.end()))
       return false;
     spoil(block, at - block.found.begin());
     return true;
@@ -261,7 +261,7 @@ TEST_P(Faults, AreRefusedAndForgotten) {
   const DrivenRun right = Drive(spec, *manifold);
   const auto mesher = NewMesher(spec);
   int refusals = 0;
-  while (const QueryBatch* batch = mesher->NextBatch()) {
+  while (const auto batch = mesher->NextBatch()) {
     Answers answers = AnswersOf(*manifold, *batch);
     Answers spoilt = answers;
     if (GetParam().spoil(*batch, spoilt)) {
@@ -334,7 +334,7 @@ Answers WithGaps(const QueryBatch& batch, Answers answers) {
 
 TEST_P(Imperfections, OneAnswerInTenMayBeMissingWhileTheMeshGrows) {
   DrivenRun run{NewMesher(spec_), {}};
-  while (const QueryBatch* batch = run.mesher->NextBatch()) {
+  while (const auto batch = run.mesher->NextBatch()) {
     const bool gaps = run.mesher->progress().phase != Phase::kCertifying;
     const Answers answers = AnswersOf(*manifold_, *batch);
     auto delta = run.mesher->Absorb(gaps ? WithGaps(*batch, answers) : answers);
@@ -347,7 +347,7 @@ TEST_P(Imperfections, OneAnswerInTenMayBeMissingWhileTheMeshGrows) {
 // Nothing is certified on answers that were not given.
 TEST_P(Imperfections, OneAnswerInTenMissingToTheCertifierIsNoCertificate) {
   DrivenRun run{NewMesher(spec_), {}};
-  while (const QueryBatch* batch = run.mesher->NextBatch()) {
+  while (const auto batch = run.mesher->NextBatch()) {
     const bool gaps = run.mesher->progress().phase == Phase::kCertifying;
     const Answers answers = AnswersOf(*manifold_, *batch);
     auto delta = run.mesher->Absorb(gaps ? WithGaps(*batch, answers) : answers);

@@ -71,7 +71,7 @@ TEST(WallsCriteriaTest, NothingIsAskedDeepInsideOfASolid) {
   auto mesher = Mesher::Create(m.SpecificationFor(0.12));
   ASSERT_TRUE(mesher);
   int asked = 0, inserted = 0;
-  while (const QueryBatch* batch = (*mesher)->NextBatch()) {
+  while (const auto batch = (*mesher)->NextBatch()) {
     for (const QueryBlock& block : batch->blocks)
       for (Eigen::Index j = 0; j < block.size(); ++j)
         asked += (*mesher)->progress().phase == Phase::kRefining && block.face == 0 &&

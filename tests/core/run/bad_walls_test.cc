@@ -19,7 +19,7 @@ Report ReportOf(Domain m, double epsilon,
                 const std::function<void(const QueryBlock&, AnswerBlock*)>& spoil) {
   auto mesher = Mesher::Create(m.SpecificationFor(epsilon));
   if (!mesher) throw std::runtime_error(mesher.error().message);
-  while (const QueryBatch* batch = (*mesher)->NextBatch()) {
+  while (const auto batch = (*mesher)->NextBatch()) {
     Answers answers = m.AnswersOf(*batch);
     for (std::size_t b = 0; b < answers.blocks.size(); ++b)
       spoil(batch->blocks[b], &answers.blocks[b]);
@@ -131,7 +131,7 @@ TEST(BadWallsTest, TangentialWallsAreRefused) {
   auto mesher = Mesher::Create(m.SpecificationFor(0.3));
   ASSERT_TRUE(mesher);
   Status refused = Status::Ok();
-  while (const QueryBatch* batch = refused.ok() ? (*mesher)->NextBatch() : nullptr)
+  while (const auto batch = refused.ok() ? (*mesher)->NextBatch() : nullptr)
     if (auto delta = (*mesher)->Absorb(m.AnswersOf(*batch)); !delta) refused = delta.error();
   EXPECT_EQ(refused.code, StatusCode::kOracleBadConormal);
   EXPECT_NE(refused.message.find("nearly tangentially: walls 0 and 1 at 17"), std::string::npos)

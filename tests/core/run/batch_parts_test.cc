@@ -63,7 +63,7 @@ TEST(PartsOfBatches, AreAskedAgainAfterARefusal) {
   spec.limits.max_batch_queries = 50;
   const auto mesher = NewMesher(spec);
   const auto answer = AnswererFor(*torus);
-  while (const QueryBatch* batch = mesher->NextBatch()) {
+  while (const auto batch = mesher->NextBatch()) {
     Answers answers = answer(*batch);
     Answers wrong = answers;
     wrong.blocks.front().points(0, 0) = std::numeric_limits<double>::quiet_NaN();

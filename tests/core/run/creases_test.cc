@@ -63,14 +63,14 @@ Candidate ClosestOf(const Shape& shape, const Vector3d& x) {
 AnswerBlock AnswerOf(const Shape& shape, const QueryBlock& block) {
   AnswerBlock answer;
   answer.points = block.points;
-  if (block.want_tangents) answer.tangents.resize(3 * shape.k, block.size());
+  if (block.want.tangents) answer.tangents.resize(3 * shape.k, block.size());
   if (!shape.finds_edges) answer.found.assign(static_cast<std::size_t>(block.size()), 1);
   for (Eigen::Index j = 0; j < block.size(); ++j) {
     const Candidate found = ClosestOf(shape, block.points.col(j));
     answer.points.col(j) = found.point;
     if (!shape.finds_edges && shape.off(found.point) == 0)
       answer.found[static_cast<std::size_t>(j)] = 0;
-    if (!block.want_tangents) continue;
+    if (!block.want.tangents) continue;
     Eigen::MatrixXd normals(3, 3 - shape.k);
     for (int a = 0; a < 3 - shape.k; ++a) normals.col(a) = found.normals[static_cast<size_t>(a)];
     const Eigen::MatrixXd q = Eigen::HouseholderQR<Eigen::MatrixXd>(normals).householderQ();

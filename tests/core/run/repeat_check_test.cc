@@ -37,7 +37,7 @@ TEST(RepeatCheck, AsksForTheFirstPointsThatWereFound) {
   ASSERT_TRUE(check.has_questions());
   const QueryBlock block = check.Questions();
   EXPECT_EQ(block.kind, QueryKind::kClosestPoint);
-  EXPECT_FALSE(block.want_sizes);
+  EXPECT_FALSE(block.want.sizes);
   EXPECT_EQ(block.size(), 64);
   EXPECT_EQ(block.points(0, 2), 3);
   check.Forget();
@@ -64,7 +64,7 @@ TEST(RepeatCheck, RefusesSizesThatChange) {
   RepeatCheck check(kEpsilon);
   const AnsweredPoints first = OnAxis(true);
   check.Sample(first);
-  EXPECT_TRUE(check.Questions().want_sizes);
+  EXPECT_TRUE(check.Questions().want.sizes);
   Answers again = Again(check, first);
   EXPECT_TRUE(check.Judge(again).ok());
   again.blocks[1].sizes[3] *= 1.2;

@@ -34,7 +34,7 @@ class RoundTripTest : public ::testing::Test {
         const AnsweredPoints on = OnSphere(block.points);
         AnswerBlock answer;
         answer.points = on.points;
-        if (block.want_tangents) {
+        if (block.want.tangents) {
           answer.tangents.resize(6, block.size());
           for (Eigen::Index i = 0; i < block.size(); ++i)
             ToByCoordinate(on.tangents.col(i).data(), 3, 2, answer.tangents.col(i).data());
@@ -69,7 +69,7 @@ TEST_F(RoundTripTest, AsksOnceWhereTheClientHasAll) {
   ASSERT_EQ(asked[0].size(), 1u);
   const QueryBlock& flats = asked[0][0];
   EXPECT_EQ(flats.kind, QueryKind::kIntersectFlat);
-  EXPECT_TRUE(flats.want_tangents);
+  EXPECT_TRUE(flats.want.tangents);
   EXPECT_EQ(flats.points, candidates.points);
   double by_vector[6];
   ToByVector(flats.bases.col(1).data(), 3, 2, by_vector);

@@ -37,7 +37,7 @@ class TangentFinderTest : public ::testing::TestWithParam<std::string> {
     Eigen::Index asked = 0;
     while (const QueryBlock* block = finder_.Next()) {
       EXPECT_EQ(block->kind, QueryKind::kClosestPoint);
-      EXPECT_FALSE(block->want_tangents);
+      EXPECT_FALSE(block->want.tangents);
       AnswerBlock answers;
       answers.points = manifold_->ClosestPoint(block->points).points;
       answers.found.assign(static_cast<std::size_t>(block->size()), 1);

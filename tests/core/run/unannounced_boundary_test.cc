@@ -61,11 +61,11 @@ Piece Square() {
 AnswerBlock AnswerOf(const Piece& piece, const QueryBlock& block) {
   AnswerBlock answer;
   answer.points = block.points;
-  if (block.want_tangents) answer.tangents.resize(6, block.size());
+  if (block.want.tangents) answer.tangents.resize(6, block.size());
   for (Eigen::Index j = 0; j < block.size(); ++j) {
     const Vector3d y = piece.closest(block.points.col(j));
     answer.points.col(j) = y;
-    if (!block.want_tangents) continue;
+    if (!block.want.tangents) continue;
     const Vector3d normal = piece.normal(y).normalized();
     const Eigen::Matrix3d q = Eigen::HouseholderQR<Vector3d>(normal).householderQ();
     for (int i = 0; i < 3; ++i)
@@ -92,7 +92,7 @@ TEST_P(UnannouncedBoundary, IsRefusedWithTheAdviceToDeclareIt) {
             BoundingBox{Eigen::VectorXd::Constant(3, -1.3), Eigen::VectorXd::Constant(3, 1.3)};
         auto mesher = Mesher::Create(spec);
         ASSERT_TRUE(mesher);
-        while (const QueryBatch* batch = (*mesher)->NextBatch()) {
+        while (const auto batch = (*mesher)->NextBatch()) {
           Answers answers;
           for (const QueryBlock& block : batch->blocks)
             answers.blocks.push_back(AnswerOf(GetParam(), block));

@@ -89,7 +89,7 @@ Specification AheadOnTorus(Manifold& torus, double epsilon) {
 TEST(SpeculativeRunFaults, AnswersThatAreMissingHereAndThereAreDoneWithout) {
   const auto torus = Make("torus");
   const auto mesher = testing::NewMesher(AheadOnTorus(*torus, 0.1));
-  while (const QueryBatch* batch = mesher->NextBatch()) {
+  while (const auto batch = mesher->NextBatch()) {
     Answers answers = testing::AnswersOf(*torus, *batch);
     for (std::size_t b = 0; b < batch->blocks.size(); ++b) {
       if (mesher->progress().phase == Phase::kCertifying) continue;

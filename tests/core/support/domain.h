@@ -87,8 +87,8 @@ class Domain {
       answer.points = there.points;
       if (!there.found.empty()) answer.found = there.found;
     }
-    if (block.want_tangents) answer.tangents.setZero(d * k, n);
-    if (block.want_clearances) {
+    if (block.want.tangents) answer.tangents.setZero(d * k, n);
+    if (block.want.clearances) {
       answer.clearances.setZero(static_cast<Eigen::Index>(walls.size()), n);
       answer.conormals.setZero(static_cast<Eigen::Index>(face.size()) * d, n);
     }
@@ -96,10 +96,10 @@ class Domain {
       if (!answer.found[static_cast<std::size_t>(j)]) continue;
       const Eigen::VectorXd y = answer.points.col(j);
       const Eigen::MatrixXd tangents = Tangents(y);
-      if (block.want_tangents)
+      if (block.want.tangents)
         for (int i = 0; i < d; ++i)
           for (int a = 0; a < k; ++a) answer.tangents(i * k + a, j) = tangents(i, a);
-      if (!block.want_clearances) continue;
+      if (!block.want.clearances) continue;
       for (std::size_t w = 0; w < walls.size(); ++w)
         answer.clearances(static_cast<Eigen::Index>(w), j) = walls[w](y, nullptr);
       for (std::size_t w = 0; w < face.size(); ++w) {

@@ -32,7 +32,7 @@ inline WallMesh MeshOf(Domain m, core::Specification spec) {
       take(std::vector<std::uint32_t>(all.begin() + static_cast<std::ptrdiff_t>(s),
                                       all.begin() + static_cast<std::ptrdiff_t>(s + width)));
   };
-  while (const core::QueryBatch* batch = (*mesher)->NextBatch()) {
+  while (const auto batch = (*mesher)->NextBatch()) {
     const auto delta = (*mesher)->Absorb(m.AnswersOf(*batch));
     if (!delta) throw std::runtime_error(delta.error().message);
     each(delta->removed, [&](const auto& s) { mesh.simplices.erase(s); });

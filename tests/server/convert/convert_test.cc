@@ -174,7 +174,7 @@ class ConvertOracleTest : public ::testing::Test {
     block.points = Eigen::MatrixXd::Random(3, 5);
     block.bases = Eigen::MatrixXd::Random(6, 5);
     block.radii = Eigen::VectorXd::Random(5);
-    block.want_tangents = block.want_sizes = true;
+    block.want.tangents = block.want.sizes = true;
     chunk_.round = std::make_shared<Round>();
     batch_->blocks = {block};
     chunk_.round->batch = batch_;
@@ -223,7 +223,7 @@ TEST_F(ConvertOracleTest, AnswersAreReadColumnByColumn) {
 }
 
 TEST_F(ConvertOracleTest, SizesThatWereNotAskedForAreIgnored) {
-  batch_->blocks[0].want_sizes = false;
+  batch_->blocks[0].want.sizes = false;
   good_.mutable_sizes()->add_shape(9);
   const auto answer = FromProto(good_, chunk_, spec_);
   ASSERT_TRUE(answer);
@@ -231,7 +231,7 @@ TEST_F(ConvertOracleTest, SizesThatWereNotAskedForAreIgnored) {
 }
 
 TEST_F(ConvertOracleTest, TangentsThatWereNotAskedForAreIgnored) {
-  batch_->blocks[0].want_tangents = false;
+  batch_->blocks[0].want.tangents = false;
   const auto answer = FromProto(good_, chunk_, spec_);
   ASSERT_TRUE(answer);
   EXPECT_EQ(answer->tangents.size(), 0);

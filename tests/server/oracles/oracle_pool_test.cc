@@ -22,11 +22,11 @@ using testing::FakeWorker;
 core::QueryBatch SomeQueries(int n) {
   core::QueryBlock block;
   block.points = Eigen::MatrixXd::Random(3, n);
-  block.want_tangents = true;
+  block.want.tangents = true;
   core::QueryBatch batch;
   batch.round = 1;
   batch.blocks = {block, block};
-  batch.blocks[1].want_tangents = false;
+  batch.blocks[1].want.tangents = false;
   return batch;
 }
 

@@ -86,7 +86,9 @@ class SlowToGo : public stellate::testing::StubMesher {
       : StubMesher(std::move(spec)), gate_(std::move(gate)) {}
   ~SlowToGo() override { gate_.wait(); }
 
-  const core::QueryBatch* NextBatch() override { return IsOver() ? nullptr : &batch_; }
+  std::shared_ptr<const core::QueryBatch> NextBatch() override {
+    return IsOver() ? nullptr : batch_;
+  }
   core::Expected<core::MeshDelta> Absorb(const core::Answers&) override {
     return core::Refuse(core::StatusCode::kCancelled, "never asked");
   }
@@ -170,7 +172,9 @@ class Founded : public stellate::testing::StubMesher {
     progress_.vertices = vertices;
   }
 
-  const core::QueryBatch* NextBatch() override { return IsOver() ? nullptr : &batch_; }
+  std::shared_ptr<const core::QueryBatch> NextBatch() override {
+    return IsOver() ? nullptr : batch_;
+  }
   core::Expected<core::MeshDelta> Absorb(const core::Answers&) override {
     return core::Refuse(core::StatusCode::kCancelled, "never asked");
   }

@@ -32,15 +32,15 @@ class FakeMesher : public stellate::testing::StubMesher {
 
   FakeMesher(core::Specification spec, Plan plan)
       : StubMesher(std::move(spec)), plan_(std::move(plan)) {
-    batch_.blocks[0].want_tangents = true;
+    batch_->blocks[0].want.tangents = true;
   }
 
-  const core::QueryBatch* NextBatch() override {
+  std::shared_ptr<const core::QueryBatch> NextBatch() override {
     if (progress_.round == static_cast<std::uint64_t>(plan_.rounds)) {
       End(core::Termination::kConverged);
     }
-    batch_.round = progress_.round + 1;
-    return IsOver() ? nullptr : &batch_;
+    batch_->round = progress_.round + 1;
+    return IsOver() ? nullptr : batch_;
   }
 
   core::Expected<core::MeshDelta> Absorb(const core::Answers& answers) override {

@@ -110,7 +110,7 @@ inline core::QueryBatch BatchOf(std::uint64_t round, Eigen::Index queries = 4, d
   batch.round = round;
   batch.blocks.resize(2);
   batch.blocks[0].points = Eigen::MatrixXd::Constant(3, queries, x);
-  batch.blocks[0].want_tangents = batch.blocks[0].want_sizes = true;
+  batch.blocks[0].want.tangents = batch.blocks[0].want.sizes = true;
   batch.blocks[1].points = Eigen::MatrixXd::Zero(3, 0);
   return batch;
 }

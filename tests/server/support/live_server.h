@@ -117,7 +117,7 @@ inline v1::AnswerChunk TrueAnswer(const v1::QueryChunk& queries) {
   const auto n = static_cast<Eigen::Index>(queries.points().shape(0));
   core::QueryBlock block;
   block.points = MatrixFromProto(queries.points(), 3, n);
-  block.want_tangents = queries.want_tangents();
+  block.want.tangents = queries.want_tangents();
   if (queries.kind() == v1::QUERY_KIND_INTERSECT_FLAT) {
     block.kind = core::QueryKind::kIntersectFlat;
     block.bases = MatrixFromProto(queries.bases(), 6, n);
@@ -129,7 +129,7 @@ inline v1::AnswerChunk TrueAnswer(const v1::QueryChunk& queries) {
   const auto count = static_cast<std::size_t>(n);
   ToProto(answer.points.data(), {count, 3}, out.mutable_points());
   out.set_found(std::string(answer.found.begin(), answer.found.end()));
-  if (block.want_tangents) {
+  if (block.want.tangents) {
     ToProto(answer.tangents.data(), {count, 3, 2}, out.mutable_tangents());
   }
   return out;

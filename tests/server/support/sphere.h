@@ -35,8 +35,8 @@ inline core::AnswerBlock AnswerSphere(const core::QueryBlock& block, Eigen::Inde
   core::AnswerBlock answer;
   answer.points.resize(3, count);
   answer.found.assign(static_cast<std::size_t>(count), 1);
-  if (block.want_tangents) answer.tangents.resize(6, count);
-  if (block.want_sizes) answer.sizes.resize(count);
+  if (block.want.tangents) answer.tangents.resize(6, count);
+  if (block.want.sizes) answer.sizes.resize(count);
   for (Eigen::Index j = 0; j < count; ++j) {
     const Eigen::Vector3d c = block.points.col(first + j);
     Eigen::Vector3d y = c.normalized();
@@ -57,8 +57,8 @@ inline core::AnswerBlock AnswerSphere(const core::QueryBlock& block, Eigen::Inde
       answer.found[static_cast<std::size_t>(j)] = found ? 1 : 0;
     }
     answer.points.col(j) = y;
-    if (block.want_sizes) answer.sizes[j] = 0.4 + 0.2 * (1 + y.z());  // some field
-    if (!block.want_tangents) continue;
+    if (block.want.sizes) answer.sizes[j] = 0.4 + 0.2 * (1 + y.z());  // some field
+    if (!block.want.tangents) continue;
     const auto basis = SphereTangents(y);
     for (int i = 0; i < 3; ++i) {
       answer.tangents(2 * i, j) = basis(i, 0);
