@@ -9,27 +9,22 @@ import (
 	"io/fs"
 	"os"
 	"path/filepath"
+	"strconv"
 	"strings"
 	"syscall"
 	"time"
 
 	"google.golang.org/protobuf/proto"
 
+	"stellate/proto/shared"
 	pb "stellate/proto/v1"
 )
 
-// lastServer is how long the server of a process that was killed may take to end.
-const lastServer = 20 * time.Second
-
-// checkpoint is a directory in which one mesh outlives the processes that make it:
-//
-//	mesh     the mesh's name on the private server, and, on the next line, what is meshed
-//	server/  that server's --data-dir
-//
-// Only what this user put there is read, and no link is followed.
+// checkpoint is a directory in which one mesh outlives the processes that make it, laid out as
+// clients/shared/checkpoint.toml says. Only what this user put there is read, and no link is followed.
 type checkpoint struct{ folder string }
 
-func (c checkpoint) record() string { return filepath.Join(c.folder, "mesh") }
+func (c checkpoint) record() string { return filepath.Join(c.folder, shared.CheckpointRecord) }
 
 // server starts the private server, once that of a killed process has come to its end.
 func (c checkpoint) server() (*Server, error) {
@@ -39,12 +34,12 @@ func (c checkpoint) server() (*Server, error) {
 	if err := c.insistOnOwn(); err != nil {
 		return nil, err
 	}
-	if _, err := os.Stat(filepath.Join(c.folder, "mesh.json")); err == nil {
+	if _, err := os.Stat(filepath.Join(c.folder, shared.CheckpointPythonRecord)); err == nil {
 		return nil, invalid("%s is a checkpoint of the Python client: take another directory", c.folder)
 	}
-	data := filepath.Join(c.folder, "server")
-	flags := []string{"--data-dir", data, "--keep-finished-seconds", "31536000"}
-	for deadline := time.Now().Add(lastServer); ; time.Sleep(100 * time.Millisecond) {
+	data := filepath.Join(c.folder, shared.CheckpointServer)
+	flags := []string{"--data-dir", data, "--keep-finished-seconds", strconv.Itoa(shared.CheckpointKeepFinishedSeconds)}
+	for deadline := time.Now().Add(shared.CheckpointLastServerSeconds * time.Second); ; time.Sleep(100 * time.Millisecond) {
 		server, err := StartServer(ServerOptions{Flags: flags})
 		switch {
 		case err == nil || !strings.Contains(err.Error(), "another server uses"):
@@ -105,16 +100,17 @@ func readOwn(path string) ([]byte, error) {
 func (c checkpoint) declare(ctx context.Context, client *Client, spec *pb.MeshSpec) (*pb.Mesh, error) {
 	essence := proto.Clone(spec).(*pb.MeshSpec)
 	essence.Label = ""
-	wanted, err := proto.MarshalOptions{Deterministic: true}.Marshal(essence)
-	if err != nil {
-		return nil, err
-	}
 	kept, err := readOwn(c.record())
 	if err != nil && !errors.Is(err, fs.ErrNotExist) {
 		return nil, err
 	}
-	name, there, _ := bytes.Cut(kept, []byte("\n"))
-	if len(kept) > 0 && !bytes.Equal(there, wanted) {
+	first, there, _ := bytes.Cut(kept, []byte("\n"))
+	name, _, _ := bytes.Cut(first, []byte(" ")) // what may follow is of clients that choose epsilon
+	same := func() bool {
+		var spec pb.MeshSpec
+		return proto.Unmarshal(there, &spec) == nil && proto.Equal(&spec, essence)
+	}
+	if len(kept) > 0 && !same() {
 		return nil, invalid("the checkpoint %s is of a mesh of another specification: take another directory, or "+
 			"remove it", c.folder)
 	}
@@ -137,12 +133,16 @@ func (c checkpoint) declare(ctx context.Context, client *Client, spec *pb.MeshSp
 	if found, err = client.create(ctx, spec); err != nil {
 		return nil, err
 	}
+	wanted, err := proto.Marshal(essence)
+	if err != nil {
+		return nil, err
+	}
 	return found, c.note(fmt.Appendf(nil, "%s\n%s", found.GetName(), wanted))
 }
 
 // note writes the record, all of it or nothing.
 func (c checkpoint) note(record []byte) error {
-	draft := c.record() + ".new"
+	draft := filepath.Join(c.folder, shared.CheckpointDraft)
 	// One of a process that was killed; a link itself, not where it leads.
 	if err := os.Remove(draft); err != nil && !errors.Is(err, fs.ErrNotExist) {
 		return err

@@ -1,6 +1,7 @@
 package stellate_test
 
 import (
+	"bytes"
 	"context"
 	"errors"
 	"os"
@@ -55,6 +56,13 @@ func TestCheckpointGoesOn(t *testing.T) {
 	}
 	if total := int(straight.Report.GetCounts().GetQueries()); first == 0 || second >= total {
 		t.Error("asked", first, "and", second, "of", total)
+	}
+	// The record of another language's client: it chose epsilon, says why, and writes out an empty label.
+	record := filepath.Join(folder, "mesh")
+	kept, err := os.ReadFile(record)
+	theirs := append(bytes.Replace(kept, []byte("\n"), []byte(" 2 a quarter of the reach\n"), 1), "R\x00"...)
+	if err := errors.Join(err, os.WriteFile(record, theirs, 0o600)); err != nil {
+		t.Fatal(err)
 	}
 	third := 0
 	again, err := stellate.NewMesh(context.Background(), counting{torus, &third}, 0.05, &options)

@@ -12,13 +12,18 @@ import (
 	"google.golang.org/grpc/backoff"
 	"google.golang.org/grpc/keepalive"
 
+	"stellate/proto/shared"
 	pb "stellate/proto/v1"
 )
 
+var (
+	callTime    = seconds(shared.ReconnectCall)
+	connectTime = seconds(shared.ReconnectConnect)
+	pingTime    = max(seconds(shared.ReconnectKeepalive), 10*time.Second) // the least that grpc-go allows
+	pingWait    = seconds(shared.ReconnectKeepalive * shared.ReconnectPingPatience)
+)
+
 const (
-	callTime       = 30 * time.Second
-	connectTime    = time.Second
-	pingTime       = 10 * time.Second // the least that grpc-go allows
 	largestMessage = 64 << 20
 	streamWindow   = 4 << 20
 )
@@ -46,14 +51,15 @@ func NewClient(to Connection) (*Client, error) {
 	if err != nil {
 		return nil, err
 	}
-	pauses := backoff.Config{BaseDelay: 100 * time.Millisecond, Multiplier: 2, Jitter: 0.2, MaxDelay: time.Second}
+	pauses := backoff.Config{BaseDelay: seconds(shared.ReconnectFirstConnectionPause), Multiplier: 2, Jitter: 0.2,
+		MaxDelay: seconds(shared.ReconnectLongestConnectionPause)}
 	options = append(options,
 		// So that the next chunk comes while one is answered.
 		grpc.WithInitialWindowSize(streamWindow), grpc.WithInitialConnWindowSize(2*streamWindow),
 		grpc.WithDefaultCallOptions(grpc.MaxCallRecvMsgSize(largestMessage), grpc.MaxCallSendMsgSize(largestMessage)),
 		grpc.WithConnectParams(grpc.ConnectParams{Backoff: pauses, MinConnectTimeout: 5 * time.Second}))
 	if !private { // whose end shows at once
-		options = append(options, grpc.WithKeepaliveParams(keepalive.ClientParameters{Time: pingTime, Timeout: 8 * time.Second}))
+		options = append(options, grpc.WithKeepaliveParams(keepalive.ClientParameters{Time: pingTime, Timeout: pingWait}))
 	}
 	if staysOnThisMachine(address) {
 		options = append(options, grpc.WithNoProxy())
@@ -71,7 +77,7 @@ func NewClient(to Connection) (*Client, error) {
 			return to.Own.whyGone()
 		}}
 	if c.patience.giveUp == 0 {
-		c.patience.giveUp = 3 * time.Minute
+		c.patience.giveUp = seconds(shared.ReconnectGiveUp)
 	}
 	if c.patience.onOutage == nil {
 		c.patience.onOutage = func(said string) { log.Print("stellate: ", said) }

@@ -3,18 +3,19 @@ package stellate
 import (
 	"context"
 	"errors"
+	"math"
 	"math/rand/v2"
 	"sync/atomic"
 	"time"
 
 	"google.golang.org/grpc/codes"
 	"google.golang.org/grpc/status"
+
+	"stellate/proto/shared"
 )
 
-const (
-	firstPause   = 100 * time.Millisecond // doubled each time
-	longestPause = 5 * time.Second
-)
+// seconds is a time as clients/shared has it.
+func seconds(s float64) time.Duration { return time.Duration(s * float64(time.Second)) }
 
 // transient says whether the server, or the way to it, was lost, so that the same call may succeed
 // later. What a server drops arrives as CANCELLED where this side cancelled nothing.
@@ -89,10 +90,11 @@ func (o *outage) wait(ctx context.Context, err error, ours *Error) error {
 		ours.Kind = ErrUnavailable
 		return ours
 	}
-	full := min(firstPause<<min(o.attempts, 10), longestPause)
+	full := min(shared.ReconnectFirstPause*math.Pow(shared.ReconnectPauseGrowth, float64(o.attempts)),
+		shared.ReconnectLongestPause)
 	o.attempts++
 	// Shortened at random: the clients of a server that comes back do not all come at once.
-	pause := time.Duration(float64(full) * (1 - rand.Float64()/2))
+	pause := seconds(full * (1 - shared.ReconnectPauseJitter*rand.Float64()))
 	select {
 	case <-ctx.Done():
 		return ours

@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "shared/reconnect.h"
+
 namespace stellate::client {
 namespace {
 
@@ -82,7 +84,12 @@ Expected<std::shared_ptr<grpc::ChannelCredentials>> Security(const Credentials& 
   return grpc::SslCredentials(options);
 }
 
+constexpr int Milliseconds(double seconds) { return static_cast<int>(1000 * seconds); }
+
 }  // namespace
+
+const double kUsualKeepalive = reconnect::kKeepalive;
+const std::chrono::milliseconds kCallTime{Milliseconds(reconnect::kCall)};
 
 Expected<std::shared_ptr<grpc::Channel>> Connect(const std::string& server,
                                                  const Credentials& credentials,
@@ -103,15 +110,18 @@ Expected<std::shared_ptr<grpc::Channel>> Connect(const std::string& server,
   KeepGrpc();
   grpc::ChannelArguments arguments;
   // Streams are quiet while the other side computes: pings find a peer that froze or vanished.
-  const int ping = std::max(1, static_cast<int>(1000 * std::min(keepalive_seconds, 1e6)));
+  const int ping = std::max(1, Milliseconds(std::min(keepalive_seconds, kNoPings)));
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, ping);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 2 * ping);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS,
+                   static_cast<int>(reconnect::kPingPatience * ping));
   arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);  // as many as it takes
   // gRPC unpacks a message before it measures it, and no server of ours packs any.
   arguments.SetInt(GRPC_COMPRESSION_CHANNEL_ENABLED_ALGORITHMS_BITSET, 1 << GRPC_COMPRESS_NONE);
   // The pauses between attempts are ours to choose, and gRPC's own would be up to two minutes.
-  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
-  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS,
+                   Milliseconds(reconnect::kFirstConnectionPause));
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS,
+                   Milliseconds(reconnect::kLongestConnectionPause));
   return grpc::experimental::CreateCustomChannelWithInterceptors(server, *security, arguments,
                                                                  std::move(interceptors));
 }

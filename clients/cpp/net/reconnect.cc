@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "shared/reconnect.h"
 #include "wire/status.h"
 
 namespace stellate::client {
@@ -37,10 +38,13 @@ Error Explain(const grpc::Status& status, bool reconnecting) {
   return error;
 }
 
-std::chrono::duration<double> Backoff::Next() {
+const Seconds Backoff::kFirst{reconnect::kFirstPause};
+const Seconds Backoff::kLongest{reconnect::kLongestPause};
+
+Seconds Backoff::Next() {
   const Seconds full = next_;
-  next_ = std::min(2 * next_, kLongest);
-  return full * (1 - std::uniform_real_distribution<double>(0, 0.5)(random_));
+  next_ = std::min(reconnect::kPauseGrowth * next_, kLongest);
+  return full * (1 - std::uniform_real_distribution<double>(0, reconnect::kPauseJitter)(random_));
 }
 
 Reconnector::Reconnector(ReconnectPolicy policy)
@@ -99,7 +103,8 @@ Error Reconnector::Lost(const grpc::Status& status) const {
 // at once.
 void Reconnector::Connect() {
   constexpr int kSlices = 20;
-  constexpr auto kSlice = std::chrono::milliseconds(50);
+  constexpr auto kSlice =
+      std::chrono::milliseconds(static_cast<int>(1000 * reconnect::kConnect / kSlices));
   for (int i = 0; policy_.channel && i < kSlices && !stopped(); ++i) {
     if (policy_.channel->WaitForConnected(std::chrono::system_clock::now() + kSlice)) return;
   }

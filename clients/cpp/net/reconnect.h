@@ -23,15 +23,15 @@ bool IsTransient(const grpc::Status& status);
 // The error that a stream's end stands for; `reconnecting` as of the Reconnector.
 Error Explain(const grpc::Status& status, bool reconnecting);
 
-// The pauses between attempts: 0.1 s, doubled each time up to 5 s, each shortened at random by up
-// to half, so that the clients of a server that comes back do not all come together.
+// The pauses between attempts: longer each time up to a limit, each shortened at random, so that
+// the clients of a server that comes back do not all come together.
 class Backoff {
  public:
   explicit Backoff(std::uint64_t random_seed) : random_(random_seed) {}
   std::chrono::duration<double> Next();
   void Reset() { next_ = kFirst; }
 
-  static constexpr std::chrono::duration<double> kFirst{0.1}, kLongest{5};
+  static const std::chrono::duration<double> kFirst, kLongest;
 
  private:
   std::chrono::duration<double> next_ = kFirst;

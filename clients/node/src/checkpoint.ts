@@ -1,7 +1,4 @@
-// A directory in which one mesh outlives the processes that make it:
-//   mesh     a line with the mesh's name on the private server and, if "auto" chose epsilon, how many finer
-//            ones may follow and why it is this one; then the specification
-//   server/  that server's --data-dir
+// A directory in which one mesh outlives the processes that make it: clients/shared/checkpoint.toml.
 import {
   closeSync,
   constants,
@@ -20,12 +17,11 @@ import { setTimeout as sleep } from "node:timers/promises";
 import type { Client } from "./client.js";
 import { FailedPrecondition, InvalidArgument, StellateError } from "./errors.js";
 import type { Choice } from "./epsilon.js";
+import { CHECKPOINT } from "./generated/shared.js";
 import type { MeshSpec } from "./generated/stellate/v1/MeshSpec.js";
 import type { MeshInfo } from "./report.js";
 import { Server } from "./server.js";
-import { Stub } from "./wire.js";
-
-const LAST_SERVER = 20_000; // milliseconds that the server of a killed process may take to end
+import { SpecBytes } from "./wire.js";
 
 export class Checkpoint {
   readonly folder: string;
@@ -33,21 +29,22 @@ export class Checkpoint {
 
   constructor(folder: string) {
     this.folder = folder.replace(/(?<=.)\/+$/, ""); // "link/" would be followed
-    this.record = join(this.folder, "mesh");
+    this.record = join(this.folder, CHECKPOINT.record);
   }
 
   /** Starts the private server, once that of a killed process has come to its end. */
   async server(): Promise<Server> {
     mkdirSync(this.folder, { recursive: true, mode: 0o700 });
     insistOnOwn(this.folder);
-    if (existsSync(join(this.folder, "mesh.json"))) {
+    if (existsSync(join(this.folder, CHECKPOINT.python_record))) {
       throw new InvalidArgument(
         `${this.folder} is a checkpoint of the Python client: take another directory`,
       );
     }
-    const data = join(this.folder, "server");
-    const flags = ["--data-dir", data, "--keep-finished-seconds", "31536000"];
-    for (const deadline = Date.now() + LAST_SERVER; ; await sleep(100)) {
+    const data = join(this.folder, CHECKPOINT.server);
+    const kept = String(CHECKPOINT.keep_finished_seconds);
+    const flags = ["--data-dir", data, "--keep-finished-seconds", kept];
+    for (const deadline = Date.now() + 1000 * CHECKPOINT.last_server_seconds; ; await sleep(100)) {
       try {
         return await Server.start({ flags });
       } catch (error) {
@@ -65,7 +62,7 @@ export class Checkpoint {
   choice(): Choice | undefined {
     const { retries, reason, spec } = this.read();
     if (!reason) return undefined;
-    const { epsilon = 0 } = Stub.service.CreateMesh.requestDeserialize(spec).spec ?? {};
+    const { epsilon } = SpecBytes.deserialize(spec);
     return { epsilon, reason, retries };
   }
 
@@ -76,10 +73,9 @@ export class Checkpoint {
     { retries, reason }: Choice,
     anew: boolean,
   ): Promise<MeshInfo> {
-    const essence = { spec: { ...spec, label: "" } };
-    const wanted = Buffer.from(Stub.service.CreateMesh.requestSerialize(essence));
+    const wanted = SpecBytes.serialize({ ...spec, label: "" });
     const { name, spec: kept } = this.read();
-    if (name && !anew && !kept.equals(wanted)) {
+    if (name && !anew && !saying(kept).equals(saying(wanted))) {
       throw new InvalidArgument(
         `the checkpoint ${this.folder} is of a mesh of another specification: ` +
           "take another directory, or remove it",
@@ -92,7 +88,7 @@ export class Checkpoint {
     }
     if (found) return found;
     found = await client.createFrom(spec);
-    const draft = `${this.record}.new`;
+    const draft = join(this.folder, CHECKPOINT.draft);
     rmSync(draft, { force: true }); // of a process that was killed; a link itself, not where it leads
     const first = [found.name, ...(reason ? [retries, reason] : [])].join(" ");
     const all = Buffer.concat([Buffer.from(`${first}\n`), wanted]);
@@ -116,6 +112,15 @@ export class Checkpoint {
     const over = error instanceof StellateError && error.mesh?.report !== undefined;
     // With more room for its journal it would go on.
     if (over && !error.reason.startsWith("JOURNAL_")) rmSync(this.record, { force: true });
+  }
+}
+
+/** The same specification, with all that other languages leave out. */
+function saying(spec: Buffer): Buffer {
+  try {
+    return SpecBytes.serialize(SpecBytes.deserialize(spec));
+  } catch {
+    return spec; // which is none
   }
 }
 

@@ -8,6 +8,7 @@ import type { Mesh__Output } from "./generated/stellate/v1/Mesh.js";
 import type { ServerInfo__Output } from "./generated/stellate/v1/ServerInfo.js";
 import type { WatchMeshResponse__Output } from "./generated/stellate/v1/WatchMeshResponse.js";
 import type { ListMeshesResponse__Output } from "./generated/stellate/v1/ListMeshesResponse.js";
+import { RECONNECT } from "./generated/shared.js";
 import { CheckedOracle, type Oracle } from "./oracle.js";
 import { infoFrom, type MeshInfo } from "./report.js";
 import { Outage, type Patience } from "./retry.js";
@@ -17,7 +18,6 @@ import { Stream } from "./stream.js";
 import { Worker, type WorkerOptions } from "./worker.js";
 import { grpc, Stub } from "./wire.js";
 
-const CALL_SECONDS = 30;
 const CONNECT_SECONDS = 1;
 const NO_PINGS = 2_000_000_000; // milliseconds
 const LARGEST_MESSAGE = 64 << 20;
@@ -54,21 +54,21 @@ export class Client {
     const credentials = options.credentials ?? {};
     // A private server needs no pings: its end shows at once.
     const isPrivate = server instanceof Server && this.address.startsWith("unix:");
-    const ping = isPrivate ? NO_PINGS : 1000 * (options.keepaliveSeconds ?? 4);
+    const ping = isPrivate ? NO_PINGS : 1000 * (options.keepaliveSeconds ?? RECONNECT.keepalive);
     this.stub = new Stub(this.address, channelCredentials(this.address, credentials), {
       "grpc.max_receive_message_length": LARGEST_MESSAGE,
       "grpc.max_send_message_length": LARGEST_MESSAGE,
       "grpc.keepalive_time_ms": ping,
-      "grpc.keepalive_timeout_ms": Math.min(2 * ping, NO_PINGS),
+      "grpc.keepalive_timeout_ms": Math.min(RECONNECT.ping_patience * ping, NO_PINGS),
       // The pauses between attempts are ours; gRPC's own would be up to two minutes.
-      "grpc.initial_reconnect_backoff_ms": 100,
-      "grpc.max_reconnect_backoff_ms": 1000,
+      "grpc.initial_reconnect_backoff_ms": 1000 * RECONNECT.first_connection_pause,
+      "grpc.max_reconnect_backoff_ms": 1000 * RECONNECT.longest_connection_pause,
       // Proxies are for the outside.
       ...(staysOnThisMachine(this.address) ? { "grpc.enable_http_proxy": 0 } : {}),
       interceptors: credentials.token === undefined ? [] : [tokenInterceptor(credentials.token)],
     });
     this.patience = {
-      giveUpSeconds: options.reconnectSeconds ?? 180,
+      giveUpSeconds: options.reconnectSeconds ?? RECONNECT.give_up,
       connect: () => this.connect(),
       hopeless: () => (server instanceof Server && !server.alive ? server.whyGone() : undefined),
       onOutage: options.onOutage ?? ((message) => console.warn(`stellate: ${message}`)),
@@ -205,7 +205,7 @@ export class Client {
   ): Promise<Reply> {
     if (once) outage.stop();
     for (;;) {
-      const deadline = Date.now() + 1000 * CALL_SECONDS;
+      const deadline = Date.now() + 1000 * RECONNECT.call;
       const [error, reply] = await new Promise<[grpc.ServiceError | null, Reply | undefined]>(
         (resolve) => call(request, { deadline }, (error, reply) => resolve([error, reply])),
       );

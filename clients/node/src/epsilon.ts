@@ -1,7 +1,7 @@
 // The epsilon "auto": what the doctor says, and what it goes on with where that was too coarse.
 import { chooseEpsilon } from "./check.js";
 import { general } from "./decimal.js";
-import { DOCTOR } from "./generated/numbers.js";
+import { DOCTOR } from "./generated/shared.js";
 import type { Oracle } from "./oracle.js";
 import type { Report } from "./report.js";
 

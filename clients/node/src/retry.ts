@@ -1,10 +1,8 @@
 // Riding out the absence of a server.
 import { setTimeout as sleep } from "node:timers/promises";
 import { MeshNotFound, StellateError, Unavailable } from "./errors.js";
+import { RECONNECT } from "./generated/shared.js";
 import { grpc } from "./wire.js";
-
-const FIRST_PAUSE = 0.1; // seconds, doubled each time
-const LONGEST_PAUSE = 5;
 
 /**
  * Whether the server, or the way to it, was lost, so that the same call may succeed later. What a
@@ -92,10 +90,11 @@ export class Outage {
       const message = ours.message + (this.attempts ? waited : "");
       throw new Unavailable(message, { reason: ours.reason, details: ours.details });
     }
-    const full = Math.min(FIRST_PAUSE * 2 ** this.attempts, LONGEST_PAUSE);
+    const longer = RECONNECT.pause_growth ** this.attempts;
+    const full = Math.min(RECONNECT.first_pause * longer, RECONNECT.longest_pause);
     this.attempts++;
     // Shortened at random: the clients of a server that comes back do not all come at once.
-    const pause = Math.min(full * (1 - Math.random() / 2), left);
+    const pause = Math.min(full * (1 - RECONNECT.pause_jitter * Math.random()), left);
     try {
       await sleep(1000 * pause, undefined, { signal: this.ending.signal });
     } catch {

@@ -4,11 +4,12 @@ import { endianness } from "node:os";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import * as grpc from "@grpc/grpc-js";
-import { loadSync } from "@grpc/proto-loader";
+import { loadSync, type MessageTypeDefinition } from "@grpc/proto-loader";
 import protobuf from "protobufjs";
 import type { ProtoGrpcType as DoctorProto } from "./generated/doctor.js";
 import type { ProtoGrpcType } from "./generated/stellate.js";
 import type { Array as WireArray } from "./generated/stellate/v1/Array.js";
+import type { MeshSpec, MeshSpec__Output } from "./generated/stellate/v1/MeshSpec.js";
 import type { StellateClient } from "./generated/stellate/v1/Stellate.js";
 
 if (endianness() !== "LE") throw new Error("stellate needs a little-endian machine");
@@ -29,6 +30,12 @@ const services: unknown = grpc.loadPackageDefinition(proto);
 export const Stub = (services as ProtoGrpcType).stellate.v1.Stellate;
 export type Stub = StellateClient;
 export const DoctorStub = (services as DoctorProto).stellate.v1.Doctor;
+
+/** A specification as the protocol's bytes, and back. */
+export const SpecBytes = proto["stellate.v1.MeshSpec"] as MessageTypeDefinition<
+  MeshSpec,
+  MeshSpec__Output
+>;
 
 const details = protobuf.parse(
   readFileSync(join(folder, "stellate/rpc/status_details.proto"), "utf8"),

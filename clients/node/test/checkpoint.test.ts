@@ -1,5 +1,15 @@
 import assert from "node:assert/strict";
-import { chmod, mkdir, mkdtemp, readFile, rename, rm, symlink, writeFile } from "node:fs/promises";
+import {
+  appendFile,
+  chmod,
+  mkdir,
+  mkdtemp,
+  readFile,
+  rename,
+  rm,
+  symlink,
+  writeFile,
+} from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
@@ -45,6 +55,10 @@ test("an aborted mesh goes on where it was, and a finished one is there at once"
   assert.deepEqual(mesh.points, straight.points);
   assert.deepEqual(mesh.simplices, straight.simplices);
   assert(first.asked > 0 && second.asked < (straight.report?.counts?.queries ?? 0));
+  const [line = "", ...rest] = (await readFile(join(checkpoint, "mesh"), "latin1")).split("\n");
+  assert.match(line, /^meshes\/\S+$/);
+  assert.equal(rest.join("\n")[0], "\b"); // a MeshSpec's first field, as all languages write it
+  await appendFile(join(checkpoint, "mesh"), "R\0"); // an empty label, which others leave out
   const third = new Counting();
   const again = await stellate.mesh(third, { epsilon: 0.05, checkpoint });
   assert.equal(third.asked, 0);

@@ -1,5 +1,5 @@
 // Writes the types of the protocol's messages to src/generated and its files to dist/proto, from
-// where they are loaded at run time; and what all clients share of the doctor.
+// where they are loaded at run time; and the numbers and words that all clients share.
 import { execFileSync } from "node:child_process";
 import { cpSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";
@@ -31,11 +31,10 @@ execFileSync(
 );
 cpSync(`${protos}/stellate`, at("../dist/proto/stellate"), { recursive: true });
 
-const table = readFileSync(at("../../shared/doctor.toml"), "utf8");
-const numbers = [...table.matchAll(/^(\w+) = (-?[0-9][^\s#]*)/gm)].map(
-  (row) => `  ${row[1]}: ${row[2]},`,
-);
-writeFileSync(
-  at("../src/generated/numbers.ts"),
-  `/** The numbers of clients/shared/doctor.toml. */\nexport const DOCTOR = {\n${numbers.join("\n")}\n};\n`,
-);
+const shared = ["doctor", "reconnect", "checkpoint"].map((name) => {
+  const table = readFileSync(at(`../../shared/${name}.toml`), "utf8");
+  const rows = [...table.matchAll(/^(\w+) = ("[^"]*"|-?[0-9][^\s#]*)/gm)];
+  const values = rows.map((row) => `  ${row[1]}: ${row[2]},\n`).join("");
+  return `/** Of clients/shared/${name}.toml. */\nexport const ${name.toUpperCase()} = {\n${values}};\n`;
+});
+writeFileSync(at("../src/generated/shared.ts"), shared.join("\n"));

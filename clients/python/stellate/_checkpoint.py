@@ -21,9 +21,11 @@ from google.protobuf.json_format import MessageToDict
 from ._epsilon import AUTO, Epsilon, choose
 from ._generated import mesh_pb2 as pb
 from ._mesh import FinishedMesh
+from ._shared import table
 from .errors import FailedPrecondition, InvalidArgument
 from .report import Progress, Report
 
+_NAMES = table("checkpoint.toml")
 _LAYOUT = 1  # of the files
 _LAST_SERVER_SECONDS = 60.0  # it has been asked to stop, and may be busy with a round
 
@@ -47,8 +49,8 @@ class Checkpoint:
         specification does not tell."""
         self._part = part
         self.directory = os.fspath(directory).rstrip("/") or "/"  # "link/" would be followed
-        self._server_directory = os.path.join(self.directory, "server")
-        self._record_path = os.path.join(self.directory, "mesh.json")
+        self._server_directory = os.path.join(self.directory, _NAMES["server"])
+        self._record_path = os.path.join(self.directory, _NAMES["python_record"])
         self._mesh_path = os.path.join(self.directory, "mesh.npz")
         self._record: dict[str, Any] = {}
         self._lock: IO[str] | None = None

@@ -31,6 +31,7 @@ from ._doctor.check import check
 from ._download import Unfinished
 from ._files.formats import check_save
 from ._oracle_source import Refused, add_oracle, name_of, oracle_of
+from ._reconnect import WAITS
 from ._version import __version__
 from .client import Client
 from .errors import Interrupted, StellateError, exit_status
@@ -266,8 +267,8 @@ def _add_results(command: argparse.ArgumentParser, required: bool) -> None:
 def _add_connection(command: argparse.ArgumentParser, default: str | None) -> None:
     add_server(command, default)
     command.add_argument(
-        "--reconnect", type=float, default=180.0, metavar="SECONDS",
-        help="that a server which went away is waited for; default: 180",
+        "--reconnect", type=float, default=WAITS["give_up"], metavar="SECONDS",
+        help=f"that a server which went away is waited for; default: {WAITS['give_up']:g}",
     )  # fmt: skip
 
 

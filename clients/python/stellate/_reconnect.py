@@ -12,12 +12,12 @@ from typing import Callable
 
 import grpc
 
+from ._shared import table
 from .errors import MeshNotFound, StellateError, Unavailable
 
 _log = logging.getLogger("stellate")
 
-_FIRST_PAUSE = 0.1
-_LONGEST_PAUSE = 5.0
+WAITS = table("reconnect.toml")
 
 
 def is_transient(error: grpc.RpcError) -> bool:
@@ -33,15 +33,15 @@ def is_transient(error: grpc.RpcError) -> bool:
 
 
 def pauses(rng: random.Random | None = None) -> Iterator[float]:
-    """0.1 s, doubled each time up to 5 s, each shortened at random by up to half.
+    """Seconds between attempts, longer each time up to a limit, each shortened at random.
 
     So the clients of a server that comes back do not all come at once.
     """
     rng = rng or random.Random()
-    full = _FIRST_PAUSE
+    full = WAITS["first_pause"]
     while True:
-        yield full * (1 - rng.random() / 2)
-        full = min(2 * full, _LONGEST_PAUSE)
+        yield full * (1 - WAITS["pause_jitter"] * rng.random())
+        full = min(WAITS["pause_growth"] * full, WAITS["longest_pause"])
 
 
 @dataclasses.dataclass

@@ -15,7 +15,7 @@ import grpc
 from ._generated import oracle_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
 from ._generated.stellate_pb2 import GetMeshRequest
-from ._reconnect import Reconnector, ReconnectPolicy
+from ._reconnect import WAITS, Reconnector, ReconnectPolicy
 from ._wire import enums
 from ._wire.arrays import fill, from_wire
 from .errors import (
@@ -30,7 +30,6 @@ from .oracle import CheckedOracle
 
 _ANSWER_BYTES = 3_000_000  # an answer has to stay below the server's 4 MB
 _MESSAGE_BYTES = 4000
-_CALL_SECONDS = 30.0
 _LOOK_AGAIN_SECONDS = 0.1
 _KINDS = (pb.QUERY_KIND_CLOSEST_POINT, pb.QUERY_KIND_INTERSECT_FLAT)
 _BUSY_SHARE = 0.25  # of the time that the server bears silence
@@ -285,10 +284,10 @@ class Worker:
     def _how_it_ended(self) -> str:
         """Of a mesh that takes no more workers; "" if that cannot be found out."""
         request = GetMeshRequest(name=self._hello.mesh)
-        give_up = time.monotonic() + _CALL_SECONDS
+        give_up = time.monotonic() + WAITS["call"]
         while True:
             try:
-                mesh = self._stub.GetMesh(request, timeout=_CALL_SECONDS)
+                mesh = self._stub.GetMesh(request, timeout=WAITS["call"])
             except grpc.RpcError:
                 return ""
             if mesh.HasField("end_time"):

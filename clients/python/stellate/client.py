@@ -15,7 +15,7 @@ from ._generated import mesh_pb2
 from ._generated import stellate_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
 from ._info import MeshInfo, ServerInfo
-from ._reconnect import Reconnector, ReconnectPolicy
+from ._reconnect import WAITS, Reconnector, ReconnectPolicy
 from ._streams import Parts, Watch
 from ._wire.spec import mesh_spec
 from ._worker import Ask, Worker, answer
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Client", "MeshInfo", "ServerInfo", "Watch", "Parts"]
 
-_CALL_SECONDS = 30.0
-_CONNECT_SECONDS = 1.0
 _NO_PINGS = 1_000_000.0
 _LARGEST_MESSAGE = 64 << 20
 
@@ -56,8 +54,8 @@ class Client:
         server: str | Server | None = None,
         credentials: Credentials | None = None,
         *,
-        reconnect_seconds: float = 180.0,
-        keepalive_seconds: float = 4.0,
+        reconnect_seconds: float = WAITS["give_up"],
+        keepalive_seconds: float = WAITS["keepalive"],
     ) -> None:
         if server is None and credentials is not None:
             raise InvalidArgument("credentials are for a server: say which")
@@ -76,16 +74,17 @@ class Client:
         # A private server needs no pings: its end shows at once.
         private = isinstance(self._server, Server) and self._server.private
         ping = max(1, int(1000 * (_NO_PINGS if private else keepalive_seconds)))
+        lost = int(WAITS["ping_patience"] * ping)
         options = [
             ("grpc.max_receive_message_length", _LARGEST_MESSAGE),
             ("grpc.max_send_message_length", _LARGEST_MESSAGE),
             ("grpc.keepalive_time_ms", ping),
-            ("grpc.keepalive_timeout_ms", 2 * ping),
-            ("grpc.http2.ping_timeout_ms", 2 * ping),  # the same to newer libraries: else a minute
+            ("grpc.keepalive_timeout_ms", lost),
+            ("grpc.http2.ping_timeout_ms", lost),  # the same to newer libraries: else a minute
             ("grpc.http2.max_pings_without_data", 0),  # as many as it takes
             # The pauses between attempts are ours; gRPC's own would be up to two minutes.
-            ("grpc.initial_reconnect_backoff_ms", 100),
-            ("grpc.max_reconnect_backoff_ms", 1000),
+            ("grpc.initial_reconnect_backoff_ms", int(1000 * WAITS["first_connection_pause"])),
+            ("grpc.max_reconnect_backoff_ms", int(1000 * WAITS["longest_connection_pause"])),
         ]
         if address.startswith(("unix:", "localhost:", "127.", "[::1]:")):
             options.append(("grpc.enable_http_proxy", 0))  # proxies are for the outside
@@ -222,7 +221,7 @@ class Client:
     def _connect(self) -> None:
         try:
             self._stub.GetServerInfo(
-                pb.GetServerInfoRequest(), timeout=_CONNECT_SECONDS, wait_for_ready=True
+                pb.GetServerInfoRequest(), timeout=WAITS["connect"], wait_for_ready=True
             )
         except grpc.RpcError:
             pass  # what is wrong the next attempt will tell
@@ -250,7 +249,7 @@ class Client:
         attempts = attempts or Reconnector(self._policy)
         while True:
             try:
-                answer = method(request, timeout=_CALL_SECONDS)
+                answer = method(request, timeout=WAITS["call"])
             except grpc.RpcError as error:
                 if once:
                     attempts.stop()

@@ -34,6 +34,8 @@ class CheckpointTest < Minitest::Test
     assert_equal [straight.points, straight.simplices], [mesh.points, mesh.simplices]
     assert_operator first.asked, :>, 0
     assert_operator second.asked, :<, straight.report.counts.queries
+    # The record of another language's client writes out an empty label.
+    File.open(File.join(@checkpoint, 'mesh'), 'ab') { |record| record.write("R\0") }
     again = kept(third)
     assert_nil third.asked
     assert_predicate again, :certified?

@@ -9,6 +9,9 @@
 #include <vector>
 
 #include "net/channel.h"
+#include "shared/reconnect.h"
+#include "stellate/download.h"
+#include "stellate/serve.h"
 
 namespace stellate::client {
 namespace {
@@ -46,12 +49,23 @@ TEST(Backoff, DoublesToItsLimitAndDiffersFromClientToClient) {
     EXPECT_GT(pause, full / 2);
     EXPECT_LE(pause, full);
     differs = differs || pause != other.Next();
-    full = std::min(2 * full, Backoff::kLongest);
+    full = std::min(reconnect::kPauseGrowth * full, Backoff::kLongest);
   }
   EXPECT_TRUE(differs);
   EXPECT_EQ(full, Backoff::kLongest);
   backoff.Reset();
   EXPECT_LE(backoff.Next(), Backoff::kFirst);
+}
+
+// The public headers, which are read without what is generated, repeat what all clients share.
+TEST(Defaults, AreThoseOfAllClients) {
+  const auto are_shared = [](const auto& options) {
+    EXPECT_EQ(options.reconnect_seconds, reconnect::kGiveUp);
+    EXPECT_EQ(options.keepalive_seconds, reconnect::kKeepalive);
+  };
+  are_shared(MeshOptions());
+  are_shared(ServeOptions());
+  are_shared(DownloadOptions());
 }
 
 TEST(Reconnector, TriesAgainAndTellsOfTheOutageOnce) {

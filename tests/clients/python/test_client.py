@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import stellate
 from fake_server import FakeServer, delta, final, serving
+from stellate import _reconnect
 from stellate._generated import mesh_pb2, oracle_pb2
 from stellate._wire.arrays import to_wire
 from stellate.manifolds import Sphere
@@ -159,3 +160,15 @@ def test_far_servers_sample_speculatively(monkeypatch, address, asked, wanted):
     monkeypatch.setattr(stellate.Client, "_call", create)
     stellate.Client(address).create(CIRCLE, 0.1, speculative=asked)
     assert specs[0].criteria.speculative is wanted
+
+
+def test_the_page_tells_how_long_clients_wait(repository):
+    page = (repository / "docs/using/outages.md").read_text()
+    first, longest, give_up, keepalive = (
+        f"{_reconnect.WAITS[name]:g} s"
+        for name in ("first_pause", "longest_pause", "give_up", "keepalive")
+    )
+    assert f"| {give_up} |\n| ping a silent server after" in page
+    assert f"| {keepalive} |\n| hear of it" in page
+    assert f"are {first}, doubled up to {longest}, each shortened at random by up to half" in page
+    assert (_reconnect.WAITS["pause_growth"], _reconnect.WAITS["pause_jitter"]) == (2, 0.5)

@@ -3,25 +3,20 @@
 require 'fileutils'
 
 module Stellate
-  # A directory in which one mesh outlives the processes that make it:
-  #   mesh     a line with the mesh's name on the private server and, if 'auto' chose epsilon, how many finer
-  #            ones may follow and why it is this one; then the specification
-  #   server/  that server's --data-dir
+  # A directory in which one mesh outlives the processes that make it: clients/shared/checkpoint.toml.
   class Checkpoint
-    LAST_SERVER_SECONDS = 20 # that the server of a killed process may take to end
-
     attr_reader :folder
 
     def initialize(folder)
       @folder = folder.to_s.sub(%r{(?<=.)/+\z}, '') # "link/" would be followed
-      @record = File.join(@folder, 'mesh')
+      @record = File.join(@folder, CHECKPOINT[:record])
     end
 
     # Starts the private server, once that of a killed process has come to its end.
     def server(&)
       FileUtils.mkdir_p(folder, mode: 0o700)
       insist_on_own
-      if File.exist?(File.join(folder, 'mesh.json'))
+      if File.exist?(File.join(folder, CHECKPOINT[:python_record]))
         raise Stellate.invalid("#{folder} is a checkpoint of the Python client: take another directory")
       end
 
@@ -31,16 +26,15 @@ module Stellate
     # The epsilon that was chosen for the mesh that is there; nil: none was.
     def choice
       _, retries, reason, there = read
-      Choice.new(V1::MeshSpec.decode(there).epsilon, reason, Integer(retries)) if reason
+      Choice.new(there.epsilon, reason, Integer(retries)) if reason && there
     end
 
     # The mesh that is there, or a new one; with `anew` a new one in its place.
     def declare(client, spec, choice, anew:)
       essence = spec.dup
       essence.label = ''
-      wanted = V1::MeshSpec.encode(essence)
       name, _, _, there = read
-      if name && !anew && there != wanted
+      if name && !anew && there != essence
         raise Stellate.invalid("the checkpoint #{folder} is of a mesh of another specification: " \
                                'take another directory, or remove it')
       end
@@ -51,7 +45,7 @@ module Stellate
 
       made = client.create_from(spec)
       chosen = choice.reason.empty? ? [] : [choice.retries, choice.reason]
-      note("#{[made.name, *chosen].join(' ')}\n".b + wanted)
+      note("#{[made.name, *chosen].join(' ')}\n".b + V1::MeshSpec.encode(essence))
       found.each { |info| client.delete(info.name) }
       made
     end
@@ -67,9 +61,10 @@ module Stellate
     private
 
     def start
-      deadline = Time.now + LAST_SERVER_SECONDS
+      deadline = Time.now + CHECKPOINT[:last_server_seconds]
       begin
-        Server.start('--data-dir', File.join(folder, 'server'), '--keep-finished-seconds', '31536000')
+        Server.start('--data-dir', File.join(folder, CHECKPOINT[:server]),
+                     '--keep-finished-seconds', CHECKPOINT[:keep_finished_seconds].to_s)
       rescue Unavailable => e
         raise unless e.message.include?('another server uses')
         raise in_use if Time.now > deadline
@@ -101,8 +96,14 @@ module Stellate
       first, there = read_own&.split("\n", 2)
       return [] if first.nil?
 
-      name, retries, reason = first.force_encoding('UTF-8').split(' ', 3)
-      [name, retries, reason, there]
+      [*first.force_encoding('UTF-8').split(' ', 3), nil, nil].first(3) << spec_of(there)
+    end
+
+    # nil for what is none.
+    def spec_of(bytes)
+      bytes && V1::MeshSpec.decode(bytes)
+    rescue Google::Protobuf::ParseError
+      nil
     end
 
     # The record, if it is a file of this user's and no link; nil if there is none.
@@ -120,7 +121,7 @@ module Stellate
 
     # All of it or nothing.
     def note(record)
-      draft = "#{@record}.new"
+      draft = File.join(folder, CHECKPOINT[:draft])
       FileUtils.rm_f(draft) # of a process that was killed; a link itself, not where it leads
       File.open(draft, File::WRONLY | File::CREAT | File::EXCL | File::BINARY, 0o600) { |file| file.write(record) }
       File.rename(draft, @record)

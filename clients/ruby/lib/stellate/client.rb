@@ -39,7 +39,6 @@ module Stellate
 
   # A connection to a server; any thread may use it. The service, call by call.
   class Client
-    CALL_SECONDS = 30
     NO_PINGS = 2_000_000_000 # milliseconds
 
     attr_reader :address, :patience, :stub, :metadata
@@ -47,8 +46,8 @@ module Stellate
     # `server`: "host:port", "unix:/path" or a Server. `reconnect_seconds`: how long one that was there and
     # went away is waited for; `keepalive_seconds`: how long a silent one is trusted before it is pinged;
     # `on_outage` is told when it is lost and when it is back.
-    def initialize(server, credentials: Credentials.new, reconnect_seconds: 180, keepalive_seconds: 4,
-                   on_outage: ->(said) { warn("stellate: #{said}") })
+    def initialize(server, credentials: Credentials.new, reconnect_seconds: RECONNECT[:give_up],
+                   keepalive_seconds: RECONNECT[:keepalive], on_outage: ->(said) { warn("stellate: #{said}") })
       own = server.is_a?(Server) ? server : nil
       @address = own ? own.address : server.to_s
       raise Stellate.invalid("server has to be host:port or unix:/path: #{@address}") unless
@@ -118,7 +117,7 @@ module Stellate
     # What the doctor found, if this is a connection to it.
     def check_report(name)
       doctor = V1::Doctor::Stub.new(@address, :this_channel_is_insecure)
-      doctor.get_check_report(V1::GetCheckReportRequest.new(name:), deadline: Time.now + CALL_SECONDS)
+      doctor.get_check_report(V1::GetCheckReportRequest.new(name:), deadline: Time.now + RECONNECT[:call])
     rescue GRPC::BadStatus => e
       raise Stellate.from_rpc(e)
     end
@@ -149,18 +148,20 @@ module Stellate
 
     def channel_args(keepalive_seconds)
       ping = keepalive_seconds ? (1000 * keepalive_seconds).to_i : NO_PINGS
+      lost = (RECONNECT[:ping_patience] * ping).to_i
       { 'grpc.max_receive_message_length' => 64 << 20, 'grpc.max_send_message_length' => 64 << 20,
-        'grpc.keepalive_time_ms' => ping, 'grpc.keepalive_timeout_ms' => [2 * ping, NO_PINGS].min,
+        'grpc.keepalive_time_ms' => ping, 'grpc.keepalive_timeout_ms' => [lost, NO_PINGS].min,
         'grpc.http2.max_pings_without_data' => 0,
         # The pauses between attempts are ours; gRPC's own would be up to two minutes.
-        'grpc.initial_reconnect_backoff_ms' => 100, 'grpc.max_reconnect_backoff_ms' => 1000,
+        'grpc.initial_reconnect_backoff_ms' => (1000 * RECONNECT[:first_connection_pause]).to_i,
+        'grpc.max_reconnect_backoff_ms' => (1000 * RECONNECT[:longest_connection_pause]).to_i,
         # Proxies are for the outside.
         'grpc.enable_http_proxy' => Credentials.stays_on_this_machine?(address) ? 0 : 1 }
     end
 
     # Waits a moment for a connection; what is wrong the next attempt will tell.
     def connect
-      stub.get_server_info(V1::GetServerInfoRequest.new, metadata:, deadline: Time.now + 1)
+      stub.get_server_info(V1::GetServerInfoRequest.new, metadata:, deadline: Time.now + RECONNECT[:connect])
     rescue GRPC::BadStatus
       nil
     end
@@ -168,7 +169,7 @@ module Stellate
     def call(method, request, once: false, outage: Outage.new(patience))
       outage.stop if once
       loop do
-        reply = stub.public_send(method, request, metadata:, deadline: Time.now + CALL_SECONDS)
+        reply = stub.public_send(method, request, metadata:, deadline: Time.now + RECONNECT[:call])
         outage.heard
         return reply
       rescue GRPC::BadStatus => e

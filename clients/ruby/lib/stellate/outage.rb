@@ -8,9 +8,6 @@ module Stellate
   # The attempts at one call or stream while the server may be away. A quiet one leaves it to others to
   # tell of it.
   class Outage
-    FIRST_PAUSE = 0.1 # seconds, doubled each time
-    LONGEST_PAUSE = 5.0
-
     def initialize(patience, quiet: false)
       @patience, @quiet = patience, quiet
       @attempts, @stopped = 0, Queue.new
@@ -53,10 +50,10 @@ module Stellate
       left = @patience.give_up_seconds - gone
       raise given_up(ours) if left <= 0
 
-      full = [FIRST_PAUSE * (2**@attempts), LONGEST_PAUSE].min
+      full = [RECONNECT[:first_pause] * (RECONNECT[:pause_growth]**@attempts), RECONNECT[:longest_pause]].min
       @attempts += 1
       # Shortened at random: the clients of a server that comes back do not all come at once.
-      pause([full * (1 - (rand / 2)), left].min)
+      pause([full * (1 - (rand * RECONNECT[:pause_jitter])), left].min)
       raise ours if stopped?
 
       @patience.connect.call

@@ -14,20 +14,18 @@ import java.util.Set;
 import stellate.v1.MeshSpec;
 
 /**
- * A directory in which one mesh outlives the processes that make it.
- *
- * <p>"mesh" has the mesh's name on the private server, and, on the next line, what is meshed;
- * "server" is that server's --data-dir.
+ * A directory in which one mesh outlives the processes that make it, as
+ * clients/shared/checkpoint.toml lays it out.
  */
 final class Checkpoint {
-  private static final long LAST_SERVER = 20_000; // milliseconds that a killed process' may take
+  private static final Shared LAYOUT = Shared.CHECKPOINT;
 
   private final Path folder;
   private final Path record;
 
   Checkpoint(Path folder) {
     this.folder = folder;
-    record = folder.resolve("mesh");
+    record = folder.resolve(LAYOUT.word("record"));
   }
 
   private StellateException wrong(String what) {
@@ -45,14 +43,16 @@ final class Checkpoint {
     } catch (IOException error) {
       throw unusable(error);
     }
-    if (Files.exists(folder.resolve("mesh.json"))) {
+    if (Files.exists(folder.resolve(LAYOUT.word("python_record")))) {
       throw wrong("is of the Python client: take another directory");
     }
-    String data = folder.resolve("server").toString();
-    long deadline = System.currentTimeMillis() + LAST_SERVER;
+    String data = folder.resolve(LAYOUT.word("server")).toString();
+    String kept = LAYOUT.word("keep_finished_seconds");
+    long deadline =
+        System.currentTimeMillis() + (long) (1000 * LAYOUT.number("last_server_seconds"));
     while (true) {
       try {
-        return Server.start("--data-dir", data, "--keep-finished-seconds", "31536000");
+        return Server.start("--data-dir", data, "--keep-finished-seconds", kept);
       } catch (StellateException error) {
         if (!error.getMessage().contains("another server uses")) {
           throw error;
@@ -113,7 +113,7 @@ final class Checkpoint {
 
   /** The mesh that is there, or a new one. */
   stellate.v1.Mesh declare(Client client, MeshSpec spec) {
-    byte[] wanted = spec.toBuilder().clearLabel().build().toByteArray();
+    MeshSpec wanted = spec.toBuilder().clearLabel().build();
     String name = "";
     try {
       if (Files.exists(record, LinkOption.NOFOLLOW_LINKS)) {
@@ -126,9 +126,10 @@ final class Checkpoint {
         while (end < kept.length && kept[end] != '\n') {
           end++;
         }
-        name = new String(kept, 0, end, StandardCharsets.UTF_8);
-        if (!Arrays.equals(
-            wanted, Arrays.copyOfRange(kept, Math.min(end + 1, kept.length), kept.length))) {
+        // What may follow the name is of clients that choose epsilon.
+        name = new String(kept, 0, end, StandardCharsets.UTF_8).split(" ", 2)[0];
+        int from = Math.min(end + 1, kept.length);
+        if (!MeshSpec.parseFrom(Arrays.copyOfRange(kept, from, kept.length)).equals(wanted)) {
           throw wrong(
               "is of a mesh of another specification: take another directory, or remove it");
         }
@@ -143,7 +144,7 @@ final class Checkpoint {
       }
       if (found == null) {
         found = client.create(spec);
-        note(found.getName(), wanted);
+        note(found.getName(), wanted.toByteArray());
       }
       return found;
     } catch (IOException error) {
@@ -156,7 +157,7 @@ final class Checkpoint {
     byte[] head = (name + "\n").getBytes(StandardCharsets.UTF_8);
     byte[] all = Arrays.copyOf(head, head.length + wanted.length);
     System.arraycopy(wanted, 0, all, head.length, wanted.length);
-    Path draft = folder.resolve("mesh.new");
+    Path draft = folder.resolve(LAYOUT.word("draft"));
     Files.deleteIfExists(draft); // of a process that was killed; a link itself, not where it leads
     Files.write(draft, all, StandardOpenOption.CREATE_NEW, StandardOpenOption.WRITE);
     Files.move(draft, record, StandardCopyOption.ATOMIC_MOVE, StandardCopyOption.REPLACE_EXISTING);

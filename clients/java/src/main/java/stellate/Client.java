@@ -35,7 +35,8 @@ import stellate.v1.StellateGrpc;
 
 /** A connection to a server; any thread may use it. The service, call by call. */
 public final class Client implements AutoCloseable {
-  private static final int CALL_SECONDS = 30;
+  private static final int CALL_SECONDS = (int) Shared.RECONNECT.number("call");
+  private static final long CONNECT_MILLIS = (long) (1000 * Shared.RECONNECT.number("connect"));
   private static final int LARGEST_MESSAGE = 64 << 20;
 
   // grpc-java sets an option that unix sockets do not have, and Netty warns of it.
@@ -52,7 +53,7 @@ public final class Client implements AutoCloseable {
 
   /** To "host:port" or "unix:/path". */
   public Client(String server, Credentials credentials) {
-    this(server, credentials, 4);
+    this(server, credentials, (long) Shared.RECONNECT.number("keepalive"));
   }
 
   /** To a server of one's own. */
@@ -84,7 +85,9 @@ public final class Client implements AutoCloseable {
     if (keepaliveSeconds > 0) {
       builder
           .keepAliveTime(keepaliveSeconds, TimeUnit.SECONDS)
-          .keepAliveTimeout(2 * keepaliveSeconds, TimeUnit.SECONDS)
+          .keepAliveTimeout(
+              (long) (Shared.RECONNECT.number("ping_patience") * keepaliveSeconds),
+              TimeUnit.SECONDS)
           .keepAliveWithoutCalls(true);
     }
     if (Credentials.staysOnThisMachine(server)) {
@@ -101,7 +104,10 @@ public final class Client implements AutoCloseable {
     patience.connect = this::connect;
   }
 
-  /** How long a server that was there and went away is waited for; 0: not at all. Default 180. */
+  /**
+   * How long a server that was there and went away is waited for; 0: not at all. Default: of
+   * clients/shared.
+   */
   public Client reconnectSeconds(double seconds) {
     patience.giveUpSeconds = seconds;
     return this;
@@ -119,7 +125,8 @@ public final class Client implements AutoCloseable {
     try {
       StellateGrpc.StellateBlockingStub soon = blocking.withWaitForReady();
       GetServerInfoRequest ask = GetServerInfoRequest.getDefaultInstance();
-      ServerInfo unused = soon.withDeadlineAfter(1, TimeUnit.SECONDS).getServerInfo(ask);
+      ServerInfo unused =
+          soon.withDeadlineAfter(CONNECT_MILLIS, TimeUnit.MILLISECONDS).getServerInfo(ask);
       patience.reached |= unused.getMaxMeshes() >= 0;
     } catch (StatusRuntimeException error) {
       return;

@@ -10,12 +10,11 @@ import java.util.function.Supplier;
 
 /** The attempts at one call or stream while the server may be away. */
 final class Outage {
-  private static final double FIRST_PAUSE = 0.1; // seconds, doubled each time
-  private static final double LONGEST_PAUSE = 5;
+  private static final Shared WAITS = Shared.RECONNECT;
 
   /** What the calls and streams of one client share. */
   static final class Patience {
-    double giveUpSeconds = 180;
+    double giveUpSeconds = WAITS.number("give_up");
     Supplier<StellateException> hopeless = () -> null; // why the server will not come back
     Consumer<String> onOutage = said -> System.err.println("stellate: " + said);
     Runnable connect = () -> {};
@@ -113,10 +112,12 @@ final class Outage {
       throw new StellateException(
           StellateException.Kind.UNAVAILABLE, ours.reason(), ours.getMessage() + waited, error);
     }
-    double full = Math.min(FIRST_PAUSE * Math.pow(2, attempts), LONGEST_PAUSE);
+    double longer = Math.pow(WAITS.number("pause_growth"), attempts);
+    double full = Math.min(WAITS.number("first_pause") * longer, WAITS.number("longest_pause"));
     attempts++;
     // Shortened at random: the clients of a server that comes back do not all come at once.
-    double pause = full * (1 - ThreadLocalRandom.current().nextDouble() / 2);
+    double chance = ThreadLocalRandom.current().nextDouble();
+    double pause = full * (1 - WAITS.number("pause_jitter") * chance);
     try {
       if (stopped.await((long) (1e9 * Math.min(pause, left)), TimeUnit.NANOSECONDS)) {
         throw ours;

@@ -6,6 +6,7 @@ import static org.junit.jupiter.api.Assertions.assertSame;
 import static org.junit.jupiter.api.Assertions.assertThrows;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
+import java.nio.charset.StandardCharsets;
 import java.nio.file.Files;
 import java.nio.file.Path;
 import java.nio.file.attribute.PosixFilePermissions;
@@ -39,7 +40,7 @@ final class CheckpointTest {
   }
 
   @Test
-  void goesOn(@TempDir Path folder) {
+  void goesOn(@TempDir Path folder) throws Exception {
     Path checkpoint = folder.resolve("torus");
     Options cancelling = in(checkpoint);
     CompletableFuture<Void> cancel = new CompletableFuture<>();
@@ -66,6 +67,12 @@ final class CheckpointTest {
     long queries = straight.report().orElseThrow().getCounts().getQueries();
     assertTrue(first.asked.get() > 0 && second.asked.get() < queries);
 
+    // The record of another language's client: it chose epsilon, says why, writes out an empty
+    // label.
+    Path record = checkpoint.resolve("mesh");
+    String kept = Files.readString(record, StandardCharsets.ISO_8859_1);
+    String theirs = kept.replaceFirst("\n", " 2 a quarter of the reach\n") + "R\0";
+    Files.writeString(record, theirs, StandardCharsets.ISO_8859_1);
     Counting third = new Counting();
     Mesh again = Stellate.mesh(third, 0.05, in(checkpoint));
     assertEquals(0, third.asked.get());
