@@ -6,7 +6,7 @@ import dataclasses
 import os
 import warnings
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from ._files import formats
 from ._files.orientation import orient, turn_outwards, turn_positive
 from .errors import UncertifiedWarning
 from .report import Progress, Report
+
+if TYPE_CHECKING:
+    from .oracles import PeriodicMesh
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -135,6 +138,18 @@ class Mesh:
         """
         heights = self.points @ _slice.as_normal(normal, self.ambient_dimension) - level
         return Mesh(*_slice.cut(self.points, self.simplices, heights))
+
+    def unwrap(self, cell: Any) -> PeriodicMesh:
+        """A mesh on a periodic cell in plain coordinates, going on from cell to cell.
+
+        Args:
+          cell: the stellate.oracles.PeriodicCell that it is a mesh on.
+
+        Raises: InvalidArgument for a mesh of something else, or one too coarse to tell how it goes on.
+        """
+        from .oracles._periodic_mesh import unwrapped  # which imports this module
+
+        return unwrapped(self, cell)
 
     def plot(
         self,

@@ -15,6 +15,8 @@ from ._kept import kept
 from ._linkage import Linkage
 from ._network import NeuralImplicit
 from ._parametrized import Parametrized
+from ._periodic import PeriodicCell
+from ._periodic_mesh import PeriodicMesh
 from ._quotient import Quotient
 from ._triangles import TriangleMesh
 from ._walls import Clipped, HalfSpace, ImplicitSolid, Solid
@@ -31,6 +33,8 @@ __all__ = [
     "ManifoldWithBoundary",
     "NeuralImplicit",
     "Parametrized",
+    "PeriodicCell",
+    "PeriodicMesh",
     "PointCloud",
     "Product",
     "Quotient",
