@@ -190,9 +190,9 @@ class ImplicitManifold:
 
     def _all_or_raise(self, y: np.ndarray, converged: np.ndarray) -> np.ndarray:
         if len(y) and not self._looked:
-            self._looked = True
             if converged.mean() < _FEW:
                 self._insist_on_a_change_of_sign()
+            self._looked = True
         if not converged.all():
             raise NotConverged(y, converged)
         return y
