@@ -32,18 +32,22 @@ Function = Callable[[Array], Any]
 class PeriodicCell:
     """R^d modulo a lattice: the flat torus, embedded without any stretching in R^(2 N).
 
-    Args:
-      lattice: (d, d), a vector that space repeats by in each row; any Bravais lattice of R^2 and R^3,
-        and of other R^d where it has an obtuse superbase.
-
         cell = PeriodicCell(2 * np.pi * np.eye(3))
         mesh = stellate.mesh(cell.solid(gyroid), epsilon=0.45)
         plain = mesh.unwrap(cell).plain()
 
-    Functions on it take plain coordinates (n, d), and are periodic. An obtuse superbase, that is vectors
-    v_0 + ... + v_d = 0 which generate the lattice and of which no two form an acute angle, has
-    |sum n_i v_i|^2 = sum_(i < j) -(v_i . v_j) (n_i - n_j)^2: so circles of radii
-    sqrt(-v_i . v_j) / 2 pi with angles 2 pi (n_i - n_j), at most 6 for d = 3, embed it isometrically.
+    Functions on it take plain coordinates (n, d), and are periodic. Vectors v[0] + ... + v[d] = 0 that
+    generate the lattice, no two of them at an acute angle, are an obtuse superbase of it. Selling's
+    formula,
+
+        length(sum_i n[i] v[i])^2 = sum_{i < j} -(v[i] . v[j]) (n[i] - n[j])^2,
+
+    says that circles of radii sqrt(-v[i] . v[j]) / 2 pi, with angles 2 pi (n[i] - n[j]), embed it
+    isometrically: at most 6 for d = 3.
+
+    Args:
+      lattice: (d, d), a vector that space repeats by in each row; any Bravais lattice of R^2 and R^3,
+        and of other R^d where it has an obtuse superbase.
 
     Attributes:
       lattice: (d, d), as given.
