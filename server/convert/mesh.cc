@@ -1,5 +1,7 @@
 #include "server/convert/mesh.h"
 
+#include <algorithm>
+
 #include "core/base/message.h"
 #include "server/convert/arrays.h"
 #include "server/convert/error_map.h"
@@ -279,7 +281,21 @@ void ToProto(const DeltaPart& part, int k, int d, v1::DownloadMeshResponse* out)
   ToProto(part.added, static_cast<std::size_t>(k) + 1, out->mutable_cells());
   out->mutable_boundary_vertices()->Add(part.boundary.begin(), part.boundary.end());
   out->mutable_boundary_walls()->Add(part.walls.begin(), part.walls.end());
+  if (part.orientation) {
+    out->mutable_orientation()->set_orientable(part.orientation->orientable);
+    out->mutable_orientation()->set_turned(part.orientation->turned.data(),
+                                           part.orientation->turned.size());
+  }
   out->set_complete(part.complete);
+}
+
+std::size_t ToProto(const core::Orientation& orientation, std::size_t first_byte,
+                    std::size_t max_bytes, v1::Orientation* out) {
+  const std::size_t end = std::min(orientation.turned.size(), first_byte + max_bytes);
+  out->set_orientable(orientation.orientable);
+  out->set_first_simplex(8 * first_byte);
+  out->set_turned(orientation.turned.data() + first_byte, end - first_byte);
+  return end;
 }
 
 }  // namespace stellate::server

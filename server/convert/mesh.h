@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "core/orientation.h"
 #include "core/report.h"
 #include "server/history/mesh_history.h"
 #include "server/session/session.h"
@@ -25,5 +26,9 @@ void ToProto(const Session& session, v1::Mesh* out);
 void ToProto(const DeltaPart& part, int k, int d, v1::DeltaChunk* out);
 // For a download: nothing is removed.
 void ToProto(const DeltaPart& part, int k, int d, v1::DownloadMeshResponse* out);
+
+// A chunk of the orientation, of `max_bytes` at most. Returns where the next one begins.
+std::size_t ToProto(const core::Orientation& orientation, std::size_t first_byte,
+                    std::size_t max_bytes, v1::Orientation* out);
 
 }  // namespace stellate::server

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/base/interruption.h"
 #include "core/base/message.h"
+#include "core/base/parallel.h"
 
 namespace stellate::server {
 namespace {
@@ -42,6 +44,14 @@ bool ReadInto(GrowingRows<T>* rows, std::size_t width, std::uint64_t count,
     left -= take;
   }
   return true;
+}
+
+std::size_t BytesOfBits(std::size_t bits) { return (bits + 7) / 8; }
+bool IsSet(const std::vector<std::uint8_t>& bits, std::size_t i) {
+  return (bits[i / 8] >> (i % 8) & 1) != 0;
+}
+void Set(std::vector<std::uint8_t>* bits, std::size_t i) {
+  (*bits)[i / 8] |= static_cast<std::uint8_t>(1u << (i % 8));
 }
 
 }  // namespace
@@ -129,25 +139,67 @@ Status MeshHistory::Append(const core::MeshDelta& delta) {
   return Status::Ok();
 }
 
+// The simplices of the newest revision, in lexicographic order of their rows.
+std::vector<std::uint32_t> MeshHistory::SortLiving() const {
+  std::vector<std::uint32_t> living;
+  living.reserve(marks_.back().simplices - marks_.back().deaths);
+  for (std::size_t v = 0; v < first_of_.size(); ++v) {
+    core::CheckInterruption(v);
+    const auto first = static_cast<std::ptrdiff_t>(living.size());
+    for (std::uint32_t s = first_of_[v]; s != kNone; s = *next_[s]) living.push_back(s);
+    std::sort(living.begin() + first, living.end(), [this](std::uint32_t a, std::uint32_t b) {
+      return std::lexicographical_compare(rows_[a], rows_[a] + row_size_, rows_[b],
+                                          rows_[b] + row_size_);
+    });
+  }
+  return living;
+}
+
+void MeshHistory::Orient() {
+  const std::vector<std::uint32_t> living = SortLiving();
+  std::vector<std::uint32_t> rows(living.size() * row_size_);
+  core::ParallelFor(living.size(), [&](std::size_t i) {
+    std::copy_n(rows_[living[i]], row_size_, rows.data() + i * row_size_);
+  });
+  core::Orientation orientation =
+      core::Orient(static_cast<int>(row_size_) - 1, static_cast<int>(d_),
+                   static_cast<std::uint32_t>(points_.size()), rows,
+                   [this](std::uint32_t v) { return points_[v]; });
+  std::vector<std::uint8_t> by_row;
+  if (orientation.orientable) by_row.assign(BytesOfBits(rows_.size()), 0);
+  for (std::size_t i = 0; i < living.size() && orientation.orientable; ++i) {
+    core::CheckInterruption(i);
+    if (IsSet(orientation.turned, i)) Set(&by_row, living[i]);
+  }
+  const std::lock_guard lock(mutex_);
+  complete_ = true;
+  orientation_ = std::move(orientation);
+  turned_by_row_ = std::move(by_row);
+}
+
+std::optional<core::Orientation> MeshHistory::orientation() const {
+  const std::lock_guard lock(mutex_);
+  return orientation_;
+}
+
 bool MeshHistory::Write(const Sink& write) const {
   const std::uint64_t revisions = marks_.size() - 1;
   return write(&revisions, sizeof(revisions)) &&
          write(marks_.data() + 1, revisions * sizeof(Mark)) && WriteRows(points_, d_, write) &&
-         WriteRows(rows_, row_size_, write) && WriteRows(deaths_, 1, write) && WriteWalls(write);
+         WriteRows(rows_, row_size_, write) && WriteRows(deaths_, 1, write) && WriteWalls(write) &&
+         WriteOrientation(write);
 }
 
-// Nothing where there is no boundary: so it was before there were any.
 bool MeshHistory::WriteWalls(const Sink& write) const {
   const std::uint64_t count = boundary_.size();
-  return count == 0 || (write(&count, sizeof(count)) &&
-                        write(boundary_.data(), boundary_.size() * sizeof(OnWalls)));
+  return write(&count, sizeof(count)) &&
+         (count == 0 || write(boundary_.data(), boundary_.size() * sizeof(OnWalls)));
 }
 
 bool MeshHistory::ReadWalls(const Source& read) {
   std::uint64_t count = 0;
-  if (!read(&count, sizeof(count))) return true;
   const std::uint64_t vertices = marks_.back().vertices;
-  if (count == 0 || count > vertices) return false;
+  if (!read(&count, sizeof(count)) || count > vertices) return false;
   for (std::uint64_t i = 0, next = 0; i < count; ++i) {
     OnWalls one;
     if (!read(&one, sizeof(one)) || one.vertex < next || one.vertex >= vertices) return false;
@@ -155,6 +207,31 @@ bool MeshHistory::ReadWalls(const Source& read) {
     boundary_.push_back(one);
   }
   return true;
+}
+
+bool MeshHistory::WriteOrientation(const Sink& write) const {
+  const std::uint8_t known = !orientation_ ? 0 : orientation_->orientable ? 2 : 1;
+  if (!write(&known, sizeof(known))) return false;
+  if (known < 2 || turned_by_row_.empty()) return true;
+  const std::vector<std::uint8_t>& turned = orientation_->turned;
+  return write(turned_by_row_.data(), turned_by_row_.size()) &&
+         (turned.empty() || write(turned.data(), turned.size()));
+}
+
+bool MeshHistory::ReadOrientation(const Source& read) {
+  std::uint8_t known = 0;
+  if (!read(&known, sizeof(known)) || known > 2) return false;
+  if (known == 0) return true;
+  orientation_.emplace();
+  if (known == 1) return true;
+  const Mark& end = marks_.back();
+  orientation_->orientable = true;
+  // No larger than the rows, which have been read.
+  turned_by_row_.resize(BytesOfBits(end.simplices));
+  orientation_->turned.resize(BytesOfBits(end.simplices - end.deaths));
+  return (turned_by_row_.empty() || read(turned_by_row_.data(), turned_by_row_.size())) &&
+         (orientation_->turned.empty() ||
+          read(orientation_->turned.data(), orientation_->turned.size()));
 }
 
 core::Expected<std::unique_ptr<MeshHistory>> MeshHistory::Read(int dimension, int ambient_dimension,
@@ -183,7 +260,7 @@ bool MeshHistory::ReadRows(const Source& read) {
   return end.vertices <= kNone && end.simplices < kNone &&
          ReadInto(&points_, d_, end.vertices, read) &&
          ReadInto(&rows_, row_size_, end.simplices, read) &&
-         ReadInto(&deaths_, 1, end.deaths, read) && ReadWalls(read);
+         ReadInto(&deaths_, 1, end.deaths, read) && ReadWalls(read) && ReadOrientation(read);
 }
 
 // From the order of births and deaths.
@@ -218,7 +295,8 @@ MeshHistory::Cursor MeshHistory::Begin(std::uint64_t from) const {
 
 std::uint64_t MeshHistory::MemoryBytes() const {
   const std::lock_guard lock(mutex_);
-  return points_.bytes() + boundary_.capacity() * sizeof(OnWalls) + rows_.bytes() + lives_.bytes() +
+  return points_.bytes() + boundary_.capacity() * sizeof(OnWalls) + turned_by_row_.capacity() +
+         (orientation_ ? orientation_->turned.capacity() : 0) + rows_.bytes() + lives_.bytes() +
          deaths_.bytes() + marks_.capacity() * sizeof(Mark) + appenders_bytes_;
 }
 
@@ -232,8 +310,9 @@ MeshHistory::Cursor MeshHistory::BeginAt(std::uint64_t revision, std::uint64_t p
   const std::lock_guard lock(mutex_);
   const Mark& mark = marks_[revision];
   const std::size_t vertex = std::min<std::size_t>(position, mark.vertices);
+  const bool is_oriented = orientation_ && revision + 1 == marks_.size();
   // Nothing was there at revision 0, so nothing goes.
-  return {0, revision, mark.deaths, vertex, position - vertex};
+  return {0, revision, mark.deaths, vertex, position - vertex, is_oriented};
 }
 
 DeltaPart MeshHistory::Next(Cursor* cursor, std::size_t max_bytes) const {
@@ -297,6 +376,8 @@ DeltaPart MeshHistory::Next(Cursor* cursor, std::size_t max_bytes) const {
 void MeshHistory::AppendAdded(Cursor* cursor, std::size_t end, std::size_t max_rows,
                               DeltaPart* part) const {
   const std::size_t stop = std::min(end, cursor->added + kScanLimit);
+  const bool has_bits = cursor->is_oriented && orientation_->orientable;
+  if (cursor->is_oriented) part->orientation.emplace().orientable = has_bits;
   part->added.reserve(std::min(stop - cursor->added, max_rows) * row_size_);
   std::size_t rows = 0;
   for (; cursor->added < stop; ++cursor->added) {
@@ -306,6 +387,10 @@ void MeshHistory::AppendAdded(Cursor* cursor, std::size_t end, std::size_t max_r
     ++rows;
     const std::uint32_t* const row = rows_[cursor->added];
     part->added.insert(part->added.end(), row, row + row_size_);
+    if (!has_bits) continue;
+    std::vector<std::uint8_t>& turned = part->orientation->turned;
+    turned.resize(BytesOfBits(rows));
+    if (IsSet(turned_by_row_, cursor->added)) Set(&turned, rows - 1);
   }
 }
 

@@ -8,8 +8,10 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
+#include "core/orientation.h"
 #include "core/report.h"
 #include "core/status.h"
 
@@ -70,6 +72,8 @@ struct DeltaPart {
   // The vertices among them that are on walls, and the walls of each.
   std::vector<std::uint32_t> boundary;
   std::vector<core::WallSet> walls;
+  // Of `added`, whose rows are not in lexicographic order; where it is known.
+  std::optional<core::Orientation> orientation;
   bool complete = false;  // the last part
 };
 
@@ -92,6 +96,13 @@ class MeshHistory {
   // leave a gap, or a removed simplex does not exist.
   core::Status Append(const core::MeshDelta& delta);
 
+  // Finds the orientation of the newest revision, which is the last: nothing can be appended then.
+  // The appending thread calls this, as work that can be interrupted (core/base/interruption.h),
+  // and then nothing has changed. REQUIRES: no Orient before.
+  void Orient();
+  // The orientation of the newest revision; none: not known.
+  std::optional<core::Orientation> orientation() const;
+
   // Writes everything as bytes, little-endian, in pieces. Returns false if `write` did. REQUIRES:
   // no Append at the same time.
   using Sink = std::function<bool(const void* data, std::size_t bytes)>;
@@ -109,6 +120,7 @@ class MeshHistory {
   struct Cursor {
     std::uint64_t from = 0, to = 0;
     std::size_t removed = 0, vertex = 0, added = 0;  // next to look at
+    bool is_oriented = false;                        // parts have an orientation
 
     std::uint64_t Position() const { return vertex + added; }
   };
@@ -138,6 +150,9 @@ class MeshHistory {
   bool ReadRows(const Source& read);
   bool WriteWalls(const Sink& write) const;
   bool ReadWalls(const Source& read);
+  bool WriteOrientation(const Sink& write) const;
+  bool ReadOrientation(const Source& read);
+  std::vector<std::uint32_t> SortLiving() const;
   bool ComputeLives();
   std::uint32_t Unlink(const std::uint32_t* row);
   void Link(std::uint32_t simplex);
@@ -161,6 +176,10 @@ class MeshHistory {
   };
   std::vector<Mark> marks_;  // sizes at each revision, 0 first
   bool complete_ = false;    // nothing can be appended
+  // Of the newest revision, once that is the last; and the same with a bit for each simplex so far,
+  // in the order of rows_.
+  std::optional<core::Orientation> orientation_;
+  std::vector<std::uint8_t> turned_by_row_;
 
   // For the appending thread only: the simplices of the newest revision, in a list for each vertex,
   // by their lowest vertex. A list is at most as long as a star.

@@ -54,6 +54,8 @@ class WatchStream final : public HistoryStream<v1::WatchMeshRequest, v1::WatchMe
     } else if (progress_due_) {
       progress_due_ = false;
       ToProto(session().View(), response()->mutable_progress());
+    } else if (over && !behind && OweOrientation()) {
+      return TakeOrientation();
     } else if (over && !behind) {
       ToProto(session(), response()->mutable_final());
       return Step::kSendLast;
@@ -74,10 +76,33 @@ class WatchStream final : public HistoryStream<v1::WatchMeshRequest, v1::WatchMe
     progress_due_ = true;
   }
 
+  bool OweOrientation() const {
+    return geometry_ && at_ > 0 && !was_oriented_ && !session().history().IsLost();
+  }
+
+  Step TakeOrientation() {
+    if (!orientation_) {
+      const MeshHistory* const history = OpenHistory();
+      if (history == nullptr) return Step::kWait;
+      orientation_ = history->orientation();
+      CloseHistory();
+    }
+    was_oriented_ = !orientation_;
+    if (was_oriented_) return Next();
+    oriented_bytes_ =
+        ToProto(*orientation_, oriented_bytes_, PartBytes(), response()->mutable_orientation());
+    was_oriented_ = oriented_bytes_ == orientation_->turned.size();
+    if (was_oriented_) orientation_.reset();
+    return Step::kSend;
+  }
+
   bool geometry_ = true;
   std::uint64_t at_ = 0;  // the client has all up to this revision
   std::optional<MeshHistory::Cursor> cursor_;
   bool progress_due_ = true;
+  std::optional<core::Orientation> orientation_;  // while it is sent
+  std::size_t oriented_bytes_ = 0;                // sent
+  bool was_oriented_ = false;                     // there is nothing more to send
 };
 
 }  // namespace

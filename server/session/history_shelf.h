@@ -34,6 +34,9 @@ class HistoryShelf {
   // Adds the change of one round, and the progress after it. kFailedPrecondition, and no change, if
   // the round does not follow the last one.
   core::Status Publish(const core::MeshDelta& delta, const PastProgress& now);
+  // Finds the orientation of the last revision, as work that can be interrupted. Once, before
+  // Record.
+  void Orient() { loaded_->Orient(); }
   // Writes the finished history and the mesh's result to the journal.
   std::optional<MeshFailure> Record(const core::Progress& progress, const core::Report& report);
 

@@ -7,6 +7,7 @@
 #include <new>
 #include <utility>
 
+#include "core/base/arenas.h"
 #include "core/base/message.h"
 
 namespace stellate::server {
@@ -109,6 +110,7 @@ void Session::Run() {
          core::Status::Ok());
   }
   SetInterruptible(nullptr);
+  Orient();
   const Ending ending = ChooseEnd(report ? &*report : nullptr);
   const bool is_recorded = RecordEnd(ending);
   ShowEnd(ending);
@@ -273,6 +275,17 @@ std::optional<MeshFailure> Session::PublishRound(core::Mesher* mesher) {
   }
   history_.WakeWatchers();
   return {};
+}
+
+// Before the end is seen, so that whoever sees it can have the orientation. The mesh is whole
+// without: clients can do with less.
+void Session::Orient() {
+  if (history_.revision() == 0 || life() == Life::kSuspended) return;
+  try {
+    core::WithThreads(request().spec.threads, orienting_, [this] { history_.Orient(); });
+  } catch (const std::bad_alloc&) {
+    Log(LogLevel::kWarning, log_context(), "no memory to orient the mesh: it ends without");
+  }
 }
 
 // The mesh fails, but not by an answer of the workers that serve it now.

@@ -6,6 +6,7 @@
 #include <mutex>
 #include <optional>
 
+#include "core/base/interruption.h"
 #include "core/mesher.h"
 #include "server/base/log.h"
 #include "server/oracles/oracle_pool.h"
@@ -100,6 +101,7 @@ class Session {
   bool FitsMemory(core::Mesher* mesher, std::uint64_t queries);
   bool Absorb(core::Mesher* mesher, const core::Answers& answers);
   std::optional<MeshFailure> PublishRound(core::Mesher* mesher);
+  void Orient();
   void FailBlameless(core::Mesher* mesher, MeshFailure failure);
   void Fail(core::Mesher* mesher, MeshFailure failure, core::Status status);
   SessionState FinalState(const core::Report* report) const;
@@ -119,6 +121,8 @@ class Session {
   MeshFailure failure_;
   core::Status blame_;                     // what all workers receive at the end
   std::optional<core::MeshDelta> unseen_;  // absorbed, not published yet
+
+  core::Interruption orienting_;
 
   mutable std::mutex mutex_;
   SessionLife life_;

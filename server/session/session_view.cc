@@ -21,9 +21,16 @@ void Session::Step(LifeEvent event) {
 
 void Session::Cancel() { Step(LifeEvent::kCancel); }
 
-void Session::Abandon() { Step(LifeEvent::kAbandon); }
+// Nobody will ask how it is oriented.
+void Session::Abandon() {
+  Step(LifeEvent::kAbandon);
+  orienting_.Raise();
+}
 
-void Session::Suspend() { Step(LifeEvent::kSuspend); }
+void Session::Suspend() {
+  Step(LifeEvent::kSuspend);
+  orienting_.Raise();
+}
 
 void Session::AbandonUnrun() {
   pool_.Shut();

@@ -3,60 +3,19 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <memory>
 #include <numeric>
 #include <utility>
 
 #include "core/base/first_ids.h"
 #include "core/base/message.h"
 #include "core/base/parallel.h"
+#include "core/certificate/complex/facets.h"
+#include "core/certificate/complex/signed_forest.h"
 #include "core/report.h"
 #include "core/specification.h"
 
 namespace stellate::core {
 namespace {
-
-// One side of a facet, sorted by the facet, then by the simplex.
-template <int K>
-class FacetSide {
- public:
-  FacetSide() = default;
-  // The facet of the simplex with these vertices without the omitted one; v is the facet's lowest
-  // vertex.
-  FacetSide(std::uint32_t simplex, const std::uint32_t* ids, std::uint32_t v, int omitted)
-      : omitted_(static_cast<std::uint32_t>(omitted)) {
-    for (int i = 1; i <= K; ++i)
-      if (i != omitted && ids[i] != v) Append(ids[i]);
-    Append(simplex);
-  }
-
-  std::uint32_t simplex() const { return static_cast<std::uint32_t>(digits_[kWords - 1]); }
-  std::uint32_t omitted() const { return omitted_; }  // number of the opposite vertex
-
-  bool SameFacet(const FacetSide& other) const {
-    bool same = digits_[kWords - 1] >> 32 == other.digits_[kWords - 1] >> 32;
-    for (int w = 0; w + 1 < kWords; ++w) same = same && digits_[w] == other.digits_[w];
-    return same;
-  }
-  bool operator<(const FacetSide& other) const {
-    for (int w = 0; w + 1 < kWords; ++w)
-      if (digits_[w] != other.digits_[w]) return digits_[w] < other.digits_[w];
-    return digits_[kWords - 1] < other.digits_[kWords - 1];
-  }
-
- private:
-  // The facet's vertices without v, ascending, then the simplex: K ids, as digits of one large
-  // number.
-  static constexpr int kWords = (K + 1) / 2;
-
-  void Append(std::uint32_t id) {
-    for (int w = 0; w + 1 < kWords; ++w) digits_[w] = digits_[w] << 32 | digits_[w + 1] >> 32;
-    digits_[kWords - 1] = digits_[kWords - 1] << 32 | id;
-  }
-
-  std::array<std::uint64_t, kWords> digits_{};
-  std::uint32_t omitted_ = 0;
-};
 
 std::uint32_t Root(std::vector<std::uint32_t>& parent, std::uint32_t v) {
   while (parent[v] != v) {
@@ -123,68 +82,6 @@ std::size_t Orient(const Adjacency& adjacency, Connectivity& result) {
   if (!result.orientable) result.orientation.clear();
   return parts;
 }
-
-// A union-find forest of vertices, joined by ties that say whether the stars of two vertices are
-// oriented oppositely. Any number of threads may tie concurrently: the trees in the end, and
-// whether some tie contradicts others, do not depend on the order.
-class VertexForest {
- public:
-  explicit VertexForest(std::uint32_t vertices)
-      : vertices_(vertices), up_(std::make_unique<std::atomic<Up>[]>(vertices)) {
-    ParallelFor(vertices, [&](std::uint32_t v) { up_[v].store(Pack(v, 0), kRelaxed); });
-  }
-
-  // Returns false if this tie contradicts others.
-  bool Join(std::uint32_t a, std::uint32_t b, bool flips) {
-    const Up differ = flips ? 1 : 0;
-    const Up up_a = up_[a].load(kRelaxed), up_b = up_[b].load(kRelaxed);
-    if (Parent(up_a) == Parent(up_b)) return (Flips(up_a) ^ Flips(up_b)) == differ;  // as mostly
-    while (true) {
-      const auto [root_a, flips_a] = Climb(a);
-      const auto [root_b, flips_b] = Climb(b);
-      const Up of_roots = flips_a ^ flips_b ^ differ;
-      if (root_a == root_b) return of_roots == 0;
-      const std::uint32_t low = std::min(root_a, root_b), high = std::max(root_a, root_b);
-      Up root = Pack(high, 0);
-      if (up_[high].compare_exchange_strong(root, Pack(low, of_roots), kRelaxed)) return true;
-      // Another thread has tied that root meanwhile.
-    }
-  }
-
-  std::uint64_t CountTrees() const {
-    std::uint64_t trees = 0;
-    for (std::uint32_t v = 0; v < vertices_; ++v) trees += Parent(up_[v].load(kRelaxed)) == v;
-    return trees;
-  }
-
- private:
-  // The parent (a root is its own), and in the lowest bit whether the two are oriented oppositely:
-  // one word, so that no thread reads half of it. Threads share nothing else.
-  using Up = std::uint64_t;
-  static constexpr auto kRelaxed = std::memory_order_relaxed;
-  static Up Pack(std::uint32_t parent, Up flips) { return Up{parent} << 1 | flips; }
-  static std::uint32_t Parent(Up up) { return static_cast<std::uint32_t>(up >> 1); }
-  static Up Flips(Up up) { return up & 1; }
-
-  // Returns the root, and whether v is oriented oppositely to it. Halves the path there.
-  std::pair<std::uint32_t, Up> Climb(std::uint32_t v) {
-    Up flips = 0;
-    while (true) {
-      Up up = up_[v].load(kRelaxed);
-      const std::uint32_t parent = Parent(up);
-      if (parent == v) return {v, flips};
-      const Up above = up_[parent].load(kRelaxed);
-      const Up both = Flips(up) ^ Flips(above);
-      if (Parent(above) != parent)
-        up_[v].compare_exchange_weak(up, Pack(Parent(above), both), kRelaxed);
-      flips ^= both;
-      v = Parent(above);
-    }
-  }
-
-  std::uint32_t vertices_;
-  std::unique_ptr<std::atomic<Up>[]> up_;
-};
 
 }  // namespace
 
@@ -267,44 +164,28 @@ Adjacency::FacetCount Adjacency::MatchFacetsOf(std::uint32_t begin, std::uint32_
                                                std::uint32_t apex) {
   const SimplexList& list = this->list();
   FacetCount count;
-  std::vector<FacetSide<K>> sides;
-  for (std::uint32_t v = begin; v < end; ++v) {
-    if (K == 1 && v == apex) continue;
-    sides.clear();
-    for (const std::uint32_t s : Star(v)) {
-      const std::uint32_t* ids = list[s];
-      // v is the lowest vertex of the simplex, or becomes it if the lowest is omitted.
-      if (ids[0] != v && ids[1] != v) continue;
-      const int first = ids[0] == v ? 1 : 0;
-      const int last = ids[0] == v ? K : 0;
-      for (int omit = first; omit <= last; ++omit) sides.emplace_back(s, ids, v, omit);
+  const auto match = [&](std::span<const SimplexFacet<K>> facet) {
+    ++count.all;
+    const SimplexFacet<K>& a = facet.front();
+    const SimplexFacet<K>& b = facet.back();
+    // Two copies of one simplex share all facets, yet bound nothing.
+    const bool good =
+        facet.size() == 2 && list[a.simplex()][a.omitted()] != list[b.simplex()][b.omitted()];
+    if (good) {
+      across_[static_cast<std::size_t>(a.simplex()) * (K + 1) + a.omitted()] = b.simplex();
+      across_[static_cast<std::size_t>(b.simplex()) * (K + 1) + b.omitted()] = a.simplex();
+    } else if (count.bad++ < Violations::kMost) {
+      std::array<std::uint32_t, K> ids{};
+      std::remove_copy(list[a.simplex()], list[a.simplex()] + K + 1, ids.begin(),
+                       list[a.simplex()][a.omitted()]);
+      count.some_bad.insert(count.some_bad.end(), ids.begin(), ids.end());
+      if (count.bad == 1)
+        count.first_bad = Message("face ", NameSimplex(ids.data(), K), " is in ", facet.size(),
+                                  facet.size() == 1 ? " simplex" : " simplices",
+                                  facet.size() == 2 ? " that are the same" : "");
     }
-    std::sort(sides.begin(), sides.end());
-    for (std::size_t i = 0; i < sides.size();) {
-      std::size_t next = i + 1;
-      while (next < sides.size() && sides[next].SameFacet(sides[i])) ++next;
-      ++count.all;
-      const FacetSide<K>& a = sides[i];
-      const FacetSide<K>& b = sides[next - 1];
-      // Two copies of one simplex share all facets, yet bound nothing.
-      const bool good =
-          next - i == 2 && list[a.simplex()][a.omitted()] != list[b.simplex()][b.omitted()];
-      if (good) {
-        across_[static_cast<std::size_t>(a.simplex()) * (K + 1) + a.omitted()] = b.simplex();
-        across_[static_cast<std::size_t>(b.simplex()) * (K + 1) + b.omitted()] = a.simplex();
-      } else if (count.bad++ < Violations::kMost) {
-        std::array<std::uint32_t, K> ids{};
-        std::remove_copy(list[a.simplex()], list[a.simplex()] + K + 1, ids.begin(),
-                         list[a.simplex()][a.omitted()]);
-        count.some_bad.insert(count.some_bad.end(), ids.begin(), ids.end());
-        if (count.bad == 1)
-          count.first_bad = Message("face ", NameSimplex(ids.data(), K), " is in ", next - i,
-                                    next - i == 1 ? " simplex" : " simplices",
-                                    next - i == 2 ? " that are the same" : "");
-      }
-      i = next;
-    }
-  }
+  };
+  ForEachFacet<K>(*this, begin, end, apex, match);
   return count;
 }
 
@@ -323,7 +204,7 @@ Connectivity ComputeConnectivity(const Adjacency& adjacency) {
 }
 
 Connectivity ComputeConnectivity(const SimplexList& list, std::span<const std::uint8_t> sides) {
-  VertexForest forest(list.vertices);
+  SignedForest forest(list.vertices);
   std::atomic<bool> orientable = true;
   ParallelFor(list.size(), [&](std::uint32_t s) {
     const std::uint32_t* ids = list[s];

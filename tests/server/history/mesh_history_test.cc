@@ -6,9 +6,15 @@
 #include <algorithm>
 #include <atomic>
 #include <cstdlib>
+#include <cstring>
+#include <memory>
 #include <new>
 #include <random>
 #include <set>
+#include <string>
+#include <string_view>
+
+#include "core/base/arenas.h"
 
 namespace {
 std::atomic<std::uint64_t> allocated{0};  // on the heap, in this process
@@ -246,6 +252,111 @@ TEST(MeshHistory, MemoryIsThatOfTheHeap) {
     EXPECT_GE(counted, 0.9 * held) << vertices;
     EXPECT_LE(counted, 1.1 * held) << vertices;
   }
+}
+
+// The boundary of a tetrahedron, after a detour, so that rows do not come in lexicographic order.
+std::unique_ptr<MeshHistory> Tetrahedron() {
+  auto history = std::make_unique<MeshHistory>(kDimension, kAmbient);
+  core::MeshDelta corners = Delta(1, 0, 4, {{1, 2, 3}, {0, 1, 2}, {0, 2, 3}}, {});
+  corners.points << 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1;
+  EXPECT_TRUE(history->Append(corners).ok());
+  EXPECT_TRUE(history->Append(Delta(2, 4, 0, {{0, 1, 3}, {0, 1, 2}}, {{0, 1, 2}})).ok());
+  return history;
+}
+
+// With normals outwards, by hand: 0 is the origin.
+const State kOutwards{{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+
+bool IsTurned(const core::Orientation& orientation, std::size_t i) {
+  return (orientation.turned[i / 8] >> (i % 8) & 1) != 0;
+}
+
+// What a download of the newest revision says, in parts.
+State Oriented(const MeshHistory& history, std::size_t max_bytes) {
+  State state;
+  MeshHistory::Cursor cursor = history.BeginAt(history.revision(), 0);
+  for (DeltaPart part; !part.complete;) {
+    part = history.Next(&cursor, max_bytes);
+    for (std::size_t i = 0; 3 * i < part.added.size(); ++i) {
+      Triangle row(part.added.begin() + 3 * i, part.added.begin() + 3 * i + 3);
+      if (IsTurned(*part.orientation, i)) std::swap(row[1], row[2]);
+      state.insert(row);
+    }
+  }
+  return state;
+}
+
+TEST(MeshHistory, TellsTheOrientationOfTheLastRevisionAlone) {
+  const auto history = Tetrahedron();
+  EXPECT_FALSE(history->orientation());
+  MeshHistory::Cursor early = history->BeginAt(2, 0);
+  history->Orient();
+  ASSERT_TRUE(history->orientation());
+  const std::vector<Triangle> sorted{{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}};
+  State state;
+  for (std::size_t i = 0; i < sorted.size(); ++i) {
+    Triangle row = sorted[i];
+    if (IsTurned(*history->orientation(), i)) std::swap(row[1], row[2]);
+    state.insert(row);
+  }
+  EXPECT_EQ(state, kOutwards);
+  for (const std::size_t bytes : {1, 60, 1000}) EXPECT_EQ(Oriented(*history, bytes), kOutwards);
+  EXPECT_FALSE(history->Next(&early, 1000).orientation) << "one answer through a download";
+  MeshHistory::Cursor first = history->BeginAt(1, 0), change = history->Begin(0);
+  EXPECT_FALSE(history->Next(&first, 1000).orientation);
+  EXPECT_FALSE(history->Next(&change, 1000).orientation);
+  EXPECT_FALSE(history->Append(Delta(3, 4, 0, {}, {{0, 1, 2}})).ok()) << "it was the last";
+}
+
+TEST(MeshHistory, AnInterruptedOrientationIsNone) {
+  const auto history = Tetrahedron();
+  core::Interruption interruption;
+  interruption.Raise();
+  EXPECT_FALSE(core::WithThreads(1, interruption, [&] { history->Orient(); }));
+  EXPECT_FALSE(history->orientation());
+}
+
+// What was written, and what is read back from it.
+struct Written {
+  std::string bytes;
+  explicit Written(const MeshHistory& history) {
+    history.Write([this](const void* data, std::size_t size) {
+      bytes.append(static_cast<const char*>(data), size);
+      return true;
+    });
+  }
+  core::Expected<std::unique_ptr<MeshHistory>> Read() const {
+    return MeshHistory::Read(
+        kDimension, kAmbient,
+        [left = std::string_view(bytes)](void* data, std::size_t size) mutable {
+          if (left.size() < size) return false;
+          std::memcpy(data, left.data(), size);
+          left.remove_prefix(size);
+          return true;
+        });
+  }
+};
+
+TEST(MeshHistory, IsReadBackWithItsOrientation) {
+  const auto history = Tetrahedron();
+  auto read = Written(*history).Read();
+  ASSERT_TRUE(read);
+  EXPECT_FALSE((*read)->orientation());
+  history->Orient();
+  Written written(*history);
+  read = written.Read();
+  ASSERT_TRUE(read);
+  EXPECT_EQ((*read)->orientation(), history->orientation());
+  EXPECT_EQ(Oriented(**read, 30), kOutwards);
+  written.bytes.pop_back();
+  EXPECT_FALSE(written.Read()) << "a byte is missing";
+
+  MeshHistory fan(kDimension, kAmbient);
+  ASSERT_TRUE(fan.Append(Delta(1, 0, 5, {{0, 1, 2}, {0, 1, 3}, {0, 1, 4}}, {})).ok());
+  fan.Orient();
+  read = Written(fan).Read();
+  ASSERT_TRUE(read && (*read)->orientation());
+  EXPECT_FALSE((*read)->orientation()->orientable);
 }
 
 }  // namespace

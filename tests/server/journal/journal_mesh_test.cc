@@ -61,6 +61,10 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
                      part.points.size() * sizeof(double));
         bytes.append(reinterpret_cast<const char*>(part.added.data()),
                      part.added.size() * sizeof(std::uint32_t));
+        EXPECT_EQ(part.orientation.has_value(),
+                  revision == history.revision() && !part.added.empty());
+        if (part.orientation)
+          bytes.append(part.orientation->turned.begin(), part.orientation->turned.end());
       }
     }
     return revisions;

@@ -1,8 +1,13 @@
 // Reading a mesh in parts, and watching one that is not as it was.
 
+#include <Eigen/LU>
 #include <algorithm>
+#include <array>
+#include <cstring>
 #include <filesystem>
 #include <limits>
+#include <set>
+#include <vector>
 
 #include "tests/server/support/live_server.h"
 
@@ -33,6 +38,8 @@ class LiveDownloadTest : public LiveServer {
       EXPECT_EQ(message.first_vertex(), std::min(part->next, message.vertices()));
       part->points += message.points().data();
       part->cells += message.cells().data();
+      const bool is_last = message.revision() == Get(name).revision();
+      EXPECT_TRUE(is_last || !message.has_orientation()) << "of an earlier revision";
       part->revision = message.revision();
       part->vertices = message.vertices();
       part->simplices = message.simplices();
@@ -80,6 +87,76 @@ TEST_F(LiveDownloadTest, AMeshIsReadWholeOrResumedAnywhere) {
     EXPECT_TRUE(whole.cells.ends_with(rest.cells));
     EXPECT_TRUE(position > whole.vertices || rest.cells == whole.cells);
   }
+}
+
+// The triangles of the whole mesh, as its Orientation turns them.
+using Oriented = std::set<std::array<std::uint32_t, 3>>;
+void Turn(const std::string& rows, const std::string& turned, Oriented* oriented) {
+  for (std::size_t i = 0; 12 * i < rows.size(); ++i) {
+    std::array<std::uint32_t, 3> row;
+    std::memcpy(row.data(), rows.data() + 12 * i, 12);
+    const auto byte = static_cast<unsigned char>(turned.at(i / 8));
+    if ((byte >> (i % 8) & 1) != 0) std::swap(row[1], row[2]);
+    oriented->insert(row);
+  }
+}
+
+// That downloads and watches tell the same, and that it is right: normals of the sphere, seen from
+// its centre, point outwards.
+TEST_F(LiveDownloadTest, AMeshThatIsOverComesWithItsOrientation) {
+  Start();
+  const std::string name = MeshSphere(0.1);
+  Oriented downloaded;
+  std::vector<double> points;
+  {
+    grpc::ClientContext context;
+    v1::DownloadMeshRequest request;
+    request.set_name(name);
+    const auto reader = stub_->DownloadMesh(&context, request);
+    v1::DownloadMeshResponse part;
+    while (reader->Read(&part)) {
+      const std::size_t known = points.size();
+      points.resize(known + part.points().data().size() / 8);
+      std::memcpy(points.data() + known, part.points().data().data(), part.points().data().size());
+      if (part.cells().data().empty()) continue;
+      ASSERT_TRUE(part.orientation().orientable());
+      Turn(part.cells().data(), part.orientation().turned(), &downloaded);
+    }
+    EXPECT_TRUE(reader->Finish().ok());
+  }
+  EXPECT_EQ(downloaded.size(), Get(name).report().counts().simplices());
+  for (const auto& row : downloaded) {
+    Eigen::Matrix3d corners;
+    for (int i = 0; i < 3; ++i) corners.col(i) = Eigen::Map<Eigen::Vector3d>(&points[3 * row[i]]);
+    ASSERT_GT(corners.determinant(), 0);
+  }
+
+  Oriented sorted, watched;
+  for (auto row : downloaded) {
+    std::sort(row.begin(), row.end());
+    sorted.insert(row);
+  }
+  std::string rows, turned;
+  for (const auto& row : sorted) rows.append(reinterpret_cast<const char*>(row.data()), 12);
+  for (const bool progress_only : {false, true}) {
+    grpc::ClientContext context;
+    v1::WatchMeshRequest request;
+    request.set_name(name);
+    request.set_progress_only(progress_only);
+    const auto reader = stub_->WatchMesh(&context, request);
+    v1::WatchMeshResponse event;
+    while (reader->Read(&event)) {
+      EXPECT_TRUE(!event.has_delta() || turned.empty()) << "after the last delta";
+      if (!event.has_orientation()) continue;
+      EXPECT_FALSE(progress_only);
+      EXPECT_EQ(event.orientation().first_simplex(), 8 * turned.size());
+      turned += event.orientation().turned();
+    }
+    EXPECT_TRUE(event.has_final());
+    EXPECT_TRUE(reader->Finish().ok());
+  }
+  Turn(rows, turned, &watched);
+  EXPECT_EQ(watched, downloaded);
 }
 
 TEST_F(LiveDownloadTest, AnEarlierRevisionCanStillBeRead) {
