@@ -1,7 +1,4 @@
-//! A directory in which one mesh outlives the processes that make it:
-//!
-//! - `mesh`: the mesh's name on the private server, and, on the next line, what is meshed
-//! - `server/`: that server's --data-dir
+//! A directory in which one mesh outlives the processes that make it: clients/shared/checkpoint.toml.
 
 use std::fs;
 use std::io::{self, Read, Write};
@@ -16,14 +13,13 @@ use crate::client::Client;
 use crate::error::{Error, Kind};
 use crate::proto::{Mesh as MeshInfo, MeshSpec};
 use crate::server::{Server, ServerOptions};
-
-const LAST_SERVER: Duration = Duration::from_secs(20); // that of a killed process may take to end
+use crate::shared::checkpoint as layout;
 
 pub struct Checkpoint<'a>(pub &'a Path);
 
 impl Checkpoint<'_> {
     fn record(&self) -> PathBuf {
-        self.0.join("mesh")
+        self.0.join(layout::RECORD)
     }
 
     fn wrong(&self, what: &str) -> Error {
@@ -35,17 +31,18 @@ impl Checkpoint<'_> {
         let made = fs::DirBuilder::new().recursive(true).mode(0o700).create(self.0);
         made.map_err(|error| self.wrong(&format!("cannot be made: {error}")))?;
         self.insist_on_own()?;
-        if self.0.join("mesh.json").exists() {
+        if self.0.join(layout::PYTHON_RECORD).exists() {
             return Err(self.wrong("is of the Python client: take another directory"));
         }
-        let data = self.0.join("server").display().to_string();
-        let flags = ["--data-dir", &data, "--keep-finished-seconds", "31536000"].map(String::from);
+        let data = self.0.join(layout::SERVER).display().to_string();
+        let kept = layout::KEEP_FINISHED_SECONDS.to_string();
+        let flags = ["--data-dir", &data, "--keep-finished-seconds", &kept].map(String::from);
         let options = ServerOptions { flags: flags.to_vec(), ..Default::default() };
         let begin = Instant::now();
         loop {
             match Server::start(&options) {
                 Err(error) if error.message.contains("another server uses") => {
-                    if begin.elapsed() > LAST_SERVER {
+                    if begin.elapsed().as_secs_f64() > layout::LAST_SERVER_SECONDS {
                         let message = format!(
                             "another process is meshing in the checkpoint {}: wait for its end, or take \
                              another directory",
@@ -106,12 +103,15 @@ impl Checkpoint<'_> {
 
     /// The mesh that is there, or a new one.
     pub fn declare(&self, client: &Client, spec: MeshSpec) -> Result<MeshInfo, Error> {
-        let wanted = MeshSpec { label: String::new(), ..spec.clone() }.encode_to_vec();
+        let wanted = MeshSpec { label: String::new(), ..spec.clone() };
         let unreadable = |error: io::Error| self.wrong(&format!("cannot be used: {error}"));
         let kept = self.read_own()?;
         let mut parts = kept.splitn(2, |&byte| byte == b'\n');
-        let name = parts.next().unwrap_or_default();
-        if !name.is_empty() && parts.next() != Some(&wanted[..]) {
+        let first = parts.next().unwrap_or_default();
+        // What may follow the name is of clients that choose epsilon.
+        let name = first.split(|&byte| byte == b' ').next().unwrap_or_default();
+        let same = |bytes| MeshSpec::decode(bytes).is_ok_and(|there: MeshSpec| there == wanted);
+        if !name.is_empty() && !parts.next().is_some_and(same) {
             return Err(
                 self.wrong("is of a mesh of another specification: take another directory, or remove it")
             );
@@ -128,8 +128,8 @@ impl Checkpoint<'_> {
             return Ok(info);
         }
         let info = client.create_from(spec)?;
-        let draft = self.record().with_extension("new"); // all of it or nothing
-        let record = [info.name.as_bytes(), b"\n", &wanted].concat();
+        let draft = self.0.join(layout::DRAFT); // all of it or nothing
+        let record = [info.name.as_bytes(), b"\n", &wanted.encode_to_vec()].concat();
         let write = || {
             match fs::remove_file(&draft) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),

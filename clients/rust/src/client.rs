@@ -20,10 +20,10 @@ use crate::proto::{
 };
 use crate::retry::{Flag, Outage, Patience};
 use crate::server::Server;
+use crate::shared::reconnect;
 use crate::spec::MeshOptions;
 use crate::worker::{Worker, WorkerOptions};
 
-const CALL_TIME: Duration = Duration::from_secs(30);
 const LARGEST_MESSAGE: usize = 64 << 20;
 const STREAM_WINDOW: u32 = 4 << 20; // so that the next chunk comes while one is answered
 
@@ -42,12 +42,12 @@ pub struct ClientOptions {
 }
 
 impl Default for ClientOptions {
-    /// No credentials, 180 s, 4 s, standard error.
+    /// No credentials, the waits of clients/shared/reconnect.toml, standard error.
     fn default() -> Self {
         ClientOptions {
             credentials: Credentials::default(),
-            reconnect: Duration::from_secs(180),
-            keepalive: Duration::from_secs(4),
+            reconnect: Duration::from_secs_f64(reconnect::GIVE_UP),
+            keepalive: Duration::from_secs_f64(reconnect::KEEPALIVE),
             on_outage: Box::new(|said| eprintln!("stellate: {said}")),
         }
     }
@@ -95,7 +95,7 @@ impl Client {
             // A private server needs no pings: its end shows at once.
             endpoint = endpoint
                 .http2_keep_alive_interval(options.keepalive)
-                .keep_alive_timeout(2 * options.keepalive)
+                .keep_alive_timeout(options.keepalive.mul_f64(reconnect::PING_PATIENCE))
                 .keep_alive_while_idle(true);
         }
         if let Some(config) = tls {
@@ -137,7 +137,9 @@ impl Client {
         F: Future<Output = Result<Response<T>, Status>>,
     {
         loop {
-            let limited = tokio::time::timeout(CALL_TIME, attempt(self.stub.clone())).await;
+            let limited =
+                tokio::time::timeout(Duration::from_secs_f64(reconnect::CALL), attempt(self.stub.clone()))
+                    .await;
             let late = |_| Status::unavailable("the server did not answer in time");
             match limited.map_err(late).and_then(|answer| answer) {
                 Ok(reply) => {

@@ -28,6 +28,12 @@ mod spec;
 mod wire;
 mod worker;
 
+/// The tables of clients/shared.
+#[allow(dead_code)] // the pauses of gRPC's own are not to be set here
+mod shared {
+    include!(concat!(env!("OUT_DIR"), "/shared.rs"));
+}
+
 /// The protocol's own messages.
 #[allow(missing_docs, clippy::doc_lazy_continuation, clippy::doc_overindented_list_items)]
 pub mod proto {

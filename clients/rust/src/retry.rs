@@ -9,9 +9,7 @@ use tokio::sync::watch;
 use tonic::{Code, Status};
 
 use crate::error::{Error, Kind};
-
-const FIRST_PAUSE: Duration = Duration::from_millis(100); // doubled each time
-const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+use crate::shared::reconnect;
 
 /// Whether the server, or the way to it, was lost, so that the same call may succeed later. What a
 /// server drops arrives as CANCELLED where this side cancelled nothing.
@@ -125,11 +123,12 @@ impl<'a> Outage<'a> {
             }
             return Err(ours);
         }
-        let full = FIRST_PAUSE.saturating_mul(1 << self.attempts.min(10)).min(LONGEST_PAUSE);
+        let longer = reconnect::PAUSE_GROWTH.powf(f64::from(self.attempts));
+        let full = Duration::from_secs_f64((reconnect::FIRST_PAUSE * longer).min(reconnect::LONGEST_PAUSE));
         self.attempts += 1;
         // Shortened at random: the clients of a server that comes back do not all come at once.
         let chance = RandomState::new().build_hasher().finish() as f64 / u64::MAX as f64;
-        let pause = full.mul_f64(1.0 - chance / 2.0).min(most - gone);
+        let pause = full.mul_f64(1.0 - reconnect::PAUSE_JITTER * chance).min(most - gone);
         tokio::select! {
             () = self.stopped.wait() => Err(ours),
             () = tokio::time::sleep(pause) => Ok(()),

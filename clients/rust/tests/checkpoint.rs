@@ -73,6 +73,11 @@ fn goes_on() {
     let queries = straight.report.and_then(|report| report.counts).unwrap().queries;
     assert!(first.0.into_inner() > 0 && (second.0.into_inner() as u64) < queries);
 
+    // The record of another language's client: it chose epsilon, says why, and writes out an empty label.
+    let record = fs::read(folder.join("mesh")).unwrap();
+    let end = record.iter().position(|&byte| byte == b'\n').unwrap();
+    let theirs = [&record[..end], b" 2 a quarter of the reach", &record[end..], b"R\0"].concat();
+    fs::write(folder.join("mesh"), theirs).unwrap();
     let again = kept(&third, 0.05, &folder).unwrap();
     assert!(again.certified());
     assert_eq!((third.0.into_inner(), counts(&again)), (0, counts(&whole)));
