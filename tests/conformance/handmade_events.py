@@ -24,6 +24,14 @@ def delta(revision, first=0, points=(), added=(), removed=(), complete=True, wal
     return Event(delta=stellate_pb2.DeltaChunk(delta=body, complete=complete))
 
 
+def orientation(turned=b"", first=0, orientable=True) -> Event:
+    return Event(
+        orientation=mesh_pb2.Orientation(
+            orientable=orientable, first_simplex=first, turned=bytes(turned)
+        )
+    )
+
+
 def final(vertices=0, simplices=0, state="SUCCEEDED", termination="CONVERGED", level="SAMPLED"):
     """`state` and the others may be numbers."""
 

@@ -17,7 +17,7 @@ sys.path.insert(0, str(_ROOT / "tests" / "clients" / "python"))
 import grpc  # noqa: E402
 import shapes  # noqa: E402
 import stellate  # noqa: E402
-from handmade_events import Event, delta, final  # noqa: E402
+from handmade_events import Event, delta, final, orientation  # noqa: E402
 from python_client import named  # noqa: E402
 from stellate import manifolds  # noqa: E402
 from stellate._generated import errors_pb2, mesh_pb2, stellate_pb2  # noqa: E402
@@ -186,6 +186,25 @@ def write_streams() -> None:
         "empty", "cancelled before there was anything", [(0, [final(0, 0, "CANCELLED", "CANCELLED", "REFUSED")], "OK")],
         nothing, ends=("CANCELLED", "CANCELLED", "REFUSED"), revision=0,
     )  # fmt: skip
+    ring = shuffled(shapes.polygon(20), 2)
+    bits = bytes.fromhex(turned(ring))
+    grown = delta(1, 0, ring.points, ring.simplices)
+    made(
+        "oriented", "an orientation in chunks, torn, and one that is overtaken by a change",
+        [(0, [grown, orientation(bits[:1]), orientation(bits[1:2], 8)], "UNAVAILABLE"),
+         (1, [delta(2, removed=ring.simplices[:1]), orientation(b"\0\0\0"),
+              delta(3, added=ring.simplices[:1]), orientation(bits[:2]),
+              orientation(bits[2:], 16), final(20, 20)], "OK")],
+        ring, revision=3,
+    )  # fmt: skip
+    made(
+        "not-oriented", "a mesh that has no orientation",
+        [(0, [whole, orientation(orientable=False), end], "OK")],
+    )  # fmt: skip
+    refused("few-bits", "an orientation of too few simplices",
+            [grown, orientation(bits[:1]), final(20, 20)])  # fmt: skip
+    refused("bits-missing", "an orientation that leaves simplices out",
+            [grown, orientation(bits[:1]), orientation(bits[2:], 16), final(20, 20)])  # fmt: skip
     refused("backwards", "a revision that is not after the last", [whole, whole, end])
     refused(
         "gap", "vertices that do not follow on those before", [delta(1, 5, TRIANGLE, EDGES), end]
@@ -233,6 +252,14 @@ def shuffled(mesh: stellate.Mesh, seed: int) -> stellate.Mesh:
     return stellate.Mesh(points, rows[np.lexsort(rows.T[::-1])])
 
 
+def turned(mesh: stellate.Mesh) -> str | None:
+    """As Orientation.turned, in hexadecimal digits; None: not orientable."""
+    oriented = mesh.oriented_simplices()
+    if oriented is None:
+        return None
+    return np.packbits(oriented[:, -1] < oriented[:, -2], bitorder="little").tobytes().hex()
+
+
 def together(*meshes: stellate.Mesh) -> stellate.Mesh:
     points = np.concatenate([mesh.points for mesh in meshes])
     first = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
@@ -262,7 +289,7 @@ def write_meshes() -> None:
         "polygon": (shuffled(shapes.polygon(7), 1), "a curve of the plane"),
         "knot": (shuffled(shapes.polygon(6, 3), 5), "a curve of space: no hypersurface"),
         "numbers": (odd, "minus zero, a subnormal, large and small"),
-        "plane": (shapes.projective_plane(3), "not orientable"),
+        "plane": (together(shapes.projective_plane(3)), "not orientable"),
         "fan": (fan, "three triangles at an edge"),
         "clifford": (stellate.Mesh(np.eye(6, 4) + 0.25, shapes.projective_plane(4).simplices), "R^4"),
         "solid": (tetrahedra, "tetrahedra of space"),
@@ -271,6 +298,8 @@ def write_meshes() -> None:
     entries = []
     for name, (mesh, about) in cases.items():
         entry = {"name": name, "about": about, "mesh": f"meshes/{name}.txt", "files": {}}
+        if (bits := turned(mesh)) is not None:
+            entry["turned"] = bits
         mesh.save(_HERE / entry["mesh"])
         for ending in ("off", "obj", "ply", "msh", "stl"):
             if name == "solid" and ending != "msh":

@@ -31,7 +31,8 @@ standard input, one after the other, each with one line of its standard output:
   serve MESH MANIFOLD    serves the mesh until it is over: "over STATE"
   watch MESH PATH K D    watches the mesh, of dimension K in R^D, to its end and saves it to PATH, also if
                          it was cancelled: "mesh REVISION TERMINATION LEVEL". Of a manifold with
-                         boundary also PATH.walls: of each vertex a line, its walls as bits
+                         boundary also PATH.walls: of each vertex a line, its walls as bits. PATH
+                         ends in .txt, or in .obj: oriented as the server says
   create LABEL           declares the torus with that label and epsilon 0.5: "created MESH";
   create LABEL seeds     with a seed in place of the box; LABEL token=TOKEN: with that token
   create LABEL walls     declares the lune

@@ -7,8 +7,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import grpc
+from stellate import load_txt
 from stellate._generated import mesh_pb2
 from stellate._generated import stellate_pb2 as pb
+from stellate._wire.arrays import to_wire
 
 from .files import carried, entries, recorded
 from .scenario import Refusal, Scenario, agree
@@ -115,6 +117,7 @@ class Saved(Scenario):
     def __init__(self, entry: Any, ending: str, folder: pathlib.Path, *arguments: Any) -> None:
         self.name, self.rules = "files", (f"{entry['name']}.{ending}",)
         super().__init__(*arguments)
+        self.entry = entry
         self.given = folder / f"{entry['name']}-given.txt"
         self.given.write_bytes(carried(entry["mesh"]))
         self.path = folder / f"{entry['name']}-saved.{ending}"
@@ -126,6 +129,40 @@ class Saved(Scenario):
 
     def hear(self, answer: str) -> None:
         wanted = "saved" if self.file else "error saveerror"
+        if agree(answer, wanted) and self.file:
+            self.judge(self.rules[0], *same_file(self.path, self.file))
+        self.judge(self.rules[0], agree(answer, wanted), f"`{answer}`", f"`{wanted}`")
+
+
+class Drawn(Saved, Declared):
+    """A mesh as a file of oriented simplices, as a watch tells how they are oriented."""
+
+    @property
+    def line(self) -> str:
+        mesh = load_txt(self.given)
+        self.spec.dimension, self.spec.ambient_dimension = mesh.dimension, mesh.ambient_dimension
+        return f"watch {self.mesh} {self.path} {mesh.dimension} {mesh.ambient_dimension}"
+
+    def watch(self, request: pb.WatchMeshRequest) -> Iterator[pb.WatchMeshResponse]:
+        mesh, turned = load_txt(self.given), self.entry.get("turned")
+        delta = mesh_pb2.MeshDelta(revision=1)
+        delta.points.CopyFrom(to_wire(mesh.points))
+        delta.added.shape[:] = mesh.simplices.shape
+        delta.added.data = mesh.simplices.astype("<u4").tobytes()
+        yield pb.WatchMeshResponse(delta=pb.DeltaChunk(delta=delta, complete=True))
+        yield pb.WatchMeshResponse(
+            orientation=mesh_pb2.Orientation(
+                orientable=turned is not None, turned=bytes.fromhex(turned or "")
+            )
+        )
+        end = mesh_pb2.Mesh(name=self.mesh, state=mesh_pb2.MESH_STATE_SUCCEEDED)
+        end.report.termination = mesh_pb2.TERMINATION_CONVERGED
+        end.report.certificate.level = mesh_pb2.CERTIFICATE_LEVEL_SAMPLED
+        yield pb.WatchMeshResponse(final=end)
+        self.over.set()
+
+    def hear(self, answer: str) -> None:
+        wanted = "mesh 1 CONVERGED SAMPLED"
         if agree(answer, wanted) and self.file:
             self.judge(self.rules[0], *same_file(self.path, self.file))
         self.judge(self.rules[0], agree(answer, wanted), f"`{answer}`", f"`{wanted}`")
@@ -143,4 +180,5 @@ def file_scenarios(folder: pathlib.Path, *arguments: Any) -> Iterator[Scenario]:
         told = {"txt", *entry["files"], *entry.get("refused", ())}
         # What every client writes; the rest `stellate download` does.
         for ending in sorted(told & {"txt", "obj"}):
-            yield Saved(entry, ending, folder, *arguments)
+            is_drawn = ending == "obj" and "obj" in entry["files"]
+            yield (Drawn if is_drawn else Saved)(entry, ending, folder, *arguments)

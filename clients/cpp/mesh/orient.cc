@@ -128,6 +128,14 @@ SimplexMatrix OrientedSimplices(const SimplexMatrix& simplices) {
 }
 
 SimplexMatrix OrientedSimplices(const Mesh& mesh) {
+  if (mesh.orientation) {
+    SimplexMatrix told = mesh.simplices;
+    for (Eigen::Index j = 0; j < told.cols() && mesh.orientation->orientable; ++j) {
+      const auto s = static_cast<size_t>(j);
+      if ((mesh.orientation->turned[s / 8] >> (s % 8) & 1) != 0) Turn(told.col(j));
+    }
+    return told;
+  }
   std::vector<Eigen::Index> component;
   SimplexMatrix oriented = Orient(mesh.simplices, &component);
   const int d = mesh.ambient_dimension();

@@ -23,7 +23,8 @@ class FixedSet final : public SimplexSet {
     return nodes_.capacity() * sizeof(Node) + first_of_.capacity() * sizeof(first_of_[0]);
   }
 
-  bool Add(const char* ids, Eigen::Index count, std::uint64_t vertices) override {
+  bool Add(const char* ids, Eigen::Index count, std::uint64_t vertices,
+           const char* turned) override {
     for (Eigen::Index i = 0; i < count; ++i) {
       const Simplex simplex = Read(ids, i);
       if (*std::max_element(simplex.begin(), simplex.end()) >= vertices) return false;
@@ -36,6 +37,10 @@ class FixedSet final : public SimplexSet {
         free_ = nodes_[place].next;
       }
       nodes_[place] = {simplex, first_of_[simplex[0]]};
+      if (turned != nullptr) {
+        turned_.resize(nodes_.size());
+        turned_[place] = (turned[i / 8] >> (i % 8) & 1) != 0;
+      }
       first_of_[simplex[0]] = place;
       ++size_;
     }
@@ -58,22 +63,27 @@ class FixedSet final : public SimplexSet {
     return true;
   }
 
-  std::optional<SimplexMatrix> Sorted() const override {
-    SimplexMatrix simplices(N, static_cast<Eigen::Index>(size_));
-    Eigen::Index column = 0;
-    std::vector<Simplex> star;
+  std::optional<Simplices> Sorted() const override {
+    Simplices sorted{SimplexMatrix(N, static_cast<Eigen::Index>(size_)), {}};
+    if (!turned_.empty()) sorted.turned.assign((size_ + 7) / 8, 0);
+    size_t column = 0;
+    std::vector<std::pair<Simplex, bool>> star;
     for (const std::uint32_t first : first_of_) {
       star.clear();
       for (std::uint32_t s = first; s != kNone; s = nodes_[s].next) {
-        star.push_back(nodes_[s].simplex);
+        star.emplace_back(nodes_[s].simplex, s < turned_.size() && turned_[s]);
       }
       std::sort(star.begin(), star.end());
-      if (std::adjacent_find(star.begin(), star.end()) != star.end()) return std::nullopt;
-      for (const Simplex& simplex : star) {
-        std::copy(simplex.begin(), simplex.end(), simplices.col(column++).begin());
+      for (size_t i = 0; i < star.size(); ++i) {
+        const Simplex& simplex = star[i].first;
+        if (i > 0 && AreEqual(simplex, star[i - 1].first)) return std::nullopt;
+        std::copy(simplex.begin(), simplex.end(),
+                  sorted.columns.col(static_cast<Eigen::Index>(column)).begin());
+        if (star[i].second) sorted.turned[column / 8] |= static_cast<std::uint8_t>(1 << column % 8);
+        ++column;
       }
     }
-    return simplices;
+    return sorted;
   }
 
  private:
@@ -99,6 +109,7 @@ class FixedSet final : public SimplexSet {
 
   std::vector<std::uint32_t> first_of_;  // by vertex
   std::vector<Node> nodes_;
+  std::vector<bool> turned_;    // by node, as far as any was
   std::uint32_t free_ = kNone;  // a list of its own
   size_t size_ = 0;
 };
@@ -159,6 +170,7 @@ void DeltaMesh::Reset() {
   ForgetPending();
   coordinates_.clear();
   boundary_.clear();
+  orientation_.reset();
   simplex_set_ = MakeSimplexSet(k_);
 }
 
@@ -170,6 +182,7 @@ Expected<void> DeltaMesh::Absorb(v1::DeltaChunk&& chunk) {
   const std::size_t bytes = chunk.ByteSizeLong();
   if (Expected<void> ok = CheckRoom(bytes); !ok) return ok;
   pending_bytes_ += bytes;
+  orientation_.reset();
   pending_.push_back(std::move(*chunk.mutable_delta()));
   if (!chunk.complete()) return {};
   pending_bytes_ = 0;
@@ -188,12 +201,30 @@ Expected<void> DeltaMesh::Add(v1::DownloadMeshResponse&& part) {
   delta.mutable_added()->Swap(part.mutable_cells());
   delta.mutable_boundary_vertices()->Swap(part.mutable_boundary_vertices());
   delta.mutable_boundary_walls()->Swap(part.mutable_boundary_walls());
-  if (delta.added().shape_size() > 0) parts_simplices_ += delta.added().shape(0);
-  return Apply(delta);
+  const std::uint64_t cells = delta.added().shape_size() > 0 ? delta.added().shape(0) : 0;
+  const v1::Orientation& orientation = part.orientation();
+  const bool has_bits = orientation.orientable();
+  if (has_bits && orientation.turned().size() != (cells + 7) / 8)
+    return tl::unexpected(BrokenProtocol("an orientation that does not fit its simplices"));
+  if (parts_simplices_ == 0 && part.has_orientation()) orientation_ = {has_bits, {}};
+  if (cells > 0 && !part.has_orientation()) orientation_.reset();
+  parts_simplices_ += cells;
+  return Apply(delta, has_bits ? orientation.turned().data() : nullptr);
+}
+
+Expected<void> DeltaMesh::Orient(const v1::Orientation& chunk) {
+  if (chunk.first_simplex() == 0) orientation_ = {chunk.orientable(), {}};
+  if (!orientation_ || chunk.first_simplex() != 8 * orientation_->turned.size())
+    return tl::unexpected(BrokenProtocol("an orientation that is out of order"));
+  if (Expected<void> ok = CheckRoom(orientation_->turned.size() + chunk.turned().size()); !ok)
+    return ok;
+  orientation_->turned.insert(orientation_->turned.end(), chunk.turned().begin(),
+                              chunk.turned().end());
+  return {};
 }
 
 // Removes first: a simplex that goes and comes back stands in both.
-Expected<void> DeltaMesh::Apply(const v1::MeshDelta& delta) {
+Expected<void> DeltaMesh::Apply(const v1::MeshDelta& delta, const char* turned) {
   const size_t known = coordinates_.size();
   if (Expected<void> ok =
           AppendNumbers(delta.points(), {static_cast<std::uint32_t>(d_)}, &coordinates_);
@@ -214,7 +245,7 @@ Expected<void> DeltaMesh::Apply(const v1::MeshDelta& delta) {
   if (!simplex_set_->Remove(delta.removed().data().data(), *removed)) {
     return tl::unexpected(BrokenProtocol("the removal of a simplex that is not there"));
   }
-  if (!simplex_set_->Add(delta.added().data().data(), *added, vertices())) {
+  if (!simplex_set_->Add(delta.added().data().data(), *added, vertices(), turned)) {
     return tl::unexpected(BrokenProtocol("a simplex with a vertex that it never sent"));
   }
   return {};
@@ -231,12 +262,18 @@ Expected<void> DeltaMesh::NoteWalls(const v1::MeshDelta& delta) {
 }
 
 Expected<Mesh> DeltaMesh::Take() const {
-  std::optional<SimplexMatrix> simplices = simplex_set_->Sorted();
+  std::optional<SimplexSet::Simplices> simplices = simplex_set_->Sorted();
   if (!simplices) return tl::unexpected(BrokenProtocol("a simplex that was there already"));
   Mesh mesh;
   mesh.points = Eigen::Map<const Eigen::MatrixXd>(
       coordinates_.data(), d_, static_cast<Eigen::Index>(coordinates_.size()) / d_);
-  mesh.simplices = std::move(*simplices);
+  mesh.simplices = std::move(simplices->columns);
+  mesh.orientation = orientation_;
+  if (orientation_ && parts_simplices_ > 0) mesh.orientation->turned = std::move(simplices->turned);
+  const auto count = static_cast<size_t>(mesh.simplices.cols());
+  if (orientation_ && orientation_->orientable &&
+      mesh.orientation->turned.size() != (count + 7) / 8)
+    return tl::unexpected(BrokenProtocol("an orientation that does not fit its simplices"));
   if (!boundary_.empty()) mesh.walls.assign(vertices(), 0);
   for (const auto& [vertex, walls] : boundary_) mesh.walls[vertex] = walls;
   return mesh;

@@ -21,11 +21,18 @@ class SimplexSet {
   virtual std::size_t bytes() const = 0;
   // `count` simplices of k+1 uint32 each; `ids` need not be aligned. False, and the set is spoilt,
   // where a vertex is not below `vertices`.
-  virtual bool Add(const char* ids, Eigen::Index count, std::uint64_t vertices) = 0;
+  // `turned`: a bit for each, as Orientation has them; null: none is.
+  virtual bool Add(const char* ids, Eigen::Index count, std::uint64_t vertices,
+                   const char* turned = nullptr) = 0;
   // False, and the set is spoilt, where one is not there.
   virtual bool Remove(const char* ids, Eigen::Index count) = 0;
-  // (k+1) x m, columns in ascending order; nothing where one is there twice.
-  virtual std::optional<SimplexMatrix> Sorted() const = 0;
+  // (k+1) x m, columns in ascending order, and which of them are turned; nothing where one is there
+  // twice.
+  struct Simplices {
+    SimplexMatrix columns;
+    std::vector<std::uint8_t> turned;
+  };
+  virtual std::optional<Simplices> Sorted() const = 0;
 };
 
 // Null unless 1 <= k <= kMaxSimplexDimension.
@@ -50,6 +57,8 @@ class DeltaMesh {
   // Takes a part of a download, which is never sent again. Errors: what does not follow on the
   // parts before it.
   Expected<void> Add(v1::DownloadMeshResponse&& part);
+  // Takes a chunk of the orientation of the last revision. Errors: what does not follow.
+  Expected<void> Orient(const v1::Orientation& chunk);
   // Of the parts so far.
   std::uint64_t vertices() const { return coordinates_.size() / static_cast<std::size_t>(d_); }
   std::uint64_t simplices() const { return parts_simplices_; }
@@ -59,7 +68,8 @@ class DeltaMesh {
     pending_bytes_ = 0;
   }
 
-  // The mesh as of revision(). Errors: a simplex that was added twice.
+  // The mesh as of revision(). Errors: a simplex that was added twice, an orientation of fewer
+  // simplices or of more.
   Expected<Mesh> Take() const;
 
  private:
@@ -69,7 +79,7 @@ class DeltaMesh {
   static std::size_t HalfOfTheMemory();
   // With so many bytes more, which have come.
   Expected<void> CheckRoom(std::size_t more) const;
-  Expected<void> Apply(const v1::MeshDelta& delta);
+  Expected<void> Apply(const v1::MeshDelta& delta, const char* turned = nullptr);
   Expected<void> NoteWalls(const v1::MeshDelta& delta);
 
   int k_, d_;
@@ -81,6 +91,7 @@ class DeltaMesh {
   std::vector<std::pair<std::uint32_t, std::uint64_t>> boundary_;  // vertices, walls as bits
   std::unique_ptr<SimplexSet> simplex_set_;
   std::uint64_t parts_simplices_ = 0;
+  std::optional<Orientation> orientation_;  // of a download without its bits, which the set has
 };
 
 }  // namespace stellate::client

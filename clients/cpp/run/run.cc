@@ -154,6 +154,11 @@ Expected<void> Run::WatchOnce(v1::Mesh* final, grpc::Status* status) {
       }
     } else if (response.has_reset_mesh()) {
       builder_->Reset();
+    } else if (response.has_orientation()) {
+      if (auto ok = builder_->Orient(response.orientation()); !ok) {
+        context.TryCancel();
+        return ok;
+      }
     } else if (response.has_progress()) {
       if (options_.on_progress) options_.on_progress(FromProto(response.progress()));
     } else if (response.has_final()) {

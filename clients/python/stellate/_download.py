@@ -11,7 +11,8 @@ from ._files.formats import check_save
 from ._info import MeshInfo, unless_failed
 from ._mesh import Mesh, with_report
 from ._wire.arrays import from_wire, indices_from_wire
-from ._wire.delta_mesh import in_order, spread_walls, walls_from_wire
+from ._wire.delta_mesh import lexicographic, spread_walls, walls_from_wire
+from ._wire.orientation import Orientation
 from .client import Client
 from .errors import FailedPrecondition, protocol_error
 from .report import Progress
@@ -71,6 +72,8 @@ def _assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | N
     d, width = info.ambient_dimension, info.dimension + 1
     points, rows = [np.empty((0, d))], [np.empty((0, width), dtype=np.uint32)]
     boundary: list[tuple[np.ndarray, np.ndarray]] = []
+    turned: list[np.ndarray] = []  # (m,) bool, of the rows
+    orientable: bool | None = True  # None: not told of all
     vertices = simplices = 0
     parts = client.parts(info.name, revision)
     try:
@@ -80,6 +83,13 @@ def _assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | N
                 block = from_wire(part.points, -1, d)
                 cells = indices_from_wire(part.cells, -1, width)
                 boundary += walls_from_wire(part, vertices + len(block))
+                if len(cells) and not part.HasField("orientation"):
+                    orientable = None
+                elif len(cells) and orientable is not None:
+                    bits = part.orientation
+                    orientable = bits.orientable
+                    told = Orientation.from_bits(bits.orientable, bits.turned, len(cells))
+                    turned.append(told.flags(len(cells) if orientable else 0))
             except ValueError as error:
                 raise protocol_error(str(error)) from error
             if len(block) and part.first_vertex != vertices:
@@ -102,13 +112,22 @@ def _assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | N
     cells = np.concatenate(rows)
     if cells.size and int(cells.max()) >= vertices:
         raise protocol_error(f"a simplex has vertex {int(cells.max())} of {vertices} vertices")
+    order = lexicographic(cells)
+    orientation = None
+    if orientable is not None:
+        orientation = (
+            Orientation.of(np.concatenate([np.empty(0, bool), *turned])[order])
+            if orientable
+            else Orientation(False)
+        )
     last = info.end_time is not None and revision == info.revision
     mesh = Mesh(
         np.concatenate(points),
-        in_order(cells),
+        cells[order].astype(np.int64),
         None,
         info.progress if last else None,
         revision,
         spread_walls(boundary, vertices),
+        orientation,
     )
     return with_report(mesh, info.report if last else None)

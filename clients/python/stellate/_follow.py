@@ -42,6 +42,8 @@ class Following:
                         yield self.so_far()
                 elif kind == "reset_mesh":
                     growth.reset()
+                elif kind == "orientation":
+                    _sound(growth.orient, event.orientation)
                 elif kind == "progress":
                     progress = Progress.from_wire(event.progress)
                     self._note(progress)
@@ -83,8 +85,17 @@ def _sound(step: Callable[..., T], *arguments: Any) -> T:
 
 def _finished(growth: DeltaMesh, final: MeshInfo) -> FinishedMesh:
     simplices = _sound(growth.simplices)
+    orientation = _sound(growth.orientation)
     mesh = with_report(
-        Mesh(growth.points(), simplices, None, final.progress, growth.revision, growth.walls()),
+        Mesh(
+            growth.points(),
+            simplices,
+            None,
+            final.progress,
+            growth.revision,
+            growth.walls(),
+            orientation,
+        ),
         final.report,
     )
     unless_failed(mesh, final)

@@ -14,6 +14,7 @@ from . import _convert, _faces, _html, _plot, _slice, viewer
 from ._faces import Face
 from ._files import formats
 from ._files.orientation import orient, turn_outwards, turn_positive
+from ._wire.orientation import Orientation
 from .errors import UncertifiedWarning
 from .report import Progress, Report
 
@@ -35,6 +36,7 @@ class Mesh:
       revision: one for each round that changed the mesh.
       walls: of a manifold with boundary, (n,) uint64: the walls that each point lies on, wall i as
         bit i; else None.
+      orientation: how the simplices are oriented, as the server says of a mesh that is over; else None.
     """
 
     points: np.ndarray
@@ -43,6 +45,7 @@ class Mesh:
     progress: Progress | None = None
     revision: int = 0
     walls: np.ndarray | None = None
+    orientation: Orientation | None = dataclasses.field(default=None, repr=False)
 
     @property
     def boundary(self) -> tuple[Face, ...]:
@@ -82,8 +85,16 @@ class Mesh:
         """The simplices with vertices exchanged so that neighbours agree; None if not orientable.
 
         A hypersurface (k = d - 1) gets its normals outwards, component by component; simplices that
-        fill space (k = d) positive volumes.
+        fill space (k = d) positive volumes. The server says so of a mesh that is over; others are
+        oriented here.
         """
+        if self.orientation is not None:
+            if not self.orientation.orientable:
+                return None
+            told = self.simplices.copy()
+            rows = np.flatnonzero(self.orientation.flags(len(told)))
+            told[rows, -2:] = told[rows][:, [-1, -2]]
+            return told
         turned = orient(self.simplices)
         if turned is None:
             return None
@@ -264,7 +275,13 @@ def with_report(mesh: Mesh, report: Report | None) -> Mesh:
     if report is None:
         return mesh
     return FinishedMesh(
-        mesh.points, mesh.simplices, report, mesh.progress, mesh.revision, mesh.walls
+        mesh.points,
+        mesh.simplices,
+        report,
+        mesh.progress,
+        mesh.revision,
+        mesh.walls,
+        mesh.orientation,
     )
 
 

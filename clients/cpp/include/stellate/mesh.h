@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,13 @@ struct Face {
   SimplexMatrix simplices;  // (j+1) x m for a face of dimension j, in order as a mesh's
 };
 
+// How a mesh is oriented: simplex s is turned, its last two ids exchanged, where bit s % 8 of
+// turned[s / 8] is set.
+struct Orientation {
+  bool orientable = false;  // else nothing is turned
+  std::vector<std::uint8_t> turned;
+};
+
 // A simplicial k-complex in R^d.
 struct Mesh {
   Eigen::MatrixXd points;   // d x n, a vertex a column
@@ -26,6 +34,9 @@ struct Mesh {
   Report report;
   // Of a manifold with boundary, n: the walls that each point lies on, wall i as bit i; else empty.
   std::vector<std::uint64_t> walls = {};
+  // As the server says of a mesh that is over, for `simplices` as they are; else none. Clear it
+  // when you change them.
+  std::optional<Orientation> orientation = {};
 
   // The faces of a manifold with boundary, by ascending walls: the boundary's parts, one for each
   // wall, of dimension k - 1; curves where two walls meet or more; points where k walls meet; and
@@ -66,7 +77,8 @@ Expected<void> CheckSave(const std::string& path, int dimension, int ambient_dim
 // they are when the complex is not an orientable pseudomanifold.
 SimplexMatrix OrientedSimplices(const SimplexMatrix& simplices);
 // The same, and the normals of a hypersurface (k = d - 1) outwards, component by component;
-// simplices that fill space (k = d) with positive volumes.
+// simplices that fill space (k = d) with positive volumes. By mesh.orientation, where it is known;
+// meshes that grow, or that no server made, are oriented here.
 SimplexMatrix OrientedSimplices(const Mesh& mesh);
 
 }  // namespace stellate

@@ -7,6 +7,7 @@ import numpy as np
 from .._generated import mesh_pb2
 from .._generated import stellate_pb2 as pb
 from .arrays import from_wire, indices_from_wire
+from .orientation import Orientation
 
 
 def _keys(rows: np.ndarray) -> np.ndarray:
@@ -22,9 +23,9 @@ def _keys(rows: np.ndarray) -> np.ndarray:
     return keys
 
 
-def in_order(rows: np.ndarray) -> np.ndarray:
-    """A copy as int64, rows in lexicographic order."""
-    return rows[np.argsort(_keys(rows), kind="stable")].astype(np.int64)
+def lexicographic(rows: np.ndarray) -> np.ndarray:
+    """(n,) int64: the order that sorts the rows."""
+    return np.argsort(_keys(rows), kind="stable")
 
 
 def _net(rows: np.ndarray, removed: int) -> np.ndarray:
@@ -96,6 +97,8 @@ class DeltaMesh:
         self._removed: list[np.ndarray] = []
         self._removed_count = 0
         self._pending: list[mesh_pb2.MeshDelta] = []
+        self._orientable: bool | None = None  # None: not told
+        self._turned = b""
 
     def absorb(self, chunk: pb.DeltaChunk) -> bool:
         """Takes one chunk; True when a revision is complete with it.
@@ -107,6 +110,7 @@ class DeltaMesh:
         if revision <= self.revision or (self._pending and self._pending[-1].revision != revision):
             raise ValueError(f"revision {revision} is out of order")
         self._pending.append(chunk.delta)
+        self._orientable = None
         if not chunk.complete:
             return False
         pending, self._pending = self._pending, []
@@ -129,6 +133,22 @@ class DeltaMesh:
             self.settle()
         self.revision = revision
         return True
+
+    def orient(self, chunk: mesh_pb2.Orientation) -> None:
+        """Takes a chunk of the last revision's orientation. Raises: ValueError if it does not follow."""
+        if chunk.first_simplex == 0:
+            self._orientable, self._turned = chunk.orientable, b""
+        if self._orientable is None or chunk.first_simplex != 8 * len(self._turned):
+            raise ValueError(f"the orientation of simplex {chunk.first_simplex} is out of order")
+        self._turned += chunk.turned
+
+    def orientation(self) -> Orientation | None:
+        """The orientation of simplices(), once the server has told it. Raises: ValueError if it has not
+        told it of all of them."""
+        self.settle()
+        if self._orientable is None:
+            return None
+        return Orientation.from_bits(self._orientable, self._turned, len(self._rows))
 
     def forget_pending(self) -> None:
         """Drops the chunks of a revision that was cut short: it will be sent again."""
