@@ -20,6 +20,9 @@ type growingComplex struct {
 	rows           []uint32 // in lexicographic order
 	added, removed []uint32
 	pending        []*pb.MeshDelta
+	turned         []byte   // as Mesh.Turned, of the last revision; nil: not told
+	turnedRows     []uint32 // of a download
+	untold         bool     // a part of the download was not oriented
 }
 
 // absorb takes one chunk; true when a revision is complete with it. An error is a delta that does not
@@ -30,7 +33,7 @@ func (g *growingComplex) absorb(chunk *pb.DeltaChunk) (bool, error) {
 	if revision <= g.revision || (len(g.pending) > 0 && g.pending[0].GetRevision() != revision) {
 		return false, fmt.Errorf("revision %d is out of order", revision)
 	}
-	g.pending = append(g.pending, delta)
+	g.pending, g.turned = append(g.pending, delta), nil
 	if !chunk.GetComplete() {
 		return false, nil
 	}
@@ -100,6 +103,65 @@ func (g *growingComplex) addWalls(vertices []uint32, walls []uint64) error {
 		g.walls[vertex] = walls[i]
 	}
 	return nil
+}
+
+// orient takes a chunk of the orientation, which comes after the last revision.
+func (g *growingComplex) orient(chunk *pb.Orientation) error {
+	if !chunk.GetOrientable() {
+		g.turned = nil
+		return nil
+	}
+	if chunk.GetFirstSimplex() == 0 {
+		g.turned = []byte{}
+	}
+	if g.turned == nil || chunk.GetFirstSimplex() != 8*uint64(len(g.turned)) {
+		return fmt.Errorf("the orientation of simplex %d is out of order", chunk.GetFirstSimplex())
+	}
+	g.turned = append(g.turned, chunk.GetTurned()...)
+	return nil
+}
+
+// orientPart notes which simplices of a part of a download, that change has just taken, are turned.
+func (g *growingComplex) orientPart(part *pb.DownloadMeshResponse) error {
+	width, turned := g.k+1, part.GetOrientation().GetTurned()
+	cells := g.added[len(g.added)-len(part.GetCells().GetData())/4:]
+	if !part.GetOrientation().GetOrientable() {
+		g.untold = g.untold || len(cells) > 0
+		return nil
+	}
+	if len(turned) != bytesOfBits(len(cells)/width) {
+		return fmt.Errorf("an orientation of %d bytes came with %d simplices", len(turned), len(cells)/width)
+	}
+	for s := range len(cells) / width {
+		if isSet(turned, s) {
+			g.turnedRows = append(g.turnedRows, cells[s*width:(s+1)*width]...)
+		}
+	}
+	return nil
+}
+
+// downloaded is the mesh of a download that is complete.
+func (g *growingComplex) downloaded() (*Mesh, error) {
+	if err := g.settle(); err != nil {
+		return nil, protocolError(err)
+	}
+	if !g.untold {
+		g.turned = bitsOf(g.rows, g.turnedRows, g.k+1)
+	}
+	return g.finished()
+}
+
+// finished is the mesh at its end, with its orientation.
+func (g *growingComplex) finished() (*Mesh, error) {
+	mesh, err := g.mesh()
+	if err == nil && g.turned != nil && len(g.turned) != bytesOfBits(mesh.SimplexCount()) {
+		err = protocolError(fmt.Errorf("an orientation of %d bytes came for %d simplices", len(g.turned), mesh.SimplexCount()))
+	}
+	if err != nil {
+		return nil, err
+	}
+	mesh.Turned = g.turned
+	return mesh, nil
 }
 
 // settle makes the rows current.

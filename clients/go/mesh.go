@@ -21,6 +21,7 @@ type Mesh struct {
 	Points           []float64 // [n, d]
 	Simplices        []uint32  // [m, k+1], zero-based, ascending in each row, rows in lexicographic order
 	Walls            []uint64  // [n], as bits the walls that each vertex lies on; nil without a boundary
+	Turned           []byte    // see OrientedSimplices; as the protocol has Orientation.turned
 	Revision         uint64    // one for each round that changed the mesh
 	Progress         *pb.Progress
 	Report           *pb.Report // how it ended and what is proved; nil while it grows
@@ -35,10 +36,20 @@ func (m *Mesh) SimplexCount() int { return len(m.Simplices) / (m.Dimension + 1) 
 // Certified says whether the mesh is finished and proved good.
 func (m *Mesh) Certified() bool { return m.Report.GetCertificate().GetCertified() }
 
-// OrientedSimplices are the simplices with vertices exchanged so that neighbours agree; nil if the mesh
-// is not orientable.
+// OrientedSimplices are the simplices with the last two vertices of some exchanged so that neighbours
+// agree, and normals of hypersurfaces point outwards. The server tells it of meshes that are over. nil if the
+// mesh is not orientable, and where that is not known: while it grows, and of a .txt file.
 func (m *Mesh) OrientedSimplices() []uint32 {
-	return orient(m.Simplices, m.Dimension+1, m.Points, m.AmbientDimension)
+	if m.Turned == nil {
+		return nil
+	}
+	oriented, width := slices.Clone(m.Simplices), m.Dimension+1
+	for s := range m.SimplexCount() {
+		if last := (s+1)*width - 1; isSet(m.Turned, s) {
+			oriented[last-1], oriented[last] = oriented[last], oriented[last-1]
+		}
+	}
+	return oriented
 }
 
 // Boundary are the (k-1)-faces that are in one simplex alone, [m, k], in lexicographic order; each lies on
@@ -112,7 +123,7 @@ func CheckSave(path string, k, d int) error {
 }
 
 // Save writes .txt (any k and d, exact: "k d nv ns", coordinates, ids from zero) or .obj (curves and
-// surfaces, d <= 3, oriented where that can be). The file takes its name when it is whole.
+// surfaces, d <= 3, oriented as OrientedSimplices are). The file takes its name when it is whole.
 func (m *Mesh) Save(path string) error {
 	if err := CheckSave(path, m.Dimension, m.AmbientDimension); err != nil {
 		return err

@@ -100,7 +100,11 @@ func (c *Client) follow(ctx context.Context, info *pb.Mesh, onProgress func(*pb.
 		}
 	}
 	hand := func(final *pb.Mesh) error {
-		mesh, err := growth.mesh()
+		made := growth.mesh
+		if final != nil {
+			made = growth.finished
+		}
+		mesh, err := made()
 		if err != nil {
 			return err
 		}
@@ -133,6 +137,10 @@ func (c *Client) follow(ctx context.Context, info *pb.Mesh, onProgress func(*pb.
 				if err := growth.settle(); err != nil {
 					return protocolError(err)
 				}
+			}
+		case *pb.WatchMeshResponse_Orientation:
+			if err := growth.orient(message.Orientation); err != nil {
+				return protocolError(err)
 			}
 		case *pb.WatchMeshResponse_Final:
 			note(message.Final.GetProgress())
@@ -304,6 +312,9 @@ func (c *Client) Download(ctx context.Context, name string, revision uint64) (*M
 			err = growth.change(&pb.MeshDelta{Added: part.GetCells(),
 				BoundaryVertices: part.GetBoundaryVertices(), BoundaryWalls: part.GetBoundaryWalls()})
 		}
+		if err == nil {
+			err = growth.orientPart(part)
+		}
 		if err != nil {
 			return protocolError(err)
 		}
@@ -312,7 +323,7 @@ func (c *Client) Download(ctx context.Context, name string, revision uint64) (*M
 	if err != nil {
 		return nil, err
 	}
-	mesh, err := growth.mesh()
+	mesh, err := growth.downloaded()
 	if err != nil || revision > 0 {
 		return mesh, err
 	}

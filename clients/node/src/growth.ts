@@ -1,8 +1,9 @@
 // The client's copy of a mesh that grows by deltas.
 import type { DeltaChunk__Output } from "./generated/stellate/v1/DeltaChunk.js";
 import type { MeshDelta__Output } from "./generated/stellate/v1/MeshDelta.js";
+import type { Orientation__Output } from "./generated/stellate/v1/Orientation.js";
 import { protocolError } from "./errors.js";
-import { joined, sameRow, sortedOrder, takeRows } from "./rows.js";
+import { bytesOfBits, joined, sameRow, sortedOrder, takeRows } from "./rows.js";
 import { indices, numbers } from "./wire.js";
 
 const UNSETTLED = 300_000; // vertex numbers of removed simplices at least; else half of those there
@@ -21,6 +22,7 @@ export class GrowingComplex {
   private removed: Uint32Array[] = [];
   private removedLength = 0;
   private pending: MeshDelta__Output[] = [];
+  private bits?: Uint8Array; // the orientation of the last revision; not there: not told
   private boundary: [number, number][] = []; // vertices and their walls, as bits
 
   constructor(
@@ -37,6 +39,7 @@ export class GrowingComplex {
       throw protocolError(`revision ${delta.revision} is out of order`);
     }
     this.pending.push(delta);
+    this.bits = undefined;
     if (!chunk.complete) return false;
     const whole = this.pending;
     this.pending = [];
@@ -65,6 +68,26 @@ export class GrowingComplex {
     this.removed = [];
     this.pending = [];
     this.boundary = [];
+    this.bits = undefined;
+  }
+
+  /** Takes a chunk of the orientation, which comes after the last revision. */
+  orient(chunk: Orientation__Output): void {
+    const first = chunk.firstSimplex;
+    const before = first === 0 ? new Uint8Array() : this.bits;
+    this.bits = undefined;
+    if (!chunk.orientable) return;
+    if (!before || first !== 8 * before.length) {
+      throw protocolError(`the orientation of simplex ${first} is out of order`);
+    }
+    this.bits = Buffer.concat([before, chunk.turned]);
+  }
+
+  /** A bit for each simplex, of a mesh that is over; undefined if it is not told. */
+  turned(): Uint8Array | undefined {
+    const count = this.simplices().length / (this.k + 1);
+    if (this.bits) checkBits(this.bits, count);
+    return this.bits;
   }
 
   /** [n], as bits the walls that each vertex lies on; undefined without a boundary. */
@@ -150,4 +173,10 @@ export class GrowingComplex {
     this.coordinates.set(block, begin);
     this.count = end / this.d;
   }
+}
+
+/** Throws if an orientation is not that of so many simplices. */
+export function checkBits(turned: Uint8Array, count: number): void {
+  if (turned.length === bytesOfBits(count)) return;
+  throw protocolError(`an orientation of ${turned.length} bytes came for ${count} simplices`);
 }

@@ -3,9 +3,8 @@ import { readFile, rename, writeFile } from "node:fs/promises";
 import { extname } from "node:path";
 import { general } from "./decimal.js";
 import { SaveError } from "./errors.js";
-import { orient } from "./orientation.js";
 import type { Progress, Report } from "./report.js";
-import { sameRow, sortedOrder, takeRows } from "./rows.js";
+import { isSet, sameRow, sortedOrder, takeRows } from "./rows.js";
 
 /** A simplicial k-complex in R^d. */
 export class Mesh {
@@ -26,6 +25,8 @@ export class Mesh {
     readonly report?: Report,
     /** [n], as bits the walls that each vertex lies on; not there without a boundary. */
     readonly walls?: BigUint64Array,
+    /** The protocol's Orientation.turned: see orientedSimplices(). */
+    readonly turned?: Uint8Array,
   ) {}
 
   get vertexCount(): number {
@@ -61,14 +62,25 @@ export class Mesh {
     return takeRows(faces, k, once);
   }
 
-  /** The simplices with vertices exchanged so that neighbours agree; undefined if not orientable. */
+  /**
+   * The simplices with the last two vertices of some exchanged so that neighbours agree, and the
+   * normals of a hypersurface point outwards. The server tells it of meshes that are over. Undefined if
+   * the mesh is not orientable, and where that is not known: while it grows, and of a .txt file.
+   */
   orientedSimplices(): Uint32Array | undefined {
-    return orient(this.simplices, this.dimension + 1, this.points, this.ambientDimension);
+    if (!this.turned) return undefined;
+    const oriented = this.simplices.slice();
+    for (let s = 0; s < this.simplexCount; s++) {
+      if (!isSet(this.turned, s)) continue;
+      const last = (s + 1) * (this.dimension + 1) - 1;
+      [oriented[last - 1], oriented[last]] = [oriented[last], oriented[last - 1]];
+    }
+    return oriented;
   }
 
   /**
    * Writes .txt (any k and d, exact: "k d nv ns", coordinates, ids from zero) or .obj (curves and
-   * surfaces, d <= 3, oriented where that can be). `stellate download` writes the other formats.
+   * surfaces, d <= 3, oriented as orientedSimplices() are). `stellate download` writes the other formats.
    * Throws SaveError for what the format cannot hold.
    */
   async save(path: string): Promise<void> {

@@ -32,6 +32,25 @@ export function takeRows(rows: Uint32Array, width: number, chosen: ArrayLike<num
   return taken;
 }
 
+/** How many bytes that many bits take. */
+export function bytesOfBits(count: number): number {
+  return Math.ceil(count / 8);
+}
+
+/** Whether bit i is set, eight in a byte, the first in the lowest. */
+export function isSet(bits: Uint8Array, i: number): boolean {
+  return ((bits[i >> 3] >> (i & 7)) & 1) === 1;
+}
+
+/** The bits in another order. */
+export function takeBits(bits: Uint8Array, order: Uint32Array): Uint8Array {
+  const taken = new Uint8Array(bytesOfBits(order.length));
+  order.forEach((from, to) => {
+    if (isSet(bits, from)) taken[to >> 3] |= 1 << (to & 7);
+  });
+  return taken;
+}
+
 /** One array of several. */
 export function joined(blocks: Uint32Array[]): Uint32Array {
   const all = new Uint32Array(blocks.reduce((length, block) => length + block.length, 0));

@@ -5,11 +5,12 @@ import { Client, type ClientOptions } from "./client.js";
 import { choose, finer } from "./epsilon.js";
 import { Cancelled, errorClass, FailedPrecondition, InvalidArgument } from "./errors.js";
 import { NotCertified, protocolError, StellateError } from "./errors.js";
-import { GrowingComplex } from "./growth.js";
+import type { Orientation__Output } from "./generated/stellate/v1/Orientation.js";
+import { checkBits, GrowingComplex } from "./growth.js";
 import { checkSave, Mesh } from "./mesh.js";
 import type { Oracle } from "./oracle.js";
 import { infoFrom, type MeshInfo, type Progress, progressFrom } from "./report.js";
-import { joined, sortedOrder, takeRows } from "./rows.js";
+import { bytesOfBits, isSet, joined, sortedOrder, takeBits, takeRows } from "./rows.js";
 import { Server } from "./server.js";
 import type { MeshOptions } from "./spec.js";
 import type { Worker, WorkerOptions } from "./worker.js";
@@ -153,15 +154,20 @@ async function assemble(client: Client, info: MeshInfo, wanted: number): Promise
   const { dimension: k, ambientDimension: d } = info;
   const growth = new GrowingComplex(k, d);
   const cells: Uint32Array[] = [];
+  const oriented: OrientedPart[] = [];
   let revision = 0;
   for await (const part of client.parts(info.name, wanted)) {
     revision = part.revision;
-    cells.push(indices(part.cells, -1, k + 1));
+    const block = indices(part.cells, -1, k + 1);
+    cells.push(block);
+    if (block.length) oriented.push({ count: block.length / (k + 1), told: part.orientation });
     growth.addPoints(part.firstVertex, numbers(part.points, -1, d));
     growth.addWalls(part.boundaryVertices, part.boundaryWalls);
   }
   const rows = joined(cells);
-  const sorted = takeRows(rows, k + 1, sortedOrder(rows, k + 1));
+  const order = sortedOrder(rows, k + 1);
+  const sorted = takeRows(rows, k + 1, order);
+  const bits = allBits(oriented, order.length);
   const last = info.over && revision === info.revision;
   return new Mesh(
     k,
@@ -172,7 +178,27 @@ async function assemble(client: Client, info: MeshInfo, wanted: number): Promise
     last ? info.progress : undefined,
     last ? info.report : undefined,
     growth.walls(),
+    bits && takeBits(bits, order),
   );
+}
+
+interface OrientedPart {
+  count: number; // of simplices
+  told: Orientation__Output | null;
+}
+
+/** The orientation of all parts, one after the other; undefined where one is without. */
+function allBits(parts: OrientedPart[], count: number): Uint8Array | undefined {
+  const bits = new Uint8Array(bytesOfBits(count));
+  let at = 0;
+  for (const part of parts) {
+    if (!part.told?.orientable) return undefined;
+    checkBits(part.told.turned, part.count);
+    for (let i = 0; i < part.count; i++, at++) {
+      if (isSet(part.told.turned, i)) bits[at >> 3] |= 1 << (at & 7);
+    }
+  }
+  return bits;
 }
 
 /**
@@ -202,12 +228,15 @@ export async function* follow(
       progress,
       report,
       growth.walls(),
+      report && growth.turned(),
     );
   for await (const event of stream) {
     if (event.delta) {
       if (growth.absorb(event.delta) && every) yield soFar();
     } else if (event.resetMesh) {
       growth.reset();
+    } else if (event.orientation) {
+      growth.orient(event.orientation);
     } else if (event.progress) {
       progress = progressFrom(event.progress);
       onProgress?.(progress);

@@ -22,8 +22,8 @@ module Stellate
     def reset
       @revision, @points, @pending, @simplices, @gone = 0, [], [], [], []
       @bits = WORD_BITS / (@k + 1)
-      @arrays = @arrays_of = nil
-      @walls = {}
+      @arrays = @arrays_of = @turned = nil
+      @walls, @turned_simplices = {}, []
     end
 
     # Takes one chunk; true when a revision is complete with it.
@@ -33,6 +33,7 @@ module Stellate
         raise Stellate.protocol_error("revision #{revision} is out of order")
       end
 
+      @turned = nil
       @pending << chunk.delta
       return false unless chunk.complete
 
@@ -82,6 +83,32 @@ module Stellate
       @simplices.concat(numbered(added))
     end
 
+    # Takes a chunk of the orientation, which comes after the last revision.
+    def orient(chunk)
+      return @turned = nil unless chunk.orientable
+
+      @turned = ''.b if chunk.first_simplex.zero?
+      unless @turned && chunk.first_simplex == 8 * @turned.bytesize
+        raise Stellate.protocol_error("the orientation of simplex #{chunk.first_simplex} is out of order")
+      end
+
+      @turned << chunk.turned
+    end
+
+    # Takes the simplices of a part of a download, oriented where it says so.
+    def add_cells(cells, orientation)
+      change(cells, nil)
+      count = cells ? cells.data.bytesize / (4 * (@k + 1)) : 0
+      return if count.zero?
+      return @untold = true unless orientation&.orientable
+
+      turned = orientation.turned
+      check_bits(turned, count)
+      @simplices.last(count).each_with_index do |simplex, i|
+        @turned_simplices << simplex if (turned.getbyte(i / 8) >> (i % 8)).odd?
+      end
+    end
+
     # The points and simplices of mesh(), as arrays of rows, for when nobody waits for this thread.
     def arrays
       @arrays = nil if @arrays_of != @revision
@@ -95,7 +122,29 @@ module Stellate
       Mesh.new(@k, @d, *arrays, revision, walls:, **more)
     end
 
+    # The mesh at its end, with its orientation.
+    def finished(**more)
+      check_bits(@turned, arrays[1].size) if @turned
+      mesh(turned: @turned, **more)
+    end
+
+    # The mesh of a download that is complete.
+    def downloaded(revision, **more)
+      settle.sort!
+      unless @untold
+        turned = @turned_simplices.to_h { |simplex| [simplex, 1] }
+        bits = @simplices.map { |simplex| turned.fetch(simplex, 0) }.join
+      end
+      mesh(revision, turned: bits && [bits].pack('b*'), **more)
+    end
+
     private
+
+    def check_bits(turned, count)
+      return if turned.bytesize == (count + 7) / 8
+
+      raise Stellate.protocol_error("an orientation of #{turned.bytesize} bytes came for #{count} simplices")
+    end
 
     # The simplices that are there.
     def settle
@@ -145,7 +194,8 @@ module Stellate
       wider = lambda do |row|
         row.inject { |number, id| (number << (2 * @bits)) | id }
       end
-      @simplices, @gone = [@simplices, @gone].map { |numbers| rows(numbers).map(&wider) }
+      @simplices, @gone, @turned_simplices =
+        [@simplices, @gone, @turned_simplices].map { |numbers| rows(numbers).map(&wider) }
       @bits *= 2
     end
   end

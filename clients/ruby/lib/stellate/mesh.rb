@@ -3,15 +3,15 @@
 module Stellate
   # A simplicial k-complex in R^d. `points` and `simplices` are arrays of rows; ids count from zero,
   # ascend in each row, and rows are in lexicographic order. `walls` are, as bits, those that each vertex lies
-  # on; nil without a boundary.
+  # on; nil without a boundary. `turned` is the protocol's Orientation.turned: see oriented_simplices.
   class Mesh
-    attr_reader :dimension, :ambient_dimension, :points, :simplices, :revision, :progress, :report, :walls
+    attr_reader :dimension, :ambient_dimension, :points, :simplices, :revision, :progress, :report, :walls, :turned
     # What a mesh that is over was made with, and why it is that where 'auto' chose it, else ''; nil of others.
     attr_accessor :epsilon, :epsilon_reason
 
-    def initialize(k, d, points, simplices, revision, progress: nil, report: nil, walls: nil)
+    def initialize(k, d, points, simplices, revision, progress: nil, report: nil, walls: nil, turned: nil)
       @dimension, @ambient_dimension, @points, @simplices = k, d, points, simplices
-      @revision, @progress, @report, @walls = revision, progress, report, walls
+      @revision, @progress, @report, @walls, @turned = revision, progress, report, walls, turned
     end
 
     # Reads the .txt format back, to the last bit.
@@ -44,8 +44,8 @@ module Stellate
       raise SaveError.new("#{path} has to end in .txt or .obj; stellate download writes others", reason: 'FORMAT')
     end
 
-    # Writes .txt (any k and d, exact: "k d nv ns", coordinates, ids from zero) or .obj (oriented where
-    # that can be). The file takes its name when it is whole.
+    # Writes .txt (any k and d, exact: "k d nv ns", coordinates, ids from zero) or .obj (oriented as
+    # oriented_simplices are). The file takes its name when it is whole.
     def save(path)
       Mesh.check_save(path, dimension, ambient_dimension)
       text = path.end_with?('.txt') ? to_txt : to_obj
@@ -53,71 +53,18 @@ module Stellate
       File.rename("#{path}.part", path)
     end
 
-    # The simplices with their last two vertices exchanged where it takes that for neighbours to agree;
-    # nil if the mesh is not orientable. A hypersurface has its normals outwards.
+    # The simplices with the last two vertices of some exchanged so that neighbours agree, and the normals of a
+    # hypersurface point outwards. The server tells it of meshes that are over. nil if the mesh is not
+    # orientable, and where that is not known: while it grows, and of a .txt file.
     def oriented_simplices
-      facets = facet_owners
-      return if facets.each_value.any? { |owners| owners.size > 2 }
+      return unless turned
 
-      turned = Array.new(simplices.size)
-      oriented = simplices.map(&:dup)
-      simplices.each_index do |start|
-        next if turned[start]
-
-        component = flood(start, turned, facets)
-        return nil if component.nil?
-
-        component.each { |s| oriented[s].push(oriented[s].pop, oriented[s].pop) if turned[s].negative? }
-        turn_outwards(oriented, component) if dimension == ambient_dimension - 1
+      simplices.each_with_index.map do |row, i|
+        (turned.getbyte(i / 8) >> (i % 8)).odd? ? [*row[...-2], row[-1], row[-2]] : row
       end
-      oriented
     end
 
     private
-
-    def facet_owners
-      owners = Hash.new { |hash, facet| hash[facet] = [] }
-      simplices.each_with_index do |row, s|
-        row.each_index { |i| owners[row[0, i] + row[(i + 1)..]] << [s, i] }
-      end
-      owners
-    end
-
-    # The component of a simplex, its signs set in `turned`; nil if they contradict each other.
-    def flood(start, turned, facets)
-      turned[start] = 1
-      component = [start]
-      component.each do |s|
-        row = simplices[s]
-        row.each_index do |i|
-          facets[row[0, i] + row[(i + 1)..]].each do |other, j|
-            next if other == s
-
-            wanted = (i - j).even? ? -turned[s] : turned[s]
-            return nil if turned[other] == -wanted
-            next if turned[other]
-
-            turned[other] = wanted
-            component << other
-          end
-        end
-      end
-      component
-    end
-
-    def turn_outwards(oriented, component)
-      volume = component.sum { |s| determinant(oriented[s].map { |id| points[id] }) }
-      component.each { |s| oriented[s].push(oriented[s].pop, oriented[s].pop) } if volume.negative?
-    end
-
-    def determinant(rows)
-      return rows[0][0] if rows.size == 1
-
-      rows.each_index.sum do |i|
-        minor = (rows[0, i] + rows[(i + 1)..]).map { |row| row[1..] }
-        (i.even? ? 1 : -1) * rows[i][0] * determinant(minor)
-      end
-    end
 
     def lines(rows, format)
       rows.map { |row| format(format, *row) }

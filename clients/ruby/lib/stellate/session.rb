@@ -79,11 +79,11 @@ module Stellate
         request.revision, request.position = part.revision, part.next_position
         growth.add_points(part.first_vertex, part.points)
         growth.add_walls(part.boundary_vertices, part.boundary_walls)
-        growth.change(part.cells, nil)
+        growth.add_cells(part.cells, part.orientation)
         :last if part.complete
       end
       more = revision.zero? ? { progress: info.progress, report: info.report } : {}
-      growth.mesh(request.revision, **more)
+      growth.downloaded(request.revision, **more)
     end
 
     # Yields a mesh at every revision and at its end. Raises how it failed.
@@ -100,6 +100,8 @@ module Stellate
         when :reset_mesh
           growth.reset
           request.from_revision = 0
+        when :orientation
+          growth.orient(event.orientation)
         when :progress
           progress = event.progress
           on_progress&.call(progress)
@@ -107,7 +109,7 @@ module Stellate
         when :final
           final = event.final
           on_progress&.call(final.progress) if final.progress
-          yield judged(growth.mesh(progress: final.progress, report: final.report), final)
+          yield judged(growth.finished(progress: final.progress, report: final.report), final)
           next :last
         end
       end

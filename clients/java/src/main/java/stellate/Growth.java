@@ -1,10 +1,12 @@
 package stellate;
 
+import com.google.protobuf.ByteString;
 import java.util.ArrayList;
 import java.util.Arrays;
 import java.util.List;
 import stellate.v1.DeltaChunk;
 import stellate.v1.MeshDelta;
+import stellate.v1.Orientation;
 
 /**
  * The client's copy of a mesh that grows by deltas: vertices and simplices as of the last complete
@@ -25,6 +27,9 @@ public final class Growth {
   private final List<int[]> removed = new ArrayList<>();
   private int removedLength;
   private final List<MeshDelta> pending = new ArrayList<>();
+  private ByteString turned; // the orientation of the last revision; null: not told
+  private final List<int[]> turnedRows = new ArrayList<>(); // of a download
+  private boolean untold; // a part of the download was not oriented
 
   /** The empty k-complex in R^d. */
   public Growth(int k, int d) {
@@ -38,6 +43,7 @@ public final class Growth {
     if (next <= revision || (!pending.isEmpty() && pending.get(0).getRevision() != next)) {
       throw StellateException.protocol("revision " + next + " is out of order");
     }
+    turned = null;
     pending.add(chunk.getDelta());
     if (!chunk.getComplete()) {
       return false;
@@ -55,6 +61,60 @@ public final class Growth {
     return true;
   }
 
+  /** Takes a chunk of the orientation, which comes after the last revision. */
+  public void orient(Orientation chunk) {
+    ByteString before = chunk.getFirstSimplex() == 0 ? ByteString.EMPTY : turned;
+    turned = null;
+    if (!chunk.getOrientable()) {
+      return;
+    }
+    if (before == null || chunk.getFirstSimplex() != 8L * before.size()) {
+      throw StellateException.protocol(
+          "the orientation of simplex " + chunk.getFirstSimplex() + " is out of order");
+    }
+    turned = before.concat(chunk.getTurned());
+  }
+
+  /** Notes which of the simplices that change() has just taken are turned. */
+  void orientPart(Orientation told) {
+    int[] cells = added.get(added.size() - 1);
+    if (!told.getOrientable()) {
+      untold |= cells.length > 0;
+      return;
+    }
+    int width = k + 1;
+    checkBits(told.getTurned(), cells.length / width);
+    byte[] bits = told.getTurned().toByteArray();
+    for (int s = 0; s < cells.length / width; s++) {
+      if (Rows.isSet(bits, s)) {
+        turnedRows.add(Arrays.copyOfRange(cells, s * width, (s + 1) * width));
+      }
+    }
+  }
+
+  private static void checkBits(ByteString bits, int count) {
+    if (bits.size() != Rows.bytesOfBits(count)) {
+      throw StellateException.protocol(
+          "an orientation of %d bytes came for %d simplices".formatted(bits.size(), count));
+    }
+  }
+
+  /** The mesh at its end, with its orientation. */
+  public Mesh finished() {
+    settle();
+    if (turned != null) {
+      checkBits(turned, rows.length / (k + 1));
+    }
+    return mesh(turned == null ? null : turned.toByteArray());
+  }
+
+  /** The mesh of a download that is complete. */
+  Mesh downloaded() {
+    settle();
+    int[] chosen = turnedRows.stream().flatMapToInt(Arrays::stream).toArray();
+    return mesh(untold ? null : Rows.bitsOf(rows, chosen, k + 1));
+  }
+
   /** Drops the chunks of a revision that was cut short: it will be sent again. */
   public void forgetPending() {
     pending.clear();
@@ -67,6 +127,7 @@ public final class Growth {
     removedLength = 0;
     coordinates = new double[1024];
     walls = null;
+    turned = null;
     rows = new int[0];
     added.clear();
     removed.clear();
@@ -176,8 +237,12 @@ public final class Growth {
   /** The mesh as of the last complete revision. */
   public Mesh mesh() {
     settle();
+    return mesh(null);
+  }
+
+  private Mesh mesh(byte[] orientation) {
     long[] bits = walls == null ? null : Arrays.copyOf(walls, count);
     double[] points = Arrays.copyOf(coordinates, count * d);
-    return new Mesh(k, d, points, rows, bits, revision, null, null);
+    return new Mesh(k, d, points, rows, bits, revision, null, null, orientation);
   }
 }

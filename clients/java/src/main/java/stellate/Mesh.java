@@ -35,6 +35,7 @@ public final class Mesh {
 
   private final Progress progress;
   private final Report report;
+  private final byte[] turned; // the protocol's Orientation.turned; null: see orientedSimplices()
 
   Mesh(
       int k,
@@ -44,7 +45,8 @@ public final class Mesh {
       long[] walls,
       long revision,
       Progress now,
-      Report end) {
+      Report end,
+      byte[] turned) {
     this.dimension = k;
     this.ambientDimension = d;
     this.points = points;
@@ -53,10 +55,12 @@ public final class Mesh {
     this.revision = revision;
     this.progress = now;
     this.report = end;
+    this.turned = turned;
   }
 
   Mesh with(Progress now, Report end) {
-    return new Mesh(dimension, ambientDimension, points, simplices, walls, revision, now, end);
+    return new Mesh(
+        dimension, ambientDimension, points, simplices, walls, revision, now, end, turned);
   }
 
   /** n */
@@ -117,9 +121,24 @@ public final class Mesh {
     return report != null && report.getCertificate().getCertified();
   }
 
-  /** The simplices with vertices exchanged so that neighbours agree; empty if not orientable. */
+  /**
+   * The simplices with the last two vertices of some exchanged so that neighbours agree, and the
+   * normals of a hypersurface point outwards. The server tells it of meshes that are over. Empty if
+   * the mesh is not orientable, and where that is not known: while it grows, and of a .txt file.
+   */
   public Optional<int[]> orientedSimplices() {
-    return Orientation.orient(simplices, dimension + 1, points, ambientDimension);
+    if (turned == null) {
+      return Optional.empty();
+    }
+    int[] oriented = simplices.clone();
+    for (int s = 0; s < simplexCount(); s++) {
+      if (Rows.isSet(turned, s)) {
+        int last = (s + 1) * (dimension + 1) - 1;
+        oriented[last] = simplices[last - 1];
+        oriented[last - 1] = simplices[last];
+      }
+    }
+    return Optional.of(oriented);
   }
 
   /** Reads the .txt format back, to the last bit. */
@@ -135,7 +154,7 @@ public final class Mesh {
     }
     double[] points = Arrays.stream(words, 4, end).mapToDouble(Double::parseDouble).toArray();
     int[] rows = Arrays.stream(words, end, words.length).mapToInt(Integer::parseInt).toArray();
-    return new Mesh(head[0], head[1], points, rows, null, 0, null, null);
+    return new Mesh(head[0], head[1], points, rows, null, 0, null, null, null);
   }
 
   /** Throws a StellateException of kind SAVE if a mesh of that kind cannot have the name. */
@@ -154,7 +173,8 @@ public final class Mesh {
 
   /**
    * Writes .txt (any k and d, exact: "k d nv ns", coordinates, ids from zero) or .obj (curves and
-   * surfaces, d at most 3, oriented where that can be). The file takes its name when it is whole.
+   * surfaces, d at most 3, oriented as orientedSimplices() are). The file takes its name when it is
+   * whole.
    */
   public void save(Path path) throws IOException {
     checkSave(path, dimension, ambientDimension);

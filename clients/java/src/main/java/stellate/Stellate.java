@@ -90,10 +90,11 @@ public final class Stellate {
                     .addAllBoundaryVertices(part.getBoundaryVerticesList())
                     .addAllBoundaryWalls(part.getBoundaryWallsList())
                     .build());
+            growth.orientPart(part.getOrientation());
             return part.getComplete();
           });
     }
-    Mesh mesh = growth.mesh();
+    Mesh mesh = growth.downloaded();
     return revision > 0 ? mesh : judged(mesh.with(info.getProgress(), info.getReport()), info);
   }
 
@@ -123,6 +124,7 @@ public final class Stellate {
               growth.reset();
               request.setFromRevision(0);
             }
+            case ORIENTATION -> growth.orient(event.getOrientation());
             case PROGRESS -> {
               progress.set(event.getProgress());
               onProgress.accept(event.getProgress());
@@ -133,7 +135,7 @@ public final class Stellate {
             case FINAL -> {
               stellate.v1.Mesh end = event.getFinal();
               onProgress.accept(end.getProgress());
-              each.test(judged(growth.mesh().with(end.getProgress(), end.getReport()), end));
+              each.test(judged(growth.finished().with(end.getProgress(), end.getReport()), end));
               return true;
             }
             default -> {} // of a newer server
