@@ -194,7 +194,7 @@ async fn follow(
                 each(judge(mesh, &last)?);
                 return Ok(true);
             }
-            None => {} // of a newer server
+            Some(Event::Orientation(_)) | None => {} // worked out here; of a newer server
         }
         Ok(false)
     });
