@@ -1,8 +1,8 @@
 //! The client's copy of a mesh that grows by deltas.
 
 use crate::error::Error;
-use crate::proto::{DeltaChunk, MeshDelta};
-use crate::rows::{row_at, sorted_order};
+use crate::proto::{DeltaChunk, MeshDelta, Orientation};
+use crate::rows::{bits_of, bytes_of_bits, is_set, row_at, sorted_order};
 use crate::wire::{indices, numbers};
 use crate::Mesh;
 
@@ -21,6 +21,9 @@ pub struct GrowingComplex {
     added: Vec<u32>,
     removed: Vec<u32>,
     pending: Vec<MeshDelta>,
+    turned: Option<Vec<u8>>, // of the last revision; None: not told
+    turned_rows: Vec<u32>,   // of a download
+    untold: bool,            // a part of the download was not oriented
 }
 
 impl GrowingComplex {
@@ -37,6 +40,9 @@ impl GrowingComplex {
             added: empty(),
             removed: empty(),
             pending: Vec::new(),
+            turned: None,
+            turned_rows: Vec::new(),
+            untold: false,
         }
     }
 
@@ -48,6 +54,7 @@ impl GrowingComplex {
         if revision <= self.revision || begun != revision {
             return Err(Error::protocol(format!("revision {revision} is out of order")));
         }
+        self.turned = None;
         self.pending.push(delta);
         if !chunk.complete {
             return Ok(false);
@@ -65,6 +72,65 @@ impl GrowingComplex {
             self.settle()?;
         }
         Ok(true)
+    }
+
+    /// Takes a chunk of the orientation, which comes after the last revision.
+    pub fn orient(&mut self, chunk: Orientation) -> Result<(), Error> {
+        let before = if chunk.first_simplex == 0 { Some(Vec::new()) } else { self.turned.take() };
+        self.turned = None;
+        if !chunk.orientable {
+            return Ok(());
+        }
+        match before {
+            Some(mut turned) if chunk.first_simplex == 8 * turned.len() as u64 => {
+                turned.extend(chunk.turned);
+                self.turned = Some(turned);
+                Ok(())
+            }
+            _ => {
+                let what = format!("the orientation of simplex {} is out of order", chunk.first_simplex);
+                Err(Error::protocol(what))
+            }
+        }
+    }
+
+    /// Notes which of the simplices that `change` has just taken are turned.
+    pub(crate) fn orient_part(
+        &mut self,
+        cells: usize,
+        orientation: Option<Orientation>,
+    ) -> Result<(), Error> {
+        let Some(told) = orientation.filter(|told| told.orientable) else {
+            self.untold |= cells > 0;
+            return Ok(());
+        };
+        check_bits(&told.turned, cells)?;
+        let width = self.k + 1;
+        let rows = &self.added[self.added.len() - cells * width..];
+        for (s, row) in rows.chunks_exact(width).enumerate() {
+            if is_set(&told.turned, s) {
+                self.turned_rows.extend_from_slice(row);
+            }
+        }
+        Ok(())
+    }
+
+    /// The mesh at its end, with its orientation.
+    pub fn finished(&mut self) -> Result<Mesh, Error> {
+        let mesh = self.mesh()?;
+        if let Some(turned) = &self.turned {
+            check_bits(turned, mesh.simplex_count())?;
+        }
+        Ok(Mesh { turned: self.turned.clone(), ..mesh })
+    }
+
+    /// The mesh of a download that is complete.
+    pub(crate) fn downloaded(&mut self) -> Result<Mesh, Error> {
+        self.settle()?;
+        if !self.untold {
+            self.turned = Some(bits_of(&self.rows, &self.turned_rows, self.k + 1));
+        }
+        self.finished()
     }
 
     /// Drops the chunks of a revision that was cut short: it will be sent again.
@@ -150,6 +216,7 @@ impl GrowingComplex {
             points: self.coordinates.clone(),
             simplices: self.rows.clone(),
             walls,
+            turned: None,
             revision: self.revision,
             progress: None,
             report: None,
@@ -164,4 +231,11 @@ impl GrowingComplex {
     pub(crate) fn set_revision(&mut self, revision: u64) {
         self.revision = revision;
     }
+}
+
+fn check_bits(turned: &[u8], count: usize) -> Result<(), Error> {
+    if turned.len() == bytes_of_bits(count) {
+        return Ok(());
+    }
+    Err(Error::protocol(format!("an orientation of {} bytes came for {count} simplices", turned.len())))
 }

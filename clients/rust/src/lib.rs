@@ -18,7 +18,6 @@ pub mod manifolds;
 mod mesh;
 mod options;
 mod oracle;
-mod orientation;
 mod progress;
 mod retry;
 mod rows;

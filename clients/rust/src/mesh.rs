@@ -6,9 +6,8 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use crate::error::{Error, Kind};
-use crate::orientation::orient;
 use crate::proto::{Progress, Report};
-use crate::rows::{row_at, sorted_order};
+use crate::rows::{is_set, row_at, sorted_order};
 
 /// A simplicial k-complex in R^d.
 #[derive(Clone, Debug)]
@@ -23,6 +22,8 @@ pub struct Mesh {
     pub simplices: Vec<u32>,
     /// `[n]`, as bits the walls that each vertex lies on; empty without a boundary.
     pub walls: Vec<u64>,
+    /// The protocol's `Orientation.turned`: see [`Mesh::oriented_simplices`].
+    pub turned: Option<Vec<u8>>,
     /// One for each round that changed the mesh.
     pub revision: u64,
     /// How it stood at this revision.
@@ -54,6 +55,7 @@ impl Mesh {
             points,
             simplices: rows,
             walls: Vec::new(),
+            turned: None,
             revision: 0,
             progress: None,
             report: None,
@@ -93,13 +95,22 @@ impl Mesh {
         once.flat_map(|face| row_at(&faces, k, face[0])).copied().collect()
     }
 
-    /// The simplices with vertices exchanged so that neighbours agree; None if not orientable.
+    /// The simplices with the last two vertices of some exchanged so that neighbours agree, and the
+    /// normals of a hypersurface point outwards. The server tells it of meshes that are over. None if the
+    /// mesh is not orientable, and where that is not known: while it grows, and of a .txt file.
     pub fn oriented_simplices(&self) -> Option<Vec<u32>> {
-        orient(&self.simplices, self.dimension + 1, &self.points, self.ambient_dimension)
+        let turned = self.turned.as_ref()?;
+        let mut oriented = self.simplices.clone();
+        for (s, row) in oriented.chunks_exact_mut(self.dimension + 1).enumerate() {
+            if is_set(turned, s) {
+                row.swap(self.dimension - 1, self.dimension);
+            }
+        }
+        Some(oriented)
     }
 
     /// Writes .txt (any k and d, exact: "k d nv ns", coordinates, ids from zero) or .obj (curves and
-    /// surfaces, d <= 3, oriented where that can be). `stellate download` writes the other formats.
+    /// surfaces, d <= 3, oriented as `oriented_simplices` are). `stellate download` writes the other formats.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         let path = path.as_ref();
         check_save(path, self.dimension, self.ambient_dimension)?;

@@ -129,16 +129,19 @@ async fn assemble(client: &Client, info: &MeshInfo, revision: u64) -> Result<Mes
             growth.set_revision(part.revision);
             let points = crate::wire::numbers(part.points.as_ref(), &[-1, d]);
             growth.add_points(part.first_vertex, &points.map_err(Error::protocol)?)?;
+            let extents = part.cells.as_ref().and_then(|cells| cells.shape.first());
+            let cells = extents.map_or(0, |&rows| rows as usize);
             growth.change(&MeshDelta {
                 added: part.cells,
                 boundary_vertices: part.boundary_vertices,
                 boundary_walls: part.boundary_walls,
                 ..Default::default()
             })?;
+            growth.orient_part(cells, part.orientation)?;
             Ok(part.complete)
         })
         .await?;
-    growth.mesh()
+    growth.downloaded()
 }
 
 /// Hands on a mesh at every revision and at its end. An error is how it failed.
@@ -182,6 +185,7 @@ async fn follow(
                 growth.reset();
                 lock().from_revision = 0;
             }
+            Some(Event::Orientation(chunk)) => growth.orient(chunk)?,
             Some(Event::Progress(now)) => {
                 progress = note(now);
                 if now.phase() == Phase::Certifying {
@@ -190,7 +194,7 @@ async fn follow(
             }
             Some(Event::Final(last)) => {
                 progress = last.progress.and_then(&mut note);
-                let mesh = Mesh { progress, report: last.report.clone(), ..growth.mesh()? };
+                let mesh = Mesh { progress, report: last.report.clone(), ..growth.finished()? };
                 each(judge(mesh, &last)?);
                 return Ok(true);
             }
