@@ -198,7 +198,7 @@ async fn follow(
                 each(judge(mesh, &last)?);
                 return Ok(true);
             }
-            Some(Event::Orientation(_)) | None => {} // worked out here; of a newer server
+            None => {} // of a newer server
         }
         Ok(false)
     });
